@@ -1,0 +1,78 @@
+"""The one decorator for all kernels, and where their compiled code is kept.
+
+Numba's disk cache compares only the file in which a function stands. A kernel
+that calls a kernel of *another* file would therefore go on using the old
+machine code after that other file was edited. Here the cache lives in a folder
+named after the content of all kernel sources together, so that an edit
+anywhere among them starts a fresh cache.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import tempfile
+from contextlib import contextmanager
+from functools import cache
+from pathlib import Path
+
+import numba
+from numba.core import config
+
+
+def _user_cache_root() -> Path:
+    """`NUMBA_CACHE_DIR` if the user set one, else the user's cache folder, else a temporary one."""
+    if config.CACHE_DIR:
+        return Path(config.CACHE_DIR)
+    if os.name == "nt":
+        base = Path(os.environ.get("LOCALAPPDATA", Path.home()))
+    else:
+        base = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
+    root = base / "rigid-env"
+    try:
+        root.mkdir(parents=True, exist_ok=True)
+        if os.access(root, os.W_OK):
+            return root
+    except OSError:
+        pass
+    return Path(tempfile.gettempdir()) / "rigid-env"
+
+
+def source_digest(folder: Path) -> str:
+    """Hexadecimal digest of every Python source under `folder`, names included."""
+    digest = hashlib.sha256()
+    for path in sorted(folder.rglob("*.py")):
+        digest.update(path.relative_to(folder).as_posix().encode())
+        digest.update(path.read_bytes())
+    return digest.hexdigest()[:16]
+
+
+@cache
+def cache_dir() -> Path:
+    """Folder of the compiled kernels that belong to exactly these kernel sources."""
+    return _user_cache_root() / source_digest(Path(__file__).parent)
+
+
+@contextmanager
+def _numba_cache_in(folder: Path):
+    before = config.CACHE_DIR
+    config.CACHE_DIR = str(folder)
+    try:
+        yield
+    finally:
+        config.CACHE_DIR = before
+
+
+def kernel(function):
+    """Compile `function` in nopython mode; cached on disk, IEEE semantics, the GIL released.
+
+    `error_model="numpy"` makes a division by zero an inf and not an exception
+    (no exception path inside a kernel); there is no `fastmath`, so results do
+    not depend on how the optimiser reorders a sum.
+
+    Switches among the arguments are passed as ``None`` (off) or ``True`` (on):
+    Numba prunes a branch on ``x is None`` while compiling, in every callee, so
+    that what is off is not in the machine code at all.
+    """
+    with _numba_cache_in(cache_dir()):
+        return numba.njit(cache=True, error_model="numpy", nogil=True)(function)
