@@ -63,6 +63,11 @@ def _numba_cache_in(folder: Path):
         config.CACHE_DIR = before
 
 
+def _compile(function, **options):
+    with _numba_cache_in(cache_dir()):
+        return numba.njit(cache=True, error_model="numpy", nogil=True, **options)(function)
+
+
 def kernel(function):
     """Compile `function` in nopython mode; cached on disk, IEEE semantics, the GIL released.
 
@@ -74,5 +79,9 @@ def kernel(function):
     Numba prunes a branch on ``x is None`` while compiling, in every callee, so
     that what is off is not in the machine code at all.
     """
-    with _numba_cache_in(cache_dir()):
-        return numba.njit(cache=True, error_model="numpy", nogil=True)(function)
+    return _compile(function)
+
+
+def inlined(function):
+    """`kernel` for what is a few instructions long, or is called from one place: no call is left of it."""
+    return _compile(function, forceinline=True)

@@ -1,0 +1,225 @@
+"""The contact set of one body: which features take part, where they are, what velocity is asked of them."""
+
+from __future__ import annotations
+
+from physics.kernels import geometry as geo
+from physics.kernels import quaternion as qt
+from physics.kernels.compiler import inlined, kernel
+from physics.kernels.layout import BLOCK, NORMAL, OFFSET, VERTEX_COUNT
+
+# Share of a resting contact's gap that a step closes. In the linear iteration of gap and velocity over steps,
+# λ² - (1 - β/2) λ + β/2 = 0, the root is double (fastest approach without overshoot) for β = 6 - 4√2.
+CLOSING_SHARE = 0.3431457505076198
+
+
+@inlined
+def wall_normal(walls, k):
+    """Unit normal of wall k."""
+    return (walls[k, NORMAL], walls[k, NORMAL + 1], walls[k, NORMAL + 2])
+
+
+@inlined
+def is_clear(x, v, h, work):
+    """Whether the bounding sphere stays clear of every wall during a free flight of h from x with velocity v.
+
+    The gap of the sphere is a parabola in time; it is bounded below by its start plus what the velocity and
+    the acceleration can each take off. A contact could only matter when this is false.
+    """
+    walls, a = work.walls, work.free_acceleration
+    half = 0.5 * h * h
+    for k in range(walls.shape[0]):
+        n = wall_normal(walls, k)
+        gap = qt.dot(n, x) - walls[k, OFFSET] - work.radius
+        gap += min(0.0, h * qt.dot(n, v)) + min(0.0, half * (n[0] * a[0] + n[1] * a[1] + n[2] * a[2]))
+        if not gap > 0.0:
+            return False
+    return True
+
+
+@inlined
+def _admit(gap, speed, slop, margin, reach, acceleration, h, is_last):
+    """Whether a feature belongs to the contact set of this stage.
+
+    It does when it touches (gap <= slop); when it is so near and so slow that the step's own acceleration
+    could bring it to the wall (it then rests, and restitution would not act); and, in the last stage that a
+    substep may have, when it would pass through the wall before the substep ends.
+    """
+    if gap <= slop:
+        return True
+    if is_last and gap + h * speed - reach <= slop:
+        return True
+    return gap <= margin and speed >= -acceleration * h and speed <= 0.0
+
+
+@kernel
+def gather(x, R, v, w, h, is_last, work):
+    """Fill `work` (slot, gap, speed, mask) with the contact set at this pose.
+
+    Parameters
+    ----------
+    x, v, w : tuples of 3 floats
+        Position, velocity, angular velocity, world frame [m, m/s, rad/s].
+    R : tuple of 9 floats
+        Body frame to world.
+    h : float
+        Time that the stage is to cover [s].
+    is_last : bool
+        Take everything in that would pass through a wall within h.
+
+    Returns
+    -------
+    count : int
+        Contacts found.
+    depth : float
+        Deepest penetration among them [m], 0 if none.
+    """
+    walls, features, shape, radius = work.walls, work.features, work.shape, work.radius
+    slop, acceleration = work.slop, work.acceleration
+    dims = (work.dims[0], work.dims[1], work.dims[2])
+    reach = 0.5 * acceleration * h * h
+    margin = slop + reach
+    count = 0
+    depth = 0.0
+    for k in range(walls.shape[0]):
+        work.mask[k] = 0
+        n = wall_normal(walls, k)
+        d = qt.dot(n, x) - walls[k, OFFSET]
+        near = margin
+        if is_last:
+            near += h * (abs(v[0]) + abs(v[1]) + abs(v[2]) + radius * (abs(w[0]) + abs(w[1]) + abs(w[2])))
+        if d > radius + near:
+            continue
+        e = geo.scaled_normal(shape, dims, R, n)
+        if d - geo.support(shape, dims, e) > near:
+            continue
+        vn = qt.dot(n, v)
+        m = qt.cross(n, w)  # n·(ω x r) = (n x ω)·r
+        if shape == BLOCK:
+            mb = qt.transposed_matvec(R, m)
+            em = (dims[0] * mb[0], dims[1] * mb[1], dims[2] * mb[2])
+            for vertex in range(VERTEX_COUNT):
+                gap = d + geo.vertex_height(e, vertex)
+                if gap > near:
+                    continue
+                speed = vn + geo.vertex_height(em, vertex)
+                if _admit(gap, speed, slop, margin, reach, acceleration, h, is_last):
+                    count = _record(count, k, vertex, features, gap, speed, work)
+                    depth = max(depth, -gap)
+        else:
+            gap = d - geo.support(shape, dims, e)
+            speed = vn + qt.dot(m, geo.support_arm(shape, dims, R, n, e))
+            if _admit(gap, speed, slop, margin, reach, acceleration, h, is_last):
+                count = _record(count, k, 0, features, gap, speed, work)
+                depth = max(depth, -gap)
+    return count, depth
+
+
+@inlined
+def _record(count, wall, feature, features, gap, speed, work):
+    work.slot[count] = wall * features + feature
+    work.gap[count] = gap
+    work.speed[count] = speed
+    work.mask[wall] |= 1 << feature
+    return count + 1
+
+
+@kernel
+def nearest_outside_set(x, R, work):
+    """Smallest gap [m] over all features that are not in the contact set (`work.mask`)."""
+    walls, shape, radius = work.walls, work.shape, work.radius
+    dims = (work.dims[0], work.dims[1], work.dims[2])
+    best = 1.0e300
+    for k in range(walls.shape[0]):
+        n = wall_normal(walls, k)
+        d = qt.dot(n, x) - walls[k, OFFSET]
+        if d - radius >= best or d > radius:
+            continue
+        e = geo.scaled_normal(shape, dims, R, n)
+        mask = work.mask[k]
+        if mask == 0:
+            best = min(best, d - geo.support(shape, dims, e))
+        elif shape == BLOCK:
+            for vertex in range(VERTEX_COUNT):
+                if not mask & (1 << vertex):
+                    best = min(best, d + geo.vertex_height(e, vertex))
+    return best
+
+
+@inlined
+def place_arms(n, R, work):
+    """Contact points of the set at this pose: `work.arm`, relative to the centre of mass, world frame [m]."""
+    walls, features, shape = work.walls, work.features, work.shape
+    dims = (work.dims[0], work.dims[1], work.dims[2])
+    for i in range(n):
+        wall = work.slot[i] // features
+        if shape == BLOCK:
+            r = geo.vertex_arm(dims, R, work.slot[i] % features)
+        else:
+            normal = wall_normal(walls, wall)
+            r = geo.support_arm(shape, dims, R, normal, geo.scaled_normal(shape, dims, R, normal))
+        work.arm[i, 0], work.arm[i, 1], work.arm[i, 2] = r
+
+
+@inlined
+def aim_impact(n, bounce_speed, slop_speed, work):
+    """Targets of an impact, and whether there is one.
+
+    A contact that approaches faster than `bounce_speed` leaves with e times that speed (Newton's law); one that
+    approaches slower is brought to rest, since its rebound would be over within the step. Approach slower than
+    `slop_speed` closes less than the slop within the step and is left to the resting stage.
+    """
+    is_impact = False
+    for i in range(n):
+        s = -work.speed[i]
+        goal = 0.0
+        if s > slop_speed:
+            is_impact = True
+            if s > bounce_speed:
+                goal = work.restitution * s
+        work.target[i, 0] = goal
+        work.target[i, 1] = 0.0
+        work.target[i, 2] = 0.0
+    return is_impact
+
+
+@inlined
+def aim_rest(n, w, h, is_last, work):
+    """Targets of the resting stage over h.
+
+    The impulses act at the middle of the step, the velocity is asked for at its end, half a step later: a
+    vertex that the body turns about has by then gained h/2 ω x (ω x r), so that is taken off. A feature still
+    above the wall may close `CLOSING_SHARE` of its gap (all of it in a substep's last stage).
+    """
+    walls, features, shape, slop = work.walls, work.features, work.shape, work.slop
+    half = 0.5 * h
+    is_turning = (w[0] != 0.0 or w[1] != 0.0 or w[2] != 0.0) and shape == BLOCK
+    share = 1.0 if is_last else CLOSING_SHARE
+    for i in range(n):
+        t0 = t1 = t2 = 0.0
+        if is_turning:
+            r = (work.arm[i, 0], work.arm[i, 1], work.arm[i, 2])
+            c = qt.cross(w, qt.cross(w, r))
+            k = work.slot[i] // features
+            t0 = -half * (c[0] * walls[k, 0] + c[1] * walls[k, 1] + c[2] * walls[k, 2])
+            t1 = -half * (c[0] * walls[k, 3] + c[1] * walls[k, 4] + c[2] * walls[k, 5])
+            t2 = -half * (c[0] * walls[k, 6] + c[1] * walls[k, 7] + c[2] * walls[k, 8])
+        if work.gap[i] > slop:
+            t0 -= share * work.gap[i] / h
+        work.target[i, 0], work.target[i, 1], work.target[i, 2] = t0, t1, t2
+
+
+@inlined
+def push_out(x, R, work):
+    """Position moved along the normals so that nothing is deeper than the slop in a wall. No velocity changes."""
+    walls, shape, radius, slop = work.walls, work.shape, work.radius, work.slop
+    dims = (work.dims[0], work.dims[1], work.dims[2])
+    for k in range(walls.shape[0]):
+        n = wall_normal(walls, k)
+        d = qt.dot(n, x) - walls[k, OFFSET]
+        if d >= radius:
+            continue
+        gap = d - geo.support(shape, dims, geo.scaled_normal(shape, dims, R, n))
+        if gap < -slop:
+            s = -gap - 0.5 * slop
+            x = (x[0] + s * n[0], x[1] + s * n[1], x[2] + s * n[2])
+    return x

@@ -1,0 +1,56 @@
+"""Where each number of a body stands: columns of the arrays that the kernels share.
+
+One row per (world, body), contiguous, so that a step reads what it needs from
+two or three cache lines. `i` is always the flat index world * body_count + body.
+"""
+
+from __future__ import annotations
+
+from physics.kernels.rotation import SERIES_SIZE
+
+# --- state (rows, STATE_SIZE): what evolves -------------------------------------------------------------------
+POS = 0  # position of the centre of mass, world frame [m]
+QUAT = 3  # unit quaternion (w, x, y, z), body to world
+LINVEL = 7  # linear velocity, world frame [m/s]
+ANGMOM = 10  # angular momentum about the centre of mass, world frame [kg m²/s]
+ANGVEL = 13  # angular velocity, world frame [rad/s]: derived, refreshed at the end of a step
+STATE_SIZE = 16
+
+# --- parameters (rows, PARAM_SIZE): what a world may have its own value of -------------------------------------
+INV_MASS = 0  # [1/kg]
+INV_INERTIA = 1  # inverse principal moments [1/(kg m²)]
+DIMENSIONS = 4  # half edges of a block, semi-axes of an ellipsoid, radius (three times) of a sphere [m]
+RADIUS = 7  # of the bounding sphere about the centre of mass [m]
+FRICTION = 8  # Coulomb coefficient against the walls
+RESTITUTION = 9  # normal coefficient against the walls
+PRINCIPAL = 10  # unit quaternion, principal frame to body frame
+SERIES = 14  # coefficients of the free-rotation series
+PARAM_SIZE = SERIES + SERIES_SIZE
+
+# --- walls (walls, WALL_SIZE) ----------------------------------------------------------------------------------
+NORMAL = 0  # unit normal, into the free side
+TANGENT_1 = 3
+TANGENT_2 = 6  # normal, tangent 1, tangent 2: right-handed
+OFFSET = 9  # free side: normal·x >= offset [m]
+WALL_SIZE = 10
+
+# --- shapes ----------------------------------------------------------------------------------------------------
+BLOCK = 0
+SPHERE = 1
+ELLIPSOID = 2
+
+# Contact features of one body on one wall: the eight vertices of a block, the one support point of the others.
+VERTEX_COUNT = 8
+
+# --- report (worlds, REPORT_SIZE) ------------------------------------------------------------------------------
+PENETRATION = 0  # worst depth met [m]
+RESIDUAL = 1  # worst natural-map residual accepted, relative to the free contact speed
+ITERATIONS = 2  # sweeps, all solves together
+SOLVES = 3  # contact problems solved
+FALLBACKS = 4  # of these, by the pivoting fallback
+UNCONVERGED = 5  # of these, with a residual above the tolerance
+SPLITS = 6  # impacts that split a substep
+UNRESOLVED = 7  # substeps with more impacts than allowed: the rest was treated as plastic
+FAULTS = 8  # bodies whose new state was not finite (their old state was kept)
+SOLVER = 9  # the strongest method needed: 0 none, 1 direct, 2 sweeps, 3 pivoting
+REPORT_SIZE = 10

@@ -1,0 +1,175 @@
+"""A step of every world: the visible list of stages.
+
+A body's substep is cut where a feature meets a wall (time of impact), so that impulses act where and when
+bodies meet, and between the cuts
+
+- in the air: exact flight (`flight.fly`);
+- touching:   Moreau's midpoint step (`stages.touch`). Half a free drift, the contact problem at the middle,
+  half a free drift.
+
+Moreau, *Unilateral contact and dry friction in finite freedom dynamics*, 1988, for the midpoint step; what
+differs is the cut at impacts and the velocity asked for at the step's end (`contact.aim_rest`), which together
+make the scheme second order between impacts and exact on parabolas.
+
+What a scene does not have arrives here as None and is pruned by the compiler (see `compiler.kernel`).
+"""
+
+from __future__ import annotations
+
+from physics.kernels import layout as at
+from physics.kernels.body import angular_velocity, bind_body, is_finite, read_state, write_state
+from physics.kernels.compiler import inlined, kernel
+from physics.kernels.contact import gather, is_clear, nearest_outside_set, push_out
+from physics.kernels.flight import fly, fly_by_scheme
+from physics.kernels.quaternion import to_matrix
+from physics.kernels.stages import impact, touch
+
+# Trials of one time of impact. A secant step on a nearly straight gap gains digits at each; Illinois' halving
+# keeps the bracket shrinking from both sides where the gap is curved.
+IMPACT_TRIALS = 16
+
+
+@kernel
+def advance(
+    n, y, h, is_last, friction, gyroscopic, tilted, pivots, scheme, memory, report, work,
+):  # fmt: skip
+    """One stage of length h: flight when nothing touches, else Moreau's step."""
+    if n > 0:
+        return touch(
+            n, y, h, is_last, friction, gyroscopic, tilted, pivots, memory, report, work,
+        )  # fmt: skip
+    if scheme is None:
+        return fly(y, work, h, gyroscopic, tilted)
+    return fly_by_scheme(scheme, y, work, h, tilted)
+
+
+@inlined
+def outside_gap(y, work):
+    """Smallest gap of what is not in the contact set [m]."""
+    return nearest_outside_set(y[0], to_matrix(y[1]), work)
+
+
+@inlined
+def contact_set(y, h, is_last, tilted, work):
+    """Gather the contact set at y for a stage of length h: (count, depth)."""
+    x, q, v, L = y
+    w = angular_velocity(q, L, work, tilted)
+    return gather(x, to_matrix(q), v, w, h, is_last, work)
+
+
+@inlined
+def has_same_pose(y, z):
+    """Whether two states have the same position and attitude, to the last bit."""
+    return y[0] == z[0] and y[1] == z[1]
+
+
+@inlined
+def kept_out(y, work):
+    """y, pushed out of the walls where it is deeper in than the slop."""
+    return push_out(y[0], to_matrix(y[1]), work), y[1], y[2], y[3]
+
+
+@kernel
+def to_next_impact(
+    n, y, h, friction, gyroscopic, tilted, pivots, scheme, memory, report, work
+):
+    """Advance by h, or to the first impact within h: (state, time advanced).
+
+    An end state in which a feature outside the contact set has passed through a wall is taken back and the
+    stage shortened (Illinois' regula falsi on the smallest gap) until the feature is within half a slop of it.
+    """
+    end = advance(
+        n, y, h, False, friction, gyroscopic, tilted, pivots, scheme, memory, report, work,
+    )  # fmt: skip
+    if has_same_pose(end, y):
+        return end, h
+    gap = outside_gap(end, work)
+    if not gap < -0.5 * work.slop:
+        return end, h
+    low, low_gap = 0.0, max(outside_gap(y, work), 0.0)
+    high, high_gap = h, gap
+    t = h
+    side = 0
+    for _ in range(IMPACT_TRIALS):
+        t = low + (high - low) * low_gap / (low_gap - high_gap)
+        end = advance(
+            n, y, t, False, friction, gyroscopic, tilted, pivots, scheme, memory, report, work,
+        )  # fmt: skip
+        gap = outside_gap(end, work)
+        if abs(gap) <= 0.5 * work.slop:
+            break
+        if gap > 0.0:
+            low, low_gap = t, gap
+            if side > 0:
+                high_gap *= 0.5
+            side = 1
+        else:
+            high, high_gap = t, gap
+            if side < 0:
+                low_gap *= 0.5
+            side = -1
+    return end, t
+
+
+@kernel
+def substep(
+    y, h, friction, gyroscopic, tilted, pivots, scheme, memory, report, work
+):
+    """State after h: impacts where they happen, flight or contact between them."""
+    left = h
+    world = work.world
+    for split in range(work.splits):
+        n, depth = contact_set(y, left, False, tilted, work)
+        if n > 0:
+            report[world, at.PENETRATION] = max(report[world, at.PENETRATION], depth)
+            y = impact(n, y, left, friction, tilted, pivots, report, work)
+        end, t = to_next_impact(
+            n, y, left, friction, gyroscopic, tilted, pivots, scheme, memory, report, work
+        )
+        left -= t
+        if n > 0 and not has_same_pose(end, y):
+            end = kept_out(end, work)
+        y = end
+        if not left > 0.0:
+            return y
+        report[world, at.SPLITS] += 1.0
+    report[world, at.UNRESOLVED] += 1.0
+    n, depth = contact_set(y, left, True, tilted, work)
+    y = advance(
+        n, y, left, True, friction, gyroscopic, tilted, pivots, scheme, memory, report, work,
+    )  # fmt: skip
+    return kept_out(y, work)
+
+
+@kernel
+def step_worlds(
+    first, last, steps, substeps, h, state, params, shapes, gravity, wrench, contact, friction, restitution,
+    gyroscopic, tilted, pivots, scheme, memory, report, scratch,
+):  # fmt: skip
+    """Advance the worlds first <= world < last by `steps` steps of `substeps` substeps of h seconds each.
+
+    A body whose new state is not finite keeps the old one, and its world's report counts the fault.
+    """
+    work = scratch[0]
+    bodies = shapes.shape[0]
+    for world in range(first, last):
+        for c in range(at.REPORT_SIZE):
+            report[world, c] = 0.0
+        for b in range(bodies):
+            i = world * bodies + b
+            bind_body(world, i, shapes[b], params, gravity, wrench, friction, restitution, tilted, work)
+            y = read_state(state, i)
+            for _ in range(steps * substeps):
+                if contact is not None and not is_clear(y[0], y[2], h, work):
+                    new = substep(y, h, friction, gyroscopic, tilted, pivots, scheme, memory, report, work)
+                elif scheme is None:
+                    new = fly(y, work, h, gyroscopic, tilted)
+                else:
+                    new = fly_by_scheme(scheme, y, work, h, tilted)
+                if not is_finite(new):
+                    report[world, at.FAULTS] += 1.0
+                    break
+                y = new
+            write_state(state, i, y)
+            w = angular_velocity(y[1], y[3], work, tilted)
+            state[i, at.ANGVEL], state[i, at.ANGVEL + 1], state[i, at.ANGVEL + 2] = w

@@ -1,0 +1,82 @@
+"""Scratch memory of one thread: what a step knows of one body, and its contacts.
+
+It is one NumPy record, so that a kernel hands on a single pointer, and the compiler knows every size. It is
+filled anew for each body (`body.bind_body`); nothing in it outlives a step.
+
+The contact fields are laid out for two bodies per contact: arm and Jacobian rows belong to the first body. The
+second one is the wall, with inverse mass and inertia zero as in the course notes, which adds nothing. Contacts
+between bodies will put the rows of the second body beside those of the first.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from physics.kernels.layout import WALL_SIZE
+from physics.kernels.pyramid import workspace_sizes
+from physics.kernels.rotation import SERIES_SIZE
+
+
+def workspace_dtype(wall_count: int, features: int) -> np.dtype:
+    """Record type for bodies with `features` contact features each against `wall_count` walls."""
+    n = max(wall_count * features, 1)
+    float_size, int_size = workspace_sizes(n)
+    f, i = np.float64, np.int64
+    settings = [
+        ("tolerance", f),  # largest residual of a contact solve, relative to the largest free contact speed
+        ("sweeps", i),  # sweeps per solve at most
+        ("splits", i),  # cuts of a substep at impacts at most
+        ("relative_slop", f),  # gap within which a feature touches, in bounding radii
+        ("rest_share", f),  # a rebound that would be over within this share of the substep is plastic
+        ("features", i),
+        ("walls", f, (max(wall_count, 1), WALL_SIZE)),  # columns of `layout`
+    ]
+    body = [
+        ("i", i),
+        ("world", i),
+        ("shape", i),
+        ("mass", f),  # [kg]
+        ("J", f, (3,)),  # inverse principal moments [1/(kg m²)]
+        ("series", f, (SERIES_SIZE,)),  # of the free rotation
+        ("principal", f, (4,)),  # quaternion, principal frame to body frame
+        ("dims", f, (3,)),  # half edges, semi-axes, or the radius three times [m]
+        ("radius", f),  # of the bounding sphere [m]
+        ("slop", f),  # [m]
+        ("mu", f),  # Coulomb coefficient
+        ("restitution", f),
+        ("free_acceleration", f, (3,)),  # of the centre of mass without contact [m/s²]
+        ("torque", f, (3,)),  # about the centre of mass [N m]
+        ("acceleration", f),  # bound for any point of the body without contact [m/s²]
+    ]
+    contacts = [
+        ("mask", i, (max(wall_count, 1),)),  # bit k: feature k of the body is in the contact set of this wall
+        ("slot", i, (n,)),  # wall * features + feature, the stable name of a contact
+        ("gap", f, (n,)),  # [m], negative when penetrating
+        ("speed", f, (n,)),  # normal velocity before the stage [m/s], negative when approaching
+        ("arm", f, (n, 3)),  # contact point relative to the centre of mass, world frame [m]
+        ("target", f, (n, 3)),  # contact velocity aimed at (normal, tangents) [m/s]
+        ("friction", f, (n,)),  # Coulomb coefficient
+        ("frame", f, (3 * n, 3)),  # directions normal, tangent 1, tangent 2 of each contact
+        ("angular", f, (3 * n, 3)),  # angular Jacobian rows arm x direction [m]
+        ("response", f, (3 * n, 3)),  # I⁻¹ (arm x direction) [1/(kg m)]
+        ("delassus", f, (3 * n, 3 * n)),  # W = J M⁻¹ Jᵀ [1/kg]
+        ("bias", f, (3 * n,)),  # b of u = W p + b [m/s]
+        ("impulse", f, (3 * n,)),  # p [N s]
+        ("saved", f, (3 * n,)),  # p of the sweeps while the fallback tries [N s]
+        ("velocity", f, (3 * n,)),  # u [m/s]
+        ("local", f, (n, 12)),  # see `sweeps.factor_blocks`
+        ("fallback_float", f, (float_size,)),
+        ("fallback_int", i, (int_size,)),
+    ]
+    return np.dtype(settings + body + contacts)
+
+
+def make_workspace(walls: np.ndarray, features: int, **settings: float) -> np.ndarray:
+    """One workspace record, shape (1,), for `walls` ((walls, WALL_SIZE)) and the numerical settings given."""
+    work = np.zeros(1, workspace_dtype(len(walls), features))
+    work["features"] = features
+    if len(walls):
+        work["walls"][0] = walls
+    for name, value in settings.items():
+        work[name] = value
+    return work

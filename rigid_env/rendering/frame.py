@@ -1,0 +1,170 @@
+"""What to draw: the interface between simulation and renderer. Plain arrays, world frame, SI units."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+BODY_KINDS = ("block", "sphere", "ellipsoid")
+
+FACE_COUNT = 6
+"""Faces of a block, in the order -x, +x, -y, +y, -z, +z of its body axes."""
+
+
+@dataclass(frozen=True, eq=False)
+class BodyView:
+    """One rigid body.
+
+    Parameters
+    ----------
+    kind : {"block", "sphere", "ellipsoid"}
+    dimensions : (3,) float
+        [m]. Full edge lengths of a block; semi-axes of a sphere (all equal) or ellipsoid. Body frame.
+    pos : (3,) float
+        [m]. Centre, world frame.
+    quat : (4,) float
+        Unit quaternion w, x, y, z, body to world.
+    colour : (3,) int or None
+        sRGB, 0..255; None takes the next colour of the palette.
+
+    Raises
+    ------
+    ValueError
+        On an unknown kind, a wrong shape or a dimension that is not positive.
+    """
+
+    kind: str
+    dimensions: np.ndarray
+    pos: np.ndarray
+    quat: np.ndarray = (1.0, 0.0, 0.0, 0.0)
+    colour: tuple[int, int, int] | None = None
+
+    def __post_init__(self):
+        if self.kind not in BODY_KINDS:
+            raise ValueError(f"kind must be one of {BODY_KINDS}, not {self.kind!r}")
+        _set_array(self, "dimensions", (3,))
+        _set_array(self, "pos", (3,))
+        _set_array(self, "quat", (4,))
+        if not np.all(self.dimensions > 0.0):
+            raise ValueError(f"dimensions must be positive, not {self.dimensions}")
+
+
+@dataclass(frozen=True, eq=False)
+class WallView:
+    """One wall: bodies may be where normal·x ≥ offset.
+
+    Parameters
+    ----------
+    normal : (3,) float
+        Unit vector out of the wall, world frame; normalised here (the offset with it).
+    offset : float
+        [m].
+
+    Raises
+    ------
+    ValueError
+        If the normal is zero or not of shape (3,).
+    """
+
+    normal: np.ndarray
+    offset: float = 0.0
+
+    def __post_init__(self):
+        _set_array(self, "normal", (3,))
+        length = float(np.linalg.norm(self.normal))
+        if length == 0.0:
+            raise ValueError("a wall's normal must not be zero")
+        object.__setattr__(self, "normal", self.normal / length)
+        object.__setattr__(self, "offset", float(self.offset) / length)
+
+
+@dataclass(frozen=True, eq=False)
+class GoalView:
+    """What the agent is after: a place on the floor, a face of body 0 to be turned, or both.
+
+    Parameters
+    ----------
+    pos : (3,) float or None
+        [m]. Target of the body's centre, world frame; its foot on the floor carries the disc. None: no disc.
+    radius : float
+        [m]. Of the disc.
+    reached : bool
+        Chooses the colour.
+    goal_face : int or None
+        Face of body 0 (a block) to highlight: 0..5 = -x, +x, -y, +y, -z, +z of the body's axes.
+
+    Raises
+    ------
+    ValueError
+        If `goal_face` is not 0..5 or `pos` not of shape (3,).
+    """
+
+    pos: np.ndarray | None = None
+    radius: float = 1.0
+    reached: bool = False
+    goal_face: int | None = None
+
+    def __post_init__(self):
+        if self.pos is not None:
+            _set_array(self, "pos", (3,))
+        if self.goal_face is not None and self.goal_face not in range(FACE_COUNT):
+            raise ValueError(f"goal_face must be 0..{FACE_COUNT - 1}, not {self.goal_face!r}")
+
+
+@dataclass(frozen=True, eq=False)
+class Frame:
+    """Everything in one picture.
+
+    Parameters
+    ----------
+    bodies : tuple of BodyView
+    walls : tuple of WallView
+    goal : GoalView or None
+    contact_points : (n, 3) float
+        [m]. World frame.
+    contact_forces : (n, 3) float
+        [N]. On the body, world frame, one for each contact point.
+    applied_force : (3,) float
+        [N]. At body 0's centre, world frame.
+    applied_torque : (3,) float
+        [N m]. On body 0, world frame.
+    text : tuple of str
+        Lines in the upper left corner.
+    force_scale : float
+        [m/N]. Length of a force's arrow; a torque's arc is |torque| · force_scale / (1 m) long.
+
+    Raises
+    ------
+    ValueError
+        If an array has the wrong shape.
+    """
+
+    bodies: tuple[BodyView, ...] = ()
+    walls: tuple[WallView, ...] = ()
+    goal: GoalView | None = None
+    contact_points: np.ndarray = field(default_factory=lambda: np.zeros((0, 3)))
+    contact_forces: np.ndarray = field(default_factory=lambda: np.zeros((0, 3)))
+    applied_force: np.ndarray = (0.0, 0.0, 0.0)
+    applied_torque: np.ndarray = (0.0, 0.0, 0.0)
+    text: tuple[str, ...] = ()
+    force_scale: float = 0.1
+
+    def __post_init__(self):
+        for name in ("bodies", "walls", "text"):
+            object.__setattr__(self, name, tuple(getattr(self, name)))
+        _set_array(self, "contact_points", (-1, 3))
+        _set_array(self, "contact_forces", (len(self.contact_points), 3))
+        _set_array(self, "applied_force", (3,))
+        _set_array(self, "applied_torque", (3,))
+
+
+def _set_array(view, name, shape):
+    """Replace the attribute by its read-only float64 copy; -1 in `shape` stands for any length."""
+    array = np.array(getattr(view, name), dtype=np.float64)
+    if array.size == 0 and shape[0] in (-1, 0):
+        array = array.reshape(0, *shape[1:])
+    if array.ndim != len(shape) or any(want not in (-1, have) for want, have in zip(shape, array.shape)):
+        raise ValueError(f"{name} must have shape {shape}, not {array.shape}")
+    array.setflags(write=False)
+    object.__setattr__(view, name, array)

@@ -1,0 +1,108 @@
+"""Small closed-form geometry of convex things: clipping, hulls, rotations."""
+
+from __future__ import annotations
+
+import numpy as np
+
+
+def rotation_matrix(quat):
+    """Rotation matrix of a quaternion.
+
+    Parameters
+    ----------
+    quat : (4,) float
+        w, x, y, z, body to world; normalised here, so that drift does not shear the picture.
+
+    Returns
+    -------
+    (3, 3) float64
+        Columns are the body's axes in the world frame.
+    """
+    w, x, y, z = np.asarray(quat, dtype=np.float64) / np.linalg.norm(quat)
+    return np.array(
+        [
+            [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+            [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+            [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+        ]
+    )
+
+
+def plane_axes(normal):
+    """Two unit vectors u, v that span the plane of a unit normal, with u × v = normal.
+
+    Parameters
+    ----------
+    normal : (3,) float
+
+    Returns
+    -------
+    u, v : (3,) float64
+    """
+    normal = np.asarray(normal, dtype=np.float64)
+    least = np.zeros(3)
+    least[np.argmin(np.abs(normal))] = 1.0
+    u = np.cross(least, normal)
+    u /= np.linalg.norm(u)
+    return u, np.cross(normal, u)
+
+
+def clip_polygon(polygon, normal, offset):
+    """Part of a convex polygon in the half-space normal·x ≥ offset (Sutherland and Hodgman 1974).
+
+    Parameters
+    ----------
+    polygon : (n, d) float
+        Vertices in order; two of them make a segment.
+    normal : (d,) float
+    offset : float
+
+    Returns
+    -------
+    (k, d) float64
+        In the same order; k = 0 if nothing is left.
+    """
+    polygon = np.asarray(polygon, dtype=np.float64)
+    heights = polygon @ np.asarray(normal, dtype=np.float64) - offset
+    if np.all(heights >= 0.0):
+        return polygon
+    kept = []
+    count = len(polygon)
+    for i in range(count):
+        j = (i + 1) % count
+        if heights[i] >= 0.0:
+            kept.append(polygon[i])
+        is_last_of_segment = count == 2 and i == 1
+        if (heights[i] >= 0.0) != (heights[j] >= 0.0) and not is_last_of_segment:
+            s = heights[i] / (heights[i] - heights[j])
+            kept.append(polygon[i] + s * (polygon[j] - polygon[i]))
+    return np.array(kept).reshape(-1, polygon.shape[1])
+
+
+def convex_hull(points):
+    """Convex hull of points in the plane (Andrew's monotone chain, 1979).
+
+    Parameters
+    ----------
+    points : (n, 2) float
+
+    Returns
+    -------
+    (k, 2) float64
+        Corners counter-clockwise, without collinear points.
+    """
+    ordered = sorted(map(tuple, np.asarray(points, dtype=np.float64).tolist()))
+    return np.array(_chain(ordered)[:-1] + _chain(ordered[::-1])[:-1])
+
+
+def _chain(ordered):
+    chain = []
+    for p in ordered:
+        while len(chain) > 1 and _turn(chain[-2], chain[-1], p) <= 0.0:
+            chain.pop()
+        chain.append(p)
+    return chain
+
+
+def _turn(a, b, c):
+    return (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])

@@ -1,0 +1,119 @@
+"""Convex meshes in the body frame: block, sphere, ellipsoid."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+
+SPHERE_SUBDIVISIONS = 12
+"""Each face of the octahedron becomes its square in triangles (8 · 144 in all): round to the eye."""
+
+BLOCK_FACES = np.array(
+    [[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]],
+)
+"""Corners of the faces -x, +x, -y, +y, -z, +z; corner 4i + 2j + k has the signs 2(i, j, k) - 1."""
+
+
+@dataclass(frozen=True, eq=False)
+class Mesh:
+    """A closed convex polyhedron.
+
+    Parameters
+    ----------
+    vertices : (n, 3) float64
+        [m], body frame.
+    faces : (m, k) int
+        Vertex indices, counter-clockwise as seen from outside.
+    normals : (m, 3) float64
+        Outward unit normals, body frame.
+    edges : (e, 4) int
+        Columns: the two vertices, the two faces.
+    is_smooth : bool
+        Stands for a round body: only its silhouette is outlined.
+    """
+
+    vertices: np.ndarray
+    faces: np.ndarray
+    normals: np.ndarray
+    edges: np.ndarray
+    is_smooth: bool
+
+
+def body_mesh(kind, dimensions):
+    """Mesh of a body; made once for each shape.
+
+    Parameters
+    ----------
+    kind : {"block", "sphere", "ellipsoid"}
+    dimensions : (3,) float
+        [m]. Full edges of a block, semi-axes otherwise.
+
+    Returns
+    -------
+    Mesh
+    """
+    return _body_mesh(kind, tuple(float(d) for d in dimensions))
+
+
+@lru_cache(maxsize=64)
+def _body_mesh(kind, dimensions):
+    return block_mesh(dimensions) if kind == "block" else ellipsoid_mesh(dimensions)
+
+
+def block_mesh(size):
+    """Block with edges `size` (3,) [m] along the body axes; faces in the order -x, +x, -y, +y, -z, +z."""
+    signs = np.array([[i, j, k] for i in (-1, 1) for j in (-1, 1) for k in (-1, 1)], dtype=np.float64)
+    return _mesh(0.5 * signs * np.asarray(size, dtype=np.float64), BLOCK_FACES, is_smooth=False)
+
+
+def ellipsoid_mesh(semi_axes, subdivisions=SPHERE_SUBDIVISIONS):
+    """Ellipsoid with `semi_axes` (3,) [m] along the body axes: a subdivided octahedron blown up to a sphere.
+
+    Every triangle lies in one octant, so that octants can be told apart by colour.
+    """
+    vertices, faces = _subdivided_octahedron(subdivisions)
+    vertices = vertices / np.linalg.norm(vertices, axis=1, keepdims=True)
+    return _mesh(vertices * np.asarray(semi_axes, dtype=np.float64), faces, is_smooth=True)
+
+
+def _subdivided_octahedron(n):
+    """Integer vertices with |x| + |y| + |z| = n, and the triangles between them."""
+    index, faces = {}, []
+
+    def vertex(p):
+        return index.setdefault(p, len(index))
+
+    for sx in (-1, 1):
+        for sy in (-1, 1):
+            for sz in (-1, 1):
+                is_mirrored = sx * sy * sz < 0
+                for triangle in _triangles(n):
+                    corners = [vertex((sx * i, sy * j, sz * (n - i - j))) for i, j in triangle]
+                    faces.append(corners[::-1] if is_mirrored else corners)
+    return np.array(list(index), dtype=np.float64), np.array(faces)
+
+
+def _triangles(n):
+    """Triangles of the grid i + j ≤ n, i, j ≥ 0, counter-clockwise in the (i, j) plane."""
+    for i in range(n):
+        for j in range(n - i):
+            yield (i, j), (i + 1, j), (i, j + 1)
+            if i + j + 2 <= n:
+                yield (i + 1, j), (i + 1, j + 1), (i, j + 1)
+
+
+def _mesh(vertices, faces, is_smooth):
+    corners = vertices[faces]
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    return Mesh(vertices, faces, normals, _edges(faces), is_smooth)
+
+
+def _edges(faces):
+    sides = {}
+    for face, corners in enumerate(faces.tolist()):
+        for a, b in zip(corners, corners[1:] + corners[:1]):
+            sides.setdefault((min(a, b), max(a, b)), []).append(face)
+    return np.array([[a, b, *pair] for (a, b), pair in sides.items()])

@@ -1,0 +1,218 @@
+"""What explains the picture: the goal's disc, contact points, arrows of forces and torques, near walls."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from rigid_env.rendering import palette
+from rigid_env.rendering.bodies import goal_colour
+from rigid_env.rendering.geometry import plane_axes, rotation_matrix
+from rigid_env.rendering.layout import faces_point, is_floor
+from rigid_env.rendering.meshes import body_mesh
+
+ARROW_WIDTH, HEAD_LENGTH, HEAD_WIDTH, HALO_WIDTH = 3.0, 13.0, 11.0, 1.3
+"""[units] of the canvas."""
+
+ARROW_LIMIT = 8.0
+"""[m]. Longest arrow drawn: the force of an impact would reach out of every picture."""
+
+CONTACT_RADIUS = 4.2
+"""[units] of the canvas."""
+
+TORQUE_RADIUS = 0.42
+"""Radius of a torque's arc, in units of the body's largest extent."""
+
+TORQUE_SWEEP = np.radians(300.0)
+"""[rad]. Largest angle of a torque's arc."""
+
+AXIS_WIDTH = 1.8
+"""[units] of the canvas. Of the line along a torque's axis."""
+
+TORQUE_STEP = np.radians(6.0)
+DISC_CORNERS = 72
+GOAL_ALPHA = 46
+HIDDEN_FADE = 0.5
+NEAR_WALL_ALPHA = 12
+
+
+def draw_goal(canvas, goal, room):
+    """Disc, ring and centre mark on the floor, at the foot of the target."""
+    if goal is None or goal.pos is None:
+        return
+    floors = [w for w in room.walls if is_floor(w)]
+    normal = floors[0].normal if floors else np.array([0.0, 1.0, 0.0])
+    height = normal @ goal.pos - floors[0].offset if floors else 0.0
+    foot = goal.pos - height * normal
+    colour = goal_colour(goal)
+    axes = plane_axes(normal)
+    ring = _circle(foot, axes, goal.radius, np.linspace(0.0, 2.0 * np.pi, DISC_CORNERS, endpoint=False))
+    canvas.polygon(ring, colour, GOAL_ALPHA)
+    canvas.loop(ring, 2.0, colour)
+    inner = foot + 0.82 * (ring - foot)
+    canvas.loop(inner, 0.7, palette.mix(colour, palette.FLOOR, 0.35))
+    arms = 0.16 * goal.radius * np.stack(axes)
+    canvas.segments(foot - arms, foot + arms, 1.4, colour)
+
+
+def draw_contacts(canvas, frame):
+    """Discs at the contact points and red arrows of their forces; paler where the body hides them."""
+    if len(frame.contact_points) == 0:
+        return
+    is_hidden = hidden_points(frame.contact_points, frame.bodies, canvas.camera.eye)
+    pixels, depths = canvas.project(frame.contact_points)
+    for i in np.lexsort((-depths, ~is_hidden)):
+        if not canvas.is_in_sight(pixels[i], depths[i]):
+            continue
+        fade = HIDDEN_FADE if is_hidden[i] else 0.0
+        colour = palette.mix(palette.CONTACT, palette.HALO, fade)
+        draw_arrow(canvas, frame.contact_points[i], frame.force_scale * frame.contact_forces[i], colour)
+        canvas.disc(pixels[i], CONTACT_RADIUS + HALO_WIDTH, palette.HALO)
+        canvas.disc(pixels[i], CONTACT_RADIUS, colour)
+
+
+def draw_wrench(canvas, frame):
+    """Orange arrow of the applied force and purple arc of the applied torque, at body 0's centre."""
+    if not frame.bodies:
+        return
+    body = frame.bodies[0]
+    _draw_torque(canvas, body, frame.force_scale * frame.applied_torque)
+    draw_arrow(canvas, body.pos, frame.force_scale * frame.applied_force, palette.APPLIED_FORCE)
+
+
+def draw_arrow(canvas, start, vector, colour):
+    """Arrow on top of what is there.
+
+    Parameters
+    ----------
+    canvas : Canvas
+    start, vector : (3,) float
+        [m], world frame. Cut off at `ARROW_LIMIT`; nothing is drawn of one shorter than a pixel.
+    colour : (3,) int
+    """
+    length = np.linalg.norm(vector)
+    if not 0.0 < length < np.inf:
+        return
+    tip = start + vector * min(1.0, ARROW_LIMIT / length)
+    pixels = canvas.camera.project_polygon(np.stack([start, tip]), canvas.size)
+    if len(pixels) == 2:
+        _arrow_line(canvas, pixels, colour)
+
+
+def draw_near_walls(canvas, room):
+    """Walls between camera and scene: an outline and a breath of colour, in front of everything."""
+    for index, wall in enumerate(room.walls):
+        polygon = room.wall_polygons[index]
+        if len(polygon) >= 3 and not faces_point(wall, canvas.camera.eye):
+            canvas.polygon(polygon, palette.WALL_OUTLINE, NEAR_WALL_ALPHA)
+            canvas.loop(polygon, 1.0, palette.mix(palette.WALL_OUTLINE, palette.HALO, 0.3))
+
+
+def draw_far_outlines(canvas, room):
+    """Outlines of the walls behind the scene; floors fade out instead."""
+    for index, wall in enumerate(room.walls):
+        polygon = room.wall_polygons[index]
+        if len(polygon) >= 3 and faces_point(wall, canvas.camera.eye) and not is_floor(wall):
+            canvas.loop(polygon, 1.1, palette.WALL_OUTLINE)
+
+
+def hidden_points(points, bodies, eye):
+    """Whether a body is between points and eye.
+
+    A point eye + s (point - eye) is inside a convex polyhedron if n·x ≤ n·vertex for all its faces; each face
+    bounds s on one side. The point is hidden if the bounds leave room before s = 1.
+
+    Parameters
+    ----------
+    points : (n, 3) float
+        [m], world frame.
+    bodies : tuple of BodyView
+    eye : (3,) float
+        [m], world frame.
+
+    Returns
+    -------
+    (n,) bool
+    """
+    rays = points - np.asarray(eye)
+    is_hidden = np.zeros(len(points), dtype=bool)
+    for body in bodies:
+        mesh = body_mesh(body.kind, body.dimensions)
+        R = rotation_matrix(body.quat)
+        local_eye, local_rays = (np.asarray(eye) - body.pos) @ R, rays @ R
+        room = np.sum(mesh.normals * mesh.vertices[mesh.faces[:, 0]], axis=1) - mesh.normals @ local_eye
+        speed = local_rays @ mesh.normals.T
+        with np.errstate(divide="ignore", invalid="ignore"):
+            bound = room / speed
+        enter = np.max(np.where(speed < 0.0, bound, -np.inf), axis=1)
+        leave = np.min(np.where(speed > 0.0, bound, np.inf), axis=1)
+        misses = np.any((speed == 0.0) & (room < 0.0), axis=1)
+        margin = 1e-3
+        is_hidden |= ~misses & (enter < leave - margin) & (enter < 1.0 - margin) & (leave > 0.0)
+    return is_hidden
+
+
+def _draw_torque(canvas, body, scaled):
+    """Arc around the axis of a torque; `scaled` (3,) is as long as the arc [m]."""
+    size = np.linalg.norm(scaled)
+    if not 0.0 < size < np.inf:
+        return
+    axis = scaled / size
+    extent = body.dimensions.max() * (1.0 if body.kind == "block" else 2.0)
+    radius = TORQUE_RADIUS * extent
+    sweep = min(size / radius, TORQUE_SWEEP)
+    angles = np.linspace(-0.5 * sweep, 0.5 * sweep, max(3, int(np.ceil(sweep / TORQUE_STEP))))
+    axes = _axes_towards(canvas, body.pos, axis)
+    pixels, depths = canvas.project(_circle(body.pos, axes, radius, angles))
+    if not canvas.is_in_sight(pixels, depths):
+        return
+    ends = body.pos + 0.5 * radius * np.stack([-axis, axis])
+    canvas.segments(ends[:1], ends[1:], AXIS_WIDTH + HALO_WIDTH, palette.HALO)
+    canvas.segments(ends[:1], ends[1:], AXIS_WIDTH, palette.TORQUE)
+    _arrow_line(canvas, pixels, palette.TORQUE)
+
+
+def _axes_towards(canvas, centre, normal):
+    """Axes of the plane of `normal`, the first as near to the camera's direction as it can be."""
+    sight = np.asarray(canvas.camera.eye) - centre
+    u = sight - (sight @ normal) * normal
+    if np.linalg.norm(u) < 1e-3 * np.linalg.norm(sight):
+        return plane_axes(normal)
+    u /= np.linalg.norm(u)
+    return u, np.cross(normal, u)
+
+
+def _circle(centre, axes, radius, angles):
+    u, v = axes
+    return centre + radius * (np.cos(angles)[:, None] * u + np.sin(angles)[:, None] * v)
+
+
+def _arrow_line(canvas, pixels, colour):
+    """Line through canvas pixels (n, 2) with a head at its end, on a white halo."""
+    lengths = np.hypot(*np.diff(pixels, axis=0).T)
+    total = lengths.sum()
+    if total < canvas.unit:
+        return
+    scale = min(1.0, total / (1.6 * canvas.unit * HEAD_LENGTH))
+    head = scale * canvas.unit * HEAD_LENGTH
+    shaft, neck = _cut_back(pixels, lengths, head)
+    along = pixels[-1] - neck
+    along = along / max(np.hypot(*along), 1e-9)
+    across = np.array([-along[1], along[0]])
+    half = 0.5 * scale * canvas.unit * HEAD_WIDTH
+    tip = pixels[-1]
+    triangle = np.stack([tip, neck + half * across, neck - half * across])
+    canvas.stroke(shaft, scale * ARROW_WIDTH + 2.0 * HALO_WIDTH, palette.HALO)
+    canvas.stroke(np.concatenate([triangle, triangle[:1]]), 2.0 * HALO_WIDTH, palette.HALO)
+    canvas.stroke(shaft, scale * ARROW_WIDTH, colour)
+    canvas.fill(triangle, colour)
+
+
+def _cut_back(pixels, lengths, cut):
+    """The line without its last `cut` pixels, and where it now ends."""
+    keep = len(lengths)
+    while keep > 1 and lengths[keep - 1] <= cut:
+        cut -= lengths[keep - 1]
+        keep -= 1
+    a, b = pixels[keep - 1], pixels[keep]
+    neck = b + min(1.0, cut / max(lengths[keep - 1], 1e-9)) * (a - b)
+    return np.concatenate([pixels[:keep], neck[None]]), neck

@@ -1,0 +1,80 @@
+"""Colours, the light, and how a surface looks in it."""
+
+from __future__ import annotations
+
+import numpy as np
+
+BACKGROUND_TOP = (243, 246, 250)
+BACKGROUND_BOTTOM = (221, 228, 238)
+FLOOR = (252, 253, 254)
+WALL = (188, 203, 224)
+GRID = (150, 165, 186)
+WALL_OUTLINE = (124, 141, 168)
+SHADOW = (38, 50, 78)
+
+BODIES = ((58, 118, 222), (238, 150, 60), (46, 160, 140), (150, 104, 208))
+"""Of bodies without a colour of their own, in turn."""
+
+CONTACT = (222, 52, 60)
+APPLIED_FORCE = (245, 136, 24)
+TORQUE = (136, 72, 210)
+GOAL = (14, 156, 178)
+GOAL_REACHED = (34, 172, 92)
+HALO = (255, 255, 255)
+TEXT = (44, 54, 74)
+
+LIGHT = np.array([0.50, 1.0, 0.42]) / np.linalg.norm([0.50, 1.0, 0.42])
+"""Unit vector towards the light, world frame: from the right, above and the viewer's side."""
+
+SUN = 0.80
+"""Part of the light, in linear intensity, that comes from `LIGHT`."""
+
+SKY, GROUND = 0.46, 0.26
+"""Ambient light, in linear intensity, on a face that looks straight up and straight down."""
+
+GLOSS, SHININESS = 0.16, 24.0
+"""Strength and exponent of the highlight (Blinn 1977)."""
+
+
+def to_linear(colour):
+    """Linear intensities 0..1 of sRGB values 0..255 (IEC 61966-2-1), same shape."""
+    c = np.asarray(colour, dtype=np.float64) / 255.0
+    return np.where(c <= 0.04045, c / 12.92, ((c + 0.055) / 1.055) ** 2.4)
+
+
+def to_srgb(intensity):
+    """sRGB values 0..255, rounded to int, of linear intensities (clipped to 0..1), same shape."""
+    i = np.clip(intensity, 0.0, 1.0)
+    c = np.where(i <= 0.0031308, 12.92 * i, 1.055 * i ** (1.0 / 2.4) - 0.055)
+    return np.rint(255.0 * c).astype(np.int64)
+
+
+def shade(colours, normals, towards_eye):
+    """Colours of flat faces in the light: Lambert, an ambient that grows towards the sky, and a highlight.
+
+    Parameters
+    ----------
+    colours : (n, 3) or (3,) float
+        sRGB, 0..255, of the surface.
+    normals : (n, 3) float
+        Outward unit normals, world frame.
+    towards_eye : (n, 3) float
+        Unit vectors from the faces to the camera, world frame.
+
+    Returns
+    -------
+    (n, 3) int64
+        sRGB, 0..255.
+    """
+    lambert = np.maximum(normals @ LIGHT, 0.0)
+    ambient = GROUND + (SKY - GROUND) * 0.5 * (1.0 + normals[:, 1])
+    half = LIGHT + towards_eye
+    half /= np.maximum(np.linalg.norm(half, axis=1, keepdims=True), 1e-12)
+    highlight = GLOSS * np.maximum(np.sum(normals * half, axis=1), 0.0) ** SHININESS
+    lit = to_linear(colours) * (ambient + SUN * lambert)[:, None] + (highlight * (lambert > 0.0))[:, None]
+    return to_srgb(lit)
+
+
+def mix(colour, other, part):
+    """sRGB colour `part` (0..1) of the way from `colour` to `other`, a tuple of int."""
+    return tuple(round((1.0 - part) * a + part * b) for a, b in zip(colour, other))

@@ -1,0 +1,195 @@
+"""Frames to pixels: the order of drawing, the picture in memory, and the window if one is wanted."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from rigid_env.rendering import palette
+from rigid_env.rendering.backdrop import draw_backdrop
+from rigid_env.rendering.bodies import draw_bodies
+from rigid_env.rendering.canvas import SUPERSAMPLING, Canvas
+from rigid_env.rendering.layout import default_camera, make_room
+from rigid_env.rendering.overlays import (
+    draw_contacts,
+    draw_far_outlines,
+    draw_goal,
+    draw_near_walls,
+    draw_wrench,
+)
+from rigid_env.rendering.shadows import draw_shadows
+
+MODES = ("rgb_array", "human")
+
+FONT_SIZE = 15
+"""[px] for a picture 600 px high; grows with the picture."""
+
+
+class Renderer:
+    """Draws frames in software, into memory or a window.
+
+    Parameters
+    ----------
+    width, height : int
+        [px]. Of the picture.
+    mode : {"rgb_array", "human"}
+        "human" shows the pictures in a window too, at no more than `fps` a second. "rgb_array" opens no
+        window and needs no display.
+    fps : float
+        [1/s].
+    title : str
+        Of the window.
+    camera : Camera or None
+        None chooses one that has the room between the walls in sight: for frames with walls it depends on the
+        walls and the bodies' sizes, without walls also on the positions in the first frame drawn.
+
+    Raises
+    ------
+    gymnasium.error.DependencyNotInstalled
+        If pygame is missing.
+    ValueError
+        On an unknown mode or a size that is not positive.
+    """
+
+    def __init__(self, width=960, height=600, mode="rgb_array", fps=40, title="rigid-env", camera=None):
+        if mode not in MODES:
+            raise ValueError(f"mode must be one of {MODES}, not {mode!r}")
+        if width < 1 or height < 1:
+            raise ValueError(f"width and height must be positive, not {width} x {height}")
+        self._pygame = _import_pygame()
+        self.width, self.height, self.mode, self.fps, self.title = int(width), int(height), mode, fps, title
+        self._camera = camera
+        self._canvas_size = (SUPERSAMPLING * self.width, SUPERSAMPLING * self.height)
+        surface = self._pygame.Surface
+        self._large = surface(self._canvas_size, 0, 32)
+        self._backdrop = surface(self._canvas_size, 0, 32)
+        self._picture = surface((self.width, self.height), 0, 32)
+        self._scene_key = self._room = self._scene_camera = None
+        self._font = self._window = self._clock = None
+        self._is_closed = False
+
+    @property
+    def is_open(self):
+        """bool. Whether a window is shown; False before the first frame and once the user has closed it."""
+        return self._window is not None
+
+    def draw(self, frame):
+        """Draw a frame; in human mode show it and wait until it is due.
+
+        Parameters
+        ----------
+        frame : Frame
+
+        Returns
+        -------
+        (height, width, 3) uint8
+            sRGB, row 0 on top. A new array.
+
+        Raises
+        ------
+        RuntimeError
+            After `close`.
+        """
+        if self._is_closed:
+            raise RuntimeError("this Renderer is closed; make a new one")
+        self._prepare_scene(frame)
+        self._large.blit(self._backdrop, (0, 0))
+        canvas = Canvas(self._large, self._scene_camera, self._pygame)
+        draw_goal(canvas, frame.goal, self._room)
+        draw_shadows(canvas, self._room, frame.bodies)
+        draw_bodies(canvas, frame.bodies, frame.goal)
+        draw_contacts(canvas, frame)
+        draw_wrench(canvas, frame)
+        draw_near_walls(canvas, self._room)
+        self._pygame.transform.smoothscale(self._large, (self.width, self.height), self._picture)
+        self._draw_text(frame.text)
+        if self.mode == "human":
+            self._show()
+        pixels = self._pygame.image.tobytes(self._picture, "RGB")
+        return np.frombuffer(pixels, dtype=np.uint8).reshape(self.height, self.width, 3).copy()
+
+    def camera(self, frame):
+        """`Camera` that `draw(frame)` looks through; its `project(points, (width, height))` gives pixels."""
+        self._prepare_scene(frame)
+        return self._scene_camera
+
+    def close(self):
+        """Close the window, if any. May be called again."""
+        self._is_closed = True
+        self._close_window()
+
+    def _prepare_scene(self, frame):
+        """Room, camera and backdrop: only when walls or shapes are not those of the last frame."""
+        key = (
+            tuple((*w.normal.tolist(), w.offset) for w in frame.walls),
+            tuple((b.kind, *b.dimensions.tolist()) for b in frame.bodies),
+        )
+        if key == self._scene_key:
+            return
+        self._scene_key = key
+        self._room = make_room(frame.walls, frame.bodies)
+        self._scene_camera = self._camera or default_camera(self._room, (self.width, self.height))
+        pixels = draw_backdrop(self._scene_camera, (self.width, self.height), self._room)
+        small = self._pygame.image.frombuffer(pixels.tobytes(), (self.width, self.height), "RGB")
+        self._backdrop.blit(self._pygame.transform.scale(small, self._canvas_size), (0, 0))
+        draw_far_outlines(Canvas(self._backdrop, self._scene_camera, self._pygame), self._room)
+
+    def _draw_text(self, lines):
+        if not lines:
+            return
+        if self._font is None:
+            self._font = _load_font(self._pygame, max(8, round(FONT_SIZE * self.height / 600)))
+        if not self._font:
+            return
+        rows = [self._font.render(line, True, palette.TEXT) for line in lines]
+        pad, pitch = self._font.get_height() // 2, self._font.get_linesize() + 2
+        size = (max(r.get_width() for r in rows) + 2 * pad, pitch * len(rows) + 2 * pad - 2)
+        panel = self._pygame.Surface(size, self._pygame.SRCALPHA, 32)
+        box = panel.get_rect()
+        self._pygame.draw.rect(panel, (255, 255, 255, 200), box, border_radius=pad)
+        self._pygame.draw.rect(panel, (*palette.WALL_OUTLINE, 90), box, width=1, border_radius=pad)
+        for i, row in enumerate(rows):
+            panel.blit(row, (pad, pad + i * pitch))
+        self._picture.blit(panel, (pad, pad))
+
+    def _show(self):
+        pygame = self._pygame
+        if self._clock is None:
+            pygame.display.init()
+            self._window = pygame.display.set_mode((self.width, self.height))
+            pygame.display.set_caption(self.title)
+            self._clock = pygame.time.Clock()
+        if self._window is None:
+            return
+        self._window.blit(self._picture, (0, 0))
+        pygame.display.flip()
+        if any(event.type == pygame.QUIT for event in pygame.event.get()):
+            self._close_window()
+            return
+        self._clock.tick(self.fps)
+
+    def _close_window(self):
+        if self._window is not None:
+            self._window = None
+            self._pygame.display.quit()
+
+
+def _import_pygame():
+    try:
+        import pygame
+        import pygame.gfxdraw
+    except ImportError as error:
+        from gymnasium.error import DependencyNotInstalled
+
+        raise DependencyNotInstalled(
+            'rendering needs pygame, which is not installed; run `pip install "rigid-env[render]"`'
+        ) from error
+    return pygame
+
+
+def _load_font(pygame, size):
+    """pygame's own font, or False where pygame was built without fonts: text is then left out."""
+    try:
+        pygame.font.init()
+        return pygame.font.Font(None, round(1.45 * size))
+    except (ImportError, NotImplementedError):
+        return False
