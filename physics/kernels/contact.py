@@ -188,11 +188,13 @@ def aim_rest(n, w, h, is_last, work):
 
     The impulses act at the middle of the step, the velocity is asked for at its end, half a step later: a
     vertex that the body turns about has by then gained h/2 ω x (ω x r), so that is taken off. A feature still
-    above the wall may close `CLOSING_SHARE` of its gap (all of it in a substep's last stage).
+    above the wall may close `CLOSING_SHARE` of its gap (all of it in a substep's last stage). What is smaller
+    than the tolerance of the solve is 0, so that a body comes to rest to the last bit.
     """
     walls, features, shape, slop = work.walls, work.features, work.shape, work.slop
     half = 0.5 * h
     is_turning = (w[0] != 0.0 or w[1] != 0.0 or w[2] != 0.0) and shape == BLOCK
+    negligible = work.tolerance * work.acceleration * h
     share = 1.0 if is_last else CLOSING_SHARE
     for i in range(n):
         t0 = t1 = t2 = 0.0
@@ -205,6 +207,8 @@ def aim_rest(n, w, h, is_last, work):
             t2 = -half * (c[0] * walls[k, 6] + c[1] * walls[k, 7] + c[2] * walls[k, 8])
         if work.gap[i] > slop:
             t0 -= share * work.gap[i] / h
+        if max(abs(t0), max(abs(t1), abs(t2))) <= negligible:
+            t0 = t1 = t2 = 0.0
         work.target[i, 0], work.target[i, 1], work.target[i, 2] = t0, t1, t2
 
 

@@ -18,9 +18,8 @@ a row and is rebuilt from the place where an index leaves: no drift. If nothing
 blocks such a drive, M z + q >= 0 has no solution with z >= 0: a body wedged
 between walls that both move in.
 
-The problem is scaled to a diagonal in [1/4, 1), and z and w are computed afresh
-after every drive, so that tolerances are dimensionless and errors do not add up.
-Ties go to the least index, which keeps degenerate problems from cycling.
+z and w are computed afresh after every drive, so that errors do not add up. Ties
+go to the least index, which keeps degenerate problems from cycling.
 
 References
 ----------
@@ -36,6 +35,7 @@ from __future__ import annotations
 
 import math
 
+from physics.kernels.clamped import DEPENDENT_TOLERANCE, clamp, release, solve_clamped
 from physics.kernels.compiler import kernel
 from physics.kernels.complementarity import (
     BAD_DATA,
@@ -48,8 +48,8 @@ from physics.kernels.complementarity import (
 )
 
 # Dimensionless: the scaled diagonal is in [1/4, 1), the scaled q at most 1. Rounding is 2^-53.
-DEPENDENT_TOLERANCE = 2.0**-40  # of its diagonal: an index with a smaller Schur complement is dependent
 DIRECTION_TOLERANCE = 2.0**-44  # of the largest rate: what moves slower stands still
+TIE_TOLERANCE = 2.0**-42  # of 1 + max z: a driven w above minus this has reached zero
 SIGN_TOLERANCE = 2.0**-40  # of 1 + max z: a w above minus this counts as >= 0
 
 # Rows of `work` after the factor (n rows) and the scaled matrix (n rows).
@@ -63,13 +63,13 @@ def dantzig_sizes(n: int) -> tuple[tuple[int, int], int]:
 
 @kernel
 def scale_problem(M, q, work):
-    """Scaled matrix and q into `work`; returns the scale of q, 0 if a diagonal entry is negative."""
+    """Scaled matrix and q into `work`; returns the scales of M (0 if its diagonal is not >= 0) and q."""
     n = q.shape[0]
     A, scale, rhs = work[n : 2 * n], work[2 * n + SCALE], work[2 * n + RHS]
     largest = 0.0
     for i in range(n):
         if M[i, i] < 0.0:
-            return 0.0
+            return 0.0, 1.0
         largest = max(largest, M[i, i])
     whole = inverse_power_of_two(largest)
     largest = 0.0
@@ -83,58 +83,7 @@ def scale_problem(M, q, work):
         rhs[i] = q[i] * scale[i] * q_scale
         for j in range(n):
             A[i, j] = M[i, j] * whole * scale[i] * scale[j]
-    return q_scale
-
-
-@kernel
-def clamp(work, index, n, count, k):
-    """Append index k to the `count` clamped ones: one row of the Cholesky factor.
-
-    Returns whether k is independent of them; if not, nothing but scratch space has changed.
-    """
-    factor, A, clamped = work[:n], work[n : 2 * n], index[:n]
-    schur = A[k, k]
-    for r in range(count):
-        entry = A[k, clamped[r]]
-        for t in range(r):
-            entry -= factor[count, t] * factor[r, t]
-        entry /= factor[r, r]
-        factor[count, r] = entry
-        schur -= entry * entry
-    if not schur > DEPENDENT_TOLERANCE * A[k, k]:
-        return False
-    factor[count, count] = math.sqrt(schur)
-    clamped[count] = k
-    index[n + k] = count
-    return True
-
-
-@kernel
-def release(work, index, n, count, k):
-    """Remove index k from the clamped ones and rebuild the factor behind it. Returns the new count."""
-    clamped = index[:n]
-    place = index[n + k]
-    index[n + k] = -1
-    kept = place
-    for r in range(place + 1, count):
-        j = clamped[r]
-        index[n + j] = -1
-        if clamp(work, index, n, kept, j):
-            kept += 1
-    return kept
-
-
-@kernel
-def solve_clamped(factor, count, x):
-    """Overwrite the first `count` entries of x with the solution of L Lᵀ y = x."""
-    for r in range(count):
-        for t in range(r):
-            x[r] -= factor[r, t] * x[t]
-        x[r] /= factor[r, r]
-    for r in range(count - 1, -1, -1):
-        for t in range(r + 1, count):
-            x[r] -= factor[t, r] * x[t]
-        x[r] /= factor[r, r]
+    return whole, q_scale
 
 
 @kernel
@@ -163,7 +112,11 @@ def find_rates(work, index, n, count, i):
 
 @kernel
 def find_block(work, index, z, n, i, largest, is_independent):
-    """First index to reach zero in the drive of i, and the step. Index -1: nothing blocks."""
+    """First index to reach zero in the drive of i, and the step. Index -1: nothing blocks.
+
+    Where w_i is zero within rounding as well, i goes first, which ends the drive. The other
+    way round i would depend on the clamped ones, and rounding would decide what comes next.
+    """
     w, rate_z, rate_w = work[2 * n + W], work[2 * n + RATE_Z], work[2 * n + RATE_W]
     threshold = DIRECTION_TOLERANCE * largest
     step = math.inf
@@ -182,6 +135,12 @@ def find_block(work, index, z, n, i, largest, is_independent):
         if value < -step * rate:
             step = -value / rate
             blocking = k
+    if is_independent and blocking != i:
+        largest = step
+        for k in range(n):
+            largest = max(largest, z[k] + step * max(rate_z[k], 0.0))
+        if w[i] + step * rate_w[i] >= -TIE_TOLERANCE * (1.0 + largest):
+            blocking = i
     return blocking, step
 
 
@@ -196,8 +155,11 @@ def drive(work, index, z, n, count, i, budget):
             return RAY, pivots, count
         z[i] += step
         for k in range(n):
+            # what is in order stays so: rounding must not carry a tied index below zero
             if index[n + k] >= 0:
-                z[k] += step * rate_z[k]
+                z[k] = max(z[k] + step * rate_z[k], 0.0)
+            elif w[k] >= 0.0:
+                w[k] = max(w[k] + step * rate_w[k], 0.0)
             else:
                 w[k] += step * rate_w[k]
         if index[n + blocking] >= 0:
@@ -217,7 +179,7 @@ def drive(work, index, z, n, count, i, budget):
 
 @kernel
 def recompute(work, index, z, n, count):
-    """z of the clamped indices from the factor, refined once, the others 0; w = M z + q. Returns max z."""
+    """z of the clamped indices from the factor, refined once, the others 0; w = M z + q."""
     factor, A, clamped = work[:n], work[n : 2 * n], index[:n]
     rhs, w, x = work[2 * n + RHS], work[2 * n + W], work[2 * n + SCRATCH]
     for k in range(n):
@@ -243,7 +205,6 @@ def recompute(work, index, z, n, count):
     for k in range(n):
         if index[n + k] < 0 and abs(w[k]) <= SIGN_TOLERANCE * (1.0 + largest):
             w[k] = 0.0
-    return largest
 
 
 @kernel
@@ -296,20 +257,24 @@ def dantzig(M, q, z, work, index, max_pivots):
 
     Notes
     -----
-    O(n c + c³) per pivot with c clamped indices; c is at most the rank of M.
-    Nothing is allocated. Multiplying M, or q, by a power of two gives exactly
-    the scaled z. Sources: see the module.
+    O(n c + c³) per pivot with c clamped indices, at most the rank of M. Nothing
+    is allocated. Scaling M, or q, by a power of two gives exactly the scaled z.
     """
     n = q.shape[0]
     z[:n] = 0.0
     if not are_finite(M, q):
         return BAD_DATA, 0
-    q_scale = scale_problem(M, q, work)
-    if q_scale == 0.0:
+    whole, q_scale = scale_problem(M, q, work)
+    if whole == 0.0:
         return BAD_DATA, 0
     index[n : 2 * n] = -1
     status, pivots = drive_all(work, index, z, n, max_pivots)
     if status != SOLVED:
         z[:n] = 0.0
         return status, pivots
-    ...
+    ones = work[2 * n + SCRATCH]
+    ones[:] = 1.0
+    status = certify(work[n : 2 * n], work[2 * n + RHS], z, ones, ones, 1.0)
+    for j in range(n):
+        z[j] *= work[2 * n + SCALE, j] * (whole / q_scale)
+    return status, pivots

@@ -49,7 +49,7 @@ from physics.kernels.complementarity import (
 
 # Dimensionless: entries of the scaled data are at most 1. Rounding is 2^-53.
 PIVOT_TOLERANCE = 2.0**-36  # of its column's largest entry: a smaller pivot is taken for rounded-off zero
-TIE_TOLERANCE = 2.0**-42  # of its column's largest entry: closer rows of the ratio test count as tied
+TIE_TOLERANCE = 2.0**-36  # of its column's largest entry: closer rows of the ratio test count as tied
 REFINEMENTS = 2  # each gains the digits the tableau's inverse still has
 
 

@@ -22,6 +22,9 @@ DIRECT = 1
 SWEEPS = 2
 PIVOTING = 3
 
+# Pivots of the fallback at most: several times the unknowns of a dozen contacts.
+MAX_PIVOTS = 500
+
 
 @inlined
 def _free_speed(rows, bias):
@@ -40,11 +43,11 @@ def _pivot(n, width, friction, residual, work):
     for r in range(rows):
         work.saved[r] = p[r]
     if friction is None:
-        normal_fallback(W, b, n, p, work.fallback_float, work.fallback_int)
+        normal_fallback(W, b, n, p, work.fallback_float, work.fallback_int, MAX_PIVOTS)
         velocities(rows, W, p, b, u)
         after = normal_residual(n, p, u, W)
     else:
-        pyramid_fallback(W, b, work.friction, n, p, work.fallback_float, work.fallback_int)
+        pyramid_fallback(W, b, work.friction, n, p, work.fallback_float, work.fallback_int, MAX_PIVOTS)
         velocities(rows, W, p, b, u)
         after = cone_residual(n, p, u, work.friction, work.local)
     if not after < residual:

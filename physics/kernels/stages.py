@@ -15,6 +15,11 @@ from physics.kernels.solve import PIVOTING, solve_contacts
 MEMORY_HEAD = 2
 
 
+def memory_size(slots: int) -> int:
+    """Columns of `memory` for bodies with `slots` possible contacts."""
+    return MEMORY_HEAD + 4 * slots
+
+
 @inlined
 def load_warm_start(n, width, memory, i, h, work):
     """Impulses of the last resting stage, by slot, scaled to a stage of length h."""

@@ -22,11 +22,26 @@ from physics.kernels.compiler import inlined, kernel
 from physics.kernels.contact import gather, is_clear, nearest_outside_set, push_out
 from physics.kernels.flight import fly, fly_by_scheme
 from physics.kernels.quaternion import to_matrix
-from physics.kernels.stages import impact, touch
+from physics.kernels.stages import impact, store_warm_start, touch
 
 # Trials of one time of impact. A secant step on a nearly straight gap gains digits at each; Illinois' halving
 # keeps the bracket shrinking from both sides where the gap is curved.
 IMPACT_TRIALS = 16
+
+
+@inlined
+def forget_contacts(memory, i, work):
+    """Clear the contact memory of a body in the air."""
+    if memory[i, 1] > 0.0:
+        store_warm_start(0, 0, memory, i, 0.0, work)
+
+
+@inlined
+def coast(y, h, gyroscopic, tilted, scheme, work):
+    """Free motion over h, by the exact flow or by the scheme asked for."""
+    if scheme is None:
+        return fly(y, work, h, gyroscopic, tilted)
+    return fly_by_scheme(scheme, y, work, h, tilted)
 
 
 @kernel
@@ -38,9 +53,8 @@ def advance(
         return touch(
             n, y, h, is_last, friction, gyroscopic, tilted, pivots, memory, report, work,
         )  # fmt: skip
-    if scheme is None:
-        return fly(y, work, h, gyroscopic, tilted)
-    return fly_by_scheme(scheme, y, work, h, tilted)
+    forget_contacts(memory, work.i, work)
+    return coast(y, h, gyroscopic, tilted, scheme, work)
 
 
 @inlined
@@ -162,10 +176,10 @@ def step_worlds(
             for _ in range(steps * substeps):
                 if contact is not None and not is_clear(y[0], y[2], h, work):
                     new = substep(y, h, friction, gyroscopic, tilted, pivots, scheme, memory, report, work)
-                elif scheme is None:
-                    new = fly(y, work, h, gyroscopic, tilted)
                 else:
-                    new = fly_by_scheme(scheme, y, work, h, tilted)
+                    if contact is not None:
+                        forget_contacts(memory, i, work)
+                    new = coast(y, h, gyroscopic, tilted, scheme, work)
                 if not is_finite(new):
                     report[world, at.FAULTS] += 1.0
                     break

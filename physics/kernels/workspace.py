@@ -13,14 +13,14 @@ from __future__ import annotations
 import numpy as np
 
 from physics.kernels.layout import WALL_SIZE
-from physics.kernels.pyramid import workspace_sizes
+from physics.kernels.pyramid import normal_sizes, pyramid_sizes
 from physics.kernels.rotation import SERIES_SIZE
 
 
 def workspace_dtype(wall_count: int, features: int) -> np.dtype:
     """Record type for bodies with `features` contact features each against `wall_count` walls."""
     n = max(wall_count * features, 1)
-    float_size, int_size = workspace_sizes(n)
+    float_size, int_size = np.maximum(pyramid_sizes(n), normal_sizes(n)).tolist()
     f, i = np.float64, np.int64
     settings = [
         ("tolerance", f),  # largest residual of a contact solve, relative to the largest free contact speed

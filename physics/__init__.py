@@ -1,0 +1,40 @@
+"""A rigid-body engine written from scratch: quaternion state, impulses and complementarity, compiled by Numba.
+
+The contract in five lines::
+
+    scene = physics.Scene(bodies=[physics.Block(size=(5, 3, 2), mass=6.0, pos=(0, 6, 0))],
+                          walls=physics.three_walls(half_width=10.0),
+                          effects=[physics.Gravity(), physics.Contact(restitution=0.3), physics.Friction(0.5)])
+    world = physics.World(scene, worlds=1024, dt=0.01, accuracy="balanced", threads=2)
+    report = world.step(wrench)
+"""
+
+from physics.accuracy import PRESETS, Accuracy
+from physics.effects import Contact, Friction, Gravity
+from physics.plan import make_plan
+from physics.report import Solver, Status, StepReport
+from physics.scene import HalfSpace, Scene, corner, three_walls
+from physics.shapes import Block, Body, Ellipsoid, Sphere
+from physics.world import Snapshot, World
+
+__all__ = [
+    "PRESETS",
+    "Accuracy",
+    "Block",
+    "Body",
+    "Contact",
+    "Ellipsoid",
+    "Friction",
+    "Gravity",
+    "HalfSpace",
+    "Scene",
+    "Snapshot",
+    "Solver",
+    "Sphere",
+    "Status",
+    "StepReport",
+    "World",
+    "corner",
+    "make_plan",
+    "three_walls",
+]

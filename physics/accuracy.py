@@ -1,0 +1,89 @@
+"""How finely a scene is simulated: presets and their knobs."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+from physics import checks
+from physics.kernels import schemes
+
+# Free-motion schemes by name; 0 is the exact flow.
+SCHEMES = {
+    "exact": 0,
+    "explicit_euler": schemes.EXPLICIT_EULER,
+    "semi_implicit_euler": schemes.SEMI_IMPLICIT_EULER,
+    "midpoint": schemes.MIDPOINT,
+    "rk4": schemes.RK4,
+}
+SOLVERS = ("sweeps", "sweeps+pivoting")
+
+
+@dataclass(frozen=True)
+class Accuracy:
+    """Every knob of a simulation; `Accuracy()` is the preset ``balanced``.
+
+    Parameters
+    ----------
+    substeps : int
+        Parts into which each `dt` is cut.
+    scheme : str
+        How free motion is integrated: ``exact`` (parabola and free rotation to rounding; second order in an
+        applied torque), or a textbook scheme to compare with: ``explicit_euler``, ``semi_implicit_euler``,
+        ``midpoint``, ``rk4``. While a body touches a wall Moreau's midpoint step is used whatever the scheme.
+    solver : str
+        ``sweeps+pivoting``: contact problems are solved directly where all contacts hold or slide, else by
+        sweeps over the exact friction cones, and by Lemke (Dantzig without friction) where those do not reach
+        the tolerance. ``sweeps``: without that last resort.
+    tolerance : float
+        Largest residual of a contact problem, relative to its largest free contact speed.
+    iterations : int
+        Sweeps per contact problem at most.
+    impacts : int
+        Impacts of one body that one substep resolves in time; more are treated as plastic and reported.
+    slop : float
+        Gap within which a feature touches a wall, and error of the place of an impact, in bounding radii.
+    rest_share : float
+        A rebound that would be over within this share of the substep is not made (restitution acts as 0): the
+        bounce threshold. 0 lets every rebound happen.
+    """
+
+    substeps: int = 1
+    scheme: str = "exact"
+    solver: str = "sweeps+pivoting"
+    tolerance: float = 1e-6
+    iterations: int = 200
+    impacts: int = 8
+    slop: float = 1e-6
+    rest_share: float = 0.5
+
+    def __post_init__(self):
+        checks.count(self.substeps, "Accuracy.substeps")
+        checks.count(self.iterations, "Accuracy.iterations")
+        checks.count(self.impacts, "Accuracy.impacts")
+        checks.positive(self.tolerance, (), "Accuracy.tolerance")
+        checks.positive(self.slop, (), "Accuracy.slop")
+        checks.share(self.rest_share, (), "Accuracy.rest_share")
+        if self.scheme not in SCHEMES:
+            raise ValueError(f"Accuracy.scheme is {self.scheme!r}; allowed are {', '.join(SCHEMES)}")
+        if self.solver not in SOLVERS:
+            raise ValueError(f"Accuracy.solver is {self.solver!r}; allowed are {', '.join(SOLVERS)}")
+
+
+_BALANCED = Accuracy()
+PRESETS = {
+    "fast": replace(_BALANCED, solver="sweeps", tolerance=1e-3, iterations=20, impacts=4, slop=1e-5),
+    "balanced": _BALANCED,
+    "precise": replace(_BALANCED, substeps=10, tolerance=1e-10, iterations=2000, impacts=32, slop=1e-9),
+    "reference": replace(_BALANCED, substeps=100, tolerance=1e-12, iterations=10_000, impacts=64, slop=1e-11),
+}
+
+
+def resolve(accuracy: str | Accuracy) -> Accuracy:
+    """The `Accuracy` of a preset's name, or the one given."""
+    if isinstance(accuracy, Accuracy):
+        return accuracy
+    if accuracy in PRESETS:
+        return PRESETS[accuracy]
+    raise ValueError(
+        f"accuracy is {accuracy!r}; allowed are {', '.join(PRESETS)}, or a physics.Accuracy(...)"
+    )

@@ -1,0 +1,63 @@
+"""Looking at a state without advancing it: gaps, contact points, momenta in and out of the stored form."""
+
+from __future__ import annotations
+
+from physics.kernels import geometry as geo
+from physics.kernels import layout as at
+from physics.kernels import quaternion as qt
+from physics.kernels.compiler import kernel
+
+
+@kernel
+def principal_matrix(state, params, i):
+    """Rotation matrix (9 scalars) from the principal frame of row i to the world."""
+    q = (state[i, at.QUAT], state[i, at.QUAT + 1], state[i, at.QUAT + 2], state[i, at.QUAT + 3])
+    p = at.PRINCIPAL
+    return qt.to_matrix(qt.multiply(q, (params[i, p], params[i, p + 1], params[i, p + 2], params[i, p + 3])))
+
+
+@kernel
+def angular_momenta(rows, state, params):
+    """Write L = R I Rᵀ ω [kg m²/s] into the given rows of `state` from their ω."""
+    for k in range(rows.shape[0]):
+        i = rows[k]
+        w = (state[i, at.ANGVEL], state[i, at.ANGVEL + 1], state[i, at.ANGVEL + 2])
+        L = (0.0, 0.0, 0.0)
+        if w[0] != 0.0 or w[1] != 0.0 or w[2] != 0.0:
+            R = principal_matrix(state, params, i)
+            m = qt.transposed_matvec(R, w)
+            j = at.INV_INERTIA
+            L = qt.matvec(R, (m[0] / params[i, j], m[1] / params[i, j + 1], m[2] / params[i, j + 2]))
+        state[i, at.ANGMOM], state[i, at.ANGMOM + 1], state[i, at.ANGMOM + 2] = L
+
+
+@kernel
+def deepest_gaps(rows, state, params, shapes, walls, gaps, which):
+    """Smallest gap [m] of each given row over all walls, and the wall it is at (-1 without walls)."""
+    for k in range(rows.shape[0]):
+        i = rows[k]
+        x = (state[i, at.POS], state[i, at.POS + 1], state[i, at.POS + 2])
+        R = qt.to_matrix((state[i, at.QUAT], state[i, at.QUAT + 1], state[i, at.QUAT + 2], state[i, at.QUAT + 3]))
+        d = (params[i, at.DIMENSIONS], params[i, at.DIMENSIONS + 1], params[i, at.DIMENSIONS + 2])
+        shape = shapes[i % shapes.shape[0]]
+        gaps[k], which[k] = 1.0e300, -1
+        for w in range(walls.shape[0]):
+            n = (walls[w, at.NORMAL], walls[w, at.NORMAL + 1], walls[w, at.NORMAL + 2])
+            gap = qt.dot(n, x) - walls[w, at.OFFSET] - geo.support(shape, d, geo.scaled_normal(shape, d, R, n))
+            if gap < gaps[k]:
+                gaps[k], which[k] = gap, w
+
+
+@kernel
+def contact_point(state, params, shapes, walls, i, wall, feature, out):
+    """World position [m] of a feature (see `layout.VERTEX_COUNT`) of row i, into out (3,)."""
+    R = qt.to_matrix((state[i, at.QUAT], state[i, at.QUAT + 1], state[i, at.QUAT + 2], state[i, at.QUAT + 3]))
+    d = (params[i, at.DIMENSIONS], params[i, at.DIMENSIONS + 1], params[i, at.DIMENSIONS + 2])
+    shape = shapes[i % shapes.shape[0]]
+    if shape == at.BLOCK:
+        r = geo.vertex_arm(d, R, feature)
+    else:
+        n = (walls[wall, at.NORMAL], walls[wall, at.NORMAL + 1], walls[wall, at.NORMAL + 2])
+        r = geo.support_arm(shape, d, R, n, geo.scaled_normal(shape, d, R, n))
+    for c in range(3):
+        out[c] = state[i, at.POS + c] + r[c]

@@ -1,0 +1,150 @@
+"""From a scene to what is compiled: which effects are on, why, and the switches of the kernel."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from physics.accuracy import SCHEMES, Accuracy
+from physics.effects import Contact, Friction, Gravity
+from physics.inertia import principal_axes
+from physics.kernels.layout import BLOCK, ELLIPSOID, SPHERE, VERTEX_COUNT
+from physics.scene import Scene
+
+SHAPE_CODES = {"block": BLOCK, "sphere": SPHERE, "ellipsoid": ELLIPSOID}
+
+# Moments that differ by less than this share are equal to rounding: the gyroscopic torque would be noise.
+ISOTROPY_TOLERANCE = 1e-14
+
+
+@dataclass(frozen=True)
+class Row:
+    """One effect in the plan."""
+
+    effect: str
+    is_on: bool
+    reason: str
+    compiled: str
+
+
+@dataclass(frozen=True)
+class Plan:
+    """The switches that the kernel is compiled for, and the reasons. None is off, True is on."""
+
+    contact: bool | None
+    friction: bool | None
+    restitution: bool | None
+    gravity: bool | None
+    gyroscopic: bool | None
+    tilted: bool | None
+    pivots: bool | None
+    scheme: int | None
+    features: int
+    rows: tuple[Row, ...]
+
+    @property
+    def key(self) -> tuple:
+        """What distinguishes one compiled kernel from another."""
+        return (
+            self.contact, self.friction, self.restitution, self.gravity, self.gyroscopic, self.tilted,
+            self.pivots, self.scheme is None, self.features,
+        )  # fmt: skip
+
+    def allows(self, inertia: np.ndarray) -> bool:
+        """Whether the kernel of this plan can turn a body with this tensor."""
+        if not self.gyroscopic:
+            return is_isotropic(inertia)
+        return bool(self.tilted) or not is_tilted(inertia)
+
+    def explain(self) -> str:
+        """The plan as text: every effect, on or off, why, and what is compiled for it."""
+        width = max(len(row.effect) for row in self.rows)
+        lines = [
+            f"{row.effect:<{width}}  {'on ' if row.is_on else 'off'}  {row.reason}"
+            + (f" [{row.compiled}]" if row.compiled else "")
+            for row in self.rows
+        ]
+        return "\n".join(lines)
+
+
+def is_isotropic(inertia: np.ndarray) -> bool:
+    """Whether all moments are equal to rounding: then ω stays constant in free flight."""
+    moments, _ = principal_axes(inertia)
+    return float(np.ptp(moments)) <= ISOTROPY_TOLERANCE * float(np.max(moments))
+
+
+def is_tilted(inertia: np.ndarray) -> bool:
+    """Whether the principal axes are not the body axes."""
+    _, R = principal_axes(inertia)
+    return not np.array_equal(R, np.eye(3))
+
+
+def make_plan(scene: Scene, accuracy: Accuracy) -> Plan:
+    """Decide what a scene needs at an accuracy."""
+    contact, friction, gravity = (scene.effect(kind) for kind in (Contact, Friction, Gravity))
+    touching = contact is not None and bool(scene.walls)
+    isotropic = all(is_isotropic(body.inertia) for body in scene.bodies)
+    tilted = not isotropic and any(is_tilted(body.inertia) for body in scene.bodies)
+    has_block = any(body.kind == "block" for body in scene.bodies)
+    restitution = touching and contact.restitution is not None
+    rubbing = touching and friction is not None
+    scheme = SCHEMES[accuracy.scheme]
+    return Plan(
+        contact=touching or None,
+        friction=rubbing or None,
+        restitution=restitution or None,
+        gravity=(gravity is not None) or None,
+        gyroscopic=(not isotropic) or None,
+        tilted=tilted or None,
+        pivots=(touching and accuracy.solver == "sweeps+pivoting") or None,
+        scheme=scheme or None,
+        features=VERTEX_COUNT if has_block else 1,
+        rows=(
+            _gravity_row(gravity),
+            Row("applied wrench", True, "given to step(wrench); None compiles it out", "step(None) has its own kernel"),
+            _contact_row(scene, contact, touching),
+            _friction_row(friction, rubbing),
+            _restitution_row(contact, touching),
+            _gyroscopic_row(isotropic, tilted),
+            Row("free motion", True, f"scheme {accuracy.scheme}, {accuracy.substeps} substep(s) per dt", ""),
+        ),
+    )
+
+
+def _gravity_row(gravity) -> Row:
+    if gravity is None:
+        return Row("gravity", False, "not declared", "")
+    return Row("gravity", True, f"declared: {gravity.acceleration} m/s²", "acceleration per world")
+
+
+def _contact_row(scene, contact, touching) -> Row:
+    if touching:
+        return Row("wall contact", True, f"declared; {len(scene.walls)} wall(s)", "detection, impacts, solver")
+    if contact is not None:
+        return Row("wall contact", False, "declared, but the scene has no walls", "")
+    reason = "not declared: the walls do not act" if scene.walls else "not declared"
+    return Row("wall contact", False, reason, "")
+
+
+def _friction_row(friction, rubbing) -> Row:
+    if rubbing:
+        return Row("friction", True, f"declared: μ = {friction.coefficient}", "three rows per contact, circular cone")
+    if friction is not None:
+        return Row("friction", False, "declared, but the scene has no walls", "")
+    return Row("friction", False, "not declared", "")
+
+
+def _restitution_row(contact, touching) -> Row:
+    if contact is None or contact.restitution is None:
+        return Row("restitution", False, "not declared: impacts are plastic", "")
+    if not touching:
+        return Row("restitution", False, "declared, but the scene has no walls", "")
+    return Row("restitution", True, f"declared: e = {contact.restitution}", "Newton's law at impacts")
+
+
+def _gyroscopic_row(isotropic, tilted) -> Row:
+    if isotropic:
+        return Row("gyroscopic torque", False, "automatic: all moments of every body are equal", "")
+    note = "free-rotation flow" + (", principal axes tilted against body axes" if tilted else "")
+    return Row("gyroscopic torque", True, "automatic: moments of inertia differ", note)

@@ -1,0 +1,108 @@
+"""What a step says about itself, per world. Nothing fails silently."""
+
+from __future__ import annotations
+
+from enum import IntEnum
+
+import numpy as np
+
+from physics.kernels import layout as at
+
+
+class Solver(IntEnum):
+    """The strongest contact method that a step needed."""
+
+    NONE = 0
+    DIRECT = 1
+    SWEEPS = 2
+    PIVOTING = 3
+
+
+class Status(IntEnum):
+    """How a world's step went."""
+
+    OK = 0
+    UNRESOLVED = 1
+    UNCONVERGED = 2
+    FAULT = 3
+
+    @property
+    def message(self) -> str:
+        """What happened, and what to do."""
+        return _MESSAGES[self]
+
+
+_MESSAGES = {
+    Status.OK: "every contact problem met its tolerance",
+    Status.UNRESOLVED: (
+        "more impacts in one substep than Accuracy.impacts: the rest of the substep was plastic; raise impacts "
+        "or substeps if the bounces matter"
+    ),
+    Status.UNCONVERGED: (
+        "a contact problem kept a residual above Accuracy.tolerance; raise iterations, use "
+        "solver='sweeps+pivoting', or loosen the tolerance"
+    ),
+    Status.FAULT: (
+        "a body's new state was not finite and its old state was kept; look at the wrench and parameters of this "
+        "world, and shorten the step"
+    ),
+}
+
+
+class StepReport:
+    """Report of one `World.step`; every property is an array over worlds.
+
+    Attributes
+    ----------
+    penetration : (worlds,) float64
+        Worst depth of a contact [m].
+    residual : (worlds,) float64
+        Worst natural-map residual accepted, relative to the free contact speed (see `physics.kernels.sweeps`).
+    iterations, solves, fallbacks, unconverged, impacts, unresolved, faults : (worlds,) int64
+        Sweeps; contact problems; of these, by the pivoting fallback; of these, above the tolerance; impacts that
+        cut a substep; substeps with more impacts than allowed; bodies whose new state was not finite.
+    """
+
+    __slots__ = ("_table",)
+
+    def __init__(self, table: np.ndarray):
+        self._table = table
+
+    penetration = property(lambda self: self._table[:, at.PENETRATION])
+    residual = property(lambda self: self._table[:, at.RESIDUAL])
+    iterations = property(lambda self: self._table[:, at.ITERATIONS].astype(np.int64))
+    solves = property(lambda self: self._table[:, at.SOLVES].astype(np.int64))
+    fallbacks = property(lambda self: self._table[:, at.FALLBACKS].astype(np.int64))
+    unconverged = property(lambda self: self._table[:, at.UNCONVERGED].astype(np.int64))
+    impacts = property(lambda self: self._table[:, at.SPLITS].astype(np.int64))
+    unresolved = property(lambda self: self._table[:, at.UNRESOLVED].astype(np.int64))
+    faults = property(lambda self: self._table[:, at.FAULTS].astype(np.int64))
+
+    @property
+    def solver(self) -> np.ndarray:
+        """(worlds,) int64, values of `Solver`."""
+        return self._table[:, at.SOLVER].astype(np.int64)
+
+    @property
+    def status(self) -> np.ndarray:
+        """(worlds,) int64, values of `Status`: the gravest thing that happened."""
+        t = self._table
+        status = np.where(t[:, at.UNRESOLVED] > 0, int(Status.UNRESOLVED), int(Status.OK))
+        status = np.where(t[:, at.UNCONVERGED] > 0, int(Status.UNCONVERGED), status)
+        return np.where(t[:, at.FAULTS] > 0, int(Status.FAULT), status)
+
+    @property
+    def ok(self) -> bool:
+        """Whether every world's contact problems met their tolerance and every state stayed finite."""
+        return not (self._table[:, at.UNCONVERGED].any() or self._table[:, at.FAULTS].any())
+
+    def messages(self) -> dict[int, str]:
+        """World index -> message, for the worlds whose status is not OK."""
+        status = self.status
+        return {int(w): Status(int(status[w])).message for w in np.flatnonzero(status)}
+
+    def __repr__(self) -> str:
+        return (
+            f"StepReport(worlds={len(self._table)}, ok={self.ok}, penetration={self.penetration.max():.3g} m, "
+            f"residual={self.residual.max():.3g}, iterations={self.iterations.sum()})"
+        )

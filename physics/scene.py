@@ -1,0 +1,96 @@
+"""A scene: bodies, walls and effects. Immutable and validated; no numerics."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from physics import checks
+from physics.effects import EFFECTS, Contact, Friction
+from physics.shapes import Body
+
+
+@dataclass(frozen=True)
+class HalfSpace:
+    """The region {x : normal·x >= offset} that bodies may be in.
+
+    Parameters
+    ----------
+    normal : (3,) array_like
+        Out of the wall, into the free side; any length but zero, it is normalised.
+    offset : float
+        Of the normalised plane [m].
+    """
+
+    normal: tuple
+    offset: float = 0.0
+
+    def __post_init__(self):
+        normal = checks.finite(self.normal, (3,), "HalfSpace.normal")
+        length = float(np.linalg.norm(normal))
+        if not length > 0 or not np.isfinite(length):
+            raise ValueError(f"HalfSpace.normal is {self.normal!r}; allowed is any vector but zero")
+        object.__setattr__(self, "normal", tuple((normal / length).tolist()))
+        object.__setattr__(self, "offset", checks.number(self.offset, "HalfSpace.offset"))
+
+
+def three_walls(half_width: float = 10.0) -> list[HalfSpace]:
+    """The three-wall box: the floor y = 0 between walls at x = ±half_width [m], open to front, back and top."""
+    half_width = float(checks.positive(half_width, (), "half_width"))
+    return [HalfSpace((0, 1, 0), 0.0), HalfSpace((1, 0, 0), -half_width), HalfSpace((-1, 0, 0), -half_width)]
+
+
+def corner() -> list[HalfSpace]:
+    """The corner: the floor y = 0 and the walls x = 0 and z = 0."""
+    return [HalfSpace((0, 1, 0), 0.0), HalfSpace((1, 0, 0), 0.0), HalfSpace((0, 0, 1), 0.0)]
+
+
+@dataclass(frozen=True)
+class Scene:
+    """Bodies, walls and effects.
+
+    Parameters
+    ----------
+    bodies : sequence of Body
+        At least one.
+    walls : sequence of HalfSpace
+    effects : sequence of effects
+        At most one of each kind. `Friction` needs `Contact`.
+
+    Raises
+    ------
+    ValueError
+        Naming what is wrong; also when a body starts deep inside a wall (checked by `World`).
+    """
+
+    bodies: Sequence[Body]
+    walls: Sequence[HalfSpace] = ()
+    effects: Sequence = ()
+
+    def __post_init__(self):
+        for name, allowed in (("bodies", Body), ("walls", HalfSpace), ("effects", EFFECTS)):
+            items = getattr(self, name)
+            items = (items,) if isinstance(items, allowed) else tuple(items)
+            for k, item in enumerate(items):
+                if not isinstance(item, allowed):
+                    raise ValueError(f"Scene.{name}[{k}] is {item!r}; allowed are instances of {_names(allowed)}")
+            object.__setattr__(self, name, items)
+        if not self.bodies:
+            raise ValueError("Scene.bodies is empty; allowed is at least one body")
+        kinds = [type(effect) for effect in self.effects]
+        for kind in set(kinds):
+            if kinds.count(kind) > 1:
+                raise ValueError(f"Scene.effects holds {kinds.count(kind)} {kind.__name__}; allowed is one")
+        if Friction in kinds and Contact not in kinds:
+            raise ValueError("Scene.effects holds Friction without Contact; add physics.Contact()")
+
+    def effect(self, kind: type):
+        """The scene's effect of this class, or None."""
+        return next((effect for effect in self.effects if isinstance(effect, kind)), None)
+
+
+def _names(allowed) -> str:
+    kinds = allowed if isinstance(allowed, tuple) else (allowed,)
+    return ", ".join(kind.__name__ for kind in kinds)

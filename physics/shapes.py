@@ -1,0 +1,160 @@
+"""The bodies of a scene: immutable descriptions, no numerics beyond their mass properties."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from physics import checks, inertia
+
+
+def _tuple(array: np.ndarray) -> tuple:
+    return tuple(float(v) for v in np.ravel(array))
+
+
+@dataclass(frozen=True, kw_only=True)
+class Body:
+    """What all bodies have in common; use `Block`, `Sphere` or `Ellipsoid`.
+
+    Parameters
+    ----------
+    pos, quat, linvel, angvel : array_like
+        Start: centre of mass [m], unit quaternion (w, x, y, z) from body to world, velocity [m/s] and angular
+        velocity [rad/s], world frame.
+    inertia_body : (3,) or (3, 3) array_like, optional
+        Moments, or tensor, about the centre of mass in the body frame [kg m²]. None: uniform density.
+    """
+
+    pos: tuple = (0.0, 0.0, 0.0)
+    quat: tuple = (1.0, 0.0, 0.0, 0.0)
+    linvel: tuple = (0.0, 0.0, 0.0)
+    angvel: tuple = (0.0, 0.0, 0.0)
+    inertia_body: tuple | None = None
+
+    def __post_init__(self):
+        self._set("mass", float(checks.positive(self.mass, (), "mass")))
+        for name in ("pos", "linvel", "angvel"):
+            self._set(name, _tuple(checks.finite(getattr(self, name), (3,), name)))
+        self._set("quat", _tuple(checks.unit_quaternion(self.quat, (4,), "quat")))
+        if self.inertia_body is not None:
+            tensor = inertia.check_inertia(self.inertia_body, "inertia_body")
+            self._set("inertia_body", tuple(map(_tuple, tensor)))
+
+    def _set(self, name, value):
+        object.__setattr__(self, name, value)
+
+    @property
+    def inertia(self) -> np.ndarray:
+        """(3, 3) inertia tensor about the centre of mass in the body frame [kg m²]."""
+        if self.inertia_body is not None:
+            return np.array(self.inertia_body)
+        return self.uniform_inertia(self.dimensions, self.mass)
+
+
+@dataclass(frozen=True)
+class Block(Body):
+    """A rectangular block; its body axes are its edges.
+
+    Parameters
+    ----------
+    size : (3,) array_like
+        Full edge lengths along body x, y, z [m].
+    mass : float
+        [kg].
+    """
+
+    size: tuple
+    mass: float
+    kind = "block"
+
+    def __post_init__(self):
+        self._set("size", _tuple(checks.positive(self.size, (3,), "size")))
+        super().__post_init__()
+
+    @property
+    def dimensions(self) -> np.ndarray:
+        """(3,) half edges [m]."""
+        return 0.5 * np.array(self.size)
+
+    @staticmethod
+    def uniform_inertia(dimensions, mass) -> np.ndarray:
+        """(3, 3) tensor [kg m²] of half edges `dimensions` [m] at uniform density."""
+        return inertia.block(2 * np.asarray(dimensions), mass)
+
+    @staticmethod
+    def bounding_radius(dimensions) -> float:
+        """Radius [m] of the sphere about the centre that holds the body."""
+        return float(np.linalg.norm(dimensions))
+
+
+@dataclass(frozen=True)
+class Sphere(Body):
+    """A solid sphere.
+
+    Parameters
+    ----------
+    radius : float
+        [m].
+    mass : float
+        [kg].
+    """
+
+    radius: float
+    mass: float
+    kind = "sphere"
+
+    def __post_init__(self):
+        self._set("radius", float(checks.positive(self.radius, (), "radius")))
+        super().__post_init__()
+
+    @property
+    def dimensions(self) -> np.ndarray:
+        """(3,) the radius three times [m]."""
+        return np.full(3, self.radius)
+
+    @staticmethod
+    def uniform_inertia(dimensions, mass) -> np.ndarray:
+        """(3, 3) tensor [kg m²] of a solid sphere."""
+        return inertia.solid_sphere(float(dimensions[0]), mass)
+
+    @staticmethod
+    def bounding_radius(dimensions) -> float:
+        """The radius [m]."""
+        return float(dimensions[0])
+
+
+@dataclass(frozen=True)
+class Ellipsoid(Body):
+    """A solid ellipsoid.
+
+    Parameters
+    ----------
+    semi_axes : (3,) array_like
+        Along body x, y, z [m].
+    mass : float
+        [kg].
+    """
+
+    semi_axes: tuple
+    mass: float
+    kind = "ellipsoid"
+
+    def __post_init__(self):
+        self._set("semi_axes", _tuple(checks.positive(self.semi_axes, (3,), "semi_axes")))
+        super().__post_init__()
+
+    @property
+    def dimensions(self) -> np.ndarray:
+        """(3,) semi-axes [m]."""
+        return np.array(self.semi_axes)
+
+    @staticmethod
+    def uniform_inertia(dimensions, mass) -> np.ndarray:
+        """(3, 3) tensor [kg m²] of a solid ellipsoid."""
+        return inertia.solid_ellipsoid(dimensions, mass)
+
+    @staticmethod
+    def bounding_radius(dimensions) -> float:
+        """The largest semi-axis [m]."""
+        return float(np.max(dimensions))

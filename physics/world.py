@@ -1,0 +1,399 @@
+"""A batch of independent worlds of one scene, and the step that advances them."""
+
+from __future__ import annotations
+
+import sys
+import threading
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from physics import checks, parameters
+from physics.accuracy import Accuracy, resolve
+from physics.contacts import contact_forces
+from physics.effects import Contact, Friction, Gravity
+from physics.kernels import layout as at
+from physics.kernels.probe import angular_momenta, deepest_gaps
+from physics.kernels.stages import memory_size
+from physics.kernels.step import step_worlds
+from physics.kernels.workspace import make_workspace
+from physics.plan import SHAPE_CODES, make_plan
+from physics.report import StepReport
+from physics.scene import Scene
+from physics.threads import SlicePool
+
+# A body may start this deep in a wall, in bounding radii: what a rounded or hand-typed pose may be off by.
+START_DEPTH = 1e-2
+
+# Seconds after which the first step of a plan says that it is compiling.
+COMPILE_NOTICE = 1.0
+
+
+@dataclass(frozen=True)
+class Snapshot:
+    """Everything that decides how a `World` goes on: states, warm starts, parameters, time."""
+
+    arrays: tuple[np.ndarray, ...]
+    time: float
+
+
+class World:
+    """Many worlds of one scene, stepped together and independent of each other.
+
+    The same world gives the same bits whatever the batch size, its place in the batch and the number of threads.
+
+    Parameters
+    ----------
+    scene : Scene
+    worlds : int
+        Size of the batch.
+    dt : float
+        Time that one `step` advances [s].
+    accuracy : str or Accuracy
+        ``fast``, ``balanced``, ``precise``, ``reference``, or a `physics.Accuracy`.
+    threads : int
+        Threads that share a step; the worlds are cut into as many slices.
+
+    Attributes
+    ----------
+    pos, quat, linvel, angvel : (worlds, bodies, 3|4|3|3) float64
+        Read-only views in the world frame, refreshed in place by every step; copy them to keep them.
+    time : float
+        Time since the start [s].
+
+    Raises
+    ------
+    ValueError
+        A parameter out of range, or a body that starts deep inside a wall.
+    """
+
+    def __init__(
+        self,
+        scene: Scene,
+        worlds: int = 1,
+        dt: float = 0.01,
+        accuracy: str | Accuracy = "balanced",
+        threads: int = 1,
+    ):
+        if not isinstance(scene, Scene):
+            raise ValueError(f"scene is {scene!r}; allowed is a physics.Scene")
+        self.scene = scene
+        self.worlds = checks.count(worlds, "worlds")
+        self.dt = float(checks.positive(dt, (), "dt"))
+        self.accuracy = resolve(accuracy)
+        self.threads = checks.count(threads, "threads")
+        self.plan = make_plan(scene, self.accuracy)
+        self.body_count = len(scene.bodies)
+        self.time = 0.0
+        self._allocate()
+        self._fill()
+        self._check_depth(self.state, self.params, np.arange(self.worlds), "scene")
+
+    # --- memory ------------------------------------------------------------------------------------------------
+
+    def _allocate(self) -> None:
+        rows = self.worlds * self.body_count
+        self.state = np.zeros((rows, at.STATE_SIZE))
+        self.params = np.zeros((rows, at.PARAM_SIZE))
+        self._gravity = np.zeros((self.worlds, 3))
+        self._walls = parameters.wall_table(self.scene.walls)
+        slots = max(len(self.scene.walls) * self.plan.features, 1)
+        self._memory = np.zeros((rows if self.plan.contact else 1, memory_size(slots)))
+        self._report = np.zeros((self.worlds, at.REPORT_SIZE))
+        self._shapes = np.array([SHAPE_CODES[body.kind] for body in self.scene.bodies])
+        self._prepare_threads()
+        self._bind_views()
+
+    def _prepare_threads(self) -> None:
+        self._pool = SlicePool(self.threads, self.worlds)
+        settings = self.accuracy
+        self._scratch = [
+            make_workspace(
+                self._walls, self.plan.features,
+                tolerance=settings.tolerance, sweeps=settings.iterations, splits=settings.impacts,
+                relative_slop=settings.slop, rest_share=settings.rest_share,
+            )
+            for _ in self._pool.slices
+        ]  # fmt: skip
+
+    def _bind_views(self) -> None:
+        table = self.state.reshape(self.worlds, self.body_count, at.STATE_SIZE)
+        self.pos, self.quat, self.linvel, self.angvel = (
+            table[:, :, first : first + size]
+            for first, size in ((at.POS, 3), (at.QUAT, 4), (at.LINVEL, 3), (at.ANGVEL, 3))
+        )
+        for view in (self.pos, self.quat, self.linvel, self.angvel):
+            view.flags.writeable = False
+
+    def _fill(self) -> None:
+        contact, friction, gravity = (self.scene.effect(kind) for kind in (Contact, Friction, Gravity))
+        state = self.state.reshape(self.worlds, self.body_count, at.STATE_SIZE)
+        for b, body in enumerate(self.scene.bodies):
+            state[:, b, at.POS : at.POS + 3] = body.pos
+            state[:, b, at.QUAT : at.QUAT + 4] = body.quat
+            state[:, b, at.LINVEL : at.LINVEL + 3] = body.linvel
+            state[:, b, at.ANGVEL : at.ANGVEL + 3] = body.angvel
+            row = np.zeros(at.PARAM_SIZE)
+            parameters.write_mass_properties(row, body.mass, body.inertia)
+            parameters.write_dimensions(row, body.dimensions, body.bounding_radius(body.dimensions))
+            row[at.FRICTION] = friction.coefficient if friction else 0.0
+            row[at.RESTITUTION] = (contact.restitution or 0.0) if contact else 0.0
+            self.params[b :: self.body_count] = row
+        self._gravity[:] = gravity.acceleration if gravity else 0.0
+        angular_momenta(np.arange(len(self.state)), self.state, self.params)
+
+    # --- stepping ----------------------------------------------------------------------------------------------
+
+    def step(self, wrench: ArrayLike | None = None, steps: int = 1) -> StepReport:
+        """Advance every world by `steps` times `dt`.
+
+        Parameters
+        ----------
+        wrench : (worlds, bodies, 6) array_like, optional
+            Force [N] and torque about the centre of mass [N m], world frame, held all the time. None: no wrench.
+        steps : int
+            Steps to take at once.
+
+        Returns
+        -------
+        StepReport
+            Of all these steps together.
+
+        Raises
+        ------
+        ValueError
+            A wrench of the wrong shape or not finite; nothing has moved then.
+        """
+        if wrench is not None:
+            wrench = checks.finite(wrench, (self.worlds, self.body_count, 6), "wrench").reshape(-1, 6)
+            wrench = np.ascontiguousarray(wrench)
+        if steps != 1:
+            checks.count(steps, "steps")
+        self._advance(wrench, steps, self.dt)
+        return StepReport(self._report.copy())
+
+    def _advance(self, wrench: np.ndarray | None, steps: int, dt: float) -> None:
+        """Run the kernel for `steps` steps of `dt` seconds each; the first run of a plan compiles."""
+        key = (self.plan.key, wrench is None, len(self._walls))
+        if key in _COMPILED:
+            self._run(wrench, steps, dt)
+            return
+        with _compile_notice():
+            self._launch(0, 0, 0, wrench, steps, dt)
+        _COMPILED.add(key)
+        self._run(wrench, steps, dt)
+
+    def _run(self, wrench: np.ndarray | None, steps: int, dt: float) -> None:
+        if len(self._pool.slices) == 1:
+            self._launch(0, 0, self.worlds, wrench, steps, dt)
+        else:
+            self._pool.run(lambda k, first, last: self._launch(k, first, last, wrench, steps, dt))
+        self.time += steps * dt
+
+    def _launch(self, k: int, first: int, last: int, wrench: np.ndarray | None, steps: int, dt: float) -> None:
+        plan, substeps = self.plan, self.accuracy.substeps
+        step_worlds(
+            first, last, steps, substeps, dt / substeps, self.state, self.params, self._shapes,
+            self._gravity if plan.gravity else None, wrench, plan.contact, plan.friction, plan.restitution,
+            plan.gyroscopic, plan.tilted, plan.pivots, plan.scheme, self._memory, self._report, self._scratch[k],
+        )  # fmt: skip
+
+    # --- changing ----------------------------------------------------------------------------------------------
+
+    def set_state(
+        self,
+        pos: ArrayLike | None = None,
+        quat: ArrayLike | None = None,
+        linvel: ArrayLike | None = None,
+        angvel: ArrayLike | None = None,
+        worlds: ArrayLike | None = None,
+    ) -> None:
+        """Put bodies elsewhere; what is None keeps its value.
+
+        Parameters
+        ----------
+        pos, quat, linvel, angvel : (k, bodies, 3|4|3|3) array_like, optional
+            World frame.
+        worlds : (k,) int array_like, optional
+            Indices of the worlds meant; None: all. Their contact memory is cleared.
+
+        Raises
+        ------
+        ValueError
+            Wrong shape, not finite, not a unit quaternion, or deep inside a wall. Nothing has changed then.
+        """
+        chosen = self._chosen(worlds)
+        rows = self._rows(chosen)
+        new = self.state[rows]
+        given = (("pos", pos, at.POS, 3), ("quat", quat, at.QUAT, 4), ("linvel", linvel, at.LINVEL, 3),
+                 ("angvel", angvel, at.ANGVEL, 3))  # fmt: skip
+        for name, value, first, size in given:
+            if value is None:
+                continue
+            check = checks.unit_quaternion if name == "quat" else checks.finite
+            value = check(value, (len(chosen), self.body_count, size), name)
+            new[:, first : first + size] = value.reshape(-1, size)
+        self._adopt(chosen, rows, new, self.params[rows], "set_state")
+
+    def set_parameters(
+        self,
+        mass: ArrayLike | None = None,
+        size: ArrayLike | None = None,
+        inertia_body: ArrayLike | None = None,
+        friction: ArrayLike | None = None,
+        restitution: ArrayLike | None = None,
+        gravity: ArrayLike | None = None,
+        worlds: ArrayLike | None = None,
+    ) -> None:
+        """Give worlds their own physical parameters; what is None keeps its value.
+
+        Parameters
+        ----------
+        mass, friction, restitution : (), (k,) or (k, bodies) array_like, optional
+            [kg], coefficients.
+        size : (3,), (k, 3) or (k, bodies, 3) array_like, optional
+            Full edges of a block, twice the semi-axes of an ellipsoid, three equal diameters of a sphere [m].
+            Position and velocity stay.
+        inertia_body : (3, 3), (k, 3, 3) or (k, bodies, 3, 3) array_like, optional
+            [kg m²]. Where it is None, a change of mass or size sets the uniform-density value, unless the
+            scene's body has an `inertia_body` of its own, which then scales with the mass.
+        gravity : (3,) or (k, 3) array_like, optional
+            [m/s²].
+        worlds : (k,) int array_like, optional
+            Indices of the worlds meant; None: all.
+
+        Raises
+        ------
+        ValueError
+            A value out of range, an effect that the scene does not declare, or a new size that reaches deep
+            into a wall. Nothing has changed then.
+        """
+        chosen = self._chosen(worlds)
+        rows = self._rows(chosen)
+        params = self.params[rows]
+        bodies, shape = self.scene.bodies, (len(chosen), self.body_count)
+        if mass is not None or size is not None or inertia_body is not None:
+            parameters.change_inertia(params, bodies, self.plan, mass, size, inertia_body, shape)
+        if friction is not None:
+            self._needs("friction", self.plan.friction, "physics.Friction(...)")
+            params[:, at.FRICTION] = checks.non_negative(*parameters.spread(friction, shape, "friction")).ravel()
+        if restitution is not None:
+            self._needs("restitution", self.plan.restitution, "physics.Contact(restitution=...)")
+            params[:, at.RESTITUTION] = checks.share(*parameters.spread(restitution, shape, "restitution")).ravel()
+        field = None
+        if gravity is not None:
+            self._needs("gravity", self.plan.gravity, "physics.Gravity(...)")
+            field = np.broadcast_to(checks.finite(gravity, np.shape(gravity), "gravity"), (len(chosen), 3))
+        self._adopt(chosen, rows, self.state[rows], params, "set_parameters", keep_memory=size is None)
+        if field is not None:
+            self._gravity[chosen] = field
+
+    def _needs(self, field: str, is_on, effect: str) -> None:
+        if not is_on:
+            raise ValueError(f"{field} was given, but the scene does not declare it; add {effect} to Scene.effects")
+
+    def _adopt(self, chosen, rows, state, params, what, keep_memory=False) -> None:
+        """Check new rows of state and parameters, then write them: all or nothing."""
+        self._check_depth(state, params, chosen, what)
+        angular_momenta(np.arange(len(rows)), state, params)
+        self.state[rows] = state
+        self.params[rows] = params
+        if self.plan.contact and not keep_memory:
+            self._memory[rows] = 0.0
+
+    def _check_depth(self, state, params, chosen, what) -> None:
+        if not self.plan.contact:
+            return
+        gaps, which = np.empty(len(state)), np.empty(len(state), np.int64)
+        deepest_gaps(np.arange(len(state)), state, params, self._shapes, self._walls, gaps, which)
+        bad = np.flatnonzero(gaps < -START_DEPTH * params[:, at.RADIUS])
+        if len(bad):
+            k = int(bad[0])
+            raise ValueError(
+                f"{what}: pos {state[k, at.POS : at.POS + 3].tolist()} of body {k % self.body_count} in world "
+                f"{int(chosen[k // self.body_count])} is {-gaps[k]:.6g} m inside walls[{which[k]}]; allowed is at most "
+                f"{START_DEPTH * params[k, at.RADIUS]:.3g} m"
+            )
+
+    def _chosen(self, worlds) -> np.ndarray:
+        if worlds is None:
+            return np.arange(self.worlds)
+        chosen = np.asarray(worlds)
+        if chosen.dtype == bool and chosen.shape == (self.worlds,):
+            chosen = np.flatnonzero(chosen)
+        if chosen.ndim != 1 or (chosen.size and not np.issubdtype(chosen.dtype, np.integer)):
+            raise ValueError(f"worlds is {worlds!r}; allowed are indices or a mask of {self.worlds} worlds")
+        if chosen.size and not (0 <= chosen.min() and chosen.max() < self.worlds):
+            raise ValueError(f"worlds is {worlds!r}; allowed are indices from 0 to {self.worlds - 1}")
+        return chosen.astype(np.int64)
+
+    def _rows(self, chosen: np.ndarray) -> np.ndarray:
+        return (chosen[:, None] * self.body_count + np.arange(self.body_count)).ravel()
+
+    # --- keeping and looking -----------------------------------------------------------------------------------
+
+    def _kept(self) -> tuple[np.ndarray, ...]:
+        return self.state, self.params, self._gravity, self._memory, self._report
+
+    def snapshot(self) -> Snapshot:
+        """All that decides the future, copied; `restore` continues bit-identically, warm starts and all."""
+        return Snapshot(tuple(array.copy() for array in self._kept()), self.time)
+
+    def restore(self, snapshot: Snapshot) -> None:
+        """Go back to a snapshot of this world, or of one of the same scene and batch size."""
+        kept = self._kept()
+        if [array.shape for array in kept] != [array.shape for array in snapshot.arrays]:
+            raise ValueError("snapshot is of another scene or batch size; allowed is one of this scene and batch size")
+        for array, value in zip(kept, snapshot.arrays):
+            array[...] = value
+        self.time = snapshot.time
+
+    def contacts(self, world: int = 0) -> tuple[np.ndarray, np.ndarray]:
+        """Contact points and forces of one world's last step.
+
+        Returns
+        -------
+        points : (n, 3) float64
+            World frame [m].
+        forces : (n, 3) float64
+            On the bodies, averaged over the last resting stage, world frame [N].
+        """
+        if not 0 <= world < self.worlds:
+            raise ValueError(f"world is {world!r}; allowed are indices from 0 to {self.worlds - 1}")
+        rows = range(world * self.body_count, (world + 1) * self.body_count)
+        if not self.plan.contact:
+            return np.zeros((0, 3)), np.zeros((0, 3))
+        return contact_forces(
+            rows, self._memory, self.state, self.params, self._shapes, self._walls, self.plan.features
+        )
+
+    def __getstate__(self):
+        kept = dict(vars(self))
+        for name in ("_pool", "_scratch", "pos", "quat", "linvel", "angvel"):
+            del kept[name]
+        return kept
+
+    def __setstate__(self, kept):
+        vars(self).update(kept)
+        self._prepare_threads()
+        self._bind_views()
+
+    def __repr__(self) -> str:
+        return f"World({self.worlds} worlds of {self.body_count} bodies, dt={self.dt}, time={self.time:.6g} s)"
+
+
+_COMPILED: set[tuple] = set()
+
+
+class _compile_notice:
+    """Says on standard error that a kernel is being compiled, if it takes long enough to notice."""
+
+    def __enter__(self):
+        text = "rigid-env: compiling the kernel of this scene, once (it is kept for later runs) ..."
+        self._timer = threading.Timer(COMPILE_NOTICE, lambda: print(text, file=sys.stderr, flush=True))
+        self._timer.daemon = True
+        self._timer.start()
+
+    def __exit__(self, *_):
+        self._timer.cancel()
