@@ -10,11 +10,13 @@ The contract in five lines::
 """
 
 from physics.accuracy import PRESETS, Accuracy
+from physics.diagnostics import Diagnostics, diagnose
 from physics.effects import Contact, Friction, Gravity
 from physics.plan import make_plan
 from physics.report import Solver, Status, StepReport
 from physics.scene import HalfSpace, Scene, corner, three_walls
 from physics.shapes import Block, Body, Ellipsoid, Sphere
+from physics.trajectory import Event, Trajectory, simulate
 from physics.world import Snapshot, World
 
 __all__ = [
@@ -23,7 +25,9 @@ __all__ = [
     "Block",
     "Body",
     "Contact",
+    "Diagnostics",
     "Ellipsoid",
+    "Event",
     "Friction",
     "Gravity",
     "HalfSpace",
@@ -33,8 +37,11 @@ __all__ = [
     "Sphere",
     "Status",
     "StepReport",
+    "Trajectory",
     "World",
     "corner",
+    "diagnose",
     "make_plan",
+    "simulate",
     "three_walls",
 ]

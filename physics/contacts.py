@@ -24,3 +24,9 @@ def contact_forces(rows, memory, state, params, shapes, walls, features) -> tupl
             points.append(point)
             forces.append(frame.T @ impulse / length)
     return np.array(points).reshape(-1, 3), np.array(forces).reshape(-1, 3)
+
+
+def walls_touched(memory_row: np.ndarray, features: int) -> set[int]:
+    """Indices of the walls that a body rests against."""
+    slots = memory_row[MEMORY_HEAD : MEMORY_HEAD + int(memory_row[1])]
+    return {int(slot) // features for slot in slots}

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from physics import checks, parameters
 from physics.accuracy import Accuracy, resolve
-from physics.contacts import contact_forces
+from physics.contacts import contact_forces, walls_touched
 from physics.effects import Contact, Friction, Gravity
 from physics.kernels import layout as at
 from physics.kernels.probe import angular_momenta, deepest_gaps
@@ -59,6 +59,8 @@ class World:
     ----------
     pos, quat, linvel, angvel : (worlds, bodies, 3|4|3|3) float64
         Read-only views in the world frame, refreshed in place by every step; copy them to keep them.
+    state : (worlds * bodies, STATE_SIZE) float64
+        The array behind them, for kernels that read it; columns in `physics.kernels.layout`.
     time : float
         Time since the start [s].
 
@@ -96,12 +98,12 @@ class World:
         rows = self.worlds * self.body_count
         self.state = np.zeros((rows, at.STATE_SIZE))
         self.params = np.zeros((rows, at.PARAM_SIZE))
-        self._gravity = np.zeros((self.worlds, 3))
-        self._walls = parameters.wall_table(self.scene.walls)
+        self.gravity = np.zeros((self.worlds, 3))
+        self.walls = parameters.wall_table(self.scene.walls)
         slots = max(len(self.scene.walls) * self.plan.features, 1)
         self._memory = np.zeros((rows if self.plan.contact else 1, memory_size(slots)))
         self._report = np.zeros((self.worlds, at.REPORT_SIZE))
-        self._shapes = np.array([SHAPE_CODES[body.kind] for body in self.scene.bodies])
+        self.shapes = np.array([SHAPE_CODES[body.kind] for body in self.scene.bodies])
         self._prepare_threads()
         self._bind_views()
 
@@ -110,7 +112,7 @@ class World:
         settings = self.accuracy
         self._scratch = [
             make_workspace(
-                self._walls, self.plan.features,
+                self.walls, self.plan.features,
                 tolerance=settings.tolerance, sweeps=settings.iterations, splits=settings.impacts,
                 relative_slop=settings.slop, rest_share=settings.rest_share,
             )
@@ -140,12 +142,12 @@ class World:
             row[at.FRICTION] = friction.coefficient if friction else 0.0
             row[at.RESTITUTION] = (contact.restitution or 0.0) if contact else 0.0
             self.params[b :: self.body_count] = row
-        self._gravity[:] = gravity.acceleration if gravity else 0.0
+        self.gravity[:] = gravity.acceleration if gravity else 0.0
         angular_momenta(np.arange(len(self.state)), self.state, self.params)
 
     # --- stepping ----------------------------------------------------------------------------------------------
 
-    def step(self, wrench: ArrayLike | None = None, steps: int = 1) -> StepReport:
+    def step(self, wrench: ArrayLike | None = None, steps: int = 1, dt: float | None = None) -> StepReport:
         """Advance every world by `steps` times `dt`.
 
         Parameters
@@ -154,6 +156,8 @@ class World:
             Force [N] and torque about the centre of mass [N m], world frame, held all the time. None: no wrench.
         steps : int
             Steps to take at once.
+        dt : float, optional
+            Instead of the world's, for this call [s].
 
         Returns
         -------
@@ -170,12 +174,13 @@ class World:
             wrench = np.ascontiguousarray(wrench)
         if steps != 1:
             checks.count(steps, "steps")
-        self._advance(wrench, steps, self.dt)
+        dt = self.dt if dt is None else float(checks.positive(dt, (), "dt"))
+        self._advance(wrench, steps, dt)
         return StepReport(self._report.copy())
 
     def _advance(self, wrench: np.ndarray | None, steps: int, dt: float) -> None:
         """Run the kernel for `steps` steps of `dt` seconds each; the first run of a plan compiles."""
-        key = (self.plan.key, wrench is None, len(self._walls))
+        key = (self.plan.key, wrench is None, len(self.walls))
         if key in _COMPILED:
             self._run(wrench, steps, dt)
             return
@@ -194,8 +199,8 @@ class World:
     def _launch(self, k: int, first: int, last: int, wrench: np.ndarray | None, steps: int, dt: float) -> None:
         plan, substeps = self.plan, self.accuracy.substeps
         step_worlds(
-            first, last, steps, substeps, dt / substeps, self.state, self.params, self._shapes,
-            self._gravity if plan.gravity else None, wrench, plan.contact, plan.friction, plan.restitution,
+            first, last, steps, substeps, dt / substeps, self.state, self.params, self.shapes,
+            self.gravity if plan.gravity else None, wrench, plan.contact, plan.friction, plan.restitution,
             plan.gyroscopic, plan.tilted, plan.pivots, plan.scheme, self._memory, self._report, self._scratch[k],
         )  # fmt: skip
 
@@ -287,7 +292,7 @@ class World:
             field = np.broadcast_to(checks.finite(gravity, np.shape(gravity), "gravity"), (len(chosen), 3))
         self._adopt(chosen, rows, self.state[rows], params, "set_parameters", keep_memory=size is None)
         if field is not None:
-            self._gravity[chosen] = field
+            self.gravity[chosen] = field
 
     def _needs(self, field: str, is_on, effect: str) -> None:
         if not is_on:
@@ -306,7 +311,7 @@ class World:
         if not self.plan.contact:
             return
         gaps, which = np.empty(len(state)), np.empty(len(state), np.int64)
-        deepest_gaps(np.arange(len(state)), state, params, self._shapes, self._walls, gaps, which)
+        deepest_gaps(np.arange(len(state)), state, params, self.shapes, self.walls, gaps, which)
         bad = np.flatnonzero(gaps < -START_DEPTH * params[:, at.RADIUS])
         if len(bad):
             k = int(bad[0])
@@ -334,7 +339,7 @@ class World:
     # --- keeping and looking -----------------------------------------------------------------------------------
 
     def _kept(self) -> tuple[np.ndarray, ...]:
-        return self.state, self.params, self._gravity, self._memory, self._report
+        return self.state, self.params, self.gravity, self._memory, self._report
 
     def snapshot(self) -> Snapshot:
         """All that decides the future, copied; `restore` continues bit-identically, warm starts and all."""
@@ -365,8 +370,15 @@ class World:
         if not self.plan.contact:
             return np.zeros((0, 3)), np.zeros((0, 3))
         return contact_forces(
-            rows, self._memory, self.state, self.params, self._shapes, self._walls, self.plan.features
+            rows, self._memory, self.state, self.params, self.shapes, self.walls, self.plan.features
         )
+
+    def touching(self, world: int = 0) -> set[tuple[int, int]]:
+        """(body, wall) of every resting contact of one world at its last step."""
+        if not self.plan.contact:
+            return set()
+        rows = range(world * self.body_count, (world + 1) * self.body_count)
+        return {(b, wall) for b, i in enumerate(rows) for wall in walls_touched(self._memory[i], self.plan.features)}
 
     def __getstate__(self):
         kept = dict(vars(self))

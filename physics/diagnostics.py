@@ -1,0 +1,47 @@
+"""Energy, momenta and gaps of a world: what one looks at, never what the step needs."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from physics.kernels import layout as at
+from physics.kernels.probe import deepest_gaps
+from physics.world import World
+
+
+@dataclass(frozen=True)
+class Diagnostics:
+    """Per world and body, shape (worlds, bodies) or (worlds, bodies, 3)."""
+
+    kinetic_energy: np.ndarray  # [J]
+    potential_energy: np.ndarray  # [J], zero at the origin
+    momentum: np.ndarray  # [kg m/s], world frame
+    angular_momentum: np.ndarray  # about the centre of mass [kg m²/s], world frame
+    gap: np.ndarray  # smallest distance to a wall [m], negative when penetrating, inf without walls
+
+    @property
+    def energy(self) -> np.ndarray:
+        """Kinetic and potential energy [J], (worlds, bodies)."""
+        return self.kinetic_energy + self.potential_energy
+
+
+def diagnose(world: World) -> Diagnostics:
+    """Energy, momenta and gaps of every body of `world` now.
+
+    Kinetic energy is ½ P·v + ½ L·ω, potential energy -m g·x.
+    """
+    shape = (world.worlds, world.body_count)
+    mass = 1.0 / world.params[:, at.INV_MASS].reshape(shape)
+    angular = world.state[:, at.ANGMOM : at.ANGMOM + 3].reshape(*shape, 3)
+    momentum = mass[..., None] * world.linvel
+    gaps, which = np.empty(len(world.state)), np.empty(len(world.state), np.int64)
+    deepest_gaps(np.arange(len(world.state)), world.state, world.params, world.shapes, world.walls, gaps, which)
+    return Diagnostics(
+        kinetic_energy=0.5 * np.sum(momentum * world.linvel + angular * world.angvel, axis=-1),
+        potential_energy=-mass * np.sum(world.gravity[:, None, :] * world.pos, axis=-1),
+        momentum=momentum,
+        angular_momentum=angular.copy(),
+        gap=np.where(which < 0, np.inf, gaps).reshape(shape),
+    )

@@ -1,0 +1,104 @@
+"""The canonical scenes: used by tests, benchmarks, environments and demonstrations alike."""
+
+from __future__ import annotations
+
+import math
+
+from physics.effects import Contact, Friction, Gravity
+from physics.scene import HalfSpace, Scene, corner, three_walls
+from physics.shapes import Block, Sphere
+
+SIZE = (5.0, 3.0, 2.0)  # of the block [m]
+MASS = 6.0  # of the block [kg]
+GRAVITY = 9.81  # [m/s²]
+HALF_WIDTH = 10.0  # of the three-wall box [m]
+
+
+def block_in_box(
+    pos=(0.0, 6.0, 0.0), restitution: float | None = 0.3, friction: float | None = 0.5, walls: str = "three", **start
+) -> Scene:
+    """The block among three walls; `start` takes quat, linvel and angvel, `walls` is ``three`` or ``corner``."""
+    layouts = {"three": lambda: three_walls(HALF_WIDTH), "corner": corner}
+    if walls not in layouts:
+        raise ValueError(f"walls is {walls!r}; allowed are {', '.join(layouts)}")
+    effects = [Gravity((0.0, -GRAVITY, 0.0)), Contact(restitution)]
+    if friction is not None:
+        effects.append(Friction(friction))
+    return Scene([Block(SIZE, MASS, pos=pos, **start)], layouts[walls](), effects)
+
+
+def drop() -> Scene:
+    """The exercise: the block, slightly turned and spinning, falls into the three-wall box."""
+    tilt = 0.25  # [rad] about (1, 1, 0)
+    s = math.sin(tilt / 2) / math.sqrt(2)
+    return block_in_box((0.0, 6.0, 0.0), quat=(math.cos(tilt / 2), s, s, 0.0), angvel=(0.3, 0.2, 0.1))
+
+
+def flight() -> Scene:
+    """The block tumbling high above the floor of the three-wall box, turning near its intermediate axis."""
+    return block_in_box((0.0, 1e6, 0.0), angvel=(0.1, 5.0, 0.1))
+
+
+def tumble() -> Scene:
+    """The block tumbling in empty space: no gravity, no walls."""
+    return Scene([Block(SIZE, MASS, angvel=(0.1, 5.0, 0.1))])
+
+
+def rest() -> Scene:
+    """The block at rest face down on the floor of the three-wall box: four contacts."""
+    return block_in_box((0.0, SIZE[1] / 2, 0.0))
+
+
+def shove() -> Scene:
+    """The block on the floor of the three-wall box, to be shoved about by random wrenches."""
+    return block_in_box((0.0, SIZE[1] / 2, 0.0))
+
+
+def corner_drop() -> Scene:
+    """The block falls, turned, into the corner of three walls at right angles."""
+    half = 0.5 * 0.7
+    s = math.sin(half) / math.sqrt(3)
+    return block_in_box((3.5, 5.0, 3.5), walls="corner", quat=(math.cos(half), s, s, s), linvel=(-1.5, 0.0, -1.0))
+
+
+def slide(speed: float = 3.0, friction: float = 0.3) -> Scene:
+    """The block slides over an endless floor along x until friction stops it: distance v²/(2 μ g)."""
+    body = Block(SIZE, MASS, pos=(0.0, SIZE[1] / 2, 0.0), linvel=(speed, 0.0, 0.0))
+    return Scene([body], [HalfSpace((0, 1, 0))], [Gravity((0, -GRAVITY, 0)), Contact(), Friction(friction)])
+
+
+def incline(angle: float, friction: float) -> Scene:
+    """The block face down on an incline of `angle` [rad] falling along +x; the wall is tilted, gravity is not."""
+    normal = (math.sin(angle), math.cos(angle), 0.0)
+    half = SIZE[1] / 2
+    body = Block(
+        SIZE, MASS, pos=(half * normal[0], half * normal[1], 0.0),
+        quat=(math.cos(angle / 2), 0.0, 0.0, -math.sin(angle / 2)),
+    )  # fmt: skip
+    return Scene([body], [HalfSpace(normal)], [Gravity((0, -GRAVITY, 0)), Contact(), Friction(friction)])
+
+
+def bounce(height: float = 1.0, restitution: float = 1.0) -> Scene:
+    """The block dropped face down from a `height` [m] of its lowest face above the floor; no friction."""
+    body = Block(SIZE, MASS, pos=(0.0, SIZE[1] / 2 + height, 0.0))
+    return Scene([body], [HalfSpace((0, 1, 0))], [Gravity((0, -GRAVITY, 0)), Contact(restitution)])
+
+
+def rolling_sphere(speed: float = 5.0, friction: float = 0.2) -> Scene:
+    """A sphere of radius 1 m and 1 kg set down sliding: it ends rolling at 5/7 of its speed."""
+    body = Sphere(1.0, 1.0, pos=(0.0, 1.0, 0.0), linvel=(speed, 0.0, 0.0))
+    return Scene([body], [HalfSpace((0, 1, 0))], [Gravity((0, -GRAVITY, 0)), Contact(), Friction(friction)])
+
+
+SCENES = {
+    function.__name__: function
+    for function in (drop, flight, tumble, rest, shove, corner_drop, slide, bounce, rolling_sphere)
+}
+SCENES["incline"] = lambda: incline(math.radians(20.0), 1.01 * math.tan(math.radians(20.0)))
+
+
+def by_name(name: str) -> Scene:
+    """The canonical scene of this name."""
+    if name not in SCENES:
+        raise ValueError(f"scene is {name!r}; allowed are {', '.join(sorted(SCENES))}")
+    return SCENES[name]()
