@@ -125,14 +125,18 @@ def _record(count, wall, feature, features, gap, speed, work):
 
 @kernel
 def nearest_outside_set(x, R, work):
-    """Smallest gap [m] over all features that are not in the contact set (`work.mask`)."""
+    """Smallest gap [m] over all features that are not in the contact set (`work.mask`).
+
+    Of a wall that the bounding sphere does not reach the sphere's gap is taken: a lower bound, and positive.
+    """
     walls, shape, radius = work.walls, work.shape, work.radius
     dims = (work.dims[0], work.dims[1], work.dims[2])
     best = 1.0e300
     for k in range(walls.shape[0]):
         n = wall_normal(walls, k)
         d = qt.dot(n, x) - walls[k, OFFSET]
-        if d - radius >= best or d > radius:
+        if d > radius:
+            best = min(best, d - radius)
             continue
         e = geo.scaled_normal(shape, dims, R, n)
         mask = work.mask[k]

@@ -102,7 +102,6 @@ def test_blocks_obey_the_pyramid_law(count):
         status, pivots, p = solve(W, b, mu)
         assert status == SOLVED
         assert pivots <= 20 * count
-        # a turned pyramid is exact only along its directions: elsewhere the polygon's own bound holds
         assert_obeys_pyramid_law(W, b, mu, p)
 
 
@@ -130,17 +129,20 @@ def test_a_call_that_returns_its_start_has_solved_the_cone(count):
     assert settled >= 8
 
 
-def test_redundant_contacts_with_degenerate_start_never_go_unsolved():
-    """Restarts from near-solutions once ended in rays: the tie tolerance was below the data's own noise."""
-    rng = np.random.default_rng(1)
+@pytest.mark.parametrize("seed", [296, 366, 438, 529, 677, 790, 1249])
+def test_redundant_contacts_seen_from_near_a_solution_ended_in_a_ray(seed):
+    """Ties as loose as the start's own error were not seen as ties, and no second path was tried.
+
+    Each of the two remedies alone saves these seeds; without both every one of them fails.
+    """
+    rng = np.random.default_rng(seed)
     J, W = block_contacts(CORNERS)
-    for _ in range(60):
-        mu = rng.choice([0.1, 0.5, 1.0])
-        b = J @ (rng.normal(size=6) * [1, 0.3, 1, 0.2, 0.5, 0.2] - [0, 1, 0, 0, 0, 0])
-        p = np.zeros(12)
-        for _ in range(30):
-            status, _, p = solve(W, b, mu, p)
-            assert status == SOLVED
+    mu = rng.choice([0.1, 0.5, 1.0])
+    b = J @ (rng.normal(size=6) * [1, 0.3, 1, 0.2, 0.5, 0.2] - [0, 1, 0, 0, 0, 0])
+    p = np.zeros(12)
+    for _ in range(15):
+        status, _, p = solve(W, b, mu, p)
+        assert status == SOLVED
 
 
 def test_scaling_by_powers_of_two_scales_p_bit_for_bit():
