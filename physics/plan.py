@@ -102,7 +102,12 @@ def make_plan(scene: Scene, accuracy: Accuracy) -> Plan:
         features=VERTEX_COUNT if has_block else 1,
         rows=(
             _gravity_row(gravity),
-            Row("applied wrench", True, "given to step(wrench); None compiles it out", "step(None) has its own kernel"),
+            Row(
+                "applied wrench",
+                True,
+                "given to step(wrench); None compiles it out",
+                "step(None) has its own kernel",
+            ),
             _contact_row(scene, contact, touching),
             _friction_row(friction, rubbing),
             _restitution_row(contact, touching),
@@ -120,7 +125,9 @@ def _gravity_row(gravity) -> Row:
 
 def _contact_row(scene, contact, touching) -> Row:
     if touching:
-        return Row("wall contact", True, f"declared; {len(scene.walls)} wall(s)", "detection, impacts, solver")
+        return Row(
+            "wall contact", True, f"declared; {len(scene.walls)} wall(s)", "detection, impacts, solver"
+        )
     if contact is not None:
         return Row("wall contact", False, "declared, but the scene has no walls", "")
     reason = "not declared: the walls do not act" if scene.walls else "not declared"
@@ -129,7 +136,9 @@ def _contact_row(scene, contact, touching) -> Row:
 
 def _friction_row(friction, rubbing) -> Row:
     if rubbing:
-        return Row("friction", True, f"declared: μ = {friction.coefficient}", "three rows per contact, circular cone")
+        return Row(
+            "friction", True, f"declared: μ = {friction.coefficient}", "three rows per contact, circular cone"
+        )
     if friction is not None:
         return Row("friction", False, "declared, but the scene has no walls", "")
     return Row("friction", False, "not declared", "")

@@ -15,7 +15,11 @@ HALF_WIDTH = 10.0  # of the three-wall box [m]
 
 
 def block_in_box(
-    pos=(0.0, 6.0, 0.0), restitution: float | None = 0.3, friction: float | None = 0.5, walls: str = "three", **start
+    pos=(0.0, 6.0, 0.0),
+    restitution: float | None = 0.3,
+    friction: float | None = 0.5,
+    walls: str = "three",
+    **start,
 ) -> Scene:
     """The block among three walls; `start` takes quat, linvel and angvel, `walls` is ``three`` or ``corner``."""
     layouts = {"three": lambda: three_walls(HALF_WIDTH), "corner": corner}
@@ -58,7 +62,9 @@ def corner_drop() -> Scene:
     """The block falls, turned, into the corner of three walls at right angles."""
     half = 0.5 * 0.7
     s = math.sin(half) / math.sqrt(3)
-    return block_in_box((3.5, 5.0, 3.5), walls="corner", quat=(math.cos(half), s, s, s), linvel=(-1.5, 0.0, -1.0))
+    return block_in_box(
+        (3.5, 5.0, 3.5), walls="corner", quat=(math.cos(half), s, s, s), linvel=(-1.5, 0.0, -1.0)
+    )
 
 
 def slide(speed: float = 3.0, friction: float = 0.3) -> Scene:

@@ -80,7 +80,13 @@ class Trajectory:
     def to_npz(self, path: str | Path) -> None:
         """Write the samples as a NumPy archive."""
         np.savez(
-            path, t=self.t, pos=self.pos, quat=self.quat, linvel=self.linvel, angvel=self.angvel, energy=self.energy
+            path,
+            t=self.t,
+            pos=self.pos,
+            quat=self.quat,
+            linvel=self.linvel,
+            angvel=self.angvel,
+            energy=self.energy,
         )
 
     def to_csv(self, path: str | Path) -> None:
@@ -90,8 +96,12 @@ class Trajectory:
             writer.writerow(("t", "body", *COLUMNS, "energy"))
             for k, t in enumerate(self.t):
                 for b in range(self.pos.shape[1]):
-                    row = np.concatenate((self.pos[k, b], self.quat[k, b], self.linvel[k, b], self.angvel[k, b]))
-                    writer.writerow((repr(float(t)), b, *map(repr, row.tolist()), repr(float(self.energy[k, b]))))
+                    row = np.concatenate(
+                        (self.pos[k, b], self.quat[k, b], self.linvel[k, b], self.angvel[k, b])
+                    )
+                    writer.writerow(
+                        (repr(float(t)), b, *map(repr, row.tolist()), repr(float(self.energy[k, b])))
+                    )
 
 
 def simulate(

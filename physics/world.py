@@ -196,7 +196,9 @@ class World:
             self._pool.run(lambda k, first, last: self._launch(k, first, last, wrench, steps, dt))
         self.time += steps * dt
 
-    def _launch(self, k: int, first: int, last: int, wrench: np.ndarray | None, steps: int, dt: float) -> None:
+    def _launch(
+        self, k: int, first: int, last: int, wrench: np.ndarray | None, steps: int, dt: float
+    ) -> None:
         plan, substeps = self.plan, self.accuracy.substeps
         step_worlds(
             first, last, steps, substeps, dt / substeps, self.state, self.params, self.shapes,
@@ -282,10 +284,14 @@ class World:
             parameters.change_inertia(params, bodies, self.plan, mass, size, inertia_body, shape)
         if friction is not None:
             self._needs("friction", self.plan.friction, "physics.Friction(...)")
-            params[:, at.FRICTION] = checks.non_negative(*parameters.spread(friction, shape, "friction")).ravel()
+            params[:, at.FRICTION] = checks.non_negative(
+                *parameters.spread(friction, shape, "friction")
+            ).ravel()
         if restitution is not None:
             self._needs("restitution", self.plan.restitution, "physics.Contact(restitution=...)")
-            params[:, at.RESTITUTION] = checks.share(*parameters.spread(restitution, shape, "restitution")).ravel()
+            params[:, at.RESTITUTION] = checks.share(
+                *parameters.spread(restitution, shape, "restitution")
+            ).ravel()
         field = None
         if gravity is not None:
             self._needs("gravity", self.plan.gravity, "physics.Gravity(...)")
@@ -296,7 +302,9 @@ class World:
 
     def _needs(self, field: str, is_on, effect: str) -> None:
         if not is_on:
-            raise ValueError(f"{field} was given, but the scene does not declare it; add {effect} to Scene.effects")
+            raise ValueError(
+                f"{field} was given, but the scene does not declare it; add {effect} to Scene.effects"
+            )
 
     def _adopt(self, chosen, rows, state, params, what, keep_memory=False) -> None:
         """Check new rows of state and parameters, then write them: all or nothing."""
@@ -349,7 +357,9 @@ class World:
         """Go back to a snapshot of this world, or of one of the same scene and batch size."""
         kept = self._kept()
         if [array.shape for array in kept] != [array.shape for array in snapshot.arrays]:
-            raise ValueError("snapshot is of another scene or batch size; allowed is one of this scene and batch size")
+            raise ValueError(
+                "snapshot is of another scene or batch size; allowed is one of this scene and batch size"
+            )
         for array, value in zip(kept, snapshot.arrays):
             array[...] = value
         self.time = snapshot.time
@@ -378,7 +388,11 @@ class World:
         if not self.plan.contact:
             return set()
         rows = range(world * self.body_count, (world + 1) * self.body_count)
-        return {(b, wall) for b, i in enumerate(rows) for wall in walls_touched(self._memory[i], self.plan.features)}
+        return {
+            (b, wall)
+            for b, i in enumerate(rows)
+            for wall in walls_touched(self._memory[i], self.plan.features)
+        }
 
     def __getstate__(self):
         kept = dict(vars(self))
@@ -392,7 +406,9 @@ class World:
         self._bind_views()
 
     def __repr__(self) -> str:
-        return f"World({self.worlds} worlds of {self.body_count} bodies, dt={self.dt}, time={self.time:.6g} s)"
+        return (
+            f"World({self.worlds} worlds of {self.body_count} bodies, dt={self.dt}, time={self.time:.6g} s)"
+        )
 
 
 _COMPILED: set[tuple] = set()

@@ -165,8 +165,16 @@ def hold_all(n, R, v, L, work):
         pn = p[0] * walls[wall, NORMAL] + p[1] * walls[wall, NORMAL + 1] + p[2] * walls[wall, NORMAL + 2]
         if not pn >= 0.0:
             return False, v, L
-        pa = p[0] * walls[wall, TANGENT_1] + p[1] * walls[wall, TANGENT_1 + 1] + p[2] * walls[wall, TANGENT_1 + 2]
-        pb = p[0] * walls[wall, TANGENT_2] + p[1] * walls[wall, TANGENT_2 + 1] + p[2] * walls[wall, TANGENT_2 + 2]
+        pa = (
+            p[0] * walls[wall, TANGENT_1]
+            + p[1] * walls[wall, TANGENT_1 + 1]
+            + p[2] * walls[wall, TANGENT_1 + 2]
+        )
+        pb = (
+            p[0] * walls[wall, TANGENT_2]
+            + p[1] * walls[wall, TANGENT_2 + 1]
+            + p[2] * walls[wall, TANGENT_2 + 2]
+        )
         if not math.sqrt(pa * pa + pb * pb) <= friction * pn:
             return False, v, L
         work.impulse[3 * i] = pn

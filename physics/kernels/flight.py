@@ -53,5 +53,17 @@ def fly_by_scheme(scheme, y, work, h, tilted):
     x, q, v, L = y
     q = principal_attitude(q, work, tilted)
     zero = (0.0, 0.0, 0.0)
-    x, q, v, L = schemes.step(scheme, x, q, v, L, zero, _vector(work.torque), _vector(work.free_acceleration), 1.0, _vector(work.J), h)
+    x, q, v, L = schemes.step(
+        scheme,
+        x,
+        q,
+        v,
+        L,
+        zero,
+        _vector(work.torque),
+        _vector(work.free_acceleration),
+        1.0,
+        _vector(work.J),
+        h,
+    )
     return x, body_attitude(q, work, tilted), v, L

@@ -76,17 +76,13 @@ def impact(n, y, h, friction, tilted, pivots, report, work):
     for k in range(3 * n):
         work.impulse[k] = 0.0
     R = qt.to_matrix(principal_attitude(q, work, tilted))
-    v, L, residual, sweeps, method = solve_contacts(
-        n, friction, pivots, v, L, R, work
-    )
+    v, L, residual, sweeps, method = solve_contacts(n, friction, pivots, v, L, R, work)
     note_solve(report, work.world, residual, sweeps, method, work.tolerance)
     return x, q, v, L
 
 
 @kernel
-def touch(
-    n, y, h, is_last, friction, gyroscopic, tilted, pivots, memory, report, work
-):
+def touch(n, y, h, is_last, friction, gyroscopic, tilted, pivots, memory, report, work):
     """State after Moreau's midpoint step over h with the n contacts of the set."""
     x, q, v, L = y
     a, torque = work.free_acceleration, work.torque
@@ -103,9 +99,7 @@ def touch(
     v = (v[0] + h * a[0], v[1] + h * a[1], v[2] + h * a[2])
     L = (L[0] + h * torque[0], L[1] + h * torque[1], L[2] + h * torque[2])
     R = qt.to_matrix(principal_attitude(q, work, tilted))
-    v, L, residual, sweeps, method = solve_contacts(
-        n, friction, pivots, v, L, R, work
-    )
+    v, L, residual, sweeps, method = solve_contacts(n, friction, pivots, v, L, R, work)
     note_solve(report, work.world, residual, sweeps, method, work.tolerance)
     store_warm_start(n, width, memory, work.i, h, work)
     x = (x[0] + half * v[0], x[1] + half * v[1], x[2] + half * v[2])

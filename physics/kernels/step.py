@@ -84,9 +84,7 @@ def kept_out(y, work):
 
 
 @kernel
-def to_next_impact(
-    n, y, h, friction, gyroscopic, tilted, pivots, scheme, memory, report, work
-):
+def to_next_impact(n, y, h, friction, gyroscopic, tilted, pivots, scheme, memory, report, work):
     """Advance by h, or to the first impact within h: (state, time advanced).
 
     An end state in which a feature outside the contact set has passed through a wall is taken back and the
@@ -126,9 +124,7 @@ def to_next_impact(
 
 
 @kernel
-def substep(
-    y, h, friction, gyroscopic, tilted, pivots, scheme, memory, report, work
-):
+def substep(y, h, friction, gyroscopic, tilted, pivots, scheme, memory, report, work):
     """State after h: impacts where they happen, flight or contact between them."""
     left = h
     world = work.world

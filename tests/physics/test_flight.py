@@ -17,7 +17,8 @@ INERTIA = np.array([6.5, 14.5, 17.0])
 def test_hard_case_4_parabola_is_exact_at_any_step(dt):
     """x = x0 + v t + g t²/2; each step rounds a few times."""
     scene = physics.Scene(
-        [physics.Block((5, 3, 2), 6.0, pos=(1, 2, 3), linvel=(4, 5, -6))], effects=[physics.Gravity((0.5, -9.81, 2))]
+        [physics.Block((5, 3, 2), 6.0, pos=(1, 2, 3), linvel=(4, 5, -6))],
+        effects=[physics.Gravity((0.5, -9.81, 2))],
     )
     world = physics.World(scene, dt=dt)
     steps = round(3.0 / dt)
@@ -60,7 +61,12 @@ def _error_of(scheme: str, dt: float) -> float:
     world.step(load, steps=round(1.0 / dt))
     start = ref.RigidState(np.zeros(3), np.array([1.0, 0, 0, 0]), np.zeros(3), INERTIA * [0.4, 1.5, -0.7])
     truth = ref.integrate_rigid_body(
-        6.0, np.diag(INERTIA), start, 1.0, gravity=np.array([0, -9.81, 0]), wrench=lambda t, Y: (np.zeros(3), torque)
+        6.0,
+        np.diag(INERTIA),
+        start,
+        1.0,
+        gravity=np.array([0, -9.81, 0]),
+        wrench=lambda t, Y: (np.zeros(3), torque),
     )
     return ref.orientation_error(world.quat[0, 0], truth.quat)
 

@@ -1,0 +1,25 @@
+"""Results of the benchmarks: where they are kept, with the machine, the versions and the commit in each."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from rigid_env.measure.machine import describe, write_json
+from rigid_env.measure.timing import Row
+
+RESULTS = Path(__file__).parent / "results"
+
+
+def keep(name: str, rows: list[Row], path: Path | None = None, **settings) -> Path:
+    """Write rows as JSON, to ``results/<name>.json`` unless a path is given; returns the path."""
+    path = Path(path) if path else RESULTS / f"{name}.json"
+    write_json(path, {"name": name, "settings": settings, "rows": [row.to_dict() for row in rows]})
+    return path
+
+
+def headline() -> str:
+    """One line on the machine and the commit, to print over a table."""
+    found = describe()
+    git = found["git"]
+    commit = "no commit" if git is None else git["commit"][:10] + (" + changes" if git["is_dirty"] else "")
+    return f"{found['processor']}, {found['cores']} cores, Python {found['python']}, {commit}, {found['date']}"

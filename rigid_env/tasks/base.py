@@ -1,0 +1,267 @@
+"""What the tasks share: the batch of worlds, starts, actions, and the order of things in a control step."""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+import numpy as np
+import physics
+from gymnasium.utils import seeding
+from physics import checks
+
+from rigid_env.tasks import layout as col
+from rigid_env.tasks.area import Area
+from rigid_env.tasks.entries import Entry
+from rigid_env.tasks.kernels import AXES, start_poses, wrenches
+from rigid_env.tasks.parameters import DRAW_COUNT, Parameters
+
+FORCE_SHARE = 0.9
+"""Longest force over the block's weight m g: less than 1, so that the agent cannot fly."""
+
+TORQUE_SHARE = 0.25
+"""Longest torque over m g times the longest half edge: too little to tip the block without the force's help
+or momentum."""
+
+FACE_COUNT = 6
+
+GOAL_DRAWS = 2  # uniform numbers per episode for the goal; a task may leave some unused
+DRAWS = col.START_SIZE + GOAL_DRAWS + DRAW_COUNT
+
+MAX_FRAME_SKIP = 10_000
+
+
+class Task:
+    """A batch of worlds with one block each, and the task set in them.
+
+    Subclasses say what a goal is (`_set_goals`), and observe with one compiled kernel (`_kernel`).
+
+    Parameters
+    ----------
+    worlds : int
+        Size of the batch.
+    accuracy : str or physics.Accuracy
+    walls : {"three", "corner"}
+        Layout, see `Area`.
+    half_width : float
+        Half the width of the floor that starts and goals are drawn from, and of the three-wall box [m].
+    mass, size, friction, restitution, gravity : number or pair
+        Block's mass [kg] and edges (three numbers) [m], coefficients against the walls, strength of gravity
+        along -y [m/s²]. A pair (low, high) is drawn from uniformly in each episode of each world.
+    frame_skip : int
+        Physics steps per control step, with the action held.
+    dt : float
+        Physics step [s].
+    threads : int
+        Threads that share a step.
+
+    Attributes
+    ----------
+    world : physics.World
+    generators : list of numpy.random.Generator or None
+        One per world: an episode does not depend on the batch it runs in.
+    record : (worlds, RECORD_SIZE) float64
+    outcome : (worlds, OUTCOME_SIZE) float64
+        Of the last step, renewed in place.
+    wrench : (worlds, 1, 6) float64
+        Applied in the last step; force [N], torque [N m], world frame.
+    report : physics.StepReport or None
+        Of the last step.
+
+    Raises
+    ------
+    ValueError
+        Naming the field, the value and what is allowed.
+    """
+
+    observation: ClassVar[tuple[Entry, ...]]
+    goal_options: ClassVar[tuple[str, ...]]
+    error_name: ClassVar[str]
+
+    def __init__(
+        self,
+        worlds: int = 1,
+        *,
+        accuracy="balanced",
+        walls="three",
+        half_width=10.0,
+        mass=6.0,
+        size=(5.0, 3.0, 2.0),
+        friction=0.5,
+        restitution=0.2,
+        gravity=9.81,
+        frame_skip=5,
+        dt=0.005,
+        threads=1,
+    ):
+        self.area = Area(walls, half_width)
+        self.parameters = Parameters(
+            mass=mass, size=size, friction=friction, restitution=restitution, gravity=gravity
+        )
+        self.area.check_room(self.parameters["size"].high)
+        self.frame_skip = checks.count(frame_skip, "frame_skip")
+        if self.frame_skip > MAX_FRAME_SKIP:
+            raise ValueError(f"frame_skip is {frame_skip!r}; allowed are integers from 1 to {MAX_FRAME_SKIP}")
+        self.world = physics.World(self._scene(), worlds=worlds, dt=dt, accuracy=accuracy, threads=threads)
+        self.generators: list[np.random.Generator | None] = [None] * worlds
+        self.record = np.zeros((worlds, col.RECORD_SIZE))
+        self.outcome = np.zeros((worlds, col.OUTCOME_SIZE))
+        self.wrench = np.zeros((worlds, 1, AXES))
+        self.report = None
+        self._actions = np.zeros((worlds, AXES))
+        self._rows = np.arange(worlds)
+        self._note_parameters(self._rows, self.parameters.draw(np.full((worlds, DRAW_COUNT), 0.5)))
+
+    @property
+    def worlds(self) -> int:
+        """Size of the batch."""
+        return self.world.worlds
+
+    @property
+    def control_dt(self) -> float:
+        """Time between two actions [s]."""
+        return self.frame_skip * self.world.dt
+
+    def _scene(self) -> physics.Scene:
+        """The block at the middle of the area, lifted clear of the floor, with the middles of all ranges."""
+        middle = {field: span.middle for field, span in self.parameters.ranges.items()}
+        return physics.Scene(
+            bodies=[physics.Block(size=tuple(middle["size"]), mass=float(middle["mass"][0]), pos=self._lifted())],
+            walls=self.area.half_spaces,
+            effects=[
+                physics.Gravity((0.0, -float(middle["gravity"][0]), 0.0)),
+                physics.Contact(restitution=float(middle["restitution"][0])),
+                physics.Friction(float(middle["friction"][0])),
+            ],
+        )
+
+    # --- episodes ----------------------------------------------------------------------------------------------
+
+    def seed(self, world: int, seed: int | None) -> int:
+        """Give one world a new generator, as `gymnasium.Env.reset` does; returns the seed."""
+        self.generators[world], used = seeding.np_random(seed)
+        return used
+
+    def begin(self, rows: np.ndarray, obs: np.ndarray, options: dict | None = None) -> None:
+        """Start a new episode in the worlds `rows`.
+
+        Parameters
+        ----------
+        rows : (n,) int64
+            Worlds.
+        obs : (worlds, entries) float32, out
+            Rows of these worlds are written.
+        options : dict, optional
+            Fix what is otherwise drawn, each for all `rows` or one per row: ``place`` (2,) x and z of the
+            centre [m], ``yaw`` () [rad], ``face`` () the face that is down, and the task's own.
+
+        Raises
+        ------
+        ValueError
+            An option that is unknown or out of range. Nothing has changed then but the generators.
+        """
+        options = dict(options or {})
+        shares = np.array([self.generators[world].random(DRAWS) for world in rows])
+        starts, goals = shares[:, : col.START_SIZE], shares[:, col.START_SIZE : col.START_SIZE + GOAL_DRAWS]
+        values = self.parameters.draw(shares[:, col.START_SIZE + GOAL_DRAWS :])
+        starts[:, :2] = self.area.spread(starts[:, :2], values["size"])
+        starts[:, col.YAW] *= 2.0 * np.pi
+        starts[:, col.START_FACE] = np.floor(FACE_COUNT * starts[:, col.START_FACE])
+        self._apply_start_options(starts, options)
+        record = self.record[rows]
+        self._set_goals(record, goals, starts, values["size"], options)
+        if options:
+            allowed = ("place", "yaw", "face", *self.goal_options)
+            raise ValueError(f"options has the key {next(iter(options))!r}; allowed are {', '.join(allowed)}")
+        self._place(rows, starts, values)
+        self.record[rows] = record
+        self._note_parameters(rows, values)
+        self.wrench[rows] = 0.0
+        self._kernel(rows, self.world.state, self.record, self.world.walls, None, obs, self.outcome)
+
+    def _apply_start_options(self, starts: np.ndarray, options: dict) -> None:
+        n = len(starts)
+        if "place" in options:
+            starts[:, :2] = spread_option("place", options.pop("place"), (n, 2))
+        if "yaw" in options:
+            starts[:, col.YAW] = spread_option("yaw", options.pop("yaw"), (n,))
+        if "face" in options:
+            starts[:, col.START_FACE] = face_option("face", options.pop("face"), n)
+
+    def _place(self, rows: np.ndarray, starts: np.ndarray, values: dict[str, np.ndarray]) -> None:
+        """Parameters and poses of new episodes into the world."""
+        pos, quat = np.empty((len(rows), 1, 3)), np.empty((len(rows), 1, 4))
+        start_poses(starts, 0.5 * values["size"], pos, quat)
+        changed = {field: values[field] for field in self.parameters.randomised}
+        if "gravity" in changed:
+            changed["gravity"] = np.outer(changed["gravity"], (0.0, -1.0, 0.0))
+        if "size" in changed:  # where the old block lay, the new one might not fit
+            self.world.set_state(pos=np.broadcast_to(self._lifted(), pos.shape), worlds=rows)
+        if changed:
+            self.world.set_parameters(**changed, worlds=rows)
+        still = np.zeros_like(pos)
+        self.world.set_state(pos=pos, quat=quat, linvel=still, angvel=still, worlds=rows)
+
+    def _lifted(self) -> tuple[float, float, float]:
+        """A place where a block of any size in the range is clear of all walls [m]."""
+        c = self.area.centre
+        return (c, float(np.linalg.norm(self.parameters["size"].high)), c)
+
+    def _note_parameters(self, rows: np.ndarray, values: dict[str, np.ndarray]) -> None:
+        weight = values["mass"] * values["gravity"]
+        half = 0.5 * values["size"]
+        self.record[rows, col.FORCE_LIMIT] = FORCE_SHARE * weight
+        self.record[rows, col.TORQUE_LIMIT] = TORQUE_SHARE * weight * half.max(axis=1)
+        self.record[rows, col.HALF : col.HALF + 3] = half
+
+    # --- control steps -----------------------------------------------------------------------------------------
+
+    def step(self, actions, obs: np.ndarray) -> None:
+        """Hold the wrenches of `actions` for `frame_skip` physics steps, then observe into `obs` and `outcome`.
+
+        Parameters
+        ----------
+        actions : (worlds, 6) array_like
+            Clipped to ±1; see `wrenches`.
+        obs : (worlds, entries) float32, out
+
+        Raises
+        ------
+        ValueError
+            Actions of the wrong shape or not finite; nothing has moved then.
+        """
+        if np.shape(actions) != self._actions.shape:
+            raise ValueError(f"actions has shape {np.shape(actions)}; allowed is shape {self._actions.shape}")
+        self._actions[...] = actions
+        bad = wrenches(self._actions, self.record, self.wrench)
+        if bad >= 0:
+            raise ValueError(f"action of world {bad} is {self._actions[bad].tolist()}; allowed are finite numbers")
+        self.report = self.world.step(self.wrench, steps=self.frame_skip)
+        self._kernel(
+            self._rows, self.world.state, self.record, self.world.walls, self._actions, obs, self.outcome
+        )
+
+    def physics_status(self) -> np.ndarray | None:
+        """(worlds,) int64, values of `physics.Status` for the last step; None: all is well."""
+        return None if self.report is None or self.report.ok else self.report.status
+
+    # --- what a task is ----------------------------------------------------------------------------------------
+
+    def _set_goals(self, record, shares, starts, size, options) -> None:
+        """Write the goals of new episodes into `record` (n, RECORD_SIZE); take what they use out of `options`."""
+        raise NotImplementedError
+
+    _kernel: ClassVar
+
+
+def spread_option(name: str, value, shape: tuple[int, ...]) -> np.ndarray:
+    """An option for n worlds, (n, ...), from one for all of them or one for each."""
+    array = np.asarray(value)
+    return checks.finite(np.broadcast_to(array, shape) if array.shape == shape[1:] else array, shape, f"options {name}")
+
+
+def face_option(name: str, value, count: int) -> np.ndarray:
+    """Face numbers (n,) from an option."""
+    faces = spread_option(name, value, (count,))
+    if not np.isin(faces, np.arange(FACE_COUNT)).all():
+        raise ValueError(f"options {name} is {value!r}; allowed are integers from 0 to {FACE_COUNT - 1}")
+    return faces

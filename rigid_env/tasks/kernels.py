@@ -1,0 +1,258 @@
+"""What a task computes in every control step, compiled: wrenches from actions, observations, rewards, success.
+
+Everything is in this one file because Numba's disk cache notices a change only in the file of the function it
+calls (callees in `physics.kernels` are covered by the name of the cache folder).
+
+Rewards are differences of a potential of the state, plus costs and the bonus of success. Differences of a
+potential leave the best policy what it is (Ng, Harada and Russell, *Policy invariance under reward
+transformations*, ICML 1999; here with discount 1).
+"""
+
+from __future__ import annotations
+
+import math
+
+from physics.kernels import layout as at
+from physics.kernels.compiler import inlined, kernel
+from physics.kernels.quaternion import multiply, to_matrix
+from rigid_env.tasks import layout as col
+
+AXES = 6  # of an action: force x, y, z, torque x, y, z
+
+# --- scales and bounds of observations: an entry is value / scale, clipped to ± bound ---------------------------
+LENGTH_SCALE = 5.0  # [m]
+LENGTH_BOUND = 10.0
+NEAR_SCALE = 1.0  # [m], of the goal's squashed coordinates: fine near the goal, flat far away
+HEIGHT_SCALE = 2.5  # [m]
+SPEED_SCALE = 5.0  # [m/s]
+SPIN_SCALE = 5.0  # [rad/s]
+RATE_BOUND = 5.0
+GAP_SCALE = 5.0  # [m]
+
+# --- success ---------------------------------------------------------------------------------------------------
+REACH_TOLERANCE = 0.3  # horizontal distance of the centre from the goal [m]
+REORIENT_TOLERANCE = 0.1  # angle between the target face's normal and straight down [rad]
+REST_SPEED = 0.1  # of the centre [m/s]
+REST_SPIN = 0.1  # [rad/s]
+HOLD_STEPS = 10  # consecutive control steps
+
+# --- rewards ---------------------------------------------------------------------------------------------------
+SUCCESS_BONUS = 5.0
+STEP_COST = 0.01
+ACTION_COST = 0.002  # times the sum of the squared action
+HOLD_VALUE = 1.0  # potential of a completed hold
+REACH_VALUE = 0.5  # potential lost per metre of distance [1/m]
+BRAKE_VALUE = 0.2  # potential lost per m/s at the goal [s/m] ...
+BRAKE_RANGE = 2.0  # ... and 1/e of that so far away [m]
+TURN_VALUE = 2.0  # potential lost per radian off the goal [1/rad]
+CALM_VALUE = 0.1  # potential lost per m/s and rad/s with the face down ...
+CALM_RANGE = 0.3  # ... and 1/e of that at this angle [rad]
+
+
+@inlined
+def clip(x, low, high):
+    """x limited to [low, high]."""
+    return min(max(x, low), high)
+
+
+@inlined
+def norm3(a, b, c):
+    """Length of (a, b, c)."""
+    return math.sqrt(a * a + b * b + c * c)
+
+
+@kernel
+def wrenches(actions, record, wrench):
+    """Forces and torques [N, N m] from actions: clipped to ±1 each, then each vector to its ball of radius 1.
+
+    Parameters
+    ----------
+    actions : (worlds, 6) float64
+    record : (worlds, RECORD_SIZE) float64
+    wrench : (worlds, 1, 6) float64, out
+        World frame.
+
+    Returns
+    -------
+    int
+        Index of the first world whose action is not finite, else -1; `wrench` is then not complete.
+    """
+    for i in range(actions.shape[0]):
+        for k in range(AXES):
+            if not math.isfinite(actions[i, k]):
+                return i
+        for first, limit in ((0, record[i, col.FORCE_LIMIT]), (3, record[i, col.TORQUE_LIMIT])):
+            x = clip(actions[i, first], -1.0, 1.0)
+            y = clip(actions[i, first + 1], -1.0, 1.0)
+            z = clip(actions[i, first + 2], -1.0, 1.0)
+            scale = limit / max(1.0, norm3(x, y, z))
+            wrench[i, 0, first] = scale * x
+            wrench[i, 0, first + 1] = scale * y
+            wrench[i, 0, first + 2] = scale * z
+    return -1
+
+
+@kernel
+def start_poses(starts, half, pos, quat):
+    """Poses of blocks that lie on the floor y = 0.
+
+    Parameters
+    ----------
+    starts : (n, START_SIZE) float64
+    half : (n, 3) float64
+        Half edges [m].
+    pos : (n, 1, 3) float64, out
+    quat : (n, 1, 4) float64, out
+    """
+    s = math.sqrt(0.5)
+    for i in range(starts.shape[0]):
+        face = int(starts[i, col.START_FACE])
+        if face == 0:  # -x down
+            q = (s, 0.0, 0.0, s)
+        elif face == 1:  # +x
+            q = (s, 0.0, 0.0, -s)
+        elif face == 2:  # -y
+            q = (1.0, 0.0, 0.0, 0.0)
+        elif face == 3:  # +y
+            q = (0.0, 0.0, 0.0, 1.0)
+        elif face == 4:  # -z
+            q = (s, -s, 0.0, 0.0)
+        else:  # +z
+            q = (s, s, 0.0, 0.0)
+        turn = 0.5 * starts[i, col.YAW]
+        q = multiply((math.cos(turn), 0.0, math.sin(turn), 0.0), q)
+        for k in range(4):
+            quat[i, 0, k] = q[k]
+        pos[i, 0, 0] = starts[i, col.PLACE]
+        pos[i, 0, 1] = half[i, face // 2]
+        pos[i, 0, 2] = starts[i, col.PLACE + 1]
+
+
+@inlined
+def observe_motion(world, first, state, obs):
+    """Height and velocities into obs[world, first : first + 7]; returns speed [m/s] and spin [rad/s]."""
+    vx, vy, vz = state[world, at.LINVEL], state[world, at.LINVEL + 1], state[world, at.LINVEL + 2]
+    wx, wy, wz = state[world, at.ANGVEL], state[world, at.ANGVEL + 1], state[world, at.ANGVEL + 2]
+    obs[world, first] = clip(state[world, at.POS + 1] / HEIGHT_SCALE, 0.0, LENGTH_BOUND)
+    obs[world, first + 1] = clip(vx / SPEED_SCALE, -RATE_BOUND, RATE_BOUND)
+    obs[world, first + 2] = clip(vy / SPEED_SCALE, -RATE_BOUND, RATE_BOUND)
+    obs[world, first + 3] = clip(vz / SPEED_SCALE, -RATE_BOUND, RATE_BOUND)
+    obs[world, first + 4] = clip(wx / SPIN_SCALE, -RATE_BOUND, RATE_BOUND)
+    obs[world, first + 5] = clip(wy / SPIN_SCALE, -RATE_BOUND, RATE_BOUND)
+    obs[world, first + 6] = clip(wz / SPIN_SCALE, -RATE_BOUND, RATE_BOUND)
+    return norm3(vx, vy, vz), norm3(wx, wy, wz)
+
+
+@inlined
+def observe_gaps(world, first, state, R, record, walls, obs):
+    """Smallest distances of the block's corners from the three walls into obs[world, first : first + 3]."""
+    for k in range(3):
+        nx, ny, nz = walls[k, at.NORMAL], walls[k, at.NORMAL + 1], walls[k, at.NORMAL + 2]
+        gap = nx * state[world, at.POS] + ny * state[world, at.POS + 1] + nz * state[world, at.POS + 2]
+        gap -= walls[k, at.OFFSET]
+        for j in range(3):
+            gap -= record[world, col.HALF + j] * abs(R[j] * nx + R[3 + j] * ny + R[6 + j] * nz)
+        obs[world, first + k] = clip(gap / GAP_SCALE, -1.0, LENGTH_BOUND)
+
+
+@inlined
+def attitude(world, state):
+    """Rotation matrix of the block, body to world, nine scalars row by row."""
+    return to_matrix(
+        (state[world, at.QUAT], state[world, at.QUAT + 1], state[world, at.QUAT + 2], state[world, at.QUAT + 3])
+    )
+
+
+@inlined
+def conclude(world, is_met, potential, error, speed, spin, actions, record, outcome):
+    """Count the hold, then reward and success of one world; `actions` is None at the start of an episode."""
+    hold = 0.0
+    if actions is not None and is_met and speed <= REST_SPEED and spin <= REST_SPIN:
+        hold = record[world, col.HOLD] + 1.0
+    potential += HOLD_VALUE * hold / HOLD_STEPS
+    success = 1.0 if hold >= HOLD_STEPS else 0.0
+    reward = 0.0
+    if actions is not None:
+        effort = 0.0
+        for k in range(AXES):
+            a = clip(actions[world, k], -1.0, 1.0)
+            effort += a * a
+        reward = potential - record[world, col.POTENTIAL] - STEP_COST - ACTION_COST * effort
+        reward += SUCCESS_BONUS * success
+    record[world, col.HOLD] = hold
+    record[world, col.POTENTIAL] = potential
+    outcome[world, col.REWARD] = reward
+    outcome[world, col.SUCCESS] = success
+    outcome[world, col.ERROR] = error
+    outcome[world, col.SPEED] = speed
+    outcome[world, col.SPIN] = spin
+    return min(hold / HOLD_STEPS, 1.0)
+
+
+@kernel
+def observe_reach(rows, state, record, walls, actions, obs, outcome):
+    """BlockReach: observation, reward and success of the worlds `rows`.
+
+    Parameters
+    ----------
+    rows : (n,) int64
+        Worlds to look at; the rest of the outputs is left alone.
+    state : (worlds, STATE_SIZE) float64
+    record : (worlds, RECORD_SIZE) float64, in and out
+        POTENTIAL and HOLD are renewed.
+    walls : (3, WALL_SIZE) float64
+    actions : (worlds, 6) float64 or None
+        That led here; None at the start of an episode.
+    obs : (worlds, 24) float32, out
+    outcome : (worlds, OUTCOME_SIZE) float64, out
+    """
+    for i in range(rows.shape[0]):
+        world = rows[i]
+        dx = record[world, col.GOAL] - state[world, at.POS]
+        dz = record[world, col.GOAL + 1] - state[world, at.POS + 2]
+        obs[world, 0] = clip(dx / LENGTH_SCALE, -LENGTH_BOUND, LENGTH_BOUND)
+        obs[world, 1] = clip(dz / LENGTH_SCALE, -LENGTH_BOUND, LENGTH_BOUND)
+        obs[world, 2] = math.tanh(dx / NEAR_SCALE)
+        obs[world, 3] = math.tanh(dz / NEAR_SCALE)
+        speed, spin = observe_motion(world, 4, state, obs)
+        R = attitude(world, state)
+        for k in range(9):
+            obs[world, 11 + k] = clip(R[k], -1.0, 1.0)
+        observe_gaps(world, 20, state, R, record, walls, obs)
+        distance = math.sqrt(dx * dx + dz * dz)
+        potential = -REACH_VALUE * distance - BRAKE_VALUE * speed * math.exp(-distance / BRAKE_RANGE)
+        obs[world, 23] = conclude(
+            world, distance <= REACH_TOLERANCE, potential, distance, speed, spin, actions, record, outcome
+        )
+
+
+@kernel
+def observe_reorient(rows, state, record, walls, actions, obs, outcome):
+    """BlockReorient: observation, reward and success of the worlds `rows`; arguments as `observe_reach`.
+
+    The body axes are told as seen from the goal: first the outward normal of the target face, then the next
+    two body axes in cyclic order, with the half edges in the same order; the policy need not know which face
+    it is. obs is (worlds, 23) float32.
+    """
+    for i in range(rows.shape[0]):
+        world = rows[i]
+        face = int(record[world, col.FACE])
+        axis = face // 2
+        sign = 1.0 if face % 2 == 1 else -1.0
+        R = attitude(world, state)
+        for j in range(3):
+            k = (axis + j) % 3
+            s = sign if j == 0 else 1.0
+            column = (R[0], R[3], R[6]) if k == 0 else ((R[1], R[4], R[7]) if k == 1 else (R[2], R[5], R[8]))
+            obs[world, 3 * j] = clip(s * column[0], -1.0, 1.0)
+            obs[world, 3 * j + 1] = clip(s * column[1], -1.0, 1.0)
+            obs[world, 3 * j + 2] = clip(s * column[2], -1.0, 1.0)
+            obs[world, 9 + j] = clip(record[world, col.HALF + k] / HEIGHT_SCALE, 0.0, LENGTH_BOUND)
+        height = sign * (R[3] if axis == 0 else (R[4] if axis == 1 else R[5]))  # of the normal's tip
+        speed, spin = observe_motion(world, 12, state, obs)
+        observe_gaps(world, 19, state, R, record, walls, obs)
+        angle = math.acos(clip(-height, -1.0, 1.0))
+        potential = -TURN_VALUE * angle - CALM_VALUE * (speed + spin) * math.exp(-angle / CALM_RANGE)
+        obs[world, 22] = conclude(
+            world, angle <= REORIENT_TOLERANCE, potential, angle, speed, spin, actions, record, outcome
+        )
