@@ -1,1 +1,1 @@
-"""Programs that measure; each is run as ``python -m benchmarks.NAME`` and keeps its result in ``results/``."""
+"""Programs that measure: ``python -m benchmarks.NAME``; each keeps its result in ``results/``."""

@@ -2,41 +2,45 @@
 
 from __future__ import annotations
 
-import contextlib
-import importlib
-from dataclasses import replace
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
 
 import gymnasium
 
-import physics
-from rigid_env.measure.timing import Stopwatch
+from rigid_env.measure.rows import ACCURACIES, Tick, paired_rows, told
+from rigid_env.measure.timing import Row, Stopwatch, interleave
 from rigid_env.measure.workloads import STEP
+from rigid_env.registration import NAMESPACE
 
-ENV_ID = "rigid_env/BlockReach-v0"
-NAMESPACE = "rigid_env/"
+ENV_ID = f"{NAMESPACE}/BlockReach-v0"
+SUBSTEPS = 5
+PHYSICS = {"dt": STEP, "frame_skip": SUBSTEPS}  # of both ours and the peer's
 UNIT = "env steps/s"
 SEED = 5
 ACTIONS = 64  # different random actions, or batches of them, used in turns
+THREADS = (1, 2)  # of the vector environment
+VECTOR_TARGET = 25.0
+SINGLE_TARGET = 3.0
+
+
+@dataclass(frozen=True)
+class EnvSizes:
+    """How much work one run is: environments and steps, ours and the peer's."""
+
+    envs: int = 1024
+    vector_steps: int = 100
+    peer_envs: int = 64
+    peer_steps: int = 50
+    single_steps: int = 4000
+
+
+FULL = EnvSizes()
+QUICK = EnvSizes(envs=16, vector_steps=3, peer_envs=2, peer_steps=3, single_steps=50)
 
 
 def environment_ids() -> list[str]:
     """Ids of our registered environments."""
-    with contextlib.suppress(ImportError):
-        importlib.import_module("rigid_env.registration")
-    return sorted(name for name in gymnasium.registry if name.startswith(NAMESPACE))
-
-
-def environment_accuracy(preset: str) -> physics.Accuracy:
-    """A preset with as many substeps of an environment's step as are `STEP` long."""
-    return replace(physics.PRESETS[preset], substeps=substeps())
-
-
-def substeps() -> int:
-    """Substeps of `STEP` in one step of our environments; the step is one over their `render_fps`."""
-    env = gymnasium.make(ENV_ID)
-    step = 1.0 / env.unwrapped.metadata["render_fps"]
-    env.close()
-    return round(step / STEP)
+    return sorted(name for name in gymnasium.registry if name.startswith(f"{NAMESPACE}/"))
 
 
 class Single:
@@ -72,3 +76,86 @@ class Vector:
             for k in range(self.steps):
                 self.envs.step(self.actions[k % ACTIONS])
         return self.steps * self.envs.num_envs / watch.seconds
+
+
+@dataclass(frozen=True)
+class EnvPeer:
+    """Another implementation to compare with: its name and how its environments are made.
+
+    Attributes
+    ----------
+    name : str
+    make : callable
+        () -> one environment, through `gymnasium.make` as ours is.
+    make_vector : callable
+        number -> vector environment of so many.
+    """
+
+    name: str
+    make: Callable[[], gymnasium.Env]
+    make_vector: Callable[[int], gymnasium.vector.VectorEnv]
+
+
+def environment_rows(
+    sizes: EnvSizes, repeats: int, peer: EnvPeer | None = None, tick: Tick | None = None
+) -> Iterator[list[Row]]:
+    """Measure the vector environment, the single one through `gymnasium.make`, and the single one bare.
+
+    Parameters
+    ----------
+    sizes : EnvSizes
+    repeats : int
+        Of every contestant, in turns.
+    peer : EnvPeer, optional
+    tick : callable, optional
+        Told before each run what is measured.
+    """
+    for threads in THREADS:
+        yield _vector_rows(threads, sizes, repeats, peer, tick)
+    yield _single_rows("single_env", "one Env, gym.make", lambda env: env, sizes, repeats, peer, tick)
+    yield _single_rows(
+        "bare_env", "one Env, unwrapped", lambda env: env.unwrapped, sizes, repeats, peer, tick
+    )
+
+
+def run_count(repeats: int, with_peer: bool) -> int:
+    """How often `environment_rows` calls `tick`."""
+    return (len(THREADS) + 2) * (len(ACCURACIES) + with_peer) * (repeats + 1)
+
+
+def _vector_rows(threads, sizes, repeats, peer, tick) -> list[Row]:
+    what = f"{sizes.envs:,} environments, {threads} thread" + "s" * (threads > 1)
+    runners = {
+        name: Vector(
+            gymnasium.make_vec(ENV_ID, sizes.envs, accuracy=name, threads=threads, **PHYSICS),
+            sizes.vector_steps,
+        )
+        for name in ACCURACIES
+    }
+    peers = {}
+    if peer is not None:
+        runners["peer"] = Vector(peer.make_vector(sizes.peer_envs), sizes.peer_steps)
+        peers["peer"] = f"{sizes.peer_envs} {peer.name} in SyncVectorEnv"
+    key = f"vector_env_{threads}_thread"
+    return _measured(key, what, VECTOR_TARGET, runners, peers, repeats, tick)
+
+
+def _single_rows(key, what, strip, sizes, repeats, peer, tick) -> list[Row]:
+    runners = {
+        name: Single(
+            strip(gymnasium.make(ENV_ID, disable_env_checker=True, accuracy=name, **PHYSICS)),
+            sizes.single_steps,
+        )
+        for name in ACCURACIES
+    }
+    peers = {}
+    if peer is not None:
+        runners["peer"], peers["peer"] = Single(strip(peer.make()), sizes.single_steps), peer.name
+    return _measured(key, what, SINGLE_TARGET if key == "single_env" else None, runners, peers, repeats, tick)
+
+
+def _measured(key, what, target, runners, peers, repeats, tick) -> list[Row]:
+    spreads = interleave(runners, repeats, told(tick, what))
+    for runner in runners.values():
+        (runner.envs if isinstance(runner, Vector) else runner.env).close()
+    return paired_rows(spreads, peers, key=key, what=what, unit=UNIT, target=target)

@@ -1,7 +1,7 @@
 """The scenes of `workloads` in MuJoCo, with its default integrator (Euler) and solver settings.
 
-MuJoCo is imported when a scene is made. It appends its warnings to ``MUJOCO_LOG.TXT`` in the working folder: run
-under `elsewhere`.
+MuJoCo is imported when a scene is made. It appends its warnings to ``MUJOCO_LOG.TXT`` in the working folder:
+run under `elsewhere`.
 """
 
 from __future__ import annotations

@@ -15,9 +15,9 @@ LARGEST_RESIDUAL = 1e-6  # of the block at rest, relative
 
 # key: (what, least ratio to MuJoCo, class in `workloads` and `mujoco_scene`)
 SINGLE = {
-    "flight": ("free flight, 1 thread", 25.0, "Flight"),
-    "rest": ("at rest face down, 4 contacts, 1 thread", 12.0, "Rest"),
-    "shove": ("shoved by random wrenches, 1 thread", 10.0, "Shove"),
+    "flight": ("free flight", 25.0, "Flight"),
+    "rest": ("at rest, 4 contacts", 12.0, "Rest"),
+    "shove": ("shoved about", 10.0, "Shove"),
 }
 BATCH_TARGET = 8.0
 
@@ -42,7 +42,9 @@ def engine_rows(sizes: Sizes, repeats: int, with_peer: bool, tick: Tick | None =
     yield _batch_rows(sizes, repeats, with_peer, tick)
 
 
-def paired_rows(spreads: dict[str, Spread], peers: dict[str, str], notes: dict | None = None, **common) -> list[Row]:
+def paired_rows(
+    spreads: dict[str, Spread], peers: dict[str, str], notes: dict | None = None, **common
+) -> list[Row]:
     """One row for each of our contestants (named by their accuracy), all against the fastest of the peers.
 
     Parameters
@@ -74,7 +76,8 @@ def run_count(repeats: int, with_peer: bool) -> int:
     return contestants * (repeats + 1)
 
 
-def _told(tick: Tick | None, what: str) -> Tick | None:
+def told(tick: Tick | None, what: str) -> Tick | None:
+    """`tick` that puts `what` before the contestant's name."""
     return None if tick is None else lambda name: tick(f"{what}: {name}")
 
 
@@ -85,7 +88,7 @@ def _single_rows(key, sizes, repeats, with_peer, tick) -> list[Row]:
     if with_peer:
         runners["mujoco"] = getattr(mujoco_scene, work)(sizes)
         peers["mujoco"] = MUJOCO
-    spreads = interleave(runners, repeats, _told(tick, what))
+    spreads = interleave(runners, repeats, told(tick, what))
     notes = {name: runner.notes() for name, runner in runners.items() if hasattr(runner, "notes")}
     for name in ACCURACIES if "mujoco" in notes else ():
         notes[name]["peer"] = notes["mujoco"]
@@ -99,7 +102,7 @@ def _held_to_residual(row: Row) -> Row:
 
 
 def _batch_rows(sizes, repeats, with_peer, tick) -> list[Row]:
-    what = f"{sizes.worlds:,} worlds, fresh random wrenches, {sizes.threads} threads"
+    what = f"{sizes.worlds:,} worlds, {sizes.threads} threads"
     runners = {accuracy: workloads.Batch(accuracy, sizes) for accuracy in ACCURACIES}
     peers = {}
     if with_peer:
@@ -107,7 +110,9 @@ def _batch_rows(sizes, repeats, with_peer, tick) -> list[Row]:
         runners["rollout"], peers["rollout"] = mujoco_scene.Rollout(sizes, landed), "mujoco.rollout"
         if mujoco_scene.has_batch():
             runners["batch"], peers["batch"] = mujoco_scene.Batch(sizes, landed), "mujoco.batch"
-    spreads = interleave(runners, repeats, _told(tick, what))
+    spreads = interleave(runners, repeats, told(tick, what))
     all_peers = {"peers": {peers[name]: spreads[name].to_dict() for name in peers}}
     notes = {name: dict(all_peers) for name in ACCURACIES} if peers else None
-    return paired_rows(spreads, peers, notes, key="batch", what=what, unit="world steps/s", target=BATCH_TARGET)
+    return paired_rows(
+        spreads, peers, notes, key="batch", what=what, unit="world steps/s", target=BATCH_TARGET
+    )

@@ -63,8 +63,7 @@ class Row:
     is_ratio : bool
         Whether `target` is a least ratio.
     is_valid : bool
-        Whether what was measured is what the row claims (a residual small enough, say); a row that is not never
-        passes.
+        Whether what was measured is what the row claims (a residual small enough, say); else it never passes.
     notes : dict
         What else was seen, JSON-able.
     """
@@ -95,7 +94,7 @@ class Row:
             return None
         if not self.is_valid:
             return False
-        return self.ratio.median >= self.target if self.is_ratio else self.ours.highest <= self.target
+        return self.ratio.median >= self.target if self.is_ratio else self.ours.median <= self.target
 
     def to_dict(self) -> dict:
         """For JSON."""

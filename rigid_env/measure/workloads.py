@@ -1,4 +1,4 @@
-"""The work that our engine is given, one world or many: each object runs it once and returns steps per second.
+"""The work that our engine is given: calling an object does it once and returns steps per second.
 
 `mujoco_scene` has the same work under the same names for MuJoCo.
 """
@@ -108,7 +108,7 @@ class Rest:
 
 
 class Shove:
-    """The block shoved about by random wrenches, held for `HOLD` steps each, from the same start every run."""
+    """The block shoved about by random wrenches, each held for `HOLD` steps; every run starts the same."""
 
     def __init__(self, accuracy, sizes: Sizes = FULL):
         self.world = physics.World(scenes.shove(), dt=STEP, accuracy=accuracy)
@@ -139,7 +139,7 @@ class Shove:
 
 
 class Batch:
-    """Many worlds with blocks that have fallen from random poses, a fresh random wrench for each at every step."""
+    """Many blocks that have fallen from random poses; every step each gets a fresh random wrench."""
 
     def __init__(self, accuracy, sizes: Sizes = FULL):
         self.world = physics.World(

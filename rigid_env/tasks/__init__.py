@@ -1,4 +1,4 @@
-"""The tasks, each written once over a batch of worlds: starts, goals, actions, observations, rewards, success.
+"""The tasks, each written once over a batch of worlds: starts, goals, actions, observations, success.
 
 The single environment is a batch of one; the vector environment and the Stable-Baselines3 adapter are the
 batch itself.

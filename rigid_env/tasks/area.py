@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+
 import physics
 from physics import checks
 
@@ -56,7 +57,7 @@ class Area:
         radius = 0.5 * float(np.linalg.norm(size))
         if not self.half_width > radius + CLEARANCE:
             raise ValueError(
-                f"half_width is {self.half_width}; allowed are numbers greater than {radius + CLEARANCE:.6g}, "
+                f"half_width is {self.half_width}; allowed is more than {radius + CLEARANCE:.6g}, "
                 f"half the diagonal of a block of size {size.tolist()} and {CLEARANCE} m more"
             )
 

@@ -5,10 +5,10 @@ from __future__ import annotations
 from typing import ClassVar
 
 import numpy as np
-import physics
 from gymnasium.utils import seeding
-from physics import checks
 
+import physics
+from physics import checks
 from rigid_env.tasks import layout as col
 from rigid_env.tasks.area import Area
 from rigid_env.tasks.entries import Entry
@@ -18,9 +18,10 @@ from rigid_env.tasks.parameters import DRAW_COUNT, Parameters
 FORCE_SHARE = 0.9
 """Longest force over the block's weight m g: less than 1, so that the agent cannot fly."""
 
-TORQUE_SHARE = 0.25
-"""Longest torque over m g times the longest half edge: too little to tip the block without the force's help
-or momentum."""
+TORQUE_SHARE = 0.5
+"""Longest torque over m g times the longest half edge. The torque to tip the block without other help is m g times
+the half edge it has to pass over: of 5 x 3 x 2 m it tips over the short one, the others take the force or
+momentum as well."""
 
 FACE_COUNT = 6
 
@@ -125,7 +126,9 @@ class Task:
         """The block at the middle of the area, lifted clear of the floor, with the middles of all ranges."""
         middle = {field: span.middle for field, span in self.parameters.ranges.items()}
         return physics.Scene(
-            bodies=[physics.Block(size=tuple(middle["size"]), mass=float(middle["mass"][0]), pos=self._lifted())],
+            bodies=[
+                physics.Block(size=tuple(middle["size"]), mass=float(middle["mass"][0]), pos=self._lifted())
+            ],
             walls=self.area.half_spaces,
             effects=[
                 physics.Gravity((0.0, -float(middle["gravity"][0]), 0.0)),
@@ -134,7 +137,7 @@ class Task:
             ],
         )
 
-    # --- episodes ----------------------------------------------------------------------------------------------
+    # --- episodes -----------------------------------------------------------------------------------------
 
     def seed(self, world: int, seed: int | None) -> int:
         """Give one world a new generator, as `gymnasium.Env.reset` does; returns the seed."""
@@ -213,10 +216,10 @@ class Task:
         self.record[rows, col.TORQUE_LIMIT] = TORQUE_SHARE * weight * half.max(axis=1)
         self.record[rows, col.HALF : col.HALF + 3] = half
 
-    # --- control steps -----------------------------------------------------------------------------------------
+    # --- control steps ------------------------------------------------------------------------------------
 
     def step(self, actions, obs: np.ndarray) -> None:
-        """Hold the wrenches of `actions` for `frame_skip` physics steps, then observe into `obs` and `outcome`.
+        """Hold the wrenches of `actions` for `frame_skip` physics steps, then observe.
 
         Parameters
         ----------
@@ -234,7 +237,9 @@ class Task:
         self._actions[...] = actions
         bad = wrenches(self._actions, self.record, self.wrench)
         if bad >= 0:
-            raise ValueError(f"action of world {bad} is {self._actions[bad].tolist()}; allowed are finite numbers")
+            raise ValueError(
+                f"action of world {bad} is {self._actions[bad].tolist()}; allowed are finite numbers"
+            )
         self.report = self.world.step(self.wrench, steps=self.frame_skip)
         self._kernel(
             self._rows, self.world.state, self.record, self.world.walls, self._actions, obs, self.outcome
@@ -244,10 +249,10 @@ class Task:
         """(worlds,) int64, values of `physics.Status` for the last step; None: all is well."""
         return None if self.report is None or self.report.ok else self.report.status
 
-    # --- what a task is ----------------------------------------------------------------------------------------
+    # --- what a task is -----------------------------------------------------------------------------------
 
     def _set_goals(self, record, shares, starts, size, options) -> None:
-        """Write the goals of new episodes into `record` (n, RECORD_SIZE); take what they use out of `options`."""
+        """Write goals of new episodes into `record` (n, RECORD_SIZE); take what they use out of `options`."""
         raise NotImplementedError
 
     _kernel: ClassVar
@@ -256,7 +261,9 @@ class Task:
 def spread_option(name: str, value, shape: tuple[int, ...]) -> np.ndarray:
     """An option for n worlds, (n, ...), from one for all of them or one for each."""
     array = np.asarray(value)
-    return checks.finite(np.broadcast_to(array, shape) if array.shape == shape[1:] else array, shape, f"options {name}")
+    return checks.finite(
+        np.broadcast_to(array, shape) if array.shape == shape[1:] else array, shape, f"options {name}"
+    )
 
 
 def face_option(name: str, value, count: int) -> np.ndarray:

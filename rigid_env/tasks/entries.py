@@ -1,4 +1,4 @@
-"""Names, units and bounds of the numbers in an observation; the docstrings of the environments hold the same."""
+"""Names, units and bounds of the numbers in an observation, as the environments' docstrings have them."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a task computes in every control step, compiled: wrenches from actions, observations, rewards, success.
+"""What a task computes in every control step, compiled: wrenches, observations, rewards, success.
 
 Everything is in this one file because Numba's disk cache notices a change only in the file of the function it
 calls (callees in `physics.kernels` are covered by the name of the cache folder).
@@ -19,7 +19,7 @@ from rigid_env.tasks import layout as col
 
 AXES = 6  # of an action: force x, y, z, torque x, y, z
 
-# --- scales and bounds of observations: an entry is value / scale, clipped to ± bound ---------------------------
+# --- scales and bounds of observations: an entry is value / scale, clipped to ± bound ---------------------
 LENGTH_SCALE = 5.0  # [m]
 LENGTH_BOUND = 10.0
 NEAR_SCALE = 1.0  # [m], of the goal's squashed coordinates: fine near the goal, flat far away
@@ -29,17 +29,17 @@ SPIN_SCALE = 5.0  # [rad/s]
 RATE_BOUND = 5.0
 GAP_SCALE = 5.0  # [m]
 
-# --- success ---------------------------------------------------------------------------------------------------
+# --- success ----------------------------------------------------------------------------------------------
 REACH_TOLERANCE = 0.3  # horizontal distance of the centre from the goal [m]
 REORIENT_TOLERANCE = 0.1  # angle between the target face's normal and straight down [rad]
 REST_SPEED = 0.1  # of the centre [m/s]
 REST_SPIN = 0.1  # [rad/s]
 HOLD_STEPS = 10  # consecutive control steps
 
-# --- rewards ---------------------------------------------------------------------------------------------------
+# --- rewards ----------------------------------------------------------------------------------------------
 SUCCESS_BONUS = 5.0
 STEP_COST = 0.01
-ACTION_COST = 0.002  # times the sum of the squared action
+ACTION_COST = 0.0005  # times the sum of the squared action
 HOLD_VALUE = 1.0  # potential of a completed hold
 REACH_VALUE = 0.5  # potential lost per metre of distance [1/m]
 BRAKE_VALUE = 0.2  # potential lost per m/s at the goal [s/m] ...
@@ -159,7 +159,12 @@ def observe_gaps(world, first, state, R, record, walls, obs):
 def attitude(world, state):
     """Rotation matrix of the block, body to world, nine scalars row by row."""
     return to_matrix(
-        (state[world, at.QUAT], state[world, at.QUAT + 1], state[world, at.QUAT + 2], state[world, at.QUAT + 3])
+        (
+            state[world, at.QUAT],
+            state[world, at.QUAT + 1],
+            state[world, at.QUAT + 2],
+            state[world, at.QUAT + 3],
+        )
     )
 
 

@@ -1,0 +1,49 @@
+"""Start of a new process to its first step, kernels in the cache: seconds, imports included."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+import physics
+from rigid_env.measure.timing import Row, Spread
+
+LIMIT = 1.5  # [s]
+
+PROGRAMS = {
+    "start_world": (
+        "new process to first World.step",
+        "import physics, physics.scenes; physics.World(physics.scenes.drop(), accuracy={accuracy!r}).step()",
+    ),
+    "start_env": (
+        "new process to first Env.step",
+        "import gymnasium; env = gymnasium.make('rigid_env:rigid_env/BlockReach-v0', accuracy={accuracy!r});"
+        "env.reset(seed=0); env.step(env.action_space.sample())",
+    ),
+}
+
+
+def start_rows(repeats: int, accuracies=("fast", "balanced")) -> list[Row]:
+    """One row per program and accuracy; each runs once more before, to fill the cache."""
+    rows = []
+    for key, (what, program) in PROGRAMS.items():
+        for accuracy in accuracies:
+            code = program.format(accuracy=accuracy)
+            samples = [_seconds(code) for _ in range(repeats + 1)][1:]
+            spread = Spread(tuple(samples))
+            rows.append(Row(key, what, "s", spread, accuracy=accuracy, target=LIMIT, is_ratio=False))
+    return rows
+
+
+def _seconds(code: str) -> float:
+    root = str(Path(physics.__file__).parents[1])
+    paths = [root, *filter(None, [os.environ.get("PYTHONPATH")])]
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(paths)}
+    with tempfile.TemporaryDirectory() as folder:
+        start = time.perf_counter()
+        subprocess.run([sys.executable, "-c", code], check=True, cwd=folder, env=environment)
+        return time.perf_counter() - start

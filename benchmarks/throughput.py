@@ -1,0 +1,102 @@
+"""Throughput beside MuJoCo: ``python -m benchmarks.throughput [--quick] [--json FILE]``.
+
+Both engines take steps of 5 ms in the same scenes, in the same process and in turns (A B A B); a ratio is
+taken turn by turn, and its median is what counts. One run of each is thrown away first. Our numbers are given
+at ``fast`` and ``balanced``. Without MuJoCo our numbers stand alone.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.progress import Progress
+
+from benchmarks import machine, memory, start
+from rigid_env.measure import environments, mujoco_scene, rows, workloads
+from rigid_env.measure.table import make_console, make_table
+from rigid_env.measure.timing import Row
+
+REPEATS = 7
+QUICK_REPEATS = 2
+MEMORY_STEPS = 1_000_000
+QUICK_MEMORY_STEPS = 2000
+PARTS = ("engine", "environments", "memory", "start")
+
+
+def measure(parts: tuple[str, ...], is_quick: bool, progress: Progress) -> list[Row]:
+    """All rows of the given parts.
+
+    Parameters
+    ----------
+    parts : tuple of str
+        Of `PARTS`.
+    is_quick : bool
+        Little work and few repeats: to see that it runs, not to be quoted.
+    progress : rich.progress.Progress
+        Shows what is measured.
+    """
+    repeats = QUICK_REPEATS if is_quick else REPEATS
+    has_peer = mujoco_scene.is_installed()
+    found: list[Row] = []
+    if "engine" in parts:
+        tick = _bar(progress, "engine", rows.run_count(repeats, has_peer))
+        sizes = workloads.QUICK if is_quick else workloads.FULL
+        for some in rows.engine_rows(sizes, repeats, has_peer, tick):
+            found += some
+    if "environments" in parts:
+        tick = _bar(progress, "environments", environments.run_count(repeats, has_peer))
+        sizes = environments.QUICK if is_quick else environments.FULL
+        for some in environments.environment_rows(sizes, repeats, _peer(has_peer), tick):
+            found += some
+    if "memory" in parts:
+        _bar(progress, "memory", 1)("memory")
+        found += memory.memory_rows(QUICK_MEMORY_STEPS if is_quick else MEMORY_STEPS)
+    if "start" in parts:
+        _bar(progress, "start", 1)("start of a process")
+        found += start.start_rows(1 if is_quick else REPEATS)
+    return found
+
+
+def _peer(has_peer: bool):
+    if not has_peer:
+        return None
+    from benchmarks.mujoco_env import make_peer
+
+    return make_peer()
+
+
+def _bar(progress: Progress, name: str, total: int):
+    task = progress.add_task(name, total=total)
+
+    def tick(what: str) -> None:
+        progress.update(task, advance=1, description=what)
+
+    return tick
+
+
+def main(
+    json: Annotated[Path | None, typer.Option(help="Where to write the result.")] = None,
+    quick: Annotated[bool, typer.Option("--quick", help="Only see that it runs.")] = False,
+    part: Annotated[list[str] | None, typer.Option(help=f"Some of {', '.join(PARTS)}.")] = None,
+) -> None:
+    """Measure steps per second, memory and start-up beside MuJoCo."""
+    parts = tuple(part or PARTS)
+    unknown = sorted(set(parts) - set(PARTS))
+    if unknown:
+        raise typer.BadParameter(f"{', '.join(unknown)}; allowed are {', '.join(PARTS)}")
+    json = json.resolve() if json else None
+    console = make_console()
+    with Progress(console=console, transient=True) as progress, mujoco_scene.elsewhere():
+        found = measure(parts, quick, progress)
+    console.print(make_table(found, machine.headline()))
+    if quick and json is None:
+        return
+    name = "throughput" if parts == PARTS else "throughput_" + "_".join(parts)
+    path = machine.keep(name, found, json, is_quick=quick, repeats=QUICK_REPEATS if quick else REPEATS)
+    console.print(f"written to {path}")
+
+
+if __name__ == "__main__":
+    typer.run(main)

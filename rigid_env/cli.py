@@ -1,0 +1,186 @@
+"""The command line ``rigid-env``. A command imports what it needs when it runs: ``--help`` is quick."""
+
+from __future__ import annotations
+
+import contextlib
+from importlib import metadata
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich import box
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
+from rich.table import Table
+
+app = typer.Typer(no_args_is_help=True, add_completion=False, help="A rigid-body engine you can check.")
+
+Json = Annotated[Path | None, typer.Option("--json", metavar="FILE", help="Write the numbers here, too.")]
+Accuracy = Annotated[str, typer.Option(help="Preset: fast, balanced, precise or reference.")]
+
+BENCH_REPEATS = 5
+QUICK_REPEATS = 2
+
+
+def _print_version(is_wanted: bool) -> None:
+    if not is_wanted:
+        return
+    try:
+        typer.echo(f"rigid-env {metadata.version('rigid-env')}")
+    except metadata.PackageNotFoundError:
+        typer.echo("rigid-env, not installed: run from its sources")
+    raise typer.Exit
+
+
+@app.callback()
+def _main(
+    version: Annotated[
+        bool, typer.Option("--version", callback=_print_version, is_eager=True, help="Show the version.")
+    ] = False,
+) -> None:
+    pass
+
+
+@contextlib.contextmanager
+def _told_errors():
+    """Turn what a user can put right into a message without a traceback."""
+    from gymnasium.error import DependencyNotInstalled
+
+    try:
+        yield
+    except ValueError as error:
+        raise typer.BadParameter(str(error)) from error
+    except (DependencyNotInstalled, OSError) as error:
+        typer.echo(f"Error: {error}", err=True)
+        raise typer.Exit(1) from error
+
+
+def _progress(console: Console) -> Progress:
+    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
+    return Progress(*columns, console=console, transient=True)
+
+
+def _write(path: Path | None, content: dict, console: Console) -> None:
+    if path is None:
+        return
+    from rigid_env.measure.machine import write_json
+
+    write_json(path, content)
+    _tell_file(path, console)
+
+
+def _tell_file(path: Path, console: Console) -> None:
+    console.print(f"written     {path}", soft_wrap=True, highlight=False)
+
+
+@app.command()
+def demo(
+    scene: Annotated[str, typer.Argument(help="A canonical scene.")] = "drop",
+    duration: Annotated[float, typer.Option(min=0.0, help="Simulated time [s].")] = 5.0,
+    accuracy: Accuracy = "balanced",
+    out: Annotated[Path, typer.Option(metavar="DIR", help="Where PNG and GIF go.")] = Path("demo"),
+    json: Json = None,
+) -> None:
+    """Drop the block in the three-wall box; print what happens, write a picture and a GIF."""
+    console = Console()
+    with _told_errors():
+        from rigid_env.demo import Demo, show
+
+        with console.status("simulating"):
+            run = Demo(scene, duration, accuracy)
+        summary = run.summary()
+        show(run, summary, console)
+        out.mkdir(parents=True, exist_ok=True)
+        files = {kind: out / f"{scene}.{kind}" for kind in ("png", "gif")}
+        run.write_png(files["png"])
+        with _progress(console) as progress:
+            task = progress.add_task("drawing", total=run.frame_count)
+            run.write_gif(files["gif"], lambda: progress.advance(task))
+        for path in files.values():
+            _tell_file(path, console)
+        summary["files"] = {kind: str(path) for kind, path in files.items()}
+        _write(json, summary, console)
+
+
+@app.command()
+def explain(
+    scene: Annotated[str, typer.Argument(help="A canonical scene.")],
+    accuracy: Accuracy = "balanced",
+    json: Json = None,
+) -> None:
+    """Say which effects a scene has, why, and what is compiled for them."""
+    console = Console()
+    with _told_errors():
+        from dataclasses import asdict
+
+        from physics import accuracy as knobs
+        from physics import make_plan, scenes
+
+        settings = knobs.resolve(accuracy)
+        plan = make_plan(scenes.by_name(scene), settings)
+        table = Table(title=f"{scene}, accuracy {accuracy}", title_justify="left", box=box.SIMPLE_HEAD)
+        for name in ("effect", "", "why", "compiled"):
+            table.add_column(name)
+        for row in plan.rows:
+            state = "[green]on[/green]" if row.is_on else "[dim]off[/dim]"
+            table.add_row(row.effect, state, row.reason, row.compiled if row.is_on else "nothing")
+        console.print(table)
+        values = asdict(settings)
+        console.print("accuracy    " + ", ".join(f"{name} {value}" for name, value in values.items()))
+        rows = [asdict(row) for row in plan.rows]
+        content = {"scene": scene, "accuracy": accuracy, "effects": rows, "settings": values}
+        _write(json, {**content, "explanation": plan.explain()}, console)
+
+
+@app.command()
+def warmup(json: Json = None) -> None:
+    """Compile the common plans ahead; what is compiled already takes no time."""
+    console = Console()
+    with _told_errors():
+        from rigid_env.warmup import jobs, warm
+
+        todo = jobs()
+        done = []
+        with _progress(console) as progress:
+            task = progress.add_task("compiling", total=len(todo))
+            for job, result in zip(todo, warm(todo)):
+                progress.update(task, advance=1, description=job.name)
+                made = f"{result.compiled} kernels compiled" if result.compiled else "from the cache"
+                console.print(f"{result.seconds:7.2f} s  {result.name}, {result.accuracy}: {made}")
+                done.append(result)
+        total = sum(result.seconds for result in done)
+        console.print(f"{total:7.2f} s  together")
+        _write(json, {"plans": [result.to_dict() for result in done], "seconds": total}, console)
+
+
+@app.command()
+def bench(
+    json: Json = None,
+    quick: Annotated[bool, typer.Option("--quick", help="Only see that it runs.")] = False,
+) -> None:
+    """Measure steps per second, beside MuJoCo if it is installed."""
+    with _told_errors():
+        from rigid_env.measure import environments, mujoco_scene, rows, workloads
+        from rigid_env.measure.table import make_console, make_table
+
+        console = make_console()
+        has_peer = mujoco_scene.is_installed()
+        repeats = QUICK_REPEATS if quick else BENCH_REPEATS
+        sizes, env_sizes = ((module.QUICK if quick else module.FULL) for module in (workloads, environments))
+        path = json.resolve() if json else None
+        total = rows.run_count(repeats, has_peer) + environments.run_count(repeats, with_peer=False)
+        found = []
+        with _progress(console) as progress, mujoco_scene.elsewhere():
+            task = progress.add_task("measuring", total=total)
+
+            def tick(what: str) -> None:
+                progress.update(task, advance=1, description=what)
+
+            for some in rows.engine_rows(sizes, repeats, has_peer, tick):
+                found += some
+            for some in environments.environment_rows(env_sizes, repeats, tick=tick):
+                found += some
+        console.print(make_table(found, "steps per second: median, lowest .. highest"))
+        if not has_peer:
+            console.print('for ratios to MuJoCo: pip install "rigid-env[bench]"', markup=False)
+        _write(path, {"is_quick": quick, "rows": [row.to_dict() for row in found]}, console)

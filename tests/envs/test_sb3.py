@@ -1,0 +1,141 @@
+"""The Stable-Baselines3 adapter."""
+
+from __future__ import annotations
+
+import warnings
+
+import numpy as np
+import pytest
+
+from rigid_env.vector_env import BlockReachVectorEnv
+
+pytest.importorskip("stable_baselines3")
+
+from stable_baselines3 import PPO
+from stable_baselines3.common.evaluation import evaluate_policy
+from stable_baselines3.common.monitor import Monitor
+from stable_baselines3.common.vec_env import VecCheckNan, VecMonitor, VecNormalize
+
+from rigid_env.sb3 import RigidVecEnv
+from tests.envs.conftest import push, random_actions
+
+
+@pytest.fixture(autouse=True)
+def warnings_are_errors():
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", UserWarning)
+        yield
+
+
+def make(num_envs=3, monitor=True, **arguments):
+    return RigidVecEnv(BlockReachVectorEnv(num_envs, autoreset_mode="SameStep", **arguments), monitor=monitor)
+
+
+def test_only_same_step_autoreset_is_taken():
+    with pytest.raises(ValueError, match=r"NEXT_STEP; allowed is .*SAME_STEP"):
+        RigidVecEnv(BlockReachVectorEnv(2))
+
+
+def test_truncation_is_told_apart_and_the_final_observation_kept(rng):
+    venv, twin = make(max_episode_steps=5), BlockReachVectorEnv(3, max_episode_steps=5)
+    venv.seed(7)
+    obs = venv.reset()
+    expected, _ = twin.reset(seed=7)
+    np.testing.assert_array_equal(obs, expected)
+    returns = np.zeros(3)
+    for k, actions in enumerate(random_actions(rng, 5, 3)):
+        obs, rewards, dones, infos = venv.step(actions)
+        expected, twin_rewards, *_ = twin.step(actions)
+        returns += twin_rewards
+        assert rewards.dtype == np.float32
+        assert dones.tolist() == [k == 4] * 3
+        assert k == 4 or infos == [{}, {}, {}]
+    for i, info in enumerate(infos):
+        np.testing.assert_array_equal(info["terminal_observation"], expected[i])
+        assert info["TimeLimit.truncated"] is True
+        assert info["is_success"] is False
+        assert info["episode"]["l"] == 5
+        assert info["episode"]["r"] == pytest.approx(returns[i], abs=1e-6)
+    np.testing.assert_array_equal(obs, twin.step(np.zeros((3, 6)))[0])
+
+
+def test_success_is_no_truncation():
+    venv = make(2, max_episode_steps=10)
+    venv.set_options({"place": (0.0, 0.0), "goal": [(0.0, 0.0), (3.0, 3.0)], "face": 2})
+    venv.reset()
+    for _ in range(10):
+        _, _, dones, infos = venv.step(np.zeros((2, 6)))
+    assert dones.all()
+    assert [info["is_success"] for info in infos] == [True, False]
+    assert [info["TimeLimit.truncated"] for info in infos] == [False, True]  # success on the last step
+
+
+def test_seeds_are_used_once():
+    venv = make()
+    assert venv.seed(3) == [3, 4, 5]
+    first = venv.reset()
+    assert not np.array_equal(first, venv.reset())
+    venv.seed(3)
+    np.testing.assert_array_equal(first, venv.reset())
+    assert len(venv.reset_infos) == 3
+    assert venv.reset_infos[0].keys() == {"is_success", "distance", "speed", "spin", "physics_status"}
+
+
+def test_attributes_and_methods():
+    venv = make()
+    assert venv.get_attr("max_episode_steps") == [300] * 3
+    assert venv.get_attr("render_mode", [0]) == [None]
+    venv.set_attr("max_episode_steps", 4)
+    assert venv.vector_env.max_episode_steps == 4
+    with pytest.raises(ValueError, match="set_attr got indices 0"):
+        venv.set_attr("max_episode_steps", 5, indices=0)
+    assert venv.has_attr("task")
+    assert not venv.has_attr("tusk")
+    assert len(venv.env_method("_seed_list", 1)) == 3
+    assert venv.env_is_wrapped(Monitor) == [True] * 3
+    assert make(monitor=False).env_is_wrapped(Monitor) == [False] * 3
+
+
+def test_pictures_are_tiled():
+    venv = make(2, render_mode="rgb_array", width=40, height=30)
+    venv.reset()
+    assert venv.render().shape == (60, 40, 3)
+
+
+def test_wrappers_of_sb3(rng):
+    venv = VecNormalize(
+        VecCheckNan(VecMonitor(make(monitor=False, max_episode_steps=6)), raise_exception=True)
+    )
+    obs = venv.reset()
+    assert obs.shape == (3, 24)
+    for actions in random_actions(rng, 6, 3):
+        obs, _, dones, infos = venv.step(actions)
+    assert dones.all()
+    assert infos[0]["episode"]["l"] == 6
+    # VecNormalize has replaced the final observation by its normalised value.
+    original = venv.unnormalize_obs(infos[0]["terminal_observation"])
+    assert np.abs(infos[0]["terminal_observation"]).max() <= 10.0
+    assert np.isfinite(original).all()
+
+
+def test_evaluate_policy_counts_the_scripted_controllers_successes():
+    class Pusher:
+        def predict(self, obs, **_):
+            return push(obs), None
+
+    successes = []
+    evaluate_policy(
+        Pusher(), make(8), n_eval_episodes=8,
+        callback=lambda scope, _: successes.append(scope["info"]["is_success"]) if scope["done"] else None,
+    )  # fmt: skip
+    assert len(successes) >= 8
+    assert np.mean(successes) > 0.8
+
+
+def test_ppo_runs_and_logs_success():
+    model = PPO(
+        "MlpPolicy", make(4, max_episode_steps=8), n_steps=16, batch_size=32, n_epochs=1, device="cpu"
+    )
+    model.learn(128)
+    assert len(model.ep_success_buffer) > 0
+    assert model.ep_info_buffer[0]["l"] == 8

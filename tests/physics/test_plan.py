@@ -1,0 +1,97 @@
+"""What a scene declares is compiled; what it does not, is not there."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import physics
+from physics import scenes
+from physics.accuracy import resolve
+
+BLOCK = physics.Block((5, 3, 2), 6.0, pos=(0, 5, 0))
+CUBE = physics.Block((2, 2, 2), 6.0, pos=(0, 5, 0))
+FLOOR = [physics.HalfSpace((0, 1, 0))]
+
+
+def switches(*effects, body=BLOCK, walls=(), accuracy="balanced"):
+    plan = physics.make_plan(physics.Scene([body], walls, effects), resolve(accuracy))
+    names = ("gravity", "contact", "friction", "restitution", "gyroscopic", "pivots")
+    return {name for name in names if getattr(plan, name)}
+
+
+def test_only_what_is_declared_is_on():
+    gravity, contact, friction = physics.Gravity(), physics.Contact(), physics.Friction()
+    assert switches() == {"gyroscopic"}
+    assert switches(body=CUBE) == set()
+    assert switches(gravity) == {"gravity", "gyroscopic"}
+    assert switches(gravity, contact) == {"gravity", "gyroscopic"}  # nothing to touch
+    assert switches(contact, walls=FLOOR) == {"contact", "gyroscopic", "pivots"}
+    assert switches(contact, walls=FLOOR, accuracy="fast") == {"contact", "gyroscopic"}
+    assert switches(physics.Contact(0.0), friction, walls=FLOOR, body=CUBE) == {
+        "contact", "friction", "restitution", "pivots",
+    }  # fmt: skip
+
+
+def test_explain_names_every_effect_and_its_reason():
+    text = physics.make_plan(scenes.drop(), resolve("balanced")).explain()
+    for word in ("gravity", "wall contact", "friction", "restitution", "gyroscopic torque", "applied wrench"):
+        assert word in text
+    assert "off  not declared" in physics.make_plan(scenes.tumble(), resolve("balanced")).explain()
+    assert "walls do not act" in physics.make_plan(physics.Scene([BLOCK], FLOOR), resolve("fast")).explain()
+
+
+PROGRAM = """
+import json, sys, physics
+from physics.kernels.step import step_worlds
+effects = eval(sys.argv[1])
+world = physics.World(physics.Scene([physics.Block((5, 3, 2), 6.0, pos=(0, 5, 0))],
+                      [physics.HalfSpace((0, 1, 0))], effects), dt=0.01)
+world.step()
+code = next(iter(step_worlds.inspect_asm().values()))
+names = ["gather", "solve_contacts", "cone_sweeps", "pyramid_fallback", "normal_sweeps", "free_rotation"]
+print(json.dumps([name for name in names if name in code]))
+"""
+
+
+def compiled_names(effects: str, cache: Path) -> set[str]:
+    """Which kernels the machine code of the step of a scene calls, compiled afresh in a process of its own."""
+    done = subprocess.run(
+        [sys.executable, "-c", PROGRAM, effects], env={**os.environ, "NUMBA_CACHE_DIR": str(cache)},
+        capture_output=True, text=True, check=True, timeout=600,
+    )  # fmt: skip
+    return set(json.loads(done.stdout))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("effects", "present", "absent"),
+    [
+        (
+            "[physics.Gravity()]",
+            {"free_rotation"},
+            {"gather", "solve_contacts", "cone_sweeps", "normal_sweeps"},
+        ),
+        ("[physics.Contact()]", {"gather", "normal_sweeps"}, {"cone_sweeps", "pyramid_fallback"}),
+    ],
+)
+def test_machine_code_holds_nothing_that_is_not_declared(effects, present, absent, tmp_path):
+    names = compiled_names(effects, tmp_path)
+    assert present <= names
+    assert not absent & names
+
+
+def test_an_undeclared_effect_and_one_that_cannot_act_leave_the_same_bits():
+    """Friction and restitution on a floor that is never reached change nothing of a flight."""
+    flights = []
+    for effects in ([physics.Gravity()], [physics.Gravity(), physics.Contact(0.5), physics.Friction(0.3)]):
+        body = physics.Block((5, 3, 2), 6.0, pos=(0, 500, 0), angvel=(1, 2, 3))
+        world = physics.World(physics.Scene([body], FLOOR, effects), dt=0.01)
+        world.step(steps=300)
+        flights.append(world.state.tobytes())
+    assert flights[0] == flights[1]
