@@ -71,7 +71,7 @@ def _bar(progress: Progress, name: str, total: int):
     task = progress.add_task(name, total=total)
 
     def tick(what: str) -> None:
-        progress.update(task, advance=1, description=what)
+        progress.update(task, advance=1, description=what, refresh=True)
 
     return tick
 
@@ -88,7 +88,8 @@ def main(
         raise typer.BadParameter(f"{', '.join(unknown)}; allowed are {', '.join(PARTS)}")
     json = json.resolve() if json else None
     console = make_console()
-    with Progress(console=console, transient=True) as progress, mujoco_scene.elsewhere():
+    # a progress bar with a thread of its own would disturb what is measured
+    with Progress(console=console, transient=True, auto_refresh=False) as progress, mujoco_scene.elsewhere():
         found = measure(parts, quick, progress)
     console.print(make_table(found, machine.headline()))
     if quick and json is None:

@@ -55,9 +55,10 @@ def _told_errors():
         raise typer.Exit(1) from error
 
 
-def _progress(console: Console) -> Progress:
+def _progress(console: Console, has_thread: bool = True) -> Progress:
+    """A progress bar; without its thread, which would disturb what is measured, refresh it yourself."""
     columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
-    return Progress(*columns, console=console, transient=True)
+    return Progress(*columns, console=console, transient=True, auto_refresh=has_thread)
 
 
 def _write(path: Path | None, content: dict, console: Console) -> None:
@@ -170,11 +171,11 @@ def bench(
         path = json.resolve() if json else None
         total = rows.run_count(repeats, has_peer) + environments.run_count(repeats, with_peer=False)
         found = []
-        with _progress(console) as progress, mujoco_scene.elsewhere():
+        with _progress(console, has_thread=False) as progress, mujoco_scene.elsewhere():
             task = progress.add_task("measuring", total=total)
 
             def tick(what: str) -> None:
-                progress.update(task, advance=1, description=what)
+                progress.update(task, advance=1, description=what, refresh=True)
 
             for some in rows.engine_rows(sizes, repeats, has_peer, tick):
                 found += some

@@ -15,13 +15,15 @@ from rich.table import Table
 import physics
 from physics import checks, scenes
 from rigid_env.picture import stroboscope, without_bodies, world_frame, write_gif, write_png
-from rigid_env.rendering import Renderer
+from rigid_env.rendering import Frame, Renderer
 
 SAMPLE_DT = 0.01  # [s]
 FRAME_SAMPLES = 4  # samples per picture of the GIF: 25 pictures a second
 PICTURE_SIZE = (960, 600)  # [px]
 GIF_SIZE = (640, 400)  # [px]
 STROBES = 7  # positions in the picture
+SIGHT = 100.0  # further from the origin than this no wall is drawn [m]
+SEEN_SPEED = 0.05  # below which nothing seems to move [m/s, rad/s]
 REST_SPEED = 1e-6  # below which a body is at rest [m/s, rad/s]
 SHOWN_EVENTS = 24
 
@@ -51,6 +53,7 @@ class Demo:
         self.trajectory = physics.simulate(self.scene, self.duration, accuracy, sample_dt=SAMPLE_DT)
         self.world = physics.World(self.scene, dt=SAMPLE_DT, accuracy=accuracy)
         self.start = self.world.snapshot()
+        self._is_far = bool(np.abs(self.world.pos).max() > SIGHT)
         self._replay(self._sample_count)
 
     def _replay(self, samples: int) -> None:
@@ -124,7 +127,7 @@ class Demo:
             if k > 0:
                 for _ in range(FRAME_SAMPLES):
                     self.world.step()
-            pictures.append(renderer.draw(world_frame(self.world, text=[f"t = {self.world.time:.2f} s"])))
+            pictures.append(renderer.draw(self._frame(f"t = {self.world.time:.2f} s")))
             tick()
         renderer.close()
         write_gif(path, pictures, 1.0 / (SAMPLE_DT * FRAME_SAMPLES))
@@ -133,19 +136,31 @@ class Demo:
         """Draw and write the stroboscopic picture: where the bodies were, and how they end."""
         renderer = Renderer(*PICTURE_SIZE)
         pictures = []
-        for sample in np.linspace(0, self._sample_count, STROBES).astype(int):
+        for sample in np.linspace(0, self._last_motion(), STROBES).astype(int):
             self._replay(int(sample))
-            pictures.append(renderer.draw(self._still_frame(is_last=sample == self._sample_count)))
-        frame = world_frame(self.world)
+            frame = replace(self._frame(), contact_points=(), contact_forces=())
+            pictures.append(renderer.draw(frame))
+        self._replay(self._sample_count)
+        frame = self._frame(f"{self.name}, t = 0 .. {self.world.time:g} s")
+        pictures.append(renderer.draw(frame))
         empty = without_bodies(frame, renderer.camera(frame))
         write_png(path, stroboscope(pictures, renderer.draw(empty)))
         renderer.close()
 
-    def _still_frame(self, is_last: bool):
-        frame = world_frame(
-            self.world, text=[f"{self.name}, t = 0 .. {self.world.time:g} s"] if is_last else ()
-        )
-        return frame if is_last else replace(frame, contact_points=(), contact_forces=())
+    def _last_motion(self) -> int:
+        """Last sample at which a body still moved in a way that one sees."""
+        speed = np.maximum(np.abs(self.trajectory.linvel), np.abs(self.trajectory.angvel)).max(axis=(1, 2))
+        moving = np.flatnonzero(speed > SEEN_SPEED)
+        return int(moving[-1]) if len(moving) else 0
+
+    def _frame(self, *text: str) -> Frame:
+        """The world now; far from the walls the picture is without them and travels with body 0."""
+        frame = world_frame(self.world, text=text)
+        if not self._is_far:
+            return frame
+        origin = frame.bodies[0].pos
+        bodies = tuple(replace(body, pos=body.pos - origin) for body in frame.bodies)
+        return replace(frame, bodies=bodies, walls=())
 
 
 def show(demo: Demo, summary: dict, console: Console) -> None:

@@ -125,8 +125,8 @@ class BlockReorientEnv(RigidEnv):
     ## Description
 
     The block of `BlockReachEnv`, in the same box; now one of its faces is to be turned down, wherever
-    that is on the floor. The torque alone is too weak to tip the block: it takes the force's help,
-    momentum, or a wall.
+    that is on the floor. The torque alone tips the block over its shortest half edge
+    only: the others take the force's help, momentum, or a wall.
 
     ## Action Space
 

@@ -13,6 +13,7 @@ from physics.kernels import layout as at
 from rigid_env.rendering import BodyView, Camera, Frame, GoalView, WallView
 from rigid_env.view import WEIGHT_ARROW
 
+FULL_CHANGE = 40.0  # of a pixel from which on it shows a body, not the rim of a shadow [of 255]
 FAINTEST = 0.25  # opacity of the first of the stroboscopic pictures; the last one has 1
 GIF_COLOURS = 128
 FAR_BEHIND = 1000.0  # times the distance between the camera and what it looks at
@@ -93,8 +94,8 @@ def stroboscope(pictures: Sequence[np.ndarray], empty: np.ndarray) -> np.ndarray
     """
     blend = empty.astype(np.float64)
     for picture, opacity in zip(pictures, np.linspace(FAINTEST, 1.0, len(pictures) + 1)[1:]):
-        differs = (picture != empty).any(axis=2)
-        blend[differs] += opacity * (picture[differs] - blend[differs])
+        change = np.abs(picture.astype(np.float64) - empty).max(axis=2, keepdims=True)
+        blend += opacity * np.minimum(change / FULL_CHANGE, 1.0) * (picture - blend)
     return np.rint(blend).astype(np.uint8)
 
 

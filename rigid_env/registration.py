@@ -14,7 +14,8 @@ def register_envs() -> None:
     """Register every environment of the package with Gymnasium; what is registered already stays.
 
     Called on import, and by Gymnasium itself (entry point `gymnasium.envs`), so that `gymnasium.make` finds
-    the ids without an import. Entry points are named by strings: nothing of the engine is imported before `make`.
+    the ids without an import. Entry points are named by strings: nothing of the engine is imported before
+    `make`.
     """
     for name, steps in MAX_EPISODE_STEPS.items():
         env_id = f"{NAMESPACE}/{name}-v0"

@@ -19,8 +19,8 @@ class RigidVecEnv(VecEnv):
 
     Worlds start anew in the step in which their episode ends; the info of that step holds
     ``terminal_observation``, ``TimeLimit.truncated``, ``is_success``, the error that the task names, and,
-    with `monitor`, ``episode`` (return ``r``, length ``l``, seconds since the start of training ``t``). The other
-    infos are empty.
+    with `monitor`, ``episode`` (return ``r``, length ``l``, seconds since the start of training ``t``).
+    The other infos are empty.
 
     Parameters
     ----------

@@ -9,6 +9,7 @@ import numpy as np
 
 from rigid_env.spaces import action_space, observation_space
 from rigid_env.tasks import Task
+from rigid_env.tasks.kernels import AXES
 from rigid_env.view import RENDER_MODES, View
 
 RENDER_FPS = 40  # of the default control period, 5 steps of 5 ms
@@ -86,10 +87,11 @@ class RigidEnv(gym.Env):
         """
         if not self._has_reset:
             raise gym.error.ResetNeeded("call reset() before step()")
-        if np.shape(action) != (6,):
-            raise ValueError(f"action has shape {np.shape(action)}; allowed is shape (6,)")
+        action = np.asarray(action)
+        if action.shape != (AXES,):
+            raise ValueError(f"action has shape {action.shape}; allowed is shape ({AXES},)")
         obs = np.empty((1, len(self.task.observation)), dtype=np.float32)
-        self.task.step((action,), obs)
+        self.task.step(action[None], obs)
         outcome = self.task.outcome[0].tolist()
         status = self.task.physics_status()
         if self.render_mode == "human":

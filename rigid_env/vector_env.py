@@ -246,7 +246,7 @@ class RigidVectorEnv(gym.vector.VectorEnv):
     # --- pictures -----------------------------------------------------------------------------------------
 
     def render(self) -> tuple[np.ndarray, ...] | None:
-        """A picture of each world, (height, width, 3) uint8; mode ``human`` shows world 0 and returns None."""
+        """A picture of each world, (height, width, 3) uint8; mode ``human`` shows world 0 and gives None."""
         if self.render_mode is None:
             gym.logger.warn(
                 "render() needs a render_mode: pass render_mode='rgb_array' or 'human' to make_vec()"

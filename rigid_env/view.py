@@ -5,13 +5,18 @@ from __future__ import annotations
 import numpy as np
 
 from rigid_env.rendering import BodyView, Frame, GoalView, Renderer, WallView
-from rigid_env.tasks import Task, kernels
+from rigid_env.tasks import Task
 from rigid_env.tasks import layout as col
+from rigid_env.tasks.base import FORCE_SHARE
 
 RENDER_MODES = ("rgb_array", "human")
 
 WEIGHT_ARROW = 2.5
 """[m] Length of the arrow of a force as large as the block's weight."""
+
+
+GOAL_RADIUS = 1.0
+"""[m] Of the goal's disc, to be seen beside a block that covers its tolerance."""
 
 
 def frame_of(task: Task, world: int = 0) -> Frame:
@@ -29,7 +34,7 @@ def frame_of(task: Task, world: int = 0) -> Frame:
     """
     record, outcome, wrench = task.record[world], task.outcome[world], task.wrench[world, 0]
     points, forces = task.world.contacts(world)
-    weight = task.world.gravity[world] / task.world.params[world, 0]
+    weight = record[col.FORCE_LIMIT] / FORCE_SHARE
     unit = "m" if task.error_name == "distance" else "rad"
     return Frame(
         bodies=(
@@ -50,7 +55,7 @@ def frame_of(task: Task, world: int = 0) -> Frame:
             f"{task.error_name} {outcome[col.ERROR]:.2f} {unit}",
             f"speed {outcome[col.SPEED]:.2f} m/s   spin {outcome[col.SPIN]:.2f} rad/s",
         ),
-        force_scale=WEIGHT_ARROW / float(np.linalg.norm(weight)),
+        force_scale=WEIGHT_ARROW / weight,
     )
 
 
@@ -59,7 +64,7 @@ def _goal(task: Task, record: np.ndarray) -> GoalView:
     if task.error_name == "angle":
         return GoalView(reached=is_held, goal_face=int(record[col.FACE]))
     x, z = record[col.GOAL : col.GOAL + 2]
-    return GoalView(pos=(x, 0.0, z), radius=kernels.REACH_TOLERANCE, reached=is_held)
+    return GoalView(pos=(x, 0.0, z), radius=GOAL_RADIUS, reached=is_held)
 
 
 class View:

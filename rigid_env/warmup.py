@@ -12,7 +12,7 @@ from numba.core import event
 
 import physics
 from physics import scenes
-from rigid_env.registration import NAMESPACE
+from rigid_env.measure.environments import environment_ids
 
 ACCURACIES = ("balanced", "fast")
 FIRST_SCENE = "drop"  # the three-wall box: at all of `ACCURACIES`, the other scenes at the first
@@ -90,8 +90,7 @@ def _scene_jobs(name: str, accuracy: str) -> list[Job]:
 
 
 def _environment_jobs(accuracy: str) -> list[Job]:
-    ids = sorted(name for name in gymnasium.registry if name.startswith(f"{NAMESPACE}/"))
-    return [Job(f"environment {name}", accuracy, _stepper(name, accuracy)) for name in ids]
+    return [Job(f"environment {name}", accuracy, _stepper(name, accuracy)) for name in environment_ids()]
 
 
 def _stepper(env_id: str, accuracy: str) -> Callable[[], None]:

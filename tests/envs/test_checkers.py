@@ -71,12 +71,14 @@ def test_make_vec_gives_the_native_batch_and_its_limit(env_id):
 
 def test_record_video_of_a_single_environment(env_id, tmp_path):
     env = gym.make(env_id, render_mode="rgb_array", width=64, height=48)
-    env = gym.wrappers.RecordVideo(env, str(tmp_path), episode_trigger=lambda k: True, video_length=3)
+    env = gym.wrappers.RecordVideo(
+        env, str(tmp_path / "video"), episode_trigger=lambda k: True, video_length=3
+    )
     env.reset(seed=0)
     for _ in range(4):
         env.step(env.action_space.sample())
     env.close()
-    (video,) = tmp_path.glob("*.mp4")
+    (video,) = tmp_path.glob("video/*.mp4")
     assert video.stat().st_size > 500
 
 
@@ -87,13 +89,13 @@ def test_record_video_of_a_vector_environment(env_id, tmp_path):
     assert len(frames) == 2
     assert not np.array_equal(*frames)  # two worlds, two pictures
     envs = gym.wrappers.vector.RecordVideo(
-        envs, str(tmp_path), episode_trigger=lambda k: True, video_length=3
+        envs, str(tmp_path / "video"), episode_trigger=lambda k: True, video_length=3
     )
     envs.reset(seed=0)
     for _ in range(4):
         envs.step(envs.action_space.sample())
     envs.close()
-    (video,) = tmp_path.glob("*.mp4")
+    (video,) = tmp_path.glob("video/*.mp4")
     assert video.stat().st_size > 500
 
 

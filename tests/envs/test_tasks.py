@@ -126,6 +126,24 @@ def test_success_takes_the_whole_hold_and_its_reward_follows_the_formula():
     assert steps[-1][4]["distance"] == pytest.approx(0.2, abs=1e-4)
 
 
+@pytest.mark.parametrize(
+    "motion", [{"linvel": (1.0, 0.0, 0.0)}, {"angvel": (0.0, 1.5, 0.0)}], ids=["slides", "spins"]
+)
+def test_the_hold_begins_when_the_block_is_at_rest_on_its_goal(motion):
+    env = BlockReachEnv()
+    env.reset(seed=0, options={"place": (0.0, 0.0), "goal": (0.0, 0.0), "face": 2})
+    env.task.world.set_state(**{name: np.reshape(value, (1, 1, 3)) for name, value in motion.items()})
+    hold, holds = 0, []
+    while hold < 3:
+        obs, _, _, _, info = env.step(np.zeros(6))
+        assert info["distance"] <= kernels.REACH_TOLERANCE
+        is_at_rest = info["speed"] <= kernels.REST_SPEED and info["spin"] <= kernels.REST_SPIN
+        hold = hold + 1 if is_at_rest else 0
+        holds.append(hold)
+        assert obs[23] == pytest.approx(hold / kernels.HOLD_STEPS)
+    assert holds[0] == 0
+
+
 def test_reorient_success_when_the_target_is_down():
     env = BlockReorientEnv()
     env.reset(seed=0, options={"face": 4, "target_face": 4})
@@ -270,8 +288,7 @@ def test_options_for_all_worlds_or_for_each():
     np.testing.assert_array_equal(envs.task.world.pos[:, 0], [[0.0, 2.5, 0.0], [3.0, 1.5, 0.0]])
 
 
-def test_a_physics_fault_is_told(monkeypatch):
-    """A step that did not go well shows in the info of its world."""
+def test_a_physics_fault_is_told():
     env, envs = BlockReachEnv(), BlockReachVectorEnv(2)
     env.reset(seed=0)
     envs.reset(seed=0)

@@ -1,0 +1,1 @@
+"""Training, evaluation and recording of agents, and baselines to compare them with, on Stable-Baselines3."""

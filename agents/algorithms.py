@@ -1,0 +1,78 @@
+"""Environments and models of a run, made from its configuration."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import gymnasium as gym
+import torch
+from gymnasium.vector import AutoresetMode
+from stable_baselines3 import PPO, SAC
+from stable_baselines3.common.base_class import BaseAlgorithm
+
+from agents.config import RunConfig
+from rigid_env.sb3 import RigidVecEnv
+
+CLASSES: dict[str, type[BaseAlgorithm]] = {"ppo": PPO, "sac": SAC}
+
+
+def make_vector_env(env: str, num_envs: int, **arguments: Any) -> gym.vector.VectorEnv:
+    """The native batch of an environment.
+
+    Parameters
+    ----------
+    env : str
+        Gymnasium id.
+    num_envs : int
+    **arguments
+        Of the environment, `autoreset_mode` and `threads` among them.
+
+    Raises
+    ------
+    ValueError
+        If there is no such environment, or an argument is out of range.
+    """
+    try:
+        return gym.make_vec(env, num_envs=num_envs, vectorization_mode="vector_entry_point", **arguments)
+    except gym.error.UnregisteredEnv as error:
+        raise ValueError(f"env is {env!r}; allowed are ids that Gymnasium knows ({error})") from error
+
+
+def make_training_env(config: RunConfig) -> RigidVecEnv:
+    """The batch that a run trains on, seeded: world i draws its episodes from the seed `config.seed` + i."""
+    vector_env = make_vector_env(
+        config.env,
+        config.num_envs,
+        autoreset_mode=AutoresetMode.SAME_STEP,
+        threads=config.threads,
+        accuracy=config.accuracy,
+        **config.env_kwargs,
+    )
+    env = RigidVecEnv(vector_env)
+    env.seed(config.seed)
+    return env
+
+
+def algorithm_arguments(config: RunConfig) -> dict[str, Any]:
+    """Keyword arguments of the algorithm's class, with names of torch classes looked up.
+
+    Raises
+    ------
+    ValueError
+        If `torch.nn` has no such activation.
+    """
+    arguments = dict(config.algorithm)
+    policy = dict(arguments.pop("policy_kwargs", {}))
+    if "activation_fn" in policy:
+        name = policy["activation_fn"]
+        if not hasattr(torch.nn, name):
+            raise ValueError(f"policy_kwargs.activation_fn is {name!r}; allowed are class names of torch.nn")
+        policy["activation_fn"] = getattr(torch.nn, name)
+    return {**arguments, "policy_kwargs": policy}
+
+
+def make_model(config: RunConfig, env: RigidVecEnv) -> BaseAlgorithm:
+    """A new model on the CPU, where small networks are fastest."""
+    return CLASSES[config.algo](
+        "MlpPolicy", env, seed=config.seed, device="cpu", **algorithm_arguments(config)
+    )

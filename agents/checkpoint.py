@@ -1,0 +1,130 @@
+"""Checkpoints: everything a run needs to go on as if it had never stopped.
+
+A checkpoint is a folder named by its step, with the model and its optimiser (`model.zip`), the replay buffer
+of SAC, and `state.pkl`: the environments in the middle of their episodes, all random generators, and the
+history of the run. It is written beside its place and renamed, so that an interrupted one is never found.
+"""
+
+from __future__ import annotations
+
+import pickle
+import random
+import shutil
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import torch
+from stable_baselines3.common.base_class import BaseAlgorithm
+from stable_baselines3.common.off_policy_algorithm import OffPolicyAlgorithm
+
+from agents.algorithms import CLASSES
+from agents.baselines import Policy
+from agents.config import RunConfig, RunFolder
+
+KEPT = 3  # newest checkpoints of a run; older ones are deleted
+
+MODEL, REPLAY, STATE = "model.zip", "replay_buffer.pkl", "state.pkl"
+
+
+def save_checkpoint(folder: Path, model: BaseAlgorithm, history: Any) -> Path:
+    """Write a checkpoint; call it between two updates, not within one.
+
+    Parameters
+    ----------
+    folder : Path
+        Of all checkpoints of the run.
+    model : BaseAlgorithm
+    history : object
+        Picklable; `load_checkpoint` gives it back.
+
+    Returns
+    -------
+    Path
+        Folder of the checkpoint.
+    """
+    place = folder / f"{model.num_timesteps:012d}"
+    partial = folder / f"{place.name}.partial"
+    shutil.rmtree(partial, ignore_errors=True)
+    partial.mkdir(parents=True)
+    model.save(partial / MODEL)
+    if isinstance(model, OffPolicyAlgorithm):
+        model.save_replay_buffer(partial / REPLAY)
+    state = {
+        "env": model.get_env(),
+        "torch": torch.get_rng_state(),
+        "numpy": np.random.get_bit_generator().state,
+        "python": random.getstate(),
+        "history": history,
+    }
+    with (partial / STATE).open("wb") as file:
+        pickle.dump(state, file)
+    shutil.rmtree(place, ignore_errors=True)
+    partial.rename(place)
+    for old in list_checkpoints(folder)[:-KEPT]:
+        shutil.rmtree(old, ignore_errors=True)
+    return place
+
+
+def list_checkpoints(folder: Path) -> list[Path]:
+    """Folders of the complete checkpoints, oldest first."""
+    return sorted(path for path in folder.glob("*") if path.name.isdigit())
+
+
+def load_checkpoint(run: RunFolder, config: RunConfig) -> tuple[BaseAlgorithm, Any]:
+    """The newest checkpoint of a run: model, environments and random generators as they were.
+
+    The same computer, versions and number of threads given, training goes on with the same bits.
+
+    Parameters
+    ----------
+    run : RunFolder
+    config : RunConfig
+
+    Returns
+    -------
+    model : BaseAlgorithm
+    history : object
+        Given to `save_checkpoint`.
+
+    Raises
+    ------
+    ValueError
+        If there is none.
+    """
+    found = list_checkpoints(run.checkpoints)
+    if not found:
+        raise ValueError(f"run is {str(run.path)!r}; allowed is one with a checkpoint")
+    model = CLASSES[config.algo].load(found[-1] / MODEL, device="cpu")
+    if isinstance(model, OffPolicyAlgorithm):
+        model.load_replay_buffer(found[-1] / REPLAY)
+    with (found[-1] / STATE).open("rb") as file:
+        state = pickle.load(file)
+    model.set_env(state["env"], force_reset=False)
+    torch.set_rng_state(state["torch"])
+    np.random.get_bit_generator().state = state["numpy"]
+    random.setstate(state["python"])
+    return model, state["history"]
+
+
+def load_policy(run: RunFolder) -> tuple[RunConfig, Policy]:
+    """The trained policy of a run, acting without exploration.
+
+    It is that of `model.zip`, or of the newest checkpoint if training has not ended.
+
+    Raises
+    ------
+    ValueError
+        If the folder is not that of a run, or has no model yet.
+    """
+    config = run.read_config()
+    found = [run.model] if run.model.is_file() else [c / MODEL for c in list_checkpoints(run.checkpoints)[-1:]]
+    if not found:
+        raise ValueError(f"run is {str(run.path)!r}; allowed is one with a model.zip or a checkpoint")
+    torch.set_num_threads(config.torch_threads)
+    return config, greedy(CLASSES[config.algo].load(found[0], device="cpu"))
+
+
+def greedy(model: BaseAlgorithm) -> Policy:
+    """The most likely action of a model for each observation."""
+    return lambda observations: model.predict(observations, deterministic=True)[0]

@@ -1,0 +1,198 @@
+"""What a run does: hyperparameters from YAML keyed by environment id and algorithm, and the folder of a run."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass, field, fields, replace
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+HYPERPARAMETERS = Path(__file__).with_name("hyperparameters.yml")
+
+ALGORITHMS = ("ppo", "sac")
+
+
+@dataclass(frozen=True)
+class RunConfig:
+    """Everything that decides a run; written to `config.yaml` in its folder.
+
+    Parameters
+    ----------
+    env : str
+        Gymnasium id.
+    algo : {"ppo", "sac"}
+    seed : int
+        Of the policy's weights, the exploration and the environments.
+    num_envs : int
+        Worlds of the training batch.
+    max_steps : int
+        Environment steps, of all worlds together, after which training ends.
+    target : float
+        Success rate at which training ends, in (0, 1].
+    accuracy : str
+        Of the engine in training.
+    evaluation_accuracy : str
+        Of the engine in evaluation and videos.
+    threads : int
+        Of the engine.
+    torch_threads : int
+    algorithm : dict
+        Keyword arguments of the class in Stable-Baselines3; ``policy_kwargs.activation_fn`` by its name in
+        `torch.nn`.
+    env_kwargs : dict
+        Further arguments of the environment.
+
+    Raises
+    ------
+    ValueError
+        Naming the field, the value and what is allowed.
+    """
+
+    env: str
+    algo: str
+    seed: int
+    num_envs: int
+    max_steps: int
+    target: float
+    accuracy: str = "fast"
+    evaluation_accuracy: str = "balanced"
+    threads: int = 2
+    torch_threads: int = 1
+    algorithm: dict[str, Any] = field(default_factory=dict)
+    env_kwargs: dict[str, Any] = field(default_factory=dict)
+
+    def __post_init__(self):
+        if self.algo not in ALGORITHMS:
+            raise ValueError(f"algo is {self.algo!r}; allowed are {', '.join(ALGORITHMS)}")
+        for name in ("num_envs", "max_steps", "threads", "torch_threads"):
+            value = getattr(self, name)
+            if isinstance(value, bool) or not isinstance(value, int) or value < 1:
+                raise ValueError(f"{name} is {value!r}; allowed are integers of at least 1")
+        if isinstance(self.seed, bool) or not isinstance(self.seed, int) or self.seed < 0:
+            raise ValueError(f"seed is {self.seed!r}; allowed are integers of at least 0")
+        if not 0.0 < self.target <= 1.0:
+            raise ValueError(f"target is {self.target!r}; allowed are success rates over 0 and up to 1")
+
+    @property
+    def evaluation_arguments(self) -> dict[str, Any]:
+        """Keyword arguments of the environment in evaluation and videos."""
+        return {**self.env_kwargs, "accuracy": self.evaluation_accuracy}
+
+    def write(self, path: Path) -> None:
+        """Write as YAML."""
+        path.write_text(yaml.safe_dump(asdict(self), sort_keys=False), encoding="utf-8")
+
+
+def read_hyperparameters(env: str, algo: str, path: Path = HYPERPARAMETERS) -> dict[str, Any]:
+    """The entry of an environment and an algorithm in a file of hyperparameters.
+
+    Parameters
+    ----------
+    env : str
+        Gymnasium id; a module to import before a colon is left out.
+    algo : str
+    path : Path
+
+    Returns
+    -------
+    dict
+        Fields of `RunConfig`.
+
+    Raises
+    ------
+    ValueError
+        If there is no such entry, or it has an unknown key.
+    """
+    table = yaml.safe_load(path.read_text(encoding="utf-8"))
+    if env not in table:
+        raise ValueError(f"env is {env!r}; allowed are those of {path.name}: {', '.join(table)}")
+    if algo not in table[env]:
+        raise ValueError(f"algo is {algo!r}; allowed with {env} are {', '.join(table[env])}")
+    entry = table[env][algo]
+    unknown = set(entry) - {f.name for f in fields(RunConfig)}
+    if unknown:
+        raise ValueError(f"{path.name}: {env}, {algo} has the unknown keys {', '.join(sorted(unknown))}")
+    return entry
+
+
+def make_config(env: str, algo: str, seed: int, path: Path = HYPERPARAMETERS, **changes: Any) -> RunConfig:
+    """The configuration of a new run: hyperparameters of the file, with `changes` that are not None.
+
+    Raises
+    ------
+    ValueError
+        See `read_hyperparameters` and `RunConfig`.
+    """
+    env = env.rpartition(":")[2]
+    config = RunConfig(env=env, algo=algo, seed=seed, **read_hyperparameters(env, algo, path))
+    return change(config, **changes)
+
+
+def change(config: RunConfig, **changes: Any) -> RunConfig:
+    """The same configuration with those `changes` that are not None."""
+    return replace(config, **{name: value for name, value in changes.items() if value is not None})
+
+
+@dataclass(frozen=True)
+class RunFolder:
+    """Where the files of a run are.
+
+    Parameters
+    ----------
+    path : Path
+    """
+
+    path: Path
+
+    @property
+    def config(self) -> Path:
+        """The configuration, YAML."""
+        return self.path / "config.yaml"
+
+    @property
+    def model(self) -> Path:
+        """The trained model, by Stable-Baselines3."""
+        return self.path / "model.zip"
+
+    @property
+    def checkpoints(self) -> Path:
+        """Folders named by their step, see `agents.checkpoint`."""
+        return self.path / "checkpoints"
+
+    @property
+    def monitor(self) -> Path:
+        """Every training episode: return, length, seconds, success; read by SB3's `load_results`."""
+        return self.path / "monitor.csv"
+
+    @property
+    def curve(self) -> Path:
+        """The learning curve; `.png` beside it."""
+        return self.path / "curve.csv"
+
+    @property
+    def evaluation(self) -> Path:
+        """Of the trained model on fresh episodes, JSON."""
+        return self.path / "evaluation.json"
+
+    @property
+    def result(self) -> Path:
+        """What `--json` writes."""
+        return self.path / "result.json"
+
+    @property
+    def video(self) -> Path:
+        """Some episodes; `.gif` where there is no ffmpeg."""
+        return self.path / "episodes.mp4"
+
+    def read_config(self) -> RunConfig:
+        """The configuration of the run.
+
+        Raises
+        ------
+        ValueError
+            If the folder is not that of a run.
+        """
+        if not self.config.is_file():
+            raise ValueError(f"run is {str(self.path)!r}; allowed is the folder of a run, with a config.yaml")
+        return RunConfig(**yaml.safe_load(self.config.read_text(encoding="utf-8")))

@@ -1,0 +1,211 @@
+"""Success rate of a trained agent or a baseline: ``python -m agents.evaluate RUN_DIR``.
+
+Each of a fixed set of seeds gets exactly one episode, run to its end. Counting whichever episodes end first
+would favour short ones, that is, successes.
+"""
+
+from __future__ import annotations
+
+import json
+import time
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any
+
+import numpy as np
+import typer
+from gymnasium.vector import AutoresetMode
+from rich.console import Console
+from rich.table import Table
+
+from agents.algorithms import make_vector_env
+from agents.baselines import Policy, baseline_policy
+from agents.checkpoint import load_policy
+from agents.config import RunFolder
+from agents.interval import wilson
+
+BATCH = 500  # episodes at a time
+
+FIRST_SEED = 1_000_000_000  # far from the seeds of training, which start at the seed of the run
+SEED_STRIDE = 1_000_000  # episodes between the sets of seeds of two evaluations
+
+
+@dataclass(frozen=True)
+class Episodes:
+    """What came of episodes, one row each.
+
+    Parameters
+    ----------
+    success : (n,) bool
+    returns : (n,) float64
+    lengths : (n,) int64
+        Control steps.
+    """
+
+    success: np.ndarray
+    returns: np.ndarray
+    lengths: np.ndarray
+
+    def summary(self) -> dict[str, Any]:
+        """Numbers for a table or JSON."""
+        successes, count = int(self.success.sum()), len(self.success)
+        low, high = wilson(successes, count)
+        return {
+            "episodes": count,
+            "successes": successes,
+            "success_rate": successes / count,
+            "interval": [low, high],
+            "interval_is": "Wilson score, 95 %",
+            "return_mean": float(self.returns.mean()),
+            "return_std": float(self.returns.std()),
+            "length_mean": float(self.lengths.mean()),
+            "length_max": int(self.lengths.max()),
+        }
+
+
+def evaluation_seeds(seed: int, count: int) -> range:
+    """Seeds of the episodes of an evaluation; two evaluations, or training, share none of them."""
+    first = FIRST_SEED + SEED_STRIDE * seed
+    return range(first, first + count)
+
+
+def run_episodes(env: str, policy: Policy, seeds: range, threads: int = 2, **arguments: Any) -> Episodes:
+    """One episode for each seed, from its reset to its end.
+
+    Parameters
+    ----------
+    env : str
+        Gymnasium id.
+    policy : callable
+        Observations (n, entries) to actions (n, 6).
+    seeds : sequence of int
+    threads : int
+        Of the engine.
+    **arguments
+        Of the environment.
+
+    Returns
+    -------
+    Episodes
+        In the order of the seeds.
+    """
+    parts = []
+    for first in range(0, len(seeds), BATCH):
+        batch = list(seeds[first : first + BATCH])
+        vector_env = make_vector_env(
+            env, len(batch), autoreset_mode=AutoresetMode.SAME_STEP, threads=threads, **arguments
+        )
+        parts.append(_first_episodes(vector_env, policy, batch))
+        vector_env.close()
+    return Episodes(*(np.concatenate([getattr(part, name) for part in parts]) for name in vars(parts[0])))
+
+
+def _first_episodes(vector_env, policy: Policy, seeds: list[int]) -> Episodes:
+    """The first episode of every world; what a world does afterwards is not counted."""
+    count = len(seeds)
+    success, is_running = np.zeros(count, dtype=bool), np.ones(count, dtype=bool)
+    returns, lengths = np.zeros(count), np.zeros(count, dtype=np.int64)
+    observations, _ = vector_env.reset(seed=seeds)
+    while is_running.any():
+        observations, rewards, terminations, truncations, infos = vector_env.step(policy(observations))
+        returns += np.where(is_running, rewards, 0.0)
+        lengths += is_running
+        ended = is_running & (terminations | truncations)
+        if ended.any():
+            success[ended] = infos["final_info"]["is_success"][ended]
+            is_running &= ~ended
+    return Episodes(success, returns, lengths)
+
+
+def evaluate(env: str, policy: Policy, episodes: int, seed: int, **arguments: Any) -> dict[str, Any]:
+    """Evaluate a policy on fresh seeded episodes.
+
+    Parameters
+    ----------
+    env : str
+    policy : callable
+    episodes : int
+    seed : int
+        Of the set of episodes; the same set for every policy.
+    **arguments
+        Of the environment.
+
+    Returns
+    -------
+    dict
+        The summary, with what was evaluated.
+
+    Raises
+    ------
+    ValueError
+        If `episodes` is not from 1 to `SEED_STRIDE`.
+    """
+    if not 1 <= episodes <= SEED_STRIDE:
+        raise ValueError(f"episodes is {episodes}; allowed is 1 to {SEED_STRIDE}")
+    start = time.perf_counter()
+    done = run_episodes(env, policy, evaluation_seeds(seed, episodes), **arguments)
+    seconds = time.perf_counter() - start
+    return {"env": env, **arguments, "seed": seed, **done.summary(), "seconds": round(seconds, 3)}
+
+
+def print_evaluation(result: dict[str, Any], title: str, console: Console) -> None:
+    """Print an evaluation as a table."""
+    low, high = result["interval"]
+    table = Table(title=title, show_header=False, title_justify="left")
+    table.add_row("environment", result["env"])
+    table.add_row("episodes", f"{result['episodes']} (seed {result['seed']})")
+    table.add_row("success rate", f"{result['success_rate']:.1%}  ({low:.1%} to {high:.1%}, 95 %)")
+    table.add_row("return", f"{result['return_mean']:.3f} ± {result['return_std']:.3f}")
+    table.add_row("length", f"{result['length_mean']:.1f} steps, at most {result['length_max']}")
+    table.add_row("time", f"{result['seconds']:.1f} s")
+    console.print(table)
+
+
+def choose_policy(
+    run: Path | None, baseline: str | None, env: str, seed: int, accuracy: str | None
+) -> tuple[str, str, dict[str, Any], Policy]:
+    """What the command line asks to be looked at: a run or a baseline.
+
+    Returns
+    -------
+    title, env : str
+    arguments : dict
+        Of the environment.
+    policy : callable
+
+    Raises
+    ------
+    ValueError
+        If it asks for both or none, or for something that does not exist.
+    """
+    if (run is None) == (baseline is None):
+        raise ValueError("allowed is either the folder of a run or --baseline")
+    if run is None:
+        return f"baseline {baseline}", env, {"accuracy": accuracy or "balanced"}, baseline_policy(baseline, env, seed)
+    config, policy = load_policy(RunFolder(run))
+    arguments = config.evaluation_arguments
+    return str(run), config.env, {**arguments, "accuracy": accuracy or arguments["accuracy"]}, policy
+
+
+def main(
+    run: Annotated[Path | None, typer.Argument(metavar="RUN_DIR", help="Folder of a run.")] = None,
+    baseline: Annotated[str | None, typer.Option(help="Instead of a run: random or controller.")] = None,
+    env: Annotated[str, typer.Option(help="Of the baseline.")] = "rigid_env/BlockReach-v0",
+    episodes: Annotated[int, typer.Option(help="How many, each with its own seed.")] = 1000,
+    seed: Annotated[int, typer.Option(min=0, help="Of the set of episodes.")] = 0,
+    accuracy: Annotated[str | None, typer.Option(help="Preset of the engine.")] = None,
+    json_file: Annotated[Path | None, typer.Option("--json", metavar="FILE", help="Write the numbers, too.")] = None,
+) -> None:
+    """Success rate, with its confidence interval, of a trained agent or a baseline on fresh seeded episodes."""
+    try:
+        title, env, arguments, policy = choose_policy(run, baseline, env, seed, accuracy)
+        result = evaluate(env, policy, episodes, seed, **arguments)
+    except ValueError as error:
+        raise typer.BadParameter(str(error)) from error
+    print_evaluation(result, title, Console())
+    if json_file is not None:
+        json_file.write_text(json.dumps({"policy": title, **result}, indent=2) + "\n", encoding="utf-8")
+
+
+if __name__ == "__main__":
+    typer.run(main)

@@ -1,0 +1,127 @@
+"""Video of episodes of a trained agent or a baseline: ``python -m agents.record RUN_DIR``."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Annotated, Any
+
+import gymnasium as gym
+import numpy as np
+import typer
+from rich.console import Console
+
+from agents.baselines import Policy
+from agents.config import RunFolder
+from agents.evaluate import choose_policy, evaluation_seeds
+
+SIZE = (640, 400)  # width and height of the picture [px]; even, as the video's colour format asks
+PAUSE = 0.5  # the last picture of an episode is shown so long [s]
+GIF_STEP = 2  # every second picture: a GIF counts in hundredths of a second and gets large
+
+
+def record(env: str, policy: Policy, seeds: range, path: Path, **arguments: Any) -> Path:
+    """Write a video of one episode for each seed.
+
+    Parameters
+    ----------
+    env : str
+        Gymnasium id.
+    policy : callable
+        Observations (n, entries) to actions (n, 6).
+    seeds : sequence of int
+    path : Path
+        With the suffix ``.mp4`` or ``.gif``. Without ffmpeg, ``.mp4`` becomes ``.gif``.
+    **arguments
+        Of the environment.
+
+    Returns
+    -------
+    Path
+        Of the file written.
+
+    Raises
+    ------
+    ValueError
+        On another suffix.
+    """
+    if path.suffix not in (".mp4", ".gif"):
+        raise ValueError(f"video is {str(path)!r}; allowed are files named .mp4 or .gif")
+    width, height = SIZE
+    single = gym.make(env, render_mode="rgb_array", width=width, height=height, **arguments)
+    fps = single.metadata["render_fps"]
+    path.parent.mkdir(parents=True, exist_ok=True)
+    try:
+        if path.suffix == ".mp4" and _has_ffmpeg():
+            return _write_mp4(path, _pictures(single, policy, seeds, round(PAUSE * fps)), fps)
+        return _write_gif(path.with_suffix(".gif"), _pictures(single, policy, seeds, round(PAUSE * fps)), fps)
+    finally:
+        single.close()
+
+
+def _pictures(single: gym.Env, policy: Policy, seeds: range, pause: int) -> Iterator[np.ndarray]:
+    """Pictures (height, width, 3) uint8 of all episodes, one after the other."""
+    for seed in seeds:
+        observation, _ = single.reset(seed=seed)
+        has_ended = False
+        yield single.render()
+        while not has_ended:
+            observation, _, terminated, truncated, _ = single.step(policy(observation[None])[0])
+            has_ended = terminated or truncated
+            picture = single.render()
+            yield picture
+        for _ in range(pause):
+            yield picture
+
+
+def _has_ffmpeg() -> bool:
+    try:
+        import imageio_ffmpeg
+
+        imageio_ffmpeg.get_ffmpeg_exe()
+    except (ImportError, RuntimeError):
+        return False
+    return True
+
+
+def _write_mp4(path: Path, pictures: Iterator[np.ndarray], fps: float) -> Path:
+    import imageio_ffmpeg
+
+    writer = imageio_ffmpeg.write_frames(
+        str(path), SIZE, fps=fps, codec="libx264", quality=7, macro_block_size=2, ffmpeg_log_level="error"
+    )
+    writer.send(None)
+    for picture in pictures:
+        writer.send(np.ascontiguousarray(picture))
+    writer.close()
+    return path
+
+
+def _write_gif(path: Path, pictures: Iterator[np.ndarray], fps: float) -> Path:
+    from rigid_env.picture import write_gif
+
+    write_gif(path, [picture for k, picture in enumerate(pictures) if k % GIF_STEP == 0], fps / GIF_STEP)
+    return path
+
+
+def main(
+    run: Annotated[Path | None, typer.Argument(metavar="RUN_DIR", help="Folder of a run.")] = None,
+    baseline: Annotated[str | None, typer.Option(help="Instead of a run: random or controller.")] = None,
+    env: Annotated[str, typer.Option(help="Of the baseline.")] = "rigid_env/BlockReach-v0",
+    episodes: Annotated[int, typer.Option(min=1, help="How many.")] = 4,
+    seed: Annotated[int, typer.Option(min=0, help="Of the set of episodes, as in agents.evaluate.")] = 0,
+    accuracy: Annotated[str | None, typer.Option(help="Preset of the engine.")] = None,
+    out: Annotated[Path | None, typer.Option(help="File to write, .mp4 or .gif.")] = None,
+) -> None:
+    """Video of episodes of a trained agent or a baseline."""
+    try:
+        title, env, arguments, policy = choose_policy(run, baseline, env, seed, accuracy)
+        path = out or (RunFolder(run).video if run else Path(f"{baseline}-{env.rpartition('/')[2]}.mp4"))
+        path = record(env, policy, evaluation_seeds(seed, episodes), path, **arguments)
+    except ValueError as error:
+        raise typer.BadParameter(str(error)) from error
+    Console().print(f"{title}: {episodes} episodes in {path}", soft_wrap=True, highlight=False)
+
+
+if __name__ == "__main__":
+    typer.run(main)

@@ -1,0 +1,220 @@
+"""The command line: what it prints and writes, and what it says about mistakes."""
+
+import json
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+import physics
+import rigid_env.warmup
+from physics import scenes
+from rigid_env.cli import app
+from rigid_env.picture import stroboscope, without_bodies, world_frame
+from rigid_env.rendering import Camera
+
+runner = CliRunner()
+
+
+def run(*arguments, code=0):
+    result = runner.invoke(app, list(map(str, arguments)))
+    assert result.exit_code == code, result.output
+    return result.output
+
+
+def loaded(path):
+    found = json.loads(path.read_text())
+    assert {"date", "processor", "versions", "git"} <= set(found["machine"])
+    return found
+
+
+# all commands
+
+
+def test_version_and_help():
+    assert run("--version").startswith("rigid-env")
+    for command in ("demo", "explain", "warmup", "bench"):
+        assert command in run("--help")
+        assert "--json" in run(command, "--help")
+
+
+def test_module_runs_and_importing_it_is_light():
+    done = subprocess.run([sys.executable, "-m", "rigid_env", "--version"], capture_output=True, text=True)
+    assert done.stdout.startswith("rigid-env")
+    code = "import sys, rigid_env.cli; print([m for m in ('numba', 'physics', 'pygame') if m in sys.modules])"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    assert done.stdout.strip() == "[]"
+
+
+@pytest.mark.parametrize("command", ["demo", "explain"])
+def test_mistakes_are_named_with_what_is_allowed(command):
+    output = run(command, "dorp", code=2)
+    assert "'dorp'" in output
+    for name in scenes.SCENES:
+        assert name in output
+    output = run(command, "drop", "--accuracy", "best", code=2)
+    assert "'best'" in output
+    for name in physics.PRESETS:
+        assert name in output
+
+
+def test_negative_and_endless_durations_are_refused():
+    assert "duration" in run("demo", "rest", "--duration", -1, code=2)
+    assert "duration" in run("demo", "rest", "--duration", "inf", code=2)
+
+
+# demo
+
+
+def test_demo_at_rest(tmp_path):
+    image = pytest.importorskip("PIL.Image")
+    pytest.importorskip("pygame")
+    out, numbers = tmp_path / "pictures", tmp_path / "numbers.json"
+    output = run("demo", "rest", "--duration", 0.2, "--out", out, "--json", numbers)
+    assert "at rest     yes" in output
+    with image.open(out / "rest.png") as png:
+        assert png.size == (960, 600)
+    with image.open(out / "rest.gif") as gif:
+        assert gif.size == (640, 400)
+        assert gif.info["duration"] == 40
+        assert gif.info["loop"] == 0
+    found = loaded(numbers)
+    assert found["scene"] == "rest"
+    assert found["duration"] == pytest.approx(0.2)
+    # 6 kg on 1.5 m of height
+    assert found["energy"]["start"] == pytest.approx(6.0 * 9.81 * 1.5, rel=1e-12)
+    assert found["energy"]["dissipated"] == pytest.approx(0.0, abs=1e-9)
+    assert len(found["contacts"]["points"]) == 4
+    np.testing.assert_allclose(found["contacts"]["total_force"], (0.0, 6.0 * 9.81, 0.0), rtol=1e-6, atol=1e-6)
+    assert found["final"]["is_at_rest"] is True
+    assert found["status"]["name"] == "ok"
+    assert [event["kind"] for event in found["events"]] == ["touch"]
+    assert set(found["files"]) == {"png", "gif"}
+
+
+def test_demo_tells_of_the_fall(tmp_path):
+    image = pytest.importorskip("PIL.Image")
+    pytest.importorskip("pygame")
+    numbers = tmp_path / "numbers.json"
+    output = run("demo", "--duration", 1.0, "--out", tmp_path, "--json", numbers)
+    assert "impact" in output
+    found = loaded(numbers)
+    # the lowest corner of the tilted block meets the floor before its centre could fall to half its thickness
+    first = found["events"][0]
+    assert first["kind"] == "impact"
+    assert 0.0 < first["t"] < np.sqrt(2.0 * (6.0 - 1.0) / 9.81)
+    energy = found["energy"]
+    assert energy["dissipated"] == pytest.approx(energy["start"] - energy["end"], rel=1e-12)
+    assert 0.0 < energy["dissipated"] < energy["start"]
+    assert found["status"]["impacts"] >= 1
+    with image.open(tmp_path / "drop.gif") as gif:
+        assert gif.n_frames == 26  # 25 a second, and the start
+
+
+def test_demo_far_from_the_walls_travels_with_the_block(tmp_path):
+    image = pytest.importorskip("PIL.Image")
+    pytest.importorskip("pygame")
+    run("demo", "flight", "--duration", 0.1, "--out", tmp_path)
+    with image.open(tmp_path / "flight.png") as png:
+        pixels = np.asarray(png.convert("RGB")).astype(int)
+    middle = pixels[280:320, 460:500].mean(axis=(0, 1))
+    assert middle[2] > middle[0] + 60  # the blue block, not the pale background
+
+
+# explain
+
+
+def test_explain_says_what_is_on_and_why(tmp_path):
+    path = tmp_path / "plan.json"
+    output = run("explain", "bounce", "--json", path)
+    assert "not declared" in output
+    found = loaded(path)
+    effects = {entry["effect"]: entry for entry in found["effects"]}
+    assert effects["friction"]["is_on"] is False
+    assert effects["restitution"]["is_on"] is True
+    assert "e = 1.0" in effects["restitution"]["reason"]
+    plan = physics.make_plan(scenes.bounce(), physics.PRESETS["balanced"])
+    assert found["explanation"] == plan.explain()
+    assert found["settings"]["tolerance"] == physics.PRESETS["balanced"].tolerance
+
+
+# warmup and bench
+
+
+def test_warmup_covers_environments_and_scenes_once():
+    found = rigid_env.warmup.jobs()
+    names = [(job.name, job.accuracy) for job in found]
+    assert len(set(names)) == len(names)
+    for name in ("rigid_env/BlockReach-v0", "rigid_env/BlockReorient-v0"):
+        for accuracy in ("fast", "balanced"):
+            assert (f"environment {name}", accuracy) in names
+    plans = {physics.make_plan(make(), physics.PRESETS["balanced"]).key for make in scenes.SCENES.values()}
+    with_wrench = [name for name in names if "with wrench" in name[0] and name[1] == "balanced"]
+    assert len(with_wrench) == len(plans)
+
+
+def test_second_warmup_compiles_nothing(tmp_path, monkeypatch):
+    few = [job for job in rigid_env.warmup.jobs() if "scene drop" in job.name and job.accuracy == "balanced"]
+    assert len(few) == 2
+    monkeypatch.setattr(rigid_env.warmup, "jobs", lambda: few)
+    run("warmup")
+    path = tmp_path / "warmup.json"
+    output = run("warmup", "--json", path)
+    assert output.count("from the cache") == 2
+    found = loaded(path)
+    assert [plan["compiled"] for plan in found["plans"]] == [0, 0]
+    assert found["seconds"] == pytest.approx(sum(plan["seconds"] for plan in found["plans"]))
+
+
+@pytest.mark.slow
+def test_bench_measures(tmp_path):
+    path = tmp_path / "bench.json"
+    output = run("bench", "--quick", "--json", path)
+    assert "free flight" in output
+    found = loaded(path)
+    assert found["is_quick"] is True
+    keys = {entry["key"] for entry in found["rows"]}
+    assert keys >= {"flight", "rest", "shove", "batch", "single_env", "vector_env_1_thread"}
+    assert all(entry["ours"]["median"] > 0 for entry in found["rows"])
+
+
+# pictures
+
+
+def test_frame_shows_the_world_as_it_is():
+    world = physics.World(scenes.rest(), worlds=2)
+    world.set_state(pos=[[[3.0, 1.5, -1.0]]], worlds=[1])
+    world.step()
+    frame = world_frame(world, 1, text=["text"], applied=np.arange(6.0))
+    np.testing.assert_allclose(frame.bodies[0].dimensions, scenes.SIZE)
+    np.testing.assert_allclose(frame.bodies[0].pos, world.pos[1, 0])
+    assert len(frame.walls) == 3
+    assert len(frame.contact_points) == 4
+    assert frame.applied_torque.tolist() == [3.0, 4.0, 5.0]
+    assert frame.text == ("text",)
+
+
+def test_frame_of_a_sphere_has_its_radius_and_of_empty_space_no_walls():
+    sphere = world_frame(physics.World(scenes.rolling_sphere())).bodies[0]
+    assert (sphere.kind, sphere.dimensions.tolist()) == ("sphere", [1.0, 1.0, 1.0])
+    frame = world_frame(physics.World(scenes.tumble()))
+    assert frame.walls == ()
+    assert np.isfinite(frame.force_scale)
+
+
+def test_without_bodies_they_are_behind_the_camera():
+    camera = Camera(eye=(0.0, 5.0, 20.0), target=(0.0, 2.0, 0.0))
+    frame = without_bodies(world_frame(physics.World(scenes.rest())), camera)
+    _, depth = camera.project(frame.bodies[0].pos[None], (320, 200))
+    assert depth[0] < 0.0
+
+
+def test_stroboscope_keeps_what_does_not_move_and_ends_solid():
+    empty = np.full((1, 3, 3), 200, np.uint8)
+    first, last = empty.copy(), empty.copy()
+    first[0, 0], last[0, 2] = 0, 0
+    picture = stroboscope([first, last], empty)[0, :, 0]
+    # opacities 0.25 + 0.75 k / 2
+    assert picture.tolist() == [round(200 * (1 - 0.625)), 200, 0]
