@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import gymnasium as gym
@@ -10,10 +11,16 @@ from gymnasium.vector import AutoresetMode
 from stable_baselines3 import PPO, SAC
 from stable_baselines3.common.base_class import BaseAlgorithm
 
+import physics
 from agents.config import RunConfig
 from rigid_env.sb3 import RigidVecEnv
 
 CLASSES: dict[str, type[BaseAlgorithm]] = {"ppo": PPO, "sac": SAC}
+
+
+def make_single_env(env: str, **arguments: Any) -> gym.Env:
+    """A single environment; arguments as `make_vector_env`, all but `num_envs`."""
+    return _make(gym.make, env, arguments)
 
 
 def make_vector_env(env: str, num_envs: int, **arguments: Any) -> gym.vector.VectorEnv:
@@ -25,15 +32,23 @@ def make_vector_env(env: str, num_envs: int, **arguments: Any) -> gym.vector.Vec
         Gymnasium id.
     num_envs : int
     **arguments
-        Of the environment, `autoreset_mode` and `threads` among them.
+        Of the environment, `autoreset_mode` and `threads` among them. `accuracy` may be a dict, too: the
+        fields of a `physics.Accuracy`.
 
     Raises
     ------
     ValueError
         If there is no such environment, or an argument is out of range.
     """
+    native = {"num_envs": num_envs, "vectorization_mode": "vector_entry_point"}
+    return _make(gym.make_vec, env, {**native, **arguments})
+
+
+def _make(maker: Callable[..., Any], env: str, arguments: dict[str, Any]) -> Any:
+    if isinstance(arguments.get("accuracy"), dict):
+        arguments = {**arguments, "accuracy": physics.Accuracy(**arguments["accuracy"])}
     try:
-        return gym.make_vec(env, num_envs=num_envs, vectorization_mode="vector_entry_point", **arguments)
+        return maker(env, **arguments)
     except gym.error.UnregisteredEnv as error:
         raise ValueError(f"env is {env!r}; allowed are ids that Gymnasium knows ({error})") from error
 
@@ -73,6 +88,4 @@ def algorithm_arguments(config: RunConfig) -> dict[str, Any]:
 
 def make_model(config: RunConfig, env: RigidVecEnv) -> BaseAlgorithm:
     """A new model on the CPU, where small networks are fastest."""
-    return CLASSES[config.algo](
-        "MlpPolicy", env, seed=config.seed, device="cpu", **algorithm_arguments(config)
-    )
+    return CLASSES[config.algo]("MlpPolicy", env, seed=config.seed, device="cpu", **algorithm_arguments(config))

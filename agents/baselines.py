@@ -55,7 +55,7 @@ def random_policy(seed: int = 0) -> Policy:
 
 
 def reach_controller(observations: np.ndarray) -> np.ndarray:
-    """BlockReach by hand: carry most of the weight, slide to the goal as fast as one can still brake, set down.
+    """BlockReach by hand: carry most of the weight, slide to the goal no faster than one can brake, set down.
 
     The friction that remains under the lifted block is left to the speed loop to overcome; a torque turns the
     body axis that is nearest to the vertical into it, so that the block stays on its face.

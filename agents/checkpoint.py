@@ -118,11 +118,13 @@ def load_policy(run: RunFolder) -> tuple[RunConfig, Policy]:
         If the folder is not that of a run, or has no model yet.
     """
     config = run.read_config()
-    found = [run.model] if run.model.is_file() else [c / MODEL for c in list_checkpoints(run.checkpoints)[-1:]]
+    found = [place / MODEL for place in list_checkpoints(run.checkpoints)]
+    if run.model.is_file():
+        found.append(run.model)
     if not found:
         raise ValueError(f"run is {str(run.path)!r}; allowed is one with a model.zip or a checkpoint")
     torch.set_num_threads(config.torch_threads)
-    return config, greedy(CLASSES[config.algo].load(found[0], device="cpu"))
+    return config, greedy(CLASSES[config.algo].load(found[-1], device="cpu"))
 
 
 def greedy(model: BaseAlgorithm) -> Policy:

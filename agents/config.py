@@ -1,4 +1,4 @@
-"""What a run does: hyperparameters from YAML keyed by environment id and algorithm, and the folder of a run."""
+"""What a run does, from YAML keyed by environment id and algorithm, and where its files are."""
 
 from __future__ import annotations
 
@@ -30,10 +30,10 @@ class RunConfig:
         Environment steps, of all worlds together, after which training ends.
     target : float
         Success rate at which training ends, in (0, 1].
-    accuracy : str
-        Of the engine in training.
-    evaluation_accuracy : str
-        Of the engine in evaluation and videos.
+    accuracy : str or dict
+        Of the engine in training: a preset, or the fields of a `physics.Accuracy`.
+    evaluation_accuracy : str or dict
+        The same in evaluation and videos.
     threads : int
         Of the engine.
     torch_threads : int
@@ -55,8 +55,8 @@ class RunConfig:
     num_envs: int
     max_steps: int
     target: float
-    accuracy: str = "fast"
-    evaluation_accuracy: str = "balanced"
+    accuracy: str | dict[str, Any] = "balanced"
+    evaluation_accuracy: str | dict[str, Any] = "balanced"
     threads: int = 2
     torch_threads: int = 1
     algorithm: dict[str, Any] = field(default_factory=dict)

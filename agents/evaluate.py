@@ -29,6 +29,14 @@ BATCH = 500  # episodes at a time
 FIRST_SEED = 1_000_000_000  # far from the seeds of training, which start at the seed of the run
 SEED_STRIDE = 1_000_000  # episodes between the sets of seeds of two evaluations
 
+# --- options of the command lines -------------------------------------------------------------------------
+RunArgument = Annotated[Path | None, typer.Argument(metavar="RUN_DIR", help="Folder of a run.")]
+BaselineOption = Annotated[str | None, typer.Option(help="Instead of a run: random or controller.")]
+EnvOption = Annotated[str, typer.Option(help="Of the baseline.")]
+SeedOption = Annotated[int, typer.Option(min=0, help="Of the set of episodes.")]
+AccuracyOption = Annotated[str | None, typer.Option(help="Preset of the engine.")]
+JsonOption = Annotated[Path | None, typer.Option("--json", metavar="FILE", help="Write the numbers here, too.")]
+
 
 @dataclass(frozen=True)
 class Episodes:
@@ -148,6 +156,11 @@ def evaluate(env: str, policy: Policy, episodes: int, seed: int, **arguments: An
     return {"env": env, **arguments, "seed": seed, **done.summary(), "seconds": round(seconds, 3)}
 
 
+def write_json(path: Path, content: dict[str, Any]) -> None:
+    """Write numbers as JSON."""
+    path.write_text(json.dumps(content, indent=2) + "\n", encoding="utf-8")
+
+
 def print_evaluation(result: dict[str, Any], title: str, console: Console) -> None:
     """Print an evaluation as a table."""
     low, high = result["interval"]
@@ -161,17 +174,18 @@ def print_evaluation(result: dict[str, Any], title: str, console: Console) -> No
     console.print(table)
 
 
-def choose_policy(
-    run: Path | None, baseline: str | None, env: str, seed: int, accuracy: str | None
-) -> tuple[str, str, dict[str, Any], Policy]:
-    """What the command line asks to be looked at: a run or a baseline.
+@dataclass(frozen=True)
+class Subject:
+    """Who is looked at, and where: a policy, and an environment with its arguments."""
 
-    Returns
-    -------
-    title, env : str
-    arguments : dict
-        Of the environment.
-    policy : callable
+    title: str
+    policy: Policy
+    env: str
+    arguments: dict[str, Any]
+
+
+def choose_subject(run: Path | None, baseline: str | None, env: str, seed: int, accuracy: str | None) -> Subject:
+    """What a command line asks for: a run, or a baseline.
 
     Raises
     ------
@@ -180,31 +194,32 @@ def choose_policy(
     """
     if (run is None) == (baseline is None):
         raise ValueError("allowed is either the folder of a run or --baseline")
+    chosen = {} if accuracy is None else {"accuracy": accuracy}
     if run is None:
-        return f"baseline {baseline}", env, {"accuracy": accuracy or "balanced"}, baseline_policy(baseline, env, seed)
+        policy = baseline_policy(baseline, env, seed)
+        return Subject(f"baseline {baseline}", policy, env, {"accuracy": "balanced", **chosen})
     config, policy = load_policy(RunFolder(run))
-    arguments = config.evaluation_arguments
-    return str(run), config.env, {**arguments, "accuracy": accuracy or arguments["accuracy"]}, policy
+    return Subject(str(run), policy, config.env, {**config.evaluation_arguments, **chosen})
 
 
 def main(
-    run: Annotated[Path | None, typer.Argument(metavar="RUN_DIR", help="Folder of a run.")] = None,
-    baseline: Annotated[str | None, typer.Option(help="Instead of a run: random or controller.")] = None,
-    env: Annotated[str, typer.Option(help="Of the baseline.")] = "rigid_env/BlockReach-v0",
+    run: RunArgument = None,
+    baseline: BaselineOption = None,
+    env: EnvOption = "rigid_env/BlockReach-v0",
     episodes: Annotated[int, typer.Option(help="How many, each with its own seed.")] = 1000,
-    seed: Annotated[int, typer.Option(min=0, help="Of the set of episodes.")] = 0,
-    accuracy: Annotated[str | None, typer.Option(help="Preset of the engine.")] = None,
-    json_file: Annotated[Path | None, typer.Option("--json", metavar="FILE", help="Write the numbers, too.")] = None,
+    seed: SeedOption = 0,
+    accuracy: AccuracyOption = None,
+    json_file: JsonOption = None,
 ) -> None:
-    """Success rate, with its confidence interval, of a trained agent or a baseline on fresh seeded episodes."""
+    """Success rate, with its confidence interval, of a trained agent or a baseline on fresh episodes."""
     try:
-        title, env, arguments, policy = choose_policy(run, baseline, env, seed, accuracy)
-        result = evaluate(env, policy, episodes, seed, **arguments)
+        subject = choose_subject(run, baseline, env, seed, accuracy)
+        result = evaluate(subject.env, subject.policy, episodes, seed, **subject.arguments)
     except ValueError as error:
         raise typer.BadParameter(str(error)) from error
-    print_evaluation(result, title, Console())
+    print_evaluation(result, subject.title, Console())
     if json_file is not None:
-        json_file.write_text(json.dumps({"policy": title, **result}, indent=2) + "\n", encoding="utf-8")
+        write_json(json_file, {"policy": subject.title, **result})
 
 
 if __name__ == "__main__":

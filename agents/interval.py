@@ -36,10 +36,10 @@ def wilson(successes: int, trials: int, z: float = Z_95) -> tuple[float, float]:
     Assoc. 22, 1927.
     """
     if not (trials >= 1 and 0 <= successes <= trials):
-        raise ValueError(f"successes, trials are {successes}, {trials}; allowed is 0 <= successes <= trials >= 1")
-    share, square = successes / trials, z * z
-    centre = (share + square / (2 * trials)) / (1 + square / trials)
-    half_width = z * math.sqrt(share * (1 - share) / trials + square / (4 * trials**2)) / (1 + square / trials)
+        raise ValueError(f"successes is {successes} of {trials} trials; allowed is 0 to trials, at least 1 trial")
+    share, weight = successes / trials, z * z / trials
+    centre = (share + weight / 2) / (1 + weight)
+    half_width = math.sqrt(weight * (share * (1 - share) + weight / 4)) / (1 + weight)
     low = 0.0 if successes == 0 else centre - half_width
     high = 1.0 if successes == trials else centre + half_width
     return low, high

@@ -11,9 +11,18 @@ import numpy as np
 import typer
 from rich.console import Console
 
+from agents.algorithms import make_single_env
 from agents.baselines import Policy
 from agents.config import RunFolder
-from agents.evaluate import choose_policy, evaluation_seeds
+from agents.evaluate import (
+    AccuracyOption,
+    BaselineOption,
+    EnvOption,
+    RunArgument,
+    SeedOption,
+    choose_subject,
+    evaluation_seeds,
+)
 
 SIZE = (640, 400)  # width and height of the picture [px]; even, as the video's colour format asks
 PAUSE = 0.5  # the last picture of an episode is shown so long [s]
@@ -48,7 +57,7 @@ def record(env: str, policy: Policy, seeds: range, path: Path, **arguments: Any)
     if path.suffix not in (".mp4", ".gif"):
         raise ValueError(f"video is {str(path)!r}; allowed are files named .mp4 or .gif")
     width, height = SIZE
-    single = gym.make(env, render_mode="rgb_array", width=width, height=height, **arguments)
+    single = make_single_env(env, render_mode="rgb_array", width=width, height=height, **arguments)
     fps = single.metadata["render_fps"]
     path.parent.mkdir(parents=True, exist_ok=True)
     try:
@@ -105,22 +114,23 @@ def _write_gif(path: Path, pictures: Iterator[np.ndarray], fps: float) -> Path:
 
 
 def main(
-    run: Annotated[Path | None, typer.Argument(metavar="RUN_DIR", help="Folder of a run.")] = None,
-    baseline: Annotated[str | None, typer.Option(help="Instead of a run: random or controller.")] = None,
-    env: Annotated[str, typer.Option(help="Of the baseline.")] = "rigid_env/BlockReach-v0",
-    episodes: Annotated[int, typer.Option(min=1, help="How many.")] = 4,
-    seed: Annotated[int, typer.Option(min=0, help="Of the set of episodes, as in agents.evaluate.")] = 0,
-    accuracy: Annotated[str | None, typer.Option(help="Preset of the engine.")] = None,
+    run: RunArgument = None,
+    baseline: BaselineOption = None,
+    env: EnvOption = "rigid_env/BlockReach-v0",
+    episodes: Annotated[int, typer.Option(min=1, help="How many, the first that agents.evaluate counts.")] = 4,
+    seed: SeedOption = 0,
+    accuracy: AccuracyOption = None,
     out: Annotated[Path | None, typer.Option(help="File to write, .mp4 or .gif.")] = None,
 ) -> None:
     """Video of episodes of a trained agent or a baseline."""
     try:
-        title, env, arguments, policy = choose_policy(run, baseline, env, seed, accuracy)
+        subject = choose_subject(run, baseline, env, seed, accuracy)
         path = out or (RunFolder(run).video if run else Path(f"{baseline}-{env.rpartition('/')[2]}.mp4"))
-        path = record(env, policy, evaluation_seeds(seed, episodes), path, **arguments)
+        seeds = evaluation_seeds(seed, episodes)
+        path = record(subject.env, subject.policy, seeds, path, **subject.arguments)
     except ValueError as error:
         raise typer.BadParameter(str(error)) from error
-    Console().print(f"{title}: {episodes} episodes in {path}", soft_wrap=True, highlight=False)
+    Console().print(f"{subject.title}: {episodes} episodes in {path}", soft_wrap=True, highlight=False)
 
 
 if __name__ == "__main__":

@@ -22,6 +22,4 @@ def headline() -> str:
     found = describe()
     git = found["git"]
     commit = "no commit" if git is None else git["commit"][:10] + (" + changes" if git["is_dirty"] else "")
-    return (
-        f"{found['processor']}, {found['cores']} cores, Python {found['python']}, {commit}, {found['date']}"
-    )
+    return f"{found['processor']}, {found['cores']} cores, Python {found['python']}, {commit}, {found['date']}"

@@ -84,6 +84,4 @@ def resolve(accuracy: str | Accuracy) -> Accuracy:
         return accuracy
     if accuracy in PRESETS:
         return PRESETS[accuracy]
-    raise ValueError(
-        f"accuracy is {accuracy!r}; allowed are {', '.join(PRESETS)}, or a physics.Accuracy(...)"
-    )
+    raise ValueError(f"accuracy is {accuracy!r}; allowed are {', '.join(PRESETS)}, or a physics.Accuracy(...)")

@@ -37,9 +37,7 @@ def diagnose(world: World) -> Diagnostics:
     angular = world.state[:, at.ANGMOM : at.ANGMOM + 3].reshape(*shape, 3)
     momentum = mass[..., None] * world.linvel
     gaps, which = np.empty(len(world.state)), np.empty(len(world.state), np.int64)
-    deepest_gaps(
-        np.arange(len(world.state)), world.state, world.params, world.shapes, world.walls, gaps, which
-    )
+    deepest_gaps(np.arange(len(world.state)), world.state, world.params, world.shapes, world.walls, gaps, which)
     return Diagnostics(
         kinetic_energy=0.5 * np.sum(momentum * world.linvel + angular * world.angvel, axis=-1),
         potential_energy=-mass * np.sum(world.gravity[:, None, :] * world.pos, axis=-1),

@@ -104,9 +104,7 @@ def solid_cylinder(radius: float, height: float, mass: float) -> np.ndarray:
     return hollow_cylinder(radius, height, mass, 0.0)
 
 
-def hollow_cylinder(
-    radius: float, height: float, mass: float, inner_radius: float | None = None
-) -> np.ndarray:
+def hollow_cylinder(radius: float, height: float, mass: float, inner_radius: float | None = None) -> np.ndarray:
     """Inertia of an open tube, axis along body y; thin wall if `inner_radius` is None.
 
     A wall from r to R has M (R² + r²)/2 along the axis and

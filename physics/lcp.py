@@ -147,6 +147,5 @@ def _require_semidefinite(M: np.ndarray) -> None:
     least = float(np.min(np.linalg.eigvalsh(M), initial=0.0)) if len(M) else 0.0
     if least < -tolerance:
         raise ValueError(
-            f"M has the eigenvalue {least:g}; method 'dantzig' takes positive semidefinite M only: "
-            "use method='lemke'"
+            f"M has the eigenvalue {least:g}; method 'dantzig' takes positive semidefinite M only: use method='lemke'"
         )

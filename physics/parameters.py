@@ -52,9 +52,7 @@ def spread(value, shape: tuple[int, ...], field: str) -> tuple[np.ndarray, tuple
             array = array[:, None]
         return np.broadcast_to(array, shape), shape, field
     except (TypeError, ValueError):
-        raise ValueError(
-            f"{field} is {value!r}; allowed is shape {shape}, or without the bodies axis"
-        ) from None
+        raise ValueError(f"{field} is {value!r}; allowed is shape {shape}, or without the bodies axis") from None
 
 
 def change_inertia(params, bodies, plan, mass, size, inertia_body, shape) -> None:
@@ -71,9 +69,7 @@ def change_inertia(params, bodies, plan, mass, size, inertia_body, shape) -> Non
     for k, row in enumerate(params):
         body = bodies[k % len(bodies)]
         if body.kind == "sphere" and len(set(halves[k])) > 1:
-            raise ValueError(
-                f"size is {(2 * halves[k]).tolist()} for a sphere; allowed are three equal diameters"
-            )
+            raise ValueError(f"size is {(2 * halves[k]).tolist()} for a sphere; allowed are three equal diameters")
         if tensors is not None:
             tensor = check_inertia(tensors[k], "inertia_body")
         elif body.inertia_body is not None:

@@ -71,9 +71,7 @@ def uniform_field(masses: ArrayLike, acceleration: ArrayLike) -> np.ndarray:
     return np.outer(masses, acceleration)
 
 
-def total_wrench(
-    points: ArrayLike, forces: ArrayLike, centre: ArrayLike = (0, 0, 0)
-) -> tuple[np.ndarray, np.ndarray]:
+def total_wrench(points: ArrayLike, forces: ArrayLike, centre: ArrayLike = (0, 0, 0)) -> tuple[np.ndarray, np.ndarray]:
     """Resultant of forces at points: total force and total torque about `centre`.
 
     Parameters
@@ -117,9 +115,7 @@ def potential_energy(masses: ArrayLike, positions: ArrayLike, acceleration: Arra
     return float(-np.asarray(masses, dtype=float) @ (np.asarray(positions, dtype=float) @ acceleration))
 
 
-def rigid_velocities(
-    positions: ArrayLike, centre: ArrayLike, linvel: ArrayLike, angvel: ArrayLike
-) -> np.ndarray:
+def rigid_velocities(positions: ArrayLike, centre: ArrayLike, linvel: ArrayLike, angvel: ArrayLike) -> np.ndarray:
     """Velocities v + ω x (p - centre) (n, 3) [m/s] of points of a rigid body.
 
     Parameters

@@ -44,6 +44,14 @@ class Plan:
     rows: tuple[Row, ...]
 
     @property
+    def smooth(self) -> bool | None:
+        """Contact without friction: the switch opposite to `friction`.
+
+        Numba prunes a branch only for the argument that is None, so that each of two alternatives needs one.
+        """
+        return True if self.contact and not self.friction else None
+
+    @property
     def key(self) -> tuple:
         """What distinguishes one compiled kernel from another."""
         return (
@@ -125,9 +133,7 @@ def _gravity_row(gravity) -> Row:
 
 def _contact_row(scene, contact, touching) -> Row:
     if touching:
-        return Row(
-            "wall contact", True, f"declared; {len(scene.walls)} wall(s)", "detection, impacts, solver"
-        )
+        return Row("wall contact", True, f"declared; {len(scene.walls)} wall(s)", "detection, impacts, solver")
     if contact is not None:
         return Row("wall contact", False, "declared, but the scene has no walls", "")
     reason = "not declared: the walls do not act" if scene.walls else "not declared"
@@ -136,9 +142,7 @@ def _contact_row(scene, contact, touching) -> Row:
 
 def _friction_row(friction, rubbing) -> Row:
     if rubbing:
-        return Row(
-            "friction", True, f"declared: μ = {friction.coefficient}", "three rows per contact, circular cone"
-        )
+        return Row("friction", True, f"declared: μ = {friction.coefficient}", "three rows per contact, circular cone")
     if friction is not None:
         return Row("friction", False, "declared, but the scene has no walls", "")
     return Row("friction", False, "not declared", "")

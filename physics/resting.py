@@ -99,9 +99,7 @@ def _matrix(q: np.ndarray) -> np.ndarray:
     return np.eye(3) + 2 * w * skew + 2 * skew @ skew
 
 
-def _touching(
-    world: World, i: int, gap: float, v: np.ndarray, w: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
+def _touching(world: World, i: int, gap: float, v: np.ndarray, w: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Arms (n, 3) and normals (n, 3) of the features within `gap` of a wall that do not move away from it."""
     arms, normals = [], []
     features = at.VERTEX_COUNT if world.shapes[i % world.body_count] == at.BLOCK else 1

@@ -75,9 +75,7 @@ class Scene:
             items = (items,) if isinstance(items, allowed) else tuple(items)
             for k, item in enumerate(items):
                 if not isinstance(item, allowed):
-                    raise ValueError(
-                        f"Scene.{name}[{k}] is {item!r}; allowed are instances of {_names(allowed)}"
-                    )
+                    raise ValueError(f"Scene.{name}[{k}] is {item!r}; allowed are instances of {_names(allowed)}")
             object.__setattr__(self, name, items)
         if not self.bodies:
             raise ValueError("Scene.bodies is empty; allowed is at least one body")

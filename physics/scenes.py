@@ -62,9 +62,7 @@ def corner_drop() -> Scene:
     """The block falls, turned, into the corner of three walls at right angles."""
     half = 0.5 * 0.7
     s = math.sin(half) / math.sqrt(3)
-    return block_in_box(
-        (3.5, 5.0, 3.5), walls="corner", quat=(math.cos(half), s, s, s), linvel=(-1.5, 0.0, -1.0)
-    )
+    return block_in_box((3.5, 5.0, 3.5), walls="corner", quat=(math.cos(half), s, s, s), linvel=(-1.5, 0.0, -1.0))
 
 
 def slide(speed: float = 3.0, friction: float = 0.3) -> Scene:

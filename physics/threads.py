@@ -9,6 +9,7 @@ from __future__ import annotations
 import os
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
+from itertools import pairwise
 
 
 class SlicePool:
@@ -17,7 +18,7 @@ class SlicePool:
     def __init__(self, threads: int, count: int):
         threads = min(threads, count)
         bounds = [count * k // threads for k in range(threads + 1)]
-        self.slices = list(zip(bounds[:-1], bounds[1:]))
+        self.slices = list(pairwise(bounds))
         self._pool: ThreadPoolExecutor | None = None
         self._pid = -1
 

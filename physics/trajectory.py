@@ -6,6 +6,7 @@ import csv
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -96,12 +97,8 @@ class Trajectory:
             writer.writerow(("t", "body", *COLUMNS, "energy"))
             for k, t in enumerate(self.t):
                 for b in range(self.pos.shape[1]):
-                    row = np.concatenate(
-                        (self.pos[k, b], self.quat[k, b], self.linvel[k, b], self.angvel[k, b])
-                    )
-                    writer.writerow(
-                        (repr(float(t)), b, *map(repr, row.tolist()), repr(float(self.energy[k, b])))
-                    )
+                    row = np.concatenate((self.pos[k, b], self.quat[k, b], self.linvel[k, b], self.angvel[k, b]))
+                    writer.writerow((repr(float(t)), b, *map(repr, row.tolist()), repr(float(self.energy[k, b]))))
 
 
 def simulate(
@@ -145,7 +142,7 @@ def simulate(
         times[-1] = min(times[-1], duration) if whole else times[-1]
     samples, events, reports = [_sample(world)], [], []
     touching: set[tuple[int, int]] = set()
-    for start, end in zip(times[:-1], times[1:]):
+    for start, end in pairwise(times):
         is_short = end == times[-1] and len(times) > whole + 1
         load = None if wrench is None else np.asarray(wrench(start, world), dtype=float)[None]
         report = world.step(load, dt=end - start if is_short else None)

@@ -196,13 +196,11 @@ class World:
             self._pool.run(lambda k, first, last: self._launch(k, first, last, wrench, steps, dt))
         self.time += steps * dt
 
-    def _launch(
-        self, k: int, first: int, last: int, wrench: np.ndarray | None, steps: int, dt: float
-    ) -> None:
+    def _launch(self, k: int, first: int, last: int, wrench: np.ndarray | None, steps: int, dt: float) -> None:
         plan, substeps = self.plan, self.accuracy.substeps
         step_worlds(
             first, last, steps, substeps, dt / substeps, self.state, self.params, self.shapes,
-            self.gravity if plan.gravity else None, wrench, plan.contact, plan.friction, plan.restitution,
+            self.gravity if plan.gravity else None, wrench, plan.contact, plan.friction, plan.smooth, plan.restitution,
             plan.gyroscopic, plan.tilted, plan.pivots, plan.scheme, self._memory, self._report, self._scratch[k],
         )  # fmt: skip
 
@@ -284,14 +282,10 @@ class World:
             parameters.change_inertia(params, bodies, self.plan, mass, size, inertia_body, shape)
         if friction is not None:
             self._needs("friction", self.plan.friction, "physics.Friction(...)")
-            params[:, at.FRICTION] = checks.non_negative(
-                *parameters.spread(friction, shape, "friction")
-            ).ravel()
+            params[:, at.FRICTION] = checks.non_negative(*parameters.spread(friction, shape, "friction")).ravel()
         if restitution is not None:
             self._needs("restitution", self.plan.restitution, "physics.Contact(restitution=...)")
-            params[:, at.RESTITUTION] = checks.share(
-                *parameters.spread(restitution, shape, "restitution")
-            ).ravel()
+            params[:, at.RESTITUTION] = checks.share(*parameters.spread(restitution, shape, "restitution")).ravel()
         field = None
         if gravity is not None:
             self._needs("gravity", self.plan.gravity, "physics.Gravity(...)")
@@ -302,9 +296,7 @@ class World:
 
     def _needs(self, field: str, is_on, effect: str) -> None:
         if not is_on:
-            raise ValueError(
-                f"{field} was given, but the scene does not declare it; add {effect} to Scene.effects"
-            )
+            raise ValueError(f"{field} was given, but the scene does not declare it; add {effect} to Scene.effects")
 
     def _adopt(self, chosen, rows, state, params, what, keep_memory=False) -> None:
         """Check new rows of state and parameters, then write them: all or nothing."""
@@ -337,7 +329,7 @@ class World:
             chosen = np.flatnonzero(chosen)
         if chosen.ndim != 1 or (chosen.size and not np.issubdtype(chosen.dtype, np.integer)):
             raise ValueError(f"worlds is {worlds!r}; allowed are indices or a mask of {self.worlds} worlds")
-        if chosen.size and not (0 <= chosen.min() and chosen.max() < self.worlds):
+        if chosen.size and not (chosen.min() >= 0 and chosen.max() < self.worlds):
             raise ValueError(f"worlds is {worlds!r}; allowed are indices from 0 to {self.worlds - 1}")
         return chosen.astype(np.int64)
 
@@ -357,9 +349,7 @@ class World:
         """Go back to a snapshot of this world, or of one of the same scene and batch size."""
         kept = self._kept()
         if [array.shape for array in kept] != [array.shape for array in snapshot.arrays]:
-            raise ValueError(
-                "snapshot is of another scene or batch size; allowed is one of this scene and batch size"
-            )
+            raise ValueError("snapshot is of another scene or batch size; allowed is one of this scene and batch size")
         for array, value in zip(kept, snapshot.arrays):
             array[...] = value
         self.time = snapshot.time
@@ -379,20 +369,14 @@ class World:
         rows = range(world * self.body_count, (world + 1) * self.body_count)
         if not self.plan.contact:
             return np.zeros((0, 3)), np.zeros((0, 3))
-        return contact_forces(
-            rows, self._memory, self.state, self.params, self.shapes, self.walls, self.plan.features
-        )
+        return contact_forces(rows, self._memory, self.state, self.params, self.shapes, self.walls, self.plan.features)
 
     def touching(self, world: int = 0) -> set[tuple[int, int]]:
         """(body, wall) of every resting contact of one world at its last step."""
         if not self.plan.contact:
             return set()
         rows = range(world * self.body_count, (world + 1) * self.body_count)
-        return {
-            (b, wall)
-            for b, i in enumerate(rows)
-            for wall in walls_touched(self._memory[i], self.plan.features)
-        }
+        return {(b, wall) for b, i in enumerate(rows) for wall in walls_touched(self._memory[i], self.plan.features)}
 
     def __getstate__(self):
         kept = dict(vars(self))
@@ -406,9 +390,7 @@ class World:
         self._bind_views()
 
     def __repr__(self) -> str:
-        return (
-            f"World({self.worlds} worlds of {self.body_count} bodies, dt={self.dt}, time={self.time:.6g} s)"
-        )
+        return f"World({self.worlds} worlds of {self.body_count} bodies, dt={self.dt}, time={self.time:.6g} s)"
 
 
 _COMPILED: set[tuple] = set()

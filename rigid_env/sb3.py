@@ -38,18 +38,14 @@ class RigidVecEnv(VecEnv):
 
     def __init__(self, vector_env: RigidVectorEnv, monitor: bool = True):
         if vector_env.autoreset_mode is not AutoresetMode.SAME_STEP:
-            raise ValueError(
-                f"vector_env has {vector_env.autoreset_mode}; allowed is AutoresetMode.SAME_STEP"
-            )
+            raise ValueError(f"vector_env has {vector_env.autoreset_mode}; allowed is AutoresetMode.SAME_STEP")
         self.vector_env = vector_env
         self.monitor = monitor
         self._actions = None
         self._returns = np.zeros(vector_env.num_envs)
         self._lengths = np.zeros(vector_env.num_envs, dtype=np.int64)
         self._start = time.perf_counter()
-        super().__init__(
-            vector_env.num_envs, vector_env.single_observation_space, vector_env.single_action_space
-        )
+        super().__init__(vector_env.num_envs, vector_env.single_observation_space, vector_env.single_action_space)
         self.metadata = vector_env.metadata
 
     def reset(self) -> np.ndarray:
@@ -150,9 +146,7 @@ class RigidVecEnv(VecEnv):
     def _require_all(self, what: str, indices) -> None:
         chosen = sorted(set(self._get_indices(indices)))
         if chosen != list(range(self.num_envs)):
-            raise ValueError(
-                f"{what} got indices {indices!r}; allowed is None: the environments are one batch"
-            )
+            raise ValueError(f"{what} got indices {indices!r}; allowed is None: the environments are one batch")
 
     def env_is_wrapped(self, wrapper_class: type[gym.Wrapper], indices=None) -> list[bool]:
         """True for SB3's `Monitor` where this adapter does its work, else False."""

@@ -61,9 +61,7 @@ class RigidVectorEnv(gym.vector.VectorEnv):
         if max_episode_steps is not None and not (
             isinstance(max_episode_steps, (int, np.integer)) and max_episode_steps >= 1
         ):
-            raise ValueError(
-                f"max_episode_steps is {max_episode_steps!r}; allowed are None and positive integers"
-            )
+            raise ValueError(f"max_episode_steps is {max_episode_steps!r}; allowed are None and positive integers")
         self.max_episode_steps = max_episode_steps
         self.task = self.task_class(num_envs, **parameters)
         fps = max(1, round(1.0 / self.task.control_dt))
@@ -224,9 +222,7 @@ class RigidVectorEnv(gym.vector.VectorEnv):
         if mask is None:
             return np.ones(self.num_envs, dtype=np.bool_)
         if not isinstance(mask, np.ndarray) or mask.dtype != np.bool_ or mask.shape != (self.num_envs,):
-            raise ValueError(
-                f"options reset_mask is {mask!r}; allowed is a bool array of shape ({self.num_envs},)"
-            )
+            raise ValueError(f"options reset_mask is {mask!r}; allowed is a bool array of shape ({self.num_envs},)")
         if not mask.any():
             raise ValueError(f"options reset_mask is {mask!r}; allowed are arrays with at least one True")
         return mask
@@ -238,9 +234,7 @@ class RigidVectorEnv(gym.vector.VectorEnv):
             return [int(seed) + i for i in range(self.num_envs)]
         seeds = list(seed)
         if len(seeds) != self.num_envs:
-            raise ValueError(
-                f"seed has {len(seeds)} entries; allowed are an int, None, or {self.num_envs} entries"
-            )
+            raise ValueError(f"seed has {len(seeds)} entries; allowed are an int, None, or {self.num_envs} entries")
         return seeds
 
     # --- pictures -----------------------------------------------------------------------------------------
@@ -248,9 +242,7 @@ class RigidVectorEnv(gym.vector.VectorEnv):
     def render(self) -> tuple[np.ndarray, ...] | None:
         """A picture of each world, (height, width, 3) uint8; mode ``human`` shows world 0 and gives None."""
         if self.render_mode is None:
-            gym.logger.warn(
-                "render() needs a render_mode: pass render_mode='rgb_array' or 'human' to make_vec()"
-            )
+            gym.logger.warn("render() needs a render_mode: pass render_mode='rgb_array' or 'human' to make_vec()")
             return None
         if self.render_mode == "human":
             self._view.draw(self.task)

@@ -88,9 +88,7 @@ class View:
 
     def __init__(self, mode: str | None, width: int, height: int, fps: float, title: str):
         if mode is not None and mode not in RENDER_MODES:
-            raise ValueError(
-                f"render_mode is {mode!r}; allowed are None, {', '.join(map(repr, RENDER_MODES))}"
-            )
+            raise ValueError(f"render_mode is {mode!r}; allowed are None, {', '.join(map(repr, RENDER_MODES))}")
         for name, value in (("width", width), ("height", height)):
             if isinstance(value, bool) or not isinstance(value, (int, np.integer)) or value < 1:
                 raise ValueError(f"{name} is {value!r}; allowed are integers of at least 1")

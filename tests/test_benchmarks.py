@@ -24,9 +24,7 @@ needs_mujoco = pytest.mark.skipif(not mujoco_scene.is_installed(), reason="mujoc
 
 
 def row(ours, peer=None, target=None, **more):
-    return Row(
-        "key", "what", "steps/s", Spread(ours), peer=Spread(peer) if peer else None, target=target, **more
-    )
+    return Row("key", "what", "steps/s", Spread(ours), peer=Spread(peer) if peer else None, target=target, **more)
 
 
 # arithmetic
@@ -161,9 +159,7 @@ def test_wrenches_act_alike_in_both_engines_in_the_air():
     world.step(wrench[None, None], steps=steps)
     time = steps * workloads.STEP
     # MuJoCo's Euler is off by a dt t / 2 in place; |a| <= 5 m/s²
-    np.testing.assert_allclose(
-        data.qpos[:3], world.pos[0, 0], rtol=0, atol=0.5 * 5.0 * workloads.STEP * time * 1.01
-    )
+    np.testing.assert_allclose(data.qpos[:3], world.pos[0, 0], rtol=0, atol=0.5 * 5.0 * workloads.STEP * time * 1.01)
     np.testing.assert_allclose(data.qvel[:3], world.linvel[0, 0], rtol=1e-9)
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+
 from physics.kernels import layout as at
 from physics.kernels import quaternion as qt
 from physics.kernels.compiler import inlined, kernel

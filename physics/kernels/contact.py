@@ -52,7 +52,7 @@ def _admit(gap, speed, slop, margin, reach, acceleration, h, is_last):
 
 
 @kernel
-def gather(x, R, v, w, h, is_last, work):
+def gather(x, R, v, w, h, work):
     """Fill `work` (slot, gap, speed, mask) with the contact set at this pose.
 
     Parameters
@@ -63,8 +63,6 @@ def gather(x, R, v, w, h, is_last, work):
         Body frame to world.
     h : float
         Time that the stage is to cover [s].
-    is_last : bool
-        Take everything in that would pass through a wall within h.
 
     Returns
     -------
@@ -85,7 +83,7 @@ def gather(x, R, v, w, h, is_last, work):
         n = wall_normal(walls, k)
         d = qt.dot(n, x) - walls[k, OFFSET]
         near = margin
-        if is_last:
+        if work.is_last:
             near += h * (abs(v[0]) + abs(v[1]) + abs(v[2]) + radius * (abs(w[0]) + abs(w[1]) + abs(w[2])))
         if d > radius + near:
             continue
@@ -102,13 +100,13 @@ def gather(x, R, v, w, h, is_last, work):
                 if gap > near:
                     continue
                 speed = vn + geo.vertex_height(em, vertex)
-                if _admit(gap, speed, slop, margin, reach, acceleration, h, is_last):
+                if _admit(gap, speed, slop, margin, reach, acceleration, h, work.is_last):
                     count = _record(count, k, vertex, features, gap, speed, work)
                     depth = max(depth, -gap)
         else:
             gap = d - geo.support(shape, dims, e)
             speed = vn + qt.dot(m, geo.support_arm(shape, dims, R, n, e))
-            if _admit(gap, speed, slop, margin, reach, acceleration, h, is_last):
+            if _admit(gap, speed, slop, margin, reach, acceleration, h, work.is_last):
                 count = _record(count, k, 0, features, gap, speed, work)
                 depth = max(depth, -gap)
     return count, depth
@@ -165,7 +163,7 @@ def place_arms(n, R, work):
 
 
 @inlined
-def aim_impact(n, bounce_speed, slop_speed, work):
+def aim_impact(n, bounce_speed, slop_speed, rate, work):
     """Targets of an impact, and whether there is one.
 
     A contact that approaches faster than `bounce_speed` leaves with e times that speed (Newton's law); one that
@@ -176,7 +174,7 @@ def aim_impact(n, bounce_speed, slop_speed, work):
     for i in range(n):
         s = -work.speed[i]
         goal = 0.0
-        if s > slop_speed:
+        if s > slop_speed + max(work.gap[i], 0.0) * rate:
             is_impact = True
             if s > bounce_speed:
                 goal = work.restitution * s
@@ -187,7 +185,17 @@ def aim_impact(n, bounce_speed, slop_speed, work):
 
 
 @inlined
-def aim_rest(n, w, h, is_last, work):
+def is_closing(i, n, work):
+    """Whether a contact of the wall of contact i is still above it."""
+    wall = work.slot[i] // work.features
+    for j in range(n):
+        if work.gap[j] > work.slop and work.slot[j] // work.features == wall:
+            return True
+    return False
+
+
+@inlined
+def aim_rest(n, w, h, work):
     """Targets of the resting stage over h.
 
     The impulses act at the middle of the step, the velocity is asked for at its end, half a step later: a
@@ -195,11 +203,11 @@ def aim_rest(n, w, h, is_last, work):
     above the wall may close `CLOSING_SHARE` of its gap (all of it in a substep's last stage). What is smaller
     than the tolerance of the solve is 0, so that a body comes to rest to the last bit.
     """
-    walls, features, shape, slop = work.walls, work.features, work.shape, work.slop
+    walls, features, shape = work.walls, work.features, work.shape
     half = 0.5 * h
     is_turning = (w[0] != 0.0 or w[1] != 0.0 or w[2] != 0.0) and shape == BLOCK
     negligible = work.tolerance * work.acceleration * h
-    share = 1.0 if is_last else CLOSING_SHARE
+    share = 1.0 if work.is_last else CLOSING_SHARE
     for i in range(n):
         t0 = t1 = t2 = 0.0
         if is_turning:
@@ -209,7 +217,7 @@ def aim_rest(n, w, h, is_last, work):
             t0 = -half * (c[0] * walls[k, 0] + c[1] * walls[k, 1] + c[2] * walls[k, 2])
             t1 = -half * (c[0] * walls[k, 3] + c[1] * walls[k, 4] + c[2] * walls[k, 5])
             t2 = -half * (c[0] * walls[k, 6] + c[1] * walls[k, 7] + c[2] * walls[k, 8])
-        if work.gap[i] > slop:
+        if is_closing(i, n, work):
             t0 -= share * work.gap[i] / h
         if max(abs(t0), max(abs(t1), abs(t2))) <= negligible:
             t0 = t1 = t2 = 0.0

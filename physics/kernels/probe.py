@@ -37,17 +37,13 @@ def deepest_gaps(rows, state, params, shapes, walls, gaps, which):
     for k in range(rows.shape[0]):
         i = rows[k]
         x = (state[i, at.POS], state[i, at.POS + 1], state[i, at.POS + 2])
-        R = qt.to_matrix(
-            (state[i, at.QUAT], state[i, at.QUAT + 1], state[i, at.QUAT + 2], state[i, at.QUAT + 3])
-        )
+        R = qt.to_matrix((state[i, at.QUAT], state[i, at.QUAT + 1], state[i, at.QUAT + 2], state[i, at.QUAT + 3]))
         d = (params[i, at.DIMENSIONS], params[i, at.DIMENSIONS + 1], params[i, at.DIMENSIONS + 2])
         shape = shapes[i % shapes.shape[0]]
         gaps[k], which[k] = 1.0e300, -1
         for w in range(walls.shape[0]):
             n = (walls[w, at.NORMAL], walls[w, at.NORMAL + 1], walls[w, at.NORMAL + 2])
-            gap = (
-                qt.dot(n, x) - walls[w, at.OFFSET] - geo.support(shape, d, geo.scaled_normal(shape, d, R, n))
-            )
+            gap = qt.dot(n, x) - walls[w, at.OFFSET] - geo.support(shape, d, geo.scaled_normal(shape, d, R, n))
             if gap < gaps[k]:
                 gaps[k], which[k] = gap, w
 

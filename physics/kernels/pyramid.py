@@ -118,12 +118,8 @@ def fill_pair(W, w_scale, heading, i, j, M):
             gn = 0.0
             gx, gy = direction(heading, j, c - 1)
         un = w_scale * (W[3 * i, 3 * j] * gn + W[3 * i, 3 * j + 1] * gx + W[3 * i, 3 * j + 2] * gy)
-        ux = w_scale * (
-            W[3 * i + 1, 3 * j] * gn + W[3 * i + 1, 3 * j + 1] * gx + W[3 * i + 1, 3 * j + 2] * gy
-        )
-        uy = w_scale * (
-            W[3 * i + 2, 3 * j] * gn + W[3 * i + 2, 3 * j + 1] * gx + W[3 * i + 2, 3 * j + 2] * gy
-        )
+        ux = w_scale * (W[3 * i + 1, 3 * j] * gn + W[3 * i + 1, 3 * j + 1] * gx + W[3 * i + 1, 3 * j + 2] * gy)
+        uy = w_scale * (W[3 * i + 2, 3 * j] * gn + W[3 * i + 2, 3 * j + 1] * gx + W[3 * i + 2, 3 * j + 2] * gy)
         M[row, column + c] = un
         for k in range(DIRECTIONS):
             dx, dy = direction(heading, i, k)

@@ -1,11 +1,14 @@
-"""One contact problem: direct, else warm-started sweeps, else the pivoting fallback; with its residual."""
+"""One contact problem: directly, else by sweeps and Newton, else by pivoting; with its residual."""
 
 from __future__ import annotations
 
 from physics.kernels import quaternion as qt
 from physics.kernels.compiler import inlined, kernel
 from physics.kernels.direct import hold_all
+from physics.kernels.few import slide_few
+from physics.kernels.proximal import proximal_newton
 from physics.kernels.pyramid import normal_fallback, pyramid_fallback
+from physics.kernels.slide import slide_patch
 from physics.kernels.sweeps import (
     assemble,
     cone_residual,
@@ -22,6 +25,18 @@ DIRECT = 1
 SWEEPS = 2
 PIVOTING = 3
 
+# The pyramid's octagon is off by up to 1 - cos(π/8) = 8 % of the friction. Sweeps that stall nearer to a
+# solution than this share of the largest free contact speed know it better: their residual is reported as it
+# is.
+PIVOT_ABOVE = 0.01
+
+# Sweeps before Newton's method takes over: most problems that are left for sweeps need fewer than ten.
+FIRST_SWEEPS = 24
+
+# What to try first.
+HOLD = 0
+SLIDE = 1
+
 # Pivots of the fallback at most: several times the unknowns of a dozen contacts.
 MAX_PIVOTS = 500
 
@@ -36,17 +51,19 @@ def _free_speed(rows, bias):
 
 
 @kernel
-def _pivot(n, width, friction, residual, work):
+def _pivot(n, friction, smooth, residual, work):
     """Pivoting fallback; its result is kept where it beats that of the sweeps. Returns the residual [m/s]."""
-    rows = width * n
     p, W, b, u = work.impulse, work.delassus, work.bias, work.velocity
+    after, rows = residual, n
+    if friction is not None:
+        rows = 3 * n
     for r in range(rows):
         work.saved[r] = p[r]
-    if friction is None:
+    if smooth is not None:
         normal_fallback(W, b, n, p, work.fallback_float, work.fallback_int, MAX_PIVOTS)
         velocities(rows, W, p, b, u)
         after = normal_residual(n, p, u, W)
-    else:
+    if friction is not None:
         pyramid_fallback(W, b, work.friction, n, p, work.fallback_float, work.fallback_int, MAX_PIVOTS)
         velocities(rows, W, p, b, u)
         after = cone_residual(n, p, u, work.friction, work.local)
@@ -80,19 +97,45 @@ def _apply(n, width, v, L, work):
     )
 
 
-@kernel
-def _sweep(n, width, friction, tolerance, limit, work):
-    if friction is None:
-        return normal_sweeps(n, tolerance, limit, work)
-    factor_blocks(n, work)
-    for i in range(n):
-        work.friction[i] = work.mu
-    return cone_sweeps(n, work.friction, tolerance, limit, work)
+@inlined
+def _assemble(n, width, R, v, L, work):
+    """Assemble the contact problem; largest free contact speed."""
+    J = work.J
+    mb = qt.transposed_matvec(R, L)
+    assemble(n, width, R, v, qt.matvec(R, (J[0] * mb[0], J[1] * mb[1], J[2] * mb[2])), work)
+    return _free_speed(width * n, work.bias)
 
 
 @kernel
-def solve_contacts(n, friction, pivots, v, L, R, work):
+def _iterate(n, friction, smooth, goal, work):
+    """Sweeps; with friction also Newton's method where a few do not do: (sweeps and steps, residual [m/s])."""
+    steps, residual = 0, 0.0
+    if smooth is not None:
+        steps, residual = normal_sweeps(n, goal, work.sweeps, work)
+    if friction is not None:
+        factor_blocks(n, work)
+        for i in range(n):
+            work.friction[i] = work.mu
+        limit = min(work.sweeps, FIRST_SWEEPS)
+        for attempt in range(2):
+            sweeps, residual = cone_sweeps(n, work.friction, goal, limit, work)
+            steps += sweeps
+            if residual <= goal or attempt > 0 or limit == work.sweeps:
+                break
+            sweeps, residual = proximal_newton(n, residual, goal, work)
+            steps += sweeps
+            if residual <= goal:
+                break
+            limit = work.sweeps - limit
+    return steps, residual
+
+
+@kernel
+def solve_contacts(n, friction, smooth, pivots, v, L, R, work):
     """Contact impulses that bring the contacts of `work` to their target velocities as far as they can.
+
+    Tried in this order: all hold and all slide, directly, the one first that worked for this body before;
+    sweeps; pivoting. The first whose residual is within the tolerance gives the result.
 
     Parameters
     ----------
@@ -100,6 +143,8 @@ def solve_contacts(n, friction, pivots, v, L, R, work):
         Contacts in `work`: slot, arm, target are read, impulse (width * n, the warm start) is overwritten.
     friction : True or None
         None: frictionless, one row per contact.
+    smooth : True or None
+        The opposite switch: None with friction (see `physics.plan.Plan.smooth`).
     pivots : True or None
         None: no pivoting fallback.
     v, L : tuples of 3 floats
@@ -117,23 +162,40 @@ def solve_contacts(n, friction, pivots, v, L, R, work):
     method : int
         DIRECT, SWEEPS or PIVOTING.
     """
-    width = 3
-    if friction is None:
-        width = 1
-    else:
-        found, v1, L1 = hold_all(n, R, v, L, work)
-        if found:
-            return v1, L1, 0.0, 0, DIRECT
-    J = work.J
-    mb = qt.transposed_matvec(R, L)
-    w = qt.matvec(R, (J[0] * mb[0], J[1] * mb[1], J[2] * mb[2]))
-    assemble(n, width, R, v, w, work)
-    tolerance = work.tolerance
-    scale = _free_speed(width * n, work.bias)
-    sweeps, residual = _sweep(n, width, friction, tolerance * scale, work.sweeps, work)
+    width = 1 if friction is None else 3
+    count = n
+    scale = -1.0
+    for attempt in range(2):
+        if friction is not None and (attempt == 0) == (work.mode == HOLD):
+            found, v1, L1, residual = hold_all(n, R, v, L, work)
+            if found:
+                work.mode = HOLD
+                return v1, L1, residual, 0, DIRECT
+            continue
+        if n > 2:
+            count, v1, L1, residual = slide_patch(n, friction, R, v, L, work)
+            if count == 0:
+                work.mode = SLIDE
+                return v1, L1, residual, 0, DIRECT
+        if count <= 2:
+            if scale < 0.0:
+                scale = _assemble(n, width, R, v, L, work)
+            found, residual = slide_few(n, count, friction, work.tolerance * scale, work)
+            if found:
+                v1, L1 = _apply(n, width, v, L, work)
+                if scale > 0.0:
+                    residual /= scale
+                work.mode = SLIDE
+                return v1, L1, residual, 0, DIRECT
+        if friction is None:
+            break
+    if scale < 0.0:
+        scale = _assemble(n, width, R, v, L, work)
+    goal = work.tolerance * scale
+    sweeps, residual = _iterate(n, friction, smooth, goal, work)
     method = SWEEPS
-    if pivots is not None and not residual <= tolerance * scale:
-        residual = _pivot(n, width, friction, residual, work)
+    if pivots is not None and not residual <= max(goal, PIVOT_ABOVE * scale):
+        residual = _pivot(n, friction, smooth, residual, work)
         method = PIVOTING
     v, L = _apply(n, width, v, L, work)
     if scale > 0.0:

@@ -44,15 +44,11 @@ def coast(y, h, gyroscopic, tilted, scheme, work):
     return fly_by_scheme(scheme, y, work, h, tilted)
 
 
-@kernel
-def advance(
-    n, y, h, is_last, friction, gyroscopic, tilted, pivots, scheme, memory, report, work,
-):  # fmt: skip
+@inlined
+def advance(n, y, h, friction, smooth, gyroscopic, tilted, pivots, scheme, memory, report, work):
     """One stage of length h: flight when nothing touches, else Moreau's step."""
     if n > 0:
-        return touch(
-            n, y, h, is_last, friction, gyroscopic, tilted, pivots, memory, report, work,
-        )  # fmt: skip
+        return touch(n, y, h, friction, smooth, gyroscopic, tilted, pivots, memory, report, work)
     forget_contacts(memory, work.i, work)
     return coast(y, h, gyroscopic, tilted, scheme, work)
 
@@ -64,11 +60,11 @@ def outside_gap(y, work):
 
 
 @inlined
-def contact_set(y, h, is_last, tilted, work):
+def contact_set(y, h, tilted, work):
     """Gather the contact set at y for a stage of length h: (count, depth)."""
     x, q, v, L = y
     w = angular_velocity(q, L, work, tilted)
-    return gather(x, to_matrix(q), v, w, h, is_last, work)
+    return gather(x, to_matrix(q), v, w, h, work)
 
 
 @inlined
@@ -84,33 +80,24 @@ def kept_out(y, work):
 
 
 @kernel
-def to_next_impact(n, y, h, friction, gyroscopic, tilted, pivots, scheme, memory, report, work):
+def to_next_impact(n, y, h, friction, smooth, gyroscopic, tilted, pivots, scheme, memory, report, work):
     """Advance by h, or to the first impact within h: (state, time advanced).
 
     An end state in which a feature outside the contact set has passed through a wall is taken back and the
     stage shortened (Illinois' regula falsi on the smallest gap) until the feature is within half a slop of it.
     """
-    end = advance(
-        n, y, h, False, friction, gyroscopic, tilted, pivots, scheme, memory, report, work,
-    )  # fmt: skip
-    if has_same_pose(end, y):
-        return end, h
-    gap = outside_gap(end, work)
-    if not gap < -0.5 * work.slop:
-        return end, h
-    low, low_gap = 0.0, max(outside_gap(y, work), 0.0)
-    high, high_gap = h, gap
-    t = h
-    side = 0
-    for _ in range(IMPACT_TRIALS):
-        t = low + (high - low) * low_gap / (low_gap - high_gap)
-        end = advance(
-            n, y, t, False, friction, gyroscopic, tilted, pivots, scheme, memory, report, work,
-        )  # fmt: skip
-        gap = outside_gap(end, work)
-        if abs(gap) <= 0.5 * work.slop:
+    t, low, low_gap, high, high_gap, side = h, 0.0, 0.0, h, 0.0, 0
+    end = y
+    for trial in range(IMPACT_TRIALS + 1):
+        end = advance(n, y, t, friction, smooth, gyroscopic, tilted, pivots, scheme, memory, report, work)
+        if has_same_pose(end, y) or work.is_last:
             break
-        if gap > 0.0:
+        gap = outside_gap(end, work)
+        if abs(gap) <= 0.5 * work.slop or (trial == 0 and gap > 0.0):
+            break
+        if trial == 0:
+            low_gap, high_gap = max(outside_gap(y, work), 0.0), gap
+        elif gap > 0.0:
             low, low_gap = t, gap
             if side > 0:
                 high_gap *= 0.5
@@ -120,40 +107,42 @@ def to_next_impact(n, y, h, friction, gyroscopic, tilted, pivots, scheme, memory
             if side < 0:
                 low_gap *= 0.5
             side = -1
+        t = low + (high - low) * low_gap / (low_gap - high_gap)
     return end, t
 
 
 @kernel
-def substep(y, h, friction, gyroscopic, tilted, pivots, scheme, memory, report, work):
-    """State after h: impacts where they happen, flight or contact between them."""
+def substep(y, h, friction, smooth, gyroscopic, tilted, pivots, scheme, memory, report, work):
+    """State after h: impacts where they happen, flight or contact between them.
+
+    When a substep has used up its cuts its rest is one plastic stage that takes in all it would pass through.
+    """
     left = h
     world = work.world
-    for split in range(work.splits):
-        n, depth = contact_set(y, left, False, tilted, work)
+    work.is_last = 0
+    for split in range(work.splits + 1):
+        if split == work.splits:
+            report[world, at.UNRESOLVED] += 1.0
+            work.is_last = 1
+        n, depth = contact_set(y, left, tilted, work)
         if n > 0:
             report[world, at.PENETRATION] = max(report[world, at.PENETRATION], depth)
-            y = impact(n, y, left, friction, tilted, pivots, report, work)
-        end, t = to_next_impact(
-            n, y, left, friction, gyroscopic, tilted, pivots, scheme, memory, report, work
-        )
+            if not work.is_last:
+                y = impact(n, y, left, friction, smooth, tilted, pivots, report, work)
+        end, t = to_next_impact(n, y, left, friction, smooth, gyroscopic, tilted, pivots, scheme, memory, report, work)
         left -= t
         if n > 0 and not has_same_pose(end, y):
             end = kept_out(end, work)
         y = end
         if not left > 0.0:
-            return y
+            break
         report[world, at.SPLITS] += 1.0
-    report[world, at.UNRESOLVED] += 1.0
-    n, depth = contact_set(y, left, True, tilted, work)
-    y = advance(
-        n, y, left, True, friction, gyroscopic, tilted, pivots, scheme, memory, report, work,
-    )  # fmt: skip
-    return kept_out(y, work)
+    return y
 
 
 @kernel
 def step_worlds(
-    first, last, steps, substeps, h, state, params, shapes, gravity, wrench, contact, friction, restitution,
+    first, last, steps, substeps, h, state, params, shapes, gravity, wrench, contact, friction, smooth, restitution,
     gyroscopic, tilted, pivots, scheme, memory, report, scratch,
 ):  # fmt: skip
     """Advance the worlds first <= world < last by `steps` steps of `substeps` substeps of h seconds each.
@@ -171,7 +160,7 @@ def step_worlds(
             y = read_state(state, i)
             for _ in range(steps * substeps):
                 if contact is not None and not is_clear(y[0], y[2], h, work):
-                    new = substep(y, h, friction, gyroscopic, tilted, pivots, scheme, memory, report, work)
+                    new = substep(y, h, friction, smooth, gyroscopic, tilted, pivots, scheme, memory, report, work)
                 else:
                     if contact is not None:
                         forget_contacts(memory, i, work)

@@ -24,11 +24,21 @@ from __future__ import annotations
 
 import math
 
-from physics.kernels.compiler import kernel
+from physics.kernels.compiler import inlined, kernel
 
 # Columns of `work.local`: rows of the inverse of the contact's 3x3 block, then ρ_t and ρ.
 TANGENTIAL_STEP = 9
 NORMAL_STEP = 10
+
+# Newton steps of one contact's sliding direction per visit at most, and the last turn worth another [rad].
+TURN_LIMIT = 3
+TURN_ENOUGH = 1.0e-3
+
+# Sweeps between two extrapolations. A slow sweep contracts along one direction with a ratio q near 1, which
+# two changes of p tell; the rest of that geometric series, q/(1 - q) times the last change, is then added at
+# once.
+EXTRAPOLATION_PERIOD = 4
+RATIO_LIMIT = 0.998
 
 
 @kernel
@@ -66,9 +76,7 @@ def assemble(n, width, R, v, w, work):
             response[row, 0] = i11 * gx + i12 * gy + i13 * gz
             response[row, 1] = i12 * gx + i22 * gy + i23 * gz
             response[row, 2] = i13 * gx + i23 * gy + i33 * gz
-            work.bias[row] = (
-                (a * v[0] + b * v[1] + d * v[2]) + (gx * w[0] + gy * w[1] + gz * w[2]) - work.target[i, c]
-            )
+            work.bias[row] = (a * v[0] + b * v[1] + d * v[2]) + (gx * w[0] + gy * w[1] + gz * w[2]) - work.target[i, c]
     W = work.delassus
     for r in range(width * n):
         gx, gy, gz = angular[r, 0], angular[r, 1], angular[r, 2]
@@ -155,6 +163,46 @@ def normal_sweeps(n, tolerance, limit, work):
     return sweeps, residual
 
 
+@inlined
+def _slide_one(r, b0, b1, b2, p1, p2, mu, W):
+    """Impulse of one sliding contact that alone answers its free velocity b, and whether one was found.
+
+    With p = p_n (1, -μ d), p_n = -b_n / (W_nn - μ W_nt·d): the contact neither approaches nor leaves. What is
+    left is the angle of d for which the velocity across, g = e·u_t with e = n x d, vanishes: Newton's method
+    on the angle, g' = -d·u_t + e·(p_n' (W_tn - μ W_tt d) - μ p_n W_tt e), p_n' = μ p_n W_nt·e / (W_nn - μ
+    W_nt·d).
+    """
+    a, b, c = W[r, r], W[r, r + 1], W[r, r + 2]
+    d, e, f = W[r + 1, r + 1], W[r + 1, r + 2], W[r + 2, r + 2]
+    x, y = -p1, -p2
+    size = math.sqrt(x * x + y * y)
+    if not size > 0.0:
+        x, y = b1, b2
+        size = math.sqrt(x * x + y * y)
+    if size > 0.0:
+        x, y = x / size, y / size
+    pn = 0.0
+    for _ in range(TURN_LIMIT):
+        along = a - mu * (b * x + c * y)
+        pn = -b0 / along
+        gx, gy = b - mu * (d * x + e * y), c - mu * (e * x + f * y)
+        ux, uy = b1 + pn * gx, b2 + pn * gy
+        across, forward = x * uy - y * ux, x * ux + y * uy
+        ex, ey = mu * (e * x - d * y), mu * (f * x - e * y)
+        change = mu * pn * (c * x - b * y) / along
+        slope = -forward + (x * (change * gy - pn * ey) - y * (change * gx - pn * ex))
+        if not (pn >= 0.0 and forward > 0.0 and slope < 0.0):
+            return False, 0.0, 0.0, 0.0
+        t = -across / slope
+        x, y = x - t * y, y + t * x
+        size = 1.0 / math.sqrt(x * x + y * y)
+        x, y = size * x, size * y
+        if abs(t) <= TURN_ENOUGH:
+            break
+    pn = -b0 / (a - mu * (b * x + c * y))
+    return pn >= 0.0, pn, -mu * pn * x, -mu * pn * y
+
+
 @kernel
 def _local_impulse(i, p, u, mu, W, local):
     """Impulse of contact i that answers its own velocity, all others held: (normal, tangent 1, tangent 2)."""
@@ -169,7 +217,14 @@ def _local_impulse(i, p, u, mu, W, local):
     q2 = p2 - (local[i, 6] * u[r] + local[i, 7] * u[r + 1] + local[i, 8] * u[r + 2])
     if q0 >= 0.0 and q1 * q1 + q2 * q2 <= (mu * q0) ** 2:
         return q0, q1, q2
-    # Slide: normal first, then the tangential step projected on the disk of radius μ p_n.
+    # Slide: by turning the direction; else normal first, then the tangential step projected on the disk μ
+    # p_n.
+    b0 = u[r] - (W[r, r] * p0 + W[r, r + 1] * p1 + W[r, r + 2] * p2)
+    b1 = u[r + 1] - (W[r + 1, r] * p0 + W[r + 1, r + 1] * p1 + W[r + 1, r + 2] * p2)
+    b2 = u[r + 2] - (W[r + 2, r] * p0 + W[r + 2, r + 1] * p1 + W[r + 2, r + 2] * p2)
+    found, q0, q1, q2 = _slide_one(r, b0, b1, b2, p1, p2, mu, W)
+    if found:
+        return q0, q1, q2
     q0 = max(0.0, p0 - local[i, NORMAL_STEP] * u[r])
     dn = q0 - p0
     step = local[i, TANGENTIAL_STEP]
@@ -180,6 +235,23 @@ def _local_impulse(i, p, u, mu, W, local):
         q1 *= limit / size
         q2 *= limit / size
     return q0, q1, q2
+
+
+@inlined
+def _extrapolate(n, mu, ratio, work):
+    """p plus the rest of the geometric series of its changes, back in the cones; and u = W p + b."""
+    p, change = work.impulse, work.change
+    s = ratio / (1.0 - ratio)
+    for i in range(n):
+        r = 3 * i
+        q0 = max(0.0, p[r] + s * change[r])
+        q1, q2 = p[r + 1] + s * change[r + 1], p[r + 2] + s * change[r + 2]
+        size, limit = math.sqrt(q1 * q1 + q2 * q2), mu[i] * q0
+        if size > limit:
+            q1 *= limit / size
+            q2 *= limit / size
+        p[r], p[r + 1], p[r + 2] = q0, q1, q2
+    velocities(3 * n, work.delassus, p, work.bias, work.velocity)
 
 
 @kernel
@@ -194,19 +266,25 @@ def cone_sweeps(n, mu, tolerance, limit, work):
     residual : float
         [m/s], measured on the returned impulses.
     """
-    p, u, W, local = work.impulse, work.velocity, work.delassus, work.local
+    p, u, W, local, change = work.impulse, work.velocity, work.delassus, work.local, work.change
     rows = 3 * n
     velocities(rows, W, p, work.bias, u)
     residual = cone_residual(n, p, u, mu, local)
     sweeps = 0
     while not residual <= tolerance and sweeps < limit:
+        product = square = 0.0
         for i in range(n):
             r = 3 * i
             q0, q1, q2 = _local_impulse(i, p, u, mu[i], W, local)
             d0, d1, d2 = q0 - p[r], q1 - p[r + 1], q2 - p[r + 2]
             p[r], p[r + 1], p[r + 2] = q0, q1, q2
+            product += d0 * change[r] + d1 * change[r + 1] + d2 * change[r + 2]
+            square += change[r] * change[r] + change[r + 1] * change[r + 1] + change[r + 2] * change[r + 2]
+            change[r], change[r + 1], change[r + 2] = d0, d1, d2
             for s in range(rows):
                 u[s] += (W[r, s] * d0 + W[r + 1, s] * d1) + W[r + 2, s] * d2
         sweeps += 1
+        if sweeps % EXTRAPOLATION_PERIOD == 0 and product > 0.0:
+            _extrapolate(n, mu, min(product / square, RATIO_LIMIT), work)
         residual = cone_residual(n, p, u, mu, local)
     return sweeps, residual

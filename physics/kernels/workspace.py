@@ -3,9 +3,9 @@
 It is one NumPy record, so that a kernel hands on a single pointer, and the compiler knows every size. It is
 filled anew for each body (`body.bind_body`); nothing in it outlives a step.
 
-The contact fields are laid out for two bodies per contact: arm and Jacobian rows belong to the first body. The
-second one is the wall, with inverse mass and inertia zero as in the course notes, which adds nothing. Contacts
-between bodies will put the rows of the second body beside those of the first.
+The contact fields are laid out for two bodies per contact: arm and Jacobian rows belong to the first body.
+The second one is the wall, with inverse mass and inertia zero as in the course notes, which adds nothing.
+Contacts between bodies will put the rows of the second body beside those of the first.
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ from __future__ import annotations
 import numpy as np
 
 from physics.kernels.layout import WALL_SIZE
+from physics.kernels.patch import PATCH_SIZE
 from physics.kernels.pyramid import normal_sizes, pyramid_sizes
 from physics.kernels.rotation import SERIES_SIZE
 
@@ -46,6 +47,8 @@ def workspace_dtype(wall_count: int, features: int) -> np.dtype:
         ("restitution", f),
         ("free_acceleration", f, (3,)),  # of the centre of mass without contact [m/s²]
         ("torque", f, (3,)),  # about the centre of mass [N m]
+        ("mode", i),  # which direct solve to try first, then which one did it (`solve.HOLD`, `solve.SLIDE`)
+        ("is_last", i),  # 1 in the last stage a substep may have: take in all that would pass through a wall
         ("acceleration", f),  # bound for any point of the body without contact [m/s²]
     ]
     contacts = [
@@ -63,7 +66,18 @@ def workspace_dtype(wall_count: int, features: int) -> np.dtype:
         ("bias", f, (3 * n,)),  # b of u = W p + b [m/s]
         ("impulse", f, (3 * n,)),  # p [N s]
         ("saved", f, (3 * n,)),  # p of the sweeps while the fallback tries [N s]
+        ("change", f, (3 * n,)),  # of p in the last sweep [N s]
         ("velocity", f, (3 * n,)),  # u [m/s]
+        ("active", i, (n,)),  # of a direct solve: contacts that push, flags (`direct`) or a list (`slide`)
+        ("normal", f, (n,)),  # of a direct solve: normal impulse, negative where the contact is open [N s]
+        ("across", f, (n, 2)),  # of `direct`: tangential impulse [N s]
+        ("weight", f, (n,)),  # of `share`: share in the tangential impulse [N s]
+        ("patch", f, (n, PATCH_SIZE)),  # see `patch`
+        ("twist", f, (6,)),  # of `proximal`: change of (v, ω) [m/s, rad/s]
+        ("start", f, (6,)),
+        ("defect", f, (6,)),
+        ("newton", f, (6, 7)),
+        ("trial", f, (3 * n,)),  # [N s]
         ("local", f, (n, 12)),  # see `sweeps.factor_blocks`
         ("fallback_float", f, (float_size,)),
         ("fallback_int", i, (int_size,)),

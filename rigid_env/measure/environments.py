@@ -113,9 +113,7 @@ def environment_rows(
     for threads in THREADS:
         yield _vector_rows(threads, sizes, repeats, peer, tick)
     yield _single_rows("single_env", "one Env, gym.make", lambda env: env, sizes, repeats, peer, tick)
-    yield _single_rows(
-        "bare_env", "one Env, unwrapped", lambda env: env.unwrapped, sizes, repeats, peer, tick
-    )
+    yield _single_rows("bare_env", "one Env, unwrapped", lambda env: env.unwrapped, sizes, repeats, peer, tick)
 
 
 def run_count(repeats: int, with_peer: bool) -> int:

@@ -42,9 +42,7 @@ def engine_rows(sizes: Sizes, repeats: int, with_peer: bool, tick: Tick | None =
     yield _batch_rows(sizes, repeats, with_peer, tick)
 
 
-def paired_rows(
-    spreads: dict[str, Spread], peers: dict[str, str], notes: dict | None = None, **common
-) -> list[Row]:
+def paired_rows(spreads: dict[str, Spread], peers: dict[str, str], notes: dict | None = None, **common) -> list[Row]:
     """One row for each of our contestants (named by their accuracy), all against the fastest of the peers.
 
     Parameters
@@ -113,6 +111,4 @@ def _batch_rows(sizes, repeats, with_peer, tick) -> list[Row]:
     spreads = interleave(runners, repeats, told(tick, what))
     all_peers = {"peers": {peers[name]: spreads[name].to_dict() for name in peers}}
     notes = {name: dict(all_peers) for name in ACCURACIES} if peers else None
-    return paired_rows(
-        spreads, peers, notes, key="batch", what=what, unit="world steps/s", target=BATCH_TARGET
-    )
+    return paired_rows(spreads, peers, notes, key="batch", what=what, unit="world steps/s", target=BATCH_TARGET)

@@ -115,7 +115,5 @@ def _grid(points, normal):
             off = np.abs(coordinate - spacing * np.rint(coordinate / spacing))
             cover = np.clip((0.5 * (drawn + footprint) - off) / footprint, 0.0, 1.0)
             crowded = np.clip(2.0 - 4.0 * footprint / spacing, 0.0, 1.0)
-            strength = np.maximum(
-                strength, peak * cover * crowded * np.minimum(1.0, 2.0 * LINE_WIDTH / drawn)
-            )
+            strength = np.maximum(strength, peak * cover * crowded * np.minimum(1.0, 2.0 * LINE_WIDTH / drawn))
     return strength

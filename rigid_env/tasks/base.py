@@ -93,9 +93,7 @@ class Task:
         threads=1,
     ):
         self.area = Area(walls, half_width)
-        self.parameters = Parameters(
-            mass=mass, size=size, friction=friction, restitution=restitution, gravity=gravity
-        )
+        self.parameters = Parameters(mass=mass, size=size, friction=friction, restitution=restitution, gravity=gravity)
         self.area.check_room(self.parameters["size"].high)
         self.frame_skip = checks.count(frame_skip, "frame_skip")
         self.world = physics.World(self._scene(), worlds=worlds, dt=dt, accuracy=accuracy, threads=threads)
@@ -122,9 +120,7 @@ class Task:
         """The block at the middle of the area, lifted clear of the floor, with the middles of all ranges."""
         middle = {field: span.middle for field, span in self.parameters.ranges.items()}
         return physics.Scene(
-            bodies=[
-                physics.Block(size=tuple(middle["size"]), mass=float(middle["mass"][0]), pos=self._lifted())
-            ],
+            bodies=[physics.Block(size=tuple(middle["size"]), mass=float(middle["mass"][0]), pos=self._lifted())],
             walls=self.area.half_spaces,
             effects=[
                 physics.Gravity((0.0, -float(middle["gravity"][0]), 0.0)),
@@ -234,13 +230,9 @@ class Task:
         self._actions[...] = actions
         bad = wrenches(self._actions, self.record, self.wrench)
         if bad >= 0:
-            raise ValueError(
-                f"action of world {bad} is {self._actions[bad].tolist()}; allowed are finite numbers"
-            )
+            raise ValueError(f"action of world {bad} is {self._actions[bad].tolist()}; allowed are finite numbers")
         self.report = self.world.step(self.wrench, steps=self.frame_skip)
-        self._kernel(
-            self._rows, self.world.state, self.record, self.world.walls, self._actions, obs, self.outcome
-        )
+        self._kernel(self._rows, self.world.state, self.record, self.world.walls, self._actions, obs, self.outcome)
 
     def physics_status(self) -> np.ndarray | None:
         """(worlds,) int64, values of `physics.Status` for the last step; None: all is well."""
@@ -258,9 +250,7 @@ class Task:
 def spread_option(name: str, value, shape: tuple[int, ...]) -> np.ndarray:
     """An option for n worlds, (n, ...), from one for all of them or one for each."""
     array = np.asarray(value)
-    return checks.finite(
-        np.broadcast_to(array, shape) if array.shape == shape[1:] else array, shape, f"options {name}"
-    )
+    return checks.finite(np.broadcast_to(array, shape) if array.shape == shape[1:] else array, shape, f"options {name}")
 
 
 def face_option(name: str, value, count: int) -> np.ndarray:

@@ -48,7 +48,5 @@ def push(obs: np.ndarray) -> np.ndarray:
     error = offset * np.minimum(1.5, 3.0 / np.maximum(distance, 1e-6)) - velocity
     size = np.linalg.norm(error, axis=-1, keepdims=True)
     action = np.zeros((*obs.shape[:-1], 6), dtype=np.float32)
-    action[..., [0, 2]] = np.where(
-        distance > 0.15, error / np.maximum(size, 1e-6) * np.minimum(0.5 + size, 1.0), 0.0
-    )
+    action[..., [0, 2]] = np.where(distance > 0.15, error / np.maximum(size, 1e-6) * np.minimum(0.5 + size, 1.0), 0.0)
     return action

@@ -78,9 +78,7 @@ def test_reset_mask_leaves_the_callers_options_alone(vector_class):
 
 def test_vector_episode_statistics_count_each_step_once(vector_class):
     for mode in ("NextStep", "SameStep"):
-        envs = gym.wrappers.vector.RecordEpisodeStatistics(
-            vector_class(2, autoreset_mode=mode, max_episode_steps=3)
-        )
+        envs = gym.wrappers.vector.RecordEpisodeStatistics(vector_class(2, autoreset_mode=mode, max_episode_steps=3))
         envs.reset(seed=0)
         lengths = []
         for _ in range(9):

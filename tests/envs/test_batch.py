@@ -90,9 +90,7 @@ def test_seeds_decide_everything(vector_class, rng):
     np.testing.assert_array_equal(first[[0, 2]], envs.reset(seed=[1, None, 3])[0][[0, 2]])
 
 
-@pytest.mark.parametrize(
-    "copier", [copy.deepcopy, lambda x: pickle.loads(pickle.dumps(x))], ids=["deepcopy", "pickle"]
-)
+@pytest.mark.parametrize("copier", [copy.deepcopy, lambda x: pickle.loads(pickle.dumps(x))], ids=["deepcopy", "pickle"])
 def test_a_copy_goes_on_as_the_original(env_class, vector_class, copier, rng):
     for env, worlds in ((env_class(friction=(0.3, 0.7)), None), (vector_class(2, max_episode_steps=9), 2)):
         env.reset(seed=3)

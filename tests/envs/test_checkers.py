@@ -35,9 +35,7 @@ def test_sb3_check_env_without_a_warning(env_id):
 
 @pytest.mark.slow
 def test_make_with_module_prefix_in_a_fresh_process(env_id):
-    code = (
-        f"import gymnasium as gym\nenv = gym.make('rigid_env:{env_id}')\nprint(env.reset(seed=0)[0].shape)\n"
-    )
+    code = f"import gymnasium as gym\nenv = gym.make('rigid_env:{env_id}')\nprint(env.reset(seed=0)[0].shape)\n"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=300)
     assert done.returncode == 0, done.stderr
     assert done.stdout.startswith("(2")
@@ -71,9 +69,7 @@ def test_make_vec_gives_the_native_batch_and_its_limit(env_id):
 
 def test_record_video_of_a_single_environment(env_id, tmp_path):
     env = gym.make(env_id, render_mode="rgb_array", width=64, height=48)
-    env = gym.wrappers.RecordVideo(
-        env, str(tmp_path / "video"), episode_trigger=lambda k: True, video_length=3
-    )
+    env = gym.wrappers.RecordVideo(env, str(tmp_path / "video"), episode_trigger=lambda k: True, video_length=3)
     env.reset(seed=0)
     for _ in range(4):
         env.step(env.action_space.sample())

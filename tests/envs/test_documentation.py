@@ -69,10 +69,7 @@ def test_numbers_in_rewards_and_episode_end(env_class):
         assert f"at most {k.REORIENT_TOLERANCE:g} rad," in end
     assert f"costs {kernels.STEP_COST:g} and {kernels.ACTION_COST:g} times" in rewards
     assert f"Success earns {kernels.SUCCESS_BONUS:g}" in rewards
-    assert (
-        f"speed of at most {kernels.REST_SPEED:g} m/s and a spin of at most {kernels.REST_SPIN:g} rad/s"
-        in end
-    )
+    assert f"speed of at most {kernels.REST_SPEED:g} m/s and a spin of at most {kernels.REST_SPIN:g} rad/s" in end
     assert f"on {kernels.HOLD_STEPS} control steps in a row" in end
     steps = MAX_EPISODE_STEPS[env_class.task_class.__name__]
     assert f"after {steps} control steps ({steps * env_class().task.control_dt:g} s)" in end
@@ -88,9 +85,7 @@ def test_observation_scales_are_the_documented_units():
 
 
 def test_argument_table_holds_the_defaults():
-    rows = {
-        row[0].strip("`"): row[1].strip("`") for row in table(section(BlockReachEnv.__doc__, "Arguments"))
-    }
+    rows = {row[0].strip("`"): row[1].strip("`") for row in table(section(BlockReachEnv.__doc__, "Arguments"))}
     defaults = {
         name: parameter.default
         for owner in (Task.__init__, BlockReachEnv.__init__)

@@ -103,9 +103,7 @@ def test_pictures_are_tiled():
 
 
 def test_wrappers_of_sb3(rng):
-    venv = VecNormalize(
-        VecCheckNan(VecMonitor(make(monitor=False, max_episode_steps=6)), raise_exception=True)
-    )
+    venv = VecNormalize(VecCheckNan(VecMonitor(make(monitor=False, max_episode_steps=6)), raise_exception=True))
     obs = venv.reset()
     assert obs.shape == (3, 24)
     for actions in random_actions(rng, 6, 3):
@@ -133,9 +131,7 @@ def test_evaluate_policy_counts_the_scripted_controllers_successes():
 
 
 def test_ppo_runs_and_logs_success():
-    model = PPO(
-        "MlpPolicy", make(4, max_episode_steps=8), n_steps=16, batch_size=32, n_epochs=1, device="cpu"
-    )
+    model = PPO("MlpPolicy", make(4, max_episode_steps=8), n_steps=16, batch_size=32, n_epochs=1, device="cpu")
     model.learn(128)
     assert len(model.ep_success_buffer) > 0
     assert model.ep_info_buffer[0]["l"] == 8

@@ -126,9 +126,7 @@ def test_success_takes_the_whole_hold_and_its_reward_follows_the_formula():
     assert steps[-1][4]["distance"] == pytest.approx(0.2, abs=1e-4)
 
 
-@pytest.mark.parametrize(
-    "motion", [{"linvel": (1.0, 0.0, 0.0)}, {"angvel": (0.0, 1.5, 0.0)}], ids=["slides", "spins"]
-)
+@pytest.mark.parametrize("motion", [{"linvel": (1.0, 0.0, 0.0)}, {"angvel": (0.0, 1.5, 0.0)}], ids=["slides", "spins"])
 def test_the_hold_begins_when_the_block_is_at_rest_on_its_goal(motion):
     env = BlockReachEnv()
     env.reset(seed=0, options={"place": (0.0, 0.0), "goal": (0.0, 0.0), "face": 2})

@@ -118,10 +118,7 @@ def test_a_long_step_equals_many_short_ones():
     whole = turn(BLOCK, (1, 0, 0, 0), L, 1.0)
     for pieces in (10, 1000):
         # Each piece rounds the attitude by a few EPS; the motion is not near the unstable axis.
-        assert (
-            ref.orientation_error(turn(BLOCK, (1, 0, 0, 0), L, 1.0 / pieces, pieces), whole)
-            < 20 * pieces * EPS
-        )
+        assert ref.orientation_error(turn(BLOCK, (1, 0, 0, 0), L, 1.0 / pieces, pieces), whole) < 20 * pieces * EPS
 
 
 @given(st.tuples(*[st.floats(-30, 30)] * 3), st.sampled_from([0.003, 0.02, 0.5]))
@@ -136,9 +133,7 @@ def test_flow_keeps_unit_length_energy_and_reverses(angvel, h):
     assert energy == pytest.approx(start, rel=30 * EPS * parts, abs=1e-300)
     back = turn(BLOCK, q, L, -h)
     # Rounding of each part, amplified at most by exp(σ h) with σ below 0.5 |ω|.
-    assert ref.orientation_error(back, (1.0, 0, 0, 0)) < 30 * EPS * parts * np.exp(
-        0.5 * np.linalg.norm(angvel) * h
-    )
+    assert ref.orientation_error(back, (1.0, 0, 0, 0)) < 30 * EPS * parts * np.exp(0.5 * np.linalg.norm(angvel) * h)
 
 
 @pytest.mark.parametrize("axis", [0, 1, 2])

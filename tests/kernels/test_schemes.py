@@ -46,9 +46,7 @@ TUMBLE = {
 }
 
 vectors = st.tuples(*[st.floats(-10, 10)] * 3)
-unit_quaternions = (
-    st.tuples(*[st.floats(-1, 1)] * 4).filter(lambda q: math.hypot(*q) > 0.1).map(quaternion.normalise)
-)
+unit_quaternions = st.tuples(*[st.floats(-1, 1)] * 4).filter(lambda q: math.hypot(*q) > 0.1).map(quaternion.normalise)
 codes = st.sampled_from(list(SCHEMES))
 steps_sizes = st.floats(1e-4, 0.1)
 
@@ -134,9 +132,7 @@ def test_momenta_of_the_tumbling_block_are_exact(code):
 @given(x=vectors, v=vectors, force=vectors, g=vectors, h=steps_sizes, n=st.integers(0, 200))
 def test_free_flight_is_the_discrete_parabola(code, x, v, force, g, h, n):
     """x_n = x_0 + n h v_0 + c h² a with c = n (n - 1) / 2, n (n + 1) / 2 or n² / 2."""
-    c = {schemes.EXPLICIT_EULER: n * (n - 1) / 2, schemes.SEMI_IMPLICIT_EULER: n * (n + 1) / 2}.get(
-        code, n * n / 2
-    )
+    c = {schemes.EXPLICIT_EULER: n * (n - 1) / 2, schemes.SEMI_IMPLICIT_EULER: n * (n + 1) / 2}.get(code, n * n / 2)
     x_n, _, v_n, _ = schemes.integrate(code, x, START, v, ZERO, force, ZERO, g, 0.5, J, h, n)
     a = np.array(g) + 0.5 * np.array(force)
     # |a| ≤ 15, so |v| ≤ 10 + 15 n h ≤ 310 and |x| ≤ 10 + 310 n h; each of n steps rounds v and x by EPS,
@@ -262,9 +258,7 @@ def test_opposite_quaternions_are_the_same_body(code, q, L, torque, h):
 @settings(deadline=None, max_examples=60)
 @given(codes, unit_quaternions, vectors, vectors, steps_sizes)
 def test_what_has_no_inverse_mass_and_inertia_stays(code, q, force, torque, h):
-    x, q_n, v, _ = schemes.integrate(
-        code, (1.0, 2.0, 3.0), q, ZERO, ZERO, force, torque, ZERO, 0.0, ZERO, h, 5
-    )
+    x, q_n, v, _ = schemes.integrate(code, (1.0, 2.0, 3.0), q, ZERO, ZERO, force, torque, ZERO, 0.0, ZERO, h, 5)
     assert x == (1, 2, 3)
     assert v == ZERO
     # Normalisation rounds each part by 2.5 EPS a step at most.

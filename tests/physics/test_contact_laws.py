@@ -47,9 +47,7 @@ def test_hard_case_14_one_vertex_hits(e, accuracy):
     after = physics.diagnose(world)
     # Impulse and momenta add a handful of rounded terms of size 30.
     assert after.momentum[0, 0] == pytest.approx(6.0 * v + J * n, abs=1e-12)
-    assert after.angular_momentum[0, 0] == pytest.approx(
-        R @ INERTIA @ R.T @ w + np.cross(r, J * n), abs=1e-12
-    )
+    assert after.angular_momentum[0, 0] == pytest.approx(R @ INERTIA @ R.T @ w + np.cross(r, J * n), abs=1e-12)
 
 
 @given(
@@ -63,9 +61,7 @@ def test_frictional_impact_obeys_newton_coulomb_and_dissipates(q, v, w, e, mu):
     """Any pose and velocity: the impulse is in the cone, the vertex leaves at -e v_n, and with e = 0 energy falls."""
     quat = np.array(q) / np.linalg.norm(q)
     scene, r, R = on_lowest_vertex(tuple(quat), v, w, e, mu)
-    heights = np.sort(
-        (np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]) * HALF) @ R.T[:, 1]
-    )
+    heights = np.sort((np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]) * HALF) @ R.T[:, 1])
     if heights[1] - heights[0] < 1e-3:
         return  # an edge or a face, not a vertex
     approach = np.array(v)[1] + np.cross(w, r)[1]
@@ -138,9 +134,7 @@ def test_hard_case_16_sliding_stops_at_v2_over_2mug_in_any_heading(heading, mu, 
     assert world.step(steps=math.ceil(speed / (mu * scenes.GRAVITY) / 0.005) + 5).ok
     stop = world.pos[0, 0].copy()
     assert stop @ direction == pytest.approx(distance, rel=1e-3)
-    assert stop @ direction == pytest.approx(
-        distance, abs=mu * scenes.GRAVITY * 0.005**2 / 4 + 1e-5 * distance
-    )
+    assert stop @ direction == pytest.approx(distance, abs=mu * scenes.GRAVITY * 0.005**2 / 4 + 1e-5 * distance)
     assert abs(np.cross(stop, direction)[1]) < 1e-6 * distance
     world.step(steps=1000)
     assert np.array_equal(world.pos[0, 0], stop)
@@ -200,9 +194,7 @@ def test_hard_case_18_tips_on_an_incline_beyond_b_over_h(ratio):
     angle = math.atan(ratio * 1.5 / 2.5)  # standing upright on its 3 m wide face, 5 m tall: b/h = 1.5/2.5
     normal = np.array([math.sin(angle), math.cos(angle), 0.0])
     turn = math.pi / 2 - angle
-    body = physics.Block(
-        (5, 3, 2), 6.0, pos=tuple(2.5 * normal), quat=(math.cos(turn / 2), 0, 0, math.sin(turn / 2))
-    )
+    body = physics.Block((5, 3, 2), 6.0, pos=tuple(2.5 * normal), quat=(math.cos(turn / 2), 0, 0, math.sin(turn / 2)))
     scene = physics.Scene(
         [body],
         [physics.HalfSpace(tuple(normal))],

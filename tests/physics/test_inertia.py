@@ -113,9 +113,7 @@ def test_thin_walls_are_the_limit_of_thick_ones(radius, mass):
     inner = radius * (1 - 1e-12)
     thick, thin = inertia.hollow_sphere(radius, mass, inner), inertia.hollow_sphere(radius, mass)
     assert same(thick, thin, 2e-12)
-    assert same(
-        inertia.hollow_cylinder(radius, 1, mass, inner), inertia.hollow_cylinder(radius, 1, mass), 2e-12
-    )
+    assert same(inertia.hollow_cylinder(radius, 1, mass, inner), inertia.hollow_cylinder(radius, 1, mass), 2e-12)
 
 
 @settings(deadline=None)
@@ -140,9 +138,7 @@ def test_composition_of_placed_clouds_is_the_cloud_of_all(particles, pos, rotvec
     R = rotation(rotvec)
     first = point_cloud(positions, weights)
     joined = compose([first, first.placed(pos, R)])
-    everything = point_cloud(
-        np.vstack([positions, positions @ R.T + pos]), np.concatenate([weights, weights])
-    )
+    everything = point_cloud(np.vstack([positions, positions @ R.T + pos]), np.concatenate([weights, weights]))
     # Coordinates reach 40 m, so that tensors lose EPS of M (40 m)² per term, of 12 terms.
     assert np.abs(joined.centre - everything.centre).max() <= 60 * EPS * 40
     assert np.abs(joined.inertia - everything.inertia).max() <= 60 * EPS * joined.mass * 40**2

@@ -43,9 +43,7 @@ def test_the_state_vector_is_particle_by_particle_and_comes_apart_again(cloud):
 @given(clouds, vectors)
 def test_the_derivative_is_velocity_and_force_over_mass(cloud, field):
     positions, velocities, masses = cloud
-    rate = particles.derivative(
-        particles.pack(positions, velocities), particles.uniform_field(masses, field), masses
-    )
+    rate = particles.derivative(particles.pack(positions, velocities), particles.uniform_field(masses, field), masses)
     x_rate, v_rate = particles.unpack(rate)
     assert np.array_equal(x_rate, velocities)
     assert np.abs(v_rate - field).max() <= EPS * 10
@@ -104,9 +102,7 @@ def test_a_rigidly_moving_cloud_is_the_rigid_body(centre, linvel, angvel):
     assert np.abs(body.angular_momentum - tensor @ angvel).max() <= 60 * EPS * 13**2 * 17
     assert np.abs(body.angvel - angvel).max() <= 60 * EPS * 13**2 * 17 / 6.5
     energy = 3 * linvel @ linvel + angvel @ tensor @ angvel / 2
-    assert particles.kinetic_energy(BLOCK_MASSES, velocities) == pytest.approx(
-        energy, abs=60 * EPS * 6 * 60**2
-    )
+    assert particles.kinetic_energy(BLOCK_MASSES, velocities) == pytest.approx(energy, abs=60 * EPS * 6 * 60**2)
 
 
 def test_particles_on_one_line_have_no_angular_velocity():

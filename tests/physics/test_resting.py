@@ -33,9 +33,7 @@ def test_agrees_with_the_step_of_the_world():
     contact = resting_contact(world, wrench=load)
     world.step(load[None, None], steps=3)
     points, forces = world.contacts()
-    assert forces.sum(axis=0) == pytest.approx(
-        (contact.forces[:, None] * contact.normals).sum(axis=0), rel=1e-6
-    )
+    assert forces.sum(axis=0) == pytest.approx((contact.forces[:, None] * contact.normals).sum(axis=0), rel=1e-6)
     stepped = np.cross(points - world.pos[0, 0], forces).sum(axis=0)
     assert stepped == pytest.approx(-load[3:] * [1, 1, 1], abs=1e-4)
 

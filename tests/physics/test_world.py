@@ -36,9 +36,7 @@ def spread(world, names):
 def wrenches(names, steps):
     """(steps, worlds, 1, 6) wrenches that depend on the world's name only."""
     limits = 0.9 * 6 * 9.81 * np.array([1, 1, 1, 1.5, 1.5, 1.5])
-    return np.stack(
-        [np.random.default_rng(1000 + int(n)).uniform(-1, 1, (steps, 1, 6)) * limits for n in names], 1
-    )
+    return np.stack([np.random.default_rng(1000 + int(n)).uniform(-1, 1, (steps, 1, 6)) * limits for n in names], 1)
 
 
 def run(world, names, steps=60):
@@ -137,9 +135,7 @@ def test_parameters_may_differ_from_world_to_world():
     load[:, 0, 0] = 24.0
     free.step(load, steps=100)
     assert free.linvel[:, 0, 0] == pytest.approx([4.0, 2.0])
-    assert free.angvel[0] != pytest.approx(
-        free.angvel[1]
-    )  # twice the moments, same start: it still turns alike ...
+    assert free.angvel[0] != pytest.approx(free.angvel[1])  # twice the moments, same start: it still turns alike ...
     assert physics.diagnose(free).angular_momentum[1] == pytest.approx(
         2 * physics.diagnose(free).angular_momentum[0], rel=1e-12
     )

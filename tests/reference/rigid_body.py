@@ -95,9 +95,7 @@ def integrate_rigid_body(
         spin = quaternion_product(np.array([0, *omega]), q)
         return np.concatenate([P / mass, spin / 2, mass * gravity + force, torque])
 
-    solution = solve_ivp(
-        derivative, (0, duration), np.concatenate(state), method="DOP853", rtol=rtol, atol=1e-2 * rtol
-    )
+    solution = solve_ivp(derivative, (0, duration), np.concatenate(state), method="DOP853", rtol=rtol, atol=1e-2 * rtol)
     assert solution.success, solution.message
     Y = solution.y[:, -1]
     return RigidState(Y[:3], Y[3:7] / np.linalg.norm(Y[3:7]), Y[7:10], Y[10:])

@@ -1,0 +1,115 @@
+"""The history of a run: a window over its last episodes, and the learning curve with its CSV and picture."""
+
+from __future__ import annotations
+
+import csv
+import os
+from collections import deque
+from dataclasses import asdict, dataclass, field, fields
+from pathlib import Path
+
+WINDOW = 500  # finished episodes whose mean is shown, and held against the target
+
+
+@dataclass(frozen=True)
+class CurvePoint:
+    """A point of the learning curve.
+
+    Parameters
+    ----------
+    steps : int
+        Environment steps of all worlds together.
+    seconds : float
+        Of training, interruptions left out [s].
+    episodes : int
+        Finished so far.
+    success_rate, mean_return, mean_length : float
+        Over the last `WINDOW` episodes, as explored; nan before the first ends.
+    """
+
+    steps: int
+    seconds: float
+    episodes: int
+    success_rate: float
+    mean_return: float
+    mean_length: float
+
+
+@dataclass
+class History:
+    """What a run remembers of its episodes; part of every checkpoint.
+
+    Parameters
+    ----------
+    seconds : float
+        Of training so far [s].
+    episodes : int
+        Finished so far.
+    monitor_size : int
+        Bytes of the monitor file at the checkpoint.
+    next_confirmation : int
+        Number of finished episodes from which on the target may be confirmed.
+    confirmations : int
+        Made so far.
+    points : list of CurvePoint
+    window : deque of (success, return, length)
+    """
+
+    seconds: float = 0.0
+    episodes: int = 0
+    monitor_size: int = 0
+    next_confirmation: int = WINDOW
+    confirmations: int = 0
+    points: list[CurvePoint] = field(default_factory=list)
+    window: deque[tuple[bool, float, int]] = field(default_factory=lambda: deque(maxlen=WINDOW))
+
+    def add(self, success: bool, episode_return: float, length: int) -> None:
+        """Count a finished episode."""
+        self.episodes += 1
+        self.window.append((success, episode_return, length))
+
+    def point(self, steps: int) -> CurvePoint:
+        """Where the run stands now."""
+        columns = zip(*self.window) if self.window else ((float("nan"),),) * 3
+        means = [sum(column) / len(column) for column in columns]
+        return CurvePoint(steps, round(self.seconds, 3), self.episodes, *means)
+
+
+def write_curve(points: list[CurvePoint], path: Path) -> None:
+    """Write the learning curve as CSV; an older file is replaced at once."""
+    partial = path.with_suffix(".partial")
+    with partial.open("w", newline="", encoding="utf-8") as file:
+        writer = csv.DictWriter(file, [f.name for f in fields(CurvePoint)], lineterminator="\n")
+        writer.writeheader()
+        writer.writerows(asdict(point) for point in points)
+    os.replace(partial, path)
+
+
+def plot_curve(points: list[CurvePoint], target: float, title: str, path: Path) -> None:
+    """Draw success rate and mean return over steps and over time as PNG.
+
+    Parameters
+    ----------
+    points : list of CurvePoint
+    target : float
+        Success rate to draw a line at.
+    title : str
+    path : Path
+    """
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(9.0, 5.5), layout="constrained")
+    axes = figure.subplots(2, 2, sharex="col", sharey="row")
+    xs = [point.steps / 1e6 for point in points], [point.seconds for point in points]
+    for column, (x, label) in enumerate(zip(xs, ("million steps", "seconds"))):
+        axes[0, column].plot(x, [point.success_rate for point in points], color="tab:green")
+        axes[0, column].axhline(target, color="grey", linestyle="--", linewidth=1.0)
+        axes[1, column].plot(x, [point.mean_return for point in points], color="tab:blue")
+        axes[1, column].set_xlabel(label)
+    for axis in axes.flat:
+        axis.grid(alpha=0.3)
+    axes[0, 0].set_ylabel("success rate")
+    axes[0, 0].set_ylim(-0.02, 1.02)
+    axes[1, 0].set_ylabel("mean return")
+    figure.suptitle(f"{title}, mean of the last {WINDOW} episodes")
+    figure.savefig(path, dpi=110)

@@ -1,0 +1,135 @@
+"""What watches over training: counts episodes, draws the curve, writes checkpoints, stops at the target."""
+
+from __future__ import annotations
+
+import csv
+import json
+import time
+
+import numpy as np
+from stable_baselines3.common.callbacks import BaseCallback
+
+from agents.checkpoint import greedy, save_checkpoint
+from agents.config import RunConfig, RunFolder
+from agents.curve import WINDOW, History, write_curve
+from agents.evaluate import SEED_STRIDE, evaluation_seeds, run_episodes
+from agents.progress import ProgressDisplay
+
+POINT_EVERY = 0.5  # between two points of the curve [s]
+CHECKPOINT_EVERY = 10.0  # of training; what an interruption costs at most [s]
+
+CONFIRMATION_EPISODES = 300  # of the deterministic policy on fresh seeds, before training may end
+CONFIRMATION_PAUSE = 2000  # episodes of training after a confirmation that failed
+CONFIRMATION_SEEDS = SEED_STRIDE // 2  # apart from those of the final evaluation
+
+
+class Supervisor(BaseCallback):
+    """Callback of a run.
+
+    The target is reached when the success rate of the last `WINDOW` episodes of training is at least the
+    target, and that of `CONFIRMATION_EPISODES` episodes of the deterministic policy is, too.
+
+    Parameters
+    ----------
+    config : RunConfig
+    run : RunFolder
+    history : History
+        Continued.
+    display : ProgressDisplay
+
+    Attributes
+    ----------
+    is_target_reached : bool
+    """
+
+    def __init__(self, config: RunConfig, run: RunFolder, history: History, display: ProgressDisplay):
+        super().__init__()
+        self.config, self.run_folder, self.history, self.display = config, run, history, display
+        self.is_target_reached = False
+        self._last_point = self._last_checkpoint = float("-inf")
+
+    # --- calls of Stable-Baselines3 -----------------------------------------------------------------------
+
+    def _on_training_start(self) -> None:
+        self._open_monitor()
+        self._start = time.perf_counter() - self.history.seconds
+
+    def _on_rollout_start(self) -> None:
+        """Between two updates: the only moment at which all of the run is in a state to be kept."""
+        self.history.seconds = time.perf_counter() - self._start
+        if self.history.seconds - self._last_point >= POINT_EVERY:
+            self._add_point()
+        self.is_target_reached = self._is_confirmed()
+        if self.is_target_reached or self.history.seconds - self._last_checkpoint >= CHECKPOINT_EVERY:
+            self._checkpoint()
+
+    def _on_step(self) -> bool:
+        if self.is_target_reached:
+            return False
+        for world in np.flatnonzero(self.locals["dones"]):
+            info = self.locals["infos"][world]
+            episode = info["episode"]
+            self.history.add(info["is_success"], episode["r"], episode["l"])
+            seconds = round(time.perf_counter() - self._start, 3)
+            self._rows.writerow((episode["r"], episode["l"], seconds, int(info["is_success"])))
+        return True
+
+    def _on_training_end(self) -> None:
+        if not self.is_target_reached:
+            self.history.seconds = time.perf_counter() - self._start
+            self._add_point()
+            self._checkpoint()
+        self._monitor.close()
+
+    # --- parts of these -----------------------------------------------------------------------------------
+
+    def _add_point(self) -> None:
+        point = self.history.point(self.num_timesteps)
+        self.history.points.append(point)
+        self.display.update(point)
+        self._last_point = self.history.seconds
+
+    def _is_confirmed(self) -> bool:
+        """Whether the target is reached, by the last episodes and then by an evaluation."""
+        history = self.history
+        if len(history.window) < WINDOW or history.episodes < history.next_confirmation:
+            return False
+        if history.point(self.num_timesteps).success_rate < self.config.target:
+            return False
+        seeds = evaluation_seeds(self.config.seed, SEED_STRIDE)[CONFIRMATION_SEEDS:]
+        first = CONFIRMATION_EPISODES * history.confirmations
+        episodes = run_episodes(
+            self.config.env,
+            greedy(self.model),
+            seeds[first : first + CONFIRMATION_EPISODES],
+            threads=self.config.threads,
+            **self.config.evaluation_arguments,
+        )
+        rate = episodes.success.mean()
+        history.confirmations += 1
+        history.next_confirmation = history.episodes + CONFIRMATION_PAUSE
+        history.seconds = time.perf_counter() - self._start
+        self.display.say(
+            f"{history.seconds:6.1f} s  {rate:.1%} of {CONFIRMATION_EPISODES} fresh episodes succeed without "
+            f"exploration, the target is {self.config.target:.1%}"
+        )
+        return bool(rate >= self.config.target)
+
+    def _checkpoint(self) -> None:
+        self._monitor.flush()
+        self.history.monitor_size = self._monitor.tell()
+        save_checkpoint(self.run_folder.checkpoints, self.model, self.history)
+        write_curve(self.history.points, self.run_folder.curve)
+        self._last_checkpoint = self.history.seconds
+
+    def _open_monitor(self) -> None:
+        """Open the monitor file, in the format of SB3's `Monitor`; resuming cuts it at the checkpoint."""
+        is_new = self.history.monitor_size == 0
+        self._monitor = self.run_folder.monitor.open("w" if is_new else "r+", newline="", encoding="utf-8")
+        self._rows = csv.writer(self._monitor, lineterminator="\n")
+        if is_new:
+            self._monitor.write("#" + json.dumps({"t_start": 0.0, "env_id": self.config.env}) + "\n")
+            self._rows.writerow(("r", "l", "t", "is_success"))
+        else:
+            self._monitor.seek(self.history.monitor_size)
+            self._monitor.truncate()

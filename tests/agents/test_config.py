@@ -1,0 +1,85 @@
+"""Hyperparameters against the signatures they go to, and what configurations refuse."""
+
+from __future__ import annotations
+
+import inspect
+
+import gymnasium as gym
+import pytest
+import yaml
+from stable_baselines3.common.policies import ActorCriticPolicy
+from stable_baselines3.sac.policies import SACPolicy
+
+import physics
+from agents.algorithms import CLASSES, algorithm_arguments
+from agents.config import ALGORITHMS, HYPERPARAMETERS, RunFolder, change, make_config
+
+TABLE = yaml.safe_load(HYPERPARAMETERS.read_text(encoding="utf-8"))
+ENTRIES = [(env, algo) for env, entry in TABLE.items() for algo in entry]
+POLICIES = {"ppo": ActorCriticPolicy, "sac": SACPolicy}
+OURS = {"policy", "env", "seed", "device"}  # set by make_model
+
+
+def test_every_environment_has_every_algorithm():
+    assert set(ENTRIES) == {
+        (f"rigid_env/{name}-v0", algo) for name in ("BlockReach", "BlockReorient") for algo in ALGORITHMS
+    }
+
+
+@pytest.mark.parametrize(("env", "algo"), ENTRIES)
+def test_every_key_is_accepted(env, algo):
+    config = make_config(env, algo, seed=0)
+    assert env in gym.registry
+    physics.Accuracy(**config.accuracy)
+    allowed = set(inspect.signature(CLASSES[algo].__init__).parameters) - {"self"} - OURS
+    assert set(config.algorithm) <= allowed
+    policy_arguments = algorithm_arguments(config)["policy_kwargs"]
+    assert set(policy_arguments) <= set(inspect.signature(POLICIES[algo].__init__).parameters)
+    assert inspect.isclass(policy_arguments["activation_fn"])
+
+
+def test_minibatches_divide_the_rollout():
+    for env, entry in TABLE.items():
+        config = make_config(env, "ppo", seed=0)
+        assert config.num_envs * entry["ppo"]["algorithm"]["n_steps"] % config.algorithm["batch_size"] == 0
+
+
+def test_file_brings_back_what_was_written(tmp_path):
+    config = make_config("rigid_env/BlockReach-v0", "ppo", seed=7, target=0.5, num_envs=None)
+    config.write(tmp_path / "config.yaml")
+    assert RunFolder(tmp_path).read_config() == config
+    assert (config.seed, config.target, config.num_envs) == (7, 0.5, TABLE[config.env]["ppo"]["num_envs"])
+
+
+def test_module_before_the_id_is_left_out():
+    assert make_config("rigid_env:rigid_env/BlockReach-v0", "ppo", 0).env == "rigid_env/BlockReach-v0"
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [{"algo": "dqn"}, {"num_envs": 0}, {"max_steps": 1.5}, {"threads": True}, {"seed": -1}, {"target": 0.0}],
+    ids=lambda changes: next(iter(changes)),
+)
+def test_wrong_values_are_named(changes):
+    (name, value), *_ = changes.items()
+    config = make_config("rigid_env/BlockReach-v0", "ppo", seed=0)
+    with pytest.raises(ValueError, match=f"{name} is {value!r}; allowed"):
+        change(config, **changes)
+
+
+def test_unknown_entries_are_named(tmp_path):
+    with pytest.raises(ValueError, match=r"env is 'CartPole-v1'; allowed are .*BlockReach"):
+        make_config("CartPole-v1", "ppo", 0)
+    path = tmp_path / "mine.yml"
+    path.write_text("E:\n  ppo: {num_env: 3}\n", encoding="utf-8")
+    with pytest.raises(ValueError, match="unknown keys num_env"):
+        make_config("E", "ppo", 0, path)
+    with pytest.raises(ValueError, match="algo is 'sac'; allowed with E are ppo"):
+        make_config("E", "sac", 0, path)
+
+
+def test_unknown_activation_is_named():
+    config = make_config("rigid_env/BlockReach-v0", "ppo", seed=0)
+    config = change(config, algorithm={"policy_kwargs": {"activation_fn": "Rellu"}})
+    with pytest.raises(ValueError, match="activation_fn is 'Rellu'"):
+        algorithm_arguments(config)
