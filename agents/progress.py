@@ -11,6 +11,7 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 from agents.curve import CurvePoint
 
 LINE_EVERY = 10.0  # between two lines where there is no terminal [s]
+BAR_WIDTH = 12  # of steps over their limit; all of the line goes into 80 columns
 RATE_OVER = 5.0  # time over which the speed is averaged [s]
 
 
@@ -28,8 +29,7 @@ class ProgressDisplay:
         self._max_steps = max_steps
         self._bar = Progress(
             TextColumn("{task.fields[numbers]}"),
-            BarColumn(bar_width=None),
-            TextColumn("{task.percentage:3.0f} % of the limit"),
+            BarColumn(bar_width=BAR_WIDTH),
             TimeElapsedColumn(),
             console=console,
             disable=not console.is_terminal,
@@ -53,7 +53,8 @@ class ProgressDisplay:
         rate = "   ..." if math.isnan(self._rate) else f"{self._rate:6,.0f}"
         success = "  ..." if math.isnan(point.success_rate) else f"{point.success_rate:5.1%}"
         mean_return = "  ..." if math.isnan(point.mean_return) else f"{point.mean_return:6.2f}"
-        numbers = f"success {success}  return {mean_return}  {point.steps:,} steps  {rate} steps/s"
+        steps = f"{point.steps / 1e6:5.2f} M steps"
+        numbers = f"success {success}  return {mean_return}  {steps}  {rate} steps/s"
         self._bar.update(self._task, completed=min(point.steps, self._max_steps), numbers=numbers)
         if not self.console.is_terminal and now - self._last_line >= LINE_EVERY:
             self._last_line = now

@@ -18,7 +18,7 @@ from agents.progress import ProgressDisplay
 POINT_EVERY = 0.5  # between two points of the curve [s]
 CHECKPOINT_EVERY = 10.0  # of training; what an interruption costs at most [s]
 
-CONFIRMATION_EPISODES = 300  # of the deterministic policy on fresh seeds, before training may end
+CONFIRMATION_EPISODES = 500  # of the deterministic policy on fresh seeds, before training may end
 CONFIRMATION_PAUSE = 2000  # episodes of training after a confirmation that failed
 CONFIRMATION_SEEDS = SEED_STRIDE // 2  # apart from those of the final evaluation
 

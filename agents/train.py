@@ -23,7 +23,7 @@ from rich.console import Console
 from stable_baselines3.common.logger import configure
 
 from agents.algorithms import make_model, make_training_env
-from agents.checkpoint import greedy, load_checkpoint
+from agents.checkpoint import greedy, list_checkpoints, load_checkpoint
 from agents.config import HYPERPARAMETERS, RunConfig, RunFolder, change, make_config
 from agents.curve import History, plot_curve, write_curve
 from agents.evaluate import JsonOption, evaluate, evaluation_seeds, print_evaluation, write_json
@@ -31,6 +31,7 @@ from agents.progress import ProgressDisplay
 from agents.record import record
 from agents.supervisor import Supervisor
 
+DEFAULTS = {"env": "rigid_env/BlockReach-v0", "algo": "ppo", "seed": 0}
 EVALUATION_EPISODES = 1000
 VIDEO_EPISODES = 3
 INTERRUPTED = 130  # exit status of a program ended by Ctrl-C
@@ -95,10 +96,7 @@ def train(
                 reset_num_timesteps=not is_resumed,
             )
         except KeyboardInterrupt as interrupt:
-            raise Interrupted(
-                f"Interrupted at step {model.num_timesteps:,}. The last checkpoint is kept; go on with\n"
-                f"python -m agents.train --resume {run.path}"
-            ) from interrupt
+            raise Interrupted(interruption_message(run, model.num_timesteps)) from interrupt
         finally:
             write_curve(history.points, run.curve)
             title = f"{config.env}, {config.algo}, seed {config.seed}"
@@ -107,13 +105,49 @@ def train(
     last = history.points[-1]
     return {
         "steps": last.steps,
-        "training_seconds": last.seconds,
-        "steps_per_second": round((last.steps - first_step) / max(last.seconds - first_second, 1e-9)),
+        "training_seconds": round(history.seconds, 3),
+        "steps_per_second": round((last.steps - first_step) / (history.seconds - first_second)),
         "is_target_reached": supervisor.is_target_reached,
         "training_success_rate": last.success_rate,
         "training_return_mean": last.mean_return,
         "policy": greedy(model),
     }
+
+
+def interruption_message(run: RunFolder, step: int) -> str:
+    """What is left of an interrupted run, and how to go on."""
+    kept = list_checkpoints(run.checkpoints)
+    if not kept:
+        return f"Interrupted before the first checkpoint; {run.path} holds nothing to go on from."
+    return (
+        f"Interrupted at step {step:,}. The checkpoint of step {int(kept[-1].name):,} is kept; go on with\n"
+        f"python -m agents.train --resume {run.path}"
+    )
+
+
+def choose_config(resume: Path | None, hyperparameters: Path, fixed: dict[str, Any]) -> RunConfig:
+    """The configuration of a new run, or of the one to go on with.
+
+    Parameters
+    ----------
+    resume : Path or None
+        Folder of the run to go on with.
+    hyperparameters : Path
+    fixed : dict
+        ``env``, ``algo``, ``seed``, ``num_envs``, ``accuracy``: None where nothing else than the default is
+        wanted.
+
+    Raises
+    ------
+    ValueError
+        On values out of range, and where a run is to go on as another one.
+    """
+    given = {name: value for name, value in fixed.items() if value is not None}
+    if resume is None:
+        return make_config(path=hyperparameters, **{**DEFAULTS, **given})
+    if given:
+        raise ValueError(f"{next(iter(given))} cannot change with --resume; allowed are target, max_steps, threads")
+    return RunFolder(resume).read_config()
 
 
 def finish(config: RunConfig, run: RunFolder, policy, with_video: bool, console: Console) -> dict[str, Any]:
@@ -146,9 +180,9 @@ def new_folder(out: Path, config: RunConfig) -> RunFolder:
 
 
 def main(
-    env: Annotated[str, typer.Option(help="Gymnasium id.")] = "rigid_env/BlockReach-v0",
-    algo: Annotated[str, typer.Option(help="ppo or sac.")] = "ppo",
-    seed: Annotated[int, typer.Option(help="Of weights, exploration and environments.")] = 0,
+    env: Annotated[str | None, typer.Option(help="Gymnasium id.", show_default=DEFAULTS["env"])] = None,
+    algo: Annotated[str | None, typer.Option(help="ppo or sac.", show_default=DEFAULTS["algo"])] = None,
+    seed: Annotated[int | None, typer.Option(help="Of all that is random.", show_default="0")] = None,
     num_envs: Annotated[int | None, typer.Option(help="Worlds trained on at once.")] = None,
     accuracy: Annotated[str | None, typer.Option(help="Preset of the engine in training.")] = None,
     target: Annotated[float | None, typer.Option(help="Success rate to stop at, 0 to 1.")] = None,
@@ -164,15 +198,12 @@ def main(
     """Train an agent until it reaches the target, evaluate it, and record a video.
 
     What is not given comes from the hyperparameters of the environment and the algorithm. With --resume,
-    only --target, --max-steps and --threads can be changed.
+    only target, limit and threads can be changed.
     """
     start, console = time.perf_counter(), Console()
     try:
-        if resume is None:
-            changes = {"num_envs": num_envs, "accuracy": accuracy}
-            config = make_config(env, algo, seed, hyperparameters, **changes)
-        else:
-            config = RunFolder(resume).read_config()
+        fixed = {"env": env, "algo": algo, "seed": seed, "num_envs": num_envs, "accuracy": accuracy}
+        config = choose_config(resume, hyperparameters, fixed)
         config = change(config, target=target, max_steps=max_steps, threads=threads)
         run = new_folder(out, config) if resume is None else RunFolder(resume)
         console.print(f"run         {run.path}", soft_wrap=True, highlight=False)

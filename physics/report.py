@@ -94,7 +94,7 @@ class StepReport:
     @property
     def ok(self) -> bool:
         """Whether every world's contact problems met their tolerance and every state stayed finite."""
-        return not (self._table[:, at.UNCONVERGED].any() or self._table[:, at.FAULTS].any())
+        return not self._table[:, at.UNCONVERGED : at.FAULTS + 1].any()
 
     def messages(self) -> dict[int, str]:
         """World index -> message, for the worlds whose status is not OK."""

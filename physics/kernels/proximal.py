@@ -5,21 +5,20 @@ as slowly as one likes, and four contacts of a face leave the impulses undetermi
 body's twist is determined, and has six components however many contacts there are. For impulses q near the
 solution let
 
-    p(x) = law(q - ρ u(x)),    u(x) = J x + b,    law: p_n <- max(0, p_n), p_t <- its projection on |p_t| <= μ
-    p_n,
+    p(x) = law(q - ρ u(x)),    u(x) = J x + b,
 
-per contact, with ρ a large multiple of the contact's mass. Then x = M⁻¹ Jᵀ p(x) is a nonlinear system for the
-twist alone, x at most a few pieces away from linear; its Newton matrix 1 - M⁻¹ Jᵀ p'(u) J is never singular
-for want of determined impulses. Setting q = p(x) and starting again converges to the contact law itself, by
-about the factor 1/(1 + ρ W) each time: with ρ = 10⁴/W a few rounds do.
+where the law takes max(0, p_n) and then projects p_t on the disk |p_t| <= μ p_n, contact by contact, with ρ a
+large multiple of the contact's mass. Then x = M⁻¹ Jᵀ p(x) is a nonlinear system for the twist alone, at most a
+few pieces away from linear; its Newton matrix 1 - M⁻¹ Jᵀ p'(u) J is never singular for want of determined
+impulses. Setting q = p(x) and starting again converges to the contact law itself, by about the factor
+1/(1 + ρ W) each time, so that a few rounds of growing ρ do.
 
 References
 ----------
 .. [1] R. T. Rockafellar, *Monotone operators and the proximal point algorithm*, SIAM J. Control Optim. 14,
-1976.
+   1976.
 .. [2] P. Alart, A. Curnier, *A mixed formulation for frictional contact problems prone to Newton like
-solution
-   methods*, Comput. Methods Appl. Mech. Eng. 92, 1991 (`law` and its derivative).
+   solution methods*, Comput. Methods Appl. Mech. Eng. 92, 1991 (`law` and its derivative).
 """
 
 from __future__ import annotations
@@ -29,19 +28,25 @@ import math
 from physics.kernels.compiler import inlined, kernel
 from physics.kernels.sweeps import NORMAL_STEP, cone_residual, velocities
 
-# ρ in units of a contact's normal mass 1/W_nn. Larger: fewer rounds, and Newton steps that overshoot more
-# often.
-PROXIMAL_FACTOR = 1.0e4
+# ρ in units of a contact's normal mass 1/W_nn: of the first round, its growth from round to round, and the
+# largest, where rounding times ρ is still below what is asked for. Large: fewer rounds, Newton steps that
+# overshoot more often.
+PROXIMAL_FACTOR = 1.0e3
+FACTOR_GROWTH = 10.0
+FACTOR_LIMIT = 1.0e6
+
+# Rounds; Newton steps of a round, halvings of a step, and steps that did not make the defect smaller, at most.
 ROUNDS = 12
-NEWTON_STEPS = 40
+NEWTON_STEPS = 20
 HALVINGS = 6
+FAILURES = 5
 
 # A round is solved to this share of the residual that is asked for.
 ROUND_SHARE = 0.01
 
 
 @inlined
-def _defect(n, inv_mass, work):
+def _defect(n, factor, inv_mass, work):
     """x - M⁻¹ Jᵀ p(x) into `work.defect`, p(x) into `work.trial`; its size as a velocity [m/s].
 
     `work.velocity` receives q - ρ u, which the derivative of the law is taken at.
@@ -52,7 +57,7 @@ def _defect(n, inv_mass, work):
         g[c] = x[c]
     for i in range(n):
         r = 3 * i
-        rho = PROXIMAL_FACTOR * work.local[i, NORMAL_STEP]
+        rho = factor * work.local[i, NORMAL_STEP]
         for s in range(r, r + 3):
             u = work.bias[s] + (
                 (frame[s, 0] * x[0] + frame[s, 1] * x[1] + frame[s, 2] * x[2])
@@ -77,7 +82,7 @@ def _row(s, c, work):
 
 
 @inlined
-def _fill_matrix(n, inv_mass, work):
+def _fill_matrix(n, factor, inv_mass, work):
     """Newton matrix 1 - M⁻¹ Jᵀ p'(u) J at the point of the last `_defect`, and -defect beside it (6 x 7)."""
     A, y, frame, response = work.newton, work.velocity, work.frame, work.response
     for a in range(6):
@@ -89,7 +94,7 @@ def _fill_matrix(n, inv_mass, work):
         r = 3 * i
         if not y[r] > 0.0:
             continue
-        rho = PROXIMAL_FACTOR * work.local[i, NORMAL_STEP]
+        rho = factor * work.local[i, NORMAL_STEP]
         size, limit = math.sqrt(y[r + 1] * y[r + 1] + y[r + 2] * y[r + 2]), work.mu * y[r]
         da = db = 0.0
         k11 = k22 = 1.0
@@ -132,10 +137,10 @@ def _eliminate(A):
 
 
 @inlined
-def _newton_step(n, size, inv_mass, work):
+def _newton_step(n, size, factor, inv_mass, work):
     """One damped Newton step on the twist; the new size of the defect."""
     x, start, step = work.twist, work.start, work.newton
-    _fill_matrix(n, inv_mass, work)
+    _fill_matrix(n, factor, inv_mass, work)
     _eliminate(work.newton)
     for c in range(6):
         start[c] = x[c]
@@ -144,7 +149,7 @@ def _newton_step(n, size, inv_mass, work):
     for _ in range(HALVINGS):
         for c in range(6):
             x[c] = start[c] + t * step[c, 6]
-        after = _defect(n, inv_mass, work)
+        after = _defect(n, factor, inv_mass, work)
         if after < size:
             break
         t *= 0.5
@@ -186,18 +191,22 @@ def proximal_newton(n, residual, goal, work):
     rows = 3 * n
     inv_mass = 1.0 / work.mass
     steps = 0
+    factor = PROXIMAL_FACTOR
     for s in range(rows):
         work.saved[s] = p[s]
     for _ in range(ROUNDS):
         _twist_of_impulses(n, inv_mass, work)
-        size = _defect(n, inv_mass, work)
+        size = _defect(n, factor, inv_mass, work)
+        failures = 0
         for _ in range(NEWTON_STEPS):
             if not size > ROUND_SHARE * goal:
                 break
-            after = _newton_step(n, size, inv_mass, work)
+            after = _newton_step(n, size, factor, inv_mass, work)
             steps += 1
             if not after < size:
-                break
+                failures += 1
+                if failures > FAILURES:
+                    break
             size = after
         for s in range(rows):
             p[s] = work.trial[s]
@@ -209,6 +218,7 @@ def proximal_newton(n, residual, goal, work):
                 work.saved[s] = p[s]
         if residual <= goal:
             break
+        factor = min(FACTOR_GROWTH * factor, FACTOR_LIMIT)
     for s in range(rows):
         p[s] = work.saved[s]
     velocities(rows, W, p, work.bias, u)

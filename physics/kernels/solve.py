@@ -30,8 +30,8 @@ PIVOTING = 3
 # is.
 PIVOT_ABOVE = 0.01
 
-# Sweeps before Newton's method takes over: most problems that are left for sweeps need fewer than ten.
-FIRST_SWEEPS = 24
+# Sweeps before Newton's method has a turn: most problems that are left for sweeps need fewer than ten.
+SWEEPS_AT_ONCE = 24
 
 # What to try first.
 HOLD = 0
@@ -108,7 +108,7 @@ def _assemble(n, width, R, v, L, work):
 
 @kernel
 def _iterate(n, friction, smooth, goal, work):
-    """Sweeps; with friction also Newton's method where a few do not do: (sweeps and steps, residual [m/s])."""
+    """Sweeps, with friction in turn with Newton's method: (sweeps and steps, residual [m/s])."""
     steps, residual = 0, 0.0
     if smooth is not None:
         steps, residual = normal_sweeps(n, goal, work.sweeps, work)
@@ -116,17 +116,17 @@ def _iterate(n, friction, smooth, goal, work):
         factor_blocks(n, work)
         for i in range(n):
             work.friction[i] = work.mu
-        limit = min(work.sweeps, FIRST_SWEEPS)
-        for attempt in range(2):
-            sweeps, residual = cone_sweeps(n, work.friction, goal, limit, work)
+        left = work.sweeps
+        while True:
+            sweeps, residual = cone_sweeps(n, work.friction, goal, min(left, SWEEPS_AT_ONCE), work)
             steps += sweeps
-            if residual <= goal or attempt > 0 or limit == work.sweeps:
+            left -= sweeps
+            if residual <= goal or left <= 0:
                 break
-            sweeps, residual = proximal_newton(n, residual, goal, work)
-            steps += sweeps
+            newtons, residual = proximal_newton(n, residual, goal, work)
+            steps += newtons
             if residual <= goal:
                 break
-            limit = work.sweeps - limit
     return steps, residual
 
 
@@ -135,7 +135,7 @@ def solve_contacts(n, friction, smooth, pivots, v, L, R, work):
     """Contact impulses that bring the contacts of `work` to their target velocities as far as they can.
 
     Tried in this order: all hold and all slide, directly, the one first that worked for this body before;
-    sweeps; pivoting. The first whose residual is within the tolerance gives the result.
+    sweeps in turn with Newton's method; pivoting. The first whose residual is within the tolerance gives the result.
 
     Parameters
     ----------

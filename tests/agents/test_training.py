@@ -123,12 +123,12 @@ def test_finished_run_asks_for_more_steps(tiny, tmp_path):
 
 @pytest.mark.train
 def test_learns_to_reach_in_a_narrow_box(tmp_path):
-    config = make_config("rigid_env/BlockReach-v0", "ppo", seed=0, target=0.8, max_steps=1_500_000, num_envs=128)
-    algorithm = {**config.algorithm, "batch_size": 1024}
+    config = make_config("rigid_env/BlockReach-v0", "ppo", seed=0, target=0.7, max_steps=1_500_000, num_envs=128)
+    algorithm = {**config.algorithm, "batch_size": 512}
     config = change(config, env_kwargs={"half_width": 4.0}, algorithm=algorithm, threads=1)
     run = RunFolder(tmp_path / "run")
     result = train(config, run, console=QUIET)
     assert result["is_target_reached"]
     assert result["training_success_rate"] >= config.target
     fresh = run_episodes(config.env, result["policy"], range(200), **config.evaluation_arguments)
-    assert fresh.success.mean() >= 0.7  # confirmed at 0.8 of 300: six standard errors of 200 below
+    assert fresh.success.mean() >= 0.5  # confirmed at 0.7 of 500; six standard errors of 200 below

@@ -1,0 +1,67 @@
+"""One contact problem of a block, in a workspace and as the dense matrices of the reference."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from physics.kernels.quaternion import to_matrix
+from physics.kernels.solve import solve_contacts
+from physics.kernels.workspace import make_workspace
+
+SIZE = np.array([2.5, 1.5, 1.0])
+MASS = 6.0
+INERTIA = MASS / 3.0 * np.array([SIZE[1] ** 2 + SIZE[2] ** 2, SIZE[0] ** 2 + SIZE[2] ** 2, SIZE[0] ** 2 + SIZE[1] ** 2])
+FLOOR = np.array([0, 1, 0, 0, 0, 1, 1, 0, 0, 0.0])  # normal y, tangents z and x, offset
+SIDE = np.array([1, 0, 0, 0, 1, 0, 0, 0, 1, 0.0])
+FACE = (0, 1, 4, 5)  # vertices with y < 0
+
+
+class Problem:
+    """Vertices of a block on walls, with a free motion and target velocities."""
+
+    def __init__(self, contacts, v, w, mu, quat=(1, 0, 0, 0), target=None, tolerance=1e-10, mass=MASS, length=1.0):
+        self.work = make_workspace(np.array([FLOOR, SIDE]), 8, tolerance=tolerance, sweeps=2000)
+        self.one = one = self.work[0]
+        self.n = n = len(contacts)
+        self.quat = tuple(float(c) for c in np.array(quat) / np.linalg.norm(quat))
+        self.R = tuple(float(c) for c in to_matrix(self.quat))
+        R = np.array(self.R).reshape(3, 3)
+        inertia = INERTIA * (mass / MASS) * length**2
+        one["mass"], one["J"], one["mu"] = mass, 1.0 / inertia, mu
+        one["radius"] = length * np.linalg.norm(SIZE)
+        signs = np.array([[1 if k >> c & 1 else -1 for c in range(3)] for k in range(8)])
+        for i, (wall, vertex) in enumerate(contacts):
+            one["slot"][i] = 8 * wall + vertex
+            one["arm"][i] = R @ (length * SIZE * signs[vertex])
+        if target is not None:
+            one["target"][:n] = target
+        self.v = tuple(float(c) for c in v)
+        self.inertia = R @ np.diag(inertia) @ R.T
+        self.L = tuple(float(c) for c in self.inertia @ np.array(w, float))
+        self.mass = mass
+        self.mu = np.full(n, float(mu))
+
+    def matrices(self):
+        """(W, b) of u = W p + b in plain NumPy."""
+        rows, n = [], self.n
+        for i in range(n):
+            wall = self.one["walls"][self.one["slot"][i] // 8]
+            for axis in wall[:9].reshape(3, 3):
+                rows.append(np.concatenate([axis, np.cross(self.one["arm"][i], axis)]))
+        J = np.array(rows)
+        inverse = np.zeros((6, 6))
+        inverse[:3, :3] = np.eye(3) / self.mass
+        inverse[3:, 3:] = np.linalg.inv(self.inertia)
+        twist = np.concatenate([self.v, inverse[3:, 3:] @ np.array(self.L)])
+        return J @ inverse @ J.T, J @ twist - self.one["target"][:n].ravel()
+
+    def solve(self, mode=0, friction=True, warm=None):
+        """Impulses (n, 3), and what `solve_contacts` returns."""
+        self.one["mode"] = mode
+        self.one["impulse"] = 0.0
+        if warm is not None:
+            self.one["impulse"][: 3 * self.n] = np.ravel(warm)
+        on, off = (True, None) if friction else (None, True)
+        result = solve_contacts(self.n, on, off, True, self.v, self.L, self.R, self.one)
+        width = 3 if friction else 1
+        return np.array(self.one["impulse"][: width * self.n]).reshape(self.n, width), result
