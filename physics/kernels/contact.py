@@ -167,17 +167,19 @@ def aim_impact(n, bounce_speed, slop_speed, rate, work):
     """Targets of an impact, and whether there is one.
 
     A contact that approaches faster than `bounce_speed` leaves with e times that speed (Newton's law); one that
-    approaches slower is brought to rest, since its rebound would be over within the step. Approach slower than
-    `slop_speed` closes less than the slop within the step and is left to the resting stage.
+    approaches slower is brought to rest, since its rebound would be over within the step, and if it also is slower
+    than `slop_speed` plus its gap times `rate` (1/h) it closes less than the slop within the step and is left to
+    the resting stage.
     """
     is_impact = False
     for i in range(n):
         s = -work.speed[i]
         goal = 0.0
-        if s > slop_speed + max(work.gap[i], 0.0) * rate:
+        is_bounce = work.restitution > 0.0 and s > bounce_speed
+        if is_bounce:
+            goal = work.restitution * s
+        if is_bounce or s > slop_speed + max(work.gap[i], 0.0) * rate:
             is_impact = True
-            if s > bounce_speed:
-                goal = work.restitution * s
         work.target[i, 0] = goal
         work.target[i, 1] = 0.0
         work.target[i, 2] = 0.0

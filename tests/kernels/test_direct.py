@@ -200,3 +200,13 @@ def test_without_friction_a_wall_takes_normal_impulses_only():
     np.testing.assert_allclose(q[:, 0], p[:, 0], rtol=1e-13, atol=1e-13)
     np.testing.assert_allclose([*v, *L], [*v2, *L2], rtol=1e-13, atol=1e-13)
     assert not p[:, 1:].any()
+
+
+@settings(max_examples=200, deadline=None)
+@given(subset, slow, slow, st.lists(slow, min_size=4, max_size=4), st.sampled_from([HOLD, SLIDE]))
+def test_any_targets_are_met(vertices, v, w, targets, mode):
+    """Target velocities that are those of no rigid motion, normal and tangential."""
+    goal = 0.1 * np.array(targets[: len(vertices)])
+    problem = Problem(floor(vertices), (v[0], v[1] + FALL, v[2]), w, 0.5, target=goal)
+    if np.abs(problem.matrices()[1]).max() > 1e-3:
+        assert_solved(problem, *problem.solve(mode))

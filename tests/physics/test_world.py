@@ -135,7 +135,6 @@ def test_parameters_may_differ_from_world_to_world():
     load[:, 0, 0] = 24.0
     free.step(load, steps=100)
     assert free.linvel[:, 0, 0] == pytest.approx([4.0, 2.0])
-    assert free.angvel[0] != pytest.approx(free.angvel[1])  # twice the moments, same start: it still turns alike ...
     assert physics.diagnose(free).angular_momentum[1] == pytest.approx(
         2 * physics.diagnose(free).angular_momentum[0], rel=1e-12
     )
