@@ -57,9 +57,9 @@ class Supervisor(BaseCallback):
     def _on_rollout_start(self) -> None:
         """Between two updates: the only moment at which all of the run is in a state to be kept."""
         self.history.seconds = time.perf_counter() - self._start
-        if self.history.seconds - self._last_point >= POINT_EVERY:
-            self._add_point()
         self.is_target_reached = self._is_confirmed()
+        if self.is_target_reached or self.history.seconds - self._last_point >= POINT_EVERY:
+            self._add_point()
         if self.is_target_reached or self.history.seconds - self._last_checkpoint >= CHECKPOINT_EVERY:
             self._checkpoint()
 
