@@ -32,8 +32,9 @@ class Accuracy:
         ``midpoint``, ``rk4``. While a body touches a wall Moreau's midpoint step is used whatever the scheme.
     solver : str
         ``sweeps+pivoting``: contact problems are solved directly where all contacts hold or slide, else by
-        sweeps over the exact friction cones, and by Lemke (Dantzig without friction) where those do not reach
-        the tolerance. ``sweeps``: without that last resort.
+        sweeps over the exact friction cones and Newton's method, and by Lemke (Dantzig without friction) where those
+        leave a residual above 1 %. What stays above the tolerance is reported as unconverged.
+        ``sweeps``: without that last resort.
     tolerance : float
         Largest residual of a contact problem, relative to its largest free contact speed.
     iterations : int
