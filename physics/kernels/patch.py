@@ -1,49 +1,66 @@
-"""Sums over the contacts of a patch on one wall, for `slide`, whose docstring has the formulas."""
+"""Sums over the contacts of a patch on one wall, for `slide` and `pivot`, whose docstrings have the formulas."""
 
 from __future__ import annotations
 
 import math
 
-from physics.kernels import quaternion as qt
 from physics.kernels.compiler import inlined
+from physics.kernels.layout import NORMAL, TANGENT_1, TANGENT_2
+from physics.kernels.point import point_velocity
 
 # Second moments of a patch: below this share of det to trace² it counts as a line (edges 1 : 1000).
 LINE_LIMIT = 1.0e-6
 
-# Columns of `work.patch`, a row per active contact: coordinates (normal, tangents) relative to the centre of
-# mass, targets (normal, tangents), impulse per normal impulse (-μ d), sliding speed, normal impulse, W_aa +
-# W_bb.
+# Columns of `work.patch`, a row per contact: coordinates (normal, tangents) relative to the centre of mass, targets
+# (normal, tangents), impulse per normal impulse (-μ d), sliding speed, normal impulse, W_aa + W_bb.
 C, A, B, TARGET, TARGET_A, TARGET_B, X, Y, SPEED, P, MOBILITY = range(11)
 PATCH_SIZE = 11
 
 
 @inlined
-def place_patch(n, friction, axes, v, w, inv_mass, K, work):
-    """Fill `work.patch`; largest free contact speed [m/s], and the planar motion after the warm start."""
-    patch, target, impulse, arm = work.patch, work.target, work.impulse, work.arm
-    normal, t1, t2 = axes
+def contact_place(i, work):
+    """Coordinates (c, a, b) of contact i."""
+    return work.patch[i, C], work.patch[i, A], work.patch[i, B]
+
+
+@inlined
+def contact_target(i, work):
+    """Target velocity of contact i (normal, tangents)."""
+    return work.patch[i, TARGET], work.patch[i, TARGET_A], work.patch[i, TARGET_B]
+
+
+@inlined
+def place_patch(n, friction, wall, u, w, inv_mass, K, work):
+    """Fill `work.patch`; largest free contact speed [m/s], and the planar motion after the warm start.
+
+    u, w are the velocity and angular velocity without contact impulses in the frame of the wall.
+    """
+    walls, patch, target, impulse, arm = work.walls, work.patch, work.target, work.impulse, work.arm
+    n0, n1, n2 = walls[wall, NORMAL], walls[wall, NORMAL + 1], walls[wall, NORMAL + 2]
+    s0, s1, s2 = walls[wall, TANGENT_1], walls[wall, TANGENT_1 + 1], walls[wall, TANGENT_1 + 2]
+    t0, t1, t2 = walls[wall, TANGENT_2], walls[wall, TANGENT_2 + 1], walls[wall, TANGENT_2 + 2]
     scale = fa = fb = tn = ta = tb = 0.0
     for i in range(n):
-        r = (arm[i, 0], arm[i, 1], arm[i, 2])
-        c, a, b = qt.dot(normal, r), qt.dot(t1, r), qt.dot(t2, r)
-        work.active[i] = i
-        work.normal[i] = 0.0
+        rx, ry, rz = arm[i, 0], arm[i, 1], arm[i, 2]
+        c = n0 * rx + n1 * ry + n2 * rz
+        a = s0 * rx + s1 * ry + s2 * rz
+        b = t0 * rx + t1 * ry + t2 * rz
         patch[i, C], patch[i, A], patch[i, B] = c, a, b
         patch[i, TARGET], patch[i, TARGET_A], patch[i, TARGET_B] = target[i, 0], target[i, 1], target[i, 2]
         patch[i, MOBILITY] = (
             2.0 * inv_mass + K[0] * (a * a + b * b) - 2.0 * c * (K[1] * a + K[2] * b) + c * c * (K[3] + K[5])
         )
-        scale = max(scale, abs(v[0] + w[1] * b - w[2] * a - target[i, 0]))
+        speed = point_velocity((c, a, b), u, w)
+        scale = max(scale, abs(speed[0] - target[i, 0]))
         if friction is not None:
-            scale = max(scale, abs(v[1] + w[2] * c - w[0] * b - target[i, 1]))
-            scale = max(scale, abs(v[2] + w[0] * a - w[1] * c - target[i, 2]))
+            scale = max(scale, max(abs(speed[1] - target[i, 1]), abs(speed[2] - target[i, 2])))
             p, x, y = impulse[3 * i], impulse[3 * i + 1], impulse[3 * i + 2]
             fa += x
             fb += y
             tn += a * y - b * x
             ta += b * p - c * y
             tb += c * x - a * p
-    start = (v[1] + inv_mass * fa, v[2] + inv_mass * fb, w[0] + (K[0] * tn + K[1] * ta + K[2] * tb))
+    start = (u[1] + inv_mass * fa, u[2] + inv_mass * fb, w[0] + (K[0] * tn + K[1] * ta + K[2] * tb))
     return scale, start
 
 
@@ -56,15 +73,17 @@ def fit_targets(count, work):
     patch = work.patch
     cc = ca = cb = t0 = 0.0
     for j in range(count):
-        cc += patch[j, C]
-        ca += patch[j, A]
-        cb += patch[j, B]
-        t0 += patch[j, TARGET]
+        i = work.active[j]
+        cc += patch[i, C]
+        ca += patch[i, A]
+        cb += patch[i, B]
+        t0 += patch[i, TARGET]
     s = 1.0 / count
     cc, ca, cb, t0 = s * cc, s * ca, s * cb, s * t0
     saa = sab = sbb = ta = tb = 0.0
     for j in range(count):
-        a, b, t = patch[j, A] - ca, patch[j, B] - cb, patch[j, TARGET]
+        i = work.active[j]
+        a, b, t = patch[i, A] - ca, patch[i, B] - cb, patch[i, TARGET]
         saa += a * a
         sab += a * b
         sbb += b * b
@@ -77,14 +96,13 @@ def fit_targets(count, work):
 
 
 @inlined
-def misfit(n, vn, wa, wb, axes, work):
+def misfit(n, vn, wa, wb, work):
     """Largest violation of the normal targets [m/s] by the normal motion; an open contact may be faster."""
-    arm, normal_impulse = work.arm, work.normal
+    patch = work.patch
     worst = 0.0
     for i in range(n):
-        r = (arm[i, 0], arm[i, 1], arm[i, 2])
-        miss = work.target[i, 0] - (vn + wa * qt.dot(axes[2], r) - wb * qt.dot(axes[1], r))
-        if normal_impulse[i] >= 0.0:
+        miss = patch[i, TARGET] - (vn + wa * patch[i, B] - wb * patch[i, A])
+        if work.normal[i] >= 0.0:
             miss = abs(miss)
         worst = max(worst, miss)
     return worst
@@ -105,15 +123,16 @@ def respond(count, mu, center, y0, gain, motion, wa, wb, inv_mass, K, work):
     g0 = g1 = g2 = h0 = h1 = h2 = 0.0
     x1 = x2 = y1 = y2 = f1 = f2 = 0.0
     for j in range(count):
-        c, a, b = patch[j, C], patch[j, A], patch[j, B]
-        ua = motion[0] + wb * c - motion[2] * b - patch[j, TARGET_A]
-        ub = motion[1] + motion[2] * a - wa * c - patch[j, TARGET_B]
+        i = work.active[j]
+        c, a, b = patch[i, C], patch[i, A], patch[i, B]
+        ua = motion[0] + wb * c - motion[2] * b - patch[i, TARGET_A]
+        ub = motion[1] + motion[2] * a - wa * c - patch[i, TARGET_B]
         size = math.sqrt(ua * ua + ub * ub)
         s = 0.0
         if size > 0.0:
             s = -mu / size
         x, y = s * ua, s * ub
-        patch[j, X], patch[j, Y], patch[j, SPEED] = x, y, size
+        patch[i, X], patch[i, Y], patch[i, SPEED] = x, y, size
         qn, qa, qb = a * y - b * x, b - c * y, c * x - a
         f = K[0] * qn + K[1] * qa + K[2] * qb
         g = K[1] * qn + K[3] * qa + K[4] * qb
@@ -155,19 +174,21 @@ def respond(count, mu, center, y0, gain, motion, wa, wb, inv_mass, K, work):
 
 @inlined
 def resultant(count, center, y0, y, work):
-    """Normal impulses of the active contacts: place of the one that pulls most or -1, and what all exert."""
+    """Normal impulses of the active contacts: place of the one that pulls most or -1, and what the others exert."""
     patch = work.patch
     lowest = 0.0
     loser = -1
     fa = fb = tn = ta = tb = 0.0
     for j in range(count):
-        c, a, b = patch[j, C], patch[j, A], patch[j, B]
+        i = work.active[j]
+        c, a, b = patch[i, C], patch[i, A], patch[i, B]
         p = y0 + (y[0] * (a - center[1]) + y[1] * (b - center[2]))
-        patch[j, P] = p
         if not p >= lowest:
             lowest = p
             loser = j
-        px, py = p * patch[j, X], p * patch[j, Y]
+        p = max(p, 0.0)
+        patch[i, P] = p
+        px, py = p * patch[i, X], p * patch[i, Y]
         fa += px
         fb += py
         tn += a * py - b * px
@@ -177,37 +198,76 @@ def resultant(count, center, y0, y, work):
 
 
 @inlined
-def slide_residual(count, mu, delta, work):
-    """Largest tangential residual [m/s]: the motion the directions are of is left by delta."""
-    patch = work.patch
-    worst = 0.0
-    for j in range(count):
-        da, db = delta[0] - delta[2] * patch[j, B], delta[1] + delta[2] * patch[j, A]
-        x, y, p, size = patch[j, X], patch[j, Y], patch[j, P], patch[j, SPEED]
-        if p > 0.0 and mu > 0.0:
-            # (x, y) = -μ d; s = μ p trace(W_tt) is at least μ p / ρ_t.
-            s = mu * p * patch[j, MOBILITY]
-            along = size - (x * da + y * db) / mu
-            if not along > 0.0:
-                return math.inf
-            worst = max(worst, abs(x * db - y * da) * s / (mu * (s + along)))
-    return worst
+def across_misses(count, mu, pivot, delta, work):
+    """Largest tangential residual [m/s] when the motion that the directions are of is left by delta.
 
+    Contact `pivot` holds and does not count; -1: all slide. Of a contact that moves backwards the whole velocity
+    counts: its impulse is in the cone, and projections do not lengthen.
 
-@inlined
-def drag(count, mu, work):
-    """H = Σ κ h hᵀ (11, 12, 13, 22, 23, 33): how the friction grows with the planar motion."""
+    Also H = Σ κ h hᵀ (11, 12, 13, 22, 23, 33): how the friction across grows with the planar motion.
+    """
     patch = work.patch
-    k11 = k12 = k13 = k22 = k23 = k33 = 0.0
+    worst = k11 = k12 = k13 = k22 = k23 = k33 = 0.0
+    if not mu > 0.0:
+        return worst, (k11, k12, k13, k22, k23, k33)
+    inv_mu = 1.0 / mu
     for j in range(count):
-        a, b, x, y, p, size = patch[j, A], patch[j, B], patch[j, X], patch[j, Y], patch[j, P], patch[j, SPEED]
-        if size > 0.0 and mu > 0.0:
-            s = p / (mu * size)
-            h = -(a * x + b * y)
+        i = work.active[j]
+        a, b, p, size = patch[i, A], patch[i, B], patch[i, P], patch[i, SPEED]
+        x, y = patch[i, X] * inv_mu, patch[i, Y] * inv_mu
+        da, db = delta[0] - delta[2] * b, delta[1] + delta[2] * a
+        load = mu * p
+        if i == pivot:
+            continue
+        # (x, y) = -d; the weight, μ p trace(W_tt), is at least μ p / ρ_t.
+        weight = load * patch[i, MOBILITY]
+        along, across = size - (x * da + y * db), abs(x * db - y * da)
+        if weight > 0.0:
+            if along > 0.0:
+                worst = max(worst, across * weight / (weight + along))
+            else:
+                worst = max(worst, across - along)
+        if size > 0.0:
+            s, h = load / size, -(a * x + b * y)
             k11 += s * y * y
             k12 -= s * x * y
             k13 += s * y * h
             k22 += s * x * x
             k23 -= s * x * h
             k33 += s * h * h
+    return worst, (k11, k12, k13, k22, k23, k33)
+
+
+@inlined
+def add_along(count, mu, k, work):
+    """H with the part along the directions, κ d dᵀ, besides: friction as a viscous drag."""
+    patch = work.patch
+    k11, k12, k13, k22, k23, k33 = k
+    for j in range(count):
+        i = work.active[j]
+        x, y, size = patch[i, X], patch[i, Y], patch[i, SPEED]
+        if size > 0.0:
+            s, h = patch[i, P] / (mu * size), patch[i, A] * y - patch[i, B] * x
+            k11 += s * x * x
+            k12 += s * x * y
+            k13 += s * x * h
+            k22 += s * y * y
+            k23 += s * y * h
+            k33 += s * h * h
     return k11, k12, k13, k22, k23, k33
+
+
+@inlined
+def turns_little(count, mu, step, work):
+    """Whether no direction turns by more than about 70 degrees, and none backwards, in a step of the motion."""
+    patch = work.patch
+    for j in range(count):
+        i = work.active[j]
+        x, y, size = patch[i, X], patch[i, Y], patch[i, SPEED]
+        if size > 0.0:
+            s = 1.0 / mu
+            da, db = step[0] - step[2] * patch[i, B], step[1] + step[2] * patch[i, A]
+            along, across = size - s * (x * da + y * db), s * (x * db - y * da)
+            if not (along > 0.1 * size and abs(across) <= 3.0 * along):
+                return False
+    return True

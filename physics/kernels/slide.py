@@ -24,6 +24,10 @@ slops). Where the impulses are those of the directions of τ, the velocity acros
 so the residual is measured, not estimated: |h_i·δ| s/(s + |u|) with s = μ p_i (W_aa + W_bb), no less than the
 natural map of `sweeps`.
 
+Where a step would turn a direction right round, Newton's method is left for one step of Weiszfeld's: H then also
+has the part along the directions, κ_i d_i d_iᵀ, as if friction were a viscous drag of that coefficient. That
+always slows the contacts that stop; one that all but stops is tried as a pivot (`pivot`).
+
 A contact that would have to pull opens, the one that pulls most first; the fit of the targets says whether it
 then separates fast enough. Without friction the first linear system is the solution.
 """
@@ -34,27 +38,41 @@ import math
 
 from physics.kernels import quaternion as qt
 from physics.kernels.compiler import inlined, kernel
+from physics.kernels.pair import solve_few
 from physics.kernels.patch import (
-    PATCH_SIZE,
+    SPEED,
+    A,
+    B,
     P,
     X,
     Y,
-    drag,
+    across_misses,
+    add_along,
     fit_targets,
     misfit,
     place_patch,
     respond,
     resultant,
-    slide_residual,
+    turns_little,
 )
+from physics.kernels.pivot import FOUND, PULLS, SLIPS, turn_about
+from physics.kernels.point import to_world, wall_frame
 from physics.kernels.share import wall_axes
 
 # Linear solves of one attempt at most. Two are usual at a tolerance of 1e-6, each contact that opens costs
 # one more.
-SLIDE_LIMIT = 8
+SLIDE_LIMIT = 16
 
-# Times that a sliding direction may have to turn right round before the contacts are taken not to slide.
-STRIKES = 2
+# A contact is tried as a pivot when a step of Weiszfeld's leaves less than this share of its speed; after the first
+# such step, the slowest one whatever is left.
+STOPPING = 0.3
+
+# A motion that is too fast by more than 1/STRETCH_LIMIT is slowed first, to SHRINK_AT_MOST of it in one step.
+STRETCH_LIMIT = 0.4
+SHRINK_AT_MOST = 0.02
+
+# What to try first (`work.mode`): all hold, all slide, or PIVOT + the slot of the contact that holds.
+HOLD, SLIDE, PIVOT = range(3)
 
 
 @inlined
@@ -83,68 +101,155 @@ def _newton(compliance, k, delta):
 
 
 @inlined
+def _stretch(motion, delta, gyration2):
+    """By how much a motion of the same direction is larger where it leaves no energy: on the ray through it.
+
+    The friction is the same all along the ray: σ = 1 + <τ, δ>/<τ, τ>, in the metric (1, 1, I/m).
+    """
+    size2 = motion[0] * motion[0] + motion[1] * motion[1] + gyration2 * motion[2] * motion[2]
+    return 1.0 + (motion[0] * delta[0] + motion[1] * delta[1] + gyration2 * motion[2] * delta[2]) / size2
+
+
+@inlined
 def _drop(loser, count, work):
-    """Open the active contact at place `loser`: the contacts behind it move up."""
-    work.normal[work.active[loser]] = -1.0
+    """Open the active contact at place `loser`: those behind it move up."""
+    work.patch[work.active[loser], P] = work.normal[work.active[loser]] = -1.0
     for j in range(loser, count - 1):
         work.active[j] = work.active[j + 1]
-        for c in range(PATCH_SIZE):
-            work.patch[j, c] = work.patch[j + 1, c]
     return count - 1
 
 
 @inlined
-def _store(n, count, friction, work):
-    """Impulses of the active contacts to `work.impulse`, zero for the open ones."""
+def _store(n, friction, work):
+    """Impulses of the contacts that push to `work.impulse`, zero for the open ones."""
     width = 1 if friction is None else 3
-    if count < n:
-        for k in range(width * n):
-            work.impulse[k] = 0.0
-    for j in range(count):
-        p, k = work.patch[j, P], width * work.active[j]
-        work.impulse[k] = p
+    for i in range(n):
+        p = max(work.patch[i, P], 0.0)
+        work.impulse[width * i] = p
         if friction is not None:
-            work.impulse[k + 1] = p * work.patch[j, X]
-            work.impulse[k + 2] = p * work.patch[j, Y]
+            work.impulse[width * i + 1] = p * work.patch[i, X]
+            work.impulse[width * i + 2] = p * work.patch[i, Y]
 
 
 @inlined
-def _add(axes, a, b, c, base):
-    """base + a axes[0] + b axes[1] + c axes[2]."""
-    n, t1, t2 = axes
-    return (
-        base[0] + (a * n[0] + b * t1[0] + c * t2[0]),
-        base[1] + (a * n[1] + b * t1[1] + c * t2[1]),
-        base[2] + (a * n[2] + b * t1[2] + c * t2[2]),
-    )
-
-
-@inlined
-def _wall_frame(R, v, L, axes, J):
-    """Inverse inertia (00, 01, 02, 11, 12, 22), velocity and angular velocity in the frame of the wall."""
-    e0, e1 = qt.transposed_matvec(R, axes[0]), qt.transposed_matvec(R, axes[1])
-    e2 = qt.transposed_matvec(R, axes[2])
-    j0 = (J[0] * e0[0], J[1] * e0[1], J[2] * e0[2])
-    j1 = (J[0] * e1[0], J[1] * e1[1], J[2] * e1[2])
-    j2 = (J[0] * e2[0], J[1] * e2[1], J[2] * e2[2])
-    K = (qt.dot(j0, e0), qt.dot(j0, e1), qt.dot(j0, e2), qt.dot(j1, e1), qt.dot(j1, e2), qt.dot(j2, e2))
-    m = qt.transposed_matvec(R, L)
-    u = (qt.dot(axes[0], v), qt.dot(axes[1], v), qt.dot(axes[2], v))
-    return K, u, (qt.dot(j0, m), qt.dot(j1, m), qt.dot(j2, m))
-
-
-@inlined
-def _normal_motion(n, count, goal, axes, work):
+def _normal_motion(n, count, goal, work):
     """Normal motion that meets the targets, (v_n, ω_a, ω_b); the centroid; and whether there is one."""
     is_patch, center, (t0, ga, gb) = fit_targets(count, work)
     wa, wb = gb, -ga
     vn = t0 - wa * center[2] + wb * center[1]
-    return is_patch and misfit(n, vn, wa, wb, axes, work) <= goal, center, (vn, wa, wb)
+    return is_patch and misfit(n, vn, wa, wb, work) <= goal, center, (vn, wa, wb)
+
+
+@inlined
+def _slowest(count, mu, step, hurry, work):
+    """The active contact that is slowest after a step, if it is STOPPING or there is a `hurry`; else -1."""
+    patch = work.patch
+    best, found = math.inf, -1
+    for j in range(count):
+        i = work.active[j]
+        x, y, size = patch[i, X], patch[i, Y], patch[i, SPEED]
+        da, db = step[0] - step[2] * patch[i, B], step[1] + step[2] * patch[i, A]
+        s = size / mu
+        ua, ub = da - s * x, db - s * y
+        left = math.sqrt(ua * ua + ub * ub)
+        if left < best and (hurry or left < STOPPING * size):
+            best, found = left, i
+    return found
+
+
+@inlined
+def _first_pivot(n, work):
+    """The contact that held alone in the step before, or -1."""
+    if work.mode >= PIVOT:
+        for i in range(n):
+            if work.slot[i] == work.mode - PIVOT:
+                return i
+    return -1
+
+
+@kernel
+def _search(n, patient, mu, goal, start, u, w, inv_mass, K, work):
+    """Directions and set of pushing contacts: (found, impulses along the tangents and moments, Σ p_n, residual).
+
+    Parameters
+    ----------
+    patient : bool
+        Whether a contact that pulls may push again while directions still turn. Otherwise it opens at once, which
+        is quick and nearly always right.
+    goal : float
+        Residual asked for [m/s].
+    start : tuple of 3 floats
+        Planar motion to start from.
+    u, w, K
+        Velocity and angular velocity without contact impulses, inverse inertia: in the frame of the wall.
+    """
+    for i in range(n):
+        work.active[i] = i
+        work.normal[i] = 0.0
+    none = (0.0, 0.0, 0.0, 0.0, 0.0)
+    count, motion, pivot, tried, hurry, is_set = n, start, -1, 0, False, n < 3
+    center = normal_motion = start
+    if not is_set:
+        pivot = _first_pivot(n, work)
+    for _ in range(SLIDE_LIMIT):
+        if count < 3:
+            return solve_few(n, count, mu, goal, u, w, inv_mass, K, work)
+        if not is_set:
+            ok, center, normal_motion = _normal_motion(n, count, goal, work)
+            if not ok:
+                break
+            is_set = True
+        vn, wa, wb = normal_motion
+        push = (vn - u[0]) / inv_mass
+        y0, gain = push / count, (wa - w[1], wb - w[2])
+        if pivot >= 0:
+            tried |= 1 << pivot
+            what, loser, total, miss, motion = turn_about(
+                pivot, count, mu, goal, center, y0, gain, u, w, wa, wb, motion[2], inv_mass, K, work
+            )
+            if what == FOUND:
+                work.mode = PIVOT + work.slot[pivot]
+                return True, total, push, miss
+            if what == PULLS:
+                count, is_set, tried = _drop(loser, count, work), False, 0
+            elif what != SLIPS:
+                motion = start
+            pivot = -1
+            continue
+        y, compliance = respond(count, mu, center, y0, gain, motion, wa, wb, inv_mass, K, work)
+        loser, total = resultant(count, center, y0, y, work)
+        is_settled = True
+        if loser < 0 or patient:
+            fa, fb, tn, ta, tb = total
+            wn = w[0] + (K[0] * tn + K[1] * ta + K[2] * tb)
+            delta = (u[1] + inv_mass * fa - motion[0], u[2] + inv_mass * fb - motion[1], wn - motion[2])
+            miss, k = across_misses(count, mu, -1, delta, work)
+            if loser < 0 and miss <= goal:
+                work.mode = SLIDE
+                return True, total, push, miss
+            step = _newton(compliance, k, delta)
+            is_settled = turns_little(count, mu, step, work)
+            if not is_settled:
+                stretch = _stretch(motion, delta, inv_mass / K[0])
+                if 0.0 < stretch < STRETCH_LIMIT:
+                    motion = (stretch * motion[0], stretch * motion[1], stretch * motion[2])
+                    continue
+                step = _newton(compliance, add_along(count, mu, k, work), delta)
+                pivot = _slowest(count, mu, step, hurry, work)
+                hurry = True
+                if pivot >= 0 and tried & (1 << pivot):
+                    pivot = -1
+            motion = (motion[0] + step[0], motion[1] + step[1], motion[2] + step[2])
+        if loser >= 0 and is_settled:
+            count, is_set, tried = _drop(loser, count, work), False, 0
+            if not patient:
+                motion = start
+    return False, none, 0.0, 0.0
 
 
 @kernel
 def slide_patch(n, friction, R, v, L, work):
-    """Try the impulses with which the n contacts slide, or open: three or more of one wall, not on a line.
+    """Try the impulses with which the n contacts of one wall slide, open, or turn about one that holds.
 
     Parameters
     ----------
@@ -159,53 +264,31 @@ def slide_patch(n, friction, R, v, L, work):
 
     Returns
     -------
-    left : int
-        0: found, and `work.impulse` written. 1 or 2: so many contacts, those in `work.active`, still push
-        when the others open (for `few.slide_few`). n: not found.
+    found : bool
+        Whether `work.impulse` was written; `work.mode` then says what to try first next time.
     v, L : tuples of 3 floats
         With the contact impulses, when found.
     residual : float
         Relative to the largest free contact speed.
     """
-    walls, mass, mu = work.walls, work.mass, work.mu
     wall = work.slot[0] // work.features
-    if n < 3 or work.slot[n - 1] // work.features != wall:
-        return n, v, L, 0.0
-    inv_mass = 1.0 / mass
-    axes = wall_axes(walls, wall)
-    K, u, w = _wall_frame(R, v, L, axes, work.J)
-    scale, start = place_patch(n, friction, axes, u, w, inv_mass, K, work)
+    if work.slot[n - 1] // work.features != wall:
+        return False, v, L, 0.0
+    inv_mass = 1.0 / work.mass
+    axes = wall_axes(work.walls, wall)
+    K, u, w = wall_frame(R, v, L, axes, work.J)
+    scale, start = place_patch(n, friction, wall, u, w, inv_mass, K, work)
     goal = work.tolerance * scale
-    count = n
-    strikes = 0
-    motion = start
-    ok, center, normal_motion = _normal_motion(n, count, goal, axes, work)
-    for _ in range(SLIDE_LIMIT):
-        if not ok or strikes > STRIKES:
+    found, total, push, miss = False, (0.0, 0.0, 0.0, 0.0, 0.0), 0.0, 0.0
+    for patient in range(2):
+        found, total, push, miss = _search(n, patient > 0, work.mu, goal, start, u, w, inv_mass, K, work)
+        if found or n < 3:
             break
-        vn, wa, wb = normal_motion
-        y0 = mass * (vn - u[0]) / count
-        gain = (wa - w[1], wb - w[2])
-        y, compliance = respond(count, mu, center, y0, gain, motion, wa, wb, inv_mass, K, work)
-        loser, (fa, fb, tn, ta, tb) = resultant(count, center, y0, y, work)
-        if loser >= 0:
-            count = _drop(loser, count, work)
-            if count < 3:
-                return count, v, L, 0.0
-            motion = start
-            ok, center, normal_motion = _normal_motion(n, count, goal, axes, work)
-            continue
-        wn = w[0] + (K[0] * tn + K[1] * ta + K[2] * tb)
-        delta = (u[1] + inv_mass * fa - motion[0], u[2] + inv_mass * fb - motion[1], wn - motion[2])
-        miss = slide_residual(count, mu, delta, work)
-        if miss <= goal:
-            _store(n, count, friction, work)
-            if scale > 0.0:
-                miss /= scale
-            v = _add(axes, inv_mass * (count * y0), inv_mass * fa, inv_mass * fb, v)
-            return 0, v, _add(axes, tn, ta, tb, L), miss
-        if miss == math.inf:
-            strikes += 1
-        step = _newton(compliance, drag(count, mu, work), delta)
-        motion = (motion[0] + step[0], motion[1] + step[1], motion[2] + step[2])
-    return n, v, L, 0.0
+    if not found:
+        return False, v, L, 0.0
+    _store(n, friction, work)
+    if scale > 0.0:
+        miss /= scale
+    fa, fb, tn, ta, tb = total
+    v = to_world(axes, inv_mass * push, inv_mass * fa, inv_mass * fb, v)
+    return True, v, to_world(axes, tn, ta, tb, L), miss

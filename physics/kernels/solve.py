@@ -5,10 +5,11 @@ from __future__ import annotations
 from physics.kernels import quaternion as qt
 from physics.kernels.compiler import inlined, kernel
 from physics.kernels.direct import hold_all
-from physics.kernels.few import slide_few
+from physics.kernels.layout import NORMAL
 from physics.kernels.proximal import proximal_newton
 from physics.kernels.pyramid import normal_fallback, pyramid_fallback
-from physics.kernels.slide import slide_patch
+from physics.kernels.share import wall_axis
+from physics.kernels.slide import HOLD, slide_patch
 from physics.kernels.sweeps import (
     assemble,
     cone_residual,
@@ -31,11 +32,7 @@ PIVOTING = 3
 PIVOT_ABOVE = 0.01
 
 # Sweeps before Newton's method has a turn: most problems that are left for sweeps need fewer than ten.
-SWEEPS_AT_ONCE = 24
-
-# What to try first.
-HOLD = 0
-SLIDE = 1
+SWEEPS_AT_ONCE = 12
 
 # Pivots of the fallback at most: several times the unknowns of a dozen contacts.
 MAX_PIVOTS = 500
@@ -95,6 +92,21 @@ def _apply(n, width, v, L, work):
         (v[0] + inv_mass * px, v[1] + inv_mass * py, v[2] + inv_mass * pz),
         (L[0] + lx, L[1] + ly, L[2] + lz),
     )
+
+
+@inlined
+def _may_hold(n, v, work):
+    """Whether to try first that all contacts hold.
+
+    A face that holds on a wall stops the centre of mass (but for small targets), so that friction has to undo
+    the tangential velocity and the normal impulses the normal one: |v_t| <= μ |v_n|. For an edge or a vertex,
+    and for several walls, it is what worked last.
+    """
+    wall = work.slot[0] // work.features
+    if n < 3 or work.slot[n - 1] // work.features != wall:
+        return work.mode == HOLD
+    u = qt.dot(wall_axis(work.walls, wall, NORMAL), v)
+    return qt.dot(v, v) <= (1.0 + work.mu * work.mu) * u * u
 
 
 @inlined
@@ -163,34 +175,20 @@ def solve_contacts(n, friction, smooth, pivots, v, L, R, work):
         DIRECT, SWEEPS or PIVOTING.
     """
     width = 1 if friction is None else 3
-    count = n
-    scale = -1.0
+    holds_first = friction is not None and _may_hold(n, v, work)
     for attempt in range(2):
-        if friction is not None and (attempt == 0) == (work.mode == HOLD):
+        if friction is not None and (attempt == 0) == holds_first:
             found, v1, L1, residual = hold_all(n, R, v, L, work)
             if found:
                 work.mode = HOLD
                 return v1, L1, residual, 0, DIRECT
             continue
-        if n > 2:
-            count, v1, L1, residual = slide_patch(n, friction, R, v, L, work)
-            if count == 0:
-                work.mode = SLIDE
-                return v1, L1, residual, 0, DIRECT
-        if count <= 2:
-            if scale < 0.0:
-                scale = _assemble(n, width, R, v, L, work)
-            found, residual = slide_few(n, count, friction, work.tolerance * scale, work)
-            if found:
-                v1, L1 = _apply(n, width, v, L, work)
-                if scale > 0.0:
-                    residual /= scale
-                work.mode = SLIDE
-                return v1, L1, residual, 0, DIRECT
+        found, v1, L1, residual = slide_patch(n, friction, R, v, L, work)
+        if found:
+            return v1, L1, residual, 0, DIRECT
         if friction is None:
             break
-    if scale < 0.0:
-        scale = _assemble(n, width, R, v, L, work)
+    scale = _assemble(n, width, R, v, L, work)
     goal = work.tolerance * scale
     sweeps, residual = _iterate(n, friction, smooth, goal, work)
     method = SWEEPS

@@ -8,7 +8,8 @@ from physics.kernels.body import angular_velocity, principal_attitude
 from physics.kernels.compiler import inlined, kernel
 from physics.kernels.contact import aim_impact, aim_rest, place_arms
 from physics.kernels.flight import drift
-from physics.kernels.solve import PIVOTING, SLIDE, solve_contacts
+from physics.kernels.slide import SLIDE
+from physics.kernels.solve import PIVOTING, solve_contacts
 
 # Row of `memory`: length of the last resting stage [s], its contact count, which direct solve to try first
 # (`HOLD` or `SLIDE`, what worked last), the slots of its contacts, then the impulses of all slots, zero where

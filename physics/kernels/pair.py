@@ -1,0 +1,244 @@
+"""One or two contacts of one wall: every mixture of holding, sliding and opening, without a Delassus matrix.
+
+Two contacts that slide are two angles. For given directions "both normal velocities are the ones asked for" is a
+2 x 2 system for the normal impulses, and Newton's method turns both directions at once until no velocity is left
+across them (`point` has the same for a single contact).
+
+A direction that would have to turn right round belongs to a contact that holds. Its impulse answers the other's,
+p_i = -W_ii⁻¹ (b_i + W_ij p_j), so that the other one is a single contact with the block W_jj - W_ji W_ii⁻¹ W_ij.
+Where the cone does not allow p_i, contact i slides against it, and that is the next direction to start from.
+"""
+
+from __future__ import annotations
+
+import math
+
+from physics.kernels.compiler import inlined, kernel
+from physics.kernels.patch import P, X, Y, contact_place, contact_target
+from physics.kernels.point import (
+    LOST,
+    SLID,
+    answer,
+    block,
+    heading,
+    miss_across,
+    moment,
+    point_velocity,
+    times,
+    turned,
+)
+from physics.kernels.share import solve_symmetric
+
+# Newton steps at most. Two are usual at a tolerance of 1e-6.
+PAIR_LIMIT = 12
+
+
+@inlined
+def _plus(p, q):
+    return p[0] + q[0], p[1] + q[1], p[2] + q[2]
+
+
+@inlined
+def _transposed(W):
+    return W[0], W[3], W[6], W[1], W[4], W[7], W[2], W[5], W[8]
+
+
+@inlined
+def _opened(Wi, Wji, bi, bj, mu, goal, x, y):
+    """Contact i alone, contact j open: (found, p_i, p_j, residual)."""
+    zero = (0.0, 0.0, 0.0)
+    what, p, miss = answer(Wi, bi, mu, Wi[4] + Wi[8], goal, x, y, True)
+    if what == LOST:
+        return False, p, zero, miss
+    apart = bj[0] + times(Wji, p)[0]
+    return apart >= -goal, p, zero, max(miss, -apart)
+
+
+@kernel
+def _held(Wi, Wij, Wj, bi, bj, mu, goal, x, y):
+    """Contact i holds, j slides or opens: (found, p_i, p_j, residual, direction of i, and of j, to go on from)."""
+    Wji = _transposed(Wij)
+    k = (Wi[0], Wi[1], Wi[2], Wi[4], Wi[5], Wi[8])
+    s0 = solve_symmetric(k, (Wij[0], Wij[3], Wij[6]))
+    s1 = solve_symmetric(k, (Wij[1], Wij[4], Wij[7]))
+    s2 = solve_symmetric(k, (Wij[2], Wij[5], Wij[8]))
+    h = solve_symmetric(k, bi)
+    c0, c1, c2, ch = times(Wji, s0), times(Wji, s1), times(Wji, s2), times(Wji, h)
+    W = (
+        Wj[0] - c0[0], Wj[1] - c1[0], Wj[2] - c2[0],
+        Wj[3] - c0[1], Wj[4] - c1[1], Wj[5] - c2[1],
+        Wj[6] - c0[2], Wj[7] - c1[2], Wj[8] - c2[2],
+    )  # fmt: skip
+    b = (bj[0] - ch[0], bj[1] - ch[1], bj[2] - ch[2])
+    what, pj, miss = answer(W, b, mu, Wj[4] + Wj[8], goal, x, y, False)
+    pi = (
+        -h[0] - (s0[0] * pj[0] + s1[0] * pj[1] + s2[0] * pj[2]),
+        -h[1] - (s0[1] * pj[0] + s1[1] * pj[1] + s2[1] * pj[2]),
+        -h[2] - (s0[2] * pj[0] + s1[2] * pj[1] + s2[2] * pj[2]),
+    )
+    holds = pi[0] >= 0.0 and pi[1] * pi[1] + pi[2] * pi[2] <= (mu * pi[0]) * (mu * pi[0])
+    found = what != LOST and holds
+    xi, yi = heading(-pi[1], -pi[2], mu)
+    if what == SLID:
+        x, y = pj[1] / pj[0], pj[2] / pj[0]
+    return found, pi, pj, miss, xi, yi, x, y
+
+
+@inlined
+def _both_slide(W1, W12, W2, b1, b2, mu, x1, y1, x2, y2):
+    """One Newton step of two sliding contacts: (p_1, p_2, misses, turns)."""
+    a11, a12 = W1[0] + (W1[1] * x1 + W1[2] * y1), W12[0] + (W12[1] * x2 + W12[2] * y2)
+    a21, a22 = W12[0] + (W12[3] * x1 + W12[6] * y1), W2[0] + (W2[1] * x2 + W2[2] * y2)
+    s = 1.0 / (a11 * a22 - a12 * a21)
+    p1, p2 = s * (a12 * b2[0] - a22 * b1[0]), s * (a21 * b1[0] - a11 * b2[0])
+    # Tangential velocity of i per normal impulse of j, friction along with it.
+    g11x, g11y = W1[3] + (W1[4] * x1 + W1[5] * y1), W1[6] + (W1[7] * x1 + W1[8] * y1)
+    g12x, g12y = W12[3] + (W12[4] * x2 + W12[5] * y2), W12[6] + (W12[7] * x2 + W12[8] * y2)
+    g21x, g21y = W12[1] + (W12[4] * x1 + W12[7] * y1), W12[2] + (W12[5] * x1 + W12[8] * y1)
+    g22x, g22y = W2[3] + (W2[4] * x2 + W2[5] * y2), W2[6] + (W2[7] * x2 + W2[8] * y2)
+    u1x, u1y = b1[1] + (g11x * p1 + g12x * p2), b1[2] + (g11y * p1 + g12y * p2)
+    u2x, u2y = b2[1] + (g21x * p1 + g22x * p2), b2[2] + (g21y * p1 + g22y * p2)
+    # All of what follows is μ times the true across, along and slopes, which the turns do not notice.
+    along1, along2 = -(x1 * u1x + y1 * u1y), -(x2 * u2x + y2 * u2y)
+    across1, across2 = y1 * u1x - x1 * u1y, y2 * u2x - x2 * u2y
+    # Turning direction 1 by dα changes (x1, y1) by (-y1, x1) dα: what that does to p, then to u.
+    f1, f2 = p1 * (W1[2] * x1 - W1[1] * y1), p1 * (W12[6] * x1 - W12[3] * y1)
+    d1, d2 = s * (a12 * f2 - a22 * f1), s * (a21 * f1 - a11 * f2)
+    vx = g11x * d1 + g12x * d2 + p1 * (W1[5] * x1 - W1[4] * y1)
+    vy = g11y * d1 + g12y * d2 + p1 * (W1[8] * x1 - W1[7] * y1)
+    j11 = y1 * vx - x1 * vy - along1
+    vx = g21x * d1 + g22x * d2 + p1 * (W12[7] * x1 - W12[4] * y1)
+    vy = g21y * d1 + g22y * d2 + p1 * (W12[8] * x1 - W12[5] * y1)
+    j21 = y2 * vx - x2 * vy
+    f1, f2 = p2 * (W12[2] * x2 - W12[1] * y2), p2 * (W2[2] * x2 - W2[1] * y2)
+    d1, d2 = s * (a12 * f2 - a22 * f1), s * (a21 * f1 - a11 * f2)
+    vx = g11x * d1 + g12x * d2 + p2 * (W12[5] * x2 - W12[4] * y2)
+    vy = g11y * d1 + g12y * d2 + p2 * (W12[8] * x2 - W12[7] * y2)
+    j12 = y1 * vx - x1 * vy
+    vx = g21x * d1 + g22x * d2 + p2 * (W2[5] * x2 - W2[4] * y2)
+    vy = g21y * d1 + g22y * d2 + p2 * (W2[8] * x2 - W2[7] * y2)
+    j22 = y2 * vx - x2 * vy - along2
+    s = 1.0 / (j11 * j22 - j12 * j21)
+    turn1, turn2 = s * (j12 * across2 - j22 * across1), s * (j21 * across1 - j11 * across2)
+    s = 1.0 / mu
+    miss1 = miss_across(s * across1, s * along1, p1 * mu * (W1[4] + W1[8]))
+    miss2 = miss_across(s * across2, s * along2, p2 * mu * (W2[4] + W2[8]))
+    return p1, p2, miss1, miss2, turn1, turn2
+
+
+@kernel
+def solve_two(W1, W12, W2, b1, b2, mu, goal, x1, y1, x2, y2):
+    """Impulses of two contacts: (found, p_1, p_2, residual [m/s])."""
+    zero = (0.0, 0.0, 0.0)
+    W21 = _transposed(W12)
+    tried = 0
+    for _ in range(PAIR_LIMIT):
+        p1, p2, miss1, miss2, turn1, turn2 = _both_slide(W1, W12, W2, b1, b2, mu, x1, y1, x2, y2)
+        if not (p1 >= 0.0 and p2 >= 0.0):
+            if p1 >= p2:
+                return _opened(W1, W21, b1, b2, mu, goal, x1, y1)
+            found, q2, q1, miss = _opened(W2, W12, b2, b1, mu, goal, x2, y2)
+            return found, q1, q2, miss
+        worst = max(miss1, miss2)
+        if worst <= goal:
+            return True, (p1, p1 * x1, p1 * y1), (p2, p2 * x2, p2 * y2), worst
+        if miss1 == math.inf and not tried & 1:
+            tried |= 1
+            found, q1, q2, miss, x1, y1, x2, y2 = _held(W1, W12, W2, b1, b2, mu, goal, x2, y2)
+            if found:
+                return True, q1, q2, miss
+        elif miss2 == math.inf and not tried & 2:
+            tried |= 2
+            found, q2, q1, miss, x2, y2, x1, y1 = _held(W2, W21, W1, b2, b1, mu, goal, x1, y1)
+            if found:
+                return True, q1, q2, miss
+        else:
+            x1, y1 = turned(x1, y1, turn1)
+            x2, y2 = turned(x2, y2, turn2)
+    return False, zero, zero, 0.0
+
+
+@inlined
+def _free(i, u, w, work):
+    """Velocity of contact i without contact impulses, less its target."""
+    place, target = contact_place(i, work), contact_target(i, work)
+    f = point_velocity(place, u, w)
+    return f[0] - target[0], f[1] - target[1], f[2] - target[2]
+
+
+@inlined
+def _keep(i, p, work):
+    """Impulse of contact i to `work.patch`: P, and X, Y per normal impulse."""
+    work.patch[i, P] = p[0]
+    work.patch[i, X] = work.patch[i, Y] = 0.0
+    if p[0] > 0.0:
+        work.patch[i, X], work.patch[i, Y] = p[1] / p[0], p[2] / p[0]
+
+
+@inlined
+def _closes(n, count, p, m, u, w, inv_mass, K, work):
+    """Fastest approach of the contacts that are not active [m/s], after impulse p with moment m."""
+    after_u = (u[0] + inv_mass * p[0], u[1] + inv_mass * p[1], u[2] + inv_mass * p[2])
+    after_w = (
+        w[0] + (K[0] * m[0] + K[1] * m[1] + K[2] * m[2]),
+        w[1] + (K[1] * m[0] + K[3] * m[1] + K[4] * m[2]),
+        w[2] + (K[2] * m[0] + K[4] * m[1] + K[5] * m[2]),
+    )
+    fastest = 0.0
+    for i in range(n):
+        if count == 0 or (i != work.active[0] and (count < 2 or i != work.active[1])):
+            fastest = max(fastest, -_free(i, after_u, after_w, work)[0])
+    return fastest
+
+
+@kernel
+def solve_few(n, count, mu, goal, u, w, inv_mass, K, work):
+    """Impulses of the `count` <= 2 active contacts of `work.patch`, the other ones of the n open.
+
+    Returns
+    -------
+    found : bool
+    total : tuple of 5 floats
+        Impulses along the tangents [N s] and moments (normal, tangents) of all contacts.
+    push : float
+        Sum of the normal impulses [N s].
+    residual : float
+        [m/s].
+    """
+    impulse = work.impulse
+    width = 3 if mu > 0.0 else 1
+    p = m = q = (0.0, 0.0, 0.0)
+    found, miss = True, 0.0
+    if count > 0:
+        i = work.active[0]
+        r, b1 = contact_place(i, work), _free(i, u, w, work)
+        W1 = block(r, r, inv_mass, K)
+        x1 = y1 = 0.0
+        if count == 1:
+            if mu > 0.0:
+                k = width * i
+                f = times(W1, (impulse[k], impulse[k + 1], impulse[k + 2]))
+                x1, y1 = heading(b1[1] + f[1], b1[2] + f[2], mu)
+            what, p, miss = answer(W1, b1, mu, W1[4] + W1[8], goal, x1, y1, True)
+            found = what != LOST
+        else:
+            j = work.active[1]
+            s, b2 = contact_place(j, work), _free(j, u, w, work)
+            W2, W12 = block(s, s, inv_mass, K), block(r, s, inv_mass, K)
+            x2 = y2 = 0.0
+            if mu > 0.0:
+                k, l = width * i, width * j
+                f, g = (impulse[k], impulse[k + 1], impulse[k + 2]), (impulse[l], impulse[l + 1], impulse[l + 2])
+                u1, u2 = _plus(times(W1, f), times(W12, g)), _plus(times(W2, g), times(_transposed(W12), f))
+                x1, y1 = heading(b1[1] + u1[1], b1[2] + u1[2], mu)
+                x2, y2 = heading(b2[1] + u2[1], b2[2] + u2[2], mu)
+            found, p, q, miss = solve_two(W1, W12, W2, b1, b2, mu, goal, x1, y1, x2, y2)
+            _keep(j, q, work)
+            m = moment(s, q)
+        _keep(i, p, work)
+        m = _plus(moment(r, p), m)
+        p = _plus(p, q)
+    if found and count < n:
+        closing = _closes(n, count, p, m, u, w, inv_mass, K, work)
+        found, miss = closing <= goal, max(miss, closing)
+    return found, (p[1], p[2], m[0], m[1], m[2]), p[0], miss

@@ -1,0 +1,135 @@
+"""A patch of contacts that turns about one of them: that one holds, the others slide or open.
+
+Coulomb's friction lets one contact of a patch hold while the others slide about it for a whole range of loads, not
+by accident. With contact k held the planar motion is one number, ω_n, and the directions of the others are those
+of a rotation about r_k: only its sense matters (but for targets that differ, which is why ω_n is iterated on).
+Given the directions, all is linear in the impulse (f_a, f_b) across contact k and in y_1, y_2 of `slide`: ω_a and
+ω_b are the ones asked for, and contact k has its target velocity.
+
+Where the cone does not allow (f_a, f_b) contact k slides against it, which is a direction to go on from.
+"""
+
+from __future__ import annotations
+
+import math
+
+from physics.kernels.compiler import kernel
+from physics.kernels.patch import MOBILITY, SPEED, TARGET_A, TARGET_B, A, B, C, P, X, Y, across_misses
+
+# Rounds on ω_n at most: one when the sense is guessed right and all targets agree.
+PIVOT_LIMIT = 4
+
+# What came out.
+NOT_FOUND, FOUND, SLIPS, PULLS = range(4)
+
+
+@kernel
+def turn_about(k, count, mu, goal, center, y0, gain, u, w, wa, wb, spin, inv_mass, K, work):
+    """Impulses with which contact k holds and the other active contacts slide.
+
+    Parameters
+    ----------
+    k : int
+        The contact.
+    center, y0, gain, u, w, wa, wb, K
+        As in `slide.slide_patch`.
+    spin : float
+        First guess of ω_n [rad/s].
+
+    Returns
+    -------
+    what : int
+        FOUND; SLIPS: contact k cannot hold; PULLS: an active contact would have to pull; NOT_FOUND.
+    loser : int
+        Place of the active contact that pulls most.
+    total : tuple of 5 floats
+        Impulses along the tangents and moments of all contacts.
+    miss : float
+        Residual [m/s].
+    motion : tuple of 3 floats
+        Planar motion (v_a, v_b, ω_n): where contact k slips, just off the pivot.
+    """
+    patch = work.patch
+    ck, ak, bk = patch[k, C], patch[k, A], patch[k, B]
+    ta, tb = patch[k, TARGET_A], patch[k, TARGET_B]
+    # Response (ω_n, ω_a, ω_b) to f_a and to f_b.
+    pn, pa, pb = ck * K[2] - bk * K[0], ck * K[4] - bk * K[1], ck * K[5] - bk * K[2]
+    qn, qa, qb = ak * K[0] - ck * K[1], ak * K[1] - ck * K[3], ak * K[2] - ck * K[4]
+    none = (0.0, 0.0, 0.0, 0.0, 0.0)
+    still = (0.0, 0.0, 0.0)
+    patch[k, X] = patch[k, Y] = patch[k, SPEED] = 0.0
+    for _ in range(PIVOT_LIMIT):
+        x0 = x1 = x2 = y_0 = y1 = y2 = 0.0
+        f0 = f1 = f2 = g0 = g1 = g2 = h0 = h1 = h2 = 0.0
+        for j in range(count):
+            i = work.active[j]
+            c, a, b = patch[i, C], patch[i, A], patch[i, B]
+            x = y = 0.0
+            if i != k:
+                ua = wb * (c - ck) - spin * (b - bk) + (ta - patch[i, TARGET_A])
+                ub = spin * (a - ak) - wa * (c - ck) + (tb - patch[i, TARGET_B])
+                size = math.sqrt(ua * ua + ub * ub)
+                s = 0.0
+                if size > 0.0:
+                    s = -mu / size
+                x, y = s * ua, s * ub
+                patch[i, X], patch[i, Y], patch[i, SPEED] = x, y, size
+            mn, ma, mb = a * y - b * x, b - c * y, c * x - a
+            f = K[0] * mn + K[1] * ma + K[2] * mb
+            g = K[1] * mn + K[3] * ma + K[4] * mb
+            h = K[2] * mn + K[4] * ma + K[5] * mb
+            a -= center[1]
+            b -= center[2]
+            x0, x1, x2 = x0 + x, x1 + a * x, x2 + b * x
+            y_0, y1, y2 = y_0 + y, y1 + a * y, y2 + b * y
+            f0, f1, f2 = f0 + f, f1 + a * f, f2 + b * f
+            g0, g1, g2 = g0 + g, g1 + a * g, g2 + b * g
+            h0, h1, h2 = h0 + h, h1 + a * h, h2 + b * h
+        s = 1.0 / (g1 * h2 - g2 * h1)
+        ra, rb = gain[0] - g0 * y0, gain[1] - h0 * y0
+        r1, r2 = s * (h2 * ra - g2 * rb), s * (g1 * rb - h1 * ra)
+        e11, e21 = s * (h2 * pa - g2 * pb), s * (g1 * pb - h1 * pa)
+        e12, e22 = s * (h2 * qa - g2 * qb), s * (g1 * qb - h1 * qa)
+        free = w[0] + f0 * y0 + f1 * r1 + f2 * r2
+        wfa, wfb = pn - f1 * e11 - f2 * e21, qn - f1 * e12 - f2 * e22
+        maa = inv_mass * (1.0 - x1 * e11 - x2 * e21) - bk * wfa
+        mab = -inv_mass * (x1 * e12 + x2 * e22) - bk * wfb
+        mba = -inv_mass * (y1 * e11 + y2 * e21) + ak * wfa
+        mbb = inv_mass * (1.0 - y1 * e12 - y2 * e22) + ak * wfb
+        va = ta - u[1] - wb * ck - inv_mass * (x0 * y0 + x1 * r1 + x2 * r2) + free * bk
+        vb = tb - u[2] + wa * ck - inv_mass * (y_0 * y0 + y1 * r1 + y2 * r2) - free * ak
+        s = 1.0 / (maa * mbb - mab * mba)
+        fa, fb = s * (mbb * va - mab * vb), s * (maa * vb - mba * va)
+        y1, y2 = r1 - e11 * fa - e12 * fb, r2 - e21 * fa - e22 * fb
+        turned = free + wfa * fa + wfb * fb
+        lowest = 0.0
+        loser = -1
+        sa, sb, sn, ma, mb = fa, fb, ak * fb - bk * fa, -ck * fb, ck * fa
+        for j in range(count):
+            i = work.active[j]
+            c, a, b = patch[i, C], patch[i, A], patch[i, B]
+            p = y0 + (y1 * (a - center[1]) + y2 * (b - center[2]))
+            patch[i, P] = p
+            if not p >= lowest:
+                lowest = p
+                loser = j
+            px, py = p * patch[i, X], p * patch[i, Y]
+            sa, sb, sn = sa + px, sb + py, sn + (a * py - b * px)
+            ma, mb = ma + (b * p - c * py), mb + (c * px - a * p)
+        change = turned - spin
+        miss, _ = across_misses(count, mu, k, (change * bk, -change * ak, change), work)
+        if not math.isfinite(turned):
+            return NOT_FOUND, -1, none, miss, still
+        if miss <= goal:
+            motion = (ta - wb * ck + turned * bk, tb + wa * ck - turned * ak, turned)
+            if loser >= 0:
+                return PULLS, loser, none, miss, motion
+            size, load = math.sqrt(fa * fa + fb * fb), mu * patch[k, P]
+            if size <= load:
+                s = 1.0 / patch[k, P]
+                patch[k, X], patch[k, Y] = s * fa, s * fb
+                return FOUND, -1, (sa, sb, sn, ma, mb), miss, motion
+            s = (size - load) * patch[k, MOBILITY] / size
+            return SLIPS, -1, none, miss, (motion[0] - s * fa, motion[1] - s * fb, turned)
+        spin = turned
+    return NOT_FOUND, -1, none, 0.0, still
