@@ -93,10 +93,9 @@ class RigidEnv(gym.Env):
         obs = np.empty((1, len(self.task.observation)), dtype=np.float32)
         self.task.step(action[None], obs)
         outcome = self.task.outcome[0].tolist()
-        status = self.task.physics_status()
+        info = self._info(outcome, int(self.task.world.status[0]))
         if self.render_mode == "human":
             self.render()
-        info = self._info(outcome, 0 if status is None else int(status[0]))
         return obs[0], outcome[0], info["is_success"], False, info
 
     def _info(self, outcome: list[float], status: int) -> dict[str, Any]:
