@@ -130,12 +130,9 @@ class World:
             state[:, b, at.QUAT : at.QUAT + 4] = body.quat
             state[:, b, at.LINVEL : at.LINVEL + 3] = body.linvel
             state[:, b, at.ANGVEL : at.ANGVEL + 3] = body.angvel
-            row = np.zeros(at.PARAM_SIZE)
-            parameters.write_mass_properties(row, body.mass, body.inertia)
-            parameters.write_dimensions(row, body.dimensions, body.bounding_radius(body.dimensions))
-            row[at.FRICTION] = friction.coefficient if friction else 0.0
-            row[at.RESTITUTION] = (contact.restitution or 0.0) if contact else 0.0
-            self.params[b :: self.body_count] = row
+        parameters.write_bodies(self.params, self.scene.bodies)
+        self.params[:, at.FRICTION] = friction.coefficient if friction else 0.0
+        self.params[:, at.RESTITUTION] = (contact.restitution or 0.0) if contact else 0.0
         self.gravity[:] = gravity.acceleration if gravity else 0.0
         angular_momenta(np.arange(len(self.state)), self.state, self.params)
 
