@@ -177,11 +177,6 @@ class World:
         """Of the last step, whoever took it."""
         return StepReport(self.report_table.copy())
 
-    @property
-    def status(self) -> np.ndarray:
-        """(worlds,) int64, values of `Status`: the gravest thing that happened in the last step of each world."""
-        return StepReport(self.report_table).status
-
     # --- changing ----------------------------------------------------------------------------------------------
 
     def set_state(

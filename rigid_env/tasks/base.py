@@ -9,6 +9,7 @@ from gymnasium.utils import seeding
 
 import physics
 from physics import checks
+from physics.report import gravest
 from rigid_env.tasks import layout as col
 from rigid_env.tasks.area import Area
 from rigid_env.tasks.entries import Entry
@@ -61,6 +62,8 @@ class Task:
     record : (worlds, RECORD_SIZE) float64
     outcome : (worlds, OUTCOME_SIZE) float64
         Of the last step, renewed in place.
+    status : (worlds,) int64
+        Values of `physics.Status`, of the last step, renewed in place; OK at the start of an episode.
 
     Raises
     ------
@@ -96,6 +99,7 @@ class Task:
         self.generators: list[np.random.Generator | None] = [None] * worlds
         self.record = np.zeros((worlds, col.RECORD_SIZE))
         self.outcome = np.zeros((worlds, col.OUTCOME_SIZE))
+        self.status = np.zeros(worlds, dtype=np.int64)
         self._advance = physics.Stepper(self.world, self.frame_skip)
         self._actions = np.zeros((worlds, AXES))
         self._rows = np.arange(worlds)
@@ -171,6 +175,7 @@ class Task:
         self.record[rows] = record
         self._note_parameters(rows, values)
         self.wrench[rows] = 0.0
+        self.status[rows] = physics.Status.OK
         self._kernel(rows, self.world.state, self.record, self.world.walls, None, obs, self.outcome)
 
     def _apply_start_options(self, starts: np.ndarray, options: dict) -> None:
@@ -232,6 +237,7 @@ class Task:
         if bad >= 0:
             raise ValueError(f"action of world {bad} is {self._actions[bad].tolist()}; allowed are finite numbers")
         self._advance()
+        gravest(self.world.report_table, self.status)
         self._kernel(self._rows, self.world.state, self.record, self.world.walls, self._actions, obs, self.outcome)
 
     # --- what a task is -----------------------------------------------------------------------------------

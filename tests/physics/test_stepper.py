@@ -41,7 +41,7 @@ def test_a_stepper_takes_the_steps_of_step(loads, threads):
         np.testing.assert_array_equal(prepared.state, plain.state)
         assert prepared.time == plain.time
         np.testing.assert_array_equal(prepared.report.iterations, report.iterations)
-        np.testing.assert_array_equal(prepared.status, report.status)
+        np.testing.assert_array_equal(prepared.report.status, report.status)
 
 
 def test_without_wrench_and_with_its_own_dt():
@@ -107,7 +107,7 @@ def test_a_wrench_that_is_not_finite_is_a_fault():
     stepper, before = physics.Stepper(world), world.pos.copy()
     stepper.wrench[2] = np.nan
     stepper()
-    assert world.status.tolist() == [0, 0, physics.Status.FAULT, 0, 0]
+    assert world.report.status.tolist() == [0, 0, physics.Status.FAULT, 0, 0]
     np.testing.assert_array_equal(world.pos[2], before[2])
     assert np.isfinite(world.state).all()
 
