@@ -53,34 +53,44 @@ class Stepper:
         self.world = world
         self.steps = checks.count(steps, "steps")
         self.dt = world.dt if dt is None else float(checks.positive(dt, (), "dt"))
-        self.wrench = np.zeros((world.worlds, world.body_count, 6)) if has_wrench else None
+        self.wrench = world.no_wrench() if has_wrench else None
         self._calls: list[Callable[[], None]] | None = None
 
     def __call__(self) -> None:
         """Advance every world by `steps` times `dt`."""
         if self._calls is None:
-            self._calls = self._bind()
-        self.world.pool.run(self._calls)
-        self.world.time += self.steps * self.dt
-
-    def _bind(self) -> list[Callable[[], None]]:
-        """One call of the kernel for each slice of the batch, all arguments bound."""
-        world, plan, substeps = self.world, self.world.plan, self.world.accuracy.substeps
-        argument_lists = [
-            (
-                first, last, self.steps, substeps, self.dt / substeps, world.state, world.params, world.shapes,
-                world.gravity if plan.gravity else None,
-                None if self.wrench is None else self.wrench.reshape(-1, 6),
-                plan.contact, plan.friction, plan.smooth, plan.restitution, plan.gyroscopic, plan.tilted, plan.pivots,
-                plan.scheme, world.memory, world.report_table, scratch,
-            )
-            for (first, last), scratch in zip(world.pool.slices, world.scratch)
-        ]  # fmt: skip
-        machine_code = _machine_code((plan.key, self.wrench is None, len(world.walls)), argument_lists[0])
-        return [partial(machine_code, *arguments) for arguments in argument_lists]
+            self._calls = kernel_calls(self.world, self.wrench, self.steps, self.dt)
+        self.world.advance(self._calls, self.steps * self.dt)
 
     def __getstate__(self):
         return {**vars(self), "_calls": None}  # machine code belongs to the process
+
+
+def kernel_calls(world: World, wrench: np.ndarray | None, steps: int, dt: float) -> list[Callable[[], None]]:
+    """One call of the step kernel for each slice of the batch, all arguments bound.
+
+    Parameters
+    ----------
+    world : World
+        Its arrays are bound, not the world itself: it may keep the calls, and is freed with its last user.
+    wrench : (worlds, bodies, 6) float64, contiguous and writable, or None
+        What it holds when a call is made counts.
+    steps : int
+    dt : float
+        [s].
+    """
+    plan, substeps = world.plan, world.accuracy.substeps
+    argument_lists = [
+        (
+            first, last, steps, substeps, dt / substeps, world.state, world.params, world.shapes,
+            world.gravity if plan.gravity else None, None if wrench is None else wrench.reshape(-1, 6),
+            plan.contact, plan.friction, plan.smooth, plan.restitution, plan.gyroscopic, plan.tilted, plan.pivots,
+            plan.scheme, world.memory, world.report_table, scratch,
+        )
+        for (first, last), scratch in zip(world.pool.slices, world.scratch)
+    ]  # fmt: skip
+    machine_code = _machine_code((plan.key, wrench is None, len(world.walls)), argument_lists[0])
+    return [partial(machine_code, *arguments) for arguments in argument_lists]
 
 
 def _machine_code(key: tuple, arguments: tuple) -> Callable[..., None]:

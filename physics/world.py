@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,7 +19,7 @@ from physics.kernels.workspace import make_workspace
 from physics.plan import SHAPE_CODES, make_plan
 from physics.report import StepReport
 from physics.scene import Scene
-from physics.stepper import Stepper
+from physics.stepper import kernel_calls
 from physics.threads import SlicePool
 
 
@@ -53,6 +54,8 @@ class World:
         Read-only views in the world frame, refreshed in place by every step; copy them to keep them.
     state : (worlds * bodies, STATE_SIZE) float64
         The array behind them, for kernels that read it; columns in `physics.kernels.layout`.
+    report_table : (worlds, REPORT_SIZE) float64
+        The array behind `report`, likewise.
     time : float
         Time since the start [s].
 
@@ -110,8 +113,9 @@ class World:
             )
             for _ in self.pool.slices
         ]  # fmt: skip
-        self._prepared: Stepper | None = None
-        self._prepared_for: tuple | None = None  # arguments of `step`: the next call with the same finds all ready
+        self._wrench: np.ndarray | None = None
+        self._calls: list[Callable[[], None]] = []
+        self._bound_for: tuple | None = None  # arguments of `step`: the next call with the same finds all bound
 
     def _bind_views(self) -> None:
         table = self.state.reshape(self.worlds, self.body_count, at.STATE_SIZE)
@@ -165,12 +169,22 @@ class World:
         steps = checks.count(steps, "steps")
         dt = self.dt if dt is None else float(checks.positive(dt, (), "dt"))
         key = (steps, dt, wrench is None)
-        if key != self._prepared_for:
-            self._prepared, self._prepared_for = Stepper(self, steps, dt, wrench is not None), key
+        if key != self._bound_for:
+            self._wrench = None if wrench is None else self.no_wrench()
+            self._calls, self._bound_for = kernel_calls(self, self._wrench, steps, dt), key
         if wrench is not None:
-            self._prepared.wrench[...] = wrench
-        self._prepared()
+            self._wrench[...] = wrench
+        self.advance(self._calls, steps * dt)
         return self.report
+
+    def advance(self, calls: list[Callable[[], None]], duration: float) -> None:
+        """Make `kernel_calls` that take `duration` [s]; for those who prepare them."""
+        self.pool.run(calls)
+        self.time += duration
+
+    def no_wrench(self) -> np.ndarray:
+        """(worlds, bodies, 6) float64 zeros: an array for wrenches."""
+        return np.zeros((self.worlds, self.body_count, 6))
 
     @property
     def report(self) -> StepReport:
@@ -282,7 +296,7 @@ class World:
 
     def __getstate__(self):
         kept = dict(vars(self))
-        for name in ("pool", "scratch", "_prepared", "_prepared_for", "pos", "quat", "linvel", "angvel"):
+        for name in ("pool", "scratch", "_wrench", "_calls", "_bound_for", "pos", "quat", "linvel", "angvel"):
             del kept[name]
         return kept
 

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import copy
+import gc
 import pickle
+import weakref
 
 import numpy as np
 import pytest
@@ -83,6 +85,19 @@ def test_changes_of_arguments_between_steps_of_a_world_are_heeded():
     pushed.step()
     free.step()
     np.testing.assert_array_equal(pushed.state, free.state)
+
+
+def test_a_world_is_freed_with_its_last_user():
+    """What a step keeps ready holds the world's arrays, not the world: no cycle for the collector to find."""
+    world = shoved()
+    world.step()
+    gone = weakref.ref(world)
+    gc.disable()
+    try:
+        del world
+        assert gone() is None
+    finally:
+        gc.enable()
 
 
 def test_a_wrench_in_any_memory_runs_the_same_code(loads):
