@@ -37,12 +37,6 @@ class Stepper:
     has_wrench : bool
         Whether there is one; without, its part of the kernel is left out.
 
-    Attributes
-    ----------
-    wrench : (worlds, bodies, 6) float64, or None
-        Force [N] and torque about the centre of mass [N m], world frame, held during a call. Write into it; it
-        is not checked: a body whose new state is not finite keeps the old one, and `World.report` says so.
-
     Raises
     ------
     ValueError
@@ -53,13 +47,22 @@ class Stepper:
         self.world = world
         self.steps = checks.count(steps, "steps")
         self.dt = world.dt if dt is None else float(checks.positive(dt, (), "dt"))
-        self.wrench = world.no_wrench() if has_wrench else None
+        self._wrench = world.no_wrench() if has_wrench else None
         self._calls: list[Callable[[], None]] | None = None
+
+    @property
+    def wrench(self) -> np.ndarray | None:
+        """(worlds, bodies, 6) float64 to write into: force [N] and torque about the centre of mass [N m].
+
+        World frame, held during a call; None without wrench. What is in it is not checked: a body whose new state
+        is not finite keeps the old one, and `World.report` says so.
+        """
+        return self._wrench
 
     def __call__(self) -> None:
         """Advance every world by `steps` times `dt`."""
         if self._calls is None:
-            self._calls = kernel_calls(self.world, self.wrench, self.steps, self.dt)
+            self._calls = kernel_calls(self.world, self._wrench, self.steps, self.dt)
         self.world.advance(self._calls, self.steps * self.dt)
 
     def __getstate__(self):

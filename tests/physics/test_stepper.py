@@ -127,6 +127,12 @@ def test_a_wrench_that_is_not_finite_is_a_fault():
     assert np.isfinite(world.state).all()
 
 
+def test_the_wrench_cannot_be_replaced():
+    """The calls are bound to its memory: another array would be ignored."""
+    with pytest.raises(AttributeError):
+        physics.Stepper(shoved()).wrench = np.ones((WORLDS, 1, 6))
+
+
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
