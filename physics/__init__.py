@@ -16,6 +16,7 @@ from physics.plan import make_plan
 from physics.report import Solver, Status, StepReport
 from physics.scene import HalfSpace, Scene, corner, three_walls
 from physics.shapes import Block, Body, Ellipsoid, Sphere
+from physics.stepper import Stepper
 from physics.trajectory import Event, Trajectory, simulate
 from physics.world import Snapshot, World
 
@@ -37,6 +38,7 @@ __all__ = [
     "Sphere",
     "Status",
     "StepReport",
+    "Stepper",
     "Trajectory",
     "World",
     "corner",

@@ -63,21 +63,30 @@ def _of_revolution(across: float, along: float) -> np.ndarray:
     return np.diag([across, along, across])
 
 
-def _of_semi_axes(a: float, b: float, c: float, moment: float) -> np.ndarray:
-    """Tensor diag(b² + c², a² + c², a² + b²) * `moment` of a body with three planes of symmetry."""
-    return np.diag([b * b + c * c, a * a + c * c, a * a + b * b]) * moment
+def block_moments(size: np.ndarray, mass: float | np.ndarray) -> np.ndarray:
+    """Principal moments (..., 3) [kg m²] of solid blocks of edges `size` (..., 3) [m] and `mass` (...) [kg]."""
+    return _plane_symmetric(size, mass) / 12
+
+
+def ellipsoid_moments(semi_axes: np.ndarray, mass: float | np.ndarray) -> np.ndarray:
+    """Principal moments (..., 3) [kg m²] of solid ellipsoids of `semi_axes` (..., 3) [m] and `mass` (...) [kg]."""
+    return _plane_symmetric(semi_axes, mass) / 5
+
+
+def _plane_symmetric(axes: np.ndarray, mass: float | np.ndarray) -> np.ndarray:
+    """(b² + c², a² + c², a² + b²) mass, which the moments of a body with three planes of symmetry are a share of."""
+    a, b, c = np.moveaxis(axes * axes, -1, 0)
+    return np.stack([b + c, a + c, a + b], axis=-1) * np.asarray(mass)[..., None]
 
 
 def block(size: ArrayLike, mass: float) -> np.ndarray:
     """Inertia of a solid block of edges `size` (3,) [m], along the body axes."""
-    a, b, c = _positive(size, (3,), "size")
-    return _of_semi_axes(a, b, c, float(_positive(mass, (), "mass"))) / 12
+    return np.diag(block_moments(_positive(size, (3,), "size"), _positive(mass, (), "mass")))
 
 
 def solid_ellipsoid(semi_axes: ArrayLike, mass: float) -> np.ndarray:
     """Inertia of a solid ellipsoid, `semi_axes` (a, b, c) [m] along the body axes."""
-    a, b, c = _positive(semi_axes, (3,), "semi_axes")
-    return _of_semi_axes(a, b, c, float(_positive(mass, (), "mass"))) / 5
+    return np.diag(ellipsoid_moments(_positive(semi_axes, (3,), "semi_axes"), _positive(mass, (), "mass")))
 
 
 def solid_sphere(radius: float, mass: float) -> np.ndarray:

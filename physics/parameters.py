@@ -7,8 +7,10 @@ import numpy as np
 from physics import checks
 from physics.inertia import check_inertia, principal_axes
 from physics.kernels import layout as at
+from physics.kernels.compiler import kernel
 from physics.kernels.rotation import attitude_series
 from physics.scene import HalfSpace
+from physics.shapes import Body
 
 
 def quaternion_of(R: np.ndarray) -> np.ndarray:
@@ -29,19 +31,32 @@ def quaternion_of(R: np.ndarray) -> np.ndarray:
     return q if q[0] >= 0 else -q
 
 
-def write_mass_properties(row: np.ndarray, mass: float, inertia: np.ndarray) -> None:
-    """Mass, inverse principal moments, principal frame and rotation series into one parameter row."""
-    moments, R = principal_axes(inertia)
-    row[at.INV_MASS] = 1.0 / mass
-    row[at.INV_INERTIA : at.INV_INERTIA + 3] = 1.0 / moments
-    row[at.PRINCIPAL : at.PRINCIPAL + 4] = quaternion_of(R)
-    attitude_series(*row[at.INV_INERTIA : at.INV_INERTIA + 3], row[at.SERIES : at.SERIES + at.SERIES_SIZE])
+def write_bodies(params: np.ndarray, bodies: tuple[Body, ...]) -> None:
+    """Mass properties and dimensions of a scene's bodies into `params` (worlds * bodies, PARAM_SIZE)."""
+    for b, body in enumerate(bodies):
+        moments, R = principal_axes(body.inertia)
+        _write_body(
+            params[b :: len(bodies)], body, np.array([body.mass]), moments[None], R[None], body.dimensions[None]
+        )
+    _write_series(params)
 
 
-def write_dimensions(row: np.ndarray, dimensions: np.ndarray, radius: float) -> None:
-    """Half edges or semi-axes [m] and bounding radius [m] into one parameter row."""
-    row[at.DIMENSIONS : at.DIMENSIONS + 3] = dimensions
-    row[at.RADIUS] = radius
+def _write_body(rows, body, masses, moments, R, dimensions) -> None:
+    """One body into its rows (n, PARAM_SIZE), but for the series; the other arrays have n rows, or one for all."""
+    rows[:, at.INV_MASS] = 1.0 / masses
+    rows[:, at.INV_INERTIA : at.INV_INERTIA + 3] = 1.0 / moments
+    rows[:, at.PRINCIPAL : at.PRINCIPAL + 4] = np.reshape([quaternion_of(frame) for frame in R], (-1, 4))
+    rows[:, at.DIMENSIONS : at.DIMENSIONS + 3] = dimensions
+    rows[:, at.RADIUS] = body.bounding_radius(dimensions)
+
+
+@kernel
+def _write_series(params):
+    """Coefficients of the rotation series into all rows of `params` from their moments."""
+    first = at.INV_INERTIA
+    for i in range(params.shape[0]):
+        series = params[i, at.SERIES : at.SERIES + at.SERIES_SIZE]
+        attitude_series(params[i, first], params[i, first + 1], params[i, first + 2], series)
 
 
 def spread(value, shape: tuple[int, ...], field: str) -> tuple[np.ndarray, tuple[int, ...], str]:
@@ -66,23 +81,46 @@ def change_inertia(params, bodies, plan, mass, size, inertia_body, shape) -> Non
     tensors = None
     if inertia_body is not None:
         tensors = checks.finite(*spread(inertia_body, (*shape, 3, 3), "inertia_body")).reshape(-1, 3, 3)
-    for k, row in enumerate(params):
-        body = bodies[k % len(bodies)]
-        if body.kind == "sphere" and len(set(halves[k])) > 1:
-            raise ValueError(f"size is {(2 * halves[k]).tolist()} for a sphere; allowed are three equal diameters")
-        if tensors is not None:
-            tensor = check_inertia(tensors[k], "inertia_body")
-        elif body.inertia_body is not None:
-            tensor = body.inertia * (masses[k] / body.mass)
-        else:
-            tensor = body.uniform_inertia(halves[k], float(masses[k]))
-        if not plan.allows(tensor):
-            raise ValueError(
-                f"the inertia becomes {tensor.tolist()}; the scene's bodies are all isotropic, or aligned with "
-                "their axes, and its kernel leaves the rest out: give a body of the scene such an inertia_body"
-            )
-        write_mass_properties(row, float(masses[k]), tensor)
-        write_dimensions(row, halves[k], body.bounding_radius(halves[k]))
+    for b, body in enumerate(bodies):
+        rows = slice(b, None, len(bodies))
+        if body.kind == "sphere":
+            _check_spheres(halves[rows])
+        given = None if tensors is None else tensors[rows]
+        moments, R = _principal_axes(body, masses[rows], halves[rows], given)
+        _check_allowed(plan, moments, R)
+        _write_body(params[rows], body, masses[rows], moments, R, halves[rows])
+    _write_series(params)
+
+
+def _principal_axes(body, masses, halves, tensors) -> tuple[np.ndarray, np.ndarray]:
+    """Moments (n, 3) [kg m²] and frames (n, 3, 3), or (1, 3, 3) for all, of one body of the scene in n worlds."""
+    if tensors is not None:
+        each = [principal_axes(check_inertia(tensor, "inertia_body")) for tensor in tensors]
+        return np.array([moments for moments, _ in each]).reshape(-1, 3), np.array([R for _, R in each]).reshape(
+            -1, 3, 3
+        )
+    if body.inertia_body is not None:
+        moments, R = principal_axes(body.inertia)
+        return moments * (masses / body.mass)[:, None], R[None]
+    return body.uniform_moments(halves, masses), np.eye(3)[None]
+
+
+def _check_spheres(halves) -> None:
+    bad = np.flatnonzero(np.ptp(halves, axis=1) > 0)
+    if len(bad):
+        size = (2 * halves[bad[0]]).tolist()
+        raise ValueError(f"size is {size} for a sphere; allowed are three equal diameters")
+
+
+def _check_allowed(plan, moments, R) -> None:
+    bad = np.flatnonzero(~plan.allows(moments, R))
+    if len(bad):
+        frame = np.broadcast_to(R, (len(moments), 3, 3))[bad[0]]
+        tensor = frame * moments[bad[0]] @ frame.T
+        raise ValueError(
+            f"the inertia becomes {tensor.tolist()}; the scene's bodies are all isotropic, or aligned with "
+            "their axes, and its kernel leaves the rest out: give a body of the scene such an inertia_body"
+        )
 
 
 def wall_table(walls: tuple[HalfSpace, ...]) -> np.ndarray:

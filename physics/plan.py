@@ -59,11 +59,23 @@ class Plan:
             self.pivots, self.scheme is None, self.features,
         )  # fmt: skip
 
-    def allows(self, inertia: np.ndarray) -> bool:
-        """Whether the kernel of this plan can turn a body with this tensor."""
+    def allows(self, moments: np.ndarray, R: np.ndarray) -> np.ndarray:
+        """Whether the kernel of this plan can turn bodies with these `physics.inertia.principal_axes`.
+
+        Parameters
+        ----------
+        moments : (n, 3) float64
+            [kg m²].
+        R : (n, 3, 3) float64
+            Principal frame to body frame.
+
+        Returns
+        -------
+        (n,) bool
+        """
         if not self.gyroscopic:
-            return is_isotropic(inertia)
-        return bool(self.tilted) or not is_tilted(inertia)
+            return is_isotropic(moments)
+        return ~is_tilted(R) | bool(self.tilted)
 
     def explain(self) -> str:
         """The plan as text: every effect, on or off, why, and what is compiled for it."""
@@ -76,24 +88,23 @@ class Plan:
         return "\n".join(lines)
 
 
-def is_isotropic(inertia: np.ndarray) -> bool:
-    """Whether all moments are equal to rounding: then ω stays constant in free flight."""
-    moments, _ = principal_axes(inertia)
-    return float(np.ptp(moments)) <= ISOTROPY_TOLERANCE * float(np.max(moments))
+def is_isotropic(moments: np.ndarray) -> np.ndarray:
+    """Whether all `moments` (..., 3) are equal to rounding: then ω stays constant in free flight."""
+    return np.ptp(moments, axis=-1) <= ISOTROPY_TOLERANCE * np.max(moments, axis=-1)
 
 
-def is_tilted(inertia: np.ndarray) -> bool:
-    """Whether the principal axes are not the body axes."""
-    _, R = principal_axes(inertia)
-    return not np.array_equal(R, np.eye(3))
+def is_tilted(R: np.ndarray) -> np.ndarray:
+    """Whether the principal axes `R` (..., 3, 3) are not the body axes."""
+    return (R - np.eye(3)).any(axis=(-2, -1))
 
 
 def make_plan(scene: Scene, accuracy: Accuracy) -> Plan:
     """Decide what a scene needs at an accuracy."""
     contact, friction, gravity = (scene.effect(kind) for kind in (Contact, Friction, Gravity))
     touching = contact is not None and bool(scene.walls)
-    isotropic = all(is_isotropic(body.inertia) for body in scene.bodies)
-    tilted = not isotropic and any(is_tilted(body.inertia) for body in scene.bodies)
+    axes = [principal_axes(body.inertia) for body in scene.bodies]
+    isotropic = all(is_isotropic(moments) for moments, _ in axes)
+    tilted = not isotropic and any(is_tilted(R) for _, R in axes)
     has_block = any(body.kind == "block" for body in scene.bodies)
     restitution = touching and contact.restitution is not None
     rubbing = touching and friction is not None

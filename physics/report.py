@@ -7,6 +7,7 @@ from enum import IntEnum
 import numpy as np
 
 from physics.kernels import layout as at
+from physics.kernels.compiler import kernel
 
 
 class Solver(IntEnum):
@@ -49,6 +50,23 @@ _MESSAGES = {
 }
 
 
+# What the kernel below compares with: Numba takes plain integers from a module.
+_UNRESOLVED, _UNCONVERGED, _FAULT = int(Status.UNRESOLVED), int(Status.UNCONVERGED), int(Status.FAULT)
+
+
+@kernel
+def gravest(table, status):
+    """Write the `Status` of each row of a report `table` (worlds, REPORT_SIZE) into `status` (worlds,) int64."""
+    for world in range(table.shape[0]):
+        status[world] = 0
+        if table[world, at.FAULTS] > 0.0:
+            status[world] = _FAULT
+        elif table[world, at.UNCONVERGED] > 0.0:
+            status[world] = _UNCONVERGED
+        elif table[world, at.UNRESOLVED] > 0.0:
+            status[world] = _UNRESOLVED
+
+
 class StepReport:
     """Report of one `World.step`; every property is an array over worlds.
 
@@ -86,10 +104,9 @@ class StepReport:
     @property
     def status(self) -> np.ndarray:
         """(worlds,) int64, values of `Status`: the gravest thing that happened."""
-        t = self._table
-        status = np.where(t[:, at.UNRESOLVED] > 0, int(Status.UNRESOLVED), int(Status.OK))
-        status = np.where(t[:, at.UNCONVERGED] > 0, int(Status.UNCONVERGED), status)
-        return np.where(t[:, at.FAULTS] > 0, int(Status.FAULT), status)
+        status = np.empty(len(self._table), dtype=np.int64)
+        gravest(self._table, status)
+        return status
 
     @property
     def ok(self) -> bool:

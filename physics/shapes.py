@@ -49,7 +49,7 @@ class Body:
         """(3, 3) inertia tensor about the centre of mass in the body frame [kg m²]."""
         if self.inertia_body is not None:
             return np.array(self.inertia_body)
-        return self.uniform_inertia(self.dimensions, self.mass)
+        return np.diag(self.uniform_moments(self.dimensions, self.mass))
 
 
 @dataclass(frozen=True)
@@ -78,14 +78,15 @@ class Block(Body):
         return 0.5 * np.array(self.size)
 
     @staticmethod
-    def uniform_inertia(dimensions, mass) -> np.ndarray:
-        """(3, 3) tensor [kg m²] of half edges `dimensions` [m] at uniform density."""
-        return inertia.block(2 * np.asarray(dimensions), mass)
+    def uniform_moments(dimensions, mass) -> np.ndarray:
+        """Principal moments (..., 3) [kg m²], along the body axes, of half edges `dimensions` (..., 3) [m]."""
+        return inertia.block_moments(2 * dimensions, mass)
 
     @staticmethod
-    def bounding_radius(dimensions) -> float:
-        """Radius [m] of the sphere about the centre that holds the body."""
-        return float(np.linalg.norm(dimensions))
+    def bounding_radius(dimensions) -> np.ndarray:
+        """Radius (...) [m] of the sphere about the centre that holds the body."""
+        a, b, c = np.moveaxis(dimensions * dimensions, -1, 0)
+        return np.sqrt(a + b + c)
 
 
 @dataclass(frozen=True)
@@ -114,14 +115,14 @@ class Sphere(Body):
         return np.full(3, self.radius)
 
     @staticmethod
-    def uniform_inertia(dimensions, mass) -> np.ndarray:
-        """(3, 3) tensor [kg m²] of a solid sphere."""
-        return inertia.solid_sphere(float(dimensions[0]), mass)
+    def uniform_moments(dimensions, mass) -> np.ndarray:
+        """Principal moments (..., 3) [kg m²] of solid spheres; `dimensions` (..., 3) as above."""
+        return inertia.ellipsoid_moments(dimensions, mass)
 
     @staticmethod
-    def bounding_radius(dimensions) -> float:
-        """The radius [m]."""
-        return float(dimensions[0])
+    def bounding_radius(dimensions) -> np.ndarray:
+        """The radius (...) [m]."""
+        return dimensions[..., 0]
 
 
 @dataclass(frozen=True)
@@ -150,11 +151,11 @@ class Ellipsoid(Body):
         return np.array(self.semi_axes)
 
     @staticmethod
-    def uniform_inertia(dimensions, mass) -> np.ndarray:
-        """(3, 3) tensor [kg m²] of a solid ellipsoid."""
-        return inertia.solid_ellipsoid(dimensions, mass)
+    def uniform_moments(dimensions, mass) -> np.ndarray:
+        """Principal moments (..., 3) [kg m²] of solid ellipsoids of semi-axes `dimensions` (..., 3) [m]."""
+        return inertia.ellipsoid_moments(dimensions, mass)
 
     @staticmethod
-    def bounding_radius(dimensions) -> float:
-        """The largest semi-axis [m]."""
-        return float(np.max(dimensions))
+    def bounding_radius(dimensions) -> np.ndarray:
+        """The largest semi-axis (...) [m]."""
+        return np.max(dimensions, axis=-1)

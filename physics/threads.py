@@ -7,13 +7,19 @@ threading layer of Numba in it, so worlds may be stepped from several Python thr
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from itertools import pairwise
 
 
 class SlicePool:
-    """Runs a function on consecutive slices of range(count), one slice per thread."""
+    """Consecutive slices of range(count), one per thread, and the threads that work on them.
+
+    Attributes
+    ----------
+    slices : list of (first, last)
+        first <= index < last.
+    """
 
     def __init__(self, threads: int, count: int):
         threads = min(threads, count)
@@ -22,17 +28,17 @@ class SlicePool:
         self._pool: ThreadPoolExecutor | None = None
         self._pid = -1
 
-    def run(self, work: Callable[[int, int, int], None]) -> None:
-        """Call work(slice index, first, last) for every slice; the last one on the calling thread."""
-        if len(self.slices) == 1:
-            work(0, *self.slices[0])
+    def run(self, calls: Sequence[Callable[[], None]]) -> None:
+        """Make the calls, one per slice, at the same time; the last one on the calling thread."""
+        if len(calls) == 1:
+            calls[0]()
             return
         if self._pool is None or self._pid != os.getpid():
             self._pool = ThreadPoolExecutor(len(self.slices) - 1, thread_name_prefix="rigid-env")
             self._pid = os.getpid()
-        waiting = [self._pool.submit(work, k, *bounds) for k, bounds in enumerate(self.slices[:-1])]
+        waiting = [self._pool.submit(call) for call in calls[:-1]]
         try:
-            work(len(self.slices) - 1, *self.slices[-1])
+            calls[-1]()
         finally:
             for future in waiting:
                 future.result()

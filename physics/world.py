@@ -2,32 +2,25 @@
 
 from __future__ import annotations
 
-import sys
-import threading
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from physics import checks, parameters
+from physics import changes, checks, parameters
 from physics.accuracy import Accuracy, resolve
 from physics.contacts import contact_forces, walls_touched
 from physics.effects import Contact, Friction, Gravity
 from physics.kernels import layout as at
-from physics.kernels.probe import angular_momenta, deepest_gaps
+from physics.kernels.probe import angular_momenta
 from physics.kernels.stages import memory_size
-from physics.kernels.step import step_worlds
 from physics.kernels.workspace import make_workspace
 from physics.plan import SHAPE_CODES, make_plan
 from physics.report import StepReport
 from physics.scene import Scene
+from physics.stepper import kernel_calls
 from physics.threads import SlicePool
-
-# A body may start this deep in a wall, in bounding radii: what a rounded or hand-typed pose may be off by.
-START_DEPTH = 1e-2
-
-# Seconds after which the first step of a plan says that it is compiling.
-COMPILE_NOTICE = 1.0
 
 
 @dataclass(frozen=True)
@@ -61,6 +54,8 @@ class World:
         Read-only views in the world frame, refreshed in place by every step; copy them to keep them.
     state : (worlds * bodies, STATE_SIZE) float64
         The array behind them, for kernels that read it; columns in `physics.kernels.layout`.
+    report_table : (worlds, REPORT_SIZE) float64
+        The array behind `report`, likewise.
     time : float
         Time since the start [s].
 
@@ -90,7 +85,7 @@ class World:
         self.time = 0.0
         self._allocate()
         self._fill()
-        self._check_depth(self.state, self.params, np.arange(self.worlds), "scene")
+        changes.check_depth(self, self.state, self.params, np.arange(self.worlds), "scene")
 
     # --- memory ------------------------------------------------------------------------------------------------
 
@@ -101,23 +96,26 @@ class World:
         self.gravity = np.zeros((self.worlds, 3))
         self.walls = parameters.wall_table(self.scene.walls)
         slots = max(len(self.scene.walls) * self.plan.features, 1)
-        self._memory = np.zeros((rows if self.plan.contact else 1, memory_size(slots)))
-        self._report = np.zeros((self.worlds, at.REPORT_SIZE))
+        self.memory = np.zeros((rows if self.plan.contact else 1, memory_size(slots)))
+        self.report_table = np.zeros((self.worlds, at.REPORT_SIZE))
         self.shapes = np.array([SHAPE_CODES[body.kind] for body in self.scene.bodies])
         self._prepare_threads()
         self._bind_views()
 
     def _prepare_threads(self) -> None:
-        self._pool = SlicePool(self.threads, self.worlds)
+        self.pool = SlicePool(self.threads, self.worlds)
         settings = self.accuracy
-        self._scratch = [
+        self.scratch = [
             make_workspace(
                 self.walls, self.plan.features,
                 tolerance=settings.tolerance, sweeps=settings.iterations, splits=settings.impacts,
                 relative_slop=settings.slop, rest_share=settings.rest_share,
             )
-            for _ in self._pool.slices
+            for _ in self.pool.slices
         ]  # fmt: skip
+        self._wrench: np.ndarray | None = None
+        self._calls: list[Callable[[], None]] = []
+        self._bound_for: tuple | None = None  # arguments of `step`: the next call with the same finds all bound
 
     def _bind_views(self) -> None:
         table = self.state.reshape(self.worlds, self.body_count, at.STATE_SIZE)
@@ -136,12 +134,9 @@ class World:
             state[:, b, at.QUAT : at.QUAT + 4] = body.quat
             state[:, b, at.LINVEL : at.LINVEL + 3] = body.linvel
             state[:, b, at.ANGVEL : at.ANGVEL + 3] = body.angvel
-            row = np.zeros(at.PARAM_SIZE)
-            parameters.write_mass_properties(row, body.mass, body.inertia)
-            parameters.write_dimensions(row, body.dimensions, body.bounding_radius(body.dimensions))
-            row[at.FRICTION] = friction.coefficient if friction else 0.0
-            row[at.RESTITUTION] = (contact.restitution or 0.0) if contact else 0.0
-            self.params[b :: self.body_count] = row
+        parameters.write_bodies(self.params, self.scene.bodies)
+        self.params[:, at.FRICTION] = friction.coefficient if friction else 0.0
+        self.params[:, at.RESTITUTION] = (contact.restitution or 0.0) if contact else 0.0
         self.gravity[:] = gravity.acceleration if gravity else 0.0
         angular_momenta(np.arange(len(self.state)), self.state, self.params)
 
@@ -167,42 +162,34 @@ class World:
         Raises
         ------
         ValueError
-            A wrench of the wrong shape or not finite; nothing has moved then.
+            A wrench of the wrong shape or not finite, or steps or dt out of range; nothing has moved then.
         """
         if wrench is not None:
-            wrench = checks.finite(wrench, (self.worlds, self.body_count, 6), "wrench").reshape(-1, 6)
-            wrench = np.ascontiguousarray(wrench)
-        if steps != 1:
-            checks.count(steps, "steps")
+            wrench = checks.finite(wrench, (self.worlds, self.body_count, 6), "wrench")
+        steps = checks.count(steps, "steps")
         dt = self.dt if dt is None else float(checks.positive(dt, (), "dt"))
-        self._advance(wrench, steps, dt)
-        return StepReport(self._report.copy())
+        key = (steps, dt, wrench is None)
+        if key != self._bound_for:
+            self._wrench = None if wrench is None else self.no_wrench()
+            self._calls, self._bound_for = kernel_calls(self, self._wrench, steps, dt), key
+        if wrench is not None:
+            self._wrench[...] = wrench
+        self.advance(self._calls, steps * dt)
+        return self.report
 
-    def _advance(self, wrench: np.ndarray | None, steps: int, dt: float) -> None:
-        """Run the kernel for `steps` steps of `dt` seconds each; the first run of a plan compiles."""
-        key = (self.plan.key, wrench is None, len(self.walls))
-        if key in _COMPILED:
-            self._run(wrench, steps, dt)
-            return
-        with _compile_notice():
-            self._launch(0, 0, 0, wrench, steps, dt)
-        _COMPILED.add(key)
-        self._run(wrench, steps, dt)
+    def advance(self, calls: list[Callable[[], None]], duration: float) -> None:
+        """Make `kernel_calls` that take `duration` [s]; for those who prepare them."""
+        self.pool.run(calls)
+        self.time += duration
 
-    def _run(self, wrench: np.ndarray | None, steps: int, dt: float) -> None:
-        if len(self._pool.slices) == 1:
-            self._launch(0, 0, self.worlds, wrench, steps, dt)
-        else:
-            self._pool.run(lambda k, first, last: self._launch(k, first, last, wrench, steps, dt))
-        self.time += steps * dt
+    def no_wrench(self) -> np.ndarray:
+        """(worlds, bodies, 6) float64 zeros: an array for wrenches."""
+        return np.zeros((self.worlds, self.body_count, 6))
 
-    def _launch(self, k: int, first: int, last: int, wrench: np.ndarray | None, steps: int, dt: float) -> None:
-        plan, substeps = self.plan, self.accuracy.substeps
-        step_worlds(
-            first, last, steps, substeps, dt / substeps, self.state, self.params, self.shapes,
-            self.gravity if plan.gravity else None, wrench, plan.contact, plan.friction, plan.smooth, plan.restitution,
-            plan.gyroscopic, plan.tilted, plan.pivots, plan.scheme, self._memory, self._report, self._scratch[k],
-        )  # fmt: skip
+    @property
+    def report(self) -> StepReport:
+        """Of the last step, whoever took it."""
+        return StepReport(self.report_table.copy())
 
     # --- changing ----------------------------------------------------------------------------------------------
 
@@ -228,18 +215,7 @@ class World:
         ValueError
             Wrong shape, not finite, not a unit quaternion, or deep inside a wall. Nothing has changed then.
         """
-        chosen = self._chosen(worlds)
-        rows = self._rows(chosen)
-        new = self.state[rows]
-        given = (("pos", pos, at.POS, 3), ("quat", quat, at.QUAT, 4), ("linvel", linvel, at.LINVEL, 3),
-                 ("angvel", angvel, at.ANGVEL, 3))  # fmt: skip
-        for name, value, first, size in given:
-            if value is None:
-                continue
-            check = checks.unit_quaternion if name == "quat" else checks.finite
-            value = check(value, (len(chosen), self.body_count, size), name)
-            new[:, first : first + size] = value.reshape(-1, size)
-        self._adopt(chosen, rows, new, self.params[rows], "set_state")
+        changes.set_state(self, pos, quat, linvel, angvel, worlds)
 
     def set_parameters(
         self,
@@ -274,72 +250,12 @@ class World:
             A value out of range, an effect that the scene does not declare, or a new size that reaches deep
             into a wall. Nothing has changed then.
         """
-        chosen = self._chosen(worlds)
-        rows = self._rows(chosen)
-        params = self.params[rows]
-        bodies, shape = self.scene.bodies, (len(chosen), self.body_count)
-        if mass is not None or size is not None or inertia_body is not None:
-            parameters.change_inertia(params, bodies, self.plan, mass, size, inertia_body, shape)
-        if friction is not None:
-            self._needs("friction", self.plan.friction, "physics.Friction(...)")
-            params[:, at.FRICTION] = checks.non_negative(*parameters.spread(friction, shape, "friction")).ravel()
-        if restitution is not None:
-            self._needs("restitution", self.plan.restitution, "physics.Contact(restitution=...)")
-            params[:, at.RESTITUTION] = checks.share(*parameters.spread(restitution, shape, "restitution")).ravel()
-        field = None
-        if gravity is not None:
-            self._needs("gravity", self.plan.gravity, "physics.Gravity(...)")
-            field = np.broadcast_to(checks.finite(gravity, np.shape(gravity), "gravity"), (len(chosen), 3))
-        self._adopt(chosen, rows, self.state[rows], params, "set_parameters", keep_memory=size is None)
-        if field is not None:
-            self.gravity[chosen] = field
-
-    def _needs(self, field: str, is_on, effect: str) -> None:
-        if not is_on:
-            raise ValueError(f"{field} was given, but the scene does not declare it; add {effect} to Scene.effects")
-
-    def _adopt(self, chosen, rows, state, params, what, keep_memory=False) -> None:
-        """Check new rows of state and parameters, then write them: all or nothing."""
-        self._check_depth(state, params, chosen, what)
-        angular_momenta(np.arange(len(rows)), state, params)
-        self.state[rows] = state
-        self.params[rows] = params
-        if self.plan.contact and not keep_memory:
-            self._memory[rows] = 0.0
-
-    def _check_depth(self, state, params, chosen, what) -> None:
-        if not self.plan.contact:
-            return
-        gaps, which = np.empty(len(state)), np.empty(len(state), np.int64)
-        deepest_gaps(np.arange(len(state)), state, params, self.shapes, self.walls, gaps, which)
-        bad = np.flatnonzero(gaps < -START_DEPTH * params[:, at.RADIUS])
-        if len(bad):
-            k = int(bad[0])
-            raise ValueError(
-                f"{what}: pos {state[k, at.POS : at.POS + 3].tolist()} of body {k % self.body_count} in world "
-                f"{int(chosen[k // self.body_count])} is {-gaps[k]:.6g} m inside walls[{which[k]}]; allowed is at most "
-                f"{START_DEPTH * params[k, at.RADIUS]:.3g} m"
-            )
-
-    def _chosen(self, worlds) -> np.ndarray:
-        if worlds is None:
-            return np.arange(self.worlds)
-        chosen = np.asarray(worlds)
-        if chosen.dtype == bool and chosen.shape == (self.worlds,):
-            chosen = np.flatnonzero(chosen)
-        if chosen.ndim != 1 or (chosen.size and not np.issubdtype(chosen.dtype, np.integer)):
-            raise ValueError(f"worlds is {worlds!r}; allowed are indices or a mask of {self.worlds} worlds")
-        if chosen.size and not (chosen.min() >= 0 and chosen.max() < self.worlds):
-            raise ValueError(f"worlds is {worlds!r}; allowed are indices from 0 to {self.worlds - 1}")
-        return chosen.astype(np.int64)
-
-    def _rows(self, chosen: np.ndarray) -> np.ndarray:
-        return (chosen[:, None] * self.body_count + np.arange(self.body_count)).ravel()
+        changes.set_parameters(self, mass, size, inertia_body, friction, restitution, gravity, worlds)
 
     # --- keeping and looking -----------------------------------------------------------------------------------
 
     def _kept(self) -> tuple[np.ndarray, ...]:
-        return self.state, self.params, self.gravity, self._memory, self._report
+        return self.state, self.params, self.gravity, self.memory, self.report_table
 
     def snapshot(self) -> Snapshot:
         """All that decides the future, copied; `restore` continues bit-identically, warm starts and all."""
@@ -369,18 +285,18 @@ class World:
         rows = range(world * self.body_count, (world + 1) * self.body_count)
         if not self.plan.contact:
             return np.zeros((0, 3)), np.zeros((0, 3))
-        return contact_forces(rows, self._memory, self.state, self.params, self.shapes, self.walls, self.plan.features)
+        return contact_forces(rows, self.memory, self.state, self.params, self.shapes, self.walls, self.plan.features)
 
     def touching(self, world: int = 0) -> set[tuple[int, int]]:
         """(body, wall) of every resting contact of one world at its last step."""
         if not self.plan.contact:
             return set()
         rows = range(world * self.body_count, (world + 1) * self.body_count)
-        return {(b, wall) for b, i in enumerate(rows) for wall in walls_touched(self._memory[i], self.plan.features)}
+        return {(b, wall) for b, i in enumerate(rows) for wall in walls_touched(self.memory[i], self.plan.features)}
 
     def __getstate__(self):
         kept = dict(vars(self))
-        for name in ("_pool", "_scratch", "pos", "quat", "linvel", "angvel"):
+        for name in ("pool", "scratch", "_wrench", "_calls", "_bound_for", "pos", "quat", "linvel", "angvel"):
             del kept[name]
         return kept
 
@@ -391,19 +307,3 @@ class World:
 
     def __repr__(self) -> str:
         return f"World({self.worlds} worlds of {self.body_count} bodies, dt={self.dt}, time={self.time:.6g} s)"
-
-
-_COMPILED: set[tuple] = set()
-
-
-class _compile_notice:
-    """Says on standard error that a kernel is being compiled, if it takes long enough to notice."""
-
-    def __enter__(self):
-        text = "rigid-env: compiling the kernel of this scene, once (it is kept for later runs) ..."
-        self._timer = threading.Timer(COMPILE_NOTICE, lambda: print(text, file=sys.stderr, flush=True))
-        self._timer.daemon = True
-        self._timer.start()
-
-    def __exit__(self, *_):
-        self._timer.cancel()

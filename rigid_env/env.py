@@ -88,7 +88,7 @@ class BlockReachEnv(RigidEnv):
     `gymnasium.make`.
 
     `info` holds `is_success`, `distance` [m], `speed` [m/s], `spin` [rad/s], and `physics_status`, a
-    `physics.Status`: 0 when every contact problem of the step was solved to its tolerance.
+    `physics.Status`: 0 when nothing went wrong in the step, contact problems above their tolerance included.
 
     ## Arguments
 
@@ -195,7 +195,7 @@ class BlockReorientEnv(RigidEnv):
     `gymnasium.make`.
 
     `info` holds `is_success`, `angle` [rad], `speed` [m/s], `spin` [rad/s], and `physics_status`, a
-    `physics.Status`: 0 when every contact problem of the step was solved to its tolerance.
+    `physics.Status`: 0 when nothing went wrong in the step, contact problems above their tolerance included.
 
     ## Arguments
 

@@ -124,7 +124,7 @@ class RigidVectorEnv(gym.vector.VectorEnv):
         self._waiting[rows] = False
         self._last_obs[...] = obs
         self._show()
-        return obs, self._infos(mask, None)
+        return obs, self._infos(mask)
 
     def step(self, actions) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, dict[str, Any]]:
         """Hold actions for one control step; see `gymnasium.vector.VectorEnv.step`.
@@ -156,7 +156,7 @@ class RigidVectorEnv(gym.vector.VectorEnv):
         truncations = np.zeros(self.num_envs, dtype=np.bool_)
         if self.max_episode_steps is not None:
             truncations = self._elapsed >= self.max_episode_steps
-        status, finals = task.physics_status(), {}
+        finals = {}
         if self.autoreset_mode is AutoresetMode.NEXT_STEP:
             rows = np.flatnonzero(self._ended)
             rewards[rows], terminations[rows], truncations[rows] = 0.0, False, False
@@ -164,16 +164,14 @@ class RigidVectorEnv(gym.vector.VectorEnv):
         if self.autoreset_mode is AutoresetMode.SAME_STEP:
             rows = np.flatnonzero(self._ended)
             if len(rows):
-                finals = self._finals(rows, obs, status)
+                finals = self._finals(rows, obs)
         if self.autoreset_mode is not AutoresetMode.DISABLED and len(rows):
             ended = self._ended
             self._begin(rows, obs, {})
             self._ended = ended & (self.autoreset_mode is AutoresetMode.NEXT_STEP)
-            if status is not None:
-                status[rows] = 0
         self._last_obs[...] = obs
         self._show()
-        return obs, rewards, terminations, truncations, {**self._infos(everyone, status), **finals}
+        return obs, rewards, terminations, truncations, {**self._infos(everyone), **finals}
 
     # --- parts of these -----------------------------------------------------------------------------------
 
@@ -191,7 +189,7 @@ class RigidVectorEnv(gym.vector.VectorEnv):
         self._elapsed[rows] = 0
         self._ended[rows] = False
 
-    def _infos(self, mask: np.ndarray, status: np.ndarray | None) -> dict[str, Any]:
+    def _infos(self, mask: np.ndarray) -> dict[str, Any]:
         """Info arrays with their masks, as `VectorEnv._add_info` makes them; zero where the mask is False."""
         outcome = self.task.outcome
         infos = {
@@ -199,12 +197,12 @@ class RigidVectorEnv(gym.vector.VectorEnv):
             self.task.error_name: np.where(mask, outcome[:, col.ERROR], 0.0),
             "speed": np.where(mask, outcome[:, col.SPEED], 0.0),
             "spin": np.where(mask, outcome[:, col.SPIN], 0.0),
-            "physics_status": np.zeros(self.num_envs, dtype=np.int64) if status is None else status * mask,
+            "physics_status": self.task.status * mask,
         }
         infos.update({f"_{key}": mask.copy() for key in tuple(infos)})
         return infos
 
-    def _finals(self, rows: np.ndarray, obs: np.ndarray, status: np.ndarray | None) -> dict[str, Any]:
+    def _finals(self, rows: np.ndarray, obs: np.ndarray) -> dict[str, Any]:
         """`final_obs` and `final_info` of the episodes that end, before their worlds start anew."""
         final_obs = np.full(self.num_envs, None, dtype=object)
         for i in rows:
@@ -213,7 +211,7 @@ class RigidVectorEnv(gym.vector.VectorEnv):
         return {
             "final_obs": final_obs,
             "_final_obs": mask.copy(),
-            "final_info": self._infos(mask, status),
+            "final_info": self._infos(mask),
             "_final_info": mask.copy(),
         }
 

@@ -9,6 +9,7 @@ from gymnasium.utils import seeding
 
 import physics
 from physics import checks
+from physics.report import gravest
 from rigid_env.tasks import layout as col
 from rigid_env.tasks.area import Area
 from rigid_env.tasks.entries import Entry
@@ -61,10 +62,8 @@ class Task:
     record : (worlds, RECORD_SIZE) float64
     outcome : (worlds, OUTCOME_SIZE) float64
         Of the last step, renewed in place.
-    wrench : (worlds, 1, 6) float64
-        Applied in the last step; force [N], torque [N m], world frame.
-    report : physics.StepReport or None
-        Of the last step.
+    status : (worlds,) int64
+        Values of `physics.Status`, of the last step, renewed in place; OK at the start of an episode.
 
     Raises
     ------
@@ -100,8 +99,8 @@ class Task:
         self.generators: list[np.random.Generator | None] = [None] * worlds
         self.record = np.zeros((worlds, col.RECORD_SIZE))
         self.outcome = np.zeros((worlds, col.OUTCOME_SIZE))
-        self.wrench = np.zeros((worlds, 1, AXES))
-        self.report = None
+        self.status = np.zeros(worlds, dtype=np.int64)
+        self._advance = physics.Stepper(self.world, self.frame_skip)
         self._actions = np.zeros((worlds, AXES))
         self._rows = np.arange(worlds)
         self._note_parameters(self._rows, self.parameters.draw(np.full((worlds, DRAW_COUNT), 0.5)))
@@ -110,6 +109,11 @@ class Task:
     def worlds(self) -> int:
         """Size of the batch."""
         return self.world.worlds
+
+    @property
+    def wrench(self) -> np.ndarray:
+        """(worlds, 1, 6) float64, applied in the last step: force [N], torque [N m], world frame."""
+        return self._advance.wrench
 
     @property
     def control_dt(self) -> float:
@@ -171,6 +175,7 @@ class Task:
         self.record[rows] = record
         self._note_parameters(rows, values)
         self.wrench[rows] = 0.0
+        self.status[rows] = physics.Status.OK
         self._kernel(rows, self.world.state, self.record, self.world.walls, None, obs, self.outcome)
 
     def _apply_start_options(self, starts: np.ndarray, options: dict) -> None:
@@ -231,12 +236,9 @@ class Task:
         bad = wrenches(self._actions, self.record, self.wrench)
         if bad >= 0:
             raise ValueError(f"action of world {bad} is {self._actions[bad].tolist()}; allowed are finite numbers")
-        self.report = self.world.step(self.wrench, steps=self.frame_skip)
+        self._advance()
+        gravest(self.world.report_table, self.status)
         self._kernel(self._rows, self.world.state, self.record, self.world.walls, self._actions, obs, self.outcome)
-
-    def physics_status(self) -> np.ndarray | None:
-        """(worlds,) int64, values of `physics.Status` for the last step; None: all is well."""
-        return None if self.report is None or self.report.ok else self.report.status
 
     # --- what a task is -----------------------------------------------------------------------------------
 

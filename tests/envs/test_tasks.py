@@ -296,3 +296,6 @@ def test_a_physics_fault_is_told():
     envs.task.world.state[1, physics.kernels.layout.LINVEL] = np.inf
     assert env.step(still[0])[4]["physics_status"] == physics.Status.FAULT
     assert envs.step(still)[4]["physics_status"].tolist() == [physics.Status.OK, physics.Status.FAULT]
+    assert env.reset()[1]["physics_status"] == physics.Status.OK
+    mask = np.array([False, True])
+    assert envs.reset(options={"reset_mask": mask})[1]["physics_status"].tolist() == [physics.Status.OK] * 2

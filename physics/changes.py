@@ -1,0 +1,122 @@
+"""Changes to a running world from outside: checked first, then written, all or nothing."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from physics import checks, parameters
+from physics.kernels import layout as at
+from physics.kernels.probe import angular_momenta, deepest_gaps
+
+if TYPE_CHECKING:
+    from physics.world import World
+
+# A body may be put this deep into a wall, in bounding radii: what a rounded or hand-typed pose may be off by.
+START_DEPTH = 1e-2
+
+
+def set_state(world: World, pos, quat, linvel, angvel, worlds) -> None:
+    """`World.set_state`, which documents it."""
+    chosen = _chosen(world, worlds)
+    rows = _rows(world, chosen)
+    state = world.state[rows]
+    given = (("pos", pos, at.POS, 3), ("quat", quat, at.QUAT, 4), ("linvel", linvel, at.LINVEL, 3),
+             ("angvel", angvel, at.ANGVEL, 3))  # fmt: skip
+    for name, value, first, size in given:
+        if value is None:
+            continue
+        check = checks.unit_quaternion if name == "quat" else checks.finite
+        value = check(value, (len(chosen), world.body_count, size), name)
+        state[:, first : first + size] = value.reshape(-1, size)
+    _adopt(world, chosen, rows, state, world.params[rows], "set_state")
+
+
+def set_parameters(world: World, mass, size, inertia_body, friction, restitution, gravity, worlds) -> None:
+    """`World.set_parameters`, which documents it."""
+    chosen = _chosen(world, worlds)
+    rows = _rows(world, chosen)
+    params = world.params[rows]
+    plan, shape = world.plan, (len(chosen), world.body_count)
+    if mass is not None or size is not None or inertia_body is not None:
+        parameters.change_inertia(params, world.scene.bodies, plan, mass, size, inertia_body, shape)
+    if friction is not None:
+        _needs("friction", plan.friction, "physics.Friction(...)")
+        params[:, at.FRICTION] = checks.non_negative(*parameters.spread(friction, shape, "friction")).ravel()
+    if restitution is not None:
+        _needs("restitution", plan.restitution, "physics.Contact(restitution=...)")
+        params[:, at.RESTITUTION] = checks.share(*parameters.spread(restitution, shape, "restitution")).ravel()
+    field = None
+    if gravity is not None:
+        _needs("gravity", plan.gravity, "physics.Gravity(...)")
+        field = np.broadcast_to(checks.finite(gravity, np.shape(gravity), "gravity"), (len(chosen), 3))
+    _adopt(world, chosen, rows, world.state[rows], params, "set_parameters", keep_memory=size is None)
+    if field is not None:
+        world.gravity[chosen] = field
+
+
+def check_depth(world: World, state: np.ndarray, params: np.ndarray, chosen: np.ndarray, what: str) -> None:
+    """Refuse bodies that are deep inside a wall.
+
+    Parameters
+    ----------
+    world : World
+    state, params : (k * bodies, STATE_SIZE | PARAM_SIZE) float64
+        Rows to look at.
+    chosen : (k,) int64
+        The worlds that these rows belong to.
+    what : str
+        What the message begins with.
+
+    Raises
+    ------
+    ValueError
+        Naming the first such body, where it is, and how deep it may be.
+    """
+    if not world.plan.contact:
+        return
+    gaps, which = np.empty(len(state)), np.empty(len(state), np.int64)
+    deepest_gaps(np.arange(len(state)), state, params, world.shapes, world.walls, gaps, which)
+    bad = np.flatnonzero(gaps < -START_DEPTH * params[:, at.RADIUS])
+    if len(bad):
+        k = int(bad[0])
+        raise ValueError(
+            f"{what}: pos {state[k, at.POS : at.POS + 3].tolist()} of body {k % world.body_count} in world "
+            f"{int(chosen[k // world.body_count])} is {-gaps[k]:.6g} m inside walls[{which[k]}]; allowed is at most "
+            f"{START_DEPTH * params[k, at.RADIUS]:.3g} m"
+        )
+
+
+def _adopt(world: World, chosen, rows, state, params, what, keep_memory=False) -> None:
+    """Check new rows of state and parameters, then write them."""
+    check_depth(world, state, params, chosen, what)
+    angular_momenta(np.arange(len(rows)), state, params)
+    world.state[rows] = state
+    world.params[rows] = params
+    if world.plan.contact and not keep_memory:
+        world.memory[rows] = 0.0
+
+
+def _needs(field: str, is_on, effect: str) -> None:
+    if not is_on:
+        raise ValueError(f"{field} was given, but the scene does not declare it; add {effect} to Scene.effects")
+
+
+def _chosen(world: World, worlds) -> np.ndarray:
+    """Indices (k,) int64 of the worlds meant by what a user gives."""
+    if worlds is None:
+        return np.arange(world.worlds)
+    chosen = np.asarray(worlds)
+    if chosen.dtype == bool and chosen.shape == (world.worlds,):
+        chosen = np.flatnonzero(chosen)
+    if chosen.ndim != 1 or (chosen.size and not np.issubdtype(chosen.dtype, np.integer)):
+        raise ValueError(f"worlds is {worlds!r}; allowed are indices or a mask of {world.worlds} worlds")
+    if chosen.size and not (chosen.min() >= 0 and chosen.max() < world.worlds):
+        raise ValueError(f"worlds is {worlds!r}; allowed are indices from 0 to {world.worlds - 1}")
+    return chosen.astype(np.int64)
+
+
+def _rows(world: World, chosen: np.ndarray) -> np.ndarray:
+    """Rows (k * bodies,) of these worlds in the arrays of bodies."""
+    return (chosen[:, None] * world.body_count + np.arange(world.body_count)).ravel()

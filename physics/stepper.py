@@ -1,0 +1,123 @@
+"""A step prepared once and taken often: from a world to bound calls of its compiled kernel."""
+
+from __future__ import annotations
+
+import sys
+import threading
+from collections.abc import Callable
+from functools import partial
+from typing import TYPE_CHECKING
+
+import numba
+import numpy as np
+
+from physics import checks
+from physics.kernels.step import step_worlds
+
+if TYPE_CHECKING:
+    from physics.world import World
+
+# Seconds after which the first step of a plan says that it is compiling.
+COMPILE_NOTICE = 1.0
+
+
+class Stepper:
+    """The same step of a world again and again, with all that can be checked or looked up done before.
+
+    For loops in which that takes longer than the step of one world itself: the wrench is an array to write into,
+    and a call is the step alone.
+
+    Parameters
+    ----------
+    world : World
+    steps : int
+        Steps that one call takes.
+    dt : float, optional
+        Time of one of them, instead of the world's [s].
+    has_wrench : bool
+        Whether there is one; without, its part of the kernel is left out.
+
+    Raises
+    ------
+    ValueError
+        `steps` is not a positive integer, or `dt` not a positive number.
+    """
+
+    def __init__(self, world: World, steps: int = 1, dt: float | None = None, has_wrench: bool = True):
+        self.world = world
+        self.steps = checks.count(steps, "steps")
+        self.dt = world.dt if dt is None else float(checks.positive(dt, (), "dt"))
+        self._wrench = world.no_wrench() if has_wrench else None
+        self._calls: list[Callable[[], None]] | None = None
+
+    @property
+    def wrench(self) -> np.ndarray | None:
+        """(worlds, bodies, 6) float64 to write into: force [N] and torque about the centre of mass [N m].
+
+        World frame, held during a call; None without wrench. What is in it is not checked: a body whose new state
+        is not finite keeps the old one, and `World.report` says so.
+        """
+        return self._wrench
+
+    def __call__(self) -> None:
+        """Advance every world by `steps` times `dt`."""
+        if self._calls is None:
+            self._calls = kernel_calls(self.world, self._wrench, self.steps, self.dt)
+        self.world.advance(self._calls, self.steps * self.dt)
+
+    def __getstate__(self):
+        return {**vars(self), "_calls": None}  # machine code belongs to the process
+
+
+def kernel_calls(world: World, wrench: np.ndarray | None, steps: int, dt: float) -> list[Callable[[], None]]:
+    """One call of the step kernel for each slice of the batch, all arguments bound.
+
+    Parameters
+    ----------
+    world : World
+        Its arrays are bound, not the world itself: it may keep the calls, and is freed with its last user.
+    wrench : (worlds, bodies, 6) float64, contiguous and writable, or None
+        What it holds when a call is made counts.
+    steps : int
+    dt : float
+        [s].
+    """
+    plan, substeps = world.plan, world.accuracy.substeps
+    argument_lists = [
+        (
+            first, last, steps, substeps, dt / substeps, world.state, world.params, world.shapes,
+            world.gravity if plan.gravity else None, None if wrench is None else wrench.reshape(-1, 6),
+            plan.contact, plan.friction, plan.smooth, plan.restitution, plan.gyroscopic, plan.tilted, plan.pivots,
+            plan.scheme, world.memory, world.report_table, scratch,
+        )
+        for (first, last), scratch in zip(world.pool.slices, world.scratch)
+    ]  # fmt: skip
+    machine_code = _machine_code((plan.key, wrench is None, len(world.walls)), argument_lists[0])
+    return [partial(machine_code, *arguments) for arguments in argument_lists]
+
+
+def _machine_code(key: tuple, arguments: tuple) -> Callable[..., None]:
+    """The step kernel compiled for arguments of these types, which `key` determines.
+
+    Calling it directly leaves out Numba's dispatcher, which would find out the types of all arguments each time.
+    """
+    if key not in _COMPILED:
+        with _compile_notice():
+            _COMPILED[key] = step_worlds.compile(tuple(map(numba.typeof, arguments)))
+    return _COMPILED[key]
+
+
+_COMPILED: dict[tuple, Callable[..., None]] = {}
+
+
+class _compile_notice:
+    """Says on standard error that a kernel is being compiled, if it takes long enough to notice."""
+
+    def __enter__(self):
+        text = "rigid-env: compiling the kernel of this scene, once (it is kept for later runs) ..."
+        self._timer = threading.Timer(COMPILE_NOTICE, lambda: print(text, file=sys.stderr, flush=True))
+        self._timer.daemon = True
+        self._timer.start()
+
+    def __exit__(self, *_):
+        self._timer.cancel()
