@@ -65,7 +65,7 @@ def _numba_cache_in(folder: Path):
 
 def _compile(function, **options):
     with _numba_cache_in(cache_dir()):
-        return numba.njit(cache=True, error_model="numpy", nogil=True, **options)(function)
+        return numba.njit(cache=True, error_model="numpy", nogil=True, _nrt=False, **options)(function)
 
 
 def kernel(function):

@@ -11,6 +11,9 @@ from physics.kernels.layout import BLOCK, NORMAL, OFFSET, VERTEX_COUNT
 # λ² - (1 - β/2) λ + β/2 = 0, the root is double (fastest approach without overshoot) for β = 6 - 4√2.
 CLOSING_SHARE = 0.3431457505076198
 
+# Share of the slop below which the displacement of a contact in one step does not count.
+UNSEEN = 1.0e-3
+
 
 @inlined
 def wall_normal(walls, k):
@@ -203,12 +206,13 @@ def aim_rest(n, w, h, work):
     The impulses act at the middle of the step, the velocity is asked for at its end, half a step later: a
     vertex that the body turns about has by then gained h/2 ω x (ω x r), so that is taken off. A feature still
     above the wall may close `CLOSING_SHARE` of its gap (all of it in a substep's last stage). What is smaller
-    than the tolerance of the solve is 0, so that a body comes to rest to the last bit.
+    than the tolerance of the solve, or would move a contact by less than `UNSEEN` slops in the step, is 0: a body
+    comes to rest to the last bit, and contacts that hold are not asked to move apart by next to nothing.
     """
     walls, features, shape = work.walls, work.features, work.shape
     half = 0.5 * h
     is_turning = (w[0] != 0.0 or w[1] != 0.0 or w[2] != 0.0) and shape == BLOCK
-    negligible = work.tolerance * work.acceleration * h
+    negligible = max(work.tolerance * work.acceleration * h, UNSEEN * work.slop / h)
     share = 1.0 if work.is_last else CLOSING_SHARE
     for i in range(n):
         t0 = t1 = t2 = 0.0

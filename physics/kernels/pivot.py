@@ -16,8 +16,8 @@ import math
 from physics.kernels.compiler import kernel
 from physics.kernels.patch import MOBILITY, SPEED, TARGET_A, TARGET_B, A, B, C, P, X, Y, across_misses
 
-# Rounds on ω_n at most: one when the sense is guessed right and all targets agree.
-PIVOT_LIMIT = 4
+# Rounds on ω_n at most: one when the sense is guessed right and all targets agree, two when it is the other sense.
+PIVOT_LIMIT = 3
 
 # What came out.
 NOT_FOUND, FOUND, SLIPS, PULLS = range(4)

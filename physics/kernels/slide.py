@@ -141,12 +141,14 @@ def _normal_motion(n, count, goal, work):
 
 
 @inlined
-def _slowest(count, mu, step, hurry, work):
-    """The active contact that is slowest after a step, if it is STOPPING or there is a `hurry`; else -1."""
+def _slowest(count, mu, step, tried, hurry, work):
+    """The active contact, not yet `tried`, that is slowest after a step, if it is STOPPING or in a `hurry`; or -1."""
     patch = work.patch
     best, found = math.inf, -1
     for j in range(count):
         i = work.active[j]
+        if tried & (1 << i):
+            continue
         x, y, size = patch[i, X], patch[i, Y], patch[i, SPEED]
         da, db = step[0] - step[2] * patch[i, B], step[1] + step[2] * patch[i, A]
         s = size / mu
@@ -204,7 +206,7 @@ def _search(n, patient, mu, goal, start, u, w, inv_mass, K, work):
         y0, gain = push / count, (wa - w[1], wb - w[2])
         if pivot >= 0:
             tried |= 1 << pivot
-            what, loser, total, miss, motion = turn_about(
+            what, loser, total, miss, slip = turn_about(
                 pivot, count, mu, goal, center, y0, gain, u, w, wa, wb, motion[2], inv_mass, K, work
             )
             if what == FOUND:
@@ -212,8 +214,8 @@ def _search(n, patient, mu, goal, start, u, w, inv_mass, K, work):
                 return True, total, push, miss
             if what == PULLS:
                 count, is_set, tried = _drop(loser, count, work), False, 0
-            elif what != SLIPS:
-                motion = start
+            elif what == SLIPS:
+                motion = slip
             pivot = -1
             continue
         y, compliance = respond(count, mu, center, y0, gain, motion, wa, wb, inv_mass, K, work)
@@ -235,10 +237,8 @@ def _search(n, patient, mu, goal, start, u, w, inv_mass, K, work):
                     motion = (stretch * motion[0], stretch * motion[1], stretch * motion[2])
                     continue
                 step = _newton(compliance, add_along(count, mu, k, work), delta)
-                pivot = _slowest(count, mu, step, hurry, work)
+                pivot = _slowest(count, mu, step, tried, hurry, work)
                 hurry = True
-                if pivot >= 0 and tried & (1 << pivot):
-                    pivot = -1
             motion = (motion[0] + step[0], motion[1] + step[1], motion[2] + step[2])
         if loser >= 0 and is_settled:
             count, is_set, tried = _drop(loser, count, work), False, 0

@@ -98,10 +98,12 @@ def _apply(n, width, v, L, work):
 def _may_hold(n, v, work):
     """Whether to try first that all contacts hold.
 
-    A face that holds on a wall stops the centre of mass (but for small targets), so that friction has to undo
-    the tangential velocity and the normal impulses the normal one: |v_t| <= μ |v_n|. For an edge or a vertex,
-    and for several walls, it is what worked last.
+    A face that holds on a wall stops the centre of mass (but for small targets), so that friction has to undo the
+    tangential velocity and the normal impulses the normal one: |v_t| <= μ |v_n|. `slide` knows all about a single
+    contact. For an edge and for several walls it is what worked last.
     """
+    if n == 1:
+        return False
     wall = work.slot[0] // work.features
     if n < 3 or work.slot[n - 1] // work.features != wall:
         return work.mode == HOLD

@@ -16,6 +16,8 @@ What a scene does not have arrives here as None and is pruned by the compiler (s
 
 from __future__ import annotations
 
+import math
+
 from physics.kernels import layout as at
 from physics.kernels.body import angular_velocity, bind_body, is_finite, read_state, write_state
 from physics.kernels.compiler import inlined, kernel
@@ -24,8 +26,7 @@ from physics.kernels.flight import fly, fly_by_scheme
 from physics.kernels.quaternion import to_matrix
 from physics.kernels.stages import impact, store_warm_start, touch
 
-# Trials of one time of impact. A secant step on a nearly straight gap gains digits at each; Illinois' halving
-# keeps the bracket shrinking from both sides where the gap is curved.
+# Trials of one time of impact: a secant, then parabolas through the last three. Three are usual.
 IMPACT_TRIALS = 16
 
 
@@ -79,14 +80,32 @@ def kept_out(y, work):
     return push_out(y[0], to_matrix(y[1]), work), y[1], y[2], y[3]
 
 
+@inlined
+def second_difference(a, fa, b, fb, c, fc):
+    """Second divided difference of three values: half of a parabola's second derivative; 0 of equal places."""
+    if not (a < b < c):
+        return 0.0
+    return ((fc - fb) / (c - b) - (fb - fa) / (b - a)) / (c - a)
+
+
+@inlined
+def crossing(low_gap, high_gap, width, bend):
+    """Where the parabola from low_gap >= 0 to high_gap < 0, `width` later, first is zero: within [0, width].
+
+    With the slope B at its start and `bend` c, c x² + B x + low_gap = 0, in the form that does not cancel.
+    """
+    B = (high_gap - low_gap) / width - bend * width
+    return 2.0 * low_gap / (math.sqrt(max(B * B - 4.0 * bend * low_gap, 0.0)) - B)
+
+
 @kernel
 def to_next_impact(n, y, h, friction, smooth, gyroscopic, tilted, pivots, scheme, memory, report, work):
     """Advance by h, or to the first impact within h: (state, time advanced).
 
-    An end state in which a feature outside the contact set has passed through a wall is taken back and the
-    stage shortened (Illinois' regula falsi on the smallest gap) until the feature is within half a slop of it.
+    An end state in which a feature outside the contact set has passed through a wall is taken back and the stage
+    shortened until the feature is within half a slop of it: `crossing` of the smallest gap.
     """
-    t, low, low_gap, high, high_gap, side = h, 0.0, 0.0, h, 0.0, 0
+    t, low, low_gap, high, high_gap, bend = h, 0.0, 0.0, h, 0.0, 0.0
     end = y
     for trial in range(IMPACT_TRIALS + 1):
         end = advance(n, y, t, friction, smooth, gyroscopic, tilted, pivots, scheme, memory, report, work)
@@ -97,17 +116,13 @@ def to_next_impact(n, y, h, friction, smooth, gyroscopic, tilted, pivots, scheme
             break
         if trial == 0:
             low_gap, high_gap = max(outside_gap(y, work), 0.0), gap
-        elif gap > 0.0:
-            low, low_gap = t, gap
-            if side > 0:
-                high_gap *= 0.5
-            side = 1
         else:
-            high, high_gap = t, gap
-            if side < 0:
-                low_gap *= 0.5
-            side = -1
-        t = low + (high - low) * low_gap / (low_gap - high_gap)
+            bend = second_difference(low, low_gap, t, gap, high, high_gap)
+            if gap > 0.0:
+                low, low_gap = t, gap
+            else:
+                high, high_gap = t, gap
+        t = low + crossing(low_gap, high_gap, high - low, bend)
     return end, t
 
 
