@@ -73,7 +73,9 @@ def kernel(function):
 
     `error_model="numpy"` makes a division by zero an inf and not an exception
     (no exception path inside a kernel); there is no `fastmath`, so results do
-    not depend on how the optimiser reorders a sum.
+    not depend on how the optimiser reorders a sum. Without Numba's run time
+    (`_nrt`) there are no reference counts to keep, nor can a kernel allocate:
+    arrays are lent to it, and views of the workspace need no owner.
 
     Switches among the arguments are passed as ``None`` (off) or ``True`` (on):
     Numba prunes a branch on ``x is None`` while compiling, in every callee, so

@@ -256,5 +256,6 @@ def normal_fallback(W, b, n, p, work, index, max_pivots):
     z = work[size : size + n]
     status, pivots = dantzig(W, b[:n], z, work[:size].reshape((2 * n + 6, n)), index, max_pivots)
     if status == SOLVED:
-        p[:n] = z
+        for i in range(n):
+            p[i] = z[i]
     return status, pivots
