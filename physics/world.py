@@ -46,7 +46,7 @@ class World:
     accuracy : str or Accuracy
         ``fast``, ``balanced``, ``precise``, ``reference``, or a `physics.Accuracy`.
     threads : int
-        Threads that share a step; the worlds are cut into as many slices.
+        Threads that share a step; the worlds are cut into slices for them.
 
     Attributes
     ----------
