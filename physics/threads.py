@@ -11,7 +11,6 @@ from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from itertools import pairwise
 
-
 # Slices per thread: worlds in contact take several times as long as others, and a thread that is done with its
 # slices takes the next one. Each costs a microsecond.
 SLICES_PER_THREAD = 8
