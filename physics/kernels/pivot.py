@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import math
 
-from physics.kernels.compiler import kernel
+from physics.kernels.compiler import inlined, kernel
 from physics.kernels.patch import MOBILITY, SPEED, TARGET_A, TARGET_B, A, B, C, P, X, Y, across_misses
 
 # Rounds on ω_n at most: one when the sense is guessed right and all targets agree, two when it is the other sense.
@@ -21,6 +21,97 @@ PIVOT_LIMIT = 3
 
 # What came out.
 NOT_FOUND, FOUND, SLIPS, PULLS = range(4)
+
+
+@inlined
+def _point_at(k, count, mu, center, wa, wb, spin, K, work):
+    """Directions of the contacts that slide about contact k, for ω_n = spin, and sums over all of them.
+
+    Returns
+    -------
+    x, y, f, g, h : tuples of 3 floats
+        Of the impulse per normal impulse along the two tangents and of the response (ω_n, ω_a, ω_b) to it: sums with
+        the weights 1, a, b (about the centroid).
+    """
+    patch = work.patch
+    ck, ak, bk = patch[k, C], patch[k, A], patch[k, B]
+    x0 = x1 = x2 = y0 = y1 = y2 = 0.0
+    f0 = f1 = f2 = g0 = g1 = g2 = h0 = h1 = h2 = 0.0
+    for j in range(count):
+        i = work.active[j]
+        c, a, b = patch[i, C], patch[i, A], patch[i, B]
+        x = y = 0.0
+        if i != k:
+            ua = wb * (c - ck) - spin * (b - bk) + (patch[k, TARGET_A] - patch[i, TARGET_A])
+            ub = spin * (a - ak) - wa * (c - ck) + (patch[k, TARGET_B] - patch[i, TARGET_B])
+            size = math.sqrt(ua * ua + ub * ub)
+            s = 0.0
+            if size > 0.0:
+                s = -mu / size
+            x, y = s * ua, s * ub
+            patch[i, SPEED] = size
+        patch[i, X], patch[i, Y] = x, y
+        mn, ma, mb = a * y - b * x, b - c * y, c * x - a
+        f = K[0] * mn + K[1] * ma + K[2] * mb
+        g = K[1] * mn + K[3] * ma + K[4] * mb
+        h = K[2] * mn + K[4] * ma + K[5] * mb
+        a -= center[1]
+        b -= center[2]
+        x0, x1, x2 = x0 + x, x1 + a * x, x2 + b * x
+        y0, y1, y2 = y0 + y, y1 + a * y, y2 + b * y
+        f0, f1, f2 = f0 + f, f1 + a * f, f2 + b * f
+        g0, g1, g2 = g0 + g, g1 + a * g, g2 + b * g
+        h0, h1, h2 = h0 + h, h1 + a * h, h2 + b * h
+    return (x0, x1, x2), (y0, y1, y2), (f0, f1, f2), (g0, g1, g2), (h0, h1, h2)
+
+
+@inlined
+def _hold_at(k, sums, y0, gain, u, w, wa, wb, inv_mass, K, work):
+    """Impulse (f_a, f_b) across contact k, (y_1, y_2), and the ω_n that they lead to."""
+    x, y, f, g, h = sums
+    patch = work.patch
+    ck, ak, bk = patch[k, C], patch[k, A], patch[k, B]
+    # Response (ω_n, ω_a, ω_b) to f_a and to f_b.
+    pn, pa, pb = ck * K[2] - bk * K[0], ck * K[4] - bk * K[1], ck * K[5] - bk * K[2]
+    qn, qa, qb = ak * K[0] - ck * K[1], ak * K[1] - ck * K[3], ak * K[2] - ck * K[4]
+    s = 1.0 / (g[1] * h[2] - g[2] * h[1])
+    ra, rb = gain[0] - g[0] * y0, gain[1] - h[0] * y0
+    r1, r2 = s * (h[2] * ra - g[2] * rb), s * (g[1] * rb - h[1] * ra)
+    e11, e21 = s * (h[2] * pa - g[2] * pb), s * (g[1] * pb - h[1] * pa)
+    e12, e22 = s * (h[2] * qa - g[2] * qb), s * (g[1] * qb - h[1] * qa)
+    free = w[0] + f[0] * y0 + f[1] * r1 + f[2] * r2
+    wfa, wfb = pn - f[1] * e11 - f[2] * e21, qn - f[1] * e12 - f[2] * e22
+    maa = inv_mass * (1.0 - x[1] * e11 - x[2] * e21) - bk * wfa
+    mab = -inv_mass * (x[1] * e12 + x[2] * e22) - bk * wfb
+    mba = -inv_mass * (y[1] * e11 + y[2] * e21) + ak * wfa
+    mbb = inv_mass * (1.0 - y[1] * e12 - y[2] * e22) + ak * wfb
+    va = patch[k, TARGET_A] - u[1] - wb * ck - inv_mass * (x[0] * y0 + x[1] * r1 + x[2] * r2) + free * bk
+    vb = patch[k, TARGET_B] - u[2] + wa * ck - inv_mass * (y[0] * y0 + y[1] * r1 + y[2] * r2) - free * ak
+    s = 1.0 / (maa * mbb - mab * mba)
+    fa, fb = s * (mbb * va - mab * vb), s * (maa * vb - mba * va)
+    return (fa, fb), (r1 - e11 * fa - e12 * fb, r2 - e21 * fa - e22 * fb), free + wfa * fa + wfb * fb
+
+
+@inlined
+def _load(k, count, center, y0, y, f, work):
+    """Normal impulses of the active contacts: place of the one that pulls most or -1, and what all exert."""
+    patch = work.patch
+    ck, ak, bk = patch[k, C], patch[k, A], patch[k, B]
+    lowest = 0.0
+    loser = -1
+    fa, fb, tn, ta, tb = f[0], f[1], ak * f[1] - bk * f[0], -ck * f[1], ck * f[0]
+    for j in range(count):
+        i = work.active[j]
+        c, a, b = patch[i, C], patch[i, A], patch[i, B]
+        p = y0 + (y[0] * (a - center[1]) + y[1] * (b - center[2]))
+        patch[i, P] = p
+        if not p >= lowest:
+            lowest = p
+            loser = j
+        px, py = p * patch[i, X], p * patch[i, Y]
+        fa, fb, tn = fa + px, fb + py, tn + (a * py - b * px)
+        ta, tb = ta + (b * p - c * py), tb + (c * px - a * p)
+    return loser, (fa, fb, tn, ta, tb)
 
 
 @kernel
@@ -51,84 +142,27 @@ def turn_about(k, count, mu, goal, center, y0, gain, u, w, wa, wb, spin, inv_mas
     """
     patch = work.patch
     ck, ak, bk = patch[k, C], patch[k, A], patch[k, B]
-    ta, tb = patch[k, TARGET_A], patch[k, TARGET_B]
-    # Response (ω_n, ω_a, ω_b) to f_a and to f_b.
-    pn, pa, pb = ck * K[2] - bk * K[0], ck * K[4] - bk * K[1], ck * K[5] - bk * K[2]
-    qn, qa, qb = ak * K[0] - ck * K[1], ak * K[1] - ck * K[3], ak * K[2] - ck * K[4]
-    none = (0.0, 0.0, 0.0, 0.0, 0.0)
-    still = (0.0, 0.0, 0.0)
-    patch[k, X] = patch[k, Y] = patch[k, SPEED] = 0.0
+    none, still = (0.0, 0.0, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
+    patch[k, SPEED] = 0.0
     for _ in range(PIVOT_LIMIT):
-        x0 = x1 = x2 = y_0 = y1 = y2 = 0.0
-        f0 = f1 = f2 = g0 = g1 = g2 = h0 = h1 = h2 = 0.0
-        for j in range(count):
-            i = work.active[j]
-            c, a, b = patch[i, C], patch[i, A], patch[i, B]
-            x = y = 0.0
-            if i != k:
-                ua = wb * (c - ck) - spin * (b - bk) + (ta - patch[i, TARGET_A])
-                ub = spin * (a - ak) - wa * (c - ck) + (tb - patch[i, TARGET_B])
-                size = math.sqrt(ua * ua + ub * ub)
-                s = 0.0
-                if size > 0.0:
-                    s = -mu / size
-                x, y = s * ua, s * ub
-                patch[i, X], patch[i, Y], patch[i, SPEED] = x, y, size
-            mn, ma, mb = a * y - b * x, b - c * y, c * x - a
-            f = K[0] * mn + K[1] * ma + K[2] * mb
-            g = K[1] * mn + K[3] * ma + K[4] * mb
-            h = K[2] * mn + K[4] * ma + K[5] * mb
-            a -= center[1]
-            b -= center[2]
-            x0, x1, x2 = x0 + x, x1 + a * x, x2 + b * x
-            y_0, y1, y2 = y_0 + y, y1 + a * y, y2 + b * y
-            f0, f1, f2 = f0 + f, f1 + a * f, f2 + b * f
-            g0, g1, g2 = g0 + g, g1 + a * g, g2 + b * g
-            h0, h1, h2 = h0 + h, h1 + a * h, h2 + b * h
-        s = 1.0 / (g1 * h2 - g2 * h1)
-        ra, rb = gain[0] - g0 * y0, gain[1] - h0 * y0
-        r1, r2 = s * (h2 * ra - g2 * rb), s * (g1 * rb - h1 * ra)
-        e11, e21 = s * (h2 * pa - g2 * pb), s * (g1 * pb - h1 * pa)
-        e12, e22 = s * (h2 * qa - g2 * qb), s * (g1 * qb - h1 * qa)
-        free = w[0] + f0 * y0 + f1 * r1 + f2 * r2
-        wfa, wfb = pn - f1 * e11 - f2 * e21, qn - f1 * e12 - f2 * e22
-        maa = inv_mass * (1.0 - x1 * e11 - x2 * e21) - bk * wfa
-        mab = -inv_mass * (x1 * e12 + x2 * e22) - bk * wfb
-        mba = -inv_mass * (y1 * e11 + y2 * e21) + ak * wfa
-        mbb = inv_mass * (1.0 - y1 * e12 - y2 * e22) + ak * wfb
-        va = ta - u[1] - wb * ck - inv_mass * (x0 * y0 + x1 * r1 + x2 * r2) + free * bk
-        vb = tb - u[2] + wa * ck - inv_mass * (y_0 * y0 + y1 * r1 + y2 * r2) - free * ak
-        s = 1.0 / (maa * mbb - mab * mba)
-        fa, fb = s * (mbb * va - mab * vb), s * (maa * vb - mba * va)
-        y1, y2 = r1 - e11 * fa - e12 * fb, r2 - e21 * fa - e22 * fb
-        turned = free + wfa * fa + wfb * fb
-        lowest = 0.0
-        loser = -1
-        sa, sb, sn, ma, mb = fa, fb, ak * fb - bk * fa, -ck * fb, ck * fa
-        for j in range(count):
-            i = work.active[j]
-            c, a, b = patch[i, C], patch[i, A], patch[i, B]
-            p = y0 + (y1 * (a - center[1]) + y2 * (b - center[2]))
-            patch[i, P] = p
-            if not p >= lowest:
-                lowest = p
-                loser = j
-            px, py = p * patch[i, X], p * patch[i, Y]
-            sa, sb, sn = sa + px, sb + py, sn + (a * py - b * px)
-            ma, mb = ma + (b * p - c * py), mb + (c * px - a * p)
+        sums = _point_at(k, count, mu, center, wa, wb, spin, K, work)
+        (fa, fb), y, turned = _hold_at(k, sums, y0, gain, u, w, wa, wb, inv_mass, K, work)
+        loser, total = _load(k, count, center, y0, y, (fa, fb), work)
         change = turned - spin
         miss, _ = across_misses(count, mu, k, (change * bk, -change * ak, change), work)
         if not math.isfinite(turned):
-            return NOT_FOUND, -1, none, miss, still
+            break
         if miss <= goal:
-            motion = (ta - wb * ck + turned * bk, tb + wa * ck - turned * ak, turned)
+            motion = (
+                patch[k, TARGET_A] - wb * ck + turned * bk, patch[k, TARGET_B] + wa * ck - turned * ak, turned
+            )  # fmt: skip
             if loser >= 0:
                 return PULLS, loser, none, miss, motion
             size, load = math.sqrt(fa * fa + fb * fb), mu * patch[k, P]
             if size <= load:
                 s = 1.0 / patch[k, P]
                 patch[k, X], patch[k, Y] = s * fa, s * fb
-                return FOUND, -1, (sa, sb, sn, ma, mb), miss, motion
+                return FOUND, -1, total, miss, motion
             s = (size - load) * patch[k, MOBILITY] / size
             return SLIPS, -1, none, miss, (motion[0] - s * fa, motion[1] - s * fb, turned)
         spin = turned

@@ -67,9 +67,8 @@ SLIDE_LIMIT = 16
 # such step, the slowest one whatever is left.
 STOPPING = 0.3
 
-# A motion that is too fast by more than 1/STRETCH_LIMIT is slowed first, to SHRINK_AT_MOST of it in one step.
+# A motion too fast by more than 1/STRETCH_LIMIT is slowed first.
 STRETCH_LIMIT = 0.4
-SHRINK_AT_MOST = 0.02
 
 # What to try first (`work.mode`): all hold, all slide, or PIVOT + the slot of the contact that holds.
 HOLD, SLIDE, PIVOT = range(3)
@@ -160,6 +159,21 @@ def _slowest(count, mu, step, tried, hurry, work):
 
 
 @inlined
+def _turn(count, mu, compliance, k, motion, delta, gyration2, tried, hurry, work):
+    """The next motion by Newton's step, or what replaces it: (whether it was Newton's, pivot to try or -1, motion)."""
+    step = _newton(compliance, k, delta)
+    is_settled = turns_little(count, mu, step, work)
+    pivot = -1
+    if not is_settled:
+        stretch = _stretch(motion, delta, gyration2)
+        if 0.0 < stretch < STRETCH_LIMIT:
+            return False, -1, (stretch * motion[0], stretch * motion[1], stretch * motion[2])
+        step = _newton(compliance, add_along(count, mu, k, work), delta)
+        pivot = _slowest(count, mu, step, tried, hurry, work)
+    return is_settled, pivot, (motion[0] + step[0], motion[1] + step[1], motion[2] + step[2])
+
+
+@inlined
 def _first_pivot(n, work):
     """The contact that held alone in the step before, or -1."""
     if work.mode >= PIVOT:
@@ -229,17 +243,10 @@ def _search(n, patient, mu, goal, start, u, w, inv_mass, K, work):
             if loser < 0 and miss <= goal:
                 work.mode = SLIDE
                 return True, total, push, miss
-            step = _newton(compliance, k, delta)
-            is_settled = turns_little(count, mu, step, work)
-            if not is_settled:
-                stretch = _stretch(motion, delta, inv_mass / K[0])
-                if 0.0 < stretch < STRETCH_LIMIT:
-                    motion = (stretch * motion[0], stretch * motion[1], stretch * motion[2])
-                    continue
-                step = _newton(compliance, add_along(count, mu, k, work), delta)
-                pivot = _slowest(count, mu, step, tried, hurry, work)
-                hurry = True
-            motion = (motion[0] + step[0], motion[1] + step[1], motion[2] + step[2])
+            is_settled, pivot, motion = _turn(
+                count, mu, compliance, k, motion, delta, inv_mass / K[0], tried, hurry, work
+            )
+            hurry = hurry or not is_settled
         if loser >= 0 and is_settled:
             count, is_set, tried = _drop(loser, count, work), False, 0
             if not patient:
