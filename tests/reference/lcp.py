@@ -47,7 +47,7 @@ def project_on_cone(p, mu):
     p = np.array(p, float)
     for row, m in zip(p, mu):
         length = np.hypot(row[1], row[2])
-        if length <= m * row[0]:
+        if row[0] >= 0.0 and length <= m * row[0]:
             continue
         if m * length <= -row[0]:
             row[:] = 0.0
