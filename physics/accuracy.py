@@ -31,7 +31,7 @@ class Accuracy:
         applied torque), or a textbook scheme to compare with: ``explicit_euler``, ``semi_implicit_euler``,
         ``midpoint``, ``rk4``. While a body touches a wall Moreau's midpoint step is used whatever the scheme.
     solver : str
-        ``sweeps+pivoting``: contact problems are solved directly where all contacts hold or slide, else by
+        ``sweeps+pivoting``: contact problems of one wall are solved directly where they hold, slide or pivot, else by
         sweeps over the exact friction cones and Newton's method, and by Lemke (Dantzig without friction) where those
         leave a residual above 1 %. What stays above the tolerance is reported as unconverged.
         ``sweeps``: without that last resort.

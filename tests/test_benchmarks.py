@@ -20,6 +20,7 @@ from rigid_env.measure.table import cells, make_table, number
 from rigid_env.measure.timing import Row, Spread, fastest, interleave
 
 ROOT = Path(__file__).parents[1]
+# The peer is an extra (`bench`, part of `dev`): without it the benchmarks run alone, and so do their tests.
 needs_mujoco = pytest.mark.skipif(not mujoco_scene.is_installed(), reason="mujoco is not installed")
 
 

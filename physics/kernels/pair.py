@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import math
 
+from physics.kernels import quaternion as qt
 from physics.kernels.compiler import inlined, kernel
 from physics.kernels.patch import P, X, Y, contact_place, contact_target
 from physics.kernels.point import (
@@ -22,9 +23,7 @@ from physics.kernels.point import (
     block,
     heading,
     miss_across,
-    moment,
     point_velocity,
-    times,
     turned,
 )
 from physics.kernels.share import solve_symmetric
@@ -50,7 +49,7 @@ def _opened(Wi, Wji, bi, bj, mu, goal, x, y):
     what, p, miss = answer(Wi, bi, mu, Wi[4] + Wi[8], goal, x, y, True)
     if what == LOST:
         return False, p, zero, miss
-    apart = bj[0] + times(Wji, p)[0]
+    apart = bj[0] + qt.matvec(Wji, p)[0]
     return apart >= -goal, p, zero, max(miss, -apart)
 
 
@@ -63,7 +62,7 @@ def _held(Wi, Wij, Wj, bi, bj, mu, goal, x, y):
     s1 = solve_symmetric(k, (Wij[1], Wij[4], Wij[7]))
     s2 = solve_symmetric(k, (Wij[2], Wij[5], Wij[8]))
     h = solve_symmetric(k, bi)
-    c0, c1, c2, ch = times(Wji, s0), times(Wji, s1), times(Wji, s2), times(Wji, h)
+    c0, c1, c2, ch = qt.matvec(Wji, s0), qt.matvec(Wji, s1), qt.matvec(Wji, s2), qt.matvec(Wji, h)
     W = (
         Wj[0] - c0[0], Wj[1] - c1[0], Wj[2] - c2[0],
         Wj[3] - c0[1], Wj[4] - c1[1], Wj[5] - c2[1],
@@ -217,7 +216,7 @@ def solve_few(n, count, mu, goal, u, w, inv_mass, K, work):
         if count == 1:
             if mu > 0.0:
                 k = width * i
-                f = times(W1, (impulse[k], impulse[k + 1], impulse[k + 2]))
+                f = qt.matvec(W1, (impulse[k], impulse[k + 1], impulse[k + 2]))
                 x1, y1 = heading(b1[1] + f[1], b1[2] + f[2], mu)
             what, p, miss = answer(W1, b1, mu, W1[4] + W1[8], goal, x1, y1, True)
             found = what != LOST
@@ -229,14 +228,15 @@ def solve_few(n, count, mu, goal, u, w, inv_mass, K, work):
             if mu > 0.0:
                 k, l = width * i, width * j
                 f, g = (impulse[k], impulse[k + 1], impulse[k + 2]), (impulse[l], impulse[l + 1], impulse[l + 2])
-                u1, u2 = _plus(times(W1, f), times(W12, g)), _plus(times(W2, g), times(_transposed(W12), f))
+                u1 = _plus(qt.matvec(W1, f), qt.matvec(W12, g))
+                u2 = _plus(qt.matvec(W2, g), qt.matvec(_transposed(W12), f))
                 x1, y1 = heading(b1[1] + u1[1], b1[2] + u1[2], mu)
                 x2, y2 = heading(b2[1] + u2[1], b2[2] + u2[2], mu)
             found, p, q, miss = solve_two(W1, W12, W2, b1, b2, mu, goal, x1, y1, x2, y2)
             _keep(j, q, work)
-            m = moment(s, q)
+            m = qt.cross(s, q)
         _keep(i, p, work)
-        m = _plus(moment(r, p), m)
+        m = _plus(qt.cross(r, p), m)
         p = _plus(p, q)
     if found and count < n:
         closing = _closes(n, count, p, m, u, w, inv_mass, K, work)

@@ -14,7 +14,7 @@ from __future__ import annotations
 import math
 
 from physics.kernels.compiler import inlined, kernel
-from physics.kernels.patch import MOBILITY, SPEED, TARGET_A, TARGET_B, A, B, C, P, X, Y, across_misses
+from physics.kernels.patch import MOBILITY, SPEED, TARGET_A, TARGET_B, A, B, C, P, X, Y, across_misses, resultant
 
 # Rounds on ω_n at most: one when the sense is guessed right and all targets agree, two when it is the other sense.
 PIVOT_LIMIT = 3
@@ -92,28 +92,6 @@ def _hold_at(k, sums, y0, gain, u, w, wa, wb, inv_mass, K, work):
     return (fa, fb), (r1 - e11 * fa - e12 * fb, r2 - e21 * fa - e22 * fb), free + wfa * fa + wfb * fb
 
 
-@inlined
-def _load(k, count, center, y0, y, f, work):
-    """Normal impulses of the active contacts: place of the one that pulls most or -1, and what all exert."""
-    patch = work.patch
-    ck, ak, bk = patch[k, C], patch[k, A], patch[k, B]
-    lowest = 0.0
-    loser = -1
-    fa, fb, tn, ta, tb = f[0], f[1], ak * f[1] - bk * f[0], -ck * f[1], ck * f[0]
-    for j in range(count):
-        i = work.active[j]
-        c, a, b = patch[i, C], patch[i, A], patch[i, B]
-        p = y0 + (y[0] * (a - center[1]) + y[1] * (b - center[2]))
-        patch[i, P] = p
-        if not p >= lowest:
-            lowest = p
-            loser = j
-        px, py = p * patch[i, X], p * patch[i, Y]
-        fa, fb, tn = fa + px, fb + py, tn + (a * py - b * px)
-        ta, tb = ta + (b * p - c * py), tb + (c * px - a * p)
-    return loser, (fa, fb, tn, ta, tb)
-
-
 @kernel
 def turn_about(k, count, mu, goal, center, y0, gain, u, w, wa, wb, spin, inv_mass, K, work):
     """Impulses with which contact k holds and the other active contacts slide.
@@ -147,7 +125,8 @@ def turn_about(k, count, mu, goal, center, y0, gain, u, w, wa, wb, spin, inv_mas
     for _ in range(PIVOT_LIMIT):
         sums = _point_at(k, count, mu, center, wa, wb, spin, K, work)
         (fa, fb), y, turned = _hold_at(k, sums, y0, gain, u, w, wa, wb, inv_mass, K, work)
-        loser, total = _load(k, count, center, y0, y, (fa, fb), work)
+        loser, (sa, sb, tn, ta, tb) = resultant(count, center, y0, y, work)
+        total = (sa + fa, sb + fb, tn + (ak * fb - bk * fa), ta - ck * fb, tb + ck * fa)
         change = turned - spin
         miss, _ = across_misses(count, mu, k, (change * bk, -change * ak, change), work)
         if not math.isfinite(turned):

@@ -55,15 +55,8 @@ def to_world(axes, a, b, c, base):
 @inlined
 def point_velocity(r, u, w):
     """u + ω x r in the frame of the wall: (normal, tangents)."""
-    c, a, b = r
-    return u[0] + (w[1] * b - w[2] * a), u[1] + (w[2] * c - w[0] * b), u[2] + (w[0] * a - w[1] * c)
-
-
-@inlined
-def moment(r, p):
-    """r x p in the frame of the wall."""
-    c, a, b = r
-    return a * p[2] - b * p[1], b * p[0] - c * p[2], c * p[1] - a * p[0]
+    m = qt.cross(w, r)
+    return u[0] + m[0], u[1] + m[1], u[2] + m[2]
 
 
 @inlined
@@ -79,16 +72,6 @@ def block(r, s, inv_mass, K):
         c * n2 - b * n0, inv_mass + (c * s2 - b * s0), c * t2 - b * t0,
         a * n0 - c * n1, a * s0 - c * s1, inv_mass + (a * t0 - c * t1),
     )  # fmt: skip
-
-
-@inlined
-def times(W, p):
-    """W p of a 3 x 3 block."""
-    return (
-        W[0] * p[0] + W[1] * p[1] + W[2] * p[2],
-        W[3] * p[0] + W[4] * p[1] + W[5] * p[2],
-        W[6] * p[0] + W[7] * p[1] + W[8] * p[2],
-    )
 
 
 @inlined

@@ -148,8 +148,8 @@ def _iterate(n, friction, smooth, goal, work):
 def solve_contacts(n, friction, smooth, pivots, v, L, R, work):
     """Contact impulses that bring the contacts of `work` to their target velocities as far as they can.
 
-    Tried in this order: all hold and all slide, directly, the one first that worked for this body before;
-    sweeps in turn with Newton's method; pivoting. The first whose residual is within the tolerance gives the result.
+    Tried in this order: `hold_all` and `slide_patch`, directly, the likelier one first (`_may_hold`); sweeps in turn
+    with Newton's method; pivoting. The first whose residual is within the tolerance gives the result.
 
     Parameters
     ----------

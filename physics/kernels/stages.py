@@ -11,8 +11,8 @@ from physics.kernels.flight import drift
 from physics.kernels.slide import SLIDE
 from physics.kernels.solve import PIVOTING, solve_contacts
 
-# Row of `memory`: length of the last resting stage [s], its contact count, which direct solve to try first
-# (`HOLD` or `SLIDE`, what worked last), the slots of its contacts, then the impulses of all slots, zero where
+# Row of `memory`: length of the last resting stage [s], its contact count, which direct solve worked last
+# (`slide.HOLD`, `SLIDE`, `PIVOT` + slot), the slots of its contacts, then the impulses of all slots, zero where
 # there is no contact.
 STAGE_LENGTH, CONTACT_COUNT, MODE = range(3)
 MEMORY_HEAD = 3

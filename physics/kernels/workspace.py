@@ -47,7 +47,7 @@ def workspace_dtype(wall_count: int, features: int) -> np.dtype:
         ("restitution", f),
         ("free_acceleration", f, (3,)),  # of the centre of mass without contact [m/s²]
         ("torque", f, (3,)),  # about the centre of mass [N m]
-        ("mode", i),  # which direct solve to try first, then which one did it (`solve.HOLD`, `solve.SLIDE`)
+        ("mode", i),  # which direct solve to try first, then which one did it (`slide.HOLD`, `SLIDE`, `PIVOT` + slot)
         ("is_last", i),  # 1 in the last stage a substep may have: take in all that would pass through a wall
         ("acceleration", f),  # bound for any point of the body without contact [m/s²]
     ]

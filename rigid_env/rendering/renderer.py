@@ -191,5 +191,5 @@ def _load_font(pygame, size):
     try:
         pygame.font.init()
         return pygame.font.Font(None, round(1.45 * size))
-    except (ImportError, NotImplementedError):
+    except (ImportError, NotImplementedError):  # what pygame raises for a module it was built without
         return False

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from typing import ClassVar
 
 import numpy as np
@@ -30,7 +31,7 @@ GOAL_DRAWS = 2  # uniform numbers per episode for the goal; a task may leave som
 DRAWS = col.START_SIZE + GOAL_DRAWS + DRAW_COUNT
 
 
-class Task:
+class Task(ABC):
     """A batch of worlds with one block each, and the task set in them.
 
     Subclasses say what a goal is (`_set_goals`), and observe with one compiled kernel (`_kernel`).
@@ -242,9 +243,9 @@ class Task:
 
     # --- what a task is -----------------------------------------------------------------------------------
 
+    @abstractmethod
     def _set_goals(self, record, shares, starts, size, options) -> None:
         """Write goals of new episodes into `record` (n, RECORD_SIZE); take what they use out of `options`."""
-        raise NotImplementedError
 
     _kernel: ClassVar
 
