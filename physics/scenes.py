@@ -94,9 +94,30 @@ def rolling_sphere(speed: float = 5.0, friction: float = 0.2) -> Scene:
     return Scene([body], [HalfSpace((0, 1, 0))], [Gravity((0, -GRAVITY, 0)), Contact(), Friction(friction)])
 
 
+def vertex_drop(restitution: float = 0.3, friction: float = 0.5) -> Scene:
+    """The block dropped on a vertex from 1 m: turned by 0.7 rad about (1, 1, 0), at rest at first."""
+    half, clearance = 0.5 * 0.7, 1.0
+    s = math.sin(half) / math.sqrt(2)
+    # Height of the centre above the lowest vertex: Σ a_i |y·e_i|, the second row of the rotation matrix.
+    row = (2 * s * s, 1 - 2 * s * s, 2 * s * math.cos(half))
+    height = sum(0.5 * size * abs(c) for size, c in zip(SIZE, row))
+    body = Block(SIZE, MASS, pos=(0.0, height + clearance, 0.0), quat=(math.cos(half), s, s, 0.0))
+    effects = [Gravity((0, -GRAVITY, 0)), Contact(restitution), Friction(friction)]
+    return Scene([body], [HalfSpace((0, 1, 0))], effects)
+
+
+def closed_box(half: float = 5.0) -> Scene:
+    """The elastic block tumbling without gravity or friction between six walls at ±`half` [m]: chaotic."""
+    normals = [tuple(sign * (axis == k) for k in range(3)) for axis in range(3) for sign in (1.0, -1.0)]
+    body = Block(SIZE, MASS, linvel=(3.0, 4.0, 5.0), angvel=(1.0, 2.0, 0.5))
+    return Scene([body], [HalfSpace(normal, -half) for normal in normals], [Contact(1.0)])
+
+
 SCENES = {
     function.__name__: function
-    for function in (drop, flight, tumble, rest, shove, corner_drop, slide, bounce, rolling_sphere)
+    for function in (
+        drop, flight, tumble, rest, shove, corner_drop, slide, bounce, rolling_sphere, vertex_drop, closed_box,
+    )  # fmt: skip
 }
 SCENES["incline"] = lambda: incline(math.radians(20.0), 1.01 * math.tan(math.radians(20.0)))
 
