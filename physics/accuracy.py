@@ -7,8 +7,10 @@ from dataclasses import dataclass, replace
 from physics import checks
 from physics.kernels import schemes
 
-# Free-motion schemes by name; 0 is the exact flow.
+# Schemes by name; 0 is time stepping with the exact flow, -1 the event-driven scheme.
+EVENTS = -1
 SCHEMES = {
+    "events": EVENTS,
     "exact": 0,
     "explicit_euler": schemes.EXPLICIT_EULER,
     "semi_implicit_euler": schemes.SEMI_IMPLICIT_EULER,
@@ -27,20 +29,24 @@ class Accuracy:
     substeps : int
         Parts into which each `dt` is cut.
     scheme : str
-        How free motion is integrated: ``exact`` (parabola and free rotation to rounding; second order in an
-        applied torque), or a textbook scheme to compare with: ``explicit_euler``, ``semi_implicit_euler``,
-        ``midpoint``, ``rk4``. While a body touches a wall Moreau's midpoint step is used whatever the scheme.
+        ``events``: smooth motion to `tolerance` between events, each located to rounding (impacts, and where contacts
+        begin, end, stick and slip). Otherwise time stepping, and how free motion is integrated: ``exact`` (parabola
+        and free rotation to rounding; second order in an applied torque), or a textbook scheme to compare with:
+        ``explicit_euler``, ``semi_implicit_euler``, ``midpoint``, ``rk4``; while a body touches a wall Moreau's
+        midpoint step is used whichever it is.
     solver : str
         ``sweeps+pivoting``: contact problems of one wall are solved directly where they hold, slide or pivot, else by
         sweeps over the exact friction cones and Newton's method, and by Lemke (Dantzig without friction) where those
         leave a residual above 1 %. What stays above the tolerance is reported as unconverged.
         ``sweeps``: without that last resort.
     tolerance : float
-        Largest residual of a contact problem, relative to its largest free contact speed.
+        Largest residual of a contact problem, relative to its largest free contact speed; with ``events`` also the
+        error of one smooth step, relative to the body's size and speed.
     iterations : int
         Sweeps per contact problem at most.
     impacts : int
-        Impacts of one body that one substep resolves in time; more are treated as plastic and reported.
+        Impacts (with ``events`` all events) of one body that one substep resolves in time; more are reported and
+        treated as plastic (with ``events`` the rest of the substep is left out).
     slop : float
         Gap within which a feature touches a wall, and error of the place of an impact, in bounding radii.
     rest_share : float
@@ -74,8 +80,12 @@ _BALANCED = Accuracy()
 PRESETS = {
     "fast": replace(_BALANCED, solver="sweeps", tolerance=1e-3, iterations=20, impacts=4, slop=1e-5),
     "balanced": _BALANCED,
-    "precise": replace(_BALANCED, substeps=10, tolerance=1e-10, iterations=2000, impacts=32, slop=1e-9),
-    "reference": replace(_BALANCED, substeps=100, tolerance=1e-12, iterations=10_000, impacts=64, slop=1e-11),
+    "precise": replace(
+        _BALANCED, scheme="events", tolerance=1e-10, iterations=2000, impacts=10_000, slop=1e-10, rest_share=1e-5
+    ),
+    "reference": replace(
+        _BALANCED, scheme="events", tolerance=1e-13, iterations=10_000, impacts=100_000, slop=1e-12, rest_share=1e-7
+    ),
 }
 
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from physics.accuracy import SCHEMES, Accuracy
+from physics.accuracy import EVENTS, SCHEMES, Accuracy
 from physics.effects import Contact, Friction, Gravity
 from physics.inertia import principal_axes
 from physics.kernels.layout import BLOCK, ELLIPSOID, SPHERE, VERTEX_COUNT
@@ -40,6 +40,7 @@ class Plan:
     tilted: bool | None
     pivots: bool | None
     scheme: int | None
+    events: bool | None
     features: int
     rows: tuple[Row, ...]
 
@@ -56,7 +57,7 @@ class Plan:
         """What distinguishes one compiled kernel from another."""
         return (
             self.contact, self.friction, self.restitution, self.gravity, self.gyroscopic, self.tilted,
-            self.pivots, self.scheme is None, self.features,
+            self.pivots, self.scheme is None, self.events, self.features,
         )  # fmt: skip
 
     def allows(self, moments: np.ndarray, R: np.ndarray) -> np.ndarray:
@@ -117,7 +118,8 @@ def make_plan(scene: Scene, accuracy: Accuracy) -> Plan:
         gyroscopic=(not isotropic) or None,
         tilted=tilted or None,
         pivots=(touching and accuracy.solver == "sweeps+pivoting") or None,
-        scheme=scheme or None,
+        scheme=scheme if scheme > 0 else None,
+        events=(scheme == EVENTS) or None,
         features=VERTEX_COUNT if has_block else 1,
         rows=(
             _gravity_row(gravity),

@@ -12,6 +12,7 @@ import numba
 import numpy as np
 
 from physics import checks
+from physics.kernels.events.hybrid import step_events
 from physics.kernels.step import step_worlds
 
 if TYPE_CHECKING:
@@ -83,27 +84,29 @@ def kernel_calls(world: World, wrench: np.ndarray | None, steps: int, dt: float)
         [s].
     """
     plan, substeps = world.plan, world.accuracy.substeps
+    kernel = step_events if plan.events else step_worlds
     argument_lists = [
         (
             first, last, steps, substeps, dt / substeps, world.state, world.params, world.shapes,
             world.gravity if plan.gravity else None, None if wrench is None else wrench.reshape(-1, 6),
             plan.contact, plan.friction, plan.smooth, plan.restitution, plan.gyroscopic, plan.tilted, plan.pivots,
-            plan.scheme, world.memory, world.report_table, scratch,
+            *((world.memory, world.report_table, scratch, motion, world.event_log, world.event_counts)
+              if plan.events else (plan.scheme, world.memory, world.report_table, scratch)),
         )
-        for (first, last), scratch in zip(world.pool.slices, world.scratch)
+        for (first, last), scratch, motion in zip(world.pool.slices, world.scratch, world.motions)
     ]  # fmt: skip
-    machine_code = _machine_code((plan.key, wrench is None, len(world.walls)), argument_lists[0])
+    machine_code = _machine_code(kernel, (plan.key, wrench is None, len(world.walls)), argument_lists[0])
     return [partial(machine_code, *arguments) for arguments in argument_lists]
 
 
-def _machine_code(key: tuple, arguments: tuple) -> Callable[..., None]:
+def _machine_code(kernel, key: tuple, arguments: tuple) -> Callable[..., None]:
     """The step kernel compiled for arguments of these types, which `key` determines.
 
     Calling it directly leaves out Numba's dispatcher, which would find out the types of all arguments each time.
     """
     if key not in _COMPILED:
         with _compile_notice():
-            _COMPILED[key] = step_worlds.compile(tuple(map(numba.typeof, arguments)))
+            _COMPILED[key] = kernel.compile(tuple(map(numba.typeof, arguments)))
     return _COMPILED[key]
 
 

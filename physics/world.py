@@ -13,6 +13,8 @@ from physics.accuracy import Accuracy, resolve
 from physics.contacts import contact_forces, walls_touched
 from physics.effects import Contact, Friction, Gravity
 from physics.kernels import layout as at
+from physics.kernels.events.log import EVENT_SIZE
+from physics.kernels.events.motion import make_motion
 from physics.kernels.probe import angular_momenta
 from physics.kernels.stages import memory_size
 from physics.kernels.workspace import make_workspace
@@ -98,6 +100,8 @@ class World:
         slots = max(len(self.scene.walls) * self.plan.features, 1)
         self.memory = np.zeros((rows if self.plan.contact else 1, memory_size(slots)))
         self.report_table = np.zeros((self.worlds, at.REPORT_SIZE))
+        self.event_counts = np.zeros(rows if self.plan.events else 1, dtype=np.int64)
+        self.make_event_room(0)
         self.shapes = np.array([SHAPE_CODES[body.kind] for body in self.scene.bodies])
         self._prepare_threads()
         self._bind_views()
@@ -113,9 +117,17 @@ class World:
             )
             for _ in self.pool.slices
         ]  # fmt: skip
+        self.motions = [
+            make_motion(len(self.walls), self.plan.features) if self.plan.events else None for _ in self.pool.slices
+        ]
         self._wrench: np.ndarray | None = None
         self._calls: list[Callable[[], None]] = []
         self._bound_for: tuple | None = None  # arguments of `step`: the next call with the same finds all bound
+
+    def make_event_room(self, room: int) -> None:
+        """Let a step of the event-driven scheme log up to `room` events per body; for `simulate`."""
+        self.event_log = np.zeros((len(self.event_counts), room, EVENT_SIZE))
+        self._bound_for = None
 
     def _bind_views(self) -> None:
         table = self.state.reshape(self.worlds, self.body_count, at.STATE_SIZE)
@@ -296,7 +308,7 @@ class World:
 
     def __getstate__(self):
         kept = dict(vars(self))
-        for name in ("pool", "scratch", "_wrench", "_calls", "_bound_for", "pos", "quat", "linvel", "angvel"):
+        for name in ("pool", "scratch", "motions", "_wrench", "_calls", "_bound_for", "pos", "quat", "linvel", "angvel"):
             del kept[name]
         return kept
 

@@ -1,0 +1,162 @@
+"""Flight: the time at which the first feature of a body reaches a wall, to rounding and without a miss.
+
+Over a time τ_h the gap of a feature is bounded below by
+
+    g + g' τ + (g'' - C τ_h / 3) τ²/2,    τ <= τ_h,
+
+where C bounds its third derivative. The first zero of that parabola comes no later than an impact could, so the body
+may fly up to it; from there again, until the zero is reached. The bound is exact on a parabola, and near a wall the
+steps converge like Newton's with the third derivative neglected (conservative advancement, Mirtich 1996, to second
+order).
+
+With ω <= Ω = J_max |L|, α <= A = J_max (|τ| + Ω |L|) and dα/dt <= B = 2 Ω A + J_max (A |L| + Ω |τ|) + J_max Ω |τ|
+the third derivative of a point at distance ρ is at most ρ (B + 3 Ω A + Ω³). A sphere's gap has none. The support
+function of an ellipsoid, s = |D Rᵀ n|, has derivatives that exceed those of a point at its largest semi-axis by at
+most 3 κ², κ the ratio of its largest to its smallest.
+"""
+
+from __future__ import annotations
+
+import math
+
+from physics.kernels import quaternion as qt
+from physics.kernels.compiler import inlined, kernel
+from physics.kernels.contact import is_clear, wall_normal
+from physics.kernels.events.forces import arm_and_rate, free_turning, load, plus
+from physics.kernels.events.motion import END, SIZE, START
+from physics.kernels.events.smooth import CUT, SHORTEST, get_state, put_state, start_step, try_step
+from physics.kernels.flight import fly
+from physics.kernels.layout import ELLIPSOID, OFFSET, SPHERE
+
+# Advances towards one impact at most; six are usual, more where a body grazes a wall.
+ADVANCES = 200
+
+# An advance by less than this share of the time left is the last one: what it leaves is of third order in it.
+FINEST = 1.0e-13
+
+# Refinements of the time over which the parabola bounds the gap.
+REFINEMENTS = 4
+
+
+@inlined
+def parabola_root(g, r, b):
+    """First positive zero of g + r τ + b τ²/2 for g >= 0; infinite if there is none."""
+    if b == 0.0:
+        return g / -r if r < 0.0 else math.inf
+    disc = r * r - 2.0 * b * g
+    if disc < 0.0:
+        return math.inf
+    if r < 0.0:
+        return 2.0 * g / (math.sqrt(disc) - r)
+    if b < 0.0:
+        return (r + math.sqrt(disc)) / -b
+    return math.inf
+
+
+@inlined
+def safe_time(g, r, b, third, horizon):
+    """A time within which a gap g with rate r, second derivative b and third at most `third` is not used up."""
+    t = min(horizon, parabola_root(g, r, b - third * horizon / 3.0))
+    for _ in range(REFINEMENTS):
+        over = min(horizon, 2.0 * t)
+        t = max(t, min(over, parabola_root(g, r, b - third * over / 3.0)))
+    if b > 0.0 and r >= 0.0 and third > 0.0:
+        t = max(t, min(horizon, 3.0 * b / third))
+    return t
+
+
+@kernel
+def third_bound(L, left, work):
+    """Bound of the third derivative of any feature's gap over the time `left` [m/s³]."""
+    if work.shape == SPHERE:
+        return 0.0
+    t = math.sqrt(work.torque[0] ** 2 + work.torque[1] ** 2 + work.torque[2] ** 2)
+    m = math.sqrt(qt.dot(L, L)) + left * t
+    j = max(work.J[0], work.J[1], work.J[2])
+    w = j * m
+    a = j * (t + w * m)
+    b = 2.0 * w * a + j * (a * m + w * t) + j * w * t
+    bound = work.radius * (b + 3.0 * w * a + w * w * w)
+    if work.shape == ELLIPSOID:
+        d = work.dims
+        ratio = max(d[0], d[1], d[2]) / min(d[0], d[1], d[2])
+        bound *= 3.0 * ratio * ratio
+    return bound
+
+
+@kernel
+def safe_flight(y, left, third, tilted, work, motion):
+    """A time within which no feature at y reaches a wall, at most `left`."""
+    x, q, v, m = y
+    R, _, w, alpha = free_turning(y, tilted, work)
+    dims, a, shape = load(work.dims), load(work.free_acceleration), work.shape
+    t = left
+    for k in range(work.walls.shape[0]):
+        n = wall_normal(work.walls, k)
+        d = qt.dot(n, x) - work.walls[k, OFFSET]
+        vn, an = qt.dot(n, v), qt.dot(n, a)
+        if d - work.radius + min(0.0, t * vn) + min(0.0, 0.5 * t * t * an) > 0.0:
+            continue
+        for feature in range(work.features):
+            r, rate = arm_and_rate(shape, dims, R, w, n, feature)
+            gap = d + qt.dot(n, r)
+            speed = vn + qt.dot(n, qt.cross(w, r))
+            bend = an + qt.dot(n, plus(qt.cross(alpha, r), qt.cross(w, rate)))
+            if gap <= work.slop and speed >= -motion.still:
+                gap, speed = max(gap, 0.0), max(speed, 0.0)
+            t = min(t, safe_time(max(gap, 0.0), speed, bend, third, t))
+    return t
+
+
+@inlined
+def has_torque(work):
+    """Whether a torque acts."""
+    t = work.torque
+    return t[0] != 0.0 or t[1] != 0.0 or t[2] != 0.0
+
+
+@kernel
+def fly_smoothly(y, t, tilted, work, motion):
+    """Free motion under a torque over t by extrapolated steps."""
+    put_state(motion, START, y)
+    left, tries = t, 0
+    motion.step = left
+    while left > 0.0 and tries < 10000:
+        tries += 1
+        h = start_step(left, tilted, work, motion)
+        error, _ = try_step(h, tilted, work, motion)
+        if error > work.tolerance and h > SHORTEST * t:
+            motion.step = CUT * h
+            continue
+        for c in range(SIZE):
+            motion.y[START, c] = motion.y[END, c]
+        left -= h
+        motion.step = 2.0 * h
+    return get_state(motion, START)
+
+
+@kernel
+def fly_freely(y, t, gyroscopic, tilted, work, motion):
+    """State after the time t without contact."""
+    if has_torque(work):
+        return fly_smoothly(y, t, tilted, work, motion)
+    return fly(y, work, t, gyroscopic, tilted)
+
+
+@kernel
+def fly_to_wall(y, left, gyroscopic, tilted, work, motion):
+    """Fly for `left` or until a feature reaches a wall: (state, time, whether it did, whether the search ended)."""
+    motion.count = 0
+    if is_clear(y[0], y[2], left, work):
+        return fly_freely(y, left, gyroscopic, tilted, work, motion), left, False, True
+    third = third_bound(y[3], left, work)
+    now, t = y, 0.0
+    for _ in range(ADVANCES):
+        step = safe_flight(now, left - t, third, tilted, work, motion)
+        if t + step >= left:
+            return fly_freely(y, left, gyroscopic, tilted, work, motion), left, False, True
+        t += step
+        now = fly_freely(y, t, gyroscopic, tilted, work, motion)
+        if step <= FINEST * left:
+            return now, t, True, True
+    return now, t, True, False

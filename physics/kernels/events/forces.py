@@ -1,0 +1,273 @@
+"""Forces of the contacts that act: the acceleration-level problem a = A f + b of a regime, and its velocities.
+
+A regime says of each contact whether it *holds* (its point has no acceleration) or *slides* (no normal
+acceleration; the force is f_n (n - μ d) along the direction d of its sliding). With the acceleration of a contact
+
+    a_i = dv/dt + dω/dt x r_i + ω x dr_i/dt
+
+(dr/dt = ω x r for a vertex; a sphere's and an ellipsoid's contact point wander over the body) that is a linear
+system: as many unknowns as equations, three for a contact that holds, one for one that slides. More than two
+sliding contacts of one wall have one force resultant in three unknowns: the forces that are affine in the place
+on the wall, f_i = y_0 + y_1 a_i + y_2 b_i, have the least norm of all with that resultant, and with them the
+three combinations of rows with the same coefficients stand for the equations.
+
+The same rows, with velocities or gaps in place of accelerations and pushes along the rows, bring a state back to
+what the regime says (`cancel`): the least change in the kinetic metric.
+
+Witkin and Baraff, *Physically Based Modeling*, SIGGRAPH course notes, 1997, part II, section 8, for a = A f + b;
+what differs is friction in it, and that the regime is known.
+"""
+
+from __future__ import annotations
+
+import math
+
+from physics.kernels import geometry as geo
+from physics.kernels import quaternion as qt
+from physics.kernels.body import principal_attitude
+from physics.kernels.compiler import inlined, kernel
+from physics.kernels.contact import wall_normal
+from physics.kernels.events.linear import eliminate
+from physics.kernels.layout import BLOCK, SPHERE
+from physics.kernels.share import wall_axes
+
+# Sliding contacts of one wall from which on their normal forces are taken as affine.
+PATCH = 3
+
+
+@inlined
+def vector(a, k):
+    """Row k of an array (n, 3)."""
+    return (a[k, 0], a[k, 1], a[k, 2])
+
+
+@inlined
+def plus(a, b):
+    return (a[0] + b[0], a[1] + b[1], a[2] + b[2])
+
+
+@inlined
+def times(s, a):
+    return (s * a[0], s * a[1], s * a[2])
+
+
+@inlined
+def load(work_field):
+    """A field (3,) of the workspace."""
+    return (work_field[0], work_field[1], work_field[2])
+
+
+@inlined
+def turned_by(P, J, h):
+    """I⁻¹ h for the principal axes P and inverse moments J, world frame."""
+    m = qt.transposed_matvec(P, h)
+    return qt.matvec(P, (J[0] * m[0], J[1] * m[1], J[2] * m[2]))
+
+
+@inlined
+def arm_and_rate(shape, dims, R, w, n, feature):
+    """Contact point relative to the centre of mass, and its rate of change, world frame [m, m/s].
+
+    Of an ellipsoid: r = R c with c = -D e/s, e = D Rᵀ n, s = |e| and de/dt = D (Rᵀn x Rᵀω).
+    """
+    if shape == BLOCK:
+        r = geo.vertex_arm(dims, R, feature)
+        return r, qt.cross(w, r)
+    if shape == SPHERE:
+        return (-dims[0] * n[0], -dims[0] * n[1], -dims[0] * n[2]), (0.0, 0.0, 0.0)
+    nb, wb = qt.transposed_matvec(R, n), qt.transposed_matvec(R, w)
+    e = (dims[0] * nb[0], dims[1] * nb[1], dims[2] * nb[2])
+    s = math.sqrt(qt.dot(e, e))
+    m = qt.cross(nb, wb)
+    f = (dims[0] * m[0], dims[1] * m[1], dims[2] * m[2])
+    along = qt.dot(e, f) / (s * s)
+    c = (-dims[0] * e[0] / s, -dims[1] * e[1] / s, -dims[2] * e[2] / s)
+    dc = (
+        -dims[0] * (f[0] - along * e[0]) / s,
+        -dims[1] * (f[1] - along * e[1]) / s,
+        -dims[2] * (f[2] - along * e[2]) / s,
+    )
+    r = qt.matvec(R, c)
+    return r, plus(qt.cross(w, r), qt.matvec(R, dc))
+
+
+@kernel
+def free_turning(y, tilted, work):
+    """Body axes, principal axes, ω and the rate of change of ω without contact: (R, P, ω, I⁻¹(τ - ω x L))."""
+    q, L = y[1], y[3]
+    R = qt.to_matrix(q)
+    P = R
+    if tilted is not None:
+        P = qt.to_matrix(principal_attitude(q, work, tilted))
+    J = work.J
+    w = turned_by(P, J, L)
+    g = qt.cross(w, L)
+    t = work.torque
+    return R, P, w, turned_by(P, J, (t[0] - g[0], t[1] - g[1], t[2] - g[2]))
+
+
+@kernel
+def place(y, R, w, alpha, work, motion):
+    """Arms, velocities, directions of sliding and free accelerations (`goal`) of the contacts that act."""
+    shape, features, walls = work.shape, work.features, work.walls
+    dims, a, v = load(work.dims), load(work.free_acceleration), y[2]
+    for j in range(motion.count):
+        n = wall_normal(walls, motion.slot[j] // features)
+        r, rate = arm_and_rate(shape, dims, R, w, n, motion.slot[j] % features)
+        u = plus(v, qt.cross(w, r))
+        b = plus(plus(a, qt.cross(alpha, r)), qt.cross(w, rate))
+        un = qt.dot(n, u)
+        t = (u[0] - un * n[0], u[1] - un * n[1], u[2] - un * n[2])
+        speed = math.sqrt(qt.dot(t, t))
+        d = vector(motion.reference, j)
+        if speed > motion.still and qt.dot(t, d) > 0.0:
+            d = times(1.0 / speed, t)
+        for c in range(3):
+            motion.arm[j, c], motion.velocity[j, c], motion.goal[j, c] = r[c], u[c], b[c]
+            motion.way[j, c] = d[c]
+
+
+@inlined
+def _add(m, r, push, row, share, motion):
+    """Add `share` of a contact at r to unknown m."""
+    h, e = qt.cross(r, push), qt.cross(r, row)
+    for c in range(3):
+        motion.push[m, c] += share * push[c]
+        motion.turn[m, c] += share * h[c]
+        motion.row[m, c] += share * row[c]
+        motion.row_turn[m, c] += share * e[c]
+
+
+@inlined
+def _clear(m, count, motion):
+    """Empty the unknowns m <= k < m + count."""
+    for k in range(m, m + count):
+        motion.unknown[k] = 0.0
+        for c in range(3):
+            motion.push[k, c] = motion.turn[k, c] = motion.row[k, c] = motion.row_turn[k, c] = 0.0
+
+
+@kernel
+def _add_held(m, j, axes, motion):
+    """Three unknowns of contact j."""
+    _clear(m, 3, motion)
+    r, b = vector(motion.arm, j), vector(motion.goal, j)
+    motion.first[j] = m
+    for c in range(3):
+        _add(m + c, r, axes[c], axes[c], 1.0, motion)
+        motion.unknown[m + c] = -qt.dot(axes[c], b)
+    return m + 3
+
+
+@inlined
+def _slide_push(mu, n, j, motion):
+    d = vector(motion.way, j)
+    return (n[0] - mu * d[0], n[1] - mu * d[1], n[2] - mu * d[2])
+
+
+@kernel
+def _add_patch(m, first, last, mu, axes, radius, motion):
+    """Three unknowns of the sliding contacts first <= j < last of one wall."""
+    _clear(m, 3, motion)
+    ca = cb = 0.0
+    count = 0
+    for j in range(first, last):
+        if not motion.holds[j]:
+            r = vector(motion.arm, j)
+            ca += qt.dot(axes[1], r)
+            cb += qt.dot(axes[2], r)
+            count += 1
+    for j in range(first, last):
+        if motion.holds[j]:
+            continue
+        r, b = vector(motion.arm, j), -qt.dot(axes[0], vector(motion.goal, j))
+        push = _slide_push(mu, axes[0], j, motion)
+        s = (qt.dot(axes[1], r) - ca / count) / radius
+        t = (qt.dot(axes[2], r) - cb / count) / radius
+        motion.first[j], motion.is_patch[j] = m, 1
+        motion.place[j, 0], motion.place[j, 1] = s, t
+        _add(m, r, push, axes[0], 1.0, motion)
+        _add(m + 1, r, push, axes[0], s, motion)
+        _add(m + 2, r, push, axes[0], t, motion)
+        motion.unknown[m] += b
+        motion.unknown[m + 1] += s * b
+        motion.unknown[m + 2] += t * b
+    return m + 3
+
+
+@kernel
+def list_unknowns(mu, work, motion):
+    """Fill push, turn, row, row_turn and the right-hand sides (`unknown`) from `goal`; their number."""
+    m = first = 0
+    while first < motion.count:
+        wall = motion.slot[first] // work.features
+        axes = wall_axes(work.walls, wall)
+        last, sliding = first, 0
+        while last < motion.count and motion.slot[last] // work.features == wall:
+            motion.is_patch[last] = 0
+            if not motion.holds[last]:
+                sliding += 1
+            last += 1
+        for j in range(first, last):
+            if motion.holds[j]:
+                m = _add_held(m, j, axes, motion)
+            elif sliding < PATCH:
+                _clear(m, 1, motion)
+                _add(m, vector(motion.arm, j), _slide_push(mu, axes[0], j, motion), axes[0], 1.0, motion)
+                motion.unknown[m] = -qt.dot(axes[0], vector(motion.goal, j))
+                motion.first[j] = m
+                m += 1
+        if sliding >= PATCH:
+            m = _add_patch(m, first, last, mu, axes, work.radius, motion)
+        first = last
+    return m
+
+
+@kernel
+def solve_unknowns(m, P, work, motion):
+    """Solve for the m unknowns; total force and moment of the contacts, and the rank."""
+    inv_mass, J, A = 1.0 / work.mass, work.J, motion.matrix
+    for k in range(m):
+        F, g = vector(motion.push, k), turned_by(P, J, vector(motion.turn, k))
+        for l in range(m):
+            A[l, k] = inv_mass * qt.dot(vector(motion.row, l), F) + qt.dot(vector(motion.row_turn, l), g)
+        A[k, m] = motion.unknown[k]
+    rank = eliminate(m, A, motion.order, motion.unknown)
+    force = moment = (0.0, 0.0, 0.0)
+    for k in range(m):
+        s = motion.unknown[k]
+        force = plus(force, times(s, vector(motion.push, k)))
+        moment = plus(moment, times(s, vector(motion.turn, k)))
+    return force, moment, rank
+
+
+@kernel
+def spread(mu, work, motion):
+    """Force of each contact that acts (`force`, `normal`) from the unknowns."""
+    for j in range(motion.count):
+        axes = wall_axes(work.walls, motion.slot[j] // work.features)
+        k = motion.first[j]
+        if motion.holds[j]:
+            f = times(motion.unknown[k], axes[0])
+            f = plus(f, plus(times(motion.unknown[k + 1], axes[1]), times(motion.unknown[k + 2], axes[2])))
+            motion.normal[j] = motion.unknown[k]
+        else:
+            s = motion.unknown[k]
+            if motion.is_patch[j]:
+                s += motion.place[j, 0] * motion.unknown[k + 1] + motion.place[j, 1] * motion.unknown[k + 2]
+            motion.normal[j] = s
+            f = times(s, _slide_push(mu, axes[0], j, motion))
+        motion.force[j, 0], motion.force[j, 1], motion.force[j, 2] = f
+
+
+@kernel
+def regime_forces(y, tilted, work, motion):
+    """Forces of the regime at y: (total force, total moment, ω, dω/dt without contact, principal axes)."""
+    R, P, w, alpha = free_turning(y, tilted, work)
+    zero = (0.0, 0.0, 0.0)
+    if motion.count == 0:
+        return zero, zero, w, alpha, P
+    place(y, R, w, alpha, work, motion)
+    m = list_unknowns(work.mu, work, motion)
+    force, moment, _ = solve_unknowns(m, P, work, motion)
+    return force, moment, w, alpha, P

@@ -1,0 +1,156 @@
+"""What ends a regime: the smallest of the quantities that have to stay positive during a smooth step.
+
+- *Gap* of every feature that does not act, in radii. A dip between the ends of a step shows in the cubic through the
+  gaps and their rates at both ends.
+- *Push* of every contact that acts, in weights.
+- *Cone*: what friction could do beyond what a contact that holds asks of it, in weights. Two contacts that hold on
+  one wall may share what acts along their line as they like, so that for them it is what is left of both.
+- *Speed* of every contact that slides, against the direction at the start of the step, in the speed of the body.
+"""
+
+from __future__ import annotations
+
+import math
+
+from physics.kernels import geometry as geo
+from physics.kernels import quaternion as qt
+from physics.kernels.compiler import inlined, kernel
+from physics.kernels.contact import wall_normal
+from physics.kernels.events.forces import free_turning, load, spread, vector
+from physics.kernels.events.motion import END, START, V
+from physics.kernels.events.smooth import find_rate, get_state, sliding_velocity
+from physics.kernels.layout import BLOCK, OFFSET, VERTEX_COUNT
+
+NO_GUARD, GAP, PUSH, CONE, SPEED = range(5)
+
+# Forces of this many weights are rounding: a push or a cone is given up only when it is missed by more.
+MARGIN = 1.0e-9
+
+
+@kernel
+def look_around(row, tilted, work, motion):
+    """Gaps and their rates of all features into column `row` of `gap`; of a wall out of reach infinite."""
+    x, q, v, m = get_state(motion, row)
+    R, _, w, _ = free_turning((x, q, v, m), tilted, work)
+    dims, features, shape = load(work.dims), work.features, work.shape
+    for k in range(work.walls.shape[0]):
+        n = wall_normal(work.walls, k)
+        d = qt.dot(n, x) - work.walls[k, OFFSET]
+        if d > 2.0 * work.radius:
+            for feature in range(features):
+                motion.gap[row, k * features + feature] = math.inf
+            continue
+        e = geo.scaled_normal(shape, dims, R, n)
+        vn, turn = qt.dot(n, v), qt.cross(n, w)
+        if shape == BLOCK:
+            b = qt.transposed_matvec(R, turn)
+            f = (dims[0] * b[0], dims[1] * b[1], dims[2] * b[2])
+            for vertex in range(VERTEX_COUNT):
+                motion.gap[row, k * features + vertex] = d + geo.vertex_height(e, vertex)
+                motion.gap_rate[row, k * features + vertex] = vn + geo.vertex_height(f, vertex)
+        else:
+            motion.gap[row, k * features] = d - geo.support(shape, dims, e)
+            motion.gap_rate[row, k * features] = vn + qt.dot(turn, geo.support_arm(shape, dims, R, n, e))
+
+
+@inlined
+def lowest(g0, r0, g1, r1, h):
+    """Smallest value on (0, h] of the cubic with these values and slopes at 0 and h."""
+    low = g1
+    if r0 < 0.0 and r1 > 0.0 and g0 < math.inf:
+        # g0 + r0 t + c t² + k t³; its slope vanishes where 3 k t² + 2 c t + r0 = 0, r0 < 0 at the start.
+        c = (3.0 * (g1 - g0) / h - 2.0 * r0 - r1) / h
+        k = (r0 + r1 - 2.0 * (g1 - g0) / h) / (h * h)
+        disc = c * c - 3.0 * k * r0
+        if disc > 0.0:
+            t = -r0 / (c + math.sqrt(disc))
+            if 0.0 < t < h:
+                low = min(low, g0 + t * (r0 + t * (c + t * k)))
+    return low
+
+
+@inlined
+def gap_margin(h, work, motion):
+    """Smallest gap of the features that do not act [m] over a step of h; of those that just left, less the slop."""
+    least, which = math.inf, -1
+    for s in range(motion.is_active.shape[0]):
+        if motion.is_active[s] or motion.gap[END, s] == math.inf:
+            continue
+        g0, g1 = motion.gap[START, s], motion.gap[END, s]
+        if g0 <= work.slop:
+            low = g1 + work.slop
+        else:
+            low = lowest(g0, motion.gap_rate[START, s], g1, motion.gap_rate[END, s], h)
+        if low < least:
+            least, which = low, s
+    return least, which
+
+
+@inlined
+def _cone_excess(j, mu, work, motion):
+    """Tangential force of contact j less μ times its push [N]."""
+    n = wall_normal(work.walls, motion.slot[j] // work.features)
+    f = vector(motion.force, j)
+    p = motion.normal[j]
+    return math.sqrt(max(0.0, qt.dot(f, f) - qt.dot(n, f) * qt.dot(n, f))) - mu * p
+
+
+@inlined
+def _pair_excess(i, j, mu, work, motion):
+    """The same of two contacts on one wall, whatever they share of the force along their line [N]."""
+    n = wall_normal(work.walls, motion.slot[i] // work.features)
+    a, b = vector(motion.arm, i), vector(motion.arm, j)
+    e = (b[0] - a[0], b[1] - a[1], b[2] - a[2])
+    s = 1.0 / math.sqrt(qt.dot(e, e))
+    e = (s * e[0], s * e[1], s * e[2])
+    across = qt.cross(n, e)
+    f, g = vector(motion.force, i), vector(motion.force, j)
+    p, q = mu * motion.normal[i], mu * motion.normal[j]
+    fa, ga = abs(qt.dot(across, f)), abs(qt.dot(across, g))
+    worst = max(fa - p, ga - q)
+    if worst > 0.0:
+        return worst
+    along = abs(qt.dot(e, f) + qt.dot(e, g))
+    return along - math.sqrt((p - fa) * (p + fa)) - math.sqrt((q - ga) * (q + ga))
+
+
+@kernel
+def cone_excess(j, work, motion):
+    """How far the contact j that holds, with the others of its wall that hold, leaves its cone [N]."""
+    wall, other, holding = motion.slot[j] // work.features, j, 1
+    for k in range(motion.count):
+        if k != j and motion.holds[k] and motion.slot[k] // work.features == wall:
+            other = k
+            holding += 1
+    if holding == 2 and motion.normal[j] >= 0.0 and motion.normal[other] >= 0.0:
+        return _pair_excess(j, other, work.mu, work, motion)
+    return _cone_excess(j, work.mu, work, motion)
+
+
+@kernel
+def least_margin(h, tilted, work, motion):
+    """Smallest margin at END, a step of h after START: (margin, guard, contact or slot)."""
+    find_rate(END, tilted, work, motion)
+    spread(work.mu, work, motion)
+    look_around(END, tilted, work, motion)
+    gap, which = gap_margin(h, work, motion)
+    margin, guard = gap / work.radius, GAP
+    if motion.weight > 0.0:
+        for j in range(motion.count):
+            push = motion.normal[j] / motion.weight + MARGIN
+            if push < margin:
+                margin, guard, which = push, PUSH, j
+            if motion.holds[j]:
+                cone = MARGIN - cone_excess(j, work, motion) / motion.weight
+                if cone < margin:
+                    margin, guard, which = cone, CONE, j
+    if work.mu > 0.0:
+        scale = motion.scale[V]
+        for j in range(motion.count):
+            if not motion.holds[j]:
+                t, _ = sliding_velocity(j, work, motion)
+                speed = qt.dot(t, vector(motion.reference, j))
+                speed = (speed + motion.still if motion.is_starting[j] else speed - motion.still) / scale
+                if speed < margin:
+                    margin, guard, which = speed, SPEED, j
+    return margin, guard, which

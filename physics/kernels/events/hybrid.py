@@ -1,0 +1,423 @@
+"""The event-driven step of every world: smooth motion between events, each located to rounding.
+
+A body flies, collides, moves in contact or rests:
+
+- *flies*: exact flight to the next wall (`air`);
+- *collides*: impulses at all touching contacts at once, by the solver of the time-stepping scheme. A rebound that
+  would be over within a threshold of time is not made: the rest of such a sequence of bounces, t/(1 - e) long for a
+  first bounce of length t, is left out and stated with the event that ends it;
+- *moves*: extrapolated smooth motion with the forces of the regime (`smooth`, `forces`) until a guard (`guards`) ends
+  it; then the next regime is looked for a moment ahead (`regime`), where what the guard has foretold has happened;
+- *rests*: nothing changes until the load does.
+
+Where no regime is consistent (Painlevé) the velocities jump: the impulse of an inelastic collision, looked for a
+moment ahead.
+
+Baraff, *Coping with friction for non-penetrating rigid body simulation*, SIGGRAPH 1991, for impulses where forces
+have no solution.
+"""
+
+from __future__ import annotations
+
+import math
+
+from physics.kernels import layout as at
+from physics.kernels import quaternion as qt
+from physics.kernels.body import angular_velocity, bind_body, is_finite, principal_attitude, read_state, write_state
+from physics.kernels.compiler import inlined, kernel
+from physics.kernels.contact import wall_normal
+from physics.kernels.events import log as ev
+from physics.kernels.events.air import fly_freely, fly_to_wall
+from physics.kernels.events.forces import arm_and_rate, free_turning, load
+from physics.kernels.events.guards import CONE, GAP, NO_GUARD, PUSH, SPEED, least_margin, look_around
+from physics.kernels.events.motion import END, START
+from physics.kernels.events.regime import (
+    ASKS,
+    COLLIDES,
+    FLIES,
+    IS_LOST,
+    RESTS,
+    find_candidates,
+    find_regime,
+    pose_contact,
+    read_resting,
+)
+from physics.kernels.events.smooth import (
+    CUT,
+    EASY,
+    GROWTH,
+    SHORTEST,
+    cancel,
+    get_state,
+    put_state,
+    start_step,
+    try_step,
+)
+from physics.kernels.slide import SLIDE
+from physics.kernels.solve import solve_contacts
+from physics.kernels.stages import MEMORY_HEAD, note_solve
+
+# The next regime is looked for so much later, in √(radius / acceleration): what a guard foretold is then far above
+# rounding, and the body has moved by 1e-10 radii.
+AHEAD = 1.0e-5
+
+# Trials of the time at which a guard ends a step.
+LOCATIONS = 80
+
+# Residual of a contact problem that is as good as none: rounding of forces that differ by five orders.
+SOLVED = 1.0e-11
+
+# State of a body at a wall (`motion.state`).
+AWAY, SLIPS, STICKS = range(3)
+
+
+@inlined
+def rebound(speed, normal, r, rate, w, alpha, work, motion):
+    """Velocity asked of a contact that approaches with `speed`; what a bounce too short leaves out is noted.
+
+    With the free acceleration b towards the wall a bounce at e times the speed takes t = 2 e speed / b, and all that
+    follow it t e/(1 - e).
+    """
+    if not speed > motion.still:
+        return 0.0
+    goal = work.restitution * speed
+    if goal > motion.still:
+        return goal
+    a, c, g = load(work.free_acceleration), qt.cross(alpha, r), qt.cross(w, rate)
+    b = -(qt.dot(normal, a) + qt.dot(normal, c) + qt.dot(normal, g))
+    if b > 0.0 and work.restitution < 1.0:
+        motion.left_out = max(motion.left_out, 2.0 * goal / (b * (1.0 - work.restitution)))
+    return 0.0
+
+
+@kernel
+def pose_collision(y, tilted, work, motion, report):
+    """Write the contact problem of all touching contacts into `work`; their number."""
+    put_state(motion, START, y)
+    look_around(START, tilted, work, motion)
+    R, _, w, alpha = free_turning(y, tilted, work)
+    n = 0
+    motion.left_out = 0.0
+    for s in range(motion.is_active.shape[0]):
+        if not motion.gap[START, s] <= work.slop or n >= work.slot.shape[0]:
+            continue
+        normal = wall_normal(work.walls, s // work.features)
+        r, rate = arm_and_rate(work.shape, load(work.dims), R, w, normal, s % work.features)
+        goal = rebound(-motion.gap_rate[START, s], normal, r, rate, w, alpha, work, motion)
+        pose_contact(n, s, r, (goal, 0.0, 0.0), work)
+        n += 1
+        report[work.world, at.PENETRATION] = max(report[work.world, at.PENETRATION], -motion.gap[START, s])
+    work.mode = SLIDE
+    return n
+
+
+@kernel
+def pose_jump(y, tilted, work, motion):
+    """Write the contact problem a moment ahead into `work`: (contacts, velocity, angular momentum without them)."""
+    h = motion.ahead
+    count, _ = find_candidates(y, tilted, work, motion)
+    R, _, w, _ = free_turning(y, tilted, work)
+    for i in range(count):
+        s = motion.candidate[i]
+        n = wall_normal(work.walls, s // work.features)
+        r, _ = arm_and_rate(work.shape, load(work.dims), R, w, n, s % work.features)
+        pose_contact(i, s, r, (0.0, 0.0, 0.0), work)
+    work.mode = SLIDE
+    a, torque, v, L = work.free_acceleration, work.torque, y[2], y[3]
+    return (
+        count,
+        (v[0] + h * a[0], v[1] + h * a[1], v[2] + h * a[2]),
+        (L[0] + h * torque[0], L[1] + h * torque[1], L[2] + h * torque[2]),
+    )
+
+
+@kernel
+def carry_on(y, h, tilted, work):
+    """State after a moment h at constant velocities."""
+    x, q, v, L = y
+    w = angular_velocity(q, L, work, tilted)
+    x = (x[0] + h * v[0], x[1] + h * v[1], x[2] + h * v[2])
+    return x, qt.normalise(qt.multiply(qt.exponential((h * w[0], h * w[1], h * w[2])), q)), v, L
+
+
+@kernel
+def log_impulses(n, width, work, log, counts, t):
+    """One event per wall with the sum of its impulses."""
+    for wall in range(work.walls.shape[0]):
+        px = py = pz = 0.0
+        for i in range(n):
+            if work.slot[i] // work.features == wall:
+                for c in range(width):
+                    s = work.impulse[width * i + c]
+                    px += s * work.walls[wall, 3 * c]
+                    py += s * work.walls[wall, 3 * c + 1]
+                    pz += s * work.walls[wall, 3 * c + 2]
+        if px != 0.0 or py != 0.0 or pz != 0.0:
+            ev.note_event(log, counts, work.i, t, ev.IMPACT, wall, (px, py, pz))
+
+
+@kernel
+def log_changes(work, motion, log, counts, t):
+    """Events of the walls at which the body now does something else."""
+    zero = (0.0, 0.0, 0.0)
+    for wall in range(work.walls.shape[0]):
+        state = AWAY
+        for j in range(motion.count):
+            if motion.slot[j] // work.features == wall:
+                if motion.holds[j]:
+                    state = STICKS
+                elif state == AWAY:
+                    state = SLIPS
+        old = motion.state[wall]
+        if state == old:
+            continue
+        motion.state[wall] = state
+        if old == AWAY:
+            ev.note_event(log, counts, work.i, t + motion.left_out, ev.TOUCH, wall, zero)
+        elif state == AWAY:
+            ev.note_event(log, counts, work.i, t, ev.RELEASE, wall, zero)
+        else:
+            ev.note_event(log, counts, work.i, t, ev.STICK if state == STICKS else ev.SLIP, wall, zero)
+
+
+@kernel
+def locate(h, margin, tilted, work, motion):
+    """End the step where its smallest margin is zero (END): (its length, guard, contact or slot).
+
+    False position with the Illinois rule, and halves where that is slow.
+    """
+    low, high, low_margin, high_margin = 0.0, h, 1.0e-3, margin
+    guard, which = 0, -1
+    side = 0
+    for k in range(LOCATIONS):
+        t = low + (high - low) * low_margin / (low_margin - high_margin)
+        if k % 4 == 3 or not low < t < high:
+            t = 0.5 * (low + high)
+        try_step(t, tilted, work, motion)
+        margin, g, w = least_margin(t, tilted, work, motion)
+        if margin < 0.0:
+            high, high_margin, guard, which = t, margin, g, w
+            if side == 1:
+                low_margin *= 0.5
+            side = 1
+        else:
+            low, low_margin = t, margin
+            if g == GAP and margin <= 1.0e-15:
+                return t, g, w
+            if side == -1:
+                high_margin *= 0.5
+            side = -1
+        if high - low <= 1.0e-15 * h or (margin < 0.0 and margin > -1.0e-15):
+            break
+    if margin >= 0.0:
+        try_step(high, tilted, work, motion)
+        _, guard, which = least_margin(high, tilted, work, motion)
+    return high, guard, which
+
+
+@inlined
+def has_stopped(guard, which, work, motion):
+    """Whether the contact that ended a step all but stands still there: then that is the end, not before."""
+    if guard != SPEED:
+        return False
+    n = wall_normal(work.walls, motion.slot[which] // work.features)
+    u = motion.velocity
+    un = u[which, 0] * n[0] + u[which, 1] * n[1] + u[which, 2] * n[2]
+    t0, t1, t2 = u[which, 0] - un * n[0], u[which, 1] - un * n[1], u[which, 2] - un * n[2]
+    return t0 * t0 + t1 * t1 + t2 * t2 <= motion.still * motion.still
+
+
+@kernel
+def move(y, left, tilted, work, motion):
+    """Smooth motion of the regime for `left`, or until a guard ends it: (state, time, guard)."""
+    y = cancel(cancel(y, 0, tilted, work, motion), 1, tilted, work, motion)
+    put_state(motion, START, y)
+    look_around(START, tilted, work, motion)
+    motion.step = left
+    t = 0.0
+    for _ in range(1000000):
+        h = start_step(left - t, tilted, work, motion)
+        error, used = try_step(h, tilted, work, motion)
+        if error > work.tolerance and h > SHORTEST * left:
+            motion.step = CUT * h
+            continue
+        margin, guard, which = least_margin(h, tilted, work, motion)
+        is_over = margin < 0.0
+        if is_over and not has_stopped(guard, which, work, motion):
+            h, guard, which = locate(h, margin, tilted, work, motion)
+        t += h
+        motion.step = GROWTH * h if used <= EASY else h
+        y = cancel(cancel(get_state(motion, END), 0, tilted, work, motion), 1, tilted, work, motion)
+        if is_over:
+            return y, t, guard
+        put_state(motion, START, y)
+        if not t < left:
+            break
+        for s in range(motion.is_active.shape[0]):
+            motion.gap[START, s], motion.gap_rate[START, s] = motion.gap[END, s], motion.gap_rate[END, s]
+    return y, left, 0
+
+
+@kernel
+def look_ahead(y, tilted, work, motion):
+    """Where the regime would lead in a moment."""
+    put_state(motion, START, y)
+    motion.step = motion.ahead
+    start_step(motion.ahead, tilted, work, motion)
+    try_step(motion.ahead, tilted, work, motion)
+    return cancel(get_state(motion, END), 1, tilted, work, motion)
+
+
+@kernel
+def set_thresholds(y, h, tilted, work, motion):
+    """What counts as no speed, and how far a regime is looked ahead."""
+    v, w = y[2], angular_velocity(y[1], y[3], work, tilted)
+    speed = math.sqrt(qt.dot(v, v)) + work.radius * math.sqrt(qt.dot(w, w))
+    motion.still = 0.5 * work.rest_share * h * work.acceleration + 1.0e-13 * speed
+    motion.ahead = AHEAD * h
+    if work.acceleration > 0.0:
+        motion.ahead = min(motion.ahead, AHEAD * math.sqrt(work.radius / work.acceleration))
+
+
+@kernel
+def keep_contacts(memory, i, work, motion):
+    """What the body does at the walls, and its contact forces, for those who ask (`stages.store_warm_start`)."""
+    slots = work.slot.shape[0]
+    row = MEMORY_HEAD + slots
+    for k in range(int(memory[i, 1])):
+        for c in range(3):
+            memory[i, row + 3 * int(memory[i, MEMORY_HEAD + k]) + c] = 0.0
+    memory[i, 0], memory[i, 1] = 1.0, motion.count
+    for j in range(motion.count):
+        slot = motion.slot[j]
+        memory[i, MEMORY_HEAD + j] = slot
+        f = motion.force
+        for c in range(3):
+            k = 3 * c
+            wall = slot // work.features
+            memory[i, row + 3 * slot + c] = (
+                f[j, 0] * work.walls[wall, k] + f[j, 1] * work.walls[wall, k + 1] + f[j, 2] * work.walls[wall, k + 2]
+            )
+    total = 0.0
+    for wall in range(work.walls.shape[0] - 1, -1, -1):
+        total = 3.0 * total + motion.state[wall]
+    memory[i, 2] = total
+
+
+@inlined
+def recall_contacts(memory, i, work, motion):
+    """What the body did at the walls at the end of the last step: base 3 digits of the memory's mode."""
+    total = int(memory[i, 2])
+    for wall in range(work.walls.shape[0]):
+        motion.state[wall] = total % 3
+        total //= 3
+
+
+@kernel
+def principal_axes(y, tilted, work):
+    """Rotation matrix of the principal axes at y."""
+    return qt.to_matrix(principal_attitude(y[1], work, tilted))
+
+
+@kernel
+def advance(y, h, friction, smooth, gyroscopic, tilted, pivots, work, motion, memory, report, log, counts, start):
+    """State after h: events where they happen, smooth motion between them.
+
+    A contact problem is posed by what the body does, solved in this one place, and read back. `seen` is where the
+    regime is looked for: at y, or a moment ahead of it when a guard has ended the last one.
+    """
+    set_thresholds(y, h, tilted, work, motion)
+    recall_contacts(memory, work.i, work, motion)
+    world = work.world
+    motion.left_out = 0.0
+    seen, t = y, 0.0
+    width = 3
+    if friction is None:
+        width = 1
+    for k in range(work.splits + 1):
+        if k == work.splits:
+            report[world, at.UNRESOLVED] += 1.0
+            break
+        what, n, v, L = find_regime(seen, friction, tilted, work, motion)
+        if what == COLLIDES:
+            n, v, L = pose_collision(y, tilted, work, motion, report), y[2], y[3]
+        elif what == IS_LOST:
+            n, v, L = pose_jump(y, tilted, work, motion)
+        if what == ASKS or what == COLLIDES or what == IS_LOST:
+            P = principal_axes(seen if what == ASKS else y, tilted, work)
+            v, L, residual, sweeps, method = solve_contacts(n, friction, smooth, pivots, v, L, P, work)
+            note_solve(report, world, residual, sweeps, method, max(work.tolerance, SOLVED))
+        if what == ASKS:
+            what = read_resting(n, seen, v, L, friction, tilted, work, motion)
+        elif what == COLLIDES or what == IS_LOST:
+            y = y[0], y[1], v, L
+            log_impulses(n, width, work, log, counts, start + t)
+        step = 0.0
+        if what == COLLIDES:
+            report[world, at.SPLITS] += 1.0
+            seen = y
+            continue
+        log_changes(work, motion, log, counts, start + t)
+        if what == RESTS:
+            if y[2] != (0.0, 0.0, 0.0) or y[3] != (0.0, 0.0, 0.0):
+                ev.note_event(log, counts, work.i, start + t + motion.left_out, ev.REST, -1, (0.0, 0.0, 0.0))
+            y = cancel(y, 0, tilted, work, motion)
+            y = y[0], y[1], (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
+            break
+        guard = NO_GUARD
+        if what == IS_LOST:
+            report[world, at.FALLBACKS] += 1.0
+            y, step = carry_on(y, motion.ahead, tilted, work), motion.ahead
+        elif what == FLIES:
+            y, step, hit, ended = fly_to_wall(y, h - t, gyroscopic, tilted, work, motion)
+            if not ended:
+                report[world, at.UNRESOLVED] += 1.0
+        else:
+            y, step, guard = move(y, h - t, tilted, work, motion)
+        t += step
+        motion.left_out = 0.0
+        if not t < h:
+            break
+        seen = y
+        if guard == PUSH or guard == CONE:
+            seen = look_ahead(y, tilted, work, motion)
+    keep_contacts(memory, work.i, work, motion)
+    return y
+
+
+@kernel
+def step_events(
+    first, last, steps, substeps, h, state, params, shapes, gravity, wrench, contact, friction, smooth, restitution,
+    gyroscopic, tilted, pivots, memory, report, scratch, motions, log, counts,
+):  # fmt: skip
+    """Advance the worlds first <= world < last by `steps` steps of `substeps` parts of h seconds each.
+
+    Events go to `log` (rows, room, EVENT_SIZE), their number to `counts` (rows,); otherwise as `step.step_worlds`.
+    """
+    work, motion = scratch[0], motions[0]
+    bodies = shapes.shape[0]
+    for world in range(first, last):
+        for c in range(at.REPORT_SIZE):
+            report[world, c] = 0.0
+        for b in range(bodies):
+            i = world * bodies + b
+            counts[i] = 0
+            bind_body(world, i, shapes[b], params, gravity, wrench, friction, restitution, tilted, work)
+            y = read_state(state, i)
+            for k in range(steps * substeps):
+                if contact is not None:
+                    new = advance(
+                        y, h, friction, smooth, gyroscopic, tilted, pivots, work, motion, memory, report, log, counts,
+                        k * h,
+                    )  # fmt: skip
+                else:
+                    motion.count = 0
+                    new = fly_freely(y, h, gyroscopic, tilted, work, motion)
+                if not is_finite(new):
+                    report[world, at.FAULTS] += 1.0
+                    ev.note_event(log, counts, i, k * h, ev.FAULT, -1, (0.0, 0.0, 0.0))
+                    break
+                y = new
+            write_state(state, i, y)
+            w = angular_velocity(y[1], y[3], work, tilted)
+            state[i, at.ANGVEL], state[i, at.ANGVEL + 1], state[i, at.ANGVEL + 2] = w

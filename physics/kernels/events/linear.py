@@ -1,0 +1,59 @@
+"""A small dense system that may be singular: Gauss's elimination with full pivoting."""
+
+from __future__ import annotations
+
+from physics.kernels.compiler import kernel
+
+# A pivot below this share of the largest one is none: the rows left then say the same twice.
+PIVOT_SHARE = 1.0e-10
+
+
+@kernel
+def eliminate(m, A, order, x):
+    """Solve the m equations A[:, :m] x = A[:, m], A is overwritten; unknowns without a pivot are 0.
+
+    Parameters
+    ----------
+    m : int
+    A : (>= m, >= m + 1) float64, overwritten
+        Right-hand side in column m.
+    order : (>= m,) int64, out
+        Column of each pivot.
+    x : (>= m,) float64, out
+
+    Returns
+    -------
+    rank : int
+    """
+    for k in range(m):
+        order[k] = k
+        x[k] = 0.0
+    largest, rank = 0.0, 0
+    for k in range(m):
+        best, p, c = 0.0, k, k
+        for i in range(k, m):
+            for j in range(k, m):
+                size = abs(A[i, j])
+                if size > best:
+                    best, p, c = size, i, j
+        largest = max(largest, best)
+        if not best > PIVOT_SHARE * largest:
+            break
+        rank += 1
+        for j in range(m + 1):
+            A[k, j], A[p, j] = A[p, j], A[k, j]
+        for i in range(m):
+            A[i, k], A[i, c] = A[i, c], A[i, k]
+        order[k], order[c] = order[c], order[k]
+        s = 1.0 / A[k, k]
+        for i in range(k + 1, m):
+            factor = A[i, k] * s
+            if factor != 0.0:
+                for j in range(k + 1, m + 1):
+                    A[i, j] -= factor * A[k, j]
+    for k in range(rank - 1, -1, -1):
+        total = A[k, m]
+        for j in range(k + 1, rank):
+            total -= A[k, j] * x[order[j]]
+        x[order[k]] = total / A[k, k]
+    return rank

@@ -1,0 +1,78 @@
+"""Scratch memory of the event-driven scheme: the contacts that act now, their forces, the smooth motion's stages.
+
+Besides the workspace of `physics.kernels.workspace`, which the impact solver shares with the time-stepping scheme.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from physics.kernels.layout import VERTEX_COUNT
+
+# Vertices of a block that can lie in one plane.
+FACE = 4
+
+# Columns of a smooth state: position, quaternion, velocity, angular momentum.
+X, Q, V, L, SIZE = 0, 3, 7, 10, 13
+
+# Rows of `y`: where the step starts, where it ends, two of the midpoint rule.
+START, END, LAST, NOW, ROWS = 0, 1, 2, 3, 4
+
+# Midpoint rules with 2, 4, 6, ... parts that are extrapolated at most: order 16.
+ORDERS = 8
+
+
+def motion_dtype(wall_count: int, features: int) -> np.dtype:
+    """Record type for bodies with `features` contact features each against `wall_count` walls."""
+    n = max(wall_count, 1) * (FACE if features == VERTEX_COUNT else 1)
+    m = 3 * n
+    n_slots = max(wall_count, 1) * features
+    f, i = np.float64, np.int64
+    return np.dtype([
+        ("still", f),  # speed of a contact that counts as none [m/s]
+        ("ahead", f),  # time by which the next regime is looked for [s]
+        ("step", f),  # length of the last smooth step [s]
+        ("left_out", f),  # time that a sequence of bounces would have taken on [s]
+        ("is_known", i),  # 1: the regime was found at the last event
+        ("count", i),  # contacts that act
+        ("slot", i, (n,)),  # wall * features + feature
+        ("holds", i, (n,)),  # 1: no velocity at all; 0: slides
+        ("way", f, (n, 3)),  # direction of sliding
+        ("reference", f, (n, 3)),  # the one at the start of the step
+        ("is_starting", i, (n,)),  # 1: the contact was at rest at the start of the step
+        ("arm", f, (n, 3)),  # contact point relative to the centre of mass [m]
+        ("velocity", f, (n, 3)),  # of the body there [m/s]
+        ("goal", f, (n, 3)),  # what the unknowns are to cancel: acceleration, velocity or gap
+        ("force", f, (n, 3)),  # [N]
+        ("normal", f, (n,)),  # of it, along the normal [N]
+        ("first", i, (n,)),  # first unknown of the contact
+        ("place", f, (n, 2)),  # coordinates in the patch, in radii
+        ("is_patch", i, (n,)),
+        ("push", f, (m, 3)),  # force per unknown
+        ("turn", f, (m, 3)),  # moment per unknown about the centre of mass
+        ("row", f, (m, 3)),  # direction of the constraint
+        ("row_turn", f, (m, 3)),  # its moment
+        ("matrix", f, (m, m + 1)),
+        ("order", i, (m,)),
+        ("unknown", f, (m,)),
+        ("kind", i, (2 * n,)),  # candidates of a regime: open, held, sliding
+        ("is_fresh", i, (2 * n,)),  # of them: slides from rest
+        ("changes", i, (2 * n,)),
+        ("candidate", i, (2 * n,)),  # their slots
+        ("candidate_way", f, (2 * n, 3)),
+        ("state", i, (max(wall_count, 1),)),  # what the body did at each wall after the last event
+        ("gap", f, (2, n_slots)),  # of every feature, at the start and at the end of the step [m]
+        ("gap_rate", f, (2, n_slots)),  # [m/s]
+        ("is_active", i, (n_slots,)),
+        ("weight", f),  # scale of the forces [N]
+        ("y", f, (ROWS, SIZE)),
+        ("rate", f, (SIZE,)),
+        ("first_rate", f, (SIZE,)),
+        ("scale", f, (SIZE,)),
+        ("table", f, (ORDERS, SIZE)),
+    ])  # fmt: skip
+
+
+def make_motion(wall_count: int, features: int) -> np.ndarray:
+    """One such record, shape (1,)."""
+    return np.zeros(1, motion_dtype(wall_count, features))

@@ -1,0 +1,239 @@
+"""Smooth motion in one regime: the midpoint rule, extrapolated to any order.
+
+One step of length h is made by Gragg's midpoint rule with 2, 4, 6, ... parts; its error is a series in the square
+of the parts' length, so that each further number of parts raises the order by two (Bulirsch and Stoer). Two
+successive orders that agree end the step; if 16 does not do, it is cut. Constant forces need two rules.
+
+Hairer, Nørsett and Wanner, *Solving Ordinary Differential Equations I*, II.9, for the rule, its smoothing step and
+the table.
+"""
+
+from __future__ import annotations
+
+import math
+
+from physics.kernels import quaternion as qt
+from physics.kernels.compiler import inlined, kernel
+from physics.kernels.contact import wall_normal
+from physics.kernels.events.forces import (
+    free_turning,
+    list_unknowns,
+    place,
+    plus,
+    regime_forces,
+    solve_unknowns,
+    turned_by,
+    vector,
+)
+from physics.kernels.events.motion import END, LAST, NOW, ORDERS, SIZE, START, L, Q, V, X
+from physics.kernels.layout import OFFSET, SPHERE
+
+# A step is cut to this share when the extrapolation does not settle, and no further than to SHORTEST of the time
+# asked for.
+CUT = 0.25
+SHORTEST = 1.0e-12
+
+# The next step is this many times as long when at most EASY rules were needed.
+GROWTH = 4.0
+EASY = 4
+
+# A body with corners turns by no more than this in a step, so that the gaps at its ends and their rates show whether
+# a corner dipped into a wall between them [rad].
+TURN_AT_MOST = 0.25
+
+
+@inlined
+def get_state(motion, row):
+    """(x, q, v, L) of a row of `y`."""
+    y = motion.y
+    return (
+        (y[row, X], y[row, X + 1], y[row, X + 2]),
+        (y[row, Q], y[row, Q + 1], y[row, Q + 2], y[row, Q + 3]),
+        (y[row, V], y[row, V + 1], y[row, V + 2]),
+        (y[row, L], y[row, L + 1], y[row, L + 2]),
+    )
+
+
+@inlined
+def put_state(motion, row, state):
+    """Write (x, q, v, L) to a row of `y`."""
+    x, q, v, m = state
+    y = motion.y
+    y[row, X], y[row, X + 1], y[row, X + 2] = x
+    y[row, Q], y[row, Q + 1], y[row, Q + 2], y[row, Q + 3] = q
+    y[row, V], y[row, V + 1], y[row, V + 2] = v
+    y[row, L], y[row, L + 1], y[row, L + 2] = m
+
+
+@kernel
+def find_rate(row, tilted, work, motion):
+    """Rate of change of a row of `y` into `rate`, the forces of its contacts into the unknowns."""
+    state = get_state(motion, row)
+    q, v = state[1], state[2]
+    F, T, w, _, _ = regime_forces(state, tilted, work, motion)
+    inv_mass = 1.0 / work.mass
+    turn = qt.multiply((0.0, w[0], w[1], w[2]), q)
+    rate = motion.rate
+    for c in range(3):
+        rate[X + c] = v[c]
+        rate[V + c] = work.free_acceleration[c] + inv_mass * F[c]
+        rate[L + c] = work.torque[c] + T[c]
+    rate[Q], rate[Q + 1], rate[Q + 2], rate[Q + 3] = 0.5 * turn[0], 0.5 * turn[1], 0.5 * turn[2], 0.5 * turn[3]
+
+
+@kernel
+def set_scale(h, tilted, work, motion):
+    """Sizes against which the errors of a step are held."""
+    x, q, v, m = get_state(motion, START)
+    J = work.J
+    size = math.sqrt(qt.dot(m, m))
+    speed = math.sqrt(qt.dot(v, v)) + work.radius * max(J[0], J[1], J[2]) * size + work.acceleration * h
+    place_size = work.radius + max(abs(x[0]), max(abs(x[1]), abs(x[2])))
+    for c in range(3):
+        motion.scale[X + c] = place_size
+        motion.scale[V + c] = speed
+        motion.scale[L + c] = speed * work.mass * work.radius
+    for c in range(4):
+        motion.scale[Q + c] = 1.0
+
+
+@kernel
+def _midpoint_rule(parts, h, tilted, work, motion):
+    """One rule with `parts` parts from START, smoothed, into row END."""
+    y, rate = motion.y, motion.rate
+    s = h / parts
+    for c in range(SIZE):
+        y[LAST, c] = y[START, c]
+        y[NOW, c] = y[START, c] + s * motion.first_rate[c]
+    for _ in range(parts - 1):
+        find_rate(NOW, tilted, work, motion)
+        for c in range(SIZE):
+            old = y[LAST, c]
+            y[LAST, c] = y[NOW, c]
+            y[NOW, c] = old + 2.0 * s * rate[c]
+    find_rate(NOW, tilted, work, motion)
+    for c in range(SIZE):
+        y[END, c] = 0.5 * (y[NOW, c] + y[LAST, c] + s * rate[c])
+
+
+@kernel
+def try_step(h, tilted, work, motion):
+    """Row END from row START, h later (`first_rate` known): (relative error, rules used)."""
+    table, y = motion.table, motion.y
+    goal = work.tolerance
+    set_scale(h, tilted, work, motion)
+    error = math.inf
+    used = ORDERS
+    for k in range(ORDERS):
+        _midpoint_rule(2 * (k + 1), h, tilted, work, motion)
+        error = 0.0
+        for c in range(SIZE):
+            new, change = y[END, c], math.inf
+            for j in range(1, k + 1):
+                ratio = (k + 1.0) / (k + 1.0 - j)
+                old = table[j - 1, c]
+                change = (new - old) / (ratio * ratio - 1.0)
+                table[j - 1, c] = new
+                new += change
+            table[k, c] = new
+            y[END, c] = new
+            if motion.scale[c] > 0.0:
+                error = max(error, abs(change) / motion.scale[c])
+        if not error > goal:
+            used = k + 1
+            break
+    x, q, v, m = get_state(motion, END)
+    put_state(motion, END, (x, qt.normalise(q), v, m))
+    return error, used
+
+
+@inlined
+def sliding_velocity(j, work, motion):
+    """Tangential velocity of contact j and its size."""
+    n = wall_normal(work.walls, motion.slot[j] // work.features)
+    u = vector(motion.velocity, j)
+    un = qt.dot(n, u)
+    t = (u[0] - un * n[0], u[1] - un * n[1], u[2] - un * n[2])
+    return t, math.sqrt(qt.dot(t, t))
+
+
+@kernel
+def start_step(left, tilted, work, motion):
+    """Make row START ready for `try_step`; how long the step should be at most.
+
+    No longer than the time `left`, what the last step's ease suggests, a turn of TURN_AT_MOST, and the time at which
+    a contact that is slowed as it is now stops sliding.
+    """
+    state = get_state(motion, START)
+    R, P, w, alpha = free_turning(state, tilted, work)
+    for j in range(motion.count):
+        for c in range(3):
+            motion.reference[j, c] = motion.way[j, c]
+    place(state, R, w, alpha, work, motion)
+    for j in range(motion.count):
+        t, speed = sliding_velocity(j, work, motion)
+        motion.is_starting[j] = 1 if speed <= 2.0 * motion.still else 0
+        if speed > motion.still:
+            for c in range(3):
+                motion.reference[j, c] = t[c] / speed
+    find_rate(START, tilted, work, motion)
+    for c in range(SIZE):
+        motion.first_rate[c] = motion.rate[c]
+    turn = math.sqrt(qt.dot(w, w))
+    motion.weight = work.mass * (work.acceleration + work.radius * turn * turn)
+    h = min(left, motion.step)
+    if work.shape != SPHERE and h * turn > TURN_AT_MOST:
+        h = TURN_AT_MOST / turn
+    return _until_stop(h, P, w, work, motion)
+
+
+@inlined
+def _until_stop(h, P, w, work, motion):
+    """h, or the time until the first contact stops sliding if it is slowed as at the start."""
+    rate, a, torque = motion.first_rate, work.free_acceleration, work.torque
+    T = (rate[L] - torque[0], rate[L + 1] - torque[1], rate[L + 2] - torque[2])
+    turning = turned_by(P, work.J, T)
+    for j in range(motion.count):
+        if motion.holds[j] or motion.is_starting[j] or not work.mu > 0.0:
+            continue
+        d = vector(motion.reference, j)
+        _, speed = sliding_velocity(j, work, motion)
+        change = qt.dot(d, plus(vector(motion.goal, j), qt.cross(turning, vector(motion.arm, j))))
+        for c in range(3):
+            change += d[c] * (rate[V + c] - a[c])
+        if change < 0.0 and -change * h > speed:
+            h = -speed / change
+    return h
+
+
+@kernel
+def cancel(y, what, tilted, work, motion):
+    """State with the gaps (`what` 0) or velocities (1) taken off that the regime does not allow.
+
+    Least change in the kinetic metric: along M⁻¹ Jᵀ.
+    """
+    if motion.count == 0:
+        return y
+    x, q, v, m = y
+    R, P, w, alpha = free_turning(y, tilted, work)
+    place(y, R, w, alpha, work, motion)
+    for j in range(motion.count):
+        wall = motion.slot[j] // work.features
+        n = wall_normal(work.walls, wall)
+        if what == 0:
+            gap = qt.dot(n, x) + qt.dot(n, vector(motion.arm, j)) - work.walls[wall, OFFSET]
+            for c in range(3):
+                motion.goal[j, c] = gap * n[c]
+        else:
+            for c in range(3):
+                motion.goal[j, c] = motion.velocity[j, c]
+    k = list_unknowns(0.0, work, motion)
+    F, T, _ = solve_unknowns(k, P, work, motion)
+    s = 1.0 / work.mass
+    if what == 0:
+        x = (x[0] + s * F[0], x[1] + s * F[1], x[2] + s * F[2])
+        q = qt.normalise(qt.multiply(qt.exponential(turned_by(P, work.J, T)), q))
+    else:
+        v = (v[0] + s * F[0], v[1] + s * F[1], v[2] + s * F[2])
+        m = (m[0] + T[0], m[1] + T[1], m[2] + T[2])
+    return x, q, v, m
