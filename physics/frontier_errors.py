@@ -102,7 +102,7 @@ def deepest_penetration(scene: Scene, pos, quat) -> float:
         for wall in scene.walls:
             normal = np.array(wall.normal)
             gap = pos[:, b] @ normal - wall.offset - _support(body, np.einsum("nji,j->ni", R, normal))
-            worst = max(worst, float(-gap.min()))
+            worst = float(np.maximum(worst, -gap.min()))  # keeps what is not a number
     return worst
 
 

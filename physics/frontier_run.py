@@ -138,8 +138,8 @@ class _Turn:
         self.is_lost = _is_lost(trajectory, self.errors[truth.measure], truth.scale)
         self.note = _note(trajectory)
         self.restart, self.run = contender.runner(self.steps)
-        self.first = self._seconds(1)  # compiles and warms up: counts only where nothing else does
-        self.runs = max(1, math.ceil(LEAST_TIME / max(self._seconds(1), 1e-9)))
+        self.first = self._seconds(1)  # warms up: counts only where nothing else does (`watch` has compiled)
+        self.runs = 1 if self.first >= LEAST_TIME else math.ceil(LEAST_TIME / max(self._seconds(1), 1e-9))
         self.seconds: list[float] = []
 
     def _seconds(self, runs: int) -> float:
