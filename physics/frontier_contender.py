@@ -15,6 +15,10 @@ from physics.world import World
 OURS = "rigid-env"
 
 
+class TooSlow(Exception):
+    """A contender takes longer than its measurement is worth; the message says how long."""
+
+
 class Contender(Protocol):
     """An engine at one setting and one step, on one scene.
 
@@ -30,7 +34,13 @@ class Contender(Protocol):
     dt: float
 
     def watch(self, steps: int) -> Trajectory:
-        """Samples at the start and after each of `steps` steps."""
+        """Samples at the start and after each of `steps` steps.
+
+        Raises
+        ------
+        TooSlow
+            It gave up; it is left out, and the result says so.
+        """
 
     def runner(self, steps: int) -> tuple[Callable[[], None], Callable[[], None]]:
         """Two functions: one goes back to the start, the other, which is timed, takes `steps` steps from there."""

@@ -70,6 +70,8 @@ class Frontier:
         Simulated time [s].
     is_complete : bool
         False: interrupted; what is here is what was done.
+    skipped : tuple of str
+        Who was left out, and why.
     """
 
     points: tuple[FrontierPoint, ...]
@@ -79,6 +81,7 @@ class Frontier:
     truth: str
     duration: float
     is_complete: bool = True
+    skipped: tuple[str, ...] = ()
 
     # --- points ------------------------------------------------------------------------------------------------
 
@@ -181,7 +184,8 @@ class Frontier:
         own = {name: value if math.isfinite(value) else None for name, value in self.floors.items()}
         return {
             "measure": self.measure, "units": dict(self.units), "truth": self.truth, "own_error": own,
-            "duration": self.duration, "is_complete": self.is_complete, "points": rows,
+            "duration": self.duration, "is_complete": self.is_complete,
+            "skipped": list(self.skipped), "points": rows,
         }  # fmt: skip
 
     def __str__(self) -> str:

@@ -10,7 +10,7 @@ from itertools import product
 
 from physics import checks
 from physics.accuracy import Accuracy, resolve
-from physics.frontier_contender import OURS, Contender, EngineContender
+from physics.frontier_contender import OURS, Contender, EngineContender, TooSlow
 from physics.frontier_errors import deepest_penetration, energy_error
 from physics.frontier_result import Frontier, FrontierPoint
 from physics.frontier_truth import UNITS, ReferenceTruth, Truth
@@ -27,6 +27,9 @@ LOST_SHARE = 0.5
 
 # A timed run takes at least this long, so that the clock's grain and a call's overhead do not show [s].
 LEAST_TIME = 2e-3
+
+# A peer whose run took this long needs no other one to warm up [s].
+LONG_TIME = 1.0
 
 # No further repeat of a contender whose repeats took this long together [s].
 BUDGET = 5.0
@@ -106,11 +109,14 @@ def measure(
     tell = _Counter(progress, 1 + len(contenders) * (1 + repeats))
     tell(f"truth: {truth.text}")
     floors = dict(truth.floors)
-    turns, is_complete = [], True
+    turns, skipped, is_complete = [], [], True
     try:
         for contender in contenders:
             tell(f"error of {_name(contender)}")
-            turns.append(_Turn(contender, scene, truth, duration))
+            try:
+                turns.append(_Turn(contender, scene, truth, duration))
+            except TooSlow as error:
+                skipped.append(f"{_name(contender)}: {error}")
         for _ in range(repeats):
             for turn in turns:
                 tell(f"time of {_name(turn.contender)}")
@@ -120,7 +126,7 @@ def measure(
     points = tuple(turn.point() for turn in turns)
     return Frontier(
         points, truth.measure, {**truth.units, **{name: UNITS[name] for name in ("energy", "penetration")}}, floors,
-        truth.text, duration, is_complete,
+        truth.text, duration, is_complete, tuple(skipped),
     )  # fmt: skip
 
 
@@ -129,7 +135,9 @@ class _Turn:
 
     def __init__(self, contender: Contender, scene: Scene, truth: Truth | ReferenceTruth, duration: float):
         self.contender, self.steps = contender, round(duration / contender.dt)
+        start = time.perf_counter()
         trajectory = contender.watch(self.steps)
+        watched = time.perf_counter() - start
         self.errors = {
             **truth.errors(trajectory),
             "energy": energy_error(scene, trajectory.energy),
@@ -138,8 +146,11 @@ class _Turn:
         self.is_lost = _is_lost(trajectory, self.errors[truth.measure], truth.scale)
         self.note = _note(trajectory)
         self.restart, self.run = contender.runner(self.steps)
-        self.first = self._seconds(1)  # warms up: counts only where nothing else does (`watch` has compiled)
-        self.runs = 1 if self.first >= LEAST_TIME else math.ceil(LEAST_TIME / max(self._seconds(1), 1e-9))
+        self.runs = 1
+        self.first = watched  # compiles and warms up: counts only where nothing else does
+        if watched < LONG_TIME or contender.engine == OURS:
+            self.first = self._seconds(1)
+            self.runs = 1 if self.first >= LEAST_TIME else math.ceil(LEAST_TIME / max(self._seconds(1), 1e-9))
         self.seconds: list[float] = []
 
     def _seconds(self, runs: int) -> float:

@@ -105,7 +105,7 @@ class Found:
             for engine, setting in self.frontier.families() if engine == OURS
         ]  # fmt: skip
         about = {"case": self.job.key, "what": self.job.what, "goals": goals, "settings": orders}
-        return {**about, "skipped": list(self.job.skipped), **content}
+        return {**content, **about, "skipped": [*self.job.skipped, *self.frontier.skipped]}
 
 
 def names() -> list[str]:

@@ -17,9 +17,11 @@ PANEL = (5.0, 3.9)  # [inch]
 DPI = 130
 
 # Our settings are circles, one colour each; an engine is one marker and colour.
-OUR_COLOURS = ("#0072b2", "#009e73", "#56b4e9", "#003f5c", "#66a182")
+OUR_COLOURS = ("#56b4e9", "#0072b2", "#009e73", "#003f5c", "#66a182")
+OUR_SIZES = (8.5, 6.5, 4.5)  # of circles: where settings coincide, both show [pt]
 PEER_STYLES = (("^", "#d55e00"), ("s", "#cc79a7"), ("D", "#e69f00"), ("v", "#8c6bb1"))
-INK, PALE = "#222222", "#9a9a9a"
+PEER_SIZE = 4.0  # [pt]
+INK, PALE, GOLD = "#222222", "#8a8a8a", "#f0c000"
 
 # Decades below the smallest error above zero at which an error of exactly zero is drawn.
 ZERO_GAP = 0.7
@@ -75,16 +77,18 @@ def write_plot(results: Sequence[Found], path: str | Path) -> None:
     figure.savefig(path, dpi=DPI)
 
 
-def _styles(results: Sequence[Found]) -> dict[str, tuple[str, str]]:
-    """Marker and colour by name of a family: our settings, and the other engines."""
+def _styles(results: Sequence[Found]) -> dict[str, tuple[str, str, float]]:
+    """Marker, colour and size by name of a family: our settings, and the other engines."""
     families = dict.fromkeys(f for found in results for f in found.frontier.families())
     ours = [setting for engine, setting in families if engine == OURS]
     theirs = dict.fromkeys(engine for engine, _ in families if engine != OURS)
-    styles = {name: ("o", OUR_COLOURS[k % len(OUR_COLOURS)]) for k, name in enumerate(ours)}
-    return {**styles, **{name: PEER_STYLES[k % len(PEER_STYLES)] for k, name in enumerate(theirs)}}
+    sized = {
+        name: ("o", OUR_COLOURS[k % len(OUR_COLOURS)], OUR_SIZES[k % len(OUR_SIZES)]) for k, name in enumerate(ours)
+    }
+    return {**sized, **{name: (*PEER_STYLES[k % len(PEER_STYLES)], PEER_SIZE) for k, name in enumerate(theirs)}}
 
 
-def _draw_panel(panel, found: Found, styles: dict[str, tuple[str, str]]) -> None:
+def _draw_panel(panel, found: Found, styles: dict[str, tuple[str, str, float]]) -> None:
     frontier = found.frontier
     unit = frontier.units[frontier.measure]
     seen = [e for p in frontier.points if math.isfinite(e := frontier.error(p)) and e > 0]
@@ -100,11 +104,11 @@ def _draw_panel(panel, found: Found, styles: dict[str, tuple[str, str]]) -> None
     for engine, setting in frontier.families():
         name = setting if engine == OURS else engine
         _draw_family(panel, frontier, frontier.of(setting, engine), zero, styles[name], engine, name)
-    _draw_front(panel, frontier, zero)
     for error, us in found.job.goals:
-        panel.plot(us, error, marker="*", ms=13, color="#f0c000", mec=INK, mew=0.7, ls="none", zorder=6, label="goal")
+        panel.plot(us, error, marker="*", ms=13, color=GOLD, mec=INK, mew=0.7, ls="none", zorder=6, label="goal")
     if frontier.own_error() > 0:
         panel.axhline(frontier.own_error(), color="#b00020", ls=":", lw=1.2, zorder=1, label="the truth's own error")
+    _draw_regions(panel, found, zero)
 
 
 def _draw_family(panel, frontier, points, zero, style, engine, name) -> None:
@@ -112,12 +116,11 @@ def _draw_family(panel, frontier, points, zero, style, engine, name) -> None:
     shown = [(1e6 * p.cost, frontier.error(p), p.is_lost) for p in points if math.isfinite(frontier.error(p))]
     if not shown:
         return
-    marker, colour = style
+    marker, colour, size = style
     label = f"{OURS} {name}" if engine == OURS else name
     is_ours = engine == OURS
     xs, ys = [us for us, _, _ in shown], [max(error, zero) for _, error, _ in shown]
     panel.plot(xs, ys, color=colour, lw=1.1 if is_ours else 0.6, alpha=0.8 if is_ours else 0.35, zorder=3)
-    size = 6.0 if is_ours else 4.0
     look = {"marker": marker, "ms": size, "color": colour, "ls": "none", "zorder": 4 if is_ours else 3}
     solid = [(x, y) for x, y, (_, error, lost) in zip(xs, ys, shown) if error > 0 and not lost]
     hollow = [(x, y) for x, y, (_, error, lost) in zip(xs, ys, shown) if error == 0 or lost]
@@ -128,12 +131,17 @@ def _draw_family(panel, frontier, points, zero, style, engine, name) -> None:
         panel.annotate("exactly 0", (xs[0], zero), (6, -9), textcoords="offset points", fontsize=7, color=PALE)
 
 
-def _draw_front(panel, frontier: physics.Frontier, zero: float) -> None:
-    """The Pareto front as stairs: what can be had in so much time."""
-    front = frontier.front()
+def _draw_regions(panel, found: Found, zero: float) -> None:
+    """The Pareto front as stairs up to the edges, and where a point must lie to reach a goal; last, as limits stay."""
+    (left, right), (bottom, top) = panel.get_xlim(), panel.get_ylim()
+    front = found.frontier.front()
     if front:
-        xs, ys = [1e6 * p.cost for p in front], [max(frontier.error(p), zero) for p in front]
-        panel.step(xs, ys, where="post", color=INK, lw=1.4, alpha=0.75, zorder=2, label="Pareto front")
+        xs, ys = [1e6 * p.cost for p in front], [max(found.frontier.error(p), zero) for p in front]
+        xs, ys = [xs[0], *xs, right], [top, *ys, ys[-1]]
+        panel.step(xs, ys, where="post", color=INK, lw=1.3, alpha=0.7, zorder=2, label="Pareto front")
+    for error, us in found.job.goals:
+        panel.fill_between([left, us], bottom, error, color=GOLD, alpha=0.10, lw=0, zorder=0)
+    panel.set(xlim=(left, right), ylim=(bottom, top))
 
 
 def _measure_name(frontier: physics.Frontier) -> str:

@@ -49,7 +49,7 @@ def summary(found: Found) -> list[str]:
     for engine, setting in frontier.families():
         if engine == OURS:
             lines.append(f"{setting}: {_behaviour(frontier, setting)}")
-    lines += [f"skipped: {reason}" for reason in found.job.skipped]
+    lines += [f"skipped: {reason}" for reason in (*found.job.skipped, *frontier.skipped)]
     notes = dict.fromkeys(f"{p}: {p.note}" for p in frontier.points if p.note)
     lines += [f"not all well: {note}" for note in notes]
     if not frontier.is_complete:

@@ -4,12 +4,16 @@ It has no coefficient of restitution. In the Hunt-Crossley model of its TAMSI an
 f = k x (1 + d ẋ), a body that arrives at v leaves at e v where d v (1 + e) = ln((1 + d v)/(1 - d e v)): `d` is set
 for the speed of the first impact of a body that falls without turning, and is right at that speed only. SAP has
 nothing of the kind.
+
+Its point contact puts one point between two shapes, on which no block rests. A block is therefore its eight vertices,
+as its users do it: against half-spaces that is the same shape.
 """
 
 from __future__ import annotations
 
 import logging
 import math
+from itertools import product
 
 import numpy as np
 from scipy.optimize import brentq
@@ -45,6 +49,8 @@ class Drake:
     name = "drake"
 
     def __init__(self):
+        import pydrake.common  # noqa: F401 (it sets up the logging that is turned down below)
+
         self.version = version("drake")
         # It warns at every half-space that deformable bodies would not collide with it.
         logging.getLogger("drake").setLevel(logging.ERROR)
@@ -114,7 +120,6 @@ class _Run:
 
     def _fill(self, approximation, stiction, dissipation) -> None:
         from pydrake.geometry import AddContactMaterial, HalfSpace, ProximityProperties
-        from pydrake.math import RigidTransform
         from pydrake.multibody.plant import CoulombFriction, DiscreteContactApproximation
 
         plant, mu = self.plant, friction(self.scene)
@@ -127,13 +132,14 @@ class _Run:
         for k, wall in enumerate(walls(self.scene)):
             pose = HalfSpace.MakePose(np.array(wall.normal), np.array(wall.normal) * wall.offset)
             plant.RegisterCollisionGeometry(plant.world_body(), pose, HalfSpace(), f"wall{k}", surface)
-        self.bodies = [self._add_body(b, body, RigidTransform(), surface) for b, body in enumerate(self.scene.bodies)]
+        self.bodies = [self._add_body(b, body, surface) for b, body in enumerate(self.scene.bodies)]
         if stiction is not None:
             plant.set_stiction_tolerance(stiction)
         plant.Finalize()
 
-    def _add_body(self, b: int, body: physics.Body, pose, surface):
-        from pydrake.geometry import Box, Ellipsoid, Sphere
+    def _add_body(self, b: int, body: physics.Body, surface):
+        from pydrake.geometry import Ellipsoid, Sphere
+        from pydrake.math import RigidTransform
         from pydrake.multibody.tree import RotationalInertia, SpatialInertia, UnitInertia
 
         I = body.inertia
@@ -142,11 +148,15 @@ class _Run:
         unit.SetFromRotationalInertia(tensor, body.mass)
         made = self.plant.AddRigidBody(f"body{b}", SpatialInertia(body.mass, np.zeros(3), unit))
         half = body.dimensions
-        shape = {
-            "block": lambda: Box(*(2 * half)), "sphere": lambda: Sphere(half[0]), "ellipsoid": lambda: Ellipsoid(*half),
-        }[body.kind]()  # fmt: skip
-        if walls(self.scene):
-            self.plant.RegisterCollisionGeometry(made, pose, shape, f"shape{b}", surface)
+        if not walls(self.scene):
+            return made
+        if body.kind == "block":
+            shapes = [(Sphere(0.0), RigidTransform(half * corner)) for corner in product((-1, 1), repeat=3)]
+        else:
+            shape = Sphere(half[0]) if body.kind == "sphere" else Ellipsoid(*half)
+            shapes = [(shape, RigidTransform())]
+        for k, (shape, pose) in enumerate(shapes):
+            self.plant.RegisterCollisionGeometry(made, pose, shape, f"body{b}, shape{k}", surface)
         return made
 
     def _separate_bodies(self, graph) -> None:

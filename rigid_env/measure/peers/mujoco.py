@@ -4,7 +4,8 @@ Its contacts are soft: a coefficient of restitution is no parameter of it. Where
 acceleration of the contact, -b v - k r, is set such that one step turns the speed v into -e v: b = (1 + e)/h, with
 k = 0 or a small stiffness against sinking in (`solref` negative, see "Solver parameters" in MuJoCo's documentation).
 
-MuJoCo would start the scene anew when a state is not finite; that is switched off, so that it shows.
+MuJoCo would start the scene anew when a state is not finite; that is switched off, so that it shows in the errors. Its
+warnings of it, on the screen and in a file, are not wanted then.
 """
 
 from __future__ import annotations
@@ -44,7 +45,10 @@ class MuJoCo:
     name = "mujoco"
 
     def __init__(self):
+        import mujoco
+
         self.version = version("mujoco")
+        mujoco.set_mju_user_warning(lambda text: None)
 
     def settings(self, scene: physics.Scene) -> dict[str, dict]:
         """Other integrators in free motion, stiff contacts at rest, one-step restitution where there is any."""
