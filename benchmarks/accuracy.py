@@ -28,13 +28,13 @@ def main(
     path = json.resolve() if json else None
     console.print(machine.headline())
     try:
-        results = measure_and_show(console, scene or (), peers, ladder)
+        report = measure_and_show(console, scene or (), peers, ladder)
     except ValueError as error:
         raise typer.BadParameter(str(error)) from error
-    if path is None and not quick:
+    if path is None and not quick and report.is_complete:
         path = machine.RESULTS / ("_".join(["accuracy", *(scene or ())]) + ".json")
     if path is not None:
-        write_result(path, results, ladder)
+        write_result(path, report)
         console.print(f"written to {path}", soft_wrap=True, highlight=False)
 
 

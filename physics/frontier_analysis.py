@@ -8,6 +8,9 @@ from itertools import pairwise
 
 import numpy as np
 
+# Two points always lie on a line.
+LEAST_POINTS = 3
+
 # Errors that a power of the step explains by less than this share of their variance have no order.
 LEAST_FIT = 0.9
 
@@ -57,11 +60,11 @@ def observed_order(steps: Sequence[float], errors: Sequence[float], floor: float
     """Slope of log error over log step by least squares, where the error falls.
 
     Left out are errors that are not finite or at the truth's own `floor`, and the `flat_tail` but for its coarsest
-    point, at which the fall ends. None where fewer than two steps are left, or where no line fits them (`LEAST_FIT`).
+    point, at which the fall ends. None where fewer than three steps are left, or no line fits them (`LEAST_FIT`).
     """
     tail = flat_tail(steps, errors)[:-1]
     kept = [i for i in range(len(steps)) if math.isfinite(errors[i]) and errors[i] > floor and i not in tail]
-    if len({steps[i] for i in kept}) < 2:
+    if len({steps[i] for i in kept}) < LEAST_POINTS:
         return None
     x, y = np.log([steps[i] for i in kept]), np.log([errors[i] for i in kept])
     x, y = x - x.mean(), y - y.mean()

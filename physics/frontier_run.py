@@ -8,6 +8,8 @@ from collections.abc import Callable, Iterable, Sequence
 from fractions import Fraction
 from itertools import product
 
+import numpy as np
+
 from physics import checks
 from physics.accuracy import Accuracy, resolve
 from physics.frontier_contender import OURS, Contender, EngineContender, TooSlow
@@ -138,11 +140,12 @@ class _Turn:
         start = time.perf_counter()
         trajectory = contender.watch(self.steps)
         watched = time.perf_counter() - start
-        self.errors = {
-            **truth.errors(trajectory),
-            "energy": energy_error(scene, trajectory.energy),
-            "penetration": deepest_penetration(scene, trajectory.pos, trajectory.quat),
-        }
+        with np.errstate(over="ignore", invalid="ignore"):  # what has blown up is lost, and no warning
+            self.errors = {
+                **truth.errors(trajectory),
+                "energy": energy_error(scene, trajectory.energy),
+                "penetration": deepest_penetration(scene, trajectory.pos, trajectory.quat),
+            }
         self.is_lost = _is_lost(trajectory, self.errors[truth.measure], truth.scale)
         self.note = _note(trajectory)
         self.restart, self.run = contender.runner(self.steps)

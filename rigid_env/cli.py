@@ -20,6 +20,7 @@ Accuracy = Annotated[str, typer.Option(help="Preset: fast, balanced, precise or 
 
 BENCH_REPEATS = 5
 QUICK_REPEATS = 2
+INTERRUPTED = 130  # exit status, as a shell gives it
 
 
 def _print_version(is_wanted: bool) -> None:
@@ -207,10 +208,12 @@ def accuracy(
             accuracy_plot.require_matplotlib()
         console, ladder = make_console(), QUICK if quick else Ladder()
         files = [path.resolve() if path else None for path in (json, plot)]
-        results = accuracy_report.measure_and_show(console, scene or (), peers, ladder, is_full, below)
+        report = accuracy_report.measure_and_show(console, scene or (), peers, ladder, is_full, below)
         if files[0]:
-            accuracy_report.write_result(files[0], results, ladder)
+            accuracy_report.write_result(files[0], report)
             _tell_file(files[0], console)
-        if files[1] and results:
-            accuracy_plot.write_plot(results, files[1])
+        if files[1] and report.results:
+            accuracy_plot.write_plot(report.results, files[1])
             _tell_file(files[1], console)
+    if not report.is_complete:
+        raise typer.Exit(INTERRUPTED)

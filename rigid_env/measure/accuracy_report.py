@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 from pathlib import Path
 
 from rich.console import Console
@@ -18,6 +18,23 @@ from rigid_env.measure.machine import write_json
 from rigid_env.measure.mujoco_scene import elsewhere
 
 
+@dataclass(frozen=True)
+class Report:
+    """What was measured.
+
+    Attributes
+    ----------
+    results : tuple of Found
+    ladder : Ladder
+    is_complete : bool
+        False: interrupted.
+    """
+
+    results: tuple[Found, ...]
+    ladder: Ladder
+    is_complete: bool
+
+
 def measure_and_show(
     console: Console,
     scenes: Sequence[str] = (),
@@ -25,7 +42,7 @@ def measure_and_show(
     ladder: Ladder | None = None,
     is_full: bool = False,
     below: float | None = None,
-) -> list[Found]:
+) -> Report:
     """Measure scenes and print a table of each as soon as it is there.
 
     Parameters
@@ -68,19 +85,21 @@ def measure_and_show(
     console.print(MARKS, markup=False, style="dim")
     for line in [line for found in results for line in (answers(found, below) if below else ())]:
         console.print(line, markup=False, highlight=False, soft_wrap=True)
-    return results
+    is_complete = len(results) == len(jobs) and all(found.frontier.is_complete for found in results)
+    return Report(tuple(results), ladder, is_complete)
 
 
-def write_result(path: Path, results: Sequence[Found], ladder: Ladder) -> None:
+def write_result(path: Path, report: Report) -> None:
     """Write results as JSON: settings, scenes, and all points as ``rows``, with machine, versions and commit."""
-    presets = {name: asdict(physics.PRESETS[name]) for name in ladder.accuracies}
+    presets = {name: asdict(physics.PRESETS[name]) for name in report.ladder.accuracies}
     scenes, rows = [], []
-    for found in results:
+    for found in report.results:
         about = found.to_dict()
         rows += [_row(found.job.key, about["measure"], point) for point in about.pop("points")]
         scenes.append(about)
-    settings = {**asdict(ladder), "presets": presets}
-    write_json(path, {"name": "accuracy", "settings": settings, "scenes": scenes, "rows": rows})
+    content = {"name": "accuracy", "is_complete": report.is_complete}
+    content["settings"] = {**asdict(report.ladder), "presets": presets}
+    write_json(path, {**content, "scenes": scenes, "rows": rows})
 
 
 def _row(case: str, measure: str, point: dict) -> dict:

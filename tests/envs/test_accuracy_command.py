@@ -189,6 +189,19 @@ def test_mistakes_are_named_with_what_is_allowed():
     assert "below" in run("vertex", "--quick", "--below", "-1", code=2)
 
 
+def test_an_interrupted_command_writes_what_it_has_and_says_so(tmp_path, monkeypatch):
+    def stop(jobs, ladder, tick):
+        yield found(POINTS, is_complete=False)
+
+    monkeypatch.setattr(accuracy, "run", stop)
+    file = tmp_path / "a.json"
+    output = run("slide", "--json", file, code=130)
+    assert "interrupted: not all was measured" in output
+    content = json.loads(file.read_text())
+    assert content["is_complete"] is False
+    assert [row["error"] for row in content["rows"]][-2:] == [None, 2e-2]
+
+
 # the picture
 
 

@@ -10,8 +10,9 @@ import pytest
 
 import physics
 from physics import scenes
+from physics.frontier_contender import TooSlow
 from rigid_env.measure import peers
-from rigid_env.measure.peers import PeerContender, Unsupported
+from rigid_env.measure.peers import PeerContender, Unsupported, contender
 from rigid_env.measure.peers.contender import friction, gravity, restitution, walls
 
 G = 9.81
@@ -43,8 +44,8 @@ def test_every_setting_starts_where_the_scene_does(engine):
     assert next(iter(engine.settings(scene))) == "default"
     assert engine.version
     start = physics.simulate(scene, 0.0)
-    for contender in contenders(engine, scene, 0.01):
-        seen = contender.watch(2)
+    for one in contenders(engine, scene, 0.01):
+        seen = one.watch(2)
         assert seen.t.tolist() == pytest.approx([0.0, 0.01, 0.02])
         # Turned into the engine's frames and back: a few roundings of numbers up to 50.
         for name in ("pos", "linvel", "angvel"):
@@ -68,8 +69,8 @@ def test_the_default_falls_by_semi_implicit_euler_and_turns_right(engine):
 def test_a_restart_forgets(engine):
     """A run, timed or not, is the same again after a restart: nothing of the first is remembered."""
     scene = scenes.slide()
-    for contender in contenders(engine, scene, 0.01)[:2]:
-        run = engine.open(scene, 0.01, **contender.options)
+    for one in contenders(engine, scene, 0.01)[:2]:
+        run = engine.open(scene, 0.01, **one.options)
         ends = []
         for _ in range(2):
             run.restart()
@@ -80,14 +81,14 @@ def test_a_restart_forgets(engine):
 
 def test_steps_at_once_are_steps_one_by_one(engine):
     scene = scenes.slide()
-    contender = contenders(engine, scene, 0.01)[0]
-    restart, run = contender.runner(20)
+    one = contenders(engine, scene, 0.01)[0]
+    restart, run = one.runner(20)
     restart()
     run()
-    opened = engine.open(scene, 0.01, **contender.options)
+    opened = engine.open(scene, 0.01, **one.options)
     opened.restart()
     opened.advance(20)
-    np.testing.assert_allclose(opened.state()[0], contender.watch(20).pos[-1], rtol=0, atol=1e-12)
+    np.testing.assert_allclose(opened.state()[0], one.watch(20).pos[-1], rtol=0, atol=1e-12)
 
 
 def test_friction_is_that_of_the_scene(engine):
@@ -203,6 +204,31 @@ def test_a_peer_that_is_missing_names_the_extra(monkeypatch):
             peers.load(name)
     with pytest.raises(ValueError, match="peer is 'nobody'; allowed are mujoco, pybullet, drake"):
         peers.load("nobody")
+
+
+def test_a_peer_that_takes_too_long_gives_up(monkeypatch):
+    monkeypatch.setattr(contender, "LIMIT", -1.0)
+    slow = PeerContender(Standing(), scenes.tumble(), "default", {}, 0.01)
+    with pytest.raises(TooSlow, match="0 s simulated in -1 s"):
+        slow.watch(10)
+
+
+class Standing:
+    """An engine in which nothing moves."""
+
+    name, version = "standing", "1"
+
+    def open(self, scene, dt):
+        return self
+
+    def restart(self):
+        pass
+
+    def advance(self, steps):
+        pass
+
+    def state(self):
+        return np.zeros((1, 3)), np.array([[1.0, 0.0, 0.0, 0.0]]), np.zeros((1, 3)), np.zeros((1, 3))
 
 
 def test_what_peers_ask_of_a_scene():

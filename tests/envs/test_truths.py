@@ -110,6 +110,17 @@ def test_the_error_falls_with_the_step(key):
     assert fine <= 0.25 * coarse * 1.1
 
 
+def test_a_soft_contact_rests_when_it_is_as_still_as_it_gets():
+    """A speed of 1 mm/s that never ends: at rest up to 4 v/g of twice that earlier, and a sample later."""
+    seen = bouncing(0.5, duration=2.0, dt=1e-3)
+    at_rest = np.flatnonzero(seen.linvel[:, 1] == 0.0)[1:]
+    seen.linvel[at_rest, 1] = 1e-3 * (-1.0) ** at_rest
+    rest = 3.0 * math.sqrt(2.0 / G)
+    assert rest - 8e-3 / G <= truths.time_of_rest(seen) <= rest + 1e-3
+    seen.linvel[at_rest, 1] *= 100.0
+    assert truths.time_of_rest(seen) == math.inf
+
+
 def test_a_body_that_sank_has_an_error_and_no_exception():
     """The apex after a bounce under the floor is below it: a peer may do that."""
     t = np.array([0.0, 0.1, 0.2])

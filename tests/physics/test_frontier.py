@@ -10,7 +10,7 @@ import pytest
 
 import physics
 from physics import Accuracy, Frontier, FrontierPoint, Truth, frontier_analysis, frontier_errors, frontier_run, scenes
-from physics.frontier_contender import EngineContender, setting_name
+from physics.frontier_contender import EngineContender, TooSlow, setting_name
 from physics.frontier_truth import ReferenceTruth, rows_at
 
 G = 9.81
@@ -335,3 +335,26 @@ def test_a_run_that_reports_trouble_says_so():
     traj = contender.watch(100)
     assert not traj.ok
     assert "samples: a contact problem kept a residual" in frontier_run._note(traj)
+
+
+class Slow(EngineContender):
+    """A contender that gives up."""
+
+    engine = "snail"
+
+    def watch(self, steps):
+        raise TooSlow("a yard an hour")
+
+
+def test_who_is_too_slow_is_left_out_and_named():
+    ours, slow = (kind(falling(), Accuracy(), 0.1) for kind in (EngineContender, Slow))
+    found = frontier_run.measure([slow, ours], falling(), 1.0, repeats=1)
+    assert [p.engine for p in found.points] == ["rigid-env"]
+    assert found.skipped == ("snail balanced, 100 ms: a yard an hour",)
+    assert found.is_complete
+    assert found.to_dict()["skipped"] == list(found.skipped)
+
+
+def test_without_a_contender_of_ours_a_truth_is_needed():
+    with pytest.raises(ValueError, match="truth is None, and no contender is of our engine"):
+        frontier_run.measure([Slow(falling(), Accuracy(), 0.1)], falling(), 1.0, repeats=1)
