@@ -23,7 +23,7 @@ PEER_STYLES = (("^", "#d55e00"), ("s", "#cc79a7"), ("D", "#e69f00"), ("v", "#8c6
 PEER_SIZE = 4.0  # [pt]
 INK, PALE, GOLD = "#222222", "#8a8a8a", "#f0c000"
 
-# Decades below the smallest error above zero at which an error of exactly zero is drawn.
+# Decades below the smallest error above zero, or goal, at which an error of exactly zero is drawn.
 ZERO_GAP = 0.7
 
 
@@ -92,7 +92,7 @@ def _draw_panel(panel, found: Found, styles: dict[str, tuple[str, str, float]]) 
     frontier = found.frontier
     unit = frontier.units[frontier.measure]
     seen = [e for p in frontier.points if math.isfinite(e := frontier.error(p)) and e > 0]
-    zero = 10 ** (math.log10(min(seen, default=1e-16)) - ZERO_GAP)
+    zero = 10 ** (math.log10(min([*seen, *(error for error, _ in found.job.goals)], default=1e-16)) - ZERO_GAP)
     panel.set(
         xscale="log", yscale="log", xlabel="µs per simulated second", ylabel=f"{_measure_name(frontier)} [{unit}]"
     )
@@ -127,7 +127,7 @@ def _draw_family(panel, frontier, points, zero, style, engine, name) -> None:
     panel.plot(*(zip(*solid) if solid else ((), ())), alpha=1.0 if is_ours else 0.75, label=label, **look)
     if hollow:
         panel.plot(*zip(*hollow), mfc="white", label="_hollow", **look)
-    if any(error == 0 for _, error, _ in shown):
+    if any(error == 0 for _, error, _ in shown) and not panel.texts:
         panel.annotate("exactly 0", (xs[0], zero), (6, -9), textcoords="offset points", fontsize=7, color=PALE)
 
 

@@ -69,7 +69,7 @@ def _behaviour(frontier: physics.Frontier, setting: str) -> str:
     order, plateau, lost = (getattr(frontier, name)(setting) for name in ("order", "plateau", "lost_from"))
     parts = [f"observed order {order:.2g}" if order is not None else "no order to be seen"]
     if plateau is not None:
-        parts.append(f"no smaller than {plateau:.2g} with smaller steps")
+        parts.append(f"no smaller than {plateau:.2g} with smaller steps" if plateau else "no error")
     if lost is not None:
         parts.append(f"lost from {1e3 * lost:g} ms")
     return ", ".join(parts)
