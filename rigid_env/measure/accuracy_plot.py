@@ -127,6 +127,7 @@ def _draw_family(panel, frontier, points, zero, style, engine, name) -> None:
     panel.plot(*(zip(*solid) if solid else ((), ())), alpha=1.0 if is_ours else 0.75, label=label, **look)
     if hollow:
         panel.plot(*zip(*hollow), mfc="white", label="_hollow", **look)
+        panel.plot([], [], marker="o", ms=PEER_SIZE, color=PALE, mfc="white", ls="none", label="lost, or exactly 0")
     if any(error == 0 for _, error, _ in shown) and not panel.texts:
         panel.annotate("exactly 0", (xs[0], zero), (6, -9), textcoords="offset points", fontsize=7, color=PALE)
 
