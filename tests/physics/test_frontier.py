@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -143,7 +144,7 @@ def test_energy_is_conserved_or_never_rises():
 
 def test_events_are_paired_where_both_have_as_many():
     def event(t, kind):
-        return physics.Event(t, kind, 0)
+        return SimpleNamespace(t=t, kind=kind)
 
     true = [event(1.0, "impact"), event(2.0, "impact"), event(3.0, "touch"), event(9.0, "fault")]
     seen = [event(2.5, "impact"), event(1.0, "impact"), event(3.1, "touch"), event(4.0, "touch")]
