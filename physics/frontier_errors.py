@@ -102,7 +102,7 @@ def deepest_penetration(scene: Scene, pos, quat) -> float:
         for wall in scene.walls:
             normal = np.array(wall.normal)
             gap = pos[:, b] @ normal - wall.offset - _support(body, np.einsum("nji,j->ni", R, normal))
-            worst = float(np.maximum(worst, -gap.min()))  # keeps what is not a number
+            worst = 0.0 + float(np.maximum(worst, -gap.min()))  # keeps what is not a number, no -0.0
     return worst
 
 
