@@ -12,6 +12,9 @@ The contract in five lines::
 from physics.accuracy import PRESETS, Accuracy
 from physics.diagnostics import Diagnostics, diagnose
 from physics.effects import Contact, Friction, Gravity
+from physics.frontier_result import Frontier, FrontierPoint
+from physics.frontier_run import frontier, ladder
+from physics.frontier_truth import Truth
 from physics.plan import make_plan
 from physics.report import Solver, Status, StepReport
 from physics.scene import HalfSpace, Scene, corner, three_walls
@@ -30,6 +33,8 @@ __all__ = [
     "Ellipsoid",
     "Event",
     "Friction",
+    "Frontier",
+    "FrontierPoint",
     "Gravity",
     "HalfSpace",
     "Scene",
@@ -40,9 +45,12 @@ __all__ = [
     "StepReport",
     "Stepper",
     "Trajectory",
+    "Truth",
     "World",
     "corner",
     "diagnose",
+    "frontier",
+    "ladder",
     "make_plan",
     "simulate",
     "three_walls",

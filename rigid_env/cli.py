@@ -20,6 +20,7 @@ Accuracy = Annotated[str, typer.Option(help="Preset: fast, balanced, precise or 
 
 BENCH_REPEATS = 5
 QUICK_REPEATS = 2
+INTERRUPTED = 130  # exit status, as a shell gives it
 
 
 def _print_version(is_wanted: bool) -> None:
@@ -185,3 +186,34 @@ def bench(
         if not has_peer:
             console.print('for ratios to MuJoCo: pip install "rigid-env[bench]"', markup=False)
         _write(path, {"is_quick": quick, "rows": [row.to_dict() for row in found]}, console)
+
+
+@app.command()
+def accuracy(
+    scene: Annotated[list[str] | None, typer.Argument(help="Scenes; none: all with a known outcome.")] = None,
+    peers: Annotated[str, typer.Option(metavar="NAMES", help="Of mujoco,pybullet,drake; with commas.")] = "",
+    below: Annotated[float | None, typer.Option(help="Name the cheapest setting below this error.")] = None,
+    json: Json = None,
+    plot: Annotated[Path | None, typer.Option(metavar="FILE", help="Draw error against time.")] = None,
+    is_full: Annotated[bool, typer.Option("--all", help="Show every point, not only each engine's best.")] = False,
+    quick: Annotated[bool, typer.Option("--quick", help="Only see that it runs.")] = False,
+) -> None:
+    """Show what accuracy costs in time: error against truth and wall-clock time, beside other engines."""
+    with _told_errors():
+        from rigid_env.measure import accuracy_plot, accuracy_report
+        from rigid_env.measure.accuracy import QUICK, Ladder
+        from rigid_env.measure.table import make_console
+
+        if plot:
+            accuracy_plot.require_matplotlib()
+        console, ladder = make_console(), QUICK if quick else Ladder()
+        files = [path.resolve() if path else None for path in (json, plot)]
+        report = accuracy_report.measure_and_show(console, scene or (), peers, ladder, is_full, below)
+        if files[0]:
+            accuracy_report.write_result(files[0], report)
+            _tell_file(files[0], console)
+        if files[1] and report.results:
+            accuracy_plot.write_plot(report.results, files[1])
+            _tell_file(files[1], console)
+    if not report.is_complete:
+        raise typer.Exit(INTERRUPTED)

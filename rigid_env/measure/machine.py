@@ -13,8 +13,8 @@ from pathlib import Path
 import physics
 
 PACKAGES = (
-    "rigid-env", "numpy", "scipy", "numba", "llvmlite", "gymnasium", "mujoco", "pygame-ce",
-    "stable-baselines3",
+    "rigid-env", "numpy", "scipy", "numba", "llvmlite", "gymnasium", "mujoco", "pybullet", "drake",
+    "pygame-ce", "stable-baselines3", "matplotlib",
 )  # fmt: skip
 
 # Results of earlier measurements do not make a checkout differ from its commit.

@@ -35,7 +35,7 @@ def loaded(path):
 
 def test_version_and_help():
     assert run("--version").startswith("rigid-env")
-    for command in ("demo", "explain", "warmup", "bench"):
+    for command in ("demo", "explain", "warmup", "bench", "accuracy"):
         assert command in run("--help")
         assert "--json" in run(command, "--help")
 

@@ -1,0 +1,82 @@
+"""What a ladder of errors and times says: the front, the order, the floor. Pure functions of numbers."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from itertools import pairwise
+
+import numpy as np
+
+# Two points always lie on a line.
+LEAST_POINTS = 3
+
+# Errors that a power of the step explains by less than this share of their variance have no order.
+LEAST_FIT = 0.9
+
+# Below this observed order a smaller step does not pay any more: half of the lowest order a convergent scheme has.
+FLAT_ORDER = 0.5
+
+
+def front(errors: Sequence[float], costs: Sequence[float], floor: float = 0.0) -> list[int]:
+    """Indices of the points that no other one beats, quickest first.
+
+    A point is on the front if every quicker one has a larger error. Errors at or below `floor`, the truth's own error,
+    cannot be told apart and count as equal to it: the quickest of them is on the front. What is not finite never is.
+    """
+    found, best = [], math.inf
+    order = sorted(range(len(errors)), key=lambda i: (costs[i], errors[i]))
+    for i in order:
+        seen = max(errors[i], floor)
+        if seen < best:  # false for what is not finite
+            found.append(i)
+            best = seen
+    return found
+
+
+def flat_tail(steps: Sequence[float], errors: Sequence[float]) -> list[int]:
+    """Indices of the smallest steps over which the error no longer falls, finest first; empty while it still does.
+
+    From the finest step on towards coarser ones, as long as the coarser one's error is not larger than the finer one's
+    by more than the `FLAT_ORDER`-th power of their ratio. A single step is no tail. A mere lucky value in the middle
+    is none either: the finer steps after it fall again.
+    """
+    order = [i for i in np.argsort(steps, kind="stable") if math.isfinite(errors[i])]
+    tail = order[:1]
+    for finer, coarser in pairwise(order):
+        if errors[coarser] > errors[finer] * (steps[coarser] / steps[finer]) ** FLAT_ORDER:
+            break
+        tail.append(coarser)
+    return tail if len(tail) > 1 else []
+
+
+def plateau(steps: Sequence[float], errors: Sequence[float]) -> float | None:
+    """Smallest error of the `flat_tail`: below it, smaller steps do not come. None while the error still falls."""
+    tail = flat_tail(steps, errors)
+    return min(errors[i] for i in tail) if tail else None
+
+
+def observed_order(steps: Sequence[float], errors: Sequence[float], floor: float = 0.0) -> float | None:
+    """Slope of log error over log step by least squares, where the error falls.
+
+    Left out are errors that are not finite or at the truth's own `floor`, and the `flat_tail` but for its coarsest
+    point, at which the fall ends. None where fewer than three steps are left, or no line fits them (`LEAST_FIT`).
+    """
+    tail = flat_tail(steps, errors)[:-1]
+    kept = [i for i in range(len(steps)) if math.isfinite(errors[i]) and errors[i] > floor and i not in tail]
+    if len({steps[i] for i in kept}) < LEAST_POINTS:
+        return None
+    x, y = np.log([steps[i] for i in kept]), np.log([errors[i] for i in kept])
+    x, y = x - x.mean(), y - y.mean()
+    slope = float(x @ y / (x @ x))
+    return slope if slope * (x @ y) >= LEAST_FIT * (y @ y) else None
+
+
+def lost_from(steps: Sequence[float], is_lost: Sequence[bool]) -> float | None:
+    """Smallest step from which on every larger one is lost; None where the largest is not."""
+    found = None
+    for i in sorted(range(len(steps)), key=lambda i: -steps[i]):
+        if not is_lost[i]:
+            break
+        found = steps[i]
+    return found
