@@ -177,12 +177,15 @@ def rotation_series(q):
 
 def start(scene_body):
     """The exact start of a body as multiple-precision numbers: x, q, v, ω in the body frame."""
-    q = [mpmath.mpf(a) for a in scene_body.quat]
-    length = mpmath.sqrt(sum(a * a for a in q))
-    q = [a / length for a in q]
-    omega = rotation(q).T @ np.array([mpmath.mpf(a) for a in scene_body.angvel])
-    pos, vel = ([mpmath.mpf(a) for a in row] for row in (scene_body.pos, scene_body.linvel))
-    return [*pos, *q, *vel, *omega]
+    return start_of([*scene_body.pos, *scene_body.quat, *scene_body.linvel, *scene_body.angvel])
+
+
+def start_of(numbers):
+    """The same of 13 numbers with ω in the world frame; |q| is made 1."""
+    numbers = [mpmath.mpf(a) for a in numbers]
+    length = mpmath.sqrt(sum(a * a for a in numbers[3:7]))
+    q = [a / length for a in numbers[3:7]]
+    return [*numbers[:3], *q, *numbers[7:10], *(rotation(q).T @ np.array(numbers[10:]))]
 
 
 def world_frame(state):

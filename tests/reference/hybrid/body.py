@@ -11,8 +11,9 @@ from physics.effects import Contact, Friction, Gravity
 from physics.scene import Scene
 from tests.reference.rigid_body import rotation_matrix
 
-POS, QUAT, VEL, ANGVEL, GAPS = slice(0, 3), slice(3, 7), slice(7, 10), slice(10, 13), slice(13, None)
+POS, QUAT, VEL, ANGVEL, GAPS = slice(0, 3), slice(3, 7), slice(7, 10), slice(10, 13), slice(13, -1)
 TWIST = slice(7, 13)
+CLOCK = -1  # time since the regime began [s]
 
 
 def skew(a):
@@ -88,9 +89,9 @@ def from_scene(scene: Scene, force=(0, 0, 0), torque=(0, 0, 0)):
 
 
 def start(problem: Problem, pos, quat, linvel, angvel):
-    """The state vector y = (x, q, v, ω, gaps) of the reference."""
+    """The state vector y = (x, q, v, ω, gaps, clock) of the reference."""
     y = np.concatenate([pos, np.asarray(quat, float) / np.linalg.norm(quat), linvel, angvel])
-    return np.concatenate([y, gaps(problem, y)])
+    return np.concatenate([y, gaps(problem, y), [0.0]])
 
 
 def arms(problem: Problem, y):

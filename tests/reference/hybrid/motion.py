@@ -22,8 +22,6 @@ class Options(NamedTuple):
     turn: float = 0.05  # of a step [rad]; also the share of the time in which gravity or v cross the body
     zeno: float = 1e-9  # flights shorter than this are not made [s]
     snap: float = 1e-11  # sliding that has become slower than this stops [m/s]
-    soft: float = 1e-12  # ε of a slide that begins [m/s]
-    harden: float = 1e-4  # speed at which it has begun [m/s]
     tiny: float = 1e-12  # normal speed that is rounding [m/s]
     together: float = 1e-12  # impacts within this time are one [s]
     ahead: float = 1e-6  # look ahead that tells what follows when a contact stops to hold or to push [s]
@@ -102,7 +100,7 @@ class _Run:
         speeds = body.normal_speeds(self.problem, y)
         rest = [c for c in touching if abs(speeds[c]) <= self.options.tiny]
         after = choose(self.problem, y, rest, self.options.snap, ())
-        rate = dynamics(self.problem, y, after._replace(soft=self.options.soft if after.soft else 0.0))[0]
+        rate = dynamics(self.problem, y, after)[0]
         J = body.jacobian(self.problem, y, touching)[:, 0]
         a = J @ rate[TWIST] + body.convective(self.problem, y, touching)[:, 0]
         flights = {}
@@ -120,16 +118,15 @@ class _Run:
         candidates = [c for c in touching if abs(speeds[c]) <= self.options.tiny]
         y = self.y
         if ahead is not None:
-            y = advance(self.problem, y, ahead, self.options.ahead, self.options)
+            y = advance(self.problem, y, ahead, self.options.ahead)
         now = choose(self.problem, y, candidates, self.options.snap, at_rest)
-        if now.soft:
-            now = now._replace(soft=self.options.soft)
         self.y = project(self.problem, self.y, now)
-        return now
+        return regime.with_directions(self.problem, self.y, now, self.options)
 
     def slip_rates(self, y, now):
-        """(contacts, speeds, d speed/dt) of the contacts that slide."""
-        slides = [c for c, mode in zip(now.active, now.modes) if mode == SLIDE]
+        """(contacts, speeds, d speed/dt) of the contacts that slide and do not only begin to."""
+        begin = now.turning.which if now.turning else ()
+        slides = [c for k, (c, mode) in enumerate(zip(now.active, now.modes)) if mode == SLIDE and k not in begin]
         if not slides or self.problem.friction == 0.0:
             return [], np.zeros(0), np.zeros(0)
         J = body.jacobian(self.problem, y, slides)
@@ -151,7 +148,7 @@ class _Run:
         begin, longest = self.t, solver.max_step
         while True:
             t0, y0 = solver.t, solver.y.copy()
-            solver.max_step = longest if now.soft else min(longest, self.cap(y0, now))
+            solver.max_step = min(longest, self.cap(y0, now))
             solver.step()
             if solver.status == "failed":
                 raise RuntimeError(f"integrator failed at t = {begin + solver.t}, {now}")
@@ -162,7 +159,7 @@ class _Run:
             if kind is None and not over:
                 continue
             self.t = begin + t0 + h
-            self.y = advance(self.problem, y0, now, h, self.options)
+            self.y = advance(self.problem, y0, now, h)
             return ("end", []) if over else (kind, contacts)
 
     def first_end(self, now, y0, solver):
@@ -171,7 +168,7 @@ class _Run:
         dense = solver.dense_output()
 
         def state(h):
-            return advance(self.problem, y0, now, h, self.options)
+            return advance(self.problem, y0, now, h)
 
         found = [(None, [], width)]
         hit = self.first_hit(now, dense, solver, state)
@@ -179,9 +176,9 @@ class _Run:
             found.append(("impact", *hit))
         found.extend(self.first_margins(now, dense, solver, state, min(h for *_, h in found)))
         slides, speed, _ = self.slip_rates(solver.y, now)
-        if now.soft and len(speed) and speed.min() > self.options.harden:
-            found.append(("harden", [], width))
-        if not now.soft and len(speed) and speed.min() < self.options.snap:
+        if solver.status == "finished":
+            found.append(("begun", [], width))
+        if len(speed) and speed.min() < self.options.snap:
             stopped = [c for c, s in zip(slides, speed) if s < 1e2 * self.options.snap]
             found.append(("stick", stopped, width))
         # Of two at the end of the step the one that says more.
@@ -264,7 +261,7 @@ class _Run:
         return kind, contacts, brentq(margin, left, right, xtol=1e-15, rtol=1e-14)
 
 
-DEGREE = 7  # of DOP853's dense output; Radau's has 3
+DEGREE = 7  # of DOP853's dense output
 QUARTERS = np.linspace(0.0, 1.0, 5)
 
 
@@ -305,7 +302,7 @@ def simulate(problem: Problem, y, duration, sample_times=(), options=None) -> Re
 
     def sample(t, h, y, now):
         for k in np.flatnonzero((times > t) & (times <= t + h)):
-            samples[k] = advance(problem, y, now, times[k] - t, run.options)[:13]
+            samples[k] = advance(problem, y, now, times[k] - t)[:13]
 
     touching = [c for c in range(problem.contact_count) if y[GAPS][c] <= 1e-12]
     run.y[GAPS][touching] = 0.0
@@ -333,8 +330,8 @@ def follow(run, now, kind, contacts):
         if np.all(body.normal_speeds(run.problem, run.y)[contacts] >= -run.options.tiny):
             run.record("touch", contacts)
         return run.settle([*now.fixed, *contacts])
-    if kind == "harden":
-        return now._replace(soft=0.0)
+    if kind == "begun":
+        return now._replace(turning=None)
     if kind == "stick":
         run.record("stick", contacts)
         modes = tuple(HOLD if c in contacts else mode for c, mode in zip(now.active, now.modes))

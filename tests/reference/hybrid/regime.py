@@ -5,25 +5,21 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from scipy.integrate import DOP853, Radau
+from scipy.integrate import DOP853
 
-from tests.reference.hybrid import body, contact
-from tests.reference.hybrid.body import GAPS, POS, QUAT, TWIST, VEL, Problem
+from tests.reference.hybrid import body, contact, slip
+from tests.reference.hybrid.body import CLOCK, GAPS, POS, QUAT, TWIST, VEL, Problem
 from tests.reference.hybrid.contact import HOLD, OPEN, SLIDE
+from tests.reference.hybrid.slip import Turning
 
 
 class Regime(NamedTuple):
-    """Contacts that carry, their modes; those that only touch; whether sliding has only just begun.
-
-    Where a contact starts to slide its direction u_t/|u_t| is that of a vector that is still zero. There the
-    direction is u_t/√(|u_t|² + ε²) at first (``soft``): within ε of the velocity it is Coulomb's law, and the
-    integrator is an implicit one, since the direction follows at the rate μ f_n/(m |u_t|).
-    """
+    """Contacts that carry, their modes; those that only touch; directions of those whose sliding only begins."""
 
     active: tuple = ()
     modes: tuple = ()
     idle: tuple = ()
-    soft: float = 0.0  # ε [m/s]; 0: sharp
+    turning: Turning | None = None
 
     @property
     def fixed(self) -> list:
@@ -47,10 +43,13 @@ def places(problem: Problem, y, contacts):
     return np.array([problem.frames[problem.wall(c)][1:] @ r[c] for c in contacts]).reshape(-1, 2)
 
 
-def directions(velocities, soft):
-    """(n, 2) of sliding; see `Regime` for `soft`."""
-    size = np.sqrt(np.sum(velocities[:, 1:] ** 2, axis=1) + soft**2)
-    return velocities[:, 1:] / np.where(size > 0, size, 1.0)[:, None]
+def directions(velocities, turning, clock):
+    """(n, 2) of sliding: those of the velocities, or as `slip` has found them."""
+    size = np.linalg.norm(velocities[:, 1:], axis=1)
+    found = velocities[:, 1:] / np.where(size > 0, size, 1.0)[:, None]
+    if turning is not None:
+        found[list(turning.which)] = turning.directions(clock)
+    return found
 
 
 def dynamics(problem: Problem, y, regime: Regime):
@@ -59,12 +58,13 @@ def dynamics(problem: Problem, y, regime: Regime):
     rate[POS], rate[QUAT] = y[VEL], body.quaternion_rate(y)
     rate[GAPS] = body.normal_speeds(problem, y)
     rate[GAPS][regime.fixed] = 0.0
+    rate[CLOCK] = 1.0
     if not regime.active:
         rate[TWIST] = body.free_acceleration(problem, y)
         return rate, np.zeros((0, 3)), np.zeros((0, 0))
     A, b, u, carried, free = assemble(problem, y, regime.active)
     walls = [problem.wall(c) for c in regime.active]
-    d = directions(u, regime.soft)
+    d = directions(u, regime.turning, y[CLOCK])
     f = contact.regime_forces(A, b, walls, places(problem, y, regime.active), regime.modes, d, problem.friction)
     rate[TWIST] = free + carried @ f.ravel()
     return rate, f, A
@@ -112,34 +112,47 @@ def choose(problem: Problem, y, touching, still, at_rest) -> Regime:
     answer = contact.solve(question)
     idle = contact.idle_pulls(question, answer, max(np.abs(b).max(), 1e-300))
     carry = [i for i, mode in enumerate(answer.modes) if mode != OPEN]
-    starts = any(answer.modes[i] == SLIDE and given[i] is None for i in carry)
+    starts = [k for k, i in enumerate(carry) if answer.modes[i] == SLIDE and given[i] is None]
+    begin = [answer.a[carry[k], 1:] for k in starts]
     return Regime(
         active=tuple(touching[i] for i in carry),
         modes=tuple(answer.modes[i] for i in carry),
         idle=tuple(touching[i] for i in idle),
-        soft=float(starts),
+        turning=slip.constant(starts, begin) if starts else None,
     )
 
 
+def with_directions(problem: Problem, y, regime: Regime, options) -> Regime:
+    """The regime from the state y on, with the directions in which its contacts start to slide."""
+    if regime.turning is None:
+        return regime
+    y = y.copy()
+    y[CLOCK] = 0.0
+    starting = [regime.active[k] for k in regime.turning.which]
+
+    def velocities(turning, times):
+        trial, now, found = regime._replace(turning=turning), y, []
+        for h in np.diff(times, prepend=0.0):
+            now = advance(problem, now, trial, h)
+            found.append((body.jacobian(problem, now, starting) @ now[TWIST])[:, 1:])
+        return np.array(found).transpose(1, 0, 2)
+
+    span = 0.5 * options.max_step(problem, y)
+    return regime._replace(turning=slip.collocate(regime.turning, span, velocities))
+
+
 def integrator(problem: Problem, y, regime: Regime, options):
-    """SciPy's one-step integrator of the regime from local time 0: DOP853, or Radau while sliding begins."""
-    method = Radau if regime.soft else DOP853
-    return method(
-        lambda t, y: dynamics(problem, y, regime)[0], 0.0, y, np.inf,
+    """SciPy's one-step integrator of the regime from local time 0; it ends where sliding has begun."""
+    return DOP853(
+        lambda t, y: dynamics(problem, y, regime)[0], 0.0, y, regime.turning.span if regime.turning else np.inf,
         rtol=options.rtol, atol=1e-2 * options.rtol, max_step=options.max_step(problem, y),
     )  # fmt: skip
 
 
-def advance(problem: Problem, y, regime: Regime, h, options):
-    """y after h: one step of DOP853 (h within a step that its error control has accepted), or Radau again."""
+def advance(problem: Problem, y, regime: Regime, h):
+    """y after h: one step of DOP853, h within a step that its error control has accepted."""
     if h <= 0.0:
         return y.copy()
-    if regime.soft:
-        solver = integrator(problem, y, regime, options)
-        solver.t_bound = h
-        while solver.status == "running":
-            solver.step()
-        return solver.y
     stages = []
     for row in DOP853.A[: DOP853.n_stages]:
         moved = y + h * sum((a * k for a, k in zip(row, stages) if a != 0.0), np.zeros_like(y))
@@ -170,6 +183,7 @@ def project(problem: Problem, y, regime: Regime, restart_above=1e-6):
     far = y[GAPS] > restart_above
     y[GAPS][far] = fresh[far]
     y[GAPS][fixed] = 0.0
+    y[CLOCK] = 0.0
     return y
 
 
