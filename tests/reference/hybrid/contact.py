@@ -138,7 +138,8 @@ def solve(problem: Contacts) -> Answer:
     """The first combination of modes that obeys every law.
 
     The order decides where there is more than one (large friction): combinations in which at most one contact
-    starts to slide come first; among them those with most contacts active; then those with most that hold.
+    starts to slide come first, then those in which none holds; among them those with most contacts active; then
+    those with most that hold.
 
     Raises
     ------
@@ -149,7 +150,7 @@ def solve(problem: Contacts) -> Answer:
 
     def effort(modes):
         searched = sum(mode == SLIDE and d is None for mode, d in zip(modes, problem.given))
-        return searched > 1, modes.count(OPEN), -modes.count(HOLD)
+        return searched > 1, searched > 1 and HOLD in modes, modes.count(OPEN), -modes.count(HOLD)
 
     for modes in sorted(itertools.product(*choices), key=effort):
         answer = _attempt(problem, modes)
