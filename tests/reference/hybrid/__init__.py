@@ -20,7 +20,7 @@ I*, 2nd ed., 1993, section II.6, for events on the dense output.
 
     body      state, kinematics, mass          contact   the contact problem of one instant
     regime    smooth motion between events     motion    the events
-    slip      how sliding begins
+    slip      how sliding begins                hits      when the next gap closes
 """
 
 from tests.reference.hybrid.body import Problem, from_scene

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import itertools
-from math import comb
 from typing import NamedTuple
 
 import numpy as np
 from scipy.optimize import brentq
 
-from tests.reference.hybrid import body, contact, regime
+from tests.reference.hybrid import body, contact, hits, regime
 from tests.reference.hybrid.body import ANGVEL, GAPS, TWIST, VEL, Problem
 from tests.reference.hybrid.contact import HOLD, SLIDE
 from tests.reference.hybrid.regime import advance, choose, dynamics, margins, project
@@ -174,7 +173,7 @@ class _Run:
             return advance(self.problem, y0, now, h)
 
         found = [(None, [], width)]
-        hit = self.first_hit(now, dense, solver, state)
+        hit = hits.first_hit(self.problem, self.options, now, dense, solver, state)
         if hit is not None:
             found.append(("impact", *hit))
         found.extend(self.first_margins(now, dense, solver, state, min(h for *_, h in found)))
@@ -186,57 +185,6 @@ class _Run:
             found.append(("stick", stopped, width))
         # Of two at the end of the step the one that says more.
         return min(found, key=lambda end: (end[2], end[0] is None))
-
-    def first_hit(self, now, dense, solver, state):
-        """([contacts], h) of the first gap that closes: all roots of the step's dense output, which is a polynomial."""
-        width = solver.t - solver.t_old
-        nodes = 0.5 - 0.5 * np.cos(np.pi * (np.arange(DEGREE + 1) + 0.5) / (DEGREE + 1))
-        loose = [c for c in range(self.problem.contact_count) if c not in now.fixed]
-        if not loose:
-            return None
-        sampled = dense(solver.t_old + width * nodes)[GAPS][loose]
-        coefficients = np.linalg.solve(np.vander(nodes, increasing=True), sampled.T)
-        start = state(0.0)[GAPS][loose]
-        coefficients[0] = start
-        times = {}
-        for k, c in enumerate(loose):
-            if start[k] > 0.0 and np.min(BERNSTEIN @ coefficients[:, k]) > 0.0:
-                continue
-            theta = self.down_crossing(coefficients[:, k], start[k], width)
-            if theta is not None:
-                times[c] = self.polish(c, theta * width, width, state)
-        if not times:
-            return None
-        h = min(times.values())
-        y = state(h)
-        speeds = body.normal_speeds(self.problem, y)
-        both = [c for c in loose if c in times and times[c] - h <= self.options.together]
-        near = [c for c in loose if speeds[c] < 0 and y[GAPS][c] <= -speeds[c] * self.options.together]
-        return sorted(set(both) | set(near)), h
-
-    def down_crossing(self, coefficients, start, width):
-        """The first root θ in (0, 1] at which the gap falls; a gap that starts at zero has that root taken out."""
-        reduced = coefficients[1:] if start == 0.0 else coefficients
-        slope = np.polynomial.polynomial.polyder(coefficients)
-        roots = np.polynomial.polynomial.polyroots(reduced)
-        real = np.sort(roots.real[(np.abs(roots.imag) < 1e-6 * np.abs(roots)) & (roots.real > 0) & (roots.real <= 1)])
-        for theta in real:
-            if np.polynomial.polynomial.polyval(theta, slope) / width < -0.1 * self.options.tiny:
-                return theta
-        return None
-
-    def polish(self, c, h, width, state):
-        """Newton on the gap itself."""
-        for _ in range(20):
-            y = state(h)
-            speed = body.normal_speeds(self.problem, y)[c]
-            if speed >= 0:
-                break
-            change = y[GAPS][c] / speed
-            h = min(max(h - change, 0.0), width)
-            if abs(change) <= 1e-15 * width:
-                break
-        return h
 
     def first_margins(self, now, dense, solver, state, limit):
         """Ends [(kind, contacts, h)] at which a force leaves its cone, sampled four times per step."""
@@ -264,16 +212,7 @@ class _Run:
         return kind, contacts, brentq(margin, left, right, xtol=1e-15, rtol=1e-14)
 
 
-DEGREE = 7  # of DOP853's dense output
 QUARTERS = np.linspace(0.0, 1.0, 5)
-
-
-def _bernstein(n):
-    """Rows give Bernstein coefficients on [0, 1] of a polynomial of degree n: all positive, no root."""
-    return np.array([[comb(i, j) / comb(n, j) if j <= i else 0.0 for j in range(n + 1)] for i in range(n + 1)])
-
-
-BERNSTEIN = _bernstein(DEGREE)
 
 
 def collide(problem: Problem, y, touching, restitution):
