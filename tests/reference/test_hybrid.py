@@ -132,11 +132,12 @@ B, H, M = 0.1, 1.0, 2.0
 R, ALPHA, I_C = math.hypot(B, H), math.atan2(B, H), M * (B * B + H * H) / 3
 
 
-def tall_block(tilt, mu, e=0.0):
+def tall_block(tilt, mu, e=0.0, rate=0.0):
     phi = tilt - ALPHA
     block = physics.Block(
         (2 * B, 2 * H, 0.5), M, pos=(R * math.sin(phi), R * math.cos(phi), 0.0),
         quat=(math.cos(tilt / 2), 0.0, 0.0, -math.sin(tilt / 2)),
+        linvel=(R * math.cos(phi) * rate, -R * math.sin(phi) * rate, 0.0), angvel=(0.0, 0.0, -rate),
     )  # fmt: skip
     effects = [physics.Gravity((0, -G, 0)), physics.Contact(e), physics.Friction(mu)]
     return physics.Scene([block], [physics.HalfSpace((0, 1, 0))], effects)
@@ -210,6 +211,25 @@ def test_tipping_block_slips_where_the_cone_ends():
     # The error of the slip's time moves the whole motion by as much; collocation leaves 1e-12 across.
     np.testing.assert_allclose([-result.y[12], result.y[0], result.y[7]], moved[1:], atol=1e-10)
     assert result.y[1] == pytest.approx(R * math.cos(moved[0]), abs=1e-10)
+
+
+def test_fast_tipping_block_leaves_the_floor_where_it_would_pull():
+    # Without friction N is positive while R cos φ φ̇² < g; from φ < 0 on it grows past that.
+    tilt, end = 0.005, 0.05
+    phi = tilt - ALPHA
+    spin = math.sqrt(0.998 * G / (R * math.cos(phi)))
+    _, result = run(tall_block(tilt, 0.0, rate=spin), end)
+    start = [phi, spin, R * math.sin(phi), R * math.cos(phi) * spin]
+    tip = solve_ivp(_sliding(0.0, 1.0), (0, end), start, "DOP853", rtol=1e-13, atol=1e-15, max_step=1e-3,
+                    dense_output=True).sol  # fmt: skip
+    leave = brentq(lambda t: R * math.cos(tip(t)[0]) * tip(t)[1] ** 2 - G, 0.0, 0.03, xtol=1e-15)
+    assert [(event.kind, event.contact[0]) for event in result.events] == [("release", 1), ("release", 5)]
+    # 1e-13 of g, against the 0.3 g/s at which it is passed.
+    assert result.events[0].t == pytest.approx(leave, abs=1e-11)
+    # Free from then on: the spin stays, the centre falls.
+    phi, rate = tip(leave)[:2]
+    assert result.y[12] == pytest.approx(-rate, abs=1e-11)
+    assert result.y[8] == pytest.approx(-R * math.sin(phi) * rate - G * (end - leave), abs=1e-11)
 
 
 def test_elastic_block_against_multiple_precision():

@@ -283,6 +283,8 @@ def follow(run, now, kind, contacts):
     following = run.settle(now.fixed, at_rest=held, ahead=now)
     if kind == "slip":
         contacts = [c for c, m in zip(following.active, following.modes) if c in held and m == SLIDE]
+    if kind == "release":
+        contacts = [c for c in now.active if c not in following.fixed] or contacts
     if kind != "carry":
         run.record(kind, contacts)
     return following
