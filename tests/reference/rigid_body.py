@@ -149,13 +149,13 @@ def _taylor(moments: np.ndarray, start: list, duration: float, steps: int, order
     for _ in range(steps):
         series = [[a] for a in now]
         for k in range(order):
-            for row, rate in zip(series, _coefficients(series, euler)):
+            for row, rate in zip(series, taylor_coefficients(series, euler)):
                 row.append(rate / (k + 1))
         now = [mpmath.polyval(row[::-1], h) for row in series]
     return now
 
 
-def _coefficients(series: list, euler: list) -> list:
+def taylor_coefficients(series: list, euler: list) -> list:
     """Next Taylor coefficient of ω' = (I_j - I_k)/I_i ω_j ω_k and of q' = q ω / 2 (Cauchy products)."""
     a, b, c, w, x, y, z = series
 
