@@ -48,10 +48,11 @@ class Accuracy:
         Impacts (with ``events`` all events) of one body that one substep resolves in time; more are reported and
         treated as plastic (with ``events`` the rest of the substep is left out).
     slop : float
-        Gap within which a feature touches a wall, and error of the place of an impact, in bounding radii.
+        Gap within which a feature touches a wall, and (but with ``events``) error of the place of an impact, in
+        bounding radii. With ``events`` a rebound no higher than a few slops is not made.
     rest_share : float
-        A rebound that would be over within this share of the substep is not made (restitution acts as 0): the
-        bounce threshold. 0 lets every rebound happen.
+        Bounce threshold of time stepping: a rebound that would be over within this share of the substep is not made
+        (restitution acts as 0). 0 lets every rebound happen.
     """
 
     substeps: int = 1
@@ -81,10 +82,10 @@ PRESETS = {
     "fast": replace(_BALANCED, solver="sweeps", tolerance=1e-3, iterations=20, impacts=4, slop=1e-5),
     "balanced": _BALANCED,
     "precise": replace(
-        _BALANCED, scheme="events", tolerance=1e-10, iterations=2000, impacts=10_000, slop=1e-10, rest_share=1e-5
+        _BALANCED, scheme="events", tolerance=1e-10, iterations=2000, impacts=10_000, slop=1e-12
     ),
     "reference": replace(
-        _BALANCED, scheme="events", tolerance=1e-13, iterations=10_000, impacts=100_000, slop=1e-12, rest_share=1e-7
+        _BALANCED, scheme="events", tolerance=1e-13, iterations=10_000, impacts=100_000, slop=1e-14
     ),
 }
 

@@ -102,7 +102,7 @@ def safe_flight(y, left, third, tilted, work, motion):
             gap = d + qt.dot(n, r)
             speed = vn + qt.dot(n, qt.cross(w, r))
             bend = an + qt.dot(n, plus(qt.cross(alpha, r), qt.cross(w, rate)))
-            if gap <= work.slop and speed >= -motion.still:
+            if gap <= motion.touch and speed >= -motion.still:
                 gap, speed = max(gap, 0.0), max(speed, 0.0)
             t = min(t, safe_time(max(gap, 0.0), speed, bend, third, t))
     return t

@@ -77,8 +77,8 @@ def gap_margin(h, work, motion):
         if motion.is_active[s] or motion.gap[END, s] == math.inf:
             continue
         g0, g1 = motion.gap[START, s], motion.gap[END, s]
-        if g0 <= work.slop:
-            low = g1 + work.slop
+        if g0 <= motion.touch:
+            low = g1 - min(g0, 0.0) + motion.touch
         else:
             low = lowest(g0, motion.gap_rate[START, s], g1, motion.gap_rate[END, s], h)
         if low < least:

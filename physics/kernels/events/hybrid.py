@@ -61,6 +61,15 @@ from physics.kernels.stages import MEMORY_HEAD, note_solve
 # rounding, and the body has moved by 1e-10 radii.
 AHEAD = 1.0e-5
 
+# Gaps of this share of what they are the difference of are rounding; see `set_thresholds` for HOP.
+ROUNDING = 1.0e-15
+HOP = 4.0
+
+# Contacts that touch within this share of min(√(radius/acceleration), radius/speed), and ten times the tolerance, do so
+# at once: rounding would else make two impacts of that of an edge, with another outcome.
+TOGETHER = 1.0e-10
+TINY = 1.0e-300
+
 # Trials of the time at which a guard ends a step.
 LOCATIONS = 80
 
@@ -92,18 +101,19 @@ def rebound(speed, normal, r, rate, w, alpha, work, motion):
 
 @kernel
 def pose_collision(y, tilted, work, motion, report):
-    """Write the contact problem of all touching contacts into `work`; their number."""
+    """Write the contact problem of all contacts that touch, or would in no time, into `work`; their number."""
     put_state(motion, START, y)
     look_around(START, tilted, work, motion)
     R, _, w, alpha = free_turning(y, tilted, work)
     n = 0
     motion.left_out = 0.0
     for s in range(motion.is_active.shape[0]):
-        if not motion.gap[START, s] <= work.slop or n >= work.slot.shape[0]:
+        rate = motion.gap_rate[START, s]
+        if not motion.gap[START, s] <= max(motion.touch, -rate * motion.together) or n >= work.slot.shape[0]:
             continue
         normal = wall_normal(work.walls, s // work.features)
-        r, rate = arm_and_rate(work.shape, load(work.dims), R, w, normal, s % work.features)
-        goal = rebound(-motion.gap_rate[START, s], normal, r, rate, w, alpha, work, motion)
+        r, r_rate = arm_and_rate(work.shape, load(work.dims), R, w, normal, s % work.features)
+        goal = rebound(-rate, normal, r, r_rate, w, alpha, work, motion)
         pose_contact(n, s, r, (goal, 0.0, 0.0), work)
         n += 1
         report[work.world, at.PENETRATION] = max(report[work.world, at.PENETRATION], -motion.gap[START, s])
@@ -270,13 +280,21 @@ def look_ahead(y, tilted, work, motion):
 
 @kernel
 def set_thresholds(y, h, tilted, work, motion):
-    """What counts as no speed, and how far a regime is looked ahead."""
-    v, w = y[2], angular_velocity(y[1], y[3], work, tilted)
+    """What counts as no gap and no speed, and how far a regime is looked ahead.
+
+    A contact is still when the speed would not lift it by HOP gaps that count as none: a bounce as low as that would
+    gain from being set down on the wall what it loses in the impact.
+    """
+    x, v, w = y[0], y[2], angular_velocity(y[1], y[3], work, tilted)
     speed = math.sqrt(qt.dot(v, v)) + work.radius * math.sqrt(qt.dot(w, w))
-    motion.still = 0.5 * work.rest_share * h * work.acceleration + 1.0e-13 * speed
-    motion.ahead = AHEAD * h
+    motion.touch = max(work.slop, ROUNDING * (work.radius + math.sqrt(qt.dot(x, x))))
+    motion.noise = 1.0e-13 * speed
+    motion.still = math.sqrt(2.0 * HOP * work.acceleration * motion.touch) + motion.noise
+    unit = h
     if work.acceleration > 0.0:
-        motion.ahead = min(motion.ahead, AHEAD * math.sqrt(work.radius / work.acceleration))
+        unit = min(unit, math.sqrt(work.radius / work.acceleration))
+    motion.ahead = AHEAD * unit
+    motion.together = (TOGETHER + 10.0 * work.tolerance) * min(unit, work.radius / (speed + TINY))
 
 
 @kernel
@@ -331,6 +349,7 @@ def advance(y, h, friction, smooth, gyroscopic, tilted, pivots, work, motion, me
     world = work.world
     motion.left_out = 0.0
     seen, t = y, 0.0
+    closing = False  # a contact that will leave has to be stopped first
     width = 3
     if friction is None:
         width = 1
@@ -338,23 +357,27 @@ def advance(y, h, friction, smooth, gyroscopic, tilted, pivots, work, motion, me
         if k == work.splits:
             report[world, at.UNRESOLVED] += 1.0
             break
-        what, n, v, L = find_regime(seen, friction, tilted, work, motion)
+        what, n, v, L = COLLIDES, 0, y[2], y[3]
+        if not closing:
+            what, n, v, L = find_regime(seen, friction, tilted, work, motion)
+        closing = False
         if what == COLLIDES:
             n, v, L = pose_collision(y, tilted, work, motion, report), y[2], y[3]
         elif what == IS_LOST:
             n, v, L = pose_jump(y, tilted, work, motion)
-        if what == ASKS or what == COLLIDES or what == IS_LOST:
+        if what in (ASKS, COLLIDES, IS_LOST):
             P = principal_axes(seen if what == ASKS else y, tilted, work)
             v, L, residual, sweeps, method = solve_contacts(n, friction, smooth, pivots, v, L, P, work)
             note_solve(report, world, residual, sweeps, method, max(work.tolerance, SOLVED))
         if what == ASKS:
             what = read_resting(n, seen, v, L, friction, tilted, work, motion)
-        elif what == COLLIDES or what == IS_LOST:
+            closing = what == COLLIDES
+        elif what in (COLLIDES, IS_LOST):
             y = y[0], y[1], v, L
             log_impulses(n, width, work, log, counts, start + t)
         step = 0.0
         if what == COLLIDES:
-            report[world, at.SPLITS] += 1.0
+            report[world, at.SPLITS] += 0.0 if closing else 1.0
             seen = y
             continue
         log_changes(work, motion, log, counts, start + t)
@@ -369,7 +392,7 @@ def advance(y, h, friction, smooth, gyroscopic, tilted, pivots, work, motion, me
             report[world, at.FALLBACKS] += 1.0
             y, step = carry_on(y, motion.ahead, tilted, work), motion.ahead
         elif what == FLIES:
-            y, step, hit, ended = fly_to_wall(y, h - t, gyroscopic, tilted, work, motion)
+            y, step, _, ended = fly_to_wall(y, h - t, gyroscopic, tilted, work, motion)
             if not ended:
                 report[world, at.UNRESOLVED] += 1.0
         else:
@@ -379,7 +402,7 @@ def advance(y, h, friction, smooth, gyroscopic, tilted, pivots, work, motion, me
         if not t < h:
             break
         seen = y
-        if guard == PUSH or guard == CONE:
+        if guard in (PUSH, CONE):
             seen = look_ahead(y, tilted, work, motion)
     keep_contacts(memory, work.i, work, motion)
     return y

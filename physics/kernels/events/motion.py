@@ -29,11 +29,13 @@ def motion_dtype(wall_count: int, features: int) -> np.dtype:
     n_slots = max(wall_count, 1) * features
     f, i = np.float64, np.int64
     return np.dtype([
+        ("touch", f),  # gap within which a feature touches [m]
         ("still", f),  # speed of a contact that counts as none [m/s]
+        ("noise", f),  # speed that is rounding [m/s]
+        ("together", f),  # impacts within this time are one [s]
         ("ahead", f),  # time by which the next regime is looked for [s]
         ("step", f),  # length of the last smooth step [s]
         ("left_out", f),  # time that a sequence of bounces would have taken on [s]
-        ("is_known", i),  # 1: the regime was found at the last event
         ("count", i),  # contacts that act
         ("slot", i, (n,)),  # wall * features + feature
         ("holds", i, (n,)),  # 1: no velocity at all; 0: slides

@@ -57,7 +57,7 @@ def find_candidates(y, tilted, work, motion):
     look_around(START, tilted, work, motion)
     count = 0
     for s in range(motion.is_active.shape[0]):
-        if motion.gap[START, s] <= work.slop and count < motion.candidate.shape[0]:
+        if motion.gap[START, s] <= motion.touch and count < motion.candidate.shape[0]:
             rate = motion.gap_rate[START, s]
             if rate < -motion.still:
                 return 0, True
@@ -155,6 +155,15 @@ def keep_forces(count, width, work, motion):
         k += 1
 
 
+@inlined
+def closes(count, motion):
+    """Whether a contact that will leave is still, by a little, on its way in."""
+    for i in range(count):
+        if motion.kind[i] == OPEN and motion.gap_rate[START, motion.candidate[i]] < -motion.noise:
+            return True
+    return False
+
+
 @kernel
 def is_still(y, w, acceleration, work, motion):
     """Whether the body neither moves nor begins to: what is left is rounding."""
@@ -185,6 +194,8 @@ def read_resting(count, y, a, moment, friction, tilted, work, motion):
         for c in range(3):
             motion.candidate_way[i, c] = at[c] / size if size > SMALL * scale else 0.0
     act(count, work, motion)
+    if closes(count, motion):
+        return COLLIDES
     if motion.count == 0:
         return FLIES
     acceleration = math.sqrt(qt.dot(a, a)) + work.radius * math.sqrt(qt.dot(alpha, alpha))
@@ -302,4 +313,6 @@ def find_regime(y, friction, tilted, work, motion):
         return ASKS, count, a, moment
     if not mixed_forces(count, y, R, P, w, alpha, work, motion):
         return IS_LOST, count, zero, zero
+    if closes(count, motion):
+        return COLLIDES, 0, zero, zero
     return (MOVES if motion.count > 0 else FLIES), count, zero, zero
