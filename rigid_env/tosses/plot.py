@@ -53,8 +53,9 @@ def _draw_ladder(axes, report: Report, name: str, unit: str) -> None:
         getattr(report.limits.noise, f"{name}_mean"), color="0.5", linestyle=":", label="noise of the first frame"
     )
     axes.plot(times, errors, "o", label="mean over the tosses not fitted")
-    for rung, us, error in zip(report.ladder, times, errors):
-        axes.annotate(rung.accuracy, (us, error), xytext=(0, 7), textcoords="offset points", ha="center", fontsize=8)
+    for k, (rung, us, error) in enumerate(zip(report.ladder, times, errors)):
+        place = (0, 7 if k % 2 else -14)  # above and below by turns: neighbours may be close
+        axes.annotate(rung.accuracy, (us, error), xytext=place, textcoords="offset points", ha="center", fontsize=8)
     axes.set_xscale("log")
     axes.set_xlim(min(times) / 2.0, max(times) * 2.0)
     axes.set_ylim(0.0, 1.25 * max(errors))

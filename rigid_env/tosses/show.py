@@ -43,10 +43,8 @@ def _table(title: str, *names: str) -> Table:
 
 
 def _case_table(report: Report) -> Table:
-    table = _table(
-        "position error [cube widths] and rotation error [deg]: mean, median over tosses", "what was fitted", "tosses",
-        "position", "median", "rotation", "median", "target",
-    )  # fmt: skip
+    title = "mean and median over tosses of position error (cube widths) and rotation error (degrees)"
+    table = _table(title, "what was fitted", "tosses", "position", "median", "rotation", "median", "target")
     for case in report.cases:
         for name, summary in (("fitted", case.trained), ("rest", case.rest), ("all", case.every)):
             is_good = summary.position_mean <= TARGETS["position_mean"]
