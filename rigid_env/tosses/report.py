@@ -167,7 +167,10 @@ class Measurement:
         return sum(self.effort.evaluations(len(setup.parameters)) for setup in self.setups)
 
     def run(self, tick: Callable[[str, int], None] = lambda what, done: None) -> Report:
-        """Fit each setup, then the ladder and the limits; ``tick`` is told what is done and how many evaluations."""
+        """Fit each setup, then the ladder and the limits; ``tick`` is told what is done and how many evaluations.
+
+        After Ctrl-C no other setup is fitted, and the ladder is the accuracy of the fit alone: it ends soon.
+        """
         for setup in self.setups:
             case = self._case(setup, lambda best, what=setup.name: tick(f"{what}: {best:.4f}", 1))
             self.report.cases.append(case)
@@ -202,7 +205,7 @@ class Measurement:
 
     def _measure_ladder(self, tick: Callable[[str, int], None]) -> None:
         case = self.headline()
-        for accuracy in PRESETS:
+        for accuracy in PRESETS if self.report.is_complete else (self.report.accuracy,):
             tick(f"accuracy {accuracy}", 0)
             self._compile(accuracy)
             runs, begin = [], time.perf_counter()
