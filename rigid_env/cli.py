@@ -217,3 +217,42 @@ def accuracy(
             _tell_file(files[1], console)
     if not report.is_complete:
         raise typer.Exit(INTERRUPTED)
+
+
+def tosses(
+    data: Annotated[Path, typer.Argument(metavar="DATA", help="A .npz of tosses, or a folder of <number>.pt files.")],
+    accuracy: Accuracy = "balanced",
+    fit: Annotated[
+        str | None, typer.Option(metavar="NAMES", help="Fit only these, once: friction,restitution.")
+    ] = None,
+    seed: Annotated[int, typer.Option(min=0, help="Of the split into tosses to fit and the rest.")] = 0,
+    threads: Annotated[int, typer.Option(min=1, help="That share a replay.")] = 1,
+    quick: Annotated[bool, typer.Option("--quick", help="Hardly search: only see that it runs.")] = False,
+    plot: Annotated[Path | None, typer.Option(metavar="FILE", help="Draw error against time here (PNG).")] = None,
+    json: Json = None,
+) -> None:
+    """Replay measured cube tosses: fit a quarter of them, report errors over the rest."""
+    with _told_errors():
+        from physics import accuracy as knobs
+        from rigid_env.measure.table import make_console
+        from rigid_env.tosses import data as files
+        from rigid_env.tosses import plot as pictures
+        from rigid_env.tosses.fit import QUICK, Effort
+        from rigid_env.tosses.report import Measurement
+        from rigid_env.tosses.show import show
+
+        console = make_console()
+        knobs.resolve(accuracy)
+        if plot is not None:
+            pictures.require_matplotlib()
+        names = None if fit is None else tuple(name.strip() for name in fit.split(","))
+        effort = QUICK if quick else Effort()
+        measurement = Measurement(files.load(data), accuracy, effort, seed, threads, names)
+        with _progress(console) as progress:
+            task = progress.add_task("fitting", total=measurement.evaluations())
+            report = measurement.run(lambda what, done: progress.update(task, advance=done, description=what))
+        show(report, measurement.headline(), console)
+        if plot is not None:
+            pictures.write_plot(plot, report)
+            _tell_file(plot, console)
+        _write(json, {"data": data.name, "is_quick": quick, **report.to_dict()}, console)
