@@ -81,12 +81,8 @@ _BALANCED = Accuracy()
 PRESETS = {
     "fast": replace(_BALANCED, solver="sweeps", tolerance=1e-3, iterations=20, impacts=4, slop=1e-5),
     "balanced": _BALANCED,
-    "precise": replace(
-        _BALANCED, scheme="events", tolerance=1e-10, iterations=2000, impacts=10_000, slop=1e-12
-    ),
-    "reference": replace(
-        _BALANCED, scheme="events", tolerance=1e-13, iterations=10_000, impacts=100_000, slop=1e-14
-    ),
+    "precise": replace(_BALANCED, scheme="events", tolerance=1e-10, iterations=2000, impacts=10_000, slop=1e-12),
+    "reference": replace(_BALANCED, scheme="events", tolerance=1e-13, iterations=10_000, impacts=100_000, slop=1e-14),
 }
 
 

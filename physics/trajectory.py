@@ -6,6 +6,7 @@ import csv
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from itertools import pairwise
 from pathlib import Path
 
@@ -14,6 +15,7 @@ import numpy as np
 from physics import checks
 from physics.accuracy import Accuracy
 from physics.diagnostics import diagnose
+from physics.kernels.events.log import KINDS
 from physics.report import StepReport
 from physics.scene import Scene
 from physics.world import World
@@ -28,23 +30,31 @@ COLUMNS = (
 
 @dataclass(frozen=True)
 class Event:
-    """Something that happened to a body; known to the sample interval that ends at `t`.
+    """Something that happened to a body.
 
     Attributes
     ----------
     t : float
-        End of the interval [s].
+        When [s]. The event-driven scheme knows it to rounding; where it has left out the end of a sequence of ever
+        smaller bounces, the contact's ``touch`` and the body's ``rest`` come when that would have ended. Time
+        stepping knows the sample interval: `t` is its end.
     kind : str
-        ``impact`` (velocities jumped), ``touch`` (a resting contact began), ``release`` (one ended), ``fault``.
+        ``impact`` (velocities jumped), ``touch`` (a resting contact began), ``release`` (one ended), ``fault``; of
+        the event-driven scheme also ``stick`` and ``slip`` (a resting contact ceased or began to slide) and
+        ``rest`` (the body came to rest).
     body : int
     wall : int
-        -1 where the kind has none.
+        -1 where the kind has none, and for the impacts of time stepping.
+    impulse : (3,) tuple of float
+        Of an ``impact`` on the body, all contacts of the wall together, world frame [N s]; zero where it is not
+        known (time stepping) or the kind has none.
     """
 
     t: float
     kind: str
     body: int
     wall: int = -1
+    impulse: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
 
 @dataclass(frozen=True)
@@ -141,16 +151,14 @@ def simulate(
     else:
         times[-1] = min(times[-1], duration) if whole else times[-1]
     samples, events, reports = [_sample(world)], [], []
-    touching: set[tuple[int, int]] = set()
+    watch = _logged if world.plan.events else _Touching()
     for start, end in pairwise(times):
         is_short = end == times[-1] and len(times) > whole + 1
         load = None if wrench is None else np.asarray(wrench(start, world), dtype=float)[None]
-        report = world.step(load, dt=end - start if is_short else None)
+        dt = end - start if is_short else None
+        events += watch(world, start, end, partial(world.step, load, dt=dt))
         samples.append(_sample(world))
-        reports.append(report)
-        now = world.touching()
-        events += _events(end, report, touching, now)
-        touching = now
+        reports.append(world.report)
     columns = [np.array(column) for column in zip(*samples)]
     return Trajectory(np.array(times), *columns, events=tuple(events), reports=tuple(reports))
 
@@ -162,10 +170,36 @@ def _sample(world: World) -> tuple[np.ndarray, ...]:
     )  # fmt: skip
 
 
-def _events(t: float, report: StepReport, before: set, now: set) -> list[Event]:
-    events = [Event(t, "impact", -1)] * int(report.impacts[0])
-    events += [Event(t, "touch", *pair) for pair in sorted(now - before)]
-    events += [Event(t, "release", *pair) for pair in sorted(before - now)]
-    if report.faults[0]:
-        events.append(Event(t, "fault", -1))
-    return events
+class _Touching:
+    """Events of time stepping: what its reports and resting contacts tell apart from one sample to the next."""
+
+    def __init__(self):
+        self._before: set[tuple[int, int]] = set()
+
+    def __call__(self, world: World, start: float, end: float, step: Callable[[], StepReport]) -> list[Event]:
+        """Take a step; the events of it."""
+        report = step()
+        before, now = self._before, world.touching()
+        self._before = now
+        events = [Event(end, "impact", -1)] * int(report.impacts[0])
+        events += [Event(end, "touch", *pair) for pair in sorted(now - before)]
+        events += [Event(end, "release", *pair) for pair in sorted(before - now)]
+        if report.faults[0]:
+            events.append(Event(end, "fault", -1))
+        return events
+
+
+def _logged(world: World, start: float, end: float, step: Callable[[], StepReport]) -> list[Event]:
+    """Take a step of the event-driven scheme; its log, for which room is made and the step repeated if need be."""
+    before = world.snapshot()
+    step()
+    most = int(world.event_counts.max())
+    if most > world.event_log.shape[1]:
+        world.restore(before)
+        world.make_event_room(2 * most)
+        return _logged(world, start, end, step)
+    events = []
+    for body, (count, rows) in enumerate(zip(world.event_counts.tolist(), world.event_log)):
+        for t, kind, wall, *impulse in rows[:count].tolist():
+            events.append(Event(start + t, KINDS[int(kind)], body, int(wall), tuple(impulse)))
+    return sorted(events, key=lambda event: event.t)

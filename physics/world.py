@@ -308,7 +308,8 @@ class World:
 
     def __getstate__(self):
         kept = dict(vars(self))
-        for name in ("pool", "scratch", "motions", "_wrench", "_calls", "_bound_for", "pos", "quat", "linvel", "angvel"):
+        views = ("pos", "quat", "linvel", "angvel")
+        for name in ("pool", "scratch", "motions", "_wrench", "_calls", "_bound_for", *views):
             del kept[name]
         return kept
 

@@ -219,6 +219,7 @@ def accuracy(
         raise typer.Exit(INTERRUPTED)
 
 
+@app.command()
 def tosses(
     data: Annotated[Path, typer.Argument(metavar="DATA", help="A .npz of tosses, or a folder of <number>.pt files.")],
     accuracy: Accuracy = "balanced",

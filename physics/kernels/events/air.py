@@ -87,7 +87,7 @@ def third_bound(L, left, work):
 @kernel
 def safe_flight(y, left, third, tilted, work, motion):
     """A time within which no feature at y reaches a wall, at most `left`."""
-    x, q, v, m = y
+    x, v = y[0], y[2]
     R, _, w, alpha = free_turning(y, tilted, work)
     dims, a, shape = load(work.dims), load(work.free_acceleration), work.shape
     t = left

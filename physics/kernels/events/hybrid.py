@@ -319,13 +319,15 @@ def keep_contacts(memory, i, work, motion):
     total = 0.0
     for wall in range(work.walls.shape[0] - 1, -1, -1):
         total = 3.0 * total + motion.state[wall]
-    memory[i, 2] = total
+    memory[i, 2] = 2.0 * total + motion.is_resting
 
 
 @inlined
 def recall_contacts(memory, i, work, motion):
-    """What the body did at the walls at the end of the last step: base 3 digits of the memory's mode."""
+    """What the body did at the end of the last step: whether it rested, and base 3 a digit per wall."""
     total = int(memory[i, 2])
+    motion.is_resting = total % 2
+    total //= 2
     for wall in range(work.walls.shape[0]):
         motion.state[wall] = total % 3
         total //= 3
@@ -382,11 +384,13 @@ def advance(y, h, friction, smooth, gyroscopic, tilted, pivots, work, motion, me
             continue
         log_changes(work, motion, log, counts, start + t)
         if what == RESTS:
-            if y[2] != (0.0, 0.0, 0.0) or y[3] != (0.0, 0.0, 0.0):
+            if not motion.is_resting:
                 ev.note_event(log, counts, work.i, start + t + motion.left_out, ev.REST, -1, (0.0, 0.0, 0.0))
             y = cancel(y, 0, tilted, work, motion)
             y = y[0], y[1], (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
+            motion.is_resting = 1
             break
+        motion.is_resting = 0
         guard = NO_GUARD
         if what == IS_LOST:
             report[world, at.FALLBACKS] += 1.0

@@ -62,6 +62,7 @@ def motion_dtype(wall_count: int, features: int) -> np.dtype:
         ("changes", i, (2 * n,)),
         ("candidate", i, (2 * n,)),  # their slots
         ("candidate_way", f, (2 * n, 3)),
+        ("is_resting", i),
         ("state", i, (max(wall_count, 1),)),  # what the body did at each wall after the last event
         ("gap", f, (2, n_slots)),  # of every feature, at the start and at the end of the step [m]
         ("gap_rate", f, (2, n_slots)),  # [m/s]

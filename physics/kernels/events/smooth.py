@@ -84,7 +84,7 @@ def find_rate(row, tilted, work, motion):
 @kernel
 def set_scale(h, tilted, work, motion):
     """Sizes against which the errors of a step are held."""
-    x, q, v, m = get_state(motion, START)
+    x, _, v, m = get_state(motion, START)
     J = work.J
     size = math.sqrt(qt.dot(m, m))
     speed = math.sqrt(qt.dot(v, v)) + work.radius * max(J[0], J[1], J[2]) * size + work.acceleration * h
