@@ -1,0 +1,164 @@
+"""What training at a coarse accuracy costs when the world is exact: ``python -m agents.accuracy_transfer``.
+
+One policy is trained per accuracy, with the same hyperparameters, seed and target; when to stop is judged at the
+accuracy that it trains at, as one would who has no other. Each is then evaluated on the same fresh episodes at its
+own accuracy and at `reference`. The table sets success at `reference` against the time the training took.
+
+A policy that has been trained already is not trained again: interrupted, the program goes on where it was.
+"""
+
+from __future__ import annotations
+
+import json
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+from rich import box
+from rich.console import Console
+from rich.table import Table
+
+from agents.checkpoint import load_policy
+from agents.config import HYPERPARAMETERS, RunConfig, RunFolder, make_config
+from agents.evaluate import JsonOption, evaluate, write_json
+from agents.train import DEFAULTS, INTERRUPTED, Interrupted, train
+from physics.accuracy import PRESETS
+
+TRUTH = "reference"
+TRAINED_AT = "fast,balanced,precise"
+EPISODES = 500
+
+
+@dataclass(frozen=True)
+class Transfer:
+    """A policy trained at one accuracy.
+
+    Attributes
+    ----------
+    accuracy : str
+        Preset of the engine in training.
+    training_seconds : float
+    steps : int
+        Environment steps of training.
+    is_target_reached : bool
+        Whether training ended at its target, not at its limit.
+    own, truth : dict
+        Evaluations at that accuracy and at `reference` (`agents.evaluate.Episodes.summary`).
+    """
+
+    accuracy: str
+    training_seconds: float
+    steps: int
+    is_target_reached: bool
+    own: dict[str, Any]
+    truth: dict[str, Any]
+
+
+def parse_accuracies(names: str) -> list[str]:
+    """Presets from their names with commas.
+
+    Raises
+    ------
+    ValueError
+        If one is none.
+    """
+    found = [name.strip() for name in names.split(",")]
+    unknown = [name for name in found if name not in PRESETS]
+    if unknown:
+        raise ValueError(f"accuracies has {unknown[0]!r}; allowed are {', '.join(PRESETS)}, with commas")
+    return found
+
+
+def trained(config: RunConfig, run: RunFolder, console: Console) -> dict[str, Any]:
+    """What `agents.train.train` says of a run; it trains if that has not been done in this folder.
+
+    Raises
+    ------
+    ValueError
+        If the folder holds another run.
+    """
+    if run.model.is_file() and run.result.is_file():
+        if run.read_config() != config:
+            raise ValueError(f"out holds a run of another configuration in {str(run.path)!r}; allowed is a new folder")
+        return json.loads(run.result.read_text(encoding="utf-8"))
+    result = train(config, run, console=console)
+    del result["policy"]
+    write_json(run.result, result)
+    return result
+
+
+def transfer(config: RunConfig, run: RunFolder, episodes: int, console: Console) -> Transfer:
+    """Train (once) and evaluate one policy.
+
+    Parameters
+    ----------
+    config : RunConfig
+        Its `accuracy` is the preset's name.
+    run : RunFolder
+    episodes : int
+        Per evaluation.
+    console : rich.console.Console
+    """
+    result = trained(config, run, console)
+    _, policy = load_policy(run)
+    seen = [
+        evaluate(config.env, policy, episodes, config.seed, **{**config.env_kwargs, "accuracy": accuracy})
+        for accuracy in (config.accuracy, TRUTH)
+    ]
+    return Transfer(
+        config.accuracy, result["training_seconds"], result["steps"], result["is_target_reached"], seen[0], seen[1]
+    )
+
+
+def make_table(env: str, rows: list[Transfer]) -> Table:
+    """Success against training time."""
+    table = Table(title=f"{env}: trained at an accuracy, judged at {TRUTH}", title_justify="left", box=box.SIMPLE_HEAD)
+    for name in ("trained at", "training, s", "million steps", "success there", f"success at {TRUTH}", "95 %"):
+        table.add_column(name, justify="left" if name == "trained at" else "right")
+    for row in rows:
+        low, high = row.truth["interval"]
+        table.add_row(
+            row.accuracy + ("" if row.is_target_reached else " (limit)"),
+            f"{row.training_seconds:.0f}", f"{row.steps / 1e6:.2f}",
+            f"{row.own['success_rate']:.1%}", f"{row.truth['success_rate']:.1%}", f"{low:.1%} to {high:.1%}",
+        )  # fmt: skip
+    return table
+
+
+def main(
+    env: Annotated[str, typer.Option(help="Gymnasium id.")] = DEFAULTS["env"],
+    algo: Annotated[str, typer.Option(help="ppo or sac.")] = DEFAULTS["algo"],
+    seed: Annotated[int, typer.Option(min=0, help="Of all that is random.")] = DEFAULTS["seed"],
+    accuracies: Annotated[str, typer.Option(metavar="NAMES", help="Presets to train at, with commas.")] = TRAINED_AT,
+    episodes: Annotated[int, typer.Option(min=1, help="Of each evaluation.")] = EPISODES,
+    target: Annotated[float | None, typer.Option(help="Success rate to stop at, 0 to 1.")] = None,
+    max_steps: Annotated[int | None, typer.Option(help="Steps to stop at.")] = None,
+    hyperparameters: Annotated[Path, typer.Option(help="YAML file.", exists=True)] = HYPERPARAMETERS,
+    out: Annotated[Path, typer.Option(help="Where the runs are kept; done ones are not repeated.")] = Path("transfer"),
+    json_file: JsonOption = None,
+) -> None:
+    """Train one policy per accuracy, evaluate each at `reference`: success against training time."""
+    console, rows = Console(), []
+    try:
+        for name in parse_accuracies(accuracies):
+            config = make_config(
+                env, algo, seed, hyperparameters,
+                accuracy=name, evaluation_accuracy=name, target=target, max_steps=max_steps,
+            )  # fmt: skip
+            console.print(f"training at {name}", highlight=False)
+            run = RunFolder(out / f"{config.env.rpartition('/')[2]}-{algo}-s{seed}-{name}")
+            rows.append(transfer(config, run, episodes, console))
+            console.print(make_table(config.env, rows[-1:]))
+    except ValueError as error:
+        raise typer.BadParameter(str(error)) from error
+    except Interrupted as interruption:
+        console.print(str(interruption), soft_wrap=True, highlight=False)
+        raise typer.Exit(INTERRUPTED) from interruption
+    console.print(make_table(env, rows))
+    if json_file is not None:
+        write_json(json_file, {"env": env, "algo": algo, "seed": seed, "rows": [asdict(row) for row in rows]})
+
+
+if __name__ == "__main__":
+    typer.run(main)
