@@ -240,7 +240,7 @@ def has_stopped(guard, which, work, motion):
 @kernel
 def move(y, left, tilted, work, motion):
     """Smooth motion of the regime for `left`, or until a guard ends it: (state, time, guard)."""
-    y = cancel(cancel(y, 0, tilted, work, motion), 1, tilted, work, motion)
+    y = cancel(y, tilted, work, motion)
     put_state(motion, START, y)
     look_around(START, tilted, work, motion)
     motion.step = left
@@ -257,7 +257,7 @@ def move(y, left, tilted, work, motion):
             h, guard, which = locate(h, margin, tilted, work, motion)
         t += h
         motion.step = GROWTH * h if used <= EASY else h
-        y = cancel(cancel(get_state(motion, END), 0, tilted, work, motion), 1, tilted, work, motion)
+        y = cancel(get_state(motion, END), tilted, work, motion)
         if is_over:
             return y, t, guard
         put_state(motion, START, y)
@@ -275,7 +275,7 @@ def look_ahead(y, tilted, work, motion):
     motion.step = motion.ahead
     start_step(motion.ahead, tilted, work, motion)
     try_step(motion.ahead, tilted, work, motion)
-    return cancel(get_state(motion, END), 1, tilted, work, motion)
+    return cancel(get_state(motion, END), tilted, work, motion)
 
 
 @kernel
@@ -386,7 +386,7 @@ def advance(y, h, friction, smooth, gyroscopic, tilted, pivots, work, motion, me
         if what == RESTS:
             if not motion.is_resting:
                 ev.note_event(log, counts, work.i, start + t + motion.left_out, ev.REST, -1, (0.0, 0.0, 0.0))
-            y = cancel(y, 0, tilted, work, motion)
+            y = cancel(y, tilted, work, motion)
             y = y[0], y[1], (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
             motion.is_resting = 1
             break

@@ -37,6 +37,10 @@ SHORTEST = 1.0e-12
 GROWTH = 4.0
 EASY = 4
 
+# Gaps and velocities of contacts below these shares of `motion.touch` and `motion.noise` are left as they are.
+UNSEEN_GAP = 0.1
+UNSEEN_SPEED = 0.01
+
 # A body with corners turns by no more than this in a step, so that the gaps at its ends and their rates show whether
 # a corner dipped into a wall between them [rad].
 TURN_AT_MOST = 0.25
@@ -206,9 +210,18 @@ def _until_stop(h, P, w, work, motion):
     return h
 
 
+@inlined
+def _push_along(P, work, motion):
+    """Velocity and turn, both per kinetic metric, that take off `goal` along the rows of the regime."""
+    k = list_unknowns(0.0, work, motion)
+    F, T, _ = solve_unknowns(k, P, work, motion)
+    s = 1.0 / work.mass
+    return (s * F[0], s * F[1], s * F[2]), T
+
+
 @kernel
-def cancel(y, what, tilted, work, motion):
-    """State with the gaps (`what` 0) or velocities (1) taken off that the regime does not allow.
+def cancel(y, tilted, work, motion):
+    """State without the gaps and velocities of contacts that the regime does not allow, where above rounding.
 
     Least change in the kinetic metric: along M⁻¹ Jᵀ.
     """
@@ -217,23 +230,30 @@ def cancel(y, what, tilted, work, motion):
     x, q, v, m = y
     R, P, w, alpha = free_turning(y, tilted, work)
     place(y, R, w, alpha, work, motion)
+    worst = 0.0
     for j in range(motion.count):
         wall = motion.slot[j] // work.features
         n = wall_normal(work.walls, wall)
-        if what == 0:
-            gap = qt.dot(n, x) + qt.dot(n, vector(motion.arm, j)) - work.walls[wall, OFFSET]
-            for c in range(3):
-                motion.goal[j, c] = gap * n[c]
-        else:
-            for c in range(3):
-                motion.goal[j, c] = motion.velocity[j, c]
-    k = list_unknowns(0.0, work, motion)
-    F, T, _ = solve_unknowns(k, P, work, motion)
-    s = 1.0 / work.mass
-    if what == 0:
-        x = (x[0] + s * F[0], x[1] + s * F[1], x[2] + s * F[2])
-        q = qt.normalise(qt.multiply(qt.exponential(turned_by(P, work.J, T)), q))
-    else:
-        v = (v[0] + s * F[0], v[1] + s * F[1], v[2] + s * F[2])
-        m = (m[0] + T[0], m[1] + T[1], m[2] + T[2])
+        gap = qt.dot(n, x) + qt.dot(n, vector(motion.arm, j)) - work.walls[wall, OFFSET]
+        worst = max(worst, abs(gap))
+        for c in range(3):
+            motion.goal[j, c] = gap * n[c]
+    if worst > UNSEEN_GAP * motion.touch:
+        move, turn = _push_along(P, work, motion)
+        x = plus(x, move)
+        q = qt.normalise(qt.multiply(qt.exponential(turned_by(P, work.J, turn)), q))
+        R, P, w, alpha = free_turning((x, q, v, m), tilted, work)
+        place((x, q, v, m), R, w, alpha, work, motion)
+    worst = 0.0
+    for j in range(motion.count):
+        n = wall_normal(work.walls, motion.slot[j] // work.features)
+        u = vector(motion.velocity, j)
+        worst = max(worst, abs(qt.dot(n, u)))
+        if motion.holds[j]:
+            worst = max(worst, max(abs(u[0]), max(abs(u[1]), abs(u[2]))))
+        for c in range(3):
+            motion.goal[j, c] = u[c]
+    if worst > UNSEEN_SPEED * motion.noise:
+        change, turn = _push_along(P, work, motion)
+        v, m = plus(v, change), plus(m, turn)
     return x, q, v, m
