@@ -3,6 +3,8 @@
 - *Gap* of every feature that does not act, in radii. A dip between the ends of a step shows in the cubic through the
   gaps and their rates at both ends.
 - *Push* of every contact that acts, in weights.
+- *Load*: of a touching vertex that was left to the other three of a sliding face because the affine force pulled there,
+  what that force still pulls, in weights.
 - *Cone*: what friction could do beyond what a contact that holds asks of it, in weights. Two contacts that hold on
   one wall may share what acts along their line as they like, so that for them it is what is left of both.
 - *Speed* of every contact that slides, against the direction at the start of the step, in the speed of the body.
@@ -20,8 +22,9 @@ from physics.kernels.events.forces import free_turning, load, spread, vector
 from physics.kernels.events.motion import END, START, V
 from physics.kernels.events.smooth import find_rate, get_state, sliding_velocity
 from physics.kernels.layout import BLOCK, OFFSET, VERTEX_COUNT
+from physics.kernels.share import wall_axes
 
-NO_GUARD, GAP, PUSH, CONE, SPEED = range(5)
+NO_GUARD, GAP, PUSH, CONE, SPEED, LOAD = range(6)
 
 # Forces of this many weights are rounding: a push or a cone is given up only when it is missed by more.
 MARGIN = 1.0e-9
@@ -127,6 +130,49 @@ def cone_excess(j, work, motion):
     return _cone_excess(j, work.mu, work, motion)
 
 
+@inlined
+def idle_pull(work, motion):
+    """Least pull [N] that the affine force of a sliding face has at a touching vertex which does not act."""
+    least, which = math.inf, -1
+    for j in range(motion.count):
+        if not motion.is_patch[j] or (j > 0 and motion.slot[j] // work.features == motion.slot[j - 1] // work.features):
+            continue
+        wall, k = motion.slot[j] // work.features, motion.first[j]
+        axes = wall_axes(work.walls, wall)
+        r = vector(motion.arm, j)
+        for s in range(wall * work.features, (wall + 1) * work.features):
+            if motion.is_active[s] or not motion.gap[START, s] <= motion.touch:
+                continue
+            # The vertices of a face are its corners: the missing one is the sum of its neighbours less the opposite.
+            p = vector(motion.arm, opposite(s, wall, work, motion))
+            a = b = 0.0
+            for i in range(motion.count):
+                if motion.slot[i] // work.features == wall:
+                    a += qt.dot(axes[1], vector(motion.arm, i))
+                    b += qt.dot(axes[2], vector(motion.arm, i))
+            a -= 2.0 * qt.dot(axes[1], p) + qt.dot(axes[1], r)
+            b -= 2.0 * qt.dot(axes[2], p) + qt.dot(axes[2], r)
+            pull = -motion.unknown[k]
+            pull -= (motion.place[j, 0] + a / work.radius) * motion.unknown[k + 1]
+            pull -= (motion.place[j, 1] + b / work.radius) * motion.unknown[k + 2]
+            if pull < least:
+                least, which = pull, s
+    return least, which
+
+
+@inlined
+def opposite(slot, wall, work, motion):
+    """The contact of a face of three that is farthest from the vertex `slot`: all its bits but the face's differ."""
+    best, most = -1, -1
+    for i in range(motion.count):
+        if motion.slot[i] // work.features == wall:
+            bits = (motion.slot[i] % work.features) ^ (slot % work.features)
+            differing = (bits & 1) + ((bits >> 1) & 1) + ((bits >> 2) & 1)
+            if differing > most:
+                best, most = i, differing
+    return best
+
+
 @kernel
 def least_margin(h, tilted, work, motion):
     """Smallest margin at END, a step of h after START: (margin, guard, contact or slot)."""
@@ -144,13 +190,16 @@ def least_margin(h, tilted, work, motion):
                 cone = MARGIN - cone_excess(j, work, motion) / motion.weight
                 if cone < margin:
                     margin, guard, which = cone, CONE, j
-    if work.mu > 0.0:
+        pull, slot = idle_pull(work, motion)
+        if pull / motion.weight + MARGIN < margin:
+            margin, guard, which = pull / motion.weight + MARGIN, LOAD, slot
+    if work.mu > 0.0 and margin >= 0.0:  # a contact may stop within the step, unless something ends it before
         scale = motion.scale[V]
         for j in range(motion.count):
             if not motion.holds[j]:
                 t, _ = sliding_velocity(j, work, motion)
                 speed = qt.dot(t, vector(motion.reference, j))
-                speed = (speed + motion.still if motion.is_starting[j] else speed - motion.still) / scale
+                speed = (speed + 0.5 * motion.still if motion.is_starting[j] else speed - motion.still) / scale
                 if speed < margin:
                     margin, guard, which = speed, SPEED, j
     return margin, guard, which

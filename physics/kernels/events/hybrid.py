@@ -29,15 +29,15 @@ from physics.kernels.contact import wall_normal
 from physics.kernels.events import log as ev
 from physics.kernels.events.air import fly_freely, fly_to_wall
 from physics.kernels.events.forces import arm_and_rate, free_turning, load
-from physics.kernels.events.guards import CONE, GAP, NO_GUARD, PUSH, SPEED, least_margin, look_around
+from physics.kernels.events.guards import CONE, GAP, LOAD, NO_GUARD, PUSH, SPEED, least_margin, look_around
 from physics.kernels.events.motion import END, START
 from physics.kernels.events.regime import (
     ASKS,
+    ASKS_SLIDING,
     COLLIDES,
     FLIES,
     IS_LOST,
     RESTS,
-    find_candidates,
     find_regime,
     pose_contact,
     read_resting,
@@ -57,16 +57,28 @@ from physics.kernels.slide import SLIDE
 from physics.kernels.solve import solve_contacts
 from physics.kernels.stages import MEMORY_HEAD, note_solve
 
-# The next regime is looked for so much later, in √(radius / acceleration): what a guard foretold is then far above
-# rounding, and the body has moved by 1e-10 radii.
+# The next regime is looked for so much later, in the time radius / (speed + √(radius acceleration)): what a guard
+# foretold is then above rounding, and the body has hardly moved. FURTHER times as far when it was not.
 AHEAD = 1.0e-5
+FURTHER = 8.0
+FARTHEST = 64.0
+
+# More than CROWD events within CROWD_TIME look-aheads go round in circles, at the verge between two regimes. Then, as
+# where no force is consistent, an impulse and a leap of LEAP look-aheads are made, to first order; the leaps grow while
+# the crowd lasts, up to LONGEST, with PAUSE events between them.
+CROWD = 24
+CROWD_TIME = 0.1
+LEAP = 1.0
+LONGER = 4.0
+LONGEST = 100.0
+PAUSE = 6
 
 # Gaps of this share of what they are the difference of are rounding; see `set_thresholds` for HOP.
 ROUNDING = 1.0e-15
 HOP = 4.0
 
-# Contacts that touch within this share of min(√(radius/acceleration), radius/speed), and ten times the tolerance, do so
-# at once: rounding would else make two impacts of that of an edge, with another outcome.
+# Contacts that touch within this share of the same time, and ten times the tolerance, do so at once: rounding would
+# else make two impacts of that of an edge, with another outcome.
 TOGETHER = 1.0e-10
 TINY = 1.0e-300
 
@@ -75,6 +87,8 @@ LOCATIONS = 80
 
 # Residual of a contact problem that is as good as none: rounding of forces that differ by five orders.
 SOLVED = 1.0e-11
+
+NOTHING = -1
 
 # State of a body at a wall (`motion.state`).
 AWAY, SLIPS, STICKS = range(3)
@@ -122,16 +136,20 @@ def pose_collision(y, tilted, work, motion, report):
 
 
 @kernel
-def pose_jump(y, tilted, work, motion):
-    """Write the contact problem a moment ahead into `work`: (contacts, velocity, angular momentum without them)."""
-    h = motion.ahead
-    count, _ = find_candidates(y, tilted, work, motion)
+def pose_jump(y, h, tilted, work, motion):
+    """Write the contact problem of a first-order step over h into `work`: (contacts, velocity, angular momentum)."""
+    put_state(motion, START, y)
+    look_around(START, tilted, work, motion)
     R, _, w, _ = free_turning(y, tilted, work)
-    for i in range(count):
-        s = motion.candidate[i]
+    count = 0
+    for s in range(motion.is_active.shape[0]):
+        gap = motion.gap[START, s]
+        if not gap <= motion.touch - min(0.0, motion.gap_rate[START, s]) * h or count >= work.slot.shape[0]:
+            continue
         n = wall_normal(work.walls, s // work.features)
         r, _ = arm_and_rate(work.shape, load(work.dims), R, w, n, s % work.features)
-        pose_contact(i, s, r, (0.0, 0.0, 0.0), work)
+        pose_contact(count, s, r, (-max(gap, 0.0) / h, 0.0, 0.0), work)
+        count += 1
     work.mode = SLIDE
     a, torque, v, L = work.free_acceleration, work.torque, y[2], y[3]
     return (
@@ -151,8 +169,9 @@ def carry_on(y, h, tilted, work):
 
 
 @kernel
-def log_impulses(n, width, work, log, counts, t):
-    """One event per wall with the sum of its impulses."""
+def log_impulses(n, width, work, motion, log, counts, t):
+    """One event per wall with the sum of its impulses, if that is above rounding."""
+    least = work.mass * motion.noise
     for wall in range(work.walls.shape[0]):
         px = py = pz = 0.0
         for i in range(n):
@@ -162,7 +181,7 @@ def log_impulses(n, width, work, log, counts, t):
                     px += s * work.walls[wall, 3 * c]
                     py += s * work.walls[wall, 3 * c + 1]
                     pz += s * work.walls[wall, 3 * c + 2]
-        if px != 0.0 or py != 0.0 or pz != 0.0:
+        if px * px + py * py + pz * pz > least * least:
             ev.note_event(log, counts, work.i, t, ev.IMPACT, wall, (px, py, pz))
 
 
@@ -279,7 +298,7 @@ def look_ahead(y, tilted, work, motion):
 
 
 @kernel
-def set_thresholds(y, h, tilted, work, motion):
+def set_thresholds(y, tilted, work, motion):
     """What counts as no gap and no speed, and how far a regime is looked ahead.
 
     A contact is still when the speed would not lift it by HOP gaps that count as none: a bounce as low as that would
@@ -290,11 +309,9 @@ def set_thresholds(y, h, tilted, work, motion):
     motion.touch = max(work.slop, ROUNDING * (work.radius + math.sqrt(qt.dot(x, x))))
     motion.noise = 1.0e-13 * speed
     motion.still = math.sqrt(2.0 * HOP * work.acceleration * motion.touch) + motion.noise
-    unit = h
-    if work.acceleration > 0.0:
-        unit = min(unit, math.sqrt(work.radius / work.acceleration))
+    unit = work.radius / (speed + math.sqrt(work.radius * work.acceleration) + TINY)
     motion.ahead = AHEAD * unit
-    motion.together = (TOGETHER + 10.0 * work.tolerance) * min(unit, work.radius / (speed + TINY))
+    motion.together = (TOGETHER + 10.0 * work.tolerance) * unit
 
 
 @kernel
@@ -346,12 +363,14 @@ def advance(y, h, friction, smooth, gyroscopic, tilted, pivots, work, motion, me
     A contact problem is posed by what the body does, solved in this one place, and read back. `seen` is where the
     regime is looked for: at y, or a moment ahead of it when a guard has ended the last one.
     """
-    set_thresholds(y, h, tilted, work, motion)
+    set_thresholds(y, tilted, work, motion)
+    nearest = motion.ahead
     recall_contacts(memory, work.i, work, motion)
     world = work.world
     motion.left_out = 0.0
     seen, t = y, 0.0
-    closing = False  # a contact that will leave has to be stopped first
+    told = NOTHING  # what is to be done next, whatever the regime: stop a contact that will leave, or jump
+    since, crowd, leap = 0.0, 0, LEAP * motion.ahead
     width = 3
     if friction is None:
         width = 1
@@ -359,27 +378,35 @@ def advance(y, h, friction, smooth, gyroscopic, tilted, pivots, work, motion, me
         if k == work.splits:
             report[world, at.UNRESOLVED] += 1.0
             break
-        what, n, v, L = COLLIDES, 0, y[2], y[3]
-        if not closing:
+        crowd += 1
+        if t > since + CROWD_TIME * nearest:
+            since, crowd = t, 0
+        if crowd > CROWD:
+            told = IS_LOST
+        what, n, v, L = told, 0, y[2], y[3]
+        if told == NOTHING:
             what, n, v, L = find_regime(seen, friction, tilted, work, motion)
-        closing = False
+        is_asked, is_sliding = what in (ASKS, ASKS_SLIDING), what == ASKS_SLIDING
+        told = NOTHING
         if what == COLLIDES:
             n, v, L = pose_collision(y, tilted, work, motion, report), y[2], y[3]
         elif what == IS_LOST:
-            n, v, L = pose_jump(y, tilted, work, motion)
-        if what in (ASKS, COLLIDES, IS_LOST):
-            P = principal_axes(seen if what == ASKS else y, tilted, work)
+            n, v, L = pose_jump(y, min(leap, h - t), tilted, work, motion)
+        if is_asked or what in (COLLIDES, IS_LOST):
+            P = principal_axes(seen if is_asked else y, tilted, work)
             v, L, residual, sweeps, method = solve_contacts(n, friction, smooth, pivots, v, L, P, work)
             note_solve(report, world, residual, sweeps, method, max(work.tolerance, SOLVED))
-        if what == ASKS:
-            what = read_resting(n, seen, v, L, friction, tilted, work, motion)
-            closing = what == COLLIDES
+        if is_asked:
+            what = read_resting(n, seen, v, L, friction, is_sliding, tilted, work, motion)
+            if what in (COLLIDES, IS_LOST):
+                told, seen = what, y
+                continue
         elif what in (COLLIDES, IS_LOST):
             y = y[0], y[1], v, L
-            log_impulses(n, width, work, log, counts, start + t)
+            log_impulses(n, width, work, motion, log, counts, start + t)
         step = 0.0
         if what == COLLIDES:
-            report[world, at.SPLITS] += 0.0 if closing else 1.0
+            report[world, at.SPLITS] += 1.0
             seen = y
             continue
         log_changes(work, motion, log, counts, start + t)
@@ -394,7 +421,10 @@ def advance(y, h, friction, smooth, gyroscopic, tilted, pivots, work, motion, me
         guard = NO_GUARD
         if what == IS_LOST:
             report[world, at.FALLBACKS] += 1.0
-            y, step = carry_on(y, motion.ahead, tilted, work), motion.ahead
+            step = min(leap, h - t)
+            y = carry_on(y, step, tilted, work)
+            leap = min(LONGER * leap, LONGEST * nearest)
+            since, crowd = t + step, CROWD - PAUSE
         elif what == FLIES:
             y, step, _, ended = fly_to_wall(y, h - t, gyroscopic, tilted, work, motion)
             if not ended:
@@ -402,11 +432,17 @@ def advance(y, h, friction, smooth, gyroscopic, tilted, pivots, work, motion, me
         else:
             y, step, guard = move(y, h - t, tilted, work, motion)
         t += step
+        if guard in (PUSH, CONE, LOAD) and step < motion.ahead:
+            motion.ahead = min(motion.ahead * FURTHER, FARTHEST * nearest)  # rounding hid what was foretold
+        elif step > motion.ahead:
+            motion.ahead = nearest
+            leap = max(LEAP * nearest, leap / LONGER)
+        ev.note_event(log, counts, work.i, t, 20 + what, guard, (step, 1.0 * motion.count, 1.0 * n))  # DEBUG
         motion.left_out = 0.0
         if not t < h:
             break
         seen = y
-        if guard in (PUSH, CONE):
+        if guard in (PUSH, CONE, LOAD):
             seen = look_ahead(y, tilted, work, motion)
     keep_contacts(memory, work.i, work, motion)
     return y

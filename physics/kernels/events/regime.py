@@ -5,8 +5,9 @@
 
 When no contact slides, these are the conditions of an impact with accelerations in place of velocities, and the same
 solver gives them: exact cones, pivoting behind it. When some slide, contacts change between open, held and sliding
-until all conditions hold; each trial is one linear system (`forces`). Where none is found (Painlevé's paradox: a
-sliding contact may have no force, or several) the velocities have to jump, and `hybrid` makes an impulse of it.
+until all conditions hold; each trial is one linear system (`forces`). Where that goes round in circles the solver is
+asked again, with a large tangential acceleration in place of each contact's sliding. If it can only stop the sliding
+(Painlevé's paradox: a sliding contact may have no force) the velocities have to jump: `hybrid` makes an impulse of it.
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ from physics.kernels import quaternion as qt
 from physics.kernels.compiler import inlined, kernel
 from physics.kernels.contact import wall_normal
 from physics.kernels.events.forces import (
+    PATCH,
     arm_and_rate,
     free_turning,
     list_unknowns,
@@ -25,6 +27,7 @@ from physics.kernels.events.forces import (
     plus,
     solve_unknowns,
     spread,
+    times,
     turned_by,
     vector,
 )
@@ -35,16 +38,26 @@ from physics.kernels.share import wall_axes
 from physics.kernels.slide import HOLD
 
 # What a body does.
-FLIES, COLLIDES, MOVES, RESTS, IS_LOST, ASKS = range(6)
+FLIES, COLLIDES, MOVES, RESTS, IS_LOST, ASKS, ASKS_SLIDING = range(7)
 
 OPEN, HELD, SLIDING = range(3)
 
-# Accelerations and forces below this share of the largest free ones are zero.
+# Accelerations and forces below this share of the largest free ones are zero: of the solver's, and of an exact trial.
 SMALL = 1.0e-8
+SMALL_EXACT = 1.0e-11
 
 # Trials of a mixture, and how often one contact may change in them.
 TRIALS = 60
 CHANGES = 6
+
+# Tangential acceleration that stands for sliding where no mixture was found, in largest free ones; the direction of a
+# contact that slides is then off by the inverse of it. A push of PARADOX times that would stop the sliding: there is no
+# force, only an impulse.
+FAST = 1.0e3
+PARADOX = 0.03
+
+# Approach of a contact that will leave that is none, in `motion.still`.
+UNSEEN_APPROACH = 1.0e-6
 
 # Directions of sliding from rest are found when they no longer change by more than this.
 SAME_WAY = 1.0e-9
@@ -113,6 +126,12 @@ def sliding_now(i, y, R, w, work, motion):
 
 
 @inlined
+def acceleration_scale(w, work):
+    """Size of the accelerations of a body's contacts [m/s²]."""
+    return work.acceleration + work.radius * qt.dot(w, w)
+
+
+@inlined
 def pose_contact(i, slot, r, target, work):
     """Contact i of a problem for `solve.solve_contacts`, without a warm start."""
     work.slot[i] = slot
@@ -122,22 +141,42 @@ def pose_contact(i, slot, r, target, work):
 
 
 @kernel
-def pose_resting(count, y, R, w, work, motion):
+def pose_resting(count, y, R, w, has_sliding, work, motion):
     """Write the contact problem of candidates that do not slide into `work`: (acceleration, moment) without forces.
 
     It is that of an impact with the free acceleration for velocity, the moment τ - ω x L for angular momentum and
     forces for impulses; what an arm's own motion adds to a contact's acceleration is asked of it as a target.
+    `has_sliding`: some of the candidates slide (`candidate_way`).
     """
     walls, features = work.walls, work.features
+    scale = acceleration_scale(w, work)
     for i in range(count):
         slot = motion.candidate[i]
         axes = wall_axes(walls, slot // features)
         r, rate = arm_and_rate(work.shape, load(work.dims), R, w, axes[0], slot % features)
         c = qt.cross(w, rate)
+        if has_sliding:  # as if it had accelerated along its sliding for long: no force then turns it
+            c = plus(c, times(FAST * scale, vector(motion.candidate_way, i)))
         pose_contact(i, slot, r, (-qt.dot(axes[0], c), -qt.dot(axes[1], c), -qt.dot(axes[2], c)), work)
     work.mode = HOLD
     g, t = qt.cross(w, y[3]), work.torque
     return load(work.free_acceleration), (t[0] - g[0], t[1] - g[1], t[2] - g[2])
+
+
+@inlined
+def is_way(way, i):
+    """Whether a contact has a direction of sliding."""
+    return way[i, 0] != 0.0 or way[i, 1] != 0.0 or way[i, 2] != 0.0
+
+
+@inlined
+def is_idle(i, count, width, small, work):
+    """Whether contact i without a force may be left to the others of its wall: at least three push."""
+    wall, pushing = work.slot[i] // work.features, 0
+    for j in range(count):
+        if work.slot[j] // work.features == wall and work.impulse[width * j] > small * work.mass:
+            pushing += 1
+    return pushing >= PATCH
 
 
 @inlined
@@ -158,8 +197,9 @@ def keep_forces(count, width, work, motion):
 @inlined
 def closes(count, motion):
     """Whether a contact that will leave is still, by a little, on its way in."""
+    least = -motion.noise - UNSEEN_APPROACH * motion.still
     for i in range(count):
-        if motion.kind[i] == OPEN and motion.gap_rate[START, motion.candidate[i]] < -motion.noise:
+        if motion.kind[i] == OPEN and motion.gap_rate[START, motion.candidate[i]] < least:
             return True
     return False
 
@@ -173,26 +213,34 @@ def is_still(y, w, acceleration, work, motion):
 
 
 @kernel
-def read_resting(count, y, a, moment, friction, tilted, work, motion):
+def read_resting(count, y, a, moment, friction, has_sliding, tilted, work, motion):
     """What the body does by the solution of `pose_resting`'s problem; the contacts that act are set."""
     R, P, w, _ = free_turning(y, tilted, work)
     alpha = turned_by(P, work.J, moment)
     width = 3
     if friction is None:
         width = 1
-    scale = work.acceleration + work.radius * qt.dot(w, w)
+    scale = acceleration_scale(w, work)
+    small = SMALL * scale
+    if has_sliding:
+        small *= FAST
     for i in range(count):
         an, at = contact_acceleration(i, y, R, w, a, alpha, work, motion)
         size = math.sqrt(qt.dot(at, at))
         push = work.impulse[width * i]
+        if has_sliding and push > PARADOX * FAST * work.mass * scale:
+            return IS_LOST
+        slides = has_sliding and is_way(motion.candidate_way, i)
         kind = SLIDING
-        if not push > SMALL * work.mass * scale and an > SMALL * scale:
+        if not push > small * work.mass and (an > small or is_idle(i, count, width, small, work)):
             kind = OPEN
-        elif friction is not None and size <= SMALL * scale:
+        elif friction is not None and not slides and size <= small:
             kind = HELD
         motion.kind[i] = kind
+        if slides:
+            continue
         for c in range(3):
-            motion.candidate_way[i, c] = at[c] / size if size > SMALL * scale else 0.0
+            motion.candidate_way[i, c] = at[c] / size if size > small else 0.0
     act(count, work, motion)
     if closes(count, motion):
         return COLLIDES
@@ -208,7 +256,7 @@ def read_resting(count, y, a, moment, friction, tilted, work, motion):
 @kernel
 def _change_one(count, y, R, w, a, alpha, scale, work, motion):
     """The change that a trial asks for most: (candidate, its new kind), -1 when all conditions hold."""
-    weight = SMALL * work.mass * scale
+    weight = SMALL_EXACT * work.mass * scale
     k = worst = 0
     which, kind = -1, OPEN
     deepest = -weight
@@ -240,14 +288,14 @@ def _change_one(count, y, R, w, a, alpha, scale, work, motion):
         return which, kind
     for i in range(count):
         an, at = contact_acceleration(i, y, R, w, a, alpha, work, motion)
-        if motion.kind[i] == OPEN and an < -SMALL * scale:
+        if motion.kind[i] == OPEN and an < -SMALL_EXACT * scale:
             return i, SLIDING if motion.is_fresh[i] == 0 else HELD
         if motion.kind[i] == SLIDING and motion.is_fresh[i]:
             size = math.sqrt(qt.dot(at, at))
             along = qt.dot(at, vector(motion.candidate_way, i))
             if along < 0.0:
                 return i, HELD
-            if size > SMALL * scale and size - along > 0.5 * SAME_WAY * size:
+            if size > SMALL_EXACT * scale and size - along > 0.5 * SAME_WAY * size:
                 for c in range(3):
                     motion.candidate_way[i, c] = at[c] / size
                 return i, SLIDING
@@ -292,7 +340,8 @@ def find_regime(y, friction, tilted, work, motion):
     """What the body does at y, and the contacts that act: (what, number of candidates, acceleration, moment).
 
     `ASKS`: none of the candidates slides, and the contact problem with this acceleration and moment, which is posed
-    in `work`, decides (`read_resting`).
+    in `work`, decides (`read_resting`). `ASKS_SLIDING`: some do, no mixture was found, and that problem decides for
+    them, too.
     """
     zero = (0.0, 0.0, 0.0)
     motion.count = 0
@@ -308,11 +357,11 @@ def find_regime(y, friction, tilted, work, motion):
     if friction is not None:
         for i in range(count):
             slides = sliding_now(i, y, R, w, work, motion) or slides
-    if not slides:
-        a, moment = pose_resting(count, y, R, w, work, motion)
-        return ASKS, count, a, moment
-    if not mixed_forces(count, y, R, P, w, alpha, work, motion):
-        return IS_LOST, count, zero, zero
+    if not slides or not mixed_forces(count, y, R, P, w, alpha, work, motion):
+        for i in range(count):
+            slides = sliding_now(i, y, R, w, work, motion) or slides
+        a, moment = pose_resting(count, y, R, w, slides, work, motion)
+        return (ASKS_SLIDING if slides else ASKS), count, a, moment
     if closes(count, motion):
         return COLLIDES, 0, zero, zero
     return (MOVES if motion.count > 0 else FLIES), count, zero, zero

@@ -176,7 +176,7 @@ def start_step(left, tilted, work, motion):
     place(state, R, w, alpha, work, motion)
     for j in range(motion.count):
         t, speed = sliding_velocity(j, work, motion)
-        motion.is_starting[j] = 1 if speed <= 2.0 * motion.still else 0
+        motion.is_starting[j] = 1 if speed <= motion.still else 0
         if speed > motion.still:
             for c in range(3):
                 motion.reference[j, c] = t[c] / speed
