@@ -125,7 +125,7 @@ def fly_smoothly(y, t, tilted, work, motion):
         tries += 1
         h = start_step(left, tilted, work, motion)
         error, _ = try_step(h, tilted, work, motion)
-        if error > work.tolerance and h > SHORTEST * t:
+        if not error <= work.tolerance and h > SHORTEST * t:
             motion.step = CUT * h
             continue
         for c in range(SIZE):

@@ -24,7 +24,7 @@ from physics.kernels.events.smooth import find_rate, get_state, sliding_velocity
 from physics.kernels.layout import BLOCK, OFFSET, VERTEX_COUNT
 from physics.kernels.share import wall_axes
 
-NO_GUARD, GAP, PUSH, CONE, SPEED, LOAD = range(6)
+NO_GUARD, GAP, PUSH, CONE, SPEED, LOAD, NO_STEP = range(7)
 
 # Forces of this many weights are rounding: a push or a cone is given up only when it is missed by more.
 MARGIN = 1.0e-9

@@ -29,7 +29,7 @@ from physics.kernels.contact import wall_normal
 from physics.kernels.events import log as ev
 from physics.kernels.events.air import fly_freely, fly_to_wall
 from physics.kernels.events.forces import arm_and_rate, free_turning, load
-from physics.kernels.events.guards import CONE, GAP, LOAD, NO_GUARD, PUSH, SPEED, least_margin, look_around
+from physics.kernels.events.guards import CONE, GAP, LOAD, NO_GUARD, NO_STEP, PUSH, SPEED, least_margin, look_around
 from physics.kernels.events.motion import END, START
 from physics.kernels.events.regime import (
     ASKS,
@@ -76,14 +76,18 @@ PAUSE = 6
 # Gaps of this share of what they are the difference of are rounding; see `set_thresholds` for HOP.
 ROUNDING = 1.0e-15
 HOP = 4.0
+SETTLED = 1.0e-6
 
 # Contacts that touch within this share of the same time, and ten times the tolerance, do so at once: rounding would
 # else make two impacts of that of an edge, with another outcome.
 TOGETHER = 1.0e-10
 TINY = 1.0e-300
 
+# Smooth steps at most before the next regime is looked for.
+STEPS = 10_000
+
 # Trials of the time at which a guard ends a step.
-LOCATIONS = 80
+LOCATIONS = 110
 
 # Residual of a contact problem that is as good as none: rounding of forces that differ by five orders.
 SOLVED = 1.0e-11
@@ -213,15 +217,16 @@ def log_changes(work, motion, log, counts, t):
 def locate(h, margin, tilted, work, motion):
     """End the step where its smallest margin is zero (END): (its length, guard, contact or slot).
 
-    False position with the Illinois rule, and halves where that is slow.
+    False position with the Illinois rule, and a half after each trial that left more than half.
     """
     low, high, low_margin, high_margin = 0.0, h, 1.0e-3, margin
     guard, which = 0, -1
-    side = 0
-    for k in range(LOCATIONS):
+    side, width = 0, 4.0 * h
+    for _ in range(LOCATIONS):
         t = low + (high - low) * low_margin / (low_margin - high_margin)
-        if k % 4 == 3 or not low < t < high:
+        if high - low > 0.5 * width or not low < t < high:
             t = 0.5 * (low + high)
+        width = high - low
         try_step(t, tilted, work, motion)
         margin, g, w = least_margin(t, tilted, work, motion)
         if margin < 0.0:
@@ -256,18 +261,30 @@ def has_stopped(guard, which, work, motion):
     return t0 * t0 + t1 * t1 + t2 * t2 <= motion.still * motion.still
 
 
+@inlined
+def body_speed(y, tilted, work):
+    """Speed that no point of the body exceeds [m/s]."""
+    v, w = y[2], angular_velocity(y[1], y[3], work, tilted)
+    return math.sqrt(qt.dot(v, v)) + work.radius * math.sqrt(qt.dot(w, w))
+
+
 @kernel
 def move(y, left, tilted, work, motion):
     """Smooth motion of the regime for `left`, or until a guard ends it: (state, time, guard)."""
+    had = body_speed(y, tilted, work)
     y = cancel(y, tilted, work, motion)
+    if had > motion.still and body_speed(y, tilted, work) <= SETTLED * motion.still:
+        return y, 0.0, SPEED  # the contacts have taken all of it: it may be at rest
     put_state(motion, START, y)
     look_around(START, tilted, work, motion)
     motion.step = left
     t = 0.0
-    for _ in range(1000000):
+    for _ in range(STEPS):
         h = start_step(left - t, tilted, work, motion)
         error, used = try_step(h, tilted, work, motion)
-        if error > work.tolerance and h > SHORTEST * left:
+        if not error <= work.tolerance:
+            if not h > SHORTEST * left:
+                return get_state(motion, START), t, NO_STEP
             motion.step = CUT * h
             continue
         margin, guard, which = least_margin(h, tilted, work, motion)
@@ -284,7 +301,9 @@ def move(y, left, tilted, work, motion):
             break
         for s in range(motion.is_active.shape[0]):
             motion.gap[START, s], motion.gap_rate[START, s] = motion.gap[END, s], motion.gap_rate[END, s]
-    return y, left, 0
+    if t < left:
+        return get_state(motion, START), t, NO_STEP
+    return y, left, NO_GUARD
 
 
 @kernel
@@ -304,8 +323,7 @@ def set_thresholds(y, tilted, work, motion):
     A contact is still when the speed would not lift it by HOP gaps that count as none: a bounce as low as that would
     gain from being set down on the wall what it loses in the impact.
     """
-    x, v, w = y[0], y[2], angular_velocity(y[1], y[3], work, tilted)
-    speed = math.sqrt(qt.dot(v, v)) + work.radius * math.sqrt(qt.dot(w, w))
+    x, speed = y[0], body_speed(y, tilted, work)
     motion.touch = max(work.slop, ROUNDING * (work.radius + math.sqrt(qt.dot(x, x))))
     motion.noise = 1.0e-13 * speed
     motion.still = math.sqrt(2.0 * HOP * work.acceleration * motion.touch) + motion.noise
@@ -413,8 +431,8 @@ def advance(y, h, friction, smooth, gyroscopic, tilted, pivots, work, motion, me
         if what == RESTS:
             if not motion.is_resting:
                 ev.note_event(log, counts, work.i, start + t + motion.left_out, ev.REST, -1, (0.0, 0.0, 0.0))
-            y = cancel(y, tilted, work, motion)
-            y = y[0], y[1], (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
+                y = cancel(y, tilted, work, motion)
+                y = y[0], y[1], (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
             motion.is_resting = 1
             break
         motion.is_resting = 0
@@ -437,11 +455,12 @@ def advance(y, h, friction, smooth, gyroscopic, tilted, pivots, work, motion, me
         elif step > motion.ahead:
             motion.ahead = nearest
             leap = max(LEAP * nearest, leap / LONGER)
-        ev.note_event(log, counts, work.i, t, 20 + what, guard, (step, 1.0 * motion.count, 1.0 * n))  # DEBUG
         motion.left_out = 0.0
         if not t < h:
             break
         seen = y
+        if guard == NO_STEP:
+            told = IS_LOST
         if guard in (PUSH, CONE, LOAD):
             seen = look_ahead(y, tilted, work, motion)
     keep_contacts(memory, work.i, work, motion)

@@ -57,11 +57,11 @@ def motion_dtype(wall_count: int, features: int) -> np.dtype:
         ("matrix", f, (m, m + 1)),
         ("order", i, (m,)),
         ("unknown", f, (m,)),
-        ("kind", i, (2 * n,)),  # candidates of a regime: open, held, sliding
-        ("is_fresh", i, (2 * n,)),  # of them: slides from rest
-        ("changes", i, (2 * n,)),
-        ("candidate", i, (2 * n,)),  # their slots
-        ("candidate_way", f, (2 * n, 3)),
+        ("kind", i, (n,)),  # candidates of a regime: open, held, sliding
+        ("is_fresh", i, (n,)),  # of them: slides from rest
+        ("changes", i, (n,)),
+        ("candidate", i, (n,)),  # their slots
+        ("candidate_way", f, (n, 3)),
         ("is_resting", i),
         ("state", i, (max(wall_count, 1),)),  # what the body did at each wall after the last event
         ("gap", f, (2, n_slots)),  # of every feature, at the start and at the end of the step [m]

@@ -70,7 +70,7 @@ def find_candidates(y, tilted, work, motion):
     look_around(START, tilted, work, motion)
     count = 0
     for s in range(motion.is_active.shape[0]):
-        if motion.gap[START, s] <= motion.touch and count < motion.candidate.shape[0]:
+        if motion.gap[START, s] <= motion.touch and count < motion.slot.shape[0]:
             rate = motion.gap_rate[START, s]
             if rate < -motion.still:
                 return 0, True
@@ -282,8 +282,9 @@ def _change_one(count, y, R, w, a, alpha, scale, work, motion):
         fn = qt.dot(n, f)
         t = (fn * n[0] - f[0], fn * n[1] - f[1], fn * n[2] - f[2])
         size = math.sqrt(qt.dot(t, t))
-        for c in range(3):
-            motion.candidate_way[which, c] = t[c] / size
+        if size > 0.0:
+            for c in range(3):
+                motion.candidate_way[which, c] = t[c] / size
         motion.is_fresh[which] = 1
         return which, kind
     for i in range(count):

@@ -130,7 +130,7 @@ def try_step(h, tilted, work, motion):
     used = ORDERS
     for k in range(ORDERS):
         _midpoint_rule(2 * (k + 1), h, tilted, work, motion)
-        error = 0.0
+        error = total = 0.0
         for c in range(SIZE):
             new, change = y[END, c], math.inf
             for j in range(1, k + 1):
@@ -141,9 +141,12 @@ def try_step(h, tilted, work, motion):
                 new += change
             table[k, c] = new
             y[END, c] = new
+            total += new
             if motion.scale[c] > 0.0:
                 error = max(error, abs(change) / motion.scale[c])
-        if not error > goal:
+        if not math.isfinite(total):
+            return math.inf, ORDERS
+        if error <= goal:
             used = k + 1
             break
     x, q, v, m = get_state(motion, END)
