@@ -112,6 +112,12 @@ def test_safe_time_without_a_third_derivative_is_the_zero_itself(b):
     assert safe_time(1.0, -4.0, b, 0.0, 10.0) == parabola_root(1.0, -4.0, b)
 
 
+def test_safe_time_of_a_contact_that_is_about_to_leave():
+    """From no gap and no speed at all: b t²/2 - C t³/6 is zero at 3 b / C."""
+    assert safe_time(0.0, 0.0, 4.0, 6.0, 10.0) == pytest.approx(2.0, rel=4 * EPS)
+    assert safe_time(0.0, 0.0, 4.0, 6.0, 1.0) == 1.0
+
+
 # --- contact points ------------------------------------------------------------------------------------------------
 
 
