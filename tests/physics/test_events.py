@@ -45,12 +45,6 @@ def of_kind(run, *kinds):
     return [event for event in run.events if event.kind in kinds]
 
 
-def gaps(pos, quat):
-    """Heights of the eight vertices [m]."""
-    signs = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)])
-    return pos[1] + (signs * HALF) @ rotation_matrix(quat)[1]
-
-
 # --- stored truths -------------------------------------------------------------------------------------------------
 
 # Steps between impacts err by `tolerance` of the radius 3 m and the speed, a step of contact at most some hundred
@@ -143,8 +137,8 @@ def test_closed_box_hits_twenty_times_in_the_order_of_the_truth(sample_dt):
 
 
 @pytest.mark.parametrize("sample_dt", [0.005, 0.1, 3.0])
-@pytest.mark.parametrize(("accuracy", "low"), [("precise", 1e-12), ("reference", 1e-12)])
-def test_zeno_bounces_end_when_their_sum_says(accuracy, low, sample_dt):
+@pytest.mark.parametrize("accuracy", ["precise", "reference"])
+def test_zeno_bounces_end_when_their_sum_says(accuracy, sample_dt):
     """e = 0.5 from 1 m: √(2h/g)(1+e)/(1-e), of which what is not bounced is added."""
     run = physics.simulate(on_floor(block((0, 2.5, 0)), 0.5, 0.5), 3.0, accuracy, sample_dt)
     end = math.sqrt(2 / G) * 3
@@ -153,8 +147,8 @@ def test_zeno_bounces_end_when_their_sum_says(accuracy, low, sample_dt):
     (rest,) = of_kind(run, "rest")
     # Each of some 20 bounces rounds a time of 1 s, and its height to 1e-15 of 1.5 m: the last speeds, 1e-5 m/s, by
     # 1e-15 g / 1e-5; in all below 1e-12 s.
-    assert touch.t == pytest.approx(end, abs=low)
-    assert rest.t == pytest.approx(end, abs=low)
+    assert touch.t == pytest.approx(end, abs=1e-12)
+    assert rest.t == pytest.approx(end, abs=1e-12)
     assert run.pos[-1, 0] == pytest.approx([0, 1.5, 0], abs=1e-14)
     assert not run.linvel[-1].any()
 
@@ -234,7 +228,7 @@ def test_slide_stops_at_v2_over_2mug(sample_dt):
     # Constant deceleration: the extrapolated rules are exact but for rounding, as is the place where speed ends.
     assert run.pos[-1, 0] == pytest.approx([v * v / (2 * mu * G), 1.5, 0], abs=1e-12)
     stops = of_kind(run, "stick", "rest")
-    # The contact counts as still from `still`, 1.5e-5 m/s, on: 5e-6 s before the end.
+    # A stop under a constant force is a step of its own: nothing is given up before it.
     assert stops[0].t == pytest.approx(v / (mu * G), abs=1e-12)
     assert not run.linvel[-1].any()
     assert not run.angvel[-1].any()
@@ -315,7 +309,7 @@ def test_block_tips_over_an_edge_and_hits_the_right_wall():
     rolling = run.energy[run.t < t, 0]
     np.testing.assert_allclose(rolling, rolling[0], rtol=1e-10)
     assert [(e.kind, e.wall) for e in run.events if e.t < t - 1e-9] == [("touch", FLOOR_WALL)]
-    # Its corner leaves the wall, so the turn is over and the floor's edge is let go or pressed: normal law there.
+    # The wall pushes the corner back.
     corner = np.array([2.5, -1.5])
     assert impact.impulse[0] < 0
     at = np.searchsorted(run.t, t)
@@ -327,16 +321,16 @@ def test_block_tips_over_an_edge_and_hits_the_right_wall():
     strict=True, raises=AssertionError, reason="an impact while touching walls without force is placed to 1e-7 s only"
 )
 def test_frictionless_block_dropped_into_a_corner_stays_there():
-    """Three walls at once: slides down to rest, or not at all sideways where nothing pushes; momenta add up."""
+    """Pushed into two walls it falls along them, which do nothing, to rest on the floor."""
     scene = scenes.block_in_box((2.5, 3.0, 1.0), restitution=0.0, friction=0.0, walls="corner", linvel=(-2.0, 0, -1.0))
     run = physics.simulate(scene, 2.0, "precise", 0.1)
     assert run.ok
     impacts = of_kind(run, "impact")
-    # The contact problem of three walls at once is solved to 1e-10 of its speeds.
-    # At once against both side walls, with all of m v; at √(2h/g) on the floor.
+    # At once against both side walls, with all of m v; at √(2h/g) on the floor. Such a contact problem is solved
+    # to 1e-10 of its speeds.
     np.testing.assert_allclose([e.impulse for e in impacts[:2]], [[12, 0, 0], [0, 0, 6]], rtol=0, atol=1e-9)
     assert impacts[2].t == pytest.approx(math.sqrt(3 / G), abs=1e-12)
-    assert impacts[2].impulse == pytest.approx([0, 6 * math.sqrt(3 * G), 0], abs=1e-11)
+    assert impacts[2].impulse == pytest.approx([0, 6 * math.sqrt(3 * G), 0], abs=1e-9)
     assert run.pos[-1, 0] == pytest.approx([2.5, 1.5, 1.0], abs=1e-14)
     assert orientation_error(run.quat[-1, 0], np.array([1.0, 0, 0, 0])) < 1e-14
 
@@ -446,7 +440,7 @@ def test_same_bits_in_a_batch_with_threads_after_a_snapshot_and_after_pickling()
 
 
 def test_a_log_without_room_is_made_room_for():
-    """All of 6 s in one sample: the same impacts as sampled often."""
+    """All of 3 s in one sample: the same impacts as sampled often."""
     scene = scenes.vertex_drop()
     one, many = (physics.simulate(scene, 3.0, "precise", sample_dt) for sample_dt in (3.0, 0.01))
     assert [e.kind for e in one.events[:100]] == [e.kind for e in many.events[:100]]
