@@ -29,6 +29,9 @@ BOUNDS = {
     "inertia": (0.0005, 0.0020),  # [kg m²]
     "gravity": (9.0, 10.0),  # [m/s²]
     "table": (-0.004, 0.004),  # [m]
+    "heavy_x": (-0.010, 0.010),  # [m]
+    "heavy_y": (-0.010, 0.010),  # [m]
+    "heavy_z": (-0.010, 0.010),  # [m]
 }
 
 REFINED = 3  # points from which the simplex starts

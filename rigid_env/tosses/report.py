@@ -18,8 +18,9 @@ from rigid_env.tosses.metric import Errors, Summary, compare
 from rigid_env.tosses.replay import Cube, Recording, replay, starts, sunken
 
 CONTACT = ("friction", "restitution")
-ALL = (*CONTACT, "inertia", "side")
-HEADLINE = "contact and cube"
+BODY = (*CONTACT, "inertia", "side")
+ALL = (*CONTACT, "inertia", "heavy_x", "heavy_y", "heavy_z")
+HEADLINE = "contact and mass"
 
 REPEATS = 3  # of a timed replay, unless one takes longer than `PATIENCE`
 PATIENCE = 2.0  # [s]
@@ -131,6 +132,7 @@ def setups(scale: float, names: tuple[str, ...] | None = None) -> list[Setup]:
         return [Setup(", ".join(check_names(names)), tuple(names), Recording())]
     return [
         Setup("contact", CONTACT, Recording()),
+        Setup("contact and cube", BODY, Recording()),
         Setup(HEADLINE, ALL, Recording()),
         Setup("lengths corrected", ALL, Recording(length_scale=scale)),
         Setup("start half a frame on", ALL, Recording(is_midframe=True)),

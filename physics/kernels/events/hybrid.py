@@ -112,7 +112,7 @@ def pose_collision(y, tilted, work, motion, report):
         if not motion.gap[START, s] <= max(motion.touch, -rate * motion.together) or n >= work.slot.shape[0]:
             continue
         normal = wall_normal(work.walls, s // work.features)
-        r, r_rate = arm_and_rate(work.shape, load(work.dims), R, w, normal, s % work.features)
+        r, r_rate = arm_and_rate(work.shape, load(work.dims), R, w, normal, s % work.features, tilted, work)
         goal = rebound(-rate, normal, r, r_rate, w, alpha, work, motion)
         pose_contact(n, s, r, (goal, 0.0, 0.0), work)
         n += 1
@@ -130,7 +130,7 @@ def pose_jump(y, tilted, work, motion):
     for i in range(count):
         s = motion.candidate[i]
         n = wall_normal(work.walls, s // work.features)
-        r, _ = arm_and_rate(work.shape, load(work.dims), R, w, n, s % work.features)
+        r, _ = arm_and_rate(work.shape, load(work.dims), R, w, n, s % work.features, tilted, work)
         pose_contact(i, s, r, (0.0, 0.0, 0.0), work)
     work.mode = SLIDE
     a, torque, v, L = work.free_acceleration, work.torque, y[2], y[3]

@@ -85,22 +85,22 @@ def act(count, work, motion):
 
 
 @inlined
-def contact_acceleration(i, y, R, w, a, alpha, work, motion):
+def contact_acceleration(i, y, R, w, a, alpha, tilted, work, motion):
     """Acceleration of candidate i: (normal part, tangential part)."""
     wall = motion.candidate[i] // work.features
     n = wall_normal(work.walls, wall)
-    r, rate = arm_and_rate(work.shape, load(work.dims), R, w, n, motion.candidate[i] % work.features)
+    r, rate = arm_and_rate(work.shape, load(work.dims), R, w, n, motion.candidate[i] % work.features, tilted, work)
     b = plus(plus(a, qt.cross(alpha, r)), qt.cross(w, rate))
     bn = qt.dot(n, b)
     return bn, (b[0] - bn * n[0], b[1] - bn * n[1], b[2] - bn * n[2])
 
 
 @kernel
-def sliding_now(i, y, R, w, work, motion):
+def sliding_now(i, y, R, w, tilted, work, motion):
     """Whether candidate i slides; its direction into `candidate_way`."""
     wall = motion.candidate[i] // work.features
     n = wall_normal(work.walls, wall)
-    r, _ = arm_and_rate(work.shape, load(work.dims), R, w, n, motion.candidate[i] % work.features)
+    r, _ = arm_and_rate(work.shape, load(work.dims), R, w, n, motion.candidate[i] % work.features, tilted, work)
     u = plus(y[2], qt.cross(w, r))
     un = qt.dot(n, u)
     t = (u[0] - un * n[0], u[1] - un * n[1], u[2] - un * n[2])
@@ -122,7 +122,7 @@ def pose_contact(i, slot, r, target, work):
 
 
 @kernel
-def pose_resting(count, y, R, w, work, motion):
+def pose_resting(count, y, R, w, tilted, work, motion):
     """Write the contact problem of candidates that do not slide into `work`: (acceleration, moment) without forces.
 
     It is that of an impact with the free acceleration for velocity, the moment τ - ω x L for angular momentum and
@@ -132,7 +132,7 @@ def pose_resting(count, y, R, w, work, motion):
     for i in range(count):
         slot = motion.candidate[i]
         axes = wall_axes(walls, slot // features)
-        r, rate = arm_and_rate(work.shape, load(work.dims), R, w, axes[0], slot % features)
+        r, rate = arm_and_rate(work.shape, load(work.dims), R, w, axes[0], slot % features, tilted, work)
         c = qt.cross(w, rate)
         pose_contact(i, slot, r, (-qt.dot(axes[0], c), -qt.dot(axes[1], c), -qt.dot(axes[2], c)), work)
     work.mode = HOLD
@@ -182,7 +182,7 @@ def read_resting(count, y, a, moment, friction, tilted, work, motion):
         width = 1
     scale = work.acceleration + work.radius * qt.dot(w, w)
     for i in range(count):
-        an, at = contact_acceleration(i, y, R, w, a, alpha, work, motion)
+        an, at = contact_acceleration(i, y, R, w, a, alpha, tilted, work, motion)
         size = math.sqrt(qt.dot(at, at))
         push = work.impulse[width * i]
         kind = SLIDING
@@ -206,7 +206,7 @@ def read_resting(count, y, a, moment, friction, tilted, work, motion):
 
 
 @kernel
-def _change_one(count, y, R, w, a, alpha, scale, work, motion):
+def _change_one(count, y, R, w, a, alpha, scale, tilted, work, motion):
     """The change that a trial asks for most: (candidate, its new kind), -1 when all conditions hold."""
     weight = SMALL * work.mass * scale
     k = worst = 0
@@ -239,7 +239,7 @@ def _change_one(count, y, R, w, a, alpha, scale, work, motion):
         motion.is_fresh[which] = 1
         return which, kind
     for i in range(count):
-        an, at = contact_acceleration(i, y, R, w, a, alpha, work, motion)
+        an, at = contact_acceleration(i, y, R, w, a, alpha, tilted, work, motion)
         if motion.kind[i] == OPEN and an < -SMALL * scale:
             return i, SLIDING if motion.is_fresh[i] == 0 else HELD
         if motion.kind[i] == SLIDING and motion.is_fresh[i]:
@@ -255,20 +255,20 @@ def _change_one(count, y, R, w, a, alpha, scale, work, motion):
 
 
 @kernel
-def mixed_forces(count, y, R, P, w, alpha_free, work, motion):
+def mixed_forces(count, y, R, P, w, alpha_free, tilted, work, motion):
     """Kinds of the candidates when some of them slide; whether they were found."""
     scale = work.acceleration + work.radius * qt.dot(w, w)
     for i in range(count):
         motion.is_fresh[i] = motion.changes[i] = 0
         motion.kind[i] = SLIDING
-        if not sliding_now(i, y, R, w, work, motion):
+        if not sliding_now(i, y, R, w, tilted, work, motion):
             motion.is_fresh[i] = 1
             if work.mu > 0.0:
                 motion.kind[i] = HELD
     f = load(work.free_acceleration)
     for _ in range(TRIALS):
         act(count, work, motion)
-        place(y, R, w, alpha_free, work, motion)
+        place(y, R, w, alpha_free, tilted, work, motion)
         m = list_unknowns(work.mu, work, motion)
         F, T, _ = solve_unknowns(m, P, work, motion)
         spread(work.mu, work, motion)
@@ -276,7 +276,7 @@ def mixed_forces(count, y, R, P, w, alpha_free, work, motion):
         s = 1.0 / work.mass
         a = (f[0] + s * F[0], f[1] + s * F[1], f[2] + s * F[2])
         alpha = plus(alpha_free, turn)
-        which, kind = _change_one(count, y, R, w, a, alpha, scale, work, motion)
+        which, kind = _change_one(count, y, R, w, a, alpha, scale, tilted, work, motion)
         if which < 0:
             return True
         if kind != motion.kind[which]:
@@ -307,11 +307,11 @@ def find_regime(y, friction, tilted, work, motion):
     slides = False
     if friction is not None:
         for i in range(count):
-            slides = sliding_now(i, y, R, w, work, motion) or slides
+            slides = sliding_now(i, y, R, w, tilted, work, motion) or slides
     if not slides:
-        a, moment = pose_resting(count, y, R, w, work, motion)
+        a, moment = pose_resting(count, y, R, w, tilted, work, motion)
         return ASKS, count, a, moment
-    if not mixed_forces(count, y, R, P, w, alpha, work, motion):
+    if not mixed_forces(count, y, R, P, w, alpha, tilted, work, motion):
         return IS_LOST, count, zero, zero
     if closes(count, motion):
         return COLLIDES, 0, zero, zero

@@ -169,7 +169,7 @@ def start_step(left, tilted, work, motion):
     for j in range(motion.count):
         for c in range(3):
             motion.reference[j, c] = motion.way[j, c]
-    place(state, R, w, alpha, work, motion)
+    place(state, R, w, alpha, tilted, work, motion)
     for j in range(motion.count):
         t, speed = sliding_velocity(j, work, motion)
         motion.is_starting[j] = 1 if speed <= 2.0 * motion.still else 0
@@ -216,7 +216,7 @@ def cancel(y, what, tilted, work, motion):
         return y
     x, q, v, m = y
     R, P, w, alpha = free_turning(y, tilted, work)
-    place(y, R, w, alpha, work, motion)
+    place(y, R, w, alpha, tilted, work, motion)
     for j in range(motion.count):
         wall = motion.slot[j] // work.features
         n = wall_normal(work.walls, wall)
