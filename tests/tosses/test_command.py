@@ -31,7 +31,7 @@ def test_command_prints_and_writes_everything(npz, tmp_path):
     found = json.loads(numbers.read_text())
     assert {"machine", "cases", "ladder", "limits", "flight", "length_scale", "split_seed"} <= set(found)
     assert [rung["accuracy"] for rung in found["ladder"]] == ["fast", "balanced", "precise", "reference"]
-    assert [case["rest"]["tosses"] for case in found["cases"]] == [18] * 5
+    assert [case["rest"]["tosses"] for case in found["cases"]] == [18] * 6
     assert found["is_quick"] is True
 
 
