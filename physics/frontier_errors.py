@@ -34,7 +34,7 @@ def distances(scene: Scene, pos, quat, true_pos, true_quat) -> np.ndarray:
     pos, true_pos : (samples, bodies, 3) float64
     quat, true_quat : (samples, bodies, 4) float64
     """
-    radii = np.array([float(type(body).bounding_radius(body.dimensions)) for body in scene.bodies])
+    radii = np.array([body.bounding_radius(body.dimensions) + np.linalg.norm(body.center) for body in scene.bodies])
     turn = 2.0 * radii * np.sin(0.5 * angles_between(quat, true_quat))
     return np.linalg.norm(pos - true_pos, axis=-1) + turn
 
@@ -101,13 +101,14 @@ def deepest_penetration(scene: Scene, pos, quat) -> float:
         R = rotation_matrices(quat[:, b])
         for wall in scene.walls:
             normal = np.array(wall.normal)
-            gap = pos[:, b] @ normal - wall.offset - _support(body, np.einsum("nji,j->ni", R, normal))
+            direction = np.einsum("nji,j->ni", R, normal)
+            gap = pos[:, b] @ normal + direction @ body.center - wall.offset - _support(body, direction)
             worst = 0.0 + float(np.maximum(worst, -gap.min()))  # keeps what is not a number, no -0.0
     return worst
 
 
 def _support(body: Body, direction: np.ndarray) -> np.ndarray:
-    """Extent (n,) [m] of a body along `direction` (n, 3), unit vectors in its own frame."""
+    """Extent (n,) [m] of a body from its geometric centre along `direction` (n, 3), unit vectors in its own frame."""
     scaled = direction * body.dimensions
     if body.kind == "block":
         return np.abs(scaled).sum(axis=-1)

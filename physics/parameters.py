@@ -47,7 +47,8 @@ def _write_body(rows, body, masses, moments, R, dimensions) -> None:
     rows[:, at.INV_INERTIA : at.INV_INERTIA + 3] = 1.0 / moments
     rows[:, at.PRINCIPAL : at.PRINCIPAL + 4] = np.reshape([quaternion_of(frame) for frame in R], (-1, 4))
     rows[:, at.DIMENSIONS : at.DIMENSIONS + 3] = dimensions
-    rows[:, at.RADIUS] = body.bounding_radius(dimensions)
+    rows[:, at.CENTER : at.CENTER + 3] = body.center
+    rows[:, at.RADIUS] = body.bounding_radius(dimensions) + np.linalg.norm(body.center)  # about the centre of mass
 
 
 @kernel

@@ -30,7 +30,11 @@ class Row:
 
 @dataclass(frozen=True)
 class Plan:
-    """The switches that the kernel is compiled for, and the reasons. None is off, True is on."""
+    """The switches that the kernel is compiled for, and the reasons. None is off, True is on.
+
+    `tilted` is on where the body frame of a body is not all there is to know of its mass: its principal axes are not
+    its body axes, or its geometric centre is not its centre of mass.
+    """
 
     contact: bool | None
     friction: bool | None
@@ -105,7 +109,8 @@ def make_plan(scene: Scene, accuracy: Accuracy) -> Plan:
     touching = contact is not None and bool(scene.walls)
     axes = [principal_axes(body.inertia) for body in scene.bodies]
     isotropic = all(is_isotropic(moments) for moments, _ in axes)
-    tilted = not isotropic and any(is_tilted(R) for _, R in axes)
+    turned = not isotropic and any(is_tilted(R) for _, R in axes)
+    uneven = [b for b, body in enumerate(scene.bodies) if any(body.center)]
     has_block = any(body.kind == "block" for body in scene.bodies)
     restitution = touching and contact.restitution is not None
     rubbing = touching and friction is not None
@@ -116,7 +121,7 @@ def make_plan(scene: Scene, accuracy: Accuracy) -> Plan:
         restitution=restitution or None,
         gravity=(gravity is not None) or None,
         gyroscopic=(not isotropic) or None,
-        tilted=tilted or None,
+        tilted=(turned or bool(uneven)) or None,
         pivots=(touching and accuracy.solver == "sweeps+pivoting") or None,
         scheme=scheme if scheme > 0 else None,
         events=(scheme == EVENTS) or None,
@@ -132,7 +137,8 @@ def make_plan(scene: Scene, accuracy: Accuracy) -> Plan:
             _contact_row(scene, contact, touching),
             _friction_row(friction, rubbing),
             _restitution_row(contact, touching),
-            _gyroscopic_row(isotropic, tilted),
+            _gyroscopic_row(isotropic, turned),
+            _center_row(uneven),
             Row("free motion", True, f"scheme {accuracy.scheme}, {accuracy.substeps} substep(s) per dt", ""),
         ),
     )
@@ -169,8 +175,15 @@ def _restitution_row(contact, touching) -> Row:
     return Row("restitution", True, f"declared: e = {contact.restitution}", "Newton's law at impacts")
 
 
-def _gyroscopic_row(isotropic, tilted) -> Row:
+def _gyroscopic_row(isotropic, turned) -> Row:
     if isotropic:
         return Row("gyroscopic torque", False, "automatic: all moments of every body are equal", "")
-    note = "free-rotation flow" + (", principal axes tilted against body axes" if tilted else "")
+    note = "free-rotation flow" + (", principal axes tilted against body axes" if turned else "")
     return Row("gyroscopic torque", True, "automatic: moments of inertia differ", note)
+
+
+def _center_row(uneven) -> Row:
+    if not uneven:
+        return Row("uneven mass", False, "automatic: every body's centre of mass is its geometric centre", "")
+    reason = f"declared: center of {'body' if len(uneven) == 1 else 'bodies'} {', '.join(map(str, uneven))} is not 0"
+    return Row("uneven mass", True, reason, "contacts about the centre of mass")

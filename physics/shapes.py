@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from typing import ClassVar
 
 import numpy as np
 
@@ -31,6 +32,7 @@ class Body:
     linvel: tuple = (0.0, 0.0, 0.0)
     angvel: tuple = (0.0, 0.0, 0.0)
     inertia_body: tuple | None = None
+    center: ClassVar[tuple] = (0.0, 0.0, 0.0)  # of the shape, from the centre of mass; a block may have another
 
     def __post_init__(self):
         self._set("mass", float(checks.positive(self.mass, (), "mass")))
@@ -62,14 +64,25 @@ class Block(Body):
         Full edge lengths along body x, y, z [m].
     mass : float
         [kg].
+    center : (3,) array_like
+        Position of the geometric centre, where the diagonals meet, relative to the centre of mass, along the body
+        axes [m]: a block heavy on its +x side has a negative x here. `pos` is the centre of mass, so that the block
+        occupies the space around ``pos + R(quat) center``. Where it is not 0 the density is not uniform, and
+        `inertia_body`, about the centre of mass, must be given.
     """
 
     size: tuple
     mass: float
+    center: tuple = field(default=(0.0, 0.0, 0.0), kw_only=True)
     kind = "block"
 
     def __post_init__(self):
         self._set("size", _tuple(checks.positive(self.size, (3,), "size")))
+        self._set("center", _tuple(checks.finite(self.center, (3,), "center")))
+        if any(self.center) and self.inertia_body is None:
+            raise ValueError(
+                f"center is {self.center!r} without inertia_body; give the inertia about the centre of mass"
+            )
         super().__post_init__()
 
     @property

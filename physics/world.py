@@ -247,7 +247,7 @@ class World:
             [kg], coefficients.
         size : (3,), (k, 3) or (k, bodies, 3) array_like, optional
             Full edges of a block, twice the semi-axes of an ellipsoid, three equal diameters of a sphere [m].
-            Position and velocity stay.
+            Position and velocity stay, and so does the `center` of a block: in metres, not as a share of the edges.
         inertia_body : (3, 3), (k, 3, 3) or (k, bodies, 3, 3) array_like, optional
             [kg m²]. Where it is None, a change of mass or size sets the uniform-density value, unless the
             scene's body has an `inertia_body` of its own, which then scales with the mass.

@@ -11,6 +11,7 @@ import numpy as np
 from physics import World
 from physics.kernels import layout as at
 from rigid_env.rendering import BodyView, Camera, Frame, GoalView, WallView
+from rigid_env.rendering.geometry import rotation_matrix
 from rigid_env.view import WEIGHT_ARROW
 
 FULL_CHANGE = 40.0  # of a pixel from which on it shows a body, not the rim of a shadow [of 255]
@@ -38,7 +39,7 @@ def world_frame(
         Lines in the upper left corner.
     goal : GoalView, optional
     applied : (6,) float, optional
-        Force [N] and torque [N m] on body 0, world frame.
+        Force [N] and torque [N m] on body 0, world frame; drawn at its geometric centre.
 
     Returns
     -------
@@ -65,9 +66,10 @@ def world_frame(
 
 def _body_view(world: World, index: int, body: int) -> BodyView:
     kind = world.scene.bodies[body].kind
-    stored = world.params[index * world.body_count + body, at.DIMENSIONS : at.DIMENSIONS + 3]
+    params, quat = world.params[index * world.body_count + body], world.quat[index, body]
+    stored, center = params[at.DIMENSIONS : at.DIMENSIONS + 3], params[at.CENTER : at.CENTER + 3]
     dimensions = 2.0 * stored if kind == "block" else stored
-    return BodyView(kind, dimensions, world.pos[index, body], world.quat[index, body])
+    return BodyView(kind, dimensions, world.pos[index, body] + rotation_matrix(quat) @ center, quat)
 
 
 def without_bodies(frame: Frame, camera: Camera) -> Frame:

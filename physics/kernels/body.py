@@ -14,7 +14,8 @@ from physics.kernels.rotation import SERIES_SIZE
 def bind_body(world, i, shape, params, gravity, wrench, friction, restitution, tilted, work):
     """Write what the step needs of body i into `work`: parameters, and the loads that are held over the step.
 
-    gravity, wrench, friction, restitution and tilted are None where the scene does not have them.
+    gravity, wrench, friction, restitution and tilted are None where the scene does not have them: tilted, where the
+    principal axes of every body are its body axes and its geometric centre is its centre of mass.
     """
     inv_mass, radius = params[i, at.INV_MASS], params[i, at.RADIUS]
     work.i, work.world, work.shape = i, world, shape
@@ -39,6 +40,8 @@ def bind_body(world, i, shape, params, gravity, wrench, friction, restitution, t
     if tilted is not None:
         for c in range(4):
             work.principal[c] = params[i, at.PRINCIPAL + c]
+        for c in range(3):
+            work.center[c] = params[i, at.CENTER + c]
     a, t, J = work.free_acceleration, work.torque, work.J
     work.acceleration = math.sqrt(a[0] * a[0] + a[1] * a[1] + a[2] * a[2])
     if wrench is not None:

@@ -22,6 +22,21 @@ def wall_normal(walls, k):
 
 
 @inlined
+def center_arm(R, work):
+    """Geometric centre of a body relative to its centre of mass, world frame [m]; only of a scene that is `tilted`."""
+    return qt.matvec(R, (work.center[0], work.center[1], work.center[2]))
+
+
+@inlined
+def geometric_center(x, R, work, tilted):
+    """Geometric centre of a body whose centre of mass is at x [m] (the same unless `tilted`)."""
+    if tilted is None:
+        return x
+    r = center_arm(R, work)
+    return (x[0] + r[0], x[1] + r[1], x[2] + r[2])
+
+
+@inlined
 def is_clear(x, v, h, work):
     """Whether the bounding sphere stays clear of every wall during a free flight of h from x with velocity v.
 
@@ -55,7 +70,7 @@ def _admit(gap, speed, slop, margin, reach, acceleration, h, is_last):
 
 
 @kernel
-def gather(x, R, v, w, h, work):
+def gather(x, R, v, w, h, tilted, work):
     """Fill `work` (slot, gap, speed, mask) with the contact set at this pose.
 
     Parameters
@@ -77,6 +92,7 @@ def gather(x, R, v, w, h, work):
     walls, features, shape, radius = work.walls, work.features, work.shape, work.radius
     slop, acceleration = work.slop, work.acceleration
     dims = (work.dims[0], work.dims[1], work.dims[2])
+    center = geometric_center(x, R, work, tilted)
     reach = 0.5 * acceleration * h * h
     margin = slop + reach
     count = 0
@@ -84,7 +100,7 @@ def gather(x, R, v, w, h, work):
     for k in range(walls.shape[0]):
         work.mask[k] = 0
         n = wall_normal(walls, k)
-        d = qt.dot(n, x) - walls[k, OFFSET]
+        d = qt.dot(n, center) - walls[k, OFFSET]
         near = margin
         if work.is_last:
             near += h * (abs(v[0]) + abs(v[1]) + abs(v[2]) + radius * (abs(w[0]) + abs(w[1]) + abs(w[2])))
@@ -97,6 +113,8 @@ def gather(x, R, v, w, h, work):
         m = qt.cross(n, w)  # n·(ω x r) = (n x ω)·r
         if shape == BLOCK:
             mb = qt.transposed_matvec(R, m)
+            if tilted is not None:
+                vn += qt.dot(m, center_arm(R, work))
             em = (dims[0] * mb[0], dims[1] * mb[1], dims[2] * mb[2])
             for vertex in range(VERTEX_COUNT):
                 gap = d + geo.vertex_height(e, vertex)
@@ -125,17 +143,18 @@ def _record(count, wall, feature, features, gap, speed, work):
 
 
 @kernel
-def nearest_outside_set(x, R, work):
+def nearest_outside_set(x, R, tilted, work):
     """Smallest gap [m] over all features that are not in the contact set (`work.mask`).
 
     Of a wall that the bounding sphere does not reach the sphere's gap is taken: a lower bound, and positive.
     """
     walls, shape, radius = work.walls, work.shape, work.radius
     dims = (work.dims[0], work.dims[1], work.dims[2])
+    center = geometric_center(x, R, work, tilted)
     best = 1.0e300
     for k in range(walls.shape[0]):
         n = wall_normal(walls, k)
-        d = qt.dot(n, x) - walls[k, OFFSET]
+        d = qt.dot(n, center) - walls[k, OFFSET]
         if d > radius:
             best = min(best, d - radius)
             continue
@@ -151,7 +170,7 @@ def nearest_outside_set(x, R, work):
 
 
 @inlined
-def place_arms(n, R, work):
+def place_arms(n, R, tilted, work):
     """Contact points of the set at this pose: `work.arm`, relative to the centre of mass, world frame [m]."""
     walls, features, shape = work.walls, work.features, work.shape
     dims = (work.dims[0], work.dims[1], work.dims[2])
@@ -159,6 +178,9 @@ def place_arms(n, R, work):
         wall = work.slot[i] // features
         if shape == BLOCK:
             r = geo.vertex_arm(dims, R, work.slot[i] % features)
+            if tilted is not None:
+                c = center_arm(R, work)
+                r = (r[0] + c[0], r[1] + c[1], r[2] + c[2])
         else:
             normal = wall_normal(walls, wall)
             r = geo.support_arm(shape, dims, R, normal, geo.scaled_normal(shape, dims, R, normal))
@@ -231,13 +253,13 @@ def aim_rest(n, w, h, work):
 
 
 @inlined
-def push_out(x, R, work):
+def push_out(x, R, tilted, work):
     """Position moved along the normals so that nothing is deeper than the slop in a wall. No velocity changes."""
     walls, shape, radius, slop = work.walls, work.shape, work.radius, work.slop
     dims = (work.dims[0], work.dims[1], work.dims[2])
     for k in range(walls.shape[0]):
         n = wall_normal(walls, k)
-        d = qt.dot(n, x) - walls[k, OFFSET]
+        d = qt.dot(n, geometric_center(x, R, work, tilted)) - walls[k, OFFSET]
         if d >= radius:
             continue
         gap = d - geo.support(shape, dims, geo.scaled_normal(shape, dims, R, n))

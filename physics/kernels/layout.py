@@ -25,7 +25,8 @@ FRICTION = 8  # Coulomb coefficient against the walls
 RESTITUTION = 9  # normal coefficient against the walls
 PRINCIPAL = 10  # unit quaternion, principal frame to body frame
 SERIES = 14  # coefficients of the free-rotation series
-PARAM_SIZE = SERIES + SERIES_SIZE
+CENTER = SERIES + SERIES_SIZE  # geometric centre of a block from its centre of mass, body frame [m]
+PARAM_SIZE = CENTER + 3
 
 # --- walls (walls, WALL_SIZE) ----------------------------------------------------------------------------------
 NORMAL = 0  # unit normal, into the free side

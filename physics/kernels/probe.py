@@ -39,11 +39,14 @@ def deepest_gaps(rows, state, params, shapes, walls, gaps, which):
         x = (state[i, at.POS], state[i, at.POS + 1], state[i, at.POS + 2])
         R = qt.to_matrix((state[i, at.QUAT], state[i, at.QUAT + 1], state[i, at.QUAT + 2], state[i, at.QUAT + 3]))
         d = (params[i, at.DIMENSIONS], params[i, at.DIMENSIONS + 1], params[i, at.DIMENSIONS + 2])
+        c = at.CENTER
+        r = qt.matvec(R, (params[i, c], params[i, c + 1], params[i, c + 2]))
+        center = (x[0] + r[0], x[1] + r[1], x[2] + r[2])
         shape = shapes[i % shapes.shape[0]]
         gaps[k], which[k] = 1.0e300, -1
         for w in range(walls.shape[0]):
             n = (walls[w, at.NORMAL], walls[w, at.NORMAL + 1], walls[w, at.NORMAL + 2])
-            gap = qt.dot(n, x) - walls[w, at.OFFSET] - geo.support(shape, d, geo.scaled_normal(shape, d, R, n))
+            gap = qt.dot(n, center) - walls[w, at.OFFSET] - geo.support(shape, d, geo.scaled_normal(shape, d, R, n))
             if gap < gaps[k]:
                 gaps[k], which[k] = gap, w
 
@@ -55,7 +58,9 @@ def contact_point(state, params, shapes, walls, i, wall, feature, out):
     d = (params[i, at.DIMENSIONS], params[i, at.DIMENSIONS + 1], params[i, at.DIMENSIONS + 2])
     shape = shapes[i % shapes.shape[0]]
     if shape == at.BLOCK:
-        r = geo.vertex_arm(d, R, feature)
+        b, c = geo.vertex_arm(d, R, feature), at.CENTER
+        m = qt.matvec(R, (params[i, c], params[i, c + 1], params[i, c + 2]))
+        r = (m[0] + b[0], m[1] + b[1], m[2] + b[2])
     else:
         n = (walls[wall, at.NORMAL], walls[wall, at.NORMAL + 1], walls[wall, at.NORMAL + 2])
         r = geo.support_arm(shape, d, R, n, geo.scaled_normal(shape, d, R, n))

@@ -75,7 +75,7 @@ def impact(n, y, h, friction, smooth, tilted, pivots, report, work):
         bounce_speed /= work.restitution
     if not aim_impact(n, bounce_speed, work.slop / h, 1.0 / h, work):
         return y
-    place_arms(n, qt.to_matrix(q), work)
+    place_arms(n, qt.to_matrix(q), tilted, work)
     for k in range(3 * n):
         work.impulse[k] = 0.0
     R = qt.to_matrix(principal_attitude(q, work, tilted))
@@ -94,7 +94,7 @@ def touch(n, y, h, friction, smooth, gyroscopic, tilted, pivots, memory, report,
     w = angular_velocity(q, L, work, tilted)
     x = (x[0] + half * v[0], x[1] + half * v[1], x[2] + half * v[2])
     q = drift(q, L, work, half, gyroscopic, tilted)
-    place_arms(n, qt.to_matrix(q), work)
+    place_arms(n, qt.to_matrix(q), tilted, work)
     aim_rest(n, w, h, work)
     width = 3
     if friction is None:

@@ -55,9 +55,9 @@ def advance(n, y, h, friction, smooth, gyroscopic, tilted, pivots, scheme, memor
 
 
 @inlined
-def outside_gap(y, work):
+def outside_gap(y, tilted, work):
     """Smallest gap of what is not in the contact set [m]."""
-    return nearest_outside_set(y[0], to_matrix(y[1]), work)
+    return nearest_outside_set(y[0], to_matrix(y[1]), tilted, work)
 
 
 @inlined
@@ -65,7 +65,7 @@ def contact_set(y, h, tilted, work):
     """Gather the contact set at y for a stage of length h: (count, depth)."""
     x, q, v, L = y
     w = angular_velocity(q, L, work, tilted)
-    return gather(x, to_matrix(q), v, w, h, work)
+    return gather(x, to_matrix(q), v, w, h, tilted, work)
 
 
 @inlined
@@ -75,9 +75,9 @@ def has_same_pose(y, z):
 
 
 @inlined
-def kept_out(y, work):
+def kept_out(y, tilted, work):
     """y, pushed out of the walls where it is deeper in than the slop."""
-    return push_out(y[0], to_matrix(y[1]), work), y[1], y[2], y[3]
+    return push_out(y[0], to_matrix(y[1]), tilted, work), y[1], y[2], y[3]
 
 
 @inlined
@@ -111,11 +111,11 @@ def to_next_impact(n, y, h, friction, smooth, gyroscopic, tilted, pivots, scheme
         end = advance(n, y, t, friction, smooth, gyroscopic, tilted, pivots, scheme, memory, report, work)
         if has_same_pose(end, y) or work.is_last:
             break
-        gap = outside_gap(end, work)
+        gap = outside_gap(end, tilted, work)
         if abs(gap) <= 0.5 * work.slop or (trial == 0 and gap > 0.0):
             break
         if trial == 0:
-            low_gap, high_gap = max(outside_gap(y, work), 0.0), gap
+            low_gap, high_gap = max(outside_gap(y, tilted, work), 0.0), gap
         else:
             bend = second_difference(low, low_gap, t, gap, high, high_gap)
             if gap > 0.0:
@@ -147,7 +147,7 @@ def substep(y, h, friction, smooth, gyroscopic, tilted, pivots, scheme, memory, 
         end, t = to_next_impact(n, y, left, friction, smooth, gyroscopic, tilted, pivots, scheme, memory, report, work)
         left -= t
         if n > 0 and not has_same_pose(end, y):
-            end = kept_out(end, work)
+            end = kept_out(end, tilted, work)
         y = end
         if not left > 0.0:
             break

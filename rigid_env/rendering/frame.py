@@ -22,7 +22,7 @@ class BodyView:
     dimensions : (3,) float
         [m]. Full edge lengths of a block; semi-axes of a sphere (all equal) or ellipsoid. Body frame.
     pos : (3,) float
-        [m]. Centre, world frame.
+        [m]. Geometric centre, world frame.
     quat : (4,) float
         Unit quaternion w, x, y, z, body to world.
     colour : (3,) int or None

@@ -29,7 +29,12 @@ BOUNDS = {
     "inertia": (0.0005, 0.0020),  # [kg m²]
     "gravity": (9.0, 10.0),  # [m/s²]
     "table": (-0.004, 0.004),  # [m]
+    "heavy_x": (-0.010, 0.010),  # [m]
+    "heavy_y": (-0.010, 0.010),  # [m]
+    "heavy_z": (-0.010, 0.010),  # [m]
 }
+
+NOMINAL = Cube()
 
 REFINED = 3  # points from which the simplex starts
 FIRST_SIMPLEX = 0.08  # its first edges, in widths of the box
@@ -71,7 +76,7 @@ class Fit:
     ----------
     cube : Cube
     names : tuple of str
-        Of the parameters that were fitted; the others have their nominal values.
+        Of the parameters that were fitted; the others have their nominal values, or those the fit was given.
     objective : float
         See the module [cube widths].
     evaluations : int
@@ -151,14 +156,15 @@ class Objective:
 class _Search:
     """Evaluates points of the unit box and remembers the best."""
 
-    def __init__(self, objective: Callable[[Cube], float], names: tuple[str, ...], tick: Callable[[float], None]):
-        self.objective, self.names, self.tick = objective, names, tick
+    def __init__(self, objective: Callable[[Cube], float], names: tuple[str, ...], tick: Callable[[float], None],
+                 nominal: Cube):  # fmt: skip
+        self.objective, self.names, self.tick, self.nominal = objective, names, tick, nominal
         self.low, self.high = np.array([BOUNDS[name] for name in names]).T
-        self.best, self.cube, self.count = np.inf, Cube(), 0
+        self.best, self.cube, self.count = np.inf, nominal, 0
 
     def __call__(self, point: np.ndarray) -> float:
         values = self.low + np.clip(point, 0.0, 1.0) * (self.high - self.low)
-        cube = replace(Cube(), **dict(zip(self.names, values.tolist())))
+        cube = replace(self.nominal, **dict(zip(self.names, values.tolist())))
         found = self.objective(cube)
         self.count += 1
         if found < self.best:
@@ -182,13 +188,16 @@ def fit(
     names: tuple[str, ...],
     effort: Effort,
     tick: Callable[[float], None] = lambda best: None,
+    nominal: Cube = NOMINAL,
 ) -> Fit:
     """Search the parameters `names` for the least `objective`; ``tick`` is told the best so far after each evaluation.
+
+    What is not fitted is as in `nominal`.
 
     Ctrl-C ends the search; what was best until then is returned, marked as not complete. Before the first evaluation
     has ended there is nothing to return, and the interrupt goes on.
     """
-    search = _Search(objective, check_names(names), tick)
+    search = _Search(objective, check_names(names), tick, nominal)
     is_complete = True
     try:
         search.run(effort)

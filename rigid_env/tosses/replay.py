@@ -33,6 +33,8 @@ class Cube:
         [m/s²].
     table : float
         Height of the table [m].
+    heavy_x, heavy_y, heavy_z : float
+        Centre of mass from the cube's centre, which is tracked, body frame [m].
     """
 
     friction: float = 0.18
@@ -41,12 +43,20 @@ class Cube:
     inertia: float = data.INERTIA
     gravity: float = data.GRAVITY
     table: float = 0.0
+    heavy_x: float = 0.0
+    heavy_y: float = 0.0
+    heavy_z: float = 0.0
+
+    @property
+    def center_of_mass(self) -> np.ndarray:
+        """(3,) from the cube's centre, body frame [m]."""
+        return np.array([self.heavy_x, self.heavy_y, self.heavy_z])
 
     def scene(self) -> physics.Scene:
         """The cube over the table; z is up."""
         body = physics.Block(
             size=(self.side,) * 3, mass=data.MASS, pos=(0.0, 0.0, self.table + self.side),
-            inertia_body=(self.inertia,) * 3,
+            center=-self.center_of_mass, inertia_body=(self.inertia,) * 3,
         )  # fmt: skip
         effects = [
             physics.Gravity((0.0, 0.0, -self.gravity)),
@@ -158,14 +168,17 @@ def replay(
     seconds = simulated = 0.0
     for chosen in batches(lengths):
         world = physics.World(scene, worlds=len(chosen), dt=SAMPLE_DT, accuracy=accuracy, threads=threads)
+        arm = attitude(begin.quat[chosen]).apply(cube.center_of_mass)
+        linvel = begin.linvel[chosen] + np.cross(begin.angvel[chosen], arm)
         world.set_state(
-            pos[chosen, None], begin.quat[chosen, None], begin.linvel[chosen, None], begin.angvel[chosen, None]
+            (pos[chosen] + arm)[:, None], begin.quat[chosen, None], linvel[:, None], begin.angvel[chosen, None]
         )
         table, spent = _watch(world, int(lengths[chosen].max()))
         seconds += spent
         simulated += len(chosen) * (len(table) - 1) * SAMPLE_DT
         for column, i in enumerate(chosen):
             poses[offsets[i] : offsets[i + 1]] = table[: lengths[i], column]
+    poses[:, :3] -= attitude(poses[:, 3:]).apply(cube.center_of_mass)
     return poses, 1e6 * seconds / simulated
 
 

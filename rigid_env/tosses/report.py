@@ -11,15 +11,17 @@ import numpy as np
 from physics.accuracy import PRESETS
 from rigid_env.tosses import data
 from rigid_env.tosses.data import Tosses
-from rigid_env.tosses.fit import Effort, Fit, Objective, check_names, fit
+from rigid_env.tosses.fit import NOMINAL, Effort, Fit, Objective, check_names, fit
 from rigid_env.tosses.flight import Flight, disturb, measure_flight, rest_scale
 from rigid_env.tosses.limits import Limits, find_limits
 from rigid_env.tosses.metric import Errors, Summary, compare
 from rigid_env.tosses.replay import Cube, Recording, replay, starts, sunken
 
 CONTACT = ("friction", "restitution")
-ALL = (*CONTACT, "inertia", "side")
-HEADLINE = "contact and cube"
+BODY = (*CONTACT, "inertia", "side")
+HEAVY = ("heavy_x", "heavy_y", "heavy_z")
+MASS = (*CONTACT, "inertia", *HEAVY)
+HEADLINE = "contact and mass"
 
 REPEATS = 3  # of a timed replay, unless one takes longer than `PATIENCE`
 PATIENCE = 2.0  # [s]
@@ -33,11 +35,12 @@ PEERS = {"MuJoCo": (0.133, 19.5), "Drake": (0.135, 17.5), "PyBullet": (0.145, 16
 
 @dataclass(frozen=True)
 class Setup:
-    """One way to fit: which parameters, and how the recording is read."""
+    """One way to fit: which parameters, how the recording is read, and what the cube is in all else."""
 
     name: str
     parameters: tuple[str, ...]
     recording: Recording
+    nominal: Cube = NOMINAL
 
 
 @dataclass(frozen=True)
@@ -125,15 +128,20 @@ class Report:
         }  # fmt: skip
 
 
-def setups(scale: float, names: tuple[str, ...] | None = None) -> list[Setup]:
-    """What is fitted: contact alone, then the headline and its two variants; or only `names` in the headline's way."""
+def setups(scale: float, flight: Flight, names: tuple[str, ...] | None = None) -> list[Setup]:
+    """What is fitted: the headline, what leads to it and its two variants; or only `names` in the headline's way.
+
+    Second is the contact with the centre of mass where the free flights show it: not fitted to any error.
+    """
     if names is not None:
         return [Setup(", ".join(check_names(names)), tuple(names), Recording())]
     return [
         Setup("contact", CONTACT, Recording()),
-        Setup(HEADLINE, ALL, Recording()),
-        Setup("lengths corrected", ALL, Recording(length_scale=scale)),
-        Setup("start half a frame on", ALL, Recording(is_midframe=True)),
+        Setup("flights' centre of mass", CONTACT, Recording(), Cube(**dict(zip(HEAVY, flight.center_of_mass)))),
+        Setup("contact and cube", BODY, Recording()),
+        Setup(HEADLINE, MASS, Recording()),
+        Setup("lengths corrected", MASS, Recording(length_scale=scale)),
+        Setup("start half a frame on", MASS, Recording(is_midframe=True)),
     ]
 
 
@@ -159,8 +167,9 @@ class Measurement:
         self.fitted, self.others = data.split(len(tosses), seed)
         self.training = tosses.subset(self.fitted)
         scale = rest_scale(self.training)
-        self.report = Report(tosses, accuracy, seed, measure_flight(self.training), scale)
-        self.setups = setups(scale, names)
+        flight = measure_flight(self.training)
+        self.report = Report(tosses, accuracy, seed, flight, scale)
+        self.setups = setups(scale, flight, names)
 
     def evaluations(self) -> int:
         """Of all fits together, at most."""
@@ -196,7 +205,7 @@ class Measurement:
         objective = Objective(
             self.training, setup.recording, report.flight, self.effort, report.accuracy, self.threads
         )  # fmt: skip
-        found = fit(objective, setup.parameters, self.effort, tick)
+        found = fit(objective, setup.parameters, self.effort, tick, setup.nominal)
         errors, _, _ = self.errors(found.cube, setup.recording, report.accuracy)
         lifted = int((sunken(starts(report.tosses, found.cube, setup.recording), found.cube) > 0.0).sum())
         return Case(

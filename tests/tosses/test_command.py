@@ -25,13 +25,13 @@ def test_command_prints_and_writes_everything(npz, tmp_path):
     pytest.importorskip("matplotlib")
     numbers, picture = tmp_path / "numbers.json", tmp_path / "picture.png"
     output = run(npz, "--quick", "--json", numbers, "--plot", picture)
-    for text in ("24 tosses, 6 of them", "contact and cube", "lengths corrected", "reference", "noise", "PyBullet"):
+    for text in ("24 tosses, 6 of them", "contact and mass", "lengths corrected", "reference", "noise", "PyBullet"):
         assert text in output
     assert picture.read_bytes().startswith(b"\x89PNG")
     found = json.loads(numbers.read_text())
     assert {"machine", "cases", "ladder", "limits", "flight", "length_scale", "split_seed"} <= set(found)
     assert [rung["accuracy"] for rung in found["ladder"]] == ["fast", "balanced", "precise", "reference"]
-    assert [case["rest"]["tosses"] for case in found["cases"]] == [18] * 4
+    assert [case["rest"]["tosses"] for case in found["cases"]] == [18] * 6
     assert found["is_quick"] is True
 
 

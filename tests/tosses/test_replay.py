@@ -90,3 +90,13 @@ def test_disturbed_starts_have_the_noise_and_keep_the_pose(made, rng, true_cube)
     np.testing.assert_array_equal(other.linvel[:, :2], begin.linvel[:, :2])
     # standard deviation of 24 samples: to 15 %, three times that allowed
     assert (other.angvel - begin.angvel)[:, 0].std() == pytest.approx(2.0, rel=0.45)
+
+
+def test_a_heavy_side_is_where_the_flights_show_it():
+    from tests.tosses.conftest import make_tosses
+
+    cube = Cube(heavy_x=0.001, heavy_y=-0.002, heavy_z=0.006)
+    made = make_tosses(6, cube)
+    flight = measure_flight(made)
+    assert flight.gravity == pytest.approx(9.81, rel=1e-9)
+    np.testing.assert_allclose(flight.center_of_mass, cube.center_of_mass, rtol=0, atol=1e-10)

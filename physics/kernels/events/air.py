@@ -98,7 +98,7 @@ def safe_flight(y, left, third, tilted, work, motion):
         if d - work.radius + min(0.0, t * vn) + min(0.0, 0.5 * t * t * an) > 0.0:
             continue
         for feature in range(work.features):
-            r, rate = arm_and_rate(shape, dims, R, w, n, feature)
+            r, rate = arm_and_rate(shape, dims, R, w, n, feature, tilted, work)
             gap = d + qt.dot(n, r)
             speed = vn + qt.dot(n, qt.cross(w, r))
             bend = an + qt.dot(n, plus(qt.cross(alpha, r), qt.cross(w, rate)))

@@ -26,7 +26,7 @@ from physics.kernels import geometry as geo
 from physics.kernels import quaternion as qt
 from physics.kernels.body import principal_attitude
 from physics.kernels.compiler import inlined, kernel
-from physics.kernels.contact import wall_normal
+from physics.kernels.contact import center_arm, wall_normal
 from physics.kernels.events.linear import eliminate
 from physics.kernels.layout import BLOCK, SPHERE
 from physics.kernels.share import wall_axes
@@ -65,13 +65,15 @@ def turned_by(P, J, h):
 
 
 @inlined
-def arm_and_rate(shape, dims, R, w, n, feature):
+def arm_and_rate(shape, dims, R, w, n, feature, tilted, work):
     """Contact point relative to the centre of mass, and its rate of change, world frame [m, m/s].
 
     Of an ellipsoid: r = R c with c = -D e/s, e = D Rᵀ n, s = |e| and de/dt = D (Rᵀn x Rᵀω).
     """
     if shape == BLOCK:
         r = geo.vertex_arm(dims, R, feature)
+        if tilted is not None:
+            r = plus(r, center_arm(R, work))
         return r, qt.cross(w, r)
     if shape == SPHERE:
         return (-dims[0] * n[0], -dims[0] * n[1], -dims[0] * n[2]), (0.0, 0.0, 0.0)
@@ -107,13 +109,13 @@ def free_turning(y, tilted, work):
 
 
 @kernel
-def place(y, R, w, alpha, work, motion):
+def place(y, R, w, alpha, tilted, work, motion):
     """Arms, velocities, directions of sliding and free accelerations (`goal`) of the contacts that act."""
     shape, features, walls = work.shape, work.features, work.walls
     dims, a, v = load(work.dims), load(work.free_acceleration), y[2]
     for j in range(motion.count):
         n = wall_normal(walls, motion.slot[j] // features)
-        r, rate = arm_and_rate(shape, dims, R, w, n, motion.slot[j] % features)
+        r, rate = arm_and_rate(shape, dims, R, w, n, motion.slot[j] % features, tilted, work)
         u = plus(v, qt.cross(w, r))
         b = plus(plus(a, qt.cross(alpha, r)), qt.cross(w, rate))
         un = qt.dot(n, u)
@@ -267,7 +269,7 @@ def regime_forces(y, tilted, work, motion):
     zero = (0.0, 0.0, 0.0)
     if motion.count == 0:
         return zero, zero, w, alpha, P
-    place(y, R, w, alpha, work, motion)
+    place(y, R, w, alpha, tilted, work, motion)
     m = list_unknowns(work.mu, work, motion)
     force, moment, _ = solve_unknowns(m, P, work, motion)
     return force, moment, w, alpha, P

@@ -17,7 +17,7 @@ import math
 from physics.kernels import geometry as geo
 from physics.kernels import quaternion as qt
 from physics.kernels.compiler import inlined, kernel
-from physics.kernels.contact import wall_normal
+from physics.kernels.contact import center_arm, geometric_center, wall_normal
 from physics.kernels.events.forces import free_turning, load, spread, vector
 from physics.kernels.events.motion import END, START, V
 from physics.kernels.events.smooth import find_rate, get_state, sliding_velocity
@@ -36,9 +36,10 @@ def look_around(row, tilted, work, motion):
     x, q, v, m = get_state(motion, row)
     R, _, w, _ = free_turning((x, q, v, m), tilted, work)
     dims, features, shape = load(work.dims), work.features, work.shape
+    center = geometric_center(x, R, work, tilted)
     for k in range(work.walls.shape[0]):
         n = wall_normal(work.walls, k)
-        d = qt.dot(n, x) - work.walls[k, OFFSET]
+        d = qt.dot(n, center) - work.walls[k, OFFSET]
         if d > 2.0 * work.radius:
             for feature in range(features):
                 motion.gap[row, k * features + feature] = math.inf
@@ -46,6 +47,8 @@ def look_around(row, tilted, work, motion):
         e = geo.scaled_normal(shape, dims, R, n)
         vn, turn = qt.dot(n, v), qt.cross(n, w)
         if shape == BLOCK:
+            if tilted is not None:
+                vn += qt.dot(turn, center_arm(R, work))
             b = qt.transposed_matvec(R, turn)
             f = (dims[0] * b[0], dims[1] * b[1], dims[2] * b[2])
             for vertex in range(VERTEX_COUNT):

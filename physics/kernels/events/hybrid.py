@@ -130,7 +130,7 @@ def pose_collision(y, tilted, work, motion, report):
         if not motion.gap[START, s] <= max(motion.touch, -rate * motion.together) or n >= work.slot.shape[0]:
             continue
         normal = wall_normal(work.walls, s // work.features)
-        r, r_rate = arm_and_rate(work.shape, load(work.dims), R, w, normal, s % work.features)
+        r, r_rate = arm_and_rate(work.shape, load(work.dims), R, w, normal, s % work.features, tilted, work)
         goal = rebound(-rate, normal, r, r_rate, w, alpha, work, motion)
         pose_contact(n, s, r, (goal, 0.0, 0.0), work)
         n += 1
@@ -151,7 +151,7 @@ def pose_jump(y, h, tilted, work, motion):
         if not gap <= motion.touch - min(0.0, motion.gap_rate[START, s]) * h or count >= work.slot.shape[0]:
             continue
         n = wall_normal(work.walls, s // work.features)
-        r, _ = arm_and_rate(work.shape, load(work.dims), R, w, n, s % work.features)
+        r, _ = arm_and_rate(work.shape, load(work.dims), R, w, n, s % work.features, tilted, work)
         pose_contact(count, s, r, (-max(gap, 0.0) / h, 0.0, 0.0), work)
         count += 1
     work.mode = SLIDE

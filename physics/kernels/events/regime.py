@@ -98,22 +98,22 @@ def act(count, work, motion):
 
 
 @inlined
-def contact_acceleration(i, y, R, w, a, alpha, work, motion):
+def contact_acceleration(i, y, R, w, a, alpha, tilted, work, motion):
     """Acceleration of candidate i: (normal part, tangential part)."""
     wall = motion.candidate[i] // work.features
     n = wall_normal(work.walls, wall)
-    r, rate = arm_and_rate(work.shape, load(work.dims), R, w, n, motion.candidate[i] % work.features)
+    r, rate = arm_and_rate(work.shape, load(work.dims), R, w, n, motion.candidate[i] % work.features, tilted, work)
     b = plus(plus(a, qt.cross(alpha, r)), qt.cross(w, rate))
     bn = qt.dot(n, b)
     return bn, (b[0] - bn * n[0], b[1] - bn * n[1], b[2] - bn * n[2])
 
 
 @kernel
-def sliding_now(i, y, R, w, work, motion):
+def sliding_now(i, y, R, w, tilted, work, motion):
     """Whether candidate i slides; its direction into `candidate_way`."""
     wall = motion.candidate[i] // work.features
     n = wall_normal(work.walls, wall)
-    r, _ = arm_and_rate(work.shape, load(work.dims), R, w, n, motion.candidate[i] % work.features)
+    r, _ = arm_and_rate(work.shape, load(work.dims), R, w, n, motion.candidate[i] % work.features, tilted, work)
     u = plus(y[2], qt.cross(w, r))
     un = qt.dot(n, u)
     t = (u[0] - un * n[0], u[1] - un * n[1], u[2] - un * n[2])
@@ -141,7 +141,7 @@ def pose_contact(i, slot, r, target, work):
 
 
 @kernel
-def pose_resting(count, y, R, w, has_sliding, work, motion):
+def pose_resting(count, y, R, w, has_sliding, tilted, work, motion):
     """Write the contact problem of candidates that do not slide into `work`: (acceleration, moment) without forces.
 
     It is that of an impact with the free acceleration for velocity, the moment τ - ω x L for angular momentum and
@@ -153,7 +153,7 @@ def pose_resting(count, y, R, w, has_sliding, work, motion):
     for i in range(count):
         slot = motion.candidate[i]
         axes = wall_axes(walls, slot // features)
-        r, rate = arm_and_rate(work.shape, load(work.dims), R, w, axes[0], slot % features)
+        r, rate = arm_and_rate(work.shape, load(work.dims), R, w, axes[0], slot % features, tilted, work)
         c = qt.cross(w, rate)
         if has_sliding:  # as if it had accelerated along its sliding for long: no force then turns it
             c = plus(c, times(FAST * scale, vector(motion.candidate_way, i)))
@@ -225,7 +225,7 @@ def read_resting(count, y, a, moment, friction, has_sliding, tilted, work, motio
     if has_sliding:
         small *= FAST
     for i in range(count):
-        an, at = contact_acceleration(i, y, R, w, a, alpha, work, motion)
+        an, at = contact_acceleration(i, y, R, w, a, alpha, tilted, work, motion)
         size = math.sqrt(qt.dot(at, at))
         push = work.impulse[width * i]
         if has_sliding and push > PARADOX * FAST * work.mass * scale:
@@ -254,7 +254,7 @@ def read_resting(count, y, a, moment, friction, has_sliding, tilted, work, motio
 
 
 @kernel
-def _change_one(count, y, R, w, a, alpha, scale, work, motion):
+def _change_one(count, y, R, w, a, alpha, scale, tilted, work, motion):
     """The change that a trial asks for most: (candidate, its new kind), -1 when all conditions hold."""
     weight = SMALL_EXACT * work.mass * scale
     k = worst = 0
@@ -288,7 +288,7 @@ def _change_one(count, y, R, w, a, alpha, scale, work, motion):
         motion.is_fresh[which] = 1
         return which, kind
     for i in range(count):
-        an, at = contact_acceleration(i, y, R, w, a, alpha, work, motion)
+        an, at = contact_acceleration(i, y, R, w, a, alpha, tilted, work, motion)
         if motion.kind[i] == OPEN and an < -SMALL_EXACT * scale:
             return i, SLIDING if motion.is_fresh[i] == 0 else HELD
         if motion.kind[i] == SLIDING and motion.is_fresh[i]:
@@ -304,20 +304,20 @@ def _change_one(count, y, R, w, a, alpha, scale, work, motion):
 
 
 @kernel
-def mixed_forces(count, y, R, P, w, alpha_free, work, motion):
+def mixed_forces(count, y, R, P, w, alpha_free, tilted, work, motion):
     """Kinds of the candidates when some of them slide; whether they were found."""
     scale = work.acceleration + work.radius * qt.dot(w, w)
     for i in range(count):
         motion.is_fresh[i] = motion.changes[i] = 0
         motion.kind[i] = SLIDING
-        if not sliding_now(i, y, R, w, work, motion):
+        if not sliding_now(i, y, R, w, tilted, work, motion):
             motion.is_fresh[i] = 1
             if work.mu > 0.0:
                 motion.kind[i] = HELD
     f = load(work.free_acceleration)
     for _ in range(TRIALS):
         act(count, work, motion)
-        place(y, R, w, alpha_free, work, motion)
+        place(y, R, w, alpha_free, tilted, work, motion)
         m = list_unknowns(work.mu, work, motion)
         F, T, _ = solve_unknowns(m, P, work, motion)
         spread(work.mu, work, motion)
@@ -325,7 +325,7 @@ def mixed_forces(count, y, R, P, w, alpha_free, work, motion):
         s = 1.0 / work.mass
         a = (f[0] + s * F[0], f[1] + s * F[1], f[2] + s * F[2])
         alpha = plus(alpha_free, turn)
-        which, kind = _change_one(count, y, R, w, a, alpha, scale, work, motion)
+        which, kind = _change_one(count, y, R, w, a, alpha, scale, tilted, work, motion)
         if which < 0:
             return True
         if kind != motion.kind[which]:
@@ -357,11 +357,12 @@ def find_regime(y, friction, tilted, work, motion):
     slides = False
     if friction is not None:
         for i in range(count):
-            slides = sliding_now(i, y, R, w, work, motion) or slides
-    if not slides or not mixed_forces(count, y, R, P, w, alpha, work, motion):
-        for i in range(count):
-            slides = sliding_now(i, y, R, w, work, motion) or slides
-        a, moment = pose_resting(count, y, R, w, slides, work, motion)
+            slides = sliding_now(i, y, R, w, tilted, work, motion) or slides
+    if not slides or not mixed_forces(count, y, R, P, w, alpha, tilted, work, motion):
+        if slides:
+            for i in range(count):
+                sliding_now(i, y, R, w, tilted, work, motion)
+        a, moment = pose_resting(count, y, R, w, slides, tilted, work, motion)
         return (ASKS_SLIDING if slides else ASKS), count, a, moment
     if closes(count, motion):
         return COLLIDES, 0, zero, zero

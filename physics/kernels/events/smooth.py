@@ -176,7 +176,7 @@ def start_step(left, tilted, work, motion):
     for j in range(motion.count):
         for c in range(3):
             motion.reference[j, c] = motion.way[j, c]
-    place(state, R, w, alpha, work, motion)
+    place(state, R, w, alpha, tilted, work, motion)
     for j in range(motion.count):
         t, speed = sliding_velocity(j, work, motion)
         motion.is_starting[j] = 1 if speed <= motion.still else 0
@@ -232,7 +232,7 @@ def cancel(y, tilted, work, motion):
         return y
     x, q, v, m = y
     R, P, w, alpha = free_turning(y, tilted, work)
-    place(y, R, w, alpha, work, motion)
+    place(y, R, w, alpha, tilted, work, motion)
     worst = 0.0
     for j in range(motion.count):
         wall = motion.slot[j] // work.features
@@ -246,7 +246,7 @@ def cancel(y, tilted, work, motion):
         x = plus(x, move)
         q = qt.normalise(qt.multiply(qt.exponential(turned_by(P, work.J, turn)), q))
         R, P, w, alpha = free_turning((x, q, v, m), tilted, work)
-        place((x, q, v, m), R, w, alpha, work, motion)
+        place((x, q, v, m), R, w, alpha, tilted, work, motion)
     worst = 0.0
     for j in range(motion.count):
         n = wall_normal(work.walls, motion.slot[j] // work.features)

@@ -32,7 +32,7 @@ class Problem(NamedTuple):
     mass: float
     inertia: np.ndarray  # (3, 3), body frame
     inverse_inertia: np.ndarray
-    points: np.ndarray  # (k, 3), body frame; of a sphere one row of zeros
+    points: np.ndarray  # (k, 3), from the centre of mass, body frame; of a sphere one row of zeros
     radius: float  # of a sphere; 0 for a block
     frames: np.ndarray  # (walls, 3, 3): rows normal, tangent 1, tangent 2
     offsets: np.ndarray  # (walls,)
@@ -75,7 +75,7 @@ def from_scene(scene: Scene, force=(0, 0, 0), torque=(0, 0, 0)):
         mass=body.mass,
         inertia=body.inertia,
         inverse_inertia=np.linalg.inv(body.inertia),
-        points=np.zeros((1, 3)) if is_sphere else signs * body.dimensions,
+        points=np.zeros((1, 3)) if is_sphere else signs * body.dimensions + body.center,
         radius=body.dimensions[0] if is_sphere else 0.0,
         frames=np.array([_frame(wall.normal) for wall in scene.walls]).reshape(-1, 3, 3),
         offsets=np.array([wall.offset for wall in scene.walls], float),
