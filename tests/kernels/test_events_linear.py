@@ -134,7 +134,7 @@ def unit(rng, size):
 
 def arm(shape, dims, R, w, n, feature=0):
     """Arm and rate as arrays."""
-    r, rate = arm_and_rate(shape, tuple(dims), tuple(R.ravel()), tuple(w), tuple(n), feature)
+    r, rate = arm_and_rate(shape, tuple(dims), tuple(R.ravel()), tuple(w), tuple(n), feature, None, None)
     return np.array(r), np.array(rate)
 
 
