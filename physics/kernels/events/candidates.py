@@ -1,0 +1,104 @@
+"""Contacts that touch: candidates for acting, what they do, and their accelerations."""
+
+from __future__ import annotations
+
+import math
+
+from physics.kernels import quaternion as qt
+from physics.kernels.compiler import inlined, kernel
+from physics.kernels.contact import wall_normal
+from physics.kernels.events.forces import (
+    arm_and_rate,
+    load,
+    plus,
+)
+from physics.kernels.events.guards import look_around
+from physics.kernels.events.motion import START
+from physics.kernels.events.smooth import put_state
+
+# What a body does.
+FLIES, COLLIDES, MOVES, RESTS, IS_LOST, ASKS, ASKS_SLIDING = range(7)
+
+# What a candidate does.
+OPEN, HELD, SLIDING = range(3)
+
+# Approach of a contact that will leave that is none, in `motion.still`.
+UNSEEN_APPROACH = 1.0e-6
+
+
+@kernel
+def find_candidates(y, tilted, work, motion):
+    """Features that touch and do not leave, into `candidate`: (count, whether one approaches)."""
+    put_state(motion, START, y)
+    look_around(START, tilted, work, motion)
+    count = 0
+    for s in range(motion.is_active.shape[0]):
+        if motion.gap[START, s] <= motion.touch and count < motion.slot.shape[0]:
+            rate = motion.gap_rate[START, s]
+            if rate < -motion.still:
+                return 0, True
+            if rate <= motion.still:
+                motion.candidate[count] = s
+                count += 1
+    return count, False
+
+
+@kernel
+def act(count, work, motion):
+    """Let the candidates act that are not open; mark their slots."""
+    k = 0
+    for s in range(motion.is_active.shape[0]):
+        motion.is_active[s] = 0
+    for i in range(count):
+        if motion.kind[i] != OPEN and k < motion.slot.shape[0]:
+            motion.slot[k] = motion.candidate[i]
+            motion.is_active[motion.candidate[i]] = 1
+            motion.holds[k] = 1 if motion.kind[i] == HELD else 0
+            for c in range(3):
+                motion.way[k, c] = motion.reference[k, c] = motion.candidate_way[i, c]
+            k += 1
+    motion.count = k
+
+
+@inlined
+def contact_acceleration(i, y, R, w, a, alpha, tilted, work, motion):
+    """Acceleration of candidate i: (normal part, tangential part)."""
+    wall = motion.candidate[i] // work.features
+    n = wall_normal(work.walls, wall)
+    r, rate = arm_and_rate(work.shape, load(work.dims), R, w, n, motion.candidate[i] % work.features, tilted, work)
+    b = plus(plus(a, qt.cross(alpha, r)), qt.cross(w, rate))
+    bn = qt.dot(n, b)
+    return bn, (b[0] - bn * n[0], b[1] - bn * n[1], b[2] - bn * n[2])
+
+
+@kernel
+def sliding_now(i, y, R, w, tilted, work, motion):
+    """Whether candidate i slides; its direction into `candidate_way`."""
+    wall = motion.candidate[i] // work.features
+    n = wall_normal(work.walls, wall)
+    r, _ = arm_and_rate(work.shape, load(work.dims), R, w, n, motion.candidate[i] % work.features, tilted, work)
+    u = plus(y[2], qt.cross(w, r))
+    un = qt.dot(n, u)
+    t = (u[0] - un * n[0], u[1] - un * n[1], u[2] - un * n[2])
+    speed = math.sqrt(qt.dot(t, t))
+    for c in range(3):
+        motion.candidate_way[i, c] = 0.0
+        if speed > motion.still:
+            motion.candidate_way[i, c] = t[c] / speed
+    return speed > motion.still
+
+
+@inlined
+def acceleration_scale(w, work):
+    """Size of the accelerations of a body's contacts [m/s²]."""
+    return work.acceleration + work.radius * qt.dot(w, w)
+
+
+@inlined
+def closes(count, motion):
+    """Whether a contact that will leave is still, by a little, on its way in."""
+    least = -motion.noise - UNSEEN_APPROACH * motion.still
+    for i in range(count):
+        if motion.kind[i] == OPEN and motion.gap_rate[START, motion.candidate[i]] < least:
+            return True
+    return False

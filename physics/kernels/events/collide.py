@@ -1,0 +1,107 @@
+"""Impulses: what a contact problem asks of an impact, and of a leap where no force is consistent."""
+
+from __future__ import annotations
+
+from physics.kernels import layout as at
+from physics.kernels import quaternion as qt
+from physics.kernels.body import angular_velocity
+from physics.kernels.compiler import inlined, kernel
+from physics.kernels.contact import wall_normal
+from physics.kernels.events import log as ev
+from physics.kernels.events.forces import arm_and_rate, free_turning, load
+from physics.kernels.events.guards import look_around
+from physics.kernels.events.motion import START
+from physics.kernels.events.resting import pose_contact
+from physics.kernels.events.smooth import put_state
+from physics.kernels.slide import SLIDE
+
+
+@inlined
+def rebound(speed, normal, r, rate, w, alpha, work, motion):
+    """Velocity asked of a contact that approaches with `speed`; what a bounce too short leaves out is noted.
+
+    With the free acceleration b towards the wall a bounce at e times the speed takes t = 2 e speed / b, and all that
+    follow it t e/(1 - e).
+    """
+    if not speed > motion.still:
+        return 0.0
+    goal = work.restitution * speed
+    if goal > motion.still:
+        return goal
+    a, c, g = load(work.free_acceleration), qt.cross(alpha, r), qt.cross(w, rate)
+    b = -(qt.dot(normal, a) + qt.dot(normal, c) + qt.dot(normal, g))
+    if b > 0.0 and work.restitution < 1.0:
+        motion.left_out = max(motion.left_out, 2.0 * goal / (b * (1.0 - work.restitution)))
+    return 0.0
+
+
+@kernel
+def pose_collision(y, tilted, work, motion, report):
+    """Write the contact problem of all contacts that touch, or would in no time, into `work`; their number."""
+    put_state(motion, START, y)
+    look_around(START, tilted, work, motion)
+    R, _, w, alpha = free_turning(y, tilted, work)
+    n = 0
+    motion.left_out = 0.0
+    for s in range(motion.is_active.shape[0]):
+        rate = motion.gap_rate[START, s]
+        if not motion.gap[START, s] <= max(motion.touch, -rate * motion.together) or n >= work.slot.shape[0]:
+            continue
+        normal = wall_normal(work.walls, s // work.features)
+        r, r_rate = arm_and_rate(work.shape, load(work.dims), R, w, normal, s % work.features, tilted, work)
+        goal = rebound(-rate, normal, r, r_rate, w, alpha, work, motion)
+        pose_contact(n, s, r, (goal, 0.0, 0.0), work)
+        n += 1
+        report[work.world, at.PENETRATION] = max(report[work.world, at.PENETRATION], -motion.gap[START, s])
+    work.mode = SLIDE
+    return n
+
+
+@kernel
+def pose_jump(y, h, tilted, work, motion):
+    """Write the contact problem of a first-order step over h into `work`: (contacts, velocity, angular momentum)."""
+    put_state(motion, START, y)
+    look_around(START, tilted, work, motion)
+    R, _, w, _ = free_turning(y, tilted, work)
+    count = 0
+    for s in range(motion.is_active.shape[0]):
+        gap = motion.gap[START, s]
+        if not gap <= motion.touch - min(0.0, motion.gap_rate[START, s]) * h or count >= work.slot.shape[0]:
+            continue
+        n = wall_normal(work.walls, s // work.features)
+        r, _ = arm_and_rate(work.shape, load(work.dims), R, w, n, s % work.features, tilted, work)
+        pose_contact(count, s, r, (-max(gap, 0.0) / h, 0.0, 0.0), work)
+        count += 1
+    work.mode = SLIDE
+    a, torque, v, L = work.free_acceleration, work.torque, y[2], y[3]
+    return (
+        count,
+        (v[0] + h * a[0], v[1] + h * a[1], v[2] + h * a[2]),
+        (L[0] + h * torque[0], L[1] + h * torque[1], L[2] + h * torque[2]),
+    )
+
+
+@kernel
+def carry_on(y, h, tilted, work):
+    """State after a moment h at constant velocities."""
+    x, q, v, L = y
+    w = angular_velocity(q, L, work, tilted)
+    x = (x[0] + h * v[0], x[1] + h * v[1], x[2] + h * v[2])
+    return x, qt.normalise(qt.multiply(qt.exponential((h * w[0], h * w[1], h * w[2])), q)), v, L
+
+
+@kernel
+def log_impulses(n, width, work, motion, log, counts, t):
+    """One event per wall with the sum of its impulses, if that is above rounding."""
+    least = work.mass * motion.noise
+    for wall in range(work.walls.shape[0]):
+        px = py = pz = 0.0
+        for i in range(n):
+            if work.slot[i] // work.features == wall:
+                for c in range(width):
+                    s = work.impulse[width * i + c]
+                    px += s * work.walls[wall, 3 * c]
+                    py += s * work.walls[wall, 3 * c + 1]
+                    pz += s * work.walls[wall, 3 * c + 2]
+        if px * px + py * py + pz * pz > least * least:
+            ev.note_event(log, counts, work.i, t, ev.IMPACT, wall, (px, py, pz))

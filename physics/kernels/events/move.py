@@ -1,0 +1,131 @@
+"""Smooth motion of a regime up to the guard that ends it, and a look at what comes next."""
+
+from __future__ import annotations
+
+import math
+
+from physics.kernels import quaternion as qt
+from physics.kernels.body import angular_velocity
+from physics.kernels.compiler import inlined, kernel
+from physics.kernels.events.guards import GAP, NO_GUARD, NO_STEP, SPEED, least_margin, look_around
+from physics.kernels.events.motion import END, START
+from physics.kernels.events.smooth import (
+    CUT,
+    EASY,
+    GROWTH,
+    SHORTEST,
+    cancel,
+    get_state,
+    put_state,
+    sliding_velocity,
+    start_step,
+    try_step,
+)
+
+# Smooth steps at most before the next regime is looked for.
+STEPS = 10_000
+
+# Trials of the time at which a guard ends a step.
+LOCATIONS = 110
+
+# A body whose contacts, when set right, take its speed down to this share of `motion.still` may be at rest.
+SETTLED = 1.0e-6
+
+
+@kernel
+def locate(h, margin, tilted, work, motion):
+    """End the step where its smallest margin is zero (END): (its length, guard, contact or slot).
+
+    False position with the Illinois rule, and a half after each trial that left more than half.
+    """
+    low, high, low_margin, high_margin = 0.0, h, 1.0e-3, margin
+    guard, which = 0, -1
+    side, width = 0, 4.0 * h
+    for _ in range(LOCATIONS):
+        t = low + (high - low) * low_margin / (low_margin - high_margin)
+        if high - low > 0.5 * width or not low < t < high:
+            t = 0.5 * (low + high)
+        width = high - low
+        try_step(t, tilted, work, motion)
+        margin, g, w = least_margin(t, tilted, work, motion)
+        if margin < 0.0:
+            high, high_margin, guard, which = t, margin, g, w
+            if side == 1:
+                low_margin *= 0.5
+            side = 1
+        else:
+            low, low_margin = t, margin
+            if g == GAP and margin <= 1.0e-15:
+                return t, g, w
+            if side == -1:
+                high_margin *= 0.5
+            side = -1
+        if high - low <= 1.0e-15 * h or (margin < 0.0 and margin > -1.0e-15):
+            break
+    if margin >= 0.0:
+        try_step(high, tilted, work, motion)
+        _, guard, which = least_margin(high, tilted, work, motion)
+    return high, guard, which
+
+
+@inlined
+def has_stopped(guard, which, work, motion):
+    """Whether the contact that ended a step all but stands still there: then that is the end, not before."""
+    if guard != SPEED:
+        return False
+    return sliding_velocity(which, work, motion)[1] <= motion.still
+
+
+@inlined
+def body_speed(y, tilted, work):
+    """Speed that no point of the body exceeds [m/s]."""
+    v, w = y[2], angular_velocity(y[1], y[3], work, tilted)
+    return math.sqrt(qt.dot(v, v)) + work.radius * math.sqrt(qt.dot(w, w))
+
+
+@kernel
+def move(y, left, tilted, work, motion):
+    """Smooth motion of the regime for `left`, or until a guard ends it: (state, time, guard)."""
+    had = body_speed(y, tilted, work)
+    y = cancel(y, tilted, work, motion)
+    if had > motion.still and body_speed(y, tilted, work) <= SETTLED * motion.still:
+        return y, 0.0, SPEED  # the contacts have taken all of it: it may be at rest
+    put_state(motion, START, y)
+    look_around(START, tilted, work, motion)
+    motion.step = left
+    t = 0.0
+    for _ in range(STEPS):
+        h = start_step(left - t, tilted, work, motion)
+        error, used = try_step(h, tilted, work, motion)
+        if not error <= work.tolerance:
+            if not h > SHORTEST * left:
+                return get_state(motion, START), t, NO_STEP
+            motion.step = CUT * h
+            continue
+        margin, guard, which = least_margin(h, tilted, work, motion)
+        is_over = margin < 0.0
+        if is_over and not has_stopped(guard, which, work, motion):
+            h, guard, which = locate(h, margin, tilted, work, motion)
+        t += h
+        motion.step = GROWTH * h if used <= EASY else h
+        y = cancel(get_state(motion, END), tilted, work, motion)
+        if is_over:
+            return y, t, guard
+        put_state(motion, START, y)
+        if not t < left:
+            break
+        for s in range(motion.is_active.shape[0]):
+            motion.gap[START, s], motion.gap_rate[START, s] = motion.gap[END, s], motion.gap_rate[END, s]
+    if t < left:
+        return get_state(motion, START), t, NO_STEP
+    return y, left, NO_GUARD
+
+
+@kernel
+def look_ahead(y, tilted, work, motion):
+    """Where the regime would lead in a moment."""
+    put_state(motion, START, y)
+    motion.step = motion.ahead
+    start_step(motion.ahead, tilted, work, motion)
+    try_step(motion.ahead, tilted, work, motion)
+    return cancel(get_state(motion, END), tilted, work, motion)

@@ -1,0 +1,70 @@
+"""What a body does at the walls: told as events when it changes, and remembered from step to step."""
+
+from __future__ import annotations
+
+from physics.kernels.compiler import inlined, kernel
+from physics.kernels.events import log as ev
+from physics.kernels.stages import MEMORY_HEAD
+
+# State of a body at a wall (`motion.state`).
+AWAY, SLIPS, STICKS = range(3)
+
+
+@kernel
+def log_changes(work, motion, log, counts, t):
+    """Events of the walls at which the body now does something else."""
+    zero = (0.0, 0.0, 0.0)
+    for wall in range(work.walls.shape[0]):
+        state = AWAY
+        for j in range(motion.count):
+            if motion.slot[j] // work.features == wall:
+                if motion.holds[j]:
+                    state = STICKS
+                elif state == AWAY:
+                    state = SLIPS
+        old = motion.state[wall]
+        if state == old:
+            continue
+        motion.state[wall] = state
+        if old == AWAY:
+            ev.note_event(log, counts, work.i, t + motion.left_out, ev.TOUCH, wall, zero)
+        elif state == AWAY:
+            ev.note_event(log, counts, work.i, t, ev.RELEASE, wall, zero)
+        else:
+            ev.note_event(log, counts, work.i, t, ev.STICK if state == STICKS else ev.SLIP, wall, zero)
+
+
+@kernel
+def keep_contacts(memory, i, work, motion):
+    """What the body does at the walls, and its contact forces, for those who ask (`stages.store_warm_start`)."""
+    slots = work.slot.shape[0]
+    row = MEMORY_HEAD + slots
+    for k in range(int(memory[i, 1])):
+        for c in range(3):
+            memory[i, row + 3 * int(memory[i, MEMORY_HEAD + k]) + c] = 0.0
+    memory[i, 0], memory[i, 1] = 1.0, motion.count
+    for j in range(motion.count):
+        slot = motion.slot[j]
+        memory[i, MEMORY_HEAD + j] = slot
+        f = motion.force
+        for c in range(3):
+            k = 3 * c
+            wall = slot // work.features
+            memory[i, row + 3 * slot + c] = (
+                f[j, 0] * work.walls[wall, k] + f[j, 1] * work.walls[wall, k + 1] + f[j, 2] * work.walls[wall, k + 2]
+            )
+    total = 0.0
+    for wall in range(work.walls.shape[0] - 1, -1, -1):
+        total = 3.0 * total + motion.state[wall]
+    memory[i, 2] = 2.0 * total + motion.is_resting
+
+
+@inlined
+def recall_contacts(memory, i, work, motion):
+    """What the body did at the end of the last step: whether it rested, and base 3 a digit per wall."""
+    total = int(memory[i, 2])
+    motion.is_resting = total % 2
+    total //= 2
+    for wall in range(work.walls.shape[0]):
+        motion.state[wall] = total % 3
+        total //= 3
