@@ -202,10 +202,11 @@ def accuracy(
     with _told_errors():
         from rigid_env.measure import accuracy_plot, accuracy_report
         from rigid_env.measure.accuracy import QUICK, Ladder
+        from rigid_env.measure.plotting import require_matplotlib
         from rigid_env.measure.table import make_console
 
         if plot:
-            accuracy_plot.require_matplotlib()
+            require_matplotlib()
         console, ladder = make_console(), QUICK if quick else Ladder()
         files = [path.resolve() if path else None for path in (json, plot)]
         report = accuracy_report.measure_and_show(console, scene or (), peers, ladder, is_full, below)
@@ -235,6 +236,7 @@ def tosses(
     """Replay measured cube tosses: fit a quarter of them, report errors over the rest."""
     with _told_errors():
         from physics import accuracy as knobs
+        from rigid_env.measure.plotting import require_matplotlib
         from rigid_env.measure.table import make_console
         from rigid_env.tosses import data as files
         from rigid_env.tosses import plot as pictures
@@ -245,7 +247,7 @@ def tosses(
         console = make_console()
         knobs.resolve(accuracy)
         if plot is not None:
-            pictures.require_matplotlib()
+            require_matplotlib()
         names = None if fit is None else tuple(name.strip() for name in fit.split(","))
         effort = QUICK if quick else Effort()
         measurement = Measurement(files.load(data), accuracy, effort, seed, threads, names)

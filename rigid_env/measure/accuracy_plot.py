@@ -6,11 +6,10 @@ import math
 from collections.abc import Sequence
 from pathlib import Path
 
-from gymnasium.error import DependencyNotInstalled
-
 import physics
 from physics.frontier_contender import OURS
 from rigid_env.measure.accuracy import Found
+from rigid_env.measure.plotting import require_matplotlib
 
 COLUMNS = 3
 PANEL = (5.0, 3.9)  # [inch]
@@ -25,20 +24,6 @@ INK, PALE, GOLD = "#222222", "#8a8a8a", "#f0c000"
 
 # Decades below the smallest error above zero, or goal, at which an error of exactly zero is drawn.
 ZERO_GAP = 0.7
-
-
-def require_matplotlib() -> None:
-    """Say what to install before anything is measured.
-
-    Raises
-    ------
-    gymnasium.error.DependencyNotInstalled
-        matplotlib is missing.
-    """
-    try:
-        import matplotlib  # noqa: F401
-    except ImportError as error:
-        raise DependencyNotInstalled('matplotlib is not installed: pip install "rigid-env[agents]"') from error
 
 
 def write_plot(results: Sequence[Found], path: str | Path) -> None:

@@ -12,21 +12,6 @@ SIZE = (10.0, 7.0)  # [in]
 DPI = 120
 
 
-def require_matplotlib() -> None:
-    """Ask for what a plot needs before anything is measured.
-
-    Raises
-    ------
-    gymnasium.error.DependencyNotInstalled
-    """
-    try:
-        import matplotlib  # noqa: F401
-    except ImportError as error:
-        from gymnasium.error import DependencyNotInstalled
-
-        raise DependencyNotInstalled('a plot needs matplotlib: pip install "rigid-env[agents]"') from error
-
-
 def write_plot(path: Path, report: Report) -> None:
     """Above: error against time at each accuracy; below: error along the toss. Left position, right rotation."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg

@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import logging
 import math
+from importlib import import_module
 from itertools import product
 
 import numpy as np
@@ -49,8 +50,7 @@ class Drake:
     name = "drake"
 
     def __init__(self):
-        import pydrake.common  # noqa: F401 (it sets up the logging that is turned down below)
-
+        import_module("pydrake.common")  # it sets up the logging that is turned down below
         self.version = version("drake")
         # It warns at every half-space that deformable bodies would not collide with it.
         logging.getLogger("drake").setLevel(logging.ERROR)
