@@ -16,8 +16,9 @@ from contextlib import contextmanager
 from functools import cache
 from pathlib import Path
 
-import numba
 from numba.core import config
+
+from physics.kernels.linking import Kernel
 
 
 def _user_cache_root() -> Path:
@@ -64,8 +65,13 @@ def _numba_cache_in(folder: Path):
 
 
 def _compile(function, **options):
+    if config.DISABLE_JIT:
+        return function
+    options = {"nopython": True, "boundscheck": None, "error_model": "numpy", "nogil": True, "_nrt": False, **options}
+    compiled = Kernel(function, options=options)
     with _numba_cache_in(cache_dir()):
-        return numba.njit(cache=True, error_model="numpy", nogil=True, _nrt=False, **options)(function)
+        compiled.enable_caching()
+    return compiled
 
 
 def kernel(function):

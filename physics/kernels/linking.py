@@ -1,0 +1,135 @@
+"""How kernels are compiled together: each to LLVM IR once, all of them to machine code once.
+
+Left to itself Numba optimises a kernel and makes machine code of it as soon as it is typed, and then once more in
+every caller it is linked into, up to a dozen levels of a step. Here a kernel that is called from another one is a
+*part*: lowered to IR and no further. Only a *whole*, which Python calls, links all parts below it, is optimised and
+becomes machine code; it alone is kept on disk.
+
+`pipeline_class` is Numba's documented way to have a function compiled otherwise; what is not public of Numba here is
+`JITCodeLibrary`, the IR of one function with the libraries that it calls.
+"""
+
+from __future__ import annotations
+
+from numba import _dynfunc
+from numba.core.codegen import CodeLibrary, JITCodeLibrary
+from numba.core.compiler import CompilerBase, DefaultPassBuilder, Flags
+from numba.core.compiler_machinery import LoweringPass, register_pass
+from numba.core.registry import CPUDispatcher
+from numba.core.typed_passes import NativeLowering
+
+
+class _PartLibrary(JITCodeLibrary):
+    """IR of one part, neither linked nor optimised."""
+
+    def finalize(self):
+        self._finalized = True
+
+
+class _WholeLibrary(JITCodeLibrary):
+    """IR of a whole, linked with that of every part below it before it is optimised."""
+
+    def finalize(self):
+        self._linking_libraries = _callers_first(self)
+        super().finalize()
+
+
+def _callers_first(whole: _WholeLibrary) -> list[CodeLibrary]:
+    """Every library below `whole` once, after all that call it: the linker drops what nobody has called so far."""
+    callees_first: dict[CodeLibrary, None] = {}
+
+    def visit(library):
+        for callee in library._linking_libraries:
+            if callee not in callees_first:
+                if isinstance(callee, _PartLibrary):
+                    visit(callee)
+                callees_first[callee] = None
+
+    visit(whole)
+    return list(reversed(callees_first))
+
+
+class _Flags(Flags):
+    """Flags of a compilation that are equal when the same ones are set alike.
+
+    Numba looks them up for each subscript it types; comparing the two dozen that are not set took a fifth of all time.
+    """
+
+    def values(self):
+        return self._values
+
+
+class _WholeCompiler(CompilerBase):
+    """Numba's pipeline, into a library of ours."""
+
+    library_class: type[JITCodeLibrary] = _WholeLibrary
+
+    def __init__(self, typingctx, targetctx, library, args, return_type, flags, local_types):
+        super().__init__(typingctx, targetctx, library, args, return_type, _Flags(flags), local_types)
+        self.state.flags.no_cfunc_wrapper = True
+
+    def define_pipelines(self):
+        state = self.state
+        state.library = self.library_class(state.targetctx.codegen(), state.func_id.func_qualname)
+        state.library.enable_object_caching()
+        return [DefaultPassBuilder.define_nopython_pipeline(state)]
+
+
+@register_pass(mutates_CFG=False, analysis_only=True)
+class _KeepAsPart(LoweringPass):
+    """Make the IR known to Numba, which knows functions by their entry points, under one that must not be called."""
+
+    _name = "keep_as_part"
+
+    def __init__(self):
+        super().__init__()
+
+    def run_pass(self, state):
+        lowered = state["cr"]
+        about = lowered.fndesc
+        entry = _dynfunc.make_function(about.lookup_module(), about.qualname, "", 0, lowered.env, (state.library,))
+        state.targetctx.insert_user_function(entry, about, [state.library])
+        state["cr"] = lowered._replace(cfunc=entry)
+        return True
+
+
+class _PartCompiler(_WholeCompiler):
+    """Numba's pipeline up to the IR."""
+
+    library_class = _PartLibrary
+
+    def __init__(self, *arguments):
+        super().__init__(*arguments)
+        self.state.flags.no_cpython_wrapper = True
+        self.state.flags.no_compile = True
+
+    def define_pipelines(self):
+        (pipeline,) = super().define_pipelines()
+        pipeline.add_pass_after(_KeepAsPart, NativeLowering)
+        pipeline.finalize()
+        return [pipeline]
+
+
+class Kernel(CPUDispatcher):
+    """A function compiled for the types of its arguments: a whole for Python, a part for other kernels.
+
+    Parameters
+    ----------
+    function : Callable
+    local_types : dict, optional
+        Must be empty; Numba passes it.
+    options : dict
+        Numba's options, as of `numba.njit`.
+    """
+
+    def __init__(self, function, local_types=None, options=None):
+        super().__init__(function, local_types, options, pipeline_class=_WholeCompiler)
+        self._part = CPUDispatcher(function, local_types, options, pipeline_class=_PartCompiler)
+
+    def get_call_template(self, args, kws):
+        """How another kernel calls this one."""
+        return self._part.get_call_template(args, kws)
+
+    def get_overload(self, sig):
+        """What another kernel calls."""
+        return self._part.get_overload(sig)
