@@ -76,7 +76,7 @@ class EngineContender:
         """See `Contender`."""
         world = World(self.scene, dt=self.dt, accuracy=self.accuracy)
         start = world.snapshot()
-        return (lambda: world.restore(start)), Stepper(world, steps=steps, has_wrench=False)
+        return (lambda: world.restore(start)), Stepper(world, steps=steps)
 
 
 def setting_name(accuracy: str | Accuracy) -> str:

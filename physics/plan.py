@@ -131,8 +131,8 @@ def make_plan(scene: Scene, accuracy: Accuracy) -> Plan:
             Row(
                 "applied wrench",
                 True,
-                "given to step(wrench); None compiles it out",
-                "step(None) has its own kernel",
+                "given to step(wrench)",
+                "six numbers per body, zero without one",
             ),
             _contact_row(scene, contact, touching),
             _friction_row(friction, rubbing),

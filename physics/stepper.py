@@ -35,8 +35,6 @@ class Stepper:
         Steps that one call takes.
     dt : float, optional
         Time of one of them, instead of the world's [s].
-    has_wrench : bool
-        Whether there is one; without, its part of the kernel is left out.
 
     Raises
     ------
@@ -44,18 +42,18 @@ class Stepper:
         `steps` is not a positive integer, or `dt` not a positive number.
     """
 
-    def __init__(self, world: World, steps: int = 1, dt: float | None = None, has_wrench: bool = True):
+    def __init__(self, world: World, steps: int = 1, dt: float | None = None):
         self.world = world
         self.steps = checks.count(steps, "steps")
         self.dt = world.dt if dt is None else float(checks.positive(dt, (), "dt"))
-        self._wrench = world.no_wrench() if has_wrench else None
+        self._wrench = world.no_wrench()
         self._calls: list[Callable[[], None]] | None = None
 
     @property
-    def wrench(self) -> np.ndarray | None:
+    def wrench(self) -> np.ndarray:
         """(worlds, bodies, 6) float64 to write into: force [N] and torque about the centre of mass [N m].
 
-        World frame, held during a call; None without wrench. What is in it is not checked: a body whose new state
+        World frame, held during a call; zeros at first. What is in it is not checked: a body whose new state
         is not finite keeps the old one, and `World.report` says so.
         """
         return self._wrench
@@ -70,14 +68,14 @@ class Stepper:
         return {**vars(self), "_calls": None}  # machine code belongs to the process
 
 
-def kernel_calls(world: World, wrench: np.ndarray | None, steps: int, dt: float) -> list[Callable[[], None]]:
+def kernel_calls(world: World, wrench: np.ndarray, steps: int, dt: float) -> list[Callable[[], None]]:
     """One call of the step kernel for each slice of the batch, all arguments bound.
 
     Parameters
     ----------
     world : World
         Its arrays are bound, not the world itself: it may keep the calls, and is freed with its last user.
-    wrench : (worlds, bodies, 6) float64, contiguous and writable, or None
+    wrench : (worlds, bodies, 6) float64, contiguous and writable
         What it holds when a call is made counts.
     steps : int
     dt : float
@@ -88,14 +86,14 @@ def kernel_calls(world: World, wrench: np.ndarray | None, steps: int, dt: float)
     argument_lists = [
         (
             first, last, steps, substeps, dt / substeps, world.state, world.params, world.shapes,
-            world.gravity if plan.gravity else None, None if wrench is None else wrench.reshape(-1, 6),
+            world.gravity if plan.gravity else None, wrench.reshape(-1, 6),
             plan.contact, plan.friction, plan.smooth, plan.restitution, plan.gyroscopic, plan.tilted, plan.pivots,
             *((world.memory, world.report_table, scratch, motion, world.event_log, world.event_counts)
               if plan.events else (plan.scheme, world.memory, world.report_table, scratch)),
         )
         for (first, last), scratch, motion in zip(world.pool.slices, world.scratch, world.motions)
     ]  # fmt: skip
-    machine_code = _machine_code(kernel, (plan.key, wrench is None, len(world.walls)), argument_lists[0])
+    machine_code = _machine_code(kernel, (plan.key, len(world.walls)), argument_lists[0])
     return [partial(machine_code, *arguments) for arguments in argument_lists]
 
 

@@ -120,7 +120,7 @@ class World:
         self.motions = [
             make_motion(len(self.walls), self.plan.features) if self.plan.events else None for _ in self.pool.slices
         ]
-        self._wrench: np.ndarray | None = None
+        self._wrench = self.no_wrench()
         self._calls: list[Callable[[], None]] = []
         self._bound_for: tuple | None = None  # arguments of `step`: the next call with the same finds all bound
 
@@ -180,12 +180,9 @@ class World:
             wrench = checks.finite(wrench, (self.worlds, self.body_count, 6), "wrench")
         steps = checks.count(steps, "steps")
         dt = self.dt if dt is None else float(checks.positive(dt, (), "dt"))
-        key = (steps, dt, wrench is None)
-        if key != self._bound_for:
-            self._wrench = None if wrench is None else self.no_wrench()
-            self._calls, self._bound_for = kernel_calls(self, self._wrench, steps, dt), key
-        if wrench is not None:
-            self._wrench[...] = wrench
+        if (steps, dt) != self._bound_for:
+            self._calls, self._bound_for = kernel_calls(self, self._wrench, steps, dt), (steps, dt)
+        self._wrench[...] = 0.0 if wrench is None else wrench
         self.advance(self._calls, steps * dt)
         return self.report
 

@@ -61,7 +61,7 @@ def jobs() -> list[Job]:
             key = (physics.make_plan(scene, physics.PRESETS[accuracy]).key, len(scene.walls) > 0)
             if key not in seen:
                 seen.add(key)
-                found += _scene_jobs(name, accuracy)
+                found.append(_scene_job(name, accuracy))
     return found
 
 
@@ -76,17 +76,14 @@ def warm(todo: list[Job]) -> Iterator[Warmed]:
         yield Warmed(job.name, job.accuracy, seconds, compiled)
 
 
-def _scene_jobs(name: str, accuracy: str) -> list[Job]:
-    def step(has_wrench: bool) -> None:
+def _scene_job(name: str, accuracy: str) -> Job:
+    def step() -> None:
         world = physics.World(scenes.by_name(name), accuracy=accuracy)
-        world.step(np.zeros((1, world.body_count, 6)) if has_wrench else None)
+        world.step()
         physics.diagnose(world)
         world.contacts()
 
-    return [
-        Job(f"scene {name}, no wrench", accuracy, lambda: step(False)),
-        Job(f"scene {name}, with wrench", accuracy, lambda: step(True)),
-    ]
+    return Job(f"scene {name}", accuracy, step)
 
 
 def _environment_jobs(accuracy: str) -> list[Job]:

@@ -14,7 +14,7 @@ from physics.kernels.rotation import SERIES_SIZE
 def bind_body(world, i, shape, params, gravity, wrench, friction, restitution, tilted, work):
     """Write what the step needs of body i into `work`: parameters, and the loads that are held over the step.
 
-    gravity, wrench, friction, restitution and tilted are None where the scene does not have them: tilted, where the
+    gravity, friction, restitution and tilted are None where the scene does not have them: tilted, where the
     principal axes of every body are its body axes and its geometric centre is its centre of mass.
     """
     inv_mass, radius = params[i, at.INV_MASS], params[i, at.RADIUS]
@@ -24,12 +24,10 @@ def bind_body(world, i, shape, params, gravity, wrench, friction, restitution, t
         work.J[c] = params[i, at.INV_INERTIA + c]
         work.dims[c] = params[i, at.DIMENSIONS + c]
         work.free_acceleration[c] = 0.0
-        work.torque[c] = 0.0
         if gravity is not None:
             work.free_acceleration[c] = gravity[world, c]
-        if wrench is not None:
-            work.free_acceleration[c] += inv_mass * wrench[i, c]
-            work.torque[c] = wrench[i, 3 + c]
+        work.free_acceleration[c] += inv_mass * wrench[i, c]
+        work.torque[c] = wrench[i, 3 + c]
     for c in range(SERIES_SIZE):
         work.series[c] = params[i, at.SERIES + c]
     work.mu = work.restitution = 0.0
@@ -44,9 +42,8 @@ def bind_body(world, i, shape, params, gravity, wrench, friction, restitution, t
             work.center[c] = params[i, at.CENTER + c]
     a, t, J = work.free_acceleration, work.torque, work.J
     work.acceleration = math.sqrt(a[0] * a[0] + a[1] * a[1] + a[2] * a[2])
-    if wrench is not None:
-        turning = max(J[0], J[1], J[2]) * math.sqrt(t[0] * t[0] + t[1] * t[1] + t[2] * t[2])
-        work.acceleration += radius * turning
+    turning = max(J[0], J[1], J[2]) * math.sqrt(t[0] * t[0] + t[1] * t[1] + t[2] * t[2])
+    work.acceleration += radius * turning
 
 
 @inlined

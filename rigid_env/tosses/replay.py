@@ -190,7 +190,7 @@ def batches(lengths: np.ndarray) -> Iterator[np.ndarray]:
 
 def _watch(world: physics.World, frames: int) -> tuple[np.ndarray, float]:
     """Poses (frames, worlds, 7) of a world from now on, and the wall-clock time of its steps [s]."""
-    step = physics.Stepper(world, has_wrench=False)
+    step = physics.Stepper(world)
     table = np.empty((frames, world.worlds, 7))
     seconds = 0.0
     for k in range(frames):

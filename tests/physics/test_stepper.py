@@ -48,8 +48,8 @@ def test_a_stepper_takes_the_steps_of_step(loads, threads):
 
 def test_without_wrench_and_with_its_own_dt():
     plain, prepared = shoved(), shoved()
-    stepper = physics.Stepper(prepared, dt=0.002, has_wrench=False)
-    assert stepper.wrench is None
+    stepper = physics.Stepper(prepared, dt=0.002)
+    assert not stepper.wrench.any()
     for _ in range(50):
         plain.step(dt=0.002)
         stepper()

@@ -1,0 +1,71 @@
+"""Kernels compiled together: every part is lowered once, and only what Python calls is optimised.
+
+Each count is taken in a process of its own with a cache of its own, so that it is the count of a first use.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+PROGRAM = """
+import collections, json, sys
+from numba.core import event
+from numba.core.codegen import JITCodeLibrary
+import numpy as np
+import physics
+from physics import scenes
+
+optimised, lowered = collections.Counter(), collections.Counter()
+optimise = JITCodeLibrary._optimize_final_module
+
+def counted(self):
+    if self.name != "nrt":  # Numba's own run time
+        optimised[self.name] += 1
+    optimise(self)
+
+JITCodeLibrary._optimize_final_module = counted
+ends = []
+with event.install_recorder("numba:compile") as recorder:
+    for accuracy in sys.argv[1].split(","):
+        for wrench in (None, np.zeros((1, 1, 6))):
+            world = physics.World(scenes.drop(), dt=0.01, accuracy=accuracy)
+            world.step(wrench, steps=3)
+            ends.append(world.state.tolist())
+for _, what in recorder.buffer:
+    if what.is_start:
+        lowered[f"{what.data['dispatcher']} {what.data['args']}"] += 1
+print(json.dumps({"optimised": optimised, "lowered": lowered, "ends": ends}))
+"""
+
+
+def first_use(accuracies: str, cache: Path) -> dict:
+    """What is compiled for the three-wall box in a new process that keeps its kernels in `cache`."""
+    done = subprocess.run(
+        [sys.executable, "-c", PROGRAM, accuracies], env={**os.environ, "NUMBA_CACHE_DIR": str(cache)},
+        capture_output=True, text=True, check=True, timeout=900,
+    )  # fmt: skip
+    return json.loads(done.stdout)
+
+
+@pytest.mark.slow
+def test_a_contact_plan_is_optimised_once_and_compiled_once_for_all_processes(tmp_path):
+    """Two plans, each with and without a wrench, in one process; then again in another."""
+    first = first_use("fast,balanced", tmp_path)
+    assert first["optimised"].pop("step_worlds") == 2  # one machine code for each plan, not for each kind of wrench
+    # No kernel of a step is optimised for itself: what is left are those that Python calls, before the first step.
+    assert not {"substep", "solve_contacts", "hold_all", "cone_sweeps"} & set(first["optimised"])
+    # And none is typed twice: `balanced` adds its last resort to what `fast` had.
+    names = [key for key in first["lowered"] if "solve_contacts" in key or "hold_all" in key]
+    assert len(names) == 3  # two of the solver, whose arguments tell the plans apart, one of the direct solve
+    assert set(first["lowered"].values()) == {1}
+
+    second = first_use("fast,balanced", tmp_path)
+    assert second["optimised"] == {}
+    assert second["lowered"] == {}
+    assert second["ends"] == first["ends"]
