@@ -13,6 +13,44 @@ from pathlib import Path
 
 import pytest
 
+from physics.kernels.compiler import kernel
+
+
+@kernel
+def square(x):
+    return x * x
+
+
+@kernel
+def never_squares(x):
+    for _ in range(0):
+        x = square(x)
+    return x
+
+
+@kernel
+def squares(x):
+    return square(x)
+
+
+@kernel
+def both(x):
+    return never_squares(x) + squares(x)
+
+
+def test_a_callee_that_its_first_caller_lost_is_linked_for_the_next():
+    """The optimiser takes the call out of `never_squares`: linked right after it alone, `square` would be dropped."""
+    assert both(3.0) == 12.0
+
+
+def test_a_kernel_that_only_kernels_call_is_never_made_machine_code():
+    both(3)
+    assert both.signatures
+    assert not squares.signatures
+    assert squares(4) == 16  # until Python calls it
+    assert len(squares.signatures) == 1
+
+
 PROGRAM = """
 import collections, json, sys
 from numba.core import event
