@@ -95,7 +95,7 @@ def _adopt(world: World, chosen, rows, state, params, what, keep_memory=False) -
     world.state[rows] = state
     world.params[rows] = params
     if world.plan.contact and not keep_memory:
-        world.memory[rows] = 0.0
+        world.memory[chosen if world.plan.many else rows] = 0.0
 
 
 def _needs(field: str, is_on, effect: str) -> None:

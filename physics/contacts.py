@@ -2,31 +2,61 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from physics.kernels import layout as at
+from physics.kernels.many import arrays as many
 from physics.kernels.probe import contact_point
 from physics.kernels.stages import MEMORY_HEAD
 
+if TYPE_CHECKING:
+    from physics.world import World
 
-def contact_forces(rows, memory, state, params, shapes, walls, features) -> tuple[np.ndarray, np.ndarray]:
-    """Points (n, 3) [m] and forces (n, 3) [N] on the bodies `rows`, world frame; see `World.contacts`."""
-    points, forces = [], []
-    impulses_at = MEMORY_HEAD + (memory.shape[1] - MEMORY_HEAD) // 4
-    for i in rows:
-        length, count = memory[i, 0], int(memory[i, 1])
-        for slot in memory[i, MEMORY_HEAD : MEMORY_HEAD + count].astype(int):
-            wall, feature = divmod(int(slot), features)
-            point = np.empty(3)
-            contact_point(state, params, shapes, walls, i, wall, feature, point)
-            frame = walls[wall, at.NORMAL : at.NORMAL + 9].reshape(3, 3)
-            impulse = memory[i, impulses_at + 3 * slot : impulses_at + 3 * slot + 3]
-            points.append(point)
-            forces.append(frame.T @ impulse / length)
+
+def contact_ends(world: World, index: int) -> np.ndarray:
+    """Bodies and walls that touch, (n, 2) int64; see `World.contact_ends`."""
+    if not world.plan.contact:
+        return np.zeros((0, 2), dtype=np.int64)
+    if world.plan.many:
+        return _many_rows(world, index)[:, many.FIRST : many.SECOND + 1].astype(np.int64)
+    ends = [(b, -1 - slot // world.plan.features) for b in range(world.body_count) for slot in _slots(world, index, b)]
+    return np.array(ends, dtype=np.int64).reshape(-1, 2)
+
+
+def contact_forces(world: World, index: int) -> tuple[np.ndarray, np.ndarray]:
+    """Points (n, 3) [m] and forces (n, 3) [N], world frame; see `World.contacts`."""
+    if not world.plan.contact:
+        return np.zeros((0, 3)), np.zeros((0, 3))
+    if world.plan.many:
+        rows = _many_rows(world, index)
+        length = world.memory[index, many.STAGE_LENGTH] or 1.0  # no row where nothing touched yet
+        return rows[:, many.POINT : many.POINT + 3].copy(), rows[:, many.IMPULSE : many.IMPULSE + 3] / length
+    found = [_wall_contact(world, index, b, slot) for b in range(world.body_count) for slot in _slots(world, index, b)]
+    points, forces = zip(*found) if found else ((), ())
     return np.array(points).reshape(-1, 3), np.array(forces).reshape(-1, 3)
 
 
-def walls_touched(memory_row: np.ndarray, features: int) -> set[int]:
-    """Indices of the walls that a body rests against."""
-    slots = memory_row[MEMORY_HEAD : MEMORY_HEAD + int(memory_row[1])]
-    return {int(slot) // features for slot in slots}
+def _many_rows(world: World, index: int) -> np.ndarray:
+    """Remembered contacts (n, `MEMORY_SIZE`) of one world in which bodies touch each other."""
+    row = world.memory[index]
+    count = int(row[many.CONTACT_COUNT])
+    return row[many.MEMORY_HEAD : many.MEMORY_HEAD + many.MEMORY_SIZE * count].reshape(count, many.MEMORY_SIZE)
+
+
+def _slots(world: World, index: int, body: int) -> list[int]:
+    """Slots (wall * features + feature) at which a body rests."""
+    row = world.memory[index * world.body_count + body]
+    return row[MEMORY_HEAD : MEMORY_HEAD + int(row[1])].astype(int).tolist()
+
+
+def _wall_contact(world: World, index: int, body: int, slot: int) -> tuple[np.ndarray, np.ndarray]:
+    """Point [m] and force [N] at one slot, (3,) each."""
+    i = index * world.body_count + body
+    row, (wall, feature) = world.memory[i], divmod(slot, world.plan.features)
+    point = np.empty(3)
+    contact_point(world.state, world.params, world.shapes, world.walls, i, wall, feature, point)
+    impulses_at = MEMORY_HEAD + (world.memory.shape[1] - MEMORY_HEAD) // 4
+    impulse = row[impulses_at + 3 * slot : impulses_at + 3 * slot + 3]
+    return point, world.walls[wall, at.NORMAL : at.NORMAL + 9].reshape(3, 3).T @ impulse / row[0]

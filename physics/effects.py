@@ -30,18 +30,23 @@ class Gravity:
 
 @dataclass(frozen=True)
 class Contact:
-    """Bodies do not pass through walls.
+    """Bodies do not pass through walls, nor through each other.
 
     Parameters
     ----------
     restitution : float, optional
         Newton's coefficient e in [0, 1]: the normal velocity after an impact is -e times that before. None:
         impacts are plastic and the kernel holds no restitution.
+    between_bodies : bool, optional
+        False: bodies meet walls only, and pass through each other.
     """
 
     restitution: float | None = None
+    between_bodies: bool = True
 
     def __post_init__(self):
+        if not isinstance(self.between_bodies, bool):
+            raise ValueError(f"Contact.between_bodies is {self.between_bodies!r}; allowed are True and False")
         if self.restitution is not None:
             value = float(checks.share(self.restitution, (), "Contact.restitution"))
             object.__setattr__(self, "restitution", value)

@@ -33,7 +33,7 @@ class Plan:
     """The switches that the kernel is compiled for, and the reasons. None is off, True is on.
 
     `tilted` is on where the body frame of a body is not all there is to know of its mass: its principal axes are not
-    its body axes, or its geometric centre is not its centre of mass.
+    its body axes, or its geometric centre is not its centre of mass. `many` is on where bodies touch each other.
     """
 
     contact: bool | None
@@ -45,6 +45,7 @@ class Plan:
     pivots: bool | None
     scheme: int | None
     events: bool | None
+    many: bool | None
     features: int
     rows: tuple[Row, ...]
 
@@ -61,7 +62,7 @@ class Plan:
         """What distinguishes one compiled kernel from another."""
         return (
             self.contact, self.friction, self.restitution, self.gravity, self.gyroscopic, self.tilted,
-            self.pivots, self.scheme is None, self.events, self.features,
+            self.pivots, self.scheme is None, self.events, self.many, self.features,
         )  # fmt: skip
 
     def allows(self, moments: np.ndarray, R: np.ndarray) -> np.ndarray:
@@ -106,7 +107,8 @@ def is_tilted(R: np.ndarray) -> np.ndarray:
 def make_plan(scene: Scene, accuracy: Accuracy) -> Plan:
     """Decide what a scene needs at an accuracy."""
     contact, friction, gravity = (scene.effect(kind) for kind in (Contact, Friction, Gravity))
-    touching = contact is not None and bool(scene.walls)
+    many = contact is not None and contact.between_bodies and len(scene.bodies) > 1
+    touching = contact is not None and (bool(scene.walls) or many)
     axes = [principal_axes(body.inertia) for body in scene.bodies]
     isotropic = all(is_isotropic(moments) for moments, _ in axes)
     turned = not isotropic and any(is_tilted(R) for _, R in axes)
@@ -115,6 +117,8 @@ def make_plan(scene: Scene, accuracy: Accuracy) -> Plan:
     restitution = touching and contact.restitution is not None
     rubbing = touching and friction is not None
     scheme = SCHEMES[accuracy.scheme]
+    if many:
+        _check_many(scene, scheme)
     return Plan(
         contact=touching or None,
         friction=rubbing or None,
@@ -125,6 +129,7 @@ def make_plan(scene: Scene, accuracy: Accuracy) -> Plan:
         pivots=(touching and accuracy.solver == "sweeps+pivoting") or None,
         scheme=scheme if scheme > 0 else None,
         events=(scheme == EVENTS) or None,
+        many=many or None,
         features=VERTEX_COUNT if has_block else 1,
         rows=(
             _gravity_row(gravity),
@@ -134,7 +139,8 @@ def make_plan(scene: Scene, accuracy: Accuracy) -> Plan:
                 "given to step(wrench)",
                 "six numbers per body, zero without one",
             ),
-            _contact_row(scene, contact, touching),
+            _contact_row(scene, contact),
+            _between_row(scene, contact, many),
             _friction_row(friction, rubbing),
             _restitution_row(contact, touching),
             _gyroscopic_row(isotropic, turned),
@@ -150,8 +156,23 @@ def _gravity_row(gravity) -> Row:
     return Row("gravity", True, f"declared: {gravity.acceleration} m/s²", "acceleration per world")
 
 
-def _contact_row(scene, contact, touching) -> Row:
-    if touching:
+def _check_many(scene, scheme) -> None:
+    """Refuse what contact between bodies does not know yet."""
+    hint = "; give the scene Contact(between_bodies=False) if its bodies need not meet"
+    if scheme == EVENTS:
+        raise ValueError(
+            "accuracy has the scheme 'events', which knows contact with walls only; allowed for bodies that touch "
+            f"each other are 'fast', 'balanced' and every time-stepping scheme{hint}"
+        )
+    for b, body in enumerate(scene.bodies):
+        if body.kind not in ("block", "sphere"):
+            raise ValueError(
+                f"Scene.bodies[{b}] is an {body.kind}; allowed where bodies touch each other are blocks and spheres{hint}"
+            )
+
+
+def _contact_row(scene, contact) -> Row:
+    if contact is not None and scene.walls:
         return Row("wall contact", True, f"declared; {len(scene.walls)} wall(s)", "detection, impacts, solver")
     if contact is not None:
         return Row("wall contact", False, "declared, but the scene has no walls", "")
@@ -159,11 +180,21 @@ def _contact_row(scene, contact, touching) -> Row:
     return Row("wall contact", False, reason, "")
 
 
+def _between_row(scene, contact, many) -> Row:
+    if many:
+        return Row("body contact", True, f"declared; {len(scene.bodies)} bodies", "pairs, one problem for all bodies")
+    if contact is None:
+        return Row("body contact", False, "not declared", "")
+    if len(scene.bodies) == 1:
+        return Row("body contact", False, "declared, but the scene has one body", "")
+    return Row("body contact", False, "declared without contact between bodies", "")
+
+
 def _friction_row(friction, rubbing) -> Row:
     if rubbing:
         return Row("friction", True, f"declared: μ = {friction.coefficient}", "three rows per contact, circular cone")
     if friction is not None:
-        return Row("friction", False, "declared, but the scene has no walls", "")
+        return Row("friction", False, "declared, but nothing can touch", "")
     return Row("friction", False, "not declared", "")
 
 
@@ -171,7 +202,7 @@ def _restitution_row(contact, touching) -> Row:
     if contact is None or contact.restitution is None:
         return Row("restitution", False, "not declared: impacts are plastic", "")
     if not touching:
-        return Row("restitution", False, "declared, but the scene has no walls", "")
+        return Row("restitution", False, "declared, but nothing can touch", "")
     return Row("restitution", True, f"declared: e = {contact.restitution}", "Newton's law at impacts")
 
 

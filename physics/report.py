@@ -17,6 +17,7 @@ class Solver(IntEnum):
     DIRECT = 1
     SWEEPS = 2
     PIVOTING = 3
+    NEWTON = 4
 
 
 class Status(IntEnum):
@@ -26,6 +27,7 @@ class Status(IntEnum):
     UNRESOLVED = 1
     UNCONVERGED = 2
     FAULT = 3
+    LEFT_OUT = 4
 
     @property
     def message(self) -> str:
@@ -47,11 +49,16 @@ _MESSAGES = {
         "a body's new state was not finite and its old state was kept; look at the wrench and parameters of this "
         "world, and shorten the step"
     ),
+    Status.LEFT_OUT: (
+        "more bodies were near each other than there is room for, and contacts were left out; spread the bodies, or "
+        "give the scene fewer"
+    ),
 }
 
 
 # What the kernel below compares with: Numba takes plain integers from a module.
 _UNRESOLVED, _UNCONVERGED, _FAULT = int(Status.UNRESOLVED), int(Status.UNCONVERGED), int(Status.FAULT)
+_LEFT_OUT = int(Status.LEFT_OUT)
 
 
 @kernel
@@ -61,6 +68,8 @@ def gravest(table, status):
         status[world] = 0
         if table[world, at.FAULTS] > 0.0:
             status[world] = _FAULT
+        elif table[world, at.LEFT_OUT] > 0.0:
+            status[world] = _LEFT_OUT
         elif table[world, at.UNCONVERGED] > 0.0:
             status[world] = _UNCONVERGED
         elif table[world, at.UNRESOLVED] > 0.0:
@@ -76,9 +85,10 @@ class StepReport:
         Worst depth of a contact [m].
     residual : (worlds,) float64
         Worst natural-map residual accepted, relative to the free contact speed (see `physics.kernels.sweeps`).
-    iterations, solves, fallbacks, unconverged, impacts, unresolved, faults : (worlds,) int64
-        Sweeps; contact problems; of these, by the pivoting fallback; of these, above the tolerance; impacts that
-        cut a substep; substeps with more impacts than allowed; bodies whose new state was not finite.
+    iterations, solves, fallbacks, unconverged, impacts, unresolved, faults, left_out : (worlds,) int64
+        Sweeps and Newton steps; contact problems; of these, by the pivoting fallback; of these, above the tolerance; impacts that
+        cut a substep; substeps with more impacts than allowed; bodies whose new state was not finite; contacts and near
+        pairs of bodies for which there was no room.
     """
 
     __slots__ = ("_table",)
@@ -95,6 +105,7 @@ class StepReport:
     impacts = property(lambda self: self._table[:, at.SPLITS].astype(np.int64))
     unresolved = property(lambda self: self._table[:, at.UNRESOLVED].astype(np.int64))
     faults = property(lambda self: self._table[:, at.FAULTS].astype(np.int64))
+    left_out = property(lambda self: self._table[:, at.LEFT_OUT].astype(np.int64))
 
     @property
     def solver(self) -> np.ndarray:
@@ -110,8 +121,8 @@ class StepReport:
 
     @property
     def ok(self) -> bool:
-        """Whether every world's contact problems met their tolerance and every state stayed finite."""
-        return not self._table[:, at.UNCONVERGED : at.FAULTS + 1].any()
+        """Whether every world's contact problems met their tolerance, were whole, and every state stayed finite."""
+        return not (self._table[:, at.UNCONVERGED : at.FAULTS + 1].any() or self._table[:, at.LEFT_OUT].any())
 
     def messages(self) -> dict[int, str]:
         """World index -> message, for the worlds whose status is not OK."""

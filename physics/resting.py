@@ -62,12 +62,14 @@ def resting_contact(
     Raises
     ------
     ValueError
-        An index out of range, or a wrench of the wrong shape or not finite.
+        An index out of range, a wrench of the wrong shape or not finite, or a world whose bodies touch each other.
     """
     if not (0 <= index < world.worlds and 0 <= body < world.body_count):
         raise ValueError(
             f"index, body is {index}, {body}; allowed are below {world.worlds} worlds and {world.body_count} bodies"
         )
+    if world.plan.many:
+        raise ValueError("world has contact between bodies; allowed here are scenes with Contact(between_bodies=False)")
     load = np.zeros(6) if wrench is None else checks.finite(wrench, (6,), "wrench")
     i = index * world.body_count + body
     row, params = world.state[i], world.params[i]

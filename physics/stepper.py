@@ -13,9 +13,11 @@ import numpy as np
 
 from physics import checks
 from physics.kernels.events.hybrid import step_events
+from physics.kernels.many.step import step_many
 from physics.kernels.step import step_worlds
 
 if TYPE_CHECKING:
+    from physics.plan import Plan
     from physics.world import World
 
 # Seconds after which the first step of a plan says that it is compiling.
@@ -82,19 +84,44 @@ def kernel_calls(world: World, wrench: np.ndarray, steps: int, dt: float) -> lis
         [s].
     """
     plan, substeps = world.plan, world.accuracy.substeps
-    kernel = step_events if plan.events else step_worlds
+    kernel, own_arguments = _step_of(plan)
     argument_lists = [
         (
             first, last, steps, substeps, dt / substeps, world.state, world.params, world.shapes,
-            world.gravity if plan.gravity else None, wrench.reshape(-1, 6),
-            plan.contact, plan.friction, plan.smooth, plan.restitution, plan.gyroscopic, plan.tilted, plan.pivots,
-            *((world.memory, world.report_table, scratch, motion, world.event_log, world.event_counts)
-              if plan.events else (plan.scheme, world.memory, world.report_table, scratch)),
+            world.gravity if plan.gravity else None, wrench.reshape(-1, 6), *own_arguments(world, k),
         )
-        for (first, last), scratch, motion in zip(world.pool.slices, world.scratch, world.motions)
+        for k, (first, last) in enumerate(world.pool.slices)
     ]  # fmt: skip
     machine_code = _machine_code(kernel, (plan.key, len(world.walls)), argument_lists[0])
     return [partial(machine_code, *arguments) for arguments in argument_lists]
+
+
+def _step_of(plan: Plan) -> tuple[Callable, Callable[[World, int], tuple]]:
+    """The step kernel of a plan, and what gives the arguments that it alone has for one slice of the batch."""
+    if plan.many:
+        return step_many, _many_arguments
+    if plan.events:
+        return step_events, _event_arguments
+    return step_worlds, _world_arguments
+
+
+def _many_arguments(world: World, k: int) -> tuple:
+    plan = world.plan
+    switches = (plan.friction, plan.restitution, plan.gyroscopic, plan.tilted, plan.scheme)
+    return *switches, world.memory, world.report_table, world.scratch[k]
+
+
+def _wall_switches(plan: Plan) -> tuple:
+    return plan.contact, plan.friction, plan.smooth, plan.restitution, plan.gyroscopic, plan.tilted, plan.pivots
+
+
+def _event_arguments(world: World, k: int) -> tuple:
+    log = (world.event_log, world.event_counts)
+    return *_wall_switches(world.plan), world.memory, world.report_table, world.scratch[k], world.motions[k], *log
+
+
+def _world_arguments(world: World, k: int) -> tuple:
+    return *_wall_switches(world.plan), world.plan.scheme, world.memory, world.report_table, world.scratch[k]
 
 
 def _machine_code(kernel, key: tuple, arguments: tuple) -> Callable[..., None]:

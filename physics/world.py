@@ -10,11 +10,12 @@ from numpy.typing import ArrayLike
 
 from physics import changes, checks, parameters
 from physics.accuracy import Accuracy, resolve
-from physics.contacts import contact_forces, walls_touched
+from physics.contacts import contact_ends, contact_forces
 from physics.effects import Contact, Friction, Gravity
 from physics.kernels import layout as at
 from physics.kernels.events.log import EVENT_SIZE
 from physics.kernels.events.motion import make_motion
+from physics.kernels.many import arrays as many
 from physics.kernels.probe import angular_momenta
 from physics.kernels.stages import memory_size
 from physics.kernels.workspace import make_workspace
@@ -97,8 +98,7 @@ class World:
         self.params = np.zeros((rows, at.PARAM_SIZE))
         self.gravity = np.zeros((self.worlds, 3))
         self.walls = parameters.wall_table(self.scene.walls)
-        slots = max(len(self.scene.walls) * self.plan.features, 1)
-        self.memory = np.zeros((rows if self.plan.contact else 1, memory_size(slots)))
+        self.memory = self._make_memory()
         self.report_table = np.zeros((self.worlds, at.REPORT_SIZE))
         self.event_counts = np.zeros(rows if self.plan.events else 1, dtype=np.int64)
         self.make_event_room(0)
@@ -109,20 +109,30 @@ class World:
     def _prepare_threads(self) -> None:
         self.pool = SlicePool(self.threads, self.worlds)
         settings = self.accuracy
+        numbers = {
+            "tolerance": settings.tolerance, "sweeps": settings.iterations, "splits": settings.impacts,
+            "relative_slop": settings.slop, "rest_share": settings.rest_share,
+        }  # fmt: skip
         self.scratch = [
-            make_workspace(
-                self.walls, self.plan.features,
-                tolerance=settings.tolerance, sweeps=settings.iterations, splits=settings.impacts,
-                relative_slop=settings.slop, rest_share=settings.rest_share,
-            )
+            many.make_many(self.body_count, self.walls, **numbers)
+            if self.plan.many
+            else make_workspace(self.walls, self.plan.features, **numbers)
             for _ in self.pool.slices
-        ]  # fmt: skip
+        ]
         self.motions = [
             make_motion(len(self.walls), self.plan.features) if self.plan.events else None for _ in self.pool.slices
         ]
         self._wrench = self.no_wrench()
         self._calls: list[Callable[[], None]] = []
         self._bound_for: tuple | None = None  # arguments of `step`: the next call with the same finds all bound
+
+    def _make_memory(self) -> np.ndarray:
+        """What is remembered of contacts: a row per world where bodies touch each other, else a row per body."""
+        walls = len(self.scene.walls)
+        if self.plan.many:
+            return np.zeros((self.worlds, many.memory_size(self.body_count, walls)))
+        rows = self.worlds * self.body_count if self.plan.contact else 1
+        return np.zeros((rows, memory_size(max(walls * self.plan.features, 1))))
 
     def make_event_room(self, room: int) -> None:
         """Let a step of the event-driven scheme log up to `room` events per body; for `simulate`."""
@@ -287,21 +297,23 @@ class World:
         points : (n, 3) float64
             World frame [m].
         forces : (n, 3) float64
-            On the bodies, averaged over the last resting stage, world frame [N].
+            On the body, of two bodies on the first one, averaged over the last resting stage, world frame [N].
         """
-        if not 0 <= world < self.worlds:
-            raise ValueError(f"world is {world!r}; allowed are indices from 0 to {self.worlds - 1}")
-        rows = range(world * self.body_count, (world + 1) * self.body_count)
-        if not self.plan.contact:
-            return np.zeros((0, 3)), np.zeros((0, 3))
-        return contact_forces(rows, self.memory, self.state, self.params, self.shapes, self.walls, self.plan.features)
+        self._check_index(world)
+        return contact_forces(self, world)
+
+    def contact_ends(self, world: int = 0) -> np.ndarray:
+        """(n, 2) int64: body, and other body or -1 - k for wall k, of each of the `contacts` of one world."""
+        self._check_index(world)
+        return contact_ends(self, world)
 
     def touching(self, world: int = 0) -> set[tuple[int, int]]:
-        """(body, wall) of every resting contact of one world at its last step."""
-        if not self.plan.contact:
-            return set()
-        rows = range(world * self.body_count, (world + 1) * self.body_count)
-        return {(b, wall) for b, i in enumerate(rows) for wall in walls_touched(self.memory[i], self.plan.features)}
+        """(body, wall) of every resting contact with a wall of one world at its last step."""
+        return {(int(body), -1 - int(other)) for body, other in self.contact_ends(world) if other < 0}
+
+    def _check_index(self, world: int) -> None:
+        if not 0 <= world < self.worlds:
+            raise ValueError(f"world is {world!r}; allowed are indices from 0 to {self.worlds - 1}")
 
     def __getstate__(self):
         kept = dict(vars(self))

@@ -18,21 +18,22 @@ from physics.kernels.pyramid import normal_sizes, pyramid_sizes
 from physics.kernels.rotation import SERIES_SIZE
 
 
-def workspace_dtype(wall_count: int, features: int) -> np.dtype:
-    """Record type for bodies with `features` contact features each against `wall_count` walls."""
-    n = max(wall_count * features, 1)
-    float_size, int_size = np.maximum(pyramid_sizes(n), normal_sizes(n)).tolist()
+def setting_fields() -> list[tuple]:
+    """Fields of the numerical settings."""
     f, i = np.float64, np.int64
-    settings = [
+    return [
         ("tolerance", f),  # largest residual of a contact solve, relative to the largest free contact speed
         ("sweeps", i),  # sweeps per solve at most
         ("splits", i),  # cuts of a substep at impacts at most
-        ("relative_slop", f),  # gap within which a feature touches, in bounding radii
         ("rest_share", f),  # a rebound that would be over within this share of the substep is plastic
-        ("features", i),
-        ("walls", f, (max(wall_count, 1), WALL_SIZE)),  # columns of `layout`
     ]
-    body = [
+
+
+def body_fields() -> list[tuple]:
+    """Fields of what `body.bind_body` writes of one body."""
+    f, i = np.float64, np.int64
+    return [
+        ("relative_slop", f),  # gap within which a feature touches, in bounding radii; the one field that is read
         ("i", i),
         ("world", i),
         ("shape", i),
@@ -48,9 +49,22 @@ def workspace_dtype(wall_count: int, features: int) -> np.dtype:
         ("restitution", f),
         ("free_acceleration", f, (3,)),  # of the centre of mass without contact [m/s²]
         ("torque", f, (3,)),  # about the centre of mass [N m]
+        ("acceleration", f),  # bound for any point of the body without contact [m/s²]
+    ]
+
+
+def workspace_dtype(wall_count: int, features: int) -> np.dtype:
+    """Record type for bodies with `features` contact features each against `wall_count` walls."""
+    n = max(wall_count * features, 1)
+    float_size, int_size = np.maximum(pyramid_sizes(n), normal_sizes(n)).tolist()
+    f, i = np.float64, np.int64
+    scene = [
+        ("features", i),
+        ("walls", f, (max(wall_count, 1), WALL_SIZE)),  # columns of `layout`
+    ]
+    stage = [
         ("mode", i),  # which direct solve to try first, then which one did it (`slide.HOLD`, `SLIDE`, `PIVOT` + slot)
         ("is_last", i),  # 1 in the last stage a substep may have: take in all that would pass through a wall
-        ("acceleration", f),  # bound for any point of the body without contact [m/s²]
     ]
     contacts = [
         ("mask", i, (max(wall_count, 1),)),  # bit k: feature k of the body is in the contact set of this wall
@@ -83,7 +97,7 @@ def workspace_dtype(wall_count: int, features: int) -> np.dtype:
         ("fallback_float", f, (float_size,)),
         ("fallback_int", i, (int_size,)),
     ]
-    return np.dtype(settings + body + contacts)
+    return np.dtype(setting_fields() + scene + body_fields() + stage + contacts)
 
 
 def make_workspace(walls: np.ndarray, features: int, **settings: float) -> np.ndarray:

@@ -1,0 +1,132 @@
+"""Scratch memory of one thread for worlds whose bodies touch each other.
+
+A named tuple of arrays: its type does not depend on how many bodies, walls or contacts there are, so that one
+compiled kernel serves them all. It is filled anew for every world and every stage; nothing in it outlives a step.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from physics.kernels.layout import STATE_SIZE, VERTEX_COUNT
+from physics.kernels.workspace import body_fields, setting_fields
+
+# Contacts that two bodies may have at once: a rectangle clipped by another one has up to eight vertices.
+PAIR_CONTACTS = 8
+
+# Pairs near each other at once, per body: twelve spheres touch one of their size, and each pair counts for two.
+PAIRS_PER_BODY = 8
+
+# Blocks of the linear system of `envelope` per body: where more are needed Newton's method is left out.
+BLOCKS_PER_BODY = 64
+
+# `counts`: contacts, pairs, and contacts or pairs for which there was no room.
+CONTACTS, PAIRS, LEFT_OUT = range(3)
+
+# Row of `memory`, one per world: length of the last resting stage [s], its contact count, then `MEMORY_SIZE` numbers
+# for each contact: its name, first and second body (-1 - k: wall k), impulse and point in the world frame.
+STAGE_LENGTH, CONTACT_COUNT = range(2)
+MEMORY_HEAD = 2
+NAME, FIRST, SECOND, IMPULSE, POINT = 0, 1, 2, 3, 6
+MEMORY_SIZE = 9
+
+
+class Many(NamedTuple):
+    """Bodies, pairs and contacts of the world that a thread is at; shapes in `make_many`."""
+
+    bodies: np.ndarray  # records: parameters and loads, see `workspace.body_fields`
+    now: np.ndarray  # states, columns of `layout`
+    rotation: np.ndarray  # body frame to world, row by row
+    turning: np.ndarray  # inverse inertia in the world frame: 00, 01, 02, 11, 12, 22 [1/(kg m²)]
+    twist: np.ndarray  # velocity and angular velocity, world frame [m/s, rad/s]
+    place: np.ndarray  # geometric centre, world frame [m]
+    box: np.ndarray  # lower, then upper corner of the box along the world axes, motion of the stage included [m]
+    touched: np.ndarray  # 1: the body is in a contact of this stage
+    order: np.ndarray  # bodies by the lower end of their boxes
+    merged: np.ndarray  # scratch of sorting
+    walls: np.ndarray  # columns of `layout`
+    pairs: np.ndarray  # bodies whose boxes overlap
+    counts: np.ndarray
+    ends: np.ndarray  # first and second body of a contact; -1 - k: wall k
+    name: np.ndarray  # of a contact, the same while the same features touch
+    owner: np.ndarray  # body that the normal turns with, -1: none
+    normal: np.ndarray  # out of the second body, in the frame of its owner
+    anchor: np.ndarray  # points of first and second body, in their frames, from their centres of mass [m]
+    frame: np.ndarray  # normal, tangent 1, tangent 2, world frame
+    arm: np.ndarray  # points of first and second body from their centres of mass, world frame [m]
+    gap: np.ndarray  # [m], negative when penetrating
+    speed: np.ndarray  # normal velocity before the stage [m/s], negative when approaching
+    mu: np.ndarray  # Coulomb coefficient
+    bounce: np.ndarray  # coefficient of restitution
+    target: np.ndarray  # velocity aimed at: normal, tangents [m/s]
+    impulse: np.ndarray  # normal, tangents [N s]
+    block: np.ndarray  # the contact's own 3 x 3 of W = J M⁻¹ Jᵀ [1/kg]
+    table: np.ndarray  # places of names in the last stage's contacts: open addressing
+    mix: np.ndarray  # of a pair of blocks: axes of one in the other, and absolute values
+    polygon: np.ndarray  # of a pair of blocks: clipped face, two copies of (x, y, height)
+    edge: np.ndarray  # of a pair of blocks: edges into and out of each vertex of it
+    free: np.ndarray  # twists without contact impulses [m/s, rad/s]
+    degree: np.ndarray  # of `envelope`: bodies that touch a body, where its list begins, and the lists
+    offset: np.ndarray
+    neighbour: np.ndarray
+    rank: np.ndarray  # number of a body in the linear system, -1: none
+    first: np.ndarray  # first block of a row of the envelope, and where block 0 of the row would be
+    start: np.ndarray
+    lower: np.ndarray  # blocks of the linear system
+    upper: np.ndarray
+    spare: np.ndarray
+    aim: np.ndarray  # of `newton`: q - ρ u [N s]
+    trial: np.ndarray  # p(x) [N s]
+    saved: np.ndarray  # best impulses met [N s]
+    defect: np.ndarray  # x - M⁻¹ Jᵀ p(x) [m/s, rad/s]
+    before: np.ndarray  # twists before a Newton step
+    change: np.ndarray  # the step
+    row: np.ndarray  # Jacobian rows of both ends of a contact, and what the bodies answer
+    reply: np.ndarray
+    at_end: np.ndarray  # bodies of a contact
+    settings: np.ndarray  # one record: see `workspace.setting_fields`
+
+
+def contact_room(bodies: int, walls: int) -> int:
+    """Contacts that a world of so many bodies and walls has room for."""
+    return bodies * walls * VERTEX_COUNT + pair_room(bodies) * PAIR_CONTACTS
+
+
+def pair_room(bodies: int) -> int:
+    """Pairs near each other that a world of so many bodies has room for."""
+    return max(1, min(bodies * (bodies - 1) // 2, PAIRS_PER_BODY * bodies))
+
+
+def memory_size(bodies: int, walls: int) -> int:
+    """Columns of `memory` of one world."""
+    return MEMORY_HEAD + MEMORY_SIZE * contact_room(bodies, walls)
+
+
+def make_many(bodies: int, walls: np.ndarray, relative_slop: float, **settings: float) -> Many:
+    """Scratch for worlds of `bodies` bodies among `walls` ((walls, WALL_SIZE)), and the numerical settings given."""
+    f, i, nb = np.float64, np.int64, bodies
+    pairs, n = pair_room(bodies), contact_room(bodies, len(walls))
+    record = np.zeros(1, np.dtype(setting_fields()))
+    for name, value in settings.items():
+        record[name] = value
+    rows = np.zeros(nb, np.dtype(body_fields()))
+    rows["relative_slop"] = relative_slop
+    blocks = min(nb * (nb + 1) // 2, BLOCKS_PER_BODY * nb)
+    table = 1 << (2 * n - 1).bit_length()
+    return Many(
+        bodies=rows, now=np.zeros((nb, STATE_SIZE)), rotation=np.zeros((nb, 9)), turning=np.zeros((nb, 6)),
+        twist=np.zeros((nb, 6)), place=np.zeros((nb, 3)), box=np.zeros((nb, 6)), touched=np.zeros(nb, i),
+        order=np.arange(nb, dtype=i), merged=np.zeros(nb, i), walls=walls.copy(), pairs=np.zeros((pairs, 2), i),
+        counts=np.zeros(3, i), ends=np.zeros((n, 2), i), name=np.zeros(n, i), owner=np.zeros(n, i),
+        normal=np.zeros((n, 3), f), anchor=np.zeros((n, 6)), frame=np.zeros((n, 9)), arm=np.zeros((n, 6)),
+        gap=np.zeros(n), speed=np.zeros(n), mu=np.zeros(n), bounce=np.zeros(n), target=np.zeros((n, 3)),
+        impulse=np.zeros((n, 3)), block=np.zeros((n, 9)), table=np.full(table, -1, i), mix=np.zeros((4, 3, 3)),
+        polygon=np.zeros((2, 16, 3)), edge=np.zeros((2, 16, 2), i),
+        free=np.zeros((nb, 6)), degree=np.zeros(nb, i), offset=np.zeros(nb, i), neighbour=np.zeros(2 * pairs, i),
+        rank=np.zeros(nb, i), first=np.zeros(nb, i), start=np.zeros(nb, i), lower=np.zeros((blocks, 6, 6)),
+        upper=np.zeros((blocks, 6, 6)), spare=np.zeros((6, 12)), aim=np.zeros((n, 3)), trial=np.zeros((n, 3)),
+        saved=np.zeros((n, 3)), defect=np.zeros((nb, 6)), before=np.zeros((nb, 6)), change=np.zeros((nb, 6)),
+        row=np.zeros((2, 3, 6)), reply=np.zeros((2, 3, 6)), at_end=np.zeros(2, i), settings=record,
+    )  # fmt: skip

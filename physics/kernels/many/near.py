@@ -1,0 +1,121 @@
+"""Broad phase: which bodies may touch within a stage.
+
+Sweep and prune: the boxes around the bodies, the motion of the stage included, are sorted along the world axis on
+which the bodies are spread most; a body is then compared with those behind it until one begins beyond its end.
+
+Reference: D. Baraff, *Dynamic simulation of non-penetrating rigid bodies*, PhD thesis, Cornell, 1992, section 2.3.
+"""
+
+from __future__ import annotations
+
+from physics.kernels import geometry as geo
+from physics.kernels.compiler import inlined, kernel
+from physics.kernels.layout import SPHERE
+from physics.kernels.many.arrays import LEFT_OUT, PAIRS
+
+
+@inlined
+def reach(b, h, many):
+    """Bound for how far any point of body b moves in h without contact [m]."""
+    t, body = many.twist, many.bodies[b]
+    linear = abs(t[b, 0]) + abs(t[b, 1]) + abs(t[b, 2])
+    angular = abs(t[b, 3]) + abs(t[b, 4]) + abs(t[b, 5])
+    return h * (linear + body.radius * angular) + 0.5 * h * h * body.acceleration
+
+
+@inlined
+def half_extent(b, axis, many):
+    """Half the width of body b along a world axis [m]."""
+    R, d, shape = many.rotation, many.bodies[b].dims, many.bodies[b].shape
+    if shape == SPHERE:
+        return d[0]
+    e = (d[0] * R[b, 3 * axis], d[1] * R[b, 3 * axis + 1], d[2] * R[b, 3 * axis + 2])
+    return geo.support(shape, (d[0], d[1], d[2]), e)
+
+
+@kernel
+def bound_bodies(h, many):
+    """Write `many.box`: every body with all it may sweep in h, and the slop."""
+    for b in range(many.now.shape[0]):
+        margin = reach(b, h, many) + many.bodies[b].slop
+        for axis in range(3):
+            half = half_extent(b, axis, many) + margin
+            many.box[b, axis] = many.place[b, axis] - half
+            many.box[b, axis + 3] = many.place[b, axis] + half
+
+
+@inlined
+def widest_axis(many):
+    """World axis with the largest variance of the bodies' centres."""
+    best, axis, count = -1.0, 0, many.place.shape[0]
+    for k in range(3):
+        total = square = 0.0
+        for b in range(count):
+            total += many.place[b, k]
+        for b in range(count):
+            d = many.place[b, k] - total / count
+            square += d * d
+        if square > best:
+            best, axis = square, k
+    return axis
+
+
+@inlined
+def _merge(first, middle, last, axis, many):
+    """Merge two sorted runs of `many.order` that follow each other."""
+    order, merged, box = many.order, many.merged, many.box
+    i, j = first, middle
+    for k in range(first, last):
+        if j >= last or (i < middle and box[order[i], axis] <= box[order[j], axis]):
+            merged[k] = order[i]
+            i += 1
+        else:
+            merged[k] = order[j]
+            j += 1
+    for k in range(first, last):
+        order[k] = merged[k]
+
+
+@inlined
+def sort_bodies(axis, many):
+    """Write `many.order`: the bodies by the lower end of their boxes, ties by index (merge sort)."""
+    count = many.order.shape[0]
+    for b in range(count):
+        many.order[b] = b
+    width = 1
+    while width < count:
+        for first in range(0, count - width, 2 * width):
+            _merge(first, first + width, min(first + 2 * width, count), axis, many)
+        width *= 2
+
+
+@inlined
+def _overlap(a, b, many):
+    box = many.box
+    for k in range(3):
+        if box[a, k] > box[b, k + 3] or box[b, k] > box[a, k + 3]:
+            return False
+    return True
+
+
+@kernel
+def find_pairs(h, many):
+    """Write `many.pairs` and their number: all pairs (a < b) of bodies whose boxes overlap."""
+    bound_bodies(h, many)
+    axis = widest_axis(many)
+    sort_bodies(axis, many)
+    order, box, count = many.order, many.box, 0
+    for i in range(order.shape[0]):
+        a = order[i]
+        for j in range(i + 1, order.shape[0]):
+            b = order[j]
+            if box[b, axis] > box[a, axis + 3]:
+                break
+            if not _overlap(a, b, many):
+                continue
+            if count == many.pairs.shape[0]:
+                many.counts[LEFT_OUT] += 1
+                continue
+            many.pairs[count, 0], many.pairs[count, 1] = min(a, b), max(a, b)
+            count += 1
+    many.counts[PAIRS] = count

@@ -1,0 +1,188 @@
+"""Sweeps over all contacts of a world with the exact circular Coulomb cone.
+
+The problem and its natural-map residual are those of `physics.kernels.sweeps`; here u is not kept per contact through
+a matrix W, which would be full, but follows from the twists of the bodies,
+
+    u_k = E_k ((v + ω x r)_a - (v + ω x r)_b) - target_k,
+
+which an impulse of contact k changes by M⁻¹ Jᵀ. A visit of one contact answers it alone (`point.answer`), and sweeps
+go up and down the list in turns, so that loads travel through a stack in both senses.
+"""
+
+from __future__ import annotations
+
+import math
+
+from physics.kernels import quaternion as qt
+from physics.kernels.compiler import inlined, kernel
+from physics.kernels.many.contacts import local_velocity, matrix, plus, put, vector
+from physics.kernels.point import LOST, answer
+
+# Share of the residual asked for to which one contact is answered.
+ANSWER_SHARE = 0.1
+
+
+@inlined
+def turned(b, a, many):
+    """I⁻¹ a of body b, world frame."""
+    K = many.turning
+    return (
+        K[b, 0] * a[0] + K[b, 1] * a[1] + K[b, 2] * a[2],
+        K[b, 1] * a[0] + K[b, 3] * a[1] + K[b, 4] * a[2],
+        K[b, 2] * a[0] + K[b, 4] * a[1] + K[b, 5] * a[2],
+    )
+
+
+@inlined
+def push(k, local, many):
+    """Change the twists of both bodies by an impulse of contact k, given in its frame [N s]."""
+    p = qt.transposed_matvec(matrix(many.frame, k), local)
+    t = many.twist
+    a, b = many.ends[k, 0], many.ends[k, 1]
+    put(t, a, 0, plus(vector(t, a, 0), 1.0 / many.bodies[a].mass, p))
+    put(t, a, 3, plus(vector(t, a, 3), 1.0, turned(a, qt.cross(vector(many.arm, k, 0), p), many)))
+    if b >= 0:
+        put(t, b, 0, plus(vector(t, b, 0), -1.0 / many.bodies[b].mass, p))
+        put(t, b, 3, plus(vector(t, b, 3), -1.0, turned(b, qt.cross(vector(many.arm, k, 3), p), many)))
+
+
+@inlined
+def _add_block(k, b, first, W, many):
+    """W plus what one end adds to the contact's own block: 1/m + (r x e_i)·I⁻¹ (r x e_j); upper triangle."""
+    r, E = vector(many.arm, k, first), many.frame
+    g0, g1, g2 = qt.cross(r, vector(E, k, 0)), qt.cross(r, vector(E, k, 3)), qt.cross(r, vector(E, k, 6))
+    h0, h1, h2 = turned(b, g0, many), turned(b, g1, many), turned(b, g2, many)
+    m = 1.0 / many.bodies[b].mass
+    return (
+        W[0] + (m + qt.dot(g0, h0)), W[1] + qt.dot(g0, h1), W[2] + qt.dot(g0, h2),
+        W[3] + (m + qt.dot(g1, h1)), W[4] + qt.dot(g1, h2), W[5] + (m + qt.dot(g2, h2)),
+    )  # fmt: skip
+
+
+@kernel
+def assemble(n, many):
+    """Write every contact's own block; the twists hold the warm start's impulses afterwards. Returns the scale.
+
+    The scale is the largest velocity that a contact would have without any impulse [m/s].
+    """
+    scale = 0.0
+    for k in range(n):
+        u, t = local_velocity(k, many), vector(many.target, k, 0)
+        scale = max(scale, max(abs(u[0] - t[0]), max(abs(u[1] - t[1]), abs(u[2] - t[2]))))
+        W = _add_block(k, many.ends[k, 0], 0, (0.0, 0.0, 0.0, 0.0, 0.0, 0.0), many)
+        if many.ends[k, 1] >= 0:
+            W = _add_block(k, many.ends[k, 1], 3, W, many)
+        B = many.block
+        B[k, 0], B[k, 1], B[k, 2] = W[0], W[1], W[2]
+        B[k, 3], B[k, 4], B[k, 5] = W[1], W[3], W[4]
+        B[k, 6], B[k, 7], B[k, 8] = W[2], W[4], W[5]
+    for k in range(n):
+        push(k, vector(many.impulse, k, 0), many)
+    return scale
+
+
+@inlined
+def _velocity(k, many):
+    """u of contact k less its target."""
+    u, t = local_velocity(k, many), vector(many.target, k, 0)
+    return (u[0] - t[0], u[1] - t[1], u[2] - t[2])
+
+
+@inlined
+def _tangential_step(W):
+    """1/λ_max of the tangential part of a block."""
+    half = 0.5 * (W[4] - W[8])
+    return 1.0 / (0.5 * (W[4] + W[8]) + math.sqrt(half * half + W[5] * W[5]))
+
+
+@inlined
+def _on_disk(x, y, limit):
+    """(x, y), shortened to `limit` if it is longer."""
+    size = math.sqrt(x * x + y * y)
+    if size > limit:
+        return x * (limit / size), y * (limit / size)
+    return x, y
+
+
+@inlined
+def natural_map(p, u, W, mu):
+    """Natural-map residual of one contact [m/s]; see `physics.kernels.sweeps`."""
+    step = _tangential_step(W)
+    x, y = _on_disk(p[1] - step * u[1], p[2] - step * u[2], mu * max(p[0], 0.0))
+    dx, dy = p[1] - x, p[2] - y
+    return max(abs(min(u[0], p[0] * W[0])), math.sqrt(dx * dx + dy * dy) / step)
+
+
+@inlined
+def _normal_map(p, u, W):
+    return abs(min(u, p * W))
+
+
+@kernel
+def residual_of(n, friction, many):
+    """Largest natural-map residual of the impulses as they are [m/s]."""
+    worst = 0.0
+    for k in range(n):
+        u, p = _velocity(k, many), vector(many.impulse, k, 0)
+        if friction is None:
+            miss = _normal_map(p[0], u[0], many.block[k, 0])
+        else:
+            miss = natural_map(p, u, matrix(many.block, k), many.mu[k])
+        if not miss <= worst:  # also what is not a number
+            worst = miss
+    return worst
+
+
+@inlined
+def _answer_one(k, p, u, W, mu, goal):
+    """Impulse of contact k that answers its own velocity, all others held."""
+    own = qt.matvec(W, p)
+    b = (u[0] - own[0], u[1] - own[1], u[2] - own[2])
+    x = y = 0.0
+    if p[0] > 0.0:
+        x, y = p[1] / p[0], p[2] / p[0]
+        size = math.sqrt(x * x + y * y)
+        if size > 0.0:
+            x, y = mu * x / size, mu * y / size
+    what, q, _ = answer(W, b, mu, W[4] + W[8], goal, x, y, True)
+    if what != LOST:
+        return q
+    # The normal impulse first, then the tangential step, back on the disk.
+    normal = max(0.0, p[0] - u[0] / W[0])
+    d, step = normal - p[0], _tangential_step(W)
+    x, y = _on_disk(p[1] - step * (u[1] + W[3] * d), p[2] - step * (u[2] + W[6] * d), mu * normal)
+    return normal, x, y
+
+
+@inlined
+def _visit(k, goal, friction, many):
+    """Answer contact k; its residual before [m/s]."""
+    u, p, W = _velocity(k, many), vector(many.impulse, k, 0), matrix(many.block, k)
+    if friction is None:
+        miss = _normal_map(p[0], u[0], W[0])
+        q = (max(0.0, p[0] - u[0] / W[0]), 0.0, 0.0)
+    else:
+        miss = natural_map(p, u, W, many.mu[k])
+        q = _answer_one(k, p, u, W, many.mu[k], goal)
+    put(many.impulse, k, 0, q)
+    push(k, (q[0] - p[0], q[1] - p[1], q[2] - p[2]), many)
+    return miss
+
+
+@kernel
+def sweep_contacts(n, friction, goal, limit, many):
+    """Improve the impulses by sweeps until the residual is at most `goal` [m/s], or `limit` sweeps are done.
+
+    `many.impulse` and `many.twist`, which belong to each other, hold the start and receive the result. Returns the
+    number of sweeps and the residual, measured on what is returned.
+    """
+    residual, sweeps = residual_of(n, friction, many), 0
+    while not residual <= goal and sweeps < limit:
+        worst = 0.0
+        for i in range(n):
+            k = i if sweeps % 2 == 0 else n - 1 - i
+            worst = max(worst, _visit(k, ANSWER_SHARE * goal, friction, many))
+        sweeps += 1
+        if worst <= goal or sweeps == limit:
+            residual = residual_of(n, friction, many)
+    return sweeps, residual

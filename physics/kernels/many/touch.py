@@ -1,0 +1,112 @@
+"""Narrow phase: the contacts of every body with every wall, and of every pair that is near."""
+
+from __future__ import annotations
+
+import math
+
+from physics.kernels import geometry as geo
+from physics.kernels import quaternion as qt
+from physics.kernels.compiler import inlined, kernel
+from physics.kernels.layout import BLOCK, NORMAL, OFFSET, SPHERE, VERTEX_COUNT
+from physics.kernels.many.arrays import CONTACTS, PAIRS
+from physics.kernels.many.block_block import touch_blocks
+from physics.kernels.many.contacts import matrix, minus, pair_slop, plus, record, vector
+from physics.kernels.many.near import find_pairs, reach
+
+
+@kernel
+def touch_wall(b, wall, margin, h, many):
+    """Add the contacts of body b with a wall that are no more than `margin` [m] from it."""
+    body, R = many.bodies[b], matrix(many.rotation, b)
+    n, x = vector(many.walls, wall, NORMAL), vector(many.place, b, 0)
+    d = qt.dot(n, x) - many.walls[wall, OFFSET]
+    if d > body.radius + margin:
+        return
+    dims = (body.dims[0], body.dims[1], body.dims[2])
+    e = geo.scaled_normal(body.shape, dims, R, n)
+    if d - geo.support(body.shape, dims, e) > margin:
+        return
+    if body.shape == BLOCK:
+        for vertex in range(VERTEX_COUNT):
+            gap = d + geo.vertex_height(e, vertex)
+            if gap <= margin:
+                point = plus(x, 1.0, geo.vertex_arm(dims, R, vertex))
+                record(b, -1 - wall, vertex, -1, n, point, point, gap, h, many)
+    else:
+        gap = d - geo.support(body.shape, dims, e)
+        point = plus(x, 1.0, geo.support_arm(body.shape, dims, R, n, e))
+        record(b, -1 - wall, 0, -1, n, point, point, gap, h, many)
+
+
+@inlined
+def touch_spheres(a, b, margin, h, many):
+    """Add the contact of two spheres."""
+    x, y = vector(many.place, a, 0), vector(many.place, b, 0)
+    ra, rb = many.bodies[a].dims[0], many.bodies[b].dims[0]
+    n = minus(x, y)
+    size = math.sqrt(qt.dot(n, n))
+    if size - ra - rb > margin:
+        return
+    n = (n[0] / size, n[1] / size, n[2] / size) if size > 0.0 else (0.0, 1.0, 0.0)
+    record(a, b, 0, -1, n, plus(x, -ra, n), plus(y, rb, n), size - ra - rb, h, many)
+
+
+@inlined
+def nearest_in_block(p, d):
+    """(nearest point on the surface of a block, outward normal, distance) for a point p, all in its frame."""
+    q = (min(max(p[0], -d[0]), d[0]), min(max(p[1], -d[1]), d[1]), min(max(p[2], -d[2]), d[2]))
+    w = minus(p, q)
+    size = math.sqrt(qt.dot(w, w))
+    if size > 0.0:
+        return q, (w[0] / size, w[1] / size, w[2] / size), size
+    depth = (abs(p[0]) - d[0], abs(p[1]) - d[1], abs(p[2]) - d[2])  # inside: out by the nearest face
+    if depth[0] >= depth[1] and depth[0] >= depth[2]:
+        s = math.copysign(1.0, p[0])
+        return (s * d[0], p[1], p[2]), (s, 0.0, 0.0), depth[0]
+    if depth[1] >= depth[2]:
+        s = math.copysign(1.0, p[1])
+        return (p[0], s * d[1], p[2]), (0.0, s, 0.0), depth[1]
+    s = math.copysign(1.0, p[2])
+    return (p[0], p[1], s * d[2]), (0.0, 0.0, s), depth[2]
+
+
+@inlined
+def touch_sphere_block(a, b, margin, h, many):
+    """Add the contact of a sphere and a block, whichever of the two is a."""
+    ball, brick = a, b
+    if many.bodies[a].shape == BLOCK:
+        ball, brick = b, a
+    R, dims, r = matrix(many.rotation, brick), many.bodies[brick].dims, many.bodies[ball].dims[0]
+    x, y = vector(many.place, ball, 0), vector(many.place, brick, 0)
+    q, n, distance = nearest_in_block(qt.transposed_matvec(R, minus(x, y)), (dims[0], dims[1], dims[2]))
+    if distance - r > margin:
+        return
+    n, on_block = qt.matvec(R, n), plus(y, 1.0, qt.matvec(R, q))
+    on_ball = plus(x, -r, n)
+    if ball == a:
+        record(a, b, 0, -1, n, on_ball, on_block, distance - r, h, many)
+    else:
+        record(a, b, 0, -1, (-n[0], -n[1], -n[2]), on_block, on_ball, distance - r, h, many)
+
+
+@kernel
+def find_contacts(h, many):
+    """Write the contact set of the bodies where they are, for a stage of length h."""
+    many.counts[CONTACTS] = 0
+    bodies = many.bodies
+    for b in range(bodies.shape[0]):
+        many.touched[b] = 0
+        margin = reach(b, h, many) + bodies[b].slop
+        for wall in range(many.walls.shape[0]):
+            touch_wall(b, wall, margin, h, many)
+    find_pairs(h, many)
+    for k in range(many.counts[PAIRS]):
+        a, b = many.pairs[k, 0], many.pairs[k, 1]
+        margin = reach(a, h, many) + reach(b, h, many) + pair_slop(a, b, many)
+        first, second = bodies[a].shape, bodies[b].shape
+        if first == BLOCK and second == BLOCK:
+            touch_blocks(a, b, margin, h, many)
+        elif first == SPHERE and second == SPHERE:
+            touch_spheres(a, b, margin, h, many)
+        else:
+            touch_sphere_block(a, b, margin, h, many)
