@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import gc
 import sys
 import threading
 from collections.abc import Callable
+from contextlib import contextmanager
 from functools import partial
 from typing import TYPE_CHECKING
 
@@ -130,7 +132,7 @@ def _machine_code(kernel, key: tuple, arguments: tuple) -> Callable[..., None]:
     Calling it directly leaves out Numba's dispatcher, which would find out the types of all arguments each time.
     """
     if key not in _COMPILED:
-        with _compile_notice():
+        with _compiling():
             _COMPILED[key] = kernel.compile(tuple(map(numba.typeof, arguments)))
     return _COMPILED[key]
 
@@ -138,14 +140,21 @@ def _machine_code(kernel, key: tuple, arguments: tuple) -> Callable[..., None]:
 _COMPILED: dict[tuple, Callable[..., None]] = {}
 
 
-class _compile_notice:
-    """Says on standard error that a kernel is being compiled, if it takes long enough to notice."""
+@contextmanager
+def _compiling():
+    """Say on standard error that a kernel is being compiled, if it takes long enough to notice.
 
-    def __enter__(self):
-        text = "rigid-env: compiling the kernel of this scene, once (it is kept for later runs) ..."
-        self._timer = threading.Timer(COMPILE_NOTICE, lambda: print(text, file=sys.stderr, flush=True))
-        self._timer.daemon = True
-        self._timer.start()
-
-    def __exit__(self, *_):
-        self._timer.cancel()
+    The garbage collector waits: it would walk through Numba's growing tables again and again, a tenth of the time.
+    """
+    text = "rigid-env: compiling the kernel of this scene, once (it is kept for later runs) ..."
+    timer = threading.Timer(COMPILE_NOTICE, lambda: print(text, file=sys.stderr, flush=True))
+    timer.daemon = True
+    was_collecting = gc.isenabled()
+    timer.start()
+    gc.disable()
+    try:
+        yield
+    finally:
+        timer.cancel()
+        if was_collecting:
+            gc.enable()
