@@ -10,7 +10,7 @@ from physics.kernels.compiler import inlined, kernel
 from physics.kernels.rotation import SERIES_SIZE
 
 
-@kernel
+@inlined
 def bind_body(world, i, shape, params, gravity, wrench, friction, restitution, tilted, work):
     """Write what the step needs of body i into `work`: parameters, and the loads that are held over the step.
 
