@@ -86,9 +86,9 @@ class StepReport:
     residual : (worlds,) float64
         Worst natural-map residual accepted, relative to the free contact speed (see `physics.kernels.sweeps`).
     iterations, solves, fallbacks, unconverged, impacts, unresolved, faults, left_out : (worlds,) int64
-        Sweeps and Newton steps; contact problems; of these, by the pivoting fallback; of these, above the tolerance; impacts that
-        cut a substep; substeps with more impacts than allowed; bodies whose new state was not finite; contacts and near
-        pairs of bodies for which there was no room.
+        Sweeps and Newton steps; contact problems; of these, by the pivoting fallback; of these, above the tolerance;
+        impacts that cut a substep; substeps with more impacts than allowed; bodies whose new state was not finite;
+        contacts and near pairs of bodies for which there was no room.
     """
 
     __slots__ = ("_table",)

@@ -87,8 +87,8 @@ def test_the_normal_of_two_blocks_separates_them_most(seed, distance):
     others /= np.linalg.norm(others, axis=1)[:, None]
     if best < 0:  # of separated blocks the greatest distance may be along none of the axes: that of two vertices
         assert max(separation(other, many) for other in others) <= best + 3e-6
-    # No contact is deeper than the blocks overlap along the normal (the lowest vertex may be beside the face and clipped
-    # away); blocks that overlap have one that is, blocks that are apart none.
+    # No contact is deeper than the blocks overlap along the normal (the lowest vertex may be beside the face and
+    # clipped away); blocks that overlap have one that is, blocks that are apart none.
     assert many.gap[:n].min() >= best - 1e-6 - 1e-12
     assert (many.gap[:n].min() <= 1e-6) == (best <= 0)
     # Points lie on the blocks they are points of (up to the slop by which the clipping is generous), and their
@@ -115,7 +115,7 @@ def test_names_of_equal_stacked_blocks_do_not_change_with_rounding():
 # --- linear system ---------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("count, links", [(1, 0), (2, 1), (9, 8), (12, 20), (30, 60)])
+@pytest.mark.parametrize(("count", "links"), [(1, 0), (2, 1), (9, 8), (12, 20), (30, 60)])
 def test_the_block_system_is_solved(count, links):
     rng = np.random.default_rng(links)
     many = make_many(count, np.zeros((0, at.WALL_SIZE)), **SETTINGS)

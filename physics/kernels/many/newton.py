@@ -50,6 +50,10 @@ SWEEP_WORK = 250.0
 CONTACT_WORK = 1500.0
 BLOCK_WORK = 2.0 * SIZE**3
 
+# Work that Newton's method may take, in that of the sweeps allowed; fewer steps than these lead nowhere.
+WORTH = 4.0
+LEAST_STEPS = 6
+
 
 @inlined
 def _law(y, mu):
@@ -220,12 +224,12 @@ def _copy(n, source, target):
 
 @inlined
 def _steps_worth(n, count, sweeps, many):
-    """Newton steps that take no more work than so many sweeps: in a wide pile the linear system is dear, or too dear."""
+    """Newton steps that take `WORTH` times the work of so many sweeps: in a wide pile each of them is dear."""
     work = n * CONTACT_WORK
     for i in range(count):
         width = i - many.first[i] + 1
         work += BLOCK_WORK * width * width
-    return int(sweeps * n * SWEEP_WORK / work)
+    return int(WORTH * sweeps * n * SWEEP_WORK / work)
 
 
 @inlined
@@ -249,7 +253,7 @@ def newton_contacts(n, friction, residual, goal, limit, many):
     residual, goal : float
         Of the start, and asked for [m/s].
     limit : int
-        Newton steps at most, and sweeps whose work all of them together may take.
+        Sweeps that the problem is worth: Newton's method may take `WORTH` times their work.
 
     Returns
     -------
@@ -260,8 +264,8 @@ def newton_contacts(n, friction, residual, goal, limit, many):
     count = lay_out(n, many)
     if count == 0:
         return 0, residual
-    limit = min(limit, _steps_worth(n, count, limit, many))
-    if limit == 0:
+    limit = _steps_worth(n, count, limit, many)
+    if limit < LEAST_STEPS:
         return 0, residual
     mass, failures = _heaviest(count, many), 0
     _copy(n, many.impulse, many.saved)

@@ -1,0 +1,319 @@
+"""Bodies that touch each other: closed forms, balance of forces, conservation laws, determinism."""
+
+from __future__ import annotations
+
+import itertools
+import pickle
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import physics
+from physics.report import Solver, Status
+
+G = 9.81
+FLOOR = [physics.HalfSpace((0, 1, 0))]
+CUBE = (1.0, 1.0, 1.0)
+
+
+def tower(count, top=1.0, offset=0.0, seed=0):
+    """Unit cubes of 1 kg on each other, the top one of another mass; `offset` is the largest shift of each [m]."""
+    rng = np.random.default_rng(seed)
+    masses = [1.0] * (count - 1) + [top]
+    shifts = rng.uniform(-offset, offset, (count, 2))
+    bodies = [physics.Block(CUBE, m, pos=(x, 0.5 + k, z)) for k, (m, (x, z)) in enumerate(zip(masses, shifts))]
+    return physics.Scene(bodies, FLOOR, [physics.Gravity((0, -G, 0)), physics.Contact(), physics.Friction(0.5)])
+
+
+def balls(positions, velocities, masses, restitution, walls=()):
+    bodies = [physics.Sphere(0.5, m, pos=p, linvel=v) for p, v, m in zip(positions, velocities, masses)]
+    return physics.World(physics.Scene(bodies, walls, [physics.Contact(restitution)]), dt=0.01)
+
+
+def momenta(world):
+    """Linear momentum, and angular momentum about the origin, of all bodies of world 0."""
+    about = physics.diagnose(world)
+    p, spin = about.momentum[0], about.angular_momentum[0]
+    return p.sum(axis=0), (np.cross(world.pos[0], p) + spin).sum(axis=0)
+
+
+# --- impacts: closed forms -------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("restitution", [0.0, 0.5, 1.0])
+@pytest.mark.parametrize("mass", [1.0, 3.0, 1e6])
+def test_head_on_impact(restitution, mass):
+    world = balls([(-2, 0, 0), (0.3, 0, 0)], [(4, 0, 0), (-1, 0, 0)], [1.0, mass], restitution)
+    world.step(steps=60)
+    # Momentum, and Newton's law: the relative velocity 5 m/s becomes -5 e. One contact is answered in closed form.
+    common = (4 - mass) / (1 + mass)
+    expected = [common - 5 * restitution * mass / (1 + mass), common + 5 * restitution / (1 + mass)]
+    np.testing.assert_allclose(world.linvel[0, :, 0], expected, rtol=1e-12, atol=1e-12)
+    assert not world.linvel[0, :, 1:].any()
+
+
+def test_oblique_impact_turns_along_the_line_of_centres():
+    world = balls([(-3, 0, 0), (0, 0.6, 0)], [(5, 0, 0), (0, 0, 0)], [1.0, 1.0], 1.0)
+    world.step(steps=100)
+    # At the impact the centres are 1 m apart: the line between them rises by asin(0.6). Equal masses: the struck ball
+    # takes all of the velocity along it. The place of the impact is off by up to the slop, 5e-7 m, so the line by
+    # 5e-7/0.8 rad.
+    along = 5 * 0.8
+    np.testing.assert_allclose(world.linvel[0, 1], (along * 0.8, along * 0.6, 0), atol=5 * 1e-6)
+    np.testing.assert_allclose(world.linvel[0].sum(axis=0), (5, 0, 0), atol=1e-12)
+    assert physics.diagnose(world).energy.sum() == pytest.approx(12.5, rel=1e-12)
+
+
+def test_touching_balls_are_struck_at_once_by_the_law_of_newton():
+    world = balls([(-3, 0, 0), (0, 0, 0), (1, 0, 0)], [(3, 0, 0), (0, 0, 0), (0, 0, 0)], [1.0] * 3, 1.0)
+    world.step(steps=100)
+    # One problem for both contacts: u1' = -u1, u2' = -u2 = 0 (they did not approach). Solved to 1e-6 of 3 m/s.
+    np.testing.assert_allclose(world.linvel[0, :, 0], (-1, 2, 2), atol=3e-6)
+
+
+def test_balls_a_little_apart_are_struck_one_after_the_other():
+    world = balls([(-3, 0, 0), (0, 0, 0), (1.001, 0, 0)], [(3, 0, 0), (0, 0, 0), (0, 0, 0)], [1.0] * 3, 1.0)
+    world.step(steps=100)
+    np.testing.assert_allclose(world.linvel[0, :, 0], (0, 0, 3), atol=3e-6)
+
+
+@pytest.mark.parametrize(("ratio", "collisions"), [(1, 3), (100, 31)])
+def test_collisions_of_two_masses_and_a_wall(ratio, collisions):
+    """Galperin, *Playing pool with π*, 2003: floor(π √ratio) of them, counting those with the wall."""
+    world = balls([(2, 0, 0), (6, 0, 0)], [(0, 0, 0), (-1, 0, 0)], [1.0, ratio], 1.0, [physics.HalfSpace((1, 0, 0))])
+    seen, before = 0, world.linvel[0, :, 0].copy()
+    for _ in range(12_000):
+        world.step(dt=1e-3)  # shorter than the time between any two collisions
+        seen += not np.array_equal(world.linvel[0, :, 0], before)
+        before = world.linvel[0, :, 0].copy()
+    assert seen == collisions
+    assert physics.diagnose(world).energy.sum() == pytest.approx(0.5 * ratio, rel=1e-10)
+
+
+@pytest.mark.parametrize("thin", [True, False])
+def test_a_bullet_does_not_pass_through_a_plate(thin):
+    plate = physics.Block((0.01 if thin else 1.0, 4, 4), 1000.0)
+    ball = physics.Sphere(0.01, 0.01, pos=(-7.3, 0.1, 0.2), linvel=(500, 0, 0))
+    world = physics.World(physics.Scene([plate, ball], (), [physics.Contact(1.0)]), dt=0.01)
+    world.step(steps=3)  # it flies 5 m in a step
+    assert world.pos[0, 1, 0] < -7  # back again
+    assert world.linvel[0, 1, 0] == pytest.approx(-500, rel=1e-3)
+
+
+# --- impacts: laws ---------------------------------------------------------------------------------------------
+
+
+@settings(max_examples=25, deadline=None)
+@given(seed=st.integers(0, 2**32 - 1), restitution=st.sampled_from([0.0, 0.6]))
+def test_free_bodies_keep_their_momenta_and_gain_no_energy(seed, restitution):
+    rng = np.random.default_rng(seed)
+    bodies = []
+    for place in itertools.product((-1.5, 1.5), repeat=3):
+        q = rng.normal(size=4)
+        bodies.append(
+            physics.Block(
+                rng.uniform(0.5, 1.4, 3), 10 ** rng.uniform(-1, 1), pos=place, quat=q / np.linalg.norm(q),
+                linvel=-1.5 * np.array(place) + rng.normal(size=3), angvel=rng.normal(size=3),
+            )
+        )  # fmt: skip
+    scene = physics.Scene(bodies, (), [physics.Contact(restitution), physics.Friction(0.0 if restitution else 0.5)])
+    world = physics.World(scene, dt=0.01)
+    linear, angular = momenta(world)
+    energy = physics.diagnose(world).energy.sum()
+    size = np.abs(physics.diagnose(world).momentum).sum()
+    depth = 0.0
+    for _ in range(150):
+        world.step()
+        now = physics.diagnose(world).energy.sum()
+        # A solve with residual r of the speeds u is off by r u² per unit mass. And what overlaps by d is pushed apart,
+        # which turns a body of radius >= 0.4 m by d/0.4 under its angular momentum: of its energy of turning as much,
+        # times the ratio of its moments of inertia less one (< 8 for edges of 0.5 to 1.4 m).
+        turn = 8 * max(depth, world.report.penetration[0]) / 0.4
+        assert now <= energy * (1 + 10 * max(1e-6, world.report.residual[0]) + turn)
+        energy, depth = now, world.report.penetration[0]
+    after, spin = momenta(world)
+    # Impulses act in pairs on points that differ by the gap of a contact at most: linear momentum to rounding of 150
+    # steps, angular momentum to the gaps at which speculative contacts push (a tenth of a radius, `FAST_SHARE`).
+    np.testing.assert_allclose(after, linear, atol=150 * 1e-16 * size)
+    assert np.abs(spin - angular).max() <= 0.1 * size
+
+
+# --- rest ------------------------------------------------------------------------------------------------------
+
+
+def balance(world, index=0):
+    """Largest defect of force [N] and moment [N m] of any body at rest, and of the friction cones [N]."""
+    points, forces = world.contacts(index)
+    force = np.array([b.mass for b in world.scene.bodies])[:, None] * np.array([0, -G, 0])
+    moment = np.zeros_like(force)
+    for (a, b), point, f in zip(world.contact_ends(index), points, forces):
+        for body, sign in ((a, 1.0), (b, -1.0)):
+            if body >= 0:
+                force[body] += sign * f
+                moment[body] += np.cross(point - world.pos[index, body], sign * f)
+    push = np.where(world.contact_ends(index)[:, 1] < 0, forces[:, 1], -forces[:, 1])  # of two, on the lower one
+    slack = np.hypot(forces[:, 0], forces[:, 2]) - 0.5 * push
+    return np.abs(force).max(), np.abs(moment).max(), max(slack.max(), -push.min())
+
+
+@pytest.mark.parametrize("count", [2, 10, 20])
+@pytest.mark.parametrize("top", [1.0, 1e3, 1e6])
+@pytest.mark.parametrize("accuracy", ["fast", "balanced"])
+def test_a_tower_stands_and_every_body_is_in_balance(count, top, accuracy):
+    world = physics.World(tower(count, top), dt=0.01, accuracy=accuracy)
+    start = world.pos.copy()
+    for _ in range(100):
+        report = world.step()
+        assert report.status[0] == Status.OK
+    # It rests where it was put, to the slop of every interface.
+    slop = world.accuracy.slop * np.sqrt(0.75)
+    assert np.abs(world.pos - start).max() <= 2 * count * slop
+    # A residual r of the free speed g h leaves each body an acceleration of about r g: of its mass and all above it.
+    force, moment, cone = balance(world)
+    tolerance = 10 * world.accuracy.tolerance * G * (count + top)
+    assert force <= tolerance
+    assert moment <= tolerance
+    assert cone <= tolerance
+
+
+def test_a_tower_with_offsets_stands():
+    world = physics.World(tower(15, offset=0.01), dt=0.01)
+    start = world.pos.copy()
+    world.step(steps=500)
+    assert world.report.ok
+    assert np.abs(world.pos - start).max() <= 1e-5
+    assert balance(world)[0] <= 1e-4 * G
+
+
+def test_a_heavy_block_does_not_sink_into_a_light_one():
+    world = physics.World(tower(2, 1e6), dt=0.01)
+    for _ in range(200):
+        assert world.step().penetration[0] <= 1e-3  # 0.1 % of the edge; the slop is 9e-7 m
+    gap = world.pos[0, 1, 1] - world.pos[0, 0, 1] - 1
+    assert abs(gap) <= 2e-6
+
+
+def test_a_block_slides_on_another_until_friction_stops_it():
+    bodies = [
+        physics.Block((20, 1, 4), 50.0, pos=(0, 0.5, 0)),
+        physics.Block((1, 1, 1), 1.0, pos=(-4, 1.5, 0), linvel=(3.0, 0, 0)),
+    ]
+    effects = [physics.Gravity((0, -G, 0)), physics.Contact(), physics.Friction(0.3)]
+    world = physics.World(physics.Scene(bodies, FLOOR, effects), dt=0.005)
+    world.step(steps=400)
+    # The plank's own friction, 51 times that of the block, holds it. v²/(2 μ g); the step in which it stops is
+    # off by at most v_last h <= μ g h².
+    distance = world.pos[0, 1, 0] + 4
+    assert distance == pytest.approx(9 / (2 * 0.3 * G), abs=0.3 * G * 0.005**2 + 1e-6)
+    assert abs(world.pos[0, 0, 0]) <= 1e-9
+    assert not np.any(np.abs(world.linvel) > 1e-6)
+
+
+def test_an_overhang_topples_beyond_its_limit_only():
+    # Two blocks, the upper shifted by s: it stands while its centre is above the lower one, s < 1/2.
+    for shift, stands in ((0.49, True), (0.51, False)):
+        bodies = [physics.Block(CUBE, 1.0, pos=(0, 0.5, 0)), physics.Block(CUBE, 1.0, pos=(shift, 1.5, 0))]
+        effects = [physics.Gravity((0, -G, 0)), physics.Contact(), physics.Friction(0.5)]
+        world = physics.World(physics.Scene(bodies, FLOOR, effects), dt=0.005)
+        world.step(steps=400)
+        assert (world.pos[0, 1, 1] > 1.499) == stands
+
+
+def test_overlapping_bodies_come_apart_without_speed():
+    bodies = [physics.Block(CUBE, 1.0), physics.Block(CUBE, 1.0, pos=(0.75, 0.1, 0))]
+    world = physics.World(physics.Scene(bodies, (), [physics.Contact(), physics.Friction(0.5)]), dt=0.01)
+    world.step(steps=60)
+    assert world.step().penetration[0] <= 1e-6  # 0.25 m halved 60 times, down to the slop of 9e-7 m
+    assert not world.linvel.any()
+
+
+# --- independence ----------------------------------------------------------------------------------------------
+
+
+def heap(worlds, threads=1):
+    """A few blocks and balls falling on each other, each world a little different."""
+    bodies = [
+        physics.Block((1, 0.8, 1.2), 2.0, pos=(0, 0.5, 0)),
+        physics.Sphere(0.4, 1.0, pos=(0.2, 1.5, 0.1)),
+        physics.Block((0.7, 0.7, 0.7), 1.0, pos=(-0.2, 2.4, 0), quat=(np.cos(0.3), 0, 0, np.sin(0.3))),
+    ]
+    effects = [physics.Gravity((0, -G, 0)), physics.Contact(0.2), physics.Friction(0.5)]
+    world = physics.World(physics.Scene(bodies, FLOOR, effects), worlds=worlds, dt=0.01, threads=threads)
+    velocity = np.zeros((worlds, 3, 3))
+    velocity[:, 2, 0] = 0.1 * np.arange(worlds)
+    world.set_state(linvel=velocity)
+    return world
+
+
+def test_same_bits_for_threads_and_batch_sizes():
+    one, two = heap(7), heap(7, threads=2)
+    one.step(steps=120)
+    two.step(steps=120)
+    np.testing.assert_array_equal(one.state, two.state)
+    few = heap(3)
+    few.step(steps=120)
+    np.testing.assert_array_equal(few.state, one.state[: 3 * 3])
+
+
+def test_a_snapshot_in_contact_continues_bit_identically():
+    world = heap(2)
+    world.step(steps=60)
+    assert len(world.contact_ends(0))
+    snapshot = pickle.loads(pickle.dumps(world.snapshot()))
+    world.step(steps=60)
+    expected = world.state.copy()
+    other = heap(2)
+    other.restore(snapshot)
+    other.step(steps=60)
+    np.testing.assert_array_equal(other.state, expected)
+
+
+def test_without_contact_between_them_bodies_are_alone():
+    bodies = [physics.Block((1, 1, 1), 1.0, pos=(0, 2, 0), angvel=(1, 2, 3)), physics.Sphere(0.5, 1.0, pos=(0.2, 2, 0))]
+    effects = [physics.Gravity((0, -G, 0)), physics.Contact(0.3, between_bodies=False), physics.Friction(0.5)]
+    both = physics.World(physics.Scene(bodies, FLOOR, effects), dt=0.01)
+    both.step(steps=200)
+    for b, body in enumerate(bodies):
+        alone = physics.World(physics.Scene([body], FLOOR, effects), dt=0.01)
+        alone.step(steps=200)
+        # A sphere alone needs no gyroscopic torque, and its kernel leaves it out: equal to rounding there.
+        np.testing.assert_allclose(both.pos[0, b], alone.pos[0, 0], atol=1e-12)
+    assert not both.plan.many
+    assert "declared without contact between bodies" in both.plan.explain()
+
+
+# --- saying so -------------------------------------------------------------------------------------------------
+
+
+def test_what_is_not_known_yet_is_refused():
+    two = [physics.Block(CUBE, 1.0, pos=(0, 2, 0)), physics.Block(CUBE, 1.0, pos=(3, 2, 0))]
+    with pytest.raises(ValueError, match="scheme 'events'.*between_bodies=False"):
+        physics.World(physics.Scene(two, (), [physics.Contact()]), accuracy="precise")
+    with pytest.raises(ValueError, match=r"bodies\[1\] is an ellipsoid"):
+        physics.World(physics.Scene([two[0], physics.Ellipsoid((1, 2, 3), 1.0)], (), [physics.Contact()]))
+    with pytest.raises(ValueError, match="between_bodies is 1"):
+        physics.Contact(between_bodies=1)
+    world = physics.World(physics.Scene(two, FLOOR, [physics.Gravity(), physics.Contact(between_bodies=False)]),
+                          accuracy="precise")  # fmt: skip
+    assert not world.plan.many
+
+
+def test_contacts_without_room_are_reported():
+    # Forty balls at nearly one place: 780 near pairs, and room for 8 per body.
+    bodies = [physics.Sphere(1.0, 1.0, pos=(0.01 * k, 0, 0)) for k in range(40)]
+    world = physics.World(physics.Scene(bodies, (), [physics.Contact(1.0)]), dt=0.01)
+    report = world.step()
+    assert report.status[0] == Status.LEFT_OUT
+    assert not report.ok
+    assert report.left_out[0] >= 780 - 8 * 40
+    assert "contacts were left out" in report.messages()[0]
+
+
+def test_the_report_names_the_method():
+    world = physics.World(tower(10), dt=0.01)
+    assert world.step().solver[0] == Solver.NEWTON  # cold start of a tower: sweeps crawl
+    two = balls([(-0.6, 0, 0), (0.6, 0, 0)], [(10, 0, 0), (0, 0, 0)], [1, 1], 1.0)
+    two.step(steps=5)
+    assert two.step().solver[0] == Solver.NONE
