@@ -14,7 +14,7 @@ import typer
 from rich.progress import Progress
 
 from benchmarks import machine, memory, start
-from rigid_env.measure import environments, mujoco_scene, rows, workloads
+from rigid_env.measure import bodies, environments, mujoco_scene, rows, workloads
 from rigid_env.measure.table import make_console, make_table
 from rigid_env.measure.timing import Row
 
@@ -22,7 +22,7 @@ REPEATS = 7
 QUICK_REPEATS = 2
 MEMORY_STEPS = 1_000_000
 QUICK_MEMORY_STEPS = 2000
-PARTS = ("engine", "environments", "memory", "start")
+PARTS = ("engine", "bodies", "environments", "memory", "start")
 
 
 def measure(parts: tuple[str, ...], is_quick: bool, progress: Progress) -> list[Row]:
@@ -44,6 +44,10 @@ def measure(parts: tuple[str, ...], is_quick: bool, progress: Progress) -> list[
         tick = _bar(progress, "engine", rows.run_count(repeats, has_peer))
         sizes = workloads.QUICK if is_quick else workloads.FULL
         for some in rows.engine_rows(sizes, repeats, has_peer, tick):
+            found += some
+    if "bodies" in parts:
+        tick = _bar(progress, "bodies", bodies.run_count(repeats, has_peer))
+        for some in bodies.body_rows(is_quick, repeats, has_peer, tick):
             found += some
     if "environments" in parts:
         tick = _bar(progress, "environments", environments.run_count(repeats, has_peer))

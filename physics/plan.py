@@ -167,7 +167,8 @@ def _check_many(scene, scheme) -> None:
     for b, body in enumerate(scene.bodies):
         if body.kind not in ("block", "sphere"):
             raise ValueError(
-                f"Scene.bodies[{b}] is an {body.kind}; allowed where bodies touch each other are blocks and spheres{hint}"
+                f"Scene.bodies[{b}] is an {body.kind}; allowed where bodies touch each other are blocks and "
+                f"spheres{hint}"
             )
 
 

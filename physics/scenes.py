@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+
 from physics.effects import Contact, Friction, Gravity
 from physics.scene import HalfSpace, Scene, corner, three_walls
 from physics.shapes import Block, Sphere
@@ -113,10 +115,32 @@ def closed_box(half: float = 5.0) -> Scene:
     return Scene([body], [HalfSpace(normal, -half) for normal in normals], [Contact(1.0)])
 
 
+def tower(count: int = 10, top: float = 1.0) -> Scene:
+    """Unit cubes of 1 kg standing on each other on an endless floor, the top one of mass `top` [kg]."""
+    masses = [1.0] * (count - 1) + [top]
+    bodies = [Block((1.0, 1.0, 1.0), mass, pos=(0.0, k + 0.5, 0.0)) for k, mass in enumerate(masses)]
+    return Scene(bodies, [HalfSpace((0, 1, 0))], [Gravity((0, -GRAVITY, 0)), Contact(), Friction(0.5)])
+
+
+def heap(count: int = 100, seed: int = 1) -> Scene:
+    """Unit cubes of 1 kg, turned at random, falling in layers of 5 x 5 into a shaft of 9 m x 9 m."""
+    rng = np.random.default_rng(seed)
+    pitch = 1.75  # of the grid they start from; the diagonal of a cube is 1.732 m
+    bodies = []
+    for k in range(count):
+        q = rng.standard_normal(4)
+        place = (pitch * (k % 5 - 2), pitch * (k // 25) + 1.0, pitch * (k // 5 % 5 - 2))
+        bodies.append(Block((1.0, 1.0, 1.0), 1.0, pos=place, quat=q / np.linalg.norm(q)))
+    normals = [(0, 1, 0), (1, 0, 0), (-1, 0, 0), (0, 0, 1), (0, 0, -1)]
+    walls = [HalfSpace(normal, 0.0 if normal[1] else -4.5) for normal in normals]
+    return Scene(bodies, walls, [Gravity((0, -GRAVITY, 0)), Contact(), Friction(0.5)])
+
+
 SCENES = {
     function.__name__: function
     for function in (
         drop, flight, tumble, rest, shove, corner_drop, slide, bounce, rolling_sphere, vertex_drop, closed_box,
+        tower, heap,
     )
 }  # fmt: skip
 SCENES["incline"] = lambda: incline(math.radians(20.0), 1.01 * math.tan(math.radians(20.0)))

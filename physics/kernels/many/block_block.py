@@ -22,6 +22,11 @@ from physics.kernels.many.contacts import minus, pair_slop, plus, record, vector
 # does not. Rounding of the nine products is 1e-16; its square root would still be noise.
 PARALLEL = 1.0e-12
 
+# Cosine of the angle between the product of two edges and a face normal above which the faces count as lying flat on
+# each other (11 degrees). One point would let them tip to and fro; the clipped face holds them, at the distance that
+# the edges say.
+FLAT = 0.98
+
 # Names: face (of a: 0 to 2, of b: 3 to 5) * 64 + edge in * 8 + edge out, then edges.
 FACE_NAMES = 64
 FIRST_EDGE_NAME = 6 * FACE_NAMES
@@ -169,8 +174,31 @@ def _lowest(x, y, many):
 
 
 @inlined
-def _touch_face(a, b, face, h, many):
-    """Contacts between a face of one block and the clipped face of the other."""
+def lowest(source, count, polygon):
+    """Least height of a vertex of the polygon in copy `source`."""
+    low = math.inf
+    for k in range(count):
+        low = min(low, polygon[source, k, 2])
+    return low
+
+
+@inlined
+def is_along_face(edges, face, many):
+    """Whether the product of two edges is nearly a face normal: the faces then lie flat on each other."""
+    C, i, j = many.mix[AXES], edges // 3, edges % 3
+    square = 1.0 - C[i, j] * C[i, j]
+    # Component of (edge i of a) x (edge j of b) along the face normal: on axis k of a it is the determinant
+    # e_k · (e_i x b_j), one entry of C; on axis k of b likewise, with the transpose.
+    if face < 3:
+        c = 0.0 if face == i else C[3 - face - i, j]
+    else:
+        c = 0.0 if face - 3 == j else C[i, 6 - face - j]
+    return c * c >= FLAT * FLAT * square
+
+
+@inlined
+def _touch_face(a, b, face, least, h, many):
+    """Contacts between a face of one block and the clipped face of the other, lifted until none has a gap < least."""
     r, o, axis = a, b, face
     way = many.mix[FROM_A, 0, face % 3]
     if face >= 3:
@@ -190,10 +218,11 @@ def _touch_face(a, b, face, h, many):
     if count == 0:
         _incident(r, o, axis, sign, many)
         source, count = _lowest(d[(axis + 1) % 3], d[(axis + 2) % 3], many), 1
+    lift = max(0.0, least + d[axis] - lowest(source, count, p))
     for k in range(count):
-        gap = p[source, k, 2] - d[axis]
+        gap = p[source, k, 2] - d[axis] + lift
         point = plus(plus(vector(many.place, r, 0), p[source, k, 0], x), p[source, k, 1], y)
-        on_face, on_other = plus(point, d[axis], out), plus(point, p[source, k, 2], out)
+        on_face, on_other = plus(point, d[axis], out), plus(point, d[axis] + gap, out)
         name = face * FACE_NAMES + 8 * many.edge[source, k, 0] + many.edge[source, k, 1]
         if face < 3:
             record(a, b, name, r, (-out[0], -out[1], -out[2]), on_face, on_other, gap, h, many)
@@ -242,7 +271,9 @@ def touch_blocks(a, b, margin, h, many):
     further, edges = best_edges(a, b, many)
     if further > margin:
         return
-    if further > apart + pair_slop(a, b, many):
-        _touch_edges(a, b, edges, further, h, many)
+    if further <= apart + pair_slop(a, b, many):
+        _touch_face(a, b, face, apart, h, many)
+    elif is_along_face(edges, face, many):
+        _touch_face(a, b, face, further, h, many)
     else:
-        _touch_face(a, b, face, h, many)
+        _touch_edges(a, b, edges, further, h, many)

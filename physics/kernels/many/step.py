@@ -103,20 +103,24 @@ def is_meeting(k, h, many):
 
 @inlined
 def aim_impact(n, h, is_last, many):
-    """Targets of an impact, and whether there is one; see `physics.kernels.contact.aim_impact`."""
+    """Targets of an impact, and whether there is one; see `physics.kernels.contact.aim_impact`.
+
+    What approaches no faster than loads make it within `rest_share` of the step is left to the resting stage.
+    """
     is_impact = False
     for k in range(n):
         slop = pair_slop(many.ends[k, 0], many.ends[k, 1], many)
         gap, speed, goal = many.gap[k], many.speed[k], 0.0
+        slow = max(slop / h, many.settings[0].rest_share * _acceleration(k, many) * h)
         if gap > slop:
             goal = -gap / h
             if not is_last and is_meeting(k, h, many):
                 goal = -FAR
-            elif goal - speed > slop / h:
+            elif goal - speed > slow:
                 is_impact = True
         elif bounces(k, h, many):
             goal, is_impact = -many.bounce[k] * speed, True
-        elif -speed > slop / h:
+        elif -speed > slow:
             is_impact = True
         put(many.target, k, 0, (goal, 0.0, 0.0))
         put(many.impulse, k, 0, (0.0, 0.0, 0.0))

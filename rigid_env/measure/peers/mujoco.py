@@ -124,7 +124,9 @@ def model_xml(
         f'size="0 0 1" contype="1" conaffinity="2" {surface}/>'
         for wall in walls(scene)
     )
-    bodies = "".join(_body_xml(body, surface) for body in scene.bodies)
+    contact_law = scene.effect(physics.Contact)
+    affinity = 3 if contact_law is not None and contact_law.between_bodies else 1
+    bodies = "".join(_body_xml(body, f'conaffinity="{affinity}" {surface}') for body in scene.bodies)
     return f"""<mujoco>
   <compiler balanceinertia="false"/>
   <option timestep="{dt!r}" gravity="{_text(gravity(scene))}" integrator="{integrator}" cone="{cone}"
@@ -144,7 +146,7 @@ def _reference(contact: str, e: float, dt: float, share: float) -> str:
 
 def _body_xml(body: physics.Body, surface: str) -> str:
     I = body.inertia
-    shape = f'type="{KINDS[body.kind]}" size="{_text(body.dimensions)}" contype="2" conaffinity="1"'
+    shape = f'type="{KINDS[body.kind]}" size="{_text(body.dimensions)}" contype="2"'
     full = (I[0, 0], I[1, 1], I[2, 2], I[0, 1], I[0, 2], I[1, 2])
     return (
         f'<body pos="{_text(body.pos)}" quat="{_text(body.quat)}"><freejoint/>'
