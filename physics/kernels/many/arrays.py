@@ -39,6 +39,7 @@ class Many(NamedTuple):
     bodies: np.ndarray  # records: parameters and loads, see `workspace.body_fields`
     now: np.ndarray  # states, columns of `layout`
     rotation: np.ndarray  # body frame to world, row by row
+    lightness: np.ndarray  # 1/mass [1/kg]
     turning: np.ndarray  # inverse inertia in the world frame: 00, 01, 02, 11, 12, 22 [1/(kg m²)]
     twist: np.ndarray  # velocity and angular velocity, world frame [m/s, rad/s]
     place: np.ndarray  # geometric centre, world frame [m]
@@ -62,6 +63,7 @@ class Many(NamedTuple):
     bounce: np.ndarray  # coefficient of restitution
     target: np.ndarray  # velocity aimed at: normal, tangents [m/s]
     impulse: np.ndarray  # normal, tangents [N s]
+    step: np.ndarray  # 1/λ_max of the tangential part of its block [kg]
     block: np.ndarray  # the contact's own 3 x 3 of W = J M⁻¹ Jᵀ [1/kg]
     table: np.ndarray  # places of names in the last stage's contacts: open addressing
     mix: np.ndarray  # of a pair of blocks: axes of one in the other, and absolute values
@@ -116,17 +118,18 @@ def make_many(bodies: int, walls: np.ndarray, relative_slop: float, **settings: 
     blocks = min(nb * (nb + 1) // 2, BLOCKS_PER_BODY * nb)
     table = 1 << (2 * n - 1).bit_length()
     return Many(
-        bodies=rows, now=np.zeros((nb, STATE_SIZE)), rotation=np.zeros((nb, 9)), turning=np.zeros((nb, 6)),
-        twist=np.zeros((nb, 6)), place=np.zeros((nb, 3)), box=np.zeros((nb, 6)), touched=np.zeros(nb, i),
-        order=np.arange(nb, dtype=i), merged=np.zeros(nb, i), walls=walls.copy(), pairs=np.zeros((pairs, 2), i),
-        counts=np.zeros(3, i), ends=np.zeros((n, 2), i), name=np.zeros(n, i), owner=np.zeros(n, i),
-        normal=np.zeros((n, 3), f), anchor=np.zeros((n, 6)), frame=np.zeros((n, 9)), arm=np.zeros((n, 6)),
-        gap=np.zeros(n), speed=np.zeros(n), mu=np.zeros(n), bounce=np.zeros(n), target=np.zeros((n, 3)),
-        impulse=np.zeros((n, 3)), block=np.zeros((n, 9)), table=np.full(table, -1, i), mix=np.zeros((4, 3, 3)),
-        polygon=np.zeros((2, 16, 3)), edge=np.zeros((2, 16, 2), i),
-        free=np.zeros((nb, 6)), degree=np.zeros(nb, i), offset=np.zeros(nb, i), neighbour=np.zeros(2 * pairs, i),
-        rank=np.zeros(nb, i), first=np.zeros(nb, i), start=np.zeros(nb, i), lower=np.zeros((blocks, 6, 6)),
-        upper=np.zeros((blocks, 6, 6)), spare=np.zeros((6, 12)), aim=np.zeros((n, 3)), trial=np.zeros((n, 3)),
-        saved=np.zeros((n, 3)), defect=np.zeros((nb, 6)), before=np.zeros((nb, 6)), change=np.zeros((nb, 6)),
-        row=np.zeros((2, 3, 6)), reply=np.zeros((2, 3, 6)), at_end=np.zeros(2, i), settings=record,
+        bodies=rows, now=np.zeros((nb, STATE_SIZE)), rotation=np.zeros((nb, 9)), lightness=np.zeros(nb),
+        turning=np.zeros((nb, 6)), twist=np.zeros((nb, 6)), place=np.zeros((nb, 3)), box=np.zeros((nb, 6)),
+        touched=np.zeros(nb, i), order=np.arange(nb, dtype=i), merged=np.zeros(nb, i), walls=walls.copy(),
+        pairs=np.zeros((pairs, 2), i), counts=np.zeros(3, i), ends=np.zeros((n, 2), i), name=np.zeros(n, i),
+        owner=np.zeros(n, i), normal=np.zeros((n, 3), f), anchor=np.zeros((n, 6)), frame=np.zeros((n, 9)),
+        arm=np.zeros((n, 6)), gap=np.zeros(n), speed=np.zeros(n), mu=np.zeros(n), bounce=np.zeros(n),
+        target=np.zeros((n, 3)), impulse=np.zeros((n, 3)), step=np.zeros(n), block=np.zeros((n, 9)),
+        table=np.full(table, -1, i), mix=np.zeros((4, 3, 3)), polygon=np.zeros((2, 16, 3)),
+        edge=np.zeros((2, 16, 2), i), free=np.zeros((nb, 6)), degree=np.zeros(nb, i), offset=np.zeros(nb, i),
+        neighbour=np.zeros(2 * pairs, i), rank=np.zeros(nb, i), first=np.zeros(nb, i), start=np.zeros(nb, i),
+        lower=np.zeros((blocks, 6, 6)), upper=np.zeros((blocks, 6, 6)), spare=np.zeros((6, 12)), aim=np.zeros((n, 3)),
+        trial=np.zeros((n, 3)), saved=np.zeros((n, 3)), defect=np.zeros((nb, 6)), before=np.zeros((nb, 6)),
+        change=np.zeros((nb, 6)), row=np.zeros((2, 3, 6)), reply=np.zeros((2, 3, 6)), at_end=np.zeros(2, i),
+        settings=record,
     )  # fmt: skip

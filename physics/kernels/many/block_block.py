@@ -197,14 +197,17 @@ def is_along_face(edges, face, many):
 
 
 @inlined
-def _touch_face(a, b, face, least, h, many):
-    """Contacts between a face of one block and the clipped face of the other, lifted until none has a gap < least."""
-    r, o, axis = a, b, face
-    way = many.mix[FROM_A, 0, face % 3]
-    if face >= 3:
-        r, o, axis = b, a, face - 3
-        way = -many.mix[FROM_B, 0, axis]
-    sign = math.copysign(1.0, way)
+def _reference(a, b, face, many):
+    """(block with the face, other block, axis, its sense towards the other)."""
+    if face < 3:
+        return a, b, face, math.copysign(1.0, many.mix[FROM_A, 0, face])
+    return b, a, face - 3, -math.copysign(1.0, many.mix[FROM_B, 0, face - 3])
+
+
+@inlined
+def _clip_face(a, b, face, many):
+    """Clip the face that looks against this one by its sides: (copy of the polygon, vertices)."""
+    r, o, axis, sign = _reference(a, b, face, many)
     _incident(r, o, axis, sign, many)
     d, slop = many.bodies[r].dims, pair_slop(a, b, many)
     source, count = 0, 4
@@ -212,12 +215,20 @@ def _touch_face(a, b, face, least, h, many):
         k, s = side // 2, 1.0 - 2.0 * (side % 2)
         count = _clip(source, count, k, s, d[(axis + 1 + k) % 3], 4 + side, slop, many)
         source = 1 - source
-    R, p = many.rotation, many.polygon
-    x, y, out = _column(R, r, (axis + 1) % 3), _column(R, r, (axis + 2) % 3), _column(R, r, axis)
-    out = (sign * out[0], sign * out[1], sign * out[2])
+    return source, count
+
+
+@inlined
+def _touch_face(a, b, face, source, count, least, h, many):
+    """Contacts between a face and the clipped face of the other block, lifted until none has a gap < least."""
+    r, o, axis, sign = _reference(a, b, face, many)
+    d = many.bodies[r].dims
     if count == 0:
         _incident(r, o, axis, sign, many)
         source, count = _lowest(d[(axis + 1) % 3], d[(axis + 2) % 3], many), 1
+    R, p = many.rotation, many.polygon
+    x, y, out = _column(R, r, (axis + 1) % 3), _column(R, r, (axis + 2) % 3), _column(R, r, axis)
+    out = (sign * out[0], sign * out[1], sign * out[2])
     lift = max(0.0, least + d[axis] - lowest(source, count, p))
     for k in range(count):
         gap = p[source, k, 2] - d[axis] + lift
@@ -263,17 +274,29 @@ def _touch_edges(a, b, edges, gap, h, many):
 
 @kernel
 def touch_blocks(a, b, margin, h, many):
-    """Add the contacts of blocks a and b that are no more than `margin` [m] apart."""
+    """Add the contacts of blocks a and b that are no more than `margin` [m] apart.
+
+    Where a face separates them or nearly does, and something of the other block is above it, no product of edges can
+    say that they are further apart: that something touches.
+    """
     _relate(a, b, many)
     apart, face = best_face(a, b, many)
     if apart > margin:
         return
-    further, edges = best_edges(a, b, many)
+    slop = pair_slop(a, b, many)
+    source = count = 0
+    is_clipped = apart >= -slop
+    if is_clipped:
+        source, count = _clip_face(a, b, face, many)
+    further, edges = apart, 0
+    if count == 0:
+        further, edges = best_edges(a, b, many)
     if further > margin:
         return
-    if further <= apart + pair_slop(a, b, many):
-        _touch_face(a, b, face, apart, h, many)
-    elif is_along_face(edges, face, many):
-        _touch_face(a, b, face, further, h, many)
+    is_face = further <= apart + slop
+    if is_face or is_along_face(edges, face, many):
+        if not is_clipped:
+            source, count = _clip_face(a, b, face, many)
+        _touch_face(a, b, face, source, count, max(apart, further), h, many)
     else:
         _touch_edges(a, b, edges, further, h, many)

@@ -12,8 +12,8 @@ carry, whatever that contact's own mass is. So ρ is a multiple of the largest m
 a light one takes no more rounds than two of a kind.
 
 The first guess is that everything holds: then the law is linear, and one linear system is the answer for whatever
-stands still, however high or heavy. It is taken up if its residual is below that of the sweeps before. Where ρ grows
-too large for Newton's method to find its pieces, the round is thrown away and ρ shrinks.
+stands still, however high or heavy. Where ρ grows too large for Newton's method to find its pieces, the round is
+thrown away and ρ shrinks.
 """
 
 from __future__ import annotations
@@ -26,11 +26,14 @@ from physics.kernels.many.contacts import local_velocity, matrix, minus, plus, p
 from physics.kernels.many.envelope import SIZE, block_of, clear, factor, lay_out, substitute
 from physics.kernels.many.sweeps import residual_of, turned
 
-# ρ in units of the largest mass: of the first guess that everything holds; of the first round after that guess, and
-# after another start; its growth from round to round, the largest, and what it shrinks by when a round fails.
+# ρ in units of the largest mass: of the guess that everything holds, with its rounds and the share of the residual
+# asked for at which they end; of the first round after that guess, and after sweeps; its growth from round to round,
+# the largest, and what it shrinks by when a round fails.
 HOLD_FACTOR = 1.0e4
-FACTOR_AFTER_HOLD = 10.0
-FIRST_FACTOR = 0.1
+HOLD_ROUNDS = 5
+HOLD_SHARE = 1.0e-3
+AFTER_HOLD = 10.0
+AFTER_SWEEPS = 0.1
 FACTOR_GROWTH = 10.0
 FACTOR_LIMIT = 1.0e8
 FACTOR_LOSS = 30.0
@@ -69,10 +72,10 @@ def _take_answer(k, p, many):
     """Take M⁻¹ Jᵀ p of contact k off the defects of its bodies."""
     p = qt.transposed_matvec(matrix(many.frame, k), p)
     g, a, b = many.defect, many.ends[k, 0], many.ends[k, 1]
-    put(g, a, 0, plus(vector(g, a, 0), -1.0 / many.bodies[a].mass, p))
+    put(g, a, 0, plus(vector(g, a, 0), -many.lightness[a], p))
     put(g, a, 3, minus(vector(g, a, 3), turned(a, qt.cross(vector(many.arm, k, 0), p), many)))
     if b >= 0:
-        put(g, b, 0, plus(vector(g, b, 0), 1.0 / many.bodies[b].mass, p))
+        put(g, b, 0, plus(vector(g, b, 0), many.lightness[b], p))
         put(g, b, 3, plus(vector(g, b, 3), 1.0, turned(b, qt.cross(vector(many.arm, k, 3), p), many)))
 
 
@@ -118,7 +121,7 @@ def _slopes(y, mu):
 def _write_rows(k, end, first, sign, many):
     """Jacobian rows of one end of contact k, and what its body answers to each: `many.row`, `many.reply`."""
     r, E, b = vector(many.arm, k, first), many.frame, many.ends[k, end]
-    m = 1.0 / many.bodies[b].mass
+    m = many.lightness[b]
     for c in range(3):
         e = vector(E, k, 3 * c)
         g = qt.cross(r, e)
@@ -162,10 +165,22 @@ def _fill_matrix(n, count, rho, all_hold, many):
                 _add_block(i, j, D, rho, many)
 
 
+@inlined
+def _follow(count, many):
+    """Solve the factored system for the defect and take it off the twists."""
+    for i in range(count):
+        for c in range(SIZE):
+            many.change[i, c] = -many.defect[many.order[i], c]
+    substitute(count, many.change, many)
+    for i in range(count):
+        for c in range(SIZE):
+            many.twist[many.order[i], c] += many.change[i, c]
+
+
 @kernel
-def _newton_step(n, count, rho, all_hold, norm, many):
+def _newton_step(n, count, rho, norm, many):
     """One damped Newton step on the twists from a defect of the given norm: the new (norm, largest velocity)."""
-    _fill_matrix(n, count, rho, all_hold, many)
+    _fill_matrix(n, count, rho, False, many)
     factor(count, many)
     for i in range(count):
         b = many.order[i]
@@ -179,28 +194,11 @@ def _newton_step(n, count, rho, all_hold, norm, many):
             b = many.order[i]
             for c in range(SIZE):
                 many.twist[b, c] = many.before[b, c] + t * many.change[i, c]
-        after, worst = _defect(n, rho, all_hold, many)
-        if all_hold or after < norm:
+        after, worst = _defect(n, rho, False, many)
+        if after < norm:
             break
         t *= 0.5
     return after, worst
-
-
-@kernel
-def _round(n, count, rho, all_hold, enough, limit, many):
-    """p(x) at the x that solves x = M⁻¹ Jᵀ p(x) to `enough` [m/s], into `many.impulse` and the twists: Newton steps."""
-    norm, worst = _defect(n, rho, all_hold, many)
-    steps = failures = 0
-    while worst > enough and steps < limit and failures <= FAILED_STEPS:
-        after, worst = _newton_step(n, count, rho, all_hold, norm, many)
-        steps += 1
-        if not after < norm:
-            failures += 1
-        norm = after
-    for k in range(n):
-        put(many.impulse, k, 0, _law(vector(many.trial, k, 0), many.mu[k]))
-    _apply(n, many.impulse, many)
-    return steps
 
 
 @inlined
@@ -223,6 +221,36 @@ def _copy(n, source, target):
 
 
 @inlined
+def _take_trial(n, many):
+    """Take the impulses of the last `_defect`, as the law allows them, and the twists that belong to them."""
+    for k in range(n):
+        put(many.impulse, k, 0, _law(vector(many.trial, k, 0), many.mu[k]))
+    _apply(n, many.impulse, many)
+
+
+@inlined
+def _restore(n, many):
+    """Back to the best impulses met."""
+    _copy(n, many.saved, many.impulse)
+    _apply(n, many.impulse, many)
+
+
+@kernel
+def _round(n, count, rho, enough, limit, many):
+    """p(x) at the x that solves x = M⁻¹ Jᵀ p(x) to `enough` [m/s], into `many.impulse` and the twists: Newton steps."""
+    norm, worst = _defect(n, rho, False, many)
+    steps = failures = 0
+    while worst > enough and steps < limit and failures <= FAILED_STEPS:
+        after, worst = _newton_step(n, count, rho, norm, many)
+        steps += 1
+        if not after < norm:
+            failures += 1
+        norm = after
+    _take_trial(n, many)
+    return steps
+
+
+@inlined
 def _steps_worth(n, count, sweeps, many):
     """Newton steps that take `WORTH` times the work of so many sweeps: in a wide pile each of them is dear."""
     work = n * CONTACT_WORK
@@ -242,18 +270,60 @@ def _heaviest(count, many):
 
 
 @kernel
-def newton_contacts(n, friction, residual, goal, limit, many):
+def prepare_newton(n, sweeps, many):
+    """Number the bodies for the linear system: Newton steps that the problem is worth, 0 where they are too dear.
+
+    A problem of n contacts that may take so many sweeps is worth `WORTH` times their work.
+    """
+    count = lay_out(n, many)
+    if count == 0:
+        return 0, 0
+    steps = _steps_worth(n, count, sweeps, many)
+    return count, steps if steps >= LEAST_STEPS else 0
+
+
+@kernel
+def guess_all_hold(n, count, friction, residual, goal, many):
+    """Impulses as if every contact held, if that makes the residual smaller; the residual then [m/s].
+
+    The law being linear, its matrix is factored once, and a few rounds of q = p(x) cost little more than one: what
+    stands still is solved so far below the goal that the steps to come find nothing to do.
+    """
+    rho = HOLD_FACTOR * _heaviest(count, many)
+    _copy(n, many.impulse, many.saved)
+    _fill_matrix(n, count, rho, True, many)
+    factor(count, many)
+    for _ in range(HOLD_ROUNDS):
+        _defect(n, rho, True, many)
+        _follow(count, many)
+        _defect(n, rho, True, many)
+        _take_trial(n, many)
+        now = residual_of(n, friction, many)
+        if not now < residual:
+            _restore(n, many)
+            break
+        residual = now
+        _copy(n, many.impulse, many.saved)
+        if residual <= HOLD_SHARE * goal:
+            break
+    return residual
+
+
+@kernel
+def newton_contacts(n, count, friction, residual, goal, limit, scale, many):
     """Improve the impulses of the world's contact problem until the residual is within `goal` [m/s].
 
     Parameters
     ----------
-    n : int
-        Contacts. `many.impulse` is the start, `many.free` the twists without any impulse; `many.impulse` and
-        `many.twist` receive the best that was met.
+    n, count : int
+        Contacts, and bodies in them. `many.impulse` is the start, `many.free` the twists without any impulse;
+        `many.impulse` and `many.twist` receive the best that was met.
     residual, goal : float
         Of the start, and asked for [m/s].
     limit : int
-        Sweeps that the problem is worth: Newton's method may take `WORTH` times their work.
+        Newton steps at most.
+    scale : float
+        ρ of the first round, in units of the largest mass.
 
     Returns
     -------
@@ -261,31 +331,18 @@ def newton_contacts(n, friction, residual, goal, limit, many):
     residual : float
         [m/s], measured on what is returned.
     """
-    count = lay_out(n, many)
-    if count == 0:
-        return 0, residual
-    limit = _steps_worth(n, count, limit, many)
-    if limit < LEAST_STEPS:
-        return 0, residual
-    mass, failures = _heaviest(count, many), 0
+    mass, failures, steps = _heaviest(count, many), 0, 0
     _copy(n, many.impulse, many.saved)
-    steps = _round(n, count, HOLD_FACTOR * mass, True, goal, 1, many)
-    scale = FIRST_FACTOR
-    while True:
+    while residual > goal and failures <= FAILED_ROUNDS and steps < limit:
+        enough = ROUND_SHARE * min(ENOUGH * goal, residual)
+        steps += max(1, _round(n, count, scale * mass, enough, min(NEWTON_STEPS, limit - steps), many))
         now = residual_of(n, friction, many)
         if now < residual:
             residual = now
             _copy(n, many.impulse, many.saved)
-            scale = FACTOR_AFTER_HOLD if steps == 1 else min(FACTOR_GROWTH * scale, FACTOR_LIMIT)
-        elif steps > 1:
+            scale = min(FACTOR_GROWTH * scale, FACTOR_LIMIT)
+        else:
             failures += 1
             scale /= FACTOR_LOSS
-        if residual <= goal or failures > FAILED_ROUNDS or steps >= limit:
-            break
-        _copy(n, many.saved, many.impulse)
-        _apply(n, many.impulse, many)
-        enough = ROUND_SHARE * min(ENOUGH * goal, residual)
-        steps += max(1, _round(n, count, scale * mass, False, enough, min(NEWTON_STEPS, limit - steps), many))
-    _copy(n, many.saved, many.impulse)
-    _apply(n, many.impulse, many)
+            _restore(n, many)
     return steps, residual

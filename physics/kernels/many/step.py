@@ -332,6 +332,7 @@ def step_many(
         for b in range(bodies):
             i = world * bodies + b
             bind_body(world, i, shapes[b], params, gravity, wrench, friction, restitution, tilted, many.bodies[b])
+            many.lightness[b] = params[i, at.INV_MASS]
             write_state(many.now, b, read_state(state, i))
         for _ in range(steps * substeps):
             substep_world(world, h, friction, gyroscopic, tilted, scheme, memory, report, many)

@@ -39,10 +39,10 @@ def push(k, local, many):
     p = qt.transposed_matvec(matrix(many.frame, k), local)
     t = many.twist
     a, b = many.ends[k, 0], many.ends[k, 1]
-    put(t, a, 0, plus(vector(t, a, 0), 1.0 / many.bodies[a].mass, p))
+    put(t, a, 0, plus(vector(t, a, 0), many.lightness[a], p))
     put(t, a, 3, plus(vector(t, a, 3), 1.0, turned(a, qt.cross(vector(many.arm, k, 0), p), many)))
     if b >= 0:
-        put(t, b, 0, plus(vector(t, b, 0), -1.0 / many.bodies[b].mass, p))
+        put(t, b, 0, plus(vector(t, b, 0), -many.lightness[b], p))
         put(t, b, 3, plus(vector(t, b, 3), -1.0, turned(b, qt.cross(vector(many.arm, k, 3), p), many)))
 
 
@@ -52,7 +52,7 @@ def _add_block(k, b, first, W, many):
     r, E = vector(many.arm, k, first), many.frame
     g0, g1, g2 = qt.cross(r, vector(E, k, 0)), qt.cross(r, vector(E, k, 3)), qt.cross(r, vector(E, k, 6))
     h0, h1, h2 = turned(b, g0, many), turned(b, g1, many), turned(b, g2, many)
-    m = 1.0 / many.bodies[b].mass
+    m = many.lightness[b]
     return (
         W[0] + (m + qt.dot(g0, h0)), W[1] + qt.dot(g0, h1), W[2] + qt.dot(g0, h2),
         W[3] + (m + qt.dot(g1, h1)), W[4] + qt.dot(g1, h2), W[5] + (m + qt.dot(g2, h2)),
@@ -76,6 +76,8 @@ def assemble(n, many):
         B[k, 0], B[k, 1], B[k, 2] = W[0], W[1], W[2]
         B[k, 3], B[k, 4], B[k, 5] = W[1], W[3], W[4]
         B[k, 6], B[k, 7], B[k, 8] = W[2], W[4], W[5]
+        half = 0.5 * (W[3] - W[5])
+        many.step[k] = 1.0 / (0.5 * (W[3] + W[5]) + math.sqrt(half * half + W[4] * W[4]))
     for k in range(n):
         push(k, vector(many.impulse, k, 0), many)
     return scale
@@ -89,13 +91,6 @@ def _velocity(k, many):
 
 
 @inlined
-def _tangential_step(W):
-    """1/λ_max of the tangential part of a block."""
-    half = 0.5 * (W[4] - W[8])
-    return 1.0 / (0.5 * (W[4] + W[8]) + math.sqrt(half * half + W[5] * W[5]))
-
-
-@inlined
 def _on_disk(x, y, limit):
     """(x, y), shortened to `limit` if it is longer."""
     size = math.sqrt(x * x + y * y)
@@ -105,12 +100,11 @@ def _on_disk(x, y, limit):
 
 
 @inlined
-def natural_map(p, u, W, mu):
-    """Natural-map residual of one contact [m/s]; see `physics.kernels.sweeps`."""
-    step = _tangential_step(W)
+def natural_map(p, u, normal, step, mu):
+    """Natural-map residual of one contact [m/s]; see `physics.kernels.sweeps`. `normal` is W_nn, `step` 1/λ_max."""
     x, y = _on_disk(p[1] - step * u[1], p[2] - step * u[2], mu * max(p[0], 0.0))
     dx, dy = p[1] - x, p[2] - y
-    return max(abs(min(u[0], p[0] * W[0])), math.sqrt(dx * dx + dy * dy) / step)
+    return max(abs(min(u[0], p[0] * normal)), math.sqrt(dx * dx + dy * dy) / step)
 
 
 @inlined
@@ -127,14 +121,14 @@ def residual_of(n, friction, many):
         if friction is None:
             miss = _normal_map(p[0], u[0], many.block[k, 0])
         else:
-            miss = natural_map(p, u, matrix(many.block, k), many.mu[k])
+            miss = natural_map(p, u, many.block[k, 0], many.step[k], many.mu[k])
         if not miss <= worst:  # also what is not a number
             worst = miss
     return worst
 
 
 @inlined
-def _answer_one(k, p, u, W, mu, goal):
+def _answer_one(p, u, W, step, mu, goal):
     """Impulse of contact k that answers its own velocity, all others held."""
     own = qt.matvec(W, p)
     b = (u[0] - own[0], u[1] - own[1], u[2] - own[2])
@@ -149,24 +143,25 @@ def _answer_one(k, p, u, W, mu, goal):
         return q
     # The normal impulse first, then the tangential step, back on the disk.
     normal = max(0.0, p[0] - u[0] / W[0])
-    d, step = normal - p[0], _tangential_step(W)
+    d = normal - p[0]
     x, y = _on_disk(p[1] - step * (u[1] + W[3] * d), p[2] - step * (u[2] + W[6] * d), mu * normal)
     return normal, x, y
 
 
 @inlined
 def _visit(k, goal, friction, many):
-    """Answer contact k; its residual before [m/s]."""
+    """Answer contact k; how far its impulse was off, as a velocity [m/s]: its residual or a little more."""
     u, p, W = _velocity(k, many), vector(many.impulse, k, 0), matrix(many.block, k)
     if friction is None:
-        miss = _normal_map(p[0], u[0], W[0])
         q = (max(0.0, p[0] - u[0] / W[0]), 0.0, 0.0)
     else:
-        miss = natural_map(p, u, W, many.mu[k])
-        q = _answer_one(k, p, u, W, many.mu[k], goal)
+        q = _answer_one(p, u, W, many.step[k], many.mu[k], goal)
+    d = (q[0] - p[0], q[1] - p[1], q[2] - p[2])
+    if d[0] == 0.0 and d[1] == 0.0 and d[2] == 0.0:
+        return 0.0
     put(many.impulse, k, 0, q)
-    push(k, (q[0] - p[0], q[1] - p[1], q[2] - p[2]), many)
-    return miss
+    push(k, d, many)
+    return max(abs(d[0]) * W[0], max(abs(d[1]), abs(d[2])) / many.step[k])
 
 
 @kernel
