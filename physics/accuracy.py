@@ -18,6 +18,7 @@ SCHEMES = {
     "rk4": schemes.RK4,
 }
 SOLVERS = ("sweeps", "sweeps+pivoting")
+COLLISIONS = ("simultaneous", "sequential")
 
 
 @dataclass(frozen=True)
@@ -53,6 +54,16 @@ class Accuracy:
     rest_share : float
         Bounce threshold of time stepping: a rebound that would be over within this share of the substep is not made
         (restitution acts as 0). 0 lets every rebound happen.
+    collisions : str
+        What happens to contacts that collide at the same moment. ``simultaneous``: one contact problem of all of them.
+        ``sequential``, with ``events`` only: one after the other, the one that approaches fastest first (of equals the
+        one of the lowest wall and vertex), until none approaches; where that has no end in sight, the rest at once,
+        reported as unconverged. Two laws, not two accuracies: where several contacts collide they have other outcomes.
+
+    Raises
+    ------
+    ValueError
+        A value out of range, or ``sequential`` without ``events``.
     """
 
     substeps: int = 1
@@ -63,6 +74,7 @@ class Accuracy:
     impacts: int = 8
     slop: float = 1e-6
     rest_share: float = 0.5
+    collisions: str = "simultaneous"
 
     def __post_init__(self):
         checks.count(self.substeps, "Accuracy.substeps")
@@ -75,6 +87,13 @@ class Accuracy:
             raise ValueError(f"Accuracy.scheme is {self.scheme!r}; allowed are {', '.join(SCHEMES)}")
         if self.solver not in SOLVERS:
             raise ValueError(f"Accuracy.solver is {self.solver!r}; allowed are {', '.join(SOLVERS)}")
+        if self.collisions not in COLLISIONS:
+            raise ValueError(f"Accuracy.collisions is {self.collisions!r}; allowed are {', '.join(COLLISIONS)}")
+        if self.collisions == "sequential" and self.scheme != "events":
+            raise ValueError(
+                f"Accuracy.collisions is 'sequential' with scheme {self.scheme!r}; allowed with scheme 'events' only, "
+                "which knows the moment of a collision"
+            )
 
 
 _BALANCED = Accuracy()

@@ -12,7 +12,10 @@ import numpy as np
 LEAST_POINTS = 3
 
 # Errors that a power of the step explains by less than this share of their variance have no order.
-LEAST_FIT = 0.9
+LEAST_FIT = 0.95
+
+# An error lies on a line through others when it is off by less than this factor.
+NEAR = 2.0
 
 # Below this observed order a smaller step does not pay any more: half of the lowest order a convergent scheme has.
 FLAT_ORDER = 0.5
@@ -57,19 +60,33 @@ def plateau(steps: Sequence[float], errors: Sequence[float]) -> float | None:
 
 
 def observed_order(steps: Sequence[float], errors: Sequence[float], floor: float = 0.0) -> float | None:
-    """Slope of log error over log step by least squares, where the error falls.
+    """Slope of log error over log step by least squares, where the error falls as a power of the step.
 
-    Left out are errors that are not finite or at the truth's own `floor`, and the `flat_tail` but for its coarsest
-    point, at which the fall ends. None where fewer than three steps are left, or no line fits them (`LEAST_FIT`).
+    Left out are, at the fine end, errors at the truth's own `floor` and the `flat_tail` but for its coarsest point, at
+    which the fall ends; at the coarse end, steps too large for the power to show: the fewest such that the rest lie
+    within a factor `NEAR` of their line, at most a quarter of those that fall: more would find a power in noise. None
+    where fewer than `LEAST_POINTS` steps are left, or no rising line explains them (`LEAST_FIT`). Errors that are not
+    finite count as absent.
     """
     tail = flat_tail(steps, errors)[:-1]
-    kept = [i for i in range(len(steps)) if math.isfinite(errors[i]) and errors[i] > floor and i not in tail]
-    if len({steps[i] for i in kept}) < LEAST_POINTS:
+    falling = [i for i in np.argsort(steps) if math.isfinite(errors[i]) and errors[i] > floor and i not in tail]
+    if len({steps[i] for i in falling}) < LEAST_POINTS:
         return None
-    x, y = np.log([steps[i] for i in kept]), np.log([errors[i] for i in kept])
+    x, y = np.log([steps[i] for i in falling]), np.log([errors[i] for i in falling])
+    least = max(LEAST_POINTS, len(falling) - len(falling) // 4)
+    for count in range(len(falling), least - 1, -1):
+        slope, share, off = _line(x[:count], y[:count])
+        if off <= math.log(NEAR):
+            return slope if slope > 0.0 and share >= LEAST_FIT else None
+    return None
+
+
+def _line(x: np.ndarray, y: np.ndarray) -> tuple[float, float, float]:
+    """Line through points by least squares: slope, share of the variance that it explains, farthest point from it."""
     x, y = x - x.mean(), y - y.mean()
     slope = float(x @ y / (x @ x))
-    return slope if slope * (x @ y) >= LEAST_FIT * (y @ y) else None
+    rest = y - slope * x
+    return slope, 1.0 - float(rest @ rest) / float(y @ y) if y.any() else 0.0, float(np.abs(rest).max())
 
 
 def lost_from(steps: Sequence[float], is_lost: Sequence[bool]) -> float | None:

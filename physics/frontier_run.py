@@ -22,6 +22,7 @@ from physics.trajectory import Trajectory
 
 PRESETS = ("fast", "balanced", "precise")
 STEPS = (0.02, 0.01, 0.005, 0.002, 0.001)  # [s]
+COARSE_STEPS = (0.1, 0.05)  # of an event-driven scheme besides, which is as exact there and pays less [s]
 REPEATS = 5
 
 # An error larger than this share of what happens in the scene follows it no longer.
@@ -43,10 +44,19 @@ Progress = Callable[[int, int, str], None]
 
 
 def ladder(
-    accuracies: Sequence[str | Accuracy] = PRESETS, steps: Sequence[float] = STEPS
+    accuracies: Sequence[str | Accuracy] = PRESETS, steps: Sequence[float] | None = None
 ) -> list[tuple[str | Accuracy, float]]:
-    """Every accuracy at every step [s]: the `settings` of `frontier`."""
-    return list(product(accuracies, steps))
+    """Every accuracy at every step [s]: the `settings` of `frontier`.
+
+    Without `steps`: at `STEPS`, and what is event-driven at `COARSE_STEPS`, too.
+    """
+    if steps is not None:
+        return list(product(accuracies, steps))
+    return [
+        (accuracy, dt)
+        for accuracy in accuracies
+        for dt in (*(COARSE_STEPS if resolve(accuracy).scheme == "events" else ()), *STEPS)
+    ]
 
 
 def frontier(
@@ -68,7 +78,7 @@ def frontier(
     duration : float
         Simulated time [s]; of it, the largest whole multiple of the time that all steps have in common.
     settings : iterable of (str or Accuracy, float), optional
-        Accuracy and step [s]; None: `ladder()`.
+        Accuracy and step [s]; None: `ladder()`, without coarse steps if the duration is shorter than they are.
     truth : Truth, or callable, optional
         An outcome you know: `Trajectory` -> error. None: `ReferenceTruth`.
     repeats : int
@@ -89,9 +99,12 @@ def frontier(
     """
     if not isinstance(scene, Scene):
         raise ValueError(f"scene is {scene!r}; allowed is a physics.Scene")
+    duration = float(checks.positive(duration, (), "duration"))
+    if settings is None:
+        settings = ladder() if duration >= max(COARSE_STEPS) else ladder(steps=STEPS)
     contenders = [
         EngineContender(scene, resolve(accuracy), float(checks.positive(dt, (), f"settings[{k}] step")))
-        for k, (accuracy, dt) in enumerate(_pairs(ladder() if settings is None else settings))
+        for k, (accuracy, dt) in enumerate(_pairs(settings))
     ]
     return measure(contenders, scene, duration, truth, repeats, progress)
 

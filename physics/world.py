@@ -120,7 +120,10 @@ class World:
             for _ in self.pool.slices
         ]
         self.motions = [
-            make_motion(len(self.walls), self.plan.features) if self.plan.events else None for _ in self.pool.slices
+            make_motion(len(self.walls), self.plan.features, settings.collisions == "sequential")
+            if self.plan.events
+            else None
+            for _ in self.pool.slices
         ]
         self._wrench = self.no_wrench()
         self._calls: list[Callable[[], None]] = []

@@ -29,13 +29,15 @@ class Ladder:
     Attributes
     ----------
     accuracies : tuple of str
-    steps, peer_steps : tuple of float
+    steps : tuple of float, or None
+        [s]; None: those of `physics.ladder`, coarser ones for event-driven accuracies among them.
+    peer_steps : tuple of float
         [s].
     repeats : int
     """
 
     accuracies: tuple[str, ...] = frontier_run.PRESETS
-    steps: tuple[float, ...] = STEPS
+    steps: tuple[float, ...] | None = None
     peer_steps: tuple[float, ...] = PEER_STEPS
     repeats: int = REPEATS
 
@@ -176,7 +178,8 @@ def _make_job(name: str, engines: Mapping[str, peers.Engine], ladder: Ladder) ->
     scene = case.scene() if case else scenes.by_name(name)
     duration = case.duration if case else OPEN.get(name, DURATION)
     what = case.what if case else f"{name}, {duration:g} s: largest error of any point of the body"
-    ours = [EngineContender(scene, physics.PRESETS[a], dt) for a in ladder.accuracies for dt in ladder.steps]
+    settings = physics.ladder(ladder.accuracies, ladder.steps)
+    ours = [EngineContender(scene, physics.PRESETS[a], dt) for a, dt in settings]
     theirs, skipped = [], []
     for engine in engines.values():
         some, reasons = _peer_contenders(engine, scene, ladder.peer_steps)

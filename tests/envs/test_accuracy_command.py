@@ -12,7 +12,7 @@ from rich.console import Console
 from typer.testing import CliRunner
 
 import physics
-from physics import Frontier, FrontierPoint
+from physics import Frontier, FrontierPoint, frontier_run
 from rigid_env.cli import app
 from rigid_env.measure import accuracy, accuracy_report, peers
 from rigid_env.measure.accuracy import QUICK, Found, Job, Ladder
@@ -229,5 +229,15 @@ def test_without_matplotlib_the_extra_is_named_before_anything_is_measured(monke
     assert 'pip install "rigid-env[agents]"' in run("vertex", "--plot", tmp_path / "a.png", code=1)
 
 
-def test_ladder_of_peers_is_finer():
-    assert min(Ladder().peer_steps) < min(Ladder().steps)
+def test_ladder_of_peers_is_finer_and_that_of_events_coarser():
+    (job,) = accuracy.make_jobs(["sphere"])
+    ours = {c.setting: [k.dt for k in job.contenders if k.setting == c.setting] for c in job.contenders}
+    assert min(Ladder().peer_steps) < min(ours["balanced"]) == min(ours["precise"])
+    assert max(ours["precise"]) == 0.1 > max(ours["balanced"])
+
+
+@pytest.mark.parametrize("job", accuracy.make_jobs(), ids=lambda job: job.key)
+def test_every_step_of_the_ladder_divides_the_whole_duration(job):
+    """Or the measurement would end early, and a closed form of the end be compared with something before it."""
+    duration, _ = frontier_run.common_times(job.duration, [c.dt for c in job.contenders])
+    assert duration == pytest.approx(job.duration, rel=1e-12)

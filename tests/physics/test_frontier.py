@@ -76,6 +76,51 @@ def test_errors_that_no_power_of_the_step_explains_have_no_order():
     assert frontier_analysis.observed_order([0.08, 0.04, 0.02, 0.01], [4e-2, 1e-5, 3e-2, 5e-3]) is None
 
 
+@pytest.mark.parametrize("order", [1.0, 2.0])
+@pytest.mark.parametrize("scatter", [1.0, 1.1])
+@pytest.mark.parametrize("off", [0.1, 1.0, 10.0])
+def test_a_step_too_coarse_for_the_power_is_left_out_of_the_order(order, scatter, off):
+    """The known slope of the other four steps, whose errors are scattered to both sides by 10 %.
+
+    Least squares is then off by Σ ±x ln 1.1/Σx² with x = ln h less its mean: 0.061.
+    """
+    steps = [0.02, 0.01, 0.005, 0.002, 0.001]
+    errors = [h**order * scatter ** (-1) ** k for k, h in enumerate(steps)]
+    found = frontier_analysis.observed_order(steps, [off * errors[0], *errors[1:]])
+    assert found == pytest.approx(order, abs=0.065 if scatter > 1.0 else 1e-12)
+
+
+def test_at_most_a_quarter_of_the_steps_is_left_out_of_an_order():
+    steps = [0.64, 0.32, 0.16, 0.08, 0.04, 0.02, 0.01, 0.005]
+    wild = [1e3, 1e2, 1e3]
+    assert frontier_analysis.observed_order(steps, wild[:2] + [h * h for h in steps[2:]]) == pytest.approx(2, abs=1e-12)
+    assert frontier_analysis.observed_order(steps, wild + [h * h for h in steps[3:]]) is None
+
+
+def test_an_error_that_grows_with_smaller_steps_has_no_order():
+    steps = [0.08, 0.04, 0.02, 0.01, 0.005]
+    assert frontier_analysis.observed_order(steps, [1 / h for h in steps]) is None
+    assert frontier_analysis.observed_order(steps, [1.0] * 5) is None
+
+
+def test_noise_has_no_order():
+    """Errors between 1 and 100 at random, whatever the step: less than a tenth of the ladders look like a power.
+
+    Three numbers rise, as those of a power would, one time in six.
+    """
+    rng = np.random.default_rng(0)
+    steps = [0.02, 0.01, 0.005, 0.002, 0.001]
+    some = [frontier_analysis.observed_order(steps, 10.0 ** rng.uniform(0, 2, 5)) for _ in range(1000)]
+    assert sum(found is not None for found in some) <= 100
+
+
+def test_the_ladder_of_an_event_driven_accuracy_begins_coarser():
+    steps = {name: [dt for a, dt in physics.ladder() if a == name] for name in ("fast", "balanced", "precise")}
+    assert steps["fast"] == steps["balanced"] == list(frontier_run.STEPS)
+    assert steps["precise"] == [*frontier_run.COARSE_STEPS, *frontier_run.STEPS]
+    assert physics.ladder(["precise"], (0.01,)) == [("precise", 0.01)]
+
+
 def test_lost_from_is_the_smallest_step_from_which_all_are():
     assert frontier_analysis.lost_from([0.01, 0.02, 0.04, 0.08], [True, False, True, True]) == 0.04
     assert frontier_analysis.lost_from([0.01, 0.02], [True, False]) is None

@@ -3,7 +3,8 @@
 A body flies, collides, moves in contact or rests:
 
 - *flies*: exact flight to the next wall (`air`);
-- *collides*: impulses at all touching contacts at once, by the solver of the time-stepping scheme. A rebound that
+- *collides*: impulses at all touching contacts at once, or at one after the other, by the solver of the time-stepping
+  scheme. A rebound that
   would be over within a threshold of time is not made: the rest of such a sequence of bounces, t/(1 - e) long for a
   first bounce of length t, is left out and stated with the event that ends it;
 - *moves*: extrapolated smooth motion with the forces of the regime (`smooth`, `forces`) until a guard (`guards`) ends
@@ -104,7 +105,7 @@ def advance(y, h, friction, smooth, gyroscopic, tilted, pivots, work, motion, me
     nearest = motion.ahead
     recall_contacts(memory, work.i, work, motion)
     world = work.world
-    motion.left_out = 0.0
+    motion.left_out, motion.turns = 0.0, 0
     seen, t = y, 0.0
     told = NOTHING  # what is to be done next, whatever the regime: stop a contact that will leave, or jump
     since, crowd, leap = 0.0, 0, LEAP * motion.ahead
@@ -144,6 +145,7 @@ def advance(y, h, friction, smooth, gyroscopic, tilted, pivots, work, motion, me
         step = 0.0
         if what == COLLIDES:
             report[world, at.SPLITS] += 1.0
+            crowd -= motion.is_sequential  # those in turn have a bound of their own
             seen = y
             continue
         log_changes(work, motion, log, counts, start + t)
@@ -174,7 +176,7 @@ def advance(y, h, friction, smooth, gyroscopic, tilted, pivots, work, motion, me
         elif step > motion.ahead:
             motion.ahead = nearest
             leap = max(LEAP * nearest, leap / LONGER)
-        motion.left_out = 0.0
+        motion.left_out, motion.turns = 0.0, 0
         if not t < h:
             break
         seen = y

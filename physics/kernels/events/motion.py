@@ -33,6 +33,8 @@ def motion_dtype(wall_count: int, features: int) -> np.dtype:
         ("still", f),  # speed of a contact that counts as none [m/s]
         ("noise", f),  # speed that is rounding [m/s]
         ("together", f),  # impacts within this time are one [s]
+        ("is_sequential", i),  # 1: contacts collide in turn, 0: at once
+        ("turns", i),  # impacts in turn so far at this moment
         ("ahead", f),  # time by which the next regime is looked for [s]
         ("step", f),  # length of the last smooth step [s]
         ("left_out", f),  # time that a sequence of bounces would have taken on [s]
@@ -76,6 +78,8 @@ def motion_dtype(wall_count: int, features: int) -> np.dtype:
     ])  # fmt: skip
 
 
-def make_motion(wall_count: int, features: int) -> np.ndarray:
+def make_motion(wall_count: int, features: int, is_sequential: bool) -> np.ndarray:
     """One such record, shape (1,)."""
-    return np.zeros(1, motion_dtype(wall_count, features))
+    motion = np.zeros(1, motion_dtype(wall_count, features))
+    motion["is_sequential"] = is_sequential
+    return motion
