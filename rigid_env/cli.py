@@ -105,6 +105,30 @@ def demo(
 
 
 @app.command()
+def run(
+    scene: Annotated[Path, typer.Argument(metavar="SCENE.toml", help="A scene file (docs/scene-files.md).")],
+    duration: Annotated[float, typer.Option(min=0.0, help="Simulated time [s].")] = 5.0,
+    accuracy: Accuracy = "balanced",
+    npz: Annotated[Path | None, typer.Option(metavar="FILE", help="Write the samples here.")] = None,
+    json: Json = None,
+) -> None:
+    """Simulate a scene from a file; print what happens."""
+    console = Console()
+    with _told_errors():
+        from physics import load_scene
+        from rigid_env.demo import Demo, show
+
+        with console.status("simulating"):
+            done = Demo(scene.stem, duration, accuracy, load_scene(scene))
+        summary = done.summary()
+        show(done, summary, console)
+        if npz is not None:
+            done.trajectory.to_npz(npz)
+            _tell_file(npz, console)
+        _write(json, {"file": str(scene), **summary}, console)
+
+
+@app.command()
 def explain(
     scene: Annotated[str, typer.Argument(help="A canonical scene.")],
     accuracy: Accuracy = "balanced",
