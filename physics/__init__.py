@@ -17,6 +17,7 @@ from physics.fields import AngularDrag, Buoyancy, Drag, Magnus, Push, Spring, Wi
 from physics.frontier_result import Frontier, FrontierPoint
 from physics.frontier_run import frontier, ladder
 from physics.frontier_truth import Truth
+from physics.mjcf import load_mjcf, save_mjcf
 from physics.plan import make_plan
 from physics.report import Solver, Status, StepReport
 from physics.scene import HalfSpace, Scene, corner, three_walls
@@ -63,9 +64,11 @@ __all__ = [
     "field_function",
     "frontier",
     "ladder",
+    "load_mjcf",
     "load_scene",
     "look_at",
     "make_plan",
+    "save_mjcf",
     "save_scene",
     "simulate",
     "three_walls",

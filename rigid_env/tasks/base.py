@@ -49,8 +49,8 @@ class Task(ABC):
         Block's mass [kg] and edges (three numbers) [m], coefficients against the walls, strength of gravity
         along -y [m/s²]. A pair (low, high) is drawn from uniformly in each episode of each world.
     effects : sequence of physics effects
-        Added to gravity, contact and friction; one of the same class replaces the task's. What is drawn from a range
-        cannot be replaced.
+        Added to gravity, contact and friction; one of the same class replaces the task's, and the limits of the action
+        follow its gravity. What is drawn from a range cannot be replaced.
     frame_skip : int
         Physics steps per control step, with the action held.
     dt : float
@@ -228,7 +228,9 @@ class Task(ABC):
         return (c, float(np.linalg.norm(self.parameters["size"].high)), c)
 
     def _note_parameters(self, rows: np.ndarray, values: dict[str, np.ndarray]) -> None:
-        weight = values["mass"] * values["gravity"]
+        given = next((effect for effect in self.effects if isinstance(effect, physics.Gravity)), None)
+        gravity = values["gravity"] if given is None else float(np.linalg.norm(given.acceleration))
+        weight = values["mass"] * gravity
         half = 0.5 * values["size"]
         self.record[rows, col.FORCE_LIMIT] = FORCE_SHARE * weight
         self.record[rows, col.TORQUE_LIMIT] = TORQUE_SHARE * weight * half.max(axis=1)

@@ -218,3 +218,27 @@ def test_stroboscope_keeps_what_does_not_move_and_ends_solid():
     picture = stroboscope([first, last], empty)[0, :, 0]
     # opacities 0.25 + 0.75 k / 2
     assert picture.tolist() == [round(200 * (1 - 0.625)), 200, 0]
+
+
+# run
+
+
+def test_run_simulates_a_scene_file(tmp_path):
+    scene, samples, numbers = (tmp_path / f"ball.{kind}" for kind in ("toml", "npz", "json"))
+    ball = physics.Sphere(0.5, 2.0, linvel=(1.0, 0.0, 0.0))
+    physics.save_scene(physics.Scene([ball], effects=[physics.Gravity()]), scene)
+    output = run("run", scene, "--duration", 1, "--npz", samples, "--json", numbers)
+    assert "ball, accuracy balanced, 1 s" in output
+    with np.load(samples) as found:
+        assert found["t"][-1] == pytest.approx(1.0)
+        assert found["pos"][-1, 0] == pytest.approx([1.0, -9.81 / 2, 0.0], abs=1e-12)
+    assert loaded(numbers)["final"]["pos"][0] == pytest.approx([1.0, -9.81 / 2, 0.0], abs=1e-12)
+
+
+def test_run_tells_what_is_wrong_with_a_file(tmp_path):
+    path = tmp_path / "ball.toml"
+    path.write_text('[[bodies]]\nkind = "Sphere"\nradius = -1\nmass = 2\n')
+    output = " ".join(run("run", path, code=2).replace("│", " ").split())
+    assert "line 3" in output
+    assert "radius is -1" in output
+    run("run", tmp_path / "none.toml", code=1)

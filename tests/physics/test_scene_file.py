@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
+from pathlib import Path
 from typing import ClassVar
 
 import pytest
@@ -91,3 +93,13 @@ def test_a_field_of_ones_own_is_read_where_its_class_is_given(tmp_path):
     assert physics.load_scene(path, kinds=[Trough]) == scene
     with pytest.raises(ValueError, match="kind is 'Trough'; allowed are Gravity"):
         physics.load_scene(path)
+
+
+def test_the_file_of_the_docs_is_read_and_its_mistake_told_as_stated(tmp_path):
+    page = (Path(__file__).parents[2] / "docs" / "scene-files.md").read_text(encoding="utf-8")
+    text = page.split("```toml\n")[1].split("```")[0]
+    scene = from_toml(text)
+    assert [type(effect).__name__ for effect in scene.effects] == ["Gravity", "Contact", "Drag"]
+    told = page.split("    ball.toml, ")[1].split("\n")[0]
+    with pytest.raises(ValueError, match=f"^{re.escape('ball.toml, ' + told)}$"):
+        from_toml(text.replace("mass = ", "mass = -"), "ball.toml")
