@@ -75,6 +75,11 @@ class Field:
         """Raise a ValueError where the field does not fit a scene of so many bodies."""
 
     @property
+    def takes_energy(self) -> bool | None:
+        """Whether it only ever takes mechanical energy (True), keeps it, its own included (False), or neither."""
+        return None
+
+    @property
     def label(self) -> str:
         """Name in a plan: of the class, in words."""
         name = type(self).__name__

@@ -55,6 +55,10 @@ class Drag(_Checked):
         for name in ("coefficient", "density", "linear"):
             self._set(name, checks.non_negative)
 
+    @property
+    def takes_energy(self):
+        return True
+
     def columns(self, body, worlds):
         return np.array([0.5 * self.density * self.coefficient, self.linear])
 
@@ -80,6 +84,10 @@ class AngularDrag(_Checked):
         self._set("linear", checks.non_negative)
         self._set("quadratic", checks.non_negative)
 
+    @property
+    def takes_energy(self):
+        return True
+
     def columns(self, body, worlds):
         return np.array([self.linear, self.quadratic])
 
@@ -104,6 +112,10 @@ class Magnus(_Checked):
     def __post_init__(self):
         self._set("coefficient", checks.non_negative)
         self._set("density", checks.non_negative)
+
+    @property
+    def takes_energy(self):
+        return False
 
     def columns(self, body, worlds):
         return np.array([0.5 * self.density * self.coefficient])
@@ -182,6 +194,10 @@ class Buoyancy(_Checked):
             raise ValueError(f"Buoyancy.normal is {self.normal!r}; allowed is any vector but zero")
         object.__setattr__(self, "normal", tuple(checks.unit(np.array(self.normal), length).tolist()))
 
+    @property
+    def takes_energy(self):
+        return False
+
     def columns(self, body, worlds):
         return np.array([*self.normal, self.offset, self.density * self.gravity])
 
@@ -226,6 +242,10 @@ class Spring(_Checked):
 
     def check(self, body_count):
         _check_body(self, body_count)
+
+    @property
+    def takes_energy(self):
+        return self.damping > 0
 
     def columns(self, body, worlds):
         acts = float(body == self.body)

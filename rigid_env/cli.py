@@ -213,6 +213,34 @@ def bench(
 
 
 @app.command()
+def effects(
+    accuracy: Accuracy = "balanced",
+    json: Json = None,
+    quick: Annotated[bool, typer.Option("--quick", help="Only see that it runs.")] = False,
+) -> None:
+    """Measure what each effect costs: steps per second of its scene with it and without."""
+    with _told_errors():
+        from physics import accuracy as knobs
+        from rigid_env.measure import effects as costs
+        from rigid_env.measure.table import make_console, make_table
+
+        knobs.resolve(accuracy)
+        console, path = make_console(), json.resolve() if json else None
+        repeats, steps = (QUICK_REPEATS, costs.QUICK_STEPS) if quick else (BENCH_REPEATS, costs.STEPS)
+        found = []
+        with _progress(console, has_thread=False) as progress:
+            task = progress.add_task("measuring", total=costs.run_count(repeats))
+
+            def tick(what: str) -> None:
+                progress.update(task, advance=1, description=what, refresh=True)
+
+            for name in costs.CASES:
+                found.append(costs.effect_row(name, accuracy, steps, repeats, tick))
+        console.print(make_table(found, "steps per second with the effect, against the scene without it"))
+        _write(path, {"is_quick": quick, "rows": [row.to_dict() for row in found]}, console)
+
+
+@app.command()
 def accuracy(
     scene: Annotated[list[str] | None, typer.Argument(help="Scenes; none: all with a known outcome.")] = None,
     peers: Annotated[str, typer.Option(metavar="NAMES", help="Of mujoco,pybullet,drake; with commas.")] = "",
