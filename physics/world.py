@@ -329,12 +329,13 @@ class World:
     def __getstate__(self):
         kept = dict(vars(self))
         views = ("pos", "quat", "linvel", "angvel")
-        for name in ("pool", "scratch", "motions", "_wrench", "_calls", "_bound_for", *views):
+        for name in ("plan", "pool", "scratch", "motions", "_wrench", "_calls", "_bound_for", *views):
             del kept[name]
         return kept
 
     def __setstate__(self, kept):
         vars(self).update(kept)
+        self.plan = make_plan(self.scene, self.accuracy)  # it holds compiled functions of fields
         self._prepare_threads()
         self._bind_views()
 

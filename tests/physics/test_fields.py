@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from concurrent.futures import ProcessPoolExecutor
+from multiprocessing import get_context
 
 import numpy as np
 import pytest
@@ -216,6 +218,24 @@ def test_worlds_have_gusts_of_their_own_and_the_same_ones_in_any_batch():
         small.step()
     # Time in one call is call_start + k h, in many time += h: rounding of t, and nothing else.
     assert small.state == pytest.approx(after, abs=1e-12)
+
+
+def test_a_world_in_fields_travels_to_another_process():
+    """Pickled there and back by a process that is spawned: it goes on as the one that stayed."""
+    effects = [physics.Drag(0.47), physics.Wind(gust=3.0, seed=5)]
+    world = physics.World(physics.Scene([physics.Sphere(0.3, 0.5)], effects=effects), worlds=2, dt=0.01)
+    world.step(steps=10)
+    with ProcessPoolExecutor(1, mp_context=get_context("spawn")) as pool:
+        there = pool.submit(advanced, world).result()
+    world.step(steps=10)
+    assert np.array_equal(there.state, world.state)
+    assert there.time == world.time
+
+
+def advanced(world: physics.World) -> physics.World:
+    """The world ten steps later."""
+    world.step(steps=10)
+    return world
 
 
 def test_a_block_bobs_with_the_frequency_of_its_waterplane():
