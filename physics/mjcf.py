@@ -24,8 +24,8 @@ KEYFRAME = "start"
 def save_mjcf(scene: Scene, path: str | Path, drop: bool = False) -> None:
     """Write a scene for MuJoCo.
 
-    Bodies with mass, inertia, pose and velocity, planes, gravity, friction and springs; bodies meet planes only. The
-    contacts are MuJoCo's soft ones with its defaults, its time step too.
+    Bodies with mass, inertia, pose and velocity, planes, gravity, friction and springs. The contacts are MuJoCo's soft
+    ones with its defaults, its time step too.
 
     Parameters
     ----------
@@ -125,7 +125,11 @@ def _add_body(world: ET.Element, b: int, body, contact: Contact | None, surface:
     ET.SubElement(element, "inertial", pos="0 0 0", mass=_text(body.mass), fullinertia=full)
     size = body.dimensions[:1] if body.kind == "sphere" else body.dimensions
     shape = {"type": GEOMS[body.kind], "size": _text(size), "pos": _text(body.center)}
-    ET.SubElement(element, "geom", **shape, contype="1" if contact else "0", conaffinity="0", **surface)
+    touch = {
+        "contype": str(int(contact is not None)),
+        "conaffinity": str(int(bool(contact and contact.between_bodies))),
+    }
+    ET.SubElement(element, "geom", **shape, **touch, **surface)
     for k, spring in enumerate(springs):
         if spring.body == b:
             ET.SubElement(element, "site", name=f"point{k}", pos=_text(spring.point))

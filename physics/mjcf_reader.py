@@ -170,17 +170,30 @@ def _velocities(root: ET.Element, count: int) -> np.ndarray:
 
 
 def _contact_effects(elements: list[ET.Element], planes: list[ET.Element]) -> list:
-    """Contact and friction between all bodies and all planes; MuJoCo takes the larger friction of two."""
-    found = set()
-    for element in elements:
-        geom = element.find("geom")
-        for plane in planes:
-            mine, its = ((int(g.get("contype", 1)), int(g.get("conaffinity", 1))) for g in (geom, plane))
-            meets = bool(mine[0] & its[1] or its[0] & mine[1])
-            slides = max(int(geom.get("condim", 3)), int(plane.get("condim", 3))) == 1
-            mu = 0.0 if slides else max(_numbers(g, "friction", FRICTION, 1)[0] for g in (geom, plane))
-            found.add((meets, float(mu) if meets else 0.0))
-    if len(found) > 1:
-        raise ValueError(f"pairs of bodies and planes differ in contact and friction: {sorted(found)}; allowed is one")
-    meets, mu = found.pop() if found else (False, 0.0)
-    return ([Contact()] if meets else []) + ([Friction(mu)] if mu > 0 else [])
+    """Contact and friction of all bodies; MuJoCo takes the larger friction of two."""
+    geoms = [element.find("geom") for element in elements]
+    with_planes = {_pair(geom, plane) for geom in geoms for plane in planes}
+    with_bodies = {_pair(a, b) for a in geoms for b in geoms}
+    for found, what in ((with_planes, "planes"), (with_bodies, "bodies")):
+        if len(found) > 1:
+            told = f"pairs of bodies and {what} differ in contact or friction: {sorted(found)}"
+            raise ValueError(f"{told}; allowed is one")
+    between, mu_between = with_bodies.pop() if with_bodies else (False, 0.0)
+    meets, mu = with_planes.pop() if with_planes else (False, 0.0)
+    if not meets:
+        mu = mu_between
+    elif between and mu_between != mu:
+        raise ValueError(f"friction is {mu} with planes, {mu_between} between bodies; allowed is one")
+    if not meets and not (between and len(geoms) > 1):
+        return []
+    return [Contact(between_bodies=between)] + ([Friction(mu)] if mu > 0 else [])
+
+
+def _pair(a: ET.Element, b: ET.Element) -> tuple[bool, float]:
+    """Whether two geoms touch, and with what friction."""
+    (own, mine), (other, its) = ((int(g.get("contype", 1)), int(g.get("conaffinity", 1))) for g in (a, b))
+    if not (own & its or other & mine):
+        return False, 0.0
+    if max(int(g.get("condim", 3)) for g in (a, b)) == 1:
+        return True, 0.0
+    return True, float(max(_numbers(g, "friction", FRICTION, 1)[0] for g in (a, b)))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from concurrent.futures import ProcessPoolExecutor
+from dataclasses import replace
 from multiprocessing import get_context
 
 import numpy as np
@@ -374,8 +375,12 @@ def test_the_football_flies_as_an_independent_integrator_says():
 
 @pytest.mark.parametrize("accuracy", ["balanced", "fast", "precise"])
 def test_fields_without_strength_leave_every_bit(accuracy):
-    """Flight, impacts, sliding and rest of the block in its box; and a tumbling flight without walls."""
-    for built in (scenes.drop(), scenes.tumble()):
+    """The block in its box; a tumbling flight without walls; a ball that falls on a block."""
+    pair = physics.Scene(
+        [physics.Sphere(0.5, 1.0, pos=(0, 2, 0)), physics.Block((1, 1, 1), 2.0, pos=(0.2, 0.5, 0))],
+        [physics.HalfSpace((0, 1, 0))], [GRAVITY, physics.Contact(0.3), physics.Friction(0.4)],
+    )  # fmt: skip
+    for built in (scenes.drop(), scenes.tumble(), *([pair] if accuracy == "balanced" else [])):
         runs = []
         for extra in ((), NOTHING):
             effects = (*built.effects, *extra)
@@ -406,6 +411,41 @@ def test_sliding_in_a_field_is_of_second_order_and_precise_to_its_tolerance():
     assert abs(world.linvel[0, 0, 0] - speed) + abs(world.pos[0, 0, 0] - way) < 1e-8
     world, _, _ = slide_in_water("precise", 0.1, 4.0)
     assert world.linvel[0, 0].tolist() == [0, 0, 0]  # it has stopped, and rests
+
+
+def test_bodies_that_may_touch_each_other_feel_fields_as_each_alone_does():
+    """Far apart, in the kernel of many bodies: the same formulas, to rounding of some hundred steps."""
+    ball = physics.Sphere(0.3, 2.0, pos=(-50, 0, 0), linvel=(3, 0, 1), angvel=(0, 5, 0))
+    brick = physics.Block((0.5, 0.3, 0.2), 2.0, pos=(50, 0, 0), angvel=(1, 2, 3))
+    springs = physics.Spring((-50, 1, 0), (0.1, 0, 0), 40.0), physics.Spring((50, 1, 0), (0.1, 0, 0), 40.0, body=1)
+    effects = [GRAVITY, physics.Drag(0.9), physics.Magnus(), physics.Contact(), *springs]
+    both = physics.World(physics.Scene([ball, brick], effects=effects), dt=0.01)
+    assert both.plan.many
+    both.step(steps=100)
+    for b, body in enumerate((ball, brick)):
+        alone = replace(springs[b], body=0)
+        single = physics.World(physics.Scene([body], effects=[*effects[:3], alone]), dt=0.01)
+        single.step(steps=100)
+        for name in ("pos", "quat", "linvel", "angvel"):
+            # In the kernel of both the sphere has a gyroscopic flow: the same motion to rounding, not to the bit.
+            assert getattr(both, name)[0, b] == pytest.approx(getattr(single, name)[0, 0], abs=1e-11)
+
+
+def test_two_balls_on_springs_meet_with_the_speed_that_the_springs_gave_them():
+    """Each swings about its anchor as a cosine; they touch where x = r, and a plastic impact stops both."""
+    balls = [physics.Sphere(0.5, 1.0, pos=(side * 2.0, 0, 0)) for side in (-1.0, 1.0)]
+    springs = [physics.Spring((0, 0, 0), stiffness=9.0, body=b) for b in range(2)]
+    built = physics.Scene(balls, effects=[physics.Contact(), *springs])
+    free, hit = (physics.World(built, dt=0.005) for _ in range(2))
+    time = math.acos(0.25) / 3.0  # 2 cos(3 t) = 1/2
+    free.step(steps=round(0.4 / 0.005))
+    # Leapfrog: the phase is off by (ω h)²/24 of itself, the place by 2 ω times that at most: 3e-5.
+    assert free.pos[0, 1, 0] == pytest.approx(2.0 * math.cos(3.0 * 0.4), abs=5e-5)
+    hit.step(steps=math.ceil(time / 0.005) + 1)
+    assert hit.linvel[0, :, 0] == pytest.approx([0, 0], abs=1e-9)
+    # The springs press them together from then on: x stays at the radius, to the slop and the place of the impact.
+    hit.step(steps=200)
+    assert hit.pos[0, :, 0] == pytest.approx([-0.5, 0.5], abs=0.01)
 
 
 def test_precise_finds_the_impact_of_a_ball_that_falls_through_air():
