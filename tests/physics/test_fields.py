@@ -373,21 +373,30 @@ def test_the_football_flies_as_an_independent_integrator_says():
     assert error(end(football, t, 0.1, "precise")) < 1e-8
 
 
-@pytest.mark.parametrize("accuracy", ["balanced", "fast", "precise"])
-def test_fields_without_strength_leave_every_bit(accuracy):
-    """The block in its box; a tumbling flight without walls; a ball that falls on a block."""
-    pair = physics.Scene(
-        [physics.Sphere(0.5, 1.0, pos=(0, 2, 0)), physics.Block((1, 1, 1), 2.0, pos=(0.2, 0.5, 0))],
-        [physics.HalfSpace((0, 1, 0))], [GRAVITY, physics.Contact(0.3), physics.Friction(0.4)],
-    )  # fmt: skip
-    for built in (scenes.drop(), scenes.tumble(), *([pair] if accuracy == "balanced" else [])):
-        runs = []
-        for extra in ((), NOTHING):
-            effects = (*built.effects, *extra)
-            world = physics.World(physics.Scene(built.bodies, built.walls, effects), dt=0.01, accuracy=accuracy)
-            world.step(steps=300)
-            runs.append((world.state.tobytes(), world.memory.tobytes(), world.report_table.tobytes()))
-        assert runs[0] == runs[1]
+BALL_ON_BLOCK = physics.Scene(
+    [physics.Sphere(0.5, 1.0, pos=(0, 2, 0)), physics.Block((1, 1, 1), 2.0, pos=(0.2, 0.5, 0))],
+    [physics.HalfSpace((0, 1, 0))], [GRAVITY, physics.Contact(0.3), physics.Friction(0.4)],
+)  # fmt: skip
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("built", "accuracy"),
+    [
+        (scenes.tumble(), "balanced"), (scenes.tumble(), "precise"), (scenes.drop(), "balanced"),
+        (scenes.drop(), "precise"), (BALL_ON_BLOCK, "balanced"),
+    ],
+    ids=["tumble", "tumble, precise", "drop", "drop, precise", "ball on block"],
+)  # fmt: skip
+def test_fields_without_strength_leave_every_bit(built, accuracy):
+    """A tumbling flight without walls; the block in its box, to its rest; a ball that falls on a block."""
+    runs = []
+    for extra in ((), NOTHING):
+        effects = (*built.effects, *extra)
+        world = physics.World(physics.Scene(built.bodies, built.walls, effects), dt=0.01, accuracy=accuracy)
+        world.step(steps=300)
+        runs.append((world.state.tobytes(), world.memory.tobytes(), world.report_table.tobytes()))
+    assert runs[0] == runs[1]
 
 
 def slide_in_water(accuracy, dt, duration):
