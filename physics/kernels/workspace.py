@@ -34,6 +34,7 @@ def body_fields(terms: tuple[Term, ...] = ()) -> list[tuple]:
     """Fields of what `body.bind_body` writes of one body, and of what the scene's force fields do to it."""
     f, i = np.float64, np.int64
     return [
+        *members(terms),  # first: Numba takes a record for one that it begins with, and its kernels for its own
         ("relative_slop", f),  # gap within which a feature touches, in bounding radii; the one field that is read
         ("i", i),
         ("world", i),
@@ -51,7 +52,6 @@ def body_fields(terms: tuple[Term, ...] = ()) -> list[tuple]:
         ("free_acceleration", f, (3,)),  # of the centre of mass without contact [m/s²]
         ("torque", f, (3,)),  # about the centre of mass [N m]
         ("acceleration", f),  # bound for any point of the body without contact [m/s²]
-        *members(terms),
     ]
 
 
