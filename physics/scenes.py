@@ -155,10 +155,7 @@ SCENES = {
     function.__name__: function
     for function in (
         drop, flight, tumble, rest, shove, corner_drop, slide, bounce, rolling_sphere, vertex_drop, closed_box,
-        tower, heap,
-
-
-        football,
+        tower, heap, football,
     )
 }  # fmt: skip
 SCENES["incline"] = lambda: incline(math.radians(20.0), 1.01 * math.tan(math.radians(20.0)))
