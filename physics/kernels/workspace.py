@@ -34,7 +34,7 @@ def body_fields(terms: tuple[Term, ...] = ()) -> list[tuple]:
     """Fields of what `body.bind_body` writes of one body, and of what the scene's force fields do to it."""
     f, i = np.float64, np.int64
     return [
-        *members(terms),  # first: Numba takes a record for one that it begins with, and its kernels for its own
+        *members(terms),  # first: a record may stand for one that it begins with, and Numba would say so
         ("relative_slop", f),  # gap within which a feature touches, in bounding radii; the one field that is read
         ("i", i),
         ("world", i),

@@ -428,7 +428,7 @@ def test_bodies_that_may_touch_each_other_feel_fields_as_each_alone_does():
     brick = physics.Block((0.5, 0.3, 0.2), 2.0, pos=(50, 0, 0), angvel=(1, 2, 3))
     springs = physics.Spring((-50, 1, 0), (0.1, 0, 0), 40.0), physics.Spring((50, 1, 0), (0.1, 0, 0), 40.0, body=1)
     effects = [GRAVITY, physics.Drag(0.9), physics.Magnus(), physics.Contact(), *springs]
-    # Compiled before: Numba takes a record for another one that it begins with, and took these kernels for the others.
+    # Compiled before, without fields: a record may stand for one that it begins with, but these kernels must not.
     physics.World(physics.Scene([ball, brick], effects=[GRAVITY, physics.Contact()]), dt=0.01).step()
     both = physics.World(physics.Scene([ball, brick], effects=effects), dt=0.01)
     assert both.plan.many
