@@ -10,14 +10,18 @@ The contract in five lines::
 """
 
 from physics.accuracy import PRESETS, Accuracy
-from physics.diagnostics import Diagnostics, diagnose
+from physics.diagnostics import Diagnostics, diagnose, look_at
 from physics.effects import Contact, Friction, Gravity
+from physics.field import Field, field_function
+from physics.fields import AngularDrag, Buoyancy, Drag, Magnus, Push, Spring, Wind
 from physics.frontier_result import Frontier, FrontierPoint
 from physics.frontier_run import frontier, ladder
 from physics.frontier_truth import Truth
+from physics.mjcf import load_mjcf, save_mjcf
 from physics.plan import make_plan
 from physics.report import Solver, Status, StepReport
 from physics.scene import HalfSpace, Scene, corner, three_walls
+from physics.scene_file import load_scene, save_scene
 from physics.shapes import Block, Body, Ellipsoid, Sphere
 from physics.stepper import Stepper
 from physics.trajectory import Event, Trajectory, simulate
@@ -26,32 +30,46 @@ from physics.world import Snapshot, World
 __all__ = [
     "PRESETS",
     "Accuracy",
+    "AngularDrag",
     "Block",
     "Body",
+    "Buoyancy",
     "Contact",
     "Diagnostics",
+    "Drag",
     "Ellipsoid",
     "Event",
+    "Field",
     "Friction",
     "Frontier",
     "FrontierPoint",
     "Gravity",
     "HalfSpace",
+    "Magnus",
+    "Push",
     "Scene",
     "Snapshot",
     "Solver",
     "Sphere",
+    "Spring",
     "Status",
     "StepReport",
     "Stepper",
     "Trajectory",
     "Truth",
+    "Wind",
     "World",
     "corner",
     "diagnose",
+    "field_function",
     "frontier",
     "ladder",
+    "load_mjcf",
+    "load_scene",
+    "look_at",
     "make_plan",
+    "save_mjcf",
+    "save_scene",
     "simulate",
     "three_walls",
 ]

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from physics import checks, parameters
+from physics.field import Field, FieldSlot, write_columns
 from physics.kernels import layout as at
 from physics.kernels.probe import angular_momenta, deepest_gaps
 
@@ -33,7 +36,7 @@ def set_state(world: World, pos, quat, linvel, angvel, worlds) -> None:
     _adopt(world, chosen, rows, state, world.params[rows], "set_state")
 
 
-def set_parameters(world: World, mass, size, inertia_body, friction, restitution, gravity, worlds) -> None:
+def set_parameters(world: World, mass, size, inertia_body, friction, restitution, gravity, effects, worlds) -> None:
     """`World.set_parameters`, which documents it."""
     chosen = _chosen(world, worlds)
     rows = _rows(world, chosen)
@@ -47,6 +50,8 @@ def set_parameters(world: World, mass, size, inertia_body, friction, restitution
     if restitution is not None:
         _needs("restitution", plan.restitution, "physics.Contact(restitution=...)")
         params[:, at.RESTITUTION] = checks.share(*parameters.spread(restitution, shape, "restitution")).ravel()
+    if effects is not None:
+        write_columns(_changed_slots(world, effects), params[:, at.PARAM_SIZE :], world.body_count, chosen)
     field = None
     if gravity is not None:
         _needs("gravity", plan.gravity, "physics.Gravity(...)")
@@ -101,6 +106,26 @@ def _adopt(world: World, chosen, rows, state, params, what, keep_memory=False) -
 def _needs(field: str, is_on, effect: str) -> None:
     if not is_on:
         raise ValueError(f"{field} was given, but the scene does not declare it; add {effect} to Scene.effects")
+
+
+def _changed_slots(world: World, effects) -> list[FieldSlot]:
+    """The scene's kinds of field that `effects` are of, with these in place of the scene's."""
+    kinds: dict[type, list[Field]] = {}
+    for effect in effects if isinstance(effects, Sequence) else (effects,):
+        if not isinstance(effect, Field):
+            raise ValueError(f"effects holds {effect!r}; allowed are force fields (the rest has arguments of its own)")
+        effect.check(world.body_count)
+        kinds.setdefault(type(effect), []).append(effect)
+    slots = {type(slot.effects[0]): slot for slot in world.plan.fields}
+    for kind, given in kinds.items():
+        _needs(kind.__name__, kind in slots, f"physics.{kind.__name__}(...)")
+        slot = slots[kind]
+        if len(given) != len(slot.effects):
+            raise ValueError(
+                f"effects holds {len(given)} {kind.__name__}; allowed are {len(slot.effects)}, as in the scene"
+            )
+        slots[kind] = replace(slot, effects=tuple(given))
+    return [slots[kind] for kind in kinds]
 
 
 def _chosen(world: World, worlds) -> np.ndarray:

@@ -9,6 +9,10 @@ from numpy.typing import ArrayLike
 # a state printed or stored in single precision keeps.
 UNIT_TOLERANCE = 1e-6
 
+# A vector of up to four components divided by its length has length 1 within this: half an ulp of each quotient and of
+# the length, and rounding of the length when it is measured again.
+UNIT_ROUNDING = 4 * np.finfo(float).eps
+
 
 def finite(value: ArrayLike, shape: tuple[int, ...], field: str) -> np.ndarray:
     """`value` as a float64 array of exactly `shape`, all finite."""
@@ -65,7 +69,12 @@ def unit_quaternion(value: ArrayLike, shape: tuple[int, ...], field: str) -> np.
     length = np.linalg.norm(array, axis=-1, keepdims=True)
     if not (np.abs(length - 1) <= UNIT_TOLERANCE).all():
         raise ValueError(f"{field} is {_show(array)}; allowed are unit quaternions (w, x, y, z)")
-    return array / length
+    return unit(array, length)
+
+
+def unit(array: np.ndarray, length: np.ndarray) -> np.ndarray:
+    """`array` divided by its `length`; where that is 1 to rounding as it is, so that doing it twice changes nothing."""
+    return np.where(np.abs(length - 1) <= UNIT_ROUNDING, array, array / length)
 
 
 def _show(array: np.ndarray) -> str:

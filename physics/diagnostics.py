@@ -7,7 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from physics.kernels import layout as at
+from physics.kernels.fields.probe import look_at_fields
 from physics.kernels.probe import deepest_gaps
+from physics.kernels.workspace import body_records
 from physics.world import World
 
 
@@ -16,7 +18,7 @@ class Diagnostics:
     """Per world and body, shape (worlds, bodies) or (worlds, bodies, 3)."""
 
     kinetic_energy: np.ndarray  # [J]
-    potential_energy: np.ndarray  # [J], zero at the origin
+    potential_energy: np.ndarray  # [J]: of gravity, zero at the origin, and of fields that have one
     momentum: np.ndarray  # [kg m/s], world frame
     angular_momentum: np.ndarray  # about the centre of mass [kg m²/s], world frame
     gap: np.ndarray  # smallest distance to a wall [m], negative when penetrating, inf without walls
@@ -30,7 +32,7 @@ class Diagnostics:
 def diagnose(world: World) -> Diagnostics:
     """Energy, momenta and gaps of every body of `world` now.
 
-    Kinetic energy is ½ P·v + ½ L·ω, potential energy -m g·x.
+    Kinetic energy is ½ P·v + ½ L·ω, potential energy -m g·x and what fields add (`Field.energy`).
     """
     shape = (world.worlds, world.body_count)
     mass = 1.0 / world.params[:, at.INV_MASS].reshape(shape)
@@ -38,10 +40,30 @@ def diagnose(world: World) -> Diagnostics:
     momentum = mass[..., None] * world.linvel
     gaps, which = np.empty(len(world.state)), np.empty(len(world.state), np.int64)
     deepest_gaps(np.arange(len(world.state)), world.state, world.params, world.shapes, world.walls, gaps, which)
+    potential = -mass * np.sum(world.gravity[:, None, :] * world.pos, axis=-1)
+    if world.plan.fields:
+        potential += look_at(world)[1].reshape(shape)
     return Diagnostics(
         kinetic_energy=0.5 * np.sum(momentum * world.linvel + angular * world.angvel, axis=-1),
-        potential_energy=-mass * np.sum(world.gravity[:, None, :] * world.pos, axis=-1),
+        potential_energy=potential,
         momentum=momentum,
         angular_momentum=angular.copy(),
         gap=np.where(which < 0, np.inf, gaps).reshape(shape),
     )
+
+
+def look_at(world: World) -> tuple[np.ndarray, np.ndarray]:
+    """What the scene's fields do now.
+
+    Returns
+    -------
+    wrenches : (worlds * bodies, 6) float64
+        Force [N] and torque about the centre of mass [N m], world frame.
+    energies : (worlds * bodies,) float64
+        Potential energies [J].
+    """
+    wrenches, energies = np.zeros((len(world.state), 6)), np.zeros(len(world.state))
+    if world.plan.fields:
+        arrays = world.state, world.params, world.shapes
+        look_at_fields(*arrays, world.plan.tilted, world.time, body_records(world.scratch[0]), wrenches, energies)
+    return wrenches, energies

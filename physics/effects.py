@@ -2,6 +2,7 @@
 
 A scene declares its effects; what it does not declare is not compiled into its
 kernel. The gyroscopic torque declares itself where a body's moments differ.
+Force fields (drag, springs, your own) stand in `physics.fields`.
 """
 
 from __future__ import annotations
@@ -9,6 +10,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from physics import checks
+from physics.field import Field
 
 
 @dataclass(frozen=True)
@@ -69,4 +71,4 @@ class Friction:
         object.__setattr__(self, "coefficient", value)
 
 
-EFFECTS = (Gravity, Contact, Friction)
+EFFECTS = (Gravity, Contact, Friction, Field)

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from physics.effects import Contact, Friction, Gravity
+from physics.field import Field
 from physics.scene import Scene
 from physics.shapes import Body
 
@@ -74,19 +75,27 @@ def mechanical_energy(scene: Scene, pos, quat, linvel, angvel) -> np.ndarray:
 
 
 def conserves_energy(scene: Scene) -> bool:
-    """Whether nothing in the scene takes energy: no contact, or elastic contact without friction."""
+    """Whether nothing in the scene takes energy: no contact, or elastic contact without friction; no drag."""
+    if any(law is not False for law in _field_laws(scene)):
+        return False
     contact, friction = scene.effect(Contact), scene.effect(Friction)
     if contact is None or not scene.walls:
         return True
     return contact.restitution == 1.0 and (friction is None or friction.coefficient == 0.0)
 
 
+def _field_laws(scene: Scene) -> list[bool | None]:
+    return [effect.takes_energy for effect in scene.effects if isinstance(effect, Field)]
+
+
 def energy_error(scene: Scene, energy: np.ndarray) -> float:
     """By how much the energy [J], (samples, bodies), breaks its law; bodies do not exchange any.
 
     Where it is conserved: the largest departure from the start. Else: the largest rise above an earlier value, which
-    nothing passive has; what the right losses are only a truth can tell.
+    nothing passive has; what the right losses are only a truth can tell. Not a number where a field may give energy.
     """
+    if None in _field_laws(scene):
+        return float("nan")
     if conserves_energy(scene):
         return float(np.abs(energy - energy[0]).max())
     return float((energy - np.minimum.accumulate(energy, axis=0)).max())

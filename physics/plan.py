@@ -8,7 +8,10 @@ import numpy as np
 
 from physics.accuracy import EVENTS, SCHEMES, Accuracy
 from physics.effects import Contact, Friction, Gravity
+from physics.field import FieldSlot, field_slots
+from physics.fields import FIELDS
 from physics.inertia import principal_axes
+from physics.kernels.fields.terms import Term
 from physics.kernels.layout import BLOCK, ELLIPSOID, SPHERE, VERTEX_COUNT
 from physics.scene import Scene
 
@@ -47,6 +50,7 @@ class Plan:
     events: bool | None
     many: bool | None
     features: int
+    fields: tuple[FieldSlot, ...]
     rows: tuple[Row, ...]
 
     @property
@@ -63,7 +67,18 @@ class Plan:
         return (
             self.contact, self.friction, self.restitution, self.gravity, self.gyroscopic, self.tilted,
             self.pivots, self.scheme is None, self.events, self.many, self.features,
+            *(term.marker for term in self.terms),
         )  # fmt: skip
+
+    @property
+    def terms(self) -> tuple[Term, ...]:
+        """The fields' part in the kernel."""
+        return tuple(slot.term for slot in self.fields)
+
+    @property
+    def field_columns(self) -> int:
+        """Columns of parameters that the fields have."""
+        return sum(term.count * term.size for term in self.terms)
 
     def allows(self, moments: np.ndarray, R: np.ndarray) -> np.ndarray:
         """Whether the kernel of this plan can turn bodies with these `physics.inertia.principal_axes`.
@@ -119,6 +134,7 @@ def make_plan(scene: Scene, accuracy: Accuracy) -> Plan:
     scheme = SCHEMES[accuracy.scheme]
     if many:
         _check_many(scene, scheme)
+    fields = field_slots(scene.effects, len(scene.bodies))
     return Plan(
         contact=touching or None,
         friction=rubbing or None,
@@ -131,6 +147,7 @@ def make_plan(scene: Scene, accuracy: Accuracy) -> Plan:
         events=(scheme == EVENTS) or None,
         many=many or None,
         features=VERTEX_COUNT if has_block else 1,
+        fields=fields,
         rows=(
             _gravity_row(gravity),
             Row(
@@ -145,6 +162,7 @@ def make_plan(scene: Scene, accuracy: Accuracy) -> Plan:
             _restitution_row(contact, touching),
             _gyroscopic_row(isotropic, turned),
             _center_row(uneven),
+            *_field_rows(fields),
             Row("free motion", True, f"scheme {accuracy.scheme}, {accuracy.substeps} substep(s) per dt", ""),
         ),
     )
@@ -219,3 +237,14 @@ def _center_row(uneven) -> Row:
         return Row("uneven mass", False, "automatic: every body's centre of mass is its geometric centre", "")
     reason = f"declared: center of {'body' if len(uneven) == 1 else 'bodies'} {', '.join(map(str, uneven))} is not 0"
     return Row("uneven mass", True, reason, "contacts about the centre of mass")
+
+
+def _field_rows(fields: tuple[FieldSlot, ...]) -> list[Row]:
+    """What is declared, then the built-in fields that are not."""
+    rows = [
+        Row(slot.effects[0].label, True, f"declared: {', '.join(map(repr, slot.effects))}",
+            f"{slot.term.count * slot.term.size} parameters per body, one function")
+        for slot in fields
+    ]  # fmt: skip
+    declared = {type(slot.effects[0]) for slot in fields}
+    return rows + [Row(kind().label, False, "not declared", "") for kind in FIELDS if kind not in declared]

@@ -20,6 +20,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from physics import checks
+from physics.diagnostics import look_at
 from physics.kernels import layout as at
 from physics.kernels.probe import contact_point
 from physics.lcp import LcpResult, lcp
@@ -72,6 +73,7 @@ def resting_contact(
         raise ValueError("world has contact between bodies; allowed here are scenes with Contact(between_bodies=False)")
     load = np.zeros(6) if wrench is None else checks.finite(wrench, (6,), "wrench")
     i = index * world.body_count + body
+    load = load + look_at(world)[0][i]
     row, params = world.state[i], world.params[i]
     if gap is None:
         gap = 10 * world.accuracy.slop * params[at.RADIUS]

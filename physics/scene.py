@@ -9,6 +9,7 @@ import numpy as np
 
 from physics import checks
 from physics.effects import EFFECTS, Contact, Friction
+from physics.field import Field
 from physics.shapes import Body
 
 
@@ -32,7 +33,7 @@ class HalfSpace:
         length = float(np.linalg.norm(normal))
         if not length > 0 or not np.isfinite(length):
             raise ValueError(f"HalfSpace.normal is {self.normal!r}; allowed is any vector but zero")
-        object.__setattr__(self, "normal", tuple((normal / length).tolist()))
+        object.__setattr__(self, "normal", tuple(checks.unit(normal, length).tolist()))
         object.__setattr__(self, "offset", checks.number(self.offset, "HalfSpace.offset"))
 
 
@@ -57,7 +58,8 @@ class Scene:
         At least one.
     walls : sequence of HalfSpace
     effects : sequence of effects
-        At most one of each kind. `Friction` needs `Contact`.
+        At most one of each kind, but any number of `Spring` and `Push`. `Friction` needs `Contact`, `Wind` needs a
+        field for it to act through.
 
     Raises
     ------
@@ -81,10 +83,18 @@ class Scene:
             raise ValueError("Scene.bodies is empty; allowed is at least one body")
         kinds = [type(effect) for effect in self.effects]
         for kind in set(kinds):
-            if kinds.count(kind) > 1:
+            if kinds.count(kind) > 1 and not getattr(kind, "has_many", False):
                 raise ValueError(f"Scene.effects holds {kinds.count(kind)} {kind.__name__}; allowed is one")
         if Friction in kinds and Contact not in kinds:
             raise ValueError("Scene.effects holds Friction without Contact; add physics.Contact()")
+        self._check_fields()
+
+    def _check_fields(self) -> None:
+        fields = [effect for effect in self.effects if isinstance(effect, Field)]
+        for field in fields:
+            field.check(len(self.bodies))
+        if fields and all(field.is_air for field in fields):
+            raise ValueError("Scene.effects holds Wind without what it acts through; add physics.Drag()")
 
     def effect(self, kind: type):
         """The scene's effect of this class, or None."""

@@ -7,8 +7,9 @@ import math
 import numpy as np
 
 from physics.effects import Contact, Friction, Gravity
+from physics.fields import AngularDrag, Drag, Magnus
 from physics.scene import HalfSpace, Scene, corner, three_walls
-from physics.shapes import Block, Sphere
+from physics.shapes import Block, Ellipsoid, Sphere
 
 SIZE = (5.0, 3.0, 2.0)  # of the block [m]
 MASS = 6.0  # of the block [kg]
@@ -136,11 +137,25 @@ def heap(count: int = 100, seed: int = 1) -> Scene:
     return Scene(bodies, walls, [Gravity((0, -GRAVITY, 0)), Contact(), Friction(0.5)])
 
 
+def football() -> Scene:
+    """The football of the course notes in flight: kicked at 25 m/s, spinning about its long axis and a little off it.
+
+    Gravity exerts no torque on it; drag and lift are those of the air, and the spin wears off slowly.
+    """
+    launch, spin = 0.6, 50.0  # [rad] above the horizon, [rad/s] about the long axis
+    c, s = math.cos(launch), math.sin(launch)
+    ball = Ellipsoid(
+        (0.14, 0.085, 0.085), 0.41, pos=(0.0, 1.0, 0.0), quat=(math.cos(launch / 2), 0.0, 0.0, math.sin(launch / 2)),
+        linvel=(25.0 * c, 25.0 * s, 0.0), angvel=(spin * c - 2.0 * s, spin * s + 2.0 * c, 1.0),
+    )  # fmt: skip
+    return Scene([ball], [], [Gravity((0, -GRAVITY, 0)), Drag(0.2), Magnus(), AngularDrag(1e-6)])
+
+
 SCENES = {
     function.__name__: function
     for function in (
         drop, flight, tumble, rest, shove, corner_drop, slide, bounce, rolling_sphere, vertex_drop, closed_box,
-        tower, heap,
+        tower, heap, football,
     )
 }  # fmt: skip
 SCENES["incline"] = lambda: incline(math.radians(20.0), 1.01 * math.tan(math.radians(20.0)))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,13 +12,15 @@ from physics import changes, checks, parameters
 from physics.accuracy import Accuracy, resolve
 from physics.contacts import contact_ends, contact_forces
 from physics.effects import Contact, Friction, Gravity
+from physics.field import Field, write_columns
 from physics.kernels import layout as at
 from physics.kernels.events.log import EVENT_SIZE
 from physics.kernels.events.motion import make_motion
+from physics.kernels.fields.terms import declare
 from physics.kernels.many import arrays as many
 from physics.kernels.probe import angular_momenta
 from physics.kernels.stages import memory_size
-from physics.kernels.workspace import make_workspace
+from physics.kernels.workspace import body_records, make_workspace
 from physics.plan import SHAPE_CODES, make_plan
 from physics.report import StepReport
 from physics.scene import Scene
@@ -95,7 +97,7 @@ class World:
     def _allocate(self) -> None:
         rows = self.worlds * self.body_count
         self.state = np.zeros((rows, at.STATE_SIZE))
-        self.params = np.zeros((rows, at.PARAM_SIZE))
+        self.params = np.zeros((rows, at.PARAM_SIZE + self.plan.field_columns))
         self.gravity = np.zeros((self.worlds, 3))
         self.walls = parameters.wall_table(self.scene.walls)
         self.memory = self._make_memory()
@@ -109,14 +111,15 @@ class World:
     def _prepare_threads(self) -> None:
         self.pool = SlicePool(self.threads, self.worlds)
         settings = self.accuracy
+        declare(self.plan.terms)
         numbers = {
             "tolerance": settings.tolerance, "sweeps": settings.iterations, "splits": settings.impacts,
             "relative_slop": settings.slop, "rest_share": settings.rest_share,
         }  # fmt: skip
         self.scratch = [
-            many.make_many(self.body_count, self.walls, **numbers)
+            many.make_many(self.body_count, self.walls, self.plan.terms, **numbers)
             if self.plan.many
-            else make_workspace(self.walls, self.plan.features, **numbers)
+            else make_workspace(self.walls, self.plan.features, self.plan.terms, **numbers)
             for _ in self.pool.slices
         ]
         self.motions = [
@@ -163,6 +166,8 @@ class World:
         self.params[:, at.FRICTION] = friction.coefficient if friction else 0.0
         self.params[:, at.RESTITUTION] = (contact.restitution or 0.0) if contact else 0.0
         self.gravity[:] = gravity.acceleration if gravity else 0.0
+        columns = self.params[:, at.PARAM_SIZE :]
+        write_columns(self.plan.fields, columns, self.body_count, np.arange(self.worlds))
         angular_momenta(np.arange(len(self.state)), self.state, self.params)
 
     # --- stepping ----------------------------------------------------------------------------------------------
@@ -201,6 +206,9 @@ class World:
 
     def advance(self, calls: list[Callable[[], None]], duration: float) -> None:
         """Make `kernel_calls` that take `duration` [s]; for those who prepare them."""
+        if self.plan.fields:
+            for scratch in self.scratch:
+                body_records(scratch)["call_start"] = self.time
         self.pool.run(calls)
         self.time += duration
 
@@ -247,6 +255,7 @@ class World:
         friction: ArrayLike | None = None,
         restitution: ArrayLike | None = None,
         gravity: ArrayLike | None = None,
+        effects: Sequence[Field] | None = None,
         worlds: ArrayLike | None = None,
     ) -> None:
         """Give worlds their own physical parameters; what is None keeps its value.
@@ -263,6 +272,8 @@ class World:
             scene's body has an `inertia_body` of its own, which then scales with the mass.
         gravity : (3,) or (k, 3) array_like, optional
             [m/s²].
+        effects : sequence of Field, optional
+            Force fields in place of the scene's of the same class (of `Spring` and `Push` all, in the scene's order).
         worlds : (k,) int array_like, optional
             Indices of the worlds meant; None: all.
 
@@ -272,7 +283,7 @@ class World:
             A value out of range, an effect that the scene does not declare, or a new size that reaches deep
             into a wall. Nothing has changed then.
         """
-        changes.set_parameters(self, mass, size, inertia_body, friction, restitution, gravity, worlds)
+        changes.set_parameters(self, mass, size, inertia_body, friction, restitution, gravity, effects, worlds)
 
     # --- keeping and looking -----------------------------------------------------------------------------------
 
@@ -321,12 +332,13 @@ class World:
     def __getstate__(self):
         kept = dict(vars(self))
         views = ("pos", "quat", "linvel", "angvel")
-        for name in ("pool", "scratch", "motions", "_wrench", "_calls", "_bound_for", *views):
+        for name in ("plan", "pool", "scratch", "motions", "_wrench", "_calls", "_bound_for", *views):
             del kept[name]
         return kept
 
     def __setstate__(self, kept):
         vars(self).update(kept)
+        self.plan = make_plan(self.scene, self.accuracy)  # it holds compiled functions of fields
         self._prepare_threads()
         self._bind_views()
 

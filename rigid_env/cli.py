@@ -105,6 +105,30 @@ def demo(
 
 
 @app.command()
+def run(
+    scene: Annotated[Path, typer.Argument(metavar="SCENE.toml", help="A scene file (docs/scene-files.md).")],
+    duration: Annotated[float, typer.Option(min=0.0, help="Simulated time [s].")] = 5.0,
+    accuracy: Accuracy = "balanced",
+    npz: Annotated[Path | None, typer.Option(metavar="FILE", help="Write the samples here.")] = None,
+    json: Json = None,
+) -> None:
+    """Simulate a scene from a file; print what happens."""
+    console = Console()
+    with _told_errors():
+        from physics import load_scene
+        from rigid_env.demo import Demo, show
+
+        with console.status("simulating"):
+            done = Demo(scene.stem, duration, accuracy, load_scene(scene))
+        summary = done.summary()
+        show(done, summary, console)
+        if npz is not None:
+            done.trajectory.to_npz(npz)
+            _tell_file(npz, console)
+        _write(json, {"file": str(scene), **summary}, console)
+
+
+@app.command()
 def explain(
     scene: Annotated[str, typer.Argument(help="A canonical scene.")],
     accuracy: Accuracy = "balanced",
@@ -185,6 +209,34 @@ def bench(
         console.print(make_table(found, "steps per second: median, lowest .. highest"))
         if not has_peer:
             console.print('for ratios to MuJoCo: pip install "rigid-env[bench]"', markup=False)
+        _write(path, {"is_quick": quick, "rows": [row.to_dict() for row in found]}, console)
+
+
+@app.command()
+def effects(
+    accuracy: Accuracy = "balanced",
+    json: Json = None,
+    quick: Annotated[bool, typer.Option("--quick", help="Only see that it runs.")] = False,
+) -> None:
+    """Measure what each effect costs: steps per second of its scene with it and without."""
+    with _told_errors():
+        from physics import accuracy as knobs
+        from rigid_env.measure import effects as costs
+        from rigid_env.measure.table import make_console, make_table
+
+        knobs.resolve(accuracy)
+        console, path = make_console(), json.resolve() if json else None
+        repeats, steps = (QUICK_REPEATS, costs.QUICK_STEPS) if quick else (BENCH_REPEATS, costs.STEPS)
+        found = []
+        with _progress(console, has_thread=False) as progress:
+            task = progress.add_task("measuring", total=costs.run_count(repeats))
+
+            def tick(what: str) -> None:
+                progress.update(task, advance=1, description=what, refresh=True)
+
+            for name in costs.CASES:
+                found.append(costs.effect_row(name, accuracy, steps, repeats, tick))
+        console.print(make_table(found, "steps per second with the effect, against the scene without it"))
         _write(path, {"is_quick": quick, "rows": [row.to_dict() for row in found]}, console)
 
 

@@ -34,11 +34,13 @@ class Demo:
     Parameters
     ----------
     name : str
-        Of a canonical scene, see `physics.scenes`.
+        Of a canonical scene, see `physics.scenes`, or of `scene`.
     duration : float
         Rounded to whole samples of `SAMPLE_DT` [s].
     accuracy : str
         Preset.
+    scene : physics.Scene, optional
+        Instead of the canonical one.
 
     Raises
     ------
@@ -46,8 +48,8 @@ class Demo:
         An unknown scene or accuracy, or a negative duration.
     """
 
-    def __init__(self, name: str, duration: float, accuracy: str):
-        self.scene = scenes.by_name(name)
+    def __init__(self, name: str, duration: float, accuracy: str, scene: physics.Scene | None = None):
+        self.scene = scenes.by_name(name) if scene is None else scene
         self._sample_count = round(float(checks.non_negative(duration, (), "duration")) / SAMPLE_DT)
         self.name, self.duration, self.accuracy = name, self._sample_count * SAMPLE_DT, accuracy
         self.trajectory = physics.simulate(self.scene, self.duration, accuracy, sample_dt=SAMPLE_DT)

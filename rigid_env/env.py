@@ -102,6 +102,7 @@ class BlockReachEnv(RigidEnv):
     | `friction` | 0.5 | Coulomb coefficient against the walls |
     | `restitution` | 0.2 | of the block against the walls |
     | `gravity` | 9.81 | along -y [m/s²] |
+    | `effects` | () | `physics` effects besides (`physics.Drag()`, ...), or instead of the task's of that class |
     | `frame_skip` | 5 | physics steps per control step |
     | `dt` | 0.005 | physics step [s] |
     | `render_mode` | None | `"rgb_array"`, `"human"` or None |

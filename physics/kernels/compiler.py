@@ -64,13 +64,25 @@ def _numba_cache_in(folder: Path):
         config.CACHE_DIR = before
 
 
-def _compile(function, **options):
+# What all kernels have in common; see `kernel`.
+OPTIONS = {"error_model": "numpy", "nogil": True, "_nrt": False}
+
+# For `numba.extending.overload`: what it chooses is a part of the kernel that calls it, with no call left.
+CHOSEN = {**OPTIONS, "forceinline": True, "pipeline_class": Kernel.part_pipeline}
+
+
+def _make(function, **options):
+    """A `Kernel` of `function`; without a compiler the function itself."""
     if config.DISABLE_JIT:
         return function
-    options = {"nopython": True, "boundscheck": None, "error_model": "numpy", "nogil": True, "_nrt": False, **options}
-    compiled = Kernel(function, options=options)
-    with _numba_cache_in(cache_dir()):
-        compiled.enable_caching()
+    return Kernel(function, options={"nopython": True, "boundscheck": None, **OPTIONS, **options})
+
+
+def _compile(function, **options):
+    compiled = _make(function, **options)
+    if not config.DISABLE_JIT:
+        with _numba_cache_in(cache_dir()):
+            compiled.enable_caching()
     return compiled
 
 
@@ -93,3 +105,8 @@ def kernel(function):
 def inlined(function):
     """`kernel` for what is a few instructions long, or is called from one place: no call is left of it."""
     return _compile(function, forceinline=True)
+
+
+def composed(function):
+    """`inlined` without a place of its own on disk: made at run time, or by a user, and kept with what calls it."""
+    return _make(function, forceinline=True)

@@ -122,6 +122,8 @@ class Kernel(CPUDispatcher):
         Numba's options, as of `numba.njit`.
     """
 
+    part_pipeline = _PartCompiler
+
     def __init__(self, function, local_types=None, options=None):
         super().__init__(function, local_types, options, pipeline_class=_WholeCompiler)
         self._part = CPUDispatcher(function, local_types, options, pipeline_class=_PartCompiler)

@@ -22,6 +22,7 @@ from physics.kernels import layout as at
 from physics.kernels.body import angular_velocity, bind_body, is_finite, read_state, write_state
 from physics.kernels.compiler import inlined, kernel
 from physics.kernels.contact import gather, is_clear, nearest_outside_set, push_out
+from physics.kernels.fields.loads import bind_fields, hold_loads, hold_mean_loads, pass_time, set_clock
 from physics.kernels.flight import fly, fly_by_scheme
 from physics.kernels.quaternion import to_matrix
 from physics.kernels.stages import impact, store_warm_start, touch
@@ -48,8 +49,12 @@ def coast(y, h, gyroscopic, tilted, scheme, work):
 @inlined
 def advance(n, y, h, friction, smooth, gyroscopic, tilted, pivots, scheme, memory, report, work):
     """One stage of length h: flight when nothing touches, else Moreau's step."""
+    hold_loads(y, h, n > 0, gyroscopic, tilted, work)
     if n > 0:
-        return touch(n, y, h, friction, smooth, gyroscopic, tilted, pivots, memory, report, work)
+        end = touch(n, y, h, friction, smooth, gyroscopic, tilted, pivots, memory, report, work)
+        if hold_mean_loads(y, end, h, gyroscopic, tilted, work):
+            end = touch(n, y, h, friction, smooth, gyroscopic, tilted, pivots, memory, report, work)
+        return end
     forget_contacts(memory, work.i, work)
     return coast(y, h, gyroscopic, tilted, scheme, work)
 
@@ -139,6 +144,7 @@ def substep(y, h, friction, smooth, gyroscopic, tilted, pivots, scheme, memory, 
         if split == work.splits:
             report[world, at.UNRESOLVED] += 1.0
             work.is_last = 1
+        hold_loads(y, left, False, gyroscopic, tilted, work)
         n, depth = contact_set(y, left, tilted, work)
         if n > 0:
             report[world, at.PENETRATION] = max(report[world, at.PENETRATION], depth)
@@ -146,6 +152,7 @@ def substep(y, h, friction, smooth, gyroscopic, tilted, pivots, scheme, memory, 
                 y = impact(n, y, left, friction, smooth, tilted, pivots, report, work)
         end, t = to_next_impact(n, y, left, friction, smooth, gyroscopic, tilted, pivots, scheme, memory, report, work)
         left -= t
+        pass_time(t, work)
         if n > 0 and not has_same_pose(end, y):
             end = kept_out(end, tilted, work)
         y = end
@@ -172,8 +179,11 @@ def step_worlds(
         for b in range(bodies):
             i = world * bodies + b
             bind_body(world, i, shapes[b], params, gravity, wrench, friction, restitution, tilted, work)
+            bind_fields(params, i, work)
             y = read_state(state, i)
-            for _ in range(steps * substeps):
+            for k in range(steps * substeps):
+                set_clock(k * h, work)
+                hold_loads(y, h, False, gyroscopic, tilted, work)
                 if contact is not None and not is_clear(y[0], y[2], h, work):
                     new = substep(y, h, friction, smooth, gyroscopic, tilted, pivots, scheme, memory, report, work)
                 else:

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from physics.kernels.fields.terms import Term, members
 from physics.kernels.layout import WALL_SIZE
 from physics.kernels.patch import PATCH_SIZE
 from physics.kernels.pyramid import normal_sizes, pyramid_sizes
@@ -29,10 +30,11 @@ def setting_fields() -> list[tuple]:
     ]
 
 
-def body_fields() -> list[tuple]:
-    """Fields of what `body.bind_body` writes of one body."""
+def body_fields(terms: tuple[Term, ...] = ()) -> list[tuple]:
+    """Fields of what `body.bind_body` writes of one body, and of what the scene's force fields do to it."""
     f, i = np.float64, np.int64
     return [
+        *members(terms),  # first: a record may stand for one that it begins with, and Numba would say so
         ("relative_slop", f),  # gap within which a feature touches, in bounding radii; the one field that is read
         ("i", i),
         ("world", i),
@@ -53,8 +55,8 @@ def body_fields() -> list[tuple]:
     ]
 
 
-def workspace_dtype(wall_count: int, features: int) -> np.dtype:
-    """Record type for bodies with `features` contact features each against `wall_count` walls."""
+def workspace_dtype(wall_count: int, features: int, terms: tuple[Term, ...] = ()) -> np.dtype:
+    """Record type for bodies with `features` contact features each against `wall_count` walls, in these fields."""
     n = max(wall_count * features, 1)
     float_size, int_size = np.maximum(pyramid_sizes(n), normal_sizes(n)).tolist()
     f, i = np.float64, np.int64
@@ -97,15 +99,20 @@ def workspace_dtype(wall_count: int, features: int) -> np.dtype:
         ("fallback_float", f, (float_size,)),
         ("fallback_int", i, (int_size,)),
     ]
-    return np.dtype(setting_fields() + scene + body_fields() + stage + contacts)
+    return np.dtype(setting_fields() + scene + body_fields(terms) + stage + contacts)
 
 
-def make_workspace(walls: np.ndarray, features: int, **settings: float) -> np.ndarray:
-    """One workspace record, shape (1,), for `walls` ((walls, WALL_SIZE)) and the numerical settings given."""
-    work = np.zeros(1, workspace_dtype(len(walls), features))
+def make_workspace(walls: np.ndarray, features: int, terms: tuple[Term, ...] = (), **settings: float) -> np.ndarray:
+    """One workspace record, shape (1,), for `walls` ((walls, WALL_SIZE)), fields, and the numerical settings given."""
+    work = np.zeros(1, workspace_dtype(len(walls), features, terms))
     work["features"] = features
     if len(walls):
         work["walls"][0] = walls
     for name, value in settings.items():
         work[name] = value
     return work
+
+
+def body_records(scratch) -> np.ndarray:
+    """The records of `body_fields` in a workspace, or in the `many.arrays.Many` of worlds whose bodies touch."""
+    return getattr(scratch, "bodies", scratch)

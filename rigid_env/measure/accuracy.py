@@ -190,6 +190,8 @@ def _make_job(name: str, engines: Mapping[str, peers.Engine], ladder: Ladder) ->
 
 def _peer_contenders(engine: peers.Engine, scene: physics.Scene, steps: Sequence[float]) -> tuple[list, list[str]]:
     found, reasons = [], []
+    if any(isinstance(effect, physics.Field) for effect in scene.effects):
+        return [], [f"{engine.name}: it has none of the scene's force fields"]
     for setting, options in engine.settings(scene).items():
         try:
             engine.open(scene, steps[0], **options)

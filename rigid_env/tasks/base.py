@@ -48,6 +48,9 @@ class Task(ABC):
     mass, size, friction, restitution, gravity : number or pair
         Block's mass [kg] and edges (three numbers) [m], coefficients against the walls, strength of gravity
         along -y [m/s²]. A pair (low, high) is drawn from uniformly in each episode of each world.
+    effects : sequence of physics effects
+        Added to gravity, contact and friction; one of the same class replaces the task's, and the limits of the action
+        follow its gravity. What is drawn from a range cannot be replaced.
     frame_skip : int
         Physics steps per control step, with the action held.
     dt : float
@@ -88,6 +91,7 @@ class Task(ABC):
         friction=0.5,
         restitution=0.2,
         gravity=9.81,
+        effects=(),
         frame_skip=5,
         dt=0.005,
         threads=1,
@@ -96,6 +100,7 @@ class Task(ABC):
         self.parameters = Parameters(mass=mass, size=size, friction=friction, restitution=restitution, gravity=gravity)
         self.area.check_room(self.parameters["size"].high)
         self.frame_skip = checks.count(frame_skip, "frame_skip")
+        self.effects = self._checked_effects(effects)
         self.world = physics.World(self._scene(), worlds=worlds, dt=dt, accuracy=accuracy, threads=threads)
         self.generators: list[np.random.Generator | None] = [None] * worlds
         self.record = np.zeros((worlds, col.RECORD_SIZE))
@@ -124,15 +129,30 @@ class Task(ABC):
     def _scene(self) -> physics.Scene:
         """The block at the middle of the area, lifted clear of the floor, with the middles of all ranges."""
         middle = {field: span.middle for field, span in self.parameters.ranges.items()}
+        own = [
+            physics.Gravity((0.0, -float(middle["gravity"][0]), 0.0)),
+            physics.Contact(restitution=float(middle["restitution"][0])),
+            physics.Friction(float(middle["friction"][0])),
+        ]
+        replaced = {type(effect) for effect in self.effects}
         return physics.Scene(
             bodies=[physics.Block(size=tuple(middle["size"]), mass=float(middle["mass"][0]), pos=self._lifted())],
             walls=self.area.half_spaces,
-            effects=[
-                physics.Gravity((0.0, -float(middle["gravity"][0]), 0.0)),
-                physics.Contact(restitution=float(middle["restitution"][0])),
-                physics.Friction(float(middle["friction"][0])),
-            ],
+            effects=[*(effect for effect in own if type(effect) not in replaced), *self.effects],
         )
+
+    def _checked_effects(self, effects) -> tuple:
+        """The effects given, if none takes the place of what is drawn."""
+        try:
+            effects = tuple(effects)
+        except TypeError:
+            raise ValueError(f"effects is {effects!r}; allowed is a sequence of effects") from None
+        drawn = {physics.Gravity: "gravity", physics.Contact: "restitution", physics.Friction: "friction"}
+        for effect in effects:
+            field = drawn.get(type(effect))
+            if field in self.parameters.randomised:
+                raise ValueError(f"effects holds {effect!r}, but {field} is drawn from a range; give one of the two")
+        return effects
 
     # --- episodes -----------------------------------------------------------------------------------------
 
@@ -208,7 +228,9 @@ class Task(ABC):
         return (c, float(np.linalg.norm(self.parameters["size"].high)), c)
 
     def _note_parameters(self, rows: np.ndarray, values: dict[str, np.ndarray]) -> None:
-        weight = values["mass"] * values["gravity"]
+        given = next((effect for effect in self.effects if isinstance(effect, physics.Gravity)), None)
+        gravity = values["gravity"] if given is None else float(np.linalg.norm(given.acceleration))
+        weight = values["mass"] * gravity
         half = 0.5 * values["size"]
         self.record[rows, col.FORCE_LIMIT] = FORCE_SHARE * weight
         self.record[rows, col.TORQUE_LIMIT] = TORQUE_SHARE * weight * half.max(axis=1)

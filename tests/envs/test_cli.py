@@ -11,6 +11,7 @@ from typer.testing import CliRunner
 import physics
 import rigid_env.warmup
 from physics import scenes
+from physics.fields import FIELDS
 from rigid_env.cli import app
 from rigid_env.picture import stroboscope, without_bodies, world_frame
 from rigid_env.rendering import Camera
@@ -35,7 +36,7 @@ def loaded(path):
 
 def test_version_and_help():
     assert run("--version").startswith("rigid-env")
-    for command in ("demo", "explain", "warmup", "bench", "accuracy"):
+    for command in ("demo", "run", "explain", "warmup", "bench", "effects", "accuracy"):
         assert command in run("--help")
         assert "--json" in run(command, "--help")
 
@@ -218,3 +219,47 @@ def test_stroboscope_keeps_what_does_not_move_and_ends_solid():
     picture = stroboscope([first, last], empty)[0, :, 0]
     # opacities 0.25 + 0.75 k / 2
     assert picture.tolist() == [round(200 * (1 - 0.625)), 200, 0]
+
+
+# run
+
+
+def test_run_simulates_a_scene_file(tmp_path):
+    scene, samples, numbers = (tmp_path / f"ball.{kind}" for kind in ("toml", "npz", "json"))
+    ball = physics.Sphere(0.5, 2.0, linvel=(1.0, 0.0, 0.0))
+    physics.save_scene(physics.Scene([ball], effects=[physics.Gravity()]), scene)
+    output = run("run", scene, "--duration", 1, "--npz", samples, "--json", numbers)
+    assert "ball, accuracy balanced, 1 s" in output
+    with np.load(samples) as found:
+        assert found["t"][-1] == pytest.approx(1.0)
+        assert found["pos"][-1, 0] == pytest.approx([1.0, -9.81 / 2, 0.0], abs=1e-12)
+    assert loaded(numbers)["final"]["pos"][0] == pytest.approx([1.0, -9.81 / 2, 0.0], abs=1e-12)
+
+
+def test_run_tells_what_is_wrong_with_a_file(tmp_path):
+    path = tmp_path / "ball.toml"
+    path.write_text('[[bodies]]\nkind = "Sphere"\nradius = -1\nmass = 2\n')
+    output = " ".join(run("run", path, code=2).replace("│", " ").split())
+    assert "line 3" in output
+    assert "radius is -1" in output
+    run("run", tmp_path / "none.toml", code=1)
+
+
+# effects
+
+
+def test_effects_measures_every_effect_with_and_without(tmp_path):
+    """Every effect has a row; what it stores is what its plan says, and nothing for what is in every kernel."""
+    path = tmp_path / "effects.json"
+    run("effects", "--quick", "--json", path)
+    rows = {row["key"]: row for row in loaded(path)["rows"]}
+    kinds = {kind.__name__.lower() for kind in (physics.Gravity, physics.Contact, physics.Friction, *FIELDS)}
+    assert {name.replace(" ", "") for name in rows} == kinds | {"gusts"}
+    for row in rows.values():
+        assert row["ours"]["min"] > 0
+        assert row["peer"]["min"] > 0
+        added = 1e9 / row["ours"]["median"] - 1e9 / row["peer"]["median"]
+        assert row["notes"]["added_ns_per_step"] == pytest.approx(added)
+    stored = {name: row["notes"]["added_bytes_per_body"] for name, row in rows.items()}
+    assert (stored["gravity"], stored["contact"], stored["drag"], stored["spring"]) == (0, 0, 16, 72)
+    assert "'best'" in run("effects", "--accuracy", "best", code=2)

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
+import pickle
 
+import gymnasium as gym
 import numpy as np
 import pytest
 
@@ -299,3 +301,52 @@ def test_a_physics_fault_is_told():
     assert env.reset()[1]["physics_status"] == physics.Status.OK
     mask = np.array([False, True])
     assert envs.reset(options={"reset_mask": mask})[1]["physics_status"].tolist() == [physics.Status.OK] * 2
+
+
+def test_effects_are_added_or_take_the_place_of_the_tasks():
+    """Through `gymnasium.make`: water drags, half the gravity halves weight and force limit; the rest stays."""
+    plain = BlockReachEnv()
+    env = gym.make(
+        "rigid_env:rigid_env/BlockReach-v0", effects=[physics.Drag(0.0, linear=5.0), physics.Gravity((0, -4, 0))]
+    )
+    task = env.unwrapped.task
+    kinds = [type(effect) for effect in task.world.scene.effects]
+    assert kinds == [physics.Contact, physics.Friction, physics.Drag, physics.Gravity]
+    assert task.record[0, col.FORCE_LIMIT] == pytest.approx(0.9 * 6.0 * 4.0)
+    assert plain.task.record[0, col.FORCE_LIMIT] == pytest.approx(0.9 * 6.0 * 9.81)
+    speeds = []
+    for effects in ((), (physics.Drag(0.0, linear=5.0),)):
+        single = BlockReachEnv(effects=effects, friction=0.0)
+        single.reset(seed=3, options={"place": (0.0, 0.0), "face": 2, "yaw": 0.0})
+        for _ in range(8):  # 0.2 s, clear of the walls
+            single.step(np.array([1.0, 0, 0, 0, 0, 0]))
+        speeds.append(single.task.world.linvel[0, 0, 0])
+    # m v' = F - c v on the frictionless floor: v = (F/c)(1 - e^(-c t/m)), second order in the step of 5 ms.
+    force = 0.9 * 6.0 * 9.81
+    assert speeds[0] == pytest.approx(force / 6.0 * 0.2, rel=1e-9)
+    assert speeds[1] == pytest.approx(force / 5.0 * (1 - math.exp(-5.0 * 0.2 / 6.0)), rel=1e-5)
+
+
+def test_a_task_in_fields_is_pickled_and_batched_like_any_other(rng):
+    effects = [physics.Drag(), physics.Wind(gust=2.0)]
+    single, batch = BlockReachEnv(effects=effects), BlockReachVectorEnv(3, effects=effects)
+    first, _ = single.reset(seed=7)
+    assert np.array_equal(batch.reset(seed=7)[0][0], first)
+    again = pickle.loads(pickle.dumps(single))
+    for action in random_actions(rng, 5, 1)[:, 0]:
+        seen = single.step(action)[0]
+        assert np.array_equal(again.step(action)[0], seen)
+        assert np.array_equal(batch.step(np.broadcast_to(action, (3, 6)))[0][0], seen)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({"effects": 3}, "effects is 3; allowed is a sequence of effects"),
+        ({"effects": [1]}, r"Scene.effects\[3\] is 1; allowed"),
+        ({"effects": [physics.Friction(0.3)], "friction": (0.2, 0.4)}, "but friction is drawn from a range"),
+    ],
+)
+def test_effects_that_do_not_fit_are_refused(arguments, message):
+    with pytest.raises(ValueError, match=message):
+        BlockReachEnv(**arguments)

@@ -185,6 +185,11 @@ def test_energy_is_conserved_or_never_rises():
     assert frontier_errors.energy_error(scenes.tumble(), losing) == 4.0
     assert frontier_errors.energy_error(scenes.bounce(1.0, 1.0), losing) == 4.0
     assert frontier_errors.energy_error(scenes.drop(), losing) == 0.5
+    assert frontier_errors.energy_error(scenes.football(), losing) == 0.5  # drag only takes
+    ball = physics.Sphere(1.0, 1.0)
+    for effect, error in ((physics.Spring(), 4.0), (physics.Spring(damping=1.0), 0.5), (physics.Push(), np.nan)):
+        found = frontier_errors.energy_error(physics.Scene([ball], effects=[effect]), losing)
+        assert found == pytest.approx(error, nan_ok=True)
 
 
 def test_events_are_paired_where_both_have_as_many():

@@ -116,3 +116,59 @@ def test_an_offset_center_is_compiled_only_where_a_body_has_it():
     isotropic = plan((0.1, 0, 0), (4.0, 4.0, 4.0))
     assert isotropic.tilted
     assert isotropic.gyroscopic is None
+
+
+def test_fields_are_part_of_the_plan_and_their_order_is_not():
+    spring, drag = physics.Spring(), physics.Drag()
+
+    def plan(*effects):
+        return physics.make_plan(physics.Scene([BLOCK], effects=effects), resolve("balanced"))
+
+    assert plan().fields == ()
+    assert plan().field_columns == 0
+    assert plan(spring, drag).key == plan(drag, spring).key
+    assert plan(spring, spring, drag).key != plan(spring, drag).key
+    assert plan(physics.Drag(0.9)).key == plan(drag).key  # strength is a number, not a kernel
+    assert (
+        physics.World(physics.Scene([BLOCK], effects=[drag])).params.shape[1]
+        == 2 + physics.World(physics.Scene([BLOCK])).params.shape[1]
+    )
+    text = plan(drag).explain()
+    assert "declared: Drag(coefficient=0.47" in text
+    for name in ("angular drag", "magnus", "wind", "buoyancy", "spring", "push"):
+        assert f"{name} " in text
+
+
+FIELD_PROGRAM = """
+import json, sys, physics
+from physics.kernels.step import step_worlds
+body = physics.Block((5, 3, 2), 6.0, pos=(0, 5, 0))
+world = physics.World(physics.Scene([body], effects=eval(sys.argv[1])), dt=0.01)
+world.step()
+code = next(iter(step_worlds.inspect_llvm().values()))
+names = ["field_load", "hold_loads", "drag", "buoyancy", "_wet_block", "spring", "_gust", "magnus", "push"]
+print(json.dumps({"names": [name for name in names if name in code], "members": list(world.scratch[0].dtype.names)}))
+"""
+
+
+@pytest.mark.slow
+def test_machine_code_holds_only_the_fields_that_are_declared(tmp_path):
+    """Names of compiled functions in the step of a scene: those of its fields, of no field where it has none."""
+
+    def look(effects: str) -> dict:
+        done = subprocess.run(
+            [sys.executable, "-c", FIELD_PROGRAM, effects], env={**os.environ, "NUMBA_CACHE_DIR": str(tmp_path)},
+            capture_output=True, text=True, check=True, timeout=600,
+        )  # fmt: skip
+        return json.loads(done.stdout)
+
+    bare, air, water = look("[]"), look("[physics.Drag()]"), look("[physics.Buoyancy()]")
+    assert bare["names"] == []
+    assert {"field_load", "drag"} <= set(air["names"])
+    assert {"field_load", "buoyancy", "_wet_block"} <= set(water["names"])
+    assert not {"buoyancy", "_wet_block", "spring", "_gust", "magnus", "push"} & set(air["names"])
+    assert not {"drag", "spring", "_gust", "magnus", "push"} & set(water["names"])
+    stored = set(air["members"]) - set(bare["members"])
+    assert stored == {
+        "held_acceleration", "held_torque", "call_start", "now", "is_felt", "columns", "load_drag_1x2",
+    }  # fmt: skip

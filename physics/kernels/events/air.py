@@ -13,6 +13,9 @@ With ω <= Ω = J_max |L|, α <= A = J_max (|τ| + Ω |L|) and dα/dt <= B = 2 �
 the third derivative of a point at distance ρ is at most ρ (B + 3 Ω A + Ω³). A sphere's gap has none. The support
 function of an ellipsoid, s = |D Rᵀ n|, has derivatives that exceed those of a point at its largest semi-axis by at
 most 3 κ², κ the ratio of its largest to its smallest.
+
+In a field there is no such bound: the body moves as it does in contact, by smooth steps with gaps and their rates
+watched at both ends (`move`), unless it felt nothing of any field on its way.
 """
 
 from __future__ import annotations
@@ -23,8 +26,11 @@ from physics.kernels import quaternion as qt
 from physics.kernels.compiler import inlined, kernel
 from physics.kernels.contact import is_clear, wall_normal
 from physics.kernels.events.forces import arm_and_rate, free_turning, load, plus
+from physics.kernels.events.guards import NO_GUARD, NO_STEP
 from physics.kernels.events.motion import END, SIZE, START
+from physics.kernels.events.move import move
 from physics.kernels.events.smooth import CUT, SHORTEST, get_state, put_state, start_step, try_step
+from physics.kernels.fields.loads import has_fields, pass_time, refresh_loads, set_now, start_feeling, was_felt
 from physics.kernels.flight import fly
 from physics.kernels.layout import ELLIPSOID, OFFSET, SPHERE
 
@@ -117,7 +123,7 @@ def has_torque(work):
 
 @kernel
 def fly_smoothly(y, t, tilted, work, motion):
-    """Free motion under a torque over t by extrapolated steps."""
+    """Free motion under a torque or in fields over t by extrapolated steps."""
     put_state(motion, START, y)
     left, tries = t, 0
     motion.step = left
@@ -131,6 +137,7 @@ def fly_smoothly(y, t, tilted, work, motion):
         for c in range(SIZE):
             motion.y[START, c] = motion.y[END, c]
         left -= h
+        pass_time(h, work)
         motion.step = 2.0 * h
     return get_state(motion, START)
 
@@ -138,8 +145,11 @@ def fly_smoothly(y, t, tilted, work, motion):
 @kernel
 def fly_freely(y, t, gyroscopic, tilted, work, motion):
     """State after the time t without contact."""
-    if has_torque(work):
-        return fly_smoothly(y, t, tilted, work, motion)
+    if has_torque(work) or has_fields(work):
+        start_feeling(work)
+        end = fly_smoothly(y, t, tilted, work, motion)
+        if was_felt(work):
+            return end
     return fly(y, work, t, gyroscopic, tilted)
 
 
@@ -147,6 +157,13 @@ def fly_freely(y, t, gyroscopic, tilted, work, motion):
 def fly_to_wall(y, left, gyroscopic, tilted, work, motion):
     """Fly for `left` or until a feature reaches a wall: (state, time, whether it did, whether the search ended)."""
     motion.count = 0
+    if has_fields(work):
+        now = start_feeling(work)
+        end, t, guard = move(y, left, tilted, work, motion)
+        if was_felt(work):
+            return end, t, guard != NO_GUARD, guard != NO_STEP
+        set_now(now, work)
+        refresh_loads(y, 0.0, tilted, work)
     if is_clear(y[0], y[2], left, work):
         return fly_freely(y, left, gyroscopic, tilted, work, motion), left, False, True
     third = third_bound(y[3], left, work)

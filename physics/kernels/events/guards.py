@@ -179,7 +179,7 @@ def opposite(slot, wall, work, motion):
 @kernel
 def least_margin(h, tilted, work, motion):
     """Smallest margin at END, a step of h after START: (margin, guard, contact or slot)."""
-    find_rate(END, tilted, work, motion)
+    find_rate(END, h, tilted, work, motion)
     spread(work.mu, work, motion)
     look_around(END, tilted, work, motion)
     gap, which = gap_margin(h, work, motion)

@@ -38,6 +38,7 @@ from physics.kernels.events.smooth import (
     cancel,
 )
 from physics.kernels.events.state import keep_contacts, log_changes, recall_contacts
+from physics.kernels.fields.loads import bind_fields, refresh_loads, set_clock
 from physics.kernels.solve import solve_contacts
 from physics.kernels.stages import note_solve
 
@@ -101,12 +102,14 @@ def advance(y, h, friction, smooth, gyroscopic, tilted, pivots, work, motion, me
     A contact problem is posed by what the body does, solved in this one place, and read back. `seen` is where the
     regime is looked for: at y, or a moment ahead of it when a guard has ended the last one.
     """
+    set_clock(start, work)
+    refresh_loads(y, 0.0, tilted, work)
     set_thresholds(y, tilted, work, motion)
     nearest = motion.ahead
     recall_contacts(memory, work.i, work, motion)
     world = work.world
     motion.left_out, motion.turns = 0.0, 0
-    seen, t = y, 0.0
+    seen, later, t = y, 0.0, 0.0
     told = NOTHING  # what is to be done next, whatever the regime: stop a contact that will leave, or jump
     since, crowd, leap = 0.0, 0, LEAP * motion.ahead
     width = 3
@@ -123,9 +126,12 @@ def advance(y, h, friction, smooth, gyroscopic, tilted, pivots, work, motion, me
             told = IS_LOST
         what, n, v, L = told, 0, y[2], y[3]
         if told == NOTHING:
+            refresh_loads(seen, later, tilted, work)
             what, n, v, L = find_regime(seen, friction, tilted, work, motion)
         is_asked, is_sliding = what in (ASKS, ASKS_SLIDING), what == ASKS_SLIDING
         told = NOTHING
+        if what in (COLLIDES, IS_LOST):
+            refresh_loads(y, 0.0, tilted, work)
         if what == COLLIDES:
             n, v, L = pose_collision(y, tilted, work, motion, report), y[2], y[3]
         elif what == IS_LOST:
@@ -137,7 +143,7 @@ def advance(y, h, friction, smooth, gyroscopic, tilted, pivots, work, motion, me
         if is_asked:
             what = read_resting(n, seen, v, L, friction, is_sliding, tilted, work, motion)
             if what in (COLLIDES, IS_LOST):
-                told, seen = what, y
+                told, seen, later = what, y, 0.0
                 continue
         elif what in (COLLIDES, IS_LOST):
             y = y[0], y[1], v, L
@@ -146,7 +152,7 @@ def advance(y, h, friction, smooth, gyroscopic, tilted, pivots, work, motion, me
         if what == COLLIDES:
             report[world, at.SPLITS] += 1.0
             crowd -= motion.is_sequential  # those in turn have a bound of their own
-            seen = y
+            seen, later = y, 0.0
             continue
         log_changes(work, motion, log, counts, start + t)
         if what == RESTS:
@@ -171,6 +177,7 @@ def advance(y, h, friction, smooth, gyroscopic, tilted, pivots, work, motion, me
         else:
             y, step, guard = move(y, h - t, tilted, work, motion)
         t += step
+        set_clock(start + t, work)
         if guard in (PUSH, CONE, LOAD) and step < motion.ahead:
             motion.ahead = min(motion.ahead * FURTHER, FARTHEST * nearest)  # rounding hid what was foretold
         elif step > motion.ahead:
@@ -179,11 +186,11 @@ def advance(y, h, friction, smooth, gyroscopic, tilted, pivots, work, motion, me
         motion.left_out, motion.turns = 0.0, 0
         if not t < h:
             break
-        seen = y
+        seen, later = y, 0.0
         if guard == NO_STEP:
             told = IS_LOST
         if guard in (PUSH, CONE, LOAD):
-            seen = look_ahead(y, tilted, work, motion)
+            seen, later = look_ahead(y, tilted, work, motion), motion.ahead
     keep_contacts(memory, work.i, work, motion)
     return y
 
@@ -206,6 +213,7 @@ def step_events(
             i = world * bodies + b
             counts[i] = 0
             bind_body(world, i, shapes[b], params, gravity, wrench, friction, restitution, tilted, work)
+            bind_fields(params, i, work)
             y = read_state(state, i)
             for k in range(steps * substeps):
                 if contact is not None:
@@ -215,6 +223,7 @@ def step_events(
                     )  # fmt: skip
                 else:
                     motion.count = 0
+                    set_clock(k * h, work)
                     new = fly_freely(y, h, gyroscopic, tilted, work, motion)
                 if not is_finite(new):
                     report[world, at.FAULTS] += 1.0

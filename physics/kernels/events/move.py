@@ -21,6 +21,7 @@ from physics.kernels.events.smooth import (
     start_step,
     try_step,
 )
+from physics.kernels.fields.loads import pass_time
 
 # Smooth steps at most before the next regime is looked for.
 STEPS = 10_000
@@ -107,6 +108,7 @@ def move(y, left, tilted, work, motion):
         if is_over and not has_stopped(guard, which, work, motion):
             h, guard, which = locate(h, margin, tilted, work, motion)
         t += h
+        pass_time(h, work)
         motion.step = GROWTH * h if used <= EASY else h
         y = cancel(get_state(motion, END), tilted, work, motion)
         if is_over:

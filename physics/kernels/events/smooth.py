@@ -26,6 +26,7 @@ from physics.kernels.events.forces import (
     vector,
 )
 from physics.kernels.events.motion import END, LAST, NOW, ORDERS, SIZE, START, L, Q, V, X
+from physics.kernels.fields.loads import has_fields, refresh_loads
 from physics.kernels.layout import OFFSET, SPHERE
 
 # A step is cut to this share when the extrapolation does not settle, and no further than to SHORTEST of the time
@@ -70,9 +71,10 @@ def put_state(motion, row, state):
 
 
 @kernel
-def find_rate(row, tilted, work, motion):
-    """Rate of change of a row of `y` into `rate`, the forces of its contacts into the unknowns."""
+def find_rate(row, later, tilted, work, motion):
+    """Rate of change of a row of `y`, `later` [s] than START, into `rate`, its contacts' forces into the unknowns."""
     state = get_state(motion, row)
+    refresh_loads(state, later, tilted, work)
     q, v = state[1], state[2]
     F, T, w, _, _ = regime_forces(state, tilted, work, motion)
     inv_mass = 1.0 / work.mass
@@ -109,13 +111,13 @@ def _midpoint_rule(parts, h, tilted, work, motion):
     for c in range(SIZE):
         y[LAST, c] = y[START, c]
         y[NOW, c] = y[START, c] + s * motion.first_rate[c]
-    for _ in range(parts - 1):
-        find_rate(NOW, tilted, work, motion)
+    for k in range(1, parts):
+        find_rate(NOW, k * s, tilted, work, motion)
         for c in range(SIZE):
             old = y[LAST, c]
             y[LAST, c] = y[NOW, c]
             y[NOW, c] = old + 2.0 * s * rate[c]
-    find_rate(NOW, tilted, work, motion)
+    find_rate(NOW, h, tilted, work, motion)
     for c in range(SIZE):
         y[END, c] = 0.5 * (y[NOW, c] + y[LAST, c] + s * rate[c])
 
@@ -168,8 +170,9 @@ def sliding_velocity(j, work, motion):
 def start_step(left, tilted, work, motion):
     """Make row START ready for `try_step`; how long the step should be at most.
 
-    No longer than the time `left`, what the last step's ease suggests, a turn of TURN_AT_MOST, and the time at which
-    a contact that is slowed as it is now stops sliding.
+    No longer than the time `left`, what the last step's ease suggests, a turn of TURN_AT_MOST, the time at which a
+    contact that is slowed as it is now stops sliding, and, flying through a field, the time in which the body crosses
+    its radius, so that no wall is reached and left again unseen.
     """
     state = get_state(motion, START)
     R, P, w, alpha = free_turning(state, tilted, work)
@@ -183,7 +186,7 @@ def start_step(left, tilted, work, motion):
         if speed > motion.still:
             for c in range(3):
                 motion.reference[j, c] = t[c] / speed
-    find_rate(START, tilted, work, motion)
+    find_rate(START, 0.0, tilted, work, motion)
     for c in range(SIZE):
         motion.first_rate[c] = motion.rate[c]
     turn = math.sqrt(qt.dot(w, w))
@@ -191,6 +194,8 @@ def start_step(left, tilted, work, motion):
     h = min(left, motion.step)
     if work.shape != SPHERE and h * turn > TURN_AT_MOST:
         h = TURN_AT_MOST / turn
+    if motion.count == 0 and has_fields(work):
+        h = min(h, work.radius / (math.sqrt(qt.dot(state[2], state[2])) + math.sqrt(work.radius * work.acceleration)))
     return _until_stop(h, P, w, work, motion)
 
 

@@ -10,6 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from physics.kernels.fields.terms import Term
 from physics.kernels.layout import STATE_SIZE, VERTEX_COUNT
 from physics.kernels.workspace import body_fields, setting_fields
 
@@ -106,14 +107,16 @@ def memory_size(bodies: int, walls: int) -> int:
     return MEMORY_HEAD + MEMORY_SIZE * contact_room(bodies, walls)
 
 
-def make_many(bodies: int, walls: np.ndarray, relative_slop: float, **settings: float) -> Many:
-    """Scratch for worlds of `bodies` bodies among `walls` ((walls, WALL_SIZE)), and the numerical settings given."""
+def make_many(
+    bodies: int, walls: np.ndarray, terms: tuple[Term, ...] = (), *, relative_slop: float, **settings: float
+) -> Many:
+    """Scratch for worlds of `bodies` bodies among `walls` ((walls, WALL_SIZE)), in fields, with numerical settings."""
     f, i, nb = np.float64, np.int64, bodies
     pairs, n = pair_room(bodies), contact_room(bodies, len(walls))
     record = np.zeros(1, np.dtype(setting_fields()))
     for name, value in settings.items():
         record[name] = value
-    rows = np.zeros(nb, np.dtype(body_fields()))
+    rows = np.zeros(nb, np.dtype(body_fields(terms)))
     rows["relative_slop"] = relative_slop
     blocks = min(nb * (nb + 1) // 2, BLOCKS_PER_BODY * nb)
     table = 1 << (2 * n - 1).bit_length()

@@ -22,6 +22,7 @@ from physics.kernels import quaternion as qt
 from physics.kernels.body import angular_velocity, bind_body, is_finite, read_state, write_state
 from physics.kernels.compiler import inlined, kernel
 from physics.kernels.contact import CLOSING_SHARE, UNSEEN
+from physics.kernels.fields.loads import bind_fields, hold_loads, pass_time, set_clock
 from physics.kernels.flight import drift
 from physics.kernels.many import memory as kept
 from physics.kernels.many.apart import push_apart
@@ -217,10 +218,19 @@ def aim_rest(n, h, many):
         put(many.target, k, 0, t)
 
 
+@inlined
+def hold_all_loads(h, gyroscopic, tilted, many):
+    """Hold the loads of the middle of a stage of length h for every body; nothing where there are no fields."""
+    for b in range(many.now.shape[0]):
+        is_touching = many.touched[b] == 1
+        hold_loads(read_state(many.now, b), h, is_touching, gyroscopic, tilted, many.bodies[b])
+
+
 @kernel
 def glide(n, world, h, friction, gyroscopic, tilted, scheme, memory, report, many):
     """Every body after h: exact flight, or Moreau's midpoint step with the n contacts of the set."""
     half = 0.5 * h
+    hold_all_loads(h, gyroscopic, tilted, many)
     for b in range(many.now.shape[0]):
         if many.touched[b] == 0:
             write_state(many.now, b, coast(read_state(many.now, b), h, gyroscopic, tilted, scheme, many.bodies[b]))
@@ -286,6 +296,7 @@ def substep_world(world, h, friction, gyroscopic, tilted, scheme, memory, report
     left, impacts = h, 0
     for cut in range(CUTS_PER_IMPACT * many.settings[0].splits + 1):
         is_last = impacts >= many.settings[0].splits or cut == CUTS_PER_IMPACT * many.settings[0].splits
+        hold_all_loads(left, gyroscopic, tilted, many)
         place_bodies(tilted, many)
         find_contacts(left, many)
         n = many.counts[CONTACTS]
@@ -301,6 +312,8 @@ def substep_world(world, h, friction, gyroscopic, tilted, scheme, memory, report
             report[world, at.SPLITS] += 1.0
         glide(n, world, t, friction, gyroscopic, tilted, scheme, memory, report, many)
         left -= t
+        for b in range(many.now.shape[0]):
+            pass_time(t, many.bodies[b])
         if n > 0:
             push_apart(n, tilted, many)
         if not left > 0.0:
@@ -333,8 +346,12 @@ def step_many(
             i = world * bodies + b
             bind_body(world, i, shapes[b], params, gravity, wrench, friction, restitution, tilted, many.bodies[b])
             many.lightness[b] = params[i, at.INV_MASS]
+            bind_fields(params, i, many.bodies[b])
             write_state(many.now, b, read_state(state, i))
-        for _ in range(steps * substeps):
+            many.touched[b] = 0
+        for k in range(steps * substeps):
+            for b in range(bodies):
+                set_clock(k * h, many.bodies[b])
             substep_world(world, h, friction, gyroscopic, tilted, scheme, memory, report, many)
             if not world_is_finite(many):
                 report[world, at.FAULTS] += 1.0

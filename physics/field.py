@@ -1,0 +1,228 @@
+"""What makes an effect a force field, and how a user's own one is compiled and kept.
+
+A field is a frozen dataclass with a compiled function: force and torque on a body from its state, the field's
+parameters and the time. The built-in ones stand in `physics.fields`; your own needs no more than they do::
+
+    @physics.field_function
+    def pull(state, p, t):
+        return (-p[0] * state.x[0], 0.0, 0.0), (0.0, 0.0, 0.0)
+
+    @dataclass(frozen=True)
+    class Trough(physics.Field):
+        stiffness: float = 1.0  # [N/m]
+        function: ClassVar = pull
+"""
+
+from __future__ import annotations
+
+import hashlib
+import inspect
+import types
+from dataclasses import dataclass, fields
+from pathlib import Path
+from typing import ClassVar
+
+import numpy as np
+from numba.core.dispatcher import Dispatcher
+
+from physics import checks
+from physics.kernels.compiler import composed
+from physics.kernels.fields.terms import AIR, LOAD, Term
+
+field_function = composed
+
+
+@dataclass(frozen=True)
+class Field:
+    """A force field: force and torque on every body from its state and the time. Subclass it to make one.
+
+    Attributes
+    ----------
+    function : compiled function, of the class
+        ``(state, p, t) -> (force, torque)`` with a `physics.kernels.fields.state.FieldState`, the numbers of
+        `columns` and the time [s]; force [N] and torque about the centre of mass [N m] are tuples of three, world
+        frame. Made by `physics.field_function`; it may call others that are.
+    energy : compiled function or None, of the class
+        ``(state, p, t) -> potential energy`` [J], of a field that has one: for `physics.diagnose`.
+    has_many : bool, of the class
+        Whether a scene may hold several.
+    is_air : bool, of the class
+        Whether `function` gives the velocity of the air (a tuple of three) instead of a load.
+    """
+
+    function: ClassVar = None
+    energy: ClassVar = None
+    has_many: ClassVar[bool] = False
+    is_air: ClassVar[bool] = False
+
+    def columns(self, body: int, worlds: np.ndarray) -> np.ndarray:
+        """Numbers for `function`, for one body of the scene.
+
+        Parameters
+        ----------
+        body : int
+        worlds : (k,) int64
+
+        Returns
+        -------
+        (n,) or (k, n) float64
+            By default the dataclass's own fields, one after the other; the same n for every body and world.
+        """
+        numbers = [np.ravel(np.asarray(getattr(self, field.name), dtype=np.float64)) for field in fields(self)]
+        return np.concatenate(numbers) if numbers else np.empty(0)
+
+    def check(self, body_count: int) -> None:
+        """Raise a ValueError where the field does not fit a scene of so many bodies."""
+
+    @property
+    def takes_energy(self) -> bool | None:
+        """Whether it only ever takes mechanical energy (True), keeps it, its own included (False), or neither."""
+        return None
+
+    @property
+    def label(self) -> str:
+        """Name in a plan: of the class, in words."""
+        name = type(self).__name__
+        return "".join(f" {c.lower()}" if c.isupper() and k else c.lower() for k, c in enumerate(name))
+
+
+@dataclass(frozen=True)
+class FieldSlot:
+    """A kind of field in a scene: its term in the kernel, and which of the scene's effects it stands for.
+
+    Attributes
+    ----------
+    term : Term
+    first : int
+        Its first column among the fields' [1].
+    effects : tuple of Field
+    """
+
+    term: Term
+    first: int
+    effects: tuple[Field, ...]
+
+
+def field_slots(effects: tuple, body_count: int) -> tuple[FieldSlot, ...]:
+    """The fields among a scene's effects, by kind; the order in which they were declared does not matter.
+
+    Raises
+    ------
+    ValueError
+        A field without a compiled function, or with another number of columns for another body or effect.
+    """
+    kinds: dict[type, list[Field]] = {}
+    for effect in effects:
+        if isinstance(effect, Field):
+            kinds.setdefault(type(effect), []).append(effect)
+    slots, first = [], 0
+    for kind, found in sorted(kinds.items(), key=lambda item: _name(item[0])):
+        size = _column_count(kind, found, body_count)
+        marker = f"{AIR if kind.is_air else LOAD}_{_name(kind)}_{len(found)}x{size}"
+        term = Term(marker, _compiled(kind, "function"), _compiled(kind, "energy"), size, len(found))
+        slots.append(FieldSlot(term, first, tuple(found)))
+        first += size * len(found)
+    return tuple(slots)
+
+
+def _column_count(kind: type, found: list[Field], body_count: int) -> int:
+    sizes = {effect.columns(body, np.arange(1)).shape[-1] for effect in found for body in range(body_count)}
+    if len(sizes) != 1:
+        raise ValueError(f"{kind.__name__}.columns gives {sorted(sizes)} numbers; allowed is one length for all bodies")
+    return sizes.pop()
+
+
+def _compiled(kind: type, name: str) -> Dispatcher | None:
+    function = vars(kind).get(name, getattr(kind, name))
+    if isinstance(function, Dispatcher) or (function is None and name == "energy"):
+        return function
+    raise ValueError(f"{kind.__name__}.{name} is {function!r}; allowed is a function under @physics.field_function")
+
+
+def _name(kind: type) -> str:
+    """What tells this kind of field from all others: its function's name, and of a user's own its content, too."""
+    function = _compiled(kind, "function")
+    name = function.py_func.__name__.replace("_", "")
+    if function.py_func.__module__.startswith("physics.kernels."):
+        return name
+    return f"{name}{digest(function, _compiled(kind, 'energy'))}"
+
+
+def digest(*functions: Dispatcher | None) -> str:
+    """Hexadecimal digest of everything that decides what these functions compile to.
+
+    Their code, the numbers and functions that they read from around them, and so on down; of other modules that they
+    name the source.
+    """
+    found = hashlib.sha256()
+    seen: set[int] = set()
+    for function in functions:
+        _feed(found, function, seen)
+    return found.hexdigest()[:16]
+
+
+def _feed(found, value, seen: set[int]) -> None:
+    """Add a value that a function reads to a digest."""
+    if isinstance(value, Dispatcher):
+        value = value.py_func
+    if isinstance(value, types.FunctionType):
+        if id(value) not in seen:
+            seen.add(id(value))
+            _feed_function(found, value, seen)
+    elif isinstance(value, types.ModuleType):
+        found.update(value.__name__.encode())
+        source = getattr(value, "__file__", None)
+        if source and Path(source).suffix == ".py":
+            found.update(Path(source).read_bytes())
+    elif isinstance(value, np.ndarray):
+        found.update(f"{value.dtype}{value.shape}".encode() + value.tobytes())
+    elif isinstance(value, (tuple, list)):
+        for item in value:
+            _feed(found, item, seen)
+    elif isinstance(value, type):
+        found.update(f"{value.__module__}.{value.__qualname__}".encode())
+    else:
+        found.update(repr(value).encode())
+
+
+def _feed_function(found, function: types.FunctionType, seen: set[int]) -> None:
+    around = inspect.getclosurevars(function)
+    code = function.__code__
+    found.update(code.co_code)
+    found.update(repr((code.co_names, code.co_varnames)).encode())
+    for constant in code.co_consts:
+        if isinstance(constant, types.CodeType):
+            found.update(constant.co_code + repr(constant.co_names).encode())
+        else:
+            found.update(repr(constant).encode())
+    for names in (around.nonlocals, around.globals):
+        for name in sorted(names):
+            found.update(name.encode())
+            _feed(found, names[name], seen)
+
+
+def write_columns(slots: tuple[FieldSlot, ...], params: np.ndarray, body_count: int, worlds: np.ndarray) -> None:
+    """Write the parameters of all fields into their columns.
+
+    Parameters
+    ----------
+    slots : tuple of FieldSlot
+    params : (len(worlds) * body_count, n) float64, out
+        The columns of fields alone.
+    body_count : int
+    worlds : (k,) int64
+        Which worlds these rows are.
+
+    Raises
+    ------
+    ValueError
+        A parameter that is not finite.
+    """
+    for slot in slots:
+        size = slot.term.size
+        for k, effect in enumerate(slot.effects):
+            first = slot.first + k * size
+            for body in range(body_count):
+                numbers = np.asarray(effect.columns(body, worlds), dtype=np.float64)
+                checks.finite(numbers, numbers.shape, f"{type(effect).__name__}.columns")
+                params[body::body_count, first : first + size] = numbers

@@ -1,0 +1,32 @@
+"""Magnus lift: the force across the velocity of a body that spins.
+
+    F = ½ ρ C π r³ ω x u,    u = velocity relative to the air,  r = (d1 d2 d3)^(1/3)
+
+r is the radius of the sphere of the same extent. It acts at the centre of mass.
+
+References
+----------
+S. I. Rubinow, J. B. Keller, *The transverse force on a spinning sphere moving in a viscous fluid*, J. Fluid Mech. 11,
+1961: C = 2 at small Reynolds numbers. A. M. Nathan, *The effect of spin on the flight of a baseball*, Am. J. Phys. 76,
+2008: about 1 for sports balls.
+"""
+
+from __future__ import annotations
+
+import math
+
+from physics.kernels import quaternion as qt
+from physics.kernels.compiler import inlined
+from physics.kernels.fields.state import ZERO, minus, times
+
+# Columns.
+STRENGTH = 0  # ½ ρ C [kg/m³]
+SIZE = 1
+
+
+@inlined
+def magnus(state, p, t):
+    """(force, torque) of the lift."""
+    d = state.dims
+    u = minus(state.v, state.air)
+    return times(p[STRENGTH] * math.pi * d[0] * d[1] * d[2], qt.cross(state.w, u)), ZERO

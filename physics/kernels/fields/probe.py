@@ -1,0 +1,28 @@
+"""What the fields do to bodies now, for those who look at a world."""
+
+from __future__ import annotations
+
+from physics.kernels.body import bind_body, read_state
+from physics.kernels.compiler import kernel
+from physics.kernels.fields.loads import bind_fields, field_state
+from physics.kernels.fields.terms import total_energy, total_load
+
+
+@kernel
+def look_at_fields(state, params, shapes, tilted, start, scratch, wrenches, energies):
+    """Write force and torque of all fields (rows, 6) [N, N m] and potential energies (rows,) [J] at `start` [s].
+
+    `wrenches` is zero at first: it is the wrench that is bound, too.
+    """
+    work = scratch[0]
+    for i in range(state.shape[0]):
+        bind_body(
+            i // shapes.shape[0], i, shapes[i % shapes.shape[0]], params, None, wrenches, None, None, tilted, work
+        )
+        bind_fields(params, i, work)
+        x, q, v, L = read_state(state, i)
+        told = field_state(x, q, v, L, start, tilted, work)
+        F, T = total_load(told, start, work)
+        for c in range(3):
+            wrenches[i, c], wrenches[i, 3 + c] = F[c], T[c]
+        energies[i] = total_energy(told, start, work)

@@ -1,0 +1,176 @@
+"""Which fields a kernel is compiled for: read off the *type* of the workspace.
+
+A scene's fields are members of its workspace record: one marker per kind of field, `load_drag_1x3` for one `Drag` of
+three columns. Numba compiles a kernel per type of its arguments, so that a record without markers has kernels without
+fields, and one with them is found in the disk cache by its markers, from any process. A user's own field is marked
+with a digest of its source: an edit is another type.
+
+What is compiled for a type is chosen while Numba finds out types (`numba.extending.overload`): functions here are
+chosen by the record, and nothing is passed for it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from typing import NamedTuple
+
+from numba.extending import overload
+
+from physics.kernels.compiler import CHOSEN, composed, kernel
+from physics.kernels.fields.state import ZERO, plus
+
+# First word of a marker: what the field's function gives, a (force, torque) or the velocity of the air.
+LOAD, AIR = "load", "air"
+
+
+class Term(NamedTuple):
+    """A kind of field in a scene.
+
+    Attributes
+    ----------
+    marker : str
+        Member of the workspace.
+    function : dispatcher
+        (state, parameters, time) -> (force, torque), or -> velocity of the air.
+    energy : dispatcher or None
+        (state, parameters, time) -> potential energy [J].
+    size : int
+        Columns of one field.
+    count : int
+        Fields of this kind.
+    """
+
+    marker: str
+    function: Callable
+    energy: Callable | None
+    size: int
+    count: int
+
+
+_KNOWN: dict[str, Term] = {}
+
+
+def declare(terms: tuple[Term, ...]) -> None:
+    """Make terms known before a kernel is compiled for a workspace that holds their markers."""
+    _KNOWN.update((term.marker, term) for term in terms)
+
+
+def members(terms: tuple[Term, ...]) -> list[tuple]:
+    """What a workspace holds for these terms: nothing when there are none."""
+    if not terms:
+        return []
+    columns = sum(term.count * term.size for term in terms)
+    return [
+        ("held_acceleration", float, (3,)),  # of gravity and wrench [m/s²]
+        ("held_torque", float, (3,)),  # of the wrench [N m]
+        ("call_start", float),  # time at the start of the call [s]
+        ("now", float),  # of the stage [s]
+        ("is_felt", int),  # 1: some field was not zero since this was set to 0
+        ("columns", float, (max(columns, 1),)),  # parameters of all fields, in the order of the markers
+        *((term.marker, float) for term in terms),
+    ]
+
+
+def _markers(names) -> list[str]:
+    return [name for name in names if name.split("_")[0] in (LOAD, AIR)]
+
+
+def _names(work) -> list[str]:
+    """Members of a workspace, or of the type of one."""
+    return list(work.fields) if hasattr(work, "fields") else list(work.dtype.names)
+
+
+def if_declared(otherwise: Callable):
+    """Make a function, whose last argument is the workspace, a kernel that is `otherwise` where there are no fields.
+
+    `otherwise` is inlined: of one that does nothing nothing is left.
+    """
+
+    def decorate(function):
+        compiled = kernel(function)
+
+        def stub(*arguments):
+            return (function if _markers(_names(arguments[-1])) else otherwise)(*arguments)
+
+        def call(*arguments):
+            return compiled(*arguments)
+
+        @overload(stub, jit_options=CHOSEN, strict=False)
+        def choose(*types):
+            return call if _markers(_names(types[-1])) else otherwise
+
+        stub.__doc__ = function.__doc__
+        return stub
+
+    return decorate
+
+
+def _instances(work, kind: str) -> Iterator[tuple[Term, int, int]]:
+    """Each field of this kind in a workspace: its term, first and last column."""
+    first = 0
+    for marker in _markers(_names(work)):
+        term = _KNOWN[marker]
+        for _ in range(term.count):
+            if marker.startswith(kind):
+                yield term, first, first + term.size
+            first += term.size
+
+
+def _sum(kind: str, start: Callable, chosen: Callable, add: Callable):
+    """A kernel (state, t, work) that adds up what the chosen functions of a workspace's fields give."""
+
+    def stub(state, t, work):
+        return total(work)(state, t, work)
+
+    def total(work):
+        result = start
+        for term, first, last in _instances(work, kind):
+            if chosen(term) is not None:
+                result = add(composed(result), chosen(term), first, last)
+        return result
+
+    @overload(stub, jit_options=CHOSEN, strict=False)
+    def choose(state, t, work):
+        return total(work)
+
+    return stub
+
+
+def _no_load(state, t, work):
+    return ZERO, ZERO
+
+
+def _no_air(state, t, work):
+    return ZERO
+
+
+def _no_energy(state, t, work):
+    return 0.0
+
+
+def _add_load(before, function, first, last):
+    def add(state, t, work):
+        F, T = before(state, t, work)
+        f, m = function(state, work.columns[first:last], t)
+        return plus(F, f), plus(T, m)
+
+    return add
+
+
+def _add_number(before, function, first, last):
+    def add(state, t, work):
+        return before(state, t, work) + function(state, work.columns[first:last], t)
+
+    return add
+
+
+def _add_vector(before, function, first, last):
+    def add(state, t, work):
+        return plus(before(state, t, work), function(state, work.columns[first:last], t))
+
+    return add
+
+
+total_load = _sum(LOAD, _no_load, lambda term: term.function, _add_load)
+total_air = _sum(AIR, _no_air, lambda term: term.function, _add_vector)
+total_energy = _sum(LOAD, _no_energy, lambda term: term.energy, _add_number)

@@ -1,0 +1,91 @@
+"""What an effect costs: a scene with it and the same scene without, step for step, in turns."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import physics
+from physics import scenes
+from rigid_env.measure.timing import Row, Stopwatch, interleave
+
+STEP = 0.005  # [s]
+STEPS = 20_000  # of one run
+QUICK_STEPS = 500
+ON, OFF = "on", "off"
+
+GRAVITY = physics.Gravity((0.0, -scenes.GRAVITY, 0.0))
+FLOATING = physics.Block((2.0, 1.0, 3.0), 3000.0, pos=(0.0, 0.1, 0.0), angvel=(0.1, 0.2, 0.1))
+CORNER = (2.5, 1.5, 1.0)
+
+
+def _flying() -> physics.Body:
+    """The tumbling block."""
+    return scenes.tumble().bodies[0]
+
+
+def _case(effect, *others, body=None) -> tuple[physics.Scene, physics.Scene]:
+    """A body in flight with the effect and without, and with `others` in both."""
+    body = body or _flying()
+    return tuple(physics.Scene([body], effects=[*others, *extra]) for extra in ((effect,), ()))
+
+
+def _touching(kind: type) -> tuple[physics.Scene, physics.Scene]:
+    """The block at rest with an effect of contact and without it: without `Contact` it falls."""
+    scene = scenes.rest()
+    gone = {physics.Contact: (physics.Contact, physics.Friction)}.get(kind, (kind,))
+    without = [effect for effect in scene.effects if not isinstance(effect, gone)]
+    return scene, physics.Scene(scene.bodies, scene.walls, without)
+
+
+CASES: dict[str, Callable[[], tuple[physics.Scene, physics.Scene]]] = {
+    "gravity": lambda: _case(GRAVITY),
+    "contact": lambda: _touching(physics.Contact),
+    "friction": lambda: _touching(physics.Friction),
+    "drag": lambda: _case(physics.Drag(), GRAVITY),
+    "angular drag": lambda: _case(physics.AngularDrag(), GRAVITY),
+    "magnus": lambda: _case(physics.Magnus(), GRAVITY),
+    "wind": lambda: _case(physics.Wind(), GRAVITY, physics.Drag()),
+    "gusts": lambda: _case(physics.Wind(gust=2.0), GRAVITY, physics.Drag()),
+    "buoyancy": lambda: _case(physics.Buoyancy(), GRAVITY, body=FLOATING),
+    "spring": lambda: _case(physics.Spring((0.0, 5.0, 0.0), CORNER, 40.0, 1.0), GRAVITY),
+    "push": lambda: _case(physics.Push((1.0, 0.0, 0.0), CORNER), GRAVITY),
+}
+
+
+class Steps:
+    """Steps of one world from its start."""
+
+    def __init__(self, scene: physics.Scene, accuracy: str, steps: int):
+        self.world = physics.World(scene, dt=STEP, accuracy=accuracy)
+        self.start, self.steps = self.world.snapshot(), steps
+
+    def __call__(self) -> float:
+        self.world.restore(self.start)
+        with Stopwatch() as watch:
+            self.world.step(steps=self.steps)
+        return self.steps / watch.seconds
+
+
+def run_count(repeats: int) -> int:
+    """How often `effect_row` calls `tick`, over all effects."""
+    return len(CASES) * 2 * (repeats + 1)
+
+
+def effect_row(name: str, accuracy: str, steps: int, repeats: int, tick: Callable[[str], None] | None = None) -> Row:
+    """Measure one effect of `CASES`.
+
+    Returns
+    -------
+    Row
+        Steps per second with the effect, against those without it. In `notes`: what the effect adds to a step
+        [ns], and the bytes of parameters that its scene stores more per body.
+    """
+    runners = {key: Steps(scene, accuracy, steps) for key, scene in zip((ON, OFF), CASES[name]())}
+    told = None if tick is None else lambda key: tick(f"{name}: {key}")
+    spreads = interleave(runners, repeats, told)
+    stored = {key: runner.world.params.shape[1] * runner.world.params.itemsize for key, runner in runners.items()}
+    added = 1e9 / spreads[ON].median - 1e9 / spreads[OFF].median
+    return Row(
+        key=name, what=name, unit="steps/s", ours=spreads[ON], accuracy=accuracy, peer_name="the scene without it",
+        peer=spreads[OFF], notes={"added_ns_per_step": added, "added_bytes_per_body": stored[ON] - stored[OFF]},
+    )  # fmt: skip

@@ -1,0 +1,160 @@
+"""Scenes as MJCF: read back equal; MuJoCo loads them with the same mass, inertia, pose, velocity and springs."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import physics
+from physics import scenes
+from physics.frontier_errors import rotation_matrices
+from physics.mjcf import from_mjcf, to_mjcf
+
+EPS = np.finfo(float).eps
+TURNED = (0.5, 0.5, -0.5, 0.5)
+HEAVY_SIDE = physics.Block(
+    (5, 3, 2), 6.0, pos=(0, 9, 0), quat=TURNED, linvel=(1, 2, 3), angvel=(0.3, -0.2, 0.1), center=(0.1, 0, -0.2),
+    inertia_body=((7, 0.1, 0.2), (0.1, 14, 0), (0.2, 0, 16)),
+)  # fmt: skip
+MIXED = physics.Scene(
+    [
+        HEAVY_SIDE,
+        physics.Sphere(0.7, 2.0, pos=(4, 5, 6)),
+        physics.Ellipsoid((1.0, 0.5, 0.8), 1.0, pos=(-4, 5, 0), angvel=(1, 2, 3)),
+    ],
+    [physics.HalfSpace((0, 1, 0), -0.5), physics.HalfSpace((1, 2, 2), -7.0)],
+    [physics.Gravity((0.5, -9.81, 0)), physics.Contact(), physics.Friction(0.4)],
+)
+EXPRESSIBLE = {
+    **{name: scenes.by_name(name) for name in ("tumble", "slide", "incline", "rolling_sphere")},
+    "mixed": MIXED,
+    "slippery": physics.Scene(MIXED.bodies, MIXED.walls, [physics.Contact()]),
+    "apart": physics.Scene(MIXED.bodies, MIXED.walls, [physics.Contact(between_bodies=False), physics.Friction(0.4)]),
+    "in space": physics.Scene(MIXED.bodies, effects=[physics.Contact(), physics.Friction(0.4)]),
+    "through": physics.Scene(MIXED.bodies, MIXED.walls, [physics.Gravity()]),
+}
+
+
+@pytest.mark.parametrize("name", EXPRESSIBLE)
+def test_a_scene_comes_back(name):
+    """To rounding: a spin goes to the body's frame and back, a plane's offset to a point and back."""
+    scene = EXPRESSIBLE[name]
+    back = from_mjcf(to_mjcf(scene))
+    assert [type(effect) for effect in back.effects] == [type(effect) for effect in scene.effects]
+    assert back.effects == scene.effects
+    for body, again in zip(scene.bodies, back.bodies, strict=True):
+        assert type(again) is type(body)
+        assert (again.mass, again.pos, again.quat, again.linvel) == (body.mass, body.pos, body.quat, body.linvel)
+        assert np.array_equal(again.dimensions, body.dimensions)
+        assert again.center == body.center
+        assert (again.inertia_body is None) == (body.inertia_body is None)
+        assert again.inertia == pytest.approx(body.inertia, rel=4 * EPS)
+        assert again.angvel == pytest.approx(body.angvel, abs=16 * EPS * (1 + np.abs(body.angvel).max()))
+    for wall, again in zip(scene.walls, back.walls, strict=True):
+        assert again.normal == wall.normal
+        assert again.offset == pytest.approx(wall.offset, rel=8 * EPS)
+
+
+@pytest.mark.parametrize("name", EXPRESSIBLE)
+def test_mujoco_loads_it_with_the_same_mass_inertia_and_start(name):
+    mujoco = pytest.importorskip("mujoco")
+    scene = EXPRESSIBLE[name]
+    model = mujoco.MjModel.from_xml_string(to_mjcf(scene))
+    data = mujoco.MjData(model)
+    mujoco.mj_resetDataKeyframe(model, data, 0)
+    mujoco.mj_forward(model, data)
+    gravity = scene.effect(physics.Gravity)
+    assert np.array_equal(model.opt.gravity, gravity.acceleration if gravity else np.zeros(3))
+    for b, body in enumerate(scene.bodies, 1):
+        assert model.body_mass[b] == body.mass
+        R = rotation_matrices(model.body_iquat[b])
+        # MuJoCo diagonalises the tensor by an iteration of its own, to about 1e-12 of it.
+        assert R @ np.diag(model.body_inertia[b]) @ R.T == pytest.approx(body.inertia, abs=1e-10 * body.inertia.max())
+        assert data.xipos[b] == pytest.approx(body.pos, abs=1e-14 * 10)
+        velocity = np.empty(6)
+        mujoco.mj_objectVelocity(model, data, mujoco.mjtObj.mjOBJ_BODY, b, velocity, 0)
+        # Rotation matrices of MuJoCo and here differ by rounding.
+        assert velocity[3:] == pytest.approx(body.linvel, abs=1e-13)
+        assert velocity[:3] == pytest.approx(body.angvel, abs=1e-13)
+
+
+def test_a_spring_pulls_in_mujoco_as_it_does_here():
+    """Accelerations at the start, without contacts: the same law, to the rounding of a few lengths."""
+    mujoco = pytest.importorskip("mujoco")
+    springs = [
+        physics.Spring((0, 12, 1), (1, 0.5, 0.2), 80.0, 3.0, length=0.5),
+        physics.Spring((3, 2, 0), (-1, 0.5, 0.2), 60.0),
+    ]
+    scene = physics.Scene([HEAVY_SIDE], effects=[physics.Gravity(), *springs])
+    model = mujoco.MjModel.from_xml_string(to_mjcf(scene))
+    data = mujoco.MjData(model)
+    mujoco.mj_resetDataKeyframe(model, data, 0)
+    mujoco.mj_forward(model, data)
+    world = physics.World(scene)
+    wrench = physics.look_at(world)[0][0]
+    assert data.qacc[:3] == pytest.approx(wrench[:3] / 6.0 + [0, -9.81, 0], rel=1e-10)
+    R = rotation_matrices(np.array(HEAVY_SIDE.quat))
+    spin = R.T @ HEAVY_SIDE.angvel
+    torque = R.T @ wrench[3:] - np.cross(spin, HEAVY_SIDE.inertia @ spin)
+    assert data.qacc[3:] == pytest.approx(np.linalg.solve(HEAVY_SIDE.inertia, torque), rel=1e-9, abs=1e-10)
+
+
+def test_a_model_written_elsewhere_is_read():
+    """MuJoCo's defaults, density instead of mass, a turned inertial frame off the body's origin."""
+    scene = from_mjcf("""<mujoco>
+      <worldbody>
+        <light pos="0 0 3"/>
+        <geom type="plane" size="0 0 1" pos="0 0 -2"/>
+        <body pos="0 0 1"><freejoint/><geom type="box" size="1 2 3"/></body>
+        <body pos="0 0 9" quat="0 0 0 2"><joint type="free"/>
+          <inertial pos="1 0 0" quat="1 0 0 1" mass="3" diaginertia="1 2 2.5"/>
+          <geom type="box" size="1 1 1"/>
+        </body>
+      </worldbody>
+    </mujoco>""")
+    first, second = scene.bodies
+    assert first == physics.Block((2, 4, 6), 48_000.0, pos=(0, 0, 1))
+    assert second.pos == pytest.approx((-1, 0, 9), abs=4 * EPS)
+    assert second.center == pytest.approx((-1, 0, 0), abs=4 * EPS)
+    assert second.inertia == pytest.approx(np.diag([2, 1, 2.5]), abs=8 * EPS)
+    assert scene.walls == (physics.HalfSpace((0, 0, 1), -2.0),)
+    assert scene.effects == (physics.Gravity((0, 0, -9.81)), physics.Contact(), physics.Friction(1.0))
+
+
+FREE = '<freejoint/><geom type="box" size="1 1 1"/>'
+REFUSED = [
+    ("<mujoco><worldbody><body>" + FREE + "</body></worldbody>", "no element found|mismatched|unclosed"),
+    ("<mujoco><worldbody/></mujoco>", "bodies is empty"),
+    ("<mujoco><default/><worldbody/></mujoco>", "<default> in <mujoco> has no counterpart"),
+    ("<mujoco><worldbody><body><geom size='1'/></body></worldbody></mujoco>", "<body> is not a free body"),
+    (
+        f"<mujoco><worldbody><body name='b' euler='1 2 3'>{FREE}</body></worldbody></mujoco>",
+        "euler of <body 'b'> is not read",
+    ),
+    (f"<mujoco><worldbody><body>{FREE}<body/></body></worldbody></mujoco>", "<body> in <body> has no counterpart"),
+    (
+        "<mujoco><worldbody><body><freejoint/><geom type='capsule' size='1 1' mass='1'/></body></worldbody></mujoco>",
+        "<geom> is a capsule; allowed are box, sphere, ellipsoid",
+    ),
+    (
+        "<mujoco><worldbody><geom size='1'/></worldbody></mujoco>",
+        "<geom> of the world is a sphere; allowed are planes",
+    ),
+]
+
+
+@pytest.mark.parametrize(("text", "message"), REFUSED)
+def test_what_a_scene_cannot_hold_is_named(text, message):
+    with pytest.raises(ValueError, match=f"^here: .*({message})"):
+        from_mjcf(text, "here")
+
+
+def test_what_mjcf_cannot_express_is_refused_or_named(tmp_path):
+    scene = physics.Scene([physics.Sphere(1, 1)], effects=[physics.Gravity(), physics.Drag(0.3), physics.Contact(0.5)])
+    path = tmp_path / "scene.xml"
+    with pytest.raises(ValueError, match=r"cannot express Contact\(restitution=0.5.*\), Drag\(.*drop=True"):
+        physics.save_mjcf(scene, path)
+    assert not path.exists()
+    physics.save_mjcf(scene, path, drop=True)
+    assert "left out: Contact(restitution=0.5, between_bodies=True), Drag(coefficient=0.3" in path.read_text()
+    assert physics.load_mjcf(path).effects == (physics.Gravity(),)

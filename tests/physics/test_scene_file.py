@@ -1,0 +1,105 @@
+"""Scenes as files: every canonical scene comes back equal, and mistakes are told with their line."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from pathlib import Path
+from typing import ClassVar
+
+import pytest
+
+import physics
+from physics import scenes
+from physics.scene_file import from_toml, to_toml
+
+EVERYTHING = physics.Scene(
+    [
+        physics.Block((5, 3, 2), 6.0, pos=(0.1, 0.2, 0.3), quat=(0.5, 0.5, -0.5, 0.5), center=(0.1, 0, 0),
+                      inertia_body=((3, 0.1, 0), (0.1, 4, 0), (0, 0, 5))),
+        physics.Sphere(0.1, 1 / 3, linvel=(1e-300, -2.5e17, 0)),
+        physics.Ellipsoid((1, 2, 3), 4.0, angvel=(1, 2, 3)),
+    ],
+    [physics.HalfSpace((1, 2, 3), -0.7)],
+    [
+        physics.Gravity((0.1, -9.81, 0)), physics.Contact(0.3), physics.Friction(0.7), physics.Drag(0.4, linear=0.1),
+        physics.AngularDrag(0.1, 0.2), physics.Magnus(0.9), physics.Wind((1, 2, 3), 0.5, seed=7),
+        physics.Buoyancy(998.0, (0.1, 1, 0)), physics.Spring((1, 2, 3), body=1), physics.Spring(damping=3.0, body=2),
+        physics.Push((1, 2, 3), frame="body"),
+    ],
+)  # fmt: skip
+
+
+@pytest.mark.parametrize("name", [*scenes.SCENES, "everything"])
+def test_a_scene_comes_back_equal(name, tmp_path):
+    scene = EVERYTHING if name == "everything" else scenes.by_name(name)
+    path = tmp_path / "scene.toml"
+    physics.save_scene(scene, path)
+    back = physics.load_scene(path)
+    assert back == scene
+    assert to_toml(back) == path.read_text(encoding="utf-8")
+
+
+def test_what_is_left_out_has_its_default():
+    scene = from_toml('[[bodies]]\nkind = "Sphere"\nradius = 1\nmass = 2\n\n[[effects]]\nkind = "Gravity"\n')
+    assert scene == physics.Scene([physics.Sphere(1.0, 2.0)], effects=[physics.Gravity()])
+
+
+BALL = '[[bodies]]\nkind = "Sphere"\nradius = 1\nmass = 2\n'
+MISTAKES = [
+    ("bodies = 3", "line 1: bodies is 3"),
+    (
+        BALL + "[[bodies]]\nkind = 'Cube'\n",
+        r"line 6: bodies\[1\]: kind is 'Cube'; allowed are Block, Sphere",
+    ),
+    (BALL + "colour = 1\n", r"line 5: bodies\[0\]: colour is not known; allowed are .*radius"),
+    (BALL + "pos = [1, 2]\n", r"line 5: bodies\[0\]: pos has shape \(2,\)"),
+    ('[[bodies]]\nkind = "Sphere"\nmass = 2\n', r"line 1: bodies\[0\]: radius is missing"),
+    ("\n" + BALL.replace("mass = 2", "mass = -2"), r"line 5: bodies\[0\]: mass is -2"),
+    (BALL + "[[walls]]\noffset = 1\n", r"line 5: walls\[0\]: normal is missing"),
+    (BALL + "[[effects]]\nkind = 'Drag'\n\nlinear = -1\n", r"line 8: effects\[0\]: Drag.linear is -1"),
+    (BALL + "[[effects]]\nkind = 'Friction'\n", "Friction without Contact"),
+    (BALL + "[[effect]]\n", "line 5: effect is not known; allowed are format, bodies, walls, effects"),
+    ("format = 2\n" + BALL, "line 1: format is 2; allowed is 1"),
+    ("mass = \n", "Invalid value.*line 1"),
+    ("", "bodies is empty"),
+]
+
+
+@pytest.mark.parametrize(("text", "message"), MISTAKES)
+def test_a_mistake_is_told_with_its_line(text, message):
+    with pytest.raises(ValueError, match=f"(?s)^here.*{message}"):
+        from_toml(text, "here")
+
+
+@physics.field_function
+def pull(state, p, t):
+    """Towards x = 0."""
+    return (-p[0] * state.x[0], 0.0, 0.0), (0.0, 0.0, 0.0)
+
+
+@dataclass(frozen=True)
+class Trough(physics.Field):
+    """A field of one's own."""
+
+    stiffness: float = 1.0
+    function: ClassVar = pull
+
+
+def test_a_field_of_ones_own_is_read_where_its_class_is_given(tmp_path):
+    scene = physics.Scene([physics.Sphere(1, 2)], effects=[Trough(3.0)])
+    path = tmp_path / "scene.toml"
+    physics.save_scene(scene, path)
+    assert physics.load_scene(path, kinds=[Trough]) == scene
+    with pytest.raises(ValueError, match="kind is 'Trough'; allowed are Gravity"):
+        physics.load_scene(path)
+
+
+def test_the_file_of_the_docs_is_read_and_its_mistake_told_as_stated(tmp_path):
+    page = (Path(__file__).parents[2] / "docs" / "scene-files.md").read_text(encoding="utf-8")
+    text = page.split("```toml\n")[1].split("```")[0]
+    scene = from_toml(text)
+    assert [type(effect).__name__ for effect in scene.effects] == ["Gravity", "Contact", "Drag"]
+    told = page.split("    ball.toml, ")[1].split("\n")[0]
+    with pytest.raises(ValueError, match=f"^{re.escape('ball.toml, ' + told)}$"):
+        from_toml(text.replace("mass = ", "mass = -"), "ball.toml")
