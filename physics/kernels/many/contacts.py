@@ -99,6 +99,15 @@ def pair_slop(a, b, many):
 
 
 @inlined
+def acceleration_of(k, many):
+    """Bound for the relative acceleration of a contact's points without contact [m/s²]."""
+    a, b = many.ends[k, 0], many.ends[k, 1]
+    if b < 0:
+        return many.bodies[a].acceleration
+    return many.bodies[a].acceleration + many.bodies[b].acceleration
+
+
+@inlined
 def _laws(k, a, b, many):
     """Coefficients of two bodies: the geometric mean of friction, the larger restitution. Of a wall: the body's."""
     mu, e = many.bodies[a].mu, many.bodies[a].restitution

@@ -1,0 +1,101 @@
+"""The stage between impacts: exact flight of what touches nothing, Moreau's midpoint step of what does."""
+
+from __future__ import annotations
+
+from physics.kernels import layout as at
+from physics.kernels import quaternion as qt
+from physics.kernels.body import angular_velocity, read_state, write_state
+from physics.kernels.compiler import inlined, kernel
+from physics.kernels.contact import CLOSING_SHARE, UNSEEN
+from physics.kernels.fields.loads import hold_loads
+from physics.kernels.flight import drift
+from physics.kernels.many import memory as kept
+from physics.kernels.many.contacts import acceleration_of, matrix, minus, pair_slop, plus, put, refresh, vector
+from physics.kernels.many.place import place_body
+from physics.kernels.many.settle import settle
+from physics.kernels.step import coast
+
+
+@inlined
+def vector_of(a):
+    """The three numbers of an array."""
+    return (a[0], a[1], a[2])
+
+
+@inlined
+def drift_body(b, h, gyroscopic, tilted, many):
+    """Body b after half a free drift: position and attitude at constant momenta."""
+    x, q, v, L = read_state(many.now, b)
+    write_state(many.now, b, (plus(x, h, v), drift(q, L, many.bodies[b], h, gyroscopic, tilted), v, L))
+
+
+@inlined
+def _centripetal(b, k, first, many):
+    """ω x (ω x r) of one end of contact k, world frame [m/s²]."""
+    w = vector(many.twist, b, 3)
+    return qt.cross(w, qt.cross(w, vector(many.arm, k, first)))
+
+
+@inlined
+def aim_rest(n, h, many):
+    """Targets of the resting stage over h, with gaps at its middle; see `physics.kernels.contact.aim_rest`.
+
+    A contact that was apart at the start may close what is left of its gap at the middle in the half that follows.
+    """
+    half = 0.5 * h
+    for k in range(n):
+        a, b = many.ends[k, 0], many.ends[k, 1]
+        slop = pair_slop(a, b, many)
+        c = _centripetal(a, k, 0, many)
+        if b >= 0:
+            c = minus(c, _centripetal(b, k, 3, many))
+        t = qt.matvec(matrix(many.frame, k), (-half * c[0], -half * c[1], -half * c[2]))
+        if many.gap[k] > slop:
+            t = (t[0] - many.gap[k] / half, t[1], t[2])
+        elif many.gap[k] > 0.0:
+            t = (t[0] - CLOSING_SHARE * many.gap[k] / h, t[1], t[2])
+        negligible = max(many.settings[0].tolerance * acceleration_of(k, many) * h, UNSEEN * slop / h)
+        if max(abs(t[0]), max(abs(t[1]), abs(t[2]))) <= negligible:
+            t = (0.0, 0.0, 0.0)
+        put(many.target, k, 0, t)
+
+
+@inlined
+def hold_all_loads(h, gyroscopic, tilted, many):
+    """Hold the loads of the middle of a stage of length h for every body; nothing where there are no fields."""
+    for b in range(many.now.shape[0]):
+        is_touching = many.touched[b] == 1
+        hold_loads(read_state(many.now, b), h, is_touching, gyroscopic, tilted, many.bodies[b])
+
+
+@kernel
+def glide(n, world, h, friction, gyroscopic, tilted, scheme, memory, report, many):
+    """Every body after h: exact flight, or Moreau's midpoint step with the n contacts of the set."""
+    half = 0.5 * h
+    hold_all_loads(h, gyroscopic, tilted, many)
+    for b in range(many.now.shape[0]):
+        if many.touched[b] == 0:
+            write_state(many.now, b, coast(read_state(many.now, b), h, gyroscopic, tilted, scheme, many.bodies[b]))
+            continue
+        drift_body(b, half, gyroscopic, tilted, many)
+        place_body(b, tilted, many)
+    if n == 0:
+        kept.forget(world, memory)
+        return
+    refresh(many)
+    aim_rest(n, h, many)
+    for b in range(many.now.shape[0]):
+        if many.touched[b] == 1:
+            body = many.bodies[b]
+            a, torque = vector_of(body.free_acceleration), vector_of(body.torque)
+            put(many.now, b, at.LINVEL, plus(vector(many.now, b, at.LINVEL), h, a))
+            put(many.now, b, at.ANGMOM, plus(vector(many.now, b, at.ANGMOM), h, torque))
+            put(many.twist, b, 0, vector(many.now, b, at.LINVEL))
+            q, L = read_state(many.now, b)[1], vector(many.now, b, at.ANGMOM)
+            put(many.twist, b, 3, angular_velocity(q, L, body, tilted))
+    kept.load(n, world, h, friction, memory, many)
+    settle(n, world, friction, report, many)
+    kept.store(n, world, h, memory, many)
+    for b in range(many.now.shape[0]):
+        if many.touched[b] == 1:
+            drift_body(b, half, gyroscopic, tilted, many)

@@ -1,0 +1,118 @@
+"""Impacts: what contacts ask of velocities where bodies meet, and how long it takes until they next do."""
+
+from __future__ import annotations
+
+import math
+
+from physics.kernels import quaternion as qt
+from physics.kernels.compiler import inlined, kernel
+from physics.kernels.many import memory as kept
+from physics.kernels.many.contacts import acceleration_of, pair_slop, put, vector
+from physics.kernels.many.settle import settle
+
+# A meeting is fast where it would close this share of the smaller body's radius in the time left: it is then met in
+# time, not stopped in front of. A quarter of it: the error of the place where a plastic meeting acts.
+FAST_SHARE = 0.1
+
+# What a free rotation may add to the bound of a point's acceleration, ω² r: its angular velocity changes on the way.
+TURNING_MARGIN = 2.0
+
+# Slops that something may go in until the resting stage stops it at the middle of the step: a contact problem less.
+SOFT_LANDING = 100.0
+
+FAR = 1.0e300
+
+
+@inlined
+def bounces(k, h, many):
+    """Whether contact k would leave again for longer than `rest_share` of h after an impact at its speed now."""
+    least = many.settings[0].rest_share * acceleration_of(k, many) * h
+    return many.bounce[k] > 0.0 and -many.bounce[k] * many.speed[k] > least
+
+
+@inlined
+def is_meeting(k, h, many):
+    """Whether contact k is still apart and to be met in time: it bounces, or is fast."""
+    a, b = many.ends[k, 0], many.ends[k, 1]
+    if not (many.gap[k] > pair_slop(a, b, many) and many.speed[k] < 0.0):
+        return False
+    radius = many.bodies[a].radius
+    if b >= 0:
+        radius = min(radius, many.bodies[b].radius)
+    return bounces(k, h, many) or -many.speed[k] * h > FAST_SHARE * radius
+
+
+@inlined
+def aim_impact(n, h, is_last, many):
+    """Targets of an impact, and whether there is one; see `physics.kernels.contact.aim_impact`.
+
+    What approaches no faster than loads make it within `rest_share` of the step, or would go in by a few slops only
+    until the middle of it, is left to the resting stage.
+    """
+    is_impact = False
+    for k in range(n):
+        slop = pair_slop(many.ends[k, 0], many.ends[k, 1], many)
+        gap, speed, goal = many.gap[k], many.speed[k], 0.0
+        slow = max(2.0 * SOFT_LANDING * slop / h, many.settings[0].rest_share * acceleration_of(k, many) * h)
+        if gap > slop:
+            goal = -gap / h
+            if not is_last and is_meeting(k, h, many):
+                goal = -FAR
+            elif goal - speed > slow:
+                is_impact = True
+        elif speed > 0.0:
+            goal = -many.bounce[k] * speed  # Moreau's law for what leaves: without it a struck chain could gain energy
+        elif bounces(k, h, many):
+            goal, is_impact = -many.bounce[k] * speed, True
+        elif -speed > slow:
+            is_impact = True
+        put(many.target, k, 0, (goal, 0.0, 0.0))
+        put(many.impulse, k, 0, (0.0, 0.0, 0.0))
+    return is_impact
+
+
+@inlined
+def leave_out_the_free(n, many):
+    """Drop the contacts that have no target from the set: they are not met in this stage. Returns what is left."""
+    left = 0
+    for k in range(n):
+        if many.target[k, 0] > -FAR:
+            if left < k:
+                kept.copy_contact(k, left, many)
+            left += 1
+    return left
+
+
+@kernel
+def strike(n, world, h, is_last, friction, tilted, report, many):
+    """Velocities after the impulses of the contacts that approach; nothing where none does. Contacts in the set."""
+    is_impact = aim_impact(n, h, is_last, many)
+    meeting = time_until_meeting(n, h, is_last, many)
+    n = leave_out_the_free(n, many)
+    if not is_impact:
+        return n, meeting, False
+    settle(n, world, friction, report, many)
+    return n, meeting, True
+
+
+@inlined
+def time_until_meeting(n, h, is_last, many):
+    """Time until the first of the meetings that matter, at the latest h [s]: never too late.
+
+    Two points approach by no more than s t + a t²/2 with a the bound of their acceleration by loads and turning, so
+    that the gap lasts at least until t = 2 gap/(s + √(s² + 2 a gap)).
+    """
+    first = h
+    if is_last:
+        return first
+    for k in range(n):
+        if not is_meeting(k, h, many):
+            continue
+        a, b, s = many.ends[k, 0], many.ends[k, 1], -many.speed[k]
+        w = vector(many.twist, a, 3)
+        bound = acceleration_of(k, many) + TURNING_MARGIN * qt.dot(w, w) * many.bodies[a].radius
+        if b >= 0:
+            w = vector(many.twist, b, 3)
+            bound += TURNING_MARGIN * qt.dot(w, w) * many.bodies[b].radius
+        first = min(first, 2.0 * many.gap[k] / (s + math.sqrt(s * s + 2.0 * bound * many.gap[k])))
+    return first
