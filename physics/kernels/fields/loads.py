@@ -87,19 +87,27 @@ def put_loads(force, torque, work):
 
 
 @if_declared()
-def hold_loads(y, h, is_touching, gyroscopic, tilted, work):
-    """Hold the loads of the middle of a stage of length h that starts at y, now."""
+def hold_loads(y, h, gyroscopic, tilted, work):
+    """Hold the loads of the middle of a flight of length h that starts at y, now."""
     x, q, v, L = y
-    a, torque = _vector(work.held_acceleration), _vector(work.held_torque)
     half = 0.5 * h
     t = work.now + half
     q = drift(q, L, work, half, gyroscopic, tilted)
     x = plus(x, times(half, v))
     F, T = field_load(x, q, v, L, t, tilted, work)
-    if not is_touching:
-        v = plus(v, times(half, plus(a, times(1.0 / work.mass, F))))
-        L = plus(L, times(half, plus(torque, T)))
-        F, T = field_load(x, q, v, L, t, tilted, work)
+    v = plus(v, times(half, plus(_vector(work.held_acceleration), times(1.0 / work.mass, F))))
+    L = plus(L, times(half, plus(_vector(work.held_torque), T)))
+    F, T = field_load(x, q, v, L, t, tilted, work)
+    put_loads(F, T, work)
+
+
+@if_declared()
+def hold_contact_loads(y, h, gyroscopic, tilted, work):
+    """Hold the loads of the middle of a stage in contact, with the velocities of its start."""
+    x, q, v, L = y
+    half = 0.5 * h
+    q = drift(q, L, work, half, gyroscopic, tilted)
+    F, T = field_load(plus(x, times(half, v)), q, v, L, work.now + half, tilted, work)
     put_loads(F, T, work)
 
 

@@ -22,7 +22,7 @@ from physics.kernels import quaternion as qt
 from physics.kernels.body import angular_velocity, bind_body, is_finite, read_state, write_state
 from physics.kernels.compiler import inlined, kernel
 from physics.kernels.contact import CLOSING_SHARE, UNSEEN
-from physics.kernels.fields.loads import bind_fields, hold_loads, pass_time, set_clock
+from physics.kernels.fields.loads import bind_fields, hold_contact_loads, hold_loads, pass_time, set_clock
 from physics.kernels.flight import drift
 from physics.kernels.many import memory as kept
 from physics.kernels.many.apart import push_apart
@@ -222,8 +222,10 @@ def aim_rest(n, h, many):
 def hold_all_loads(h, gyroscopic, tilted, many):
     """Hold the loads of the middle of a stage of length h for every body; nothing where there are no fields."""
     for b in range(many.now.shape[0]):
-        is_touching = many.touched[b] == 1
-        hold_loads(read_state(many.now, b), h, is_touching, gyroscopic, tilted, many.bodies[b])
+        if many.touched[b] == 1:
+            hold_contact_loads(read_state(many.now, b), h, gyroscopic, tilted, many.bodies[b])
+        else:
+            hold_loads(read_state(many.now, b), h, gyroscopic, tilted, many.bodies[b])
 
 
 @kernel
