@@ -22,7 +22,14 @@ from physics.kernels import layout as at
 from physics.kernels.body import angular_velocity, bind_body, is_finite, read_state, write_state
 from physics.kernels.compiler import inlined, kernel
 from physics.kernels.contact import gather, is_clear, nearest_outside_set, push_out
-from physics.kernels.fields.loads import bind_fields, hold_loads, hold_mean_loads, pass_time, set_clock
+from physics.kernels.fields.loads import (
+    bind_fields,
+    hold_contact_loads,
+    hold_loads,
+    hold_mean_loads,
+    pass_time,
+    set_clock,
+)
 from physics.kernels.flight import fly, fly_by_scheme
 from physics.kernels.quaternion import to_matrix
 from physics.kernels.stages import impact, store_warm_start, touch
@@ -49,12 +56,13 @@ def coast(y, h, gyroscopic, tilted, scheme, work):
 @inlined
 def advance(n, y, h, friction, smooth, gyroscopic, tilted, pivots, scheme, memory, report, work):
     """One stage of length h: flight when nothing touches, else Moreau's step."""
-    hold_loads(y, h, n > 0, gyroscopic, tilted, work)
     if n > 0:
+        hold_contact_loads(y, h, gyroscopic, tilted, work)
         end = touch(n, y, h, friction, smooth, gyroscopic, tilted, pivots, memory, report, work)
         if hold_mean_loads(y, end, h, gyroscopic, tilted, work):
             end = touch(n, y, h, friction, smooth, gyroscopic, tilted, pivots, memory, report, work)
         return end
+    hold_loads(y, h, gyroscopic, tilted, work)
     forget_contacts(memory, work.i, work)
     return coast(y, h, gyroscopic, tilted, scheme, work)
 
@@ -144,7 +152,7 @@ def substep(y, h, friction, smooth, gyroscopic, tilted, pivots, scheme, memory, 
         if split == work.splits:
             report[world, at.UNRESOLVED] += 1.0
             work.is_last = 1
-        hold_loads(y, left, False, gyroscopic, tilted, work)
+        hold_loads(y, left, gyroscopic, tilted, work)
         n, depth = contact_set(y, left, tilted, work)
         if n > 0:
             report[world, at.PENETRATION] = max(report[world, at.PENETRATION], depth)
@@ -183,7 +191,7 @@ def step_worlds(
             y = read_state(state, i)
             for k in range(steps * substeps):
                 set_clock(k * h, work)
-                hold_loads(y, h, False, gyroscopic, tilted, work)
+                hold_loads(y, h, gyroscopic, tilted, work)
                 if contact is not None and not is_clear(y[0], y[2], h, work):
                     new = substep(y, h, friction, smooth, gyroscopic, tilted, pivots, scheme, memory, report, work)
                 else:

@@ -282,13 +282,13 @@ def test_views_are_read_only_and_refreshed_in_place():
 
 
 def test_several_bodies_do_not_disturb_each_other():
-    """Bodies meet walls only, for now: three shapes in one world move as each does alone."""
+    """Without contact between them three shapes in one world move as each does alone."""
     bodies = [
         physics.Block((5, 3, 2), 6.0, pos=(-4, 3, 0), angvel=(0.3, 0.2, 0.1)),
         physics.Sphere(1.0, 2.0, pos=(4, 3, 0), linvel=(1, 0, 0)),
         physics.Ellipsoid((1.0, 0.5, 0.8), 1.0, pos=(0, 2, 3), angvel=(0, 0, 1)),
     ]
-    effects = [physics.Gravity(), physics.Contact(0.3), physics.Friction(0.5)]
+    effects = [physics.Gravity(), physics.Contact(0.3, between_bodies=False), physics.Friction(0.5)]
     together = physics.World(physics.Scene(bodies, physics.three_walls(), effects), dt=0.005)
     together.step(steps=300)
     for b, body in enumerate(bodies):

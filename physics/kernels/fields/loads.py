@@ -27,28 +27,12 @@ from physics.kernels.fields.terms import if_declared, total_air, total_load
 from physics.kernels.flight import drift
 
 
-def _nothing(*arguments):
-    return None
-
-
-def _false(*arguments):
-    return False
-
-
-def _true(*arguments):
-    return True
-
-
-def _zero(*arguments):
-    return 0.0
-
-
 @inlined
 def _vector(a):
     return (a[0], a[1], a[2])
 
 
-@if_declared(_nothing)
+@if_declared()
 def bind_fields(params, i, work):
     """Take the fields' parameters of body i, and what the step holds, into `work`."""
     for c in range(work.columns.shape[0]):
@@ -58,13 +42,13 @@ def bind_fields(params, i, work):
         work.held_torque[c] = work.torque[c]
 
 
-@if_declared(_nothing)
+@if_declared()
 def set_clock(elapsed, work):
     """Say that so much time has passed since the start of the call [s]."""
     work.now = work.call_start + elapsed
 
 
-@if_declared(_nothing)
+@if_declared()
 def pass_time(h, work):
     """Say that so much time has passed since it was last said [s]."""
     work.now += h
@@ -102,24 +86,32 @@ def put_loads(force, torque, work):
     work.acceleration += work.radius * turning
 
 
-@if_declared(_nothing)
-def hold_loads(y, h, is_touching, gyroscopic, tilted, work):
-    """Hold the loads of the middle of a stage of length h that starts at y, now."""
+@if_declared()
+def hold_loads(y, h, gyroscopic, tilted, work):
+    """Hold the loads of the middle of a flight of length h that starts at y, now."""
     x, q, v, L = y
-    a, torque = _vector(work.held_acceleration), _vector(work.held_torque)
     half = 0.5 * h
     t = work.now + half
     q = drift(q, L, work, half, gyroscopic, tilted)
     x = plus(x, times(half, v))
     F, T = field_load(x, q, v, L, t, tilted, work)
-    if not is_touching:
-        v = plus(v, times(half, plus(a, times(1.0 / work.mass, F))))
-        L = plus(L, times(half, plus(torque, T)))
-        F, T = field_load(x, q, v, L, t, tilted, work)
+    v = plus(v, times(half, plus(_vector(work.held_acceleration), times(1.0 / work.mass, F))))
+    L = plus(L, times(half, plus(_vector(work.held_torque), T)))
+    F, T = field_load(x, q, v, L, t, tilted, work)
     put_loads(F, T, work)
 
 
-@if_declared(_false)
+@if_declared()
+def hold_contact_loads(y, h, gyroscopic, tilted, work):
+    """Hold the loads of the middle of a stage in contact, with the velocities of its start."""
+    x, q, v, L = y
+    half = 0.5 * h
+    q = drift(q, L, work, half, gyroscopic, tilted)
+    F, T = field_load(plus(x, times(half, v)), q, v, L, work.now + half, tilted, work)
+    put_loads(F, T, work)
+
+
+@if_declared(False)
 def hold_mean_loads(y, end, h, gyroscopic, tilted, work):
     """Hold the loads of the middle of a stage in contact from y to `end`: whether they are others than before."""
     x, q, v, L = y
@@ -132,7 +124,7 @@ def hold_mean_loads(y, end, h, gyroscopic, tilted, work):
     return a != _vector(work.free_acceleration) or torque != _vector(work.torque)
 
 
-@if_declared(_nothing)
+@if_declared()
 def refresh_loads(y, later, tilted, work):
     """Let the loads at the state y act, `later` [s] than now."""
     x, q, v, L = y
@@ -142,26 +134,26 @@ def refresh_loads(y, later, tilted, work):
         work.is_felt = 1
 
 
-@if_declared(_false)
+@if_declared(False)
 def has_fields(work):
     """Whether the scene declares a field."""
     return True
 
 
-@if_declared(_zero)
+@if_declared(0.0)
 def start_feeling(work):
     """Forget what was felt; the time now [s]."""
     work.is_felt = 0
     return work.now
 
 
-@if_declared(_nothing)
+@if_declared()
 def set_now(t, work):
     """Say what time it is [s]."""
     work.now = t
 
 
-@if_declared(_true)
+@if_declared(True)
 def was_felt(work):
     """Whether a field, or a held torque, was not zero anywhere since `start_feeling`."""
     return work.is_felt == 1

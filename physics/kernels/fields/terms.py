@@ -80,24 +80,27 @@ def _names(work) -> list[str]:
     return list(work.fields) if hasattr(work, "fields") else list(work.dtype.names)
 
 
-def if_declared(otherwise: Callable):
-    """Make a function, whose last argument is the workspace, a kernel that is `otherwise` where there are no fields.
+def if_declared(otherwise=None):
+    """Make a function, whose last argument is the workspace, a kernel that only returns `otherwise` without fields.
 
-    `otherwise` is inlined: of one that does nothing nothing is left.
+    That is inlined: nothing is left of it.
     """
 
     def decorate(function):
         compiled = kernel(function)
 
-        def stub(*arguments):
-            return (function if _markers(_names(arguments[-1])) else otherwise)(*arguments)
-
         def call(*arguments):
             return compiled(*arguments)
 
+        def skip(*arguments):
+            return otherwise
+
+        def stub(*arguments):
+            return function(*arguments) if _markers(_names(arguments[-1])) else otherwise
+
         @overload(stub, jit_options=CHOSEN, strict=False)
         def choose(*types):
-            return call if _markers(_names(types[-1])) else otherwise
+            return call if _markers(_names(types[-1])) else skip
 
         stub.__doc__ = function.__doc__
         return stub

@@ -7,7 +7,7 @@ from physics.kernels import quaternion as qt
 from physics.kernels.body import angular_velocity, read_state, write_state
 from physics.kernels.compiler import inlined, kernel
 from physics.kernels.contact import CLOSING_SHARE, UNSEEN
-from physics.kernels.fields.loads import hold_loads
+from physics.kernels.fields.loads import hold_contact_loads, hold_loads
 from physics.kernels.flight import drift
 from physics.kernels.many import memory as kept
 from physics.kernels.many.contacts import acceleration_of, matrix, minus, pair_slop, plus, put, refresh, vector
@@ -64,8 +64,10 @@ def aim_rest(n, h, many):
 def hold_all_loads(h, gyroscopic, tilted, many):
     """Hold the loads of the middle of a stage of length h for every body; nothing where there are no fields."""
     for b in range(many.now.shape[0]):
-        is_touching = many.touched[b] == 1
-        hold_loads(read_state(many.now, b), h, is_touching, gyroscopic, tilted, many.bodies[b])
+        if many.touched[b] == 1:
+            hold_contact_loads(read_state(many.now, b), h, gyroscopic, tilted, many.bodies[b])
+        else:
+            hold_loads(read_state(many.now, b), h, gyroscopic, tilted, many.bodies[b])
 
 
 @kernel
