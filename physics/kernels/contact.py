@@ -194,14 +194,15 @@ def aim_impact(n, bounce_speed, slop_speed, rate, work):
     A contact that approaches faster than `bounce_speed` leaves with e times that speed (Newton's law); one that
     approaches slower is brought to rest, since its rebound would be over within the step, and if it also is slower
     than `slop_speed` plus its gap times `rate` (1/h) it closes less than the slop within the step and is left to
-    the resting stage.
+    the resting stage. One that leaves may be turned round, to e times its speed: with that, and only with that, no
+    frictionless impact of several contacts gains energy (Moreau; theory, section 8).
     """
     is_impact = False
     for i in range(n):
         s = -work.speed[i]
         goal = 0.0
         is_bounce = work.restitution > 0.0 and s > bounce_speed
-        if is_bounce:
+        if is_bounce or s < 0.0:
             goal = work.restitution * s
         if is_bounce or s > slop_speed + max(work.gap[i], 0.0) * rate:
             is_impact = True

@@ -125,7 +125,7 @@ def to_next_impact(n, y, h, friction, smooth, gyroscopic, tilted, pivots, scheme
         if has_same_pose(end, y) or work.is_last:
             break
         gap = outside_gap(end, tilted, work)
-        if abs(gap) <= 0.5 * work.slop or (trial == 0 and gap > 0.0):
+        if abs(gap) <= 0.5 * work.slop or (trial == 0 and gap > 0.0) or trial == IMPACT_TRIALS:
             break
         if trial == 0:
             low_gap, high_gap = max(outside_gap(y, tilted, work), 0.0), gap

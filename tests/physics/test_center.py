@@ -170,7 +170,7 @@ def test_tumbles_as_the_independent_reference_does(accuracy, tolerance):
 def test_an_uneven_neighbour_changes_no_bit_of_an_even_block(accuracy):
     """The even block runs through the kernel that adds an offset, of 0."""
     even = block(center=(0, 0, 0), inertia_body=(1.0, 1.3, 0.9), pos=(0, 2, 0), quat=QUAT, angvel=(1, 2, -1))
-    effects = [physics.Gravity(), physics.Contact(0.3), physics.Friction(0.4)]
+    effects = [physics.Gravity(), physics.Contact(0.3, between_bodies=False), physics.Friction(0.4)]
     worlds = [
         physics.World(physics.Scene(bodies, FLOOR, effects), accuracy=accuracy)
         for bodies in ([even], [even, block(pos=(9, 3, 0))])
