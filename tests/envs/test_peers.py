@@ -105,12 +105,19 @@ def test_walls_with_any_normal_hold(engine):
     assert np.linalg.norm(seen.pos[-1, 0] - scene.bodies[0].pos) < 0.1
 
 
-def test_bodies_do_not_meet_each_other(engine):
-    """As in our engine: two blocks in the same place fly on."""
-    bodies = [physics.Block((1, 1, 1), 1.0, pos=(0, 5, 0), linvel=(v, 0, 0)) for v in (1.0, -1.0)]
-    scene = physics.Scene(bodies, [physics.HalfSpace((0, 1, 0))], [physics.Contact()])
-    seen = contenders(engine, scene, 0.01)[0].watch(10)
+def test_bodies_meet_each_other_where_the_scene_says_so(engine):
+    """Two blocks fly on through each other, or do not; an engine that is not given that says so."""
+    bodies = [physics.Block((1, 1, 1), 1.0, pos=(-0.6 * v, 5, 0), linvel=(v, 0, 0)) for v in (1.0, -1.0)]
+    floor = [physics.HalfSpace((0, 1, 0))]
+    scene = physics.Scene(bodies, floor, [physics.Contact(between_bodies=False)])
+    seen = contenders(engine, scene, 0.01)[0].watch(30)
     np.testing.assert_allclose(seen.linvel[-1, :, 0], (1.0, -1.0), rtol=0, atol=1e-12)
+    scene = physics.Scene(bodies, floor, [physics.Contact()])
+    if engine.name == "mujoco":
+        assert np.abs(contenders(engine, scene, 0.01)[0].watch(30).linvel[-1]).max() < 0.5  # soft, and plastic
+    else:
+        with pytest.raises(Unsupported, match="between bodies"):
+            engine.open(scene, 0.01)
 
 
 def bouncing_sphere(e) -> physics.Scene:

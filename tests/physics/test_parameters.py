@@ -19,7 +19,7 @@ BODIES = (
 
 
 def make(worlds, bodies=BODIES):
-    effects = [physics.Gravity(), physics.Contact(0.2), physics.Friction(0.5)]
+    effects = [physics.Gravity(), physics.Contact(0.2, between_bodies=False), physics.Friction(0.5)]
     return physics.World(physics.Scene(bodies, physics.three_walls(), effects), worlds=worlds)
 
 

@@ -23,6 +23,19 @@ class Unsupported(Exception):
     """A peer cannot express a scene; the message says what."""
 
 
+def refuse_meetings(scene: physics.Scene) -> None:
+    """For a peer that is only given contact with walls.
+
+    Raises
+    ------
+    Unsupported
+        Bodies of the scene touch each other.
+    """
+    contact = scene.effect(physics.Contact)
+    if contact is not None and contact.between_bodies and len(scene.bodies) > 1:
+        raise Unsupported("contact between bodies is not handed to this engine")
+
+
 class Run(Protocol):
     """A scene in a peer, at one setting and one step."""
 

@@ -22,7 +22,7 @@ from scipy.optimize import brentq
 import physics
 from physics.frontier_errors import rotation_matrices
 from rigid_env.measure.machine import version
-from rigid_env.measure.peers.contender import State, Unsupported, friction, gravity, restitution, walls
+from rigid_env.measure.peers.contender import State, Unsupported, friction, gravity, refuse_meetings, restitution, walls
 
 LOOSE, TIGHT = 1e-6, 1e-10  # accuracies of the integrator
 
@@ -63,6 +63,7 @@ class Drake:
 
     def open(self, scene: physics.Scene, dt: float, **options) -> _Run:
         """See `contender.Engine`."""
+        refuse_meetings(scene)
         if options.pop("is_fitted", False):
             options["dissipation"] = dissipation(scene)
         return _Run(scene, dt, **options)

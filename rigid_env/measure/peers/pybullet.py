@@ -15,7 +15,7 @@ import numpy as np
 
 import physics
 from rigid_env.measure.machine import version
-from rigid_env.measure.peers.contender import State, Unsupported, friction, gravity, restitution, walls
+from rigid_env.measure.peers.contender import State, Unsupported, friction, gravity, refuse_meetings, restitution, walls
 
 FASTEST = 1e6  # limit of coordinates' speeds, far above what scenes have
 
@@ -42,6 +42,7 @@ class PyBullet:
 
     def open(self, scene: physics.Scene, dt: float, **options) -> _Run:
         """See `contender.Engine`; ellipsoids, and inertia tensors that are not diagonal, it cannot express."""
+        refuse_meetings(scene)
         for body in scene.bodies:
             if body.kind == "ellipsoid":
                 raise Unsupported("PyBullet has no ellipsoid")
