@@ -3,9 +3,8 @@
 It is one NumPy record, so that a kernel hands on a single pointer, and the compiler knows every size. It is
 filled anew for each body (`body.bind_body`); nothing in it outlives a step.
 
-The contact fields are laid out for two bodies per contact: arm and Jacobian rows belong to the first body.
-The second one is the wall, with inverse mass and inertia zero as in the course notes, which adds nothing.
-Contacts between bodies will put the rows of the second body beside those of the first.
+Contacts here are with walls: arm and Jacobian rows belong to the body. The wall has inverse mass and inertia zero as
+in the course notes, and adds nothing. Bodies that touch each other have a memory of their own (`many.arrays`).
 """
 
 from __future__ import annotations

@@ -8,8 +8,7 @@ near the solution let
 contact by contact; x = M⁻¹ Jᵀ p(x) is a nonlinear system for the twists alone, whose Newton matrix
 1 + M⁻¹ Jᵀ ρ p' J has a 6 x 6 block where two bodies touch (`envelope`). Then q = p(x) and again. A round contracts by
 about 1/(1 + ρ w) with w the smallest mobility that matters: the inverse of the heaviest mass that a contact may have to
-carry, whatever that contact's own mass is. So ρ is a multiple of the largest mass in the problem, and a heavy block on
-a light one takes no more rounds than two of a kind.
+carry, whatever that contact's own mass is. So ρ is a multiple of the largest mass in the problem.
 
 The first guess is that everything holds: then the law is linear, and one linear system is the answer for whatever
 stands still, however high or heavy. Where ρ grows too large for Newton's method to find its pieces, the round is

@@ -11,7 +11,7 @@ from physics.kernels.many.contacts import acceleration_of, pair_slop, put, vecto
 from physics.kernels.many.settle import settle
 
 # A meeting is fast where it would close this share of the smaller body's radius in the time left: it is then met in
-# time, not stopped in front of. A quarter of it: the error of the place where a plastic meeting acts.
+# time, not stopped in front of.
 FAST_SHARE = 0.1
 
 # What a free rotation may add to the bound of a point's acceleration, ω² r: its angular velocity changes on the way.
