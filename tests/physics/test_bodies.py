@@ -66,6 +66,40 @@ def test_oblique_impact_turns_along_the_line_of_centres():
     assert physics.diagnose(world).energy.sum() == pytest.approx(12.5, rel=1e-12)
 
 
+@pytest.mark.parametrize("restitution", [0.2, 0.7])
+@pytest.mark.parametrize("ball_first", [True, False])
+def test_a_ball_turns_the_block_that_it_hits_off_centre(restitution, ball_first):
+    v, offset, mass, moment = 3.0, 0.6, 5.0, 5.0 * (1.0**2 + 2.0**2) / 12
+    ball = physics.Sphere(0.5, 2.0, pos=(-2, offset, 0), linvel=(v, 0, 0))
+    block = physics.Block((1, 2, 1), mass)
+    bodies = [ball, block] if ball_first else [block, ball]
+    world = physics.World(physics.Scene(bodies, (), [physics.Contact(restitution)]), dt=0.01)
+    # One contact is one sweep, which is exact: were it wrong, Newton's method would mend it unseen.
+    assert {int(world.step().solver[0]) for _ in range(50)} == {Solver.NONE, Solver.SWEEPS}
+    b, k = (0, 1) if ball_first else (1, 0)
+    # The normal goes through the ball's centre; the block gets -offset times the impulse about z. Solved to 1e-6.
+    j = (1 + restitution) * v / (1 / 2.0 + 1 / mass + offset**2 / moment)
+    assert world.linvel[0, b, 0] == pytest.approx(v - j / 2.0, abs=1e-6 * v)
+    assert world.linvel[0, k, 0] == pytest.approx(j / mass, abs=1e-6 * v)
+    assert world.angvel[0, k, 2] == pytest.approx(-offset * j / moment, abs=1e-6 * v)
+
+
+def test_a_plastic_landing_stops_in_front_of_what_it_meets():
+    """At whatever moment of a step it comes: eight heights, spread over the way of one step."""
+    speed, dt = np.sqrt(2 * G * 0.5), 0.01
+    assert speed * dt < 0.1 * np.sqrt(0.75)  # too slow to be met in time: `strike.FAST_SHARE`
+    bodies = [physics.Block(CUBE, 1.0, pos=(0, 0.5, 0)), physics.Block(CUBE, 1.0, pos=(0, 2.0, 0))]
+    effects = [physics.Gravity((0, -G, 0)), physics.Contact(), physics.Friction(0.5)]
+    world = physics.World(physics.Scene(bodies, FLOOR, effects), worlds=8, dt=dt)
+    pos = world.pos.copy()
+    pos[:, 1, 1] += speed * dt * np.arange(8) / 8
+    world.set_state(pos=pos)
+    worst = np.max([world.step().penetration for _ in range(60)], axis=0)
+    # A hundred slops is what the resting stage may stop by itself; without the limit half a step's way, 16 mm.
+    assert worst.max() <= 101 * 1e-6 * np.sqrt(0.75)
+    assert world.pos[:, 1, 1] == pytest.approx(1.5, abs=1e-4)
+
+
 def test_touching_balls_are_struck_at_once_by_the_law_of_newton():
     world = balls([(-3, 0, 0), (0, 0, 0), (1, 0, 0)], [(3, 0, 0), (0, 0, 0), (0, 0, 0)], [1.0] * 3, 1.0)
     world.step(steps=100)
