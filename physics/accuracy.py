@@ -18,6 +18,7 @@ SCHEMES = {
     "rk4": schemes.RK4,
 }
 SOLVERS = ("sweeps", "sweeps+pivoting")
+SLIPS = ("mean", "end")
 COLLISIONS = ("simultaneous", "sequential")
 
 
@@ -54,6 +55,10 @@ class Accuracy:
     rest_share : float
         Bounce threshold of time stepping: a rebound that would be over within this share of the substep is not made
         (restitution acts as 0). 0 lets every rebound happen.
+    slip : str
+        What friction opposes in a step of time stepping in which one or two points of a body touch walls. ``mean``: the
+        mean of their slip before and after the step, of second order. ``end``: their slip after it, as for faces and
+        between bodies: quicker, and of first order where the direction of sliding turns.
     collisions : str
         What happens to contacts that collide at the same moment. ``simultaneous``: one contact problem of all of them.
         ``sequential``, with ``events`` only: one after the other, the one that approaches fastest first (of equals the
@@ -74,6 +79,7 @@ class Accuracy:
     impacts: int = 8
     slop: float = 1e-6
     rest_share: float = 0.5
+    slip: str = "mean"
     collisions: str = "simultaneous"
 
     def __post_init__(self):
@@ -87,6 +93,8 @@ class Accuracy:
             raise ValueError(f"Accuracy.scheme is {self.scheme!r}; allowed are {', '.join(SCHEMES)}")
         if self.solver not in SOLVERS:
             raise ValueError(f"Accuracy.solver is {self.solver!r}; allowed are {', '.join(SOLVERS)}")
+        if self.slip not in SLIPS:
+            raise ValueError(f"Accuracy.slip is {self.slip!r}; allowed are {', '.join(SLIPS)}")
         if self.collisions not in COLLISIONS:
             raise ValueError(f"Accuracy.collisions is {self.collisions!r}; allowed are {', '.join(COLLISIONS)}")
         if self.collisions == "sequential" and self.scheme != "events":
@@ -98,7 +106,7 @@ class Accuracy:
 
 _BALANCED = Accuracy()
 PRESETS = {
-    "fast": replace(_BALANCED, solver="sweeps", tolerance=1e-3, iterations=20, impacts=4, slop=1e-5),
+    "fast": replace(_BALANCED, solver="sweeps", tolerance=1e-3, iterations=20, impacts=4, slop=1e-5, slip="end"),
     "balanced": _BALANCED,
     "precise": replace(_BALANCED, scheme="events", tolerance=1e-10, iterations=2000, impacts=10_000, slop=1e-12),
     "reference": replace(_BALANCED, scheme="events", tolerance=1e-13, iterations=10_000, impacts=100_000, slop=1e-14),

@@ -19,6 +19,7 @@ from physics.kernels.events.motion import make_motion
 from physics.kernels.fields.terms import declare
 from physics.kernels.many import arrays as many
 from physics.kernels.probe import angular_momenta
+from physics.kernels.slip import FEW
 from physics.kernels.stages import memory_size
 from physics.kernels.workspace import body_records, make_workspace
 from physics.plan import SHAPE_CODES, make_plan
@@ -115,6 +116,7 @@ class World:
         numbers = {
             "tolerance": settings.tolerance, "sweeps": settings.iterations, "splits": settings.impacts,
             "relative_slop": settings.slop, "rest_share": settings.rest_share,
+            "mean_slip": FEW if settings.slip == "mean" else 0,
         }  # fmt: skip
         self.scratch = [
             many.make_many(self.body_count, self.walls, self.plan.terms, **numbers)

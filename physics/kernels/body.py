@@ -93,12 +93,29 @@ def body_attitude(q, work, tilted):
     return qt.multiply(q, (p[0], -p[1], -p[2], -p[3]))
 
 
-@kernel
-def angular_velocity(q, L, work, tilted):
-    """ω = R I⁻¹ Rᵀ L, world frame [rad/s]."""
-    if L[0] == 0.0 and L[1] == 0.0 and L[2] == 0.0:
-        return (0.0, 0.0, 0.0)
-    J = work.J
-    R = qt.to_matrix(principal_attitude(q, work, tilted))
+@inlined
+def turning(R, L, J):
+    """ω = R I⁻¹ Rᵀ L, world frame [rad/s], R the principal frame in the world, J the inverse principal moments."""
     m = qt.transposed_matvec(R, L)
     return qt.matvec(R, (J[0] * m[0], J[1] * m[1], J[2] * m[2]))
+
+
+@kernel
+def angular_velocity(q, L, work, tilted):
+    """`turning` of a body with attitude q."""
+    if L[0] == 0.0 and L[1] == 0.0 and L[2] == 0.0:
+        return (0.0, 0.0, 0.0)
+    return turning(qt.to_matrix(principal_attitude(q, work, tilted)), L, work.J)
+
+
+@inlined
+def free_turning(q, L, work, gyroscopic, tilted):
+    """Angular velocity [rad/s] and acceleration [rad/s²] of a body on which no torque acts, world frame."""
+    zero = (0.0, 0.0, 0.0)
+    if L[0] == 0.0 and L[1] == 0.0 and L[2] == 0.0:
+        return zero, zero
+    R = qt.to_matrix(principal_attitude(q, work, tilted))
+    w = turning(R, L, work.J)
+    if gyroscopic is None:
+        return w, zero
+    return w, turning(R, qt.cross(L, w), work.J)

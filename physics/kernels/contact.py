@@ -11,6 +11,10 @@ from physics.kernels.layout import BLOCK, NORMAL, OFFSET, VERTEX_COUNT
 # λ² - (1 - β/2) λ + β/2 = 0, the root is double (fastest approach without overshoot) for β = 6 - 4√2.
 CLOSING_SHARE = 0.3431457505076198
 
+# Slops within which what approaches has arrived. Features that touched together may be two slops apart, and the place
+# of the first one's impact is half a slop off: an edge that comes down again does so with both its ends at once.
+TOGETHER = 3.0
+
 # Share of the slop below which the displacement of a contact in one step does not count.
 UNSEEN = 1.0e-3
 
@@ -62,7 +66,7 @@ def _admit(gap, speed, slop, margin, reach, acceleration, h, is_last):
     could bring it to the wall (it then rests, and restitution would not act); and, in the last stage that a
     substep may have, when it would pass through the wall before the substep ends.
     """
-    if gap <= slop:
+    if gap <= slop or (gap <= TOGETHER * slop and speed < 0.0):
         return True
     if is_last and gap + h * speed - reach <= slop:
         return True
@@ -101,7 +105,7 @@ def gather(x, R, v, w, h, tilted, work):
         work.mask[k] = 0
         n = wall_normal(walls, k)
         d = qt.dot(n, center) - walls[k, OFFSET]
-        near = margin
+        near = max(margin, TOGETHER * slop)
         if work.is_last:
             near += h * (abs(v[0]) + abs(v[1]) + abs(v[2]) + radius * (abs(w[0]) + abs(w[1]) + abs(w[2])))
         if d > radius + near:
@@ -223,11 +227,12 @@ def is_closing(i, n, work):
 
 
 @inlined
-def aim_rest(n, w, h, work):
+def aim_rest(n, w, alpha, h, work):
     """Targets of the resting stage over h.
 
     The impulses act at the middle of the step, the velocity is asked for at its end, half a step later: a
-    vertex that the body turns about has by then gained h/2 ω x (ω x r), so that is taken off. A feature still
+    vertex that the body turns about has by then gained h/2 (ω x (ω x r) + α x r), α the angular acceleration of
+    free turning, so that is taken off. A feature still
     above the wall may close `CLOSING_SHARE` of its gap (all of it in a substep's last stage). What is smaller
     than the tolerance of the solve, or would move a contact by less than `UNSEEN` slops in the step, is 0: a body
     comes to rest to the last bit, and contacts that hold are not asked to move apart by next to nothing.
@@ -241,7 +246,8 @@ def aim_rest(n, w, h, work):
         t0 = t1 = t2 = 0.0
         if is_turning:
             r = (work.arm[i, 0], work.arm[i, 1], work.arm[i, 2])
-            c = qt.cross(w, qt.cross(w, r))
+            c, d = qt.cross(w, qt.cross(w, r)), qt.cross(alpha, r)
+            c = (c[0] + d[0], c[1] + d[1], c[2] + d[2])
             k = work.slot[i] // features
             t0 = -half * (c[0] * walls[k, 0] + c[1] * walls[k, 1] + c[2] * walls[k, 2])
             t1 = -half * (c[0] * walls[k, 3] + c[1] * walls[k, 4] + c[2] * walls[k, 5])

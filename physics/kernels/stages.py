@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from physics.kernels import layout as at
 from physics.kernels import quaternion as qt
-from physics.kernels.body import angular_velocity, principal_attitude
+from physics.kernels.body import free_turning, principal_attitude, turning
 from physics.kernels.compiler import inlined, kernel
 from physics.kernels.contact import aim_impact, aim_rest, place_arms
 from physics.kernels.flight import drift
 from physics.kernels.slide import SLIDE
+from physics.kernels.slip import has_turned_round, oppose_mean_slip
 from physics.kernels.solve import PIVOTING, solve_contacts
 
 # Row of `memory`: length of the last resting stage [s], its contact count, which direct solve worked last
@@ -91,23 +92,30 @@ def touch(n, y, h, friction, smooth, gyroscopic, tilted, pivots, memory, report,
     x, q, v, L = y
     a, torque = work.free_acceleration, work.torque
     half = 0.5 * h
-    w = angular_velocity(q, L, work, tilted)
+    w, alpha = free_turning(q, L, work, gyroscopic, tilted)
     x = (x[0] + half * v[0], x[1] + half * v[1], x[2] + half * v[2])
     q = drift(q, L, work, half, gyroscopic, tilted)
-    place_arms(n, qt.to_matrix(q), tilted, work)
-    aim_rest(n, w, h, work)
+    R = qt.to_matrix(q)
+    place_arms(n, R, tilted, work)
+    if tilted is not None:
+        R = qt.to_matrix(principal_attitude(q, work, tilted))
+    aim_rest(n, w, alpha, h, work)
+    opposes_mean = False
+    if friction is not None and n <= work.mean_slip:
+        opposes_mean = oppose_mean_slip(n, v, turning(R, L, work.J), max(h, memory[work.i, STAGE_LENGTH]), work)
     width = 3
     if friction is None:
         width = 1
     load_warm_start(n, width, memory, work.i, h, work)
     v = (v[0] + h * a[0], v[1] + h * a[1], v[2] + h * a[2])
     L = (L[0] + h * torque[0], L[1] + h * torque[1], L[2] + h * torque[2])
-    R = qt.to_matrix(principal_attitude(q, work, tilted))
     work.mode = int(memory[work.i, MODE])
-    v, L, residual, sweeps, method = solve_contacts(n, friction, smooth, pivots, v, L, R, work)
+    v1, L1, residual, sweeps, method = solve_contacts(n, friction, smooth, pivots, v, L, R, work)
+    if opposes_mean and has_turned_round(n, v1, turning(R, L1, work.J), work):
+        aim_rest(n, w, alpha, h, work)
+        v1, L1, residual, sweeps, method = solve_contacts(n, friction, smooth, pivots, v, L, R, work)
     memory[work.i, MODE] = work.mode
     note_solve(report, work.world, residual, sweeps, method, work.tolerance)
     store_warm_start(n, width, memory, work.i, h, work)
-    x = (x[0] + half * v[0], x[1] + half * v[1], x[2] + half * v[2])
-    q = drift(q, L, work, half, gyroscopic, tilted)
-    return x, q, v, L
+    x = (x[0] + half * v1[0], x[1] + half * v1[1], x[2] + half * v1[2])
+    return x, drift(q, L1, work, half, gyroscopic, tilted), v1, L1

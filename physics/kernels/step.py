@@ -8,8 +8,8 @@ bodies meet, and between the cuts
   half a free drift.
 
 Moreau, *Unilateral contact and dry friction in finite freedom dynamics*, 1988, for the midpoint step; what
-differs is the cut at impacts and the velocity asked for at the step's end (`contact.aim_rest`), which together
-make the scheme second order between impacts and exact on parabolas.
+differs are the cut at impacts, the velocity asked for at the step's end (`contact.aim_rest`) and friction against the
+mean slip of few contacts (`slip`), which together make the scheme second order between impacts and exact on parabolas.
 
 What a scene does not have arrives here as None and is pruned by the compiler (see `compiler.kernel`).
 """

@@ -25,6 +25,7 @@ def setting_fields() -> list[tuple]:
         ("tolerance", f),  # largest residual of a contact solve, relative to the largest free contact speed
         ("sweeps", i),  # sweeps per solve at most
         ("splits", i),  # cuts of a substep at impacts at most
+        ("mean_slip", i),  # contacts of a stage up to which friction opposes their mean slip (`slip`)
         ("rest_share", f),  # a rebound that would be over within this share of the substep is plastic
     ]
 

@@ -1,0 +1,91 @@
+"""Friction of a stage against the mean of the slip velocities before and after it: of second order.
+
+In Moreau's step the friction of the whole stage opposes the slip velocity u¹ at its end: an error of first order
+wherever the direction of sliding turns, and that of a vertex may turn by 90° within a few steps. Against the mean
+½ (u⁰ + u¹) it is the midpoint rule, of second order, and its work, -μ p_n |½ (u⁰ + u¹)|, is what the energy loses:
+that of any impulse is its product with the mean velocity. To the solver, which asks for friction against u less its
+target, that is the target -u⁰.
+
+Such friction cannot stop a contact, only turn it round. Where it does, u¹·u⁰ < 0, the stage is solved once more with
+friction against u¹. So are stages in which nothing slips at first.
+"""
+
+from __future__ import annotations
+
+import math
+
+from physics.kernels import quaternion as qt
+from physics.kernels.compiler import inlined
+from physics.kernels.layout import SPHERE, TANGENT_1
+from physics.kernels.share import contact_arm
+
+# Contacts of a stage at most, `mean_slip` of the settings, for `physics.Accuracy.slip`. The slips of a face turn slowly,
+# as a whole, and a solve more is dear there.
+FEW = 2
+
+# A contact that held slips by less than this many times the error of its target.
+MARGIN = 2.0
+
+
+@inlined
+def _tangential(i, v, w, work):
+    """Tangential velocity of the body at contact i [m/s]."""
+    walls, k = work.walls, work.slot[i] // work.features
+    m = qt.cross(w, contact_arm(work, i))
+    x, y, z = v[0] + m[0], v[1] + m[1], v[2] + m[2]
+    t = TANGENT_1
+    return (
+        walls[k, t] * x + walls[k, t + 1] * y + walls[k, t + 2] * z,
+        walls[k, t + 3] * x + walls[k, t + 4] * y + walls[k, t + 5] * z,
+    )
+
+
+@inlined
+def _least_slip(w, h, work):
+    """Slip at the start of a stage up to which a contact holds [m/s].
+
+    What the target of a contact that held (`contact.aim_rest`) left over in the stage before: nothing of a sphere,
+    whose arm does not turn with it, else h² (ω α + ω³ r).
+    """
+    if work.shape == SPHERE:
+        return 0.0
+    square = qt.dot(w, w)
+    return MARGIN * h * math.sqrt(square) * h * (work.acceleration + work.radius * square)
+
+
+@inlined
+def oppose_mean_slip(n, v, w, h, work):
+    """Let friction oppose the mean slip of the stage: whether all contacts slip.
+
+    Parameters
+    ----------
+    v, w : tuples of 3 floats
+        Velocity and angular velocity before the impulses, at the attitude of the middle of the stage.
+    h : float
+        Length of the stage [s].
+
+    Notes
+    -----
+    Changes the tangents of `work.target`, which `contact.aim_rest` has set: what the turning of its arm takes from a
+    contact in half a stage. Added to the velocity at the middle it gives the one at the start.
+    """
+    least = _least_slip(w, h, work)
+    for i in range(n):
+        a, b = _tangential(i, v, w, work)
+        a, b = a + work.target[i, 1], b + work.target[i, 2]
+        if not a * a + b * b > least * least:
+            return False
+    for i in range(n):
+        a, b = _tangential(i, v, w, work)
+        work.target[i, 1], work.target[i, 2] = -a, -b
+    return True
+
+
+@inlined
+def has_turned_round(n, v, w, work):
+    """Whether the slip of a contact that pushes is against the one before, -`work.target`, after impulses."""
+    for i in range(n):
+        a, b = _tangential(i, v, w, work)
+        if work.impulse[3 * i] > 0.0 and a * work.target[i, 1] + b * work.target[i, 2] > 0.0:
+            return True
+    return False
