@@ -129,6 +129,26 @@ def run(
 
 
 @app.command()
+def replay(
+    file: Annotated[Path, typer.Argument(metavar="FILE", help="What physics.Recorder wrote.")],
+    json: Json = None,
+) -> None:
+    """Take recorded steps again, and say whether they come out the same, bit for bit."""
+    console = Console()
+    with _told_errors():
+        from physics import Recording
+        from rigid_env.replaying import show, summary
+
+        recording = Recording.load(file)
+        with console.status("replaying"):
+            content = summary(recording.replay())
+        show(content, console)
+        _write(json, {"file": str(file), **content}, console)
+    if not content["is_identical"]:
+        raise typer.Exit(1)
+
+
+@app.command()
 def explain(
     scene: Annotated[str, typer.Argument(help="A canonical scene.")],
     accuracy: Accuracy = "balanced",
