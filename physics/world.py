@@ -123,7 +123,8 @@ class World:
         settings = self.accuracy
         declare(self.plan.terms)
         numbers = {
-            "tolerance": settings.tolerance, "sweeps": settings.iterations, "splits": settings.impacts,
+            "tolerance": settings.tolerance, "sweeps": settings.iterations,
+            "splits": settings.impacts * (self.body_count if self.plan.many else 1),
             "relative_slop": settings.slop, "rest_share": settings.rest_share,
         }  # fmt: skip
         self.scratch = [
