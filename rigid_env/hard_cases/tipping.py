@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import replace
 
 import numpy as np
 from scipy.integrate import solve_ivp
@@ -20,7 +19,6 @@ from rigid_env.hard_cases.scenery import (
     block,
     energy,
     on_floor,
-    state_of,
     tilt_about_z,
     turned,
     wrench,
