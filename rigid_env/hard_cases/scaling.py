@@ -187,7 +187,7 @@ def backwards(on: Setting) -> Sequence[Check]:
     """e = 1, μ = 0: with all velocities turned round everything goes back to the start.
 
     The sphere in a box after 1000 hits, to rounding (case 8); the block tumbling there after 2 s and a few hits: a hit
-    is made half a slop off its place at most, and what the scene, which is chaotic, makes of it is the growth of a nudge.
+    is made half a slop off its place at most, and what the scene makes of that is the growth of a nudge.
     """
     half, checks = 5.0, []
     start, velocity, hits = np.array([0.3, -1.1, 2.0]), np.array([3.0, 4.0, 5.0]), on.pick(1000, 200)
