@@ -331,3 +331,30 @@ def tosses(
             pictures.write_plot(plot, report)
             _tell_file(plot, console)
         _write(json, {"data": data.name, "is_quick": quick, **report.to_dict()}, console)
+
+
+@app.command()
+def hard_cases(
+    cases: Annotated[list[str] | None, typer.Argument(metavar="[CASE]...", help="Names or numbers; none: all.")] = None,
+    accuracy: Annotated[str, typer.Option(metavar="NAMES", help="Presets, with commas.")] = "balanced",
+    dt: Annotated[float, typer.Option(help="Step [s].")] = 0.01,
+    steps: Annotated[str, typer.Option(metavar="LIST", help="Also at these steps [s], with commas.")] = "",
+    peers: Annotated[bool, typer.Option("--peers", help="Also in other engines.")] = False,
+    quick: Annotated[bool, typer.Option("--quick", help="Shorter runs, with limits for them.")] = False,
+    json: Json = None,
+    plot: Annotated[Path | None, typer.Option(metavar="FILE", help="Draw which hold at which steps.")] = None,
+    markdown: Annotated[Path | None, typer.Option(metavar="FILE", help="Write the page docs/hard-cases.md.")] = None,
+) -> None:
+    """Run the hard cases, each with a known outcome; exit status 1 where one does not hold."""
+    with _told_errors():
+        from rigid_env.hard_cases.command import run as run_them
+        from rigid_env.measure.table import make_console
+
+        console, files = make_console(), [path and path.resolve() for path in (json, plot, markdown)]
+        report, written = run_them(console, cases or (), accuracy, dt, steps, peers, quick, *files)
+        for path in written:
+            _tell_file(path, console)
+    if not report.is_complete:
+        raise typer.Exit(INTERRUPTED)
+    if report.has_failed:
+        raise typer.Exit(1)

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from physics.kernels import layout as at
 from physics.kernels import quaternion as qt
+from physics.kernels.arms import place_arms
 from physics.kernels.body import angular_velocity, principal_attitude
 from physics.kernels.compiler import inlined, kernel
-from physics.kernels.contact import aim_impact, aim_rest, place_arms
+from physics.kernels.contact import aim_impact, aim_rest
 from physics.kernels.flight import drift
 from physics.kernels.slide import SLIDE
 from physics.kernels.solve import PIVOTING, solve_contacts
@@ -92,10 +93,12 @@ def touch(n, y, h, friction, smooth, gyroscopic, tilted, pivots, memory, report,
     a, torque = work.free_acceleration, work.torque
     half = 0.5 * h
     w = angular_velocity(q, L, work, tilted)
+    spin_up = angular_velocity(q, qt.cross(L, w), work, tilted)
     x = (x[0] + half * v[0], x[1] + half * v[1], x[2] + half * v[2])
     q = drift(q, L, work, half, gyroscopic, tilted)
-    place_arms(n, qt.to_matrix(q), tilted, work)
-    aim_rest(n, w, h, work)
+    middle = qt.to_matrix(q)
+    place_arms(n, middle, tilted, work)
+    aim_rest(n, w, spin_up, middle, h, tilted, work)
     width = 3
     if friction is None:
         width = 1
