@@ -202,8 +202,19 @@ def is_closing(i, n, work):
 
 
 @inlined
-def aim_rest(n, w, spin_up, R, h, tilted, work):
-    """Targets of the resting stage over h; R is the attitude at its middle.
+def gainless(target, speed):
+    """A target for the normal velocity, no more than what turns the approach at `speed` < 0 round.
+
+    Impulses p that change contact velocities from u to u' change the energy by p·(u + u')/2: a push with u' <= -u adds
+    nothing. Where a body turns by much less than a radian in a stage what is asked for is just -u. Where it turns by
+    more, ω x (ω x r) says nothing about the end of the stage, and is as large as one likes.
+    """
+    return min(target, max(-speed, 0.0))
+
+
+@inlined
+def aim_rest(n, v, w, spin_up, R, h, tilted, work):
+    """Targets of the resting stage over h; R is the attitude at its middle, v and w are the velocities there before it.
 
     The impulses act at the middle of the step, the velocity is asked for at its end, half a step later: a
     vertex that the body turns about has by then gained h/2 ω x (ω x r), so that is taken off. The lowest point of an
@@ -232,6 +243,9 @@ def aim_rest(n, w, spin_up, R, h, tilted, work):
             t0 = -half * (c[0] * walls[k, 0] + c[1] * walls[k, 1] + c[2] * walls[k, 2])
             t1 = -half * (c[0] * walls[k, 3] + c[1] * walls[k, 4] + c[2] * walls[k, 5])
             t2 = -half * (c[0] * walls[k, 6] + c[1] * walls[k, 7] + c[2] * walls[k, 8])
+            if t0 > 0.0:
+                most = gainless(t0, qt.dot(wall_normal(walls, k), v) + qt.dot(wall_normal(walls, k), qt.cross(w, r)))
+                t0, t1, t2 = most, t1 * (most / t0), t2 * (most / t0)
         if is_closing(i, n, work):
             t0 -= share * work.gap[i] / h
         if max(abs(t0), max(abs(t1), abs(t2))) <= negligible:

@@ -92,13 +92,13 @@ def touch(n, y, h, friction, smooth, gyroscopic, tilted, pivots, memory, report,
     x, q, v, L = y
     a, torque = work.free_acceleration, work.torque
     half = 0.5 * h
-    w = angular_velocity(q, L, work, tilted)
-    spin_up = angular_velocity(q, qt.cross(L, w), work, tilted)
     x = (x[0] + half * v[0], x[1] + half * v[1], x[2] + half * v[2])
     q = drift(q, L, work, half, gyroscopic, tilted)
+    w = angular_velocity(q, L, work, tilted)
+    spin_up = angular_velocity(q, qt.cross(L, w), work, tilted)
     middle = qt.to_matrix(q)
     place_arms(n, middle, tilted, work)
-    aim_rest(n, w, spin_up, middle, h, tilted, work)
+    aim_rest(n, v, w, spin_up, middle, h, tilted, work)
     width = 3
     if friction is None:
         width = 1
