@@ -19,6 +19,8 @@ from physics.frontier_run import frontier, ladder
 from physics.frontier_truth import Truth
 from physics.mjcf import load_mjcf, save_mjcf
 from physics.plan import make_plan
+from physics.recorder import Recorder
+from physics.recording import Recording, Replay
 from physics.report import Solver, Status, StepReport
 from physics.scene import HalfSpace, Scene, corner, three_walls
 from physics.scene_file import load_scene, save_scene
@@ -47,6 +49,9 @@ __all__ = [
     "HalfSpace",
     "Magnus",
     "Push",
+    "Recorder",
+    "Recording",
+    "Replay",
     "Scene",
     "Snapshot",
     "Solver",

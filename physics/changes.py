@@ -101,6 +101,8 @@ def _adopt(world: World, chosen, rows, state, params, what, keep_memory=False) -
     world.params[rows] = params
     if world.plan.contact and not keep_memory:
         world.memory[chosen if world.plan.many else rows] = 0.0
+    if world.recorder is not None:
+        world.recorder.changed(chosen)
 
 
 def _needs(field: str, is_on, effect: str) -> None:

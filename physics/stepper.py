@@ -66,7 +66,7 @@ class Stepper:
         """Advance every world by `steps` times `dt`."""
         if self._calls is None:
             self._calls = kernel_calls(self.world, self._wrench, self.steps, self.dt)
-        self.world.advance(self._calls, self.steps * self.dt)
+        self.world.advance(self._calls, self._wrench, self.steps, self.dt)
 
     def __getstate__(self):
         return {**vars(self), "_calls": None}  # machine code belongs to the process

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -27,6 +28,12 @@ from physics.report import StepReport
 from physics.scene import Scene
 from physics.stepper import kernel_calls
 from physics.threads import SlicePool
+
+if TYPE_CHECKING:
+    from physics.recorder import Recorder
+
+# Arrays that decide how a `World` goes on, in the order of `Snapshot.arrays`.
+KEPT = ("state", "params", "gravity", "memory", "report_table")
 
 
 @dataclass(frozen=True)
@@ -64,6 +71,8 @@ class World:
         The array behind `report`, likewise.
     time : float
         Time since the start [s].
+    recorder : Recorder or None
+        What is told of every step; see `physics.Recorder`.
 
     Raises
     ------
@@ -89,6 +98,7 @@ class World:
         self.plan = make_plan(scene, self.accuracy)
         self.body_count = len(scene.bodies)
         self.time = 0.0
+        self.recorder: Recorder | None = None
         self._allocate()
         self._fill()
         changes.check_depth(self, self.state, self.params, np.arange(self.worlds), "scene")
@@ -114,7 +124,8 @@ class World:
         settings = self.accuracy
         declare(self.plan.terms)
         numbers = {
-            "tolerance": settings.tolerance, "sweeps": settings.iterations, "splits": settings.impacts,
+            "tolerance": settings.tolerance, "sweeps": settings.iterations,
+            "splits": settings.impacts * (self.body_count if self.plan.many else 1),
             "relative_slop": settings.slop, "rest_share": settings.rest_share,
             "mean_slip": FEW if settings.slip == "mean" else 0,
         }  # fmt: skip
@@ -203,16 +214,20 @@ class World:
         if (steps, dt) != self._bound_for:
             self._calls, self._bound_for = kernel_calls(self, self._wrench, steps, dt), (steps, dt)
         self._wrench[...] = 0.0 if wrench is None else wrench
-        self.advance(self._calls, steps * dt)
+        self.advance(self._calls, self._wrench, steps, dt)
         return self.report
 
-    def advance(self, calls: list[Callable[[], None]], duration: float) -> None:
-        """Make `kernel_calls` that take `duration` [s]; for those who prepare them."""
+    def advance(self, calls: list[Callable[[], None]], wrench: np.ndarray, steps: int, dt: float) -> None:
+        """Make the `kernel_calls` that these arguments were bound in; for those who prepare them."""
+        if self.recorder is not None:
+            self.recorder.before(wrench, steps, dt)
         if self.plan.fields:
             for scratch in self.scratch:
                 body_records(scratch)["call_start"] = self.time
         self.pool.run(calls)
-        self.time += duration
+        self.time += steps * dt
+        if self.recorder is not None:
+            self.recorder.after()
 
     def no_wrench(self) -> np.ndarray:
         """(worlds, bodies, 6) float64 zeros: an array for wrenches."""
@@ -289,21 +304,24 @@ class World:
 
     # --- keeping and looking -----------------------------------------------------------------------------------
 
-    def _kept(self) -> tuple[np.ndarray, ...]:
-        return self.state, self.params, self.gravity, self.memory, self.report_table
+    def kept(self) -> tuple[np.ndarray, ...]:
+        """The arrays themselves that a snapshot copies, in the order of `KEPT`."""
+        return tuple(getattr(self, name) for name in KEPT)
 
     def snapshot(self) -> Snapshot:
         """All that decides the future, copied; `restore` continues bit-identically, warm starts and all."""
-        return Snapshot(tuple(array.copy() for array in self._kept()), self.time)
+        return Snapshot(tuple(array.copy() for array in self.kept()), self.time)
 
     def restore(self, snapshot: Snapshot) -> None:
         """Go back to a snapshot of this world, or of one of the same scene and batch size."""
-        kept = self._kept()
+        kept = self.kept()
         if [array.shape for array in kept] != [array.shape for array in snapshot.arrays]:
             raise ValueError("snapshot is of another scene or batch size; allowed is one of this scene and batch size")
         for array, value in zip(kept, snapshot.arrays):
             array[...] = value
         self.time = snapshot.time
+        if self.recorder is not None:
+            self.recorder.changed(slice(None))
 
     def contacts(self, world: int = 0) -> tuple[np.ndarray, np.ndarray]:
         """Contact points and forces of one world's last step.

@@ -129,6 +129,26 @@ def run(
 
 
 @app.command()
+def replay(
+    file: Annotated[Path, typer.Argument(metavar="FILE", help="What physics.Recorder wrote.")],
+    json: Json = None,
+) -> None:
+    """Take recorded steps again, and say whether they come out the same, bit for bit."""
+    console = Console()
+    with _told_errors():
+        from physics import Recording
+        from rigid_env.replaying import show, summary
+
+        recording = Recording.load(file)
+        with console.status("replaying"):
+            content = summary(recording.replay())
+        show(content, console)
+        _write(json, {"file": str(file), **content}, console)
+    if not content["is_identical"]:
+        raise typer.Exit(1)
+
+
+@app.command()
 def explain(
     scene: Annotated[str, typer.Argument(help="A canonical scene.")],
     accuracy: Accuracy = "balanced",
@@ -311,3 +331,30 @@ def tosses(
             pictures.write_plot(plot, report)
             _tell_file(plot, console)
         _write(json, {"data": data.name, "is_quick": quick, **report.to_dict()}, console)
+
+
+@app.command()
+def hard_cases(
+    cases: Annotated[list[str] | None, typer.Argument(metavar="[CASE]...", help="Names or numbers; none: all.")] = None,
+    accuracy: Annotated[str, typer.Option(metavar="NAMES", help="Presets, with commas.")] = "balanced",
+    dt: Annotated[float, typer.Option(help="Step [s].")] = 0.01,
+    steps: Annotated[str, typer.Option(metavar="LIST", help="Also at these steps [s], with commas.")] = "",
+    peers: Annotated[bool, typer.Option("--peers", help="Also in other engines.")] = False,
+    quick: Annotated[bool, typer.Option("--quick", help="Shorter runs, with limits for them.")] = False,
+    json: Json = None,
+    plot: Annotated[Path | None, typer.Option(metavar="FILE", help="Draw which hold at which steps.")] = None,
+    markdown: Annotated[Path | None, typer.Option(metavar="FILE", help="Write the page docs/hard-cases.md.")] = None,
+) -> None:
+    """Run the hard cases, each with a known outcome; exit status 1 where one does not hold."""
+    with _told_errors():
+        from rigid_env.hard_cases.command import run as run_them
+        from rigid_env.measure.table import make_console
+
+        console, files = make_console(), [path and path.resolve() for path in (json, plot, markdown)]
+        report, written = run_them(console, cases or (), accuracy, dt, steps, peers, quick, *files)
+        for path in written:
+            _tell_file(path, console)
+    if not report.is_complete:
+        raise typer.Exit(INTERRUPTED)
+    if report.has_failed:
+        raise typer.Exit(1)

@@ -105,6 +105,7 @@ class BlockReachEnv(RigidEnv):
     | `effects` | () | `physics` effects besides (`physics.Drag()`, ...), or instead of the task's of that class |
     | `frame_skip` | 5 | physics steps per control step |
     | `dt` | 0.005 | physics step [s] |
+    | `dump_faults` | None | folder for what led to a state that was not finite (`rigid-env replay`) |
     | `render_mode` | None | `"rgb_array"`, `"human"` or None |
     | `width` | 960 | of pictures [px] |
     | `height` | 600 | of pictures [px] |

@@ -106,16 +106,3 @@ def angular_velocity(q, L, work, tilted):
     if L[0] == 0.0 and L[1] == 0.0 and L[2] == 0.0:
         return (0.0, 0.0, 0.0)
     return turning(qt.to_matrix(principal_attitude(q, work, tilted)), L, work.J)
-
-
-@inlined
-def free_turning(q, L, work, gyroscopic, tilted):
-    """Angular velocity [rad/s] and acceleration [rad/s²] of a body on which no torque acts, world frame."""
-    zero = (0.0, 0.0, 0.0)
-    if L[0] == 0.0 and L[1] == 0.0 and L[2] == 0.0:
-        return zero, zero
-    R = qt.to_matrix(principal_attitude(q, work, tilted))
-    w = turning(R, L, work.J)
-    if gyroscopic is None:
-        return w, zero
-    return w, turning(R, qt.cross(L, w), work.J)

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from physics.kernels import geometry as geo
 from physics.kernels import quaternion as qt
+from physics.kernels.arms import arm_and_rate, center_arm, geometric_center, wall_normal
 from physics.kernels.compiler import inlined, kernel
-from physics.kernels.layout import BLOCK, NORMAL, OFFSET, VERTEX_COUNT
+from physics.kernels.layout import BLOCK, OFFSET, SPHERE, VERTEX_COUNT
 
 # Share of a resting contact's gap that a step closes. In the linear iteration of gap and velocity over steps,
 # λ² - (1 - β/2) λ + β/2 = 0, the root is double (fastest approach without overshoot) for β = 6 - 4√2.
@@ -17,27 +18,6 @@ TOGETHER = 3.0
 
 # Share of the slop below which the displacement of a contact in one step does not count.
 UNSEEN = 1.0e-3
-
-
-@inlined
-def wall_normal(walls, k):
-    """Unit normal of wall k."""
-    return (walls[k, NORMAL], walls[k, NORMAL + 1], walls[k, NORMAL + 2])
-
-
-@inlined
-def center_arm(R, work):
-    """Geometric centre of a body relative to its centre of mass, world frame [m]; only of a scene that is `tilted`."""
-    return qt.matvec(R, (work.center[0], work.center[1], work.center[2]))
-
-
-@inlined
-def geometric_center(x, R, work, tilted):
-    """Geometric centre of a body whose centre of mass is at x [m] (the same unless `tilted`)."""
-    if tilted is None:
-        return x
-    r = center_arm(R, work)
-    return (x[0] + r[0], x[1] + r[1], x[2] + r[2])
 
 
 @inlined
@@ -148,47 +128,46 @@ def _record(count, wall, feature, features, gap, speed, work):
 
 @kernel
 def nearest_outside_set(x, R, tilted, work):
-    """Smallest gap [m] over all features that are not in the contact set (`work.mask`).
+    """Smallest gap [m] over all features that are not in the contact set (`work.mask`), and the slot of its feature.
 
-    Of a wall that the bounding sphere does not reach the sphere's gap is taken: a lower bound, and positive.
+    Of a wall that the bounding sphere does not reach the sphere's gap is taken: a lower bound, and positive (slot -1).
     """
-    walls, shape, radius = work.walls, work.shape, work.radius
+    walls, features, shape, radius = work.walls, work.features, work.shape, work.radius
     dims = (work.dims[0], work.dims[1], work.dims[2])
     center = geometric_center(x, R, work, tilted)
-    best = 1.0e300
+    best, slot = 1.0e300, -1
     for k in range(walls.shape[0]):
         n = wall_normal(walls, k)
         d = qt.dot(n, center) - walls[k, OFFSET]
         if d > radius:
-            best = min(best, d - radius)
+            if d - radius < best:
+                best, slot = d - radius, -1
             continue
         e = geo.scaled_normal(shape, dims, R, n)
         mask = work.mask[k]
-        if mask == 0:
-            best = min(best, d - geo.support(shape, dims, e))
-        elif shape == BLOCK:
+        if mask == 0 and not d - geo.support(shape, dims, e) < best:
+            continue
+        if shape == BLOCK:
             for vertex in range(VERTEX_COUNT):
-                if not mask & (1 << vertex):
-                    best = min(best, d + geo.vertex_height(e, vertex))
-    return best
+                gap = d + geo.vertex_height(e, vertex)
+                if not mask & (1 << vertex) and gap < best:
+                    best, slot = gap, k * features + vertex
+        elif mask == 0:
+            best, slot = d - geo.support(shape, dims, e), k * features
+    return best, slot
 
 
-@inlined
-def place_arms(n, R, tilted, work):
-    """Contact points of the set at this pose: `work.arm`, relative to the centre of mass, world frame [m]."""
+@kernel
+def gap_of(slot, x, R, tilted, work):
+    """Gap [m] of one feature to its wall."""
     walls, features, shape = work.walls, work.features, work.shape
     dims = (work.dims[0], work.dims[1], work.dims[2])
-    for i in range(n):
-        wall = work.slot[i] // features
-        if shape == BLOCK:
-            r = geo.vertex_arm(dims, R, work.slot[i] % features)
-            if tilted is not None:
-                c = center_arm(R, work)
-                r = (r[0] + c[0], r[1] + c[1], r[2] + c[2])
-        else:
-            normal = wall_normal(walls, wall)
-            r = geo.support_arm(shape, dims, R, normal, geo.scaled_normal(shape, dims, R, normal))
-        work.arm[i, 0], work.arm[i, 1], work.arm[i, 2] = r
+    n = wall_normal(walls, slot // features)
+    d = qt.dot(n, geometric_center(x, R, work, tilted)) - walls[slot // features, OFFSET]
+    e = geo.scaled_normal(shape, dims, R, n)
+    if shape == BLOCK:
+        return d + geo.vertex_height(e, slot % features)
+    return d - geo.support(shape, dims, e)
 
 
 @inlined
@@ -227,31 +206,49 @@ def is_closing(i, n, work):
 
 
 @inlined
-def aim_rest(n, w, alpha, h, work):
-    """Targets of the resting stage over h.
+def gainless(target, speed):
+    """A target for the normal velocity, no more than what turns the approach at `speed` < 0 round.
 
-    The impulses act at the middle of the step, the velocity is asked for at its end, half a step later: a
-    vertex that the body turns about has by then gained h/2 (ω x (ω x r) + α x r), α the angular acceleration of
-    free turning, so that is taken off. A feature still
-    above the wall may close `CLOSING_SHARE` of its gap (all of it in a substep's last stage). What is smaller
-    than the tolerance of the solve, or would move a contact by less than `UNSEEN` slops in the step, is 0: a body
-    comes to rest to the last bit, and contacts that hold are not asked to move apart by next to nothing.
+    Impulses p that change contact velocities from u to u' change the energy by p·(u + u')/2: a push with u' <= -u adds
+    nothing. Where a body turns by much less than a radian in a stage what is asked for is just -u. Where it turns by
+    more, ω x (ω x r) says nothing about the end of the stage, and is as large as one likes.
+    """
+    return min(target, max(-speed, 0.0))
+
+
+@inlined
+def aim_rest(n, v, w, alpha, R, h, tilted, work):
+    """Targets of the resting stage over h; R is the attitude at its middle, v and w are the velocities there before it.
+
+    The impulses act at the middle of the step, the velocity is asked for at its end, half a step later: a point has by
+    then gained h/2 (ω x ṙ + α x r), α the angular acceleration of free turning, and that is taken off. Of a vertex
+    ṙ = ω x r; the lowest point of an ellipsoid wanders over it; of a sphere it is 0. A feature still above the wall
+    may close `CLOSING_SHARE` of its gap (all of it in a substep's last stage). What is smaller than the tolerance of
+    the solve, or would move a contact by less than `UNSEEN` slops in the step, is 0: a body comes to rest to the last
+    bit, and contacts that hold are not asked to move apart by next to nothing.
     """
     walls, features, shape = work.walls, work.features, work.shape
     half = 0.5 * h
-    is_turning = (w[0] != 0.0 or w[1] != 0.0 or w[2] != 0.0) and shape == BLOCK
+    dims = (work.dims[0], work.dims[1], work.dims[2])
+    is_turning = (w[0] != 0.0 or w[1] != 0.0 or w[2] != 0.0) and shape != SPHERE
     negligible = max(work.tolerance * work.acceleration * h, UNSEEN * work.slop / h)
     share = 1.0 if work.is_last else CLOSING_SHARE
     for i in range(n):
         t0 = t1 = t2 = 0.0
         if is_turning:
             r = (work.arm[i, 0], work.arm[i, 1], work.arm[i, 2])
-            c, d = qt.cross(w, qt.cross(w, r)), qt.cross(alpha, r)
-            c = (c[0] + d[0], c[1] + d[1], c[2] + d[2])
             k = work.slot[i] // features
+            rate = qt.cross(w, r)
+            if shape != BLOCK:
+                r, rate = arm_and_rate(shape, dims, R, w, wall_normal(walls, k), 0, tilted, work)
+            a, b = qt.cross(w, rate), qt.cross(alpha, r)
+            c = (a[0] + b[0], a[1] + b[1], a[2] + b[2])
             t0 = -half * (c[0] * walls[k, 0] + c[1] * walls[k, 1] + c[2] * walls[k, 2])
             t1 = -half * (c[0] * walls[k, 3] + c[1] * walls[k, 4] + c[2] * walls[k, 5])
             t2 = -half * (c[0] * walls[k, 6] + c[1] * walls[k, 7] + c[2] * walls[k, 8])
+            if t0 > 0.0:
+                most = gainless(t0, qt.dot(wall_normal(walls, k), v) + qt.dot(wall_normal(walls, k), qt.cross(w, r)))
+                t0, t1, t2 = most, t1 * (most / t0), t2 * (most / t0)
         if is_closing(i, n, work):
             t0 -= share * work.gap[i] / h
         if max(abs(t0), max(abs(t1), abs(t2))) <= negligible:

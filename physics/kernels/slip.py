@@ -19,8 +19,8 @@ from physics.kernels.compiler import inlined
 from physics.kernels.layout import SPHERE, TANGENT_1
 from physics.kernels.share import contact_arm
 
-# Contacts of a stage at most, `mean_slip` of the settings, for `physics.Accuracy.slip`. The slips of a face turn slowly,
-# as a whole, and a solve more is dear there.
+# Contacts of a stage at most, `mean_slip` of the settings, for `physics.Accuracy.slip`. The slips of a face turn
+# slowly, as a whole, and a solve more is dear there.
 FEW = 2
 
 # A contact that held slips by less than this many times the error of its target.

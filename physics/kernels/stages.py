@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from physics.kernels import layout as at
 from physics.kernels import quaternion as qt
-from physics.kernels.body import free_turning, principal_attitude, turning
+from physics.kernels.arms import place_arms
+from physics.kernels.body import principal_attitude, turning
 from physics.kernels.compiler import inlined, kernel
-from physics.kernels.contact import aim_impact, aim_rest, place_arms
+from physics.kernels.contact import aim_impact, aim_rest
 from physics.kernels.flight import drift
 from physics.kernels.slide import SLIDE
 from physics.kernels.slip import has_turned_round, oppose_mean_slip
@@ -92,17 +93,20 @@ def touch(n, y, h, friction, smooth, gyroscopic, tilted, pivots, memory, report,
     x, q, v, L = y
     a, torque = work.free_acceleration, work.torque
     half = 0.5 * h
-    w, alpha = free_turning(q, L, work, gyroscopic, tilted)
     x = (x[0] + half * v[0], x[1] + half * v[1], x[2] + half * v[2])
     q = drift(q, L, work, half, gyroscopic, tilted)
-    R = qt.to_matrix(q)
-    place_arms(n, R, tilted, work)
+    middle = qt.to_matrix(q)
+    place_arms(n, middle, tilted, work)
+    R = middle
     if tilted is not None:
         R = qt.to_matrix(principal_attitude(q, work, tilted))
-    aim_rest(n, w, alpha, h, work)
+    w, alpha = turning(R, L, work.J), (0.0, 0.0, 0.0)
+    if gyroscopic is not None:
+        alpha = turning(R, qt.cross(L, w), work.J)
+    aim_rest(n, v, w, alpha, middle, h, tilted, work)
     opposes_mean = False
     if friction is not None and n <= work.mean_slip:
-        opposes_mean = oppose_mean_slip(n, v, turning(R, L, work.J), max(h, memory[work.i, STAGE_LENGTH]), work)
+        opposes_mean = oppose_mean_slip(n, v, w, max(h, memory[work.i, STAGE_LENGTH]), work)
     width = 3
     if friction is None:
         width = 1
@@ -112,7 +116,7 @@ def touch(n, y, h, friction, smooth, gyroscopic, tilted, pivots, memory, report,
     work.mode = int(memory[work.i, MODE])
     v1, L1, residual, sweeps, method = solve_contacts(n, friction, smooth, pivots, v, L, R, work)
     if opposes_mean and has_turned_round(n, v1, turning(R, L1, work.J), work):
-        aim_rest(n, w, alpha, h, work)
+        aim_rest(n, y[2], w, alpha, middle, h, tilted, work)
         v1, L1, residual, sweeps, method = solve_contacts(n, friction, smooth, pivots, v, L, R, work)
     memory[work.i, MODE] = work.mode
     note_solve(report, work.world, residual, sweeps, method, work.tolerance)

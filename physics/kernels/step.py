@@ -21,7 +21,7 @@ import math
 from physics.kernels import layout as at
 from physics.kernels.body import angular_velocity, bind_body, is_finite, read_state, write_state
 from physics.kernels.compiler import inlined, kernel
-from physics.kernels.contact import gather, is_clear, nearest_outside_set, push_out
+from physics.kernels.contact import gap_of, gather, is_clear, nearest_outside_set, push_out
 from physics.kernels.fields.loads import (
     bind_fields,
     hold_contact_loads,
@@ -69,7 +69,7 @@ def advance(n, y, h, friction, smooth, gyroscopic, tilted, pivots, scheme, memor
 
 @inlined
 def outside_gap(y, tilted, work):
-    """Smallest gap of what is not in the contact set [m]."""
+    """Smallest gap of what is not in the contact set [m], and the slot of its feature."""
     return nearest_outside_set(y[0], to_matrix(y[1]), tilted, work)
 
 
@@ -107,6 +107,8 @@ def crossing(low_gap, high_gap, width, bend):
 
     With the slope B at its start and `bend` c, c x² + B x + low_gap = 0, in the form that does not cancel.
     """
+    if not low_gap > 0.0:
+        return 0.0
     B = (high_gap - low_gap) / width - bend * width
     return 2.0 * low_gap / (math.sqrt(max(B * B - 4.0 * bend * low_gap, 0.0)) - B)
 
@@ -116,23 +118,30 @@ def to_next_impact(n, y, h, friction, smooth, gyroscopic, tilted, pivots, scheme
     """Advance by h, or to the first impact within h: (state, time advanced).
 
     An end state in which a feature outside the contact set has passed through a wall is taken back and the stage
-    shortened until the feature is within half a slop of it: `crossing` of the smallest gap.
+    shortened until that feature is within half a slop of it: `crossing` of its gap. Another one that is through the
+    wall by then is sought instead. The gap of one feature is smooth; the smallest of all has kinks, before which a
+    parabola would creep along a wall that nothing hits.
     """
-    t, low, low_gap, high, high_gap, bend = h, 0.0, 0.0, h, 0.0, 0.0
-    end = y
+    t, low, low_gap, high, high_gap, bend, slot = h, 0.0, 0.0, h, 0.0, 0.0, -1
+    end = low_end = y
     for trial in range(IMPACT_TRIALS + 1):
         end = advance(n, y, t, friction, smooth, gyroscopic, tilted, pivots, scheme, memory, report, work)
         if has_same_pose(end, y) or work.is_last:
             break
-        gap = outside_gap(end, tilted, work)
-        if abs(gap) <= 0.5 * work.slop or (trial == 0 and gap > 0.0) or trial == IMPACT_TRIALS:
+        gap, nearest = outside_gap(end, tilted, work)
+        if trial == IMPACT_TRIALS or (trial == 0 and gap >= -0.5 * work.slop):
             break
-        if trial == 0:
-            low_gap, high_gap = max(outside_gap(y, tilted, work), 0.0), gap
+        if nearest != slot and gap < -0.5 * work.slop:
+            slot, high, high_gap, bend = nearest, t, gap, 0.0
+            low_gap = max(gap_of(slot, low_end[0], to_matrix(low_end[1]), tilted, work), 0.0)
         else:
+            if nearest != slot:
+                gap = gap_of(slot, end[0], to_matrix(end[1]), tilted, work)
+            if abs(gap) <= 0.5 * work.slop:
+                break
             bend = second_difference(low, low_gap, t, gap, high, high_gap)
             if gap > 0.0:
-                low, low_gap = t, gap
+                low, low_gap, low_end = t, gap, end
             else:
                 high, high_gap = t, gap
         t = low + crossing(low_gap, high_gap, high - low, bend)

@@ -55,6 +55,9 @@ class Task(ABC):
         Physics steps per control step, with the action held.
     dt : float
         Physics step [s].
+    dump_faults : str or Path, optional
+        Folder for the last control steps of a world whose state did not stay finite; ``rigid-env replay`` takes them
+        again. See `physics.Recorder`, which then keeps a copy of them all.
     threads : int
         Threads that share a step.
 
@@ -94,6 +97,7 @@ class Task(ABC):
         effects=(),
         frame_skip=5,
         dt=0.005,
+        dump_faults=None,
         threads=1,
     ):
         self.area = Area(walls, half_width)
@@ -107,6 +111,8 @@ class Task(ABC):
         self.outcome = np.zeros((worlds, col.OUTCOME_SIZE))
         self.status = np.zeros(worlds, dtype=np.int64)
         self._advance = physics.Stepper(self.world, self.frame_skip)
+        if dump_faults is not None:
+            physics.Recorder(self.world, folder=dump_faults)
         self._actions = np.zeros((worlds, AXES))
         self._rows = np.arange(worlds)
         self._note_parameters(self._rows, self.parameters.draw(np.full((worlds, DRAW_COUNT), 0.5)))

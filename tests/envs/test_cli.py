@@ -36,7 +36,7 @@ def loaded(path):
 
 def test_version_and_help():
     assert run("--version").startswith("rigid-env")
-    for command in ("demo", "run", "explain", "warmup", "bench", "effects", "accuracy"):
+    for command in ("demo", "run", "explain", "warmup", "bench", "effects", "accuracy", "hard-cases"):
         assert command in run("--help")
         assert "--json" in run(command, "--help")
 

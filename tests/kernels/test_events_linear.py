@@ -10,8 +10,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.linalg import expm
 
+from physics.kernels.arms import arm_and_rate
 from physics.kernels.events.air import parabola_root, safe_time
-from physics.kernels.events.forces import arm_and_rate
 from physics.kernels.events.linear import PIVOT_SHARE, eliminate
 from physics.kernels.layout import BLOCK, ELLIPSOID, SPHERE
 

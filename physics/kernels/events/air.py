@@ -23,9 +23,10 @@ from __future__ import annotations
 import math
 
 from physics.kernels import quaternion as qt
+from physics.kernels.arms import arm_and_rate, wall_normal
 from physics.kernels.compiler import inlined, kernel
-from physics.kernels.contact import is_clear, wall_normal
-from physics.kernels.events.forces import arm_and_rate, free_turning, load, plus
+from physics.kernels.contact import is_clear
+from physics.kernels.events.forces import free_turning, load, plus
 from physics.kernels.events.guards import NO_GUARD, NO_STEP
 from physics.kernels.events.motion import END, SIZE, START
 from physics.kernels.events.move import move

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from physics.kernels import layout as at
 from physics.kernels import quaternion as qt
+from physics.kernels.arms import arm_and_rate, wall_normal
 from physics.kernels.body import angular_velocity
 from physics.kernels.compiler import inlined, kernel
-from physics.kernels.contact import wall_normal
 from physics.kernels.events import log as ev
-from physics.kernels.events.forces import arm_and_rate, free_turning, load
+from physics.kernels.events.forces import free_turning, load
 from physics.kernels.events.guards import look_around
 from physics.kernels.events.motion import START
 from physics.kernels.events.resting import pose_contact

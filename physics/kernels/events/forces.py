@@ -22,13 +22,11 @@ from __future__ import annotations
 
 import math
 
-from physics.kernels import geometry as geo
 from physics.kernels import quaternion as qt
+from physics.kernels.arms import arm_and_rate, wall_normal
 from physics.kernels.body import principal_attitude
 from physics.kernels.compiler import inlined, kernel
-from physics.kernels.contact import center_arm, wall_normal
 from physics.kernels.events.linear import eliminate
-from physics.kernels.layout import BLOCK, SPHERE
 from physics.kernels.share import wall_axes
 
 # Sliding contacts of one wall from which on their normal forces are taken as affine.
@@ -62,35 +60,6 @@ def turned_by(P, J, h):
     """I⁻¹ h for the principal axes P and inverse moments J, world frame."""
     m = qt.transposed_matvec(P, h)
     return qt.matvec(P, (J[0] * m[0], J[1] * m[1], J[2] * m[2]))
-
-
-@inlined
-def arm_and_rate(shape, dims, R, w, n, feature, tilted, work):
-    """Contact point relative to the centre of mass, and its rate of change, world frame [m, m/s].
-
-    Of an ellipsoid: r = R c with c = -D e/s, e = D Rᵀ n, s = |e| and de/dt = D (Rᵀn x Rᵀω).
-    """
-    if shape == BLOCK:
-        r = geo.vertex_arm(dims, R, feature)
-        if tilted is not None:
-            r = plus(r, center_arm(R, work))
-        return r, qt.cross(w, r)
-    if shape == SPHERE:
-        return (-dims[0] * n[0], -dims[0] * n[1], -dims[0] * n[2]), (0.0, 0.0, 0.0)
-    nb, wb = qt.transposed_matvec(R, n), qt.transposed_matvec(R, w)
-    e = (dims[0] * nb[0], dims[1] * nb[1], dims[2] * nb[2])
-    s = math.sqrt(qt.dot(e, e))
-    m = qt.cross(nb, wb)
-    f = (dims[0] * m[0], dims[1] * m[1], dims[2] * m[2])
-    along = qt.dot(e, f) / (s * s)
-    c = (-dims[0] * e[0] / s, -dims[1] * e[1] / s, -dims[2] * e[2] / s)
-    dc = (
-        -dims[0] * (f[0] - along * e[0]) / s,
-        -dims[1] * (f[1] - along * e[1]) / s,
-        -dims[2] * (f[2] - along * e[2]) / s,
-    )
-    r = qt.matvec(R, c)
-    return r, plus(qt.cross(w, r), qt.matvec(R, dc))
 
 
 @kernel

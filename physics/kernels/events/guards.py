@@ -16,8 +16,8 @@ import math
 
 from physics.kernels import geometry as geo
 from physics.kernels import quaternion as qt
+from physics.kernels.arms import center_arm, geometric_center, wall_normal
 from physics.kernels.compiler import inlined, kernel
-from physics.kernels.contact import center_arm, geometric_center, wall_normal
 from physics.kernels.events.forces import free_turning, load, spread, vector
 from physics.kernels.events.motion import END, START, V
 from physics.kernels.events.smooth import find_rate, get_state, sliding_velocity

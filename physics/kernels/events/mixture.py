@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 
 from physics.kernels import quaternion as qt
+from physics.kernels.arms import wall_normal
 from physics.kernels.compiler import kernel
-from physics.kernels.contact import wall_normal
 from physics.kernels.events.candidates import (
     HELD,
     OPEN,

@@ -13,8 +13,8 @@ from __future__ import annotations
 import math
 
 from physics.kernels import quaternion as qt
+from physics.kernels.arms import wall_normal
 from physics.kernels.compiler import inlined, kernel
-from physics.kernels.contact import wall_normal
 from physics.kernels.events.forces import (
     free_turning,
     list_unknowns,

@@ -6,7 +6,7 @@ from physics.kernels import layout as at
 from physics.kernels import quaternion as qt
 from physics.kernels.body import angular_velocity, read_state, write_state
 from physics.kernels.compiler import inlined, kernel
-from physics.kernels.contact import CLOSING_SHARE, UNSEEN
+from physics.kernels.contact import CLOSING_SHARE, UNSEEN, gainless
 from physics.kernels.fields.loads import hold_contact_loads, hold_loads
 from physics.kernels.flight import drift
 from physics.kernels.many import memory as kept
@@ -50,6 +50,9 @@ def aim_rest(n, h, many):
         if b >= 0:
             c = minus(c, _centripetal(b, k, 3, many))
         t = qt.matvec(matrix(many.frame, k), (-half * c[0], -half * c[1], -half * c[2]))
+        if t[0] > 0.0:
+            share = gainless(t[0], many.speed[k]) / t[0]
+            t = (share * t[0], share * t[1], share * t[2])
         if many.gap[k] > slop:
             t = (t[0] - many.gap[k] / half, t[1], t[2])
         elif many.gap[k] > 0.0:

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from physics.kernels import layout as at
 from physics.kernels import quaternion as qt
+from physics.kernels.arms import geometric_center
 from physics.kernels.body import angular_velocity, principal_attitude, read_state
 from physics.kernels.compiler import inlined
-from physics.kernels.contact import geometric_center
 from physics.kernels.many.contacts import put, vector
 
 

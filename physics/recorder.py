@@ -1,0 +1,189 @@
+"""The last steps of a batch of worlds, kept so that what went wrong can be replayed bit for bit."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+from physics import checks
+from physics.recording import Recording, Start, origin
+from physics.report import Status, gravest
+from physics.world import Snapshot, World
+
+
+@dataclass
+class _Chapter:
+    """Consecutive steps of the batch from one complete snapshot on."""
+
+    # (step, worlds, rows of each kept array for each of these worlds, time)
+    starts: list[tuple[int, np.ndarray, list[np.ndarray], float]] = field(default_factory=list)
+    loads: list[tuple[np.ndarray, int, float]] = field(default_factory=list)  # wrench, steps, dt
+    states: list[np.ndarray] = field(default_factory=list)
+
+
+class Recorder:
+    """Keeps the last steps of a `World` and writes those of a world with a fault to a file.
+
+    It is told of every step, whoever takes it (`World.step`, `Stepper`, an environment), and of every change by
+    `set_state`, `set_parameters` and `restore`; arrays of the world written past these are not seen. Worlds are
+    independent, so that a file holds one world only. Without a recorder a step does nothing for it.
+
+    Parameters
+    ----------
+    world : World
+        Has one recorder at a time: this one from now on.
+    keep : int
+        Calls of a step that can be replayed at least; up to twice as many are kept, each with a copy of all wrenches
+        and states (176 bytes per body).
+    folder : str or Path, optional
+        Where files go; made when there is one. None: only `save` writes.
+    on : sequence of Status
+        What makes a world's steps a file.
+    limit : int
+        Files that are written by themselves, at most.
+
+    Attributes
+    ----------
+    files : list of Path
+        Written by themselves.
+
+    Raises
+    ------
+    ValueError
+        A parameter out of range.
+
+    Examples
+    --------
+    >>> recorder = physics.Recorder(world, keep=100, folder="faults")
+    >>> physics.Recording.load("faults/fault-0.npz").replay().is_identical
+    True
+    """
+
+    def __init__(
+        self,
+        world: World,
+        keep: int = 200,
+        folder: str | Path | None = None,
+        on: Sequence[Status] = (Status.FAULT,),
+        limit: int = 10,
+    ):
+        self.world = world
+        self.keep = checks.count(keep, "keep")
+        self.limit = checks.count(limit, "limit")
+        self.folder = None if folder is None else Path(folder)
+        if not all(isinstance(status, Status) for status in on):
+            raise ValueError(f"on is {on!r}; allowed are values of physics.Status")
+        self.on = tuple(on)
+        self.files: list[Path] = []
+        self._chapters = [_Chapter()]
+        self._changed = np.ones(world.worlds, dtype=np.bool_)
+        self._status = np.zeros(world.worlds, dtype=np.int64)
+        world.recorder = self
+
+    def stop(self) -> None:
+        """Let the world go on without it; what is kept stays."""
+        if self.world.recorder is self:
+            self.world.recorder = None
+
+    # --- told by the world -------------------------------------------------------------------------------------
+
+    def changed(self, worlds: np.ndarray | slice) -> None:
+        """These worlds were changed from outside."""
+        self._changed[worlds] = True
+
+    def before(self, wrench: np.ndarray, steps: int, dt: float) -> None:
+        """A step is about to be taken."""
+        chapter = self._chapters[-1]
+        if len(chapter.loads) == self.keep:
+            chapter = _Chapter()
+            self._chapters = [self._chapters[-1], chapter]
+            self._changed[:] = True
+        if self._changed.any():
+            chosen, world = np.flatnonzero(self._changed), self.world
+            rows = [_rows(array, world.worlds, chosen) for array in world.kept()]
+            chapter.starts.append((len(chapter.loads), chosen, rows, world.time))
+            self._changed[:] = False
+        chapter.loads.append((wrench.copy(), steps, dt))
+
+    def after(self) -> None:
+        """The step has been taken."""
+        self._chapters[-1].states.append(self.world.state.copy())
+        if self.folder is None or len(self.files) == self.limit:
+            return
+        gravest(self.world.report_table, self._status)
+        for world in np.flatnonzero(np.isin(self._status, self.on))[: self.limit - len(self.files)].tolist():
+            status = Status(int(self._status[world]))
+            reason = f"{status.name} of world {world} at t = {self.world.time!r} s: {status.message}"
+            self.folder.mkdir(parents=True, exist_ok=True)
+            self.files.append(self.recording(world, reason).save(_free_path(self.folder, status.name.lower())))
+
+    # --- asked by the user -------------------------------------------------------------------------------------
+
+    def save(self, path: str | Path, world: int = 0, reason: str = "asked for") -> Path:
+        """Write the last steps of one world; returns the path."""
+        return self.recording(world, reason).save(path)
+
+    def recording(self, world: int = 0, reason: str = "asked for") -> Recording:
+        """The last steps of one world, at least `keep` if so many were taken.
+
+        Raises
+        ------
+        ValueError
+            There is no such world.
+        """
+        worlds, bodies = self.world.worlds, self.world.body_count
+        if not 0 <= world < worlds:
+            raise ValueError(f"world is {world!r}; allowed are indices from 0 to {worlds - 1}")
+        starts, loads, states = [], [], []
+        for chapter in self._chapters:
+            first, count = len(loads), len(chapter.states)  # an interrupted step has a load, but no state
+            starts += _starts_of(chapter, world, first, count)
+            loads += chapter.loads[:count]
+            states += [state[world * bodies : (world + 1) * bodies] for state in chapter.states]
+        if not starts:
+            arrays = [_rows(array, worlds, np.array([world]))[0] for array in self.world.kept()]
+            starts = [Start(0, Snapshot(tuple(arrays), self.world.time))]
+        return Recording(
+            scene=self.world.scene,
+            accuracy=self.world.accuracy,
+            starts=tuple(starts),
+            wrenches=np.array([wrench[world] for wrench, _, _ in loads]).reshape(-1, bodies, 6),
+            steps=np.array([steps for _, steps, _ in loads], dtype=np.int64),
+            dt=np.array([dt for _, _, dt in loads], dtype=np.float64),
+            states=np.array(states).reshape(-1, bodies, self.world.state.shape[1]),
+            reason=reason,
+            origin=origin(),
+        )
+
+
+def _rows(array: np.ndarray, worlds: int, chosen: np.ndarray) -> np.ndarray:
+    """(chosen, rows of a world, columns): copied parts of an array whose rows belong to worlds in turn."""
+    if len(array) < worlds:  # the contact memory of a scene without contact: one row, never used
+        return np.broadcast_to(array, (len(chosen), *array.shape)).copy()
+    return array.reshape(worlds, len(array) // worlds, *array.shape[1:])[chosen]
+
+
+def _starts_of(chapter: _Chapter, world: int, first: int, count: int) -> list[Start]:
+    """Where one world went on from in a chapter whose first step is number `first` of the recording."""
+    found = []
+    for step, worlds, rows, time in chapter.starts:
+        place = np.flatnonzero(worlds == world)
+        if len(place) and step < count:
+            found.append(Start(first + step, Snapshot(tuple(part[place[0]] for part in rows), time)))
+    return found
+
+
+def _free_path(folder: Path, name: str) -> Path:
+    """A path in `folder` that no file has yet, also when several processes write there."""
+    number = 0
+    while True:
+        path = folder / f"{name}-{number}.npz"
+        try:
+            os.close(os.open(path, os.O_CREAT | os.O_EXCL | os.O_WRONLY))
+            return path
+        except FileExistsError:
+            number += 1

@@ -1,0 +1,45 @@
+"""What `rigid-env hard-cases` does with what a user typed."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+from rich.console import Console
+
+from rigid_env.hard_cases import page, registry
+from rigid_env.hard_cases.report import Report, make_plan, run_and_show
+from rigid_env.measure.plotting import require_matplotlib
+
+
+def run(
+    console: Console,
+    cases: Sequence[str],
+    accuracy: str,
+    dt: float,
+    steps: str,
+    has_peers: bool,
+    is_quick: bool,
+    json: Path | None,
+    plot: Path | None,
+    markdown: Path | None,
+) -> tuple[Report, list[Path]]:
+    """Run the cases, print them, write what is asked for: the report, and the files written.
+
+    Raises
+    ------
+    ValueError
+        No such case or preset, or a step out of range; nothing has run then.
+    gymnasium.error.DependencyNotInstalled
+        A picture is asked for without matplotlib; likewise.
+    """
+    if plot:
+        require_matplotlib()
+    plan = make_plan(registry.find(cases), accuracy, dt, steps, not is_quick, has_peers)
+    report = run_and_show(console, plan, json)
+    if plot:
+        page.write_picture(plot, report)
+    if markdown:
+        page.write_page(markdown, report, plot, " ".join(["rigid-env", *sys.argv[1:]]))
+    return report, [path for path in (json, plot, markdown) if path]

@@ -1,0 +1,128 @@
+"""The command `rigid-env hard-cases`: what it prints, writes and returns."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+from typer.testing import CliRunner
+
+from rigid_env.cli import app
+from rigid_env.hard_cases import page, registry, report
+from rigid_env.hard_cases.case import Case, Check, Setting, UnsupportedError
+from rigid_env.hard_cases.run import Outcome, Status, run_case
+
+runner = CliRunner()
+
+
+def run(*arguments, code=0):
+    result = runner.invoke(app, ["hard-cases", *map(str, arguments)])
+    assert result.exit_code == code, result.output
+    return result.output
+
+
+def replace_cases(monkeypatch, *runs):
+    """Cases that need no kernel."""
+    cases = tuple(Case(k + 1, f"case-{k + 1}", "a case", "to hold", run) for k, run in enumerate(runs))
+    monkeypatch.setattr(registry, "CASES", cases)
+    return cases
+
+
+def holds(on: Setting):
+    return [Check("a number", 1.0, 4.0, "m")]
+
+
+def fails(on: Setting):
+    return [Check("a number", 1.0, 4.0, "m"), Check("another", float("nan"), 4.0)]
+
+
+def cannot(on: Setting):
+    raise UnsupportedError("not at this accuracy")
+
+
+def fails_when_coarse(on: Setting):
+    return [Check("a number", on.dt, 0.02, "s")]
+
+
+def test_a_small_case_in_the_terminal_and_as_json(tmp_path):
+    numbers = tmp_path / "numbers.json"
+    output = run("parabola", "--quick", "--json", numbers)
+    assert "parabola" in output
+    assert "1 holds" in output
+    found = json.loads(numbers.read_text())
+    assert {"date", "processor", "versions", "git"} <= set(found["machine"])
+    assert found["is_complete"] is True
+    (row,) = found["rows"]
+    assert (row["number"], row["engine"], row["accuracy"], row["dt"]) == (4, "rigid-env", "balanced", 0.01)
+    assert row["status"] == "holds"
+    assert [check["what"] for check in row["checks"]] == ["error of the place", "error of the velocity"]
+    assert all(check["passes"] for check in row["checks"])
+
+
+def test_a_case_that_fails_is_shown_and_told_to_the_shell(monkeypatch, tmp_path):
+    replace_cases(monkeypatch, holds, fails, cannot)
+    numbers = tmp_path / "numbers.json"
+    output = run("--json", numbers, code=1)
+    assert "1 holds, 1 fails, 1 not supported" in output
+    assert "not at this accuracy" in output
+    rows = json.loads(numbers.read_text())["rows"]
+    assert [row["status"] for row in rows] == ["holds", "fails", "not supported"]
+    assert rows[1]["checks"][1]["value"] is None  # JSON has no NaN
+
+
+def test_a_grid_of_steps_shows_where_each_holds_and_only_the_default_step_counts(monkeypatch):
+    replace_cases(monkeypatch, fails_when_coarse)
+    output = run("--steps", "1e-3,5e-2", "--accuracy", "balanced,precise")
+    line = next(line for line in output[output.index("at which steps") :].splitlines() if "case-1" in line)
+    assert line.split()[2:] == ["✓", "✓", "✗"] * 2
+
+
+def test_what_is_done_before_an_interruption_is_kept(monkeypatch, tmp_path):
+    def interrupted(on):
+        raise KeyboardInterrupt
+
+    replace_cases(monkeypatch, holds, interrupted, holds)
+    numbers = tmp_path / "numbers.json"
+    output = run("--json", numbers, code=130)
+    assert "interrupted" in output
+    found = json.loads(numbers.read_text())
+    assert found["is_complete"] is False
+    assert [row["number"] for row in found["rows"]] == [1]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (("zino",), ("'zino'", "zeno")),
+        (("--accuracy", "best"), ("'best'", "balanced")),
+        (("--dt", "0"), ("dt", "greater than 0")),
+        (("--steps", "1e-3,x"), ("steps", "'1e-3,x'")),
+    ],
+)
+def test_mistakes_are_named_before_anything_runs(arguments, words):
+    output = " ".join(run(*arguments, code=2).split())
+    for word in words:
+        assert word in output
+
+
+def test_page_and_picture(monkeypatch, tmp_path):
+    pytest.importorskip("matplotlib")
+    replace_cases(monkeypatch, holds, fails)
+    text, picture = tmp_path / "page.md", tmp_path / "images" / "picture.png"
+    run("--steps", "1e-3", "--markdown", text, "--plot", picture, code=1)
+    content = text.read_text()
+    assert "| 2 | `case-2`: a case | to hold |" in content
+    assert "![Margin of every case at every step](images/picture.png)" in content
+    assert "not known yet" in content
+    assert picture.stat().st_size > 1000
+
+
+def test_other_engines_stand_beside_ours(monkeypatch, tmp_path):
+    monkeypatch.setattr(registry, "CASES", (Case(1, "case-1", "a case", "to hold", holds, peers=True),))
+    plan = report.make_plan(registry.find(), "balanced", 0.01, "", True, True)
+    ours = run_case(plan.cases[0], plan.settings[0])
+    theirs = Outcome(plan.cases[0], "other", "default", 0.01, Status.FAILS, tuple(fails(plan.settings[0])), "", 1.0)
+    text = tmp_path / "page.md"
+    page.write_page(text, report.Report(plan, (ours,), (theirs,), True), None, "rigid-env hard-cases --peers")
+    assert "| # | case | rigid-env | other |" in text.read_text()
+    assert "| 1 | case-1 | ✓ balanced | ✗ another: nan (≤ 4) |" in text.read_text()
