@@ -8,7 +8,7 @@ from importlib import import_module
 from rigid_env.hard_cases.case import Case
 
 # Each has a tuple CASES.
-MODULES = ("flight", "bounces", "friction", "tipping", "scaling")
+MODULES = ("flight", "bounces", "impacts", "friction", "rolling", "tipping", "scaling")
 
 
 def _gathered() -> tuple[Case, ...]:
