@@ -247,8 +247,8 @@ def kane(on: Setting) -> Sequence[Check]:
 
 
 NEAR_THE_CONE = (
-    "where μ is 0.1 % below tanθ the event-driven scheme starts with an impulse that no force explains: within 1e-5 s of "
-    "the start the block gains up to 3e-5 m/s, after which it accelerates as it must"
+    "where μ is 0.1 % below tanθ the event-driven scheme starts with an impulse that no force explains: within 1e-5 s "
+    "of the start the block gains up to 3e-5 m/s, after which it accelerates as it must"
 )
 NEWTON = (
     "Newton's restitution and Coulomb's friction together may give energy where slip reverses, here at e = 1; a law "

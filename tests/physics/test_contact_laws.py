@@ -1,4 +1,4 @@
-"""Impacts, friction and rest against closed forms: what `tests/hard_cases` does not run (other presets, any heading)."""
+"""Impacts, friction and rest against closed forms: what `tests/hard_cases` does not run (presets, any heading)."""
 
 from __future__ import annotations
 
