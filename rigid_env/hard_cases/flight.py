@@ -138,7 +138,10 @@ def growth_rate(on: Setting) -> Sequence[Check]:
 
 
 def parabola(on: Setting) -> Sequence[Check]:
-    """x = x₀ + v t + g t²/2, exact at any step; each step rounds numbers of this size a few times."""
+    """x = x₀ + v t + g t²/2, exact at any step (Galilei, *Two New Sciences*, 1638, fourth day).
+
+    A uniform field turns nothing, and the block tumbles meanwhile. Each step rounds numbers of this size a few times.
+    """
     x, v, g = np.array([1, 2, 3.0]), np.array([4, 5, -6.0]), np.array([0.5, -9.81, 2])
     body = physics.Block((5, 3, 2), 6.0, pos=x, linvel=v, angvel=(0.1, 5.0, 0.1))
     world = on.world(free(body, tuple(g)))
