@@ -14,7 +14,7 @@ import numpy as np
 import physics
 from physics.frontier_errors import angles_between, mechanical_energy, rotation_matrices
 from physics.scenes import GRAVITY, MASS, SIZE
-from rigid_env.hard_cases.case import Check, none_of
+from rigid_env.hard_cases.case import Check, Setting, none_of
 
 EPS = float(np.finfo(float).eps)
 FLOOR = physics.HalfSpace((0, 1, 0))
@@ -103,6 +103,22 @@ def wrench(force=(0.0, 0.0, 0.0), torque=(0.0, 0.0, 0.0), bodies: int = 1) -> np
     load = np.zeros((1, bodies, 6))
     load[0, 0, :3], load[0, 0, 3:] = force, torque
     return load
+
+
+def of_last_step(on: Setting, mu: float) -> float:
+    """By how much a step in which sliding ends moves too far or too short [m]: the speed left, μ g dt at most, dt."""
+    return 0.0 if on.is_event_driven else mu * GRAVITY * on.dt**2
+
+
+def early(on: Setting, body: physics.Body) -> float:
+    """Way [m] by which one hit may move the path of a body that flies between walls.
+
+    Time stepping finds the time of a hit at constant speed by one division: 0. The event-driven scheme takes contacts
+    that would touch within 1e-10 and ten tolerances of the time R/v as one impact (theory, section 8): one of them is
+    turned round that much early, 2 v of it.
+    """
+    radius = float(body.bounding_radius(body.dimensions))
+    return 2 * (1e-10 + 10 * on.tolerance) * radius if on.is_event_driven else 0.0
 
 
 def state_of(world) -> np.ndarray:
