@@ -10,7 +10,17 @@ from physics.kernels.contact import CLOSING_SHARE, UNSEEN, gainless
 from physics.kernels.fields.loads import hold_contact_loads, hold_loads
 from physics.kernels.flight import drift
 from physics.kernels.many import memory as kept
-from physics.kernels.many.contacts import acceleration_of, matrix, minus, pair_slop, plus, put, refresh, vector
+from physics.kernels.many.contacts import (
+    acceleration_of,
+    local_velocity,
+    matrix,
+    minus,
+    pair_slop,
+    plus,
+    put,
+    refresh,
+    vector,
+)
 from physics.kernels.many.place import place_body
 from physics.kernels.many.settle import settle
 from physics.kernels.step import coast
@@ -51,7 +61,7 @@ def aim_rest(n, h, many):
             c = minus(c, _centripetal(b, k, 3, many))
         t = qt.matvec(matrix(many.frame, k), (-half * c[0], -half * c[1], -half * c[2]))
         if t[0] > 0.0:
-            share = gainless(t[0], many.speed[k]) / t[0]
+            share = gainless(t[0], local_velocity(k, many)[0]) / t[0]
             t = (share * t[0], share * t[1], share * t[2])
         if many.gap[k] > slop:
             t = (t[0] - many.gap[k] / half, t[1], t[2])
@@ -84,6 +94,8 @@ def glide(n, world, h, friction, gyroscopic, tilted, scheme, memory, report, man
             continue
         drift_body(b, half, gyroscopic, tilted, many)
         place_body(b, tilted, many)
+        _, q, _, L = read_state(many.now, b)
+        put(many.twist, b, 3, angular_velocity(q, L, many.bodies[b], tilted))
     if n == 0:
         kept.forget(world, memory)
         return
