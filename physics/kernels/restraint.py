@@ -1,12 +1,13 @@
 """Impacts with friction and restitution that would gain energy: as much of the rebound as there is energy for.
 
-Newton's restitution is a law of normal velocities before and after; where friction turns the slip round meanwhile, it can
-ask for more than the body has (Kane's paradox). A plastic impact never does: with u⁺ = u⁻ + W p, p·u⁺ <= 0,
+Newton's restitution is a law of normal velocities before and after; where friction turns the slip round meanwhile, it
+can ask for more than the body has (Kane's paradox). A plastic impact never does: with u⁺ = u⁻ + W p, p·u⁺ <= 0,
 
     ΔE = ½ p·(u⁻ + u⁺) = ½ (2 p·u⁺ - p·W p) <= 0.
 
-The momenta between it (s = 0) and the full rebound (s = 1) are those of impulses in the same cones, which are convex, and
-leave no contact approaching. The energy is a parabola in s; the largest s at which it is what it was before is taken.
+The momenta between it (s = 0) and the full rebound (s = 1) are those of impulses in the same cones, which are convex,
+and leave no contact approaching. The energy is a parabola in s; the largest s at which it is what it was before is
+taken.
 
 References
 ----------

@@ -9,6 +9,7 @@ from physics.kernels.compiler import inlined, kernel
 from physics.kernels.contact import CLOSING_SHARE, UNSEEN, gainless
 from physics.kernels.fields.loads import hold_contact_loads, hold_loads
 from physics.kernels.flight import drift
+from physics.kernels.layout import SPHERE
 from physics.kernels.many import memory as kept
 from physics.kernels.many.contacts import (
     acceleration_of,
@@ -41,7 +42,9 @@ def drift_body(b, h, gyroscopic, tilted, many):
 
 @inlined
 def _centripetal(b, k, first, many):
-    """ω x (ω x r) of one end of contact k, world frame [m/s²]."""
+    """ω x (ω x r) of one end of contact k, world frame [m/s²]; 0 of a sphere, whose point of contact does not turn."""
+    if many.bodies[b].shape == SPHERE:
+        return (0.0, 0.0, 0.0)
     w = vector(many.twist, b, 3)
     return qt.cross(w, qt.cross(w, vector(many.arm, k, first)))
 
