@@ -216,10 +216,9 @@ def gainless(target, speed):
 def aim_rest(n, v, w, spin_up, R, h, tilted, work):
     """Targets of the resting stage over h; R is the attitude at its middle, v and w are the velocities there before it.
 
-    The impulses act at the middle of the step, the velocity is asked for at its end, half a step later: a
-    vertex that the body turns about has by then gained h/2 ω x (ω x r), so that is taken off. The lowest point of an
-    ellipsoid, which wanders over it at ṙ, has gained h/2 (ω x ṙ + ω̇ x r), ω̇ that of free turning (`spin_up`); of a
-    sphere both are 0. A feature still
+    The impulses act at the middle of the step, the velocity is asked for at its end, half a step later: a contact
+    point at r, which wanders over the body at ṙ - ω x r, has by then gained h/2 (ω x ṙ + ω̇ x r), so that is taken off.
+    ω̇ is that of free turning (`spin_up`); ṙ = ω x r of a vertex, and of a sphere both are 0. A feature still
     above the wall may close `CLOSING_SHARE` of its gap (all of it in a substep's last stage). What is smaller
     than the tolerance of the solve, or would move a contact by less than `UNSEEN` slops in the step, is 0: a body
     comes to rest to the last bit, and contacts that hold are not asked to move apart by next to nothing.
@@ -235,11 +234,11 @@ def aim_rest(n, v, w, spin_up, R, h, tilted, work):
         if is_turning:
             r = (work.arm[i, 0], work.arm[i, 1], work.arm[i, 2])
             k = work.slot[i] // features
-            c = qt.cross(w, qt.cross(w, r))
+            rate = qt.cross(w, r)
             if shape != BLOCK:
                 r, rate = arm_and_rate(shape, dims, R, w, wall_normal(walls, k), 0, tilted, work)
-                a, b = qt.cross(w, rate), qt.cross(spin_up, r)
-                c = (a[0] + b[0], a[1] + b[1], a[2] + b[2])
+            a, b = qt.cross(w, rate), qt.cross(spin_up, r)
+            c = (a[0] + b[0], a[1] + b[1], a[2] + b[2])
             t0 = -half * (c[0] * walls[k, 0] + c[1] * walls[k, 1] + c[2] * walls[k, 2])
             t1 = -half * (c[0] * walls[k, 3] + c[1] * walls[k, 4] + c[2] * walls[k, 5])
             t2 = -half * (c[0] * walls[k, 6] + c[1] * walls[k, 7] + c[2] * walls[k, 8])

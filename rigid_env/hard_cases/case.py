@@ -143,13 +143,13 @@ class Setting:
 
     @property
     def tolerance(self) -> float:
-        """`Accuracy.tolerance`: residual of a contact problem by the free contact speed. 0 of another engine."""
-        return resolve(self.accuracy).tolerance if self.is_ours else 0.0
+        """`Accuracy.tolerance`: residual of a contact problem by the free contact speed; the same for other engines."""
+        return resolve(self.accuracy).tolerance
 
     @property
     def slop(self) -> float:
-        """`Accuracy.slop`: gap that counts as none, in bounding radii. 0 of another engine."""
-        return resolve(self.accuracy).slop if self.is_ours else 0.0
+        """`Accuracy.slop`: gap that counts as none, in bounding radii; the same for other engines."""
+        return resolve(self.accuracy).slop
 
     def steps(self, duration: float) -> int:
         """Whole steps that take at least `duration` [s], to rounding."""

@@ -1,4 +1,4 @@
-"""Hard cases of friction and rest: sliding, rolling, inclines, squeezing, pressing into a corner, jamming."""
+"""Hard cases of friction and rest: sliding, inclines, squeezing, pressing into a corner, jamming."""
 
 from __future__ import annotations
 
@@ -20,6 +20,7 @@ from rigid_env.hard_cases.scenery import (
     is_finite,
     laws,
     none_of_finite,
+    of_last_step,
     on_floor,
     state_of,
     turned,
@@ -28,36 +29,6 @@ from rigid_env.hard_cases.scenery import (
 
 RADIUS = 0.5 * float(np.linalg.norm(SIZE))  # of the block's bounding sphere [m]
 HOUR, MINUTE = 3600.0, 60.0  # [s]
-
-
-def rolling(on: Setting) -> Sequence[Check]:
-    """A sphere set down sliding at v₀ rolls from t = 2 v₀/(7 μ g) on, at 5 v₀/7, and stays so.
-
-    m v̇ = -μ m g and (2/5) m r² ω̇ = μ m g r until v = ω r (Goldsmith, *Impact*; any text on mechanics). Friction is
-    constant until then: only the step in which sliding ends is not exact, in place by μ g dt², as a velocity is hit to
-    the tolerance of a contact problem. Angular momentum about the ground is (7/5) m v r throughout.
-    """
-    v, mu, radius = 5.0, 0.2, 1.0
-    # The other walls are too far to be met, and high above the floor: this is the step of the sphere in a box.
-    scene = boxed(physics.Sphere(radius, 1.0, linvel=(v, 0, 0)), (1e3, radius, 1e3), 0.0, mu, (0, -GRAVITY, 0))
-    world = on.world(scene)
-    t = 2 * v / (7 * mu * GRAVITY)
-    world.step(steps=on.steps(t) + 2)
-    rolls, end = world.linvel[0, 0, 0], 4.0
-    world.step(steps=on.steps(end) - on.steps(t) - 2)
-    place = v * t - mu * GRAVITY * t * t / 2 + 5 * v / 7 * (world.time - t)
-    tight = max(10 * on.tolerance, 64 * EPS) * v
-    return [
-        within("speed when rolling", rolls, 5 * v / 7, tight, "m/s"),
-        Check("change of it afterwards", abs(world.linvel[0, 0, 0] - rolls), tight, "m/s"),
-        Check("slip afterwards", abs(world.linvel[0, 0, 0] + radius * world.angvel[0, 0, 2]), tight, "m/s"),
-        within("place at 4 s", world.pos[0, 0, 0], place, _of_last_step(on, mu) + end * tight, "m"),
-    ]
-
-
-def _of_last_step(on: Setting, mu: float) -> float:
-    """By how much a step in which sliding ends moves too far or too short [m]: the speed left, μ g dt at most, dt."""
-    return 0.0 if on.is_event_driven else mu * GRAVITY * on.dt**2
 
 
 def stop(on: Setting) -> Sequence[Check]:
@@ -80,7 +51,7 @@ def stop(on: Setting) -> Sequence[Check]:
         creep += int(np.count_nonzero(state_of(world) != before))
     share = max(on.tolerance / mu, 64 * EPS) * distance
     return [
-        Check("error of the distance, nine headings", wrong, _of_last_step(on, mu) / 4 + share, "m"),
+        Check("error of the distance, nine headings", wrong, of_last_step(on, mu) / 4 + share, "m"),
         Check("departure from the straight line", bent, share, "m"),
         Check("numbers of the state that change in 10 s of rest", creep, 0.0),
     ]
@@ -136,7 +107,7 @@ def at_rest(on: Setting) -> Sequence[Check]:
     """
     world = on.world(on_floor(block(), friction=0.5))
     world.step(steps=10)
-    before, steps = state_of(world), on.pick(1_000_000, 100_000)
+    before, steps = state_of(world), 1_000_000 if on.is_ours else on.pick(1_000_000, 100_000)
     world.step(steps=steps)
     after = state_of(world)
     checks = [
@@ -275,16 +246,28 @@ def kane(on: Setting) -> Sequence[Check]:
     return [Check(f"energy gained, e = {e}", gain, 4 * on.tolerance + 64 * EPS) for e, gain in worst.items()]
 
 
+NEAR_THE_CONE = (
+    "where μ is 0.1 % below tanθ the event-driven scheme starts with an impulse that no force explains: within 1e-5 s "
+    "of the start the block gains up to 3e-5 m/s, after which it accelerates as it must"
+)
+NEWTON = (
+    "Newton's restitution and Coulomb's friction together may give energy where slip reverses, here at e = 1; a law "
+    "that does not (Poisson's or Stronge's), or a cap, is not built"
+)
+
 CASES = (
-    Case(12, "rolling", "sliding sphere starts to roll", "5v₀/7 from t = 2v₀/(7μg) on", rolling, peers=True),
     Case(16, "sliding-stop", "sliding stop, any heading", "distance v²/(2μg), straight, then rest", stop, peers=True),
     Case(17, "incline", "incline, μ 0.1 % above and below tanθ", "no creep in an hour; else a = g(sinθ - μ cosθ)",
-         incline, peers=True),
+         incline, peers=True, faults={"precise": NEAR_THE_CONE},
+    ),
     Case(20, "at-rest", "at rest for 1,000,000 steps", "no creep, no sinking, no kinetic energy", at_rest, peers=True),
     Case(30, "squeezed", "squeezed between two jaws by F", "holds iff 2μF ≥ mg", squeezed),
     Case(31, "pressed", "pressed into a corner with 1e3 to 1e6 times its weight",
          "wall forces balance; let go, no energy comes of it", pressed),
     Case(35, "painleve", "Painlevé's rod, μ > (tanθ + 4cotθ)/3", "finite, no energy gained, and the report says so",
          painleve),
-    Case(36, "slip-reversal", "oblique impact with slip reversal (Kane)", "no energy gained", kane),
+    Case(
+        36, "slip-reversal", "oblique impact with slip reversal (Kane)", "no energy gained", kane,
+        faults={"balanced": NEWTON, "precise": NEWTON},
+    ),
 )  # fmt: skip

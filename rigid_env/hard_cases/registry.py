@@ -8,7 +8,10 @@ from importlib import import_module
 from rigid_env.hard_cases.case import Case
 
 # Each has a tuple CASES.
-MODULES = ("flight", "bounces", "friction", "tipping", "scaling", "piles", "leaning", "chains", "random_scenes")
+MODULES = (
+    "flight", "bounces", "impacts", "friction", "rolling", "tipping", "scaling", "piles", "leaning", "chains",
+    "random_scenes",
+)  # fmt: skip
 
 
 def _gathered() -> tuple[Case, ...]:

@@ -14,7 +14,7 @@ import numpy as np
 import physics
 from physics.frontier_errors import angles_between, mechanical_energy, rotation_matrices
 from physics.scenes import GRAVITY, MASS, SIZE
-from rigid_env.hard_cases.case import Check, none_of
+from rigid_env.hard_cases.case import Check, Setting, none_of
 
 EPS = float(np.finfo(float).eps)
 FLOOR = physics.HalfSpace((0, 1, 0))
@@ -103,6 +103,11 @@ def wrench(force=(0.0, 0.0, 0.0), torque=(0.0, 0.0, 0.0), bodies: int = 1) -> np
     load = np.zeros((1, bodies, 6))
     load[0, 0, :3], load[0, 0, 3:] = force, torque
     return load
+
+
+def of_last_step(on: Setting, mu: float) -> float:
+    """By how much a step in which sliding ends moves too far or too short [m]: the speed left, μ g dt at most, dt."""
+    return 0.0 if on.is_event_driven else mu * GRAVITY * on.dt**2
 
 
 def state_of(world) -> np.ndarray:
