@@ -63,9 +63,7 @@ def aim_rest(n, h, many):
         if b >= 0:
             c = minus(c, _centripetal(b, k, 3, many))
         t = qt.matvec(matrix(many.frame, k), (-half * c[0], -half * c[1], -half * c[2]))
-        if t[0] > 0.0:
-            share = gainless(t[0], local_velocity(k, many)[0]) / t[0]
-            t = (share * t[0], share * t[1], share * t[2])
+        t = gainless(t, local_velocity(k, many))
         if many.gap[k] > slop:
             t = (t[0] - many.gap[k] / half, t[1], t[2])
         elif many.gap[k] > 0.0:
