@@ -295,7 +295,15 @@ def random_scenes(setting: Setting) -> list[Check]:
     return checks
 
 
+FOUND = (
+    "balls among other bodies pass a wall in a step in which a force throws them through the box (a few worlds in a "
+    "hundred); in one step in some ten thousand that turns a lone body by radians the resting stage still gains energy "
+    "(targets h/2 (ω x ṙ + ω̇ x r), which `contact.gainless` bounds by the speed that is there, but not in the metric of "
+    "W⁻¹); python -m benchmarks.soak keeps such steps as recordings"
+)
+
 CASES = (
     Case(47, "random-scenes", "100,000 random scenes, forces up to 1,000,000 times the weight",
-         "no NaN, no exception, no escape, energy never above what was put in", random_scenes),
+         "no NaN, no exception, no escape, energy never above what was put in", random_scenes,
+         faults={"balanced": FOUND, "fast": FOUND}),
 )  # fmt: skip
