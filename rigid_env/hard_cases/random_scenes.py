@@ -297,9 +297,9 @@ def random_scenes(setting: Setting) -> list[Check]:
 
 FOUND = (
     "balls among other bodies pass a wall in a step in which a force throws them through the box (a few worlds in a "
-    "hundred); in one step in some ten thousand that turns a lone body by radians the resting stage still gains energy "
-    "(targets h/2 (ω x ṙ + ω̇ x r), which `contact.gainless` bounds by the speed that is there, but not in the metric of "
-    "W⁻¹); python -m benchmarks.soak keeps such steps as recordings"
+    "hundred); in a few steps in a hundred thousand that turn a body by a radian or more the resting stage still gains "
+    "energy (its targets h/2 (ω x ṙ + ω̇ x r), which `contact.gainless` bounds, but not in the metric of W⁻¹); "
+    "python -m benchmarks.soak keeps such steps as recordings"
 )
 
 CASES = (
