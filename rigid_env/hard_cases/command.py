@@ -38,8 +38,8 @@ def run(
         require_matplotlib()
     plan = make_plan(registry.find(cases), accuracy, dt, steps, not is_quick, has_peers)
     report = run_and_show(console, plan, json)
+    if markdown:  # first: it says whether the checkout is that of the commit
+        page.write_page(markdown, report, plot, " ".join(["rigid-env", *sys.argv[1:]]))
     if plot:
         page.write_picture(plot, report)
-    if markdown:
-        page.write_page(markdown, report, plot, " ".join(["rigid-env", *sys.argv[1:]]))
     return report, [path for path in (json, plot, markdown) if path]

@@ -148,6 +148,9 @@ def squeezed(on: Setting) -> Sequence[Check]:
     ]
 
 
+PUSHES = ((1.0, 1.0, 1.0), (1.5, 0.6, 0.9), (0.7, 1.4, 1.1), (1.2, 1.2, 0.5))  # along the three walls, in loads
+
+
 def pressed(on: Setting) -> Sequence[Check]:
     """Pressed into a corner with 1e3 to 1e6 times its weight: the walls balance it; let go, no energy comes of it.
 
@@ -155,31 +158,42 @@ def pressed(on: Setting) -> Sequence[Check]:
     under the load: it moves by that share of a dt², which the next one finds, and by the slop. What is let go has no
     more energy than before but that of its weight over a slop.
     """
-    balance, gain, wrong, half, checks, slop = 0.0, 0.0, 0, 50.0, [], on.slop * RADIUS
+    checks, balance, gain, wrong, slop = [], 0.0, 0.0, 0, on.slop * RADIUS
     for times in (1e3, 1e4, 1e5, 1e6):
-        place = np.array(SIZE) / 2 - half
-        scene = boxed(block(tuple(place)), (half,) * 3, 0.2, 0.5, (0, -GRAVITY, 0))
-        world = on.world(scene)
-        start = energy(world, scene)
-        push = np.full(3, -times * MASS * GRAVITY)
-        for _ in range(on.steps(2.0)):
-            world.step(wrench(push))
-        _, forces = world.contacts()
-        load = -push + (0, MASS * GRAVITY, 0)
-        balance = max(balance, np.abs(forces.sum(axis=0) - load).max() / load.max()) if len(forces) else math.inf
-        limit = math.sqrt(3) * (2 * slop + on.tolerance * times * GRAVITY * on.dt**2) + 64 * EPS * half
-        checks.append(Check(f"way in 2 s, {times:g} times", np.linalg.norm(world.pos[0, 0] - place), limit, "m"))
-        pressed_energy = energy(world, scene)
-        for _ in range(on.steps(2.0)):
-            world.step()
-            gain = max(gain, energy(world, scene) - max(pressed_energy, start))
-        wrong += not is_finite(world)
+        way, load = 0.0, times * MASS * GRAVITY
+        for push in PUSHES:
+            world, off, start, energies = _press(on, load * np.array(push))
+            way, wrong = max(way, off), wrong + (not is_finite(world))
+            forces = world.contacts()[1].sum(axis=0) if len(world.contacts()[1]) else np.zeros(3)
+            expected = load * np.array(push) + (0, MASS * GRAVITY, 0)
+            balance = max(balance, np.abs(forces - expected).max() / load)
+            before = max(start, energies)
+            for _ in range(on.steps(1.0)):
+                world.step()
+                gain = max(gain, energy(world, world.scene) - before)
+        limit = math.sqrt(3) * (2 * slop + 1.5 * on.tolerance * times * GRAVITY * on.dt**2) + 64 * EPS * CORNER
+        checks.append(Check(f"way in 2 s, {times:g} times", way, limit, "m"))
     return [
         *checks,
         Check("wall forces against the load", balance, 4 * on.tolerance + 64 * EPS),
         Check("energy gained when let go", gain, MASS * GRAVITY * slop + 1e-9 * on.tolerance, "J"),
         none_of("states that are not finite", wrong),
     ]
+
+
+CORNER = 50.0  # how far the corner is from the origin, along each axis [m]
+
+
+def _press(on: Setting, push: np.ndarray) -> tuple:
+    """The block, pushed into the corner for 2 s: world, farthest from its start [m], energies before and after [J]."""
+    place = np.array(SIZE) / 2 - CORNER
+    scene = boxed(block(tuple(place)), (CORNER,) * 3, 0.2, 0.5, (0, -GRAVITY, 0))
+    world = on.world(scene)
+    start, off = energy(world, scene), 0.0
+    for _ in range(on.steps(2.0)):
+        world.step(wrench(-push))
+        off = max(off, float(np.linalg.norm(world.pos[0, 0] - place)))
+    return world, off, start, energy(world, scene)
 
 
 def painleve(on: Setting) -> Sequence[Check]:
@@ -255,6 +269,12 @@ NEWTON = (
     "that does not (Poisson's or Stronge's), or a cap, is not built"
 )
 
+CREEP = (
+    "under 1e5 times the weight and more the tolerance, relative to the free speed of the loaded step, lets the block "
+    "creep along the walls from step to step; and of some thousand contact problems of ten and more contacts one is "
+    "left with a residual of per cents, which throws it (the report says so)"
+)
+
 CASES = (
     Case(16, "sliding-stop", "sliding stop, any heading", "distance v²/(2μg), straight, then rest", stop, peers=True),
     Case(17, "incline", "incline, μ 0.1 % above and below tanθ", "no creep in an hour; else a = g(sinθ - μ cosθ)",
@@ -263,7 +283,7 @@ CASES = (
     Case(20, "at-rest", "at rest for 1,000,000 steps", "no creep, no sinking, no kinetic energy", at_rest, peers=True),
     Case(30, "squeezed", "squeezed between two jaws by F", "holds iff 2μF ≥ mg", squeezed),
     Case(31, "pressed", "pressed into a corner with 1e3 to 1e6 times its weight",
-         "wall forces balance; let go, no energy comes of it", pressed),
+         "wall forces balance; let go, no energy comes of it", pressed, faults={"balanced": CREEP}),
     Case(35, "painleve", "Painlevé's rod, μ > (tanθ + 4cotθ)/3", "finite, no energy gained, and the report says so",
          painleve),
     Case(

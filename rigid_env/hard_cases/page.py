@@ -81,8 +81,8 @@ def _beside(report: Report) -> list[str]:
     note = (
         f"At {1e3 * report.plan.dt:g} ms, the same runs and the same limits. Ours at `{first}`, every other engine at "
         "its defaults and, where it does not hold with them, at the settings of `rigid_env/measure/peers`: the first "
-        "that holds is shown. A wrench, contact forces and reports are not handed to other engines, so that only cases "
-        "that look at the motion alone are here."
+        "that holds is shown. They make the shorter runs of `--quick`. A wrench, contact forces and reports are not "
+        "handed to other engines, so that only cases that look at the motion alone are here."
     )
     head = ("#", "case", "rigid-env", *engines)
     return ["## Beside other engines", note, show.markdown_table(head, rows)]

@@ -111,7 +111,10 @@ class Report:
 
 
 def run_and_show(console: Console, plan: Plan, keep: Path | None = None) -> Report:
-    """Run all of it with a progress bar; print tables; after every outcome of ours `keep` holds all so far."""
+    """Run all of it with a progress bar; print tables; after every outcome of ours `keep` holds all so far.
+
+    Other engines make the shorter runs: all their settings are tried.
+    """
     engines, missing = others.load_engines() if plan.has_peers else ({}, [])
     if missing:
         console.print(f"not installed: {', '.join(missing)}", markup=False)
@@ -131,7 +134,7 @@ def run_and_show(console: Console, plan: Plan, keep: Path | None = None) -> Repo
             if keep is not None:
                 write_json(keep, Report(plan, tuple(done), (), False).to_dict())
         if len(done) == total:
-            setting = Setting(dt=plan.dt, is_thorough=plan.is_thorough)
+            setting = Setting(dt=plan.dt, is_thorough=False)
             for outcome in others.run_peers(plan.cases, list(engines.values()), setting, tick):
                 theirs.append(outcome)
                 progress.advance(task)

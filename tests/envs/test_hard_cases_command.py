@@ -10,7 +10,9 @@ from typer.testing import CliRunner
 from rigid_env.cli import app
 from rigid_env.hard_cases import page, registry, report
 from rigid_env.hard_cases.case import Case, Check, Setting, UnsupportedError
+from rigid_env.hard_cases.peers import run_peer
 from rigid_env.hard_cases.run import Outcome, Status, run_case
+from rigid_env.measure.peers import load
 
 runner = CliRunner()
 
@@ -126,3 +128,19 @@ def test_other_engines_stand_beside_ours(monkeypatch, tmp_path):
     page.write_page(text, report.Report(plan, (ours,), (theirs,), True), None, "rigid-env hard-cases --peers")
     assert "| # | case | rigid-env | other |" in text.read_text()
     assert "| 1 | case-1 | ✓ balanced | ✗ another: nan (≤ 4) |" in text.read_text()
+
+
+def test_another_engine_runs_a_case_at_the_first_setting_that_holds():
+    pytest.importorskip("mujoco")
+    (parabola,) = registry.find(("parabola",))
+    outcome = run_peer(parabola, load("mujoco"), Setting(is_thorough=False))
+    # Its default integrator is of first order; RK4 is exact on a parabola.
+    assert (outcome.status, outcome.engine, outcome.accuracy) == (Status.HOLDS, "mujoco", "RK4")
+
+
+def test_what_another_engine_cannot_express_is_said():
+    pytest.importorskip("mujoco")
+    (pushed,) = registry.find(("tips-when-pushed",))
+    outcome = run_peer(pushed, load("mujoco"), Setting(is_thorough=False))
+    assert outcome.status is Status.UNSUPPORTED
+    assert "wrench" in outcome.reason

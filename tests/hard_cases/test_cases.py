@@ -19,12 +19,14 @@ DT = 0.01
 
 def parameters():
     """Every case that is built, at every accuracy."""
+    found = []
     for case in registry.CASES:
         for accuracy in ACCURACIES:
             reason = case.faults.get(accuracy)
             marks = [pytest.mark.xfail(strict=True, raises=AssertionError, reason=reason)] if reason else []
             if case.run is not None:
-                yield pytest.param(case, accuracy, id=f"{case.number}-{case.name}-{accuracy}", marks=marks)
+                found.append(pytest.param(case, accuracy, id=f"{case.number}-{case.name}-{accuracy}", marks=marks))
+    return found
 
 
 @pytest.mark.parametrize(("case", "accuracy"), parameters())
