@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from rich.console import Console
@@ -162,8 +162,6 @@ def _print(console: Console, report: Report) -> None:
 
 def _beside(report: Report) -> Sequence[Outcome]:
     """Ours at the first accuracy and theirs, case by case; the engine stands for the name of the case."""
-    from dataclasses import replace
-
     first = report.plan.accuracies[0]
     ours = [one for one in report.details if one.accuracy == first and one.case.peers]
     rows = sorted([*ours, *report.peers], key=lambda one: (one.case.number, one.engine != OURS))
