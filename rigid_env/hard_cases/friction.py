@@ -265,8 +265,8 @@ NEAR_THE_CONE = (
     "of the start the block gains up to 3e-5 m/s, after which it accelerates as it must"
 )
 NEWTON = (
-    "Newton's restitution and Coulomb's friction together may give energy where slip reverses, here at e = 1; the cap of "
-    "time stepping (kernels/restraint.py) is not built into the event-driven scheme"
+    "Newton's restitution and Coulomb's friction together may give energy where slip reverses, here at e = 1; the cap "
+    "of time stepping (kernels/restraint.py) is not built into the event-driven scheme"
 )
 
 CREEP = (
