@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 from physics.kernels import geometry as geo
 from physics.kernels import quaternion as qt
 from physics.kernels.arms import arm_and_rate, center_arm, geometric_center, wall_normal
@@ -206,14 +208,26 @@ def is_closing(i, n, work):
 
 
 @inlined
-def gainless(target, speed):
-    """A target for the normal velocity, no more than what turns the approach at `speed` < 0 round.
+def gainless(target, u):
+    """A target for the velocity of a contact (normal, tangents), no more than what turns its velocity u round.
 
     Impulses p that change contact velocities from u to u' change the energy by p·(u + u')/2: a push with u' <= -u adds
-    nothing. Where a body turns by much less than a radian in a stage what is asked for is just -u. Where it turns by
-    more, ω x (ω x r) says nothing about the end of the stage, and is as large as one likes.
+    nothing, nor does what holds at |u'| <= |u|. Where a body turns by much less than a radian in a stage what is asked
+    for is just -u. Where it turns by more, ω x ṙ says nothing about the end of the stage, and is as large as one likes.
     """
-    return min(target, max(-speed, 0.0))
+    most, square = u[1] * u[1] + u[2] * u[2], target[1] * target[1] + target[2] * target[2]
+    share = math.sqrt(most / square) if square > most else 1.0
+    return min(target[0], max(-u[0], 0.0)), share * target[1], share * target[2]
+
+
+@inlined
+def _in_frame(k, a, walls):
+    """A vector in the frame of wall k: normal, tangents."""
+    return (
+        a[0] * walls[k, 0] + a[1] * walls[k, 1] + a[2] * walls[k, 2],
+        a[0] * walls[k, 3] + a[1] * walls[k, 4] + a[2] * walls[k, 5],
+        a[0] * walls[k, 6] + a[1] * walls[k, 7] + a[2] * walls[k, 8],
+    )
 
 
 @inlined
@@ -243,12 +257,10 @@ def aim_rest(n, v, w, alpha, R, h, tilted, work):
                 r, rate = arm_and_rate(shape, dims, R, w, wall_normal(walls, k), 0, tilted, work)
             a, b = qt.cross(w, rate), qt.cross(alpha, r)
             c = (a[0] + b[0], a[1] + b[1], a[2] + b[2])
-            t0 = -half * (c[0] * walls[k, 0] + c[1] * walls[k, 1] + c[2] * walls[k, 2])
-            t1 = -half * (c[0] * walls[k, 3] + c[1] * walls[k, 4] + c[2] * walls[k, 5])
-            t2 = -half * (c[0] * walls[k, 6] + c[1] * walls[k, 7] + c[2] * walls[k, 8])
-            if t0 > 0.0:
-                most = gainless(t0, qt.dot(wall_normal(walls, k), v) + qt.dot(wall_normal(walls, k), qt.cross(w, r)))
-                t0, t1, t2 = most, t1 * (most / t0), t2 * (most / t0)
+            c = (-half * c[0], -half * c[1], -half * c[2])
+            u = qt.cross(w, r)
+            u = (v[0] + u[0], v[1] + u[1], v[2] + u[2])
+            t0, t1, t2 = gainless(_in_frame(k, c, walls), _in_frame(k, u, walls))
         if is_closing(i, n, work):
             t0 -= share * work.gap[i] / h
         if max(abs(t0), max(abs(t1), abs(t2))) <= negligible:

@@ -9,6 +9,7 @@ from physics.kernels.body import principal_attitude, turning
 from physics.kernels.compiler import inlined, kernel
 from physics.kernels.contact import aim_impact, aim_rest
 from physics.kernels.flight import drift
+from physics.kernels.restraint import ROUNDING, between, kinetic_energy, rebound_share
 from physics.kernels.slide import SLIDE
 from physics.kernels.slip import has_turned_round, oppose_mean_slip
 from physics.kernels.solve import PIVOTING, solve_contacts
@@ -68,6 +69,15 @@ def note_solve(report, world, residual, sweeps, method, tolerance):
         report[world, at.UNCONVERGED] += 1.0
 
 
+@inlined
+def aim_plastic(n, work):
+    """Targets and first guess of an impact without rebound."""
+    for k in range(3 * n):
+        work.impulse[k] = 0.0
+    for i in range(n):
+        work.target[i, 0] = 0.0
+
+
 @kernel
 def impact(n, y, h, friction, smooth, tilted, pivots, report, work):
     """State after the impulses of the contacts that approach; unchanged when none does."""
@@ -82,9 +92,19 @@ def impact(n, y, h, friction, smooth, tilted, pivots, report, work):
         work.impulse[k] = 0.0
     R = qt.to_matrix(principal_attitude(q, work, tilted))
     work.mode = SLIDE
-    v, L, residual, sweeps, method = solve_contacts(n, friction, smooth, pivots, v, L, R, work)
+    v1, L1, residual, sweeps, method = solve_contacts(n, friction, smooth, pivots, v, L, R, work)
     note_solve(report, work.world, residual, sweeps, method, work.tolerance)
-    return x, q, v, L
+    if friction is not None:
+        before, full = kinetic_energy(q, v, L, work, tilted), kinetic_energy(q, v1, L1, work, tilted)
+        if work.restitution > 0.0 and full > before + ROUNDING * before:
+            aim_plastic(n, work)
+            v0, L0, residual, sweeps, method = solve_contacts(n, friction, smooth, pivots, v, L, R, work)
+            note_solve(report, work.world, residual, sweeps, method, work.tolerance)
+            plastic = kinetic_energy(q, v0, L0, work, tilted)
+            middle = kinetic_energy(q, between(v0, v1, 0.5), between(L0, L1, 0.5), work, tilted)
+            s = rebound_share(before, plastic, full, middle)
+            return x, q, between(v0, v1, s), between(L0, L1, s)
+    return x, q, v1, L1
 
 
 @kernel

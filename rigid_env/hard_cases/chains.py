@@ -26,12 +26,13 @@ def cradle(count: int, gap: float) -> physics.Scene:
 def newtons_cradle(setting: Setting) -> list[Check]:
     """One ball strikes n - 1 that touch, n = 3 and 5: at once, or in turn.
 
-    At once: one problem for all contacts. By Newton's law each normal velocity is reversed, u_1 = v becomes -v and u_k = 0
-    stays. With x the first ball's velocity after, all others have x + v, and momentum says n x + (n - 1) v = v: x = -(n -
-    2)/n v, the others 2/n v: (-1/3, 2/3, 2/3) v of three. Energy: ((n - 2)² + 4 (n - 1))/n² = 1.
+    At once: one problem for all contacts. By Newton's law each normal velocity is reversed, u_1 = v becomes -v and u_k
+    = 0 stays. With x the first ball's velocity after, all others have x + v, and momentum says n x + (n - 1) v = v: x =
+    -(n - 2)/n v, the others 2/n v: (-1/3, 2/3, 2/3) v of three. Energy: ((n - 2)² + 4 (n - 1))/n² = 1.
 
-    In turn: two equal balls exchange their velocities, so that the last one alone leaves with v. Balls a hair apart (1 mm)
-    do that by themselves. For balls that touch it must be possible to choose it: `Accuracy(collisions="sequential")`.
+    In turn: two equal balls exchange their velocities, so that the last one alone leaves with v. Balls a hair apart (1
+    mm) do that by themselves. For balls that touch it must be possible to choose it:
+    `Accuracy(collisions="sequential")`.
 
     The speeds are solved to the tolerance of the free contact speed v, at each of n - 1 impacts and contacts.
     """
@@ -46,7 +47,9 @@ def newtons_cradle(setting: Setting) -> list[Check]:
             checks.append(Check(f"{count} balls, {how}: error of the speeds", error, limit, "m/s"))
             energy = float((after @ after) / SPEED**2)
             checks.append(within(f"{count} balls, {how}: energy after by before", energy, 1.0, 2 * limit / SPEED))
-        checks.append(none_of(f"{count} balls that touch: in turn is not offered or does not come out", _in_turn(count)))
+        checks.append(
+            none_of(f"{count} balls that touch: in turn is not offered or does not come out", _in_turn(count))
+        )
     return checks
 
 
@@ -72,9 +75,9 @@ def digits_of_pi(setting: Setting) -> list[Check]:
 
     In the plane (√m1 x1, √m2 x2) the motion is a billiard ball in a wedge of angle atan(√(m1/m2)); unfolded, a straight
     line that crosses the wedge's images π/angle times. Between two collisions the light ball crosses the free gap x
-    between wall and heavy ball at the speed v1, or from one to the other at least as much as is left of it, so that half
-    of x/(|v1| + 3 |v2|) is a step with at most one collision (|v1| grows by 2 |v2| in one). An impact of one contact is
-    answered in closed form: the energy is off by rounding per collision, and two gaps within the slop.
+    between wall and heavy ball at the speed v1, or from one to the other at least as much as is left of it, so that
+    half of x/(|v1| + 3 |v2|) is a step with at most one collision (|v1| grows by 2 |v2| in one). An impact of one
+    contact is answered in closed form: the energy is off by rounding per collision, and two gaps within the slop.
 
     References
     ----------
@@ -101,17 +104,24 @@ def _collisions(setting: Setting, world) -> int:
     """Changes of any velocity until both balls move off, the heavy one no slower."""
     seen = 0
     for _ in range(100_000):
-        (light, heavy), (x1, x2) = world.linvel[0, :, 0].tolist(), world.pos[0, :, 0].tolist()
+        (light, heavy), place = world.linvel[0, :, 0].tolist(), float(world.pos[0, 1, 0])
         if 0 <= light <= heavy:
             return seen
-        free = x2 - 3 * RADIUS
+        free = place - 3 * RADIUS
         world.step(dt=min(setting.dt, 0.5 * free / (abs(light) + 3 * abs(heavy))))
         seen += not np.array_equal(world.linvel[0, :, 0], (light, heavy))
     return seen
 
 
+IN_TURN = (
+    "balls that touch collide at once: to let them do so in turn (Accuracy.collisions) is known to the event-driven "
+    "scheme only, which does not know bodies that touch each other"
+)
+
 CASES = (
     Case(33, "cradle", "Newton's cradle of 3 and 5 balls",
-         "(0, ..., 0, v) in turn, (-1/3, 2/3, 2/3) v at once: both can be chosen", newtons_cradle),
-    Case(34, "digits-of-pi", "two masses and a wall, ratio 1 to 1,000,000", "3, 31, 314, 3141 collisions", digits_of_pi),
+         "(0, ..., 0, v) in turn, (-1/3, 2/3, 2/3) v at once: both can be chosen", newtons_cradle,
+         faults={"balanced": IN_TURN, "fast": IN_TURN}),
+    Case(34, "digits-of-pi", "two masses and a wall, ratio 1 to 1,000,000", "3, 31, 314, 3141 collisions",
+         digits_of_pi),
 )  # fmt: skip

@@ -18,10 +18,10 @@ BALLS_PENETRATION = 1.35e-4
 def heavy_on_light(setting: Setting) -> list[Check]:
     """A cube of 1 to 1,000,000 kg on one of 1 kg, for a minute.
 
-    The interface carries the weight M g of what is above it, the floor (M + 1) g. The velocities of a contact problem are
-    off by its tolerance times the free speed g h, so in a load that is carried by masses of at most M + 1 kg the force
-    is off by at most tolerance * g * (M + 1) at each of eight contacts: 10 tolerances of the whole weight. Depth: the
-    slop at each of two interfaces.
+    The interface carries the weight M g of what is above it, the floor (M + 1) g. The velocities of a contact problem
+    are off by its tolerance times the free speed g h, so in a load that is carried by masses of at most M + 1 kg the
+    force is off by at most tolerance * g * (M + 1) at each of eight contacts: 10 tolerances of the whole weight. Depth:
+    the slop at each of two interfaces.
     """
     checks = []
     for top in (1.0, 1e2, 1e4, 1e6):
@@ -62,8 +62,9 @@ def towers(setting: Setting) -> list[Check]:
 def pyramids(setting: Setting) -> list[Check]:
     """Pyramids with 10 and 20 cubes in the lowest row, cubes 0.02 m apart, for 5 s.
 
-    Every cube lies on two with almost half a face each: in balance by symmetry. The floor carries all of the weight; each
-    of its contacts is off by the tolerance times the free speed g h, times the masses that lean on it, the base at most.
+    Every cube lies on two with almost half a face each: in balance by symmetry. The floor carries all of the weight;
+    each of its contacts is off by the tolerance times the free speed g h, times the masses that lean on it, the base at
+    most.
     """
     checks = []
     for base in setting.pick((10, 20), (10,)):
@@ -82,10 +83,10 @@ def pyramids(setting: Setting) -> list[Check]:
 def overhangs(setting: Setting) -> list[Check]:
     """Five planks of length 1 m, each as far beyond the next as it may be.
 
-    Let x_k be how far plank k from the top reaches beyond plank k + 1. The k planks from the top have their common centre
-    above that edge exactly if x_k = 1/(2 k): with the first k - 1 centred on the edge of plank k, at distance 1/2
-    from its centre, the common centre is 1/(2 k) from the edge. So the reach is (1/2) Σ 1/k. At 0.98 of every x_k it
-    stands, at 1.02 the top falls: to below the middle of the pile, 0.5 m.
+    Let x_k be how far plank k from the top reaches beyond plank k + 1. The k planks from the top have their common
+    centre above that edge exactly if x_k = 1/(2 k): with the first k - 1 centred on the edge of plank k, at distance
+    1/2 from its centre, the common centre is 1/(2 k) from the edge. So the reach is (1/2) Σ 1/k. At 0.98 of every x_k
+    it stands, at 1.02 the top falls: to below the middle of the pile, 0.5 m.
     """
     checks = []
     for share in (0.98, 1.02):
@@ -109,10 +110,10 @@ def overhangs(setting: Setting) -> list[Check]:
 def balls(setting: Setting) -> list[Check]:
     """6 x 6 x 6 balls of radius 0.5 m and 1 kg fall from 1 m, 0.1 m apart, at a tenth of the step (1 ms).
 
-    e = 0, μ = 0: penetration is an error, and its sum of squares over all contacts is below what the benchmark allows at
-    every hundredth of a second of 10 s. e = 1: the energy stays; an impact whose contact problem is solved to the tolerance
-    is off by that share of the energy of the balls that it involves, so after n impacts per ball by n tolerances. A ball
-    has about 1 impact with each neighbour per fall of 0.1 m, 0.14 s; 26 neighbours: 2000 in 10 s.
+    e = 0, μ = 0: penetration is an error, and its sum of squares over all contacts is below what the benchmark allows
+    at every hundredth of a second of 10 s. e = 1: the energy stays; an impact whose contact problem is solved to the
+    tolerance is off by that share of the energy of the balls that it involves, so after n impacts per ball by n
+    tolerances. A ball has about 1 impact with each neighbour per fall of 0.1 m, 0.14 s; 26 neighbours: 2000 in 10 s.
 
     The starting columns are in unstable balance: balls of a layer are moved by up to 0.01 m along x and z (seed 0).
 
@@ -162,8 +163,8 @@ def squared_depths(pos: np.ndarray, radius: float) -> float:
 CASES = (
     Case(24, "heavy-on-light", "a heavy cube on a light one, up to 1,000,000:1", "stands; loads = weight above",
          heavy_on_light),
-    Case(25, "towers", "towers of 10, 20 and 50 cubes for a minute, and one of 15 askew", "upright; loads = weight above",
-         towers),
+    Case(25, "towers", "towers of 10, 20 and 50 cubes for a minute, and one of 15 askew",
+         "upright; loads = weight above", towers),
     Case(26, "pyramids", "pyramids of base 10 and 20", "stand", pyramids),
     Case(27, "overhang", "five planks at the limit of overhang", "balances to (length/2) Σ 1/k, topples just beyond",
          overhangs),

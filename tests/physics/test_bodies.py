@@ -100,32 +100,6 @@ def test_a_plastic_landing_stops_in_front_of_what_it_meets():
     assert world.pos[:, 1, 1] == pytest.approx(1.5, abs=1e-4)
 
 
-def test_touching_balls_are_struck_at_once_by_the_law_of_newton():
-    world = balls([(-3, 0, 0), (0, 0, 0), (1, 0, 0)], [(3, 0, 0), (0, 0, 0), (0, 0, 0)], [1.0] * 3, 1.0)
-    world.step(steps=100)
-    # One problem for both contacts: u1' = -u1, u2' = -u2 = 0 (they did not approach). Solved to 1e-6 of 3 m/s.
-    np.testing.assert_allclose(world.linvel[0, :, 0], (-1, 2, 2), atol=3e-6)
-
-
-def test_balls_a_little_apart_are_struck_one_after_the_other():
-    world = balls([(-3, 0, 0), (0, 0, 0), (1.001, 0, 0)], [(3, 0, 0), (0, 0, 0), (0, 0, 0)], [1.0] * 3, 1.0)
-    world.step(steps=100)
-    np.testing.assert_allclose(world.linvel[0, :, 0], (0, 0, 3), atol=3e-6)
-
-
-@pytest.mark.parametrize(("ratio", "collisions"), [(1, 3), (100, 31)])
-def test_collisions_of_two_masses_and_a_wall(ratio, collisions):
-    """Galperin, *Playing pool with π*, 2003: floor(π √ratio) of them, counting those with the wall."""
-    world = balls([(2, 0, 0), (6, 0, 0)], [(0, 0, 0), (-1, 0, 0)], [1.0, ratio], 1.0, [physics.HalfSpace((1, 0, 0))])
-    seen, before = 0, world.linvel[0, :, 0].copy()
-    for _ in range(12_000):
-        world.step(dt=1e-3)  # shorter than the time between any two collisions
-        seen += not np.array_equal(world.linvel[0, :, 0], before)
-        before = world.linvel[0, :, 0].copy()
-    assert seen == collisions
-    assert physics.diagnose(world).energy.sum() == pytest.approx(0.5 * ratio, rel=1e-10)
-
-
 @pytest.mark.parametrize("thin", [True, False])
 def test_a_bullet_does_not_pass_through_a_plate(thin):
     plate = physics.Block((0.01 if thin else 1.0, 4, 4), 1000.0)
@@ -174,6 +148,37 @@ def test_free_bodies_keep_their_momenta_and_gain_no_energy(seed, restitution):
     assert np.abs(spin - angular).max() <= 0.1 * size
 
 
+def test_a_ball_among_others_rolls_as_it_does_alone():
+    """The point of contact of a ball does not turn with it: it lost the wall when it turned far in a step."""
+    v, mu = 7.0, 0.3
+    bodies = [physics.Sphere(0.1, 1.0, pos=(0, 0.1, 0), linvel=(v, 0, 0)), physics.Sphere(0.1, 1.0, pos=(0, 0.1, 5))]
+    effects = [physics.Gravity((0, -G, 0)), physics.Contact(), physics.Friction(mu)]
+    world = physics.World(physics.Scene(bodies, FLOOR, effects), dt=0.01)
+    world.step(steps=200)
+    # It slides until 2 v/(7 μ g) = 0.68 s, and rolls on at 5 v/7, turning by 0.5 rad a step. Solved to 1e-6 each step.
+    assert world.linvel[0, 0, 0] == pytest.approx(5 * v / 7, rel=200 * 1e-6)
+    assert world.angvel[0, 0, 2] == pytest.approx(-50 * v / 7, rel=200 * 1e-6)
+    assert abs(world.pos[0, 0, 1] - 0.1) <= 1e-6 * 0.1  # the slop
+
+
+@pytest.mark.parametrize("count", [1, 2])
+def test_a_block_that_turns_by_radians_in_a_step_gains_no_energy(count):
+    """Once up to ten thousand times its energy: what was asked of a vertex in contact was h ω² r/2, far above ω r."""
+    bodies = [
+        physics.Block((0.2, 0.3, 1.0), 1.0, pos=(3 * k, 1, 0), linvel=(0, -20, 0), angvel=(300, 500, 200))
+        for k in range(count)
+    ]
+    effects = [physics.Gravity((0, -G, 0)), physics.Contact(0.0), physics.Friction(0.0)]
+    world = physics.World(physics.Scene(bodies, FLOOR, effects), dt=0.01)
+    energy = physics.diagnose(world).energy.sum()
+    for _ in range(100):
+        report = world.step()
+        now = physics.diagnose(world).energy.sum()
+        # Nine problems a step, each off by 4 tolerances of the energy; and pushed out of the floor by some slops.
+        assert now <= energy + 36e-6 * abs(energy) + count * G * 2 * max(1e-6, report.penetration[0])
+        energy = now
+
+
 # --- rest ------------------------------------------------------------------------------------------------------
 
 
@@ -212,15 +217,6 @@ def test_a_tower_stands_and_every_body_is_in_balance(count, top, accuracy):
     assert cone <= tolerance
 
 
-def test_a_tower_with_offsets_stands():
-    world = physics.World(tower(15, offset=0.01), dt=0.01)
-    start = world.pos.copy()
-    world.step(steps=500)
-    assert world.report.ok
-    assert np.abs(world.pos - start).max() <= 1e-5
-    assert balance(world)[0] <= 1e-4 * G
-
-
 def test_a_heavy_block_does_not_sink_into_a_light_one():
     world = physics.World(tower(2, 1e6), dt=0.01)
     for _ in range(200):
@@ -243,16 +239,6 @@ def test_a_block_slides_on_another_until_friction_stops_it():
     assert distance == pytest.approx(9 / (2 * 0.3 * G), abs=0.3 * G * 0.005**2 + 1e-6)
     assert abs(world.pos[0, 0, 0]) <= 1e-9
     assert not np.any(np.abs(world.linvel) > 1e-6)
-
-
-def test_an_overhang_topples_beyond_its_limit_only():
-    # Two blocks, the upper shifted by s: it stands while its centre is above the lower one, s < 1/2.
-    for shift, stands in ((0.49, True), (0.51, False)):
-        bodies = [physics.Block(CUBE, 1.0, pos=(0, 0.5, 0)), physics.Block(CUBE, 1.0, pos=(shift, 1.5, 0))]
-        effects = [physics.Gravity((0, -G, 0)), physics.Contact(), physics.Friction(0.5)]
-        world = physics.World(physics.Scene(bodies, FLOOR, effects), dt=0.005)
-        world.step(steps=400)
-        assert (world.pos[0, 1, 1] > 1.499) == stands
 
 
 def test_overlapping_bodies_come_apart_without_speed():

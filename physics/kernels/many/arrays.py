@@ -89,6 +89,7 @@ class Many(NamedTuple):
     row: np.ndarray  # Jacobian rows of both ends of a contact, and what the bodies answer
     reply: np.ndarray
     at_end: np.ndarray  # bodies of a contact
+    momenta: np.ndarray  # of `restraint`: velocity and angular momentum before an impact, then with all of its rebound
     settings: np.ndarray  # one record: see `workspace.setting_fields`
 
 
@@ -134,5 +135,6 @@ def make_many(
         lower=np.zeros((blocks, 6, 6)), upper=np.zeros((blocks, 6, 6)), spare=np.zeros((6, 12)), aim=np.zeros((n, 3)),
         trial=np.zeros((n, 3)), saved=np.zeros((n, 3)), defect=np.zeros((nb, 6)), before=np.zeros((nb, 6)),
         change=np.zeros((nb, 6)), row=np.zeros((2, 3, 6)), reply=np.zeros((2, 3, 6)), at_end=np.zeros(2, i),
+        momenta=np.zeros((nb, 12)),
         settings=record,
     )  # fmt: skip

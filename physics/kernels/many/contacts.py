@@ -6,6 +6,7 @@ import math
 
 from physics.kernels import quaternion as qt
 from physics.kernels.compiler import inlined, kernel
+from physics.kernels.layout import SPHERE
 from physics.kernels.many.arrays import CONTACTS, LEFT_OUT
 
 # Contact features that two bodies, or a body and a wall, can have: what a contact's name is made with.
@@ -172,6 +173,18 @@ def record(a, b, feature, owner, normal, point_a, point_b, gap, h, many):
     return True
 
 
+@inlined
+def _carried(b, k, first, side, n, many):
+    """Point of body b in contact k from its centre of mass, world frame [m]: carried along as the body turns.
+
+    That of a sphere stays where it is along the normal: turning brings another point there.
+    """
+    if many.bodies[b].shape == SPHERE:
+        r = side * many.bodies[b].dims[0]
+        return (r * n[0], r * n[1], r * n[2])
+    return qt.matvec(matrix(many.rotation, b), vector(many.anchor, k, first))
+
+
 @kernel
 def refresh(many):
     """Arms, frames and gaps of the contact set where the bodies are now, their points and normals carried along.
@@ -180,16 +193,16 @@ def refresh(many):
     """
     for k in range(many.counts[CONTACTS]):
         a, b, owner = many.ends[k, 0], many.ends[k, 1], many.owner[k]
-        arm = qt.matvec(matrix(many.rotation, a), vector(many.anchor, k, 0))
-        put(many.arm, k, 0, arm)
         n = vector(many.normal, k, 0)
         if owner >= 0:
             n = qt.matvec(matrix(many.rotation, owner), n)
             put_frame(k, n, many)
+        arm = _carried(a, k, 0, -1.0, n, many)
+        put(many.arm, k, 0, arm)
         point = plus(arm, 1.0, vector(many.now, a, 0))
         if b < 0:
             many.gap[k] = qt.dot(n, point) - many.walls[-1 - b, 9]
         else:
-            arm = qt.matvec(matrix(many.rotation, b), vector(many.anchor, k, 3))
+            arm = _carried(b, k, 3, 1.0, n, many)
             put(many.arm, k, 3, arm)
             many.gap[k] = qt.dot(n, minus(point, plus(arm, 1.0, vector(many.now, b, 0))))

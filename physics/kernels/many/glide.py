@@ -9,8 +9,19 @@ from physics.kernels.compiler import inlined, kernel
 from physics.kernels.contact import CLOSING_SHARE, UNSEEN, gainless
 from physics.kernels.fields.loads import hold_contact_loads, hold_loads
 from physics.kernels.flight import drift
+from physics.kernels.layout import SPHERE
 from physics.kernels.many import memory as kept
-from physics.kernels.many.contacts import acceleration_of, matrix, minus, pair_slop, plus, put, refresh, vector
+from physics.kernels.many.contacts import (
+    acceleration_of,
+    local_velocity,
+    matrix,
+    minus,
+    pair_slop,
+    plus,
+    put,
+    refresh,
+    vector,
+)
 from physics.kernels.many.place import place_body
 from physics.kernels.many.settle import settle
 from physics.kernels.step import coast
@@ -31,7 +42,9 @@ def drift_body(b, h, gyroscopic, tilted, many):
 
 @inlined
 def _centripetal(b, k, first, many):
-    """ω x (ω x r) of one end of contact k, world frame [m/s²]."""
+    """ω x (ω x r) of one end of contact k, world frame [m/s²]; 0 of a sphere, whose point of contact does not turn."""
+    if many.bodies[b].shape == SPHERE:
+        return (0.0, 0.0, 0.0)
     w = vector(many.twist, b, 3)
     return qt.cross(w, qt.cross(w, vector(many.arm, k, first)))
 
@@ -50,9 +63,7 @@ def aim_rest(n, h, many):
         if b >= 0:
             c = minus(c, _centripetal(b, k, 3, many))
         t = qt.matvec(matrix(many.frame, k), (-half * c[0], -half * c[1], -half * c[2]))
-        if t[0] > 0.0:
-            share = gainless(t[0], many.speed[k]) / t[0]
-            t = (share * t[0], share * t[1], share * t[2])
+        t = gainless(t, local_velocity(k, many))
         if many.gap[k] > slop:
             t = (t[0] - many.gap[k] / half, t[1], t[2])
         elif many.gap[k] > 0.0:
@@ -84,6 +95,8 @@ def glide(n, world, h, friction, gyroscopic, tilted, scheme, memory, report, man
             continue
         drift_body(b, half, gyroscopic, tilted, many)
         place_body(b, tilted, many)
+        _, q, _, L = read_state(many.now, b)
+        put(many.twist, b, 3, angular_velocity(q, L, many.bodies[b], tilted))
     if n == 0:
         kept.forget(world, memory)
         return

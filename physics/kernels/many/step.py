@@ -65,11 +65,12 @@ def substep_world(world, h, friction, gyroscopic, tilted, scheme, memory, report
         note_depth(n, world, report, many)
         n, t, is_impact = strike(n, world, left, is_last, friction, tilted, report, many)
         many.counts[CONTACTS] = n
+        if is_impact and not is_last:
+            impacts += 1
+            continue  # what may be met in the time left is another set now
         mark_touched(n, many)
         if is_last:
             report[world, at.UNRESOLVED] += 1.0
-        if is_impact:
-            impacts += 1
         if t < left:
             report[world, at.SPLITS] += 1.0
         glide(n, world, t, friction, gyroscopic, tilted, scheme, memory, report, many)

@@ -8,7 +8,7 @@ from physics.kernels import quaternion as qt
 from physics.kernels.compiler import inlined, kernel
 from physics.kernels.many import memory as kept
 from physics.kernels.many.contacts import acceleration_of, pair_slop, put, vector
-from physics.kernels.many.settle import settle
+from physics.kernels.many.restraint import settle_restrained
 
 # A meeting is fast where it would close this share of the smaller body's radius in the time left: it is then met in
 # time, not stopped in front of.
@@ -91,7 +91,7 @@ def strike(n, world, h, is_last, friction, tilted, report, many):
     n = leave_out_the_free(n, many)
     if not is_impact:
         return n, meeting, False
-    settle(n, world, friction, report, many)
+    settle_restrained(n, world, friction, tilted, report, many)
     return n, meeting, True
 
 

@@ -1,0 +1,115 @@
+"""Look for failures as long as one likes: ``python -m benchmarks.soak --minutes 5 --seed 0 --keep DIR [--env ID]``.
+
+Without ``--env``: random scenes, parameters, states and wrenches (`rigid_env.hard_cases.random_scenes`), held against
+its laws. With it: an agent that pushes with all its strength, at random and for long into the walls, at every accuracy;
+states stay finite and inside, rewards and successes are computed anew from the states. Each failure is kept, shrunk, as
+a recording for ``rigid-env replay``. Ctrl-C ends it early; what was found is written all the same.
+"""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+from typing import Annotated
+
+import numpy as np
+import typer
+from rich.console import Console
+from rich.progress import Progress
+
+import physics
+from benchmarks import machine, soak_env
+from benchmarks.shrink import shrink
+from rigid_env.hard_cases import random_scenes
+from rigid_env.measure.machine import write_json
+
+BATCH = 200
+RECORDED = 40  # steps: a whole run of `random_scenes.drive`
+KEPT_PER_LAW = 5  # recordings of each family and kind of failure
+
+
+def soak_scenes(seconds: float, seed: int, accuracy: str, keep: Path | None, tick) -> dict:
+    """Random scenes for so many seconds: what was run, and what was found."""
+    rng, found = np.random.default_rng(seed), {}
+    worlds = {
+        family: physics.World(random_scenes.scene_of(family), worlds=BATCH, accuracy=accuracy)
+        for family in random_scenes.BODIES
+    }
+    for family, world in worlds.items():
+        world.step(dt=1e-9)  # compiles
+        found[family] = {"worlds": 0, "steps": 0, "failures": {}, "largest_gain": 0.0}
+    deadline = time.monotonic() + seconds
+    try:
+        while time.monotonic() < deadline:
+            for family, world in worlds.items():
+                _soak_batch(family, world, rng, found[family], keep)
+                tick(", ".join(f"{name} {one['worlds']}: {_failures(one)}" for name, one in found.items()))
+    except KeyboardInterrupt:
+        pass
+    return found
+
+
+def _failures(found: dict) -> str:
+    count = sum(found["failures"].values())
+    return f"{count} failures" if count else "no failure"
+
+
+def _soak_batch(family: str, world: physics.World, rng, found: dict, keep: Path | None) -> None:
+    recorder = physics.Recorder(world, keep=RECORDED)
+
+    def told(index: int, law: str) -> None:
+        kind = law.split()[0]
+        found["failures"][kind] = found["failures"].get(kind, 0) + 1
+        if keep is None or found["failures"][kind] > KEPT_PER_LAW:
+            return
+        keep.mkdir(parents=True, exist_ok=True)
+        small = shrink(recorder.recording(index, f"{family}: {law}"))
+        number = found["failures"][kind]
+        small.save(keep / f"{family}-{kind}-{world.accuracy.scheme}-{number}.npz")
+
+    outcome = random_scenes.drive(world, rng, told)
+    recorder.stop()
+    found["worlds"] += world.worlds
+    found["steps"] += world.worlds * (2 * random_scenes.PUSHED + random_scenes.FREE)
+    found["largest_gain"] = max(found["largest_gain"], float(outcome.gain.max()))
+
+
+def main(
+    minutes: Annotated[float, typer.Option(min=0.0, help="How long.")] = 5.0,
+    seed: Annotated[int, typer.Option(min=0)] = 0,
+    keep: Annotated[Path | None, typer.Option(metavar="DIR", help="Where recordings of failures go.")] = None,
+    env: Annotated[list[str] | None, typer.Option(metavar="ID", help="Environments instead of scenes.")] = None,
+    accuracy: Annotated[
+        list[str] | None, typer.Option(help="Presets; none: balanced for scenes, all for --env.")
+    ] = None,
+    json: Annotated[Path | None, typer.Option(metavar="FILE", help="Instead of benchmarks/results/soak.json.")] = None,
+) -> None:
+    """Run random scenes, or environments, and report what breaks a law."""
+    console = Console()
+    presets = accuracy or (list(physics.PRESETS) if env else ["balanced"])
+    for name in presets:
+        physics.accuracy.resolve(name)
+    jobs = [(preset, name) for preset in presets for name in env or [None]]
+    found: dict = {}
+    console.print(machine.headline())
+    with Progress(console=console, transient=True) as progress:
+        task = progress.add_task("soaking", total=len(jobs))
+        for preset, name in jobs:
+            seconds = 60.0 * minutes / len(jobs)
+
+            def tick(what: str, preset=preset) -> None:
+                progress.update(task, description=f"{preset}: {what}")
+
+            if name is None:
+                found[preset] = soak_scenes(seconds, seed, preset, keep, tick)
+            else:
+                found[f"{name} {preset}"] = soak_env.soak(name, preset, seconds, seed, keep, tick)
+            progress.advance(task)
+    path = json or machine.RESULTS / ("soak_env.json" if env else "soak.json")
+    write_json(path, {"seed": seed, "minutes": minutes, "found": found})
+    console.print_json(data=found)
+    console.print(f"written to {path}")
+
+
+if __name__ == "__main__":
+    typer.run(main)

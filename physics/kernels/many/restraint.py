@@ -1,0 +1,96 @@
+"""Impacts among bodies that would gain energy by friction and restitution; see `physics.kernels.restraint`."""
+
+from __future__ import annotations
+
+from physics.kernels import layout as at
+from physics.kernels import quaternion as qt
+from physics.kernels.body import angular_velocity, read_state
+from physics.kernels.compiler import inlined, kernel
+from physics.kernels.many.contacts import pair_slop, plus, put, vector
+from physics.kernels.many.settle import settle
+from physics.kernels.restraint import ROUNDING, rebound_share
+
+BEFORE, FULL = 0, 6
+
+
+@inlined
+def _keep(first, many):
+    """Copy the momenta of all bodies to `many.momenta`."""
+    for b in range(many.now.shape[0]):
+        put(many.momenta, b, first, vector(many.now, b, at.LINVEL))
+        put(many.momenta, b, first + 3, vector(many.now, b, at.ANGMOM))
+
+
+@inlined
+def _turn(tilted, many):
+    """Twists of all bodies from their momenta."""
+    for b in range(many.now.shape[0]):
+        _, q, v, L = read_state(many.now, b)
+        put(many.twist, b, 0, v)
+        put(many.twist, b, 3, angular_velocity(q, L, many.bodies[b], tilted))
+
+
+@kernel
+def kinetic_energy(tilted, many):
+    """Of all bodies of the world [J]; their twists are made anew."""
+    _turn(tilted, many)
+    total = 0.0
+    for b in range(many.now.shape[0]):
+        v, L = vector(many.now, b, at.LINVEL), vector(many.now, b, at.ANGMOM)
+        total += 0.5 * (qt.dot(v, v) / many.lightness[b] + qt.dot(L, vector(many.twist, b, 3)))
+    return total
+
+
+@inlined
+def _mix(s, many):
+    """Move the momenta of all bodies by the share s towards those with all of the rebound."""
+    for b in range(many.now.shape[0]):
+        v, L = vector(many.now, b, at.LINVEL), vector(many.now, b, at.ANGMOM)
+        v1, L1 = vector(many.momenta, b, FULL), vector(many.momenta, b, FULL + 3)
+        put(many.now, b, at.LINVEL, plus(plus(v, -s, v), s, v1))
+        put(many.now, b, at.ANGMOM, plus(plus(L, -s, L), s, L1))
+
+
+@inlined
+def _aim_plastic(n, many):
+    """Targets of what touches without rebound, and momenta as before the impact."""
+    for k in range(n):
+        put(many.impulse, k, 0, (0.0, 0.0, 0.0))
+        if not many.gap[k] > pair_slop(many.ends[k, 0], many.ends[k, 1], many):
+            many.target[k, 0] = 0.0
+    for b in range(many.now.shape[0]):
+        put(many.now, b, at.LINVEL, vector(many.momenta, b, BEFORE))
+        put(many.now, b, at.ANGMOM, vector(many.momenta, b, BEFORE + 3))
+
+
+@inlined
+def _has_rebound(n, many):
+    """Whether any contact that touches is to leave with a speed."""
+    for k in range(n):
+        if many.target[k, 0] != 0.0 and not many.gap[k] > pair_slop(many.ends[k, 0], many.ends[k, 1], many):
+            return True
+    return False
+
+
+@kernel
+def settle_restrained(n, world, friction, tilted, report, many):
+    """`settle` the n contacts of an impact; with friction, with as much of the rebound as there is energy for."""
+    if friction is None or not _has_rebound(n, many):
+        settle(n, world, friction, report, many)
+        return
+    _keep(BEFORE, many)
+    before = kinetic_energy(tilted, many)
+    settle(n, world, friction, report, many)
+    full = kinetic_energy(tilted, many)
+    if not full > before + ROUNDING * before:
+        return
+    _keep(FULL, many)
+    _aim_plastic(n, many)
+    _turn(tilted, many)
+    settle(n, world, friction, report, many)
+    plastic = kinetic_energy(tilted, many)
+    _mix(0.5, many)
+    middle = kinetic_energy(tilted, many)
+    s = rebound_share(before, plastic, full, middle)
+    _mix(2.0 * s - 1.0, many)  # from the middle
+    _turn(tilted, many)

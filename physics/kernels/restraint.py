@@ -1,0 +1,54 @@
+"""Impacts with friction and restitution that would gain energy: as much of the rebound as there is energy for.
+
+Newton's restitution is a law of normal velocities before and after; where friction turns the slip round meanwhile, it
+can ask for more than the body has (Kane's paradox). A plastic impact never does: with u⁺ = u⁻ + W p, p·u⁺ <= 0,
+
+    ΔE = ½ p·(u⁻ + u⁺) = ½ (2 p·u⁺ - p·W p) <= 0.
+
+The momenta between it (s = 0) and the full rebound (s = 1) are those of impulses in the same cones, which are convex,
+and leave no contact approaching. The energy is a parabola in s; the largest s at which it is what it was before is
+taken.
+
+References
+----------
+.. [1] T. R. Kane, D. A. Levinson, *Dynamics: Theory and Applications*, 1985 (the paradox).
+"""
+
+from __future__ import annotations
+
+import math
+
+from physics.kernels import quaternion as qt
+from physics.kernels.body import angular_velocity
+from physics.kernels.compiler import inlined
+
+# Share of the energy by which rounding of an impact may raise it: of the dozen products and sums behind a momentum.
+ROUNDING = 1.0e-14
+
+
+@inlined
+def kinetic_energy(q, v, L, work, tilted):
+    """Of one body [J]."""
+    return 0.5 * (work.mass * qt.dot(v, v) + qt.dot(L, angular_velocity(q, L, work, tilted)))
+
+
+@inlined
+def rebound_share(before, plastic, full, middle):
+    """Largest s in [0, 1] at which the energy is no more than `before`.
+
+    `plastic`, `middle` and `full` are the energies at s = 0, 1/2 and 1 [J]: f(s) = plastic + B s + C s² with
+    C = 2 (full + plastic) - 4 middle >= 0 and f(1) > before >= f(0). The root in the form that does not cancel.
+    """
+    c = min(plastic - before, 0.0)
+    C = max(2.0 * (full + plastic) - 4.0 * middle, 0.0)
+    B = full - plastic - C
+    below = B + math.sqrt(max(B * B - 4.0 * C * c, 0.0))
+    if not below > 0.0:
+        return 0.0
+    return min(-2.0 * c / below, 1.0)
+
+
+@inlined
+def between(a, b, s):
+    """a + s (b - a) of vectors."""
+    return (a[0] + s * (b[0] - a[0]), a[1] + s * (b[1] - a[1]), a[2] + s * (b[2] - a[2]))
