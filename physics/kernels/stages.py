@@ -94,9 +94,9 @@ def impact(n, y, h, friction, smooth, tilted, pivots, report, work):
     work.mode = SLIDE
     v1, L1, residual, sweeps, method = solve_contacts(n, friction, smooth, pivots, v, L, R, work)
     note_solve(report, work.world, residual, sweeps, method, work.tolerance)
-    if friction is not None:
+    if friction is not None and work.restitution > 0.0:
         before, full = kinetic_energy(q, v, L, work, tilted), kinetic_energy(q, v1, L1, work, tilted)
-        if work.restitution > 0.0 and full > before + ROUNDING * before:
+        if full > before + ROUNDING * before:
             aim_plastic(n, work)
             v0, L0, residual, sweeps, method = solve_contacts(n, friction, smooth, pivots, v, L, R, work)
             note_solve(report, work.world, residual, sweeps, method, work.tolerance)

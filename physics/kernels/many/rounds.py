@@ -3,8 +3,8 @@
 With support functions s(n) of the two bodies about their centres (both symmetric) and d from the centre of b to that
 of a, the bodies are apart along the unit vector n by σ(n) = n·d - s_a(n) - s_b(n). The largest σ is their distance or,
 negative, what moves them apart by the least way. Its gradient is the vector from the point of b to that of a with
-normal n: it must be along n. For an ellipsoid s = √(nᵀDn), D = R diag(a²) Rᵀ, with the point Dn/s and the second derivative
-(D - p pᵀ)/s, p that point; so that on the sphere of directions one step is
+normal n: it must be along n. For an ellipsoid s = √(nᵀDn), D = R diag(a²) Rᵀ, with the point Dn/s and the second
+derivative (D - p pᵀ)/s, p that point; so that on the sphere of directions one step is
 
     (H_a + H_b + σ) δ = g - (g·n) n,        δ ⟂ n, for H n = 0.
 
