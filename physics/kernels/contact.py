@@ -129,8 +129,31 @@ def _record(count, wall, feature, features, gap, speed, work):
 
 
 @kernel
+def has_passed(x, R, tilted, work):
+    """Whether a feature that is not in the contact set (`work.mask`) is more than half a slop behind a wall."""
+    walls, shape, least = work.walls, work.shape, -0.5 * work.slop
+    dims = (work.dims[0], work.dims[1], work.dims[2])
+    center = geometric_center(x, R, work, tilted)
+    for k in range(walls.shape[0]):
+        n = wall_normal(walls, k)
+        d = qt.dot(n, center) - walls[k, OFFSET]
+        if d > work.radius:
+            continue
+        e, mask = geo.scaled_normal(shape, dims, R, n), work.mask[k]
+        if d - geo.support(shape, dims, e) >= least:
+            continue
+        if mask == 0:
+            return True
+        if shape == BLOCK:
+            for vertex in range(VERTEX_COUNT):
+                if not mask & (1 << vertex) and d + geo.vertex_height(e, vertex) < least:
+                    return True
+    return False
+
+
+@kernel
 def nearest_outside_set(x, R, tilted, work):
-    """Smallest gap [m] over all features that are not in the contact set (`work.mask`), and the slot of its feature.
+    """Smallest gap [m] over all features that are not in the contact set, and the slot of its feature.
 
     Of a wall that the bounding sphere does not reach the sphere's gap is taken: a lower bound, and positive (slot -1).
     """
@@ -230,6 +253,13 @@ def _in_frame(k, a, walls):
     )
 
 
+@kernel
+def _wandering(k, R, w, tilted, work):
+    """`arm_and_rate` of a body without vertices at wall k: apart, so that blocks do not carry it along."""
+    dims = (work.dims[0], work.dims[1], work.dims[2])
+    return arm_and_rate(work.shape, dims, R, w, wall_normal(work.walls, k), 0, tilted, work)
+
+
 @inlined
 def aim_rest(n, v, w, alpha, R, h, tilted, work):
     """Targets of the resting stage over h; R is the attitude at its middle, v and w are the velocities there before it.
@@ -243,7 +273,6 @@ def aim_rest(n, v, w, alpha, R, h, tilted, work):
     """
     walls, features, shape = work.walls, work.features, work.shape
     half = 0.5 * h
-    dims = (work.dims[0], work.dims[1], work.dims[2])
     is_turning = (w[0] != 0.0 or w[1] != 0.0 or w[2] != 0.0) and shape != SPHERE
     negligible = max(work.tolerance * work.acceleration * h, UNSEEN * work.slop / h)
     share = 1.0 if work.is_last else CLOSING_SHARE
@@ -254,7 +283,7 @@ def aim_rest(n, v, w, alpha, R, h, tilted, work):
             k = work.slot[i] // features
             rate = qt.cross(w, r)
             if shape != BLOCK:
-                r, rate = arm_and_rate(shape, dims, R, w, wall_normal(walls, k), 0, tilted, work)
+                r, rate = _wandering(k, R, w, tilted, work)
             a, b = qt.cross(w, rate), qt.cross(alpha, r)
             c = (a[0] + b[0], a[1] + b[1], a[2] + b[2])
             c = (-half * c[0], -half * c[1], -half * c[2])

@@ -11,7 +11,7 @@ from physics.kernels.contact import aim_impact, aim_rest
 from physics.kernels.flight import drift
 from physics.kernels.restraint import ROUNDING, between, kinetic_energy, rebound_share
 from physics.kernels.slide import SLIDE
-from physics.kernels.slip import has_turned_round, oppose_mean_slip
+from physics.kernels.slip import has_turned_round, oppose_end_slip, oppose_mean_slip
 from physics.kernels.solve import PIVOTING, solve_contacts
 
 # Row of `memory`: length of the last resting stage [s], its contact count, which direct solve worked last
@@ -120,9 +120,11 @@ def touch(n, y, h, friction, smooth, gyroscopic, tilted, pivots, memory, report,
     R = middle
     if tilted is not None:
         R = qt.to_matrix(principal_attitude(q, work, tilted))
-    w, alpha = turning(R, L, work.J), (0.0, 0.0, 0.0)
-    if gyroscopic is not None:
-        alpha = turning(R, qt.cross(L, w), work.J)
+    w, alpha = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
+    if L[0] != 0.0 or L[1] != 0.0 or L[2] != 0.0:
+        w = turning(R, L, work.J)
+        if gyroscopic is not None:
+            alpha = turning(R, qt.cross(L, w), work.J)
     aim_rest(n, v, w, alpha, middle, h, tilted, work)
     opposes_mean = False
     if friction is not None and n <= work.mean_slip:
@@ -136,7 +138,7 @@ def touch(n, y, h, friction, smooth, gyroscopic, tilted, pivots, memory, report,
     work.mode = int(memory[work.i, MODE])
     v1, L1, residual, sweeps, method = solve_contacts(n, friction, smooth, pivots, v, L, R, work)
     if opposes_mean and has_turned_round(n, v1, turning(R, L1, work.J), work):
-        aim_rest(n, y[2], w, alpha, middle, h, tilted, work)
+        oppose_end_slip(n, work)
         v1, L1, residual, sweeps, method = solve_contacts(n, friction, smooth, pivots, v, L, R, work)
     memory[work.i, MODE] = work.mode
     note_solve(report, work.world, residual, sweeps, method, work.tolerance)

@@ -21,7 +21,7 @@ import math
 from physics.kernels import layout as at
 from physics.kernels.body import angular_velocity, bind_body, is_finite, read_state, write_state
 from physics.kernels.compiler import inlined, kernel
-from physics.kernels.contact import gap_of, gather, is_clear, nearest_outside_set, push_out
+from physics.kernels.contact import gap_of, gather, has_passed, is_clear, nearest_outside_set, push_out
 from physics.kernels.fields.loads import (
     bind_fields,
     hold_contact_loads,
@@ -126,11 +126,11 @@ def to_next_impact(n, y, h, friction, smooth, gyroscopic, tilted, pivots, scheme
     end = low_end = y
     for trial in range(IMPACT_TRIALS + 1):
         end = advance(n, y, t, friction, smooth, gyroscopic, tilted, pivots, scheme, memory, report, work)
-        if has_same_pose(end, y) or work.is_last:
+        if has_same_pose(end, y) or work.is_last or trial == IMPACT_TRIALS:
+            break
+        if trial == 0 and not has_passed(end[0], to_matrix(end[1]), tilted, work):
             break
         gap, nearest = outside_gap(end, tilted, work)
-        if trial == IMPACT_TRIALS or (trial == 0 and gap >= -0.5 * work.slop):
-            break
         if nearest != slot and gap < -0.5 * work.slop:
             slot, high, high_gap, bend = nearest, t, gap, 0.0
             low_gap = max(gap_of(slot, low_end[0], to_matrix(low_end[1]), tilted, work), 0.0)

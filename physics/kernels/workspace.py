@@ -16,6 +16,7 @@ from physics.kernels.layout import WALL_SIZE
 from physics.kernels.patch import PATCH_SIZE
 from physics.kernels.pyramid import normal_sizes, pyramid_sizes
 from physics.kernels.rotation import SERIES_SIZE
+from physics.kernels.slip import FEW
 
 
 def setting_fields() -> list[tuple]:
@@ -75,6 +76,7 @@ def workspace_dtype(wall_count: int, features: int, terms: tuple[Term, ...] = ()
         ("speed", f, (n,)),  # normal velocity before the stage [m/s], negative when approaching
         ("arm", f, (n, 3)),  # contact point relative to the centre of mass, world frame [m]
         ("target", f, (n, 3)),  # contact velocity aimed at (normal, tangents) [m/s]
+        ("held", f, (FEW, 2)),  # tangents for which contacts hold, where `target` has others (`slip`)
         ("friction", f, (n,)),  # Coulomb coefficient
         ("frame", f, (3 * n, 3)),  # directions normal, tangent 1, tangent 2 of each contact
         ("angular", f, (3 * n, 3)),  # angular Jacobian rows arm x direction [m]
