@@ -76,6 +76,16 @@ def gravest(table, status):
             status[world] = _UNRESOLVED
 
 
+_LARGEST = [at.PENETRATION, at.RESIDUAL, at.SOLVER]
+
+
+def add_report(total: np.ndarray, table: np.ndarray) -> None:
+    """Add a report `table` (worlds, REPORT_SIZE) to that of steps before: counts add up, of the rest the largest."""
+    largest = np.maximum(total[:, _LARGEST], table[:, _LARGEST])
+    total += table
+    total[:, _LARGEST] = largest
+
+
 class StepReport:
     """Report of one `World.step`; every property is an array over worlds.
 

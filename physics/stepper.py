@@ -15,6 +15,7 @@ import numpy as np
 
 from physics import checks
 from physics.kernels.events.hybrid import step_events
+from physics.kernels.linked import step_linked
 from physics.kernels.many.step import step_many
 from physics.kernels.step import step_worlds
 
@@ -66,7 +67,7 @@ class Stepper:
         """Advance every world by `steps` times `dt`."""
         if self._calls is None:
             self._calls = kernel_calls(self.world, self._wrench, self.steps, self.dt)
-        self.world.advance(self._calls, self.steps * self.dt)
+        self.world.advance(self._calls, self._wrench, self.steps, self.dt)
 
     def __getstate__(self):
         return {**vars(self), "_calls": None}  # machine code belongs to the process
@@ -80,12 +81,16 @@ def kernel_calls(world: World, wrench: np.ndarray, steps: int, dt: float) -> lis
     world : World
         Its arrays are bound, not the world itself: it may keep the calls, and is freed with its last user.
     wrench : (worlds, bodies, 6) float64, contiguous and writable
-        What it holds when a call is made counts.
+        What it holds when a call is made counts; of a scene with an actuator what that makes of it.
     steps : int
+        Where an actuator remembers, a call takes one of them.
     dt : float
         [s].
     """
     plan, substeps = world.plan, world.accuracy.substeps
+    if world.actuation is not None:
+        wrench = world.actuation.applied
+        steps = 1 if world.actuation.actuator.remembers else steps
     kernel, own_arguments = _step_of(plan)
     argument_lists = [
         (
@@ -102,6 +107,8 @@ def _step_of(plan: Plan) -> tuple[Callable, Callable[[World, int], tuple]]:
     """The step kernel of a plan, and what gives the arguments that it alone has for one slice of the batch."""
     if plan.many:
         return step_many, _many_arguments
+    if plan.linked:
+        return step_linked, _linked_arguments
     if plan.events:
         return step_events, _event_arguments
     return step_worlds, _world_arguments
@@ -111,6 +118,11 @@ def _many_arguments(world: World, k: int) -> tuple:
     plan = world.plan
     switches = (plan.friction, plan.restitution, plan.gyroscopic, plan.tilted, plan.scheme)
     return *switches, world.memory, world.report_table, world.scratch[k]
+
+
+def _linked_arguments(world: World, k: int) -> tuple:
+    plan = world.plan
+    return plan.gyroscopic, plan.tilted, plan.scheme, world.report_table, world.scratch[k]
 
 
 def _wall_switches(plan: Plan) -> tuple:

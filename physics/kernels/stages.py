@@ -8,6 +8,7 @@ from physics.kernels.body import angular_velocity, principal_attitude
 from physics.kernels.compiler import inlined, kernel
 from physics.kernels.contact import aim_impact, aim_rest, place_arms
 from physics.kernels.flight import drift
+from physics.kernels.resist import aim_tangential, resist_turning
 from physics.kernels.slide import SLIDE
 from physics.kernels.solve import PIVOTING, solve_contacts
 
@@ -76,11 +77,13 @@ def impact(n, y, h, friction, smooth, tilted, pivots, report, work):
     if not aim_impact(n, bounce_speed, work.slop / h, 1.0 / h, work):
         return y
     place_arms(n, qt.to_matrix(q), tilted, work)
+    aim_tangential(n, bounce_speed, y, tilted, work)
     for k in range(3 * n):
         work.impulse[k] = 0.0
     R = qt.to_matrix(principal_attitude(q, work, tilted))
     work.mode = SLIDE
-    v, L, residual, sweeps, method = solve_contacts(n, friction, smooth, pivots, v, L, R, work)
+    solved = solve_contacts(n, friction, smooth, pivots, v, L, R, work)
+    v, L, residual, sweeps, method = resist_turning(n, friction, smooth, pivots, v, L, solved, R, work)
     note_solve(report, work.world, residual, sweeps, method, work.tolerance)
     return x, q, v, L
 
@@ -104,7 +107,8 @@ def touch(n, y, h, friction, smooth, gyroscopic, tilted, pivots, memory, report,
     L = (L[0] + h * torque[0], L[1] + h * torque[1], L[2] + h * torque[2])
     R = qt.to_matrix(principal_attitude(q, work, tilted))
     work.mode = int(memory[work.i, MODE])
-    v, L, residual, sweeps, method = solve_contacts(n, friction, smooth, pivots, v, L, R, work)
+    solved = solve_contacts(n, friction, smooth, pivots, v, L, R, work)
+    v, L, residual, sweeps, method = resist_turning(n, friction, smooth, pivots, v, L, solved, R, work)
     memory[work.i, MODE] = work.mode
     note_solve(report, work.world, residual, sweeps, method, work.tolerance)
     store_warm_start(n, width, memory, work.i, h, work)
