@@ -42,6 +42,9 @@ TRIALS = 5
 # A body stands still when the torque's power is this share of what it was without it: some roundings.
 STILL = 1.0e-13
 
+# Share by which rounding may let the energy of an impact grow.
+GAIN = 1.0e-12
+
 rolling_radius = number_of(ROLLING)
 spin_radius = number_of(SPIN)
 tangential_share = number_of(TANGENTIAL)
@@ -121,11 +124,7 @@ def _no_aim(n, bounce_speed, y, tilted, work):
 
 @if_law((TANGENTIAL,), _no_aim)
 def aim_tangential(n, bounce_speed, y, tilted, work):
-    """Targets along the wall of the one contact that bounces; several at once are left to friction alone.
-
-    Several contacts with coefficients of their own could gain energy, one of a sphere cannot: what it does along the
-    wall and across does not mix.
-    """
+    """Targets along the wall of the one contact that bounces; where several do, friction alone acts along them."""
     bouncing, found = 0, 0
     for i in range(n):
         if -work.speed[i] > bounce_speed:
@@ -139,3 +138,24 @@ def aim_tangential(n, bounce_speed, y, tilted, work):
     share, wall = tangential_share(work), work.slot[found] // work.features
     work.target[found, 1] = -share * qt.dot(wall_axis(work.walls, wall, TANGENT_1), u)
     work.target[found, 2] = -share * qt.dot(wall_axis(work.walls, wall, TANGENT_2), u)
+
+
+@inlined
+def _energy(v, L, R, work):
+    """Kinetic energy [J]."""
+    return 0.5 * (work.mass * qt.dot(v, v) + qt.dot(L, _turning(L, R, work)))
+
+
+@if_law((TANGENTIAL,), _as_solved)
+def without_gain(n, friction, smooth, pivots, v, L, solved, R, work):
+    """What `solve_contacts` gave for v and L, or, where that has gained energy, what it gives without `aim_tangential`.
+
+    A sphere's only contact cannot gain any: what it does along the wall and across does not mix. That of a sphere
+    which at the same time rests on another wall can, its coefficients there being others.
+    """
+    if n == 1 or not _energy(solved[0], solved[1], R, work) > (1.0 + GAIN) * _energy(v, L, R, work):
+        return solved
+    for i in range(n):
+        work.target[i, 1] = work.target[i, 2] = 0.0
+        work.impulse[3 * i] = work.impulse[3 * i + 1] = work.impulse[3 * i + 2] = 0.0
+    return solve_contacts(n, friction, smooth, pivots, v, L, R, work)

@@ -8,7 +8,7 @@ from physics.kernels.body import angular_velocity, principal_attitude
 from physics.kernels.compiler import inlined, kernel
 from physics.kernels.contact import aim_impact, aim_rest, place_arms
 from physics.kernels.flight import drift
-from physics.kernels.resist import aim_tangential, resist_turning
+from physics.kernels.resist import aim_tangential, resist_turning, without_gain
 from physics.kernels.slide import SLIDE
 from physics.kernels.solve import PIVOTING, solve_contacts
 
@@ -83,6 +83,7 @@ def impact(n, y, h, friction, smooth, tilted, pivots, report, work):
     R = qt.to_matrix(principal_attitude(q, work, tilted))
     work.mode = SLIDE
     solved = solve_contacts(n, friction, smooth, pivots, v, L, R, work)
+    solved = without_gain(n, friction, smooth, pivots, v, L, solved, R, work)
     v, L, residual, sweeps, method = resist_turning(n, friction, smooth, pivots, v, L, solved, R, work)
     note_solve(report, work.world, residual, sweeps, method, work.tolerance)
     return x, q, v, L
