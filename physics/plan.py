@@ -219,10 +219,11 @@ def _check_laws(scene: Scene, seen: _Seen, many: bool, scheme: int) -> None:
     """Refuse laws of contact where they are not known."""
     declared = {TANGENTIAL: "Contact.tangential", ROLLING: "RollingFriction", SPIN: "SpinFriction"}
     names = ", ".join(declared[law] for law in seen.laws)
-    if names and scheme == EVENTS:
+    torques = ", ".join(declared[law] for law in seen.laws if law != TANGENTIAL)
+    if torques and scheme == EVENTS:
         raise ValueError(
-            f"accuracy has the scheme 'events', which does not know {names}; allowed are 'fast', 'balanced' and every "
-            "time-stepping scheme"
+            f"accuracy has the scheme 'events', which does not know {torques}; allowed are 'fast', 'balanced' and "
+            "every time-stepping scheme"
         )
     if names and many:
         raise ValueError(

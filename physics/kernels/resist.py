@@ -118,8 +118,20 @@ def resist_turning(n, friction, smooth, pivots, v, L, solved, R, work):
     return solved
 
 
-def _no_aim(n, bounce_speed, y, tilted, work):
+def _no_aim(*arguments):
     return None
+
+
+@inlined
+def aim_at(k, y, tilted, work):
+    """Target along the wall of contact k, from the velocity of its point."""
+    _, q, v, L = y
+    w = angular_velocity(q, L, work, tilted)
+    u = qt.cross(w, (work.arm[k, 0], work.arm[k, 1], work.arm[k, 2]))
+    u = (u[0] + v[0], u[1] + v[1], u[2] + v[2])
+    share, wall = tangential_share(work), work.slot[k] // work.features
+    work.target[k, 1] = -share * qt.dot(wall_axis(work.walls, wall, TANGENT_1), u)
+    work.target[k, 2] = -share * qt.dot(wall_axis(work.walls, wall, TANGENT_2), u)
 
 
 @if_law((TANGENTIAL,), _no_aim)
@@ -129,15 +141,8 @@ def aim_tangential(n, bounce_speed, y, tilted, work):
     for i in range(n):
         if -work.speed[i] > bounce_speed:
             bouncing, found = bouncing + 1, i
-    if bouncing != 1:
-        return
-    _, q, v, L = y
-    w = angular_velocity(q, L, work, tilted)
-    u = qt.cross(w, (work.arm[found, 0], work.arm[found, 1], work.arm[found, 2]))
-    u = (u[0] + v[0], u[1] + v[1], u[2] + v[2])
-    share, wall = tangential_share(work), work.slot[found] // work.features
-    work.target[found, 1] = -share * qt.dot(wall_axis(work.walls, wall, TANGENT_1), u)
-    work.target[found, 2] = -share * qt.dot(wall_axis(work.walls, wall, TANGENT_2), u)
+    if bouncing == 1:
+        aim_at(found, y, tilted, work)
 
 
 @inlined

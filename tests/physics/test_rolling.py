@@ -121,6 +121,34 @@ def test_an_impact_of_a_superball(tangential, mu):
     assert built.angvel[0, 0] == pytest.approx(w + 2.5 / R**2 * np.cross([0, -R, 0], change), abs=1e-12)
 
 
+@pytest.mark.parametrize("tangential", [1.0, 0.4, -0.5])
+def test_a_superball_at_precise(tangential):
+    """Flight, impact, flight: places and velocities in closed form, to 1e-8 and better."""
+    v, w, fall, e, t = np.array([3.0, 0.0, 1.0]), np.array([0.5, 0.3, 2.0]), 2.0, 0.6, 0.5
+    body = ball(pos=(0, R + 1, 0), linvel=v - [0, fall, 0], angvel=w)
+    effects = [physics.Gravity((0, -G, 0)), physics.Contact(e, tangential=tangential), physics.Friction(5.0)]
+    built = physics.World(physics.Scene([body], [FLOOR], effects), dt=0.1, accuracy="precise")
+    built.step(steps=round(t / 0.1))
+    hit = math.sqrt(fall**2 + 2 * G)
+    first = (hit - fall) / G
+    change = -2 / 7 * (1 + tangential) * (v + np.cross(w, [0, -R, 0]))
+    end = v + change + [0, e * hit - G * (t - first), 0]
+    place = v * first + (v + change) * (t - first) + [0, R + e * hit * (t - first) - G * (t - first) ** 2 / 2, 0]
+    assert built.linvel[0, 0] == pytest.approx(end, abs=1e-9)
+    assert built.pos[0, 0] == pytest.approx(place, abs=1e-9)
+    assert built.angvel[0, 0] == pytest.approx(w + 2.5 / R**2 * np.cross([0, -R, 0], change), abs=1e-9)
+
+
+def test_a_superball_at_precise_keeps_its_energy():
+    """Some twenty elastic impacts, each to rounding."""
+    body = ball(pos=(0, 1.5, 0), linvel=(2, 0, 1), angvel=(1, 2, 3))
+    effects = [physics.Gravity((0, -G, 0)), physics.Contact(1.0, tangential=1.0), physics.Friction(50.0)]
+    built = physics.World(physics.Scene([body], [FLOOR], effects), accuracy="precise")
+    start = energy(built)
+    assert built.step(steps=2000).impacts[0] > 15
+    assert energy(built) == pytest.approx(start, rel=1e-11)
+
+
 def test_a_superball_keeps_its_energy_and_comes_back():
     """e = e_t = 1: every impact is conservative, and after two of them it flies along the floor as before (Garwin)."""
     built = world(ball(pos=(0, 1.5, 0), linvel=(2, 0, 1), angvel=(1, 2, 3)), mu=50.0, e=1.0, tangential=1.0)
