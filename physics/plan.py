@@ -166,7 +166,6 @@ def make_plan(scene: Scene, accuracy: Accuracy) -> Plan:
     seen, scheme = _see(scene), SCHEMES[accuracy.scheme]
     is_linked = any(slot.term.is_linked for slot in seen.fields)
     many = seen.touching and (seen.meeting or is_linked)
-    _check_linked(is_linked, scheme)
     if many:
         _check_many(scene, seen.meeting, scheme)
     _check_laws(scene, seen, many, scheme)
@@ -193,26 +192,17 @@ def make_plan(scene: Scene, accuracy: Accuracy) -> Plan:
 def _check_many(scene: Scene, meeting: bool, scheme: int) -> None:
     """Refuse what the step of all bodies at once does not know yet."""
     hint = "; give the scene Contact(between_bodies=False) if its bodies need not meet" if meeting else ""
+    what = "touch each other" if meeting else "touch walls and are tied together by springs"
     if scheme == EVENTS:
         raise ValueError(
-            "accuracy has the scheme 'events', which knows contact with walls only; allowed for bodies that touch "
-            f"each other are 'fast', 'balanced' and every time-stepping scheme{hint}"
+            "accuracy has the scheme 'events', which knows contact of single bodies with walls only; allowed where "
+            f"bodies {what} are 'fast', 'balanced' and every time-stepping scheme{hint}"
         )
-    what = "touch each other" if meeting else "touch walls and are tied together by springs"
     for b, body in enumerate(scene.bodies):
         if body.kind not in ("block", "sphere"):
             raise ValueError(
                 f"Scene.bodies[{b}] is an {body.kind}; allowed where bodies {what} are blocks and spheres{hint}"
             )
-
-
-def _check_linked(is_linked: bool, scheme: int) -> None:
-    """Refuse springs between bodies where bodies are advanced one by one."""
-    if is_linked and scheme == EVENTS:
-        raise ValueError(
-            "accuracy has the scheme 'events', which moves one body at a time; allowed with Spring(other=...) are "
-            "'fast', 'balanced' and every time-stepping scheme"
-        )
 
 
 def _check_laws(scene: Scene, seen: _Seen, many: bool, scheme: int) -> None:

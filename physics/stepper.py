@@ -122,7 +122,8 @@ def _many_arguments(world: World, k: int) -> tuple:
 
 def _linked_arguments(world: World, k: int) -> tuple:
     plan = world.plan
-    return plan.gyroscopic, plan.tilted, plan.scheme, world.report_table, world.scratch[k]
+    held = None if plan.events else True
+    return plan.gyroscopic, plan.tilted, plan.scheme, held, plan.events, world.report_table, world.scratch[k]
 
 
 def _wall_switches(plan: Plan) -> tuple:

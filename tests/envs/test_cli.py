@@ -148,7 +148,7 @@ FALLING = """
 [[bodies]]
 kind = "Sphere"
 radius = 0.1
-mass = 1.0
+mass = 10.0
 linvel = [1.0, 0.0, 0.0]
 
 [[effects]]
@@ -168,7 +168,7 @@ offset = -0.7
 
 
 def test_explain_measures_when_effects_act_and_what_time_they_take(tmp_path):
-    """A ball that falls into water 0.7 m below: the water acts from the step in which the ball reaches it."""
+    """A heavy ball falls into water 0.7 m below: the water acts from the step in which the ball reaches it."""
     scene, path = tmp_path / "ball.toml", tmp_path / "shares.json"
     scene.write_text(FALLING)
     output = run("explain", scene, "--duration", 1.0, "--json", path)

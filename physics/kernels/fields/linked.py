@@ -103,13 +103,15 @@ def _put_anchor(first, columns, x, R, v, w):
 
 
 @inlined
-def _middle(body):
+def middle(body):
+    """(x, q, v, L) of a body in the middle of the stage."""
     m = body.middle
     return (m[0], m[1], m[2]), (m[3], m[4], m[5], m[6]), (m[7], m[8], m[9]), (m[10], m[11], m[12])
 
 
 @inlined
-def _put_middle(body, y):
+def put_middle(body, y):
+    """Write it."""
     x, q, v, L = y
     m = body.middle
     m[0], m[1], m[2] = x
@@ -126,7 +128,7 @@ def _put_anchors(first, count, tilted, bodies):
         for k in range(first, first + SIZE * count, SIZE):
             if columns[k + OTHER] >= 0.0:
                 other = bodies[int(columns[k + OTHER])]
-                x, q, v, L = _middle(other)
+                x, q, v, L = middle(other)
                 _put_anchor(k, columns, x, qt.to_matrix(q), v, angular_velocity(q, L, other, tilted))
 
 
@@ -140,28 +142,34 @@ def hold_linked_loads(first, count, h, gyroscopic, tilted, world):
     for b in range(bodies.shape[0]):
         x, q, v, L = read_state(world.now, b)
         q = drift(q, L, bodies[b], half, gyroscopic, tilted)
-        _put_middle(bodies[b], (plus(x, times(half, v)), q, v, L))
+        put_middle(bodies[b], (plus(x, times(half, v)), q, v, L))
     _put_anchors(first, count, tilted, bodies)
     for b in range(bodies.shape[0]):
         if world.touched[b] == 0:
             _kick(bodies[b], half, tilted)
     _put_anchors(first, count, tilted, bodies)
     for b in range(bodies.shape[0]):
-        x, q, v, L = _middle(bodies[b])
+        x, q, v, L = middle(bodies[b])
         F, T = field_load(x, q, v, L, bodies[b].now + half, tilted, bodies[b])
         put_loads(F, T, bodies[b])
     return True
 
 
+@_if_linked(lambda arguments: _record(arguments[-1]), None)
+def place_anchors(first, count, tilted, world):
+    """Put the anchors of all springs where the bodies' `middle` says."""
+    _put_anchors(first, count, tilted, world.bodies)
+
+
 @inlined
 def _kick(body, half, tilted):
     """Give the middle of a body half a stage's kick of all loads."""
-    x, q, v, L = _middle(body)
+    x, q, v, L = middle(body)
     F, T = field_load(x, q, v, L, body.now + half, tilted, body)
     a, held = body.held_acceleration, body.held_torque
     v = plus(v, times(half, plus((a[0], a[1], a[2]), times(1.0 / body.mass, F))))
     L = plus(L, times(half, plus((held[0], held[1], held[2]), T)))
-    _put_middle(body, (x, q, v, L))
+    put_middle(body, (x, q, v, L))
 
 
 @_if_linked(lambda arguments: arguments[-1], None)
