@@ -67,8 +67,8 @@ def step_linked(
 ):  # fmt: skip
     """Advance the worlds first <= world < last by `steps` steps of `substeps` substeps of h seconds each.
 
-    Of the switches `held` and `events` one is on: loads held over the step, or motion to the tolerance. A world in which
-    a new state is not finite keeps the last good one, and its report counts the fault.
+    Of the switches `held` and `events` one is on: loads held over the step, or motion to the tolerance. A world in
+    which a new state is not finite keeps the last good one, and its report counts the fault.
     """
     bodies = shapes.shape[0]
     for world in range(first, last):
