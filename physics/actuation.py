@@ -11,11 +11,18 @@ attitude are of second order in the step, as with anything that is held.
 
 from __future__ import annotations
 
+import math
+from collections.abc import Callable
 from itertools import pairwise
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from physics.effects import Actuator
+from physics.report import add_report
+
+if TYPE_CHECKING:
+    from physics.world import World
 
 # Treads shorter than this share of the step are rounding of the times they lie between.
 NO_TIME = 1e-9
@@ -42,15 +49,31 @@ class Actuation:
         self._output = np.zeros(shape)  # w
         self._commands: list[tuple[float, np.ndarray]] = []  # those that still count: when given [s], clipped
 
+    def advance(self, world: World, calls: list[Callable[[], None]], wrench: np.ndarray, steps: int, dt: float) -> None:
+        """`World.advance` through the actuator: one that remembers is asked at each step."""
+        if not self.actuator.remembers:
+            self.take(wrench, world.time, dt)
+            world.make(calls, steps * dt)
+            return
+        total = np.zeros_like(world.report_table)
+        for _ in range(steps):
+            self.take(wrench, world.time, dt)
+            world.make(calls, dt)
+            add_report(total, world.report_table)
+        world.report_table[...] = total
+
     def take(self, wrench: np.ndarray, start: float, dt: float) -> None:
         """Take the command of the step from `start` over `dt` [s]; `applied` is then what acts in it."""
         command = self._clipped(wrench)
         if not self.actuator.remembers:
             self.applied[...] = command
             return
-        self._commands.append((start, command))
+        treads = self._treads(command, start, dt)
+        if len(treads) == 1:
+            self.applied[...] = self._follow(treads[0][1], dt)
+            return
         total = np.zeros_like(command)
-        for length, tread in self._treads(start, dt):
+        for length, tread in treads:
             total += length * self._follow(tread, length)
         self.applied[...] = total / dt
 
@@ -65,8 +88,11 @@ class Actuation:
                 command[..., first : first + 3] *= share[..., None]
         return command
 
-    def _treads(self, start: float, dt: float) -> list[tuple[float, np.ndarray]]:
+    def _treads(self, command: np.ndarray, start: float, dt: float) -> list[tuple[float, np.ndarray]]:
         """(length [s], command) of the staircase from `start` over `dt`; zero before the first command arrives."""
+        if self.actuator.delay == 0.0:
+            return [(dt, command)]
+        self._commands.append((start, command))
         arrivals = [-np.inf, *((given + self.actuator.delay - start) / dt for given, _ in self._commands)]
         commands = [np.zeros_like(self.applied), *(command for _, command in self._commands)]
         edges = [*(_snapped(share) for share in arrivals), 1.0]
@@ -82,8 +108,8 @@ class Actuation:
             return command
         x = length / self.actuator.lag
         gap = self._output - command
-        self._output = command + gap * np.exp(-x)
-        return command - gap * (np.expm1(-x) / x)
+        self._output = command + gap * math.exp(-x)
+        return command - gap * (math.expm1(-x) / x)
 
     def forget(self, worlds: np.ndarray) -> None:
         """Let these worlds begin at rest: no output, no commands on their way."""

@@ -58,8 +58,8 @@ class Stepper:
     def wrench(self) -> np.ndarray:
         """(worlds, bodies, 6) float64 to write into: force [N] and torque about the centre of mass [N m].
 
-        World frame, held during a call; zeros at first. What is in it is not checked: a body whose new state
-        is not finite keeps the old one, and `World.report` says so.
+        World frame, held during a call (with an actuator: the command that it is given); zeros at first. What is in
+        it is not checked: a body whose new state is not finite keeps the old one, and `World.report` says so.
         """
         return self._wrench
 

@@ -24,7 +24,7 @@ from physics.kernels.probe import angular_momenta
 from physics.kernels.stages import memory_size
 from physics.kernels.workspace import body_records, make_workspace
 from physics.plan import SHAPE_CODES, make_plan
-from physics.report import StepReport, add_report
+from physics.report import StepReport
 from physics.scene import Scene
 from physics.stepper import kernel_calls
 from physics.threads import SlicePool
@@ -217,19 +217,12 @@ class World:
     def advance(self, calls: list[Callable[[], None]], wrench: np.ndarray, steps: int, dt: float) -> None:
         """Make the `kernel_calls` of so many steps of `dt` [s] with this wrench; for those who prepare them."""
         if self.actuation is None:
-            self._make(calls, steps * dt)
-        elif not self.actuation.actuator.remembers:
-            self.actuation.take(wrench, self.time, dt)
-            self._make(calls, steps * dt)
+            self.make(calls, steps * dt)
         else:
-            total = np.zeros_like(self.report_table)
-            for _ in range(steps):
-                self.actuation.take(wrench, self.time, dt)
-                self._make(calls, dt)
-                add_report(total, self.report_table)
-            self.report_table[...] = total
+            self.actuation.advance(self, calls, wrench, steps, dt)
 
-    def _make(self, calls: list[Callable[[], None]], duration: float) -> None:
+    def make(self, calls: list[Callable[[], None]], duration: float) -> None:
+        """Make kernel calls that take so long [s]."""
         if self.plan.fields:
             for scratch in self.scratch:
                 body_records(scratch)["call_start"] = self.time
