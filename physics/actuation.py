@@ -19,6 +19,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from physics.effects import Actuator
+from physics.kernels.actuator import follow, shorten
 from physics.report import add_report
 
 if TYPE_CHECKING:
@@ -46,8 +47,13 @@ class Actuation:
     def __init__(self, actuator: Actuator, shape: tuple[int, int, int]):
         self.actuator = actuator
         self.applied = np.zeros(shape)
-        self._output = np.zeros(shape)  # w
-        self._commands: list[tuple[float, np.ndarray]] = []  # those that still count: when given [s], clipped
+        self._shape = shape
+        self._output = self._nothing()  # w
+        self._command = self._nothing()  # of this step, clipped
+        self._late: list[tuple[float, np.ndarray]] = []  # commands with a delay that still count: when given [s]
+
+    def _nothing(self) -> np.ndarray:
+        return np.zeros((self._shape[0] * self._shape[1], 6))
 
     def advance(self, world: World, calls: list[Callable[[], None]], wrench: np.ndarray, steps: int, dt: float) -> None:
         """`World.advance` through the actuator: one that remembers is asked at each step."""
@@ -64,70 +70,46 @@ class Actuation:
 
     def take(self, wrench: np.ndarray, start: float, dt: float) -> None:
         """Take the command of the step from `start` over `dt` [s]; `applied` is then what acts in it."""
-        command = self._clipped(wrench)
-        if not self.actuator.remembers:
-            self.applied[...] = command
-            return
-        treads = self._treads(command, start, dt)
-        if len(treads) == 1:
-            self.applied[...] = self._follow(treads[0][1], dt)
-            return
-        total = np.zeros_like(command)
-        for length, tread in treads:
-            total += length * self._follow(tread, length)
-        self.applied[...] = total / dt
+        if self.actuator.delay > 0.0:
+            self._command = self._nothing()
+        self._command[...] = wrench.reshape(-1, 6)
+        limits = (self.actuator.limit_force, self.actuator.limit_torque)
+        shorten(self._command, *(np.inf if limit is None else limit for limit in limits))
+        applied = self.applied.reshape(-1, 6)
+        for k, (share, tread) in enumerate(self._treads(start, dt)):
+            gone, kept = 1.0, 0.0
+            if self.actuator.lag > 0.0:
+                x = share * dt / self.actuator.lag
+                gone = -math.expm1(-x)
+                kept = gone / x
+            follow(tread, gone, kept, share, k == 0, self._output, applied)
 
-    def _clipped(self, wrench: np.ndarray) -> np.ndarray:
-        """A copy, with forces and torques no longer than the limits."""
-        command = np.array(wrench)
-        for first, limit in ((0, self.actuator.limit_force), (3, self.actuator.limit_torque)):
-            if limit is not None:
-                x, y, z = (command[..., first + c] for c in range(3))
-                size = np.sqrt(x * x + y * y + z * z)
-                share = np.divide(limit, size, out=np.ones_like(size), where=size > limit)
-                command[..., first : first + 3] *= share[..., None]
-        return command
-
-    def _treads(self, command: np.ndarray, start: float, dt: float) -> list[tuple[float, np.ndarray]]:
-        """(length [s], command) of the staircase from `start` over `dt`; zero before the first command arrives."""
+    def _treads(self, start: float, dt: float) -> list[tuple[float, np.ndarray]]:
+        """(share of the step, command) of the staircase from `start` over `dt`; zero before the first command."""
         if self.actuator.delay == 0.0:
-            return [(dt, command)]
-        self._commands.append((start, command))
-        arrivals = [-np.inf, *((given + self.actuator.delay - start) / dt for given, _ in self._commands)]
-        commands = [np.zeros_like(self.applied), *(command for _, command in self._commands)]
-        edges = [*(_snapped(share) for share in arrivals), 1.0]
-        begun = sum(share <= 0.0 for share in edges[:-1]) - 1
-        del self._commands[: max(begun - 1, 0)]
-        spans = zip(pairwise(min(max(share, 0.0), 1.0) for share in edges), commands)
-        return [((end - begin) * dt, command) for (begin, end), command in spans if end > begin]
-
-    def _follow(self, command: np.ndarray, length: float) -> np.ndarray:
-        """Let the lag follow a command for a time [s]; the mean of its output meanwhile."""
-        if self.actuator.lag == 0.0:
-            self._output = command
-            return command
-        x = length / self.actuator.lag
-        gap = self._output - command
-        self._output = command + gap * math.exp(-x)
-        return command - gap * (math.expm1(-x) / x)
+            return [(1.0, self._command)]
+        self._late.append((start, self._command))
+        arrivals = [-np.inf, *(_snapped((given + self.actuator.delay - start) / dt) for given, _ in self._late)]
+        commands = [self._nothing(), *(command for _, command in self._late)]
+        begun = sum(share <= 0.0 for share in arrivals) - 1
+        del self._late[: max(begun - 1, 0)]
+        edges = [min(max(share, 0.0), 1.0) for share in (*arrivals, 1.0)]
+        return [(end - begin, command) for (begin, end), command in zip(pairwise(edges), commands) if end > begin]
 
     def forget(self, worlds: np.ndarray) -> None:
         """Let these worlds begin at rest: no output, no commands on their way."""
-        self._output = self._output.copy()
-        self._output[worlds] = 0.0
-        self._commands = [(given, command.copy()) for given, command in self._commands]
-        for _, command in self._commands:
-            command[worlds] = 0.0
+        for rows in (self._output, *(command for _, command in self._late)):
+            rows.reshape(self._shape)[worlds] = 0.0
 
     def kept(self) -> tuple:
         """What decides how it goes on, for `put_back`."""
-        return self._output.copy(), [(given, command.copy()) for given, command in self._commands]
+        return self._output.copy(), [(given, command.copy()) for given, command in self._late]
 
     def put_back(self, kept: tuple) -> None:
         """Go on from what `kept` gave."""
-        output, commands = kept
-        self._output = output.copy()
-        self._commands = [(given, command.copy()) for given, command in commands]
+        output, late = kept
+        self._output[...] = output
+        self._late = [(given, command.copy()) for given, command in late]
 
 
 def _snapped(share: float) -> float:

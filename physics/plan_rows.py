@@ -109,8 +109,8 @@ def _actuator_row(scene) -> Row:
     actuator = scene.effect(Actuator)
     if actuator is None:
         return Row("actuator", False, "not declared: the wrench acts as given", "")
-    note = "one call of the kernel per step" if actuator.remembers else ""
-    return Row("actuator", True, f"declared: {actuator!r}", f"before the kernel, in NumPy{', ' + note if note else ''}")
+    note = "one call per step" if actuator.remembers else ""
+    return Row("actuator", True, f"declared: {actuator!r}", f"before the step{', ' + note if note else ''}")
 
 
 def make_rows(scene, accuracy, seen) -> tuple[Row, ...]:
