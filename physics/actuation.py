@@ -57,7 +57,7 @@ class Actuation:
 
     def advance(self, world: World, calls: list[Callable[[], None]], wrench: np.ndarray, steps: int, dt: float) -> None:
         """`World.advance` through the actuator: one that remembers is asked at each step."""
-        if not self.actuator.remembers:
+        if steps == 1 or not self.actuator.remembers:
             self.take(wrench, world.time, dt)
             world.make(calls, steps * dt)
             return

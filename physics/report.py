@@ -76,14 +76,15 @@ def gravest(table, status):
             status[world] = _UNRESOLVED
 
 
-_LARGEST = [at.PENETRATION, at.RESIDUAL, at.SOLVER]
-
-
-def add_report(total: np.ndarray, table: np.ndarray) -> None:
+@kernel
+def add_report(total, table):
     """Add a report `table` (worlds, REPORT_SIZE) to that of steps before: counts add up, of the rest the largest."""
-    largest = np.maximum(total[:, _LARGEST], table[:, _LARGEST])
-    total += table
-    total[:, _LARGEST] = largest
+    for world in range(table.shape[0]):
+        for c in range(at.REPORT_SIZE):
+            if c == at.PENETRATION or c == at.RESIDUAL or c == at.SOLVER:
+                total[world, c] = max(total[world, c], table[world, c])
+            else:
+                total[world, c] += table[world, c]
 
 
 class StepReport:
