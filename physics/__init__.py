@@ -11,7 +11,7 @@ The contract in five lines::
 
 from physics.accuracy import PRESETS, Accuracy
 from physics.diagnostics import Diagnostics, diagnose, look_at
-from physics.effects import Contact, Friction, Gravity
+from physics.effects import Actuator, Contact, Friction, Gravity, RollingFriction, SpinFriction
 from physics.field import Field, field_function
 from physics.fields import AngularDrag, Buoyancy, Drag, Magnus, Push, Spring, Wind
 from physics.frontier_result import Frontier, FrontierPoint
@@ -28,10 +28,12 @@ from physics.shapes import Block, Body, Ellipsoid, Sphere
 from physics.stepper import Stepper
 from physics.trajectory import Event, Trajectory, simulate
 from physics.world import Snapshot, World
+from physics.wrench import wrench_at
 
 __all__ = [
     "PRESETS",
     "Accuracy",
+    "Actuator",
     "AngularDrag",
     "Block",
     "Body",
@@ -52,10 +54,12 @@ __all__ = [
     "Recorder",
     "Recording",
     "Replay",
+    "RollingFriction",
     "Scene",
     "Snapshot",
     "Solver",
     "Sphere",
+    "SpinFriction",
     "Spring",
     "Status",
     "StepReport",
@@ -77,4 +81,5 @@ __all__ = [
     "save_scene",
     "simulate",
     "three_walls",
+    "wrench_at",
 ]

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from physics import checks, parameters
+from physics.effects import RESISTANCES
 from physics.field import Field, FieldSlot, write_columns
 from physics.kernels import layout as at
 from physics.kernels.probe import angular_momenta, deepest_gaps
@@ -34,6 +35,8 @@ def set_state(world: World, pos, quat, linvel, angvel, worlds) -> None:
         value = check(value, (len(chosen), world.body_count, size), name)
         state[:, first : first + size] = value.reshape(-1, size)
     _adopt(world, chosen, rows, state, world.params[rows], "set_state")
+    if world.actuation is not None:
+        world.actuation.forget(chosen)
 
 
 def set_parameters(world: World, mass, size, inertia_body, friction, restitution, gravity, effects, worlds) -> None:
@@ -51,7 +54,13 @@ def set_parameters(world: World, mass, size, inertia_body, friction, restitution
         _needs("restitution", plan.restitution, "physics.Contact(restitution=...)")
         params[:, at.RESTITUTION] = checks.share(*parameters.spread(restitution, shape, "restitution")).ravel()
     if effects is not None:
-        write_columns(_changed_slots(world, effects), params[:, at.PARAM_SIZE :], world.body_count, chosen)
+        effects = tuple(effects) if isinstance(effects, Sequence) else (effects,)
+        resistances = [effect for effect in effects if isinstance(effect, RESISTANCES)]
+        for effect in resistances:
+            _needs(type(effect).__name__, world.scene.effect(type(effect)), f"physics.{type(effect).__name__}(...)")
+        parameters.write_laws(params, plan.laws, resistances)
+        fields = [effect for effect in effects if effect not in resistances]
+        write_columns(_changed_slots(world, fields), params[:, at.PARAM_SIZE :], world.body_count, chosen)
     field = None
     if gravity is not None:
         _needs("gravity", plan.gravity, "physics.Gravity(...)")
@@ -113,19 +122,21 @@ def _needs(field: str, is_on, effect: str) -> None:
 def _changed_slots(world: World, effects) -> list[FieldSlot]:
     """The scene's kinds of field that `effects` are of, with these in place of the scene's."""
     kinds: dict[type, list[Field]] = {}
-    for effect in effects if isinstance(effects, Sequence) else (effects,):
+    for effect in effects:
         if not isinstance(effect, Field):
-            raise ValueError(f"effects holds {effect!r}; allowed are force fields (the rest has arguments of its own)")
+            raise ValueError(
+                f"effects holds {effect!r}; allowed are force fields, RollingFriction and SpinFriction (the rest has "
+                "arguments of its own, or is the same in all worlds)"
+            )
         effect.check(world.body_count)
-        kinds.setdefault(type(effect), []).append(effect)
-    slots = {type(slot.effects[0]): slot for slot in world.plan.fields}
+        kinds.setdefault(effect.kind, []).append(effect)
+    slots = {slot.kind: slot for slot in world.plan.fields}
     for kind, given in kinds.items():
-        _needs(kind.__name__, kind in slots, f"physics.{kind.__name__}(...)")
+        name = type(given[0]).__name__ + (" between bodies" if kind.is_linked else "")
+        _needs(name, kind in slots, f"physics.{type(given[0]).__name__}(...)")
         slot = slots[kind]
         if len(given) != len(slot.effects):
-            raise ValueError(
-                f"effects holds {len(given)} {kind.__name__}; allowed are {len(slot.effects)}, as in the scene"
-            )
+            raise ValueError(f"effects holds {len(given)} {name}; allowed are {len(slot.effects)}, as in the scene")
         slots[kind] = replace(slot, effects=tuple(given))
     return [slots[kind] for kind in kinds]
 

@@ -41,10 +41,15 @@ class Contact:
         impacts are plastic and the kernel holds no restitution.
     between_bodies : bool, optional
         False: bodies meet walls only, and pass through each other.
+    tangential : float, optional
+        Tangential coefficient e_t in [-1, 1] of spheres at walls (Walton 1993): the point of contact leaves an impact
+        with -e_t times its tangential velocity, as far as `Friction` holds it. 1: a superball; 0: it sticks; -1: it
+        slides on. None: as 0, and nothing of it is compiled.
     """
 
     restitution: float | None = None
     between_bodies: bool = True
+    tangential: float | None = None
 
     def __post_init__(self):
         if not isinstance(self.between_bodies, bool):
@@ -52,6 +57,10 @@ class Contact:
         if self.restitution is not None:
             value = float(checks.share(self.restitution, (), "Contact.restitution"))
             object.__setattr__(self, "restitution", value)
+        if self.tangential is not None:
+            object.__setattr__(self, "tangential", checks.number(self.tangential, "Contact.tangential"))
+            if not -1.0 <= self.tangential <= 1.0:
+                raise ValueError(f"Contact.tangential is {self.tangential}; allowed are numbers from -1 to 1")
 
 
 @dataclass(frozen=True)
@@ -71,4 +80,78 @@ class Friction:
         object.__setattr__(self, "coefficient", value)
 
 
-EFFECTS = (Gravity, Contact, Friction, Field)
+class _Resistance:
+    """A torque of contact, bounded by a length times the normal force."""
+
+    def __post_init__(self):
+        name = f"{type(self).__name__}.radius"
+        object.__setattr__(self, "radius", float(checks.non_negative(self.radius, (), name)))
+
+
+@dataclass(frozen=True)
+class RollingFriction(_Resistance):
+    """Rolling resistance of spheres and ellipsoids at walls: a torque of at most ``radius`` times the normal force.
+
+    It opposes the part of the angular velocity along the wall, and stops it at most.
+
+    Parameters
+    ----------
+    radius : float
+        By how much the normal force is ahead of the middle of the contact [m] (Coulomb 1785); at least 0.
+    """
+
+    radius: float = 0.001
+
+
+@dataclass(frozen=True)
+class SpinFriction(_Resistance):
+    """Friction of spheres and ellipsoids spinning on a wall: a torque of at most ``radius`` times the normal force.
+
+    It opposes the part of the angular velocity along the wall's normal, and stops it at most.
+
+    Parameters
+    ----------
+    radius : float
+        Arm of the friction [m]; at least 0. Of a round patch of radius a under Hertz's pressure 3π/16 μ a (Contensou
+        1962).
+    """
+
+    radius: float = 0.001
+
+
+@dataclass(frozen=True)
+class Actuator:
+    """What lies between the wrench of `World.step` and the bodies: delay, then limits, then lag, in this order.
+
+    Parameters
+    ----------
+    limit_force, limit_torque : float, optional
+        A longer force or torque is shortened to this, its direction kept [N, N m]; more than 0. None: no limit.
+    lag : float
+        Time constant τ of what follows, ``τ dw/dt = command - w`` [s]; at least 0. 0: at once.
+    delay : float
+        Time after which a command arrives [s]; at least 0.
+    """
+
+    limit_force: float | None = None
+    limit_torque: float | None = None
+    lag: float = 0.0
+    delay: float = 0.0
+
+    def __post_init__(self):
+        for name in ("limit_force", "limit_torque"):
+            value = getattr(self, name)
+            if value is not None:
+                object.__setattr__(self, name, float(checks.positive(value, (), f"Actuator.{name}")))
+        for name in ("lag", "delay"):
+            value = checks.non_negative(getattr(self, name), (), f"Actuator.{name}")
+            object.__setattr__(self, name, float(value))
+
+    @property
+    def remembers(self) -> bool:
+        """Whether what it gives depends on earlier commands."""
+        return self.lag > 0.0 or self.delay > 0.0
+
+
+RESISTANCES = (RollingFriction, SpinFriction)
+EFFECTS = (Gravity, Contact, Friction, *RESISTANCES, Actuator, Field)

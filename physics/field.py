@@ -48,12 +48,20 @@ class Field:
         Whether a scene may hold several.
     is_air : bool, of the class
         Whether `function` gives the velocity of the air (a tuple of three) instead of a load.
+    is_linked : bool, of the class
+        Whether `function` depends on another body, too; only the built-in `Spring` between bodies knows how.
     """
 
     function: ClassVar = None
     energy: ClassVar = None
     has_many: ClassVar[bool] = False
     is_air: ClassVar[bool] = False
+    is_linked: ClassVar[bool] = False
+
+    @property
+    def kind(self) -> type:
+        """Class whose functions are compiled for it: its own."""
+        return type(self)
 
     def columns(self, body: int, worlds: np.ndarray) -> np.ndarray:
         """Numbers for `function`, for one body of the scene.
@@ -86,18 +94,28 @@ class Field:
         return "".join(f" {c.lower()}" if c.isupper() and k else c.lower() for k, c in enumerate(name))
 
 
+class Checked(Field):
+    """Sets checked values on a frozen dataclass."""
+
+    def _set(self, name: str, check, shape: tuple = ()) -> None:
+        value = check(getattr(self, name), shape, f"{type(self).__name__}.{name}")
+        object.__setattr__(self, name, tuple(value.tolist()) if shape else float(value))
+
+
 @dataclass(frozen=True)
 class FieldSlot:
     """A kind of field in a scene: its term in the kernel, and which of the scene's effects it stands for.
 
     Attributes
     ----------
+    kind : type
     term : Term
     first : int
         Its first column among the fields' [1].
     effects : tuple of Field
     """
 
+    kind: type
     term: Term
     first: int
     effects: tuple[Field, ...]
@@ -114,13 +132,13 @@ def field_slots(effects: tuple, body_count: int) -> tuple[FieldSlot, ...]:
     kinds: dict[type, list[Field]] = {}
     for effect in effects:
         if isinstance(effect, Field):
-            kinds.setdefault(type(effect), []).append(effect)
+            kinds.setdefault(effect.kind, []).append(effect)
     slots, first = [], 0
     for kind, found in sorted(kinds.items(), key=lambda item: _name(item[0])):
         size = _column_count(kind, found, body_count)
         marker = f"{AIR if kind.is_air else LOAD}_{_name(kind)}_{len(found)}x{size}"
-        term = Term(marker, _compiled(kind, "function"), _compiled(kind, "energy"), size, len(found))
-        slots.append(FieldSlot(term, first, tuple(found)))
+        term = Term(marker, _compiled(kind, "function"), _compiled(kind, "energy"), size, len(found), kind.is_linked)
+        slots.append(FieldSlot(kind, term, first, tuple(found)))
         first += size * len(found)
     return tuple(slots)
 

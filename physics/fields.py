@@ -8,28 +8,16 @@ from typing import ClassVar
 import numpy as np
 
 from physics import checks
-from physics.field import Field
-from physics.kernels.fields import angular_drag, buoyancy, drag, magnus, spring, wind
+from physics.field import Checked
+from physics.kernels.fields import angular_drag, buoyancy, drag, magnus, wind
+from physics.springs import Push, Spring
 
 AIR_DENSITY = 1.225  # at sea level, 15 °C (ISO 2533, standard atmosphere) [kg/m³]
 WATER_DENSITY = 1000.0  # [kg/m³]
 
 
-def _check_body(effect, body_count: int) -> None:
-    if effect.body >= body_count:
-        raise ValueError(f"{type(effect).__name__}.body is {effect.body}; allowed are indices below {body_count}")
-
-
-class _Checked(Field):
-    """Sets checked values on a frozen dataclass."""
-
-    def _set(self, name: str, check, shape: tuple = ()) -> None:
-        value = check(getattr(self, name), shape, f"{type(self).__name__}.{name}")
-        object.__setattr__(self, name, tuple(value.tolist()) if shape else float(value))
-
-
 @dataclass(frozen=True)
-class Drag(_Checked):
+class Drag(Checked):
     """Drag of the air (or water) on every body: ``F = -(½ ρ C A |u| + c) u``, A the area of its shadow along u.
 
     u is the velocity of the body's geometric centre relative to the air (`Wind`), where the force acts.
@@ -64,7 +52,7 @@ class Drag(_Checked):
 
 
 @dataclass(frozen=True)
-class AngularDrag(_Checked):
+class AngularDrag(Checked):
     """Drag on the spin of every body: ``T = -(c + d |ω|) ω``.
 
     Parameters
@@ -93,7 +81,7 @@ class AngularDrag(_Checked):
 
 
 @dataclass(frozen=True)
-class Magnus(_Checked):
+class Magnus(Checked):
     """Lift of every body that spins: ``F = ½ ρ C π r³ ω x u``, r the radius of the sphere of the same volume.
 
     Parameters
@@ -122,7 +110,7 @@ class Magnus(_Checked):
 
 
 @dataclass(frozen=True)
-class Wind(_Checked):
+class Wind(Checked):
     """Velocity of the air, the same everywhere, with gusts; it acts through `Drag`, `Magnus` and fields of your own.
 
     Parameters
@@ -161,7 +149,7 @@ class Wind(_Checked):
 
 
 @dataclass(frozen=True)
-class Buoyancy(_Checked):
+class Buoyancy(Checked):
     """Lift of a fluid at rest that fills a half-space: its weight where the body is, at the centre of that part.
 
     Parameters
@@ -200,95 +188,6 @@ class Buoyancy(_Checked):
 
     def columns(self, body, worlds):
         return np.array([*self.normal, self.offset, self.density * self.gravity])
-
-
-@dataclass(frozen=True)
-class Spring(_Checked):
-    """Spring and damper from a point of a body to a fixed anchor: ``-(k (l - l0) + c dl/dt)`` along it. Any number.
-
-    Parameters
-    ----------
-    anchor : (3,) array_like
-        World frame [m].
-    point : (3,) array_like
-        Where it is fixed to the body: body frame, from the centre of mass [m].
-    stiffness : float
-        k [N/m].
-    damping : float
-        c [N s/m].
-    length : float
-        l0, without force [m].
-    body : int
-        Index in `Scene.bodies`.
-    """
-
-    anchor: tuple = (0.0, 0.0, 0.0)
-    point: tuple = (0.0, 0.0, 0.0)
-    stiffness: float = 100.0
-    damping: float = 0.0
-    length: float = 0.0
-    body: int = 0
-
-    function: ClassVar = spring.spring
-    energy: ClassVar = spring.spring_energy
-    has_many: ClassVar[bool] = True
-
-    def __post_init__(self):
-        self._set("anchor", checks.finite, (3,))
-        self._set("point", checks.finite, (3,))
-        for name in ("stiffness", "damping", "length"):
-            self._set(name, checks.non_negative)
-        checks.count(self.body, "Spring.body", least=0)
-
-    def check(self, body_count):
-        _check_body(self, body_count)
-
-    @property
-    def takes_energy(self):
-        return self.damping > 0
-
-    def columns(self, body, worlds):
-        acts = float(body == self.body)
-        return np.array([*self.point, *self.anchor, self.length, acts * self.stiffness, acts * self.damping])
-
-
-@dataclass(frozen=True)
-class Push(_Checked):
-    """A constant force at a point of a body. Any number.
-
-    Parameters
-    ----------
-    force : (3,) array_like
-        [N].
-    point : (3,) array_like
-        Where it acts: body frame, from the centre of mass [m].
-    frame : {"world", "body"}
-        Of `force`; ``body``: it turns with the body, as the thrust of a rocket does.
-    body : int
-        Index in `Scene.bodies`.
-    """
-
-    force: tuple = (0.0, 0.0, 0.0)
-    point: tuple = (0.0, 0.0, 0.0)
-    frame: str = "world"
-    body: int = 0
-
-    function: ClassVar = spring.push
-    has_many: ClassVar[bool] = True
-
-    def __post_init__(self):
-        self._set("force", checks.finite, (3,))
-        self._set("point", checks.finite, (3,))
-        if self.frame not in ("world", "body"):
-            raise ValueError(f"Push.frame is {self.frame!r}; allowed are world, body")
-        checks.count(self.body, "Push.body", least=0)
-
-    def check(self, body_count):
-        _check_body(self, body_count)
-
-    def columns(self, body, worlds):
-        acts = float(body == self.body)
-        return np.array([*self.point, *(acts * np.array(self.force)), float(self.frame == "body")])
 
 
 FIELDS = (Drag, AngularDrag, Magnus, Wind, Buoyancy, Spring, Push)

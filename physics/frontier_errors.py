@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from physics.effects import Contact, Friction, Gravity
+from physics.effects import RESISTANCES, Contact, Friction, Gravity
 from physics.field import Field
 from physics.scene import Scene
 from physics.shapes import Body
@@ -81,6 +81,8 @@ def conserves_energy(scene: Scene) -> bool:
     contact, friction = scene.effect(Contact), scene.effect(Friction)
     if contact is None or not scene.walls:
         return True
+    if any(scene.effect(kind) is not None and scene.effect(kind).radius > 0 for kind in RESISTANCES):
+        return False
     return contact.restitution == 1.0 and (friction is None or friction.coefficient == 0.0)
 
 

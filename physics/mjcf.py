@@ -99,7 +99,7 @@ def to_mjcf(scene: Scene, drop: bool = False) -> str:
 
 def _inexpressible(scene: Scene) -> list:
     contact = scene.effect(Contact)
-    lost = [contact] if contact and contact.restitution else []
+    lost = [contact] if contact and (contact.restitution or contact.tangential) else []
     return lost + [e for e in scene.effects if not isinstance(e, (Gravity, Contact, Friction, Spring))]
 
 
@@ -133,13 +133,16 @@ def _add_body(world: ET.Element, b: int, body, contact: Contact | None, surface:
     for k, spring in enumerate(springs):
         if spring.body == b:
             ET.SubElement(element, "site", name=f"point{k}", pos=_text(spring.point))
+        if spring.other == b:
+            ET.SubElement(element, "site", name=f"anchor{k}", pos=_text(spring.anchor))
 
 
 def _add_springs(root: ET.Element, world: ET.Element, springs: list[Spring]) -> None:
-    """A spring is a straight tendon from a site of the world to one of the body."""
+    """A spring is a straight tendon from a site of the world, or of another body, to one of the body."""
     tendons = ET.SubElement(root, "tendon")
     for k, spring in enumerate(springs):
-        ET.SubElement(world, "site", name=f"anchor{k}", pos=_text(spring.anchor))
+        if spring.other is None:
+            ET.SubElement(world, "site", name=f"anchor{k}", pos=_text(spring.anchor))
         law = {"stiffness": spring.stiffness, "damping": spring.damping, "springlength": spring.length}
         line = ET.SubElement(tendons, "spatial", {name: _text(value) for name, value in law.items()})
         for end in ("anchor", "point"):

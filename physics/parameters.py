@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from physics import checks
+from physics.effects import Contact, RollingFriction, SpinFriction
 from physics.inertia import check_inertia, principal_axes
 from physics.kernels import layout as at
 from physics.kernels.compiler import kernel
+from physics.kernels.laws import ROLLING, SPIN, TANGENTIAL
 from physics.kernels.rotation import attitude_series
 from physics.scene import HalfSpace
 from physics.shapes import Body
@@ -49,6 +53,23 @@ def _write_body(rows, body, masses, moments, R, dimensions) -> None:
     rows[:, at.DIMENSIONS : at.DIMENSIONS + 3] = dimensions
     rows[:, at.CENTER : at.CENTER + 3] = body.center
     rows[:, at.RADIUS] = body.bounding_radius(dimensions) + np.linalg.norm(body.center)  # about the centre of mass
+
+
+# Which effect a law of contact is a number of.
+LAW_EFFECTS = {
+    TANGENTIAL: (Contact, "tangential"),
+    ROLLING: (RollingFriction, "radius"),
+    SPIN: (SpinFriction, "radius"),
+}
+
+
+def write_laws(params: np.ndarray, laws: tuple[str, ...], effects: Sequence) -> None:
+    """Numbers of the laws of contact among `effects` into their columns, the last of `params` (n, ...)."""
+    for k, law in enumerate(laws):
+        kind, name = LAW_EFFECTS[law]
+        for effect in effects:
+            if isinstance(effect, kind):
+                params[:, params.shape[1] - len(laws) + k] = getattr(effect, name)
 
 
 @kernel

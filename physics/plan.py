@@ -7,12 +7,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from physics.accuracy import EVENTS, SCHEMES, Accuracy
-from physics.effects import Contact, Friction, Gravity
+from physics.effects import Contact, Friction, Gravity, RollingFriction, SpinFriction
 from physics.field import FieldSlot, field_slots
-from physics.fields import FIELDS
 from physics.inertia import principal_axes
 from physics.kernels.fields.terms import Term
+from physics.kernels.laws import LAWS, ROLLING, SPIN, TANGENTIAL
 from physics.kernels.layout import BLOCK, ELLIPSOID, SPHERE, VERTEX_COUNT
+from physics.plan_rows import Row, make_rows
 from physics.scene import Scene
 
 SHAPE_CODES = {"block": BLOCK, "sphere": SPHERE, "ellipsoid": ELLIPSOID}
@@ -22,21 +23,13 @@ ISOTROPY_TOLERANCE = 1e-14
 
 
 @dataclass(frozen=True)
-class Row:
-    """One effect in the plan."""
-
-    effect: str
-    is_on: bool
-    reason: str
-    compiled: str
-
-
-@dataclass(frozen=True)
 class Plan:
     """The switches that the kernel is compiled for, and the reasons. None is off, True is on.
 
     `tilted` is on where the body frame of a body is not all there is to know of its mass: its principal axes are not
-    its body axes, or its geometric centre is not its centre of mass. `many` is on where bodies touch each other.
+    its body axes, or its geometric centre is not its centre of mass. `many` is on where bodies touch each other, or
+    touch walls and are tied together by springs; `meeting` says whether they touch each other. `linked` is on where
+    they are tied together and touch nothing. `laws` are those of `physics.kernels.laws`.
     """
 
     contact: bool | None
@@ -49,8 +42,11 @@ class Plan:
     scheme: int | None
     events: bool | None
     many: bool | None
+    meeting: bool
+    linked: bool | None
     features: int
     fields: tuple[FieldSlot, ...]
+    laws: tuple[str, ...]
     rows: tuple[Row, ...]
 
     @property
@@ -66,7 +62,7 @@ class Plan:
         """What distinguishes one compiled kernel from another."""
         return (
             self.contact, self.friction, self.restitution, self.gravity, self.gyroscopic, self.tilted,
-            self.pivots, self.scheme is None, self.events, self.many, self.features,
+            self.pivots, self.scheme is None, self.events, self.many, self.linked, self.features, *self.laws,
             *(term.marker for term in self.terms),
         )  # fmt: skip
 
@@ -119,132 +115,114 @@ def is_tilted(R: np.ndarray) -> np.ndarray:
     return (R - np.eye(3)).any(axis=(-2, -1))
 
 
-def make_plan(scene: Scene, accuracy: Accuracy) -> Plan:
-    """Decide what a scene needs at an accuracy."""
+@dataclass(frozen=True)
+class _Seen:
+    """What a plan is made of."""
+
+    contact: Contact | None
+    friction: Friction | None
+    gravity: Gravity | None
+    touching: bool
+    meeting: bool
+    rubbing: bool
+    isotropic: bool
+    turned: bool
+    uneven: list[int]
+    fields: tuple[FieldSlot, ...]
+    laws: tuple[str, ...]
+
+
+def _see(scene: Scene) -> _Seen:
+    """Which effects can act in a scene."""
     contact, friction, gravity = (scene.effect(kind) for kind in (Contact, Friction, Gravity))
-    many = contact is not None and contact.between_bodies and len(scene.bodies) > 1
-    touching = contact is not None and (bool(scene.walls) or many)
+    meeting = contact is not None and contact.between_bodies and len(scene.bodies) > 1
+    touching = contact is not None and (bool(scene.walls) or meeting)
     axes = [principal_axes(body.inertia) for body in scene.bodies]
     isotropic = all(is_isotropic(moments) for moments, _ in axes)
-    turned = not isotropic and any(is_tilted(R) for _, R in axes)
-    uneven = [b for b, body in enumerate(scene.bodies) if any(body.center)]
-    has_block = any(body.kind == "block" for body in scene.bodies)
-    restitution = touching and contact.restitution is not None
-    rubbing = touching and friction is not None
-    scheme = SCHEMES[accuracy.scheme]
+    return _Seen(
+        contact, friction, gravity, touching, meeting,
+        rubbing=touching and friction is not None,
+        isotropic=isotropic,
+        turned=not isotropic and any(is_tilted(R) for _, R in axes),
+        uneven=[b for b, body in enumerate(scene.bodies) if any(body.center)],
+        fields=field_slots(scene.effects, len(scene.bodies)),
+        laws=_laws(scene, contact) if touching else (),
+    )  # fmt: skip
+
+
+def _laws(scene: Scene, contact: Contact) -> tuple[str, ...]:
+    """The laws of `physics.kernels.laws` that act where bodies touch walls."""
+    has_round = any(body.kind != "block" for body in scene.bodies)
+    is_on = {
+        TANGENTIAL: contact.tangential is not None,
+        ROLLING: has_round and scene.effect(RollingFriction) is not None,
+        SPIN: has_round and scene.effect(SpinFriction) is not None,
+    }
+    return tuple(law for law in LAWS if is_on[law])
+
+
+def make_plan(scene: Scene, accuracy: Accuracy) -> Plan:
+    """Decide what a scene needs at an accuracy."""
+    seen, scheme = _see(scene), SCHEMES[accuracy.scheme]
+    is_linked = any(slot.term.is_linked for slot in seen.fields)
+    many = seen.touching and (seen.meeting or is_linked)
     if many:
-        _check_many(scene, scheme)
-    fields = field_slots(scene.effects, len(scene.bodies))
+        _check_many(scene, seen.meeting, scheme)
+    _check_laws(scene, seen, many, scheme)
     return Plan(
-        contact=touching or None,
-        friction=rubbing or None,
-        restitution=restitution or None,
-        gravity=(gravity is not None) or None,
-        gyroscopic=(not isotropic) or None,
-        tilted=(turned or bool(uneven)) or None,
-        pivots=(touching and accuracy.solver == "sweeps+pivoting") or None,
+        contact=seen.touching or None,
+        friction=seen.rubbing or None,
+        restitution=(seen.touching and seen.contact.restitution is not None) or None,
+        gravity=(seen.gravity is not None) or None,
+        gyroscopic=(not seen.isotropic) or None,
+        tilted=(seen.turned or bool(seen.uneven)) or None,
+        pivots=(seen.touching and accuracy.solver == "sweeps+pivoting") or None,
         scheme=scheme if scheme > 0 else None,
         events=(scheme == EVENTS) or None,
         many=many or None,
-        features=VERTEX_COUNT if has_block else 1,
-        fields=fields,
-        rows=(
-            _gravity_row(gravity),
-            Row(
-                "applied wrench",
-                True,
-                "given to step(wrench)",
-                "six numbers per body, zero without one",
-            ),
-            _contact_row(scene, contact),
-            _between_row(scene, contact, many),
-            _friction_row(friction, rubbing),
-            _restitution_row(contact, touching),
-            _gyroscopic_row(isotropic, turned),
-            _center_row(uneven),
-            *_field_rows(fields),
-            Row("free motion", True, f"scheme {accuracy.scheme}, {accuracy.substeps} substep(s) per dt", ""),
-        ),
+        meeting=seen.meeting,
+        linked=(is_linked and not many) or None,
+        features=VERTEX_COUNT if any(body.kind == "block" for body in scene.bodies) else 1,
+        fields=seen.fields,
+        laws=seen.laws,
+        rows=make_rows(scene, accuracy, seen),
     )
 
 
-def _gravity_row(gravity) -> Row:
-    if gravity is None:
-        return Row("gravity", False, "not declared", "")
-    return Row("gravity", True, f"declared: {gravity.acceleration} m/s²", "acceleration per world")
-
-
-def _check_many(scene, scheme) -> None:
-    """Refuse what contact between bodies does not know yet."""
-    hint = "; give the scene Contact(between_bodies=False) if its bodies need not meet"
+def _check_many(scene: Scene, meeting: bool, scheme: int) -> None:
+    """Refuse what the step of all bodies at once does not know yet."""
+    hint = "; give the scene Contact(between_bodies=False) if its bodies need not meet" if meeting else ""
+    what = "touch each other" if meeting else "touch walls and are tied together by springs"
     if scheme == EVENTS:
         raise ValueError(
-            "accuracy has the scheme 'events', which knows contact with walls only; allowed for bodies that touch "
-            f"each other are 'fast', 'balanced' and every time-stepping scheme{hint}"
+            "accuracy has the scheme 'events', which knows contact of single bodies with walls only; allowed where "
+            f"bodies {what} are 'fast', 'balanced' and every time-stepping scheme{hint}"
         )
     for b, body in enumerate(scene.bodies):
         if body.kind not in ("block", "sphere"):
             raise ValueError(
-                f"Scene.bodies[{b}] is an {body.kind}; allowed where bodies touch each other are blocks and "
-                f"spheres{hint}"
+                f"Scene.bodies[{b}] is an {body.kind}; allowed where bodies {what} are blocks and spheres{hint}"
             )
 
 
-def _contact_row(scene, contact) -> Row:
-    if contact is not None and scene.walls:
-        return Row("wall contact", True, f"declared; {len(scene.walls)} wall(s)", "detection, impacts, solver")
-    if contact is not None:
-        return Row("wall contact", False, "declared, but the scene has no walls", "")
-    reason = "not declared: the walls do not act" if scene.walls else "not declared"
-    return Row("wall contact", False, reason, "")
-
-
-def _between_row(scene, contact, many) -> Row:
-    if many:
-        return Row("body contact", True, f"declared; {len(scene.bodies)} bodies", "pairs, one problem for all bodies")
-    if contact is None:
-        return Row("body contact", False, "not declared", "")
-    if len(scene.bodies) == 1:
-        return Row("body contact", False, "declared, but the scene has one body", "")
-    return Row("body contact", False, "declared without contact between bodies", "")
-
-
-def _friction_row(friction, rubbing) -> Row:
-    if rubbing:
-        return Row("friction", True, f"declared: μ = {friction.coefficient}", "three rows per contact, circular cone")
-    if friction is not None:
-        return Row("friction", False, "declared, but nothing can touch", "")
-    return Row("friction", False, "not declared", "")
-
-
-def _restitution_row(contact, touching) -> Row:
-    if contact is None or contact.restitution is None:
-        return Row("restitution", False, "not declared: impacts are plastic", "")
-    if not touching:
-        return Row("restitution", False, "declared, but nothing can touch", "")
-    return Row("restitution", True, f"declared: e = {contact.restitution}", "Newton's law at impacts")
-
-
-def _gyroscopic_row(isotropic, turned) -> Row:
-    if isotropic:
-        return Row("gyroscopic torque", False, "automatic: all moments of every body are equal", "")
-    note = "free-rotation flow" + (", principal axes tilted against body axes" if turned else "")
-    return Row("gyroscopic torque", True, "automatic: moments of inertia differ", note)
-
-
-def _center_row(uneven) -> Row:
-    if not uneven:
-        return Row("uneven mass", False, "automatic: every body's centre of mass is its geometric centre", "")
-    reason = f"declared: center of {'body' if len(uneven) == 1 else 'bodies'} {', '.join(map(str, uneven))} is not 0"
-    return Row("uneven mass", True, reason, "contacts about the centre of mass")
-
-
-def _field_rows(fields: tuple[FieldSlot, ...]) -> list[Row]:
-    """What is declared, then the built-in fields that are not."""
-    rows = [
-        Row(slot.effects[0].label, True, f"declared: {', '.join(map(repr, slot.effects))}",
-            f"{slot.term.count * slot.term.size} parameters per body, one function")
-        for slot in fields
-    ]  # fmt: skip
-    declared = {type(slot.effects[0]) for slot in fields}
-    return rows + [Row(kind().label, False, "not declared", "") for kind in FIELDS if kind not in declared]
+def _check_laws(scene: Scene, seen: _Seen, many: bool, scheme: int) -> None:
+    """Refuse laws of contact where they are not known."""
+    declared = {TANGENTIAL: "Contact.tangential", ROLLING: "RollingFriction", SPIN: "SpinFriction"}
+    names = ", ".join(declared[law] for law in seen.laws)
+    torques = ", ".join(declared[law] for law in seen.laws if law != TANGENTIAL)
+    if torques and scheme == EVENTS:
+        raise ValueError(
+            f"accuracy has the scheme 'events', which does not know {torques}; allowed are 'fast', 'balanced' and "
+            "every time-stepping scheme"
+        )
+    if names and many:
+        raise ValueError(
+            f"Scene.effects holds {names}, which act between a body and a wall; allowed are scenes of one body, or "
+            "with Contact(between_bodies=False) and no Spring between bodies"
+        )
+    for b, body in enumerate(scene.bodies if TANGENTIAL in seen.laws else ()):
+        if body.kind != "sphere":
+            raise ValueError(
+                f"Contact.tangential is {seen.contact.tangential}, but Scene.bodies[{b}] is a {body.kind}; allowed "
+                "where every body is a sphere: of others it would not say how an impact ends"
+            )

@@ -76,6 +76,17 @@ def gravest(table, status):
             status[world] = _UNRESOLVED
 
 
+@kernel
+def add_report(total, table):
+    """Add a report `table` (worlds, REPORT_SIZE) to that of steps before: counts add up, of the rest the largest."""
+    for world in range(table.shape[0]):
+        for c in range(at.REPORT_SIZE):
+            if c == at.PENETRATION or c == at.RESIDUAL or c == at.SOLVER:
+                total[world, c] = max(total[world, c], table[world, c])
+            else:
+                total[world, c] += table[world, c]
+
+
 class StepReport:
     """Report of one `World.step`; every property is an array over worlds.
 

@@ -15,6 +15,7 @@ import numpy as np
 
 from physics import checks
 from physics.kernels.events.hybrid import step_events
+from physics.kernels.linked import step_linked
 from physics.kernels.many.step import step_many
 from physics.kernels.step import step_worlds
 
@@ -57,8 +58,8 @@ class Stepper:
     def wrench(self) -> np.ndarray:
         """(worlds, bodies, 6) float64 to write into: force [N] and torque about the centre of mass [N m].
 
-        World frame, held during a call; zeros at first. What is in it is not checked: a body whose new state
-        is not finite keeps the old one, and `World.report` says so.
+        World frame, held during a call (with an actuator: the command that it is given); zeros at first. What is in
+        it is not checked: a body whose new state is not finite keeps the old one, and `World.report` says so.
         """
         return self._wrench
 
@@ -80,12 +81,16 @@ def kernel_calls(world: World, wrench: np.ndarray, steps: int, dt: float) -> lis
     world : World
         Its arrays are bound, not the world itself: it may keep the calls, and is freed with its last user.
     wrench : (worlds, bodies, 6) float64, contiguous and writable
-        What it holds when a call is made counts.
+        What it holds when a call is made counts; of a scene with an actuator what that makes of it.
     steps : int
+        Where an actuator remembers, a call takes one of them.
     dt : float
         [s].
     """
     plan, substeps = world.plan, world.accuracy.substeps
+    if world.actuation is not None:
+        wrench = world.actuation.applied
+        steps = 1 if world.actuation.actuator.remembers else steps
     kernel, own_arguments = _step_of(plan)
     argument_lists = [
         (
@@ -102,6 +107,8 @@ def _step_of(plan: Plan) -> tuple[Callable, Callable[[World, int], tuple]]:
     """The step kernel of a plan, and what gives the arguments that it alone has for one slice of the batch."""
     if plan.many:
         return step_many, _many_arguments
+    if plan.linked:
+        return step_linked, _linked_arguments
     if plan.events:
         return step_events, _event_arguments
     return step_worlds, _world_arguments
@@ -111,6 +118,12 @@ def _many_arguments(world: World, k: int) -> tuple:
     plan = world.plan
     switches = (plan.friction, plan.restitution, plan.gyroscopic, plan.tilted, plan.scheme)
     return *switches, world.memory, world.report_table, world.scratch[k]
+
+
+def _linked_arguments(world: World, k: int) -> tuple:
+    plan = world.plan
+    held = None if plan.events else True
+    return plan.gyroscopic, plan.tilted, plan.scheme, held, plan.events, world.report_table, world.scratch[k]
 
 
 def _wall_switches(plan: Plan) -> tuple:

@@ -11,13 +11,15 @@ from numpy.typing import ArrayLike
 
 from physics import changes, checks, parameters
 from physics.accuracy import Accuracy, resolve
+from physics.actuation import Actuation
 from physics.contacts import contact_ends, contact_forces
-from physics.effects import Contact, Friction, Gravity
+from physics.effects import Actuator, Contact, Friction, Gravity, RollingFriction, SpinFriction
 from physics.field import Field, write_columns
 from physics.kernels import layout as at
 from physics.kernels.events.log import EVENT_SIZE
 from physics.kernels.events.motion import make_motion
 from physics.kernels.fields.terms import declare
+from physics.kernels.linked import make_linked
 from physics.kernels.many import arrays as many
 from physics.kernels.probe import angular_momenta
 from physics.kernels.slip import FEW
@@ -38,10 +40,11 @@ KEPT = ("state", "params", "gravity", "memory", "report_table")
 
 @dataclass(frozen=True)
 class Snapshot:
-    """Everything that decides how a `World` goes on: states, warm starts, parameters, time."""
+    """Everything that decides how a `World` goes on: states, warm starts, parameters, time, the actuator's memory."""
 
     arrays: tuple[np.ndarray, ...]
     time: float
+    actuation: tuple | None = None
 
 
 class World:
@@ -108,7 +111,7 @@ class World:
     def _allocate(self) -> None:
         rows = self.worlds * self.body_count
         self.state = np.zeros((rows, at.STATE_SIZE))
-        self.params = np.zeros((rows, at.PARAM_SIZE + self.plan.field_columns))
+        self.params = np.zeros((rows, at.PARAM_SIZE + self.plan.field_columns + len(self.plan.laws)))
         self.gravity = np.zeros((self.worlds, 3))
         self.walls = parameters.wall_table(self.scene.walls)
         self.memory = self._make_memory()
@@ -116,6 +119,8 @@ class World:
         self.event_counts = np.zeros(rows if self.plan.events else 1, dtype=np.int64)
         self.make_event_room(0)
         self.shapes = np.array([SHAPE_CODES[body.kind] for body in self.scene.bodies])
+        actuator = self.scene.effect(Actuator)
+        self.actuation = None if actuator is None else Actuation(actuator, (self.worlds, self.body_count, 6))
         self._prepare_threads()
         self._bind_views()
 
@@ -129,12 +134,7 @@ class World:
             "relative_slop": settings.slop, "rest_share": settings.rest_share,
             "mean_slip": FEW if settings.slip == "mean" else 0,
         }  # fmt: skip
-        self.scratch = [
-            many.make_many(self.body_count, self.walls, self.plan.terms, **numbers)
-            if self.plan.many
-            else make_workspace(self.walls, self.plan.features, self.plan.terms, **numbers)
-            for _ in self.pool.slices
-        ]
+        self.scratch = [self._make_scratch(**numbers) for _ in self.pool.slices]
         self.motions = [
             make_motion(len(self.walls), self.plan.features, settings.collisions == "sequential")
             if self.plan.events
@@ -144,6 +144,15 @@ class World:
         self._wrench = self.no_wrench()
         self._calls: list[Callable[[], None]] = []
         self._bound_for: tuple | None = None  # arguments of `step`: the next call with the same finds all bound
+
+    def _make_scratch(self, **numbers):
+        """Working memory of one thread, with the numerical settings in it."""
+        plan = self.plan
+        if plan.many:
+            return many.make_many(self.body_count, self.walls, plan.terms, meet=plan.meeting, **numbers)
+        if plan.linked:
+            return make_linked(self.body_count, plan.terms, **numbers)
+        return make_workspace(self.walls, plan.features, plan.terms, plan.laws, **numbers)
 
     def _make_memory(self) -> np.ndarray:
         """What is remembered of contacts: a row per world where bodies touch each other, else a row per body."""
@@ -179,6 +188,7 @@ class World:
         self.params[:, at.FRICTION] = friction.coefficient if friction else 0.0
         self.params[:, at.RESTITUTION] = (contact.restitution or 0.0) if contact else 0.0
         self.gravity[:] = gravity.acceleration if gravity else 0.0
+        parameters.write_laws(self.params, self.plan.laws, self.scene.effects)
         columns = self.params[:, at.PARAM_SIZE :]
         write_columns(self.plan.fields, columns, self.body_count, np.arange(self.worlds))
         angular_momenta(np.arange(len(self.state)), self.state, self.params)
@@ -218,16 +228,23 @@ class World:
         return self.report
 
     def advance(self, calls: list[Callable[[], None]], wrench: np.ndarray, steps: int, dt: float) -> None:
-        """Make the `kernel_calls` that these arguments were bound in; for those who prepare them."""
+        """Make the `kernel_calls` of so many steps of `dt` [s] with this wrench; for those who prepare them."""
         if self.recorder is not None:
             self.recorder.before(wrench, steps, dt)
+        if self.actuation is None:
+            self.make(calls, steps * dt)
+        else:
+            self.actuation.advance(self, calls, wrench, steps, dt)
+        if self.recorder is not None:
+            self.recorder.after()
+
+    def make(self, calls: list[Callable[[], None]], duration: float) -> None:
+        """Make kernel calls that take so long [s]."""
         if self.plan.fields:
             for scratch in self.scratch:
                 body_records(scratch)["call_start"] = self.time
         self.pool.run(calls)
-        self.time += steps * dt
-        if self.recorder is not None:
-            self.recorder.after()
+        self.time += duration
 
     def no_wrench(self) -> np.ndarray:
         """(worlds, bodies, 6) float64 zeros: an array for wrenches."""
@@ -255,7 +272,7 @@ class World:
         pos, quat, linvel, angvel : (k, bodies, 3|4|3|3) array_like, optional
             World frame.
         worlds : (k,) int array_like, optional
-            Indices of the worlds meant; None: all. Their contact memory is cleared.
+            Indices of the worlds meant; None: all. Their contact memory is cleared, and that of their actuators.
 
         Raises
         ------
@@ -272,7 +289,7 @@ class World:
         friction: ArrayLike | None = None,
         restitution: ArrayLike | None = None,
         gravity: ArrayLike | None = None,
-        effects: Sequence[Field] | None = None,
+        effects: Sequence[Field | RollingFriction | SpinFriction] | None = None,
         worlds: ArrayLike | None = None,
     ) -> None:
         """Give worlds their own physical parameters; what is None keeps its value.
@@ -289,8 +306,9 @@ class World:
             scene's body has an `inertia_body` of its own, which then scales with the mass.
         gravity : (3,) or (k, 3) array_like, optional
             [m/s²].
-        effects : sequence of Field, optional
-            Force fields in place of the scene's of the same class (of `Spring` and `Push` all, in the scene's order).
+        effects : sequence of effects, optional
+            Force fields in place of the scene's of the same class (of `Spring` and `Push` all, in the scene's order;
+            springs between bodies count for themselves), `RollingFriction` and `SpinFriction` likewise.
         worlds : (k,) int array_like, optional
             Indices of the worlds meant; None: all.
 
@@ -310,7 +328,8 @@ class World:
 
     def snapshot(self) -> Snapshot:
         """All that decides the future, copied; `restore` continues bit-identically, warm starts and all."""
-        return Snapshot(tuple(array.copy() for array in self.kept()), self.time)
+        actuation = None if self.actuation is None else self.actuation.kept()
+        return Snapshot(tuple(array.copy() for array in self.kept()), self.time, actuation)
 
     def restore(self, snapshot: Snapshot) -> None:
         """Go back to a snapshot of this world, or of one of the same scene and batch size."""
@@ -320,6 +339,8 @@ class World:
         for array, value in zip(kept, snapshot.arrays):
             array[...] = value
         self.time = snapshot.time
+        if self.actuation is not None:
+            self.actuation.put_back(snapshot.actuation)
         if self.recorder is not None:
             self.recorder.changed(slice(None))
 

@@ -150,8 +150,11 @@ def replay(
 
 @app.command()
 def explain(
-    scene: Annotated[str, typer.Argument(help="A canonical scene.")],
+    scene: Annotated[str, typer.Argument(help="A canonical scene, or a scene file (docs/scene-files.md).")],
     accuracy: Accuracy = "balanced",
+    duration: Annotated[
+        float | None, typer.Option(help="Run it so long [s]: when does each effect act, what time does it take?")
+    ] = None,
     json: Json = None,
 ) -> None:
     """Say which effects a scene has, why, and what is compiled for them."""
@@ -160,10 +163,11 @@ def explain(
         from dataclasses import asdict
 
         from physics import accuracy as knobs
-        from physics import make_plan, scenes
+        from physics import load_scene, make_plan, scenes
 
         settings = knobs.resolve(accuracy)
-        plan = make_plan(scenes.by_name(scene), settings)
+        built = load_scene(scene) if scene.endswith(".toml") else scenes.by_name(scene)
+        plan = make_plan(built, settings)
         table = Table(title=f"{scene}, accuracy {accuracy}", title_justify="left", box=box.SIMPLE_HEAD)
         for name in ("effect", "", "why", "compiled"):
             table.add_column(name)
@@ -175,7 +179,25 @@ def explain(
         console.print("accuracy    " + ", ".join(f"{name} {value}" for name, value in values.items()))
         rows = [asdict(row) for row in plan.rows]
         content = {"scene": scene, "accuracy": accuracy, "effects": rows, "settings": values}
+        if duration is not None:
+            content["shares"] = _effect_shares(built, duration, accuracy, console)
         _write(json, {**content, "explanation": plan.explain()}, console)
+
+
+def _effect_shares(scene, duration: float, accuracy: str, console: Console) -> list[dict]:
+    """Measure and print what the effects of a scene do in a run; the same for JSON."""
+    from rigid_env.measure import shares
+
+    with _progress(console, has_thread=False) as progress:
+        task = progress.add_task("measuring", total=shares.run_count(scene))
+        found = shares.measure(
+            scene,
+            duration,
+            accuracy,
+            tick=lambda name: progress.update(task, advance=1, description=name, refresh=True),
+        )
+    console.print(shares.make_table(found, f"{duration:g} s in steps of {shares.STEP} s, without a wrench"))
+    return [share.to_dict() for share in found]
 
 
 @app.command()
@@ -236,6 +258,7 @@ def bench(
 def effects(
     accuracy: Accuracy = "balanced",
     json: Json = None,
+    markdown: Annotated[Path | None, typer.Option(metavar="FILE", help="Put the table into this page, too.")] = None,
     quick: Annotated[bool, typer.Option("--quick", help="Only see that it runs.")] = False,
 ) -> None:
     """Measure what each effect costs: steps per second of its scene with it and without."""
@@ -257,6 +280,9 @@ def effects(
             for name in costs.CASES:
                 found.append(costs.effect_row(name, accuracy, steps, repeats, tick))
         console.print(make_table(found, "steps per second with the effect, against the scene without it"))
+        if markdown is not None:
+            costs.write_markdown(markdown, found, accuracy)
+            _tell_file(markdown, console)
         _write(path, {"is_quick": quick, "rows": [row.to_dict() for row in found]}, console)
 
 

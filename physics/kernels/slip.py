@@ -44,13 +44,14 @@ def _tangential(i, v, w, work):
 def _least_slip(w, h, work):
     """Slip at the start of a stage up to which a contact holds [m/s].
 
-    What the target of a contact that held (`contact.aim_rest`) left over in the stage before: nothing of a sphere,
-    whose arm does not turn with it, else h² (ω α + ω³ r).
+    What the target of a contact that held (`contact.aim_rest`) left over in the stage before: the tolerance of its
+    solve, and h² (ω α + ω³ r) but of a sphere, whose arm does not turn with it.
     """
+    least = work.tolerance * work.acceleration * h
     if work.shape == SPHERE:
-        return 0.0
+        return least
     square = qt.dot(w, w)
-    return MARGIN * h * math.sqrt(square) * h * (work.acceleration + work.radius * square)
+    return least + MARGIN * h * math.sqrt(square) * h * (work.acceleration + work.radius * square)
 
 
 @inlined

@@ -9,6 +9,7 @@ from physics.kernels.body import principal_attitude, turning
 from physics.kernels.compiler import inlined, kernel
 from physics.kernels.contact import aim_impact, aim_rest
 from physics.kernels.flight import drift
+from physics.kernels.resist import aim_tangential, resist_turning, without_gain
 from physics.kernels.restraint import ROUNDING, between, kinetic_energy, rebound_share
 from physics.kernels.slide import SLIDE
 from physics.kernels.slip import has_turned_round, oppose_end_slip, oppose_mean_slip
@@ -75,7 +76,7 @@ def aim_plastic(n, work):
     for k in range(3 * n):
         work.impulse[k] = 0.0
     for i in range(n):
-        work.target[i, 0] = 0.0
+        work.target[i, 0] = work.target[i, 1] = work.target[i, 2] = 0.0
 
 
 @kernel
@@ -88,11 +89,14 @@ def impact(n, y, h, friction, smooth, tilted, pivots, report, work):
     if not aim_impact(n, bounce_speed, work.slop / h, 1.0 / h, work):
         return y
     place_arms(n, qt.to_matrix(q), tilted, work)
+    aim_tangential(n, bounce_speed, y, tilted, work)
     for k in range(3 * n):
         work.impulse[k] = 0.0
     R = qt.to_matrix(principal_attitude(q, work, tilted))
     work.mode = SLIDE
-    v1, L1, residual, sweeps, method = solve_contacts(n, friction, smooth, pivots, v, L, R, work)
+    solved = solve_contacts(n, friction, smooth, pivots, v, L, R, work)
+    solved = without_gain(n, friction, smooth, pivots, v, L, solved, R, work)
+    v1, L1, residual, sweeps, method = resist_turning(n, friction, smooth, pivots, v, L, solved, R, work)
     note_solve(report, work.world, residual, sweeps, method, work.tolerance)
     if friction is not None and work.restitution > 0.0:
         before, full = kinetic_energy(q, v, L, work, tilted), kinetic_energy(q, v1, L1, work, tilted)
@@ -136,10 +140,11 @@ def touch(n, y, h, friction, smooth, gyroscopic, tilted, pivots, memory, report,
     v = (v[0] + h * a[0], v[1] + h * a[1], v[2] + h * a[2])
     L = (L[0] + h * torque[0], L[1] + h * torque[1], L[2] + h * torque[2])
     work.mode = int(memory[work.i, MODE])
-    v1, L1, residual, sweeps, method = solve_contacts(n, friction, smooth, pivots, v, L, R, work)
-    if opposes_mean and has_turned_round(n, v1, turning(R, L1, work.J), work):
+    solved = solve_contacts(n, friction, smooth, pivots, v, L, R, work)
+    if opposes_mean and has_turned_round(n, solved[0], turning(R, solved[1], work.J), work):
         oppose_end_slip(n, work)
-        v1, L1, residual, sweeps, method = solve_contacts(n, friction, smooth, pivots, v, L, R, work)
+        solved = solve_contacts(n, friction, smooth, pivots, v, L, R, work)
+    v1, L1, residual, sweeps, method = resist_turning(n, friction, smooth, pivots, v, L, solved, R, work)
     memory[work.i, MODE] = work.mode
     note_solve(report, work.world, residual, sweeps, method, work.tolerance)
     store_warm_start(n, width, memory, work.i, h, work)

@@ -31,6 +31,7 @@ from physics.kernels.fields.loads import (
     set_clock,
 )
 from physics.kernels.flight import fly, fly_by_scheme
+from physics.kernels.laws import bind_laws
 from physics.kernels.quaternion import to_matrix
 from physics.kernels.stages import impact, store_warm_start, touch
 
@@ -197,6 +198,7 @@ def step_worlds(
             i = world * bodies + b
             bind_body(world, i, shapes[b], params, gravity, wrench, friction, restitution, tilted, work)
             bind_fields(params, i, work)
+            bind_laws(params, i, work)
             y = read_state(state, i)
             for k in range(steps * substeps):
                 set_clock(k * h, work)

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from physics.kernels import laws as contact_laws
 from physics.kernels.fields.terms import Term, members
 from physics.kernels.layout import WALL_SIZE
 from physics.kernels.patch import PATCH_SIZE
@@ -31,11 +32,12 @@ def setting_fields() -> list[tuple]:
     ]
 
 
-def body_fields(terms: tuple[Term, ...] = ()) -> list[tuple]:
-    """Fields of what `body.bind_body` writes of one body, and of what the scene's force fields do to it."""
+def body_fields(terms: tuple[Term, ...] = (), laws: tuple[str, ...] = ()) -> list[tuple]:
+    """Fields of what `body.bind_body` writes of one body, and of what the scene's fields and laws do to it."""
     f, i = np.float64, np.int64
     return [
         *members(terms),  # first: a record may stand for one that it begins with, and Numba would say so
+        *contact_laws.members(laws),
         ("relative_slop", f),  # gap within which a feature touches, in bounding radii; the one field that is read
         ("i", i),
         ("world", i),
@@ -56,8 +58,10 @@ def body_fields(terms: tuple[Term, ...] = ()) -> list[tuple]:
     ]
 
 
-def workspace_dtype(wall_count: int, features: int, terms: tuple[Term, ...] = ()) -> np.dtype:
-    """Record type for bodies with `features` contact features each against `wall_count` walls, in these fields."""
+def workspace_dtype(
+    wall_count: int, features: int, terms: tuple[Term, ...] = (), laws: tuple[str, ...] = ()
+) -> np.dtype:
+    """Record type for bodies with `features` contact features each on `wall_count` walls, in these fields and laws."""
     n = max(wall_count * features, 1)
     float_size, int_size = np.maximum(pyramid_sizes(n), normal_sizes(n)).tolist()
     f, i = np.float64, np.int64
@@ -101,12 +105,14 @@ def workspace_dtype(wall_count: int, features: int, terms: tuple[Term, ...] = ()
         ("fallback_float", f, (float_size,)),
         ("fallback_int", i, (int_size,)),
     ]
-    return np.dtype(setting_fields() + scene + body_fields(terms) + stage + contacts)
+    return np.dtype(setting_fields() + scene + body_fields(terms, laws) + stage + contacts)
 
 
-def make_workspace(walls: np.ndarray, features: int, terms: tuple[Term, ...] = (), **settings: float) -> np.ndarray:
-    """One workspace record, shape (1,), for `walls` ((walls, WALL_SIZE)), fields, and the numerical settings given."""
-    work = np.zeros(1, workspace_dtype(len(walls), features, terms))
+def make_workspace(
+    walls: np.ndarray, features: int, terms: tuple[Term, ...] = (), laws: tuple[str, ...] = (), **settings: float
+) -> np.ndarray:
+    """One workspace record, shape (1,), for `walls` ((walls, WALL_SIZE)), fields, laws, and numerical settings."""
+    work = np.zeros(1, workspace_dtype(len(walls), features, terms, laws))
     work["features"] = features
     if len(walls):
         work["walls"][0] = walls

@@ -194,8 +194,10 @@ def _make_job(name: str, engines: Mapping[str, peers.Engine], ladder: Ladder) ->
 
 def _peer_contenders(engine: peers.Engine, scene: physics.Scene, steps: Sequence[float]) -> tuple[list, list[str]]:
     found, reasons = [], []
-    if any(isinstance(effect, physics.Field) for effect in scene.effects):
-        return [], [f"{engine.name}: it has none of the scene's force fields"]
+    ours_alone = (physics.Field, physics.RollingFriction, physics.SpinFriction)
+    contact = scene.effect(physics.Contact)
+    if any(isinstance(effect, ours_alone) for effect in scene.effects) or (contact and contact.tangential):
+        return [], [f"{engine.name}: it is not given the scene's fields and laws of contact"]
     for setting, options in engine.settings(scene).items():
         try:
             engine.open(scene, steps[0], **options)

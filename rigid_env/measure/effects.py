@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from pathlib import Path
 
 import physics
 from physics import scenes
@@ -18,15 +19,34 @@ FLOATING = physics.Block((2.0, 1.0, 3.0), 3000.0, pos=(0.0, 0.1, 0.0), angvel=(0
 CORNER = (2.5, 1.5, 1.0)
 
 
+FLOOR = physics.HalfSpace((0.0, 1.0, 0.0))
+BALL = physics.Sphere(0.5, 2.0, pos=(0.0, 0.5, 0.0), linvel=(5.0, 0.0, 0.0), angvel=(0.0, 30.0, -10.0))
+BOUNCING = physics.Sphere(0.5, 2.0, pos=(0.0, 1.5, 0.0), linvel=(5.0, 0.0, 0.0), angvel=(0.0, 3.0, 1.0))
+TOUCH = (GRAVITY, physics.Contact(), physics.Friction(50.0))
+
+# Lines of a page between which `write_markdown` puts the table.
+BEGIN, END = "<!-- costs: rigid-env effects --markdown docs/effects.md -->", "<!-- end of costs -->"
+
+
 def _flying() -> physics.Body:
     """The tumbling block."""
     return scenes.tumble().bodies[0]
 
 
-def _case(effect, *others, body=None) -> tuple[physics.Scene, physics.Scene]:
-    """A body in flight with the effect and without, and with `others` in both."""
-    body = body or _flying()
-    return tuple(physics.Scene([body], effects=[*others, *extra]) for extra in ((effect,), ()))
+def _case(effect, *others, bodies=None, walls=()) -> tuple[physics.Scene, physics.Scene]:
+    """Bodies with the effect and without, and with `others` in both; one in flight if none are given."""
+    bodies = bodies or [_flying()]
+    return tuple(physics.Scene(bodies, walls, [*others, *extra]) for extra in ((effect,), ()))
+
+
+def _bouncing() -> tuple[physics.Scene, physics.Scene]:
+    """A superball, and a ball that sticks at impacts."""
+    laws = (physics.Contact(1.0, tangential=1.0), physics.Contact(1.0))
+    return tuple(physics.Scene([BOUNCING], [FLOOR], [GRAVITY, law, physics.Friction(50.0)]) for law in laws)
+
+
+def _pair() -> list[physics.Body]:
+    return [_flying(), physics.Block((2.0, 1.0, 3.0), 4.0, pos=(6.0, 5.0, 0.0), angvel=(0.5, 1.0, 0.0))]
 
 
 def _touching(kind: type) -> tuple[physics.Scene, physics.Scene]:
@@ -46,9 +66,14 @@ CASES: dict[str, Callable[[], tuple[physics.Scene, physics.Scene]]] = {
     "magnus": lambda: _case(physics.Magnus(), GRAVITY),
     "wind": lambda: _case(physics.Wind(), GRAVITY, physics.Drag()),
     "gusts": lambda: _case(physics.Wind(gust=2.0), GRAVITY, physics.Drag()),
-    "buoyancy": lambda: _case(physics.Buoyancy(), GRAVITY, body=FLOATING),
+    "buoyancy": lambda: _case(physics.Buoyancy(), GRAVITY, bodies=[FLOATING]),
     "spring": lambda: _case(physics.Spring((0.0, 5.0, 0.0), CORNER, 40.0, 1.0), GRAVITY),
+    "spring between bodies": lambda: _case(physics.Spring(CORNER, CORNER, 40.0, 1.0, other=1), bodies=_pair()),
     "push": lambda: _case(physics.Push((1.0, 0.0, 0.0), CORNER), GRAVITY),
+    "tangential restitution": _bouncing,
+    "rolling friction": lambda: _case(physics.RollingFriction(), *TOUCH, bodies=[BALL], walls=[FLOOR]),
+    "spin friction": lambda: _case(physics.SpinFriction(), *TOUCH, bodies=[BALL], walls=[FLOOR]),
+    "actuator": lambda: _case(physics.Actuator(limit_force=1.0, lag=0.1), GRAVITY),
 }
 
 
@@ -89,3 +114,31 @@ def effect_row(name: str, accuracy: str, steps: int, repeats: int, tick: Callabl
         key=name, what=name, unit="steps/s", ours=spreads[ON], accuracy=accuracy, peer_name="the scene without it",
         peer=spreads[OFF], notes={"added_ns_per_step": added, "added_bytes_per_body": stored[ON] - stored[OFF]},
     )  # fmt: skip
+
+
+def markdown(rows: list[Row]) -> str:
+    """The rows as a table of a page: what an effect adds to a step, in time and in memory."""
+    lines = [
+        "| effect | its scene without it [ns a step] | adds [ns] | stores [bytes a body] |",
+        "| --- | --- | --- | --- |",
+    ]
+    for row in rows:
+        alone, added = 1e9 / row.peer.median, row.notes["added_ns_per_step"]
+        lines.append(f"| {row.what} | {alone:.0f} | {added:.0f} | {row.notes['added_bytes_per_body']} |")
+    return "\n".join(lines)
+
+
+def write_markdown(path: Path, rows: list[Row], accuracy: str) -> None:
+    """Put the table of `rows` into a page, between the lines `BEGIN` and `END`.
+
+    Raises
+    ------
+    ValueError
+        The page does not have those lines.
+    """
+    head, found, rest = path.read_text(encoding="utf-8").partition(BEGIN)
+    _, closed, tail = rest.partition(END)
+    if not (found and closed):
+        raise ValueError(f"markdown is {str(path)!r}; allowed are pages with the lines {BEGIN} and {END}")
+    text = f"\nMedians at `{accuracy}`, one world, steps of {STEP} s.\n\n{markdown(rows)}\n\n"
+    path.write_text(f"{head}{BEGIN}\n{text}{END}{tail}", encoding="utf-8")

@@ -3,6 +3,7 @@
 import json
 import subprocess
 import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -13,6 +14,8 @@ import rigid_env.warmup
 from physics import scenes
 from physics.fields import FIELDS
 from rigid_env.cli import app
+from rigid_env.measure import effects as costs
+from rigid_env.measure.shares import names_of, without
 from rigid_env.picture import stroboscope, without_bodies, world_frame
 from rigid_env.rendering import Camera
 
@@ -141,6 +144,62 @@ def test_explain_says_what_is_on_and_why(tmp_path):
     assert found["settings"]["tolerance"] == physics.PRESETS["balanced"].tolerance
 
 
+FALLING = """
+[[bodies]]
+kind = "Sphere"
+radius = 0.1
+mass = 10.0
+linvel = [1.0, 0.0, 0.0]
+
+[[effects]]
+kind = "Gravity"
+
+[[effects]]
+kind = "Drag"
+
+[[effects]]
+kind = "Wind"
+velocity = [3.0, 0.0, 0.0]
+
+[[effects]]
+kind = "Buoyancy"
+offset = -0.7
+"""
+
+
+def test_explain_measures_when_effects_act_and_what_time_they_take(tmp_path):
+    """A heavy ball falls into water 0.7 m below: the water acts from the step in which the ball reaches it."""
+    scene, path = tmp_path / "ball.toml", tmp_path / "shares.json"
+    scene.write_text(FALLING)
+    output = run("explain", scene, "--duration", 1.0, "--json", path)
+    shares = {share["effect"]: share for share in loaded(path)["shares"]}
+    assert list(shares) == ["Gravity", "Drag", "Wind", "Buoyancy"]
+    assert [shares[name]["acted"] for name in ("Gravity", "Drag", "Wind")] == [1.0, 1.0, 1.0]
+    # It has 0.6 m to fall, in the air: √(2 0.6/9.81) = 0.35 s, a little more for the drag, which the step rounds up.
+    assert shares["Buoyancy"]["acted"] == pytest.approx(1 - 0.35, abs=0.015)
+    for share in shares.values():
+        assert -np.inf < share["time"]["min"] <= share["time"]["median"] <= share["time"]["max"] < 1
+    assert "of steps" in output
+    assert "duration is -1.0" in run("explain", scene, "--duration", -1, code=2)
+
+
+def test_an_effect_is_left_out_with_what_needs_it():
+    effects = [
+        physics.Gravity(), physics.Contact(0.5, tangential=0.2), physics.Friction(), physics.RollingFriction(),
+        physics.Drag(), physics.Wind(), physics.Spring(other=1), physics.Spring(),
+    ]  # fmt: skip
+    bodies = [physics.Sphere(1, 1), physics.Sphere(1, 1, pos=(5, 0, 0))]
+    scene = physics.Scene(bodies, effects=effects)
+    assert names_of(scene)[-3:] == ["Wind", "Spring 1", "Spring 2"]
+    assert [type(e).__name__ for e in without(scene, effects[1]).effects] == [
+        "Gravity", "Drag", "Wind", "Spring", "Spring",
+    ]  # fmt: skip
+    assert without(scene, effects[2]).effect(physics.Contact) == physics.Contact(0.5)
+    assert without(scene, effects[6]).effects == (*effects[:6], effects[7])
+    airy = physics.Scene(bodies, effects=[physics.Drag(), physics.Wind()])
+    assert without(airy, airy.effects[0]).effects == ()
+
+
 # warmup and bench
 
 
@@ -250,10 +309,13 @@ def test_run_tells_what_is_wrong_with_a_file(tmp_path):
 
 def test_effects_measures_every_effect_with_and_without(tmp_path):
     """Every effect has a row; what it stores is what its plan says, and nothing for what is in every kernel."""
-    path = tmp_path / "effects.json"
-    run("effects", "--quick", "--json", path)
+    path, page = tmp_path / "effects.json", tmp_path / "page.md"
+    begin, end = costs.BEGIN, costs.END
+    page.write_text(f"before\n{begin}\nold\n{end}\nafter\n")
+    run("effects", "--quick", "--json", path, "--markdown", page)
     rows = {row["key"]: row for row in loaded(path)["rows"]}
     kinds = {kind.__name__.lower() for kind in (physics.Gravity, physics.Contact, physics.Friction, *FIELDS)}
+    kinds |= {"rollingfriction", "spinfriction", "actuator", "tangentialrestitution", "springbetweenbodies"}
     assert {name.replace(" ", "") for name in rows} == kinds | {"gusts"}
     for row in rows.values():
         assert row["ours"]["min"] > 0
@@ -262,4 +324,15 @@ def test_effects_measures_every_effect_with_and_without(tmp_path):
         assert row["notes"]["added_ns_per_step"] == pytest.approx(added)
     stored = {name: row["notes"]["added_bytes_per_body"] for name, row in rows.items()}
     assert (stored["gravity"], stored["contact"], stored["drag"], stored["spring"]) == (0, 0, 16, 72)
+    names = "spring between bodies", "tangential restitution", "rolling friction", "spin friction", "actuator"
+    assert [stored[name] for name in names] == [128, 8, 8, 8, 0]
+    text = page.read_text()
+    assert text.startswith(f"before\n{begin}\n")
+    assert text.endswith(f"{end}\nafter\n")
+    assert "old" not in text
+    assert all(f"| {name} |" in text for name in rows)
+    page.write_text("no such lines")
+    with pytest.raises(ValueError, match="allowed are pages with the lines"):
+        costs.write_markdown(page, [], "balanced")
+    assert costs.BEGIN in (Path(__file__).parents[2] / "docs" / "effects.md").read_text(encoding="utf-8")
     assert "'best'" in run("effects", "--accuracy", "best", code=2)

@@ -54,7 +54,8 @@ world = physics.World(physics.Scene([physics.Block((5, 3, 2), 6.0, pos=(0, 5, 0)
                       [physics.HalfSpace((0, 1, 0))], effects), dt=0.01)
 world.step()
 code = next(iter(step_worlds.inspect_asm().values()))
-names = ["gather", "solve_contacts", "cone_sweeps", "pyramid_fallback", "normal_sweeps", "free_rotation"]
+names = ["gather", "solve_contacts", "cone_sweeps", "pyramid_fallback", "normal_sweeps", "free_rotation",
+         "resist_turning", "without_gain", "aim_tangential", "bind_laws", "hold_linked_loads"]
 print(json.dumps([name for name in names if name in code]))
 """
 
@@ -77,7 +78,11 @@ def compiled_names(effects: str, cache: Path) -> set[str]:
             {"free_rotation"},
             {"gather", "solve_contacts", "cone_sweeps", "normal_sweeps"},
         ),
-        ("[physics.Contact()]", {"gather", "normal_sweeps"}, {"cone_sweeps", "pyramid_fallback"}),
+        (
+            "[physics.Contact()]",
+            {"gather", "normal_sweeps"},
+            {"cone_sweeps", "pyramid_fallback", "resist_turning", "without_gain", "aim_tangential", "bind_laws"},
+        ),
     ],
 )
 def test_machine_code_holds_nothing_that_is_not_declared(effects, present, absent, tmp_path):

@@ -22,9 +22,12 @@ EVERYTHING = physics.Scene(
     ],
     [physics.HalfSpace((1, 2, 3), -0.7)],
     [
-        physics.Gravity((0.1, -9.81, 0)), physics.Contact(0.3), physics.Friction(0.7), physics.Drag(0.4, linear=0.1),
+        physics.Gravity((0.1, -9.81, 0)), physics.Contact(0.3, tangential=-0.2), physics.Friction(0.7),
+        physics.RollingFriction(0.02), physics.SpinFriction(0.003), physics.Actuator(5.0, lag=0.1, delay=0.02),
+        physics.Drag(0.4, linear=0.1),
         physics.AngularDrag(0.1, 0.2), physics.Magnus(0.9), physics.Wind((1, 2, 3), 0.5, seed=7),
         physics.Buoyancy(998.0, (0.1, 1, 0)), physics.Spring((1, 2, 3), body=1), physics.Spring(damping=3.0, body=2),
+        physics.Spring((1, 0, 0), (0, 0.5, 0), body=2, other=0),
         physics.Push((1, 2, 3), frame="body"),
     ],
 )  # fmt: skip

@@ -13,6 +13,8 @@ from physics.kernels.events.guards import look_around
 from physics.kernels.events.motion import START
 from physics.kernels.events.resting import pose_contact
 from physics.kernels.events.smooth import put_state
+from physics.kernels.laws import TANGENTIAL, if_law
+from physics.kernels.resist import aim_at
 from physics.kernels.slide import SLIDE
 
 # Impacts in turn at one moment at most. Speeds fall by a constant factor from round to round where they do not end:
@@ -93,6 +95,25 @@ def pose_collision(y, tilted, work, motion, report):
         report[work.world, at.PENETRATION] = max(report[work.world, at.PENETRATION], -motion.gap[START, s])
     work.mode = SLIDE
     return n
+
+
+def _no_aim(*arguments):
+    return None
+
+
+@if_law((TANGENTIAL,), _no_aim)
+def aim_collision(n, y, tilted, motion, work):
+    """`resist.aim_tangential` for a collision posed: targets along the wall of the one contact that bounces.
+
+    What does not rebound though it has a restitution is a bounce left out, and is not one along the wall either.
+    """
+    bouncing, found = 0, 0
+    for i in range(n):
+        speed = -motion.gap_rate[START, work.slot[i]]
+        if speed > motion.still and (work.target[i, 0] > 0.0 or not work.restitution > 0.0):
+            bouncing, found = bouncing + 1, i
+    if bouncing == 1:
+        aim_at(found, y, tilted, work)
 
 
 @kernel

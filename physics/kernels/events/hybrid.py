@@ -29,7 +29,7 @@ from physics.kernels.compiler import kernel
 from physics.kernels.events import log as ev
 from physics.kernels.events.air import fly_freely, fly_to_wall
 from physics.kernels.events.candidates import ASKS, ASKS_SLIDING, COLLIDES, FLIES, IS_LOST, RESTS
-from physics.kernels.events.collide import carry_on, log_impulses, pose_collision, pose_jump
+from physics.kernels.events.collide import aim_collision, carry_on, log_impulses, pose_collision, pose_jump
 from physics.kernels.events.guards import CONE, LOAD, NO_GUARD, NO_STEP, PUSH
 from physics.kernels.events.move import body_speed, look_ahead, move
 from physics.kernels.events.regime import find_regime
@@ -39,6 +39,8 @@ from physics.kernels.events.smooth import (
 )
 from physics.kernels.events.state import keep_contacts, log_changes, recall_contacts
 from physics.kernels.fields.loads import bind_fields, refresh_loads, set_clock
+from physics.kernels.laws import bind_laws
+from physics.kernels.resist import without_gain
 from physics.kernels.solve import solve_contacts
 from physics.kernels.stages import note_solve
 
@@ -134,11 +136,15 @@ def advance(y, h, friction, smooth, gyroscopic, tilted, pivots, work, motion, me
             refresh_loads(y, 0.0, tilted, work)
         if what == COLLIDES:
             n, v, L = pose_collision(y, tilted, work, motion, report), y[2], y[3]
+            aim_collision(n, y, tilted, motion, work)
         elif what == IS_LOST:
             n, v, L = pose_jump(y, min(leap, h - t), tilted, work, motion)
         if is_asked or what in (COLLIDES, IS_LOST):
             P = principal_axes(seen if is_asked else y, tilted, work)
-            v, L, residual, sweeps, method = solve_contacts(n, friction, smooth, pivots, v, L, P, work)
+            solved = solve_contacts(n, friction, smooth, pivots, v, L, P, work)
+            if what == COLLIDES:
+                solved = without_gain(n, friction, smooth, pivots, v, L, solved, P, work)
+            v, L, residual, sweeps, method = solved
             note_solve(report, world, residual, sweeps, method, max(work.tolerance, SOLVED))
         if is_asked:
             what = read_resting(n, seen, v, L, friction, is_sliding, tilted, work, motion)
@@ -214,6 +220,7 @@ def step_events(
             counts[i] = 0
             bind_body(world, i, shapes[b], params, gravity, wrench, friction, restitution, tilted, work)
             bind_fields(params, i, work)
+            bind_laws(params, i, work)
             y = read_state(state, i)
             for k in range(steps * substeps):
                 if contact is not None:

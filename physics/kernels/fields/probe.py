@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from physics.kernels.body import bind_body, read_state
 from physics.kernels.compiler import kernel
+from physics.kernels.fields.linked import look_for_anchors
 from physics.kernels.fields.loads import bind_fields, field_state
 from physics.kernels.fields.terms import total_energy, total_load
 
@@ -20,6 +21,7 @@ def look_at_fields(state, params, shapes, tilted, start, scratch, wrenches, ener
             i // shapes.shape[0], i, shapes[i % shapes.shape[0]], params, None, wrenches, None, None, tilted, work
         )
         bind_fields(params, i, work)
+        look_for_anchors(i, state, shapes.shape[0], work)
         x, q, v, L = read_state(state, i)
         told = field_state(x, q, v, L, start, tilted, work)
         F, T = total_load(told, start, work)

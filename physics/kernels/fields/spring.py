@@ -30,7 +30,7 @@ PUSH_SIZE = 7
 
 
 @inlined
-def _stretch(state, p):
+def stretch(state, p):
     """Point of the body relative to its centre of mass, vector to it from the anchor, and its length."""
     arm = qt.matvec(state.R, (p[POINT], p[POINT + 1], p[POINT + 2]))
     e = minus(plus(state.x, arm), (p[ANCHOR], p[ANCHOR + 1], p[ANCHOR + 2]))
@@ -42,7 +42,7 @@ def spring(state, p, t):
     """(force, torque) of a spring."""
     if p[STIFFNESS] == 0.0 and p[DAMPING] == 0.0:
         return ZERO, ZERO
-    arm, e, l = _stretch(state, p)
+    arm, e, l = stretch(state, p)
     u = velocity_at(state, arm)
     if l == 0.0:
         return acting_at(arm, times(-p[DAMPING], u))
@@ -53,7 +53,7 @@ def spring(state, p, t):
 @inlined
 def spring_energy(state, p, t):
     """½ k (l - l0)² [J]."""
-    _, _, l = _stretch(state, p)
+    _, _, l = stretch(state, p)
     return 0.5 * p[STIFFNESS] * (l - p[LENGTH]) * (l - p[LENGTH])
 
 

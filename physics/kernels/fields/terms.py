@@ -38,6 +38,8 @@ class Term(NamedTuple):
         Columns of one field.
     count : int
         Fields of this kind.
+    is_linked : bool
+        Whether its loads depend on other bodies, too.
     """
 
     marker: str
@@ -45,6 +47,7 @@ class Term(NamedTuple):
     energy: Callable | None
     size: int
     count: int
+    is_linked: bool = False
 
 
 _KNOWN: dict[str, Term] = {}
@@ -60,6 +63,7 @@ def members(terms: tuple[Term, ...]) -> list[tuple]:
     if not terms:
         return []
     columns = sum(term.count * term.size for term in terms)
+    is_linked = any(term.is_linked for term in terms)
     return [
         ("held_acceleration", float, (3,)),  # of gravity and wrench [m/s²]
         ("held_torque", float, (3,)),  # of the wrench [N m]
@@ -68,6 +72,7 @@ def members(terms: tuple[Term, ...]) -> list[tuple]:
         ("is_felt", int),  # 1: some field was not zero since this was set to 0
         ("columns", float, (max(columns, 1),)),  # parameters of all fields, in the order of the markers
         *((term.marker, float) for term in terms),
+        *([("middle", float, (13,))] if is_linked else []),  # state in the middle of the stage: x, q, v, L
     ]
 
 
@@ -108,7 +113,7 @@ def if_declared(otherwise=None):
     return decorate
 
 
-def _instances(work, kind: str) -> Iterator[tuple[Term, int, int]]:
+def instances(work, kind: str) -> Iterator[tuple[Term, int, int]]:
     """Each field of this kind in a workspace: its term, first and last column."""
     first = 0
     for marker in _markers(_names(work)):
@@ -127,7 +132,7 @@ def _sum(kind: str, start: Callable, chosen: Callable, add: Callable):
 
     def total(work):
         result = start
-        for term, first, last in _instances(work, kind):
+        for term, first, last in instances(work, kind):
             if chosen(term) is not None:
                 result = add(composed(result), chosen(term), first, last)
         return result

@@ -7,6 +7,7 @@ from physics.kernels import quaternion as qt
 from physics.kernels.body import angular_velocity, read_state, write_state
 from physics.kernels.compiler import inlined, kernel
 from physics.kernels.contact import CLOSING_SHARE, UNSEEN, gainless
+from physics.kernels.fields.linked import hold_linked_loads
 from physics.kernels.fields.loads import hold_contact_loads, hold_loads
 from physics.kernels.flight import drift
 from physics.kernels.layout import SPHERE
@@ -77,6 +78,8 @@ def aim_rest(n, h, many):
 @inlined
 def hold_all_loads(h, gyroscopic, tilted, many):
     """Hold the loads of the middle of a stage of length h for every body; nothing where there are no fields."""
+    if hold_linked_loads(h, gyroscopic, tilted, many):
+        return
     for b in range(many.now.shape[0]):
         if many.touched[b] == 1:
             hold_contact_loads(read_state(many.now, b), h, gyroscopic, tilted, many.bodies[b])

@@ -99,7 +99,9 @@ def find_contacts(h, many):
         margin = reach(b, h, many) + bodies[b].slop
         for wall in range(many.walls.shape[0]):
             touch_wall(b, wall, margin, h, many)
-    find_pairs(h, many)
+    many.counts[PAIRS] = 0
+    if many.settings[0].meet == 1:
+        find_pairs(h, many)
     for k in range(many.counts[PAIRS]):
         a, b = many.pairs[k, 0], many.pairs[k, 1]
         margin = reach(a, h, many) + reach(b, h, many) + pair_slop(a, b, many)

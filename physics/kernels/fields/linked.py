@@ -1,0 +1,183 @@
+"""Spring and damper between two bodies: to each of them a spring to an anchor that moves with the other.
+
+The point of the other body and its velocity are numbers among the spring's columns, written (`put_anchors`) before
+the loads of either body are asked for. Both ends see the same two points and velocities, so that their forces are
+equal and opposite to the last bit; and since the loads of a stage are those of its middle, where they act along the
+line of the two points, momentum and angular momentum of the two together are kept to rounding.
+"""
+
+from __future__ import annotations
+
+from numba.extending import overload
+
+from physics.kernels import layout as at
+from physics.kernels import quaternion as qt
+from physics.kernels.body import angular_velocity, read_state
+from physics.kernels.compiler import CHOSEN, inlined, kernel
+from physics.kernels.fields.loads import field_load, put_loads
+from physics.kernels.fields.spring import DAMPING, LENGTH, STIFFNESS, stretch
+from physics.kernels.fields.state import ZERO, acting_at, minus, plus, times, velocity_at
+from physics.kernels.fields.terms import LOAD, instances
+from physics.kernels.flight import drift
+
+# Columns: those of a spring, whose anchor is the other body's point now, and after them
+ANCHOR = 3
+VELOCITY = 9  # of the anchor, world frame [m/s]
+OTHER = 12  # index of the other body, -1: the spring is not at this one
+OTHER_POINT = 13  # in the other body's frame, from its centre of mass [m]
+SIZE = 16
+
+
+@inlined
+def linked_spring(state, p, t):
+    """(force, torque) of a spring to another body."""
+    if p[OTHER] < 0.0 or (p[STIFFNESS] == 0.0 and p[DAMPING] == 0.0):
+        return ZERO, ZERO
+    arm, e, l = stretch(state, p)
+    u = minus(velocity_at(state, arm), (p[VELOCITY], p[VELOCITY + 1], p[VELOCITY + 2]))
+    if l == 0.0:
+        return acting_at(arm, times(-p[DAMPING], u))
+    s = p[STIFFNESS] * (l - p[LENGTH]) + p[DAMPING] * qt.dot(u, e) / l
+    return acting_at(arm, times(-s / l, e))
+
+
+@inlined
+def linked_spring_energy(state, p, t):
+    """Half of ½ k (l - l0)² [J]: the other half is the other body's."""
+    if p[OTHER] < 0.0:
+        return 0.0
+    _, _, l = stretch(state, p)
+    return 0.25 * p[STIFFNESS] * (l - p[LENGTH]) * (l - p[LENGTH])
+
+
+def _first_columns(record) -> list[int]:
+    """First column of each spring between bodies in a record of a body, or in the type of one."""
+    return [first for term, first, _ in instances(record, LOAD) if term.function is linked_spring]
+
+
+def _if_linked(where, otherwise):
+    """Make a function a kernel that is told first column and number of the springs, else returns `otherwise`.
+
+    `where` gives the record of a body, or its type, from the function's arguments.
+    """
+
+    def decorate(function):
+        compiled = kernel(function)
+
+        def chosen(arguments, callee):
+            columns = _first_columns(where(arguments))
+            if not columns:
+                return lambda *arguments: otherwise
+            first, count = columns[0], len(columns)
+            return lambda *arguments: callee(first, count, *arguments)
+
+        def stub(*arguments):
+            return chosen(arguments, function)(*arguments)
+
+        @overload(stub, jit_options=CHOSEN, strict=False)
+        def choose(*types):
+            return chosen(types, compiled)
+
+        stub.__doc__ = function.__doc__
+        return stub
+
+    return decorate
+
+
+def _record(world):
+    """Record of a body in a `Many` or `Linked`, or its type in the type of one."""
+    if hasattr(world, "bodies"):
+        return world.bodies[0]
+    return world.types[world.fields.index("bodies")].dtype
+
+
+@inlined
+def _put_anchor(first, columns, x, R, v, w):
+    """Write point and velocity of the other body, whose state this is, into the columns of a spring."""
+    o = first + OTHER_POINT
+    r = qt.matvec(R, (columns[o], columns[o + 1], columns[o + 2]))
+    place, speed = plus(x, r), plus(v, qt.cross(w, r))
+    for c in range(3):
+        columns[first + ANCHOR + c] = place[c]
+        columns[first + VELOCITY + c] = speed[c]
+
+
+@inlined
+def middle(body):
+    """(x, q, v, L) of a body in the middle of the stage."""
+    m = body.middle
+    return (m[0], m[1], m[2]), (m[3], m[4], m[5], m[6]), (m[7], m[8], m[9]), (m[10], m[11], m[12])
+
+
+@inlined
+def put_middle(body, y):
+    """Write it."""
+    x, q, v, L = y
+    m = body.middle
+    m[0], m[1], m[2] = x
+    m[3], m[4], m[5], m[6] = q
+    m[7], m[8], m[9] = v
+    m[10], m[11], m[12] = L
+
+
+@inlined
+def _put_anchors(first, count, tilted, bodies):
+    """Put the anchors of all springs where the bodies' `middle` says."""
+    for b in range(bodies.shape[0]):
+        columns = bodies[b].columns
+        for k in range(first, first + SIZE * count, SIZE):
+            if columns[k + OTHER] >= 0.0:
+                other = bodies[int(columns[k + OTHER])]
+                x, q, v, L = middle(other)
+                _put_anchor(k, columns, x, qt.to_matrix(q), v, angular_velocity(q, L, other, tilted))
+
+
+@_if_linked(lambda arguments: _record(arguments[-1]), False)
+def hold_linked_loads(first, count, h, gyroscopic, tilted, world):
+    """`loads.hold_loads` for bodies that springs tie together: all at once. False, and nothing done, without those.
+
+    A body in contact keeps the velocities of the start of the stage, as in `loads.hold_contact_loads`.
+    """
+    bodies, half = world.bodies, 0.5 * h
+    for b in range(bodies.shape[0]):
+        x, q, v, L = read_state(world.now, b)
+        q = drift(q, L, bodies[b], half, gyroscopic, tilted)
+        put_middle(bodies[b], (plus(x, times(half, v)), q, v, L))
+    _put_anchors(first, count, tilted, bodies)
+    for b in range(bodies.shape[0]):
+        if world.touched[b] == 0:
+            _kick(bodies[b], half, tilted)
+    _put_anchors(first, count, tilted, bodies)
+    for b in range(bodies.shape[0]):
+        x, q, v, L = middle(bodies[b])
+        F, T = field_load(x, q, v, L, bodies[b].now + half, tilted, bodies[b])
+        put_loads(F, T, bodies[b])
+    return True
+
+
+@_if_linked(lambda arguments: _record(arguments[-1]), None)
+def place_anchors(first, count, tilted, world):
+    """Put the anchors of all springs where the bodies' `middle` says."""
+    _put_anchors(first, count, tilted, world.bodies)
+
+
+@inlined
+def _kick(body, half, tilted):
+    """Give the middle of a body half a stage's kick of all loads."""
+    x, q, v, L = middle(body)
+    F, T = field_load(x, q, v, L, body.now + half, tilted, body)
+    a, held = body.held_acceleration, body.held_torque
+    v = plus(v, times(half, plus((a[0], a[1], a[2]), times(1.0 / body.mass, F))))
+    L = plus(L, times(half, plus((held[0], held[1], held[2]), T)))
+    put_middle(body, (x, q, v, L))
+
+
+@_if_linked(lambda arguments: arguments[-1], None)
+def look_for_anchors(first, count, i, state, bodies, work):
+    """Put the anchors of body i's springs where the other bodies of its world are now."""
+    for k in range(first, first + SIZE * count, SIZE):
+        if work.columns[k + OTHER] >= 0.0:
+            j = i - i % bodies + int(work.columns[k + OTHER])
+            x, q, v, _ = read_state(state, j)
+            w = (state[j, at.ANGVEL], state[j, at.ANGVEL + 1], state[j, at.ANGVEL + 2])
+            _put_anchor(k, work.columns, x, qt.to_matrix(q), v, w)

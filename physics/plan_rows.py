@@ -1,0 +1,134 @@
+"""What a plan says of each effect: on or off, why, and what is compiled for it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from physics.effects import Actuator, RollingFriction, SpinFriction
+from physics.field import FieldSlot
+from physics.fields import FIELDS
+from physics.kernels.laws import ROLLING, SPIN, TANGENTIAL
+
+
+@dataclass(frozen=True)
+class Row:
+    """One effect in the plan."""
+
+    effect: str
+    is_on: bool
+    reason: str
+    compiled: str
+
+
+def _gravity_row(gravity) -> Row:
+    if gravity is None:
+        return Row("gravity", False, "not declared", "")
+    return Row("gravity", True, f"declared: {gravity.acceleration} m/s²", "acceleration per world")
+
+
+def _contact_row(scene, contact) -> Row:
+    if contact is not None and scene.walls:
+        return Row("wall contact", True, f"declared; {len(scene.walls)} wall(s)", "detection, impacts, solver")
+    if contact is not None:
+        return Row("wall contact", False, "declared, but the scene has no walls", "")
+    reason = "not declared: the walls do not act" if scene.walls else "not declared"
+    return Row("wall contact", False, reason, "")
+
+
+def _between_row(scene, contact, many) -> Row:
+    if many:
+        return Row("body contact", True, f"declared; {len(scene.bodies)} bodies", "pairs, one problem for all bodies")
+    if contact is None:
+        return Row("body contact", False, "not declared", "")
+    if len(scene.bodies) == 1:
+        return Row("body contact", False, "declared, but the scene has one body", "")
+    return Row("body contact", False, "declared without contact between bodies", "")
+
+
+def _friction_row(friction, rubbing) -> Row:
+    if rubbing:
+        return Row("friction", True, f"declared: μ = {friction.coefficient}", "three rows per contact, circular cone")
+    if friction is not None:
+        return Row("friction", False, "declared, but nothing can touch", "")
+    return Row("friction", False, "not declared", "")
+
+
+def _restitution_row(contact, touching) -> Row:
+    if contact is None or contact.restitution is None:
+        return Row("restitution", False, "not declared: impacts are plastic", "")
+    if not touching:
+        return Row("restitution", False, "declared, but nothing can touch", "")
+    return Row("restitution", True, f"declared: e = {contact.restitution}", "Newton's law at impacts")
+
+
+def _gyroscopic_row(isotropic, turned) -> Row:
+    if isotropic:
+        return Row("gyroscopic torque", False, "automatic: all moments of every body are equal", "")
+    note = "free-rotation flow" + (", principal axes tilted against body axes" if turned else "")
+    return Row("gyroscopic torque", True, "automatic: moments of inertia differ", note)
+
+
+def _center_row(uneven) -> Row:
+    if not uneven:
+        return Row("uneven mass", False, "automatic: every body's centre of mass is its geometric centre", "")
+    reason = f"declared: center of {'body' if len(uneven) == 1 else 'bodies'} {', '.join(map(str, uneven))} is not 0"
+    return Row("uneven mass", True, reason, "contacts about the centre of mass")
+
+
+def _field_rows(fields: tuple[FieldSlot, ...]) -> list[Row]:
+    """What is declared, then the built-in fields that are not."""
+    rows = [
+        Row(slot.effects[0].label, True, f"declared: {', '.join(map(repr, slot.effects))}",
+            f"{slot.term.count * slot.term.size} parameters per body, one function"
+            + (", all bodies at once" if slot.term.is_linked else ""))
+        for slot in fields
+    ]  # fmt: skip
+    declared = {type(slot.effects[0]) for slot in fields}
+    return rows + [Row(kind().label, False, "not declared", "") for kind in FIELDS if kind not in declared]
+
+
+def _tangential_row(scene, contact, laws) -> Row:
+    if contact is None or contact.tangential is None:
+        return Row("tangential restitution", False, "not declared", "")
+    if TANGENTIAL not in laws:
+        return Row("tangential restitution", False, "declared, but nothing can touch", "")
+    return Row("tangential restitution", True, f"declared: e_t = {contact.tangential}", "a target along the wall")
+
+
+def _resistance_row(scene, kind, law, laws) -> Row:
+    name = {RollingFriction: "rolling friction", SpinFriction: "spin friction"}[kind]
+    effect = scene.effect(kind)
+    if effect is None:
+        return Row(name, False, "not declared", "")
+    if law not in laws:
+        return Row(name, False, "declared, but no round body can touch a wall", "")
+    return Row(name, True, f"declared: {effect.radius} m", "the contact problem again, with a torque")
+
+
+def _actuator_row(scene) -> Row:
+    actuator = scene.effect(Actuator)
+    if actuator is None:
+        return Row("actuator", False, "not declared: the wrench acts as given", "")
+    note = "one call per step" if actuator.remembers else ""
+    return Row("actuator", True, f"declared: {actuator!r}", f"before the step{', ' + note if note else ''}")
+
+
+def make_rows(scene, accuracy, seen) -> tuple[Row, ...]:
+    """All rows of a plan; `seen` holds what `physics.plan.make_plan` found out of the scene."""
+    contact, friction, touching, rubbing = seen.contact, seen.friction, seen.touching, seen.rubbing
+    return (
+        _gravity_row(seen.gravity),
+        Row("applied wrench", True, "given to step(wrench)", "six numbers per body, zero without one"),
+        _actuator_row(scene),
+        _contact_row(scene, contact),
+        _between_row(scene, contact, seen.meeting),
+        _friction_row(friction, rubbing),
+        _restitution_row(contact, touching),
+        _tangential_row(scene, contact, seen.laws),
+        _resistance_row(scene, RollingFriction, ROLLING, seen.laws),
+        _resistance_row(scene, SpinFriction, SPIN, seen.laws),
+        _gyroscopic_row(seen.isotropic, seen.turned),
+        _center_row(seen.uneven),
+        *_field_rows(seen.fields),
+        Row("free motion", True, f"scheme {accuracy.scheme}, {accuracy.substeps} substep(s) per dt", ""),
+    )
