@@ -54,7 +54,7 @@ class Recorder:
     Raises
     ------
     ValueError
-        A parameter out of range.
+        A parameter out of range; or the world has an `Actuator` with a lag or a delay, whose memory no recording holds.
 
     Examples
     --------
@@ -71,6 +71,11 @@ class Recorder:
         on: Sequence[Status] = (Status.FAULT,),
         limit: int = 10,
     ):
+        if world.actuation is not None and world.actuation.actuator.remembers:
+            raise ValueError(
+                f"world has {world.actuation.actuator!r}, whose memory a recording does not hold; allowed are actuators "
+                "without lag and delay"
+            )
         self.world = world
         self.keep = checks.count(keep, "keep")
         self.limit = checks.count(limit, "limit")

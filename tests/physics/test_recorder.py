@@ -139,3 +139,17 @@ def test_another_process_replays_bodies_in_contact_bit_for_bit(tmp_path):
     assert done.returncode == 1
     assert "differs from step 3 on" in done.stdout
     assert command(str(tmp_path / "none.npz")).returncode == 1
+
+
+def test_an_actuator_that_remembers_is_refused_and_one_that_does_not_is_replayed(tmp_path):
+    def world(**what):
+        block = physics.Block((1, 1, 1), 1.0)
+        return physics.World(physics.Scene([block], effects=[physics.Actuator(limit_force=2.0, **what)]), dt=0.01)
+
+    with pytest.raises(ValueError, match="lag=0.1.*without lag and delay"):
+        physics.Recorder(world(lag=0.1))
+    some = world()
+    recorder = physics.Recorder(some)
+    for _ in range(3):
+        some.step(np.full((1, 1, 6), 5.0))
+    assert physics.Recording.load(recorder.save(tmp_path / "a.npz")).replay().is_identical
