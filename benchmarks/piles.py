@@ -1,8 +1,8 @@
 """How cost grows with a pile: ``python -m benchmarks.piles [--quick] [--json FILE] [--plot FILE]``.
 
-A pile of cubes that settles in a shaft (`scenes.heap`), from a few to many: time of a step against its contacts, once it
-lies, and the exponent that fits. And the broad phase alone, for cubes spread evenly in a box at one density: time against
-the pairs that it finds.
+A pile of cubes that settles in a shaft (`scenes.heap`), from a few to many: time of a step against its contacts once
+it has fallen, and the exponent that fits. And the broad phase alone, for cubes spread evenly in a box at one density:
+time against the pairs that it finds. Result and plot are written only where they are asked for.
 """
 
 from __future__ import annotations
