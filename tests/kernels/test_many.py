@@ -8,10 +8,15 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy.sparse import csr_array
+from scipy.sparse.csgraph import connected_components
 
 from physics.kernels import layout as at
-from physics.kernels.many import envelope
+from physics.kernels.many import blocks as blocks_of
+from physics.kernels.many import cone
 from physics.kernels.many.arrays import CONTACTS, PAIRS, make_many
+from physics.kernels.many.elimination import order_bodies
+from physics.kernels.many.islands import find_islands
 from physics.kernels.many.near import find_pairs
 from physics.kernels.many.touch import find_contacts
 
@@ -116,43 +121,144 @@ def test_names_of_equal_stacked_blocks_do_not_change_with_rounding():
     assert names[0] == names[1] == names[2]
 
 
-# --- linear system ---------------------------------------------------------------------------------------------
+# --- islands and the linear system -----------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(("count", "links"), [(1, 0), (2, 1), (9, 8), (12, 20), (30, 60)])
+def touching(count, pairs, walls=()):
+    """`Many` with one contact for each pair of bodies, and for each body in `walls`; how many contacts."""
+    many = make_many(count, np.zeros((1, at.WALL_SIZE)), **SETTINGS)
+    ends = [*pairs, *((b, -1) for b in walls)]
+    many.ends[: len(ends)] = np.reshape(ends, (-1, 2))
+    return many, len(ends)
+
+
+@settings(max_examples=50, deadline=None)
+@given(seed=st.integers(0, 2**32 - 1), count=st.integers(1, 30), links=st.integers(0, 40))
+def test_islands_are_the_connected_components(seed, count, links):
+    rng = np.random.default_rng(seed)
+    every = list(itertools.combinations(range(count), 2))
+    pairs = [every[k] for k in rng.permutation(len(every))[:links]]
+    walls = rng.choice(count, rng.integers(1, count + 1), replace=False).tolist()
+    many, n = touching(count, pairs, walls)
+    found = find_islands(n, many)
+    graph = csr_array((np.ones(len(pairs)), np.reshape(pairs, (-1, 2)).T.astype(int)), (count, count))
+    labels = connected_components(graph, directed=False)[1]
+    seen = []
+    for i in range(found):
+        contacts = many.queue[many.first_contact[i] : many.first_contact[i + 1]]
+        bodies = many.order[many.first_body[i] : many.first_body[i + 1]]
+        assert (np.diff(contacts) > 0).all()  # in their order
+        label = labels[many.ends[contacts[0], 0]]
+        assert set(labels[many.ends[contacts, 0]]) == {label}
+        assert sorted(bodies) == np.flatnonzero(labels == label).tolist()
+        seen += contacts.tolist()
+    assert sorted(seen) == list(range(n))
+
+
+def island_of_all(count, pairs):
+    """`Many` with one island of all bodies, which `pairs` must connect, ordered for elimination; products it takes."""
+    many, n = touching(count, pairs, [0])
+    assert find_islands(n, many) == 1
+    return many, order_bodies(0, n, 0, count, many)
+
+
+def connected_pairs(rng, count, links):
+    """Pairs of a random connected graph: a tree and `links` more."""
+    pairs = {(int(rng.integers(0, b)), b) for b in range(1, count)}
+    every = [pair for pair in itertools.combinations(range(count), 2) if pair not in pairs]
+    more = rng.choice(len(every), min(links, len(every)), replace=False) if every else []
+    return sorted(pairs | {every[k] for k in more})
+
+
+@pytest.mark.parametrize(("count", "links"), [(1, 0), (2, 0), (9, 0), (12, 12), (30, 40)])
 def test_the_block_system_is_solved(count, links):
     rng = np.random.default_rng(links)
-    many = make_many(count, np.zeros((0, at.WALL_SIZE)), **SETTINGS)
-    every = list(itertools.combinations(range(count), 2))
-    chosen = sorted(every[k] for k in rng.choice(len(every), links, replace=False)) if links else []
-    ends = [*chosen, *((b, -1) for b in range(count))]  # each body also touches a wall, so that all take part
-    many.ends[: len(ends)] = ends
-    many.touched[:] = 1
-    assert envelope.lay_out(len(ends), many) == count
-    envelope.clear(count, many)
+    pairs = connected_pairs(rng, count, links)
+    many, products = island_of_all(count, pairs)
+    assert products >= count
+    blocks_of.clear(0, count, many)
     A = np.eye(6 * count)
-    for a, b in [*chosen, *((b, b) for b in range(count))]:
+    for a, b in [*pairs, *((b, b) for b in range(count))]:
         for i, j in {(a, b), (b, a)}:
             block = rng.normal(size=(6, 6)) + 6 * np.sqrt(1 + links) * np.eye(6) * (i == j)
-            r, c = many.rank[i], many.rank[j]
-            array, place = (many.lower, many.start[r] + c) if r >= c else (many.upper, many.start[c] + r)
-            array[place] += block
-            A[6 * r : 6 * r + 6, 6 * c : 6 * c + 6] += block
+            if i == j:
+                many.diagonal[i] += block
+            elif many.rank[i] > many.rank[j]:
+                many.lower[blocks_of.place_of(j, i, many)] += block
+            else:
+                many.upper[blocks_of.place_of(i, j, many)] += block
+            A[6 * i : 6 * i + 6, 6 * j : 6 * j + 6] += block
     right = rng.normal(size=(count, 6))
     x = right.copy()
-    envelope.factor(count, many)
-    envelope.substitute(count, x, many)
+    blocks_of.factor(0, count, many)
+    blocks_of.substitute(0, count, x, many)
     # Backward error of elimination: rounding times the condition of A times its order.
     bound = 6 * count * np.finfo(float).eps * np.linalg.cond(A) * np.abs(x).max()
     np.testing.assert_allclose(x.ravel(), np.linalg.solve(A, right.ravel()), atol=bound)
 
 
-def test_a_stack_is_tridiagonal_whatever_the_order_of_its_bodies():
+@pytest.mark.parametrize("kind", ["stack", "plate", "tree"])
+def test_a_tree_of_bodies_fills_nothing_whatever_their_order(kind):
     rng = np.random.default_rng(0)
-    place = rng.permutation(20)
-    many = make_many(20, np.zeros((0, at.WALL_SIZE)), **SETTINGS)
-    ends = [tuple(sorted((place[k], place[k + 1]))) for k in range(19)]
-    many.ends[:19] = ends
-    many.touched[:] = 1
-    assert envelope.lay_out(19, many) == 20
-    assert (np.arange(20) - many.first <= 1).all()
+    place = rng.permutation(40)
+    tree = {
+        "stack": [(k, k + 1) for k in range(39)],
+        "plate": [(0, k) for k in range(1, 40)],
+        "tree": [(int(rng.integers(0, k)), k) for k in range(1, 40)],
+    }[kind]
+    _, products = island_of_all(40, sorted(sorted((int(place[a]), int(place[b]))) for a, b in tree))
+    # Every body but the last has one later neighbour: one block below the diagonal, one product, one inverse.
+    assert products == 3 * 39 + 1
+
+
+@pytest.mark.parametrize(("rows", "columns"), [(4, 4), (10, 3)])
+def test_minimum_degree_fills_no_more_than_the_numbers_of_a_grid(rows, columns):
+    at_grid = np.arange(rows * columns).reshape(rows, columns)
+    pairs = [*zip(at_grid[:, :-1].ravel(), at_grid[:, 1:].ravel()), *zip(at_grid[:-1].ravel(), at_grid[1:].ravel())]
+    _, products = island_of_all(rows * columns, sorted((int(a), int(b)) for a, b in pairs))
+    band = rows * columns * (1 + columns + columns**2)  # row by row, each body has `columns` later neighbours at most
+    assert products <= band
+
+
+def test_where_there_is_no_room_for_the_blocks_the_island_says_so():
+    count = 90  # all touch all: 4005 blocks, and room for 32 a body
+    assert island_of_all(count, list(itertools.combinations(range(count), 2)))[1] == -1
+
+
+# --- cones -----------------------------------------------------------------------------------------------------
+
+
+def inside(rng):
+    """A point inside the Lorentz cone, sometimes near its boundary."""
+    tangent = rng.normal(size=2)
+    return (np.hypot(*tangent) + 10 ** rng.uniform(-3, 1), *tangent)
+
+
+@settings(max_examples=100, deadline=None)
+@given(seed=st.integers(0, 2**32 - 1))
+def test_the_scaling_takes_p_and_u_to_the_same_point(seed):
+    rng = np.random.default_rng(seed)
+    p, u, x = inside(rng), inside(rng), tuple(rng.normal(size=3))
+    w = cone.scaling(p, u)
+    # Rounding of W and its inverse: they are within the condition of the scaling, (w₀ + |w'|)² (η cancels), of exact.
+    bound = 1e-14 * (w[0] + np.hypot(w[1], w[2])) ** 2
+    size = np.abs(cone.scaled(w, p)).max()
+    np.testing.assert_allclose(cone.scaled(w, p), cone.unscaled(w, u), atol=10 * bound * size)
+    np.testing.assert_allclose(cone.unscaled(w, cone.scaled(w, x)), x, atol=10 * bound)
+    twice = cone.unscaled(w, cone.unscaled(w, x))
+    np.testing.assert_allclose(cone.unscaled_twice(w, x), twice, atol=10 * bound * np.abs(twice).max() + 1e-14)
+
+
+@settings(max_examples=100, deadline=None)
+@given(seed=st.integers(0, 2**32 - 1))
+def test_the_quotient_undoes_the_product_and_the_way_out_ends_at_the_boundary(seed):
+    rng = np.random.default_rng(seed)
+    a, b = inside(rng), tuple(rng.normal(size=3))
+    # The product's matrix has eigenvalues a₀ ± |a'|.
+    condition = (a[0] + np.hypot(a[1], a[2])) / (a[0] - np.hypot(a[1], a[2]))
+    np.testing.assert_allclose(cone.quotient(cone.product(a, b), a), b, atol=1e-14 * condition * np.abs(b).max())
+    t = cone.way_out(a, b)
+    end = np.array(a) + t * np.array(b)
+    slack = end[0] - np.hypot(end[1], end[2])
+    assert slack >= -1e-12 * (1 + np.abs(b).max())
+    assert t == 1 or abs(slack) <= 1e-12 * condition * (1 + np.abs(b).max())

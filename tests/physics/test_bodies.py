@@ -237,7 +237,8 @@ def test_a_block_slides_on_another_until_friction_stops_it():
     # off by at most v_last h <= μ g h².
     distance = world.pos[0, 1, 0] + 4
     assert distance == pytest.approx(9 / (2 * 0.3 * G), abs=0.3 * G * 0.005**2 + 1e-6)
-    assert abs(world.pos[0, 0, 0]) <= 1e-9
+    # A residual of 1e-6 of the free speed g h lets it creep at that speed at most: 1e-6 g h for 2 s.
+    assert abs(world.pos[0, 0, 0]) <= 1e-6 * G * 0.005 * 2
     assert not np.any(np.abs(world.linvel) > 1e-6)
 
 

@@ -12,7 +12,7 @@ from physics.kernels.body import read_state, write_state
 from physics.kernels.compiler import inlined, kernel
 from physics.kernels.many.contacts import pair_slop, plus, put, refresh, vector
 from physics.kernels.many.place import place_body
-from physics.kernels.many.sweeps import assemble, sweep_contacts
+from physics.kernels.many.sweeps import assemble, residual_of, sweep_contacts
 
 # Share of the depth beyond half a slop that one stage takes back: turning makes the whole of it overshoot.
 APART_SHARE = 0.5
@@ -58,7 +58,7 @@ def push_apart(n, tilted, many):
         put(many.twist, b, 0, (0.0, 0.0, 0.0))
         put(many.twist, b, 3, (0.0, 0.0, 0.0))
     goal = APART_ERROR * assemble(n, many)
-    sweep_contacts(n, None, goal, APART_SWEEPS, many)
+    sweep_contacts(0, n, None, residual_of(0, n, None, many), goal, APART_SWEEPS, many)
     for b in range(many.now.shape[0]):
         if many.touched[b] == 1:
             _displace(b, many)

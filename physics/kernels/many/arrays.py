@@ -20,8 +20,8 @@ PAIR_CONTACTS = 8
 # Pairs near each other at once, per body: twelve spheres touch one of their size, and each pair counts for two.
 PAIRS_PER_BODY = 8
 
-# Blocks of the linear system of `envelope` per body: where more are needed Newton's method is left out.
-BLOCKS_PER_BODY = 64
+# Blocks of the linear system of `blocks` per body: where more are needed Newton's method is left out.
+BLOCKS_PER_BODY = 32
 
 # `counts`: contacts, pairs, and contacts or pairs for which there was no room.
 CONTACTS, PAIRS, LEFT_OUT = range(3)
@@ -66,30 +66,50 @@ class Many(NamedTuple):
     impulse: np.ndarray  # normal, tangents [N s]
     step: np.ndarray  # 1/λ_max of the tangential part of its block [kg]
     block: np.ndarray  # the contact's own 3 x 3 of W = J M⁻¹ Jᵀ [1/kg]
+    inverse: np.ndarray  # its inverse: 00, 01, 02, 11, 12, 22 [kg]
     table: np.ndarray  # places of names in the last stage's contacts: open addressing
     mix: np.ndarray  # of a pair of blocks: axes of one in the other, and absolute values
     polygon: np.ndarray  # of a pair of blocks: clipped face, two copies of (x, y, height)
     edge: np.ndarray  # of a pair of blocks: edges into and out of each vertex of it
     free: np.ndarray  # twists without contact impulses [m/s, rad/s]
-    degree: np.ndarray  # of `envelope`: bodies that touch a body, where its list begins, and the lists
-    offset: np.ndarray
-    neighbour: np.ndarray
-    rank: np.ndarray  # number of a body in the linear system, -1: none
-    first: np.ndarray  # first block of a row of the envelope, and where block 0 of the row would be
-    start: np.ndarray
-    lower: np.ndarray  # blocks of the linear system
+    parent: np.ndarray  # of `islands`: a body of the same island, and the number of a body's island
+    island: np.ndarray
+    first_contact: np.ndarray  # where the contacts and bodies of an island begin in `queue` and `order`
+    first_body: np.ndarray
+    queue: np.ndarray  # contacts, island by island
+    neighbour: np.ndarray  # of `elimination`: linked lists of bodies that touch a body, (body, next entry)
+    links: np.ndarray  # how many entries those have
+    head: np.ndarray  # first entry of a body
+    degree: np.ndarray  # its length
+    mark: np.ndarray
+    bucket: np.ndarray  # linked lists of bodies of one degree
+    ahead: np.ndarray
+    behind: np.ndarray
+    rank: np.ndarray  # place of a body in the elimination
+    start: np.ndarray  # later neighbours of a body: `column[start : stop]`
+    stop: np.ndarray
+    column: np.ndarray
+    diagonal: np.ndarray  # of `blocks`: the linear system
+    lower: np.ndarray
     upper: np.ndarray
+    swaps: np.ndarray
     spare: np.ndarray
     aim: np.ndarray  # of `newton`: q - ρ u [N s]
     trial: np.ndarray  # p(x) [N s]
-    saved: np.ndarray  # best impulses met [N s]
+    saved: np.ndarray  # best impulses met by one method, and by all [N s]
+    best: np.ndarray
     defect: np.ndarray  # x - M⁻¹ Jᵀ p(x) [m/s, rad/s]
     before: np.ndarray  # twists before a Newton step
     change: np.ndarray  # the step
     row: np.ndarray  # Jacobian rows of both ends of a contact, and what the bodies answer
     reply: np.ndarray
-    at_end: np.ndarray  # bodies of a contact
     momenta: np.ndarray  # of `restraint`: velocity and angular momentum before an impact, then with all of its rebound
+    weighed: np.ndarray
+    inside: np.ndarray  # of `interior`: p̂ and û, their scaling (w, η), what û misses, what is added to p̂
+    slack: np.ndarray
+    scaling: np.ndarray
+    miss: np.ndarray
+    extra: np.ndarray
     settings: np.ndarray  # one record: see `workspace.setting_fields`
 
 
@@ -123,7 +143,7 @@ def make_many(
         record[name] = value
     rows = np.zeros(nb, np.dtype(body_fields(terms)))
     rows["relative_slop"] = relative_slop
-    blocks = min(nb * (nb + 1) // 2, BLOCKS_PER_BODY * nb)
+    blocks = min(max(1, nb * (nb - 1) // 2), BLOCKS_PER_BODY * nb)
     table = 1 << (2 * n - 1).bit_length()
     return Many(
         bodies=rows, now=np.zeros((nb, STATE_SIZE)), rotation=np.zeros((nb, 9)), lightness=np.zeros(nb),
@@ -133,12 +153,18 @@ def make_many(
         owner=np.zeros(n, i), normal=np.zeros((n, 3), f), anchor=np.zeros((n, 6)), frame=np.zeros((n, 9)),
         arm=np.zeros((n, 6)), gap=np.zeros(n), speed=np.zeros(n), mu=np.zeros(n), bounce=np.zeros(n),
         target=np.zeros((n, 3)), impulse=np.zeros((n, 3)), step=np.zeros(n), block=np.zeros((n, 9)),
+        inverse=np.zeros((n, 6)),
         table=np.full(table, -1, i), mix=np.zeros((4, 3, 3)), polygon=np.zeros((2, 16, 3)),
-        edge=np.zeros((2, 16, 2), i), free=np.zeros((nb, 6)), degree=np.zeros(nb, i), offset=np.zeros(nb, i),
-        neighbour=np.zeros(2 * pairs, i), rank=np.zeros(nb, i), first=np.zeros(nb, i), start=np.zeros(nb, i),
-        lower=np.zeros((blocks, 6, 6)), upper=np.zeros((blocks, 6, 6)), spare=np.zeros((6, 12)), aim=np.zeros((n, 3)),
-        trial=np.zeros((n, 3)), saved=np.zeros((n, 3)), defect=np.zeros((nb, 6)), before=np.zeros((nb, 6)),
-        change=np.zeros((nb, 6)), row=np.zeros((2, 3, 6)), reply=np.zeros((2, 3, 6)), at_end=np.zeros(2, i),
-        momenta=np.zeros((nb, 12)),
-        settings=record,
+        edge=np.zeros((2, 16, 2), i), free=np.zeros((nb, 6)), parent=np.zeros(nb, i), island=np.zeros(nb, i),
+        first_contact=np.zeros(n + 1, i), first_body=np.zeros(n + 1, i), queue=np.zeros(n, i),
+        neighbour=np.zeros((2 * blocks, 2), i), links=np.zeros(1, i), head=np.zeros(nb, i), degree=np.zeros(nb, i),
+        mark=np.zeros(nb, i), bucket=np.zeros(nb, i), ahead=np.zeros(nb, i), behind=np.zeros(nb, i),
+        rank=np.zeros(nb, i), start=np.zeros(nb, i), stop=np.zeros(nb, i), column=np.zeros(blocks, i),
+        diagonal=np.zeros((nb, 6, 6)), lower=np.zeros((blocks, 6, 6)), upper=np.zeros((blocks, 6, 6)),
+        swaps=np.zeros(6, i), spare=np.zeros((6, 6)), aim=np.zeros((n, 3)), trial=np.zeros((n, 3)),
+        saved=np.zeros((n, 3)), best=np.zeros((n, 3)), defect=np.zeros((nb, 6)),
+        before=np.zeros((nb, 6)), change=np.zeros((nb, 6)),
+        row=np.zeros((2, 3, 6)), reply=np.zeros((2, 3, 6)), weighed=np.zeros((2, 3, 6)),
+        inside=np.zeros((n, 3)), slack=np.zeros((n, 3)), scaling=np.zeros((n, 4)), miss=np.zeros((n, 3)),
+        extra=np.zeros((n, 3)), momenta=np.zeros((nb, 12)), settings=record,
     )  # fmt: skip

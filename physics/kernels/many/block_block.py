@@ -101,6 +101,15 @@ def _crossing(p, q, axis, bound):
 
 
 @inlined
+def _is_within(source, count, axis, sign, bound, many):
+    """Whether sign * coordinate <= bound for every vertex of the polygon in copy `source`: nothing to clip."""
+    furthest = -math.inf
+    for k in range(count):
+        furthest = max(furthest, sign * many.polygon[source, k, axis])
+    return furthest <= bound
+
+
+@inlined
 def _clip(source, count, axis, sign, bound, side, slop, many):
     """Clip the polygon in copy `source` by sign * coordinate <= bound; its vertices, now in the other copy.
 
@@ -213,8 +222,10 @@ def _clip_face(a, b, face, many):
     source, count = 0, 4
     for side in range(4):
         k, s = side // 2, 1.0 - 2.0 * (side % 2)
-        count = _clip(source, count, k, s, d[(axis + 1 + k) % 3], 4 + side, slop, many)
-        source = 1 - source
+        bound = d[(axis + 1 + k) % 3]
+        if not _is_within(source, count, k, s, bound + slop, many):
+            count = _clip(source, count, k, s, bound, 4 + side, slop, many)
+            source = 1 - source
     return source, count
 
 

@@ -74,21 +74,25 @@ def put_frame(k, n, many):
 
 
 @inlined
-def relative_velocity(k, many):
-    """Velocity of the first body's point of contact k relative to the second's, world frame [m/s]."""
+def relative_velocity(k, t, many):
+    """Velocity of the first body's point of contact k relative to the second's, for twists t, world frame [m/s]."""
     a, b = many.ends[k, 0], many.ends[k, 1]
-    v, w = vector(many.twist, a, 0), vector(many.twist, a, 3)
-    u = plus(v, 1.0, qt.cross(w, vector(many.arm, k, 0)))
+    u = plus(vector(t, a, 0), 1.0, qt.cross(vector(t, a, 3), vector(many.arm, k, 0)))
     if b >= 0:
-        v, w = vector(many.twist, b, 0), vector(many.twist, b, 3)
-        u = minus(u, plus(v, 1.0, qt.cross(w, vector(many.arm, k, 3))))
+        u = minus(u, plus(vector(t, b, 0), 1.0, qt.cross(vector(t, b, 3), vector(many.arm, k, 3))))
     return u
 
 
 @inlined
-def local_velocity(k, many):
+def velocity_along(k, t, many):
     """The same in the contact's frame: normal, tangents."""
-    return qt.matvec(matrix(many.frame, k), relative_velocity(k, many))
+    return qt.matvec(matrix(many.frame, k), relative_velocity(k, t, many))
+
+
+@inlined
+def local_velocity(k, many):
+    """`velocity_along` for the twists as they are."""
+    return velocity_along(k, many.twist, many)
 
 
 @inlined
@@ -155,7 +159,7 @@ def record(a, b, feature, owner, normal, point_a, point_b, gap, h, many):
         acceleration += many.bodies[b].acceleration
         partner = b
     put_frame(k, normal, many)
-    speed = qt.dot(normal, relative_velocity(k, many))
+    speed = qt.dot(normal, relative_velocity(k, many.twist, many))
     slop = pair_slop(a, b, many)
     if gap > slop and gap + h * speed - 0.5 * h * h * acceleration > slop:
         return True

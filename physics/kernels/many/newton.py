@@ -6,7 +6,7 @@ near the solution let
     p(x) = law(q - ρ u(x)),    u(x) = J x + b,
 
 contact by contact; x = M⁻¹ Jᵀ p(x) is a nonlinear system for the twists alone, whose Newton matrix
-1 + M⁻¹ Jᵀ ρ p' J has a 6 x 6 block where two bodies touch (`envelope`). Then q = p(x) and again. A round contracts by
+1 + M⁻¹ Jᵀ ρ p' J has a 6 x 6 block where two bodies touch (`blocks`). Then q = p(x) and again. A round contracts by
 about 1/(1 + ρ w) with w the smallest mobility that matters: the inverse of the heaviest mass that a contact may have to
 carry, whatever that contact's own mass is. So ρ is a multiple of the largest mass in the problem.
 
@@ -18,19 +18,17 @@ thrown away and ρ shrinks.
 from __future__ import annotations
 
 from physics.kernels.compiler import inlined, kernel
+from physics.kernels.many.blocks import SIZE, factor, substitute
 from physics.kernels.many.contacts import put, vector
-from physics.kernels.many.envelope import SIZE, factor, lay_out, substitute
-from physics.kernels.many.sweeps import residual_of
-from physics.kernels.many.system import defect, fill_matrix, law, take_answer
+from physics.kernels.many.elimination import order_bodies
+from physics.kernels.many.sweeps import push, residual_of
+from physics.kernels.many.system import defect, fill_matrix, law
 
 # ρ in units of the largest mass: of the guess that everything holds, with its rounds and the share of the residual
-# asked for at which they end; of the first round after that guess, and after sweeps; its growth from round to round,
-# the largest, and what it shrinks by when a round fails.
+# asked for at which they end; its growth from round to round, the largest, and what it shrinks by when a round fails.
 HOLD_FACTOR = 1.0e4
 HOLD_ROUNDS = 5
 HOLD_SHARE = 1.0e-3
-AFTER_HOLD = 10.0
-AFTER_SWEEPS = 0.1
 FACTOR_GROWTH = 10.0
 FACTOR_LIMIT = 1.0e8
 FACTOR_LOSS = 30.0
@@ -45,46 +43,45 @@ FAILED_STEPS = 2
 ROUND_SHARE = 0.01
 ENOUGH = 100.0
 
-# Multiplications of a contact in one sweep, of one in the Newton matrix, and of a row of the envelope per width².
-SWEEP_WORK = 250.0
-CONTACT_WORK = 1500.0
-BLOCK_WORK = 2.0 * SIZE**3
+# Time of a contact in one sweep, of one in an iteration with the linear system, and of a product of two blocks [ns].
+SWEEP_WORK = 100.0
+CONTACT_WORK = 350.0
+BLOCK_WORK = 90.0
 
-# Work that Newton's method may take, in that of the sweeps allowed; fewer steps than these lead nowhere.
+# Work that iterations with the system may take, in that of the sweeps allowed; fewer than these lead nowhere.
 WORTH = 4.0
 LEAST_STEPS = 6
 
 
 @inlined
-def _follow(count, many):
+def _follow(part, many):
     """Solve the factored system for the defect and take it off the twists."""
-    for i in range(count):
+    _, _, begin, end = part
+    substitute(begin, end, many.defect, many)
+    for i in range(begin, end):
+        b = many.order[i]
         for c in range(SIZE):
-            many.change[i, c] = -many.defect[many.order[i], c]
-    substitute(count, many.change, many)
-    for i in range(count):
-        for c in range(SIZE):
-            many.twist[many.order[i], c] += many.change[i, c]
+            many.twist[b, c] -= many.defect[b, c]
 
 
 @kernel
-def _newton_step(n, count, rho, norm, many):
+def _newton_step(part, rho, norm, many):
     """One damped Newton step on the twists from a defect of the given norm: the new (norm, largest velocity)."""
-    fill_matrix(n, count, rho, False, many)
-    factor(count, many)
-    for i in range(count):
+    _, _, begin, end = part
+    fill_matrix(part, rho, False, many)
+    factor(begin, end, many)
+    for i in range(begin, end):
         b = many.order[i]
         for c in range(SIZE):
-            many.change[i, c] = -many.defect[b, c]
-            many.before[b, c] = many.twist[b, c]
-    substitute(count, many.change, many)
+            many.change[b, c], many.before[b, c] = many.defect[b, c], many.twist[b, c]
+    substitute(begin, end, many.change, many)
     after, worst, t = norm, 0.0, 1.0
     for _ in range(HALVINGS):
-        for i in range(count):
+        for i in range(begin, end):
             b = many.order[i]
             for c in range(SIZE):
-                many.twist[b, c] = many.before[b, c] + t * many.change[i, c]
-        after, worst = defect(n, rho, False, many)
+                many.twist[b, c] = many.before[b, c] - t * many.change[b, c]
+        after, worst = defect(part, rho, False, many)
         if after < norm:
             break
         t *= 0.5
@@ -92,122 +89,129 @@ def _newton_step(n, count, rho, norm, many):
 
 
 @inlined
-def _apply(n, impulse, many):
-    """Twists from the free ones and the given impulses."""
-    for b in range(many.twist.shape[0]):
+def _apply(part, many):
+    """Twists from the free ones and the impulses."""
+    first, last, begin, end = part
+    for i in range(begin, end):
+        b = many.order[i]
         for c in range(SIZE):
-            many.defect[b, c] = 0.0
-    for k in range(n):
-        take_answer(k, vector(impulse, k, 0), many)
-    for b in range(many.twist.shape[0]):
-        for c in range(SIZE):
-            many.twist[b, c] = many.free[b, c] - many.defect[b, c]
+            many.twist[b, c] = many.free[b, c]
+    for i in range(first, last):
+        push(many.queue[i], vector(many.impulse, many.queue[i], 0), many.twist, many)
 
 
 @inlined
-def _copy(n, source, target):
-    for k in range(n):
-        put(target, k, 0, vector(source, k, 0))
+def _copy(part, source, target, many):
+    for i in range(part[0], part[1]):
+        put(target, many.queue[i], 0, vector(source, many.queue[i], 0))
 
 
 @inlined
-def _take_trial(n, many):
+def _take_trial(part, many):
     """Take the impulses of the last `defect`, as the law allows them, and the twists that belong to them."""
-    for k in range(n):
+    for i in range(part[0], part[1]):
+        k = many.queue[i]
         put(many.impulse, k, 0, law(vector(many.trial, k, 0), many.mu[k]))
-    _apply(n, many.impulse, many)
+    _apply(part, many)
 
 
 @inlined
-def _restore(n, many):
+def _restore(part, many):
     """Back to the best impulses met."""
-    _copy(n, many.saved, many.impulse)
-    _apply(n, many.impulse, many)
+    _copy(part, many.saved, many.impulse, many)
+    _apply(part, many)
 
 
 @kernel
-def _round(n, count, rho, enough, limit, many):
+def _round(part, rho, enough, limit, many):
     """p(x) at the x that solves x = M⁻¹ Jᵀ p(x) to `enough` [m/s], into `many.impulse` and the twists: Newton steps."""
-    norm, worst = defect(n, rho, False, many)
+    norm, worst = defect(part, rho, False, many)
     steps = failures = 0
     while worst > enough and steps < limit and failures <= FAILED_STEPS:
-        after, worst = _newton_step(n, count, rho, norm, many)
+        after, worst = _newton_step(part, rho, norm, many)
         steps += 1
         if not after < norm:
             failures += 1
         norm = after
-    _take_trial(n, many)
+    _take_trial(part, many)
     return steps
 
 
 @inlined
-def _steps_worth(n, count, sweeps, many):
-    """Newton steps that take `WORTH` times the work of so many sweeps: in a wide pile each of them is dear."""
-    work = n * CONTACT_WORK
-    for i in range(count):
-        width = i - many.first[i] + 1
-        work += BLOCK_WORK * width * width
-    return int(WORTH * sweeps * n * SWEEP_WORK / work)
-
-
-@inlined
-def _heaviest(count, many):
+def _heaviest(part, many):
     """Largest mass among the bodies of the problem [kg]."""
     mass = 0.0
-    for i in range(count):
+    for i in range(part[2], part[3]):
         mass = max(mass, many.bodies[many.order[i]].mass)
     return mass
 
 
 @kernel
-def prepare_newton(n, sweeps, many):
-    """Number the bodies for the linear system: Newton steps that the problem is worth, 0 where they are too dear.
+def prepare_system(part, sweeps, many):
+    """Order the bodies for the linear system: the iterations with it that an island is worth, 0 where it is too dear.
 
-    A problem of n contacts that may take so many sweeps is worth `WORTH` times their work.
+    A problem that may take so many sweeps is worth `WORTH` times their work.
     """
-    count = lay_out(n, many)
-    if count == 0:
-        return 0, 0
-    steps = _steps_worth(n, count, sweeps, many)
-    return count, steps if steps >= LEAST_STEPS else 0
+    first, last, begin, end = part
+    products = order_bodies(first, last, begin, end, many)
+    if products < 0:
+        return 0
+    work = (last - first) * CONTACT_WORK + products * BLOCK_WORK
+    count = int(WORTH * sweeps * (last - first) * SWEEP_WORK / work)
+    return min(count, sweeps) if count >= LEAST_STEPS else 0
+
+
+@inlined
+def save_best(part, many):
+    """Remember the impulses as they are as the best of all methods."""
+    _copy(part, many.impulse, many.best, many)
+
+
+@inlined
+def bring_back_best(part, many):
+    """The best impulses of all methods, and the twists that belong to them."""
+    _copy(part, many.best, many.impulse, many)
+    _apply(part, many)
 
 
 @kernel
-def guess_all_hold(n, count, friction, residual, goal, many):
+def guess_all_hold(part, friction, residual, goal, many):
     """Impulses as if every contact held, if that makes the residual smaller; the residual then [m/s].
 
     The law being linear, its matrix is factored once, and a few rounds of q = p(x) cost little more than one: what
     stands still is solved so far below the goal that the steps to come find nothing to do.
     """
-    rho = HOLD_FACTOR * _heaviest(count, many)
-    _copy(n, many.impulse, many.saved)
-    fill_matrix(n, count, rho, True, many)
-    factor(count, many)
+    first, last, begin, end = part
+    rho = HOLD_FACTOR * _heaviest(part, many)
+    _copy(part, many.impulse, many.saved, many)
+    fill_matrix(part, rho, True, many)
+    factor(begin, end, many)
     for _ in range(HOLD_ROUNDS):
-        defect(n, rho, True, many)
-        _follow(count, many)
-        defect(n, rho, True, many)
-        _take_trial(n, many)
-        now = residual_of(n, friction, many)
+        defect(part, rho, True, many)
+        _follow(part, many)
+        defect(part, rho, True, many)
+        _take_trial(part, many)
+        now = residual_of(first, last, friction, many)
         if not now < residual:
-            _restore(n, many)
+            _restore(part, many)
             break
         residual = now
-        _copy(n, many.impulse, many.saved)
+        _copy(part, many.impulse, many.saved, many)
         if residual <= HOLD_SHARE * goal:
             break
     return residual
 
 
 @kernel
-def newton_contacts(n, count, friction, residual, goal, limit, scale, many):
-    """Improve the impulses of the world's contact problem until the residual is within `goal` [m/s].
+def newton_contacts(part, friction, residual, goal, limit, scale, many):
+    """Improve the impulses of an island until the residual is within `goal` [m/s].
 
     Parameters
     ----------
-    n, count : int
-        Contacts, and bodies in them. `many.impulse` is the start, `many.free` the twists without any impulse;
-        `many.impulse` and `many.twist` receive the best that was met.
+    part : tuple of 4 ints
+        Its contacts `many.queue[part[0]:part[1]]` and bodies `many.order[part[2]:part[3]]`. `many.impulse` is the
+        start, `many.free` the twists without any impulse; `many.impulse` and `many.twist` receive the best that was
+        met.
     residual, goal : float
         Of the start, and asked for [m/s].
     limit : int
@@ -221,18 +225,18 @@ def newton_contacts(n, count, friction, residual, goal, limit, scale, many):
     residual : float
         [m/s], measured on what is returned.
     """
-    mass, failures, steps = _heaviest(count, many), 0, 0
-    _copy(n, many.impulse, many.saved)
+    mass, failures, steps = _heaviest(part, many), 0, 0
+    _copy(part, many.impulse, many.saved, many)
     while residual > goal and failures <= FAILED_ROUNDS and steps < limit:
         enough = ROUND_SHARE * min(ENOUGH * goal, residual)
-        steps += max(1, _round(n, count, scale * mass, enough, min(NEWTON_STEPS, limit - steps), many))
-        now = residual_of(n, friction, many)
+        steps += max(1, _round(part, scale * mass, enough, min(NEWTON_STEPS, limit - steps), many))
+        now = residual_of(part[0], part[1], friction, many)
         if now < residual:
             residual = now
-            _copy(n, many.impulse, many.saved)
+            _copy(part, many.impulse, many.saved, many)
             scale = min(FACTOR_GROWTH * scale, FACTOR_LIMIT)
         else:
             failures += 1
             scale /= FACTOR_LOSS
-            _restore(n, many)
+            _restore(part, many)
     return steps, residual

@@ -16,7 +16,7 @@ import math
 from physics.kernels import quaternion as qt
 from physics.kernels.compiler import inlined, kernel
 from physics.kernels.many.contacts import local_velocity, matrix, plus, put, vector
-from physics.kernels.point import LOST, answer
+from physics.kernels.point import LOST, answer, heading
 
 # Share of the residual asked for to which one contact is answered.
 ANSWER_SHARE = 0.1
@@ -34,10 +34,9 @@ def turned(b, a, many):
 
 
 @inlined
-def push(k, local, many):
-    """Change the twists of both bodies by an impulse of contact k, given in its frame [N s]."""
+def push(k, local, t, many):
+    """Change the twists t of both bodies by an impulse of contact k, given in its frame [N s]."""
     p = qt.transposed_matvec(matrix(many.frame, k), local)
-    t = many.twist
     a, b = many.ends[k, 0], many.ends[k, 1]
     put(t, a, 0, plus(vector(t, a, 0), many.lightness[a], p))
     put(t, a, 3, plus(vector(t, a, 3), 1.0, turned(a, qt.cross(vector(many.arm, k, 0), p), many)))
@@ -59,6 +58,22 @@ def _add_block(k, b, first, W, many):
     )  # fmt: skip
 
 
+@inlined
+def put_inverse(k, many):
+    """Write the inverse of the contact's own block: upper triangle."""
+    B = many.block
+    W = (B[k, 0], B[k, 1], B[k, 2], B[k, 4], B[k, 5], B[k, 8])
+    x, y, z = W[3] * W[5] - W[4] * W[4], W[2] * W[4] - W[1] * W[5], W[1] * W[4] - W[2] * W[3]
+    s = 1.0 / (W[0] * x + W[1] * y + W[2] * z)
+    V = many.inverse
+    V[k, 0], V[k, 1], V[k, 2] = s * x, s * y, s * z
+    V[k, 3], V[k, 4], V[k, 5] = (
+        s * (W[0] * W[5] - W[2] * W[2]),
+        s * (W[1] * W[2] - W[0] * W[4]),
+        s * (W[0] * W[3] - W[1] * W[1]),
+    )
+
+
 @kernel
 def assemble(n, many):
     """Write every contact's own block; the twists hold the warm start's impulses afterwards. Returns the scale.
@@ -78,8 +93,9 @@ def assemble(n, many):
         B[k, 6], B[k, 7], B[k, 8] = W[2], W[4], W[5]
         half = 0.5 * (W[3] - W[5])
         many.step[k] = 1.0 / (0.5 * (W[3] + W[5]) + math.sqrt(half * half + W[4] * W[4]))
+        many.queue[k] = k
     for k in range(n):
-        push(k, vector(many.impulse, k, 0), many)
+        push(k, vector(many.impulse, k, 0), many.twist, many)
     return scale
 
 
@@ -113,10 +129,11 @@ def _normal_map(p, u, W):
 
 
 @kernel
-def residual_of(n, friction, many):
-    """Largest natural-map residual of the impulses as they are [m/s]."""
+def residual_of(first, last, friction, many):
+    """Largest natural-map residual of the contacts `many.queue[first:last]`, their impulses as they are [m/s]."""
     worst = 0.0
-    for k in range(n):
+    for i in range(first, last):
+        k = many.queue[i]
         u, p = _velocity(k, many), vector(many.impulse, k, 0)
         if friction is None:
             miss = _normal_map(p[0], u[0], many.block[k, 0])
@@ -128,56 +145,65 @@ def residual_of(n, friction, many):
 
 
 @inlined
-def _answer_one(p, u, W, step, mu, goal):
+def _answer_one(k, p, u, goal, many):
     """Impulse of contact k that answers its own velocity, all others held."""
+    W, V, mu, step = matrix(many.block, k), many.inverse, many.mu[k], many.step[k]
     own = qt.matvec(W, p)
     b = (u[0] - own[0], u[1] - own[1], u[2] - own[2])
-    x = y = 0.0
-    if p[0] > 0.0:
-        x, y = p[1] / p[0], p[2] / p[0]
-        size = math.sqrt(x * x + y * y)
-        if size > 0.0:
-            x, y = mu * x / size, mu * y / size
-    what, q, _ = answer(W, b, mu, W[4] + W[8], goal, x, y, True)
+    if b[0] >= 0.0:
+        return (0.0, 0.0, 0.0)
+    q = (
+        p[0] - (V[k, 0] * u[0] + V[k, 1] * u[1] + V[k, 2] * u[2]),
+        p[1] - (V[k, 1] * u[0] + V[k, 3] * u[1] + V[k, 4] * u[2]),
+        p[2] - (V[k, 2] * u[0] + V[k, 4] * u[1] + V[k, 5] * u[2]),
+    )
+    if q[0] >= 0.0 and q[1] * q[1] + q[2] * q[2] <= (mu * q[0]) * (mu * q[0]):
+        return q
+    x, y = (p[1], p[2]) if p[0] > 0.0 and p[1] * p[1] + p[2] * p[2] > 0.0 else (q[1], q[2])
+    x, y = heading(-x, -y, mu)
+    what, q, _ = answer(W, b, mu, W[4] + W[8], goal, x, y, False)
     if what != LOST:
         return q
     # The normal impulse first, then the tangential step, back on the disk.
     normal = max(0.0, p[0] - u[0] / W[0])
     d = normal - p[0]
     x, y = _on_disk(p[1] - step * (u[1] + W[3] * d), p[2] - step * (u[2] + W[6] * d), mu * normal)
-    return normal, x, y
+    return (normal, x, y)
 
 
 @inlined
 def _visit(k, goal, friction, many):
     """Answer contact k; how far its impulse was off, as a velocity [m/s]: its residual or a little more."""
-    u, p, W = _velocity(k, many), vector(many.impulse, k, 0), matrix(many.block, k)
+    u, p, normal = _velocity(k, many), vector(many.impulse, k, 0), many.block[k, 0]
     if friction is None:
-        q = (max(0.0, p[0] - u[0] / W[0]), 0.0, 0.0)
+        q = (max(0.0, p[0] - u[0] / normal), 0.0, 0.0)
     else:
-        q = _answer_one(p, u, W, many.step[k], many.mu[k], goal)
+        q = _answer_one(k, p, u, goal, many)
     d = (q[0] - p[0], q[1] - p[1], q[2] - p[2])
     if d[0] == 0.0 and d[1] == 0.0 and d[2] == 0.0:
         return 0.0
     put(many.impulse, k, 0, q)
-    push(k, d, many)
-    return max(abs(d[0]) * W[0], max(abs(d[1]), abs(d[2])) / many.step[k])
+    push(k, d, many.twist, many)
+    return max(abs(d[0]) * normal, max(abs(d[1]), abs(d[2])) / many.step[k])
 
 
 @kernel
-def sweep_contacts(n, friction, goal, limit, many):
-    """Improve the impulses by sweeps until the residual is at most `goal` [m/s], or `limit` sweeps are done.
+def sweep_contacts(first, last, friction, residual, goal, limit, many):
+    """Improve the impulses of `many.queue[first:last]` by sweeps until the residual is at most `goal` [m/s].
 
-    `many.impulse` and `many.twist`, which belong to each other, hold the start and receive the result. Returns the
-    number of sweeps and the residual, measured on what is returned.
+    `many.impulse` and `many.twist`, which belong to each other, hold the start, whose residual is given, and receive
+    the result. Returns the number of sweeps, `limit` at most, and the residual, measured on what is returned.
     """
-    residual, sweeps = residual_of(n, friction, many), 0
+    sweeps = 0
+    if not residual <= goal and friction is not None:
+        for i in range(first, last):
+            put_inverse(many.queue[i], many)
     while not residual <= goal and sweeps < limit:
         worst = 0.0
-        for i in range(n):
-            k = i if sweeps % 2 == 0 else n - 1 - i
+        for i in range(first, last):
+            k = many.queue[i if sweeps % 2 == 0 else first + last - 1 - i]
             worst = max(worst, _visit(k, ANSWER_SHARE * goal, friction, many))
         sweeps += 1
         if worst <= goal or sweeps == limit:
-            residual = residual_of(n, friction, many)
+            residual = residual_of(first, last, friction, many)
     return sweeps, residual
