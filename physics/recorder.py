@@ -73,8 +73,8 @@ class Recorder:
     ):
         if world.actuation is not None and world.actuation.actuator.remembers:
             raise ValueError(
-                f"world has {world.actuation.actuator!r}, whose memory a recording does not hold; allowed are actuators "
-                "without lag and delay"
+                f"world has {world.actuation.actuator!r}, whose memory a recording does not hold; allowed are "
+                "actuators without lag and delay"
             )
         self.world = world
         self.keep = checks.count(keep, "keep")

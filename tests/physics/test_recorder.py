@@ -146,7 +146,7 @@ def test_an_actuator_that_remembers_is_refused_and_one_that_does_not_is_replayed
         block = physics.Block((1, 1, 1), 1.0)
         return physics.World(physics.Scene([block], effects=[physics.Actuator(limit_force=2.0, **what)]), dt=0.01)
 
-    with pytest.raises(ValueError, match="lag=0.1.*without lag and delay"):
+    with pytest.raises(ValueError, match=r"lag=0\.1.*without lag and delay"):
         physics.Recorder(world(lag=0.1))
     some = world()
     recorder = physics.Recorder(some)
