@@ -28,7 +28,8 @@ class Plan:
 
     `tilted` is on where the body frame of a body is not all there is to know of its mass: its principal axes are not
     its body axes, or its geometric centre is not its centre of mass. `many` is on where bodies touch each other, or
-    touch walls and are tied together by springs; `meeting` says whether they touch each other. `linked` is on where
+    touch walls and are tied together by springs; `meeting` says whether they touch each other, `ellipsoids` whether
+    there are any among those. `linked` is on where
     they are tied together and touch nothing. `laws` are those of `physics.kernels.laws`.
     """
 
@@ -43,6 +44,7 @@ class Plan:
     events: bool | None
     many: bool | None
     meeting: bool
+    ellipsoids: bool | None
     linked: bool | None
     features: int
     fields: tuple[FieldSlot, ...]
@@ -62,7 +64,8 @@ class Plan:
         """What distinguishes one compiled kernel from another."""
         return (
             self.contact, self.friction, self.restitution, self.gravity, self.gyroscopic, self.tilted,
-            self.pivots, self.scheme is None, self.events, self.many, self.linked, self.features, *self.laws,
+            self.pivots, self.scheme is None, self.events, self.many, self.ellipsoids, self.linked, self.features,
+            *self.laws,
             *(term.marker for term in self.terms),
         )  # fmt: skip
 
@@ -181,6 +184,7 @@ def make_plan(scene: Scene, accuracy: Accuracy) -> Plan:
         events=(scheme == EVENTS) or None,
         many=many or None,
         meeting=seen.meeting,
+        ellipsoids=(seen.meeting and any(body.kind == "ellipsoid" for body in scene.bodies)) or None,
         linked=(is_linked and not many) or None,
         features=VERTEX_COUNT if any(body.kind == "block" for body in scene.bodies) else 1,
         fields=seen.fields,
@@ -198,11 +202,6 @@ def _check_many(scene: Scene, meeting: bool, scheme: int) -> None:
             "accuracy has the scheme 'events', which knows contact of single bodies with walls only; allowed where "
             f"bodies {what} are 'fast', 'balanced' and every time-stepping scheme{hint}"
         )
-    for b, body in enumerate(scene.bodies):
-        if body.kind not in ("block", "sphere"):
-            raise ValueError(
-                f"Scene.bodies[{b}] is an {body.kind}; allowed where bodies {what} are blocks and spheres{hint}"
-            )
 
 
 def _check_laws(scene: Scene, seen: _Seen, many: bool, scheme: int) -> None:

@@ -37,7 +37,8 @@ def _contact_row(scene, contact) -> Row:
 
 def _between_row(scene, contact, many) -> Row:
     if many:
-        return Row("body contact", True, f"declared; {len(scene.bodies)} bodies", "pairs, one problem for all bodies")
+        return Row("body contact", True, f"declared; {len(scene.bodies)} bodies", "pairs, one problem for all bodies"
+                   + (", ellipsoids" if any(body.kind == "ellipsoid" for body in scene.bodies) else ""))  # fmt: skip
     if contact is None:
         return Row("body contact", False, "not declared", "")
     if len(scene.bodies) == 1:

@@ -37,18 +37,11 @@ def _plus(a, b):
 
 
 @inlined
-def arm_and_rate(shape, dims, R, w, n, feature, tilted, work):
-    """Contact point relative to the centre of mass, and its rate of change, world frame [m, m/s].
+def wandering_point(dims, R, w, n):
+    """Point of an ellipsoid with the normal -n from its centre, and its rate of change, world frame [m, m/s].
 
-    Of an ellipsoid: r = R c with c = -D e/s, e = D Rᵀ n, s = |e| and de/dt = D (Rᵀn x Rᵀω).
+    r = R c with c = -D e/s, e = D Rᵀ n, s = |e| and de/dt = D (Rᵀn x Rᵀω).
     """
-    if shape == BLOCK:
-        r = geo.vertex_arm(dims, R, feature)
-        if tilted is not None:
-            r = _plus(r, center_arm(R, work))
-        return r, qt.cross(w, r)
-    if shape == SPHERE:
-        return (-dims[0] * n[0], -dims[0] * n[1], -dims[0] * n[2]), (0.0, 0.0, 0.0)
     nb, wb = qt.transposed_matvec(R, n), qt.transposed_matvec(R, w)
     e = (dims[0] * nb[0], dims[1] * nb[1], dims[2] * nb[2])
     s = math.sqrt(qt.dot(e, e))
@@ -63,6 +56,19 @@ def arm_and_rate(shape, dims, R, w, n, feature, tilted, work):
     )
     r = qt.matvec(R, c)
     return r, _plus(qt.cross(w, r), qt.matvec(R, dc))
+
+
+@inlined
+def arm_and_rate(shape, dims, R, w, n, feature, tilted, work):
+    """Contact point relative to the centre of mass, and its rate of change, world frame [m, m/s]."""
+    if shape == BLOCK:
+        r = geo.vertex_arm(dims, R, feature)
+        if tilted is not None:
+            r = _plus(r, center_arm(R, work))
+        return r, qt.cross(w, r)
+    if shape == SPHERE:
+        return (-dims[0] * n[0], -dims[0] * n[1], -dims[0] * n[2]), (0.0, 0.0, 0.0)
+    return wandering_point(dims, R, w, n)
 
 
 @inlined

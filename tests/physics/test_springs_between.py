@@ -240,11 +240,6 @@ BAD = [
                                             [physics.Contact(between_bodies=False), tied()]), accuracy="precise"),
         "scheme 'events', .*allowed where bodies touch walls and are tied together by springs are 'fast'",
     ),
-    (
-        lambda: physics.World(physics.Scene(PAIR, [physics.HalfSpace((0, 1, 0), -5)],
-                                            [physics.Contact(between_bodies=False), tied()])),
-        r"Scene.bodies\[1\] is an ellipsoid; allowed where bodies touch walls and are tied",
-    ),
 ]  # fmt: skip
 
 

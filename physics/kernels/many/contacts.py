@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import math
 
+from physics.kernels import geometry as geo
 from physics.kernels import quaternion as qt
 from physics.kernels.compiler import inlined, kernel
-from physics.kernels.layout import SPHERE
+from physics.kernels.layout import ELLIPSOID, SPHERE
 from physics.kernels.many.arrays import CONTACTS, LEFT_OUT
 
 # Contact features that two bodies, or a body and a wall, can have: what a contact's name is made with.
@@ -181,11 +182,15 @@ def record(a, b, feature, owner, normal, point_a, point_b, gap, h, many):
 def _carried(b, k, first, side, n, many):
     """Point of body b in contact k from its centre of mass, world frame [m]: carried along as the body turns.
 
-    That of a sphere stays where it is along the normal: turning brings another point there.
+    That of a round body is where its normal is that of the contact: turning brings another point there.
     """
-    if many.bodies[b].shape == SPHERE:
-        r = side * many.bodies[b].dims[0]
+    shape, d = many.bodies[b].shape, many.bodies[b].dims
+    if shape == SPHERE:
+        r = side * d[0]
         return (r * n[0], r * n[1], r * n[2])
+    if shape == ELLIPSOID:
+        dims, R, m = (d[0], d[1], d[2]), matrix(many.rotation, b), (-side * n[0], -side * n[1], -side * n[2])
+        return geo.support_arm(shape, dims, R, m, geo.scaled_normal(shape, dims, R, m))
     return qt.matvec(matrix(many.rotation, b), vector(many.anchor, k, first))
 
 

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from physics.kernels import layout as at
 from physics.kernels import quaternion as qt
+from physics.kernels.arms import wandering_point
 from physics.kernels.body import angular_velocity, read_state, write_state
 from physics.kernels.compiler import inlined, kernel
 from physics.kernels.contact import CLOSING_SHARE, UNSEEN, gainless
 from physics.kernels.fields.linked import hold_linked_loads
 from physics.kernels.fields.loads import hold_contact_loads, hold_loads
 from physics.kernels.flight import drift
-from physics.kernels.layout import SPHERE
+from physics.kernels.layout import ELLIPSOID, SPHERE
 from physics.kernels.many import memory as kept
 from physics.kernels.many.contacts import (
     acceleration_of,
@@ -42,11 +43,16 @@ def drift_body(b, h, gyroscopic, tilted, many):
 
 
 @inlined
-def _centripetal(b, k, first, many):
-    """ω x (ω x r) of one end of contact k, world frame [m/s²]; 0 of a sphere, whose point of contact does not turn."""
-    if many.bodies[b].shape == SPHERE:
+def _centripetal(b, k, first, side, many):
+    """ω x ṙ of one end of contact k, world frame [m/s²]; 0 of a sphere, whose point of contact does not turn."""
+    shape, w = many.bodies[b].shape, vector(many.twist, b, 3)
+    if shape == SPHERE:
         return (0.0, 0.0, 0.0)
-    w = vector(many.twist, b, 3)
+    if shape == ELLIPSOID:
+        d, n = many.bodies[b].dims, vector(many.frame, k, 0)
+        n = (-side * n[0], -side * n[1], -side * n[2])
+        _, rate = wandering_point((d[0], d[1], d[2]), matrix(many.rotation, b), w, n)
+        return qt.cross(w, rate)
     return qt.cross(w, qt.cross(w, vector(many.arm, k, first)))
 
 
@@ -60,9 +66,9 @@ def aim_rest(n, h, many):
     for k in range(n):
         a, b = many.ends[k, 0], many.ends[k, 1]
         slop = pair_slop(a, b, many)
-        c = _centripetal(a, k, 0, many)
+        c = _centripetal(a, k, 0, -1.0, many)
         if b >= 0:
-            c = minus(c, _centripetal(b, k, 3, many))
+            c = minus(c, _centripetal(b, k, 3, 1.0, many))
         t = qt.matvec(matrix(many.frame, k), (-half * c[0], -half * c[1], -half * c[2]))
         t = gainless(t, local_velocity(k, many))
         if many.gap[k] > slop:

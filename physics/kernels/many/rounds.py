@@ -189,7 +189,7 @@ def direction_between(A, is_block, B, dims, d, n):
 
 
 @inlined
-def start_from(A, d):
+def start_from(d):
     """Direction from the centre of b, the origin, to that of a; any where they are the same."""
     size = math.sqrt(qt.dot(d, d))
     if size > 0.0:

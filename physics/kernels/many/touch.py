@@ -7,11 +7,12 @@ import math
 from physics.kernels import geometry as geo
 from physics.kernels import quaternion as qt
 from physics.kernels.compiler import inlined, kernel
-from physics.kernels.layout import BLOCK, NORMAL, OFFSET, SPHERE, VERTEX_COUNT
+from physics.kernels.layout import BLOCK, ELLIPSOID, NORMAL, OFFSET, SPHERE, VERTEX_COUNT
 from physics.kernels.many.arrays import CONTACTS, PAIRS
 from physics.kernels.many.block_block import touch_blocks
 from physics.kernels.many.contacts import matrix, minus, pair_slop, plus, record, vector
 from physics.kernels.many.near import find_pairs, reach
+from physics.kernels.many.rounds import block_point, direction_between, point_of, squares_of, start_from
 
 
 @kernel
@@ -89,9 +90,50 @@ def touch_sphere_block(a, b, margin, h, many):
         record(a, b, 0, -1, (-n[0], -n[1], -n[2]), on_block, on_ball, distance - r, h, many)
 
 
+@inlined
+def _turned_back(R, S):
+    """Rᵀ S: from the frame of S to that of R."""
+    x = qt.transposed_matvec(R, (S[0], S[3], S[6]))
+    y = qt.transposed_matvec(R, (S[1], S[4], S[7]))
+    z = qt.transposed_matvec(R, (S[2], S[5], S[8]))
+    return (x[0], y[0], z[0], x[1], y[1], z[1], x[2], y[2], z[2])
+
+
 @kernel
-def find_contacts(h, many):
-    """Write the contact set of the bodies where they are, for a stage of length h."""
+def touch_ellipsoid(a, b, margin, h, many):
+    """Add the contact of an ellipsoid and any body, whichever of the two is a; in the frame of the other one."""
+    first, second = a, b
+    if many.bodies[a].shape != ELLIPSOID:
+        first, second = b, a
+    R, size, d = matrix(many.rotation, second), many.bodies[second].dims, many.bodies[first].dims
+    x, dims = vector(many.place, second, 0), (size[0], size[1], size[2])
+    way = qt.transposed_matvec(R, minus(vector(many.place, first, 0), x))
+    A = squares_of(_turned_back(R, matrix(many.rotation, first)), (d[0], d[1], d[2]))
+    B = (size[0] * size[0], 0.0, 0.0, size[1] * size[1], 0.0, size[2] * size[2])
+    is_block = many.bodies[second].shape == BLOCK
+    start = nearest_in_block(way, dims)[1] if is_block else start_from(way)
+    n, gap = direction_between(A, is_block, B, dims, way, start)
+    if gap > margin:
+        return
+    on_first = minus(way, point_of(A, n)[1])
+    on_second = block_point(dims, n, on_first) if is_block else point_of(B, n)[1]
+    n, on_first, on_second = (
+        qt.matvec(R, n),
+        plus(x, 1.0, qt.matvec(R, on_first)),
+        plus(x, 1.0, qt.matvec(R, on_second)),
+    )
+    if first == a:
+        record(a, b, 0, -1, n, on_first, on_second, gap, h, many)
+    else:
+        record(a, b, 0, -1, (-n[0], -n[1], -n[2]), on_second, on_first, gap, h, many)
+
+
+@kernel
+def find_contacts(h, ellipsoids, many):
+    """Write the contact set of the bodies where they are, for a stage of length h.
+
+    `ellipsoids` is None where the scene has none.
+    """
     many.counts[CONTACTS] = 0
     bodies = many.bodies
     for b in range(bodies.shape[0]):
@@ -106,6 +148,10 @@ def find_contacts(h, many):
         a, b = many.pairs[k, 0], many.pairs[k, 1]
         margin = reach(a, h, many) + reach(b, h, many) + pair_slop(a, b, many)
         first, second = bodies[a].shape, bodies[b].shape
+        if ellipsoids is not None:  # noqa: SIM102 (a branch of its own is what the compiler prunes)
+            if first == ELLIPSOID or second == ELLIPSOID:
+                touch_ellipsoid(a, b, margin, h, many)
+                continue
         if first == BLOCK and second == BLOCK:
             touch_blocks(a, b, margin, h, many)
         elif first == SPHERE and second == SPHERE:
