@@ -4,7 +4,8 @@ A warm start that still solves the problem costs one look at the residual. Else 
 (`islands`), and each that is not solved yet takes, in this order, as far as it is needed:
 
 1. where there is one contact one sweep, which is exact then;
-2. the guess that everything holds: one linear system, the answer for what stands still, far below what is asked;
+2. the guess that everything holds, unless the warm start says otherwise: one linear system, the answer for what stands
+   still, far below what is asked;
 3. a few sweeps, the answer for what meets and parts;
 4. an interior-point method, which finds what holds, slides and opens whatever the start, and Newton's method on the
    twists from there, in turns.
@@ -15,7 +16,7 @@ to 4. All iterations together are no more than the sweeps allowed, but for those
 
 from __future__ import annotations
 
-from physics.kernels.compiler import kernel
+from physics.kernels.compiler import inlined, kernel
 from physics.kernels.many.interior import interior_point
 from physics.kernels.many.islands import find_islands
 from physics.kernels.many.newton import (
@@ -68,6 +69,15 @@ def solve_hard(part, friction, scale, residual, goal, limit, many):
     return count, best
 
 
+@inlined
+def is_mixed(part, many):
+    """Whether in the warm start some contacts push and some do not: then not all of them will hold."""
+    pushing = 0
+    for i in range(part[0], part[1]):
+        pushing += 1 if many.impulse[many.queue[i], 0] > 0.0 else 0
+    return 0 < pushing < part[1] - part[0]
+
+
 @kernel
 def solve_island(part, friction, scale, residual, goal, many):
     """Solve one island from impulses of the given residual [m/s]: (iterations, residual, method)."""
@@ -77,9 +87,10 @@ def solve_island(part, friction, scale, residual, goal, many):
     if steps == 0:
         count, residual = sweep_contacts(first, last, friction, residual, goal, limit if last - first > 1 else 1, many)
         return count, residual, SWEEPS
-    residual = guess_all_hold(part, friction, residual, goal, many)
-    if residual <= goal:
-        return 1, residual, NEWTON
+    if not is_mixed(part, many):
+        residual = guess_all_hold(part, friction, residual, goal, many)
+        if residual <= goal:
+            return 1, residual, NEWTON
     count, residual = sweep_contacts(first, last, friction, residual, goal, FIRST_SWEEPS, many)
     if residual <= goal:
         return 1 + count, residual, NEWTON
