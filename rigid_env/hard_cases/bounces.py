@@ -198,9 +198,4 @@ CASES = (
         9, "tumbling-block", "tumbling block in a closed box, e = 1", "energy constant; a replay has the same bits",
         tumbling,
     ),
-    Case(
-        11, "superball", "superball: tangential restitution",
-        "v' = v - (2/7)(1+e_t)(v+rω), rω' = rω - (5/7)(1+e_t)(v+rω)",
-        missing="tangential restitution is not an effect yet",
-    ),
 )  # fmt: skip

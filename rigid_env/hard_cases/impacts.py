@@ -14,6 +14,7 @@ from physics.scenes import GRAVITY, MASS, SIZE
 from rigid_env.hard_cases.case import Case, Check, Setting, none_of
 from rigid_env.hard_cases.scenery import (
     EPS,
+    FLOOR,
     attitude,
     block,
     boxed,
@@ -47,6 +48,30 @@ def _signed(world, aim, room: float) -> np.ndarray:
     """Velocity with what further hits of the far walls have turned round turned back."""
     hits = np.floor((np.abs(aim) * world.time + room) / (2 * room))
     return world.linvel[0, 0] * np.where(np.mod(hits, 2) == 0, -1.0, 1.0)
+
+
+def superball(on: Setting) -> Sequence[Check]:
+    """A sphere with tangential restitution e_t: its point of contact leaves with -e_t times its slip u = v + ω x (-r n).
+
+    The impulse J along the wall changes v by J/m and ω by (-r n) x J/I, I = (2/5) m r², and u by (7/2) J/m: so
+    Δv = -(2/7)(1+e_t) u, and r Δω is 5/2 of it (R. L. Garwin, *Kinematics of an ultraelastic rough ball*, Am. J. Phys.
+    37, 1969). Friction is large enough for all of it. A handful of rounded numbers of size 10, but for the tolerance of
+    the contact problem that several laws at once may need.
+    """
+    radius, e, worst, worst_spin = 0.5, 0.6, 0.0, 0.0
+    v, w, n = np.array([3.0, -4.0, 1.0]), np.array([0.5, 2.0, -3.0]), np.array([0.0, 1.0, 0.0])
+    for tangential in (-1.0, 0.0, 0.4, 1.0):
+        body = physics.Sphere(radius, 2.0, pos=(0, radius, 0), linvel=v, angvel=w)
+        effects = [physics.Contact(e, tangential=tangential), physics.Friction(50.0)]
+        world = on.world(physics.Scene([body], [FLOOR], effects))
+        world.step()
+        slip = v + np.cross(w, -radius * n)
+        change = -2 / 7 * (1 + tangential) * (slip - (slip @ n) * n)
+        speed = v + change - (1 + e) * (v @ n) * n
+        spin = w + 2.5 / radius**2 * np.cross(-radius * n, change)
+        worst = max(worst, np.abs(world.linvel[0, 0] - speed).max())
+        worst_spin = max(worst_spin, np.abs(world.angvel[0, 0] - spin).max())
+    return [Check("error of v', four e_t", worst, 1e-12, "m/s"), Check("error of ω'", worst_spin, 1e-11, "rad/s")]
 
 
 def rod(on: Setting) -> Sequence[Check]:
@@ -155,6 +180,10 @@ CASES = (
     Case(
         10, "corner", "sphere into a corner, e = 1", "v' = -v, whichever wall comes first, or all at once", corner,
         peers=True,
+    ),
+    Case(
+        11, "superball", "superball: tangential restitution",
+        "v' = v - (2/7)(1+e_t)(v+rω), rω' = rω - (5/7)(1+e_t)(v+rω)", superball,
     ),
     Case(
         13, "rod", "one end of a rod hits at an angle θ, μ = 0",
