@@ -80,7 +80,7 @@ def test_the_normal_of_two_blocks_separates_them_most(seed, distance):
     many = blocks([np.zeros(3), distance * direction], [rotation(rng), rotation(rng)], halves)
     h = 10.0  # the margin is the way that the loads could bring the blocks in h: gaps up to a m/s² h² = 100 m count
     many.bodies["acceleration"] = 1.0
-    find_contacts(h, many)
+    find_contacts(h, None, many)
     n = many.counts[CONTACTS]
     assert n > 0
     normal = many.frame[0, :3]
@@ -115,7 +115,7 @@ def test_names_of_equal_stacked_blocks_do_not_change_with_rounding():
     names = []
     for shift in (0.0, 1e-15, -1e-15):
         many = blocks([[0, 0, 0], [shift, 1, shift]], [np.eye(3), np.eye(3)], np.full((2, 3), 0.5))
-        find_contacts(0.01, many)
+        find_contacts(0.01, None, many)
         names.append(sorted(many.name[: many.counts[CONTACTS]].tolist()))
     assert len(names[0]) == 4
     assert names[0] == names[1] == names[2]
