@@ -55,8 +55,7 @@ def superball(on: Setting) -> Sequence[Check]:
 
     The impulse J along the wall changes v by J/m and ω by (-r n) x J/I, I = (2/5) m r², and u by (7/2) J/m: so
     Δv = -(2/7)(1+e_t) u, and r Δω is 5/2 of it (R. L. Garwin, *Kinematics of an ultraelastic rough ball*, Am. J. Phys.
-    37, 1969). Friction is large enough for all of it. A handful of rounded numbers of size 10, but for the tolerance of
-    the contact problem that several laws at once may need.
+    37, 1969). Friction is large enough for all of it. A handful of rounded numbers of size 10.
     """
     radius, e, worst, worst_spin = 0.5, 0.6, 0.0, 0.0
     v, w, n = np.array([3.0, -4.0, 1.0]), np.array([0.5, 2.0, -3.0]), np.array([0.0, 1.0, 0.0])
