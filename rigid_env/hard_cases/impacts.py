@@ -51,7 +51,7 @@ def _signed(world, aim, room: float) -> np.ndarray:
 
 
 def superball(on: Setting) -> Sequence[Check]:
-    """A sphere with tangential restitution e_t: its point of contact leaves with -e_t times its slip u = v + ω x (-r n).
+    """A sphere with tangential restitution e_t: its point of contact leaves at -e_t times its slip u = v + ω x (-r n).
 
     The impulse J along the wall changes v by J/m and ω by (-r n) x J/I, I = (2/5) m r², and u by (7/2) J/m: so
     Δv = -(2/7)(1+e_t) u, and r Δω is 5/2 of it (R. L. Garwin, *Kinematics of an ultraelastic rough ball*, Am. J. Phys.
