@@ -21,6 +21,7 @@ from rich.table import Table
 
 from agents.checkpoint import load_policy
 from agents.config import HYPERPARAMETERS, RunConfig, RunFolder, make_config
+from agents.curve import plot_transfer
 from agents.evaluate import JsonOption, evaluate, write_json
 from agents.train import DEFAULTS, INTERRUPTED, Interrupted, train
 from physics.accuracy import PRESETS
@@ -137,6 +138,7 @@ def main(
     hyperparameters: Annotated[Path, typer.Option(help="YAML file.", exists=True)] = HYPERPARAMETERS,
     out: Annotated[Path, typer.Option(help="Where the runs are kept; done ones are not repeated.")] = Path("transfer"),
     json_file: JsonOption = None,
+    plot: Annotated[Path | None, typer.Option(metavar="FILE", help="Draw the picture here.")] = None,
 ) -> None:
     """Train one policy per accuracy, evaluate each at `reference`: success against training time."""
     console, rows = Console(), []
@@ -156,6 +158,9 @@ def main(
         console.print(str(interruption), soft_wrap=True, highlight=False)
         raise typer.Exit(INTERRUPTED) from interruption
     console.print(make_table(env, rows))
+    if plot is not None:
+        plot.parent.mkdir(parents=True, exist_ok=True)
+        plot_transfer(rows, f"{env}: trained at an accuracy, judged at {TRUTH}", plot)
     if json_file is not None:
         write_json(json_file, {"env": env, "algo": algo, "seed": seed, "rows": [asdict(row) for row in rows]})
 

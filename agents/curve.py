@@ -113,3 +113,31 @@ def plot_curve(points: list[CurvePoint], target: float, title: str, path: Path) 
     axes[1, 0].set_ylabel("mean return")
     figure.suptitle(f"{title}, mean of the last {WINDOW} episodes")
     figure.savefig(path, dpi=110)
+
+
+def plot_transfer(rows: list, title: str, path: Path) -> None:
+    """Draw success at `reference` against training time as PNG, with intervals of 95 %, one mark per accuracy.
+
+    Parameters
+    ----------
+    rows : list of agents.accuracy_transfer.Transfer
+    title : str
+    path : Path
+    """
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(6.5, 4.5), layout="constrained")
+    axis = figure.subplots()
+    for row in rows:
+        rate, (low, high) = row.truth["success_rate"], row.truth["interval"]
+        bars = [[rate - low], [high - rate]]
+        axis.errorbar(row.training_seconds, rate, bars, marker="o", capsize=4, label=row.accuracy)
+        axis.plot(row.training_seconds, row.own["success_rate"], marker="x", color="grey")
+    axis.plot([], [], marker="x", color="grey", linestyle="none", label="where it was trained")
+    axis.set_xscale("log")
+    axis.set_xlabel("training [s]")
+    axis.set_ylabel("success at reference")
+    axis.grid(alpha=0.3, which="both")
+    axis.legend()
+    axis.set_title(title)
+    figure.savefig(path, dpi=110)

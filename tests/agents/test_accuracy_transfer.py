@@ -10,6 +10,7 @@ from rich.console import Console
 
 from agents import accuracy_transfer as module
 from agents.config import RunFolder
+from agents.curve import plot_transfer
 
 
 @pytest.fixture
@@ -56,3 +57,13 @@ def test_table_has_a_row_per_accuracy():
     seen = {"success_rate": 0.9, "interval": [0.88, 0.92]}
     rows = [module.Transfer(name, 10.0, 1_000_000, True, seen, seen) for name in ("fast", "balanced")]
     assert module.make_table("rigid_env/BlockReach-v0", rows).row_count == 2
+
+
+def test_picture_has_a_mark_per_accuracy(tmp_path):
+    pytest.importorskip("matplotlib")
+    seen = {"success_rate": 0.9, "interval": [0.88, 0.92]}
+    few = [module.Transfer("fast", 10.0, 1_000_000, True, seen, seen)]
+    more = [*few, module.Transfer("precise", 100.0, 1_000_000, True, seen, seen)]
+    for name, rows in (("few", few), ("more", more)):
+        plot_transfer(rows, "a title", tmp_path / f"{name}.png")
+    assert (tmp_path / "few.png").read_bytes() != (tmp_path / "more.png").read_bytes()
