@@ -18,6 +18,9 @@ CLOSING_SHARE = 0.3431457505076198
 # of the first one's impact is half a slop off: an edge that comes down again does so with both its ends at once.
 TOGETHER = 3.0
 
+# Turn in a stage beyond which accelerations at its middle say nothing about its end any more [rad].
+LARGEST_TURN = 0.5
+
 # Share of the slop below which the displacement of a contact in one step does not count.
 UNSEEN = 1.0e-3
 
@@ -273,7 +276,7 @@ def aim_rest(n, v, w, alpha, R, h, tilted, work):
     """
     walls, features, shape = work.walls, work.features, work.shape
     half = 0.5 * h
-    is_turning = (w[0] != 0.0 or w[1] != 0.0 or w[2] != 0.0) and shape != SPHERE
+    is_turning = 0.0 < qt.dot(w, w) * h * h <= LARGEST_TURN * LARGEST_TURN and shape != SPHERE
     negligible = max(work.tolerance * work.acceleration * h, UNSEEN * work.slop / h)
     share = 1.0 if work.is_last else CLOSING_SHARE
     for i in range(n):

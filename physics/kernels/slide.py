@@ -123,11 +123,14 @@ def _store(n, friction, work):
     """Impulses of the contacts that push to `work.impulse`, zero for the open ones."""
     width = 1 if friction is None else 3
     for i in range(n):
-        p = max(work.patch[i, P], 0.0)
-        work.impulse[width * i] = p
-        if friction is not None:
-            work.impulse[width * i + 1] = p * work.patch[i, X]
-            work.impulse[width * i + 2] = p * work.patch[i, Y]
+        for c in range(width):
+            work.impulse[width * i + c] = 0.0  # an open contact's direction may be no number
+        p = work.patch[i, P]
+        if p > 0.0:
+            work.impulse[width * i] = p
+            if friction is not None:
+                work.impulse[width * i + 1] = p * work.patch[i, X]
+                work.impulse[width * i + 2] = p * work.patch[i, Y]
 
 
 @inlined

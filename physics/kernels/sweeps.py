@@ -119,8 +119,8 @@ def velocities(rows, W, p, b, u):
 
 @kernel
 def cone_residual(n, p, u, mu, local):
-    """Largest natural-map residual over the contacts [m/s]; see the module docstring."""
-    worst = 0.0
+    """Largest natural-map residual over the contacts [m/s]; see the module docstring. Infinite if u is no number."""
+    worst = check = 0.0
     for i in range(n):
         r = 3 * i
         rho, rho_t = local[i, NORMAL_STEP], local[i, TANGENTIAL_STEP]
@@ -132,7 +132,8 @@ def cone_residual(n, p, u, mu, local):
             y *= limit / size
         dx, dy = p[r + 1] - x, p[r + 2] - y
         worst = max(worst, math.sqrt(dx * dx + dy * dy) / rho_t)
-    return worst
+        check += u[r]
+    return worst if math.isfinite(check) else math.inf
 
 
 @kernel

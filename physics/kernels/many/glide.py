@@ -7,7 +7,7 @@ from physics.kernels import quaternion as qt
 from physics.kernels.arms import wandering_point
 from physics.kernels.body import angular_velocity, read_state, write_state
 from physics.kernels.compiler import inlined, kernel
-from physics.kernels.contact import CLOSING_SHARE, UNSEEN, gainless
+from physics.kernels.contact import CLOSING_SHARE, LARGEST_TURN, UNSEEN, gainless
 from physics.kernels.fields.linked import hold_linked_loads
 from physics.kernels.fields.loads import hold_contact_loads, hold_loads
 from physics.kernels.flight import drift
@@ -43,10 +43,13 @@ def drift_body(b, h, gyroscopic, tilted, many):
 
 
 @inlined
-def _centripetal(b, k, first, side, many):
-    """ω x ṙ of one end of contact k, world frame [m/s²]; 0 of a sphere, whose point of contact does not turn."""
+def _centripetal(b, k, first, side, h, many):
+    """ω x ṙ of one end of contact k, world frame [m/s²].
+
+    0 of a sphere, whose point of contact does not turn, and where it says nothing about the end of a stage of length h.
+    """
     shape, w = many.bodies[b].shape, vector(many.twist, b, 3)
-    if shape == SPHERE:
+    if shape == SPHERE or qt.dot(w, w) * h * h > LARGEST_TURN * LARGEST_TURN:
         return (0.0, 0.0, 0.0)
     if shape == ELLIPSOID:
         d, n = many.bodies[b].dims, vector(many.frame, k, 0)
@@ -66,9 +69,9 @@ def aim_rest(n, h, many):
     for k in range(n):
         a, b = many.ends[k, 0], many.ends[k, 1]
         slop = pair_slop(a, b, many)
-        c = _centripetal(a, k, 0, -1.0, many)
+        c = _centripetal(a, k, 0, -1.0, h, many)
         if b >= 0:
-            c = minus(c, _centripetal(b, k, 3, 1.0, many))
+            c = minus(c, _centripetal(b, k, 3, 1.0, h, many))
         t = qt.matvec(matrix(many.frame, k), (-half * c[0], -half * c[1], -half * c[2]))
         t = gainless(t, local_velocity(k, many))
         if many.gap[k] > slop:

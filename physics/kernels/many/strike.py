@@ -31,15 +31,22 @@ def bounces(k, h, many):
 
 
 @inlined
+def fast_speed(k, h, many):
+    """Speed that closes `FAST_SHARE` of the smaller radius within h [m/s]."""
+    a, b = many.ends[k, 0], many.ends[k, 1]
+    radius = many.bodies[a].radius
+    if b >= 0:
+        radius = min(radius, many.bodies[b].radius)
+    return FAST_SHARE * radius / h
+
+
+@inlined
 def is_meeting(k, h, many):
     """Whether contact k is still apart and to be met in time: it bounces, or is fast."""
     a, b = many.ends[k, 0], many.ends[k, 1]
     if not (many.gap[k] > pair_slop(a, b, many) and many.speed[k] < 0.0):
         return False
-    radius = many.bodies[a].radius
-    if b >= 0:
-        radius = min(radius, many.bodies[b].radius)
-    return bounces(k, h, many) or -many.speed[k] * h > FAST_SHARE * radius
+    return bounces(k, h, many) or -many.speed[k] > fast_speed(k, h, many)
 
 
 @inlined
@@ -47,13 +54,14 @@ def aim_impact(n, h, is_last, many):
     """Targets of an impact, and whether there is one; see `physics.kernels.contact.aim_impact`.
 
     What approaches no faster than loads make it within `rest_share` of the step, or would go in by a few slops only
-    until the middle of it, is left to the resting stage.
+    until the middle of it, is left to the resting stage, unless it is fast.
     """
     is_impact = False
     for k in range(n):
         slop = pair_slop(many.ends[k, 0], many.ends[k, 1], many)
         gap, speed, goal = many.gap[k], many.speed[k], 0.0
         slow = max(2.0 * SOFT_LANDING * slop / h, many.settings[0].rest_share * acceleration_of(k, many) * h)
+        slow = min(slow, fast_speed(k, h, many))
         if gap > slop:
             goal = -gap / h
             if not is_last and is_meeting(k, h, many):
@@ -83,14 +91,43 @@ def leave_out_the_free(n, many):
     return left
 
 
+@inlined
+def _mark(k, many):
+    many.touched[many.ends[k, 0]] = 1
+    if many.ends[k, 1] >= 0:
+        many.touched[many.ends[k, 1]] = 1
+
+
+@inlined
+def keep_the_crowded(n, many):
+    """Keep those without a target whose bodies are in other contacts of the set, or in some that are kept for this.
+
+    Loads alone do not bring them together in this stage, but what pushes these bodies may.
+    """
+    for b in range(many.touched.shape[0]):
+        many.touched[b] = 0
+    for k in range(n):
+        if many.target[k, 0] > -FAR:
+            _mark(k, many)
+    is_growing = True
+    while is_growing:
+        is_growing = False
+        for k in range(n):
+            a, b = many.ends[k, 0], many.ends[k, 1]
+            if not many.target[k, 0] > -FAR and (many.touched[a] == 1 or (b >= 0 and many.touched[b] == 1)):
+                many.target[k, 0], is_growing = 0.0, True
+                _mark(k, many)
+
+
 @kernel
 def strike(n, world, h, is_last, friction, tilted, report, many):
     """Velocities after the impulses of the contacts that approach; nothing where none does. Contacts in the set."""
     is_impact = aim_impact(n, h, is_last, many)
     meeting = time_until_meeting(n, h, is_last, many)
-    n = leave_out_the_free(n, many)
     if not is_impact:
-        return n, meeting, False
+        keep_the_crowded(n, many)
+        return leave_out_the_free(n, many), meeting, False
+    n = leave_out_the_free(n, many)
     settle_restrained(n, world, friction, tilted, report, many)
     return n, meeting, True
 
