@@ -340,7 +340,10 @@ class World:
             array[...] = value
         self.time = snapshot.time
         if self.actuation is not None:
-            self.actuation.put_back(snapshot.actuation)
+            if snapshot.actuation is None:  # of a world without an actuator: there is nothing to go on with
+                self.actuation.forget(np.arange(self.worlds))
+            else:
+                self.actuation.put_back(snapshot.actuation)
         if self.recorder is not None:
             self.recorder.changed(slice(None))
 

@@ -308,6 +308,7 @@ def touch_blocks(a, b, margin, h, many):
     if is_face or is_along_face(edges, face, many):
         if not is_clipped:
             source, count = _clip_face(a, b, face, many)
-        _touch_face(a, b, face, source, count, max(apart, further), h, many)
-    else:
-        _touch_edges(a, b, edges, further, h, many)
+        if is_face or count > 0:
+            _touch_face(a, b, face, source, count, max(apart, further), h, many)
+            return
+    _touch_edges(a, b, edges, further, h, many)
