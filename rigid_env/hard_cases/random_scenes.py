@@ -295,13 +295,7 @@ def random_scenes(setting: Setting) -> list[Check]:
     return checks
 
 
-FOUND = (
-    "one world in some hundreds with several bodies gains a share of its energy a little above the limit in a step "
-    "(6e-5, 8e-4); not looked into yet; python -m benchmarks.soak keeps such steps as recordings"
-)
-
 CASES = (
     Case(47, "random-scenes", "100,000 random scenes, forces up to 1,000,000 times the weight",
-         "no NaN, no exception, no escape, energy never above what was put in", random_scenes,
-         faults={"balanced": FOUND, "fast": FOUND}),
+         "no NaN, no exception, no escape, energy never above what was put in", random_scenes),
 )  # fmt: skip
