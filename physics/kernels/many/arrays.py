@@ -20,6 +20,9 @@ PAIR_CONTACTS = 8
 # Pairs near each other at once, per body: twelve spheres touch one of their size, and each pair counts for two.
 PAIRS_PER_BODY = 8
 
+# Entries of all columns of the broad phase, per body.
+ENTRIES_PER_BODY = 4
+
 # Blocks of the linear system of `blocks` per body: where more are needed Newton's method is left out.
 BLOCKS_PER_BODY = 32
 
@@ -47,7 +50,10 @@ class Many(NamedTuple):
     box: np.ndarray  # lower, then upper corner of the box along the world axes, motion of the stage included [m]
     touched: np.ndarray  # 1: the body is in a contact of this stage
     order: np.ndarray  # bodies by the lower end of their boxes
-    merged: np.ndarray  # scratch of sorting
+    merged: np.ndarray  # scratch of sorting; then places of the bodies in `order`
+    first_entry: np.ndarray  # of `columns`: where the bodies of a column begin in `entry`, and where to go on
+    cursor: np.ndarray
+    entry: np.ndarray
     walls: np.ndarray  # columns of `layout`
     pairs: np.ndarray  # bodies whose boxes overlap
     counts: np.ndarray
@@ -148,7 +154,8 @@ def make_many(
     return Many(
         bodies=rows, now=np.zeros((nb, STATE_SIZE)), rotation=np.zeros((nb, 9)), lightness=np.zeros(nb),
         turning=np.zeros((nb, 6)), twist=np.zeros((nb, 6)), place=np.zeros((nb, 3)), box=np.zeros((nb, 6)),
-        touched=np.zeros(nb, i), order=np.arange(nb, dtype=i), merged=np.zeros(nb, i), walls=walls.copy(),
+        touched=np.zeros(nb, i), order=np.arange(nb, dtype=i), merged=np.zeros(nb, i),
+        first_entry=np.zeros(nb + 1, i), cursor=np.zeros(nb, i), entry=np.zeros(ENTRIES_PER_BODY * nb, i), walls=walls.copy(),
         pairs=np.zeros((pairs, 2), i), counts=np.zeros(3, i), ends=np.zeros((n, 2), i), name=np.zeros(n, i),
         owner=np.zeros(n, i), normal=np.zeros((n, 3), f), anchor=np.zeros((n, 6)), frame=np.zeros((n, 9)),
         arm=np.zeros((n, 6)), gap=np.zeros(n), speed=np.zeros(n), mu=np.zeros(n), bounce=np.zeros(n),

@@ -1,7 +1,9 @@
 """Broad phase: which bodies may touch within a stage.
 
 Sweep and prune: the boxes around the bodies, the motion of the stage included, are sorted along the world axis on
-which the bodies are spread most; a body is then compared with those behind it until one begins beyond its end.
+which the bodies are spread most; a body is then compared with those behind it until one begins beyond its end. Many
+bodies are compared within columns along that axis only (`columns`). The pairs come in the order of the sweep, however
+the columns are cut.
 
 Reference: D. Baraff, *Dynamic simulation of non-penetrating rigid bodies*, PhD thesis, Cornell, 1992, section 2.3.
 """
@@ -12,6 +14,7 @@ from physics.kernels import geometry as geo
 from physics.kernels.compiler import inlined, kernel
 from physics.kernels.layout import SPHERE
 from physics.kernels.many.arrays import LEFT_OUT, PAIRS
+from physics.kernels.many.columns import columns_of, fill_columns
 
 
 @inlined
@@ -98,24 +101,61 @@ def _overlap(a, b, many):
     return True
 
 
+@inlined
+def _sort_behind(first, last, many):
+    """Sort the new pairs `many.pairs[first:last]`, whose first body is the same, by the place of the second one."""
+    pairs, rank = many.pairs, many.merged
+    for i in range(first + 1, last):
+        b, j = pairs[i, 1], i
+        while j > first and rank[pairs[j - 1, 1]] > rank[b]:
+            pairs[j, 1] = pairs[j - 1, 1]
+            j -= 1
+        pairs[j, 1] = b
+
+
+@inlined
+def _pair_in_column(a, i, j, axes, cuts, count, many):
+    """Add the pairs of a with those behind it in a column, if their boxes overlap there first: how many pairs now."""
+    axis, u, v = axes
+    box, nv = many.box, cuts[5]
+    column = i * nv + j
+    many.cursor[column] += 1  # past a
+    for k in range(many.cursor[column], many.first_entry[column + 1]):
+        b = many.entry[k]
+        if box[b, axis] > box[a, axis + 3]:
+            break
+        if not _overlap(a, b, many):
+            continue
+        a_i, _, a_j, _ = columns_of(a, u, v, cuts, many)
+        b_i, _, b_j, _ = columns_of(b, u, v, cuts, many)
+        if max(a_i, b_i) != i or max(a_j, b_j) != j:
+            continue  # found in the column of the lower corner of what the boxes share
+        if count == many.pairs.shape[0]:
+            many.counts[LEFT_OUT] += 1
+            continue
+        many.pairs[count, 0], many.pairs[count, 1] = a, b
+        count += 1
+    return count
+
+
 @kernel
 def find_pairs(h, many):
     """Write `many.pairs` and their number: all pairs (a < b) of bodies whose boxes overlap."""
     bound_bodies(h, many)
     axis = widest_axis(many)
     sort_bodies(axis, many)
-    order, box, count = many.order, many.box, 0
-    for i in range(order.shape[0]):
-        a = order[i]
-        for j in range(i + 1, order.shape[0]):
-            b = order[j]
-            if box[b, axis] > box[a, axis + 3]:
-                break
-            if not _overlap(a, b, many):
-                continue
-            if count == many.pairs.shape[0]:
-                many.counts[LEFT_OUT] += 1
-                continue
-            many.pairs[count, 0], many.pairs[count, 1] = min(a, b), max(a, b)
-            count += 1
+    u, v = (axis + 1) % 3, (axis + 2) % 3
+    cuts, pairs, count = fill_columns(u, v, many), many.pairs, 0
+    for r in range(many.order.shape[0]):
+        many.merged[many.order[r]] = r
+    for r in range(many.order.shape[0]):
+        a, first = many.order[r], count
+        i0, i1, j0, j1 = columns_of(a, u, v, cuts, many)
+        for i in range(i0, i1 + 1):
+            for j in range(j0, j1 + 1):
+                count = _pair_in_column(a, i, j, (axis, u, v), cuts, count, many)
+        _sort_behind(first, count, many)
+        for k in range(first, count):
+            b = pairs[k, 1]
+            pairs[k, 0], pairs[k, 1] = min(a, b), max(a, b)
     many.counts[PAIRS] = count
