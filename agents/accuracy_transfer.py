@@ -25,6 +25,7 @@ from agents.curve import plot_transfer
 from agents.evaluate import JsonOption, evaluate, write_json
 from agents.train import DEFAULTS, INTERRUPTED, Interrupted, train
 from physics.accuracy import PRESETS
+from rigid_env.measure import machine
 
 TRUTH = "reference"
 TRAINED_AT = "fast,balanced,precise"
@@ -162,7 +163,7 @@ def main(
         plot.parent.mkdir(parents=True, exist_ok=True)
         plot_transfer(rows, f"{env}: trained at an accuracy, judged at {TRUTH}", plot)
     if json_file is not None:
-        write_json(json_file, {"env": env, "algo": algo, "seed": seed, "rows": [asdict(row) for row in rows]})
+        machine.write_json(json_file, {"env": env, "algo": algo, "seed": seed, "rows": [asdict(row) for row in rows]})
 
 
 if __name__ == "__main__":

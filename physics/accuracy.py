@@ -61,14 +61,15 @@ class Accuracy:
         between bodies: quicker, and of first order where the direction of sliding turns.
     collisions : str
         What happens to contacts that collide at the same moment. ``simultaneous``: one contact problem of all of them.
-        ``sequential``, with ``events`` only: one after the other, the one that approaches fastest first (of equals the
-        one of the lowest wall and vertex), until none approaches; where that has no end in sight, the rest at once,
-        reported as unconverged. Two laws, not two accuracies: where several contacts collide they have other outcomes.
+        ``sequential``, with ``events`` or where bodies touch each other: one after the other, the one that approaches
+        fastest first (of equals the one of the lowest wall and vertex), until none approaches; where that has no end in
+        sight, the rest at once, reported (unconverged, or unresolved). Two laws, not two accuracies: where several
+        contacts collide they have other outcomes.
 
     Raises
     ------
     ValueError
-        A value out of range, or ``sequential`` without ``events``.
+        A value out of range.
     """
 
     substeps: int = 1
@@ -97,11 +98,6 @@ class Accuracy:
             raise ValueError(f"Accuracy.slip is {self.slip!r}; allowed are {', '.join(SLIPS)}")
         if self.collisions not in COLLISIONS:
             raise ValueError(f"Accuracy.collisions is {self.collisions!r}; allowed are {', '.join(COLLISIONS)}")
-        if self.collisions == "sequential" and self.scheme != "events":
-            raise ValueError(
-                f"Accuracy.collisions is 'sequential' with scheme {self.scheme!r}; allowed with scheme 'events' only, "
-                "which knows the moment of a collision"
-            )
 
 
 _BALANCED = Accuracy()

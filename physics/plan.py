@@ -171,6 +171,8 @@ def make_plan(scene: Scene, accuracy: Accuracy) -> Plan:
     many = seen.touching and (seen.meeting or is_linked)
     if many:
         _check_many(scene, seen.meeting, scheme)
+    elif seen.touching:
+        _check_collisions(accuracy)
     _check_laws(scene, seen, many, scheme)
     return Plan(
         contact=seen.touching or None,
@@ -201,6 +203,15 @@ def _check_many(scene: Scene, meeting: bool, scheme: int) -> None:
         raise ValueError(
             "accuracy has the scheme 'events', which knows contact of single bodies with walls only; allowed where "
             f"bodies {what} are 'fast', 'balanced' and every time-stepping scheme{hint}"
+        )
+
+
+def _check_collisions(accuracy: Accuracy) -> None:
+    """Refuse impacts in turn where a step knows what collides within a stage, not at one moment."""
+    if accuracy.collisions == "sequential" and accuracy.scheme != "events":
+        raise ValueError(
+            f"Accuracy.collisions is 'sequential' with scheme {accuracy.scheme!r}; allowed where bodies touch walls "
+            "only is the scheme 'events', which knows the moment of a collision"
         )
 
 

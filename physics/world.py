@@ -149,7 +149,10 @@ class World:
         """Working memory of one thread, with the numerical settings in it."""
         plan = self.plan
         if plan.many:
-            return many.make_many(self.body_count, self.walls, plan.terms, meet=plan.meeting, **numbers)
+            in_turn = self.accuracy.collisions == "sequential"
+            return many.make_many(
+                self.body_count, self.walls, plan.terms, meet=plan.meeting, in_turn=in_turn, **numbers
+            )
         if plan.linked:
             return make_linked(self.body_count, plan.terms, **numbers)
         return make_workspace(self.walls, plan.features, plan.terms, plan.laws, **numbers)

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 
 import physics
-from rigid_env.hard_cases.case import Case, Check, Setting, UnsupportedError, none_of, within
+from physics.accuracy import resolve
+from rigid_env.hard_cases.case import Case, Check, Setting, within
 
 RADIUS = 0.5  # [m]
 SPEED = 3.0  # of the ball that strikes [m/s]
@@ -31,8 +33,7 @@ def newtons_cradle(setting: Setting) -> list[Check]:
     -(n - 2)/n v, the others 2/n v: (-1/3, 2/3, 2/3) v of three. Energy: ((n - 2)² + 4 (n - 1))/n² = 1.
 
     In turn: two equal balls exchange their velocities, so that the last one alone leaves with v. Balls a hair apart (1
-    mm) do that by themselves. For balls that touch it must be possible to choose it:
-    `Accuracy(collisions="sequential")`.
+    mm) do that by themselves; for balls that touch it is chosen by `Accuracy(collisions="sequential")`.
 
     The speeds are solved to the tolerance of the free contact speed v, at each of n - 1 impacts and contacts.
     """
@@ -47,9 +48,7 @@ def newtons_cradle(setting: Setting) -> list[Check]:
             checks.append(Check(f"{count} balls, {how}: error of the speeds", error, limit, "m/s"))
             energy = float((after @ after) / SPEED**2)
             checks.append(within(f"{count} balls, {how}: energy after by before", energy, 1.0, 2 * limit / SPEED))
-        checks.append(
-            none_of(f"{count} balls that touch: in turn is not offered or does not come out", _in_turn(count))
-        )
+        checks.append(_in_turn(setting, count))
     return checks
 
 
@@ -60,14 +59,12 @@ def _after(setting: Setting, scene: physics.Scene) -> np.ndarray:
     return world.linvel[0, :, 0].copy()
 
 
-def _in_turn(count: int) -> bool:
-    """Whether balls that touch do not pass the impact on one by one where that is asked for."""
-    setting = Setting(physics.Accuracy(scheme="events", collisions="sequential"))
-    try:
-        after = _after(setting, cradle(count, 0.0))
-    except UnsupportedError:
-        return True
-    return bool(np.abs(after - SPEED * (np.arange(count) == count - 1)).max() > 1e-9)
+def _in_turn(setting: Setting, count: int) -> Check:
+    """Whether balls that touch pass the impact on one by one where that is asked for."""
+    chosen = replace(setting, accuracy=replace(resolve(setting.accuracy), collisions="sequential"))
+    after = _after(chosen, cradle(count, 0.0))
+    error = float(np.abs(after - SPEED * (np.arange(count) == count - 1)).max())
+    return Check(f"{count} balls, in turn: error of the speeds", error, (count - 1) * setting.tolerance * SPEED, "m/s")
 
 
 def digits_of_pi(setting: Setting) -> list[Check]:
@@ -113,15 +110,9 @@ def _collisions(setting: Setting, world) -> int:
     return seen
 
 
-IN_TURN = (
-    "balls that touch collide at once: to let them do so in turn (Accuracy.collisions) is known to the event-driven "
-    "scheme only, which does not know bodies that touch each other"
-)
-
 CASES = (
     Case(33, "cradle", "Newton's cradle of 3 and 5 balls",
-         "(0, ..., 0, v) in turn, (-1/3, 2/3, 2/3) v at once: both can be chosen", newtons_cradle,
-         faults={"balanced": IN_TURN, "fast": IN_TURN}),
+         "(0, ..., 0, v) in turn, (-1/3, 2/3, 2/3) v at once: both can be chosen", newtons_cradle),
     Case(34, "digits-of-pi", "two masses and a wall, ratio 1 to 1,000,000", "3, 31, 314, 3141 collisions",
          digits_of_pi),
 )  # fmt: skip

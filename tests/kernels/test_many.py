@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import math
 
 import numpy as np
 import pytest
@@ -146,6 +147,39 @@ def test_the_normal_of_two_blocks_separates_them_most(seed, distance):
             if n > 1 or best < 0:  # apart, a lone point may stand for a face that is beside the other one
                 assert (np.abs(local) <= halves[b] + lift + 1e-5).all()
         assert normal @ (points[0] - points[1]) == pytest.approx(many.gap[k], abs=1e-12)
+
+
+@settings(max_examples=100, deadline=None)
+@given(
+    seed=st.integers(0, 2**32 - 1),
+    turns=st.tuples(st.floats(-math.pi, math.pi), st.floats(0.02, 1.5)),
+    shift=st.floats(-0.9, 0.9),
+)
+def test_parallel_edges_that_touch_push_along_the_middle_of_what_both_allow(seed, turns, shift):
+    """In the plane across the edges: at a corner between its +x and +y faces, turned by α, a block allows the normals
+    from α to α + 90°; one that touches it with the corner of its -x and -y faces, turned by β, allows β to β + 90°,
+    turned round. The middle of what both allow, for |α - β| < 90°, is (α + β)/2 + 45°.
+    """
+    rng = np.random.default_rng(seed)
+    alpha, beta = turns[0], turns[0] + turns[1] * rng.choice([-1, 1])
+    halves, world = rng.uniform(0.3, 1.0, (2, 3)), rotation(rng)
+    planar = [
+        np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]]) for c, s in ((math.cos(t), math.sin(t)) for t in (alpha, beta))
+    ]
+    a = -planar[0] @ [halves[0, 0], halves[0, 1], 0.0]
+    b = planar[1] @ [halves[1, 0], halves[1, 1], shift * halves[:, 2].sum()]
+    if abs(shift) * halves[:, 2].sum() > halves[:, 2].sum() - 0.01:
+        return  # beside each other along the edges
+    many = blocks([world @ a, world @ b], [world @ R for R in planar], halves)
+    find_contacts(0.01, None, many)
+    n = many.counts[CONTACTS]
+    middle = 0.5 * (alpha + beta) + 0.25 * math.pi
+    assert n == 2
+    # The normal is out of the second block. A turned corner is rounded in the last bits; what is low is judged by slops
+    # of 1e-6, which a normal does not see.
+    expected = -world @ [math.cos(middle), math.sin(middle), 0.0]
+    np.testing.assert_allclose(many.frame[:n, :3], np.tile(expected, (n, 1)), atol=1e-12)
+    np.testing.assert_allclose(many.gap[:n], 0.0, atol=1e-14)
 
 
 def test_names_of_equal_stacked_blocks_do_not_change_with_rounding():

@@ -18,6 +18,7 @@ from tests.reference import impacts
 MASS, RADIUS = 2.0, 0.5
 INERTIA = np.diag([6.5, 14.5, 17.0])
 LAWS = {"simultaneous": impacts.simultaneous, "sequential": impacts.sequential}
+STEP, SLOP = 0.1, 1e-9  # of the row of balls [s, radii]
 MOMENT = 1e-6  # that is simulated: all contacts touch at its start [s]
 
 
@@ -156,8 +157,51 @@ def test_impacts_in_turn_without_an_end_are_reported_and_solved_at_once():
 def test_the_law_is_checked():
     with pytest.raises(ValueError, match=r"Accuracy.collisions is 'both'; allowed are simultaneous, sequential"):
         physics.Accuracy(collisions="both")
-    with pytest.raises(ValueError, match=r"Accuracy.collisions is 'sequential' with scheme 'exact'; allowed with"):
-        physics.Accuracy(collisions="sequential")
+
+
+def test_one_body_at_walls_collides_in_turn_with_events_only():
+    scene = physics.Scene([physics.Sphere(RADIUS, MASS)], [physics.HalfSpace((0, 1, 0), -1.0)], [physics.Contact()])
+    with pytest.raises(ValueError, match=r"Accuracy.collisions is 'sequential' with scheme 'exact'; allowed where"):
+        physics.World(scene, accuracy=physics.Accuracy(collisions="sequential"))
+
+
+def in_a_row(places, speeds, masses, e, collisions) -> np.ndarray:
+    """Velocities along x of balls in a row after the impacts of one step [m/s]."""
+    bodies = [physics.Sphere(RADIUS, m, pos=(x, 0, 0), linvel=(v, 0, 0)) for x, v, m in zip(places, speeds, masses)]
+    scene = physics.Scene(bodies, [], [physics.Contact(e)])
+    settings = physics.Accuracy(collisions=collisions, impacts=1000, slop=SLOP)
+    world = physics.World(scene, dt=STEP, accuracy=settings)
+    assert world.step().ok
+    return world.linvel[0, :, 0].copy()
+
+
+@given(
+    speeds=st.lists(st.floats(-3, 3), min_size=2, max_size=4),
+    masses=st.lists(st.floats(0.2, 5.0), min_size=4, max_size=4),
+    e=st.floats(0.0, 1.0),
+)
+@settings(max_examples=60)
+def test_balls_that_touch_in_a_row_follow_the_law_that_was_asked_for(speeds, masses, e):
+    """In a row that touches every velocity of approach is v_i - v_{i+1}: the reference's J, and M the masses."""
+    n = len(speeds)
+    J = np.eye(n)[1:] - np.eye(n)[:-1]
+    M, V = np.diag(masses[:n]), np.array(speeds)
+    # What approaches no faster than two hundred slops in a step, 1e-6 m/s, is left to the resting stage, plastic: three
+    # such leftovers at most, 2 slow each by a light ball, and what they start along a row whose masses differ by 25.
+    slow = 200 * SLOP * RADIUS / STEP
+    after = in_a_row([2 * RADIUS * k for k in range(n)], speeds, masses, e, "sequential")
+    expected = impacts.sequential(J, M, V, e, slow)
+    assert after == pytest.approx(expected, abs=3 * 2 * 25 * slow)
+    assert masses[:n] @ after == pytest.approx(masses[:n] @ V, abs=1e-12 * 4 * 3 * 5 * 10)  # momentum, to rounding
+    assert masses[:n] @ after**2 <= (masses[:n] @ V**2) * (1 + 1e-9)
+
+
+@pytest.mark.parametrize(
+    ("collisions", "expected"), [("simultaneous", (-1 / 3, 2 / 3, 2 / 3)), ("sequential", (0.0, 0.0, 1.0))]
+)
+def test_a_cradle_of_three_does_as_it_is_told(collisions, expected):
+    after = in_a_row([0.0, 2 * RADIUS, 4 * RADIUS], (1.0, 0.0, 0.0), (MASS,) * 3, 1.0, collisions)
+    assert after == pytest.approx(expected, abs=2e-6)  # two contacts, solved to 1e-6 of the speed of 1 m/s
 
 
 @given(angle=st.floats(0.8, 2.35), e=st.floats(0.0, 1.0), speed=st.floats(0.1, 5.0), heading=st.floats(-math.pi, 0.0))

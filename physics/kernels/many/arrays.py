@@ -135,16 +135,24 @@ def memory_size(bodies: int, walls: int) -> int:
 
 
 def make_many(
-    bodies: int, walls: np.ndarray, terms: tuple[Term, ...] = (), *, meet=True, relative_slop: float, **settings: float
+    bodies: int,
+    walls: np.ndarray,
+    terms: tuple[Term, ...] = (),
+    *,
+    meet=True,
+    in_turn=False,
+    relative_slop: float,
+    **settings: float,
 ) -> Many:
     """Scratch for worlds of `bodies` bodies among `walls` ((walls, WALL_SIZE)), in fields, with numerical settings.
 
-    `meet` says whether bodies touch each other, or walls only.
+    `meet` says whether bodies touch each other, or walls only; `in_turn` whether contacts that collide do so one after
+    the other.
     """
     f, i, nb = np.float64, np.int64, bodies
     pairs, n = pair_room(bodies), contact_room(bodies, len(walls))
-    record = np.zeros(1, np.dtype([*setting_fields(), ("meet", i)]))
-    record["meet"] = meet
+    record = np.zeros(1, np.dtype([*setting_fields(), ("meet", i), ("in_turn", i)]))
+    record["meet"], record["in_turn"] = meet, in_turn
     for name, value in settings.items():
         record[name] = value
     rows = np.zeros(nb, np.dtype(body_fields(terms)))

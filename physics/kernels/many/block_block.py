@@ -230,6 +230,55 @@ def _clip_face(a, b, face, many):
 
 
 @inlined
+def _edge_at_rim(d, axis, source, count, slop, many):
+    """(its ends, axis of the rim, its sense) where all that is low of the polygon is an edge along the face's rim.
+
+    What is within a slop of the lowest vertex is low; two slops from the rim are on it. Without such an edge the ends
+    are -1.
+    """
+    p, low = many.polygon, lowest(source, count, many.polygon)
+    for side in range(4):
+        k, sense = side // 2, 1.0 - 2.0 * (side % 2)
+        bound, first, last, is_rim = d[(axis + 1 + k) % 3], -1, -1, True
+        for v in range(count):
+            if p[source, v, 2] <= low + slop:
+                is_rim = is_rim and sense * p[source, v, k] >= bound - 2.0 * slop
+                first = v if first < 0 or p[source, v, 1 - k] < p[source, first, 1 - k] else first
+                last = v if last < 0 or p[source, v, 1 - k] > p[source, last, 1 - k] else last
+        if is_rim and p[source, last, 1 - k] - p[source, first, 1 - k] > 2.0 * slop:
+            return first, last, (axis + 1 + k) % 3, sense
+    return -1, -1, 0, 1.0
+
+
+@inlined
+def _between_faces(o, out, rim, point, many):
+    """Normal of two parallel edges that touch: the middle of all that are allowed.
+
+    An edge of a convex body allows every direction between the normals of its two faces: of the one block from `out`
+    to `rim`, of block o from one to the other of those whose edge passes `point`, turned round. Both hold `out`, and
+    o's ends before `rim`, a quarter turn from its other end: what both allow lies between `out` and that end.
+    """
+    end, most, along = out, 0.0, qt.cross(out, rim)
+    w = minus(point, vector(many.place, o, 0))
+    for j in range(3):
+        axis = _column(many.rotation, o, j)
+        s = -math.copysign(1.0, qt.dot(axis, w))
+        normal = (s * axis[0], s * axis[1], s * axis[2])
+        towards = qt.dot(normal, rim)
+        if abs(qt.dot(normal, along)) < 0.5 and towards > most:
+            most, end = towards, normal
+    n = plus(out, 1.0, end)
+    s = 1.0 / math.sqrt(qt.dot(n, n))
+    return (s * n[0], s * n[1], s * n[2])
+
+
+@inlined
+def _above(r, x, y, s, t, many):
+    """Point s along x and t along y from the centre of block r [m]."""
+    return plus(plus(vector(many.place, r, 0), s, x), t, y)
+
+
+@inlined
 def _touch_face(a, b, face, source, count, least, h, many):
     """Contacts between a face and the clipped face of the other block, lifted until none has a gap < least."""
     r, o, axis, sign = _reference(a, b, face, many)
@@ -240,16 +289,28 @@ def _touch_face(a, b, face, source, count, least, h, many):
     R, p = many.rotation, many.polygon
     x, y, out = _column(R, r, (axis + 1) % 3), _column(R, r, (axis + 2) % 3), _column(R, r, axis)
     out = (sign * out[0], sign * out[1], sign * out[2])
+    slop = pair_slop(a, b, many)
     lift = max(0.0, least + d[axis] - lowest(source, count, p))
+    n, owner, first, last, side, sense = out, r, -1, -1, 0, 1.0
+    if lift <= slop:
+        first, last, side, sense = _edge_at_rim(d, axis, source, count, slop, many)
+    if first >= 0:
+        rim = _column(R, r, side)
+        point = _above(r, x, y, p[source, first, 0], p[source, first, 1], many)
+        point = plus(point, p[source, first, 2], out)
+        n, owner = _between_faces(o, out, (sense * rim[0], sense * rim[1], sense * rim[2]), point, many), -1
     for k in range(count):
+        if first >= 0 and k != first and k != last:
+            continue
         gap = p[source, k, 2] - d[axis] + lift
-        point = plus(plus(vector(many.place, r, 0), p[source, k, 0], x), p[source, k, 1], y)
+        point = _above(r, x, y, p[source, k, 0], p[source, k, 1], many)
         on_face, on_other = plus(point, d[axis], out), plus(point, d[axis] + gap, out)
+        gap *= qt.dot(n, out)
         name = face * FACE_NAMES + 8 * many.edge[source, k, 0] + many.edge[source, k, 1]
         if face < 3:
-            record(a, b, name, r, (-out[0], -out[1], -out[2]), on_face, on_other, gap, h, many)
+            record(a, b, name, owner, (-n[0], -n[1], -n[2]), on_face, on_other, gap, h, many)
         else:
-            record(a, b, name, r, out, on_other, on_face, gap, h, many)
+            record(a, b, name, owner, n, on_other, on_face, gap, h, many)
 
 
 @inlined

@@ -51,15 +51,17 @@ def is_meeting(k, h, many):
 
 @inlined
 def aim_impact(n, h, is_last, many):
-    """Targets of an impact, and whether there is one; see `physics.kernels.contact.aim_impact`.
+    """Targets of an impact, and the contact that approaches fastest of those that make it one, -1: there is none.
+
+    See `physics.kernels.contact.aim_impact`.
 
     What approaches no faster than loads make it within `rest_share` of the step, or would go in by a few slops only
     until the middle of it, is left to the resting stage, unless it is fast.
     """
-    is_impact = False
+    fastest = -1
     for k in range(n):
         slop = pair_slop(many.ends[k, 0], many.ends[k, 1], many)
-        gap, speed, goal = many.gap[k], many.speed[k], 0.0
+        gap, speed, goal, is_hit = many.gap[k], many.speed[k], 0.0, False
         slow = max(2.0 * SOFT_LANDING * slop / h, many.settings[0].rest_share * acceleration_of(k, many) * h)
         slow = min(slow, fast_speed(k, h, many))
         if gap > slop:
@@ -67,16 +69,18 @@ def aim_impact(n, h, is_last, many):
             if not is_last and is_meeting(k, h, many):
                 goal = -FAR
             elif goal - speed > slow:
-                is_impact = True
+                is_hit = True
         elif speed > 0.0:
             goal = -many.bounce[k] * speed  # Moreau's law for what leaves: without it a struck chain could gain energy
         elif bounces(k, h, many):
-            goal, is_impact = -many.bounce[k] * speed, True
+            goal, is_hit = -many.bounce[k] * speed, True
         elif -speed > slow:
-            is_impact = True
+            is_hit = True
+        if is_hit and (fastest < 0 or speed < many.speed[fastest]):
+            fastest = k
         put(many.target, k, 0, (goal, 0.0, 0.0))
         put(many.impulse, k, 0, (0.0, 0.0, 0.0))
-    return is_impact
+    return fastest
 
 
 @inlined
@@ -121,12 +125,19 @@ def keep_the_crowded(n, many):
 
 @kernel
 def strike(n, world, h, is_last, friction, tilted, report, many):
-    """Velocities after the impulses of the contacts that approach; nothing where none does. Contacts in the set."""
-    is_impact = aim_impact(n, h, is_last, many)
+    """Velocities after the impulses of the contacts that approach; nothing where none does. Contacts in the set.
+
+    In turn only the one that approaches fastest gives an impulse: the step comes back for the others.
+    """
+    fastest = aim_impact(n, h, is_last, many)
     meeting = time_until_meeting(n, h, is_last, many)
-    if not is_impact:
+    if fastest < 0:
         keep_the_crowded(n, many)
         return leave_out_the_free(n, many), meeting, False
+    if many.settings[0].in_turn == 1 and not is_last:
+        for k in range(n):
+            if k != fastest:
+                many.target[k, 0] = -FAR  # its turn comes when this one is over
     n = leave_out_the_free(n, many)
     settle_restrained(n, world, friction, tilted, report, many)
     return n, meeting, True
