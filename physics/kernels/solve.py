@@ -31,6 +31,9 @@ PIVOTING = 3
 # is.
 PIVOT_ABOVE = 0.01
 
+# Residual that rounding leaves, relative to the largest free contact speed: no more is asked for.
+ROUNDING = 1.0e-12
+
 # Sweeps before Newton's method has a turn: most problems that are left for sweeps need fewer than ten.
 SWEEPS_AT_ONCE = 12
 
@@ -191,7 +194,7 @@ def solve_contacts(n, friction, smooth, pivots, v, L, R, work):
         if friction is None:
             break
     scale = _assemble(n, width, R, v, L, work)
-    goal = work.tolerance * scale
+    goal = max(min(work.tolerance * scale, work.still), ROUNDING * scale)
     sweeps, residual = _iterate(n, friction, smooth, goal, work)
     method = SWEEPS
     if pivots is not None and not residual <= max(goal, PIVOT_ABOVE * scale):

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 from physics.kernels import layout as at
 from physics.kernels import quaternion as qt
 from physics.kernels.arms import place_arms
@@ -20,6 +22,9 @@ from physics.kernels.solve import PIVOTING, solve_contacts
 # there is no contact.
 STAGE_LENGTH, CONTACT_COUNT, MODE = range(3)
 MEMORY_HEAD = 3
+
+# Slops that what is pressed by strong loads may move in a step.
+STILL_SHARE = 0.01
 
 
 def memory_size(slots: int) -> int:
@@ -58,6 +63,19 @@ def store_warm_start(n, width, memory, i, h, work):
 
 
 @inlined
+def still_speed(h, work):
+    """Residual that a resting stage of length h is solved to whatever the tolerance allows [m/s].
+
+    A share of the speed that loads give in h is a place error of that share of a h² in every step. Under loads so
+    strong that this is more than a slop what is pressed against walls would creep: it is held to a small part of one.
+    """
+    slop_speed = work.slop / h
+    if work.tolerance * work.acceleration * h > slop_speed:
+        return STILL_SHARE * slop_speed
+    return math.inf
+
+
+@inlined
 def note_solve(report, world, residual, sweeps, method, tolerance):
     """Add one contact solve to the world's report."""
     report[world, at.SOLVES] += 1.0
@@ -93,7 +111,7 @@ def impact(n, y, h, friction, smooth, tilted, pivots, report, work):
     for k in range(3 * n):
         work.impulse[k] = 0.0
     R = qt.to_matrix(principal_attitude(q, work, tilted))
-    work.mode = SLIDE
+    work.mode, work.still = SLIDE, math.inf
     solved = solve_contacts(n, friction, smooth, pivots, v, L, R, work)
     solved = without_gain(n, friction, smooth, pivots, v, L, solved, R, work)
     v1, L1, residual, sweeps, method = resist_turning(n, friction, smooth, pivots, v, L, solved, R, work)
@@ -139,7 +157,7 @@ def touch(n, y, h, friction, smooth, gyroscopic, tilted, pivots, memory, report,
     load_warm_start(n, width, memory, work.i, h, work)
     v = (v[0] + h * a[0], v[1] + h * a[1], v[2] + h * a[2])
     L = (L[0] + h * torque[0], L[1] + h * torque[1], L[2] + h * torque[2])
-    work.mode = int(memory[work.i, MODE])
+    work.mode, work.still = int(memory[work.i, MODE]), still_speed(h, work)
     solved = solve_contacts(n, friction, smooth, pivots, v, L, R, work)
     if opposes_mean and has_turned_round(n, solved[0], turning(R, solved[1], work.J), work):
         oppose_end_slip(n, work)

@@ -71,6 +71,7 @@ def workspace_dtype(
     ]
     stage = [
         ("mode", i),  # which direct solve to try first, then which one did it (`slide.HOLD`, `SLIDE`, `PIVOT` + slot)
+        ("still", f),  # residual that is asked for beside the tolerance [m/s]: see `stages.still_speed`
         ("is_last", i),  # 1 in the last stage a substep may have: take in all that would pass through a wall
     ]
     contacts = [
@@ -113,7 +114,7 @@ def make_workspace(
 ) -> np.ndarray:
     """One workspace record, shape (1,), for `walls` ((walls, WALL_SIZE)), fields, laws, and numerical settings."""
     work = np.zeros(1, workspace_dtype(len(walls), features, terms, laws))
-    work["features"] = features
+    work["features"], work["still"] = features, np.inf
     if len(walls):
         work["walls"][0] = walls
     for name, value in settings.items():
