@@ -59,7 +59,8 @@ ANGLE_LIMIT = 0.06
 # than 0.037 (4e-4)⁴ = 1e-15 of its size, and the attitude, where m(h) enters times θ/4, by less than 1e-17.
 SHORT_SERIES = 4.0e-4
 
-# More parts than this in one step mean a state that is not physical (the caller's guard reports it).
+# A step with more parts than this, 6e5 rad, leaves the attitude as it is: energy and momentum are kept, and where in
+# its turn the body is matters to nothing that a step of that length can resolve.
 PARTS_LIMIT = 1.0e7
 
 # Coefficients of s and d, two of first, three of second and four of third order in (|m|², 2E).
@@ -193,8 +194,8 @@ def free_rotation(q, L, J, series, h):
     angle = abs(h) * math.sqrt(max(J[0], J[1], J[2]) * energy2)
     if angle <= ANGLE_LIMIT:
         q, m = _part(q, m, J, series, mm, energy2, h)
-    else:
-        parts = int(min(angle / ANGLE_LIMIT, PARTS_LIMIT)) + 1
+    elif angle <= ANGLE_LIMIT * PARTS_LIMIT:
+        parts = int(angle / ANGLE_LIMIT) + 1
         for _ in range(parts):
             q, m = _part(q, m, J, series, mm, energy2, h / parts)
     return q

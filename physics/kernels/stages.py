@@ -89,6 +89,34 @@ def note_solve(report, world, residual, sweeps, method, tolerance):
 
 
 @inlined
+def contacts_gain(before, w, v, L, solved, R, h, work):
+    """Whether the impulses of a resting stage raise the energy by more than its solve may be off.
+
+    Impulses P at the centre of mass and moments Q about it change it by ½ P·(v + v') + ½ Q·(ω + ω'), v and ω before
+    the stage (`before`, w), v' and ω' after it. `v`, `L` are those with loads and without impulses.
+    """
+    v1, L1, _, _, _ = solved
+    w1, a = turning(R, L1, work.J), work.free_acceleration
+    push = work.mass * (
+        (v1[0] - v[0]) * (before[0] + v1[0])
+        + (v1[1] - v[1]) * (before[1] + v1[1])
+        + (v1[2] - v[2]) * (before[2] + v1[2])
+    )
+    turn = (L1[0] - L[0]) * (w[0] + w1[0]) + (L1[1] - L[1]) * (w[1] + w1[1]) + (L1[2] - L[2]) * (w[2] + w1[2])
+    square = h * h * (a[0] * a[0] + a[1] * a[1] + a[2] * a[2])
+    size = work.mass * (qt.dot(before, before) + square) + abs(qt.dot(L1, w1))
+    return push + turn > work.tolerance * size
+
+
+@inlined
+def calm_targets(n, work):
+    """Targets that cannot raise the energy: no contact is pushed off or along, and with p·u' <= 0 none gives any."""
+    for i in range(n):
+        work.target[i, 0] = min(work.target[i, 0], 0.0)
+        work.target[i, 1] = work.target[i, 2] = 0.0
+
+
+@inlined
 def aim_plastic(n, work):
     """Targets and first guess of an impact without rebound."""
     for k in range(3 * n):
@@ -155,12 +183,16 @@ def touch(n, y, h, friction, smooth, gyroscopic, tilted, pivots, memory, report,
     if friction is None:
         width = 1
     load_warm_start(n, width, memory, work.i, h, work)
+    before = v
     v = (v[0] + h * a[0], v[1] + h * a[1], v[2] + h * a[2])
     L = (L[0] + h * torque[0], L[1] + h * torque[1], L[2] + h * torque[2])
     work.mode, work.still = int(memory[work.i, MODE]), still_speed(h, work)
     solved = solve_contacts(n, friction, smooth, pivots, v, L, R, work)
     if opposes_mean and has_turned_round(n, solved[0], turning(R, solved[1], work.J), work):
         oppose_end_slip(n, work)
+        solved = solve_contacts(n, friction, smooth, pivots, v, L, R, work)
+    if contacts_gain(before, w, v, L, solved, R, h, work):
+        calm_targets(n, work)
         solved = solve_contacts(n, friction, smooth, pivots, v, L, R, work)
     v1, L1, residual, sweeps, method = resist_turning(n, friction, smooth, pivots, v, L, solved, R, work)
     memory[work.i, MODE] = work.mode

@@ -19,6 +19,7 @@ from __future__ import annotations
 import math
 
 from physics.kernels import layout as at
+from physics.kernels import quaternion as qt
 from physics.kernels.body import angular_velocity, bind_body, is_finite, read_state, write_state
 from physics.kernels.compiler import inlined, kernel
 from physics.kernels.contact import gap_of, gather, has_passed, is_clear, nearest_outside_set, push_out
@@ -33,10 +34,14 @@ from physics.kernels.fields.loads import (
 from physics.kernels.flight import fly, fly_by_scheme
 from physics.kernels.laws import bind_laws
 from physics.kernels.quaternion import to_matrix
+from physics.kernels.restraint import kinetic_energy
 from physics.kernels.stages import impact, store_warm_start, touch
 
 # Trials of one time of impact: a secant, then parabolas through the last three. Three are usual.
 IMPACT_TRIALS = 16
+
+# Slops that a body is lifted out of a wall for nothing.
+FREE_LIFT = 10.0
 
 
 @inlined
@@ -90,8 +95,20 @@ def has_same_pose(y, z):
 
 @inlined
 def kept_out(y, tilted, work):
-    """y, pushed out of the walls where it is deeper in than the slop."""
-    return push_out(y[0], to_matrix(y[1]), tilted, work), y[1], y[2], y[3]
+    """y, pushed out of the walls where it is deeper in than the slop.
+
+    What turns by radians in a step may be found deep in a wall. To lift it out against its loads takes work: that is
+    paid with its motion, as far as there is any.
+    """
+    x, q, v, L = y
+    z = push_out(x, to_matrix(q), tilted, work)
+    d, a = (z[0] - x[0], z[1] - x[1], z[2] - x[2]), work.free_acceleration
+    lift = -work.mass * (a[0] * d[0] + a[1] * d[1] + a[2] * d[2])
+    if qt.dot(d, d) > (FREE_LIFT * work.slop) ** 2 and lift > 0.0:
+        kinetic = kinetic_energy(q, v, L, work, tilted)
+        s = math.sqrt(1.0 - lift / kinetic) if lift < kinetic else 0.0
+        v, L = (s * v[0], s * v[1], s * v[2]), (s * L[0], s * L[1], s * L[2])
+    return z, q, v, L
 
 
 @inlined

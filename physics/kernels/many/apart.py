@@ -1,4 +1,4 @@
-"""What overlaps is pushed apart: positions only, no velocity changes.
+"""What overlaps is pushed apart: positions only; velocities change where that would gain energy (`thrift`).
 
 The displacements of the bodies solve the frictionless contact problem whose targets are depths instead of velocities:
 the least displacement, in the metric of mass, that brings every contact of the set back to half a slop. A quarter of
@@ -7,15 +7,23 @@ overlap therefore comes apart without speed.
 
 from __future__ import annotations
 
+import math
+
 from physics.kernels import quaternion as qt
-from physics.kernels.body import read_state, write_state
+from physics.kernels.body import angular_velocity, read_state, write_state
 from physics.kernels.compiler import inlined, kernel
 from physics.kernels.many.contacts import pair_slop, plus, put, refresh, vector
 from physics.kernels.many.place import place_body
 from physics.kernels.many.sweeps import assemble, residual_of, sweep_contacts
+from physics.kernels.many.thrift import bring_inside, pay_for_place
 
 # Share of the depth beyond half a slop that one stage takes back: turning makes the whole of it overshoot.
 APART_SHARE = 0.5
+
+# Rounds, and the depth in slops from which on there is another, if the last one helped: what loads of a million times
+# the weight have turned deep into others is taken out at once.
+ROUNDS = 8
+DEEP = 1000.0
 
 # Error of the displacements, relative to the largest depth, and sweeps for it at most.
 APART_ERROR = 1.0e-3
@@ -24,36 +32,44 @@ APART_SWEEPS = 50
 
 @inlined
 def _aim_apart(n, many):
-    """Displacements asked for along the normals [m]; whether there is any: something deeper than its slop."""
-    is_deep = False
+    """Displacements asked for along the normals [m]; the deepest that anything is, in its slop: from 1 on there are."""
+    deepest = 0.0
     for k in range(n):
         slop, gap = pair_slop(many.ends[k, 0], many.ends[k, 1], many), many.gap[k]
         goal = -max(gap, 0.0)
         if gap < -slop:
-            goal, is_deep = -APART_SHARE * (gap + 0.5 * slop), True
+            goal = -APART_SHARE * (gap + 0.5 * slop)
+        deepest = max(deepest, -gap / slop)
         put(many.target, k, 0, (goal, 0.0, 0.0))
         put(many.impulse, k, 0, (0.0, 0.0, 0.0))
-    return is_deep
+    return deepest
 
 
 @inlined
-def _displace(b, many):
+def _place_inside(b, tilted, many):
+    """Where body b is, inside all walls with its centre."""
+    place_body(b, tilted, many)
+    bring_inside(b, tilted, many)
+
+
+@inlined
+def _displace(b, tilted, many):
     """Move and turn body b by what `many.twist` says."""
     x, q, v, L = read_state(many.now, b)
+    start, before = x, 0.5 * qt.dot(L, angular_velocity(q, L, many.bodies[b], tilted))
     turn = qt.exponential(vector(many.twist, b, 3))
     x = plus(x, 1.0, vector(many.twist, b, 0))
     write_state(many.now, b, (x, qt.normalise(qt.multiply(turn, q)), v, L))
+    pay_for_place(b, start, before, tilted, many)
 
 
-@kernel
-def push_apart(n, tilted, many):
-    """Move the bodies of the n contacts apart where they overlap by more than the slop."""
-    for b in range(many.now.shape[0]):
-        if many.touched[b] == 1:
-            place_body(b, tilted, many)
+@inlined
+def _part_once(n, tilted, many):
+    """One round for the n contacts, posed where the bodies are: the deepest that anything was, in its slop."""
     refresh(many)
-    if not _aim_apart(n, many):
-        return
+    deepest = _aim_apart(n, many)
+    if not deepest > 1.0:
+        return deepest
     for b in range(many.now.shape[0]):
         put(many.twist, b, 0, (0.0, 0.0, 0.0))
         put(many.twist, b, 3, (0.0, 0.0, 0.0))
@@ -61,4 +77,20 @@ def push_apart(n, tilted, many):
     sweep_contacts(0, n, None, residual_of(0, n, None, many), goal, APART_SWEEPS, many)
     for b in range(many.now.shape[0]):
         if many.touched[b] == 1:
-            _displace(b, many)
+            _displace(b, tilted, many)
+            _place_inside(b, tilted, many)
+    return deepest
+
+
+@kernel
+def push_apart(n, tilted, many):
+    """Move the bodies of the n contacts apart where they overlap by more than the slop."""
+    for b in range(many.now.shape[0]):
+        if many.touched[b] == 1:
+            _place_inside(b, tilted, many)
+    before = math.inf
+    for _ in range(ROUNDS):
+        deepest = _part_once(n, tilted, many)
+        if not DEEP < deepest < before:
+            break
+        before = deepest

@@ -26,6 +26,7 @@ from physics.kernels.many.contacts import (
 )
 from physics.kernels.many.place import place_body
 from physics.kernels.many.settle import settle
+from physics.kernels.many.thrift import keep_loaded, note_loaded, stage_has_gained, take_stage_back
 from physics.kernels.step import coast
 
 
@@ -96,6 +97,14 @@ def hold_all_loads(h, gyroscopic, tilted, many):
             hold_loads(read_state(many.now, b), h, gyroscopic, tilted, many.bodies[b])
 
 
+@inlined
+def turn_loaded(b, tilted, many):
+    """Twist of body b from its momenta."""
+    put(many.twist, b, 0, vector(many.now, b, at.LINVEL))
+    q, L = read_state(many.now, b)[1], vector(many.now, b, at.ANGMOM)
+    put(many.twist, b, 3, angular_velocity(q, L, many.bodies[b], tilted))
+
+
 @kernel
 def glide(n, world, h, friction, gyroscopic, tilted, scheme, memory, report, many):
     """Every body after h: exact flight, or Moreau's midpoint step with the n contacts of the set."""
@@ -118,13 +127,19 @@ def glide(n, world, h, friction, gyroscopic, tilted, scheme, memory, report, man
         if many.touched[b] == 1:
             body = many.bodies[b]
             a, torque = vector_of(body.free_acceleration), vector_of(body.torque)
+            note_loaded(b, vector(many.now, b, at.LINVEL), many)
             put(many.now, b, at.LINVEL, plus(vector(many.now, b, at.LINVEL), h, a))
             put(many.now, b, at.ANGMOM, plus(vector(many.now, b, at.ANGMOM), h, torque))
-            put(many.twist, b, 0, vector(many.now, b, at.LINVEL))
-            q, L = read_state(many.now, b)[1], vector(many.now, b, at.ANGMOM)
-            put(many.twist, b, 3, angular_velocity(q, L, body, tilted))
+            keep_loaded(b, many)
+            turn_loaded(b, tilted, many)
     kept.load(n, world, h, friction, memory, many)
     settle(n, world, friction, report, many)
+    if stage_has_gained(h, many):
+        take_stage_back(n, many)
+        for b in range(many.now.shape[0]):
+            if many.touched[b] == 1:
+                turn_loaded(b, tilted, many)
+        settle(n, world, friction, report, many)
     kept.store(n, world, h, memory, many)
     for b in range(many.now.shape[0]):
         if many.touched[b] == 1:

@@ -10,13 +10,18 @@ A warm start that still solves the problem costs one look at the residual. Else 
 4. an interior-point method, which finds what holds, slides and opens whatever the start, and Newton's method on the
    twists from there, in turns.
 
+What has a residual then that no impulses at all would beat is solved without friction.
+
 Where the linear system is dear (many bodies that all lie on each other), sweeps up to their limit take the place of 2
 to 4. All iterations together are no more than the sweeps allowed, but for those of the last method begun.
 """
 
 from __future__ import annotations
 
+import math
+
 from physics.kernels.compiler import inlined, kernel
+from physics.kernels.many.contacts import put
 from physics.kernels.many.interior import interior_point
 from physics.kernels.many.islands import find_islands
 from physics.kernels.many.newton import (
@@ -30,6 +35,9 @@ from physics.kernels.many.sweeps import assemble, residual_of, sweep_contacts
 
 # Sweeps before the interior-point method.
 FIRST_SWEEPS = 5
+
+# Sweeps without friction, where all else failed.
+LAST_SWEEPS = 100
 
 # Residual at which the interior-point method gives way to Newton's, relative to the largest velocity without impulses,
 # and what it is multiplied by when that was too early: where a contact is about to slip or open, the former gains two
@@ -99,6 +107,23 @@ def solve_island(part, friction, scale, residual, goal, many):
 
 
 @kernel
+def solve_without_friction(part, friction, residual, goal, many):
+    """Impulses along the normals only, from none: the residual, which is that of the problem with friction [m/s].
+
+    The last resort, where the methods for friction went astray: these sweeps never raise the energy.
+    """
+    first, last, begin, end = part
+    for i in range(first, last):
+        put(many.impulse, many.queue[i], 0, (0.0, 0.0, 0.0))
+    for i in range(begin, end):
+        b = many.order[i]
+        for c in range(6):
+            many.twist[b, c] = many.free[b, c]
+    sweep_contacts(first, last, None, residual, goal, LAST_SWEEPS, many)
+    return residual_of(first, last, friction, many)
+
+
+@kernel
 def solve_contacts(n, friction, many):
     """Solve for `many.impulse` from the warm start in it: (iterations, relative residual, method).
 
@@ -122,6 +147,8 @@ def solve_contacts(n, friction, many):
         residual = residual_of(part[0], part[1], friction, many)
         if not residual <= goal:
             count, residual, used = solve_island(part, friction, scale, residual, goal, many)
+            if not residual <= scale:  # no impulses at all would have been better
+                residual = solve_without_friction(part, friction, math.inf, goal, many)
             iterations, method = max(iterations, count), max(method, used)
         if not residual <= worst:
             worst = residual

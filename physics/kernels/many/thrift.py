@@ -1,0 +1,117 @@
+"""No more energy than there is, where bodies touch each other: resting stages, and places put right.
+
+A contact's target that knows how the bodies turn (`glide.aim_rest`) is gainless by itself where bodies answer alike in
+all directions; others, and many contacts together, may gain. To push or turn bodies apart may lift them against their
+loads, and changes ½ L·I⁻¹L at the same L: that is paid with their motion. See `physics.kernels.restraint` for impacts.
+"""
+
+from __future__ import annotations
+
+import math
+
+from physics.kernels import geometry as geo
+from physics.kernels import layout as at
+from physics.kernels import quaternion as qt
+from physics.kernels.body import angular_velocity, read_state
+from physics.kernels.compiler import inlined, kernel
+from physics.kernels.layout import NORMAL, OFFSET
+from physics.kernels.many.contacts import matrix, minus, plus, put, vector
+
+# Columns of `many.momenta` in a resting stage: velocities before it, then momenta with its loads.
+VELOCITY, LOADED = 0, 6
+
+# Share of its energy that a body gains for nothing by being put right, and slops that it is lifted for nothing.
+FREE_SHARE = 1.0e-7
+FREE_LIFT = 10.0
+
+
+@inlined
+def note_loaded(b, velocity, many):
+    """Keep the velocity of body b before its loads; `many.now` has its momenta and `many.twist` its ω before them."""
+    put(many.momenta, b, VELOCITY, velocity)
+    put(many.momenta, b, VELOCITY + 3, vector(many.twist, b, 3))
+
+
+@inlined
+def keep_loaded(b, many):
+    """Keep the momenta of body b with its loads."""
+    put(many.momenta, b, LOADED, vector(many.now, b, at.LINVEL))
+    put(many.momenta, b, LOADED + 3, vector(many.now, b, at.ANGMOM))
+
+
+@kernel
+def stage_has_gained(h, many):
+    """Whether the impulses of a resting stage raised the energy by more than its solve may be off.
+
+    Impulses P and moments Q of a body change its energy by ½ P·(v + v') + ½ Q·(ω + ω').
+    """
+    gain = size = 0.0
+    for b in range(many.now.shape[0]):
+        if many.touched[b] == 0:
+            continue
+        body, v1, L1 = many.bodies[b], vector(many.now, b, at.LINVEL), vector(many.now, b, at.ANGMOM)
+        v, w = vector(many.momenta, b, VELOCITY), vector(many.momenta, b, VELOCITY + 3)
+        P, Q = minus(v1, vector(many.momenta, b, LOADED)), minus(L1, vector(many.momenta, b, LOADED + 3))
+        w1, a = vector(many.twist, b, 3), body.free_acceleration
+        gain += body.mass * qt.dot(P, plus(v, 1.0, v1)) + qt.dot(Q, plus(w, 1.0, w1))
+        square = h * h * (a[0] * a[0] + a[1] * a[1] + a[2] * a[2])
+        size += body.mass * (qt.dot(v, v) + square) + abs(qt.dot(L1, w1))
+    return gain > many.settings[0].tolerance * size
+
+
+@kernel
+def take_stage_back(n, many):
+    """Momenta with loads and without impulses, and targets that cannot raise the energy: see `stages.calm_targets`."""
+    for b in range(many.now.shape[0]):
+        if many.touched[b] == 0:
+            continue
+        put(many.now, b, at.LINVEL, vector(many.momenta, b, LOADED))
+        put(many.now, b, at.ANGMOM, vector(many.momenta, b, LOADED + 3))
+    for k in range(n):
+        put(many.target, k, 0, (min(many.target[k, 0], 0.0), 0.0, 0.0))
+
+
+@inlined
+def _slowed(kinetic, price):
+    """What velocities are multiplied by to pay a price [J] with them."""
+    return math.sqrt(1.0 - price / kinetic) if price < kinetic else 0.0
+
+
+@kernel
+def pay_for_place(b, x, before, tilted, many):
+    """Pay for what moving body b from x, where its turning had the energy `before` [J], has gained; from its motion."""
+    y, q, v, L = read_state(many.now, b)
+    body = many.bodies[b]
+    turning = 0.5 * qt.dot(L, angular_velocity(q, L, body, tilted))
+    kinetic = 0.5 * body.mass * qt.dot(v, v) + turning
+    d, a = minus(y, x), body.free_acceleration
+    lift = -body.mass * (a[0] * d[0] + a[1] * d[1] + a[2] * d[2])
+    free = FREE_SHARE * kinetic + body.mass * body.acceleration * FREE_LIFT * body.slop
+    price = turning - before + lift
+    if price > free:
+        s = _slowed(kinetic, price)
+        put(many.now, b, at.LINVEL, (s * v[0], s * v[1], s * v[2]))
+        put(many.now, b, at.ANGMOM, (s * L[0], s * L[1], s * L[2]))
+
+
+@kernel
+def bring_inside(b, tilted, many):
+    """Bring back a body whose centre is behind a wall, without the velocity that led there: whether it was.
+
+    Contacts hold points. Loads of a million times the weight may turn a body by many radians in a step, and points that
+    move with that say nothing about where the centre goes.
+    """
+    body, was_outside = many.bodies[b], False
+    dims = (body.dims[0], body.dims[1], body.dims[2])
+    for k in range(many.walls.shape[0]):
+        n, center = vector(many.walls, k, NORMAL), vector(many.place, b, 0)
+        d = qt.dot(n, center) - many.walls[k, OFFSET]
+        if d >= 0.0:
+            continue
+        was_outside = True
+        reach = geo.support(body.shape, dims, geo.scaled_normal(body.shape, dims, matrix(many.rotation, b), n))
+        put(many.place, b, 0, plus(center, reach - d, n))
+        put(many.now, b, at.POS, plus(vector(many.now, b, at.POS), reach - d, n))
+        v = vector(many.now, b, at.LINVEL)
+        put(many.now, b, at.LINVEL, plus(v, -min(qt.dot(n, v), 0.0), n))
+    return was_outside
