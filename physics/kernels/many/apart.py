@@ -22,27 +22,32 @@ APART_SHARE = 0.5
 
 # Rounds, and the depth in slops from which on there is another, if the last one helped: what loads of a million times
 # the weight have turned deep into others is taken out at once.
-ROUNDS = 8
-DEEP = 1000.0
+ROUNDS = 30
+DEEP = 100.0
 
-# Error of the displacements, relative to the largest depth, and sweeps for it at most.
+# Error of the displacements, relative to the largest that is asked for, and sweeps for it at most: something light
+# between a wall and something heavy needs as many as their masses differ.
 APART_ERROR = 1.0e-3
 APART_SWEEPS = 50
+DEEP_SWEEPS = 1000
 
 
 @inlined
 def _aim_apart(n, many):
-    """Displacements asked for along the normals [m]; the deepest that anything is, in its slop: from 1 on there are."""
-    deepest = 0.0
+    """Displacements asked for along the normals: the deepest that anything is, in its slop (from 1 on some are asked
+    for), and the largest [m].
+    """
+    deepest = largest = 0.0
     for k in range(n):
         slop, gap = pair_slop(many.ends[k, 0], many.ends[k, 1], many), many.gap[k]
         goal = -max(gap, 0.0)
         if gap < -slop:
             goal = -APART_SHARE * (gap + 0.5 * slop)
+            largest = max(largest, goal)
         deepest = max(deepest, -gap / slop)
         put(many.target, k, 0, (goal, 0.0, 0.0))
         put(many.impulse, k, 0, (0.0, 0.0, 0.0))
-    return deepest
+    return deepest, largest
 
 
 @inlined
@@ -67,14 +72,15 @@ def _displace(b, tilted, many):
 def _part_once(n, tilted, many):
     """One round for the n contacts, posed where the bodies are: the deepest that anything was, in its slop."""
     refresh(many)
-    deepest = _aim_apart(n, many)
+    deepest, largest = _aim_apart(n, many)
     if not deepest > 1.0:
         return deepest
     for b in range(many.now.shape[0]):
         put(many.twist, b, 0, (0.0, 0.0, 0.0))
         put(many.twist, b, 3, (0.0, 0.0, 0.0))
-    goal = APART_ERROR * assemble(n, many)
-    sweep_contacts(0, n, None, residual_of(0, n, None, many), goal, APART_SWEEPS, many)
+    assemble(n, many)
+    sweeps = DEEP_SWEEPS if deepest > DEEP else APART_SWEEPS
+    sweep_contacts(0, n, None, residual_of(0, n, None, many), APART_ERROR * largest, sweeps, many)
     for b in range(many.now.shape[0]):
         if many.touched[b] == 1:
             _displace(b, tilted, many)

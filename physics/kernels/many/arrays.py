@@ -151,8 +151,8 @@ def make_many(
     """
     f, i, nb = np.float64, np.int64, bodies
     pairs, n = pair_room(bodies), contact_room(bodies, len(walls))
-    record = np.zeros(1, np.dtype([*setting_fields(), ("meet", i), ("in_turn", i)]))
-    record["meet"], record["in_turn"] = meet, in_turn
+    record = np.zeros(1, np.dtype([*setting_fields(), ("still", f), ("meet", i), ("in_turn", i)]))
+    record["still"], record["meet"], record["in_turn"] = np.inf, meet, in_turn
     for name, value in settings.items():
         record[name] = value
     rows = np.zeros(nb, np.dtype(body_fields(terms)))

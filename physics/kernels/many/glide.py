@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 from physics.kernels import layout as at
 from physics.kernels import quaternion as qt
 from physics.kernels.arms import wandering_point
@@ -25,8 +27,9 @@ from physics.kernels.many.contacts import (
     vector,
 )
 from physics.kernels.many.place import place_body
-from physics.kernels.many.settle import settle
-from physics.kernels.many.thrift import keep_loaded, note_loaded, stage_has_gained, take_stage_back
+from physics.kernels.many.settle import settle, settle_smoothly
+from physics.kernels.many.thrift import keep_loaded, note_loaded, stage_has_gained, take_stage_back, turn_loaded
+from physics.kernels.stages import STILL_SHARE
 from physics.kernels.step import coast
 
 
@@ -98,11 +101,14 @@ def hold_all_loads(h, gyroscopic, tilted, many):
 
 
 @inlined
-def turn_loaded(b, tilted, many):
-    """Twist of body b from its momenta."""
-    put(many.twist, b, 0, vector(many.now, b, at.LINVEL))
-    q, L = read_state(many.now, b)[1], vector(many.now, b, at.ANGMOM)
-    put(many.twist, b, 3, angular_velocity(q, L, many.bodies[b], tilted))
+def still_speed(h, many):
+    """Residual that the stage is solved to whatever the tolerance allows; see `physics.kernels.stages.still_speed`."""
+    least = math.inf
+    for b in range(many.now.shape[0]):
+        slop_speed = many.bodies[b].slop / h
+        if many.touched[b] == 1 and many.settings[0].tolerance * many.bodies[b].acceleration * h > slop_speed:
+            least = min(least, STILL_SHARE * slop_speed)
+    return least
 
 
 @kernel
@@ -133,13 +139,15 @@ def glide(n, world, h, friction, gyroscopic, tilted, scheme, memory, report, man
             keep_loaded(b, many)
             turn_loaded(b, tilted, many)
     kept.load(n, world, h, friction, memory, many)
+    many.settings[0].still = still_speed(h, many)
     settle(n, world, friction, report, many)
     if stage_has_gained(h, many):
-        take_stage_back(n, many)
-        for b in range(many.now.shape[0]):
-            if many.touched[b] == 1:
-                turn_loaded(b, tilted, many)
+        take_stage_back(n, tilted, many)
         settle(n, world, friction, report, many)
+        if friction is not None and stage_has_gained(h, many):
+            take_stage_back(n, tilted, many)
+            settle_smoothly(n, many)
+    many.settings[0].still = math.inf
     kept.store(n, world, h, memory, many)
     for b in range(many.now.shape[0]):
         if many.touched[b] == 1:

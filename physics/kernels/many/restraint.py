@@ -7,10 +7,13 @@ from physics.kernels import quaternion as qt
 from physics.kernels.body import angular_velocity, read_state
 from physics.kernels.compiler import inlined, kernel
 from physics.kernels.many.contacts import pair_slop, plus, put, vector
-from physics.kernels.many.settle import settle
+from physics.kernels.many.settle import settle, settle_smoothly
 from physics.kernels.restraint import ROUNDING, rebound_share
 
 BEFORE, FULL = 0, 6
+
+# Tolerances of its solve by which a plastic impact may raise the energy, as a share of it.
+SOLVED = 4.0
 
 
 @inlined
@@ -73,22 +76,37 @@ def _has_rebound(n, many):
 
 
 @kernel
+def _settle_without_friction(n, tilted, many):
+    """The plastic impact without friction from the momenta before: no solve with friction came out right."""
+    _aim_plastic(n, many)
+    _turn(tilted, many)
+    settle_smoothly(n, many)
+
+
+@kernel
 def settle_restrained(n, world, friction, tilted, report, many):
     """`settle` the n contacts of an impact; with friction, with as much of the rebound as there is energy for."""
-    if friction is None or not _has_rebound(n, many):
+    if friction is None:
         settle(n, world, friction, report, many)
         return
     _keep(BEFORE, many)
     before = kinetic_energy(tilted, many)
+    most = before + SOLVED * many.settings[0].tolerance * before
+    has_rebound = _has_rebound(n, many)
     settle(n, world, friction, report, many)
     full = kinetic_energy(tilted, many)
-    if not full > before + ROUNDING * before:
+    if not full > (before + ROUNDING * before if has_rebound else most):
         return
-    _keep(FULL, many)
-    _aim_plastic(n, many)
-    _turn(tilted, many)
-    settle(n, world, friction, report, many)
-    plastic = kinetic_energy(tilted, many)
+    plastic = full
+    if has_rebound:
+        _keep(FULL, many)
+        _aim_plastic(n, many)
+        _turn(tilted, many)
+        settle(n, world, friction, report, many)
+        plastic = kinetic_energy(tilted, many)
+    if plastic > most:
+        _settle_without_friction(n, tilted, many)
+        return
     _mix(0.5, many)
     middle = kinetic_energy(tilted, many)
     s = rebound_share(before, plastic, full, middle)

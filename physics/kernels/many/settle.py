@@ -6,7 +6,7 @@ from physics.kernels import layout as at
 from physics.kernels import quaternion as qt
 from physics.kernels.compiler import inlined, kernel
 from physics.kernels.many.contacts import matrix, plus, put, vector
-from physics.kernels.many.solve import solve_contacts
+from physics.kernels.many.solve import solve_contacts, solve_smoothly
 
 
 @inlined
@@ -40,3 +40,10 @@ def settle(n, world, friction, report, many):
     solved = solve_contacts(n, friction, many)
     add_impulses(n, many)
     note_solve(world, solved, many.settings[0].tolerance, report)
+
+
+@kernel
+def settle_smoothly(n, many):
+    """`settle` without friction, where a solve with it came out wrong; the report has that one already."""
+    solve_smoothly(n, many)
+    add_impulses(n, many)

@@ -10,7 +10,7 @@ A warm start that still solves the problem costs one look at the residual. Else 
 4. an interior-point method, which finds what holds, slides and opens whatever the start, and Newton's method on the
    twists from there, in turns.
 
-What has a residual then that no impulses at all would beat is solved without friction.
+What has a residual then that no impulses at all would beat, or a stress beyond reason, is solved without friction.
 
 Where the linear system is dear (many bodies that all lie on each other), sweeps up to their limit take the place of 2
 to 4. All iterations together are no more than the sweeps allowed, but for those of the last method begun.
@@ -21,7 +21,7 @@ from __future__ import annotations
 import math
 
 from physics.kernels.compiler import inlined, kernel
-from physics.kernels.many.contacts import put
+from physics.kernels.many.contacts import put, vector
 from physics.kernels.many.interior import interior_point
 from physics.kernels.many.islands import find_islands
 from physics.kernels.many.newton import (
@@ -35,6 +35,13 @@ from physics.kernels.many.sweeps import assemble, residual_of, sweep_contacts
 
 # Sweeps before the interior-point method.
 FIRST_SWEEPS = 5
+
+# Residual that rounding leaves, relative to the largest free velocity: no more is asked for.
+ROUNDING = 1.0e-12
+
+# Bodies that wedge by friction hold any stress. Impulses that alone would give this many times the free velocities are
+# one that a method ran into, not what holds a million times a body's weight: what they leave is rounding.
+STRAINED = 1.0e9
 
 # Sweeps without friction, where all else failed.
 LAST_SWEEPS = 100
@@ -106,21 +113,54 @@ def solve_island(part, friction, scale, residual, goal, many):
     return 1 + count + more, residual, NEWTON
 
 
+@inlined
+def strain(first, last, many):
+    """Largest speed that a contact's impulse alone would give [m/s]."""
+    most = 0.0
+    for i in range(first, last):
+        k = many.queue[i]
+        p = vector(many.impulse, k, 0)
+        most = max(most, many.block[k, 0] * max(abs(p[0]), max(abs(p[1]), abs(p[2]))))
+    return most
+
+
+@inlined
+def forget_impulses(first, last, many):
+    """No impulses."""
+    for i in range(first, last):
+        put(many.impulse, many.queue[i], 0, (0.0, 0.0, 0.0))
+
+
+@inlined
+def free_body(b, many):
+    """The twist of body b without any impulse."""
+    for c in range(6):
+        many.twist[b, c] = many.free[b, c]
+
+
 @kernel
-def solve_without_friction(part, friction, residual, goal, many):
+def solve_without_friction(part, friction, goal, many):
     """Impulses along the normals only, from none: the residual, which is that of the problem with friction [m/s].
 
     The last resort, where the methods for friction went astray: these sweeps never raise the energy.
     """
     first, last, begin, end = part
-    for i in range(first, last):
-        put(many.impulse, many.queue[i], 0, (0.0, 0.0, 0.0))
+    forget_impulses(first, last, many)
     for i in range(begin, end):
-        b = many.order[i]
-        for c in range(6):
-            many.twist[b, c] = many.free[b, c]
-    sweep_contacts(first, last, None, residual, goal, LAST_SWEEPS, many)
+        free_body(many.order[i], many)
+    sweep_contacts(first, last, None, math.inf, goal, LAST_SWEEPS, many)
     return residual_of(first, last, friction, many)
+
+
+@kernel
+def solve_smoothly(n, many):
+    """`solve_without_friction` of all n contacts, for what a solve with friction came out wrong: the residual [m/s]."""
+    forget_impulses(0, n, many)
+    for b in range(many.twist.shape[0]):
+        for c in range(6):
+            many.free[b, c] = many.twist[b, c]
+    goal = many.settings[0].tolerance * assemble(n, many)
+    return sweep_contacts(0, n, None, math.inf, goal, LAST_SWEEPS, many)[1]
 
 
 @kernel
@@ -137,7 +177,11 @@ def solve_contacts(n, friction, many):
     scale = assemble(n, many)
     if not scale > 0.0:
         return 0, 0.0, SWEEPS
-    goal = many.settings[0].tolerance * scale
+    goal = max(min(many.settings[0].tolerance * scale, many.settings[0].still), ROUNDING * scale)
+    if strain(0, n, many) > STRAINED * scale:
+        forget_impulses(0, n, many)
+        for b in range(many.twist.shape[0]):
+            free_body(b, many)
     residual = residual_of(0, n, friction, many)
     if residual <= goal:
         return 0, residual / scale, SWEEPS
@@ -147,8 +191,8 @@ def solve_contacts(n, friction, many):
         residual = residual_of(part[0], part[1], friction, many)
         if not residual <= goal:
             count, residual, used = solve_island(part, friction, scale, residual, goal, many)
-            if not residual <= scale:  # no impulses at all would have been better
-                residual = solve_without_friction(part, friction, math.inf, goal, many)
+            if not residual <= scale or strain(part[0], part[1], many) > STRAINED * scale:
+                residual = solve_without_friction(part, friction, goal, many)
             iterations, method = max(iterations, count), max(method, used)
         if not residual <= worst:
             worst = residual

@@ -59,14 +59,23 @@ def stage_has_gained(h, many):
     return gain > many.settings[0].tolerance * size
 
 
+@inlined
+def turn_loaded(b, tilted, many):
+    """Twist of body b from its momenta."""
+    put(many.twist, b, 0, vector(many.now, b, at.LINVEL))
+    q, L = read_state(many.now, b)[1], vector(many.now, b, at.ANGMOM)
+    put(many.twist, b, 3, angular_velocity(q, L, many.bodies[b], tilted))
+
+
 @kernel
-def take_stage_back(n, many):
+def take_stage_back(n, tilted, many):
     """Momenta with loads and without impulses, and targets that cannot raise the energy: see `stages.calm_targets`."""
     for b in range(many.now.shape[0]):
         if many.touched[b] == 0:
             continue
         put(many.now, b, at.LINVEL, vector(many.momenta, b, LOADED))
         put(many.now, b, at.ANGMOM, vector(many.momenta, b, LOADED + 3))
+        turn_loaded(b, tilted, many)
     for k in range(n):
         put(many.target, k, 0, (min(many.target[k, 0], 0.0), 0.0, 0.0))
 
