@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from physics import checks, parameters
-from physics.effects import RESISTANCES
+from physics.effects import RESISTANCES, Friction
 from physics.field import Field, FieldSlot, write_columns
 from physics.kernels import layout as at
 from physics.kernels.probe import angular_momenta, deepest_gaps
@@ -55,11 +55,14 @@ def set_parameters(world: World, mass, size, inertia_body, friction, restitution
         params[:, at.RESTITUTION] = checks.share(*parameters.spread(restitution, shape, "restitution")).ravel()
     if effects is not None:
         effects = tuple(effects) if isinstance(effects, Sequence) else (effects,)
-        resistances = [effect for effect in effects if isinstance(effect, RESISTANCES)]
-        for effect in resistances:
+        laws = [effect for effect in effects if isinstance(effect, (*RESISTANCES, Friction))]
+        for effect in laws:
             _needs(type(effect).__name__, world.scene.effect(type(effect)), f"physics.{type(effect).__name__}(...)")
-        parameters.write_laws(params, plan.laws, resistances)
-        fields = [effect for effect in effects if effect not in resistances]
+            if isinstance(effect, Friction):
+                _check_axis(effect, world.scene.effect(Friction))
+                params[:, at.FRICTION] = effect.along
+        parameters.write_laws(params, plan.laws, laws)
+        fields = [effect for effect in effects if effect not in laws]
         write_columns(_changed_slots(world, fields), params[:, at.PARAM_SIZE :], world.body_count, chosen)
     field = None
     if gravity is not None:
@@ -119,14 +122,21 @@ def _needs(field: str, is_on, effect: str) -> None:
         raise ValueError(f"{field} was given, but the scene does not declare it; add {effect} to Scene.effects")
 
 
+def _check_axis(friction: Friction, declared: Friction) -> None:
+    if friction.axis != declared.axis:
+        raise ValueError(
+            f"Friction.axis is {friction.axis}; allowed is the scene's, {declared.axis}: it is the same in all worlds"
+        )
+
+
 def _changed_slots(world: World, effects) -> list[FieldSlot]:
     """The scene's kinds of field that `effects` are of, with these in place of the scene's."""
     kinds: dict[type, list[Field]] = {}
     for effect in effects:
         if not isinstance(effect, Field):
             raise ValueError(
-                f"effects holds {effect!r}; allowed are force fields, RollingFriction and SpinFriction (the rest has "
-                "arguments of its own, or is the same in all worlds)"
+                f"effects holds {effect!r}; allowed are force fields, Friction, RollingFriction and SpinFriction (the "
+                "rest has arguments of its own, or is the same in all worlds)"
             )
         effect.check(world.body_count)
         kinds.setdefault(effect.kind, []).append(effect)

@@ -48,7 +48,8 @@ def _between_row(scene, contact, many) -> Row:
 
 def _friction_row(friction, rubbing) -> Row:
     if rubbing:
-        return Row("friction", True, f"declared: μ = {friction.coefficient}", "three rows per contact, circular cone")
+        cone = "circular cone" if friction.axis is None else "elliptic cone"
+        return Row("friction", True, f"declared: μ = {friction.coefficient}", f"three rows per contact, {cone}")
     if friction is not None:
         return Row("friction", False, "declared, but nothing can touch", "")
     return Row("friction", False, "not declared", "")

@@ -12,8 +12,8 @@ from numba.extending import overload
 from physics.kernels.compiler import CHOSEN, kernel
 
 # Names of the laws, in the order of their numbers in `work.laws` and of their columns, the last of `params`.
-TANGENTIAL, ROLLING, SPIN = "tangential", "rolling", "spin"
-LAWS = (TANGENTIAL, ROLLING, SPIN)
+TANGENTIAL, ROLLING, SPIN, ANISOTROPY = "tangential", "rolling", "spin", "anisotropy"
+LAWS = (TANGENTIAL, ROLLING, SPIN, ANISOTROPY)
 _PREFIX = "law_"
 
 
@@ -55,8 +55,8 @@ def if_law(laws: tuple[str, ...], instead):
     return decorate
 
 
-def number_of(law: str):
-    """A kernel (work) that gives the number of a law for the body in the workspace, 0 where it is not declared."""
+def number_of(law: str, otherwise: float = 0.0):
+    """A kernel (work) that gives the number of a law for the body in the workspace; `otherwise` if undeclared."""
 
     def stub(work):
         return chosen(work)(work)
@@ -64,7 +64,7 @@ def number_of(law: str):
     def chosen(work):
         declared = _declared(work)
         if law not in declared:
-            return lambda work: 0.0
+            return lambda work: otherwise
         place = declared.index(law)
         return lambda work: work.laws[place]
 

@@ -16,6 +16,7 @@ import math
 
 from physics.kernels import quaternion as qt
 from physics.kernels.compiler import inlined
+from physics.kernels.ellipse import friction_ratio
 from physics.kernels.layout import SPHERE, TANGENT_1
 from physics.kernels.share import contact_arm
 
@@ -93,8 +94,10 @@ def oppose_end_slip(n, work):
 @inlined
 def has_turned_round(n, v, w, work):
     """Whether the slip of a contact that pushes is against the one before, -`work.target`, after impulses."""
+    ratio = friction_ratio(work)
     for i in range(n):
         a, b = _tangential(i, v, w, work)
+        b *= ratio * ratio  # both slips stretched (`ellipse`)
         if work.impulse[3 * i] > 0.0 and a * work.target[i, 1] + b * work.target[i, 2] > 0.0:
             return True
     return False

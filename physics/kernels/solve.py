@@ -5,10 +5,10 @@ from __future__ import annotations
 from physics.kernels import quaternion as qt
 from physics.kernels.compiler import inlined, kernel
 from physics.kernels.direct import hold_all
-from physics.kernels.layout import NORMAL
+from physics.kernels.ellipse import eased, stretch, unstretch
 from physics.kernels.proximal import proximal_newton
 from physics.kernels.pyramid import normal_fallback, pyramid_fallback
-from physics.kernels.share import wall_axis
+from physics.kernels.share import wall_axes
 from physics.kernels.slide import HOLD, slide_patch
 from physics.kernels.sweeps import (
     assemble,
@@ -110,8 +110,9 @@ def _may_hold(n, v, work):
     wall = work.slot[0] // work.features
     if n < 3 or work.slot[n - 1] // work.features != wall:
         return work.mode == HOLD
-    u = qt.dot(wall_axis(work.walls, wall, NORMAL), v)
-    return qt.dot(v, v) <= (1.0 + work.mu * work.mu) * u * u
+    axes = wall_axes(work.walls, wall)
+    u, e = qt.dot(axes[0], v), eased(v, axes, work)
+    return qt.dot(e, e) <= (1.0 + work.mu * work.mu) * u * u
 
 
 @inlined
@@ -120,6 +121,7 @@ def _assemble(n, width, R, v, L, work):
     J = work.J
     mb = qt.transposed_matvec(R, L)
     assemble(n, width, R, v, qt.matvec(R, (J[0] * mb[0], J[1] * mb[1], J[2] * mb[2])), work)
+    stretch(n, work)
     return _free_speed(width * n, work.bias)
 
 
@@ -200,6 +202,7 @@ def solve_contacts(n, friction, smooth, pivots, v, L, R, work):
     if pivots is not None and not residual <= max(goal, PIVOT_ABOVE * scale):
         residual = _pivot(n, friction, smooth, residual, work)
         method = PIVOTING
+    unstretch(n, work)
     v, L = _apply(n, width, v, L, work)
     if scale > 0.0:
         residual /= scale

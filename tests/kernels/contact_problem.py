@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from physics.kernels.laws import ANISOTROPY
 from physics.kernels.quaternion import to_matrix
 from physics.kernels.solve import solve_contacts
 from physics.kernels.workspace import make_workspace
@@ -17,10 +18,15 @@ FACE = (0, 1, 4, 5)  # vertices with y < 0
 
 
 class Problem:
-    """Vertices of a block on walls, with a free motion and target velocities."""
+    """Vertices of a block on walls, with a free motion and target velocities; `ratio` is μ2/μ1."""
 
-    def __init__(self, contacts, v, w, mu, quat=(1, 0, 0, 0), target=None, tolerance=1e-10, mass=MASS, length=1.0):
-        self.work = make_workspace(np.array([FLOOR, SIDE]), 8, tolerance=tolerance, sweeps=2000)
+    def __init__(
+        self, contacts, v, w, mu, quat=(1, 0, 0, 0), target=None, tolerance=1e-10, mass=MASS, length=1.0, ratio=None
+    ):
+        laws = () if ratio is None else (ANISOTROPY,)
+        self.work = make_workspace(np.array([FLOOR, SIDE]), 8, laws=laws, tolerance=tolerance, sweeps=2000)
+        if ratio is not None:
+            self.work["laws"] = ratio
         self.one = one = self.work[0]
         self.n = n = len(contacts)
         self.quat = tuple(float(c) for c in np.array(quat) / np.linalg.norm(quat))
