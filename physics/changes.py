@@ -12,6 +12,7 @@ from physics import checks, parameters
 from physics.effects import RESISTANCES, Friction
 from physics.field import Field, FieldSlot, write_columns
 from physics.kernels import layout as at
+from physics.kernels.laws import STIFFNESS
 from physics.kernels.probe import angular_momenta, deepest_gaps
 
 if TYPE_CHECKING:
@@ -19,6 +20,9 @@ if TYPE_CHECKING:
 
 # A body may be put this deep into a wall, in bounding radii: what a rounded or hand-typed pose may be off by.
 START_DEPTH = 1e-2
+
+# And so deep into one that gives, where depth is what carries it: its centre of mass stays outside.
+SOFT_DEPTH = 1.0
 
 
 def set_state(world: World, pos, quat, linvel, angvel, worlds) -> None:
@@ -95,13 +99,14 @@ def check_depth(world: World, state: np.ndarray, params: np.ndarray, chosen: np.
         return
     gaps, which = np.empty(len(state)), np.empty(len(state), np.int64)
     deepest_gaps(np.arange(len(state)), state, params, world.shapes, world.walls, gaps, which)
-    bad = np.flatnonzero(gaps < -START_DEPTH * params[:, at.RADIUS])
+    allowed = (SOFT_DEPTH if STIFFNESS in world.plan.laws else START_DEPTH) * params[:, at.RADIUS]
+    bad = np.flatnonzero(gaps < -allowed)
     if len(bad):
         k = int(bad[0])
         raise ValueError(
             f"{what}: pos {state[k, at.POS : at.POS + 3].tolist()} of body {k % world.body_count} in world "
             f"{int(chosen[k // world.body_count])} is {-gaps[k]:.6g} m inside walls[{which[k]}]; allowed is at most "
-            f"{START_DEPTH * params[k, at.RADIUS]:.3g} m"
+            f"{allowed[k]:.3g} m"
         )
 
 

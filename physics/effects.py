@@ -47,11 +47,19 @@ class Contact:
         Tangential coefficient e_t in [-1, 1] of spheres at walls (Walton 1993): the point of contact leaves an impact
         with -e_t times its tangential velocity, as far as `Friction` holds it. 1: a superball; 0: it sticks; -1: it
         slides on. None: as 0, and nothing of it is compiled.
+    stiffness : float, optional
+        k of a spring between each contact point (a vertex, the lowest point of a round body) and a wall, which pushes
+        with k times the depth [N/m]; greater than 0. It bounces by itself: not with a restitution. None: rigid.
+    damping : float, optional
+        c of a damper beside it [N s/m]; at least 0. The two together never pull (Kelvin and Voigt's model, without
+        adhesion).
     """
 
     restitution: float | None = None
     between_bodies: bool = True
     tangential: float | None = None
+    stiffness: float | None = None
+    damping: float = 0.0
 
     def __post_init__(self):
         if not isinstance(self.between_bodies, bool):
@@ -63,6 +71,21 @@ class Contact:
             object.__setattr__(self, "tangential", checks.number(self.tangential, "Contact.tangential"))
             if not -1.0 <= self.tangential <= 1.0:
                 raise ValueError(f"Contact.tangential is {self.tangential}; allowed are numbers from -1 to 1")
+        self._check_springs()
+
+    def _check_springs(self) -> None:
+        object.__setattr__(self, "damping", float(checks.non_negative(self.damping, (), "Contact.damping")))
+        if self.stiffness is None:
+            if self.damping > 0:
+                raise ValueError(f"Contact.damping is {self.damping}; allowed without a stiffness is 0")
+            return
+        object.__setattr__(self, "stiffness", float(checks.positive(self.stiffness, (), "Contact.stiffness")))
+        for name in ("restitution", "tangential"):
+            if getattr(self, name) is not None:
+                raise ValueError(
+                    f"Contact.{name} is {getattr(self, name)} with a stiffness; allowed is None: springs and dampers "
+                    "say how a body bounces"
+                )
 
 
 @dataclass(frozen=True)

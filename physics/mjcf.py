@@ -99,7 +99,7 @@ def to_mjcf(scene: Scene, drop: bool = False) -> str:
 
 def _inexpressible(scene: Scene) -> list:
     contact = scene.effect(Contact)
-    lost = [contact] if contact and (contact.restitution or contact.tangential) else []
+    lost = [contact] if contact and (contact.restitution or contact.tangential or contact.stiffness) else []
     friction = scene.effect(Friction)
     lost += [friction] if friction and friction.axis is not None else []
     return lost + [e for e in scene.effects if not isinstance(e, (Gravity, Contact, Friction, Spring))]

@@ -11,7 +11,7 @@ from physics.effects import Contact, Friction, RollingFriction, SpinFriction
 from physics.inertia import check_inertia, principal_axes
 from physics.kernels import layout as at
 from physics.kernels.compiler import kernel
-from physics.kernels.laws import ANISOTROPY, ROLLING, SPIN, TANGENTIAL
+from physics.kernels.laws import ANISOTROPY, DAMPING, ROLLING, SPIN, STIFFNESS, TANGENTIAL
 from physics.kernels.rotation import attitude_series
 from physics.scene import HalfSpace
 from physics.shapes import Body
@@ -61,6 +61,8 @@ LAW_EFFECTS = {
     ROLLING: (RollingFriction, "radius"),
     SPIN: (SpinFriction, "radius"),
     ANISOTROPY: (Friction, "ratio"),
+    STIFFNESS: (Contact, "stiffness"),
+    DAMPING: (Contact, "damping"),
 }
 
 

@@ -11,7 +11,7 @@ from physics.effects import Contact, Friction, Gravity, RollingFriction, SpinFri
 from physics.field import FieldSlot, field_slots
 from physics.inertia import principal_axes
 from physics.kernels.fields.terms import Term
-from physics.kernels.laws import ANISOTROPY, LAWS, ROLLING, SPIN, TANGENTIAL
+from physics.kernels.laws import ANISOTROPY, DAMPING, LAWS, ROLLING, SPIN, STIFFNESS, TANGENTIAL
 from physics.kernels.layout import BLOCK, ELLIPSOID, SPHERE, VERTEX_COUNT
 from physics.plan_rows import Row, make_rows
 from physics.scene import Scene
@@ -161,6 +161,8 @@ def _laws(scene: Scene, contact: Contact, friction: Friction | None) -> tuple[st
         ROLLING: has_round and scene.effect(RollingFriction) is not None,
         SPIN: has_round and scene.effect(SpinFriction) is not None,
         ANISOTROPY: friction is not None and friction.axis is not None,
+        STIFFNESS: contact.stiffness is not None,
+        DAMPING: contact.stiffness is not None,
     }
     return tuple(law for law in LAWS if is_on[law])
 
@@ -220,13 +222,13 @@ def _check_laws(scene: Scene, seen: _Seen, many: bool, scheme: int) -> None:
     """Refuse laws of contact where they are not known."""
     declared = {
         TANGENTIAL: "Contact.tangential", ROLLING: "RollingFriction", SPIN: "SpinFriction",
-        ANISOTROPY: "Friction with two coefficients",
+        ANISOTROPY: "Friction with two coefficients", STIFFNESS: "Contact.stiffness",
     }  # fmt: skip
-    names = ", ".join(declared[law] for law in seen.laws)
-    torques = ", ".join(declared[law] for law in seen.laws if law in (ROLLING, SPIN))
-    if torques and scheme == EVENTS:
+    names = ", ".join(declared[law] for law in seen.laws if law in declared)
+    unknown = ", ".join(declared[law] for law in seen.laws if law in (ROLLING, SPIN, STIFFNESS))
+    if unknown and scheme == EVENTS:
         raise ValueError(
-            f"accuracy has the scheme 'events', which does not know {torques}; allowed are 'fast', 'balanced' and "
+            f"accuracy has the scheme 'events', which does not know {unknown}; allowed are 'fast', 'balanced' and "
             "every time-stepping scheme"
         )
     if names and many:

@@ -13,7 +13,8 @@ from physics.kernels.compiler import CHOSEN, kernel
 
 # Names of the laws, in the order of their numbers in `work.laws` and of their columns, the last of `params`.
 TANGENTIAL, ROLLING, SPIN, ANISOTROPY = "tangential", "rolling", "spin", "anisotropy"
-LAWS = (TANGENTIAL, ROLLING, SPIN, ANISOTROPY)
+STIFFNESS, DAMPING = "stiffness", "damping"
+LAWS = (TANGENTIAL, ROLLING, SPIN, ANISOTROPY, STIFFNESS, DAMPING)
 _PREFIX = "law_"
 
 
@@ -21,7 +22,8 @@ def members(laws: tuple[str, ...]) -> list[tuple]:
     """What a workspace holds for these laws: nothing when there are none."""
     if not laws:
         return []
-    return [("laws", float, (len(laws),)), *((_PREFIX + name, float) for name in laws)]
+    numbers = [("laws", float, (len(laws),)), *((_PREFIX + name, float) for name in laws)]
+    return numbers + [("give", float)] * (STIFFNESS in laws)  # γ of a stage [1/kg], see `compliance`
 
 
 def _declared(work) -> list[str]:

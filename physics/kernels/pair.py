@@ -15,6 +15,7 @@ import math
 
 from physics.kernels import quaternion as qt
 from physics.kernels.compiler import inlined, kernel
+from physics.kernels.compliance import give_way
 from physics.kernels.ellipse import friction_ratio
 from physics.kernels.patch import P, X, Y, contact_place, contact_target
 from physics.kernels.point import (
@@ -212,7 +213,7 @@ def solve_few(n, count, mu, goal, u, w, inv_mass, K, work):
     if count > 0:
         i = work.active[0]
         r, b1 = contact_place(i, work), _free(i, u, w, work)
-        W1 = block(r, r, inv_mass, ratio, K)
+        W1 = give_way(block(r, r, inv_mass, ratio, K), work)
         x1 = y1 = 0.0
         if count == 1:
             if mu > 0.0:
@@ -224,7 +225,7 @@ def solve_few(n, count, mu, goal, u, w, inv_mass, K, work):
         else:
             j = work.active[1]
             s, b2 = contact_place(j, work), _free(j, u, w, work)
-            W2, W12 = block(s, s, inv_mass, ratio, K), block(r, s, inv_mass, ratio, K)
+            W2, W12 = give_way(block(s, s, inv_mass, ratio, K), work), block(r, s, inv_mass, ratio, K)
             x2 = y2 = 0.0
             if mu > 0.0:
                 k, l = width * i, width * j

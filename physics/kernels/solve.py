@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from physics.kernels import quaternion as qt
 from physics.kernels.compiler import inlined, kernel
+from physics.kernels.compliance import soften, stiffness
 from physics.kernels.direct import hold_all
 from physics.kernels.ellipse import eased, stretch, unstretch
 from physics.kernels.proximal import proximal_newton
@@ -122,6 +123,7 @@ def _assemble(n, width, R, v, L, work):
     mb = qt.transposed_matvec(R, L)
     assemble(n, width, R, v, qt.matvec(R, (J[0] * mb[0], J[1] * mb[1], J[2] * mb[2])), work)
     stretch(n, work)
+    soften(n, width, work)
     return _free_speed(width * n, work.bias)
 
 
@@ -130,6 +132,10 @@ def _iterate(n, friction, smooth, goal, work):
     """Sweeps, with friction in turn with Newton's method: (sweeps and steps, residual [m/s])."""
     steps, residual = 0, 0.0
     if smooth is not None:
+        if stiffness(work) > 0.0:  # W is positive definite, but sweeps crawl where γ is small: a few pivots first
+            normal_fallback(
+                work.delassus, work.bias, n, work.impulse, work.fallback_float, work.fallback_int, MAX_PIVOTS
+            )
         steps, residual = normal_sweeps(n, goal, work.sweeps, work)
     if friction is not None:
         factor_blocks(n, work)
@@ -183,7 +189,10 @@ def solve_contacts(n, friction, smooth, pivots, v, L, R, work):
     """
     width = 1 if friction is None else 3
     holds_first = friction is not None and _may_hold(n, v, work)
-    for attempt in range(2):
+    attempts = 2
+    if stiffness(work) > 0.0:  # what gives neither holds nor has a normal motion known beforehand: `slide` for one or two
+        holds_first, attempts = False, 1 if n <= 2 else 0
+    for attempt in range(attempts):
         if friction is not None and (attempt == 0) == holds_first:
             found, v1, L1, residual = hold_all(n, R, v, L, work)
             if found:

@@ -197,7 +197,7 @@ def _peer_contenders(engine: peers.Engine, scene: physics.Scene, steps: Sequence
     ours_alone = (physics.Field, physics.RollingFriction, physics.SpinFriction)
     contact = scene.effect(physics.Contact)
     friction = scene.effect(physics.Friction)
-    is_ours = (contact and contact.tangential) or (friction and friction.axis is not None)
+    is_ours = (contact and (contact.tangential or contact.stiffness)) or (friction and friction.axis is not None)
     if is_ours or any(isinstance(effect, ours_alone) for effect in scene.effects):
         return [], [f"{engine.name}: it is not given the scene's fields and laws of contact"]
     for setting, options in engine.settings(scene).items():
