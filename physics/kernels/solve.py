@@ -141,9 +141,12 @@ def _iterate(n, friction, smooth, goal, work):
         factor_blocks(n, work)
         for i in range(n):
             work.friction[i] = work.mu
-        left = work.sweeps
+        left, at_once = work.sweeps, SWEEPS_AT_ONCE
+        if stiffness(work) > 0.0:  # the normals are determined, and Newton's method shares tangents out evenly
+            at_once = 0
         while True:
-            sweeps, residual = cone_sweeps(n, work.friction, goal, min(left, SWEEPS_AT_ONCE), work)
+            sweeps, residual = cone_sweeps(n, work.friction, goal, min(left, at_once), work)
+            at_once = SWEEPS_AT_ONCE
             steps += sweeps
             left -= sweeps
             if residual <= goal or left <= 0:
