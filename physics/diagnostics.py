@@ -19,7 +19,7 @@ class Diagnostics:
     """Per world and body, shape (worlds, bodies) or (worlds, bodies, 3)."""
 
     kinetic_energy: np.ndarray  # [J]
-    potential_energy: np.ndarray  # [J]: of gravity, zero at the origin, of contact that gives, and of fields that have one
+    potential_energy: np.ndarray  # [J]: of gravity (0 at the origin), springs of contact, and fields that have one
     momentum: np.ndarray  # [kg m/s], world frame
     angular_momentum: np.ndarray  # about the centre of mass [kg m²/s], world frame
     gap: np.ndarray  # smallest distance to a wall [m], negative when penetrating, inf without walls
@@ -33,7 +33,8 @@ class Diagnostics:
 def diagnose(world: World) -> Diagnostics:
     """Energy, momenta and gaps of every body of `world` now.
 
-    Kinetic energy is ½ P·v + ½ L·ω, potential energy -m g·x and what fields (`Field.energy`) and springs of contact add.
+    Kinetic energy is ½ P·v + ½ L·ω, potential energy -m g·x and what fields (`Field.energy`) add,
+    and springs of contact.
     """
     shape = (world.worlds, world.body_count)
     mass = 1.0 / world.params[:, at.INV_MASS].reshape(shape)

@@ -1,24 +1,27 @@
-"""Contact that gives: a spring and a damper between each contact point and its wall, implicit, stable at any stiffness.
+"""Contact that gives: springs and dampers between contact points and walls, implicit, stable at any stiffness.
 
-A point with the gap g pushes with f = -k g - c g', and never pulls: 0 <= f ⟂ f + k g + c g' >= 0. A stage of length h drifts
-(1 - θ) h with the old velocities and θ h with the new ones, and its impulse is that of gap and rate weighted in the same way:
+A point with the gap g pushes with f = -k g - c g', and never pulls: 0 <= f ⟂ f + k g + c g' >= 0. A stage of length h
+drifts (1 - θ) h with the old velocities and θ h with the new ones, and its impulse is that of gap and rate weighted in
+the same way:
 
     p = -h (k g_θ + c g'_θ),    g_θ = (1 - θ) g⁰ + θ g¹,    g'_θ likewise.
 
-(Of a point that is still above the wall, g⁰ > 0, 0 stands for g⁰ there: what is stored in the spring is then no more than
-was paid for.) With g, the gap after the first drift, g¹ = g + θh u + (θh)² b/2 and g'¹ = u + θh b, u the new velocity of the point where it is
-then and b what it gains there per time by turning (`contact.aim_rest`), that is linear in u. In a contact problem
+(Of a point that is still above the wall, g⁰ > 0, 0 stands for g⁰ there: what is stored in the spring is then no more
+than was paid for.) With g, the gap after the first drift, g¹ = g + θh u + (θh)² b/2 and g'¹ = u + θh b, u the new
+velocity of the point where it is then and b what it gains there per time by turning (`contact.aim_rest`), that is
+linear in u. In a contact problem
 
     0 <= p ⟂ u + γ p - t >= 0,    γ = 1/(h D),    D = θ (θhk + c),
     t = -[k (θ (g + (θh)² b/2) + (1 - θ) g⁰) + c (θ²h b + (1 - θ) g'⁰)]/D,
 
-a number γ more on the diagonal of W, and a target. In equilibrium g = g⁰ = -p/(hk) at any h and θ: the sag is exact. A point
-that ends up deeper than g¹, since turning is no parabola, is lifted there (`lift_to_due`): by moving the body, as in
-`contact.push_out`. A depth that no force has worked for would be energy for a stiff spring.
+a number γ more on the diagonal of W, and a target. In equilibrium g = g⁰ = -p/(hk) at any h and θ: the sag is exact.
+A point that ends up deeper than g¹, since turning is no parabola, is lifted there (`lift_to_due`): by moving the body,
+as in `contact.push_out`. A depth that no force has worked for would be energy for a stiff spring.
 
-This is the θ-method. θ = ½ is the midpoint rule: of second order, a spring keeps its energy (p (u⁰ + u¹)/2 = -k (g¹² - g⁰²)/2).
-θ = 1 is implicit Euler, which brings what a step cannot resolve to rest in one step. For ½ <= θ <= 1 no energy is gained. With λ the
-fastest rate of the contacts, √(k w) or c w, w = Σ W_nn of them all (no less than the largest eigenvalue),
+This is the θ-method. θ = ½ is the midpoint rule: of second order, and a spring keeps its energy, p (u⁰ + u¹)/2 =
+-k (g¹² - g⁰²)/2. θ = 1 is implicit Euler, which brings what a step cannot resolve to rest in one step. For ½ <= θ <= 1
+no energy is gained. With λ the fastest rate of the contacts, √(k w) or c w, w = Σ W_nn of them all (no less than the
+largest eigenvalue),
 
     θ = max(½, 1 - 1/(λh)):
 
@@ -26,7 +29,8 @@ the midpoint rule where λh <= 2, and towards implicit Euler beyond.
 
 References
 ----------
-E. Hairer, G. Wanner, *Solving Ordinary Differential Equations II*, 2nd ed., 1996, section IV.3, for the stability of θ-methods.
+E. Hairer, G. Wanner, *Solving Ordinary Differential Equations II*, 2nd ed., 1996, section IV.3, for the stability of
+θ-methods.
 """
 
 from __future__ import annotations
@@ -77,8 +81,8 @@ def _no_aim(*arguments):
 def aim_springs(n, x, R, v, w, alpha, before, after, tilted, work):
     """Targets along the normals, and the γ of the stage, in place of what `contact.aim_rest` asks for.
 
-    x, R, v, w, alpha are those of the body between the drifts of `before` and `after`, before the impulses; `work.gap` is
-    that at the start.
+    x, R, v, w, alpha are those of the body between the drifts of `before` and `after`, before the impulses;
+    `work.gap` is that at the start.
     """
     h = before + after
     k, c = stiffness(work), damping(work)

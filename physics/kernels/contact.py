@@ -22,7 +22,7 @@ TOGETHER = 3.0
 # Turn in a stage beyond which accelerations at its middle say nothing about its end any more [rad].
 LARGEST_TURN = 0.5
 
-stiffness = number_of(STIFFNESS)
+stiffness = number_of(STIFFNESS)  # of contact that gives (`compliance`)
 
 # Share of the slop below which the displacement of a contact in one step does not count.
 UNSEEN = 1.0e-3

@@ -112,7 +112,7 @@ def _as_solved(n, friction, smooth, pivots, v, w, solved, free, R, h, work):
 
 @if_law((STIFFNESS,), _as_solved)
 def without_gift(n, friction, smooth, pivots, v, w, solved, free, R, h, work):
-    """What `solve_contacts` gave for `free` (v, L), or that with friction against the mean slip, if friction gave energy.
+    """What `solve_contacts` gave for `free` (v, L); if friction gave energy, that with friction against the mean slip.
 
     An impulse p adds p·½(u⁰ + u¹). Friction that stops a contact adds ½ p_t·u⁰, which in a rigid impact the normal
     impulse outweighs. A spring pushes as much as it is deep, not as much as would do that.

@@ -193,7 +193,7 @@ def solve_contacts(n, friction, smooth, pivots, v, L, R, work):
     width = 1 if friction is None else 3
     holds_first = friction is not None and _may_hold(n, v, work)
     attempts = 2
-    if stiffness(work) > 0.0:  # what gives neither holds nor has a normal motion known beforehand: `slide` for one or two
+    if stiffness(work) > 0.0:  # neither holds nor has a normal motion known beforehand: `slide` for one or two
         holds_first, attempts = False, 1 if n <= 2 else 0
     for attempt in range(attempts):
         if friction is not None and (attempt == 0) == holds_first:

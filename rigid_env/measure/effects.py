@@ -49,6 +49,14 @@ def _bouncing() -> tuple[physics.Scene, physics.Scene]:
     return tuple(physics.Scene([BOUNCING], [FLOOR], [GRAVITY, law, physics.Friction(50.0)]) for law in laws)
 
 
+def _soft() -> tuple[physics.Scene, physics.Scene]:
+    """The block at rest on springs, and on rock."""
+    scene = scenes.rest()
+    others = [effect for effect in scene.effects if not isinstance(effect, physics.Contact)]
+    laws = (physics.Contact(stiffness=1e5, damping=1e3), physics.Contact())
+    return tuple(physics.Scene(scene.bodies, scene.walls, [*others, law]) for law in laws)
+
+
 def _grained() -> tuple[physics.Scene, physics.Scene]:
     """The slope with two coefficients of friction, and with one."""
     laws = (physics.Friction((0.2, 0.4), axis=(0.0, 0.0, 1.0)), physics.Friction(0.3))
@@ -82,6 +90,7 @@ CASES: dict[str, Callable[[], tuple[physics.Scene, physics.Scene]]] = {
     "push": lambda: _case(physics.Push((1.0, 0.0, 0.0), CORNER), GRAVITY),
     "tangential restitution": _bouncing,
     "friction of two coefficients": _grained,
+    "compliance": _soft,
     "rolling friction": lambda: _case(physics.RollingFriction(), *TOUCH, bodies=[BALL], walls=[FLOOR]),
     "spin friction": lambda: _case(physics.SpinFriction(), *TOUCH, bodies=[BALL], walls=[FLOOR]),
     "actuator": lambda: _case(physics.Actuator(limit_force=1.0, lag=0.1), GRAVITY),

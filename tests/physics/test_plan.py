@@ -84,7 +84,11 @@ def compiled_names(effects: str, cache: Path) -> set[str]:
             {"cone_sweeps", "pyramid_fallback", "resist_turning", "without_gain", "aim_tangential", "bind_laws"},
         ),
         ("[physics.Contact(), physics.Friction()]", {"cone_sweeps"}, {"ellipse", "bind_laws"}),
-        ("[physics.Contact(), physics.Friction((0.1, 0.2), (0, 0, 1))]", {"cone_sweeps", "ellipse", "bind_laws"}, set()),
+        (
+            "[physics.Contact(), physics.Friction((0.1, 0.2), (0, 0, 1))]",
+            {"cone_sweeps", "ellipse", "bind_laws"},
+            set(),
+        ),
     ],
 )
 def test_machine_code_holds_nothing_that_is_not_declared(effects, present, absent, tmp_path):
