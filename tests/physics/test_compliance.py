@@ -142,9 +142,9 @@ def test_an_undamped_bounce_loses_what_the_last_step_of_contact_cuts_off():
 def test_a_bounce_takes_its_time_and_its_energy(zeta):
     """The force of x'' + 2ζω x' + ω² x = 0 from x = 0, x' = -v ends where x'' = 0 (Schwager and Pöschel 2007).
 
-    That is at ω_d t = π - 2 asin ζ, with x' = v e^(-ζωt), and the ball flies the way x = -2ζ x'/ω that is left. Undamped
-    the time is π/ω, e = 1. Of second order, whatever part of a step the contact begins and ends in: root of the mean
-    square of 64 of them.
+    That is at ω_d t = π - 2 asin ζ, with x' = v e^(-ζωt), and the ball flies the way x = -2ζ x'/ω that is left. The
+    time is π/ω undamped, e = 1. Of second order, whatever part of a step the contact begins and ends in: root of the
+    mean square of 64 of them.
     """
     omega = math.sqrt(K / M)
     t = (math.pi - 2 * math.asin(zeta)) / (omega * math.sqrt(1 - zeta**2))
@@ -167,9 +167,9 @@ def test_no_stiffness_gives_energy(k, friction):
     """200 blocks that tumble onto the floor, undamped, steps of 10 ms.
 
     Without turning there is nothing to gain. A point that turns by φ in a step is off its parabola by φ³ r/12, and the
-    energy of its spring by k times that and its depth ρ. For k = 1e3, which a step resolves, with ρ = 0.2 m and φ = 0.1,
-    0.01 J a step of either sign, in ten steps of a bounce up to 0.1 % of some 40 J. Depths go with 1/√k, and what a step
-    does not resolve loses most of its energy at once.
+    energy of its spring by k times that and its depth ρ. For k = 1e3, which a step resolves, with ρ = 0.2 m, φ = 0.1,
+    0.01 J a step of either sign, in ten steps of a bounce up to 0.1 % of some 40 J. Depths go with 1/√k, and what a
+    step does not resolve loses most of its energy at once.
     """
     rng = np.random.default_rng(7)
     count = 200
