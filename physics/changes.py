@@ -9,9 +9,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from physics import checks, parameters
-from physics.effects import RESISTANCES
+from physics.effects import RESISTANCES, Friction
 from physics.field import Field, FieldSlot, write_columns
 from physics.kernels import layout as at
+from physics.kernels.laws import STIFFNESS
 from physics.kernels.probe import angular_momenta, deepest_gaps
 
 if TYPE_CHECKING:
@@ -19,6 +20,9 @@ if TYPE_CHECKING:
 
 # A body may be put this deep into a wall, in bounding radii: what a rounded or hand-typed pose may be off by.
 START_DEPTH = 1e-2
+
+# And so deep into one that gives, where depth is what carries it: its centre of mass stays outside.
+SOFT_DEPTH = 1.0
 
 
 def set_state(world: World, pos, quat, linvel, angvel, worlds) -> None:
@@ -55,11 +59,14 @@ def set_parameters(world: World, mass, size, inertia_body, friction, restitution
         params[:, at.RESTITUTION] = checks.share(*parameters.spread(restitution, shape, "restitution")).ravel()
     if effects is not None:
         effects = tuple(effects) if isinstance(effects, Sequence) else (effects,)
-        resistances = [effect for effect in effects if isinstance(effect, RESISTANCES)]
-        for effect in resistances:
+        laws = [effect for effect in effects if isinstance(effect, (*RESISTANCES, Friction))]
+        for effect in laws:
             _needs(type(effect).__name__, world.scene.effect(type(effect)), f"physics.{type(effect).__name__}(...)")
-        parameters.write_laws(params, plan.laws, resistances)
-        fields = [effect for effect in effects if effect not in resistances]
+            if isinstance(effect, Friction):
+                _check_axis(effect, world.scene.effect(Friction))
+                params[:, at.FRICTION] = effect.along
+        parameters.write_laws(params, plan.laws, laws)
+        fields = [effect for effect in effects if effect not in laws]
         write_columns(_changed_slots(world, fields), params[:, at.PARAM_SIZE :], world.body_count, chosen)
     field = None
     if gravity is not None:
@@ -92,13 +99,14 @@ def check_depth(world: World, state: np.ndarray, params: np.ndarray, chosen: np.
         return
     gaps, which = np.empty(len(state)), np.empty(len(state), np.int64)
     deepest_gaps(np.arange(len(state)), state, params, world.shapes, world.walls, gaps, which)
-    bad = np.flatnonzero(gaps < -START_DEPTH * params[:, at.RADIUS])
+    allowed = (SOFT_DEPTH if STIFFNESS in world.plan.laws else START_DEPTH) * params[:, at.RADIUS]
+    bad = np.flatnonzero(gaps < -allowed)
     if len(bad):
         k = int(bad[0])
         raise ValueError(
             f"{what}: pos {state[k, at.POS : at.POS + 3].tolist()} of body {k % world.body_count} in world "
             f"{int(chosen[k // world.body_count])} is {-gaps[k]:.6g} m inside walls[{which[k]}]; allowed is at most "
-            f"{START_DEPTH * params[k, at.RADIUS]:.3g} m"
+            f"{allowed[k]:.3g} m"
         )
 
 
@@ -119,14 +127,21 @@ def _needs(field: str, is_on, effect: str) -> None:
         raise ValueError(f"{field} was given, but the scene does not declare it; add {effect} to Scene.effects")
 
 
+def _check_axis(friction: Friction, declared: Friction) -> None:
+    if friction.axis != declared.axis:
+        raise ValueError(
+            f"Friction.axis is {friction.axis}; allowed is the scene's, {declared.axis}: it is the same in all worlds"
+        )
+
+
 def _changed_slots(world: World, effects) -> list[FieldSlot]:
     """The scene's kinds of field that `effects` are of, with these in place of the scene's."""
     kinds: dict[type, list[Field]] = {}
     for effect in effects:
         if not isinstance(effect, Field):
             raise ValueError(
-                f"effects holds {effect!r}; allowed are force fields, RollingFriction and SpinFriction (the rest has "
-                "arguments of its own, or is the same in all worlds)"
+                f"effects holds {effect!r}; allowed are force fields, Friction, RollingFriction and SpinFriction (the "
+                "rest has arguments of its own, or is the same in all worlds)"
             )
         effect.check(world.body_count)
         kinds.setdefault(effect.kind, []).append(effect)

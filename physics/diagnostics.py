@@ -8,7 +8,8 @@ import numpy as np
 
 from physics.kernels import layout as at
 from physics.kernels.fields.probe import look_at_fields
-from physics.kernels.probe import deepest_gaps
+from physics.kernels.laws import STIFFNESS
+from physics.kernels.probe import deepest_gaps, spring_energies
 from physics.kernels.workspace import body_records
 from physics.world import World
 
@@ -18,7 +19,7 @@ class Diagnostics:
     """Per world and body, shape (worlds, bodies) or (worlds, bodies, 3)."""
 
     kinetic_energy: np.ndarray  # [J]
-    potential_energy: np.ndarray  # [J]: of gravity, zero at the origin, and of fields that have one
+    potential_energy: np.ndarray  # [J]: of gravity (0 at the origin), springs of contact, and fields that have one
     momentum: np.ndarray  # [kg m/s], world frame
     angular_momentum: np.ndarray  # about the centre of mass [kg m²/s], world frame
     gap: np.ndarray  # smallest distance to a wall [m], negative when penetrating, inf without walls
@@ -32,7 +33,8 @@ class Diagnostics:
 def diagnose(world: World) -> Diagnostics:
     """Energy, momenta and gaps of every body of `world` now.
 
-    Kinetic energy is ½ P·v + ½ L·ω, potential energy -m g·x and what fields add (`Field.energy`).
+    Kinetic energy is ½ P·v + ½ L·ω, potential energy -m g·x and what fields (`Field.energy`) add,
+    and springs of contact.
     """
     shape = (world.worlds, world.body_count)
     mass = 1.0 / world.params[:, at.INV_MASS].reshape(shape)
@@ -43,6 +45,11 @@ def diagnose(world: World) -> Diagnostics:
     potential = -mass * np.sum(world.gravity[:, None, :] * world.pos, axis=-1)
     if world.plan.fields:
         potential += look_at(world)[1].reshape(shape)
+    laws = world.plan.laws
+    if STIFFNESS in laws:
+        energies, column = np.empty(len(world.state)), world.params.shape[1] - len(laws) + laws.index(STIFFNESS)
+        spring_energies(world.state, world.params, world.shapes, world.walls, column, energies)
+        potential += energies.reshape(shape)
     return Diagnostics(
         kinetic_energy=0.5 * np.sum(momentum * world.linvel + angular * world.angvel, axis=-1),
         potential_energy=potential,

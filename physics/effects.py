@@ -9,6 +9,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import numpy as np
+
 from physics import checks
 from physics.field import Field
 
@@ -45,11 +47,19 @@ class Contact:
         Tangential coefficient e_t in [-1, 1] of spheres at walls (Walton 1993): the point of contact leaves an impact
         with -e_t times its tangential velocity, as far as `Friction` holds it. 1: a superball; 0: it sticks; -1: it
         slides on. None: as 0, and nothing of it is compiled.
+    stiffness : float, optional
+        k of a spring between each contact point (a vertex, the lowest point of a round body) and a wall, which pushes
+        with k times the depth [N/m]; greater than 0. It bounces by itself: not with a restitution. None: rigid.
+    damping : float, optional
+        c of a damper beside it [N s/m]; at least 0. The two together never pull (Kelvin and Voigt's model, without
+        adhesion).
     """
 
     restitution: float | None = None
     between_bodies: bool = True
     tangential: float | None = None
+    stiffness: float | None = None
+    damping: float = 0.0
 
     def __post_init__(self):
         if not isinstance(self.between_bodies, bool):
@@ -61,23 +71,79 @@ class Contact:
             object.__setattr__(self, "tangential", checks.number(self.tangential, "Contact.tangential"))
             if not -1.0 <= self.tangential <= 1.0:
                 raise ValueError(f"Contact.tangential is {self.tangential}; allowed are numbers from -1 to 1")
+        self._check_springs()
+
+    def _check_springs(self) -> None:
+        object.__setattr__(self, "damping", float(checks.non_negative(self.damping, (), "Contact.damping")))
+        if self.stiffness is None:
+            if self.damping > 0:
+                raise ValueError(f"Contact.damping is {self.damping}; allowed without a stiffness is 0")
+            return
+        object.__setattr__(self, "stiffness", float(checks.positive(self.stiffness, (), "Contact.stiffness")))
+        for name in ("restitution", "tangential"):
+            if getattr(self, name) is not None:
+                raise ValueError(
+                    f"Contact.{name} is {getattr(self, name)} with a stiffness; allowed is None: springs and dampers "
+                    "say how a body bounces"
+                )
 
 
 @dataclass(frozen=True)
 class Friction:
-    """Coulomb friction with the exact circular cone: |f_t| <= μ f_n, opposed to sliding.
+    """Coulomb friction with the exact cone: |f_t| <= μ f_n, opposed to sliding.
 
     Parameters
     ----------
-    coefficient : float
-        μ, the same for sticking and sliding; at least 0.
+    coefficient : float or (2,) array_like
+        μ, the same for sticking and sliding; at least 0. Two, greater than 0: μ1 along `axis` and μ2 across it, of
+        walls with a grain. Their tangential forces fill the ellipse (f1/μ1)² + (f2/μ2)² <= f_n², and what slides is
+        opposed by the one that dissipates most (Goyal, Ruina and Papadopoulos 1991).
+    axis : (3,) or (walls, 3) array_like, optional
+        Direction of μ1, world frame, for all walls or one for each; its part along the wall counts. Needed with two
+        coefficients, and only then.
     """
 
-    coefficient: float = 0.5
+    coefficient: float | tuple = 0.5
+    axis: tuple | None = None
 
     def __post_init__(self):
-        value = float(checks.non_negative(self.coefficient, (), "Friction.coefficient"))
-        object.__setattr__(self, "coefficient", value)
+        name, given = "Friction.coefficient", self.coefficient
+        is_even = not np.iterable(given) or isinstance(given, str)
+        if is_even:
+            object.__setattr__(self, "coefficient", float(checks.non_negative(given, (), name)))
+        else:
+            object.__setattr__(self, "coefficient", tuple(checks.positive(given, (2,), name).tolist()))
+        if is_even != (self.axis is None):
+            allowed = "None with one coefficient" if is_even else "a direction with two coefficients"
+            raise ValueError(f"Friction.axis is {self.axis!r}; allowed is {allowed}")
+        if not is_even:
+            object.__setattr__(self, "axis", _axes(self.axis))
+
+    @property
+    def along(self) -> float:
+        """μ, or μ1."""
+        return self.coefficient if self.axis is None else self.coefficient[0]
+
+    @property
+    def ratio(self) -> float:
+        """μ2/μ1."""
+        return 1.0 if self.axis is None else self.coefficient[1] / self.coefficient[0]
+
+    def directions(self, walls: int) -> np.ndarray | None:
+        """(walls, 3) directions of μ1, world frame; None where it is the same all around."""
+        return None if self.axis is None else np.broadcast_to(np.array(self.axis), (walls, 3))
+
+
+def _axes(axis) -> tuple:
+    """One direction or a sequence of them, checked."""
+    try:
+        shape = np.shape(axis)
+    except ValueError:
+        shape = ()
+    value = checks.finite(axis, (*shape[:-1], 3) if len(shape) == 2 else (3,), "Friction.axis")
+    if not value.any(axis=-1).all():
+        raise ValueError(f"Friction.axis is {axis!r}; allowed are directions, any vectors but zero")
+    return tuple(value.tolist()) if value.ndim == 1 else tuple(tuple(row) for row in value.tolist())
 
 
 class _Resistance:

@@ -99,7 +99,9 @@ def to_mjcf(scene: Scene, drop: bool = False) -> str:
 
 def _inexpressible(scene: Scene) -> list:
     contact = scene.effect(Contact)
-    lost = [contact] if contact and (contact.restitution or contact.tangential) else []
+    lost = [contact] if contact and (contact.restitution or contact.tangential or contact.stiffness) else []
+    friction = scene.effect(Friction)
+    lost += [friction] if friction and friction.axis is not None else []
     return lost + [e for e in scene.effects if not isinstance(e, (Gravity, Contact, Friction, Spring))]
 
 
@@ -111,7 +113,7 @@ def _text(numbers) -> str:
 def _surface(scene: Scene) -> dict[str, str]:
     """Friction of all geoms: MuJoCo takes the larger of two, and condim 1 has none."""
     friction = scene.effect(Friction)
-    if friction is None:
+    if friction is None or friction.axis is not None:
         return {"condim": "1"}
     return {"condim": "3", "friction": _text((friction.coefficient, 0, 0))}
 

@@ -7,11 +7,11 @@ from collections.abc import Sequence
 import numpy as np
 
 from physics import checks
-from physics.effects import Contact, RollingFriction, SpinFriction
+from physics.effects import Contact, Friction, RollingFriction, SpinFriction
 from physics.inertia import check_inertia, principal_axes
 from physics.kernels import layout as at
 from physics.kernels.compiler import kernel
-from physics.kernels.laws import ROLLING, SPIN, TANGENTIAL
+from physics.kernels.laws import ANISOTROPY, DAMPING, ROLLING, SPIN, STIFFNESS, TANGENTIAL
 from physics.kernels.rotation import attitude_series
 from physics.scene import HalfSpace
 from physics.shapes import Body
@@ -60,6 +60,9 @@ LAW_EFFECTS = {
     TANGENTIAL: (Contact, "tangential"),
     ROLLING: (RollingFriction, "radius"),
     SPIN: (SpinFriction, "radius"),
+    ANISOTROPY: (Friction, "ratio"),
+    STIFFNESS: (Contact, "stiffness"),
+    DAMPING: (Contact, "damping"),
 }
 
 
@@ -145,16 +148,19 @@ def _check_allowed(plan, moments, R) -> None:
         )
 
 
-def wall_table(walls: tuple[HalfSpace, ...]) -> np.ndarray:
+def wall_table(walls: tuple[HalfSpace, ...], along: np.ndarray | None = None) -> np.ndarray:
     """(walls, WALL_SIZE): normal, two tangents that complete it to a right-handed frame, offset.
 
-    The first tangent comes from the world axis that follows the one the normal is most along, made perpendicular:
-    for a wall normal to a world axis the frame is a permutation of the world's, exactly.
+    The first tangent is the part along the wall of the directions `along` (walls, 3). Without them it comes from the
+    world axis that follows the one the normal is most along: for a wall normal to a world axis the frame is a
+    permutation of the world's, exactly.
     """
     table = np.zeros((len(walls), at.WALL_SIZE))
-    for row, wall in zip(table, walls):
+    for k, (row, wall) in enumerate(zip(table, walls)):
         n = np.array(wall.normal)
         axis = np.eye(3)[(int(np.argmax(np.abs(n))) + 1) % 3]
+        if along is not None:
+            axis = along[k] / np.linalg.norm(along[k])
         t1 = axis - (axis @ n) * n
         t1 /= np.linalg.norm(t1)
         row[at.NORMAL : at.NORMAL + 3] = n

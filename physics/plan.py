@@ -11,7 +11,7 @@ from physics.effects import Contact, Friction, Gravity, RollingFriction, SpinFri
 from physics.field import FieldSlot, field_slots
 from physics.inertia import principal_axes
 from physics.kernels.fields.terms import Term
-from physics.kernels.laws import LAWS, ROLLING, SPIN, TANGENTIAL
+from physics.kernels.laws import ANISOTROPY, DAMPING, LAWS, ROLLING, SPIN, STIFFNESS, TANGENTIAL
 from physics.kernels.layout import BLOCK, ELLIPSOID, SPHERE, VERTEX_COUNT
 from physics.plan_rows import Row, make_rows
 from physics.scene import Scene
@@ -149,17 +149,20 @@ def _see(scene: Scene) -> _Seen:
         turned=not isotropic and any(is_tilted(R) for _, R in axes),
         uneven=[b for b, body in enumerate(scene.bodies) if any(body.center)],
         fields=field_slots(scene.effects, len(scene.bodies)),
-        laws=_laws(scene, contact) if touching else (),
+        laws=_laws(scene, contact, friction) if touching else (),
     )  # fmt: skip
 
 
-def _laws(scene: Scene, contact: Contact) -> tuple[str, ...]:
+def _laws(scene: Scene, contact: Contact, friction: Friction | None) -> tuple[str, ...]:
     """The laws of `physics.kernels.laws` that act where bodies touch walls."""
     has_round = any(body.kind != "block" for body in scene.bodies)
     is_on = {
         TANGENTIAL: contact.tangential is not None,
         ROLLING: has_round and scene.effect(RollingFriction) is not None,
         SPIN: has_round and scene.effect(SpinFriction) is not None,
+        ANISOTROPY: friction is not None and friction.axis is not None,
+        STIFFNESS: contact.stiffness is not None,
+        DAMPING: contact.stiffness is not None,
     }
     return tuple(law for law in LAWS if is_on[law])
 
@@ -217,12 +220,15 @@ def _check_collisions(accuracy: Accuracy) -> None:
 
 def _check_laws(scene: Scene, seen: _Seen, many: bool, scheme: int) -> None:
     """Refuse laws of contact where they are not known."""
-    declared = {TANGENTIAL: "Contact.tangential", ROLLING: "RollingFriction", SPIN: "SpinFriction"}
-    names = ", ".join(declared[law] for law in seen.laws)
-    torques = ", ".join(declared[law] for law in seen.laws if law != TANGENTIAL)
-    if torques and scheme == EVENTS:
+    declared = {
+        TANGENTIAL: "Contact.tangential", ROLLING: "RollingFriction", SPIN: "SpinFriction",
+        ANISOTROPY: "Friction with two coefficients", STIFFNESS: "Contact.stiffness",
+    }  # fmt: skip
+    names = ", ".join(declared[law] for law in seen.laws if law in declared)
+    unknown = ", ".join(declared[law] for law in seen.laws if law in (ROLLING, SPIN, STIFFNESS))
+    if unknown and scheme == EVENTS:
         raise ValueError(
-            f"accuracy has the scheme 'events', which does not know {torques}; allowed are 'fast', 'balanced' and "
+            f"accuracy has the scheme 'events', which does not know {unknown}; allowed are 'fast', 'balanced' and "
             "every time-stepping scheme"
         )
     if names and many:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from physics.effects import Actuator, RollingFriction, SpinFriction
 from physics.field import FieldSlot
 from physics.fields import FIELDS
-from physics.kernels.laws import ROLLING, SPIN, TANGENTIAL
+from physics.kernels.laws import ROLLING, SPIN, STIFFNESS, TANGENTIAL
 
 
 @dataclass(frozen=True)
@@ -48,7 +48,8 @@ def _between_row(scene, contact, many) -> Row:
 
 def _friction_row(friction, rubbing) -> Row:
     if rubbing:
-        return Row("friction", True, f"declared: μ = {friction.coefficient}", "three rows per contact, circular cone")
+        cone = "circular cone" if friction.axis is None else "elliptic cone"
+        return Row("friction", True, f"declared: μ = {friction.coefficient}", f"three rows per contact, {cone}")
     if friction is not None:
         return Row("friction", False, "declared, but nothing can touch", "")
     return Row("friction", False, "not declared", "")
@@ -96,6 +97,15 @@ def _tangential_row(scene, contact, laws) -> Row:
     return Row("tangential restitution", True, f"declared: e_t = {contact.tangential}", "a target along the wall")
 
 
+def _compliance_row(contact, laws) -> Row:
+    if contact is None or contact.stiffness is None:
+        return Row("compliance", False, "not declared: contact is rigid", "")
+    if STIFFNESS not in laws:
+        return Row("compliance", False, "declared, but nothing can touch", "")
+    reason = f"declared: {contact.stiffness} N/m, {contact.damping} N s/m per contact point"
+    return Row("compliance", True, reason, "a number on the diagonal, and a target")
+
+
 def _resistance_row(scene, kind, law, laws) -> Row:
     name = {RollingFriction: "rolling friction", SpinFriction: "spin friction"}[kind]
     effect = scene.effect(kind)
@@ -126,6 +136,7 @@ def make_rows(scene, accuracy, seen) -> tuple[Row, ...]:
         _friction_row(friction, rubbing),
         _restitution_row(contact, touching),
         _tangential_row(scene, contact, seen.laws),
+        _compliance_row(contact, seen.laws),
         _resistance_row(scene, RollingFriction, ROLLING, seen.laws),
         _resistance_row(scene, SpinFriction, SPIN, seen.laws),
         _gyroscopic_row(seen.isotropic, seen.turned),

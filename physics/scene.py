@@ -12,6 +12,10 @@ from physics.effects import EFFECTS, RESISTANCES, Contact, Friction
 from physics.field import Field
 from physics.shapes import Body
 
+# An axis of friction and the normal of a wall count as parallel below this sine of the angle between them [rad]: of the
+# sixteen digits of a direction ten are left for its part along the wall.
+LEAST_SINE = 1e-6
+
 
 @dataclass(frozen=True)
 class HalfSpace:
@@ -95,7 +99,23 @@ class Scene:
                 f"Contact.tangential is {contact.tangential} without Friction, which is what acts along a wall; add "
                 "physics.Friction(...)"
             )
+        self._check_axes()
         self._check_fields()
+
+    def _check_axes(self) -> None:
+        friction = self.effect(Friction)
+        if friction is None or friction.axis is None or not self.walls:
+            return
+        axes = np.array(friction.axis)
+        if axes.ndim == 2 and len(axes) != len(self.walls):
+            count = len(self.walls)
+            raise ValueError(f"Friction.axis has {len(axes)} directions; allowed are one, or {count}: one per wall")
+        for k, (axis, wall) in enumerate(zip(friction.directions(len(self.walls)), self.walls)):
+            if not np.linalg.norm(np.cross(axis, wall.normal)) > LEAST_SINE * np.linalg.norm(axis):
+                raise ValueError(
+                    f"Friction.axis is {axis.tolist()}, the normal of walls[{k}]; allowed are directions along a wall, "
+                    "which may be given one per wall"
+                )
 
     def _check_fields(self) -> None:
         fields = [effect for effect in self.effects if isinstance(effect, Field)]

@@ -113,7 +113,9 @@ class World:
         self.state = np.zeros((rows, at.STATE_SIZE))
         self.params = np.zeros((rows, at.PARAM_SIZE + self.plan.field_columns + len(self.plan.laws)))
         self.gravity = np.zeros((self.worlds, 3))
-        self.walls = parameters.wall_table(self.scene.walls)
+        friction = self.scene.effect(Friction)
+        along = friction.directions(len(self.scene.walls)) if friction else None
+        self.walls = parameters.wall_table(self.scene.walls, along)
         self.memory = self._make_memory()
         self.report_table = np.zeros((self.worlds, at.REPORT_SIZE))
         self.event_counts = np.zeros(rows if self.plan.events else 1, dtype=np.int64)
@@ -188,7 +190,7 @@ class World:
             state[:, b, at.LINVEL : at.LINVEL + 3] = body.linvel
             state[:, b, at.ANGVEL : at.ANGVEL + 3] = body.angvel
         parameters.write_bodies(self.params, self.scene.bodies)
-        self.params[:, at.FRICTION] = friction.coefficient if friction else 0.0
+        self.params[:, at.FRICTION] = friction.along if friction else 0.0
         self.params[:, at.RESTITUTION] = (contact.restitution or 0.0) if contact else 0.0
         self.gravity[:] = gravity.acceleration if gravity else 0.0
         parameters.write_laws(self.params, self.plan.laws, self.scene.effects)
@@ -292,7 +294,7 @@ class World:
         friction: ArrayLike | None = None,
         restitution: ArrayLike | None = None,
         gravity: ArrayLike | None = None,
-        effects: Sequence[Field | RollingFriction | SpinFriction] | None = None,
+        effects: Sequence[Field | Friction | RollingFriction | SpinFriction] | None = None,
         worlds: ArrayLike | None = None,
     ) -> None:
         """Give worlds their own physical parameters; what is None keeps its value.
@@ -300,7 +302,7 @@ class World:
         Parameters
         ----------
         mass, friction, restitution : (), (k,) or (k, bodies) array_like, optional
-            [kg], coefficients.
+            [kg], coefficients. Of a `Friction` with two coefficients the first; the second changes with it.
         size : (3,), (k, 3) or (k, bodies, 3) array_like, optional
             Full edges of a block, twice the semi-axes of an ellipsoid, three equal diameters of a sphere [m].
             Position and velocity stay, and so does the `center` of a block: in metres, not as a share of the edges.
@@ -311,7 +313,7 @@ class World:
             [m/s²].
         effects : sequence of effects, optional
             Force fields in place of the scene's of the same class (of `Spring` and `Push` all, in the scene's order;
-            springs between bodies count for themselves), `RollingFriction` and `SpinFriction` likewise.
+            springs between bodies count for themselves), `Friction`, `RollingFriction` and `SpinFriction` likewise.
         worlds : (k,) int array_like, optional
             Indices of the worlds meant; None: all.
 

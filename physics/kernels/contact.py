@@ -8,6 +8,7 @@ from physics.kernels import geometry as geo
 from physics.kernels import quaternion as qt
 from physics.kernels.arms import arm_and_rate, center_arm, geometric_center, wall_normal
 from physics.kernels.compiler import inlined, kernel
+from physics.kernels.laws import STIFFNESS, number_of
 from physics.kernels.layout import BLOCK, OFFSET, SPHERE, VERTEX_COUNT
 
 # Share of a resting contact's gap that a step closes. In the linear iteration of gap and velocity over steps,
@@ -20,6 +21,8 @@ TOGETHER = 3.0
 
 # Turn in a stage beyond which accelerations at its middle say nothing about its end any more [rad].
 LARGEST_TURN = 0.5
+
+stiffness = number_of(STIFFNESS)  # of contact that gives (`compliance`)
 
 # Share of the slop below which the displacement of a contact in one step does not count.
 UNSEEN = 1.0e-3
@@ -80,6 +83,8 @@ def gather(x, R, v, w, h, tilted, work):
     """
     walls, features, shape, radius = work.walls, work.features, work.shape, work.radius
     slop, acceleration = work.slop, work.acceleration
+    if stiffness(work) > 0.0:  # springs push where there is no gap left
+        acceleration = 0.0
     dims = (work.dims[0], work.dims[1], work.dims[2])
     center = geometric_center(x, R, work, tilted)
     reach = 0.5 * acceleration * h * h

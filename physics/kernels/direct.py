@@ -31,6 +31,7 @@ from physics.kernels.point import to_world
 from physics.kernels.share import (
     contact_arm,
     first_active,
+    is_in_cone,
     minus,
     share_by_load,
     share_out,
@@ -213,7 +214,7 @@ def _mend(n, count, c, k, is_line, T, work):
     It shares them out as if all contacts were equally deep in the wall, which is so to a few slops; the moment
     that is missing for it makes one more bolt group, (K⁻¹ ΔT) x d_i.
     """
-    walls, features, mu = work.walls, work.features, work.mu
+    walls, features = work.walls, work.features
     mx, my, mz = T
     for i in range(n):
         if work.active[i] == 0:
@@ -233,7 +234,7 @@ def _mend(n, count, c, k, is_line, T, work):
         pa = work.across[i, 0] + qt.dot(wall_axis(walls, wall, TANGENT_1), p)
         pb = work.across[i, 1] + qt.dot(wall_axis(walls, wall, TANGENT_2), p)
         work.normal[i], work.across[i, 0], work.across[i, 1] = pn, pa, pb
-        if not (pn >= 0.0 and pa * pa + pb * pb <= (mu * pn) * (mu * pn)):
+        if not (pn >= 0.0 and is_in_cone(pn, pa, pb, work)):
             return False
     return True
 

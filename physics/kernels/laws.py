@@ -12,8 +12,9 @@ from numba.extending import overload
 from physics.kernels.compiler import CHOSEN, kernel
 
 # Names of the laws, in the order of their numbers in `work.laws` and of their columns, the last of `params`.
-TANGENTIAL, ROLLING, SPIN = "tangential", "rolling", "spin"
-LAWS = (TANGENTIAL, ROLLING, SPIN)
+TANGENTIAL, ROLLING, SPIN, ANISOTROPY = "tangential", "rolling", "spin", "anisotropy"
+STIFFNESS, DAMPING = "stiffness", "damping"
+LAWS = (TANGENTIAL, ROLLING, SPIN, ANISOTROPY, STIFFNESS, DAMPING)
 _PREFIX = "law_"
 
 
@@ -21,7 +22,8 @@ def members(laws: tuple[str, ...]) -> list[tuple]:
     """What a workspace holds for these laws: nothing when there are none."""
     if not laws:
         return []
-    return [("laws", float, (len(laws),)), *((_PREFIX + name, float) for name in laws)]
+    numbers = [("laws", float, (len(laws),)), *((_PREFIX + name, float) for name in laws)]
+    return numbers + [("give", float)] * (STIFFNESS in laws)  # γ of a stage [1/kg], see `compliance`
 
 
 def _declared(work) -> list[str]:
@@ -55,8 +57,8 @@ def if_law(laws: tuple[str, ...], instead):
     return decorate
 
 
-def number_of(law: str):
-    """A kernel (work) that gives the number of a law for the body in the workspace, 0 where it is not declared."""
+def number_of(law: str, otherwise: float = 0.0):
+    """A kernel (work) that gives the number of a law for the body in the workspace; `otherwise` if undeclared."""
 
     def stub(work):
         return chosen(work)(work)
@@ -64,7 +66,7 @@ def number_of(law: str):
     def chosen(work):
         declared = _declared(work)
         if law not in declared:
-            return lambda work: 0.0
+            return lambda work: otherwise
         place = declared.index(law)
         return lambda work: work.laws[place]
 

@@ -15,6 +15,8 @@ import math
 
 from physics.kernels import quaternion as qt
 from physics.kernels.compiler import inlined, kernel
+from physics.kernels.compliance import give_way
+from physics.kernels.ellipse import friction_ratio
 from physics.kernels.patch import P, X, Y, contact_place, contact_target
 from physics.kernels.point import (
     LOST,
@@ -204,30 +206,31 @@ def solve_few(n, count, mu, goal, u, w, inv_mass, K, work):
     residual : float
         [m/s].
     """
-    impulse = work.impulse
+    impulse, ratio = work.impulse, friction_ratio(work)
     width = 3 if mu > 0.0 else 1
     p = m = q = (0.0, 0.0, 0.0)
     found, miss = True, 0.0
     if count > 0:
         i = work.active[0]
         r, b1 = contact_place(i, work), _free(i, u, w, work)
-        W1 = block(r, r, inv_mass, K)
+        W1 = give_way(block(r, r, inv_mass, ratio, K), work)
         x1 = y1 = 0.0
         if count == 1:
             if mu > 0.0:
                 k = width * i
-                f = qt.matvec(W1, (impulse[k], impulse[k + 1], impulse[k + 2]))
+                f = qt.matvec(W1, (impulse[k], impulse[k + 1], impulse[k + 2] / ratio))
                 x1, y1 = heading(b1[1] + f[1], b1[2] + f[2], mu)
             what, p, miss = answer(W1, b1, mu, W1[4] + W1[8], goal, x1, y1, True)
             found = what != LOST
         else:
             j = work.active[1]
             s, b2 = contact_place(j, work), _free(j, u, w, work)
-            W2, W12 = block(s, s, inv_mass, K), block(r, s, inv_mass, K)
+            W2, W12 = give_way(block(s, s, inv_mass, ratio, K), work), block(r, s, inv_mass, ratio, K)
             x2 = y2 = 0.0
             if mu > 0.0:
                 k, l = width * i, width * j
-                f, g = (impulse[k], impulse[k + 1], impulse[k + 2]), (impulse[l], impulse[l + 1], impulse[l + 2])
+                f = (impulse[k], impulse[k + 1], impulse[k + 2] / ratio)
+                g = (impulse[l], impulse[l + 1], impulse[l + 2] / ratio)
                 u1 = _plus(qt.matvec(W1, f), qt.matvec(W12, g))
                 u2 = _plus(qt.matvec(W2, g), qt.matvec(_transposed(W12), f))
                 x1, y1 = heading(b1[1] + u1[1], b1[2] + u1[2], mu)

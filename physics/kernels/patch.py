@@ -5,13 +5,15 @@ from __future__ import annotations
 import math
 
 from physics.kernels.compiler import inlined
+from physics.kernels.ellipse import friction_ratio
 from physics.kernels.layout import NORMAL, TANGENT_1, TANGENT_2
 from physics.kernels.point import point_velocity
 
 # Second moments of a patch: below this share of det to trace² it counts as a line (edges 1 : 1000).
 LINE_LIMIT = 1.0e-6
 
-# Columns of `work.patch`, a row per contact: coordinates (normal, tangents) relative to the centre of mass, targets
+# Columns of `work.patch`, a row per contact, all in the stretched frame of `ellipse` (of an even wall: its frame):
+# coordinates (normal, tangents) relative to the centre of mass, targets
 # (normal, tangents), impulse per normal impulse (-μ d), sliding speed, normal impulse, W_aa + W_bb.
 C, A, B, TARGET, TARGET_A, TARGET_B, X, Y, SPEED, P, MOBILITY = range(11)
 PATCH_SIZE = 11
@@ -33,34 +35,36 @@ def contact_target(i, work):
 def place_patch(n, friction, wall, u, w, inv_mass, K, work):
     """Fill `work.patch`; largest free contact speed [m/s], and the planar motion after the warm start.
 
-    u, w are the velocity and angular velocity without contact impulses in the frame of the wall.
+    u, w, K are velocity and angular velocity without contact impulses, and inverse inertia, in the stretched frame.
     """
     walls, patch, target, impulse, arm = work.walls, work.patch, work.target, work.impulse, work.arm
     n0, n1, n2 = walls[wall, NORMAL], walls[wall, NORMAL + 1], walls[wall, NORMAL + 2]
     s0, s1, s2 = walls[wall, TANGENT_1], walls[wall, TANGENT_1 + 1], walls[wall, TANGENT_1 + 2]
     t0, t1, t2 = walls[wall, TANGENT_2], walls[wall, TANGENT_2 + 1], walls[wall, TANGENT_2 + 2]
+    ratio = friction_ratio(work)
+    mass_b = ratio * ratio * inv_mass
     scale = fa = fb = tn = ta = tb = 0.0
     for i in range(n):
         rx, ry, rz = arm[i, 0], arm[i, 1], arm[i, 2]
-        c = n0 * rx + n1 * ry + n2 * rz
-        a = s0 * rx + s1 * ry + s2 * rz
+        c = ratio * (n0 * rx + n1 * ry + n2 * rz)
+        a = ratio * (s0 * rx + s1 * ry + s2 * rz)
         b = t0 * rx + t1 * ry + t2 * rz
         patch[i, C], patch[i, A], patch[i, B] = c, a, b
-        patch[i, TARGET], patch[i, TARGET_A], patch[i, TARGET_B] = target[i, 0], target[i, 1], target[i, 2]
+        patch[i, TARGET], patch[i, TARGET_A], patch[i, TARGET_B] = target[i, 0], target[i, 1], ratio * target[i, 2]
         patch[i, MOBILITY] = (
-            2.0 * inv_mass + K[0] * (a * a + b * b) - 2.0 * c * (K[1] * a + K[2] * b) + c * c * (K[3] + K[5])
+            inv_mass + mass_b + K[0] * (a * a + b * b) - 2.0 * c * (K[1] * a + K[2] * b) + c * c * (K[3] + K[5])
         )
         speed = point_velocity((c, a, b), u, w)
         scale = max(scale, abs(speed[0] - target[i, 0]))
         if friction is not None:
-            scale = max(scale, max(abs(speed[1] - target[i, 1]), abs(speed[2] - target[i, 2])))
-            p, x, y = impulse[3 * i], impulse[3 * i + 1], impulse[3 * i + 2]
+            scale = max(scale, max(abs(speed[1] - target[i, 1]), abs(speed[2] - ratio * target[i, 2])))
+            p, x, y = impulse[3 * i], impulse[3 * i + 1], impulse[3 * i + 2] / ratio
             fa += x
             fb += y
             tn += a * y - b * x
             ta += b * p - c * y
             tb += c * x - a * p
-    start = (u[1] + inv_mass * fa, u[2] + inv_mass * fb, w[0] + (K[0] * tn + K[1] * ta + K[2] * tb))
+    start = (u[1] + inv_mass * fa, u[2] + mass_b * fb, w[0] + (K[0] * tn + K[1] * ta + K[2] * tb))
     return scale, start
 
 
@@ -118,7 +122,8 @@ def respond(count, mu, center, y0, gain, motion, wa, wb, inv_mass, K, work):
     compliance : tuple of 9 floats
         Planar motion per planar impulse at the centroid, row by row: with the normal motion held by y_1, y_2.
     """
-    patch = work.patch
+    patch, ratio = work.patch, friction_ratio(work)
+    mass_b = ratio * ratio * inv_mass
     cc, ca, cb = center
     g0 = g1 = g2 = h0 = h1 = h2 = 0.0
     x1 = x2 = y1 = y2 = f1 = f2 = 0.0
@@ -157,14 +162,14 @@ def respond(count, mu, center, y0, gain, motion, wa, wb, inv_mass, K, work):
     # Rows (ω_a, ω_b) of the response to the impulse (D_a, D_b, D_n), moments (D_n, -c D_b, c D_a).
     sa = (cc * K[4], -cc * K[3], K[1])
     sb = (cc * K[5], -cc * K[4], K[2])
-    x1, x2, y1, y2 = inv_mass * x1, inv_mass * x2, inv_mass * y1, inv_mass * y2
+    x1, x2, y1, y2 = inv_mass * x1, inv_mass * x2, mass_b * y1, mass_b * y2
     # Motion per δω_a, δω_b made up for by y.
     pa, pb = s * (x1 * h2 - x2 * h1), s * (x2 * g1 - x1 * g2)
     qa, qb = s * (y1 * h2 - y2 * h1), s * (y2 * g1 - y1 * g2)
     ra, rb = s * (f1 * h2 - f2 * h1), s * (f2 * g1 - f1 * g2)
     compliance = (
         inv_mass - pa * sa[0] - pb * sb[0], -pa * sa[1] - pb * sb[1], -pa * sa[2] - pb * sb[2],
-        -qa * sa[0] - qb * sb[0], inv_mass - qa * sa[1] - qb * sb[1], -qa * sa[2] - qb * sb[2],
+        -qa * sa[0] - qb * sb[0], mass_b - qa * sa[1] - qb * sb[1], -qa * sa[2] - qb * sb[2],
         cc * K[2] - ra * sa[0] - rb * sb[0],
         -cc * K[1] - ra * sa[1] - rb * sb[1],
         K[0] - ra * sa[2] - rb * sb[2],

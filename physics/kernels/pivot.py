@@ -14,6 +14,7 @@ from __future__ import annotations
 import math
 
 from physics.kernels.compiler import inlined, kernel
+from physics.kernels.ellipse import friction_ratio
 from physics.kernels.patch import MOBILITY, SPEED, TARGET_A, TARGET_B, A, B, C, P, X, Y, across_misses, resultant
 
 # Rounds on ω_n at most: one when the sense is guessed right and all targets agree, two when it is the other sense.
@@ -69,7 +70,8 @@ def _point_at(k, count, mu, center, wa, wb, spin, K, work):
 def _hold_at(k, sums, y0, gain, u, w, wa, wb, inv_mass, K, work):
     """Impulse (f_a, f_b) across contact k, (y_1, y_2), and the ω_n that they lead to."""
     x, y, f, g, h = sums
-    patch = work.patch
+    patch, ratio = work.patch, friction_ratio(work)
+    mass_b = ratio * ratio * inv_mass
     ck, ak, bk = patch[k, C], patch[k, A], patch[k, B]
     # Response (ω_n, ω_a, ω_b) to f_a and to f_b.
     pn, pa, pb = ck * K[2] - bk * K[0], ck * K[4] - bk * K[1], ck * K[5] - bk * K[2]
@@ -83,10 +85,10 @@ def _hold_at(k, sums, y0, gain, u, w, wa, wb, inv_mass, K, work):
     wfa, wfb = pn - f[1] * e11 - f[2] * e21, qn - f[1] * e12 - f[2] * e22
     maa = inv_mass * (1.0 - x[1] * e11 - x[2] * e21) - bk * wfa
     mab = -inv_mass * (x[1] * e12 + x[2] * e22) - bk * wfb
-    mba = -inv_mass * (y[1] * e11 + y[2] * e21) + ak * wfa
-    mbb = inv_mass * (1.0 - y[1] * e12 - y[2] * e22) + ak * wfb
+    mba = -mass_b * (y[1] * e11 + y[2] * e21) + ak * wfa
+    mbb = mass_b * (1.0 - y[1] * e12 - y[2] * e22) + ak * wfb
     va = patch[k, TARGET_A] - u[1] - wb * ck - inv_mass * (x[0] * y0 + x[1] * r1 + x[2] * r2) + free * bk
-    vb = patch[k, TARGET_B] - u[2] + wa * ck - inv_mass * (y[0] * y0 + y[1] * r1 + y[2] * r2) - free * ak
+    vb = patch[k, TARGET_B] - u[2] + wa * ck - mass_b * (y[0] * y0 + y[1] * r1 + y[2] * r2) - free * ak
     s = 1.0 / (maa * mbb - mab * mba)
     fa, fb = s * (mbb * va - mab * vb), s * (maa * vb - mba * va)
     return (fa, fb), (r1 - e11 * fa - e12 * fb, r2 - e21 * fa - e22 * fb), free + wfa * fa + wfb * fb

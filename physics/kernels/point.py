@@ -60,8 +60,8 @@ def point_velocity(r, u, w):
 
 
 @inlined
-def block(r, s, inv_mass, K):
-    """W between contacts r and s: velocity at r, row by row, per impulse at s."""
+def block(r, s, inv_mass, ratio, K):
+    """W between contacts r and s: velocity at r, row by row, per impulse at s; see `ellipse` for the ratio μ2/μ1."""
     c, a, b = s
     n0, n1, n2 = b * K[1] - a * K[2], b * K[3] - a * K[4], b * K[4] - a * K[5]
     s0, s1, s2 = c * K[2] - b * K[0], c * K[4] - b * K[1], c * K[5] - b * K[2]
@@ -70,7 +70,7 @@ def block(r, s, inv_mass, K):
     return (
         inv_mass + (b * n1 - a * n2), b * s1 - a * s2, b * t1 - a * t2,
         c * n2 - b * n0, inv_mass + (c * s2 - b * s0), c * t2 - b * t0,
-        a * n0 - c * n1, a * s0 - c * s1, inv_mass + (a * t0 - c * t1),
+        a * n0 - c * n1, a * s0 - c * s1, ratio * ratio * inv_mass + (a * t0 - c * t1),
     )  # fmt: skip
 
 

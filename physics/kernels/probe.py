@@ -52,17 +52,35 @@ def deepest_gaps(rows, state, params, shapes, walls, gaps, which):
 
 
 @kernel
-def contact_point(state, params, shapes, walls, i, wall, feature, out):
-    """World position [m] of a feature (see `layout.VERTEX_COUNT`) of row i, into out (3,)."""
+def spring_energies(state, params, shapes, walls, column, energies):
+    """Energy [J] of the springs of contact, ½ k g² of each point with a gap g < 0, of every row; k in `column`."""
+    for i in range(state.shape[0]):
+        shape, energies[i] = shapes[i % shapes.shape[0]], 0.0
+        point = (0.0, 0.0, 0.0)
+        for w in range(walls.shape[0]):
+            n = (walls[w, at.NORMAL], walls[w, at.NORMAL + 1], walls[w, at.NORMAL + 2])
+            for feature in range(at.VERTEX_COUNT if shape == at.BLOCK else 1):
+                point = point_of(state, params, shape, n, i, feature)
+                gap = min(qt.dot(n, point) - walls[w, at.OFFSET], 0.0)
+                energies[i] += 0.5 * params[i, column] * gap * gap
+
+
+@kernel
+def point_of(state, params, shape, n, i, feature):
+    """World position [m] of a feature (see `layout.VERTEX_COUNT`) of row i towards the normal n of a wall."""
     R = qt.to_matrix((state[i, at.QUAT], state[i, at.QUAT + 1], state[i, at.QUAT + 2], state[i, at.QUAT + 3]))
     d = (params[i, at.DIMENSIONS], params[i, at.DIMENSIONS + 1], params[i, at.DIMENSIONS + 2])
-    shape = shapes[i % shapes.shape[0]]
     if shape == at.BLOCK:
         b, c = geo.vertex_arm(d, R, feature), at.CENTER
         m = qt.matvec(R, (params[i, c], params[i, c + 1], params[i, c + 2]))
         r = (m[0] + b[0], m[1] + b[1], m[2] + b[2])
     else:
-        n = (walls[wall, at.NORMAL], walls[wall, at.NORMAL + 1], walls[wall, at.NORMAL + 2])
         r = geo.support_arm(shape, d, R, n, geo.scaled_normal(shape, d, R, n))
-    for c in range(3):
-        out[c] = state[i, at.POS + c] + r[c]
+    return (state[i, at.POS] + r[0], state[i, at.POS + 1] + r[1], state[i, at.POS + 2] + r[2])
+
+
+@kernel
+def contact_point(state, params, shapes, walls, i, wall, feature, out):
+    """`point_of` the feature of row i towards a wall, into out (3,)."""
+    n = (walls[wall, at.NORMAL], walls[wall, at.NORMAL + 1], walls[wall, at.NORMAL + 2])
+    out[0], out[1], out[2] = point_of(state, params, shapes[i % shapes.shape[0]], n, i, feature)

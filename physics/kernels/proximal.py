@@ -26,6 +26,7 @@ from __future__ import annotations
 import math
 
 from physics.kernels.compiler import inlined, kernel
+from physics.kernels.compliance import yielding
 from physics.kernels.sweeps import NORMAL_STEP, cone_residual, velocities
 
 # ρ in units of a contact's normal mass 1/W_nn: of the first round, its growth from round to round, and the
@@ -64,6 +65,7 @@ def _defect(n, factor, inv_mass, work):
                 + (angular[s, 0] * x[3] + angular[s, 1] * x[4] + angular[s, 2] * x[5])
             )
             y[s] = q[s] - rho * u
+        y[r] = yielding(y[r], rho, work)
         size, limit = math.sqrt(y[r + 1] * y[r + 1] + y[r + 2] * y[r + 2]), work.mu * max(y[r], 0.0)
         s = limit / size if size > limit else 1.0
         p[r], p[r + 1], p[r + 2] = max(y[r], 0.0), s * y[r + 1], s * y[r + 2]
@@ -103,7 +105,8 @@ def _fill_matrix(n, factor, inv_mass, work):
             da, db, s = y[r + 1] / size, y[r + 2] / size, limit / size
             k11, k12, k22 = s * (1.0 - da * da), -s * da * db, s * (1.0 - db * db)
         for b in range(6):
-            jn, ja, jb = rho * _row(r, b, work), rho * _row(r + 1, b, work), rho * _row(r + 2, b, work)
+            jn = yielding(rho, rho, work) * _row(r, b, work)
+            ja, jb = rho * _row(r + 1, b, work), rho * _row(r + 2, b, work)
             pa = k11 * ja + k12 * jb
             pb = k12 * ja + k22 * jb
             if size > limit:

@@ -6,6 +6,7 @@ import math
 
 from physics.kernels import quaternion as qt
 from physics.kernels.compiler import inlined
+from physics.kernels.ellipse import friction_ratio
 from physics.kernels.layout import NORMAL, TANGENT_1, TANGENT_2
 
 # Weighted sharings of the tangential impulses at most, and the excess over a cone at which none is worth a
@@ -68,9 +69,16 @@ def first_active(n, work):
 
 
 @inlined
+def is_in_cone(pn, pa, pb, work):
+    """Whether an impulse (normal, tangents) is in the cone of friction."""
+    limit, b = work.mu * pn, pb / friction_ratio(work)
+    return pa * pa + b * b <= limit * limit
+
+
+@inlined
 def share_out(n, count, c, F, a, work):
     """Bolt-group impulses: (the contact that pulls most or -1, whether all are in their cones)."""
-    walls, features, mu = work.walls, work.features, work.mu
+    walls, features = work.walls, work.features
     lowest = 0.0
     loser = -1
     holds = True
@@ -88,7 +96,7 @@ def share_out(n, count, c, F, a, work):
         if not pn >= lowest:
             lowest = pn
             loser = i
-        if not pa * pa + pb * pb <= (mu * pn) * (mu * pn):
+        if not is_in_cone(pn, pa, pb, work):
             holds = False
     return loser, holds
 
@@ -100,7 +108,7 @@ def _share_by_weight(n, t1, t2, work):
     With weights g_i, their centre r_g, ρ_i = r_i - r_g: p_t,i = g_i (P_t / Σg + α n x ρ_i), α = T_n / Σ g ρ²,
     T_n the moment of the tangential impulses about r_g. Weights are lowered where the cone is left.
     """
-    active, across, weight = work.active, work.across, work.weight
+    active, across, weight, ratio = work.active, work.across, work.weight, friction_ratio(work)
     total = fa = fb = ma = mb = 0.0
     for i in range(n):
         if active[i] == 0:
@@ -130,6 +138,7 @@ def _share_by_weight(n, t1, t2, work):
         x, y = fa - alpha * (qt.dot(t2, r) - mb), fb + alpha * (qt.dot(t1, r) - ma)
         across[i, 0], across[i, 1] = g * x, g * y
         limit = work.mu * work.normal[i]
+        y /= ratio
         size = g * math.sqrt(x * x + y * y)
         if not size <= limit:
             weight[i] *= 0.98 * limit / size

@@ -38,6 +38,7 @@ import math
 
 from physics.kernels import quaternion as qt
 from physics.kernels.compiler import inlined, kernel
+from physics.kernels.ellipse import friction_ratio, stretched_frame
 from physics.kernels.pair import solve_few
 from physics.kernels.patch import (
     SPEED,
@@ -100,13 +101,15 @@ def _newton(compliance, k, delta):
 
 
 @inlined
-def _stretch(motion, delta, gyration2):
+def _lengthening(motion, delta, gyration2, work):
     """By how much a motion of the same direction is larger where it leaves no energy: on the ray through it.
 
-    The friction is the same all along the ray: σ = 1 + <τ, δ>/<τ, τ>, in the metric (1, 1, I/m).
+    The friction is the same all along the ray: σ = 1 + <τ, δ>/<τ, τ>, in the metric (1, 1/k², I/m), k = μ2/μ1.
     """
-    size2 = motion[0] * motion[0] + motion[1] * motion[1] + gyration2 * motion[2] * motion[2]
-    return 1.0 + (motion[0] * delta[0] + motion[1] * delta[1] + gyration2 * motion[2] * delta[2]) / size2
+    ratio = friction_ratio(work)
+    s = 1.0 / (ratio * ratio)
+    size2 = motion[0] * motion[0] + s * motion[1] * motion[1] + gyration2 * motion[2] * motion[2]
+    return 1.0 + (motion[0] * delta[0] + s * motion[1] * delta[1] + gyration2 * motion[2] * delta[2]) / size2
 
 
 @inlined
@@ -120,8 +123,8 @@ def _drop(loser, count, work):
 
 @inlined
 def _store(n, friction, work):
-    """Impulses of the contacts that push to `work.impulse`, zero for the open ones."""
-    width = 1 if friction is None else 3
+    """Impulses of the contacts that push to `work.impulse`, along the unit tangents; zero for the open ones."""
+    width, ratio = 1 if friction is None else 3, friction_ratio(work)
     for i in range(n):
         for c in range(width):
             work.impulse[width * i + c] = 0.0  # an open contact's direction may be no number
@@ -130,7 +133,7 @@ def _store(n, friction, work):
             work.impulse[width * i] = p
             if friction is not None:
                 work.impulse[width * i + 1] = p * work.patch[i, X]
-                work.impulse[width * i + 2] = p * work.patch[i, Y]
+                work.impulse[width * i + 2] = ratio * (p * work.patch[i, Y])
 
 
 @inlined
@@ -168,7 +171,7 @@ def _turn(count, mu, compliance, k, motion, delta, gyration2, tried, hurry, work
     is_settled = turns_little(count, mu, step, work)
     pivot = -1
     if not is_settled:
-        stretch = _stretch(motion, delta, gyration2)
+        stretch = _lengthening(motion, delta, gyration2, work)
         if 0.0 < stretch < STRETCH_LIMIT:
             return False, -1, (stretch * motion[0], stretch * motion[1], stretch * motion[2])
         step = _newton(compliance, add_along(count, mu, k, work), delta)
@@ -200,8 +203,10 @@ def _search(n, patient, mu, goal, start, u, w, inv_mass, K, work):
     start : tuple of 3 floats
         Planar motion to start from.
     u, w, K
-        Velocity and angular velocity without contact impulses, inverse inertia: in the frame of the wall.
+        Velocity and angular velocity without contact impulses, inverse inertia: in the stretched frame of the wall.
     """
+    ratio = friction_ratio(work)
+    mass_b = ratio * ratio * inv_mass
     for i in range(n):
         work.active[i] = i
         work.normal[i] = 0.0
@@ -241,7 +246,7 @@ def _search(n, patient, mu, goal, start, u, w, inv_mass, K, work):
         if loser < 0 or patient:
             fa, fb, tn, ta, tb = total
             wn = w[0] + (K[0] * tn + K[1] * ta + K[2] * tb)
-            delta = (u[1] + inv_mass * fa - motion[0], u[2] + inv_mass * fb - motion[1], wn - motion[2])
+            delta = (u[1] + inv_mass * fa - motion[0], u[2] + mass_b * fb - motion[1], wn - motion[2])
             miss, k = across_misses(count, mu, -1, delta, work)
             if loser < 0 and miss <= goal:
                 work.mode = SLIDE
@@ -286,7 +291,9 @@ def slide_patch(n, friction, R, v, L, work):
         return False, v, L, 0.0
     inv_mass = 1.0 / work.mass
     axes = wall_axes(work.walls, wall)
+    ratio = friction_ratio(work)
     K, u, w = wall_frame(R, v, L, axes, work.J)
+    K, u, w = stretched_frame(K, u, w, ratio)
     scale, start = place_patch(n, friction, wall, u, w, inv_mass, K, work)
     goal = work.tolerance * scale
     found, total, push, miss = False, (0.0, 0.0, 0.0, 0.0, 0.0), 0.0, 0.0
@@ -300,5 +307,5 @@ def slide_patch(n, friction, R, v, L, work):
     if scale > 0.0:
         miss /= scale
     fa, fb, tn, ta, tb = total
-    v = to_world(axes, inv_mass * push, inv_mass * fa, inv_mass * fb, v)
-    return True, v, to_world(axes, tn, ta, tb, L), miss
+    v = to_world(axes, inv_mass * push, inv_mass * fa, ratio * (inv_mass * fb), v)
+    return True, v, to_world(axes, tn, ta, tb / ratio, L), miss

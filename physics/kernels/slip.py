@@ -15,9 +15,13 @@ from __future__ import annotations
 import math
 
 from physics.kernels import quaternion as qt
+from physics.kernels.body import turning
 from physics.kernels.compiler import inlined
+from physics.kernels.ellipse import friction_ratio
+from physics.kernels.laws import STIFFNESS, if_law
 from physics.kernels.layout import SPHERE, TANGENT_1
 from physics.kernels.share import contact_arm
+from physics.kernels.solve import solve_contacts
 
 # Contacts of a stage at most, `mean_slip` of the settings, for `physics.Accuracy.slip`. The slips of a face turn
 # slowly, as a whole, and a solve more is dear there.
@@ -93,8 +97,43 @@ def oppose_end_slip(n, work):
 @inlined
 def has_turned_round(n, v, w, work):
     """Whether the slip of a contact that pushes is against the one before, -`work.target`, after impulses."""
+    ratio = friction_ratio(work)
     for i in range(n):
         a, b = _tangential(i, v, w, work)
+        b *= ratio * ratio  # both slips stretched (`ellipse`)
         if work.impulse[3 * i] > 0.0 and a * work.target[i, 1] + b * work.target[i, 2] > 0.0:
             return True
     return False
+
+
+def _as_solved(n, friction, smooth, pivots, v, w, solved, free, R, h, work):
+    return solved
+
+
+@if_law((STIFFNESS,), _as_solved)
+def without_gift(n, friction, smooth, pivots, v, w, solved, free, R, h, work):
+    """What `solve_contacts` gave for `free` (v, L); if friction gave energy, that with friction against the mean slip.
+
+    An impulse p adds p·½(u⁰ + u¹). Friction that stops a contact adds ½ p_t·u⁰, which in a rigid impact the normal
+    impulse outweighs. A spring pushes as much as it is deep, not as much as would do that.
+
+    Parameters
+    ----------
+    v, w : tuples of 3 floats
+        Velocity and angular velocity before the stage, at the attitude R of its middle.
+    """
+    if friction is None:
+        return solved
+    w1 = turning(R, solved[1], work.J)
+    gift = push = 0.0
+    for i in range(n):
+        a, b = _tangential(i, v, w, work)
+        c, d = _tangential(i, solved[0], w1, work)
+        gift += 0.5 * (work.impulse[3 * i + 1] * (a + c) + work.impulse[3 * i + 2] * (b + d))
+        push += work.impulse[3 * i]
+    if not gift > (1.0 + work.mu) * push * work.tolerance * work.acceleration * h:
+        return solved
+    for i in range(n):
+        a, b = _tangential(i, v, w, work)
+        work.target[i, 1], work.target[i, 2] = -a, -b
+    return solve_contacts(n, friction, smooth, pivots, free[0], free[1], R, work)

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from physics.kernels import quaternion as qt
 from physics.kernels.compiler import inlined, kernel
+from physics.kernels.compliance import soften, stiffness
 from physics.kernels.direct import hold_all
-from physics.kernels.layout import NORMAL
+from physics.kernels.ellipse import eased, stretch, unstretch
 from physics.kernels.proximal import proximal_newton
 from physics.kernels.pyramid import normal_fallback, pyramid_fallback
-from physics.kernels.share import wall_axis
+from physics.kernels.share import wall_axes
 from physics.kernels.slide import HOLD, slide_patch
 from physics.kernels.sweeps import (
     assemble,
@@ -110,8 +111,9 @@ def _may_hold(n, v, work):
     wall = work.slot[0] // work.features
     if n < 3 or work.slot[n - 1] // work.features != wall:
         return work.mode == HOLD
-    u = qt.dot(wall_axis(work.walls, wall, NORMAL), v)
-    return qt.dot(v, v) <= (1.0 + work.mu * work.mu) * u * u
+    axes = wall_axes(work.walls, wall)
+    u, e = qt.dot(axes[0], v), eased(v, axes, work)
+    return qt.dot(e, e) <= (1.0 + work.mu * work.mu) * u * u
 
 
 @inlined
@@ -120,6 +122,8 @@ def _assemble(n, width, R, v, L, work):
     J = work.J
     mb = qt.transposed_matvec(R, L)
     assemble(n, width, R, v, qt.matvec(R, (J[0] * mb[0], J[1] * mb[1], J[2] * mb[2])), work)
+    stretch(n, work)
+    soften(n, width, work)
     return _free_speed(width * n, work.bias)
 
 
@@ -128,14 +132,21 @@ def _iterate(n, friction, smooth, goal, work):
     """Sweeps, with friction in turn with Newton's method: (sweeps and steps, residual [m/s])."""
     steps, residual = 0, 0.0
     if smooth is not None:
+        if stiffness(work) > 0.0:  # W is positive definite, but sweeps crawl where γ is small: a few pivots first
+            normal_fallback(
+                work.delassus, work.bias, n, work.impulse, work.fallback_float, work.fallback_int, MAX_PIVOTS
+            )
         steps, residual = normal_sweeps(n, goal, work.sweeps, work)
     if friction is not None:
         factor_blocks(n, work)
         for i in range(n):
             work.friction[i] = work.mu
-        left = work.sweeps
+        left, at_once = work.sweeps, SWEEPS_AT_ONCE
+        if stiffness(work) > 0.0:  # the normals are determined, and Newton's method shares tangents out evenly
+            at_once = 0
         while True:
-            sweeps, residual = cone_sweeps(n, work.friction, goal, min(left, SWEEPS_AT_ONCE), work)
+            sweeps, residual = cone_sweeps(n, work.friction, goal, min(left, at_once), work)
+            at_once = SWEEPS_AT_ONCE
             steps += sweeps
             left -= sweeps
             if residual <= goal or left <= 0:
@@ -181,7 +192,10 @@ def solve_contacts(n, friction, smooth, pivots, v, L, R, work):
     """
     width = 1 if friction is None else 3
     holds_first = friction is not None and _may_hold(n, v, work)
-    for attempt in range(2):
+    attempts = 2
+    if stiffness(work) > 0.0:  # neither holds nor has a normal motion known beforehand: `slide` for one or two
+        holds_first, attempts = False, 1 if n <= 2 else 0
+    for attempt in range(attempts):
         if friction is not None and (attempt == 0) == holds_first:
             found, v1, L1, residual = hold_all(n, R, v, L, work)
             if found:
@@ -200,6 +214,7 @@ def solve_contacts(n, friction, smooth, pivots, v, L, R, work):
     if pivots is not None and not residual <= max(goal, PIVOT_ABOVE * scale):
         residual = _pivot(n, friction, smooth, residual, work)
         method = PIVOTING
+    unstretch(n, work)
     v, L = _apply(n, width, v, L, work)
     if scale > 0.0:
         residual /= scale

@@ -9,12 +9,14 @@ from physics.kernels import quaternion as qt
 from physics.kernels.arms import place_arms
 from physics.kernels.body import principal_attitude, turning
 from physics.kernels.compiler import inlined, kernel
+from physics.kernels.compliance import aim_springs, foretell_gaps, parts_of_stage
 from physics.kernels.contact import aim_impact, aim_rest
 from physics.kernels.flight import drift
+from physics.kernels.laws import STIFFNESS, if_law
 from physics.kernels.resist import aim_tangential, resist_turning, without_gain
 from physics.kernels.restraint import ROUNDING, between, kinetic_energy, rebound_share
 from physics.kernels.slide import SLIDE
-from physics.kernels.slip import has_turned_round, oppose_end_slip, oppose_mean_slip
+from physics.kernels.slip import has_turned_round, oppose_end_slip, oppose_mean_slip, without_gift
 from physics.kernels.solve import PIVOTING, solve_contacts
 
 # Row of `memory`: length of the last resting stage [s], its contact count, which direct solve worked last
@@ -116,6 +118,22 @@ def calm_targets(n, work):
         work.target[i, 1] = work.target[i, 2] = 0.0
 
 
+def _rigid_without_gain(n, friction, smooth, pivots, before, w, solved, free, R, h, work):
+    if contacts_gain(before, w, free[0], free[1], solved, R, h, work):
+        calm_targets(n, work)
+        return solve_contacts(n, friction, smooth, pivots, free[0], free[1], R, work)
+    return solved
+
+
+@if_law((STIFFNESS,), _rigid_without_gain)
+def without_stage_gain(n, friction, smooth, pivots, before, w, solved, free, R, h, work):
+    """What `solve_contacts` gave for `free` (v, L); if that raises the energy, what it gives for calm targets.
+
+    Springs give back what they hold.
+    """
+    return solved
+
+
 @inlined
 def aim_plastic(n, work):
     """Targets and first guess of an impact without rebound."""
@@ -162,9 +180,9 @@ def touch(n, y, h, friction, smooth, gyroscopic, tilted, pivots, memory, report,
     """State after Moreau's midpoint step over h with the n contacts of the set."""
     x, q, v, L = y
     a, torque = work.free_acceleration, work.torque
-    half = 0.5 * h
-    x = (x[0] + half * v[0], x[1] + half * v[1], x[2] + half * v[2])
-    q = drift(q, L, work, half, gyroscopic, tilted)
+    before, after = parts_of_stage(n, y, h, tilted, work)
+    x = (x[0] + before * v[0], x[1] + before * v[1], x[2] + before * v[2])
+    q = drift(q, L, work, before, gyroscopic, tilted)
     middle = qt.to_matrix(q)
     place_arms(n, middle, tilted, work)
     R = middle
@@ -176,14 +194,14 @@ def touch(n, y, h, friction, smooth, gyroscopic, tilted, pivots, memory, report,
         if gyroscopic is not None:
             alpha = turning(R, qt.cross(L, w), work.J)
     aim_rest(n, v, w, alpha, middle, h, tilted, work)
-    opposes_mean = False
+    aim_springs(n, x, middle, v, w, alpha, before, after, tilted, work)
+    v0, opposes_mean = v, False
     if friction is not None and n <= work.mean_slip:
         opposes_mean = oppose_mean_slip(n, v, w, max(h, memory[work.i, STAGE_LENGTH]), work)
     width = 3
     if friction is None:
         width = 1
     load_warm_start(n, width, memory, work.i, h, work)
-    before = v
     v = (v[0] + h * a[0], v[1] + h * a[1], v[2] + h * a[2])
     L = (L[0] + h * torque[0], L[1] + h * torque[1], L[2] + h * torque[2])
     work.mode, work.still = int(memory[work.i, MODE]), still_speed(h, work)
@@ -191,12 +209,12 @@ def touch(n, y, h, friction, smooth, gyroscopic, tilted, pivots, memory, report,
     if opposes_mean and has_turned_round(n, solved[0], turning(R, solved[1], work.J), work):
         oppose_end_slip(n, work)
         solved = solve_contacts(n, friction, smooth, pivots, v, L, R, work)
-    if contacts_gain(before, w, v, L, solved, R, h, work):
-        calm_targets(n, work)
-        solved = solve_contacts(n, friction, smooth, pivots, v, L, R, work)
+    solved = without_gift(n, friction, smooth, pivots, v0, w, solved, (v, L), R, h, work)
+    solved = without_stage_gain(n, friction, smooth, pivots, v0, w, solved, (v, L), R, h, work)
     v1, L1, residual, sweeps, method = resist_turning(n, friction, smooth, pivots, v, L, solved, R, work)
     memory[work.i, MODE] = work.mode
     note_solve(report, work.world, residual, sweeps, method, work.tolerance)
     store_warm_start(n, width, memory, work.i, h, work)
-    x = (x[0] + half * v1[0], x[1] + half * v1[1], x[2] + half * v1[2])
-    return x, drift(q, L1, work, half, gyroscopic, tilted), v1, L1
+    foretell_gaps(n, v1, turning(R, L1, work.J), after, work)
+    x = (x[0] + after * v1[0], x[1] + after * v1[1], x[2] + after * v1[2])
+    return x, drift(q, L1, work, after, gyroscopic, tilted), v1, L1

@@ -22,6 +22,7 @@ from physics.kernels import layout as at
 from physics.kernels import quaternion as qt
 from physics.kernels.body import angular_velocity, bind_body, is_finite, read_state, write_state
 from physics.kernels.compiler import inlined, kernel
+from physics.kernels.compliance import lift_to_due, stiffness
 from physics.kernels.contact import gap_of, gather, has_passed, is_clear, nearest_outside_set, push_out
 from physics.kernels.fields.loads import (
     bind_fields,
@@ -183,14 +184,14 @@ def substep(y, h, friction, smooth, gyroscopic, tilted, pivots, scheme, memory, 
         n, depth = contact_set(y, left, tilted, work)
         if n > 0:
             report[world, at.PENETRATION] = max(report[world, at.PENETRATION], depth)
-            if not work.is_last:
+            if not work.is_last and not stiffness(work) > 0.0:
                 y = impact(n, y, left, friction, smooth, tilted, pivots, report, work)
         end, t = to_next_impact(n, y, left, friction, smooth, gyroscopic, tilted, pivots, scheme, memory, report, work)
         left -= t
         pass_time(t, work)
-        if n > 0 and not has_same_pose(end, y):
+        if n > 0 and not stiffness(work) > 0.0 and not has_same_pose(end, y):
             end = kept_out(end, tilted, work)
-        y = end
+        y = lift_to_due(n, end, tilted, work)
         if not left > 0.0:
             break
         report[world, at.SPLITS] += 1.0

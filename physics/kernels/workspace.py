@@ -78,6 +78,7 @@ def workspace_dtype(
         ("mask", i, (max(wall_count, 1),)),  # bit k: feature k of the body is in the contact set of this wall
         ("slot", i, (n,)),  # wall * features + feature, the stable name of a contact
         ("gap", f, (n,)),  # [m], negative when penetrating
+        *[("due", f, (n,))] * (contact_laws.STIFFNESS in laws),  # gap at the end of a stage [m] (`compliance`)
         ("speed", f, (n,)),  # normal velocity before the stage [m/s], negative when approaching
         ("arm", f, (n, 3)),  # contact point relative to the centre of mass, world frame [m]
         ("target", f, (n, 3)),  # contact velocity aimed at (normal, tangents) [m/s]

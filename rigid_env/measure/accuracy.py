@@ -196,7 +196,9 @@ def _peer_contenders(engine: peers.Engine, scene: physics.Scene, steps: Sequence
     found, reasons = [], []
     ours_alone = (physics.Field, physics.RollingFriction, physics.SpinFriction)
     contact = scene.effect(physics.Contact)
-    if any(isinstance(effect, ours_alone) for effect in scene.effects) or (contact and contact.tangential):
+    friction = scene.effect(physics.Friction)
+    is_ours = (contact and (contact.tangential or contact.stiffness)) or (friction and friction.axis is not None)
+    if is_ours or any(isinstance(effect, ours_alone) for effect in scene.effects):
         return [], [f"{engine.name}: it is not given the scene's fields and laws of contact"]
     for setting, options in engine.settings(scene).items():
         try:

@@ -24,6 +24,10 @@ BALL = physics.Sphere(0.5, 2.0, pos=(0.0, 0.5, 0.0), linvel=(5.0, 0.0, 0.0), ang
 BOUNCING = physics.Sphere(0.5, 2.0, pos=(0.0, 1.5, 0.0), linvel=(5.0, 0.0, 0.0), angvel=(0.0, 3.0, 1.0))
 TOUCH = (GRAVITY, physics.Contact(), physics.Friction(50.0))
 
+# A slope on which a slab slides for ever, across the grain.
+SLAB = physics.Block((2.0, 0.2, 2.0), 2.0, pos=(0.0, 0.1, 0.0))
+SLOPE = physics.Gravity((5.0, -8.0, 3.0))
+
 # Lines of a page between which `write_markdown` puts the table.
 BEGIN, END = "<!-- costs: rigid-env effects --markdown docs/effects.md -->", "<!-- end of costs -->"
 
@@ -43,6 +47,20 @@ def _bouncing() -> tuple[physics.Scene, physics.Scene]:
     """A superball, and a ball that sticks at impacts."""
     laws = (physics.Contact(1.0, tangential=1.0), physics.Contact(1.0))
     return tuple(physics.Scene([BOUNCING], [FLOOR], [GRAVITY, law, physics.Friction(50.0)]) for law in laws)
+
+
+def _soft() -> tuple[physics.Scene, physics.Scene]:
+    """The block at rest on springs, and on rock."""
+    scene = scenes.rest()
+    others = [effect for effect in scene.effects if not isinstance(effect, physics.Contact)]
+    laws = (physics.Contact(stiffness=1e5, damping=1e3), physics.Contact())
+    return tuple(physics.Scene(scene.bodies, scene.walls, [*others, law]) for law in laws)
+
+
+def _grained() -> tuple[physics.Scene, physics.Scene]:
+    """The slope with two coefficients of friction, and with one."""
+    laws = (physics.Friction((0.2, 0.4), axis=(0.0, 0.0, 1.0)), physics.Friction(0.3))
+    return tuple(physics.Scene([SLAB], [FLOOR], [SLOPE, physics.Contact(), law]) for law in laws)
 
 
 def _pair() -> list[physics.Body]:
@@ -71,6 +89,8 @@ CASES: dict[str, Callable[[], tuple[physics.Scene, physics.Scene]]] = {
     "spring between bodies": lambda: _case(physics.Spring(CORNER, CORNER, 40.0, 1.0, other=1), bodies=_pair()),
     "push": lambda: _case(physics.Push((1.0, 0.0, 0.0), CORNER), GRAVITY),
     "tangential restitution": _bouncing,
+    "friction of two coefficients": _grained,
+    "compliance": _soft,
     "rolling friction": lambda: _case(physics.RollingFriction(), *TOUCH, bodies=[BALL], walls=[FLOOR]),
     "spin friction": lambda: _case(physics.SpinFriction(), *TOUCH, bodies=[BALL], walls=[FLOOR]),
     "actuator": lambda: _case(physics.Actuator(limit_force=1.0, lag=0.1), GRAVITY),

@@ -327,6 +327,20 @@ def test_effects_are_added_or_take_the_place_of_the_tasks():
     assert speeds[1] == pytest.approx(force / 5.0 * (1 - math.exp(-5.0 * 0.2 / 6.0)), rel=1e-5)
 
 
+def test_a_task_on_walls_with_a_grain():
+    """`Friction` with two coefficients in place of the task's: shoved along z and x the block slows by its own μ g."""
+    mu = (0.2, 0.4)
+    env = gym.make("rigid_env:rigid_env/BlockReach-v0", effects=[physics.Friction(mu, axis=(0, 0, 1))])
+    world = env.unwrapped.task.world
+    for k, way in enumerate(((0, 0, 1), (1, 0, 0))):
+        env.reset(seed=3, options={"place": (0.0, 0.0), "face": 2, "yaw": 0.0})
+        start = world.linvel.copy()
+        world.set_state(linvel=start + way)
+        world.step(steps=10, dt=0.01)
+        # The block lies on a face: one deceleration, exact at any step.
+        assert world.linvel[0, 0] @ way == pytest.approx(1 - mu[k] * 9.81 * 0.1, abs=1e-9)
+
+
 def test_a_task_in_fields_is_pickled_and_batched_like_any_other(rng):
     effects = [physics.Drag(), physics.Wind(gust=2.0)]
     single, batch = BlockReachEnv(effects=effects), BlockReachVectorEnv(3, effects=effects)

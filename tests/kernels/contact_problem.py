@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from physics.kernels.laws import ANISOTROPY, DAMPING, STIFFNESS
 from physics.kernels.quaternion import to_matrix
 from physics.kernels.solve import solve_contacts
 from physics.kernels.workspace import make_workspace
@@ -17,10 +18,31 @@ FACE = (0, 1, 4, 5)  # vertices with y < 0
 
 
 class Problem:
-    """Vertices of a block on walls, with a free motion and target velocities."""
+    """Vertices of a block on walls, with a free motion and target velocities.
 
-    def __init__(self, contacts, v, w, mu, quat=(1, 0, 0, 0), target=None, tolerance=1e-10, mass=MASS, length=1.0):
-        self.work = make_workspace(np.array([FLOOR, SIDE]), 8, tolerance=tolerance, sweeps=2000)
+    `ratio` is μ2/μ1 of friction, `give` the γ [1/kg] of walls that give.
+    """
+
+    def __init__(
+        self,
+        contacts,
+        v,
+        w,
+        mu,
+        quat=(1, 0, 0, 0),
+        target=None,
+        tolerance=1e-10,
+        mass=MASS,
+        length=1.0,
+        ratio=None,
+        give=None,
+    ):
+        laws = (ANISOTROPY,) * (ratio is not None) + (STIFFNESS, DAMPING) * (give is not None)
+        self.work = make_workspace(np.array([FLOOR, SIDE]), 8, laws=laws, tolerance=tolerance, sweeps=2000)
+        if ratio is not None:
+            self.work["laws"][0, 0] = ratio
+        if give is not None:
+            self.work["laws"][0, -2], self.work["give"] = 1.0, give
         self.one = one = self.work[0]
         self.n = n = len(contacts)
         self.quat = tuple(float(c) for c in np.array(quat) / np.linalg.norm(quat))
@@ -53,7 +75,10 @@ class Problem:
         inverse[:3, :3] = np.eye(3) / self.mass
         inverse[3:, 3:] = np.linalg.inv(self.inertia)
         twist = np.concatenate([self.v, inverse[3:, 3:] @ np.array(self.L)])
-        return J @ inverse @ J.T, J @ twist - self.one["target"][:n].ravel()
+        W = J @ inverse @ J.T
+        if "give" in self.one.dtype.names:
+            W[::3, ::3] += self.one["give"] * np.eye(n)
+        return W, J @ twist - self.one["target"][:n].ravel()
 
     def solve(self, mode=0, friction=True, warm=None):
         """Impulses (n, 3), and what `solve_contacts` returns."""

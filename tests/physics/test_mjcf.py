@@ -177,3 +177,13 @@ def test_what_mjcf_cannot_express_is_refused_or_named(tmp_path):
         in path.read_text()
     )
     assert physics.load_mjcf(path).effects == (physics.Gravity(),)
+
+
+def test_two_coefficients_of_friction_are_left_out_whole(tmp_path):
+    """A geom of MuJoCo has one along the surface: none is better than half of it."""
+    grain = physics.Friction((0.2, 0.5), axis=(0, 0, 1))
+    scene = physics.Scene([physics.Sphere(1, 1)], [physics.HalfSpace((0, 1, 0), -5)], [physics.Contact(), grain])
+    with pytest.raises(ValueError, match=r"cannot express Friction\(coefficient=\(0.2, 0.5\)"):
+        physics.save_mjcf(scene, tmp_path / "scene.xml")
+    physics.save_mjcf(scene, tmp_path / "scene.xml", drop=True)
+    assert physics.load_mjcf(tmp_path / "scene.xml").effect(physics.Friction) is None

@@ -26,6 +26,7 @@ from physics.kernels import quaternion as qt
 from physics.kernels.arms import arm_and_rate, wall_normal
 from physics.kernels.body import principal_attitude
 from physics.kernels.compiler import inlined, kernel
+from physics.kernels.ellipse import opposing
 from physics.kernels.events.linear import eliminate
 from physics.kernels.share import wall_axes
 
@@ -131,15 +132,16 @@ def _add_held(m, j, axes, motion):
 
 
 @inlined
-def _slide_push(mu, n, j, motion):
-    d = vector(motion.way, j)
+def _slide_push(mu, axes, j, work, motion):
+    n, d = axes[0], opposing(vector(motion.way, j), axes, work)
     return (n[0] - mu * d[0], n[1] - mu * d[1], n[2] - mu * d[2])
 
 
 @kernel
-def _add_patch(m, first, last, mu, axes, radius, motion):
+def _add_patch(m, first, last, mu, axes, work, motion):
     """Three unknowns of the sliding contacts first <= j < last of one wall."""
     _clear(m, 3, motion)
+    radius = work.radius
     ca = cb = 0.0
     count = 0
     for j in range(first, last):
@@ -152,7 +154,7 @@ def _add_patch(m, first, last, mu, axes, radius, motion):
         if motion.holds[j]:
             continue
         r, b = vector(motion.arm, j), -qt.dot(axes[0], vector(motion.goal, j))
-        push = _slide_push(mu, axes[0], j, motion)
+        push = _slide_push(mu, axes, j, work, motion)
         s = (qt.dot(axes[1], r) - ca / count) / radius
         t = (qt.dot(axes[2], r) - cb / count) / radius
         motion.first[j], motion.is_patch[j] = m, 1
@@ -184,12 +186,12 @@ def list_unknowns(mu, work, motion):
                 m = _add_held(m, j, axes, motion)
             elif sliding < PATCH:
                 _clear(m, 1, motion)
-                _add(m, vector(motion.arm, j), _slide_push(mu, axes[0], j, motion), axes[0], 1.0, motion)
+                _add(m, vector(motion.arm, j), _slide_push(mu, axes, j, work, motion), axes[0], 1.0, motion)
                 motion.unknown[m] = -qt.dot(axes[0], vector(motion.goal, j))
                 motion.first[j] = m
                 m += 1
         if sliding >= PATCH:
-            m = _add_patch(m, first, last, mu, axes, work.radius, motion)
+            m = _add_patch(m, first, last, mu, axes, work, motion)
         first = last
     return m
 
@@ -227,7 +229,7 @@ def spread(mu, work, motion):
             if motion.is_patch[j]:
                 s += motion.place[j, 0] * motion.unknown[k + 1] + motion.place[j, 1] * motion.unknown[k + 2]
             motion.normal[j] = s
-            f = times(s, _slide_push(mu, axes[0], j, motion))
+            f = times(s, _slide_push(mu, axes, j, work, motion))
         motion.force[j, 0], motion.force[j, 1], motion.force[j, 2] = f
 
 

@@ -18,6 +18,7 @@ from physics.kernels import geometry as geo
 from physics.kernels import quaternion as qt
 from physics.kernels.arms import center_arm, geometric_center, wall_normal
 from physics.kernels.compiler import inlined, kernel
+from physics.kernels.ellipse import eased
 from physics.kernels.events.forces import free_turning, load, spread, vector
 from physics.kernels.events.motion import END, START, V
 from physics.kernels.events.smooth import find_rate, get_state, sliding_velocity
@@ -95,8 +96,8 @@ def gap_margin(h, work, motion):
 @inlined
 def _cone_excess(j, mu, work, motion):
     """Tangential force of contact j less μ times its push [N]."""
-    n = wall_normal(work.walls, motion.slot[j] // work.features)
-    f = vector(motion.force, j)
+    axes = wall_axes(work.walls, motion.slot[j] // work.features)
+    n, f = axes[0], eased(vector(motion.force, j), axes, work)
     p = motion.normal[j]
     return math.sqrt(max(0.0, qt.dot(f, f) - qt.dot(n, f) * qt.dot(n, f))) - mu * p
 
@@ -104,13 +105,13 @@ def _cone_excess(j, mu, work, motion):
 @inlined
 def _pair_excess(i, j, mu, work, motion):
     """The same of two contacts on one wall, whatever they share of the force along their line [N]."""
-    n = wall_normal(work.walls, motion.slot[i] // work.features)
+    axes = wall_axes(work.walls, motion.slot[i] // work.features)
     a, b = vector(motion.arm, i), vector(motion.arm, j)
-    e = (b[0] - a[0], b[1] - a[1], b[2] - a[2])
+    e = eased((b[0] - a[0], b[1] - a[1], b[2] - a[2]), axes, work)
     s = 1.0 / math.sqrt(qt.dot(e, e))
     e = (s * e[0], s * e[1], s * e[2])
-    across = qt.cross(n, e)
-    f, g = vector(motion.force, i), vector(motion.force, j)
+    across = qt.cross(axes[0], e)
+    f, g = eased(vector(motion.force, i), axes, work), eased(vector(motion.force, j), axes, work)
     p, q = mu * motion.normal[i], mu * motion.normal[j]
     fa, ga = abs(qt.dot(across, f)), abs(qt.dot(across, g))
     worst = max(fa - p, ga - q)

@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 
 from physics.kernels import quaternion as qt
-from physics.kernels.arms import wall_normal
 from physics.kernels.compiler import kernel
+from physics.kernels.ellipse import eased
 from physics.kernels.events.candidates import (
     HELD,
     OPEN,
@@ -26,6 +26,7 @@ from physics.kernels.events.forces import (
     vector,
 )
 from physics.kernels.events.guards import cone_excess
+from physics.kernels.share import wall_axes
 
 # Accelerations and forces of an exact trial below this share of the largest free ones are zero.
 SMALL_EXACT = 1.0e-11
@@ -62,8 +63,8 @@ def _change_one(count, y, R, w, a, alpha, scale, tilted, work, motion):
                     most, which, worst, kind = excess, i, k, SLIDING
             k += 1
     if which >= 0:
-        n = wall_normal(work.walls, motion.candidate[which] // work.features)
-        f = vector(motion.force, worst)
+        axes = wall_axes(work.walls, motion.candidate[which] // work.features)
+        n, f = axes[0], eased(eased(vector(motion.force, worst), axes, work), axes, work)
         fn = qt.dot(n, f)
         t = (fn * n[0] - f[0], fn * n[1] - f[1], fn * n[2] - f[2])
         size = math.sqrt(qt.dot(t, t))

@@ -143,8 +143,16 @@ def restitution(scene: physics.Scene) -> float:
 
 
 def friction(scene: physics.Scene) -> float:
-    """Coefficient of friction; 0 without."""
+    """Coefficient of friction; 0 without.
+
+    Raises
+    ------
+    Unsupported
+        It has two.
+    """
     effect = scene.effect(physics.Friction)
+    if effect and effect.axis is not None:
+        raise Unsupported("friction with two coefficients is ours")
     return float(effect.coefficient) if effect and scene.walls else 0.0
 
 
