@@ -5,10 +5,10 @@ every caller it is linked into, up to a dozen levels of a step. Here a kernel th
 *part*: lowered to IR and no further. Only a *whole*, which Python calls, links all parts below it, is optimised and
 becomes machine code; it alone is kept on disk.
 
-A symbol is named after its function and the types of its arguments. Numba names a record type by a number that counts the
-types of the process: machine code made in two processes, for two records of the same number, would have the same names in
-it, and a third process that loads both from disk would run the parts of one in the other. Here a digest of the types is
-part of each name.
+A symbol is named after its function and the types of its arguments. Numba names a record type by a number that counts
+the types of the process: machine code made in two processes, for two records of the same number, would have the same
+names in it, and a third process that loads both from disk would run the parts of one in the other. Here a digest of the
+types is part of each name.
 
 `pipeline_class` is Numba's documented way to have a function compiled otherwise; what is not public of Numba here is
 `JITCodeLibrary`, the IR of one function with the libraries that it calls.

@@ -206,7 +206,9 @@ def step_worlds(
 ):  # fmt: skip
     """Advance the worlds first <= world < last by `steps` steps of `substeps` substeps of h seconds each.
 
-    A body whose new state is not finite keeps the old one, and its world's report counts the fault.
+    A body in flight looks for walls only when it could be near one (`clearance`), one that sleeps for nothing (`sleep`,
+    None where the scene does not declare it). A body whose new state is not finite keeps the old one, and its world's
+    report counts the fault.
     """
     work = scratch[0]
     bodies = shapes.shape[0]

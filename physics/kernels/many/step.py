@@ -10,6 +10,9 @@ A substep of a world is, until its time is used up:
              the contact problem of all of them at the middle, half a free drift;
 5. apart     what still overlaps is pushed apart, positions only (`apart`).
 
+Where the scene declares it, what has been at rest for long enough then falls asleep and takes part in none of this, but
+for the broad phase, until something wakes it (`sleep`).
+
 The stages are those of `physics.kernels.step`, for a whole world where that has one body.
 """
 
