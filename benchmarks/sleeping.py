@@ -26,8 +26,8 @@ ASLEEP, AWAKE = "asleep", "awake"
 MILLION = 1_000_000
 SETTLE = 10_000  # steps in which a tower falls asleep, at most
 
-# Half widths of boxes [m]: one in which a flight, of which the block falls 490 m, meets nothing, and one that its bounding
-# sphere of 3.08 m reaches beyond, while the block, 2.92 m from its axis to an edge as it turns about z, does not.
+# Half widths of boxes [m]: one in which a flight, in which the block falls 490 m, meets nothing, and one that its
+# bounding sphere of 3.08 m reaches beyond, while the block, 2.92 m from its axis to an edge as it turns, does not.
 LARGE, NARROW = 1e3, 3.0
 
 
