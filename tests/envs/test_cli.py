@@ -13,6 +13,7 @@ import physics
 import rigid_env.warmup
 from physics import scenes
 from physics.fields import FIELDS
+from physics.kernels.sleep import SLEEP_SIZE
 from rigid_env.cli import app
 from rigid_env.measure import effects as costs
 from rigid_env.measure.shares import names_of, without
@@ -325,8 +326,9 @@ def test_effects_measures_every_effect_with_and_without(tmp_path):
         assert row["notes"]["added_ns_per_step"] == pytest.approx(added)
     stored = {name: row["notes"]["added_bytes_per_body"] for name, row in rows.items()}
     assert (stored["gravity"], stored["contact"], stored["drag"], stored["spring"]) == (0, 0, 16, 72)
-    names = "spring between bodies", "tangential restitution", "rolling friction", "spin friction", "actuator", "sleeping"
-    assert [stored[name] for name in names] == [128, 8, 8, 8, 0, 152]
+    names = "spring between bodies", "tangential restitution", "rolling friction", "spin friction", "actuator"
+    assert [stored[name] for name in names] == [128, 8, 8, 8, 0]
+    assert stored["sleeping"] == 8 * SLEEP_SIZE
     text = page.read_text()
     assert text.startswith(f"before\n{begin}\n")
     assert text.endswith(f"{end}\nafter\n")
