@@ -13,7 +13,6 @@ from hypothesis import strategies as st
 import physics
 from physics import scenes
 from physics.accuracy import resolve
-from physics.plan_rows import Row
 from rigid_env.hard_cases import registry
 from rigid_env.hard_cases.case import Setting
 
@@ -312,51 +311,3 @@ def test_a_recording_is_replayed_bit_for_bit(tmp_path):
     recording = physics.Recording.load(recorder.save(tmp_path / "sleep.npz"))
     assert recording.replay().is_identical
     assert (recording.world().sleep[0] == recorder.recording().starts[0].snapshot.arrays[-1]).all()
-
-
-# --- declaring it ----------------------------------------------------------------------------------------------
-
-
-def plan(*effects, accuracy="balanced", walls=BLOCK.walls):
-    scene = physics.Scene(BLOCK.bodies, walls, [*BLOCK.effects, *effects])
-    return physics.make_plan(scene, resolve(accuracy))
-
-
-def row_of(plan):
-    return next(row for row in plan.rows if row.effect == "sleeping")
-
-
-def test_undeclared_nothing_of_it_is_there():
-    assert physics.World(BLOCK).sleep.size == 0
-    assert not physics.World(BLOCK).asleep.any()
-    with_it, without = plan(physics.Sleeping()), plan()
-    assert [(a, b) for a, b in zip(with_it.key, without.key) if a != b] == [(True, None)]
-    assert row_of(without) == Row("sleeping", False, "not declared", "")
-    assert row_of(with_it).is_on
-    assert row_of(with_it).reason == "declared: Sleeping(slops=4.0, time=None)"
-    assert "nothing can touch" in plan(physics.Sleeping(), walls=()).explain()
-
-
-def test_under_loads_that_may_change_by_themselves_nothing_sleeps():
-    gusts = (physics.Sleeping(), physics.Drag(), physics.Wind(gust=1.0))
-    assert not plan(*gusts).sleeping
-    assert "nothing rests under what may change by itself: wind" in plan(*gusts).explain()
-    calm = (physics.Sleeping(), physics.Drag(), physics.Wind(gust=0.0))
-    assert plan(*calm).sleeping
-    world = physics.World(physics.Scene(BLOCK.bodies, BLOCK.walls, [*BLOCK.effects, *calm]))
-    with pytest.raises(ValueError, match=r"Wind.*may change by itself, in a scene in which bodies sleep"):
-        world.set_parameters(effects=[physics.Wind(gust=1.0)])
-
-
-@pytest.mark.parametrize(
-    ("make", "message"),
-    [
-        (lambda: physics.Sleeping(slops=0), "Sleeping.slops is 0"),
-        (lambda: physics.Sleeping(time=-1), "Sleeping.time is -1"),
-        (lambda: physics.Scene(BLOCK.bodies, effects=[physics.Sleeping()]), "Sleeping without Contact"),
-        (lambda: physics.World(sleeping(BLOCK), accuracy="precise"), "'events', which does not know Sleeping"),
-    ],
-)
-def test_what_is_asked_wrongly_is_refused(make, message):
-    with pytest.raises(ValueError, match=message):
-        make()
