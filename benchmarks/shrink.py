@@ -79,14 +79,14 @@ def _without(recording: Recording, body: int) -> Recording | None:
     scene = physics.Scene(
         [other for k, other in enumerate(bodies) if k != body], recording.scene.walls, recording.scene.effects
     )
-    memory = physics.World(scene, accuracy=recording.accuracy).memory
+    fresh = dict(zip(KEPT, physics.World(scene, accuracy=recording.accuracy).kept()))
 
     def smaller(start: Start) -> Start:
         arrays = dict(zip(KEPT, start.snapshot.arrays))
         for name in ("state", "params"):
             arrays[name] = np.delete(arrays[name], body, axis=0)
-        arrays["memory"] = memory.copy()
-        return Start(start.step, Snapshot(tuple(arrays[name] for name in KEPT), start.snapshot.time))
+        arrays |= {name: fresh[name].copy() for name in ("memory", "sleep") if name in fresh}
+        return Start(start.step, Snapshot(tuple(arrays.values()), start.snapshot.time))
 
     return replace(
         recording,

@@ -11,7 +11,7 @@ The contract in five lines::
 
 from physics.accuracy import PRESETS, Accuracy
 from physics.diagnostics import Diagnostics, diagnose, look_at
-from physics.effects import Actuator, Contact, Friction, Gravity, RollingFriction, SpinFriction
+from physics.effects import Actuator, Contact, Friction, Gravity, RollingFriction, Sleeping, SpinFriction
 from physics.field import Field, field_function
 from physics.fields import AngularDrag, Buoyancy, Drag, Magnus, Push, Spring, Wind
 from physics.frontier_result import Frontier, FrontierPoint
@@ -56,6 +56,7 @@ __all__ = [
     "Replay",
     "RollingFriction",
     "Scene",
+    "Sleeping",
     "Snapshot",
     "Solver",
     "Sphere",

@@ -116,6 +116,8 @@ def _adopt(world: World, chosen, rows, state, params, what, keep_memory=False) -
     angular_momenta(np.arange(len(rows)), state, params)
     world.state[rows] = state
     world.params[rows] = params
+    if world.plan.sleeping:
+        world.sleep[rows] = 0.0
     if world.plan.contact and not keep_memory:
         world.memory[chosen if world.plan.many else rows] = 0.0
     if world.recorder is not None:
@@ -144,6 +146,11 @@ def _changed_slots(world: World, effects) -> list[FieldSlot]:
                 "rest has arguments of its own, or is the same in all worlds)"
             )
         effect.check(world.body_count)
+        if world.plan.sleeping and not effect.is_steady:
+            raise ValueError(
+                f"effects holds {effect!r}, which may change by itself, in a scene in which bodies sleep; allowed is "
+                "what is steady, or a scene that declares such a field, in which nothing sleeps"
+            )
         kinds.setdefault(effect.kind, []).append(effect)
     slots = {slot.kind: slot for slot in world.plan.fields}
     for kind, given in kinds.items():

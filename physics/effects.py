@@ -219,5 +219,32 @@ class Actuator:
         return self.lag > 0.0 or self.delay > 0.0
 
 
+@dataclass(frozen=True)
+class Sleeping:
+    """Bodies at rest are left out of the step until something changes that acts on them.
+
+    What has gone no way in two windows of time in a row, and not ever further, sleeps with all that it touches, is near
+    to or is tied to: it keeps its place to the last bit, has no velocity, and costs next to nothing. Another wrench,
+    something awake that comes near, or a change from outside (`World.set_state`, `World.set_parameters`) wakes it.
+
+    Parameters
+    ----------
+    slops : float
+        Way of any point of a body in a window that counts as none, in `Accuracy.slop` of its bounding radius; more than
+        0.
+    time : float, optional
+        Length of a window [s]; more than 0. None: √(2 r/a), the time in which the body would fall its bounding radius r
+        at the acceleration a that it would have without contact; without any it does not sleep.
+    """
+
+    slops: float = 4.0
+    time: float | None = None
+
+    def __post_init__(self):
+        object.__setattr__(self, "slops", float(checks.positive(self.slops, (), "Sleeping.slops")))
+        if self.time is not None:
+            object.__setattr__(self, "time", float(checks.positive(self.time, (), "Sleeping.time")))
+
+
 RESISTANCES = (RollingFriction, SpinFriction)
-EFFECTS = (Gravity, Contact, Friction, *RESISTANCES, Actuator, Field)
+EFFECTS = (Gravity, Contact, Friction, *RESISTANCES, Actuator, Sleeping, Field)

@@ -88,6 +88,14 @@ class Field:
         return None
 
     @property
+    def is_steady(self) -> bool:
+        """Whether what it does to a body that does not move stays the same; not known of fields of your own.
+
+        `Sleeping` needs to know: under a load that may change by itself nothing sleeps.
+        """
+        return False
+
+    @property
     def label(self) -> str:
         """Name in a plan: of the class, in words."""
         name = type(self).__name__
@@ -95,7 +103,11 @@ class Field:
 
 
 class Checked(Field):
-    """Sets checked values on a frozen dataclass."""
+    """A built-in field: it sets checked values on a frozen dataclass."""
+
+    @property
+    def is_steady(self):
+        return True
 
     def _set(self, name: str, check, shape: tuple = ()) -> None:
         value = check(getattr(self, name), shape, f"{type(self).__name__}.{name}")

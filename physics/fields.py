@@ -139,6 +139,10 @@ class Wind(Checked):
         self._set("time_scale", checks.positive)
         checks.count(self.seed, "Wind.seed", least=0)
 
+    @property
+    def is_steady(self):
+        return self.gust == 0
+
     def columns(self, body, worlds):
         phases = np.zeros((len(worlds), wind.SIZE - wind.PHASES))
         if self.gust > 0:

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from physics.accuracy import EVENTS, SCHEMES, Accuracy
-from physics.effects import Contact, Friction, Gravity, RollingFriction, SpinFriction
-from physics.field import FieldSlot, field_slots
+from physics.effects import Contact, Friction, Gravity, RollingFriction, Sleeping, SpinFriction
+from physics.field import Field, FieldSlot, field_slots
 from physics.inertia import principal_axes
 from physics.kernels.fields.terms import Term
 from physics.kernels.laws import ANISOTROPY, DAMPING, LAWS, ROLLING, SPIN, STIFFNESS, TANGENTIAL
@@ -30,7 +30,8 @@ class Plan:
     its body axes, or its geometric centre is not its centre of mass. `many` is on where bodies touch each other, or
     touch walls and are tied together by springs; `meeting` says whether they touch each other, `ellipsoids` whether
     there are any among those. `linked` is on where
-    they are tied together and touch nothing. `laws` are those of `physics.kernels.laws`.
+    they are tied together and touch nothing. `sleeping` is on where bodies may sleep. `laws` are those of
+    `physics.kernels.laws`.
     """
 
     contact: bool | None
@@ -46,6 +47,7 @@ class Plan:
     meeting: bool
     ellipsoids: bool | None
     linked: bool | None
+    sleeping: bool | None
     features: int
     fields: tuple[FieldSlot, ...]
     laws: tuple[str, ...]
@@ -64,7 +66,8 @@ class Plan:
         """What distinguishes one compiled kernel from another."""
         return (
             self.contact, self.friction, self.restitution, self.gravity, self.gyroscopic, self.tilted,
-            self.pivots, self.scheme is None, self.events, self.many, self.ellipsoids, self.linked, self.features,
+            self.pivots, self.scheme is None, self.events, self.many, self.ellipsoids, self.linked,
+            self.sleeping, self.features,
             *self.laws,
             *(term.marker for term in self.terms),
         )  # fmt: skip
@@ -131,6 +134,7 @@ class _Seen:
     isotropic: bool
     turned: bool
     uneven: list[int]
+    sleeping: bool
     fields: tuple[FieldSlot, ...]
     laws: tuple[str, ...]
 
@@ -142,12 +146,14 @@ def _see(scene: Scene) -> _Seen:
     touching = contact is not None and (bool(scene.walls) or meeting)
     axes = [principal_axes(body.inertia) for body in scene.bodies]
     isotropic = all(is_isotropic(moments) for moments, _ in axes)
+    steady = all(effect.is_steady for effect in scene.effects if isinstance(effect, Field))
     return _Seen(
         contact, friction, gravity, touching, meeting,
         rubbing=touching and friction is not None,
         isotropic=isotropic,
         turned=not isotropic and any(is_tilted(R) for _, R in axes),
         uneven=[b for b, body in enumerate(scene.bodies) if any(body.center)],
+        sleeping=touching and steady and scene.effect(Sleeping) is not None,
         fields=field_slots(scene.effects, len(scene.bodies)),
         laws=_laws(scene, contact, friction) if touching else (),
     )  # fmt: skip
@@ -177,6 +183,11 @@ def make_plan(scene: Scene, accuracy: Accuracy) -> Plan:
     elif seen.touching:
         _check_collisions(accuracy)
     _check_laws(scene, seen, many, scheme)
+    if seen.sleeping and scheme == EVENTS:
+        raise ValueError(
+            "accuracy has the scheme 'events', which does not know Sleeping; allowed are 'fast', 'balanced' and every "
+            "time-stepping scheme"
+        )
     return Plan(
         contact=seen.touching or None,
         friction=seen.rubbing or None,
@@ -191,6 +202,7 @@ def make_plan(scene: Scene, accuracy: Accuracy) -> Plan:
         meeting=seen.meeting,
         ellipsoids=(seen.meeting and any(body.kind == "ellipsoid" for body in scene.bodies)) or None,
         linked=(is_linked and not many) or None,
+        sleeping=seen.sleeping or None,
         features=VERTEX_COUNT if any(body.kind == "block" for body in scene.bodies) else 1,
         fields=seen.fields,
         laws=seen.laws,

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from physics.effects import Actuator, RollingFriction, SpinFriction
-from physics.field import FieldSlot
+from physics.effects import Actuator, RollingFriction, Sleeping, SpinFriction
+from physics.field import Field, FieldSlot
 from physics.fields import FIELDS
 from physics.kernels.laws import ROLLING, SPIN, STIFFNESS, TANGENTIAL
+from physics.kernels.sleep import SLEEP_SIZE
 
 
 @dataclass(frozen=True)
@@ -124,6 +125,19 @@ def _actuator_row(scene) -> Row:
     return Row("actuator", True, f"declared: {actuator!r}", f"before the step{', ' + note if note else ''}")
 
 
+def _sleeping_row(scene, touching, sleeping) -> Row:
+    effect = scene.effect(Sleeping)
+    if effect is None:
+        return Row("sleeping", False, "not declared", "")
+    if sleeping:
+        return Row("sleeping", True, f"declared: {effect!r}", f"{SLEEP_SIZE} numbers per body, a look at each")
+    if not touching:
+        return Row("sleeping", False, "declared, but nothing can touch", "")
+    restless = [field for field in scene.effects if isinstance(field, Field) and not field.is_steady]
+    names = ", ".join(field.label for field in restless)
+    return Row("sleeping", False, f"declared, but nothing rests under what may change by itself: {names}", "")
+
+
 def make_rows(scene, accuracy, seen) -> tuple[Row, ...]:
     """All rows of a plan; `seen` holds what `physics.plan.make_plan` found out of the scene."""
     contact, friction, touching, rubbing = seen.contact, seen.friction, seen.touching, seen.rubbing
@@ -131,6 +145,7 @@ def make_rows(scene, accuracy, seen) -> tuple[Row, ...]:
         _gravity_row(seen.gravity),
         Row("applied wrench", True, "given to step(wrench)", "six numbers per body, zero without one"),
         _actuator_row(scene),
+        _sleeping_row(scene, touching, seen.sleeping),
         _contact_row(scene, contact),
         _between_row(scene, contact, seen.meeting),
         _friction_row(friction, rubbing),

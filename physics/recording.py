@@ -147,7 +147,7 @@ class Recording:
             with np.load(path, allow_pickle=False) as file:
                 content = dict(file)
             head = json.loads(str(content["head"]))
-            columns = [content[f"start_{name}"] for name in KEPT]
+            columns = [content[f"start_{name}"] for name in KEPT if name != "sleep" or "start_sleep" in content]
         except (KeyError, ValueError, EOFError) as error:
             raise ValueError(f"{path} is no recording ({error}); allowed is what physics.Recorder writes") from None
         if head["format"] > FORMAT:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from physics import checks
-from physics.effects import EFFECTS, RESISTANCES, Contact, Friction
+from physics.effects import EFFECTS, RESISTANCES, Contact, Friction, Sleeping
 from physics.field import Field
 from physics.shapes import Body
 
@@ -62,9 +62,9 @@ class Scene:
         At least one.
     walls : sequence of HalfSpace
     effects : sequence of effects
-        At most one of each kind, but any number of `Spring` and `Push`. `Friction`, `RollingFriction` and
-        `SpinFriction` need `Contact`, `Contact.tangential` needs `Friction`, `Wind` needs a field for it to act
-        through.
+        At most one of each kind, but any number of `Spring` and `Push`. `Friction`, `RollingFriction`,
+        `SpinFriction` and `Sleeping` need `Contact`, `Contact.tangential` needs `Friction`, `Wind` needs a field for it
+        to act through.
 
     Raises
     ------
@@ -90,7 +90,7 @@ class Scene:
         for kind in set(kinds):
             if kinds.count(kind) > 1 and not getattr(kind, "has_many", False):
                 raise ValueError(f"Scene.effects holds {kinds.count(kind)} {kind.__name__}; allowed is one")
-        for kind in (Friction, *RESISTANCES):
+        for kind in (Friction, *RESISTANCES, Sleeping):
             if kind in kinds and Contact not in kinds:
                 raise ValueError(f"Scene.effects holds {kind.__name__} without Contact; add physics.Contact()")
         contact = self.effect(Contact)

@@ -14,7 +14,7 @@ from pathlib import Path
 
 import tomlkit
 
-from physics.effects import Actuator, Contact, Friction, Gravity, RollingFriction, SpinFriction
+from physics.effects import Actuator, Contact, Friction, Gravity, RollingFriction, Sleeping, SpinFriction
 from physics.field import Field
 from physics.fields import FIELDS
 from physics.scene import HalfSpace, Scene
@@ -29,7 +29,7 @@ else:
 FORMAT = 1
 
 BODIES = (Block, Sphere, Ellipsoid)
-EFFECTS = (Gravity, Contact, Friction, RollingFriction, SpinFriction, Actuator, *FIELDS)
+EFFECTS = (Gravity, Contact, Friction, RollingFriction, SpinFriction, Actuator, Sleeping, *FIELDS)
 LISTS = ("bodies", "walls", "effects")
 
 

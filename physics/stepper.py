@@ -17,6 +17,7 @@ from physics import checks
 from physics.kernels.events.hybrid import step_events
 from physics.kernels.linked import step_linked
 from physics.kernels.many.step import step_many
+from physics.kernels.sleep import sleep_through
 from physics.kernels.step import step_worlds
 
 if TYPE_CHECKING:
@@ -100,7 +101,24 @@ def kernel_calls(world: World, wrench: np.ndarray, steps: int, dt: float) -> lis
         for k, (first, last) in enumerate(world.pool.slices)
     ]  # fmt: skip
     machine_code = _machine_code(kernel, (plan.key, len(world.walls)), argument_lists[0])
-    return [partial(machine_code, *arguments) for arguments in argument_lists]
+    calls = [partial(machine_code, *arguments) for arguments in argument_lists]
+    if plan.many and plan.sleeping:
+        return [_unless_asleep(world, wrench, worlds, call) for worlds, call in zip(world.pool.slices, calls)]
+    return calls
+
+
+def _unless_asleep(world: World, wrench: np.ndarray, worlds: tuple[int, int], call: Callable) -> Callable[[], None]:
+    """A call that is not made where every body of its worlds sleeps: handing over its arguments alone takes 2 µs."""
+    sleep = world.sleep_of_kernel()
+    first, last = worlds[0] * world.body_count, worlds[1] * world.body_count
+    arguments = (first, last, wrench.reshape(-1, 6), sleep, world.report_table[worlds[0] : worlds[1]])
+    asleep = _machine_code(sleep_through, ("sleep_through",), arguments)
+
+    def step():
+        if not asleep(*arguments):
+            call()
+
+    return step
 
 
 def _step_of(plan: Plan) -> tuple[Callable, Callable[[World, int], tuple]]:
@@ -117,7 +135,7 @@ def _step_of(plan: Plan) -> tuple[Callable, Callable[[World, int], tuple]]:
 def _many_arguments(world: World, k: int) -> tuple:
     plan = world.plan
     switches = (plan.friction, plan.restitution, plan.gyroscopic, plan.tilted, plan.ellipsoids, plan.scheme)
-    return *switches, world.memory, world.report_table, world.scratch[k]
+    return *switches, world.sleep_of_kernel(), world.memory, world.report_table, world.scratch[k]
 
 
 def _linked_arguments(world: World, k: int) -> tuple:
@@ -136,7 +154,8 @@ def _event_arguments(world: World, k: int) -> tuple:
 
 
 def _world_arguments(world: World, k: int) -> tuple:
-    return *_wall_switches(world.plan), world.plan.scheme, world.memory, world.report_table, world.scratch[k]
+    switches = (*_wall_switches(world.plan), world.plan.scheme)
+    return *switches, world.sleep_of_kernel(), world.memory, world.report_table, world.scratch[k]
 
 
 def _machine_code(kernel, key: tuple, arguments: tuple) -> Callable[..., None]:

@@ -13,7 +13,7 @@ from physics import changes, checks, parameters
 from physics.accuracy import Accuracy, resolve
 from physics.actuation import Actuation
 from physics.contacts import contact_ends, contact_forces
-from physics.effects import Actuator, Contact, Friction, Gravity, RollingFriction, SpinFriction
+from physics.effects import Actuator, Contact, Friction, Gravity, RollingFriction, Sleeping, SpinFriction
 from physics.field import Field, write_columns
 from physics.kernels import layout as at
 from physics.kernels.events.log import EVENT_SIZE
@@ -22,6 +22,7 @@ from physics.kernels.fields.terms import declare
 from physics.kernels.linked import make_linked
 from physics.kernels.many import arrays as many
 from physics.kernels.probe import angular_momenta
+from physics.kernels.sleep import GROUP, SLEEP_SIZE, Sleep
 from physics.kernels.slip import FEW
 from physics.kernels.stages import memory_size
 from physics.kernels.workspace import body_records, make_workspace
@@ -34,8 +35,8 @@ from physics.threads import SlicePool
 if TYPE_CHECKING:
     from physics.recorder import Recorder
 
-# Arrays that decide how a `World` goes on, in the order of `Snapshot.arrays`.
-KEPT = ("state", "params", "gravity", "memory", "report_table")
+# Arrays that decide how a `World` goes on, in the order of `Snapshot.arrays`; the last one where bodies may sleep.
+KEPT = ("state", "params", "gravity", "memory", "report_table", "sleep")
 
 
 @dataclass(frozen=True)
@@ -117,6 +118,7 @@ class World:
         along = friction.directions(len(self.scene.walls)) if friction else None
         self.walls = parameters.wall_table(self.scene.walls, along)
         self.memory = self._make_memory()
+        self.sleep = np.zeros((rows if self.plan.sleeping else 0, SLEEP_SIZE))
         self.report_table = np.zeros((self.worlds, at.REPORT_SIZE))
         self.event_counts = np.zeros(rows if self.plan.events else 1, dtype=np.int64)
         self.make_event_room(0)
@@ -329,7 +331,7 @@ class World:
 
     def kept(self) -> tuple[np.ndarray, ...]:
         """The arrays themselves that a snapshot copies, in the order of `KEPT`."""
-        return tuple(getattr(self, name) for name in KEPT)
+        return tuple(getattr(self, name) for name in (KEPT if self.plan.sleeping else KEPT[:-1]))
 
     def snapshot(self) -> Snapshot:
         """All that decides the future, copied; `restore` continues bit-identically, warm starts and all."""
@@ -373,6 +375,20 @@ class World:
     def touching(self, world: int = 0) -> set[tuple[int, int]]:
         """(body, wall) of every resting contact with a wall of one world at its last step."""
         return {(int(body), -1 - int(other)) for body, other in self.contact_ends(world) if other < 0}
+
+    @property
+    def asleep(self) -> np.ndarray:
+        """(worlds, bodies) bool: which bodies sleep; see `physics.Sleeping`. A new array."""
+        if not self.plan.sleeping:
+            return np.zeros((self.worlds, self.body_count), dtype=np.bool_)
+        return self.sleep[:, GROUP].reshape(self.worlds, self.body_count) > 0.0
+
+    def sleep_of_kernel(self) -> Sleep | None:
+        """What the step is told of sleep; None where no body may."""
+        if not self.plan.sleeping:
+            return None
+        effect = self.scene.effect(Sleeping)
+        return Sleep(self.sleep, effect.slops * self.accuracy.slop, effect.time or 0.0)
 
     def _check_index(self, world: int) -> None:
         if not 0 <= world < self.worlds:

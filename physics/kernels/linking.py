@@ -5,11 +5,18 @@ every caller it is linked into, up to a dozen levels of a step. Here a kernel th
 *part*: lowered to IR and no further. Only a *whole*, which Python calls, links all parts below it, is optimised and
 becomes machine code; it alone is kept on disk.
 
+A symbol is named after its function and the types of its arguments. Numba names a record type by a number that counts
+the types of the process: machine code made in two processes, for two records of the same number, would have the same
+names in it, and a third process that loads both from disk would run the parts of one in the other. Here a digest of the
+types is part of each name.
+
 `pipeline_class` is Numba's documented way to have a function compiled otherwise; what is not public of Numba here is
 `JITCodeLibrary`, the IR of one function with the libraries that it calls.
 """
 
 from __future__ import annotations
+
+import hashlib
 
 from numba import _dynfunc
 from numba.core.codegen import CodeLibrary, JITCodeLibrary
@@ -53,10 +60,16 @@ class _Flags(Flags):
     """Flags of a compilation that are equal when the same ones are set alike.
 
     Numba looks them up for each subscript it types; comparing the two dozen that are not set took a fifth of all time.
+    What it puts into the names of symbols for them also tells the types of the arguments.
     """
+
+    types = ""
 
     def values(self):
         return self._values
+
+    def get_mangle_string(self):
+        return super().get_mangle_string() + self.types
 
 
 class _WholeCompiler(CompilerBase):
@@ -65,7 +78,9 @@ class _WholeCompiler(CompilerBase):
     library_class: type[JITCodeLibrary] = _WholeLibrary
 
     def __init__(self, typingctx, targetctx, library, args, return_type, flags, local_types):
-        super().__init__(typingctx, targetctx, library, args, return_type, _Flags(flags), local_types)
+        flags = _Flags(flags)
+        flags.types = hashlib.sha256(str(args).encode()).hexdigest()[:16]
+        super().__init__(typingctx, targetctx, library, args, return_type, flags, local_types)
         self.state.flags.no_cfunc_wrapper = True
 
     def define_pipelines(self):

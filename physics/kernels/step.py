@@ -21,9 +21,10 @@ import math
 from physics.kernels import layout as at
 from physics.kernels import quaternion as qt
 from physics.kernels.body import angular_velocity, bind_body, is_finite, read_state, write_state
+from physics.kernels.clearance import clear_substeps
 from physics.kernels.compiler import inlined, kernel
 from physics.kernels.compliance import lift_to_due, stiffness
-from physics.kernels.contact import gap_of, gather, has_passed, is_clear, nearest_outside_set, push_out
+from physics.kernels.contact import gap_of, gather, has_passed, nearest_outside_set, push_out
 from physics.kernels.fields.loads import (
     bind_fields,
     hold_contact_loads,
@@ -36,6 +37,7 @@ from physics.kernels.flight import fly, fly_by_scheme
 from physics.kernels.laws import bind_laws
 from physics.kernels.quaternion import to_matrix
 from physics.kernels.restraint import kinetic_energy
+from physics.kernels.sleep import falls_asleep, laid_down, sleeps_on
 from physics.kernels.stages import impact, store_warm_start, touch
 
 # Trials of one time of impact: a secant, then parabolas through the last three. Three are usual.
@@ -201,11 +203,13 @@ def substep(y, h, friction, smooth, gyroscopic, tilted, pivots, scheme, memory, 
 @kernel
 def step_worlds(
     first, last, steps, substeps, h, state, params, shapes, gravity, wrench, contact, friction, smooth, restitution,
-    gyroscopic, tilted, pivots, scheme, memory, report, scratch,
+    gyroscopic, tilted, pivots, scheme, sleep, memory, report, scratch,
 ):  # fmt: skip
     """Advance the worlds first <= world < last by `steps` steps of `substeps` substeps of h seconds each.
 
-    A body whose new state is not finite keeps the old one, and its world's report counts the fault.
+    A body in flight looks for walls only when it could be near one (`clearance`), one that sleeps for nothing (`sleep`,
+    None where the scene does not declare it). A body whose new state is not finite keeps the old one, and its world's
+    report counts the fault.
     """
     work = scratch[0]
     bodies = shapes.shape[0]
@@ -214,23 +218,31 @@ def step_worlds(
             report[world, c] = 0.0
         for b in range(bodies):
             i = world * bodies + b
+            if sleep is not None and sleeps_on(i, wrench, sleep):
+                continue
             bind_body(world, i, shapes[b], params, gravity, wrench, friction, restitution, tilted, work)
             bind_fields(params, i, work)
             bind_laws(params, i, work)
-            y = read_state(state, i)
+            y, clear = read_state(state, i), 0
             for k in range(steps * substeps):
                 set_clock(k * h, work)
                 hold_loads(y, h, gyroscopic, tilted, work)
-                if contact is not None and not is_clear(y[0], y[2], h, work):
+                if contact is not None and clear == 0:
+                    clear = clear_substeps(y[0], y[2], h, steps * substeps - k, work)
+                    if clear > 0:
+                        forget_contacts(memory, i, work)
+                if contact is not None and clear == 0:
                     new = substep(y, h, friction, smooth, gyroscopic, tilted, pivots, scheme, memory, report, work)
                 else:
-                    if contact is not None:
-                        forget_contacts(memory, i, work)
+                    clear -= 1
                     new = coast(y, h, gyroscopic, tilted, scheme, work)
                 if not is_finite(new):
                     report[world, at.FAULTS] += 1.0
                     break
                 y = new
+                if sleep is not None and falls_asleep(i, y, h, work, sleep):
+                    y = laid_down(y)
+                    break
             write_state(state, i, y)
             w = angular_velocity(y[1], y[3], work, tilted)
             state[i, at.ANGVEL], state[i, at.ANGVEL + 1], state[i, at.ANGVEL + 2] = w

@@ -75,6 +75,12 @@ def _touching(kind: type) -> tuple[physics.Scene, physics.Scene]:
     return scene, physics.Scene(scene.bodies, scene.walls, without)
 
 
+def _resting() -> tuple[physics.Scene, physics.Scene]:
+    """The block at rest, which sleeps after a second and a half, and one that never does."""
+    scene = scenes.rest()
+    return physics.Scene(scene.bodies, scene.walls, [*scene.effects, physics.Sleeping()]), scene
+
+
 CASES: dict[str, Callable[[], tuple[physics.Scene, physics.Scene]]] = {
     "gravity": lambda: _case(GRAVITY),
     "contact": lambda: _touching(physics.Contact),
@@ -93,6 +99,7 @@ CASES: dict[str, Callable[[], tuple[physics.Scene, physics.Scene]]] = {
     "compliance": _soft,
     "rolling friction": lambda: _case(physics.RollingFriction(), *TOUCH, bodies=[BALL], walls=[FLOOR]),
     "spin friction": lambda: _case(physics.SpinFriction(), *TOUCH, bodies=[BALL], walls=[FLOOR]),
+    "sleeping": _resting,
     "actuator": lambda: _case(physics.Actuator(limit_force=1.0, lag=0.1), GRAVITY),
 }
 
@@ -109,6 +116,11 @@ class Steps:
         with Stopwatch() as watch:
             self.world.step(steps=self.steps)
         return self.steps / watch.seconds
+
+
+def bytes_per_body(world: physics.World) -> int:
+    """Bytes of parameters, and of what is kept of its sleep, that a world stores per body."""
+    return (world.params.nbytes + world.sleep.nbytes) // (world.worlds * world.body_count)
 
 
 def run_count(repeats: int) -> int:
@@ -128,7 +140,7 @@ def effect_row(name: str, accuracy: str, steps: int, repeats: int, tick: Callabl
     runners = {key: Steps(scene, accuracy, steps) for key, scene in zip((ON, OFF), CASES[name]())}
     told = None if tick is None else lambda key: tick(f"{name}: {key}")
     spreads = interleave(runners, repeats, told)
-    stored = {key: runner.world.params.shape[1] * runner.world.params.itemsize for key, runner in runners.items()}
+    stored = {key: bytes_per_body(runner.world) for key, runner in runners.items()}
     added = 1e9 / spreads[ON].median - 1e9 / spreads[OFF].median
     return Row(
         key=name, what=name, unit="steps/s", ours=spreads[ON], accuracy=accuracy, peer_name="the scene without it",

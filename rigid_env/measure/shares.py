@@ -52,7 +52,7 @@ class Share:
 def without(scene: physics.Scene, effect) -> physics.Scene:
     """The scene without one of its effects, and without those that need it."""
     left = [other for other in scene.effects if other is not effect]
-    needs_contact = (physics.Friction, physics.RollingFriction, physics.SpinFriction)
+    needs_contact = (physics.Friction, physics.RollingFriction, physics.SpinFriction, physics.Sleeping)
     if isinstance(effect, physics.Contact):
         left = [other for other in left if not isinstance(other, needs_contact)]
     if isinstance(effect, physics.Friction):
@@ -74,12 +74,14 @@ def acted_shares(world: physics.World, others: list[physics.World], steps: int) 
     acted = np.zeros(len(others))
     for _ in range(steps):
         before, time = world.state.copy(), world.time
-        memory = world.memory.copy()
+        memory, sleep = world.memory.copy(), world.sleep.copy()
         world.step()
         for k, other in enumerate(others):
             other.state[...] = before
             other.time = time
             other.memory[...] = memory if other.memory.shape == memory.shape else 0.0
+            if other.sleep.shape == sleep.shape:
+                other.sleep[...] = sleep
             other.step()
             acted[k] += not np.array_equal(other.state, world.state)
     return (acted / steps).tolist()

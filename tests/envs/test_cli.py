@@ -13,6 +13,7 @@ import physics
 import rigid_env.warmup
 from physics import scenes
 from physics.fields import FIELDS
+from physics.kernels.sleep import SLEEP_SIZE
 from rigid_env.cli import app
 from rigid_env.measure import effects as costs
 from rigid_env.measure.shares import names_of, without
@@ -186,16 +187,16 @@ def test_explain_measures_when_effects_act_and_what_time_they_take(tmp_path):
 def test_an_effect_is_left_out_with_what_needs_it():
     effects = [
         physics.Gravity(), physics.Contact(0.5, tangential=0.2), physics.Friction(), physics.RollingFriction(),
-        physics.Drag(), physics.Wind(), physics.Spring(other=1), physics.Spring(),
+        physics.Drag(), physics.Wind(), physics.Spring(other=1), physics.Spring(), physics.Sleeping(),
     ]  # fmt: skip
     bodies = [physics.Sphere(1, 1), physics.Sphere(1, 1, pos=(5, 0, 0))]
     scene = physics.Scene(bodies, effects=effects)
-    assert names_of(scene)[-3:] == ["Wind", "Spring 1", "Spring 2"]
+    assert names_of(scene)[-4:] == ["Wind", "Spring 1", "Spring 2", "Sleeping"]
     assert [type(e).__name__ for e in without(scene, effects[1]).effects] == [
         "Gravity", "Drag", "Wind", "Spring", "Spring",
     ]  # fmt: skip
     assert without(scene, effects[2]).effect(physics.Contact) == physics.Contact(0.5)
-    assert without(scene, effects[6]).effects == (*effects[:6], effects[7])
+    assert without(scene, effects[6]).effects == (*effects[:6], *effects[7:])
     airy = physics.Scene(bodies, effects=[physics.Drag(), physics.Wind()])
     assert without(airy, airy.effects[0]).effects == ()
 
@@ -315,7 +316,8 @@ def test_effects_measures_every_effect_with_and_without(tmp_path):
     run("effects", "--quick", "--json", path, "--markdown", page)
     rows = {row["key"]: row for row in loaded(path)["rows"]}
     kinds = {kind.__name__.lower() for kind in (physics.Gravity, physics.Contact, physics.Friction, *FIELDS)}
-    kinds |= {"rollingfriction", "spinfriction", "actuator", "tangentialrestitution", "springbetweenbodies"}
+    kinds |= {"rollingfriction", "spinfriction", "actuator", "sleeping", "tangentialrestitution"}
+    kinds |= {"springbetweenbodies"}
     assert {name.replace(" ", "") for name in rows} == kinds | {"gusts"}
     for row in rows.values():
         assert row["ours"]["min"] > 0
@@ -326,6 +328,7 @@ def test_effects_measures_every_effect_with_and_without(tmp_path):
     assert (stored["gravity"], stored["contact"], stored["drag"], stored["spring"]) == (0, 0, 16, 72)
     names = "spring between bodies", "tangential restitution", "rolling friction", "spin friction", "actuator"
     assert [stored[name] for name in names] == [128, 8, 8, 8, 0]
+    assert stored["sleeping"] == 8 * SLEEP_SIZE
     text = page.read_text()
     assert text.startswith(f"before\n{begin}\n")
     assert text.endswith(f"{end}\nafter\n")

@@ -110,3 +110,41 @@ def test_a_contact_plan_is_optimised_once_and_compiled_once_for_all_processes(tm
     assert second["optimised"] == {}
     assert second["lowered"] == {}
     assert second["ends"] == first["ends"]
+
+
+RECORDS = """
+import sys
+import numpy as np
+from physics.kernels.compiler import kernel
+
+@kernel
+def total(row):
+    s = 0.0
+    for k in range(row.numbers.shape[0]):
+        s += row.numbers[k]
+    return s
+
+@kernel
+def totals(rows):
+    return total(rows[0])
+
+count = int(sys.argv[1])
+rows = np.zeros(1, [("numbers", float, (count,))])
+rows["numbers"] = 1.0
+assert totals(rows) == count
+(part,) = total._part.overloads.values()
+print(part.fndesc.mangled_name)
+"""
+
+
+def test_a_symbol_names_the_content_of_a_record_type(tmp_path):
+    """Numba numbers record types process by process and names symbols by that number: parts made by two processes had
+    the same name, and in a third one, which loaded both from disk, a block on an edge stayed where it was."""
+    program = tmp_path / "records.py"
+    program.write_text(RECORDS)
+    environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path), "PYTHONPATH": str(Path(__file__).parents[2])}
+    names = set()
+    for count in ("2", "3"):
+        command = [sys.executable, program, count]
+        names.add(subprocess.run(command, env=environment, capture_output=True, text=True, check=True).stdout)
+    assert len(names) == 2

@@ -24,6 +24,7 @@ EVERYTHING = physics.Scene(
     [
         physics.Gravity((0.1, -9.81, 0)), physics.Contact(0.3, tangential=-0.2), physics.Friction(0.7),
         physics.RollingFriction(0.02), physics.SpinFriction(0.003), physics.Actuator(5.0, lag=0.1, delay=0.02),
+        physics.Sleeping(8.0, time=0.5),
         physics.Drag(0.4, linear=0.1),
         physics.AngularDrag(0.1, 0.2), physics.Magnus(0.9), physics.Wind((1, 2, 3), 0.5, seed=7),
         physics.Buoyancy(998.0, (0.1, 1, 0)), physics.Spring((1, 2, 3), body=1), physics.Spring(damping=3.0, body=2),

@@ -19,6 +19,7 @@ from physics.kernels.fields.spring import DAMPING, LENGTH, STIFFNESS, stretch
 from physics.kernels.fields.state import ZERO, acting_at, minus, plus, times, velocity_at
 from physics.kernels.fields.terms import LOAD, instances
 from physics.kernels.flight import drift
+from physics.kernels.many.islands import join
 
 # Columns: those of a spring, whose anchor is the other body's point now, and after them
 ANCHOR = 3
@@ -159,6 +160,16 @@ def hold_linked_loads(first, count, h, gyroscopic, tilted, world):
 def place_anchors(first, count, tilted, world):
     """Put the anchors of all springs where the bodies' `middle` says."""
     _put_anchors(first, count, tilted, world.bodies)
+
+
+@_if_linked(lambda arguments: _record(arguments[-1]), None)
+def join_linked(first, count, parent, world):
+    """Make one island of any two bodies that a spring ties together, in what leads to the first body of each."""
+    for b in range(world.bodies.shape[0]):
+        columns = world.bodies[b].columns
+        for k in range(first, first + SIZE * count, SIZE):
+            if columns[k + OTHER] >= 0.0:
+                join(b, int(columns[k + OTHER]), parent)
 
 
 @inlined

@@ -29,6 +29,7 @@ from physics.kernels.many.contacts import (
 from physics.kernels.many.place import place_body
 from physics.kernels.many.settle import settle, settle_smoothly
 from physics.kernels.many.thrift import keep_loaded, note_loaded, stage_has_gained, take_stage_back, turn_loaded
+from physics.kernels.sleep import sleeps
 from physics.kernels.stages import STILL_SHARE
 from physics.kernels.step import coast
 
@@ -112,11 +113,13 @@ def still_speed(h, many):
 
 
 @kernel
-def glide(n, world, h, friction, gyroscopic, tilted, scheme, memory, report, many):
+def glide(n, world, h, friction, gyroscopic, tilted, scheme, sleep, memory, report, many):
     """Every body after h: exact flight, or Moreau's midpoint step with the n contacts of the set."""
-    half = 0.5 * h
+    half, first = 0.5 * h, world * many.now.shape[0]
     hold_all_loads(h, gyroscopic, tilted, many)
     for b in range(many.now.shape[0]):
+        if sleeps(first + b, sleep):
+            continue
         if many.touched[b] == 0:
             write_state(many.now, b, coast(read_state(many.now, b), h, gyroscopic, tilted, scheme, many.bodies[b]))
             continue
@@ -125,7 +128,7 @@ def glide(n, world, h, friction, gyroscopic, tilted, scheme, memory, report, man
         _, q, _, L = read_state(many.now, b)
         put(many.twist, b, 3, angular_velocity(q, L, many.bodies[b], tilted))
     if n == 0:
-        kept.forget(world, memory)
+        kept.forget_awake(world, h, sleep, memory, many)
         return
     refresh(many)
     aim_rest(n, h, many)
@@ -148,7 +151,7 @@ def glide(n, world, h, friction, gyroscopic, tilted, scheme, memory, report, man
             take_stage_back(n, tilted, many)
             settle_smoothly(n, many)
     many.settings[0].still = math.inf
-    kept.store(n, world, h, memory, many)
+    kept.store(n, world, h, sleep, memory, many)
     for b in range(many.now.shape[0]):
         if many.touched[b] == 1:
             drift_body(b, half, gyroscopic, tilted, many)

@@ -12,12 +12,19 @@ from physics.kernels.compiler import inlined, kernel
 
 
 @inlined
-def _root(b, parent):
+def root_of(b, parent):
     """First body of the island of b."""
     while parent[b] != b:
         parent[b] = parent[parent[b]]
         b = parent[b]
     return b
+
+
+@inlined
+def join(a, b, parent):
+    """Make one island of those of a and b."""
+    a, b = root_of(a, parent), root_of(b, parent)
+    parent[max(a, b)] = min(a, b)
 
 
 @inlined
@@ -28,8 +35,7 @@ def _join(n, many):
         parent[b] = b
     for k in range(n):
         if many.ends[k, 1] >= 0:
-            a, b = _root(many.ends[k, 0], parent), _root(many.ends[k, 1], parent)
-            parent[max(a, b)] = min(a, b)
+            join(many.ends[k, 0], many.ends[k, 1], parent)
 
 
 @inlined
@@ -39,7 +45,7 @@ def _list_contacts(n, many):
     for b in range(island.shape[0]):
         island[b] = -1
     for k in range(n):
-        root = _root(many.ends[k, 0], parent)
+        root = root_of(many.ends[k, 0], parent)
         if island[root] < 0:
             island[root], begin[count] = count, 0
             count += 1
@@ -48,7 +54,7 @@ def _list_contacts(n, many):
     for i in range(count):
         total, begin[i] = total + begin[i], total
     for k in range(n):
-        i = island[_root(many.ends[k, 0], parent)]
+        i = island[root_of(many.ends[k, 0], parent)]
         many.queue[begin[i]] = k
         begin[i] += 1
     for i in range(count, 0, -1):
@@ -64,7 +70,7 @@ def _list_bodies(count, many):
     for i in range(count + 1):
         begin[i] = 0
     for b in range(island.shape[0]):
-        island[b] = island[_root(b, many.parent)]  # the root comes first
+        island[b] = island[root_of(b, many.parent)]  # the root comes first
         if island[b] >= 0:
             begin[island[b]] += 1
     for i in range(count):

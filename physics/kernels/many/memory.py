@@ -20,6 +20,7 @@ from physics.kernels.many.arrays import (
     STAGE_LENGTH,
 )
 from physics.kernels.many.contacts import matrix, plus, put, vector
+from physics.kernels.sleep import sleeps
 
 
 @inlined
@@ -83,12 +84,31 @@ def load(n, world, h, friction, memory, many):
     _clear_names(world, memory, table)
 
 
+@inlined
+def _keep_sleeping(world, h, sleep, memory, many):
+    """Move the contacts of what sleeps to the front, their impulses as of a stage of length h: how many."""
+    if sleep is None:
+        return 0
+    first, count, length = world * many.now.shape[0], 0, memory[world, STAGE_LENGTH]
+    for k in range(int(memory[world, CONTACT_COUNT])):
+        row, to = _row(k), _row(count)
+        if sleeps(first + int(memory[world, row + FIRST]), sleep):
+            for c in range(MEMORY_SIZE):
+                memory[world, to + c] = memory[world, row + c]
+            for c in range(3):
+                memory[world, to + IMPULSE + c] *= h / length
+            count += 1
+    return count
+
+
 @kernel
-def store(n, world, h, memory, many):
-    """Keep the n contacts of this stage, which took h."""
-    memory[world, STAGE_LENGTH], memory[world, CONTACT_COUNT] = h, n
+def store(n, world, h, sleep, memory, many):
+    """Keep the n contacts of this stage, which took h, and those of what sleeps, as far as there is room."""
+    before = _keep_sleeping(world, h, sleep, memory, many)
+    n = min(n, many.gap.shape[0] - before)
+    memory[world, STAGE_LENGTH], memory[world, CONTACT_COUNT] = h, before + n
     for k in range(n):
-        row, a = _row(k), many.ends[k, 0]
+        row, a = _row(before + k), many.ends[k, 0]
         memory[world, row + NAME] = many.name[k]
         memory[world, row + FIRST], memory[world, row + SECOND] = many.ends[k, 0], many.ends[k, 1]
         p = qt.transposed_matvec(matrix(many.frame, k), vector(many.impulse, k, 0))
@@ -100,6 +120,15 @@ def store(n, world, h, memory, many):
 def forget(world, memory):
     """Nothing touches any more."""
     memory[world, STAGE_LENGTH] = memory[world, CONTACT_COUNT] = 0.0
+
+
+@inlined
+def forget_awake(world, h, sleep, memory, many):
+    """Nothing touches any more but what sleeps, in a stage that took h."""
+    if sleep is None:
+        forget(world, memory)
+    else:
+        store(0, world, h, sleep, memory, many)
 
 
 @inlined

@@ -10,6 +10,9 @@ A substep of a world is, until its time is used up:
              the contact problem of all of them at the middle, half a free drift;
 5. apart     what still overlaps is pushed apart, positions only (`apart`).
 
+Where the scene declares it, what has been at rest for long enough then falls asleep and takes part in none of this, but
+for the broad phase, until something wakes it (`sleep`).
+
 The stages are those of `physics.kernels.step`, for a whole world where that has one body.
 """
 
@@ -25,6 +28,7 @@ from physics.kernels.many.arrays import CONTACTS, LEFT_OUT
 from physics.kernels.many.contacts import put
 from physics.kernels.many.glide import glide, hold_all_loads
 from physics.kernels.many.place import place_bodies
+from physics.kernels.many.sleep import all_sleep, doze, sleep_on, wake_world
 from physics.kernels.many.strike import strike
 from physics.kernels.many.touch import find_contacts
 
@@ -53,14 +57,14 @@ def mark_touched(n, many):
 
 
 @kernel
-def substep_world(world, h, friction, gyroscopic, tilted, ellipsoids, scheme, memory, report, many):
+def substep_world(world, h, friction, gyroscopic, tilted, ellipsoids, scheme, sleep, memory, report, many):
     """Advance the bodies of one world by h: the stages of the module's list."""
     left, impacts = h, 0
     for cut in range(CUTS_PER_IMPACT * many.settings[0].splits + 1):
         is_last = impacts >= many.settings[0].splits or cut == CUTS_PER_IMPACT * many.settings[0].splits
         hold_all_loads(left, gyroscopic, tilted, many)
         place_bodies(tilted, many)
-        find_contacts(left, ellipsoids, many)
+        find_contacts(left, ellipsoids, world, sleep, many)
         n = many.counts[CONTACTS]
         note_depth(n, world, report, many)
         n, t, is_impact = strike(n, world, left, is_last, friction, tilted, report, many)
@@ -73,7 +77,7 @@ def substep_world(world, h, friction, gyroscopic, tilted, ellipsoids, scheme, me
             report[world, at.UNRESOLVED] += 1.0
         if t < left:
             report[world, at.SPLITS] += 1.0
-        glide(n, world, t, friction, gyroscopic, tilted, scheme, memory, report, many)
+        glide(n, world, t, friction, gyroscopic, tilted, scheme, sleep, memory, report, many)
         left -= t
         for b in range(many.now.shape[0]):
             pass_time(t, many.bodies[b])
@@ -95,7 +99,7 @@ def world_is_finite(many):
 @kernel
 def step_many(
     first, last, steps, substeps, h, state, params, shapes, gravity, wrench, friction, restitution, gyroscopic,
-    tilted, ellipsoids, scheme, memory, report, many,
+    tilted, ellipsoids, scheme, sleep, memory, report, many,
 ):  # fmt: skip
     """Advance the worlds first <= world < last by `steps` steps of `substeps` substeps of h seconds each.
 
@@ -105,6 +109,8 @@ def step_many(
     for world in range(first, last):
         for c in range(at.REPORT_SIZE):
             report[world, c] = 0.0
+        if sleep is not None and sleep_on(world, bodies, wrench, sleep):
+            continue
         for b in range(bodies):
             i = world * bodies + b
             bind_body(world, i, shapes[b], params, gravity, wrench, friction, restitution, tilted, many.bodies[b])
@@ -115,13 +121,18 @@ def step_many(
         for k in range(steps * substeps):
             for b in range(bodies):
                 set_clock(k * h, many.bodies[b])
-            substep_world(world, h, friction, gyroscopic, tilted, ellipsoids, scheme, memory, report, many)
+            substep_world(world, h, friction, gyroscopic, tilted, ellipsoids, scheme, sleep, memory, report, many)
             if not world_is_finite(many):
                 report[world, at.FAULTS] += 1.0
                 kept.forget(world, memory)
+                wake_world(world, bodies, sleep)
                 break
+            if sleep is not None:
+                doze(world, h, sleep, many)
             for b in range(bodies):
                 write_state(state, world * bodies + b, read_state(many.now, b))
+            if sleep is not None and all_sleep(world, bodies, sleep):
+                break
         for b in range(bodies):
             i = world * bodies + b
             _, q, _, L = read_state(state, i)

@@ -13,6 +13,8 @@ from physics.kernels.many.block_block import touch_blocks
 from physics.kernels.many.contacts import matrix, minus, pair_slop, plus, record, vector
 from physics.kernels.many.near import find_pairs, reach
 from physics.kernels.many.rounds import block_point, direction_between, point_of, squares_of, start_from
+from physics.kernels.many.sleep import wake_near
+from physics.kernels.sleep import sleeps
 
 
 @kernel
@@ -129,23 +131,30 @@ def touch_ellipsoid(a, b, margin, h, many):
 
 
 @kernel
-def find_contacts(h, ellipsoids, many):
+def find_contacts(h, ellipsoids, world, sleep, many):
     """Write the contact set of the bodies where they are, for a stage of length h.
 
-    `ellipsoids` is None where the scene has none.
+    `ellipsoids` is None where the scene has none, `sleep` where it does not declare it. What sleeps and comes near
+    nothing is left out.
     """
-    many.counts[CONTACTS] = 0
+    many.counts[CONTACTS] = many.counts[PAIRS] = 0
     bodies = many.bodies
+    first_row = world * bodies.shape[0]
+    if many.settings[0].meet == 1:
+        find_pairs(h, many)
+    if sleep is not None:
+        wake_near(world, sleep, many)
     for b in range(bodies.shape[0]):
         many.touched[b] = 0
+        if sleeps(first_row + b, sleep):
+            continue
         margin = reach(b, h, many) + bodies[b].slop
         for wall in range(many.walls.shape[0]):
             touch_wall(b, wall, margin, h, many)
-    many.counts[PAIRS] = 0
-    if many.settings[0].meet == 1:
-        find_pairs(h, many)
     for k in range(many.counts[PAIRS]):
         a, b = many.pairs[k, 0], many.pairs[k, 1]
+        if sleeps(first_row + a, sleep):
+            continue  # and so does b: `wake_near`
         margin = reach(a, h, many) + reach(b, h, many) + pair_slop(a, b, many)
         first, second = bodies[a].shape, bodies[b].shape
         if ellipsoids is not None:  # noqa: SIM102 (a branch of its own is what the compiler prunes)
