@@ -11,8 +11,9 @@ import numpy as np
 from physics import checks, parameters
 from physics.effects import RESISTANCES
 from physics.field import Field, FieldSlot, write_columns
+from physics.gaps import wall_gaps
 from physics.kernels import layout as at
-from physics.kernels.probe import angular_momenta, deepest_gaps
+from physics.kernels.probe import angular_momenta
 
 if TYPE_CHECKING:
     from physics.world import World
@@ -90,8 +91,7 @@ def check_depth(world: World, state: np.ndarray, params: np.ndarray, chosen: np.
     """
     if not world.plan.contact:
         return
-    gaps, which = np.empty(len(state)), np.empty(len(state), np.int64)
-    deepest_gaps(np.arange(len(state)), state, params, world.shapes, world.walls, gaps, which)
+    gaps, which = wall_gaps(world, state, params)
     bad = np.flatnonzero(gaps < -START_DEPTH * params[:, at.RADIUS])
     if len(bad):
         k = int(bad[0])
