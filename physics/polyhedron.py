@@ -87,8 +87,8 @@ def convex_hull(points: tuple[tuple[float, float, float], ...]) -> Polyhedron:
     Raises
     ------
     ValueError
-        Saying what of `points` is not allowed: fewer than four, all within `COPLANAR` of a plane, more than
-        `MOST_CORNERS` corners.
+        Saying what of `points` is not allowed: fewer than four, all within `COPLANAR` of a plane, or so near to a line
+        that the moment of inertia about it is rounding, more than `MOST_CORNERS` corners.
     """
     if len(points) < 4:
         raise ValueError(f"points has {len(points)} of them; allowed are at least 4, not all in one plane")
@@ -105,11 +105,20 @@ def convex_hull(points: tuple[tuple[float, float, float], ...]) -> Polyhedron:
     centroid = _without_noise(first / volume, np.abs(about).max())
     about = about - centroid
     volume, _, second = _moments(about, loops)
-    second = _without_noise(second / volume, np.abs(second / volume).max())
+    second = _second_moment(second / volume)
     return Polyhedron(
         _without_noise(middle + scale * centroid, size), scale * about, _normals(about, loops), loops,
         _edges(loops), scale**3 * volume, scale**2 * second,
     )  # fmt: skip
+
+
+def _second_moment(found: np.ndarray) -> np.ndarray:
+    """The mean of r rᵀ, diagonal where it is to rounding, of a body that has a moment of inertia about every axis."""
+    size = np.abs(found).max()
+    found = np.where(np.eye(3, dtype=bool), found, _without_noise(found, size))
+    if not np.linalg.eigvalsh(np.trace(found) * np.eye(3) - found)[0] > ROUNDING * size:
+        raise ValueError("points lie on one line, or nearly; allowed are points that span a volume")
+    return found
 
 
 def _without_noise(values: np.ndarray, size: float) -> np.ndarray:

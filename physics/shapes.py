@@ -192,7 +192,7 @@ class Hull(Body):
     Raises
     ------
     ValueError
-        Fewer than four points, all in one plane (within 1e-9 of the size), or a hull of more than
+        Fewer than four points, all in one plane (within 1e-9 of the size) or nearly on a line, or a hull of more than
         `polyhedron.MOST_CORNERS` corners.
     """
 

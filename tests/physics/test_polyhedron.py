@@ -124,6 +124,7 @@ def on_sphere(count):
         (CUBE[:4], "points lie in one plane"),
         (np.tile(CUBE[0], (5, 1)), "points lie in one plane"),
         (CUBE * (1, 1, 1e-10), "points lie in one plane"),
+        (CUBE * (1, 1e-8, 1e-8), "points lie on one line"),
         (CUBE[:, :2], r"points has shape \(8, 2\)"),
         (np.where(CUBE > 0, np.nan, CUBE), "(?s)points is .*allowed are finite numbers"),
         ([(1, 2, 3), (1, 2)], "points is .*allowed are rows of 3 numbers"),
@@ -135,6 +136,11 @@ def on_sphere(count):
 def test_what_is_no_hull_is_refused(points, message):
     with pytest.raises(ValueError, match=message):
         hull(points)
+
+
+def test_a_thin_plate_has_the_moments_of_one():
+    body = physics.Hull(CUBE * (1, 1, 1e-7), 12.0)
+    np.testing.assert_allclose(np.diag(body.inertia), (1.0, 1.0, 2.0), rtol=1e-12)
 
 
 def test_as_many_corners_as_allowed_are():
