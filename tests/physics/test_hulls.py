@@ -11,7 +11,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import physics
+from physics.frontier_errors import deepest_penetration
 from physics.report import Status
+from physics.resting import resting_contact
 from physics.scene_file import from_toml, to_toml
 from tests.reference.polyhedra import prism
 
@@ -300,6 +302,8 @@ def test_gaps_to_walls_are_those_of_its_corners():
     assert physics.diagnose(world).gap[0, 0] == pytest.approx(lowest, abs=1e-14)
     deep = world.pos.copy()
     deep[:, 0, 1] -= lowest + 0.1
+    sampled = deepest_penetration(world.scene, deep, world.quat)
+    assert sampled == pytest.approx(0.1, abs=1e-13)
     with pytest.raises(ValueError, match=r"of body 0 in world 0 is 0.1 m inside walls\[0\]"):
         world.set_state(pos=deep)
 
@@ -336,3 +340,5 @@ def test_what_is_not_known_of_hulls_is_refused():
     with pytest.raises(ValueError, match="without hulls"):
         physics.World(physics.Scene([hull], [FLOOR], [physics.Contact(tangential=0.5), physics.Friction(0.5)]))
     physics.World(physics.Scene([hull], [FLOOR], [*laws, physics.AngularDrag(0.1)]))  # needs no shape
+    with pytest.raises(ValueError, match="body is 0, a hull; allowed are blocks, spheres and ellipsoids"):
+        resting_contact(physics.World(physics.Scene([hull], [FLOOR], [physics.Gravity()])))
