@@ -30,7 +30,7 @@ from physics.kernels.many.hulls import (
     LAST_FACE,
     LEFT,
     RIGHT,
-)  # fmt: skip
+)
 
 # Names: ((body of the pair, face) * 128 + edge in) * 128 + edge out (see `hull_clip.SIDES`); then pairs of edges. A
 # polyhedron of 64 corners has at most 124 faces and 186 edges (Euler's formula).

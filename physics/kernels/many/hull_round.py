@@ -17,7 +17,7 @@ from physics.kernels.many.hulls import (
     LAST_CORNER,
     LAST_EDGE,
     LAST_FACE,
-)  # fmt: skip
+)
 from physics.kernels.many.rounds import direction_between, nearest_in_block, point_of, squares_of, turned_back
 
 NO_SQUARES = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
