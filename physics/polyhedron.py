@@ -80,7 +80,7 @@ class Polyhedron:
         return mass * (np.trace(S) * np.eye(3) - S)
 
 
-@lru_cache(maxsize=256)
+@lru_cache(maxsize=4096)
 def convex_hull(points: tuple[tuple[float, float, float], ...]) -> Polyhedron:
     """The polyhedron of finite points.
 
