@@ -24,7 +24,7 @@ from physics.recording import Recording, Replay
 from physics.report import Solver, Status, StepReport
 from physics.scene import HalfSpace, Scene, corner, three_walls
 from physics.scene_file import load_scene, save_scene
-from physics.shapes import Block, Body, Ellipsoid, Sphere
+from physics.shapes import Block, Body, Ellipsoid, Hull, Sphere
 from physics.stepper import Stepper
 from physics.trajectory import Event, Trajectory, simulate
 from physics.world import Snapshot, World
@@ -49,6 +49,7 @@ __all__ = [
     "FrontierPoint",
     "Gravity",
     "HalfSpace",
+    "Hull",
     "Magnus",
     "Push",
     "Recorder",

@@ -11,9 +11,10 @@ import numpy as np
 from physics import checks, parameters
 from physics.effects import RESISTANCES, Friction
 from physics.field import Field, FieldSlot, write_columns
+from physics.gaps import wall_gaps
 from physics.kernels import layout as at
 from physics.kernels.laws import STIFFNESS
-from physics.kernels.probe import angular_momenta, deepest_gaps
+from physics.kernels.probe import angular_momenta
 
 if TYPE_CHECKING:
     from physics.world import World
@@ -97,8 +98,7 @@ def check_depth(world: World, state: np.ndarray, params: np.ndarray, chosen: np.
     """
     if not world.plan.contact:
         return
-    gaps, which = np.empty(len(state)), np.empty(len(state), np.int64)
-    deepest_gaps(np.arange(len(state)), state, params, world.shapes, world.walls, gaps, which)
+    gaps, which = wall_gaps(world, state, params)
     allowed = (SOFT_DEPTH if STIFFNESS in world.plan.laws else START_DEPTH) * params[:, at.RADIUS]
     bad = np.flatnonzero(gaps < -allowed)
     if len(bad):

@@ -27,6 +27,15 @@ def finite(value: ArrayLike, shape: tuple[int, ...], field: str) -> np.ndarray:
     return array
 
 
+def rows(value: ArrayLike, width: int, field: str) -> np.ndarray:
+    """`value` as a finite float64 array of any number of rows of `width`."""
+    try:
+        count = len(np.asarray(value, dtype=np.float64))
+    except (TypeError, ValueError):
+        raise ValueError(f"{field} is {value!r}; allowed are rows of {width} numbers") from None
+    return finite(value, (count, width), field)
+
+
 def number(value: float, field: str) -> float:
     """A finite float."""
     return float(finite(value, (), field))

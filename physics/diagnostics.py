@@ -6,10 +6,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from physics.gaps import wall_gaps
 from physics.kernels import layout as at
 from physics.kernels.fields.probe import look_at_fields
 from physics.kernels.laws import STIFFNESS
-from physics.kernels.probe import deepest_gaps, spring_energies
+from physics.kernels.probe import spring_energies
 from physics.kernels.workspace import body_records
 from physics.world import World
 
@@ -40,8 +41,7 @@ def diagnose(world: World) -> Diagnostics:
     mass = 1.0 / world.params[:, at.INV_MASS].reshape(shape)
     angular = world.state[:, at.ANGMOM : at.ANGMOM + 3].reshape(*shape, 3)
     momentum = mass[..., None] * world.linvel
-    gaps, which = np.empty(len(world.state)), np.empty(len(world.state), np.int64)
-    deepest_gaps(np.arange(len(world.state)), world.state, world.params, world.shapes, world.walls, gaps, which)
+    gaps, which = wall_gaps(world, world.state, world.params)
     potential = -mass * np.sum(world.gravity[:, None, :] * world.pos, axis=-1)
     if world.plan.fields:
         potential += look_at(world)[1].reshape(shape)

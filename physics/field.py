@@ -50,6 +50,8 @@ class Field:
         Whether `function` gives the velocity of the air (a tuple of three) instead of a load.
     is_linked : bool, of the class
         Whether `function` depends on another body, too; only the built-in `Spring` between bodies knows how.
+    needs_axes : bool, of the class
+        Whether `function` makes something of the shape and the half axes in the state: a hull has none.
     """
 
     function: ClassVar = None
@@ -57,6 +59,7 @@ class Field:
     has_many: ClassVar[bool] = False
     is_air: ClassVar[bool] = False
     is_linked: ClassVar[bool] = False
+    needs_axes: ClassVar[bool] = False
 
     @property
     def kind(self) -> type:

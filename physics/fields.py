@@ -38,6 +38,7 @@ class Drag(Checked):
     linear: float = 0.0
 
     function: ClassVar = drag.drag
+    needs_axes: ClassVar = True
 
     def __post_init__(self):
         for name in ("coefficient", "density", "linear"):
@@ -96,6 +97,7 @@ class Magnus(Checked):
     density: float = AIR_DENSITY
 
     function: ClassVar = magnus.magnus
+    needs_axes: ClassVar = True
 
     def __post_init__(self):
         self._set("coefficient", checks.non_negative)
@@ -174,6 +176,7 @@ class Buoyancy(Checked):
     gravity: float = 9.81
 
     function: ClassVar = buoyancy.buoyancy
+    needs_axes: ClassVar = True
     energy: ClassVar = buoyancy.buoyancy_energy
 
     def __post_init__(self):

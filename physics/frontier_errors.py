@@ -113,13 +113,15 @@ def deepest_penetration(scene: Scene, pos, quat) -> float:
         for wall in scene.walls:
             normal = np.array(wall.normal)
             direction = np.einsum("nji,j->ni", R, normal)
-            gap = pos[:, b] @ normal + direction @ body.center - wall.offset - _support(body, direction)
+            gap = pos[:, b] @ normal + direction @ body.center - wall.offset - _support(body, -direction)
             worst = 0.0 + float(np.maximum(worst, -gap.min()))  # keeps what is not a number, no -0.0
     return worst
 
 
 def _support(body: Body, direction: np.ndarray) -> np.ndarray:
     """Extent (n,) [m] of a body from its geometric centre along `direction` (n, 3), unit vectors in its own frame."""
+    if body.kind == "hull":
+        return (direction @ body.polyhedron.vertices.T).max(axis=-1)
     scaled = direction * body.dimensions
     if body.kind == "block":
         return np.abs(scaled).sum(axis=-1)

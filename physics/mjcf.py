@@ -17,14 +17,15 @@ from physics.frontier_errors import rotation_matrices
 from physics.mjcf_reader import read_scene
 from physics.scene import Scene
 
-GEOMS = {"block": "box", "sphere": "sphere", "ellipsoid": "ellipsoid"}
+GEOMS = {"block": "box", "sphere": "sphere", "ellipsoid": "ellipsoid", "hull": "mesh"}
 KEYFRAME = "start"
 
 
 def save_mjcf(scene: Scene, path: str | Path, drop: bool = False) -> None:
     """Write a scene for MuJoCo.
 
-    Bodies with mass, inertia, pose and velocity, planes, gravity, friction and springs. The contacts are MuJoCo's soft
+    Bodies with mass, inertia, pose and velocity (hulls as meshes, which `load_mjcf` does not read), planes, gravity,
+    friction and springs. The contacts are MuJoCo's soft
     ones with its defaults, its time step too.
 
     Parameters
@@ -81,6 +82,7 @@ def to_mjcf(scene: Scene, drop: bool = False) -> str:
     ET.SubElement(root, "compiler", angle="radian")
     gravity = scene.effect(Gravity)
     ET.SubElement(root, "option", gravity=_text(gravity.acceleration if gravity else (0, 0, 0)))
+    _add_meshes(root, scene)
     world = ET.SubElement(root, "worldbody")
     surface = _surface(scene)
     for wall in scene.walls:
@@ -95,6 +97,14 @@ def to_mjcf(scene: Scene, drop: bool = False) -> str:
     _add_keyframe(root, scene)
     ET.indent(root)
     return ET.tostring(root, encoding="unicode") + "\n"
+
+
+def _add_meshes(root: ET.Element, scene: Scene) -> None:
+    """Corners of the hulls, about their centres of mass."""
+    hulls = {f"hull{b}": body for b, body in enumerate(scene.bodies) if body.kind == "hull"}
+    assets = ET.SubElement(root, "asset") if hulls else None
+    for name, body in hulls.items():
+        ET.SubElement(assets, "mesh", name=name, vertex=_text(body.polyhedron.vertices))
 
 
 def _inexpressible(scene: Scene) -> list:
@@ -126,7 +136,8 @@ def _add_body(world: ET.Element, b: int, body, contact: Contact | None, surface:
     full = _text((I[0, 0], I[1, 1], I[2, 2], I[0, 1], I[0, 2], I[1, 2]))
     ET.SubElement(element, "inertial", pos="0 0 0", mass=_text(body.mass), fullinertia=full)
     size = body.dimensions[:1] if body.kind == "sphere" else body.dimensions
-    shape = {"type": GEOMS[body.kind], "size": _text(size), "pos": _text(body.center)}
+    extent = {"mesh": f"hull{b}"} if body.kind == "hull" else {"size": _text(size)}
+    shape = {"type": GEOMS[body.kind], **extent, "pos": _text(body.center)}
     touch = {
         "contype": str(int(contact is not None)),
         "conaffinity": str(int(bool(contact and contact.between_bodies))),

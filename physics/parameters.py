@@ -12,6 +12,7 @@ from physics.inertia import check_inertia, principal_axes
 from physics.kernels import layout as at
 from physics.kernels.compiler import kernel
 from physics.kernels.laws import ANISOTROPY, DAMPING, ROLLING, SPIN, STIFFNESS, TANGENTIAL
+from physics.kernels.many.hulls import CUBE
 from physics.kernels.rotation import attitude_series
 from physics.scene import HalfSpace
 from physics.shapes import Body
@@ -43,6 +44,14 @@ def write_bodies(params: np.ndarray, bodies: tuple[Body, ...]) -> None:
             params[b :: len(bodies)], body, np.array([body.mass]), moments[None], R[None], body.dimensions[None]
         )
     _write_series(params)
+
+
+def polyhedra(bodies: tuple[Body, ...]) -> list:
+    """What `physics.kernels.many.hulls.make_hulls` reads of a scene's bodies; empty where none is a hull."""
+    if not any(body.kind == "hull" for body in bodies):
+        return []
+    blocks = {"block": CUBE}
+    return [body.polyhedron if body.kind == "hull" else blocks.get(body.kind) for body in bodies]
 
 
 def _write_body(rows, body, masses, moments, R, dimensions) -> None:
@@ -110,6 +119,8 @@ def change_inertia(params, bodies, plan, mass, size, inertia_body, shape) -> Non
         rows = slice(b, None, len(bodies))
         if body.kind == "sphere":
             _check_spheres(halves[rows])
+        if body.kind == "hull":
+            _check_hull(b, body, halves[rows])
         given = None if tensors is None else tensors[rows]
         moments, R = _principal_axes(body, masses[rows], halves[rows], given)
         _check_allowed(plan, moments, R)
@@ -124,7 +135,7 @@ def _principal_axes(body, masses, halves, tensors) -> tuple[np.ndarray, np.ndarr
         return np.array([moments for moments, _ in each]).reshape(-1, 3), np.array([R for _, R in each]).reshape(
             -1, 3, 3
         )
-    if body.inertia_body is not None:
+    if body.inertia_body is not None or body.kind == "hull":
         moments, R = principal_axes(body.inertia)
         return moments * (masses / body.mass)[:, None], R[None]
     return body.uniform_moments(halves, masses), np.eye(3)[None]
@@ -135,6 +146,15 @@ def _check_spheres(halves) -> None:
     if len(bad):
         size = (2 * halves[bad[0]]).tolist()
         raise ValueError(f"size is {size} for a sphere; allowed are three equal diameters")
+
+
+def _check_hull(b, body, halves) -> None:
+    if (halves != body.dimensions).any():
+        size = (2 * halves[(halves != body.dimensions).any(axis=1)][0]).tolist()
+        raise ValueError(
+            f"size is {size} for Scene.bodies[{b}], a hull, which has its points in all worlds; allowed is twice its "
+            f"dimensions, {(2 * body.dimensions).tolist()}"
+        )
 
 
 def _check_allowed(plan, moments, R) -> None:

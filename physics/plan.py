@@ -12,11 +12,11 @@ from physics.field import Field, FieldSlot, field_slots
 from physics.inertia import principal_axes
 from physics.kernels.fields.terms import Term
 from physics.kernels.laws import ANISOTROPY, DAMPING, LAWS, ROLLING, SPIN, STIFFNESS, TANGENTIAL
-from physics.kernels.layout import BLOCK, ELLIPSOID, SPHERE, VERTEX_COUNT
+from physics.kernels.layout import BLOCK, ELLIPSOID, HULL, SPHERE, VERTEX_COUNT
 from physics.plan_rows import Row, make_rows
 from physics.scene import Scene
 
-SHAPE_CODES = {"block": BLOCK, "sphere": SPHERE, "ellipsoid": ELLIPSOID}
+SHAPE_CODES = {"block": BLOCK, "sphere": SPHERE, "ellipsoid": ELLIPSOID, "hull": HULL}
 
 # Moments that differ by less than this share are equal to rounding: the gyroscopic torque would be noise.
 ISOTROPY_TOLERANCE = 1e-14
@@ -28,8 +28,8 @@ class Plan:
 
     `tilted` is on where the body frame of a body is not all there is to know of its mass: its principal axes are not
     its body axes, or its geometric centre is not its centre of mass. `many` is on where bodies touch each other, or
-    touch walls and are tied together by springs; `meeting` says whether they touch each other, `ellipsoids` whether
-    there are any among those. `linked` is on where
+    touch walls and are tied together by springs, or a hull touches walls; `meeting` says whether they touch each other,
+    `ellipsoids` whether there are any among those, `hulls` whether any touch anything. `linked` is on where
     they are tied together and touch nothing. `sleeping` is on where bodies may sleep. `laws` are those of
     `physics.kernels.laws`.
     """
@@ -46,6 +46,7 @@ class Plan:
     many: bool | None
     meeting: bool
     ellipsoids: bool | None
+    hulls: bool | None
     linked: bool | None
     sleeping: bool | None
     features: int
@@ -66,7 +67,7 @@ class Plan:
         """What distinguishes one compiled kernel from another."""
         return (
             self.contact, self.friction, self.restitution, self.gravity, self.gyroscopic, self.tilted,
-            self.pivots, self.scheme is None, self.events, self.many, self.ellipsoids, self.linked,
+            self.pivots, self.scheme is None, self.events, self.many, self.ellipsoids, self.hulls, self.linked,
             self.sleeping, self.features,
             *self.laws,
             *(term.marker for term in self.terms),
@@ -161,7 +162,7 @@ def _see(scene: Scene) -> _Seen:
 
 def _laws(scene: Scene, contact: Contact, friction: Friction | None) -> tuple[str, ...]:
     """The laws of `physics.kernels.laws` that act where bodies touch walls."""
-    has_round = any(body.kind != "block" for body in scene.bodies)
+    has_round = any(body.kind in ("sphere", "ellipsoid") for body in scene.bodies)
     is_on = {
         TANGENTIAL: contact.tangential is not None,
         ROLLING: has_round and scene.effect(RollingFriction) is not None,
@@ -177,9 +178,10 @@ def make_plan(scene: Scene, accuracy: Accuracy) -> Plan:
     """Decide what a scene needs at an accuracy."""
     seen, scheme = _see(scene), SCHEMES[accuracy.scheme]
     is_linked = any(slot.term.is_linked for slot in seen.fields)
-    many = seen.touching and (seen.meeting or is_linked)
+    hulls = seen.touching and _has(scene, "hull")
+    many = seen.touching and (seen.meeting or is_linked or hulls)
     if many:
-        _check_many(scene, seen.meeting, scheme)
+        _check_many(scene, seen.meeting, is_linked, scheme)
     elif seen.touching:
         _check_collisions(accuracy)
     _check_laws(scene, seen, many, scheme)
@@ -200,24 +202,36 @@ def make_plan(scene: Scene, accuracy: Accuracy) -> Plan:
         events=(scheme == EVENTS) or None,
         many=many or None,
         meeting=seen.meeting,
-        ellipsoids=(seen.meeting and any(body.kind == "ellipsoid" for body in scene.bodies)) or None,
+        ellipsoids=(seen.meeting and _has(scene, "ellipsoid")) or None,
+        hulls=hulls or None,
         linked=(is_linked and not many) or None,
         sleeping=seen.sleeping or None,
-        features=VERTEX_COUNT if any(body.kind == "block" for body in scene.bodies) else 1,
+        features=VERTEX_COUNT if _has(scene, "block") else 1,
         fields=seen.fields,
         laws=seen.laws,
         rows=make_rows(scene, accuracy, seen),
     )
 
 
-def _check_many(scene: Scene, meeting: bool, scheme: int) -> None:
+def _has(scene: Scene, kind: str) -> bool:
+    return any(body.kind == kind for body in scene.bodies)
+
+
+def _check_many(scene: Scene, meeting: bool, is_linked: bool, scheme: int) -> None:
     """Refuse what the step of all bodies at once does not know yet."""
-    hint = "; give the scene Contact(between_bodies=False) if its bodies need not meet" if meeting else ""
-    what = "touch each other" if meeting else "touch walls and are tied together by springs"
+    known, what, hint = "bodies", "hulls touch walls", ""
+    if _has(scene, "hull"):
+        known = "blocks, spheres and ellipsoids"
+    if is_linked:
+        what = "bodies touch walls and are tied together by springs"
+    if meeting:
+        what = "bodies touch each other"
+        if not _has(scene, "hull"):
+            hint = "; give the scene Contact(between_bodies=False) if its bodies need not meet"
     if scheme == EVENTS:
         raise ValueError(
-            "accuracy has the scheme 'events', which knows contact of single bodies with walls only; allowed where "
-            f"bodies {what} are 'fast', 'balanced' and every time-stepping scheme{hint}"
+            f"accuracy has the scheme 'events', which knows contact of single {known} with walls only; allowed where "
+            f"{what} are 'fast', 'balanced' and every time-stepping scheme{hint}"
         )
 
 
@@ -246,7 +260,7 @@ def _check_laws(scene: Scene, seen: _Seen, many: bool, scheme: int) -> None:
     if names and many:
         raise ValueError(
             f"Scene.effects holds {names}, which act between a body and a wall; allowed are scenes of one body, or "
-            "with Contact(between_bodies=False) and no Spring between bodies"
+            "with Contact(between_bodies=False), without hulls and without Spring between bodies"
         )
     for b, body in enumerate(scene.bodies if TANGENTIAL in seen.laws else ()):
         if body.kind != "sphere":

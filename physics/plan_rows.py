@@ -29,7 +29,8 @@ def _gravity_row(gravity) -> Row:
 
 def _contact_row(scene, contact) -> Row:
     if contact is not None and scene.walls:
-        return Row("wall contact", True, f"declared; {len(scene.walls)} wall(s)", "detection, impacts, solver")
+        hulls = ", corners of hulls" if any(body.kind == "hull" for body in scene.bodies) else ""
+        return Row("wall contact", True, f"declared; {len(scene.walls)} wall(s)", f"detection{hulls}, impacts, solver")
     if contact is not None:
         return Row("wall contact", False, "declared, but the scene has no walls", "")
     reason = "not declared: the walls do not act" if scene.walls else "not declared"
@@ -38,8 +39,11 @@ def _contact_row(scene, contact) -> Row:
 
 def _between_row(scene, contact, many) -> Row:
     if many:
-        return Row("body contact", True, f"declared; {len(scene.bodies)} bodies", "pairs, one problem for all bodies"
-                   + (", ellipsoids" if any(body.kind == "ellipsoid" for body in scene.bodies) else ""))  # fmt: skip
+        kinds = {body.kind for body in scene.bodies}
+        also = "".join(f", {kind}s" for kind in ("ellipsoid", "hull") if kind in kinds)
+        return Row(
+            "body contact", True, f"declared; {len(scene.bodies)} bodies", f"pairs, one problem for all bodies{also}"
+        )
     if contact is None:
         return Row("body contact", False, "not declared", "")
     if len(scene.bodies) == 1:

@@ -71,6 +71,8 @@ def resting_contact(
         )
     if world.plan.many:
         raise ValueError("world has contact between bodies; allowed here are scenes with Contact(between_bodies=False)")
+    if world.scene.bodies[body].kind == "hull":
+        raise ValueError(f"body is {body}, a hull; allowed are blocks, spheres and ellipsoids")
     load = np.zeros(6) if wrench is None else checks.finite(wrench, (6,), "wrench")
     i = index * world.body_count + body
     load = load + look_at(world)[0][i]

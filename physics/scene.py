@@ -121,6 +121,13 @@ class Scene:
         fields = [effect for effect in self.effects if isinstance(effect, Field)]
         for field in fields:
             field.check(len(self.bodies))
+        for b, body in enumerate(self.bodies):
+            unknown = [type(field).__name__ for field in fields if field.needs_axes and body.kind == "hull"]
+            if unknown:
+                raise ValueError(
+                    f"Scene.effects holds {', '.join(unknown)}, and Scene.bodies[{b}] is a hull; allowed with it are "
+                    "blocks, spheres and ellipsoids: it depends on what their surface is like"
+                )
         if fields and all(field.is_air for field in fields):
             raise ValueError("Scene.effects holds Wind without what it acts through; add physics.Drag()")
 

@@ -18,7 +18,7 @@ from physics.effects import Actuator, Contact, Friction, Gravity, RollingFrictio
 from physics.field import Field
 from physics.fields import FIELDS
 from physics.scene import HalfSpace, Scene
-from physics.shapes import Block, Ellipsoid, Sphere
+from physics.shapes import Block, Ellipsoid, Hull, Sphere
 
 if sys.version_info >= (3, 11):
     import tomllib
@@ -28,7 +28,7 @@ else:
 # Number of the format; a reader refuses what is newer than itself.
 FORMAT = 1
 
-BODIES = (Block, Sphere, Ellipsoid)
+BODIES = (Block, Sphere, Ellipsoid, Hull)
 EFFECTS = (Gravity, Contact, Friction, RollingFriction, SpinFriction, Actuator, Sleeping, *FIELDS)
 LISTS = ("bodies", "walls", "effects")
 

@@ -8,6 +8,7 @@ from typing import ClassVar
 import numpy as np
 
 from physics import checks, inertia
+from physics.polyhedron import Polyhedron, convex_hull
 
 
 def _tuple(array: np.ndarray) -> tuple:
@@ -16,7 +17,7 @@ def _tuple(array: np.ndarray) -> tuple:
 
 @dataclass(frozen=True, kw_only=True)
 class Body:
-    """What all bodies have in common; use `Block`, `Sphere` or `Ellipsoid`.
+    """What all bodies have in common; use `Block`, `Sphere`, `Ellipsoid` or `Hull`.
 
     Parameters
     ----------
@@ -172,3 +173,58 @@ class Ellipsoid(Body):
     def bounding_radius(dimensions) -> np.ndarray:
         """The largest semi-axis (...) [m]."""
         return np.max(dimensions, axis=-1)
+
+
+@dataclass(frozen=True)
+class Hull(Body):
+    """The convex hull of points, of uniform density: a wedge, a prism, a rock.
+
+    `pos` is the centre of mass, as of every body: the hull is shifted there. Where that is in the frame of the points
+    says `centroid`, so that a body whose points stand where it is to be in the world has ``pos=hull.centroid``.
+
+    Parameters
+    ----------
+    points : (n, 3) array_like
+        Along the body axes, from any origin [m]. Those inside the hull do not matter.
+    mass : float
+        [kg].
+
+    Raises
+    ------
+    ValueError
+        Fewer than four points, all in one plane (within 1e-9 of the size) or nearly on a line, or a hull of more than
+        `polyhedron.MOST_CORNERS` corners.
+    """
+
+    points: tuple
+    mass: float
+    kind = "hull"
+
+    def __post_init__(self):
+        self._set("points", tuple(map(_tuple, checks.rows(self.points, 3, "points"))))
+        convex_hull(self.points)
+        super().__post_init__()
+
+    @property
+    def polyhedron(self) -> Polyhedron:
+        """Corners, faces and edges about the centre of mass, in the body frame; the same object for equal points."""
+        return convex_hull(self.points)
+
+    @property
+    def centroid(self) -> tuple[float, float, float]:
+        """Centre of mass in the frame of `points` [m]."""
+        return _tuple(self.polyhedron.centroid)
+
+    @property
+    def inertia(self) -> np.ndarray:
+        """(3, 3) inertia tensor about the centre of mass in the body frame [kg m²]."""
+        return np.array(self.inertia_body) if self.inertia_body is not None else self.polyhedron.inertia(self.mass)
+
+    @property
+    def dimensions(self) -> np.ndarray:
+        """(3,) how far the hull reaches from the centre of mass along each body axis, either way [m]."""
+        return np.abs(self.polyhedron.vertices).max(axis=0)
+
+    def bounding_radius(self, dimensions) -> np.ndarray:
+        """Distance (...) of the farthest corner from the centre of mass [m]; `dimensions` (..., 3) do not change it."""
+        return np.full(np.shape(dimensions)[:-1], self.polyhedron.radius)

@@ -153,9 +153,9 @@ class World:
         """Working memory of one thread, with the numerical settings in it."""
         plan = self.plan
         if plan.many:
-            in_turn = self.accuracy.collisions == "sequential"
+            polyhedra, in_turn = parameters.polyhedra(self.scene.bodies), self.accuracy.collisions == "sequential"
             return many.make_many(
-                self.body_count, self.walls, plan.terms, meet=plan.meeting, in_turn=in_turn, **numbers
+                self.body_count, self.walls, plan.terms, polyhedra, meet=plan.meeting, in_turn=in_turn, **numbers
             )
         if plan.linked:
             return make_linked(self.body_count, plan.terms, **numbers)
@@ -165,7 +165,8 @@ class World:
         """What is remembered of contacts: a row per world where bodies touch each other, else a row per body."""
         walls = len(self.scene.walls)
         if self.plan.many:
-            return np.zeros((self.worlds, many.memory_size(self.body_count, walls)))
+            polyhedra = parameters.polyhedra(self.scene.bodies)
+            return np.zeros((self.worlds, many.memory_size(self.body_count, walls, polyhedra)))
         rows = self.worlds * self.body_count if self.plan.contact else 1
         return np.zeros((rows, memory_size(max(walls * self.plan.features, 1))))
 
@@ -306,7 +307,8 @@ class World:
         mass, friction, restitution : (), (k,) or (k, bodies) array_like, optional
             [kg], coefficients. Of a `Friction` with two coefficients the first; the second changes with it.
         size : (3,), (k, 3) or (k, bodies, 3) array_like, optional
-            Full edges of a block, twice the semi-axes of an ellipsoid, three equal diameters of a sphere [m].
+            Full edges of a block, twice the semi-axes of an ellipsoid, three equal diameters of a sphere [m]; a hull
+            cannot change its size: twice its `dimensions`.
             Position and velocity stay, and so does the `center` of a block: in metres, not as a share of the edges.
         inertia_body : (3, 3), (k, 3, 3) or (k, bodies, 3, 3) array_like, optional
             [kg m²]. Where it is None, a change of mass or size sets the uniform-density value, unless the

@@ -69,7 +69,9 @@ def _body_view(world: World, index: int, body: int) -> BodyView:
     params, quat = world.params[index * world.body_count + body], world.quat[index, body]
     stored, center = params[at.DIMENSIONS : at.DIMENSIONS + 3], params[at.CENTER : at.CENTER + 3]
     dimensions = 2.0 * stored if kind == "block" else stored
-    return BodyView(kind, dimensions, world.pos[index, body] + rotation_matrix(quat) @ center, quat)
+    solid = world.scene.bodies[body].polyhedron if kind == "hull" else None
+    outline = {} if solid is None else {"corners": solid.vertices, "faces": solid.loops}
+    return BodyView(kind, dimensions, world.pos[index, body] + rotation_matrix(quat) @ center, quat, **outline)
 
 
 def without_bodies(frame: Frame, camera: Camera) -> Frame:

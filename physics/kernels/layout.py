@@ -19,7 +19,9 @@ STATE_SIZE = 16
 # --- parameters (rows, PARAM_SIZE): what a world may have its own value of -------------------------------------
 INV_MASS = 0  # [1/kg]
 INV_INERTIA = 1  # inverse principal moments [1/(kg m²)]
-DIMENSIONS = 4  # half edges of a block, semi-axes of an ellipsoid, radius (three times) of a sphere [m]
+DIMENSIONS = (
+    4  # half edges of a block, semi-axes of an ellipsoid, radius (three times) of a sphere, reach of a hull [m]
+)
 RADIUS = 7  # of the bounding sphere about the centre of mass [m]
 FRICTION = 8  # Coulomb coefficient against the walls
 RESTITUTION = 9  # normal coefficient against the walls
@@ -39,6 +41,7 @@ WALL_SIZE = 10
 BLOCK = 0
 SPHERE = 1
 ELLIPSOID = 2
+HULL = 3  # its corners stand in tables: `many.hulls`
 
 # Contact features of one body on one wall: the eight vertices of a block, the one support point of the others.
 VERTEX_COUNT = 8

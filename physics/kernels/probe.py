@@ -33,7 +33,7 @@ def angular_momenta(rows, state, params):
 
 @kernel
 def deepest_gaps(rows, state, params, shapes, walls, gaps, which):
-    """Smallest gap [m] of each given row over all walls, and the wall it is at (-1 without walls)."""
+    """Smallest gap [m] of each given row over all walls, and the wall it is at (-1 without walls); not of hulls."""
     for k in range(rows.shape[0]):
         i = rows[k]
         x = (state[i, at.POS], state[i, at.POS + 1], state[i, at.POS + 2])

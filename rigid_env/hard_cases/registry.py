@@ -9,8 +9,8 @@ from rigid_env.hard_cases.case import Case
 
 # Each has a tuple CASES.
 MODULES = (
-    "flight", "bounces", "impacts", "friction", "rolling", "tipping", "scaling", "piles", "leaning", "chains",
-    "random_scenes",
+    "flight", "bounces", "impacts", "friction", "rolling", "tipping", "scaling", "piles", "leaning", "arch",
+    "chains", "random_scenes",
 )  # fmt: skip
 
 

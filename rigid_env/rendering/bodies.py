@@ -39,7 +39,7 @@ def draw_bodies(canvas, bodies, goal):
 
 
 def _draw_body(canvas, body, colour, goal):
-    mesh = body_mesh(body.kind, body.dimensions)
+    mesh = body_mesh(body)
     R = rotation_matrix(body.quat)
     vertices, normals = body.pos + mesh.vertices @ R.T, mesh.normals @ R.T
     towards_eye = canvas.camera.eye - vertices[mesh.faces].mean(axis=1)

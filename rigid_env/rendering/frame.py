@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-BODY_KINDS = ("block", "sphere", "ellipsoid")
+BODY_KINDS = ("block", "sphere", "ellipsoid", "hull")
 
 FACE_COUNT = 6
 """Faces of a block, in the order -x, +x, -y, +y, -z, +z of its body axes."""
@@ -18,20 +18,25 @@ class BodyView:
 
     Parameters
     ----------
-    kind : {"block", "sphere", "ellipsoid"}
+    kind : {"block", "sphere", "ellipsoid", "hull"}
     dimensions : (3,) float
-        [m]. Full edge lengths of a block; semi-axes of a sphere (all equal) or ellipsoid. Body frame.
+        [m]. Full edge lengths of a block; semi-axes of a sphere (all equal) or ellipsoid; how far a hull reaches from
+        `pos`. Body frame.
     pos : (3,) float
-        [m]. Geometric centre, world frame.
+        [m]. Geometric centre, of a hull its centre of mass, world frame.
     quat : (4,) float
         Unit quaternion w, x, y, z, body to world.
     colour : (3,) int or None
         sRGB, 0..255; None takes the next colour of the palette.
+    corners : (n, 3) float
+        [m]. Of a hull, from `pos`, body frame; none of the others.
+    faces : tuple of tuples of int
+        Of a hull: the corners of each face, counter-clockwise as seen from outside.
 
     Raises
     ------
     ValueError
-        On an unknown kind, a wrong shape or a dimension that is not positive.
+        On an unknown kind, a wrong shape, a dimension that is not positive, or a hull without faces.
     """
 
     kind: str
@@ -39,6 +44,8 @@ class BodyView:
     pos: np.ndarray
     quat: np.ndarray = (1.0, 0.0, 0.0, 0.0)
     colour: tuple[int, int, int] | None = None
+    corners: np.ndarray = field(default_factory=lambda: np.zeros((0, 3)))
+    faces: tuple[tuple[int, ...], ...] = ()
 
     def __post_init__(self):
         if self.kind not in BODY_KINDS:
@@ -46,6 +53,9 @@ class BodyView:
         _set_array(self, "dimensions", (3,))
         _set_array(self, "pos", (3,))
         _set_array(self, "quat", (4,))
+        _set_array(self, "corners", (-1, 3))
+        if (self.kind == "hull") != bool(self.faces):
+            raise ValueError(f"faces must be those of a hull, and of nothing else, not {self.faces!r} of a {self.kind}")
         if not np.all(self.dimensions > 0.0):
             raise ValueError(f"dimensions must be positive, not {self.dimensions}")
 

@@ -1,9 +1,10 @@
-"""Convex meshes in the body frame: block, sphere, ellipsoid."""
+"""Convex meshes in the body frame: block, sphere, ellipsoid, hull."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
+from itertools import pairwise
 
 import numpy as np
 
@@ -41,20 +42,16 @@ class Mesh:
     is_smooth: bool
 
 
-def body_mesh(kind, dimensions):
-    """Mesh of a body; made once for each shape.
-
-    Parameters
-    ----------
-    kind : {"block", "sphere", "ellipsoid"}
-    dimensions : (3,) float
-        [m]. Full edges of a block, semi-axes otherwise.
+def body_mesh(body):
+    """Mesh of a `BodyView`; made once for each shape.
 
     Returns
     -------
     Mesh
     """
-    return _body_mesh(kind, tuple(float(d) for d in dimensions))
+    if body.kind == "hull":
+        return hull_mesh(tuple(map(tuple, body.corners.tolist())), body.faces)
+    return _body_mesh(body.kind, tuple(body.dimensions.tolist()))
 
 
 @lru_cache(maxsize=64)
@@ -66,6 +63,23 @@ def block_mesh(size):
     """Block with edges `size` (3,) [m] along the body axes; faces in the order -x, +x, -y, +y, -z, +z."""
     signs = np.array([[i, j, k] for i in (-1, 1) for j in (-1, 1) for k in (-1, 1)], dtype=np.float64)
     return _mesh(0.5 * signs * np.asarray(size, dtype=np.float64), BLOCK_FACES, is_smooth=False)
+
+
+@lru_cache(maxsize=256)
+def hull_mesh(corners, polygons):
+    """Convex polyhedron of `corners` (n tuples of 3) [m] with `polygons`, tuples of corners; see `BodyView`.
+
+    A polygon becomes triangles, which are all the same size; what they have between them is no edge.
+    """
+    faces, of_side = [], {}
+    for polygon in polygons:
+        for triangle in ((polygon[0], *pair) for pair in pairwise(polygon[1:])):
+            of_side.update(dict.fromkeys(zip(triangle, (*triangle[1:], triangle[0])), len(faces)))
+            faces.append(triangle)
+    sides = [side for polygon in polygons for side in zip(polygon, (*polygon[1:], polygon[0])) if side[0] < side[1]]
+    edges = np.array([(a, b, of_side[a, b], of_side[b, a]) for a, b in sides])
+    mesh = _mesh(np.array(corners), np.array(faces), is_smooth=False)
+    return replace(mesh, edges=edges)
 
 
 def ellipsoid_mesh(semi_axes, subdivisions=SPHERE_SUBDIVISIONS):

@@ -136,7 +136,7 @@ def hidden_points(points, bodies, eye):
     rays = points - np.asarray(eye)
     is_hidden = np.zeros(len(points), dtype=bool)
     for body in bodies:
-        mesh = body_mesh(body.kind, body.dimensions)
+        mesh = body_mesh(body)
         R = rotation_matrix(body.quat)
         local_eye, local_rays = (np.asarray(eye) - body.pos) @ R, rays @ R
         room = np.sum(mesh.normals * mesh.vertices[mesh.faces[:, 0]], axis=1) - mesh.normals @ local_eye

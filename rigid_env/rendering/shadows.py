@@ -45,12 +45,12 @@ def outline(body):
     Returns
     -------
     (n, 3) float64
-        [m], world frame. A block's corners. On an ellipsoid x = R A u, |u| = 1, light grazes where its normal
+        [m], world frame. A block's or hull's corners. On an ellipsoid x = R A u, |u| = 1, light grazes where its normal
         R A⁻¹ u is perpendicular to the light: the great circle of u perpendicular to A⁻¹ Rᵀ light.
     """
     R = rotation_matrix(body.quat)
-    if body.kind == "block":
-        return body.pos + body_mesh(body.kind, body.dimensions).vertices @ R.T
+    if body.kind in ("block", "hull"):
+        return body.pos + body_mesh(body).vertices @ R.T
     pole = (R.T @ palette.LIGHT) / body.dimensions
     u, v = plane_axes(pole / np.linalg.norm(pole))
     angle = 2.0 * np.pi * np.arange(OUTLINE_POINTS) / OUTLINE_POINTS

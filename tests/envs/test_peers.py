@@ -204,6 +204,19 @@ def test_an_ellipsoid_rests_in_the_others():
             assert seen.pos[-1, 0, 1] == pytest.approx(2.0, abs=0.01)
 
 
+def test_a_hull_rests_where_it_can_be_expressed_and_is_refused_elsewhere(engine):
+    cube = physics.Hull([(x, y, z) for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], 2.0, pos=(0, 1, 0))
+    scene = physics.Scene([cube], [physics.HalfSpace((0, 1, 0))], [physics.Gravity(), physics.Contact()])
+    if engine.name != "mujoco":
+        with pytest.raises(Unsupported, match="hulls are not handed to"):
+            engine.open(scene, 0.01)
+        return
+    run = engine.open(scene, 0.01)
+    run.restart()
+    run.advance(100)
+    assert run.state()[0][0, 1] == pytest.approx(1.0, abs=1e-2)  # its contacts are soft
+
+
 def test_a_peer_that_is_missing_names_the_extra(monkeypatch):
     monkeypatch.setattr(importlib.util, "find_spec", lambda name: None)
     for name in peers.ENGINES:

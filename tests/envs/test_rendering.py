@@ -3,12 +3,15 @@
 import os
 import subprocess
 import sys
+from dataclasses import replace
 from math import radians, tan
 
 import gymnasium
 import numpy as np
 import pytest
 
+import physics
+from rigid_env.picture import without_bodies, world_frame
 from rigid_env.rendering import BodyView, Camera, Frame, GoalView, Renderer, WallView, palette
 from rigid_env.rendering.camera import NEAR, fit_camera
 from rigid_env.rendering.geometry import clip_polygon, convex_hull, plane_axes, rotation_matrix
@@ -161,9 +164,10 @@ def test_plane_axes_are_right_handed(normal):
 
 MESHES = {
     "block": block_mesh((5, 3, 2)),
-    "sphere": body_mesh("sphere", (1.5, 1.5, 1.5)),
+    "sphere": body_mesh(BodyView("sphere", (1.5, 1.5, 1.5), (0, 0, 0))),
     "ellipsoid": ellipsoid_mesh((2.5, 1.5, 1.0), subdivisions=5),
 }
+WEDGE = physics.Hull([(0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1), (1, 0, 1), (0, 1, 1)], 1.0, pos=(0, 2, 0))
 
 
 @pytest.mark.parametrize("mesh", MESHES.values(), ids=MESHES)
@@ -174,6 +178,39 @@ def test_mesh_is_closed_and_convex_with_outward_normals(mesh):
     on_face = np.take_along_axis(heights, mesh.faces, axis=1)
     assert np.all(on_face > 0.0)  # the centre is inside
     assert np.all(heights <= on_face[:, :1] + 1e-12)  # no vertex beyond a face
+
+
+def test_a_hull_is_drawn_with_its_corners_and_without_the_diagonals_of_its_faces():
+    solid = WEDGE.polyhedron
+    view = BodyView("hull", WEDGE.dimensions, WEDGE.pos, corners=solid.vertices, faces=solid.loops)
+    mesh = body_mesh(view)
+    assert mesh is body_mesh(view)
+    assert len(mesh.faces) == 2 + 3 * 2  # two triangles, three quadrangles of two
+    assert sorted(map(tuple, mesh.edges[:, :2].tolist())) == sorted(map(tuple, solid.edges[:, :2].tolist()))
+    for a, b, left, right in mesh.edges:
+        for face in (left, right):
+            assert {a, b} <= set(mesh.faces[face])
+        assert mesh.normals[left] @ mesh.normals[right] < 0.99
+    heights = mesh.normals @ mesh.vertices.T
+    assert np.all(heights <= heights[np.arange(len(mesh.faces)), mesh.faces[:, 0]][:, None] + 1e-12)
+    for wrong in ({"faces": ()}, {"kind": "block"}):
+        with pytest.raises(ValueError, match="faces must be those of a hull"):
+            replace(view, **wrong)
+
+
+def test_a_world_of_hulls_is_drawn_where_they_are(renderer):
+    world = physics.World(physics.Scene([WEDGE], [physics.HalfSpace((0, 1, 0))], [physics.Gravity()]))
+    frame = world_frame(world)
+    np.testing.assert_array_equal(frame.bodies[0].corners, WEDGE.polyhedron.vertices)
+    camera = renderer.camera(frame)
+    picture = renderer.draw(frame).copy()
+    changed = body_pixels(picture, renderer.draw(without_bodies(frame, camera)))
+    corners, _ = camera.project(WEDGE.polyhedron.vertices + WEDGE.pos, SIZE)
+    # Its outline and its shadow on the floor are all that changes; the body itself is within the outline's box.
+    middle = corners.mean(axis=0)
+    assert np.abs(changed - middle).sum(axis=1).min() < 1.0
+    above = changed[changed[:, 1] < corners[:, 1].max()]
+    assert (above.min(axis=0) >= corners.min(axis=0) - 2.0).all()
 
 
 def test_block_faces_are_in_the_promised_order():

@@ -118,7 +118,7 @@ def test_the_normal_of_two_blocks_separates_them_most(seed, distance):
     many = blocks([np.zeros(3), distance * direction], [rotation(rng), rotation(rng)], halves)
     h = 10.0  # the margin is the way that the loads could bring the blocks in h: gaps up to a m/s² h² = 100 m count
     many.bodies["acceleration"] = 1.0
-    find_contacts(h, None, 0, None, many)
+    find_contacts(h, None, None, 0, None, many)
     n = many.counts[CONTACTS]
     assert n > 0
     normal = many.frame[0, :3]
@@ -171,7 +171,7 @@ def test_parallel_edges_that_touch_push_along_the_middle_of_what_both_allow(seed
     if abs(shift) * halves[:, 2].sum() > halves[:, 2].sum() - 0.01:
         return  # beside each other along the edges
     many = blocks([world @ a, world @ b], [world @ R for R in planar], halves)
-    find_contacts(0.01, None, 0, None, many)
+    find_contacts(0.01, None, None, 0, None, many)
     n = many.counts[CONTACTS]
     middle = 0.5 * (alpha + beta) + 0.25 * math.pi
     assert n == 2
@@ -186,7 +186,7 @@ def test_names_of_equal_stacked_blocks_do_not_change_with_rounding():
     names = []
     for shift in (0.0, 1e-15, -1e-15):
         many = blocks([[0, 0, 0], [shift, 1, shift]], [np.eye(3), np.eye(3)], np.full((2, 3), 0.5))
-        find_contacts(0.01, None, 0, None, many)
+        find_contacts(0.01, None, None, 0, None, many)
         names.append(sorted(many.name[: many.counts[CONTACTS]].tolist()))
     assert len(names[0]) == 4
     assert names[0] == names[1] == names[2]

@@ -9,7 +9,6 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from physics.kernels.many import rounds
-from physics.kernels.many.touch import nearest_in_block
 from tests.reference.separation import block_support, ellipsoid_support, largest_separation, spread
 
 lengths = st.tuples(*[st.floats(0.2, 5.0)] * 3)
@@ -33,7 +32,7 @@ def pair(seed, a, b, is_block, gap):
 
 
 def solve(A, B, b, is_block, d):
-    start = nearest_in_block(d, tuple(b))[1] if is_block else rounds.start_from(d)
+    start = rounds.nearest_in_block(d, tuple(b))[1] if is_block else rounds.start_from(d)
     n, apart = rounds.direction_between(A, is_block, B, tuple(b), d, start)
     on_a = np.array(d) - rounds.point_of(A, n)[1]
     on_b = rounds.block_point(tuple(b), n, tuple(on_a)) if is_block else rounds.point_of(B, n)[1]

@@ -78,6 +78,28 @@ def test_mujoco_loads_it_with_the_same_mass_inertia_and_start(name):
         assert velocity[:3] == pytest.approx(body.angvel, abs=1e-13)
 
 
+def test_mujoco_has_the_corners_of_a_hull_where_they_are_here():
+    mujoco = pytest.importorskip("mujoco")
+    points = [(0, 0, 0), (1, 0, 0), (0, 0.7, 0), (0, 0, 0.5), (1, 0, 0.5), (0, 0.7, 0.5)]
+    body = physics.Hull(points, 2.0, pos=(1, 2, 3), quat=TURNED, angvel=(1, 2, 3))
+    scene = physics.Scene([body], MIXED.walls, MIXED.effects)
+    model = mujoco.MjModel.from_xml_string(to_mjcf(scene))
+    data = mujoco.MjData(model)
+    mujoco.mj_resetDataKeyframe(model, data, 0)
+    mujoco.mj_forward(model, data)
+    geom = model.ngeom - 1
+    there = model.mesh_vert @ data.geom_xmat[geom].reshape(3, 3).T + data.geom_xpos[geom]
+    here = body.polyhedron.vertices @ rotation_matrices(np.array(body.quat)).T + body.pos
+    distances = np.linalg.norm(there[:, None] - here[None], axis=-1)
+    assert there.shape == here.shape
+    assert distances.min(axis=0).max() <= 1e-6  # MuJoCo keeps meshes in single precision
+    assert model.body_mass[1] == 2.0
+    R = rotation_matrices(model.body_iquat[1])
+    assert R @ np.diag(model.body_inertia[1]) @ R.T == pytest.approx(body.inertia, abs=1e-10)
+    with pytest.raises(ValueError, match="is a mesh; allowed are box, sphere, ellipsoid"):
+        from_mjcf(to_mjcf(scene))
+
+
 def test_a_spring_pulls_in_mujoco_as_it_does_here():
     """Accelerations at the start, without contacts: the same law, to the rounding of a few lengths."""
     mujoco = pytest.importorskip("mujoco")

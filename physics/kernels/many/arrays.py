@@ -6,12 +6,14 @@ compiled kernel serves them all. It is filled anew for every world and every sta
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 
 from physics.kernels.fields.terms import Term
 from physics.kernels.layout import STATE_SIZE, VERTEX_COUNT
+from physics.kernels.many.hulls import Hulls, make_hulls, room_of_face
 from physics.kernels.workspace import body_fields, setting_fields
 
 # Contacts that two bodies may have at once: a rectangle clipped by another one has up to eight vertices.
@@ -116,12 +118,14 @@ class Many(NamedTuple):
     scaling: np.ndarray
     miss: np.ndarray
     extra: np.ndarray
+    hulls: Hulls | None  # tables of convex polyhedra, and a pair of them in place; None where there is no hull
     settings: np.ndarray  # one record: see `workspace.setting_fields`
 
 
-def contact_room(bodies: int, walls: int) -> int:
-    """Contacts that a world of so many bodies and walls has room for."""
-    return bodies * walls * VERTEX_COUNT + pair_room(bodies) * PAIR_CONTACTS
+def contact_room(bodies: int, walls: int, polyhedra: Sequence = ()) -> int:
+    """Contacts that a world of so many bodies and walls has room for; `polyhedra` are those of `make_hulls`."""
+    corners = max([VERTEX_COUNT, *(len(body.vertices) for body in polyhedra if body is not None)])
+    return bodies * walls * corners + pair_room(bodies) * max(PAIR_CONTACTS, room_of_face(polyhedra))
 
 
 def pair_room(bodies: int) -> int:
@@ -129,15 +133,16 @@ def pair_room(bodies: int) -> int:
     return max(1, min(bodies * (bodies - 1) // 2, PAIRS_PER_BODY * bodies))
 
 
-def memory_size(bodies: int, walls: int) -> int:
+def memory_size(bodies: int, walls: int, polyhedra: Sequence = ()) -> int:
     """Columns of `memory` of one world."""
-    return MEMORY_HEAD + MEMORY_SIZE * contact_room(bodies, walls)
+    return MEMORY_HEAD + MEMORY_SIZE * contact_room(bodies, walls, polyhedra)
 
 
 def make_many(
     bodies: int,
     walls: np.ndarray,
     terms: tuple[Term, ...] = (),
+    polyhedra: Sequence = (),
     *,
     meet=True,
     in_turn=False,
@@ -146,11 +151,11 @@ def make_many(
 ) -> Many:
     """Scratch for worlds of `bodies` bodies among `walls` ((walls, WALL_SIZE)), in fields, with numerical settings.
 
-    `meet` says whether bodies touch each other, or walls only; `in_turn` whether contacts that collide do so one after
-    the other.
+    `polyhedra` are those of `make_hulls`, empty where there is no hull. `meet` says whether bodies touch each other, or
+    walls only; `in_turn` whether contacts that collide do so one after the other.
     """
     f, i, nb = np.float64, np.int64, bodies
-    pairs, n = pair_room(bodies), contact_room(bodies, len(walls))
+    pairs, n = pair_room(bodies), contact_room(bodies, len(walls), polyhedra)
     record = np.zeros(1, np.dtype([*setting_fields(), ("still", f), ("meet", i), ("in_turn", i)]))
     record["still"], record["meet"], record["in_turn"] = np.inf, meet, in_turn
     for name, value in settings.items():
@@ -182,5 +187,6 @@ def make_many(
         before=np.zeros((nb, 6)), change=np.zeros((nb, 6)),
         row=np.zeros((2, 3, 6)), reply=np.zeros((2, 3, 6)), weighed=np.zeros((2, 3, 6)),
         inside=np.zeros((n, 3)), slack=np.zeros((n, 3)), scaling=np.zeros((n, 4)), miss=np.zeros((n, 3)),
-        extra=np.zeros((n, 3)), momenta=np.zeros((nb, 12)), settings=record,
+        extra=np.zeros((n, 3)), momenta=np.zeros((nb, 12)),
+        hulls=make_hulls(polyhedra) if polyhedra else None, settings=record,
     )  # fmt: skip

@@ -10,7 +10,7 @@ from physics.kernels.compiler import inlined, kernel
 from physics.kernels.layout import ELLIPSOID, SPHERE
 from physics.kernels.many.arrays import CONTACTS, LEFT_OUT
 
-# Contact features that two bodies, or a body and a wall, can have: what a contact's name is made with.
+# Contact features that two bodies, or a body and a wall, have unless one is a hull: what a contact's name is made with.
 FEATURES = 512
 
 
@@ -139,7 +139,7 @@ def record(a, b, feature, owner, normal, point_a, point_b, gap, h, many):
     a, b : int
         Bodies; b = -1 - k is wall k.
     feature : int
-        Below `FEATURES`: which of the features of this pair.
+        Which of the features of this pair: below `FEATURES` unless one of them is a hull.
     owner : int
         Body that the normal turns with; -1: it keeps its direction.
     normal, point_a, point_b : tuples of 3 floats
@@ -169,7 +169,9 @@ def record(a, b, feature, owner, normal, point_a, point_b, gap, h, many):
     if owner >= 0:
         local = qt.transposed_matvec(matrix(many.rotation, owner), normal)
     put(many.normal, k, 0, local)
-    many.name[k] = (a * (count + many.walls.shape[0]) + partner) * FEATURES + feature
+    partners = count + many.walls.shape[0]
+    page = feature // FEATURES * count * partners  # of features beyond the first `FEATURES`: names after all of those
+    many.name[k] = (page + a * partners + partner) * FEATURES + feature % FEATURES
     _laws(k, a, b, many)
     many.touched[a] = 1
     if b >= 0:

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from physics.kernels import geometry as geo
 from physics.kernels.compiler import inlined, kernel
-from physics.kernels.layout import SPHERE
+from physics.kernels.layout import BLOCK, HULL, SPHERE
 from physics.kernels.many.arrays import LEFT_OUT, PAIRS
 from physics.kernels.many.columns import columns_of, fill_columns
 
@@ -28,10 +28,12 @@ def reach(b, h, many):
 
 @inlined
 def half_extent(b, axis, many):
-    """Half the width of body b along a world axis [m]."""
+    """Half the width of body b along a world axis [m]; of a hull that of the block that reaches as far as it does."""
     R, d, shape = many.rotation, many.bodies[b].dims, many.bodies[b].shape
     if shape == SPHERE:
         return d[0]
+    if shape == HULL:
+        shape = BLOCK
     e = (d[0] * R[b, 3 * axis], d[1] * R[b, 3 * axis + 1], d[2] * R[b, 3 * axis + 2])
     return geo.support(shape, (d[0], d[1], d[2]), e)
 

@@ -22,6 +22,7 @@ import math
 
 from physics.kernels import quaternion as qt
 from physics.kernels.compiler import inlined, kernel
+from physics.kernels.many.contacts import minus
 
 # Newton steps at most; five are usual from a centre to centre start.
 STEPS = 40
@@ -205,3 +206,31 @@ def block_point(dims, n, near):
         math.copysign(dims[1], n[1]) if n[1] != 0.0 else min(max(near[1], -dims[1]), dims[1]),
         math.copysign(dims[2], n[2]) if n[2] != 0.0 else min(max(near[2], -dims[2]), dims[2]),
     )
+
+
+@inlined
+def nearest_in_block(p, d):
+    """(nearest point on the surface of a block, outward normal, distance) for a point p, all in its frame."""
+    q = (min(max(p[0], -d[0]), d[0]), min(max(p[1], -d[1]), d[1]), min(max(p[2], -d[2]), d[2]))
+    w = minus(p, q)
+    size = math.sqrt(qt.dot(w, w))
+    if size > 0.0:
+        return q, (w[0] / size, w[1] / size, w[2] / size), size
+    depth = (abs(p[0]) - d[0], abs(p[1]) - d[1], abs(p[2]) - d[2])  # inside: out by the nearest face
+    if depth[0] >= depth[1] and depth[0] >= depth[2]:
+        s = math.copysign(1.0, p[0])
+        return (s * d[0], p[1], p[2]), (s, 0.0, 0.0), depth[0]
+    if depth[1] >= depth[2]:
+        s = math.copysign(1.0, p[1])
+        return (p[0], s * d[1], p[2]), (0.0, s, 0.0), depth[1]
+    s = math.copysign(1.0, p[2])
+    return (p[0], p[1], s * d[2]), (0.0, 0.0, s), depth[2]
+
+
+@inlined
+def turned_back(R, S):
+    """Rᵀ S: from the frame of S to that of R."""
+    x = qt.transposed_matvec(R, (S[0], S[3], S[6]))
+    y = qt.transposed_matvec(R, (S[1], S[4], S[7]))
+    z = qt.transposed_matvec(R, (S[2], S[5], S[8]))
+    return (x[0], y[0], z[0], x[1], y[1], z[1], x[2], y[2], z[2])

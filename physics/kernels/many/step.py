@@ -57,14 +57,14 @@ def mark_touched(n, many):
 
 
 @kernel
-def substep_world(world, h, friction, gyroscopic, tilted, ellipsoids, scheme, sleep, memory, report, many):
+def substep_world(world, h, friction, gyroscopic, tilted, ellipsoids, hulls, scheme, sleep, memory, report, many):
     """Advance the bodies of one world by h: the stages of the module's list."""
     left, impacts = h, 0
     for cut in range(CUTS_PER_IMPACT * many.settings[0].splits + 1):
         is_last = impacts >= many.settings[0].splits or cut == CUTS_PER_IMPACT * many.settings[0].splits
         hold_all_loads(left, gyroscopic, tilted, many)
         place_bodies(tilted, many)
-        find_contacts(left, ellipsoids, world, sleep, many)
+        find_contacts(left, ellipsoids, hulls, world, sleep, many)
         n = many.counts[CONTACTS]
         note_depth(n, world, report, many)
         n, t, is_impact = strike(n, world, left, is_last, friction, tilted, report, many)
@@ -99,7 +99,7 @@ def world_is_finite(many):
 @kernel
 def step_many(
     first, last, steps, substeps, h, state, params, shapes, gravity, wrench, friction, restitution, gyroscopic,
-    tilted, ellipsoids, scheme, sleep, memory, report, many,
+    tilted, ellipsoids, hulls, scheme, sleep, memory, report, many,
 ):  # fmt: skip
     """Advance the worlds first <= world < last by `steps` steps of `substeps` substeps of h seconds each.
 
@@ -121,7 +121,9 @@ def step_many(
         for k in range(steps * substeps):
             for b in range(bodies):
                 set_clock(k * h, many.bodies[b])
-            substep_world(world, h, friction, gyroscopic, tilted, ellipsoids, scheme, sleep, memory, report, many)
+            substep_world(
+                world, h, friction, gyroscopic, tilted, ellipsoids, hulls, scheme, sleep, memory, report, many
+            )
             if not world_is_finite(many):
                 report[world, at.FAULTS] += 1.0
                 kept.forget(world, memory)

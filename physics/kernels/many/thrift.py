@@ -14,7 +14,7 @@ from physics.kernels import layout as at
 from physics.kernels import quaternion as qt
 from physics.kernels.body import angular_velocity, read_state
 from physics.kernels.compiler import inlined, kernel
-from physics.kernels.layout import NORMAL, OFFSET
+from physics.kernels.layout import HULL, NORMAL, OFFSET
 from physics.kernels.many.contacts import matrix, minus, plus, put, vector
 
 # Columns of `many.momenta` in a resting stage: velocities before it, then momenta with its loads.
@@ -118,7 +118,9 @@ def bring_inside(b, tilted, many):
         if d >= 0.0:
             continue
         was_outside = True
-        reach = geo.support(body.shape, dims, geo.scaled_normal(body.shape, dims, matrix(many.rotation, b), n))
+        reach = body.radius
+        if body.shape != HULL:
+            reach = geo.support(body.shape, dims, geo.scaled_normal(body.shape, dims, matrix(many.rotation, b), n))
         put(many.place, b, 0, plus(center, reach - d, n))
         put(many.now, b, at.POS, plus(vector(many.now, b, at.POS), reach - d, n))
         v = vector(many.now, b, at.LINVEL)

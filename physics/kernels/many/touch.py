@@ -7,12 +7,24 @@ import math
 from physics.kernels import geometry as geo
 from physics.kernels import quaternion as qt
 from physics.kernels.compiler import inlined, kernel
-from physics.kernels.layout import BLOCK, ELLIPSOID, NORMAL, OFFSET, SPHERE, VERTEX_COUNT
+from physics.kernels.layout import BLOCK, ELLIPSOID, HULL, NORMAL, OFFSET, SPHERE, VERTEX_COUNT
 from physics.kernels.many.arrays import CONTACTS, PAIRS
 from physics.kernels.many.block_block import touch_blocks
 from physics.kernels.many.contacts import matrix, minus, pair_slop, plus, record, vector
+from physics.kernels.many.hull_hull import touch_hulls
+from physics.kernels.many.hull_place import corner_arm
+from physics.kernels.many.hull_round import touch_ellipsoid_hull, touch_sphere_hull
+from physics.kernels.many.hulls import FIRST_CORNER, LAST_CORNER
 from physics.kernels.many.near import find_pairs, reach
-from physics.kernels.many.rounds import block_point, direction_between, point_of, squares_of, start_from
+from physics.kernels.many.rounds import (
+    block_point,
+    direction_between,
+    nearest_in_block,
+    point_of,
+    squares_of,
+    start_from,
+    turned_back,
+)  # fmt: skip
 from physics.kernels.many.sleep import wake_near
 from physics.kernels.sleep import sleeps
 
@@ -41,6 +53,21 @@ def touch_wall(b, wall, margin, h, many):
         record(b, -1 - wall, 0, -1, n, point, point, gap, h, many)
 
 
+@kernel
+def touch_hull_wall(b, wall, margin, h, many):
+    """Add the contacts of hull b with a wall: its corners that are no more than `margin` [m] from it, by number."""
+    n, x, first = vector(many.walls, wall, NORMAL), vector(many.place, b, 0), many.hulls.of[b, FIRST_CORNER]
+    d = qt.dot(n, x) - many.walls[wall, OFFSET]
+    if d > many.bodies[b].radius + margin:
+        return
+    for k in range(many.hulls.of[b, LAST_CORNER] - first):
+        r = corner_arm(b, first + k, many)
+        gap = d + qt.dot(n, r)
+        if gap <= margin:
+            point = plus(x, 1.0, r)
+            record(b, -1 - wall, k, -1, n, point, point, gap, h, many)
+
+
 @inlined
 def touch_spheres(a, b, margin, h, many):
     """Add the contact of two spheres."""
@@ -52,25 +79,6 @@ def touch_spheres(a, b, margin, h, many):
         return
     n = (n[0] / size, n[1] / size, n[2] / size) if size > 0.0 else (0.0, 1.0, 0.0)
     record(a, b, 0, -1, n, plus(x, -ra, n), plus(y, rb, n), size - ra - rb, h, many)
-
-
-@inlined
-def nearest_in_block(p, d):
-    """(nearest point on the surface of a block, outward normal, distance) for a point p, all in its frame."""
-    q = (min(max(p[0], -d[0]), d[0]), min(max(p[1], -d[1]), d[1]), min(max(p[2], -d[2]), d[2]))
-    w = minus(p, q)
-    size = math.sqrt(qt.dot(w, w))
-    if size > 0.0:
-        return q, (w[0] / size, w[1] / size, w[2] / size), size
-    depth = (abs(p[0]) - d[0], abs(p[1]) - d[1], abs(p[2]) - d[2])  # inside: out by the nearest face
-    if depth[0] >= depth[1] and depth[0] >= depth[2]:
-        s = math.copysign(1.0, p[0])
-        return (s * d[0], p[1], p[2]), (s, 0.0, 0.0), depth[0]
-    if depth[1] >= depth[2]:
-        s = math.copysign(1.0, p[1])
-        return (p[0], s * d[1], p[2]), (0.0, s, 0.0), depth[1]
-    s = math.copysign(1.0, p[2])
-    return (p[0], p[1], s * d[2]), (0.0, 0.0, s), depth[2]
 
 
 @inlined
@@ -92,15 +100,6 @@ def touch_sphere_block(a, b, margin, h, many):
         record(a, b, 0, -1, (-n[0], -n[1], -n[2]), on_block, on_ball, distance - r, h, many)
 
 
-@inlined
-def _turned_back(R, S):
-    """Rᵀ S: from the frame of S to that of R."""
-    x = qt.transposed_matvec(R, (S[0], S[3], S[6]))
-    y = qt.transposed_matvec(R, (S[1], S[4], S[7]))
-    z = qt.transposed_matvec(R, (S[2], S[5], S[8]))
-    return (x[0], y[0], z[0], x[1], y[1], z[1], x[2], y[2], z[2])
-
-
 @kernel
 def touch_ellipsoid(a, b, margin, h, many):
     """Add the contact of an ellipsoid and any body, whichever of the two is a; in the frame of the other one."""
@@ -110,7 +109,7 @@ def touch_ellipsoid(a, b, margin, h, many):
     R, size, d = matrix(many.rotation, second), many.bodies[second].dims, many.bodies[first].dims
     x, dims = vector(many.place, second, 0), (size[0], size[1], size[2])
     way = qt.transposed_matvec(R, minus(vector(many.place, first, 0), x))
-    A = squares_of(_turned_back(R, matrix(many.rotation, first)), (d[0], d[1], d[2]))
+    A = squares_of(turned_back(R, matrix(many.rotation, first)), (d[0], d[1], d[2]))
     B = (size[0] * size[0], 0.0, 0.0, size[1] * size[1], 0.0, size[2] * size[2])
     is_block = many.bodies[second].shape == BLOCK
     start = nearest_in_block(way, dims)[1] if is_block else start_from(way)
@@ -131,11 +130,11 @@ def touch_ellipsoid(a, b, margin, h, many):
 
 
 @kernel
-def find_contacts(h, ellipsoids, world, sleep, many):
+def find_contacts(h, ellipsoids, hulls, world, sleep, many):
     """Write the contact set of the bodies where they are, for a stage of length h.
 
-    `ellipsoids` is None where the scene has none, `sleep` where it does not declare it. What sleeps and comes near
-    nothing is left out.
+    `ellipsoids` and `hulls` are None where the scene has none, `sleep` where it does not declare it. What sleeps and
+    comes near nothing is left out.
     """
     many.counts[CONTACTS] = many.counts[PAIRS] = 0
     bodies = many.bodies
@@ -150,6 +149,10 @@ def find_contacts(h, ellipsoids, world, sleep, many):
             continue
         margin = reach(b, h, many) + bodies[b].slop
         for wall in range(many.walls.shape[0]):
+            if hulls is not None:  # noqa: SIM102 (a branch of its own is what the compiler prunes)
+                if bodies[b].shape == HULL:
+                    touch_hull_wall(b, wall, margin, h, many)
+                    continue
             touch_wall(b, wall, margin, h, many)
     for k in range(many.counts[PAIRS]):
         a, b = many.pairs[k, 0], many.pairs[k, 1]
@@ -157,7 +160,18 @@ def find_contacts(h, ellipsoids, world, sleep, many):
             continue  # and so does b: `wake_near`
         margin = reach(a, h, many) + reach(b, h, many) + pair_slop(a, b, many)
         first, second = bodies[a].shape, bodies[b].shape
-        if ellipsoids is not None:  # noqa: SIM102 (a branch of its own is what the compiler prunes)
+        if hulls is not None:
+            if ellipsoids is not None:  # noqa: SIM102
+                if (first == HULL and second == ELLIPSOID) or (first == ELLIPSOID and second == HULL):
+                    touch_ellipsoid_hull(a, b, margin, h, many)
+                    continue
+            if first == HULL or second == HULL:
+                if first == SPHERE or second == SPHERE:
+                    touch_sphere_hull(a, b, margin, h, many)
+                else:
+                    touch_hulls(a, b, margin, h, many)
+                continue
+        if ellipsoids is not None:  # noqa: SIM102
             if first == ELLIPSOID or second == ELLIPSOID:
                 touch_ellipsoid(a, b, margin, h, many)
                 continue

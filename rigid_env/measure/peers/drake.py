@@ -64,6 +64,8 @@ class Drake:
     def open(self, scene: physics.Scene, dt: float, **options) -> _Run:
         """See `contender.Engine`."""
         refuse_meetings(scene)
+        if any(body.kind == "hull" for body in scene.bodies):
+            raise Unsupported("hulls are not handed to Drake")
         if options.pop("is_fitted", False):
             options["dissipation"] = dissipation(scene)
         return _Run(scene, dt, **options)

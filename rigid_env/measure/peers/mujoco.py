@@ -18,7 +18,7 @@ from rigid_env.measure.machine import version
 from rigid_env.measure.peers.contender import State, friction, gravity, restitution, walls
 
 HARD = "0.9999 0.9999 0.001 0.5 2"  # solimp: as rigid as MuJoCo allows
-KINDS = {"block": "box", "sphere": "sphere", "ellipsoid": "ellipsoid"}
+KINDS = {"block": "box", "sphere": "sphere", "ellipsoid": "ellipsoid", "hull": "mesh"}
 
 FREE = {
     "default": {},
@@ -126,11 +126,17 @@ def model_xml(
     )
     contact_law = scene.effect(physics.Contact)
     affinity = 3 if contact_law is not None and contact_law.between_bodies else 1
-    bodies = "".join(_body_xml(body, f'conaffinity="{affinity}" {surface}') for body in scene.bodies)
+    bodies = "".join(_body_xml(b, body, f'conaffinity="{affinity}" {surface}') for b, body in enumerate(scene.bodies))
+    meshes = "".join(
+        f'<mesh name="hull{b}" vertex="{_text(body.polyhedron.vertices.ravel())}"/>'
+        for b, body in enumerate(scene.bodies)
+        if body.kind == "hull"
+    )
     return f"""<mujoco>
   <compiler balanceinertia="false"/>
   <option timestep="{dt!r}" gravity="{_text(gravity(scene))}" integrator="{integrator}" cone="{cone}"
           impratio="{impratio}" noslip_iterations="{noslip}"><flag autoreset="disable"/></option>
+  <asset>{meshes}</asset>
   <worldbody>{planes}{bodies}</worldbody>
 </mujoco>"""
 
@@ -144,9 +150,10 @@ def _reference(contact: str, e: float, dt: float, share: float) -> str:
     return ""
 
 
-def _body_xml(body: physics.Body, surface: str) -> str:
+def _body_xml(b: int, body: physics.Body, surface: str) -> str:
     I = body.inertia
-    shape = f'type="{KINDS[body.kind]}" size="{_text(body.dimensions)}" contype="2"'
+    extent = f'mesh="hull{b}"' if body.kind == "hull" else f'size="{_text(body.dimensions)}"'
+    shape = f'type="{KINDS[body.kind]}" {extent} contype="2"'
     full = (I[0, 0], I[1, 1], I[2, 2], I[0, 1], I[0, 2], I[1, 2])
     return (
         f'<body pos="{_text(body.pos)}" quat="{_text(body.quat)}"><freejoint/>'
