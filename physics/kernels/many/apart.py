@@ -15,7 +15,7 @@ from physics.kernels.compiler import inlined, kernel
 from physics.kernels.many.contacts import pair_slop, plus, put, refresh, vector
 from physics.kernels.many.place import place_body
 from physics.kernels.many.sweeps import assemble, residual_of, sweep_contacts
-from physics.kernels.many.thrift import bring_inside, pay_for_place
+from physics.kernels.many.thrift import bring_inside, free_lift, keep_turning, lift_of, pay
 
 # Share of the depth beyond half a slop that one stage takes back: turning makes the whole of it overshoot.
 APART_SHARE = 0.5
@@ -59,13 +59,31 @@ def _place_inside(b, tilted, many):
 
 @inlined
 def _displace(b, tilted, many):
-    """Move and turn body b by what `many.twist` says."""
+    """Move and turn body b by what `many.twist` says; the work that it takes against its loads [J]."""
     x, q, v, L = read_state(many.now, b)
     start, before = x, 0.5 * qt.dot(L, angular_velocity(q, L, many.bodies[b], tilted))
     turn = qt.exponential(vector(many.twist, b, 3))
     x = plus(x, 1.0, vector(many.twist, b, 0))
     write_state(many.now, b, (x, qt.normalise(qt.multiply(turn, q)), v, L))
-    pay_for_place(b, start, before, tilted, many)
+    keep_turning(b, before, tilted, many)
+    return lift_of(b, start, many)
+
+
+@inlined
+def _displace_all(tilted, many):
+    """Move and turn the bodies, and let those that were lifted pay for what all of them were (`thrift`)."""
+    total = ups = free = 0.0
+    for b in range(many.now.shape[0]):
+        many.before[b, 0] = 0.0
+        if many.touched[b] == 1:
+            lift = _displace(b, tilted, many)
+            _place_inside(b, tilted, many)
+            many.before[b, 0] = max(lift, 0.0)
+            total, ups, free = total + lift, ups + max(lift, 0.0), free + free_lift(b, many)
+    if total > free:
+        for b in range(many.now.shape[0]):
+            if many.before[b, 0] > 0.0:
+                pay(b, many.before[b, 0] * (total / ups), tilted, many)
 
 
 @inlined
@@ -81,10 +99,7 @@ def _part_once(n, tilted, many):
     assemble(n, many)
     sweeps = DEEP_SWEEPS if deepest > DEEP else APART_SWEEPS
     sweep_contacts(0, n, None, residual_of(0, n, None, many), APART_ERROR * largest, sweeps, many)
-    for b in range(many.now.shape[0]):
-        if many.touched[b] == 1:
-            _displace(b, tilted, many)
-            _place_inside(b, tilted, many)
+    _displace_all(tilted, many)
     return deepest
 
 

@@ -28,16 +28,17 @@ from physics.kernels.many.contacts import (
 )
 from physics.kernels.many.place import place_body
 from physics.kernels.many.settle import settle, settle_smoothly
-from physics.kernels.many.thrift import keep_loaded, note_loaded, stage_has_gained, take_stage_back, turn_loaded
+from physics.kernels.many.thrift import (
+    keep_loaded,
+    note_loaded,
+    stage_has_gained,
+    take_stage_back,
+    turn_loaded,
+    vector_of,
+)
 from physics.kernels.sleep import sleeps
 from physics.kernels.stages import STILL_SHARE
 from physics.kernels.step import coast
-
-
-@inlined
-def vector_of(a):
-    """The three numbers of an array."""
-    return (a[0], a[1], a[2])
 
 
 @inlined

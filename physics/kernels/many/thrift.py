@@ -1,8 +1,9 @@
 """No more energy than there is, where bodies touch each other: resting stages, and places put right.
 
 A contact's target that knows how the bodies turn (`glide.aim_rest`) is gainless by itself where bodies answer alike in
-all directions; others, and many contacts together, may gain. To push or turn bodies apart may lift them against their
-loads, and changes ½ L·I⁻¹L at the same L: that is paid with their motion. See `physics.kernels.restraint` for impacts.
+all directions; others, and many contacts together, may gain. To push bodies apart may lift them against their loads,
+which is paid with their motion, and turns them, which changes ½ L·I⁻¹L at the same L. For impacts see
+`physics.kernels.restraint`.
 """
 
 from __future__ import annotations
@@ -20,9 +21,16 @@ from physics.kernels.many.contacts import matrix, minus, plus, put, vector
 # Columns of `many.momenta` in a resting stage: velocities before it, then momenta with its loads.
 VELOCITY, LOADED = 0, 6
 
-# Share of its energy that a body gains for nothing by being put right, and slops that it is lifted for nothing.
+# Share of its energy of turning that a body gains for nothing by being put right, and slops that it is lifted for
+# nothing. What is lifted pays where walls push: bodies push each other apart in pairs, and keep their momentum.
 FREE_SHARE = 1.0e-7
 FREE_LIFT = 10.0
+
+
+@inlined
+def vector_of(a):
+    """The three numbers of an array."""
+    return (a[0], a[1], a[2])
 
 
 @inlined
@@ -81,26 +89,38 @@ def take_stage_back(n, tilted, many):
 
 
 @inlined
-def _slowed(kinetic, price):
-    """What velocities are multiplied by to pay a price [J] with them."""
-    return math.sqrt(1.0 - price / kinetic) if price < kinetic else 0.0
+def lift_of(b, x, many):
+    """Work that moving body b from x to where it is takes against its loads [J]."""
+    body, y = many.bodies[b], vector(many.now, b, at.POS)
+    return -body.mass * qt.dot(vector_of(body.free_acceleration), minus(y, x))
 
 
 @kernel
-def pay_for_place(b, x, before, tilted, many):
-    """Pay for what moving body b from x, where its turning had the energy `before` [J], has gained; from its motion."""
-    y, q, v, L = read_state(many.now, b)
-    body = many.bodies[b]
-    turning = 0.5 * qt.dot(L, angular_velocity(q, L, body, tilted))
-    kinetic = 0.5 * body.mass * qt.dot(v, v) + turning
-    d, a = minus(y, x), body.free_acceleration
-    lift = -body.mass * (a[0] * d[0] + a[1] * d[1] + a[2] * d[2])
-    free = FREE_SHARE * kinetic + body.mass * body.acceleration * FREE_LIFT * body.slop
-    price = turning - before + lift
-    if price > free:
-        s = _slowed(kinetic, price)
-        put(many.now, b, at.LINVEL, (s * v[0], s * v[1], s * v[2]))
+def keep_turning(b, before, tilted, many):
+    """Shorten the angular momentum of a body that was turned, if ½L·I⁻¹L would be more than before."""
+    _, q, _, L = read_state(many.now, b)
+    after = 0.5 * qt.dot(L, angular_velocity(q, L, many.bodies[b], tilted))
+    if after > before + FREE_SHARE * before:
+        s = math.sqrt(before / after)
         put(many.now, b, at.ANGMOM, (s * L[0], s * L[1], s * L[2]))
+
+
+@kernel
+def pay(b, price, tilted, many):
+    """Take a price [J] from the motion of body b, as far as there is any."""
+    _, q, v, L = read_state(many.now, b)
+    body = many.bodies[b]
+    kinetic = 0.5 * (body.mass * qt.dot(v, v) + qt.dot(L, angular_velocity(q, L, body, tilted)))
+    s = math.sqrt(1.0 - price / kinetic) if price < kinetic else 0.0
+    put(many.now, b, at.LINVEL, (s * v[0], s * v[1], s * v[2]))
+    put(many.now, b, at.ANGMOM, (s * L[0], s * L[1], s * L[2]))
+
+
+@inlined
+def free_lift(b, many):
+    """Lift of body b that costs nothing [J]."""
+    body = many.bodies[b]
+    return body.mass * body.acceleration * FREE_LIFT * body.slop
 
 
 @kernel
