@@ -25,6 +25,10 @@ from physics.kernels.solve import PIVOTING, solve_contacts
 STAGE_LENGTH, CONTACT_COUNT, MODE = range(3)
 MEMORY_HEAD = 3
 
+# Share of its energy that a body may gain in a resting stage by what is of third order in the step: more is a step that
+# turns it too far, and is taken without targets that know how it turns.
+GAIN_SHARE = 2.0e-5
+
 # Slops that what is pressed by strong loads may move in a step.
 STILL_SHARE = 0.01
 
@@ -92,7 +96,7 @@ def note_solve(report, world, residual, sweeps, method, tolerance):
 
 @inlined
 def contacts_gain(before, w, v, L, solved, R, h, work):
-    """Whether the impulses of a resting stage raise the energy by more than its solve may be off.
+    """Whether the impulses of a resting stage raise the energy by more than its solve and its step may be off.
 
     Impulses P at the centre of mass and moments Q about it change it by ½ P·(v + v') + ½ Q·(ω + ω'), v and ω before
     the stage (`before`, w), v' and ω' after it. `v`, `L` are those with loads and without impulses.
@@ -107,7 +111,7 @@ def contacts_gain(before, w, v, L, solved, R, h, work):
     turn = (L1[0] - L[0]) * (w[0] + w1[0]) + (L1[1] - L[1]) * (w[1] + w1[1]) + (L1[2] - L[2]) * (w[2] + w1[2])
     square = h * h * (a[0] * a[0] + a[1] * a[1] + a[2] * a[2])
     size = work.mass * (qt.dot(before, before) + square) + abs(qt.dot(L1, w1))
-    return push + turn > work.tolerance * size
+    return push + turn > max(work.tolerance, GAIN_SHARE) * size
 
 
 @inlined

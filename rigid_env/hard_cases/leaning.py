@@ -119,15 +119,9 @@ def dominoes(setting: Setting) -> list[Check]:
     ]
 
 
-TWO_EDGES = (
-    "edges that touch may take any normal between those of the two faces; the engine takes a face's, 20° off the "
-    "horizontal (block_block.best_face, the first block's of equals), so that the apex slips unless μ >= tanφ"
-)
-
 CASES = (
     Case(28, "cards", "two cards lean on each other, 20° from the vertical",
-         "hold iff μ >= ½ tanφ (less half their thickness by length)", cards, peers=True,
-         faults={"balanced": TWO_EDGES, "fast": TWO_EDGES}),
+         "hold iff μ >= ½ tanφ (less half their thickness by length)", cards, peers=True),
     Case(29, "ladder", "a ladder against a wall, both ends rough",
          "slips below tanθ = (1 - μ²)/(2 μ), θ from the floor", ladder, peers=True),
     Case(44, "dominoes", "a run of twenty dominoes", "all fall, in order", dominoes, peers=True),

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 import numpy as np
 import pytest
 
@@ -194,10 +196,7 @@ def test_what_mjcf_cannot_express_is_refused_or_named(tmp_path):
         physics.save_mjcf(scene, path)
     assert not path.exists()
     physics.save_mjcf(scene, path, drop=True)
-    assert (
-        "left out: Contact(restitution=0.5, between_bodies=True, tangential=None), Drag(coefficient=0.3"
-        in path.read_text()
-    )
+    assert re.search(r"left out: Contact\(restitution=0.5, .*\), Drag\(coefficient=0.3", path.read_text())
     assert physics.load_mjcf(path).effects == (physics.Gravity(),)
 
 

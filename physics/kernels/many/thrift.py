@@ -17,6 +17,7 @@ from physics.kernels.body import angular_velocity, read_state
 from physics.kernels.compiler import inlined, kernel
 from physics.kernels.layout import HULL, NORMAL, OFFSET
 from physics.kernels.many.contacts import matrix, minus, plus, put, vector
+from physics.kernels.stages import GAIN_SHARE
 
 # Columns of `many.momenta` in a resting stage: velocities before it, then momenta with its loads.
 VELOCITY, LOADED = 0, 6
@@ -49,7 +50,7 @@ def keep_loaded(b, many):
 
 @kernel
 def stage_has_gained(h, many):
-    """Whether the impulses of a resting stage raised the energy by more than its solve may be off.
+    """Whether the impulses of a resting stage raised the energy by more than its solve and its step may be off.
 
     Impulses P and moments Q of a body change its energy by ½ P·(v + v') + ½ Q·(ω + ω').
     """
@@ -64,7 +65,7 @@ def stage_has_gained(h, many):
         gain += body.mass * qt.dot(P, plus(v, 1.0, v1)) + qt.dot(Q, plus(w, 1.0, w1))
         square = h * h * (a[0] * a[0] + a[1] * a[1] + a[2] * a[2])
         size += body.mass * (qt.dot(v, v) + square) + abs(qt.dot(L1, w1))
-    return gain > many.settings[0].tolerance * size
+    return gain > max(many.settings[0].tolerance, GAIN_SHARE) * size
 
 
 @inlined
