@@ -198,6 +198,8 @@ def free_rotation(q, L, J, series, h):
         parts = int(angle / ANGLE_LIMIT) + 1
         for _ in range(parts):
             q, m = _part(q, m, J, series, mm, energy2, h / parts)
+    elif not angle < math.inf:
+        return (math.nan, math.nan, math.nan, math.nan)  # its energy overflows: the caller's guard reports it
     return q
 
 

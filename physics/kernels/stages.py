@@ -122,15 +122,15 @@ def calm_targets(n, work):
         work.target[i, 1] = work.target[i, 2] = 0.0
 
 
-def _rigid_without_gain(n, friction, smooth, pivots, before, w, solved, free, R, h, work):
+def _calmed_if_it_gains(n, friction, smooth, pivots, before, w, solved, free, R, h, work):
     if contacts_gain(before, w, free[0], free[1], solved, R, h, work):
         calm_targets(n, work)
         return solve_contacts(n, friction, smooth, pivots, free[0], free[1], R, work)
     return solved
 
 
-@if_law((STIFFNESS,), _rigid_without_gain)
-def without_stage_gain(n, friction, smooth, pivots, before, w, solved, free, R, h, work):
+@if_law((STIFFNESS,), _calmed_if_it_gains)
+def calmed_stage(n, friction, smooth, pivots, before, w, solved, free, R, h, work):
     """What `solve_contacts` gave for `free` (v, L); if that raises the energy, what it gives for calm targets.
 
     Springs give back what they hold.
@@ -214,7 +214,7 @@ def touch(n, y, h, friction, smooth, gyroscopic, tilted, pivots, memory, report,
         oppose_end_slip(n, work)
         solved = solve_contacts(n, friction, smooth, pivots, v, L, R, work)
     solved = without_gift(n, friction, smooth, pivots, v0, w, solved, (v, L), R, h, work)
-    solved = without_stage_gain(n, friction, smooth, pivots, v0, w, solved, (v, L), R, h, work)
+    solved = calmed_stage(n, friction, smooth, pivots, v0, w, solved, (v, L), R, h, work)
     v1, L1, residual, sweeps, method = resist_turning(n, friction, smooth, pivots, v, L, solved, R, work)
     memory[work.i, MODE] = work.mode
     note_solve(report, work.world, residual, sweeps, method, work.tolerance)

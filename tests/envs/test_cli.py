@@ -316,7 +316,8 @@ def test_effects_measures_every_effect_with_and_without(tmp_path):
     run("effects", "--quick", "--json", path, "--markdown", page)
     rows = {row["key"]: row for row in loaded(path)["rows"]}
     kinds = {kind.__name__.lower() for kind in (physics.Gravity, physics.Contact, physics.Friction, *FIELDS)}
-    kinds |= {"rollingfriction", "spinfriction", "actuator", "sleeping", "tangentialrestitution"}
+    kinds |= {"rollingfriction", "spinfriction", "actuator", "sleeping", "tangentialrestitution", "compliance"}
+    kinds |= {"frictionoftwocoefficients"}
     kinds |= {"springbetweenbodies"}
     assert {name.replace(" ", "") for name in rows} == kinds | {"gusts"}
     for row in rows.values():

@@ -123,4 +123,4 @@ def test_blocks_of_the_wall_frame_are_those_of_the_dense_matrix():
     K = tuple(inverse[i, j] for i, j in ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2)))
     r, s = (tuple(axes @ problem.one["arm"][i]) for i in range(2))
     # Sums of products of size 1, a dozen roundings.
-    np.testing.assert_allclose(np.reshape(block(r, s, 1 / problem.mass, K), (3, 3)), W[:3, 3:], atol=5e-15)
+    np.testing.assert_allclose(np.reshape(block(r, s, 1 / problem.mass, 1.0, K), (3, 3)), W[:3, 3:], atol=5e-15)

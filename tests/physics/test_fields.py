@@ -487,7 +487,7 @@ def test_parameters_of_fields_may_differ_from_world_to_world():
     for bad, message in (
         ([physics.Spring(), physics.Spring()], "2 Spring; allowed are 1"),
         ([physics.Spring(body=1)], "Spring.body is 1"),
-        ([physics.Friction()], "effects holds Friction"),
+        ([physics.Friction()], "Friction was given, but the scene does not declare it"),
     ):
         with pytest.raises(ValueError, match=message):
             world.set_parameters(mass=1.0, effects=bad)
