@@ -87,9 +87,7 @@ def compiled_names(effects: str, cache: Path) -> set[str]:
             "[physics.Contact(), physics.Friction()]",
             {"cone_sweeps"},
             {"ellipse", "bind_laws"},
-            marks=pytest.mark.xfail(
-                reason="a stub of `kernels.ellipse` is a part of its own; what it holds is to be seen"
-            ),
+            marks=pytest.mark.xfail(reason="a stub of `kernels.ellipse` is a part of its own"),
         ),
         (
             "[physics.Contact(), physics.Friction((0.1, 0.2), (0, 0, 1))]",
