@@ -53,8 +53,8 @@ def stage_has_gained(n, h, many):
     """Whether the impulses of a resting stage of n contacts raised the energy by more than solve and step may be off.
 
     Impulses P and moments Q of a body change its energy by ½ P·(v + v') + ½ Q·(ω + ω'). A contact that pushes may keep
-    a residual r = tolerance · s, s the largest free speed, and so give ½ p r, which in a tower is far more than what its
-    bodies move with. To hold loads, none needs a p above all of them together, F: what is beyond is strain.
+    a residual r = tolerance · s, s the largest free speed, and so give ½ p r, which in a tower is far more than what
+    its bodies move with. To hold loads, none needs a p above all of them together, F: what is beyond is strain.
     """
     gain = size = fastest = F = 0.0
     for b in range(many.now.shape[0]):
