@@ -131,7 +131,7 @@ def test_a_contact_plan_is_optimised_once_and_compiled_once_for_all_processes(tm
 RECORDS = """
 import sys
 import numpy as np
-from physics.kernels.compiler import composed, kernel
+from physics.kernels.compiler import kernel
 
 @kernel
 def total(row):
