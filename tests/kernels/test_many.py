@@ -192,6 +192,25 @@ def test_names_of_equal_stacked_blocks_do_not_change_with_rounding():
     assert names[0] == names[1] == names[2]
 
 
+@settings(max_examples=100, deadline=None)
+@given(yaw=st.floats(-4, 4), shift=st.tuples(st.floats(-3, 3), st.floats(-3, 3)))
+@example(yaw=0.2, shift=(1.0, 0.0))  # a side from 0.8 to 1.2 slops outside: its crossing with the rim is beyond its end
+def test_faces_that_end_together_touch_all_over(yaw, shift):
+    """Equal cubes on each other, sides apart by slops: at the four corners, none of them lost or off the faces."""
+    slop = 1e-6 * math.sqrt(0.75)
+    c, s = math.cos(yaw * slop), math.sin(yaw * slop)
+    turned = np.array([[c, 0.0, s], [0.0, 1.0, 0.0], [-s, 0.0, c]])
+    many = blocks([[0, 0, 0], [shift[0] * slop, 1, shift[1] * slop]], [np.eye(3), turned], np.full((2, 3), 0.5))
+    find_contacts(0.01, None, None, 0, None, many)
+    points = many.arm[: many.counts[CONTACTS], :3]
+    # A corner is off by the shift, its way by the turn, and what the clip leaves or takes: a slop.
+    reach = (3 + 4 * 0.5 + 1 + 1e-6) * slop
+    corners = np.array(list(itertools.product((-0.5, 0.5), (0.5,), (-0.5, 0.5))))
+    distance = np.abs(points[:, None] - corners).max(axis=-1)
+    assert (distance.min(axis=0) <= reach).all()  # every corner is held
+    assert (np.abs(points) <= 0.5 + reach).all()  # nothing off the faces
+
+
 # --- islands and the linear system -----------------------------------------------------------------------------
 
 

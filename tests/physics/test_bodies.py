@@ -68,10 +68,12 @@ def test_oblique_impact_turns_along_the_line_of_centres():
 
 @pytest.mark.parametrize("restitution", [0.2, 0.7])
 @pytest.mark.parametrize("ball_first", [True, False])
-def test_a_ball_turns_the_block_that_it_hits_off_centre(restitution, ball_first):
+@pytest.mark.parametrize("shape", ["block", "hull"])
+def test_a_ball_turns_the_block_that_it_hits_off_centre(restitution, ball_first, shape):
     v, offset, mass, moment = 3.0, 0.6, 5.0, 5.0 * (1.0**2 + 2.0**2) / 12
     ball = physics.Sphere(0.5, 2.0, pos=(-2, offset, 0), linvel=(v, 0, 0))
-    block = physics.Block((1, 2, 1), mass)
+    corners = 0.5 * np.array(list(itertools.product((-1, 1), (-2, 2), (-1, 1))))
+    block = physics.Block((1, 2, 1), mass) if shape == "block" else physics.Hull(corners, mass)
     bodies = [ball, block] if ball_first else [block, ball]
     world = physics.World(physics.Scene(bodies, (), [physics.Contact(restitution)]), dt=0.01)
     # One contact is one sweep, which is exact: were it wrong, Newton's method would mend it unseen.

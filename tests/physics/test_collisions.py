@@ -7,7 +7,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 import physics
@@ -175,12 +175,12 @@ def in_a_row(places, speeds, masses, e, collisions) -> np.ndarray:
     return world.linvel[0, :, 0].copy()
 
 
-@pytest.mark.xfail(reason="e = 1/8, speeds (0, 0, -1), masses (1, 1/2, 1): a solve ends at a residual of 0.11")
 @given(
     speeds=st.lists(st.floats(-3, 3), min_size=2, max_size=4),
     masses=st.lists(st.floats(0.2, 5.0), min_size=4, max_size=4),
     e=st.floats(0.0, 1.0),
 )
+@example(speeds=[0.0, 0.0, -1.0], masses=[1.0, 0.5, 1.0, 1.0], e=0.125)  # all end at -0.4: what is left is rounding
 @settings(max_examples=60)
 def test_balls_that_touch_in_a_row_follow_the_law_that_was_asked_for(speeds, masses, e):
     """In a row that touches every velocity of approach is v_i - v_{i+1}: the reference's J, and M the masses."""

@@ -181,6 +181,15 @@ def record(a, b, feature, owner, normal, point_a, point_b, gap, h, many):
 
 
 @inlined
+def record_either(a, b, first, n, on_first, on_second, gap, h, many):
+    """Record the one contact of a and b, of which one is `first`; n is out of the other one."""
+    if first == a:
+        record(a, b, 0, -1, n, on_first, on_second, gap, h, many)
+    else:
+        record(a, b, 0, -1, (-n[0], -n[1], -n[2]), on_second, on_first, gap, h, many)
+
+
+@inlined
 def _carried(b, k, first, side, n, many):
     """Point of body b in contact k from its centre of mass, world frame [m]: carried along as the body turns.
 

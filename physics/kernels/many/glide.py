@@ -165,10 +165,10 @@ def glide(n, world, h, friction, gyroscopic, tilted, scheme, sleep, memory, repo
     kept.load(n, world, h, friction, memory, many)
     many.settings[0].still = still_speed(h, many)
     settle(n, world, friction, report, many)
-    if stage_has_gained(h, many):
+    if stage_has_gained(n, h, many):
         take_stage_back(n, tilted, many)
         settle(n, world, friction, report, many)
-        if friction is not None and stage_has_gained(h, many):
+        if friction is not None and stage_has_gained(n, h, many):
             take_stage_back(n, tilted, many)
             settle_smoothly(n, many)
     many.settings[0].still = math.inf

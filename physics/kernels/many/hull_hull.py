@@ -15,7 +15,7 @@ import math
 
 from physics.kernels import quaternion as qt
 from physics.kernels.compiler import inlined, kernel
-from physics.kernels.many.block_block import FLAT, PARALLEL
+from physics.kernels.many.block_axes import FLAT, PARALLEL
 from physics.kernels.many.contacts import minus, pair_slop, plus, record, vector
 from physics.kernels.many.hull_clip import SIDES, clip_face, incident
 from physics.kernels.many.hull_place import nearest_on_face, put_in_place

@@ -7,7 +7,7 @@ import math
 from physics.kernels import quaternion as qt
 from physics.kernels.compiler import inlined, kernel
 from physics.kernels.layout import ELLIPSOID, SPHERE
-from physics.kernels.many.contacts import matrix, minus, plus, record, tangents, vector
+from physics.kernels.many.contacts import matrix, minus, plus, record_either, tangents, vector
 from physics.kernels.many.hull_hull import edge_of
 from physics.kernels.many.hull_place import is_above_face, nearest_on_face, put_in_place
 from physics.kernels.many.hulls import (
@@ -62,11 +62,7 @@ def touch_sphere_hull(a, b, margin, h, many):
     y, n, distance = nearest_on_hull(hull, minus(x, origin), many)
     if distance - r > margin:
         return
-    on_hull, on_ball = plus(origin, 1.0, y), plus(x, -r, n)
-    if ball == a:
-        record(a, b, 0, -1, n, on_ball, on_hull, distance - r, h, many)
-    else:
-        record(a, b, 0, -1, (-n[0], -n[1], -n[2]), on_hull, on_ball, distance - r, h, many)
+    record_either(a, b, ball, n, plus(x, -r, n), plus(origin, 1.0, y), distance - r, h, many)
 
 
 @inlined
@@ -134,7 +130,4 @@ def touch_ellipsoid_hull(a, b, margin, h, many):
         return
     on_round = plus(origin, 1.0, minus(way, point_of(A, n)[1]))
     on_hull = plus(on_round, -best, n)
-    if round_ == a:
-        record(a, b, 0, -1, n, on_round, on_hull, best, h, many)
-    else:
-        record(a, b, 0, -1, (-n[0], -n[1], -n[2]), on_hull, on_round, best, h, many)
+    record_either(a, b, round_, n, on_round, on_hull, best, h, many)

@@ -39,6 +39,11 @@ FIRST_SWEEPS = 5
 # Residual that rounding leaves, relative to the largest free velocity: no more is asked for.
 ROUNDING = 1.0e-12
 
+# Where bodies of one velocity touch, all that is left to solve is the rounding of that velocity, and nothing can be
+# solved relative to it: u is the difference of two sums v + ω x r of three products and three terms each, every one of
+# them rounded, which makes 2 · 6 · ε of the largest, and the impulses round the velocities once more.
+VELOCITY_ROUNDING = 16 * 2.0**-52
+
 # Bodies that wedge by friction hold any stress. Impulses that alone would give this many times the free velocities are
 # one that a method ran into, not what holds a million times a body's weight: what they leave is rounding.
 STRAINED = 1.0e9
@@ -125,6 +130,17 @@ def strain(first, last, many):
 
 
 @inlined
+def fastest(many):
+    """No point of a body is faster than this [m/s]."""
+    most = 0.0
+    for b in range(many.twist.shape[0]):
+        v, w = vector(many.twist, b, 0), vector(many.twist, b, 3)
+        linear = max(abs(v[0]), max(abs(v[1]), abs(v[2])))
+        most = max(most, linear + many.bodies[b].radius * (abs(w[0]) + abs(w[1]) + abs(w[2])))
+    return most
+
+
+@inlined
 def forget_impulses(first, last, many):
     """No impulses."""
     for i in range(first, last):
@@ -168,13 +184,15 @@ def solve_contacts(n, friction, many):
     """Solve for `many.impulse` from the warm start in it: (iterations, relative residual, method).
 
     `many.twist` holds the velocities without any contact impulse and receives those with them. The residual is
-    measured on what is returned, relative to the largest velocity that a contact would have without any impulse.
+    measured on what is returned, relative to the largest velocity that a contact would have without any impulse; or,
+    where all of those are next to rounding, to that speed of which the velocities' rounding is the tolerance's share.
     Iterations are those of the island that took most.
     """
     for b in range(many.twist.shape[0]):
         for c in range(6):
             many.free[b, c] = many.twist[b, c]
-    scale = assemble(n, many)
+    least = VELOCITY_ROUNDING * fastest(many) / many.settings[0].tolerance
+    scale = max(assemble(n, many), least)
     if not scale > 0.0:
         return 0, 0.0, SWEEPS
     goal = max(min(many.settings[0].tolerance * scale, many.settings[0].still), ROUNDING * scale)

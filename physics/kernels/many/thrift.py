@@ -49,12 +49,14 @@ def keep_loaded(b, many):
 
 
 @kernel
-def stage_has_gained(h, many):
-    """Whether the impulses of a resting stage raised the energy by more than its solve and its step may be off.
+def stage_has_gained(n, h, many):
+    """Whether the impulses of a resting stage of n contacts raised the energy by more than solve and step may be off.
 
-    Impulses P and moments Q of a body change its energy by ½ P·(v + v') + ½ Q·(ω + ω').
+    Impulses P and moments Q of a body change its energy by ½ P·(v + v') + ½ Q·(ω + ω'). A contact that pushes may keep
+    a residual r = tolerance · s, s the largest free speed, and so give ½ p r, which in a tower is far more than what
+    its bodies move with. To hold loads, none needs a p above all of them together, F: what is beyond is strain.
     """
-    gain = size = 0.0
+    gain = size = fastest = F = 0.0
     for b in range(many.now.shape[0]):
         if many.touched[b] == 0:
             continue
@@ -65,7 +67,13 @@ def stage_has_gained(h, many):
         gain += body.mass * qt.dot(P, plus(v, 1.0, v1)) + qt.dot(Q, plus(w, 1.0, w1))
         square = h * h * (a[0] * a[0] + a[1] * a[1] + a[2] * a[2])
         size += body.mass * (qt.dot(v, v) + square) + abs(qt.dot(L1, w1))
-    return gain > max(many.settings[0].tolerance, GAIN_SHARE) * size
+        fastest = max(fastest, qt.dot(v, v) + square)
+        F += body.mass * math.sqrt(square)
+    held = 0.0
+    for k in range(n):
+        held += min(many.impulse[k, 0], F)
+    tolerance = many.settings[0].tolerance
+    return gain > max(tolerance, GAIN_SHARE) * size + tolerance * math.sqrt(fastest) * held
 
 
 @inlined

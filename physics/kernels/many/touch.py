@@ -10,7 +10,7 @@ from physics.kernels.compiler import inlined, kernel
 from physics.kernels.layout import BLOCK, ELLIPSOID, HULL, NORMAL, OFFSET, SPHERE, VERTEX_COUNT
 from physics.kernels.many.arrays import CONTACTS, PAIRS
 from physics.kernels.many.block_block import touch_blocks
-from physics.kernels.many.contacts import matrix, minus, pair_slop, plus, record, vector
+from physics.kernels.many.contacts import matrix, minus, pair_slop, plus, record, record_either, vector
 from physics.kernels.many.hull_hull import touch_hulls
 from physics.kernels.many.hull_place import corner_arm
 from physics.kernels.many.hull_round import touch_ellipsoid_hull, touch_sphere_hull
@@ -92,12 +92,8 @@ def touch_sphere_block(a, b, margin, h, many):
     q, n, distance = nearest_in_block(qt.transposed_matvec(R, minus(x, y)), (dims[0], dims[1], dims[2]))
     if distance - r > margin:
         return
-    n, on_block = qt.matvec(R, n), plus(y, 1.0, qt.matvec(R, q))
-    on_ball = plus(x, -r, n)
-    if ball == a:
-        record(a, b, 0, -1, n, on_ball, on_block, distance - r, h, many)
-    else:
-        record(a, b, 0, -1, (-n[0], -n[1], -n[2]), on_block, on_ball, distance - r, h, many)
+    n = qt.matvec(R, n)
+    record_either(a, b, ball, n, plus(x, -r, n), plus(y, 1.0, qt.matvec(R, q)), distance - r, h, many)
 
 
 @kernel
@@ -123,10 +119,7 @@ def touch_ellipsoid(a, b, margin, h, many):
         plus(x, 1.0, qt.matvec(R, on_first)),
         plus(x, 1.0, qt.matvec(R, on_second)),
     )
-    if first == a:
-        record(a, b, 0, -1, n, on_first, on_second, gap, h, many)
-    else:
-        record(a, b, 0, -1, (-n[0], -n[1], -n[2]), on_second, on_first, gap, h, many)
+    record_either(a, b, first, n, on_first, on_second, gap, h, many)
 
 
 @kernel

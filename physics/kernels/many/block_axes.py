@@ -1,0 +1,97 @@
+"""The fifteen axes that can separate two blocks: three face normals of each and nine products of edges.
+
+References
+----------
+S. Gottschalk, M. C. Lin, D. Manocha, *OBBTree*, SIGGRAPH 1996.
+"""
+
+from __future__ import annotations
+
+import math
+
+from physics.kernels.compiler import inlined
+from physics.kernels.many.contacts import minus, pair_slop, vector
+
+# Squared sine of the angle between two edges below which they are parallel: their product says nothing that a face
+# does not. Rounding of the nine products is 1e-16; its square root would still be noise.
+PARALLEL = 1.0e-12
+
+# Cosine of the angle between the product of two edges and a face normal above which the faces count as lying flat on
+# each other (11 degrees). One point would let them tip to and fro; the clipped face holds them, at the distance that
+# the edges say.
+FLAT = 0.98
+
+AXES, SIZES, FROM_A, FROM_B = 0, 1, 2, 3
+
+
+@inlined
+def column(R, b, k):
+    """Axis k of body b, world frame."""
+    return (R[b, k], R[b, 3 + k], R[b, 6 + k])
+
+
+@inlined
+def relate(a, b, many):
+    """Write `many.mix`: axes of b in a, absolute values, and the way from a to b in both frames."""
+    R, mix, place = many.rotation, many.mix, many.place
+    for i in range(3):
+        for j in range(3):
+            c = R[a, i] * R[b, j] + R[a, 3 + i] * R[b, 3 + j] + R[a, 6 + i] * R[b, 6 + j]
+            mix[AXES, i, j], mix[SIZES, i, j] = c, abs(c)
+    d = minus(vector(place, b, 0), vector(place, a, 0))
+    for i in range(3):
+        mix[FROM_A, 0, i] = R[a, i] * d[0] + R[a, 3 + i] * d[1] + R[a, 6 + i] * d[2]
+        mix[FROM_B, 0, i] = R[b, i] * d[0] + R[b, 3 + i] * d[1] + R[b, 6 + i] * d[2]
+
+
+@inlined
+def best_face(a, b, many):
+    """(separation, face) of the face normal that separates most; the first block's unless the other's is better."""
+    S, da, db = many.mix[SIZES], many.bodies[a].dims, many.bodies[b].dims
+    way_a, way_b = many.mix[FROM_A, 0], many.mix[FROM_B, 0]
+    best, face = -math.inf, 0
+    slop = pair_slop(a, b, many)
+    for i in range(3):
+        s = abs(way_a[i]) - (da[i] + (db[0] * S[i, 0] + db[1] * S[i, 1] + db[2] * S[i, 2]))
+        if s > best + slop:
+            best, face = s, i
+    for j in range(3):
+        s = abs(way_b[j]) - (db[j] + (da[0] * S[0, j] + da[1] * S[1, j] + da[2] * S[2, j]))
+        if s > best + slop:
+            best, face = s, 3 + j
+    return best, face
+
+
+@inlined
+def best_edges(a, b, many):
+    """(separation, 3 i + j) of the product of edges i of a and j of b that separates most."""
+    C, S, way = many.mix[AXES], many.mix[SIZES], many.mix[FROM_A, 0]
+    da, db = many.bodies[a].dims, many.bodies[b].dims
+    best, edges = -math.inf, 0
+    for i in range(3):
+        i1, i2 = (i + 1) % 3, (i + 2) % 3
+        for j in range(3):
+            square = 1.0 - C[i, j] * C[i, j]
+            if square < PARALLEL:
+                continue
+            j1, j2 = (j + 1) % 3, (j + 2) % 3
+            apart = abs(way[i2] * C[i1, j] - way[i1] * C[i2, j])
+            size = (da[i1] * S[i2, j] + da[i2] * S[i1, j]) + (db[j1] * S[i, j2] + db[j2] * S[i, j1])
+            s = (apart - size) / math.sqrt(square)
+            if s > best:
+                best, edges = s, 3 * i + j
+    return best, edges
+
+
+@inlined
+def is_along_face(edges, face, many):
+    """Whether the product of two edges is nearly a face normal: the faces then lie flat on each other."""
+    C, i, j = many.mix[AXES], edges // 3, edges % 3
+    square = 1.0 - C[i, j] * C[i, j]
+    # Component of (edge i of a) x (edge j of b) along the face normal: on axis k of a it is the determinant
+    # e_k · (e_i x b_j), one entry of C; on axis k of b likewise, with the transpose.
+    if face < 3:
+        c = 0.0 if face == i else C[3 - face - i, j]
+    else:
+        c = 0.0 if face - 3 == j else C[i, 6 - face - j]
+    return c * c >= FLAT * FLAT * square

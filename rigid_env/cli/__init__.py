@@ -1,0 +1,32 @@
+"""The command line ``rigid-env``. A command imports what it needs when it runs: ``--help`` is quick."""
+
+from __future__ import annotations
+
+from importlib import metadata
+from typing import Annotated
+
+import typer
+
+from rigid_env.cli import exploring, measuring
+from rigid_env.cli.common import app
+
+__all__ = ["app", "exploring", "measuring"]
+
+
+def _print_version(is_wanted: bool) -> None:
+    if not is_wanted:
+        return
+    try:
+        typer.echo(f"rigid-env {metadata.version('rigid-env')}")
+    except metadata.PackageNotFoundError:
+        typer.echo("rigid-env, not installed: run from its sources")
+    raise typer.Exit
+
+
+@app.callback()
+def _main(
+    version: Annotated[
+        bool, typer.Option("--version", callback=_print_version, is_eager=True, help="Show the version.")
+    ] = False,
+) -> None:
+    pass
