@@ -71,11 +71,12 @@ OPTIONS = {"error_model": "numpy", "nogil": True, "_nrt": False}
 CHOSEN = {**OPTIONS, "forceinline": True, "pipeline_class": Kernel.part_pipeline}
 
 
-def _make(function, **options):
+def _make(function, is_foreign=False, **options):
     """A `Kernel` of `function`; without a compiler the function itself."""
     if config.DISABLE_JIT:
         return function
-    return Kernel(function, options={"nopython": True, "boundscheck": None, **OPTIONS, **options})
+    options = {"nopython": True, "boundscheck": None, **OPTIONS, **options}
+    return Kernel(function, options=options, is_foreign=is_foreign)
 
 
 def _compile(function, **options):
@@ -109,4 +110,4 @@ def inlined(function):
 
 def composed(function):
     """`inlined` without a place of its own on disk: made at run time, or by a user, and kept with what calls it."""
-    return _make(function, forceinline=True)
+    return _make(function, is_foreign=True, forceinline=True)

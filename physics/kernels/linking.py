@@ -21,9 +21,12 @@ import hashlib
 from numba import _dynfunc
 from numba.core.codegen import CodeLibrary, JITCodeLibrary
 from numba.core.compiler import CompilerBase, DefaultPassBuilder, Flags
-from numba.core.compiler_machinery import LoweringPass, register_pass
+from numba.core.compiler_machinery import LoweringPass, PassManager, register_pass
 from numba.core.registry import CPUDispatcher
-from numba.core.typed_passes import NativeLowering
+from numba.core.typed_passes import NativeLowering, NoPythonBackend
+
+from physics.kernels.passes import KernelPasses
+from physics.kernels.remember import RememberingTarget, remembering
 
 
 class _PartLibrary(JITCodeLibrary):
@@ -73,21 +76,26 @@ class _Flags(Flags):
 
 
 class _WholeCompiler(CompilerBase):
-    """Numba's pipeline, into a library of ours."""
+    """Passes of ours, into a library of ours."""
 
     library_class: type[JITCodeLibrary] = _WholeLibrary
 
     def __init__(self, typingctx, targetctx, library, args, return_type, flags, local_types):
         flags = _Flags(flags)
         flags.types = hashlib.sha256(str(args).encode()).hexdigest()[:16]
-        super().__init__(typingctx, targetctx, library, args, return_type, flags, local_types)
+        contexts = remembering(typingctx), RememberingTarget(targetctx)
+        super().__init__(*contexts, library, args, return_type, flags, local_types)
         self.state.flags.no_cfunc_wrapper = True
+
+    def passes(self) -> PassManager:
+        """To be run one after another."""
+        return KernelPasses(NoPythonBackend)
 
     def define_pipelines(self):
         state = self.state
         state.library = self.library_class(state.targetctx.codegen(), state.func_id.func_qualname)
         state.library.enable_object_caching()
-        return [DefaultPassBuilder.define_nopython_pipeline(state)]
+        return [self.passes()]
 
 
 @register_pass(mutates_CFG=False, analysis_only=True)
@@ -109,7 +117,7 @@ class _KeepAsPart(LoweringPass):
 
 
 class _PartCompiler(_WholeCompiler):
-    """Numba's pipeline up to the IR."""
+    """Up to the IR."""
 
     library_class = _PartLibrary
 
@@ -118,11 +126,18 @@ class _PartCompiler(_WholeCompiler):
         self.state.flags.no_cpython_wrapper = True
         self.state.flags.no_compile = True
 
-    def define_pipelines(self):
-        (pipeline,) = super().define_pipelines()
+    def passes(self):
+        return KernelPasses(_KeepAsPart, NoPythonBackend)
+
+
+class _AnyPartCompiler(_PartCompiler):
+    """For a function of which nothing is known: all that Numba's own pipeline does."""
+
+    def passes(self):
+        pipeline = DefaultPassBuilder.define_nopython_pipeline(self.state)
         pipeline.add_pass_after(_KeepAsPart, NativeLowering)
         pipeline.finalize()
-        return [pipeline]
+        return pipeline
 
 
 class Kernel(CPUDispatcher):
@@ -135,13 +150,16 @@ class Kernel(CPUDispatcher):
         Must be empty; Numba passes it.
     options : dict
         Numba's options, as of `numba.njit`.
+    is_foreign : bool
+        It may be more than a kernel is: a closure, a comprehension. Such a function is only called from kernels.
     """
 
     part_pipeline = _PartCompiler
 
-    def __init__(self, function, local_types=None, options=None):
+    def __init__(self, function, local_types=None, options=None, is_foreign=False):
         super().__init__(function, local_types, options, pipeline_class=_WholeCompiler)
-        self._part = CPUDispatcher(function, local_types, options, pipeline_class=_PartCompiler)
+        part_compiler = _AnyPartCompiler if is_foreign else _PartCompiler
+        self._part = CPUDispatcher(function, local_types, options, pipeline_class=part_compiler)
 
     def get_call_template(self, args, kws):
         """How another kernel calls this one."""

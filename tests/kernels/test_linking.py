@@ -13,7 +13,7 @@ from pathlib import Path
 
 import pytest
 
-from physics.kernels.compiler import kernel
+from physics.kernels.compiler import composed, kernel
 
 
 @kernel
@@ -49,6 +49,22 @@ def test_a_kernel_that_only_kernels_call_is_never_made_machine_code():
     assert not squares.signatures
     assert squares(4) == 16  # until Python calls it
     assert len(squares.signatures) == 1
+
+
+@composed
+def with_a_closure(x):
+    twice = lambda y: 2.0 * y  # noqa: E731
+    return twice(x)
+
+
+@kernel
+def calls_a_closure(x):
+    return with_a_closure(x)
+
+
+def test_what_users_write_may_be_more_than_a_kernel():
+    """Passes of kernels leave closures out; functions that others hand over go through all of Numba's."""
+    assert calls_a_closure(3.0) == 6.0
 
 
 PROGRAM = """

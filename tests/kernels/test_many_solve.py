@@ -5,58 +5,23 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from benchmarks import problems
+from benchmarks.problems import SETTINGS
 from physics.kernels import layout as at
 from physics.kernels.many import interior, islands, newton, solve, sweeps
 from physics.kernels.many.arrays import Many, make_many
 from tests.reference.lcp import coulomb_defect, solve_coulomb
 
-SETTINGS = {"relative_slop": 1e-6, "tolerance": 1e-6, "sweeps": 200, "splits": 8, "rest_share": 0.5}
 
-
-def pile(seed: int, bodies: int, contacts: int, mu: float, masses: float = 1.0) -> tuple[Many, int]:
-    """Bodies on each other, each on the one before by `contacts` contacts at random places, falling onto each other.
-
-    Masses are powers of `masses` at random; the lowest lies on a wall. Returns scratch and the number of contacts.
-    """
-    rng = np.random.default_rng(seed)
-    many = make_many(bodies, np.zeros((1, at.WALL_SIZE)), **SETTINGS)
-    mass = masses ** rng.uniform(-1, 1, bodies)
-    many.bodies["mass"], many.bodies["radius"], many.lightness[:] = mass, 1.0, 1 / mass
-    for b in range(bodies):
-        A = rng.normal(size=(3, 3))
-        K = (A @ A.T + np.eye(3)) / mass[b]
-        many.turning[b] = K[np.triu_indices(3)]
-    many.twist[:] = rng.normal(size=(bodies, 6))
-    many.twist[:, 1] -= 3.0
-    n = bodies * contacts
-    for k in range(n):
-        b = k // contacts
-        normal = np.array([0, 1, 0]) + 0.3 * rng.normal(size=3)
-        frame = np.linalg.qr(np.column_stack([normal, rng.normal(size=(3, 2))]))[0].T
-        many.ends[k] = (b, b - 1) if b > 0 else (0, -1)
-        many.frame[k] = (frame * np.sign(frame[0] @ normal)).ravel()
-        many.arm[k] = rng.normal(size=6)
-    many.mu[:] = mu
-    many.touched[:] = 1
-    return many, n
+def pile(*arguments) -> tuple[Many, int]:
+    """Scratch with a random pile (`problems.pile`), and the number of contacts."""
+    problem = problems.pile(*arguments)
+    return problem.many, problem.count
 
 
 def dense(many: Many, n: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Jacobian (3 n, 6 bodies), inverse mass matrix and free velocities of the problem, without the kernels."""
-    count = len(many.twist)
-    J, inverse = np.zeros((3 * n, 6 * count)), np.zeros((6 * count, 6 * count))
-    for b in range(count):
-        K = np.zeros((3, 3))
-        K[np.triu_indices(3)] = many.turning[b]
-        inverse[6 * b : 6 * b + 3, 6 * b : 6 * b + 3] = many.lightness[b] * np.eye(3)
-        inverse[6 * b + 3 : 6 * b + 6, 6 * b + 3 : 6 * b + 6] = K + np.triu(K, 1).T
-    for k in range(n):
-        E = many.frame[k].reshape(3, 3)
-        for b, r, sign in zip(many.ends[k], many.arm[k].reshape(2, 3), (1, -1)):
-            if b >= 0:
-                J[3 * k : 3 * k + 3, 6 * b : 6 * b + 3] += sign * E
-                J[3 * k : 3 * k + 3, 6 * b + 3 : 6 * b + 6] += sign * np.cross(r, E)
-    return J, inverse, J @ many.twist.ravel() - many.target[:n].ravel()
+    return problems.Frictional("", many, n, many.twist).dense()
 
 
 @pytest.mark.parametrize("mu", [0.1, 0.5, 1.0])

@@ -1,0 +1,274 @@
+"""Every contact solver on the same problems, time against residual: ``python -m benchmarks.solvers [--json FILE]``.
+
+Two tables. Linear complementarity problems (no friction): sweeps, Dantzig's and Lemke's methods. Contacts with
+Coulomb's law: sweeps over the bodies' twists, Newton's method, the interior-point method, all of them as `many.solve`
+takes them in turn (the default), and on the dense matrix W = J M⁻¹ Jᵀ sweeps and Lemke's method with a pyramid of eight
+directions in place of the cone. All start from no impulses. The residual is the natural-map residual of
+`physics.kernels.sweeps`, relative to the largest velocity without impulses, measured here on what each returns.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Annotated
+
+import numpy as np
+import typer
+from rich.table import Table
+
+from benchmarks import machine, problems
+from physics.kernels import layout as at
+from physics.kernels.compiler import kernel
+from physics.kernels.complementarity import SOLVED
+from physics.kernels.dantzig import dantzig, dantzig_sizes
+from physics.kernels.lemke import lemke, lemke_sizes
+from physics.kernels.many.interior import interior_point
+from physics.kernels.many.islands import find_islands
+from physics.kernels.many.newton import newton_contacts, prepare_system
+from physics.kernels.many.solve import POLISH, forget_impulses, solve_contacts
+from physics.kernels.many.sweeps import assemble, residual_of, sweep_contacts
+from physics.kernels.pyramid import pyramid_fallback
+from physics.kernels.sweeps import cone_sweeps, factor_blocks, normal_sweeps
+from physics.kernels.workspace import make_workspace
+from rigid_env.measure.machine import write_json
+from rigid_env.measure.table import make_console
+
+LIMIT = 1000  # sweeps, steps or iterations
+PIVOTS = 10_000
+TOLERANCE = 1e-6  # residual that is asked for
+FEATURES = 8  # contacts of one wall in a workspace
+MOST_DENSE = 60  # contacts for which Lemke's method is given a matrix: ten unknowns each
+SAMPLES, QUICK_SAMPLES = 7, 1
+SAMPLE_TIME = 0.02  # of one sample at least [s]
+
+CHAIN, SWEEPS, NEWTON, INTERIOR = range(4)
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What one solver made of one problem.
+
+    Attributes
+    ----------
+    problem, solver : str
+    contacts : int
+        Or unknowns.
+    iterations : int
+        Sweeps, steps or pivots.
+    residual : float or None
+        Relative; None of a method that says that it found no solution, or returns what is no number.
+    seconds : float
+        Of one solve, median [s].
+    """
+
+    problem: str
+    solver: str
+    contacts: int
+    iterations: int
+    residual: float | None
+    seconds: float
+
+
+def timed(solve: Callable[[int], object], samples: int) -> float:
+    """Median time of one solve [s]; `solve` makes as many as it is told."""
+    solve(1)
+    start, times = time.perf_counter(), []
+    solve(1)
+    count = max(1, int(SAMPLE_TIME / (time.perf_counter() - start))) if samples > 1 else 1
+    for _ in range(samples):
+        start = time.perf_counter()
+        solve(count)
+        times.append((time.perf_counter() - start) / count)
+    return float(np.median(times))
+
+
+# --- without friction --------------------------------------------------------------------------------------------
+
+
+def _complementarity_solvers(
+    problem: problems.Complementarity,
+) -> dict[str, Callable[[], tuple[bool, int, np.ndarray]]]:
+    """Solvers by name: () -> (whether one was found, iterations, z)."""
+    M, q, n = problem.M, problem.q, len(problem.q)
+    z = np.zeros(n)
+    work = make_workspace(np.zeros((-(-n // FEATURES), at.WALL_SIZE)), FEATURES)[0]
+    work["delassus"][:n, :n], work["bias"][:n] = M, q
+
+    def sweeps():
+        work["impulse"][:n] = 0.0
+        count, _ = normal_sweeps(n, TOLERANCE * np.abs(q).max(), LIMIT, work)
+        return True, count, work["impulse"][:n]
+
+    def pivots(method, sizes):
+        shape, length = sizes(n)
+        floats, integers = np.zeros(shape), np.zeros(length, dtype=np.int64)
+
+        def solve():
+            status, count = method(M, q, z, floats, integers, PIVOTS)
+            return status == SOLVED, count, z
+
+        return solve
+
+    found = {"sweeps": sweeps, "Lemke": pivots(lemke, lemke_sizes)}
+    if np.array_equal(M, M.T):
+        found["Dantzig"] = pivots(dantzig, dantzig_sizes)
+    return found
+
+
+def without_friction(problem: problems.Complementarity, samples: int) -> list[Outcome]:
+    """Every solver of linear complementarity problems on one."""
+    outcomes = []
+    for name, solve in _complementarity_solvers(problem).items():
+        is_found, count, z = solve()
+        with np.errstate(over="ignore", invalid="ignore"):  # sweeps may diverge where M is not symmetric
+            residual = np.abs(np.minimum(z, problem.M @ z + problem.q)).max() / np.abs(problem.q).max()
+
+        def often(times, solve=solve):
+            for _ in range(times):
+                solve()
+
+        seconds = timed(often, samples)
+        kept = float(residual) if is_found and np.isfinite(residual) else None
+        outcomes.append(Outcome(problem.name, name, len(z), int(count), kept, seconds))
+    return outcomes
+
+
+# --- with friction -----------------------------------------------------------------------------------------------
+
+
+@kernel
+def _solve_island(method, part, residual, goal, limit, many):
+    """Iterations of one method for one island; -1 where its linear system finds no room."""
+    if method == SWEEPS:
+        return sweep_contacts(part[0], part[1], True, residual, goal, limit, many)[0]
+    if prepare_system(part, limit, many) == 0:
+        return -1
+    if method == INTERIOR:
+        return interior_point(part, residual, goal, limit, many)
+    return newton_contacts(part, True, residual, goal, limit, POLISH[0], many)[0]
+
+
+@kernel
+def solve_bodies(method, times, n, twists, limit, many):
+    """Solve so often from no impulses: (iterations or -1, relative residual) of the last time."""
+    count, worst = 0, 0.0
+    for _ in range(times):
+        for b in range(twists.shape[0]):
+            for c in range(6):
+                many.twist[b, c] = many.free[b, c] = twists[b, c]
+        for k in range(n):
+            many.queue[k] = k
+        forget_impulses(0, n, many)
+        if method == CHAIN:
+            count, worst, _ = solve_contacts(n, True, many)
+            continue
+        scale, count = assemble(n, many), 0
+        for i in range(find_islands(n, many)):
+            part = (many.first_contact[i], many.first_contact[i + 1], many.first_body[i], many.first_body[i + 1])
+            residual = residual_of(part[0], part[1], True, many)
+            more = _solve_island(method, part, residual, many.settings[0].tolerance * scale, limit, many)
+            if more < 0:
+                return -1, 1.0
+            count = max(count, more)
+        worst = residual_of(0, n, True, many) / scale
+    return count, worst
+
+
+def _dense_work(problem: problems.Frictional):
+    """A workspace with W, b and μ of a problem."""
+    n, (J, inverse, b) = problem.count, problem.dense()
+    work = make_workspace(np.zeros((-(-n // FEATURES), at.WALL_SIZE)), FEATURES)[0]
+    work["delassus"][: 3 * n, : 3 * n], work["bias"][: 3 * n] = J @ inverse @ J.T, b
+    work["friction"][:n] = problem.many.mu[:n]
+    return work
+
+
+def _residual_of_impulses(problem: problems.Frictional, p: np.ndarray) -> float:
+    """Relative residual of impulses (3 n,), by the same kernel for all."""
+    many, n = problem.many, problem.count
+    many.twist[:], many.impulse[:n] = problem.twists, 0.0
+    scale = assemble(n, many)
+    many.twist[:], many.impulse[:n] = problem.twists, p.reshape(n, 3)
+    assemble(n, many)
+    return residual_of(0, n, True, many) / scale
+
+
+def with_friction(problem: problems.Frictional, samples: int) -> list[Outcome]:
+    """Every solver of contacts with friction on one problem."""
+    n, many, outcomes = problem.count, problem.many, []
+    many.settings["tolerance"], many.settings["sweeps"], many.settings["still"] = TOLERANCE, LIMIT, np.inf
+    for name, method in (("in turn", CHAIN), ("sweeps", SWEEPS), ("Newton", NEWTON), ("interior point", INTERIOR)):
+        count, residual = solve_bodies(method, 1, n, problem.twists, LIMIT, many)
+        if count < 0:
+            continue
+        seconds = timed(lambda k, m=method: solve_bodies(m, k, n, problem.twists, LIMIT, many), samples)
+        outcomes.append(Outcome(problem.name, name, n, int(count), float(residual), seconds))
+    if n > MOST_DENSE:
+        return outcomes
+    work = _dense_work(problem)
+    goal = TOLERANCE * np.abs(work["bias"][: 3 * n]).max()
+
+    def sweeps():
+        work["impulse"][:] = work["change"][:] = 0.0
+        factor_blocks(n, work)
+        return cone_sweeps(n, work["friction"], goal, LIMIT, work)[0]
+
+    def pyramid():
+        work["impulse"][:] = 0.0
+        W, b, mu, p = (work[name] for name in ("delassus", "bias", "friction", "impulse"))
+        return pyramid_fallback(W, b, mu, n, p, work["fallback_float"], work["fallback_int"], PIVOTS)[1]
+
+    for name, solve in (("sweeps, dense", sweeps), ("Lemke, pyramid", pyramid)):
+        count = solve()
+        residual = _residual_of_impulses(problem, np.array(work["impulse"][: 3 * n]))
+        seconds = timed(lambda k, s=solve: [s() for _ in range(k)], samples)
+        outcomes.append(Outcome(problem.name, name, n, int(count), float(residual), seconds))
+    return outcomes
+
+
+# --- all of them -------------------------------------------------------------------------------------------------
+
+
+def table(title: str, outcomes: list[Outcome]) -> Table:
+    """One row for each outcome."""
+    found = Table(title=title, title_justify="left")
+    for heading, side in (("problem", "left"), ("contacts", "right"), ("solver", "left"), ("iterations", "right"),
+                          ("residual", "right"), ("µs", "right")):  # fmt: skip
+        found.add_column(heading, justify=side)
+    last = ""
+    for o in outcomes:
+        name, last = (o.problem if o.problem != last else ""), o.problem
+        residual = "none found" if o.residual is None else f"{o.residual:.1e}"
+        found.add_row(
+            name, str(o.contacts) if name else "", o.solver, str(o.iterations), residual, f"{1e6 * o.seconds:.1f}"
+        )
+    return found
+
+
+def main(
+    json: Annotated[Path | None, typer.Option(help="Where to write the result.")] = None,
+    quick: Annotated[bool, typer.Option("--quick", help="Only see that it runs.")] = False,
+) -> None:
+    """Run every contact solver on the same problems and print time against residual."""
+    console, samples = make_console(), QUICK_SAMPLES if quick else SAMPLES
+    console.print(machine.headline())
+    tables: dict[str, list[Outcome]] = {"linear complementarity": [], "Coulomb friction": []}
+    with console.status("solving") as status:
+        for problem in (*problems.textbook(), *problems.random_complementarity()):
+            tables["linear complementarity"] += without_friction(problem, samples)
+        for make in (problems.piles, problems.hard):
+            for problem in make():
+                status.update(problem.name)
+                tables["Coulomb friction"] += with_friction(problem, samples)
+    for title, outcomes in tables.items():
+        console.print(table(title, outcomes))
+    if json is not None:
+        kept = {title: [asdict(o) for o in outcomes] for title, outcomes in tables.items()}
+        write_json(json, {"name": "solvers", "is_quick": quick, "tolerance": TOLERANCE, **kept})
+
+
+if __name__ == "__main__":
+    typer.run(main)

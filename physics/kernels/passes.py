@@ -1,0 +1,114 @@
+"""What Numba does to a kernel before it is lowered, without what kernels have no use for.
+
+Numba's own pipeline looks for closures, comprehensions, `with`, `raise`, array expressions and functions inlined by
+it, none of which a kernel has, and determines after most passes which variable lives where, which only the last one
+asks for. A kernel that does have one of them fails to compile. What users write goes through Numba's own pipeline.
+"""
+
+from __future__ import annotations
+
+from numba.core.compiler_machinery import FunctionPass, PassManager, _pass_registry, register_pass
+from numba.core.ir_utils import build_definitions
+from numba.core.rewrites import rewrite_registry
+from numba.core.ssa import reconstruct_ssa
+from numba.core.typed_passes import (
+    AnnotateTypes,
+    IRLegalization,
+    NativeLowering,
+    NopythonTypeInference,
+    PreLowerStripPhis,
+)
+from numba.core.untyped_passes import (
+    DeadBranchPrune,
+    FixupArgs,
+    RewriteSemanticConstants,
+    TranslateByteCode,
+)
+
+
+class _Plain(FunctionPass):
+    """A pass that is one function of the state."""
+
+    def __init__(self):
+        super().__init__()
+
+    def run_pass(self, state):
+        self.change(state)
+        return True
+
+
+@register_pass(mutates_CFG=True, analysis_only=False)
+class _Rewrites(_Plain):
+    """Numba's rewrites before inference, such as that of a constant subscript."""
+
+    _name = "kernel_rewrites"
+
+    def change(self, state):
+        blocks = state.func_ir.blocks
+        for make in rewrite_registry.rewrites["before-inference"]:
+            rewrite = make(state)
+            for label in list(blocks):
+                while rewrite.match(state.func_ir, blocks[label], state.typemap, state.calltypes):
+                    blocks[label] = rewrite.apply()
+
+
+@register_pass(mutates_CFG=True, analysis_only=False)
+class _SingleAssignment(_Plain):
+    """Each variable is assigned once."""
+
+    _name = "kernel_single_assignment"
+
+    def change(self, state):
+        state.func_ir = reconstruct_ssa(state.func_ir)
+        state.func_ir._definitions = build_definitions(state.func_ir.blocks)
+
+
+@register_pass(mutates_CFG=True, analysis_only=False)
+class _NoPhis(PreLowerStripPhis):
+    """What a variable is where branches meet becomes assignments at their ends."""
+
+    _name = "kernel_no_phis"
+
+    def run_pass(self, state):
+        state.func_ir = self._strip_phi_nodes(state.func_ir)
+        state.func_ir._definitions = build_definitions(state.func_ir.blocks)
+        return True
+
+
+TO_LLVM = (
+    TranslateByteCode,
+    FixupArgs,
+    RewriteSemanticConstants,
+    DeadBranchPrune,
+    _Rewrites,
+    _SingleAssignment,
+    DeadBranchPrune,
+    NopythonTypeInference,
+    _NoPhis,
+    IRLegalization,
+    AnnotateTypes,
+    NativeLowering,
+)
+
+
+class KernelPasses(PassManager):
+    """The passes of a kernel, one after another; what is wrong with it is raised as the pass words it.
+
+    Parameters
+    ----------
+    at_last : type
+        Passes after the lowering to LLVM.
+    """
+
+    def __init__(self, *at_last: type):
+        super().__init__("nopython")
+        for each in (*TO_LLVM, *at_last):
+            self.add_pass(each, each.__name__)
+        self.finalize()
+
+    def run(self, state):
+        """Pass by pass, without writing down all types of a kernel for each of them."""
+        for each, _ in self.passes:
+            one = _pass_registry.get(each).pass_inst
+            one.analysis = self._analysis
+            one.run_pass(state)

@@ -1,0 +1,78 @@
+"""Numba's contexts, asked once: what is remembered is what Numba would say, and only our kernels get it."""
+
+from __future__ import annotations
+
+import operator
+
+import numba
+import numpy as np
+import pytest
+from numba.core import types
+from numba.core.registry import cpu_target
+
+from physics.kernels.compiler import kernel
+from physics.kernels.remember import RememberingTarget, remembering
+
+PAIRS = [
+    (types.float64, types.float64),
+    (types.int64, types.float64),
+    (types.int64, types.int64),
+    (types.boolean, types.int64),
+    (types.UniTuple(types.float64, 3), types.UniTuple(types.float64, 2)),
+]
+
+
+@kernel
+def sums(a, b):
+    """Something compiled, so that all of Numba's registries are loaded."""
+    return a + b
+
+
+@pytest.mark.parametrize("function", [operator.add, operator.lt, operator.eq], ids=lambda f: f.__name__)
+@pytest.mark.parametrize("pair", PAIRS, ids=str)
+def test_a_signature_is_the_one_that_numba_finds(function, pair):
+    sums(1.0, 2.0)
+    context = cpu_target.typing_context
+    kind = context.resolve_value_type(function)
+    if function is operator.add or pair[0] is not PAIRS[-1][0]:
+        ours = remembering(context).resolve_function_type(kind, pair, {})
+        again = remembering(context).resolve_function_type(kind, pair, {})
+        assert ours is again
+        assert ours == context.resolve_function_type(kind, pair, {})
+
+
+def test_what_does_not_exist_is_refused_each_time():
+    context = remembering(cpu_target.typing_context)
+    kind = context.resolve_value_type(operator.add)
+    for _ in range(2):
+        with pytest.raises(numba.TypingError):
+            context.resolve_function_type(kind, (types.none, types.float64), {})
+
+
+def test_members_of_a_record_are_told_apart_by_its_type():
+    context = remembering(cpu_target.typing_context)
+    first = numba.from_dtype(np.dtype([("x", np.float64), ("y", np.int64)]))
+    other = numba.from_dtype(np.dtype([("x", np.int64)]))
+    for _ in range(2):
+        assert context.resolve_getattr(first, "x") == types.float64
+        assert context.resolve_getattr(first, "y") == types.int64
+        assert context.resolve_getattr(other, "x") == types.int64
+
+
+def test_a_size_is_the_one_that_llvm_gives():
+    context = cpu_target.target_context
+    for kind in (types.boolean, types.int32, types.float64, types.UniTuple(types.float64, 3)):
+        layout = context.get_data_type(kind)
+        assert RememberingTarget(context).get_abi_sizeof(layout) == context.get_abi_sizeof(layout)
+
+
+def test_functions_of_others_are_answered_by_numba():
+    """What is asked in Numba's own context leaves no trace in what is remembered."""
+    known = len(remembering(cpu_target.typing_context).signatures)
+
+    @numba.njit
+    def other(a, b):
+        return a - b
+
+    assert other(np.float32(3), np.complex64(1)) == 2
+    assert len(remembering(cpu_target.typing_context).signatures) == known
