@@ -27,10 +27,11 @@ WHOLE = 2**24
 # some of them, and no shorter part shows less.
 PART_ERROR = 100.0
 
-# Where the shortest part does not meet the error, or after so many parts, those of the rest of the substep are no
-# shorter than four times it: what has no limit, and what rattles without end, takes no end of parts.
+# Where the shortest part does not meet the error, or after so many parts tried, those of the rest of the substep are no
+# shorter than four times it: what has no limit, and what rattles without end, takes no end of parts. There are 12 such
+# lengths, so that this ends after some 600 trials; the longer a part, the later it is refused for this reason.
 GIVE_UP = 4
-PATIENCE = 500
+PATIENCE = 50
 
 # Tolerance of the contact problems of many bodies, and slop in bounding radii, below which rounding would decide.
 LEAST_TOLERANCE = 1.0e-11
@@ -128,8 +129,8 @@ def _advance(world, start, h, switches, memory, report, many):
 
 @kernel
 def _take_part(world, start, unit, part, shortest, switches, memory, report, many):
-    """Advance by `part` units of time [s], or by half of it, or by a quarter ...: (units taken, error)."""
-    tilted = switches[2]
+    """Advance by `part` units of time [s], or by half of it, or a quarter ...: (units taken, error, lengths tried)."""
+    tilted, tried = switches[2], 1
     _keep(START, world, memory, report, many)
     _advance(world, start, part * unit, switches, memory, report, many)
     while True:
@@ -141,9 +142,10 @@ def _take_part(world, start, unit, part, shortest, switches, memory, report, man
         _advance(world, start + half, half, switches, memory, report, many)
         error = _error(tilted, many)
         if error <= 1.0 or part <= shortest:
-            return part, error
+            return part, error, tried
         _come_back(MIDDLE, world, memory, report, many)  # the coarse answer of the first half
         part //= 2
+        tried += 1
 
 
 @kernel
@@ -155,20 +157,21 @@ def refine(world, start, h, switches, memory, report, many):
 
     `switches` are friction, gyroscopic, tilted, ellipsoids, hulls and scheme, as in `substep_world`.
     """
-    place, shortest, unit, parts = 0, 1, h / WHOLE, 0
+    place, shortest, unit, patience = 0, 1, h / WHOLE, PATIENCE
     part = int(memory[world, PART] * WHOLE)
     if part == 0:
         part = WHOLE
     while place < WHOLE:
-        part, error = _take_part(world, start + place * unit, unit, part, shortest, switches, memory, report, many)
+        now = start + place * unit
+        part, error, tried = _take_part(world, now, unit, part, shortest, switches, memory, report, many)
         place += part
+        patience -= tried
         if not world_is_finite(many):
             return
         if error > 1.0:
             report[world, at.FALLBACKS] += 1.0
-        parts += 1
-        if error > 1.0 or parts % PATIENCE == 0:
-            shortest = min(GIVE_UP * shortest, WHOLE)
+        if error > 1.0 or patience <= 0:
+            shortest, patience = min(GIVE_UP * shortest, WHOLE), PATIENCE
         part = min(2 * part, WHOLE)  # what rounding leaves is no reason to stay with short ones: it is always tried
         memory[world, PART] = part / WHOLE
         part = min(part, place & -place)
