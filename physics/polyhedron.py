@@ -17,9 +17,12 @@ import math
 from dataclasses import dataclass
 from functools import lru_cache
 from itertools import pairwise
+from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.spatial import ConvexHull, QhullError
+
+if TYPE_CHECKING:
+    from scipy.spatial import ConvexHull
 
 # Corners at most: names of contacts count a polygon's edges in 6 bits (`kernels.many.hull_hull`), and two hulls with e
 # edges each are compared in e² pairs.
@@ -127,6 +130,8 @@ def _without_noise(values: np.ndarray, size: float) -> np.ndarray:
 
 def _polygons(points: np.ndarray) -> tuple[np.ndarray, tuple[tuple[int, ...], ...]]:
     """Indices (v,) of the points that are corners, and the faces as loops of corners."""
+    from scipy.spatial import ConvexHull, QhullError  # a quarter of a second, for those who have a hull
+
     flat = ValueError("points lie in one plane, or nearly; allowed are points that span a volume")
     try:
         hull = ConvexHull(points)
@@ -175,6 +180,8 @@ def _area_vectors(corners: np.ndarray) -> np.ndarray:
 
 def _around(points: np.ndarray, members: list[int], hull: ConvexHull, face: list[int]) -> list[int]:
     """Those of a face's points that are its corners, counter-clockwise as seen from outside, the least index first."""
+    from scipy.spatial import ConvexHull
+
     normal = hull.equations[face[0], :3]
     x = np.eye(3)[np.argmin(np.abs(normal))]
     x = np.cross(normal, x)
