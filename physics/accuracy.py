@@ -32,7 +32,11 @@ class Accuracy:
         Parts into which each `dt` is cut.
     scheme : str
         ``events``: smooth motion to `tolerance` between events, each located to rounding (impacts, and where contacts
-        begin, end, stick and slip). Otherwise time stepping, and how free motion is integrated: ``exact`` (parabola
+        begin, end, stick and slip). Where bodies touch each other, or hulls or bodies tied together by springs touch
+        walls, it is time stepping with an error instead: a substep is cut into parts, each of which agrees with two of
+        half its length, to 100 tolerances of the body's size and speed; impacts are met in time, what else changes is
+        found by halving, down to 2**-24 of the substep (what that leaves is counted as `StepReport.fallbacks`).
+        Otherwise time stepping, and how free motion is integrated: ``exact`` (parabola
         and free rotation to rounding; second order in an applied torque), or a textbook scheme to compare with:
         ``explicit_euler``, ``semi_implicit_euler``, ``midpoint``, ``rk4``; while a body touches a wall Moreau's
         midpoint step is used whichever it is.
@@ -43,15 +47,18 @@ class Accuracy:
         ``sweeps``: without that last resort.
     tolerance : float
         Largest residual of a contact problem, relative to its largest free contact speed; with ``events`` also the
-        error of one smooth step, relative to the body's size and speed.
+        error of one smooth step, relative to the body's size and speed (where bodies touch each other a hundredth of
+        that of a part, and no less than 1e-11).
     iterations : int
         Sweeps per contact problem at most.
     impacts : int
         Impacts (with ``events`` all events) of one body that one substep resolves in time; more are reported and
-        treated as plastic (with ``events`` the rest of the substep is left out).
+        treated as plastic (with ``events`` the rest of the substep is left out). Where bodies touch each other: of all
+        of them, in one substep or part.
     slop : float
         Gap within which a feature touches a wall, and (but with ``events``) error of the place of an impact, in
-        bounding radii. With ``events`` a rebound no higher than a few slops is not made.
+        bounding radii. With ``events`` a rebound no higher than a few slops is not made; where bodies touch each other
+        it is no less than 1e-12 there.
     rest_share : float
         Bounce threshold of time stepping: a rebound that would be over within this share of the substep is not made
         (restitution acts as 0). 0 lets every rebound happen.

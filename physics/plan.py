@@ -29,9 +29,9 @@ class Plan:
     `tilted` is on where the body frame of a body is not all there is to know of its mass: its principal axes are not
     its body axes, or its geometric centre is not its centre of mass. `many` is on where bodies touch each other, or
     touch walls and are tied together by springs, or a hull touches walls; `meeting` says whether they touch each other,
-    `ellipsoids` whether there are any among those, `hulls` whether any touch anything. `linked` is on where
-    they are tied together and touch nothing. `sleeping` is on where bodies may sleep. `laws` are those of
-    `physics.kernels.laws`.
+    `ellipsoids` whether there are any among those, `hulls` whether any touch anything. `refined` is on where `many` is
+    and an error is asked for: by the scheme ``events``. `linked` is on where they are tied together and touch nothing.
+    `sleeping` is on where bodies may sleep. `laws` are those of `physics.kernels.laws`.
     """
 
     contact: bool | None
@@ -44,6 +44,7 @@ class Plan:
     scheme: int | None
     events: bool | None
     many: bool | None
+    refined: bool | None
     meeting: bool
     ellipsoids: bool | None
     hulls: bool | None
@@ -67,8 +68,8 @@ class Plan:
         """What distinguishes one compiled kernel from another."""
         return (
             self.contact, self.friction, self.restitution, self.gravity, self.gyroscopic, self.tilted,
-            self.pivots, self.scheme is None, self.events, self.many, self.ellipsoids, self.hulls, self.linked,
-            self.sleeping, self.features,
+            self.pivots, self.scheme is None, self.events, self.many, self.refined, self.ellipsoids, self.hulls,
+            self.linked, self.sleeping, self.features,
             *self.laws,
             *(term.marker for term in self.terms),
         )  # fmt: skip
@@ -180,9 +181,7 @@ def make_plan(scene: Scene, accuracy: Accuracy) -> Plan:
     is_linked = any(slot.term.is_linked for slot in seen.fields)
     hulls = seen.touching and _has(scene, "hull")
     many = seen.touching and (seen.meeting or is_linked or hulls)
-    if many:
-        _check_many(scene, seen.meeting, is_linked, scheme)
-    elif seen.touching:
+    if seen.touching and not many:
         _check_collisions(accuracy)
     _check_laws(scene, seen, many, scheme)
     if seen.sleeping and scheme == EVENTS:
@@ -199,8 +198,9 @@ def make_plan(scene: Scene, accuracy: Accuracy) -> Plan:
         tilted=(seen.turned or bool(seen.uneven)) or None,
         pivots=(seen.touching and accuracy.solver == "sweeps+pivoting") or None,
         scheme=scheme if scheme > 0 else None,
-        events=(scheme == EVENTS) or None,
+        events=(scheme == EVENTS and not many) or None,
         many=many or None,
+        refined=(scheme == EVENTS and many) or None,
         meeting=seen.meeting,
         ellipsoids=(seen.meeting and _has(scene, "ellipsoid")) or None,
         hulls=hulls or None,
@@ -209,30 +209,12 @@ def make_plan(scene: Scene, accuracy: Accuracy) -> Plan:
         features=VERTEX_COUNT if _has(scene, "block") else 1,
         fields=seen.fields,
         laws=seen.laws,
-        rows=make_rows(scene, accuracy, seen),
+        rows=make_rows(scene, accuracy, seen, scheme == EVENTS and many),
     )
 
 
 def _has(scene: Scene, kind: str) -> bool:
     return any(body.kind == kind for body in scene.bodies)
-
-
-def _check_many(scene: Scene, meeting: bool, is_linked: bool, scheme: int) -> None:
-    """Refuse what the step of all bodies at once does not know yet."""
-    known, what, hint = "bodies", "hulls touch walls", ""
-    if _has(scene, "hull"):
-        known = "blocks, spheres and ellipsoids"
-    if is_linked:
-        what = "bodies touch walls and are tied together by springs"
-    if meeting:
-        what = "bodies touch each other"
-        if not _has(scene, "hull"):
-            hint = "; give the scene Contact(between_bodies=False) if its bodies need not meet"
-    if scheme == EVENTS:
-        raise ValueError(
-            f"accuracy has the scheme 'events', which knows contact of single {known} with walls only; allowed where "
-            f"{what} are 'fast', 'balanced' and every time-stepping scheme{hint}"
-        )
 
 
 def _check_collisions(accuracy: Accuracy) -> None:

@@ -142,7 +142,7 @@ def _sleeping_row(scene, touching, sleeping) -> Row:
     return Row("sleeping", False, f"declared, but nothing rests under what may change by itself: {names}", "")
 
 
-def make_rows(scene, accuracy, seen) -> tuple[Row, ...]:
+def make_rows(scene, accuracy, seen, refined) -> tuple[Row, ...]:
     """All rows of a plan; `seen` holds what `physics.plan.make_plan` found out of the scene."""
     contact, friction, touching, rubbing = seen.contact, seen.friction, seen.touching, seen.rubbing
     return (
@@ -161,5 +161,6 @@ def make_rows(scene, accuracy, seen) -> tuple[Row, ...]:
         _gyroscopic_row(seen.isotropic, seen.turned),
         _center_row(seen.uneven),
         *_field_rows(seen.fields),
-        Row("free motion", True, f"scheme {accuracy.scheme}, {accuracy.substeps} substep(s) per dt", ""),
-    )
+        Row("free motion", True, f"scheme {accuracy.scheme}, {accuracy.substeps} substep(s) per dt",
+            "parts that meet an error" if refined else ""),
+    )  # fmt: skip

@@ -97,7 +97,9 @@ class StepReport:
     residual : (worlds,) float64
         Worst natural-map residual accepted, relative to the free contact speed (see `physics.kernels.sweeps`).
     iterations, solves, fallbacks, unconverged, impacts, unresolved, faults, left_out : (worlds,) int64
-        Sweeps and Newton steps; contact problems; of these, by the pivoting fallback; of these, above the tolerance;
+        Sweeps and Newton steps; contact problems (with an error asked for, those of refused parts, too); of these, by
+        the pivoting fallback (with the scheme ``events`` small leaps of first order, and parts of the shortest length
+        with more than the error asked for); above the tolerance;
         impacts that cut a substep; substeps with more impacts than allowed; bodies whose new state was not finite;
         contacts and near pairs of bodies for which there was no room.
     """

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -21,6 +21,7 @@ from physics.kernels.events.motion import make_motion
 from physics.kernels.fields.terms import declare
 from physics.kernels.linked import make_linked
 from physics.kernels.many import arrays as many
+from physics.kernels.many.refine import LEAST_SLOP, LEAST_TOLERANCE
 from physics.kernels.probe import angular_momenta
 from physics.kernels.sleep import GROUP, SLEEP_SIZE, Sleep
 from physics.kernels.slip import FEW
@@ -132,6 +133,9 @@ class World:
         self.pool = SlicePool(self.threads, self.worlds)
         settings = self.accuracy
         declare(self.plan.terms)
+        if self.plan.refined:
+            settings = replace(settings, tolerance=max(settings.tolerance, LEAST_TOLERANCE),
+                               slop=max(settings.slop, LEAST_SLOP))  # fmt: skip
         numbers = {
             "tolerance": settings.tolerance, "sweeps": settings.iterations,
             "splits": settings.impacts * (self.body_count if self.plan.many else 1),
@@ -155,8 +159,9 @@ class World:
         if plan.many:
             polyhedra, in_turn = parameters.polyhedra(self.scene.bodies), self.accuracy.collisions == "sequential"
             return many.make_many(
-                self.body_count, self.walls, plan.terms, polyhedra, meet=plan.meeting, in_turn=in_turn, **numbers
-            )
+                self.body_count, self.walls, plan.terms, polyhedra, meet=plan.meeting, in_turn=in_turn,
+                refined=bool(plan.refined), **numbers,
+            )  # fmt: skip
         if plan.linked:
             return make_linked(self.body_count, plan.terms, **numbers)
         return make_workspace(self.walls, plan.features, plan.terms, plan.laws, **numbers)

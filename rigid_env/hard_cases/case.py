@@ -137,6 +137,11 @@ class Setting:
         return self.maker is None and resolve(self.accuracy).scheme == "events"
 
     @property
+    def meets_an_error(self) -> bool:
+        """Whether bodies that touch each other are stepped to an error: dear, so that quick runs have fewer bodies."""
+        return self.is_event_driven
+
+    @property
     def is_ours(self) -> bool:
         """Whether the engine is ours: only then there are reports, contact forces and parameters to look at."""
         return self.maker is None

@@ -99,13 +99,14 @@ def dominoes(setting: Setting) -> list[Check]:
     It is in balance on its edge when tilted by atan(0.2/1) = 0.197 rad, and starts at 0.3 rad. A falling domino hits
     the next one at 0.9 of its height (gap 0.4 m, height 1 m: √(1 - 0.4²) = 0.92), far above its centre, so that with
     friction to hold its foot it is pushed over. Fallen: its centre, 0.51 m high at the top of its way, is below 0.45 m.
-    They fall in order, all within 10 s.
+    They fall in order, all within 10 s. A quick run to an error has eight.
     """
     tilt = 0.15
     first = physics.Block((0.2, 1, 0.5), 1.0, pos=(0.1, 0.55, 0), quat=(math.cos(tilt), 0, 0, -math.sin(tilt)))
-    others = [physics.Block((0.2, 1, 0.5), 1.0, pos=(0.6 * k, 0.5, 0)) for k in range(1, 20)]
+    count = 8 if setting.meets_an_error and not setting.is_thorough else 20
+    others = [physics.Block((0.2, 1, 0.5), 1.0, pos=(0.6 * k, 0.5, 0)) for k in range(1, count)]
     world = setting.world(stacks.pile([first, *others]))
-    fallen = np.full(20, np.inf)
+    fallen = np.full(count, np.inf)
     for k in range(setting.steps(10.0)):
         world.step()
         low = world.pos[0, :, 1] < 0.45

@@ -114,6 +114,7 @@ def balls(setting: Setting) -> list[Check]:
     at every hundredth of a second of 10 s. e = 1: the energy stays; an impact whose contact problem is solved to the
     tolerance is off by that share of the energy of the balls that it involves, so after n impacts per ball by n
     tolerances. A ball has about 1 impact with each neighbour per fall of 0.1 m, 0.14 s; 26 neighbours: 2000 in 10 s.
+    A quick run to an error has 3 x 3 x 3 balls, and their share of the penetration.
 
     The starting columns are in unstable balance: balls of a layer are moved by up to 0.01 m along x and z (seed 0).
 
@@ -123,10 +124,11 @@ def balls(setting: Setting) -> list[Check]:
     """
     rng = np.random.default_rng(0)
     checks, duration = [], setting.pick(10.0, 1.5)
+    side = 3 if setting.meets_an_error and not setting.is_thorough else 6
     for restitution in (0.0, 1.0):
         bodies = [
             physics.Sphere(0.5, 1.0, pos=(1.1 * i + u, 1.5 + 1.1 * j, 1.1 * k + w))
-            for i, j, k in np.ndindex(6, 6, 6)
+            for i, j, k in np.ndindex(side, side, side)
             for u, w in [rng.uniform(-0.01, 0.01, 2)]
         ]
         effects = [physics.Gravity((0, -G, 0)), physics.Contact(restitution)]
@@ -139,7 +141,8 @@ def balls(setting: Setting) -> list[Check]:
             faults += int(report.faults[0] + report.left_out[0])
         checks.append(none_of(f"e = {restitution:g}: faults and contacts left out", faults))
         if restitution == 0.0:
-            checks.append(Check("e = 0: sum of squared depths", worst, BALLS_PENETRATION, "m²"))
+            share = (side / 6) ** 3  # of the balls that the benchmark's limit is for
+            checks.append(Check("e = 0: sum of squared depths", worst, share * BALLS_PENETRATION, "m²"))
         else:
             drift = abs(_energy(world) / energy - 1)
             checks.append(Check("e = 1: drift of the energy", drift, 200 * duration * setting.tolerance))

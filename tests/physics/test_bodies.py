@@ -312,8 +312,6 @@ def test_without_contact_between_them_bodies_are_alone():
 
 def test_what_is_not_known_yet_is_refused():
     two = [physics.Block(CUBE, 1.0, pos=(0, 2, 0)), physics.Block(CUBE, 1.0, pos=(3, 2, 0))]
-    with pytest.raises(ValueError, match=r"scheme 'events'.*between_bodies=False"):
-        physics.World(physics.Scene(two, (), [physics.Contact()]), accuracy="precise")
     with pytest.raises(ValueError, match="between_bodies is 1"):
         physics.Contact(between_bodies=1)
     world = physics.World(physics.Scene(two, FLOOR, [physics.Gravity(), physics.Contact(between_bodies=False)]),

@@ -317,8 +317,6 @@ def test_a_lone_hull_has_the_step_of_many_bodies_and_says_so():
 
 def test_what_is_not_known_of_hulls_is_refused():
     hull, laws = physics.Hull(WEDGE, 1.0, pos=(0, 2, 0)), [physics.Gravity(), physics.Contact(), physics.Friction(0.5)]
-    with pytest.raises(ValueError, match=r"'events', which knows contact of single blocks, .*where hulls touch walls"):
-        physics.World(physics.Scene([hull], [FLOOR], laws), accuracy="precise")
     for field in (physics.Drag(), physics.Magnus(), physics.Buoyancy()):
         with pytest.raises(ValueError, match=rf"{type(field).__name__}, and Scene.bodies\[1\] is a hull; allowed with"):
             physics.Scene([physics.Sphere(1.0, 1.0), hull], [FLOOR], [*laws, field])

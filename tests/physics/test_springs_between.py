@@ -235,11 +235,6 @@ BAD = [
     (lambda: physics.Spring(other=0), "Spring.other is 0, as Spring.body; allowed are other bodies and None"),
     (lambda: physics.Spring(other=-1), "Spring.other is -1"),
     (lambda: physics.Scene([physics.Sphere(1, 1)], effects=[physics.Spring(other=1)]), "Spring.other is 1; .* below 1"),
-    (
-        lambda: physics.World(physics.Scene(BALLS, [physics.HalfSpace((0, 1, 0))],
-                                            [physics.Contact(between_bodies=False), tied()]), accuracy="precise"),
-        "scheme 'events', .*allowed where bodies touch walls and are tied together by springs are 'fast'",
-    ),
 ]  # fmt: skip
 
 

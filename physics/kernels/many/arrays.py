@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from physics.kernels.fields.terms import Term
-from physics.kernels.layout import STATE_SIZE, VERTEX_COUNT
+from physics.kernels.layout import REPORT_SIZE, STATE_SIZE, VERTEX_COUNT
 from physics.kernels.many.hulls import Hulls, make_hulls, room_of_face
 from physics.kernels.workspace import body_fields, setting_fields
 
@@ -31,12 +31,21 @@ BLOCKS_PER_BODY = 32
 # `counts`: contacts, pairs, and contacts or pairs for which there was no room.
 CONTACTS, PAIRS, LEFT_OUT = range(3)
 
-# Row of `memory`, one per world: length of the last resting stage [s], its contact count, then `MEMORY_SIZE` numbers
-# for each contact: its name, first and second body (-1 - k: wall k), impulse and point in the world frame.
-STAGE_LENGTH, CONTACT_COUNT = range(2)
-MEMORY_HEAD = 2
+# Row of `memory`, one per world: length of the last resting stage [s], its contact count, the next part of a substep as
+# a share of it (of `refine`; 0: all of it), then `MEMORY_SIZE` numbers for each contact: its name, first and second
+# body (-1 - k: wall k), impulse and point in the world frame.
+STAGE_LENGTH, CONTACT_COUNT, PART = range(3)
+MEMORY_HEAD = 3
 NAME, FIRST, SECOND, IMPULSE, POINT = 0, 1, 2, 3, 6
 MEMORY_SIZE = 9
+
+
+class Kept(NamedTuple):
+    """A world at moments to which `refine` comes back, one row for each."""
+
+    now: np.ndarray  # states of the bodies, (moments, bodies, STATE_SIZE)
+    memory: np.ndarray  # row of `memory`
+    report: np.ndarray  # row of the report
 
 
 class Many(NamedTuple):
@@ -119,6 +128,7 @@ class Many(NamedTuple):
     miss: np.ndarray
     extra: np.ndarray
     hulls: Hulls | None  # tables of convex polyhedra, and a pair of them in place; None where there is no hull
+    kept: Kept | None  # None where no error is asked for
     settings: np.ndarray  # one record: see `workspace.setting_fields`
 
 
@@ -146,6 +156,7 @@ def make_many(
     *,
     meet=True,
     in_turn=False,
+    refined=False,
     relative_slop: float,
     **settings: float,
 ) -> Many:
@@ -156,8 +167,8 @@ def make_many(
     """
     f, i, nb = np.float64, np.int64, bodies
     pairs, n = pair_room(bodies), contact_room(bodies, len(walls), polyhedra)
-    record = np.zeros(1, np.dtype([*setting_fields(), ("still", f), ("meet", i), ("in_turn", i)]))
-    record["still"], record["meet"], record["in_turn"] = np.inf, meet, in_turn
+    record = np.zeros(1, np.dtype([*setting_fields(), ("still", f), ("meet", i), ("in_turn", i), ("in_time", i)]))
+    record["still"], record["meet"], record["in_turn"], record["in_time"] = np.inf, meet, in_turn, refined
     for name, value in settings.items():
         record[name] = value
     rows = np.zeros(nb, np.dtype(body_fields(terms)))
@@ -188,5 +199,11 @@ def make_many(
         row=np.zeros((2, 3, 6)), reply=np.zeros((2, 3, 6)), weighed=np.zeros((2, 3, 6)),
         inside=np.zeros((n, 3)), slack=np.zeros((n, 3)), scaling=np.zeros((n, 4)), miss=np.zeros((n, 3)),
         extra=np.zeros((n, 3)), momenta=np.zeros((nb, 12)),
-        hulls=make_hulls(polyhedra) if polyhedra else None, settings=record,
+        hulls=make_hulls(polyhedra) if polyhedra else None,
+        kept=make_kept(nb, memory_size(nb, len(walls), polyhedra)) if refined else None, settings=record,
     )  # fmt: skip
+
+
+def make_kept(bodies: int, memory: int) -> Kept:
+    """Room for a world of so many bodies and columns of `memory` at three moments."""
+    return Kept(np.zeros((3, bodies, STATE_SIZE)), np.zeros((3, memory)), np.zeros((3, REPORT_SIZE)))

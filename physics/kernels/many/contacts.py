@@ -205,6 +205,18 @@ def _carried(b, k, first, side, n, many):
     return qt.matvec(matrix(many.rotation, b), vector(many.anchor, k, first))
 
 
+@inlined
+def _meet_on_face(k, a, b, owner, n, many):
+    """Let the point on the face that has the normal be where the other body's point is, which slides along it."""
+    if owner < 0:
+        return
+    other, of_other, of_owner, side = a, 0, 3, -1.0
+    if owner == a:
+        other, of_other, of_owner, side = b, 3, 0, 1.0
+    point = plus(vector(many.now, other, 0), 1.0, vector(many.arm, k, of_other))
+    put(many.arm, k, of_owner, minus(plus(point, side * many.gap[k], n), vector(many.now, owner, 0)))
+
+
 @kernel
 def refresh(many):
     """Arms, frames and gaps of the contact set where the bodies are now, their points and normals carried along.
@@ -226,3 +238,5 @@ def refresh(many):
             arm = _carried(b, k, 3, 1.0, n, many)
             put(many.arm, k, 3, arm)
             many.gap[k] = qt.dot(n, minus(point, plus(arm, 1.0, vector(many.now, b, 0))))
+            if many.settings[0].in_time == 1:
+                _meet_on_face(k, a, b, owner, n, many)

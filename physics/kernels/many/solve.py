@@ -44,6 +44,10 @@ ROUNDING = 1.0e-12
 # them rounded, which makes 2 · 6 · ε of the largest, and the impulses round the velocities once more.
 VELOCITY_ROUNDING = 16 * 2.0**-52
 
+# An impulse is rounded, too, and with it the velocities, by up to this share of what it alone would give its bodies
+# (half an ulp in it, in its moment, and in each of the sums): a light cube under a heavy one can be at rest no better.
+IMPULSE_ROUNDING = 2 * 2.0**-52
+
 # Bodies that wedge by friction hold any stress. Impulses that alone would give this many times the free velocities are
 # one that a method ran into, not what holds a million times a body's weight: what they leave is rounding.
 STRAINED = 1.0e9
@@ -185,24 +189,28 @@ def solve_contacts(n, friction, many):
 
     `many.twist` holds the velocities without any contact impulse and receives those with them. The residual is
     measured on what is returned, relative to the largest velocity that a contact would have without any impulse; or,
-    where all of those are next to rounding, to that speed of which the velocities' rounding is the tolerance's share.
+    where all of those are next to rounding, to that speed of which the rounding of velocities or of impulses is the
+    tolerance's share.
     Iterations are those of the island that took most.
     """
     for b in range(many.twist.shape[0]):
         for c in range(6):
             many.free[b, c] = many.twist[b, c]
-    least = VELOCITY_ROUNDING * fastest(many) / many.settings[0].tolerance
+    tolerance = many.settings[0].tolerance
+    least = VELOCITY_ROUNDING * fastest(many) / tolerance
     scale = max(assemble(n, many), least)
     if not scale > 0.0:
         return 0, 0.0, SWEEPS
-    goal = max(min(many.settings[0].tolerance * scale, many.settings[0].still), ROUNDING * scale)
+    goal = max(min(tolerance * scale, many.settings[0].still), ROUNDING * scale)
     if strain(0, n, many) > STRAINED * scale:
         forget_impulses(0, n, many)
         for b in range(many.twist.shape[0]):
             free_body(b, many)
+    rounding = IMPULSE_ROUNDING * strain(0, n, many)
+    goal = max(goal, rounding)
     residual = residual_of(0, n, friction, many)
     if residual <= goal:
-        return 0, residual / scale, SWEEPS
+        return 0, residual / max(scale, rounding / tolerance), SWEEPS
     iterations, worst, method = 0, 0.0, SWEEPS
     for i in range(find_islands(n, many)):
         part = (many.first_contact[i], many.first_contact[i + 1], many.first_body[i], many.first_body[i + 1])
@@ -214,4 +222,4 @@ def solve_contacts(n, friction, many):
             iterations, method = max(iterations, count), max(method, used)
         if not residual <= worst:
             worst = residual
-    return iterations, worst / scale, method
+    return iterations, worst / max(scale, IMPULSE_ROUNDING * strain(0, n, many) / tolerance), method

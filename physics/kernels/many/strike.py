@@ -31,13 +31,30 @@ def bounces(k, h, many):
 
 
 @inlined
+def slow_speed(k, h, many):
+    """Speed that the resting stage may stop [m/s].
+
+    What loads give within `rest_share` of h, or what goes in by a few slops only until the middle of it.
+    """
+    slop = pair_slop(many.ends[k, 0], many.ends[k, 1], many)
+    return max(2.0 * SOFT_LANDING * slop / h, many.settings[0].rest_share * acceleration_of(k, many) * h)
+
+
+@inlined
 def fast_speed(k, h, many):
-    """Speed that closes `FAST_SHARE` of the smaller radius within h [m/s]."""
-    a, b = many.ends[k, 0], many.ends[k, 1]
-    radius = many.bodies[a].radius
-    if b >= 0:
-        radius = min(radius, many.bodies[b].radius)
-    return FAST_SHARE * radius / h
+    """Speed that is to be met in time: one that closes `FAST_SHARE` of the smaller radius within h [m/s].
+
+    Where an error is asked for (`refine`) all that is not slow, so that no part has to be as short as the error of
+    where bodies meet.
+    """
+    one, other = many.ends[k, 0], many.ends[k, 1]
+    radius = many.bodies[one].radius
+    if other >= 0:
+        radius = min(radius, many.bodies[other].radius)
+    fast = FAST_SHARE * radius / h
+    if many.settings[0].in_time == 1:
+        fast = min(fast, slow_speed(k, h, many))
+    return fast
 
 
 @inlined
@@ -62,8 +79,7 @@ def aim_impact(n, h, is_last, many):
     for k in range(n):
         slop = pair_slop(many.ends[k, 0], many.ends[k, 1], many)
         gap, speed, goal, is_hit = many.gap[k], many.speed[k], 0.0, False
-        slow = max(2.0 * SOFT_LANDING * slop / h, many.settings[0].rest_share * acceleration_of(k, many) * h)
-        slow = min(slow, fast_speed(k, h, many))
+        slow = min(slow_speed(k, h, many), fast_speed(k, h, many))
         if gap > slop:
             goal = -gap / h
             if not is_last and is_meeting(k, h, many):

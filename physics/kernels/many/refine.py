@@ -1,0 +1,177 @@
+"""Error control of a substep: parts as long as they agree with two of half their length.
+
+Impacts are met in time by a part of any length (`strike`). What is not, and makes an error of first or second order in
+the part where it happens: contacts that open, begin to slip or hold; slow meetings; and contacts whose problem has
+another answer. Halving finds all of them, and what moves smoothly is of second order in between.
+
+Parts are `whole`, 1/2, 1/4, ... of the substep, at multiples of their length, so that a part that is refused begins
+with the first half of it, which is known already. A part that is good for twice its length is followed by one.
+"""
+
+from __future__ import annotations
+
+import math
+
+from physics.kernels import layout as at
+from physics.kernels.body import angular_velocity, is_finite, read_state
+from physics.kernels.compiler import inlined, kernel
+from physics.kernels.fields.loads import set_clock
+from physics.kernels.many.arrays import CONTACT_COUNT, MEMORY_HEAD, MEMORY_SIZE, PART
+from physics.kernels.many.contacts import minus
+from physics.kernels.many.substep import substep_world
+
+# A substep in its shortest parts.
+WHOLE = 2**24
+
+# Error that a part may have, in tolerances of the contact problem: what is left of that in one part, as a velocity, is
+# some of them, and no shorter part shows less.
+PART_ERROR = 100.0
+
+# Where the shortest part does not meet the error, or after so many parts tried, those of the rest of the substep are no
+# shorter than four times it: what has no limit, and what rattles without end, takes no end of parts. There are 12 such
+# lengths, so that this ends after some 600 trials; the longer a part, the later it is refused for this reason.
+GIVE_UP = 4
+PATIENCE = 50
+
+# Tolerance of the contact problems of many bodies, and slop in bounding radii, below which rounding would decide.
+LEAST_TOLERANCE = 1.0e-11
+LEAST_SLOP = 1.0e-12
+
+# Rounding of a position, in units of its last place.
+ROUNDING = 16.0 * 2.0**-52
+
+START, COARSE, MIDDLE = range(3)
+
+
+@inlined
+def world_is_finite(many):
+    """Whether every number of every body is."""
+    for b in range(many.now.shape[0]):
+        if not is_finite(read_state(many.now, b)):
+            return False
+    return True
+
+
+@inlined
+def _keep(slot, world, memory, report, many):
+    """Keep the world as it is now."""
+    kept = many.kept
+    for b in range(many.now.shape[0]):
+        for c in range(many.now.shape[1]):
+            kept.now[slot, b, c] = many.now[b, c]
+    for c in range(MEMORY_HEAD + MEMORY_SIZE * int(memory[world, CONTACT_COUNT])):
+        kept.memory[slot, c] = memory[world, c]
+    for c in range(at.REPORT_SIZE):
+        kept.report[slot, c] = report[world, c]
+
+
+@inlined
+def _come_back(slot, world, memory, report, many):
+    """Make the world what it was when it was kept, but for the work that the report counts."""
+    kept = many.kept
+    for b in range(many.now.shape[0]):
+        for c in range(many.now.shape[1]):
+            many.now[b, c] = kept.now[slot, b, c]
+    for c in range(MEMORY_HEAD + MEMORY_SIZE * int(kept.memory[slot, CONTACT_COUNT])):
+        memory[world, c] = kept.memory[slot, c]
+    for c in range(at.REPORT_SIZE):
+        if c != at.SOLVES and c != at.ITERATIONS:
+            report[world, c] = kept.report[slot, c]
+
+
+@inlined
+def _length(a):
+    return math.sqrt(a[0] * a[0] + a[1] * a[1] + a[2] * a[2])
+
+
+@inlined
+def _apart(b, tilted, many):
+    """How far body b is from where `COARSE` has it, in its radius; and by how much faster, in its speed.
+
+    Of its speed counts no less than what its loads give it over its radius.
+    """
+    body = many.bodies[b]
+    x, q, v, L = read_state(many.now, b)
+    y, p, u, K = read_state(many.kept.now[COARSE], b)
+    way, r = minus(x, y), body.radius
+    same, other = 0.0, 0.0
+    for c in range(4):
+        same += (q[c] - p[c]) ** 2
+        other += (q[c] + p[c]) ** 2
+    pose = _length(way) + 2.0 * r * math.sqrt(min(same, other))
+    pose = max(0.0, pose - ROUNDING * _length(x)) / r
+    w, z = angular_velocity(q, L, body, tilted), angular_velocity(p, K, body, tilted)
+    speed = _length(v) + r * _length(w) + math.sqrt(r * body.acceleration)
+    change = _length(minus(v, u)) + r * _length(minus(w, z))
+    return max(pose, change / speed) if change > 0.0 else pose
+
+
+@inlined
+def _error(tilted, many):
+    """Largest error of any body, 1: all that is allowed."""
+    worst, allowed = 0.0, PART_ERROR * many.settings[0].tolerance
+    for b in range(many.now.shape[0]):
+        found = _apart(b, tilted, many) / allowed
+        if not found <= worst:
+            worst = found
+    return worst
+
+
+@kernel
+def _advance(world, start, h, switches, memory, report, many):
+    """One part of h [s], `start` [s] after the call."""
+    friction, gyroscopic, tilted, ellipsoids, hulls, scheme = switches
+    for b in range(many.now.shape[0]):
+        set_clock(start, many.bodies[b])
+        many.touched[b] = 0
+    substep_world(world, h, friction, gyroscopic, tilted, ellipsoids, hulls, scheme, None, memory, report, many)
+
+
+@kernel
+def _take_part(world, start, unit, part, shortest, switches, memory, report, many):
+    """Advance by `part` units of time [s], or by half of it, or a quarter ...: (units taken, error, lengths tried)."""
+    tilted, tried = switches[2], 1
+    _keep(START, world, memory, report, many)
+    _advance(world, start, part * unit, switches, memory, report, many)
+    while True:
+        half = 0.5 * part * unit
+        _keep(COARSE, world, memory, report, many)
+        _come_back(START, world, memory, report, many)
+        _advance(world, start, half, switches, memory, report, many)
+        _keep(MIDDLE, world, memory, report, many)
+        _advance(world, start + half, half, switches, memory, report, many)
+        error = _error(tilted, many)
+        if error <= 1.0 or part <= shortest:
+            return part, error, tried
+        _come_back(MIDDLE, world, memory, report, many)  # the coarse answer of the first half
+        part //= 2
+        tried += 1
+
+
+@kernel
+def refine(world, start, h, switches, memory, report, many):
+    """Advance the bodies of one world by h [s], `start` [s] after the call, in parts that meet the error.
+
+    Where the shortest part does not meet it either, that is counted as a fallback, and the shortest part of this
+    substep is longer from there on.
+
+    `switches` are friction, gyroscopic, tilted, ellipsoids, hulls and scheme, as in `substep_world`.
+    """
+    place, shortest, unit, patience = 0, 1, h / WHOLE, PATIENCE
+    part = int(memory[world, PART] * WHOLE)
+    if part == 0:
+        part = WHOLE
+    while place < WHOLE:
+        now = start + place * unit
+        part, error, tried = _take_part(world, now, unit, part, shortest, switches, memory, report, many)
+        place += part
+        patience -= tried
+        if not world_is_finite(many):
+            return
+        if error > 1.0:
+            report[world, at.FALLBACKS] += 1.0
+        if error > 1.0 or patience <= 0:
+            shortest, patience = min(GIVE_UP * shortest, WHOLE), PATIENCE
+        part = min(2 * part, WHOLE)  # what rounding leaves is no reason to stay with short ones: it is always tried
+        memory[world, PART] = part / WHOLE
+        part = min(part, place & -place)

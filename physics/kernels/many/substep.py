@@ -1,0 +1,80 @@
+"""A substep of a world whose bodies touch each other: the visible list of stages.
+
+The world goes, until the time of the substep is used up, through
+
+1. find      the contact set where the bodies are (`touch`): what touches or could within the time left;
+2. strike    velocities jump where bodies meet (`strike`); what could meet later may approach no faster than its gap
+             allows (a speculative contact: nothing passes through anything, however fast);
+3. until     the time that can pass before a meeting that matters: one that bounces, or is fast (`strike`);
+4. glide     bodies in no contact fly exactly; the others take Moreau's midpoint step (`glide`): half a free drift,
+             the contact problem of all of them at the middle, half a free drift;
+5. apart     what still overlaps is pushed apart, positions only (`apart`).
+
+The stages are those of `physics.kernels.step`, for a whole world where that has one body.
+"""
+
+from __future__ import annotations
+
+from physics.kernels import layout as at
+from physics.kernels.compiler import inlined, kernel
+from physics.kernels.fields.loads import pass_time
+from physics.kernels.many.apart import push_apart
+from physics.kernels.many.arrays import CONTACTS, LEFT_OUT
+from physics.kernels.many.glide import glide, hold_all_loads
+from physics.kernels.many.place import place_bodies
+from physics.kernels.many.strike import strike
+from physics.kernels.many.touch import find_contacts
+
+# Cuts of a substep per impact allowed: a meeting is approached from before it, in two or three.
+CUTS_PER_IMPACT = 4
+
+
+@inlined
+def note_depth(n, world, report, many):
+    """Deepest penetration of the set into the world's report, and contacts for which there was no room."""
+    for k in range(n):
+        report[world, at.PENETRATION] = max(report[world, at.PENETRATION], -many.gap[k])
+    report[world, at.LEFT_OUT] += many.counts[LEFT_OUT]
+    many.counts[LEFT_OUT] = 0
+
+
+@inlined
+def mark_touched(n, many):
+    """`many.touched`: bodies in a contact of the set."""
+    for b in range(many.touched.shape[0]):
+        many.touched[b] = 0
+    for k in range(n):
+        many.touched[many.ends[k, 0]] = 1
+        if many.ends[k, 1] >= 0:
+            many.touched[many.ends[k, 1]] = 1
+
+
+@kernel
+def substep_world(world, h, friction, gyroscopic, tilted, ellipsoids, hulls, scheme, sleep, memory, report, many):
+    """Advance the bodies of one world by h: the stages of the module's list."""
+    left, impacts = h, 0
+    for cut in range(CUTS_PER_IMPACT * many.settings[0].splits + 1):
+        is_last = impacts >= many.settings[0].splits or cut == CUTS_PER_IMPACT * many.settings[0].splits
+        hold_all_loads(left, gyroscopic, tilted, many)
+        place_bodies(tilted, many)
+        find_contacts(left, ellipsoids, hulls, world, sleep, many)
+        n = many.counts[CONTACTS]
+        note_depth(n, world, report, many)
+        n, t, is_impact = strike(n, world, left, is_last, friction, tilted, report, many)
+        many.counts[CONTACTS] = n
+        if is_impact and not is_last:
+            impacts += 1
+            continue  # what may be met in the time left is another set now
+        mark_touched(n, many)
+        if is_last:
+            report[world, at.UNRESOLVED] += 1.0
+        if t < left:
+            report[world, at.SPLITS] += 1.0
+        glide(n, world, t, friction, gyroscopic, tilted, scheme, sleep, memory, report, many)
+        left -= t
+        for b in range(many.now.shape[0]):
+            pass_time(t, many.bodies[b])
+        if n > 0:
+            push_apart(n, tilted, many)
+        if not left > 0.0:
+            break
