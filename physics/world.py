@@ -3,30 +3,24 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from physics import changes, checks, parameters
+from physics import allocation, changes, checks, parameters
 from physics.accuracy import Accuracy, resolve
 from physics.actuation import Actuation
 from physics.contacts import contact_ends, contact_forces
-from physics.effects import Actuator, Contact, Friction, Gravity, RollingFriction, Sleeping, SpinFriction
-from physics.field import Field, write_columns
+from physics.effects import Actuator, Friction, RollingFriction, Sleeping, SpinFriction
+from physics.field import Field
 from physics.kernels import layout as at
 from physics.kernels.events.log import EVENT_SIZE
 from physics.kernels.events.motion import make_motion
 from physics.kernels.fields.terms import declare
-from physics.kernels.linked import make_linked
-from physics.kernels.many import arrays as many
-from physics.kernels.many.refine import LEAST_SLOP, LEAST_TOLERANCE
-from physics.kernels.probe import angular_momenta
 from physics.kernels.sleep import GROUP, SLEEP_SIZE, Sleep
-from physics.kernels.slip import FEW
-from physics.kernels.stages import memory_size
-from physics.kernels.workspace import body_records, make_workspace
+from physics.kernels.workspace import body_records
 from physics.plan import SHAPE_CODES, make_plan
 from physics.report import StepReport
 from physics.scene import Scene
@@ -105,7 +99,7 @@ class World:
         self.time = 0.0
         self.recorder: Recorder | None = None
         self._allocate()
-        self._fill()
+        allocation.fill(self)
         changes.check_depth(self, self.state, self.params, np.arange(self.worlds), "scene")
 
     # --- memory ------------------------------------------------------------------------------------------------
@@ -118,7 +112,7 @@ class World:
         friction = self.scene.effect(Friction)
         along = friction.directions(len(self.scene.walls)) if friction else None
         self.walls = parameters.wall_table(self.scene.walls, along)
-        self.memory = self._make_memory()
+        self.memory = allocation.make_memory(self.scene, self.plan, self.worlds)
         self.sleep = np.zeros((rows if self.plan.sleeping else 0, SLEEP_SIZE))
         self.report_table = np.zeros((self.worlds, at.REPORT_SIZE))
         self.event_counts = np.zeros(rows if self.plan.events else 1, dtype=np.int64)
@@ -131,20 +125,12 @@ class World:
 
     def _prepare_threads(self) -> None:
         self.pool = SlicePool(self.threads, self.worlds)
-        settings = self.accuracy
         declare(self.plan.terms)
-        if self.plan.refined:
-            settings = replace(settings, tolerance=max(settings.tolerance, LEAST_TOLERANCE),
-                               slop=max(settings.slop, LEAST_SLOP))  # fmt: skip
-        numbers = {
-            "tolerance": settings.tolerance, "sweeps": settings.iterations,
-            "splits": settings.impacts * (self.body_count if self.plan.many else 1),
-            "relative_slop": settings.slop, "rest_share": settings.rest_share,
-            "mean_slip": FEW if settings.slip == "mean" else 0,
-        }  # fmt: skip
-        self.scratch = [self._make_scratch(**numbers) for _ in self.pool.slices]
+        self.scratch = [
+            allocation.make_scratch(self.scene, self.plan, self.walls, self.accuracy) for _ in self.pool.slices
+        ]
         self.motions = [
-            make_motion(len(self.walls), self.plan.features, settings.collisions == "sequential")
+            make_motion(len(self.walls), self.plan.features, self.accuracy.collisions == "sequential")
             if self.plan.events
             else None
             for _ in self.pool.slices
@@ -152,28 +138,6 @@ class World:
         self._wrench = self.no_wrench()
         self._calls: list[Callable[[], None]] = []
         self._bound_for: tuple | None = None  # arguments of `step`: the next call with the same finds all bound
-
-    def _make_scratch(self, **numbers):
-        """Working memory of one thread, with the numerical settings in it."""
-        plan = self.plan
-        if plan.many:
-            polyhedra, in_turn = parameters.polyhedra(self.scene.bodies), self.accuracy.collisions == "sequential"
-            return many.make_many(
-                self.body_count, self.walls, plan.terms, polyhedra, meet=plan.meeting, in_turn=in_turn,
-                refined=bool(plan.refined), **numbers,
-            )  # fmt: skip
-        if plan.linked:
-            return make_linked(self.body_count, plan.terms, **numbers)
-        return make_workspace(self.walls, plan.features, plan.terms, plan.laws, **numbers)
-
-    def _make_memory(self) -> np.ndarray:
-        """What is remembered of contacts: a row per world where bodies touch each other, else a row per body."""
-        walls = len(self.scene.walls)
-        if self.plan.many:
-            polyhedra = parameters.polyhedra(self.scene.bodies)
-            return np.zeros((self.worlds, many.memory_size(self.body_count, walls, polyhedra)))
-        rows = self.worlds * self.body_count if self.plan.contact else 1
-        return np.zeros((rows, memory_size(max(walls * self.plan.features, 1))))
 
     def make_event_room(self, room: int) -> None:
         """Let a step of the event-driven scheme log up to `room` events per body; for `simulate`."""
@@ -188,23 +152,6 @@ class World:
         )
         for view in (self.pos, self.quat, self.linvel, self.angvel):
             view.flags.writeable = False
-
-    def _fill(self) -> None:
-        contact, friction, gravity = (self.scene.effect(kind) for kind in (Contact, Friction, Gravity))
-        state = self.state.reshape(self.worlds, self.body_count, at.STATE_SIZE)
-        for b, body in enumerate(self.scene.bodies):
-            state[:, b, at.POS : at.POS + 3] = body.pos
-            state[:, b, at.QUAT : at.QUAT + 4] = body.quat
-            state[:, b, at.LINVEL : at.LINVEL + 3] = body.linvel
-            state[:, b, at.ANGVEL : at.ANGVEL + 3] = body.angvel
-        parameters.write_bodies(self.params, self.scene.bodies)
-        self.params[:, at.FRICTION] = friction.along if friction else 0.0
-        self.params[:, at.RESTITUTION] = (contact.restitution or 0.0) if contact else 0.0
-        self.gravity[:] = gravity.acceleration if gravity else 0.0
-        parameters.write_laws(self.params, self.plan.laws, self.scene.effects)
-        columns = self.params[:, at.PARAM_SIZE :]
-        write_columns(self.plan.fields, columns, self.body_count, np.arange(self.worlds))
-        angular_momenta(np.arange(len(self.state)), self.state, self.params)
 
     # --- stepping ----------------------------------------------------------------------------------------------
 
