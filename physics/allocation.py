@@ -53,7 +53,8 @@ def make_memory(scene: Scene, plan: Plan, worlds: int) -> np.ndarray:
     """What is remembered of contacts: a row per world where bodies touch each other, else a row per body."""
     bodies, walls = len(scene.bodies), len(scene.walls)
     if plan.many:
-        return np.zeros((worlds, many.memory_size(bodies, walls, parameters.polyhedra(scene.bodies))))
+        polyhedra = parameters.polyhedra(scene.bodies)
+        return np.zeros((worlds, many.memory_size(bodies, walls, polyhedra, bool(plan.refined))))
     return np.zeros((worlds * bodies if plan.contact else 1, memory_size(max(walls * plan.features, 1))))
 
 

@@ -31,11 +31,11 @@ BLOCKS_PER_BODY = 32
 # `counts`: contacts, pairs, and contacts or pairs for which there was no room.
 CONTACTS, PAIRS, LEFT_OUT = range(3)
 
-# Row of `memory`, one per world: length of the last resting stage [s], its contact count, the next part of a substep as
-# a share of it (of `refine`; 0: all of it), then `MEMORY_SIZE` numbers for each contact: its name, first and second
-# body (-1 - k: wall k), impulse and point in the world frame.
-STAGE_LENGTH, CONTACT_COUNT, PART = range(3)
-MEMORY_HEAD = 3
+# Row of `memory`, one per world: length of the last resting stage [s], its contact count, then `MEMORY_SIZE` numbers
+# for each contact: its name, first and second body (-1 - k: wall k), impulse and point in the world frame. Where
+# substeps are refined the last column of all is the next part of one as a share of it (`refine`; 0: all of it).
+STAGE_LENGTH, CONTACT_COUNT = range(2)
+MEMORY_HEAD = 2
 NAME, FIRST, SECOND, IMPULSE, POINT = 0, 1, 2, 3, 6
 MEMORY_SIZE = 9
 
@@ -143,9 +143,9 @@ def pair_room(bodies: int) -> int:
     return max(1, min(bodies * (bodies - 1) // 2, PAIRS_PER_BODY * bodies))
 
 
-def memory_size(bodies: int, walls: int, polyhedra: Sequence = ()) -> int:
-    """Columns of `memory` of one world."""
-    return MEMORY_HEAD + MEMORY_SIZE * contact_room(bodies, walls, polyhedra)
+def memory_size(bodies: int, walls: int, polyhedra: Sequence = (), refined: bool = False) -> int:
+    """Columns of `memory` of one world; of one whose substeps are refined the last one is for the length of a part."""
+    return MEMORY_HEAD + MEMORY_SIZE * contact_room(bodies, walls, polyhedra) + int(refined)
 
 
 def make_many(

@@ -16,7 +16,7 @@ from physics.kernels import layout as at
 from physics.kernels.body import angular_velocity, is_finite, read_state
 from physics.kernels.compiler import inlined, kernel
 from physics.kernels.fields.loads import set_clock
-from physics.kernels.many.arrays import CONTACT_COUNT, MEMORY_HEAD, MEMORY_SIZE, PART
+from physics.kernels.many.arrays import CONTACT_COUNT, MEMORY_HEAD, MEMORY_SIZE
 from physics.kernels.many.contacts import minus
 from physics.kernels.many.substep import substep_world
 
@@ -158,7 +158,8 @@ def refine(world, start, h, switches, memory, report, many):
     `switches` are friction, gyroscopic, tilted, ellipsoids, hulls and scheme, as in `substep_world`.
     """
     place, shortest, unit, patience = 0, 1, h / WHOLE, PATIENCE
-    part = int(memory[world, PART] * WHOLE)
+    next_part = memory.shape[1] - 1
+    part = int(memory[world, next_part] * WHOLE)
     if part == 0:
         part = WHOLE
     while place < WHOLE:
@@ -173,5 +174,5 @@ def refine(world, start, h, switches, memory, report, many):
         if error > 1.0 or patience <= 0:
             shortest, patience = min(GIVE_UP * shortest, WHOLE), PATIENCE
         part = min(2 * part, WHOLE)  # what rounding leaves is no reason to stay with short ones: it is always tried
-        memory[world, PART] = part / WHOLE
+        memory[world, next_part] = part / WHOLE
         part = min(part, place & -place)
