@@ -76,6 +76,15 @@ def is_finite(y):
 
 
 @inlined
+def all_finite(now):
+    """Whether every number of every state in `now` (bodies, STATE_SIZE) is."""
+    for b in range(now.shape[0]):
+        if not is_finite(read_state(now, b)):
+            return False
+    return True
+
+
+@inlined
 def principal_attitude(q, work, tilted):
     """Quaternion of the principal frame from that of the body frame (the same unless `tilted`)."""
     if tilted is None:

@@ -11,8 +11,8 @@ from typing import NamedTuple
 import numpy as np
 
 from physics.kernels import layout as at
-from physics.kernels.body import angular_velocity, bind_body, is_finite, read_state, write_state
-from physics.kernels.compiler import inlined, kernel
+from physics.kernels.body import all_finite, angular_velocity, bind_body, read_state, write_state
+from physics.kernels.compiler import kernel
 from physics.kernels.fields.linked import hold_linked_loads
 from physics.kernels.fields.loads import bind_fields, set_clock
 from physics.kernels.fields.terms import Term
@@ -51,15 +51,6 @@ def _substep(h, gyroscopic, tilted, scheme, linked):
         write_state(linked.now, b, y)
 
 
-@inlined
-def _is_good(linked):
-    """Whether every number of every body's state is finite."""
-    for b in range(linked.now.shape[0]):
-        if not is_finite(read_state(linked.now, b)):
-            return False
-    return True
-
-
 @kernel
 def step_linked(
     first, last, steps, substeps, h, state, params, shapes, gravity, wrench, gyroscopic, tilted, scheme, held, events,
@@ -86,7 +77,7 @@ def step_linked(
                 _substep(h, gyroscopic, tilted, scheme, linked)
             if events is not None:
                 step_smooth(world, h, tilted, report, linked)
-            if not _is_good(linked):
+            if not all_finite(linked.now):
                 report[world, at.FAULTS] += 1.0
                 break
             for b in range(bodies):

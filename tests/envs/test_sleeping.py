@@ -6,7 +6,7 @@ import gymnasium as gym
 import numpy as np
 
 import physics
-import rigid_env  # noqa: F401
+import rigid_env  # noqa: F401 (registers the environments)
 
 
 def test_an_environment_with_sleep_is_the_same_and_its_reset_wakes():

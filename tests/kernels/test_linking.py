@@ -53,7 +53,7 @@ def test_a_kernel_that_only_kernels_call_is_never_made_machine_code():
 
 @composed
 def with_a_closure(x):
-    twice = lambda y: 2.0 * y  # noqa: E731
+    twice = lambda y: 2.0 * y  # noqa: E731 (a closure is what this is about)
     return twice(x)
 
 

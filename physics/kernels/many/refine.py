@@ -13,7 +13,7 @@ from __future__ import annotations
 import math
 
 from physics.kernels import layout as at
-from physics.kernels.body import angular_velocity, is_finite, read_state
+from physics.kernels.body import all_finite, angular_velocity, read_state
 from physics.kernels.compiler import inlined, kernel
 from physics.kernels.fields.loads import set_clock
 from physics.kernels.many.arrays import CONTACT_COUNT, MEMORY_HEAD, MEMORY_SIZE
@@ -41,15 +41,6 @@ LEAST_SLOP = 1.0e-12
 ROUNDING = 16.0 * 2.0**-52
 
 START, COARSE, MIDDLE = range(3)
-
-
-@inlined
-def world_is_finite(many):
-    """Whether every number of every body is."""
-    for b in range(many.now.shape[0]):
-        if not is_finite(read_state(many.now, b)):
-            return False
-    return True
 
 
 @inlined
@@ -167,7 +158,7 @@ def refine(world, start, h, switches, memory, report, many):
         part, error, tried = _take_part(world, now, unit, part, shortest, switches, memory, report, many)
         place += part
         patience -= tried
-        if not world_is_finite(many):
+        if not all_finite(many.now):
             return
         if error > 1.0:
             report[world, at.FALLBACKS] += 1.0

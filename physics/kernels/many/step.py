@@ -10,12 +10,12 @@ for the broad phase, until something wakes it (`sleep`).
 from __future__ import annotations
 
 from physics.kernels import layout as at
-from physics.kernels.body import angular_velocity, bind_body, read_state, write_state
+from physics.kernels.body import all_finite, angular_velocity, bind_body, read_state, write_state
 from physics.kernels.compiler import kernel
 from physics.kernels.fields.loads import bind_fields, set_clock
 from physics.kernels.many import memory as kept
 from physics.kernels.many.contacts import put
-from physics.kernels.many.refine import refine, world_is_finite
+from physics.kernels.many.refine import refine
 from physics.kernels.many.sleep import all_sleep, doze, sleep_on, wake_world
 from physics.kernels.many.substep import substep_world
 
@@ -52,7 +52,7 @@ def step_many(
                 substep_world(
                     world, h, friction, gyroscopic, tilted, ellipsoids, hulls, scheme, sleep, memory, report, many
                 )
-            if not world_is_finite(many):
+            if not all_finite(many.now):
                 report[world, at.FAULTS] += 1.0
                 kept.forget(world, memory)
                 wake_world(world, bodies, sleep)

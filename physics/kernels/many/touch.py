@@ -154,7 +154,7 @@ def find_contacts(h, ellipsoids, hulls, world, sleep, many):
         margin = reach(a, h, many) + reach(b, h, many) + pair_slop(a, b, many)
         first, second = bodies[a].shape, bodies[b].shape
         if hulls is not None:
-            if ellipsoids is not None:  # noqa: SIM102
+            if ellipsoids is not None:  # noqa: SIM102 (as above)
                 if (first == HULL and second == ELLIPSOID) or (first == ELLIPSOID and second == HULL):
                     touch_ellipsoid_hull(a, b, margin, h, many)
                     continue
@@ -164,7 +164,7 @@ def find_contacts(h, ellipsoids, hulls, world, sleep, many):
                 else:
                     touch_hulls(a, b, margin, h, many)
                 continue
-        if ellipsoids is not None:  # noqa: SIM102
+        if ellipsoids is not None:  # noqa: SIM102 (as above)
             if first == ELLIPSOID or second == ELLIPSOID:
                 touch_ellipsoid(a, b, margin, h, many)
                 continue
