@@ -11,6 +11,18 @@ from physics.kernels.layout import BLOCK, NORMAL, SPHERE
 
 
 @inlined
+def wall_of(slot, work):
+    """Wall of a contact: `features`, 8 or 1, is a power of two, and a step asks too often for a division each time."""
+    return slot >> work.feature_bits
+
+
+@inlined
+def feature_of(slot, work):
+    """Feature of the body that touches there."""
+    return slot & (work.features - 1)
+
+
+@inlined
 def wall_normal(walls, k):
     """Unit normal of wall k."""
     return (walls[k, NORMAL], walls[k, NORMAL + 1], walls[k, NORMAL + 2])
@@ -74,12 +86,12 @@ def arm_and_rate(shape, dims, R, w, n, feature, tilted, work):
 @inlined
 def place_arms(n, R, tilted, work):
     """Contact points of the set at this pose: `work.arm`, relative to the centre of mass, world frame [m]."""
-    walls, features, shape = work.walls, work.features, work.shape
+    walls, shape = work.walls, work.shape
     dims = (work.dims[0], work.dims[1], work.dims[2])
     for i in range(n):
-        wall = work.slot[i] // features
+        wall = wall_of(work.slot[i], work)
         if shape == BLOCK:
-            r = geo.vertex_arm(dims, R, work.slot[i] % features)
+            r = geo.vertex_arm(dims, R, feature_of(work.slot[i], work))
             if tilted is not None:
                 c = center_arm(R, work)
                 r = (r[0] + c[0], r[1] + c[1], r[2] + c[2])

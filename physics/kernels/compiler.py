@@ -99,8 +99,11 @@ def kernel(function):
     Switches among the arguments are passed as ``None`` (off) or ``True`` (on):
     Numba prunes a branch on ``x is None`` while compiling, in every callee, so
     that what is off is not in the machine code at all.
+
+    That it is not inlined is said, because Numba would have it inlined where the first caller that it is compiled for
+    is, and with it all that it calls, a copy for each call.
     """
-    return _compile(function)
+    return _compile(function, forceinline=False)
 
 
 def inlined(function):

@@ -38,7 +38,7 @@ from __future__ import annotations
 import math
 
 from physics.kernels import quaternion as qt
-from physics.kernels.arms import arm_and_rate, place_arms, wall_normal
+from physics.kernels.arms import arm_and_rate, feature_of, place_arms, wall_normal, wall_of
 from physics.kernels.body import principal_attitude, turning
 from physics.kernels.compiler import inlined
 from physics.kernels.contact import LARGEST_TURN, UNSEEN, gap_of, nearest_outside_set
@@ -66,7 +66,7 @@ def parts_of_stage(n, y, h, tilted, work):
     R = qt.to_matrix(principal_attitude(q, work, tilted))
     w = n / work.mass
     for i in range(n):
-        m = qt.cross(contact_arm(work, i), wall_normal(work.walls, work.slot[i] // work.features))
+        m = qt.cross(contact_arm(work, i), wall_normal(work.walls, wall_of(work.slot[i], work)))
         w += qt.dot(m, turning(R, m, work.J))
     rate = max(math.sqrt(stiffness(work) * w), damping(work) * w)
     theta = max(0.5, 1.0 - 1.0 / (rate * h))
@@ -92,9 +92,9 @@ def aim_springs(n, x, R, v, w, alpha, before, after, tilted, work):
     dims = (work.dims[0], work.dims[1], work.dims[2])
     is_turning = qt.dot(w, w) * h * h <= LARGEST_TURN * LARGEST_TURN
     for i in range(n):
-        wall = work.slot[i] // work.features
+        wall = wall_of(work.slot[i], work)
         normal = wall_normal(work.walls, wall)
-        r, rate = arm_and_rate(work.shape, dims, R, w, normal, work.slot[i] % work.features, tilted, work)
+        r, rate = arm_and_rate(work.shape, dims, R, w, normal, feature_of(work.slot[i], work), tilted, work)
         gain = 0.0
         if is_turning:
             gain = qt.dot(normal, qt.cross(w, rate)) + qt.dot(normal, qt.cross(alpha, r))
@@ -110,7 +110,7 @@ def aim_springs(n, x, R, v, w, alpha, before, after, tilted, work):
 def foretell_gaps(n, v, w, after, work):
     """Gaps at the end of the stage into `work.due`, from the velocities after the impulses."""
     for i in range(n):
-        normal = wall_normal(work.walls, work.slot[i] // work.features)
+        normal = wall_normal(work.walls, wall_of(work.slot[i], work))
         work.due[i] += after * (qt.dot(normal, v) + qt.dot(normal, qt.cross(w, contact_arm(work, i))))
 
 
@@ -126,10 +126,10 @@ def lift_to_due(n, y, tilted, work):
     for i in range(n):
         lift = min(work.due[i], 0.0) - gap_of(work.slot[i], x, R, tilted, work)
         if lift > least:
-            x = _along(x, lift, wall_normal(work.walls, work.slot[i] // work.features))
+            x = _along(x, lift, wall_normal(work.walls, wall_of(work.slot[i], work)))
     gap, slot = nearest_outside_set(x, R, tilted, work)
     if gap < -least:
-        x = _along(x, -gap, wall_normal(work.walls, slot // work.features))
+        x = _along(x, -gap, wall_normal(work.walls, wall_of(slot, work)))
     return x, q, v, L
 
 

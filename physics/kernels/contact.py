@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import math
-
 from physics.kernels import geometry as geo
 from physics.kernels import quaternion as qt
-from physics.kernels.arms import arm_and_rate, center_arm, geometric_center, wall_normal
+from physics.kernels.arms import arm_and_rate, center_arm, feature_of, geometric_center, wall_normal, wall_of
 from physics.kernels.compiler import inlined, kernel
 from physics.kernels.laws import STIFFNESS, number_of
 from physics.kernels.layout import BLOCK, OFFSET, SPHERE, VERTEX_COUNT
@@ -61,7 +59,7 @@ def _admit(gap, speed, slop, margin, reach, acceleration, h, is_last):
     return gap <= margin and speed >= -acceleration * h and speed <= 0.0
 
 
-@kernel
+@inlined
 def gather(x, R, v, w, h, tilted, work):
     """Fill `work` (slot, gap, speed, mask) with the contact set at this pose.
 
@@ -136,7 +134,7 @@ def _record(count, wall, feature, features, gap, speed, work):
     return count + 1
 
 
-@kernel
+@inlined
 def has_passed(x, R, tilted, work):
     """Whether a feature that is not in the contact set (`work.mask`) is more than half a slop behind a wall."""
     walls, shape, least = work.walls, work.shape, -0.5 * work.slop
@@ -193,13 +191,13 @@ def nearest_outside_set(x, R, tilted, work):
 @kernel
 def gap_of(slot, x, R, tilted, work):
     """Gap [m] of one feature to its wall."""
-    walls, features, shape = work.walls, work.features, work.shape
+    walls, shape = work.walls, work.shape
     dims = (work.dims[0], work.dims[1], work.dims[2])
-    n = wall_normal(walls, slot // features)
-    d = qt.dot(n, geometric_center(x, R, work, tilted)) - walls[slot // features, OFFSET]
+    n = wall_normal(walls, wall_of(slot, work))
+    d = qt.dot(n, geometric_center(x, R, work, tilted)) - walls[wall_of(slot, work), OFFSET]
     e = geo.scaled_normal(shape, dims, R, n)
     if shape == BLOCK:
-        return d + geo.vertex_height(e, slot % features)
+        return d + geo.vertex_height(e, feature_of(slot, work))
     return d - geo.support(shape, dims, e)
 
 
@@ -231,9 +229,9 @@ def aim_impact(n, bounce_speed, slop_speed, rate, work):
 @inlined
 def is_closing(i, n, work):
     """Whether a contact of the wall of contact i is still above it."""
-    wall = work.slot[i] // work.features
+    wall = wall_of(work.slot[i], work)
     for j in range(n):
-        if work.gap[j] > work.slop and work.slot[j] // work.features == wall:
+        if work.gap[j] > work.slop and wall_of(work.slot[j], work) == wall:
             return True
     return False
 
@@ -245,9 +243,11 @@ def gainless(target, u):
     Impulses p that change contact velocities from u to u' change the energy by p·(u + u')/2: a push with u' <= -u adds
     nothing, nor does what holds at |u'| <= |u|. Where a body turns by much less than a radian in a stage what is asked
     for is just -u. Where it turns by more, ω x ṙ says nothing about the end of the stage, and is as large as one likes.
+    Along the wall a target t longer than u is shortened to |u|²/|t| <= |u|: the same where they are all but equal, and
+    one division.
     """
     most, square = u[1] * u[1] + u[2] * u[2], target[1] * target[1] + target[2] * target[2]
-    share = math.sqrt(most / square) if square > most else 1.0
+    share = most / square if square > most else 1.0
     return min(target[0], max(-u[0], 0.0)), share * target[1], share * target[2]
 
 
@@ -269,6 +269,16 @@ def _wandering(k, R, w, tilted, work):
 
 
 @inlined
+def _turning_gain(s, w, a):
+    """s ([ω]x² + [α]x): what a point of the body gains by turning is this times its arm."""
+    return (
+        -s * (w[1] * w[1] + w[2] * w[2]), s * (w[0] * w[1] - a[2]), s * (w[0] * w[2] + a[1]),
+        s * (w[0] * w[1] + a[2]), -s * (w[0] * w[0] + w[2] * w[2]), s * (w[1] * w[2] - a[0]),
+        s * (w[0] * w[2] - a[1]), s * (w[1] * w[2] + a[0]), -s * (w[0] * w[0] + w[1] * w[1]),
+    )  # fmt: skip
+
+
+@inlined
 def aim_rest(n, v, w, alpha, R, h, tilted, work):
     """Targets of the resting stage over h; R is the attitude at its middle, v and w are the velocities there before it.
 
@@ -279,22 +289,21 @@ def aim_rest(n, v, w, alpha, R, h, tilted, work):
     the solve, or would move a contact by less than `UNSEEN` slops in the step, is 0: a body comes to rest to the last
     bit, and contacts that hold are not asked to move apart by next to nothing.
     """
-    walls, features, shape = work.walls, work.features, work.shape
+    walls, shape = work.walls, work.shape
     half = 0.5 * h
     is_turning = 0.0 < qt.dot(w, w) * h * h <= LARGEST_TURN * LARGEST_TURN and shape != SPHERE
     negligible = max(work.tolerance * work.acceleration * h, UNSEEN * work.slop / h)
-    share = 1.0 if work.is_last else CLOSING_SHARE
+    share, gain = 1.0 if work.is_last else CLOSING_SHARE, _turning_gain(-half, w, alpha)
     for i in range(n):
         t0 = t1 = t2 = 0.0
         if is_turning:
             r = (work.arm[i, 0], work.arm[i, 1], work.arm[i, 2])
-            k = work.slot[i] // features
-            rate = qt.cross(w, r)
+            k = wall_of(work.slot[i], work)
+            c = qt.matvec(gain, r)
             if shape != BLOCK:
                 r, rate = _wandering(k, R, w, tilted, work)
-            a, b = qt.cross(w, rate), qt.cross(alpha, r)
-            c = (a[0] + b[0], a[1] + b[1], a[2] + b[2])
-            c = (-half * c[0], -half * c[1], -half * c[2])
+                a, b = qt.cross(w, rate), qt.cross(alpha, r)
+                c = (-half * (a[0] + b[0]), -half * (a[1] + b[1]), -half * (a[2] + b[2]))
             u = qt.cross(w, r)
             u = (v[0] + u[0], v[1] + u[1], v[2] + u[2])
             t0, t1, t2 = gainless(_in_frame(k, c, walls), _in_frame(k, u, walls))

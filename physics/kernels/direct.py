@@ -25,7 +25,8 @@ from __future__ import annotations
 import math
 
 from physics.kernels import quaternion as qt
-from physics.kernels.compiler import inlined, kernel
+from physics.kernels.arms import wall_of
+from physics.kernels.compiler import inlined
 from physics.kernels.layout import NORMAL, TANGENT_1, TANGENT_2
 from physics.kernels.point import to_world
 from physics.kernels.share import (
@@ -84,7 +85,7 @@ def _is_line(k):
 def _world_target(i, work):
     """Target velocity of contact i in the world frame."""
     n, a, b = work.target[i, 0], work.target[i, 1], work.target[i, 2]
-    walls, wall = work.walls, work.slot[i] // work.features
+    walls, wall = work.walls, wall_of(work.slot[i], work)
     return (
         n * walls[wall, NORMAL] + a * walls[wall, TANGENT_1] + b * walls[wall, TANGENT_2],
         n * walls[wall, NORMAL + 1] + a * walls[wall, TANGENT_1 + 1] + b * walls[wall, TANGENT_2 + 1],
@@ -122,7 +123,7 @@ def _miss(n, v, w, work):
 
     A contact without impulse may separate faster than asked.
     """
-    walls, features = work.walls, work.features
+    walls = work.walls
     worst = 0.0
     for i in range(n):
         m = qt.cross(w, contact_arm(work, i))
@@ -131,7 +132,7 @@ def _miss(n, v, w, work):
         if work.normal[i] > 0.0:
             worst = max(worst, math.sqrt(qt.dot(d, d)))
         else:
-            worst = max(worst, -qt.dot(wall_axis(walls, work.slot[i] // features, NORMAL), d))
+            worst = max(worst, -qt.dot(wall_axis(walls, wall_of(work.slot[i], work), NORMAL), d))
     return worst
 
 
@@ -214,12 +215,12 @@ def _mend(n, count, c, k, is_line, T, work):
     It shares them out as if all contacts were equally deep in the wall, which is so to a few slops; the moment
     that is missing for it makes one more bolt group, (K⁻¹ ΔT) x d_i.
     """
-    walls, features = work.walls, work.features
+    walls = work.walls
     mx, my, mz = T
     for i in range(n):
         if work.active[i] == 0:
             continue
-        wall, d = work.slot[i] // features, minus(contact_arm(work, i), c)
+        wall, d = wall_of(work.slot[i], work), minus(contact_arm(work, i), c)
         pn, pa, pb = work.normal[i], work.across[i, 0], work.across[i, 1]
         p = to_world(wall_axes(walls, wall), pn, pa, pb, (0.0, 0.0, 0.0))
         m = qt.cross(d, p)
@@ -228,7 +229,7 @@ def _mend(n, count, c, k, is_line, T, work):
     for i in range(n):
         if work.active[i] == 0:
             continue
-        wall = work.slot[i] // features
+        wall = wall_of(work.slot[i], work)
         p = qt.cross(a, minus(contact_arm(work, i), c))
         pn = work.normal[i] + qt.dot(wall_axis(walls, wall, NORMAL), p)
         pa = work.across[i, 0] + qt.dot(wall_axis(walls, wall, TANGENT_1), p)
@@ -253,7 +254,7 @@ def _free_speed(n, R, v, L, work):
     return largest
 
 
-@kernel
+@inlined
 def hold_all(n, R, v, L, work):
     """Try the impulses with which all n contacts take their target velocity.
 

@@ -13,7 +13,7 @@ def _vector(a):
     return (a[0], a[1], a[2])
 
 
-@kernel
+@inlined
 def drift(q, L, work, h, gyroscopic, tilted):
     """Attitude after h with constant angular momentum L, exact to rounding."""
     if L[0] == 0.0 and L[1] == 0.0 and L[2] == 0.0:
@@ -24,7 +24,7 @@ def drift(q, L, work, h, gyroscopic, tilted):
     return body_attitude(free_rotation(principal, L, _vector(work.J), work.series, h), work, tilted)
 
 
-@kernel
+@inlined
 def fly(y, work, h, gyroscopic, tilted):
     """State (x, q, v, L) after h under the constant acceleration and torque of the step.
 

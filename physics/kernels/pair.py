@@ -87,54 +87,62 @@ def _held(Wi, Wij, Wj, bi, bj, mu, goal, x, y):
 
 @inlined
 def _both_slide(W1, W12, W2, b1, b2, mu, x1, y1, x2, y2):
-    """One Newton step of two sliding contacts: (p_1, p_2, misses, turns)."""
+    """Two contacts that slide in given directions: (p_1, p_2, misses, what `_turns` goes on with)."""
     a11, a12 = W1[0] + (W1[1] * x1 + W1[2] * y1), W12[0] + (W12[1] * x2 + W12[2] * y2)
     a21, a22 = W12[0] + (W12[3] * x1 + W12[6] * y1), W2[0] + (W2[1] * x2 + W2[2] * y2)
     s = 1.0 / (a11 * a22 - a12 * a21)
     p1, p2 = s * (a12 * b2[0] - a22 * b1[0]), s * (a21 * b1[0] - a11 * b2[0])
     # Tangential velocity of i per normal impulse of j, friction along with it.
-    g11x, g11y = W1[3] + (W1[4] * x1 + W1[5] * y1), W1[6] + (W1[7] * x1 + W1[8] * y1)
-    g12x, g12y = W12[3] + (W12[4] * x2 + W12[5] * y2), W12[6] + (W12[7] * x2 + W12[8] * y2)
-    g21x, g21y = W12[1] + (W12[4] * x1 + W12[7] * y1), W12[2] + (W12[5] * x1 + W12[8] * y1)
-    g22x, g22y = W2[3] + (W2[4] * x2 + W2[5] * y2), W2[6] + (W2[7] * x2 + W2[8] * y2)
-    u1x, u1y = b1[1] + (g11x * p1 + g12x * p2), b1[2] + (g11y * p1 + g12y * p2)
-    u2x, u2y = b2[1] + (g21x * p1 + g22x * p2), b2[2] + (g21y * p1 + g22y * p2)
+    g11 = W1[3] + (W1[4] * x1 + W1[5] * y1), W1[6] + (W1[7] * x1 + W1[8] * y1)
+    g12 = W12[3] + (W12[4] * x2 + W12[5] * y2), W12[6] + (W12[7] * x2 + W12[8] * y2)
+    g21 = W12[1] + (W12[4] * x1 + W12[7] * y1), W12[2] + (W12[5] * x1 + W12[8] * y1)
+    g22 = W2[3] + (W2[4] * x2 + W2[5] * y2), W2[6] + (W2[7] * x2 + W2[8] * y2)
+    u1x, u1y = b1[1] + (g11[0] * p1 + g12[0] * p2), b1[2] + (g11[1] * p1 + g12[1] * p2)
+    u2x, u2y = b2[1] + (g21[0] * p1 + g22[0] * p2), b2[2] + (g21[1] * p1 + g22[1] * p2)
     # All of what follows is μ times the true across, along and slopes, which the turns do not notice.
     along1, along2 = -(x1 * u1x + y1 * u1y), -(x2 * u2x + y2 * u2y)
     across1, across2 = y1 * u1x - x1 * u1y, y2 * u2x - x2 * u2y
-    # Turning direction 1 by dα changes (x1, y1) by (-y1, x1) dα: what that does to p, then to u.
+    t = 1.0 / mu
+    miss1 = miss_across(t * across1, t * along1, p1 * mu * (W1[4] + W1[8]))
+    miss2 = miss_across(t * across2, t * along2, p2 * mu * (W2[4] + W2[8]))
+    inverse = (s * a11, s * a12, s * a21, s * a22)
+    return p1, p2, miss1, miss2, (inverse, g11, g12, g21, g22, along1, along2, across1, across2)
+
+
+@inlined
+def _turns(W1, W12, W2, x1, y1, x2, y2, p1, p2, sliding):
+    """Newton's step of both directions [rad]: turning direction 1 by dα changes (x1, y1) by (-y1, x1) dα."""
+    inverse, g11, g12, g21, g22, along1, along2, across1, across2 = sliding
+    a11, a12, a21, a22 = inverse
+    # What a turn of direction 1 does to p, then to u; then the same of direction 2.
     f1, f2 = p1 * (W1[2] * x1 - W1[1] * y1), p1 * (W12[6] * x1 - W12[3] * y1)
-    d1, d2 = s * (a12 * f2 - a22 * f1), s * (a21 * f1 - a11 * f2)
-    vx = g11x * d1 + g12x * d2 + p1 * (W1[5] * x1 - W1[4] * y1)
-    vy = g11y * d1 + g12y * d2 + p1 * (W1[8] * x1 - W1[7] * y1)
+    d1, d2 = a12 * f2 - a22 * f1, a21 * f1 - a11 * f2
+    vx = g11[0] * d1 + g12[0] * d2 + p1 * (W1[5] * x1 - W1[4] * y1)
+    vy = g11[1] * d1 + g12[1] * d2 + p1 * (W1[8] * x1 - W1[7] * y1)
     j11 = y1 * vx - x1 * vy - along1
-    vx = g21x * d1 + g22x * d2 + p1 * (W12[7] * x1 - W12[4] * y1)
-    vy = g21y * d1 + g22y * d2 + p1 * (W12[8] * x1 - W12[5] * y1)
+    vx = g21[0] * d1 + g22[0] * d2 + p1 * (W12[7] * x1 - W12[4] * y1)
+    vy = g21[1] * d1 + g22[1] * d2 + p1 * (W12[8] * x1 - W12[5] * y1)
     j21 = y2 * vx - x2 * vy
     f1, f2 = p2 * (W12[2] * x2 - W12[1] * y2), p2 * (W2[2] * x2 - W2[1] * y2)
-    d1, d2 = s * (a12 * f2 - a22 * f1), s * (a21 * f1 - a11 * f2)
-    vx = g11x * d1 + g12x * d2 + p2 * (W12[5] * x2 - W12[4] * y2)
-    vy = g11y * d1 + g12y * d2 + p2 * (W12[8] * x2 - W12[7] * y2)
+    d1, d2 = a12 * f2 - a22 * f1, a21 * f1 - a11 * f2
+    vx = g11[0] * d1 + g12[0] * d2 + p2 * (W12[5] * x2 - W12[4] * y2)
+    vy = g11[1] * d1 + g12[1] * d2 + p2 * (W12[8] * x2 - W12[7] * y2)
     j12 = y1 * vx - x1 * vy
-    vx = g21x * d1 + g22x * d2 + p2 * (W2[5] * x2 - W2[4] * y2)
-    vy = g21y * d1 + g22y * d2 + p2 * (W2[8] * x2 - W2[7] * y2)
+    vx = g21[0] * d1 + g22[0] * d2 + p2 * (W2[5] * x2 - W2[4] * y2)
+    vy = g21[1] * d1 + g22[1] * d2 + p2 * (W2[8] * x2 - W2[7] * y2)
     j22 = y2 * vx - x2 * vy - along2
     s = 1.0 / (j11 * j22 - j12 * j21)
-    turn1, turn2 = s * (j12 * across2 - j22 * across1), s * (j21 * across1 - j11 * across2)
-    s = 1.0 / mu
-    miss1 = miss_across(s * across1, s * along1, p1 * mu * (W1[4] + W1[8]))
-    miss2 = miss_across(s * across2, s * along2, p2 * mu * (W2[4] + W2[8]))
-    return p1, p2, miss1, miss2, turn1, turn2
+    return s * (j12 * across2 - j22 * across1), s * (j21 * across1 - j11 * across2)
 
 
-@kernel
+@inlined
 def solve_two(W1, W12, W2, b1, b2, mu, goal, x1, y1, x2, y2):
     """Impulses of two contacts: (found, p_1, p_2, residual [m/s])."""
     zero = (0.0, 0.0, 0.0)
     W21 = _transposed(W12)
     tried = 0
     for _ in range(PAIR_LIMIT):
-        p1, p2, miss1, miss2, turn1, turn2 = _both_slide(W1, W12, W2, b1, b2, mu, x1, y1, x2, y2)
+        p1, p2, miss1, miss2, sliding = _both_slide(W1, W12, W2, b1, b2, mu, x1, y1, x2, y2)
         if not (p1 >= 0.0 and p2 >= 0.0):
             if p1 >= p2:
                 return _opened(W1, W21, b1, b2, mu, goal, x1, y1)
@@ -154,6 +162,7 @@ def solve_two(W1, W12, W2, b1, b2, mu, goal, x1, y1, x2, y2):
             if found:
                 return True, q1, q2, miss
         else:
+            turn1, turn2 = _turns(W1, W12, W2, x1, y1, x2, y2, p1, p2, sliding)
             x1, y1 = turned(x1, y1, turn1)
             x2, y2 = turned(x2, y2, turn2)
     return False, zero, zero, 0.0
@@ -192,7 +201,7 @@ def _closes(n, count, p, m, u, w, inv_mass, K, work):
     return fastest
 
 
-@kernel
+@inlined
 def solve_few(n, count, mu, goal, u, w, inv_mass, K, work):
     """Impulses of the `count` <= 2 active contacts of `work.patch`, the other ones of the n open.
 

@@ -113,20 +113,18 @@ def misfit(n, vn, wa, wb, work):
 
 
 @inlined
-def respond(count, mu, center, y0, gain, motion, wa, wb, inv_mass, K, work):
-    """Directions at a planar motion, the y_1, y_2 that go with them, and the compliance with these y at work.
+def respond(count, mu, center, y0, gain, motion, wa, wb, K, work):
+    """Directions at a planar motion, and the y_1, y_2 that go with them.
 
     Returns
     -------
     y : tuple of 2 floats
-    compliance : tuple of 9 floats
-        Planar motion per planar impulse at the centroid, row by row: with the normal motion held by y_1, y_2.
+    turning : tuple of 6 floats
+        (ω_a per y_1, y_2; ω_b per y_1, y_2; ω_n per y_1, y_2), friction along with them.
     """
-    patch, ratio = work.patch, friction_ratio(work)
-    mass_b = ratio * ratio * inv_mass
-    cc, ca, cb = center
-    g0 = g1 = g2 = h0 = h1 = h2 = 0.0
-    x1 = x2 = y1 = y2 = f1 = f2 = 0.0
+    patch = work.patch
+    _, ca, cb = center
+    n0 = n1 = n2 = a0 = a1 = a2 = b0 = b1 = b2 = 0.0
     for j in range(count):
         i = work.active[j]
         c, a, b = patch[i, C], patch[i, A], patch[i, B]
@@ -138,27 +136,40 @@ def respond(count, mu, center, y0, gain, motion, wa, wb, inv_mass, K, work):
             s = -mu / size
         x, y = s * ua, s * ub
         patch[i, X], patch[i, Y], patch[i, SPEED] = x, y, size
-        qn, qa, qb = a * y - b * x, b - c * y, c * x - a
-        f = K[0] * qn + K[1] * qa + K[2] * qb
-        g = K[1] * qn + K[3] * qa + K[4] * qb
-        h = K[2] * qn + K[4] * qa + K[5] * qb
+        mn, ma, mb = a * y - b * x, b - c * y, c * x - a
         a -= ca
         b -= cb
-        g0 += g
-        g1 += a * g
-        g2 += b * g
-        h0 += h
-        h1 += a * h
-        h2 += b * h
-        f1 += a * f
-        f2 += b * f
+        n0, n1, n2 = n0 + mn, n1 + a * mn, n2 + b * mn
+        a0, a1, a2 = a0 + ma, a1 + a * ma, a2 + b * ma
+        b0, b1, b2 = b0 + mb, b1 + a * mb, b2 + b * mb
+    g0, h0 = K[1] * n0 + K[3] * a0 + K[4] * b0, K[2] * n0 + K[4] * a0 + K[5] * b0
+    g1, g2 = K[1] * n1 + K[3] * a1 + K[4] * b1, K[1] * n2 + K[3] * a2 + K[4] * b2
+    h1, h2 = K[2] * n1 + K[4] * a1 + K[5] * b1, K[2] * n2 + K[4] * a2 + K[5] * b2
+    f1, f2 = K[0] * n1 + K[1] * a1 + K[2] * b1, K[0] * n2 + K[1] * a2 + K[2] * b2
+    s = 1.0 / (g1 * h2 - g2 * h1)
+    ra, rb = gain[0] - g0 * y0, gain[1] - h0 * y0
+    return (s * (h2 * ra - g2 * rb), s * (g1 * rb - h1 * ra)), (g1, g2, h1, h2, f1, f2)
+
+
+@inlined
+def comply(count, center, turning, inv_mass, K, work):
+    """Planar motion per planar impulse at the centroid, row by row (9): with the normal motion held by y_1, y_2.
+
+    `turning` is that of `respond`, which only a step of Newton's has a use for this after.
+    """
+    patch, ratio = work.patch, friction_ratio(work)
+    mass_b = ratio * ratio * inv_mass
+    cc, ca, cb = center
+    g1, g2, h1, h2, f1, f2 = turning
+    s = 1.0 / (g1 * h2 - g2 * h1)
+    x1 = x2 = y1 = y2 = 0.0
+    for j in range(count):
+        i = work.active[j]
+        a, b, x, y = patch[i, A] - ca, patch[i, B] - cb, patch[i, X], patch[i, Y]
         x1 += a * x
         x2 += b * x
         y1 += a * y
         y2 += b * y
-    s = 1.0 / (g1 * h2 - g2 * h1)
-    ra, rb = gain[0] - g0 * y0, gain[1] - h0 * y0
-    y = (s * (h2 * ra - g2 * rb), s * (g1 * rb - h1 * ra))
     # Rows (ω_a, ω_b) of the response to the impulse (D_a, D_b, D_n), moments (D_n, -c D_b, c D_a).
     sa = (cc * K[4], -cc * K[3], K[1])
     sb = (cc * K[5], -cc * K[4], K[2])
@@ -167,14 +178,13 @@ def respond(count, mu, center, y0, gain, motion, wa, wb, inv_mass, K, work):
     pa, pb = s * (x1 * h2 - x2 * h1), s * (x2 * g1 - x1 * g2)
     qa, qb = s * (y1 * h2 - y2 * h1), s * (y2 * g1 - y1 * g2)
     ra, rb = s * (f1 * h2 - f2 * h1), s * (f2 * g1 - f1 * g2)
-    compliance = (
+    return (
         inv_mass - pa * sa[0] - pb * sb[0], -pa * sa[1] - pb * sb[1], -pa * sa[2] - pb * sb[2],
         -qa * sa[0] - qb * sb[0], mass_b - qa * sa[1] - qb * sb[1], -qa * sa[2] - qb * sb[2],
         cc * K[2] - ra * sa[0] - rb * sb[0],
         -cc * K[1] - ra * sa[1] - rb * sb[1],
         K[0] - ra * sa[2] - rb * sb[2],
     )  # fmt: skip
-    return y, compliance
 
 
 @inlined

@@ -28,7 +28,7 @@ from __future__ import annotations
 import math
 
 from physics.kernels import quaternion as qt
-from physics.kernels.arms import wall_normal
+from physics.kernels.arms import wall_normal, wall_of
 from physics.kernels.body import angular_velocity, turning
 from physics.kernels.compiler import inlined, kernel
 from physics.kernels.laws import ROLLING, SPIN, TANGENTIAL, if_law, number_of
@@ -61,7 +61,7 @@ def _against(n, width, across, along, w, work):
     x = y = z = 0.0
     for k in range(n):
         p = max(work.impulse[width * k], 0.0)
-        N = wall_normal(work.walls, work.slot[k] // work.features)
+        N = wall_normal(work.walls, wall_of(work.slot[k], work))
         spin = qt.dot(N, w)
         r = (w[0] - spin * N[0], w[1] - spin * N[1], w[2] - spin * N[2])
         size = math.sqrt(qt.dot(r, r))
@@ -122,7 +122,7 @@ def aim_at(k, y, tilted, work):
     w = angular_velocity(q, L, work, tilted)
     u = qt.cross(w, (work.arm[k, 0], work.arm[k, 1], work.arm[k, 2]))
     u = (u[0] + v[0], u[1] + v[1], u[2] + v[2])
-    share, wall = tangential_share(work), work.slot[k] // work.features
+    share, wall = tangential_share(work), wall_of(work.slot[k], work)
     work.target[k, 1] = -share * qt.dot(wall_axis(work.walls, wall, TANGENT_1), u)
     work.target[k, 2] = -share * qt.dot(wall_axis(work.walls, wall, TANGENT_2), u)
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 from physics.kernels import quaternion as qt
+from physics.kernels.arms import wall_of
 from physics.kernels.compiler import inlined
 from physics.kernels.ellipse import friction_ratio
 from physics.kernels.layout import NORMAL, TANGENT_1, TANGENT_2
@@ -78,7 +79,7 @@ def is_in_cone(pn, pa, pb, work):
 @inlined
 def share_out(n, count, c, F, a, work):
     """Bolt-group impulses: (the contact that pulls most or -1, whether all are in their cones)."""
-    walls, features = work.walls, work.features
+    walls = work.walls
     lowest = 0.0
     loser = -1
     holds = True
@@ -86,7 +87,7 @@ def share_out(n, count, c, F, a, work):
     for i in range(n):
         if work.active[i] == 0:
             continue
-        wall = work.slot[i] // features
+        wall = wall_of(work.slot[i], work)
         m = qt.cross(a, minus(contact_arm(work, i), c))
         p = (s * F[0] + m[0], s * F[1] + m[1], s * F[2] + m[2])
         pn = qt.dot(wall_axis(walls, wall, NORMAL), p)
@@ -149,13 +150,13 @@ def _share_by_weight(n, t1, t2, work):
 @inlined
 def share_by_load(n, work):
     """Share the tangential impulses of one wall out in proportion to the normal ones; whether that holds."""
-    walls, features, active = work.walls, work.features, work.active
-    wall = work.slot[first_active(n, work)] // features
+    walls, active = work.walls, work.active
+    wall = wall_of(work.slot[first_active(n, work)], work)
     t1, t2 = wall_axis(walls, wall, TANGENT_1), wall_axis(walls, wall, TANGENT_2)
     for i in range(n):
         if active[i] == 0:
             continue
-        if work.slot[i] // features != wall:
+        if wall_of(work.slot[i], work) != wall:
             return False
         work.weight[i] = work.normal[i]
     for _ in range(SHARE_LIMIT):

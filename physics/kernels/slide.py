@@ -37,7 +37,8 @@ from __future__ import annotations
 import math
 
 from physics.kernels import quaternion as qt
-from physics.kernels.compiler import inlined, kernel
+from physics.kernels.arms import wall_of
+from physics.kernels.compiler import inlined
 from physics.kernels.ellipse import friction_ratio, stretched_frame
 from physics.kernels.pair import solve_few
 from physics.kernels.patch import (
@@ -49,6 +50,7 @@ from physics.kernels.patch import (
     Y,
     across_misses,
     add_along,
+    comply,
     fit_targets,
     misfit,
     place_patch,
@@ -189,7 +191,7 @@ def _first_pivot(n, work):
     return -1
 
 
-@kernel
+@inlined
 def _search(n, patient, mu, goal, start, u, w, inv_mass, K, work):
     """Directions and set of pushing contacts: (found, impulses along the tangents and moments, Σ p_n, residual).
 
@@ -240,7 +242,7 @@ def _search(n, patient, mu, goal, start, u, w, inv_mass, K, work):
                 motion = slip
             pivot = -1
             continue
-        y, compliance = respond(count, mu, center, y0, gain, motion, wa, wb, inv_mass, K, work)
+        y, turning = respond(count, mu, center, y0, gain, motion, wa, wb, K, work)
         loser, total = resultant(count, center, y0, y, work)
         is_settled = True
         if loser < 0 or patient:
@@ -251,6 +253,7 @@ def _search(n, patient, mu, goal, start, u, w, inv_mass, K, work):
             if loser < 0 and miss <= goal:
                 work.mode = SLIDE
                 return True, total, push, miss
+            compliance = comply(count, center, turning, inv_mass, K, work)
             is_settled, pivot, motion = _turn(
                 count, mu, compliance, k, motion, delta, inv_mass / K[0], tried, hurry, work
             )
@@ -262,7 +265,7 @@ def _search(n, patient, mu, goal, start, u, w, inv_mass, K, work):
     return False, none, 0.0, 0.0
 
 
-@kernel
+@inlined
 def slide_patch(n, friction, R, v, L, work):
     """Try the impulses with which the n contacts of one wall slide, open, or turn about one that holds.
 
@@ -286,8 +289,8 @@ def slide_patch(n, friction, R, v, L, work):
     residual : float
         Relative to the largest free contact speed.
     """
-    wall = work.slot[0] // work.features
-    if work.slot[n - 1] // work.features != wall:
+    wall = wall_of(work.slot[0], work)
+    if wall_of(work.slot[n - 1], work) != wall:
         return False, v, L, 0.0
     inv_mass = 1.0 / work.mass
     axes = wall_axes(work.walls, wall)

@@ -15,6 +15,7 @@ from __future__ import annotations
 import math
 
 from physics.kernels import quaternion as qt
+from physics.kernels.arms import wall_of
 from physics.kernels.body import turning
 from physics.kernels.compiler import inlined
 from physics.kernels.ellipse import friction_ratio
@@ -34,7 +35,7 @@ MARGIN = 2.0
 @inlined
 def _tangential(i, v, w, work):
     """Tangential velocity of the body at contact i [m/s]."""
-    walls, k = work.walls, work.slot[i] // work.features
+    walls, k = work.walls, wall_of(work.slot[i], work)
     m = qt.cross(w, contact_arm(work, i))
     x, y, z = v[0] + m[0], v[1] + m[1], v[2] + m[2]
     t = TANGENT_1

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from physics.kernels import quaternion as qt
+from physics.kernels.arms import wall_of
 from physics.kernels.compiler import inlined, kernel
 from physics.kernels.compliance import soften, stiffness
 from physics.kernels.direct import hold_all
@@ -78,11 +79,11 @@ def _pivot(n, friction, smooth, residual, work):
 @inlined
 def _apply(n, width, v, L, work):
     """Velocity and angular momentum after the impulses: v + Σ P/m, L + Σ r x P."""
-    walls, features = work.walls, work.features
+    walls = work.walls
     inv_mass = 1.0 / work.mass
     px = py = pz = lx = ly = lz = 0.0
     for i in range(n):
-        wall = work.slot[i] // features
+        wall = wall_of(work.slot[i], work)
         x = y = z = 0.0
         for c in range(width):
             s = work.impulse[width * i + c]
@@ -108,8 +109,8 @@ def _may_hold(n, v, work):
     """
     if n == 1:
         return False
-    wall = work.slot[0] // work.features
-    if n < 3 or work.slot[n - 1] // work.features != wall:
+    wall = wall_of(work.slot[0], work)
+    if n < 3 or wall_of(work.slot[n - 1], work) != wall:
         return work.mode == HOLD
     axes = wall_axes(work.walls, wall)
     u, e = qt.dot(axes[0], v), eased(v, axes, work)

@@ -8,7 +8,7 @@ from physics.kernels import layout as at
 from physics.kernels import quaternion as qt
 from physics.kernels.arms import place_arms
 from physics.kernels.body import principal_attitude, turning
-from physics.kernels.compiler import inlined, kernel
+from physics.kernels.compiler import inlined
 from physics.kernels.compliance import aim_springs, foretell_gaps, parts_of_stage
 from physics.kernels.contact import aim_impact, aim_rest
 from physics.kernels.flight import drift
@@ -147,7 +147,7 @@ def aim_plastic(n, work):
         work.target[i, 0] = work.target[i, 1] = work.target[i, 2] = 0.0
 
 
-@kernel
+@inlined
 def impact(n, y, h, friction, smooth, tilted, pivots, report, work):
     """State after the impulses of the contacts that approach; unchanged when none does."""
     x, q, v, L = y
@@ -179,7 +179,7 @@ def impact(n, y, h, friction, smooth, tilted, pivots, report, work):
     return x, q, v1, L1
 
 
-@kernel
+@inlined
 def touch(n, y, h, friction, smooth, gyroscopic, tilted, pivots, memory, report, work):
     """State after Moreau's midpoint step over h with the n contacts of the set."""
     x, q, v, L = y

@@ -24,6 +24,7 @@ from __future__ import annotations
 
 import math
 
+from physics.kernels.arms import wall_of
 from physics.kernels.compiler import inlined, kernel
 
 # Columns of `work.local`: rows of the inverse of the contact's 3x3 block, then ρ_t and ρ.
@@ -54,7 +55,7 @@ def assemble(n, width, R, v, w, work):
     v, w : tuples of 3 floats
         Velocity and angular velocity without contact impulses, world frame [m/s, rad/s].
     """
-    walls, features, inv_mass, J = work.walls, work.features, 1.0 / work.mass, work.J
+    walls, inv_mass, J = work.walls, 1.0 / work.mass, work.J
     frame, angular, response, arm = work.frame, work.angular, work.response, work.arm
     # I⁻¹ in the world frame, six numbers.
     j1, j2, j3 = J[0], J[1], J[2]
@@ -65,7 +66,7 @@ def assemble(n, width, R, v, w, work):
     i23 = j1 * R[3] * R[6] + j2 * R[4] * R[7] + j3 * R[5] * R[8]
     i33 = j1 * R[6] * R[6] + j2 * R[7] * R[7] + j3 * R[8] * R[8]
     for i in range(n):
-        wall = work.slot[i] // features
+        wall = wall_of(work.slot[i], work)
         x, y, z = arm[i, 0], arm[i, 1], arm[i, 2]
         for c in range(width):
             row = width * i + c

@@ -67,6 +67,7 @@ def workspace_dtype(
     f, i = np.float64, np.int64
     scene = [
         ("features", i),
+        ("feature_bits", i),  # log2 of it
         ("walls", f, (max(wall_count, 1), WALL_SIZE)),  # columns of `layout`
     ]
     stage = [
@@ -115,7 +116,7 @@ def make_workspace(
 ) -> np.ndarray:
     """One workspace record, shape (1,), for `walls` ((walls, WALL_SIZE)), fields, laws, and numerical settings."""
     work = np.zeros(1, workspace_dtype(len(walls), features, terms, laws))
-    work["features"], work["still"] = features, np.inf
+    work["features"], work["feature_bits"], work["still"] = features, features.bit_length() - 1, np.inf
     if len(walls):
         work["walls"][0] = walls
     for name, value in settings.items():

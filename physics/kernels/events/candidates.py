@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from physics.kernels import quaternion as qt
-from physics.kernels.arms import wall_normal
+from physics.kernels.arms import feature_of, wall_normal, wall_of
 from physics.kernels.compiler import inlined, kernel
 from physics.kernels.events.forces import (
     arm_and_rate,
@@ -63,9 +63,9 @@ def act(count, work, motion):
 @inlined
 def contact_acceleration(i, y, R, w, a, alpha, tilted, work, motion):
     """Acceleration of candidate i: (normal part, tangential part)."""
-    wall = motion.candidate[i] // work.features
+    wall = wall_of(motion.candidate[i], work)
     n = wall_normal(work.walls, wall)
-    r, rate = arm_and_rate(work.shape, load(work.dims), R, w, n, motion.candidate[i] % work.features, tilted, work)
+    r, rate = arm_and_rate(work.shape, load(work.dims), R, w, n, feature_of(motion.candidate[i], work), tilted, work)
     b = plus(plus(a, qt.cross(alpha, r)), qt.cross(w, rate))
     bn = qt.dot(n, b)
     return bn, (b[0] - bn * n[0], b[1] - bn * n[1], b[2] - bn * n[2])
@@ -74,9 +74,9 @@ def contact_acceleration(i, y, R, w, a, alpha, tilted, work, motion):
 @kernel
 def sliding_now(i, y, R, w, tilted, work, motion):
     """Whether candidate i slides; its direction into `candidate_way`."""
-    wall = motion.candidate[i] // work.features
+    wall = wall_of(motion.candidate[i], work)
     n = wall_normal(work.walls, wall)
-    r, _ = arm_and_rate(work.shape, load(work.dims), R, w, n, motion.candidate[i] % work.features, tilted, work)
+    r, _ = arm_and_rate(work.shape, load(work.dims), R, w, n, feature_of(motion.candidate[i], work), tilted, work)
     u = plus(y[2], qt.cross(w, r))
     un = qt.dot(n, u)
     t = (u[0] - un * n[0], u[1] - un * n[1], u[2] - un * n[2])

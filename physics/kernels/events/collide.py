@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from physics.kernels import layout as at
 from physics.kernels import quaternion as qt
-from physics.kernels.arms import arm_and_rate, wall_normal
+from physics.kernels.arms import arm_and_rate, feature_of, wall_normal, wall_of
 from physics.kernels.body import angular_velocity
 from physics.kernels.compiler import inlined, kernel
 from physics.kernels.events import log as ev
@@ -87,8 +87,8 @@ def pose_collision(y, tilted, work, motion, report):
         rate = motion.gap_rate[START, s]
         if not touches(s, motion) or n >= work.slot.shape[0] or (only != ALL and s != only):
             continue
-        normal = wall_normal(work.walls, s // work.features)
-        r, r_rate = arm_and_rate(work.shape, load(work.dims), R, w, normal, s % work.features, tilted, work)
+        normal = wall_normal(work.walls, wall_of(s, work))
+        r, r_rate = arm_and_rate(work.shape, load(work.dims), R, w, normal, feature_of(s, work), tilted, work)
         goal = rebound(-rate, normal, r, r_rate, w, alpha, work, motion)
         pose_contact(n, s, r, (goal, 0.0, 0.0), work)
         n += 1
@@ -127,8 +127,8 @@ def pose_jump(y, h, tilted, work, motion):
         gap = motion.gap[START, s]
         if not gap <= motion.touch - min(0.0, motion.gap_rate[START, s]) * h or count >= work.slot.shape[0]:
             continue
-        n = wall_normal(work.walls, s // work.features)
-        r, _ = arm_and_rate(work.shape, load(work.dims), R, w, n, s % work.features, tilted, work)
+        n = wall_normal(work.walls, wall_of(s, work))
+        r, _ = arm_and_rate(work.shape, load(work.dims), R, w, n, feature_of(s, work), tilted, work)
         pose_contact(count, s, r, (-max(gap, 0.0) / h, 0.0, 0.0), work)
         count += 1
     work.mode = SLIDE
@@ -156,7 +156,7 @@ def log_impulses(n, width, work, motion, log, counts, t):
     for wall in range(work.walls.shape[0]):
         px = py = pz = 0.0
         for i in range(n):
-            if work.slot[i] // work.features == wall:
+            if wall_of(work.slot[i], work) == wall:
                 for c in range(width):
                     s = work.impulse[width * i + c]
                     px += s * work.walls[wall, 3 * c]

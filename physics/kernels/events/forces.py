@@ -23,7 +23,7 @@ from __future__ import annotations
 import math
 
 from physics.kernels import quaternion as qt
-from physics.kernels.arms import arm_and_rate, wall_normal
+from physics.kernels.arms import arm_and_rate, feature_of, wall_normal, wall_of
 from physics.kernels.body import principal_attitude
 from physics.kernels.compiler import inlined, kernel
 from physics.kernels.ellipse import opposing
@@ -81,11 +81,11 @@ def free_turning(y, tilted, work):
 @kernel
 def place(y, R, w, alpha, tilted, work, motion):
     """Arms, velocities, directions of sliding and free accelerations (`goal`) of the contacts that act."""
-    shape, features, walls = work.shape, work.features, work.walls
+    shape, walls = work.shape, work.walls
     dims, a, v = load(work.dims), load(work.free_acceleration), y[2]
     for j in range(motion.count):
-        n = wall_normal(walls, motion.slot[j] // features)
-        r, rate = arm_and_rate(shape, dims, R, w, n, motion.slot[j] % features, tilted, work)
+        n = wall_normal(walls, wall_of(motion.slot[j], work))
+        r, rate = arm_and_rate(shape, dims, R, w, n, feature_of(motion.slot[j], work), tilted, work)
         u = plus(v, qt.cross(w, r))
         b = plus(plus(a, qt.cross(alpha, r)), qt.cross(w, rate))
         un = qt.dot(n, u)
@@ -173,10 +173,10 @@ def list_unknowns(mu, work, motion):
     """Fill push, turn, row, row_turn and the right-hand sides (`unknown`) from `goal`; their number."""
     m = first = 0
     while first < motion.count:
-        wall = motion.slot[first] // work.features
+        wall = wall_of(motion.slot[first], work)
         axes = wall_axes(work.walls, wall)
         last, sliding = first, 0
-        while last < motion.count and motion.slot[last] // work.features == wall:
+        while last < motion.count and wall_of(motion.slot[last], work) == wall:
             motion.is_patch[last] = 0
             if not motion.holds[last]:
                 sliding += 1
@@ -218,7 +218,7 @@ def solve_unknowns(m, P, work, motion):
 def spread(mu, work, motion):
     """Force of each contact that acts (`force`, `normal`) from the unknowns."""
     for j in range(motion.count):
-        axes = wall_axes(work.walls, motion.slot[j] // work.features)
+        axes = wall_axes(work.walls, wall_of(motion.slot[j], work))
         k = motion.first[j]
         if motion.holds[j]:
             f = times(motion.unknown[k], axes[0])

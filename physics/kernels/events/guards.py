@@ -16,7 +16,7 @@ import math
 
 from physics.kernels import geometry as geo
 from physics.kernels import quaternion as qt
-from physics.kernels.arms import center_arm, geometric_center, wall_normal
+from physics.kernels.arms import center_arm, feature_of, geometric_center, wall_normal, wall_of
 from physics.kernels.compiler import inlined, kernel
 from physics.kernels.ellipse import eased
 from physics.kernels.events.forces import free_turning, load, spread, vector
@@ -96,7 +96,7 @@ def gap_margin(h, work, motion):
 @inlined
 def _cone_excess(j, mu, work, motion):
     """Tangential force of contact j less μ times its push [N]."""
-    axes = wall_axes(work.walls, motion.slot[j] // work.features)
+    axes = wall_axes(work.walls, wall_of(motion.slot[j], work))
     n, f = axes[0], eased(vector(motion.force, j), axes, work)
     p = motion.normal[j]
     return math.sqrt(max(0.0, qt.dot(f, f) - qt.dot(n, f) * qt.dot(n, f))) - mu * p
@@ -105,7 +105,7 @@ def _cone_excess(j, mu, work, motion):
 @inlined
 def _pair_excess(i, j, mu, work, motion):
     """The same of two contacts on one wall, whatever they share of the force along their line [N]."""
-    axes = wall_axes(work.walls, motion.slot[i] // work.features)
+    axes = wall_axes(work.walls, wall_of(motion.slot[i], work))
     a, b = vector(motion.arm, i), vector(motion.arm, j)
     e = eased((b[0] - a[0], b[1] - a[1], b[2] - a[2]), axes, work)
     s = 1.0 / math.sqrt(qt.dot(e, e))
@@ -124,9 +124,9 @@ def _pair_excess(i, j, mu, work, motion):
 @kernel
 def cone_excess(j, work, motion):
     """How far the contact j that holds, with the others of its wall that hold, leaves its cone [N]."""
-    wall, other, holding = motion.slot[j] // work.features, j, 1
+    wall, other, holding = wall_of(motion.slot[j], work), j, 1
     for k in range(motion.count):
-        if k != j and motion.holds[k] and motion.slot[k] // work.features == wall:
+        if k != j and motion.holds[k] and wall_of(motion.slot[k], work) == wall:
             other = k
             holding += 1
     if holding == 2 and motion.normal[j] >= 0.0 and motion.normal[other] >= 0.0:
@@ -139,9 +139,9 @@ def idle_pull(work, motion):
     """Least pull [N] that the affine force of a sliding face has at a touching vertex which does not act."""
     least, which = math.inf, -1
     for j in range(motion.count):
-        if not motion.is_patch[j] or (j > 0 and motion.slot[j] // work.features == motion.slot[j - 1] // work.features):
+        if not motion.is_patch[j] or (j > 0 and wall_of(motion.slot[j], work) == wall_of(motion.slot[j - 1], work)):
             continue
-        wall, k = motion.slot[j] // work.features, motion.first[j]
+        wall, k = wall_of(motion.slot[j], work), motion.first[j]
         axes = wall_axes(work.walls, wall)
         r = vector(motion.arm, j)
         for s in range(wall * work.features, (wall + 1) * work.features):
@@ -151,7 +151,7 @@ def idle_pull(work, motion):
             p = vector(motion.arm, opposite(s, wall, work, motion))
             a = b = 0.0
             for i in range(motion.count):
-                if motion.slot[i] // work.features == wall:
+                if wall_of(motion.slot[i], work) == wall:
                     a += qt.dot(axes[1], vector(motion.arm, i))
                     b += qt.dot(axes[2], vector(motion.arm, i))
             a -= 2.0 * qt.dot(axes[1], p) + qt.dot(axes[1], r)
@@ -169,8 +169,8 @@ def opposite(slot, wall, work, motion):
     """The contact of a face of three that is farthest from the vertex `slot`: all its bits but the face's differ."""
     best, most = -1, -1
     for i in range(motion.count):
-        if motion.slot[i] // work.features == wall:
-            bits = (motion.slot[i] % work.features) ^ (slot % work.features)
+        if wall_of(motion.slot[i], work) == wall:
+            bits = feature_of(motion.slot[i], work) ^ feature_of(slot, work)
             differing = (bits & 1) + ((bits >> 1) & 1) + ((bits >> 2) & 1)
             if differing > most:
                 best, most = i, differing

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 from physics.kernels import quaternion as qt
+from physics.kernels.arms import wall_of
 from physics.kernels.compiler import kernel
 from physics.kernels.ellipse import eased
 from physics.kernels.events.candidates import (
@@ -63,7 +64,7 @@ def _change_one(count, y, R, w, a, alpha, scale, tilted, work, motion):
                     most, which, worst, kind = excess, i, k, SLIDING
             k += 1
     if which >= 0:
-        axes = wall_axes(work.walls, motion.candidate[which] // work.features)
+        axes = wall_axes(work.walls, wall_of(motion.candidate[which], work))
         n, f = axes[0], eased(eased(vector(motion.force, worst), axes, work), axes, work)
         fn = qt.dot(n, f)
         t = (fn * n[0] - f[0], fn * n[1] - f[1], fn * n[2] - f[2])

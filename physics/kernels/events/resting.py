@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 from physics.kernels import quaternion as qt
+from physics.kernels.arms import feature_of, wall_of
 from physics.kernels.compiler import inlined, kernel
 from physics.kernels.events.candidates import (
     COLLIDES,
@@ -60,12 +61,12 @@ def pose_resting(count, y, R, w, has_sliding, tilted, work, motion):
     forces for impulses; what an arm's own motion adds to a contact's acceleration is asked of it as a target.
     `has_sliding`: some of the candidates slide (`candidate_way`).
     """
-    walls, features = work.walls, work.features
+    walls = work.walls
     scale = acceleration_scale(w, work)
     for i in range(count):
         slot = motion.candidate[i]
-        axes = wall_axes(walls, slot // features)
-        r, rate = arm_and_rate(work.shape, load(work.dims), R, w, axes[0], slot % features, tilted, work)
+        axes = wall_axes(walls, wall_of(slot, work))
+        r, rate = arm_and_rate(work.shape, load(work.dims), R, w, axes[0], feature_of(slot, work), tilted, work)
         c = qt.cross(w, rate)
         if has_sliding:  # as if it had accelerated along its sliding for long: no force then turns it
             c = plus(c, times(FAST * scale, vector(motion.candidate_way, i)))
@@ -84,9 +85,9 @@ def is_way(way, i):
 @inlined
 def is_idle(i, count, width, small, work):
     """Whether contact i without a force may be left to the others of its wall: at least three push."""
-    wall, pushing = work.slot[i] // work.features, 0
+    wall, pushing = wall_of(work.slot[i], work), 0
     for j in range(count):
-        if work.slot[j] // work.features == wall and work.impulse[width * j] > small * work.mass:
+        if wall_of(work.slot[j], work) == wall and work.impulse[width * j] > small * work.mass:
             pushing += 1
     return pushing >= PATCH
 
@@ -98,7 +99,7 @@ def keep_forces(count, width, work, motion):
     for i in range(count):
         if motion.kind[i] == OPEN:
             continue
-        axes = wall_axes(work.walls, work.slot[i] // work.features)
+        axes = wall_axes(work.walls, wall_of(work.slot[i], work))
         for c in range(3):
             motion.force[k, c] = 0.0
             for d in range(width):

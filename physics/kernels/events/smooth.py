@@ -13,7 +13,7 @@ from __future__ import annotations
 import math
 
 from physics.kernels import quaternion as qt
-from physics.kernels.arms import wall_normal
+from physics.kernels.arms import wall_normal, wall_of
 from physics.kernels.compiler import inlined, kernel
 from physics.kernels.events.forces import (
     free_turning,
@@ -159,7 +159,7 @@ def try_step(h, tilted, work, motion):
 @inlined
 def sliding_velocity(j, work, motion):
     """Tangential velocity of contact j and its size."""
-    n = wall_normal(work.walls, motion.slot[j] // work.features)
+    n = wall_normal(work.walls, wall_of(motion.slot[j], work))
     u = vector(motion.velocity, j)
     un = qt.dot(n, u)
     t = (u[0] - un * n[0], u[1] - un * n[1], u[2] - un * n[2])
@@ -240,7 +240,7 @@ def cancel(y, tilted, work, motion):
     place(y, R, w, alpha, tilted, work, motion)
     worst = 0.0
     for j in range(motion.count):
-        wall = motion.slot[j] // work.features
+        wall = wall_of(motion.slot[j], work)
         n = wall_normal(work.walls, wall)
         gap = qt.dot(n, x) + qt.dot(n, vector(motion.arm, j)) - work.walls[wall, OFFSET]
         worst = max(worst, abs(gap))
@@ -254,7 +254,7 @@ def cancel(y, tilted, work, motion):
         place((x, q, v, m), R, w, alpha, tilted, work, motion)
     worst = 0.0
     for j in range(motion.count):
-        n = wall_normal(work.walls, motion.slot[j] // work.features)
+        n = wall_normal(work.walls, wall_of(motion.slot[j], work))
         u = vector(motion.velocity, j)
         worst = max(worst, abs(qt.dot(n, u)))
         if motion.holds[j]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from physics.kernels.arms import wall_of
 from physics.kernels.compiler import inlined, kernel
 from physics.kernels.events import log as ev
 from physics.kernels.stages import MEMORY_HEAD
@@ -17,7 +18,7 @@ def log_changes(work, motion, log, counts, t):
     for wall in range(work.walls.shape[0]):
         state = AWAY
         for j in range(motion.count):
-            if motion.slot[j] // work.features == wall:
+            if wall_of(motion.slot[j], work) == wall:
                 if motion.holds[j]:
                     state = STICKS
                 elif state == AWAY:
@@ -49,7 +50,7 @@ def keep_contacts(memory, i, work, motion):
         f = motion.force
         for c in range(3):
             k = 3 * c
-            wall = slot // work.features
+            wall = wall_of(slot, work)
             memory[i, row + 3 * slot + c] = (
                 f[j, 0] * work.walls[wall, k] + f[j, 1] * work.walls[wall, k + 1] + f[j, 2] * work.walls[wall, k + 2]
             )
