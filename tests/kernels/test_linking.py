@@ -13,7 +13,7 @@ from pathlib import Path
 
 import pytest
 
-from physics.kernels.compiler import composed, kernel
+from physics.kernels.compiler import composed, inlined, kernel
 
 
 @kernel
@@ -49,6 +49,31 @@ def test_a_kernel_that_only_kernels_call_is_never_made_machine_code():
     assert not squares.signatures
     assert squares(4) == 16  # until Python calls it
     assert len(squares.signatures) == 1
+
+
+@kernel
+def halved(x):
+    return 0.5 * x
+
+
+@inlined
+def quartered(x):
+    return halved(halved(x))
+
+
+@kernel
+def eighth(x):
+    return quartered(halved(x))
+
+
+def test_what_an_inlined_function_calls_is_not_inlined_for_that():
+    """Left to itself Numba hands the option on to callees: copies of a whole contact solver, and minutes to compile."""
+    assert eighth(8.0) == 1.0
+    inlined_parts = {
+        function.__name__: [part.fndesc.inline for part in function._part.overloads.values()]
+        for function in (halved, quartered)
+    }
+    assert inlined_parts == {"halved": [False], "quartered": [True]}
 
 
 @composed
