@@ -103,31 +103,30 @@ def share_out(n, count, c, F, a, work):
 
 
 @inlined
-def _share_by_weight(n, t1, t2, work):
+def _share_by_weight(n, work):
     """Share the tangential impulses out by `work.weight` once: by what ratio that leaves a cone.
 
     With weights g_i, their centre r_g, ρ_i = r_i - r_g: p_t,i = g_i (P_t / Σg + α n x ρ_i), α = T_n / Σ g ρ²,
     T_n the moment of the tangential impulses about r_g. Weights are lowered where the cone is left.
     """
-    active, across, weight, ratio = work.active, work.across, work.weight, friction_ratio(work)
+    active, across, weight, place, ratio = work.active, work.across, work.weight, work.place, friction_ratio(work)
     total = fa = fb = ma = mb = 0.0
     for i in range(n):
         if active[i] == 0:
             continue
-        g, r = weight[i], contact_arm(work, i)
+        g = weight[i]
         total += g
         fa += across[i, 0]
         fb += across[i, 1]
-        ma += g * qt.dot(t1, r)
-        mb += g * qt.dot(t2, r)
+        ma += g * place[i, 0]
+        mb += g * place[i, 1]
     s = 1.0 / total
     ma, mb, fa, fb = s * ma, s * mb, s * fa, s * fb
     moment = second = 0.0
     for i in range(n):
         if active[i] == 0:
             continue
-        r = contact_arm(work, i)
-        a, b = qt.dot(t1, r) - ma, qt.dot(t2, r) - mb
+        a, b = place[i, 0] - ma, place[i, 1] - mb
         moment += a * across[i, 1] - b * across[i, 0]
         second += weight[i] * (a * a + b * b)
     alpha = moment / second if second > 0.0 else 0.0
@@ -135,8 +134,8 @@ def _share_by_weight(n, t1, t2, work):
     for i in range(n):
         if active[i] == 0:
             continue
-        r, g = contact_arm(work, i), weight[i]
-        x, y = fa - alpha * (qt.dot(t2, r) - mb), fb + alpha * (qt.dot(t1, r) - ma)
+        g = weight[i]
+        x, y = fa - alpha * (place[i, 1] - mb), fb + alpha * (place[i, 0] - ma)
         across[i, 0], across[i, 1] = g * x, g * y
         limit = work.mu * work.normal[i]
         y /= ratio
@@ -158,9 +157,10 @@ def share_by_load(n, work):
             continue
         if wall_of(work.slot[i], work) != wall:
             return False
-        work.weight[i] = work.normal[i]
+        work.weight[i], r = work.normal[i], contact_arm(work, i)
+        work.place[i, 0], work.place[i, 1] = qt.dot(t1, r), qt.dot(t2, r)
     for _ in range(SHARE_LIMIT):
-        worst = _share_by_weight(n, t1, t2, work)
+        worst = _share_by_weight(n, work)
         if worst <= 1.0:
             return True
         if worst > HOPELESS:

@@ -98,6 +98,7 @@ def workspace_dtype(
         ("normal", f, (n,)),  # of a direct solve: normal impulse, negative where the contact is open [N s]
         ("across", f, (n, 2)),  # of `direct`: tangential impulse [N s]
         ("weight", f, (n,)),  # of `share`: share in the tangential impulse [N s]
+        ("place", f, (n, 2)),  # of `share`: coordinates of the contact along the tangents [m]
         ("patch", f, (n, PATCH_SIZE)),  # see `patch`
         ("twist", f, (6,)),  # of `proximal`: change of (v, ω) [m/s, rad/s]
         ("start", f, (6,)),

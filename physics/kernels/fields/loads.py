@@ -21,7 +21,7 @@ import math
 from physics.kernels import layout as at
 from physics.kernels import quaternion as qt
 from physics.kernels.body import angular_velocity
-from physics.kernels.compiler import inlined, kernel
+from physics.kernels.compiler import inlined
 from physics.kernels.fields.state import ZERO, FieldState, plus, times
 from physics.kernels.fields.terms import if_declared, total_air, total_load
 from physics.kernels.flight import drift
@@ -54,7 +54,7 @@ def pass_time(h, work):
     work.now += h
 
 
-@kernel
+@inlined
 def field_state(x, q, v, L, t, tilted, work):
     """What the fields are told."""
     R = qt.to_matrix(q)
@@ -67,13 +67,13 @@ def field_state(x, q, v, L, t, tilted, work):
     return FieldState(x, v, w, R, center, air, work.mass, work.shape, _vector(work.dims))
 
 
-@kernel
+@inlined
 def field_load(x, q, v, L, t, tilted, work):
     """(force, torque about the centre of mass) of all fields at a state and a time."""
     return total_load(field_state(x, q, v, L, t, tilted, work), t, work)
 
 
-@kernel
+@inlined
 def put_loads(force, torque, work):
     """Let them act, besides what is held; `work.acceleration` bounds what they do to any point of the body."""
     inv_mass, J = 1.0 / work.mass, work.J
