@@ -39,6 +39,9 @@ ROUNDING = 1.0e-12
 # Sweeps before Newton's method has a turn: most problems that are left for sweeps need fewer than ten.
 SWEEPS_AT_ONCE = 12
 
+# Turns of Newton's method that end early, unless there is no other; what they leave it is given its time for.
+QUICK_TURNS = 10
+
 # Pivots of the fallback at most: several times the unknowns of a dozen contacts.
 MAX_PIVOTS = 500
 
@@ -142,7 +145,7 @@ def _iterate(n, friction, smooth, goal, work):
         factor_blocks(n, work)
         for i in range(n):
             work.friction[i] = work.mu
-        left, at_once = work.sweeps, SWEEPS_AT_ONCE
+        left, at_once, turns = work.sweeps, SWEEPS_AT_ONCE, 0
         if stiffness(work) > 0.0:  # the normals are determined, and Newton's method shares tangents out evenly
             at_once = 0
         while True:
@@ -152,7 +155,9 @@ def _iterate(n, friction, smooth, goal, work):
             left -= sweeps
             if residual <= goal or left <= 0:
                 break
-            newtons, residual = proximal_newton(n, residual, goal, work)
+            is_quick = turns < QUICK_TURNS and left > SWEEPS_AT_ONCE
+            newtons, residual = proximal_newton(n, residual, goal, is_quick, work)
+            turns += 1
             steps += newtons
             if residual <= goal:
                 break

@@ -54,7 +54,7 @@ def test_the_residual_is_measured_on_the_result(v, w, mu):
 def test_newton_never_makes_it_worse(v, w, mu):
     _, one = prepared((v[0], v[1] - 0.05, v[2]), w, mu)
     _, before = cone_sweeps(4, one["friction"], 0.0, 3, one)
-    _, after = proximal_newton(4, before, 1e-10, one)
+    _, after = proximal_newton(4, before, 1e-10, False, one)
     assert after <= before
     p, u = one["impulse"], np.zeros_like(one["velocity"])
     velocities(12, one["delassus"], p, one["bias"], u)
@@ -65,7 +65,7 @@ def test_newton_solves_a_pivot_from_a_cold_start():
     """A pivot: turned about a point near a vertex, which holds while the other three slide, from a cold start."""
     _, one = prepared((0.02, -0.05, 0.004), (0, 0.012, 0), 0.5)
     _, start = cone_sweeps(4, one["friction"], 0.0, 1, one)
-    steps, residual = proximal_newton(4, start, 1e-8, one)
+    steps, residual = proximal_newton(4, start, 1e-8, False, one)
     assert residual <= 1e-8
     assert steps <= 200  # 117 when this was written; a round is at most 20
 
