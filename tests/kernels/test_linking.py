@@ -12,6 +12,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from numba.core.codegen import JITCodeLibrary
 
 from physics.kernels.compiler import composed, inlined, kernel
 
@@ -49,6 +50,27 @@ def test_a_kernel_that_only_kernels_call_is_never_made_machine_code():
     assert not squares.signatures
     assert squares(4) == 16  # until Python calls it
     assert len(squares.signatures) == 1
+
+
+@kernel
+def calls_three_deep(x):
+    return both(x) + 1
+
+
+def test_nobody_outside_can_call_a_part(monkeypatch):
+    """So that what it does not read of its arguments is not handed to it: a hundred arrays, in a world of bodies."""
+    linkage, optimise = {}, JITCodeLibrary._optimize_final_module
+
+    def noted(library):
+        functions = [f for f in library._final_module.functions if not f.is_declaration]
+        linkage.update((f.name, f.linkage.name) for f in functions)
+        optimise(library)
+
+    monkeypatch.setattr(JITCodeLibrary, "_optimize_final_module", noted)
+    assert calls_three_deep(complex(3.0)) == 13.0  # of a type that nothing else asks for
+    for part in ("both", "squares", "never_squares", "square"):
+        assert {kind for name, kind in linkage.items() if f"test_linking{len(part)}{part}B" in name} == {"internal"}
+    assert "external" in {kind for name, kind in linkage.items() if "calls_three_deep" in name}
 
 
 @kernel
