@@ -28,8 +28,9 @@ from physics.kernels.lemke import lemke, lemke_sizes
 from physics.kernels.many.interior import interior_point
 from physics.kernels.many.islands import find_islands
 from physics.kernels.many.newton import newton_contacts, prepare_system
-from physics.kernels.many.solve import POLISH, forget_impulses, solve_contacts
-from physics.kernels.many.sweeps import assemble, residual_of, sweep_contacts
+from physics.kernels.many.response import assemble, residual_of
+from physics.kernels.many.solve import POLISH, forget_all, solve_contacts
+from physics.kernels.many.sweeps import sweep_contacts
 from physics.kernels.pyramid import pyramid_fallback
 from physics.kernels.sweeps import cone_sweeps, factor_blocks, normal_sweeps
 from physics.kernels.workspace import make_workspace
@@ -161,7 +162,7 @@ def solve_bodies(method, times, n, twists, limit, many):
                 many.twist[b, c] = many.free[b, c] = twists[b, c]
         for k in range(n):
             many.queue[k] = k
-        forget_impulses(0, n, many)
+        forget_all(n, many)
         if method == CHAIN:
             count, worst, _ = solve_contacts(n, True, many)
             continue

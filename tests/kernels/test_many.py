@@ -14,7 +14,7 @@ from scipy.sparse.csgraph import connected_components
 
 from physics.kernels import layout as at
 from physics.kernels.many import blocks as blocks_of
-from physics.kernels.many import cone
+from physics.kernels.many import cone, system
 from physics.kernels.many.arrays import CONTACTS, LEFT_OUT, PAIRS, make_many
 from physics.kernels.many.elimination import order_bodies
 from physics.kernels.many.islands import find_islands
@@ -267,7 +267,7 @@ def test_the_block_system_is_solved(count, links):
     many, products = island_of_all(count, pairs)
     assert products >= count
     blocks_of.clear(0, count, many)
-    A = np.eye(6 * count)
+    A = np.zeros((6 * count, 6 * count))
     for a, b in [*pairs, *((b, b) for b in range(count))]:
         for i, j in {(a, b), (b, a)}:
             block = rng.normal(size=(6, 6)) + 6 * np.sqrt(1 + links) * np.eye(6) * (i == j)
@@ -285,6 +285,43 @@ def test_the_block_system_is_solved(count, links):
     # Backward error of elimination: rounding times the condition of A times its order.
     bound = 6 * count * np.finfo(float).eps * np.linalg.cond(A) * np.abs(x).max()
     np.testing.assert_allclose(x.ravel(), np.linalg.solve(A, right.ravel()), atol=bound)
+
+
+@pytest.mark.parametrize(("count", "links"), [(1, 0), (2, 0), (9, 12)])
+def test_the_matrix_is_that_of_the_contacts(count, links):
+    """1 + M⁻¹ Jᵀ ρ D J, D not symmetric, against dense matrices; contacts of walls among them."""
+    rng = np.random.default_rng(links)
+    many, n = touching(count, connected_pairs(rng, count, links), list(range(0, count, 2)))
+    find_islands(n, many)
+    order_bodies(0, n, 0, count, many)
+    many.frame[:n] = [np.linalg.qr(rng.normal(size=(3, 3)))[0].ravel() for _ in range(n)]
+    many.arm[:n], many.lightness[:] = rng.normal(size=(n, 6)), rng.uniform(0.5, 2, count)
+    M, D, rho = np.zeros((6 * count, 6 * count)), rng.normal(size=(n, 9)), 0.7
+    for b in range(count):
+        K = rng.normal(size=(3, 3))
+        K = K @ K.T
+        many.turning[b] = K[np.triu_indices(3)]
+        M[6 * b : 6 * b + 3, 6 * b : 6 * b + 3] = many.lightness[b] * np.eye(3)
+        M[6 * b + 3 : 6 * b + 6, 6 * b + 3 : 6 * b + 6] = K
+    blocks_of.clear(0, count, many)
+    A, found = np.eye(6 * count), np.zeros((6 * count, 6 * count))
+    for k in range(n):
+        J = np.zeros((3, 6 * count))
+        for end, (b, sign) in enumerate(zip(many.ends[k], (1, -1))):
+            if b >= 0:
+                r = many.arm[k, 3 * end : 3 * end + 3]
+                J[:, 6 * b : 6 * b + 6] = sign * np.hstack([np.eye(3), np.cross(np.eye(3), r).T])  # v + ω x r
+        J = many.frame[k].reshape(3, 3) @ J
+        A += M @ J.T @ (rho * D[k].reshape(3, 3)) @ J
+        system.add_contact(k, tuple(D[k]), rho, many)
+    system.complete_matrix(0, count, many)
+    for b in range(count):
+        found[6 * b : 6 * b + 6, 6 * b : 6 * b + 6] = many.diagonal[b]
+        for k in range(many.start[b], many.stop[b]):
+            c = many.column[k]
+            found[6 * c : 6 * c + 6, 6 * b : 6 * b + 6] = many.lower[k]
+            found[6 * b : 6 * b + 6, 6 * c : 6 * c + 6] = many.upper[k]
+    np.testing.assert_allclose(found, A, atol=1e-14 * n * np.abs(A).max())  # rounding of n sums of products
 
 
 @pytest.mark.parametrize("kind", ["stack", "plate", "tree"])
@@ -329,11 +366,13 @@ def inside(rng):
 def test_the_scaling_takes_p_and_u_to_the_same_point(seed):
     rng = np.random.default_rng(seed)
     p, u, x = inside(rng), inside(rng), tuple(rng.normal(size=3))
-    w = cone.scaling(p, u)
+    w, own, inverse = cone.scaling(p, u)
     # Rounding of W and its inverse: they are within the condition of the scaling, (w₀ + |w'|)² (η cancels), of exact.
     bound = 1e-14 * (w[0] + np.hypot(w[1], w[2])) ** 2
     size = np.abs(cone.scaled(w, p)).max()
-    np.testing.assert_allclose(cone.scaled(w, p), cone.unscaled(w, u), atol=10 * bound * size)
+    np.testing.assert_allclose(own, cone.scaled(w, p), atol=10 * bound * size)
+    np.testing.assert_allclose(own, cone.unscaled(w, u), atol=10 * bound * size)
+    np.testing.assert_allclose(inverse**-4, cone.determinant(p) * cone.determinant(u))  # det W x = η² det x
     np.testing.assert_allclose(cone.unscaled(w, cone.scaled(w, x)), x, atol=10 * bound)
     twice = cone.unscaled(w, cone.unscaled(w, x))
     np.testing.assert_allclose(cone.unscaled_twice(w, x), twice, atol=10 * bound * np.abs(twice).max() + 1e-14)
@@ -346,9 +385,12 @@ def test_the_quotient_undoes_the_product_and_the_way_out_ends_at_the_boundary(se
     a, b = inside(rng), tuple(rng.normal(size=3))
     # The product's matrix has eigenvalues a₀ ± |a'|.
     condition = (a[0] + np.hypot(a[1], a[2])) / (a[0] - np.hypot(a[1], a[2]))
-    np.testing.assert_allclose(cone.quotient(cone.product(a, b), a), b, atol=1e-14 * condition * np.abs(b).max())
-    t = cone.way_out(a, b)
-    end = np.array(a) + t * np.array(b)
-    slack = end[0] - np.hypot(end[1], end[2])
-    assert slack >= -1e-12 * (1 + np.abs(b).max())
-    assert t == 1 or abs(slack) <= 1e-12 * condition * (1 + np.abs(b).max())
+    inverse = 1 / np.sqrt(cone.determinant(a))
+    quotient = cone.quotient(cone.product(a, b), a, inverse)
+    np.testing.assert_allclose(quotient, b, atol=1e-14 * condition * np.abs(b).max())
+    rate = cone.way_out(a, inverse, b)
+    far = np.array(a) * 1e-3 + np.array(b) if rate <= 0 else np.array(a) + np.array(b) / rate
+    slack = far[0] - np.hypot(far[1], far[2])
+    bound = 1e-12 * condition * (np.abs(a).max() + np.abs(b).max() * max(1, 1 / abs(rate)))
+    assert slack >= -bound
+    assert rate <= 0 or slack <= bound

@@ -8,7 +8,7 @@ import pytest
 from benchmarks import problems
 from benchmarks.problems import SETTINGS
 from physics.kernels import layout as at
-from physics.kernels.many import interior, islands, newton, solve, sweeps
+from physics.kernels.many import interior, islands, newton, response, solve
 from physics.kernels.many.arrays import Many, make_many
 from tests.reference.lcp import coulomb_defect, solve_coulomb
 
@@ -71,14 +71,14 @@ def test_of_piles_that_wedge_nine_in_ten_are_solved():
 def test_the_interior_point_method_alone_comes_near_from_any_start(seed, mu):
     many, n = pile(seed, 8, 4, mu)
     many.free[:] = many.twist
-    scale = sweeps.assemble(n, many)
+    scale = response.assemble(n, many)
     assert islands.find_islands(n, many) == 1
     part = (0, n, 0, 8)
     assert newton.prepare_system(part, 200, many) > 0
     count = interior.interior_point(part, scale, 1e-4 * scale, 30, many)
     assert count < 30
     # It stops at 1e-4 on twists of its own; those that belong to the impulses differ by what is left of its equations.
-    assert sweeps.residual_of(0, n, True, many) <= 1e-3 * scale
+    assert response.residual_of(0, n, True, many) <= 1e-3 * scale
 
 
 def test_islands_are_solved_as_if_they_were_alone():

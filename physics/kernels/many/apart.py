@@ -14,7 +14,8 @@ from physics.kernels.body import angular_velocity, read_state, write_state
 from physics.kernels.compiler import inlined, kernel
 from physics.kernels.many.contacts import pair_slop, plus, put, refresh, vector
 from physics.kernels.many.place import place_body
-from physics.kernels.many.sweeps import assemble, residual_of, sweep_contacts
+from physics.kernels.many.response import assemble, residual_of
+from physics.kernels.many.sweeps import sweep_normals
 from physics.kernels.many.thrift import bring_inside, free_lift, keep_turning, lift_of, pay
 
 # Share of the depth beyond half a slop that one stage takes back: turning makes the whole of it overshoot.
@@ -98,7 +99,7 @@ def _part_once(n, tilted, many):
         put(many.twist, b, 3, (0.0, 0.0, 0.0))
     assemble(n, many)
     sweeps = DEEP_SWEEPS if deepest > DEEP else APART_SWEEPS
-    sweep_contacts(0, n, None, residual_of(0, n, None, many), APART_ERROR * largest, sweeps, many)
+    sweep_normals(0, n, residual_of(0, n, None, many), APART_ERROR * largest, sweeps, many)
     _displace_all(tilted, many)
     return deepest
 

@@ -84,6 +84,10 @@ class Many(NamedTuple):
     step: np.ndarray  # 1/λ_max of the tangential part of its block [kg]
     block: np.ndarray  # the contact's own 3 x 3 of W = J M⁻¹ Jᵀ [1/kg]
     inverse: np.ndarray  # its inverse: 00, 01, 02, 11, 12, 22 [kg]
+    settled: np.ndarray  # of `sweeps`: impulses two sweeps ago, and what those two changed [N s]
+    trend: np.ndarray
+    visited: np.ndarray  # of sweeps without friction: numbers of the last visits of a contact, of a push of a body
+    pushed: np.ndarray
     table: np.ndarray  # places of names in the last stage's contacts: open addressing
     mix: np.ndarray  # of a pair of blocks: axes of one in the other, and absolute values
     polygon: np.ndarray  # of a pair of blocks: clipped face, two copies of (x, y, height)
@@ -118,13 +122,12 @@ class Many(NamedTuple):
     defect: np.ndarray  # x - M⁻¹ Jᵀ p(x) [m/s, rad/s]
     before: np.ndarray  # twists before a Newton step
     change: np.ndarray  # the step
-    row: np.ndarray  # Jacobian rows of both ends of a contact, and what the bodies answer
-    reply: np.ndarray
+    weighed: np.ndarray  # of `system`: what one contact adds, times the Jacobian of each end
     momenta: np.ndarray  # of `restraint`: velocity and angular momentum before an impact, then with all of its rebound
-    weighed: np.ndarray
     inside: np.ndarray  # of `interior`: p̂ and û, their scaling (w, η), what û misses, what is added to p̂
     slack: np.ndarray
     scaling: np.ndarray
+    own: np.ndarray  # λ, 1/√det λ and the direction of slip
     miss: np.ndarray
     extra: np.ndarray
     hulls: Hulls | None  # tables of convex polyhedra, and a pair of them in place; None where there is no hull
@@ -185,7 +188,8 @@ def make_many(
         owner=np.zeros(n, i), normal=np.zeros((n, 3), f), anchor=np.zeros((n, 6)), frame=np.zeros((n, 9)),
         arm=np.zeros((n, 6)), gap=np.zeros(n), speed=np.zeros(n), mu=np.zeros(n), bounce=np.zeros(n),
         target=np.zeros((n, 3)), impulse=np.zeros((n, 3)), step=np.zeros(n), block=np.zeros((n, 9)),
-        inverse=np.zeros((n, 6)),
+        inverse=np.zeros((n, 6)), settled=np.zeros((n, 3)), trend=np.zeros((n, 3)), visited=np.zeros(n, i),
+        pushed=np.zeros(nb, i),
         table=np.full(table, -1, i), mix=np.zeros((4, 3, 3)), polygon=np.zeros((2, 16, 3)),
         edge=np.zeros((2, 16, 2), i), free=np.zeros((nb, 6)), parent=np.zeros(nb, i), island=np.zeros(nb, i),
         first_contact=np.zeros(n + 1, i), first_body=np.zeros(n + 1, i), queue=np.zeros(n, i),
@@ -195,10 +199,9 @@ def make_many(
         diagonal=np.zeros((nb, 6, 6)), lower=np.zeros((blocks, 6, 6)), upper=np.zeros((blocks, 6, 6)),
         swaps=np.zeros(6, i), spare=np.zeros((6, 6)), aim=np.zeros((n, 3)), trial=np.zeros((n, 3)),
         saved=np.zeros((n, 3)), best=np.zeros((n, 3)), defect=np.zeros((nb, 6)),
-        before=np.zeros((nb, 6)), change=np.zeros((nb, 6)),
-        row=np.zeros((2, 3, 6)), reply=np.zeros((2, 3, 6)), weighed=np.zeros((2, 3, 6)),
-        inside=np.zeros((n, 3)), slack=np.zeros((n, 3)), scaling=np.zeros((n, 4)), miss=np.zeros((n, 3)),
-        extra=np.zeros((n, 3)), momenta=np.zeros((nb, 12)),
+        before=np.zeros((nb, 6)), change=np.zeros((nb, 6)), weighed=np.zeros((2, 3, 6)),
+        inside=np.zeros((n, 3)), slack=np.zeros((n, 3)), scaling=np.zeros((n, 4)), own=np.zeros((n, 6)),
+        miss=np.zeros((n, 3)), extra=np.zeros((n, 3)), momenta=np.zeros((nb, 12)),
         hulls=make_hulls(polyhedra) if polyhedra else None,
         kept=make_kept(nb, memory_size(nb, len(walls), polyhedra)) if refined else None, settings=record,
     )  # fmt: skip

@@ -19,12 +19,12 @@ SIZE = 6  # of a block: velocity and angular velocity of a body
 
 @kernel
 def clear(begin, end, many):
-    """Set the system of the bodies `many.order[begin:end]` to the identity."""
+    """Set the system of the bodies `many.order[begin:end]` to zero."""
     for i in range(begin, end):
         b = many.order[i]
         for r in range(SIZE):
             for c in range(SIZE):
-                many.diagonal[b, r, c] = 1.0 if r == c else 0.0
+                many.diagonal[b, r, c] = 0.0
         for k in range(many.start[b], many.stop[b]):
             for r in range(SIZE):
                 for c in range(SIZE):

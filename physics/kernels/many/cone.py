@@ -29,12 +29,13 @@ def determinant(a):
 
 @inlined
 def scaling(p, u):
-    """(w₀, w₁, w₂, η) for p and u inside the cone."""
+    """((w₀, w₁, w₂, η), λ, 1/√det λ) for p and u inside the cone."""
     dp, du = math.sqrt(determinant(p)), math.sqrt(determinant(u))
     s, t = 1.0 / dp, 1.0 / du
     half = 1.0 / math.sqrt(2.0 + 2.0 * s * t * qt.dot(p, u))  # 1/(2γ)
-    w = (half * (t * u[0] + s * p[0]), half * (t * u[1] - s * p[1]), half * (t * u[2] - s * p[2]))
-    return (w[0], w[1], w[2], math.sqrt(du * s))
+    eta = math.sqrt(du * s)
+    w = (half * (t * u[0] + s * p[0]), half * (t * u[1] - s * p[1]), half * (t * u[2] - s * p[2]), eta)
+    return w, scaled(w, p), 1.0 / (dp * eta)
 
 
 @inlined
@@ -66,25 +67,19 @@ def product(a, b):
 
 
 @inlined
-def quotient(b, a):
-    """x with a ∘ x = b."""
-    x = (a[0] * b[0] - a[1] * b[1] - a[2] * b[2]) / determinant(a)
+def quotient(b, a, inverse):
+    """x with a ∘ x = b, `inverse` being 1/√det a."""
+    x = (a[0] * b[0] - a[1] * b[1] - a[2] * b[2]) * (inverse * inverse)
     s = 1.0 / a[0]
     return (x, s * (b[1] - x * a[1]), s * (b[2] - x * a[2]))
 
 
 @inlined
-def way_out(a, d):
-    """Largest t ≤ 1 for which a + t d is in the cone, a being inside."""
-    A, C = d[0] * d[0] - d[1] * d[1] - d[2] * d[2], determinant(a)
-    B = a[0] * d[0] - a[1] * d[1] - a[2] * d[2]  # A t² + 2 B t + C
-    t, square = 1.0, B * B - A * C
-    if d[0] < 0.0:
-        t = min(t, -a[0] / d[0])
-    if square >= 0.0:
-        q = -(B + math.copysign(math.sqrt(square), B))
-        if q != 0.0 and C / q > 0.0:
-            t = min(t, C / q)
-        if A != 0.0 and q / A > 0.0:
-            t = min(t, q / A)
-    return t
+def way_out(a, inverse, d):
+    """1/t for the largest t for which a + t d is in the cone, a being inside; no more than 0: any.
+
+    The scaling with a/√det a takes a to √det a e and d to h √det a: 1 + t h₀ ≥ t |h'| is asked for.
+    """
+    s = inverse
+    h = unscaled((s * a[0], s * a[1], s * a[2], 1.0), (s * d[0], s * d[1], s * d[2]))
+    return math.sqrt(h[1] * h[1] + h[2] * h[2]) - h[0]

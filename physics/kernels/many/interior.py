@@ -6,9 +6,9 @@ iteration is one Newton step for
 
     x = M⁻¹ Jᵀ p,    û = S (J x + b) + |û_t| e,    p̂ ∘ û = σ ν e,
 
-scaled as in `cone`, first with σ = 0 to see how far that leads, then with σ and the second-order term that this
-suggests (Mehrotra [2]_). The derivative of |û_t| is taken along, which makes the matrix unsymmetric, and its blocks
-are those of Newton's method on twists (`system`). What counts is measured as everywhere, by the natural map.
+scaled as in `cone` (λ = W p̂ = W⁻¹ û), first with σ = 0 to see how far that leads, then with σ and the second-order
+term that this suggests (Mehrotra [2]_). The derivative of |û_t| is taken along, which makes the matrix unsymmetric, and
+its blocks are those of Newton's method on twists (`system`). What counts is measured as everywhere, by the natural map.
 
 Without friction of a contact its cone is a half line: S = (1, 0, 0).
 
@@ -23,12 +23,13 @@ from __future__ import annotations
 
 import math
 
+from physics.kernels import quaternion as qt
 from physics.kernels.compiler import inlined, kernel
 from physics.kernels.many import cone
 from physics.kernels.many.blocks import SIZE, clear, factor, substitute
 from physics.kernels.many.contacts import local_velocity, plus, put, vector, velocity_along
-from physics.kernels.many.sweeps import natural_map, push
-from physics.kernels.many.system import add_contact
+from physics.kernels.many.response import natural_map, push
+from physics.kernels.many.system import add_contact, complete_matrix
 
 # How near to the boundary of the cones a step may lead; least ratio of p̂·û after and before that is aimed at.
 STEP_SHARE = 0.98
@@ -50,13 +51,10 @@ def _into(s, a):
 
 
 @inlined
-def _change(k, u, s, many):
-    """(S + e (û_t/|û_t|)ᵀ) J dx for the change of twists in `many.change`."""
+def _change(k, s, x, y, many):
+    """(S + e dᵀ) J dx for the change of twists in `many.change`, d = (0, x, y) the direction of slip."""
     d = _into(s, velocity_along(k, many.change, many))
-    size = math.sqrt(u[1] * u[1] + u[2] * u[2])
-    if size > 0.0:
-        d = (d[0] + (u[1] * d[1] + u[2] * d[2]) / size, d[1], d[2])
-    return d
+    return (d[0] + (x * d[1] + y * d[2]), d[1], d[2])
 
 
 @inlined
@@ -74,14 +72,11 @@ def _begin(part, start, many):
 
 
 @inlined
-def _pose(k, s, w, u, many):
-    """Add contact k to the system: S W⁻² (S + e (û_t/|û_t|)ᵀ) between its rows."""
+def _pose(k, s, w, x, y, many):
+    """Add contact k to the system: S W⁻² (S + e dᵀ) between its rows, d = (0, x, y) the direction of slip."""
     f = 1.0 / (w[3] * w[3])
     a, b, c = f * (2.0 * w[0] * w[0] - 1.0), -2.0 * f * w[0] * w[1], -2.0 * f * w[0] * w[2]
     d, e, g = f * (1.0 + 2.0 * w[1] * w[1]), 2.0 * f * w[1] * w[2], f * (1.0 + 2.0 * w[2] * w[2])
-    size, x, y = math.sqrt(u[1] * u[1] + u[2] * u[2]), 0.0, 0.0
-    if size > 0.0:
-        x, y = u[1] / size, u[2] / size
     n, t = s
     D = (n * n * a, n * t * (b + a * x), n * t * (c + a * y), n * t * b, t * t * (d + b * x), t * t * (e + b * y),
          n * t * c, t * t * (e + c * x), t * t * (g + c * y))  # fmt: skip
@@ -105,16 +100,21 @@ def _prepare(part, many):
         v = (v[0] - t[0], v[1] - t[1], v[2] - t[2])
         real = (p[0] * s[0], s[1] * p[1], s[1] * p[2])
         worst = max(worst, natural_map(real, v, many.block[k, 0], many.step[k], many.mu[k] * s[1]))
-        w = cone.scaling(p, u)
-        gap += p[0] * u[0] + p[1] * u[1] + p[2] * u[2]
+        slip = math.sqrt(u[1] * u[1] + u[2] * u[2])
+        x, y = (u[1] / slip, u[2] / slip) if slip > 0.0 else (0.0, 0.0)
+        w, own, inverse = cone.scaling(p, u)
+        gap += qt.dot(p, u)
         v = _into(s, v)
-        miss = (v[0] + math.sqrt(u[1] * u[1] + u[2] * u[2]) - u[0], v[1] - u[1], v[2] - u[2])
+        miss = (v[0] + slip - u[0], v[1] - u[1], v[2] - u[2])
         put(many.miss, k, 0, miss)
-        put(many.scaling, k, 0, (w[0], w[1], w[2]))
-        many.scaling[k, 3] = w[3]
-        _pose(k, s, w, u, many)
+        put(many.own, k, 0, own)
+        put(many.extra, k, 0, (0.0, 0.0, 0.0))
+        many.own[k, 3], many.own[k, 4], many.own[k, 5] = inverse, x, y
+        many.scaling[k, 0], many.scaling[k, 1], many.scaling[k, 2], many.scaling[k, 3] = w
+        _pose(k, s, w, x, y, many)
         f = _into(s, cone.unscaled_twice(w, miss))
         push(k, (-f[0], -f[1], -f[2]), many.defect, many)
+    complete_matrix(begin, end, many)
     factor(begin, end, many)
     return gap / (last - first), worst
 
@@ -125,32 +125,28 @@ def _scaling_of(k, many):
     return (many.scaling[k, 0], many.scaling[k, 1], many.scaling[k, 2], many.scaling[k, 3])
 
 
-@kernel
+@inlined
 def _explore(part, many):
-    """Changes of p̂ and û that belong to `many.change`; how far they lead, and p̂·û of a contact there."""
+    """Changes that belong to `many.change`, W dp̂ and dû; how far they lead, and p̂·û of a contact there.
+
+    With what is in `many.extra`, f, they satisfy W dp̂ + W⁻¹ dû = f - λ. The second number is right where f is 0.
+    """
     first, last = part[0], part[1]
-    t = 1.0
-    pp = pd = dd = 0.0
+    most = 1.0  # of what 1/t must be at least
+    square = product = 0.0
     for i in range(first, last):
         k = many.queue[i]
-        p, u, w = vector(many.inside, k, 0), vector(many.slack, k, 0), _scaling_of(k, many)
-        du = plus(_change(k, u, _units(k, many), many), 1.0, vector(many.miss, k, 0))
-        f, g = vector(many.extra, k, 0), cone.unscaled_twice(w, du)
-        dp = (f[0] - p[0] - g[0], f[1] - p[1] - g[1], f[2] - p[2] - g[2])
+        own, inverse = vector(many.own, k, 0), many.own[k, 3]
+        du = plus(_change(k, _units(k, many), many.own[k, 4], many.own[k, 5], many), 1.0, vector(many.miss, k, 0))
+        f, g = vector(many.extra, k, 0), cone.unscaled(_scaling_of(k, many), du)
+        dp = (f[0] - own[0] - g[0], f[1] - own[1] - g[1], f[2] - own[2] - g[2])
         put(many.aim, k, 0, dp)
         put(many.trial, k, 0, du)
-        t = min(t, min(cone.way_out(p, dp), cone.way_out(u, du)))
-        pp += p[0] * u[0] + p[1] * u[1] + p[2] * u[2]
-        pd += p[0] * du[0] + p[1] * du[1] + p[2] * du[2] + (u[0] * dp[0] + u[1] * dp[1] + u[2] * dp[2])
-        dd += dp[0] * du[0] + dp[1] * du[1] + dp[2] * du[2]
-    return t, (pp + t * (pd + t * dd)) / (last - first)
-
-
-@inlined
-def _forget_extra(part, many):
-    """Nothing is added to p̂ yet."""
-    for i in range(part[0], part[1]):
-        put(many.extra, many.queue[i], 0, (0.0, 0.0, 0.0))
+        most = max(most, max(cone.way_out(own, inverse, dp), cone.way_out(own, inverse, g)))
+        square += qt.dot(own, own)
+        product += qt.dot(dp, g)
+    t = 1.0 / most
+    return t, ((1.0 - t) * square + t * t * product) / (last - first)
 
 
 @inlined
@@ -164,16 +160,15 @@ def _set_right_side(part, many):
 
 @inlined
 def _correct(part, center, many):
-    """Right side with σ ν = `center` and the second-order term of the changes found so far."""
+    """Right side with σ ν = `center` and the second-order term of the changes found so far: f = λ \\ (σ ν e - ...)."""
     _set_right_side(part, many)
     for i in range(part[0], part[1]):
         k = many.queue[i]
-        p, w = vector(many.inside, k, 0), _scaling_of(k, many)
-        a, b = cone.scaled(w, vector(many.aim, k, 0)), cone.unscaled(w, vector(many.trial, k, 0))
-        m = cone.product(a, b)
-        f = cone.unscaled(w, cone.quotient((center - m[0], -m[1], -m[2]), cone.scaled(w, p)))
+        own, a = vector(many.own, k, 0), vector(many.aim, k, 0)
+        m = cone.product(a, (-own[0] - a[0], -own[1] - a[1], -own[2] - a[2]))
+        f = cone.quotient((center - m[0], -m[1], -m[2]), own, many.own[k, 3])
         put(many.extra, k, 0, f)
-        push(k, _into(_units(k, many), f), many.change, many)
+        push(k, _into(_units(k, many), cone.unscaled(_scaling_of(k, many), f)), many.change, many)
 
 
 @inlined
@@ -181,7 +176,8 @@ def _step(part, t, many):
     """Go t of the way."""
     for i in range(part[0], part[1]):
         k = many.queue[i]
-        put(many.inside, k, 0, plus(vector(many.inside, k, 0), t, vector(many.aim, k, 0)))
+        dp = cone.unscaled(_scaling_of(k, many), vector(many.aim, k, 0))
+        put(many.inside, k, 0, plus(vector(many.inside, k, 0), t, dp))
         put(many.slack, k, 0, plus(vector(many.slack, k, 0), t, vector(many.trial, k, 0)))
     for i in range(part[2], part[3]):
         b = many.order[i]
@@ -225,7 +221,6 @@ def interior_point(part, start, goal, limit, many):
         gap, worst = _prepare(part, many)
         if not worst > goal:
             break
-        _forget_extra(part, many)
         _set_right_side(part, many)
         substitute(part[2], part[3], many.change, many)
         _, after = _explore(part, many)

@@ -21,7 +21,7 @@ from physics.kernels.compiler import inlined, kernel
 from physics.kernels.many.blocks import SIZE, factor, substitute
 from physics.kernels.many.contacts import put, vector
 from physics.kernels.many.elimination import order_bodies
-from physics.kernels.many.sweeps import push, residual_of
+from physics.kernels.many.response import push, residual_of
 from physics.kernels.many.system import defect, fill_matrix, law
 
 # ρ in units of the largest mass: of the guess that everything holds, with its rounds and the share of the residual

@@ -8,7 +8,8 @@ A warm start that still solves the problem costs one look at the residual. Else 
    still, far below what is asked;
 3. a few sweeps, the answer for what meets and parts;
 4. an interior-point method, which finds what holds, slides and opens whatever the start, and Newton's method on the
-   twists from there, in turns.
+   twists from there, in turns;
+5. sweeps up to their limit, from the best that was met.
 
 What has a residual then that no impulses at all would beat, or a stress beyond reason, is solved without friction.
 
@@ -21,6 +22,7 @@ from __future__ import annotations
 import math
 
 from physics.kernels.compiler import inlined, kernel
+from physics.kernels.many.blocks import SIZE
 from physics.kernels.many.contacts import put, vector
 from physics.kernels.many.interior import interior_point
 from physics.kernels.many.islands import find_islands
@@ -31,7 +33,8 @@ from physics.kernels.many.newton import (
     prepare_system,
     save_best,
 )
-from physics.kernels.many.sweeps import assemble, residual_of, sweep_contacts
+from physics.kernels.many.response import assemble, residual_of
+from physics.kernels.many.sweeps import sweep_contacts, sweep_normals
 
 # Sweeps before the interior-point method.
 FIRST_SWEEPS = 5
@@ -55,29 +58,66 @@ STRAINED = 1.0e9
 # Sweeps without friction, where all else failed.
 LAST_SWEEPS = 100
 
-# Residual at which the interior-point method gives way to Newton's, relative to the largest velocity without impulses,
-# and what it is multiplied by when that was too early: where a contact is about to slip or open, the former gains two
-# digits where p·u gains four, and rounding ends it.
-ROUGH = 1.0e-4
-ROUGHER = 0.1
+# Turns of the interior-point method and Newton's. Where a contact is about to slip or open, the former gains two
+# digits where p·u gains four, and rounding ends it: it gives way to Newton's at this residual, relative to the largest
+# velocity without impulses; where that was too early it goes on, and at last it begins anew, from no impulses.
+ROUGH = (1.0e-5, 1.0e-6, 1.0e-5)
+ANEW = 2
 
-# Iterations of the first in each turn, steps of the second in two turns, and its ρ in units of the largest mass: large
-# where the pieces of the law are found, smaller and for longer where that fails.
-INTERIOR_STEPS = 20
-POLISH_STEPS = (10, 40)
-POLISH = (1.0e3, 1.0)
+# Iterations of the first in a turn, steps of the second in each, and its ρ in units of the largest mass: smaller and
+# for longer where the pieces of the law are not found.
+INTERIOR_STEPS = (20, 20, 40)
+POLISH_STEPS = (10, 40, 40)
+POLISH = (10.0, 1.0, 1.0)
 
 # The strongest method that was needed: codes of `physics.report.Solver`.
 SWEEPS, NEWTON = 2, 4
 
 
+@inlined
+def keep_free(many):
+    """`many.free`: the twists as they are, without any impulse."""
+    for b in range(many.twist.shape[0]):
+        for c in range(SIZE):
+            many.free[b, c] = many.twist[b, c]
+
+
+@inlined
+def free_body(b, many):
+    """The twist of body b without any impulse."""
+    for c in range(SIZE):
+        many.twist[b, c] = many.free[b, c]
+
+
+@inlined
+def forget_impulses(part, many):
+    """No impulses in an island."""
+    for i in range(part[0], part[1]):
+        put(many.impulse, many.queue[i], 0, (0.0, 0.0, 0.0))
+    for i in range(part[2], part[3]):
+        free_body(many.order[i], many)
+
+
+@inlined
+def forget_all(n, many):
+    """No impulses at all."""
+    for k in range(n):
+        put(many.impulse, k, 0, (0.0, 0.0, 0.0))
+    for b in range(many.twist.shape[0]):
+        free_body(b, many)
+
+
 @kernel
 def solve_hard(part, friction, scale, residual, goal, limit, many):
     """Interior point and Newton's method in turns: (iterations, residual)."""
-    count, best, rough, start = 0, residual, max(goal, ROUGH * scale), residual
+    count, best, start = 0, residual, residual
     save_best(part, many)
-    for turn in range(2):
-        count += interior_point(part, start, rough, min(INTERIOR_STEPS, limit - count), many)
+    for turn in range(len(ROUGH)):
+        if turn == ANEW:
+            start = scale
+            forget_impulses(part, many)
+        rough = max(goal, ROUGH[turn] * scale)
+        count += interior_point(part, start, rough, min(INTERIOR_STEPS[turn], limit - count), many)
         now = residual_of(part[0], part[1], friction, many)
         if now > goal and count < limit:
             more, now = newton_contacts(part, friction, now, goal, POLISH_STEPS[turn], POLISH[turn], many)
@@ -87,10 +127,21 @@ def solve_hard(part, friction, scale, residual, goal, limit, many):
             save_best(part, many)
         if not now > goal or count >= limit:
             break
-        rough, start = ROUGHER * rough, 0.0
+        start = 0.0
     if not now <= best:
         bring_back_best(part, many)
     return count, best
+
+
+@kernel
+def sweep_at_last(part, friction, residual, goal, limit, many):
+    """Sweeps from the best impulses met, which stay where those do not lead to better ones: (sweeps, residual)."""
+    save_best(part, many)
+    count, now = sweep_contacts(part[0], part[1], friction, residual, goal, limit, many)
+    if not now < residual:
+        bring_back_best(part, many)
+        return count, residual
+    return count, now
 
 
 @inlined
@@ -119,7 +170,11 @@ def solve_island(part, friction, scale, residual, goal, many):
     if residual <= goal:
         return 1 + count, residual, NEWTON
     more, residual = solve_hard(part, friction, scale, residual, goal, max(1, steps - count - 1), many)
-    return 1 + count + more, residual, NEWTON
+    count += 1 + more
+    if residual > goal:
+        more, residual = sweep_at_last(part, friction, residual, goal, limit, many)
+        count += more
+    return count, residual, NEWTON
 
 
 @inlined
@@ -144,43 +199,25 @@ def fastest(many):
     return most
 
 
-@inlined
-def forget_impulses(first, last, many):
-    """No impulses."""
-    for i in range(first, last):
-        put(many.impulse, many.queue[i], 0, (0.0, 0.0, 0.0))
-
-
-@inlined
-def free_body(b, many):
-    """The twist of body b without any impulse."""
-    for c in range(6):
-        many.twist[b, c] = many.free[b, c]
-
-
 @kernel
 def solve_without_friction(part, friction, goal, many):
     """Impulses along the normals only, from none: the residual, which is that of the problem with friction [m/s].
 
     The last resort, where the methods for friction went astray: these sweeps never raise the energy.
     """
-    first, last, begin, end = part
-    forget_impulses(first, last, many)
-    for i in range(begin, end):
-        free_body(many.order[i], many)
-    sweep_contacts(first, last, None, math.inf, goal, LAST_SWEEPS, many)
+    first, last, _, _ = part
+    forget_impulses(part, many)
+    sweep_normals(first, last, math.inf, goal, LAST_SWEEPS, many)
     return residual_of(first, last, friction, many)
 
 
 @kernel
 def solve_smoothly(n, many):
     """`solve_without_friction` of all n contacts, for what a solve with friction came out wrong: the residual [m/s]."""
-    forget_impulses(0, n, many)
-    for b in range(many.twist.shape[0]):
-        for c in range(6):
-            many.free[b, c] = many.twist[b, c]
+    keep_free(many)
+    forget_all(n, many)
     goal = many.settings[0].tolerance * assemble(n, many)
-    return sweep_contacts(0, n, None, math.inf, goal, LAST_SWEEPS, many)[1]
+    return sweep_normals(0, n, math.inf, goal, LAST_SWEEPS, many)[1]
 
 
 @kernel
@@ -193,9 +230,7 @@ def solve_contacts(n, friction, many):
     tolerance's share.
     Iterations are those of the island that took most.
     """
-    for b in range(many.twist.shape[0]):
-        for c in range(6):
-            many.free[b, c] = many.twist[b, c]
+    keep_free(many)
     tolerance = many.settings[0].tolerance
     least = VELOCITY_ROUNDING * fastest(many) / tolerance
     scale = max(assemble(n, many), least)
@@ -203,9 +238,7 @@ def solve_contacts(n, friction, many):
         return 0, 0.0, SWEEPS
     goal = max(min(tolerance * scale, many.settings[0].still), ROUNDING * scale)
     if strain(0, n, many) > STRAINED * scale:
-        forget_impulses(0, n, many)
-        for b in range(many.twist.shape[0]):
-            free_body(b, many)
+        forget_all(n, many)
     rounding = IMPULSE_ROUNDING * strain(0, n, many)
     goal = max(goal, rounding)
     residual = residual_of(0, n, friction, many)

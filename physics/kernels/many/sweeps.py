@@ -1,147 +1,71 @@
-"""Sweeps over all contacts of a world with the exact circular Coulomb cone.
+"""Sweeps over all contacts of a world with the exact circular Coulomb cone, on the twists of the bodies (`response`).
 
-The problem and its natural-map residual are those of `physics.kernels.sweeps`; here u is not kept per contact through
-a matrix W, which would be full, but follows from the twists of the bodies,
-
-    u_k = E_k ((v + ω x r)_a - (v + ω x r)_b) - target_k,
-
-which an impulse of contact k changes by M⁻¹ Jᵀ. A visit of one contact answers it alone (`point.answer`), and sweeps
-go up and down the list in turns, so that loads travel through a stack in both senses.
+A visit of one contact answers it alone (`point.answer`), and sweeps go up and down the list in turns, so that loads
+travel through a stack in both senses.
 """
 
 from __future__ import annotations
 
-import math
-
 from physics.kernels import quaternion as qt
 from physics.kernels.compiler import inlined, kernel
-from physics.kernels.many.contacts import local_velocity, matrix, plus, put, vector
+from physics.kernels.many.contacts import matrix, put, relative_velocity, vector
+from physics.kernels.many.response import on_disk, push, push_along, put_inverse, residual_of, velocity_missed
 from physics.kernels.point import LOST, answer, heading
 
 # Share of the residual asked for to which one contact is answered.
 ANSWER_SHARE = 0.1
 
-
-@inlined
-def turned(b, a, many):
-    """I⁻¹ a of body b, world frame."""
-    K = many.turning
-    return (
-        K[b, 0] * a[0] + K[b, 1] * a[1] + K[b, 2] * a[2],
-        K[b, 1] * a[0] + K[b, 3] * a[1] + K[b, 4] * a[2],
-        K[b, 2] * a[0] + K[b, 4] * a[1] + K[b, 5] * a[2],
-    )
+# Sweeps between two extrapolations, an even number: those up and down belong together. Slow sweeps contract along one
+# direction with a ratio q near 1, which two changes tell; the rest of that series, q/(1 - q) times the last change, is
+# added at once. See `physics.kernels.sweeps`.
+EXTRAPOLATION_PERIOD = 4
+RATIO_LIMIT = 0.998
 
 
 @inlined
-def push(k, local, t, many):
-    """Change the twists t of both bodies by an impulse of contact k, given in its frame [N s]."""
-    p = qt.transposed_matvec(matrix(many.frame, k), local)
-    a, b = many.ends[k, 0], many.ends[k, 1]
-    put(t, a, 0, plus(vector(t, a, 0), many.lightness[a], p))
-    put(t, a, 3, plus(vector(t, a, 3), 1.0, turned(a, qt.cross(vector(many.arm, k, 0), p), many)))
-    if b >= 0:
-        put(t, b, 0, plus(vector(t, b, 0), -many.lightness[b], p))
-        put(t, b, 3, plus(vector(t, b, 3), -1.0, turned(b, qt.cross(vector(many.arm, k, 3), p), many)))
-
-
-@inlined
-def _add_block(k, b, first, W, many):
-    """W plus what one end adds to the contact's own block: 1/m + (r x e_i)·I⁻¹ (r x e_j); upper triangle."""
-    r, E = vector(many.arm, k, first), many.frame
-    g0, g1, g2 = qt.cross(r, vector(E, k, 0)), qt.cross(r, vector(E, k, 3)), qt.cross(r, vector(E, k, 6))
-    h0, h1, h2 = turned(b, g0, many), turned(b, g1, many), turned(b, g2, many)
-    m = many.lightness[b]
-    return (
-        W[0] + (m + qt.dot(g0, h0)), W[1] + qt.dot(g0, h1), W[2] + qt.dot(g0, h2),
-        W[3] + (m + qt.dot(g1, h1)), W[4] + qt.dot(g1, h2), W[5] + (m + qt.dot(g2, h2)),
-    )  # fmt: skip
-
-
-@inlined
-def put_inverse(k, many):
-    """Write the inverse of the contact's own block: upper triangle."""
-    B = many.block
-    W = (B[k, 0], B[k, 1], B[k, 2], B[k, 4], B[k, 5], B[k, 8])
-    x, y, z = W[3] * W[5] - W[4] * W[4], W[2] * W[4] - W[1] * W[5], W[1] * W[4] - W[2] * W[3]
-    s = 1.0 / (W[0] * x + W[1] * y + W[2] * z)
-    V = many.inverse
-    V[k, 0], V[k, 1], V[k, 2] = s * x, s * y, s * z
-    V[k, 3], V[k, 4], V[k, 5] = (
-        s * (W[0] * W[5] - W[2] * W[2]),
-        s * (W[1] * W[2] - W[0] * W[4]),
-        s * (W[0] * W[3] - W[1] * W[1]),
-    )
+def _normal_velocity(k, many):
+    """u_n of contact k less its target."""
+    return qt.dot(vector(many.frame, k, 0), relative_velocity(k, many.twist, many)) - many.target[k, 0]
 
 
 @kernel
-def assemble(n, many):
-    """Write every contact's own block; the twists hold the warm start's impulses afterwards. Returns the scale.
+def sweep_normals(first, last, residual, goal, limit, many):
+    """`sweep_contacts` without friction: impulses along the normals only.
 
-    The scale is the largest velocity that a contact would have without any impulse [m/s].
+    A contact that has been answered is passed over until a body of it has been pushed again, and it is not answered
+    where what it is off by is a small share of the goal: where little is to be done, few contacts are visited.
     """
-    scale = 0.0
-    for k in range(n):
-        u, t = local_velocity(k, many), vector(many.target, k, 0)
-        scale = max(scale, max(abs(u[0] - t[0]), max(abs(u[1] - t[1]), abs(u[2] - t[2]))))
-        W = _add_block(k, many.ends[k, 0], 0, (0.0, 0.0, 0.0, 0.0, 0.0, 0.0), many)
-        if many.ends[k, 1] >= 0:
-            W = _add_block(k, many.ends[k, 1], 3, W, many)
-        B = many.block
-        B[k, 0], B[k, 1], B[k, 2] = W[0], W[1], W[2]
-        B[k, 3], B[k, 4], B[k, 5] = W[1], W[3], W[4]
-        B[k, 6], B[k, 7], B[k, 8] = W[2], W[4], W[5]
-        half = 0.5 * (W[3] - W[5])
-        many.step[k] = 1.0 / (0.5 * (W[3] + W[5]) + math.sqrt(half * half + W[4] * W[4]))
-        many.queue[k] = k
-    for k in range(n):
-        push(k, vector(many.impulse, k, 0), many.twist, many)
-    return scale
-
-
-@inlined
-def _velocity(k, many):
-    """u of contact k less its target."""
-    u, t = local_velocity(k, many), vector(many.target, k, 0)
-    return (u[0] - t[0], u[1] - t[1], u[2] - t[2])
-
-
-@inlined
-def _on_disk(x, y, limit):
-    """(x, y), shortened to `limit` if it is longer."""
-    size = math.sqrt(x * x + y * y)
-    if size > limit:
-        return x * (limit / size), y * (limit / size)
-    return x, y
-
-
-@inlined
-def natural_map(p, u, normal, step, mu):
-    """Natural-map residual of one contact [m/s]; see `physics.kernels.sweeps`. `normal` is W_nn, `step` 1/λ_max."""
-    x, y = _on_disk(p[1] - step * u[1], p[2] - step * u[2], mu * max(p[0], 0.0))
-    dx, dy = p[1] - x, p[2] - y
-    return max(abs(min(u[0], p[0] * normal)), math.sqrt(dx * dx + dy * dy) / step)
-
-
-@inlined
-def _normal_map(p, u, W):
-    return abs(min(u, p * W))
-
-
-@kernel
-def residual_of(first, last, friction, many):
-    """Largest natural-map residual of the contacts `many.queue[first:last]`, their impulses as they are [m/s]."""
-    worst = 0.0
+    sweeps = visits = 0
     for i in range(first, last):
         k = many.queue[i]
-        u, p = _velocity(k, many), vector(many.impulse, k, 0)
-        if friction is None:
-            miss = _normal_map(p[0], u[0], many.block[k, 0])
-        else:
-            miss = natural_map(p, u, many.block[k, 0], many.step[k], many.mu[k])
-        if not miss <= worst:  # also what is not a number
-            worst = miss
-    return worst
+        many.visited[k] = -1
+        many.pushed[many.ends[k, 0]] = 0
+        if many.ends[k, 1] >= 0:
+            many.pushed[many.ends[k, 1]] = 0
+    while not residual <= goal and sweeps < limit:
+        worst = 0.0
+        for i in range(first, last):
+            k = many.queue[i if sweeps % 2 == 0 else first + last - 1 - i]
+            a, b = many.ends[k, 0], many.ends[k, 1]
+            if many.visited[k] >= many.pushed[a] and (b < 0 or many.visited[k] >= many.pushed[b]):
+                continue
+            visits += 1
+            many.visited[k] = visits
+            p, normal = many.impulse[k, 0], many.block[k, 0]
+            d = max(0.0, p - _normal_velocity(k, many) / normal) - p
+            off = abs(d) * normal
+            worst = max(worst, off)
+            if off > ANSWER_SHARE * goal:
+                many.impulse[k, 0] = p + d
+                n = vector(many.frame, k, 0)
+                push_along(k, (d * n[0], d * n[1], d * n[2]), many.twist, many)
+                many.pushed[a] = visits
+                if b >= 0:
+                    many.pushed[b] = visits
+        sweeps += 1
+        if worst <= goal or sweeps == limit:
+            residual = residual_of(first, last, None, many)
+    return sweeps, residual
 
 
 @inlined
@@ -167,24 +91,60 @@ def _answer_one(k, p, u, goal, many):
     # The normal impulse first, then the tangential step, back on the disk.
     normal = max(0.0, p[0] - u[0] / W[0])
     d = normal - p[0]
-    x, y = _on_disk(p[1] - step * (u[1] + W[3] * d), p[2] - step * (u[2] + W[6] * d), mu * normal)
+    x, y = on_disk(p[1] - step * (u[1] + W[3] * d), p[2] - step * (u[2] + W[6] * d), mu * normal)
     return (normal, x, y)
 
 
 @inlined
-def _visit(k, goal, friction, many):
+def _visit(k, goal, many):
     """Answer contact k; how far its impulse was off, as a velocity [m/s]: its residual or a little more."""
-    u, p, normal = _velocity(k, many), vector(many.impulse, k, 0), many.block[k, 0]
-    if friction is None:
-        q = (max(0.0, p[0] - u[0] / normal), 0.0, 0.0)
-    else:
-        q = _answer_one(k, p, u, goal, many)
+    u, p, normal = velocity_missed(k, many), vector(many.impulse, k, 0), many.block[k, 0]
+    q = _answer_one(k, p, u, goal, many)
     d = (q[0] - p[0], q[1] - p[1], q[2] - p[2])
     if d[0] == 0.0 and d[1] == 0.0 and d[2] == 0.0:
         return 0.0
     put(many.impulse, k, 0, q)
     push(k, d, many.twist, many)
     return max(abs(d[0]) * normal, max(abs(d[1]), abs(d[2])) / many.step[k])
+
+
+@inlined
+def _note_change(first, last, many):
+    """`many.trend`: what the impulses have changed by since the last call. Returns its product with the change before
+    and the square of that one, weighed by W_nn as kinetic energy.
+    """
+    product = square = 0.0
+    for i in range(first, last):
+        k = many.queue[i]
+        p, old, before = vector(many.impulse, k, 0), vector(many.settled, k, 0), vector(many.trend, k, 0)
+        d = (p[0] - old[0], p[1] - old[1], p[2] - old[2])
+        product += many.block[k, 0] * qt.dot(d, before)
+        square += many.block[k, 0] * qt.dot(before, before)
+        put(many.trend, k, 0, d)
+        put(many.settled, k, 0, p)
+    return product, square
+
+
+@inlined
+def _extrapolate(first, last, s, many):
+    """Impulses plus s times their last change, back in the cones, and the twists that belong to them."""
+    for i in range(first, last):
+        k = many.queue[i]
+        p, d = vector(many.impulse, k, 0), vector(many.trend, k, 0)
+        normal = max(0.0, p[0] + s * d[0])
+        x, y = on_disk(p[1] + s * d[1], p[2] + s * d[2], many.mu[k] * normal)
+        put(many.impulse, k, 0, (normal, x, y))
+        put(many.settled, k, 0, (normal, x, y))
+        push(k, (normal - p[0], x - p[1], y - p[2]), many.twist, many)
+
+
+@inlined
+def _begin_sweeps(first, last, many):
+    for i in range(first, last):
+        k = many.queue[i]
+        put_inverse(k, many)
+        put(many.settled, k, 0, vector(many.impulse, k, 0))
+        put(many.trend, k, 0, (0.0, 0.0, 0.0))
 
 
 @kernel
@@ -194,16 +154,22 @@ def sweep_contacts(first, last, friction, residual, goal, limit, many):
     `many.impulse` and `many.twist`, which belong to each other, hold the start, whose residual is given, and receive
     the result. Returns the number of sweeps, `limit` at most, and the residual, measured on what is returned.
     """
+    if friction is None:
+        return sweep_normals(first, last, residual, goal, limit, many)
     sweeps = 0
-    if not residual <= goal and friction is not None:
-        for i in range(first, last):
-            put_inverse(many.queue[i], many)
+    if not residual <= goal:
+        _begin_sweeps(first, last, many)
     while not residual <= goal and sweeps < limit:
         worst = 0.0
         for i in range(first, last):
             k = many.queue[i if sweeps % 2 == 0 else first + last - 1 - i]
-            worst = max(worst, _visit(k, ANSWER_SHARE * goal, friction, many))
+            worst = max(worst, _visit(k, ANSWER_SHARE * goal, many))
         sweeps += 1
         if worst <= goal or sweeps == limit:
             residual = residual_of(first, last, friction, many)
+        elif sweeps % 2 == 0:
+            product, square = _note_change(first, last, many)
+            if sweeps % EXTRAPOLATION_PERIOD == 0 and product > 0.0:
+                ratio = min(product / square, RATIO_LIMIT)
+                _extrapolate(first, last, ratio / (1.0 - ratio), many)
     return sweeps, residual

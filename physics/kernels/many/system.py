@@ -7,8 +7,8 @@ import math
 from physics.kernels import quaternion as qt
 from physics.kernels.compiler import inlined, kernel
 from physics.kernels.many.blocks import SIZE, clear, place_of, six
-from physics.kernels.many.contacts import local_velocity, put, vector
-from physics.kernels.many.sweeps import push, turned
+from physics.kernels.many.contacts import local_velocity, matrix, put, vector
+from physics.kernels.many.response import push, turned
 
 
 @inlined
@@ -62,63 +62,99 @@ def _slopes(y, mu):
 
 
 @inlined
-def _write_rows(k, end, first, sign, many):
-    """Jacobian rows of one end of contact k, and what its body answers to each: `many.row`, `many.reply`."""
-    r, E, b = vector(many.arm, k, first), many.frame, many.ends[k, end]
-    m = many.lightness[b]
+def _world_rows(D, E, rho):
+    """Rows of ρ Eᵀ D E: D is given in the frame whose axes are the rows of E."""
+    x = qt.transposed_matvec(D, (rho * E[0], rho * E[3], rho * E[6]))
+    y = qt.transposed_matvec(D, (rho * E[1], rho * E[4], rho * E[7]))
+    z = qt.transposed_matvec(D, (rho * E[2], rho * E[5], rho * E[8]))
+    return qt.transposed_matvec(E, x), qt.transposed_matvec(E, y), qt.transposed_matvec(E, z)
+
+
+@inlined
+def _weigh(end, A, r, many):
+    """`many.weighed`: A J of one end, J = (1, -[r]×) from the twist of its body to the velocity of its point."""
+    W = many.weighed
     for c in range(3):
-        e = vector(E, k, 3 * c)
-        g = qt.cross(r, e)
-        h = turned(b, g, many)
-        for s in range(3):
-            many.row[end, c, s], many.row[end, c, s + 3] = sign * e[s], sign * g[s]
-            many.reply[end, c, s], many.reply[end, c, s + 3] = sign * m * e[s], sign * h[s]
+        g = qt.cross(r, A[c])
+        W[end, c, 0], W[end, c, 1], W[end, c, 2] = A[c]
+        W[end, c, 3], W[end, c, 4], W[end, c, 5] = g
 
 
 @inlined
-def _weigh(end, D, rho, many):
-    """`many.weighed`: ρ p' times the rows of one end."""
-    row, out = many.row, many.weighed
-    for c in range(SIZE):
-        x, y, z = rho * row[end, 0, c], rho * row[end, 1, c], rho * row[end, 2, c]
-        out[end, 0, c] = D[0] * x + D[1] * y + D[2] * z
-        out[end, 1, c] = D[3] * x + D[4] * y + D[5] * z
-        out[end, 2, c] = D[6] * x + D[7] * y + D[8] * z
+def _add_rows(B, place, r, s, x, t, y):
+    """Add s x + t y to row r of the block B[place]."""
+    old = six(B, place, r)
+    B[place, r, 0], B[place, r, 1], B[place, r, 2], B[place, r, 3], B[place, r, 4], B[place, r, 5] = (
+        old[0] + (s * x[0] + t * y[0]), old[1] + (s * x[1] + t * y[1]), old[2] + (s * x[2] + t * y[2]),
+        old[3] + (s * x[3] + t * y[3]), old[4] + (s * x[4] + t * y[4]), old[5] + (s * x[5] + t * y[5]),
+    )  # fmt: skip
 
 
 @inlined
-def _add_product(A, place, i, j, many):
-    """Add M⁻¹ Jᵀ ρ p' J, of end i to end j of a contact, to the block A[place]."""
-    reply, x, y, z = many.reply, six(many.weighed, j, 0), six(many.weighed, j, 1), six(many.weighed, j, 2)
-    for r in range(SIZE):
-        a, b, c, old = reply[i, 0, r], reply[i, 1, r], reply[i, 2, r], six(A, place, r)
-        A[place, r, 0], A[place, r, 1], A[place, r, 2], A[place, r, 3], A[place, r, 4], A[place, r, 5] = (
-            old[0] + (a * x[0] + b * y[0] + c * z[0]), old[1] + (a * x[1] + b * y[1] + c * z[1]),
-            old[2] + (a * x[2] + b * y[2] + c * z[2]), old[3] + (a * x[3] + b * y[3] + c * z[3]),
-            old[4] + (a * x[4] + b * y[4] + c * z[4]), old[5] + (a * x[5] + b * y[5] + c * z[5]),
-        )  # fmt: skip
+def _add_row(B, place, r, s, x):
+    """Add s x to row r of the block B[place]."""
+    old = six(B, place, r)
+    B[place, r, 0], B[place, r, 1], B[place, r, 2], B[place, r, 3], B[place, r, 4], B[place, r, 5] = (
+        old[0] + s * x[0], old[1] + s * x[1], old[2] + s * x[2],
+        old[3] + s * x[3], old[4] + s * x[4], old[5] + s * x[5],
+    )  # fmt: skip
+
+
+@inlined
+def _add_product(B, place, r, j, s, many):
+    """Add s Jᵀ (A J of end j) to the block B[place], Jᵀ = (1; [r]×) of the end that the rows belong to."""
+    x, y, z = six(many.weighed, j, 0), six(many.weighed, j, 1), six(many.weighed, j, 2)
+    _add_row(B, place, 0, s, x)
+    _add_row(B, place, 1, s, y)
+    _add_row(B, place, 2, s, z)
+    _add_rows(B, place, 3, s * r[1], z, -s * r[2], y)
+    _add_rows(B, place, 4, s * r[2], x, -s * r[0], z)
+    _add_rows(B, place, 5, s * r[0], y, -s * r[1], x)
 
 
 @inlined
 def add_contact(k, D, rho, many):
-    """Add M⁻¹ Jᵀ ρ D J of contact k to the blocks of its bodies; D: nine numbers, row by row."""
+    """Add Jᵀ ρ D J of contact k to the blocks of its bodies; D: nine numbers, row by row, in the contact's frame."""
     a, b = many.ends[k, 0], many.ends[k, 1]
-    _write_rows(k, 0, 0, 1.0, many)
-    _weigh(0, D, rho, many)
-    _add_product(many.diagonal, a, 0, 0, many)
+    A, r = _world_rows(D, matrix(many.frame, k), rho), vector(many.arm, k, 0)
+    _weigh(0, A, r, many)
+    _add_product(many.diagonal, a, r, 0, 1.0, many)
     if b < 0:
         return
-    _write_rows(k, 1, 3, -1.0, many)
-    _weigh(1, D, rho, many)
-    _add_product(many.diagonal, b, 1, 1, many)
+    t = vector(many.arm, k, 3)
+    _weigh(1, A, t, many)
+    _add_product(many.diagonal, b, t, 1, 1.0, many)
     if many.rank[a] < many.rank[b]:
         place = place_of(a, b, many)
-        _add_product(many.upper, place, 0, 1, many)
-        _add_product(many.lower, place, 1, 0, many)
+        _add_product(many.upper, place, r, 1, -1.0, many)
+        _add_product(many.lower, place, t, 0, -1.0, many)
     else:
         place = place_of(b, a, many)
-        _add_product(many.upper, place, 1, 0, many)
-        _add_product(many.lower, place, 0, 1, many)
+        _add_product(many.upper, place, t, 0, -1.0, many)
+        _add_product(many.lower, place, r, 1, -1.0, many)
+
+
+@inlined
+def _respond(B, place, b, many):
+    """Multiply the rows of the block B[place] by M⁻¹ of body b."""
+    m = many.lightness[b]
+    for c in range(SIZE):
+        w = turned(b, (B[place, 3, c], B[place, 4, c], B[place, 5, c]), many)
+        B[place, 0, c], B[place, 1, c], B[place, 2, c] = m * B[place, 0, c], m * B[place, 1, c], m * B[place, 2, c]
+        B[place, 3, c], B[place, 4, c], B[place, 5, c] = w
+
+
+@inlined
+def complete_matrix(begin, end, many):
+    """1 + M⁻¹ times what contacts have added."""
+    for i in range(begin, end):
+        b = many.order[i]
+        _respond(many.diagonal, b, b, many)
+        for c in range(SIZE):
+            many.diagonal[b, c, c] += 1.0
+        for k in range(many.start[b], many.stop[b]):
+            _respond(many.upper, k, b, many)
+            _respond(many.lower, k, many.column[k], many)
 
 
 @kernel
@@ -131,3 +167,4 @@ def fill_matrix(part, rho, all_hold, many):
         y = (1.0, 0.0, 0.0) if all_hold else vector(many.aim, k, 0)
         if y[0] > 0.0:
             add_contact(k, _slopes(y, many.mu[k]), rho, many)
+    complete_matrix(begin, end, many)
