@@ -28,7 +28,7 @@ from physics.kernels.many.system import defect, fill_matrix, law
 # asked for at which they end; its growth from round to round, the largest, and what it shrinks by when a round fails.
 HOLD_FACTOR = 1.0e4
 HOLD_ROUNDS = 5
-HOLD_SHARE = 1.0e-3
+HOLD_SHARE = 1.0e-6
 FACTOR_GROWTH = 10.0
 FACTOR_LIMIT = 1.0e8
 FACTOR_LOSS = 30.0
