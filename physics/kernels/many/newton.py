@@ -44,13 +44,14 @@ ROUND_SHARE = 0.01
 ENOUGH = 100.0
 
 # Time of a contact in one sweep, of one in an iteration with the linear system, and of a product of two blocks [ns].
-SWEEP_WORK = 100.0
-CONTACT_WORK = 350.0
-BLOCK_WORK = 90.0
+SWEEP_WORK = 25.0
+CONTACT_WORK = 230.0
+BLOCK_WORK = 60.0
 
-# Work that iterations with the system may take, in that of the sweeps allowed; fewer than these lead nowhere.
-WORTH = 4.0
-LEAST_STEPS = 6
+# Work that iterations with the system may take, in that of the sweeps allowed: much, since what sweeps leave unsolved
+# sinks in and is then pushed apart at as high a cost, step by step. Fewer than these lead nowhere.
+WORTH = 200.0
+LEAST_STEPS = 12
 
 
 @inlined
