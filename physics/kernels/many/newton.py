@@ -24,11 +24,10 @@ from physics.kernels.many.elimination import order_bodies
 from physics.kernels.many.response import push, residual_of
 from physics.kernels.many.system import defect, fill_matrix, law
 
-# ρ in units of the largest mass: of the guess that everything holds, with its rounds and the share of the residual
-# asked for at which they end; its growth from round to round, the largest, and what it shrinks by when a round fails.
+# ρ in units of the largest mass: of the guess that everything holds, with its rounds; its growth from round to round,
+# the largest, and what it shrinks by when a round fails.
 HOLD_FACTOR = 1.0e4
 HOLD_ROUNDS = 5
-HOLD_SHARE = 1.0e-6
 FACTOR_GROWTH = 10.0
 FACTOR_LIMIT = 1.0e8
 FACTOR_LOSS = 30.0
@@ -176,8 +175,8 @@ def bring_back_best(part, many):
 
 
 @kernel
-def guess_all_hold(part, friction, residual, goal, many):
-    """Impulses as if every contact held, if that makes the residual smaller; the residual then [m/s].
+def guess_all_hold(part, friction, residual, enough, many):
+    """Impulses as if every contact held, if that makes the residual smaller, down to `enough`; the residual then [m/s].
 
     The law being linear, its matrix is factored once, and a few rounds of q = p(x) cost little more than one: what
     stands still is solved so far below the goal that the steps to come find nothing to do.
@@ -198,7 +197,7 @@ def guess_all_hold(part, friction, residual, goal, many):
             break
         residual = now
         _copy(part, many.impulse, many.saved, many)
-        if residual <= HOLD_SHARE * goal:
+        if residual <= enough:
             break
     return residual
 

@@ -36,6 +36,11 @@ from physics.kernels.many.newton import (
 from physics.kernels.many.response import assemble, residual_of
 from physics.kernels.many.sweeps import sweep_contacts, sweep_normals
 
+# Share of the residual asked for, or of this finer one, relative to the largest free velocity, that the guess that all
+# holds is solved to: what stands finds nothing to do in the steps to come.
+HOLD_SHARE = 1.0e-3
+FINE = 1.0e-6
+
 # Sweeps before the interior-point method.
 FIRST_SWEEPS = 5
 
@@ -163,7 +168,7 @@ def solve_island(part, friction, scale, residual, goal, many):
         count, residual = sweep_contacts(first, last, friction, residual, goal, limit if last - first > 1 else 1, many)
         return count, residual, SWEEPS
     if not is_mixed(part, many):
-        residual = guess_all_hold(part, friction, residual, goal, many)
+        residual = guess_all_hold(part, friction, residual, HOLD_SHARE * min(goal, FINE * scale), many)
         if residual <= goal:
             return 1, residual, NEWTON
     count, residual = sweep_contacts(first, last, friction, residual, goal, FIRST_SWEEPS, many)
