@@ -8,7 +8,7 @@ import pytest
 from benchmarks import problems
 from benchmarks.problems import SETTINGS
 from physics.kernels import layout as at
-from physics.kernels.many import interior, islands, newton, response, solve
+from physics.kernels.many import interior, islands, newton, response, solve, sweeps
 from physics.kernels.many.arrays import Many, make_many
 from tests.reference.lcp import coulomb_defect, solve_coulomb
 
@@ -79,6 +79,32 @@ def test_the_interior_point_method_alone_comes_near_from_any_start(seed, mu):
     assert count < 30
     # It stops at 1e-4 on twists of its own; those that belong to the impulses differ by what is left of its equations.
     assert response.residual_of(0, n, True, many) <= 1e-3 * scale
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_sweeps_without_friction_solve_the_complementarity_problem(seed):
+    """u = W p + b, 0 <= p ⟂ u >= 0 along the normals: no contact is passed over that a push has changed."""
+    many, n = pile(seed, 12, 4, 0.0)
+    J, inverse, b = dense(many, n)
+    goal = 1e-6 * response.assemble(n, many)
+    count, residual = sweeps.sweep_normals(0, n, np.inf, goal, 2000, many)
+    assert count < 2000
+    assert residual <= goal
+    p, normals = many.impulse[:n, 0], J[::3]
+    W = normals @ inverse @ normals.T
+    # The twists have taken up some thousand pushes, each rounded.
+    missed = np.abs(np.minimum(W @ p + b[::3], p * np.diag(W))).max()
+    assert missed <= goal + 1e-11 * np.abs(b).max()
+    assert not many.impulse[:n, 1:].any()
+
+
+def test_slow_sweeps_are_extrapolated():
+    """Without that this pile takes 865 of them."""
+    many, n = pile(0, 12, 4, 0.2)
+    goal = 1e-6 * response.assemble(n, many)
+    count, residual = sweeps.sweep_contacts(0, n, True, np.inf, goal, 1000, many)
+    assert residual <= goal
+    assert count <= 400
 
 
 def test_islands_are_solved_as_if_they_were_alone():
