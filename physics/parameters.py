@@ -13,7 +13,7 @@ from physics.kernels import layout as at
 from physics.kernels.compiler import kernel
 from physics.kernels.laws import ANISOTROPY, DAMPING, ROLLING, SPIN, STIFFNESS, TANGENTIAL
 from physics.kernels.many.hulls import CUBE
-from physics.kernels.rotation import attitude_series
+from physics.kernels.rotation import attitude_series, write_attitude_series
 from physics.scene import HalfSpace
 from physics.shapes import Body
 
@@ -84,9 +84,15 @@ def write_laws(params: np.ndarray, laws: tuple[str, ...], effects: Sequence) -> 
                 params[:, params.shape[1] - len(laws) + k] = getattr(effect, name)
 
 
-@kernel
-def _write_series(params):
+def _write_series(params: np.ndarray) -> None:
     """Coefficients of the rotation series into all rows of `params` from their moments."""
+    first, series = at.INV_INERTIA, params[:, at.SERIES : at.SERIES + at.SERIES_SIZE]
+    write_attitude_series(*params[:, first : first + 3].T, series.T)
+
+
+@kernel
+def _change_series(params):
+    """The same, compiled: worlds with bodies of their own change them at every reset."""
     first = at.INV_INERTIA
     for i in range(params.shape[0]):
         series = params[i, at.SERIES : at.SERIES + at.SERIES_SIZE]
@@ -125,7 +131,7 @@ def change_inertia(params, bodies, plan, mass, size, inertia_body, shape) -> Non
         moments, R = _principal_axes(body, masses[rows], halves[rows], given)
         _check_allowed(plan, moments, R)
         _write_body(params[rows], body, masses[rows], moments, R, halves[rows])
-    _write_series(params)
+    _change_series(params)
 
 
 def _principal_axes(body, masses, halves, tensors) -> tuple[np.ndarray, np.ndarray]:

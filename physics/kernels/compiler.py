@@ -18,7 +18,7 @@ from pathlib import Path
 
 from numba.core import config
 
-from physics.kernels.linking import Kernel
+from physics.kernels.codegen.linking import Kernel
 
 
 def _user_cache_root() -> Path:

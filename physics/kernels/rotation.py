@@ -72,15 +72,16 @@ PARTS_LIMIT = 1.0e7
 SERIES_SIZE = 18
 
 
-@kernel
-def attitude_series(J1, J2, J3, out):
-    """Coefficients of the series s and d for one body.
+def write_attitude_series(J1, J2, J3, out):
+    """Coefficients of the series s and d, of one body or of many at once.
+
+    Without a kernel for the bodies of a new world, since that would have to be compiled first; `attitude_series` is it.
 
     Parameters
     ----------
-    J1, J2, J3 : float
+    J1, J2, J3 : float or (n,) float64
         Inverse principal moments of inertia [1/(kg m²)].
-    out : (SERIES_SIZE,) float64, out
+    out : (SERIES_SIZE,) or (SERIES_SIZE, n) float64, out
         s: (1,0) (0,1) | (2,0) (1,1) (0,2) | (3,0) (2,1) (1,2) (0,3), powers of (|m|², 2E); then d likewise.
     """
     e1 = J1 + J2 + J3
@@ -91,19 +92,22 @@ def attitude_series(J1, J2, J3, out):
     out[2] = e2 * e2 / 120 - e1 * e3 / 40
     out[3] = e3 / 30 - e1 * e2 / 120
     out[4] = e1 * e1 / 120 - e2 / 240
-    out[5] = 17 * e2**3 / 20160 - 11 * e1 * e2 * e3 / 3360 + 5 * e3**2 / 1008
-    out[6] = -e1 * e2**2 / 560 + 11 * e1**2 * e3 / 1680 - e2 * e3 / 672
-    out[7] = e1**2 * e2 / 3360 + 41 * e2**2 / 20160 - 53 * e1 * e3 / 5040
-    out[8] = -(e1**3) / 5040 + e1 * e2 / 5040 + e3 / 280
+    out[5] = 17 * (e2 * e2 * e2) / 20160 - 11 * e1 * e2 * e3 / 3360 + 5 * (e3 * e3) / 1008
+    out[6] = -e1 * (e2 * e2) / 560 + 11 * (e1 * e1) * e3 / 1680 - e2 * e3 / 672
+    out[7] = (e1 * e1) * e2 / 3360 + 41 * (e2 * e2) / 20160 - 53 * e1 * e3 / 5040
+    out[8] = -(e1 * e1 * e1) / 5040 + e1 * e2 / 5040 + e3 / 280
     out[9] = -e3 / 6
     out[10] = e2 / 12
     out[11] = -e2 * e3 / 240
     out[12] = e1 * e3 / 30 - e2 * e2 / 240
     out[13] = -e1 * e2 / 240 - e3 / 40
-    out[14] = e1 * e3**2 / 280 - 19 * e2**2 * e3 / 20160
-    out[15] = e2**3 / 10080 - e1 * e2 * e3 / 10080 - 11 * e3**2 / 1260
-    out[16] = 13 * e1 * e2**2 / 20160 - e1**2 * e3 / 315 + 11 * e2 * e3 / 2016
-    out[17] = e1**2 * e2 / 10080 - 13 * e2**2 / 10080 + e1 * e3 / 336
+    out[14] = e1 * (e3 * e3) / 280 - 19 * (e2 * e2) * e3 / 20160
+    out[15] = e2 * e2 * e2 / 10080 - e1 * e2 * e3 / 10080 - 11 * (e3 * e3) / 1260
+    out[16] = 13 * e1 * (e2 * e2) / 20160 - (e1 * e1) * e3 / 315 + 11 * e2 * e3 / 2016
+    out[17] = (e1 * e1) * e2 / 10080 - 13 * (e2 * e2) / 10080 + e1 * e3 / 336
+
+
+attitude_series = kernel(write_attitude_series)
 
 
 @inlined

@@ -10,8 +10,8 @@ import pytest
 from numba.core import types
 from numba.core.registry import cpu_target
 
+from physics.kernels.codegen.remember import RememberingTarget, remembering
 from physics.kernels.compiler import kernel
-from physics.kernels.remember import RememberingTarget, remembering
 
 PAIRS = [
     (types.float64, types.float64),

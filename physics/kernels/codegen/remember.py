@@ -7,7 +7,7 @@ holds (and what is registered later), and remembers
 
 - what a built-in function gives for arguments of some types,
 - of what type a member of a record or an array is,
-- that there is no special way to lower an operation,
+- how an operation is lowered, or that there is no special way to,
 - how many bytes a type takes.
 
 Only kernels of ours are compiled in these contexts; others in the same process see Numba's.
@@ -15,11 +15,15 @@ Only kernels of ours are compiled in these contexts; others in the same process 
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import cache
 from typing import ClassVar
 
 from numba.core import types, typing
 from numba.core.cpu import CPUContext
+
+from physics.kernels.codegen.builder import FoldingBuilder, slot
+from physics.kernels.codegen.elements import array_in_record, lowering_of
 
 
 class RememberingTyping(typing.Context):
@@ -71,7 +75,7 @@ types.Function.get_call_type = _get_call_type
 
 
 class RememberingTarget(CPUContext):
-    """How Numba lowers operations.
+    """How Numba lowers operations, and how kernels do where that takes fewer instructions.
 
     Parameters
     ----------
@@ -79,7 +83,9 @@ class RememberingTarget(CPUContext):
         Whose knowledge is shared.
     """
 
+    lowerings: ClassVar[dict[tuple, Callable]] = {}  # by operation and signature
     absent: ClassVar[set[tuple]] = set()  # operations without a lowering of their own, and their signatures
+    asked: ClassVar[set] = set()  # operations for which Numba has looked through its registries
     sizes: ClassVar[dict] = {}  # of LLVM types [bytes]
 
     def __init__(self, context):
@@ -92,14 +98,51 @@ class RememberingTarget(CPUContext):
 
     def get_function(self, fn, sig, _firstcall=True):
         """How `fn` is lowered for a signature; raises NotImplementedError if there is no way."""
-        key = (fn, sig)
-        if key in self.absent:
+        lowering = self.lowerings.get((fn, sig))
+        if lowering is None:
+            lower = lowering_of(fn, sig)
+            lowering = self.numba_function(fn, sig) if lower is None else _bound(lower, self, sig)
+            self.lowerings[fn, sig] = lowering
+        return lowering
+
+    def numba_function(self, fn, sig):
+        """How Numba lowers `fn`; its registries are looked through once for each, not for each signature."""
+        if (fn, sig) in self.absent:
             raise NotImplementedError(f"No definition for lowering {fn}{sig}")
+        is_new = fn not in self.asked
+        self.asked.add(fn)
         try:
-            return super().get_function(fn, sig, _firstcall)
+            return super().get_function(fn, sig, is_new)
         except NotImplementedError:
-            self.absent.add(key)
+            self.absent.add((fn, sig))
             raise
+
+    def get_getattr(self, typ, attr):
+        """How a member of a value is read."""
+        if isinstance(typ, types.Record) and isinstance(typ.typeof(attr), types.NestedArray):
+            return array_in_record
+        return super().get_getattr(typ, attr)
+
+    def pair_first(self, builder, val, ty):
+        """What an iterator gave."""
+        return builder.extract_value(val, 0)
+
+    def pair_second(self, builder, val, ty):
+        """Whether it gave something."""
+        return builder.extract_value(val, 1)
+
+    def call_internal(self, builder, fndesc, sig, args):
+        """Call what Numba has compiled. Where that raises, so does its caller: a kernel has no `try`."""
+        if not isinstance(builder, FoldingBuilder) or isinstance(sig.return_type, types.Optional):
+            return super().call_internal(builder, fndesc, sig, args)
+        function = self.declare_function(builder.module, fndesc)
+        result = slot(builder, self.call_conv.get_return_type(sig.return_type).pointee)
+        raised = self.call_conv._get_excinfo_argument(builder.function)
+        words = self.get_arg_packer(sig.args).as_arguments(builder, args)
+        status = builder.call(function, [result, raised, *words])
+        with builder.if_then(builder.icmp_unsigned("!=", status, status.type(0))):
+            builder.ret(status)
+        return self.get_returned_value(builder, sig.return_type, builder.load(result))
 
     def get_abi_sizeof(self, ty):
         """Size of an LLVM type [bytes]: Numba writes and parses a module for each question."""
@@ -107,3 +150,12 @@ class RememberingTarget(CPUContext):
         if size is None:
             size = self.sizes[ty] = super().get_abi_sizeof(ty)
         return size
+
+
+def _bound(lower: Callable, context: RememberingTarget, sig) -> Callable:
+    """A lowering of ours, to be called as Numba calls its own."""
+
+    def lowered(builder, args, loc=None):
+        return lower(context, builder, sig, args)
+
+    return lowered

@@ -29,12 +29,15 @@ from numba.core.compiler_machinery import LoweringPass, PassManager, register_pa
 from numba.core.registry import CPUDispatcher
 from numba.core.typed_passes import NativeLowering, NoPythonBackend
 
-from physics.kernels.passes import KernelPasses
-from physics.kernels.remember import RememberingTarget, remembering
+from physics.kernels.codegen.passes import KernelPasses
+from physics.kernels.codegen.remember import RememberingTarget, remembering
 
 
 class _PartLibrary(JITCodeLibrary):
     """IR of one part, neither linked nor optimised."""
+
+    def _optimize_functions(self, ll_module):
+        ll_module.data_layout = self._codegen._data_layout
 
     def finalize(self):
         self._finalized = True

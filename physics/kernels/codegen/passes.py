@@ -1,29 +1,23 @@
 """What Numba does to a kernel before it is lowered, without what kernels have no use for.
 
 Numba's own pipeline looks for closures, comprehensions, `with`, `raise`, array expressions and functions inlined by
-it, none of which a kernel has, and determines after most passes which variable lives where, which only the last one
-asks for. A kernel that does have one of them fails to compile. What users write goes through Numba's own pipeline.
+it, none of which a kernel has, and determines after most passes which variable lives where, which nobody asks for
+where no variable has to be released (`physics.kernels.codegen.lowering`). A kernel that does have one of them fails to
+compile. What users write goes through Numba's own pipeline.
 """
 
 from __future__ import annotations
 
 from numba.core.compiler_machinery import FunctionPass, PassManager, _pass_registry, register_pass
+from numba.core.interpreter import Interpreter, peep_hole_list_to_tuple
 from numba.core.ir_utils import build_definitions
 from numba.core.rewrites import rewrite_registry
 from numba.core.ssa import reconstruct_ssa
-from numba.core.typed_passes import (
-    AnnotateTypes,
-    IRLegalization,
-    NativeLowering,
-    NopythonTypeInference,
-    PreLowerStripPhis,
-)
-from numba.core.untyped_passes import (
-    DeadBranchPrune,
-    FixupArgs,
-    RewriteSemanticConstants,
-    TranslateByteCode,
-)
+from numba.core.typed_passes import AnnotateTypes, PreLowerStripPhis
+from numba.core.untyped_passes import DeadBranchPrune, FixupArgs, RewriteSemanticConstants
+
+from physics.kernels.codegen.inference import infer_types
+from physics.kernels.codegen.lowering import KernelLowering
 
 
 class _Plain(FunctionPass):
@@ -35,6 +29,24 @@ class _Plain(FunctionPass):
     def run_pass(self, state):
         self.change(state)
         return True
+
+
+class _Interpreter(Interpreter):
+    """From byte code to Numba's own code; of its corrections those that calls with `*` need."""
+
+    def post_process(self, peepholes, func_ir):
+        """Leave out those for `with`, `try`, dictionaries, and calls with many keywords."""
+        return super().post_process([peep_hole_list_to_tuple], func_ir)
+
+
+@register_pass(mutates_CFG=True, analysis_only=False)
+class _FromByteCode(_Plain):
+    """Numba's own code of a function."""
+
+    _name = "kernel_from_byte_code"
+
+    def change(self, state):
+        state.func_ir = _Interpreter(state.func_id).interpret(state.bc)
 
 
 @register_pass(mutates_CFG=True, analysis_only=False)
@@ -63,6 +75,16 @@ class _SingleAssignment(_Plain):
         state.func_ir._definitions = build_definitions(state.func_ir.blocks)
 
 
+@register_pass(mutates_CFG=False, analysis_only=False)
+class _Types(_Plain):
+    """Of what type each variable is, and what each call calls."""
+
+    _name = "kernel_types"
+
+    def change(self, state):
+        infer_types(state)
+
+
 @register_pass(mutates_CFG=True, analysis_only=False)
 class _NoPhis(PreLowerStripPhis):
     """What a variable is where branches meet becomes assignments at their ends."""
@@ -76,18 +98,17 @@ class _NoPhis(PreLowerStripPhis):
 
 
 TO_LLVM = (
-    TranslateByteCode,
+    _FromByteCode,
     FixupArgs,
     RewriteSemanticConstants,
     DeadBranchPrune,
     _Rewrites,
     _SingleAssignment,
     DeadBranchPrune,
-    NopythonTypeInference,
+    _Types,
     _NoPhis,
-    IRLegalization,
     AnnotateTypes,
-    NativeLowering,
+    KernelLowering,
 )
 
 

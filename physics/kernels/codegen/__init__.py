@@ -1,0 +1,1 @@
+"""From a kernel's Python to machine code, by way of Numba and LLVM."""

@@ -1,0 +1,360 @@
+"""How kernels become instructions: what our lowering writes means what Python means, and is short."""
+
+from __future__ import annotations
+
+import re
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from numba.core.codegen import CPUCodeLibrary
+from numba.core.typeinfer import CallConstraint
+
+from physics.kernels.codegen.inference import _Network
+from physics.kernels.compiler import composed, kernel
+
+RECORD = np.dtype([("scale", np.float64), ("grid", np.float64, (3, 4)), ("line", np.float64, (5,)), ("n", np.int64)])
+
+
+# --- elements ------------------------------------------------------------------------------------------------------
+
+
+@kernel
+def element(a, i):
+    return a[i]
+
+
+@kernel
+def element_of_two(a, i, j):
+    return a[i, j]
+
+
+@kernel
+def element_of_three(a, i, j, k):
+    return a[i, j, k]
+
+
+@kernel
+def write(a, i, j, value):
+    a[i, j] = value
+
+
+def index(length: int):
+    """Every index that Python takes on an axis, of either sign."""
+    return st.integers(-length, length - 1)
+
+
+def grid(*shape: int) -> np.ndarray:
+    return np.arange(1.0, 1.0 + np.prod(shape)).reshape(shape)
+
+
+# Contiguous, with gaps, backwards, the other way about.
+VIEWS = [lambda a: a, lambda a: a[:, ::2], lambda a: a[::-1], lambda a: a.T]
+
+
+@pytest.mark.parametrize("view", VIEWS)
+@given(data=st.data())
+def test_an_element_is_the_one_that_numpy_gives(view, data):
+    a = view(grid(5, 6))
+    i, j = (data.draw(index(length)) for length in a.shape)
+    assert element_of_two(a, i, j) == a[i, j]
+    assert element_of_two(a, np.uint32(i % a.shape[0]), j) == a[i, j]
+    assert element(a[:, 0], i) == a[i, 0]
+    assert element(a[0], j) == a[0, j]
+
+
+@given(index(2), index(3), index(4))
+def test_an_element_of_three_axes(i, j, k):
+    a = grid(2, 3, 4)
+    assert element_of_three(a, i, j, k) == a[i, j, k]
+    assert element_of_three(a.transpose(2, 0, 1), k, i, j) == a[i, j, k]
+
+
+@pytest.mark.parametrize("kind", [np.float64, np.float32, np.int64, np.bool_])
+@pytest.mark.parametrize("view", VIEWS)
+@given(data=st.data())
+def test_what_is_written_stands_there_and_nowhere_else(kind, view, data):
+    a = view(np.zeros((5, 6), kind))
+    i, j = (data.draw(index(length)) for length in a.shape)
+    write(a, i, j, 1)  # an integer: it is converted
+    expected = np.zeros_like(a)
+    expected[i, j] = 1
+    assert (a == expected).all()
+
+
+@kernel
+def last_of_each(a):
+    return a[-1, 0] + 100.0 * a[0, -1]
+
+
+def test_known_indices_count_from_the_end_as_well():
+    a = grid(3, 4)
+    assert last_of_each(a) == a[-1, 0] + 100.0 * a[0, -1]
+
+
+# --- records -------------------------------------------------------------------------------------------------------
+
+
+@kernel
+def of_record(record, i, j):
+    return record.grid[i, j] + record.line[j] * record.scale + record.grid[-1, -2] + record.line[0] * record.n
+
+
+@kernel
+def write_record(record, i, j, value):
+    record.grid[i, j] = value
+    record.n = i
+
+
+@kernel
+def sum_of_row(record):
+    row, total = record.grid[1], 0.0
+    for k in range(row.shape[0]):
+        total += row[k]
+    return total + row.shape[0] + row.size
+
+
+def record_of(scale=0.5):
+    records = np.zeros(1, RECORD)
+    records["scale"], records["grid"], records["line"], records["n"] = scale, grid(3, 4), grid(5), 7
+    return records
+
+
+@given(index(3), st.integers(-4, 3))
+def test_arrays_in_a_record(i, j):
+    record = record_of()[0]
+    expected = record["grid"][i, j] + record["line"][j] * 0.5 + record["grid"][-1, -2] + record["line"][0] * 7
+    assert of_record(record, i, j) == expected
+    write_record(record, i, j, -3.0)
+    expected = grid(3, 4)
+    expected[i, j] = -3.0
+    assert (record["grid"] == expected).all()
+    assert (record["line"] == grid(5)).all()
+    assert record["n"] == i
+
+
+def test_a_view_of_an_array_in_a_record():
+    assert sum_of_row(record_of()[0]) == grid(3, 4)[1].sum() + 4 + 4
+
+
+# --- ranges and variables ------------------------------------------------------------------------------------------
+
+
+@kernel
+def counted(stop):
+    numbers = 0
+    for i in range(stop):
+        numbers = 10 * numbers + i
+    return numbers
+
+
+@kernel
+def counted_from(start, stop):
+    numbers, last = 0, -99
+    for i in range(start, stop):
+        numbers, last = numbers + i * i, i
+    return numbers, last
+
+
+@kernel
+def counted_by(start, stop, step):
+    numbers, last = 0, -99
+    for i in range(start, stop, step):
+        numbers, last = 3 * numbers + i, i
+    return numbers, last
+
+
+@kernel
+def first_past(limit, stop):
+    total = 0
+    for i in range(stop):
+        for j in range(i, stop):
+            if j % 3 == 1:
+                continue
+            if j > i + 4:
+                break
+            total += 10 * i + j
+        else:
+            total += 1000
+        if total > limit:
+            return total, i
+    return total, -1
+
+
+@given(st.integers(-3, 9), st.integers(-4, 9), st.integers(-3, 3).filter(bool), st.integers(0, 5000))
+def test_loops_run_as_pythons_do(start, stop, step, limit):
+    loops = [(counted, (stop,)), (counted_from, (start, stop)), (counted_by, (start, stop, step))]
+    for loop, args in [*loops, (first_past, (limit, stop))]:
+        assert loop(*args) == loop.py_func(*args)
+
+
+@kernel
+def by_branches(x, n):
+    a = b = x
+    if x > 2.0:
+        a = 2.0 * x
+        c = a + 1.0
+    else:
+        c = -x
+    for i in range(n):
+        d = c + i
+        if d > 5.0:
+            b = a
+        a, c = c, d
+    while a > 10.0 and n > 0:
+        a, n = a - b - 1.0, n - 1
+    return a, b, c, n
+
+
+@given(st.floats(-9, 9), st.integers(0, 9))
+def test_variables_keep_their_values_through_branches_and_loops(x, n):
+    assert by_branches(x, n) == by_branches.py_func(x, n)
+
+
+@kernel
+def nothing_yet(n):
+    if n > 3:
+        late = 1.0
+    total = 0.0
+    for i in range(n):
+        if i > 3:
+            total += late
+        late = 2.0 + i
+    return total
+
+
+def test_a_variable_that_only_some_ways_assign():
+    for n in (0, 3, 4, 8):
+        assert nothing_yet(n) == nothing_yet.py_func(n)
+
+
+# --- calls ---------------------------------------------------------------------------------------------------------
+
+
+def refuse(x):
+    if x < 0.0:
+        raise ValueError("x is negative")
+    return 2.0 * x
+
+
+def guard(x):
+    try:
+        return inner(x)
+    except Exception:
+        return -1.0
+
+
+inner = composed(refuse)
+guarded = composed(guard)
+
+
+@kernel
+def in_between(x):
+    return 1.0 + inner(x)
+
+
+@kernel
+def outer(x):
+    return 1.0 + in_between(x)
+
+
+@kernel
+def outer_guarded(x):
+    return guarded(x)
+
+
+def test_what_a_users_function_raises_gets_through_the_kernels():
+    assert outer(3.0) == 8.0
+    with pytest.raises(ValueError, match="x is negative"):
+        outer(-3.0)
+    assert outer(4.0) == 10.0
+
+
+def test_what_a_users_function_catches_does_not():
+    assert outer_guarded(3.0) == 6.0
+    assert outer_guarded(-3.0) == -1.0
+
+
+# --- how much is written -------------------------------------------------------------------------------------------
+
+
+@kernel
+def straight(record, a, i):
+    x, y = record.grid[i, 1], record.line[2]
+    a[i, 0] = x + y
+    return a[i, 1]
+
+
+@kernel
+def calls_straight(record, a, i):
+    return straight(record, a, i)
+
+
+def instructions_of(function, monkeypatch, *args) -> dict[str, list[str]]:
+    """What is written for a kernel, by part: the instructions' names."""
+    written, add = {}, CPUCodeLibrary.add_ir_module
+
+    def noted(library, module):
+        written[library.name] = re.findall(r"^  (?:%\S+ = )?([a-z]+)", str(module), re.MULTILINE)
+        add(library, module)
+
+    monkeypatch.setattr(CPUCodeLibrary, "add_ir_module", noted)
+    function(*args)
+    return written
+
+
+def test_an_element_takes_no_memory_of_its_own(monkeypatch):
+    """Numba's own lowering makes 6 places in memory and 255 instructions of this part."""
+    written = instructions_of(calls_straight, monkeypatch, record_of()[0], grid(3, 4), 1)["straight"]
+    assert "alloca" not in written
+    assert written.count("load") == 3
+    assert written.count("store") == 2  # the element, and the result
+    assert len(written) < 60
+
+
+# --- types ---------------------------------------------------------------------------------------------------------
+
+
+@kernel
+def becomes_float(n):
+    total = 0
+    for i in range(n):
+        total = total + 0.5 * i
+    return total
+
+
+@kernel
+def calls_becomes_float(n):
+    return becomes_float(n) + becomes_float(n + 1)
+
+
+def test_a_variable_gets_the_type_that_all_its_values_have():
+    assert calls_becomes_float(4) == 3.0 + 5.0
+
+
+def test_a_constraint_is_looked_at_again_only_if_something_changed(monkeypatch):
+    looked = []
+
+    def noted(constraint, typeinfer, resolve=CallConstraint.resolve):
+        looked.append(constraint)
+        resolve(constraint, typeinfer, *[typeinfer.typevars], fnty=typeinfer.typevars[constraint.func].getone())
+
+    rounds = []
+    propagate = _Network.propagate
+
+    def counted_rounds(network, typeinfer):
+        rounds.append(network)
+        return propagate(network, typeinfer)
+
+    monkeypatch.setattr(_Network, "propagate", counted_rounds)
+    monkeypatch.setattr(CallConstraint, "__call__", noted)
+
+    @kernel
+    def plain(x):
+        return abs(x) + abs(x + 1.0)
+
+    assert plain(-3.0) == 5.0
+    assert len(rounds) == 2  # the second to see that nothing changes
+    calls = [each for each in looked if type(each) is CallConstraint]
+    assert len(calls) == len(set(map(id, calls))) == 2
