@@ -50,8 +50,8 @@ def source_digest(folder: Path) -> str:
 
 @cache
 def cache_dir() -> Path:
-    """Folder of the compiled kernels that belong to exactly these kernel sources."""
-    return _user_cache_root() / source_digest(Path(__file__).parent)
+    """Folder of the compiled kernels that belong to exactly these kernel sources, and check their indices or do not."""
+    return _user_cache_root() / (source_digest(Path(__file__).parent) + ("-checked" if config.BOUNDSCHECK else ""))
 
 
 @contextmanager
@@ -95,6 +95,9 @@ def kernel(function):
     not depend on how the optimiser reorders a sum. Without Numba's run time
     (`_nrt`) there are no reference counts to keep, nor can a kernel allocate:
     arrays are lent to it, and views of the workspace need no owner.
+
+    An index counts from the front of its axis, unless it is a literal: nothing asks whether it is negative. Under
+    `NUMBA_BOUNDSCHECK=1` one that is outside its axis raises IndexError.
 
     Switches among the arguments are passed as ``None`` (off) or ``True`` (on):
     Numba prunes a branch on ``x is None`` while compiling, in every callee, so

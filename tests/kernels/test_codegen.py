@@ -2,7 +2,12 @@
 
 from __future__ import annotations
 
+import os
 import re
+import subprocess
+import sys
+from collections import namedtuple
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -11,8 +16,10 @@ from hypothesis import strategies as st
 from numba.core.codegen import CPUCodeLibrary
 from numba.core.typeinfer import CallConstraint
 
+import physics
 from physics.kernels.codegen.inference import _Network
 from physics.kernels.compiler import composed, kernel
+from tests.kernels.anew import anew
 
 RECORD = np.dtype([("scale", np.float64), ("grid", np.float64, (3, 4)), ("line", np.float64, (5,)), ("n", np.int64)])
 
@@ -41,8 +48,8 @@ def write(a, i, j, value):
 
 
 def index(length: int):
-    """Every index that Python takes on an axis, of either sign."""
-    return st.integers(-length, length - 1)
+    """Every index of an axis, counted from the front."""
+    return st.integers(0, length - 1)
 
 
 def grid(*shape: int) -> np.ndarray:
@@ -59,7 +66,7 @@ def test_an_element_is_the_one_that_numpy_gives(view, data):
     a = view(grid(5, 6))
     i, j = (data.draw(index(length)) for length in a.shape)
     assert element_of_two(a, i, j) == a[i, j]
-    assert element_of_two(a, np.uint32(i % a.shape[0]), j) == a[i, j]
+    assert element_of_two(a, np.uint32(i), j) == a[i, j]
     assert element(a[:, 0], i) == a[i, 0]
     assert element(a[0], j) == a[0, j]
 
@@ -88,9 +95,64 @@ def last_of_each(a):
     return a[-1, 0] + 100.0 * a[0, -1]
 
 
-def test_known_indices_count_from_the_end_as_well():
+def test_a_literal_counts_from_the_end_as_well():
     a = grid(3, 4)
     assert last_of_each(a) == a[-1, 0] + 100.0 * a[0, -1]
+
+
+def users_element(a, i, j):
+    return a[i, j]
+
+
+of_user = composed(users_element)
+
+
+@kernel
+def asks_user(a, i, j):
+    return of_user(a, i, j)
+
+
+@given(st.integers(-5, 4), st.integers(-6, 5))
+def test_a_users_function_may_count_from_the_end(i, j):
+    a = grid(5, 6)
+    assert asks_user(a, i, j) == a[i, j]
+
+
+CHECKED = """
+import numpy as np
+import physics
+from physics import scenes
+from physics.kernels.compiler import kernel
+
+@kernel
+def element(a, i, j):
+    return a[i, j]
+
+@kernel
+def asks(a, i, j):
+    return element(a, i, j)
+
+refused = 0
+for i, j in ((0, 2), (2, 0), (-1, 0), (0, -1)):
+    try:
+        asks(np.ones((2, 2)), i, j)
+    except IndexError:
+        refused += 1
+assert asks(np.ones((2, 2)), 1, 1) == 1.0
+for scene, accuracy in ((scenes.drop(), "balanced"), (scenes.tower(3), "fast")):
+    physics.World(scene, dt=0.01, accuracy=accuracy).step(steps=200)
+print(refused)
+"""
+
+
+def test_indices_are_checked_where_that_is_asked_for(tmp_path):
+    """Kernels do not look at them (a negative one reads what stands before): here all of two scenes are looked at."""
+    root = str(Path(physics.__file__).parents[1])
+    environment = {**os.environ, "NUMBA_BOUNDSCHECK": "1", "NUMBA_CACHE_DIR": str(tmp_path), "PYTHONPATH": root}
+    program = tmp_path / "checked.py"  # Numba keeps only what a file holds
+    program.write_text(CHECKED)
+    done = subprocess.run([sys.executable, program], env=environment, capture_output=True, text=True, check=False)
+    assert done.stdout.split() == ["4"], done.stderr
 
 
 # --- records -------------------------------------------------------------------------------------------------------
@@ -121,7 +183,7 @@ def record_of(scale=0.5):
     return records
 
 
-@given(index(3), st.integers(-4, 3))
+@given(index(3), index(4))
 def test_arrays_in_a_record(i, j):
     record = record_of()[0]
     expected = record["grid"][i, j] + record["line"][j] * 0.5 + record["grid"][-1, -2] + record["line"][0] * 7
@@ -292,7 +354,7 @@ def calls_straight(record, a, i):
 
 
 def instructions_of(function, monkeypatch, *args) -> dict[str, list[str]]:
-    """What is written for a kernel, by part: the instructions' names."""
+    """What is written for a kernel that is not kept, and for the parts it is the first to call: instructions' names."""
     written, add = {}, CPUCodeLibrary.add_ir_module
 
     def noted(library, module):
@@ -300,7 +362,8 @@ def instructions_of(function, monkeypatch, *args) -> dict[str, list[str]]:
         add(library, module)
 
     monkeypatch.setattr(CPUCodeLibrary, "add_ir_module", noted)
-    function(*args)
+    anew(function)(*args)
+    monkeypatch.undo()
     return written
 
 
@@ -311,6 +374,46 @@ def test_an_element_takes_no_memory_of_its_own(monkeypatch):
     assert written.count("load") == 3
     assert written.count("store") == 2  # the element, and the result
     assert len(written) < 60
+
+
+Wide = namedtuple("Wide", [f"a{k}" for k in range(12)])  # 12 arrays, 84 words
+
+
+@kernel
+def of_wide(wide, i):
+    return wide.a3[i] + wide.a11.shape[0]
+
+
+@kernel
+def some_of_wide(wide, i):
+    row = wide.a3
+    if i > 1:
+        row = wide.a7
+    return of_wide(wide, i) + 100.0 * row[i]
+
+
+@kernel
+def calls_with_wide(wide, n):
+    total = 0.0
+    for i in range(n):
+        total += some_of_wide(wide, i)
+    return total
+
+
+@kernel
+def changed_wide(wide):
+    swapped = Wide(
+        wide.a11, wide.a10, wide.a9, wide.a8, wide.a7, wide.a6, wide.a5, wide.a4, wide.a3, wide.a2, wide.a1, wide.a0
+    )
+    return of_wide(swapped, 1) + 1000.0 * of_wide(wide, 1)
+
+
+def test_a_large_tuple_is_handed_on_by_its_address(monkeypatch):
+    wide = Wide(*(np.arange(4.0) + 10 * k for k in range(12)))
+    written = instructions_of(calls_with_wide, monkeypatch, wide, 4)
+    assert calls_with_wide(wide, 4) == calls_with_wide.py_func(wide, 4)
+    assert len(written["some_of_wide"]) < 70  # 84 words to hand on, if it were word by word, and as many to take
+    assert changed_wide(wide) == changed_wide.py_func(wide)
 
 
 # --- types ---------------------------------------------------------------------------------------------------------
@@ -333,6 +436,11 @@ def test_a_variable_gets_the_type_that_all_its_values_have():
     assert calls_becomes_float(4) == 3.0 + 5.0
 
 
+@kernel
+def two_calls(x):
+    return abs(x) + abs(x + 1.0)
+
+
 def test_a_constraint_is_looked_at_again_only_if_something_changed(monkeypatch):
     looked = []
 
@@ -350,11 +458,7 @@ def test_a_constraint_is_looked_at_again_only_if_something_changed(monkeypatch):
     monkeypatch.setattr(_Network, "propagate", counted_rounds)
     monkeypatch.setattr(CallConstraint, "__call__", noted)
 
-    @kernel
-    def plain(x):
-        return abs(x) + abs(x + 1.0)
-
-    assert plain(-3.0) == 5.0
+    assert anew(two_calls)(-3.0) == 5.0
     assert len(rounds) == 2  # the second to see that nothing changes
     calls = [each for each in looked if type(each) is CallConstraint]
     assert len(calls) == len(set(map(id, calls))) == 2

@@ -15,6 +15,7 @@ import pytest
 from numba.core.codegen import JITCodeLibrary
 
 from physics.kernels.compiler import composed, inlined, kernel
+from tests.kernels.anew import anew
 
 
 @kernel
@@ -67,7 +68,7 @@ def test_nobody_outside_can_call_a_part(monkeypatch):
         optimise(library)
 
     monkeypatch.setattr(JITCodeLibrary, "_optimize_final_module", noted)
-    assert calls_three_deep(complex(3.0)) == 13.0  # of a type that nothing else asks for
+    assert anew(calls_three_deep)(complex(3.0)) == 13.0  # of a type that nothing else asks for
     for part in ("both", "squares", "never_squares", "square"):
         assert {kind for name, kind in linkage.items() if f"test_linking{len(part)}{part}B" in name} == {"internal"}
     assert "external" in {kind for name, kind in linkage.items() if "calls_three_deep" in name}
@@ -90,7 +91,7 @@ def calls_what_is_inlined(x):
 
 def test_what_an_inlined_function_calls_is_not_inlined_for_that():
     """Left to itself Numba hands the option on to callees: copies of a whole contact solver, and minutes to compile."""
-    assert calls_what_is_inlined(8.0) == 2.0
+    assert anew(calls_what_is_inlined)(8.0) == 2.0
     inlined_parts = {
         function.__name__: [part.fndesc.inline for part in function._part.overloads.values()]
         for function in (halved, quartered)

@@ -13,12 +13,46 @@ def _position(indices) -> tuple[int, ...]:
     return (indices,) if isinstance(indices, int) else tuple(indices)
 
 
+class Elsewhere:
+    """A structure in memory that nobody changes while a function runs, of which nothing has been read yet.
+
+    Parameters
+    ----------
+    address : llvmlite.ir.Value
+        Pointer to it.
+    """
+
+    def __init__(self, address):
+        self.address = address
+        self.type = address.type.pointee
+        self._members: dict[int, Elsewhere | ir.Value] = {}
+
+    def member(self, builder: ir.IRBuilder, k: int):
+        """A member: read at the entry of the function, once, unless it is a structure again."""
+        if k not in self._members:
+            with builder.goto_entry_block():
+                address = builder.gep(self.address, [ir.Constant(ir.IntType(32), n) for n in (0, k)], inbounds=True)
+                is_word = not isinstance(address.type.pointee, ir.Aggregate)
+                self._members[k] = builder.load(address) if is_word else Elsewhere(address)
+        return self._members[k]
+
+    def read(self, builder: ir.IRBuilder):
+        """All of it, as a value."""
+        return ir.IRBuilder.load(builder, self.address)
+
+
 class FoldingBuilder(ir.IRBuilder):
     """LLVM's builder for a structure's members, and for products and sums with nothing to compute."""
 
     def extract_value(self, agg, idx, name=""):
         """A member of a structure: the one that was put in, if that is known."""
         position = _position(idx)
+        while isinstance(agg, Elsewhere):
+            if not position:
+                return agg
+            agg, position = agg.member(self, position[0]), position[1:]
+        if not position:
+            return agg
         while isinstance(agg, ir.InsertValue):
             put = tuple(agg.indices)
             shared = min(len(put), len(position))
@@ -42,12 +76,17 @@ class FoldingBuilder(ir.IRBuilder):
     def insert_value(self, agg, value, idx, name=""):
         """A structure with one member changed."""
         position = _position(idx)
+        agg, value = _as_value(self, agg), _as_value(self, value)
         known = isinstance(agg, ir.Constant) and isinstance(agg.constant, (list, tuple))
         if known and isinstance(value, ir.Constant) and len(position) == 1:
             members = list(agg.constant)
             members[position[0]] = value
             return ir.Constant(agg.type, members)
         return super().insert_value(agg, value, position, name)
+
+    def store(self, value, ptr, align=None):
+        """Write a value."""
+        return super().store(_as_value(self, value), ptr, align)
 
     def mul(self, lhs, rhs, name="", flags=()):
         """Product of integers."""
@@ -68,6 +107,10 @@ class FoldingBuilder(ir.IRBuilder):
         if _is_number(lhs) and _is_number(rhs):
             return ir.Constant(lhs.type, lhs.constant + rhs.constant)
         return super().add(lhs, rhs, name, flags)
+
+
+def _as_value(builder, value):
+    return value.read(builder) if isinstance(value, Elsewhere) else value
 
 
 def _is_number(value) -> bool:

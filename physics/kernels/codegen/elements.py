@@ -13,7 +13,7 @@ import operator
 from llvmlite import ir
 from numba.core import cgutils, types
 
-from physics.kernels.codegen.builder import constant_of, slot
+from physics.kernels.codegen.builder import FoldingBuilder, constant_of, slot
 
 WORD = ir.IntType(64)
 INSIDE = ("nsw",)  # no index and no number of a range is beyond what a word holds
@@ -31,31 +31,37 @@ def _lengths(builder, array_type, array, member, known) -> list:
     return [builder.extract_value(array, (member, axis)) for axis in range(array_type.ndim)]
 
 
-def _from_front(builder, context, index, type_, length):
-    """An index as a word, counted from the front of an axis."""
+def _from_front(context, builder, index, type_, length):
+    """An index as a word, counted from the front of an axis.
+
+    In kernels only a literal counts from the end: to ask of each index whether it is negative takes 6 % of a heap's
+    time. Functions of users, which are not written with our builder, may count as they like.
+    """
     index = context.cast(builder, index, type_, types.intp if type_.signed else types.uintp)
     known = constant_of(index)
-    if not type_.signed or (known is not None and known >= 0):
+    is_from_front = known >= 0 if known is not None else isinstance(builder, FoldingBuilder)
+    if is_from_front or not type_.signed:
         return index
     return builder.select(builder.icmp_signed("<", index, _word(0)), builder.add(index, length), index)
 
 
 def _pointer(context, builder, array_type, array, index_types, indices):
-    """Where an element is."""
+    """Where an element is; under NUMBA_BOUNDSCHECK=1 an index outside its axis raises IndexError."""
     shape = _lengths(builder, array_type, array, SHAPE, lambda known: known.shape)
     data = builder.extract_value(array, DATA)
-    indices = [
-        _from_front(builder, context, index, type_, length)
-        for index, type_, length in zip(indices, index_types, shape, strict=True)
-    ]
+    from_front = []
+    for axis, (index, type_, length) in enumerate(zip(indices, index_types, shape, strict=True)):
+        from_front.append(_from_front(context, builder, index, type_, length))
+        if context.enable_boundscheck:
+            cgutils.do_boundscheck(context, builder, from_front[axis], length, axis)
     if array_type.layout == "C":
-        place = indices[0]
-        for index, length in zip(indices[1:], shape[1:], strict=True):
+        place = from_front[0]
+        for index, length in zip(from_front[1:], shape[1:], strict=True):
             place = builder.add(builder.mul(place, length, flags=INSIDE), index, flags=INSIDE)
         return builder.gep(data, [place], inbounds=True)
     strides = _lengths(builder, array_type, array, STRIDES, lambda known: known.strides)
     offset = _word(0)
-    for index, stride in zip(indices, strides, strict=True):
+    for index, stride in zip(from_front, strides, strict=True):
         offset = builder.add(offset, builder.mul(index, stride))
     return cgutils.pointer_add(builder, data, offset)
 

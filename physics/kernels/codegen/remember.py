@@ -21,7 +21,9 @@ from typing import ClassVar
 
 from numba.core import types, typing
 from numba.core.cpu import CPUContext
+from numba.core.imputils import user_function
 
+from physics.kernels.codegen.arguments import Arguments
 from physics.kernels.codegen.builder import FoldingBuilder, slot
 from physics.kernels.codegen.elements import array_in_record, lowering_of
 
@@ -117,6 +119,10 @@ class RememberingTarget(CPUContext):
             self.absent.add((fn, sig))
             raise
 
+    def get_arg_packer(self, fe_args):
+        """The words of a call's arguments."""
+        return Arguments(self.data_model_manager, fe_args)
+
     def get_getattr(self, typ, attr):
         """How a member of a value is read."""
         if isinstance(typ, types.Record) and isinstance(typ.typeof(attr), types.NestedArray):
@@ -131,18 +137,17 @@ class RememberingTarget(CPUContext):
         """Whether it gave something."""
         return builder.extract_value(val, 1)
 
-    def call_internal(self, builder, fndesc, sig, args):
-        """Call what Numba has compiled. Where that raises, so does its caller: a kernel has no `try`."""
-        if not isinstance(builder, FoldingBuilder) or isinstance(sig.return_type, types.Optional):
-            return super().call_internal(builder, fndesc, sig, args)
-        function = self.declare_function(builder.module, fndesc)
-        result = slot(builder, self.call_conv.get_return_type(sig.return_type).pointee)
-        raised = self.call_conv._get_excinfo_argument(builder.function)
-        words = self.get_arg_packer(sig.args).as_arguments(builder, args)
-        status = builder.call(function, [result, raised, *words])
-        with builder.if_then(builder.icmp_unsigned("!=", status, status.type(0))):
-            builder.ret(status)
-        return self.get_returned_value(builder, sig.return_type, builder.load(result))
+    def insert_user_function(self, func, fndesc, libs=()):
+        """Have a kernel known by its entry point, and how it is called."""
+
+        def call(context, builder, sig, args):
+            if isinstance(builder, FoldingBuilder) and not isinstance(fndesc.restype, types.Optional):
+                return _call(context, builder, fndesc, args)
+            return numbas_call(context, builder, sig, args)
+
+        numbas_call = user_function(fndesc, libs)
+        call.signature, call.libs = fndesc.argtypes, tuple(libs)
+        self._defns[func].append(call, call.signature)
 
     def get_abi_sizeof(self, ty):
         """Size of an LLVM type [bytes]: Numba writes and parses a module for each question."""
@@ -150,6 +155,19 @@ class RememberingTarget(CPUContext):
         if size is None:
             size = self.sizes[ty] = super().get_abi_sizeof(ty)
         return size
+
+
+def _call(context: RememberingTarget, builder: FoldingBuilder, about, args):
+    """Call a kernel. Where that raises, so does its caller: kernels have no `try`."""
+    convention = context.call_conv
+    function = context.declare_function(builder.module, about)
+    result = slot(builder, convention.get_return_type(about.restype).pointee)
+    raised = convention._get_excinfo_argument(builder.function)
+    words = context.get_arg_packer(about.argtypes).as_arguments(builder, args)
+    status = builder.call(function, [result, raised, *words])
+    with builder.if_then(builder.icmp_unsigned("!=", status, status.type(0))):
+        builder.ret(status)
+    return context.get_returned_value(builder, about.restype, builder.load(result))
 
 
 def _bound(lower: Callable, context: RememberingTarget, sig) -> Callable:
