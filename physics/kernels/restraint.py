@@ -1,4 +1,4 @@
-"""Impacts with friction and restitution that would gain energy: as much of the rebound as there is energy for.
+"""Impacts and stages that would gain energy: as much of the rebound, or of the impulses, as there is energy for.
 
 Newton's restitution is a law of normal velocities before and after; where friction turns the slip round meanwhile, it
 can ask for more than the body has (Kane's paradox). A plastic impact never does: with u⁺ = u⁻ + W p, p·u⁺ <= 0,
@@ -19,8 +19,8 @@ from __future__ import annotations
 import math
 
 from physics.kernels import quaternion as qt
-from physics.kernels.body import angular_velocity
-from physics.kernels.compiler import inlined
+from physics.kernels.body import angular_velocity, turning
+from physics.kernels.compiler import inlined, kernel
 
 # Share of the energy by which rounding of an impact may raise it: of the dozen products and sums behind a momentum.
 ROUNDING = 1.0e-14
@@ -52,3 +52,30 @@ def rebound_share(before, plastic, full, middle):
 def between(a, b, s):
     """a + s (b - a) of vectors."""
     return (a[0] + s * (b[0] - a[0]), a[1] + s * (b[1] - a[1]), a[2] + s * (b[2] - a[2]))
+
+
+@kernel
+def shortened(n, friction, before, w, solved, free, R, work):
+    """What `solve_contacts` gave for `free` (v, L), with impulses so short that they give no energy.
+
+    For a problem that no method solved. Its impulses lie in their cones, and so does any share s of them, whose work is
+    ½ s (A + s B), A = P·(v + v_free) + Q·(ω + ω_free), B = P·P/m + Q·I⁻¹ Q >= 0, with v and ω (`before`, `w`) before
+    the stage. That is none at s = -A/B if A < 0, and less for any shorter.
+    """
+    v, L = free
+    v1, L1, residual, sweeps, method = solved
+    u, M = (v1[0] - v[0], v1[1] - v[1], v1[2] - v[2]), (L1[0] - L[0], L1[1] - L[1], L1[2] - L[2])
+    w0, dw = turning(R, L, work.J), turning(R, M, work.J)
+    A = work.mass * (qt.dot(u, before) + qt.dot(u, v)) + qt.dot(M, w) + qt.dot(M, w0)
+    B = work.mass * qt.dot(u, u) + qt.dot(M, dw)
+    if not A + B > 0.0:
+        return solved
+    s = 0.0
+    if A < 0.0:
+        s = -A / B
+    width = 3
+    if friction is None:
+        width = 1
+    for r in range(width * n):
+        work.impulse[r] *= s
+    return between(v, v1, s), between(L, L1, s), residual, sweeps, method

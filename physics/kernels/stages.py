@@ -14,7 +14,7 @@ from physics.kernels.contact import aim_impact, aim_rest
 from physics.kernels.flight import drift
 from physics.kernels.laws import STIFFNESS, if_law
 from physics.kernels.resist import aim_tangential, resist_turning, without_gain
-from physics.kernels.restraint import ROUNDING, between, kinetic_energy, rebound_share
+from physics.kernels.restraint import ROUNDING, between, kinetic_energy, rebound_share, shortened
 from physics.kernels.slide import SLIDE
 from physics.kernels.slip import has_turned_round, oppose_end_slip, oppose_mean_slip, without_gift
 from physics.kernels.solve import PIVOTING, solve_contacts
@@ -125,7 +125,9 @@ def calm_targets(n, work):
 def _calmed_if_it_gains(n, friction, smooth, pivots, before, w, solved, free, R, h, work):
     if contacts_gain(before, w, free[0], free[1], solved, R, h, work):
         calm_targets(n, work)
-        return solve_contacts(n, friction, smooth, pivots, free[0], free[1], R, work)
+        solved = solve_contacts(n, friction, smooth, pivots, free[0], free[1], R, work)
+        if not solved[2] <= work.tolerance and contacts_gain(before, w, free[0], free[1], solved, R, h, work):
+            return shortened(n, friction, before, w, solved, free, R, work)
     return solved
 
 
@@ -133,7 +135,7 @@ def _calmed_if_it_gains(n, friction, smooth, pivots, before, w, solved, free, R,
 def calmed_stage(n, friction, smooth, pivots, before, w, solved, free, R, h, work):
     """What `solve_contacts` gave for `free` (v, L); if that raises the energy, what it gives for calm targets.
 
-    Springs give back what they hold.
+    If even that does, since no method solved it, as much of it as does not. Springs give back what they hold.
     """
     return solved
 
@@ -163,6 +165,8 @@ def impact(n, y, h, friction, smooth, tilted, pivots, report, work):
     R = qt.to_matrix(principal_attitude(q, work, tilted))
     work.mode, work.still = SLIDE, math.inf
     solved = solve_contacts(n, friction, smooth, pivots, v, L, R, work)
+    if not solved[2] <= work.tolerance:
+        solved = shortened(n, friction, v, turning(R, L, work.J), solved, (v, L), R, work)
     solved = without_gain(n, friction, smooth, pivots, v, L, solved, R, work)
     v1, L1, residual, sweeps, method = resist_turning(n, friction, smooth, pivots, v, L, solved, R, work)
     note_solve(report, work.world, residual, sweeps, method, work.tolerance)
@@ -170,7 +174,10 @@ def impact(n, y, h, friction, smooth, tilted, pivots, report, work):
         before, full = kinetic_energy(q, v, L, work, tilted), kinetic_energy(q, v1, L1, work, tilted)
         if full > before + ROUNDING * before:
             aim_plastic(n, work)
-            v0, L0, residual, sweeps, method = solve_contacts(n, friction, smooth, pivots, v, L, R, work)
+            solved = solve_contacts(n, friction, smooth, pivots, v, L, R, work)
+            if not solved[2] <= work.tolerance:
+                solved = shortened(n, friction, v, turning(R, L, work.J), solved, (v, L), R, work)
+            v0, L0, residual, sweeps, method = solved
             note_solve(report, work.world, residual, sweeps, method, work.tolerance)
             plastic = kinetic_energy(q, v0, L0, work, tilted)
             middle = kinetic_energy(q, between(v0, v1, 0.5), between(L0, L1, 0.5), work, tilted)

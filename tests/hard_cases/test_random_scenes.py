@@ -8,15 +8,20 @@ import pytest
 import physics
 from rigid_env.hard_cases import random_scenes
 
-# Family, worlds, seed: before resting stages, places put right and failed solves were kept from giving energy (decision
-# 14), 1, 3 and 2 worlds of ellipsoids broke a law in these, and 5, 7 and 5 of several bodies.
-DRAWS = [("ellipsoid", 1000, seed) for seed in (0, 1, 6)] + [("bodies", 500, seed) for seed in (0, 1, 2)]
+# Family, worlds, seed, accuracy: before resting stages, places put right and failed solves were kept from giving energy
+# (decision 14), 1, 3 and 2 worlds of ellipsoids broke a law in these, 5, 7 and 5 of several bodies, and 2, 1 and 1 of
+# blocks at `fast`, which has no method beyond sweeps: they gained up to 9 times what was put in.
+DRAWS = [
+    *(("ellipsoid", 1000, seed, "balanced") for seed in (0, 1, 6)),
+    *(("bodies", 500, seed, "balanced") for seed in (0, 1, 2)),
+    *(("block", 1000, seed, "fast") for seed in (2, 21, 23)),
+]
 
 
-@pytest.mark.parametrize(("family", "worlds", "seed"), DRAWS)
-def test_no_law_is_broken(family, worlds, seed):
-    world = physics.World(random_scenes.scene_of(family), worlds=worlds, dt=0.01)
-    limit = random_scenes.gain_limit("balanced")
+@pytest.mark.parametrize(("family", "worlds", "seed", "accuracy"), DRAWS)
+def test_no_law_is_broken(family, worlds, seed, accuracy):
+    world = physics.World(random_scenes.scene_of(family), worlds=worlds, dt=0.01, accuracy=accuracy)
+    limit = random_scenes.gain_limit(accuracy)
     outcome = random_scenes.drive(world, np.random.default_rng(seed))
     broken = np.flatnonzero(outcome.broken_laws(limit))
     assert [(k, outcome.law(k, limit)) for k in broken.tolist()] == []
