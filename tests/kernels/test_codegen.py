@@ -18,6 +18,7 @@ from numba.core.typeinfer import CallConstraint
 
 import physics
 from physics.kernels.codegen.inference import _Network
+from physics.kernels.codegen.linking import _PartLibrary
 from physics.kernels.compiler import composed, kernel
 from tests.kernels.anew import anew
 
@@ -155,6 +156,39 @@ def test_indices_are_checked_where_that_is_asked_for(tmp_path):
     assert done.stdout.split() == ["4"], done.stderr
 
 
+@kernel
+def reshaped(a, rows, columns, i, j):
+    """Of the elements from the third on: a matrix."""
+    matrix = a[2 : 2 + rows * columns].reshape((rows, columns))
+    return matrix[i, j] + 100.0 * matrix.shape[0] + 1000.0 * matrix.shape[1]
+
+
+@given(st.integers(1, 4), st.integers(1, 5), st.data())
+def test_an_array_with_another_shape(rows, columns, data):
+    a = np.arange(30.0)
+    i, j = data.draw(index(rows)), data.draw(index(columns))
+    assert reshaped(a, rows, columns, i, j) == reshaped.py_func(a, rows, columns, i, j)
+
+
+@kernel
+def column_of_reshaped(a, j, k):
+    """Sum of a column, which is read by its strides."""
+    total = 0.0
+    column = a.reshape((2, 3, 4))[:, j, k]
+    for i in range(column.shape[0]):
+        total = 10.0 * total + column[i]
+    row = a.reshape((2, 3, 4))[1, :, k]
+    for i in range(row.shape[0]):
+        total = 10.0 * total + row[i]
+    return total
+
+
+@given(index(3), index(4))
+def test_columns_of_an_array_with_another_shape(j, k):
+    a = np.arange(24.0)
+    assert column_of_reshaped(a, j, k) == column_of_reshaped.py_func(a, j, k)
+
+
 # --- records -------------------------------------------------------------------------------------------------------
 
 
@@ -252,6 +286,23 @@ def test_loops_run_as_pythons_do(start, stop, step, limit):
 
 
 @kernel
+def backwards(first, last):
+    numbers, seen = 0, -99
+    for i in range(first, last, -1):
+        numbers, seen = 3 * numbers + i, i
+    for i in range(last, first, 3):
+        numbers, seen = 3 * numbers + i, i
+    for i in range(first, last, -2):
+        numbers, seen = 3 * numbers + i, i
+    return numbers, seen
+
+
+@given(st.integers(-9, 9), st.integers(-9, 9))
+def test_loops_with_steps_that_are_written_down(first, last):
+    assert backwards(first, last) == backwards.py_func(first, last)
+
+
+@kernel
 def by_branches(x, n):
     a = b = x
     if x > 2.0:
@@ -289,6 +340,102 @@ def nothing_yet(n):
 def test_a_variable_that_only_some_ways_assign():
     for n in (0, 3, 4, 8):
         assert nothing_yet(n) == nothing_yet.py_func(n)
+
+
+# --- numbers and tuples --------------------------------------------------------------------------------------------
+
+NUMBERS = st.floats(width=64) | st.sampled_from([0.0, -0.0, float("nan"), float("inf")])
+
+
+def same(a, b) -> bool:
+    """Bit for bit, but for what kind of NaN it is."""
+    return np.array_equal(np.float64(a), np.float64(b), equal_nan=True) and np.signbit(a) == np.signbit(b)
+
+
+@kernel
+def extremes(x, y, z, k):
+    return max(x, y), min(x, y), max(x, y, z), min(z, y, x), max(x, k), min(k, 3)
+
+
+@given(NUMBERS, NUMBERS, NUMBERS, st.integers(-9, 9))
+def test_the_largest_and_the_smallest_are_pythons(x, y, z, k):
+    """The first of equal ones (of 0.0 and -0.0), and what NaN comes first stays."""
+    assert all(map(same, extremes(x, y, z, k), extremes.py_func(x, y, z, k)))
+
+
+@kernel
+def truncated(x, n):
+    return int(x), int(n)
+
+
+@given(st.floats(-1e15, 1e15), st.integers(-(2**62), 2**62))
+def test_a_number_becomes_an_integer_towards_zero(x, n):
+    assert truncated(x, n) == (int(x), n)
+
+
+@kernel
+def powers(x, n):
+    return x**1, x**2, x**3, x**4, x**7, x**0, x**-2, x**n
+
+
+def test_a_power_that_is_written_down_is_a_product():
+    """As Numba multiplies: from the right, squares first."""
+    for x in (0.3, -1.7, 1e40, 3.0):
+        first, square, cube, fourth, seventh, zeroth, inverse, other = powers(x, 5)
+        assert (first, square, cube) == (x, x * x, x * (x * x))
+        assert (fourth, seventh) == ((x * x) * (x * x), x * (x * x) * ((x * x) * (x * x)))
+        assert (zeroth, inverse) == (1.0, 1.0 / (x * x))
+        assert other == pytest.approx(x**5)
+
+
+@kernel
+def power(x, n):
+    return x**n
+
+
+@kernel
+def inverse(x):
+    return 1.0 / x
+
+
+def test_dividing_by_zero_is_no_error_whatever_numba_has_compiled_for_itself():
+    """Its `x ** n` divides, for these types as `inverse` does, and there dividing by zero is an error."""
+    x = np.float32(0.0)
+    assert power(np.float32(2.0), -1) == 0.5
+    assert inverse(x) == np.inf
+
+
+TURNS = (0.5, -2.0, 8.25, 3.0)
+
+
+@kernel
+def chosen(x, y, k):
+    of_numbers = (x, y, x * y, 7.0)
+    of_tuples = ((x, y, 1.0), (y, x, 2.0))
+    one = of_tuples[k % 2]
+    return of_numbers[k] + TURNS[k], one[0], one[2], k in (1, 3), y in (2.0, x)
+
+
+@given(st.floats(-9, 9), st.floats(-9, 9), index(4))
+def test_a_member_of_a_tuple_is_the_one_that_is_asked_for(x, y, k):
+    assert chosen(x, y, k) == chosen.py_func(x, y, k)
+
+
+def users_member(x, k):
+    return (x, 2.0 * x, 3.0 * x)[k]
+
+
+member_of_user = composed(users_member)
+
+
+@kernel
+def asks_member(x, k):
+    return member_of_user(x, k)
+
+
+@given(st.integers(-3, 2))
+def test_a_users_function_may_count_from_the_end_of_a_tuple(k):
+    assert asks_member(1.5, k) == users_member(1.5, k)
 
 
 # --- calls ---------------------------------------------------------------------------------------------------------
@@ -338,6 +485,62 @@ def test_what_a_users_function_catches_does_not():
     assert outer_guarded(-3.0) == -1.0
 
 
+@kernel
+def both_ways(x):
+    """Two structures, one within another, from several ends."""
+    if x > 1.0:
+        return (x, (x * x, 2)), x > 2.0
+    if x < -1.0:
+        return (1.0, (2.0, 3)), False
+    return (-x, (x, 1)), True
+
+
+@kernel
+def nothing(a, x):
+    a[0] = x
+
+
+@kernel
+def perhaps(x):
+    if x > 0.0:
+        return x
+    return None
+
+
+@kernel
+def row_of(a, k):
+    return a[k]
+
+
+@kernel
+def takes_a_view(a):
+    row = row_of(a, 1)
+    row[0] = 7.0
+    return row[2] + row.shape[0]
+
+
+def test_a_kernel_returns_a_view():
+    a = grid(3, 4)
+    assert takes_a_view(a) == a[1, 2] + 4.0
+    assert a[1, 0] == 7.0
+
+
+@kernel
+def takes_values(a, x):
+    (first, (second, count)), is_large = both_ways(x)
+    nothing(a, x)
+    there = perhaps(x)
+    late = -1.0 if there is None else there
+    return first, second, count, is_large, late
+
+
+@given(st.floats(-3, 3))
+def test_kernels_return_numbers_tuples_and_nothing(x):
+    a, expected = np.arange(4.0), np.arange(4.0)
+    assert takes_values(a, x) == takes_values.py_func(expected, x)
+    assert (a == expected).all()
+
+
 # --- how much is written -------------------------------------------------------------------------------------------
 
 
@@ -355,13 +558,14 @@ def calls_straight(record, a, i):
 
 def instructions_of(function, monkeypatch, *args) -> dict[str, list[str]]:
     """What is written for a kernel that is not kept, and for the parts it is the first to call: instructions' names."""
-    written, add = {}, CPUCodeLibrary.add_ir_module
+    written = {}
+    for library_class in (CPUCodeLibrary, _PartLibrary):
 
-    def noted(library, module):
-        written[library.name] = re.findall(r"^  (?:%\S+ = )?([a-z]+)", str(module), re.MULTILINE)
-        add(library, module)
+        def noted(library, module, add=library_class.add_ir_module):
+            written[library.name] = re.findall(r"^  (?:%\S+ = )?([a-z]+)", str(module), re.MULTILINE)
+            add(library, module)
 
-    monkeypatch.setattr(CPUCodeLibrary, "add_ir_module", noted)
+        monkeypatch.setattr(library_class, "add_ir_module", noted)
     anew(function)(*args)
     monkeypatch.undo()
     return written
@@ -372,7 +576,7 @@ def test_an_element_takes_no_memory_of_its_own(monkeypatch):
     written = instructions_of(calls_straight, monkeypatch, record_of()[0], grid(3, 4), 1)["straight"]
     assert "alloca" not in written
     assert written.count("load") == 3
-    assert written.count("store") == 2  # the element, and the result
+    assert written.count("store") == 1
     assert len(written) < 60
 
 

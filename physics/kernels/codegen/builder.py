@@ -8,6 +8,9 @@ from __future__ import annotations
 
 from llvmlite import ir
 
+WORD = ir.IntType(64)
+INSIDE = ("nsw",)  # no index and no number of a range is beyond what a word holds
+
 
 def _position(indices) -> tuple[int, ...]:
     return (indices,) if isinstance(indices, int) else tuple(indices)
@@ -41,52 +44,99 @@ class Elsewhere:
         return ir.IRBuilder.load(builder, self.address)
 
 
+def member_type(type_: ir.Type, k: int) -> ir.Type:
+    """Type of a member of a structure."""
+    return type_.gep(ir.Constant(ir.IntType(32), k))
+
+
+class Together:
+    """A structure of which only the members are known: written down as one value only where all of it is needed.
+
+    Parameters
+    ----------
+    type_ : llvmlite.ir.Type
+    members : sequence
+        Of values, structures, and None for what is not defined.
+    """
+
+    def __init__(self, type_: ir.Type, members):
+        self.type = type_
+        self._members = tuple(members)
+
+    def member(self, builder: ir.IRBuilder, k: int):
+        """A member."""
+        return ir.Constant(member_type(self.type, k), ir.Undefined) if self._members[k] is None else self._members[k]
+
+    def changed(self, builder: ir.IRBuilder, value, position: tuple[int, ...]):
+        """The structure with another member, or member of a member."""
+        k, *within = position
+        if within:
+            value = builder.insert_value(self.member(builder, k), value, within)
+        return Together(self.type, (*self._members[:k], value, *self._members[k + 1 :]))
+
+    def read(self, builder: ir.IRBuilder):
+        """All of it, as a value."""
+        members = [_as_value(builder, self.member(builder, k)) for k in range(len(self._members))]
+        whole = ir.Constant(self.type, [m if _is_constant(m) else ir.Constant(m.type, ir.Undefined) for m in members])
+        for k, member in enumerate(members):
+            if not _is_constant(member):
+                whole = ir.IRBuilder.insert_value(builder, whole, member, k)
+        return whole
+
+
+def together(builder: ir.IRBuilder, type_: ir.Type, members):
+    """A structure of these members, for our builder or Numba's."""
+    structure = Together(type_, members)
+    return structure if isinstance(builder, FoldingBuilder) else structure.read(builder)
+
+
+def _is_constant(value) -> bool:
+    return isinstance(value, ir.Constant)
+
+
+def _taken_apart(value):
+    """A constant structure by its members; anything else as it is."""
+    if not _is_constant(value) or not isinstance(value.type, ir.Aggregate):
+        return value
+    known = value.constant if isinstance(value.constant, (list, tuple)) else None
+    if known is None and value.constant is not ir.Undefined:
+        return value
+    return Together(value.type, known or [None] * len(value.type))
+
+
 class FoldingBuilder(ir.IRBuilder):
-    """LLVM's builder for a structure's members, and for products and sums with nothing to compute."""
+    """LLVM's builder for structures known by their members, and for products and sums with nothing to compute."""
 
     def extract_value(self, agg, idx, name=""):
         """A member of a structure: the one that was put in, if that is known."""
         position = _position(idx)
-        while isinstance(agg, Elsewhere):
-            if not position:
-                return agg
-            agg, position = agg.member(self, position[0]), position[1:]
-        if not position:
-            return agg
-        while isinstance(agg, ir.InsertValue):
-            put = tuple(agg.indices)
-            shared = min(len(put), len(position))
-            if put[:shared] != position[:shared]:
-                agg = agg.aggregate
-            elif len(put) <= len(position):
-                agg, position = agg.value, position[len(put) :]
-                if not position:
-                    return agg
-            else:  # only part of what is asked for was put in
-                break
-        if isinstance(agg, ir.Constant) and isinstance(agg.constant, (list, tuple)):
-            for k in position:
-                if not isinstance(agg.constant, (list, tuple)):
-                    break
-                agg, position = agg.constant[k], position[1:]
-            if not position:
-                return agg
-        return super().extract_value(agg, position, name)
+        agg = _taken_apart(agg)
+        while position and isinstance(agg, (Elsewhere, Together)):
+            agg, position = _taken_apart(agg.member(self, position[0])), position[1:]
+        return super().extract_value(agg, position, name) if position else agg
 
     def insert_value(self, agg, value, idx, name=""):
         """A structure with one member changed."""
-        position = _position(idx)
-        agg, value = _as_value(self, agg), _as_value(self, value)
-        known = isinstance(agg, ir.Constant) and isinstance(agg.constant, (list, tuple))
-        if known and isinstance(value, ir.Constant) and len(position) == 1:
-            members = list(agg.constant)
-            members[position[0]] = value
-            return ir.Constant(agg.type, members)
-        return super().insert_value(agg, value, position, name)
+        agg = _taken_apart(agg)
+        if isinstance(agg, Together):
+            return agg.changed(self, value, _position(idx))
+        return super().insert_value(_as_value(self, agg), _as_value(self, value), _position(idx), name)
 
     def store(self, value, ptr, align=None):
         """Write a value."""
         return super().store(_as_value(self, value), ptr, align)
+
+    def call(self, fn, args, *more, **named):
+        """Call a function."""
+        return super().call(fn, [_as_value(self, each) for each in args], *more, **named)
+
+    def select(self, cond, lhs, rhs, *more, **named):
+        """One of two values."""
+        return super().select(cond, _as_value(self, lhs), _as_value(self, rhs), *more, **named)
+
+    def ret(self, value):
+        """Leave the function with a value."""
+        return super().ret(_as_value(self, value))
 
     def mul(self, lhs, rhs, name="", flags=()):
         """Product of integers."""
@@ -110,7 +160,7 @@ class FoldingBuilder(ir.IRBuilder):
 
 
 def _as_value(builder, value):
-    return value.read(builder) if isinstance(value, Elsewhere) else value
+    return value.read(builder) if isinstance(value, (Elsewhere, Together)) else value
 
 
 def _is_number(value) -> bool:
@@ -119,6 +169,11 @@ def _is_number(value) -> bool:
 
 def _is(value, number: int) -> bool:
     return _is_number(value) and value.constant == number
+
+
+def word(value: int) -> ir.Constant:
+    """A known word."""
+    return ir.Constant(WORD, value)
 
 
 def constant_of(value):

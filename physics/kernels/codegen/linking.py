@@ -21,14 +21,20 @@ types is part of each name.
 from __future__ import annotations
 
 import hashlib
+from functools import cache
 
+from llvmlite import binding as llvm
 from numba import _dynfunc
+from numba.core import cgutils, event
 from numba.core.codegen import CodeLibrary, JITCodeLibrary
 from numba.core.compiler import CompilerBase, DefaultPassBuilder, Flags
+from numba.core.compiler_lock import global_compiler_lock
 from numba.core.compiler_machinery import LoweringPass, PassManager, register_pass
 from numba.core.registry import CPUDispatcher
+from numba.core.sigutils import normalize_signature
 from numba.core.typed_passes import NativeLowering, NoPythonBackend
 
+from physics.kernels.codegen.lowering import PartLowering, WholeLowering
 from physics.kernels.codegen.passes import KernelPasses
 from physics.kernels.codegen.remember import RememberingTarget, remembering
 
@@ -36,8 +42,16 @@ from physics.kernels.codegen.remember import RememberingTarget, remembering
 class _PartLibrary(JITCodeLibrary):
     """IR of one part, neither linked nor optimised."""
 
-    def _optimize_functions(self, ll_module):
-        ll_module.data_layout = self._codegen._data_layout
+    def add_ir_module(self, ir_module):
+        """Take the module in: every whole that calls the part has the same one."""
+        for function in ir_module.functions:
+            if not function.is_declaration:
+                function.linkage = "linkonce_odr"
+        self._final_module = llvm.parse_assembly(cgutils.normalize_ir_text(str(ir_module)))
+        self._final_module.data_layout = self._codegen._data_layout
+
+    def _get_module_for_linking(self):
+        return self._final_module
 
     def finalize(self):
         self._finalized = True
@@ -88,6 +102,11 @@ class _Flags(Flags):
         return super().get_mangle_string() + self.types
 
 
+@cache
+def _passes(*at_last: type) -> KernelPasses:
+    return KernelPasses(*at_last)
+
+
 class _WholeCompiler(CompilerBase):
     """Passes of ours, into a library of ours."""
 
@@ -102,7 +121,7 @@ class _WholeCompiler(CompilerBase):
 
     def passes(self) -> PassManager:
         """To be run one after another."""
-        return KernelPasses(NoPythonBackend)
+        return _passes(WholeLowering, NoPythonBackend)
 
     def define_pipelines(self):
         state = self.state
@@ -140,7 +159,7 @@ class _PartCompiler(_WholeCompiler):
         self.state.flags.no_compile = True
 
     def passes(self):
-        return KernelPasses(_KeepAsPart, NoPythonBackend)
+        return _passes(PartLowering, _KeepAsPart, NoPythonBackend)
 
 
 class _AnyPartCompiler(_PartCompiler):
@@ -151,6 +170,20 @@ class _AnyPartCompiler(_PartCompiler):
         pipeline.add_pass_after(_KeepAsPart, NativeLowering)
         pipeline.finalize()
         return pipeline
+
+
+class _Part(CPUDispatcher):
+    """A kernel that other kernels call."""
+
+    def compile(self, sig):
+        """Have it compiled for the types of its arguments, without the two clocks that Numba starts for each: they tell
+        each other of every call of LLVM, as many of them as calls are nested."""
+        args, return_type = normalize_signature(sig)
+        if args not in self.overloads:
+            about = {"dispatcher": self, "args": args, "return_type": return_type}
+            with global_compiler_lock, self._compiling_counter, event.trigger_event("numba:compile", data=about):
+                self.add_overload(self._compiler.compile(args, return_type))
+        return self.overloads[args].entry_point
 
 
 class Kernel(CPUDispatcher):
@@ -171,8 +204,8 @@ class Kernel(CPUDispatcher):
 
     def __init__(self, function, local_types=None, options=None, is_foreign=False):
         super().__init__(function, local_types, options, pipeline_class=_WholeCompiler)
-        part_compiler = _AnyPartCompiler if is_foreign else _PartCompiler
-        self._part = CPUDispatcher(function, local_types, options, pipeline_class=part_compiler)
+        dispatcher, compiler = (CPUDispatcher, _AnyPartCompiler) if is_foreign else (_Part, _PartCompiler)
+        self._part = dispatcher(function, local_types, options, pipeline_class=compiler)
 
     def get_call_template(self, args, kws):
         """How another kernel calls this one."""

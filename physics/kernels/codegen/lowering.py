@@ -18,6 +18,7 @@ from numba.core.lowering import Lower
 from numba.core.typed_passes import NativeLowering
 
 from physics.kernels.codegen.builder import FoldingBuilder, slot
+from physics.kernels.codegen.calls import MayRaise, ValueDescriptor
 
 
 class _KernelLower(Lower):
@@ -41,7 +42,23 @@ class _KernelLower(Lower):
         self._cur_ir_block = block
         for each in block.body:
             self.loc = each.loc
-            self.lower_inst(each)
+            if isinstance(each, ir.Assign):
+                name = each.target.name
+                self.storevar(self.lower_assign(self.typeof(name), each), name)
+            else:
+                self.lower_inst(each)
+
+    def lower_binop(self, resty, expr, op):
+        """An operation on two values; those with a number that is written down are no others (`scalars` sees one)."""
+        context, builder = self.context, self.builder
+        function = context.typing_context.resolve_value_type(op)
+        sig = function.get_call_type(context.typing_context, self.fndesc.calltypes[expr].args, {})
+        operands = [
+            context.cast(builder, self.loadvar(each.name), self.typeof(each.name), type_)
+            for each, type_ in zip((expr.lhs, expr.rhs), sig.args, strict=True)
+        ]
+        value = context.get_function(function, sig)(builder, operands)
+        return context.cast(builder, value, sig.return_type, resty)
 
     def loadvar(self, name):
         """Value of a variable."""
@@ -63,13 +80,46 @@ class _KernelLower(Lower):
             self.builder.store(value, self.getvar(name))
 
 
-@register_pass(mutates_CFG=True, analysis_only=False)
-class KernelLowering(NativeLowering):
-    """The pass in which a kernel is lowered."""
+class _ValueLower(_KernelLower):
+    """The lowering of a function that returns its value, not a status."""
 
-    _name = "kernel_lowering"
+    def setup_function(self, fndesc):
+        """Declare the function."""
+        fndesc.__class__ = ValueDescriptor
+        super().setup_function(fndesc)
+
+
+@register_pass(mutates_CFG=True, analysis_only=False)
+class WholeLowering(NativeLowering):
+    """The pass in which a kernel is lowered as Python calls it."""
+
+    _name = "whole_lowering"
 
     @property
     def lowering_class(self):
         """What lowers one function."""
         return _KernelLower
+
+
+@register_pass(mutates_CFG=True, analysis_only=False)
+class PartLowering(WholeLowering):
+    """The pass in which a kernel is lowered as other kernels call it."""
+
+    _name = "part_lowering"
+
+    @property
+    def lowering_class(self):
+        """What lowers one function."""
+        return _ValueLower
+
+    def run_pass(self, state):
+        """Lower a kernel; one that may raise an exception gives a status, as all do whose indices are checked."""
+        if not state.targetctx.enable_boundscheck:
+            try:
+                return super().run_pass(state)
+            except MayRaise:
+                pass
+        return WholeLowering.run_pass(_WITH_STATUS, state)
+
+
+_WITH_STATUS = WholeLowering()

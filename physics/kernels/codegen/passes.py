@@ -17,7 +17,6 @@ from numba.core.typed_passes import AnnotateTypes, PreLowerStripPhis
 from numba.core.untyped_passes import DeadBranchPrune, FixupArgs, RewriteSemanticConstants
 
 from physics.kernels.codegen.inference import infer_types
-from physics.kernels.codegen.lowering import KernelLowering
 
 
 class _Plain(FunctionPass):
@@ -97,7 +96,7 @@ class _NoPhis(PreLowerStripPhis):
         return True
 
 
-TO_LLVM = (
+TO_TYPES = (
     _FromByteCode,
     FixupArgs,
     RewriteSemanticConstants,
@@ -108,7 +107,6 @@ TO_LLVM = (
     _Types,
     _NoPhis,
     AnnotateTypes,
-    KernelLowering,
 )
 
 
@@ -118,12 +116,12 @@ class KernelPasses(PassManager):
     Parameters
     ----------
     at_last : type
-        Passes after the lowering to LLVM.
+        The lowering to LLVM, and what follows it.
     """
 
     def __init__(self, *at_last: type):
         super().__init__("nopython")
-        for each in (*TO_LLVM, *at_last):
+        for each in (*TO_TYPES, *at_last):
             self.add_pass(each, each.__name__)
         self.finalize()
 

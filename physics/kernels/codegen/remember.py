@@ -23,9 +23,11 @@ from numba.core import types, typing
 from numba.core.cpu import CPUContext
 from numba.core.imputils import user_function
 
+from physics.kernels.codegen import calls
+from physics.kernels.codegen.answers import lowering_of, signature_of
 from physics.kernels.codegen.arguments import Arguments
-from physics.kernels.codegen.builder import FoldingBuilder, slot
-from physics.kernels.codegen.elements import array_in_record, lowering_of
+from physics.kernels.codegen.builder import FoldingBuilder
+from physics.kernels.codegen.elements import array_in_record
 
 
 class RememberingTyping(typing.Context):
@@ -68,7 +70,8 @@ def _get_call_type(function, context, args, kws, asked=types.Function.get_call_t
     key = (function, tuple(args))
     found = context.signatures.get(key)
     if found is None:
-        found = context.signatures[key] = asked(function, context, args, kws)
+        found = signature_of(function, context, args) or asked(function, context, args, kws)
+        context.signatures[key] = found
     return found
 
 
@@ -85,7 +88,7 @@ class RememberingTarget(CPUContext):
         Whose knowledge is shared.
     """
 
-    lowerings: ClassVar[dict[tuple, Callable]] = {}  # by operation and signature
+    lowerings: ClassVar[dict[tuple, Callable]] = {}  # by operation, signature, and what is an error
     absent: ClassVar[set[tuple]] = set()  # operations without a lowering of their own, and their signatures
     asked: ClassVar[set] = set()  # operations for which Numba has looked through its registries
     sizes: ClassVar[dict] = {}  # of LLVM types [bytes]
@@ -100,11 +103,13 @@ class RememberingTarget(CPUContext):
 
     def get_function(self, fn, sig, _firstcall=True):
         """How `fn` is lowered for a signature; raises NotImplementedError if there is no way."""
-        lowering = self.lowerings.get((fn, sig))
+        # What Numba compiles for itself has an error model of its own.
+        key = fn, sig, type(self.error_model), self.enable_boundscheck
+        lowering = self.lowerings.get(key)
         if lowering is None:
             lower = lowering_of(fn, sig)
-            lowering = self.numba_function(fn, sig) if lower is None else _bound(lower, self, sig)
-            self.lowerings[fn, sig] = lowering
+            lowering = self.numba_function(fn, sig) if lower is None else _bound(lower, self, fn, sig)
+            self.lowerings[key] = lowering
         return lowering
 
     def numba_function(self, fn, sig):
@@ -118,6 +123,17 @@ class RememberingTarget(CPUContext):
         except NotImplementedError:
             self.absent.add((fn, sig))
             raise
+
+    @property
+    def call_conv(self):
+        """How functions are called."""
+        return calls.Convention(self)
+
+    def declare_function(self, module, fndesc):
+        """A function in a module that defines or calls it."""
+        if calls.gives_value(fndesc):
+            return calls.declare(self, module, fndesc)
+        return super().declare_function(module, fndesc)
 
     def get_arg_packer(self, fe_args):
         """The words of a call's arguments."""
@@ -141,8 +157,9 @@ class RememberingTarget(CPUContext):
         """Have a kernel known by its entry point, and how it is called."""
 
         def call(context, builder, sig, args):
-            if isinstance(builder, FoldingBuilder) and not isinstance(fndesc.restype, types.Optional):
-                return _call(context, builder, fndesc, args)
+            is_kernel = isinstance(builder, FoldingBuilder) and not isinstance(fndesc.restype, types.Optional)
+            if is_kernel or calls.gives_value(fndesc):
+                return calls.call(context, builder, fndesc, args)
             return numbas_call(context, builder, sig, args)
 
         numbas_call = user_function(fndesc, libs)
@@ -157,23 +174,11 @@ class RememberingTarget(CPUContext):
         return size
 
 
-def _call(context: RememberingTarget, builder: FoldingBuilder, about, args):
-    """Call a kernel. Where that raises, so does its caller: kernels have no `try`."""
-    convention = context.call_conv
-    function = context.declare_function(builder.module, about)
-    result = slot(builder, convention.get_return_type(about.restype).pointee)
-    raised = convention._get_excinfo_argument(builder.function)
-    words = context.get_arg_packer(about.argtypes).as_arguments(builder, args)
-    status = builder.call(function, [result, raised, *words])
-    with builder.if_then(builder.icmp_unsigned("!=", status, status.type(0))):
-        builder.ret(status)
-    return context.get_returned_value(builder, about.restype, builder.load(result))
-
-
-def _bound(lower: Callable, context: RememberingTarget, sig) -> Callable:
+def _bound(lower: Callable, context: RememberingTarget, fn, sig) -> Callable:
     """A lowering of ours, to be called as Numba calls its own."""
 
     def lowered(builder, args, loc=None):
-        return lower(context, builder, sig, args)
+        value = lower(context, builder, sig, args)
+        return context.numba_function(fn, sig)(builder, args) if value is NotImplemented else value
 
     return lowered

@@ -89,8 +89,10 @@ def sort_bodies(axis, many):
         many.order[b] = b
     width = 1
     while width < count:
-        for first in range(0, count - width, 2 * width):
+        first = 0
+        while first + width < count:
             _merge(first, first + width, min(first + 2 * width, count), axis, many)
+            first += 2 * width
         width *= 2
 
 

@@ -1,0 +1,48 @@
+"""What is said of an operation at once, in Numba's place: of what type its result is, and how it is lowered.
+
+Numba has a dozen templates for `a[i]` and asks each, and for what follows it writes many times what is needed. Each
+module here knows some operations; of all others Numba is asked.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from numba.core import types, typing
+
+from physics.kernels.codegen import elements, ranges, scalars, tuples
+
+
+def signature_of(function: types.Function, context: typing.Context, args: tuple) -> typing.Signature | None:
+    """Signature of `function` for types of arguments, or None where Numba has to be asked.
+
+    Parameters
+    ----------
+    function : types.Function
+    context : typing.Context
+    args : tuple of types.Type
+    """
+    key = function.typing_key
+    return elements.signature(key, context, args) or scalars.signature(key, context, args)
+
+
+def lowering_of(function, sig: typing.Signature) -> Callable | None:
+    """How to lower `function` for a signature, or None where Numba's way is taken.
+
+    Parameters
+    ----------
+    function : types.Function or str
+    sig : typing.Signature
+
+    Returns
+    -------
+    Callable, optional
+        Of a context, a builder, the signature and the values of the arguments; what it returns is NotImplemented where
+        Numba's way is taken after all.
+    """
+    key = function if isinstance(function, str) else getattr(function, "typing_key", None)
+    for module in (elements, ranges, tuples, scalars):
+        found = module.lowering(key, sig)
+        if found is not None:
+            return found
+    return None
