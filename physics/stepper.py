@@ -2,11 +2,7 @@
 
 from __future__ import annotations
 
-import gc
-import sys
-import threading
 from collections.abc import Callable
-from contextlib import contextmanager
 from functools import partial
 from typing import TYPE_CHECKING
 
@@ -19,13 +15,11 @@ from physics.kernels.linked import step_linked
 from physics.kernels.many.step import step_many
 from physics.kernels.sleep import sleep_through
 from physics.kernels.step import step_worlds
+from physics.machine_code import compiling
 
 if TYPE_CHECKING:
     from physics.plan import Plan
     from physics.world import World
-
-# Seconds after which the first step of a plan says that it is compiling.
-COMPILE_NOTICE = 1.0
 
 
 class Stepper:
@@ -41,6 +35,9 @@ class Stepper:
         Steps that one call takes.
     dt : float, optional
         Time of one of them, instead of the world's [s].
+    then : Callable, optional
+        What each thread does with the worlds that it has stepped: from their list, as of `physics.kernels.turns`, which
+        every call renews, to a function without arguments. See `physics.machine_code.bound`.
 
     Raises
     ------
@@ -48,12 +45,20 @@ class Stepper:
         `steps` is not a positive integer, or `dt` not a positive number.
     """
 
-    def __init__(self, world: World, steps: int = 1, dt: float | None = None):
+    def __init__(
+        self,
+        world: World,
+        steps: int = 1,
+        dt: float | None = None,
+        then: Callable[[np.ndarray], Callable[[], object]] | None = None,
+    ):
         self.world = world
         self.steps = checks.count(steps, "steps")
         self.dt = world.dt if dt is None else float(checks.positive(dt, (), "dt"))
         self._wrench = world.no_wrench()
+        self._then = then
         self._calls: list[Callable[[], None]] | None = None
+        self._afterwards: list[Callable[[], None]] = []
 
     @property
     def wrench(self) -> np.ndarray:
@@ -67,15 +72,37 @@ class Stepper:
     def __call__(self) -> None:
         """Advance every world by `steps` times `dt`."""
         if self._calls is None:
-            self._calls = kernel_calls(self.world, self._wrench, self.steps, self.dt)
+            self._prepare()
         self.world.advance(self._calls, self._wrench, self.steps, self.dt)
+        for call in self._afterwards:
+            call()
+
+    def _prepare(self) -> None:
+        calls = kernel_calls(self.world, self._wrench, self.steps, self.dt)
+        if self._then is not None:
+            following = [self._then(taken) for taken in self.world.team.taken]
+            if _takes_each_step(self.world) and self.steps > 1:  # with calls of their own
+                self._afterwards = following
+            else:
+                calls = [partial(_one_by_one, *both) for both in zip(calls, following, strict=True)]
+        self._calls = calls
 
     def __getstate__(self):
-        return {**vars(self), "_calls": None}  # machine code belongs to the process
+        return {**vars(self), "_calls": None, "_afterwards": []}  # machine code belongs to the process
+
+
+def _one_by_one(first: Callable[[], None], second: Callable[[], None]) -> None:
+    first()
+    second()
+
+
+def _takes_each_step(world: World) -> bool:
+    """A call of several steps is made step by step, since the actuator is asked at each."""
+    return world.actuation is not None and world.actuation.actuator.remembers
 
 
 def kernel_calls(world: World, wrench: np.ndarray, steps: int, dt: float) -> list[Callable[[], None]]:
-    """One call of the step kernel for each slice of the batch, all arguments bound.
+    """One call of the step kernel for each thread, all arguments bound.
 
     Parameters
     ----------
@@ -91,27 +118,25 @@ def kernel_calls(world: World, wrench: np.ndarray, steps: int, dt: float) -> lis
     plan, substeps = world.plan, world.accuracy.substeps
     if world.actuation is not None:
         wrench = world.actuation.applied
-        steps = 1 if world.actuation.actuator.remembers else steps
+        steps = 1 if _takes_each_step(world) else steps
     kernel, own_arguments = _step_of(plan)
     argument_lists = [
         (
-            first, last, steps, substeps, dt / substeps, world.state, world.params, world.shapes,
+            world.team.turns, taken, steps, substeps, dt / substeps, world.state, world.params, world.shapes,
             world.gravity if plan.gravity else None, wrench.reshape(-1, 6), *own_arguments(world, k),
         )
-        for k, (first, last) in enumerate(world.pool.slices)
+        for k, taken in enumerate(world.team.taken)
     ]  # fmt: skip
     machine_code = _machine_code(kernel, (plan.key, len(world.walls)), argument_lists[0])
     calls = [partial(machine_code, *arguments) for arguments in argument_lists]
-    if plan.many and plan.sleeping:
-        return [_unless_asleep(world, wrench, worlds, call) for worlds, call in zip(world.pool.slices, calls)]
+    if plan.many and plan.sleeping and world.team.size == 1:
+        return [_unless_asleep(world, wrench, calls[0])]
     return calls
 
 
-def _unless_asleep(world: World, wrench: np.ndarray, worlds: tuple[int, int], call: Callable) -> Callable[[], None]:
-    """A call that is not made where every body of its worlds sleeps: handing over its arguments alone takes 2 µs."""
-    sleep = world.sleep_of_kernel()
-    first, last = worlds[0] * world.body_count, worlds[1] * world.body_count
-    arguments = (first, last, wrench.reshape(-1, 6), sleep, world.report_table[worlds[0] : worlds[1]])
+def _unless_asleep(world: World, wrench: np.ndarray, call: Callable) -> Callable[[], None]:
+    """A call that is not made where every body sleeps: handing over its arguments alone takes 2 µs."""
+    arguments = (0, world.worlds * world.body_count, wrench.reshape(-1, 6), world.sleep_of_kernel(), world.report_table)
     asleep = _machine_code(sleep_through, ("sleep_through",), arguments)
 
     def step():
@@ -122,7 +147,7 @@ def _unless_asleep(world: World, wrench: np.ndarray, worlds: tuple[int, int], ca
 
 
 def _step_of(plan: Plan) -> tuple[Callable, Callable[[World, int], tuple]]:
-    """The step kernel of a plan, and what gives the arguments that it alone has for one slice of the batch."""
+    """The step kernel of a plan, and what gives the arguments that it alone has for one thread."""
     if plan.many:
         return step_many, _many_arguments
     if plan.linked:
@@ -165,29 +190,9 @@ def _machine_code(kernel, key: tuple, arguments: tuple) -> Callable[..., None]:
     Calling it directly leaves out Numba's dispatcher, which would find out the types of all arguments each time.
     """
     if key not in _COMPILED:
-        with _compiling():
+        with compiling():
             _COMPILED[key] = kernel.compile(tuple(map(numba.typeof, arguments)))
     return _COMPILED[key]
 
 
 _COMPILED: dict[tuple, Callable[..., None]] = {}
-
-
-@contextmanager
-def _compiling():
-    """Say on standard error that a kernel is being compiled, if it takes long enough to notice.
-
-    The garbage collector waits: it would walk through Numba's growing tables again and again, a tenth of the time.
-    """
-    text = "rigid-env: compiling the kernel of this scene, once (it is kept for later runs) ..."
-    timer = threading.Timer(COMPILE_NOTICE, lambda: print(text, file=sys.stderr, flush=True))
-    timer.daemon = True
-    was_collecting = gc.isenabled()
-    timer.start()
-    gc.disable()
-    try:
-        yield
-    finally:
-        timer.cancel()
-        if was_collecting:
-            gc.enable()

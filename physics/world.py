@@ -25,7 +25,7 @@ from physics.plan import SHAPE_CODES, make_plan
 from physics.report import StepReport
 from physics.scene import Scene
 from physics.stepper import kernel_calls
-from physics.threads import SlicePool
+from physics.threads import Team
 
 if TYPE_CHECKING:
     from physics.recorder import Recorder
@@ -58,7 +58,7 @@ class World:
     accuracy : str or Accuracy
         ``fast``, ``balanced``, ``precise``, ``reference``, or a `physics.Accuracy`.
     threads : int
-        Threads that share a step; the worlds are cut into slices for them.
+        Threads that share a step; each takes the next few worlds until none is left.
 
     Attributes
     ----------
@@ -124,16 +124,16 @@ class World:
         self._bind_views()
 
     def _prepare_threads(self) -> None:
-        self.pool = SlicePool(self.threads, self.worlds)
+        self.team = Team(self.threads, self.worlds)
         declare(self.plan.terms)
         self.scratch = [
-            allocation.make_scratch(self.scene, self.plan, self.walls, self.accuracy) for _ in self.pool.slices
+            allocation.make_scratch(self.scene, self.plan, self.walls, self.accuracy) for _ in range(self.team.size)
         ]
         self.motions = [
             make_motion(len(self.walls), self.plan.features, self.accuracy.collisions == "sequential")
             if self.plan.events
             else None
-            for _ in self.pool.slices
+            for _ in range(self.team.size)
         ]
         self._wrench = self.no_wrench()
         self._calls: list[Callable[[], None]] = []
@@ -203,7 +203,7 @@ class World:
         if self.plan.fields:
             for scratch in self.scratch:
                 body_records(scratch)["call_start"] = self.time
-        self.pool.run(calls)
+        self.team.run(calls)
         self.time += duration
 
     def no_wrench(self) -> np.ndarray:
@@ -351,7 +351,7 @@ class World:
     def __getstate__(self):
         kept = dict(vars(self))
         views = ("pos", "quat", "linvel", "angvel")
-        for name in ("plan", "pool", "scratch", "motions", "_wrench", "_calls", "_bound_for", *views):
+        for name in ("plan", "team", "scratch", "motions", "_wrench", "_calls", "_bound_for", *views):
             del kept[name]
         return kept
 

@@ -41,7 +41,6 @@ class RigidEnv(gym.Env):
         self.action_space = action_space()
         self._view = View(render_mode, width, height, self.metadata["render_fps"], self.task_class.__name__)
         self._world = np.zeros(1, dtype=np.int64)
-        self._obs_shape = (1, len(self.task.observation))
         self._has_reset = False
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None):
@@ -61,12 +60,11 @@ class RigidEnv(gym.Env):
         """
         super().reset(seed=seed)
         self.task.generators[0] = self.np_random
-        obs = np.empty(self._obs_shape, dtype=np.float32)
-        self.task.begin(self._world, obs, options)
+        self.task.begin(self._world, options)
         self._has_reset = True
         if self.render_mode == "human":
             self.render()
-        return obs[0], self._info(self.task.outcome[0].tolist())
+        return self.task.obs[0].copy(), self._info(self.task.outcome[0].tolist())
 
     def step(self, action):
         """Hold an action for one control step; see `gymnasium.Env.step`.
@@ -91,13 +89,12 @@ class RigidEnv(gym.Env):
         action = np.asarray(action)
         if action.shape != (AXES,):
             raise ValueError(f"action has shape {action.shape}; allowed is shape ({AXES},)")
-        obs = np.empty(self._obs_shape, dtype=np.float32)
-        self.task.step(action[None], obs)
+        self.task.step(action[None])
         outcome = self.task.outcome[0].tolist()
         info = self._info(outcome)
         if self.render_mode == "human":
             self.render()
-        return obs[0], outcome[0], info["is_success"], False, info
+        return self.task.obs[0].copy(), outcome[0], info["is_success"], False, info
 
     def _info(self, outcome: list[float]) -> dict[str, Any]:
         _, success, error, speed, spin = outcome

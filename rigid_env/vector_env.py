@@ -80,7 +80,6 @@ class RigidVectorEnv(gym.vector.VectorEnv):
         self._elapsed = np.zeros(num_envs, dtype=np.int64)
         self._ended = np.zeros(num_envs, dtype=np.bool_)
         self._waiting = np.ones(num_envs, dtype=np.bool_)  # for their first reset
-        self._last_obs = np.zeros(self.observation_space.shape, dtype=np.float32)
 
     @property
     def np_random(self) -> tuple[np.random.Generator | None, ...]:
@@ -119,12 +118,10 @@ class RigidVectorEnv(gym.vector.VectorEnv):
         for i in rows:
             if seeds[i] is not None or self.task.generators[i] is None:
                 self._seeds[i] = self.task.seed(i, seeds[i])
-        obs = self._last_obs.copy()
-        self._begin(rows, obs, options)
+        self._begin(rows, options)
         self._waiting[rows] = False
-        self._last_obs[...] = obs
         self._show()
-        return obs, self._infos(mask)
+        return self.task.obs.copy(), self._infos(mask)
 
     def step(self, actions) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, dict[str, Any]]:
         """Hold actions for one control step; see `gymnasium.vector.VectorEnv.step`.
@@ -147,9 +144,8 @@ class RigidVectorEnv(gym.vector.VectorEnv):
             Before the first reset; in mode ``Disabled`` also after the end of an episode.
         """
         self._check_ready()
-        task, everyone = self.task, np.ones(self.num_envs, dtype=np.bool_)
-        obs = np.empty(self._last_obs.shape, dtype=np.float32)
-        task.step(actions, obs)
+        task = self.task
+        task.step(actions)
         self._elapsed += 1
         rewards = task.outcome[:, col.REWARD].copy()
         terminations = task.outcome[:, col.SUCCESS] > 0.0
@@ -164,14 +160,13 @@ class RigidVectorEnv(gym.vector.VectorEnv):
         if self.autoreset_mode is AutoresetMode.SAME_STEP:
             rows = np.flatnonzero(self._ended)
             if len(rows):
-                finals = self._finals(rows, obs)
+                finals = self._finals(rows)
         if self.autoreset_mode is not AutoresetMode.DISABLED and len(rows):
             ended = self._ended
-            self._begin(rows, obs, {})
+            self._begin(rows, {})
             self._ended = ended & (self.autoreset_mode is AutoresetMode.NEXT_STEP)
-        self._last_obs[...] = obs
         self._show()
-        return obs, rewards, terminations, truncations, {**self._infos(everyone), **finals}
+        return task.obs.copy(), rewards, terminations, truncations, {**self._infos(), **finals}
 
     # --- parts of these -----------------------------------------------------------------------------------
 
@@ -184,29 +179,34 @@ class RigidVectorEnv(gym.vector.VectorEnv):
                 "is disabled: reset(options={'reset_mask': terminations | truncations}) first"
             )
 
-    def _begin(self, rows: np.ndarray, obs: np.ndarray, options: dict[str, Any]) -> None:
-        self.task.begin(rows, obs, options)
+    def _begin(self, rows: np.ndarray, options: dict[str, Any]) -> None:
+        self.task.begin(rows, options)
         self._elapsed[rows] = 0
         self._ended[rows] = False
 
-    def _infos(self, mask: np.ndarray) -> dict[str, Any]:
+    def _infos(self, mask: np.ndarray | None = None) -> dict[str, Any]:
         """Info arrays with their masks, as `VectorEnv._add_info` makes them; zero where the mask is False."""
         outcome = self.task.outcome
         infos = {
-            "is_success": (outcome[:, col.SUCCESS] > 0.0) & mask,
-            self.task.error_name: np.where(mask, outcome[:, col.ERROR], 0.0),
-            "speed": np.where(mask, outcome[:, col.SPEED], 0.0),
-            "spin": np.where(mask, outcome[:, col.SPIN], 0.0),
-            "physics_status": self.task.status * mask,
+            "is_success": outcome[:, col.SUCCESS] > 0.0,
+            self.task.error_name: outcome[:, col.ERROR].copy(),
+            "speed": outcome[:, col.SPEED].copy(),
+            "spin": outcome[:, col.SPIN].copy(),
+            "physics_status": self.task.status.copy(),
         }
+        if mask is None:
+            mask = np.ones(self.num_envs, dtype=np.bool_)
+        else:
+            for values in infos.values():
+                values[~mask] = 0
         infos.update({f"_{key}": mask.copy() for key in tuple(infos)})
         return infos
 
-    def _finals(self, rows: np.ndarray, obs: np.ndarray) -> dict[str, Any]:
+    def _finals(self, rows: np.ndarray) -> dict[str, Any]:
         """`final_obs` and `final_info` of the episodes that end, before their worlds start anew."""
         final_obs = np.full(self.num_envs, None, dtype=object)
         for i in rows:
-            final_obs[i] = obs[i].copy()
+            final_obs[i] = self.task.obs[i].copy()
         mask = self._ended
         return {
             "final_obs": final_obs,

@@ -18,6 +18,7 @@ from physics.kernels.fields.loads import bind_fields, set_clock
 from physics.kernels.fields.terms import Term
 from physics.kernels.linked_smooth import PLANES, SIZE, step_smooth
 from physics.kernels.step import coast
+from physics.kernels.turns import begin, next_world
 from physics.kernels.workspace import body_fields
 
 
@@ -53,16 +54,20 @@ def _substep(h, gyroscopic, tilted, scheme, linked):
 
 @kernel
 def step_linked(
-    first, last, steps, substeps, h, state, params, shapes, gravity, wrench, gyroscopic, tilted, scheme, held, events,
+    turns, taken, steps, substeps, h, state, params, shapes, gravity, wrench, gyroscopic, tilted, scheme, held, events,
     report, linked,
 ):  # fmt: skip
-    """Advance the worlds first <= world < last by `steps` steps of `substeps` substeps of h seconds each.
+    """Advance the worlds that no other thread has taken by `steps` steps of `substeps` substeps of h seconds each.
 
     Of the switches `held` and `events` one is on: loads held over the step, or motion to the tolerance. A world in
     which a new state is not finite keeps the last good one, and its report counts the fault.
     """
     bodies = shapes.shape[0]
-    for world in range(first, last):
+    world = begin(taken)
+    while True:
+        world = next_world(world, turns, taken)
+        if world < 0:
+            break
         for c in range(at.REPORT_SIZE):
             report[world, c] = 0.0
         for b in range(bodies):

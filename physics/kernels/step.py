@@ -42,6 +42,7 @@ from physics.kernels.quaternion import to_matrix
 from physics.kernels.restraint import kinetic_energy
 from physics.kernels.sleep import falls_asleep, laid_down, sleeps_on
 from physics.kernels.stages import impact, store_warm_start, touch
+from physics.kernels.turns import begin, next_world
 
 # Trials of one time of impact: a secant, then parabolas through the last three. Three are usual.
 IMPACT_TRIALS = 16
@@ -205,10 +206,10 @@ def substep(y, h, friction, smooth, gyroscopic, tilted, pivots, scheme, memory, 
 
 @kernel
 def step_worlds(
-    first, last, steps, substeps, h, state, params, shapes, gravity, wrench, contact, friction, smooth, restitution,
+    turns, taken, steps, substeps, h, state, params, shapes, gravity, wrench, contact, friction, smooth, restitution,
     gyroscopic, tilted, pivots, scheme, sleep, memory, report, scratch,
 ):  # fmt: skip
-    """Advance the worlds first <= world < last by `steps` steps of `substeps` substeps of h seconds each.
+    """Advance the worlds that no other thread has taken by `steps` steps of `substeps` substeps of h seconds each.
 
     A body in flight looks for walls only when it could be near one (`clearance`), one that sleeps for nothing (`sleep`,
     None where the scene does not declare it). A body whose new state is not finite keeps the old one, and its world's
@@ -216,7 +217,11 @@ def step_worlds(
     """
     work = scratch[0]
     bodies = shapes.shape[0]
-    for world in range(first, last):
+    world = begin(taken)
+    while True:
+        world = next_world(world, turns, taken)
+        if world < 0:
+            break
         for c in range(at.REPORT_SIZE):
             report[world, c] = 0.0
         for b in range(bodies):

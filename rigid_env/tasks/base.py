@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Callable
 from typing import ClassVar
 
 import numpy as np
@@ -10,7 +11,9 @@ from gymnasium.utils import seeding
 
 import physics
 from physics import checks
+from physics.machine_code import bound
 from physics.report import gravest
+from physics.threads import listed
 from rigid_env.tasks import layout as col
 from rigid_env.tasks.area import Area
 from rigid_env.tasks.entries import Entry
@@ -67,6 +70,7 @@ class Task(ABC):
     generators : list of numpy.random.Generator or None
         One per world: an episode does not depend on the batch it runs in.
     record : (worlds, RECORD_SIZE) float64
+    obs : (worlds, entries) float32
     outcome : (worlds, OUTCOME_SIZE) float64
         Of the last step, renewed in place.
     status : (worlds,) int64
@@ -108,14 +112,14 @@ class Task(ABC):
         self.world = physics.World(self._scene(), worlds=worlds, dt=dt, accuracy=accuracy, threads=threads)
         self.generators: list[np.random.Generator | None] = [None] * worlds
         self.record = np.zeros((worlds, col.RECORD_SIZE))
+        self.obs = np.zeros((worlds, len(self.observation)), dtype=np.float32)
         self.outcome = np.zeros((worlds, col.OUTCOME_SIZE))
         self.status = np.zeros(worlds, dtype=np.int64)
-        self._advance = physics.Stepper(self.world, self.frame_skip)
+        self._advance = physics.Stepper(self.world, self.frame_skip, then=self._observer)
         if dump_faults is not None:
             physics.Recorder(self.world, folder=dump_faults)
         self._actions = np.zeros((worlds, AXES))
-        self._rows = np.arange(worlds)
-        self._note_parameters(self._rows, self.parameters.draw(np.full((worlds, DRAW_COUNT), 0.5)))
+        self._note_parameters(np.arange(worlds), self.parameters.draw(np.full((worlds, DRAW_COUNT), 0.5)))
 
     @property
     def worlds(self) -> int:
@@ -167,15 +171,13 @@ class Task(ABC):
         self.generators[world], used = seeding.np_random(seed)
         return used
 
-    def begin(self, rows: np.ndarray, obs: np.ndarray, options: dict | None = None) -> None:
+    def begin(self, rows: np.ndarray, options: dict | None = None) -> None:
         """Start a new episode in the worlds `rows`.
 
         Parameters
         ----------
         rows : (n,) int64
             Worlds.
-        obs : (worlds, entries) float32, out
-            Rows of these worlds are written.
         options : dict, optional
             Fix what is otherwise drawn, each for all `rows` or one per row: ``place`` (2,) x and z of the
             centre [m], ``yaw`` () [rad], ``face`` () the face that is down, and the task's own.
@@ -203,7 +205,7 @@ class Task(ABC):
         self._note_parameters(rows, values)
         self.wrench[rows] = 0.0
         self.status[rows] = physics.Status.OK
-        self._kernel(rows, self.world.state, self.record, self.world.walls, None, obs, self.outcome)
+        self._kernel(listed(rows), self.world.state, self.record, self.world.walls, None, self.obs, self.outcome)
 
     def _apply_start_options(self, starts: np.ndarray, options: dict) -> None:
         n = len(starts)
@@ -244,14 +246,13 @@ class Task(ABC):
 
     # --- control steps ------------------------------------------------------------------------------------
 
-    def step(self, actions, obs: np.ndarray) -> None:
+    def step(self, actions) -> None:
         """Hold the wrenches of `actions` for `frame_skip` physics steps, then observe.
 
         Parameters
         ----------
         actions : (worlds, 6) array_like
             Clipped to ±1; see `wrenches`.
-        obs : (worlds, entries) float32, out
 
         Raises
         ------
@@ -267,7 +268,13 @@ class Task(ABC):
             raise ValueError(f"action of world {bad} is {self._actions[bad].tolist()}; allowed are finite numbers")
         self._advance()
         gravest(self.world.report_table, self.status)
-        self._kernel(self._rows, self.world.state, self.record, self.world.walls, self._actions, obs, self.outcome)
+
+    def _observer(self, taken: np.ndarray) -> Callable[[], object]:
+        """What observes the worlds that a thread has stepped."""
+        world = self.world
+        return bound(
+            self._kernel, taken, world.state, self.record, world.walls, self._actions, self.obs, self.outcome
+        )  # fmt: skip
 
     # --- what a task is -----------------------------------------------------------------------------------
 

@@ -15,6 +15,7 @@ import math
 from physics.kernels import layout as at
 from physics.kernels.compiler import inlined, kernel
 from physics.kernels.quaternion import multiply, to_matrix
+from physics.kernels.turns import FIRST, TAKEN
 from rigid_env.tasks import layout as col
 
 AXES = 6  # of an action: force x, y, z, torque x, y, z
@@ -195,13 +196,13 @@ def conclude(world, is_met, potential, error, speed, spin, actions, record, outc
 
 
 @kernel
-def observe_reach(rows, state, record, walls, actions, obs, outcome):
-    """BlockReach: observation, reward and success of the worlds `rows`.
+def observe_reach(taken, state, record, walls, actions, obs, outcome):
+    """BlockReach: observation, reward and success of some worlds.
 
     Parameters
     ----------
-    rows : (n,) int64
-        Worlds to look at; the rest of the outputs is left alone.
+    taken : (FIRST + n or more,) int64
+        Worlds to look at, listed as in `physics.kernels.turns`; the rest of the outputs is left alone.
     state : (worlds, STATE_SIZE) float64
     record : (worlds, RECORD_SIZE) float64, in and out
         POTENTIAL and HOLD are renewed.
@@ -211,8 +212,8 @@ def observe_reach(rows, state, record, walls, actions, obs, outcome):
     obs : (worlds, 24) float32, out
     outcome : (worlds, OUTCOME_SIZE) float64, out
     """
-    for i in range(rows.shape[0]):
-        world = rows[i]
+    for i in range(taken[TAKEN]):
+        world = taken[FIRST + i]
         dx = record[world, col.GOAL] - state[world, at.POS]
         dz = record[world, col.GOAL + 1] - state[world, at.POS + 2]
         obs[world, 0] = clip(dx / LENGTH_SCALE, -LENGTH_BOUND, LENGTH_BOUND)
@@ -232,15 +233,15 @@ def observe_reach(rows, state, record, walls, actions, obs, outcome):
 
 
 @kernel
-def observe_reorient(rows, state, record, walls, actions, obs, outcome):
-    """BlockReorient: observation, reward and success of the worlds `rows`; arguments as `observe_reach`.
+def observe_reorient(taken, state, record, walls, actions, obs, outcome):
+    """BlockReorient: observation, reward and success of some worlds; arguments as `observe_reach`.
 
     The body axes are told as seen from the goal: first the outward normal of the target face, then the next
     two body axes in cyclic order, with the half edges in the same order; the policy need not know which face
     it is. obs is (worlds, 23) float32.
     """
-    for i in range(rows.shape[0]):
-        world = rows[i]
+    for i in range(taken[TAKEN]):
+        world = taken[FIRST + i]
         face = int(record[world, col.FACE])
         axis = face // 2
         sign = 1.0 if face % 2 == 1 else -1.0

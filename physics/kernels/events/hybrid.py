@@ -43,6 +43,7 @@ from physics.kernels.laws import bind_laws
 from physics.kernels.resist import without_gain
 from physics.kernels.solve import solve_contacts
 from physics.kernels.stages import note_solve
+from physics.kernels.turns import begin, next_world
 
 # The next regime is looked for so much later, in the time radius / (speed + √(radius acceleration)): what a guard
 # foretold is then above rounding, and the body has hardly moved. FURTHER times as far when it was not.
@@ -203,16 +204,20 @@ def advance(y, h, friction, smooth, gyroscopic, tilted, pivots, work, motion, me
 
 @kernel
 def step_events(
-    first, last, steps, substeps, h, state, params, shapes, gravity, wrench, contact, friction, smooth, restitution,
+    turns, taken, steps, substeps, h, state, params, shapes, gravity, wrench, contact, friction, smooth, restitution,
     gyroscopic, tilted, pivots, memory, report, scratch, motions, log, counts,
 ):  # fmt: skip
-    """Advance the worlds first <= world < last by `steps` steps of `substeps` parts of h seconds each.
+    """Advance the worlds that no other thread has taken by `steps` steps of `substeps` parts of h seconds each.
 
     Events go to `log` (rows, room, EVENT_SIZE), their number to `counts` (rows,); otherwise as `step.step_worlds`.
     """
     work, motion = scratch[0], motions[0]
     bodies = shapes.shape[0]
-    for world in range(first, last):
+    world = begin(taken)
+    while True:
+        world = next_world(world, turns, taken)
+        if world < 0:
+            break
         for c in range(at.REPORT_SIZE):
             report[world, c] = 0.0
         for b in range(bodies):

@@ -18,19 +18,24 @@ from physics.kernels.many.contacts import put
 from physics.kernels.many.refine import refine
 from physics.kernels.many.sleep import all_sleep, doze, sleep_on, wake_world
 from physics.kernels.many.substep import substep_world
+from physics.kernels.turns import begin, next_world
 
 
 @kernel
 def step_many(
-    first, last, steps, substeps, h, state, params, shapes, gravity, wrench, friction, restitution, gyroscopic,
+    turns, taken, steps, substeps, h, state, params, shapes, gravity, wrench, friction, restitution, gyroscopic,
     tilted, ellipsoids, hulls, scheme, refined, sleep, memory, report, many,
 ):  # fmt: skip
-    """Advance the worlds first <= world < last by `steps` steps of `substeps` substeps of h seconds each.
+    """Advance the worlds that no other thread has taken by `steps` steps of `substeps` substeps of h seconds each.
 
     A world in which a new state is not finite keeps the last good one, and its report counts the fault.
     """
     bodies = shapes.shape[0]
-    for world in range(first, last):
+    world = begin(taken)
+    while True:
+        world = next_world(world, turns, taken)
+        if world < 0:
+            break
         for c in range(at.REPORT_SIZE):
             report[world, c] = 0.0
         if sleep is not None and sleep_on(world, bodies, wrench, sleep):
