@@ -15,11 +15,17 @@ from physics.kernels.events.resting import pose_contact
 from physics.kernels.events.smooth import put_state
 from physics.kernels.laws import TANGENTIAL, if_law
 from physics.kernels.resist import aim_at
+from physics.kernels.restraint import ROUNDING, between, kinetic_energy, rebound_share
 from physics.kernels.slide import SLIDE
+from physics.kernels.solve import solve_contacts
+from physics.kernels.stages import aim_plastic, note_solve
 
 # Impacts in turn at one moment at most. Speeds fall by a constant factor from round to round where they do not end:
 # cos²φ between two plastic walls whose normals are φ apart or π - φ.
 TURNS = 1000
+
+# Residual of a contact problem that is as good as none: rounding of forces that differ by five orders.
+SOLVED = 1.0e-11
 
 # No contact alone.
 ALL = -1
@@ -114,6 +120,30 @@ def aim_collision(n, y, tilted, motion, work):
             bouncing, found = bouncing + 1, i
     if bouncing == 1:
         aim_at(found, y, tilted, work)
+
+
+@kernel
+def within_energy(n, y, friction, smooth, tilted, pivots, solved, P, work, motion, report):
+    """What `solve_contacts` gave for a collision with friction, or as much of its rebound as there is energy for.
+
+    Impulses are those of what is returned. See `physics.kernels.restraint`.
+    """
+    _, q, v, L = y
+    v1, L1 = solved[0], solved[1]
+    before, full = kinetic_energy(q, v, L, work, tilted), kinetic_energy(q, v1, L1, work, tilted)
+    if not full > (1.0 + ROUNDING) * before:
+        return solved
+    for k in range(3 * n):
+        motion.rebound[k] = work.impulse[k]
+    note_solve(report, work.world, *solved[2:], max(work.tolerance, SOLVED))
+    aim_plastic(n, work)
+    v0, L0, residual, sweeps, method = solve_contacts(n, friction, smooth, pivots, v, L, P, work)
+    plastic = kinetic_energy(q, v0, L0, work, tilted)
+    middle = kinetic_energy(q, between(v0, v1, 0.5), between(L0, L1, 0.5), work, tilted)
+    s = rebound_share(before, plastic, full, middle)
+    for k in range(3 * n):
+        work.impulse[k] += s * (motion.rebound[k] - work.impulse[k])
+    return between(v0, v1, s), between(L0, L1, s), residual, sweeps, method
 
 
 @kernel

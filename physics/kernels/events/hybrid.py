@@ -29,7 +29,15 @@ from physics.kernels.compiler import kernel
 from physics.kernels.events import log as ev
 from physics.kernels.events.air import fly_freely, fly_to_wall
 from physics.kernels.events.candidates import ASKS, ASKS_SLIDING, COLLIDES, FLIES, IS_LOST, RESTS
-from physics.kernels.events.collide import aim_collision, carry_on, log_impulses, pose_collision, pose_jump
+from physics.kernels.events.collide import (
+    SOLVED,
+    aim_collision,
+    carry_on,
+    log_impulses,
+    pose_collision,
+    pose_jump,
+    within_energy,
+)
 from physics.kernels.events.guards import CONE, LOAD, NO_GUARD, NO_STEP, PUSH
 from physics.kernels.events.move import body_speed, look_ahead, move
 from physics.kernels.events.regime import find_regime
@@ -69,9 +77,6 @@ HOP = 4.0
 # else make two impacts of that of an edge, with another outcome.
 TOGETHER = 1.0e-10
 TINY = 1.0e-300
-
-# Residual of a contact problem that is as good as none: rounding of forces that differ by five orders.
-SOLVED = 1.0e-11
 
 NOTHING = -1
 
@@ -145,6 +150,10 @@ def advance(y, h, friction, smooth, gyroscopic, tilted, pivots, work, motion, me
             solved = solve_contacts(n, friction, smooth, pivots, v, L, P, work)
             if what == COLLIDES:
                 solved = without_gain(n, friction, smooth, pivots, v, L, solved, P, work)
+                if friction is not None and work.restitution > 0.0:
+                    solved = within_energy(
+                        n, y, friction, smooth, tilted, pivots, solved, P, work, motion, report
+                    )  # fmt: skip
             v, L, residual, sweeps, method = solved
             note_solve(report, world, residual, sweeps, method, max(work.tolerance, SOLVED))
         if is_asked:

@@ -38,6 +38,7 @@ def motion_dtype(wall_count: int, features: int) -> np.dtype:
         ("ahead", f),  # time by which the next regime is looked for [s]
         ("step", f),  # length of the last smooth step [s]
         ("left_out", f),  # time that a sequence of bounces would have taken on [s]
+        ("rebound", f, (3 * n_slots,)),  # impulses of a rebound that there is not enough energy for [N s]
         ("count", i),  # contacts that act
         ("slot", i, (n,)),  # wall * features + feature
         ("holds", i, (n,)),  # 1: no velocity at all; 0: slides
