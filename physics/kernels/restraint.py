@@ -54,6 +54,19 @@ def between(a, b, s):
     return (a[0] + s * (b[0] - a[0]), a[1] + s * (b[1] - a[1]), a[2] + s * (b[2] - a[2]))
 
 
+@inlined
+def part_of_rebound(q, before, plastic, full, work, tilted):
+    """The (v, L) between those of a plastic impact and of a full rebound that there is energy for, and its share s.
+
+    `before` is the energy before the impact [J], which the full rebound would raise.
+    """
+    (v0, L0), (v1, L1) = plastic, full
+    middle = kinetic_energy(q, between(v0, v1, 0.5), between(L0, L1, 0.5), work, tilted)
+    ends = kinetic_energy(q, v0, L0, work, tilted), kinetic_energy(q, v1, L1, work, tilted)
+    s = rebound_share(before, ends[0], ends[1], middle)
+    return between(v0, v1, s), between(L0, L1, s), s
+
+
 @kernel
 def shortened(n, friction, before, w, solved, free, R, work):
     """What `solve_contacts` gave for `free` (v, L), with impulses so short that they give no energy.

@@ -14,7 +14,7 @@ from physics.kernels.contact import aim_impact, aim_rest
 from physics.kernels.flight import drift
 from physics.kernels.laws import STIFFNESS, if_law
 from physics.kernels.resist import aim_tangential, resist_turning, without_gain
-from physics.kernels.restraint import ROUNDING, between, kinetic_energy, rebound_share, shortened
+from physics.kernels.restraint import ROUNDING, kinetic_energy, part_of_rebound, shortened
 from physics.kernels.slide import SLIDE
 from physics.kernels.slip import has_turned_round, oppose_end_slip, oppose_mean_slip, without_gift
 from physics.kernels.solve import PIVOTING, solve_contacts
@@ -179,10 +179,7 @@ def impact(n, y, h, friction, smooth, tilted, pivots, report, work):
                 solved = shortened(n, friction, v, turning(R, L, work.J), solved, (v, L), R, work)
             v0, L0, residual, sweeps, method = solved
             note_solve(report, work.world, residual, sweeps, method, work.tolerance)
-            plastic = kinetic_energy(q, v0, L0, work, tilted)
-            middle = kinetic_energy(q, between(v0, v1, 0.5), between(L0, L1, 0.5), work, tilted)
-            s = rebound_share(before, plastic, full, middle)
-            return x, q, between(v0, v1, s), between(L0, L1, s)
+            v1, L1, _ = part_of_rebound(q, before, (v0, L0), (v1, L1), work, tilted)
     return x, q, v1, L1
 
 

@@ -94,11 +94,7 @@ class WholeLowering(NativeLowering):
     """The pass in which a kernel is lowered as Python calls it."""
 
     _name = "whole_lowering"
-
-    @property
-    def lowering_class(self):
-        """What lowers one function."""
-        return _KernelLower
+    lowering_class = _KernelLower
 
 
 @register_pass(mutates_CFG=True, analysis_only=False)
@@ -106,11 +102,7 @@ class PartLowering(WholeLowering):
     """The pass in which a kernel is lowered as other kernels call it."""
 
     _name = "part_lowering"
-
-    @property
-    def lowering_class(self):
-        """What lowers one function."""
-        return _ValueLower
+    lowering_class = _ValueLower
 
     def run_pass(self, state):
         """Lower a kernel; one that may raise an exception gives a status, as all do whose indices are checked."""

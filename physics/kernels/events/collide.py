@@ -15,7 +15,7 @@ from physics.kernels.events.resting import pose_contact
 from physics.kernels.events.smooth import put_state
 from physics.kernels.laws import TANGENTIAL, if_law
 from physics.kernels.resist import aim_at
-from physics.kernels.restraint import ROUNDING, between, kinetic_energy, rebound_share
+from physics.kernels.restraint import ROUNDING, kinetic_energy, part_of_rebound
 from physics.kernels.slide import SLIDE
 from physics.kernels.solve import solve_contacts
 from physics.kernels.stages import aim_plastic, note_solve
@@ -138,12 +138,10 @@ def within_energy(n, y, friction, smooth, tilted, pivots, solved, P, work, motio
     note_solve(report, work.world, *solved[2:], max(work.tolerance, SOLVED))
     aim_plastic(n, work)
     v0, L0, residual, sweeps, method = solve_contacts(n, friction, smooth, pivots, v, L, P, work)
-    plastic = kinetic_energy(q, v0, L0, work, tilted)
-    middle = kinetic_energy(q, between(v0, v1, 0.5), between(L0, L1, 0.5), work, tilted)
-    s = rebound_share(before, plastic, full, middle)
+    v, L, s = part_of_rebound(q, before, (v0, L0), (v1, L1), work, tilted)
     for k in range(3 * n):
         work.impulse[k] += s * (motion.rebound[k] - work.impulse[k])
-    return between(v0, v1, s), between(L0, L1, s), residual, sweeps, method
+    return v, L, residual, sweeps, method
 
 
 @kernel
