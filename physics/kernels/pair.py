@@ -17,7 +17,6 @@ from physics.kernels import quaternion as qt
 from physics.kernels.compiler import inlined, kernel
 from physics.kernels.compliance import give_way
 from physics.kernels.ellipse import friction_ratio
-from physics.kernels.patch import P, X, Y, contact_place, contact_target
 from physics.kernels.point import (
     LOST,
     SLID,
@@ -169,88 +168,56 @@ def solve_two(W1, W12, W2, b1, b2, mu, goal, x1, y1, x2, y2):
 
 
 @inlined
-def _free(i, u, w, work):
-    """Velocity of contact i without contact impulses, less its target."""
-    place, target = contact_place(i, work), contact_target(i, work)
-    f = point_velocity(place, u, w)
-    return f[0] - target[0], f[1] - target[1], f[2] - target[2]
+def contact_at(i, axes, u, w, work):
+    """Coordinates of contact i, its velocity without impulses less its target, and its impulse so far.
+
+    All (normal, tangents) in the stretched frame of the wall with these axes; u, w are the body's motion there. Without
+    friction there are no impulses so far.
+    """
+    arm, ratio = (work.arm[i, 0], work.arm[i, 1], work.arm[i, 2]), friction_ratio(work)
+    place = (ratio * qt.dot(axes[0], arm), ratio * qt.dot(axes[1], arm), qt.dot(axes[2], arm))
+    f, impulse = point_velocity(place, u, w), (0.0, 0.0, 0.0)
+    if work.mu > 0.0:
+        impulse = (work.impulse[3 * i], work.impulse[3 * i + 1], work.impulse[3 * i + 2] / ratio)
+    return place, (f[0] - work.target[i, 0], f[1] - work.target[i, 1], f[2] - ratio * work.target[i, 2]), impulse
 
 
 @inlined
-def _keep(i, p, work):
-    """Impulse of contact i to `work.patch`: P, and X, Y per normal impulse."""
-    work.patch[i, P] = p[0]
-    work.patch[i, X] = work.patch[i, Y] = 0.0
-    if p[0] > 0.0:
-        work.patch[i, X], work.patch[i, Y] = p[1] / p[0], p[2] / p[0]
+def solve_one(first, mu, goal, inv_mass, K, work):
+    """Impulse of a contact (see `contact_at`) that alone touches: (found, impulse, moment, residual [m/s])."""
+    r, b, impulse = first
+    W = give_way(block(r, r, inv_mass, friction_ratio(work), K), work)
+    x = y = 0.0
+    if mu > 0.0:
+        f = qt.matvec(W, impulse)
+        x, y = heading(b[1] + f[1], b[2] + f[2], mu)
+    what, p, miss = answer(W, b, mu, W[4] + W[8], goal, x, y, True)
+    return what != LOST, p, qt.cross(r, p), miss
 
 
 @inlined
-def _closes(n, count, p, m, u, w, inv_mass, K, work):
-    """Fastest approach of the contacts that are not active [m/s], after impulse p with moment m."""
-    after_u = (u[0] + inv_mass * p[0], u[1] + inv_mass * p[1], u[2] + inv_mass * p[2])
-    after_w = (
-        w[0] + (K[0] * m[0] + K[1] * m[1] + K[2] * m[2]),
-        w[1] + (K[1] * m[0] + K[3] * m[1] + K[4] * m[2]),
-        w[2] + (K[2] * m[0] + K[4] * m[1] + K[5] * m[2]),
-    )
-    fastest = 0.0
-    for i in range(n):
-        if count == 0 or (i != work.active[0] and (count < 2 or i != work.active[1])):
-            fastest = max(fastest, -_free(i, after_u, after_w, work)[0])
-    return fastest
-
-
-@inlined
-def solve_few(n, count, mu, goal, u, w, inv_mass, K, work):
-    """Impulses of the `count` <= 2 active contacts of `work.patch`, the other ones of the n open.
+def solve_pair(first, second, mu, goal, inv_mass, K, work):
+    """Impulses of two contacts (see `contact_at`).
 
     Returns
     -------
     found : bool
-    total : tuple of 5 floats
-        Impulses along the tangents [N s] and moments (normal, tangents) of all contacts.
-    push : float
-        Sum of the normal impulses [N s].
+    p, q : tuples of 3 floats
+        Of the first and of the second [N s].
+    moment : tuple of 3 floats
+        Of both.
     residual : float
         [m/s].
     """
-    impulse, ratio = work.impulse, friction_ratio(work)
-    width = 3 if mu > 0.0 else 1
-    p = m = q = (0.0, 0.0, 0.0)
-    found, miss = True, 0.0
-    if count > 0:
-        i = work.active[0]
-        r, b1 = contact_place(i, work), _free(i, u, w, work)
-        W1 = give_way(block(r, r, inv_mass, ratio, K), work)
-        x1 = y1 = 0.0
-        if count == 1:
-            if mu > 0.0:
-                k = width * i
-                f = qt.matvec(W1, (impulse[k], impulse[k + 1], impulse[k + 2] / ratio))
-                x1, y1 = heading(b1[1] + f[1], b1[2] + f[2], mu)
-            what, p, miss = answer(W1, b1, mu, W1[4] + W1[8], goal, x1, y1, True)
-            found = what != LOST
-        else:
-            j = work.active[1]
-            s, b2 = contact_place(j, work), _free(j, u, w, work)
-            W2, W12 = give_way(block(s, s, inv_mass, ratio, K), work), block(r, s, inv_mass, ratio, K)
-            x2 = y2 = 0.0
-            if mu > 0.0:
-                k, l = width * i, width * j
-                f = (impulse[k], impulse[k + 1], impulse[k + 2] / ratio)
-                g = (impulse[l], impulse[l + 1], impulse[l + 2] / ratio)
-                u1 = _plus(qt.matvec(W1, f), qt.matvec(W12, g))
-                u2 = _plus(qt.matvec(W2, g), qt.matvec(_transposed(W12), f))
-                x1, y1 = heading(b1[1] + u1[1], b1[2] + u1[2], mu)
-                x2, y2 = heading(b2[1] + u2[1], b2[2] + u2[2], mu)
-            found, p, q, miss = solve_two(W1, W12, W2, b1, b2, mu, goal, x1, y1, x2, y2)
-            _keep(j, q, work)
-            m = qt.cross(s, q)
-        _keep(i, p, work)
-        m = _plus(qt.cross(r, p), m)
-        p = _plus(p, q)
-    if found and count < n:
-        closing = _closes(n, count, p, m, u, w, inv_mass, K, work)
-        found, miss = closing <= goal, max(miss, closing)
-    return found, (p[1], p[2], m[0], m[1], m[2]), p[0], miss
+    (r, b1, f), (s, b2, g) = first, second
+    ratio = friction_ratio(work)
+    W1, W2 = give_way(block(r, r, inv_mass, ratio, K), work), give_way(block(s, s, inv_mass, ratio, K), work)
+    W12 = block(r, s, inv_mass, ratio, K)
+    x1 = y1 = x2 = y2 = 0.0
+    if mu > 0.0:
+        u1 = _plus(qt.matvec(W1, f), qt.matvec(W12, g))
+        u2 = _plus(qt.matvec(W2, g), qt.matvec(_transposed(W12), f))
+        x1, y1 = heading(b1[1] + u1[1], b1[2] + u1[2], mu)
+        x2, y2 = heading(b2[1] + u2[1], b2[2] + u2[2], mu)
+    found, p, q, miss = solve_two(W1, W12, W2, b1, b2, mu, goal, x1, y1, x2, y2)
+    return found, p, q, _plus(qt.cross(r, p), qt.cross(s, q)), miss

@@ -15,7 +15,8 @@ import math
 
 from physics.kernels.compiler import inlined, kernel
 from physics.kernels.ellipse import friction_ratio
-from physics.kernels.patch import MOBILITY, SPEED, TARGET_A, TARGET_B, A, B, C, P, X, Y, across_misses, resultant
+from physics.kernels.lanes import chosen, total
+from physics.kernels.patch import across_misses, lane, opposed, resultant
 
 # Rounds on ω_n at most: one when the sense is guessed right and all targets agree, two when it is the other sense.
 PIVOT_LIMIT = 3
@@ -25,54 +26,51 @@ NOT_FOUND, FOUND, SLIPS, PULLS = range(4)
 
 
 @inlined
-def _point_at(k, count, mu, center, wa, wb, spin, K, work):
+def _contact(k, patch):
+    """Coordinates of contact k and what is asked of it along the tangents."""
+    (c, a, b), (_, target_a, target_b), _ = patch
+    return (c[k], a[k], b[k]), (target_a[k], target_b[k])
+
+
+@inlined
+def _point_at(k, patch, on, mu, center, wa, wb, spin, K):
     """Directions of the contacts that slide about contact k, for ω_n = spin, and sums over all of them.
 
     Returns
     -------
+    slip : tuple of 3 lanes
+        As of `patch.respond`.
     x, y, f, g, h : tuples of 3 floats
         Of the impulse per normal impulse along the two tangents and of the response (ω_n, ω_a, ω_b) to it: sums with
         the weights 1, a, b (about the centroid).
     """
-    patch = work.patch
-    ck, ak, bk = patch[k, C], patch[k, A], patch[k, B]
-    x0 = x1 = x2 = y0 = y1 = y2 = 0.0
-    f0 = f1 = f2 = g0 = g1 = g2 = h0 = h1 = h2 = 0.0
-    for j in range(count):
-        i = work.active[j]
-        c, a, b = patch[i, C], patch[i, A], patch[i, B]
-        x = y = 0.0
-        if i != k:
-            ua = wb * (c - ck) - spin * (b - bk) + (patch[k, TARGET_A] - patch[i, TARGET_A])
-            ub = spin * (a - ak) - wa * (c - ck) + (patch[k, TARGET_B] - patch[i, TARGET_B])
-            size = math.sqrt(ua * ua + ub * ub)
-            s = 0.0
-            if size > 0.0:
-                s = -mu / size
-            x, y = s * ua, s * ub
-            patch[i, SPEED] = size
-        patch[i, X], patch[i, Y] = x, y
-        mn, ma, mb = a * y - b * x, b - c * y, c * x - a
-        f = K[0] * mn + K[1] * ma + K[2] * mb
-        g = K[1] * mn + K[3] * ma + K[4] * mb
-        h = K[2] * mn + K[4] * ma + K[5] * mb
-        a -= center[1]
-        b -= center[2]
-        x0, x1, x2 = x0 + x, x1 + a * x, x2 + b * x
-        y0, y1, y2 = y0 + y, y1 + a * y, y2 + b * y
-        f0, f1, f2 = f0 + f, f1 + a * f, f2 + b * f
-        g0, g1, g2 = g0 + g, g1 + a * g, g2 + b * g
-        h0, h1, h2 = h0 + h, h1 + a * h, h2 + b * h
-    return (x0, x1, x2), (y0, y1, y2), (f0, f1, f2), (g0, g1, g2), (h0, h1, h2)
+    (c, a, b), (_, target_a, target_b), _ = patch
+    (ck, ak, bk), (ta, tb) = _contact(k, patch)
+    ua = wb * (c - ck) - spin * (b - bk) + (ta - target_a)
+    ub = spin * (a - ak) - wa * (c - ck) + (tb - target_b)
+    x, y, size = slip = opposed(ua, ub, chosen(lane(k), 0.0, on), mu)
+    mn, ma, mb = a * y - b * x, on * b - c * y, c * x - on * a
+    f = K[0] * mn + K[1] * ma + K[2] * mb
+    g = K[1] * mn + K[3] * ma + K[4] * mb
+    h = K[2] * mn + K[4] * ma + K[5] * mb
+    a, b = a - center[1], b - center[2]
+    return (
+        slip,
+        (total(x), total(a * x), total(b * x)),
+        (total(y), total(a * y), total(b * y)),
+        (total(f), total(a * f), total(b * f)),
+        (total(g), total(a * g), total(b * g)),
+        (total(h), total(a * h), total(b * h)),
+    )
 
 
 @inlined
-def _hold_at(k, sums, y0, gain, u, w, wa, wb, inv_mass, K, work):
+def _hold_at(k, patch, sums, y0, gain, u, w, wa, wb, inv_mass, K, work):
     """Impulse (f_a, f_b) across contact k, (y_1, y_2), and the ω_n that they lead to."""
     x, y, f, g, h = sums
-    patch, ratio = work.patch, friction_ratio(work)
+    ratio = friction_ratio(work)
     mass_b = ratio * ratio * inv_mass
-    ck, ak, bk = patch[k, C], patch[k, A], patch[k, B]
+    (ck, ak, bk), (ta, tb) = _contact(k, patch)
     # Response (ω_n, ω_a, ω_b) to f_a and to f_b.
     pn, pa, pb = ck * K[2] - bk * K[0], ck * K[4] - bk * K[1], ck * K[5] - bk * K[2]
     qn, qa, qb = ak * K[0] - ck * K[1], ak * K[1] - ck * K[3], ak * K[2] - ck * K[4]
@@ -87,21 +85,23 @@ def _hold_at(k, sums, y0, gain, u, w, wa, wb, inv_mass, K, work):
     mab = -inv_mass * (x[1] * e12 + x[2] * e22) - bk * wfb
     mba = -mass_b * (y[1] * e11 + y[2] * e21) + ak * wfa
     mbb = mass_b * (1.0 - y[1] * e12 - y[2] * e22) + ak * wfb
-    va = patch[k, TARGET_A] - u[1] - wb * ck - inv_mass * (x[0] * y0 + x[1] * r1 + x[2] * r2) + free * bk
-    vb = patch[k, TARGET_B] - u[2] + wa * ck - mass_b * (y[0] * y0 + y[1] * r1 + y[2] * r2) - free * ak
+    va = ta - u[1] - wb * ck - inv_mass * (x[0] * y0 + x[1] * r1 + x[2] * r2) + free * bk
+    vb = tb - u[2] + wa * ck - mass_b * (y[0] * y0 + y[1] * r1 + y[2] * r2) - free * ak
     s = 1.0 / (maa * mbb - mab * mba)
     fa, fb = s * (mbb * va - mab * vb), s * (maa * vb - mba * va)
     return (fa, fb), (r1 - e11 * fa - e12 * fb, r2 - e21 * fa - e22 * fb), free + wfa * fa + wfb * fb
 
 
 @kernel
-def turn_about(k, count, mu, goal, center, y0, gain, u, w, wa, wb, spin, inv_mass, K, work):
+def turn_about(k, patch, on, mu, goal, center, y0, gain, u, w, wa, wb, spin, inv_mass, K, work):
     """Impulses with which contact k holds and the other active contacts slide.
 
     Parameters
     ----------
     k : int
         The contact.
+    patch, on
+        Of the contacts (`patch`).
     center, y0, gain, u, w, wa, wb, K
         As in `slide.slide_patch`.
     spin : float
@@ -112,7 +112,9 @@ def turn_about(k, count, mu, goal, center, y0, gain, u, w, wa, wb, spin, inv_mas
     what : int
         FOUND; SLIPS: contact k cannot hold; PULLS: an active contact would have to pull; NOT_FOUND.
     loser : int
-        Place of the active contact that pulls most.
+        The active contact that pulls most.
+    impulses : tuple of 3 lanes
+        Of the contacts, when found (normal, tangents).
     total : tuple of 5 floats
         Impulses along the tangents and moments of all contacts.
     miss : float
@@ -120,31 +122,28 @@ def turn_about(k, count, mu, goal, center, y0, gain, u, w, wa, wb, spin, inv_mas
     motion : tuple of 3 floats
         Planar motion (v_a, v_b, ω_n): where contact k slips, just off the pivot.
     """
-    patch = work.patch
-    ck, ak, bk = patch[k, C], patch[k, A], patch[k, B]
+    (ck, ak, bk), (ta, tb) = _contact(k, patch)
     none, still = (0.0, 0.0, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
-    patch[k, SPEED] = 0.0
     for _ in range(PIVOT_LIMIT):
-        sums = _point_at(k, count, mu, center, wa, wb, spin, K, work)
-        (fa, fb), y, turned = _hold_at(k, sums, y0, gain, u, w, wa, wb, inv_mass, K, work)
-        loser, (sa, sb, tn, ta, tb) = resultant(count, center, y0, y, work)
-        total = (sa + fa, sb + fb, tn + (ak * fb - bk * fa), ta - ck * fb, tb + ck * fa)
+        slip, x, y, f, g, h = _point_at(k, patch, on, mu, center, wa, wb, spin, K)
+        sums = x, y, f, g, h
+        (fa, fb), slopes, turned = _hold_at(k, patch, sums, y0, gain, u, w, wa, wb, inv_mass, K, work)
+        loser, p, (sa, sb, mn, ma, mb) = resultant(patch, on, center, y0, slopes, slip)
+        exerted = (sa + fa, sb + fb, mn + (ak * fb - bk * fa), ma - ck * fb, mb + ck * fa)
         change = turned - spin
-        miss, _ = across_misses(count, mu, k, (change * bk, -change * ak, change), work)
+        is_held = lane(k)
+        miss, _ = across_misses(patch, chosen(is_held, 0.0, p), slip, mu, (change * bk, -change * ak, change))
         if not math.isfinite(turned):
             break
         if miss <= goal:
-            motion = (
-                patch[k, TARGET_A] - wb * ck + turned * bk, patch[k, TARGET_B] + wa * ck - turned * ak, turned
-            )  # fmt: skip
+            impulses = p, chosen(is_held, fa, p * slip[0]), chosen(is_held, fb, p * slip[1])
+            motion = (ta - wb * ck + turned * bk, tb + wa * ck - turned * ak, turned)
             if loser >= 0:
-                return PULLS, loser, none, miss, motion
-            size, load = math.sqrt(fa * fa + fb * fb), mu * patch[k, P]
+                return PULLS, loser, impulses, none, miss, motion
+            size, load = math.sqrt(fa * fa + fb * fb), mu * p[k]
             if size <= load:
-                s = 1.0 / patch[k, P]
-                patch[k, X], patch[k, Y] = s * fa, s * fb
-                return FOUND, -1, total, miss, motion
-            s = (size - load) * patch[k, MOBILITY] / size
-            return SLIPS, -1, none, miss, (motion[0] - s * fa, motion[1] - s * fb, turned)
+                return FOUND, -1, impulses, exerted, miss, motion
+            s = (size - load) * patch[2][k] / size
+            return SLIPS, -1, impulses, none, miss, (motion[0] - s * fa, motion[1] - s * fb, turned)
         spin = turned
-    return NOT_FOUND, -1, none, 0.0, still
+    return NOT_FOUND, -1, (on, on, on), none, 0.0, still

@@ -40,23 +40,23 @@ from physics.kernels import quaternion as qt
 from physics.kernels.arms import wall_of
 from physics.kernels.compiler import inlined
 from physics.kernels.ellipse import friction_ratio, stretched_frame
-from physics.kernels.pair import solve_few
+from physics.kernels.lanes import Lanes, chosen, first_of, larger, largest, least, root
+from physics.kernels.pair import contact_at, solve_one, solve_pair
 from physics.kernels.patch import (
-    SPEED,
-    A,
-    B,
-    P,
-    X,
-    Y,
+    MOST,
     across_misses,
     add_along,
     comply,
     fit_targets,
+    free_speed,
+    lane,
     misfit,
     place_patch,
+    pushing,
     respond,
     resultant,
     turns_little,
+    warm_motion,
 )
 from physics.kernels.pivot import FOUND, PULLS, SLIPS, turn_about
 from physics.kernels.point import to_world, wall_frame
@@ -115,69 +115,41 @@ def _lengthening(motion, delta, gyration2, work):
 
 
 @inlined
-def _drop(loser, count, work):
-    """Open the active contact at place `loser`: those behind it move up."""
-    work.patch[work.active[loser], P] = work.normal[work.active[loser]] = -1.0
-    for j in range(loser, count - 1):
-        work.active[j] = work.active[j + 1]
-    return count - 1
-
-
-@inlined
-def _store(n, friction, work):
-    """Impulses of the contacts that push to `work.impulse`, along the unit tangents; zero for the open ones."""
-    width, ratio = 1 if friction is None else 3, friction_ratio(work)
-    for i in range(n):
-        for c in range(width):
-            work.impulse[width * i + c] = 0.0  # an open contact's direction may be no number
-        p = work.patch[i, P]
-        if p > 0.0:
-            work.impulse[width * i] = p
-            if friction is not None:
-                work.impulse[width * i + 1] = p * work.patch[i, X]
-                work.impulse[width * i + 2] = ratio * (p * work.patch[i, Y])
-
-
-@inlined
-def _normal_motion(n, count, goal, work):
+def _normal_motion(count, goal, patch, on):
     """Normal motion that meets the targets, (v_n, ω_a, ω_b); the centroid; and whether there is one."""
-    is_patch, center, (t0, ga, gb) = fit_targets(count, work)
+    is_patch, center, (t0, ga, gb) = fit_targets(count, patch, on)
     wa, wb = gb, -ga
     vn = t0 - wa * center[2] + wb * center[1]
-    return is_patch and misfit(n, vn, wa, wb, work) <= goal, center, (vn, wa, wb)
+    return is_patch and misfit(patch, on, vn, wa, wb) <= goal, center, (vn, wa, wb)
 
 
 @inlined
-def _slowest(count, mu, step, tried, hurry, work):
+def _slowest(patch, on, slip, mu, step, tried, hurry):
     """The active contact, not yet `tried`, that is slowest after a step, if it is STOPPING or in a `hurry`; or -1."""
-    patch = work.patch
-    best, found = math.inf, -1
-    for j in range(count):
-        i = work.active[j]
-        if tried & (1 << i):
-            continue
-        x, y, size = patch[i, X], patch[i, Y], patch[i, SPEED]
-        da, db = step[0] - step[2] * patch[i, B], step[1] + step[2] * patch[i, A]
-        s = size / mu
-        ua, ub = da - s * x, db - s * y
-        left = math.sqrt(ua * ua + ub * ub)
-        if left < best and (hurry or left < STOPPING * size):
-            best, found = left, i
-    return found
+    (_, a, b), _, _ = patch
+    x, y, size = slip
+    da, db = step[0] - step[2] * b, step[1] + step[2] * a
+    s = size / mu
+    ua, ub = da - s * x, db - s * y
+    left = chosen(on > tried, root(ua * ua + ub * ub), math.inf)
+    if not hurry:
+        left = chosen(left < STOPPING * size, left, math.inf)
+    best = least(left)
+    return first_of(left == best) if best < math.inf else -1
 
 
 @inlined
-def _turn(count, mu, compliance, k, motion, delta, gyration2, tried, hurry, work):
+def _turn(patch, on, p, slip, mu, compliance, k, motion, delta, gyration2, tried, hurry, work):
     """The next motion by Newton's step, or what replaces it: (whether it was Newton's, pivot to try or -1, motion)."""
     step = _newton(compliance, k, delta)
-    is_settled = turns_little(count, mu, step, work)
+    is_settled = turns_little(patch, on, slip, mu, step)
     pivot = -1
     if not is_settled:
         stretch = _lengthening(motion, delta, gyration2, work)
         if 0.0 < stretch < STRETCH_LIMIT:
             return False, -1, (stretch * motion[0], stretch * motion[1], stretch * motion[2])
-        step = _newton(compliance, add_along(count, mu, k, work), delta)
-        pivot = _slowest(count, mu, step, tried, hurry, work)
+        step = _newton(compliance, add_along(patch, p, slip, mu, k), delta)
+        pivot = _slowest(patch, on, slip, mu, step, tried, hurry)
     return is_settled, pivot, (motion[0] + step[0], motion[1] + step[1], motion[2] + step[2])
 
 
@@ -192,8 +164,29 @@ def _first_pivot(n, work):
 
 
 @inlined
-def _search(n, patient, mu, goal, start, u, w, inv_mass, K, work):
-    """Directions and set of pushing contacts: (found, impulses along the tangents and moments, Σ p_n, residual).
+def _two_left(patch, on, mu, goal, axes, u, w, inv_mass, K, work):
+    """The two contacts that still push, the others open: (found, impulses, tangents and moments, Σ p_n, residual)."""
+    (_, a, b), (target, _, _), _ = patch
+    i = first_of(on > 0.0)
+    j = first_of(chosen(lane(i), 0.0, on) > 0.0)
+    first, second = contact_at(i, axes, u, w, work), contact_at(j, axes, u, w, work)
+    found, p, q, m, miss = solve_pair(first, second, mu, goal, inv_mass, K, work)
+    is_i, is_j = lane(i), lane(j)
+    impulses = (
+        chosen(is_i, p[0], chosen(is_j, q[0], 0.0)),
+        chosen(is_i, p[1], chosen(is_j, q[1], 0.0)),
+        chosen(is_i, p[2], chosen(is_j, q[2], 0.0)),
+    )
+    vn = u[0] + inv_mass * (p[0] + q[0])
+    wa, wb = w[1] + (K[1] * m[0] + K[3] * m[1] + K[4] * m[2]), w[2] + (K[2] * m[0] + K[4] * m[1] + K[5] * m[2])
+    closing = largest(larger(0.0, chosen(on > 0.0, 0.0, target - (vn + (wa * b - wb * a)))))
+    exerted = (p[1] + q[1], p[2] + q[2], m[0], m[1], m[2])
+    return found and closing <= goal, impulses, exerted, p[0] + q[0], max(miss, closing)
+
+
+@inlined
+def _search(n, patient, mu, goal, patch, start, axes, u, w, inv_mass, K, work):
+    """Directions and set of pushing contacts.
 
     Parameters
     ----------
@@ -206,22 +199,29 @@ def _search(n, patient, mu, goal, start, u, w, inv_mass, K, work):
         Planar motion to start from.
     u, w, K
         Velocity and angular velocity without contact impulses, inverse inertia: in the stretched frame of the wall.
+
+    Returns
+    -------
+    found : bool
+    impulses : tuple of 3 lanes
+        Of each contact (normal, tangents) [N s].
+    exerted : tuple of 5 floats
+        Their sums along the tangents, and moments.
+    push : float
+        Sum of the normal impulses [N s].
+    residual : float
+        [m/s].
     """
     ratio = friction_ratio(work)
     mass_b = ratio * ratio * inv_mass
-    for i in range(n):
-        work.active[i] = i
-        work.normal[i] = 0.0
-    none = (0.0, 0.0, 0.0, 0.0, 0.0)
-    count, motion, pivot, tried, hurry, is_set = n, start, -1, 0, False, n < 3
+    on, none = pushing(n), Lanes(0.0, 0.0, 0.0, 0.0)
+    count, motion, pivot, tried, hurry, is_set = n, start, _first_pivot(n, work), none, False, False
     center = normal_motion = start
-    if not is_set:
-        pivot = _first_pivot(n, work)
     for _ in range(SLIDE_LIMIT):
         if count < 3:
-            return solve_few(n, count, mu, goal, u, w, inv_mass, K, work)
+            return _two_left(patch, on, mu, goal, axes, u, w, inv_mass, K, work)
         if not is_set:
-            ok, center, normal_motion = _normal_motion(n, count, goal, work)
+            ok, center, normal_motion = _normal_motion(count, goal, patch, on)
             if not ok:
                 break
             is_set = True
@@ -229,40 +229,96 @@ def _search(n, patient, mu, goal, start, u, w, inv_mass, K, work):
         push = (vn - u[0]) / inv_mass
         y0, gain = push / count, (wa - w[1], wb - w[2])
         if pivot >= 0:
-            tried |= 1 << pivot
-            what, loser, total, miss, slip = turn_about(
-                pivot, count, mu, goal, center, y0, gain, u, w, wa, wb, motion[2], inv_mass, K, work
+            tried = chosen(lane(pivot), 1.0, tried)
+            what, loser, impulses, exerted, miss, slipped = turn_about(
+                pivot, patch, on, mu, goal, center, y0, gain, u, w, wa, wb, motion[2], inv_mass, K, work
             )
             if what == FOUND:
                 work.mode = PIVOT + work.slot[pivot]
-                return True, total, push, miss
+                return True, impulses, exerted, push, miss
             if what == PULLS:
-                count, is_set, tried = _drop(loser, count, work), False, 0
+                count, on, is_set, tried = count - 1, chosen(lane(loser), 0.0, on), False, none
             elif what == SLIPS:
-                motion = slip
+                motion = slipped
             pivot = -1
             continue
-        y, turning = respond(count, mu, center, y0, gain, motion, wa, wb, K, work)
-        loser, total = resultant(count, center, y0, y, work)
+        slip, y, turning = respond(patch, on, mu, center, y0, gain, motion, wa, wb, K)
+        loser, p, exerted = resultant(patch, on, center, y0, y, slip)
         is_settled = True
         if loser < 0 or patient:
-            fa, fb, tn, ta, tb = total
+            fa, fb, tn, ta, tb = exerted
             wn = w[0] + (K[0] * tn + K[1] * ta + K[2] * tb)
             delta = (u[1] + inv_mass * fa - motion[0], u[2] + mass_b * fb - motion[1], wn - motion[2])
-            miss, k = across_misses(count, mu, -1, delta, work)
+            miss, k = across_misses(patch, p, slip, mu, delta)
             if loser < 0 and miss <= goal:
                 work.mode = SLIDE
-                return True, total, push, miss
-            compliance = comply(count, center, turning, inv_mass, K, work)
+                return True, (p, p * slip[0], p * slip[1]), exerted, push, miss
+            compliance = comply(patch, center, slip, turning, inv_mass, K, work)
             is_settled, pivot, motion = _turn(
-                count, mu, compliance, k, motion, delta, inv_mass / K[0], tried, hurry, work
+                patch, on, p, slip, mu, compliance, k, motion, delta, inv_mass / K[0], tried, hurry, work
             )
             hurry = hurry or not is_settled
         if loser >= 0 and is_settled:
-            count, is_set, tried = _drop(loser, count, work), False, 0
+            count, on, is_set, tried = count - 1, chosen(lane(loser), 0.0, on), False, none
             if not patient:
                 motion = start
-    return False, none, 0.0, 0.0
+    return False, (none, none, none), (0.0, 0.0, 0.0, 0.0, 0.0), 0.0, 0.0
+
+
+@inlined
+def _slide_many(n, friction, axes, u, w, inv_mass, K, work):
+    """Three contacts or four: (found, tangents and moments, Σ p_n, residual, its scale), `work.impulse` when found."""
+    patch, on = place_patch(n, axes, inv_mass, K, work), pushing(n)
+    scale = free_speed(friction, patch, u, w)
+    start = warm_motion(n, friction, patch, on, u, w, inv_mass, K, work)
+    goal = work.tolerance * scale
+    for patient in range(2):
+        found, impulses, exerted, push, miss = _search(
+            n, patient > 0, work.mu, goal, patch, start, axes, u, w, inv_mass, K, work
+        )
+        if found:
+            for i in range(n):
+                _store(i, (impulses[0][i], impulses[1][i], impulses[2][i]), friction, work)
+            return True, exerted, push, miss, scale
+    return False, (0.0, 0.0, 0.0, 0.0, 0.0), 0.0, 0.0, scale
+
+
+@inlined
+def _store(i, p, friction, work):
+    """Impulse of contact i to `work.impulse`, along the unit tangents."""
+    if friction is None:
+        work.impulse[i] = p[0]
+    else:
+        work.impulse[3 * i], work.impulse[3 * i + 1] = p[0], p[1]
+        work.impulse[3 * i + 2] = friction_ratio(work) * p[2]
+
+
+@inlined
+def _largest(friction, b):
+    """Largest component of a contact velocity that impulses can change [m/s]."""
+    if friction is None:
+        return abs(b[0])
+    return max(abs(b[0]), max(abs(b[1]), abs(b[2])))
+
+
+@inlined
+def _slide_few(n, friction, axes, u, w, inv_mass, K, work):
+    """One contact or two, as `_slide_many`."""
+    first = contact_at(0, axes, u, w, work)
+    scale = _largest(friction, first[1])
+    if n == 1:
+        found, p, m, miss = solve_one(first, work.mu, work.tolerance * scale, inv_mass, K, work)
+    else:
+        second = contact_at(1, axes, u, w, work)
+        scale = max(scale, _largest(friction, second[1]))
+        found, p, q, m, miss = solve_pair(first, second, work.mu, work.tolerance * scale, inv_mass, K, work)
+        if found:
+            _store(1, q, friction, work)
+    if found:
+        _store(0, p, friction, work)
+    if n == 2:
+        p = p[0] + q[0], p[1] + q[1], p[2] + q[2]
+    return found, (p[1], p[2], m[0], m[1], m[2]), p[0], miss, scale
 
 
 @inlined
@@ -290,25 +346,21 @@ def slide_patch(n, friction, R, v, L, work):
         Relative to the largest free contact speed.
     """
     wall = wall_of(work.slot[0], work)
-    if wall_of(work.slot[n - 1], work) != wall:
+    if n > MOST or wall_of(work.slot[n - 1], work) != wall:
         return False, v, L, 0.0
     inv_mass = 1.0 / work.mass
     axes = wall_axes(work.walls, wall)
     ratio = friction_ratio(work)
     K, u, w = wall_frame(R, v, L, axes, work.J)
     K, u, w = stretched_frame(K, u, w, ratio)
-    scale, start = place_patch(n, friction, wall, u, w, inv_mass, K, work)
-    goal = work.tolerance * scale
-    found, total, push, miss = False, (0.0, 0.0, 0.0, 0.0, 0.0), 0.0, 0.0
-    for patient in range(2):
-        found, total, push, miss = _search(n, patient > 0, work.mu, goal, start, u, w, inv_mass, K, work)
-        if found or n < 3:
-            break
+    if n < 3:
+        found, exerted, push, miss, scale = _slide_few(n, friction, axes, u, w, inv_mass, K, work)
+    else:
+        found, exerted, push, miss, scale = _slide_many(n, friction, axes, u, w, inv_mass, K, work)
     if not found:
         return False, v, L, 0.0
-    _store(n, friction, work)
     if scale > 0.0:
         miss /= scale
-    fa, fb, tn, ta, tb = total
+    fa, fb, tn, ta, tb = exerted
     v = to_world(axes, inv_mass * push, inv_mass * fa, ratio * (inv_mass * fb), v)
     return True, v, to_world(axes, tn, ta, tb / ratio, L), miss

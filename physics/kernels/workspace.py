@@ -14,7 +14,6 @@ import numpy as np
 from physics.kernels import laws as contact_laws
 from physics.kernels.fields.terms import Term, members
 from physics.kernels.layout import WALL_SIZE
-from physics.kernels.patch import PATCH_SIZE
 from physics.kernels.pyramid import normal_sizes, pyramid_sizes
 from physics.kernels.rotation import SERIES_SIZE
 from physics.kernels.slip import FEW
@@ -99,7 +98,6 @@ def workspace_dtype(
         ("across", f, (n, 2)),  # of `direct`: tangential impulse [N s]
         ("weight", f, (n,)),  # of `share`: share in the tangential impulse [N s]
         ("place", f, (n, 2)),  # of `share`: coordinates of the contact along the tangents [m]
-        ("patch", f, (n, PATCH_SIZE)),  # see `patch`
         ("twist", f, (6,)),  # of `proximal`: change of (v, ω) [m/s, rad/s]
         ("start", f, (6,)),
         ("defect", f, (6,)),

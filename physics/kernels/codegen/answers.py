@@ -10,7 +10,7 @@ from collections.abc import Callable
 
 from numba.core import types, typing
 
-from physics.kernels.codegen import elements, ranges, scalars, tuples
+from physics.kernels.codegen import elements, lanes, ranges, scalars, tuples
 
 
 def signature_of(function: types.Function, context: typing.Context, args: tuple) -> typing.Signature | None:
@@ -23,7 +23,11 @@ def signature_of(function: types.Function, context: typing.Context, args: tuple)
     args : tuple of types.Type
     """
     key = function.typing_key
-    return elements.signature(key, context, args) or scalars.signature(key, context, args)
+    for module in (elements, scalars, lanes):
+        found = module.signature(key, context, args)
+        if found is not None:
+            return found
+    return None
 
 
 def lowering_of(function, sig: typing.Signature) -> Callable | None:
@@ -41,7 +45,7 @@ def lowering_of(function, sig: typing.Signature) -> Callable | None:
         Numba's way is taken after all.
     """
     key = function if isinstance(function, str) else getattr(function, "typing_key", None)
-    for module in (elements, ranges, tuples, scalars):
+    for module in (elements, ranges, tuples, scalars, lanes):
         found = module.lowering(key, sig)
         if found is not None:
             return found

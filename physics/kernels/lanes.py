@@ -1,0 +1,101 @@
+"""Four numbers at once: what is done to one is done to each, in one instruction where the processor has one for it.
+
+A block rests on a wall with three or four vertices, and all of them are asked the same: how fast they slide, in what
+direction, what they push with. In kernels `Lanes` is a vector of LLVM's (`codegen.lanes`); what stands here is what it
+means, and what it is without a compiler. A number beside lanes is four of it. No result depends on the processor: each
+lane is what the number alone would be, and sums are taken in one order (`total`).
+"""
+
+from __future__ import annotations
+
+import math
+import operator
+from collections.abc import Callable
+
+import numpy as np
+
+WIDTH = 4
+
+
+class Lanes:
+    """Four numbers, or what is true of each of four."""
+
+    __slots__ = ("each",)
+
+    def __init__(self, a, b, c, d):
+        self.each = (a, b, c, d)
+
+    def __getitem__(self, k):
+        return self.each[k]
+
+    def __neg__(self):
+        return Lanes(*(-one for one in self.each))
+
+    def __abs__(self):
+        return Lanes(*(abs(one) for one in self.each))
+
+    def __invert__(self):
+        return Lanes(*(not one for one in self.each))
+
+
+def _each(of: Callable, *values) -> Lanes:
+    """A function of each lane of some values; of a number, of that."""
+    spread = [one.each if isinstance(one, Lanes) else (one,) * WIDTH for one in values]
+    return Lanes(*(of(*lane) for lane in zip(*spread, strict=True)))
+
+
+def _divided(x, y) -> float:
+    """A quotient as kernels have it: infinite or no number where Python raises an exception."""
+    with np.errstate(all="ignore"):
+        return float(np.float64(x) / np.float64(y))
+
+
+def _define(name: str, of: Callable) -> None:
+    setattr(Lanes, f"__{name}__", lambda self, other: _each(of, self, other))
+    setattr(Lanes, f"__r{name}__", lambda self, other: _each(of, other, self))
+
+
+for _name, _of in (("add", operator.add), ("sub", operator.sub), ("mul", operator.mul), ("truediv", _divided)):
+    _define(_name, _of)
+for _name in ("lt", "le", "gt", "ge", "eq", "and", "or"):
+    _define(_name, getattr(operator, f"__{_name}__"))
+
+
+def root(x):
+    """Square roots; of a negative number, no number."""
+    return _each(lambda one: math.sqrt(one) if one >= 0.0 else math.nan, x)
+
+
+def larger(x, y):
+    """The larger of two, each on its own: y where it is larger, as `max(x, y)` has it."""
+    return _each(max, x, y)
+
+
+def smaller(x, y):
+    """The smaller of two, each on its own: `min(x, y)`."""
+    return _each(min, x, y)
+
+
+def chosen(where, x, y):
+    """x where something is true, else y."""
+    return _each(lambda true, one, other: one if true else other, where, x, y)
+
+
+def total(x):
+    """Sum of all four: first those two apart, which is also the first half and the second half."""
+    return (x[0] + x[2]) + (x[1] + x[3])
+
+
+def largest(x):
+    """The largest of all four."""
+    return max(max(x[0], x[2]), max(x[1], x[3]))
+
+
+def least(x):
+    """The least of all four."""
+    return min(min(x[0], x[2]), min(x[1], x[3]))
+
+
+def first_of(where):
+    """The first lane of which something is true, or -1."""
+    return next((k for k in range(WIDTH) if where[k]), -1)
