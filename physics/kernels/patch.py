@@ -8,6 +8,8 @@ what is asked for along the same axes, and `mobility` W_aa + W_bb of each contac
 
 from __future__ import annotations
 
+import math
+
 from physics.kernels.compiler import inlined
 from physics.kernels.ellipse import friction_ratio
 from physics.kernels.lanes import Lanes, chosen, first_of, larger, largest, least, root, total
@@ -18,6 +20,12 @@ MOST = 4
 
 # Second moments of a patch: below this share of det to trace² it counts as a line (edges 1 : 1000).
 LINE_LIMIT = 1.0e-6
+
+# A warm start is of other loads if its pushes are off by more than this share of what is needed.
+WARM_SHARE = 0.1
+
+# Share of its free slip that a face which all but holds starts with.
+LEAST_SLIP = 0.01
 
 
 @inlined
@@ -73,16 +81,69 @@ def free_speed(friction, patch, u, w):
 
 
 @inlined
-def warm_motion(n, friction, patch, on, u, w, inv_mass, K, work):
-    """Planar motion after the impulses in `work`, those of the warm start; without friction there are none."""
-    if friction is None:
-        return u[1], u[2], w[0]
+def is_warm(push, needed):
+    """Whether pushes of a warm start are near enough to those that the loads of now need, for its friction to be."""
+    return abs(push - needed) <= WARM_SHARE * abs(needed)
+
+
+@inlined
+def warm_motion(n, patch, on, u, w, inv_mass, K, work):
+    """Planar motion after the impulses in `work`, those of the warm start, and whether they are of these loads."""
     (c, a, b), _, _ = patch
     ratio = friction_ratio(work)
     p, x = on * _of_each(work.impulse, 0, n), on * _of_each(work.impulse, 1, n)
     y = on * _of_each(work.impulse, 2, n) / ratio
     spin = K[0] * (a * y - b * x) + K[1] * (b * p - c * y) + K[2] * (c * x - a * p)
-    return u[1] + inv_mass * total(x), u[2] + ratio * ratio * inv_mass * total(y), w[0] + total(spin)
+    motion = u[1] + inv_mass * total(x), u[2] + ratio * ratio * inv_mass * total(y), w[0] + total(spin)
+    return motion, is_warm(inv_mass * total(p), -u[0])
+
+
+@inlined
+def _spread(n, patch, on):
+    """Centroid of the contacts along the tangents, and mean square of their distance from it."""
+    (_, a, b), _, _ = patch
+    share = 1.0 / n
+    ca, cb = share * total(on * a), share * total(on * b)
+    a, b = on * (a - ca), on * (b - cb)
+    return ca, cb, share * (total(a * a) + total(b * b))
+
+
+@inlined
+def may_hold(n, patch, mu, u, w, inv_mass, K):
+    """Whether friction can stop the motion (u, w) of a face that stops at its wall: φ(0) <= 1 of `cold_motion`.
+
+    The normal impulses undo the normal velocity, the tangential ones what is along the wall.
+    """
+    ca, cb, second = _spread(n, patch, pushing(n))
+    va, vb, turn = u[1] - w[0] * cb, u[2] + w[0] * ca, w[0] * inv_mass / K[0]
+    return second * (va * va + vb * vb) + turn * turn <= second * (mu * u[0]) * (mu * u[0])
+
+
+@inlined
+def cold_motion(n, patch, on, mu, u, w, inv_mass, K):
+    """Planar motion that friction leaves of one without impulses, if the planar friction is that of an ellipsoid.
+
+    The forces and moments about the centroid that equal pushes, P in all, can exert while a face slides are all but an
+    ellipsoid, (|f|/μP)² + (T/μPρ)² <= 1, and the slip is along its normal, (v, ρ² ω) (Goyal et al. 1991; Howe and
+    Cutkosky 1996). With ρ² = Σ|d_i|²/n, β = μP/m, γ = μPρ²/I and the slip's size s, s² = v² + ρ²ω²,
+
+        v = v₀ s/(s + β),   ω = ω₀ s/(s + γ),   φ(s)² = v₀²/(s + β)² + ρ²ω₀²/(s + γ)² = 1.
+
+    1/φ is all but a straight line and concave: one step of Newton's, from where it is not above 1, is near enough. What
+    φ(0) <= 1 says would hold is given a small part of its slip, since directions are wanted.
+    """
+    ca, cb, second = _spread(n, patch, on)
+    va, vb = u[1] - w[0] * cb, u[2] + w[0] * ca
+    slip2, turn2, beta = va * va + vb * vb, second * w[0] * w[0], mu * max(-u[0], 0.0)
+    free, gamma = math.sqrt(slip2 + turn2), beta * second * K[0] / inv_mass
+    s = max(free - max(beta, gamma), 0.0)
+    p, q = 1.0 / (s + beta), 1.0 / (s + gamma)
+    square = slip2 * p * p + turn2 * q * q
+    s += (math.sqrt(square) - 1.0) * square / (slip2 * p * p * p + turn2 * q * q * q)
+    s = max(s, LEAST_SLIP * free)
+    p, q = s / (s + beta), s / (s + gamma)
+    wn = q * w[0]
+    return p * va + wn * cb, p * vb - wn * ca, wn
 
 
 @inlined

@@ -37,21 +37,19 @@ from __future__ import annotations
 import math
 
 from physics.kernels import quaternion as qt
-from physics.kernels.arms import wall_of
 from physics.kernels.compiler import inlined
 from physics.kernels.ellipse import friction_ratio, stretched_frame
 from physics.kernels.lanes import Lanes, chosen, first_of, larger, largest, least, root
 from physics.kernels.pair import contact_at, solve_one, solve_pair
 from physics.kernels.patch import (
-    MOST,
     across_misses,
     add_along,
+    cold_motion,
     comply,
     fit_targets,
     free_speed,
     lane,
     misfit,
-    place_patch,
     pushing,
     respond,
     resultant,
@@ -185,7 +183,7 @@ def _two_left(patch, on, mu, goal, axes, u, w, inv_mass, K, work):
 
 
 @inlined
-def _search(n, patient, mu, goal, patch, start, axes, u, w, inv_mass, K, work):
+def _search(n, patient, mu, goal, patch, start, pivot, axes, u, w, inv_mass, K, work):
     """Directions and set of pushing contacts.
 
     Parameters
@@ -197,6 +195,8 @@ def _search(n, patient, mu, goal, patch, start, axes, u, w, inv_mass, K, work):
         Residual asked for [m/s].
     start : tuple of 3 floats
         Planar motion to start from.
+    pivot : int
+        Contact that is tried as one first, or -1.
     u, w, K
         Velocity and angular velocity without contact impulses, inverse inertia: in the stretched frame of the wall.
 
@@ -215,7 +215,7 @@ def _search(n, patient, mu, goal, patch, start, axes, u, w, inv_mass, K, work):
     ratio = friction_ratio(work)
     mass_b = ratio * ratio * inv_mass
     on, none = pushing(n), Lanes(0.0, 0.0, 0.0, 0.0)
-    count, motion, pivot, tried, hurry, is_set = n, start, _first_pivot(n, work), none, False, False
+    count, motion, tried, hurry, is_set = n, start, none, False, False
     center = normal_motion = start
     for _ in range(SLIDE_LIMIT):
         if count < 3:
@@ -266,15 +266,21 @@ def _search(n, patient, mu, goal, patch, start, axes, u, w, inv_mass, K, work):
 
 
 @inlined
-def _slide_many(n, friction, axes, u, w, inv_mass, K, work):
+def _slide_many(n, friction, patch, axes, u, w, inv_mass, K, work):
     """Three contacts or four: (found, tangents and moments, Σ p_n, residual, its scale), `work.impulse` when found."""
-    patch, on = place_patch(n, axes, inv_mass, K, work), pushing(n)
+    on = pushing(n)
     scale = free_speed(friction, patch, u, w)
-    start = warm_motion(n, friction, patch, on, u, w, inv_mass, K, work)
+    start, pivot = (u[1], u[2], w[0]), -1
+    if friction is not None:
+        start, is_of_now = warm_motion(n, patch, on, u, w, inv_mass, K, work)
+        if is_of_now:
+            pivot = _first_pivot(n, work)
+        elif work.mu > 0.0:
+            start = cold_motion(n, patch, on, work.mu, u, w, inv_mass, K)
     goal = work.tolerance * scale
     for patient in range(2):
         found, impulses, exerted, push, miss = _search(
-            n, patient > 0, work.mu, goal, patch, start, axes, u, w, inv_mass, K, work
+            n, patient > 0, work.mu, goal, patch, start, pivot, axes, u, w, inv_mass, K, work
         )
         if found:
             for i in range(n):
@@ -322,17 +328,28 @@ def _slide_few(n, friction, axes, u, w, inv_mass, K, work):
 
 
 @inlined
-def slide_patch(n, friction, R, v, L, work):
+def seen_from_wall(wall, R, v, L, work):
+    """Axes of a wall; inverse inertia, velocity and angular velocity without impulses in its stretched frame."""
+    axes = wall_axes(work.walls, wall)
+    K, u, w = wall_frame(R, v, L, axes, work.J)
+    K, u, w = stretched_frame(K, u, w, friction_ratio(work))
+    return axes, K, u, w
+
+
+@inlined
+def slide_patch(n, friction, seen, patch, v, L, work):
     """Try the impulses with which the n contacts of one wall slide, open, or turn about one that holds.
 
     Parameters
     ----------
     n : int
-        Contacts in `work`: arm, target, slot and impulse (the warm start) are read.
+        Contacts in `work`, `patch.MOST` at most: arm, target, slot and impulse (the warm start) are read.
     friction : True or None
         None: frictionless, `work.mu` is 0 and `work.impulse` has one number per contact.
-    R : tuple of 9 floats
-        Principal frame to world.
+    seen : tuple
+        Of `seen_from_wall`.
+    patch : tuple
+        Of `patch.place_patch`; it is read if there are more than two contacts.
     v, L : tuples of 3 floats
         Velocity [m/s] and angular momentum [kg m²/s] without contact impulses, world frame.
 
@@ -345,18 +362,12 @@ def slide_patch(n, friction, R, v, L, work):
     residual : float
         Relative to the largest free contact speed.
     """
-    wall = wall_of(work.slot[0], work)
-    if n > MOST or wall_of(work.slot[n - 1], work) != wall:
-        return False, v, L, 0.0
-    inv_mass = 1.0 / work.mass
-    axes = wall_axes(work.walls, wall)
-    ratio = friction_ratio(work)
-    K, u, w = wall_frame(R, v, L, axes, work.J)
-    K, u, w = stretched_frame(K, u, w, ratio)
+    axes, K, u, w = seen
+    inv_mass, ratio = 1.0 / work.mass, friction_ratio(work)
     if n < 3:
         found, exerted, push, miss, scale = _slide_few(n, friction, axes, u, w, inv_mass, K, work)
     else:
-        found, exerted, push, miss, scale = _slide_many(n, friction, axes, u, w, inv_mass, K, work)
+        found, exerted, push, miss, scale = _slide_many(n, friction, patch, axes, u, w, inv_mass, K, work)
     if not found:
         return False, v, L, 0.0
     if scale > 0.0:

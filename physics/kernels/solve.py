@@ -7,11 +7,12 @@ from physics.kernels.arms import wall_of
 from physics.kernels.compiler import inlined, kernel
 from physics.kernels.compliance import soften, stiffness
 from physics.kernels.direct import hold_all
-from physics.kernels.ellipse import eased, stretch, unstretch
+from physics.kernels.ellipse import stretch, unstretch
+from physics.kernels.lanes import Lanes
+from physics.kernels.patch import MOST, may_hold, place_patch
 from physics.kernels.proximal import proximal_newton
 from physics.kernels.pyramid import normal_fallback, pyramid_fallback
-from physics.kernels.share import wall_axes
-from physics.kernels.slide import HOLD, slide_patch
+from physics.kernels.slide import HOLD, seen_from_wall, slide_patch
 from physics.kernels.sweeps import (
     assemble,
     cone_residual,
@@ -103,21 +104,43 @@ def _apply(n, width, v, L, work):
 
 
 @inlined
-def _may_hold(n, v, work):
-    """Whether to try first that all contacts hold.
+def _face(n, seen, work):
+    """The patch of three contacts or four of one wall; of fewer nothing that is read."""
+    nothing = Lanes(0.0, 0.0, 0.0, 0.0)
+    if n < 3:
+        return (nothing, nothing, nothing), (nothing, nothing, nothing), nothing
+    return place_patch(n, seen[0], 1.0 / work.mass, seen[1], work)
 
-    A face that holds on a wall stops the centre of mass (but for small targets), so that friction has to undo the
-    tangential velocity and the normal impulses the normal one: |v_t| <= μ |v_n|. `slide` knows all about a single
-    contact. For an edge and for several walls it is what worked last.
+
+@inlined
+def _directly(n, friction, R, v, L, work):
+    """Try that all contacts hold, and that they slide, the likelier one first: (found, v, L, residual).
+
+    `slide` knows all about a single contact. Whether an edge, or contacts of several walls, held last is tried first.
     """
-    if n == 1:
-        return False
     wall = wall_of(work.slot[0], work)
-    if n < 3 or wall_of(work.slot[n - 1], work) != wall:
-        return work.mode == HOLD
-    axes = wall_axes(work.walls, wall)
-    u, e = qt.dot(axes[0], v), eased(v, axes, work)
-    return qt.dot(e, e) <= (1.0 + work.mu * work.mu) * u * u
+    is_one_wall = n <= MOST and wall_of(work.slot[n - 1], work) == wall
+    seen = seen_from_wall(wall, R, v, L, work)
+    patch = _face(n if is_one_wall else 0, seen, work)
+    holds_first = False
+    if friction is not None and n > 1:
+        holds_first = work.mode == HOLD
+        if is_one_wall and n > 2:
+            holds_first = may_hold(n, patch, work.mu, seen[2], seen[3], 1.0 / work.mass, seen[1])
+    attempts = 2
+    if stiffness(work) > 0.0:  # neither holds nor has a normal motion known beforehand: `slide` for one or two
+        holds_first, attempts = False, 1 if n <= 2 else 0
+    for attempt in range(attempts):
+        if friction is not None and (attempt == 0) == holds_first:
+            found, v1, L1, residual = hold_all(n, R, v, L, work)
+            if found:
+                work.mode = HOLD
+                return True, v1, L1, residual
+        elif is_one_wall:
+            found, v1, L1, residual = slide_patch(n, friction, seen, patch, v, L, work)
+            if found:
+                return True, v1, L1, residual
+    return False, v, L, 0.0
 
 
 @inlined
@@ -168,7 +191,7 @@ def _iterate(n, friction, smooth, goal, work):
 def solve_contacts(n, friction, smooth, pivots, v, L, R, work):
     """Contact impulses that bring the contacts of `work` to their target velocities as far as they can.
 
-    Tried in this order: `hold_all` and `slide_patch`, directly, the likelier one first (`_may_hold`); sweeps in turn
+    Tried in this order: `hold_all` and `slide_patch`, directly, the likelier one first; sweeps in turn
     with Newton's method; pivoting. The first whose residual is within the tolerance gives the result.
 
     Parameters
@@ -197,22 +220,9 @@ def solve_contacts(n, friction, smooth, pivots, v, L, R, work):
         DIRECT, SWEEPS or PIVOTING.
     """
     width = 1 if friction is None else 3
-    holds_first = friction is not None and _may_hold(n, v, work)
-    attempts = 2
-    if stiffness(work) > 0.0:  # neither holds nor has a normal motion known beforehand: `slide` for one or two
-        holds_first, attempts = False, 1 if n <= 2 else 0
-    for attempt in range(attempts):
-        if friction is not None and (attempt == 0) == holds_first:
-            found, v1, L1, residual = hold_all(n, R, v, L, work)
-            if found:
-                work.mode = HOLD
-                return v1, L1, residual, 0, DIRECT
-            continue
-        found, v1, L1, residual = slide_patch(n, friction, R, v, L, work)
-        if found:
-            return v1, L1, residual, 0, DIRECT
-        if friction is None:
-            break
+    found, v1, L1, residual = _directly(n, friction, R, v, L, work)
+    if found:
+        return v1, L1, residual, 0, DIRECT
     scale = _assemble(n, width, R, v, L, work)
     goal = max(min(work.tolerance * scale, work.still), ROUNDING * scale)
     sweeps, residual = _iterate(n, friction, smooth, goal, work)
