@@ -21,7 +21,7 @@ from physics.kernels.events.smooth import (
     start_step,
     try_step,
 )
-from physics.kernels.fields.loads import pass_time
+from physics.kernels.fields.loads import pass_time, refresh_loads
 
 # Smooth steps at most before the next regime is looked for.
 STEPS = 10_000
@@ -94,14 +94,15 @@ def move(y, left, tilted, work, motion):
     put_state(motion, START, y)
     look_around(START, tilted, work, motion)
     motion.step = left
-    t = 0.0
+    t, h = 0.0, start_step(left, tilted, work, motion)
     for _ in range(STEPS):
-        h = start_step(left - t, tilted, work, motion)
         error, used = try_step(h, tilted, work, motion)
         if not error <= work.tolerance:
             if not h > SHORTEST * left:
                 return get_state(motion, START), t, NO_STEP
-            motion.step = CUT * h
+            # Not `start_step` again: it would go by the directions of sliding (`way`) that the trial ended with.
+            h *= CUT
+            refresh_loads(get_state(motion, START), 0.0, tilted, work)  # the scale of the errors is that of the start
             continue
         margin, guard, which = least_margin(h, tilted, work, motion)
         is_over = margin < 0.0
@@ -118,6 +119,7 @@ def move(y, left, tilted, work, motion):
             break
         for s in range(motion.is_active.shape[0]):
             motion.gap[START, s], motion.gap_rate[START, s] = motion.gap[END, s], motion.gap_rate[END, s]
+        h = start_step(left - t, tilted, work, motion)
     if t < left:
         return get_state(motion, START), t, NO_STEP
     return y, left, NO_GUARD
