@@ -18,6 +18,11 @@ cone although every contact pushes, the tangential impulses are shared out in th
 ones instead, the same formula with the weights p_n: a lightly loaded contact is then asked for little. A
 contact that would have to pull is left out, the one that pulls most first. If each p_i lies in its friction
 cone at the end, this solves the contact problem exactly; otherwise the contacts slide (`slide`, `sweeps`).
+
+Targets of contacts that hold need not be those of a rigid motion: points of a body that turns are asked to move apart
+(`contact.aim_rest`), by next to nothing when it is about to hold. Held to the letter they would all slide, nanometres a
+step, and friction would be spent on that. They are taken for those of the twist that fits them best where that changes
+them by less than `work.unseen`.
 """
 
 from __future__ import annotations
@@ -297,7 +302,8 @@ def hold_all(n, R, v, L, work):
             if largest > 0.0 or count < n:
                 miss = _miss(n, v1, w1, work)
                 if not miss <= RIGID_LIMIT * largest:
-                    residual = miss / _free_speed(n, R, v, L, work)
+                    if miss > work.unseen:
+                        residual = miss / _free_speed(n, R, v, L, work)
                     if not residual <= work.tolerance:
                         return False, v, L, 0.0
             for i in range(n):

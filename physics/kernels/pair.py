@@ -23,6 +23,7 @@ from physics.kernels.point import (
     answer,
     block,
     heading,
+    is_warm,
     miss_across,
     point_velocity,
     turned,
@@ -190,7 +191,8 @@ def solve_one(first, mu, goal, inv_mass, K, work):
     x = y = 0.0
     if mu > 0.0:
         f = qt.matvec(W, impulse)
-        x, y = heading(b[1] + f[1], b[2] + f[2], mu)
+        if is_warm(f[0], -b[0]):
+            x, y = heading(b[1] + f[1], b[2] + f[2], mu)
     what, p, miss = answer(W, b, mu, W[4] + W[8], goal, x, y, True)
     return what != LOST, p, qt.cross(r, p), miss
 
@@ -217,6 +219,8 @@ def solve_pair(first, second, mu, goal, inv_mass, K, work):
     if mu > 0.0:
         u1 = _plus(qt.matvec(W1, f), qt.matvec(W12, g))
         u2 = _plus(qt.matvec(W2, g), qt.matvec(_transposed(W12), f))
+        if not (is_warm(u1[0], -b1[0]) and is_warm(u2[0], -b2[0])):
+            u1 = u2 = (0.0, 0.0, 0.0)
         x1, y1 = heading(b1[1] + u1[1], b1[2] + u1[2], mu)
         x2, y2 = heading(b2[1] + u2[1], b2[2] + u2[2], mu)
     found, p, q, miss = solve_two(W1, W12, W2, b1, b2, mu, goal, x1, y1, x2, y2)

@@ -10,62 +10,32 @@ from __future__ import annotations
 
 import math
 
+from physics.kernels import quaternion as qt
+from physics.kernels.columns import column, part, present
 from physics.kernels.compiler import inlined
 from physics.kernels.ellipse import friction_ratio
-from physics.kernels.lanes import Lanes, chosen, first_of, larger, largest, least, root, total
-from physics.kernels.point import point_velocity
-
-# Contacts that a patch can have.
-MOST = 4
+from physics.kernels.lanes import chosen, first_of, larger, largest, least, root, total
+from physics.kernels.point import is_warm, point_velocity
 
 # Second moments of a patch: below this share of det to trace² it counts as a line (edges 1 : 1000).
 LINE_LIMIT = 1.0e-6
-
-# A warm start is of other loads if its pushes are off by more than this share of what is needed.
-WARM_SHARE = 0.1
 
 # Share of its free slip that a face which all but holds starts with.
 LEAST_SLIP = 0.01
 
 
 @inlined
-def lane(k):
-    """Where lane k is."""
-    return Lanes(0.0, 1.0, 2.0, 3.0) == k
-
-
-@inlined
-def pushing(n):
-    """`on` of n contacts that all push."""
-    return Lanes(1.0, 1.0, 1.0, 1.0 if n > 3 else 0.0)
-
-
-@inlined
-def _column(table, column, n):
-    """A column of a table of contacts."""
-    return Lanes(table[0, column], table[1, column], table[2, column], table[n - 1, column])
-
-
-@inlined
-def _of_each(values, column, n):
-    """A number of each contact, of three that each has in a row."""
-    return Lanes(values[column], values[3 + column], values[6 + column], values[3 * n - 3 + column])
-
-
-@inlined
 def place_patch(n, axes, inv_mass, K, work):
     """The patch (place, target, mobility) of the n contacts in `work`, on the wall with these axes."""
     ratio = friction_ratio(work)
-    arm = (_column(work.arm, 0, n), _column(work.arm, 1, n), _column(work.arm, 2, n))
+    arm = (column(work.arm, 0, n), column(work.arm, 1, n), column(work.arm, 2, n))
     e, s, t = axes
     c = ratio * (e[0] * arm[0] + e[1] * arm[1] + e[2] * arm[2])
     a = ratio * (s[0] * arm[0] + s[1] * arm[1] + s[2] * arm[2])
     b = t[0] * arm[0] + t[1] * arm[1] + t[2] * arm[2]
-    target = (_column(work.target, 0, n), _column(work.target, 1, n), ratio * _column(work.target, 2, n))
+    target = (column(work.target, 0, n), column(work.target, 1, n), ratio * column(work.target, 2, n))
     mass_b = ratio * ratio * inv_mass
-    mobility = (
-        (inv_mass + mass_b) + K[0] * (a * a + b * b) - 2.0 * c * (K[1] * a + K[2] * b) + c * c * (K[3] + K[5])
-    )
+    mobility = (inv_mass + mass_b) + K[0] * (a * a + b * b) - 2.0 * c * (K[1] * a + K[2] * b) + c * c * (K[3] + K[5])
     return (c, a, b), target, mobility
 
 
@@ -81,18 +51,12 @@ def free_speed(friction, patch, u, w):
 
 
 @inlined
-def is_warm(push, needed):
-    """Whether pushes of a warm start are near enough to those that the loads of now need, for its friction to be."""
-    return abs(push - needed) <= WARM_SHARE * abs(needed)
-
-
-@inlined
 def warm_motion(n, patch, on, u, w, inv_mass, K, work):
     """Planar motion after the impulses in `work`, those of the warm start, and whether they are of these loads."""
     (c, a, b), _, _ = patch
     ratio = friction_ratio(work)
-    p, x = on * _of_each(work.impulse, 0, n), on * _of_each(work.impulse, 1, n)
-    y = on * _of_each(work.impulse, 2, n) / ratio
+    p, x = on * part(work.impulse, 0, n), on * part(work.impulse, 1, n)
+    y = on * part(work.impulse, 2, n) / ratio
     spin = K[0] * (a * y - b * x) + K[1] * (b * p - c * y) + K[2] * (c * x - a * p)
     motion = u[1] + inv_mass * total(x), u[2] + ratio * ratio * inv_mass * total(y), w[0] + total(spin)
     return motion, is_warm(inv_mass * total(p), -u[0])
@@ -109,14 +73,21 @@ def _spread(n, patch, on):
 
 
 @inlined
-def may_hold(n, patch, mu, u, w, inv_mass, K):
-    """Whether friction can stop the motion (u, w) of a face that stops at its wall: φ(0) <= 1 of `cold_motion`.
+def may_hold(n, patch, axes, v, L, work):
+    """Whether friction may stop a face, with the velocity v and angular momentum L that it has without it.
 
-    The normal impulses undo the normal velocity, the tangential ones what is along the wall.
+    What holds stops at its wall: the pushes P take away the normal momentum, and friction, μP at most, the tangential
+    one; its moment about the centroid is μ Σ p_i |d_i| <= μP max |d_i| at most. Of a face that can hold this is true;
+    one that slips within the tolerance of a solve would be taken for it, and creep.
     """
-    ca, cb, second = _spread(n, patch, pushing(n))
-    va, vb, turn = u[1] - w[0] * cb, u[2] + w[0] * ca, w[0] * inv_mass / K[0]
-    return second * (va * va + vb * vb) + turn * turn <= second * (mu * u[0]) * (mu * u[0])
+    (_, a, b), _, _ = patch
+    ca, cb, _ = _spread(n, patch, present(n))
+    va, vb = qt.dot(axes[1], v), qt.dot(axes[2], v) / friction_ratio(work)
+    friction = work.mu * qt.dot(axes[0], v)
+    moment = ca * vb - cb * va - qt.dot(axes[0], L) / work.mass
+    a, b = a - ca, b - cb
+    limit = friction * friction
+    return va * va + vb * vb <= limit and moment * moment <= largest(a * a + b * b) * limit
 
 
 @inlined
@@ -148,9 +119,9 @@ def cold_motion(n, patch, on, mu, u, w, inv_mass, K):
 
 @inlined
 def fit_targets(count, patch, on):
-    """Centroid (normal, tangents) of the active contacts and the affine fit of their targets (value, slopes).
+    """The normal motion that fits the targets of the active contacts best: (is one, centroid, (v_n, ω_a, ω_b)).
 
-    On a line the slopes are not finite, or no longer accurate: then ok is false.
+    Of contacts on a line it is not finite, or no longer accurate: then there is none.
     """
     (c, a, b), (target, _, _), _ = patch
     s = 1.0 / count
@@ -160,15 +131,14 @@ def fit_targets(count, patch, on):
     det, trace = saa * sbb - sab * sab, saa + sbb
     s = 1.0 / det
     ga, gb = s * (sbb * ta - sab * tb), s * (saa * tb - sab * ta)
-    return det > LINE_LIMIT * trace * trace, center, (t0, ga, gb)
+    return det > LINE_LIMIT * trace * trace, center, (t0 - (ga * center[1] + gb * center[2]), gb, -ga)
 
 
 @inlined
-def misfit(patch, on, vn, wa, wb):
-    """Largest violation of the normal targets [m/s] by the normal motion; an open contact may be faster."""
+def spare_speed(patch, vn, wa, wb):
+    """Normal velocities of the contacts less their targets [m/s] in a normal motion; of an open one it may be > 0."""
     (_, a, b), (target, _, _), _ = patch
-    miss = target - (vn + wa * b - wb * a)
-    return largest(larger(0.0, chosen(on > 0.0, abs(miss), miss)))
+    return (vn + wa * b - wb * a) - target
 
 
 @inlined
@@ -257,8 +227,8 @@ def resultant(patch, on, center, y0, y, slip):
 def across_misses(patch, p, slip, mu, delta):
     """Largest tangential residual [m/s] when the motion that the directions are of is left by delta.
 
-    Of the contacts with a push p > 0. Of one that moves backwards the whole velocity counts: its impulse is in the cone,
-    and projections do not lengthen.
+    Of the contacts with a push p > 0. Of one that moves backwards the whole velocity counts: its impulse is in the
+    cone, and projections do not lengthen.
 
     Also H = Σ κ h hᵀ (11, 12, 13, 22, 23, 33): how the friction across grows with the planar motion.
     """

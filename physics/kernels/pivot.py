@@ -13,10 +13,11 @@ from __future__ import annotations
 
 import math
 
+from physics.kernels.columns import lane
 from physics.kernels.compiler import inlined, kernel
 from physics.kernels.ellipse import friction_ratio
 from physics.kernels.lanes import chosen, total
-from physics.kernels.patch import across_misses, lane, opposed, resultant
+from physics.kernels.patch import across_misses, opposed, resultant
 
 # Rounds on ω_n at most: one when the sense is guessed right and all targets agree, two when it is the other sense.
 PIVOT_LIMIT = 3
@@ -48,7 +49,8 @@ def _point_at(k, patch, on, mu, center, wa, wb, spin, K):
     (ck, ak, bk), (ta, tb) = _contact(k, patch)
     ua = wb * (c - ck) - spin * (b - bk) + (ta - target_a)
     ub = spin * (a - ak) - wa * (c - ck) + (tb - target_b)
-    x, y, size = slip = opposed(ua, ub, chosen(lane(k), 0.0, on), mu)
+    slip = opposed(ua, ub, chosen(lane(k), 0.0, on), mu)
+    x, y, _ = slip
     mn, ma, mb = a * y - b * x, on * b - c * y, c * x - on * a
     f = K[0] * mn + K[1] * ma + K[2] * mb
     g = K[1] * mn + K[3] * ma + K[4] * mb

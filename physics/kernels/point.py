@@ -23,6 +23,9 @@ TURN_LIMIT = 10
 # Largest turn of one Newton step [rad].
 TURN_AT_MOST = 1.0
 
+# A warm start is of other loads if its pushes are off by more than this share of what is needed.
+WARM_SHARE = 0.1
+
 # What a contact was found to do.
 LOST, OPEN, HELD, SLID = range(4)
 
@@ -72,6 +75,12 @@ def block(r, s, inv_mass, ratio, K):
         c * n2 - b * n0, inv_mass + (c * s2 - b * s0), c * t2 - b * t0,
         a * n0 - c * n1, a * s0 - c * s1, ratio * ratio * inv_mass + (a * t0 - c * t1),
     )  # fmt: skip
+
+
+@inlined
+def is_warm(push, needed):
+    """Whether what a warm start pushes with is near enough to what the loads of now need, for its friction to be so."""
+    return abs(push - needed) <= WARM_SHARE * abs(needed)
 
 
 @inlined

@@ -37,6 +37,7 @@ from __future__ import annotations
 import math
 
 from physics.kernels import quaternion as qt
+from physics.kernels.columns import lane, present
 from physics.kernels.compiler import inlined
 from physics.kernels.ellipse import friction_ratio, stretched_frame
 from physics.kernels.lanes import Lanes, chosen, first_of, larger, largest, least, root
@@ -48,11 +49,9 @@ from physics.kernels.patch import (
     comply,
     fit_targets,
     free_speed,
-    lane,
-    misfit,
-    pushing,
     respond,
     resultant,
+    spare_speed,
     turns_little,
     warm_motion,
 )
@@ -113,12 +112,32 @@ def _lengthening(motion, delta, gyration2, work):
 
 
 @inlined
-def _normal_motion(count, goal, patch, on):
-    """Normal motion that meets the targets, (v_n, ω_a, ω_b); the centroid; and whether there is one."""
-    is_patch, center, (t0, ga, gb) = fit_targets(count, patch, on)
-    wa, wb = gb, -ga
-    vn = t0 - wa * center[2] + wb * center[1]
-    return is_patch and misfit(patch, on, vn, wa, wb) <= goal, center, (vn, wa, wb)
+def _normal_motion(count, goal, patch, on, u, w):
+    """Normal motion of the contacts that push, and which do.
+
+    Targets of four contacts that are those of no rigid motion are met by three: one opens that is then faster than
+    asked. Of the two of a rectangle it is the one that approaches less.
+
+    Returns
+    -------
+    ok : bool
+        Whether the targets are met, and no open contact closes.
+    count, on
+        Contacts that push.
+    center : tuple of 3 floats
+        Their centroid.
+    motion : tuple of 3 floats
+        (v_n, ω_a, ω_b).
+    """
+    is_patch, center, motion = fit_targets(count, patch, on)
+    spare = spare_speed(patch, motion[0], motion[1], motion[2])
+    if is_patch and count > 3 and not largest(abs(spare)) <= goal:
+        free = chosen(spare > 0.0, spare_speed(patch, u[0], w[1], w[2]), -math.inf)
+        count, on = count - 1, chosen(lane(first_of(free == largest(free))), 0.0, on)
+        is_patch, center, motion = fit_targets(count, patch, on)
+        spare = spare_speed(patch, motion[0], motion[1], motion[2])
+    ok = is_patch and largest(larger(-spare, on * spare)) <= goal
+    return ok, count, on, center, motion
 
 
 @inlined
@@ -163,7 +182,15 @@ def _first_pivot(n, work):
 
 @inlined
 def _two_left(patch, on, mu, goal, axes, u, w, inv_mass, K, work):
-    """The two contacts that still push, the others open: (found, impulses, tangents and moments, Σ p_n, residual)."""
+    """The two contacts that still push, the others open.
+
+    Returns
+    -------
+    found, impulses, exerted, push, residual
+        As `_search`.
+    closing : int
+        The open contact that would close fastest, where that is why it is not found, else -1.
+    """
     (_, a, b), (target, _, _), _ = patch
     i = first_of(on > 0.0)
     j = first_of(chosen(lane(i), 0.0, on) > 0.0)
@@ -177,9 +204,19 @@ def _two_left(patch, on, mu, goal, axes, u, w, inv_mass, K, work):
     )
     vn = u[0] + inv_mass * (p[0] + q[0])
     wa, wb = w[1] + (K[1] * m[0] + K[3] * m[1] + K[4] * m[2]), w[2] + (K[2] * m[0] + K[4] * m[1] + K[5] * m[2])
-    closing = largest(larger(0.0, chosen(on > 0.0, 0.0, target - (vn + (wa * b - wb * a)))))
+    closing = chosen(on > 0.0, 0.0, target - (vn + (wa * b - wb * a)))
+    fastest, again = largest(larger(0.0, closing)), -1
+    if found and not fastest <= goal:
+        found, again = False, first_of(closing == fastest)
     exerted = (p[1] + q[1], p[2] + q[2], m[0], m[1], m[2])
-    return found and closing <= goal, impulses, exerted, p[0] + q[0], max(miss, closing)
+    return found, impulses, exerted, p[0] + q[0], max(miss, fastest), again
+
+
+@inlined
+def _moved(exerted, u, w, inv_mass, mass_b, K):
+    """Planar motion that impulses along the tangents, and moments, lead to."""
+    fa, fb, tn, ta, tb = exerted
+    return u[1] + inv_mass * fa, u[2] + mass_b * fb, w[0] + (K[0] * tn + K[1] * ta + K[2] * tb)
 
 
 @inlined
@@ -214,14 +251,19 @@ def _search(n, patient, mu, goal, patch, start, pivot, axes, u, w, inv_mass, K, 
     """
     ratio = friction_ratio(work)
     mass_b = ratio * ratio * inv_mass
-    on, none = pushing(n), Lanes(0.0, 0.0, 0.0, 0.0)
+    on = present(n)
+    none = is_back = Lanes(0.0, 0.0, 0.0, 0.0)
     count, motion, tried, hurry, is_set = n, start, none, False, False
     center = normal_motion = start
     for _ in range(SLIDE_LIMIT):
         if count < 3:
-            return _two_left(patch, on, mu, goal, axes, u, w, inv_mass, K, work)
+            found, impulses, exerted, push, miss, again = _two_left(patch, on, mu, goal, axes, u, w, inv_mass, K, work)
+            if again < 0 or is_back[again] > 0.0:
+                return found, impulses, exerted, push, miss
+            count, on, is_back = 3, chosen(lane(again), 1.0, on), chosen(lane(again), 1.0, is_back)
+            motion = _moved(exerted, u, w, inv_mass, mass_b, K)
         if not is_set:
-            ok, center, normal_motion = _normal_motion(count, goal, patch, on)
+            ok, count, on, center, normal_motion = _normal_motion(count, goal, patch, on, u, w)
             if not ok:
                 break
             is_set = True
@@ -246,9 +288,8 @@ def _search(n, patient, mu, goal, patch, start, pivot, axes, u, w, inv_mass, K, 
         loser, p, exerted = resultant(patch, on, center, y0, y, slip)
         is_settled = True
         if loser < 0 or patient:
-            fa, fb, tn, ta, tb = exerted
-            wn = w[0] + (K[0] * tn + K[1] * ta + K[2] * tb)
-            delta = (u[1] + inv_mass * fa - motion[0], u[2] + mass_b * fb - motion[1], wn - motion[2])
+            led_to = _moved(exerted, u, w, inv_mass, mass_b, K)
+            delta = led_to[0] - motion[0], led_to[1] - motion[1], led_to[2] - motion[2]
             miss, k = across_misses(patch, p, slip, mu, delta)
             if loser < 0 and miss <= goal:
                 work.mode = SLIDE
@@ -268,7 +309,7 @@ def _search(n, patient, mu, goal, patch, start, pivot, axes, u, w, inv_mass, K, 
 @inlined
 def _slide_many(n, friction, patch, axes, u, w, inv_mass, K, work):
     """Three contacts or four: (found, tangents and moments, Σ p_n, residual, its scale), `work.impulse` when found."""
-    on = pushing(n)
+    on = present(n)
     scale = free_speed(friction, patch, u, w)
     start, pivot = (u[1], u[2], w[0]), -1
     if friction is not None:
@@ -343,7 +384,7 @@ def slide_patch(n, friction, seen, patch, v, L, work):
     Parameters
     ----------
     n : int
-        Contacts in `work`, `patch.MOST` at most: arm, target, slot and impulse (the warm start) are read.
+        Contacts in `work`, four at most: arm, target, slot and impulse (the warm start) are read.
     friction : True or None
         None: frictionless, `work.mu` is 0 and `work.impulse` has one number per contact.
     seen : tuple

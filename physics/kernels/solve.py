@@ -8,8 +8,8 @@ from physics.kernels.compiler import inlined, kernel
 from physics.kernels.compliance import soften, stiffness
 from physics.kernels.direct import hold_all
 from physics.kernels.ellipse import stretch, unstretch
-from physics.kernels.lanes import Lanes
-from physics.kernels.patch import MOST, may_hold, place_patch
+from physics.kernels.lanes import WIDTH, Lanes
+from physics.kernels.patch import may_hold, place_patch
 from physics.kernels.proximal import proximal_newton
 from physics.kernels.pyramid import normal_fallback, pyramid_fallback
 from physics.kernels.slide import HOLD, seen_from_wall, slide_patch
@@ -119,14 +119,14 @@ def _directly(n, friction, R, v, L, work):
     `slide` knows all about a single contact. Whether an edge, or contacts of several walls, held last is tried first.
     """
     wall = wall_of(work.slot[0], work)
-    is_one_wall = n <= MOST and wall_of(work.slot[n - 1], work) == wall
+    is_one_wall = n <= WIDTH and wall_of(work.slot[n - 1], work) == wall
     seen = seen_from_wall(wall, R, v, L, work)
     patch = _face(n if is_one_wall else 0, seen, work)
     holds_first = False
     if friction is not None and n > 1:
         holds_first = work.mode == HOLD
         if is_one_wall and n > 2:
-            holds_first = may_hold(n, patch, work.mu, seen[2], seen[3], 1.0 / work.mass, seen[1])
+            holds_first = may_hold(n, patch, seen[0], v, L, work)
     attempts = 2
     if stiffness(work) > 0.0:  # neither holds nor has a normal motion known beforehand: `slide` for one or two
         holds_first, attempts = False, 1 if n <= 2 else 0

@@ -32,6 +32,9 @@ GAIN_SHARE = 2.0e-5
 # Slops that what is pressed by strong loads may move in a step.
 STILL_SHARE = 0.01
 
+# Slops that contacts which hold may miss their targets by in a step.
+UNSEEN_SHARE = 0.01
+
 
 def memory_size(slots: int) -> int:
     """Columns of `memory` for bodies with `slots` possible contacts."""
@@ -163,7 +166,7 @@ def impact(n, y, h, friction, smooth, tilted, pivots, report, work):
     for k in range(3 * n):
         work.impulse[k] = 0.0
     R = qt.to_matrix(principal_attitude(q, work, tilted))
-    work.mode, work.still = SLIDE, math.inf
+    work.mode, work.still, work.unseen = SLIDE, math.inf, 0.0
     solved = solve_contacts(n, friction, smooth, pivots, v, L, R, work)
     if not solved[2] <= work.tolerance:
         solved = shortened(n, friction, v, turning(R, L, work.J), solved, (v, L), R, work)
@@ -213,6 +216,7 @@ def touch(n, y, h, friction, smooth, gyroscopic, tilted, pivots, memory, report,
     v = (v[0] + h * a[0], v[1] + h * a[1], v[2] + h * a[2])
     L = (L[0] + h * torque[0], L[1] + h * torque[1], L[2] + h * torque[2])
     work.mode, work.still = int(memory[work.i, MODE]), still_speed(h, work)
+    work.unseen = UNSEEN_SHARE * work.slop / h
     solved = solve_contacts(n, friction, smooth, pivots, v, L, R, work)
     if opposes_mean and has_turned_round(n, solved[0], turning(R, solved[1], work.J), work):
         oppose_end_slip(n, work)

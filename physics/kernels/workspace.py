@@ -72,6 +72,7 @@ def workspace_dtype(
     stage = [
         ("mode", i),  # which direct solve to try first, then which one did it (`slide.HOLD`, `SLIDE`, `PIVOT` + slot)
         ("still", f),  # residual that is asked for beside the tolerance [m/s]: see `stages.still_speed`
+        ("unseen", f),  # by what the targets of contacts that hold may be off [m/s]: see `direct`
         ("is_last", i),  # 1 in the last stage a substep may have: take in all that would pass through a wall
     ]
     contacts = [
@@ -96,8 +97,6 @@ def workspace_dtype(
         ("active", i, (n,)),  # of a direct solve: contacts that push, flags (`direct`) or a list (`slide`)
         ("normal", f, (n,)),  # of a direct solve: normal impulse, negative where the contact is open [N s]
         ("across", f, (n, 2)),  # of `direct`: tangential impulse [N s]
-        ("weight", f, (n,)),  # of `share`: share in the tangential impulse [N s]
-        ("place", f, (n, 2)),  # of `share`: coordinates of the contact along the tangents [m]
         ("twist", f, (6,)),  # of `proximal`: change of (v, ω) [m/s, rad/s]
         ("start", f, (6,)),
         ("defect", f, (6,)),

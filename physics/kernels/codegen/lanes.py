@@ -9,8 +9,8 @@ from functools import partial
 from llvmlite import ir
 from numba.core import cgutils, types, typing
 from numba.core.typing.templates import AbstractTemplate, infer_global
-from numba.extending import register_model
 from numba.extending import models as data_models
+from numba.extending import register_model
 
 from physics.kernels import lanes
 from physics.kernels.codegen.builder import WORD, word
