@@ -25,14 +25,16 @@ LEAST_SLIP = 0.01
 
 
 @inlined
+def _along(axis, n, work):
+    """Coordinates of the contacts along an axis, from the centre of mass."""
+    return axis[0] * column(work.arm, 0, n) + axis[1] * column(work.arm, 1, n) + axis[2] * column(work.arm, 2, n)
+
+
+@inlined
 def place_patch(n, axes, inv_mass, K, work):
     """The patch (place, target, mobility) of the n contacts in `work`, on the wall with these axes."""
     ratio = friction_ratio(work)
-    arm = (column(work.arm, 0, n), column(work.arm, 1, n), column(work.arm, 2, n))
-    e, s, t = axes
-    c = ratio * (e[0] * arm[0] + e[1] * arm[1] + e[2] * arm[2])
-    a = ratio * (s[0] * arm[0] + s[1] * arm[1] + s[2] * arm[2])
-    b = t[0] * arm[0] + t[1] * arm[1] + t[2] * arm[2]
+    c, a, b = ratio * _along(axes[0], n, work), ratio * _along(axes[1], n, work), _along(axes[2], n, work)
     target = (column(work.target, 0, n), column(work.target, 1, n), ratio * column(work.target, 2, n))
     mass_b = ratio * ratio * inv_mass
     mobility = (inv_mass + mass_b) + K[0] * (a * a + b * b) - 2.0 * c * (K[1] * a + K[2] * b) + c * c * (K[3] + K[5])
@@ -63,9 +65,8 @@ def warm_motion(n, patch, on, u, w, inv_mass, K, work):
 
 
 @inlined
-def _spread(n, patch, on):
+def _spread(n, a, b, on):
     """Centroid of the contacts along the tangents, and mean square of their distance from it."""
-    (_, a, b), _, _ = patch
     share = 1.0 / n
     ca, cb = share * total(on * a), share * total(on * b)
     a, b = on * (a - ca), on * (b - cb)
@@ -73,21 +74,22 @@ def _spread(n, patch, on):
 
 
 @inlined
-def may_hold(n, patch, axes, v, L, work):
+def may_hold(n, axes, v, L, work):
     """Whether friction may stop a face, with the velocity v and angular momentum L that it has without it.
 
     What holds stops at its wall: the pushes P take away the normal momentum, and friction, μP at most, the tangential
     one; its moment about the centroid is μ Σ p_i |d_i| <= μP max |d_i| at most. Of a face that can hold this is true;
     one that slips within the tolerance of a solve would be taken for it, and creep.
     """
-    (_, a, b), _, _ = patch
-    ca, cb, _ = _spread(n, patch, present(n))
-    va, vb = qt.dot(axes[1], v), qt.dot(axes[2], v) / friction_ratio(work)
-    friction = work.mu * qt.dot(axes[0], v)
+    ratio, friction = friction_ratio(work), work.mu * qt.dot(axes[0], v)
+    va, vb, limit = qt.dot(axes[1], v), qt.dot(axes[2], v) / ratio, friction * friction
+    if va * va + vb * vb > limit:
+        return False
+    a, b = ratio * _along(axes[1], n, work), _along(axes[2], n, work)
+    ca, cb, _ = _spread(n, a, b, present(n))
     moment = ca * vb - cb * va - qt.dot(axes[0], L) / work.mass
     a, b = a - ca, b - cb
-    limit = friction * friction
-    return va * va + vb * vb <= limit and moment * moment <= largest(a * a + b * b) * limit
+    return moment * moment <= largest(a * a + b * b) * limit
 
 
 @inlined
@@ -103,7 +105,8 @@ def cold_motion(n, patch, on, mu, u, w, inv_mass, K):
     1/φ is all but a straight line and concave: one step of Newton's, from where it is not above 1, is near enough. What
     φ(0) <= 1 says would hold is given a small part of its slip, since directions are wanted.
     """
-    ca, cb, second = _spread(n, patch, on)
+    (_, a, b), _, _ = patch
+    ca, cb, second = _spread(n, a, b, on)
     va, vb = u[1] - w[0] * cb, u[2] + w[0] * ca
     slip2, turn2, beta = va * va + vb * vb, second * w[0] * w[0], mu * max(-u[0], 0.0)
     free, gamma = math.sqrt(slip2 + turn2), beta * second * K[0] / inv_mass

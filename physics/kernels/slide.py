@@ -49,6 +49,7 @@ from physics.kernels.patch import (
     comply,
     fit_targets,
     free_speed,
+    place_patch,
     respond,
     resultant,
     spare_speed,
@@ -307,9 +308,9 @@ def _search(n, patient, mu, goal, patch, start, pivot, axes, u, w, inv_mass, K, 
 
 
 @inlined
-def _slide_many(n, friction, patch, axes, u, w, inv_mass, K, work):
+def _slide_many(n, friction, axes, u, w, inv_mass, K, work):
     """Three contacts or four: (found, tangents and moments, Σ p_n, residual, its scale), `work.impulse` when found."""
-    on = present(n)
+    patch, on = place_patch(n, axes, inv_mass, K, work), present(n)
     scale = free_speed(friction, patch, u, w)
     start, pivot = (u[1], u[2], w[0]), -1
     if friction is not None:
@@ -369,16 +370,7 @@ def _slide_few(n, friction, axes, u, w, inv_mass, K, work):
 
 
 @inlined
-def seen_from_wall(wall, R, v, L, work):
-    """Axes of a wall; inverse inertia, velocity and angular velocity without impulses in its stretched frame."""
-    axes = wall_axes(work.walls, wall)
-    K, u, w = wall_frame(R, v, L, axes, work.J)
-    K, u, w = stretched_frame(K, u, w, friction_ratio(work))
-    return axes, K, u, w
-
-
-@inlined
-def slide_patch(n, friction, seen, patch, v, L, work):
+def slide_patch(n, friction, wall, R, v, L, work):
     """Try the impulses with which the n contacts of one wall slide, open, or turn about one that holds.
 
     Parameters
@@ -387,10 +379,10 @@ def slide_patch(n, friction, seen, patch, v, L, work):
         Contacts in `work`, four at most: arm, target, slot and impulse (the warm start) are read.
     friction : True or None
         None: frictionless, `work.mu` is 0 and `work.impulse` has one number per contact.
-    seen : tuple
-        Of `seen_from_wall`.
-    patch : tuple
-        Of `patch.place_patch`; it is read if there are more than two contacts.
+    wall : int
+        The wall.
+    R : tuple of 9 floats
+        Principal frame to world.
     v, L : tuples of 3 floats
         Velocity [m/s] and angular momentum [kg m²/s] without contact impulses, world frame.
 
@@ -403,12 +395,13 @@ def slide_patch(n, friction, seen, patch, v, L, work):
     residual : float
         Relative to the largest free contact speed.
     """
-    axes, K, u, w = seen
-    inv_mass, ratio = 1.0 / work.mass, friction_ratio(work)
+    axes, inv_mass, ratio = wall_axes(work.walls, wall), 1.0 / work.mass, friction_ratio(work)
+    K, u, w = wall_frame(R, v, L, axes, work.J)
+    K, u, w = stretched_frame(K, u, w, ratio)
     if n < 3:
         found, exerted, push, miss, scale = _slide_few(n, friction, axes, u, w, inv_mass, K, work)
     else:
-        found, exerted, push, miss, scale = _slide_many(n, friction, patch, axes, u, w, inv_mass, K, work)
+        found, exerted, push, miss, scale = _slide_many(n, friction, axes, u, w, inv_mass, K, work)
     if not found:
         return False, v, L, 0.0
     if scale > 0.0:

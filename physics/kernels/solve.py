@@ -8,11 +8,12 @@ from physics.kernels.compiler import inlined, kernel
 from physics.kernels.compliance import soften, stiffness
 from physics.kernels.direct import hold_all
 from physics.kernels.ellipse import stretch, unstretch
-from physics.kernels.lanes import WIDTH, Lanes
-from physics.kernels.patch import may_hold, place_patch
+from physics.kernels.lanes import WIDTH
+from physics.kernels.patch import may_hold
 from physics.kernels.proximal import proximal_newton
 from physics.kernels.pyramid import normal_fallback, pyramid_fallback
-from physics.kernels.slide import HOLD, seen_from_wall, slide_patch
+from physics.kernels.share import wall_axes
+from physics.kernels.slide import HOLD, slide_patch
 from physics.kernels.sweeps import (
     assemble,
     cone_residual,
@@ -104,15 +105,6 @@ def _apply(n, width, v, L, work):
 
 
 @inlined
-def _face(n, seen, work):
-    """The patch of three contacts or four of one wall; of fewer nothing that is read."""
-    nothing = Lanes(0.0, 0.0, 0.0, 0.0)
-    if n < 3:
-        return (nothing, nothing, nothing), (nothing, nothing, nothing), nothing
-    return place_patch(n, seen[0], 1.0 / work.mass, seen[1], work)
-
-
-@inlined
 def _directly(n, friction, R, v, L, work):
     """Try that all contacts hold, and that they slide, the likelier one first: (found, v, L, residual).
 
@@ -120,13 +112,11 @@ def _directly(n, friction, R, v, L, work):
     """
     wall = wall_of(work.slot[0], work)
     is_one_wall = n <= WIDTH and wall_of(work.slot[n - 1], work) == wall
-    seen = seen_from_wall(wall, R, v, L, work)
-    patch = _face(n if is_one_wall else 0, seen, work)
     holds_first = False
     if friction is not None and n > 1:
         holds_first = work.mode == HOLD
         if is_one_wall and n > 2:
-            holds_first = may_hold(n, patch, seen[0], v, L, work)
+            holds_first = may_hold(n, wall_axes(work.walls, wall), v, L, work)
     attempts = 2
     if stiffness(work) > 0.0:  # neither holds nor has a normal motion known beforehand: `slide` for one or two
         holds_first, attempts = False, 1 if n <= 2 else 0
@@ -137,7 +127,7 @@ def _directly(n, friction, R, v, L, work):
                 work.mode = HOLD
                 return True, v1, L1, residual
         elif is_one_wall:
-            found, v1, L1, residual = slide_patch(n, friction, seen, patch, v, L, work)
+            found, v1, L1, residual = slide_patch(n, friction, wall, R, v, L, work)
             if found:
                 return True, v1, L1, residual
     return False, v, L, 0.0
