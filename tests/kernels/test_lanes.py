@@ -1,0 +1,120 @@
+"""Four numbers at once: compiled they are, to the last bit, what they are in Python."""
+
+from __future__ import annotations
+
+import math
+import types
+
+import numpy as np
+import pytest
+from hypothesis import example, given
+from hypothesis import strategies as st
+
+from physics.kernels import columns
+from physics.kernels.compiler import inlined, kernel
+from physics.kernels.lanes import Lanes, chosen, first_of, larger, largest, least, root, smaller, total
+
+FOUR = st.tuples(*[st.floats(width=64, allow_subnormal=False)] * 4)
+NAN, INF = math.nan, math.inf
+CORNERS = [(NAN, 0.0, -0.0, 1.0), (INF, -INF, NAN, 2.0), (0.0, -0.0, 0.0, -0.0), (1.0, 1.0, 1.0, 1.0)]
+
+
+@inlined
+def _sums(x, y, s):
+    return x + y, x - s, s * y, x / y, s / x, -x, abs(x), 2 * x
+
+
+@inlined
+def _choices(x, y, s):
+    return root(x), larger(x, y), smaller(x, s), chosen(x > y, x, s), chosen((x <= s) & ~(y == x), 1.0, y)
+
+
+@inlined
+def _orders(x, y, s):
+    return first_of(x < y), first_of(x >= s), first_of((x > s) | (y > s)), first_of(~(x <= y))
+
+
+@inlined
+def _of_all(x):
+    return total(x), largest(x), least(x)
+
+
+@kernel
+def compute(a, b, s, out):
+    """All operations on lanes a and b and a number s: four numbers in each row of `out`."""
+    x, y = Lanes(a[0], a[1], a[2], a[3]), Lanes(b[0], b[1], b[2], b[3])
+    row = 0
+    for z in _sums(x, y, s):
+        for k in range(4):
+            out[row, k] = z[k]
+        row += 1
+    for z in _choices(x, y, s):
+        for k in range(4):
+            out[row, k] = z[k]
+        row += 1
+    places, sums = _orders(x, y, s), _of_all(x)
+    for k in range(4):
+        out[row, k] = places[k]
+    for k in range(3):
+        out[row + 1, k] = sums[k]
+
+
+def interpreted(function, **others):
+    """A kernel's Python function, with others for the kernels that it calls."""
+    function = function.py_func
+    return types.FunctionType(function.__code__, {**function.__globals__, **others})
+
+
+PARTS = {name: interpreted(part) for name, part in [("_sums", _sums), ("_choices", _choices), ("_orders", _orders)]}
+in_python = interpreted(compute, _of_all=interpreted(_of_all), **PARTS)
+
+
+@given(FOUR, FOUR, st.floats(allow_subnormal=False))
+@example(CORNERS[0], CORNERS[1], 0.0)
+@example(CORNERS[1], CORNERS[3], NAN)
+@example(CORNERS[2], CORNERS[2], -0.0)
+def test_each_operation_means_what_python_says(a, b, s):
+    """The same bits; of what is no number only that it is none."""
+    found, meant = np.zeros((2, 15, 4))
+    compute(np.array(a), np.array(b), s, found)
+    with np.errstate(all="ignore"):
+        in_python(np.array(a), np.array(b), s, meant)
+    nothing = np.isnan(meant)
+    assert np.array_equal(np.isnan(found), nothing)
+    assert np.array_equal(np.signbit(found[~nothing]), np.signbit(meant[~nothing]))
+    assert np.array_equal(found[~nothing], meant[~nothing])
+
+
+def test_a_sum_is_taken_in_one_order():
+    """(a + c) + (b + d): another order gives another last bit."""
+    a = np.array([1.0, 1e-16, 1e-16, 0.0])
+    out = np.zeros((15, 4))
+    compute(a, a, 1.0, out)
+    assert out[14, 0] == (a[0] + a[2]) + (a[1] + a[3]) != a[0] + (a[1] + (a[2] + a[3]))
+
+
+@kernel
+def put(values, table, thirds, n, out):
+    """What `columns` makes of n contacts: six rows of four."""
+    for row, z in enumerate(
+        (
+            columns.numbers(values, n),
+            columns.column(table, 1, n),
+            columns.part(thirds, 2, n),
+            columns.present(n),
+            chosen(columns.lane(n - 1), 1.0, 0.0),
+        )
+    ):
+        for k in range(4):
+            out[row, k] = z[k]
+
+
+@pytest.mark.parametrize("n", [1, 2, 3, 4])
+def test_numbers_of_contacts_become_lanes(n):
+    """The last contact stands where there is none, and is told apart by `present`."""
+    values, table, thirds = np.arange(10.0, 10 + n), np.arange(2.0 * n).reshape(n, 2), np.arange(3.0 * n)
+    out = np.zeros((5, 4))
+    put(values, table, thirds, n, out)
+    rows = np.minimum(range(4), n - 1)
+    expected = [values[rows], table[rows, 1], thirds[3 * rows + 2], np.arange(4) < n, np.arange(4) == n - 1]
+    assert np.array_equal(out, np.array(expected, float))
