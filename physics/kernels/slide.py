@@ -29,7 +29,11 @@ has the part along the directions, κ_i d_i d_iᵀ, as if friction were a viscou
 always slows the contacts that stop; one that all but stops is tried as a pivot (`pivot`).
 
 A contact that would have to pull opens, the one that pulls most first; the fit of the targets says whether it
-then separates fast enough. Without friction the first linear system is the solution.
+then separates fast enough. One that would close while two others push pushes again, once. Without friction the first
+linear system is the solution.
+
+All begins with the motion that the impulses of the last step lead to, or, where these are of other loads, with
+`patch.cold_motion`.
 """
 
 from __future__ import annotations
