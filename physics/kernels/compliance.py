@@ -8,7 +8,7 @@ the same way:
 
 (Of a point that is still above the wall, g⁰ > 0, 0 stands for g⁰ there: what is stored in the spring is then no more
 than was paid for.) With g, the gap after the first drift, g¹ = g + θh u + (θh)² b/2 and g'¹ = u + θh b, u the new
-velocity of the point where it is then and b what it gains there per time by turning (`contact.aim_rest`), that is
+velocity of the point where it is then and b what it gains there per time by turning (`aims.aim_rest`), that is
 linear in u. In a contact problem
 
     0 <= p ⟂ u + γ p - t >= 0,    γ = 1/(h D),    D = θ (θhk + c),
@@ -38,10 +38,11 @@ from __future__ import annotations
 import math
 
 from physics.kernels import quaternion as qt
+from physics.kernels.aims import LARGEST_TURN, UNSEEN
 from physics.kernels.arms import arm_and_rate, feature_of, place_arms, wall_normal, wall_of
 from physics.kernels.body import principal_attitude, turning
 from physics.kernels.compiler import inlined
-from physics.kernels.contact import LARGEST_TURN, UNSEEN, gap_of, nearest_outside_set
+from physics.kernels.contact import gap_of, nearest_outside_set
 from physics.kernels.laws import DAMPING, STIFFNESS, if_law, number_of
 from physics.kernels.share import contact_arm
 
@@ -79,7 +80,7 @@ def _no_aim(*arguments):
 
 @if_law((STIFFNESS,), _no_aim)
 def aim_springs(n, x, R, v, w, alpha, before, after, tilted, work):
-    """Targets along the normals, and the γ of the stage, in place of what `contact.aim_rest` asks for.
+    """Targets along the normals, and the γ of the stage, in place of what `aims.aim_rest` asks for.
 
     x, R, v, w, alpha are those of the body between the drifts of `before` and `after`, before the impulses;
     `work.gap` is that at the start.

@@ -20,7 +20,7 @@ contact that would have to pull is left out, the one that pulls most first. If e
 cone at the end, this solves the contact problem exactly; otherwise the contacts slide (`slide`, `sweeps`).
 
 Targets of contacts that hold need not be those of a rigid motion: points of a body that turns are asked to move apart
-(`contact.aim_rest`), by next to nothing when it is about to hold. Held to the letter they would all slide, nanometres a
+(`aims.aim_rest`), by next to nothing when it is about to hold. Held to the letter they would all slide, nanometres a
 step, and friction would be spent on that. They are taken for those of the twist that fits them best where that changes
 them by less than `work.unseen`.
 """

@@ -105,7 +105,7 @@ def turn_about(k, patch, on, mu, goal, center, y0, gain, u, w, wa, wb, spin, inv
     patch, on
         Of the contacts (`patch`).
     center, y0, gain, u, w, wa, wb, K
-        As in `slide.slide_patch`.
+        As in `slide.search`.
     spin : float
         First guess of ω_n [rad/s].
 

@@ -43,26 +43,20 @@ import math
 from physics.kernels import quaternion as qt
 from physics.kernels.columns import lane, present
 from physics.kernels.compiler import inlined
-from physics.kernels.ellipse import friction_ratio, stretched_frame
+from physics.kernels.ellipse import friction_ratio
 from physics.kernels.lanes import Lanes, chosen, first_of, larger, largest, least, root
-from physics.kernels.pair import contact_at, solve_one, solve_pair
+from physics.kernels.pair import contact_at, solve_pair
 from physics.kernels.patch import (
     across_misses,
     add_along,
-    cold_motion,
     comply,
     fit_targets,
-    free_speed,
-    place_patch,
     respond,
     resultant,
     spare_speed,
     turns_little,
-    warm_motion,
 )
 from physics.kernels.pivot import FOUND, PULLS, SLIPS, turn_about
-from physics.kernels.point import to_world, wall_frame
-from physics.kernels.share import wall_axes
 
 # Linear solves of one attempt at most. Two are usual at a tolerance of 1e-6, each contact that opens costs
 # one more.
@@ -176,7 +170,7 @@ def _turn(patch, on, p, slip, mu, compliance, k, motion, delta, gyration2, tried
 
 
 @inlined
-def _first_pivot(n, work):
+def first_pivot(n, work):
     """The contact that held alone in the step before, or -1."""
     if work.mode >= PIVOT:
         for i in range(n):
@@ -225,7 +219,7 @@ def _moved(exerted, u, w, inv_mass, mass_b, K):
 
 
 @inlined
-def _search(n, patient, mu, goal, patch, start, pivot, axes, u, w, inv_mass, K, work):
+def search(n, patient, mu, goal, patch, start, pivot, axes, u, w, inv_mass, K, work):
     """Directions and set of pushing contacts.
 
     Parameters
@@ -309,107 +303,3 @@ def _search(n, patient, mu, goal, patch, start, pivot, axes, u, w, inv_mass, K, 
             if not patient:
                 motion = start
     return False, (none, none, none), (0.0, 0.0, 0.0, 0.0, 0.0), 0.0, 0.0
-
-
-@inlined
-def _slide_many(n, friction, axes, u, w, inv_mass, K, work):
-    """Three contacts or four: (found, tangents and moments, Σ p_n, residual, its scale), `work.impulse` when found."""
-    patch, on = place_patch(n, axes, inv_mass, K, work), present(n)
-    scale = free_speed(friction, patch, u, w)
-    start, pivot = (u[1], u[2], w[0]), -1
-    if friction is not None:
-        start, is_of_now = warm_motion(n, patch, on, u, w, inv_mass, K, work)
-        if is_of_now:
-            pivot = _first_pivot(n, work)
-        elif work.mu > 0.0:
-            start = cold_motion(n, patch, on, work.mu, u, w, inv_mass, K)
-    goal = work.tolerance * scale
-    for patient in range(2):
-        found, impulses, exerted, push, miss = _search(
-            n, patient > 0, work.mu, goal, patch, start, pivot, axes, u, w, inv_mass, K, work
-        )
-        if found:
-            for i in range(n):
-                _store(i, (impulses[0][i], impulses[1][i], impulses[2][i]), friction, work)
-            return True, exerted, push, miss, scale
-    return False, (0.0, 0.0, 0.0, 0.0, 0.0), 0.0, 0.0, scale
-
-
-@inlined
-def _store(i, p, friction, work):
-    """Impulse of contact i to `work.impulse`, along the unit tangents."""
-    if friction is None:
-        work.impulse[i] = p[0]
-    else:
-        work.impulse[3 * i], work.impulse[3 * i + 1] = p[0], p[1]
-        work.impulse[3 * i + 2] = friction_ratio(work) * p[2]
-
-
-@inlined
-def _largest(friction, b):
-    """Largest component of a contact velocity that impulses can change [m/s]."""
-    if friction is None:
-        return abs(b[0])
-    return max(abs(b[0]), max(abs(b[1]), abs(b[2])))
-
-
-@inlined
-def _slide_few(n, friction, axes, u, w, inv_mass, K, work):
-    """One contact or two, as `_slide_many`."""
-    first = contact_at(0, axes, u, w, work)
-    scale = _largest(friction, first[1])
-    if n == 1:
-        found, p, m, miss = solve_one(first, work.mu, work.tolerance * scale, inv_mass, K, work)
-    else:
-        second = contact_at(1, axes, u, w, work)
-        scale = max(scale, _largest(friction, second[1]))
-        found, p, q, m, miss = solve_pair(first, second, work.mu, work.tolerance * scale, inv_mass, K, work)
-        if found:
-            _store(1, q, friction, work)
-    if found:
-        _store(0, p, friction, work)
-    if n == 2:
-        p = p[0] + q[0], p[1] + q[1], p[2] + q[2]
-    return found, (p[1], p[2], m[0], m[1], m[2]), p[0], miss, scale
-
-
-@inlined
-def slide_patch(n, friction, wall, R, v, L, work):
-    """Try the impulses with which the n contacts of one wall slide, open, or turn about one that holds.
-
-    Parameters
-    ----------
-    n : int
-        Contacts in `work`, four at most: arm, target, slot and impulse (the warm start) are read.
-    friction : True or None
-        None: frictionless, `work.mu` is 0 and `work.impulse` has one number per contact.
-    wall : int
-        The wall.
-    R : tuple of 9 floats
-        Principal frame to world.
-    v, L : tuples of 3 floats
-        Velocity [m/s] and angular momentum [kg m²/s] without contact impulses, world frame.
-
-    Returns
-    -------
-    found : bool
-        Whether `work.impulse` was written; `work.mode` then says what to try first next time.
-    v, L : tuples of 3 floats
-        With the contact impulses, when found.
-    residual : float
-        Relative to the largest free contact speed.
-    """
-    axes, inv_mass, ratio = wall_axes(work.walls, wall), 1.0 / work.mass, friction_ratio(work)
-    K, u, w = wall_frame(R, v, L, axes, work.J)
-    K, u, w = stretched_frame(K, u, w, ratio)
-    if n < 3:
-        found, exerted, push, miss, scale = _slide_few(n, friction, axes, u, w, inv_mass, K, work)
-    else:
-        found, exerted, push, miss, scale = _slide_many(n, friction, axes, u, w, inv_mass, K, work)
-    if not found:
-        return False, v, L, 0.0
-    if scale > 0.0:
-        miss /= scale
-    fa, fb, tn, ta, tb = exerted
-    v = to_world(axes, inv_mass * push, inv_mass * fa, ratio * (inv_mass * fb), v)
-    return True, v, to_world(axes, tn, ta, tb / ratio, L), miss

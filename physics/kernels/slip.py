@@ -49,7 +49,7 @@ def _tangential(i, v, w, work):
 def _least_slip(w, h, work):
     """Slip at the start of a stage up to which a contact holds [m/s].
 
-    What the target of a contact that held (`contact.aim_rest`) left over in the stage before: the tolerance of its
+    What the target of a contact that held (`aims.aim_rest`) left over in the stage before: the tolerance of its
     solve, and h² (ω α + ω³ r) but of a sphere, whose arm does not turn with it.
     """
     least = work.tolerance * work.acceleration * h
@@ -72,7 +72,7 @@ def oppose_mean_slip(n, v, w, h, work):
 
     Notes
     -----
-    Changes the tangents of `work.target`, which `contact.aim_rest` has set: what the turning of its arm takes from a
+    Changes the tangents of `work.target`, which `aims.aim_rest` has set: what the turning of its arm takes from a
     contact in half a stage (kept in `work.held`). Added to the velocity at the middle it gives the one at the start.
     """
     least = _least_slip(w, h, work)

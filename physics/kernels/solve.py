@@ -13,7 +13,7 @@ from physics.kernels.patch import may_hold
 from physics.kernels.proximal import proximal_newton
 from physics.kernels.pyramid import normal_fallback, pyramid_fallback
 from physics.kernels.share import wall_axes
-from physics.kernels.slide import HOLD, slide_patch
+from physics.kernels.slide import HOLD
 from physics.kernels.sweeps import (
     assemble,
     cone_residual,
@@ -23,6 +23,7 @@ from physics.kernels.sweeps import (
     normal_sweeps,
     velocities,
 )
+from physics.kernels.wall import slide_on
 
 # Methods, weakest need first (column SOLVER of the report).
 NO_SOLVE = 0
@@ -127,7 +128,7 @@ def _directly(n, friction, R, v, L, work):
                 work.mode = HOLD
                 return True, v1, L1, residual
         elif is_one_wall:
-            found, v1, L1, residual = slide_patch(n, friction, wall, R, v, L, work)
+            found, v1, L1, residual = slide_on(n, friction, wall, R, v, L, work)
             if found:
                 return True, v1, L1, residual
     return False, v, L, 0.0
@@ -181,7 +182,7 @@ def _iterate(n, friction, smooth, goal, work):
 def solve_contacts(n, friction, smooth, pivots, v, L, R, work):
     """Contact impulses that bring the contacts of `work` to their target velocities as far as they can.
 
-    Tried in this order: `hold_all` and `slide_patch`, directly, the likelier one first; sweeps in turn
+    Tried in this order: `hold_all` and `slide_on`, directly, the likelier one first; sweeps in turn
     with Newton's method; pivoting. The first whose residual is within the tolerance gives the result.
 
     Parameters

@@ -6,11 +6,11 @@ import math
 
 from physics.kernels import layout as at
 from physics.kernels import quaternion as qt
+from physics.kernels.aims import aim_impact, aim_rest
 from physics.kernels.arms import place_arms
 from physics.kernels.body import principal_attitude, turning
 from physics.kernels.compiler import inlined
 from physics.kernels.compliance import aim_springs, foretell_gaps, parts_of_stage
-from physics.kernels.contact import aim_impact, aim_rest
 from physics.kernels.flight import drift
 from physics.kernels.laws import STIFFNESS, if_law
 from physics.kernels.resist import aim_tangential, resist_turning, without_gain

@@ -8,7 +8,7 @@ bodies meet, and between the cuts
   half a free drift.
 
 Moreau, *Unilateral contact and dry friction in finite freedom dynamics*, 1988, for the midpoint step; what
-differs are the cut at impacts, the velocity asked for at the step's end (`contact.aim_rest`) and friction against the
+differs are the cut at impacts, the velocity asked for at the step's end (`aims.aim_rest`) and friction against the
 mean slip of few contacts (`slip`), which together make the scheme second order between impacts and exact on parabolas.
 
 What a scene does not have arrives here as None and is pruned by the compiler (see `compiler.kernel`).
@@ -27,7 +27,7 @@ from physics.kernels.body import angular_velocity, bind_body, is_finite, read_st
 from physics.kernels.clearance import clear_substeps
 from physics.kernels.compiler import inlined, kernel
 from physics.kernels.compliance import lift_to_due, stiffness
-from physics.kernels.contact import gap_of, gather, has_passed, nearest_outside_set, push_out
+from physics.kernels.contact import gap_of, gap_rate, gather, has_passed, nearest_outside_set, push_out
 from physics.kernels.fields.loads import (
     bind_fields,
     hold_contact_loads,
@@ -157,8 +157,10 @@ def to_next_impact(n, y, h, friction, smooth, gyroscopic, tilted, pivots, scheme
             break
         gap, nearest = outside_gap(end, tilted, work)
         if nearest != slot and gap < -0.5 * work.slop:
-            slot, high, high_gap, bend = nearest, t, gap, 0.0
+            slot, high, high_gap = nearest, t, gap
             low_gap = max(gap_of(slot, low_end[0], to_matrix(low_end[1]), tilted, work), 0.0)
+            rate = gap_rate(slot, low_end, tilted, work)
+            bend = ((high_gap - low_gap) / (high - low) - rate) / (high - low)
         else:
             if nearest != slot:
                 gap = gap_of(slot, end[0], to_matrix(end[1]), tilted, work)

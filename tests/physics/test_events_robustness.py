@@ -47,7 +47,6 @@ HIT = "an impact placed too late, where the push of a contact is zero: then agai
 
 CASES = [(walls, seed) for walls in ("three", "corner") for seed in range(100, 112)]
 FAILING = {
-    ("corner", 102): WALLS,
     ("corner", 103): WALLS,
     ("corner", 104): WALLS,
 }

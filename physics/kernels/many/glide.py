@@ -6,10 +6,10 @@ import math
 
 from physics.kernels import layout as at
 from physics.kernels import quaternion as qt
+from physics.kernels.aims import CLOSING_SHARE, LARGEST_TURN, UNSEEN, gainless
 from physics.kernels.arms import wandering_point
 from physics.kernels.body import angular_velocity, read_state, write_state
 from physics.kernels.compiler import inlined, kernel
-from physics.kernels.contact import CLOSING_SHARE, LARGEST_TURN, UNSEEN, gainless
 from physics.kernels.fields.linked import hold_linked_loads
 from physics.kernels.fields.loads import hold_contact_loads, hold_loads
 from physics.kernels.flight import drift
@@ -81,7 +81,7 @@ def _coriolis(k, many):
 
 @inlined
 def aim_rest(n, h, many):
-    """Targets of the resting stage over h, with gaps at its middle; see `physics.kernels.contact.aim_rest`.
+    """Targets of the resting stage over h, with gaps at its middle; see `physics.kernels.aims.aim_rest`.
 
     A contact that was apart at the start may close what is left of its gap at the middle in the half that follows.
     Where an error is asked for, what a point on a circle has risen by then is no gap: it would make the velocity an

@@ -70,7 +70,7 @@ def is_meeting(k, h, many):
 def aim_impact(n, h, is_last, many):
     """Targets of an impact, and the contact that approaches fastest of those that make it one, -1: there is none.
 
-    See `physics.kernels.contact.aim_impact`.
+    See `physics.kernels.aims.aim_impact`.
 
     What approaches no faster than loads make it within `rest_share` of the step, or would go in by a few slops only
     until the middle of it, is left to the resting stage, unless it is fast.
