@@ -83,11 +83,12 @@ def may_hold(n, axes, v, L, work):
     """
     ratio, friction = friction_ratio(work), work.mu * qt.dot(axes[0], v)
     va, vb, limit = qt.dot(axes[1], v), qt.dot(axes[2], v) / ratio, friction * friction
-    if va * va + vb * vb > limit:
-        return False
+    spin, slip = qt.dot(axes[0], L) / work.mass, va * va + vb * vb
+    if slip > limit or (slip == 0.0 and spin == 0.0):
+        return slip <= limit
     a, b = ratio * _along(axes[1], n, work), _along(axes[2], n, work)
     ca, cb, _ = _spread(n, a, b, present(n))
-    moment = ca * vb - cb * va - qt.dot(axes[0], L) / work.mass
+    moment = ca * vb - cb * va - spin
     a, b = a - ca, b - cb
     return moment * moment <= largest(a * a + b * b) * limit
 
