@@ -33,6 +33,10 @@ from physics.kernels.share import solve_symmetric
 # Newton steps at most. Two are usual at a tolerance of 1e-6.
 PAIR_LIMIT = 12
 
+# How often a contact is tried as one that holds, and both once more after one that was open has closed.
+HELD_LIMIT = 2
+OPENED_LIMIT = 1
+
 
 @inlined
 def _plus(p, q):
@@ -46,13 +50,14 @@ def _transposed(W):
 
 @inlined
 def _opened(Wi, Wji, bi, bj, mu, goal, x, y):
-    """Contact i alone, contact j open: (found, p_i, p_j, residual)."""
+    """Contact i alone, contact j open: (found, p_i, p_j, residual, direction of i, and of j, to go on from)."""
     zero = (0.0, 0.0, 0.0)
     what, p, miss = answer(Wi, bi, mu, Wi[4] + Wi[8], goal, x, y, True)
-    if what == LOST:
-        return False, p, zero, miss
-    apart = bj[0] + qt.matvec(Wji, p)[0]
-    return apart >= -goal, p, zero, max(miss, -apart)
+    uj = _plus(bj, qt.matvec(Wji, p))
+    if p[0] > 0.0:
+        x, y = p[1] / p[0], p[2] / p[0]
+    xj, yj = heading(uj[1], uj[2], mu)
+    return what != LOST and uj[0] >= -goal, p, zero, max(miss, -uj[0]), x, y, xj, yj
 
 
 @kernel
@@ -140,24 +145,28 @@ def solve_two(W1, W12, W2, b1, b2, mu, goal, x1, y1, x2, y2):
     """Impulses of two contacts: (found, p_1, p_2, residual [m/s])."""
     zero = (0.0, 0.0, 0.0)
     W21 = _transposed(W12)
-    tried = 0
+    held1 = held2 = opened = 0
     for _ in range(PAIR_LIMIT):
         p1, p2, miss1, miss2, sliding = _both_slide(W1, W12, W2, b1, b2, mu, x1, y1, x2, y2)
         if not (p1 >= 0.0 and p2 >= 0.0):
             if p1 >= p2:
-                return _opened(W1, W21, b1, b2, mu, goal, x1, y1)
-            found, q2, q1, miss = _opened(W2, W12, b2, b1, mu, goal, x2, y2)
-            return found, q1, q2, miss
+                found, q1, q2, miss, x1, y1, x2, y2 = _opened(W1, W21, b1, b2, mu, goal, x1, y1)
+            else:
+                found, q2, q1, miss, x2, y2, x1, y1 = _opened(W2, W12, b2, b1, mu, goal, x2, y2)
+            if found or opened == OPENED_LIMIT:
+                return found, q1, q2, miss
+            opened += 1  # the open one closes: once more with both
+            continue
         worst = max(miss1, miss2)
         if worst <= goal:
             return True, (p1, p1 * x1, p1 * y1), (p2, p2 * x2, p2 * y2), worst
-        if miss1 == math.inf and not tried & 1:
-            tried |= 1
+        if miss1 == math.inf and held1 < HELD_LIMIT:
+            held1 += 1
             found, q1, q2, miss, x1, y1, x2, y2 = _held(W1, W12, W2, b1, b2, mu, goal, x2, y2)
             if found:
                 return True, q1, q2, miss
-        elif miss2 == math.inf and not tried & 2:
-            tried |= 2
+        elif miss2 == math.inf and held2 < HELD_LIMIT:
+            held2 += 1
             found, q2, q1, miss, x2, y2, x1, y1 = _held(W2, W21, W1, b2, b1, mu, goal, x1, y1)
             if found:
                 return True, q1, q2, miss
