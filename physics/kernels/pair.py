@@ -18,6 +18,7 @@ from physics.kernels.compiler import inlined, kernel
 from physics.kernels.compliance import give_way
 from physics.kernels.ellipse import friction_ratio
 from physics.kernels.point import (
+    HELD,
     LOST,
     SLID,
     answer,
@@ -54,8 +55,10 @@ def _opened(Wi, Wji, bi, bj, mu, goal, x, y):
     zero = (0.0, 0.0, 0.0)
     what, p, miss = answer(Wi, bi, mu, Wi[4] + Wi[8], goal, x, y, True)
     uj = _plus(bj, qt.matvec(Wji, p))
-    if p[0] > 0.0:
+    if what == SLID:
         x, y = p[1] / p[0], p[2] / p[0]
+    elif what == HELD:
+        x, y = heading(-p[1], -p[2], mu)
     xj, yj = heading(uj[1], uj[2], mu)
     return what != LOST and uj[0] >= -goal, p, zero, max(miss, -uj[0]), x, y, xj, yj
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from physics.kernels.slide import HOLD, SLIDE
@@ -40,6 +40,7 @@ CONTACTS = [[(0, 0)], floor((0, 1)), floor((0, 5)), floor(FACE), [(0, 0), (1, 0)
     st.sampled_from(CONTACTS), speeds, st.sampled_from([0.1, 0.5, 1.0]), st.sampled_from([0.2, 0.7, 3.0]),
     st.sampled_from([HOLD, SLIDE]),
 )  # fmt: skip
+@example([(0, 0), (0, 1), (0, 4), (0, 5)], (0.0, 0.0, 0.125, 0.0, 0.0, 0.125), 1.0, 0.7, HOLD)
 def test_impulses_dissipate_most(contacts, motion, mu, ratio, mode):
     """Whichever method found them: directly, by sweeps and Newton's method, on one wall and on two.
 
