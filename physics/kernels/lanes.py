@@ -61,9 +61,24 @@ for _name in ("lt", "le", "gt", "ge", "eq", "and", "or"):
     _define(_name, getattr(operator, f"__{_name}__"))
 
 
+def row(array, i, j):
+    """The four numbers `array[i, j]` to `array[i, j + 3]`, in one read."""
+    return Lanes(*(float(array[i, j + k]) for k in range(WIDTH)))
+
+
+def put_row(array, i, j, x):
+    """Write four numbers, or one of them four times, to `array[i, j]` to `array[i, j + 3]`."""
+    for k, one in enumerate(_each(float, x).each):
+        array[i, j + k] = one
+
+
+def _root(x) -> float:
+    return math.sqrt(x) if x >= 0.0 else math.nan
+
+
 def root(x):
-    """Square roots; of a negative number, no number."""
-    return _each(lambda one: math.sqrt(one) if one >= 0.0 else math.nan, x)
+    """Square roots; of a negative number, no number. Of a number that is not lanes, a number."""
+    return _each(_root, x) if isinstance(x, Lanes) else _root(x)
 
 
 def larger(x, y):
@@ -84,6 +99,11 @@ def chosen(where, x, y):
 def total(x):
     """Sum of all four: first those two apart, which is also the first half and the second half."""
     return (x[0] + x[2]) + (x[1] + x[3])
+
+
+def totals(a, b, c, d):
+    """`total` of each of four lanes."""
+    return Lanes(*(total(_each(float, one)) for one in (a, b, c, d)))
 
 
 def largest(x):

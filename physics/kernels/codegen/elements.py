@@ -40,7 +40,7 @@ def _from_front(context, builder, index, type_, length):
     return builder.select(builder.icmp_signed("<", index, word(0)), builder.add(index, length), index)
 
 
-def _pointer(context, builder, array_type, array, index_types, indices):
+def pointer(context, builder, array_type, array, index_types, indices):
     """Where an element is; under NUMBA_BOUNDSCHECK=1 an index outside its axis raises IndexError."""
     shape = _lengths(builder, array_type, array, SHAPE, lambda known: known.shape)
     data = builder.extract_value(array, DATA)
@@ -78,7 +78,7 @@ def _is_element(array_type, index_type) -> bool:
 
 def _read(context, builder, sig, args):
     """`a[index]`."""
-    place = _pointer(context, builder, sig.args[0], args[0], *_indices(builder, sig.args[1], args[1]))
+    place = pointer(context, builder, sig.args[0], args[0], *_indices(builder, sig.args[1], args[1]))
     return context.unpack_value(builder, sig.args[0].dtype, place, None if sig.args[0].aligned else 1)
 
 
@@ -86,7 +86,7 @@ def _write(context, builder, sig, args):
     """`a[index] = value`."""
     array_type, index_type, value_type = sig.args
     value = context.cast(builder, args[2], value_type, array_type.dtype)
-    place = _pointer(context, builder, array_type, args[0], *_indices(builder, index_type, args[1]))
+    place = pointer(context, builder, array_type, args[0], *_indices(builder, index_type, args[1]))
     context.pack_value(builder, array_type.dtype, value, place, None if array_type.aligned else 1)
 
 

@@ -13,9 +13,12 @@ from numba.extending import models as data_models
 from numba.extending import register_model
 
 from physics.kernels import lanes
+from physics.kernels.codegen import elements
 from physics.kernels.codegen.builder import WORD, word
 
 _DOUBLE, _INDEX = ir.DoubleType(), ir.IntType(32)
+
+NUMBER_SIZE = 8  # [bytes]
 
 
 class LanesType(types.Type):
@@ -56,7 +59,8 @@ _BOTH = {operator.and_: "and_", operator.or_: "or_"}
 _OF_TWO = (lanes.larger, lanes.smaller)
 _OF_ALL = (lanes.total, lanes.largest, lanes.least)
 _OF_EACH = (operator.neg, abs, lanes.root)
-_NAMED = (lanes.Lanes, lanes.root, lanes.chosen, lanes.first_of, *_OF_TWO, *_OF_ALL)
+_ROWS = (lanes.row, lanes.put_row)
+_NAMED = (lanes.Lanes, lanes.root, lanes.chosen, lanes.first_of, lanes.totals, *_OF_TWO, *_OF_ALL, *_ROWS)
 
 
 def _are_numbers(args) -> bool:
@@ -66,6 +70,15 @@ def _are_numbers(args) -> bool:
 def _are_lanes(args) -> bool:
     """Lanes and numbers beside them, at least one of the former."""
     return LANES in args and all(each is LANES or isinstance(each, types.Number) for each in args)
+
+
+def _is_place_of_row(args) -> bool:
+    """A table of numbers, and where in it a row begins."""
+    return (
+        isinstance(args[0], types.Array)
+        and (args[0].dtype, args[0].ndim, args[0].layout) == (types.float64, 2, "C")
+        and all(isinstance(each, types.Integer) for each in args[1:])
+    )
 
 
 def _result(key, args) -> types.Type | None:
@@ -78,6 +91,13 @@ def _result(key, args) -> types.Type | None:
         return (types.intp if key is lanes.first_of else MARKS) if args == (MARKS,) else None
     if key in _BOTH:
         return MARKS if args == (MARKS, MARKS) else None
+    if key in _ROWS:
+        result = LANES if key is lanes.row else types.none
+        return result if _is_place_of_row(args[:3]) and _are_lanes((LANES, *args[3:])) else None
+    if key is lanes.root and _are_numbers(args):
+        return types.float64
+    if key is lanes.totals:
+        return LANES if len(args) == lanes.WIDTH and _are_lanes((LANES, *args)) else None
     if not _are_lanes(args[:2]):
         return None
     if key is operator.getitem or key in _OF_ALL:
@@ -94,6 +114,8 @@ def signature(key, context, args) -> typing.Signature | None:
     if result is None:
         return None
     number = types.intp if key is operator.getitem else types.float64
+    if key in _ROWS:
+        return typing.signature(result, args[0], types.intp, types.intp, *args[3:])
     return typing.signature(result, *(number if isinstance(each, types.Number) else each for each in args))
 
 
@@ -155,12 +177,52 @@ def _not(context, builder, sig, args):
 
 
 def _call(name, context, builder, sig, args):
-    """A function of LLVM's for vectors."""
+    """A function of LLVM's for vectors and numbers."""
     type_ = args[0].type
+    width = f"v{lanes.WIDTH}" if isinstance(type_, ir.VectorType) else ""
     function = cgutils.get_or_insert_function(
-        builder.module, ir.FunctionType(type_, [type_]), f"llvm.{name}.v{lanes.WIDTH}f64"
+        builder.module, ir.FunctionType(type_, [type_]), f"llvm.{name}.{width}f64"
     )
     return builder.call(function, args)
+
+
+def _place_of_row(context, builder, sig, args):
+    """Pointer to four numbers of a table."""
+    if context.enable_boundscheck:
+        elements.pointer(context, builder, sig.args[0], args[0], sig.args[1:3], [args[1], _last(builder, args[2])])
+    place = elements.pointer(context, builder, sig.args[0], args[0], sig.args[1:3], args[1:3])
+    return builder.bitcast(place, context.get_value_type(LANES).as_pointer())
+
+
+def _last(builder, first):
+    """Column of the last number of a row."""
+    return builder.add(first, word(lanes.WIDTH - 1))
+
+
+def _read_row(context, builder, sig, args):
+    """`row`: a table begins anywhere, so that nothing is known of the place but that it is one of a number."""
+    return builder.load(_place_of_row(context, builder, sig, args), align=NUMBER_SIZE)
+
+
+def _write_row(context, builder, sig, args):
+    """`put_row`."""
+    builder.store(_spread(builder, args[3]), _place_of_row(context, builder, sig, args), align=NUMBER_SIZE)
+    return context.get_dummy_value()
+
+
+def _totals(context, builder, sig, args):
+    """`totals`: halves of two and two beside each other, and halves of those."""
+    a, b, c, d = (_spread(builder, each) for each in args)
+
+    def joined(x, y, first, second):
+        parts = [
+            builder.shuffle_vector(x, y, ir.Constant(ir.VectorType(_INDEX, lanes.WIDTH), which))
+            for which in (first, second)
+        ]
+        return builder.fadd(*parts)
+
+    x, y = joined(a, b, (0, 1, 4, 5), (2, 3, 6, 7)), joined(c, d, (0, 1, 4, 5), (2, 3, 6, 7))
+    return joined(x, y, (0, 2, 4, 6), (1, 3, 5, 7))
 
 
 def _halves(builder, value, join: Callable):
@@ -203,6 +265,9 @@ _LOWERINGS = {
     lanes.chosen: _choose,
     lanes.first_of: _first,
     lanes.root: partial(_call, "sqrt"),
+    lanes.row: _read_row,
+    lanes.put_row: _write_row,
+    lanes.totals: _totals,
     lanes.larger: partial(_one_of_two, ">"),
     lanes.smaller: partial(_one_of_two, "<"),
     lanes.total: _total,
@@ -219,5 +284,5 @@ _LOWERINGS = {
 
 def lowering(key, sig: typing.Signature) -> Callable | None:
     """What lowers an operation on lanes."""
-    is_ours = key is lanes.Lanes or LANES in sig.args or MARKS in sig.args
+    is_ours = key in _NAMED or LANES in sig.args or MARKS in sig.args
     return _LOWERINGS.get(key) if is_ours else None

@@ -1,0 +1,38 @@
+"""Lanes (`physics.kernels.lanes`) as they are compiled against what they mean in plain Python: the same bits."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from numba.core import config
+
+from physics.kernels.compiler import kernel
+from physics.kernels.lanes import put_row, root, row, total, totals
+
+
+@kernel
+def rows(table, i, j, out):
+    """Reads of four numbers from any place, sums of them, and writes."""
+    x, y = row(table, i, j), row(table, i, j + 1)
+    put_row(out, 0, 0, x * y)
+    put_row(out, 0, 5, totals(x, y, x * y, 2.0))
+    put_row(out, 1, 1, root(x))
+    put_row(out, 1, 7, 3.0)
+    out[0, 9], out[0, 10], out[1, 0] = root(table[i, j]), total(x), root(-1.0)
+
+
+@pytest.mark.parametrize("place", [(0, 0), (1, 3), (2, 4)])
+def test_rows_of_a_table_are_read_and_written_as_numbers(place):
+    table = np.random.default_rng(0).uniform(0.1, 1.0, (3, 9))
+    compiled, plain = np.zeros((2, 11)), np.zeros((2, 11))
+    rows(table, *place, compiled)
+    getattr(rows, "py_func", rows)(table, *place, plain)
+    np.testing.assert_array_equal(compiled, plain)
+    i, j = place
+    np.testing.assert_array_equal(plain[0, :4], table[i, j : j + 4] * table[i, j + 1 : j + 5])
+
+
+@pytest.mark.skipif(not config.BOUNDSCHECK, reason="asks for NUMBA_BOUNDSCHECK=1")
+def test_a_row_that_ends_outside_its_table_is_an_error():
+    with pytest.raises(IndexError):
+        rows(np.ones((3, 9)), 2, 5, np.zeros((2, 11)))
