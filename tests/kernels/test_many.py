@@ -13,9 +13,10 @@ from scipy.sparse import csr_array
 from scipy.sparse.csgraph import connected_components
 
 from physics.kernels import layout as at
+from physics.kernels.compiler import kernel
 from physics.kernels.many import blocks as blocks_of
-from physics.kernels.many import cone, system
-from physics.kernels.many.arrays import CONTACTS, LEFT_OUT, PAIRS, make_many
+from physics.kernels.many import bundles, cone, system
+from physics.kernels.many.arrays import BUNDLES, CONTACTS, LEFT_OUT, PAIRS, make_many
 from physics.kernels.many.elimination import order_bodies
 from physics.kernels.many.islands import find_islands
 from physics.kernels.many.near import find_pairs
@@ -214,6 +215,16 @@ def test_faces_that_end_together_touch_all_over(yaw, shift):
 # --- islands and the linear system -----------------------------------------------------------------------------
 
 
+def numbers_of(block):
+    """The numbers of a 6 x 6 block as `blocks` has them: column by column, one unused after each three."""
+    return np.pad(block.T.reshape(6, 2, 3), ((0, 0), (0, 0), (0, 1))).ravel()
+
+
+def block_of(numbers):
+    """The 6 x 6 block of such numbers."""
+    return numbers.reshape(6, 2, 4)[:, :, :3].reshape(6, 6).T
+
+
 def touching(count, pairs, walls=()):
     """`Many` with one contact for each pair of bodies, and for each body in `walls`; how many contacts."""
     many = make_many(count, np.zeros((1, at.WALL_SIZE)), **SETTINGS)
@@ -272,26 +283,57 @@ def test_the_block_system_is_solved(count, links):
         for i, j in {(a, b), (b, a)}:
             block = rng.normal(size=(6, 6)) + 6 * np.sqrt(1 + links) * np.eye(6) * (i == j)
             if i == j:
-                many.diagonal[i] += block
+                many.diagonal[i] += numbers_of(block)
             elif many.rank[i] > many.rank[j]:
-                many.lower[blocks_of.place_of(j, i, many)] += block
+                many.lower[blocks_of.place_of(j, i, many)] += numbers_of(block)
             else:
-                many.upper[blocks_of.place_of(i, j, many)] += block
+                many.upper[blocks_of.place_of(i, j, many)] += numbers_of(block)
             A[6 * i : 6 * i + 6, 6 * j : 6 * j + 6] += block
     right = rng.normal(size=(count, 6))
-    x = right.copy()
+    x = np.pad(right.reshape(count, 2, 3), ((0, 0), (0, 0), (0, 1))).reshape(count, 8)
     blocks_of.factor(0, count, many)
     blocks_of.substitute(0, count, x, many)
+    x = x.reshape(count, 2, 4)[:, :, :3]
     # Backward error of elimination: rounding times the condition of A times its order.
     bound = 6 * count * np.finfo(float).eps * np.linalg.cond(A) * np.abs(x).max()
     np.testing.assert_allclose(x.ravel(), np.linalg.solve(A, right.ravel()), atol=bound)
 
 
+@pytest.mark.parametrize("kind", ["any", "in order", "needs exchanges", "far apart"])
+def test_a_block_is_inverted(kind):
+    """With pivots on its diagonal or not; entries a million apart are no worse than their condition."""
+    rng = np.random.default_rng(0)
+    for _ in range(50):
+        A = rng.normal(size=(6, 6))
+        if kind == "in order":
+            A += 20.0 * np.eye(6)
+        elif kind == "needs exchanges":
+            A = (A + 20.0 * np.eye(6))[rng.permutation(6)]
+        elif kind == "far apart":
+            A = A @ A.T * 1.0e6 + np.eye(6)
+        many = make_many(1, np.zeros((1, at.WALL_SIZE)), **SETTINGS)
+        many.diagonal[0] = numbers_of(A)
+        blocks_of.invert(many.diagonal, 0, many.swaps)
+        # Gauss and Jordan: rounding times condition, times what multipliers up to PIVOT_FACTOR add to it in practice.
+        error = block_of(many.diagonal[0]) - np.linalg.inv(A)
+        assert np.linalg.norm(error, 2) <= 1e-13 * np.linalg.cond(A) * np.linalg.norm(np.linalg.inv(A), 2)
+
+
+@kernel
+def add_bundles(rho, D, E, F, many):
+    """`add_bundle` of all bundles; D, E, F: three numbers of each contact, its matrix."""
+    for g in range(many.counts[BUNDLES]):
+        x, y, z = bundles.gather(g, D, many), bundles.gather(g, E, many), bundles.gather(g, F, many)
+        system.add_bundle(g, (x[0], x[1], x[2], y[0], y[1], y[2], z[0], z[1], z[2]), rho, many)
+
+
+@pytest.mark.parametrize("contacts", [1, 3, 4, 6])
 @pytest.mark.parametrize(("count", "links"), [(1, 0), (2, 0), (9, 12)])
-def test_the_matrix_is_that_of_the_contacts(count, links):
-    """1 + M⁻¹ Jᵀ ρ D J, D not symmetric, against dense matrices; contacts of walls among them."""
+def test_the_matrix_is_that_of_the_contacts(count, links, contacts):
+    """1 + M⁻¹ Jᵀ ρ D J, D not symmetric, against dense matrices; contacts of walls among them, several of each pair."""
     rng = np.random.default_rng(links)
-    many, n = touching(count, connected_pairs(rng, count, links), list(range(0, count, 2)))
+    pairs = [pair for pair in connected_pairs(rng, count, links) for _ in range(contacts)]
+    many, n = touching(count, pairs, list(range(0, count, 2)))
     find_islands(n, many)
     order_bodies(0, n, 0, count, many)
     many.frame[:n] = [np.linalg.qr(rng.normal(size=(3, 3)))[0].ravel() for _ in range(n)]
@@ -303,6 +345,7 @@ def test_the_matrix_is_that_of_the_contacts(count, links):
         many.turning[b] = K[np.triu_indices(3)]
         M[6 * b : 6 * b + 3, 6 * b : 6 * b + 3] = many.lightness[b] * np.eye(3)
         M[6 * b + 3 : 6 * b + 6, 6 * b + 3 : 6 * b + 6] = K
+    assert bundles.bundle_contacts(0, n, many)
     blocks_of.clear(0, count, many)
     A, found = np.eye(6 * count), np.zeros((6 * count, 6 * count))
     for k in range(n):
@@ -313,14 +356,14 @@ def test_the_matrix_is_that_of_the_contacts(count, links):
                 J[:, 6 * b : 6 * b + 6] = sign * np.hstack([np.eye(3), np.cross(np.eye(3), r).T])  # v + ω x r
         J = many.frame[k].reshape(3, 3) @ J
         A += M @ J.T @ (rho * D[k].reshape(3, 3)) @ J
-        system.add_contact(k, tuple(D[k]), rho, many)
+    add_bundles(rho, *(np.ascontiguousarray(D[:, k : k + 3]) for k in (0, 3, 6)), many)
     system.complete_matrix(0, count, many)
     for b in range(count):
-        found[6 * b : 6 * b + 6, 6 * b : 6 * b + 6] = many.diagonal[b]
+        found[6 * b : 6 * b + 6, 6 * b : 6 * b + 6] = block_of(many.diagonal[b])
         for k in range(many.start[b], many.stop[b]):
             c = many.column[k]
-            found[6 * c : 6 * c + 6, 6 * b : 6 * b + 6] = many.lower[k]
-            found[6 * b : 6 * b + 6, 6 * c : 6 * c + 6] = many.upper[k]
+            found[6 * c : 6 * c + 6, 6 * b : 6 * b + 6] = block_of(many.lower[k])
+            found[6 * b : 6 * b + 6, 6 * c : 6 * c + 6] = block_of(many.upper[k])
     np.testing.assert_allclose(found, A, atol=1e-14 * n * np.abs(A).max())  # rounding of n sums of products
 
 

@@ -28,8 +28,22 @@ ENTRIES_PER_BODY = 4
 # Blocks of the linear system of `blocks` per body: where more are needed Newton's method is left out.
 BLOCKS_PER_BODY = 32
 
-# `counts`: contacts, pairs, and contacts or pairs for which there was no room.
-CONTACTS, PAIRS, LEFT_OUT = range(3)
+# Bundles of contacts of one island (`bundles`) per body: where more are needed Newton's method is left out, too.
+BUNDLES_PER_BODY = 32
+
+# `counts`: contacts, pairs, contacts or pairs for which there was no room, and bundles of the island that is solved.
+CONTACTS, PAIRS, LEFT_OUT, BUNDLES = range(4)
+
+# Of `blocks`: numbers of a column, velocity and angular velocity with one unused after each, and of a block of six.
+COLUMN_SIZE = 8
+BLOCK_SIZE = 6 * COLUMN_SIZE
+
+# Numbers of a row of `rows`: fifteen vectors, one unused number after each.
+ROWS_SIZE = 15 * 4
+
+# Numbers of a row of `bundle`, and of `lanes`: four for each of the fields in `bundles`.
+BUNDLE_SIZE = 6
+LANES_SIZE = 4 * 52
 
 # Row of `memory`, one per world: length of the last resting stage [s], its contact count, then `MEMORY_SIZE` numbers
 # for each contact: its name, first and second body (-1 - k: wall k), impulse and point in the world frame. Where
@@ -84,6 +98,8 @@ class Many(NamedTuple):
     step: np.ndarray  # 1/λ_max of the tangential part of its block [kg]
     block: np.ndarray  # the contact's own 3 x 3 of W = J M⁻¹ Jᵀ [1/kg]
     inverse: np.ndarray  # its inverse: 00, 01, 02, 11, 12, 22 [kg]
+    rows: np.ndarray  # of `rows`: the Jacobian of a contact, and M⁻¹ times it
+    motion: np.ndarray  # twists while contacts are swept, columns of `blocks`
     settled: np.ndarray  # of `sweeps`: impulses two sweeps ago, and what those two changed [N s]
     trend: np.ndarray
     visited: np.ndarray  # of sweeps without friction: numbers of the last visits of a contact, of a push of a body
@@ -114,22 +130,13 @@ class Many(NamedTuple):
     lower: np.ndarray
     upper: np.ndarray
     swaps: np.ndarray
-    spare: np.ndarray
-    aim: np.ndarray  # of `newton`: q - ρ u [N s]
-    trial: np.ndarray  # p(x) [N s]
-    saved: np.ndarray  # best impulses met by one method, and by all [N s]
-    best: np.ndarray
-    defect: np.ndarray  # x - M⁻¹ Jᵀ p(x) [m/s, rad/s]
+    best: np.ndarray  # best impulses met by all methods for an island [N s]
+    defect: np.ndarray  # of `newton`: x - M⁻¹ Jᵀ p(x), columns of `blocks` [m/s, rad/s]
     before: np.ndarray  # twists before a Newton step
-    change: np.ndarray  # the step
-    weighed: np.ndarray  # of `system`: what one contact adds, times the Jacobian of each end
+    change: np.ndarray  # the step, columns of `blocks`
+    bundle: np.ndarray  # of `bundles`: bodies, place of their block, contacts
+    lanes: np.ndarray  # what `newton` and `interior` know of contacts
     momenta: np.ndarray  # of `restraint`: velocity and angular momentum before an impact, then with all of its rebound
-    inside: np.ndarray  # of `interior`: p̂ and û, their scaling (w, η), what û misses, what is added to p̂
-    slack: np.ndarray
-    scaling: np.ndarray
-    own: np.ndarray  # λ, 1/√det λ and the direction of slip
-    miss: np.ndarray
-    extra: np.ndarray
     hulls: Hulls | None  # tables of convex polyhedra, and a pair of them in place; None where there is no hull
     kept: Kept | None  # None where no error is asked for
     settings: np.ndarray  # one record: see `workspace.setting_fields`
@@ -177,6 +184,7 @@ def make_many(
     rows = np.zeros(nb, np.dtype(body_fields(terms)))
     rows["relative_slop"] = relative_slop
     blocks = min(max(1, nb * (nb - 1) // 2), BLOCKS_PER_BODY * nb)
+    bundles = max(1, min(n, BUNDLES_PER_BODY * nb))
     table = 1 << (2 * n - 1).bit_length()
     return Many(
         bodies=rows, now=np.zeros((nb, STATE_SIZE)), rotation=np.zeros((nb, 9)), lightness=np.zeros(nb),
@@ -184,24 +192,22 @@ def make_many(
         touched=np.zeros(nb, i), order=np.arange(nb, dtype=i), merged=np.zeros(nb, i),
         first_entry=np.zeros(nb + 1, i), cursor=np.zeros(nb, i), entry=np.zeros(ENTRIES_PER_BODY * nb, i),
         walls=walls.copy(),
-        pairs=np.zeros((pairs, 2), i), counts=np.zeros(3, i), ends=np.zeros((n, 2), i), name=np.zeros(n, i),
+        pairs=np.zeros((pairs, 2), i), counts=np.zeros(4, i), ends=np.zeros((n, 2), i), name=np.zeros(n, i),
         owner=np.zeros(n, i), normal=np.zeros((n, 3), f), anchor=np.zeros((n, 6)), frame=np.zeros((n, 9)),
         arm=np.zeros((n, 6)), gap=np.zeros(n), speed=np.zeros(n), mu=np.zeros(n), bounce=np.zeros(n),
         target=np.zeros((n, 3)), impulse=np.zeros((n, 3)), step=np.zeros(n), block=np.zeros((n, 9)),
-        inverse=np.zeros((n, 6)), settled=np.zeros((n, 3)), trend=np.zeros((n, 3)), visited=np.zeros(n, i),
-        pushed=np.zeros(nb, i),
+        rows=np.zeros((n, ROWS_SIZE)), motion=np.zeros((nb, COLUMN_SIZE)), inverse=np.zeros((n, 6)),
+        settled=np.zeros((n, 3)), trend=np.zeros((n, 3)), visited=np.zeros(n, i), pushed=np.zeros(nb, i),
         table=np.full(table, -1, i), mix=np.zeros((4, 3, 3)), polygon=np.zeros((2, 16, 3)),
         edge=np.zeros((2, 16, 2), i), free=np.zeros((nb, 6)), parent=np.zeros(nb, i), island=np.zeros(nb, i),
         first_contact=np.zeros(n + 1, i), first_body=np.zeros(n + 1, i), queue=np.zeros(n, i),
         neighbour=np.zeros((2 * blocks, 2), i), links=np.zeros(1, i), head=np.zeros(nb, i), degree=np.zeros(nb, i),
         mark=np.zeros(nb, i), bucket=np.zeros(nb, i), ahead=np.zeros(nb, i), behind=np.zeros(nb, i),
         rank=np.zeros(nb, i), start=np.zeros(nb, i), stop=np.zeros(nb, i), column=np.zeros(blocks, i),
-        diagonal=np.zeros((nb, 6, 6)), lower=np.zeros((blocks, 6, 6)), upper=np.zeros((blocks, 6, 6)),
-        swaps=np.zeros(6, i), spare=np.zeros((6, 6)), aim=np.zeros((n, 3)), trial=np.zeros((n, 3)),
-        saved=np.zeros((n, 3)), best=np.zeros((n, 3)), defect=np.zeros((nb, 6)),
-        before=np.zeros((nb, 6)), change=np.zeros((nb, 6)), weighed=np.zeros((2, 3, 6)),
-        inside=np.zeros((n, 3)), slack=np.zeros((n, 3)), scaling=np.zeros((n, 4)), own=np.zeros((n, 6)),
-        miss=np.zeros((n, 3)), extra=np.zeros((n, 3)), momenta=np.zeros((nb, 12)),
+        diagonal=np.zeros((nb, BLOCK_SIZE)), lower=np.zeros((blocks, BLOCK_SIZE)), upper=np.zeros((blocks, BLOCK_SIZE)),
+        swaps=np.zeros(6, i), best=np.zeros((n, 3)), defect=np.zeros((nb, COLUMN_SIZE)), before=np.zeros((nb, 6)),
+        change=np.zeros((nb, COLUMN_SIZE)), bundle=np.zeros((bundles, BUNDLE_SIZE), i),
+        lanes=np.zeros((bundles, LANES_SIZE)), momenta=np.zeros((nb, 12)),
         hulls=make_hulls(polyhedra) if polyhedra else None,
         kept=make_kept(nb, memory_size(nb, len(walls), polyhedra)) if refined else None, settings=record,
     )  # fmt: skip

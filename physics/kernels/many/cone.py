@@ -1,4 +1,5 @@
-"""The Lorentz cone x₀ ≥ |(x₁, x₂)| and its scaling, contact by contact: what `interior` is made of.
+"""The Lorentz cone x₀ ≥ |(x₁, x₂)| and its scaling, contact by contact or of four at once: what `interior` is
+made of.
 
 With the product a ∘ b = (a·b, a₀ b' + b₀ a') the cone is that of squares. The scaling of Nesterov and Todd is the
 symmetric W with W p = W⁻¹ u = λ: for the unit vector w = (ū + R p̄)/(2γ), R = diag(1, -1, -1), and η⁴ = det u/det p
@@ -14,26 +15,25 @@ References
 
 from __future__ import annotations
 
-import math
-
 from physics.kernels import quaternion as qt
 from physics.kernels.compiler import inlined
+from physics.kernels.lanes import root
 
 
 @inlined
 def determinant(a):
     """a₀² - |a'|², as a product that does not cancel for a' of one component."""
-    size = math.sqrt(a[1] * a[1] + a[2] * a[2])
+    size = root(a[1] * a[1] + a[2] * a[2])
     return (a[0] - size) * (a[0] + size)
 
 
 @inlined
 def scaling(p, u):
     """((w₀, w₁, w₂, η), λ, 1/√det λ) for p and u inside the cone."""
-    dp, du = math.sqrt(determinant(p)), math.sqrt(determinant(u))
+    dp, du = root(determinant(p)), root(determinant(u))
     s, t = 1.0 / dp, 1.0 / du
-    half = 1.0 / math.sqrt(2.0 + 2.0 * s * t * qt.dot(p, u))  # 1/(2γ)
-    eta = math.sqrt(du * s)
+    half = 1.0 / root(2.0 + 2.0 * s * t * qt.dot(p, u))  # 1/(2γ)
+    eta = root(du * s)
     w = (half * (t * u[0] + s * p[0]), half * (t * u[1] - s * p[1]), half * (t * u[2] - s * p[2]), eta)
     return w, scaled(w, p), 1.0 / (dp * eta)
 
@@ -82,4 +82,4 @@ def way_out(a, inverse, d):
     """
     s = inverse
     h = unscaled((s * a[0], s * a[1], s * a[2], 1.0), (s * d[0], s * d[1], s * d[2]))
-    return math.sqrt(h[1] * h[1] + h[2] * h[2]) - h[0]
+    return root(h[1] * h[1] + h[2] * h[2]) - h[0]

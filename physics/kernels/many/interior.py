@@ -21,15 +21,15 @@ References
 
 from __future__ import annotations
 
-import math
-
 from physics.kernels import quaternion as qt
 from physics.kernels.compiler import inlined, kernel
+from physics.kernels.lanes import Lanes, chosen, larger, largest, total
+from physics.kernels.many import bundles as of
 from physics.kernels.many import cone
-from physics.kernels.many.blocks import SIZE, clear, factor, substitute
-from physics.kernels.many.contacts import local_velocity, plus, put, vector, velocity_along
-from physics.kernels.many.response import natural_map, push
-from physics.kernels.many.system import add_contact, complete_matrix
+from physics.kernels.many.arrays import BUNDLES, COLUMN_SIZE
+from physics.kernels.many.blocks import SIZE, SPIN, clear, factor, substitute
+from physics.kernels.many.contacts import plus
+from physics.kernels.many.system import add_bundle, complete_matrix, set_less
 
 # How near to the boundary of the cones a step may lead; least ratio of p̂·û after and before that is aimed at.
 STEP_SHARE = 0.98
@@ -37,11 +37,9 @@ LEAST_RATIO = 1.0e-4
 
 
 @inlined
-def _units(k, many):
-    """Diagonal of S of contact k: (normal, tangents)."""
-    if not many.mu[k] > 0.0:
-        return 1.0, 0.0
-    return 1.0 / many.mu[k], 1.0
+def _units(g, many):
+    """Diagonal of S of the contacts of bundle g: (normal, tangents)."""
+    return of.one(g, of.UNIT, many), of.one(g, of.UNIT + 1, many)
 
 
 @inlined
@@ -51,36 +49,68 @@ def _into(s, a):
 
 
 @inlined
-def _change(k, s, x, y, many):
-    """(S + e dᵀ) J dx for the change of twists in `many.change`, d = (0, x, y) the direction of slip."""
-    d = _into(s, velocity_along(k, many.change, many))
-    return (d[0] + (x * d[1] + y * d[2]), d[1], d[2])
+def _impulse(s, p):
+    """p of p̂."""
+    return (s[0] * p[0], s[1] * p[1], s[1] * p[2])
 
 
 @inlined
-def _begin(part, start, many):
+def _set_units(g, many):
+    """Write the diagonal of S of the contacts of bundle g."""
+    mu = of.one(g, of.MU, many)
+    of.put_one(g, of.UNIT, chosen(mu > 0.0, 1.0 / mu, 1.0), many)
+    of.put_one(g, of.UNIT + 1, chosen(mu > 0.0, Lanes(1.0, 1.0, 1.0, 1.0), 0.0), many)
+
+
+@inlined
+def _begin(start, many):
     """Start inside the cones by about `start` [m/s], near the impulses as they are."""
-    for i in range(part[0], part[1]):
-        k = many.queue[i]
-        s = _units(k, many)
-        p, u, t = vector(many.impulse, k, 0), local_velocity(k, many), vector(many.target, k, 0)
-        u = _into(s, (u[0] - t[0], u[1] - t[1], u[2] - t[2]))
+    for g in range(many.counts[BUNDLES]):
+        _set_units(g, many)
+        s, p = _units(g, many), of.gather(g, many.impulse, many)
+        u = _into(s, of.velocity_missed(g, many))
         p = (p[0] / s[0], s[1] * p[1], s[1] * p[2])
-        side, slip = math.sqrt(p[1] * p[1] + p[2] * p[2]), math.sqrt(u[1] * u[1] + u[2] * u[2])
-        put(many.inside, k, 0, (max(p[0], side) + start / (many.block[k, 0] * s[0]), p[1], p[2]))
-        put(many.slack, k, 0, (max(u[0] + slip, slip) + start, u[1], u[2]))
+        side, slip = of.length(p[1], p[2]), of.length(u[1], u[2])
+        inside = larger(p[0], side) + start / (of.one(g, of.NORMAL, many) * s[0])
+        of.put_three(g, of.INSIDE, (inside, p[1], p[2]), many)
+        of.put_three(g, of.SLACK, (larger(u[0] + slip, slip) + start, u[1], u[2]), many)
 
 
 @inlined
-def _pose(k, s, w, x, y, many):
-    """Add contact k to the system: S W⁻² (S + e dᵀ) between its rows, d = (0, x, y) the direction of slip."""
+def _pose(g, s, w, x, y, many):
+    """Add bundle g to the system: S W⁻² (S + e dᵀ) between its rows, d = (0, x, y) the direction of slip."""
     f = 1.0 / (w[3] * w[3])
     a, b, c = f * (2.0 * w[0] * w[0] - 1.0), -2.0 * f * w[0] * w[1], -2.0 * f * w[0] * w[2]
-    d, e, g = f * (1.0 + 2.0 * w[1] * w[1]), 2.0 * f * w[1] * w[2], f * (1.0 + 2.0 * w[2] * w[2])
+    d, e, g2 = f * (1.0 + 2.0 * w[1] * w[1]), 2.0 * f * w[1] * w[2], f * (1.0 + 2.0 * w[2] * w[2])
     n, t = s
     D = (n * n * a, n * t * (b + a * x), n * t * (c + a * y), n * t * b, t * t * (d + b * x), t * t * (e + b * y),
-         n * t * c, t * t * (e + c * x), t * t * (g + c * y))  # fmt: skip
-    add_contact(k, D, 1.0, many)
+         n * t * c, t * t * (e + c * x), t * t * (g2 + c * y))  # fmt: skip
+    add_bundle(g, D, 1.0, many)
+
+
+@inlined
+def _scale(g, many):
+    """Scaling of bundle g, its matrix and right side: (p̂·û, residual [m/s])."""
+    s, p, u = _units(g, many), of.three(g, of.INSIDE, many), of.three(g, of.SLACK, many)
+    v = of.velocity_missed(g, many)
+    worst = of.misses(g, _impulse(s, p), v, many)
+    slip = of.length(u[1], u[2])
+    slips = slip > 0.0
+    x, y = chosen(slips, u[1] / slip, 0.0), chosen(slips, u[2] / slip, 0.0)
+    w, own, inverse = cone.scaling(p, u)
+    v = _into(s, v)
+    miss = (v[0] + slip - u[0], v[1] - u[1], v[2] - u[2])
+    of.put_three(g, of.MISS, miss, many)
+    of.put_three(g, of.OWN, own, many)
+    of.put_one(g, of.INVERSE, inverse, many)
+    of.put_one(g, of.SLIP, x, many)
+    of.put_one(g, of.SLIP + 1, y, many)
+    of.put_three(g, of.SCALING, w, many)
+    of.put_one(g, of.SCALING + 3, w[3], many)
+    _pose(g, s, w, x, y, many)
+    f = _into(s, cone.unscaled_twice(w, miss))
+    of.push(g, (-f[0], -f[1], -f[2]), many.defect, SPIN, many)
+    return qt.dot(p, u), worst
 
 
 @kernel
@@ -89,64 +119,54 @@ def _prepare(part, many):
     first, last, begin, end = part
     clear(begin, end, many)
     for i in range(begin, end):
-        b = many.order[i]
-        for c in range(SIZE):
-            many.defect[b, c] = many.free[b, c] - many.twist[b, c]
-    gap = worst = 0.0
-    for i in range(first, last):
-        k = many.queue[i]
-        s, p, u = _units(k, many), vector(many.inside, k, 0), vector(many.slack, k, 0)
-        v, t = local_velocity(k, many), vector(many.target, k, 0)
-        v = (v[0] - t[0], v[1] - t[1], v[2] - t[2])
-        real = (p[0] * s[0], s[1] * p[1], s[1] * p[2])
-        worst = max(worst, natural_map(real, v, many.block[k, 0], many.step[k], many.mu[k] * s[1]))
-        slip = math.sqrt(u[1] * u[1] + u[2] * u[2])
-        x, y = (u[1] / slip, u[2] / slip) if slip > 0.0 else (0.0, 0.0)
-        w, own, inverse = cone.scaling(p, u)
-        gap += qt.dot(p, u)
-        v = _into(s, v)
-        miss = (v[0] + slip - u[0], v[1] - u[1], v[2] - u[2])
-        put(many.miss, k, 0, miss)
-        put(many.own, k, 0, own)
-        put(many.extra, k, 0, (0.0, 0.0, 0.0))
-        many.own[k, 3], many.own[k, 4], many.own[k, 5] = inverse, x, y
-        many.scaling[k, 0], many.scaling[k, 1], many.scaling[k, 2], many.scaling[k, 3] = w
-        _pose(k, s, w, x, y, many)
-        f = _into(s, cone.unscaled_twice(w, miss))
-        push(k, (-f[0], -f[1], -f[2]), many.defect, many)
+        set_less(many.order[i], many.free, many.twist, many)
+    gap = worst = Lanes(0.0, 0.0, 0.0, 0.0)
+    for g in range(many.counts[BUNDLES]):
+        product, miss = _scale(g, many)
+        gap, worst = gap + of.one(g, of.WEIGHT, many) * product, larger(worst, miss)
     complete_matrix(begin, end, many)
     factor(begin, end, many)
-    return gap / (last - first), worst
+    return total(gap) / (last - first), largest(worst)
 
 
 @inlined
-def _scaling_of(k, many):
-    """(w₀, w₁, w₂, η) of contact k."""
-    return (many.scaling[k, 0], many.scaling[k, 1], many.scaling[k, 2], many.scaling[k, 3])
+def _scaling_of(g, many):
+    """(w₀, w₁, w₂, η) of the contacts of bundle g."""
+    w = of.three(g, of.SCALING, many)
+    return (w[0], w[1], w[2], of.one(g, of.SCALING + 3, many))
 
 
 @inlined
-def _explore(part, many):
+def _change(g, s, many):
+    """(S + e dᵀ) J dx for the change of twists in `many.change`, d = (0, x, y) the direction of slip."""
+    x, y = of.one(g, of.SLIP, many), of.one(g, of.SLIP + 1, many)
+    d = _into(s, of.velocity_along(g, many.change, SPIN, many))
+    return (d[0] + (x * d[1] + y * d[2]), d[1], d[2])
+
+
+@inlined
+def _explore(part, is_corrected, many):
     """Changes that belong to `many.change`, W dp̂ and dû; how far they lead, and p̂·û of a contact there.
 
-    With what is in `many.extra`, f, they satisfy W dp̂ + W⁻¹ dû = f - λ. The second number is right where f is 0.
+    With f, what is in the bundles if `is_corrected`, else 0, they satisfy W dp̂ + W⁻¹ dû = f - λ. The second number is
+    right where f is 0.
     """
-    first, last = part[0], part[1]
-    most = 1.0  # of what 1/t must be at least
-    square = product = 0.0
-    for i in range(first, last):
-        k = many.queue[i]
-        own, inverse = vector(many.own, k, 0), many.own[k, 3]
-        du = plus(_change(k, _units(k, many), many.own[k, 4], many.own[k, 5], many), 1.0, vector(many.miss, k, 0))
-        f, g = vector(many.extra, k, 0), cone.unscaled(_scaling_of(k, many), du)
-        dp = (f[0] - own[0] - g[0], f[1] - own[1] - g[1], f[2] - own[2] - g[2])
-        put(many.aim, k, 0, dp)
-        put(many.trial, k, 0, du)
-        most = max(most, max(cone.way_out(own, inverse, dp), cone.way_out(own, inverse, g)))
-        square += qt.dot(own, own)
-        product += qt.dot(dp, g)
-    t = 1.0 / most
-    return t, ((1.0 - t) * square + t * t * product) / (last - first)
+    most = Lanes(1.0, 1.0, 1.0, 1.0)  # of what 1/t must be at least
+    square = product = Lanes(0.0, 0.0, 0.0, 0.0)
+    for g in range(many.counts[BUNDLES]):
+        own, inverse, on = of.three(g, of.OWN, many), of.one(g, of.INVERSE, many), of.one(g, of.WEIGHT, many)
+        du = plus(_change(g, _units(g, many), many), 1.0, of.three(g, of.MISS, many))
+        h = cone.unscaled(_scaling_of(g, many), du)
+        dp = (-own[0] - h[0], -own[1] - h[1], -own[2] - h[2])
+        if is_corrected:
+            dp = plus(dp, 1.0, of.three(g, of.EXTRA, many))
+        of.put_three(g, of.CHANGE, dp, many)
+        of.put_three(g, of.SLACK_CHANGE, du, many)
+        most = larger(most, larger(cone.way_out(own, inverse, dp), cone.way_out(own, inverse, h)))
+        square = square + on * qt.dot(own, own)
+        product = product + on * qt.dot(dp, h)
+    t = 1.0 / largest(most)
+    return t, ((1.0 - t) * total(square) + t * t * total(product)) / (part[1] - part[0])
 
 
 @inlined
@@ -154,7 +174,7 @@ def _set_right_side(part, many):
     """`many.change`: the right side that `_prepare` left."""
     for i in range(part[2], part[3]):
         b = many.order[i]
-        for c in range(SIZE):
+        for c in range(COLUMN_SIZE):
             many.change[b, c] = many.defect[b, c]
 
 
@@ -162,27 +182,26 @@ def _set_right_side(part, many):
 def _correct(part, center, many):
     """Right side with σ ν = `center` and the second-order term of the changes found so far: f = λ \\ (σ ν e - ...)."""
     _set_right_side(part, many)
-    for i in range(part[0], part[1]):
-        k = many.queue[i]
-        own, a = vector(many.own, k, 0), vector(many.aim, k, 0)
+    for g in range(many.counts[BUNDLES]):
+        own, a = of.three(g, of.OWN, many), of.three(g, of.CHANGE, many)
         m = cone.product(a, (-own[0] - a[0], -own[1] - a[1], -own[2] - a[2]))
-        f = cone.quotient((center - m[0], -m[1], -m[2]), own, many.own[k, 3])
-        put(many.extra, k, 0, f)
-        push(k, _into(_units(k, many), cone.unscaled(_scaling_of(k, many), f)), many.change, many)
+        f = cone.quotient((center - m[0], -m[1], -m[2]), own, of.one(g, of.INVERSE, many))
+        of.put_three(g, of.EXTRA, f, many)
+        of.push(g, _into(_units(g, many), cone.unscaled(_scaling_of(g, many), f)), many.change, SPIN, many)
 
 
 @inlined
 def _step(part, t, many):
     """Go t of the way."""
-    for i in range(part[0], part[1]):
-        k = many.queue[i]
-        dp = cone.unscaled(_scaling_of(k, many), vector(many.aim, k, 0))
-        put(many.inside, k, 0, plus(vector(many.inside, k, 0), t, dp))
-        put(many.slack, k, 0, plus(vector(many.slack, k, 0), t, vector(many.trial, k, 0)))
+    for g in range(many.counts[BUNDLES]):
+        dp = cone.unscaled(_scaling_of(g, many), of.three(g, of.CHANGE, many))
+        of.put_three(g, of.INSIDE, plus(of.three(g, of.INSIDE, many), t, dp), many)
+        du = of.three(g, of.SLACK_CHANGE, many)
+        of.put_three(g, of.SLACK, plus(of.three(g, of.SLACK, many), t, du), many)
     for i in range(part[2], part[3]):
         b = many.order[i]
         for c in range(SIZE):
-            many.twist[b, c] += t * many.change[b, c]
+            many.twist[b, c] += t * many.change[b, c + c // 3]
 
 
 @inlined
@@ -192,11 +211,10 @@ def _take(part, many):
         b = many.order[i]
         for c in range(SIZE):
             many.twist[b, c] = many.free[b, c]
-    for i in range(part[0], part[1]):
-        k = many.queue[i]
-        s, p = _units(k, many), vector(many.inside, k, 0)
-        put(many.impulse, k, 0, (p[0] * s[0], s[1] * p[1], s[1] * p[2]))
-        push(k, vector(many.impulse, k, 0), many.twist, many)
+    for g in range(many.counts[BUNDLES]):
+        p = _impulse(_units(g, many), of.three(g, of.INSIDE, many))
+        of.scatter(g, p, many.impulse, many)
+        of.push(g, p, many.twist, 3, many)
 
 
 @kernel
@@ -215,7 +233,7 @@ def interior_point(part, start, goal, limit, many):
     limit : int
     """
     if start > 0.0:
-        _begin(part, start, many)
+        _begin(start, many)
     count = 0
     while count < limit:
         gap, worst = _prepare(part, many)
@@ -223,11 +241,11 @@ def interior_point(part, start, goal, limit, many):
             break
         _set_right_side(part, many)
         substitute(part[2], part[3], many.change, many)
-        _, after = _explore(part, many)
+        _, after = _explore(part, False, many)
         ratio = min(1.0, max(after / gap, LEAST_RATIO))
         _correct(part, ratio * ratio * ratio * gap, many)
         substitute(part[2], part[3], many.change, many)
-        t, _ = _explore(part, many)
+        t, _ = _explore(part, True, many)
         _step(part, min(1.0, STEP_SHARE * t), many)
         count += 1
     _take(part, many)

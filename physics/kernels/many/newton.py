@@ -18,6 +18,8 @@ thrown away and ρ shrinks.
 from __future__ import annotations
 
 from physics.kernels.compiler import inlined, kernel
+from physics.kernels.many import bundles as of
+from physics.kernels.many.arrays import BUNDLES, COLUMN_SIZE
 from physics.kernels.many.blocks import SIZE, factor, substitute
 from physics.kernels.many.contacts import put, vector
 from physics.kernels.many.elimination import order_bodies
@@ -61,7 +63,7 @@ def _follow(part, many):
     for i in range(begin, end):
         b = many.order[i]
         for c in range(SIZE):
-            many.twist[b, c] -= many.defect[b, c]
+            many.twist[b, c] -= many.defect[b, c + c // 3]
 
 
 @kernel
@@ -73,14 +75,16 @@ def _newton_step(part, rho, norm, many):
     for i in range(begin, end):
         b = many.order[i]
         for c in range(SIZE):
-            many.change[b, c], many.before[b, c] = many.defect[b, c], many.twist[b, c]
+            many.before[b, c] = many.twist[b, c]
+        for c in range(COLUMN_SIZE):
+            many.change[b, c] = many.defect[b, c]
     substitute(begin, end, many.change, many)
     after, worst, t = norm, 0.0, 1.0
     for _ in range(HALVINGS):
         for i in range(begin, end):
             b = many.order[i]
             for c in range(SIZE):
-                many.twist[b, c] = many.before[b, c] - t * many.change[b, c]
+                many.twist[b, c] = many.before[b, c] - t * many.change[b, c + c // 3]
         after, worst = defect(part, rho, False, many)
         if after < norm:
             break
@@ -90,35 +94,47 @@ def _newton_step(part, rho, norm, many):
 
 @inlined
 def _apply(part, many):
-    """Twists from the free ones and the impulses."""
-    first, last, begin, end = part
+    """Impulses of the bundles, also contact by contact, and twists from the free ones and them."""
+    _, _, begin, end = part
     for i in range(begin, end):
         b = many.order[i]
         for c in range(SIZE):
             many.twist[b, c] = many.free[b, c]
-    for i in range(first, last):
-        push(many.queue[i], vector(many.impulse, many.queue[i], 0), many.twist, many)
+    for g in range(many.counts[BUNDLES]):
+        p = of.three(g, of.IMPULSE, many)
+        of.scatter(g, p, many.impulse, many)
+        of.push(g, p, many.twist, 3, many)
 
 
 @inlined
-def _copy(part, source, target, many):
-    for i in range(part[0], part[1]):
-        put(target, many.queue[i], 0, vector(source, many.queue[i], 0))
+def _gather_impulses(many):
+    """Bundle the impulses, the best met so far."""
+    for g in range(many.counts[BUNDLES]):
+        p = of.gather(g, many.impulse, many)
+        of.put_three(g, of.IMPULSE, p, many)
+        of.put_three(g, of.SAVED, p, many)
+
+
+@inlined
+def _save(many):
+    """Remember the impulses as the best met."""
+    for g in range(many.counts[BUNDLES]):
+        of.put_three(g, of.SAVED, of.three(g, of.IMPULSE, many), many)
 
 
 @inlined
 def _take_trial(part, many):
     """Take the impulses of the last `defect`, as the law allows them, and the twists that belong to them."""
-    for i in range(part[0], part[1]):
-        k = many.queue[i]
-        put(many.impulse, k, 0, law(vector(many.trial, k, 0), many.mu[k]))
+    for g in range(many.counts[BUNDLES]):
+        of.put_three(g, of.IMPULSE, law(of.three(g, of.TRIAL, many), of.one(g, of.MU, many)), many)
     _apply(part, many)
 
 
 @inlined
 def _restore(part, many):
     """Back to the best impulses met."""
-    _copy(part, many.saved, many.impulse, many)
+    for g in range(many.counts[BUNDLES]):
+        of.put_three(g, of.IMPULSE, of.three(g, of.SAVED, many), many)
     _apply(part, many)
 
 
@@ -158,20 +174,28 @@ def prepare_system(part, sweeps, many):
         return 0
     work = (last - first) * CONTACT_WORK + products * BLOCK_WORK
     count = int(WORTH * sweeps * (last - first) * SWEEP_WORK / work)
-    return min(count, sweeps) if count >= LEAST_STEPS else 0
+    if count < LEAST_STEPS or not of.bundle_contacts(first, last, many):
+        return 0
+    return min(count, sweeps)
 
 
 @inlined
 def save_best(part, many):
     """Remember the impulses as they are as the best of all methods."""
-    _copy(part, many.impulse, many.best, many)
+    for i in range(part[0], part[1]):
+        put(many.best, many.queue[i], 0, vector(many.impulse, many.queue[i], 0))
 
 
 @inlined
 def bring_back_best(part, many):
     """The best impulses of all methods, and the twists that belong to them."""
-    _copy(part, many.best, many.impulse, many)
-    _apply(part, many)
+    for i in range(part[2], part[3]):
+        for c in range(SIZE):
+            many.twist[many.order[i], c] = many.free[many.order[i], c]
+    for i in range(part[0], part[1]):
+        k = many.queue[i]
+        put(many.impulse, k, 0, vector(many.best, k, 0))
+        push(k, vector(many.best, k, 0), many.twist, many)
 
 
 @kernel
@@ -183,7 +207,7 @@ def guess_all_hold(part, friction, residual, enough, many):
     """
     first, last, begin, end = part
     rho = HOLD_FACTOR * _heaviest(part, many)
-    _copy(part, many.impulse, many.saved, many)
+    _gather_impulses(many)
     fill_matrix(part, rho, True, many)
     factor(begin, end, many)
     for _ in range(HOLD_ROUNDS):
@@ -196,7 +220,7 @@ def guess_all_hold(part, friction, residual, enough, many):
             _restore(part, many)
             break
         residual = now
-        _copy(part, many.impulse, many.saved, many)
+        _save(many)
         if residual <= enough:
             break
     return residual
@@ -226,14 +250,14 @@ def newton_contacts(part, friction, residual, goal, limit, scale, many):
         [m/s], measured on what is returned.
     """
     mass, failures, steps = _heaviest(part, many), 0, 0
-    _copy(part, many.impulse, many.saved, many)
+    _gather_impulses(many)
     while residual > goal and failures <= FAILED_ROUNDS and steps < limit:
         enough = ROUND_SHARE * min(ENOUGH * goal, residual)
         steps += max(1, _round(part, scale * mass, enough, min(NEWTON_STEPS, limit - steps), many))
         now = residual_of(part[0], part[1], friction, many)
         if now < residual:
             residual = now
-            _copy(part, many.impulse, many.saved, many)
+            _save(many)
             scale = min(FACTOR_GROWTH * scale, FACTOR_LIMIT)
         else:
             failures += 1

@@ -6,43 +6,53 @@ import math
 
 from physics.kernels import quaternion as qt
 from physics.kernels.compiler import inlined, kernel
-from physics.kernels.many.blocks import SIZE, clear, place_of, six
-from physics.kernels.many.contacts import local_velocity, matrix, put, vector
-from physics.kernels.many.response import push, turned
+from physics.kernels.lanes import Lanes, chosen, larger, put_row, row, totals
+from physics.kernels.many import bundles as of
+from physics.kernels.many.arrays import BLOCK_SIZE, BUNDLES, COLUMN_SIZE
+from physics.kernels.many.blocks import SIZE, SPIN, clear
+from physics.kernels.many.bundles import FIRST, IS_FIRST, PLACE, SECOND
+from physics.kernels.many.contacts import vector
 
 
 @inlined
 def law(y, mu):
-    """The impulse that `y` stands for: no pull, and the tangential part inside its disk."""
-    normal = max(y[0], 0.0)
-    size, limit = math.sqrt(y[1] * y[1] + y[2] * y[2]), mu * normal
-    s = limit / size if size > limit else 1.0
+    """The impulses that `y` stands for: no pull, and the tangential part inside its disk."""
+    normal = larger(y[0], 0.0)
+    size, limit = of.length(y[1], y[2]), mu * normal
+    s = chosen(size > limit, limit / size, 1.0)
     return normal, s * y[1], s * y[2]
+
+
+@inlined
+def set_less(b, a, c, many):
+    """Column b of `many.defect`: row b of twists a less that of twists c."""
+    D = many.defect
+    D[b, 0], D[b, 1], D[b, 2] = a[b, 0] - c[b, 0], a[b, 1] - c[b, 1], a[b, 2] - c[b, 2]
+    D[b, SPIN], D[b, SPIN + 1], D[b, SPIN + 2] = a[b, 3] - c[b, 3], a[b, 4] - c[b, 4], a[b, 5] - c[b, 5]
 
 
 @kernel
 def defect(part, rho, all_hold, many):
-    """x - M⁻¹ Jᵀ p(x) of every body of an island into `many.defect`, p(x) into `many.trial`.
+    """x - M⁻¹ Jᵀ p(x) of every body of an island into `many.defect`, p(x) into the bundles.
 
     Returns its norm by mass, and its largest velocity. With `all_hold` the law is left out: p = q - ρ u.
     """
-    first, last, begin, end = part
+    _, _, begin, end = part
     for i in range(begin, end):
-        b = many.order[i]
-        for c in range(SIZE):
-            many.defect[b, c] = many.twist[b, c] - many.free[b, c]
-    for i in range(first, last):
-        k = many.queue[i]
-        u, t, q = local_velocity(k, many), vector(many.target, k, 0), vector(many.impulse, k, 0)
-        y = (q[0] - rho * (u[0] - t[0]), q[1] - rho * (u[1] - t[1]), q[2] - rho * (u[2] - t[2]))
-        p = y if all_hold else law(y, many.mu[k])
-        put(many.aim, k, 0, y)
-        put(many.trial, k, 0, p)
-        push(k, (-p[0], -p[1], -p[2]), many.defect, many)
+        set_less(many.order[i], many.twist, many.free, many)
+    for g in range(many.counts[BUNDLES]):
+        u, q = of.velocity_missed(g, many), of.three(g, of.IMPULSE, many)
+        y = (q[0] - rho * u[0], q[1] - rho * u[1], q[2] - rho * u[2])
+        of.put_three(g, of.AIM, y, many)
+        p = y
+        if not all_hold:
+            p = law(y, of.one(g, of.MU, many))
+        of.put_three(g, of.TRIAL, p, many)
+        of.push(g, (-p[0], -p[1], -p[2]), many.defect, SPIN, many)
     total = worst = 0.0
     for i in range(begin, end):
         b = many.order[i]
-        v, w, r = vector(many.defect, b, 0), vector(many.defect, b, 3), many.bodies[b].radius
+        v, w, r = vector(many.defect, b, 0), vector(many.defect, b, SPIN), many.bodies[b].radius
         square = qt.dot(v, v) + r * r * qt.dot(w, w)
         total += many.bodies[b].mass * square
         worst = max(worst, square)
@@ -51,97 +61,121 @@ def defect(part, rho, all_hold, many):
 
 @inlined
 def _slopes(y, mu):
-    """Derivative of the law at y > 0, row by row."""
-    size, limit = math.sqrt(y[1] * y[1] + y[2] * y[2]), mu * y[0]
-    if not limit > 0.0:
-        return (1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-    if not size > limit:
-        return (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
-    a, b, s = y[1] / size, y[2] / size, limit / size
-    return (1.0, 0.0, 0.0, mu * a, s * (1.0 - a * a), -s * a * b, mu * b, -s * a * b, s * (1.0 - b * b))
+    """Derivative of the law, row by row: 0 for y <= 0."""
+    size, limit, on = of.length(y[1], y[2]), mu * y[0], chosen(y[0] > 0.0, Lanes(1.0, 1.0, 1.0, 1.0), 0.0)
+    slips = size > limit
+    a, b = chosen(slips, y[1] / size, 0.0), chosen(slips, y[2] / size, 0.0)
+    s = on * chosen(slips, limit / size, 1.0)
+    s = chosen(limit > 0.0, s, 0.0)
+    m = chosen(limit > 0.0, on * mu, 0.0)
+    return (on, 0.0 * on, 0.0 * on, m * a, s * (1.0 - a * a), -s * a * b, m * b, -s * a * b, s * (1.0 - b * b))
 
 
 @inlined
-def _world_rows(D, E, rho):
-    """Rows of ρ Eᵀ D E: D is given in the frame whose axes are the rows of E."""
-    x = qt.transposed_matvec(D, (rho * E[0], rho * E[3], rho * E[6]))
-    y = qt.transposed_matvec(D, (rho * E[1], rho * E[4], rho * E[7]))
-    z = qt.transposed_matvec(D, (rho * E[2], rho * E[5], rho * E[8]))
+def _world_rows(D, E, weight):
+    """Rows of Eᵀ D E times `weight`: D is given in the frame whose axes are the rows of E."""
+    x = qt.transposed_matvec(D, (weight * E[0], weight * E[3], weight * E[6]))
+    y = qt.transposed_matvec(D, (weight * E[1], weight * E[4], weight * E[7]))
+    z = qt.transposed_matvec(D, (weight * E[2], weight * E[5], weight * E[8]))
     return qt.transposed_matvec(E, x), qt.transposed_matvec(E, y), qt.transposed_matvec(E, z)
 
 
 @inlined
-def _weigh(end, A, r, many):
-    """`many.weighed`: A J of one end, J = (1, -[r]×) from the twist of its body to the velocity of its point."""
-    W = many.weighed
-    for c in range(3):
-        g = qt.cross(r, A[c])
-        W[end, c, 0], W[end, c, 1], W[end, c, 2] = A[c]
-        W[end, c, 3], W[end, c, 4], W[end, c, 5] = g
+def _sum(a):
+    """Sum of vectors of a bundle, as half a column."""
+    return totals(a[0], a[1], a[2], Lanes(0.0, 0.0, 0.0, 0.0))
 
 
 @inlined
-def _add_rows(B, place, r, s, x, t, y):
-    """Add s x + t y to row r of the block B[place]."""
-    old = six(B, place, r)
-    B[place, r, 0], B[place, r, 1], B[place, r, 2], B[place, r, 3], B[place, r, 4], B[place, r, 5] = (
-        old[0] + (s * x[0] + t * y[0]), old[1] + (s * x[1] + t * y[1]), old[2] + (s * x[2] + t * y[2]),
-        old[3] + (s * x[3] + t * y[3]), old[4] + (s * x[4] + t * y[4]), old[5] + (s * x[5] + t * y[5]),
-    )  # fmt: skip
+def _columns(x, y, z):
+    """Columns of the matrices with rows x, y, z."""
+    return (x[0], y[0], z[0]), (x[1], y[1], z[1]), (x[2], y[2], z[2])
 
 
 @inlined
-def _add_row(B, place, r, s, x):
-    """Add s x to row r of the block B[place]."""
-    old = six(B, place, r)
-    B[place, r, 0], B[place, r, 1], B[place, r, 2], B[place, r, 3], B[place, r, 4], B[place, r, 5] = (
-        old[0] + s * x[0], old[1] + s * x[1], old[2] + s * x[2],
-        old[3] + s * x[3], old[4] + s * x[4], old[5] + s * x[5],
-    )  # fmt: skip
+def _upper(A):
+    """Sums of three columns."""
+    return _sum(A[0]), _sum(A[1]), _sum(A[2])
 
 
 @inlined
-def _add_product(B, place, r, j, s, many):
-    """Add s Jᵀ (A J of end j) to the block B[place], Jᵀ = (1; [r]×) of the end that the rows belong to."""
-    x, y, z = six(many.weighed, j, 0), six(many.weighed, j, 1), six(many.weighed, j, 2)
-    _add_row(B, place, 0, s, x)
-    _add_row(B, place, 1, s, y)
-    _add_row(B, place, 2, s, z)
-    _add_rows(B, place, 3, s * r[1], z, -s * r[2], y)
-    _add_rows(B, place, 4, s * r[2], x, -s * r[0], z)
-    _add_rows(B, place, 5, s * r[0], y, -s * r[1], x)
+def _below(r, A):
+    """Sums of r x each of three columns: their moments."""
+    return _sum(qt.cross(r, A[0])), _sum(qt.cross(r, A[1])), _sum(qt.cross(r, A[2]))
 
 
 @inlined
-def add_contact(k, D, rho, many):
-    """Add Jᵀ ρ D J of contact k to the blocks of its bodies; D: nine numbers, row by row, in the contact's frame."""
-    a, b = many.ends[k, 0], many.ends[k, 1]
-    A, r = _world_rows(D, matrix(many.frame, k), rho), vector(many.arm, k, 0)
-    _weigh(0, A, r, many)
-    _add_product(many.diagonal, a, r, 0, 1.0, many)
+def _add(B, place, c, upper, lower):
+    """Add halves of three columns to those of block B[place] from c on."""
+    first, second, third = COLUMN_SIZE * c, COLUMN_SIZE * (c + 1), COLUMN_SIZE * (c + 2)
+    put_row(B, place, first, row(B, place, first) + upper[0])
+    put_row(B, place, first + SPIN, row(B, place, first + SPIN) + lower[0])
+    put_row(B, place, second, row(B, place, second) + upper[1])
+    put_row(B, place, second + SPIN, row(B, place, second + SPIN) + lower[1])
+    put_row(B, place, third, row(B, place, third) + upper[2])
+    put_row(B, place, third + SPIN, row(B, place, third + SPIN) + lower[2])
+
+
+@inlined
+def _take(B, place, c, upper, lower):
+    """Take halves of three columns off those of block B[place] from c on."""
+    first, second, third = COLUMN_SIZE * c, COLUMN_SIZE * (c + 1), COLUMN_SIZE * (c + 2)
+    put_row(B, place, first, row(B, place, first) - upper[0])
+    put_row(B, place, first + SPIN, row(B, place, first + SPIN) - lower[0])
+    put_row(B, place, second, row(B, place, second) - upper[1])
+    put_row(B, place, second + SPIN, row(B, place, second + SPIN) - lower[1])
+    put_row(B, place, third, row(B, place, third) - upper[2])
+    put_row(B, place, third + SPIN, row(B, place, third + SPIN) - lower[2])
+
+
+@kernel
+def add_bundle(g, D, rho, many):
+    """Add Jᵀ ρ D J of the contacts of bundle g to the blocks of its bodies; D row by row in the contacts' frames.
+
+    With A = ρ Eᵀ D E and J = (1, -[r]x) from the twist of a body to the velocity of its point, a block is
+
+        Jᵀ A J = (1; [r]x) A (1, -[s]x)
+
+    for the arms r of the body of its rows and s of that of its columns. Rows of -A [s]x are s x those of A.
+    """
+    a, b = many.bundle[g, FIRST], many.bundle[g, SECOND]
+    x, y, z = _world_rows(D, of.frame_of(g, many), rho * of.one(g, of.WEIGHT, many))
+    r = of.three(g, of.ARM, many)
+    A, P = _columns(x, y, z), _columns(qt.cross(r, x), qt.cross(r, y), qt.cross(r, z))
+    pull, of_a, turn_a = _upper(A), _below(r, A), _upper(P)
+    _add(many.diagonal, a, 0, pull, of_a)
+    _add(many.diagonal, a, 3, turn_a, _below(r, P))
     if b < 0:
         return
-    t = vector(many.arm, k, 3)
-    _weigh(1, A, t, many)
-    _add_product(many.diagonal, b, t, 1, 1.0, many)
-    if many.rank[a] < many.rank[b]:
-        place = place_of(a, b, many)
-        _add_product(many.upper, place, r, 1, -1.0, many)
-        _add_product(many.lower, place, t, 0, -1.0, many)
+    s = of.three(g, of.ARM + 3, many)
+    Q = _columns(qt.cross(s, x), qt.cross(s, y), qt.cross(s, z))
+    of_b, turn_b = _below(s, A), _upper(Q)
+    _add(many.diagonal, b, 0, pull, of_b)
+    _add(many.diagonal, b, 3, turn_b, _below(s, Q))
+    place = many.bundle[g, PLACE]
+    if many.bundle[g, IS_FIRST] == 1:
+        _take(many.upper, place, 0, pull, of_a)
+        _take(many.upper, place, 3, turn_b, _below(r, Q))
+        _take(many.lower, place, 0, pull, of_b)
+        _take(many.lower, place, 3, turn_a, _below(s, P))
     else:
-        place = place_of(b, a, many)
-        _add_product(many.upper, place, t, 0, -1.0, many)
-        _add_product(many.lower, place, r, 1, -1.0, many)
+        _take(many.lower, place, 0, pull, of_a)
+        _take(many.lower, place, 3, turn_b, _below(r, Q))
+        _take(many.upper, place, 0, pull, of_b)
+        _take(many.upper, place, 3, turn_a, _below(s, P))
 
 
 @inlined
 def _respond(B, place, b, many):
     """Multiply the rows of the block B[place] by M⁻¹ of body b."""
-    m = many.lightness[b]
-    for c in range(SIZE):
-        w = turned(b, (B[place, 3, c], B[place, 4, c], B[place, 5, c]), many)
-        B[place, 0, c], B[place, 1, c], B[place, 2, c] = m * B[place, 0, c], m * B[place, 1, c], m * B[place, 2, c]
-        B[place, 3, c], B[place, 4, c], B[place, 5, c] = w
+    m, K = many.lightness[b], many.turning
+    x = Lanes(K[b, 0], K[b, 1], K[b, 2], 0.0)
+    y = Lanes(K[b, 1], K[b, 3], K[b, 4], 0.0)
+    z = Lanes(K[b, 2], K[b, 4], K[b, 5], 0.0)
+    for c in range(0, BLOCK_SIZE, COLUMN_SIZE):
+        u, v, w = B[place, c + SPIN], B[place, c + SPIN + 1], B[place, c + SPIN + 2]
+        put_row(B, place, c, m * row(B, place, c))
+        put_row(B, place, c + SPIN, u * x + v * y + w * z)
 
 
 @inlined
@@ -151,7 +185,7 @@ def complete_matrix(begin, end, many):
         b = many.order[i]
         _respond(many.diagonal, b, b, many)
         for c in range(SIZE):
-            many.diagonal[b, c, c] += 1.0
+            many.diagonal[b, COLUMN_SIZE * c + c + c // 3] += 1.0
         for k in range(many.start[b], many.stop[b]):
             _respond(many.upper, k, b, many)
             _respond(many.lower, k, many.column[k], many)
@@ -160,11 +194,11 @@ def complete_matrix(begin, end, many):
 @kernel
 def fill_matrix(part, rho, all_hold, many):
     """Newton's matrix of an island at the point of the last `defect`."""
-    first, last, begin, end = part
+    _, _, begin, end = part
     clear(begin, end, many)
-    for i in range(first, last):
-        k = many.queue[i]
-        y = (1.0, 0.0, 0.0) if all_hold else vector(many.aim, k, 0)
-        if y[0] > 0.0:
-            add_contact(k, _slopes(y, many.mu[k]), rho, many)
+    for g in range(many.counts[BUNDLES]):
+        y = of.three(g, of.AIM, many)
+        if all_hold:
+            y = (Lanes(1.0, 1.0, 1.0, 1.0), Lanes(0.0, 0.0, 0.0, 0.0), Lanes(0.0, 0.0, 0.0, 0.0))
+        add_bundle(g, _slopes(y, of.one(g, of.MU, many)), rho, many)
     complete_matrix(begin, end, many)
