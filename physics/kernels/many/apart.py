@@ -14,7 +14,7 @@ from physics.kernels.body import angular_velocity, read_state, write_state
 from physics.kernels.compiler import inlined, kernel
 from physics.kernels.many.contacts import pair_slop, plus, put, refresh, vector
 from physics.kernels.many.place import place_body
-from physics.kernels.many.response import assemble, residual_of
+from physics.kernels.many.response import assemble_normals, residual_of
 from physics.kernels.many.sweeps import sweep_normals
 from physics.kernels.many.thrift import bring_inside, free_lift, keep_turning, lift_of, pay
 
@@ -97,7 +97,7 @@ def _part_once(n, tilted, many):
     for b in range(many.now.shape[0]):
         put(many.twist, b, 0, (0.0, 0.0, 0.0))
         put(many.twist, b, 3, (0.0, 0.0, 0.0))
-    assemble(n, many)
+    assemble_normals(n, many)
     sweeps = DEEP_SWEEPS if deepest > DEEP else APART_SWEEPS
     sweep_normals(0, n, residual_of(0, n, None, many), APART_ERROR * largest, sweeps, many)
     _displace_all(tilted, many)

@@ -15,6 +15,7 @@ import math
 from physics.kernels import quaternion as qt
 from physics.kernels.compiler import inlined, kernel
 from physics.kernels.many.contacts import local_velocity, matrix, plus, put, vector
+from physics.kernels.many.rows import AXIS, MOMENT_A, MOMENT_B, put_rows
 
 
 @inlined
@@ -46,12 +47,17 @@ def push_along(k, p, t, many):
 
 
 @inlined
-def _add_block(k, b, first, W, many):
-    """W plus what one end adds to the contact's own block: 1/m + (r x e_i)·I⁻¹ (r x e_j); upper triangle."""
+def _add_block(k, b, first, moments, W, many):
+    """W plus what one end adds to the contact's own block: 1/m + (r x e_i)·I⁻¹ (r x e_j); upper triangle.
+
+    Writes its vectors to `many.rows` from column `moments` on.
+    """
     r, E = vector(many.arm, k, first), many.frame
     g0, g1, g2 = qt.cross(r, vector(E, k, 0)), qt.cross(r, vector(E, k, 3)), qt.cross(r, vector(E, k, 6))
     h0, h1, h2 = turned(b, g0, many), turned(b, g1, many), turned(b, g2, many)
     m = many.lightness[b]
+    put_rows(k, moments, g0, g1, g2, many)
+    put_rows(k, moments + 12, h0, h1, h2, many)
     return (
         W[0] + (m + qt.dot(g0, h0)), W[1] + qt.dot(g0, h1), W[2] + qt.dot(g0, h2),
         W[3] + (m + qt.dot(g1, h1)), W[4] + qt.dot(g1, h2), W[5] + (m + qt.dot(g2, h2)),
@@ -84,9 +90,11 @@ def assemble(n, many):
     for k in range(n):
         u, t = local_velocity(k, many), vector(many.target, k, 0)
         scale = max(scale, max(abs(u[0] - t[0]), max(abs(u[1] - t[1]), abs(u[2] - t[2]))))
-        W = _add_block(k, many.ends[k, 0], 0, (0.0, 0.0, 0.0, 0.0, 0.0, 0.0), many)
+        E = many.frame
+        put_rows(k, AXIS, vector(E, k, 0), vector(E, k, 3), vector(E, k, 6), many)
+        W = _add_block(k, many.ends[k, 0], 0, MOMENT_A, (0.0, 0.0, 0.0, 0.0, 0.0, 0.0), many)
         if many.ends[k, 1] >= 0:
-            W = _add_block(k, many.ends[k, 1], 3, W, many)
+            W = _add_block(k, many.ends[k, 1], 3, MOMENT_B, W, many)
         B = many.block
         B[k, 0], B[k, 1], B[k, 2] = W[0], W[1], W[2]
         B[k, 3], B[k, 4], B[k, 5] = W[1], W[3], W[4]
@@ -97,6 +105,28 @@ def assemble(n, many):
     for k in range(n):
         push(k, vector(many.impulse, k, 0), many.twist, many)
     return scale
+
+
+@inlined
+def _normal_mobility(k, b, first, moments, many):
+    """What one end adds to W_nn of a contact; writes its vectors of the normal to `many.rows`."""
+    g = qt.cross(vector(many.arm, k, first), vector(many.frame, k, 0))
+    h = turned(b, g, many)
+    put(many.rows, k, moments, g)
+    put(many.rows, k, moments + 12, h)
+    return many.lightness[b] + qt.dot(g, h)
+
+
+@kernel
+def assemble_normals(n, many):
+    """`assemble` for what only asks of normals, from no impulses."""
+    for k in range(n):
+        put(many.rows, k, AXIS, vector(many.frame, k, 0))
+        W = _normal_mobility(k, many.ends[k, 0], 0, MOMENT_A, many)
+        if many.ends[k, 1] >= 0:
+            W += _normal_mobility(k, many.ends[k, 1], 3, MOMENT_B, many)
+        many.block[k, 0] = W
+        many.queue[k] = k
 
 
 @inlined

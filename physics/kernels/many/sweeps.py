@@ -8,8 +8,9 @@ from __future__ import annotations
 
 from physics.kernels import quaternion as qt
 from physics.kernels.compiler import inlined, kernel
-from physics.kernels.many.contacts import matrix, put, relative_velocity, vector
-from physics.kernels.many.response import on_disk, push, push_along, put_inverse, residual_of, velocity_missed
+from physics.kernels.many.contacts import matrix, put, vector
+from physics.kernels.many.response import on_disk, put_inverse, residual_of
+from physics.kernels.many.rows import normal_velocity, push_normal, push_rows, set_motion, set_twists, velocity
 from physics.kernels.point import LOST, answer, heading
 
 # Share of the residual asked for to which one contact is answered.
@@ -20,12 +21,6 @@ ANSWER_SHARE = 0.1
 # added at once. See `physics.kernels.sweeps`.
 EXTRAPOLATION_PERIOD = 4
 RATIO_LIMIT = 0.998
-
-
-@inlined
-def _normal_velocity(k, many):
-    """u_n of contact k less its target."""
-    return qt.dot(vector(many.frame, k, 0), relative_velocity(k, many.twist, many)) - many.target[k, 0]
 
 
 @kernel
@@ -42,8 +37,9 @@ def sweep_normals(first, last, residual, goal, limit, many):
         many.pushed[many.ends[k, 0]] = 0
         if many.ends[k, 1] >= 0:
             many.pushed[many.ends[k, 1]] = 0
+    set_motion(first, last, many)
     while not residual <= goal and sweeps < limit:
-        worst = 0.0
+        worst, before = 0.0, visits
         for i in range(first, last):
             k = many.queue[i if sweeps % 2 == 0 else first + last - 1 - i]
             a, b = many.ends[k, 0], many.ends[k, 1]
@@ -52,19 +48,21 @@ def sweep_normals(first, last, residual, goal, limit, many):
             visits += 1
             many.visited[k] = visits
             p, normal = many.impulse[k, 0], many.block[k, 0]
-            d = max(0.0, p - _normal_velocity(k, many) / normal) - p
+            d = max(0.0, p - (normal_velocity(k, many) - many.target[k, 0]) / normal) - p
             off = abs(d) * normal
             worst = max(worst, off)
             if off > ANSWER_SHARE * goal:
                 many.impulse[k, 0] = p + d
-                n = vector(many.frame, k, 0)
-                push_along(k, (d * n[0], d * n[1], d * n[2]), many.twist, many)
+                push_normal(k, d, many)
                 many.pushed[a] = visits
                 if b >= 0:
                     many.pushed[b] = visits
         sweeps += 1
         if worst <= goal or sweeps == limit:
+            set_twists(first, last, many)
             residual = residual_of(first, last, None, many)
+        if visits == before:
+            break  # all are answered, and stay so
     return sweeps, residual
 
 
@@ -98,13 +96,14 @@ def _answer_one(k, p, u, goal, many):
 @inlined
 def _visit(k, goal, many):
     """Answer contact k; how far its impulse was off, as a velocity [m/s]: its residual or a little more."""
-    u, p, normal = velocity_missed(k, many), vector(many.impulse, k, 0), many.block[k, 0]
+    u, t, p, normal = velocity(k, many), vector(many.target, k, 0), vector(many.impulse, k, 0), many.block[k, 0]
+    u = (u[0] - t[0], u[1] - t[1], u[2] - t[2])
     q = _answer_one(k, p, u, goal, many)
     d = (q[0] - p[0], q[1] - p[1], q[2] - p[2])
     if d[0] == 0.0 and d[1] == 0.0 and d[2] == 0.0:
         return 0.0
     put(many.impulse, k, 0, q)
-    push(k, d, many.twist, many)
+    push_rows(k, d, many)
     return max(abs(d[0]) * normal, max(abs(d[1]), abs(d[2])) / many.step[k])
 
 
@@ -135,11 +134,12 @@ def _extrapolate(first, last, s, many):
         x, y = on_disk(p[1] + s * d[1], p[2] + s * d[2], many.mu[k] * normal)
         put(many.impulse, k, 0, (normal, x, y))
         put(many.settled, k, 0, (normal, x, y))
-        push(k, (normal - p[0], x - p[1], y - p[2]), many.twist, many)
+        push_rows(k, (normal - p[0], x - p[1], y - p[2]), many)
 
 
 @inlined
 def _begin_sweeps(first, last, many):
+    set_motion(first, last, many)
     for i in range(first, last):
         k = many.queue[i]
         put_inverse(k, many)
@@ -166,6 +166,7 @@ def sweep_contacts(first, last, friction, residual, goal, limit, many):
             worst = max(worst, _visit(k, ANSWER_SHARE * goal, many))
         sweeps += 1
         if worst <= goal or sweeps == limit:
+            set_twists(first, last, many)
             residual = residual_of(first, last, friction, many)
         elif sweeps % 2 == 0:
             product, square = _note_change(first, last, many)
