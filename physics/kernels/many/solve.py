@@ -4,8 +4,9 @@ A warm start that still solves the problem costs one look at the residual. Else 
 (`islands`), and each that is not solved yet takes, in this order, as far as it is needed:
 
 1. where there is one contact one sweep, which is exact then;
-2. the guess that everything holds, unless the warm start says otherwise: one linear system, the answer for what stands
-   still, far below what is asked;
+2. the guess that everything holds, unless the warm start says otherwise or, where there is none, contacts part by
+   themselves: one linear system, the answer for what stands still, far below what is asked; once more after 3, where
+   all contacts push only then;
 3. a few sweeps, the answer for what meets and parts;
 4. an interior-point method, which finds what holds, slides and opens whatever the start, and Newton's method on the
    twists from there, in turns;
@@ -33,7 +34,7 @@ from physics.kernels.many.newton import (
     prepare_system,
     save_best,
 )
-from physics.kernels.many.response import assemble, residual_of
+from physics.kernels.many.response import assemble, residual_of, velocity_missed
 from physics.kernels.many.sweeps import sweep_contacts, sweep_normals
 
 # Share of the residual asked for, or of this finer one, relative to the largest free velocity, that the guess that all
@@ -150,12 +151,22 @@ def sweep_at_last(part, friction, residual, goal, limit, many):
 
 
 @inlined
-def is_mixed(part, many):
-    """Whether in the warm start some contacts push and some do not: then not all of them will hold."""
-    pushing = 0
+def all_push(part, many):
+    """Whether all contacts of an island push: else not all of them will hold."""
     for i in range(part[0], part[1]):
-        pushing += 1 if many.impulse[many.queue[i], 0] > 0.0 else 0
-    return 0 < pushing < part[1] - part[0]
+        if not many.impulse[many.queue[i], 0] > 0.0:
+            return False
+    return True
+
+
+@inlined
+def none_pushes_or_parts(part, goal, many):
+    """Whether no contact of an island pushes, and none opens faster than `goal` [m/s] without that."""
+    for i in range(part[0], part[1]):
+        k = many.queue[i]
+        if many.impulse[k, 0] > 0.0 or velocity_missed(k, many)[0] > goal:
+            return False
+    return True
 
 
 @kernel
@@ -167,13 +178,19 @@ def solve_island(part, friction, scale, residual, goal, many):
     if steps == 0:
         count, residual = sweep_contacts(first, last, friction, residual, goal, limit if last - first > 1 else 1, many)
         return count, residual, SWEEPS
-    if not is_mixed(part, many):
-        residual = guess_all_hold(part, friction, residual, HOLD_SHARE * min(goal, FINE * scale), many)
+    may_hold = all_push(part, many) or none_pushes_or_parts(part, goal, many)
+    deep = HOLD_SHARE * min(goal, FINE * scale)
+    if may_hold:
+        residual = guess_all_hold(part, friction, residual, deep, many)
         if residual <= goal:
             return 1, residual, NEWTON
     count, residual = sweep_contacts(first, last, friction, residual, goal, FIRST_SWEEPS, many)
     if residual <= goal:
         return 1 + count, residual, NEWTON
+    if not may_hold and all_push(part, many):
+        residual = guess_all_hold(part, friction, residual, deep, many)
+        if residual <= goal:
+            return 1 + count, residual, NEWTON
     more, residual = solve_hard(part, friction, scale, residual, goal, max(1, steps - count - 1), many)
     count += 1 + more
     if residual > goal:
