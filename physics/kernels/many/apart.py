@@ -13,9 +13,8 @@ from physics.kernels import quaternion as qt
 from physics.kernels.body import angular_velocity, read_state, write_state
 from physics.kernels.compiler import inlined, kernel
 from physics.kernels.many.contacts import pair_slop, plus, put, refresh, vector
+from physics.kernels.many.parting import part_contacts
 from physics.kernels.many.place import place_body
-from physics.kernels.many.response import assemble_normals, residual_of
-from physics.kernels.many.sweeps import sweep_normals
 from physics.kernels.many.thrift import bring_inside, free_lift, keep_turning, lift_of, pay
 
 # Share of the depth beyond half a slop that one stage takes back: turning makes the whole of it overshoot.
@@ -26,9 +25,11 @@ APART_SHARE = 0.5
 ROUNDS = 30
 DEEP = 100.0
 
-# Error of the displacements, relative to the largest that is asked for, and sweeps for it at most: something light
-# between a wall and something heavy needs as many as their masses differ.
-APART_ERROR = 1.0e-3
+# Error of the displacements, relative to the largest that is asked for, or in slops where that is more, and sweeps for
+# it at most: something light between a wall and something heavy needs as many as their masses differ. A stage leaves
+# half of the depth anyway, and half a slop less than the slop: what is off by less than these is done with.
+APART_ERROR = 1.0e-2
+SLOP_ERROR = 0.1
 APART_SWEEPS = 50
 DEEP_SWEEPS = 1000
 
@@ -36,19 +37,18 @@ DEEP_SWEEPS = 1000
 @inlined
 def _aim_apart(n, many):
     """Displacements asked for along the normals: the deepest that anything is, in its slop (from 1 on some are asked
-    for), and the largest [m].
+    for), and the error of them that does not matter [m].
     """
-    deepest = largest = 0.0
+    deepest, largest, least = 0.0, 0.0, math.inf
     for k in range(n):
         slop, gap = pair_slop(many.ends[k, 0], many.ends[k, 1], many), many.gap[k]
         goal = -max(gap, 0.0)
         if gap < -slop:
             goal = -APART_SHARE * (gap + 0.5 * slop)
-            largest = max(largest, goal)
+            largest, least = max(largest, goal), min(least, slop)
         deepest = max(deepest, -gap / slop)
         put(many.target, k, 0, (goal, 0.0, 0.0))
-        put(many.impulse, k, 0, (0.0, 0.0, 0.0))
-    return deepest, largest
+    return deepest, max(APART_ERROR * largest, SLOP_ERROR * least)
 
 
 @inlined
@@ -76,11 +76,14 @@ def _displace_all(tilted, many):
     total = ups = free = 0.0
     for b in range(many.now.shape[0]):
         many.before[b, 0] = 0.0
-        if many.touched[b] == 1:
+        if many.touched[b] == 0:
+            continue
+        free += free_lift(b, many)
+        if many.pushed[b] > 0:
             lift = _displace(b, tilted, many)
             _place_inside(b, tilted, many)
             many.before[b, 0] = max(lift, 0.0)
-            total, ups, free = total + lift, ups + max(lift, 0.0), free + free_lift(b, many)
+            total, ups = total + lift, ups + max(lift, 0.0)
     if total > free:
         for b in range(many.now.shape[0]):
             if many.before[b, 0] > 0.0:
@@ -91,15 +94,10 @@ def _displace_all(tilted, many):
 def _part_once(n, tilted, many):
     """One round for the n contacts, posed where the bodies are: the deepest that anything was, in its slop."""
     refresh(many)
-    deepest, largest = _aim_apart(n, many)
+    deepest, error = _aim_apart(n, many)
     if not deepest > 1.0:
         return deepest
-    for b in range(many.now.shape[0]):
-        put(many.twist, b, 0, (0.0, 0.0, 0.0))
-        put(many.twist, b, 3, (0.0, 0.0, 0.0))
-    assemble_normals(n, many)
-    sweeps = DEEP_SWEEPS if deepest > DEEP else APART_SWEEPS
-    sweep_normals(0, n, residual_of(0, n, None, many), APART_ERROR * largest, sweeps, many)
+    part_contacts(n, error, DEEP_SWEEPS if deepest > DEEP else APART_SWEEPS, many)
     _displace_all(tilted, many)
     return deepest
 

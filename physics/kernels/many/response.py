@@ -117,16 +117,14 @@ def _normal_mobility(k, b, first, moments, many):
     return many.lightness[b] + qt.dot(g, h)
 
 
-@kernel
-def assemble_normals(n, many):
-    """`assemble` for what only asks of normals, from no impulses."""
-    for k in range(n):
-        put(many.rows, k, AXIS, vector(many.frame, k, 0))
-        W = _normal_mobility(k, many.ends[k, 0], 0, MOMENT_A, many)
-        if many.ends[k, 1] >= 0:
-            W += _normal_mobility(k, many.ends[k, 1], 3, MOMENT_B, many)
-        many.block[k, 0] = W
-        many.queue[k] = k
+@inlined
+def assemble_normal(k, many):
+    """Write what only asks of the normal of contact k: W_nn and those of its rows."""
+    put(many.rows, k, AXIS, vector(many.frame, k, 0))
+    W = _normal_mobility(k, many.ends[k, 0], 0, MOMENT_A, many)
+    if many.ends[k, 1] >= 0:
+        W += _normal_mobility(k, many.ends[k, 1], 3, MOMENT_B, many)
+    many.block[k, 0] = W
 
 
 @inlined

@@ -35,7 +35,8 @@ def _set_moving(b, many):
 
 
 @inlined
-def _set_moved(b, many):
+def set_moved(b, many):
+    """The twist of body b from `many.motion`."""
     put(many.twist, b, 0, vector(many.motion, b, 0))
     put(many.twist, b, 3, vector(many.motion, b, SPIN))
 
@@ -55,9 +56,9 @@ def set_twists(first, last, many):
     """Twists of the bodies of the contacts `many.queue[first:last]` from `many.motion`."""
     for i in range(first, last):
         a, b = many.ends[many.queue[i], 0], many.ends[many.queue[i], 1]
-        _set_moved(a, many)
+        set_moved(a, many)
         if b >= 0:
-            _set_moved(b, many)
+            set_moved(b, many)
 
 
 @inlined

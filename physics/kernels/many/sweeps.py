@@ -23,6 +23,32 @@ EXTRAPOLATION_PERIOD = 4
 RATIO_LIMIT = 0.998
 
 
+@inlined
+def is_answered(k, many):
+    """Whether no body of contact k has been pushed since its last visit."""
+    a, b = many.ends[k, 0], many.ends[k, 1]
+    return many.visited[k] >= many.pushed[a] and (b < 0 or many.visited[k] >= many.pushed[b])
+
+
+@inlined
+def answer_normal(k, visit, small, many):
+    """Answer contact k along its normal if it is off by more than `small`: how far its impulse was off, as a velocity
+    [m/s]. `visit` is the number of this visit.
+    """
+    a, b = many.ends[k, 0], many.ends[k, 1]
+    many.visited[k] = visit
+    p, normal = many.impulse[k, 0], many.block[k, 0]
+    d = max(0.0, p - (normal_velocity(k, many) - many.target[k, 0]) / normal) - p
+    off = abs(d) * normal
+    if off > small:
+        many.impulse[k, 0] = p + d
+        push_normal(k, d, many)
+        many.pushed[a] = visit
+        if b >= 0:
+            many.pushed[b] = visit
+    return off
+
+
 @kernel
 def sweep_normals(first, last, residual, goal, limit, many):
     """`sweep_contacts` without friction: impulses along the normals only.
@@ -42,21 +68,10 @@ def sweep_normals(first, last, residual, goal, limit, many):
         worst, before = 0.0, visits
         for i in range(first, last):
             k = many.queue[i if sweeps % 2 == 0 else first + last - 1 - i]
-            a, b = many.ends[k, 0], many.ends[k, 1]
-            if many.visited[k] >= many.pushed[a] and (b < 0 or many.visited[k] >= many.pushed[b]):
+            if is_answered(k, many):
                 continue
             visits += 1
-            many.visited[k] = visits
-            p, normal = many.impulse[k, 0], many.block[k, 0]
-            d = max(0.0, p - (normal_velocity(k, many) - many.target[k, 0]) / normal) - p
-            off = abs(d) * normal
-            worst = max(worst, off)
-            if off > ANSWER_SHARE * goal:
-                many.impulse[k, 0] = p + d
-                push_normal(k, d, many)
-                many.pushed[a] = visits
-                if b >= 0:
-                    many.pushed[b] = visits
+            worst = max(worst, answer_normal(k, visits, ANSWER_SHARE * goal, many))
         sweeps += 1
         if worst <= goal or sweeps == limit:
             set_twists(first, last, many)
