@@ -45,26 +45,32 @@ def relate(a, b, many):
 
 
 @inlined
-def best_face(a, b, many):
-    """(separation, face) of the face normal that separates most; the first block's unless the other's is better."""
+def best_face(a, b, margin, many):
+    """(separation, face) of the face normal that separates most; the first block's unless the other's is better. One that
+    separates by more than `margin` [m] is enough.
+    """
     S, da, db = many.mix[SIZES], many.bodies[a].dims, many.bodies[b].dims
     way_a, way_b = many.mix[FROM_A, 0], many.mix[FROM_B, 0]
     best, face = -math.inf, 0
     slop = pair_slop(a, b, many)
     for i in range(3):
         s = abs(way_a[i]) - (da[i] + (db[0] * S[i, 0] + db[1] * S[i, 1] + db[2] * S[i, 2]))
+        if s > margin:
+            return s, i
         if s > best + slop:
             best, face = s, i
     for j in range(3):
         s = abs(way_b[j]) - (db[j] + (da[0] * S[0, j] + da[1] * S[1, j] + da[2] * S[2, j]))
+        if s > margin:
+            return s, 3 + j
         if s > best + slop:
             best, face = s, 3 + j
     return best, face
 
 
 @inlined
-def best_edges(a, b, many):
-    """(separation, 3 i + j) of the product of edges i of a and j of b that separates most."""
+def best_edges(a, b, margin, many):
+    """(separation, 3 i + j) of the product of edges i of a and j of b that separates most; as `best_face`."""
     C, S, way = many.mix[AXES], many.mix[SIZES], many.mix[FROM_A, 0]
     da, db = many.bodies[a].dims, many.bodies[b].dims
     best, edges = -math.inf, 0
@@ -78,6 +84,8 @@ def best_edges(a, b, many):
             apart = abs(way[i2] * C[i1, j] - way[i1] * C[i2, j])
             size = (da[i1] * S[i2, j] + da[i2] * S[i1, j]) + (db[j1] * S[i, j2] + db[j2] * S[i, j1])
             s = (apart - size) / math.sqrt(square)
+            if s > margin:
+                return s, 3 * i + j
             if s > best:
                 best, edges = s, 3 * i + j
     return best, edges

@@ -154,7 +154,7 @@ def touch_blocks(a, b, margin, h, many):
     say that they are further apart: that something touches.
     """
     relate(a, b, many)
-    apart, face = best_face(a, b, many)
+    apart, face = best_face(a, b, margin, many)
     if apart > margin:
         return
     slop = pair_slop(a, b, many)
@@ -164,7 +164,7 @@ def touch_blocks(a, b, margin, h, many):
         source, count = _clip_face(a, b, face, many)
     further, edges = apart, 0
     if count == 0:
-        further, edges = best_edges(a, b, many)
+        further, edges = best_edges(a, b, margin, many)
     if further > margin:
         return
     is_face = further <= apart + slop
