@@ -46,8 +46,9 @@ def relate(a, b, many):
 
 @inlined
 def best_face(a, b, margin, many):
-    """(separation, face) of the face normal that separates most; the first block's unless the other's is better. One that
-    separates by more than `margin` [m] is enough.
+    """(separation, face) of the face normal that separates most; the first block's unless the other's is better.
+
+    One that separates by more than `margin` [m] is enough.
     """
     S, da, db = many.mix[SIZES], many.bodies[a].dims, many.bodies[b].dims
     way_a, way_b = many.mix[FROM_A, 0], many.mix[FROM_B, 0]
