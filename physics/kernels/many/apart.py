@@ -25,11 +25,12 @@ APART_SHARE = 0.5
 ROUNDS = 30
 DEEP = 100.0
 
-# Error of the displacements, relative to the largest that is asked for, or in slops where that is more, and sweeps for
-# it at most: something light between a wall and something heavy needs as many as their masses differ. A stage leaves
-# half of the depth anyway, and half a slop less than the slop: what is off by less than these is done with.
+# Error of the displacements at most, relative to the largest that is asked for, or to so many slops where that is less,
+# and sweeps for it at most: something light between a wall and something heavy needs as many as their masses differ.
+# A stage leaves half of the depth anyway, and half a slop less than the slop: what is off by less is done with. Where
+# solves are finer than that the error is the root of their tolerance, since what it leaves grows with every landing.
 APART_ERROR = 1.0e-2
-SLOP_ERROR = 0.1
+LEAST_SLOPS = 10.0
 APART_SWEEPS = 50
 DEEP_SWEEPS = 1000
 
@@ -48,7 +49,7 @@ def _aim_apart(n, many):
             largest, least = max(largest, goal), min(least, slop)
         deepest = max(deepest, -gap / slop)
         put(many.target, k, 0, (goal, 0.0, 0.0))
-    return deepest, max(APART_ERROR * largest, SLOP_ERROR * least)
+    return deepest, min(APART_ERROR, math.sqrt(many.settings[0].tolerance)) * max(largest, LEAST_SLOPS * least)
 
 
 @inlined
