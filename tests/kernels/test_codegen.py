@@ -124,10 +124,15 @@ import numpy as np
 import physics
 from physics import scenes
 from physics.kernels.compiler import kernel
+from physics.kernels.lanes import put_row, row
 
 @kernel
 def element(a, i, j):
     return a[i, j]
+
+@kernel
+def moved(a, i, j, k, l):
+    put_row(a, k, l, row(a, i, j))
 
 @kernel
 def asks(a, i, j):
@@ -140,6 +145,12 @@ for i, j in ((0, 2), (2, 0), (-1, 0), (0, -1)):
     except IndexError:
         refused += 1
 assert asks(np.ones((2, 2)), 1, 1) == 1.0
+for place in ((1, 3, 0, 0), (2, 0, 0, 0), (0, 0, 1, 3), (0, 0, 2, 0)):  # four numbers at once, from place to place
+    try:
+        moved(np.ones((2, 6)), *place)
+    except IndexError:
+        refused += 1
+moved(np.ones((2, 6)), 1, 2, 0, 2)
 for scene, accuracy in ((scenes.drop(), "balanced"), (scenes.tower(3), "fast")):
     physics.World(scene, dt=0.01, accuracy=accuracy).step(steps=200)
 print(refused)
@@ -153,7 +164,7 @@ def test_indices_are_checked_where_that_is_asked_for(tmp_path):
     program = tmp_path / "checked.py"  # Numba keeps only what a file holds
     program.write_text(CHECKED)
     done = subprocess.run([sys.executable, program], env=environment, capture_output=True, text=True, check=False)
-    assert done.stdout.split() == ["4"], done.stderr
+    assert done.stdout.split() == ["8"], done.stderr
 
 
 @kernel

@@ -7,6 +7,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from physics.kernels.columns import present
+from physics.kernels.compiler import kernel
+from physics.kernels.patch import cold_motion, place_patch
 from physics.kernels.slide import HOLD, SLIDE
 from physics.kernels.solve import DIRECT
 from tests.kernels.contact_problem import FACE, MASS, Problem
@@ -126,3 +129,28 @@ def test_eight_contacts_of_one_wall_are_solved_by_sweeps(mode):
     problem.one["arm"][:8, 1] = -1.5
     p, result = problem.solve(mode)
     assert_solved(problem, p, result)
+
+
+@kernel
+def begun(n, mu, u, w, inv_mass, K, work):
+    """Where a face begins under new loads (`patch.cold_motion`), on the wall whose axes are x, y, z."""
+    axes = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
+    return cold_motion(n, place_patch(n, axes, inv_mass, K, work), present(n), mu, u, w, inv_mass, K)
+
+
+@pytest.mark.parametrize("n", [3, 4])
+def test_a_slip_without_spin_and_a_spin_about_the_centroid_lose_what_friction_takes(n):
+    """The ellipsoid is exact along its axes: v0 - μP/m, and I (ω0 - ω) = μPρ with the root mean square ρ of arms."""
+    work = Problem(floor(FACE), (0, 0, 0), (0, 0, 0), MU).one
+    arms = np.array([(-1.5, 2.0, 1.0), (-1.5, -1.0, 0.5), (-1.5, -1.0, -1.5), (-1.5, 0.0, 0.0)])[:n]
+    work["arm"][:n] = arms
+    push, inv_mass, spin = 0.06, 0.25, 3.0
+    K = (0.2, 0.0, 0.0, 0.1, 0.0, 0.1)
+    va, vb, wn = begun(n, MU, (-push, 0.3, -0.4), (0.0, 0.0, 0.0), inv_mass, K, work)
+    assert (va, vb, wn) == pytest.approx((0.3 * (1 - MU * push / 0.5), -0.4 * (1 - MU * push / 0.5), 0.0), rel=1e-13)
+    centre = arms.mean(axis=0)
+    rho = np.sqrt(((arms - centre)[:, 1:] ** 2).sum(axis=1).mean())
+    about = (-push, spin * centre[2], -spin * centre[1])  # the centroid is at rest
+    va, vb, wn = begun(n, MU, about, (spin, 0.0, 0.0), inv_mass, K, work)
+    left = spin - MU * push / inv_mass * rho * K[0]
+    assert (va, vb, wn) == pytest.approx((left * centre[2], -left * centre[1], left), abs=1e-13)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from numba.core import config
 
 from physics.kernels.compiler import kernel
 from physics.kernels.lanes import put_row, root, row, total, totals
@@ -30,9 +29,3 @@ def test_rows_of_a_table_are_read_and_written_as_numbers(place):
     np.testing.assert_array_equal(compiled, plain)
     i, j = place
     np.testing.assert_array_equal(plain[0, :4], table[i, j : j + 4] * table[i, j + 1 : j + 5])
-
-
-@pytest.mark.skipif(not config.BOUNDSCHECK, reason="asks for NUMBA_BOUNDSCHECK=1")
-def test_a_row_that_ends_outside_its_table_is_an_error():
-    with pytest.raises(IndexError):
-        rows(np.ones((3, 9)), 2, 5, np.zeros((2, 11)))
