@@ -45,8 +45,11 @@ def find_candidates(y, tilted, work, motion):
 
 @kernel
 def act(count, work, motion):
-    """Let the candidates act that are not open; mark their slots."""
-    k = 0
+    """Let the candidates act that are not open; mark their slots. Where one holds, the last forces are shares."""
+    k, given = 0, 0.0
+    for i in range(count):
+        if motion.kind[i] == HELD:
+            given = 1.0
     for s in range(motion.is_active.shape[0]):
         motion.is_active[s] = 0
     for i in range(count):
@@ -55,6 +58,7 @@ def act(count, work, motion):
             motion.is_active[motion.candidate[i]] = 1
             motion.holds[k] = 1 if motion.kind[i] == HELD else 0
             for c in range(3):
+                motion.share[k, c] = given * motion.last[motion.candidate[i], c]
                 motion.way[k, c] = motion.reference[k, c] = motion.candidate_way[i, c]
             k += 1
     motion.count = k
@@ -83,9 +87,9 @@ def sliding_now(i, y, R, w, tilted, work, motion):
     speed = math.sqrt(qt.dot(t, t))
     for c in range(3):
         motion.candidate_way[i, c] = 0.0
-        if speed > motion.still:
+        if speed > motion.slow:
             motion.candidate_way[i, c] = t[c] / speed
-    return speed > motion.still
+    return speed > motion.slow
 
 
 @inlined

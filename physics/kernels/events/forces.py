@@ -6,10 +6,15 @@ acceleration; the force is f_n (n - μ d) along the direction d of its sliding).
     a_i = dv/dt + dω/dt x r_i + ω x dr_i/dt
 
 (dr/dt = ω x r for a vertex; a sphere's and an ellipsoid's contact point wander over the body) that is a linear
-system: as many unknowns as equations, three for a contact that holds, one for one that slides. More than two
-sliding contacts of one wall have one force resultant in three unknowns: the forces that are affine in the place
-on the wall, f_i = y_0 + y_1 a_i + y_2 b_i, have the least norm of all with that resultant, and with them the
-three combinations of rows with the same coefficients stand for the equations.
+system: as many unknowns as equations, three for a contact that holds, one for one that slides. The normal forces of
+more than two contacts of one wall have three unknowns: those that are affine in the place on the wall,
+f_i = y_0 + y_1 a_i + y_2 b_i, have the least norm of all with their resultant, and with them the three combinations of
+rows with the same coefficients stand for the equations. So it stays when one of them holds, which then adds its two
+tangential forces: what a face presses with does not jump where a corner of it stops.
+
+Where a contact holds, the forces that were last known (`share`) are a part of the answer, and the unknowns only what is
+still to be added to them: a rigid body does not tell which of its corners presses on the floor, or on the wall beside
+it, and what the contact problem of a moment has found to hold (`resting`) does so from then on.
 
 The same rows, with velocities or gaps in place of accelerations and pushes along the rows, bring a state back to
 what the regime says (`cancel`): the least change in the kinetic metric.
@@ -30,8 +35,11 @@ from physics.kernels.ellipse import opposing
 from physics.kernels.events.linear import eliminate
 from physics.kernels.share import wall_axes
 
-# Sliding contacts of one wall from which on their normal forces are taken as affine.
+# Contacts of one wall from which on their normal forces are taken as affine.
 PATCH = 3
+
+# `motion.patch` of a contact whose normal force is an unknown of its own.
+NO_PATCH = -1
 
 
 @inlined
@@ -92,7 +100,7 @@ def place(y, R, w, alpha, tilted, work, motion):
         t = (u[0] - un * n[0], u[1] - un * n[1], u[2] - un * n[2])
         speed = math.sqrt(qt.dot(t, t))
         d = vector(motion.reference, j)
-        if speed > motion.still and qt.dot(t, d) > 0.0:
+        if speed > motion.slow and qt.dot(t, d) > 0.0:
             d = times(1.0 / speed, t)
         for c in range(3):
             motion.arm[j, c], motion.velocity[j, c], motion.goal[j, c] = r[c], u[c], b[c]
@@ -111,6 +119,43 @@ def _add(m, r, push, row, share, motion):
 
 
 @inlined
+def _slide_push(mu, axes, j, work, motion):
+    n, d = axes[0], opposing(vector(motion.way, j), axes, work)
+    return (n[0] - mu * d[0], n[1] - mu * d[1], n[2] - mu * d[2])
+
+
+@inlined
+def _push_of(mu, axes, j, work, motion):
+    """Force of contact j for each newton along the normal."""
+    if motion.holds[j]:
+        return axes[0]
+    return _slide_push(mu, axes, j, work, motion)
+
+
+@inlined
+def _contact_force(normal, first, second, mu, axes, j, work, motion):
+    """Force of contact j that presses with `normal` and, where it holds, has these along the other two axes."""
+    f = times(normal, _push_of(mu, axes, j, work, motion))
+    if motion.holds[j]:
+        f = plus(f, plus(times(first, axes[1]), times(second, axes[2])))
+    return f
+
+
+@kernel
+def _add_shares(mu, work, motion):
+    """`known`: force and moment of all shares. Without friction they make no difference, and are left out."""
+    force = moment = (0.0, 0.0, 0.0)
+    if mu > 0.0:
+        for j in range(motion.count):
+            axes = wall_axes(work.walls, wall_of(motion.slot[j], work))
+            p = vector(motion.share, j)
+            f = _contact_force(p[0], p[1], p[2], mu, axes, j, work, motion)
+            force, moment = plus(force, f), plus(moment, qt.cross(vector(motion.arm, j), f))
+    for c in range(3):
+        motion.known[0, c], motion.known[1, c] = force[c], moment[c]
+
+
+@inlined
 def _clear(m, count, motion):
     """Empty the unknowns m <= k < m + count."""
     for k in range(m, m + count):
@@ -120,44 +165,34 @@ def _clear(m, count, motion):
 
 
 @kernel
-def _add_held(m, j, axes, motion):
-    """Three unknowns of contact j."""
-    _clear(m, 3, motion)
+def _add_held(m, j, first_axis, axes, motion):
+    """Unknowns of contact j from the axis `first_axis` on: the force along each."""
     r, b = vector(motion.arm, j), vector(motion.goal, j)
     motion.first[j] = m
-    for c in range(3):
-        _add(m + c, r, axes[c], axes[c], 1.0, motion)
-        motion.unknown[m + c] = -qt.dot(axes[c], b)
-    return m + 3
-
-
-@inlined
-def _slide_push(mu, axes, j, work, motion):
-    n, d = axes[0], opposing(vector(motion.way, j), axes, work)
-    return (n[0] - mu * d[0], n[1] - mu * d[1], n[2] - mu * d[2])
+    _clear(m, 3 - first_axis, motion)
+    for c in range(first_axis, 3):
+        _add(m, r, axes[c], axes[c], 1.0, motion)
+        motion.unknown[m] = -qt.dot(axes[c], b)
+        m += 1
+    return m
 
 
 @kernel
 def _add_patch(m, first, last, mu, axes, work, motion):
-    """Three unknowns of the sliding contacts first <= j < last of one wall."""
+    """Three unknowns of the normal forces of the contacts first <= j < last, those of one wall."""
     _clear(m, 3, motion)
     radius = work.radius
     ca = cb = 0.0
-    count = 0
     for j in range(first, last):
-        if not motion.holds[j]:
-            r = vector(motion.arm, j)
-            ca += qt.dot(axes[1], r)
-            cb += qt.dot(axes[2], r)
-            count += 1
+        r = vector(motion.arm, j)
+        ca += qt.dot(axes[1], r) / (last - first)
+        cb += qt.dot(axes[2], r) / (last - first)
     for j in range(first, last):
-        if motion.holds[j]:
-            continue
         r, b = vector(motion.arm, j), -qt.dot(axes[0], vector(motion.goal, j))
-        push = _slide_push(mu, axes, j, work, motion)
-        s = (qt.dot(axes[1], r) - ca / count) / radius
-        t = (qt.dot(axes[2], r) - cb / count) / radius
-        motion.first[j], motion.is_patch[j] = m, 1
+        push = _push_of(mu, axes, j, work, motion)
+        s = (qt.dot(axes[1], r) - ca) / radius
+        t = (qt.dot(axes[2], r) - cb) / radius
+        motion.patch[j] = m
         motion.place[j, 0], motion.place[j, 1] = s, t
         _add(m, r, push, axes[0], 1.0, motion)
         _add(m + 1, r, push, axes[0], s, motion)
@@ -169,29 +204,33 @@ def _add_patch(m, first, last, mu, axes, work, motion):
 
 
 @kernel
-def list_unknowns(mu, work, motion):
-    """Fill push, turn, row, row_turn and the right-hand sides (`unknown`) from `goal`; their number."""
+def list_unknowns(mu, holding, work, motion):
+    """Fill push, turn, row, row_turn, `known` and the right-hand sides (`unknown`) from `goal`; their number.
+
+    `holding`: contacts that hold do so along the wall, too.
+    """
     m = first = 0
+    _add_shares(mu, work, motion)
     while first < motion.count:
         wall = wall_of(motion.slot[first], work)
         axes = wall_axes(work.walls, wall)
-        last, sliding = first, 0
+        last = first
         while last < motion.count and wall_of(motion.slot[last], work) == wall:
-            motion.is_patch[last] = 0
-            if not motion.holds[last]:
-                sliding += 1
+            motion.patch[last] = NO_PATCH
             last += 1
+        own = 0  # the first axis along which a contact that holds has a force of its own
+        if last - first >= PATCH:
+            m = _add_patch(m, first, last, mu, axes, work, motion)
+            own = 1
         for j in range(first, last):
-            if motion.holds[j]:
-                m = _add_held(m, j, axes, motion)
-            elif sliding < PATCH:
+            if holding and motion.holds[j]:
+                m = _add_held(m, j, own, axes, motion)
+            elif own == 0:
                 _clear(m, 1, motion)
                 _add(m, vector(motion.arm, j), _slide_push(mu, axes, j, work, motion), axes[0], 1.0, motion)
                 motion.unknown[m] = -qt.dot(axes[0], vector(motion.goal, j))
                 motion.first[j] = m
                 m += 1
-        if sliding >= PATCH:
-            m = _add_patch(m, first, last, mu, axes, work, motion)
         first = last
     return m
 
@@ -200,13 +239,15 @@ def list_unknowns(mu, work, motion):
 def solve_unknowns(m, P, work, motion):
     """Solve for the m unknowns; total force and moment of the contacts, and the rank."""
     inv_mass, J, A = 1.0 / work.mass, work.J, motion.matrix
+    force, moment = vector(motion.known, 0), vector(motion.known, 1)
+    turn = turned_by(P, J, moment)
     for k in range(m):
         F, g = vector(motion.push, k), turned_by(P, J, vector(motion.turn, k))
         for l in range(m):
             A[l, k] = inv_mass * qt.dot(vector(motion.row, l), F) + qt.dot(vector(motion.row_turn, l), g)
         A[k, m] = motion.unknown[k]
+        A[k, m] -= inv_mass * qt.dot(vector(motion.row, k), force) + qt.dot(vector(motion.row_turn, k), turn)
     rank = eliminate(m, A, motion.order, motion.unknown)
-    force = moment = (0.0, 0.0, 0.0)
     for k in range(m):
         s = motion.unknown[k]
         force = plus(force, times(s, vector(motion.push, k)))
@@ -219,18 +260,36 @@ def spread(mu, work, motion):
     """Force of each contact that acts (`force`, `normal`) from the unknowns."""
     for j in range(motion.count):
         axes = wall_axes(work.walls, wall_of(motion.slot[j], work))
-        k = motion.first[j]
-        if motion.holds[j]:
-            f = times(motion.unknown[k], axes[0])
-            f = plus(f, plus(times(motion.unknown[k + 1], axes[1]), times(motion.unknown[k + 2], axes[2])))
-            motion.normal[j] = motion.unknown[k]
+        k, p, f = motion.first[j], motion.patch[j], vector(motion.share, j)
+        if p != NO_PATCH:
+            s = motion.unknown[p]
+            s += motion.place[j, 0] * motion.unknown[p + 1] + motion.place[j, 1] * motion.unknown[p + 2]
         else:
             s = motion.unknown[k]
-            if motion.is_patch[j]:
-                s += motion.place[j, 0] * motion.unknown[k + 1] + motion.place[j, 1] * motion.unknown[k + 2]
-            motion.normal[j] = s
-            f = times(s, _slide_push(mu, axes, j, work, motion))
+            k += 1
+        motion.normal[j] = f[0] + s
+        first = second = 0.0
+        if motion.holds[j]:
+            first, second = f[1] + motion.unknown[k], f[2] + motion.unknown[k + 1]
+        f = _contact_force(motion.normal[j], first, second, mu, axes, j, work, motion)
         motion.force[j, 0], motion.force[j, 1], motion.force[j, 2] = f
+
+
+@inlined
+def forget_forces(motion):
+    """No force is known from before."""
+    for s in range(motion.last.shape[0]):
+        motion.last[s, 0] = motion.last[s, 1] = motion.last[s, 2] = 0.0
+
+
+@kernel
+def keep_forces(work, motion):
+    """`last`: the forces of the contacts that act, none of all others."""
+    forget_forces(motion)
+    for j in range(motion.count):
+        axes, f = wall_axes(work.walls, wall_of(motion.slot[j], work)), vector(motion.force, j)
+        for c in range(3):
+            motion.last[motion.slot[j], c] = qt.dot(axes[c], f)
 
 
 @kernel
@@ -241,6 +300,6 @@ def regime_forces(y, tilted, work, motion):
     if motion.count == 0:
         return zero, zero, w, alpha, P
     place(y, R, w, alpha, tilted, work, motion)
-    m = list_unknowns(work.mu, work, motion)
+    m = list_unknowns(work.mu, True, work, motion)
     force, moment, _ = solve_unknowns(m, P, work, motion)
     return force, moment, w, alpha, P

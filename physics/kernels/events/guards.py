@@ -8,6 +8,9 @@
 - *Cone*: what friction could do beyond what a contact that holds asks of it, in weights. Two contacts that hold on
   one wall may share what acts along their line as they like, so that for them it is what is left of both.
 - *Speed* of every contact that slides, against the direction at the start of the step, in the speed of the body.
+
+The forces of contacts that are more than the body's motion needs (a corner that holds on the floor and at a wall) can
+be shared out in many ways, of which a linear solve takes one: `trust` is for what that one says in vain.
 """
 
 from __future__ import annotations
@@ -19,13 +22,16 @@ from physics.kernels import quaternion as qt
 from physics.kernels.arms import center_arm, feature_of, geometric_center, wall_normal, wall_of
 from physics.kernels.compiler import inlined, kernel
 from physics.kernels.ellipse import eased
-from physics.kernels.events.forces import free_turning, load, spread, vector
+from physics.kernels.events.forces import NO_PATCH, free_turning, load, spread, vector
 from physics.kernels.events.motion import END, START, V
 from physics.kernels.events.smooth import find_rate, get_state, sliding_velocity
 from physics.kernels.layout import BLOCK, OFFSET, VERTEX_COUNT
 from physics.kernels.share import wall_axes
 
-NO_GUARD, GAP, PUSH, CONE, SPEED, LOAD, NO_STEP = range(7)
+NO_GUARD, GAP, PUSH, CONE, SPEED, LOAD, NO_STEP, WATCH = range(8)
+
+# Guards of force.
+FORCES = (PUSH, CONE, LOAD)
 
 # Forces of this many weights are rounding: a push or a cone is given up only when it is missed by more.
 MARGIN = 1.0e-9
@@ -139,9 +145,11 @@ def idle_pull(work, motion):
     """Least pull [N] that the affine force of a sliding face has at a touching vertex which does not act."""
     least, which = math.inf, -1
     for j in range(motion.count):
-        if not motion.is_patch[j] or (j > 0 and wall_of(motion.slot[j], work) == wall_of(motion.slot[j - 1], work)):
+        if motion.patch[j] == NO_PATCH or (
+            j > 0 and wall_of(motion.slot[j], work) == wall_of(motion.slot[j - 1], work)
+        ):
             continue
-        wall, k = wall_of(motion.slot[j], work), motion.first[j]
+        wall, k = wall_of(motion.slot[j], work), motion.patch[j]
         axes = wall_axes(work.walls, wall)
         r = vector(motion.arm, j)
         for s in range(wall * work.features, (wall + 1) * work.features):
@@ -178,32 +186,45 @@ def opposite(slot, wall, work, motion):
 
 
 @kernel
-def least_margin(h, tilted, work, motion):
-    """Smallest margin at END, a step of h after START: (margin, guard, contact or slot)."""
+def force_margin(work, motion):
+    """Smallest margin of the guards of force: (margin, guard, contact or slot)."""
+    margin, guard, which = math.inf, NO_GUARD, -1
+    for j in range(motion.count):
+        push = motion.normal[j] / motion.weight + MARGIN
+        if push < margin:
+            margin, guard, which = push, PUSH, j
+        if motion.holds[j]:
+            cone = MARGIN - cone_excess(j, work, motion) / motion.weight
+            if cone < margin:
+                margin, guard, which = cone, CONE, j
+    pull, slot = idle_pull(work, motion)
+    if pull / motion.weight + MARGIN < margin:
+        margin, guard, which = pull / motion.weight + MARGIN, LOAD, slot
+    return margin, guard, which
+
+
+@kernel
+def least_margin(h, heeds, tilted, work, motion):
+    """Smallest margin at END, a step of h after START: (margin, guard, contact or slot).
+
+    `heeds`: the guards of force count.
+    """
     find_rate(END, h, tilted, work, motion)
     spread(work.mu, work, motion)
     look_around(END, tilted, work, motion)
     gap, which = gap_margin(h, work, motion)
     margin, guard = gap / work.radius, GAP
-    if motion.weight > 0.0:
-        for j in range(motion.count):
-            push = motion.normal[j] / motion.weight + MARGIN
-            if push < margin:
-                margin, guard, which = push, PUSH, j
-            if motion.holds[j]:
-                cone = MARGIN - cone_excess(j, work, motion) / motion.weight
-                if cone < margin:
-                    margin, guard, which = cone, CONE, j
-        pull, slot = idle_pull(work, motion)
-        if pull / motion.weight + MARGIN < margin:
-            margin, guard, which = pull / motion.weight + MARGIN, LOAD, slot
+    if heeds and motion.weight > 0.0:
+        least, sort, j = force_margin(work, motion)
+        if least < margin:
+            margin, guard, which = least, sort, j
     if work.mu > 0.0 and margin >= 0.0:  # a contact may stop within the step, unless something ends it before
         scale = motion.scale[V]
         for j in range(motion.count):
             if not motion.holds[j]:
                 t, _ = sliding_velocity(j, work, motion)
                 speed = qt.dot(t, vector(motion.reference, j))
-                speed = (speed + 0.5 * motion.still if motion.is_starting[j] else speed - motion.still) / scale
+                speed = (speed + 0.5 * motion.slow if motion.is_starting[j] else speed - motion.slow) / scale
                 if speed < margin:
                     margin, guard, which = speed, SPEED, j
     return margin, guard, which

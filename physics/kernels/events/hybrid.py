@@ -38,7 +38,7 @@ from physics.kernels.events.collide import (
     pose_jump,
     within_energy,
 )
-from physics.kernels.events.guards import CONE, LOAD, NO_GUARD, NO_STEP, PUSH
+from physics.kernels.events.guards import FORCES, NO_GUARD, NO_STEP, WATCH
 from physics.kernels.events.move import body_speed, look_ahead, move
 from physics.kernels.events.regime import find_regime
 from physics.kernels.events.resting import read_resting
@@ -46,6 +46,7 @@ from physics.kernels.events.smooth import (
     cancel,
 )
 from physics.kernels.events.state import keep_contacts, log_changes, recall_contacts
+from physics.kernels.events.trust import GROWTH, NONE, SHARE, distrust, has_jumped, name_of_regime
 from physics.kernels.fields.loads import bind_fields, refresh_loads, set_clock
 from physics.kernels.laws import bind_laws
 from physics.kernels.resist import without_gain
@@ -78,6 +79,9 @@ HOP = 4.0
 TOGETHER = 1.0e-10
 TINY = 1.0e-300
 
+# Sliding ends at this share of the speed at which a contact that leaves counts as still.
+SLOW = 1.0e-2
+
 NOTHING = -1
 
 
@@ -92,6 +96,7 @@ def set_thresholds(y, tilted, work, motion):
     motion.touch = max(work.slop, ROUNDING * (work.radius + math.sqrt(qt.dot(x, x))))
     motion.noise = 1.0e-13 * speed
     motion.still = math.sqrt(2.0 * HOP * work.acceleration * motion.touch) + motion.noise
+    motion.slow = SLOW * motion.still + motion.noise
     unit = work.radius / (speed + math.sqrt(work.radius * work.acceleration) + TINY)
     motion.ahead = AHEAD * unit
     motion.together = (TOGETHER + 10.0 * work.tolerance) * unit
@@ -120,6 +125,8 @@ def advance(y, h, friction, smooth, gyroscopic, tilted, pivots, work, motion, me
     seen, later, t = y, 0.0, 0.0
     told = NOTHING  # what is to be done next, whatever the regime: stop a contact that will leave, or jump
     since, crowd, leap = 0.0, 0, LEAP * motion.ahead
+    kept, watched = y, 0.0  # where the last step began whose end has to be looked at, and its length
+    motion.unheeded, ended = NONE, NONE  # the regime that a guard of force has ended
     width = 3
     if friction is None:
         width = 1
@@ -136,6 +143,12 @@ def advance(y, h, friction, smooth, gyroscopic, tilted, pivots, work, motion, me
         if told == NOTHING:
             refresh_loads(seen, later, tilted, work)
             what, n, v, L = find_regime(seen, friction, tilted, work, motion)
+            if watched > nearest and has_jumped(what, y, tilted, work, motion):
+                y, t, watched = kept, t - watched, 0.0
+                seen, later = y, 0.0
+                motion.trust *= SHARE
+                set_clock(start + t, work)
+                continue
         is_asked, is_sliding = what in (ASKS, ASKS_SLIDING), what == ASKS_SLIDING
         told = NOTHING
         if what in (COLLIDES, IS_LOST):
@@ -161,10 +174,21 @@ def advance(y, h, friction, smooth, gyroscopic, tilted, pivots, work, motion, me
             if what in (COLLIDES, IS_LOST):
                 told, seen, later = what, y, 0.0
                 continue
+            if watched > nearest and has_jumped(what, y, tilted, work, motion):
+                y, t, watched = kept, t - watched, 0.0
+                seen, later = y, 0.0
+                motion.trust *= SHARE
+                set_clock(start + t, work)
+                continue
         elif what in (COLLIDES, IS_LOST):
             y = y[0], y[1], v, L
             log_impulses(n, width, work, motion, log, counts, start + t)
         step = 0.0
+        if watched > 0.0:
+            watched = 0.0
+            motion.trust *= GROWTH
+            if not t < h:
+                break
         if what == COLLIDES:
             report[world, at.SPLITS] += 1.0
             crowd -= motion.is_sequential  # those in turn have a bound of their own
@@ -191,21 +215,27 @@ def advance(y, h, friction, smooth, gyroscopic, tilted, pivots, work, motion, me
             if not ended:
                 report[world, at.UNRESOLVED] += 1.0
         else:
+            kept = y
             y, step, guard = move(y, h - t, tilted, work, motion)
+            if guard == WATCH:
+                watched = step
         t += step
         set_clock(start + t, work)
-        if guard in (PUSH, CONE, LOAD) and step < motion.ahead:
-            motion.ahead = min(motion.ahead * FURTHER, FARTHEST * nearest)  # rounding hid what was foretold
+        if guard in FORCES and (step < motion.ahead or name_of_regime(motion) == ended):
+            if not motion.ahead < FARTHEST * nearest:
+                distrust(nearest, motion)
+            motion.ahead = min(motion.ahead * FURTHER, FARTHEST * nearest)  # what was foretold has not been found
         elif step > motion.ahead:
             motion.ahead = nearest
             leap = max(LEAP * nearest, leap / LONGER)
+        ended = name_of_regime(motion) if guard in FORCES else NONE
         motion.left_out, motion.turns = 0.0, 0
-        if not t < h:
+        if not t < h and guard != WATCH:
             break
         seen, later = y, 0.0
         if guard == NO_STEP:
             told = IS_LOST
-        if guard in (PUSH, CONE, LOAD):
+        if guard in FORCES:
             seen, later = look_ahead(y, tilted, work, motion), motion.ahead
     keep_contacts(memory, work.i, work, motion)
     return y

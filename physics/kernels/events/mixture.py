@@ -6,7 +6,7 @@ import math
 
 from physics.kernels import quaternion as qt
 from physics.kernels.arms import wall_of
-from physics.kernels.compiler import kernel
+from physics.kernels.compiler import inlined, kernel
 from physics.kernels.ellipse import eased
 from physics.kernels.events.candidates import (
     HELD,
@@ -17,6 +17,7 @@ from physics.kernels.events.candidates import (
     sliding_now,
 )
 from physics.kernels.events.forces import (
+    forget_forces,
     list_unknowns,
     load,
     place,
@@ -90,9 +91,18 @@ def _change_one(count, y, R, w, a, alpha, scale, tilted, work, motion):
     return -1, OPEN
 
 
+@inlined
+def has_last(motion):
+    """Whether any force is known from before."""
+    for s in range(motion.last.shape[0]):
+        if motion.last[s, 0] != 0.0:
+            return True
+    return False
+
+
 @kernel
-def mixed_forces(count, y, R, P, w, alpha_free, tilted, work, motion):
-    """Kinds of the candidates when some of them slide; whether they were found."""
+def try_mixtures(count, y, R, P, w, alpha_free, tilted, work, motion):
+    """`mixed_forces` with the last forces as they are."""
     scale = work.acceleration + work.radius * qt.dot(w, w)
     for i in range(count):
         motion.is_fresh[i] = motion.changes[i] = 0
@@ -105,7 +115,7 @@ def mixed_forces(count, y, R, P, w, alpha_free, tilted, work, motion):
     for _ in range(TRIALS):
         act(count, work, motion)
         place(y, R, w, alpha_free, tilted, work, motion)
-        m = list_unknowns(work.mu, work, motion)
+        m = list_unknowns(work.mu, True, work, motion)
         F, T, _ = solve_unknowns(m, P, work, motion)
         spread(work.mu, work, motion)
         turn = turned_by(P, work.J, T)
@@ -121,3 +131,14 @@ def mixed_forces(count, y, R, P, w, alpha_free, tilted, work, motion):
                 return False
         motion.kind[which] = kind
     return False
+
+
+@kernel
+def mixed_forces(count, y, R, P, w, alpha_free, tilted, work, motion):
+    """Kinds of the candidates when some of them slide; whether they were found, with the last forces or without."""
+    if try_mixtures(count, y, R, P, w, alpha_free, tilted, work, motion):
+        return True
+    if not has_last(motion):
+        return False
+    forget_forces(motion)
+    return try_mixtures(count, y, R, P, w, alpha_free, tilted, work, motion)

@@ -31,12 +31,16 @@ def motion_dtype(wall_count: int, features: int) -> np.dtype:
     return np.dtype([
         ("touch", f),  # gap within which a feature touches [m]
         ("still", f),  # speed of a contact that counts as none [m/s]
+        ("slow", f),  # speed along the wall that counts as none [m/s]
         ("noise", f),  # speed that is rounding [m/s]
         ("together", f),  # impacts within this time are one [s]
         ("is_sequential", i),  # 1: contacts collide in turn, 0: at once
         ("turns", i),  # impacts in turn so far at this moment
         ("ahead", f),  # time by which the next regime is looked for [s]
         ("step", f),  # length of the last smooth step [s]
+        ("unheeded", i),  # the regime whose guards of force say nothing; see `trust`
+        ("trust", f),  # length of a step without them [s]
+        ("end_rate", f, (SIZE,)),  # rate of change at the end of such a step
         ("left_out", f),  # time that a sequence of bounces would have taken on [s]
         ("rebound", f, (3 * n_slots,)),  # impulses of a rebound that there is not enough energy for [N s]
         ("count", i),  # contacts that act
@@ -50,9 +54,12 @@ def motion_dtype(wall_count: int, features: int) -> np.dtype:
         ("goal", f, (n, 3)),  # what the unknowns are to cancel: acceleration, velocity or gap
         ("force", f, (n, 3)),  # [N]
         ("normal", f, (n,)),  # of it, along the normal [N]
-        ("first", i, (n,)),  # first unknown of the contact
+        ("first", i, (n,)),  # first unknown of the contact alone
+        ("patch", i, (n,)),  # first of the three of its wall's normal forces, NO_PATCH: its normal force is its own
         ("place", f, (n, 2)),  # coordinates in the patch, in radii
-        ("is_patch", i, (n,)),
+        ("share", f, (n, 3)),  # part of its force that is given, along the wall's axes [N]
+        ("last", f, (n_slots, 3)),  # force of every feature when it was last known, along the wall's axes [N]
+        ("known", f, (2, 3)),  # force and moment of the shares, which the unknowns add to
         ("push", f, (m, 3)),  # force per unknown
         ("turn", f, (m, 3)),  # moment per unknown about the centre of mass
         ("row", f, (m, 3)),  # direction of the constraint

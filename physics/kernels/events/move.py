@@ -7,8 +7,9 @@ import math
 from physics.kernels import quaternion as qt
 from physics.kernels.body import angular_velocity
 from physics.kernels.compiler import inlined, kernel
-from physics.kernels.events.guards import GAP, NO_GUARD, NO_STEP, SPEED, least_margin, look_around
-from physics.kernels.events.motion import END, START
+from physics.kernels.events.forces import keep_forces
+from physics.kernels.events.guards import GAP, NO_GUARD, NO_STEP, SPEED, WATCH, least_margin, look_around
+from physics.kernels.events.motion import END, SIZE, START
 from physics.kernels.events.smooth import (
     CUT,
     EASY,
@@ -21,6 +22,7 @@ from physics.kernels.events.smooth import (
     start_step,
     try_step,
 )
+from physics.kernels.events.trust import is_heeded
 from physics.kernels.fields.loads import pass_time, refresh_loads
 
 # Smooth steps at most before the next regime is looked for.
@@ -33,24 +35,37 @@ LOCATIONS = 110
 SETTLED = 1.0e-6
 
 
+@inlined
+def towards_gap(t, margin, guard, which, work, motion):
+    """Newton's step for the time at which the gap that was missed at END, t after START, is closed; -1 without one."""
+    if guard != GAP or not motion.gap_rate[END, which] < 0.0:
+        return -1.0
+    return t - margin * work.radius / motion.gap_rate[END, which]
+
+
 @kernel
-def locate(h, margin, tilted, work, motion):
+def locate(h, margin, guard, which, heeds, tilted, work, motion):
     """End the step where its smallest margin is zero (END): (its length, guard, contact or slot).
 
-    False position with the Illinois rule, and a half after each trial that left more than half.
+    Newton's steps for a gap. Else false position with the Illinois rule, and a half after each trial that left more
+    than half.
     """
-    low, high, low_margin, high_margin = 0.0, h, 1.0e-3, margin
-    guard, which = 0, -1
+    low, high, low_margin, high_margin = 0.0, h, -margin, margin
     side, width = 0, 4.0 * h
+    newton = towards_gap(h, margin, guard, which, work, motion)
     for _ in range(LOCATIONS):
-        t = low + (high - low) * low_margin / (low_margin - high_margin)
-        if high - low > 0.5 * width or not low < t < high:
-            t = 0.5 * (low + high)
-        width = high - low
+        t = newton
+        if not low < t < high:
+            t = low + (high - low) * low_margin / (low_margin - high_margin)
+            if high - low > 0.5 * width or not low < t < high:
+                t = 0.5 * (low + high)
+            width = high - low
+        newton = -1.0
         try_step(t, tilted, work, motion)
-        margin, g, w = least_margin(t, tilted, work, motion)
+        margin, g, w = least_margin(t, heeds, tilted, work, motion)
         if margin < 0.0:
             high, high_margin, guard, which = t, margin, g, w
+            newton = towards_gap(t, margin, g, w, work, motion)
             if side == 1:
                 low_margin *= 0.5
             side = 1
@@ -65,7 +80,7 @@ def locate(h, margin, tilted, work, motion):
             break
     if margin >= 0.0:
         try_step(high, tilted, work, motion)
-        _, guard, which = least_margin(high, tilted, work, motion)
+        _, guard, which = least_margin(high, heeds, tilted, work, motion)
     return high, guard, which
 
 
@@ -74,7 +89,7 @@ def has_stopped(guard, which, work, motion):
     """Whether the contact that ended a step all but stands still there: then that is the end, not before."""
     if guard != SPEED:
         return False
-    return sliding_velocity(which, work, motion)[1] <= motion.still
+    return sliding_velocity(which, work, motion)[1] <= motion.slow
 
 
 @inlined
@@ -86,14 +101,18 @@ def body_speed(y, tilted, work):
 
 @kernel
 def move(y, left, tilted, work, motion):
-    """Smooth motion of the regime for `left`, or until a guard ends it: (state, time, guard)."""
+    """Smooth motion of the regime for `left`, or until a guard ends it: (state, time, guard).
+
+    Where the guards of force are not heeded one step, no longer than `motion.trust`: its guard is WATCH at least.
+    """
+    heeds = is_heeded(motion)
     had = body_speed(y, tilted, work)
     y = cancel(y, tilted, work, motion)
     if had > motion.still and body_speed(y, tilted, work) <= SETTLED * motion.still:
         return y, 0.0, SPEED  # the contacts have taken all of it: it may be at rest
     put_state(motion, START, y)
     look_around(START, tilted, work, motion)
-    motion.step = left
+    motion.step = left if heeds else motion.trust
     t, h = 0.0, start_step(left, tilted, work, motion)
     for _ in range(STEPS):
         error, used = try_step(h, tilted, work, motion)
@@ -104,16 +123,21 @@ def move(y, left, tilted, work, motion):
             h *= CUT
             refresh_loads(get_state(motion, START), 0.0, tilted, work)  # the scale of the errors is that of the start
             continue
-        margin, guard, which = least_margin(h, tilted, work, motion)
+        margin, guard, which = least_margin(h, heeds, tilted, work, motion)
         is_over = margin < 0.0
         if is_over and not has_stopped(guard, which, work, motion):
-            h, guard, which = locate(h, margin, tilted, work, motion)
+            h, guard, which = locate(h, margin, guard, which, heeds, tilted, work, motion)
         t += h
         pass_time(h, work)
         motion.step = GROWTH * h if used <= EASY else h
+        keep_forces(work, motion)
         y = cancel(get_state(motion, END), tilted, work, motion)
         if is_over:
             return y, t, guard
+        if not heeds:
+            for c in range(SIZE):
+                motion.end_rate[c] = motion.rate[c]
+            return y, t, WATCH
         put_state(motion, START, y)
         if not t < left:
             break

@@ -24,6 +24,7 @@ from physics.kernels.events.candidates import (
 from physics.kernels.events.forces import (
     PATCH,
     arm_and_rate,
+    forget_forces,
     free_turning,
     load,
     plus,
@@ -93,18 +94,12 @@ def is_idle(i, count, width, small, work):
 
 
 @inlined
-def keep_forces(count, width, work, motion):
-    """Forces of the contacts that act, from the solver's: what a body at rest has is never found otherwise."""
-    k = 0
+def take_forces(count, width, work, motion):
+    """`last`: the solver's forces."""
+    forget_forces(motion)
     for i in range(count):
-        if motion.kind[i] == OPEN:
-            continue
-        axes = wall_axes(work.walls, wall_of(work.slot[i], work))
-        for c in range(3):
-            motion.force[k, c] = 0.0
-            for d in range(width):
-                motion.force[k, c] += work.impulse[width * i + d] * axes[d][c]
-        k += 1
+        for c in range(width):
+            motion.last[work.slot[i], c] = work.impulse[width * i + c]
 
 
 @kernel
@@ -144,6 +139,7 @@ def read_resting(count, y, a, moment, friction, has_sliding, tilted, work, motio
             continue
         for c in range(3):
             motion.candidate_way[i, c] = at[c] / size if size > small else 0.0
+    take_forces(count, width, work, motion)
     act(count, work, motion)
     if closes(count, motion):
         return COLLIDES
@@ -151,6 +147,5 @@ def read_resting(count, y, a, moment, friction, has_sliding, tilted, work, motio
         return FLIES
     acceleration = math.sqrt(qt.dot(a, a)) + work.radius * math.sqrt(qt.dot(alpha, alpha))
     if is_still(y, w, acceleration, work, motion):
-        keep_forces(count, width, work, motion)
         return RESTS
     return MOVES

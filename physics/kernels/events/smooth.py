@@ -42,6 +42,15 @@ EASY = 4
 UNSEEN_GAP = 0.1
 UNSEEN_SPEED = 0.01
 
+# Sliding turns when its acceleration is off its direction by this share, and then a step is so long at most, in times
+# |u|/|a|.
+STRAIGHT = 1.0e-4
+TURNED = 0.5
+
+# Rules after which it shows whether an extrapolation will settle: when its errors, falling twice as fast as they did
+# last, would not.
+TOLD = 3
+
 # A body with corners turns by no more than this in a step, so that the gaps at its ends and their rates show whether
 # a corner dipped into a wall between them [rad].
 TURN_AT_MOST = 0.25
@@ -132,6 +141,7 @@ def try_step(h, tilted, work, motion):
     used = ORDERS
     for k in range(ORDERS):
         _midpoint_rule(2 * (k + 1), h, tilted, work, motion)
+        before = error
         error = total = 0.0
         for c in range(SIZE):
             new, change = y[END, c], math.inf
@@ -150,6 +160,8 @@ def try_step(h, tilted, work, motion):
             return math.inf, ORDERS
         if error <= goal:
             used = k + 1
+            break
+        if k >= TOLD and error * (error / before) ** (2 * (ORDERS - 1 - k)) > goal:
             break
     x, q, v, m = get_state(motion, END)
     put_state(motion, END, (x, qt.normalise(q), v, m))
@@ -182,8 +194,8 @@ def start_step(left, tilted, work, motion):
     place(state, R, w, alpha, tilted, work, motion)
     for j in range(motion.count):
         t, speed = sliding_velocity(j, work, motion)
-        motion.is_starting[j] = 1 if speed <= motion.still else 0
-        if speed > motion.still:
+        motion.is_starting[j] = 1 if speed <= motion.slow else 0
+        if speed > motion.slow:
             for c in range(3):
                 motion.reference[j, c] = t[c] / speed
     find_rate(START, 0.0, tilted, work, motion)
@@ -201,30 +213,51 @@ def start_step(left, tilted, work, motion):
 
 @inlined
 def _until_stop(h, P, w, work, motion):
-    """h, or the time until the first contact stops sliding if it is slowed as at the start."""
+    """h, or less: until the first contact stops sliding if it is slowed as at the start, or has turned its sliding.
+
+    The direction of a velocity u + a t is analytic up to the time |u|/|a| (where a complex t makes it vanish), and no
+    step much longer than that is of any high order.
+    """
     rate, a, torque = motion.first_rate, work.free_acceleration, work.torque
     T = (rate[L] - torque[0], rate[L + 1] - torque[1], rate[L + 2] - torque[2])
+    F = (rate[V] - a[0], rate[V + 1] - a[1], rate[V + 2] - a[2])
     turning = turned_by(P, work.J, T)
     for j in range(motion.count):
         if motion.holds[j] or motion.is_starting[j] or not work.mu > 0.0:
             continue
         d = vector(motion.reference, j)
         _, speed = sliding_velocity(j, work, motion)
-        change = qt.dot(d, plus(vector(motion.goal, j), qt.cross(turning, vector(motion.arm, j))))
-        for c in range(3):
-            change += d[c] * (rate[V + c] - a[c])
-        if change < 0.0 and -change * h > speed:
-            h = -speed / change
+        change = plus(plus(vector(motion.goal, j), qt.cross(turning, vector(motion.arm, j))), F)
+        along, size = qt.dot(d, change), math.sqrt(qt.dot(change, change))
+        if along < 0.0 and -along * h > speed:
+            h = -speed / along
+        if size - abs(along) > STRAIGHT * size:
+            h = min(h, TURNED * speed / size)
     return h
 
 
 @inlined
-def _push_along(P, work, motion):
+def _push_along(holding, P, work, motion):
     """Velocity and turn, both per kinetic metric, that take off `goal` along the rows of the regime."""
-    k = list_unknowns(0.0, work, motion)
+    k = list_unknowns(0.0, holding, work, motion)
     F, T, _ = solve_unknowns(k, P, work, motion)
     s = 1.0 / work.mass
     return (s * F[0], s * F[1], s * F[2]), T
+
+
+@inlined
+def _speed_goals(motion, work):
+    """`goal`: the velocities of the contacts that act; the largest that the regime does not allow [m/s]."""
+    worst = 0.0
+    for j in range(motion.count):
+        n = wall_normal(work.walls, wall_of(motion.slot[j], work))
+        u = vector(motion.velocity, j)
+        worst = max(worst, abs(qt.dot(n, u)))
+        if motion.holds[j]:
+            worst = max(worst, max(abs(u[0]), max(abs(u[1]), abs(u[2]))))
+        for c in range(3):
+            motion.goal[j, c] = u[c]
+    return worst
 
 
 @kernel
@@ -247,21 +280,13 @@ def cancel(y, tilted, work, motion):
         for c in range(3):
             motion.goal[j, c] = gap * n[c]
     if worst > UNSEEN_GAP * motion.touch:
-        move, turn = _push_along(P, work, motion)
+        move, turn = _push_along(False, P, work, motion)
         x = plus(x, move)
         q = qt.normalise(qt.multiply(qt.exponential(turned_by(P, work.J, turn)), q))
         R, P, w, alpha = free_turning((x, q, v, m), tilted, work)
         place((x, q, v, m), R, w, alpha, tilted, work, motion)
-    worst = 0.0
-    for j in range(motion.count):
-        n = wall_normal(work.walls, wall_of(motion.slot[j], work))
-        u = vector(motion.velocity, j)
-        worst = max(worst, abs(qt.dot(n, u)))
-        if motion.holds[j]:
-            worst = max(worst, max(abs(u[0]), max(abs(u[1]), abs(u[2]))))
-        for c in range(3):
-            motion.goal[j, c] = u[c]
+    worst = _speed_goals(motion, work)
     if worst > UNSEEN_SPEED * motion.noise:
-        change, turn = _push_along(P, work, motion)
+        change, turn = _push_along(True, P, work, motion)
         v, m = plus(v, change), plus(m, turn)
     return x, q, v, m

@@ -47,13 +47,8 @@ def keep_contacts(memory, i, work, motion):
     for j in range(motion.count):
         slot = motion.slot[j]
         memory[i, MEMORY_HEAD + j] = slot
-        f = motion.force
         for c in range(3):
-            k = 3 * c
-            wall = wall_of(slot, work)
-            memory[i, row + 3 * slot + c] = (
-                f[j, 0] * work.walls[wall, k] + f[j, 1] * work.walls[wall, k + 1] + f[j, 2] * work.walls[wall, k + 2]
-            )
+            memory[i, row + 3 * slot + c] = motion.last[slot, c]
     total = 0.0
     for wall in range(work.walls.shape[0] - 1, -1, -1):
         total = 3.0 * total + motion.state[wall]
@@ -62,8 +57,12 @@ def keep_contacts(memory, i, work, motion):
 
 @inlined
 def recall_contacts(memory, i, work, motion):
-    """What the body did at the end of the last step: whether it rested, and base 3 a digit per wall."""
-    total = int(memory[i, 2])
+    """What the body did at the end of the last step, and its forces: the opposite of `keep_contacts`."""
+    row = MEMORY_HEAD + work.slot.shape[0]
+    for s in range(motion.last.shape[0]):
+        for c in range(3):
+            motion.last[s, c] = memory[i, row + 3 * s + c]
+    total = int(memory[i, 2])  # whether it rested, and base 3 a digit per wall
     motion.is_resting = total % 2
     total //= 2
     for wall in range(work.walls.shape[0]):
