@@ -14,7 +14,7 @@ from physics.kernels.events.forces import (
 )
 from physics.kernels.events.guards import look_around
 from physics.kernels.events.motion import START
-from physics.kernels.events.smooth import put_state
+from physics.kernels.events.smooth import cancel_normal_speeds, put_state
 
 # What a body does.
 FLIES, COLLIDES, MOVES, RESTS, IS_LOST, ASKS, ASKS_SLIDING = range(7)
@@ -31,7 +31,7 @@ def find_candidates(y, tilted, work, motion):
     """Features that touch and do not leave, into `candidate`: (count, whether one approaches)."""
     put_state(motion, START, y)
     look_around(START, tilted, work, motion)
-    count = 0
+    count = motion.candidates = 0
     for s in range(motion.is_active.shape[0]):
         if motion.gap[START, s] <= motion.touch and count < motion.slot.shape[0]:
             rate = motion.gap_rate[START, s]
@@ -40,6 +40,7 @@ def find_candidates(y, tilted, work, motion):
             if rate <= motion.still:
                 motion.candidate[count] = s
                 count += 1
+    motion.candidates = count
     return count, False
 
 
@@ -62,6 +63,37 @@ def act(count, work, motion):
                 motion.way[k, c] = motion.reference[k, c] = motion.candidate_way[i, c]
             k += 1
     motion.count = k
+
+
+@inlined
+def has_open(motion):
+    """Whether a candidate does not act."""
+    for i in range(motion.candidates):
+        if motion.kind[i] == OPEN:
+            return True
+    return False
+
+
+@kernel
+def set_down(y, tilted, work, motion):
+    """State without the normal velocities of all candidates that neither come nor go, whether they act or not.
+
+    A body that lies on two contacts and rocks lower than counts would else come down on the one whenever it is set
+    down on the other.
+    """
+    if not has_open(motion):
+        return y
+    put_state(motion, START, y)
+    look_around(START, tilted, work, motion)
+    motion.count = 0
+    for i in range(motion.candidates):
+        s = motion.candidate[i]
+        if motion.gap[START, s] <= motion.touch and abs(motion.gap_rate[START, s]) <= motion.still:
+            motion.slot[motion.count], motion.holds[motion.count] = s, 0
+            motion.count += 1
+    y = cancel_normal_speeds(y, tilted, work, motion)
+    act(motion.candidates, work, motion)
+    return y
 
 
 @inlined

@@ -67,8 +67,9 @@ def motion_dtype(wall_count: int, features: int) -> np.dtype:
         ("matrix", f, (m, m + 1)),
         ("order", i, (m,)),
         ("unknown", f, (m,)),
-        ("kind", i, (n,)),  # candidates of a regime: open, held, sliding
-        ("is_fresh", i, (n,)),  # of them: slides from rest
+        ("candidates", i),  # of a regime: contacts that touch and do not leave
+        ("kind", i, (n,)),  # of them: open, held, sliding
+        ("is_fresh", i, (n,)),  # slides from rest
         ("changes", i, (n,)),
         ("candidate", i, (n,)),  # their slots
         ("candidate_way", f, (n, 3)),

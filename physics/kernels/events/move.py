@@ -7,6 +7,7 @@ import math
 from physics.kernels import quaternion as qt
 from physics.kernels.body import angular_velocity
 from physics.kernels.compiler import inlined, kernel
+from physics.kernels.events.candidates import set_down
 from physics.kernels.events.forces import keep_forces
 from physics.kernels.events.guards import GAP, NO_GUARD, NO_STEP, SPEED, WATCH, least_margin, look_around
 from physics.kernels.events.motion import END, SIZE, START
@@ -107,7 +108,7 @@ def move(y, left, tilted, work, motion):
     """
     heeds = is_heeded(motion)
     had = body_speed(y, tilted, work)
-    y = cancel(y, tilted, work, motion)
+    y = cancel(set_down(y, tilted, work, motion), tilted, work, motion)
     if had > motion.still and body_speed(y, tilted, work) <= SETTLED * motion.still:
         return y, 0.0, SPEED  # the contacts have taken all of it: it may be at rest
     put_state(motion, START, y)

@@ -260,6 +260,26 @@ def _speed_goals(motion, work):
     return worst
 
 
+@inlined
+def _cancel_speeds(holding, v, m, P, work, motion):
+    """Velocity and angular momentum without the velocities of contacts that the regime does not allow (placed)."""
+    worst = _speed_goals(motion, work)
+    if not worst > UNSEEN_SPEED * motion.noise:
+        return v, m
+    change, turn = _push_along(holding, P, work, motion)
+    return plus(v, change), plus(m, turn)
+
+
+@kernel
+def cancel_normal_speeds(y, tilted, work, motion):
+    """State without the normal velocities of the contacts that act."""
+    x, q, v, m = y
+    R, P, w, alpha = free_turning(y, tilted, work)
+    place(y, R, w, alpha, tilted, work, motion)
+    v, m = _cancel_speeds(False, v, m, P, work, motion)
+    return x, q, v, m
+
+
 @kernel
 def cancel(y, tilted, work, motion):
     """State without the gaps and velocities of contacts that the regime does not allow, where above rounding.
@@ -285,8 +305,5 @@ def cancel(y, tilted, work, motion):
         q = qt.normalise(qt.multiply(qt.exponential(turned_by(P, work.J, turn)), q))
         R, P, w, alpha = free_turning((x, q, v, m), tilted, work)
         place((x, q, v, m), R, w, alpha, tilted, work, motion)
-    worst = _speed_goals(motion, work)
-    if worst > UNSEEN_SPEED * motion.noise:
-        change, turn = _push_along(True, P, work, motion)
-        v, m = plus(v, change), plus(m, turn)
+    v, m = _cancel_speeds(True, v, m, P, work, motion)
     return x, q, v, m
