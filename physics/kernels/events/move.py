@@ -29,8 +29,11 @@ from physics.kernels.fields.loads import pass_time, refresh_loads
 # Smooth steps at most before the next regime is looked for.
 STEPS = 10_000
 
-# Trials of the time at which a guard ends a step.
+# Trials of the time at which a guard ends a step, those after which what is left must have been halved, and margins
+# that are none: of a gap and of all others.
 LOCATIONS = 110
+PATIENCE = 3
+MET = (1.0e-15, 1.0e-13)
 
 # A body whose contacts, when set right, take its speed down to this share of `motion.still` may be at rest.
 SETTLED = 1.0e-6
@@ -48,22 +51,21 @@ def towards_gap(t, margin, guard, which, work, motion):
 def locate(h, margin, guard, which, heeds, tilted, work, motion):
     """End the step where its smallest margin is zero (END): (its length, guard, contact or slot).
 
-    Newton's steps for a gap. Else false position with the Illinois rule, and a half after each trial that left more
-    than half.
+    Newton's steps for a gap. Else false position with the Illinois rule, and a half where PATIENCE trials have not
+    halved what is left.
     """
     low, high, low_margin, high_margin = 0.0, h, -margin, margin
-    side, width = 0, 4.0 * h
+    side, width, stale = 0, h, 0
     newton = towards_gap(h, margin, guard, which, work, motion)
     for _ in range(LOCATIONS):
         t = newton
         if not low < t < high:
             t = low + (high - low) * low_margin / (low_margin - high_margin)
-            if high - low > 0.5 * width or not low < t < high:
+            if stale >= PATIENCE or not low < t < high:
                 t = 0.5 * (low + high)
-            width = high - low
-        newton = -1.0
         try_step(t, tilted, work, motion)
         margin, g, w = least_margin(t, heeds, tilted, work, motion)
+        newton = -1.0
         if margin < 0.0:
             high, high_margin, guard, which = t, margin, g, w
             newton = towards_gap(t, margin, g, w, work, motion)
@@ -72,12 +74,15 @@ def locate(h, margin, guard, which, heeds, tilted, work, motion):
             side = 1
         else:
             low, low_margin = t, margin
-            if g == GAP and margin <= 1.0e-15:
+            if g == GAP and margin <= MET[0]:
                 return t, g, w
             if side == -1:
                 high_margin *= 0.5
             side = -1
-        if high - low <= 1.0e-15 * h or (margin < 0.0 and margin > -1.0e-15):
+        stale += 1
+        if high - low <= 0.5 * width:
+            width, stale = high - low, 0
+        if high - low <= 1.0e-15 * h or (margin < 0.0 and margin > -(MET[0] if g == GAP else MET[1])):
             break
     if margin >= 0.0:
         try_step(high, tilted, work, motion)

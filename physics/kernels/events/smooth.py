@@ -43,9 +43,11 @@ UNSEEN_GAP = 0.1
 UNSEEN_SPEED = 0.01
 
 # Sliding turns when its acceleration is off its direction by this share, and then a step is so long at most, in times
-# |u|/|a|.
-STRAIGHT = 1.0e-4
+# |u|/|a|. Where it is straight but for less than that it turns just before it stops: there a step goes so far.
+BENT = 1.0e-4
 TURNED = 0.5
+STRAIGHT = 1.0e-12
+SHORT_OF_STOP = 0.75
 
 # Rules after which it shows whether an extrapolation will settle: when its errors, falling twice as fast as they did
 # last, would not.
@@ -229,9 +231,12 @@ def _until_stop(h, P, w, work, motion):
         _, speed = sliding_velocity(j, work, motion)
         change = plus(plus(vector(motion.goal, j), qt.cross(turning, vector(motion.arm, j))), F)
         along, size = qt.dot(d, change), math.sqrt(qt.dot(change, change))
+        bend = size - abs(along)
         if along < 0.0 and -along * h > speed:
             h = -speed / along
-        if size - abs(along) > STRAIGHT * size:
+            if bend > STRAIGHT * size:
+                h *= SHORT_OF_STOP
+        if bend > BENT * size:
             h = min(h, TURNED * speed / size)
     return h
 
