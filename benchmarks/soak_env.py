@@ -16,7 +16,7 @@ import physics
 import rigid_env  # noqa: F401 (registers the environments)
 from rigid_env.tasks import layout as col
 
-ENVS = {"fast": 64, "balanced": 64, "precise": 8, "reference": 4}  # worlds by preset: events take longer
+ENVS = {"fast": 64, "balanced": 64, "precise": 32, "reference": 32}  # worlds by preset: events take longer
 HOLD_STEPS, BONUS = 10, 5.0
 PERSISTENT = 60  # control steps for which a direction is held
 DEEP = 0.02  # bounding radii that a block may go into a wall: 0.06 m of the default one
