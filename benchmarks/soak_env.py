@@ -57,6 +57,7 @@ def soak(name: str, accuracy: str, seconds: float, seed: int, keep: Path | None,
                 found["episodes"] += int(ended.sum())
                 envs.reset(options={"reset_mask": ended})
                 judge.begin(np.flatnonzero(ended))
+            found["largest_reward_error"] = judge.largest
             tick(f"{name} {found['steps']} steps, {sum(found['wrong'].values())} wrong")
     except KeyboardInterrupt:
         pass
@@ -90,6 +91,7 @@ class Judge:
         self.task = task
         self.potential = self._potential(np.zeros(task.worlds))[0]
         self.hold = np.zeros(task.worlds)
+        self.largest = 0.0  # error of a reward so far, relative to one and its size
 
     def begin(self, rows: np.ndarray) -> None:
         """These worlds start a new episode."""
@@ -127,13 +129,15 @@ class Judge:
         self.potential, self.hold = potential, hold
         depth = -physics.diagnose(world).gap[:, 0] / np.linalg.norm(task.record[:, col.HALF : col.HALF + 3], axis=1)
         loose = ANGLE_ROUNDING if task.error_name == "angle" else ROUNDING
+        error = np.abs(reward - expected) / (1 + np.abs(expected))
+        self.largest = max(self.largest, float(error.max()))
         state = np.concatenate([world.pos, world.quat, world.linvel, world.angvel], axis=-1)[:, 0]
         found = {
             "state not finite": ~np.isfinite(state).all(axis=1),
             "observation outside its space": np.full(len(reward), not envs.observation_space.contains(obs)),
             "escaped": depth > 1.0,
             "deep in a wall": (depth > DEEP) & (depth <= 1.0),
-            "reward not earned": ~(np.abs(reward - expected) <= loose * (1 + np.abs(expected))),
+            "reward not earned": ~(error <= loose),
             "success not earned": np.asarray(terminated) != success,
         }
         return {what: int(wrong.sum()) for what, wrong in found.items() if wrong.any()}
