@@ -27,7 +27,7 @@ from physics.kernels.arms import arm_and_rate, wall_normal
 from physics.kernels.compiler import inlined, kernel
 from physics.kernels.contact import is_clear
 from physics.kernels.events.forces import free_turning, load, plus
-from physics.kernels.events.guards import NO_GUARD, NO_STEP
+from physics.kernels.events.guards import NO_STEP
 from physics.kernels.events.motion import END, SIZE, START
 from physics.kernels.events.move import move
 from physics.kernels.events.smooth import CUT, SHORTEST, get_state, put_state, start_step, try_step
@@ -156,25 +156,28 @@ def fly_freely(y, t, gyroscopic, tilted, work, motion):
 
 @kernel
 def fly_to_wall(y, left, gyroscopic, tilted, work, motion):
-    """Fly for `left` or until a feature reaches a wall: (state, time, whether it did, whether the search ended)."""
+    """Fly for `left` or until a feature reaches a wall: (state, time, whether the flight was found).
+
+    It may end earlier, where a feature flies so close along a wall that ADVANCES steps did not tell: no wall is missed.
+    """
     motion.count = 0
     if has_fields(work):
         now = start_feeling(work)
         end, t, guard = move(y, left, tilted, work, motion)
         if was_felt(work):
-            return end, t, guard != NO_GUARD, guard != NO_STEP
+            return end, t, guard != NO_STEP
         set_now(now, work)
         refresh_loads(y, 0.0, tilted, work)
     if is_clear(y[0], y[2], left, work):
-        return fly_freely(y, left, gyroscopic, tilted, work, motion), left, False, True
+        return fly_freely(y, left, gyroscopic, tilted, work, motion), left, True
     third = third_bound(y[3], left, work)
     now, t = y, 0.0
     for _ in range(ADVANCES):
         step = safe_flight(now, left - t, third, tilted, work, motion)
         if t + step >= left:
-            return fly_freely(y, left, gyroscopic, tilted, work, motion), left, False, True
+            return fly_freely(y, left, gyroscopic, tilted, work, motion), left, True
         t += step
         now = fly_freely(y, t, gyroscopic, tilted, work, motion)
         if step <= FINEST * left:
-            return now, t, True, True
-    return now, t, True, False
+            break
+    return now, t, True

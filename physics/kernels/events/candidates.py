@@ -23,7 +23,7 @@ FLIES, COLLIDES, MOVES, RESTS, IS_LOST, ASKS, ASKS_SLIDING = range(7)
 OPEN, HELD, SLIDING = range(3)
 
 # Approach of a contact that will leave that is none, in `motion.still`.
-UNSEEN_APPROACH = 1.0e-6
+UNSEEN_APPROACH = 1.0e-2
 
 
 @kernel
@@ -46,11 +46,8 @@ def find_candidates(y, tilted, work, motion):
 
 @kernel
 def act(count, work, motion):
-    """Let the candidates act that are not open; mark their slots. Where one holds, the last forces are shares."""
-    k, given = 0, 0.0
-    for i in range(count):
-        if motion.kind[i] == HELD:
-            given = 1.0
+    """Let the candidates act that are not open, with the last forces for shares; mark their slots."""
+    k = 0
     for s in range(motion.is_active.shape[0]):
         motion.is_active[s] = 0
     for i in range(count):
@@ -59,7 +56,7 @@ def act(count, work, motion):
             motion.is_active[motion.candidate[i]] = 1
             motion.holds[k] = 1 if motion.kind[i] == HELD else 0
             for c in range(3):
-                motion.share[k, c] = given * motion.last[motion.candidate[i], c]
+                motion.share[k, c] = motion.last[motion.candidate[i], c]
                 motion.way[k, c] = motion.reference[k, c] = motion.candidate_way[i, c]
             k += 1
     motion.count = k

@@ -12,9 +12,9 @@ f_i = y_0 + y_1 a_i + y_2 b_i, have the least norm of all with their resultant, 
 rows with the same coefficients stand for the equations. So it stays when one of them holds, which then adds its two
 tangential forces: what a face presses with does not jump where a corner of it stops.
 
-Where a contact holds, the forces that were last known (`share`) are a part of the answer, and the unknowns only what is
-still to be added to them: a rigid body does not tell which of its corners presses on the floor, or on the wall beside
-it, and what the contact problem of a moment has found to hold (`resting`) does so from then on.
+The forces that were last known (`share`) are a part of the answer, and the unknowns only what is still to be added to
+them: a rigid body does not tell which of its corners presses on the floor, or on the wall beside it, and what the
+contact problem of a moment has found to hold (`resting`) does so from then on.
 
 The same rows, with velocities or gaps in place of accelerations and pushes along the rows, bring a state back to
 what the regime says (`cancel`): the least change in the kinetic metric.

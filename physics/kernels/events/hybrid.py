@@ -211,7 +211,7 @@ def advance(y, h, friction, smooth, gyroscopic, tilted, pivots, work, motion, me
             leap = min(LONGER * leap, LONGEST * nearest)
             since, crowd = t + step, CROWD - PAUSE
         elif what == FLIES:
-            y, step, _, ended = fly_to_wall(y, h - t, gyroscopic, tilted, work, motion)
+            y, step, ended = fly_to_wall(y, h - t, gyroscopic, tilted, work, motion)
             if not ended:
                 report[world, at.UNRESOLVED] += 1.0
         else:
