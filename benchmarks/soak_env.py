@@ -22,8 +22,8 @@ PERSISTENT = 60  # control steps for which a direction is held
 DEEP = 0.02  # bounding radii that a block may go into a wall: 0.06 m of the default one
 ROUNDING = 1e-9  # of a reward: sums of a dozen numbers of order ten
 # Of a reward that knows an angle by its cosine, once by the kernel and once from SciPy's matrix. Each is a sum of
-# products (2 eps) of a quaternion whose square is 1 to 4 eps: 12 eps between them, which at an angle of 0 are √(24 eps) =
-# 7.3e-8 rad, at a weight of 2/rad in each of two potentials, and as much again by what multiplies it.
+# products (2 eps) of a quaternion whose square is 1 to 4 eps: 12 eps between them, which at an angle of 0 are
+# √(24 eps) = 7.3e-8 rad, at a weight of 2/rad in each of two potentials, and as much again by what multiplies it.
 ANGLE_ROUNDING = 6e-7
 
 
