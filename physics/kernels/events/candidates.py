@@ -16,8 +16,8 @@ from physics.kernels.events.guards import look_around
 from physics.kernels.events.motion import START
 from physics.kernels.events.smooth import cancel_normal_speeds, put_state
 
-# What a body does.
-FLIES, COLLIDES, MOVES, RESTS, IS_LOST, ASKS, ASKS_SLIDING = range(7)
+# What a body does; the last: nothing, since its last step went too far (`trust`).
+FLIES, COLLIDES, MOVES, RESTS, IS_LOST, ASKS, ASKS_SLIDING, GOES_BACK = range(8)
 
 # What a candidate does.
 OPEN, HELD, SLIDING = range(3)

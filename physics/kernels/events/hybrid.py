@@ -28,7 +28,7 @@ from physics.kernels.body import angular_velocity, bind_body, is_finite, princip
 from physics.kernels.compiler import kernel
 from physics.kernels.events import log as ev
 from physics.kernels.events.air import fly_freely, fly_to_wall
-from physics.kernels.events.candidates import ASKS, ASKS_SLIDING, COLLIDES, FLIES, IS_LOST, RESTS
+from physics.kernels.events.candidates import ASKS, ASKS_SLIDING, COLLIDES, FLIES, GOES_BACK, IS_LOST, RESTS
 from physics.kernels.events.collide import (
     SOLVED,
     aim_collision,
@@ -46,7 +46,7 @@ from physics.kernels.events.smooth import (
     cancel,
 )
 from physics.kernels.events.state import keep_contacts, log_changes, recall_contacts
-from physics.kernels.events.trust import GROWTH, NONE, SHARE, distrust, has_jumped, name_of_regime
+from physics.kernels.events.trust import GROWTH, NONE, SHORTER, distrust, judge, name_of_regime
 from physics.kernels.fields.loads import bind_fields, refresh_loads, set_clock
 from physics.kernels.laws import bind_laws
 from physics.kernels.resist import without_gain
@@ -143,12 +143,7 @@ def advance(y, h, friction, smooth, gyroscopic, tilted, pivots, work, motion, me
         if told == NOTHING:
             refresh_loads(seen, later, tilted, work)
             what, n, v, L = find_regime(seen, friction, tilted, work, motion)
-            if watched > nearest and has_jumped(what, y, tilted, work, motion):
-                y, t, watched = kept, t - watched, 0.0
-                seen, later = y, 0.0
-                motion.trust *= SHARE
-                set_clock(start + t, work)
-                continue
+            what = judge(what, watched, nearest, y, tilted, work, motion)
         is_asked, is_sliding = what in (ASKS, ASKS_SLIDING), what == ASKS_SLIDING
         told = NOTHING
         if what in (COLLIDES, IS_LOST):
@@ -171,19 +166,20 @@ def advance(y, h, friction, smooth, gyroscopic, tilted, pivots, work, motion, me
             note_solve(report, world, residual, sweeps, method, max(work.tolerance, SOLVED))
         if is_asked:
             what = read_resting(n, seen, v, L, friction, is_sliding, tilted, work, motion)
+            what = judge(what, watched, nearest, y, tilted, work, motion)
             if what in (COLLIDES, IS_LOST):
                 told, seen, later = what, y, 0.0
-                continue
-            if watched > nearest and has_jumped(what, y, tilted, work, motion):
-                y, t, watched = kept, t - watched, 0.0
-                seen, later = y, 0.0
-                motion.trust *= SHARE
-                set_clock(start + t, work)
                 continue
         elif what in (COLLIDES, IS_LOST):
             y = y[0], y[1], v, L
             log_impulses(n, width, work, motion, log, counts, start + t)
         step = 0.0
+        if what == GOES_BACK:
+            y, t, watched = kept, t - watched, 0.0
+            seen, later = y, 0.0
+            motion.trust *= SHORTER
+            set_clock(start + t, work)
+            continue
         if watched > 0.0:
             watched = 0.0
             motion.trust *= GROWTH
@@ -211,8 +207,8 @@ def advance(y, h, friction, smooth, gyroscopic, tilted, pivots, work, motion, me
             leap = min(LONGER * leap, LONGEST * nearest)
             since, crowd = t + step, CROWD - PAUSE
         elif what == FLIES:
-            y, step, ended = fly_to_wall(y, h - t, gyroscopic, tilted, work, motion)
-            if not ended:
+            y, step, is_found = fly_to_wall(y, h - t, gyroscopic, tilted, work, motion)
+            if not is_found:
                 report[world, at.UNRESOLVED] += 1.0
         else:
             kept = y

@@ -9,7 +9,7 @@ taken back and made shorter when the acceleration has jumped in it: then another
 from __future__ import annotations
 
 from physics.kernels.compiler import inlined, kernel
-from physics.kernels.events.candidates import ASKS, ASKS_SLIDING, MOVES, RESTS
+from physics.kernels.events.candidates import ASKS, ASKS_SLIDING, GOES_BACK, MOVES, RESTS
 from physics.kernels.events.motion import SIZE, START, L, V
 from physics.kernels.events.smooth import put_state, start_step
 
@@ -17,7 +17,7 @@ from physics.kernels.events.smooth import put_state, start_step
 # begin with no acceleration, so that one found a look-ahead late, 1e-5 of the body's time, is off by the square of it.
 FIRST = 64.0
 GROWTH = 4.0
-SHARE = 0.25
+SHORTER = 0.25
 
 # Change of acceleration that is none, in weights.
 SAME = 1.0e-6
@@ -62,3 +62,11 @@ def has_jumped(what, y, tilted, work, motion):
         if abs(motion.first_rate[c] - motion.end_rate[c]) > SAME * unit:
             return True
     return False
+
+
+@kernel
+def judge(what, watched, nearest, y, tilted, work, motion):
+    """What the body does at y, or GOES_BACK: the watched step that led there was longer than `nearest` and too long."""
+    if watched > nearest and has_jumped(what, y, tilted, work, motion):
+        return GOES_BACK
+    return what
