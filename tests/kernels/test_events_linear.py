@@ -12,7 +12,7 @@ from scipy.linalg import expm
 
 from physics.kernels.arms import arm_and_rate
 from physics.kernels.events.air import parabola_root, safe_time
-from physics.kernels.events.linear import PIVOT_SHARE, eliminate
+from physics.kernels.events.linear import PIVOT_SHARE, eliminate, solve_least
 from physics.kernels.layout import BLOCK, ELLIPSOID, SPHERE
 
 EPS = np.finfo(float).eps
@@ -24,7 +24,7 @@ def solved(A, b):
     system = np.full((m + 2, m + 3), np.nan)
     system[:m, :m], system[:m, m] = A, b
     order, x = np.zeros(m + 2, np.int64), np.full(m + 2, np.nan)
-    return eliminate(m, system, order, x), x[:m]
+    return eliminate(m, system, order, x)[0], x[:m]
 
 
 @given(st.integers(1, 12), st.integers(0, 2**32 - 1))
@@ -65,6 +65,24 @@ def test_a_pivot_of_less_than_its_share_is_none():
     rank, x = solved(np.diag([1.0, 0.5 * PIVOT_SHARE]), [1.0, 0.0])
     assert rank == 1
     assert x.tolist() == [1.0, 0.0]
+
+
+@given(st.integers(1, 6), st.integers(0, 12), st.integers(0, 3), st.integers(0, 2**32 - 1))
+def test_least_solution_is_that_of_the_pseudoinverse(rank, free, implied, seed):
+    """A few m roundings times the condition number; rows that are sums of those before them change nothing."""
+    rng = np.random.default_rng(seed)
+    m = rank + free
+    A = rng.normal(size=(rank, m))
+    condition = np.linalg.cond(A)
+    if condition > 1e6:
+        return
+    truth = np.linalg.pinv(A) @ (b := rng.normal(size=rank))
+    extra = rng.integers(-2, 3, size=(min(implied, free), rank)).astype(float)
+    rows = rank + len(extra)
+    system, x = np.full((rows, m + 1), np.nan), np.full(m, np.nan)
+    system[:, :m], system[:, m] = np.vstack([A, extra @ A]), np.concatenate([b, extra @ b])
+    solve_least(rows, m, system, x)
+    assert np.abs(x - truth).max() <= 100 * m * EPS * condition**2 * np.linalg.norm(b)
 
 
 # --- how long a gap is good for ------------------------------------------------------------------------------------

@@ -32,11 +32,14 @@ from physics.kernels.arms import arm_and_rate, feature_of, wall_normal, wall_of
 from physics.kernels.body import principal_attitude
 from physics.kernels.compiler import inlined, kernel
 from physics.kernels.ellipse import opposing
-from physics.kernels.events.linear import eliminate
+from physics.kernels.events.linear import eliminate, solve_least
 from physics.kernels.share import wall_axes
 
 # Contacts of one wall from which on their normal forces are taken as affine.
 PATCH = 3
+
+# A pivot of less than this share of the largest may be that of a row which says what others say.
+DOUBTFUL = 1.0e-7
 
 # `motion.patch` of a contact whose normal force is an unknown of its own.
 NO_PATCH = -1
@@ -159,7 +162,7 @@ def _add_shares(mu, work, motion):
 def _clear(m, count, motion):
     """Empty the unknowns m <= k < m + count."""
     for k in range(m, m + count):
-        motion.unknown[k] = 0.0
+        motion.asked[k] = 0.0
         for c in range(3):
             motion.push[k, c] = motion.turn[k, c] = motion.row[k, c] = motion.row_turn[k, c] = 0.0
 
@@ -172,7 +175,7 @@ def _add_held(m, j, first_axis, axes, motion):
     _clear(m, 3 - first_axis, motion)
     for c in range(first_axis, 3):
         _add(m, r, axes[c], axes[c], 1.0, motion)
-        motion.unknown[m] = -qt.dot(axes[c], b)
+        motion.asked[m] = -qt.dot(axes[c], b)
         m += 1
     return m
 
@@ -197,20 +200,23 @@ def _add_patch(m, first, last, mu, axes, work, motion):
         _add(m, r, push, axes[0], 1.0, motion)
         _add(m + 1, r, push, axes[0], s, motion)
         _add(m + 2, r, push, axes[0], t, motion)
-        motion.unknown[m] += b
-        motion.unknown[m + 1] += s * b
-        motion.unknown[m + 2] += t * b
+        motion.asked[m] += b
+        motion.asked[m + 1] += s * b
+        motion.asked[m + 2] += t * b
     return m + 3
 
 
 @kernel
 def list_unknowns(mu, holding, work, motion):
-    """Fill push, turn, row, row_turn, `known` and the right-hand sides (`unknown`) from `goal`; their number.
+    """Fill push, turn, row, row_turn, `known` and the right-hand sides (`asked`) from `goal`; their number.
 
     `holding`: contacts that hold do so along the wall, too.
     """
-    m = first = 0
+    m = first = motion.is_skew = 0
     _add_shares(mu, work, motion)
+    for j in range(motion.count):
+        if mu > 0.0 and not motion.holds[j]:
+            motion.is_skew = 1
     while first < motion.count:
         wall = wall_of(motion.slot[first], work)
         axes = wall_axes(work.walls, wall)
@@ -228,7 +234,7 @@ def list_unknowns(mu, holding, work, motion):
             elif own == 0:
                 _clear(m, 1, motion)
                 _add(m, vector(motion.arm, j), _slide_push(mu, axes, j, work, motion), axes[0], 1.0, motion)
-                motion.unknown[m] = -qt.dot(axes[0], vector(motion.goal, j))
+                motion.asked[m] = -qt.dot(axes[0], vector(motion.goal, j))
                 motion.first[j] = m
                 m += 1
         first = last
@@ -236,23 +242,66 @@ def list_unknowns(mu, holding, work, motion):
 
 
 @kernel
-def solve_unknowns(m, P, work, motion):
-    """Solve for the m unknowns; total force and moment of the contacts, and the rank."""
+def _set_metric(m, P, work, motion):
+    """`matrix`: what the rows would have to do with each other if all pushed along themselves; right-hand side 0."""
     inv_mass, J, A = 1.0 / work.mass, work.J, motion.matrix
-    force, moment = vector(motion.known, 0), vector(motion.known, 1)
-    turn = turned_by(P, J, moment)
     for k in range(m):
-        F, g = vector(motion.push, k), turned_by(P, J, vector(motion.turn, k))
+        F, g = vector(motion.row, k), turned_by(P, J, vector(motion.row_turn, k))
         for l in range(m):
             A[l, k] = inv_mass * qt.dot(vector(motion.row, l), F) + qt.dot(vector(motion.row_turn, l), g)
-        A[k, m] = motion.unknown[k]
-        A[k, m] -= inv_mass * qt.dot(vector(motion.row, k), force) + qt.dot(vector(motion.row_turn, k), turn)
-    rank = eliminate(m, A, motion.order, motion.unknown)
+        A[k, m] = 0.0
+
+
+@kernel
+def _choose_rows(m, P, work, motion):
+    """`chosen`: the rows that are no sums of others, by their own metric; their number."""
+    _set_metric(m, P, work, motion)
+    rank, _ = eliminate(m, motion.matrix, motion.chosen, motion.unknown)
+    return rank
+
+
+@kernel
+def _set_rows(rows, m, P, work, motion):
+    """`matrix`: the `rows` chosen equations of the m unknowns."""
+    inv_mass, J, A = 1.0 / work.mass, work.J, motion.matrix
+    F, g = vector(motion.known, 0), turned_by(P, J, vector(motion.known, 1))
+    for i in range(rows):
+        l = motion.chosen[i]
+        A[i, m] = motion.asked[l]
+        A[i, m] -= inv_mass * qt.dot(vector(motion.row, l), F) + qt.dot(vector(motion.row_turn, l), g)
+    for k in range(m):
+        F, g = vector(motion.push, k), turned_by(P, J, vector(motion.turn, k))
+        for i in range(rows):
+            l = motion.chosen[i]
+            A[i, k] = inv_mass * qt.dot(vector(motion.row, l), F) + qt.dot(vector(motion.row_turn, l), g)
+
+
+@kernel
+def solve_unknowns(m, P, work, motion):
+    """Solve for the m unknowns, those that add least to the shares; total force and moment of the contacts.
+
+    Contacts can say the same of the body's motion twice. Where each pushes along its row the matrix shows it: what a
+    row has beyond the others, a share e of it, gives a pivot of e². Where one slides, its friction pushes elsewhere,
+    the pivot is of the order e, and a row that differs by rounding from a sum of others would still be met, by forces
+    that stop a body which no contact holds. So where a pivot is small the rows are chosen by their own metric.
+    """
+    for k in range(m):
+        motion.chosen[k] = k
+    _set_rows(m, m, P, work, motion)
+    rank, least = eliminate(m, motion.matrix, motion.order, motion.unknown)
+    if rank < m or (motion.is_skew and least < DOUBTFUL):
+        rows = _choose_rows(m, P, work, motion)
+        _set_rows(rows, m, P, work, motion)
+        if rows < m:
+            solve_least(rows, m, motion.matrix, motion.unknown)
+        else:
+            eliminate(m, motion.matrix, motion.order, motion.unknown)
+    force, moment = vector(motion.known, 0), vector(motion.known, 1)
     for k in range(m):
         s = motion.unknown[k]
         force = plus(force, times(s, vector(motion.push, k)))
         moment = plus(moment, times(s, vector(motion.turn, k)))
-    return force, moment, rank
+    return force, moment
 
 
 @kernel
@@ -301,5 +350,5 @@ def regime_forces(y, tilted, work, motion):
         return zero, zero, w, alpha, P
     place(y, R, w, alpha, tilted, work, motion)
     m = list_unknowns(work.mu, True, work, motion)
-    force, moment, _ = solve_unknowns(m, P, work, motion)
+    force, moment = solve_unknowns(m, P, work, motion)
     return force, moment, w, alpha, P

@@ -84,13 +84,19 @@ def lowest(g0, r0, g1, r1, h):
 
 @inlined
 def gap_margin(h, work, motion):
-    """Smallest gap of the features that do not act [m] over a step of h; of those that just left, less the slop."""
+    """Smallest gap of the features that do not act [m] over a step of h.
+
+    Of one that leaves: what it is above where it left, so that a bounce does not end deeper, and gain by it. Of one
+    that touches and neither comes nor goes: what it is above there, and the slop.
+    """
     least, which = math.inf, -1
     for s in range(motion.is_active.shape[0]):
         if motion.is_active[s] or motion.gap[END, s] == math.inf:
             continue
         g0, g1 = motion.gap[START, s], motion.gap[END, s]
-        if g0 <= motion.touch:
+        if g0 <= motion.touch and motion.gap_rate[START, s] > motion.still:
+            low = g1 - g0
+        elif g0 <= motion.touch:
             low = g1 - min(g0, 0.0) + motion.touch
         else:
             low = lowest(g0, motion.gap_rate[START, s], g1, motion.gap_rate[END, s], h)

@@ -60,11 +60,10 @@ AHEAD = 1.0e-5
 FURTHER = 8.0
 FARTHEST = 64.0
 
-# More than CROWD events within CROWD_TIME look-aheads go round in circles, at the verge between two regimes. Then, as
+# More than CROWD events within one look-ahead go round in circles, at the verge between two regimes. Then, as
 # where no force is consistent, an impulse and a leap of LEAP look-aheads are made, to first order; the leaps grow while
 # the crowd lasts, up to LONGEST, with PAUSE events between them.
 CROWD = 24
-CROWD_TIME = 0.1
 LEAP = 1.0
 LONGER = 4.0
 LONGEST = 100.0
@@ -135,7 +134,7 @@ def advance(y, h, friction, smooth, gyroscopic, tilted, pivots, work, motion, me
             report[world, at.UNRESOLVED] += 1.0
             break
         crowd += 1
-        if t > since + CROWD_TIME * nearest:
+        if t > since + nearest:
             since, crowd = t, 0
         if crowd > CROWD:
             told = IS_LOST
@@ -175,14 +174,13 @@ def advance(y, h, friction, smooth, gyroscopic, tilted, pivots, work, motion, me
             log_impulses(n, width, work, motion, log, counts, start + t)
         step = 0.0
         if what == GOES_BACK:
+            motion.trust = SHORTER * watched
             y, t, watched = kept, t - watched, 0.0
             seen, later = y, 0.0
-            motion.trust *= SHORTER
             set_clock(start + t, work)
             continue
         if watched > 0.0:
-            watched = 0.0
-            motion.trust *= GROWTH
+            motion.trust, watched = GROWTH * watched, 0.0
             if not t < h:
                 break
         if what == COLLIDES:

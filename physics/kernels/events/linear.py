@@ -1,6 +1,8 @@
-"""A small dense system that may be singular: Gauss's elimination with full pivoting."""
+"""A small dense system that may be singular: Gauss's elimination with full pivoting, and solutions of least norm."""
 
 from __future__ import annotations
+
+import math
 
 from physics.kernels.compiler import kernel
 
@@ -24,11 +26,13 @@ def eliminate(m, A, order, x):
     Returns
     -------
     rank : int
+    least : float
+        The least pivot, one that was none included, as a share of the largest.
     """
     for k in range(m):
         order[k] = k
         x[k] = 0.0
-    largest, rank = 0.0, 0
+    largest, least, rank = 0.0, 1.0, 0
     for k in range(m):
         best, p, c = 0.0, k, k
         for i in range(k, m):
@@ -37,6 +41,7 @@ def eliminate(m, A, order, x):
                 if size > best:
                     best, p, c = size, i, j
         largest = max(largest, best)
+        least = best / largest if largest > 0.0 else 0.0
         if not best > PIVOT_SHARE * largest:
             break
         rank += 1
@@ -56,4 +61,40 @@ def eliminate(m, A, order, x):
         for j in range(k + 1, rank):
             total -= A[k, j] * x[order[j]]
         x[order[k]] = total / A[k, k]
-    return rank
+    return rank, least
+
+
+@kernel
+def solve_least(rows, m, A, x):
+    """The x of least norm with A[:rows, :m] x = A[:rows, m]; A is overwritten, a row that others imply is left out.
+
+    Rows are made orthonormal one after the other (modified Gram-Schmidt), so that x, a sum of them, is smooth in A as
+    long as its rank is the same; what elimination sets to zero instead is up to rounding where pivots are equal.
+
+    Parameters
+    ----------
+    rows, m : int
+    A : (>= rows, >= m + 1) float64, overwritten
+        Right-hand side in column m.
+    x : (>= m,) float64, out
+    """
+    largest = 0.0
+    for k in range(m):
+        x[k] = 0.0
+    for i in range(rows):
+        for j in range(i):
+            share = 0.0
+            for k in range(m):
+                share += A[i, k] * A[j, k]
+            for k in range(m + 1):
+                A[i, k] -= share * A[j, k]
+        size = 0.0
+        for k in range(m):
+            size += A[i, k] * A[i, k]
+        size = math.sqrt(size)
+        largest = max(largest, size)
+        s = 1.0 / size if size > PIVOT_SHARE * largest else 0.0
+        for k in range(m + 1):
+            A[i, k] *= s
+        for k in range(m):
+            x[k] += A[i, m] * A[i, k]

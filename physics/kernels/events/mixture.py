@@ -116,7 +116,7 @@ def try_mixtures(count, y, R, P, w, alpha_free, tilted, work, motion):
         act(count, work, motion)
         place(y, R, w, alpha_free, tilted, work, motion)
         m = list_unknowns(work.mu, True, work, motion)
-        F, T, _ = solve_unknowns(m, P, work, motion)
+        F, T = solve_unknowns(m, P, work, motion)
         spread(work.mu, work, motion)
         turn = turned_by(P, work.J, T)
         s = 1.0 / work.mass

@@ -64,8 +64,11 @@ def motion_dtype(wall_count: int, features: int) -> np.dtype:
         ("turn", f, (m, 3)),  # moment per unknown about the centre of mass
         ("row", f, (m, 3)),  # direction of the constraint
         ("row_turn", f, (m, 3)),  # its moment
+        ("is_skew", i),  # 1: some contact pushes along another line than its row
+        ("chosen", i, (m,)),  # rows that are equations
         ("matrix", f, (m, m + 1)),
         ("order", i, (m,)),
+        ("asked", f, (m,)),  # right-hand sides
         ("unknown", f, (m,)),
         ("candidates", i),  # of a regime: contacts that touch and do not leave
         ("kind", i, (n,)),  # of them: open, held, sliding

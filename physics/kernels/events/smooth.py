@@ -245,7 +245,7 @@ def _until_stop(h, P, w, work, motion):
 def _push_along(holding, P, work, motion):
     """Velocity and turn, both per kinetic metric, that take off `goal` along the rows of the regime."""
     k = list_unknowns(0.0, holding, work, motion)
-    F, T, _ = solve_unknowns(k, P, work, motion)
+    F, T = solve_unknowns(k, P, work, motion)
     s = 1.0 / work.mass
     return (s * F[0], s * F[1], s * F[2]), T
 
