@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -44,7 +45,7 @@ def loads(world: physics.World) -> np.ndarray:
     return found
 
 
-def settle(setting: Setting, world, duration: float) -> tuple[float, int, float]:
+def settle(setting: Setting, world, duration: float, enough: float = math.inf) -> tuple[float, int, float]:
     """Let a pile stand.
 
     Parameters
@@ -54,6 +55,8 @@ def settle(setting: Setting, world, duration: float) -> tuple[float, int, float]
         Or what looks like one.
     duration : float
         [s].
+    enough : float
+        Displacement that ends it [m]: of what falls, to show that it does.
 
     Returns
     -------
@@ -64,7 +67,7 @@ def settle(setting: Setting, world, duration: float) -> tuple[float, int, float]
     start = world.pos.copy()
     moved, wrong, depth = 0.0, 0, 0.0
     left = setting.steps(duration)
-    while left:
+    while left and moved < enough:
         some = min(left, setting.steps(1.0))
         report = world.step(steps=some)
         left -= some
