@@ -139,6 +139,19 @@ def _take_part(world, start, unit, part, shortest, switches, memory, report, man
         tried += 1
 
 
+@inlined
+def _loaded(h, many):
+    """Speed that its loads give the body that they give the least, in h [m/s].
+
+    A part is solved no finer than the substep as a whole would be. Its share of that is less than rounding leaves where
+    bodies turn on edges, and no error is as small.
+    """
+    least = math.inf
+    for b in range(many.now.shape[0]):
+        least = min(least, many.bodies[b].acceleration * h)
+    return least
+
+
 @kernel
 def refine(world, start, h, switches, memory, report, many):
     """Advance the bodies of one world by h [s], `start` [s] after the call, in parts that meet the error.
@@ -150,6 +163,7 @@ def refine(world, start, h, switches, memory, report, many):
     """
     place, shortest, unit, patience = 0, 1, h / WHOLE, PATIENCE
     next_part = memory.shape[1] - 1
+    many.settings[0].whole = _loaded(h, many)
     part = int(memory[world, next_part] * WHOLE)
     if part == 0:
         part = WHOLE
