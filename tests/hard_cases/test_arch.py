@@ -1,4 +1,4 @@
-"""The thickness at which an arch stands: the linear program against the closed form of infinitely many stones."""
+"""An arch: the thickness at which it stands, by linear program and closed form; and one on its way down."""
 
 from __future__ import annotations
 
@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from scipy.optimize import minimize_scalar, root_scalar
 
-from rigid_env.hard_cases.arch import arch, joints, least_thickness, missing_force
+import physics
+from rigid_env.hard_cases.arch import NEAR, arch, joints, least_thickness, missing_force
 
 
 def continuous_limit() -> float:
@@ -68,3 +69,19 @@ def test_the_stones_fill_the_arch_and_touch_the_floor():
         expected = np.array([*here, *there])
         assert all(np.abs(corners[:, :2] - corner).max(axis=1).min() < 1e-15 for corner in expected)
         assert corners[:, 1].min() >= -1e-16
+
+
+def test_parts_of_a_substep_are_solved_as_finely_as_it_and_no_finer():
+    """Stones that turn on their edges, in parts of 1/64 of a substep and less.
+
+    Relative to what gravity gives in such a part, 1e-10 is 1e-13 m/s, which rounding of the forces of an arch does not
+    leave: 44 % of the problems were not solved to it, and each of them took all iterations there are.
+    """
+    world = physics.World(arch(7, (1 - NEAR) * least_thickness(7)), dt=0.01, accuracy="precise")
+    solves = unsolved = 0
+    for _ in range(50):
+        report = world.step()
+        solves += report.solves[0]
+        unsolved += report.unconverged[0]
+    assert report.fallbacks[0] == 0
+    assert unsolved <= 0.15 * solves
