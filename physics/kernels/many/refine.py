@@ -143,8 +143,8 @@ def _take_part(world, start, unit, part, shortest, switches, memory, report, man
 def _loaded(h, many):
     """Speed that its loads give the body that they give the least, in h [m/s].
 
-    A part is solved no finer than the substep as a whole would be. Its share of that is less than rounding leaves where
-    bodies turn on edges, and no error is as small.
+    A part is solved no finer than the halves in which every substep is stepped at least. Its share of that would be less
+    than rounding leaves where bodies turn on edges, and no error is as small.
     """
     least = math.inf
     for b in range(many.now.shape[0]):
@@ -163,7 +163,7 @@ def refine(world, start, h, switches, memory, report, many):
     """
     place, shortest, unit, patience = 0, 1, h / WHOLE, PATIENCE
     next_part = memory.shape[1] - 1
-    many.settings[0].whole = _loaded(h, many)
+    many.settings[0].half = _loaded(0.5 * h, many)
     part = int(memory[world, next_part] * WHOLE)
     if part == 0:
         part = WHOLE

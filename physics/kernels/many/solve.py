@@ -249,13 +249,13 @@ def solve_contacts(n, friction, many):
     `many.twist` holds the velocities without any contact impulse and receives those with them. The residual is
     measured on what is returned, relative to the largest velocity that a contact would have without any impulse; or,
     where all of those are next to rounding, to that speed of which the rounding of velocities or of impulses is the
-    tolerance's share; or, in a part of a substep, to what loads give in the whole of it (`refine`).
+    tolerance's share; or, in a part of a substep, to what loads give in half of it (`refine`).
     Iterations are those of the island that took most.
     """
     keep_free(many)
     tolerance = many.settings[0].tolerance
     least = VELOCITY_ROUNDING * fastest(many) / tolerance
-    scale = max(assemble(n, many), max(least, many.settings[0].whole))
+    scale = max(assemble(n, many), max(least, many.settings[0].half))
     if not scale > 0.0:
         return 0, 0.0, SWEEPS
     goal = max(min(tolerance * scale, many.settings[0].still), ROUNDING * scale)
