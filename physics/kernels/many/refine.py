@@ -143,8 +143,8 @@ def _take_part(world, start, unit, part, shortest, switches, memory, report, man
 def _loaded(h, many):
     """Speed that its loads give the body that they give the least, in h [m/s].
 
-    A part is solved no finer than the halves in which every substep is stepped at least. Its share of that would be less
-    than rounding leaves where bodies turn on edges, and no error is as small.
+    A part is solved no finer than the halves in which every substep is stepped at least. Its share of that would be
+    less than rounding leaves where bodies turn on edges, and no error is as small.
     """
     least = math.inf
     for b in range(many.now.shape[0]):
