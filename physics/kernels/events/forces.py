@@ -32,14 +32,10 @@ from physics.kernels.arms import arm_and_rate, feature_of, wall_normal, wall_of
 from physics.kernels.body import principal_attitude
 from physics.kernels.compiler import inlined, kernel
 from physics.kernels.ellipse import opposing
-from physics.kernels.events.linear import eliminate, solve_least
 from physics.kernels.share import wall_axes
 
 # Contacts of one wall from which on their normal forces are taken as affine.
 PATCH = 3
-
-# A pivot of less than this share of the largest may be that of a row which says what others say.
-DOUBTFUL = 1.0e-7
 
 # `motion.patch` of a contact whose normal force is an unknown of its own.
 NO_PATCH = -1
@@ -242,69 +238,6 @@ def list_unknowns(mu, holding, work, motion):
 
 
 @kernel
-def _set_metric(m, P, work, motion):
-    """`matrix`: what the rows would have to do with each other if all pushed along themselves; right-hand side 0."""
-    inv_mass, J, A = 1.0 / work.mass, work.J, motion.matrix
-    for k in range(m):
-        F, g = vector(motion.row, k), turned_by(P, J, vector(motion.row_turn, k))
-        for l in range(m):
-            A[l, k] = inv_mass * qt.dot(vector(motion.row, l), F) + qt.dot(vector(motion.row_turn, l), g)
-        A[k, m] = 0.0
-
-
-@kernel
-def _choose_rows(m, P, work, motion):
-    """`chosen`: the rows that are no sums of others, by their own metric; their number."""
-    _set_metric(m, P, work, motion)
-    rank, _ = eliminate(m, motion.matrix, motion.chosen, motion.unknown)
-    return rank
-
-
-@kernel
-def _set_rows(rows, m, P, work, motion):
-    """`matrix`: the `rows` chosen equations of the m unknowns."""
-    inv_mass, J, A = 1.0 / work.mass, work.J, motion.matrix
-    F, g = vector(motion.known, 0), turned_by(P, J, vector(motion.known, 1))
-    for i in range(rows):
-        l = motion.chosen[i]
-        A[i, m] = motion.asked[l]
-        A[i, m] -= inv_mass * qt.dot(vector(motion.row, l), F) + qt.dot(vector(motion.row_turn, l), g)
-    for k in range(m):
-        F, g = vector(motion.push, k), turned_by(P, J, vector(motion.turn, k))
-        for i in range(rows):
-            l = motion.chosen[i]
-            A[i, k] = inv_mass * qt.dot(vector(motion.row, l), F) + qt.dot(vector(motion.row_turn, l), g)
-
-
-@kernel
-def solve_unknowns(m, P, work, motion):
-    """Solve for the m unknowns, those that add least to the shares; total force and moment of the contacts.
-
-    Contacts can say the same of the body's motion twice. Where each pushes along its row the matrix shows it: what a
-    row has beyond the others, a share e of it, gives a pivot of e². Where one slides, its friction pushes elsewhere,
-    the pivot is of the order e, and a row that differs by rounding from a sum of others would still be met, by forces
-    that stop a body which no contact holds. So where a pivot is small the rows are chosen by their own metric.
-    """
-    for k in range(m):
-        motion.chosen[k] = k
-    _set_rows(m, m, P, work, motion)
-    rank, least = eliminate(m, motion.matrix, motion.order, motion.unknown)
-    if rank < m or (motion.is_skew and least < DOUBTFUL):
-        rows = _choose_rows(m, P, work, motion)
-        _set_rows(rows, m, P, work, motion)
-        if rows < m:
-            solve_least(rows, m, motion.matrix, motion.unknown)
-        else:
-            eliminate(m, motion.matrix, motion.order, motion.unknown)
-    force, moment = vector(motion.known, 0), vector(motion.known, 1)
-    for k in range(m):
-        s = motion.unknown[k]
-        force = plus(force, times(s, vector(motion.push, k)))
-        moment = plus(moment, times(s, vector(motion.turn, k)))
-    return force, moment
-
-
-@kernel
 def spread(mu, work, motion):
     """Force of each contact that acts (`force`, `normal`) from the unknowns."""
     for j in range(motion.count):
@@ -339,16 +272,3 @@ def keep_forces(work, motion):
         axes, f = wall_axes(work.walls, wall_of(motion.slot[j], work)), vector(motion.force, j)
         for c in range(3):
             motion.last[motion.slot[j], c] = qt.dot(axes[c], f)
-
-
-@kernel
-def regime_forces(y, tilted, work, motion):
-    """Forces of the regime at y: (total force, total moment, ω, dω/dt without contact, principal axes)."""
-    R, P, w, alpha = free_turning(y, tilted, work)
-    zero = (0.0, 0.0, 0.0)
-    if motion.count == 0:
-        return zero, zero, w, alpha, P
-    place(y, R, w, alpha, tilted, work, motion)
-    m = list_unknowns(work.mu, True, work, motion)
-    force, moment = solve_unknowns(m, P, work, motion)
-    return force, moment, w, alpha, P

@@ -22,12 +22,12 @@ from physics.kernels.events.forces import (
     load,
     place,
     plus,
-    solve_unknowns,
     spread,
     turned_by,
     vector,
 )
 from physics.kernels.events.guards import cone_excess
+from physics.kernels.events.unknowns import solve_unknowns
 from physics.kernels.share import wall_axes
 
 # Accelerations and forces of an exact trial below this share of the largest free ones are zero.

@@ -15,17 +15,9 @@ import math
 from physics.kernels import quaternion as qt
 from physics.kernels.arms import wall_normal, wall_of
 from physics.kernels.compiler import inlined, kernel
-from physics.kernels.events.forces import (
-    free_turning,
-    list_unknowns,
-    place,
-    plus,
-    regime_forces,
-    solve_unknowns,
-    turned_by,
-    vector,
-)
+from physics.kernels.events.forces import free_turning, list_unknowns, place, plus, turned_by, vector
 from physics.kernels.events.motion import END, LAST, NOW, ORDERS, SIZE, START, L, Q, V, X
+from physics.kernels.events.unknowns import regime_forces, solve_unknowns
 from physics.kernels.fields.loads import has_fields, refresh_loads
 from physics.kernels.layout import OFFSET, SPHERE
 

@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from physics.kernels.events.forces import solve_unknowns
 from physics.kernels.events.motion import make_motion
+from physics.kernels.events.unknowns import solve_unknowns
 from physics.kernels.layout import VERTEX_COUNT
 
 EPS = np.finfo(float).eps
