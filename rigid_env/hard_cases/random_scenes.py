@@ -277,7 +277,7 @@ def random_scenes(setting: Setting) -> list[Check]:
 
     To an error (`precise`, `reference`) a smooth step is off by a tolerance of speed, and by two of the energy, no more
     than a contact problem; a part of a step of several bodies has its own problems. The limit is for as many of them as
-    a step may have impacts, 10,001. Most have hundreds; those in which something rattles, millions, and no more room.
+    a step may have impacts, 10,001. Most have hundreds; where something rattles it is millions, and the limit the same.
     """
     limit = gain_limit(setting.accuracy)
     checks, scale = [], setting.pick(1.0, 0.004)

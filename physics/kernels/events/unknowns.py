@@ -24,7 +24,10 @@ def _set_metric(m, P, work, motion):
 
 @kernel
 def _choose_rows(m, P, work, motion):
-    """`chosen`: the rows that are no sums of others, by their own metric; their number."""
+    """`chosen`: the rows that are no sums of others, by their own metric; their number.
+
+    Of a symmetric matrix without negative directions the largest entry is on the diagonal: columns of pivots are rows.
+    """
     _set_metric(m, P, work, motion)
     rank, _ = eliminate(m, motion.matrix, motion.chosen, motion.unknown)
     return rank

@@ -163,7 +163,7 @@ def refine(world, start, h, switches, memory, report, many):
     """
     place, shortest, unit, patience = 0, 1, h / WHOLE, PATIENCE
     next_part = memory.shape[1] - 1
-    many.settings[0].half = _loaded(0.5 * h, many)
+    many.settings[0].half = _loaded(0.5 * h, many)  # the scale of contact problems, at least
     part = int(memory[world, next_part] * WHOLE)
     if part == 0:
         part = WHOLE
