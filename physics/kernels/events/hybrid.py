@@ -86,11 +86,12 @@ NOTHING = -1
 
 @kernel
 def set_thresholds(y, tilted, work, motion):
-    """What counts as no gap and no speed, and how far a regime is looked ahead.
+    """What counts as no gap and no speed, and how far a regime is looked ahead. Contact problems are solved to rounding.
 
     A contact is still when the speed would not lift it by HOP gaps that count as none: a bounce as low as that would
     gain from being set down on the wall what it loses in the impact.
     """
+    work.still = work.unseen = 0.0
     x, speed = y[0], body_speed(y, tilted, work)
     motion.touch = max(work.slop, ROUNDING * (work.radius + math.sqrt(qt.dot(x, x))))
     motion.noise = 1.0e-13 * speed
@@ -152,7 +153,7 @@ def advance(y, h, friction, smooth, gyroscopic, tilted, pivots, work, motion, me
             aim_collision(n, y, tilted, motion, work)
         elif what == IS_LOST:
             n, v, L = pose_jump(y, min(leap, h - t), tilted, work, motion)
-        if is_asked or what in (COLLIDES, IS_LOST):
+        if n > 0 and (is_asked or what in (COLLIDES, IS_LOST)):  # a leap may find nothing in reach
             P = principal_axes(seen if is_asked else y, tilted, work)
             solved = solve_contacts(n, friction, smooth, pivots, v, L, P, work)
             if what == COLLIDES:

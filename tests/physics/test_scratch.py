@@ -1,0 +1,73 @@
+"""Nothing of one step is read in the next but the state and the contact memory: scratch may hold anything before.
+
+A thread steps many worlds with one scratch. What a kernel reads of it before writing it would carry over from whatever
+world was there before, and results would depend on the batch, or be nonsense.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import physics
+from physics import scenes
+
+# What scratch says of the scene, not of a step.
+GIVEN = {
+    "tolerance", "sweeps", "splits", "mean_slip", "rest_share", "features", "feature_bits", "walls", "relative_slop",
+    "is_sequential",
+}  # fmt: skip
+
+# Anything: what is not a number shows in whatever it gets into; 1 is in range of whatever an integer counts.
+ANY_NUMBER, ANY_COUNT = np.nan, 1
+
+
+def spoil_record(record: np.ndarray) -> None:
+    """Write over every field that a step has to set itself."""
+    for name in record.dtype.names:
+        if name not in GIVEN:
+            record[name] = ANY_NUMBER if record.dtype[name].base.kind == "f" else ANY_COUNT
+
+
+def spoil(world: physics.World) -> None:
+    """Write over the scratch of a world of bodies that touch walls only."""
+    for record in (*world.scratch, *world.motions):
+        if record is not None:
+            spoil_record(record)
+
+
+def slender() -> physics.Scene:
+    """A rod-like ellipsoid that is pushed into a wall so hard that no force is consistent: first-order leaps."""
+    body = physics.Ellipsoid(
+        (0.07868843, 0.09786638, 1.25914593), 660.42961745, pos=(-5.81312896, -5.60702696, 2.84347781),
+        linvel=(-0.2808171, 0.07838032, 0.38298866),
+    )  # fmt: skip
+    walls = [physics.HalfSpace(tuple(s * n for n in normal), -10.0) for normal in np.eye(3) for s in (1.0, -1.0)]
+    return physics.Scene([body], walls, [physics.Gravity((0, -2.0, 0)), physics.Contact(), physics.Friction(0.8)])
+
+
+def pushed(build) -> tuple[physics.Scene, np.ndarray]:
+    """A scene, and a wrench of some weights on its body."""
+    scene = build()
+    weight = 9.81 * scene.bodies[0].mass
+    return scene, weight * np.array([0.5, -0.3, 0.4, 0.6, -0.2, 0.3])
+
+
+CASES = {name: lambda name=name: pushed(scenes.SCENES[name]) for name in ("corner_drop", "closed_box", "shove", "bounce")}
+CASES["slender"] = lambda: (slender(), np.array([-8.21590761e07, 9.83922068e06, -1.09285187e06, 3.5e3, -1.6e2, -2.0e3]))
+
+
+@pytest.mark.parametrize("accuracy", ["fast", "balanced", "precise"])
+@pytest.mark.parametrize("case", CASES)
+def test_scratch_may_hold_anything(case, accuracy):
+    scene, wrench = CASES[case]()
+    clean, spoilt = (physics.World(scene, dt=0.01, accuracy=accuracy, threads=1) for _ in range(2))
+    for world in (clean, spoilt):
+        world.step()  # the scratch is there from then on
+    for k in range(40):
+        now = wrench if k % 10 < 5 else np.zeros(6)
+        spoil(spoilt)
+        for world in (clean, spoilt):
+            world.step(now[None, None])
+        np.testing.assert_array_equal(spoilt.state, clean.state, err_msg=f"step {k}")
+        assert not clean.report.faults.any()
