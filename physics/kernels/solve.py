@@ -188,7 +188,7 @@ def solve_contacts(n, friction, smooth, pivots, v, L, R, work):
     Parameters
     ----------
     n : int
-        Contacts in `work`, at least one: slot, arm, target are read, impulse (width * n, the warm start) is overwritten.
+        Contacts in `work`, one at least: slot, arm, target are read, impulse (width * n, the warm start) overwritten.
     friction : True or None
         None: frictionless, one row per contact.
     smooth : True or None

@@ -1,8 +1,6 @@
-"""Parts of the event-driven scheme: elimination, the time a gap is good for, contact points and how they move."""
+"""Parts of the event-driven scheme: elimination, contact points and how they move."""
 
 from __future__ import annotations
-
-import math
 
 import numpy as np
 import pytest
@@ -11,7 +9,6 @@ from hypothesis import strategies as st
 from scipy.linalg import expm
 
 from physics.kernels.arms import arm_and_rate
-from physics.kernels.events.air import parabola_root, safe_time
 from physics.kernels.events.linear import PIVOT_SHARE, eliminate, solve_least
 from physics.kernels.layout import BLOCK, ELLIPSOID, SPHERE
 
@@ -83,62 +80,6 @@ def test_least_solution_is_that_of_the_pseudoinverse(rank, free, implied, seed):
     system[:, :m], system[:, m] = np.vstack([A, extra @ A]), np.concatenate([b, extra @ b])
     solve_least(rows, m, system, x)
     assert np.abs(x - truth).max() <= 100 * m * EPS * condition**2 * np.linalg.norm(b)
-
-
-# --- how long a gap is good for ------------------------------------------------------------------------------------
-
-
-def none_or_some(most):
-    """Numbers up to `most` that are zero or not so small that a root is beyond the largest number."""
-    return st.floats(-most, most).filter(lambda a: a == 0 or abs(a) > 1e-6)
-
-
-GAP, RATE, BEND = st.floats(1e-6, 10), none_or_some(10), none_or_some(30)
-
-
-@given(GAP, RATE, BEND)
-def test_parabola_root_is_the_first_zero(g, r, b):
-    t = parabola_root(g, r, b)
-    if t == math.inf:
-        # Never below zero: at its lowest place, rounding of r² aside.
-        lowest = g - r * r / (2 * b) if b > 0 and r < 0 else g
-        assert lowest >= -8 * EPS * g
-        assert b > 0 or (b == 0 and r >= 0)
-        return
-    # Zero to the rounding of its terms, and positive before it (it is the smaller of the positive roots).
-    size = g + abs(r) * t + abs(b) * t * t
-    assert abs(g + r * t + b * t * t / 2) <= 16 * EPS * size
-    for share in np.linspace(0, 1 - 1e-6, 20):
-        s = share * t
-        assert g + r * s + b * s * s / 2 >= -16 * EPS * size
-
-
-@given(GAP, RATE, BEND, st.floats(0, 50), st.floats(1e-3, 10), st.lists(st.floats(-1, 1), min_size=3))
-def test_safe_time_is_never_beyond_the_first_zero(g, r, b, third, horizon, shares):
-    """Any gap whose third derivative stays within the bound, its worst case too, is not used up by then."""
-    t = safe_time(g, r, b, third, horizon)
-    assert 0 < t <= horizon
-    scale = g + abs(r) * t + abs(b) * t * t + third * t**3
-    # A constant third derivative -third is the worst; then piecewise constant ones, each sampled.
-    for s in np.linspace(0, t, 100):
-        assert g + r * s + b * s * s / 2 - third * s**3 / 6 >= -1e-13 * scale
-    y, h = [g, r, b], t / len(shares)
-    for share in shares:
-        c = share * third
-        for s in np.linspace(0, h, 8):
-            assert y[0] + y[1] * s + y[2] * s * s / 2 + c * s**3 / 6 >= -1e-13 * scale
-        y = [y[0] + y[1] * h + y[2] * h * h / 2 + c * h**3 / 6, y[1] + y[2] * h + c * h * h / 2, y[2] + c * h]
-
-
-@pytest.mark.parametrize("b", [-9.81, 0.0, 4.0])
-def test_safe_time_without_a_third_derivative_is_the_zero_itself(b):
-    assert safe_time(1.0, -4.0, b, 0.0, 10.0) == parabola_root(1.0, -4.0, b)
-
-
-def test_safe_time_of_a_contact_that_is_about_to_leave():
-    """From no gap and no speed at all: b t²/2 - C t³/6 is zero at 3 b / C."""
-    assert safe_time(0.0, 0.0, 4.0, 6.0, 10.0) == pytest.approx(2.0, rel=4 * EPS)
-    assert safe_time(0.0, 0.0, 4.0, 6.0, 1.0) == 1.0
 
 
 # --- contact points ------------------------------------------------------------------------------------------------

@@ -53,7 +53,8 @@ def pushed(build) -> tuple[physics.Scene, np.ndarray]:
     return scene, weight * np.array([0.5, -0.3, 0.4, 0.6, -0.2, 0.3])
 
 
-CASES = {name: lambda name=name: pushed(scenes.SCENES[name]) for name in ("corner_drop", "closed_box", "shove", "bounce")}
+NAMES = ("corner_drop", "closed_box", "shove", "bounce")
+CASES = {name: lambda name=name: pushed(scenes.SCENES[name]) for name in NAMES}
 CASES["slender"] = lambda: (slender(), np.array([-8.21590761e07, 9.83922068e06, -1.09285187e06, 3.5e3, -1.6e2, -2.0e3]))
 
 

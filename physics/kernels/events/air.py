@@ -9,10 +9,12 @@ may fly up to it; from there again, until the zero is reached. The bound is exac
 steps converge like Newton's with the third derivative neglected (conservative advancement, Mirtich 1996, to second
 order).
 
-With ω <= Ω = J_max |L|, α <= A = J_max (|τ| + Ω |L|) and dα/dt <= B = 2 Ω A + J_max (A |L| + Ω |τ|) + J_max Ω |τ|
-the third derivative of a point at distance ρ is at most ρ (B + 3 Ω A + Ω³). A sphere's gap has none. The support
-function of an ellipsoid, s = |D Rᵀ n|, has derivatives that exceed those of a point at its largest semi-axis by at
-most 3 κ², κ the ratio of its largest to its smallest.
+A body turns with |ω|² <= J_max ω·L, and √(ω·L) grows by |τ| √J_max at most: over τ_h, |ω| <= Ω = √(J_max ω·L) +
+J_max |τ| τ_h. In Euler's equations J_i (I_j - I_k) is between -1 and 1 (the triangle inequality of moments of inertia),
+so that |α| <= A = J_max |τ| + Ω² and |dα/dt| <= B = (1 + √2) Ω A + J_max Ω |τ|. The third derivative of a point at
+distance ρ is then at most ρ (B + 3 Ω A + Ω³). A sphere's gap has none. The support function of an ellipsoid,
+s = |D Rᵀ n|, has derivatives that exceed those of a point at its largest semi-axis by at most 3 κ², κ the ratio of its
+largest to its smallest.
 
 In a field there is no such bound: the body moves as it does in contact, by smooth steps with gaps and their rates
 watched at both ends (`move`), unless it felt nothing of any field on its way.
@@ -24,6 +26,7 @@ import math
 
 from physics.kernels import quaternion as qt
 from physics.kernels.arms import arm_and_rate, wall_normal
+from physics.kernels.body import angular_velocity
 from physics.kernels.compiler import inlined, kernel
 from physics.kernels.contact import is_clear
 from physics.kernels.events.forces import free_turning, load, plus
@@ -41,8 +44,9 @@ ADVANCES = 200
 # An advance by less than this share of the time left is the last one: what it leaves is of third order in it.
 FINEST = 1.0e-13
 
-# Refinements of the time over which the parabola bounds the gap.
-REFINEMENTS = 4
+# The time over which the parabola bounds the gap is doubled as long as it is not used up: from the first guess, which
+# is as short as the bound of the third derivative is loose, by as much as rounding tells apart at most.
+DOUBLINGS = 52
 
 
 @inlined
@@ -64,25 +68,26 @@ def parabola_root(g, r, b):
 def safe_time(g, r, b, third, horizon):
     """A time within which a gap g with rate r, second derivative b and third at most `third` is not used up."""
     t = min(horizon, parabola_root(g, r, b - third * horizon / 3.0))
-    for _ in range(REFINEMENTS):
+    for _ in range(DOUBLINGS):
         over = min(horizon, 2.0 * t)
         t = max(t, min(over, parabola_root(g, r, b - third * over / 3.0)))
+        if t < over or over == horizon:
+            break
     if b > 0.0 and r >= 0.0 and third > 0.0:
         t = max(t, min(horizon, 3.0 * b / third))
     return t
 
 
 @kernel
-def third_bound(L, left, work):
+def third_bound(y, left, tilted, work):
     """Bound of the third derivative of any feature's gap over the time `left` [m/s³]."""
     if work.shape == SPHERE:
         return 0.0
     t = math.sqrt(work.torque[0] ** 2 + work.torque[1] ** 2 + work.torque[2] ** 2)
-    m = math.sqrt(qt.dot(L, L)) + left * t
     j = max(work.J[0], work.J[1], work.J[2])
-    w = j * m
-    a = j * (t + w * m)
-    b = 2.0 * w * a + j * (a * m + w * t) + j * w * t
+    w = math.sqrt(j * max(0.0, qt.dot(angular_velocity(y[1], y[3], work, tilted), y[3]))) + j * left * t
+    a = j * t + w * w
+    b = (1.0 + math.sqrt(2.0)) * w * a + j * w * t
     bound = work.radius * (b + 3.0 * w * a + w * w * w)
     if work.shape == ELLIPSOID:
         d = work.dims
@@ -170,7 +175,7 @@ def fly_to_wall(y, left, gyroscopic, tilted, work, motion):
         refresh_loads(y, 0.0, tilted, work)
     if is_clear(y[0], y[2], left, work):
         return fly_freely(y, left, gyroscopic, tilted, work, motion), left, True
-    third = third_bound(y[3], left, work)
+    third = third_bound(y, left, tilted, work)
     now, t = y, 0.0
     for _ in range(ADVANCES):
         step = safe_flight(now, left - t, third, tilted, work, motion)

@@ -86,7 +86,7 @@ NOTHING = -1
 
 @kernel
 def set_thresholds(y, tilted, work, motion):
-    """What counts as no gap and no speed, and how far a regime is looked ahead. Contact problems are solved to rounding.
+    """What counts as no gap and no speed, and how far a regime is looked ahead; problems are solved to rounding.
 
     A contact is still when the speed would not lift it by HOP gaps that count as none: a bounce as low as that would
     gain from being set down on the wall what it loses in the impact.

@@ -82,6 +82,7 @@ def motion_dtype(wall_count: int, features: int) -> np.dtype:
         ("gap_rate", f, (2, n_slots)),  # [m/s]
         ("is_active", i, (n_slots,)),
         ("weight", f),  # scale of the forces [N]
+        ("spin", f),  # angular speed at the start of the step [rad/s]
         ("y", f, (ROWS, SIZE)),
         ("rate", f, (SIZE,)),
         ("first_rate", f, (SIZE,)),

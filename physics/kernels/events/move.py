@@ -52,7 +52,8 @@ def locate(h, margin, guard, which, heeds, tilted, work, motion):
     """End the step where its smallest margin is zero (END): (its length, guard, contact or slot).
 
     Newton's steps for a gap. Else false position with the Illinois rule, and a half where PATIENCE trials have not
-    halved what is left.
+    halved what is left. NO_STEP where a shorter step fails that was to be smooth: the margin changes its sign at a pole
+    (Painlevé), which the whole step did not see.
     """
     low, high, low_margin, high_margin = 0.0, h, -margin, margin
     side, width, stale = 0, h, 0
@@ -63,7 +64,9 @@ def locate(h, margin, guard, which, heeds, tilted, work, motion):
             t = low + (high - low) * low_margin / (low_margin - high_margin)
             if stale >= PATIENCE or not low < t < high:
                 t = 0.5 * (low + high)
-        try_step(t, tilted, work, motion)
+        error, _ = try_step(t, tilted, work, motion)
+        if not error <= work.tolerance:
+            return t, NO_STEP, which
         margin, g, w = least_margin(t, heeds, tilted, work, motion)
         newton = -1.0
         if margin < 0.0:
@@ -122,17 +125,19 @@ def move(y, left, tilted, work, motion):
     t, h = 0.0, start_step(left, tilted, work, motion)
     for _ in range(STEPS):
         error, used = try_step(h, tilted, work, motion)
-        if not error <= work.tolerance:
+        is_over, guard = False, NO_STEP
+        if error <= work.tolerance:
+            margin, guard, which = least_margin(h, heeds, tilted, work, motion)
+            is_over = margin < 0.0
+            if is_over and not has_stopped(guard, which, work, motion):
+                h, guard, which = locate(h, margin, guard, which, heeds, tilted, work, motion)
+        if guard == NO_STEP:
             if not h > SHORTEST * left:
                 return get_state(motion, START), t, NO_STEP
             # Not `start_step` again: it would go by the directions of sliding (`way`) that the trial ended with.
             h *= CUT
             refresh_loads(get_state(motion, START), 0.0, tilted, work)  # the scale of the errors is that of the start
             continue
-        margin, guard, which = least_margin(h, heeds, tilted, work, motion)
-        is_over = margin < 0.0
-        if is_over and not has_stopped(guard, which, work, motion):
-            h, guard, which = locate(h, margin, guard, which, heeds, tilted, work, motion)
         t += h
         pass_time(h, work)
         motion.step = GROWTH * h if used <= EASY else h

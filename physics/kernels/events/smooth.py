@@ -92,11 +92,9 @@ def find_rate(row, later, tilted, work, motion):
 
 @kernel
 def set_scale(h, tilted, work, motion):
-    """Sizes against which the errors of a step are held."""
-    x, _, v, m = get_state(motion, START)
-    J = work.J
-    size = math.sqrt(qt.dot(m, m))
-    speed = math.sqrt(qt.dot(v, v)) + work.radius * max(J[0], J[1], J[2]) * size + work.acceleration * h
+    """Sizes against which the errors of a step are held, its start made ready by `start_step`."""
+    x, _, v, _ = get_state(motion, START)
+    speed = math.sqrt(qt.dot(v, v)) + work.radius * motion.spin + work.acceleration * h
     place_size = work.radius + max(abs(x[0]), max(abs(x[1]), abs(x[2])))
     for c in range(3):
         motion.scale[X + c] = place_size
@@ -195,7 +193,7 @@ def start_step(left, tilted, work, motion):
     find_rate(START, 0.0, tilted, work, motion)
     for c in range(SIZE):
         motion.first_rate[c] = motion.rate[c]
-    turn = math.sqrt(qt.dot(w, w))
+    turn = motion.spin = math.sqrt(qt.dot(w, w))
     motion.weight = work.mass * (work.acceleration + work.radius * turn * turn)
     h = min(left, motion.step)
     if work.shape != SPHERE and h * turn > TURN_AT_MOST:
