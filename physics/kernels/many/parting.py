@@ -11,9 +11,8 @@ import math
 
 from physics.kernels.compiler import inlined, kernel
 from physics.kernels.many.blocks import SPIN
-from physics.kernels.many.contacts import put
 from physics.kernels.many.response import assemble_normal
-from physics.kernels.many.rows import set_moved
+from physics.kernels.many.rows import put_padded, set_moved
 from physics.kernels.many.sweeps import answer_normal, is_answered
 
 # Share of the error allowed within which a contact is left as it is: each that is answered leaves those of two bodies
@@ -29,8 +28,8 @@ def _begin(n, many):
     """No displacements, and no contacts to visit but those that are asked to open."""
     for b in range(many.now.shape[0]):
         many.pushed[b] = 0
-        put(many.motion, b, 0, (0.0, 0.0, 0.0))
-        put(many.motion, b, SPIN, (0.0, 0.0, 0.0))
+        put_padded(many.motion, b, 0, (0.0, 0.0, 0.0))
+        put_padded(many.motion, b, SPIN, (0.0, 0.0, 0.0))
     for k in range(n):
         many.queue[k] = k
         many.impulse[k, 0] = 0.0

@@ -15,7 +15,7 @@ import math
 from physics.kernels import quaternion as qt
 from physics.kernels.compiler import inlined, kernel
 from physics.kernels.many.contacts import local_velocity, matrix, plus, put, vector
-from physics.kernels.many.rows import AXIS, MOMENT_A, MOMENT_B, put_rows
+from physics.kernels.many.rows import AXIS, MOMENT_A, MOMENT_B, put_padded, put_rows
 
 
 @inlined
@@ -112,15 +112,15 @@ def _normal_mobility(k, b, first, moments, many):
     """What one end adds to W_nn of a contact; writes its vectors of the normal to `many.rows`."""
     g = qt.cross(vector(many.arm, k, first), vector(many.frame, k, 0))
     h = turned(b, g, many)
-    put(many.rows, k, moments, g)
-    put(many.rows, k, moments + 12, h)
+    put_padded(many.rows, k, moments, g)
+    put_padded(many.rows, k, moments + 12, h)
     return many.lightness[b] + qt.dot(g, h)
 
 
 @inlined
 def assemble_normal(k, many):
     """Write what only asks of the normal of contact k: W_nn and those of its rows."""
-    put(many.rows, k, AXIS, vector(many.frame, k, 0))
+    put_padded(many.rows, k, AXIS, vector(many.frame, k, 0))
     W = _normal_mobility(k, many.ends[k, 0], 0, MOMENT_A, many)
     if many.ends[k, 1] >= 0:
         W += _normal_mobility(k, many.ends[k, 1], 3, MOMENT_B, many)

@@ -6,7 +6,8 @@ For the rows e_i of a contact's frame and the arms r, s from its bodies
 
 and an impulse p changes v_a by Σ p_i e_i/m_a and ω_a by Σ p_i I_a⁻¹ (r x e_i), those of b by as much the other way.
 `many.rows` has e, r x e, I_a⁻¹ (r x e), s x e and I_b⁻¹ (s x e), three each; `many.motion` has the twists meanwhile. A
-vector is three numbers and one that is zero: a sum over four lanes is that over three.
+vector is three numbers and one that is zero: a sum over four lanes is that over three. The zero is written each time,
+since what is not a number in one world would stay there for all that come after it.
 """
 
 from __future__ import annotations
@@ -21,17 +22,23 @@ AXIS, MOMENT_A, TURN_A, MOMENT_B, TURN_B = range(0, 60, 12)
 
 
 @inlined
+def put_padded(array, i, j, a):
+    """Write a vector and its zero."""
+    put_row(array, i, j, Lanes(a[0], a[1], a[2], 0.0))
+
+
+@inlined
 def put_rows(k, first, x, y, z, many):
     """Write three vectors of a kind."""
-    put(many.rows, k, first, x)
-    put(many.rows, k, first + 4, y)
-    put(many.rows, k, first + 8, z)
+    put_padded(many.rows, k, first, x)
+    put_padded(many.rows, k, first + 4, y)
+    put_padded(many.rows, k, first + 8, z)
 
 
 @inlined
 def _set_moving(b, many):
-    put(many.motion, b, 0, vector(many.twist, b, 0))
-    put(many.motion, b, SPIN, vector(many.twist, b, 3))
+    put_padded(many.motion, b, 0, vector(many.twist, b, 0))
+    put_padded(many.motion, b, SPIN, vector(many.twist, b, 3))
 
 
 @inlined
