@@ -63,3 +63,29 @@ def test_a_force_without_bound_is_not_stepped_over(spread):
     assert report.ok, report.messages()
     # A step has some hundred smooth parts, each off by two tolerances at most.
     assert (gained <= 200 * world.accuracy.tolerance * before.kinetic_energy.sum(axis=1)).all()
+
+
+def test_a_rebound_that_a_wedge_does_not_allow():
+    """Between two walls, with μ = 1.9 at both: friction holds any stress along the line between the two contacts.
+
+    No impulse moves one of them along it, so the rebound that is asked for there has no solution. It was asked for
+    again and again, between leaps, ten thousand times in 10 ms, for 70 s; now such an impact has no rebound.
+    """
+    body = physics.Ellipsoid(
+        (0.3726973513798245, 1.070835335996931, 0.33992841316105477), 0.045237504059034615,
+        pos=(-9.086488312722647, 9.347944989733486, 8.389858713269732),
+        quat=unit((0.644483438722126, -0.3010736332577428, -0.5987433368572055, -0.36810620904704233)),
+        linvel=(-22.570784920280804, -3.7628925021394517, 451.1831451104407),
+        angvel=(-3320.84131055008, -2370.3815937314475, -185.89683487905862),
+    )  # fmt: skip
+    walls = [physics.HalfSpace((1, 0, 0), -10.0), physics.HalfSpace((0, -1, 0), -10.0)]
+    effects = [physics.Gravity((1.6, 1.4, -2.1)), physics.Contact(restitution=0.35), physics.Friction(1.91)]
+    world = physics.World(physics.Scene([body], walls, effects), dt=0.01, accuracy="precise")
+    before = physics.diagnose(world).energy.sum()
+    report = world.step()
+    # The impact that has no solution is counted, as one that pivoting could not solve either; nothing else is.
+    assert report.unresolved[0] == report.faults[0] == 0
+    assert report.unconverged[0] <= 1
+    assert report.fallbacks[0] <= 1
+    assert report.solves[0] <= 100
+    assert physics.diagnose(world).energy.sum() <= before * (1 + 20 * world.accuracy.tolerance)

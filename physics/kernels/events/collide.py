@@ -27,6 +27,9 @@ TURNS = 1000
 # Residual of a contact problem that is as good as none: rounding of forces that differ by five orders.
 SOLVED = 1.0e-11
 
+# Residual of what is no solution, relative to the largest free contact speed.
+UNSOLVED = 1.0e-3
+
 # No contact alone.
 ALL = -1
 
@@ -120,6 +123,23 @@ def aim_collision(n, y, tilted, motion, work):
             bouncing, found = bouncing + 1, i
     if bouncing == 1:
         aim_at(found, y, tilted, work)
+
+
+@kernel
+def or_plastic(n, friction, smooth, pivots, v, L, solved, P, work, report):
+    """What `solve_contacts` gave for a collision, or an impact without rebound where that was no solution.
+
+    With friction two contacts may hold any stress along the line between them, which no impulse lengthens: where one is
+    asked to rebound along it and neither slides, Newton's law and Coulomb's have no solution together.
+    """
+    is_asked = False
+    for i in range(n):
+        is_asked = is_asked or work.target[i, 0] > 0.0
+    if solved[2] <= UNSOLVED or not is_asked:
+        return solved
+    note_solve(report, work.world, *solved[2:], max(work.tolerance, SOLVED))
+    aim_plastic(n, work)
+    return solve_contacts(n, friction, smooth, pivots, v, L, P, work)
 
 
 @kernel

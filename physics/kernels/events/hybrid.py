@@ -34,6 +34,7 @@ from physics.kernels.events.collide import (
     aim_collision,
     carry_on,
     log_impulses,
+    or_plastic,
     pose_collision,
     pose_jump,
     within_energy,
@@ -157,6 +158,7 @@ def advance(y, h, friction, smooth, gyroscopic, tilted, pivots, work, motion, me
             P = principal_axes(seen if is_asked else y, tilted, work)
             solved = solve_contacts(n, friction, smooth, pivots, v, L, P, work)
             if what == COLLIDES:
+                solved = or_plastic(n, friction, smooth, pivots, v, L, solved, P, work, report)
                 solved = without_gain(n, friction, smooth, pivots, v, L, solved, P, work)
                 if friction is not None and work.restitution > 0.0:
                     solved = within_energy(
