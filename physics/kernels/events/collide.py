@@ -125,6 +125,14 @@ def aim_collision(n, y, tilted, motion, work):
         aim_at(found, y, tilted, work)
 
 
+@inlined
+def _without_rebound(n, friction, smooth, pivots, v, L, solved, P, work, report):
+    """The same collision solved without any rebound; what `solved` has cost goes into the report."""
+    note_solve(report, work.world, *solved[2:], max(work.tolerance, SOLVED))
+    aim_plastic(n, work)
+    return solve_contacts(n, friction, smooth, pivots, v, L, P, work)
+
+
 @kernel
 def or_plastic(n, friction, smooth, pivots, v, L, solved, P, work, report):
     """What `solve_contacts` gave for a collision, or an impact without rebound where that was no solution.
@@ -137,9 +145,7 @@ def or_plastic(n, friction, smooth, pivots, v, L, solved, P, work, report):
         is_asked = is_asked or work.target[i, 0] > 0.0
     if solved[2] <= UNSOLVED or not is_asked:
         return solved
-    note_solve(report, work.world, *solved[2:], max(work.tolerance, SOLVED))
-    aim_plastic(n, work)
-    return solve_contacts(n, friction, smooth, pivots, v, L, P, work)
+    return _without_rebound(n, friction, smooth, pivots, v, L, solved, P, work, report)
 
 
 @kernel
@@ -155,9 +161,8 @@ def within_energy(n, y, friction, smooth, tilted, pivots, solved, P, work, motio
         return solved
     for k in range(3 * n):
         motion.rebound[k] = work.impulse[k]
-    note_solve(report, work.world, *solved[2:], max(work.tolerance, SOLVED))
-    aim_plastic(n, work)
-    v0, L0, residual, sweeps, method = solve_contacts(n, friction, smooth, pivots, v, L, P, work)
+    plastic = _without_rebound(n, friction, smooth, pivots, v, L, solved, P, work, report)
+    v0, L0, residual, sweeps, method = plastic
     v, L, s = part_of_rebound(q, before, (v0, L0), (v1, L1), work, tilted)
     for k in range(3 * n):
         work.impulse[k] += s * (motion.rebound[k] - work.impulse[k])

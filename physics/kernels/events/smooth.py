@@ -91,7 +91,7 @@ def find_rate(row, later, tilted, work, motion):
 
 
 @kernel
-def set_scale(h, tilted, work, motion):
+def set_scale(h, work, motion):
     """Sizes against which the errors of a step are held, its start made ready by `start_step`."""
     x, _, v, _ = get_state(motion, START)
     speed = math.sqrt(qt.dot(v, v)) + work.radius * motion.spin + work.acceleration * h
@@ -128,7 +128,7 @@ def try_step(h, tilted, work, motion):
     """Row END from row START, h later (`first_rate` known): (relative error, rules used)."""
     table, y = motion.table, motion.y
     goal = work.tolerance
-    set_scale(h, tilted, work, motion)
+    set_scale(h, work, motion)
     error = math.inf
     used = ORDERS
     for k in range(ORDERS):
