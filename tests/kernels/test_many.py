@@ -17,6 +17,7 @@ from physics.kernels.compiler import kernel
 from physics.kernels.many import blocks as blocks_of
 from physics.kernels.many import bundles, cone, system
 from physics.kernels.many.arrays import BUNDLES, CONTACTS, LEFT_OUT, PAIRS, make_many
+from physics.kernels.many.block_axes import FLAT
 from physics.kernels.many.elimination import order_bodies
 from physics.kernels.many.islands import find_islands
 from physics.kernels.many.near import find_pairs
@@ -153,13 +154,14 @@ def test_the_normal_of_two_blocks_separates_them_most(seed, distance):
 @settings(max_examples=100, deadline=None)
 @given(
     seed=st.integers(0, 2**32 - 1),
-    turns=st.tuples(st.floats(-math.pi, math.pi), st.floats(0.02, 1.5)),
+    turns=st.tuples(st.floats(-math.pi, math.pi), st.floats(math.acos(FLAT) + 1e-3, math.asin(FLAT) - 1e-3)),
     shift=st.floats(-0.9, 0.9),
 )
 def test_parallel_edges_that_touch_push_along_the_middle_of_what_both_allow(seed, turns, shift):
     """In the plane across the edges: at a corner between its +x and +y faces, turned by α, a block allows the normals
     from α to α + 90°; one that touches it with the corner of its -x and -y faces, turned by β, allows β to β + 90°,
-    turned round. The middle of what both allow, for |α - β| < 90°, is (α + β)/2 + 45°.
+    turned round. The middle of what both allow, for |α - β| < 90°, is (α + β)/2 + 45°. Within 11° of 0° and of 90° two
+    of their faces lie flat on each other.
     """
     rng = np.random.default_rng(seed)
     alpha, beta = turns[0], turns[0] + turns[1] * rng.choice([-1, 1])
@@ -181,6 +183,40 @@ def test_parallel_edges_that_touch_push_along_the_middle_of_what_both_allow(seed
     expected = -world @ [math.cos(middle), math.sin(middle), 0.0]
     np.testing.assert_allclose(many.frame[:n, :3], np.tile(expected, (n, 1)), atol=1e-12)
     np.testing.assert_allclose(many.gap[:n], 0.0, atol=1e-14)
+
+
+@settings(max_examples=200, deadline=None)
+@given(
+    yaw=st.floats(0.1, 1.4),
+    shift=st.tuples(st.floats(-0.6, 0.6), st.floats(-0.6, 0.6)),
+    tilt=st.floats(1e-7, 3e-5),
+    heading=st.floats(-math.pi, math.pi),
+)
+@example(yaw=0.1, shift=(0.5, 0.0), tilt=3e-5, heading=math.pi / 2)  # low along the rim of the block below
+def test_no_contact_is_lost_where_a_face_is_tilted_by_some_slops(yaw, shift, tilt, heading):
+    """Faces as good as flat touch at the same points, tilted or not: a block lies on all of them, or could within h.
+
+    Its lowest edge alone would not hold it, and its weight would turn it until the one on the other side is lowest.
+    """
+    h, acceleration = 0.01, 10.0  # falls 500 slops in h; the rise of a corner at these tilts is 60 of them at most
+
+    def touching_at(angle):
+        c, s = math.cos(yaw), math.sin(yaw)
+        turned = np.array([[c, 0, s], [0, 1, 0], [-s, 0, c]])
+        x, z = math.cos(heading), math.sin(heading)
+        cross = np.array([[0, -z, 0], [z, 0, -x], [0, x, 0]])  # of the axis (x, 0, z)
+        tipped = (np.eye(3) + math.sin(angle) * cross + (1 - math.cos(angle)) * cross @ cross) @ turned
+        many = blocks([[0, 0, 0], [shift[0], 1.0, shift[1]]], [np.eye(3), tipped], np.full((2, 3), 0.5))
+        many.bodies["acceleration"] = acceleration
+        find_contacts(h, None, None, 0, None, many)
+        n = many.counts[CONTACTS]
+        return n, many.frame[:n, :3]
+
+    flat, _ = touching_at(0.0)
+    count, normals = touching_at(tilt)
+    assert count == flat >= 3
+    # The normal is that of one of the two faces, the last of which is turned by the tilt.
+    np.testing.assert_allclose(normals, np.tile([0.0, -1.0, 0.0], (count, 1)), atol=2 * tilt)
 
 
 def test_names_of_equal_stacked_blocks_do_not_change_with_rounding():

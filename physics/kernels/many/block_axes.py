@@ -16,9 +16,9 @@ from physics.kernels.many.contacts import minus, pair_slop, vector
 # does not. Rounding of the nine products is 1e-16; its square root would still be noise.
 PARALLEL = 1.0e-12
 
-# Cosine of the angle between the product of two edges and a face normal above which the faces count as lying flat on
-# each other (11 degrees). One point would let them tip to and fro; the clipped face holds them, at the distance that
-# the edges say.
+# Cosine of the angle between two face normals, or between the product of two edges and a face normal, above which the
+# faces count as lying flat on each other (11 degrees). One point or one edge would let them tip to and fro; the clipped
+# face holds them, at the distance that the edges say.
 FLAT = 0.98
 
 AXES, SIZES, FROM_A, FROM_B = 0, 1, 2, 3
@@ -90,6 +90,15 @@ def best_edges(a, b, margin, many):
             if s > best:
                 best, edges = s, 3 * i + j
     return best, edges
+
+
+@inlined
+def lie_flat(face, many):
+    """Whether a face of the other block is nearly parallel to this one: the two lie flat on each other."""
+    S, most = many.mix[SIZES], 0.0
+    for k in range(3):
+        most = max(most, S[face, k] if face < 3 else S[k, face - 3])
+    return most >= FLAT
 
 
 @inlined

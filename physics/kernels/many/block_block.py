@@ -11,7 +11,16 @@ import math
 
 from physics.kernels import quaternion as qt
 from physics.kernels.compiler import inlined, kernel
-from physics.kernels.many.block_axes import FROM_A, FROM_B, best_edges, best_face, column, is_along_face, relate
+from physics.kernels.many.block_axes import (
+    FROM_A,
+    FROM_B,
+    best_edges,
+    best_face,
+    column,
+    is_along_face,
+    lie_flat,
+    relate,
+)
 from physics.kernels.many.block_clip import (
     clip,
     edge_at_rim,
@@ -94,7 +103,7 @@ def _touch_face(a, b, face, source, count, least, h, many):
     slop = pair_slop(a, b, many)
     lift = max(0.0, least + d[axis] - lowest(source, count, p))
     n, owner, first, last, side, sense = out, r, -1, -1, 0, 1.0
-    if lift <= slop:
+    if lift <= slop and not lie_flat(face, many):
         first, last, side, sense = edge_at_rim(d, axis, source, count, slop, many)
     if first >= 0:
         rim = column(R, r, side)
