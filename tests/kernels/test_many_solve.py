@@ -8,7 +8,7 @@ import pytest
 from benchmarks import problems
 from benchmarks.problems import SETTINGS
 from physics.kernels import layout as at
-from physics.kernels.many import interior, islands, newton, response, solve, sweeps
+from physics.kernels.many import calm, interior, islands, newton, response, solve, sweeps
 from physics.kernels.many.arrays import Many, make_many
 from tests.reference.lcp import coulomb_defect, solve_coulomb
 
@@ -105,6 +105,20 @@ def test_slow_sweeps_are_extrapolated():
     count, residual = sweeps.sweep_contacts(0, n, True, np.inf, goal, 1000, many)
     assert residual <= goal
     assert count <= 400
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_calming_keeps_what_is_solved_solved(seed):
+    """From impulses that are just within the goal: whatever the sweeps do first, they end within it."""
+    many, n = pile(seed, 12, 4, 0.5, 10.0)
+    many.settings["tolerance"] = 1e-2
+    solve.solve_contacts(n, True, many)
+    goal = response.residual_of(0, n, True, many)
+    many.settings["rests"] = 1  # and all bodies were at rest before the stage: `momenta` are zero
+    count, residual, _ = calm.calm((0, n, 0, 12), True, goal, goal, 1e-12, 1e-12, many)
+    assert count > 0
+    assert residual <= goal
+    assert response.residual_of(0, n, True, many) == pytest.approx(residual, abs=1e-12 * np.abs(many.free).max())
 
 
 def test_islands_are_solved_as_if_they_were_alone():

@@ -177,7 +177,7 @@ def make_many(
     """
     f, i, nb = np.float64, np.int64, bodies
     pairs, n = pair_room(bodies), contact_room(bodies, len(walls), polyhedra)
-    fields = [*setting_fields(), ("still", f), ("half", f), ("meet", i), ("in_turn", i), ("in_time", i)]
+    fields = [*setting_fields(), ("still", f), ("half", f), ("rests", i), ("meet", i), ("in_turn", i), ("in_time", i)]
     record = np.zeros(1, np.dtype(fields))
     record["still"], record["meet"], record["in_turn"], record["in_time"] = np.inf, meet, in_turn, refined
     for name, value in settings.items():

@@ -163,7 +163,7 @@ def glide(n, world, h, friction, gyroscopic, tilted, scheme, sleep, memory, repo
             keep_loaded(b, many)
             turn_loaded(b, tilted, many)
     kept.load(n, world, h, friction, memory, many)
-    many.settings[0].still = still_speed(h, many)
+    many.settings[0].still, many.settings[0].rests = still_speed(h, many), 1
     settle(n, world, friction, report, many)
     if stage_has_gained(n, h, many):
         take_stage_back(n, tilted, many)
@@ -171,7 +171,7 @@ def glide(n, world, h, friction, gyroscopic, tilted, scheme, sleep, memory, repo
         if friction is not None and stage_has_gained(n, h, many):
             take_stage_back(n, tilted, many)
             settle_smoothly(n, many)
-    many.settings[0].still = math.inf
+    many.settings[0].still, many.settings[0].rests = math.inf, 0
     kept.store(n, world, h, sleep, memory, many)
     for b in range(many.now.shape[0]):
         if many.touched[b] == 1:

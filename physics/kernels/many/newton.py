@@ -198,6 +198,15 @@ def bring_back_best(part, many):
         push(k, vector(many.best, k, 0), many.twist, many)
 
 
+@inlined
+def all_push(part, many):
+    """Whether all contacts of an island push: else not all of them will hold."""
+    for i in range(part[0], part[1]):
+        if not many.impulse[many.queue[i], 0] > 0.0:
+            return False
+    return True
+
+
 @kernel
 def guess_all_hold(part, friction, residual, enough, many):
     """Impulses as if every contact held, if that makes the residual smaller, down to `enough`; the residual then [m/s].

@@ -12,6 +12,8 @@ A warm start that still solves the problem costs one look at the residual. Else 
    twists from there, in turns;
 5. sweeps up to their limit, from the best that was met.
 
+In a resting stage, what is all but at rest is solved a little further (`calm`).
+
 What has a residual then that no impulses at all would beat, or a stress beyond reason, is solved without friction.
 
 Where the linear system is dear (many bodies that all lie on each other), sweeps up to their limit take the place of 2
@@ -24,10 +26,12 @@ import math
 
 from physics.kernels.compiler import inlined, kernel
 from physics.kernels.many.blocks import SIZE
+from physics.kernels.many.calm import NEWTON, SWEEPS, calm, is_in_balance, point_speed
 from physics.kernels.many.contacts import put, vector
 from physics.kernels.many.interior import interior_point
 from physics.kernels.many.islands import find_islands
 from physics.kernels.many.newton import (
+    all_push,
     bring_back_best,
     guess_all_hold,
     newton_contacts,
@@ -75,9 +79,6 @@ ANEW = 2
 INTERIOR_STEPS = (20, 20, 40)
 POLISH_STEPS = (10, 40, 40)
 POLISH = (10.0, 1.0, 1.0)
-
-# The strongest method that was needed: codes of `physics.report.Solver`.
-SWEEPS, NEWTON = 2, 4
 
 
 @inlined
@@ -151,15 +152,6 @@ def sweep_at_last(part, friction, residual, goal, limit, many):
 
 
 @inlined
-def all_push(part, many):
-    """Whether all contacts of an island push: else not all of them will hold."""
-    for i in range(part[0], part[1]):
-        if not many.impulse[many.queue[i], 0] > 0.0:
-            return False
-    return True
-
-
-@inlined
 def none_pushes_or_parts(part, goal, many):
     """Whether no contact of an island pushes, and none opens faster than `goal` [m/s] without that."""
     for i in range(part[0], part[1]):
@@ -170,8 +162,11 @@ def none_pushes_or_parts(part, goal, many):
 
 
 @kernel
-def solve_island(part, friction, scale, residual, goal, many):
-    """Solve one island from impulses of the given residual [m/s]: (iterations, residual, method)."""
+def solve_island(part, friction, scale, residual, goal, deep, many):
+    """Solve one island from impulses of the given residual [m/s]: (iterations, residual, method).
+
+    What holds is solved to `deep` [m/s].
+    """
     first, last, _, _ = part
     limit = many.settings[0].sweeps
     steps = prepare_system(part, limit, many) if last - first > 1 else 0
@@ -179,7 +174,6 @@ def solve_island(part, friction, scale, residual, goal, many):
         count, residual = sweep_contacts(first, last, friction, residual, goal, limit if last - first > 1 else 1, many)
         return count, residual, SWEEPS
     may_hold = all_push(part, many) or none_pushes_or_parts(part, goal, many)
-    deep = HOLD_SHARE * min(goal, FINE * scale)
     if may_hold:
         residual = guess_all_hold(part, friction, residual, deep, many)
         if residual <= goal:
@@ -215,9 +209,7 @@ def fastest(many):
     """No point of a body is faster than this [m/s]."""
     most = 0.0
     for b in range(many.twist.shape[0]):
-        v, w = vector(many.twist, b, 0), vector(many.twist, b, 3)
-        linear = max(abs(v[0]), max(abs(v[1]), abs(v[2])))
-        most = max(most, linear + many.bodies[b].radius * (abs(w[0]) + abs(w[1]) + abs(w[2])))
+        most = max(most, point_speed(vector(many.twist, b, 0), vector(many.twist, b, 3), b, many))
     return most
 
 
@@ -262,19 +254,21 @@ def solve_contacts(n, friction, many):
     if strain(0, n, many) > STRAINED * scale:
         forget_all(n, many)
     rounding = IMPULSE_ROUNDING * strain(0, n, many)
-    goal = max(goal, rounding)
+    goal, least = max(goal, rounding), max(rounding, ROUNDING * scale)
     residual = residual_of(0, n, friction, many)
-    if residual <= goal:
+    if residual <= goal and is_in_balance(goal, least, many):
         return 0, residual / max(scale, rounding / tolerance), SWEEPS
-    iterations, worst, method = 0, 0.0, SWEEPS
+    iterations, worst, method, deep = 0, 0.0, SWEEPS, HOLD_SHARE * min(goal, FINE * scale)
     for i in range(find_islands(n, many)):
         part = (many.first_contact[i], many.first_contact[i + 1], many.first_body[i], many.first_body[i + 1])
         residual = residual_of(part[0], part[1], friction, many)
         if not residual <= goal:
-            count, residual, used = solve_island(part, friction, scale, residual, goal, many)
+            count, residual, used = solve_island(part, friction, scale, residual, goal, deep, many)
             if not residual <= scale or strain(part[0], part[1], many) > STRAINED * scale:
                 residual = solve_without_friction(part, friction, goal, many)
             iterations, method = max(iterations, count), max(method, used)
+        count, residual, used = calm(part, friction, residual, goal, deep, least, many)
+        iterations, method = max(iterations, count), max(method, used)
         if not residual <= worst:
             worst = residual
     return iterations, worst / max(scale, IMPULSE_ROUNDING * strain(0, n, many) / tolerance), method
