@@ -1,8 +1,8 @@
 """How cost grows with a pile: ``python -m benchmarks.piles [--quick] [--json FILE] [--plot FILE]``.
 
 A pile of cubes that settles in a shaft (`scenes.heap`), from a few to many: time of a step against its contacts once
-it has fallen, and the exponent that fits. And the broad phase alone, for cubes spread evenly in a box at one density:
-time against the pairs that it finds. Result and plot are written only where they are asked for.
+it lies, and while it falls and settles, and the exponents that fit. And the broad phase alone, for cubes spread evenly
+in a box at one density: time against the pairs that it finds. Result and plot are written only where asked for.
 """
 
 from __future__ import annotations
@@ -26,8 +26,10 @@ from rigid_env.measure.workloads import STEP
 
 PILES, QUICK_PILES = (25, 50, 100, 200, 400), (5, 10)
 SPREADS, QUICK_SPREADS = (10, 100, 1000), (10, 100)
-SETTLE, QUICK_SETTLE = 1600, 200  # steps: the highest of 400 cubes falls for 2.4 s
-PARTS = 5  # of the time that is measured; the median part counts
+LIMIT, QUICK_LIMIT = 8000, 200  # steps in which a pile has to settle
+LIES = 1e-3  # a pile lies once no body of it has been faster than this [m/s] ...
+LIES_FOR = 400  # ... for so many steps; and so many are measured then
+PARTS = 5  # of what is measured; the median part counts
 CALLS = 50  # of the broad phase in one sample
 VOLUME = 4.0  # of the box per unit cube [m³]
 
@@ -45,26 +47,58 @@ class Sample:
         Of a step, or of one broad phase [s].
     unconverged : float
         Share of the solves that did not reach the tolerance.
+    steps : int
+        That it took.
+    fastest : float
+        Speed of the fastest body at the end [m/s].
     """
 
     bodies: int
     found: float
     seconds: float
     unconverged: float = 0.0
+    steps: int = 0
+    fastest: float = 0.0
 
 
-def pile(count: int, settle: int, accuracy: str) -> Sample:
-    """Let `count` cubes settle, then measure for a quarter of that time."""
-    world = physics.World(scenes.heap(count), dt=STEP, accuracy=accuracy)
-    world.step(steps=settle)
-    steps, times, contacts, solves, failed = max(1, settle // (4 * PARTS)), [], [], 0, 0
-    for _ in range(PARTS):
+class Watch:
+    """A pile as it is stepped: parts of so many steps, what they cost and how fast it was at the end of each."""
+
+    def __init__(self, world: physics.World) -> None:
+        self.world, self.steps = world, 0
+        self.times, self.contacts, self.speeds, self.solves, self.failed = [], [], [], 0, 0
+
+    def part(self, steps: int) -> None:
+        """Step the world."""
         start = time.perf_counter()
-        report = world.step(steps=steps)
-        times.append((time.perf_counter() - start) / steps)
-        contacts.append(len(world.contact_ends(0)))
-        solves, failed = solves + int(report.solves[0]), failed + int(report.unconverged[0])
-    return Sample(count, float(np.mean(contacts)), float(np.median(times)), failed / max(1, solves))
+        report = self.world.step(steps=steps)
+        self.times.append((time.perf_counter() - start) / steps)
+        self.contacts.append(len(self.world.contact_ends(0)))
+        self.speeds.append(float(np.linalg.norm(self.world.linvel[0], axis=-1).max()))
+        self.solves, self.failed = self.solves + int(report.solves[0]), self.failed + int(report.unconverged[0])
+        self.steps += steps
+
+    def lies(self, parts: int) -> bool:
+        """Whether nothing was fast at the end of any of the last parts."""
+        return len(self.speeds) >= parts and max(self.speeds[-parts:]) <= LIES
+
+    def sample(self, seconds: float) -> Sample:
+        """What was seen, a step of it at `seconds`."""
+        contacts, failed = float(np.mean(self.contacts)), self.failed / max(1, self.solves)
+        return Sample(len(self.world.linvel[0]), contacts, seconds, failed, self.steps, self.speeds[-1])
+
+
+def pile(count: int, limit: int, accuracy: str) -> tuple[Sample, Sample]:
+    """Let `count` cubes settle until they lie, for `limit` steps at most: while they do, and what they cost then."""
+    world = physics.World(scenes.heap(count), dt=STEP, accuracy=accuracy)
+    world.step(dt=STEP * 1e-3)  # compiled
+    size = LIES_FOR // (10 * PARTS)
+    falling, lying = Watch(world), Watch(world)
+    while falling.steps < limit and not falling.lies(LIES_FOR // size):
+        falling.part(size)
+    for _ in range(PARTS):
+        lying.part(LIES_FOR // PARTS)
+    return falling.sample(float(np.mean(falling.times))), lying.sample(float(np.median(lying.times)))
 
 
 def spread(count: int) -> Sample:
@@ -91,19 +125,15 @@ def exponent(samples: list[Sample]) -> float:
     return float(np.polyfit(x, y, 1)[0])
 
 
-def draw(path: Path, piles: list[Sample], spreads: list[Sample]) -> None:
-    """Both, side by side, logarithmic."""
+def draw(path: Path, panels_of: list[tuple[str, str, list[Sample]]]) -> None:
+    """All, side by side, logarithmic: what, what it is drawn against, samples."""
     require_matplotlib()
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
-    figure = Figure(figsize=(10.0, 4.0), layout="constrained")
+    figure = Figure(figsize=(5.0 * len(panels_of), 4.0), layout="constrained")
     FigureCanvasAgg(figure)
-    panels = figure.subplots(1, 2)
-    for panel, samples, what, x in (
-        (panels[0], piles, "a step of a pile that lies", "contacts"),
-        (panels[1], spreads, "the broad phase", "near pairs"),
-    ):
+    for panel, (what, x, samples) in zip(figure.subplots(1, len(panels_of)), panels_of):
         found, times = [s.found for s in samples], [1e6 * s.seconds for s in samples]
         panel.loglog(found, times, "o-", color="#0072b2")
         panel.loglog(found, [times[0] * f / found[0] for f in found], "--", color="#8a8a8a", label="linear")
@@ -121,22 +151,29 @@ def main(
     accuracy: Annotated[str, typer.Option(help="Preset: fast or balanced.")] = "fast",
 ) -> None:
     """Measure how the cost of a step grows with the contacts of a pile, and that of the broad phase with its pairs."""
-    piles = [pile(n, QUICK_SETTLE if quick else SETTLE, accuracy) for n in (QUICK_PILES if quick else PILES)]
+    piles = [pile(n, QUICK_LIMIT if quick else LIMIT, accuracy) for n in (QUICK_PILES if quick else PILES)]
     spreads = [spread(n) for n in (QUICK_SPREADS if quick else SPREADS)]
-    for what, samples in (("contacts", piles), ("near pairs", spreads)):
+    kinds = [
+        ("a step of a pile that lies", "contacts", [lying for _, lying in piles]),
+        ("a step while it falls and settles", "contacts", [falling for falling, _ in piles]),
+        ("the broad phase", "near pairs", spreads),
+    ]
+    for what, found, samples in kinds:
+        typer.echo(what)
         for s in samples:
-            typer.echo(
-                f"{s.bodies:5d} bodies {s.found:7.0f} {what:10s} {1e6 * s.seconds:9.1f} µs"
-                f"  {100 * s.unconverged:4.1f} % unconverged"
-            )
+            more = f"  {s.steps:5d} steps {100 * s.unconverged:4.1f} % unconverged, fastest {s.fastest:.1e} m/s"
+            more = more if s.steps else ""
+            typer.echo(f"{s.bodies:5d} bodies {s.found:7.0f} {found:10s} {1e6 * s.seconds:9.1f} µs{more}")
         if not quick:
             typer.echo(f"exponent {exponent(samples):.2f}")
     if plot is not None:
-        draw(plot, piles, spreads)
+        draw(plot, kinds)
     if json is not None:
-        found = {"accuracy": accuracy, "piles": [asdict(s) for s in piles], "broad_phase": [asdict(s) for s in spreads]}
-        found["exponents"] = {"piles": exponent(piles), "broad_phase": exponent(spreads)}
-        json.write_text(json_of.dumps({"machine": machine.headline(), **found}, indent=1) + "\n")
+        names = ("piles", "falling", "broad_phase")
+        found = {name: [asdict(s) for s in samples] for name, (_, _, samples) in zip(names, kinds)}
+        found["exponents"] = {name: exponent(samples) for name, (_, _, samples) in zip(names, kinds)}
+        found = {"machine": machine.headline(), "accuracy": accuracy, **found}
+        json.write_text(json_of.dumps(found, indent=1) + "\n")
 
 
 if __name__ == "__main__":

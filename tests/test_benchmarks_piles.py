@@ -22,5 +22,15 @@ def test_a_quick_run_writes_what_it_found(tmp_path):
     assert found.exit_code == 0, found.output
     kept = json.loads((tmp_path / "p.json").read_text())
     assert [s["bodies"] for s in kept["broad_phase"]] == list(piles.QUICK_SPREADS)
-    assert all(s["seconds"] > 0 for s in kept["piles"] + kept["broad_phase"])
+    assert all(s["seconds"] > 0 for s in kept["piles"] + kept["falling"] + kept["broad_phase"])
+    assert [s["steps"] for s in kept["falling"]] == [piles.QUICK_LIMIT] * 2  # what falls for less than 1 s lies not yet
+    assert all(s["fastest"] > piles.LIES for s in kept["falling"])
     assert (tmp_path / "p.png").stat().st_size > 0
+
+
+def test_a_pile_lies_once_nothing_of_it_was_fast_for_long_enough():
+    falling, lying = piles.pile(2, 4000, "fast")
+    assert piles.LIES_FOR < falling.steps < 4000
+    assert falling.fastest <= piles.LIES
+    assert lying.steps == piles.LIES_FOR
+    assert lying.found >= 8.0  # two cubes flat on the floor, four corners each, or more where they touch
