@@ -163,7 +163,7 @@ def glide(n, world, h, friction, gyroscopic, tilted, scheme, sleep, memory, repo
             keep_loaded(b, many)
             turn_loaded(b, tilted, many)
     kept.load(n, world, h, friction, memory, many)
-    many.settings[0].still, many.settings[0].rests = still_speed(h, many), 1
+    many.settings[0].still, many.settings[0].rests = still_speed(h, many), 1 - many.settings[0].in_time
     settle(n, world, friction, report, many)
     if stage_has_gained(n, h, many):
         take_stage_back(n, tilted, many)
