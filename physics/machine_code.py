@@ -3,22 +3,86 @@
 from __future__ import annotations
 
 import gc
+import operator
 import sys
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from functools import partial
 
 import numba
+import numpy as np
+
+from physics.kernels.jobs import ARGUMENTS, CODE, ENTRY_OF, JOB_SIZE, RAISED, perform, raise_again
 
 # Seconds after which the first step of a plan says that it is compiling.
 COMPILE_NOTICE = 1.0
 
 
-def bound(kernel: Callable, *arguments) -> Callable[[], object]:
-    """A kernel with its arguments, to be called often.
+class Work:
+    """Calls of kernels with all their arguments, made one after another in machine code.
 
-    Numba's dispatcher, which finds out the types of all arguments in each call, is left out.
+    Parameters
+    ----------
+    calls : list of (int, tuple)
+        A kernel's entry (`Kernel.ready_entry`) and its arguments. Arrays are bound, not copied: what they hold when a
+        call is made counts.
+
+    Attributes
+    ----------
+    jobs, count : int
+        Address of the table of these calls, and their number: what `physics.kernels.jobs` is told.
+    """
+
+    def __init__(self, calls: list[tuple[int, tuple]]):
+        self._calls = calls  # they own what the table has addresses of
+        self._words = [np.array(list(_words(arguments)), dtype=np.int64) for _, arguments in calls]
+        self._table = np.zeros((len(calls), JOB_SIZE), dtype=np.int64)
+        self._table[:, ENTRY_OF] = [entry for entry, _ in calls]
+        self._table[:, ARGUMENTS] = [words.ctypes.data for words in self._words]
+        self.jobs, self.count = self._table.ctypes.data, len(calls)
+        self._perform = compiled(perform, (self.jobs, self.count))
+
+    def __call__(self) -> None:
+        """Make the calls."""
+        if self._perform(self.jobs, self.count):
+            self.raise_again()
+
+    def raise_again(self) -> None:
+        """Raise what one of the calls raised when they were made last, if one did."""
+        for row in self._table:
+            raise_again(row[CODE], row[RAISED])
+
+    def then(self, other: Work) -> Work:
+        """These calls, and the other ones after them."""
+        return Work([*self._calls, *other._calls])
+
+
+def _words(value) -> Iterator[int]:
+    """A value of an argument as a kernel finds it in memory: see `physics.kernels.codegen.ready`."""
+    if isinstance(value, np.ndarray):
+        yield from (0, 0, value.size, value.itemsize, value.ctypes.data, *value.shape, *value.strides)
+    elif isinstance(value, tuple):
+        for member in value:
+            yield from _words(member)
+    elif isinstance(value, float):
+        yield int(np.float64(value).view(np.int64))
+    elif value is None:
+        yield 0
+    else:
+        yield operator.index(value)
+
+
+def compiled(kernel: Callable, arguments: tuple) -> Callable:
+    """The machine code of a kernel for arguments of these types.
+
+    To call it leaves out Numba's dispatcher, which finds out the types of all arguments in each call.
+    """
+    with compiling():
+        return kernel.compile(tuple(map(numba.typeof, arguments)))
+
+
+def bound(kernel: Callable, *arguments) -> Work:
+    """A kernel that returns nothing with its arguments, to be called often.
 
     Parameters
     ----------
@@ -27,8 +91,7 @@ def bound(kernel: Callable, *arguments) -> Callable[[], object]:
     *arguments
         Arrays are bound, not copied: what they hold when a call is made counts.
     """
-    with compiling():
-        return partial(kernel.compile(tuple(map(numba.typeof, arguments))), *arguments)
+    return Work([(kernel.ready_entry(compiled(kernel, arguments)), arguments)])
 
 
 @contextmanager

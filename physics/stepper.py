@@ -3,19 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import partial
 from typing import TYPE_CHECKING
 
-import numba
 import numpy as np
 
 from physics import checks
 from physics.kernels.events.hybrid import step_events
 from physics.kernels.linked import step_linked
 from physics.kernels.many.step import step_many
-from physics.kernels.sleep import sleep_through
 from physics.kernels.step import step_worlds
-from physics.machine_code import compiling
+from physics.machine_code import Work, compiled
 
 if TYPE_CHECKING:
     from physics.plan import Plan
@@ -37,7 +34,7 @@ class Stepper:
         Time of one of them, instead of the world's [s].
     then : Callable, optional
         What each thread does with the worlds that it has stepped: from their list, as of `physics.kernels.turns`, which
-        every call renews, to a function without arguments. See `physics.machine_code.bound`.
+        every call renews, to a kernel that has it (`physics.machine_code.bound`).
 
     Raises
     ------
@@ -50,15 +47,15 @@ class Stepper:
         world: World,
         steps: int = 1,
         dt: float | None = None,
-        then: Callable[[np.ndarray], Callable[[], object]] | None = None,
+        then: Callable[[np.ndarray], Work] | None = None,
     ):
         self.world = world
         self.steps = checks.count(steps, "steps")
         self.dt = world.dt if dt is None else float(checks.positive(dt, (), "dt"))
         self._wrench = world.no_wrench()
         self._then = then
-        self._calls: list[Callable[[], None]] | None = None
-        self._afterwards: list[Callable[[], None]] = []
+        self._calls: list[Work] | None = None
+        self._afterwards: list[Work] = []
 
     @property
     def wrench(self) -> np.ndarray:
@@ -84,16 +81,11 @@ class Stepper:
             if _takes_each_step(self.world) and self.steps > 1:  # with calls of their own
                 self._afterwards = following
             else:
-                calls = [partial(_one_by_one, *both) for both in zip(calls, following, strict=True)]
+                calls = [first.then(second) for first, second in zip(calls, following, strict=True)]
         self._calls = calls
 
     def __getstate__(self):
         return {**vars(self), "_calls": None, "_afterwards": []}  # machine code belongs to the process
-
-
-def _one_by_one(first: Callable[[], None], second: Callable[[], None]) -> None:
-    first()
-    second()
 
 
 def _takes_each_step(world: World) -> bool:
@@ -101,7 +93,7 @@ def _takes_each_step(world: World) -> bool:
     return world.actuation is not None and world.actuation.actuator.remembers
 
 
-def kernel_calls(world: World, wrench: np.ndarray, steps: int, dt: float) -> list[Callable[[], None]]:
+def kernel_calls(world: World, wrench: np.ndarray, steps: int, dt: float) -> list[Work]:
     """One call of the step kernel for each thread, all arguments bound.
 
     Parameters
@@ -127,23 +119,8 @@ def kernel_calls(world: World, wrench: np.ndarray, steps: int, dt: float) -> lis
         )
         for k, taken in enumerate(world.team.taken)
     ]  # fmt: skip
-    machine_code = _machine_code(kernel, (plan.key, len(world.walls)), argument_lists[0])
-    calls = [partial(machine_code, *arguments) for arguments in argument_lists]
-    if plan.many and plan.sleeping and world.team.size == 1:
-        return [_unless_asleep(world, wrench, calls[0])]
-    return calls
-
-
-def _unless_asleep(world: World, wrench: np.ndarray, call: Callable) -> Callable[[], None]:
-    """A call that is not made where every body sleeps: handing over its arguments alone takes 2 µs."""
-    arguments = (0, world.worlds * world.body_count, wrench.reshape(-1, 6), world.sleep_of_kernel(), world.report_table)
-    asleep = _machine_code(sleep_through, ("sleep_through",), arguments)
-
-    def step():
-        if not asleep(*arguments):
-            call()
-
-    return step
+    entry = _entry(kernel, (plan.key, len(world.walls)), argument_lists[0])
+    return [Work([(entry, arguments)]) for arguments in argument_lists]
 
 
 def _step_of(plan: Plan) -> tuple[Callable, Callable[[World, int], tuple]]:
@@ -184,15 +161,11 @@ def _world_arguments(world: World, k: int) -> tuple:
     return *switches, world.sleep_of_kernel(), world.memory, world.report_table, world.scratch[k]
 
 
-def _machine_code(kernel, key: tuple, arguments: tuple) -> Callable[..., None]:
-    """The step kernel compiled for arguments of these types, which `key` determines.
-
-    Calling it directly leaves out Numba's dispatcher, which would find out the types of all arguments each time.
-    """
-    if key not in _COMPILED:
-        with compiling():
-            _COMPILED[key] = kernel.compile(tuple(map(numba.typeof, arguments)))
-    return _COMPILED[key]
+def _entry(kernel, key: tuple, arguments: tuple) -> int:
+    """Entry of the step kernel for arguments of these types, which `key` determines: to look at each takes a while."""
+    if key not in _ENTRIES:
+        _ENTRIES[key] = kernel.ready_entry(compiled(kernel, arguments))
+    return _ENTRIES[key]
 
 
-_COMPILED: dict[tuple, Callable[..., None]] = {}
+_ENTRIES: dict[tuple, int] = {}

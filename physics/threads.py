@@ -1,28 +1,34 @@
 """A batch of worlds on threads: kernels release the GIL, so a thread pool is enough.
 
 The pool is made when first needed and belongs to one process: after a fork the child makes its own. There is no
-threading layer of Numba in it, so worlds may be stepped from several Python threads at once, and forked.
+threading layer of Numba in it, so worlds may be stepped from several Python threads at once, and forked. What the pool
+runs is a loop in machine code (`physics.kernels.crew`), in which a thread stays from one run to the next if that comes
+soon.
 """
 
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Sequence
-from concurrent.futures import ThreadPoolExecutor
+import time
+from collections.abc import Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
+from functools import cache, partial
 
 import numpy as np
 
+from physics.kernels import crew
 from physics.kernels import turns as at
-from physics.machine_code import bound
+from physics.machine_code import Work, compiled
 
 # So many worlds a thread takes at once, or fewer where there are few: worlds in contact take several times as long as
 # others, and at the end one thread waits for the other's last ones.
 WORLDS_AT_ONCE = 8
 TURNS_PER_THREAD = 4
 
-# How often a thread asks whether the others have finished before it sleeps until they say so: a fifth of a millisecond.
-# To be woken takes a thread half as long as a batch of 100 worlds.
-PATIENCE = 30_000
+# How long the thread that leads asks whether the others have finished before it sleeps until they say so, and how long
+# those ask whether there is more to do before they go [s]. Meanwhile they keep their processors from others.
+PATIENCE = 2.0e-4
+STAY = 3.0e-4
 
 
 class Team:
@@ -38,7 +44,7 @@ class Team:
     ----------
     size : int
         Number of threads.
-    turns : (TURNS_SIZE,) int64
+    turns : (1 + size, APART) int64
         Whose turn it is, of `physics.kernels.turns`.
     taken : list of (FIRST + worlds,) int64
         For each thread the worlds that it took in the last run.
@@ -46,57 +52,95 @@ class Team:
 
     def __init__(self, threads: int, worlds: int):
         self.size = min(threads, worlds)
-        self.turns = np.zeros(at.TURNS_SIZE, dtype=np.int64)
-        self.turns[at.WORLDS] = worlds
-        self.turns[at.CHUNK] = worlds
-        if self.size > 1:
-            self.turns[at.CHUNK] = max(1, min(WORLDS_AT_ONCE, worlds // (TURNS_PER_THREAD * self.size)))
-        self.taken = [np.zeros(at.FIRST + worlds, dtype=np.int64) for _ in range(self.size)]
-        self._finish: Callable[[], object] | None = None
-        self._have_finished: Callable[[], object] | None = None
+        chunk = min(WORLDS_AT_ONCE, worlds // (TURNS_PER_THREAD * self.size)) if self.size > 1 else worlds
+        self.turns = at.make_turns(self.size, worlds, max(1, chunk))
+        self.taken = at.make_taken(self.size, worlds)
+        self._crew = crew.make_crew(self.size - 1)
+        self._told: Sequence[Work] | None = None  # what the crew has been told to do
+        self._futures: dict[int, Future] = {}
+        self._is_interrupted = False  # members may still be busy with the last run
         self._pool: ThreadPoolExecutor | None = None
         self._pid = -1
 
-    def run(self, calls: Sequence[Callable[[], None]]) -> None:
+    def run(self, calls: Sequence[Work]) -> None:
         """Make the calls, one per thread, of which the calling one is the first."""
-        self.turns[at.NEXT] = 0
         if self.size == 1:
+            self.turns[1, at.NEXT] = 0
             calls[0]()
             return
-        self.turns[at.FINISHED] = 0
         if self._pool is None or self._pid != os.getpid():
             self._start()
-        waiting = [self._pool.submit(self._take_part, call) for call in calls[1:]]
+        if calls is not self._told:
+            self._tell(calls)
+        if self._is_interrupted:
+            self._let_go()
+        outcome, self._is_interrupted = crew.UNFINISHED, True
         try:
-            calls[0]()
+            if self._summon() > 0:
+                self._send_for_all()
+            outcome = self._lead(calls[0].jobs, calls[0].count, self._patience)
         finally:
-            if not self._have_finished():
-                for future in waiting:
-                    future.result()
+            if outcome == crew.UNFINISHED:
+                self._let_go()
+        self._is_interrupted = False
+        if outcome != crew.DONE:
+            for call in calls:
+                call.raise_again()
 
     def _start(self) -> None:
         self._pool = ThreadPoolExecutor(self.size - 1, thread_name_prefix="rigid-env")
-        self._pid = os.getpid()
-        patience = PATIENCE if self.size <= _cores() else 1
-        self._finish = bound(at.finish, self.turns)
-        self._have_finished = bound(at.have_finished, self.turns, self.size - 1, patience)
+        self._pid, self._told, self._futures, self._is_interrupted = os.getpid(), None, {}, False
+        self._crew[...] = 0
+        self._patience, self._stay = (_pauses(s) if self.size <= _cores() else 1 for s in (PATIENCE, STAY))
+        self._summon = _prepared(crew.summon, self._crew, self.turns)
+        self._dismiss = _prepared(crew.dismiss, self._crew)
+        self._lead = partial(compiled(crew.lead, (self._crew, 0, 0, 0)), self._crew)
+        self._serve = partial(compiled(crew.serve, (self._crew, 0, 0)), self._crew)
 
-    def _take_part(self, call: Callable[[], None]) -> None:
-        call()
-        self._finish()  # not reached if the call raises: the first thread then asks for what was raised
+    def _tell(self, calls: Sequence[Work]) -> None:
+        self._told = calls
+        for member, call in enumerate(calls[1:], 1):
+            self._crew[member, crew.JOBS], self._crew[member, crew.COUNT] = call.jobs, call.count
+
+    def _send_for_all(self) -> None:
+        """Have the threads of the pool take the places of those who are away."""
+        for member in np.flatnonzero(self._crew[:, crew.WAS_AWAY]):
+            self._futures[member] = self._pool.submit(self._serve, member, self._stay)
+
+    def _let_go(self) -> None:
+        """Wait until all members are away."""
+        self._dismiss()
+        for future in self._futures.values():
+            future.result()
 
     def close(self) -> None:
         """End the threads; the team can be used again."""
         if self._pool is not None and self._pid == os.getpid():
+            self._dismiss()
             self._pool.shutdown()
         self._pool = None
 
 
 def listed(worlds: np.ndarray) -> np.ndarray:
     """Worlds (n,) as a list (FIRST + n,) int64 of those that a thread took."""
-    return np.concatenate([[len(worlds), -1], worlds])
+    taken = np.zeros(at.FIRST + len(worlds), dtype=np.int64)
+    taken[at.TAKEN], taken[at.FIRST :] = len(worlds), worlds
+    return taken
+
+
+def _prepared(kernel, *arguments):
+    return partial(compiled(kernel, arguments), *arguments)
 
 
 def _cores() -> int:
     """How many the process may use."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+@cache
+def _pauses(seconds: float) -> int:
+    """Number of pauses of a processor that take so long: of one they take 10 ns, of another 100."""
+    pause, count = compiled(crew.pause_often, (0,)), 1000
+    start = time.perf_counter()
+    pause(count)
+    return int(seconds * count / (time.perf_counter() - start)) + 1

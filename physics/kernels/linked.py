@@ -63,7 +63,7 @@ def step_linked(
     which a new state is not finite keeps the last good one, and its report counts the fault.
     """
     bodies = shapes.shape[0]
-    world = begin(taken)
+    world = begin(turns, taken)
     while True:
         world = next_world(world, turns, taken)
         if world < 0:

@@ -150,21 +150,6 @@ def sleeps_on(i, wrench, sleep):
     return sleep.rows[i, GROUP] > 0.0
 
 
-@kernel
-def sleep_through(first, last, wrench, sleep, report):
-    """Whether the bodies first <= i < last all sleep and go on to do so under these wrenches: their report is empty."""
-    for i in range(first, last):
-        if not sleeps(i, sleep):
-            return False
-        for c in range(6):
-            if wrench[i, c] != sleep.rows[i, WRENCH + c]:
-                return False
-    for world in range(report.shape[0]):
-        for c in range(report.shape[1]):
-            report[world, c] = 0.0
-    return True
-
-
 @inlined
 def falls_asleep(i, y, h, work, sleep):
     """`watch` body i, which meets walls only: whether it falls asleep now."""

@@ -219,7 +219,7 @@ def step_worlds(
     """
     work = scratch[0]
     bodies = shapes.shape[0]
-    world = begin(taken)
+    world = begin(turns, taken)
     while True:
         world = next_world(world, turns, taken)
         if world < 0:

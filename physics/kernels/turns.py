@@ -1,43 +1,65 @@
-"""How threads share a batch: each takes the next few worlds, until there is none left.
+"""How threads share a batch: each takes worlds of its own range, the next few at once, and then of the others' ranges.
 
 They do so in machine code, without the interpreter in between: its lock changes hands only when a thread begins and
-ends.
+ends. A thread finds the worlds of its own range where it left them, in the cache of its processor: where it took what
+came next, half of them had been stepped by another one the last time, and had to come from there.
 """
 
 from __future__ import annotations
 
-from numba.core import types
-from numba.extending import intrinsic
+import numpy as np
 
-from physics.kernels.codegen.elements import DATA
+from physics.kernels.atomic import add
 from physics.kernels.compiler import inlined, kernel
 
-# Of all threads: the first world that nobody has taken, how many worlds are taken at once, how many there are,
-# how many threads have finished.
-NEXT, CHUNK, WORLDS, FINISHED, TURNS_SIZE = range(5)
+# Words between what different threads change: two lines of a cache, since processors fetch them in pairs.
+APART = 16
 
-# Of one thread: how many worlds it has taken, the end of those it took last, and from FIRST on which.
-TAKEN, END, FIRST = range(3)
+# Of all threads: how many worlds are taken at once. Then, a row for each range: the first of its worlds that nobody has
+# taken, and where it ends.
+CHUNK = 0
+NEXT, LAST = range(2)
+
+# Of one thread: how many worlds it has taken, the end of those it took last, the range that it takes from, its own one,
+# and from FIRST on which worlds.
+TAKEN, END, RANGE, OWN, FIRST = range(5)
 
 
-@intrinsic
-def _add(typing_context, turns, k, number):
-    """turns[k] += number, at once for all threads; returns what was there before."""
+def make_turns(threads: int, worlds: int, chunk: int) -> np.ndarray:
+    """(1 + threads, APART) int64: the worlds in as many ranges as there are threads."""
+    turns = np.zeros((1 + threads, APART), dtype=np.int64)
+    turns[0, CHUNK] = chunk
+    turns[1:, LAST] = worlds * np.arange(1, threads + 1) // threads
+    return turns
 
-    def lower(context, builder, sig, args):
-        index = context.cast(builder, args[1], sig.args[1], types.int64)
-        number = context.cast(builder, args[2], sig.args[2], types.int64)
-        place = builder.gep(builder.extract_value(args[0], DATA), [index], inbounds=True)
-        return builder.atomic_rmw("add", place, number, "acq_rel")
 
-    return types.int64(turns, k, number), lower
+def make_taken(threads: int, worlds: int) -> list[np.ndarray]:
+    """For each thread (FIRST + worlds,) int64: nothing taken yet."""
+    lists = [np.zeros(FIRST + worlds, dtype=np.int64) for _ in range(threads)]
+    for thread, taken in enumerate(lists):
+        taken[OWN] = 1 + thread
+    return lists
 
 
 @inlined
-def begin(taken):
+def begin(turns, taken):
     """Nothing taken yet; returns what comes before the first world."""
-    taken[TAKEN] = 0
-    taken[END] = 0
+    taken[TAKEN] = taken[END] = 0
+    taken[RANGE] = taken[OWN]
+    return -1
+
+
+@kernel
+def take(turns, taken):
+    """First of the next worlds of the thread, of which `taken[END]` is the end, or -1."""
+    chunk = turns[0, CHUNK]
+    for _ in range(1, turns.shape[0]):
+        place = taken[RANGE]
+        world = add(turns, place, NEXT, chunk)
+        if world < turns[place, LAST]:
+            taken[END] = min(world + chunk, turns[place, LAST])
+            return world
+        taken[RANGE] = place + 1 if place + 1 < turns.shape[0] else 1
     return -1
 
 
@@ -48,32 +70,23 @@ def next_world(world, turns, taken):
     Parameters
     ----------
     world : int
-    turns : (TURNS_SIZE,) int64, in and out
-        Of all threads.
+    turns : (1 + threads, APART) int64, in and out
+        Of all threads: `make_turns`.
     taken : (FIRST + worlds,) int64, in and out
         Of this thread.
     """
     world += 1
     if world == taken[END]:
-        world = _add(turns, NEXT, turns[CHUNK])
-        if world >= turns[WORLDS]:
+        world = take(turns, taken)
+        if world < 0:
             return -1
-        taken[END] = min(world + turns[CHUNK], turns[WORLDS])
     taken[FIRST + taken[TAKEN]] = world
     taken[TAKEN] += 1
     return world
 
 
-@kernel
-def finish(turns):
-    """A thread has finished."""
-    _add(turns, FINISHED, 1)
-
-
-@kernel
-def have_finished(turns, threads, patience):
-    """Whether so many threads have finished; asked again and again, `patience` times."""
-    for _ in range(patience):
-        if _add(turns, FINISHED, 0) >= threads:
-            return True
-    return False
+@inlined
+def deal(turns):
+    """Nobody has taken anything."""
+    for k in range(1, turns.shape[0]):
+        turns[k, NEXT] = turns[k - 1, LAST] if k > 1 else 0

@@ -2,15 +2,21 @@
 
 from __future__ import annotations
 
-import threading
 import time
+from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 import physics
 from physics import scenes, threads
+from physics.kernels import crew, turns
+from physics.kernels.atomic import add, pause
+from physics.kernels.compiler import kernel
 from physics.kernels.turns import FIRST, TAKEN
+from physics.machine_code import bound
 from physics.threads import Team, listed
 
 
@@ -33,7 +39,6 @@ def test_each_world_is_taken_once(scene, worlds, count):
     for _ in range(3):
         world.step()
         assert sorted(np.concatenate(taken_by(world.team))) == list(range(worlds))
-        assert all(each == sorted(each) for each in taken_by(world.team))
 
 
 def test_events_are_taken_in_turn_as_well():
@@ -48,47 +53,147 @@ def test_worlds_listed_for_a_kernel():
     assert taken_by(team) == [[2, 5, 7]]
 
 
-@pytest.mark.parametrize("patience", [1, threads.PATIENCE])
+@given(st.integers(1, 5), st.integers(1, 60), st.integers(1, 9), st.randoms(use_true_random=False))
+def test_whoever_is_fast_each_world_is_taken_once(size, worlds, chunk, random):
+    """And a thread takes those of its own range first."""
+    table, lists = turns.make_turns(size, worlds, chunk), turns.make_taken(size, worlds)
+    turns.deal(table)
+    for taken in lists:
+        turns.begin(table, taken)
+    last, busy = [-1] * size, list(range(size))
+    while busy:
+        k = random.choice(busy)
+        last[k] = turns.next_world(last[k], table, lists[k])
+        if last[k] < 0:
+            busy.remove(k)
+    each = [taken[FIRST : FIRST + taken[TAKEN]].tolist() for taken in lists]
+    assert sorted(np.concatenate(each)) == list(range(worlds))
+    for k, mine in enumerate(each):
+        is_own = [worlds * k // size <= world < worlds * (k + 1) // size for world in mine]
+        assert is_own == sorted(is_own, reverse=True)
+
+
+@kernel
+def visit(visits, k, pauses):
+    """Wait, and note it; -1 instead of a number of pauses raises."""
+    if pauses[k] < 0:
+        raise ZeroDivisionError("this thread")
+    for _ in range(pauses[k]):
+        pause()
+    add(visits, 0, k, 1)
+
+
+def visitors(size: int, pauses=0) -> tuple[list, np.ndarray, np.ndarray]:
+    """Calls for so many threads; what they note, and how long each waits."""
+    visits, pauses = np.zeros((1, size), dtype=np.int64), np.full(size, pauses)
+    return [bound(visit, visits, k, pauses) for k in range(size)], visits, pauses
+
+
+@pytest.fixture
+def sent(monkeypatch) -> list:
+    """Grows by one for each thread that is sent for."""
+    found, submit = [], ThreadPoolExecutor.submit
+
+    def noted(pool, *arguments):
+        found.append(arguments)
+        return submit(pool, *arguments)
+
+    monkeypatch.setattr(ThreadPoolExecutor, "submit", noted)
+    monkeypatch.setattr(threads, "_cores", lambda: 100)  # else nobody stays where there are fewer than threads
+    return found
+
+
+SLOW = 2_000_000  # pauses: some hundredths of a second
+
+
+@pytest.mark.parametrize(("patience", "stay"), [(0.0, 0.0), (10.0, 0.0), (0.0, 10.0), (10.0, 10.0)])
 @pytest.mark.parametrize("slow", [0, 1, 2])
-def test_a_run_ends_when_the_slowest_is_done(slow, patience, monkeypatch):
+def test_a_run_ends_when_the_slowest_is_done(slow, patience, stay, sent, monkeypatch):
     monkeypatch.setattr(threads, "PATIENCE", patience)
-    team, done = Team(3, 100), []
-
-    def call(k):
-        if k == slow:
-            time.sleep(0.05)
-        done.append((k, threading.get_ident()))
-
-    for _ in range(3):
-        done.clear()
-        team.run([lambda k=k: call(k) for k in range(3)])
-        assert sorted(k for k, _ in done) == [0, 1, 2]
-        assert dict(done)[0] == threading.get_ident()  # the caller is the first of the team
-        assert len({ident for _, ident in done}) >= 2
+    monkeypatch.setattr(threads, "STAY", stay)
+    team, (calls, visits, pauses) = Team(3, 100), visitors(3)
+    pauses[slow] = SLOW
+    for times in range(1, 4):
+        team.run(calls)
+        assert visits.tolist() == [[times] * 3]
     team.close()
 
 
+def test_who_stays_is_not_sent_for_again(sent, monkeypatch):
+    """Also for other calls; who is gone is, and who leads does not wait for those who stay when all is over."""
+    monkeypatch.setattr(threads, "PATIENCE", 10.0)
+    monkeypatch.setattr(threads, "STAY", 100.0)
+    team, (calls, visits, _), (others, seen, _) = Team(3, 100), visitors(3), visitors(3)
+    for _ in range(5):
+        team.run(calls)
+        team.run(others)
+    assert len(sent) == 2
+    start = time.perf_counter()
+    team.close()
+    assert time.perf_counter() - start < 50.0
+    team.run(calls)  # it begins anew
+    assert len(sent) == 4
+    assert visits.tolist() == [[6] * 3]
+    assert seen.tolist() == [[5] * 3]
+    team.close()
+
+
+def test_who_is_not_called_soon_goes(sent, monkeypatch):
+    monkeypatch.setattr(threads, "PATIENCE", 10.0)
+    monkeypatch.setattr(threads, "STAY", 0.0)
+    team, (calls, visits, _) = Team(2, 100), visitors(2)
+    for times in range(1, 4):
+        team.run(calls)
+        for future in team._futures.values():
+            future.result(timeout=60)
+        assert team._crew[1, crew.STATE] == crew.AWAY
+        assert len(sent) == times
+    assert visits.tolist() == [[3, 3]]
+    team.close()
+
+
+@pytest.mark.parametrize("stay", [0.0, 10.0])
 @pytest.mark.parametrize("guilty", [0, 1])
-def test_what_a_thread_raises_is_raised_and_the_team_goes_on(guilty):
-    team, done = Team(2, 100), []
-
-    def call(k, fails):
-        if fails and k == guilty:
-            raise ZeroDivisionError(f"thread {k}")
-        done.append(k)
-
-    for fails in (True, False, True, False):
-        done.clear()
-        if fails:
-            with pytest.raises(ZeroDivisionError, match=f"thread {guilty}"):
-                team.run([lambda k=k: call(k, True) for k in range(2)])
-            assert done == [1 - guilty]
-        else:
-            team.run([lambda k=k: call(k, False) for k in range(2)])
-            assert sorted(done) == [0, 1]
+def test_what_a_thread_raises_is_raised_and_the_team_goes_on(guilty, stay, sent, monkeypatch):
+    monkeypatch.setattr(threads, "STAY", stay)
+    team, (calls, visits, pauses) = Team(2, 100), visitors(2)
+    for times in (1, 2):
+        pauses[guilty] = -1
+        with pytest.raises(ZeroDivisionError, match="this thread"):
+            team.run(calls)
+        assert visits[0, [guilty, 1 - guilty]].tolist() == [times - 1, 2 * times - 1]
+        pauses[guilty] = 0
+        team.run(calls)
+        assert visits[0, [guilty, 1 - guilty]].tolist() == [times, 2 * times]
     team.close()
-    team.run([lambda: done.append(2)] * 2)  # it begins anew
-    assert done.count(2) == 2
+
+
+def test_after_an_interrupt_the_team_waits_for_who_is_busy(sent, monkeypatch):
+    """Ctrl-C while the one that leads sleeps until the others have finished."""
+    monkeypatch.setattr(threads, "PATIENCE", 0.0)
+    team, (calls, visits, pauses) = Team(2, 100), visitors(2)
+    team.run(calls)
+    pauses[1] = SLOW
+    with monkeypatch.context() as patch:
+        patch.setattr(Team, "_let_go", interrupt)
+        with pytest.raises(KeyboardInterrupt):
+            team.run(calls)
+    pauses[1] = 0
+    team.run(calls)
+    assert visits.tolist() == [[3, 3]]
+    team.close()
+
+
+def interrupt(team: Team) -> None:
+    raise KeyboardInterrupt
+
+
+@kernel
+def follow(taken, state, visits, heights):
+    for k in range(taken[TAKEN]):
+        world = taken[FIRST + k]
+        visits[world] += 1
+        heights[world] = state[world, 1]
 
 
 @pytest.mark.parametrize("count", [1, 2])
@@ -98,17 +203,9 @@ def test_what_follows_a_step_follows_it_in_every_world_once(effects, count):
     scene = scenes.shove()
     scene = physics.Scene(bodies=scene.bodies, walls=scene.walls, effects=[*scene.effects, *effects])
     world = physics.World(scene, worlds=50, dt=0.01, accuracy="fast", threads=count)
-    visits = []
-
-    def follow(taken):
-        def note():
-            visits.extend((int(k), world.state[k, 1]) for k in taken[FIRST : FIRST + taken[TAKEN]])
-
-        return note
-
-    stepper = physics.Stepper(world, 3, then=follow)
-    for _ in range(2):
-        visits.clear()
+    visits, heights = np.zeros(50, dtype=np.int64), np.zeros(50)
+    stepper = physics.Stepper(world, 3, then=lambda taken: bound(follow, taken, world.state, visits, heights))
+    for times in (1, 2):
         stepper()
-        assert sorted(k for k, _ in visits) == list(range(50))
-        assert all(height == world.state[k, 1] for k, height in visits)  # of the last step
+        assert (visits == times).all()
+        np.testing.assert_array_equal(heights, world.state[:, 1])  # of the last step

@@ -111,13 +111,14 @@ class _WholeCompiler(CompilerBase):
     """Passes of ours, into a library of ours."""
 
     library_class: type[JITCodeLibrary] = _WholeLibrary
+    is_entered = True  # from outside: see `ready`
 
     def __init__(self, typingctx, targetctx, library, args, return_type, flags, local_types):
         flags = _Flags(flags)
         flags.types = hashlib.sha256(str(args).encode()).hexdigest()[:16]
         contexts = remembering(typingctx), RememberingTarget(targetctx)
         super().__init__(*contexts, library, args, return_type, flags, local_types)
-        self.state.flags.no_cfunc_wrapper = True
+        self.state.flags.no_cfunc_wrapper = not self.is_entered
 
     def passes(self) -> PassManager:
         """To be run one after another."""
@@ -152,6 +153,7 @@ class _PartCompiler(_WholeCompiler):
     """Up to the IR."""
 
     library_class = _PartLibrary
+    is_entered = False
 
     def __init__(self, *arguments):
         super().__init__(*arguments)
@@ -206,6 +208,14 @@ class Kernel(CPUDispatcher):
         super().__init__(function, local_types, options, pipeline_class=_WholeCompiler)
         dispatcher, compiler = (CPUDispatcher, _AnyPartCompiler) if is_foreign else (_Part, _PartCompiler)
         self._part = dispatcher(function, local_types, options, pipeline_class=compiler)
+
+    def ready_entry(self, machine_code) -> int:
+        """Address of the entry for other machine code (`ready`) of what `compile` gave; it must return nothing."""
+        made = next(made for made in self.overloads.values() if made.entry_point is machine_code)
+        entry = made.library.get_pointer_to_function(made.fndesc.llvm_cfunc_wrapper_name)
+        if entry == 0:
+            raise TypeError(f"{self.py_func.__name__} returns {made.signature.return_type}; allowed is nothing")
+        return entry
 
     def get_call_template(self, args, kws):
         """How another kernel calls this one."""

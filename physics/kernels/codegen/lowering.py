@@ -19,6 +19,7 @@ from numba.core.typed_passes import NativeLowering
 
 from physics.kernels.codegen.builder import FoldingBuilder, slot
 from physics.kernels.codegen.calls import MayRaise, ValueDescriptor
+from physics.kernels.codegen.ready import write_ready_entry
 
 
 class _KernelLower(Lower):
@@ -29,6 +30,10 @@ class _KernelLower(Lower):
         super().setup_function(fndesc)
         self.builder = FoldingBuilder(self.entry_block)
         self.call_helper = self.call_conv.init_call_helper(self.builder)
+
+    def create_cfunc_wrapper(self):
+        """The entry for machine code, in place of Numba's for C; see `ready`."""
+        write_ready_entry(self.context, self.library, self.fndesc)
 
     def _find_singly_assigned_variable(self):
         times = Counter(

@@ -249,7 +249,7 @@ def step_events(
     """
     work, motion = scratch[0], motions[0]
     bodies = shapes.shape[0]
-    world = begin(taken)
+    world = begin(turns, taken)
     while True:
         world = next_world(world, turns, taken)
         if world < 0:
