@@ -12,7 +12,6 @@ attitude are of second order in the step, as with anything that is held.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
@@ -23,6 +22,7 @@ from physics.kernels.actuator import follow, shorten
 from physics.report import add_report
 
 if TYPE_CHECKING:
+    from physics.machine_code import Work
     from physics.world import World
 
 # Treads shorter than this share of the step are rounding of the times they lie between.
@@ -55,7 +55,7 @@ class Actuation:
     def _nothing(self) -> np.ndarray:
         return np.zeros((self._shape[0] * self._shape[1], 6))
 
-    def advance(self, world: World, calls: list[Callable[[], None]], wrench: np.ndarray, steps: int, dt: float) -> None:
+    def advance(self, world: World, calls: list[Work], wrench: np.ndarray, steps: int, dt: float) -> None:
         """`World.advance` through the actuator: one that remembers is asked at each step."""
         if steps == 1 or not self.actuator.remembers:
             self.take(wrench, world.time, dt)

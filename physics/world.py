@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -21,6 +21,7 @@ from physics.kernels.events.motion import make_motion
 from physics.kernels.fields.terms import declare
 from physics.kernels.sleep import GROUP, SLEEP_SIZE, Sleep
 from physics.kernels.workspace import body_records
+from physics.machine_code import Work
 from physics.plan import SHAPE_CODES, make_plan
 from physics.report import StepReport
 from physics.scene import Scene
@@ -137,7 +138,7 @@ class World:
             for _ in range(self.team.size)
         ]
         self._wrench = self.no_wrench()
-        self._calls: list[Callable[[], None]] = []
+        self._calls: list[Work] = []
         self._bound_for: tuple | None = None  # arguments of `step`: the next call with the same finds all bound
 
     def make_event_room(self, room: int) -> None:
@@ -188,7 +189,7 @@ class World:
         self.advance(self._calls, self._wrench, steps, dt)
         return self.report
 
-    def advance(self, calls: list[Callable[[], None]], wrench: np.ndarray, steps: int, dt: float) -> None:
+    def advance(self, calls: list[Work], wrench: np.ndarray, steps: int, dt: float) -> None:
         """Make the `kernel_calls` of so many steps of `dt` [s] with this wrench; for those who prepare them."""
         if self.recorder is not None:
             self.recorder.before(wrench, steps, dt)
@@ -199,7 +200,7 @@ class World:
         if self.recorder is not None:
             self.recorder.after()
 
-    def make(self, calls: list[Callable[[], None]], duration: float) -> None:
+    def make(self, calls: list[Work], duration: float) -> None:
         """Make kernel calls that take so long [s]."""
         if self.plan.fields:
             for scratch in self.scratch:

@@ -27,26 +27,26 @@ def _word(context, builder, sig, args, k):
     return context.cast(builder, args[k], sig.args[k], types.int64)
 
 
-@intrinsic
-def add(typing_context, table, row, column, number):
-    """table[row, column] += number; returns what was there before."""
+def _changed_by(operation: str):
+    """How to lower a change of an element by a number, after which what was there before is returned."""
 
     def lower(context, builder, sig, args):
         number = _word(context, builder, sig, args, 3)
-        return builder.atomic_rmw("add", _pointer(context, builder, sig, args), number, "seq_cst")
+        return builder.atomic_rmw(operation, _pointer(context, builder, sig, args), number, "seq_cst")
 
-    return types.int64(table, row, column, number), lower
+    return lower
+
+
+@intrinsic
+def add(typing_context, table, row, column, number):
+    """table[row, column] += number; returns what was there before."""
+    return types.int64(table, row, column, number), _changed_by("add")
 
 
 @intrinsic
 def exchange(typing_context, table, row, column, number):
     """table[row, column] = number; returns what was there before."""
-
-    def lower(context, builder, sig, args):
-        number = _word(context, builder, sig, args, 3)
-        return builder.atomic_rmw("xchg", _pointer(context, builder, sig, args), number, "seq_cst")
-
-    return types.int64(table, row, column, number), lower
+    return types.int64(table, row, column, number), _changed_by("xchg")
 
 
 @intrinsic
