@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import gc
 import operator
+import struct
 import sys
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from contextlib import contextmanager
+from functools import cache, cached_property
+from itertools import accumulate
 
 import numba
 import numpy as np
@@ -35,12 +38,12 @@ class Work:
 
     def __init__(self, calls: list[tuple[int, tuple]]):
         self._calls = calls  # they own what the table has addresses of
-        self._words = [np.array(list(_words(arguments)), dtype=np.int64) for _, arguments in calls]
+        self._words = [np.array(_words(arguments), dtype=np.int64) for _, arguments in calls]
         self._table = np.zeros((len(calls), JOB_SIZE), dtype=np.int64)
         self._table[:, ENTRY_OF] = [entry for entry, _ in calls]
         self._table[:, ARGUMENTS] = [words.ctypes.data for words in self._words]
         self.jobs, self.count = self._table.ctypes.data, len(calls)
-        self._perform = compiled(perform, (self.jobs, self.count))
+        self._perform = _performing()
 
     def __call__(self) -> None:
         """Make the calls."""
@@ -52,24 +55,38 @@ class Work:
         for row in self._table:
             raise_again(row[CODE], row[RAISED])
 
+    def put(self, argument: int, number: float) -> None:
+        """Give the first of the calls another number for an argument that is one."""
+        self._words[0][self._places[argument]] = _words((number,))[0]
+
+    @cached_property
+    def _places(self) -> list[int]:
+        """Where the words of each argument of the first call begin."""
+        return list(accumulate((len(_words((value,))) for value in self._calls[0][1]), initial=0))
+
     def then(self, other: Work) -> Work:
         """These calls, and the other ones after them."""
         return Work([*self._calls, *other._calls])
 
 
-def _words(value) -> Iterator[int]:
-    """A value of an argument as a kernel finds it in memory: see `physics.kernels.codegen.ready`."""
-    if isinstance(value, np.ndarray):
-        yield from (0, 0, value.size, value.itemsize, value.ctypes.data, *value.shape, *value.strides)
-    elif isinstance(value, tuple):
-        for member in value:
-            yield from _words(member)
-    elif isinstance(value, float):
-        yield int(np.float64(value).view(np.int64))
-    elif value is None:
-        yield 0
-    else:
-        yield operator.index(value)
+@cache
+def _performing() -> Callable[[int, int], bool]:
+    return compiled(perform, (0, 0))
+
+
+def _words(arguments: tuple) -> list[int]:
+    """Arguments as a kernel finds them in memory: see `physics.kernels.codegen.ready`."""
+    words: list[int] = []
+    for value in arguments:
+        if isinstance(value, np.ndarray):
+            words += (0, 0, value.size, value.itemsize, value.ctypes.data, *value.shape, *value.strides)
+        elif isinstance(value, tuple):
+            words += _words(value)
+        elif isinstance(value, float):
+            words += struct.unpack("=q", struct.pack("=d", value))
+        else:
+            words.append(0 if value is None else operator.index(value))
+    return words
 
 
 def compiled(kernel: Callable, arguments: tuple) -> Callable:

@@ -14,6 +14,9 @@ from physics.kernels.many.step import step_many
 from physics.kernels.step import step_worlds
 from physics.machine_code import Work, compiled
 
+# Which arguments of all step kernels the number of steps is, and the length of a substep.
+STEPS, SUBSTEP = 2, 4
+
 if TYPE_CHECKING:
     from physics.plan import Plan
     from physics.world import World
@@ -107,20 +110,34 @@ def kernel_calls(world: World, wrench: np.ndarray, steps: int, dt: float) -> lis
     dt : float
         [s].
     """
-    plan, substeps = world.plan, world.accuracy.substeps
+    plan = world.plan
     if world.actuation is not None:
         wrench = world.actuation.applied
-        steps = 1 if _takes_each_step(world) else steps
+    steps, substeps, h = _times(world, steps, dt)
     kernel, own_arguments = _step_of(plan)
     argument_lists = [
         (
-            world.team.turns, taken, steps, substeps, dt / substeps, world.state, world.params, world.shapes,
+            world.team.turns, taken, steps, substeps, h, world.state, world.params, world.shapes,
             world.gravity if plan.gravity else None, wrench.reshape(-1, 6), *own_arguments(world, k),
         )
         for k, taken in enumerate(world.team.taken)
     ]  # fmt: skip
     entry = _entry(kernel, (plan.key, len(world.walls)), argument_lists[0])
     return [Work([(entry, arguments)]) for arguments in argument_lists]
+
+
+def retime(world: World, calls: list[Work], steps: int, dt: float) -> None:
+    """Let `kernel_calls` of a world take so many steps of another `dt` [s]: faster than to prepare others."""
+    steps, _, h = _times(world, steps, dt)
+    for call in calls:
+        call.put(STEPS, steps)
+        call.put(SUBSTEP, h)
+
+
+def _times(world: World, steps: int, dt: float) -> tuple[int, int, float]:
+    """Steps, substeps and the length of one [s] that a kernel is called for."""
+    substeps = world.accuracy.substeps
+    return 1 if _takes_each_step(world) else steps, substeps, dt / substeps
 
 
 def _step_of(plan: Plan) -> tuple[Callable, Callable[[World, int], tuple]]:

@@ -70,10 +70,10 @@ class Team:
             return
         if self._pool is None or self._pid != os.getpid():
             self._start()
-        if calls is not self._told:
-            self._tell(calls)
         if self._is_interrupted:
             self._let_go()
+        if calls is not self._told:
+            self._tell(calls)
         outcome, self._is_interrupted = crew.UNFINISHED, True
         try:
             if self._summon() > 0:
@@ -105,7 +105,11 @@ class Team:
     def _send_for_all(self) -> None:
         """Have the threads of the pool take the places of those who are away."""
         for member in np.flatnonzero(self._crew[:, crew.WAS_AWAY]):
-            self._futures[member] = self._pool.submit(self._serve, member, self._stay)
+            self._futures[member] = self._pool.submit(self._be_member, member)
+
+    def _be_member(self, member: int) -> None:
+        """What a thread of the pool does; meanwhile the team is in use, and with it all that it was told to call."""
+        self._serve(member, self._stay)
 
     def _let_go(self) -> None:
         """Wait until all members are away."""

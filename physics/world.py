@@ -25,7 +25,7 @@ from physics.machine_code import Work
 from physics.plan import SHAPE_CODES, make_plan
 from physics.report import StepReport
 from physics.scene import Scene
-from physics.stepper import kernel_calls
+from physics.stepper import kernel_calls, retime
 from physics.threads import Team
 
 if TYPE_CHECKING:
@@ -183,8 +183,11 @@ class World:
             wrench = checks.finite(wrench, (self.worlds, self.body_count, 6), "wrench")
         steps = checks.count(steps, "steps")
         dt = self.dt if dt is None else float(checks.positive(dt, (), "dt"))
-        if (steps, dt) != self._bound_for:
-            self._calls, self._bound_for = kernel_calls(self, self._wrench, steps, dt), (steps, dt)
+        if self._bound_for is None:
+            self._calls = kernel_calls(self, self._wrench, steps, dt)
+        elif (steps, dt) != self._bound_for:
+            retime(self, self._calls, steps, dt)
+        self._bound_for = (steps, dt)
         self._wrench[...] = 0.0 if wrench is None else wrench
         self.advance(self._calls, self._wrench, steps, dt)
         return self.report

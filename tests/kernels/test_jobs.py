@@ -87,6 +87,16 @@ def test_calls_are_made_in_order_each_time():
     assert notes[:7].tolist() == [6, 3, 1, 2, 3, 1, 2]
 
 
+def test_an_argument_that_is_a_number_can_be_put_in_place_of_another():
+    out, records = np.zeros(12), np.zeros(2, dtype=[("mass", float), ("speed", float)])
+    call = bound(mixed, out, None, True, 1, 1.0, np.zeros((3, 3)), records, pair_of(np.zeros(3)))
+    for count, factor in ((7, -0.5), (-1, 1e300)):
+        call.put(3, count)
+        call.put(4, factor)
+        call()
+        assert out[2:4].tolist() == [count, factor]
+
+
 def test_an_exception_is_raised_and_ends_the_row():
     notes, sign = np.zeros(20, dtype=np.int64), 1
     call = bound(note, notes, 5).then(bound(note, notes, -sign)).then(bound(note, notes, 7))

@@ -20,8 +20,8 @@ WORLDS = 5
 STEPS = 5
 
 
-def shoved(threads=1):
-    world = physics.World(scenes.shove(), worlds=WORLDS, dt=0.005, accuracy="fast", threads=threads)
+def shoved(threads=1, accuracy="fast"):
+    world = physics.World(scenes.shove(), worlds=WORLDS, dt=0.005, accuracy=accuracy, threads=threads)
     world.set_state(linvel=np.random.default_rng(1).uniform(-4, 4, (WORLDS, 1, 3)))
     return world
 
@@ -44,6 +44,21 @@ def test_a_stepper_takes_the_steps_of_step(loads, threads):
         assert prepared.time == plain.time
         np.testing.assert_array_equal(prepared.report.iterations, report.iterations)
         np.testing.assert_array_equal(prepared.report.status, report.status)
+
+
+@pytest.mark.parametrize("accuracy", ["balanced", "precise"])
+@pytest.mark.parametrize("threads", [1, 2])
+def test_a_world_whose_steps_differ_takes_those_of_steppers(loads, accuracy, threads):
+    """Its calls are prepared once, and told of other numbers and lengths of steps."""
+    plain, prepared = shoved(threads, accuracy), shoved(1, accuracy)
+    steppers = {key: physics.Stepper(prepared, *key) for key in ((1, 0.01), (3, 0.004), (2, 0.01), (1, 0.0025))}
+    for k, load in enumerate(loads[:24]):
+        steps, dt = list(steppers)[k * k % 4 if k < 12 else k % 4]
+        plain.step(load, steps=steps, dt=dt)
+        steppers[steps, dt].wrench[...] = load
+        steppers[steps, dt]()
+        np.testing.assert_array_equal(prepared.state, plain.state)
+        assert prepared.time == plain.time
 
 
 def test_without_wrench_and_with_its_own_dt():

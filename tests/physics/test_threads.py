@@ -169,7 +169,7 @@ def test_what_a_thread_raises_is_raised_and_the_team_goes_on(guilty, stay, sent,
 
 
 def test_after_an_interrupt_the_team_waits_for_who_is_busy(sent, monkeypatch):
-    """Ctrl-C while the one that leads sleeps until the others have finished."""
+    """Ctrl-C while the one that leads sleeps until the others have finished; then there is something else to do."""
     monkeypatch.setattr(threads, "PATIENCE", 0.0)
     team, (calls, visits, pauses) = Team(2, 100), visitors(2)
     team.run(calls)
@@ -178,9 +178,10 @@ def test_after_an_interrupt_the_team_waits_for_who_is_busy(sent, monkeypatch):
         patch.setattr(Team, "_let_go", interrupt)
         with pytest.raises(KeyboardInterrupt):
             team.run(calls)
-    pauses[1] = 0
-    team.run(calls)
-    assert visits.tolist() == [[3, 3]]
+    others, seen, _ = visitors(2)
+    team.run(others)
+    assert visits.tolist() == [[2, 2]]
+    assert seen.tolist() == [[1, 1]]
     team.close()
 
 
