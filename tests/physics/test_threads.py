@@ -168,9 +168,14 @@ def test_what_a_thread_raises_is_raised_and_the_team_goes_on(guilty, stay, sent,
     team.close()
 
 
-def test_after_an_interrupt_the_team_waits_for_who_is_busy(sent, monkeypatch):
-    """Ctrl-C while the one that leads sleeps until the others have finished; then there is something else to do."""
+@pytest.mark.parametrize("delay", [0.0, 0.05])
+def test_after_an_interrupt_the_team_waits_for_who_is_busy(delay, sent, monkeypatch):
+    """Ctrl-C while the one that leads sleeps until the others, who may not have begun, have finished; then there is
+    something else to do.
+    """
+    be_member = Team._be_member
     monkeypatch.setattr(threads, "PATIENCE", 0.0)
+    monkeypatch.setattr(Team, "_be_member", lambda team, member: (time.sleep(delay), be_member(team, member)))
     team, (calls, visits, pauses) = Team(2, 100), visitors(2)
     team.run(calls)
     pauses[1] = SLOW
