@@ -143,7 +143,7 @@ def _cores() -> int:
 
 @cache
 def _pauses(seconds: float) -> int:
-    """Number of pauses of a processor that take so long: of one they take 10 ns, of another 100."""
+    """Number of pauses that take so long: how long one is differs from processor to processor."""
     pause, count = compiled(crew.pause_often, (0,)), 1000
     start = time.perf_counter()
     pause(count)
