@@ -210,6 +210,21 @@ def solve_one(first, mu, goal, inv_mass, K, work):
 
 
 @inlined
+def _pushed_apart(W1, W12, W2, b1, b2):
+    """What impulses without friction do to the velocities of two contacts that approach with b1 and b2 (< 0) [m/s]."""
+    s = 1.0 / (W1[0] * W2[0] - W12[0] * W12[0])
+    p1, p2 = s * (W12[0] * b2 - W2[0] * b1), s * (W12[0] * b1 - W1[0] * b2)
+    if p1 < 0.0:
+        p1, p2 = 0.0, -b2 / W2[0]
+    elif p2 < 0.0:
+        p1, p2 = -b1 / W1[0], 0.0
+    return (
+        (W1[0] * p1 + W12[0] * p2, W1[3] * p1 + W12[3] * p2, W1[6] * p1 + W12[6] * p2),
+        (W12[0] * p1 + W2[0] * p2, W12[1] * p1 + W2[3] * p2, W12[2] * p1 + W2[6] * p2),
+    )
+
+
+@inlined
 def solve_pair(first, second, mu, goal, inv_mass, K, work):
     """Impulses of two contacts (see `contact_at`).
 
@@ -232,7 +247,7 @@ def solve_pair(first, second, mu, goal, inv_mass, K, work):
         u1 = _plus(qt.matvec(W1, f), qt.matvec(W12, g))
         u2 = _plus(qt.matvec(W2, g), qt.matvec(_transposed(W12), f))
         if not (is_warm(u1[0], -b1[0]) and is_warm(u2[0], -b2[0])):
-            u1 = u2 = (0.0, 0.0, 0.0)
+            u1, u2 = _pushed_apart(W1, W12, W2, b1[0], b2[0])
         x1, y1 = heading(b1[1] + u1[1], b1[2] + u1[2], mu)
         x2, y2 = heading(b2[1] + u2[1], b2[2] + u2[2], mu)
     found, p, q, miss = solve_two(W1, W12, W2, b1, b2, mu, goal, x1, y1, x2, y2)

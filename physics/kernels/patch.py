@@ -216,15 +216,16 @@ def comply(patch, center, slip, turning, inv_mass, K, work):
 
 @inlined
 def resultant(patch, on, center, y0, y, slip):
-    """Normal impulses of the active contacts: the one that pulls most or -1, what pushes, and what that exerts."""
+    """Normal impulses of the active contacts: which pull (1), which most (or -1), what pushes, what it exerts."""
     (c, a, b), _, _ = patch
     p = chosen(on > 0.0, y0 + (y[0] * (a - center[1]) + y[1] * (b - center[2])), 0.0)
-    loser = -1
+    pulling, loser = chosen(p < 0.0, 1.0, 0.0), -1
     if first_of(~(p >= 0.0)) >= 0:  # so that what is no number also pulls
         loser = first_of((on > 0.0) & ~(p > least(p)))
     p = larger(p, 0.0)
     px, py = p * slip[0], p * slip[1]
-    return loser, p, (total(px), total(py), total(a * py - b * px), total(b * p - c * py), total(c * px - a * p))
+    exerted = total(px), total(py), total(a * py - b * px), total(b * p - c * py), total(c * px - a * p)
+    return pulling, loser, p, exerted
 
 
 @inlined

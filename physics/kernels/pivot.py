@@ -130,7 +130,7 @@ def turn_about(k, patch, on, mu, goal, center, y0, gain, u, w, wa, wb, spin, inv
         slip, x, y, f, g, h = _point_at(k, patch, on, mu, center, wa, wb, spin, K)
         sums = x, y, f, g, h
         (fa, fb), slopes, turned = _hold_at(k, patch, sums, y0, gain, u, w, wa, wb, inv_mass, K, work)
-        loser, p, (sa, sb, mn, ma, mb) = resultant(patch, on, center, y0, slopes, slip)
+        _, loser, p, (sa, sb, mn, ma, mb) = resultant(patch, on, center, y0, slopes, slip)
         exerted = (sa + fa, sb + fb, mn + (ak * fb - bk * fa), ma - ck * fb, mb + ck * fa)
         change = turned - spin
         is_held = lane(k)

@@ -28,8 +28,9 @@ Where a step would turn a direction right round, Newton's method is left for one
 has the part along the directions, κ_i d_i d_iᵀ, as if friction were a viscous drag of that coefficient. That
 always slows the contacts that stop; one that all but stops is tried as a pivot (`pivot`).
 
-A contact that would have to pull opens, the one that pulls most first; the fit of the targets says whether it
-then separates fast enough. One that would close while two others push pushes again, once. Without friction the first
+A contact that would have to pull opens, the one that pulls most first, or two of four at once (the block tips over an
+edge); the fit of the targets says whether it then separates fast enough. One that would close while the others push
+pushes again, once; where three push and it hardly closes, not before these are solved. Without friction the first
 linear system is the solution.
 
 All begins with the motion that the impulses of the last step lead to, or, where these are of other loads, with
@@ -44,7 +45,7 @@ from physics.kernels import quaternion as qt
 from physics.kernels.columns import lane, present
 from physics.kernels.compiler import inlined
 from physics.kernels.ellipse import friction_ratio
-from physics.kernels.lanes import Lanes, chosen, first_of, larger, largest, least, root
+from physics.kernels.lanes import Lanes, chosen, first_of, larger, largest, least, root, total
 from physics.kernels.pair import contact_at, solve_pair
 from physics.kernels.patch import (
     across_misses,
@@ -111,7 +112,7 @@ def _lengthening(motion, delta, gyration2, work):
 
 
 @inlined
-def _normal_motion(count, goal, patch, on, u, w):
+def _normal_motion(count, goal, loose, patch, on, u, w):
     """Normal motion of the contacts that push, and which do.
 
     Targets of four contacts that are those of no rigid motion are met by three: one opens that is then faster than
@@ -120,7 +121,9 @@ def _normal_motion(count, goal, patch, on, u, w):
     Returns
     -------
     ok : bool
-        Whether the targets are met, and no open contact closes.
+        Whether the targets are met, and no open contact closes faster than `loose`.
+    closing : int
+        The open contact that closes fastest, by more than the goal, or -1.
     count, on
         Contacts that push.
     center : tuple of 3 floats
@@ -135,8 +138,11 @@ def _normal_motion(count, goal, patch, on, u, w):
         count, on = count - 1, chosen(lane(first_of(free == largest(free))), 0.0, on)
         is_patch, center, motion = fit_targets(count, patch, on)
         spare = spare_speed(patch, motion[0], motion[1], motion[2])
-    ok = is_patch and largest(larger(-spare, on * spare)) <= goal
-    return ok, count, on, center, motion
+    speeds = chosen(on > 0.0, 0.0, -spare)
+    fastest = largest(speeds)
+    closing = first_of(speeds == fastest) if fastest > goal else -1
+    ok = is_patch and largest(on * abs(spare)) <= goal and fastest <= loose
+    return ok, closing, count, on, center, motion
 
 
 @inlined
@@ -219,7 +225,7 @@ def _moved(exerted, u, w, inv_mass, mass_b, K):
 
 
 @inlined
-def search(n, patient, mu, goal, patch, start, pivot, axes, u, w, inv_mass, K, work):
+def search(n, patient, mu, goal, loose, patch, start, pivot, axes, u, w, inv_mass, K, work):
     """Directions and set of pushing contacts.
 
     Parameters
@@ -229,6 +235,8 @@ def search(n, patient, mu, goal, patch, start, pivot, axes, u, w, inv_mass, K, w
         is quick and nearly always right.
     goal : float
         Residual asked for [m/s].
+    loose : float
+        Speed up to which an open contact may close while it is sought which others push [m/s].
     start : tuple of 3 floats
         Planar motion to start from.
     pivot : int
@@ -252,17 +260,22 @@ def search(n, patient, mu, goal, patch, start, pivot, axes, u, w, inv_mass, K, w
     mass_b = ratio * ratio * inv_mass
     on = present(n)
     none = is_back = Lanes(0.0, 0.0, 0.0, 0.0)
-    count, motion, tried, hurry, is_set = n, start, none, False, False
+    count, motion, tried, hurry, is_set, again, closing = n, start, none, False, False, -1, -1
     center = normal_motion = start
     for _ in range(SLIDE_LIMIT):
+        if again >= 0:
+            if is_back[again] > 0.0:
+                break
+            count, on, is_back = count + 1, chosen(lane(again), 1.0, on), chosen(lane(again), 1.0, is_back)
+            again, is_set, tried = -1, False, none
         if count < 3:
             found, impulses, exerted, push, miss, again = _two_left(patch, on, mu, goal, axes, u, w, inv_mass, K, work)
-            if again < 0 or is_back[again] > 0.0:
+            if again < 0:
                 return found, impulses, exerted, push, miss
-            count, on, is_back = 3, chosen(lane(again), 1.0, on), chosen(lane(again), 1.0, is_back)
             motion = _moved(exerted, u, w, inv_mass, mass_b, K)
+            continue
         if not is_set:
-            ok, count, on, center, normal_motion = _normal_motion(count, goal, patch, on, u, w)
+            ok, closing, count, on, center, normal_motion = _normal_motion(count, goal, loose, patch, on, u, w)
             if not ok:
                 break
             is_set = True
@@ -274,6 +287,9 @@ def search(n, patient, mu, goal, patch, start, pivot, axes, u, w, inv_mass, K, w
             what, loser, impulses, exerted, miss, slipped = turn_about(
                 pivot, patch, on, mu, goal, center, y0, gain, u, w, wa, wb, motion[2], inv_mass, K, work
             )
+            if what == FOUND and closing >= 0:
+                again = closing
+                continue
             if what == FOUND:
                 work.mode = PIVOT + work.slot[pivot]
                 return True, impulses, exerted, push, miss
@@ -284,12 +300,18 @@ def search(n, patient, mu, goal, patch, start, pivot, axes, u, w, inv_mass, K, w
             pivot = -1
             continue
         slip, y, turning = respond(patch, on, mu, center, y0, gain, motion, wa, wb, K)
-        loser, p, exerted = resultant(patch, on, center, y0, y, slip)
+        pulling, loser, p, exerted = resultant(patch, on, center, y0, y, slip)
+        if not patient and count > 3 and total(pulling) == 2.0:
+            count, on, is_set, tried, motion = 2, on - pulling, False, none, start
+            continue
         is_settled = True
         if loser < 0 or patient:
             led_to = _moved(exerted, u, w, inv_mass, mass_b, K)
             delta = led_to[0] - motion[0], led_to[1] - motion[1], led_to[2] - motion[2]
             miss, k = across_misses(patch, p, slip, mu, delta)
+            if loser < 0 and miss <= goal and closing >= 0:
+                again = closing
+                continue
             if loser < 0 and miss <= goal:
                 work.mode = SLIDE
                 return True, (p, p * slip[0], p * slip[1]), exerted, push, miss

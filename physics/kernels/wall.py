@@ -9,7 +9,10 @@ from physics.kernels.pair import contact_at, solve_one, solve_pair
 from physics.kernels.patch import cold_motion, free_speed, place_patch, warm_motion
 from physics.kernels.point import to_world, wall_frame
 from physics.kernels.share import wall_axes
-from physics.kernels.slide import first_pivot, search
+from physics.kernels.slide import SLIDE, first_pivot, search
+
+# Share of the free speed by which a contact that opened may close while it is sought which others push.
+LOOSE = 1.0e-2
 
 
 @inlined
@@ -25,9 +28,10 @@ def _face(n, friction, axes, u, w, inv_mass, K, work):
         elif work.mu > 0.0:
             start = cold_motion(n, patch, on, work.mu, u, w, inv_mass, K)
     goal = work.tolerance * scale
+    loose = max(goal, LOOSE * scale) if n > 3 else goal
     for patient in range(2):
         found, impulses, exerted, push, miss = search(
-            n, patient > 0, work.mu, goal, patch, start, pivot, axes, u, w, inv_mass, K, work
+            n, patient > 0, work.mu, goal, loose, patch, start, pivot, axes, u, w, inv_mass, K, work
         )
         if found:
             for i in range(n):
@@ -67,6 +71,7 @@ def _few(n, friction, axes, u, w, inv_mass, K, work):
         found, p, q, m, miss = solve_pair(first, second, work.mu, work.tolerance * scale, inv_mass, K, work)
         if found:
             _store(1, q, friction, work)
+            work.mode = SLIDE
     if found:
         _store(0, p, friction, work)
     if n == 2:

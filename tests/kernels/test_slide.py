@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from physics.kernels.point import HELD, LOST, OPEN, SLID, answer, block
-from physics.kernels.slide import PIVOT, SLIDE
+from physics.kernels.slide import HOLD, PIVOT, SLIDE
 from physics.kernels.solve import DIRECT
 from tests.kernels.contact_problem import FACE, MASS, Problem
 from tests.kernels.test_direct import FALL, assert_solved, floor
@@ -71,6 +71,34 @@ def test_random_shoves_of_a_face_are_solved_directly():
         assert residual <= 1e-6
         direct += method == DIRECT
     assert direct >= 0.96 * 400
+
+
+def test_a_face_that_tips_is_solved_directly_though_its_targets_differ():
+    """Two or three contacts open, the targets of the four are off those of a rigid motion by about the goal.
+
+    97 % of these were solved directly when this was written. A contact that opened closes again by what the targets
+    differ: where that ended a search, as it did once, it was 75 %.
+    """
+    rng = np.random.default_rng(5)
+    direct = 0
+    for _ in range(400):
+        v = np.add(rng.normal(0, 0.03, 3), (0, FALL, 0))
+        w, target = rng.normal(0, 0.1, 3), np.zeros((4, 3))
+        target[:, 0] = -np.abs(rng.normal(0, 1e-6, 4))
+        problem = Problem(floor(FACE), v, w, 0.5, tolerance=1e-6, target=target)
+        _, (_, _, residual, _, method) = problem.solve(SLIDE)
+        assert residual <= 1e-6
+        direct += method == DIRECT
+    assert direct >= 0.94 * 400
+
+
+def test_two_contacts_that_slid_are_not_asked_to_hold_first():
+    """Where two contacts slide, that is what the next step tries first, whatever held before."""
+    problem = Problem(floor((0, 1)), (0.3, FALL, 0.1), (0, 0, 0), 0.5)
+    p, (_, _, _, _, method) = problem.solve(HOLD)
+    assert method == DIRECT
+    np.testing.assert_allclose(np.hypot(p[:, 1], p[:, 2]), 0.5 * p[:, 0], rtol=1e-12)  # they slide
+    assert problem.one["mode"] == SLIDE
 
 
 @settings(max_examples=300, deadline=None)
