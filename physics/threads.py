@@ -65,7 +65,6 @@ class Team:
     def run(self, calls: Sequence[Work]) -> None:
         """Make the calls, one per thread, of which the calling one is the first."""
         if self.size == 1:
-            self.turns[1, at.NEXT] = 0
             calls[0]()
             return
         if self._pool is None or self._pid != os.getpid():

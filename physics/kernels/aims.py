@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from physics.kernels import quaternion as qt
 from physics.kernels.arms import arm_and_rate, wall_normal, wall_of
+from physics.kernels.columns import column_from, numbers_from, put_column, spread
 from physics.kernels.compiler import inlined, kernel
+from physics.kernels.lanes import WIDTH, chosen, larger, smaller
 from physics.kernels.layout import BLOCK, SPHERE
 
 # Share of a resting contact's gap that a step closes. In the linear iteration of gap and velocity over steps,
@@ -64,8 +66,8 @@ def gainless(target, u):
     one division.
     """
     most, square = u[1] * u[1] + u[2] * u[2], target[1] * target[1] + target[2] * target[2]
-    share = most / square if square > most else 1.0
-    return min(target[0], max(-u[0], 0.0)), share * target[1], share * target[2]
+    share = chosen(square > most, most / square, 1.0)
+    return smaller(target[0], larger(-u[0], 0.0)), share * target[1], share * target[2]
 
 
 @inlined
@@ -86,13 +88,41 @@ def _wandering(k, R, w, tilted, work):
 
 
 @inlined
-def _turning_gain(s, w, a):
-    """s ([ω]x² + [α]x): what a point of the body gains by turning is this times its arm."""
+def _wandering_point(k, R, w, alpha, tilted, work):
+    """Of a body without vertices ω x r, ω x ṙ and α x r at wall k, four times each."""
+    r, rate = _wandering(k, R, w, tilted, work)
+    turn, a, b = qt.cross(w, r), qt.cross(w, rate), qt.cross(alpha, r)
     return (
-        -s * (w[1] * w[1] + w[2] * w[2]), s * (w[0] * w[1] - a[2]), s * (w[0] * w[2] + a[1]),
-        s * (w[0] * w[1] + a[2]), -s * (w[0] * w[0] + w[2] * w[2]), s * (w[1] * w[2] - a[0]),
-        s * (w[0] * w[2] - a[1]), s * (w[1] * w[2] + a[0]), -s * (w[0] * w[0] + w[1] * w[1]),
-    )  # fmt: skip
+        (spread(turn[0]), spread(turn[1]), spread(turn[2])),
+        (spread(a[0]), spread(a[1]), spread(a[2])),
+        (spread(b[0]), spread(b[1]), spread(b[2])),
+    )
+
+
+@inlined
+def _aim_at_wall(first, n, v, w, alpha, half, is_turning, negligible, rate, R, tilted, work):
+    """`aim_rest` for contacts from `first` on, up to four of one wall: the next one after them."""
+    walls, arm = work.walls, work.arm
+    k, last = wall_of(work.slot[first], work), first
+    while last + 1 < min(n, first + WIDTH) and wall_of(work.slot[last + 1], work) == k:
+        last += 1
+    t0 = t1 = t2 = spread(0.0)
+    if is_turning:
+        r = column_from(arm, 0, first, last), column_from(arm, 1, first, last), column_from(arm, 2, first, last)
+        turn = qt.cross(w, r)
+        a, b = qt.cross(w, turn), qt.cross(alpha, r)
+        if work.shape != BLOCK:
+            turn, a, b = _wandering_point(k, R, w, alpha, tilted, work)
+        u = (v[0] + turn[0], v[1] + turn[1], v[2] + turn[2])
+        c = (-half * (a[0] + b[0]), -half * (a[1] + b[1]), -half * (a[2] + b[2]))
+        t0, t1, t2 = gainless(_in_frame(k, c, walls), _in_frame(k, u, walls))
+    if is_closing(first, n, work):
+        t0 = t0 - rate * numbers_from(work.gap, first, last)
+    is_little = larger(abs(t0), larger(abs(t1), abs(t2))) <= negligible
+    put_column(work.target, 0, first, last, chosen(is_little, 0.0, t0))
+    put_column(work.target, 1, first, last, chosen(is_little, 0.0, t1))
+    put_column(work.target, 2, first, last, chosen(is_little, 0.0, t2))
+    return last + 1
 
 
 @inlined
@@ -106,26 +136,10 @@ def aim_rest(n, v, w, alpha, R, h, tilted, work):
     the solve, or would move a contact by less than `UNSEEN` slops in the step, is 0: a body comes to rest to the last
     bit, and contacts that hold are not asked to move apart by next to nothing.
     """
-    walls, shape = work.walls, work.shape
     half = 0.5 * h
-    is_turning = 0.0 < qt.dot(w, w) * h * h <= LARGEST_TURN * LARGEST_TURN and shape != SPHERE
+    is_turning = 0.0 < qt.dot(w, w) * h * h <= LARGEST_TURN * LARGEST_TURN and work.shape != SPHERE
     negligible = max(work.tolerance * work.acceleration * h, UNSEEN * work.slop / h)
-    share, gain = 1.0 if work.is_last else CLOSING_SHARE, _turning_gain(-half, w, alpha)
-    for i in range(n):
-        t0 = t1 = t2 = 0.0
-        if is_turning:
-            r = (work.arm[i, 0], work.arm[i, 1], work.arm[i, 2])
-            k = wall_of(work.slot[i], work)
-            c = qt.matvec(gain, r)
-            if shape != BLOCK:
-                r, rate = _wandering(k, R, w, tilted, work)
-                a, b = qt.cross(w, rate), qt.cross(alpha, r)
-                c = (-half * (a[0] + b[0]), -half * (a[1] + b[1]), -half * (a[2] + b[2]))
-            u = qt.cross(w, r)
-            u = (v[0] + u[0], v[1] + u[1], v[2] + u[2])
-            t0, t1, t2 = gainless(_in_frame(k, c, walls), _in_frame(k, u, walls))
-        if is_closing(i, n, work):
-            t0 -= share * work.gap[i] / h
-        if max(abs(t0), max(abs(t1), abs(t2))) <= negligible:
-            t0 = t1 = t2 = 0.0
-        work.target[i, 0], work.target[i, 1], work.target[i, 2] = t0, t1, t2
+    share = 1.0 if work.is_last else CLOSING_SHARE
+    first = 0
+    while first < n:
+        first = _aim_at_wall(first, n, v, w, alpha, half, is_turning, negligible, share / h, R, tilted, work)

@@ -7,15 +7,46 @@ from physics.kernels.lanes import Lanes
 
 
 @inlined
+def spread(x):
+    """One number four times."""
+    return Lanes(x, x, x, x)
+
+
+@inlined
+def numbers_from(values, first, last):
+    """A number of each contact from `first` to `last`."""
+    return Lanes(values[first], values[min(first + 1, last)], values[min(first + 2, last)], values[last])
+
+
+@inlined
+def column_from(table, k, first, last):
+    """Number k of each contact from `first` to `last`, a row of numbers each."""
+    second, third = min(first + 1, last), min(first + 2, last)
+    return Lanes(table[first, k], table[second, k], table[third, k], table[last, k])
+
+
+@inlined
+def put_column(table, k, first, last, x):
+    """Write what `column_from` reads."""
+    table[first, k] = x[0]
+    if last > first:
+        table[first + 1, k] = x[1]
+    if last > first + 1:
+        table[first + 2, k] = x[2]
+    if last > first + 2:
+        table[first + 3, k] = x[3]
+
+
+@inlined
 def numbers(values, n):
-    """A number of each contact."""
-    return Lanes(values[0], values[min(1, n - 1)], values[min(2, n - 1)], values[n - 1])
+    """A number of each of the n contacts."""
+    return numbers_from(values, 0, n - 1)
 
 
 @inlined
 def column(table, k, n):
-    """Number k of each contact, a row of numbers each."""
-    return Lanes(table[0, k], table[min(1, n - 1), k], table[min(2, n - 1), k], table[n - 1, k])
+    """Number k of each of the n contacts, a row of numbers each."""
+    return column_from(table, k, 0, n - 1)
 
 
 @inlined

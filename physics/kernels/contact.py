@@ -7,6 +7,7 @@ from physics.kernels import quaternion as qt
 from physics.kernels.arms import center_arm, feature_of, geometric_center, wall_normal, wall_of
 from physics.kernels.body import angular_velocity
 from physics.kernels.compiler import inlined, kernel
+from physics.kernels.lanes import WIDTH, put_row
 from physics.kernels.laws import STIFFNESS, number_of
 from physics.kernels.layout import BLOCK, OFFSET, VERTEX_COUNT
 
@@ -98,12 +99,16 @@ def gather(x, R, v, w, h, tilted, work):
             mb = qt.transposed_matvec(R, m)
             if tilted is not None:
                 vn += qt.dot(m, center_arm(R, work))
-            em = (dims[0] * mb[0], dims[1] * mb[1], dims[2] * mb[2])
+            lower, upper = geo.vertex_heights(e)
+            slower, faster = geo.vertex_heights((dims[0] * mb[0], dims[1] * mb[1], dims[2] * mb[2]))
+            put_row(work.vertices, 0, 0, d + lower)
+            put_row(work.vertices, 0, WIDTH, d + upper)
+            put_row(work.vertices, 1, 0, vn + slower)
+            put_row(work.vertices, 1, WIDTH, vn + faster)
             for vertex in range(VERTEX_COUNT):
-                gap = d + geo.vertex_height(e, vertex)
+                gap, speed = work.vertices[0, vertex], work.vertices[1, vertex]
                 if gap > near:
                     continue
-                speed = vn + geo.vertex_height(em, vertex)
                 if _admit(gap, speed, slop, margin, reach, acceleration, h, work.is_last):
                     count = _record(count, k, vertex, features, gap, speed, work)
                     depth = max(depth, -gap)

@@ -12,6 +12,7 @@ import math
 
 from physics.kernels import quaternion as qt
 from physics.kernels.compiler import inlined
+from physics.kernels.lanes import Lanes
 from physics.kernels.layout import BLOCK, SPHERE
 
 
@@ -41,6 +42,13 @@ def vertex_height(e, k):
     h += e[1] if k & 2 else -e[1]
     h += e[2] if k & 4 else -e[2]
     return h
+
+
+@inlined
+def vertex_heights(e):
+    """`vertex_height` of all eight: those of the vertices 0 to 3, and of 4 to 7."""
+    h = Lanes(-1.0, 1.0, -1.0, 1.0) * e[0] + Lanes(-1.0, -1.0, 1.0, 1.0) * e[1]
+    return h - e[2], h + e[2]
 
 
 @inlined

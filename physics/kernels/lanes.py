@@ -44,6 +44,11 @@ def _each(of: Callable, *values) -> Lanes:
     return Lanes(*(of(*lane) for lane in zip(*spread, strict=True)))
 
 
+def _of_each_or_one(of: Callable, *values):
+    """`_each`, or a function of numbers where there are no lanes among them."""
+    return _each(of, *values) if any(isinstance(one, Lanes) for one in values) else of(*values)
+
+
 def _divided(x, y) -> float:
     """A quotient as kernels have it: infinite or no number where Python raises an exception."""
     with np.errstate(all="ignore"):
@@ -82,18 +87,18 @@ def root(x):
 
 
 def larger(x, y):
-    """The larger of two, each on its own: y where it is larger, as `max(x, y)` has it."""
-    return _each(max, x, y)
+    """The larger of two, each on its own: y where it is larger, as `max(x, y)` has it. Of two numbers, a number."""
+    return _of_each_or_one(max, x, y)
 
 
 def smaller(x, y):
     """The smaller of two, each on its own: `min(x, y)`."""
-    return _each(min, x, y)
+    return _of_each_or_one(min, x, y)
 
 
 def chosen(where, x, y):
-    """x where something is true, else y."""
-    return _each(lambda true, one, other: one if true else other, where, x, y)
+    """x where something is true, else y; of a truth and two numbers, one of them."""
+    return _of_each_or_one(lambda true, one, other: one if true else other, where, x, y)
 
 
 def total(x):

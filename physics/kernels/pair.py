@@ -49,7 +49,7 @@ def _transposed(W):
     return W[0], W[3], W[6], W[1], W[4], W[7], W[2], W[5], W[8]
 
 
-@inlined
+@kernel
 def _opened(Wi, Wji, bi, bj, mu, goal, x, y):
     """Contact i alone, contact j open: (found, p_i, p_j, residual, direction of i, and of j, to go on from)."""
     zero = (0.0, 0.0, 0.0)

@@ -60,6 +60,11 @@ ANGLE_LIMIT = 0.06
 # of s and d change it by 1e-4 θ⁷ = 2e-19. 1/N is taken by its series: the first neglected term is θ⁸ = 2e-17.
 SMALL_SQUARE = 6.4e-5
 
+# Below this angle² θ² [rad²] those of second order are left out too, but for those of C and D, and all after x² in
+# `_half_angle`. Those of s and d are less than θ⁴/30 of e, which is less than θ/2: 0.02 θ⁵. Those of sn and of N change
+# m(h) by less than θ⁵, what is left out there x³ < θ⁶/64. Together 4e-17 at most of 1.2 million random bodies.
+TINY_SQUARE = 2.5e-6
+
 # Below this |P| h² + |Q| h² the last terms of the series of sn, cn, dn are left out: they change m(h) by less
 # than 0.037 (4e-4)⁴ = 1e-15 of its size, and the attitude, where m(h) enters times θ/4, by less than 1e-17.
 SHORT_SERIES = 4.0e-4
@@ -111,16 +116,19 @@ attitude_series = kernel(write_attitude_series)
 
 
 @inlined
-def _half_angle(x):
+def _half_angle(x, square):
     """(e0, 1/e0) from x = |e0 e|², that is e0² = (1 + √(1 - 4x)) / 2, by their series.
 
     The roots would stand one after the other in the longest chain of the step. 4x = sin² of an angle up to
     `ANGLE_LIMIT`, so x < 9.0e-4, and the first neglected terms, 29 x⁶ of e0 and 51 x⁶ of 1/e0, are under 3e-17.
     """
     x2 = x * x
-    x4 = x2 * x2
-    e0 = (1.0 - 0.5 * x) - (x2 * (0.625 + 1.3125 * x) + x4 * ((429.0 / 128.0) + (2431.0 / 256.0) * x))
-    inv_e0 = (1.0 + 0.5 * x) + (x2 * (0.875 + 2.0625 * x) + x4 * ((715.0 / 128.0) + (4199.0 / 256.0) * x))
+    if square > TINY_SQUARE:
+        x4 = x2 * x2
+        e0 = (1.0 - 0.5 * x) - (x2 * (0.625 + 1.3125 * x) + x4 * ((429.0 / 128.0) + (2431.0 / 256.0) * x))
+        inv_e0 = (1.0 + 0.5 * x) + (x2 * (0.875 + 2.0625 * x) + x4 * ((715.0 / 128.0) + (4199.0 / 256.0) * x))
+    else:
+        e0, inv_e0 = (1.0 - 0.5 * x) - 0.625 * x2, (1.0 + 0.5 * x) + 0.875 * x2
     return e0, inv_e0
 
 
@@ -135,33 +143,36 @@ def _part(q, m, J, c, mm, energy2, square, h):
     # Series of sn, cn and dn with their modulus multiplied out: σ = sn/√P, C = cn, D = dn, and (σ/h)².
     p = a1 * (a3 * (m2 * m2) - a2 * (m3 * m3)) * h2
     r = a3 * (a1 * (m2 * m2) - a2 * (m1 * m1)) * h2
-    t, u, p2, r2 = p + r, p * r, p * p, r * r
-    t2 = t * t
-    sn = (1.0 - t * (1.0 / 6.0)) + (t2 + 12.0 * u) * (1.0 / 120.0)
+    t, x = p + r, (a1 * a3) * (m2 * m2) * h2
+    sn, sn2 = 1.0 - t * (1.0 / 6.0), 1.0 - t * (1.0 / 3.0)
     C = (1.0 - 0.5 * p) + p * ((p + 4.0 * r) * (1.0 / 24.0))
     D = (1.0 - 0.5 * r) + r * ((r + 4.0 * p) * (1.0 / 24.0))
-    sn2 = (1.0 - t * (1.0 / 3.0)) + (2.0 * t2 + 9.0 * u) * (1.0 / 45.0)
     # s and d in the variables y = h² |m|², z = h² 2E.
     y, z = h2 * mm, h2 * energy2
-    s = z * (c[1] + z * c[4]) + y * (c[0] + z * c[3] + y * c[2])
-    d = z * (c[10] + z * c[13]) + y * (c[9] + z * c[12] + y * c[11])
-    x = (a1 * a3) * (m2 * m2) * h2
+    s, d = z * c[1] + y * c[0], z * c[10] + y * c[9]
+    if square > TINY_SQUARE:
+        u, t2 = p * r, t * t
+        sn += (t2 + 12.0 * u) * (1.0 / 120.0)
+        sn2 += (2.0 * t2 + 9.0 * u) * (1.0 / 45.0)
+        s += z * (z * c[4] + y * c[3]) + y * (y * c[2])
+        d += z * (z * c[13] + y * c[12]) + y * (y * c[11])
+        if square > SMALL_SQUARE:
+            p2, r2, yy, zz = p * p, r * r, y * y, z * z
+            sn -= t * (t2 + 132.0 * u) * (1.0 / 5040.0)
+            C -= p * ((p2 + 44.0 * u + 16.0 * r2) * (1.0 / 720.0))
+            D -= r * ((r2 + 44.0 * u + 16.0 * p2) * (1.0 / 720.0))
+            if abs(p) + abs(r) > SHORT_SERIES:
+                sn += (t2 * t2 + 1224.0 * t2 * u + 3024.0 * u * u) * (1.0 / 362880.0)
+                C += p * (p * p2 + 408.0 * p * u + 912.0 * r * u + 64.0 * r * r2) * (1.0 / 40320.0)
+                D += r * (r * r2 + 408.0 * r * u + 912.0 * p * u + 64.0 * p * p2) * (1.0 / 40320.0)
+                sn2 += (2.0 * t2 * t2 + 243.0 * t2 * u + 378.0 * u * u) * (1.0 / 14175.0)
+                sn2 -= t * (t2 + 27.0 * u) * (1.0 / 315.0)
+            s += zz * (z * c[8] + y * c[7]) + yy * (z * c[6] + y * c[5])
+            d += zz * (z * c[17] + y * c[16]) + yy * (z * c[15] + y * c[14])
+    x *= sn2
     if square > SMALL_SQUARE:
-        sn -= t * (t2 + 132.0 * u) * (1.0 / 5040.0)
-        C -= p * ((p2 + 44.0 * u + 16.0 * r2) * (1.0 / 720.0))
-        D -= r * ((r2 + 44.0 * u + 16.0 * p2) * (1.0 / 720.0))
-        if abs(p) + abs(r) > SHORT_SERIES:
-            sn += (t2 * t2 + 1224.0 * t2 * u + 3024.0 * u * u) * (1.0 / 362880.0)
-            C += p * (p * p2 + 408.0 * p * u + 912.0 * r * u + 64.0 * r * r2) * (1.0 / 40320.0)
-            D += r * (r * r2 + 408.0 * r * u + 912.0 * p * u + 64.0 * p * p2) * (1.0 / 40320.0)
-            sn2 += (2.0 * t2 * t2 + 243.0 * t2 * u + 378.0 * u * u) * (1.0 / 14175.0)
-            sn2 -= t * (t2 + 27.0 * u) * (1.0 / 315.0)
-        inv_N = 1.0 / (1.0 - x * sn2)
-        yy, zz = y * y, z * z
-        s += zz * (z * c[8] + y * c[7]) + yy * (z * c[6] + y * c[5])
-        d += zz * (z * c[17] + y * c[16]) + yy * (z * c[15] + y * c[14])
+        inv_N = 1.0 / (1.0 - x)
     else:
-        x *= sn2
         inv_N = 1.0 + x * (1.0 + x * (1.0 + x))
     sigma = h * sn
     g1, g2, g3 = sigma * (a1 * (m2 * m3)), sigma * (a2 * (m1 * m3)), sigma * (a3 * (m1 * m2))
@@ -174,7 +185,7 @@ def _part(q, m, J, c, mm, energy2, square, h):
     y1 = quarter * (s1 * J1 + d) * (m1 + n1)
     y2 = quarter * (s1 * J2 + d) * (m2 + n2)
     y3 = quarter * (s1 * J3 + d) * (m3 + n3)
-    e0, inv_e0 = _half_angle(y1 * y1 + y2 * y2 + y3 * y3)
+    e0, inv_e0 = _half_angle(y1 * y1 + y2 * y2 + y3 * y3, square)
     q = qt.renormalise(q)  # of the old q, which is known early; e is a unit quaternion to rounding
     return qt.multiply(q, (e0, y1 * inv_e0, y2 * inv_e0, y3 * inv_e0)), (n1, n2, n3)
 

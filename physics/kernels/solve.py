@@ -179,6 +179,24 @@ def _iterate(n, friction, smooth, goal, work):
 
 
 @kernel
+def _by_sweeps(n, friction, smooth, pivots, v, L, R, work):
+    """What `solve_contacts` returns, by sweeps and what follows: apart, since most problems are not left for it."""
+    width = 1 if friction is None else 3
+    scale = _assemble(n, width, R, v, L, work)
+    goal = max(min(work.tolerance * scale, work.still), ROUNDING * scale)
+    sweeps, residual = _iterate(n, friction, smooth, goal, work)
+    method = SWEEPS
+    if pivots is not None and not residual <= max(goal, PIVOT_ABOVE * scale):
+        residual = _pivot(n, friction, smooth, residual, work)
+        method = PIVOTING
+    unstretch(n, work)
+    v, L = _apply(n, width, v, L, work)
+    if scale > 0.0:
+        residual /= scale
+    return v, L, residual, sweeps, method
+
+
+@kernel
 def solve_contacts(n, friction, smooth, pivots, v, L, R, work):
     """Contact impulses that bring the contacts of `work` to their target velocities as far as they can.
 
@@ -210,19 +228,7 @@ def solve_contacts(n, friction, smooth, pivots, v, L, R, work):
     method : int
         DIRECT, SWEEPS or PIVOTING.
     """
-    width = 1 if friction is None else 3
     found, v1, L1, residual = _directly(n, friction, R, v, L, work)
     if found:
         return v1, L1, residual, 0, DIRECT
-    scale = _assemble(n, width, R, v, L, work)
-    goal = max(min(work.tolerance * scale, work.still), ROUNDING * scale)
-    sweeps, residual = _iterate(n, friction, smooth, goal, work)
-    method = SWEEPS
-    if pivots is not None and not residual <= max(goal, PIVOT_ABOVE * scale):
-        residual = _pivot(n, friction, smooth, residual, work)
-        method = PIVOTING
-    unstretch(n, work)
-    v, L = _apply(n, width, v, L, work)
-    if scale > 0.0:
-        residual /= scale
-    return v, L, residual, sweeps, method
+    return _by_sweeps(n, friction, smooth, pivots, v, L, R, work)

@@ -201,9 +201,12 @@ def touch(n, y, h, friction, smooth, gyroscopic, tilted, pivots, memory, report,
         R = qt.to_matrix(principal_attitude(q, work, tilted))
     w, alpha = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
     if L[0] != 0.0 or L[1] != 0.0 or L[2] != 0.0:
-        w = turning(R, L, work.J)
+        m, J = qt.transposed_matvec(R, L), work.J
+        wb = (J[0] * m[0], J[1] * m[1], J[2] * m[2])
+        w = qt.matvec(R, wb)
         if gyroscopic is not None:
-            alpha = turning(R, qt.cross(L, w), work.J)
+            g = qt.cross(m, wb)
+            alpha = qt.matvec(R, (J[0] * g[0], J[1] * g[1], J[2] * g[2]))
     aim_rest(n, v, w, alpha, middle, h, tilted, work)
     aim_springs(n, x, middle, v, w, alpha, before, after, tilted, work)
     v0, opposes_mean = v, False

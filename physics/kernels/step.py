@@ -138,23 +138,19 @@ def crossing(low_gap, high_gap, width, bend):
     return 2.0 * low_gap / (math.sqrt(max(B * B - 4.0 * bend * low_gap, 0.0)) - B)
 
 
-@inlined
-def to_next_impact(n, y, h, friction, smooth, gyroscopic, tilted, pivots, scheme, memory, report, work):
-    """Advance by h, or to the first impact within h: (state, time advanced).
+@kernel
+def shortened_stage(
+    n, y, end, h, friction, smooth, gyroscopic, tilted, pivots, scheme, memory, report, work
+):  # fmt: skip
+    """A stage over h that ends at `end`, where a feature has passed through a wall, up to that: (state, time advanced).
 
-    An end state in which a feature outside the contact set has passed through a wall is taken back and the stage
-    shortened until that feature is within half a slop of it: `crossing` of its gap. Another one that is through the
-    wall by then is sought instead. The gap of one feature is smooth; the smallest of all has kinks, before which a
-    parabola would creep along a wall that nothing hits.
+    It is shortened until that feature is within half a slop of the wall: `crossing` of its gap. Another one that is
+    through the wall by then is sought instead. The gap of one feature is smooth; the smallest of all has kinks, before
+    which a parabola would creep along a wall that nothing hits.
     """
     t, low, low_gap, high, high_gap, bend, slot = h, 0.0, 0.0, h, 0.0, 0.0, -1
-    end = low_end = y
-    for trial in range(IMPACT_TRIALS + 1):
-        end = advance(n, y, t, friction, smooth, gyroscopic, tilted, pivots, scheme, memory, report, work)
-        if has_same_pose(end, y) or work.is_last or trial == IMPACT_TRIALS:
-            break
-        if trial == 0 and not has_passed(end[0], to_matrix(end[1]), tilted, work):
-            break
+    low_end = y
+    for _ in range(IMPACT_TRIALS):
         gap, nearest = outside_gap(end, tilted, work)
         if nearest != slot and gap < -0.5 * work.slop:
             slot, high, high_gap = nearest, t, gap
@@ -172,7 +168,25 @@ def to_next_impact(n, y, h, friction, smooth, gyroscopic, tilted, pivots, scheme
             else:
                 high, high_gap = t, gap
         t = low + crossing(low_gap, high_gap, high - low, bend)
+        end = advance(n, y, t, friction, smooth, gyroscopic, tilted, pivots, scheme, memory, report, work)
+        if has_same_pose(end, y):
+            break
     return end, t
+
+
+@inlined
+def to_next_impact(n, y, h, friction, smooth, gyroscopic, tilted, pivots, scheme, memory, report, work):
+    """Advance by h, or to the first impact within h: (state, time advanced).
+
+    An end state in which a feature outside the contact set has passed through a wall is taken back, and the stage
+    shortened (`shortened_stage`: apart, so that what is hardly ever needed takes no part in what always is).
+    """
+    end = advance(n, y, h, friction, smooth, gyroscopic, tilted, pivots, scheme, memory, report, work)
+    if work.is_last or has_same_pose(end, y) or not has_passed(end[0], to_matrix(end[1]), tilted, work):
+        return end, h
+    return shortened_stage(
+        n, y, end, h, friction, smooth, gyroscopic, tilted, pivots, scheme, memory, report, work
+    )  # fmt: skip
 
 
 @inlined

@@ -43,7 +43,9 @@ def make_taken(threads: int, worlds: int) -> list[np.ndarray]:
 
 @inlined
 def begin(turns, taken):
-    """Nothing taken yet; returns what comes before the first world."""
+    """Nothing taken yet; returns what comes before the first world. A thread that is alone deals for itself."""
+    if turns.shape[0] == 2:
+        turns[1, NEXT] = 0
     taken[TAKEN] = taken[END] = 0
     taken[RANGE] = taken[OWN]
     return -1

@@ -13,7 +13,7 @@ import numpy as np
 
 from physics.kernels import laws as contact_laws
 from physics.kernels.fields.terms import Term, members
-from physics.kernels.layout import WALL_SIZE
+from physics.kernels.layout import VERTEX_COUNT, WALL_SIZE
 from physics.kernels.pyramid import normal_sizes, pyramid_sizes
 from physics.kernels.rotation import SERIES_SIZE
 from physics.kernels.slip import FEW
@@ -77,6 +77,7 @@ def workspace_dtype(
     ]
     contacts = [
         ("mask", i, (max(wall_count, 1),)),  # bit k: feature k of the body is in the contact set of this wall
+        ("vertices", f, (2, VERTEX_COUNT)),  # gap [m] and normal velocity [m/s] of each vertex at one wall
         ("slot", i, (n,)),  # wall * features + feature, the stable name of a contact
         ("gap", f, (n,)),  # [m], negative when penetrating
         *[("due", f, (n,))] * (contact_laws.STIFFNESS in laws),  # gap at the end of a stage [m] (`compliance`)

@@ -94,6 +94,40 @@ def test_a_sum_is_taken_in_one_order():
 
 
 @kernel
+def compute_one(a, b, s, out):
+    """What is for numbers as well."""
+    out[0], out[1], out[2] = larger(a, b), smaller(a, b), chosen(a <= b, s, a)
+
+
+@given(st.floats(), st.floats(), st.floats())
+@example(NAN, 1.0, 2.0)
+@example(1.0, NAN, 2.0)
+@example(0.0, -0.0, 1.0)
+def test_of_numbers_they_are_what_they_are_of_lanes(a, b, s):
+    found, meant = np.zeros(3), np.zeros(3)
+    compute_one(a, b, s, found)
+    compute_one.py_func(a, b, s, meant)
+    assert np.array_equal(found, meant, equal_nan=True)
+    assert np.array_equal(np.signbit(found), np.signbit(meant)) or np.isnan(found).any()
+
+
+@kernel
+def copy_columns(table, first, last, out):
+    """Columns of some contacts, doubled, to another table."""
+    for k in range(table.shape[1]):
+        columns.put_column(out, k, first, last, 2.0 * columns.column_from(table, k, first, last))
+
+
+@pytest.mark.parametrize(("first", "last"), [(0, 0), (2, 2), (1, 2), (0, 2), (3, 5), (1, 4), (4, 7)])
+def test_columns_of_some_contacts_are_read_and_written(first, last):
+    """And of no others."""
+    table, out, expected = np.arange(24.0).reshape(8, 3), np.full((8, 3), -1.0), np.full((8, 3), -1.0)
+    copy_columns(table, first, last, out)
+    expected[first : last + 1] = 2.0 * table[first : last + 1]
+    assert np.array_equal(out, expected)
+
+
+@kernel
 def put(values, table, thirds, n, out):
     """What `columns` makes of n contacts: six rows of four."""
     for row, z in enumerate(

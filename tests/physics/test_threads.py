@@ -17,6 +17,7 @@ from physics.kernels.atomic import add, pause
 from physics.kernels.compiler import kernel
 from physics.kernels.turns import FIRST, TAKEN
 from physics.machine_code import bound
+from physics.stepper import kernel_calls
 from physics.threads import Team, listed
 
 
@@ -39,6 +40,15 @@ def test_each_world_is_taken_once(scene, worlds, count):
     for _ in range(3):
         world.step()
         assert sorted(np.concatenate(taken_by(world.team))) == list(range(worlds))
+
+
+def test_a_thread_that_is_alone_deals_for_itself():
+    """So that calls that it makes one after another each find all worlds."""
+    world, twin = (physics.World(scenes.shove(), worlds=3, dt=0.01) for _ in range(2))
+    call = kernel_calls(world, world.no_wrench(), 1, 0.01)[0]
+    call.then(call)()
+    twin.step(steps=2)
+    assert np.array_equal(world.state, twin.state)
 
 
 def test_events_are_taken_in_turn_as_well():

@@ -85,6 +85,8 @@ def _result(key, args) -> types.Type | None:
     """Type of the result of an operation, or None where it is none of ours."""
     if key is lanes.Lanes:
         return LANES if len(args) == lanes.WIDTH and _are_numbers(args) else None
+    if key is lanes.chosen and args[0] is types.boolean:
+        return types.float64 if _are_numbers(args[1:]) else None
     if key is lanes.chosen:
         return LANES if args[0] is MARKS and (_are_lanes(args[1:]) or _are_numbers(args[1:])) else None
     if key is lanes.first_of or key is operator.invert:
@@ -94,7 +96,7 @@ def _result(key, args) -> types.Type | None:
     if key in _ROWS:
         result = LANES if key is lanes.row else types.none
         return result if _is_place_of_row(args[:3]) and _are_lanes((LANES, *args[3:])) else None
-    if key is lanes.root and _are_numbers(args):
+    if (key is lanes.root or key in _OF_TWO) and _are_numbers(args):
         return types.float64
     if key is lanes.totals:
         return LANES if len(args) == lanes.WIDTH and _are_lanes((LANES, *args)) else None
@@ -159,12 +161,14 @@ def _compare(order, context, builder, sig, args):
 
 
 def _choose(context, builder, sig, args):
+    if sig.args[0] is types.boolean:
+        return builder.select(context.cast(builder, args[0], types.boolean, types.boolean), *args[1:])
     return builder.select(args[0], _spread(builder, args[1]), _spread(builder, args[2]))
 
 
 def _one_of_two(order, context, builder, sig, args):
     """`larger` and `smaller`."""
-    x, y = (_spread(builder, each) for each in args)
+    x, y = (_spread(builder, each) for each in args) if LANES in sig.args else args
     return builder.select(builder.fcmp_ordered(order, y, x), y, x)
 
 

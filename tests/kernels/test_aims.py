@@ -1,0 +1,84 @@
+"""What is asked of resting contacts: the formulas of `aims`, one contact after the other in plain NumPy."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from physics.kernels.aims import CLOSING_SHARE, UNSEEN, aim_rest
+from physics.kernels.compiler import kernel
+from physics.kernels.workspace import make_workspace
+from tests.kernels.contact_problem import FLOOR, SIDE
+
+EPS = np.finfo(float).eps
+H, SLOP = 0.01, 1e-4
+EVEN = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
+
+
+@kernel
+def _aim(n, v, w, alpha, R, h, tilted, scratch):
+    aim_rest(n, v, w, alpha, R, h, tilted, scratch[0])
+
+
+def posed(slots, gaps, seed, tolerance=1e-9):
+    """A workspace with block contacts at these slots and gaps, arms at random."""
+    work = make_workspace(np.array([FLOOR, SIDE]), 8, tolerance=tolerance)
+    one, n = work[0], len(slots)
+    one["slot"][:n], one["gap"][:n], one["slop"], one["acceleration"] = slots, gaps, SLOP, 10.0
+    one["arm"][:n] = np.random.default_rng(seed).uniform(-2, 2, (n, 3))
+    return work
+
+
+def expected(work, n, v, w, alpha):
+    """Targets by the formulas of `aim_rest` and `gainless`, and the scale of their rounding."""
+    one, targets = work[0], np.zeros((n, 3))
+    for i in range(n):
+        wall, r = one["slot"][i] // 8, one["arm"][i]
+        axes = one["walls"][wall][:9].reshape(3, 3)
+        gained = axes @ (-H / 2 * (np.cross(w, np.cross(w, r)) + np.cross(alpha, r)))
+        u = axes @ (v + np.cross(w, r))
+        most, square = u[1:] @ u[1:], gained[1:] @ gained[1:]
+        along = gained[1:] * (most / square if square > most else 1.0)
+        targets[i] = min(gained[0], max(-u[0], 0.0)), *along
+        same_wall = one["slot"][:n] // 8 == wall
+        if (one["gap"][:n][same_wall] > SLOP).any():
+            targets[i, 0] -= CLOSING_SHARE * one["gap"][i] / H
+        if np.abs(targets[i]).max() <= max(one["tolerance"] * 10.0 * H, UNSEEN * SLOP / H):
+            targets[i] = 0.0
+    return targets
+
+
+ONE_WALL = [[3], [1, 2], [0, 1, 5], [0, 1, 4, 5], [0, 1, 2, 4, 5], list(range(8))]
+TWO_WALLS = [[6, 9], [0, 1, 4, 8, 9], [*range(5), *range(9, 15)]]
+
+
+@pytest.mark.parametrize("slots", ONE_WALL + TWO_WALLS, ids=len)
+@pytest.mark.parametrize("above", [0.0, 3 * SLOP])
+def test_each_contact_is_asked_for_what_the_formula_says(slots, above):
+    """Contacts of a wall are taken four at a time; which four must not matter, nor where one is still above it."""
+    n = len(slots)
+    gaps = np.random.default_rng(n).uniform(-SLOP, SLOP, n)
+    gaps[n // 2] += above
+    work = posed(slots, gaps, seed=n)
+    v, w, alpha = (0.1, -0.2, 0.3), (0.7, -1.1, 0.4), (2.0, 0.5, -1.0)
+    _aim(n, v, w, alpha, EVEN, H, None, work)
+    # Sums of a dozen products of size at most |v| + |ω| r or h/2 (|ω|² + |α|) r: 5; 1/h times a gap: 0.03.
+    np.testing.assert_allclose(work[0]["target"][:n], expected(work, n, v, w, alpha), rtol=0, atol=60 * EPS)
+    assert not work[0]["target"][n:].any()
+
+
+def test_a_body_at_rest_is_asked_for_nothing():
+    work = posed([0, 1, 4, 5], np.full(4, -SLOP / 2), seed=0)
+    work["target"] = 7.0
+    none = (0.0, 0.0, 0.0)
+    _aim(4, none, none, none, EVEN, H, None, work)
+    assert not work[0]["target"][:4].any()
+    assert (work[0]["target"][4:] == 7.0).all()
+
+
+def test_what_is_next_to_nothing_is_not_asked_for():
+    """A turn that gains a contact less than `UNSEEN` slops in the step."""
+    work = posed([0, 1, 4, 5], np.zeros(4), seed=1)
+    slow = (0.0, 1e-2 * UNSEEN * SLOP / H**2, 0.0)
+    _aim(4, (0.0, -1.0, 0.0), slow, (0.0, 0.0, 0.0), EVEN, H, None, work)
+    assert not work[0]["target"].any()
