@@ -131,26 +131,32 @@ def _record(count, wall, feature, features, gap, speed, work):
 
 
 @inlined
-def has_passed(x, R, tilted, work):
-    """Whether a feature that is not in the contact set (`work.mask`) is more than half a slop behind a wall."""
+def what_is_behind(x, R, tilted, work):
+    """What is behind walls: (whether a feature outside the contact set, by more than half a slop; anything, by a slop).
+
+    Once a feature outside the set is, the other walls are not looked at: both are true then.
+    """
     walls, shape, least = work.walls, work.shape, -0.5 * work.slop
     dims = (work.dims[0], work.dims[1], work.dims[2])
-    center = geometric_center(x, R, work, tilted)
+    center, is_deep = geometric_center(x, R, work, tilted), False
     for k in range(walls.shape[0]):
         n = wall_normal(walls, k)
         d = qt.dot(n, center) - walls[k, OFFSET]
         if d > work.radius:
             continue
         e, mask = geo.scaled_normal(shape, dims, R, n), work.mask[k]
-        if d - geo.support(shape, dims, e) >= least:
+        gap = d - geo.support(shape, dims, e)
+        if gap >= least:
             continue
         if mask == 0:
-            return True
+            return True, True
         if shape == BLOCK:
             for vertex in range(VERTEX_COUNT):
                 if not mask & (1 << vertex) and d + geo.vertex_height(e, vertex) < least:
-                    return True
-    return False
+                    return True, True
+        if gap < -work.slop:
+            is_deep = True
+    return False, is_deep
 
 
 @kernel

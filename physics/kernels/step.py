@@ -27,7 +27,7 @@ from physics.kernels.body import angular_velocity, bind_body, is_finite, read_st
 from physics.kernels.clearance import clear_substeps
 from physics.kernels.compiler import inlined, kernel
 from physics.kernels.compliance import lift_to_due, stiffness
-from physics.kernels.contact import gap_of, gap_rate, gather, has_passed, nearest_outside_set, push_out
+from physics.kernels.contact import gap_of, gap_rate, gather, nearest_outside_set, push_out, what_is_behind
 from physics.kernels.fields.loads import (
     bind_fields,
     hold_contact_loads,
@@ -176,17 +176,21 @@ def shortened_stage(
 
 @inlined
 def to_next_impact(n, y, h, friction, smooth, gyroscopic, tilted, pivots, scheme, memory, report, work):
-    """Advance by h, or to the first impact within h: (state, time advanced).
+    """Advance by h, or to the first impact within h: (state, time advanced, whether it may be deep in a wall).
 
     An end state in which a feature outside the contact set has passed through a wall is taken back, and the stage
     shortened (`shortened_stage`: apart, so that what is hardly ever needed takes no part in what always is).
     """
     end = advance(n, y, h, friction, smooth, gyroscopic, tilted, pivots, scheme, memory, report, work)
-    if work.is_last or has_same_pose(end, y) or not has_passed(end[0], to_matrix(end[1]), tilted, work):
-        return end, h
-    return shortened_stage(
+    if has_same_pose(end, y):
+        return end, h, False
+    has_passed, is_deep = what_is_behind(end[0], to_matrix(end[1]), tilted, work)
+    if work.is_last or not has_passed:
+        return end, h, is_deep
+    end, t = shortened_stage(
         n, y, end, h, friction, smooth, gyroscopic, tilted, pivots, scheme, memory, report, work
     )  # fmt: skip
+    return end, t, True
 
 
 @inlined
@@ -208,10 +212,12 @@ def substep(y, h, friction, smooth, gyroscopic, tilted, pivots, scheme, memory, 
             report[world, at.PENETRATION] = max(report[world, at.PENETRATION], depth)
             if not work.is_last and not stiffness(work) > 0.0:
                 y = impact(n, y, left, friction, smooth, tilted, pivots, report, work)
-        end, t = to_next_impact(n, y, left, friction, smooth, gyroscopic, tilted, pivots, scheme, memory, report, work)
+        end, t, is_deep = to_next_impact(
+            n, y, left, friction, smooth, gyroscopic, tilted, pivots, scheme, memory, report, work
+        )
         left -= t
         pass_time(t, work)
-        if n > 0 and not stiffness(work) > 0.0 and not has_same_pose(end, y):
+        if is_deep and n > 0 and not stiffness(work) > 0.0:
             end = kept_out(end, tilted, work)
         y = lift_to_due(n, end, tilted, work)
         if not left > 0.0:
