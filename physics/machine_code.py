@@ -9,7 +9,7 @@ import sys
 import threading
 from collections.abc import Callable
 from contextlib import contextmanager
-from functools import cache, cached_property
+from functools import cache, cached_property, partial
 from itertools import accumulate
 
 import numba
@@ -34,6 +34,8 @@ class Work:
     ----------
     jobs, count : int
         Address of the table of these calls, and their number: what `physics.kernels.jobs` is told.
+    perform : callable
+        Makes the calls; whether one raised something, which `raise_again` raises.
     """
 
     def __init__(self, calls: list[tuple[int, tuple]]):
@@ -43,11 +45,11 @@ class Work:
         self._table[:, ENTRY_OF] = [entry for entry, _ in calls]
         self._table[:, ARGUMENTS] = [words.ctypes.data for words in self._words]
         self.jobs, self.count = self._table.ctypes.data, len(calls)
-        self._perform = _performing()
+        self.perform = partial(_performing(), self.jobs, self.count)
 
     def __call__(self) -> None:
         """Make the calls."""
-        if self._perform(self.jobs, self.count):
+        if self.perform():
             self.raise_again()
 
     def raise_again(self) -> None:

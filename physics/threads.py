@@ -65,7 +65,8 @@ class Team:
     def run(self, calls: Sequence[Work]) -> None:
         """Make the calls, one per thread, of which the calling one is the first."""
         if self.size == 1:
-            calls[0]()
+            if calls[0].perform():
+                calls[0].raise_again()
             return
         if self._pool is None or self._pid != os.getpid():
             self._start()

@@ -41,7 +41,7 @@ from physics.kernels.laws import bind_laws
 from physics.kernels.quaternion import to_matrix
 from physics.kernels.restraint import kinetic_energy
 from physics.kernels.sleep import falls_asleep, laid_down, sleeps_on
-from physics.kernels.stages import impact, store_warm_start, touch
+from physics.kernels.stages import CONTACT_COUNT, impact, store_warm_start, touch
 from physics.kernels.turns import begin, next_world
 
 # Trials of one time of impact: a secant, then parabolas through the last three. Three are usual.
@@ -52,9 +52,15 @@ FREE_LIFT = 10.0
 
 
 @inlined
+def has_touched(memory, i):
+    """Whether a body had contacts in its last stage: then its bounding sphere touches a wall, or has just left it."""
+    return memory[i, CONTACT_COUNT] > 0.0
+
+
+@inlined
 def forget_contacts(memory, i, work):
     """Clear the contact memory of a body in the air."""
-    if memory[i, 1] > 0.0:
+    if has_touched(memory, i):
         store_warm_start(0, 0, memory, i, 0.0, work)
 
 
@@ -233,9 +239,9 @@ def step_worlds(
 ):  # fmt: skip
     """Advance the worlds that no other thread has taken by `steps` steps of `substeps` substeps of h seconds each.
 
-    A body in flight looks for walls only when it could be near one (`clearance`), one that sleeps for nothing (`sleep`,
-    None where the scene does not declare it). A body whose new state is not finite keeps the old one, and its world's
-    report counts the fault.
+    A body in flight looks for walls only when it could be near one (`clearance`; what touched is), one that sleeps for
+    nothing (`sleep`, None where the scene does not declare it). A body whose new state is not finite keeps the old one,
+    and its world's report counts the fault.
     """
     work = scratch[0]
     bodies = shapes.shape[0]
@@ -257,7 +263,7 @@ def step_worlds(
             for k in range(steps * substeps):
                 set_clock(k * h, work)
                 hold_loads(y, h, gyroscopic, tilted, work)
-                if contact is not None and clear == 0:
+                if contact is not None and clear == 0 and not has_touched(memory, i):
                     clear = clear_substeps(y[0], y[2], h, steps * substeps - k, work)
                     if clear > 0:
                         forget_contacts(memory, i, work)
