@@ -149,15 +149,17 @@ def _part(q, m, J, c, mm, energy2, square, h):
     D = (1.0 - 0.5 * r) + r * ((r + 4.0 * p) * (1.0 / 24.0))
     # s and d in the variables y = h² |m|², z = h² 2E.
     y, z = h2 * mm, h2 * energy2
-    s, d = z * c[1] + y * c[0], z * c[10] + y * c[9]
-    if square > TINY_SQUARE:
-        u, t2 = p * r, t * t
+    if square <= TINY_SQUARE:
+        s, d = z * c[1] + y * c[0], z * c[10] + y * c[9]
+        x *= sn2
+        inv_N = 1.0 + x * (1.0 + x)
+    else:
+        u, p2, r2, t2 = p * r, p * p, r * r, t * t
         sn += (t2 + 12.0 * u) * (1.0 / 120.0)
         sn2 += (2.0 * t2 + 9.0 * u) * (1.0 / 45.0)
-        s += z * (z * c[4] + y * c[3]) + y * (y * c[2])
-        d += z * (z * c[13] + y * c[12]) + y * (y * c[11])
+        s = z * (c[1] + z * c[4]) + y * (c[0] + z * c[3] + y * c[2])
+        d = z * (c[10] + z * c[13]) + y * (c[9] + z * c[12] + y * c[11])
         if square > SMALL_SQUARE:
-            p2, r2, yy, zz = p * p, r * r, y * y, z * z
             sn -= t * (t2 + 132.0 * u) * (1.0 / 5040.0)
             C -= p * ((p2 + 44.0 * u + 16.0 * r2) * (1.0 / 720.0))
             D -= r * ((r2 + 44.0 * u + 16.0 * p2) * (1.0 / 720.0))
@@ -167,13 +169,13 @@ def _part(q, m, J, c, mm, energy2, square, h):
                 D += r * (r * r2 + 408.0 * r * u + 912.0 * p * u + 64.0 * p * p2) * (1.0 / 40320.0)
                 sn2 += (2.0 * t2 * t2 + 243.0 * t2 * u + 378.0 * u * u) * (1.0 / 14175.0)
                 sn2 -= t * (t2 + 27.0 * u) * (1.0 / 315.0)
+            inv_N = 1.0 / (1.0 - x * sn2)
+            yy, zz = y * y, z * z
             s += zz * (z * c[8] + y * c[7]) + yy * (z * c[6] + y * c[5])
             d += zz * (z * c[17] + y * c[16]) + yy * (z * c[15] + y * c[14])
-    x *= sn2
-    if square > SMALL_SQUARE:
-        inv_N = 1.0 / (1.0 - x)
-    else:
-        inv_N = 1.0 + x * (1.0 + x * (1.0 + x))
+        else:
+            x *= sn2
+            inv_N = 1.0 + x * (1.0 + x * (1.0 + x))
     sigma = h * sn
     g1, g2, g3 = sigma * (a1 * (m2 * m3)), sigma * (a2 * (m1 * m3)), sigma * (a3 * (m1 * m2))
     n1 = (C * m1 + D * g1) * inv_N
