@@ -145,9 +145,7 @@ def crossing(low_gap, high_gap, width, bend):
 
 
 @kernel
-def shortened_stage(
-    n, y, end, h, friction, smooth, gyroscopic, tilted, pivots, scheme, memory, report, work
-):  # fmt: skip
+def shortened_stage(n, y, end, h, friction, smooth, gyroscopic, tilted, pivots, scheme, memory, report, work):
     """A stage over h that ends at `end`, where a feature has passed through a wall, up to that: (state, time advanced).
 
     It is shortened until that feature is within half a slop of the wall: `crossing` of its gap. Another one that is
@@ -193,9 +191,7 @@ def to_next_impact(n, y, h, friction, smooth, gyroscopic, tilted, pivots, scheme
     has_passed, is_deep = what_is_behind(end[0], to_matrix(end[1]), tilted, work)
     if work.is_last or not has_passed:
         return end, h, is_deep
-    end, t = shortened_stage(
-        n, y, end, h, friction, smooth, gyroscopic, tilted, pivots, scheme, memory, report, work
-    )  # fmt: skip
+    end, t = shortened_stage(n, y, end, h, friction, smooth, gyroscopic, tilted, pivots, scheme, memory, report, work)
     return end, t, True
 
 
