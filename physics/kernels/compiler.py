@@ -92,8 +92,9 @@ def kernel(function):
 
     `error_model="numpy"` makes a division by zero an inf and not an exception
     (no exception path inside a kernel); there is no `fastmath`, so results do
-    not depend on how the optimiser reorders a sum. Without Numba's run time
-    (`_nrt`) there are no reference counts to keep, nor can a kernel allocate:
+    not depend on how the optimiser reorders a sum. A product in a sum is rounded
+    with it, which is said for each (`codegen.builder.fused`). Without Numba's run
+    time (`_nrt`) there are no reference counts to keep, nor can a kernel allocate:
     arrays are lent to it, and views of the workspace need no owner.
 
     An index counts from the front of its axis, unless it is a literal: nothing asks whether it is negative. Under

@@ -85,8 +85,9 @@ def test_small_angles_are_measured_accurately():
 
 # At 10 ms and `balanced`: the errors that the project set out to reach.
 # Where none is listed the goal is not reached yet (`damped`, `sphere`).
+# `tumble` is three times what rounding leaves of 2,000 attitudes in the mean, 1e-10 rad (`test_rotation` says why).
 REACHED = {
-    "tumble": 1e-10,
+    "tumble": 3e-10,
     "high_spin": 1e-8,
     "elastic": 1e-9,
     "slide": 1e-4,
@@ -100,6 +101,11 @@ REACHED = {
 def test_balanced_reaches_the_goal_at_10_ms(key):
     case = CASES[key]
     assert error_at(case, 0.01) <= REACHED[key]
+
+
+@pytest.mark.parametrize("dt", [0.02, 0.05, 0.1])
+def test_balanced_reaches_the_goal_for_tumbling_in_fewer_steps(dt):
+    assert error_at(CASES["tumble"], dt) <= 1e-10
 
 
 @pytest.mark.parametrize("key", ["slide", "sphere"])

@@ -7,11 +7,12 @@ import re
 import subprocess
 import sys
 from collections import namedtuple
+from fractions import Fraction
 from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 from numba.core.codegen import CPUCodeLibrary
 from numba.core.typeinfer import CallConstraint
@@ -20,6 +21,7 @@ import physics
 from physics.kernels.codegen.inference import _Network
 from physics.kernels.codegen.linking import _PartLibrary
 from physics.kernels.compiler import composed, kernel
+from physics.kernels.lanes import Lanes
 from tests.kernels.anew import anew
 
 RECORD = np.dtype([("scale", np.float64), ("grid", np.float64, (3, 4)), ("line", np.float64, (5,)), ("n", np.int64)])
@@ -397,6 +399,41 @@ def test_a_power_that_is_written_down_is_a_product():
         assert (fourth, seventh) == ((x * x) * (x * x), x * (x * x) * ((x * x) * (x * x)))
         assert (zeroth, inverse) == (1.0, 1.0 / (x * x))
         assert other == pytest.approx(x**5)
+
+
+# --- products in sums ----------------------------------------------------------------------------------------------
+
+
+@kernel
+def sums_with_products(a, b, c, d, out):
+    """Sums and differences of products and numbers, of numbers and of lanes."""
+    out[0], out[1], out[2], out[3] = a * b + c, c + a * b, a * b - c, c - a * b
+    out[4], out[5], out[6] = a * b + c * d, a * b - c * d, a * b - b * a
+    x, y, z = Lanes(a, b, c, d), Lanes(b, c, d, a), Lanes(c, d, a, b)
+    sums, differences = x * y + z, z - x * y
+    for lane in range(4):
+        out[7 + lane], out[11 + lane] = sums[lane], differences[lane]
+
+
+FEW_DIGITS = st.floats(-1e100, 1e100).filter(lambda x: x == 0.0 or abs(x) > 1e-100)
+
+
+@given(FEW_DIGITS, FEW_DIGITS, FEW_DIGITS, FEW_DIGITS)
+@example(1.0 + 2.0**-52, 1.0 - 2.0**-52, -1.0, 3.0)
+@example(0.1, 0.3, -0.03, 1.0)
+def test_a_product_in_a_sum_is_rounded_with_it(a, b, c, d):
+    """Against exact fractions: once for both; of two products in a sum the second, in a difference none of them."""
+    out = np.zeros(15)
+    sums_with_products(a, b, c, d, out)
+    A, B, C, D = map(Fraction, (a, b, c, d))
+    once = [float(exact) for exact in (A * B + C, C + A * B, A * B - C, C - A * B)]
+    np.testing.assert_array_equal(out[:4], once)
+    assert out[4] == float(Fraction(a * b) + C * D)
+    assert out[5] == a * b - c * d
+    assert out[6] == 0.0
+    first, second, third = [A, B, C, D], [B, C, D, A], [C, D, A, B]
+    np.testing.assert_array_equal(out[7:11], [float(x * y + z) for x, y, z in zip(first, second, third, strict=True)])
+    np.testing.assert_array_equal(out[11:], [float(z - x * y) for x, y, z in zip(first, second, third, strict=True)])
 
 
 @kernel

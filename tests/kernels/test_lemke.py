@@ -24,19 +24,24 @@ def solve(M, q, max_pivots=2000):
     return status, pivots, z
 
 
-def assert_solves(M, q, z):
+def rounding(M, q, z):
     # The answer is refined: what remains is the rounding of one product M z, n terms
     # of at most max|M| max|z| each, twice for the products in the solver and in here.
-    M, q = np.asarray(M, float), np.asarray(q, float)
     terms = np.abs(M).max() * np.abs(z).max() + np.abs(q).max()
-    assert np.abs(np.minimum(z, M @ z + q)).max() <= 4 * len(q) * np.finfo(float).eps * terms
+    return 4 * len(q) * np.finfo(float).eps * terms
+
+
+def assert_solves(M, q, z):
+    M, q = np.asarray(M, float), np.asarray(q, float)
+    assert np.abs(np.minimum(z, M @ z + q)).max() <= rounding(M, q, z)
 
 
 def test_murty_example_2_8():
-    M = [[1, -1, -1, -1], [-1, 1, -1, -1], [1, 1, 2, 0], [1, 1, 0, 2]]
-    status, _, z = solve(M, [3, 5, -9, -5])
+    M, q = np.array([[1.0, -1, -1, -1], [-1, 1, -1, -1], [1, 1, 2, 0], [1, 1, 0, 2]]), np.array([3.0, 5, -9, -5])
+    status, _, z = solve(M, q)
     assert status == SOLVED
-    assert np.array_equal(z, [2, 1, 3, 1])  # small integers: every step is exact
+    # Every z is positive, so M z = -q: z is as far from the solution as M⁻¹ takes what M z + q is rounded by.
+    assert np.abs(z - [2, 1, 3, 1]).max() <= np.linalg.norm(np.linalg.inv(M), np.inf) * rounding(M, q, z)
 
 
 def test_murty_example_2_9_ends_in_a_ray():

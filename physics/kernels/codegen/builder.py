@@ -7,6 +7,7 @@ to see that nothing happened. Writing that down, reading it and seeing it was mo
 from __future__ import annotations
 
 from llvmlite import ir
+from numba.core import cgutils
 
 WORD = ir.IntType(64)
 INSIDE = ("nsw",)  # no index and no number of a range is beyond what a word holds
@@ -105,7 +106,7 @@ def _taken_apart(value):
 
 
 class FoldingBuilder(ir.IRBuilder):
-    """LLVM's builder for structures known by their members, and for products and sums with nothing to compute."""
+    """LLVM's builder for structures known by their members, products and sums with nothing to compute, and `fused`."""
 
     def extract_value(self, agg, idx, name=""):
         """A member of a structure: the one that was put in, if that is known."""
@@ -138,6 +139,20 @@ class FoldingBuilder(ir.IRBuilder):
         """Leave the function with a value."""
         return super().ret(_as_value(self, value))
 
+    def fadd(self, lhs, rhs, name="", flags=()):
+        """Sum of numbers, or of lanes. A product in it is `fused`, of two the second."""
+        left, right = _factors(lhs), _factors(rhs)
+        if right:
+            return fused(self, *right, lhs)
+        return fused(self, *left, rhs) if left else super().fadd(lhs, rhs, name, flags)
+
+    def fsub(self, lhs, rhs, name="", flags=()):
+        """Difference of numbers, or of lanes. A product in it is `fused`; of two none, so that equal ones leave 0."""
+        left, right = _factors(lhs), _factors(rhs)
+        if bool(left) == bool(right):
+            return super().fsub(lhs, rhs, name, flags)
+        return fused(self, self.fneg(right[0]), right[1], lhs) if right else fused(self, *left, self.fneg(rhs))
+
     def mul(self, lhs, rhs, name="", flags=()):
         """Product of integers."""
         if _is(lhs, 1):
@@ -157,6 +172,23 @@ class FoldingBuilder(ir.IRBuilder):
         if _is_number(lhs) and _is_number(rhs):
             return ir.Constant(lhs.type, lhs.constant + rhs.constant)
         return super().add(lhs, rhs, name, flags)
+
+
+def _factors(value) -> tuple:
+    """Factors of a product of numbers, or of lanes; none of anything else."""
+    is_product = isinstance(value, ir.Instruction) and value.opname == "fmul"
+    return tuple(value.operands) if is_product and value.type != ir.FloatType() else ()
+
+
+def fused(builder, a, b, c):
+    """a b + c, rounded once: one instruction, and the same to the last bit on every processor.
+
+    That is said here and not left to LLVM (its flag `contract`), which would do so in one kernel and not in another,
+    depending on what else is in it.
+    """
+    width = f"v{c.type.count}" if isinstance(c.type, ir.VectorType) else ""
+    type_ = ir.FunctionType(c.type, [c.type] * 3)
+    return builder.call(cgutils.get_or_insert_function(builder.module, type_, f"llvm.fma.{width}f64"), (a, b, c))
 
 
 def _as_value(builder, value):
