@@ -46,6 +46,28 @@ def test_a_stepper_takes_the_steps_of_step(loads, threads):
         np.testing.assert_array_equal(prepared.report.status, report.status)
 
 
+@pytest.mark.parametrize(
+    "effects",
+    [[physics.Drag(0.47), physics.Wind(gust=3.0, seed=5)], [physics.Actuator(limit_force=5.0)], [physics.Gravity()]],
+    ids=["told the time", "limited", "alone"],
+)
+def test_what_else_has_a_part_in_a_step_has_it(effects):
+    """Gusts, which are told the time; an actuator; and a recorder, that comes and goes between calls."""
+    scene = physics.Scene([physics.Sphere(0.3, 0.5)], effects=effects)
+    plain, prepared = (physics.World(scene, dt=0.01) for _ in range(2))
+    stepper = physics.Stepper(prepared, STEPS)
+    stepper.wrench[..., 0] = 20.0
+    for turn in range(4):
+        recorder = physics.Recorder(prepared) if turn == 2 else None
+        plain.step(stepper.wrench, steps=STEPS)
+        stepper()
+        np.testing.assert_array_equal(prepared.state, plain.state)
+        assert prepared.time == plain.time
+        if recorder is not None:
+            assert len(recorder.recording().wrenches) == 1
+            recorder.stop()
+
+
 @pytest.mark.parametrize("accuracy", ["balanced", "precise"])
 @pytest.mark.parametrize("threads", [1, 2])
 def test_a_world_whose_steps_differ_takes_those_of_steppers(loads, accuracy, threads):
