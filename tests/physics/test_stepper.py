@@ -56,8 +56,8 @@ def test_what_else_has_a_part_in_a_step_has_it(effects):
     scene = physics.Scene([physics.Sphere(0.3, 0.5)], effects=effects)
     plain, prepared = (physics.World(scene, dt=0.01) for _ in range(2))
     stepper = physics.Stepper(prepared, STEPS)
-    stepper.wrench[..., 0] = 20.0
     for turn in range(4):
+        stepper.wrench[..., 0] = 20.0 * (-1.0) ** turn
         recorder = physics.Recorder(prepared) if turn == 2 else None
         plain.step(stepper.wrench, steps=STEPS)
         stepper()
