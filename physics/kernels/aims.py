@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from physics.kernels import quaternion as qt
 from physics.kernels.arms import arm_and_rate, wall_normal, wall_of
-from physics.kernels.columns import column_from, numbers_from, put_column, spread
+from physics.kernels.columns import column_from, numbers_from, put_columns, spread
 from physics.kernels.compiler import inlined, kernel
 from physics.kernels.lanes import WIDTH, chosen, larger, smaller
 from physics.kernels.layout import BLOCK, SPHERE
@@ -30,6 +30,8 @@ def aim_impact(n, bounce_speed, slop_speed, rate, work):
     the resting stage. One that leaves may be turned round, to e times its speed: with that, and only with that, no
     frictionless impact of several contacts gains energy (Moreau; theory, section 8).
     """
+    if not work.approach > (min(bounce_speed, slop_speed) if work.restitution > 0.0 else slop_speed):
+        return False
     is_impact = False
     for i in range(n):
         s = -work.speed[i]
@@ -48,6 +50,8 @@ def aim_impact(n, bounce_speed, slop_speed, rate, work):
 @inlined
 def is_closing(i, n, work):
     """Whether a contact of the wall of contact i is still above it."""
+    if not work.widest > work.slop:
+        return False
     wall = wall_of(work.slot[i], work)
     for j in range(n):
         if work.gap[j] > work.slop and wall_of(work.slot[j], work) == wall:
@@ -119,10 +123,16 @@ def _aim_at_wall(first, n, v, w, alpha, half, is_turning, negligible, rate, R, t
     if is_closing(first, n, work):
         t0 = t0 - rate * numbers_from(work.gap, first, last)
     is_little = larger(abs(t0), larger(abs(t1), abs(t2))) <= negligible
-    put_column(work.target, 0, first, last, chosen(is_little, 0.0, t0))
-    put_column(work.target, 1, first, last, chosen(is_little, 0.0, t1))
-    put_column(work.target, 2, first, last, chosen(is_little, 0.0, t2))
+    t0, t1, t2 = chosen(is_little, 0.0, t0), chosen(is_little, 0.0, t1), chosen(is_little, 0.0, t2)
+    put_columns(work.target, first, last, t0, t1, t2)
     return last + 1
+
+
+@kernel
+def _aim_at_others(first, n, v, w, alpha, half, is_turning, negligible, rate, R, tilted, work):
+    """`aim_rest` for contacts from `first` on: apart, since most bodies touch one wall."""
+    while first < n:
+        first = _aim_at_wall(first, n, v, w, alpha, half, is_turning, negligible, rate, R, tilted, work)
 
 
 @inlined
@@ -139,7 +149,7 @@ def aim_rest(n, v, w, alpha, R, h, tilted, work):
     half = 0.5 * h
     is_turning = 0.0 < qt.dot(w, w) * h * h <= LARGEST_TURN * LARGEST_TURN and work.shape != SPHERE
     negligible = max(work.tolerance * work.acceleration * h, UNSEEN * work.slop / h)
-    share = 1.0 if work.is_last else CLOSING_SHARE
-    first = 0
-    while first < n:
-        first = _aim_at_wall(first, n, v, w, alpha, half, is_turning, negligible, share / h, R, tilted, work)
+    rate = (1.0 if work.is_last else CLOSING_SHARE) / h
+    first = _aim_at_wall(0, n, v, w, alpha, half, is_turning, negligible, rate, R, tilted, work)
+    if first < n:
+        _aim_at_others(first, n, v, w, alpha, half, is_turning, negligible, rate, R, tilted, work)

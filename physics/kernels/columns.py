@@ -26,15 +26,20 @@ def column_from(table, k, first, last):
 
 
 @inlined
-def put_column(table, k, first, last, x):
-    """Write what `column_from` reads."""
-    table[first, k] = x[0]
+def put_columns(table, first, last, x, y, z):
+    """Write three columns, as `column_from` reads each of them."""
+    _put_row(table, first, x[0], y[0], z[0])
     if last > first:
-        table[first + 1, k] = x[1]
+        _put_row(table, first + 1, x[1], y[1], z[1])
     if last > first + 1:
-        table[first + 2, k] = x[2]
+        _put_row(table, first + 2, x[2], y[2], z[2])
     if last > first + 2:
-        table[first + 3, k] = x[3]
+        _put_row(table, first + 3, x[3], y[3], z[3])
+
+
+@inlined
+def _put_row(table, i, x, y, z):
+    table[i, 0], table[i, 1], table[i, 2] = x, y, z
 
 
 @inlined

@@ -53,7 +53,7 @@ def _admit(gap, speed, slop, margin, reach, acceleration, h, is_last):
 
 @inlined
 def gather(x, R, v, w, h, tilted, work):
-    """Fill `work` (slot, gap, speed, mask) with the contact set at this pose.
+    """Fill `work` (slot, gap, speed, mask, and of all together widest and approach) with the contact set at this pose.
 
     Parameters
     ----------
@@ -79,15 +79,15 @@ def gather(x, R, v, w, h, tilted, work):
     center = geometric_center(x, R, work, tilted)
     reach = 0.5 * acceleration * h * h
     margin = slop + reach
+    near = max(margin, TOGETHER * slop)
+    if work.is_last:
+        near += h * (abs(v[0]) + abs(v[1]) + abs(v[2]) + radius * (abs(w[0]) + abs(w[1]) + abs(w[2])))
     count = 0
-    depth = 0.0
+    depth = widest = approach = 0.0
     for k in range(walls.shape[0]):
         work.mask[k] = 0
         n = wall_normal(walls, k)
         d = qt.dot(n, center) - walls[k, OFFSET]
-        near = max(margin, TOGETHER * slop)
-        if work.is_last:
-            near += h * (abs(v[0]) + abs(v[1]) + abs(v[2]) + radius * (abs(w[0]) + abs(w[1]) + abs(w[2])))
         if d > radius + near:
             continue
         e = geo.scaled_normal(shape, dims, R, n)
@@ -111,13 +111,14 @@ def gather(x, R, v, w, h, tilted, work):
                     continue
                 if _admit(gap, speed, slop, margin, reach, acceleration, h, work.is_last):
                     count = _record(count, k, vertex, features, gap, speed, work)
-                    depth = max(depth, -gap)
+                    depth, widest, approach = max(depth, -gap), max(widest, gap), max(approach, -speed)
         else:
             gap = d - geo.support(shape, dims, e)
             speed = vn + qt.dot(m, geo.support_arm(shape, dims, R, n, e))
             if _admit(gap, speed, slop, margin, reach, acceleration, h, work.is_last):
                 count = _record(count, k, 0, features, gap, speed, work)
-                depth = max(depth, -gap)
+                depth, widest, approach = max(depth, -gap), max(widest, gap), max(approach, -speed)
+    work.widest, work.approach = widest, approach
     return count, depth
 
 

@@ -105,33 +105,40 @@ def _apply(n, width, v, L, work):
     )
 
 
+@kernel
+def _hold(n, R, v, L, work):
+    """`hold_all`, apart: it comes before or after the other attempt, and is compiled once."""
+    return hold_all(n, R, v, L, work)
+
+
 @inlined
 def _directly(n, friction, R, v, L, work):
     """Try that all contacts hold, and that they slide, the likelier one first: (found, v, L, residual).
 
     `slide` knows all about a single contact. Whether an edge, or contacts of several walls, held last is tried first.
+    Of springs none hold, nor have they a normal motion known beforehand: `slide` for one or two.
+
+    Without a loop: LLVM would work out before it what only one of the attempts needs, whether that is made or not.
     """
-    wall = wall_of(work.slot[0], work)
+    wall, is_soft = wall_of(work.slot[0], work), stiffness(work) > 0.0
     is_one_wall = n <= WIDTH and wall_of(work.slot[n - 1], work) == wall
-    holds_first = False
-    if friction is not None and n > 1:
+    may_all_hold, holds_first = friction is not None and not is_soft, False
+    if may_all_hold and n > 1:
         holds_first = work.mode == HOLD
         if is_one_wall and n > 2:
             holds_first = may_hold(n, wall_axes(work.walls, wall), v, L, work)
-    attempts = 2
-    if stiffness(work) > 0.0:  # neither holds nor has a normal motion known beforehand: `slide` for one or two
-        holds_first, attempts = False, 1 if n <= 2 else 0
-    for attempt in range(attempts):
-        if friction is not None and (attempt == 0) == holds_first:
-            found, v1, L1, residual = hold_all(n, R, v, L, work)
-            if found:
-                work.mode = HOLD
-                return True, v1, L1, residual
-        elif is_one_wall:
-            found, v1, L1, residual = slide_on(n, friction, wall, R, v, L, work)
-            if found:
-                return True, v1, L1, residual
-    return False, v, L, 0.0
+    found, v1, L1, residual = False, v, L, 0.0
+    if holds_first:
+        found, v1, L1, residual = _hold(n, R, v, L, work)
+        if found:
+            work.mode = HOLD
+    if not found and is_one_wall and not (is_soft and n > 2):
+        found, v1, L1, residual = slide_on(n, friction, wall, R, v, L, work)
+    if not found and may_all_hold and not holds_first:
+        found, v1, L1, residual = _hold(n, R, v, L, work)
+        if found:
+            work.mode = HOLD
+    return found, v1, L1, residual
 
 
 @inlined

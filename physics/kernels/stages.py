@@ -9,7 +9,7 @@ from physics.kernels import quaternion as qt
 from physics.kernels.aims import aim_impact, aim_rest
 from physics.kernels.arms import place_arms
 from physics.kernels.body import principal_attitude, turning
-from physics.kernels.compiler import inlined
+from physics.kernels.compiler import inlined, kernel
 from physics.kernels.compliance import aim_springs, foretell_gaps, parts_of_stage
 from physics.kernels.flight import drift
 from physics.kernels.laws import STIFFNESS, if_law
@@ -55,17 +55,37 @@ def load_warm_start(n, width, memory, i, h, work):
 
 
 @inlined
-def store_warm_start(n, width, memory, i, h, work):
-    """Keep the impulses of this resting stage by slot; what no longer touches is forgotten."""
+def _are_kept(n, memory, i, work):
+    """Whether the contacts of the last resting stage are those of this one, in the same order."""
+    if memory[i, CONTACT_COUNT] != n:
+        return False
+    for k in range(n):
+        if memory[i, MEMORY_HEAD + k] != work.slot[k]:
+            return False
+    return True
+
+
+@kernel
+def _keep_slots(n, memory, i, work):
+    """Forget the contacts of the last resting stage for those of this one, whose impulses are zero as yet."""
     first = MEMORY_HEAD + work.slot.shape[0]
     for k in range(int(memory[i, CONTACT_COUNT])):
         base = first + 3 * int(memory[i, MEMORY_HEAD + k])
         for c in range(3):
             memory[i, base + c] = 0.0
-    memory[i, STAGE_LENGTH] = h
     memory[i, CONTACT_COUNT] = n
     for k in range(n):
         memory[i, MEMORY_HEAD + k] = work.slot[k]
+
+
+@inlined
+def store_warm_start(n, width, memory, i, h, work):
+    """Keep the impulses of this resting stage by slot; what no longer touches is forgotten."""
+    first = MEMORY_HEAD + work.slot.shape[0]
+    memory[i, STAGE_LENGTH] = h
+    if not _are_kept(n, memory, i, work):
+        _keep_slots(n, memory, i, work)
+    for k in range(n):
         base = first + 3 * work.slot[k]
         for c in range(width):
             memory[i, base + c] = work.impulse[width * k + c]

@@ -82,6 +82,8 @@ def workspace_dtype(
         ("gap", f, (n,)),  # [m], negative when penetrating
         *[("due", f, (n,))] * (contact_laws.STIFFNESS in laws),  # gap at the end of a stage [m] (`compliance`)
         ("speed", f, (n,)),  # normal velocity before the stage [m/s], negative when approaching
+        ("widest", f),  # largest gap of them all, 0 if there is none above a wall [m]
+        ("approach", f),  # fastest approach of them all, 0 if none does [m/s]
         ("arm", f, (n, 3)),  # contact point relative to the centre of mass, world frame [m]
         ("target", f, (n, 3)),  # contact velocity aimed at (normal, tangents) [m/s]
         ("held", f, (FEW, 2)),  # tangents for which contacts hold, where `target` has others (`slip`)

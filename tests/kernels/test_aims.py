@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
-from physics.kernels.aims import CLOSING_SHARE, UNSEEN, aim_rest
+from physics.kernels.aims import CLOSING_SHARE, UNSEEN, aim_impact, aim_rest
 from physics.kernels.compiler import kernel
 from physics.kernels.workspace import make_workspace
 from tests.kernels.contact_problem import FLOOR, SIDE
@@ -25,6 +27,7 @@ def posed(slots, gaps, seed, tolerance=1e-9):
     work = make_workspace(np.array([FLOOR, SIDE]), 8, tolerance=tolerance)
     one, n = work[0], len(slots)
     one["slot"][:n], one["gap"][:n], one["slop"], one["acceleration"] = slots, gaps, SLOP, 10.0
+    one["widest"] = max(0.0, *gaps)
     one["arm"][:n] = np.random.default_rng(seed).uniform(-2, 2, (n, 3))
     return work
 
@@ -82,3 +85,37 @@ def test_what_is_next_to_nothing_is_not_asked_for():
     slow = (0.0, 1e-2 * UNSEEN * SLOP / H**2, 0.0)
     _aim(4, (0.0, -1.0, 0.0), slow, (0.0, 0.0, 0.0), EVEN, H, None, work)
     assert not work[0]["target"].any()
+
+
+# --- impacts -------------------------------------------------------------------------------------------------------
+
+
+@kernel
+def _aim_impact(n, bounce_speed, slop_speed, rate, scratch):
+    return aim_impact(n, bounce_speed, slop_speed, rate, scratch[0])
+
+
+speeds = st.sampled_from([-2.0, -0.5, -0.1, -0.011, -0.01, -0.009, 0.0, 0.3])
+gaps = st.sampled_from([-SLOP, 0.0, SLOP, 3 * SLOP])
+
+
+@given(
+    contacts=st.lists(st.tuples(speeds, gaps), min_size=1, max_size=8),
+    restitution=st.sampled_from([0.0, 0.1, 0.5, 1.0]),
+    bounce_speed=st.sampled_from([0.001, 0.05, 1.0]),
+)
+def test_an_impact_is_what_one_contact_of_it_is(contacts, restitution, bounce_speed):
+    """Newton's law for each, and whether one of them bounces, or would close by more than a slop within the step."""
+    work, n = posed(list(range(len(contacts))), [gap for _, gap in contacts], seed=0), len(contacts)
+    work["restitution"], work["target"] = restitution, 7.0
+    work["speed"][0, :n] = [speed for speed, _ in contacts]
+    work["approach"] = max(0.0, *(-speed for speed, _ in contacts))
+    slop_speed, goals, is_impact = SLOP / H, [], False
+    for speed, gap in contacts:
+        bounces = restitution > 0.0 and -speed > bounce_speed
+        goals.append(-restitution * speed if bounces or speed > 0.0 else 0.0)
+        is_impact |= bounces or -speed > slop_speed + max(gap, 0.0) / H
+    assert _aim_impact(n, bounce_speed, slop_speed, 1.0 / H, work) == is_impact
+    if is_impact:
+        np.testing.assert_array_equal(work[0]["target"][:n], [(goal, 0.0, 0.0) for goal in goals])
+        assert (work[0]["target"][n:] == 7.0).all()

@@ -1,0 +1,109 @@
+"""The contact set of a pose against plain NumPy, and what is kept of it from stage to stage."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from physics.kernels.compiler import kernel
+from physics.kernels.contact import TOGETHER, gather
+from physics.kernels.layout import BLOCK
+from physics.kernels.quaternion import to_matrix
+from physics.kernels.stages import CONTACT_COUNT, MEMORY_HEAD, load_warm_start, memory_size, store_warm_start
+from physics.kernels.workspace import make_workspace
+from tests.kernels.contact_problem import FLOOR, SIDE, SIZE
+
+SLOP, H, FEATURES = 1e-3, 0.01, 8
+CORNERS = SIZE * (2.0 * (np.arange(FEATURES)[:, None] >> np.arange(3) & 1) - 1.0)
+
+
+# --- the set -------------------------------------------------------------------------------------------------------
+
+
+@kernel
+def _gather(x, R, v, w, h, tilted, scratch):
+    return gather(x, R, v, w, h, tilted, scratch[0])
+
+
+def block_at_walls():
+    """A workspace of the block beside two walls."""
+    work = make_workspace(np.array([FLOOR, SIDE]), FEATURES)
+    one = work[0]
+    one["shape"], one["dims"], one["radius"], one["slop"] = BLOCK, SIZE, np.linalg.norm(SIZE), SLOP
+    return work
+
+
+small = st.floats(-3.0, 3.0)
+turns = st.one_of(st.just(0.0), st.floats(-2e-3, 2e-3), st.floats(-1.0, 1.0))
+
+
+@given(
+    turn=st.tuples(turns, turns, turns),
+    depth=st.tuples(small, small),
+    v=st.tuples(small, small, small),
+    w=st.tuples(small, small, small),
+)
+def test_the_set_is_what_touches_or_arrives(turn, depth, v, w):
+    """Of both walls: slots, gaps, speeds and, of all of them, the deepest, the widest and the fastest."""
+    R = np.reshape(to_matrix(tuple(np.array([1.0, *turn]) / np.linalg.norm([1.0, *turn]))), (3, 3))
+    arms = CORNERS @ R.T
+    least = arms.min(axis=0)
+    x = np.array([-least[0] + SLOP * depth[0], -least[1] + SLOP * depth[1], 0.3])
+    work = block_at_walls()
+    count, deepest = _gather(tuple(x), tuple(R.ravel()), v, w, H, None, work)
+    gaps = np.concatenate([(x + arms)[:, 1], (x + arms)[:, 0]])
+    speeds = np.concatenate([(v + np.cross(w, arms))[:, 1], (v + np.cross(w, arms))[:, 0]])
+    clear = 1e-12  # of what is within rounding of a limit either is right
+    belongs = (gaps <= SLOP) | ((gaps <= TOGETHER * SLOP) & (speeds < 0.0))
+    unsure = (abs(gaps - SLOP) < clear) | (abs(gaps - TOGETHER * SLOP) < clear) | (abs(speeds) < clear)
+    slots = work[0]["slot"][:count]
+    assert set(np.flatnonzero(belongs & ~unsure)) <= set(slots) <= set(np.flatnonzero(belongs | unsure))
+    assert (np.diff(slots) > 0).all()
+    # Sums of three products of size at most 4, and x.
+    np.testing.assert_allclose(work[0]["gap"][:count], gaps[slots], rtol=0, atol=1e-14)
+    np.testing.assert_allclose(work[0]["speed"][:count], speeds[slots], rtol=0, atol=1e-13)
+    assert deepest == max(0.0, *-work[0]["gap"][:count], 0.0)
+    assert work[0]["widest"] == max(0.0, *work[0]["gap"][:count], 0.0)
+    assert work[0]["approach"] == max(0.0, *-work[0]["speed"][:count], 0.0)
+
+
+# --- the memory ----------------------------------------------------------------------------------------------------
+
+
+@kernel
+def _store(n, width, memory, h, scratch):
+    store_warm_start(n, width, memory, 0, h, scratch[0])
+
+
+@kernel
+def _load(n, width, memory, h, scratch):
+    load_warm_start(n, width, memory, 0, h, scratch[0])
+
+
+stages = st.lists(st.sets(st.integers(0, 2 * FEATURES - 1), max_size=5).map(sorted), min_size=1, max_size=8)
+
+
+@pytest.mark.parametrize("width", [1, 3])
+@given(stages=stages)
+def test_impulses_are_found_by_the_name_of_their_contact(width, stages):
+    """Of the stage before, times the ratio of the lengths; zero of what did not touch then; and no others are kept."""
+    work, memory = block_at_walls(), np.zeros((1, memory_size(2 * FEATURES)))
+    known, length = {}, 0.0
+    for k, slots in enumerate(stages + stages[-1:]):
+        n, h = len(slots), 0.01 * (k + 1)
+        work["slot"][0, :n] = slots
+        _load(n, width, memory, h, work)
+        found = work["impulse"][0, : n * width].reshape(n, width)
+        for slot, impulse in zip(slots, found, strict=True):
+            scale = h / length if length > 0.0 else 0.0
+            np.testing.assert_array_equal(impulse, scale * known.get(slot, np.zeros(width)))
+        impulses = 1.0 + k + np.arange(n * width).reshape(n, width)
+        work["impulse"][0, : n * width] = impulses.ravel()
+        _store(n, width, memory, h, work)
+        known, length = dict(zip(slots, impulses, strict=True)), h
+        kept = memory[0, MEMORY_HEAD + 2 * FEATURES :].reshape(2 * FEATURES, 3)
+        assert memory[0, CONTACT_COUNT] == n
+        np.testing.assert_array_equal(memory[0, MEMORY_HEAD : MEMORY_HEAD + n], slots)
+        np.testing.assert_array_equal(np.flatnonzero(kept.any(axis=1)), slots)
