@@ -26,6 +26,7 @@ from physics.kernels.point import (
     heading,
     is_warm,
     miss_across,
+    own_block,
     point_velocity,
     turned,
 )
@@ -37,6 +38,10 @@ PAIR_LIMIT = 12
 # How often a contact is tried as one that holds, and both once more after one that was open has closed.
 HELD_LIMIT = 2
 OPENED_LIMIT = 1
+
+# How often contacts that none of that is true of answer each other in turn, and how many times each.
+IN_TURN_LIMIT = 2
+ANSWERS = 8
 
 
 @inlined
@@ -143,41 +148,73 @@ def _turns(W1, W12, W2, x1, y1, x2, y2, p1, p2, sliding):
     return s * (j12 * across2 - j22 * across1), s * (j21 * across1 - j11 * across2)
 
 
+@kernel
+def _in_turn(W1, W12, W2, b1, b2, mu, goal, p, q, x1, y1, x2, y2):
+    """Each contact answers the impulse of the other in turn, from impulses p and q on; then what it came to is tried.
+
+    (found, p, q, residual, direction of the first, and of the second, to go on from). One of them was to hold or to
+    open and does not, or turns right round: Newton's method would go on to where friction pushes it along.
+    """
+    W21, miss = _transposed(W12), 0.0
+    first = second = SLID
+    for _ in range(ANSWERS):
+        first, p, miss = answer(W1, _plus(b1, qt.matvec(W12, q)), mu, W1[4] + W1[8], goal, x1, y1, True)
+        if p[0] > 0.0:
+            x1, y1 = heading(-p[1], -p[2], mu)
+        second, q, miss = answer(W2, _plus(b2, qt.matvec(W21, p)), mu, W2[4] + W2[8], goal, x2, y2, True)
+        if q[0] > 0.0:
+            x2, y2 = heading(-q[1], -q[2], mu)
+    found = False
+    if first == HELD and second == SLID:
+        found, p, q, miss, x1, y1, x2, y2 = _held(W1, W12, W2, b1, b2, mu, goal, x2, y2)
+    elif first == SLID and second == HELD:
+        found, q, p, miss, x2, y2, x1, y1 = _held(W2, W21, W1, b2, b1, mu, goal, x1, y1)
+    return found, p, q, miss, x1, y1, x2, y2
+
+
 @inlined
 def solve_two(W1, W12, W2, b1, b2, mu, goal, x1, y1, x2, y2):
     """Impulses of two contacts: (found, p_1, p_2, residual [m/s])."""
-    zero = (0.0, 0.0, 0.0)
     W21 = _transposed(W12)
-    held1 = held2 = opened = 0
+    held1 = held2 = opened = turns = 0
     for _ in range(PAIR_LIMIT):
+        is_stuck = False
         p1, p2, miss1, miss2, sliding = _both_slide(W1, W12, W2, b1, b2, mu, x1, y1, x2, y2)
+        worst, q1, q2 = max(miss1, miss2), (p1, p1 * x1, p1 * y1), (p2, p2 * x2, p2 * y2)
         if not (p1 >= 0.0 and p2 >= 0.0):
             if p1 >= p2:
-                found, q1, q2, miss, x1, y1, x2, y2 = _opened(W1, W21, b1, b2, mu, goal, x1, y1)
+                found, q1, q2, worst, x1, y1, x2, y2 = _opened(W1, W21, b1, b2, mu, goal, x1, y1)
             else:
-                found, q2, q1, miss, x2, y2, x1, y1 = _opened(W2, W12, b2, b1, mu, goal, x2, y2)
-            if found or opened == OPENED_LIMIT:
-                return found, q1, q2, miss
-            opened += 1  # the open one closes: once more with both
-            continue
-        worst = max(miss1, miss2)
-        if worst <= goal:
-            return True, (p1, p1 * x1, p1 * y1), (p2, p2 * x2, p2 * y2), worst
-        if miss1 == math.inf and held1 < HELD_LIMIT:
-            held1 += 1
-            found, q1, q2, miss, x1, y1, x2, y2 = _held(W1, W12, W2, b1, b2, mu, goal, x2, y2)
+                found, q2, q1, worst, x2, y2, x1, y1 = _opened(W2, W12, b2, b1, mu, goal, x2, y2)
             if found:
-                return True, q1, q2, miss
+                return True, q1, q2, worst
+            is_stuck, opened = opened == OPENED_LIMIT, opened + 1  # the open one closes: once more with both
+        elif worst <= goal:
+            return True, q1, q2, worst
+        elif miss1 == math.inf and held1 < HELD_LIMIT:
+            held1 += 1
+            found, q1, q2, worst, x1, y1, x2, y2 = _held(W1, W12, W2, b1, b2, mu, goal, x2, y2)
+            if found:
+                return True, q1, q2, worst
         elif miss2 == math.inf and held2 < HELD_LIMIT:
             held2 += 1
-            found, q2, q1, miss, x2, y2, x1, y1 = _held(W2, W21, W1, b2, b1, mu, goal, x1, y1)
+            found, q2, q1, worst, x2, y2, x1, y1 = _held(W2, W21, W1, b2, b1, mu, goal, x1, y1)
             if found:
-                return True, q1, q2, miss
+                return True, q1, q2, worst
+        elif worst == math.inf:
+            is_stuck = True
         else:
             turn1, turn2 = _turns(W1, W12, W2, x1, y1, x2, y2, p1, p2, sliding)
             x1, y1 = turned(x1, y1, turn1)
             x2, y2 = turned(x2, y2, turn2)
-    return False, zero, zero, 0.0
+        if is_stuck:
+            if turns == IN_TURN_LIMIT:
+                break
+            found, q1, q2, worst, x1, y1, x2, y2 = _in_turn(W1, W12, W2, b1, b2, mu, goal, q1, q2, x1, y1, x2, y2)
+            if found:
+                return True, q1, q2, worst
+            held1, held2, turns = 0, 0, turns + 1
+    return False, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), 0.0
 
 
 @inlined
@@ -199,7 +236,7 @@ def contact_at(i, axes, u, w, work):
 def solve_one(first, mu, goal, inv_mass, K, work):
     """Impulse of a contact (see `contact_at`) that alone touches: (found, impulse, moment, residual [m/s])."""
     r, b, impulse = first
-    W = give_way(block(r, r, inv_mass, friction_ratio(work), K), work)
+    W = give_way(own_block(r, inv_mass, friction_ratio(work), K), work)
     x = y = 0.0
     if mu > 0.0:
         f = qt.matvec(W, impulse)
@@ -240,7 +277,7 @@ def solve_pair(first, second, mu, goal, inv_mass, K, work):
     """
     (r, b1, f), (s, b2, g) = first, second
     ratio = friction_ratio(work)
-    W1, W2 = give_way(block(r, r, inv_mass, ratio, K), work), give_way(block(s, s, inv_mass, ratio, K), work)
+    W1, W2 = give_way(own_block(r, inv_mass, ratio, K), work), give_way(own_block(s, inv_mass, ratio, K), work)
     W12 = block(r, s, inv_mass, ratio, K)
     x1 = y1 = x2 = y2 = 0.0
     if mu > 0.0:

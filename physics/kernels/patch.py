@@ -15,7 +15,7 @@ from physics.kernels.columns import column, part, present
 from physics.kernels.compiler import inlined
 from physics.kernels.ellipse import friction_ratio
 from physics.kernels.lanes import chosen, first_of, larger, largest, least, root, total
-from physics.kernels.point import is_warm, point_velocity
+from physics.kernels.point import LEAST_SQUARE, inverse_root, is_warm, point_velocity
 
 # Second moments of a patch: below this share of det to trace² it counts as a line (edges 1 : 1000).
 LINE_LIMIT = 1.0e-6
@@ -122,14 +122,21 @@ def cold_motion(n, patch, on, mu, u, w, inv_mass, K):
 
 
 @inlined
+def centroid(count, patch, on):
+    """Centroid of the active contacts."""
+    (c, a, b), _, _ = patch
+    s = 1.0 / count
+    return s * total(on * c), s * total(on * a), s * total(on * b)
+
+
+@inlined
 def fit_targets(count, patch, on):
     """The normal motion that fits the targets of the active contacts best: (is one, centroid, (v_n, ω_a, ω_b)).
 
     Of contacts on a line it is not finite, or no longer accurate: then there is none.
     """
-    (c, a, b), (target, _, _), _ = patch
-    s = 1.0 / count
-    center, t0 = (s * total(on * c), s * total(on * a), s * total(on * b)), s * total(on * target)
+    (_, a, b), (target, _, _), _ = patch
+    center, t0 = centroid(count, patch, on), (1.0 / count) * total(on * target)
     a, b = on * (a - center[1]), on * (b - center[2])
     saa, sab, sbb, ta, tb = total(a * a), total(a * b), total(b * b), total(a * target), total(b * target)
     det, trace = saa * sbb - sab * sab, saa + sbb
@@ -148,9 +155,9 @@ def spare_speed(patch, vn, wa, wb):
 @inlined
 def opposed(ua, ub, on, mu):
     """Impulse per normal impulse that opposes a slip (ua, ub), -μ d, and its speed: none of what is open or still."""
-    size = root(ua * ua + ub * ub)
-    s = chosen(size > 0.0, -mu * on / size, 0.0)
-    return s * ua, s * ub, size
+    square = ua * ua + ub * ub
+    s = chosen(square > LEAST_SQUARE, -mu * on * inverse_root(square), 0.0)
+    return s * ua, s * ub, root(square)
 
 
 @inlined

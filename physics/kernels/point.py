@@ -15,6 +15,7 @@ import math
 
 from physics.kernels import quaternion as qt
 from physics.kernels.compiler import inlined
+from physics.kernels.lanes import root
 from physics.kernels.share import solve_symmetric
 
 # Newton steps on an angle at most: three are usual at a tolerance of 1e-6.
@@ -25,6 +26,9 @@ TURN_AT_MOST = 1.0
 
 # A warm start is of other loads if its pushes are off by more than this share of what is needed.
 WARM_SHARE = 0.1
+
+# A vector whose square is no more has no direction: 1/square would overflow below 6e-309.
+LEAST_SQUARE = 1.0e-290
 
 # What a contact was found to do.
 LOST, OPEN, HELD, SLID = range(4)
@@ -78,6 +82,27 @@ def block(r, s, inv_mass, ratio, K):
 
 
 @inlined
+def own_block(r, inv_mass, ratio, K):
+    """`block` of a contact with itself, which is symmetric."""
+    c, a, b = r
+    n1, n2 = b * K[3] - a * K[4], b * K[4] - a * K[5]
+    s0, s1, s2 = c * K[2] - b * K[0], c * K[4] - b * K[1], c * K[5] - b * K[2]
+    t0, t1, t2 = a * K[0] - c * K[1], a * K[1] - c * K[3], a * K[2] - c * K[4]
+    na, nb, ab = b * s1 - a * s2, b * t1 - a * t2, c * t2 - b * t0
+    return (
+        inv_mass + (b * n1 - a * n2), na, nb,
+        na, inv_mass + (c * s2 - b * s0), ab,
+        nb, ab, ratio * ratio * inv_mass + (a * t0 - c * t1),
+    )  # fmt: skip
+
+
+@inlined
+def inverse_root(square):
+    """1/√ of a number or of lanes, root and quotient side by side: what waits for it waits for the longer of them."""
+    return root(square) * (1.0 / square)
+
+
+@inlined
 def is_warm(push, needed):
     """Whether what a warm start pushes with is near enough to what the loads of now need, for its friction to be so."""
     return abs(push - needed) <= WARM_SHARE * abs(needed)
@@ -86,17 +111,18 @@ def is_warm(push, needed):
 @inlined
 def heading(x, y, mu):
     """-μ times the direction of (x, y); 0 when that has no direction."""
-    size = math.sqrt(x * x + y * y)
-    if not size > 0.0:
+    square = x * x + y * y
+    if not square > LEAST_SQUARE:
         return 0.0, 0.0
-    return -mu * x / size, -mu * y / size
+    s = -mu * inverse_root(square)
+    return s * x, s * y
 
 
 @inlined
 def turned(x, y, angle):
     """The vector (x, y) turned by about `angle`, its length kept."""
     t = min(TURN_AT_MOST, max(-TURN_AT_MOST, angle))
-    s = 1.0 / math.sqrt(1.0 + t * t)
+    s = inverse_root(1.0 + t * t)
     return s * (x - t * y), s * (y + t * x)
 
 

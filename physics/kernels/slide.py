@@ -50,6 +50,7 @@ from physics.kernels.pair import contact_at, solve_pair
 from physics.kernels.patch import (
     across_misses,
     add_along,
+    centroid,
     comply,
     fit_targets,
     respond,
@@ -130,6 +131,9 @@ def _normal_motion(count, goal, loose, patch, on, u, w):
         Their centroid.
     motion : tuple of 3 floats
         (v_n, ω_a, ω_b).
+    is_even : bool
+        Whether it meets the targets of four contacts within the goal. Then it does whichever of them push; three that
+        met theirs to the letter would have the fourth off by four times as much, and it would push again for nothing.
     """
     is_patch, center, motion = fit_targets(count, patch, on)
     spare = spare_speed(patch, motion[0], motion[1], motion[2])
@@ -142,7 +146,7 @@ def _normal_motion(count, goal, loose, patch, on, u, w):
     fastest = largest(speeds)
     closing = first_of(speeds == fastest) if fastest > goal else -1
     ok = is_patch and largest(on * abs(spare)) <= goal and fastest <= loose
-    return ok, closing, count, on, center, motion
+    return ok, closing, count, on, center, motion, ok and count > 3
 
 
 @inlined
@@ -255,12 +259,14 @@ def search(n, patient, mu, goal, loose, patch, start, pivot, axes, u, w, inv_mas
         Sum of the normal impulses [N s].
     residual : float
         [m/s].
+    has_opened : bool
+        Whether a contact was opened since it pulled: else patience changes nothing.
     """
     ratio = friction_ratio(work)
     mass_b = ratio * ratio * inv_mass
-    on = present(n)
+    on, has_opened = present(n), False
     none = is_back = Lanes(0.0, 0.0, 0.0, 0.0)
-    count, motion, tried, hurry, is_set, again, closing = n, start, none, False, False, -1, -1
+    count, motion, tried, hurry, is_set, is_even, again, closing = n, start, none, False, False, False, -1, -1
     center = normal_motion = start
     for _ in range(SLIDE_LIMIT):
         if again >= 0:
@@ -271,14 +277,16 @@ def search(n, patient, mu, goal, loose, patch, start, pivot, axes, u, w, inv_mas
         if count < 3:
             found, impulses, exerted, push, miss, again = _two_left(patch, on, mu, goal, axes, u, w, inv_mass, K, work)
             if again < 0:
-                return found, impulses, exerted, push, miss
+                return found, impulses, exerted, push, miss, has_opened
             motion = _moved(exerted, u, w, inv_mass, mass_b, K)
             continue
-        if not is_set:
-            ok, closing, count, on, center, normal_motion = _normal_motion(count, goal, loose, patch, on, u, w)
+        if not is_set and is_even:
+            center = centroid(count, patch, on)
+        elif not is_set:
+            ok, closing, count, on, center, normal_motion, is_even = _normal_motion(count, goal, loose, patch, on, u, w)
             if not ok:
                 break
-            is_set = True
+        is_set = True
         vn, wa, wb = normal_motion
         push = (vn - u[0]) / inv_mass
         y0, gain = push / count, (wa - w[1], wb - w[2])
@@ -292,9 +300,9 @@ def search(n, patient, mu, goal, loose, patch, start, pivot, axes, u, w, inv_mas
                 continue
             if what == FOUND:
                 work.mode = PIVOT + work.slot[pivot]
-                return True, impulses, exerted, push, miss
+                return True, impulses, exerted, push, miss, has_opened
             if what == PULLS:
-                count, on, is_set, tried = count - 1, chosen(lane(loser), 0.0, on), False, none
+                count, on, is_set, tried, has_opened = count - 1, chosen(lane(loser), 0.0, on), False, none, True
             elif what == SLIPS:
                 motion = slipped
             pivot = -1
@@ -302,7 +310,7 @@ def search(n, patient, mu, goal, loose, patch, start, pivot, axes, u, w, inv_mas
         slip, y, turning = respond(patch, on, mu, center, y0, gain, motion, wa, wb, K)
         pulling, loser, p, exerted = resultant(patch, on, center, y0, y, slip)
         if not patient and count > 3 and total(pulling) == 2.0:
-            count, on, is_set, tried, motion = 2, on - pulling, False, none, start
+            count, on, is_set, tried, motion, has_opened = 2, on - pulling, False, none, start, True
             continue
         is_settled = True
         if loser < 0 or patient:
@@ -314,14 +322,14 @@ def search(n, patient, mu, goal, loose, patch, start, pivot, axes, u, w, inv_mas
                 continue
             if loser < 0 and miss <= goal:
                 work.mode = SLIDE
-                return True, (p, p * slip[0], p * slip[1]), exerted, push, miss
+                return True, (p, p * slip[0], p * slip[1]), exerted, push, miss, has_opened
             compliance = comply(patch, center, slip, turning, inv_mass, K, work)
             is_settled, pivot, motion = _turn(
                 patch, on, p, slip, mu, compliance, k, motion, delta, inv_mass / K[0], tried, hurry, work
             )
             hurry = hurry or not is_settled
         if loser >= 0 and is_settled:
-            count, on, is_set, tried = count - 1, chosen(lane(loser), 0.0, on), False, none
+            count, on, is_set, tried, has_opened = count - 1, chosen(lane(loser), 0.0, on), False, none, True
             if not patient:
                 motion = start
-    return False, (none, none, none), (0.0, 0.0, 0.0, 0.0, 0.0), 0.0, 0.0
+    return False, (none, none, none), (0.0, 0.0, 0.0, 0.0, 0.0), 0.0, 0.0, has_opened

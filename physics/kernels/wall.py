@@ -30,13 +30,15 @@ def _face(n, friction, axes, u, w, inv_mass, K, work):
     goal = work.tolerance * scale
     loose = max(goal, LOOSE * scale) if n > 3 else goal
     for patient in range(2):
-        found, impulses, exerted, push, miss = search(
+        found, impulses, exerted, push, miss, has_opened = search(
             n, patient > 0, work.mu, goal, loose, patch, start, pivot, axes, u, w, inv_mass, K, work
         )
         if found:
             for i in range(n):
                 _store(i, (impulses[0][i], impulses[1][i], impulses[2][i]), friction, work)
             return True, exerted, push, miss, scale
+        if not has_opened:
+            break
     return False, (0.0, 0.0, 0.0, 0.0, 0.0), 0.0, 0.0, scale
 
 

@@ -122,16 +122,14 @@ def _turned(q, L, J, series, h):
 def storing(moments, angvel, h, steps):
     """Root mean square of the angle [rad] that `steps` attitudes make of rounding when they are stored, and only then.
 
-    A component is off by ulp/√12 (rms), along no radius, and the linearised flow, by differences, takes that to the end.
+    A component is off by ulp/√12 (rms), along no radius; the linearised flow, by differences, takes that to the end.
     """
     J, series = tuple(1.0 / moments), np.zeros(rotation.SERIES_SIZE)
     rotation.attitude_series(*J, series)
     held, offset = (tuple(map(float, moments * angvel)), J, series, h), 1e-5
     q, attitudes, flows = (1.0, 0.0, 0.0, 0.0), [], []
     for _ in range(steps):
-        ends = [
-            [_turned(qt.normalise(tuple(q + sign * offset * e)), *held) for sign in (1.0, -1.0)] for e in np.eye(4)
-        ]
+        ends = [[_turned(qt.normalise(tuple(q + sign * offset * e)), *held) for sign in (1.0, -1.0)] for e in np.eye(4)]
         flows.append(np.array([np.subtract(*pair) for pair in ends]).T / (2.0 * offset))
         q = _turned(q, *held)
         attitudes.append(q)

@@ -2,16 +2,31 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from physics.kernels.point import HELD, LOST, OPEN, SLID, answer, block
+from physics.kernels.compiler import kernel
+from physics.kernels.lanes import Lanes
+from physics.kernels.point import (
+    HELD,
+    LEAST_SQUARE,
+    LOST,
+    OPEN,
+    SLID,
+    answer,
+    block,
+    heading,
+    inverse_root,
+    own_block,
+)
 from physics.kernels.slide import HOLD, PIVOT, SLIDE
 from physics.kernels.solve import DIRECT
 from tests.kernels.contact_problem import FACE, MASS, Problem
-from tests.kernels.test_direct import FALL, assert_solved, floor
+from tests.kernels.test_direct import FALL, assert_solved, floor, law_defect
 
 TOLERANCE = 1e-9
 
@@ -92,6 +107,54 @@ def test_a_face_that_tips_is_solved_directly_though_its_targets_differ():
     assert direct >= 0.94 * 400
 
 
+# Vertices, v, w, quaternion and normal targets of blocks in a batch, each under a wrench of its own in each step.
+LEFT_FOR_SWEEPS = {
+    # Newton's method goes on to where friction pushes a contact along.
+    "turns round": (
+        (0, 1),
+        (0.02159, -0.06175, -0.00417),
+        (0.02211, 0.02442, -0.02143),
+        (0.9304, -0.2741, 0.2333, 0.0687),
+        (0.0, 0.0),
+    ),
+    # One holds, one slides: with the latter open it closes, with both sliding it would pull.
+    "one holds": (
+        (0, 1),
+        (0.00677, -0.00466, -0.00897),
+        (0.02116, -0.00651, -0.0207),
+        (-0.1646, 0.0, 0.9864, 0.0),
+        (0.0, 0.0),
+    ),
+    "two are left": (
+        (0, 1, 4, 5),
+        (-0.00914, -0.02055, -0.0224),
+        (-0.03527, -0.00618, -0.01088),
+        (0.9912, 0.0, 0.1322, 0.0),
+        (0.0, 0.0, 0.0, 0.0),
+    ),
+    # Targets within the goal of a rigid motion: met to the letter by three, the fourth is off by more.
+    "uneven": (
+        (2, 3, 6, 7),
+        (-0.01454, -0.02508, 0.00897),
+        (0.01785, -0.00309, -0.01762),
+        (0.0, 0.3797, 0.0, 0.9251),
+        (-3.6e-07, -4.4e-07, 0.0, 0.0),
+    ),
+}
+
+
+@pytest.mark.parametrize("key", LEFT_FOR_SWEEPS)
+def test_what_was_left_for_sweeps_is_solved_directly(key):
+    vertices, v, w, quat, normal_targets = LEFT_FOR_SWEEPS[key]
+    target = np.zeros((len(vertices), 3))
+    target[:, 0] = normal_targets
+    problem = Problem(floor(vertices), v, w, 0.5, quat=quat, target=target, tolerance=1e-6)
+    p, (_, _, residual, _, method) = problem.solve(SLIDE)
+    assert method == DIRECT
+    assert residual <= 1e-6
+    assert law_defect(problem, p) <= 1e-4  # for why a hundred times that: `assert_solved`
+
+
 def test_two_contacts_that_slid_are_not_asked_to_hold_first():
     """Where two contacts slide, that is what the next step tries first, whatever held before."""
     problem = Problem(floor((0, 1)), (0.3, FALL, 0.1), (0, 0, 0), 0.5)
@@ -152,3 +215,30 @@ def test_blocks_of_the_wall_frame_are_those_of_the_dense_matrix():
     r, s = (tuple(axes @ problem.one["arm"][i]) for i in range(2))
     # Sums of products of size 1, a dozen roundings.
     np.testing.assert_allclose(np.reshape(block(r, s, 1 / problem.mass, 1.0, K), (3, 3)), W[:3, 3:], atol=5e-15)
+    own = np.reshape(own_block(r, 1 / problem.mass, 1.0, K), (3, 3))
+    np.testing.assert_allclose(own, W[:3, :3], atol=5e-15)
+    np.testing.assert_array_equal(own, own.T)
+
+
+@kernel
+def _inverse_roots(x, out):
+    out[0] = inverse_root(x)
+    lanes = inverse_root(Lanes(x, 2.0 * x, 3.0 * x, 4.0 * x))
+    for k in range(4):
+        out[1 + k] = lanes[k]
+
+
+@given(st.floats(LEAST_SQUARE, 1e300))
+def test_the_inverse_root_is_off_by_two_roundings(x):
+    """The product of the root, ½ ulp off and with it 1/x, is rounded once more: 1.5 EPS of it at most."""
+    out = np.zeros(5)
+    _inverse_roots(x, out)
+    squares = np.array([x, x, 2.0 * x, 3.0 * x, 4.0 * x])
+    np.testing.assert_allclose(out * np.sqrt(squares), 1.0, rtol=0, atol=3 * np.finfo(float).eps)
+
+
+def test_a_direction_has_the_length_asked_for_or_there_is_none():
+    for x, y in [(3.0, -4.0), (1e-140, 0.0), (-1e120, 1e119)]:
+        a, b = heading(x, y, 0.5)
+        np.testing.assert_allclose((a, b), -0.5 * np.array([x, y]) / math.hypot(x, y), rtol=4e-16)
+    assert heading(1e-150, 1e-160, 0.5) == heading(0.0, 0.0, 0.5) == (0.0, 0.0)
