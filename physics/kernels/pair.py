@@ -188,7 +188,7 @@ def solve_two(W1, W12, W2, b1, b2, mu, goal, x1, y1, x2, y2):
                 found, q2, q1, worst, x2, y2, x1, y1 = _opened(W2, W12, b2, b1, mu, goal, x2, y2)
             if found:
                 return True, q1, q2, worst
-            is_stuck, opened = opened == OPENED_LIMIT, opened + 1  # the open one closes: once more with both
+            is_stuck, opened = opened >= OPENED_LIMIT, opened + 1  # the open one closes: once more with both
         elif worst <= goal:
             return True, q1, q2, worst
         elif miss1 == math.inf and held1 < HELD_LIMIT:
