@@ -193,7 +193,10 @@ class World:
         return self.report
 
     def advance(self, calls: list[Work], wrench: np.ndarray, steps: int, dt: float) -> None:
-        """Make the `kernel_calls` of so many steps of `dt` [s] with this wrench; for those who prepare them."""
+        """Make the `kernel_calls` of so many steps of `dt` [s] with this wrench; for those who prepare them.
+
+        A `Stepper` leaves this out where it comes to one call: what takes part in a step here is in `stepper._is_all`.
+        """
         if self.recorder is not None:
             self.recorder.before(wrench, steps, dt)
         if self.actuation is None:

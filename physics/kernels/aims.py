@@ -22,7 +22,7 @@ UNSEEN = 1.0e-3
 
 @inlined
 def aim_impact(n, bounce_speed, slop_speed, rate, work):
-    """Targets of an impact, and whether there is one.
+    """Targets of an impact, and whether there is one: where no contact is fast enough for it, none is looked at.
 
     A contact that approaches faster than `bounce_speed` leaves with e times that speed (Newton's law); one that
     approaches slower is brought to rest, since its rebound would be over within the step, and if it also is slower
