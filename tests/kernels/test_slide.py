@@ -115,7 +115,7 @@ LEFT_FOR_SWEEPS = {
         (0.02159, -0.06175, -0.00417),
         (0.02211, 0.02442, -0.02143),
         (0.9304, -0.2741, 0.2333, 0.0687),
-        (0.0, 0.0),
+        (-2.77e-06, -5.1e-06),
     ),
     # One holds, one slides: with the latter open it closes, with both sliding it would pull.
     "one holds": (
