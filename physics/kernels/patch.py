@@ -1,4 +1,4 @@
-"""Sums over the contacts of a patch on one wall, for `slide` and `pivot`, whose docstrings have the formulas.
+"""Sums over the contacts of a patch on one wall, for `slide` and `dual`, whose docstrings have the formulas.
 
 A patch has three or four contacts, a lane each (`lanes`); the fourth lane of three is the third contact once more, and
 never pushes. `on` is 1 for a contact that pushes and 0 for one that is open. All is in the stretched frame of `ellipse`
@@ -62,6 +62,14 @@ def warm_motion(n, patch, on, u, w, inv_mass, K, work):
     spin = K[0] * (a * y - b * x) + K[1] * (b * p - c * y) + K[2] * (c * x - a * p)
     motion = u[1] + inv_mass * total(x), u[2] + ratio * ratio * inv_mass * total(y), w[0] + total(spin)
     return motion, is_warm(inv_mass * total(p), -u[0])
+
+
+@inlined
+def warm_slip(n, patch, on, work):
+    """Impulses per normal impulse along the tangents (two lanes) of those in `work`; 0 where nothing pushes."""
+    p = on * part(work.impulse, 0, n)
+    s = chosen(p > 0.0, 1.0 / p, 0.0)
+    return s * part(work.impulse, 1, n), s * part(work.impulse, 2, n) / friction_ratio(work)
 
 
 @inlined
@@ -161,21 +169,24 @@ def opposed(ua, ub, on, mu):
 
 
 @inlined
-def respond(patch, on, mu, center, y0, gain, motion, wa, wb, K):
-    """Directions at a planar motion, and the y_1, y_2 that go with them.
+def slips(patch, motion, wa, wb):
+    """Tangential velocities of the contacts less their targets [m/s] in a planar motion."""
+    (c, a, b), (_, target_a, target_b), _ = patch
+    return motion[0] + wb * c - motion[2] * b - target_a, motion[1] + motion[2] * a - wa * c - target_b
+
+
+@inlined
+def respond(patch, on, center, y0, gain, slip, K):
+    """The y_1, y_2 that go with some directions, `slip`: impulses per normal impulse along the tangents (and speeds).
 
     Returns
     -------
-    slip : tuple of 3 lanes
-        Impulse per normal impulse along the tangents, -μ d, and sliding speed [m/s].
     y : tuple of 2 floats
     turning : tuple of 6 floats
         (ω_a per y_1, y_2; ω_b per y_1, y_2; ω_n per y_1, y_2), friction along with them.
     """
-    (c, a, b), (_, target_a, target_b), _ = patch
-    x, y, size = opposed(
-        motion[0] + wb * c - motion[2] * b - target_a, motion[1] + motion[2] * a - wa * c - target_b, on, mu
-    )
+    (c, a, b), _, _ = patch
+    x, y, _ = slip
     mn, ma, mb = a * y - b * x, on * b - c * y, c * x - on * a
     a, b = a - center[1], b - center[2]
     n0, n1, n2 = total(mn), total(a * mn), total(b * mn)
@@ -187,7 +198,7 @@ def respond(patch, on, mu, center, y0, gain, motion, wa, wb, K):
     f1, f2 = K[0] * n1 + K[1] * a1 + K[2] * b1, K[0] * n2 + K[1] * a2 + K[2] * b2
     s = 1.0 / (g1 * h2 - g2 * h1)
     ra, rb = gain[0] - g0 * y0, gain[1] - h0 * y0
-    return (x, y, size), (s * (h2 * ra - g2 * rb), s * (g1 * rb - h1 * ra)), (g1, g2, h1, h2, f1, f2)
+    return (s * (h2 * ra - g2 * rb), s * (g1 * rb - h1 * ra)), (g1, g2, h1, h2, f1, f2)
 
 
 @inlined
@@ -236,8 +247,15 @@ def resultant(patch, on, center, y0, y, slip):
 
 
 @inlined
+def moved(exerted, u, w, inv_mass, mass_b, K):
+    """Planar motion that impulses along the tangents, and moments, lead to."""
+    fa, fb, tn, ta, tb = exerted
+    return u[1] + inv_mass * fa, u[2] + mass_b * fb, w[0] + (K[0] * tn + K[1] * ta + K[2] * tb)
+
+
+@inlined
 def across_misses(patch, p, slip, mu, delta):
-    """Largest tangential residual [m/s] when the motion that the directions are of is left by delta.
+    """Largest tangential residual [m/s] when the motion that the directions are of is left by delta: if all slide.
 
     Of the contacts with a push p > 0. Of one that moves backwards the whole velocity counts: its impulse is in the
     cone, and projections do not lengthen.
@@ -261,17 +279,10 @@ def across_misses(patch, p, slip, mu, delta):
 
 
 @inlined
-def add_along(patch, p, slip, mu, k):
-    """H with the part along the directions, κ d dᵀ, besides: friction as a viscous drag."""
-    (_, a, b), _, _ = patch
-    x, y, size = slip
-    s, h = chosen(size > 0.0, p / (mu * size), 0.0), a * y - b * x
-    sx, sy = s * x, s * y
-    k11, k12, k13, k22, k23, k33 = k
-    return (
-        k11 + total(sx * x), k12 + total(sx * y), k13 + total(sx * h),
-        k22 + total(sy * y), k23 + total(sy * h), k33 + total(s * h * h),
-    )  # fmt: skip
+def is_turned(on, d, size, change):
+    """Which slips, of direction d and this size [m/s], turn by more than about 70 degrees when they change."""
+    along, across = size + (d[0] * change[0] + d[1] * change[1]), d[0] * change[1] - d[1] * change[0]
+    return (on * size > 0.0) & ~((along > 0.1 * size) & (abs(across) <= 3.0 * along))
 
 
 @inlined
@@ -279,7 +290,6 @@ def turns_little(patch, on, slip, mu, step):
     """Whether no direction turns by more than about 70 degrees, and none backwards, in a step of the motion."""
     (_, a, b), _, _ = patch
     x, y, size = slip
-    s = 1.0 / mu
-    da, db = step[0] - step[2] * b, step[1] + step[2] * a
-    along, across = size - s * (x * da + y * db), s * (x * db - y * da)
-    return first_of((on * size > 0.0) & ~((along > 0.1 * size) & (abs(across) <= 3.0 * along))) < 0
+    s = -1.0 / mu
+    change = step[0] - step[2] * b, step[1] + step[2] * a
+    return first_of(is_turned(on, (s * x, s * y), size, change)) < 0

@@ -24,92 +24,49 @@ slops). Where the impulses are those of the directions of τ, the velocity acros
 so the residual is measured, not estimated: |h_i·δ| s/(s + |u|) with s = μ p_i (W_aa + W_bb), no less than the
 natural map of `sweeps`.
 
-Where a step would turn a direction right round, Newton's method is left for one step of Weiszfeld's: H then also
-has the part along the directions, κ_i d_i d_iᵀ, as if friction were a viscous drag of that coefficient. That
-always slows the contacts that stop; one that all but stops is tried as a pivot (`pivot`).
+Where a step would turn a direction right round some contacts stop, or hold: their impulses, not their directions, are
+what is sought then (`dual`).
 
 A contact that would have to pull opens, the one that pulls most first, or two of four at once (the block tips over an
 edge); the fit of the targets says whether it then separates fast enough. One that would close while the others push
 pushes again, once; where three push and it hardly closes, not before these are solved. Without friction the first
 linear system is the solution.
 
-All begins with the motion that the impulses of the last step lead to, or, where these are of other loads, with
-`patch.cold_motion`.
+All begins with the motion that the impulses of the last step lead to, and with themselves where some contacts held; or,
+where they are of other loads, with `patch.cold_motion`.
 """
 
 from __future__ import annotations
 
 import math
 
-from physics.kernels import quaternion as qt
 from physics.kernels.columns import lane, present
 from physics.kernels.compiler import inlined
+from physics.kernels.dual import FOUND, NOT_FOUND, PULLS, hold_some, slowed, solve_compliant
 from physics.kernels.ellipse import friction_ratio
-from physics.kernels.lanes import Lanes, chosen, first_of, larger, largest, least, root, total
+from physics.kernels.lanes import Lanes, chosen, first_of, larger, largest, total
 from physics.kernels.pair import contact_at, solve_pair
 from physics.kernels.patch import (
     across_misses,
-    add_along,
     centroid,
     comply,
     fit_targets,
+    moved,
+    opposed,
     respond,
     resultant,
+    slips,
     spare_speed,
     turns_little,
+    warm_slip,
 )
-from physics.kernels.pivot import FOUND, PULLS, SLIPS, turn_about
 
 # Linear solves of one attempt at most. Two are usual at a tolerance of 1e-6, each contact that opens costs
 # one more.
 SLIDE_LIMIT = 16
 
-# A contact is tried as a pivot when a step of Weiszfeld's leaves less than this share of its speed; after the first
-# such step, the slowest one whatever is left.
-STOPPING = 0.3
-
-# A motion too fast by more than 1/STRETCH_LIMIT is slowed first.
-STRETCH_LIMIT = 0.4
-
-# What to try first (`work.mode`): all hold, all slide, or PIVOT + the slot of the contact that holds.
-HOLD, SLIDE, PIVOT = range(3)
-
-
-@inlined
-def _newton(compliance, k, delta):
-    """Step Δτ of (1 + C H) Δτ = δ, by the columns of the matrix and Cramer's rule."""
-    c0, c1, c2, c3, c4, c5, c6, c7, c8 = compliance
-    k0, k1, k2, k3, k4, k5 = k
-    p = (
-        1.0 + (c0 * k0 + c1 * k1 + c2 * k2),
-        c3 * k0 + c4 * k1 + c5 * k2,
-        c6 * k0 + c7 * k1 + c8 * k2,
-    )
-    q = (
-        c0 * k1 + c1 * k3 + c2 * k4,
-        1.0 + (c3 * k1 + c4 * k3 + c5 * k4),
-        c6 * k1 + c7 * k3 + c8 * k4,
-    )
-    r = (
-        c0 * k2 + c1 * k4 + c2 * k5,
-        c3 * k2 + c4 * k4 + c5 * k5,
-        1.0 + (c6 * k2 + c7 * k4 + c8 * k5),
-    )
-    qr = qt.cross(q, r)
-    s = 1.0 / qt.dot(p, qr)
-    return s * qt.dot(qr, delta), s * qt.dot(qt.cross(r, p), delta), s * qt.dot(qt.cross(p, q), delta)
-
-
-@inlined
-def _lengthening(motion, delta, gyration2, work):
-    """By how much a motion of the same direction is larger where it leaves no energy: on the ray through it.
-
-    The friction is the same all along the ray: σ = 1 + <τ, δ>/<τ, τ>, in the metric (1, 1/k², I/m), k = μ2/μ1.
-    """
-    ratio = friction_ratio(work)
-    s = 1.0 / (ratio * ratio)
-    size2 = motion[0] * motion[0] + s * motion[1] * motion[1] + gyration2 * motion[2] * motion[2]
-    return 1.0 + (motion[0] * delta[0] + s * motion[1] * delta[1] + gyration2 * motion[2] * delta[2]) / size2
+# What to try first (`work.mode`): all hold, all slide, or some of both.
+HOLD, SLIDE, MIXED = range(3)
 
 
 @inlined
@@ -150,46 +107,6 @@ def _normal_motion(count, goal, loose, patch, on, u, w):
 
 
 @inlined
-def _slowest(patch, on, slip, mu, step, tried, hurry):
-    """The active contact, not yet `tried`, that is slowest after a step, if it is STOPPING or in a `hurry`; or -1."""
-    (_, a, b), _, _ = patch
-    x, y, size = slip
-    da, db = step[0] - step[2] * b, step[1] + step[2] * a
-    s = size / mu
-    ua, ub = da - s * x, db - s * y
-    left = chosen(on > tried, root(ua * ua + ub * ub), math.inf)
-    if not hurry:
-        left = chosen(left < STOPPING * size, left, math.inf)
-    best = least(left)
-    return first_of(left == best) if best < math.inf else -1
-
-
-@inlined
-def _turn(patch, on, p, slip, mu, compliance, k, motion, delta, gyration2, tried, hurry, work):
-    """The next motion by Newton's step, or what replaces it: (whether it was Newton's, pivot to try or -1, motion)."""
-    step = _newton(compliance, k, delta)
-    is_settled = turns_little(patch, on, slip, mu, step)
-    pivot = -1
-    if not is_settled:
-        stretch = _lengthening(motion, delta, gyration2, work)
-        if 0.0 < stretch < STRETCH_LIMIT:
-            return False, -1, (stretch * motion[0], stretch * motion[1], stretch * motion[2])
-        step = _newton(compliance, add_along(patch, p, slip, mu, k), delta)
-        pivot = _slowest(patch, on, slip, mu, step, tried, hurry)
-    return is_settled, pivot, (motion[0] + step[0], motion[1] + step[1], motion[2] + step[2])
-
-
-@inlined
-def first_pivot(n, work):
-    """The contact that held alone in the step before, or -1."""
-    if work.mode >= PIVOT:
-        for i in range(n):
-            if work.slot[i] == work.mode - PIVOT:
-                return i
-    return -1
-
-
-@inlined
 def _two_left(patch, on, mu, goal, axes, u, w, inv_mass, K, work):
     """The two contacts that still push, the others open.
 
@@ -222,14 +139,7 @@ def _two_left(patch, on, mu, goal, axes, u, w, inv_mass, K, work):
 
 
 @inlined
-def _moved(exerted, u, w, inv_mass, mass_b, K):
-    """Planar motion that impulses along the tangents, and moments, lead to."""
-    fa, fb, tn, ta, tb = exerted
-    return u[1] + inv_mass * fa, u[2] + mass_b * fb, w[0] + (K[0] * tn + K[1] * ta + K[2] * tb)
-
-
-@inlined
-def search(n, patient, mu, goal, loose, patch, start, pivot, axes, u, w, inv_mass, K, work):
+def search(n, patient, mu, goal, loose, patch, start, is_mixed, axes, u, w, inv_mass, K, work):
     """Directions and set of pushing contacts.
 
     Parameters
@@ -243,8 +153,8 @@ def search(n, patient, mu, goal, loose, patch, start, pivot, axes, u, w, inv_mas
         Speed up to which an open contact may close while it is sought which others push [m/s].
     start : tuple of 3 floats
         Planar motion to start from.
-    pivot : int
-        Contact that is tried as one first, or -1.
+    is_mixed : bool
+        Whether some contacts held in the stage before: then its impulses in `work` are the start.
     u, w, K
         Velocity and angular velocity without contact impulses, inverse inertia: in the stretched frame of the wall.
 
@@ -266,19 +176,19 @@ def search(n, patient, mu, goal, loose, patch, start, pivot, axes, u, w, inv_mas
     mass_b = ratio * ratio * inv_mass
     on, has_opened = present(n), False
     none = is_back = Lanes(0.0, 0.0, 0.0, 0.0)
-    count, motion, tried, hurry, is_set, is_even, again, closing = n, start, none, False, False, False, -1, -1
+    count, motion, is_set, is_even, again, closing = n, start, False, False, -1, -1
     center = normal_motion = start
     for _ in range(SLIDE_LIMIT):
         if again >= 0:
             if is_back[again] > 0.0:
                 break
             count, on, is_back = count + 1, chosen(lane(again), 1.0, on), chosen(lane(again), 1.0, is_back)
-            again, is_set, tried = -1, False, none
+            again, is_set = -1, False
         if count < 3:
             found, impulses, exerted, push, miss, again = _two_left(patch, on, mu, goal, axes, u, w, inv_mass, K, work)
             if again < 0:
                 return found, impulses, exerted, push, miss, has_opened
-            motion = _moved(exerted, u, w, inv_mass, mass_b, K)
+            motion = moved(exerted, u, w, inv_mass, mass_b, K)
             continue
         if not is_set and is_even:
             center = centroid(count, patch, on)
@@ -290,46 +200,45 @@ def search(n, patient, mu, goal, loose, patch, start, pivot, axes, u, w, inv_mas
         vn, wa, wb = normal_motion
         push = (vn - u[0]) / inv_mass
         y0, gain = push / count, (wa - w[1], wb - w[2])
-        if pivot >= 0:
-            tried = chosen(lane(pivot), 1.0, tried)
-            what, loser, impulses, exerted, miss, slipped = turn_about(
-                pivot, patch, on, mu, goal, center, y0, gain, u, w, wa, wb, motion[2], inv_mass, K, work
-            )
-            if what == FOUND and closing >= 0:
-                again = closing
+        what, is_open, mode = NOT_FOUND, False, SLIDE
+        if is_mixed:
+            x, y = warm_slip(n, patch, on, work)
+        else:
+            slip = opposed(*slips(patch, motion, wa, wb), on, mu)
+            slopes, turning = respond(patch, on, center, y0, gain, slip, K)
+            pulling, loser, p, exerted = resultant(patch, on, center, y0, slopes, slip)
+            if not patient and count > 3 and total(pulling) == 2.0:
+                count, on, is_set, motion, has_opened = 2, on - pulling, False, start, True
                 continue
-            if what == FOUND:
-                work.mode = PIVOT + work.slot[pivot]
-                return True, impulses, exerted, push, miss, has_opened
-            if what == PULLS:
-                count, on, is_set, tried, has_opened = count - 1, chosen(lane(loser), 0.0, on), False, none, True
-            elif what == SLIPS:
-                motion = slipped
-            pivot = -1
-            continue
-        slip, y, turning = respond(patch, on, mu, center, y0, gain, motion, wa, wb, K)
-        pulling, loser, p, exerted = resultant(patch, on, center, y0, y, slip)
-        if not patient and count > 3 and total(pulling) == 2.0:
-            count, on, is_set, tried, motion, has_opened = 2, on - pulling, False, none, start, True
-            continue
-        is_settled = True
-        if loser < 0 or patient:
-            led_to = _moved(exerted, u, w, inv_mass, mass_b, K)
-            delta = led_to[0] - motion[0], led_to[1] - motion[1], led_to[2] - motion[2]
-            miss, k = across_misses(patch, p, slip, mu, delta)
-            if loser < 0 and miss <= goal and closing >= 0:
-                again = closing
-                continue
-            if loser < 0 and miss <= goal:
-                work.mode = SLIDE
-                return True, (p, p * slip[0], p * slip[1]), exerted, push, miss, has_opened
-            compliance = comply(patch, center, slip, turning, inv_mass, K, work)
-            is_settled, pivot, motion = _turn(
-                patch, on, p, slip, mu, compliance, k, motion, delta, inv_mass / K[0], tried, hurry, work
+            x, y = slip[0], slip[1]
+            is_open = loser >= 0
+            if not is_open or patient:
+                led_to = moved(exerted, u, w, inv_mass, mass_b, K)
+                delta = led_to[0] - motion[0], led_to[1] - motion[1], led_to[2] - motion[2]
+                miss, k = across_misses(patch, p, slip, mu, delta)
+                if not is_open and miss <= goal:
+                    what = FOUND
+                else:
+                    compliance = comply(patch, center, slip, turning, inv_mass, K, work)
+                    step = solve_compliant(compliance, (k[0], k[1], k[2], k[1], k[3], k[4], k[2], k[4], k[5]), delta)
+                    is_mixed = not turns_little(patch, on, slip, mu, step)
+                    if is_mixed:
+                        step, x, y = slowed(patch, on, p, slip, mu, compliance, delta, goal)
+                    motion = motion[0] + step[0], motion[1] + step[1], motion[2] + step[2]
+        if is_mixed:
+            what, loser, p, x, y, exerted, miss, motion = hold_some(
+                patient, patch, on, x, y, mu, goal, loose, center, y0, gain, motion, u, w, wa, wb, inv_mass, K, work
             )
-            hurry = hurry or not is_settled
-        if loser >= 0 and is_settled:
-            count, on, is_set, tried, has_opened = count - 1, chosen(lane(loser), 0.0, on), False, none, True
+            if what == NOT_FOUND:
+                break
+            is_open, is_mixed, mode = what == PULLS, False, MIXED
+        if what == FOUND and closing < 0:
+            work.mode = mode
+            return True, (p, p * x, p * y), exerted, push, miss, has_opened
+        if what == FOUND:
+            again = closing
+        if is_open:
+            count, on, is_set, has_opened = count - 1, chosen(lane(loser), 0.0, on), False, True
             if not patient:
                 motion = start
     return False, (none, none, none), (0.0, 0.0, 0.0, 0.0, 0.0), 0.0, 0.0, has_opened

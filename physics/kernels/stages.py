@@ -20,7 +20,7 @@ from physics.kernels.slip import has_turned_round, oppose_end_slip, oppose_mean_
 from physics.kernels.solve import PIVOTING, solve_contacts
 
 # Row of `memory`: length of the last resting stage [s], its contact count, which direct solve worked last
-# (`slide.HOLD`, `SLIDE`, `PIVOT` + slot), the slots of its contacts, then the impulses of all slots, zero where
+# (`slide.HOLD`, `SLIDE`, `MIXED`), the slots of its contacts, then the impulses of all slots, zero where
 # there is no contact.
 STAGE_LENGTH, CONTACT_COUNT, MODE = range(3)
 MEMORY_HEAD = 3

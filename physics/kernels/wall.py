@@ -9,7 +9,7 @@ from physics.kernels.pair import contact_at, solve_one, solve_pair
 from physics.kernels.patch import cold_motion, free_speed, place_patch, warm_motion
 from physics.kernels.point import to_world, wall_frame
 from physics.kernels.share import wall_axes
-from physics.kernels.slide import SLIDE, first_pivot, search
+from physics.kernels.slide import MIXED, SLIDE, search
 
 # Share of the free speed by which a contact that opened may close while it is sought which others push.
 LOOSE = 1.0e-2
@@ -20,18 +20,17 @@ def _face(n, friction, axes, u, w, inv_mass, K, work):
     """Three contacts or four: (found, tangents and moments, Σ p_n, residual, its scale), `work.impulse` when found."""
     patch, on = place_patch(n, axes, inv_mass, K, work), present(n)
     scale = free_speed(friction, patch, u, w)
-    start, pivot = (u[1], u[2], w[0]), -1
+    start, is_mixed = (u[1], u[2], w[0]), False
     if friction is not None:
         start, is_of_now = warm_motion(n, patch, on, u, w, inv_mass, K, work)
-        if is_of_now:
-            pivot = first_pivot(n, work)
-        elif work.mu > 0.0:
+        is_mixed = is_of_now and work.mode == MIXED
+        if not is_of_now and work.mu > 0.0:
             start = cold_motion(n, patch, on, work.mu, u, w, inv_mass, K)
     goal = work.tolerance * scale
     loose = max(goal, LOOSE * scale) if n > 3 else goal
     for patient in range(2):
         found, impulses, exerted, push, miss, has_opened = search(
-            n, patient > 0, work.mu, goal, loose, patch, start, pivot, axes, u, w, inv_mass, K, work
+            n, patient > 0, work.mu, goal, loose, patch, start, is_mixed, axes, u, w, inv_mass, K, work
         )
         if found:
             for i in range(n):
