@@ -2,8 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import cache
+
 import numpy as np
 from numpy.typing import ArrayLike
+
+from physics.kernels.intake import take_in
+from physics.machine_code import compiled
 
 # A quaternion counts as a unit quaternion within this; it is then normalised to rounding. Six digits are what
 # a state printed or stored in single precision keeps.
@@ -14,17 +20,42 @@ UNIT_TOLERANCE = 1e-6
 UNIT_ROUNDING = 4 * np.finfo(float).eps
 
 
-def finite(value: ArrayLike, shape: tuple[int, ...], field: str) -> np.ndarray:
-    """`value` as a float64 array of exactly `shape`, all finite."""
+def shaped(value: ArrayLike, shape: tuple[int, ...], field: str) -> np.ndarray:
+    """`value` as a float64 array of exactly `shape`."""
     try:
         array = np.asarray(value, dtype=np.float64)
     except (TypeError, ValueError):
         raise ValueError(f"{field} is {value!r}; allowed are numbers in shape {shape}") from None
     if array.shape != shape:
         raise ValueError(f"{field} has shape {array.shape}; allowed is shape {shape}")
-    if not np.isfinite(array).all():
-        raise ValueError(f"{field} is {_show(array)}; allowed are finite numbers")
     return array
+
+
+def finite(value: ArrayLike, shape: tuple[int, ...], field: str) -> np.ndarray:
+    """`value` as a float64 array of exactly `shape`, all finite."""
+    array = shaped(value, shape, field)
+    if not np.isfinite(array).all():
+        raise _not_finite(array, field)
+    return array
+
+
+def take_finite(value: ArrayLike, target: np.ndarray, field: str) -> None:
+    """Copy `value` to `target`, a contiguous float64 array of the shape that it must have, all finite.
+
+    Copied and looked at in one pass: after an error `target` is changed, too. For what is handed in with every step.
+    """
+    array = shaped(value, target.shape, field)
+    if not _taking()(np.ascontiguousarray(array).reshape(1, -1), target.reshape(1, -1)):
+        raise _not_finite(array, field)
+
+
+@cache
+def _taking() -> Callable[[np.ndarray, np.ndarray], bool]:
+    return compiled(take_in, (np.zeros((1, 1)), np.zeros((1, 1))))
+
+
+def _not_finite(array: np.ndarray, field: str) -> ValueError:
+    return ValueError(f"{field} is {_show(array)}; allowed are finite numbers")
 
 
 def rows(value: ArrayLike, width: int, field: str) -> np.ndarray:

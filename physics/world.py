@@ -179,8 +179,10 @@ class World:
         ValueError
             A wrench of the wrong shape or not finite, or steps or dt out of range; nothing has moved then.
         """
-        if wrench is not None:
-            wrench = checks.finite(wrench, (self.worlds, self.body_count, 6), "wrench")
+        if wrench is None:
+            self._wrench[...] = 0.0
+        else:
+            checks.take_finite(wrench, self._wrench, "wrench")
         steps = checks.count(steps, "steps")
         dt = self.dt if dt is None else float(checks.positive(dt, (), "dt"))
         if self._bound_for is None:
@@ -188,7 +190,6 @@ class World:
         elif (steps, dt) != self._bound_for:
             retime(self, self._calls, steps, dt)
         self._bound_for = (steps, dt)
-        self._wrench[...] = 0.0 if wrench is None else wrench
         self.advance(self._calls, self._wrench, steps, dt)
         return self.report
 

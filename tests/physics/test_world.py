@@ -217,6 +217,22 @@ def test_a_bad_wrench_is_refused_and_nothing_moves(wrench, message):
     assert world.time == 0
 
 
+def test_a_wrench_may_be_any_array_of_numbers(rng):
+    """Read-only, with gaps, transposed, whole numbers, a list: each moves the world as a plain array does."""
+    plain = rng.integers(-9, 9, (2, 1, 6)).astype(float)
+    wide = np.repeat(plain, 2, axis=2)
+    frozen = plain.copy()
+    frozen.flags.writeable = False
+    kinds = (frozen, wide[:, :, ::2], np.asfortranarray(plain), plain.astype(np.int32), plain.tolist())
+    worlds = [physics.World(scenes.drop(), worlds=2, dt=0.005) for _ in range(1 + len(kinds))]
+    for world, wrench in zip(worlds, (plain, *kinds), strict=True):
+        world.step(wrench)
+        assert world.state.tobytes() == worlds[0].state.tobytes()
+    worlds[0].step()  # and none after one is none
+    worlds[1].step(np.zeros((2, 1, 6)))
+    assert worlds[1].state.tobytes() == worlds[0].state.tobytes()
+
+
 BAD_SCENES = [
     (lambda: physics.Block((5, 3), 6.0), r"size has shape \(2,\)"),
     (lambda: physics.Block((5, 3, -2), 6.0), "size is .*-2"),
