@@ -68,6 +68,9 @@ SLIDE_LIMIT = 16
 # What to try first (`work.mode`): all hold, all slide, or some of both.
 HOLD, SLIDE, MIXED = range(3)
 
+# What a round comes to, beside `dual.NOT_FOUND`, `FOUND` and `PULLS`.
+GOES_ON, TIPS, TURNS_ROUND = range(3, 6)
+
 
 @inlined
 def _normal_motion(count, goal, loose, patch, on, u, w):
@@ -139,6 +142,50 @@ def _two_left(patch, on, mu, goal, axes, u, w, inv_mass, K, work):
 
 
 @inlined
+def _turn(patient, count, patch, on, mu, goal, center, y0, gain, motion, u, w, wa, wb, inv_mass, K, work):
+    """One round of Newton's method on the directions, those of `motion`.
+
+    Returns
+    -------
+    what : int
+        FOUND; GOES_ON; PULLS: the contact `loser` would have to pull; TIPS: two of four would; TURNS_ROUND: a direction
+        would, and the motion is that of the first step of `dual`.
+    loser, pulling
+        As of `resultant`.
+    p, x, y : lanes
+        Normal impulses, and impulses along the tangents per normal impulse: for the next round when it TURNS_ROUND.
+    exerted : tuple of 5 floats
+    miss : float
+        Residual [m/s].
+    motion : tuple of 3 floats
+        Of the next round.
+    """
+    slip, miss = opposed(*slips(patch, motion, wa, wb), on, mu), 0.0
+    slopes, turning = respond(patch, on, center, y0, gain, slip, K)
+    pulling, loser, p, exerted = resultant(patch, on, center, y0, slopes, slip)
+    x, y, what = slip[0], slip[1], GOES_ON
+    if loser >= 0:
+        what = PULLS
+        if not patient and count > 3 and total(pulling) == 2.0:
+            what = TIPS
+    if loser < 0 or patient:
+        ratio = friction_ratio(work)
+        led_to = moved(exerted, u, w, inv_mass, ratio * ratio * inv_mass, K)
+        delta = led_to[0] - motion[0], led_to[1] - motion[1], led_to[2] - motion[2]
+        miss, k = across_misses(patch, p, slip, mu, delta)
+        if loser < 0 and miss <= goal:
+            what = FOUND
+        else:
+            compliance = comply(patch, center, slip, turning, inv_mass, K, work)
+            step = solve_compliant(compliance, (k[0], k[1], k[2], k[1], k[3], k[4], k[2], k[4], k[5]), delta)
+            if not turns_little(patch, on, slip, mu, step):
+                what = TURNS_ROUND
+                step, x, y = slowed(patch, on, p, slip, mu, compliance, delta, goal)
+            motion = motion[0] + step[0], motion[1] + step[1], motion[2] + step[2]
+    return what, loser, pulling, p, x, y, exerted, miss, motion
+
+
+@inlined
 def search(n, patient, mu, goal, loose, patch, start, is_mixed, axes, u, w, inv_mass, K, work):
     """Directions and set of pushing contacts.
 
@@ -200,44 +247,28 @@ def search(n, patient, mu, goal, loose, patch, start, is_mixed, axes, u, w, inv_
         vn, wa, wb = normal_motion
         push = (vn - u[0]) / inv_mass
         y0, gain = push / count, (wa - w[1], wb - w[2])
-        what, is_open, mode = NOT_FOUND, False, SLIDE
+        what, mode = TURNS_ROUND, SLIDE
         if is_mixed:
             x, y = warm_slip(n, patch, on, work)
         else:
-            slip = opposed(*slips(patch, motion, wa, wb), on, mu)
-            slopes, turning = respond(patch, on, center, y0, gain, slip, K)
-            pulling, loser, p, exerted = resultant(patch, on, center, y0, slopes, slip)
-            if not patient and count > 3 and total(pulling) == 2.0:
-                count, on, is_set, motion, has_opened = 2, on - pulling, False, start, True
-                continue
-            x, y = slip[0], slip[1]
-            is_open = loser >= 0
-            if not is_open or patient:
-                led_to = moved(exerted, u, w, inv_mass, mass_b, K)
-                delta = led_to[0] - motion[0], led_to[1] - motion[1], led_to[2] - motion[2]
-                miss, k = across_misses(patch, p, slip, mu, delta)
-                if not is_open and miss <= goal:
-                    what = FOUND
-                else:
-                    compliance = comply(patch, center, slip, turning, inv_mass, K, work)
-                    step = solve_compliant(compliance, (k[0], k[1], k[2], k[1], k[3], k[4], k[2], k[4], k[5]), delta)
-                    is_mixed = not turns_little(patch, on, slip, mu, step)
-                    if is_mixed:
-                        step, x, y = slowed(patch, on, p, slip, mu, compliance, delta, goal)
-                    motion = motion[0] + step[0], motion[1] + step[1], motion[2] + step[2]
-        if is_mixed:
+            what, loser, pulling, p, x, y, exerted, miss, motion = _turn(
+                patient, count, patch, on, mu, goal, center, y0, gain, motion, u, w, wa, wb, inv_mass, K, work
+            )
+        if what == TURNS_ROUND:
             what, loser, p, x, y, exerted, miss, motion = hold_some(
                 patient, patch, on, x, y, mu, goal, loose, center, y0, gain, motion, u, w, wa, wb, inv_mass, K, work
             )
-            if what == NOT_FOUND:
-                break
-            is_open, is_mixed, mode = what == PULLS, False, MIXED
+            is_mixed, mode = False, MIXED
+        if what == NOT_FOUND:
+            break
         if what == FOUND and closing < 0:
             work.mode = mode
             return True, (p, p * x, p * y), exerted, push, miss, has_opened
         if what == FOUND:
             again = closing
-        if is_open:
+        if what == TIPS:
+            count, on, is_set, motion, has_opened = 2, on - pulling, False, start, True
+        if what == PULLS:
             count, on, is_set, has_opened = count - 1, chosen(lane(loser), 0.0, on), False, True
             if not patient:
                 motion = start

@@ -84,26 +84,29 @@ def test_the_impulses_of_the_last_step_are_the_start_where_some_contacts_held():
     np.testing.assert_allclose(again, p, atol=1e-13 * p.max())
 
 
-def test_random_shoves_of_a_face_are_solved_directly():
-    """What the engine is built for: a face at rest or nearly so, pushed at random, is rarely left for sweeps.
+@pytest.mark.parametrize("tolerance", [1e-6, 1e-10])
+@pytest.mark.parametrize(("speed", "spin"), [(0.03, 0.01), (0.015, 0.015)])
+def test_random_shoves_of_a_face_are_solved_directly(tolerance, speed, spin):
+    """What the engine is built for: a face at rest or nearly so, pushed at random, is hardly ever left for sweeps.
 
-    99 % of these were solved directly when this was written; an error in one of the direct solvers costs many.
+    None of these 1,600 was when this was written, and 12 were where contacts that might hold were tried one by one: an
+    error in one of the direct solvers costs many.
     """
     rng = np.random.default_rng(5)
     direct = 0
     for _ in range(400):
-        v = np.add(rng.normal(0, 0.03, 3), (0, FALL, 0))
-        problem = Problem(floor(FACE), v, rng.normal(0, 0.01, 3), 0.5, tolerance=1e-6)
+        v = np.add(rng.normal(0, speed, 3), (0, FALL, 0))
+        problem = Problem(floor(FACE), v, rng.normal(0, spin, 3), 0.5, tolerance=tolerance)
         _, (_, _, residual, _, method) = problem.solve(SLIDE)
-        assert residual <= 1e-6
+        assert residual <= tolerance
         direct += method == DIRECT
-    assert direct >= 0.96 * 400
+    assert direct >= 399
 
 
 def test_a_face_that_tips_is_solved_directly_though_its_targets_differ():
     """Two or three contacts open, the targets of the four are off those of a rigid motion by about the goal.
 
-    97 % of these were solved directly when this was written. A contact that opened closes again by what the targets
+    All of these were solved directly when this was written. A contact that opened closes again by what the targets
     differ: where that ended a search, as it did once, it was 75 %.
     """
     rng = np.random.default_rng(5)
@@ -116,7 +119,7 @@ def test_a_face_that_tips_is_solved_directly_though_its_targets_differ():
         _, (_, _, residual, _, method) = problem.solve(SLIDE)
         assert residual <= 1e-6
         direct += method == DIRECT
-    assert direct >= 0.94 * 400
+    assert direct >= 399
 
 
 # Vertices, v, w, quaternion and normal targets of blocks in a batch, each under a wrench of its own in each step.
