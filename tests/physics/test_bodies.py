@@ -16,6 +16,7 @@ from physics.report import Solver, Status
 
 G = 9.81
 FLOOR = [physics.HalfSpace((0, 1, 0))]
+EPS = np.finfo(float).eps
 CUBE = (1.0, 1.0, 1.0)
 
 
@@ -357,3 +358,30 @@ def test_the_report_names_the_method():
     two = balls([(-0.6, 0, 0), (0.6, 0, 0)], [(10, 0, 0), (0, 0, 0)], [1, 1], 1.0)
     two.step(steps=5)
     assert two.step().solver[0] == Solver.NONE
+
+
+def test_what_spins_fast_pushes_nothing_that_it_cannot_reach(rng):
+    """Slender blocks at 1e4 rad/s and more, 3 m from a block that lies, higher above the floor than a corner reaches.
+
+    The approach of a corner, taken for a straight line, would be one with everything within 100 m. They fly on their
+    parabolas; what lies does so as if it were alone.
+    """
+    count, dt = 64, 0.01
+    slender = physics.Block((0.2, 2.0, 0.4), 0.05, pos=(0, 1.6, 0))
+    lying = physics.Block((1.0, 0.2, 0.3), 17.0, pos=(3, 0.1, 0))
+    effects = [physics.Gravity((0, -G, 0)), physics.Contact(), physics.Friction(0.5)]
+    world = physics.World(physics.Scene([slender, lying], FLOOR, effects), worlds=count, dt=dt)
+    alone = physics.World(physics.Scene([lying], FLOOR, effects), dt=dt)
+    quat, linvel, angvel = np.zeros((count, 2, 4)), np.zeros((count, 2, 3)), np.zeros((count, 2, 3))
+    quat[:, 0], quat[:, 1, 0] = rng.normal(size=(count, 4)), 1.0
+    quat /= np.linalg.norm(quat, axis=-1, keepdims=True)
+    linvel[:, 0] = rng.uniform(-1, 1, (count, 3))
+    angvel[:, 0] = rng.normal(size=(count, 3)) * 10.0 ** rng.uniform(4, 5, (count, 1))
+    world.set_state(quat=quat, linvel=linvel, angvel=angvel)
+    start = world.pos[:, 0].copy()
+    report = world.step()
+    alone.step()
+    fallen = np.array([0, -0.5 * G * dt * dt, 0])
+    np.testing.assert_allclose(world.pos[:, 0], start + dt * linvel[:, 0] + fallen, atol=8 * EPS)
+    np.testing.assert_allclose(world.pos[:, 1], np.broadcast_to(alone.pos[0, 0], (count, 3)), atol=1e-9)
+    assert not report.impacts.any()

@@ -11,19 +11,43 @@ Reference: D. Baraff, *Dynamic simulation of non-penetrating rigid bodies*, PhD 
 from __future__ import annotations
 
 from physics.kernels import geometry as geo
+from physics.kernels import quaternion as qt
 from physics.kernels.compiler import inlined, kernel
-from physics.kernels.layout import BLOCK, HULL, SPHERE
+from physics.kernels.layout import BLOCK, HULL, NORMAL, OFFSET, POS, SPHERE
 from physics.kernels.many.arrays import LEFT_OUT, PAIRS
 from physics.kernels.many.columns import columns_of, fill_columns
+from physics.kernels.many.contacts import minus, pair_slop, vector
+
+
+@inlined
+def travel(b, h, many):
+    """Bound for how far body b's centre of mass moves in h without contact, and its bounding sphere with it [m]."""
+    t = many.twist
+    return h * (abs(t[b, 0]) + abs(t[b, 1]) + abs(t[b, 2])) + 0.5 * h * h * many.bodies[b].acceleration
 
 
 @inlined
 def reach(b, h, many):
-    """Bound for how far any point of body b moves in h without contact [m]."""
-    t, body = many.twist, many.bodies[b]
-    linear = abs(t[b, 0]) + abs(t[b, 1]) + abs(t[b, 2])
+    """Bound for how far any point of body b moves in h without contact [m]; by turning no further than across it."""
+    t = many.twist
     angular = abs(t[b, 3]) + abs(t[b, 4]) + abs(t[b, 5])
-    return h * (linear + body.radius * angular) + 0.5 * h * h * body.acceleration
+    return travel(b, h, many) + many.bodies[b].radius * min(h * angular, 2.0)
+
+
+@inlined
+def may_reach_wall(b, wall, h, many):
+    """Whether body b's bounding sphere may touch a wall within h, as what turns fast about a place far off may not."""
+    d = qt.dot(vector(many.walls, wall, NORMAL), vector(many.now, b, POS)) - many.walls[wall, OFFSET]
+    return not d > many.bodies[b].radius + travel(b, h, many) + many.bodies[b].slop
+
+
+@inlined
+def may_meet(a, b, h, many):
+    """Whether the bounding spheres of two bodies may touch within h."""
+    far = many.bodies[a].radius + many.bodies[b].radius + travel(a, h, many) + travel(b, h, many)
+    far += pair_slop(a, b, many)
+    d = minus(vector(many.now, a, POS), vector(many.now, b, POS))
+    return not qt.dot(d, d) > far * far
 
 
 @inlined

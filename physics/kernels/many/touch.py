@@ -15,7 +15,7 @@ from physics.kernels.many.hull_hull import touch_hulls
 from physics.kernels.many.hull_place import corner_arm
 from physics.kernels.many.hull_round import touch_ellipsoid_hull, touch_sphere_hull
 from physics.kernels.many.hulls import FIRST_CORNER, LAST_CORNER
-from physics.kernels.many.near import find_pairs, reach
+from physics.kernels.many.near import find_pairs, may_meet, may_reach_wall, reach
 from physics.kernels.many.rounds import (
     block_point,
     direction_between,
@@ -142,6 +142,8 @@ def find_contacts(h, ellipsoids, hulls, world, sleep, many):
             continue
         margin = reach(b, h, many) + bodies[b].slop
         for wall in range(many.walls.shape[0]):
+            if not may_reach_wall(b, wall, h, many):
+                continue
             if hulls is not None:  # noqa: SIM102 (a branch of its own is what the compiler prunes)
                 if bodies[b].shape == HULL:
                     touch_hull_wall(b, wall, margin, h, many)
@@ -151,6 +153,8 @@ def find_contacts(h, ellipsoids, hulls, world, sleep, many):
         a, b = many.pairs[k, 0], many.pairs[k, 1]
         if sleeps(first_row + a, sleep):
             continue  # and so does b: `wake_near`
+        if not may_meet(a, b, h, many):
+            continue
         margin = reach(a, h, many) + reach(b, h, many) + pair_slop(a, b, many)
         first, second = bodies[a].shape, bodies[b].shape
         if hulls is not None:
