@@ -80,6 +80,18 @@ class Problem:
             W[::3, ::3] += self.one["give"] * np.eye(n)
         return W, J @ twist - self.one["target"][:n].ravel()
 
+    def residual(self, p):
+        """Natural-map residual of impulses (n, 3), see `physics.kernels.sweeps`, in plain NumPy: relative."""
+        W, b = self.matrices()
+        u, worst = (W @ p.ravel() + b).reshape(-1, 3), 0.0
+        for i, (pn, *pt) in enumerate(p):
+            own = W[3 * i : 3 * i + 3, 3 * i : 3 * i + 3]
+            largest = np.linalg.eigvalsh(own[1:, 1:])[-1]
+            aim = pt - u[i, 1:] / largest
+            aim *= min(1.0, self.mu[i] * max(pn, 0.0) / max(np.hypot(*aim), 1e-300))
+            worst = max(worst, abs(min(u[i, 0], pn * own[0, 0])), np.hypot(*(pt - aim)) * largest)
+        return worst / np.abs(b).max()
+
     def solve(self, mode=0, friction=True, warm=None):
         """Impulses (n, 3), and what `solve_contacts` returns."""
         self.one["mode"] = mode

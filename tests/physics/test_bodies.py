@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 
 import physics
 from physics import scenes
+from physics.kernels.many.arrays import PAIRS
 from physics.report import Solver, Status
 
 G = 9.81
@@ -385,3 +386,12 @@ def test_what_spins_fast_pushes_nothing_that_it_cannot_reach(rng):
     np.testing.assert_allclose(world.pos[:, 0], start + dt * linvel[:, 0] + fallen, atol=8 * EPS)
     np.testing.assert_allclose(world.pos[:, 1], np.broadcast_to(alone.pos[0, 0], (count, 3)), atol=1e-9)
     assert not report.impacts.any()
+
+
+def test_many_that_spin_fast_but_far_apart_are_no_pairs():
+    """Boxes as wide as the straight ways of their corners would make 780 pairs of forty, for which there is no room."""
+    bodies = [physics.Block((1, 2, 3), 1.0, pos=(12.0 * k, 0, 0), angvel=(0, 1e5, 0)) for k in range(40)]
+    world = physics.World(physics.Scene(bodies, (), [physics.Contact()]), dt=0.01)
+    report = world.step()
+    assert not report.left_out.any()
+    assert world.scratch[0].counts[PAIRS] == 0
