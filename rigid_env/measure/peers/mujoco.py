@@ -100,6 +100,7 @@ def model_xml(
     cone: str = "pyramidal",
     impratio: float = 1.0,
     noslip: int = 0,
+    solver: str = "Newton",
     contact: str = "default",
     share: float = 0.0,
 ) -> str:
@@ -110,7 +111,7 @@ def model_xml(
     scene : Scene
     dt : float
         [s].
-    integrator, cone, impratio, noslip
+    integrator, cone, impratio, noslip, solver
         MuJoCo's options of these names.
     contact : str
         ``default``; ``stiff``: the shortest time constant MuJoCo allows, 2 h; ``onestep``: restitution in one step.
@@ -135,7 +136,7 @@ def model_xml(
     return f"""<mujoco>
   <compiler balanceinertia="false"/>
   <option timestep="{dt!r}" gravity="{_text(gravity(scene))}" integrator="{integrator}" cone="{cone}"
-          impratio="{impratio}" noslip_iterations="{noslip}"><flag autoreset="disable"/></option>
+          impratio="{impratio}" noslip_iterations="{noslip}" solver="{solver}"><flag autoreset="disable"/></option>
   <asset>{meshes}</asset>
   <worldbody>{planes}{bodies}</worldbody>
 </mujoco>"""
