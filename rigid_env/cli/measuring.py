@@ -49,6 +49,7 @@ def bench(
 
 @app.command()
 def effects(
+    effect: Annotated[list[str] | None, typer.Argument(help="Effects, as in the table; none: all of them.")] = None,
     accuracy: Accuracy = "balanced",
     json: Json = None,
     markdown: Annotated[Path | None, typer.Option(metavar="FILE", help="Put the table into this page, too.")] = None,
@@ -61,16 +62,17 @@ def effects(
         from rigid_env.measure.table import make_console, make_table
 
         knobs.resolve(accuracy)
+        names = costs.chosen(effect or (), markdown)
         console, path = make_console(), json.resolve() if json else None
         repeats, steps = (QUICK_REPEATS, costs.QUICK_STEPS) if quick else (BENCH_REPEATS, costs.STEPS)
         found = []
         with progress_bar(console, has_thread=False) as progress:
-            task = progress.add_task("measuring", total=costs.run_count(repeats))
+            task = progress.add_task("measuring", total=costs.run_count(len(names), repeats))
 
             def tick(what: str) -> None:
                 progress.update(task, advance=1, description=what, refresh=True)
 
-            for name in costs.CASES:
+            for name in names:
                 found.append(costs.effect_row(name, accuracy, steps, repeats, tick))
         console.print(make_table(found, "steps per second with the effect, against the scene without it"))
         if markdown is not None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import physics
@@ -123,9 +123,25 @@ def bytes_per_body(world: physics.World) -> int:
     return (world.params.nbytes + world.sleep.nbytes) // (world.worlds * world.body_count)
 
 
-def run_count(repeats: int) -> int:
-    """How often `effect_row` calls `tick`, over all effects."""
-    return len(CASES) * 2 * (repeats + 1)
+def chosen(names: Sequence[str], page: Path | None) -> list[str]:
+    """The effects to measure: those of the names, all where there are none.
+
+    Raises
+    ------
+    ValueError
+        A name that is none of `CASES`, or a page that would lose the rows of all others.
+    """
+    for name in names:
+        if name not in CASES:
+            raise ValueError(f"effect is {name!r}; allowed are {', '.join(CASES)}")
+    if names and page is not None:
+        raise ValueError(f"markdown is {str(page)!r} for {', '.join(names)} only; a page is written for all effects")
+    return list(names or CASES)
+
+
+def run_count(effects: int, repeats: int) -> int:
+    """How often `effect_row` calls `tick`, over so many effects."""
+    return effects * 2 * (repeats + 1)
 
 
 def effect_row(name: str, accuracy: str, steps: int, repeats: int, tick: Callable[[str], None] | None = None) -> Row:

@@ -308,35 +308,58 @@ def test_run_tells_what_is_wrong_with_a_file(tmp_path):
 # effects
 
 
-def test_effects_measures_every_effect_with_and_without(tmp_path):
-    """Every effect has a row; what it stores is what its plan says, and nothing for what is in every kernel."""
-    path, page = tmp_path / "effects.json", tmp_path / "page.md"
-    begin, end = costs.BEGIN, costs.END
-    page.write_text(f"before\n{begin}\nold\n{end}\nafter\n")
-    run("effects", "--quick", "--json", path, "--markdown", page)
-    rows = {row["key"]: row for row in loaded(path)["rows"]}
+def test_every_effect_has_a_case_that_stores_what_its_plan_says():
+    """Nothing for what is in every kernel."""
     kinds = {kind.__name__.lower() for kind in (physics.Gravity, physics.Contact, physics.Friction, *FIELDS)}
     kinds |= {"rollingfriction", "spinfriction", "actuator", "sleeping", "tangentialrestitution", "compliance"}
     kinds |= {"frictionoftwocoefficients"}
     kinds |= {"springbetweenbodies"}
-    assert {name.replace(" ", "") for name in rows} == kinds | {"gusts"}
+    assert {name.replace(" ", "") for name in costs.CASES} == kinds | {"gusts"}
+    stored = {}
+    for name, scenes_of in costs.CASES.items():
+        on, off = (costs.bytes_per_body(physics.World(scene)) for scene in scenes_of())
+        stored[name] = on - off
+    assert (stored["gravity"], stored["contact"], stored["drag"], stored["spring"]) == (0, 0, 16, 72)
+    names = "spring between bodies", "tangential restitution", "rolling friction", "spin friction", "actuator"
+    assert [stored[name] for name in names] == [128, 8, 8, 8, 0]
+    assert stored["sleeping"] == 8 * SLEEP_SIZE
+
+
+def test_effects_measures_a_scene_with_an_effect_and_without(tmp_path):
+    path = tmp_path / "effects.json"
+    run("effects", "gravity", "friction", "--quick", "--json", path)
+    rows = {row["key"]: row for row in loaded(path)["rows"]}
+    assert list(rows) == ["gravity", "friction"]
     for row in rows.values():
         assert row["ours"]["min"] > 0
         assert row["peer"]["min"] > 0
         added = 1e9 / row["ours"]["median"] - 1e9 / row["peer"]["median"]
         assert row["notes"]["added_ns_per_step"] == pytest.approx(added)
-    stored = {name: row["notes"]["added_bytes_per_body"] for name, row in rows.items()}
-    assert (stored["gravity"], stored["contact"], stored["drag"], stored["spring"]) == (0, 0, 16, 72)
-    names = "spring between bodies", "tangential restitution", "rolling friction", "spin friction", "actuator"
-    assert [stored[name] for name in names] == [128, 8, 8, 8, 0]
-    assert stored["sleeping"] == 8 * SLEEP_SIZE
+        assert row["notes"]["added_bytes_per_body"] == 0
+
+
+def test_effects_writes_its_table_into_a_page(tmp_path, monkeypatch):
+    page = tmp_path / "page.md"
+    begin, end = costs.BEGIN, costs.END
+    page.write_text(f"before\n{begin}\nold\n{end}\nafter\n")
+    monkeypatch.setattr(costs, "CASES", {"gravity": costs.CASES["gravity"]})
+    run("effects", "--quick", "--markdown", page)
     text = page.read_text()
     assert text.startswith(f"before\n{begin}\n")
     assert text.endswith(f"{end}\nafter\n")
     assert "old" not in text
-    assert all(f"| {name} |" in text for name in rows)
+    assert "| gravity |" in text
     page.write_text("no such lines")
     with pytest.raises(ValueError, match="allowed are pages with the lines"):
         costs.write_markdown(page, [], "balanced")
     assert costs.BEGIN in (Path(__file__).parents[2] / "docs" / "effects.md").read_text(encoding="utf-8")
+
+
+def test_effects_says_what_it_cannot_do_before_it_measures(tmp_path):
     assert "'best'" in run("effects", "--accuracy", "best", code=2)
+    assert "spin friction" in run("effects", "levitation", "--quick", code=2)
+    page = tmp_path / "page.md"
+    page.write_text(f"{costs.BEGIN}\nkept\n{costs.END}\n")
+    output = " ".join(run("effects", "gravity", "--markdown", page, code=2).replace("│", " ").split())
+    assert "written for all effects" in output
+    assert "kept" in page.read_text()
