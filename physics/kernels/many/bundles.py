@@ -25,7 +25,7 @@ FIRST, SECOND, PLACE, IS_FIRST, BEGIN, COUNT = range(6)
 # Fields of a contact: arms from both bodies, frame, target, μ, W_nn and step of its block, 1 or 0 for what it weighs.
 ARM, FRAME, TARGET, MU, NORMAL, STEP, WEIGHT = 0, 6, 15, 18, 19, 20, 21
 
-# Of `interior`: diagonal of S (normal, tangents), p̂, û, with which it goes on after Newton's method.
+# Of `interior`: diagonal of S (normal, tangents), p̂, û.
 UNIT, INSIDE, SLACK = 22, 24, 27
 
 # What `interior` needs while it runs: scaling (w, η), λ, 1/√det λ, direction of slip, what û misses, what is added to

@@ -10,6 +10,11 @@ scaled as in `cone` (λ = W p̂ = W⁻¹ û), first with σ = 0 to see how far t
 term that this suggests (Mehrotra [2]_). The derivative of |û_t| is taken along, which makes the matrix unsymmetric, and
 its blocks are those of Newton's method on twists (`system`). What counts is measured as everywhere, by the natural map.
 
+Where û_t is small its direction d turns with every step, and the matrix, with d in it, can be next to singular: steps
+lead to the boundary of the cones at once, and the method sticks there. Without d, |û_t| taken as given, it is that of
+a minimum, symmetric and positive definite, and steps are long; but |û_t| then follows slowly, or not at all. So after a
+short step less of d is taken along, after others more again. It ends when two steps are short in turn.
+
 Without friction of a contact its cone is a half line: S = (1, 0, 0).
 
 References
@@ -34,6 +39,14 @@ from physics.kernels.many.system import add_bundle, complete_matrix, set_less
 # How near to the boundary of the cones a step may lead; least ratio of p̂·û after and before that is aimed at.
 STEP_SHARE = 0.98
 LEAST_RATIO = 1.0e-4
+
+# Share of a whole step below which one is short; how much of d is taken along after such a step and after another one,
+# relative to before.
+SHORT = 0.1
+LESS, MORE = 0.2, 2.0
+
+# Short steps in turn that end the method.
+STUCK = 2
 
 
 @inlined
@@ -89,14 +102,14 @@ def _pose(g, s, w, x, y, many):
 
 
 @inlined
-def _scale(g, many):
-    """Scaling of bundle g, its matrix and right side: (p̂·û, residual [m/s])."""
+def _scale(g, share, many):
+    """Scaling of bundle g, its matrix with a share of d, and right side: (p̂·û, residual [m/s])."""
     s, p, u = _units(g, many), of.three(g, of.INSIDE, many), of.three(g, of.SLACK, many)
     v = of.velocity_missed(g, many)
     worst = of.misses(g, _impulse(s, p), v, many)
     slip = of.length(u[1], u[2])
-    slips = slip > 0.0
-    x, y = chosen(slips, u[1] / slip, 0.0), chosen(slips, u[2] / slip, 0.0)
+    f = chosen(slip > 0.0, share / slip, 0.0)
+    x, y = f * u[1], f * u[2]
     w, own, inverse = cone.scaling(p, u)
     v = _into(s, v)
     miss = (v[0] + slip - u[0], v[1] - u[1], v[2] - u[2])
@@ -114,18 +127,19 @@ def _scale(g, many):
 
 
 @kernel
-def _prepare(part, many):
-    """Scalings, matrix and the right side without what pushes off the boundary: (p̂·û of a contact, residual [m/s])."""
+def _prepare(part, share, many):
+    """Scalings, and the right side without what pushes off the boundary: (p̂·û of a contact, residual [m/s]).
+
+    The matrix of the contacts, which `complete_matrix` completes.
+    """
     first, last, begin, end = part
     clear(begin, end, many)
     for i in range(begin, end):
         set_less(many.order[i], many.free, many.twist, many)
     gap = worst = Lanes(0.0, 0.0, 0.0, 0.0)
     for g in range(many.counts[BUNDLES]):
-        product, miss = _scale(g, many)
+        product, miss = _scale(g, share, many)
         gap, worst = gap + of.one(g, of.WEIGHT, many) * product, larger(worst, miss)
-    complete_matrix(begin, end, many)
-    factor(begin, end, many)
     return total(gap) / (last - first), largest(worst)
 
 
@@ -226,27 +240,30 @@ def interior_point(part, start, goal, limit, many):
     part : tuple of 4 ints
         As for `newton_contacts`; the bodies are ordered for elimination.
     start : float
-        How far inside the cones to begin, about the residual of the impulses as they are [m/s]. 0: go on from where
-        the last call for this island ended.
+        How far inside the cones to begin, about the residual of the impulses as they are [m/s].
     goal : float
         Residual to stop at [m/s], before the impulses and twists are made to belong to each other.
     limit : int
     """
-    if start > 0.0:
-        _begin(start, many)
-    count = 0
-    while count < limit:
-        gap, worst = _prepare(part, many)
+    _, _, begin, end = part
+    _begin(start, many)
+    count, stuck, share = 0, 0, 1.0
+    while count < limit and stuck < STUCK:
+        gap, worst = _prepare(part, share, many)
         if not worst > goal:
             break
+        complete_matrix(begin, end, many)
+        factor(begin, end, many)
         _set_right_side(part, many)
-        substitute(part[2], part[3], many.change, many)
+        substitute(begin, end, many.change, many)
         _, after = _explore(part, False, many)
         ratio = min(1.0, max(after / gap, LEAST_RATIO))
         _correct(part, ratio * ratio * ratio * gap, many)
-        substitute(part[2], part[3], many.change, many)
+        substitute(begin, end, many.change, many)
         t, _ = _explore(part, True, many)
         _step(part, min(1.0, STEP_SHARE * t), many)
+        stuck = stuck + 1 if t < SHORT else 0
+        share = LESS * share if t < SHORT else min(1.0, MORE * share)
         count += 1
     _take(part, many)
     return count

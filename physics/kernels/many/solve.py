@@ -68,16 +68,14 @@ STRAINED = 1.0e9
 # Sweeps without friction, where all else failed.
 LAST_SWEEPS = 100
 
-# Turns of the interior-point method and Newton's. Where a contact is about to slip or open, the former gains two
-# digits where p·u gains four, and rounding ends it: it gives way to Newton's at this residual, relative to the largest
-# velocity without impulses; where that was too early it goes on, and at last it begins anew, from no impulses.
-ROUGH = (1.0e-5, 1.0e-6, 1.0e-5)
-ANEW = 2
+# Residual at which the interior-point method gives way to Newton's at the latest, relative to the largest velocity
+# without impulses: below it, rounding does.
+ROUGH = 1.0e-6
 
-# Iterations of the first in a turn, steps of the second in each, and its ρ in units of the largest mass: smaller and
-# for longer where the pieces of the law are not found.
-INTERIOR_STEPS = (20, 20, 40)
-POLISH_STEPS = (10, 40, 40)
+# Iterations of the first in a turn, which may give way before (`interior`), steps of the second, and its ρ in units of
+# the largest mass. Each turn goes on from the impulses that the one before ended with, the last one from none.
+INTERIOR_STEPS = (30, 30, 40)
+POLISH_STEPS = (20, 40, 40)
 POLISH = (10.0, 1.0, 1.0)
 
 
@@ -117,14 +115,13 @@ def forget_all(n, many):
 @kernel
 def solve_hard(part, friction, scale, residual, goal, limit, many):
     """Interior point and Newton's method in turns: (iterations, residual)."""
-    count, best, start = 0, residual, residual
+    count, best, start, last = 0, residual, residual, len(POLISH) - 1
     save_best(part, many)
-    for turn in range(len(ROUGH)):
-        if turn == ANEW:
+    for turn in range(last + 1):
+        if turn == last:
             start = scale
             forget_impulses(part, many)
-        rough = max(goal, ROUGH[turn] * scale)
-        count += interior_point(part, start, rough, min(INTERIOR_STEPS[turn], limit - count), many)
+        count += interior_point(part, start, max(goal, ROUGH * scale), min(INTERIOR_STEPS[turn], limit - count), many)
         now = residual_of(part[0], part[1], friction, many)
         if now > goal and count < limit:
             more, now = newton_contacts(part, friction, now, goal, POLISH_STEPS[turn], POLISH[turn], many)
@@ -134,7 +131,7 @@ def solve_hard(part, friction, scale, residual, goal, limit, many):
             save_best(part, many)
         if not now > goal or count >= limit:
             break
-        start = 0.0
+        start = now
     if not now <= best:
         bring_back_best(part, many)
     return count, best
