@@ -67,6 +67,21 @@ def test_of_piles_that_wedge_nine_in_ten_are_solved():
     assert solved >= 36
 
 
+def test_piles_that_slip_a_little_in_all_directions_are_solved_and_soon():
+    """Where slips are small their directions turn with every step, and the interior-point method stuck for that.
+
+    Then 5 of these 120 were not solved, and they took 49 iterations each; now it is none of them, and 32.
+    """
+    solved = iterations = 0
+    for arguments in ((8, 4, 1.0), (12, 3, 0.7)):
+        for seed in range(60):
+            many, n = pile(seed, *arguments)
+            count, residual, _ = solve.solve_contacts(n, True, many)
+            solved, iterations = solved + (residual <= 1e-6), iterations + count
+    assert solved >= 119
+    assert iterations <= 40 * 120
+
+
 @pytest.mark.parametrize("mu", [0.0, 0.2])
 @pytest.mark.parametrize("seed", range(5))
 def test_the_interior_point_method_alone_comes_near_from_any_start(seed, mu):
