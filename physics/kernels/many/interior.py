@@ -13,7 +13,7 @@ its blocks are those of Newton's method on twists (`system`). What counts is mea
 Where û_t is small its direction d turns with every step, and the matrix, with d in it, can be next to singular: steps
 lead to the boundary of the cones at once, and the method sticks there. Without d, |û_t| taken as given, it is that of
 a minimum, symmetric and positive definite, and steps are long; but |û_t| then follows slowly, or not at all. So after a
-short step less of d is taken along, after others more again. It ends when two steps are short in turn.
+short step less of d is taken along, after others more again.
 
 Without friction of a contact its cone is a half line: S = (1, 0, 0).
 
@@ -44,9 +44,6 @@ LEAST_RATIO = 1.0e-4
 # relative to before.
 SHORT = 0.1
 LESS, MORE = 0.2, 2.0
-
-# Short steps in turn that end the method.
-STUCK = 2
 
 
 @inlined
@@ -247,8 +244,8 @@ def interior_point(part, start, goal, limit, many):
     """
     _, _, begin, end = part
     _begin(start, many)
-    count, stuck, share = 0, 0, 1.0
-    while count < limit and stuck < STUCK:
+    count, share = 0, 1.0
+    while count < limit:
         gap, worst = _prepare(part, share, many)
         if not worst > goal:
             break
@@ -262,7 +259,6 @@ def interior_point(part, start, goal, limit, many):
         substitute(begin, end, many.change, many)
         t, _ = _explore(part, True, many)
         _step(part, min(1.0, STEP_SHARE * t), many)
-        stuck = stuck + 1 if t < SHORT else 0
         share = LESS * share if t < SHORT else min(1.0, MORE * share)
         count += 1
     _take(part, many)

@@ -72,8 +72,8 @@ LAST_SWEEPS = 100
 # without impulses: below it, rounding does.
 ROUGH = 1.0e-6
 
-# Iterations of the first in a turn, which may give way before (`interior`), steps of the second, and its ρ in units of
-# the largest mass. Each turn goes on from the impulses that the one before ended with, the last one from none.
+# Iterations of the first in a turn, steps of the second, and its ρ in units of the largest mass. Each turn goes on from
+# the impulses that the one before ended with, the last one from none.
 INTERIOR_STEPS = (30, 30, 40)
 POLISH_STEPS = (20, 40, 40)
 POLISH = (10.0, 1.0, 1.0)
