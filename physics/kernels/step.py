@@ -134,14 +134,17 @@ def second_difference(a, fa, b, fb, c, fc):
 
 @inlined
 def crossing(low_gap, high_gap, width, bend):
-    """Where the parabola from low_gap >= 0 to high_gap < 0, `width` later, first is zero: within [0, width].
+    """Where the parabola from low_gap >= 0 to high_gap < 0, `width` later, is zero: within [0, width].
 
-    With the slope B at its start and `bend` c, c x² + B x + low_gap = 0, in the form that does not cancel.
+    With the slope B at its start and `bend` c, c x² + B x + low_gap = 0: of the root's two forms the one that does not
+    cancel. A gap that grows at first (B > 0) comes down again: c < 0.
     """
     if not low_gap > 0.0:
         return 0.0
     B = (high_gap - low_gap) / width - bend * width
-    return 2.0 * low_gap / (math.sqrt(max(B * B - 4.0 * bend * low_gap, 0.0)) - B)
+    root = math.sqrt(max(B * B - 4.0 * bend * low_gap, 0.0))
+    x = 2.0 * low_gap / (root - B) if B < 0.0 else (B + root) / (-2.0 * bend)
+    return min(x, width)
 
 
 @kernel
@@ -150,7 +153,8 @@ def shortened_stage(n, y, end, h, friction, smooth, gyroscopic, tilted, pivots, 
 
     It is shortened until that feature is within half a slop of the wall: `crossing` of its gap. Another one that is
     through the wall by then is sought instead. The gap of one feature is smooth; the smallest of all has kinks, before
-    which a parabola would creep along a wall that nothing hits.
+    which a parabola would creep along a wall that nothing hits. Where impulses leap from one time to the next one, as
+    those that no method solves may, nothing is between: the last state that was outside is taken.
     """
     t, low, low_gap, high, high_gap, bend, slot = h, 0.0, 0.0, h, 0.0, 0.0, -1
     low_end = y
@@ -172,6 +176,9 @@ def shortened_stage(n, y, end, h, friction, smooth, gyroscopic, tilted, pivots, 
             else:
                 high, high_gap = t, gap
         t = low + crossing(low_gap, high_gap, high - low, bend)
+        if not t < high:  # nor where low and high are one, and t is not a number
+            end, t = low_end, low
+            break
         end = advance(n, y, t, friction, smooth, gyroscopic, tilted, pivots, scheme, memory, report, work)
         if has_same_pose(end, y):
             break
