@@ -18,7 +18,7 @@ from pathlib import Path
 
 from numba.core import config
 
-from physics.kernels.codegen.linking import Kernel
+from physics.kernels.codegen.linking import FOREIGN, PART, STANDING, Kernel
 
 
 def _user_cache_root() -> Path:
@@ -71,16 +71,16 @@ OPTIONS = {"error_model": "numpy", "nogil": True, "_nrt": False}
 CHOSEN = {**OPTIONS, "forceinline": True, "pipeline_class": Kernel.part_pipeline}
 
 
-def _make(function, is_foreign=False, **options):
+def _make(function, called_as=PART, **options):
     """A `Kernel` of `function`; without a compiler the function itself."""
     if config.DISABLE_JIT:
         return function
     options = {"nopython": True, "boundscheck": None, **OPTIONS, **options}
-    return Kernel(function, options=options, is_foreign=is_foreign)
+    return Kernel(function, options=options, called_as=called_as)
 
 
-def _compile(function, **options):
-    compiled = _make(function, **options)
+def _compile(function, called_as=PART, **options):
+    compiled = _make(function, called_as, **options)
     if not config.DISABLE_JIT:
         with _numba_cache_in(cache_dir()):
             compiled.enable_caching()
@@ -110,6 +110,11 @@ def kernel(function):
     return _compile(function, forceinline=False)
 
 
+def standing(function):
+    """`kernel` with machine code of its own, which all plans call: see `physics.kernels.codegen.linking`."""
+    return _compile(function, STANDING, forceinline=False)
+
+
 def inlined(function):
     """`kernel` for what is a few instructions long, or is called from one place: no call is left of it."""
     return _compile(function, forceinline=True)
@@ -117,4 +122,4 @@ def inlined(function):
 
 def composed(function):
     """`inlined` without a place of its own on disk: made at run time, or by a user, and kept with what calls it."""
-    return _make(function, is_foreign=True, forceinline=True)
+    return _make(function, FOREIGN, forceinline=True)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from physics.kernels import quaternion as qt
 from physics.kernels.arms import wall_of
-from physics.kernels.compiler import inlined, kernel
+from physics.kernels.compiler import inlined, kernel, standing
 from physics.kernels.compliance import soften, stiffness
 from physics.kernels.direct import hold_all
 from physics.kernels.ellipse import stretch, unstretch
@@ -111,7 +111,7 @@ def _hold(n, R, v, L, work):
     return hold_all(n, R, v, L, work)
 
 
-@inlined
+@standing
 def _directly(n, friction, R, v, L, work):
     """Try that all contacts hold, and that they slide, the likelier one first: (found, v, L, residual).
 
@@ -185,7 +185,7 @@ def _iterate(n, friction, smooth, goal, work):
     return steps, residual
 
 
-@kernel
+@standing
 def _by_sweeps(n, friction, smooth, pivots, v, L, R, work):
     """What `solve_contacts` returns, by sweeps and what follows: apart, since most problems are not left for it."""
     width = 1 if friction is None else 3

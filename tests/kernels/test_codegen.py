@@ -19,7 +19,7 @@ from numba.core.typeinfer import CallConstraint
 
 import physics
 from physics.kernels.codegen.inference import _Network
-from physics.kernels.codegen.linking import _PartLibrary
+from physics.kernels.codegen.libraries import PartLibrary
 from physics.kernels.compiler import composed, kernel
 from physics.kernels.lanes import Lanes
 from tests.kernels.anew import anew
@@ -607,7 +607,7 @@ def calls_straight(record, a, i):
 def instructions_of(function, monkeypatch, *args) -> dict[str, list[str]]:
     """What is written for a kernel that is not kept, and for the parts it is the first to call: instructions' names."""
     written = {}
-    for library_class in (CPUCodeLibrary, _PartLibrary):
+    for library_class in (CPUCodeLibrary, PartLibrary):
 
         def noted(library, module, add=library_class.add_ir_module):
             written[library.name] = re.findall(r"^  (?:%\S+ = )?([a-z]+)", str(module), re.MULTILINE)

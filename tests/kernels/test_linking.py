@@ -14,7 +14,7 @@ from pathlib import Path
 import pytest
 from numba.core.codegen import JITCodeLibrary
 
-from physics.kernels.compiler import composed, inlined, kernel
+from physics.kernels.compiler import composed, inlined, kernel, standing
 from tests.kernels.anew import anew
 
 
@@ -164,8 +164,11 @@ def test_a_contact_plan_is_optimised_once_and_compiled_once_for_all_processes(tm
     """Two plans, each with and without a wrench, and a tower in one process; then again in another."""
     first = first_use("fast,balanced", tmp_path, "tower")
     assert first["optimised"].pop("step_worlds") == 2  # one machine code for each plan, not for each kind of wrench
-    # No kernel of a step is optimised for itself: what is left are those that Python calls, before the first step.
-    assert not {"substep", "solve_contacts", "hold_all", "cone_sweeps"} & set(first["optimised"])
+    # Of a step those that stand are optimised for themselves (the last resort of `balanced` is in one), and no others:
+    # what is left are those that Python calls, before the first step.
+    names = ("_by_sweeps", "_directly", "find_contacts", "solve_contacts", "push_apart", "solve_smoothly")
+    assert [first["optimised"].pop(name) for name in names] == [2, 1, 1, 1, 1, 1]
+    assert not {"substep", "hold_all", "cone_sweeps", "interior_point", "touch_wall"} & set(first["optimised"])
     # And none is typed twice: `balanced` adds its last resort to what `fast` had.
     names = [key for key in first["lowered"] if "solve_contacts" in key or "hold_all" in key]
     assert len(names) == 3  # two of the solver, whose arguments tell the plans apart, one of the direct solve
@@ -181,6 +184,84 @@ def test_a_contact_plan_is_optimised_once_and_compiled_once_for_all_processes(tm
     assert second["optimised"] == {}
     assert second["lowered"] == {}
     assert second["ends"] == first["ends"]
+
+
+STANDING = """
+import collections, sys
+from numba.core.codegen import JITCodeLibrary
+from physics.kernels.compiler import kernel, standing
+
+optimised, optimise = collections.Counter(), JITCodeLibrary._optimize_final_module
+
+def counted(self):
+    optimised[self.name] += 1
+    optimise(self)
+
+JITCodeLibrary._optimize_final_module = counted
+
+@kernel
+def squared(x):
+    return x * x
+
+@standing
+def cubed(x):
+    return squared(x) * x
+
+@standing
+def to_the_ninth(x):
+    return cubed(cubed(x))
+
+@kernel
+def one(x):
+    return to_the_ninth(x) + squared(x)
+
+@kernel
+def other(x):
+    return 2.0 * to_the_ninth(x)
+
+expected = {"squared": 4.0, "one": 516.0, "other": 1024.0}
+for name in sys.argv[1].split(","):
+    assert globals()[name](2.0) == expected[name], name
+print(*sorted(f"{name} {count}" for name, count in optimised.items() if name != "nrt"), sep=", ")
+"""
+
+
+def test_what_stands_is_made_once_and_kept_for_all_that_call_it(tmp_path):
+    """Also by one that stands; in whatever order processes meet them, and whatever each has compiled before."""
+    program = tmp_path / "standing.py"
+    program.write_text(STANDING)
+    environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path), "PYTHONPATH": str(Path(__file__).parents[2])}
+
+    def optimised(names: str) -> str:
+        command = [sys.executable, program, names]
+        return subprocess.run(command, env=environment, capture_output=True, text=True, check=True).stdout.strip()
+
+    assert optimised("squared,one") == "cubed 1, one 1, squared 1, to_the_ninth 1"
+    assert optimised("other") == "other 1"  # the cube comes from disk
+    assert optimised("one,other") == ""
+    for kept in tmp_path.rglob("*to_the_ninth*"):
+        kept.unlink()
+    assert optimised("other,one") == "to_the_ninth 1"  # made anew for wholes that were kept
+
+
+@standing
+def stands(x):
+    return x - 1.0
+
+
+@kernel
+def calls_what_stands(x):
+    return stands(x)
+
+
+def test_nothing_of_what_stands_is_in_what_calls_it():
+    whole = anew(calls_what_stands)
+    assert whole(2.0) == 1.0
+    (whole,) = whole.overloads.values()
+    assert [origin.name for origin in whole.library.called] == ["stands"]
+    defined = [function.name for function in whole.library.get_defined_functions()]
+    assert not [name for name in defined if "6stands" in name]
+    assert not stands.signatures  # it is no whole, since Python has not called it
 
 
 RECORDS = """

@@ -9,13 +9,18 @@ In a whole nobody else can call a part, and the optimiser is told so: it leaves 
 arguments, and a part with one caller becomes part of that. The scratch of many bodies is a hundred arrays of seven
 words each, and a part that is handed it reads a dozen: with all of them on the stack calls took a third of a step.
 
+A kernel that *stands* is in between: machine code of its own, for all wholes that call it by its name, with all parts
+below it, made once for the types of its arguments and kept on disk beside the wholes. The optimiser sees nothing across
+that call, and without it each plan would have its solvers made machine code once more: it is for what is large, does
+not know the plan, and takes long, or is hardly ever needed.
+
 A symbol is named after its function and the types of its arguments. Numba names a record type by a number that counts
 the types of the process: machine code made in two processes, for two records of the same number, would have the same
 names in it, and a third process that loads both from disk would run the parts of one in the other. Here a digest of the
 types is part of each name.
 
-`pipeline_class` is Numba's documented way to have a function compiled otherwise; what is not public of Numba here is
-`JITCodeLibrary`, the IR of one function with the libraries that it calls.
+`pipeline_class` is Numba's documented way to have a function compiled otherwise; what is not public of Numba stands in
+`libraries` and `keeping`.
 """
 
 from __future__ import annotations
@@ -23,10 +28,8 @@ from __future__ import annotations
 import hashlib
 from functools import cache
 
-from llvmlite import binding as llvm
-from numba import _dynfunc
-from numba.core import cgutils, event
-from numba.core.codegen import CodeLibrary, JITCodeLibrary
+from numba.core import event
+from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import CompilerBase, DefaultPassBuilder, Flags
 from numba.core.compiler_lock import global_compiler_lock
 from numba.core.compiler_machinery import LoweringPass, PassManager, register_pass
@@ -34,56 +37,11 @@ from numba.core.registry import CPUDispatcher
 from numba.core.sigutils import normalize_signature
 from numba.core.typed_passes import NativeLowering, NoPythonBackend
 
+from physics.kernels.codegen.keeping import Origin, StandingCache, WholeCache, made_known
+from physics.kernels.codegen.libraries import PartLibrary, StandingLibrary, WholeLibrary
 from physics.kernels.codegen.lowering import PartLowering, WholeLowering
 from physics.kernels.codegen.passes import KernelPasses
 from physics.kernels.codegen.remember import RememberingTarget, remembering
-
-
-class _PartLibrary(JITCodeLibrary):
-    """IR of one part, neither linked nor optimised."""
-
-    def add_ir_module(self, ir_module):
-        """Take the module in: every whole that calls the part has the same one."""
-        for function in ir_module.functions:
-            if not function.is_declaration:
-                function.linkage = "linkonce_odr"
-        self._final_module = llvm.parse_assembly(cgutils.normalize_ir_text(str(ir_module)))
-        self._final_module.data_layout = self._codegen._data_layout
-
-    def _get_module_for_linking(self):
-        return self._final_module
-
-    def finalize(self):
-        self._finalized = True
-
-
-class _WholeLibrary(JITCodeLibrary):
-    """IR of a whole, linked with that of every part below it before it is optimised."""
-
-    def finalize(self):
-        self._linking_libraries = _callers_first(self)
-        super().finalize()
-
-    def _optimize_final_module(self):
-        for function in self._final_module.functions:
-            if function.linkage.name == "linkonce_odr" and not function.is_declaration:  # a part
-                function.linkage = "internal"
-        super()._optimize_final_module()
-
-
-def _callers_first(whole: _WholeLibrary) -> list[CodeLibrary]:
-    """Every library below `whole` once, after all that call it: the linker drops what nobody has called so far."""
-    callees_first: dict[CodeLibrary, None] = {}
-
-    def visit(library):
-        for callee in library._linking_libraries:
-            if callee not in callees_first:
-                if isinstance(callee, _PartLibrary):
-                    visit(callee)
-                callees_first[callee] = None
-
-    visit(whole)
-    return list(reversed(callees_first))
 
 
 class _Flags(Flags):
@@ -110,7 +68,7 @@ def _passes(*at_last: type) -> KernelPasses:
 class _WholeCompiler(CompilerBase):
     """Passes of ours, into a library of ours."""
 
-    library_class: type[JITCodeLibrary] = _WholeLibrary
+    library_class: type[JITCodeLibrary] = WholeLibrary
     is_entered = True  # from outside: see `ready`
 
     def __init__(self, typingctx, targetctx, library, args, return_type, flags, local_types):
@@ -133,7 +91,7 @@ class _WholeCompiler(CompilerBase):
 
 @register_pass(mutates_CFG=False, analysis_only=True)
 class _KeepAsPart(LoweringPass):
-    """Make the IR known to Numba, which knows functions by their entry points, under one that must not be called."""
+    """Make the part known to Numba."""
 
     _name = "keep_as_part"
 
@@ -143,8 +101,7 @@ class _KeepAsPart(LoweringPass):
     def run_pass(self, state):
         lowered = state["cr"]
         about = lowered.fndesc
-        entry = _dynfunc.make_function(about.lookup_module(), about.qualname, "", 0, lowered.env, (state.library,))
-        state.targetctx.insert_user_function(entry, about, [state.library])
+        entry = made_known(state.targetctx, about, lowered.env, state.library)
         state["cr"] = lowered._replace(cfunc=entry)
         return True
 
@@ -152,7 +109,7 @@ class _KeepAsPart(LoweringPass):
 class _PartCompiler(_WholeCompiler):
     """Up to the IR."""
 
-    library_class = _PartLibrary
+    library_class = PartLibrary
     is_entered = False
 
     def __init__(self, *arguments):
@@ -162,6 +119,19 @@ class _PartCompiler(_WholeCompiler):
 
     def passes(self):
         return _passes(PartLowering, _KeepAsPart, NoPythonBackend)
+
+
+class _StandingCompiler(_PartCompiler):
+    """Up to machine code, under a name that is the same in all processes: what calls it was made in any of them."""
+
+    library_class = StandingLibrary
+
+    def define_pipelines(self):
+        about = self.state.func_id
+        about.unique_id = 0
+        pipelines = super().define_pipelines()
+        self.state.library.origin = Origin(about.modname, about.func_qualname, self.state.args)
+        return pipelines
 
 
 class _AnyPartCompiler(_PartCompiler):
@@ -188,6 +158,32 @@ class _Part(CPUDispatcher):
         return self.overloads[args].entry_point
 
 
+class _Standing(_Part):
+    """A kernel that other kernels call, with machine code of its own."""
+
+    def enable_caching(self):
+        """Keep it on disk."""
+        self._cache = StandingCache(self.py_func)
+
+    def compile(self, sig):
+        """Have the machine code for the types of its arguments, from disk or new."""
+        args, _ = normalize_signature(sig)
+        if args not in self.overloads:
+            with global_compiler_lock:
+                kept = self._cache.load_overload(args, RememberingTarget(self.targetctx))
+                if kept is None:
+                    super().compile(sig)
+                    self._cache.save_overload(args, self.overloads[args])
+                else:
+                    self.add_overload(kept)
+        return self.overloads[args].entry_point
+
+
+PART = _Part, _PartCompiler
+STANDING = _Standing, _StandingCompiler
+FOREIGN = CPUDispatcher, _AnyPartCompiler  # may be more than a kernel is, and is only called from kernels
+
+
 class Kernel(CPUDispatcher):
     """A function compiled for the types of its arguments: a whole for Python, a part for other kernels.
 
@@ -198,16 +194,26 @@ class Kernel(CPUDispatcher):
         Must be empty; Numba passes it.
     options : dict
         Numba's options, as of `numba.njit`.
-    is_foreign : bool
-        It may be more than a kernel is: a closure, a comprehension. Such a function is only called from kernels.
+    called_as : tuple
+        What it is for other kernels: `PART`, `FOREIGN` or `STANDING`.
     """
 
     part_pipeline = _PartCompiler
 
-    def __init__(self, function, local_types=None, options=None, is_foreign=False):
+    def __init__(self, function, local_types=None, options=None, called_as=PART):
         super().__init__(function, local_types, options, pipeline_class=_WholeCompiler)
-        dispatcher, compiler = (CPUDispatcher, _AnyPartCompiler) if is_foreign else (_Part, _PartCompiler)
+        dispatcher, compiler = called_as
         self._part = dispatcher(function, local_types, options, pipeline_class=compiler)
+
+    def enable_caching(self):
+        """Keep its machine code on disk."""
+        self._cache = WholeCache(self.py_func)
+        if isinstance(self._part, _Standing):
+            self._part.enable_caching()
+
+    def stand(self, args: tuple) -> None:
+        """Have the machine code that other kernels call, for these types of arguments."""
+        self._part.compile(args)
 
     def ready_entry(self, machine_code) -> int:
         """Address of the entry for other machine code (`ready`) of what `compile` gave; it must return nothing."""

@@ -11,7 +11,7 @@ import math
 
 from physics.kernels import quaternion as qt
 from physics.kernels.body import angular_velocity, read_state, write_state
-from physics.kernels.compiler import inlined, kernel
+from physics.kernels.compiler import inlined, standing
 from physics.kernels.many.contacts import pair_slop, plus, put, refresh, vector
 from physics.kernels.many.parting import part_contacts
 from physics.kernels.many.place import place_body
@@ -103,7 +103,7 @@ def _part_once(n, tilted, many):
     return deepest
 
 
-@kernel
+@standing
 def push_apart(n, tilted, many):
     """Move the bodies of the n contacts apart where they overlap by more than the slop."""
     for b in range(many.now.shape[0]):

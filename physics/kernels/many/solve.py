@@ -24,7 +24,7 @@ from __future__ import annotations
 
 import math
 
-from physics.kernels.compiler import inlined, kernel
+from physics.kernels.compiler import inlined, kernel, standing
 from physics.kernels.many.blocks import SIZE
 from physics.kernels.many.calm import NEWTON, SWEEPS, calm, is_in_balance, point_speed
 from physics.kernels.many.contacts import put, vector
@@ -222,7 +222,7 @@ def solve_without_friction(part, friction, goal, many):
     return residual_of(first, last, friction, many)
 
 
-@kernel
+@standing
 def solve_smoothly(n, many):
     """`solve_without_friction` of all n contacts, for what a solve with friction came out wrong: the residual [m/s]."""
     keep_free(many)
@@ -231,7 +231,7 @@ def solve_smoothly(n, many):
     return sweep_normals(0, n, math.inf, goal, LAST_SWEEPS, many)[1]
 
 
-@kernel
+@standing
 def solve_contacts(n, friction, many):
     """Solve for `many.impulse` from the warm start in it: (iterations, relative residual, method).
 

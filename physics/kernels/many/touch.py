@@ -6,7 +6,7 @@ import math
 
 from physics.kernels import geometry as geo
 from physics.kernels import quaternion as qt
-from physics.kernels.compiler import inlined, kernel
+from physics.kernels.compiler import inlined, kernel, standing
 from physics.kernels.layout import BLOCK, ELLIPSOID, HULL, NORMAL, OFFSET, SPHERE, VERTEX_COUNT
 from physics.kernels.many.arrays import CONTACTS, PAIRS
 from physics.kernels.many.block_block import touch_blocks
@@ -122,7 +122,7 @@ def touch_ellipsoid(a, b, margin, h, many):
     record_either(a, b, first, n, on_first, on_second, gap, h, many)
 
 
-@kernel
+@standing
 def find_contacts(h, ellipsoids, hulls, world, sleep, many):
     """Write the contact set of the bodies where they are, for a stage of length h.
 
