@@ -1,8 +1,8 @@
-"""First use of a plan: ``python -m benchmarks.compile [--repeats N] [--accuracy NAME ...]``.
+"""First use of a plan: ``python -m benchmarks.compile [--repeats N] [--accuracy NAME ...] [--scene NAME ...]``.
 
-Each sample is a new process with an empty folder for kernels, and the three-wall box: what its first step takes, as CPU
-seconds (compiling runs on one thread, so that an idle machine shows the same as wall clock) and as wall clock; and what
-it takes in a second process that finds the kernels there.
+Each sample is three processes that keep their kernels in one folder: the first step of a scene with nothing there, that
+of the same scene without gravity, another plan that has much in common with the first, and that of the scene again; as
+CPU seconds (compiling runs on one thread, so that an idle machine shows the same as wall clock) and as wall clock.
 """
 
 from __future__ import annotations
@@ -29,9 +29,14 @@ PROGRAM = """
 import json, sys, time
 from numba.core import event
 import physics, physics.scenes
+name, accuracy, is_other = sys.argv[1:]
+scene = physics.scenes.by_name(name)
+if is_other == "True":
+    effects = [effect for effect in scene.effects if not isinstance(effect, physics.Gravity)]
+    scene = physics.Scene(scene.bodies, scene.walls, effects)
 wall, cpu = time.perf_counter(), time.process_time()
 with event.install_recorder("numba:compile") as recorder:
-    physics.World(physics.scenes.drop(), accuracy=sys.argv[1]).step()
+    physics.World(scene, accuracy=accuracy).step()
 seconds = {"cpu": time.process_time() - cpu, "wall": time.perf_counter() - wall}
 print(json.dumps({**seconds, "kernels": sum(what.is_start for _, what in recorder.buffer)}))
 """
@@ -54,39 +59,42 @@ class FirstStep:
     kernels: int
 
 
-def first_step(accuracy: str, kernels: Path) -> FirstStep:
-    """The three-wall box in a new process that keeps its kernels in the folder `kernels`."""
+def first_step(scene: str, accuracy: str, kernels: Path, *, is_other: bool = False) -> FirstStep:
+    """A scene, or the other one like it, in a new process that keeps its kernels in the folder `kernels`."""
     root = str(Path(physics.__file__).parents[1])
     path = os.pathsep.join([root, *filter(None, [os.environ.get("PYTHONPATH")])])
     done = subprocess.run(
-        [sys.executable, "-c", PROGRAM, accuracy], check=True, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL,
-        text=True, env={**os.environ, "PYTHONPATH": path, "NUMBA_CACHE_DIR": str(kernels)},
+        [sys.executable, "-c", PROGRAM, scene, accuracy, str(is_other)], check=True, stdout=subprocess.PIPE,
+        stderr=subprocess.DEVNULL, text=True, env={**os.environ, "PYTHONPATH": path, "NUMBA_CACHE_DIR": str(kernels)},
     )  # fmt: skip
     return FirstStep(**json.loads(done.stdout))
 
 
-def measure(accuracy: str, repeats: int) -> tuple[list[FirstStep], list[FirstStep]]:
-    """First steps with nothing compiled, and those of a second process each."""
-    cold, warm = [], []
+def measure(scene: str, accuracy: str, repeats: int) -> dict[str, list[FirstStep]]:
+    """First steps by what is in the folder."""
+    found: dict[str, list[FirstStep]] = {"nothing": [], "another plan": [], "this plan": []}
     for _ in range(repeats):
         with tempfile.TemporaryDirectory() as folder:
-            cold.append(first_step(accuracy, Path(folder)))
-            warm.append(first_step(accuracy, Path(folder)))
-    return cold, warm
+            found["nothing"].append(first_step(scene, accuracy, Path(folder)))
+            found["another plan"].append(first_step(scene, accuracy, Path(folder), is_other=True))
+            found["this plan"].append(first_step(scene, accuracy, Path(folder)))
+    return found
 
 
 def main(
     repeats: Annotated[int, typer.Option(min=1)] = 3,
     accuracy: Annotated[list[str] | None, typer.Option(help="Presets.")] = None,
+    scene: Annotated[list[str] | None, typer.Option(help="Scenes with gravity.")] = None,
 ) -> None:
-    """Measure the first step of the three-wall box with nothing compiled, and with all of it."""
+    """Measure the first step of a scene with nothing compiled, with another plan compiled, and with its own."""
     table = Table(title=machine.headline(), title_justify="left", box=box.SIMPLE_HEAD)
-    for name in ("accuracy", "kernels in the cache", "compiled", "CPU [s]", "wall clock [s]"):
-        table.add_column(name, justify="left" if name == "accuracy" else "right")
-    for preset in accuracy or ("fast", "balanced", "precise"):
-        for state, found in zip(("none", "all"), measure(preset, repeats)):
-            seconds = [f"{statistics.median(getattr(step, clock) for step in found):.2f}" for clock in ("cpu", "wall")]
-            table.add_row(preset, state, str(found[0].kernels), *seconds)
+    for name in ("scene", "accuracy", "in the cache", "compiled", "CPU [s]", "wall clock [s]"):
+        table.add_column(name, justify="left" if name in ("scene", "accuracy", "in the cache") else "right")
+    for one in scene or ("drop", "tower"):
+        for preset in accuracy or ("fast", "balanced", "precise"):
+            for state, found in measure(one, preset, repeats).items():
+                medians = [statistics.median(getattr(step, clock) for step in found) for clock in ("cpu", "wall")]
+                table.add_row(one, preset, state, str(found[0].kernels), *(f"{seconds:.2f}" for seconds in medians))
     make_console().print(table)
 
 
