@@ -46,7 +46,7 @@ def test_explain_names_every_effect_and_its_reason():
     assert "walls do not act" in physics.make_plan(physics.Scene([BLOCK], FLOOR), resolve("fast")).explain()
 
 
-# What becomes machine code with the step of a scene, and what that calls, before the optimiser makes fewer functions of it.
+# What becomes machine code with the step of a scene, and what that calls, before the optimiser makes functions fewer.
 LINKED = """
 import json, sys, physics
 from numba.core.codegen import JITCodeLibrary
