@@ -12,6 +12,7 @@ from physics.accuracy import Accuracy
 from physics.effects import Contact, Friction, Gravity
 from physics.field import write_columns
 from physics.kernels import layout as at
+from physics.kernels.events import motion
 from physics.kernels.linked import make_linked
 from physics.kernels.many import arrays as many
 from physics.kernels.many.refine import LEAST_SLOP, LEAST_TOLERANCE
@@ -42,11 +43,21 @@ def make_scratch(scene: Scene, plan: Plan, walls: np.ndarray, accuracy: Accuracy
     if plan.many:
         return many.make_many(
             bodies, walls, plan.terms, parameters.polyhedra(scene.bodies), meet=plan.meeting,
-            in_turn=accuracy.collisions == "sequential", refined=bool(plan.refined), **numbers,
+            in_turn=accuracy.collisions == "sequential", in_time=bool(plan.refined), **numbers,
         )  # fmt: skip
     if plan.linked:
         return make_linked(bodies, plan.terms, **numbers)
     return make_workspace(walls, plan.features, plan.terms, plan.laws, **numbers)
+
+
+def make_motion(scene: Scene, plan: Plan, accuracy: Accuracy):
+    """What one thread needs besides where an error is asked for: a smooth motion, or the world at some moments."""
+    bodies, walls = len(scene.bodies), len(scene.walls)
+    if plan.events:
+        return motion.make_motion(walls, plan.features, accuracy.collisions == "sequential")
+    if plan.refined:
+        return many.make_kept(bodies, many.memory_size(bodies, walls, parameters.polyhedra(scene.bodies)))
+    return None
 
 
 def make_memory(scene: Scene, plan: Plan, worlds: int) -> np.ndarray:

@@ -171,8 +171,7 @@ def _step_of(plan: Plan) -> tuple[Callable, Callable[[World, int], tuple]]:
 def _many_arguments(world: World, k: int) -> tuple:
     plan = world.plan
     switches = (plan.friction, plan.restitution, plan.gyroscopic, plan.tilted, plan.ellipsoids, plan.hulls, plan.scheme)
-    switches = (*switches, plan.refined)
-    return *switches, world.sleep_of_kernel(), world.memory, world.report_table, world.scratch[k]
+    return *switches, world.motions[k], world.sleep_of_kernel(), world.memory, world.report_table, world.scratch[k]
 
 
 def _linked_arguments(world: World, k: int) -> tuple:

@@ -17,7 +17,6 @@ from physics.effects import Actuator, Friction, RollingFriction, Sleeping, SpinF
 from physics.field import Field
 from physics.kernels import layout as at
 from physics.kernels.events.log import EVENT_SIZE
-from physics.kernels.events.motion import make_motion
 from physics.kernels.fields.terms import declare
 from physics.kernels.sleep import GROUP, SLEEP_SIZE, Sleep
 from physics.kernels.workspace import body_records
@@ -131,12 +130,7 @@ class World:
         self.scratch = [
             allocation.make_scratch(self.scene, self.plan, self.walls, self.accuracy) for _ in range(self.team.size)
         ]
-        self.motions = [
-            make_motion(len(self.walls), self.plan.features, self.accuracy.collisions == "sequential")
-            if self.plan.events
-            else None
-            for _ in range(self.team.size)
-        ]
+        self.motions = [allocation.make_motion(self.scene, self.plan, self.accuracy) for _ in range(self.team.size)]
         self._wrench = self.no_wrench()
         self._calls: list[Work] = []
         self._bound_for: tuple | None = None  # arguments of `step`: the next call with the same finds all bound

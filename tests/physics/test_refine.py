@@ -137,4 +137,4 @@ def test_only_what_asks_for_an_error_pays_for_it():
     assert physics.make_plan(alone, PRECISE).events
     for scene, accuracy in ((alone, PRECISE), (two, PRESETS["balanced"]), (two, PRESETS["fast"])):
         assert physics.make_plan(scene, accuracy).refined is None
-    assert physics.World(two).scratch[0].kept is None
+    assert physics.World(two).motions == [None]

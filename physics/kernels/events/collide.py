@@ -5,7 +5,7 @@ from __future__ import annotations
 from physics.kernels import layout as at
 from physics.kernels import quaternion as qt
 from physics.kernels.arms import arm_and_rate, feature_of, wall_normal, wall_of
-from physics.kernels.body import angular_velocity
+from physics.kernels.body import angular_velocity, principal_attitude
 from physics.kernels.compiler import inlined, kernel
 from physics.kernels.events import log as ev
 from physics.kernels.events.forces import free_turning, load
@@ -13,8 +13,9 @@ from physics.kernels.events.guards import look_around
 from physics.kernels.events.motion import START
 from physics.kernels.events.resting import pose_contact
 from physics.kernels.events.smooth import put_state
+from physics.kernels.fields.loads import refresh_loads
 from physics.kernels.laws import TANGENTIAL, if_law
-from physics.kernels.resist import aim_at
+from physics.kernels.resist import aim_at, without_gain
 from physics.kernels.restraint import ROUNDING, kinetic_energy, part_of_rebound
 from physics.kernels.slide import SLIDE
 from physics.kernels.solve import solve_contacts
@@ -126,9 +127,15 @@ def aim_collision(n, y, tilted, motion, work):
 
 
 @inlined
+def note(solved, report, work):
+    """Add a contact problem, which is solved to rounding, to the world's report."""
+    note_solve(report, work.world, *solved[2:], max(work.tolerance, SOLVED))
+
+
+@inlined
 def _without_rebound(n, friction, smooth, pivots, v, L, solved, P, work, report):
     """The same collision solved without any rebound; what `solved` has cost goes into the report."""
-    note_solve(report, work.world, *solved[2:], max(work.tolerance, SOLVED))
+    note(solved, report, work)
     aim_plastic(n, work)
     return solve_contacts(n, friction, smooth, pivots, v, L, P, work)
 
@@ -194,15 +201,6 @@ def pose_jump(y, h, tilted, work, motion):
 
 
 @kernel
-def carry_on(y, h, tilted, work):
-    """State after a moment h at constant velocities."""
-    x, q, v, L = y
-    w = angular_velocity(q, L, work, tilted)
-    x = (x[0] + h * v[0], x[1] + h * v[1], x[2] + h * v[2])
-    return x, qt.normalise(qt.multiply(qt.exponential((h * w[0], h * w[1], h * w[2])), q)), v, L
-
-
-@kernel
 def log_impulses(n, width, work, motion, log, counts, t):
     """One event per wall with the sum of its impulses, if that is above rounding."""
     least = work.mass * motion.noise
@@ -217,3 +215,57 @@ def log_impulses(n, width, work, motion, log, counts, t):
                     pz += s * work.walls[wall, 3 * c + 2]
         if px * px + py * py + pz * pz > least * least:
             ev.note_event(log, counts, work.i, t, ev.IMPACT, wall, (px, py, pz))
+
+
+@inlined
+def principal_axes(y, tilted, work):
+    """Rotation matrix of the principal axes at y."""
+    return qt.to_matrix(principal_attitude(y[1], work, tilted))
+
+
+@inlined
+def _width(friction):
+    return 1 if friction is None else 3
+
+
+@kernel
+def collide(y, t, friction, smooth, tilted, pivots, work, motion, report, log, counts):
+    """State after the impulses of a collision at the time t, of all that touches or of the one whose turn it is."""
+    refresh_loads(y, 0.0, tilted, work)
+    n = pose_collision(y, tilted, work, motion, report)
+    aim_collision(n, y, tilted, motion, work)
+    x, q, v, L = y
+    if n > 0:
+        P = principal_axes(y, tilted, work)
+        solved = solve_contacts(n, friction, smooth, pivots, v, L, P, work)
+        solved = or_plastic(n, friction, smooth, pivots, v, L, solved, P, work, report)
+        solved = without_gain(n, friction, smooth, pivots, v, L, solved, P, work)
+        if friction is not None and work.restitution > 0.0:
+            solved = within_energy(n, y, friction, smooth, tilted, pivots, solved, P, work, motion, report)
+        note(solved, report, work)
+        v, L = solved[0], solved[1]
+    log_impulses(n, _width(friction), work, motion, log, counts, t)
+    return x, q, v, L
+
+
+@kernel
+def jump(y, h, t, friction, smooth, tilted, pivots, work, motion, report, log, counts):
+    """State with the velocities of a first-order step over h from the time t: a leap, before it is made."""
+    refresh_loads(y, 0.0, tilted, work)
+    n, v, L = pose_jump(y, h, tilted, work, motion)
+    if n > 0:  # there may be nothing in reach
+        P = principal_axes(y, tilted, work)
+        solved = solve_contacts(n, friction, smooth, pivots, v, L, P, work)
+        note(solved, report, work)
+        v, L = solved[0], solved[1]
+    log_impulses(n, _width(friction), work, motion, log, counts, t)
+    return y[0], y[1], v, L
+
+
+@kernel
+def carry_on(y, h, tilted, work):
+    """State after a moment h at constant velocities."""
+    x, q, v, L = y
+    w = angular_velocity(q, L, work, tilted)
+    x = (x[0] + h * v[0], x[1] + h * v[1], x[2] + h * v[2])
+    return x, qt.normalise(qt.multiply(qt.exponential((h * w[0], h * w[1], h * w[2])), q)), v, L

@@ -24,51 +24,24 @@ import math
 
 from physics.kernels import layout as at
 from physics.kernels import quaternion as qt
-from physics.kernels.body import angular_velocity, bind_body, is_finite, principal_attitude, read_state, write_state
-from physics.kernels.compiler import kernel
+from physics.kernels.body import angular_velocity, bind_body, is_finite, read_state, write_state
+from physics.kernels.compiler import inlined, kernel
 from physics.kernels.events import log as ev
 from physics.kernels.events.air import fly_freely, fly_to_wall
 from physics.kernels.events.candidates import ASKS, ASKS_SLIDING, COLLIDES, FLIES, GOES_BACK, IS_LOST, RESTS
-from physics.kernels.events.collide import (
-    SOLVED,
-    aim_collision,
-    carry_on,
-    log_impulses,
-    or_plastic,
-    pose_collision,
-    pose_jump,
-    within_energy,
-)
+from physics.kernels.events.collide import carry_on, collide, jump, note, principal_axes
 from physics.kernels.events.guards import FORCES, NO_GUARD, NO_STEP, WATCH
 from physics.kernels.events.move import body_speed, look_ahead, move
+from physics.kernels.events.pace import is_crowded, note_leap, note_step, set_pace
 from physics.kernels.events.regime import find_regime
 from physics.kernels.events.resting import read_resting
-from physics.kernels.events.smooth import (
-    cancel,
-)
+from physics.kernels.events.smooth import cancel
 from physics.kernels.events.state import keep_contacts, log_changes, recall_contacts
-from physics.kernels.events.trust import GROWTH, NONE, SHORTER, distrust, judge, name_of_regime
+from physics.kernels.events.trust import GROWTH, SHORTER, judge
 from physics.kernels.fields.loads import bind_fields, refresh_loads, set_clock
 from physics.kernels.laws import bind_laws
-from physics.kernels.resist import without_gain
 from physics.kernels.solve import solve_contacts
-from physics.kernels.stages import note_solve
 from physics.kernels.turns import begin, next_world
-
-# The next regime is looked for so much later, in the time radius / (speed + √(radius acceleration)): what a guard
-# foretold is then above rounding, and the body has hardly moved. FURTHER times as far when it was not.
-AHEAD = 1.0e-5
-FURTHER = 8.0
-FARTHEST = 64.0
-
-# More than CROWD events within one look-ahead go round in circles, at the verge between two regimes. Then, as
-# where no force is consistent, an impulse and a leap of LEAP look-aheads are made, to first order; the leaps grow while
-# the crowd lasts, up to LONGEST, with PAUSE events between them.
-CROWD = 24
-LEAP = 1.0
-LONGER = 4.0
-LONGEST = 100.0
-PAUSE = 6
 
 # Gaps of this share of what they are the difference of are rounding; see `set_thresholds` for HOP.
 ROUNDING = 1.0e-15
@@ -99,87 +72,102 @@ def set_thresholds(y, tilted, work, motion):
     motion.still = math.sqrt(2.0 * HOP * work.acceleration * motion.touch) + motion.noise
     motion.slow = SLOW * motion.still + motion.noise
     unit = work.radius / (speed + math.sqrt(work.radius * work.acceleration) + TINY)
-    motion.ahead = AHEAD * unit
+    set_pace(unit, motion)
     motion.together = (TOGETHER + 10.0 * work.tolerance) * unit
 
 
+@inlined
+def begin_part(y, start, tilted, memory, work, motion):
+    """What is known when a part begins at the time `start` of the step."""
+    set_clock(start, work)
+    refresh_loads(y, 0.0, tilted, work)
+    set_thresholds(y, tilted, work, motion)
+    recall_contacts(memory, work.i, work, motion)
+    motion.left_out, motion.turns = 0.0, 0
+
+
 @kernel
-def principal_axes(y, tilted, work):
-    """Rotation matrix of the principal axes at y."""
-    return qt.to_matrix(principal_attitude(y[1], work, tilted))
+def find_what(y, is_foretold, watched, friction, smooth, tilted, pivots, work, motion, report):
+    """What the body does from y on, and whether a contact problem had to be asked, since it may come to rest.
+
+    It is looked for a moment ahead where a guard has foretold that the regime ends.
+    """
+    seen, later = y, 0.0
+    if is_foretold:
+        seen, later = look_ahead(y, tilted, work, motion), motion.ahead
+    refresh_loads(seen, later, tilted, work)
+    what, n, v, L = find_regime(seen, friction, tilted, work, motion)
+    what = judge(what, watched, y, tilted, work, motion)
+    if what not in (ASKS, ASKS_SLIDING):
+        return what, False
+    if n > 0:
+        P = principal_axes(seen, tilted, work)
+        solved = solve_contacts(n, friction, smooth, pivots, v, L, P, work)
+        note(solved, report, work)
+        v, L = solved[0], solved[1]
+    what = read_resting(n, seen, v, L, friction, what == ASKS_SLIDING, tilted, work, motion)
+    return judge(what, watched, y, tilted, work, motion), True
+
+
+@kernel
+def come_to_rest(y, t, tilted, work, motion, log, counts):
+    """State of what rests from the time t on."""
+    if motion.is_resting:
+        return y
+    motion.is_resting = 1
+    ev.note_event(log, counts, work.i, t + motion.left_out, ev.REST, -1, (0.0, 0.0, 0.0))
+    x, q, _, _ = cancel(y, tilted, work, motion)
+    return x, q, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
+
+
+@kernel
+def go_on(what, y, t, h, gyroscopic, tilted, work, motion, report):
+    """Move, fly or leap from y, at the time t of a part of length h: (state, time it took, the guard that ended it)."""
+    if what == IS_LOST:
+        report[work.world, at.FALLBACKS] += 1.0
+        step = min(motion.leap, h - t)
+        note_leap(t + step, motion)
+        return carry_on(y, step, tilted, work), step, NO_GUARD
+    if what == FLIES:
+        y, step, is_found = fly_to_wall(y, h - t, gyroscopic, tilted, work, motion)
+        if not is_found:
+            report[work.world, at.UNRESOLVED] += 1.0
+        return y, step, NO_GUARD
+    return move(y, h - t, tilted, work, motion)
 
 
 @kernel
 def advance(y, h, friction, smooth, gyroscopic, tilted, pivots, work, motion, memory, report, log, counts, start):
     """State after h: events where they happen, smooth motion between them.
 
-    A contact problem is posed by what the body does, solved in this one place, and read back. `seen` is where the
-    regime is looked for: at y, or a moment ahead of it when a guard has ended the last one.
+    Each turn asks what the body does (`told` says so beforehand where it is known) and does that. A step whose end has
+    to be looked at (`trust`) has begun at `kept` and has the length `watched`.
     """
-    set_clock(start, work)
-    refresh_loads(y, 0.0, tilted, work)
-    set_thresholds(y, tilted, work, motion)
-    nearest = motion.ahead
-    recall_contacts(memory, work.i, work, motion)
-    world = work.world
-    motion.left_out, motion.turns = 0.0, 0
-    seen, later, t = y, 0.0, 0.0
-    told = NOTHING  # what is to be done next, whatever the regime: stop a contact that will leave, or jump
-    since, crowd, leap = 0.0, 0, LEAP * motion.ahead
-    kept, watched = y, 0.0  # where the last step began whose end has to be looked at, and its length
-    motion.unheeded, ended = NONE, NONE  # the regime that a guard of force has ended
-    width = 3
-    if friction is None:
-        width = 1
+    begin_part(y, start, tilted, memory, work, motion)
+    t, told, is_foretold, kept, watched = 0.0, NOTHING, False, y, 0.0
     for k in range(work.splits + 1):
         if k == work.splits:
-            report[world, at.UNRESOLVED] += 1.0
+            report[work.world, at.UNRESOLVED] += 1.0
             break
-        crowd += 1
-        if t > since + nearest:
-            since, crowd = t, 0
-        if crowd > CROWD:
+        if is_crowded(t, motion):
             told = IS_LOST
-        what, n, v, L = told, 0, y[2], y[3]
+        what, is_answer = told, False
         if told == NOTHING:
-            refresh_loads(seen, later, tilted, work)
-            what, n, v, L = find_regime(seen, friction, tilted, work, motion)
-            what = judge(what, watched, nearest, y, tilted, work, motion)
-        is_asked, is_sliding = what in (ASKS, ASKS_SLIDING), what == ASKS_SLIDING
+            what, is_answer = find_what(
+                y, is_foretold, watched, friction, smooth, tilted, pivots, work, motion, report
+            )  # fmt: skip
         told = NOTHING
-        if what in (COLLIDES, IS_LOST):
-            refresh_loads(y, 0.0, tilted, work)
+        if is_answer and what in (COLLIDES, IS_LOST):
+            told, is_foretold = what, False
+            continue
         if what == COLLIDES:
-            n, v, L = pose_collision(y, tilted, work, motion, report), y[2], y[3]
-            aim_collision(n, y, tilted, motion, work)
+            y = collide(y, start + t, friction, smooth, tilted, pivots, work, motion, report, log, counts)
         elif what == IS_LOST:
-            n, v, L = pose_jump(y, min(leap, h - t), tilted, work, motion)
-        if n > 0 and (is_asked or what in (COLLIDES, IS_LOST)):  # a leap may find nothing in reach
-            P = principal_axes(seen if is_asked else y, tilted, work)
-            solved = solve_contacts(n, friction, smooth, pivots, v, L, P, work)
-            if what == COLLIDES:
-                solved = or_plastic(n, friction, smooth, pivots, v, L, solved, P, work, report)
-                solved = without_gain(n, friction, smooth, pivots, v, L, solved, P, work)
-                if friction is not None and work.restitution > 0.0:
-                    solved = within_energy(
-                        n, y, friction, smooth, tilted, pivots, solved, P, work, motion, report
-                    )  # fmt: skip
-            v, L, residual, sweeps, method = solved
-            note_solve(report, world, residual, sweeps, method, max(work.tolerance, SOLVED))
-        if is_asked:
-            what = read_resting(n, seen, v, L, friction, is_sliding, tilted, work, motion)
-            what = judge(what, watched, nearest, y, tilted, work, motion)
-            if what in (COLLIDES, IS_LOST):
-                told, seen, later = what, y, 0.0
-                continue
-        elif what in (COLLIDES, IS_LOST):
-            y = y[0], y[1], v, L
-            log_impulses(n, width, work, motion, log, counts, start + t)
-        step = 0.0
-        if what == GOES_BACK:
+            leap = min(motion.leap, h - t)
+            y = jump(y, leap, start + t, friction, smooth, tilted, pivots, work, motion, report, log, counts)
+        elif what == GOES_BACK:
             motion.trust = SHORTER * watched
-            y, t, watched = kept, t - watched, 0.0
-            seen, later = y, 0.0
+            y, t, watched, is_foretold = kept, t - watched, 0.0, False
             set_clock(start + t, work)
             continue
         if watched > 0.0:
@@ -187,53 +175,27 @@ def advance(y, h, friction, smooth, gyroscopic, tilted, pivots, work, motion, me
             if not t < h:
                 break
         if what == COLLIDES:
-            report[world, at.SPLITS] += 1.0
-            crowd -= motion.is_sequential  # those in turn have a bound of their own
-            seen, later = y, 0.0
+            report[work.world, at.SPLITS] += 1.0
+            motion.crowd -= motion.is_sequential  # those in turn have a bound of their own
+            is_foretold = False
             continue
         log_changes(work, motion, log, counts, start + t)
         if what == RESTS:
-            if not motion.is_resting:
-                ev.note_event(log, counts, work.i, start + t + motion.left_out, ev.REST, -1, (0.0, 0.0, 0.0))
-                y = cancel(y, tilted, work, motion)
-                y = y[0], y[1], (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
-            motion.is_resting = 1
+            y = come_to_rest(y, start + t, tilted, work, motion, log, counts)
             break
-        motion.is_resting = 0
-        guard = NO_GUARD
-        if what == IS_LOST:
-            report[world, at.FALLBACKS] += 1.0
-            step = min(leap, h - t)
-            y = carry_on(y, step, tilted, work)
-            leap = min(LONGER * leap, LONGEST * nearest)
-            since, crowd = t + step, CROWD - PAUSE
-        elif what == FLIES:
-            y, step, is_found = fly_to_wall(y, h - t, gyroscopic, tilted, work, motion)
-            if not is_found:
-                report[world, at.UNRESOLVED] += 1.0
-        else:
-            kept = y
-            y, step, guard = move(y, h - t, tilted, work, motion)
-            if guard == WATCH:
-                watched = step
+        motion.is_resting, kept = 0, y
+        y, step, guard = go_on(what, y, t, h, gyroscopic, tilted, work, motion, report)
         t += step
         set_clock(start + t, work)
-        if guard in FORCES and (step < motion.ahead or name_of_regime(motion) == ended):
-            if not motion.ahead < FARTHEST * nearest:
-                distrust(nearest, motion)
-            motion.ahead = min(motion.ahead * FURTHER, FARTHEST * nearest)  # what was foretold has not been found
-        elif step > motion.ahead:
-            motion.ahead = nearest
-            leap = max(LEAP * nearest, leap / LONGER)
-        ended = name_of_regime(motion) if guard in FORCES else NONE
+        note_step(step, guard, motion)
         motion.left_out, motion.turns = 0.0, 0
-        if not t < h and guard != WATCH:
+        if guard == WATCH:
+            watched = step
+        elif not t < h:
             break
-        seen, later = y, 0.0
-        if guard == NO_STEP:
+        elif guard == NO_STEP:
             told = IS_LOST
-        if guard in FORCES:
-            seen, later = look_ahead(y, tilted, work, motion), motion.ahead
+        is_foretold = guard in FORCES
     keep_contacts(memory, work.i, work, motion)
     return y
 

@@ -37,6 +37,11 @@ def motion_dtype(wall_count: int, features: int) -> np.dtype:
         ("is_sequential", i),  # 1: contacts collide in turn, 0: at once
         ("turns", i),  # impacts in turn so far at this moment
         ("ahead", f),  # time by which the next regime is looked for [s]
+        ("nearest", f),  # the least of these [s]
+        ("leap", f),  # length of the next leap, and when events began to crowd and their number since; see `pace`
+        ("since", f),
+        ("crowd", i),
+        ("ended", i),  # the regime that a guard of force has ended
         ("step", f),  # length of the last smooth step [s]
         ("unheeded", i),  # the regime whose guards of force say nothing; see `trust`
         ("trust", f),  # length of a step without them [s]

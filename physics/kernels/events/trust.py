@@ -65,8 +65,8 @@ def has_jumped(what, y, tilted, work, motion):
 
 
 @kernel
-def judge(what, watched, nearest, y, tilted, work, motion):
-    """What the body does at y, or GOES_BACK: the watched step that led there was longer than `nearest` and too long."""
-    if watched > nearest and has_jumped(what, y, tilted, work, motion):
+def judge(what, watched, y, tilted, work, motion):
+    """What the body does at y; GOES_BACK where the watched step that led there was too long, and no mere look-ahead."""
+    if watched > motion.nearest and has_jumped(what, y, tilted, work, motion):
         return GOES_BACK
     return what

@@ -138,7 +138,6 @@ class Many(NamedTuple):
     lanes: np.ndarray  # what `newton` and `interior` know of contacts
     momenta: np.ndarray  # of `restraint`: velocity and angular momentum before an impact, then with all of its rebound
     hulls: Hulls | None  # tables of convex polyhedra, and a pair of them in place; None where there is no hull
-    kept: Kept | None  # None where no error is asked for
     settings: np.ndarray  # one record: see `workspace.setting_fields`
 
 
@@ -166,20 +165,21 @@ def make_many(
     *,
     meet=True,
     in_turn=False,
-    refined=False,
+    in_time=False,
     relative_slop: float,
     **settings: float,
 ) -> Many:
     """Scratch for worlds of `bodies` bodies among `walls` ((walls, WALL_SIZE)), in fields, with numerical settings.
 
     `polyhedra` are those of `make_hulls`, empty where there is no hull. `meet` says whether bodies touch each other, or
-    walls only; `in_turn` whether contacts that collide do so one after the other.
+    walls only; `in_turn` whether contacts that collide do so one after the other; `in_time` whether an error is asked
+    for.
     """
     f, i, nb = np.float64, np.int64, bodies
     pairs, n = pair_room(bodies), contact_room(bodies, len(walls), polyhedra)
     fields = [*setting_fields(), ("still", f), ("half", f), ("rests", i), ("meet", i), ("in_turn", i), ("in_time", i)]
     record = np.zeros(1, np.dtype(fields))
-    record["still"], record["meet"], record["in_turn"], record["in_time"] = np.inf, meet, in_turn, refined
+    record["still"], record["meet"], record["in_turn"], record["in_time"] = np.inf, meet, in_turn, in_time
     for name, value in settings.items():
         record[name] = value
     rows = np.zeros(nb, np.dtype(body_fields(terms)))
@@ -209,8 +209,7 @@ def make_many(
         swaps=np.zeros(6, i), best=np.zeros((n, 3)), defect=np.zeros((nb, COLUMN_SIZE)), before=np.zeros((nb, 6)),
         change=np.zeros((nb, COLUMN_SIZE)), bundle=np.zeros((bundles, BUNDLE_SIZE), i),
         lanes=np.zeros((bundles, LANES_SIZE)), momenta=np.zeros((nb, 12)),
-        hulls=make_hulls(polyhedra) if polyhedra else None,
-        kept=make_kept(nb, memory_size(nb, len(walls), polyhedra)) if refined else None, settings=record,
+        hulls=make_hulls(polyhedra) if polyhedra else None, settings=record,
     )  # fmt: skip
 
 

@@ -44,9 +44,8 @@ START, COARSE, MIDDLE = range(3)
 
 
 @inlined
-def _keep(slot, world, memory, report, many):
+def _keep(slot, world, kept, memory, report, many):
     """Keep the world as it is now."""
-    kept = many.kept
     for b in range(many.now.shape[0]):
         for c in range(many.now.shape[1]):
             kept.now[slot, b, c] = many.now[b, c]
@@ -57,9 +56,8 @@ def _keep(slot, world, memory, report, many):
 
 
 @inlined
-def _come_back(slot, world, memory, report, many):
+def _come_back(slot, world, kept, memory, report, many):
     """Make the world what it was when it was kept, but for the work that the report counts."""
-    kept = many.kept
     for b in range(many.now.shape[0]):
         for c in range(many.now.shape[1]):
             many.now[b, c] = kept.now[slot, b, c]
@@ -76,14 +74,14 @@ def _length(a):
 
 
 @inlined
-def _apart(b, tilted, many):
+def _apart(b, tilted, kept, many):
     """How far body b is from where `COARSE` has it, in its radius; and by how much faster, in its speed.
 
     Of its speed counts no less than what its loads give it over its radius.
     """
     body = many.bodies[b]
     x, q, v, L = read_state(many.now, b)
-    y, p, u, K = read_state(many.kept.now[COARSE], b)
+    y, p, u, K = read_state(kept.now[COARSE], b)
     way, r = minus(x, y), body.radius
     same, other = 0.0, 0.0
     for c in range(4):
@@ -98,11 +96,11 @@ def _apart(b, tilted, many):
 
 
 @inlined
-def _error(tilted, many):
+def _error(tilted, kept, many):
     """Largest error of any body, 1: all that is allowed."""
     worst, allowed = 0.0, PART_ERROR * many.settings[0].tolerance
     for b in range(many.now.shape[0]):
-        found = _apart(b, tilted, many) / allowed
+        found = _apart(b, tilted, kept, many) / allowed
         if not found <= worst:
             worst = found
     return worst
@@ -119,22 +117,22 @@ def _advance(world, start, h, switches, memory, report, many):
 
 
 @kernel
-def _take_part(world, start, unit, part, shortest, switches, memory, report, many):
+def _take_part(world, start, unit, part, shortest, switches, kept, memory, report, many):
     """Advance by `part` units of time [s], or by half of it, or a quarter ...: (units taken, error, lengths tried)."""
     tilted, tried = switches[2], 1
-    _keep(START, world, memory, report, many)
+    _keep(START, world, kept, memory, report, many)
     _advance(world, start, part * unit, switches, memory, report, many)
     while True:
         half = 0.5 * part * unit
-        _keep(COARSE, world, memory, report, many)
-        _come_back(START, world, memory, report, many)
+        _keep(COARSE, world, kept, memory, report, many)
+        _come_back(START, world, kept, memory, report, many)
         _advance(world, start, half, switches, memory, report, many)
-        _keep(MIDDLE, world, memory, report, many)
+        _keep(MIDDLE, world, kept, memory, report, many)
         _advance(world, start + half, half, switches, memory, report, many)
-        error = _error(tilted, many)
+        error = _error(tilted, kept, many)
         if error <= 1.0 or part <= shortest:
             return part, error, tried
-        _come_back(MIDDLE, world, memory, report, many)  # the coarse answer of the first half
+        _come_back(MIDDLE, world, kept, memory, report, many)  # the coarse answer of the first half
         part //= 2
         tried += 1
 
@@ -153,13 +151,14 @@ def _loaded(h, many):
 
 
 @kernel
-def refine(world, start, h, switches, memory, report, many):
+def refine(world, start, h, switches, kept, memory, report, many):
     """Advance the bodies of one world by h [s], `start` [s] after the call, in parts that meet the error.
 
     Where the shortest part does not meet it either, that is counted as a fallback, and the shortest part of this
     substep is longer from there on.
 
-    `switches` are friction, gyroscopic, tilted, ellipsoids, hulls and scheme, as in `substep_world`.
+    `switches` are friction, gyroscopic, tilted, ellipsoids, hulls and scheme, as in `substep_world`; `kept` is what
+    `arrays.make_kept` makes.
     """
     place, shortest, unit, patience = 0, 1, h / WHOLE, PATIENCE
     next_part = memory.shape[1] - 1
@@ -169,7 +168,7 @@ def refine(world, start, h, switches, memory, report, many):
         part = WHOLE
     while place < WHOLE:
         now = start + place * unit
-        part, error, tried = _take_part(world, now, unit, part, shortest, switches, memory, report, many)
+        part, error, tried = _take_part(world, now, unit, part, shortest, switches, kept, memory, report, many)
         place += part
         patience -= tried
         if not all_finite(many.now):

@@ -13,8 +13,8 @@ from physics.kernels import layout as at
 from physics.kernels.body import all_finite, angular_velocity, bind_body, read_state, write_state
 from physics.kernels.compiler import kernel
 from physics.kernels.fields.loads import bind_fields, set_clock
-from physics.kernels.many import memory as kept
 from physics.kernels.many.contacts import put
+from physics.kernels.many.memory import forget
 from physics.kernels.many.refine import refine
 from physics.kernels.many.sleep import all_sleep, doze, sleep_on, wake_world
 from physics.kernels.many.substep import substep_world
@@ -24,7 +24,7 @@ from physics.kernels.turns import begin, next_world
 @kernel
 def step_many(
     turns, taken, steps, substeps, h, state, params, shapes, gravity, wrench, friction, restitution, gyroscopic,
-    tilted, ellipsoids, hulls, scheme, refined, sleep, memory, report, many,
+    tilted, ellipsoids, hulls, scheme, kept, sleep, memory, report, many,
 ):  # fmt: skip
     """Advance the worlds that no other thread has taken by `steps` steps of `substeps` substeps of h seconds each.
 
@@ -48,9 +48,9 @@ def step_many(
             write_state(many.now, b, read_state(state, i))
             many.touched[b] = 0
         for k in range(steps * substeps):
-            if refined is not None:
+            if kept is not None:
                 switches = (friction, gyroscopic, tilted, ellipsoids, hulls, scheme)
-                refine(world, k * h, h, switches, memory, report, many)
+                refine(world, k * h, h, switches, kept, memory, report, many)
             else:
                 for b in range(bodies):
                     set_clock(k * h, many.bodies[b])
@@ -59,7 +59,7 @@ def step_many(
                 )
             if not all_finite(many.now):
                 report[world, at.FAULTS] += 1.0
-                kept.forget(world, memory)
+                forget(world, memory)
                 wake_world(world, bodies, sleep)
                 break
             if sleep is not None:
