@@ -40,6 +40,10 @@ from physics.kernels.many.system import add_bundle, complete_matrix, set_less
 STEP_SHARE = 0.98
 LEAST_RATIO = 1.0e-4
 
+# Rounding may lead across the boundary, where masses are far apart: x₀ of what is inside is at least this times |x'|,
+# which is rounded by two units in its last place at most.
+BARELY = 1.0 + 4 * 2.0**-52
+
 # Share of a whole step below which one is short; how much of d is taken along after such a step and after another one,
 # relative to before.
 SHORT = 0.1
@@ -202,13 +206,19 @@ def _correct(part, center, many):
 
 
 @inlined
+def _within(a):
+    """a, inside the cone."""
+    return (larger(a[0], BARELY * of.length(a[1], a[2])), a[1], a[2])
+
+
+@inlined
 def _step(part, t, many):
     """Go t of the way."""
     for g in range(many.counts[BUNDLES]):
         dp = cone.unscaled(_scaling_of(g, many), of.three(g, of.CHANGE, many))
-        of.put_three(g, of.INSIDE, plus(of.three(g, of.INSIDE, many), t, dp), many)
+        of.put_three(g, of.INSIDE, _within(plus(of.three(g, of.INSIDE, many), t, dp)), many)
         du = of.three(g, of.SLACK_CHANGE, many)
-        of.put_three(g, of.SLACK, plus(of.three(g, of.SLACK, many), t, du), many)
+        of.put_three(g, of.SLACK, _within(plus(of.three(g, of.SLACK, many), t, du)), many)
     for i in range(part[2], part[3]):
         b = many.order[i]
         for c in range(SIZE):
