@@ -21,6 +21,7 @@ import typer
 import physics
 from benchmarks import machine
 from benchmarks.settling import PARTS, Ours, Sample, Theirs, settle
+from physics import scenes
 from physics.kernels.many.arrays import PAIRS
 from physics.kernels.many.near import find_pairs
 from rigid_env.measure import mujoco_scene
@@ -64,10 +65,10 @@ def exponent(samples: list[Sample]) -> float:
 
 def measure_pile(count: int, limit: int, accuracy: str, solvers: tuple[str, ...], found: dict[str, Series]) -> None:
     """Let a pile of `count` cubes settle, ours and then MuJoCo's for as many steps, and add to what was `found`."""
-    falling, lying = settle(count, Ours(count, accuracy), limit)
+    falling, lying = settle(count, Ours(scenes.heap(count), accuracy), limit)
     _note(OURS, falling, lying, found)
     for solver in solvers:
-        pair = settle(count, Theirs(count, solver), falling.steps, until_it_lies=False)
+        pair = settle(count, Theirs(scenes.heap(count), solver), falling.steps, until_it_lies=False)
         _note(f"MuJoCo, {solver}", *pair, found)
 
 

@@ -1,4 +1,4 @@
-"""A pile of cubes that settles in a shaft, ours and MuJoCo's: what a step costs while it falls, and once it lies."""
+"""A pile of cubes in a shaft, ours and MuJoCo's: what a step costs while it falls and settles, and once it lies."""
 
 from __future__ import annotations
 
@@ -8,7 +8,6 @@ from dataclasses import dataclass
 import numpy as np
 
 import physics
-from physics import scenes
 from rigid_env.measure.workloads import STEP
 
 LIES = 1e-3  # a pile lies once no body of it has been faster than this [m/s] ...
@@ -33,6 +32,10 @@ class Sample:
         That it took.
     fastest : float
         Speed of the fastest body at the end [m/s].
+    deepest : float
+        Of parts of so many steps the deepest that a contact was in one, the median over the parts [m].
+    residual : float or None
+        The same of the residual of the solves, relative as `Accuracy.tolerance` is; None: it does not say.
     """
 
     bodies: int
@@ -41,24 +44,31 @@ class Sample:
     unconverged: float | None = None
     steps: int = 0
     fastest: float = 0.0
+    deepest: float = 0.0
+    residual: float | None = None
 
 
 class Ours:
     """A pile of our engine."""
 
-    def __init__(self, count: int, accuracy: str) -> None:
-        self.world = physics.World(scenes.heap(count), dt=STEP, accuracy=accuracy)
+    def __init__(self, scene: physics.Scene, accuracy: str) -> None:
+        self.world = physics.World(scene, dt=STEP, accuracy=accuracy)
         self.world.step(dt=STEP * 1e-3)  # compiled
-        self.solves = self.failed = 0
+        self.solves, self.failed, self.residual = 0, 0, 0.0
 
     def advance(self, steps: int) -> None:
         """Step it."""
         report = self.world.step(steps=steps)
         self.solves, self.failed = self.solves + int(report.solves[0]), self.failed + int(report.unconverged[0])
+        self.residual, self._depth = float(report.residual[0]), float(report.penetration[0])
 
     def contacts(self) -> int:
         """Contacts of the last step."""
         return len(self.world.contact_ends(0))
+
+    def depth(self) -> float:
+        """Deepest that a contact was since before the last `advance` [m]."""
+        return self._depth
 
     def fastest(self) -> float:
         """Speed of the fastest body [m/s]."""
@@ -68,12 +78,12 @@ class Ours:
 class Theirs:
     """The same pile in MuJoCo, at its defaults but for the solver."""
 
-    solves = failed = 0  # it does not say
+    solves, failed, residual = 0, 0, None  # it does not say
 
-    def __init__(self, count: int, solver: str) -> None:
+    def __init__(self, scene: physics.Scene, solver: str) -> None:
         from rigid_env.measure.peers.mujoco import MuJoCo
 
-        self.run = MuJoCo().open(scenes.heap(count), STEP, solver=solver)
+        self.run = MuJoCo().open(scene, STEP, solver=solver)
         self.run.restart()
 
     def advance(self, steps: int) -> None:
@@ -83,6 +93,10 @@ class Theirs:
     def contacts(self) -> int:
         """As `Ours.contacts`."""
         return int(self.run.data.ncon)
+
+    def depth(self) -> float:
+        """Deepest contact of the last step [m]."""
+        return max(0.0, -float(self.run.data.contact.dist.min(initial=0.0)))
 
     def fastest(self) -> float:
         """As `Ours.fastest`."""
@@ -94,6 +108,7 @@ class Watch:
 
     def __init__(self, pile: Ours | Theirs) -> None:
         self.pile, self.steps, self.times, self.contacts, self.speeds = pile, 0, [], [], []
+        self.depths, self.residuals = [], []
         self.solves, self.failed = pile.solves, pile.failed
 
     def part(self, steps: int) -> None:
@@ -103,6 +118,8 @@ class Watch:
         self.times.append((time.perf_counter() - start) / steps)
         self.contacts.append(self.pile.contacts())
         self.speeds.append(self.pile.fastest())
+        self.depths.append(self.pile.depth())
+        self.residuals.append(self.pile.residual)
         self.steps += steps
 
     def lies(self, parts: int) -> bool:
@@ -113,7 +130,10 @@ class Watch:
         """What was seen, a step of it at `seconds`."""
         solves, failed = self.pile.solves - self.solves, self.pile.failed - self.failed
         share = failed / solves if solves else None
-        return Sample(bodies, float(np.mean(self.contacts)), seconds, share, self.steps, self.speeds[-1])
+        depth = float(np.median(self.depths))
+        residual = None if None in self.residuals else float(np.median(self.residuals))
+        contacts = float(np.mean(self.contacts))
+        return Sample(bodies, contacts, seconds, share, self.steps, self.speeds[-1], depth, residual)
 
 
 def settle(count: int, pile: Ours | Theirs, limit: int, until_it_lies: bool = True) -> tuple[Sample, Sample]:

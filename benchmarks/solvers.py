@@ -27,7 +27,7 @@ from physics.kernels.dantzig import dantzig, dantzig_sizes
 from physics.kernels.lemke import lemke, lemke_sizes
 from physics.kernels.many.interior import interior_point
 from physics.kernels.many.islands import find_islands
-from physics.kernels.many.newton import newton_contacts, prepare_system
+from physics.kernels.many.newton import LEAST_STEPS, WORTH_LYING, newton_contacts, prepare_system
 from physics.kernels.many.response import assemble, residual_of
 from physics.kernels.many.solve import POLISH, forget_all, solve_contacts
 from physics.kernels.many.sweeps import sweep_contacts
@@ -145,7 +145,7 @@ def _solve_island(method, part, residual, goal, limit, many):
     """Iterations of one method for one island; -1 where its linear system finds no room."""
     if method == SWEEPS:
         return sweep_contacts(part[0], part[1], True, residual, goal, limit, many)[0]
-    if prepare_system(part, limit, many) == 0:
+    if prepare_system(part, limit, WORTH_LYING, LEAST_STEPS, many) < LEAST_STEPS:
         return -1
     if method == INTERIOR:
         return interior_point(part, residual, goal, limit, many)

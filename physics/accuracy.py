@@ -50,7 +50,9 @@ class Accuracy:
         error of one smooth step, relative to the body's size and speed (where bodies touch each other a hundredth of
         that of a part, and no less than 1e-11).
     iterations : int
-        Sweeps per contact problem at most.
+        Sweeps per contact problem at most (as many visits of contacts as there are contacts are one), and as many
+        iterations with a linear system, of bodies that touch each other. Where that system would take more time than
+        ten times those sweeps (large piles at ``fast``, while they move) there are sweeps only.
     impacts : int
         Impacts (with ``events`` all events) of one body that one substep resolves in time; more are reported and
         treated as plastic (with ``events`` the rest of the substep is left out). Where bodies touch each other: of all

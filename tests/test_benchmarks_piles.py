@@ -7,6 +7,7 @@ import typer
 from typer.testing import CliRunner
 
 from benchmarks import piles, settling
+from physics import scenes
 
 
 def test_the_exponent_is_that_of_the_law_it_is_given():
@@ -68,7 +69,7 @@ def stop(count):
 
 
 def test_a_pile_lies_once_nothing_of_it_was_fast_for_long_enough():
-    falling, lying = settling.settle(2, settling.Ours(2, "fast"), 4000)
+    falling, lying = settling.settle(2, settling.Ours(scenes.heap(2), "fast"), 4000)
     assert settling.LIES_FOR < falling.steps < 4000
     assert falling.fastest <= settling.LIES
     assert lying.steps == settling.LIES_FOR

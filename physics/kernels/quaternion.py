@@ -85,6 +85,16 @@ def transposed_matvec(R, a):
 
 
 @inlined
+def symmetric_matvec(A, a):
+    """A a for a symmetric matrix, its upper triangle row by row."""
+    return (
+        A[0] * a[0] + A[1] * a[1] + A[2] * a[2],
+        A[1] * a[0] + A[3] * a[1] + A[4] * a[2],
+        A[2] * a[0] + A[4] * a[1] + A[5] * a[2],
+    )
+
+
+@inlined
 def cross(a, b):
     """a x b."""
     return (a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0])

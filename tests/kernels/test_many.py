@@ -25,6 +25,8 @@ from physics.kernels.many.touch import find_contacts
 
 SETTINGS = {"relative_slop": 1e-6, "tolerance": 1e-6, "sweeps": 100, "splits": 8, "rest_share": 0.5}
 
+ANY = 10**9  # products of blocks: as many as there are
+
 
 def rotation(rng) -> np.ndarray:
     q, r = np.linalg.qr(rng.normal(size=(3, 3)))
@@ -292,11 +294,11 @@ def test_islands_are_the_connected_components(seed, count, links):
     assert sorted(seen) == list(range(n))
 
 
-def island_of_all(count, pairs):
+def island_of_all(count, pairs, most=ANY):
     """`Many` with one island of all bodies, which `pairs` must connect, ordered for elimination; products it takes."""
     many, n = touching(count, pairs, [0])
     assert find_islands(n, many) == 1
-    return many, order_bodies(0, n, 0, count, many)
+    return many, order_bodies(0, n, 0, count, most, many)
 
 
 def connected_pairs(rng, count, links):
@@ -335,6 +337,14 @@ def test_the_block_system_is_solved(count, links):
     np.testing.assert_allclose(x.ravel(), np.linalg.solve(A, right.ravel()), atol=bound)
 
 
+def test_elimination_ends_where_it_takes_more_products_than_are_allowed():
+    pairs = connected_pairs(np.random.default_rng(0), 20, 30)
+    _, products = island_of_all(20, pairs)
+    assert products > 20
+    assert island_of_all(20, pairs, products)[1] == products
+    assert island_of_all(20, pairs, products - 1)[1] == -1
+
+
 @pytest.mark.parametrize("kind", ["any", "in order", "needs exchanges", "far apart"])
 def test_a_block_is_inverted(kind):
     """With pivots on its diagonal or not; entries a million apart are no worse than their condition."""
@@ -371,7 +381,7 @@ def test_the_matrix_is_that_of_the_contacts(count, links, contacts):
     pairs = [pair for pair in connected_pairs(rng, count, links) for _ in range(contacts)]
     many, n = touching(count, pairs, list(range(0, count, 2)))
     find_islands(n, many)
-    order_bodies(0, n, 0, count, many)
+    order_bodies(0, n, 0, count, ANY, many)
     many.frame[:n] = [np.linalg.qr(rng.normal(size=(3, 3)))[0].ravel() for _ in range(n)]
     many.arm[:n], many.lightness[:] = rng.normal(size=(n, 6)), rng.uniform(0.5, 2, count)
     M, D, rho = np.zeros((6 * count, 6 * count)), rng.normal(size=(n, 9)), 0.7

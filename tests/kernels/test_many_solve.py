@@ -9,7 +9,8 @@ from benchmarks import problems
 from benchmarks.problems import SETTINGS
 from physics import scenes
 from physics.kernels import layout as at
-from physics.kernels.many import calm, interior, islands, newton, response, solve, sweeps
+from physics.kernels.compiler import kernel
+from physics.kernels.many import calm, interior, islands, newton, response, solve, sweeps, visits
 from physics.kernels.many.arrays import Many, make_many
 from tests.reference.lcp import coulomb_defect, solve_coulomb
 
@@ -31,7 +32,7 @@ def one_island(many: Many, n: int, bodies: int) -> tuple[tuple[int, int, int, in
     scale = response.assemble(n, many)
     assert islands.find_islands(n, many) == 1
     part = (0, n, 0, bodies)
-    assert newton.prepare_system(part, 200, many) > 0
+    assert newton.prepare_system(part, 200, newton.WORTH_LYING, newton.LEAST_STEPS, many) > 0
     return part, scale
 
 
@@ -146,6 +147,98 @@ def test_slow_sweeps_are_extrapolated():
     count, residual = sweeps.sweep_contacts(0, n, True, np.inf, goal, 1000, many)
     assert residual <= goal
     assert count <= 400
+
+
+def with_resting(one: Many, n: int, bodies: int, resting: int) -> Many:
+    """A problem of so many contacts and bodies, and beside it bodies that rest on the wall by one contact each."""
+    many = make_many(bodies + resting, np.zeros((1, at.WALL_SIZE)), **SETTINGS)
+    for name in ("mass", "radius"):
+        many.bodies[name] = 1.0
+        many.bodies[name][:bodies] = one.bodies[name]
+    many.lightness[:], many.turning[:] = 1.0, (1, 0, 0, 1, 0, 1)
+    for name in ("lightness", "turning", "twist"):
+        getattr(many, name)[:bodies] = getattr(one, name)
+    for name in ("frame", "arm", "mu", "ends"):
+        getattr(many, name)[:n] = getattr(one, name)[:n]
+    for k in range(resting):
+        many.ends[n + k], many.frame[n + k] = (bodies + k, -1), np.eye(3).ravel()
+        many.arm[n + k], many.mu[n + k] = (0, -1, 0, 0, 0, 0), 0.5
+    return many
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_sweeps_visit_only_what_has_something_to_do(seed):
+    """Bodies at rest beside a pile are looked at, not visited; as many visits as there are contacts are a sweep."""
+    one, n = pile(seed, 4, 4, 0.3)
+    both, resting = with_resting(one, n, 4, 200), 200
+    found = []
+    for many, contacts in ((one, n), (both, n + resting)):
+        goal = 1e-6 * response.assemble(contacts, many)
+        found.append(sweeps.sweep_contacts(0, contacts, True, np.inf, goal, 2000, many))
+        assert found[-1][1] <= goal
+    (alone, _), (together, _) = found
+    assert alone >= 10
+    # The contacts stand in another order then, and take other sweeps: up to twice as many are allowed for that.
+    assert together <= 1 + 2 * alone * n / (n + resting)
+    assert not both.impulse[n : n + resting].any()
+    assert response.residual_of(0, n + resting, True, both) == found[1][1]
+
+
+def test_contacts_are_dealt_out_once_each():
+    for n in range(1, 14):
+        one, contacts = pile(0, n, 1, 0.3)
+        response.assemble(contacts, one)
+        deal(0, contacts, one)
+        assert sorted(one.dealt[:contacts]) == list(range(contacts))
+        assert (one.side[:contacts, :2] == one.ends[one.dealt[:contacts]]).all()
+
+
+@kernel
+def deal(first, last, many):
+    visits.deal(first, last, many)
+
+
+def crowd(bodies: int) -> tuple[Many, int]:
+    """Bodies that all touch each other, by one contact for each two, the first of them on a wall."""
+    one, _ = pile(0, bodies, bodies, 0.3)
+    many = make_many(bodies, np.zeros((1, at.WALL_SIZE)), **SETTINGS)
+    for name in ("mass", "radius"):
+        many.bodies[name] = one.bodies[name]
+    pairs = [(0, -1), *((a, b) for a in range(bodies) for b in range(a))]
+    n = len(pairs)
+    for name in ("lightness", "turning", "twist"):
+        getattr(many, name)[:] = getattr(one, name)
+    for name in ("frame", "arm", "mu"):
+        getattr(many, name)[:n] = getattr(one, name)[:n]
+    many.ends[:n] = pairs
+    return many, n
+
+
+@pytest.mark.parametrize("load", [0.0, np.inf])
+def test_what_is_too_dear_for_its_system_is_swept_while_it_moves(load):
+    """All is new in the next step then; once it lies what is solved holds, and its system is worth more."""
+    many, n = crowd(30)
+    many.settings["tolerance"], many.settings["sweeps"], many.settings["rests"] = 1e-9, 20, 1
+    many.settings["load"] = load
+    iterations, residual, method = solve.solve_contacts(n, True, many)
+    assert method == (solve.SWEEPS if load == 0.0 else solve.NEWTON)
+    assert iterations <= (20 if load == 0.0 else 3 * 20)
+    assert residual == pytest.approx(response.residual_of(0, n, True, many) / scale_of(many, n), rel=1e-9)
+
+
+def scale_of(many: Many, n: int) -> float:
+    """Largest velocity of a contact without impulses, in its frame."""
+    J, _, _ = dense(many, n)
+    return np.abs(J @ many.free.ravel() - many.target[:n].ravel()).max()
+
+
+def test_an_impact_that_is_not_solved_finely_is_swept_first():
+    """And the few sweeps that a small pile takes are all there is: no linear system."""
+    many, n = pile(0, 4, 4, 0.3)
+    many.settings["tolerance"], many.settings["sweeps"] = 1e-3, 200
+    _, residual, method = solve.solve_contacts(n, True, many)
+    assert residual <= 1e-3
+    assert method == solve.SWEEPS
 
 
 @pytest.mark.parametrize("seed", range(20))

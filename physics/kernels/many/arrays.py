@@ -38,8 +38,12 @@ CONTACTS, PAIRS, LEFT_OUT, BUNDLES = range(4)
 COLUMN_SIZE = 8
 BLOCK_SIZE = 6 * COLUMN_SIZE
 
-# Numbers of a row of `rows`: fifteen vectors, one unused number after each.
-ROWS_SIZE = 15 * 4
+# Numbers of a row of `rows`: five vectors, one unused number after each; and of one of `visit`, five lines of a cache.
+ROWS_SIZE = 5 * 4
+VISIT_SIZE = 5 * 8
+
+# Visits that are looked at together, which of them have to be made.
+CHUNK = 16
 
 # Numbers of a row of `bundle`, and of `lanes`: four for each of the fields in `bundles`.
 BUNDLE_SIZE = 6
@@ -97,12 +101,15 @@ class Many(NamedTuple):
     impulse: np.ndarray  # normal, tangents [N s]
     step: np.ndarray  # 1/λ_max of the tangential part of its block [kg]
     block: np.ndarray  # the contact's own 3 x 3 of W = J M⁻¹ Jᵀ [1/kg]
-    inverse: np.ndarray  # its inverse: 00, 01, 02, 11, 12, 22 [kg]
-    rows: np.ndarray  # of `rows`: the Jacobian of a contact, and M⁻¹ times it
+    rows: np.ndarray  # of `rows`: the normal's row of the Jacobian of a contact, and M⁻¹ times it
+    visit: np.ndarray  # of `visits`: what visits of contacts read, in the order of the visits
+    side: np.ndarray  # their bodies, as `ends`; and the second one, or the first again where that is a wall
+    chunk: np.ndarray  # of those that are next, the ones that have to be made
+    dealt: np.ndarray  # their contacts
     motion: np.ndarray  # twists while contacts are swept, columns of `blocks`
     settled: np.ndarray  # of `sweeps`: impulses two sweeps ago, and what those two changed [N s]
     trend: np.ndarray
-    visited: np.ndarray  # of sweeps without friction: numbers of the last visits of a contact, of a push of a body
+    visited: np.ndarray  # of sweeps: number of the last visit of a contact, of the last push of a body
     pushed: np.ndarray
     table: np.ndarray  # places of names in the last stage's contacts: open addressing
     mix: np.ndarray  # of a pair of blocks: axes of one in the other, and absolute values
@@ -177,7 +184,8 @@ def make_many(
     """
     f, i, nb = np.float64, np.int64, bodies
     pairs, n = pair_room(bodies), contact_room(bodies, len(walls), polyhedra)
-    fields = [*setting_fields(), ("still", f), ("half", f), ("rests", i), ("meet", i), ("in_turn", i), ("in_time", i)]
+    floats, ints = ("still", "half", "load"), ("rests", "meet", "in_turn", "in_time")
+    fields = [*setting_fields(), *((name, f) for name in floats), *((name, i) for name in ints)]
     record = np.zeros(1, np.dtype(fields))
     record["still"], record["meet"], record["in_turn"], record["in_time"] = np.inf, meet, in_turn, in_time
     for name, value in settings.items():
@@ -197,7 +205,8 @@ def make_many(
         owner=np.zeros(n, i), normal=np.zeros((n, 3), f), anchor=np.zeros((n, 6)), frame=np.zeros((n, 9)),
         arm=np.zeros((n, 6)), gap=np.zeros(n), speed=np.zeros(n), mu=np.zeros(n), bounce=np.zeros(n),
         target=np.zeros((n, 3)), impulse=np.zeros((n, 3)), step=np.zeros(n), block=np.zeros((n, 9)),
-        rows=np.zeros((n, ROWS_SIZE)), motion=np.zeros((nb, COLUMN_SIZE)), inverse=np.zeros((n, 6)),
+        rows=np.zeros((n, ROWS_SIZE)), motion=np.zeros((nb, COLUMN_SIZE)), visit=np.zeros((n, VISIT_SIZE)),
+        side=np.zeros((n, 3), i), chunk=np.zeros(CHUNK, i), dealt=np.zeros(n, i),
         settled=np.zeros((n, 3)), trend=np.zeros((n, 3)), visited=np.zeros(n, i), pushed=np.zeros(nb, i),
         table=np.full(table, -1, i), mix=np.zeros((4, 3, 3)), polygon=np.zeros((2, 16, 3)),
         edge=np.zeros((2, 16, 2), i), free=np.zeros((nb, 6)), parent=np.zeros(nb, i), island=np.zeros(nb, i),

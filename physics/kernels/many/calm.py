@@ -16,7 +16,14 @@ from __future__ import annotations
 
 from physics.kernels.compiler import inlined, kernel
 from physics.kernels.many.contacts import minus, vector
-from physics.kernels.many.newton import all_push, bring_back_best, guess_all_hold, prepare_system, save_best
+from physics.kernels.many.newton import (
+    WORTH_LYING,
+    all_push,
+    bring_back_best,
+    guess_all_hold,
+    prepare_system,
+    save_best,
+)
 from physics.kernels.many.sweeps import sweep_contacts
 from physics.kernels.many.thrift import VELOCITY
 
@@ -90,7 +97,7 @@ def calm(part, friction, residual, goal, deep, least, many):
     if not _may_calm(part, CALM_SPEED * goal, 2.0 * fine, many):
         return 0, residual, SWEEPS
     count, method = 0, SWEEPS
-    if all_push(part, many) and prepare_system(part, many.settings[0].sweeps, many) > 0:
+    if all_push(part, many) and prepare_system(part, many.settings[0].sweeps, WORTH_LYING, 1, many) > 0:
         count, method, residual = 1, NEWTON, guess_all_hold(part, friction, residual, deep, many)
     if not residual > fine:
         return count, residual, method

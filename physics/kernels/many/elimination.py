@@ -113,11 +113,11 @@ def _connect(start, end, b, many):
 
 
 @kernel
-def order_bodies(first, last, begin, end, many):
+def order_bodies(first, last, begin, end, most, many):
     """Reorder the bodies `many.order[begin:end]` of an island with contacts `many.queue[first:last]` for elimination.
 
     `many.rank` receives the place of each, `many.column[start[b] : stop[b]]` those of its neighbours that come later.
-    Returns the products of blocks that elimination takes; -1: there is no room for it.
+    Returns the products of blocks that elimination takes; -1: there is no room for it, or they are more than `most`.
     """
     if not _link(first, last, begin, end, many):
         return -1
@@ -138,5 +138,7 @@ def order_bodies(first, last, begin, end, many):
         many.stop[b] = at
         d = at - many.start[b]
         work += 1 + d + d * d
+        if work > most:
+            return -1
         least = max(0, least - 1)
     return work

@@ -133,6 +133,16 @@ def still_speed(h, many):
     return least
 
 
+@inlined
+def load_speed(h, many):
+    """Speed that the loads of the stage alone give to what touches, at most [m/s]."""
+    most = 0.0
+    for b in range(many.now.shape[0]):
+        if many.touched[b] == 1:
+            most = max(most, many.bodies[b].acceleration * h)
+    return most
+
+
 @kernel
 def glide(n, world, h, friction, gyroscopic, tilted, scheme, sleep, memory, report, many):
     """Every body after h: exact flight, or Moreau's midpoint step with the n contacts of the set."""
@@ -164,6 +174,7 @@ def glide(n, world, h, friction, gyroscopic, tilted, scheme, sleep, memory, repo
             turn_loaded(b, tilted, many)
     kept.load(n, world, h, friction, memory, many)
     many.settings[0].still, many.settings[0].rests = still_speed(h, many), 1 - many.settings[0].in_time
+    many.settings[0].load = load_speed(h, many)
     settle(n, world, friction, report, many)
     if stage_has_gained(n, h, many):
         take_stage_back(n, tilted, many)
@@ -171,7 +182,7 @@ def glide(n, world, h, friction, gyroscopic, tilted, scheme, sleep, memory, repo
         if friction is not None and stage_has_gained(n, h, many):
             take_stage_back(n, tilted, many)
             settle_smoothly(n, many)
-    many.settings[0].still, many.settings[0].rests = math.inf, 0
+    many.settings[0].still, many.settings[0].rests, many.settings[0].load = math.inf, 0, 0.0
     kept.store(n, world, h, sleep, memory, many)
     for b in range(many.now.shape[0]):
         if many.touched[b] == 1:

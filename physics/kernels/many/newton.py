@@ -49,9 +49,11 @@ SWEEP_WORK = 25.0
 CONTACT_WORK = 230.0
 BLOCK_WORK = 60.0
 
-# Work that iterations with the system may take, in that of the sweeps allowed: much, since what sweeps leave unsolved
-# sinks in and is then pushed apart at as high a cost, step by step. Fewer than these lead nowhere.
-WORTH = 200.0
+# Work that iterations with the system may take, in that of the sweeps allowed: while a pile moves and all is new in the
+# next step; and once it all but lies, where what is solved once holds for long, and what is not creeps for ever.
+# Fewer iterations than these lead nowhere.
+WORTH_MOVING = 10.0
+WORTH_LYING = 200.0
 LEAST_STEPS = 12
 
 
@@ -163,20 +165,18 @@ def _heaviest(part, many):
 
 
 @kernel
-def prepare_system(part, sweeps, many):
+def prepare_system(part, sweeps, worth, fewest, many):
     """Order the bodies for the linear system: the iterations with it that an island is worth, 0 where it is too dear.
 
-    A problem that may take so many sweeps is worth `WORTH` times their work.
+    A problem that may take so many sweeps is worth `worth` times their work, and dear where that is fewer than `fewest`
+    iterations: this is known before much work went into it.
     """
     first, last, begin, end = part
-    products = order_bodies(first, last, begin, end, many)
-    if products < 0:
+    contacts, worth = (last - first) * CONTACT_WORK, worth * sweeps * (last - first) * SWEEP_WORK
+    products = order_bodies(first, last, begin, end, int((worth / fewest - contacts) / BLOCK_WORK), many)
+    if products < 0 or not of.bundle_contacts(first, last, many):
         return 0
-    work = (last - first) * CONTACT_WORK + products * BLOCK_WORK
-    count = int(WORTH * sweeps * (last - first) * SWEEP_WORK / work)
-    if count < LEAST_STEPS or not of.bundle_contacts(first, last, many):
-        return 0
-    return min(count, sweeps)
+    return min(int(worth / (contacts + products * BLOCK_WORK)), sweeps)
 
 
 @inlined

@@ -11,8 +11,7 @@ import math
 
 from physics.kernels.compiler import inlined, kernel
 from physics.kernels.many.blocks import SPIN
-from physics.kernels.many.response import assemble_normal
-from physics.kernels.many.rows import put_padded, set_moved
+from physics.kernels.many.rows import assemble_normal, put_padded, set_moved
 from physics.kernels.many.sweeps import answer_normal, is_answered
 
 # Share of the error allowed within which a contact is left as it is: each that is answered leaves those of two bodies

@@ -15,18 +15,13 @@ import math
 from physics.kernels import quaternion as qt
 from physics.kernels.compiler import inlined, kernel
 from physics.kernels.many.contacts import local_velocity, matrix, plus, put, vector
-from physics.kernels.many.rows import AXIS, MOMENT_A, MOMENT_B, put_padded, put_rows
 
 
 @inlined
 def turned(b, a, many):
     """I⁻¹ a of body b, world frame."""
     K = many.turning
-    return (
-        K[b, 0] * a[0] + K[b, 1] * a[1] + K[b, 2] * a[2],
-        K[b, 1] * a[0] + K[b, 3] * a[1] + K[b, 4] * a[2],
-        K[b, 2] * a[0] + K[b, 4] * a[1] + K[b, 5] * a[2],
-    )
+    return qt.symmetric_matvec((K[b, 0], K[b, 1], K[b, 2], K[b, 3], K[b, 4], K[b, 5]), a)
 
 
 @inlined
@@ -47,37 +42,16 @@ def push_along(k, p, t, many):
 
 
 @inlined
-def _add_block(k, b, first, moments, W, many):
-    """W plus what one end adds to the contact's own block: 1/m + (r x e_i)·I⁻¹ (r x e_j); upper triangle.
-
-    Writes its vectors to `many.rows` from column `moments` on.
-    """
+def _add_block(k, b, first, W, many):
+    """W plus what one end adds to the contact's own block: 1/m + (r x e_i)·I⁻¹ (r x e_j); upper triangle."""
     r, E = vector(many.arm, k, first), many.frame
     g0, g1, g2 = qt.cross(r, vector(E, k, 0)), qt.cross(r, vector(E, k, 3)), qt.cross(r, vector(E, k, 6))
     h0, h1, h2 = turned(b, g0, many), turned(b, g1, many), turned(b, g2, many)
     m = many.lightness[b]
-    put_rows(k, moments, g0, g1, g2, many)
-    put_rows(k, moments + 12, h0, h1, h2, many)
     return (
         W[0] + (m + qt.dot(g0, h0)), W[1] + qt.dot(g0, h1), W[2] + qt.dot(g0, h2),
         W[3] + (m + qt.dot(g1, h1)), W[4] + qt.dot(g1, h2), W[5] + (m + qt.dot(g2, h2)),
     )  # fmt: skip
-
-
-@inlined
-def put_inverse(k, many):
-    """Write the inverse of the contact's own block: upper triangle."""
-    B = many.block
-    W = (B[k, 0], B[k, 1], B[k, 2], B[k, 4], B[k, 5], B[k, 8])
-    x, y, z = W[3] * W[5] - W[4] * W[4], W[2] * W[4] - W[1] * W[5], W[1] * W[4] - W[2] * W[3]
-    s = 1.0 / (W[0] * x + W[1] * y + W[2] * z)
-    V = many.inverse
-    V[k, 0], V[k, 1], V[k, 2] = s * x, s * y, s * z
-    V[k, 3], V[k, 4], V[k, 5] = (
-        s * (W[0] * W[5] - W[2] * W[2]),
-        s * (W[1] * W[2] - W[0] * W[4]),
-        s * (W[0] * W[3] - W[1] * W[1]),
-    )
 
 
 @kernel
@@ -90,11 +64,9 @@ def assemble(n, many):
     for k in range(n):
         u, t = local_velocity(k, many), vector(many.target, k, 0)
         scale = max(scale, max(abs(u[0] - t[0]), max(abs(u[1] - t[1]), abs(u[2] - t[2]))))
-        E = many.frame
-        put_rows(k, AXIS, vector(E, k, 0), vector(E, k, 3), vector(E, k, 6), many)
-        W = _add_block(k, many.ends[k, 0], 0, MOMENT_A, (0.0, 0.0, 0.0, 0.0, 0.0, 0.0), many)
+        W = _add_block(k, many.ends[k, 0], 0, (0.0, 0.0, 0.0, 0.0, 0.0, 0.0), many)
         if many.ends[k, 1] >= 0:
-            W = _add_block(k, many.ends[k, 1], 3, MOMENT_B, W, many)
+            W = _add_block(k, many.ends[k, 1], 3, W, many)
         B = many.block
         B[k, 0], B[k, 1], B[k, 2] = W[0], W[1], W[2]
         B[k, 3], B[k, 4], B[k, 5] = W[1], W[3], W[4]
@@ -105,26 +77,6 @@ def assemble(n, many):
     for k in range(n):
         push(k, vector(many.impulse, k, 0), many.twist, many)
     return scale
-
-
-@inlined
-def _normal_mobility(k, b, first, moments, many):
-    """What one end adds to W_nn of a contact; writes its vectors of the normal to `many.rows`."""
-    g = qt.cross(vector(many.arm, k, first), vector(many.frame, k, 0))
-    h = turned(b, g, many)
-    put_padded(many.rows, k, moments, g)
-    put_padded(many.rows, k, moments + 12, h)
-    return many.lightness[b] + qt.dot(g, h)
-
-
-@inlined
-def assemble_normal(k, many):
-    """Write what only asks of the normal of contact k: W_nn and those of its rows."""
-    put_padded(many.rows, k, AXIS, vector(many.frame, k, 0))
-    W = _normal_mobility(k, many.ends[k, 0], 0, MOMENT_A, many)
-    if many.ends[k, 1] >= 0:
-        W += _normal_mobility(k, many.ends[k, 1], 3, MOMENT_B, many)
-    many.block[k, 0] = W
 
 
 @inlined
@@ -156,17 +108,22 @@ def _normal_map(p, u, W):
     return abs(min(u, p * W))
 
 
+@inlined
+def miss_of(k, many):
+    """Natural-map residual of contact k, its impulse as it is [m/s]."""
+    return natural_map(vector(many.impulse, k, 0), velocity_missed(k, many), many.block[k, 0], many.step[k], many.mu[k])
+
+
 @kernel
 def residual_of(first, last, friction, many):
     """Largest natural-map residual of the contacts `many.queue[first:last]`, their impulses as they are [m/s]."""
     worst = 0.0
     for i in range(first, last):
         k = many.queue[i]
-        u, p = velocity_missed(k, many), vector(many.impulse, k, 0)
         if friction is None:
-            miss = _normal_map(p[0], u[0], many.block[k, 0])
+            miss = _normal_map(many.impulse[k, 0], velocity_missed(k, many)[0], many.block[k, 0])
         else:
-            miss = natural_map(p, u, many.block[k, 0], many.step[k], many.mu[k])
+            miss = miss_of(k, many)
         if not miss <= worst:  # also what is not a number
             worst = miss
     return worst

@@ -12,12 +12,16 @@ A warm start that still solves the problem costs one look at the residual. Else 
    twists from there, in turns;
 5. sweeps up to their limit, from the best that was met.
 
+An impact that is not to be solved finely begins with sweeps up to their limit: few contacts have anything to do in it.
+
 In a resting stage, what is all but at rest is solved a little further (`calm`).
 
 What has a residual then that no impulses at all would beat, or a stress beyond reason, is solved without friction.
 
-Where the linear system is dear (many bodies that all lie on each other), sweeps up to their limit take the place of 2
-to 4. All iterations together are no more than the sweeps allowed, but for those of the last method begun.
+Where the linear system is dear for what it is worth (`newton.prepare_system`: many bodies that all lie on each other,
+and move), sweeps up to their limit take the place of 2 to 5, so that what a step costs is in proportion to its
+contacts; what they leave is reported. Iterations with the system are no more than the sweeps allowed, either, but for
+those of the last method begun.
 """
 
 from __future__ import annotations
@@ -31,6 +35,9 @@ from physics.kernels.many.contacts import put, vector
 from physics.kernels.many.interior import interior_point
 from physics.kernels.many.islands import find_islands
 from physics.kernels.many.newton import (
+    LEAST_STEPS,
+    WORTH_LYING,
+    WORTH_MOVING,
     all_push,
     bring_back_best,
     guess_all_hold,
@@ -48,6 +55,13 @@ FINE = 1.0e-6
 
 # Sweeps before the interior-point method.
 FIRST_SWEEPS = 5
+
+# A pile all but lies where without impulses no contact would be faster than this many times what loads give in the
+# stage.
+LYING = 3.0
+
+# Tolerance from which on impacts are swept first.
+COARSE = 1.0e-4
 
 # Residual that rounding leaves, relative to the largest free velocity: no more is asked for.
 ROUNDING = 1.0e-12
@@ -158,6 +172,16 @@ def none_pushes_or_parts(part, goal, many):
     return True
 
 
+@inlined
+def _is_swept_first(part, goal, scale, many):
+    """Whether sweeps have the first try at an island: it has one contact, or poses an impact that is not solved finely.
+
+    An impact begins from no impulses, and asks something of the few contacts near it.
+    """
+    is_impact = many.settings[0].rests == 0
+    return part[1] - part[0] == 1 or (is_impact and goal >= COARSE * scale)
+
+
 @kernel
 def solve_island(part, friction, scale, residual, goal, deep, many):
     """Solve one island from impulses of the given residual [m/s]: (iterations, residual, method).
@@ -165,24 +189,31 @@ def solve_island(part, friction, scale, residual, goal, deep, many):
     What holds is solved to `deep` [m/s].
     """
     first, last, _, _ = part
-    limit = many.settings[0].sweeps
-    steps = prepare_system(part, limit, many) if last - first > 1 else 0
-    if steps == 0:
-        count, residual = sweep_contacts(first, last, friction, residual, goal, limit if last - first > 1 else 1, many)
-        return count, residual, SWEEPS
+    limit, count = many.settings[0].sweeps, 0
+    if _is_swept_first(part, goal, scale, many):
+        limit = limit if last - first > 1 else 1
+        count, residual = sweep_contacts(first, last, friction, residual, goal, limit, many)
+        if residual <= goal or last - first == 1:
+            return count, residual, SWEEPS
     may_hold = all_push(part, many) or none_pushes_or_parts(part, goal, many)
-    if may_hold:
+    worth = WORTH_LYING if scale <= LYING * many.settings[0].load else WORTH_MOVING
+    steps = prepare_system(part, limit, worth, 1 if may_hold else LEAST_STEPS, many)
+    if may_hold and steps > 0:
         residual = guess_all_hold(part, friction, residual, deep, many)
         if residual <= goal:
-            return 1, residual, NEWTON
-    count, residual = sweep_contacts(first, last, friction, residual, goal, FIRST_SWEEPS, many)
-    if residual <= goal:
-        return 1 + count, residual, NEWTON
+            return 1 + count, residual, NEWTON
+    if steps < LEAST_STEPS:
+        more, residual = sweep_contacts(first, last, friction, residual, goal, limit - count, many)
+        return count + more, residual, SWEEPS
+    if count == 0:
+        count, residual = sweep_contacts(first, last, friction, residual, goal, FIRST_SWEEPS, many)
+        if residual <= goal:
+            return 1 + count, residual, NEWTON
     if not may_hold and all_push(part, many):
         residual = guess_all_hold(part, friction, residual, deep, many)
         if residual <= goal:
             return 1 + count, residual, NEWTON
-    more, residual = solve_hard(part, friction, scale, residual, goal, max(1, steps - count - 1), many)
+    more, residual = solve_hard(part, friction, scale, residual, goal, max(1, steps - FIRST_SWEEPS - 1), many)
     count += 1 + more
     if residual > goal:
         more, residual = sweep_at_last(part, friction, residual, goal, limit, many)
