@@ -9,8 +9,7 @@ from benchmarks import problems
 from benchmarks.problems import SETTINGS
 from physics import scenes
 from physics.kernels import layout as at
-from physics.kernels.compiler import kernel
-from physics.kernels.many import calm, interior, islands, newton, response, solve, sweeps, visits
+from physics.kernels.many import calm, interior, islands, newton, response, solve, sweeps
 from physics.kernels.many.arrays import Many, make_many
 from tests.reference.lcp import coulomb_defect, solve_coulomb
 
@@ -182,20 +181,6 @@ def test_sweeps_visit_only_what_has_something_to_do(seed):
     assert together <= 1 + 2 * alone * n / (n + resting)
     assert not both.impulse[n : n + resting].any()
     assert response.residual_of(0, n + resting, True, both) == found[1][1]
-
-
-def test_contacts_are_dealt_out_once_each():
-    for n in range(1, 14):
-        one, contacts = pile(0, n, 1, 0.3)
-        response.assemble(contacts, one)
-        deal(0, contacts, one)
-        assert sorted(one.dealt[:contacts]) == list(range(contacts))
-        assert (one.side[:contacts, :2] == one.ends[one.dealt[:contacts]]).all()
-
-
-@kernel
-def deal(first, last, many):
-    visits.deal(first, last, many)
 
 
 def crowd(bodies: int) -> tuple[Many, int]:

@@ -26,9 +26,10 @@ ROUNDS = 30
 DEEP = 100.0
 
 # Error of the displacements at most, relative to the largest that is asked for, or to so many slops where that is less,
-# and sweeps for it at most: something light between a wall and something heavy needs as many as their masses differ.
-# A stage leaves half of the depth anyway, and half a slop less than the slop: what is off by less is done with. Where
-# solves are finer than that the error is the root of their tolerance, since what it leaves grows with every landing.
+# and sweeps for it at most, if a contact problem may take as many: something light between a wall and something heavy
+# needs as many as their masses differ. A stage leaves half of the depth anyway, and half a slop less than the slop:
+# what is off by less is done with. Where solves are finer than that the error is the root of their tolerance, since
+# what it leaves grows with every landing.
 APART_ERROR = 1.0e-2
 LEAST_SLOPS = 10.0
 APART_SWEEPS = 50
@@ -98,7 +99,7 @@ def _part_once(n, tilted, many):
     deepest, error = _aim_apart(n, many)
     if not deepest > 1.0:
         return deepest
-    part_contacts(n, error, DEEP_SWEEPS if deepest > DEEP else APART_SWEEPS, many)
+    part_contacts(n, error, DEEP_SWEEPS if deepest > DEEP else min(APART_SWEEPS, many.settings[0].sweeps), many)
     _displace_all(tilted, many)
     return deepest
 

@@ -42,9 +42,6 @@ BLOCK_SIZE = 6 * COLUMN_SIZE
 ROWS_SIZE = 5 * 4
 VISIT_SIZE = 5 * 8
 
-# Visits that are looked at together, which of them have to be made.
-CHUNK = 16
-
 # Numbers of a row of `bundle`, and of `lanes`: four for each of the fields in `bundles`.
 BUNDLE_SIZE = 6
 LANES_SIZE = 4 * 52
@@ -103,9 +100,7 @@ class Many(NamedTuple):
     block: np.ndarray  # the contact's own 3 x 3 of W = J M⁻¹ Jᵀ [1/kg]
     rows: np.ndarray  # of `rows`: the normal's row of the Jacobian of a contact, and M⁻¹ times it
     visit: np.ndarray  # of `visits`: what visits of contacts read, in the order of the visits
-    side: np.ndarray  # their bodies, as `ends`; and the second one, or the first again where that is a wall
-    chunk: np.ndarray  # of those that are next, the ones that have to be made
-    dealt: np.ndarray  # their contacts
+    side: np.ndarray  # their bodies, as `ends`
     motion: np.ndarray  # twists while contacts are swept, columns of `blocks`
     settled: np.ndarray  # of `sweeps`: impulses two sweeps ago, and what those two changed [N s]
     trend: np.ndarray
@@ -206,7 +201,7 @@ def make_many(
         arm=np.zeros((n, 6)), gap=np.zeros(n), speed=np.zeros(n), mu=np.zeros(n), bounce=np.zeros(n),
         target=np.zeros((n, 3)), impulse=np.zeros((n, 3)), step=np.zeros(n), block=np.zeros((n, 9)),
         rows=np.zeros((n, ROWS_SIZE)), motion=np.zeros((nb, COLUMN_SIZE)), visit=np.zeros((n, VISIT_SIZE)),
-        side=np.zeros((n, 3), i), chunk=np.zeros(CHUNK, i), dealt=np.zeros(n, i),
+        side=np.zeros((n, 2), i),
         settled=np.zeros((n, 3)), trend=np.zeros((n, 3)), visited=np.zeros(n, i), pushed=np.zeros(nb, i),
         table=np.full(table, -1, i), mix=np.zeros((4, 3, 3)), polygon=np.zeros((2, 16, 3)),
         edge=np.zeros((2, 16, 2), i), free=np.zeros((nb, 6)), parent=np.zeros(nb, i), island=np.zeros(nb, i),

@@ -12,7 +12,6 @@ from __future__ import annotations
 
 from physics.kernels import quaternion as qt
 from physics.kernels.compiler import inlined, kernel
-from physics.kernels.many.arrays import CHUNK
 from physics.kernels.many.contacts import minus, put, vector
 from physics.kernels.many.response import natural_map, on_disk, residual_of
 from physics.kernels.many.rows import assemble_normal, normal_velocity, push_normal, set_motion, set_twists
@@ -21,9 +20,9 @@ from physics.kernels.many.visits import (
     IMPULSE,
     INVERSE,
     MU,
-    STEP,
+    STIFF,
     UNKNOWN,
-    deal,
+    line_up,
     push,
     put_inverse,
     six,
@@ -32,10 +31,10 @@ from physics.kernels.many.visits import (
 )
 from physics.kernels.point import LOST, answer, heading
 
-# Share of the residual asked for to which one contact is answered, and within which it is left as it is: each that is
-# answered leaves those of two bodies to be visited again.
-ANSWER_SHARE = 0.5
+# Share of the residual asked for to which one contact is answered, and within which it is left as it is, each that is
+# answered leaving those of two bodies to be visited again; and the same without friction.
 LEFT_SHARE = 0.9
+NORMAL_SHARE = 0.1
 
 # Of a contact that has been seen to miss too much: it is visited and answered whatever its bodies did.
 NEVER = -1
@@ -56,10 +55,15 @@ NO_MARK = -2
 
 
 @inlined
+def _is_answered(i, a, b, many):
+    """Whether neither of two bodies (b < 0: a wall) has been pushed since the last visit i."""
+    return many.visited[i] >= many.pushed[a] and (b < 0 or many.visited[i] >= many.pushed[b])
+
+
+@inlined
 def is_answered(k, many):
     """Whether no body of contact k has been pushed since its last visit."""
-    a, b = many.ends[k, 0], many.ends[k, 1]
-    return many.visited[k] >= many.pushed[a] and (b < 0 or many.visited[k] >= many.pushed[b])
+    return _is_answered(k, many.ends[k, 0], many.ends[k, 1], many)
 
 
 @inlined
@@ -107,7 +111,7 @@ def sweep_normals(first, last, residual, goal, limit, many):
             if is_answered(k, many):
                 continue
             visits += 1
-            worst = max(worst, answer_normal(k, visits, ANSWER_SHARE * goal, many))
+            worst = max(worst, answer_normal(k, visits, NORMAL_SHARE * goal, many))
         sweeps += 1
         if worst <= goal or sweeps == limit:
             set_twists(first, last, many)
@@ -143,7 +147,7 @@ def _answer_one(W, V, mu, step, p, u, goal):
 @inlined
 def _size(i, d, many):
     """A change d of an impulse, as a velocity [m/s]."""
-    return max(abs(d[0]) * many.visit[i, BLOCK], max(abs(d[1]), abs(d[2])) / many.visit[i, STEP])
+    return max(abs(d[0]) * many.visit[i, BLOCK], max(abs(d[1]), abs(d[2])) * many.visit[i, STIFF])
 
 
 @inlined
@@ -156,22 +160,21 @@ def _keep_before(i, p, marks, many):
 
 
 @inlined
-def _visit(i, number, marks, small, goal, many):
+def _visit(i, number, marks, small, many):
     """Answer visit i if it is off by more than `small`, or has been seen to be: how far its impulse was off, as a
     velocity [m/s]: its residual or a little more. `number` is that of this visit.
     """
     W, p = six(i, BLOCK, many), vector(many.visit, i, IMPULSE)
     _keep_before(i, p, marks, many)
-    if many.visited[i] == NEVER:
-        small = 0.0
+    left = 0.0 if many.visited[i] == NEVER else small
     many.visited[i] = number
     if many.visit[i, INVERSE] == UNKNOWN:
         put_inverse(i, W, many)
     u = velocity(i, many)
-    q = _answer_one(W, six(i, INVERSE, many), many.visit[i, MU], many.visit[i, STEP], p, u, goal)
+    q = _answer_one(W, six(i, INVERSE, many), many.visit[i, MU], 1.0 / many.visit[i, STIFF], p, u, small)
     d = minus(q, p)
     off = _size(i, d, many)
-    if off > small:
+    if off > left:
         put(many.visit, i, IMPULSE, q)
         push(i, d, many)
         _mark_pushed(many.side[i, 0], many.side[i, 1], number, many)
@@ -219,7 +222,7 @@ def _look(count, small, many):
     worst = 0.0
     for i in range(count):
         R = many.visit
-        miss = natural_map(vector(R, i, IMPULSE), velocity(i, many), R[i, BLOCK], R[i, STEP], R[i, MU])
+        miss = natural_map(vector(R, i, IMPULSE), velocity(i, many), R[i, BLOCK], 1.0 / R[i, STIFF], R[i, MU])
         many.visited[i] = 0 if miss <= small else NEVER
         _mark_pushed(many.side[i, 0], many.side[i, 1], 0, many)
         if not miss <= worst:  # also what is not a number
@@ -227,26 +230,15 @@ def _look(count, small, many):
     return worst
 
 
-@inlined
-def _list_unanswered(start, count, is_up, many):
-    """List those of the next `CHUNK` visits that have to be made, without a branch that nobody foresees: how many."""
-    found = 0
-    for j in range(start, min(start + CHUNK, count)):
-        i = j if is_up else count - 1 - j
-        many.chunk[found] = i
-        last = many.visited[i]
-        found += (last < many.pushed[many.side[i, 0]]) | (last < many.pushed[many.side[i, 2]])
-    return found
-
-
 @kernel
-def _sweep(count, is_up, visits, marks, small, goal, many):
+def _sweep(count, is_up, visits, marks, small, many):
     """One sweep over those that have to be visited: how far an impulse was off at most [m/s], and visits so far."""
     worst = 0.0
-    for start in range(0, count, CHUNK):
-        for j in range(_list_unanswered(start, count, is_up, many)):
+    for j in range(count):
+        i = j if is_up else count - 1 - j
+        if not _is_answered(i, many.side[i, 0], many.side[i, 1], many):
             visits += 1
-            worst = max(worst, _visit(many.chunk[j], visits, marks, small, ANSWER_SHARE * goal, many))
+            worst = max(worst, _visit(i, visits, marks, small, many))
     return worst, visits
 
 
@@ -259,7 +251,7 @@ def _sweep_on(count, residual, goal, limit, many):
             marks = (visits, NO_MARK)
         elif since == HALF_PERIOD:
             marks = (marks[0], visits)
-        worst, visits = _sweep(count, passes % 2 == 0, visits, marks, small, goal, many)
+        worst, visits = _sweep(count, passes % 2 == 0, visits, marks, small, many)
         passes, since = passes + 1, since + 1
         if worst <= goal or visits >= most or passes == PASSES * limit:
             residual, since = _look(count, goal, many), 0
@@ -284,8 +276,8 @@ def sweep_contacts(first, last, friction, residual, goal, limit, many):
         return 0, residual
     count = last - first
     set_motion(first, last, many)
-    deal(first, last, many)
+    line_up(first, last, many)
     visits, residual = _sweep_on(count, _look(count, LEFT_SHARE * goal, many), goal, limit, many)
-    take_back(count, many)
+    take_back(first, last, many)
     set_twists(first, last, many)
     return max(1, visits // count), residual

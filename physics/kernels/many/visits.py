@@ -1,12 +1,7 @@
 """Contacts as sweeps visit them: all that a visit reads stands in one row, in the order of the visits.
 
-A visit of one contact asks for some forty numbers and changes two bodies. Two things decide what it takes. Its numbers
-come from a memory that is slower than what is done with them, so they stand side by side. And what one visit leaves is
-what the next one of the same body begins with: two visits of one body wait for each other, those of other bodies do
-not. Neighbours in the list touch the same bodies, so it is dealt out in `DEALT` parts, of which one contact each follow
-one another. (It makes no difference to how fast sweeps converge.)
-
-For the frame E, the arms r, s from the bodies a, b, and impulses p in the frame,
+A visit of one contact asks for some forty numbers and changes two bodies. For the frame E, the arms r, s from the
+bodies a, b, and impulses p in the frame,
 
     u = E (v_a + ω_a x r - v_b - ω_b x s),
 
@@ -21,12 +16,9 @@ from physics.kernels.many.blocks import SPIN
 from physics.kernels.many.contacts import matrix, minus, plus, put, vector
 from physics.kernels.many.response import turned
 
-# Parts that a list is dealt out in.
-DEALT = 4
-
-# Columns of `many.visit`: frame, arms of both bodies, block and its inverse (00, 01, 02, 11, 12, 22), target, μ, step
-# of the block, impulse.
-ARM_A, ARM_B, BLOCK, INVERSE, TARGET, MU, STEP, IMPULSE = 9, 12, 15, 21, 27, 30, 31, 32
+# Columns of `many.visit`: frame, arms of both bodies, block and its inverse (00, 01, 02, 11, 12, 22), target, μ,
+# λ_max of its tangential part, impulse.
+ARM_A, ARM_B, BLOCK, INVERSE, TARGET, MU, STIFF, IMPULSE = 9, 12, 15, 21, 27, 30, 31, 32
 
 # First number of an inverse that has not been needed yet: that of any block is positive.
 UNKNOWN = 0.0
@@ -44,29 +36,23 @@ def _write(i, k, many):
     R[i, BLOCK + 3], R[i, BLOCK + 4], R[i, BLOCK + 5] = B[k, 4], B[k, 5], B[k, 8]
     R[i, INVERSE] = UNKNOWN
     put(R, i, TARGET, vector(many.target, k, 0))
-    R[i, MU], R[i, STEP] = many.mu[k], many.step[k]
+    R[i, MU], R[i, STIFF] = many.mu[k], 1.0 / many.step[k]
     put(R, i, IMPULSE, vector(many.impulse, k, 0))
-    a, b = many.ends[k, 0], many.ends[k, 1]
-    many.side[i, 0], many.side[i, 1], many.side[i, 2] = a, b, b if b >= 0 else a
-    many.dealt[i] = k
+    many.side[i, 0], many.side[i, 1] = many.ends[k, 0], many.ends[k, 1]
 
 
 @inlined
-def deal(first, last, many):
-    """Write the contacts `many.queue[first:last]` as visits 0, 1, 2 ..., dealt out."""
-    part, at = (last - first + DEALT - 1) // DEALT, 0
-    for i in range(first, first + part):
-        for lot in range(DEALT):
-            if i + lot * part < last:
-                _write(at, many.queue[i + lot * part], many)
-                at += 1
+def line_up(first, last, many):
+    """Write the contacts `many.queue[first:last]` as visits 0, 1, 2 ..."""
+    for i in range(first, last):
+        _write(i - first, many.queue[i], many)
 
 
 @inlined
-def take_back(count, many):
-    """Impulses of the contacts from their visits."""
-    for i in range(count):
-        put(many.impulse, many.dealt[i], 0, vector(many.visit, i, IMPULSE))
+def take_back(first, last, many):
+    """Impulses of the contacts `many.queue[first:last]` from their visits."""
+    for i in range(first, last):
+        put(many.impulse, many.queue[i], 0, vector(many.visit, i - first, IMPULSE))
 
 
 @inlined
