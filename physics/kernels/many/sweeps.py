@@ -45,7 +45,7 @@ PASSES = 10
 # Half of the sweeps between two extrapolations, an even number: those up and down belong together. Slow sweeps contract
 # along one direction with a ratio q near 1, which two changes tell; the rest of that series, q/(1 - q) times the last
 # change, is added at once. See `physics.kernels.sweeps`. (Two more sweeps between them save a tenth of the visits where
-# little is asked for, and leave arches at their limit unsolved eight times as often at `precise`.) Where no more sweeps
+# little is asked for, and leave arches at their limit unsolved five times as often at `precise`.) Where no more sweeps
 # than that are allowed there is no extrapolation: what little is left is no series.
 HALF_PERIOD = 2
 RATIO_LIMIT = 0.998
