@@ -102,7 +102,7 @@ class Many(NamedTuple):
     visit: np.ndarray  # of `visits`: what visits of contacts read, in the order of the visits
     side: np.ndarray  # their bodies, as `ends`
     motion: np.ndarray  # twists while contacts are swept, columns of `blocks`
-    settled: np.ndarray  # of `sweeps`: impulses two sweeps ago, and what those two changed [N s]
+    settled: np.ndarray  # of `sweeps`: impulses of visits as they were four sweeps ago, and two sweeps ago [N s]
     trend: np.ndarray
     visited: np.ndarray  # of sweeps: number of the last visit of a contact, of the last push of a body
     pushed: np.ndarray
