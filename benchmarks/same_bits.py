@@ -1,0 +1,91 @@
+"""Compare the results of two commits to the last bit: ``python -m benchmarks.same_bits OTHER_CHECKOUT``.
+
+Each of the 24 scenes of `benchmarks.bit_scenes` takes 500 steps at each preset, over this checkout and over the other
+one, on this machine. A checkout of an older commit is made with ``git worktree add FOLDER COMMIT``.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+from typing import Annotated
+
+import numpy as np
+import typer
+from rich.progress import track
+
+from benchmarks import machine
+from benchmarks.bit_scenes import PRESETS, SCENES, STEPS
+from rigid_env.measure.machine import write_json
+
+WORKER = Path(__file__).with_name("bit_scenes.py")
+
+
+class Checkout:
+    """A process that runs scenes over one checkout."""
+
+    def __init__(self, folder: Path):
+        environment = {**os.environ, "PYTHONPATH": str(folder)}
+        self._process = subprocess.Popen(
+            [sys.executable, str(WORKER)],
+            stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, env=environment, cwd=folder,
+        )  # fmt: skip
+
+    def ask(self, scene: str, preset: str, steps: int) -> None:
+        """Have it run a scene; both checkouts do at once."""
+        self._process.stdin.write(json.dumps([scene, preset, steps]) + "\n")
+        self._process.stdin.flush()
+
+    def answer(self) -> dict:
+        """What `bit_scenes.record` returned."""
+        line = self._process.stdout.readline()
+        if not line:
+            raise RuntimeError(f"the process over this checkout ended with {self._process.wait()}")
+        return json.loads(line)
+
+    def close(self) -> None:
+        """End the process."""
+        self._process.stdin.close()
+        self._process.wait()
+
+
+def verdict(ours: dict, theirs: dict) -> str:
+    """``same``, or how two results differ."""
+    if ours == theirs:
+        return "same"
+    if "error" in ours or "error" in theirs:
+        return f"{ours.get('error', 'runs')}, was {theirs.get('error', 'runs')}"
+    return f"differs by {np.abs(np.subtract(ours['state'], theirs['state'])).max():.1e}"
+
+
+def main(
+    other: Annotated[Path, typer.Argument(help="A checkout of the commit to compare with.", exists=True)],
+    scene: Annotated[list[str] | None, typer.Option(help=f"Some of {', '.join(SCENES)}.")] = None,
+    preset: Annotated[list[str] | None, typer.Option(help=f"Some of {', '.join(PRESETS)}.")] = None,
+    steps: Annotated[int, typer.Option(min=1, help="Of each run, in parts of 25.")] = STEPS,
+    json: Annotated[Path | None, typer.Option(help="Where to write the result.")] = None,
+) -> None:
+    """Compare the states of 24 scenes at four presets with those of another commit; exit with 1 where one differs."""
+    pairs = [(name, level) for name in scene or SCENES for level in preset or PRESETS]
+    here, there = Checkout(Path(__file__).parents[1]), Checkout(other.resolve())
+    found = {}
+    for name, level in track(pairs, description="scenes"):
+        here.ask(name, level, steps)
+        there.ask(name, level, steps)
+        found[f"{name} {level}"] = verdict(here.answer(), there.answer())
+    here.close()
+    there.close()
+    different = {run: how for run, how in found.items() if how != "same"}
+    for run, how in different.items():
+        typer.echo(f"{run}: {how}")
+    typer.echo(f"{len(found) - len(different)} of {len(found)} runs of {steps} steps have the same bits")
+    if json is not None:
+        write_json(json, {"name": "same_bits", "machine": machine.headline(), "steps": steps, "runs": found})
+    raise typer.Exit(1 if different else 0)
+
+
+if __name__ == "__main__":
+    typer.run(main)
