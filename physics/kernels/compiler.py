@@ -104,6 +104,9 @@ def kernel(function):
     Numba prunes a branch on ``x is None`` while compiling, in every callee, so
     that what is off is not in the machine code at all.
 
+    A variable of a kernel with branches is not named after another one with digits behind, as x1 and x12 are: Numba may
+    take one for the other, and then cannot compile it (`tests/kernels/test_variable_names.py`).
+
     That it is not inlined is said, because Numba would have it inlined where the first caller that it is compiled for
     is, and with it all that it calls, a copy for each call.
     """

@@ -287,12 +287,12 @@ def hold_all(n, R, v, L, work):
     while count > 0:
         c, k = _patch(n, count, work)
         is_line = count < 3 or _is_line(k)
-        v1, w1 = _twist(n, count, c, k, is_line, largest == 0.0, R, v, L, work)
-        wb = qt.transposed_matvec(R, w1)
-        L1 = qt.matvec(R, (wb[0] / J[0], wb[1] / J[1], wb[2] / J[2]))
-        F = (mass * (v1[0] - v[0]), mass * (v1[1] - v[1]), mass * (v1[2] - v[2]))
+        v_new, w_new = _twist(n, count, c, k, is_line, largest == 0.0, R, v, L, work)
+        wb = qt.transposed_matvec(R, w_new)
+        L_new = qt.matvec(R, (wb[0] / J[0], wb[1] / J[1], wb[2] / J[2]))
+        F = (mass * (v_new[0] - v[0]), mass * (v_new[1] - v[1]), mass * (v_new[2] - v[2]))
         m = qt.cross(c, F)
-        T = (L1[0] - L[0] - m[0], L1[1] - L[1] - m[1], L1[2] - L[2] - m[2])
+        T = (L_new[0] - L[0] - m[0], L_new[1] - L[1] - m[1], L_new[2] - L[2] - m[2])
         a = _bolt(count, k, is_line, T)
         loser, holds = share_out(n, count, c, F, a, work)
         if loser < 0:
@@ -300,7 +300,7 @@ def hold_all(n, R, v, L, work):
                 return False, v, L, 0.0
             residual = 0.0
             if largest > 0.0 or count < n:
-                miss = _miss(n, v1, w1, work)
+                miss = _miss(n, v_new, w_new, work)
                 if not miss <= RIGID_LIMIT * largest:
                     if miss > work.unseen:
                         residual = miss / _free_speed(n, R, v, L, work)
@@ -310,7 +310,7 @@ def hold_all(n, R, v, L, work):
                 work.impulse[3 * i] = work.normal[i]
                 work.impulse[3 * i + 1] = work.across[i, 0]
                 work.impulse[3 * i + 2] = work.across[i, 1]
-            return True, v1, L1, residual
+            return True, v_new, L_new, residual
         work.active[loser] = 0
         work.normal[loser] = work.across[loser, 0] = work.across[loser, 1] = 0.0
         count -= 1

@@ -99,57 +99,57 @@ def _held(Wi, Wij, Wj, bi, bj, mu, goal, x, y):
 
 
 @inlined
-def _both_slide(W1, W12, W2, b1, b2, mu, x1, y1, x2, y2):
+def _both_slide(W11, W12, W22, b1, b2, mu, x1, y1, x2, y2):
     """Two contacts that slide in given directions: (p_1, p_2, misses, what `_turns` goes on with)."""
-    a11, a12 = W1[0] + (W1[1] * x1 + W1[2] * y1), W12[0] + (W12[1] * x2 + W12[2] * y2)
-    a21, a22 = W12[0] + (W12[3] * x1 + W12[6] * y1), W2[0] + (W2[1] * x2 + W2[2] * y2)
+    a11, a12 = W11[0] + (W11[1] * x1 + W11[2] * y1), W12[0] + (W12[1] * x2 + W12[2] * y2)
+    a21, a22 = W12[0] + (W12[3] * x1 + W12[6] * y1), W22[0] + (W22[1] * x2 + W22[2] * y2)
     s = 1.0 / (a11 * a22 - a12 * a21)
     p1, p2 = s * (a12 * b2[0] - a22 * b1[0]), s * (a21 * b1[0] - a11 * b2[0])
     # Tangential velocity of i per normal impulse of j, friction along with it.
-    g11 = W1[3] + (W1[4] * x1 + W1[5] * y1), W1[6] + (W1[7] * x1 + W1[8] * y1)
+    g11 = W11[3] + (W11[4] * x1 + W11[5] * y1), W11[6] + (W11[7] * x1 + W11[8] * y1)
     g12 = W12[3] + (W12[4] * x2 + W12[5] * y2), W12[6] + (W12[7] * x2 + W12[8] * y2)
     g21 = W12[1] + (W12[4] * x1 + W12[7] * y1), W12[2] + (W12[5] * x1 + W12[8] * y1)
-    g22 = W2[3] + (W2[4] * x2 + W2[5] * y2), W2[6] + (W2[7] * x2 + W2[8] * y2)
+    g22 = W22[3] + (W22[4] * x2 + W22[5] * y2), W22[6] + (W22[7] * x2 + W22[8] * y2)
     u1x, u1y = b1[1] + (g11[0] * p1 + g12[0] * p2), b1[2] + (g11[1] * p1 + g12[1] * p2)
     u2x, u2y = b2[1] + (g21[0] * p1 + g22[0] * p2), b2[2] + (g21[1] * p1 + g22[1] * p2)
     # All of what follows is μ times the true across, along and slopes, which the turns do not notice.
     along1, along2 = -(x1 * u1x + y1 * u1y), -(x2 * u2x + y2 * u2y)
     across1, across2 = y1 * u1x - x1 * u1y, y2 * u2x - x2 * u2y
     t = 1.0 / mu
-    miss1 = miss_across(t * across1, t * along1, p1 * mu * (W1[4] + W1[8]))
-    miss2 = miss_across(t * across2, t * along2, p2 * mu * (W2[4] + W2[8]))
+    miss1 = miss_across(t * across1, t * along1, p1 * mu * (W11[4] + W11[8]))
+    miss2 = miss_across(t * across2, t * along2, p2 * mu * (W22[4] + W22[8]))
     inverse = (s * a11, s * a12, s * a21, s * a22)
     return p1, p2, miss1, miss2, (inverse, g11, g12, g21, g22, along1, along2, across1, across2)
 
 
 @inlined
-def _turns(W1, W12, W2, x1, y1, x2, y2, p1, p2, sliding):
+def _turns(W11, W12, W22, x1, y1, x2, y2, p1, p2, sliding):
     """Newton's step of both directions [rad]: turning direction 1 by dα changes (x1, y1) by (-y1, x1) dα."""
     inverse, g11, g12, g21, g22, along1, along2, across1, across2 = sliding
     a11, a12, a21, a22 = inverse
     # What a turn of direction 1 does to p, then to u; then the same of direction 2.
-    f1, f2 = p1 * (W1[2] * x1 - W1[1] * y1), p1 * (W12[6] * x1 - W12[3] * y1)
+    f1, f2 = p1 * (W11[2] * x1 - W11[1] * y1), p1 * (W12[6] * x1 - W12[3] * y1)
     d1, d2 = a12 * f2 - a22 * f1, a21 * f1 - a11 * f2
-    vx = g11[0] * d1 + g12[0] * d2 + p1 * (W1[5] * x1 - W1[4] * y1)
-    vy = g11[1] * d1 + g12[1] * d2 + p1 * (W1[8] * x1 - W1[7] * y1)
+    vx = g11[0] * d1 + g12[0] * d2 + p1 * (W11[5] * x1 - W11[4] * y1)
+    vy = g11[1] * d1 + g12[1] * d2 + p1 * (W11[8] * x1 - W11[7] * y1)
     j11 = y1 * vx - x1 * vy - along1
     vx = g21[0] * d1 + g22[0] * d2 + p1 * (W12[7] * x1 - W12[4] * y1)
     vy = g21[1] * d1 + g22[1] * d2 + p1 * (W12[8] * x1 - W12[5] * y1)
     j21 = y2 * vx - x2 * vy
-    f1, f2 = p2 * (W12[2] * x2 - W12[1] * y2), p2 * (W2[2] * x2 - W2[1] * y2)
+    f1, f2 = p2 * (W12[2] * x2 - W12[1] * y2), p2 * (W22[2] * x2 - W22[1] * y2)
     d1, d2 = a12 * f2 - a22 * f1, a21 * f1 - a11 * f2
     vx = g11[0] * d1 + g12[0] * d2 + p2 * (W12[5] * x2 - W12[4] * y2)
     vy = g11[1] * d1 + g12[1] * d2 + p2 * (W12[8] * x2 - W12[7] * y2)
     j12 = y1 * vx - x1 * vy
-    vx = g21[0] * d1 + g22[0] * d2 + p2 * (W2[5] * x2 - W2[4] * y2)
-    vy = g21[1] * d1 + g22[1] * d2 + p2 * (W2[8] * x2 - W2[7] * y2)
+    vx = g21[0] * d1 + g22[0] * d2 + p2 * (W22[5] * x2 - W22[4] * y2)
+    vy = g21[1] * d1 + g22[1] * d2 + p2 * (W22[8] * x2 - W22[7] * y2)
     j22 = y2 * vx - x2 * vy - along2
     s = 1.0 / (j11 * j22 - j12 * j21)
     return s * (j12 * across2 - j22 * across1), s * (j21 * across1 - j11 * across2)
 
 
 @kernel
-def _in_turn(W1, W12, W2, b1, b2, mu, goal, p, q, x1, y1, x2, y2):
+def _in_turn(W11, W12, W22, b1, b2, mu, goal, p, q, x1, y1, x2, y2):
     """Each contact answers the impulse of the other in turn, from impulses p and q on; then what it came to is tried.
 
     (found, p, q, residual, direction of the first, and of the second, to go on from). One of them was to hold or to
@@ -158,34 +158,34 @@ def _in_turn(W1, W12, W2, b1, b2, mu, goal, p, q, x1, y1, x2, y2):
     W21, miss = _transposed(W12), 0.0
     first = second = SLID
     for _ in range(ANSWERS):
-        first, p, miss = answer(W1, _plus(b1, qt.matvec(W12, q)), mu, W1[4] + W1[8], goal, x1, y1, True)
+        first, p, miss = answer(W11, _plus(b1, qt.matvec(W12, q)), mu, W11[4] + W11[8], goal, x1, y1, True)
         if p[0] > 0.0:
             x1, y1 = heading(-p[1], -p[2], mu)
-        second, q, miss = answer(W2, _plus(b2, qt.matvec(W21, p)), mu, W2[4] + W2[8], goal, x2, y2, True)
+        second, q, miss = answer(W22, _plus(b2, qt.matvec(W21, p)), mu, W22[4] + W22[8], goal, x2, y2, True)
         if q[0] > 0.0:
             x2, y2 = heading(-q[1], -q[2], mu)
     found = False
     if first == HELD and second == SLID:
-        found, p, q, miss, x1, y1, x2, y2 = _held(W1, W12, W2, b1, b2, mu, goal, x2, y2)
+        found, p, q, miss, x1, y1, x2, y2 = _held(W11, W12, W22, b1, b2, mu, goal, x2, y2)
     elif first == SLID and second == HELD:
-        found, q, p, miss, x2, y2, x1, y1 = _held(W2, W21, W1, b2, b1, mu, goal, x1, y1)
+        found, q, p, miss, x2, y2, x1, y1 = _held(W22, W21, W11, b2, b1, mu, goal, x1, y1)
     return found, p, q, miss, x1, y1, x2, y2
 
 
 @inlined
-def solve_two(W1, W12, W2, b1, b2, mu, goal, x1, y1, x2, y2):
+def solve_two(W11, W12, W22, b1, b2, mu, goal, x1, y1, x2, y2):
     """Impulses of two contacts: (found, p_1, p_2, residual [m/s])."""
     W21 = _transposed(W12)
     held1 = held2 = opened = turns = 0
     for _ in range(PAIR_LIMIT):
         is_stuck = False
-        p1, p2, miss1, miss2, sliding = _both_slide(W1, W12, W2, b1, b2, mu, x1, y1, x2, y2)
+        p1, p2, miss1, miss2, sliding = _both_slide(W11, W12, W22, b1, b2, mu, x1, y1, x2, y2)
         worst, q1, q2 = max(miss1, miss2), (p1, p1 * x1, p1 * y1), (p2, p2 * x2, p2 * y2)
         if not (p1 >= 0.0 and p2 >= 0.0):
             if p1 >= p2:
-                found, q1, q2, worst, x1, y1, x2, y2 = _opened(W1, W21, b1, b2, mu, goal, x1, y1)
+                found, q1, q2, worst, x1, y1, x2, y2 = _opened(W11, W21, b1, b2, mu, goal, x1, y1)
             else:
-                found, q2, q1, worst, x2, y2, x1, y1 = _opened(W2, W12, b2, b1, mu, goal, x2, y2)
+                found, q2, q1, worst, x2, y2, x1, y1 = _opened(W22, W12, b2, b1, mu, goal, x2, y2)
             if found:
                 return True, q1, q2, worst
             is_stuck, opened = opened >= OPENED_LIMIT, opened + 1  # the open one closes: once more with both
@@ -193,24 +193,24 @@ def solve_two(W1, W12, W2, b1, b2, mu, goal, x1, y1, x2, y2):
             return True, q1, q2, worst
         elif miss1 == math.inf and held1 < HELD_LIMIT:
             held1 += 1
-            found, q1, q2, worst, x1, y1, x2, y2 = _held(W1, W12, W2, b1, b2, mu, goal, x2, y2)
+            found, q1, q2, worst, x1, y1, x2, y2 = _held(W11, W12, W22, b1, b2, mu, goal, x2, y2)
             if found:
                 return True, q1, q2, worst
         elif miss2 == math.inf and held2 < HELD_LIMIT:
             held2 += 1
-            found, q2, q1, worst, x2, y2, x1, y1 = _held(W2, W21, W1, b2, b1, mu, goal, x1, y1)
+            found, q2, q1, worst, x2, y2, x1, y1 = _held(W22, W21, W11, b2, b1, mu, goal, x1, y1)
             if found:
                 return True, q1, q2, worst
         elif worst == math.inf:
             is_stuck = True
         else:
-            turn1, turn2 = _turns(W1, W12, W2, x1, y1, x2, y2, p1, p2, sliding)
+            turn1, turn2 = _turns(W11, W12, W22, x1, y1, x2, y2, p1, p2, sliding)
             x1, y1 = turned(x1, y1, turn1)
             x2, y2 = turned(x2, y2, turn2)
         if is_stuck:
             if turns == IN_TURN_LIMIT:
                 break
-            found, q1, q2, worst, x1, y1, x2, y2 = _in_turn(W1, W12, W2, b1, b2, mu, goal, q1, q2, x1, y1, x2, y2)
+            found, q1, q2, worst, x1, y1, x2, y2 = _in_turn(W11, W12, W22, b1, b2, mu, goal, q1, q2, x1, y1, x2, y2)
             if found:
                 return True, q1, q2, worst
             held1, held2, turns = 0, 0, turns + 1
@@ -247,17 +247,17 @@ def solve_one(first, mu, goal, inv_mass, K, work):
 
 
 @inlined
-def _pushed_apart(W1, W12, W2, b1, b2):
+def _pushed_apart(W11, W12, W22, b1, b2):
     """What impulses without friction do to the velocities of two contacts that approach with b1 and b2 (< 0) [m/s]."""
-    s = 1.0 / (W1[0] * W2[0] - W12[0] * W12[0])
-    p1, p2 = s * (W12[0] * b2 - W2[0] * b1), s * (W12[0] * b1 - W1[0] * b2)
+    s = 1.0 / (W11[0] * W22[0] - W12[0] * W12[0])
+    p1, p2 = s * (W12[0] * b2 - W22[0] * b1), s * (W12[0] * b1 - W11[0] * b2)
     if p1 < 0.0:
-        p1, p2 = 0.0, -b2 / W2[0]
+        p1, p2 = 0.0, -b2 / W22[0]
     elif p2 < 0.0:
-        p1, p2 = -b1 / W1[0], 0.0
+        p1, p2 = -b1 / W11[0], 0.0
     return (
-        (W1[0] * p1 + W12[0] * p2, W1[3] * p1 + W12[3] * p2, W1[6] * p1 + W12[6] * p2),
-        (W12[0] * p1 + W2[0] * p2, W12[1] * p1 + W2[3] * p2, W12[2] * p1 + W2[6] * p2),
+        (W11[0] * p1 + W12[0] * p2, W11[3] * p1 + W12[3] * p2, W11[6] * p1 + W12[6] * p2),
+        (W12[0] * p1 + W22[0] * p2, W12[1] * p1 + W22[3] * p2, W12[2] * p1 + W22[6] * p2),
     )
 
 
@@ -277,15 +277,15 @@ def solve_pair(first, second, mu, goal, inv_mass, K, work):
     """
     (r, b1, f), (s, b2, g) = first, second
     ratio = friction_ratio(work)
-    W1, W2 = give_way(own_block(r, inv_mass, ratio, K), work), give_way(own_block(s, inv_mass, ratio, K), work)
+    W11, W22 = give_way(own_block(r, inv_mass, ratio, K), work), give_way(own_block(s, inv_mass, ratio, K), work)
     W12 = block(r, s, inv_mass, ratio, K)
     x1 = y1 = x2 = y2 = 0.0
     if mu > 0.0:
-        u1 = _plus(qt.matvec(W1, f), qt.matvec(W12, g))
-        u2 = _plus(qt.matvec(W2, g), qt.matvec(_transposed(W12), f))
+        u1 = _plus(qt.matvec(W11, f), qt.matvec(W12, g))
+        u2 = _plus(qt.matvec(W22, g), qt.matvec(_transposed(W12), f))
         if not (is_warm(u1[0], -b1[0]) and is_warm(u2[0], -b2[0])):
-            u1, u2 = _pushed_apart(W1, W12, W2, b1[0], b2[0])
+            u1, u2 = _pushed_apart(W11, W12, W22, b1[0], b2[0])
         x1, y1 = heading(b1[1] + u1[1], b1[2] + u1[2], mu)
         x2, y2 = heading(b2[1] + u2[1], b2[2] + u2[2], mu)
-    found, p, q, miss = solve_two(W1, W12, W2, b1, b2, mu, goal, x1, y1, x2, y2)
+    found, p, q, miss = solve_two(W11, W12, W22, b1, b2, mu, goal, x1, y1, x2, y2)
     return found, p, q, _plus(qt.cross(r, p), qt.cross(s, q)), miss

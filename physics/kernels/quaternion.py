@@ -119,10 +119,10 @@ def exponential(rotation):
     sin(x)/x is taken from its series where the quotient would lose digits:
     at x = 1e-4 the first neglected term x⁴/120 is 8e-19, below rounding.
     """
-    half2 = 0.25 * (rotation[0] * rotation[0] + rotation[1] * rotation[1] + rotation[2] * rotation[2])
-    half = math.sqrt(half2)
+    square = 0.25 * (rotation[0] * rotation[0] + rotation[1] * rotation[1] + rotation[2] * rotation[2])
+    half = math.sqrt(square)
     if half < 1e-4:
-        sinc = 1.0 - half2 / 6.0
+        sinc = 1.0 - square / 6.0
     else:
         sinc = math.sin(half) / half
     s = 0.5 * sinc

@@ -76,8 +76,8 @@ def shortened(n, friction, before, w, solved, free, R, work):
     the stage. That is none at s = -A/B if A < 0, and less for any shorter.
     """
     v, L = free
-    v1, L1, residual, sweeps, method = solved
-    u, M = (v1[0] - v[0], v1[1] - v[1], v1[2] - v[2]), (L1[0] - L[0], L1[1] - L[1], L1[2] - L[2])
+    v_new, L_new, residual, sweeps, method = solved
+    u, M = (v_new[0] - v[0], v_new[1] - v[1], v_new[2] - v[2]), (L_new[0] - L[0], L_new[1] - L[1], L_new[2] - L[2])
     w0, dw = turning(R, L, work.J), turning(R, M, work.J)
     A = work.mass * (qt.dot(u, before) + qt.dot(u, v)) + qt.dot(M, w) + qt.dot(M, w0)
     B = work.mass * qt.dot(u, u) + qt.dot(M, dw)
@@ -91,4 +91,4 @@ def shortened(n, friction, before, w, solved, free, R, work):
         width = 1
     for r in range(width * n):
         work.impulse[r] *= s
-    return between(v, v1, s), between(L, L1, s), residual, sweeps, method
+    return between(v, v_new, s), between(L, L_new, s), residual, sweeps, method

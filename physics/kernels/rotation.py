@@ -122,59 +122,59 @@ def _half_angle(x, square):
     The roots would stand one after the other in the longest chain of the step. 4x = sin² of an angle up to
     `ANGLE_LIMIT`, so x < 9.0e-4, and the first neglected terms, 29 x⁶ of e0 and 51 x⁶ of 1/e0, are under 3e-17.
     """
-    x2 = x * x
+    xx = x * x
     if square > TINY_SQUARE:
-        x4 = x2 * x2
-        e0 = (1.0 - 0.5 * x) - (x2 * (0.625 + 1.3125 * x) + x4 * ((429.0 / 128.0) + (2431.0 / 256.0) * x))
-        inv_e0 = (1.0 + 0.5 * x) + (x2 * (0.875 + 2.0625 * x) + x4 * ((715.0 / 128.0) + (4199.0 / 256.0) * x))
+        fourth = xx * xx
+        e0 = (1.0 - 0.5 * x) - (xx * (0.625 + 1.3125 * x) + fourth * ((429.0 / 128.0) + (2431.0 / 256.0) * x))
+        inv_e0 = (1.0 + 0.5 * x) + (xx * (0.875 + 2.0625 * x) + fourth * ((715.0 / 128.0) + (4199.0 / 256.0) * x))
     else:
-        e0, inv_e0 = (1.0 - 0.5 * x) - 0.625 * x2, (1.0 + 0.5 * x) + 0.875 * x2
+        e0, inv_e0 = (1.0 - 0.5 * x) - 0.625 * xx, (1.0 + 0.5 * x) + 0.875 * xx
     return e0, inv_e0
 
 
 @inlined
-def _part(q, m, J, c, mm, energy2, square, h):
+def _part(q, m_body, J_body, c, mm, energy2, square, h):
     """One part of the flow: (quaternion, body momentum) after h, for an angle below `ANGLE_LIMIT`, of that `square`."""
-    J1, J2, J3 = J
-    m1, m2, m3 = m
+    J1, J2, J3 = J_body
+    m1, m2, m3 = m_body
     a1, a2, a3 = J3 - J2, J1 - J3, J2 - J1
-    h2 = h * h
+    hh = h * h
 
     # Series of sn, cn and dn with their modulus multiplied out: σ = sn/√P, C = cn, D = dn, and (σ/h)².
-    p = a1 * (a3 * (m2 * m2) - a2 * (m3 * m3)) * h2
-    r = a3 * (a1 * (m2 * m2) - a2 * (m1 * m1)) * h2
-    t, x = p + r, (a1 * a3) * (m2 * m2) * h2
-    sn, sn2 = 1.0 - t * (1.0 / 6.0), 1.0 - t * (1.0 / 3.0)
+    p = a1 * (a3 * (m2 * m2) - a2 * (m3 * m3)) * hh
+    r = a3 * (a1 * (m2 * m2) - a2 * (m1 * m1)) * hh
+    t, x = p + r, (a1 * a3) * (m2 * m2) * hh
+    sn, snsn = 1.0 - t * (1.0 / 6.0), 1.0 - t * (1.0 / 3.0)
     C = (1.0 - 0.5 * p) + p * ((p + 4.0 * r) * (1.0 / 24.0))
     D = (1.0 - 0.5 * r) + r * ((r + 4.0 * p) * (1.0 / 24.0))
     # s and d in the variables y = h² |m|², z = h² 2E.
-    y, z = h2 * mm, h2 * energy2
+    y, z = hh * mm, hh * energy2
     if square <= TINY_SQUARE:
         s, d = z * c[1] + y * c[0], z * c[10] + y * c[9]
-        x *= sn2
+        x *= snsn
         inv_N = 1.0 + x * (1.0 + x)
     else:
-        u, p2, r2, t2 = p * r, p * p, r * r, t * t
-        sn += (t2 + 12.0 * u) * (1.0 / 120.0)
-        sn2 += (2.0 * t2 + 9.0 * u) * (1.0 / 45.0)
+        u, pp, rr, tt = p * r, p * p, r * r, t * t
+        sn += (tt + 12.0 * u) * (1.0 / 120.0)
+        snsn += (2.0 * tt + 9.0 * u) * (1.0 / 45.0)
         s = z * (c[1] + z * c[4]) + y * (c[0] + z * c[3] + y * c[2])
         d = z * (c[10] + z * c[13]) + y * (c[9] + z * c[12] + y * c[11])
         if square > SMALL_SQUARE:
-            sn -= t * (t2 + 132.0 * u) * (1.0 / 5040.0)
-            C -= p * ((p2 + 44.0 * u + 16.0 * r2) * (1.0 / 720.0))
-            D -= r * ((r2 + 44.0 * u + 16.0 * p2) * (1.0 / 720.0))
+            sn -= t * (tt + 132.0 * u) * (1.0 / 5040.0)
+            C -= p * ((pp + 44.0 * u + 16.0 * rr) * (1.0 / 720.0))
+            D -= r * ((rr + 44.0 * u + 16.0 * pp) * (1.0 / 720.0))
             if abs(p) + abs(r) > SHORT_SERIES:
-                sn += (t2 * t2 + 1224.0 * t2 * u + 3024.0 * u * u) * (1.0 / 362880.0)
-                C += p * (p * p2 + 408.0 * p * u + 912.0 * r * u + 64.0 * r * r2) * (1.0 / 40320.0)
-                D += r * (r * r2 + 408.0 * r * u + 912.0 * p * u + 64.0 * p * p2) * (1.0 / 40320.0)
-                sn2 += (2.0 * t2 * t2 + 243.0 * t2 * u + 378.0 * u * u) * (1.0 / 14175.0)
-                sn2 -= t * (t2 + 27.0 * u) * (1.0 / 315.0)
-            inv_N = 1.0 / (1.0 - x * sn2)
+                sn += (tt * tt + 1224.0 * tt * u + 3024.0 * u * u) * (1.0 / 362880.0)
+                C += p * (p * pp + 408.0 * p * u + 912.0 * r * u + 64.0 * r * rr) * (1.0 / 40320.0)
+                D += r * (r * rr + 408.0 * r * u + 912.0 * p * u + 64.0 * p * pp) * (1.0 / 40320.0)
+                snsn += (2.0 * tt * tt + 243.0 * tt * u + 378.0 * u * u) * (1.0 / 14175.0)
+                snsn -= t * (tt + 27.0 * u) * (1.0 / 315.0)
+            inv_N = 1.0 / (1.0 - x * snsn)
             yy, zz = y * y, z * z
             s += zz * (z * c[8] + y * c[7]) + yy * (z * c[6] + y * c[5])
             d += zz * (z * c[17] + y * c[16]) + yy * (z * c[15] + y * c[14])
         else:
-            x *= sn2
+            x *= snsn
             inv_N = 1.0 + x * (1.0 + x * (1.0 + x))
     sigma = h * sn
     g1, g2, g3 = sigma * (a1 * (m2 * m3)), sigma * (a2 * (m1 * m3)), sigma * (a3 * (m1 * m2))
@@ -182,14 +182,14 @@ def _part(q, m, J, c, mm, energy2, square, h):
     n2 = (C * D * m2 + g2) * inv_N
     n3 = (D * m3 + C * g3) * inv_N
 
-    s1 = 1.0 + s
+    s_plus_1 = 1.0 + s
     quarter = 0.25 * h
-    y1 = quarter * (s1 * J1 + d) * (m1 + n1)
-    y2 = quarter * (s1 * J2 + d) * (m2 + n2)
-    y3 = quarter * (s1 * J3 + d) * (m3 + n3)
-    e0, inv_e0 = _half_angle(y1 * y1 + y2 * y2 + y3 * y3, square)
+    v1 = quarter * (s_plus_1 * J1 + d) * (m1 + n1)
+    v2 = quarter * (s_plus_1 * J2 + d) * (m2 + n2)
+    v3 = quarter * (s_plus_1 * J3 + d) * (m3 + n3)
+    e0, inv_e0 = _half_angle(v1 * v1 + v2 * v2 + v3 * v3, square)
     q = qt.renormalise(q)  # of the old q, which is known early; e is a unit quaternion to rounding
-    return qt.multiply(q, (e0, y1 * inv_e0, y2 * inv_e0, y3 * inv_e0)), (n1, n2, n3)
+    return qt.multiply(q, (e0, v1 * inv_e0, v2 * inv_e0, v3 * inv_e0)), (n1, n2, n3)
 
 
 @inlined

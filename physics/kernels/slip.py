@@ -125,11 +125,11 @@ def without_gift(n, friction, smooth, pivots, v, w, solved, free, R, h, work):
     """
     if friction is None:
         return solved
-    w1 = turning(R, solved[1], work.J)
+    w_new = turning(R, solved[1], work.J)
     gift = push = 0.0
     for i in range(n):
         a, b = _tangential(i, v, w, work)
-        c, d = _tangential(i, solved[0], w1, work)
+        c, d = _tangential(i, solved[0], w_new, work)
         gift += 0.5 * (work.impulse[3 * i + 1] * (a + c) + work.impulse[3 * i + 2] * (b + d))
         push += work.impulse[3 * i]
     if not gift > (1.0 + work.mu) * push * work.tolerance * work.acceleration * h:

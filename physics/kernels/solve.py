@@ -127,18 +127,18 @@ def _directly(n, friction, R, v, L, work):
         holds_first = work.mode == HOLD
         if is_one_wall and n > 2:
             holds_first = may_hold(n, wall_axes(work.walls, wall), v, L, work)
-    found, v1, L1, residual = False, v, L, 0.0
+    found, v_new, L_new, residual = False, v, L, 0.0
     if holds_first:
-        found, v1, L1, residual = _hold(n, R, v, L, work)
+        found, v_new, L_new, residual = _hold(n, R, v, L, work)
         if found:
             work.mode = HOLD
     if not found and is_one_wall and not (is_soft and n > 2):
-        found, v1, L1, residual = slide_on(n, friction, wall, R, v, L, work)
+        found, v_new, L_new, residual = slide_on(n, friction, wall, R, v, L, work)
     if not found and may_all_hold and not holds_first:
-        found, v1, L1, residual = _hold(n, R, v, L, work)
+        found, v_new, L_new, residual = _hold(n, R, v, L, work)
         if found:
             work.mode = HOLD
-    return found, v1, L1, residual
+    return found, v_new, L_new, residual
 
 
 @inlined
@@ -235,7 +235,7 @@ def solve_contacts(n, friction, smooth, pivots, v, L, R, work):
     method : int
         DIRECT, SWEEPS or PIVOTING.
     """
-    found, v1, L1, residual = _directly(n, friction, R, v, L, work)
+    found, v_new, L_new, residual = _directly(n, friction, R, v, L, work)
     if found:
-        return v1, L1, residual, 0, DIRECT
+        return v_new, L_new, residual, 0, DIRECT
     return _by_sweeps(n, friction, smooth, pivots, v, L, R, work)

@@ -191,10 +191,10 @@ def impact(n, y, h, friction, smooth, tilted, pivots, report, work):
     if not solved[2] <= work.tolerance:
         solved = shortened(n, friction, v, turning(R, L, work.J), solved, (v, L), R, work)
     solved = without_gain(n, friction, smooth, pivots, v, L, solved, R, work)
-    v1, L1, residual, sweeps, method = resist_turning(n, friction, smooth, pivots, v, L, solved, R, work)
+    v_new, L_new, residual, sweeps, method = resist_turning(n, friction, smooth, pivots, v, L, solved, R, work)
     note_solve(report, work.world, residual, sweeps, method, work.tolerance)
     if friction is not None and work.restitution > 0.0:
-        before, full = kinetic_energy(q, v, L, work, tilted), kinetic_energy(q, v1, L1, work, tilted)
+        before, full = kinetic_energy(q, v, L, work, tilted), kinetic_energy(q, v_new, L_new, work, tilted)
         if full > before + ROUNDING * before:
             aim_plastic(n, work)
             solved = solve_contacts(n, friction, smooth, pivots, v, L, R, work)
@@ -202,8 +202,8 @@ def impact(n, y, h, friction, smooth, tilted, pivots, report, work):
                 solved = shortened(n, friction, v, turning(R, L, work.J), solved, (v, L), R, work)
             v0, L0, residual, sweeps, method = solved
             note_solve(report, work.world, residual, sweeps, method, work.tolerance)
-            v1, L1, _ = part_of_rebound(q, before, (v0, L0), (v1, L1), work, tilted)
-    return x, q, v1, L1
+            v_new, L_new, _ = part_of_rebound(q, before, (v0, L0), (v_new, L_new), work, tilted)
+    return x, q, v_new, L_new
 
 
 @inlined
@@ -246,10 +246,10 @@ def touch(n, y, h, friction, smooth, gyroscopic, tilted, pivots, memory, report,
         solved = solve_contacts(n, friction, smooth, pivots, v, L, R, work)
     solved = without_gift(n, friction, smooth, pivots, v0, w, solved, (v, L), R, h, work)
     solved = calmed_stage(n, friction, smooth, pivots, v0, w, solved, (v, L), R, h, work)
-    v1, L1, residual, sweeps, method = resist_turning(n, friction, smooth, pivots, v, L, solved, R, work)
+    v_new, L_new, residual, sweeps, method = resist_turning(n, friction, smooth, pivots, v, L, solved, R, work)
     memory[work.i, MODE] = work.mode
     note_solve(report, work.world, residual, sweeps, method, work.tolerance)
     store_warm_start(n, width, memory, work.i, h, work)
-    foretell_gaps(n, v1, turning(R, L1, work.J), after, work)
-    x = (x[0] + after * v1[0], x[1] + after * v1[1], x[2] + after * v1[2])
-    return x, drift(q, L1, work, after, gyroscopic, tilted), v1, L1
+    foretell_gaps(n, v_new, turning(R, L_new, work.J), after, work)
+    x = (x[0] + after * v_new[0], x[1] + after * v_new[1], x[2] + after * v_new[2])
+    return x, drift(q, L_new, work, after, gyroscopic, tilted), v_new, L_new

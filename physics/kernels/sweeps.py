@@ -59,12 +59,12 @@ def assemble(n, width, R, v, w, work):
     frame, angular, response, arm = work.frame, work.angular, work.response, work.arm
     # I⁻¹ in the world frame, six numbers.
     j1, j2, j3 = J[0], J[1], J[2]
-    i11 = j1 * R[0] * R[0] + j2 * R[1] * R[1] + j3 * R[2] * R[2]
-    i12 = j1 * R[0] * R[3] + j2 * R[1] * R[4] + j3 * R[2] * R[5]
-    i13 = j1 * R[0] * R[6] + j2 * R[1] * R[7] + j3 * R[2] * R[8]
-    i22 = j1 * R[3] * R[3] + j2 * R[4] * R[4] + j3 * R[5] * R[5]
-    i23 = j1 * R[3] * R[6] + j2 * R[4] * R[7] + j3 * R[5] * R[8]
-    i33 = j1 * R[6] * R[6] + j2 * R[7] * R[7] + j3 * R[8] * R[8]
+    k11 = j1 * R[0] * R[0] + j2 * R[1] * R[1] + j3 * R[2] * R[2]
+    k12 = j1 * R[0] * R[3] + j2 * R[1] * R[4] + j3 * R[2] * R[5]
+    k13 = j1 * R[0] * R[6] + j2 * R[1] * R[7] + j3 * R[2] * R[8]
+    k22 = j1 * R[3] * R[3] + j2 * R[4] * R[4] + j3 * R[5] * R[5]
+    k23 = j1 * R[3] * R[6] + j2 * R[4] * R[7] + j3 * R[5] * R[8]
+    k33 = j1 * R[6] * R[6] + j2 * R[7] * R[7] + j3 * R[8] * R[8]
     for i in range(n):
         wall = wall_of(work.slot[i], work)
         x, y, z = arm[i, 0], arm[i, 1], arm[i, 2]
@@ -74,9 +74,9 @@ def assemble(n, width, R, v, w, work):
             gx, gy, gz = y * d - z * b, z * a - x * d, x * b - y * a
             frame[row, 0], frame[row, 1], frame[row, 2] = a, b, d
             angular[row, 0], angular[row, 1], angular[row, 2] = gx, gy, gz
-            response[row, 0] = i11 * gx + i12 * gy + i13 * gz
-            response[row, 1] = i12 * gx + i22 * gy + i23 * gz
-            response[row, 2] = i13 * gx + i23 * gy + i33 * gz
+            response[row, 0] = k11 * gx + k12 * gy + k13 * gz
+            response[row, 1] = k12 * gx + k22 * gy + k23 * gz
+            response[row, 2] = k13 * gx + k23 * gy + k33 * gz
             work.bias[row] = (a * v[0] + b * v[1] + d * v[2]) + (gx * w[0] + gy * w[1] + gz * w[2]) - work.target[i, c]
     W = work.delassus
     for r in range(width * n):
@@ -98,11 +98,11 @@ def factor_blocks(n, work):
         r = 3 * i
         a, b, c = W[r, r], W[r, r + 1], W[r, r + 2]
         d, e, f = W[r + 1, r + 1], W[r + 1, r + 2], W[r + 2, r + 2]
-        c11, c12, c13 = d * f - e * e, c * e - b * f, b * e - c * d
-        s = 1.0 / (a * c11 + b * c12 + c * c13)
-        local[i, 0], local[i, 1], local[i, 2] = c11 * s, c12 * s, c13 * s
-        local[i, 3], local[i, 4], local[i, 5] = c12 * s, (a * f - c * c) * s, (b * c - a * e) * s
-        local[i, 6], local[i, 7], local[i, 8] = c13 * s, (b * c - a * e) * s, (a * d - b * b) * s
+        k11, k12, k13 = d * f - e * e, c * e - b * f, b * e - c * d
+        s = 1.0 / (a * k11 + b * k12 + c * k13)
+        local[i, 0], local[i, 1], local[i, 2] = k11 * s, k12 * s, k13 * s
+        local[i, 3], local[i, 4], local[i, 5] = k12 * s, (a * f - c * c) * s, (b * c - a * e) * s
+        local[i, 6], local[i, 7], local[i, 8] = k13 * s, (b * c - a * e) * s, (a * d - b * b) * s
         half = 0.5 * (d - f)
         local[i, TANGENTIAL_STEP] = 1.0 / (0.5 * (d + f) + math.sqrt(half * half + e * e))
         local[i, NORMAL_STEP] = 1.0 / a
@@ -166,7 +166,7 @@ def normal_sweeps(n, tolerance, limit, work):
 
 
 @inlined
-def _slide_one(r, b0, b1, b2, p1, p2, mu, W):
+def _slide_one(r, bn, bx, by, p1, p2, mu, W):
     """Impulse of one sliding contact that alone answers its free velocity b, and whether one was found.
 
     With p = p_n (1, -μ d), p_n = -b_n / (W_nn - μ W_nt·d): the contact neither approaches nor leaves. What is
@@ -179,16 +179,16 @@ def _slide_one(r, b0, b1, b2, p1, p2, mu, W):
     x, y = -p1, -p2
     size = math.sqrt(x * x + y * y)
     if not size > 0.0:
-        x, y = b1, b2
+        x, y = bx, by
         size = math.sqrt(x * x + y * y)
     if size > 0.0:
         x, y = x / size, y / size
     pn = 0.0
     for _ in range(TURN_LIMIT):
         along = a - mu * (b * x + c * y)
-        pn = -b0 / along
+        pn = -bn / along
         gx, gy = b - mu * (d * x + e * y), c - mu * (e * x + f * y)
-        ux, uy = b1 + pn * gx, b2 + pn * gy
+        ux, uy = bx + pn * gx, by + pn * gy
         across, forward = x * uy - y * ux, x * ux + y * uy
         ex, ey = mu * (e * x - d * y), mu * (f * x - e * y)
         change = mu * pn * (c * x - b * y) / along
@@ -201,15 +201,15 @@ def _slide_one(r, b0, b1, b2, p1, p2, mu, W):
         x, y = size * x, size * y
         if abs(t) <= TURN_ENOUGH:
             break
-    pn = -b0 / (a - mu * (b * x + c * y))
+    pn = -bn / (a - mu * (b * x + c * y))
     return pn >= 0.0, pn, -mu * pn * x, -mu * pn * y
 
 
 @kernel
-def _local_impulse(i, p, u, mu, W, local):
+def _local_impulse(i, impulse, u, mu, W, local):
     """Impulse of contact i that answers its own velocity, all others held: (normal, tangent 1, tangent 2)."""
     r = 3 * i
-    p0, p1, p2 = p[r], p[r + 1], p[r + 2]
+    p0, p1, p2 = impulse[r], impulse[r + 1], impulse[r + 2]
     # Release: with no impulse of its own the contact already separates.
     if u[r] - (W[r, r] * p0 + W[r, r + 1] * p1 + W[r, r + 2] * p2) >= 0.0:
         return 0.0, 0.0, 0.0

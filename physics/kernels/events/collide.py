@@ -162,15 +162,15 @@ def within_energy(n, y, friction, smooth, tilted, pivots, solved, P, work, motio
     Impulses are those of what is returned. See `physics.kernels.restraint`.
     """
     _, q, v, L = y
-    v1, L1 = solved[0], solved[1]
-    before, full = kinetic_energy(q, v, L, work, tilted), kinetic_energy(q, v1, L1, work, tilted)
+    v_full, L_full = solved[0], solved[1]
+    before, full = kinetic_energy(q, v, L, work, tilted), kinetic_energy(q, v_full, L_full, work, tilted)
     if not full > (1.0 + ROUNDING) * before:
         return solved
     for k in range(3 * n):
         motion.rebound[k] = work.impulse[k]
     plastic = _without_rebound(n, friction, smooth, pivots, v, L, solved, P, work, report)
-    v0, L0, residual, sweeps, method = plastic
-    v, L, s = part_of_rebound(q, before, (v0, L0), (v1, L1), work, tilted)
+    v_plastic, L_plastic, residual, sweeps, method = plastic
+    v, L, s = part_of_rebound(q, before, (v_plastic, L_plastic), (v_full, L_full), work, tilted)
     for k in range(3 * n):
         work.impulse[k] += s * (motion.rebound[k] - work.impulse[k])
     return v, L, residual, sweeps, method

@@ -76,14 +76,14 @@ def best_edges(a, b, margin, many):
     da, db = many.bodies[a].dims, many.bodies[b].dims
     best, edges = -math.inf, 0
     for i in range(3):
-        i1, i2 = (i + 1) % 3, (i + 2) % 3
+        ip, iq = (i + 1) % 3, (i + 2) % 3
         for j in range(3):
             square = 1.0 - C[i, j] * C[i, j]
             if square < PARALLEL:
                 continue
-            j1, j2 = (j + 1) % 3, (j + 2) % 3
-            apart = abs(way[i2] * C[i1, j] - way[i1] * C[i2, j])
-            size = (da[i1] * S[i2, j] + da[i2] * S[i1, j]) + (db[j1] * S[i, j2] + db[j2] * S[i, j1])
+            jp, jq = (j + 1) % 3, (j + 2) % 3
+            apart = abs(way[iq] * C[ip, j] - way[ip] * C[iq, j])
+            size = (da[ip] * S[iq, j] + da[iq] * S[ip, j]) + (db[jp] * S[i, jq] + db[jq] * S[i, jp])
             s = (apart - size) / math.sqrt(square)
             if s > margin:
                 return s, 3 * i + j

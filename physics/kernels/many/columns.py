@@ -56,11 +56,11 @@ def _count_entries(u, v, cuts, many):
     for c in range(cuts[2] * cuts[5] + 1):
         first[c] = 0
     for b in range(many.box.shape[0]):
-        i0, i1, j0, j1 = columns_of(b, u, v, cuts, many)
-        for i in range(i0, i1 + 1):
-            for j in range(j0, j1 + 1):
+        i_first, i_last, j_first, j_last = columns_of(b, u, v, cuts, many)
+        for i in range(i_first, i_last + 1):
+            for j in range(j_first, j_last + 1):
                 first[i * cuts[5] + j + 1] += 1
-        total += (i1 - i0 + 1) * (j1 - j0 + 1)
+        total += (i_last - i_first + 1) * (j_last - j_first + 1)
     return total
 
 
@@ -84,9 +84,9 @@ def fill_columns(u, v, many):
         cursor[c] = first[c]
     for r in range(many.order.shape[0]):
         b = many.order[r]
-        i0, i1, j0, j1 = columns_of(b, u, v, cuts, many)
-        for i in range(i0, i1 + 1):
-            for j in range(j0, j1 + 1):
+        i_first, i_last, j_first, j_last = columns_of(b, u, v, cuts, many)
+        for i in range(i_first, i_last + 1):
+            for j in range(j_first, j_last + 1):
                 c = i * nv + j
                 many.entry[cursor[c]] = b
                 cursor[c] += 1

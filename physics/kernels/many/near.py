@@ -178,9 +178,9 @@ def find_pairs(h, many):
         many.merged[many.order[r]] = r
     for r in range(many.order.shape[0]):
         a, first = many.order[r], count
-        i0, i1, j0, j1 = columns_of(a, u, v, cuts, many)
-        for i in range(i0, i1 + 1):
-            for j in range(j0, j1 + 1):
+        i_first, i_last, j_first, j_last = columns_of(a, u, v, cuts, many)
+        for i in range(i_first, i_last + 1):
+            for j in range(j_first, j_last + 1):
                 count = _pair_in_column(a, i, j, (axis, u, v), cuts, count, many)
         _sort_behind(first, count, many)
         for k in range(first, count):

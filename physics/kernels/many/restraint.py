@@ -49,9 +49,9 @@ def _mix(s, many):
     """Move the momenta of all bodies by the share s towards those with all of the rebound."""
     for b in range(many.now.shape[0]):
         v, L = vector(many.now, b, at.LINVEL), vector(many.now, b, at.ANGMOM)
-        v1, L1 = vector(many.momenta, b, FULL), vector(many.momenta, b, FULL + 3)
-        put(many.now, b, at.LINVEL, plus(plus(v, -s, v), s, v1))
-        put(many.now, b, at.ANGMOM, plus(plus(L, -s, L), s, L1))
+        v_full, L_full = vector(many.momenta, b, FULL), vector(many.momenta, b, FULL + 3)
+        put(many.now, b, at.LINVEL, plus(plus(v, -s, v), s, v_full))
+        put(many.now, b, at.ANGMOM, plus(plus(L, -s, L), s, L_full))
 
 
 @inlined

@@ -60,13 +60,13 @@ def stage_has_gained(n, h, many):
     for b in range(many.now.shape[0]):
         if many.touched[b] == 0:
             continue
-        body, v1, L1 = many.bodies[b], vector(many.now, b, at.LINVEL), vector(many.now, b, at.ANGMOM)
+        body, v_new, L_new = many.bodies[b], vector(many.now, b, at.LINVEL), vector(many.now, b, at.ANGMOM)
         v, w = vector(many.momenta, b, VELOCITY), vector(many.momenta, b, VELOCITY + 3)
-        P, Q = minus(v1, vector(many.momenta, b, LOADED)), minus(L1, vector(many.momenta, b, LOADED + 3))
-        w1, a = vector(many.twist, b, 3), body.free_acceleration
-        gain += body.mass * qt.dot(P, plus(v, 1.0, v1)) + qt.dot(Q, plus(w, 1.0, w1))
+        P, Q = minus(v_new, vector(many.momenta, b, LOADED)), minus(L_new, vector(many.momenta, b, LOADED + 3))
+        w_new, a = vector(many.twist, b, 3), body.free_acceleration
+        gain += body.mass * qt.dot(P, plus(v, 1.0, v_new)) + qt.dot(Q, plus(w, 1.0, w_new))
         square = h * h * (a[0] * a[0] + a[1] * a[1] + a[2] * a[2])
-        size += body.mass * (qt.dot(v, v) + square) + abs(qt.dot(L1, w1))
+        size += body.mass * (qt.dot(v, v) + square) + abs(qt.dot(L_new, w_new))
         fastest = max(fastest, qt.dot(v, v) + square)
         F += body.mass * math.sqrt(square)
     held = 0.0
