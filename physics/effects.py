@@ -14,6 +14,7 @@ import numpy as np
 from physics import checks
 from physics.field import Field
 from physics.keywords import known_keywords
+from physics.summary import fields_repr, shown
 
 
 @known_keywords
@@ -65,8 +66,9 @@ class Contact:
     damping: float = 0.0
 
     def __post_init__(self):
-        if not isinstance(self.between_bodies, bool):
-            raise ValueError(f"Contact.between_bodies is {self.between_bodies!r}; allowed are True and False")
+        if not isinstance(self.between_bodies, (bool, np.bool_)):
+            raise ValueError(f"Contact.between_bodies is {shown(self.between_bodies)}; allowed are True and False")
+        object.__setattr__(self, "between_bodies", bool(self.between_bodies))
         if self.restitution is not None:
             value = float(checks.share(self.restitution, (), "Contact.restitution"))
             object.__setattr__(self, "restitution", value)
@@ -119,9 +121,11 @@ class Friction:
             object.__setattr__(self, "coefficient", tuple(checks.positive(given, (2,), name).tolist()))
         if is_even != (self.axis is None):
             allowed = "None with one coefficient" if is_even else "a direction with two coefficients"
-            raise ValueError(f"Friction.axis is {self.axis!r}; allowed is {allowed}")
+            raise ValueError(f"Friction.axis is {shown(self.axis)}; allowed is {allowed}")
         if not is_even:
             object.__setattr__(self, "axis", _axes(self.axis))
+
+    __repr__ = fields_repr
 
     @property
     def along(self) -> float:
@@ -146,7 +150,7 @@ def _axes(axis) -> tuple:
         shape = ()
     value = checks.finite(axis, (*shape[:-1], 3) if len(shape) == 2 else (3,), "Friction.axis")
     if not value.any(axis=-1).all():
-        raise ValueError(f"Friction.axis is {axis!r}; allowed are directions, any vectors but zero")
+        raise ValueError(f"Friction.axis is {shown(axis)}; allowed are directions, any vectors but zero")
     return tuple(value.tolist()) if value.ndim == 1 else tuple(tuple(row) for row in value.tolist())
 
 

@@ -144,7 +144,7 @@ class Wind(Checked):
         self._set("velocity", checks.finite, (3,))
         self._set("gust", checks.non_negative)
         self._set("time_scale", checks.positive)
-        checks.count(self.seed, "Wind.seed", least=0)
+        checks.count(self.seed, "Wind.seed", least=0, most=None)
 
     @property
     def is_steady(self):

@@ -11,11 +11,15 @@ from typing import TypeVar
 
 T = TypeVar("T", bound=Callable)
 
+# Names with at least this share of their letters in common, in the same order, may be misspellings of each other.
+ALIKE = 0.6
+
 
 def nearest_first(name: object, allowed: Iterable[str]) -> list[str]:
-    """The names `allowed`, the one most like `name` first; names that are equally alike keep their order."""
-    name = str(name).lower()
-    return sorted(allowed, key=lambda known: -difflib.SequenceMatcher(None, name, known.lower()).ratio())
+    """The names `allowed`, those that are like `name` first, the nearest of them ahead; the rest keep its order."""
+    name, allowed = str(name).lower(), list(allowed)
+    likeness = {known: difflib.SequenceMatcher(None, name, known.lower()).ratio() for known in allowed}
+    return sorted(allowed, key=lambda known: -likeness[known] if likeness[known] >= ALIKE else 0.0)
 
 
 def known_keywords(target: T) -> T:

@@ -132,8 +132,7 @@ class Push(Checked):
     def __post_init__(self):
         self._set("force", checks.finite, (3,))
         self._set("point", checks.finite, (3,))
-        if self.frame not in ("world", "body"):
-            raise ValueError(f"Push.frame is {self.frame!r}; allowed are world, body")
+        checks.one_of(self.frame, ("world", "body"), "Push.frame")
         checks.count(self.body, "Push.body", least=0)
 
     def check(self, body_count):

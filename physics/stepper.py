@@ -14,6 +14,7 @@ from physics.kernels.many.step import step_many
 from physics.kernels.step import step_worlds
 from physics.keywords import known_keywords
 from physics.machine_code import Work, compiled
+from physics.summary import shown
 
 # Which arguments of all step kernels the number of steps is, and the length of a substep.
 STEPS, SUBSTEP = 2, 4
@@ -54,6 +55,8 @@ class Stepper:
         dt: float | None = None,
         then: Callable[[np.ndarray], Work] | None = None,
     ):
+        if not hasattr(world, "no_wrench"):  # the class itself knows this module
+            raise ValueError(f"world is {shown(world)}; allowed is a physics.World")
         self.world = world
         self.steps = checks.count(steps, "steps")
         self.dt = world.dt if dt is None else float(checks.positive(dt, (), "dt"))

@@ -81,6 +81,7 @@ def test_what_takes_every_keyword_is_refused():
             """Anything."""
 
 
-def test_equally_near_names_keep_their_order():
+def test_names_that_are_not_alike_keep_their_order():
+    assert nearest_first("best", ["fast", "balanced", "precise"]) == ["fast", "balanced", "precise"]
     assert nearest_first("zzz", ["b", "a", "c"]) == ["b", "a", "c"]
     assert nearest_first("Gravty", ["Contact", "Friction", "Gravity"])[0] == "Gravity"
