@@ -116,10 +116,8 @@ def frontier(
     if settings is None:
         settings = ladder() if duration >= max(COARSE_STEPS) else ladder(steps=STEPS)
     contenders = [
-        EngineContender(
-            scene, resolve(accuracy, f"settings[{k}]"), float(checks.positive(dt, (), f"settings[{k}] step"))
-        )
-        for k, (accuracy, dt) in enumerate(_pairs(settings))
+        EngineContender(scene, resolve(accuracy, name), float(checks.positive(dt, (), f"{name} step")))
+        for name, (accuracy, dt) in _pairs(settings).items()
     ]
     return measure(contenders, scene, duration, truth, repeats, progress)
 
@@ -231,14 +229,15 @@ def common_times(duration: float, steps: Sequence[float]) -> tuple[float, float]
     return float(whole * sample), float(sample)
 
 
-def _pairs(settings: Iterable) -> list[tuple]:
+def _pairs(settings: Iterable) -> dict[str, tuple]:
+    """The settings by what messages call them."""
     if isinstance(settings, (str, Accuracy)) or not isinstance(settings, Iterable):
         raise ValueError(f"settings is {shown(settings)}; allowed is a list of (preset or physics.Accuracy, step in s)")
     pairs = list(settings)
     for k, pair in enumerate(pairs):
         if not isinstance(pair, (tuple, list)) or len(pair) != 2:
             raise ValueError(f"settings[{k}] is {shown(pair)}; allowed is (preset or physics.Accuracy, step in s)")
-    return pairs
+    return {f"settings[{k}]": pair for k, pair in enumerate(pairs)}
 
 
 def _as_truth(truth, scene, duration, sample_dt, contenders) -> Truth | ReferenceTruth:

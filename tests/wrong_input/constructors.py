@@ -72,7 +72,7 @@ BODIES = rows(
     ("points-of-two", lambda: p.Hull([row[:2] for row in TETRAHEDRON], 1), ("points has shape (4, 2)", "rows of 3")),
     ("points-none", lambda: p.Hull(None, 1), ("points is None", "rows of 3 numbers")),
     ("points-far", lambda: p.Hull(np.array(TETRAHEDRON) * 1e308, 1), ("points is ", "1e+308", "below 1e+150")),
-    ("points-too-many", lambda: round_hull(80), ("points has 80", "64")),
+    ("points-too-many", lambda: round_hull(80), ("points has a hull of 80 corners", "at most 64")),
     ("pos-none", lambda: ball(pos=None), ("pos is None", "numbers in shape (3,)")),
     ("pos-nan", lambda: ball(pos=(0, NAN, 0)), ("pos is [ 0., nan, 0.]", "finite")),
     ("pos-generator", lambda: ball(pos=(x for x in (1, 2, 3))), ("pos is <generator", "numbers in shape (3,)")),
@@ -156,9 +156,9 @@ SCENES = rows(
     ("tangential-alone", lambda: scene(p.Contact(tangential=0.5)), ("Contact.tangential is 0.5", "add physics.Fr")),
     ("wind-alone", lambda: scene(p.Wind()), ("Scene.effects holds Wind", "add physics.Drag()")),
     ("spring-to-nobody", lambda: scene(p.Spring(body=9)), ("Spring.body is 9", "indices below 1")),
-    ("axis-is-normal", lambda: scene(p.Contact(), p.Friction((1, 2), (0, 1, 0))), ("Friction.axis is [0.0, 1.0", "along")),
+    ("axis-is-normal", lambda: scene(p.Contact(), p.Friction((1, 2), (0, 1, 0))), ("axis is [0.0, 1.0", "along")),
     ("axes-too-few", lambda: scene(p.Contact(), p.Friction((1, 2), ((1, 0, 0),) * 2)), ("Friction.axis has 2", "or 3")),
-    ("drag-of-a-hull", lambda: p.Scene([p.Hull(TETRAHEDRON, 1)], [], [p.Drag()]), ("Drag", "bodies[0] is a hull", "blocks")),
+    ("drag-of-a-hull", lambda: p.Scene(p.Hull(TETRAHEDRON, 1), [], p.Drag()), ("Drag", "bodies[0] is a hull", "block")),
     ("scene-keyword", lambda: p.Scene([ball()], efects=[]), ("'efects' (given: [])", "allowed are effects,")),
 )
 
