@@ -27,8 +27,11 @@ from physics.scene_file import load_scene, save_scene
 from physics.shapes import Block, Body, Ellipsoid, Hull, Sphere
 from physics.stepper import Stepper
 from physics.trajectory import Event, Trajectory, simulate
+from physics.version import version as _version
 from physics.world import Snapshot, World
 from physics.wrench import wrench_at
+
+__version__ = _version()
 
 __all__ = [
     "PRESETS",
@@ -70,6 +73,7 @@ __all__ = [
     "Truth",
     "Wind",
     "World",
+    "__version__",
     "corner",
     "diagnose",
     "field_function",

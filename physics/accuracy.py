@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 
 from physics import checks
 from physics.kernels import schemes
+from physics.keywords import known_keywords
 
 # Schemes by name; 0 is time stepping with the exact flow, -1 the event-driven scheme.
 EVENTS = -1
@@ -22,6 +23,7 @@ SLIPS = ("mean", "end")
 COLLISIONS = ("simultaneous", "sequential")
 
 
+@known_keywords
 @dataclass(frozen=True)
 class Accuracy:
     """Every knob of a simulation; `Accuracy()` is the preset ``balanced``.
@@ -93,20 +95,16 @@ class Accuracy:
     collisions: str = "simultaneous"
 
     def __post_init__(self):
-        checks.count(self.substeps, "Accuracy.substeps")
-        checks.count(self.iterations, "Accuracy.iterations")
-        checks.count(self.impacts, "Accuracy.impacts")
-        checks.positive(self.tolerance, (), "Accuracy.tolerance")
-        checks.positive(self.slop, (), "Accuracy.slop")
-        checks.share(self.rest_share, (), "Accuracy.rest_share")
-        if self.scheme not in SCHEMES:
-            raise ValueError(f"Accuracy.scheme is {self.scheme!r}; allowed are {', '.join(SCHEMES)}")
-        if self.solver not in SOLVERS:
-            raise ValueError(f"Accuracy.solver is {self.solver!r}; allowed are {', '.join(SOLVERS)}")
-        if self.slip not in SLIPS:
-            raise ValueError(f"Accuracy.slip is {self.slip!r}; allowed are {', '.join(SLIPS)}")
-        if self.collisions not in COLLISIONS:
-            raise ValueError(f"Accuracy.collisions is {self.collisions!r}; allowed are {', '.join(COLLISIONS)}")
+        for name in ("substeps", "iterations", "impacts"):
+            self._set(name, checks.count(getattr(self, name), f"Accuracy.{name}"))
+        for name in ("tolerance", "slop"):
+            self._set(name, float(checks.positive(getattr(self, name), (), f"Accuracy.{name}")))
+        self._set("rest_share", float(checks.share(self.rest_share, (), "Accuracy.rest_share")))
+        for name, known in (("scheme", SCHEMES), ("solver", SOLVERS), ("slip", SLIPS), ("collisions", COLLISIONS)):
+            checks.one_of(getattr(self, name), known, f"Accuracy.{name}")
+
+    def _set(self, name, value):
+        object.__setattr__(self, name, value)
 
 
 _BALANCED = Accuracy()
@@ -118,10 +116,8 @@ PRESETS = {
 }
 
 
-def resolve(accuracy: str | Accuracy) -> Accuracy:
-    """The `Accuracy` of a preset's name, or the one given."""
+def resolve(accuracy: str | Accuracy, field: str = "accuracy") -> Accuracy:
+    """The `Accuracy` of a preset's name, or the one given; `field` is what messages call it."""
     if isinstance(accuracy, Accuracy):
         return accuracy
-    if accuracy in PRESETS:
-        return PRESETS[accuracy]
-    raise ValueError(f"accuracy is {accuracy!r}; allowed are {', '.join(PRESETS)}, or a physics.Accuracy(...)")
+    return PRESETS[checks.one_of(accuracy, PRESETS, field, ", or a physics.Accuracy(...)")]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -67,6 +68,25 @@ def make_memory(scene: Scene, plan: Plan, worlds: int) -> np.ndarray:
         polyhedra = parameters.polyhedra(scene.bodies)
         return np.zeros((worlds, many.memory_size(bodies, walls, polyhedra, bool(plan.refined))))
     return np.zeros((worlds * bodies if plan.contact else 1, memory_size(max(walls * plan.features, 1))))
+
+
+def check_room(worlds: int, bodies: int, plan: Plan) -> None:
+    """Refuse more worlds than this machine's memory holds: a few would otherwise end the process."""
+    row = 8 * (at.STATE_SIZE + at.PARAM_SIZE + plan.field_columns)  # the least that a body takes [bytes]
+    memory = _memory()
+    if worlds * bodies * row > memory:
+        raise ValueError(
+            f"worlds is {worlds} of {bodies} bodies; allowed are at most {memory // (bodies * row)}, which fill the "
+            f"{memory / 2**30:.0f} GiB of memory of this machine"
+        )
+
+
+def _memory() -> int:
+    """Physical memory [bytes]; where the system does not say, an amount that no machine has."""
+    try:
+        return os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
+    except (AttributeError, ValueError, OSError):
+        return 2**62
 
 
 def fill(world: World) -> None:

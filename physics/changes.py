@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -15,6 +15,7 @@ from physics.gaps import wall_gaps
 from physics.kernels import layout as at
 from physics.kernels.laws import STIFFNESS
 from physics.kernels.probe import angular_momenta
+from physics.summary import shown
 
 if TYPE_CHECKING:
     from physics.world import World
@@ -36,8 +37,9 @@ def set_state(world: World, pos, quat, linvel, angvel, worlds) -> None:
     for name, value, first, size in given:
         if value is None:
             continue
+        shape = (len(chosen), world.body_count, size)
         check = checks.unit_quaternion if name == "quat" else checks.finite
-        value = check(value, (len(chosen), world.body_count, size), name)
+        value = check(checks.batch(value, shape, name), shape, name)
         state[:, first : first + size] = value.reshape(-1, size)
     _adopt(world, chosen, rows, state, world.params[rows], "set_state")
     if world.actuation is not None:
@@ -59,9 +61,11 @@ def set_parameters(world: World, mass, size, inertia_body, friction, restitution
         _needs("restitution", plan.restitution, "physics.Contact(restitution=...)")
         params[:, at.RESTITUTION] = checks.share(*parameters.spread(restitution, shape, "restitution")).ravel()
     if effects is not None:
-        effects = tuple(effects) if isinstance(effects, Sequence) else (effects,)
+        effects = tuple(effects) if isinstance(effects, Iterable) else (effects,)
         laws = [effect for effect in effects if isinstance(effect, (*RESISTANCES, Friction))]
         for effect in laws:
+            if sum(type(effect) is type(other) for other in laws) > 1:
+                raise ValueError(f"effects holds several {type(effect).__name__}; allowed is one")
             _needs(type(effect).__name__, world.scene.effect(type(effect)), f"physics.{type(effect).__name__}(...)")
             if isinstance(effect, Friction):
                 _check_axis(effect, world.scene.effect(Friction))
@@ -72,7 +76,8 @@ def set_parameters(world: World, mass, size, inertia_body, friction, restitution
     field = None
     if gravity is not None:
         _needs("gravity", plan.gravity, "physics.Gravity(...)")
-        field = np.broadcast_to(checks.finite(gravity, np.shape(gravity), "gravity"), (len(chosen), 3))
+        field = checks.batch(gravity, (len(chosen), 1, 3), "gravity")[:, 0]
+        field = checks.finite(field, field.shape, "gravity")
     _adopt(world, chosen, rows, world.state[rows], params, "set_parameters", keep_memory=size is None)
     if field is not None:
         world.gravity[chosen] = field
@@ -142,8 +147,8 @@ def _changed_slots(world: World, effects) -> list[FieldSlot]:
     for effect in effects:
         if not isinstance(effect, Field):
             raise ValueError(
-                f"effects holds {effect!r}; allowed are force fields, Friction, RollingFriction and SpinFriction (the "
-                "rest has arguments of its own, or is the same in all worlds)"
+                f"effects holds {shown(effect)}; allowed are force fields, Friction, RollingFriction and SpinFriction "
+                "(the rest has arguments of its own, or is the same in all worlds)"
             )
         effect.check(world.body_count)
         if world.plan.sleeping and not effect.is_steady:
@@ -167,14 +172,24 @@ def _chosen(world: World, worlds) -> np.ndarray:
     """Indices (k,) int64 of the worlds meant by what a user gives."""
     if worlds is None:
         return np.arange(world.worlds)
-    chosen = np.asarray(worlds)
+    try:
+        chosen = np.asarray(worlds)
+    except ValueError:  # ragged
+        raise _no_worlds(world, worlds) from None
     if chosen.dtype == bool and chosen.shape == (world.worlds,):
         chosen = np.flatnonzero(chosen)
     if chosen.ndim != 1 or (chosen.size and not np.issubdtype(chosen.dtype, np.integer)):
-        raise ValueError(f"worlds is {worlds!r}; allowed are indices or a mask of {world.worlds} worlds")
+        raise _no_worlds(world, worlds)
     if chosen.size and not (chosen.min() >= 0 and chosen.max() < world.worlds):
-        raise ValueError(f"worlds is {worlds!r}; allowed are indices from 0 to {world.worlds - 1}")
+        raise ValueError(f"worlds is {shown(worlds)}; allowed are indices from 0 to {world.worlds - 1}")
+    if not (chosen[1:] > chosen[:-1]).all() and len(np.unique(chosen)) < len(chosen):
+        raise ValueError(f"worlds is {shown(worlds)}; allowed is each world once")
     return chosen.astype(np.int64)
+
+
+def _no_worlds(world: World, worlds) -> ValueError:
+    allowed = f"a list of indices from 0 to {world.worlds - 1}, or a mask of {world.worlds} bools"
+    return ValueError(f"worlds is {shown(worlds)}; allowed is {allowed}")
 
 
 def _rows(world: World, chosen: np.ndarray) -> np.ndarray:

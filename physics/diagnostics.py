@@ -6,12 +6,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from physics import checks
 from physics.gaps import wall_gaps
 from physics.kernels import layout as at
 from physics.kernels.fields.probe import look_at_fields
 from physics.kernels.laws import STIFFNESS
 from physics.kernels.probe import spring_energies
 from physics.kernels.workspace import body_records
+from physics.summary import lines_repr
 from physics.world import World
 
 
@@ -25,6 +27,14 @@ class Diagnostics:
     angular_momentum: np.ndarray  # about the centre of mass [kg m²/s], world frame
     gap: np.ndarray  # smallest distance to a wall [m], negative when penetrating, inf without walls
 
+    def __repr__(self) -> str:
+        worlds, bodies = self.gap.shape
+        return lines_repr(
+            "Diagnostics", f"{worlds} worlds of {bodies} bodies",
+            f"energy {self.energy.min():.6g} to {self.energy.max():.6g} J",
+            f"gap {self.gap.min():.6g} to {self.gap.max():.6g} m",
+        )  # fmt: skip
+
     @property
     def energy(self) -> np.ndarray:
         """Kinetic and potential energy [J], (worlds, bodies)."""
@@ -37,6 +47,7 @@ def diagnose(world: World) -> Diagnostics:
     Kinetic energy is ½ P·v + ½ L·ω, potential energy -m g·x and what fields (`Field.energy`) add,
     and springs of contact.
     """
+    checks.instance(world, World, "world", "a physics.World")
     shape = (world.worlds, world.body_count)
     mass = 1.0 / world.params[:, at.INV_MASS].reshape(shape)
     angular = world.state[:, at.ANGMOM : at.ANGMOM + 3].reshape(*shape, 3)
@@ -69,6 +80,7 @@ def look_at(world: World) -> tuple[np.ndarray, np.ndarray]:
     energies : (worlds * bodies,) float64
         Potential energies [J].
     """
+    checks.instance(world, World, "world", "a physics.World")
     wrenches, energies = np.zeros((len(world.state), 6)), np.zeros(len(world.state))
     if world.plan.fields:
         arrays = world.state, world.params, world.shapes

@@ -13,8 +13,11 @@ import numpy as np
 
 from physics import checks
 from physics.field import Field
+from physics.keywords import known_keywords
+from physics.summary import fields_repr, shown
 
 
+@known_keywords
 @dataclass(frozen=True)
 class Gravity:
     """A uniform force field: every body accelerates by the same vector, and it exerts no torque.
@@ -32,6 +35,7 @@ class Gravity:
         object.__setattr__(self, "acceleration", tuple(value.tolist()))
 
 
+@known_keywords
 @dataclass(frozen=True)
 class Contact:
     """Bodies do not pass through walls, nor through each other.
@@ -62,8 +66,9 @@ class Contact:
     damping: float = 0.0
 
     def __post_init__(self):
-        if not isinstance(self.between_bodies, bool):
-            raise ValueError(f"Contact.between_bodies is {self.between_bodies!r}; allowed are True and False")
+        if not isinstance(self.between_bodies, (bool, np.bool_)):
+            raise ValueError(f"Contact.between_bodies is {shown(self.between_bodies)}; allowed are True and False")
+        object.__setattr__(self, "between_bodies", bool(self.between_bodies))
         if self.restitution is not None:
             value = float(checks.share(self.restitution, (), "Contact.restitution"))
             object.__setattr__(self, "restitution", value)
@@ -88,6 +93,7 @@ class Contact:
                 )
 
 
+@known_keywords
 @dataclass(frozen=True)
 class Friction:
     """Coulomb friction with the exact cone: |f_t| <= μ f_n, opposed to sliding.
@@ -115,9 +121,11 @@ class Friction:
             object.__setattr__(self, "coefficient", tuple(checks.positive(given, (2,), name).tolist()))
         if is_even != (self.axis is None):
             allowed = "None with one coefficient" if is_even else "a direction with two coefficients"
-            raise ValueError(f"Friction.axis is {self.axis!r}; allowed is {allowed}")
+            raise ValueError(f"Friction.axis is {shown(self.axis)}; allowed is {allowed}")
         if not is_even:
             object.__setattr__(self, "axis", _axes(self.axis))
+
+    __repr__ = fields_repr
 
     @property
     def along(self) -> float:
@@ -142,7 +150,7 @@ def _axes(axis) -> tuple:
         shape = ()
     value = checks.finite(axis, (*shape[:-1], 3) if len(shape) == 2 else (3,), "Friction.axis")
     if not value.any(axis=-1).all():
-        raise ValueError(f"Friction.axis is {axis!r}; allowed are directions, any vectors but zero")
+        raise ValueError(f"Friction.axis is {shown(axis)}; allowed are directions, any vectors but zero")
     return tuple(value.tolist()) if value.ndim == 1 else tuple(tuple(row) for row in value.tolist())
 
 
@@ -154,6 +162,7 @@ class _Resistance:
         object.__setattr__(self, "radius", float(checks.non_negative(self.radius, (), name)))
 
 
+@known_keywords
 @dataclass(frozen=True)
 class RollingFriction(_Resistance):
     """Rolling resistance of spheres and ellipsoids at walls: a torque of at most ``radius`` times the normal force.
@@ -169,6 +178,7 @@ class RollingFriction(_Resistance):
     radius: float = 0.001
 
 
+@known_keywords
 @dataclass(frozen=True)
 class SpinFriction(_Resistance):
     """Friction of spheres and ellipsoids spinning on a wall: a torque of at most ``radius`` times the normal force.
@@ -185,6 +195,7 @@ class SpinFriction(_Resistance):
     radius: float = 0.001
 
 
+@known_keywords
 @dataclass(frozen=True)
 class Actuator:
     """What lies between the wrench of `World.step` and the bodies: delay, then limits, then lag, in this order.
@@ -219,6 +230,7 @@ class Actuator:
         return self.lag > 0.0 or self.delay > 0.0
 
 
+@known_keywords
 @dataclass(frozen=True)
 class Sleeping:
     """Bodies at rest are left out of the step until something changes that acts on them.

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 from physics import checks, frontier_analysis
 from physics.frontier_contender import OURS, setting_name
+from physics.summary import counted, fields_repr, lines_repr
 
 
 @dataclass(frozen=True)
@@ -37,6 +38,8 @@ class FrontierPoint:
     costs: tuple[float, ...]
     is_lost: bool = False
     note: str = ""
+
+    __repr__ = fields_repr
 
     @property
     def cost(self) -> float:
@@ -167,6 +170,13 @@ class Frontier:
     def families(self) -> tuple[tuple[str, str], ...]:
         """Every (engine, setting) that was measured, in that order."""
         return tuple(dict.fromkeys((p.engine, p.setting) for p in self.points))
+
+    def __repr__(self) -> str:
+        return lines_repr(
+            "Frontier", f"{len(self.points)} points", f"settings: {counted(p.setting for p in self.points)}",
+            f"measure={self.measure!r}", f"duration={self.duration:.6g} s", f"is_complete={self.is_complete}",
+            f"{len(self.skipped)} skipped", f"truth: {self.truth}",
+        )  # fmt: skip
 
     # --- showing -----------------------------------------------------------------------------------------------
 

@@ -16,8 +16,10 @@ from physics.frontier_contender import OURS, Contender, EngineContender, TooSlow
 from physics.frontier_errors import deepest_penetration, energy_error
 from physics.frontier_result import Frontier, FrontierPoint
 from physics.frontier_truth import UNITS, ReferenceTruth, Truth
+from physics.keywords import known_keywords
 from physics.report import Status
 from physics.scene import Scene
+from physics.summary import shown
 from physics.trajectory import Trajectory
 
 PRESETS = ("fast", "balanced", "precise")
@@ -43,6 +45,7 @@ LARGEST_DENOMINATOR = 10**6
 Progress = Callable[[int, int, str], None]
 
 
+@known_keywords
 def ladder(
     accuracies: Sequence[str | Accuracy] = PRESETS, steps: Sequence[float] | None = None
 ) -> list[tuple[str | Accuracy, float]]:
@@ -50,8 +53,16 @@ def ladder(
 
     Without `steps`: at `STEPS`, and what is event-driven at `COARSE_STEPS`, too.
     """
+    if isinstance(accuracies, (str, Accuracy)) or not isinstance(accuracies, Iterable):
+        raise ValueError(f"accuracies is {shown(accuracies)}; allowed is a list of presets and physics.Accuracy(...)")
+    accuracies = list(accuracies)
+    for k, accuracy in enumerate(accuracies):
+        resolve(accuracy, f"accuracies[{k}]")
     if steps is not None:
-        return list(product(accuracies, steps))
+        given = checks.floats(list(steps) if isinstance(steps, Iterable) else steps, "steps", "are steps in s")
+        if given.ndim != 1:
+            raise ValueError(f"steps is {shown(steps)}; allowed is a list of steps in s")
+        return list(product(accuracies, checks.positive(given, given.shape, "steps").tolist()))
     return [
         (accuracy, dt)
         for accuracy in accuracies
@@ -59,6 +70,7 @@ def ladder(
     ]
 
 
+@known_keywords
 def frontier(
     scene: Scene,
     duration: float,
@@ -97,14 +109,15 @@ def frontier(
     KeyboardInterrupt
         Interrupted before there was a truth to compare with.
     """
-    if not isinstance(scene, Scene):
-        raise ValueError(f"scene is {scene!r}; allowed is a physics.Scene")
+    checks.instance(scene, Scene, "scene", "a physics.Scene")
+    if progress is not None and not callable(progress):
+        raise ValueError(f"progress is {shown(progress)}; allowed are a function (done, total, what) and None")
     duration = float(checks.positive(duration, (), "duration"))
     if settings is None:
         settings = ladder() if duration >= max(COARSE_STEPS) else ladder(steps=STEPS)
     contenders = [
-        EngineContender(scene, resolve(accuracy), float(checks.positive(dt, (), f"settings[{k}] step")))
-        for k, (accuracy, dt) in enumerate(_pairs(settings))
+        EngineContender(scene, resolve(accuracy, name), float(checks.positive(dt, (), f"{name} step")))
+        for name, (accuracy, dt) in _pairs(settings).items()
     ]
     return measure(contenders, scene, duration, truth, repeats, progress)
 
@@ -216,12 +229,15 @@ def common_times(duration: float, steps: Sequence[float]) -> tuple[float, float]
     return float(whole * sample), float(sample)
 
 
-def _pairs(settings: Iterable) -> list[tuple]:
+def _pairs(settings: Iterable) -> dict[str, tuple]:
+    """The settings by what messages call them."""
+    if isinstance(settings, (str, Accuracy)) or not isinstance(settings, Iterable):
+        raise ValueError(f"settings is {shown(settings)}; allowed is a list of (preset or physics.Accuracy, step in s)")
     pairs = list(settings)
     for k, pair in enumerate(pairs):
         if not isinstance(pair, (tuple, list)) or len(pair) != 2:
-            raise ValueError(f"settings[{k}] is {pair!r}; allowed is (preset or physics.Accuracy, step in s)")
-    return pairs
+            raise ValueError(f"settings[{k}] is {shown(pair)}; allowed is (preset or physics.Accuracy, step in s)")
+    return {f"settings[{k}]": pair for k, pair in enumerate(pairs)}
 
 
 def _as_truth(truth, scene, duration, sample_dt, contenders) -> Truth | ReferenceTruth:
@@ -233,7 +249,7 @@ def _as_truth(truth, scene, duration, sample_dt, contenders) -> Truth | Referenc
     if isinstance(truth, Truth):
         return truth
     if not callable(truth):
-        raise ValueError(f"truth is {truth!r}; allowed are a physics.Truth, a function of a Trajectory, or None")
+        raise ValueError(f"truth is {shown(truth)}; allowed are a physics.Truth, a function of a Trajectory, or None")
     return Truth(truth)
 
 

@@ -11,7 +11,9 @@ import numpy as np
 from physics import checks
 from physics.accuracy import Accuracy, resolve
 from physics.frontier_errors import angles_between, distances, event_error, root_mean_square
+from physics.keywords import known_keywords
 from physics.scene import Scene
+from physics.summary import shown
 from physics.trajectory import Trajectory, simulate
 
 # Units of what is measured of every scene; "error" is what a `Truth` returns, in its own unit.
@@ -33,6 +35,7 @@ LOOSER = 10.0
 SAME_TIME = 1e-6
 
 
+@known_keywords
 @dataclass(frozen=True)
 class Truth:
     """An outcome that the caller knows.
@@ -63,7 +66,7 @@ class Truth:
 
     def __post_init__(self):
         if not callable(self.error):
-            raise ValueError(f"Truth.error is {self.error!r}; allowed is a function of a Trajectory")
+            raise ValueError(f"Truth.error is {shown(self.error)}; allowed is a function of a Trajectory")
         checks.non_negative(self.own_error, (), "Truth.own_error")
         if self.scale is not None:
             checks.positive(self.scale, (), "Truth.scale")

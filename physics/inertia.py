@@ -23,6 +23,8 @@ from itertools import permutations
 import numpy as np
 from numpy.typing import ArrayLike
 
+from physics import checks
+
 # Relative to the largest moment: what sums of a thousand rounded terms may lose (1e3 · 4 · 2.2e-16).
 RELATIVE_TOLERANCE = 1e-12
 # Relative to the largest moment: what R I Rᵀ may leave off the diagonal of a tensor that is diagonal.
@@ -31,10 +33,7 @@ DIAGONAL_TOLERANCE = 8 * np.finfo(float).eps
 
 def _floats(value: ArrayLike, shape: tuple[int, ...], field: str) -> np.ndarray:
     """`value` as a finite float64 array of `shape` (-1: any length), or a ValueError."""
-    try:
-        array = np.array(value, dtype=float)
-    except (TypeError, ValueError):
-        raise ValueError(f"{field} is {value!r}; allowed are numbers in shape {shape}") from None
+    array = np.array(checks.floats(value, field, f"are numbers in shape {shape}"))
     fits = array.ndim == len(shape) and all(want in (-1, have) for want, have in zip(shape, array.shape))
     if not fits or not np.all(np.isfinite(array)):
         raise ValueError(f"{field} is {value!r}; allowed are finite numbers in shape {shape}")

@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
+from physics import checks
 from physics.effects import Contact, Friction, Gravity
 from physics.fields import Spring
 from physics.frontier_errors import rotation_matrices
@@ -40,6 +41,8 @@ def save_mjcf(scene: Scene, path: str | Path, drop: bool = False) -> None:
     ValueError
         Naming the effects that MJCF cannot express, unless `drop`.
     """
+    checks.instance(scene, Scene, "scene", "a physics.Scene")
+    checks.path(path)
     Path(path).write_text(to_mjcf(scene, drop), encoding="utf-8")
 
 
@@ -56,7 +59,12 @@ def load_mjcf(path: str | Path) -> Scene:
     OSError
         The file cannot be read.
     """
-    return from_mjcf(Path(path).read_text(encoding="utf-8"), str(path))
+    checks.path(path)
+    try:
+        text = Path(path).read_text(encoding="utf-8")
+    except UnicodeDecodeError as error:
+        raise ValueError(f"{path}: byte {error.start} is no UTF-8; allowed is a text file in MJCF") from None
+    return from_mjcf(text, str(path))
 
 
 def from_mjcf(text: str, source: str = "model") -> Scene:

@@ -86,15 +86,20 @@ def _refuse(element: ET.Element, *keys: str) -> None:
 def _wall(plane: ET.Element) -> HalfSpace:
     """A plane's free side is its +z."""
     _refuse(plane, "euler", "axisangle", "xyaxes", "fromto")
-    normal = rotation_matrices(_unit(_numbers(plane, "quat", "1 0 0 0", 4)))[:, 2]
+    normal = rotation_matrices(_unit(plane))[:, 2]
     if plane.get("zaxis") is not None:
         normal = _numbers(plane, "zaxis", None, 3)
     wall = HalfSpace(normal)
     return HalfSpace(wall.normal, float(np.array(wall.normal) @ _numbers(plane, "pos", "0 0 0", 3)))
 
 
-def _unit(q: np.ndarray) -> np.ndarray:
-    return checks.unit(q, np.linalg.norm(q))
+def _unit(element: ET.Element) -> np.ndarray:
+    """The quaternion of an element, normalised: as in MuJoCo it may have any norm but zero."""
+    q = _numbers(element, "quat", "1 0 0 0", 4)
+    norm = np.linalg.norm(q)
+    if not 0 < norm < np.inf:
+        raise ValueError(f"quat of {_name(element)} is {element.get('quat')!r} of norm {norm:g}; allowed is any but 0")
+    return checks.unit(q, norm)
 
 
 def _body(element: ET.Element, velocity: np.ndarray) -> Body:
@@ -111,7 +116,7 @@ def _body(element: ET.Element, velocity: np.ndarray) -> Body:
         raise ValueError(f"{_name(element)} has {len(geoms)} geoms; allowed is one")
     if _type(geoms[0]) not in SHAPES:
         raise ValueError(f"{_name(geoms[0])} is a {_type(geoms[0])}; allowed are {', '.join(SHAPES)}")
-    quat = _unit(_numbers(element, "quat", "1 0 0 0", 4))
+    quat = _unit(element)
     R = rotation_matrices(quat)
     mass, inertia, centre = _mass_properties(element, geoms[0])
     arm = _numbers(geoms[0], "pos", "0 0 0", 3) - centre
@@ -152,7 +157,7 @@ def _mass_properties(element: ET.Element, geom: ET.Element) -> tuple[float, np.n
         mass = float(geom.get("mass", volume * float(geom.get("density", DENSITY))))
         return mass, None, _numbers(geom, "pos", "0 0 0", 3)
     _refuse(inertial, "euler", "axisangle", "xyaxes", "zaxis")
-    R = rotation_matrices(_unit(_numbers(inertial, "quat", "1 0 0 0", 4)))
+    R = rotation_matrices(_unit(inertial))
     if inertial.get("fullinertia") is not None:
         a, b, c, d, e, f = _numbers(inertial, "fullinertia", None, 6)
         tensor = np.array([[a, d, e], [d, b, f], [e, f, c]])

@@ -101,13 +101,15 @@ def _change_series(params):
 
 def spread(value, shape: tuple[int, ...], field: str) -> tuple[np.ndarray, tuple[int, ...], str]:
     """(array, shape, field) for `checks`: `value` with a missing worlds or bodies axis added."""
+    allowed = f"shape {shape}, or without the axis of bodies, or of worlds and bodies"
+    array = checks.floats(value, field, f"are numbers in {allowed}")
+    given = array.shape
+    if array.ndim == len(shape) - 1 and given[:1] == shape[:1]:
+        array = array[:, None]
     try:
-        array = np.asarray(value, dtype=np.float64)
-        if array.ndim == len(shape) - 1 and array.shape[:1] == shape[:1]:
-            array = array[:, None]
         return np.broadcast_to(array, shape), shape, field
-    except (TypeError, ValueError):
-        raise ValueError(f"{field} is {value!r}; allowed is shape {shape}, or without the bodies axis") from None
+    except ValueError:
+        raise ValueError(f"{field} has shape {given}; allowed is {allowed}") from None
 
 
 def change_inertia(params, bodies, plan, mass, size, inertia_body, shape) -> None:

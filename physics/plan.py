@@ -6,7 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from physics.accuracy import EVENTS, SCHEMES, Accuracy
+from physics import checks
+from physics.accuracy import EVENTS, SCHEMES, Accuracy, resolve
 from physics.effects import Contact, Friction, Gravity, RollingFriction, Sleeping, SpinFriction
 from physics.field import Field, FieldSlot, field_slots
 from physics.inertia import principal_axes
@@ -15,11 +16,15 @@ from physics.kernels.laws import ANISOTROPY, DAMPING, LAWS, ROLLING, SPIN, STIFF
 from physics.kernels.layout import BLOCK, ELLIPSOID, HULL, SPHERE, VERTEX_COUNT
 from physics.plan_rows import Row, make_rows
 from physics.scene import Scene
+from physics.summary import lines_repr
 
 SHAPE_CODES = {"block": BLOCK, "sphere": SPHERE, "ellipsoid": ELLIPSOID, "hull": HULL}
 
 # Moments that differ by less than this share are equal to rounding: the gyroscopic torque would be noise.
 ISOTROPY_TOLERANCE = 1e-14
+
+# Effects that a `repr` names.
+MOST_ROWS = 20
 
 
 @dataclass(frozen=True)
@@ -54,6 +59,10 @@ class Plan:
     fields: tuple[FieldSlot, ...]
     laws: tuple[str, ...]
     rows: tuple[Row, ...]
+
+    def __repr__(self) -> str:
+        on = [row.effect for row in self.rows if row.is_on]
+        return lines_repr("Plan", *(f"{effect}: on" for effect in on[:MOST_ROWS]), f"{len(self.rows) - len(on)} off")
 
     @property
     def smooth(self) -> bool | None:
@@ -175,8 +184,10 @@ def _laws(scene: Scene, contact: Contact, friction: Friction | None) -> tuple[st
     return tuple(law for law in LAWS if is_on[law])
 
 
-def make_plan(scene: Scene, accuracy: Accuracy) -> Plan:
-    """Decide what a scene needs at an accuracy."""
+def make_plan(scene: Scene, accuracy: str | Accuracy) -> Plan:
+    """Decide what a scene needs at an accuracy, or the preset of that name."""
+    checks.instance(scene, Scene, "scene", "a physics.Scene")
+    accuracy = resolve(accuracy)
     seen, scheme = _see(scene), SCHEMES[accuracy.scheme]
     is_linked = any(slot.term.is_linked for slot in seen.fields)
     hulls = seen.touching and _has(scene, "hull")

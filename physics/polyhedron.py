@@ -21,6 +21,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from physics.summary import fields_repr
+
 if TYPE_CHECKING:
     from scipy.spatial import ConvexHull
 
@@ -66,6 +68,8 @@ class Polyhedron:
     edges: np.ndarray
     volume: float
     second_moment: np.ndarray
+
+    __repr__ = fields_repr
 
     @property
     def radius(self) -> float:

@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
 
 from physics import checks
+from physics.keywords import known_keywords
 from physics.recording import Recording, Start, origin
 from physics.report import Status, gravest
+from physics.summary import shown
 from physics.world import Snapshot, World
 
 
@@ -25,6 +27,7 @@ class _Chapter:
     states: list[np.ndarray] = field(default_factory=list)
 
 
+@known_keywords
 class Recorder:
     """Keeps the last steps of a `World` and writes those of a world with a fault to a file.
 
@@ -71,6 +74,7 @@ class Recorder:
         on: Sequence[Status] = (Status.FAULT,),
         limit: int = 10,
     ):
+        checks.instance(world, World, "world", "a physics.World")
         if world.actuation is not None and world.actuation.actuator.remembers:
             raise ValueError(
                 f"world has {world.actuation.actuator!r}, whose memory a recording does not hold; allowed are "
@@ -79,10 +83,12 @@ class Recorder:
         self.world = world
         self.keep = checks.count(keep, "keep")
         self.limit = checks.count(limit, "limit")
+        if folder is not None and not isinstance(folder, (str, os.PathLike)):
+            raise ValueError(f"folder is {shown(folder)}; allowed are a path and None")
         self.folder = None if folder is None else Path(folder)
-        if not all(isinstance(status, Status) for status in on):
-            raise ValueError(f"on is {on!r}; allowed are values of physics.Status")
-        self.on = tuple(on)
+        self.on = tuple(on) if isinstance(on, Iterable) else (on,)
+        if not all(isinstance(status, Status) for status in self.on):
+            raise ValueError(f"on is {shown(on)}; allowed are values of physics.Status")
         self.files: list[Path] = []
         self._chapters = [_Chapter()]
         self._changed = np.ones(world.worlds, dtype=np.bool_)
@@ -141,8 +147,7 @@ class Recorder:
             There is no such world.
         """
         worlds, bodies = self.world.worlds, self.world.body_count
-        if not 0 <= world < worlds:
-            raise ValueError(f"world is {world!r}; allowed are indices from 0 to {worlds - 1}")
+        checks.index(world, worlds, "world")
         starts, loads, states = [], [], []
         for chapter in self._chapters:
             first, count = len(loads), len(chapter.states)  # an interrupted step has a load, but no state

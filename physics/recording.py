@@ -10,11 +10,12 @@ import json
 import platform
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
-from importlib import metadata
 from pathlib import Path
 
+import numba
 import numpy as np
 
+from physics import checks
 from physics.accuracy import Accuracy
 from physics.diagnostics import diagnose
 from physics.field import Field
@@ -24,6 +25,8 @@ from physics.report import StepReport
 from physics.scene import Scene
 from physics.scene_file import from_toml, to_toml
 from physics.stepper import Stepper
+from physics.summary import lines_repr
+from physics.version import version
 from physics.world import KEPT, Snapshot, World
 
 # Number of the format; a reader refuses what is newer than itself.
@@ -79,6 +82,12 @@ class Recording:
     states: np.ndarray
     reason: str
     origin: dict
+
+    def __repr__(self) -> str:
+        return lines_repr(
+            "Recording", f"{len(self)} calls of step", f"{len(self.scene.bodies)} bodies",
+            f"{len(self.starts)} starts", f"reason={self.reason!r}",
+        )  # fmt: skip
 
     def __len__(self) -> int:
         return len(self.states)
@@ -143,6 +152,7 @@ class Recording:
         OSError
             The file cannot be read.
         """
+        checks.path(path)
         try:
             with np.load(path, allow_pickle=False) as file:
                 content = dict(file)
@@ -181,6 +191,11 @@ class Replay:
     reports: tuple[StepReport, ...]
     energies: np.ndarray
 
+    def __repr__(self) -> str:
+        first = self.first_difference
+        told = "identical" if first is None else f"the first difference is after call {first}"
+        return lines_repr("Replay", f"{len(self.states)} calls of step", told)
+
     @property
     def first_difference(self) -> int | None:
         """The first step after which a state differs in a bit from what was recorded; None: none does."""
@@ -212,14 +227,10 @@ class Replay:
 
 def origin() -> dict[str, str]:
     """What a recording is made with here: where any of it differs, a replay may differ in the last bits."""
-    try:
-        version = metadata.version("rigid-env")
-    except metadata.PackageNotFoundError:
-        version = "from its sources"
     return {
-        "version": version,
+        "version": version(),
         "kernels": cache_dir().name,  # digest of their sources
-        "numba": metadata.version("numba"),
+        "numba": numba.__version__,
         "numpy": np.__version__,
         "python": platform.python_version(),
         "machine": platform.platform(),

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,13 +10,19 @@ import numpy as np
 from physics import checks
 from physics.effects import EFFECTS, RESISTANCES, Contact, Friction, Sleeping
 from physics.field import Field
-from physics.shapes import Body
+from physics.keywords import known_keywords
+from physics.shapes import Block, Body, Ellipsoid, Hull, Sphere
+from physics.summary import SCREEN, counted, lines_repr, shown
 
 # An axis of friction and the normal of a wall count as parallel below this sine of the angle between them [rad]: of the
 # sixteen digits of a direction ten are left for its part along the wall.
 LEAST_SINE = 1e-6
 
+# A `repr` shows every body, wall and effect of a scene with at most so many of them, if they fit on a screen.
+MOST_SHOWN = 12
 
+
+@known_keywords
 @dataclass(frozen=True)
 class HalfSpace:
     """The region {x : normal·x >= offset} that bodies may be in.
@@ -36,11 +42,12 @@ class HalfSpace:
         normal = checks.finite(self.normal, (3,), "HalfSpace.normal")
         length = float(np.linalg.norm(normal))
         if not length > 0 or not np.isfinite(length):
-            raise ValueError(f"HalfSpace.normal is {self.normal!r}; allowed is any vector but zero")
+            raise ValueError(f"HalfSpace.normal is {shown(self.normal)}; allowed is any vector but zero")
         object.__setattr__(self, "normal", tuple(checks.unit(normal, length).tolist()))
         object.__setattr__(self, "offset", checks.number(self.offset, "HalfSpace.offset"))
 
 
+@known_keywords
 def three_walls(half_width: float = 10.0) -> list[HalfSpace]:
     """The three-wall box: the floor y = 0 between walls at x = ±half_width [m], open to front, back and top."""
     half_width = float(checks.positive(half_width, (), "half_width"))
@@ -52,6 +59,7 @@ def corner() -> list[HalfSpace]:
     return [HalfSpace((0, 1, 0), 0.0), HalfSpace((1, 0, 0), 0.0), HalfSpace((0, 0, 1), 0.0)]
 
 
+@known_keywords
 @dataclass(frozen=True)
 class Scene:
     """Bodies, walls and effects.
@@ -78,12 +86,7 @@ class Scene:
 
     def __post_init__(self):
         for name, allowed in (("bodies", Body), ("walls", HalfSpace), ("effects", EFFECTS)):
-            items = getattr(self, name)
-            items = (items,) if isinstance(items, allowed) else tuple(items)
-            for k, item in enumerate(items):
-                if not isinstance(item, allowed):
-                    raise ValueError(f"Scene.{name}[{k}] is {item!r}; allowed are instances of {_names(allowed)}")
-            object.__setattr__(self, name, items)
+            object.__setattr__(self, name, _items(getattr(self, name), name, allowed))
         if not self.bodies:
             raise ValueError("Scene.bodies is empty; allowed is at least one body")
         kinds = [type(effect) for effect in self.effects]
@@ -101,6 +104,17 @@ class Scene:
             )
         self._check_axes()
         self._check_fields()
+
+    def __repr__(self) -> str:
+        if len(self.bodies) + len(self.walls) + len(self.effects) <= MOST_SHOWN:
+            text = f"Scene(bodies={self.bodies!r}, walls={self.walls!r}, effects={self.effects!r})"
+            if len(text) <= SCREEN:
+                return text
+        kinds = {name: [type(item).__name__ for item in getattr(self, name)] for name in ("bodies", "effects")}
+        return lines_repr(
+            "Scene", f"{len(self.bodies)} bodies: {counted(kinds['bodies'])}", f"{len(self.walls)} walls",
+            f"effects: {counted(kinds['effects'])}",
+        )  # fmt: skip
 
     def _check_axes(self) -> None:
         friction = self.effect(Friction)
@@ -136,6 +150,21 @@ class Scene:
         return next((effect for effect in self.effects if isinstance(effect, kind)), None)
 
 
+def _items(given, name: str, allowed) -> tuple:
+    """The bodies, walls or effects of a scene, as a tuple."""
+    if isinstance(given, allowed):
+        return (given,)
+    if isinstance(given, (str, bytes, dict)) or not isinstance(given, Iterable):
+        raise ValueError(f"Scene.{name} is {shown(given)}; allowed is a list of {_names(allowed)}")
+    items = tuple(given)
+    for k, item in enumerate(items):
+        if isinstance(item, allowed):
+            continue
+        hint = f": write {item.__name__}(...)" if isinstance(item, type) and issubclass(item, allowed) else ""
+        raise ValueError(f"Scene.{name}[{k}] is {shown(item)}; allowed are instances of {_names(allowed)}{hint}")
+    return items
+
+
 def _names(allowed) -> str:
-    kinds = allowed if isinstance(allowed, tuple) else (allowed,)
+    kinds = {Body: (Block, Sphere, Ellipsoid, Hull)}.get(allowed, allowed if isinstance(allowed, tuple) else (allowed,))
     return ", ".join(kind.__name__ for kind in kinds)

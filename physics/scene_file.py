@@ -8,17 +8,21 @@ from __future__ import annotations
 
 import re
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import MISSING, fields
 from pathlib import Path
 
 import tomlkit
 
+from physics import checks
 from physics.effects import Actuator, Contact, Friction, Gravity, RollingFriction, Sleeping, SpinFriction
 from physics.field import Field
 from physics.fields import FIELDS
+from physics.keywords import known_keywords, nearest_first
 from physics.scene import HalfSpace, Scene
+from physics.scene_places import Places
 from physics.shapes import Block, Ellipsoid, Hull, Sphere
+from physics.summary import shown
 
 if sys.version_info >= (3, 11):
     import tomllib
@@ -43,6 +47,8 @@ def save_scene(scene: Scene, path: str | Path) -> None:
     scene : Scene
     path : str or Path
     """
+    checks.instance(scene, Scene, "scene", "a physics.Scene")
+    checks.path(path)
     Path(path).write_text(to_toml(scene), encoding="utf-8")
 
 
@@ -79,6 +85,7 @@ def _plain(value):
     return [_plain(part) for part in value] if isinstance(value, tuple) else value
 
 
+@known_keywords
 def load_scene(path: str | Path, kinds: Sequence[type[Field]] = ()) -> Scene:
     """Read a scene from a TOML file.
 
@@ -95,87 +102,88 @@ def load_scene(path: str | Path, kinds: Sequence[type[Field]] = ()) -> Scene:
     OSError
         The file cannot be read.
     """
-    path = Path(path)
-    return from_toml(path.read_text(encoding="utf-8"), str(path), kinds)
+    checks.path(path)
+    try:
+        text = Path(path).read_text(encoding="utf-8")
+    except UnicodeDecodeError as error:
+        raise ValueError(f"{path}: byte {error.start} is no UTF-8; allowed is a text file in TOML") from None
+    return from_toml(text, str(path), kinds)
 
 
 def from_toml(text: str, source: str = "scene", kinds: Sequence[type[Field]] = ()) -> Scene:
     """The scene that a text describes; `source` is what messages call it."""
+    kinds = _own_kinds(kinds)
     try:
         content = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
-        raise ValueError(f"{source}: {error}") from None
-    reader = _Reader(text, source)
+        raise ValueError(_syntax_error(text, source, str(error))) from None
+    places = Places(text, source)
     for key in content:
         if key not in ("format", *LISTS):
-            raise reader.error(None, 0, key, f"{key} is not known; allowed are format, {', '.join(LISTS)}")
-    if content.get("format", FORMAT) not in range(1, FORMAT + 1):
-        raise reader.error(None, 0, "format", f"format is {content['format']!r}; allowed is {FORMAT}")
+            allowed = ", ".join(nearest_first(key, ("format", *LISTS)))
+            raise places.error(None, 0, key, f"{key} is not known; allowed are {allowed}")
+    number = content.get("format", FORMAT)
+    if type(number) is not int or number not in range(1, FORMAT + 1):
+        raise places.error(None, 0, "format", f"format is {shown(number)}; allowed is {FORMAT}")
     known = {"bodies": BODIES, "walls": (HalfSpace,), "effects": (*EFFECTS, *kinds)}
-    lists = {name: reader.build_all(name, content.get(name, []), known[name]) for name in LISTS}
+    lists = {name: _build_all(places, name, content.get(name, []), known[name]) for name in LISTS}
     try:
         return Scene(**lists)
     except ValueError as error:
-        raise ValueError(f"{source}: {error}") from None
+        raise places.error_of_scene(lists, str(error)) from None
 
 
-class _Reader:
-    """Builds the objects of a file, and knows on which line of it what stands."""
+def _own_kinds(kinds) -> tuple:
+    """The classes of a user's fields that a file may name."""
+    found = tuple(kinds) if isinstance(kinds, Iterable) else (kinds,)
+    for kind in found:
+        if not isinstance(kind, type) or not issubclass(kind, Field):
+            raise ValueError(f"kinds holds {shown(kind)}; allowed are subclasses of physics.Field")
+    return found
 
-    def __init__(self, text: str, source: str):
-        self._lines = text.splitlines()
-        self._source = source
 
-    def error(self, name: str | None, index: int, key: str | None, message: str) -> ValueError:
-        """An error about a key of the table [[name]] number `index`, or of the file's head."""
-        start = self._table_line(name, index)
-        line = self._key_line(start, key) or start or 1
-        place = "" if name is None else f"{name}[{index}]: "
-        return ValueError(f"{self._source}, line {line}: {place}{message}")
+def _syntax_error(text: str, source: str, message: str) -> str:
+    """The reader's message, its place in front and the line itself behind."""
+    told = re.fullmatch(r"(.*) \(at (?:line (\d+), column (\d+)|end of document)\)", message, re.DOTALL)
+    if told is None:
+        return f"{source}: {message}"
+    lines = text.splitlines()
+    line = int(told.group(2) or max(len(lines), 1))
+    place = f"line {line}" + (f", column {told.group(3)}" if told.group(3) else ", at its end")
+    stands = shown(lines[line - 1].strip()) if line <= len(lines) else "''"
+    return f"{source}, {place}: {told.group(1)}, in {stands}; allowed is TOML, as `physics.save_scene` writes it"
 
-    def _table_line(self, name: str | None, index: int) -> int:
-        """Line of a table's header; 0 for the head of the file, and for a table written inline."""
-        if name is None:
-            return 0
-        header = re.compile(rf"\s*\[\[\s*\"?{name}\"?\s*\]\]")
-        found = [k for k, line in enumerate(self._lines, 1) if header.match(line)]
-        return found[index] if index < len(found) else 0
 
-    def _key_line(self, start: int, key: str | None) -> int | None:
-        """Line of a key of the table whose header is on line `start`."""
-        if key is None:
-            return None
-        wanted = re.compile(rf"\s*(\[\[?\s*)?\"?{re.escape(key)}\"?\s*[=\]]")
-        for k, line in enumerate(self._lines[start:], start + 1):
-            if wanted.match(line):
-                return k
-            if start and re.match(r"\s*\[\[", line):
-                return None
-        return None
+def _build_all(places: Places, name: str, tables, known: tuple[type, ...]) -> list:
+    """The objects of a list of tables."""
+    if not isinstance(tables, list) or not all(isinstance(table, dict) for table in tables):
+        raise places.error(None, 0, name, f"{name} is {shown(tables)}; allowed are tables [[{name}]]")
+    return [_build(places, name, k, dict(table), known) for k, table in enumerate(tables)]
 
-    def build_all(self, name: str, tables, known: tuple[type, ...]) -> list:
-        """The objects of a list of tables."""
-        if not isinstance(tables, list) or not all(isinstance(table, dict) for table in tables):
-            raise self.error(None, 0, name, f"{name} is {tables!r}; allowed are tables [[{name}]]")
-        return [self._build(name, k, dict(table), known) for k, table in enumerate(tables)]
 
-    def _build(self, name: str, index: int, table: dict, known: tuple[type, ...]):
-        kinds = {kind.__name__: kind for kind in known}
-        chosen = table.pop("kind", None) if len(known) > 1 else next(iter(kinds))
-        if chosen not in kinds:
-            raise self.error(name, index, "kind", f"kind is {chosen!r}; allowed are {', '.join(kinds)}")
-        kind = kinds[chosen]
-        parameters = {field.name: field for field in fields(kind)}
-        for key in table:
-            if key not in parameters:
-                message = f"{key} is not known; allowed are {', '.join(parameters)}"
-                raise self.error(name, index, key, message)
-        for key, field in parameters.items():
-            if field.default is MISSING and key not in table:
-                raise self.error(name, index, None, f"{key} is missing; a {kind.__name__} needs it")
-        try:
-            return kind(**table)
-        except ValueError as error:
-            told = re.match(r"(?:\w+\.)?(\w+) ", str(error))
-            key = told.group(1) if told and told.group(1) in parameters else None
-            raise self.error(name, index, key, str(error)) from None
+def _build(places: Places, name: str, index: int, table: dict, known: tuple[type, ...]):
+    kinds = {kind.__name__: kind for kind in known}
+    if len(known) == 1:
+        chosen = next(iter(kinds))
+    elif "kind" in table:
+        chosen = table.pop("kind")
+    else:
+        raise places.error(name, index, None, f"kind is missing; allowed are {', '.join(kinds)}")
+    if not isinstance(chosen, str) or chosen not in kinds:
+        allowed = ", ".join(nearest_first(chosen, kinds) if isinstance(chosen, str) else kinds)
+        raise places.error(name, index, "kind", f"kind is {shown(chosen)}; allowed are {allowed}")
+    kind = kinds[chosen]
+    parameters = {field.name: field for field in fields(kind) if field.init}
+    for key in table:
+        if key not in parameters:
+            allowed = ", ".join(nearest_first(key, parameters))
+            raise places.error(name, index, key, f"{key} is not known; allowed are {allowed}")
+    for key, field in parameters.items():
+        if field.default is MISSING and field.default_factory is MISSING and key not in table:
+            raise places.error(name, index, None, f"{key} is missing; a {kind.__name__} needs it")
+    try:
+        return kind(**table)
+    except (ValueError, TypeError) as error:
+        told = re.match(r"(?:\w+\.)?(\w+)(?:\[[^]]*\])? ", str(error))
+        key = told.group(1) if told and told.group(1) in parameters else None
+        raise places.error(name, index, key, str(error)) from None

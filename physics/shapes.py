@@ -2,13 +2,20 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 from typing import ClassVar
 
 import numpy as np
 
 from physics import checks, inertia
+from physics.keywords import known_keywords
 from physics.polyhedron import Polyhedron, convex_hull
+from physics.summary import fields_repr, shown
+
+# Smallest mass and moment of inertia [kg, kg m²], and inverse of the largest: products of two of them and of their
+# inverses are normal floats.
+LEAST = 1e-150
 
 
 def _tuple(array: np.ndarray) -> tuple:
@@ -23,9 +30,16 @@ class Body:
     ----------
     pos, quat, linvel, angvel : array_like
         Start: centre of mass [m], unit quaternion (w, x, y, z) from body to world, velocity [m/s] and angular
-        velocity [rad/s], world frame.
+        velocity [rad/s], world frame. A quaternion of norm 1 within 1e-4, as four decimals have it, is normalised.
     inertia_body : (3,) or (3, 3) array_like, optional
         Moments, or tensor, about the centre of mass in the body frame [kg m²]. None: uniform density.
+    density : float, optional
+        Instead of `mass` [kg/m³]: the body has this times its `volume` as its mass, and None here.
+
+    Raises
+    ------
+    ValueError
+        A parameter out of range, or not exactly one of mass and density.
     """
 
     pos: tuple = (0.0, 0.0, 0.0)
@@ -33,16 +47,44 @@ class Body:
     linvel: tuple = (0.0, 0.0, 0.0)
     angvel: tuple = (0.0, 0.0, 0.0)
     inertia_body: tuple | None = None
+    density: float | None = field(default=None, repr=False, compare=False)
     center: ClassVar[tuple] = (0.0, 0.0, 0.0)  # of the shape, from the centre of mass; a block may have another
 
     def __post_init__(self):
-        self._set("mass", float(checks.positive(self.mass, (), "mass")))
+        if type(self) is Body:
+            raise TypeError("Body has no shape; allowed are Block, Sphere, Ellipsoid and Hull")
+        self._set_mass()
         for name in ("pos", "linvel", "angvel"):
             self._set(name, _tuple(checks.finite(getattr(self, name), (3,), name)))
         self._set("quat", _tuple(checks.unit_quaternion(self.quat, (4,), "quat")))
         if self.inertia_body is not None:
             tensor = inertia.check_inertia(self.inertia_body, "inertia_body")
             self._set("inertia_body", tuple(map(_tuple, tensor)))
+        self._check_range()
+
+    def _set_mass(self) -> None:
+        """The mass, from the density if that is given."""
+        if (self.mass is None) == (self.density is None):
+            raise ValueError(
+                f"mass is {shown(self.mass)} and density is {shown(self.density)}; allowed is exactly one of the two: "
+                "mass [kg], or density [kg/m³]"
+            )
+        mass = self.mass
+        if mass is None:
+            mass = float(checks.positive(self.density, (), "density")) * self.volume
+            self._set("density", None)
+        self._set("mass", float(checks.positive(mass, (), "mass")))
+
+    def _check_range(self) -> None:
+        """Refuse a mass or inertia whose inverse no float holds: what is divided by it would not be finite."""
+        with np.errstate(over="ignore", invalid="ignore"):
+            moments = np.diagonal(self.inertia)
+        numbers = np.array([self.mass, *moments])
+        if not ((numbers >= LEAST) & (numbers <= 1 / LEAST)).all():
+            raise ValueError(
+                f"mass is {self.mass!r} kg, and the moments of inertia are {shown(moments)} kg m²; allowed is "
+                f"what lies between {LEAST:g} and {1 / LEAST:g}: choose other units"
+            )
 
     def _set(self, name, value):
         object.__setattr__(self, name, value)
@@ -55,6 +97,7 @@ class Body:
         return np.diag(self.uniform_moments(self.dimensions, self.mass))
 
 
+@known_keywords
 @dataclass(frozen=True)
 class Block(Body):
     """A rectangular block; its body axes are its edges.
@@ -64,7 +107,7 @@ class Block(Body):
     size : (3,) array_like
         Full edge lengths along body x, y, z [m].
     mass : float
-        [kg].
+        [kg]; or `density` instead.
     center : (3,) array_like
         Position of the geometric centre, where the diagonals meet, relative to the centre of mass, along the body
         axes [m]: a block heavy on its +x side has a negative x here. `pos` is the centre of mass, so that the block
@@ -73,7 +116,7 @@ class Block(Body):
     """
 
     size: tuple
-    mass: float
+    mass: float | None = None
     center: tuple = field(default=(0.0, 0.0, 0.0), kw_only=True)
     kind = "block"
 
@@ -85,6 +128,11 @@ class Block(Body):
                 f"center is {self.center!r} without inertia_body; give the inertia about the centre of mass"
             )
         super().__post_init__()
+
+    @property
+    def volume(self) -> float:
+        """[m³]."""
+        return math.prod(self.size)
 
     @property
     def dimensions(self) -> np.ndarray:
@@ -103,6 +151,7 @@ class Block(Body):
         return np.sqrt(a + b + c)
 
 
+@known_keywords
 @dataclass(frozen=True)
 class Sphere(Body):
     """A solid sphere.
@@ -112,16 +161,21 @@ class Sphere(Body):
     radius : float
         [m].
     mass : float
-        [kg].
+        [kg]; or `density` instead.
     """
 
     radius: float
-    mass: float
+    mass: float | None = None
     kind = "sphere"
 
     def __post_init__(self):
         self._set("radius", float(checks.positive(self.radius, (), "radius")))
         super().__post_init__()
+
+    @property
+    def volume(self) -> float:
+        """[m³]."""
+        return 4 / 3 * math.pi * math.prod((self.radius,) * 3)
 
     @property
     def dimensions(self) -> np.ndarray:
@@ -139,6 +193,7 @@ class Sphere(Body):
         return dimensions[..., 0]
 
 
+@known_keywords
 @dataclass(frozen=True)
 class Ellipsoid(Body):
     """A solid ellipsoid.
@@ -148,16 +203,21 @@ class Ellipsoid(Body):
     semi_axes : (3,) array_like
         Along body x, y, z [m].
     mass : float
-        [kg].
+        [kg]; or `density` instead.
     """
 
     semi_axes: tuple
-    mass: float
+    mass: float | None = None
     kind = "ellipsoid"
 
     def __post_init__(self):
         self._set("semi_axes", _tuple(checks.positive(self.semi_axes, (3,), "semi_axes")))
         super().__post_init__()
+
+    @property
+    def volume(self) -> float:
+        """[m³]."""
+        return 4 / 3 * math.pi * math.prod(self.semi_axes)
 
     @property
     def dimensions(self) -> np.ndarray:
@@ -175,6 +235,7 @@ class Ellipsoid(Body):
         return np.max(dimensions, axis=-1)
 
 
+@known_keywords
 @dataclass(frozen=True)
 class Hull(Body):
     """The convex hull of points, of uniform density: a wedge, a prism, a rock.
@@ -187,7 +248,7 @@ class Hull(Body):
     points : (n, 3) array_like
         Along the body axes, from any origin [m]. Those inside the hull do not matter.
     mass : float
-        [kg].
+        [kg]; or `density` instead.
 
     Raises
     ------
@@ -197,13 +258,17 @@ class Hull(Body):
     """
 
     points: tuple
-    mass: float
+    mass: float | None = None
     kind = "hull"
 
     def __post_init__(self):
         self._set("points", tuple(map(_tuple, checks.rows(self.points, 3, "points"))))
+        if self.points and not np.abs(self.points).max() < 1 / LEAST:
+            raise ValueError(f"points is {shown(self.points)}; allowed are coordinates below {1 / LEAST:g}")
         convex_hull(self.points)
         super().__post_init__()
+
+    __repr__ = fields_repr
 
     @property
     def polyhedron(self) -> Polyhedron:
@@ -219,6 +284,11 @@ class Hull(Body):
     def inertia(self) -> np.ndarray:
         """(3, 3) inertia tensor about the centre of mass in the body frame [kg m²]."""
         return np.array(self.inertia_body) if self.inertia_body is not None else self.polyhedron.inertia(self.mass)
+
+    @property
+    def volume(self) -> float:
+        """[m³]."""
+        return self.polyhedron.volume
 
     @property
     def dimensions(self) -> np.ndarray:

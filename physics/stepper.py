@@ -12,7 +12,9 @@ from physics.kernels.events.hybrid import step_events
 from physics.kernels.linked import step_linked
 from physics.kernels.many.step import step_many
 from physics.kernels.step import step_worlds
+from physics.keywords import known_keywords
 from physics.machine_code import Work, compiled
+from physics.summary import shown
 
 # Which arguments of all step kernels the number of steps is, and the length of a substep.
 STEPS, SUBSTEP = 2, 4
@@ -22,6 +24,7 @@ if TYPE_CHECKING:
     from physics.world import World
 
 
+@known_keywords
 class Stepper:
     """The same step of a world again and again, with all that can be checked or looked up done before.
 
@@ -52,6 +55,8 @@ class Stepper:
         dt: float | None = None,
         then: Callable[[np.ndarray], Work] | None = None,
     ):
+        if not hasattr(world, "no_wrench"):  # the class itself knows this module
+            raise ValueError(f"world is {shown(world)}; allowed is a physics.World")
         self.world = world
         self.steps = checks.count(steps, "steps")
         self.dt = world.dt if dt is None else float(checks.positive(dt, (), "dt"))

@@ -11,17 +11,26 @@ from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from physics import checks
 from physics.accuracy import Accuracy
 from physics.diagnostics import diagnose
 from physics.kernels.events.log import KINDS
-from physics.report import StepReport
+from physics.keywords import known_keywords
+from physics.report import StepReport, add_report
 from physics.scene import Scene
+from physics.summary import counted, lines_repr
 from physics.world import World
 
 # Samples further apart than this share of sample_dt from the last one are a sample of their own at the end.
 LAST_SAMPLE = 1e-9
+
+# Time between samples where neither it nor the step is given [s].
+SAMPLE_DT = 0.01
+
+# Samples at most: of one body they take more than ten gigabytes.
+MOST_SAMPLES = 100_000_000
 
 COLUMNS = (
     "x", "y", "z", "qw", "qx", "qy", "qz", "vx", "vy", "vz", "wx", "wy", "wz",
@@ -83,6 +92,13 @@ class Trajectory:
     events: tuple[Event, ...]
     reports: tuple[StepReport, ...]
 
+    def __repr__(self) -> str:
+        samples, bodies = self.pos.shape[:2]
+        return lines_repr(
+            "Trajectory", f"{samples} samples of {bodies} bodies", f"t = {self.t[0]:.6g} to {self.t[-1]:.6g} s",
+            f"events: {counted(event.kind for event in self.events)}", f"ok={self.ok}",
+        )  # fmt: skip
+
     @property
     def ok(self) -> bool:
         """Whether every interval's report was."""
@@ -111,12 +127,14 @@ class Trajectory:
                     writer.writerow((repr(float(t)), b, *map(repr, row.tolist()), repr(float(self.energy[k, b]))))
 
 
+@known_keywords
 def simulate(
     scene: Scene,
     duration: float,
     accuracy: str | Accuracy = "balanced",
-    sample_dt: float = 0.01,
-    wrench: Callable[[float, World], np.ndarray] | None = None,
+    sample_dt: float | None = None,
+    wrench: ArrayLike | Callable[[float, World], ArrayLike] | None = None,
+    dt: float | None = None,
 ) -> Trajectory:
     """Advance one world of a scene and sample it.
 
@@ -126,11 +144,15 @@ def simulate(
     duration : float
         [s].
     accuracy : str or Accuracy
-        See `World`; the step is `sample_dt`.
-    sample_dt : float
-        Samples are taken at 0, sample_dt, 2 sample_dt, ... up to and with `duration` [s].
-    wrench : callable, optional
-        (t, world) -> (bodies, 6), force [N] and torque [N m] held until the next sample.
+        See `World`.
+    sample_dt : float, optional
+        Samples are taken at 0, sample_dt, 2 sample_dt, ... up to and with `duration` [s]. None: `dt`, or 0.01.
+    wrench : (bodies, 6) array_like or callable, optional
+        Force [N] and torque about the centre of mass [N m], world frame, all the time; of a scene of one body also
+        (6,). Or (t, world) -> such a wrench, held until the next sample.
+    dt : float, optional
+        The engine's step, of which `sample_dt` is a whole multiple [s]. None: `sample_dt`. A last interval that is
+        shorter than `sample_dt` is cut into equal steps of at most this.
 
     Returns
     -------
@@ -139,11 +161,12 @@ def simulate(
     Raises
     ------
     ValueError
-        A parameter out of range.
+        A parameter out of range, a `sample_dt` that is no multiple of `dt`, or a wrench of another shape.
     """
-    duration = float(checks.non_negative(duration, (), "duration"))
-    sample_dt = float(checks.positive(sample_dt, (), "sample_dt"))
-    world = World(scene, dt=sample_dt, accuracy=accuracy)
+    duration, sample_dt, dt = _times(duration, sample_dt, dt)
+    steps = round(sample_dt / dt)
+    world = World(scene, dt=dt, accuracy=accuracy)
+    load = _loads(wrench, world)
     whole = math.floor(duration / sample_dt * (1 + LAST_SAMPLE))
     times = [k * sample_dt for k in range(whole + 1)]
     if duration - times[-1] > LAST_SAMPLE * sample_dt:
@@ -154,13 +177,57 @@ def simulate(
     watch = _logged if world.plan.events else _Touching()
     for start, end in pairwise(times):
         is_short = end == times[-1] and len(times) > whole + 1
-        load = None if wrench is None else np.asarray(wrench(start, world), dtype=float)[None]
-        dt = end - start if is_short else None
-        events += watch(world, start, end, partial(world.step, load, dt=dt))
+        count = max(math.ceil((end - start) / dt * (1 - LAST_SAMPLE)), 1) if is_short else steps
+        shorter = (end - start) / count if is_short else None
+        found, report = _interval(world, watch, start, end, load(start), count, shorter)
+        events += found
         samples.append(_sample(world))
-        reports.append(world.report)
+        reports.append(report)
     columns = [np.array(column) for column in zip(*samples)]
     return Trajectory(np.array(times), *columns, events=tuple(events), reports=tuple(reports))
+
+
+def _times(duration, sample_dt, dt) -> tuple[float, float, float]:
+    """Duration, sample interval and step [s], checked; defaults in place of None."""
+    duration = float(checks.non_negative(duration, (), "duration"))
+    if dt is not None:
+        dt = float(checks.positive(dt, (), "dt"))
+    if sample_dt is None:
+        sample_dt = SAMPLE_DT if dt is None else dt
+    sample_dt = float(checks.positive(sample_dt, (), "sample_dt"))
+    dt = sample_dt if dt is None else dt
+    ratio = sample_dt / dt
+    if ratio > checks.MOST or round(ratio) < 1 or abs(ratio - round(ratio)) > LAST_SAMPLE * ratio:
+        raise ValueError(f"sample_dt is {sample_dt!r} with dt={dt!r}; allowed are whole multiples of dt")
+    if duration / sample_dt > MOST_SAMPLES:
+        raise ValueError(
+            f"duration is {duration!r} with sample_dt={sample_dt!r}; allowed are at most {MOST_SAMPLES} samples"
+        )
+    return duration, sample_dt, dt
+
+
+def _loads(wrench, world: World) -> Callable[[float], np.ndarray | None]:
+    """What gives the wrench (1, bodies, 6), or None, from a time [s]."""
+    shape = (1, world.body_count, 6)
+    if wrench is None:
+        return lambda t: None
+    if callable(wrench):
+        return lambda t: checks.batch(wrench(t, world), shape, "wrench(t, world)")
+    held = checks.finite(checks.batch(wrench, shape, "wrench"), shape, "wrench")
+    return lambda t: held
+
+
+def _interval(world: World, watch, start: float, end: float, load, steps: int, dt: float | None):
+    """Take the steps between two samples: events, and the report of all of them."""
+    if steps == 1 or world.actuation is None or not world.actuation.actuator.remembers:
+        events = watch(world, start, end, partial(world.step, load, steps, dt))
+        return events, world.report
+    events, total = [], np.zeros_like(world.report_table)  # a call of several steps logs the last one's events only
+    edges = np.linspace(start, end, steps + 1).tolist()
+    for begin, stop in pairwise(edges):
+        events += watch(world, begin, stop, partial(world.step, load, 1, dt))
+        add_report(total, world.report_table)
+    return events, StepReport(total)
 
 
 def _sample(world: World) -> tuple[np.ndarray, ...]:

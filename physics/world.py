@@ -20,11 +20,13 @@ from physics.kernels.events.log import EVENT_SIZE
 from physics.kernels.fields.terms import declare
 from physics.kernels.sleep import GROUP, SLEEP_SIZE, Sleep
 from physics.kernels.workspace import body_records
+from physics.keywords import known_keywords
 from physics.machine_code import Work
 from physics.plan import SHAPE_CODES, make_plan
 from physics.report import StepReport
 from physics.scene import Scene
 from physics.stepper import kernel_calls, retime
+from physics.summary import lines_repr
 from physics.threads import Team
 
 if TYPE_CHECKING:
@@ -42,7 +44,12 @@ class Snapshot:
     time: float
     actuation: tuple | None = None
 
+    def __repr__(self) -> str:
+        shapes = (f"{name} {array.shape}" for name, array in zip(KEPT, self.arrays))
+        return lines_repr("Snapshot", f"time={self.time:.6g} s", *shapes)
 
+
+@known_keywords
 class World:
     """Many worlds of one scene, stepped together and independent of each other.
 
@@ -88,8 +95,7 @@ class World:
         accuracy: str | Accuracy = "balanced",
         threads: int = 1,
     ):
-        if not isinstance(scene, Scene):
-            raise ValueError(f"scene is {scene!r}; allowed is a physics.Scene")
+        checks.instance(scene, Scene, "scene", "a physics.Scene")
         self.scene = scene
         self.worlds = checks.count(worlds, "worlds")
         self.dt = float(checks.positive(dt, (), "dt"))
@@ -99,6 +105,7 @@ class World:
         self.body_count = len(scene.bodies)
         self.time = 0.0
         self.recorder: Recorder | None = None
+        allocation.check_room(self.worlds, self.body_count, self.plan)
         self._allocate()
         allocation.fill(self)
         changes.check_depth(self, self.state, self.params, np.arange(self.worlds), "scene")
@@ -158,6 +165,8 @@ class World:
         ----------
         wrench : (worlds, bodies, 6) array_like, optional
             Force [N] and torque about the centre of mass [N m], world frame, held all the time. None: no wrench.
+            (bodies, 6): the same for all worlds. Of a scene of one body also (6,), the same for all worlds, and
+            (worlds, 6). A scene of several bodies takes two axes as (bodies, 6), whatever the number of worlds.
         steps : int
             Steps to take at once.
         dt : float, optional
@@ -220,6 +229,7 @@ class World:
 
     # --- changing ----------------------------------------------------------------------------------------------
 
+    @known_keywords
     def set_state(
         self,
         pos: ArrayLike | None = None,
@@ -233,17 +243,22 @@ class World:
         Parameters
         ----------
         pos, quat, linvel, angvel : (k, bodies, 3|4|3|3) array_like, optional
-            World frame.
+            World frame; k is the number of worlds meant. (bodies, 3|4|3|3): the same for all of them. Of a scene of
+            one body the axis of bodies may be left out: (3,) for all worlds alike, (k, 3) a row for each. A scene of
+            several bodies takes two axes as (bodies, 3), also where k is the same number. A quaternion of norm 1
+            within 1e-4 is normalised.
         worlds : (k,) int array_like, optional
             Indices of the worlds meant; None: all. Their contact memory is cleared, and that of their actuators.
 
         Raises
         ------
         ValueError
-            Wrong shape, not finite, not a unit quaternion, or deep inside a wall. Nothing has changed then.
+            A wrong shape, a number that is not finite, no unit quaternion, a world named twice or not there, or a body
+            deep inside a wall. Nothing has changed then.
         """
         changes.set_state(self, pos, quat, linvel, angvel, worlds)
 
+    @known_keywords
     def set_parameters(
         self,
         mass: ArrayLike | None = None,
@@ -260,7 +275,8 @@ class World:
         Parameters
         ----------
         mass, friction, restitution : (), (k,) or (k, bodies) array_like, optional
-            [kg], coefficients. Of a `Friction` with two coefficients the first; the second changes with it.
+            [kg], coefficients. One axis is that of worlds wherever its length is k; (bodies,) of another length is for
+            all worlds alike. Of a `Friction` with two coefficients the first; the second changes with it.
         size : (3,), (k, 3) or (k, bodies, 3) array_like, optional
             Full edges of a block, twice the semi-axes of an ellipsoid, three equal diameters of a sphere [m]; a hull
             cannot change its size: twice its `dimensions`.
@@ -296,10 +312,20 @@ class World:
         return Snapshot(tuple(array.copy() for array in self.kept()), self.time, actuation)
 
     def restore(self, snapshot: Snapshot) -> None:
-        """Go back to a snapshot of this world, or of one of the same scene and batch size."""
+        """Go back to a snapshot of this world, or of one of the same scene and batch size.
+
+        Raises
+        ------
+        ValueError
+            It is no `Snapshot`, or one of other sizes. Nothing has changed then.
+        """
+        checks.instance(snapshot, Snapshot, "snapshot", "a physics.Snapshot, as `World.snapshot` gives it")
         kept = self.kept()
-        if [array.shape for array in kept] != [array.shape for array in snapshot.arrays]:
-            raise ValueError("snapshot is of another scene or batch size; allowed is one of this scene and batch size")
+        if [array.shape for array in kept] != [np.shape(array) for array in snapshot.arrays]:
+            raise ValueError(
+                f"snapshot is {snapshot!r}, of another scene or batch size; allowed is one of this scene of "
+                f"{self.worlds} worlds"
+            )
         for array, value in zip(kept, snapshot.arrays):
             array[...] = value
         self.time = snapshot.time
@@ -348,8 +374,7 @@ class World:
         return Sleep(self.sleep, effect.slops * self.accuracy.slop, effect.time or 0.0)
 
     def _check_index(self, world: int) -> None:
-        if not 0 <= world < self.worlds:
-            raise ValueError(f"world is {world!r}; allowed are indices from 0 to {self.worlds - 1}")
+        checks.index(world, self.worlds, "world")
 
     def __getstate__(self):
         kept = dict(vars(self))

@@ -5,12 +5,15 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
+from physics import checks
 from physics.frontier_errors import rotation_matrices
+from physics.keywords import known_keywords
 from physics.world import World
 
 FRAMES = ("world", "body")
 
 
+@known_keywords
 def wrench_at(
     world: World, force: ArrayLike, point: ArrayLike = (0.0, 0.0, 0.0), frame: str = "world", point_frame: str = "body"
 ) -> np.ndarray:
@@ -35,11 +38,11 @@ def wrench_at(
     ValueError
         A wrong shape, a number that is not finite, or a frame of another name.
     """
+    checks.instance(world, World, "world", "a physics.World")
     shape = (world.worlds, world.body_count, 3)
     force, point = _spread(force, shape, "force"), _spread(point, shape, "point")
     for name, value in (("frame", frame), ("point_frame", point_frame)):
-        if value not in FRAMES:
-            raise ValueError(f"{name} is {value!r}; allowed are {', '.join(FRAMES)}")
+        checks.one_of(value, FRAMES, name)
     R = rotation_matrices(world.quat)
     if frame == "body":
         force = np.einsum("wbij,wbj->wbi", R, force)
@@ -49,10 +52,8 @@ def wrench_at(
 
 def _spread(value, shape: tuple[int, int, int], field: str) -> np.ndarray:
     """`value` for every world and body."""
-    try:
-        array = np.broadcast_to(np.asarray(value, dtype=np.float64), shape)
-    except (TypeError, ValueError):
-        raise ValueError(f"{field} is {value!r}; allowed are numbers in shape (3,), {shape[1:]} or {shape}") from None
-    if not np.isfinite(array).all():
-        raise ValueError(f"{field} is {value!r}; allowed are finite numbers")
-    return array
+    allowed = f"shape (3,), {shape[1:]} or {shape}"
+    array = checks.floats(value, field, f"are numbers in {allowed}")
+    if array.shape not in ((3,), shape[1:], shape):
+        raise ValueError(f"{field} has shape {array.shape}; allowed is {allowed}")
+    return np.broadcast_to(checks.finite(array, array.shape, field), shape)

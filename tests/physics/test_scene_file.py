@@ -63,10 +63,34 @@ MISTAKES = [
     (BALL + "[[walls]]\noffset = 1\n", r"line 5: walls\[0\]: normal is missing"),
     (BALL + "[[effects]]\nkind = 'Drag'\n\nlinear = -1\n", r"line 8: effects\[0\]: Drag.linear is -1"),
     (BALL + "[[effects]]\nkind = 'Friction'\n", "Friction without Contact"),
-    (BALL + "[[effect]]\n", "line 5: effect is not known; allowed are format, bodies, walls, effects"),
+    (BALL + "[[effect]]\n", "line 5: effect is not known; allowed are effects, format, bodies, walls"),
     ("format = 2\n" + BALL, "line 1: format is 2; allowed is 1"),
-    ("mass = \n", "Invalid value.*line 1"),
-    ("", "bodies is empty"),
+    ("mass = \n", "line 1, column 8: Invalid value, in 'mass ='; allowed is TOML"),
+    ("\n[[bodies]\n", r"line 2, column 9: .*, in '\[\[bodies\]'; allowed is TOML"),
+    ("", "Scene.bodies is empty"),
+    (BALL + "color = 1\nmas = 3\n", r"line 5: bodies\[0\]: color is not known; allowed are "),
+    (BALL + "denstiy = 1\n", r"line 5: bodies\[0\]: denstiy is not known; allowed are density, "),
+    (BALL + "[[effects]]\nkind = 'Gravty'\n", r"line 6: effects\[0\]: kind is 'Gravty'; allowed are Gravity, "),
+    (BALL + "[[effects]]\nkind = 3\n", r"line 6: effects\[0\]: kind is 3; allowed are Gravity, "),
+    (BALL + "[[effects]]\nradius = 3\n", r"line 5: effects\[0\]: kind is missing; allowed are Gravity, "),
+    (BALL + "[[walls]]\nnormal = [0, 1, 0]\nofset = 1\n", r"line 7: walls\[0\]: ofset .*; allowed are offset, normal"),
+    (BALL + "[[walls]]\nnormal = 'up'\n", r"line 6: walls\[0\]: HalfSpace.normal is 'up'; allowed are numbers"),
+    (BALL + "quat = [1, 1, 0, 0]\n", r"line 5: bodies\[0\]: quat is .* of norm 1.41421; allowed are unit quat"),
+    (BALL + "pos = [0, true, 1]\n", r"line 5: bodies\[0\]: pos is \[0, True, 1\]; allowed are numbers"),
+    ("format = true\n" + BALL, "line 1: format is True; allowed is 1"),
+    ("[bodies]\nkind = 'Sphere'\n", r"line 1: bodies is \{'kind': 'Sphere'\}; allowed are tables \[\[bodies\]\]"),
+    (
+        '[[bodies]]\nkind = "Sphere"\nradius = 1\n',
+        r"line 1: bodies\[0\]: mass is None and density is None; allowed is",
+    ),
+    (BALL + "density = 2\n", r"line 4: bodies\[0\]: mass is 2 and density is 2; allowed is exactly one"),
+    (BALL + "[[effects]]\nkind = 'Gravity'\n" * 2, "line 7: Scene.effects holds 2 Gravity; allowed is one"),
+    (BALL + "[[effects]]\nkind = 'Friction'\n", "line 5: Scene.effects holds Friction without Contact; add"),
+    (
+        BALL + "[[effects]]\nkind = 'Gravity'\n[[effects]]\nkind = 'Push'\nbody = 4\n",
+        "line 7: Push.body is 4; allow",
+    ),
+    ("bodies = [{kind = 'Sphere', radius = 1, mass = 0}]", r"line 1: bodies\[0\]: mass is 0.0; allowed are"),
 ]
 
 
@@ -74,6 +98,24 @@ MISTAKES = [
 def test_a_mistake_is_told_with_its_line(text, message):
     with pytest.raises(ValueError, match=f"(?s)^here.*{message}"):
         from_toml(text, "here")
+
+
+def test_a_density_may_stand_in_the_file(tmp_path):
+    scene = from_toml(BALL.replace("mass = 2", "density = 3"))
+    assert scene.bodies[0].mass == 3 * scene.bodies[0].volume
+    assert "density" not in to_toml(scene)
+    assert from_toml(to_toml(scene)) == scene
+
+
+def test_a_file_that_cannot_be_read_is_named(tmp_path):
+    path = tmp_path / "scene.toml"
+    with pytest.raises(FileNotFoundError, match=r"scene\.toml"):
+        physics.load_scene(path)
+    path.write_bytes(b"# caf\xe9\n")
+    with pytest.raises(ValueError, match=r"scene.toml: byte 5 is no UTF-8; allowed is a text file"):
+        physics.load_scene(path)
+    with pytest.raises(ValueError, match=r"kinds holds <class 'int'>; allowed are subclasses of physics.Field"):
+        from_toml(BALL, kinds=[int])
 
 
 @physics.field_function

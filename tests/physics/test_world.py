@@ -200,7 +200,7 @@ def test_a_parameter_of_an_effect_that_is_not_declared_is_refused():
 
 
 BAD_WRENCHES = [
-    (np.zeros(6), r"wrench has shape \(6,\)"),
+    (np.zeros(7), r"wrench has shape \(7,\); allowed is shape \(6,\) or \(1, 6\) or \(1, 1, 6\)"),
     (np.zeros((1, 2, 6)), r"wrench has shape \(1, 2, 6\)"),
     (np.full((1, 1, 6), np.nan), "wrench is .*nan"),
     (np.full((1, 1, 6), np.inf), "wrench is .*inf"),

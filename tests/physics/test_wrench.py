@@ -35,7 +35,7 @@ def test_points_of_the_world_and_bodies_that_nothing_acts_on():
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (((1, 2),), r"force is \(1, 2\); allowed are numbers in shape \(3,\), \(1, 3\) or \(1, 1, 3\)"),
+        (((1, 2),), r"force has shape \(2,\); allowed is shape \(3,\), \(1, 3\) or \(1, 1, 3\)"),
         (((1, 2, 3), (0, 0, np.nan)), "point is .*allowed are finite"),
         (((1, 2, 3), (0, 0, 0), "air"), "frame is 'air'; allowed are world, body"),
         (((1, 2, 3), (0, 0, 0), "body", "air"), "point_frame is 'air'; allowed are world, body"),

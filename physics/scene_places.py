@@ -1,0 +1,70 @@
+"""Places in the text of a scene file: on which line a table or a key stands.
+
+The reader of TOML gives values without places. They are found again in the text: a table [[bodies]] by its header, a
+key below it, before the next header. Of tables written inline, ``bodies = [{...}]``, the line of the list is told.
+"""
+
+from __future__ import annotations
+
+import re
+
+
+class Places:
+    """Lines of one file's text.
+
+    Parameters
+    ----------
+    text : str
+    source : str
+        What messages call the file.
+    """
+
+    def __init__(self, text: str, source: str):
+        self._lines = text.splitlines()
+        self._source = source
+
+    def error(self, name: str | None, index: int, key: str | None, message: str) -> ValueError:
+        """An error about a key of the table [[name]] number `index`, or of the file's head."""
+        start = self._table_line(name, index)
+        if name is not None and not start:
+            line = self._key_line(0, name) or 1
+        else:
+            line = self._key_line(start, key) or start or 1
+        place = "" if name is None else f"{name}[{index}]: "
+        return ValueError(f"{self._source}, line {line}: {place}{message}")
+
+    def error_of_scene(self, lists: dict[str, list], message: str) -> ValueError:
+        """An error of the whole scene, at the table that its message names, by number or, of an effect, by class."""
+        told = re.search(r"\b(bodies|walls|effects)\[(\d+)\]", message)
+        if told:
+            return self._error_at(told.group(1), int(told.group(2)), message)
+        names = [type(effect).__name__ for effect in lists["effects"]]
+        found = [(place.start(), name) for name in names if (place := re.search(rf"\b{name}\b", message))]
+        if found:
+            last = len(names) - 1 - names[::-1].index(min(found)[1])
+            return self._error_at("effects", last, message)
+        return ValueError(f"{self._source}: {message}")
+
+    def _error_at(self, name: str, index: int, message: str) -> ValueError:
+        line = self._table_line(name, index) or self._key_line(0, name) or 1
+        return ValueError(f"{self._source}, line {line}: {message}")
+
+    def _table_line(self, name: str | None, index: int) -> int:
+        """Line of a table's header; 0 for the head of the file, and for a table written inline."""
+        if name is None:
+            return 0
+        header = re.compile(rf"\s*\[\[\s*[\"']?{name}[\"']?\s*\]\]")
+        found = [k for k, line in enumerate(self._lines, 1) if header.match(line)]
+        return found[index] if index < len(found) else 0
+
+    def _key_line(self, start: int, key: str | None) -> int | None:
+        """Line of a key of the table whose header is on line `start`."""
+        if key is None:
+            return None
+        wanted = re.compile(rf"\s*(\[\[?\s*)?[\"']?{re.escape(key)}[\"']?\s*[.=\]]")
+        for k, line in enumerate(self._lines[start:], start + 1):
+            if wanted.match(line):
+                return k
+            if start and re.match(r"\s*\[\[", line):
+                return None
+        return None
