@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import sys
+import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -15,6 +17,15 @@ from physics.shapes import Body
 # An axis of friction and the normal of a wall count as parallel below this sine of the angle between them [rad]: of the
 # sixteen digits of a direction ten are left for its part along the wall.
 LEAST_SINE = 1e-6
+
+NO_CONTACT = (
+    "Scene.walls are given, but no effect lets bodies touch them: bodies pass through; add physics.Contact() to "
+    "Scene.effects, or leave the walls out"
+)
+
+
+class SceneWarning(UserWarning):
+    """A scene that is valid, but in which something that it declares does nothing."""
 
 
 @dataclass(frozen=True)
@@ -66,6 +77,11 @@ class Scene:
         `SpinFriction` and `Sleeping` need `Contact`, `Contact.tangential` needs `Friction`, `Wind` needs a field for it
         to act through.
 
+    Warns
+    -----
+    SceneWarning
+        Walls without `Contact`: bodies pass through them.
+
     Raises
     ------
     ValueError
@@ -101,6 +117,8 @@ class Scene:
             )
         self._check_axes()
         self._check_fields()
+        if self.walls and contact is None:
+            warnings.warn(NO_CONTACT, SceneWarning, stacklevel=_frames_of_package())
 
     def _check_axes(self) -> None:
         friction = self.effect(Friction)
@@ -134,6 +152,14 @@ class Scene:
     def effect(self, kind: type):
         """The scene's effect of this class, or None."""
         return next((effect for effect in self.effects if isinstance(effect, kind)), None)
+
+
+def _frames_of_package() -> int:
+    """The `stacklevel` with which whoever calls this warns of the line outside this package that led here."""
+    level, frame = 1, sys._getframe(1)
+    while frame.f_back is not None and frame.f_globals.get("__name__", "").split(".")[0] in ("physics", "dataclasses"):
+        level, frame = level + 1, frame.f_back
+    return level
 
 
 def _names(allowed) -> str:
