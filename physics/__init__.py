@@ -22,7 +22,7 @@ from physics.plan import make_plan
 from physics.recorder import Recorder
 from physics.recording import Recording, Replay
 from physics.report import Solver, Status, StepReport
-from physics.scene import HalfSpace, Scene, corner, three_walls
+from physics.scene import HalfSpace, Scene, SceneWarning, corner, three_walls
 from physics.scene_file import load_scene, save_scene
 from physics.shapes import Block, Body, Ellipsoid, Hull, Sphere
 from physics.stepper import Stepper
@@ -60,6 +60,7 @@ __all__ = [
     "Replay",
     "RollingFriction",
     "Scene",
+    "SceneWarning",
     "Sleeping",
     "Snapshot",
     "Solver",

@@ -11,7 +11,7 @@ import numpy as np
 from physics import checks, parameters
 from physics.effects import RESISTANCES, Friction
 from physics.field import Field, FieldSlot, write_columns
-from physics.gaps import wall_gaps
+from physics.gaps import geometric_centres, wall_gaps
 from physics.kernels import layout as at
 from physics.kernels.laws import STIFFNESS
 from physics.kernels.probe import angular_momenta
@@ -25,6 +25,12 @@ START_DEPTH = 1e-2
 
 # And so deep into one that gives, where depth is what carries it: its centre of mass stays outside.
 SOFT_DEPTH = 1.0
+
+# Centres of two bodies are in the same place within this share of the smaller bounding radius: rounding.
+SAME_PLACE = 1e-12
+
+# A direction along which bodies are compared.
+SKEW = np.array([0.5257311121191336, 0.3090169943749474, 0.7925309171246312])
 
 
 def set_state(world: World, pos, quat, linvel, angvel, worlds) -> None:
@@ -83,6 +89,51 @@ def set_parameters(world: World, mass, size, inertia_body, friction, restitution
         world.gravity[chosen] = field
 
 
+def check_place(world: World, state: np.ndarray, params: np.ndarray, chosen: np.ndarray, what: str) -> None:
+    """Refuse what no step could start from: numbers that are too large, bodies deep in a wall or at the same place.
+
+    Parameters and errors are those of `check_depth`.
+    """
+    if not (np.abs(state) <= at.LARGEST).all():
+        columns = {"pos": at.POS, "linvel": at.LINVEL, "angvel": at.ANGVEL, "angular momentum": at.ANGMOM}
+        for name, first in columns.items():
+            bad = np.flatnonzero(~(np.abs(state[:, first : first + 3]) <= at.LARGEST).all(axis=1))
+            if len(bad):
+                k = int(bad[0])
+                raise ValueError(
+                    f"{what}: {name} {state[k, first : first + 3].tolist()} of body {k % world.body_count} in world "
+                    f"{int(chosen[k // world.body_count])} is too large; allowed are numbers up to {at.LARGEST:g}"
+                )
+    check_depth(world, state, params, chosen, what)
+    if world.plan.meeting:
+        _check_centres(world, state, params, chosen, what)
+
+
+def _check_centres(world: World, state: np.ndarray, params: np.ndarray, chosen: np.ndarray, what: str) -> None:
+    """Refuse two bodies that touch each other with their centres in the same place: no way apart is nearer than others.
+
+    Bodies in the same place are neighbours in the order along any direction, and in that along one that no scene is
+    built along hardly any others are.
+    """
+    shape = (len(chosen), world.body_count)
+    centres = geometric_centres(world, state, params).reshape(*shape, 3)
+    radii = params[:, at.RADIUS].reshape(shape)
+    order = np.argsort(centres @ SKEW, axis=1, kind="stable")
+    centres = np.take_along_axis(centres, order[:, :, None], axis=1)
+    radii = np.take_along_axis(radii, order, axis=1)
+    apart = np.abs(np.diff(centres, axis=1)).max(axis=2)
+    bad = np.argwhere(~(apart > SAME_PLACE * np.minimum(radii[:, 1:], radii[:, :-1])))
+    if len(bad):
+        k, i = bad[0]
+        a, b = sorted(order[k, i : i + 2].tolist())
+        first = k * world.body_count
+        places = [state[first + body, at.POS : at.POS + 3].tolist() for body in (a, b)]
+        raise ValueError(
+            f"{what}: bodies {a} and {b} in world {int(chosen[k])} have their centres in the same place, pos "
+            f"{places[0]} and {places[1]}; allowed are different places (what overlaps otherwise is lifted apart)"
+        )
+
+
 def check_depth(world: World, state: np.ndarray, params: np.ndarray, chosen: np.ndarray, what: str) -> None:
     """Refuse bodies that are deep inside a wall.
 
@@ -117,8 +168,8 @@ def check_depth(world: World, state: np.ndarray, params: np.ndarray, chosen: np.
 
 def _adopt(world: World, chosen, rows, state, params, what, keep_memory=False) -> None:
     """Check new rows of state and parameters, then write them."""
-    check_depth(world, state, params, chosen, what)
     angular_momenta(np.arange(len(rows)), state, params)
+    check_place(world, state, params, chosen, what)
     world.state[rows] = state
     world.params[rows] = params
     if world.plan.sleeping:

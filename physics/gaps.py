@@ -14,6 +14,15 @@ if TYPE_CHECKING:
     from physics.world import World
 
 
+def geometric_centres(world: World, state: np.ndarray, params: np.ndarray) -> np.ndarray:
+    """Centres of the bodies' shapes, (k * bodies, 3) float64, world frame [m]; arguments as of `wall_gaps`."""
+    centres = state[:, at.POS : at.POS + 3]
+    if world.plan.tilted:
+        R = rotation_matrices(state[:, at.QUAT : at.QUAT + 4])
+        centres = centres + np.einsum("kij,kj->ki", R, params[:, at.CENTER : at.CENTER + 3])
+    return centres
+
+
 def wall_gaps(world: World, state: np.ndarray, params: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Smallest gap of every body over all walls.
 

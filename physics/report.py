@@ -28,37 +28,49 @@ class Status(IntEnum):
     UNCONVERGED = 2
     FAULT = 3
     LEFT_OUT = 4
+    OVERLAP = 5
 
     @property
     def message(self) -> str:
         """What happened, and what to do."""
         return _MESSAGES[self]
 
+    @staticmethod
+    def severity(status: int) -> int:
+        """Place of a status in the order of gravity that `StepReport.status` follows; 0: OK."""
+        return _GRAVITY.index(status)
+
 
 _MESSAGES = {
     Status.OK: "every contact problem met its tolerance",
     Status.UNRESOLVED: (
-        "more impacts in one substep than Accuracy.impacts: the rest of the substep was plastic; raise impacts "
-        "or substeps if the bounces matter"
+        "more impacts in one substep than Accuracy.impacts, or more turns than can be followed: the rest of the "
+        "substep was plastic or coarse; raise impacts or substeps if it matters"
     ),
     Status.UNCONVERGED: (
         "a contact problem kept a residual above Accuracy.tolerance; raise iterations, use "
         "solver='sweeps+pivoting', or loosen the tolerance"
     ),
     Status.FAULT: (
-        "a body's new state was not finite and its old state was kept; look at the wrench and parameters of this "
-        "world, and shorten the step"
+        "a body's loads or its new state were not finite, or beyond 1e100, and its old state was kept; look at the "
+        "wrench and parameters of this world, and shorten the step"
     ),
     Status.LEFT_OUT: (
         "more bodies were near each other than there is room for, and contacts were left out; spread the bodies, or "
         "give the scene fewer"
     ),
+    Status.OVERLAP: (
+        "bodies were put where they overlap deeply, and are lifted apart without speed; put them further apart if that "
+        "was not meant"
+    ),
 }
 
 
+_GRAVITY = (Status.OK, Status.UNRESOLVED, Status.UNCONVERGED, Status.OVERLAP, Status.LEFT_OUT, Status.FAULT)
+
 # What the kernel below compares with: Numba takes plain integers from a module.
 _UNRESOLVED, _UNCONVERGED, _FAULT = int(Status.UNRESOLVED), int(Status.UNCONVERGED), int(Status.FAULT)
-_LEFT_OUT = int(Status.LEFT_OUT)
+_LEFT_OUT, _OVERLAP = int(Status.LEFT_OUT), int(Status.OVERLAP)
 
 
 @kernel
@@ -70,6 +82,8 @@ def gravest(table, status):
             status[world] = _FAULT
         elif table[world, at.LEFT_OUT] > 0.0:
             status[world] = _LEFT_OUT
+        elif table[world, at.OVERLAP] > 0.0:
+            status[world] = _OVERLAP
         elif table[world, at.UNCONVERGED] > 0.0:
             status[world] = _UNCONVERGED
         elif table[world, at.UNRESOLVED] > 0.0:
@@ -81,7 +95,7 @@ def add_report(total, table):
     """Add a report `table` (worlds, REPORT_SIZE) to that of steps before: counts add up, of the rest the largest."""
     for world in range(table.shape[0]):
         for c in range(at.REPORT_SIZE):
-            if c == at.PENETRATION or c == at.RESIDUAL or c == at.SOLVER:
+            if c in (at.PENETRATION, at.RESIDUAL, at.SOLVER, at.OVERLAP, at.FAULTY):
                 total[world, c] = max(total[world, c], table[world, c])
             else:
                 total[world, c] += table[world, c]
@@ -100,8 +114,14 @@ class StepReport:
         Sweeps and Newton steps; contact problems (with an error asked for, those of refused parts, too); of these, by
         the pivoting fallback (with the scheme ``events`` small leaps of first order, and parts of the shortest length
         with more than the error asked for); above the tolerance;
-        impacts that cut a substep; substeps with more impacts than allowed; bodies whose new state was not finite;
-        contacts and near pairs of bodies for which there was no room.
+        impacts that cut a substep; substeps with more impacts than allowed; bodies whose loads or new state were not
+        finite, or beyond 1e100; contacts and near pairs of bodies for which there was no room.
+    overlap : (worlds,) float64
+        Deepest overlap of two bodies that this step began with [m], where they were put into each other by more than a
+        hundredth of the smaller one's bounding radius; else 0.
+    fault_body : (worlds,) int64
+        The first body that `faults` counts, of a world that was kept as a whole the first one that it was kept for;
+        -1: none.
     """
 
     __slots__ = ("_table",)
@@ -119,6 +139,8 @@ class StepReport:
     unresolved = property(lambda self: self._table[:, at.UNRESOLVED].astype(np.int64))
     faults = property(lambda self: self._table[:, at.FAULTS].astype(np.int64))
     left_out = property(lambda self: self._table[:, at.LEFT_OUT].astype(np.int64))
+    overlap = property(lambda self: self._table[:, at.OVERLAP])
+    fault_body = property(lambda self: self._table[:, at.FAULTY].astype(np.int64) - 1)
 
     @property
     def solver(self) -> np.ndarray:
@@ -134,13 +156,22 @@ class StepReport:
 
     @property
     def ok(self) -> bool:
-        """Whether every world's contact problems met their tolerance, were whole, and every state stayed finite."""
-        return not (self._table[:, at.UNCONVERGED : at.FAULTS + 1].any() or self._table[:, at.LEFT_OUT].any())
+        """Whether every contact problem met its tolerance and was whole, states stayed finite, and no body was put deep
+        into another.
+        """
+        return not (self._table[:, at.UNCONVERGED : at.FAULTS + 1].any() or self._table[:, at.LEFT_OUT].any()
+                    or self._table[:, at.OVERLAP].any())  # fmt: skip
 
     def messages(self) -> dict[int, str]:
         """World index -> message, for the worlds whose status is not OK."""
-        status = self.status
-        return {int(w): Status(int(status[w])).message for w in np.flatnonzero(status)}
+        status, told = self.status, {}
+        for w in np.flatnonzero(status).tolist():
+            told[w] = Status(int(status[w])).message
+            if status[w] == Status.FAULT:
+                told[w] = f"body {self.fault_body[w]}: {told[w]}"
+            elif status[w] == Status.OVERLAP:
+                told[w] += f" (the deepest overlap is {self.overlap[w]:.3g} m)"
+        return told
 
     def __repr__(self) -> str:
         return (

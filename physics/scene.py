@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import sys
+import warnings
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
@@ -20,6 +22,15 @@ LEAST_SINE = 1e-6
 
 # A `repr` shows every body, wall and effect of a scene with at most so many of them, if they fit on a screen.
 MOST_SHOWN = 12
+
+NO_CONTACT = (
+    "Scene.walls are given, but no effect lets bodies touch them: bodies pass through; add physics.Contact() to "
+    "Scene.effects, or leave the walls out"
+)
+
+
+class SceneWarning(UserWarning):
+    """A scene that is valid, but in which something that it declares does nothing."""
 
 
 @known_keywords
@@ -74,6 +85,11 @@ class Scene:
         `SpinFriction` and `Sleeping` need `Contact`, `Contact.tangential` needs `Friction`, `Wind` needs a field for it
         to act through.
 
+    Warns
+    -----
+    SceneWarning
+        Walls without `Contact`: bodies pass through them.
+
     Raises
     ------
     ValueError
@@ -104,6 +120,8 @@ class Scene:
             )
         self._check_axes()
         self._check_fields()
+        if self.walls and contact is None:
+            warnings.warn(NO_CONTACT, SceneWarning, stacklevel=_frames_of_package())
 
     def __repr__(self) -> str:
         if len(self.bodies) + len(self.walls) + len(self.effects) <= MOST_SHOWN:
@@ -163,6 +181,14 @@ def _items(given, name: str, allowed) -> tuple:
         hint = f": write {item.__name__}(...)" if isinstance(item, type) and issubclass(item, allowed) else ""
         raise ValueError(f"Scene.{name}[{k}] is {shown(item)}; allowed are instances of {_names(allowed)}{hint}")
     return items
+
+
+def _frames_of_package() -> int:
+    """The `stacklevel` with which whoever calls this warns of the line outside this package that led here."""
+    level, frame = 1, sys._getframe(1)
+    while frame.f_back is not None and frame.f_globals.get("__name__", "").split(".")[0] in ("physics", "dataclasses"):
+        level, frame = level + 1, frame.f_back
+    return level
 
 
 def _names(allowed) -> str:

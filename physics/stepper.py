@@ -176,7 +176,8 @@ def _step_of(plan: Plan) -> tuple[Callable, Callable[[World, int], tuple]]:
 def _many_arguments(world: World, k: int) -> tuple:
     plan = world.plan
     switches = (plan.friction, plan.restitution, plan.gyroscopic, plan.tilted, plan.ellipsoids, plan.hulls, plan.scheme)
-    return *switches, world.motions[k], world.sleep_of_kernel(), world.memory, world.report_table, world.scratch[k]
+    kept = (world.motions[k], world.sleep_of_kernel(), world.memory, world.report_table)
+    return *switches, *kept, world.scratch[k], *_log(world)
 
 
 def _linked_arguments(world: World, k: int) -> tuple:
@@ -185,18 +186,23 @@ def _linked_arguments(world: World, k: int) -> tuple:
     return plan.gyroscopic, plan.tilted, plan.scheme, held, plan.events, world.report_table, world.scratch[k]
 
 
+def _log(world: World) -> tuple[np.ndarray, np.ndarray]:
+    return world.event_log, world.event_counts
+
+
 def _wall_switches(plan: Plan) -> tuple:
     return plan.contact, plan.friction, plan.smooth, plan.restitution, plan.gyroscopic, plan.tilted, plan.pivots
 
 
 def _event_arguments(world: World, k: int) -> tuple:
-    log = (world.event_log, world.event_counts)
-    return *_wall_switches(world.plan), world.memory, world.report_table, world.scratch[k], world.motions[k], *log
+    return (
+        *_wall_switches(world.plan), world.memory, world.report_table, world.scratch[k], world.motions[k], *_log(world),
+    )  # fmt: skip
 
 
 def _world_arguments(world: World, k: int) -> tuple:
     switches = (*_wall_switches(world.plan), world.plan.scheme)
-    return *switches, world.sleep_of_kernel(), world.memory, world.report_table, world.scratch[k]
+    return *switches, world.sleep_of_kernel(), world.memory, world.report_table, world.scratch[k], *_log(world)
 
 
 def _entry(kernel, key: tuple, arguments: tuple) -> int:

@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike
 from physics import checks
 from physics.accuracy import Accuracy
 from physics.diagnostics import diagnose
-from physics.kernels.events.log import KINDS
+from physics.kernels.events import log
 from physics.keywords import known_keywords
 from physics.report import StepReport, add_report
 from physics.scene import Scene
@@ -32,6 +32,9 @@ SAMPLE_DT = 0.01
 # Samples at most: of one body they take more than ten gigabytes.
 MOST_SAMPLES = 100_000_000
 
+# Events per body that a step has room for at first; one with more is taken again with more room.
+EVENT_ROOM = 16
+
 COLUMNS = (
     "x", "y", "z", "qw", "qx", "qy", "qz", "vx", "vy", "vz", "wx", "wy", "wz",
 )  # fmt: skip
@@ -39,24 +42,38 @@ COLUMNS = (
 
 @dataclass(frozen=True)
 class Event:
-    """Something that happened to a body.
+    """Something that happened to a body, at a wall, with another body or alone.
+
+    An ``impact`` is one event for each pair of bodies, or body and wall, however many contacts they have: `impulse` is
+    the sum over these. The change of a body's momentum by impacts is the sum of `impulse` over the events of which it
+    is the `body`, less that over those of which it is the `other`.
 
     Attributes
     ----------
     t : float
         When [s]. The event-driven scheme knows it to rounding; where it has left out the end of a sequence of ever
         smaller bounces, the contact's ``touch`` and the body's ``rest`` come when that would have ended. Time
-        stepping knows the sample interval: `t` is its end.
+        stepping knows the moment of an ``impact``; of the other kinds the sample interval: `t` is its end.
     kind : str
         ``impact`` (velocities jumped), ``touch`` (a resting contact began), ``release`` (one ended), ``fault``; of
         the event-driven scheme also ``stick`` and ``slip`` (a resting contact ceased or began to slide) and
-        ``rest`` (the body came to rest).
+        ``rest`` (the body came to rest). What time stepping meets so slowly that loads could have made it as fast
+        within a step is a ``touch`` without an ``impact``.
     body : int
+        -1: unknown which (``fault`` of time stepping).
     wall : int
-        -1 where the kind has none, and for the impacts of time stepping.
+        -1 where the kind has none, and where bodies meet.
     impulse : (3,) tuple of float
-        Of an ``impact`` on the body, all contacts of the wall together, world frame [N s]; zero where it is not
-        known (time stepping) or the kind has none.
+        Of an ``impact``, on the `body`, world frame [N s]; zero for the other kinds.
+    other : int
+        The other body where two meet, which gets the opposite impulse; -1: none.
+    point : (3,) tuple of float
+        Of an ``impact``: the point of `body` where the impulse acts, of several contacts the mean weighted by their
+        normal impulses, world frame [m]. On a face the impulse acts there with the moment of all contacts but for
+        what friction exerts about the normal. Zero for the other kinds.
+    normal : (3,) tuple of float
+        Of an ``impact``: unit normal out of the wall or of the other body towards `body`, of several contacts the
+        weighted mean, world frame. Zero for the other kinds.
     """
 
     t: float
@@ -64,6 +81,9 @@ class Event:
     body: int
     wall: int = -1
     impulse: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    other: int = -1
+    point: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    normal: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
 
 @dataclass(frozen=True)
@@ -175,6 +195,7 @@ def simulate(
         times[-1] = min(times[-1], duration) if whole else times[-1]
     samples, events, reports = [_sample(world)], [], []
     watch = _logged if world.plan.events else _Touching()
+    world.make_event_room(EVENT_ROOM)
     for start, end in pairwise(times):
         is_short = end == times[-1] and len(times) > whole + 1
         count = max(math.ceil((end - start) / dt * (1 - LAST_SAMPLE)), 1) if is_short else steps
@@ -238,26 +259,26 @@ def _sample(world: World) -> tuple[np.ndarray, ...]:
 
 
 class _Touching:
-    """Events of time stepping: what its reports and resting contacts tell apart from one sample to the next."""
+    """Events of time stepping: impacts from its log, the rest from contacts and faults at the samples."""
 
     def __init__(self):
         self._before: set[tuple[int, int]] = set()
 
     def __call__(self, world: World, start: float, end: float, step: Callable[[], StepReport]) -> list[Event]:
         """Take a step; the events of it."""
-        report = step()
-        before, now = self._before, world.touching()
+        events = _logged(world, start, end, step)
+        before, now = self._before, {(int(body), int(other)) for body, other in world.contact_ends()}
         self._before = now
-        events = [Event(end, "impact", -1)] * int(report.impacts[0])
-        events += [Event(end, "touch", *pair) for pair in sorted(now - before)]
-        events += [Event(end, "release", *pair) for pair in sorted(before - now)]
-        if report.faults[0]:
+        for kind, pairs in (("touch", now - before), ("release", before - now)):
+            for body, end_of in sorted(pairs, key=lambda pair: (pair[0], abs(pair[1]), pair[1])):
+                events.append(Event(end, kind, body, max(-1, -1 - end_of), other=max(-1, end_of)))
+        if world.report.faults[0]:
             events.append(Event(end, "fault", -1))
         return events
 
 
 def _logged(world: World, start: float, end: float, step: Callable[[], StepReport]) -> list[Event]:
-    """Take a step of the event-driven scheme; its log, for which room is made and the step repeated if need be."""
+    """Take a step; its log, for which room is made and the step repeated if need be."""
     before = world.snapshot()
     step()
     most = int(world.event_counts.max())
@@ -267,6 +288,8 @@ def _logged(world: World, start: float, end: float, step: Callable[[], StepRepor
         return _logged(world, start, end, step)
     events = []
     for body, (count, rows) in enumerate(zip(world.event_counts.tolist(), world.event_log)):
-        for t, kind, wall, *impulse in rows[:count].tolist():
-            events.append(Event(start + t, KINDS[int(kind)], body, int(wall), tuple(impulse)))
+        for row in rows[:count].tolist():
+            impulse, point, normal = (tuple(row[k : k + 3]) for k in (log.IMPULSE, log.POINT, log.NORMAL))
+            t, kind, wall, other = row[: log.IMPULSE]
+            events.append(Event(start + t, log.KINDS[int(kind)], body, int(wall), impulse, int(other), point, normal))
     return sorted(events, key=lambda event: event.t)

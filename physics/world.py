@@ -84,7 +84,9 @@ class World:
     Raises
     ------
     ValueError
-        A parameter out of range, or a body that starts deep inside a wall.
+        A parameter out of range, a number of a state beyond 1e100, a body that starts deep inside a wall, or two bodies
+        that touch each other and start with their centres in the same place. Bodies that overlap otherwise are lifted
+        apart, and the report of the first step says so (`Status.OVERLAP`).
     """
 
     def __init__(
@@ -108,7 +110,7 @@ class World:
         allocation.check_room(self.worlds, self.body_count, self.plan)
         self._allocate()
         allocation.fill(self)
-        changes.check_depth(self, self.state, self.params, np.arange(self.worlds), "scene")
+        changes.check_place(self, self.state, self.params, np.arange(self.worlds), "scene")
 
     # --- memory ------------------------------------------------------------------------------------------------
 
@@ -123,7 +125,7 @@ class World:
         self.memory = allocation.make_memory(self.scene, self.plan, self.worlds)
         self.sleep = np.zeros((rows if self.plan.sleeping else 0, SLEEP_SIZE))
         self.report_table = np.zeros((self.worlds, at.REPORT_SIZE))
-        self.event_counts = np.zeros(rows if self.plan.events else 1, dtype=np.int64)
+        self.event_counts = np.zeros(rows, dtype=np.int64)
         self.make_event_room(0)
         self.shapes = np.array([SHAPE_CODES[body.kind] for body in self.scene.bodies])
         actuator = self.scene.effect(Actuator)
@@ -143,7 +145,12 @@ class World:
         self._bound_for: tuple | None = None  # arguments of `step`: the next call with the same finds all bound
 
     def make_event_room(self, room: int) -> None:
-        """Let a step of the event-driven scheme log up to `room` events per body; for `simulate`."""
+        """Let a step log up to `room` events per body, 0 at first; for `simulate`.
+
+        They go to `event_log` (worlds * bodies, room, EVENT_SIZE), columns in `physics.kernels.events.log`; their
+        number to `event_counts` (worlds * bodies,) int64, those that found no room included: more than `room` says
+        so. Prepare a `Stepper` after this.
+        """
         self.event_log = np.zeros((len(self.event_counts), room, EVENT_SIZE))
         self._bound_for = None
 
@@ -253,8 +260,9 @@ class World:
         Raises
         ------
         ValueError
-            A wrong shape, a number that is not finite, no unit quaternion, a world named twice or not there, or a body
-            deep inside a wall. Nothing has changed then.
+            A wrong shape, a number that is not finite or beyond 1e100, no unit quaternion, a world named twice or not
+            there, a body deep inside a wall, or two bodies that touch each other with their centres in the same place.
+            Nothing has changed then.
         """
         changes.set_state(self, pos, quat, linvel, angvel, worlds)
 

@@ -68,10 +68,10 @@ class Demo:
 
     def events(self) -> list[dict]:
         """What happened, equal things at the same time counted."""
-        keys = [(round(e.t, 9), e.kind, e.body, e.wall) for e in self.trajectory.events]
+        keys = [(round(e.t, 9), e.kind, e.body, e.wall, e.other) for e in self.trajectory.events]
         return [
-            {"t": t, "kind": kind, "body": body, "wall": wall, "count": len(list(group))}
-            for (t, kind, body, wall), group in itertools.groupby(keys)
+            {"t": t, "kind": kind, "body": body, "wall": wall, "other": other, "count": len(list(group))}
+            for (t, kind, body, wall, other), group in itertools.groupby(keys)
         ]
 
     def summary(self) -> dict:
@@ -80,7 +80,7 @@ class Demo:
         points, forces = world.contacts()
         energy = trajectory.energy.sum(axis=1)
         moving = max(np.abs(trajectory.linvel[-1]).max(), np.abs(trajectory.angvel[-1]).max())
-        status = max(int(report.status[0]) for report in trajectory.reports) if trajectory.reports else 0
+        status = max((int(report.status[0]) for report in trajectory.reports), key=physics.Status.severity, default=0)
         last = {name: getattr(trajectory, name)[-1].tolist() for name in ("pos", "quat", "linvel", "angvel")}
         return {
             "scene": self.name,
@@ -193,12 +193,12 @@ def show(demo: Demo, summary: dict, console: Console) -> None:
 
 def _event_table(events: list[dict]) -> Table:
     table = Table(title="events", title_justify="left", box=box.SIMPLE_HEAD)
-    for name in ("time [s]", "what", "body", "wall"):
+    for name in ("time [s]", "what", "body", "wall", "other"):
         table.add_column(name, justify="left" if name == "what" else "right")
     for event in events[:SHOWN_EVENTS]:
         times = f" x {event['count']}" if event["count"] > 1 else ""
-        body, wall = (str(event[name]) if event[name] >= 0 else "-" for name in ("body", "wall"))
-        table.add_row(f"{event['t']:.2f}", event["kind"] + times, body, wall)
+        who = [str(event[name]) if event[name] >= 0 else "-" for name in ("body", "wall", "other")]
+        table.add_row(f"{event['t']:.2f}", event["kind"] + times, *who)
     if len(events) > SHOWN_EVENTS:
         table.caption = f"and {len(events) - SHOWN_EVENTS} more; --json has all"
     return table

@@ -69,19 +69,48 @@ def write_state(state, i, y):
 
 @inlined
 def is_finite(y):
-    """Whether every number of the state is finite (a sum is not finite when a term is not)."""
+    """Whether every number of the state is finite, and their squares are far from not being so (`layout.LARGEST`)."""
     x, q, v, L = y
-    total = x[0] + x[1] + x[2] + q[0] + q[1] + q[2] + q[3] + v[0] + v[1] + v[2] + L[0] + L[1] + L[2]
-    return math.isfinite(total)
+    turn = (q[0] * q[0] + q[1] * q[1]) + (q[2] * q[2] + q[3] * q[3])
+    return (qt.dot(x, x) + qt.dot(v, v)) + (qt.dot(L, L) + turn) <= at.LARGEST * at.LARGEST
 
 
 @inlined
 def all_finite(now):
     """Whether every number of every state in `now` (bodies, STATE_SIZE) is."""
+    return first_lost(now) < 0
+
+
+@inlined
+def first_lost(now):
+    """The first body in `now` (bodies, STATE_SIZE) whose state is not finite, -1: none."""
     for b in range(now.shape[0]):
         if not is_finite(read_state(now, b)):
-            return False
-    return True
+            return b
+    return -1
+
+
+@inlined
+def can_bear(work):
+    """Whether the loads that `bind_body` has found are finite, and far from overflowing (`layout.LARGEST`)."""
+    return work.acceleration <= at.LARGEST
+
+
+@inlined
+def first_overloaded(bodies):
+    """The first of the records `bodies` with loads that it cannot bear, -1: none."""
+    for b in range(bodies.shape[0]):
+        if not can_bear(bodies[b]):
+            return b
+    return -1
+
+
+@inlined
+def note_fault(world, b, report):
+    """Body b of a world keeps its old state."""
+    report[world, at.FAULTS] += 1.0
+    if report[world, at.FAULTY] == 0.0:
+        report[world, at.FAULTY] = 1.0 + b
 
 
 @inlined

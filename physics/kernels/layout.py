@@ -46,6 +46,9 @@ HULL = 3  # its corners stand in tables: `many.hulls`
 # Contact features of one body on one wall: the eight vertices of a block, the one support point of the others.
 VERTEX_COUNT = 8
 
+# Numbers of a state, and accelerations, beyond this are a fault [SI]: products of three of them are still finite.
+LARGEST = 1.0e100
+
 # --- report (worlds, REPORT_SIZE) ------------------------------------------------------------------------------
 PENETRATION = 0  # worst depth met [m]
 RESIDUAL = 1  # worst natural-map residual accepted, relative to the free contact speed
@@ -53,9 +56,11 @@ ITERATIONS = 2  # sweeps, all solves together
 SOLVES = 3  # contact problems solved
 FALLBACKS = 4  # of these, by the pivoting fallback
 UNCONVERGED = 5  # of these, with a residual above the tolerance
-FAULTS = 6  # bodies whose new state was not finite (their old state was kept)
+FAULTS = 6  # bodies whose new state was not finite or beyond `LARGEST` (their old state was kept)
 SPLITS = 7  # impacts that split a substep
 UNRESOLVED = 8  # substeps with more impacts than allowed: the rest was treated as plastic
 SOLVER = 9  # the strongest method needed: 0 none, 1 direct, 2 sweeps, 3 pivoting, 4 Newton's on all bodies
 LEFT_OUT = 10  # contacts and near pairs for which there was no room
-REPORT_SIZE = 11
+OVERLAP = 11  # deepest overlap of two bodies that were put where they overlap [m], 0 where that is little
+FAULTY = 12  # 1 + the first body at fault, 0: none
+REPORT_SIZE = 13

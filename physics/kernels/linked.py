@@ -11,7 +11,15 @@ from typing import NamedTuple
 import numpy as np
 
 from physics.kernels import layout as at
-from physics.kernels.body import all_finite, angular_velocity, bind_body, read_state, write_state
+from physics.kernels.body import (
+    angular_velocity,
+    bind_body,
+    first_lost,
+    first_overloaded,
+    note_fault,
+    read_state,
+    write_state,
+)
 from physics.kernels.compiler import kernel
 from physics.kernels.fields.linked import hold_linked_loads
 from physics.kernels.fields.loads import bind_fields, set_clock
@@ -75,6 +83,10 @@ def step_linked(
             bind_body(world, i, shapes[b], params, gravity, wrench, None, None, tilted, linked.bodies[b])
             bind_fields(params, i, linked.bodies[b])
             write_state(linked.now, b, read_state(state, i))
+        lost = first_overloaded(linked.bodies)
+        if lost >= 0:
+            note_fault(world, lost, report)
+            continue
         for k in range(steps * substeps):
             for b in range(bodies):
                 set_clock(k * h, linked.bodies[b])
@@ -82,8 +94,9 @@ def step_linked(
                 _substep(h, gyroscopic, tilted, scheme, linked)
             if events is not None:
                 step_smooth(world, h, tilted, report, linked)
-            if not all_finite(linked.now):
-                report[world, at.FAULTS] += 1.0
+            lost = first_lost(linked.now)
+            if lost >= 0:
+                note_fault(world, lost, report)
                 break
             for b in range(bodies):
                 write_state(state, world * bodies + b, read_state(linked.now, b))

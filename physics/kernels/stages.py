@@ -11,6 +11,7 @@ from physics.kernels.arms import place_arms
 from physics.kernels.body import principal_attitude, turning
 from physics.kernels.compiler import inlined, kernel
 from physics.kernels.compliance import aim_springs, foretell_gaps, parts_of_stage
+from physics.kernels.events.log import log_wall_impacts
 from physics.kernels.flight import drift
 from physics.kernels.laws import STIFFNESS, if_law
 from physics.kernels.resist import aim_tangential, resist_turning, without_gain
@@ -173,8 +174,11 @@ def aim_plastic(n, work):
 
 
 @inlined
-def impact(n, y, h, friction, smooth, tilted, pivots, report, work):
-    """State after the impulses of the contacts that approach; unchanged when none does."""
+def impact(n, y, t, h, friction, smooth, tilted, pivots, report, work, log, counts):
+    """State after the impulses of the contacts that approach; unchanged when none does.
+
+    It happens t [s] after the start of the call, with h [s] left of the substep.
+    """
     x, q, v, L = y
     bounce_speed = work.rest_share * work.acceleration * h
     if work.restitution > 0.0:
@@ -196,13 +200,19 @@ def impact(n, y, h, friction, smooth, tilted, pivots, report, work):
     if friction is not None and work.restitution > 0.0:
         before, full = kinetic_energy(q, v, L, work, tilted), kinetic_energy(q, v_new, L_new, work, tilted)
         if full > before + ROUNDING * before:
+            for k in range(3 * n):
+                work.rebound[k] = work.impulse[k]
             aim_plastic(n, work)
             solved = solve_contacts(n, friction, smooth, pivots, v, L, R, work)
             if not solved[2] <= work.tolerance:
                 solved = shortened(n, friction, v, turning(R, L, work.J), solved, (v, L), R, work)
             v0, L0, residual, sweeps, method = solved
             note_solve(report, work.world, residual, sweeps, method, work.tolerance)
-            v_new, L_new, _ = part_of_rebound(q, before, (v0, L0), (v_new, L_new), work, tilted)
+            v_new, L_new, s = part_of_rebound(q, before, (v0, L0), (v_new, L_new), work, tilted)
+            for k in range(3 * n):
+                work.impulse[k] += s * (work.rebound[k] - work.impulse[k])
+    if log.shape[1] > 0:
+        log_wall_impacts(n, 1 if friction is None else 3, x, 0.0, t, work, log, counts)
     return x, q, v_new, L_new
 
 

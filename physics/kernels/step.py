@@ -23,11 +23,12 @@ import math
 
 from physics.kernels import layout as at
 from physics.kernels import quaternion as qt
-from physics.kernels.body import angular_velocity, bind_body, is_finite, read_state, write_state
+from physics.kernels.body import angular_velocity, bind_body, can_bear, is_finite, note_fault, read_state, write_state
 from physics.kernels.clearance import clear_substeps
 from physics.kernels.compiler import inlined, kernel
 from physics.kernels.compliance import lift_to_due, stiffness
 from physics.kernels.contact import gap_of, gap_rate, gather, nearest_outside_set, push_out, what_is_behind
+from physics.kernels.events.log import drop_events, forget_events
 from physics.kernels.fields.loads import (
     bind_fields,
     hold_contact_loads,
@@ -203,8 +204,8 @@ def to_next_impact(n, y, h, friction, smooth, gyroscopic, tilted, pivots, scheme
 
 
 @inlined
-def substep(y, h, friction, smooth, gyroscopic, tilted, pivots, scheme, memory, report, work):
-    """State after h: impacts where they happen, flight or contact between them.
+def substep(y, start, h, friction, smooth, gyroscopic, tilted, pivots, scheme, memory, report, work, log, counts):
+    """State after h, `start` after the call [s]: impacts where they happen, flight or contact between them.
 
     When a substep has used up its cuts its rest is one plastic stage that takes in all it would pass through.
     """
@@ -220,7 +221,7 @@ def substep(y, h, friction, smooth, gyroscopic, tilted, pivots, scheme, memory, 
         if n > 0:
             report[world, at.PENETRATION] = max(report[world, at.PENETRATION], depth)
             if not work.is_last and not stiffness(work) > 0.0:
-                y = impact(n, y, left, friction, smooth, tilted, pivots, report, work)
+                y = impact(n, y, start + (h - left), left, friction, smooth, tilted, pivots, report, work, log, counts)
         end, t, is_deep = to_next_impact(
             n, y, left, friction, smooth, gyroscopic, tilted, pivots, scheme, memory, report, work
         )
@@ -238,13 +239,14 @@ def substep(y, h, friction, smooth, gyroscopic, tilted, pivots, scheme, memory, 
 @kernel
 def step_worlds(
     turns, taken, steps, substeps, h, state, params, shapes, gravity, wrench, contact, friction, smooth, restitution,
-    gyroscopic, tilted, pivots, scheme, sleep, memory, report, scratch,
+    gyroscopic, tilted, pivots, scheme, sleep, memory, report, scratch, log, counts,
 ):  # fmt: skip
     """Advance the worlds that no other thread has taken by `steps` steps of `substeps` substeps of h seconds each.
 
     A body in flight looks for walls only when it could be near one (`clearance`; what touched is), one that sleeps for
     nothing (`sleep`, None where the scene does not declare it). A body whose new state is not finite keeps the old one,
-    and its world's report counts the fault.
+    and its world's report counts the fault. Impacts go to `log` (rows, room, EVENT_SIZE), if that has any room, their
+    number to `counts` (rows,).
     """
     work = scratch[0]
     bodies = shapes.shape[0]
@@ -255,11 +257,15 @@ def step_worlds(
             break
         for c in range(at.REPORT_SIZE):
             report[world, c] = 0.0
+        forget_events(world, bodies, log, counts)
         for b in range(bodies):
             i = world * bodies + b
             if sleep is not None and sleeps_on(i, wrench, sleep):
                 continue
             bind_body(world, i, shapes[b], params, gravity, wrench, friction, restitution, tilted, work)
+            if not can_bear(work):
+                note_fault(world, b, report)
+                continue
             bind_fields(params, i, work)
             bind_laws(params, i, work)
             y, clear = read_state(state, i), 0
@@ -271,12 +277,16 @@ def step_worlds(
                     if clear > 0:
                         forget_contacts(memory, i, work)
                 if contact is not None and clear == 0:
-                    new = substep(y, h, friction, smooth, gyroscopic, tilted, pivots, scheme, memory, report, work)
+                    new = substep(
+                        y, k * h, h, friction, smooth, gyroscopic, tilted, pivots, scheme, memory, report, work, log,
+                        counts,
+                    )  # fmt: skip
                 else:
                     clear -= 1
                     new = coast(y, h, gyroscopic, tilted, scheme, work)
                 if not is_finite(new):
-                    report[world, at.FAULTS] += 1.0
+                    note_fault(world, b, report)
+                    drop_events(i, 1, k * h, log, counts)
                     break
                 y = new
                 if sleep is not None and falls_asleep(i, y, h, work, sleep):

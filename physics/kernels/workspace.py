@@ -108,6 +108,7 @@ def workspace_dtype(
         ("local", f, (n, 12)),  # see `sweeps.factor_blocks`
         ("fallback_float", f, (float_size,)),
         ("fallback_int", i, (int_size,)),
+        ("rebound", f, (3 * n,)),  # p of an impact with all of its rebound, where there is less energy [N s]
     ]
     return np.dtype(setting_fields() + scene + body_fields(terms, laws) + stage + contacts)
 

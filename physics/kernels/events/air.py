@@ -24,6 +24,7 @@ from __future__ import annotations
 
 import math
 
+from physics.kernels import layout as at
 from physics.kernels import quaternion as qt
 from physics.kernels.arms import arm_and_rate, wall_normal
 from physics.kernels.body import angular_velocity
@@ -47,6 +48,9 @@ FINEST = 1.0e-13
 # The time over which the parabola bounds the gap is doubled as long as it is not used up: from the first guess, which
 # is as short as the bound of the third derivative is loose, by as much as rounding tells apart at most.
 DOUBLINGS = 52
+
+# Extrapolated steps of one flight at most, those that are refused included.
+MOST_TRIES = 10_000
 
 
 @inlined
@@ -129,11 +133,11 @@ def has_torque(work):
 
 @kernel
 def fly_smoothly(y, t, tilted, work, motion):
-    """Free motion under a torque or in fields over t by extrapolated steps."""
+    """Free motion under a torque or in fields over t by extrapolated steps: (state, what MOST_TRIES left of t)."""
     put_state(motion, START, y)
     left, tries = t, 0
     motion.step = left
-    while left > 0.0 and tries < 10000:
+    while left > 0.0 and tries < MOST_TRIES:
         tries += 1
         h = start_step(left, tilted, work, motion)
         error, _ = try_step(h, tilted, work, motion)
@@ -145,22 +149,28 @@ def fly_smoothly(y, t, tilted, work, motion):
         left -= h
         pass_time(h, work)
         motion.step = 2.0 * h
-    return get_state(motion, START)
+    return get_state(motion, START), left
 
 
 @kernel
-def fly_freely(y, t, gyroscopic, tilted, work, motion):
-    """State after the time t without contact."""
+def fly_freely(y, t, gyroscopic, tilted, work, motion, report):
+    """State after the time t without contact.
+
+    Turned by more than extrapolated steps can follow the rest of t is of second order in a torque, which is reported.
+    """
     if has_torque(work) or has_fields(work):
         start_feeling(work)
-        end = fly_smoothly(y, t, tilted, work, motion)
+        end, left = fly_smoothly(y, t, tilted, work, motion)
+        if left > 0.0:
+            report[work.world, at.UNRESOLVED] += 1.0
+            end = fly(end, work, left, gyroscopic, tilted)
         if was_felt(work):
             return end
     return fly(y, work, t, gyroscopic, tilted)
 
 
 @kernel
-def fly_to_wall(y, left, gyroscopic, tilted, work, motion):
+def fly_to_wall(y, left, gyroscopic, tilted, work, motion, report):
     """Fly for `left` or until a feature reaches a wall: (state, time, whether the flight was found).
 
     It may end earlier, where a feature flies so close along a wall that ADVANCES steps did not tell: no wall is missed.
@@ -174,15 +184,15 @@ def fly_to_wall(y, left, gyroscopic, tilted, work, motion):
         set_now(now, work)
         refresh_loads(y, 0.0, tilted, work)
     if is_clear(y[0], y[2], left, work):
-        return fly_freely(y, left, gyroscopic, tilted, work, motion), left, True
+        return fly_freely(y, left, gyroscopic, tilted, work, motion, report), left, True
     third = third_bound(y, left, tilted, work)
     now, t = y, 0.0
     for _ in range(ADVANCES):
         step = safe_flight(now, left - t, third, tilted, work, motion)
         if t + step >= left:
-            return fly_freely(y, left, gyroscopic, tilted, work, motion), left, True
+            return fly_freely(y, left, gyroscopic, tilted, work, motion, report), left, True
         t += step
-        now = fly_freely(y, t, gyroscopic, tilted, work, motion)
+        now = fly_freely(y, t, gyroscopic, tilted, work, motion, report)
         if step <= FINEST * left:
             break
     return now, t, True

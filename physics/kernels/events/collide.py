@@ -200,23 +200,6 @@ def pose_jump(y, h, tilted, work, motion):
     )
 
 
-@kernel
-def log_impulses(n, width, work, motion, log, counts, t):
-    """One event per wall with the sum of its impulses, if that is above rounding."""
-    least = work.mass * motion.noise
-    for wall in range(work.walls.shape[0]):
-        px = py = pz = 0.0
-        for i in range(n):
-            if wall_of(work.slot[i], work) == wall:
-                for c in range(width):
-                    s = work.impulse[width * i + c]
-                    px += s * work.walls[wall, 3 * c]
-                    py += s * work.walls[wall, 3 * c + 1]
-                    pz += s * work.walls[wall, 3 * c + 2]
-        if px * px + py * py + pz * pz > least * least:
-            ev.note_event(log, counts, work.i, t, ev.IMPACT, wall, (px, py, pz))
-
-
 @inlined
 def principal_axes(y, tilted, work):
     """Rotation matrix of the principal axes at y."""
@@ -244,7 +227,7 @@ def collide(y, t, friction, smooth, tilted, pivots, work, motion, report, log, c
             solved = within_energy(n, y, friction, smooth, tilted, pivots, solved, P, work, motion, report)
         note(solved, report, work)
         v, L = solved[0], solved[1]
-    log_impulses(n, _width(friction), work, motion, log, counts, t)
+    ev.log_wall_impacts(n, _width(friction), x, work.mass * motion.noise, t, work, log, counts)
     return x, q, v, L
 
 
@@ -258,7 +241,7 @@ def jump(y, h, t, friction, smooth, tilted, pivots, work, motion, report, log, c
         solved = solve_contacts(n, friction, smooth, pivots, v, L, P, work)
         note(solved, report, work)
         v, L = solved[0], solved[1]
-    log_impulses(n, _width(friction), work, motion, log, counts, t)
+    ev.log_wall_impacts(n, _width(friction), y[0], work.mass * motion.noise, t, work, log, counts)
     return y[0], y[1], v, L
 
 

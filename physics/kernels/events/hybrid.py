@@ -24,7 +24,7 @@ import math
 
 from physics.kernels import layout as at
 from physics.kernels import quaternion as qt
-from physics.kernels.body import angular_velocity, bind_body, is_finite, read_state, write_state
+from physics.kernels.body import angular_velocity, bind_body, can_bear, is_finite, note_fault, read_state, write_state
 from physics.kernels.compiler import inlined, kernel
 from physics.kernels.events import log as ev
 from physics.kernels.events.air import fly_freely, fly_to_wall
@@ -115,7 +115,7 @@ def come_to_rest(y, t, tilted, work, motion, log, counts):
     if motion.is_resting:
         return y
     motion.is_resting = 1
-    ev.note_event(log, counts, work.i, t + motion.left_out, ev.REST, -1, (0.0, 0.0, 0.0))
+    ev.note_change(log, counts, work.i, t + motion.left_out, ev.REST, -1)
     x, q, _, _ = cancel(y, tilted, work, motion)
     return x, q, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
 
@@ -129,7 +129,7 @@ def go_on(what, y, t, h, gyroscopic, tilted, work, motion, report):
         note_leap(t + step, motion)
         return carry_on(y, step, tilted, work), step, NO_GUARD
     if what == FLIES:
-        y, step, is_found = fly_to_wall(y, h - t, gyroscopic, tilted, work, motion)
+        y, step, is_found = fly_to_wall(y, h - t, gyroscopic, tilted, work, motion, report)
         if not is_found:
             report[work.world, at.UNRESOLVED] += 1.0
         return y, step, NO_GUARD
@@ -222,6 +222,10 @@ def step_events(
             i = world * bodies + b
             counts[i] = 0
             bind_body(world, i, shapes[b], params, gravity, wrench, friction, restitution, tilted, work)
+            if not can_bear(work):
+                note_fault(world, b, report)
+                ev.note_change(log, counts, i, 0.0, ev.FAULT, -1)
+                continue
             bind_fields(params, i, work)
             bind_laws(params, i, work)
             y = read_state(state, i)
@@ -234,10 +238,11 @@ def step_events(
                 else:
                     motion.count = 0
                     set_clock(k * h, work)
-                    new = fly_freely(y, h, gyroscopic, tilted, work, motion)
+                    new = fly_freely(y, h, gyroscopic, tilted, work, motion, report)
                 if not is_finite(new):
-                    report[world, at.FAULTS] += 1.0
-                    ev.note_event(log, counts, i, k * h, ev.FAULT, -1, (0.0, 0.0, 0.0))
+                    note_fault(world, b, report)
+                    ev.drop_events(i, 1, k * h, log, counts)
+                    ev.note_change(log, counts, i, k * h, ev.FAULT, -1)
                     break
                 y = new
             write_state(state, i, y)

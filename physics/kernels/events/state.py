@@ -14,7 +14,6 @@ AWAY, SLIPS, STICKS = range(3)
 @kernel
 def log_changes(work, motion, log, counts, t):
     """Events of the walls at which the body now does something else."""
-    zero = (0.0, 0.0, 0.0)
     for wall in range(work.walls.shape[0]):
         state = AWAY
         for j in range(motion.count):
@@ -28,11 +27,11 @@ def log_changes(work, motion, log, counts, t):
             continue
         motion.state[wall] = state
         if old == AWAY:
-            ev.note_event(log, counts, work.i, t + motion.left_out, ev.TOUCH, wall, zero)
+            ev.note_change(log, counts, work.i, t + motion.left_out, ev.TOUCH, wall)
         elif state == AWAY:
-            ev.note_event(log, counts, work.i, t, ev.RELEASE, wall, zero)
+            ev.note_change(log, counts, work.i, t, ev.RELEASE, wall)
         else:
-            ev.note_event(log, counts, work.i, t, ev.STICK if state == STICKS else ev.SLIP, wall, zero)
+            ev.note_change(log, counts, work.i, t, ev.STICK if state == STICKS else ev.SLIP, wall)
 
 
 @kernel

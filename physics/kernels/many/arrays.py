@@ -61,6 +61,7 @@ class Kept(NamedTuple):
     now: np.ndarray  # states of the bodies, (moments, bodies, STATE_SIZE)
     memory: np.ndarray  # row of `memory`
     report: np.ndarray  # row of the report
+    counts: np.ndarray  # events of each body
 
 
 class Many(NamedTuple):
@@ -132,6 +133,7 @@ class Many(NamedTuple):
     lower: np.ndarray
     upper: np.ndarray
     swaps: np.ndarray
+    rebound: np.ndarray  # of `restraint`: impulses with all of the rebound [N s]
     best: np.ndarray  # best impulses met by all methods for an island [N s]
     defect: np.ndarray  # of `newton`: x - M⁻¹ Jᵀ p(x), columns of `blocks` [m/s, rad/s]
     before: np.ndarray  # twists before a Newton step
@@ -210,8 +212,8 @@ def make_many(
         mark=np.zeros(nb, i), bucket=np.zeros(nb, i), ahead=np.zeros(nb, i), behind=np.zeros(nb, i),
         rank=np.zeros(nb, i), start=np.zeros(nb, i), stop=np.zeros(nb, i), column=np.zeros(blocks, i),
         diagonal=np.zeros((nb, BLOCK_SIZE)), lower=np.zeros((blocks, BLOCK_SIZE)), upper=np.zeros((blocks, BLOCK_SIZE)),
-        swaps=np.zeros(6, i), best=np.zeros((n, 3)), defect=np.zeros((nb, COLUMN_SIZE)), before=np.zeros((nb, 6)),
-        change=np.zeros((nb, COLUMN_SIZE)), bundle=np.zeros((bundles, BUNDLE_SIZE), i),
+        swaps=np.zeros(6, i), rebound=np.zeros((n, 3)), best=np.zeros((n, 3)), defect=np.zeros((nb, COLUMN_SIZE)),
+        before=np.zeros((nb, 6)), change=np.zeros((nb, COLUMN_SIZE)), bundle=np.zeros((bundles, BUNDLE_SIZE), i),
         lanes=np.zeros((bundles, LANES_SIZE)), momenta=np.zeros((nb, 12)),
         hulls=make_hulls(polyhedra) if polyhedra else None, settings=record,
     )  # fmt: skip
@@ -219,4 +221,9 @@ def make_many(
 
 def make_kept(bodies: int, memory: int) -> Kept:
     """Room for a world of so many bodies and columns of `memory` at three moments."""
-    return Kept(np.zeros((3, bodies, STATE_SIZE)), np.zeros((3, memory)), np.zeros((3, REPORT_SIZE)))
+    return Kept(
+        np.zeros((3, bodies, STATE_SIZE)),
+        np.zeros((3, memory)),
+        np.zeros((3, REPORT_SIZE)),
+        np.zeros((3, bodies), np.int64),
+    )

@@ -44,7 +44,7 @@ START, COARSE, MIDDLE = range(3)
 
 
 @inlined
-def _keep(slot, world, kept, memory, report, many):
+def _keep(slot, world, kept, memory, report, many, counts):
     """Keep the world as it is now."""
     for b in range(many.now.shape[0]):
         for c in range(many.now.shape[1]):
@@ -53,11 +53,16 @@ def _keep(slot, world, kept, memory, report, many):
         kept.memory[slot, c] = memory[world, c]
     for c in range(at.REPORT_SIZE):
         kept.report[slot, c] = report[world, c]
+    for b in range(many.now.shape[0]):
+        kept.counts[slot, b] = counts[world * many.now.shape[0] + b]
 
 
 @inlined
-def _come_back(slot, world, kept, memory, report, many):
-    """Make the world what it was when it was kept, but for the work that the report counts."""
+def _come_back(slot, world, kept, memory, report, many, counts):
+    """Make the world what it was when it was kept, but for the work that the report counts.
+
+    Events logged since are no more: their rows are written over.
+    """
     for b in range(many.now.shape[0]):
         for c in range(many.now.shape[1]):
             many.now[b, c] = kept.now[slot, b, c]
@@ -66,6 +71,8 @@ def _come_back(slot, world, kept, memory, report, many):
     for c in range(at.REPORT_SIZE):
         if c != at.SOLVES and c != at.ITERATIONS:
             report[world, c] = kept.report[slot, c]
+    for b in range(many.now.shape[0]):
+        counts[world * many.now.shape[0] + b] = kept.counts[slot, b]
 
 
 @inlined
@@ -107,32 +114,35 @@ def _error(tilted, kept, many):
 
 
 @kernel
-def _advance(world, start, h, switches, memory, report, many):
+def _advance(world, start, h, switches, memory, report, many, log, counts):
     """One part of h [s], `start` [s] after the call."""
     friction, gyroscopic, tilted, ellipsoids, hulls, scheme = switches
     for b in range(many.now.shape[0]):
         set_clock(start, many.bodies[b])
         many.touched[b] = 0
-    substep_world(world, h, friction, gyroscopic, tilted, ellipsoids, hulls, scheme, None, memory, report, many)
+    substep_world(
+        world, start, h, friction, gyroscopic, tilted, ellipsoids, hulls, scheme, None, memory, report, many,
+        log, counts,
+    )  # fmt: skip
 
 
 @kernel
-def _take_part(world, start, unit, part, shortest, switches, kept, memory, report, many):
+def _take_part(world, start, unit, part, shortest, switches, kept, memory, report, many, log, counts):
     """Advance by `part` units of time [s], or by half of it, or a quarter ...: (units taken, error, lengths tried)."""
     tilted, tried = switches[2], 1
-    _keep(START, world, kept, memory, report, many)
-    _advance(world, start, part * unit, switches, memory, report, many)
+    _keep(START, world, kept, memory, report, many, counts)
+    _advance(world, start, part * unit, switches, memory, report, many, log, counts)
     while True:
         half = 0.5 * part * unit
-        _keep(COARSE, world, kept, memory, report, many)
-        _come_back(START, world, kept, memory, report, many)
-        _advance(world, start, half, switches, memory, report, many)
-        _keep(MIDDLE, world, kept, memory, report, many)
-        _advance(world, start + half, half, switches, memory, report, many)
+        _keep(COARSE, world, kept, memory, report, many, counts)
+        _come_back(START, world, kept, memory, report, many, counts)
+        _advance(world, start, half, switches, memory, report, many, log, counts)
+        _keep(MIDDLE, world, kept, memory, report, many, counts)
+        _advance(world, start + half, half, switches, memory, report, many, log, counts)
         error = _error(tilted, kept, many)
         if error <= 1.0 or part <= shortest:
             return part, error, tried
-        _come_back(MIDDLE, world, kept, memory, report, many)  # the coarse answer of the first half
+        _come_back(MIDDLE, world, kept, memory, report, many, counts)  # the coarse answer of the first half
         part //= 2
         tried += 1
 
@@ -151,7 +161,7 @@ def _loaded(h, many):
 
 
 @kernel
-def refine(world, start, h, switches, kept, memory, report, many):
+def refine(world, start, h, switches, kept, memory, report, many, log, counts):
     """Advance the bodies of one world by h [s], `start` [s] after the call, in parts that meet the error.
 
     Where the shortest part does not meet it either, that is counted as a fallback, and the shortest part of this
@@ -168,7 +178,9 @@ def refine(world, start, h, switches, kept, memory, report, many):
         part = WHOLE
     while place < WHOLE:
         now = start + place * unit
-        part, error, tried = _take_part(world, now, unit, part, shortest, switches, kept, memory, report, many)
+        part, error, tried = _take_part(
+            world, now, unit, part, shortest, switches, kept, memory, report, many, log, counts
+        )  # fmt: skip
         place += part
         patience -= tried
         if not all_finite(many.now):

@@ -55,6 +55,21 @@ def _mix(s, many):
 
 
 @inlined
+def _keep_impulses(n, many):
+    """Copy the impulses of the n contacts to `many.rebound`."""
+    for k in range(n):
+        put(many.rebound, k, 0, vector(many.impulse, k, 0))
+
+
+@inlined
+def _mix_impulses(n, s, many):
+    """Move the impulses of the n contacts by the share s towards those with all of the rebound."""
+    for k in range(n):
+        p = vector(many.impulse, k, 0)
+        put(many.impulse, k, 0, plus(plus(p, -s, p), s, vector(many.rebound, k, 0)))
+
+
+@inlined
 def _aim_plastic(n, many):
     """Targets of what touches without rebound, and momenta as before the impact."""
     for k in range(n):
@@ -100,6 +115,7 @@ def settle_restrained(n, world, friction, tilted, report, many):
     plastic = full
     if has_rebound:
         _keep(FULL, many)
+        _keep_impulses(n, many)
         _aim_plastic(n, many)
         _turn(tilted, many)
         settle(n, world, friction, report, many)
@@ -111,4 +127,5 @@ def settle_restrained(n, world, friction, tilted, report, many):
     middle = kinetic_energy(tilted, many)
     s = rebound_share(before, plastic, full, middle)
     _mix(2.0 * s - 1.0, many)  # from the middle
+    _mix_impulses(n, s, many)
     _turn(tilted, many)

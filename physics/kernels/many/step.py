@@ -10,8 +10,17 @@ for the broad phase, until something wakes it (`sleep`).
 from __future__ import annotations
 
 from physics.kernels import layout as at
-from physics.kernels.body import all_finite, angular_velocity, bind_body, read_state, write_state
+from physics.kernels.body import (
+    angular_velocity,
+    bind_body,
+    first_lost,
+    first_overloaded,
+    note_fault,
+    read_state,
+    write_state,
+)
 from physics.kernels.compiler import kernel
+from physics.kernels.events.log import drop_events, forget_events
 from physics.kernels.fields.loads import bind_fields, set_clock
 from physics.kernels.many.contacts import put
 from physics.kernels.many.memory import forget
@@ -24,11 +33,12 @@ from physics.kernels.turns import begin, next_world
 @kernel
 def step_many(
     turns, taken, steps, substeps, h, state, params, shapes, gravity, wrench, friction, restitution, gyroscopic,
-    tilted, ellipsoids, hulls, scheme, kept, sleep, memory, report, many,
+    tilted, ellipsoids, hulls, scheme, kept, sleep, memory, report, many, log, counts,
 ):  # fmt: skip
     """Advance the worlds that no other thread has taken by `steps` steps of `substeps` substeps of h seconds each.
 
     A world in which a new state is not finite keeps the last good one, and its report counts the fault.
+    Impacts go to `log` (rows, room, EVENT_SIZE), if that has any room, their number to `counts` (rows,).
     """
     bodies = shapes.shape[0]
     world = begin(turns, taken)
@@ -38,6 +48,7 @@ def step_many(
             break
         for c in range(at.REPORT_SIZE):
             report[world, c] = 0.0
+        forget_events(world, bodies, log, counts)
         if sleep is not None and sleep_on(world, bodies, wrench, sleep):
             continue
         for b in range(bodies):
@@ -47,19 +58,27 @@ def step_many(
             bind_fields(params, i, many.bodies[b])
             write_state(many.now, b, read_state(state, i))
             many.touched[b] = 0
+        lost = first_overloaded(many.bodies)
+        if lost >= 0:
+            note_fault(world, lost, report)
+            wake_world(world, bodies, sleep)
+            continue
         for k in range(steps * substeps):
             if kept is not None:
                 switches = (friction, gyroscopic, tilted, ellipsoids, hulls, scheme)
-                refine(world, k * h, h, switches, kept, memory, report, many)
+                refine(world, k * h, h, switches, kept, memory, report, many, log, counts)
             else:
                 for b in range(bodies):
                     set_clock(k * h, many.bodies[b])
                 substep_world(
-                    world, h, friction, gyroscopic, tilted, ellipsoids, hulls, scheme, sleep, memory, report, many
-                )
-            if not all_finite(many.now):
-                report[world, at.FAULTS] += 1.0
+                    world, k * h, h, friction, gyroscopic, tilted, ellipsoids, hulls, scheme, sleep, memory, report,
+                    many, log, counts,
+                )  # fmt: skip
+            lost = first_lost(many.now)
+            if lost >= 0:
+                note_fault(world, lost, report)
                 forget(world, memory)
+                drop_events(world, bodies, k * h, log, counts)
                 wake_world(world, bodies, sleep)
                 break
             if sleep is not None:

@@ -9,6 +9,7 @@ from physics.kernels.compiler import inlined, kernel
 from physics.kernels.many import memory as kept
 from physics.kernels.many.contacts import acceleration_of, pair_slop, put, vector
 from physics.kernels.many.restraint import settle_restrained
+from physics.kernels.many.told import log_impacts
 
 # A meeting is fast where it would close this share of the smaller body's radius in the time left: it is then met in
 # time, not stopped in front of.
@@ -140,8 +141,10 @@ def keep_the_crowded(n, many):
 
 
 @kernel
-def strike(n, world, h, is_last, friction, tilted, report, many):
+def strike(n, world, t, h, is_last, friction, tilted, report, many, log, counts):
     """Velocities after the impulses of the contacts that approach; nothing where none does. Contacts in the set.
+
+    It happens t [s] after the start of the call, with h [s] left of the substep.
 
     In turn only the one that approaches fastest gives an impulse: the step comes back for the others.
     """
@@ -156,6 +159,8 @@ def strike(n, world, h, is_last, friction, tilted, report, many):
                 many.target[k, 0] = -FAR  # its turn comes when this one is over
     n = leave_out_the_free(n, many)
     settle_restrained(n, world, friction, tilted, report, many)
+    if log.shape[1] > 0:
+        log_impacts(n, world, t, many, log, counts)
     return n, meeting, True
 
 

@@ -19,7 +19,7 @@ from physics.kernels import layout as at
 from physics.kernels.compiler import inlined, kernel
 from physics.kernels.fields.loads import pass_time
 from physics.kernels.many.apart import push_apart
-from physics.kernels.many.arrays import CONTACTS, LEFT_OUT
+from physics.kernels.many.arrays import CONTACTS, LEFT_OUT, STAGE_LENGTH
 from physics.kernels.many.glide import glide, hold_all_loads
 from physics.kernels.many.place import place_bodies
 from physics.kernels.many.strike import strike
@@ -28,12 +28,25 @@ from physics.kernels.many.touch import find_contacts
 # Cuts of a substep per impact allowed: a meeting is approached from before it, in two or three.
 CUTS_PER_IMPACT = 4
 
+# Bodies put into each other deeper than this share of the smaller one's bounding radius overlap: as for walls
+# (`physics.changes.START_DEPTH`), which refuse it.
+OVERLAP_SHARE = 1.0e-2
+
 
 @inlined
-def note_depth(n, world, report, many):
-    """Deepest penetration of the set into the world's report, and contacts for which there was no room."""
+def note_depth(n, world, memory, report, many):
+    """Deepest penetration of the set into the world's report, and contacts for which there was no room.
+
+    Nothing is remembered of a stage where the bodies were put: what overlaps there is told as such.
+    """
+    is_start = memory[world, STAGE_LENGTH] == 0.0
     for k in range(n):
-        report[world, at.PENETRATION] = max(report[world, at.PENETRATION], -many.gap[k])
+        depth = -many.gap[k]
+        report[world, at.PENETRATION] = max(report[world, at.PENETRATION], depth)
+        if is_start and many.ends[k, 1] >= 0:
+            radius = min(many.bodies[many.ends[k, 0]].radius, many.bodies[many.ends[k, 1]].radius)
+            if depth > OVERLAP_SHARE * radius:
+                report[world, at.OVERLAP] = max(report[world, at.OVERLAP], depth)
     report[world, at.LEFT_OUT] += many.counts[LEFT_OUT]
     many.counts[LEFT_OUT] = 0
 
@@ -50,8 +63,10 @@ def mark_touched(n, many):
 
 
 @kernel
-def substep_world(world, h, friction, gyroscopic, tilted, ellipsoids, hulls, scheme, sleep, memory, report, many):
-    """Advance the bodies of one world by h: the stages of the module's list."""
+def substep_world(
+    world, start, h, friction, gyroscopic, tilted, ellipsoids, hulls, scheme, sleep, memory, report, many, log, counts
+):  # fmt: skip
+    """Advance the bodies of one world by h, `start` after the call [s]: the stages of the module's list."""
     left, impacts = h, 0
     for cut in range(CUTS_PER_IMPACT * many.settings[0].splits + 1):
         is_last = impacts >= many.settings[0].splits or cut == CUTS_PER_IMPACT * many.settings[0].splits
@@ -59,8 +74,10 @@ def substep_world(world, h, friction, gyroscopic, tilted, ellipsoids, hulls, sch
         place_bodies(tilted, many)
         find_contacts(left, ellipsoids, hulls, world, sleep, many)
         n = many.counts[CONTACTS]
-        note_depth(n, world, report, many)
-        n, t, is_impact = strike(n, world, left, is_last, friction, tilted, report, many)
+        note_depth(n, world, memory, report, many)
+        n, t, is_impact = strike(
+            n, world, start + (h - left), left, is_last, friction, tilted, report, many, log, counts
+        )  # fmt: skip
         many.counts[CONTACTS] = n
         if is_impact and not is_last:
             impacts += 1

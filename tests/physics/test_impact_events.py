@@ -1,0 +1,194 @@
+"""Impacts as events: which bodies, where, and with what impulse; they add up to the change of momentum."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import physics
+from physics import trajectory
+from physics.kernels.events import log
+
+PRESETS = ("fast", "balanced", "precise", "reference")
+FLOOR = physics.HalfSpace((0, 1, 0), 0.0)
+
+
+def laws(restitution, friction=0.5):
+    return [
+        physics.Gravity((0, 0, 0)), physics.Contact(restitution=restitution), physics.Friction(friction)
+    ]  # fmt: skip
+
+
+def impacts(run):
+    return [event for event in run.events if event.kind == "impact"]
+
+
+def received(run, body):
+    """(3,) sum of the impulses on a body [N s]."""
+    total = np.zeros(3)
+    for event in impacts(run):
+        total += np.multiply(event.impulse, (event.body == body) - 1.0 * (event.other == body))
+    return total
+
+
+def check_momenta(run, masses, share):
+    """Every body's momentum changes by its impulses, to a share of the largest momentum there is."""
+    scale = max(m * np.linalg.norm(v) for m, v in zip(masses, run.linvel[0]))
+    for body, mass in enumerate(masses):
+        change = mass * (run.linvel[-1, body] - run.linvel[0, body])
+        np.testing.assert_allclose(received(run, body), change, rtol=0, atol=share * scale)
+
+
+@pytest.mark.parametrize("accuracy", PRESETS)
+@pytest.mark.parametrize("e", [0.5, 1.0])
+def test_two_spheres_head_on_give_the_impulse_of_the_closed_form(accuracy, e):
+    """J = (1 + e) m M/(m + M) times the speed of approach, once, at the point between the centres."""
+    m, M = 2.0, 3.0
+    bodies = [
+        physics.Sphere(0.5, m, linvel=(1, 0, 0)),
+        physics.Sphere(0.75, M, pos=(2.25, 0, 0), linvel=(-1, 0, 0)),
+    ]
+    run = physics.simulate(physics.Scene(bodies, [], laws(e)), 1.0, accuracy)
+    (hit,) = impacts(run)
+    tolerance = 1e-5 if accuracy == "fast" else 2e-6
+    assert (hit.body, hit.other, hit.wall) == (0, 1, -1)
+    assert hit.t == pytest.approx(0.5, abs=tolerance)
+    np.testing.assert_allclose(hit.impulse, ((1 + e) * m * M / (m + M) * -2.0, 0, 0), rtol=0, atol=4e-15 * 10)
+    np.testing.assert_allclose(hit.normal, (-1, 0, 0), rtol=0, atol=1e-15)
+    np.testing.assert_allclose(hit.point, (1, 0, 0), rtol=0, atol=tolerance)
+    check_momenta(run, (m, M), 1e-14)
+
+
+@pytest.mark.parametrize("accuracy", PRESETS)
+def test_a_cradle_of_blocks_hands_the_momentum_on_pair_by_pair(accuracy):
+    """Equal blocks, e = 1, a gap between each two: m v goes through every pair once, at the middle of its faces."""
+    m, v, gap = 2.0, 3.0, 0.1
+    bodies = [
+        physics.Block((1, 1, 1), m, pos=((1 + gap) * k, 0, 0), linvel=(v if k == 0 else 0, 0, 0)) for k in range(5)
+    ]
+    run = physics.simulate(physics.Scene(bodies, [], laws(1.0)), 0.3, accuracy)
+    hits = impacts(run)
+    assert [(hit.body, hit.other) for hit in hits] == [(0, 1), (1, 2), (2, 3), (3, 4)]
+    for k, hit in enumerate(hits):
+        assert hit.t == pytest.approx((k + 1) * gap / v, abs=1e-4)
+        np.testing.assert_allclose(hit.impulse, (-m * v, 0, 0), rtol=0, atol=1e-3 * m * v)
+        np.testing.assert_allclose(hit.point, ((1 + gap) * (k + 1) - 0.5, 0, 0), rtol=0, atol=1e-4)
+        np.testing.assert_allclose(hit.normal, (-1, 0, 0), rtol=0, atol=1e-12)
+    check_momenta(run, [m] * 5, 1e-12)
+
+
+@pytest.mark.parametrize("accuracy", ["fast", "balanced", "precise"])
+def test_a_tower_thrown_at_the_floor_tells_the_floor_from_its_blocks(accuracy):
+    """What each block loses is what its impulses sum up to, the floor's and its neighbours'; no more pairs than met."""
+    masses = (2.0, 1.0, 3.0)
+    bodies = [physics.Block((1, 1, 1), m, pos=(0, 1 + 1.1 * k, 0), linvel=(0, -2, 0)) for k, m in enumerate(masses)]
+    run = physics.simulate(physics.Scene(bodies, [FLOOR], laws(0.5)), 1.0, accuracy)
+    met = {(hit.body, hit.wall, hit.other) for hit in impacts(run)}
+    assert met == {(0, 0, -1), (0, -1, 1), (1, -1, 2)}
+    first = impacts(run)[0]
+    assert (first.body, first.wall) == (0, 0)
+    assert first.t == pytest.approx(0.25, abs=1e-4)
+    np.testing.assert_allclose(first.point, (0, 0, 0), rtol=0, atol=1e-4)
+    np.testing.assert_allclose(first.normal, (0, 1, 0), rtol=0, atol=1e-12)
+    assert all(np.dot(hit.impulse, hit.normal) > 0 for hit in impacts(run))
+    check_momenta(run, masses, 1e-3 if accuracy == "fast" else 1e-6)
+
+
+@pytest.mark.parametrize("accuracy", PRESETS)
+def test_a_ball_that_hits_a_block_off_its_centre_turns_it_by_the_moment_of_its_impulse(accuracy):
+    """With friction: L of the block after is (point - its centre) x the impulse on it; the ball's likewise."""
+    bodies = [
+        physics.Block((2, 1, 1), 4.0, inertia_body=(1, 2, 3)),
+        physics.Sphere(0.25, 1.0, pos=(0.75, 1.25, 0.2), linvel=(0.5, -2, 0.3), angvel=(3, 0, -4)),
+    ]
+    run = physics.simulate(physics.Scene(bodies, [], laws(0.6)), 0.5, accuracy)
+    (hit,) = impacts(run)
+    assert (hit.body, hit.other) == (0, 1)
+    assert abs(hit.impulse[0]) > 0.1  # friction has a part in it
+    check_momenta(run, (4.0, 1.0), 1e-13)
+    moment = np.cross(hit.point, hit.impulse)  # the block's centre of mass is at the origin until then
+    world = physics.World(physics.Scene(bodies, [], laws(0.6)), dt=0.5, accuracy=accuracy)
+    world.step()
+    np.testing.assert_allclose(world.state[0, 10:13], moment, rtol=0, atol=1e-12)
+
+
+@pytest.mark.parametrize("accuracy", PRESETS)
+def test_impacts_with_walls_name_body_and_wall_where_bodies_meet_only_walls(accuracy):
+    """One block between floor and wall, e = 1: the impulse turns the velocity round."""
+    block = physics.Block((1, 1, 1), 3.0, pos=(1, 1, 0), linvel=(2, -1, 0))
+    walls = [FLOOR, physics.HalfSpace((-1, 0, 0), -3.0)]
+    run = physics.simulate(physics.Scene([block], walls, laws(1.0, 0.0)), 1.2, accuracy)
+    floor, wall = impacts(run)
+    assert (floor.body, floor.wall, floor.other, wall.body, wall.wall) == (0, 0, -1, 0, 1)
+    np.testing.assert_allclose((floor.t, wall.t), (0.5, 0.75), rtol=0, atol=1e-4)
+    np.testing.assert_allclose((floor.impulse, wall.impulse), ((0, 6, 0), (-12, 0, 0)), rtol=0, atol=1e-12)
+    np.testing.assert_allclose((floor.point, wall.point), ((2, 0, 0), (3, 0.75, 0)), rtol=0, atol=1e-4)
+    np.testing.assert_allclose((floor.normal, wall.normal), ((0, 1, 0), (-1, 0, 0)), rtol=0, atol=1e-12)
+
+
+def _thrown():
+    """Three balls and a block that fall on each other and the floor with friction."""
+    bodies = [
+        physics.Block((2, 1, 1), 4.0, pos=(0, 0.7, 0), angvel=(0.3, 0.2, 1)),
+        physics.Sphere(0.3, 1.0, pos=(0.5, 1.6, 0.1), linvel=(0.5, -4, 0)),
+        physics.Sphere(0.3, 2.0, pos=(-0.5, 1.8, 0.1), linvel=(0.5, -4, 1)),
+    ]
+    return physics.Scene(bodies, [FLOOR], laws(0.6))
+
+
+@pytest.mark.parametrize("accuracy", ["balanced", "precise"])
+def test_a_log_changes_nothing_and_tells_when_it_is_full(accuracy):
+    """The same bits with room and without; the count goes on where the room ends, and nothing is counted without."""
+    plain, logged, small = (physics.World(_thrown(), accuracy=accuracy) for _ in range(3))
+    logged.make_event_room(64)
+    small.make_event_room(1)
+    most = 0
+    for _ in range(60):
+        for world in (plain, logged, small):
+            world.step()
+        assert plain.state.tobytes() == logged.state.tobytes() == small.state.tobytes()
+        assert not plain.event_counts.any()
+        np.testing.assert_array_equal(logged.event_counts, small.event_counts)
+        most = max(most, int(small.event_counts.max()))
+        for body, count in enumerate(logged.event_counts):
+            assert (np.diff(logged.event_log[body, :count, log.TIME]) >= 0).all()
+            assert (logged.event_log[body, :count, log.KIND] == log.IMPACT).all()
+    assert most > 1
+
+
+@pytest.mark.parametrize("accuracy", ["balanced", "precise"])
+def test_a_step_with_more_events_than_room_is_taken_again(accuracy, monkeypatch):
+    """`simulate` loses none."""
+    whole = physics.simulate(_thrown(), 0.6, accuracy, sample_dt=0.02)
+    monkeypatch.setattr(trajectory, "EVENT_ROOM", 1)
+    again = physics.simulate(_thrown(), 0.6, accuracy, sample_dt=0.02)
+    assert whole.events == again.events
+    assert len(impacts(whole)) > 3
+    assert whole.pos.tobytes() == again.pos.tobytes()
+
+
+def test_bodies_that_come_to_lie_on_each_other_touch_and_part():
+    """Time stepping tells the pairs that rest on each other, not only the walls."""
+    bodies = [physics.Block((1, 1, 1), 1.0, pos=(0, 0.5, 0)), physics.Block((1, 1, 1), 1.0, pos=(0, 1.5, 0))]
+    effects = [physics.Gravity((0, -9.81, 0)), physics.Contact(restitution=0.5), physics.Friction(0.5)]
+
+    def lift(t, world):
+        load = world.no_wrench()[0]
+        load[1, 1] = 30.0 if t > 0.045 else 0.0
+        return load
+
+    run = physics.simulate(physics.Scene(bodies, [FLOOR], effects), 0.1, wrench=lift)
+    told = [(event.kind, event.body, event.wall, event.other) for event in run.events]
+    assert told[:2] == [("touch", 0, 0, -1), ("touch", 0, -1, 1)]
+    assert ("release", 0, -1, 1) in told
+
+
+def test_a_step_that_is_not_kept_logs_nothing():
+    """Where a world keeps its old state nothing has hit anything."""
+    world = physics.World(_thrown())
+    world.make_event_room(16)
+    wrench = world.no_wrench()
+    wrench[0, 1, 1] = -1e160
+    world.step(wrench)
+    assert world.report.faults[0] == 1
+    assert not world.event_counts.any()
