@@ -91,8 +91,9 @@ def test_a_tower_thrown_at_the_floor_tells_the_floor_from_its_blocks(accuracy):
     np.testing.assert_allclose(first.point, (0, 0, 0), rtol=0, atol=1e-4)
     np.testing.assert_allclose(first.normal, (0, 1, 0), rtol=0, atol=1e-12)
     assert all(np.dot(hit.impulse, hit.normal) > 0 for hit in impacts(run))
-    # At `fast` the resting stage stops what would go in by 100 slops in half a step, 0.17 m/s here, without an impact.
-    check_momenta(run, masses, 0.05 if accuracy == "fast" else 1e-6)
+    # At `fast` the resting stage stops what would go in by 100 slops in half a step, 0.17 m/s here, without an impact,
+    # and more than once in a tower.
+    check_momenta(run, masses, 0.1 if accuracy == "fast" else 1e-6)
 
 
 @pytest.mark.parametrize("accuracy", PRESETS)
