@@ -9,6 +9,7 @@ import pytest
 
 import physics
 from physics import Status, scenes
+from physics.kernels import layout as at
 
 PRESETS = ("fast", "balanced", "precise", "reference")
 FLOOR = physics.HalfSpace((0, 1, 0), 0.0)
@@ -182,7 +183,7 @@ def test_steppers_and_trajectories_say_so_too(accuracy):
     assert world.report.status[0] == Status.FAULT
     run = physics.simulate(blocks(1, 1.5), 0.02, accuracy, wrench=lambda t, world: np.full((1, 6), 1e160))
     assert [report.status[0] for report in run.reports] == [Status.FAULT] * 2
-    assert [event.kind for event in run.events].count("fault") == 2
+    assert [(event.kind, event.body) for event in run.events].count(("fault", 0)) == 2
     assert not run.ok
 
 
@@ -205,10 +206,10 @@ def test_states_that_are_too_large_are_reported(name, count, accuracy):
         given[0, :, 1] += 3.0 * np.arange(count) if name == "pos" else 0.0
         given[0, count - 1, 1] = value
         world.set_state(**{name: given})
-        before = world.state.tobytes()
+        before = world.state[:, : at.ANGVEL].tobytes()  # the angular velocity is derived anew
         report = world.step()
         assert report.status[0] == Status.FAULT
         assert report.fault_body[0] == count - 1
-        assert world.state.tobytes() == before
+        assert world.state[:, : at.ANGVEL].tobytes() == before
         world.set_state(**{name: getattr(physics.World(blocks(count, 50.0)), name)})
         assert world.step().status[0] == Status.OK
