@@ -157,6 +157,7 @@ class Recording:
             with np.load(path, allow_pickle=False) as file:
                 content = dict(file)
             head = json.loads(str(content["head"]))
+            content["start_report_table"] = _widened(content["start_report_table"])
             columns = [content[f"start_{name}"] for name in KEPT if name != "sleep" or "start_sleep" in content]
         except (KeyError, ValueError, EOFError) as error:
             raise ValueError(f"{path} is no recording ({error}); allowed is what physics.Recorder writes") from None
@@ -171,6 +172,11 @@ class Recording:
             reason=head["reason"],
             origin=head["origin"],
         )
+
+
+def _widened(table: np.ndarray) -> np.ndarray:
+    """A report table (..., columns) of a version with fewer columns, with zeros for the others."""
+    return np.pad(table, [(0, 0)] * (table.ndim - 1) + [(0, max(0, at.REPORT_SIZE - table.shape[-1]))])
 
 
 @dataclass(frozen=True)

@@ -60,7 +60,6 @@ class Event:
         ``rest`` (the body came to rest). What time stepping meets so slowly that loads could have made it as fast
         within a step is a ``touch`` without an ``impact``.
     body : int
-        -1: unknown which (``fault`` of time stepping).
     wall : int
         -1 where the kind has none, and where bodies meet.
     impulse : (3,) tuple of float
@@ -273,7 +272,7 @@ class _Touching:
             for body, end_of in sorted(pairs, key=lambda pair: (pair[0], abs(pair[1]), pair[1])):
                 events.append(Event(end, kind, body, max(-1, -1 - end_of), other=max(-1, end_of)))
         if world.report.faults[0]:
-            events.append(Event(end, "fault", -1))
+            events.append(Event(end, "fault", int(world.report.fault_body[0])))
         return events
 
 

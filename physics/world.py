@@ -84,9 +84,9 @@ class World:
     Raises
     ------
     ValueError
-        A parameter out of range, a number of a state beyond 1e100, a body that starts deep inside a wall, or two bodies
-        that touch each other and start with their centres in the same place. Bodies that overlap otherwise are lifted
-        apart, and the report of the first step says so (`Status.OVERLAP`).
+        A parameter out of range, a body that starts deep inside a wall, or two bodies that touch each other and start
+        with their centres in the same place. Bodies that overlap otherwise are lifted apart, and the report of the
+        first step says so (`Status.OVERLAP`).
     """
 
     def __init__(
@@ -260,9 +260,9 @@ class World:
         Raises
         ------
         ValueError
-            A wrong shape, a number that is not finite or beyond 1e100, no unit quaternion, a world named twice or not
-            there, a body deep inside a wall, or two bodies that touch each other with their centres in the same place.
-            Nothing has changed then.
+            A wrong shape, a number that is not finite, no unit quaternion, a world named twice or not there, a body deep
+            inside a wall, or two bodies that touch each other with their centres in the same place. Nothing has changed
+            then.
         """
         changes.set_state(self, pos, quat, linvel, angvel, worlds)
 

@@ -72,7 +72,7 @@ def _touching(kind: type) -> tuple[physics.Scene, physics.Scene]:
     scene = scenes.rest()
     gone = {physics.Contact: (physics.Contact, physics.Friction)}.get(kind, (kind,))
     without = [effect for effect in scene.effects if not isinstance(effect, gone)]
-    return scene, physics.Scene(scene.bodies, scene.walls, without)
+    return scene, physics.Scene(scene.bodies, () if kind is physics.Contact else scene.walls, without)
 
 
 def _resting() -> tuple[physics.Scene, physics.Scene]:

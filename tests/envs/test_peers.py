@@ -251,6 +251,7 @@ class Standing:
         return np.zeros((1, 3)), np.array([[1.0, 0.0, 0.0, 0.0]]), np.zeros((1, 3)), np.zeros((1, 3))
 
 
+@pytest.mark.filterwarnings("ignore::physics.SceneWarning")
 def test_what_peers_ask_of_a_scene():
     assert (restitution(scenes.drop()), friction(scenes.drop()), gravity(scenes.drop())) == (0.3, 0.5, (0.0, -G, 0.0))
     assert (restitution(scenes.slide()), len(walls(scenes.slide()))) == (0.0, 1)

@@ -198,6 +198,7 @@ def test_a_hull_is_drawn_with_its_corners_and_without_the_diagonals_of_its_faces
             replace(view, **wrong)
 
 
+@pytest.mark.filterwarnings("ignore::physics.SceneWarning")
 def test_a_world_of_hulls_is_drawn_where_they_are(renderer):
     world = physics.World(physics.Scene([WEDGE], [physics.HalfSpace((0, 1, 0))], [physics.Gravity()]))
     frame = world_frame(world)

@@ -315,6 +315,7 @@ def test_a_lone_hull_has_the_step_of_many_bodies_and_says_so():
     assert free.hulls is None
 
 
+@pytest.mark.filterwarnings("ignore::physics.SceneWarning")
 def test_what_is_not_known_of_hulls_is_refused():
     hull, laws = physics.Hull(WEDGE, 1.0, pos=(0, 2, 0)), [physics.Gravity(), physics.Contact(), physics.Friction(0.5)]
     for field in (physics.Drag(), physics.Magnus(), physics.Buoyancy()):

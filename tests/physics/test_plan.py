@@ -38,6 +38,7 @@ def test_only_what_is_declared_is_on():
     }  # fmt: skip
 
 
+@pytest.mark.filterwarnings("ignore::physics.SceneWarning")
 def test_explain_names_every_effect_and_its_reason():
     text = physics.make_plan(scenes.drop(), resolve("balanced")).explain()
     for word in ("gravity", "wall contact", "friction", "restitution", "gyroscopic torque", "applied wrench"):

@@ -58,9 +58,10 @@ def step_many(
             bind_fields(params, i, many.bodies[b])
             write_state(many.now, b, read_state(state, i))
             many.touched[b] = 0
-        lost = first_overloaded(many.bodies)
+        lost = max(first_overloaded(many.bodies), first_lost(many.now))
         if lost >= 0:
             note_fault(world, lost, report)
+            forget(world, memory)
             wake_world(world, bodies, sleep)
             continue
         for k in range(steps * substeps):
