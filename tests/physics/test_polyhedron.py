@@ -148,5 +148,5 @@ def test_as_many_corners_as_allowed_are():
 
 
 def test_the_mass_must_be_one():
-    with pytest.raises(ValueError, match="mass is 0.0; allowed"):
+    with pytest.raises(ValueError, match=r"mass is 0\.0; allowed"):
         physics.Hull(CUBE, 0.0)
