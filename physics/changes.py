@@ -67,6 +67,8 @@ def set_parameters(world: World, mass, size, inertia_body, friction, restitution
         _needs("restitution", plan.restitution, "physics.Contact(restitution=...)")
         params[:, at.RESTITUTION] = checks.share(*parameters.spread(restitution, shape, "restitution")).ravel()
     if effects is not None:
+        if isinstance(effects, (str, bytes)):
+            raise ValueError(f"effects is {shown(effects)}; allowed is a list of effects")
         effects = tuple(effects) if isinstance(effects, Iterable) else (effects,)
         laws = [effect for effect in effects if isinstance(effect, (*RESISTANCES, Friction))]
         for effect in laws:

@@ -24,11 +24,17 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from physics import checks
+from physics.summary import shown
 
 # Relative to the largest moment: what sums of a thousand rounded terms may lose (1e3 · 4 · 2.2e-16).
 RELATIVE_TOLERANCE = 1e-12
 # Relative to the largest moment: what R I Rᵀ may leave off the diagonal of a tensor that is diagonal.
 DIAGONAL_TOLERANCE = 8 * np.finfo(float).eps
+
+
+# Smallest mass and moment of inertia [kg, kg m²], and inverse of the largest: products of two of them and of their
+# inverses are normal floats.
+LEAST = 1e-150
 
 
 def _floats(value: ArrayLike, shape: tuple[int, ...], field: str) -> np.ndarray:
@@ -261,6 +267,24 @@ def principal_axes(inertia: ArrayLike) -> tuple[np.ndarray, np.ndarray]:
         if np.trace(R) > best[2]:
             best = (moments[list(order)], R, np.trace(R))
     return best[0], best[1]
+
+
+def check_range(masses: np.ndarray, moments: np.ndarray) -> None:
+    """Refuse masses (n,) [kg] and principal moments (n, 3) [kg m²] that a float cannot be divided by.
+
+    Raises
+    ------
+    ValueError
+        Naming the first body's mass and moments that do not lie between `LEAST` and its inverse.
+    """
+    numbers = np.concatenate((masses[:, None], moments), axis=1)
+    good = (numbers >= LEAST) & (numbers <= 1 / LEAST)
+    if not good.all():
+        k = int(np.argmin(good.all(axis=1)))
+        raise ValueError(
+            f"mass is {float(masses[k])!r} kg, and the moments of inertia are {shown(moments[k])} kg m²; allowed is "
+            f"what lies between {LEAST:g} and {1 / LEAST:g}: choose other units"
+        )
 
 
 def check_inertia(inertia: ArrayLike, field: str) -> np.ndarray:

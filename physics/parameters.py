@@ -8,7 +8,7 @@ import numpy as np
 
 from physics import checks
 from physics.effects import Contact, Friction, RollingFriction, SpinFriction
-from physics.inertia import check_inertia, principal_axes
+from physics.inertia import check_inertia, check_range, principal_axes
 from physics.kernels import layout as at
 from physics.kernels.compiler import kernel
 from physics.kernels.laws import ANISOTROPY, DAMPING, ROLLING, SPIN, STIFFNESS, TANGENTIAL
@@ -131,6 +131,7 @@ def change_inertia(params, bodies, plan, mass, size, inertia_body, shape) -> Non
             _check_hull(b, body, halves[rows])
         given = None if tensors is None else tensors[rows]
         moments, R = _principal_axes(body, masses[rows], halves[rows], given)
+        check_range(masses[rows], moments)
         _check_allowed(plan, moments, R)
         _write_body(params[rows], body, masses[rows], moments, R, halves[rows])
     _change_series(params)

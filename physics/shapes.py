@@ -13,10 +13,6 @@ from physics.keywords import known_keywords
 from physics.polyhedron import Polyhedron, convex_hull
 from physics.summary import fields_repr, shown
 
-# Smallest mass and moment of inertia [kg, kg m²], and inverse of the largest: products of two of them and of their
-# inverses are normal floats.
-LEAST = 1e-150
-
 
 def _tuple(array: np.ndarray) -> tuple:
     return tuple(float(v) for v in np.ravel(array))
@@ -79,12 +75,7 @@ class Body:
         """Refuse a mass or inertia whose inverse no float holds: what is divided by it would not be finite."""
         with np.errstate(over="ignore", invalid="ignore"):
             moments = np.diagonal(self.inertia)
-        numbers = np.array([self.mass, *moments])
-        if not ((numbers >= LEAST) & (numbers <= 1 / LEAST)).all():
-            raise ValueError(
-                f"mass is {self.mass!r} kg, and the moments of inertia are {shown(moments)} kg m²; allowed is "
-                f"what lies between {LEAST:g} and {1 / LEAST:g}: choose other units"
-            )
+        inertia.check_range(np.array([self.mass]), moments[None])
 
     def _set(self, name, value):
         object.__setattr__(self, name, value)
@@ -263,8 +254,8 @@ class Hull(Body):
 
     def __post_init__(self):
         self._set("points", tuple(map(_tuple, checks.rows(self.points, 3, "points"))))
-        if self.points and not np.abs(self.points).max() < 1 / LEAST:
-            raise ValueError(f"points is {shown(self.points)}; allowed are coordinates below {1 / LEAST:g}")
+        if self.points and not np.abs(self.points).max() < 1 / inertia.LEAST:
+            raise ValueError(f"points is {shown(self.points)}; allowed are coordinates below {1 / inertia.LEAST:g}")
         convex_hull(self.points)
         super().__post_init__()
 

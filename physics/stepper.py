@@ -57,6 +57,8 @@ class Stepper:
     ):
         if not hasattr(world, "no_wrench"):  # the class itself knows this module
             raise ValueError(f"world is {shown(world)}; allowed is a physics.World")
+        if then is not None and not callable(then):
+            raise ValueError(f"then is {shown(then)}; allowed are None and a function of the list of worlds taken")
         self.world = world
         self.steps = checks.count(steps, "steps")
         self.dt = world.dt if dt is None else float(checks.positive(dt, (), "dt"))

@@ -331,9 +331,11 @@ class World:
         kept = self.kept()
         if [array.shape for array in kept] != [np.shape(array) for array in snapshot.arrays]:
             raise ValueError(
-                f"snapshot is {snapshot!r}, of another scene or batch size; allowed is one of this scene of "
+                f"snapshot is {snapshot!r}, of another scene or batch size; allowed is one of this scene, of "
                 f"{self.worlds} worlds"
             )
+        if any(array.dtype != value.dtype for array, value in zip(kept, snapshot.arrays)):
+            raise ValueError(f"snapshot is {snapshot!r}; allowed are arrays of 64-bit numbers, as they were taken")
         for array, value in zip(kept, snapshot.arrays):
             array[...] = value
         self.time = snapshot.time

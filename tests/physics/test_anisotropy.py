@@ -233,7 +233,7 @@ BAD = [
     (lambda: physics.Friction(0.1, Z), r"Friction.axis is \(0, 0, 1\); allowed is None with one coefficient"),
     (lambda: physics.Friction((0.1, 0.0), Z), "Friction.coefficient is .*; allowed are numbers greater than 0"),
     (lambda: physics.Friction((0.1, 0.2, 0.3), Z), r"Friction.coefficient has shape \(3,\); allowed is shape \(2,\)"),
-    (lambda: physics.Friction("rough", None), "Friction.coefficient is 'rough'; allowed are numbers"),
+    (lambda: physics.Friction("rough", None), "Friction.coefficient is 'rough'; allowed is one number"),
     (lambda: physics.Friction((0.1, 0.2), (0, 0, 0)), "Friction.axis is .*; allowed are directions"),
     (lambda: physics.Friction((0.1, 0.2), (1, [2])), "Friction.axis is .*; allowed are numbers"),
     (lambda: on([FLOOR], physics.Friction((0.1, 0.2), (0, -2, 0))), r"Friction.axis is .* the normal of walls\[0\]"),

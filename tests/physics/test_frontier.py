@@ -362,7 +362,7 @@ def test_progress_counts_every_run():
         ({"settings": [("balanced", 0.0)]}, r"settings\[0\] step"),
         ({"settings": [("balanced", 1e-9)]}, "allowed are steps from 1e-6"),
         ({"settings": ["balanced"]}, r"settings\[0\] is 'balanced'"),
-        ({"settings": [("best", 0.1)]}, "accuracy is 'best'"),
+        ({"settings": [("best", 0.1)]}, r"settings\[0\] is 'best'; allowed are fast"),
         ({"truth": 5}, "truth is 5"),
         ({"repeats": 0}, "repeats is 0"),
     ],

@@ -120,16 +120,16 @@ def on_sphere(count):
     ("points", "message"),
     [
         (CUBE[:3], "points has 3 of them; allowed are at least 4"),
-        ([], r"points has shape \(0,\); allowed is shape \(0, 3\)"),
+        ([], r"points has shape \(0,\); allowed are rows of 3 numbers"),
         (CUBE[:4], "points lie in one plane"),
         (np.tile(CUBE[0], (5, 1)), "points lie in one plane"),
         (CUBE * (1, 1, 1e-10), "points lie in one plane"),
         (CUBE * (1, 1e-8, 1e-8), "points lie on one line"),
         (CUBE[:, :2], r"points has shape \(8, 2\)"),
-        (np.where(CUBE > 0, np.nan, CUBE), "(?s)points is .*allowed are finite numbers"),
+        (np.where(CUBE > 0, np.nan, CUBE), r"points\[1, 2\] is nan; allowed are finite numbers"),
         ([(1, 2, 3), (1, 2)], "points is .*allowed are rows of 3 numbers"),
         ("rock", "points is 'rock'; allowed are rows of 3 numbers"),
-        (5, "points is 5; allowed are rows of 3 numbers"),
+        (5, "points is 5.0; allowed are rows of 3 numbers"),
         (on_sphere(MOST_CORNERS + 1), f"points has a hull of 65 corners; allowed are at most {MOST_CORNERS}"),
     ],
 )
@@ -148,5 +148,5 @@ def test_as_many_corners_as_allowed_are():
 
 
 def test_the_mass_must_be_one():
-    with pytest.raises(ValueError, match=r"mass is 0\.?; allowed"):
+    with pytest.raises(ValueError, match=r"mass is 0\.0; allowed"):
         physics.Hull(CUBE, 0.0)
