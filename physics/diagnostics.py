@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from physics import checks
+from physics.field_errors import raised
 from physics.gaps import wall_gaps
 from physics.kernels import layout as at
 from physics.kernels.fields.probe import look_at_fields
@@ -84,5 +85,8 @@ def look_at(world: World) -> tuple[np.ndarray, np.ndarray]:
     wrenches, energies = np.zeros((len(world.state), 6)), np.zeros(len(world.state))
     if world.plan.fields:
         arrays = world.state, world.params, world.shapes
-        look_at_fields(*arrays, world.plan.tilted, world.time, body_records(world.scratch[0]), wrenches, energies)
+        try:
+            look_at_fields(*arrays, world.plan.tilted, world.time, body_records(world.scratch[0]), wrenches, energies)
+        except IndexError as error:
+            raise raised(error, world.plan.fields) from error
     return wrenches, energies

@@ -15,26 +15,26 @@ parameters and the time. The built-in ones stand in `physics.fields`; your own n
 
 from __future__ import annotations
 
-import hashlib
-import inspect
-import types
 from dataclasses import dataclass, fields
-from pathlib import Path
 from typing import ClassVar
 
 import numpy as np
-from numba.core.dispatcher import Dispatcher
 
-from physics import checks
-from physics.kernels.compiler import composed
+from physics import field_check
+from physics.field_digest import as_it_is, digest
+from physics.kernels.codegen.linking import Kernel
+from physics.kernels.compiler import checked
 from physics.kernels.fields.terms import AIR, LOAD, Term
 
-field_function = composed
+field_function = checked
 
 
 @dataclass(frozen=True)
 class Field:
     """A force field: force and torque on every body from its state and the time. Subclass it to make one.
+
+    A subclass is a frozen dataclass, or gives its numbers by `columns`; one that does neither is a ValueError when an
+    object of it is made. Its functions are checked when a `World` is: see `physics.field_check`.
 
     Attributes
     ----------
@@ -61,6 +61,10 @@ class Field:
     is_linked: ClassVar[bool] = False
     needs_axes: ClassVar[bool] = False
 
+    def __new__(cls, *values, **named):
+        field_check.check_class(cls, Field)
+        return super().__new__(cls)
+
     @property
     def kind(self) -> type:
         """Class whose functions are compiled for it: its own."""
@@ -78,8 +82,13 @@ class Field:
         -------
         (n,) or (k, n) float64
             By default the dataclass's own fields, one after the other; the same n for every body and world.
+
+        Raises
+        ------
+        ValueError
+            A field of the dataclass is no finite number, nor an array of them.
         """
-        numbers = [np.ravel(np.asarray(getattr(self, field.name), dtype=np.float64)) for field in fields(self)]
+        numbers = [field_check.numbers_in(self, field.name) for field in fields(self)]
         return np.concatenate(numbers) if numbers else np.empty(0)
 
     def check(self, body_count: int) -> None:
@@ -128,12 +137,18 @@ class FieldSlot:
     first : int
         Its first column among the fields' [1].
     effects : tuple of Field
+    is_users : bool
+        Whether it is none of the built-in ones.
+    may_raise : bool
+        Whether a step in which its function is called may end in an exception.
     """
 
     kind: type
     term: Term
     first: int
     effects: tuple[Field, ...]
+    is_users: bool = False
+    may_raise: bool = False
 
 
 def field_slots(effects: tuple, body_count: int) -> tuple[FieldSlot, ...]:
@@ -142,7 +157,8 @@ def field_slots(effects: tuple, body_count: int) -> tuple[FieldSlot, ...]:
     Raises
     ------
     ValueError
-        A field without a compiled function, or with another number of columns for another body or effect.
+        A field without a compiled function, or with another number of columns for another body or effect; a user's
+        function that does not fit (`physics.field_check.check_function`).
     """
     kinds: dict[type, list[Field]] = {}
     for effect in effects:
@@ -152,22 +168,41 @@ def field_slots(effects: tuple, body_count: int) -> tuple[FieldSlot, ...]:
     for kind, found in sorted(kinds.items(), key=lambda item: _name(item[0])):
         size = _column_count(kind, found, body_count)
         marker = f"{AIR if kind.is_air else LOAD}_{_name(kind)}_{len(found)}x{size}"
-        term = Term(marker, _compiled(kind, "function"), _compiled(kind, "energy"), size, len(found), kind.is_linked)
-        slots.append(FieldSlot(kind, term, first, tuple(found)))
+        functions = [_compiled(kind, name) for name in ("function", "energy")]
+        is_users = not _is_built_in(functions[0])
+        if is_users:
+            functions = [each and as_it_is(each) for each in functions]
+        term = Term(marker, *functions, size, len(found), kind.is_linked)
+        may_raise = is_users and _check_functions(kind, term)
+        slots.append(FieldSlot(kind, term, first, tuple(found), is_users, may_raise))
         first += size * len(found)
     return tuple(slots)
 
 
 def _column_count(kind: type, found: list[Field], body_count: int) -> int:
-    sizes = {effect.columns(body, np.arange(1)).shape[-1] for effect in found for body in range(body_count)}
+    world = np.arange(1)
+    sizes = {field_check.numbers_of(effect, b, world).shape[-1] for effect in found for b in range(body_count)}
     if len(sizes) != 1:
         raise ValueError(f"{kind.__name__}.columns gives {sorted(sizes)} numbers; allowed is one length for all bodies")
     return sizes.pop()
 
 
-def _compiled(kind: type, name: str) -> Dispatcher | None:
+def _check_functions(kind: type, term: Term) -> bool:
+    """Check a user's functions; whether the one that a step calls may raise an exception."""
+    numbers = field_check.describe(kind, Field, term.size)
+    form = field_check.AIR if kind.is_air else field_check.LOAD
+    if term.energy is not None:
+        field_check.check_function(f"{kind.__name__}.energy", term.energy, field_check.ENERGY, term.size, numbers)
+    return field_check.check_function(f"{kind.__name__}.function", term.function, form, term.size, numbers)
+
+
+def _is_built_in(function: Kernel) -> bool:
+    return function.py_func.__module__.startswith("physics.kernels.")
+
+
+def _compiled(kind: type, name: str) -> Kernel | None:
     function = vars(kind).get(name, getattr(kind, name))
-    if isinstance(function, Dispatcher) or (function is None and name == "energy"):
+    if isinstance(function, Kernel) or (function is None and name == "energy"):
         return function
     raise ValueError(f"{kind.__name__}.{name} is {function!r}; allowed is a function under @physics.field_function")
 
@@ -176,62 +211,9 @@ def _name(kind: type) -> str:
     """What tells this kind of field from all others: its function's name, and of a user's own its content, too."""
     function = _compiled(kind, "function")
     name = function.py_func.__name__.replace("_", "")
-    if function.py_func.__module__.startswith("physics.kernels."):
+    if _is_built_in(function):
         return name
     return f"{name}{digest(function, _compiled(kind, 'energy'))}"
-
-
-def digest(*functions: Dispatcher | None) -> str:
-    """Hexadecimal digest of everything that decides what these functions compile to.
-
-    Their code, the numbers and functions that they read from around them, and so on down; of other modules that they
-    name the source.
-    """
-    found = hashlib.sha256()
-    seen: set[int] = set()
-    for function in functions:
-        _feed(found, function, seen)
-    return found.hexdigest()[:16]
-
-
-def _feed(found, value, seen: set[int]) -> None:
-    """Add a value that a function reads to a digest."""
-    if isinstance(value, Dispatcher):
-        value = value.py_func
-    if isinstance(value, types.FunctionType):
-        if id(value) not in seen:
-            seen.add(id(value))
-            _feed_function(found, value, seen)
-    elif isinstance(value, types.ModuleType):
-        found.update(value.__name__.encode())
-        source = getattr(value, "__file__", None)
-        if source and Path(source).suffix == ".py":
-            found.update(Path(source).read_bytes())
-    elif isinstance(value, np.ndarray):
-        found.update(f"{value.dtype}{value.shape}".encode() + value.tobytes())
-    elif isinstance(value, (tuple, list)):
-        for item in value:
-            _feed(found, item, seen)
-    elif isinstance(value, type):
-        found.update(f"{value.__module__}.{value.__qualname__}".encode())
-    else:
-        found.update(repr(value).encode())
-
-
-def _feed_function(found, function: types.FunctionType, seen: set[int]) -> None:
-    around = inspect.getclosurevars(function)
-    code = function.__code__
-    found.update(code.co_code)
-    found.update(repr((code.co_names, code.co_varnames)).encode())
-    for constant in code.co_consts:
-        if isinstance(constant, types.CodeType):
-            found.update(constant.co_code + repr(constant.co_names).encode())
-        else:
-            found.update(repr(constant).encode())
-    for names in (around.nonlocals, around.globals):
-        for name in sorted(names):
-            found.update(name.encode())
-            _feed(found, names[name], seen)
 
 
 def write_columns(slots: tuple[FieldSlot, ...], params: np.ndarray, body_count: int, worlds: np.ndarray) -> None:
@@ -249,13 +231,15 @@ def write_columns(slots: tuple[FieldSlot, ...], params: np.ndarray, body_count: 
     Raises
     ------
     ValueError
-        A parameter that is not finite.
+        A parameter that is not finite, or others in number than in the scene.
     """
     for slot in slots:
         size = slot.term.size
         for k, effect in enumerate(slot.effects):
             first = slot.first + k * size
             for body in range(body_count):
-                numbers = np.asarray(effect.columns(body, worlds), dtype=np.float64)
-                checks.finite(numbers, numbers.shape, f"{type(effect).__name__}.columns")
+                numbers = field_check.numbers_of(effect, body, worlds)
+                if numbers.shape[-1] != size:
+                    name = f"{type(effect).__name__}.columns"
+                    raise ValueError(f"{name} gives {numbers.shape[-1]} numbers; allowed are {size}, as in the scene")
                 params[body::body_count, first : first + size] = numbers

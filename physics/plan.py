@@ -89,6 +89,11 @@ class Plan:
         return tuple(slot.term for slot in self.fields)
 
     @property
+    def may_raise(self) -> bool:
+        """Whether a step may end in an exception: that of a user's field."""
+        return any(slot.may_raise for slot in self.fields)
+
+    @property
     def field_columns(self) -> int:
         """Columns of parameters that the fields have."""
         return sum(term.count * term.size for term in self.terms)

@@ -132,6 +132,11 @@ class Recorder:
             self.folder.mkdir(parents=True, exist_ok=True)
             self.files.append(self.recording(world, reason).save(_free_path(self.folder, status.name.lower())))
 
+    def undone(self) -> None:
+        """The step that was about to be taken is none: all is as before."""
+        chapter = self._chapters[-1]
+        del chapter.loads[len(chapter.states) :]
+
     # --- asked by the user -------------------------------------------------------------------------------------
 
     def save(self, path: str | Path, world: int = 0, reason: str = "asked for") -> Path:

@@ -28,6 +28,7 @@ from physics.scene import Scene
 from physics.stepper import kernel_calls, retime
 from physics.summary import lines_repr
 from physics.threads import Team
+from physics.undone import all_or_nothing
 
 if TYPE_CHECKING:
     from physics.recorder import Recorder
@@ -207,7 +208,15 @@ class World:
         """Make the `kernel_calls` of so many steps of `dt` [s] with this wrench; for those who prepare them.
 
         A `Stepper` leaves this out where it comes to one call: what takes part in a step here is in `stepper._is_all`.
+        Where a user's field raises an exception nothing has changed.
         """
+        if self.plan.may_raise:
+            with all_or_nothing(self):
+                self._advance(calls, wrench, steps, dt)
+        else:
+            self._advance(calls, wrench, steps, dt)
+
+    def _advance(self, calls: list[Work], wrench: np.ndarray, steps: int, dt: float) -> None:
         if self.recorder is not None:
             self.recorder.before(wrench, steps, dt)
         if self.actuation is None:

@@ -126,3 +126,8 @@ def inlined(function):
 def composed(function):
     """`inlined` without a place of its own on disk: made at run time, or by a user, and kept with what calls it."""
     return _make(function, FOREIGN, forceinline=True)
+
+
+def checked(function):
+    """`composed` for what a user wrote: an index may count from the end, and one outside its axis raises IndexError."""
+    return _make(function, FOREIGN, forceinline=True, boundscheck=True)

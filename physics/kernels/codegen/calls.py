@@ -88,10 +88,12 @@ class Convention(CPUCallConv):
         else:
             super().return_value(builder, retval)
 
-    def return_user_exc(self, builder, *about, **more):
-        """Leave a function with an exception."""
+    def return_user_exc(self, builder, exc, exc_args=None, loc=None, func_name=None):
+        """Leave a function with an exception; where none is given its place is that of the user's statement at hand."""
         self.must_give_status(builder)
-        super().return_user_exc(builder, *about, **more)
+        if loc is None:
+            loc, func_name = getattr(builder, "place", (None, func_name))
+        super().return_user_exc(builder, exc, exc_args, loc, func_name)
 
     def return_dynamic_user_exc(self, builder, *about, **more):
         """Leave a function with an exception whose arguments are computed."""

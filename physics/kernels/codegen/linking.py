@@ -28,7 +28,7 @@ from __future__ import annotations
 import hashlib
 from functools import cache
 
-from numba.core import event
+from numba.core import event, types
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import CompilerBase, DefaultPassBuilder, Flags
 from numba.core.compiler_lock import global_compiler_lock
@@ -39,7 +39,7 @@ from numba.core.typed_passes import NativeLowering, NoPythonBackend
 
 from physics.kernels.codegen.keeping import Origin, StandingCache, WholeCache, made_known
 from physics.kernels.codegen.libraries import PartLibrary, StandingLibrary, WholeLibrary
-from physics.kernels.codegen.lowering import PartLowering, WholeLowering
+from physics.kernels.codegen.lowering import PartLowering, UsersLowering, WholeLowering
 from physics.kernels.codegen.passes import KernelPasses
 from physics.kernels.codegen.remember import RememberingTarget, remembering
 
@@ -139,7 +139,9 @@ class _AnyPartCompiler(_PartCompiler):
 
     def passes(self):
         pipeline = DefaultPassBuilder.define_nopython_pipeline(self.state)
-        pipeline.add_pass_after(_KeepAsPart, NativeLowering)
+        own = {NativeLowering: UsersLowering}
+        pipeline.passes = [(own.get(each, each), about) for each, about in pipeline.passes]
+        pipeline.add_pass_after(_KeepAsPart, UsersLowering)
         pipeline.finalize()
         return pipeline
 
@@ -203,7 +205,13 @@ class Kernel(CPUDispatcher):
     def __init__(self, function, local_types=None, options=None, called_as=PART):
         super().__init__(function, local_types, options, pipeline_class=_WholeCompiler)
         dispatcher, compiler = called_as
-        self._part = dispatcher(function, local_types, options, pipeline_class=compiler)
+        self._make_part = lambda: dispatcher(function, local_types, options, pipeline_class=compiler)
+        self._part = self._make_part()
+
+    def renew(self) -> None:
+        """Forget what is compiled for other kernels: what the function reads around it is another thing now."""
+        self._part = self._make_part()
+        RememberingTarget.forget(types.Dispatcher(self))
 
     def enable_caching(self):
         """Keep its machine code on disk."""
@@ -214,6 +222,17 @@ class Kernel(CPUDispatcher):
     def stand(self, args: tuple) -> None:
         """Have the machine code that other kernels call, for these types of arguments."""
         self._part.compile(args)
+
+    def as_part(self, args: tuple):
+        """Have it compiled for other kernels and these types of arguments: what Numba keeps of that.
+
+        Raises
+        ------
+        Exception
+            In Numba's words: the function cannot be compiled for them.
+        """
+        self._part.compile(args)
+        return self._part.overloads[args]
 
     def ready_entry(self, machine_code) -> int:
         """Address of the entry for other machine code (`ready`) of what `compile` gave; it must return nothing."""

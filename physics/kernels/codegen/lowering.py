@@ -94,6 +94,23 @@ class _ValueLower(_KernelLower):
         super().setup_function(fndesc)
 
 
+class _UsersLower(Lower):
+    """Numba's lowering of a user's function, which remembers at which statement it is: for exceptions."""
+
+    def lower_inst(self, inst):
+        """Lower a statement."""
+        self.builder.place = self.loc, self.func_ir.func_id.func_name
+        super().lower_inst(inst)
+
+
+@register_pass(mutates_CFG=True, analysis_only=False)
+class UsersLowering(NativeLowering):
+    """The pass in which a user's function is lowered."""
+
+    _name = "users_lowering"
+    lowering_class = _UsersLower
+
+
 @register_pass(mutates_CFG=True, analysis_only=False)
 class WholeLowering(NativeLowering):
     """The pass in which a kernel is lowered as Python calls it."""

@@ -96,6 +96,12 @@ class RememberingTarget(CPUContext):
     def __init__(self, context):
         self.__dict__ = context.__dict__
 
+    @classmethod
+    def forget(cls, fn) -> None:
+        """Forget how calls of `fn` are lowered."""
+        for key in [key for key in cls.lowerings if key[0] == fn]:
+            del cls.lowerings[key]
+
     @property
     def typing_context(self):
         """The context of types that remembers."""
