@@ -2,7 +2,8 @@
 
 Both engines take steps of 5 ms in the same scenes, in the same process and in turns (A B A B); a ratio is
 taken turn by turn, and its median is what counts. One run of each is thrown away first. Our numbers are given
-at ``fast`` and ``balanced``. Without MuJoCo our numbers stand alone.
+at ``fast`` and ``balanced``. Without MuJoCo our numbers stand alone. The rows of the part ``threads`` compare two
+threads with one, on a quiet machine and beside busy processes.
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ import typer
 from rich.progress import Progress
 
 from benchmarks import machine, memory, start
-from rigid_env.measure import bodies, environments, mujoco_scene, rows, workloads
+from rigid_env.measure import bodies, crowded, environments, mujoco_scene, rows, workloads
 from rigid_env.measure.table import make_console, make_table
 from rigid_env.measure.timing import Row
 
@@ -22,7 +23,7 @@ REPEATS = 7
 QUICK_REPEATS = 2
 MEMORY_STEPS = 1_000_000
 QUICK_MEMORY_STEPS = 2000
-PARTS = ("engine", "bodies", "environments", "memory", "start")
+PARTS = ("engine", "threads", "bodies", "environments", "memory", "start")
 
 
 def measure(parts: tuple[str, ...], is_quick: bool, progress: Progress) -> list[Row]:
@@ -44,6 +45,11 @@ def measure(parts: tuple[str, ...], is_quick: bool, progress: Progress) -> list[
         tick = _bar(progress, "engine", rows.run_count(repeats, has_peer))
         sizes = workloads.QUICK if is_quick else workloads.FULL
         for some in rows.engine_rows(sizes, repeats, has_peer, tick):
+            found += some
+    if "threads" in parts:
+        tick = _bar(progress, "threads", crowded.run_count(repeats, has_peer))
+        sizes = workloads.QUICK if is_quick else workloads.FULL
+        for some in crowded.crowded_rows(sizes, repeats, has_peer, tick):
             found += some
     if "bodies" in parts:
         tick = _bar(progress, "bodies", bodies.run_count(repeats, has_peer))

@@ -3,19 +3,24 @@
 The pool is made when first needed and belongs to one process: after a fork the child makes its own. There is no
 threading layer of Numba in it, so worlds may be stepped from several Python threads at once, and forked. What the pool
 runs is a loop in machine code (`physics.kernels.crew`), in which a thread stays from one run to the next if that comes
-soon.
+soon. A thread that waits there lets other programs have its processor, and nobody waits for a thread that has not
+begun.
+
+At most as many threads take part as there are processors. The environment variable ``RIGID_ENV_THREADS=fixed`` makes
+all of them take part, and none give way.
 """
 
 from __future__ import annotations
 
 import os
-import time
+import timeit
 from collections.abc import Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from functools import cache, partial
 
 import numpy as np
 
+from physics import processors
 from physics.kernels import crew
 from physics.kernels import turns as at
 from physics.machine_code import Work, compiled
@@ -26,9 +31,13 @@ WORLDS_AT_ONCE = 8
 TURNS_PER_THREAD = 4
 
 # How long the thread that leads asks whether the others have finished before it sleeps until they say so, and how long
-# those ask whether there is more to do before they go [s]. Meanwhile they keep their processors from others.
+# those ask whether there is more to do before they go [s]. Meanwhile they give way to other threads, so often [s].
 PATIENCE = 2.0e-4
 STAY = 3.0e-4
+BETWEEN = 5.0e-6
+
+# Turns off that threads give way and that a quota counts; for measurements.
+SWITCH = "RIGID_ENV_THREADS"
 
 
 class Team:
@@ -46,7 +55,7 @@ class Team:
         Number of threads.
     turns : (1 + size, APART) int64
         Whose turn it is, of `physics.kernels.turns`.
-    taken : list of (FIRST + worlds,) int64
+    taken : (size, FIRST + worlds + APART) int64
         For each thread the worlds that it took in the last run.
     """
 
@@ -63,7 +72,10 @@ class Team:
         self._pid = -1
 
     def run(self, calls: Sequence[Work]) -> None:
-        """Make the calls, one per thread, of which the calling one is the first."""
+        """Make the calls, one per thread, of which the calling one is the first.
+
+        A call is left out if its thread has not begun when all worlds are taken: it lists no worlds then.
+        """
         if self.size == 1:
             if calls[0].perform():
                 calls[0].raise_again()
@@ -76,25 +88,27 @@ class Team:
             self._tell(calls)
         outcome, self._is_interrupted = crew.UNFINISHED, True
         try:
-            if self._summon() > 0:
+            if self._summon(self._members) > 0:
                 self._send_for_all()
-            outcome = self._lead(calls[0].jobs, calls[0].count, self._patience)
+            outcome = self._lead(self._members, calls[0].jobs, calls[0].count, self._patience)
         finally:
             if outcome == crew.UNFINISHED:
                 self._let_go()
         self._is_interrupted = False
         if outcome != crew.DONE:
-            for call in calls:
-                call.raise_again()
+            _raise(calls)
 
     def _start(self) -> None:
         self._pool = ThreadPoolExecutor(self.size - 1, thread_name_prefix="rigid-env")
         self._pid, self._told, self._futures, self._is_interrupted = os.getpid(), None, {}, False
-        self._crew[...] = 0
-        self._patience, self._stay = (_pauses(s) if self.size <= _cores() else 1 for s in (PATIENCE, STAY))
-        self._summon = _prepared(crew.summon, self._crew, self.turns)
-        self._dismiss = _prepared(crew.dismiss, self._crew)
-        self._lead = partial(compiled(crew.lead, (self._crew, 0, 0, 0)), self._crew)
+        self._crew[...] = self.taken[:, at.TAKEN] = 0
+        is_fixed = os.environ.get(SWITCH) == "fixed"
+        self._crew[0, crew.GIVE_WAY] = 0 if is_fixed else processors.giving_way()
+        self._crew[0, crew.BETWEEN], self._patience, self._stay = (_pauses(s) for s in (BETWEEN, PATIENCE, STAY))
+        self._members = (self.size if is_fixed else min(self.size, processors.usable())) - 1
+        self._summon = partial(compiled(crew.summon, (self._crew, self.turns, 0)), self._crew, self.turns)
+        self._dismiss = partial(compiled(crew.dismiss, (self._crew,)), self._crew)
+        self._lead = partial(compiled(crew.lead, (self._crew, self.taken, 0, 0, 0, 0)), self._crew, self.taken)
         self._serve = partial(compiled(crew.serve, (self._crew, 0, 0)), self._crew)
 
     def _tell(self, calls: Sequence[Work]) -> None:
@@ -132,19 +146,23 @@ def listed(worlds: np.ndarray) -> np.ndarray:
     return taken
 
 
-def _prepared(kernel, *arguments):
-    return partial(compiled(kernel, arguments), *arguments)
+def _raise(calls: Sequence[Work]) -> None:
+    """Raise what one of the calls raised; the next time a call that is left out has raised nothing."""
+    try:
+        for call in calls:
+            call.raise_again()
+    finally:
+        for call in calls:
+            call.forget()
 
 
-def _cores() -> int:
-    """How many the process may use."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+def _pauses(seconds: float) -> int:
+    """Number of pauses that take so long."""
+    return int(seconds / _pause()) + 1
 
 
 @cache
-def _pauses(seconds: float) -> int:
-    """Number of pauses that take so long: how long one is differs from processor to processor."""
+def _pause() -> float:
+    """Length of a pause [s], which differs from processor to processor: of the trial that was disturbed least."""
     pause, count = compiled(crew.pause_often, (0,)), 1000
-    start = time.perf_counter()
-    pause(count)
-    return int(seconds * count / (time.perf_counter() - start)) + 1
+    return min(timeit.repeat(lambda: pause(count), number=1, repeat=7)) / count

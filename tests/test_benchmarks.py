@@ -195,7 +195,8 @@ ROW_KEYS = {
 }  # fmt: skip
 KEYS = {
     "flight", "rest", "shove", "batch", "vector_env_1_thread", "vector_env_2_thread", "single_env",
-    "bare_env", "kernel_bytes", "python_bytes", "start_world", "start_env",
+    "bare_env", "kernel_bytes", "python_bytes", "start_world", "start_env", "threads_beside_0", "threads_beside_1",
+    "threads_beside_2",
 }  # fmt: skip
 ALONE = ("kernel_bytes", "python_bytes", "process_bytes", *start.PROGRAMS)
 
@@ -222,7 +223,7 @@ def test_throughput_runs_and_writes_every_row(tmp_path):
         assert set(entry) == ROW_KEYS
         assert entry["ours"]["min"] <= entry["ours"]["median"] <= entry["ours"]["max"]
         has_peer = entry["key"] not in ALONE and mujoco_scene.is_installed()
-        assert (entry["ratio"] is not None) == has_peer
+        assert (entry["ratio"] is not None) == (has_peer or entry["key"].startswith("threads_"))
     accuracies = {(entry["key"], entry["accuracy"]) for entry in found["rows"]}
     assert {("flight", "fast"), ("flight", "balanced"), ("start_env", "fast")} <= accuracies
     assert log_stamp() == log_before

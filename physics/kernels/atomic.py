@@ -8,6 +8,7 @@ from llvmlite import ir
 from numba.core import types
 from numba.extending import intrinsic
 
+from physics.kernels.codegen.builder import word
 from physics.kernels.codegen.elements import pointer
 from physics.kernels.codegen.ready import WORD_SIZE
 
@@ -84,3 +85,16 @@ def pause(typing_context):
         return context.get_dummy_value()
 
     return types.none(), lower
+
+
+@intrinsic
+def give_way(typing_context, address):
+    """Let another thread have the processor, by the system's function at the address; nothing if that is 0."""
+
+    def lower(context, builder, sig, args):
+        function = ir.FunctionType(ir.IntType(32), []).as_pointer()
+        with builder.if_then(builder.icmp_signed("!=", args[0], word(0))):
+            builder.call(builder.inttoptr(args[0], function), [])
+        return context.get_dummy_value()
+
+    return types.none(types.int64), lower

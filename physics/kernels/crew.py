@@ -4,25 +4,31 @@ A member of a crew makes the calls that it was given (`jobs`), says that it has 
 called again. To be woken takes a thread half as long as a batch of a hundred worlds, and to get hold of the
 interpreter, without which it can neither begin nor end, as long as another one keeps it.
 
-A member is AWAY, or CALLED until it has finished and is WAITING, or CALLED_LAST until it has finished and is AWAY. It
-may be called while it is about to go, and dismissed before it has noticed that it was called: whoever changes what it
-is does so from what it has to be, in one piece.
+A member is AWAY or WAITING until the leader has CALLED it, BUSY from when it begins, and WAITING again when it has
+finished. A member that is dismissed while it is busy is LEAVING, and then AWAY. The leader takes the call back from
+a member that has not begun when there is nothing left to do: its processor may be busy with another program.
+Whoever changes a state does so from the state it has to be in, in one atomic operation, since the other one may have
+changed it in the meantime.
+
+A thread that waits gives way every few microseconds: a program that has to share its processor runs instead, and so
+does the thread that it waits for.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
-from physics.kernels.atomic import add, exchange, exchange_if, pause, seen
+from physics.kernels.atomic import add, exchange, exchange_if, give_way, pause, seen
 from physics.kernels.compiler import inlined, kernel
 from physics.kernels.jobs import perform
-from physics.kernels.turns import APART, deal
+from physics.kernels.turns import APART, TAKEN, deal
 
-AWAY, CALLED, CALLED_LAST, WAITING = range(4)
+AWAY, WAITING, CALLED, BUSY, LEAVING = range(5)
 
-# Of a crew: how many members have finished, of how many a call raised an exception. Then, a row for each: what it does,
-# its jobs and their number, and whether it was away when it was called.
-FINISHED, FAILED = range(2)
+# Of a crew: how many members' calls raised an exception, the address of the function that gives way (0: none), and the
+# number of pauses between two calls of it. Then, a row for each member: its state, its jobs and their number, and
+# whether it was away when it was called.
+FAILED, GIVE_WAY, BETWEEN = range(3)
 STATE, JOBS, COUNT, WAS_AWAY = range(4)
 
 # What became of a run: all went well, someone has not finished, a call raised an exception.
@@ -35,11 +41,11 @@ def make_crew(members: int) -> np.ndarray:
 
 
 @kernel
-def summon(crew, turns):
-    """Call all members to a batch of which nothing is taken; how many were away, so that they have to be sent for."""
+def summon(crew, turns, members):
+    """Call the first members to a batch of which nothing is taken; how many were away and have to be sent for."""
     deal(turns)
-    crew[0, FINISHED] = crew[0, FAILED] = away = 0
-    for k in range(1, crew.shape[0]):
+    crew[0, FAILED] = away = 0
+    for k in range(1, 1 + members):
         crew[k, WAS_AWAY] = 1 if exchange(crew, k, STATE, CALLED) == AWAY else 0
         away += crew[k, WAS_AWAY]
     return away
@@ -47,51 +53,77 @@ def summon(crew, turns):
 
 @kernel
 def dismiss(crew):
-    """Let all members go, once they have done what they are called for."""
+    """Let all members go: at once, or after the call that they are busy with."""
     for k in range(1, crew.shape[0]):
-        while seen(crew, k, STATE) == CALLED or seen(crew, k, STATE) == WAITING:
-            exchange_if(crew, k, STATE, CALLED, CALLED_LAST)
+        while WAITING <= seen(crew, k, STATE) <= BUSY:
+            exchange_if(crew, k, STATE, CALLED, AWAY)
             exchange_if(crew, k, STATE, WAITING, AWAY)
-
-
-@kernel
-def lead(crew, jobs, count, patience):
-    """Make calls, and wait until all members have finished or `patience` is over: what became of it."""
-    if perform(jobs, count):
-        add(crew, 0, FAILED, 1)
-    for _ in range(patience):
-        if seen(crew, 0, FINISHED) == crew.shape[0] - 1:
-            return RAISED if seen(crew, 0, FAILED) > 0 else DONE
-        pause()
-    return UNFINISHED
+            exchange_if(crew, k, STATE, BUSY, LEAVING)
 
 
 @inlined
-def _is_called_again(crew, member, patience):
-    for _ in range(patience):
-        if seen(crew, member, STATE) != WAITING:
-            break
-        pause()
-    is_gone = exchange_if(crew, member, STATE, WAITING, AWAY)  # another thread may be in its place from here on
-    return not is_gone and seen(crew, member, STATE) != AWAY
+def _rest(crew, look):
+    """Wait for a moment after so many looks."""
+    pause()
+    if look % crew[0, BETWEEN] == 0:
+        give_way(crew[0, GIVE_WAY])
+
+
+@inlined
+def _is_busy(crew, member, patience):
+    """Whether the member has not finished after so many looks."""
+    for look in range(1, patience + 1):
+        if seen(crew, member, STATE) != BUSY:
+            return False
+        _rest(crew, look)
+    return seen(crew, member, STATE) == BUSY
+
+
+@kernel
+def lead(crew, taken, members, jobs, count, patience):
+    """Make calls, and wait until all members who have begun have finished or `patience` is over; what became of it."""
+    if perform(jobs, count):
+        add(crew, 0, FAILED, 1)
+    for k in range(1, 1 + members):
+        if exchange_if(crew, k, STATE, CALLED, WAITING):
+            taken[k, TAKEN] = 0
+    for k in range(1, 1 + members):
+        if _is_busy(crew, k, patience):
+            return UNFINISHED
+    return RAISED if seen(crew, 0, FAILED) > 0 else DONE
+
+
+@inlined
+def _begins(crew, member, patience):
+    """Whether the member, waiting, is called within so many looks; else it is away."""
+    for look in range(1, patience + 1):
+        state = seen(crew, member, STATE)
+        if state == CALLED and exchange_if(crew, member, STATE, CALLED, BUSY):
+            return True
+        if state == AWAY:
+            return False
+        _rest(crew, look)
+    while seen(crew, member, STATE) != AWAY:
+        if exchange_if(crew, member, STATE, CALLED, BUSY):
+            return True
+        if exchange_if(crew, member, STATE, WAITING, AWAY):  # another thread may be in its place from here on
+            return False
+    return False
 
 
 @kernel
 def serve(crew, member, patience):
     """Be a member: make its calls each time that it is called, until it is not for so long."""
-    is_called = True
-    while is_called:
+    while _begins(crew, member, patience):
         if perform(crew[member, JOBS], crew[member, COUNT]):
             add(crew, 0, FAILED, 1)
-        stays = exchange_if(crew, member, STATE, CALLED, WAITING)
-        if not stays:
+        if not exchange_if(crew, member, STATE, BUSY, WAITING):
             exchange(crew, member, STATE, AWAY)
-        add(crew, 0, FINISHED, 1)
-        is_called = stays and _is_called_again(crew, member, patience)
+            return
 
 
 @kernel
 def pause_often(times):
-    """How long so many pauses take is how long a patience lasts."""
+    """Pause so many times: how long that takes is how long a patience lasts."""
     for _ in range(times):
         pause()

@@ -33,11 +33,10 @@ def make_turns(threads: int, worlds: int, chunk: int) -> np.ndarray:
     return turns
 
 
-def make_taken(threads: int, worlds: int) -> list[np.ndarray]:
-    """For each thread (FIRST + worlds,) int64: nothing taken yet."""
-    lists = [np.zeros(FIRST + worlds, dtype=np.int64) for _ in range(threads)]
-    for thread, taken in enumerate(lists):
-        taken[OWN] = 1 + thread
+def make_taken(threads: int, worlds: int) -> np.ndarray:
+    """(threads, FIRST + worlds + APART) int64, a row for each thread: nothing taken yet."""
+    lists = np.zeros((threads, FIRST + worlds + APART), dtype=np.int64)
+    lists[:, OWN] = 1 + np.arange(threads)
     return lists
 
 

@@ -11,6 +11,7 @@ from importlib import metadata
 from pathlib import Path
 
 import physics
+from physics import processors
 
 PACKAGES = (
     "rigid-env", "numpy", "scipy", "numba", "llvmlite", "gymnasium", "mujoco", "pybullet", "drake",
@@ -46,10 +47,8 @@ def processor() -> str:
 
 
 def usable_cores() -> int:
-    """Cores that this process may run on."""
-    if hasattr(os, "sched_getaffinity"):
-        return len(os.sched_getaffinity(0))
-    return os.cpu_count() or 1
+    """Cores that this process may use: its affinity and its container's quota allow them."""
+    return processors.usable()
 
 
 def version(package: str) -> str | None:

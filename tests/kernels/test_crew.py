@@ -12,10 +12,11 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
-from physics import threads
-from physics.kernels.atomic import add, pause
+from physics import processors, threads
+from physics.kernels.atomic import pause
 from physics.kernels.compiler import kernel
-from physics.kernels.crew import AWAY, CALLED, CALLED_LAST, WAITING
+from physics.kernels.crew import AWAY, BUSY, CALLED, LEAVING, WAITING
+from physics.kernels.turns import TAKEN, begin, next_world
 from physics.machine_code import bound
 from physics.threads import Team
 
@@ -26,33 +27,44 @@ class Moment(NamedTuple):
     """What one who leads and one member are at; of the member there may be two threads, one that is going."""
 
     state: int = AWAY
-    finished: int = 0
-    done: int = 0  # calls that the member has made
+    left: int = 0  # worlds that nobody has taken: a run has one
+    done: int = 0  # worlds stepped, in all runs
     run: int = 0
     leader: str = "begin"
+    is_interrupted: bool = False
     threads: tuple[str, ...] = ()
 
 
 def of_leader(m: Moment) -> list[Moment]:
-    """What may follow by the one that leads, who runs out of patience at any time."""
+    """What may follow by the one that leads, who runs out of patience at any time, and may be interrupted."""
     match m.leader:
         case "begin":
-            return [m._replace(finished=0, leader="summon")] if m.run < RUNS else []
+            return [m._replace(left=1, leader="summon")] if m.run < RUNS else []
         case "summon":
-            sent = (*m.threads, "perform") if m.state == AWAY else m.threads
-            return [m._replace(state=CALLED, leader="wait", threads=sent)]
+            sent = (*m.threads, "look") if m.state == AWAY else m.threads
+            return [m._replace(state=CALLED, leader="perform", threads=sent)]
+        case "perform":
+            performed = m._replace(left=0, done=m.done + m.left, leader="take back")
+            return [performed, m._replace(leader="dismiss", is_interrupted=True)]
+        case "take back":
+            return [m._replace(state=WAITING if m.state == CALLED else m.state, leader="wait")]
         case "wait":
-            return [m._replace(leader="end" if m.finished == 1 else "wait"), m._replace(leader="dismiss")]
+            return [m._replace(leader="end")] if m.state != BUSY else [m, m._replace(leader="dismiss")]
         case "dismiss":
-            return [m._replace(leader="last" if m.state in (CALLED, WAITING) else "join")]
-        case "last":
-            return [m._replace(state=CALLED_LAST if m.state == CALLED else m.state, leader="away")]
-        case "away":
-            return [m._replace(state=AWAY if m.state == WAITING else m.state, leader="dismiss")]
+            return [m._replace(leader="dismiss called" if m.state in (WAITING, CALLED, BUSY) else "join")]
+        case "dismiss called":
+            return [m._replace(state=AWAY if m.state == CALLED else m.state, leader="dismiss waiting")]
+        case "dismiss waiting":
+            return [m._replace(state=AWAY if m.state == WAITING else m.state, leader="dismiss busy")]
+        case "dismiss busy":
+            return [m._replace(state=LEAVING if m.state == BUSY else m.state, leader="dismiss")]
         case "join":
             return [] if m.threads else [m._replace(leader="end")]
         case "end":
+            if m.is_interrupted:  # what is left of the run is given up
+                m = m._replace(done=m.run + 1, left=0, is_interrupted=False)
             assert m.done == m.run + 1
+            assert not {"perform", "hold", "made"} & set(m.threads)
             return [m._replace(run=m.run + 1, leader="begin")]
 
 
@@ -64,22 +76,25 @@ def of_thread(m: Moment, k: int) -> list[Moment]:
         return m._replace(threads=rest, **more)
 
     match m.threads[k]:
-        case "perform":
-            return [then("stay", done=m.done + 1)]
-        case "stay":
-            return [then("finish", state=WAITING) if m.state == CALLED else then("leave")]
-        case "leave":
-            return [then("finish and go", state=AWAY)]
-        case "finish and go":
-            return [then(None, finished=m.finished + 1)]
-        case "finish":
-            return [then("look", finished=m.finished + 1)]
         case "look":
-            return [then("go"), then("look" if m.state == WAITING else "go")]
+            seen = {CALLED: "take call", AWAY: None}.get(m.state, "look")
+            return [then(seen), then("go")]
+        case "take call":
+            return [then("perform", state=BUSY) if m.state == CALLED else then("look")]
+        case "perform":
+            return [then("hold" if m.left else "made", left=0)]
+        case "hold":
+            return [then("made", done=m.done + 1)]
+        case "made":
+            return [then("look", state=WAITING) if m.state == BUSY else then("leave")]
+        case "leave":
+            return [then(None, state=AWAY)]
         case "go":
-            return [then(None, state=AWAY) if m.state == WAITING else then("look again")]
-        case "look again":
-            return [then("perform" if m.state != AWAY else None)]
+            return [then(None if m.state == AWAY else "go or begin")]
+        case "go or begin":
+            return [then("perform", state=BUSY) if m.state == CALLED else then("go away")]
+        case "go away":
+            return [then(None, state=AWAY) if m.state == WAITING else then("go")]
 
 
 def test_all_orders_of_looks_and_changes():
@@ -93,31 +108,43 @@ def test_all_orders_of_looks_and_changes():
         assert following or moment.run == RUNS, f"nobody can go on: {moment}"
         for each in following:
             assert each.done <= each.run + 1, f"done twice: {each}"
+            assert len({"perform", "hold", "made"} & set(each.threads)) <= 1, f"two are the member: {each}"
             if each not in found:
                 found.add(each)
                 left.append(each)
-    assert Moment(state=AWAY, finished=1, done=RUNS, run=RUNS) in found
+    assert Moment(state=AWAY, done=RUNS, run=RUNS) in found
+    assert Moment(state=WAITING, done=RUNS, run=RUNS, threads=("look",)) in found
 
 
 @kernel
-def visit(visits, k, pauses):
+def visit(visits, turns, taken, k, pauses):
     for _ in range(pauses[k]):
         pause()
-    add(visits, 0, k, 1)
+    world = begin(turns, taken)
+    while True:
+        world = next_world(world, turns, taken)
+        if world < 0:
+            break
+        visits[world] += 1
 
 
+@pytest.mark.parametrize("gives_way", [False, True])
 @pytest.mark.parametrize(("patience", "stay"), [(2e-4, 2e-6), (2e-6, 2e-5), (1e-3, 0.0), (5e-6, 5e-6)])
 @pytest.mark.parametrize("size", [2, 4])
-def test_many_runs(size, patience, stay, monkeypatch):
+def test_many_runs(size, patience, stay, gives_way, monkeypatch):
     """4,000 runs; the mistakes that were made in it showed after some thousands."""
     monkeypatch.setattr(threads, "PATIENCE", patience)
     monkeypatch.setattr(threads, "STAY", stay)
-    monkeypatch.setattr(threads, "_cores", lambda: size)  # else nobody stays where there are fewer
+    monkeypatch.setattr(threads, "BETWEEN", 1e-6)
+    monkeypatch.setattr(processors, "usable", lambda: size)
+    if not gives_way:
+        monkeypatch.setattr(processors, "giving_way", lambda: 0)
     team, rng = Team(size, 100), np.random.default_rng(size)
-    visits, pauses = np.zeros((1, size), dtype=np.int64), np.zeros(size, dtype=np.int64)
-    calls = [bound(visit, visits, k, pauses) for k in range(size)]
+    visits, pauses = np.zeros(100, dtype=np.int64), np.zeros(size, dtype=np.int64)
+    calls = [bound(visit, visits, team.turns, taken, k, pauses) for k, taken in enumerate(team.taken)]
     for run in range(1, 4001):
         pauses[:] = rng.integers(0, 300, size)
         team.run(calls)
         assert (visits == run).all()
+        assert team.taken[:, TAKEN].sum() == 100
     team.close()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 import time
 from concurrent.futures import ThreadPoolExecutor
 
@@ -11,11 +12,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import physics
-from physics import scenes, threads
+from physics import processors, scenes, threads
 from physics.kernels import crew, turns
-from physics.kernels.atomic import add, pause
+from physics.kernels.atomic import add, pause, seen
 from physics.kernels.compiler import kernel
-from physics.kernels.turns import FIRST, TAKEN
+from physics.kernels.turns import FIRST, TAKEN, next_world
+from physics.kernels.turns import begin as turns_begin
 from physics.machine_code import bound
 from physics.stepper import kernel_calls
 from physics.threads import Team, listed
@@ -84,8 +86,11 @@ def test_whoever_is_fast_each_world_is_taken_once(size, worlds, chunk, random):
 
 
 @kernel
-def visit(visits, k, pauses):
-    """Wait, and note it; -1 instead of a number of pauses raises."""
+def visit(visits, k, pauses, begun):
+    """Wait, and note it; -1 instead of a number of pauses raises. The one that leads waits until all have begun."""
+    add(begun, 0, 0, 1)
+    while k == 0 and seen(begun, 0, 0) % visits.shape[1] != 0:
+        pause()
     if pauses[k] < 0:
         raise ZeroDivisionError("this thread")
     for _ in range(pauses[k]):
@@ -95,8 +100,8 @@ def visit(visits, k, pauses):
 
 def visitors(size: int, pauses=0) -> tuple[list, np.ndarray, np.ndarray]:
     """Calls for so many threads; what they note, and how long each waits."""
-    visits, pauses = np.zeros((1, size), dtype=np.int64), np.full(size, pauses)
-    return [bound(visit, visits, k, pauses) for k in range(size)], visits, pauses
+    visits, pauses, begun = np.zeros((1, size), dtype=np.int64), np.full(size, pauses), np.zeros((1, 1), dtype=np.int64)
+    return [bound(visit, visits, k, pauses, begun) for k in range(size)], visits, pauses
 
 
 @pytest.fixture
@@ -109,7 +114,7 @@ def sent(monkeypatch) -> list:
         return submit(pool, *arguments)
 
     monkeypatch.setattr(ThreadPoolExecutor, "submit", noted)
-    monkeypatch.setattr(threads, "_cores", lambda: 100)  # else nobody stays where there are fewer than threads
+    monkeypatch.setattr(processors, "usable", lambda: 100)  # else there are not more threads than processors
     return found
 
 
@@ -202,6 +207,58 @@ def test_after_an_interrupt_the_team_waits_for_who_is_busy(delay, sent, monkeypa
 
 def interrupt(team: Team) -> None:
     raise KeyboardInterrupt
+
+
+@kernel
+def take_all(turns, taken, visits, failing):
+    world = turns_begin(turns, taken)
+    while True:
+        world = next_world(world, turns, taken)
+        if world < 0:
+            break
+        visits[world] += 1
+    if failing[0]:
+        raise ValueError("the one that leads")
+
+
+def test_nobody_waits_for_a_thread_that_has_not_begun(sent, monkeypatch):
+    """Its list is empty then, also where it was not before, and it is sent for once."""
+    monkeypatch.setattr(threads, "STAY", 0.0)
+    team, (calls, _, pauses), visits = Team(2, 100), visitors(2), np.zeros(100, dtype=np.int64)
+    pauses[1] = -1
+    with pytest.raises(ZeroDivisionError):  # the member's call has raised the last time that it was made
+        team.run(calls)
+    team._let_go()
+    held, be_member = threading.Event(), Team._be_member
+    monkeypatch.setattr(Team, "_be_member", lambda team, member: (held.wait(60), be_member(team, member)))
+    failing = np.zeros(1, dtype=np.int64)
+    alone = [bound(take_all, team.turns, taken, visits, failing) for taken in team.taken]
+    team.taken[1, TAKEN] = 5
+    for times in range(1, 4):
+        team.run(alone)
+        assert (visits == times).all()
+        assert [len(taken) for taken in taken_by(team)] == [100, 0]
+    assert len(sent) == 2
+    failing[0] = 1
+    with pytest.raises(ValueError, match="the one that leads"):
+        team.run([alone[0], calls[1]])
+    held.set()
+    team.close()
+
+
+@pytest.mark.parametrize(("switch", "others"), [("", 1), ("fixed", 3)])
+def test_no_more_threads_than_processors(switch, others, sent, monkeypatch):
+    monkeypatch.setattr(processors, "usable", lambda: 2)
+    monkeypatch.setenv(threads.SWITCH, switch)
+    monkeypatch.setattr(threads, "STAY", 100.0)
+    world = physics.World(scenes.shove(), worlds=40, dt=0.01, accuracy="fast", threads=4)
+    for _ in range(3):
+        world.step()
+        assert sorted(np.concatenate(taken_by(world.team))) == list(range(40))
+    assert len(sent) == others
+    assert (world.team._crew[0, crew.GIVE_WAY] == 0) == (switch == "fixed")
+    assert not world.team.taken[1 + others :, TAKEN].any()
+    world.team.close()
 
 
 @kernel

@@ -1,0 +1,78 @@
+"""Processors of a process: how many it may use, and how a thread lets another one have its own."""
+
+from __future__ import annotations
+
+import ctypes
+import math
+import os
+from collections.abc import Iterator
+from functools import cache
+from pathlib import Path
+
+
+def usable(root: Path = Path("/")) -> int:
+    """Count the processors that the process may use at once: its affinity and its container's quota allow them.
+
+    Parameters
+    ----------
+    root : Path
+        Where the system's files are.
+
+    Returns
+    -------
+    int
+        At least 1; a quota of one and a half processors counts as 2.
+    """
+    bound = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    share = quota(root)
+    return bound if share >= bound else max(1, math.ceil(share))
+
+
+def quota(root: Path = Path("/")) -> float:
+    """Least share of processors that Linux's control groups grant the process, inf without a limit.
+
+    A group's limit holds for the groups inside it. Version 2 writes it in `cpu.max`, version 1 in `cpu.cfs_quota_us`.
+    """
+    return min((_share(folder) for folder in _groups(root)), default=math.inf)
+
+
+def _groups(root: Path) -> Iterator[Path]:
+    """Folders of the control groups that the process is in, those around them included."""
+    mounts = root / "sys/fs/cgroup"
+    for line in _text(root / "proc/self/cgroup").splitlines():
+        _, names, place = line.split(":", 2)
+        if names and "cpu" not in names.split(","):
+            continue
+        for name in (names, "cpu", "cpu,cpuacct") if names else ("", "unified"):
+            base = mounts / name
+            inner = base / place.lstrip("/")
+            yield from (folder for folder in (inner, *inner.parents) if folder == base or base in folder.parents)
+
+
+def _share(group: Path) -> float:
+    """Processors granted by the limit of one group; inf where it has none."""
+    limit, period = (*_text(group / "cpu.max").split(), "", "")[:2]
+    if not period:
+        limit, period = _text(group / "cpu.cfs_quota_us"), _text(group / "cpu.cfs_period_us")
+    try:
+        share = int(limit) / int(period)
+    except (ValueError, ZeroDivisionError):
+        return math.inf
+    return share if share > 0 else math.inf
+
+
+def _text(path: Path) -> str:
+    try:
+        return path.read_text(encoding="utf-8").strip()
+    except OSError:
+        return ""
+
+
+@cache
+def giving_way() -> int:
+    """Address of the system's function that lets another thread have the processor; 0 where there is none."""
+    try:
+        function = ctypes.WinDLL("kernel32").SwitchToThread if os.name == "nt" else ctypes.CDLL(None).sched_yield
+    except (AttributeError, OSError):
+        return 0
+    return ctypes.cast(function, ctypes.c_void_p).value or 0
