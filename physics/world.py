@@ -269,9 +269,9 @@ class World:
         Raises
         ------
         ValueError
-            A wrong shape, a number that is not finite, no unit quaternion, a world named twice or not there, a body deep
-            inside a wall, or two bodies that touch each other with their centres in the same place. Nothing has changed
-            then.
+            A wrong shape, a number that is not finite, no unit quaternion, a world named twice or not there, a body
+            deep inside a wall, or two bodies that touch each other with their centres in the same place. Nothing has
+            changed then.
         """
         changes.set_state(self, pos, quat, linvel, angvel, worlds)
 

@@ -1,10 +1,61 @@
 """Gymnasium environments on the `physics` engine: a block to be pushed, tipped and turned among three walls.
 
-Importing the package registers `rigid_env/BlockReach-v0` and `rigid_env/BlockReorient-v0`.
+Importing the package registers `rigid_env/BlockReach-v0` and `rigid_env/BlockReorient-v0`; the engine is imported with
+the first environment.
 """
 
-from rigid_env.registration import register_envs
+from importlib import import_module
+from typing import TYPE_CHECKING
 
+from rigid_env.registration import register_envs
+from rigid_env.shadowing import check_engine_is_found
+
+if TYPE_CHECKING:
+    from rigid_env.env import BlockReachEnv, BlockReorientEnv
+    from rigid_env.vector_env import BlockReachVectorEnv, BlockReorientVectorEnv
+
+    __version__: str
+
+check_engine_is_found()
 register_envs()
 
-__all__ = ["register_envs"]
+_LAZY = {
+    "BlockReachEnv": "rigid_env.env",
+    "BlockReachVectorEnv": "rigid_env.vector_env",
+    "BlockReorientEnv": "rigid_env.env",
+    "BlockReorientVectorEnv": "rigid_env.vector_env",
+}
+
+__all__ = [
+    "BlockReachEnv",
+    "BlockReachVectorEnv",
+    "BlockReorientEnv",
+    "BlockReorientVectorEnv",
+    "__version__",
+    "register_envs",
+]
+
+
+def __getattr__(name: str) -> object:
+    if name in _LAZY:
+        value = getattr(import_module(_LAZY[name]), name)
+    elif name == "__version__":
+        value = _version()
+    else:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}; allowed are {', '.join(__all__)}")
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})
+
+
+def _version() -> str:
+    """The version of the distribution; of sources that are not installed ``0+unknown``."""
+    from importlib.metadata import PackageNotFoundError, version
+
+    try:
+        return version("rigid-env")
+    except PackageNotFoundError:
+        return "0+unknown"

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from physics.keywords import known_keywords
 from rigid_env.single_env import RigidEnv
 from rigid_env.tasks import BlockReach, BlockReorient
 
 
+@known_keywords
 class BlockReachEnv(RigidEnv):
     """Bring a block to a place on the floor, and leave it at rest there.
 
@@ -78,8 +80,10 @@ class BlockReachEnv(RigidEnv):
     At rest on the floor on a random face, with a random yaw, at a random place clear of the walls; the
     goal is another such place. All are drawn uniformly from the square `|x|, |z| <= half_width`
     (`corner`: `0 <= x, z <= 2 half_width`), less 0.25 m and half the block's diagonal on each side.
-    `reset(options=...)` fixes what it names: `place` (x, z) [m], `yaw` [rad], `face` (the face that is
-    down, 0 to 5 for -x, +x, -y, +y, -z, +z), `goal` (x, z) [m].
+    `reset(options=...)` fixes what it names, for this episode: `place` (x, z) [m], `yaw` [rad], `face` (the
+    face that is down, 0 to 5 for -x, +x, -y, +y, -z, +z), `goal` (x, z) [m], both places inside the square, and
+    the parameters `mass`, `size`, `friction`, `restitution` and `gravity`, randomised or not. The other draws of
+    a seed stay the same.
 
     ## Episode End
 
@@ -89,6 +93,8 @@ class BlockReachEnv(RigidEnv):
 
     `info` holds `is_success`, `distance` [m], `speed` [m/s], `spin` [rad/s], and `physics_status`, a
     `physics.Status`: 0 when nothing went wrong in the step, contact problems above their tolerance included.
+    That of `reset` also holds the parameters of the episode, `mass` [kg], `size` [m], `friction`, `restitution` and
+    `gravity` [m/s²], without those that `effects` take the place of.
 
     ## Arguments
 
@@ -111,7 +117,8 @@ class BlockReachEnv(RigidEnv):
     | `height` | 600 | of pictures [px] |
 
     `mass`, `size`, `friction`, `restitution` and `gravity` take a pair (low, high) as well: each episode
-    then draws its own value. What is drawn is not observed, the edges in the gaps to the walls apart.
+    then draws its own value. What is drawn is not observed, the edges in the gaps to the walls apart. They are
+    attributes of the environment, too: a value set there holds in all later episodes.
 
     ## Version History
 
@@ -121,6 +128,7 @@ class BlockReachEnv(RigidEnv):
     task_class = BlockReach
 
 
+@known_keywords
 class BlockReorientEnv(RigidEnv):
     """Turn a block so that a given face is down, and leave it at rest.
 
@@ -188,7 +196,7 @@ class BlockReorientEnv(RigidEnv):
     ## Starting State
 
     As in `BlockReachEnv`; the target is one of the five faces that are not down. `reset(options=...)`
-    takes `place`, `yaw`, `face`, and `target_face`.
+    takes `place`, `yaw`, `face`, the parameters, and `target_face`.
 
     ## Episode End
 
@@ -198,6 +206,8 @@ class BlockReorientEnv(RigidEnv):
 
     `info` holds `is_success`, `angle` [rad], `speed` [m/s], `spin` [rad/s], and `physics_status`, a
     `physics.Status`: 0 when nothing went wrong in the step, contact problems above their tolerance included.
+    That of `reset` also holds the parameters of the episode, `mass` [kg], `size` [m], `friction`, `restitution` and
+    `gravity` [m/s²], without those that `effects` take the place of.
 
     ## Arguments
 

@@ -13,9 +13,12 @@ MAX_EPISODE_STEPS = {"BlockReach": 300, "BlockReorient": 300}
 def register_envs() -> None:
     """Register every environment of the package with Gymnasium; what is registered already stays.
 
-    Called on import, and by Gymnasium itself (entry point `gymnasium.envs`), so that `gymnasium.make` finds
-    the ids without an import. Entry points are named by strings: nothing of the engine is imported before
-    `make`.
+    ``import rigid_env`` calls it. Gymnasium imports no package on its own account in any version that this one runs
+    with (1.1 to 1.4): ``gymnasium.make("rigid_env/BlockReach-v0")`` needs that import first, in every process, and the
+    id ``"rigid_env:rigid_env/BlockReach-v0"`` brings it along, into workers, too. Versions that load plugins (the last
+    was 0.29) call this function through the entry point ``gymnasium.envs``.
+
+    Environments are named by strings: nothing of the engine is imported before `gymnasium.make`.
     """
     for name, steps in MAX_EPISODE_STEPS.items():
         env_id = f"{NAMESPACE}/{name}-v0"

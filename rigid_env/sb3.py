@@ -8,10 +8,16 @@ from typing import Any
 import gymnasium as gym
 import numpy as np
 from gymnasium.vector import AutoresetMode
-from stable_baselines3.common.monitor import Monitor
-from stable_baselines3.common.vec_env import VecEnv
 
+from rigid_env.extras import require
 from rigid_env.vector_env import RigidVectorEnv
+
+try:
+    from stable_baselines3.common.monitor import Monitor
+    from stable_baselines3.common.vec_env import VecEnv
+except ImportError:
+    require("agents", "torch", "stable_baselines3", purpose="rigid_env.sb3")
+    raise
 
 
 class RigidVecEnv(VecEnv):
@@ -20,7 +26,8 @@ class RigidVecEnv(VecEnv):
     Worlds start anew in the step in which their episode ends; the info of that step holds
     ``terminal_observation``, ``TimeLimit.truncated``, ``is_success``, the error that the task names, and,
     with `monitor`, ``episode`` (return ``r``, length ``l``, seconds since the start of training ``t``).
-    The other infos are empty.
+    The other infos are empty. `reset_infos` holds the infos of the starts of the running episodes, with the parameters
+    of each (``mass``, ``size``, ``friction``, ``restitution``, ``gravity``).
 
     Parameters
     ----------
@@ -60,7 +67,7 @@ class RigidVecEnv(VecEnv):
             raise ValueError("set_options got different options; allowed is one dict for all environments")
         seeds = None if all(seed is None for seed in self._seeds) else self._seeds
         obs, infos = self.vector_env.reset(seed=seeds, options=options or None)
-        self.reset_infos = self._rows_of(infos)
+        self.reset_infos = [self._row_of(infos, i) for i in range(self.num_envs)]
         self._reset_seeds()
         self._reset_options()
         self._returns[:] = 0.0
@@ -89,6 +96,7 @@ class RigidVecEnv(VecEnv):
         ended = np.flatnonzero(dones)
         for i in ended:
             infos[i] = self._final_info(i, bool(truncations[i] and not terminations[i]), vector_infos)
+            self.reset_infos[i] = self._row_of(vector_infos, i)
         self._returns[ended] = 0.0
         self._lengths[ended] = 0
         return obs, rewards.astype(np.float32), dones, infos
@@ -110,10 +118,10 @@ class RigidVecEnv(VecEnv):
             }
         return info
 
-    def _rows_of(self, infos: dict[str, Any]) -> list[dict[str, Any]]:
-        """A dict per world of an info of arrays."""
-        columns = {key: value.tolist() for key, value in infos.items() if not key.startswith("_")}
-        return [dict(zip(columns, row)) for row in zip(*columns.values())]
+    def _row_of(self, infos: dict[str, Any], world: int) -> dict[str, Any]:
+        """One world's info at the start of its episode."""
+        keys = (*self.vector_env.start_keys, *self.vector_env.task.own_parameters)
+        return {key: infos[key][world].tolist() for key in keys}
 
     def close(self) -> None:
         """Close the vector environment."""
@@ -122,20 +130,26 @@ class RigidVecEnv(VecEnv):
     # --- one environment's attributes are every environment's ---------------------------------------------
 
     def get_attr(self, attr_name: str, indices=None) -> list[Any]:
-        """The attribute of the vector environment, once per index."""
-        value = getattr(self.vector_env, attr_name)
-        return [value for _ in self._get_indices(indices)]
+        """The attribute of each world (`RigidVectorEnv.get_attr`), or of the vector environment, once per index."""
+        rows = list(self._get_indices(indices))
+        try:
+            values = self.vector_env.get_attr(attr_name)
+        except AttributeError:
+            return [getattr(self.vector_env, attr_name) for _ in rows]
+        return [values[i] for i in rows]
 
     def set_attr(self, attr_name: str, value: Any, indices=None) -> None:
-        """Set an attribute of the vector environment; only for all environments at once.
+        """Set an attribute of all worlds to one value; see `RigidVectorEnv.set_attr`.
 
         Raises
         ------
+        AttributeError
+            A name that has no effect.
         ValueError
-            If `indices` leaves some out.
+            If `indices` leaves some out, or on a value out of range.
         """
         self._require_all("set_attr", indices)
-        setattr(self.vector_env, attr_name, value)
+        self.vector_env.set_attr(attr_name, [value] * self.num_envs)
 
     def env_method(self, method_name: str, *method_args, indices=None, **method_kwargs) -> list[Any]:
         """Call a method of the vector environment once, for all environments; its result, once per index."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from pathlib import Path
 from typing import Any, ClassVar
 
 import gymnasium as gym
@@ -10,14 +11,21 @@ import numpy as np
 from gymnasium.vector import AutoresetMode
 from gymnasium.vector.utils import batch_space
 
+import physics
+from physics import checks
+from physics.keywords import known_keywords
+from rigid_env import vector_arguments as arguments
+from rigid_env.attributes import BatchAttributes
 from rigid_env.registration import MAX_EPISODE_STEPS
 from rigid_env.spaces import action_space, observation_space
 from rigid_env.tasks import BlockReach, BlockReorient, Task
 from rigid_env.tasks import layout as col
+from rigid_env.tasks.options import require_known
+from rigid_env.tasks.parameters import Edges, Number
 from rigid_env.view import RENDER_MODES, View
 
 
-class RigidVectorEnv(gym.vector.VectorEnv):
+class RigidVectorEnv(BatchAttributes):
     """A `Task` as a Gymnasium vector environment; subclasses name the task.
 
     World i goes through the same bits as the single environment with the same seed, whatever `num_envs`.
@@ -33,11 +41,15 @@ class RigidVectorEnv(gym.vector.VectorEnv):
         ``human`` shows world 0.
     width, height : int
         Of one world's picture [px].
-    **parameters
-        Of the task, `threads` among them; see `Task`.
+    threads : int
+        Threads that share a step.
+    accuracy, walls, half_width, mass, size, friction, restitution, gravity, effects, frame_skip, dt, dump_faults
+        Of the task, see `Task`.
 
     Raises
     ------
+    TypeError
+        An unknown argument, with the known ones, the nearest first.
     ValueError
         Naming the field, the value and what is allowed.
     """
@@ -52,18 +64,31 @@ class RigidVectorEnv(gym.vector.VectorEnv):
         render_mode: str | None = None,
         width: int = 960,
         height: int = 600,
-        **parameters,
+        *,
+        threads: int = 1,
+        accuracy: str | physics.Accuracy = "balanced",
+        walls: str = "three",
+        half_width: float = 10.0,
+        mass: Number = 6.0,
+        size: Edges = (5.0, 3.0, 2.0),
+        friction: Number = 0.5,
+        restitution: Number = 0.2,
+        gravity: Number = 9.81,
+        effects: Sequence = (),
+        frame_skip: int = 5,
+        dt: float = 0.005,
+        dump_faults: str | Path | None = None,
     ):
-        self.num_envs = num_envs
-        self.autoreset_mode = _autoreset_mode(autoreset_mode)
-        if max_episode_steps == "registered":
-            max_episode_steps = MAX_EPISODE_STEPS[self.task_class.__name__]
-        if max_episode_steps is not None and not (
-            isinstance(max_episode_steps, (int, np.integer)) and max_episode_steps >= 1
-        ):
-            raise ValueError(f"max_episode_steps is {max_episode_steps!r}; allowed are None and positive integers")
-        self.max_episode_steps = max_episode_steps
-        self.task = self.task_class(num_envs, **parameters)
+        self.num_envs = num_envs = checks.count(num_envs, "num_envs")
+        self.autoreset_mode = arguments.autoreset_mode(autoreset_mode)
+        is_registered = isinstance(max_episode_steps, str) and max_episode_steps == "registered"
+        limit = MAX_EPISODE_STEPS[self.task_class.__name__] if is_registered else max_episode_steps
+        self.max_episode_steps = arguments.episode_limit(limit)
+        self.task = self.task_class(
+            num_envs, threads=threads, accuracy=accuracy, walls=walls, half_width=half_width, mass=mass, size=size,
+            friction=friction, restitution=restitution, gravity=gravity, effects=effects, frame_skip=frame_skip,
+            dt=dt, dump_faults=dump_faults,
+        )  # fmt: skip
         fps = max(1, round(1.0 / self.task.control_dt))
         self.metadata = {
             "render_modes": list(RENDER_MODES),
@@ -91,6 +116,11 @@ class RigidVectorEnv(gym.vector.VectorEnv):
         """The seed of each world's generator; -1 before the first reset."""
         return tuple(self._seeds)
 
+    @property
+    def start_keys(self) -> tuple[str, ...]:
+        """Keys of every info, of a step and of a start."""
+        return ("is_success", self.task.error_name, "speed", "spin", "physics_status")
+
     # --- Gymnasium's two calls ----------------------------------------------------------------------------
 
     def reset(
@@ -110,18 +140,35 @@ class RigidVectorEnv(gym.vector.VectorEnv):
         -------
         observations : (num_envs, entries) float32
         infos : dict of arrays
+            With the parameters of the new episodes: ``mass``, ``size``, ``friction``, ``restitution``, ``gravity``,
+            all but those that `effects` take the place of.
+
+        Raises
+        ------
+        TypeError, ValueError
+            An option or a seed that is unknown or out of range. Nothing has changed then, the generators included.
+        gymnasium.error.ClosedEnvironmentError
+            After `close`.
         """
-        options = dict(options or {})
-        mask = self._reset_mask(options)
-        seeds = self._seed_list(seed)
+        self._check_open("reset")
+        options = dict(require_known(options, (*self.task.option_kinds, "reset_mask")))
+        mask = arguments.reset_mask(options, self.num_envs)
+        seeds = arguments.seed_list(seed, self.num_envs)
         rows = np.flatnonzero(mask)
-        for i in rows:
-            if seeds[i] is not None or self.task.generators[i] is None:
-                self._seeds[i] = self.task.seed(i, seeds[i])
-        self._begin(rows, options)
+        kept = list(self.task.generators), list(self._seeds)
+        try:
+            for i in rows:
+                if seeds[i] is not None or self.task.generators[i] is None:
+                    self._seeds[i] = self.task.seed(i, seeds[i])
+            self._begin(rows, options)
+        except (TypeError, ValueError, gym.error.Error):
+            self.task.generators[:], self._seeds[:] = kept
+            raise
         self._waiting[rows] = False
         self._show()
-        return self.task.obs.copy(), self._infos(mask)
+        infos = self._infos(mask)
+        self._tell_parameters(infos, rows)
+        return self.task.obs.copy(), infos
 
     def step(self, actions) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, dict[str, Any]]:
         """Hold actions for one control step; see `gymnasium.vector.VectorEnv.step`.
@@ -136,12 +183,17 @@ class RigidVectorEnv(gym.vector.VectorEnv):
         rewards : (num_envs,) float64
         terminations, truncations : (num_envs,) bool
         infos : dict of arrays
-            With ``final_obs`` and ``final_info`` of the episodes that ended, in mode ``SameStep``.
+            With ``final_obs`` and ``final_info`` of the episodes that ended, in mode ``SameStep``; with the parameters
+            of the episodes that begin in this step, as `reset` tells them, in both modes that start anew.
 
         Raises
         ------
         gymnasium.error.ResetNeeded
             Before the first reset; in mode ``Disabled`` also after the end of an episode.
+        gymnasium.error.ClosedEnvironmentError
+            After `close`.
+        ValueError
+            Actions of another shape, or that are not finite numbers. Nothing has changed then.
         """
         self._check_ready()
         task = self.task
@@ -152,7 +204,7 @@ class RigidVectorEnv(gym.vector.VectorEnv):
         truncations = np.zeros(self.num_envs, dtype=np.bool_)
         if self.max_episode_steps is not None:
             truncations = self._elapsed >= self.max_episode_steps
-        finals = {}
+        finals: dict[str, Any] = {}
         if self.autoreset_mode is AutoresetMode.NEXT_STEP:
             rows = np.flatnonzero(self._ended)
             rewards[rows], terminations[rows], truncations[rows] = 0.0, False, False
@@ -165,12 +217,18 @@ class RigidVectorEnv(gym.vector.VectorEnv):
             ended = self._ended
             self._begin(rows, {})
             self._ended = ended & (self.autoreset_mode is AutoresetMode.NEXT_STEP)
+            self._tell_parameters(finals, rows)
         self._show()
         return task.obs.copy(), rewards, terminations, truncations, {**self._infos(), **finals}
 
     # --- parts of these -----------------------------------------------------------------------------------
 
+    def _check_open(self, call: str) -> None:
+        if self.closed:
+            raise gym.error.ClosedEnvironmentError(f"{call}() after close(): allowed is a new environment")
+
     def _check_ready(self) -> None:
+        self._check_open("step")
         if self._waiting.any():
             raise gym.error.ResetNeeded("call reset() before step()")
         if self.autoreset_mode is AutoresetMode.DISABLED and self._ended.any():
@@ -202,6 +260,16 @@ class RigidVectorEnv(gym.vector.VectorEnv):
         infos.update({f"_{key}": mask.copy() for key in tuple(infos)})
         return infos
 
+    def _tell_parameters(self, infos: dict[str, Any], rows: np.ndarray) -> None:
+        """Add the parameters of the episodes that begin in the worlds `rows`."""
+        mask = np.zeros(self.num_envs, dtype=np.bool_)
+        mask[rows] = True
+        for field in self.task.own_parameters:
+            now = self.task.values.now[field]
+            told = np.zeros_like(now)
+            told[rows] = now[rows]
+            infos[field], infos[f"_{field}"] = told, mask.copy()
+
     def _finals(self, rows: np.ndarray) -> dict[str, Any]:
         """`final_obs` and `final_info` of the episodes that end, before their worlds start anew."""
         final_obs = np.full(self.num_envs, None, dtype=object)
@@ -215,30 +283,11 @@ class RigidVectorEnv(gym.vector.VectorEnv):
             "_final_info": mask.copy(),
         }
 
-    def _reset_mask(self, options: dict[str, Any]) -> np.ndarray:
-        mask = options.pop("reset_mask", None)
-        if mask is None:
-            return np.ones(self.num_envs, dtype=np.bool_)
-        if not isinstance(mask, np.ndarray) or mask.dtype != np.bool_ or mask.shape != (self.num_envs,):
-            raise ValueError(f"options reset_mask is {mask!r}; allowed is a bool array of shape ({self.num_envs},)")
-        if not mask.any():
-            raise ValueError(f"options reset_mask is {mask!r}; allowed are arrays with at least one True")
-        return mask
-
-    def _seed_list(self, seed) -> list[int | None]:
-        if seed is None:
-            return [None] * self.num_envs
-        if isinstance(seed, (int, np.integer)):
-            return [int(seed) + i for i in range(self.num_envs)]
-        seeds = list(seed)
-        if len(seeds) != self.num_envs:
-            raise ValueError(f"seed has {len(seeds)} entries; allowed are an int, None, or {self.num_envs} entries")
-        return seeds
-
     # --- pictures -----------------------------------------------------------------------------------------
 
     def render(self) -> tuple[np.ndarray, ...] | None:
         """A picture of each world, (height, width, 3) uint8; mode ``human`` shows world 0 and gives None."""
+        self._check_open("render")
         if self.render_mode is None:
             gym.logger.warn("render() needs a render_mode: pass render_mode='rgb_array' or 'human' to make_vec()")
             return None
@@ -256,20 +305,14 @@ class RigidVectorEnv(gym.vector.VectorEnv):
         self._view.close()
 
 
-def _autoreset_mode(mode: AutoresetMode | str) -> AutoresetMode:
-    try:
-        return AutoresetMode(mode)
-    except ValueError:
-        allowed = ", ".join(repr(m.value) for m in AutoresetMode)
-        raise ValueError(f"autoreset_mode is {mode!r}; allowed are {allowed}") from None
-
-
+@known_keywords
 class BlockReachVectorEnv(RigidVectorEnv):
     """Many worlds of `rigid_env.env.BlockReachEnv`, which documents the task."""
 
     task_class = BlockReach
 
 
+@known_keywords
 class BlockReorientVectorEnv(RigidVectorEnv):
     """Many worlds of `rigid_env.env.BlockReorientEnv`, which documents the task."""
 

@@ -52,10 +52,15 @@ class Area:
         """Both x and z of the middle [m]."""
         return self.half_width if self.walls == "corner" else 0.0
 
-    def check_room(self, size: np.ndarray) -> None:
-        """Raise a ValueError if a block of edges `size` (3,) [m] has no room to turn."""
+    def check_room(self, size: np.ndarray, option: str | None = None) -> None:
+        """Raise a ValueError, about an `option` if there is one, if a block of edges `size` (3,) has no room."""
         radius = 0.5 * float(np.linalg.norm(size))
         if not self.half_width > radius + CLEARANCE:
+            if option is not None:
+                raise ValueError(
+                    f"{option} is {size.tolist()}; allowed are edges with a diagonal below "
+                    f"{2.0 * (self.half_width - CLEARANCE):.6g} m, the width of the box less {CLEARANCE} m on each side"
+                )
             raise ValueError(
                 f"half_width is {self.half_width}; allowed is more than {radius + CLEARANCE:.6g}, "
                 f"half the diagonal of a block of size {size.tolist()} and {CLEARANCE} m more"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import reprlib
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from typing import ClassVar
@@ -15,10 +16,14 @@ from physics.machine_code import bound
 from physics.report import gravest
 from physics.threads import listed
 from rigid_env.tasks import layout as col
+from rigid_env.tasks import start
 from rigid_env.tasks.area import Area
 from rigid_env.tasks.entries import Entry
-from rigid_env.tasks.kernels import AXES, start_poses, wrenches
-from rigid_env.tasks.parameters import DRAW_COUNT, Parameters
+from rigid_env.tasks.kernels import AXES, wrenches
+from rigid_env.tasks.options import START_OPTIONS, read_options, read_parameter
+from rigid_env.tasks.parameters import DRAW_COUNT, LENGTHS, Parameters
+from rigid_env.tasks.replacing import checked_effects, refuse_replaced, replaced
+from rigid_env.tasks.values import EpisodeValues
 
 FORCE_SHARE = 0.9
 """Longest force over the block's weight m g: less than 1, so that the agent cannot fly."""
@@ -27,8 +32,6 @@ TORQUE_SHARE = 0.5
 """Longest torque over m g times the longest half edge. To tip the block a torque alone must exceed m g times
 the half edge that the centre has to pass over: this one tips the 5 x 3 x 2 m block when that is its shortest,
 and is too weak for the others without the force's help, momentum, or a wall."""
-
-FACE_COUNT = 6
 
 GOAL_DRAWS = 2  # uniform numbers per episode for the goal; a task may leave some unused
 DRAWS = col.START_SIZE + GOAL_DRAWS + DRAW_COUNT
@@ -69,6 +72,8 @@ class Task(ABC):
     world : physics.World
     generators : list of numpy.random.Generator or None
         One per world: an episode does not depend on the batch it runs in.
+    values : EpisodeValues
+        Parameters of the running episodes.
     record : (worlds, RECORD_SIZE) float64
     obs : (worlds, entries) float32
     outcome : (worlds, OUTCOME_SIZE) float64
@@ -83,7 +88,7 @@ class Task(ABC):
     """
 
     observation: ClassVar[tuple[Entry, ...]]
-    goal_options: ClassVar[tuple[str, ...]]
+    goal_options: ClassVar[dict[str, str]]
     error_name: ClassVar[str]
 
     def __init__(
@@ -108,7 +113,7 @@ class Task(ABC):
         self.parameters = Parameters(mass=mass, size=size, friction=friction, restitution=restitution, gravity=gravity)
         self.area.check_room(self.parameters["size"].high)
         self.frame_skip = checks.count(frame_skip, "frame_skip")
-        self.effects = self._checked_effects(effects)
+        self.effects = checked_effects(effects, self.parameters.randomised)
         self.world = physics.World(self._scene(), worlds=worlds, dt=dt, accuracy=accuracy, threads=threads)
         self.generators: list[np.random.Generator | None] = [None] * worlds
         self.record = np.zeros((worlds, col.RECORD_SIZE))
@@ -119,7 +124,8 @@ class Task(ABC):
         if dump_faults is not None:
             physics.Recorder(self.world, folder=dump_faults)
         self._actions = np.zeros((worlds, AXES))
-        self._note_parameters(np.arange(worlds), self.parameters.draw(np.full((worlds, DRAW_COUNT), 0.5)))
+        self.values = EpisodeValues(self.parameters, worlds)
+        self._note_parameters(np.arange(worlds), self.values.now)
 
     @property
     def worlds(self) -> int:
@@ -144,25 +150,19 @@ class Task(ABC):
             physics.Contact(restitution=float(middle["restitution"][0])),
             physics.Friction(float(middle["friction"][0])),
         ]
-        replaced = {type(effect) for effect in self.effects}
+        given = {type(effect) for effect in self.effects}
+        size, mass = self.parameters.scene_size, float(middle["mass"][0])
         return physics.Scene(
-            bodies=[physics.Block(size=tuple(middle["size"]), mass=float(middle["mass"][0]), pos=self._lifted())],
+            bodies=[physics.Block(size=tuple(size), mass=mass, pos=self._lifted(size[None]))],
             walls=self.area.half_spaces,
-            effects=[*(effect for effect in own if type(effect) not in replaced), *self.effects],
+            effects=[*(effect for effect in own if type(effect) not in given), *self.effects],
         )
 
-    def _checked_effects(self, effects) -> tuple:
-        """The effects given, if none takes the place of what is drawn."""
-        try:
-            effects = tuple(effects)
-        except TypeError:
-            raise ValueError(f"effects is {effects!r}; allowed is a sequence of effects") from None
-        drawn = {physics.Gravity: "gravity", physics.Contact: "restitution", physics.Friction: "friction"}
-        for effect in effects:
-            field = drawn.get(type(effect))
-            if field in self.parameters.randomised:
-                raise ValueError(f"effects holds {effect!r}, but {field} is drawn from a range; give one of the two")
-        return effects
+    @property
+    def own_parameters(self) -> tuple[str, ...]:
+        """Parameters that episodes may differ in: all that `effects` leave to the task."""
+        taken = replaced(self.effects)
+        return tuple(field for field in LENGTHS if field not in taken)
 
     # --- episodes -----------------------------------------------------------------------------------------
 
@@ -180,60 +180,51 @@ class Task(ABC):
             Worlds.
         options : dict, optional
             Fix what is otherwise drawn, each for all `rows` or one per row: ``place`` (2,) x and z of the
-            centre [m], ``yaw`` () [rad], ``face`` () the face that is down, and the task's own.
+            centre [m], ``yaw`` () [rad], ``face`` () the face that is down, the parameters of the block (`LENGTHS`),
+            and the task's own.
 
         Raises
         ------
-        ValueError
-            An option that is unknown or out of range. Nothing has changed then but the generators.
+        TypeError, ValueError
+            An option that is unknown or out of range. Nothing has changed then, the generators included.
         """
-        options = dict(options or {})
+        chosen = read_options(options, self.option_kinds, len(rows), self.area)
+        refuse_replaced(self.effects, chosen, "options ")
+        marks = [self.generators[world].bit_generator.state for world in rows] if chosen else []
         shares = np.array([self.generators[world].random(DRAWS) for world in rows])
         starts, goals = shares[:, : col.START_SIZE], shares[:, col.START_SIZE : col.START_SIZE + GOAL_DRAWS]
-        values = self.parameters.draw(shares[:, col.START_SIZE + GOAL_DRAWS :])
-        starts[:, :2] = self.area.spread(starts[:, :2], values["size"])
-        starts[:, col.YAW] *= 2.0 * np.pi
-        starts[:, col.START_FACE] = np.floor(FACE_COUNT * starts[:, col.START_FACE])
-        self._apply_start_options(starts, options)
-        record = self.record[rows]
-        self._set_goals(record, goals, starts, values["size"], options)
-        if options:
-            allowed = ("place", "yaw", "face", *self.goal_options)
-            raise ValueError(f"options has the key {next(iter(options))!r}; allowed are {', '.join(allowed)}")
-        self._place(rows, starts, values)
-        self.record[rows] = record
+        values = self.values.draw(rows, shares[:, col.START_SIZE + GOAL_DRAWS :], chosen)
+        start.choose(self.area, starts, values["size"], chosen)
+        pos, quat = start.poses(starts, values["size"])
+        if chosen:
+            try:
+                start.check(self.world, rows, pos, quat, values)
+            except ValueError:
+                for world, mark in zip(rows, marks):
+                    self.generators[world].bit_generator.state = mark
+                raise
+        self.values.begin(rows, values, chosen)
+        changed = self.values.changed(values)
+        lifted = self._lifted(values["size"]) if "size" in changed else None
+        start.place(self.world, rows, pos, quat, changed, lifted)
         self._note_parameters(rows, values)
+        record = self.record[rows]
+        self._set_goals(record, goals, starts, values["size"], chosen)
+        self.record[rows] = record
         self.wrench[rows] = 0.0
         self.status[rows] = physics.Status.OK
         self._kernel(listed(rows), self.world.state, self.record, self.world.walls, None, self.obs, self.outcome)
 
-    def _apply_start_options(self, starts: np.ndarray, options: dict) -> None:
-        n = len(starts)
-        if "place" in options:
-            starts[:, :2] = spread_option("place", options.pop("place"), (n, 2))
-        if "yaw" in options:
-            starts[:, col.YAW] = spread_option("yaw", options.pop("yaw"), (n,))
-        if "face" in options:
-            starts[:, col.START_FACE] = face_option("face", options.pop("face"), n)
+    @property
+    def option_kinds(self) -> dict[str, str]:
+        """Options of `begin`, and the kind of each (`options.READERS`)."""
+        return {**START_OPTIONS, **self.goal_options}
 
-    def _place(self, rows: np.ndarray, starts: np.ndarray, values: dict[str, np.ndarray]) -> None:
-        """Parameters and poses of new episodes into the world."""
-        pos, quat = np.empty((len(rows), 1, 3)), np.empty((len(rows), 1, 4))
-        start_poses(starts, 0.5 * values["size"], pos, quat)
-        changed = {field: values[field] for field in self.parameters.randomised}
-        if "gravity" in changed:
-            changed["gravity"] = np.outer(changed["gravity"], (0.0, -1.0, 0.0))
-        if "size" in changed:  # where the old block lay, the new one might not fit
-            self.world.set_state(pos=np.broadcast_to(self._lifted(), pos.shape), worlds=rows)
-        if changed:
-            self.world.set_parameters(**changed, worlds=rows)
-        still = np.zeros_like(pos)
-        self.world.set_state(pos=pos, quat=quat, linvel=still, angvel=still, worlds=rows)
-
-    def _lifted(self) -> tuple[float, float, float]:
-        """A place where a block of any size in the range is clear of all walls [m]."""
+    def _lifted(self, size: np.ndarray) -> tuple[float, float, float]:
+        """A place where blocks of edges `size` (n, 3), and of any in the range, are clear of all walls [m]."""
         c = self.area.centre
-        return (c, float(np.linalg.norm(self.parameters["size"].high)), c)
+        longest = max(np.linalg.norm(self.parameters["size"].high), np.linalg.norm(size, axis=1).max())
+        return (c, float(longest), c)
 
     def _note_parameters(self, rows: np.ndarray, values: dict[str, np.ndarray]) -> None:
         given = next((effect for effect in self.effects if isinstance(effect, physics.Gravity)), None)
@@ -243,6 +234,30 @@ class Task(ABC):
         self.record[rows, col.FORCE_LIMIT] = FORCE_SHARE * weight
         self.record[rows, col.TORQUE_LIMIT] = TORQUE_SHARE * weight * half.max(axis=1)
         self.record[rows, col.HALF : col.HALF + 3] = half
+
+    def hold(self, field: str, value) -> None:
+        """Give a parameter of every world a value from now on, in this episode and all later ones.
+
+        Parameters
+        ----------
+        field : {"mass", "size", "friction", "restitution", "gravity"}
+        value : array_like or None
+            One for all worlds or one for each; None: draw it again from the next episode on.
+
+        Raises
+        ------
+        ValueError
+            A value out of range, or a size that reaches deep into a wall where the block is. Nothing has changed then.
+        """
+        refuse_replaced(self.effects, (field,))
+        if value is not None:
+            value = read_parameter(field, field, value, self.worlds, self.area)
+            try:
+                self.world.set_parameters(**start.as_world({field: value}))
+            except ValueError as error:
+                raise ValueError(f"{field} is {reprlib.repr(value.tolist())}: {error}") from None
+        self.values.hold(field, value)
+        self._note_parameters(np.arange(self.worlds), self.values.now)
 
     # --- control steps ------------------------------------------------------------------------------------
 
@@ -259,9 +274,14 @@ class Task(ABC):
         ValueError
             Actions of the wrong shape or not finite; nothing has moved then.
         """
-        actions = np.asarray(actions)
+        try:
+            actions = np.asarray(actions)
+        except ValueError:  # rows of different lengths
+            raise ValueError(f"actions is {reprlib.repr(actions)}; allowed is shape {self._actions.shape}") from None
         if actions.shape != self._actions.shape:
             raise ValueError(f"actions has shape {actions.shape}; allowed is shape {self._actions.shape}")
+        if actions.dtype.kind not in "fiub":
+            raise ValueError(f"actions is {reprlib.repr(actions.tolist())}; allowed are numbers")
         self._actions[...] = actions
         bad = wrenches(self._actions, self.record, self.wrench)
         if bad >= 0:
@@ -283,17 +303,3 @@ class Task(ABC):
         """Write goals of new episodes into `record` (n, RECORD_SIZE); take what they use out of `options`."""
 
     _kernel: ClassVar
-
-
-def spread_option(name: str, value, shape: tuple[int, ...]) -> np.ndarray:
-    """An option for n worlds, (n, ...), from one for all of them or one for each."""
-    array = np.asarray(value)
-    return checks.finite(np.broadcast_to(array, shape) if array.shape == shape[1:] else array, shape, f"options {name}")
-
-
-def face_option(name: str, value, count: int) -> np.ndarray:
-    """Face numbers (n,) from an option."""
-    faces = spread_option(name, value, (count,))
-    if not np.isin(faces, np.arange(FACE_COUNT)).all():
-        raise ValueError(f"options {name} is {value!r}; allowed are integers from 0 to {FACE_COUNT - 1}")
-    return faces

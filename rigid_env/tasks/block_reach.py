@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from typing import ClassVar
+
 from rigid_env.tasks import entries, kernels
 from rigid_env.tasks import layout as col
-from rigid_env.tasks.base import Task, spread_option
+from rigid_env.tasks.base import Task
 
 
 class BlockReach(Task):
@@ -17,13 +19,10 @@ class BlockReach(Task):
         *entries.GAPS,
         *entries.HOLD,
     )
-    goal_options = ("goal",)
+    goal_options: ClassVar = {"goal": "place"}
     error_name = "distance"
 
     def _set_goals(self, record, shares, starts, size, options):
-        goals = self.area.spread(shares, size)
-        if "goal" in options:
-            goals = spread_option("goal", options.pop("goal"), goals.shape)
-        record[:, col.GOAL : col.GOAL + 2] = goals
+        record[:, col.GOAL : col.GOAL + 2] = options["goal"] if "goal" in options else self.area.spread(shares, size)
 
     _kernel = staticmethod(kernels.observe_reach)

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from typing import ClassVar
+
 import numpy as np
 
 from rigid_env.tasks import entries, kernels
 from rigid_env.tasks import layout as col
-from rigid_env.tasks.base import FACE_COUNT, Task, face_option
+from rigid_env.tasks.base import Task
+from rigid_env.tasks.options import FACE_COUNT
 
 
 class BlockReorient(Task):
@@ -18,14 +21,12 @@ class BlockReorient(Task):
         *entries.GAPS,
         *entries.HOLD,
     )
-    goal_options = ("target_face",)
+    goal_options: ClassVar = {"target_face": "face"}
     error_name = "angle"
 
     def _set_goals(self, record, shares, starts, size, options):
         other = 1.0 + np.floor((FACE_COUNT - 1) * shares[:, 0])
         faces = (starts[:, col.START_FACE] + other) % FACE_COUNT
-        if "target_face" in options:
-            faces = face_option("target_face", options.pop("target_face"), len(faces))
-        record[:, col.FACE] = faces
+        record[:, col.FACE] = options.get("target_face", faces)
 
     _kernel = staticmethod(kernels.observe_reorient)

@@ -76,12 +76,13 @@ def wrenches(actions, record, wrench):
     Returns
     -------
     int
-        Index of the first world whose action is not finite, else -1; `wrench` is then not complete.
+        Index of the first world whose action is not finite, else -1; `wrench` is written in the second case only.
     """
     for i in range(actions.shape[0]):
         for k in range(AXES):
             if not math.isfinite(actions[i, k]):
                 return i
+    for i in range(actions.shape[0]):
         for first, limit in ((0, record[i, col.FORCE_LIMIT]), (3, record[i, col.TORQUE_LIMIT])):
             x = clip(actions[i, first], -1.0, 1.0)
             y = clip(actions[i, first + 1], -1.0, 1.0)

@@ -8,6 +8,12 @@ import numpy as np
 
 from physics import checks
 
+Number = float | tuple[float, float]
+"""A value, or a range (low, high) to draw from."""
+
+Edges = tuple[float, float, float] | tuple[tuple[float, float, float], tuple[float, float, float]]
+"""Edges of the block [m], or a range of them."""
+
 CHECKS = {
     "mass": checks.positive,
     "size": checks.positive,
@@ -19,6 +25,9 @@ CHECKS = {
 
 LENGTHS = {"mass": 1, "size": 3, "friction": 1, "restitution": 1, "gravity": 1}
 """Numbers in each parameter, in the order in which they are drawn."""
+
+OFF_MIDDLE = (0.25, 0.4, 0.75)
+"""Shares of a range of sizes at which the block of a scene is no cube, where the middle is one."""
 
 DRAW_COUNT = sum(LENGTHS.values())
 """Uniform numbers drawn per episode, whether or not anything is randomised: fixing a parameter leaves the
@@ -105,6 +114,17 @@ class Parameters:
     def randomised(self) -> list[str]:
         """Fields that differ from episode to episode."""
         return [field for field, span in self.ranges.items() if not span.is_fixed]
+
+    @property
+    def scene_size(self) -> np.ndarray:
+        """Edges (3,) of the block that kernels are compiled for: the middle, of a range no cube [m].
+
+        The kernel of a cube has no gyroscopic torque, which all other blocks of the range need.
+        """
+        span = self["size"]
+        if span.is_fixed or np.ptp(span.middle) > 0.0:
+            return span.middle
+        return span.at(np.array(OFF_MIDDLE))
 
     def draw(self, shares: np.ndarray) -> dict[str, np.ndarray]:
         """Values from uniform numbers.

@@ -78,7 +78,8 @@ def test_seeds_are_used_once():
     venv.seed(3)
     np.testing.assert_array_equal(first, venv.reset())
     assert len(venv.reset_infos) == 3
-    assert venv.reset_infos[0].keys() == {"is_success", "distance", "speed", "spin", "physics_status"}
+    parameters = {"mass", "size", "friction", "restitution", "gravity"}
+    assert venv.reset_infos[0].keys() == {"is_success", "distance", "speed", "spin", "physics_status"} | parameters
 
 
 def test_attributes_and_methods():
@@ -91,7 +92,7 @@ def test_attributes_and_methods():
         venv.set_attr("max_episode_steps", 5, indices=0)
     assert venv.has_attr("task")
     assert not venv.has_attr("tusk")
-    assert len(venv.env_method("_seed_list", 1)) == 3
+    assert venv.env_method("call", "mass") == [(6.0,) * 3] * 3
     assert venv.env_is_wrapped(Monitor) == [True] * 3
     assert make(monitor=False).env_is_wrapped(Monitor) == [False] * 3
 

@@ -266,11 +266,12 @@ def test_a_bad_action_changes_nothing(env_class, vector_class):
 @pytest.mark.parametrize(
     ("options", "text"),
     [
-        ({"colour": 1}, "options has the key 'colour'; allowed are place, yaw, face"),
+        ({"yau": 1}, "options has the key 'yau'; allowed are yaw, "),
         ({"face": 6}, "options face is 6; allowed are integers from 0 to 5"),
         ({"face": 1.5}, "options face is 1.5"),
         ({"place": (1.0,)}, "options place"),
-        ({"place": (100.0, 0.0)}, "inside"),
+        ({"place": (100.0, 0.0)}, r"options place is \(100.0, 0.0\); allowed are places inside the box"),
+        ({"place": (9.8, 0.0)}, r"options place, .* inside walls\[2\]"),
         ({"yaw": float("inf")}, "options yaw"),
     ],
 )

@@ -1,0 +1,73 @@
+"""The engine's name `physics` taken by another file: said when the package is imported, and with the way out.
+
+Python looks for `physics` in the working folder first (``python -m``, ``python -c``) or in the folder of the script. A
+`physics.py` there, or another distribution of that name, hides the engine. Nothing is imported to find out.
+"""
+
+from __future__ import annotations
+
+import sys
+from importlib.machinery import ModuleSpec, PathFinder
+from importlib.util import find_spec
+
+ENGINE, MARK, IMPORTED = "physics", "kernels", "physics.world"
+"""The package looked for, a subpackage that only the engine's has, and a module that its first file imports: another
+distribution installed into the same folder overwrites that file alone."""
+
+
+def check_engine_is_found() -> None:
+    """Raise if ``import physics`` would give, or has given, something else than the engine.
+
+    Raises
+    ------
+    ImportError
+        Naming the file that hides the engine, and what to do.
+    """
+    spec = _spec_of(ENGINE)
+    if spec is None:
+        raise ImportError(
+            f"rigid_env needs the package {ENGINE!r} of its distribution, which is not found: install rigid-env again, "
+            "or put the folder that holds both on the path",
+            name=ENGINE,
+        )
+    folders = spec.submodule_search_locations
+    if folders is not None and PathFinder.find_spec(f"{ENGINE}.{MARK}", list(folders)) is not None:
+        source = spec.loader.get_source(ENGINE) if hasattr(spec.loader, "get_source") else None
+        if source is None or IMPORTED in source:
+            return
+    raise ImportError(_message(spec), name=ENGINE, path=spec.origin)
+
+
+def _spec_of(name: str) -> ModuleSpec | None:
+    try:
+        return find_spec(name)
+    except (ImportError, ValueError):  # imported already, without a spec
+        module = sys.modules.get(name)
+        if module is None:
+            return None
+        spec = ModuleSpec(name, None, origin=getattr(module, "__file__", None))
+        spec.submodule_search_locations = getattr(module, "__path__", None)
+        return spec
+
+
+def _message(spec: ModuleSpec) -> str:
+    found = spec.origin or next(iter(spec.submodule_search_locations or ()), "something")
+    distribution = _distribution_of(found)
+    if distribution is None:
+        way_out = (
+            "rename it, start Python in another folder, or with `python -P` (3.11 or later; PYTHONSAFEPATH=1 likewise)"
+        )
+    else:
+        way_out = f"it came with {distribution}: pip uninstall {distribution}, then install rigid-env again"
+    return f"{found} hides the package {ENGINE!r} that rigid_env is built on: {way_out}"
+
+
+def _distribution_of(path: str) -> str | None:
+    """Name of the distribution that a file of the engine's name came with."""
+    from importlib.metadata import packages_distributions
+    from pathlib import Path
+
+    if not {"site-packages", "dist-packages"} & set(Path(path).parts):
+        return None
+    names = [name for name in packages_distributions().get(ENGINE, []) if name != "rigid-env"]
+    return names[0] if names else None
