@@ -34,7 +34,7 @@ TURNS_PER_THREAD = 4
 # those ask whether there is more to do before they go [s]. Meanwhile they give way to other threads, so often [s].
 PATIENCE = 2.0e-4
 STAY = 3.0e-4
-BETWEEN = 5.0e-6
+BETWEEN = 1.0e-4
 
 # Turns off that threads give way and that a quota counts; for measurements.
 SWITCH = "RIGID_ENV_THREADS"
