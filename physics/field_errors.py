@@ -132,4 +132,6 @@ def raised(error: Exception, slots: tuple) -> Exception:
         if any(_holds(each, last.filename, last.lineno) for one in functions if one for each in called(one))
     ]
     message = f"{error} in a function of {' or '.join(exact or names)}; nothing has changed"
-    return IndexError(placed(message, Place(last.filename, last.lineno, last.name)))
+    told = IndexError(placed(message, Place(last.filename, last.lineno, last.name)))
+    told.__cause__ = error
+    return told

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 
@@ -80,7 +79,7 @@ class Plan:
         """The fields' part in the kernel."""
         return tuple(slot.term for slot in self.fields)
 
-    @cached_property
+    @property
     def may_raise(self) -> bool:
         """Whether a step may end in an exception: that of a user's field."""
         return any(slot.may_raise for slot in self.fields)

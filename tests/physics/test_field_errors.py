@@ -312,6 +312,7 @@ def test_a_computed_index_counts_from_the_end_or_is_an_error_and_nothing_has_mov
             step()
         assert f'File "{inspect.getsourcefile(made)}", line ' in str(caught.value)
         assert str(caught.value).endswith("in chosen\n    return p[k]")
+        assert isinstance(caught.value.__cause__, IndexError)
         assert all((now == then).all() for now, then in zip(world.kept(), before, strict=True))
         assert world.time == time
     for index in (3, -4, 1e15, -1e300):
