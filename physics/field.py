@@ -197,7 +197,7 @@ def _check_functions(kind: type, term: Term) -> bool:
 
 
 def _is_built_in(function: Kernel) -> bool:
-    return function.py_func.__module__.startswith("physics.kernels.")
+    return (function.py_func.__module__ or "").startswith("physics.kernels.")
 
 
 def _compiled(kind: type, name: str) -> Kernel | None:

@@ -153,7 +153,7 @@ class _Reader:
                     "functions under @physics.field_function",
                     function, expr.loc,
                 )  # fmt: skip
-            self.may_raise |= not called.py_func.__module__.startswith("physics.kernels.")
+            self.may_raise |= not (called.py_func.__module__ or "").startswith("physics.kernels.")
             return
         if not hasattr(called, "as_part"):  # Numba's own
             self.may_raise = True

@@ -131,5 +131,7 @@ def raised(error: Exception, slots: tuple) -> Exception:
         for slot, functions in ours
         if any(_holds(each, last.filename, last.lineno) for one in functions if one for each in called(one))
     ]
-    message = f"{error} in a function of {' or '.join(exact or names)}; nothing has moved"
-    return IndexError(placed(message, Place(last.filename, last.lineno, last.name)))
+    message = f"{error} in a function of {' or '.join(exact or names)}; nothing has changed"
+    told = IndexError(placed(message, Place(last.filename, last.lineno, last.name)))
+    told.__cause__ = error
+    return told

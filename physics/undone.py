@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from contextlib import contextmanager
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NoReturn
 
 from physics.field_errors import raised
 
@@ -12,26 +10,29 @@ if TYPE_CHECKING:
     from physics.world import World
 
 
-@contextmanager
-def all_or_nothing(world: World) -> Iterator[None]:
-    """Put a world back as it was when an exception leaves the block; that of an index then names the field's class.
+class Before:
+    """All that decides how a world goes on, copied before a step that may end in an exception (`Plan.may_raise`).
 
-    The kernel has advanced some worlds of the batch by then, and not the others. It costs a copy of all that decides
-    how the world goes on; it is for plans of which a step may raise an exception (`Plan.may_raise`).
+    By then the kernel has advanced some worlds of the batch, and not the others.
+
+    Parameters
+    ----------
+    world : World
     """
-    kept, time = [array.copy() for array in world.kept()], world.time
-    actuation = None if world.actuation is None else world.actuation.kept()
-    try:
-        yield
-    except Exception as error:
-        for array, before in zip(world.kept(), kept, strict=True):
+
+    def __init__(self, world: World):
+        self._world, self._time = world, world.time
+        self._kept = [array.copy() for array in world.kept()]
+        self._actuation = None if world.actuation is None else world.actuation.kept()
+
+    def put_back(self, error: Exception) -> NoReturn:
+        """Put the world back as it was and raise the exception; that of an index then names the field's class."""
+        world = self._world
+        for array, before in zip(world.kept(), self._kept, strict=True):
             array[...] = before
-        world.time = time
+        world.time = self._time
         if world.actuation is not None:
-            world.actuation.put_back(actuation)
+            world.actuation.put_back(self._actuation)
         if world.recorder is not None:
             world.recorder.undone()
-        told = raised(error, world.plan.fields)
-        if told is error:
-            raise
-        raise told from error
+        raise raised(error, world.plan.fields)

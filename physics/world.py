@@ -28,7 +28,7 @@ from physics.scene import Scene
 from physics.stepper import kernel_calls, retime
 from physics.summary import lines_repr
 from physics.threads import Team
-from physics.undone import all_or_nothing
+from physics.undone import Before
 
 if TYPE_CHECKING:
     from physics.recorder import Recorder
@@ -137,6 +137,7 @@ class World:
     def _prepare_threads(self) -> None:
         self.team = Team(self.threads, self.worlds)
         declare(self.plan.terms)
+        self._may_raise = self.plan.may_raise
         self.scratch = [
             allocation.make_scratch(self.scene, self.plan, self.walls, self.accuracy) for _ in range(self.team.size)
         ]
@@ -210,19 +211,18 @@ class World:
         A `Stepper` leaves this out where it comes to one call: what takes part in a step here is in `stepper._is_all`.
         Where a user's field raises an exception nothing has changed.
         """
-        if self.plan.may_raise:
-            with all_or_nothing(self):
-                self._advance(calls, wrench, steps, dt)
-        else:
-            self._advance(calls, wrench, steps, dt)
-
-    def _advance(self, calls: list[Work], wrench: np.ndarray, steps: int, dt: float) -> None:
-        if self.recorder is not None:
-            self.recorder.before(wrench, steps, dt)
-        if self.actuation is None:
-            self.make(calls, steps * dt)
-        else:
-            self.actuation.advance(self, calls, wrench, steps, dt)
+        before = Before(self) if self._may_raise else None
+        try:
+            if self.recorder is not None:
+                self.recorder.before(wrench, steps, dt)
+            if self.actuation is None:
+                self.make(calls, steps * dt)
+            else:
+                self.actuation.advance(self, calls, wrench, steps, dt)
+        except Exception as error:
+            if before is None:
+                raise
+            before.put_back(error)
         if self.recorder is not None:
             self.recorder.after()
 
