@@ -194,3 +194,34 @@ def test_a_step_that_is_not_kept_logs_nothing():
     world.step(wrench)
     assert world.report.faults[0] == 1
     assert not world.event_counts.any()
+
+
+@pytest.mark.parametrize("accuracy", ["balanced", "precise"])
+@pytest.mark.parametrize("count", [1, 2])
+def test_random_impacts_with_friction_and_rebound_add_up(accuracy, count):
+    """Also where only a part of the rebound is made, since the whole would gain energy (`kernels/restraint.py`)."""
+    worlds, rng = 100 if count == 1 or accuracy == "balanced" else 10, np.random.default_rng(0)
+    flying = physics.Block((1, 4, 0.5), 2.0, pos=(0, 8, 0))
+    bodies, floor = ([flying], 0.0) if count == 1 else ([physics.Block((5, 3, 2), 6.0), flying], -1000.0)
+    scene = physics.Scene(bodies, [physics.HalfSpace((0, 1, 0), floor)], laws(1.0, 1.5))
+    world = physics.World(scene, worlds, dt=0.02, accuracy=accuracy)
+    world.make_event_room(64)
+    quat, linvel = rng.normal(size=(worlds, count, 4)), rng.normal(size=(worlds, count, 3))
+    quat /= np.linalg.norm(quat, axis=2, keepdims=True)
+    linvel[:, -1, 1] -= 8.0
+    world.set_state(quat=quat, linvel=linvel, angvel=3 * rng.normal(size=(worlds, count, 3)))
+    masses = np.array([body.mass for body in bodies])[:, None]
+    before = masses * world.linvel
+    world.step(steps=50)
+    told = np.zeros_like(before)
+    for row, (number, events) in enumerate(zip(world.event_counts, world.event_log)):
+        of, body = divmod(row, count)
+        for event in events[:number]:
+            impulse, other = event[log.IMPULSE : log.IMPULSE + 3], int(event[log.OTHER])
+            told[of, body] += impulse
+            if other >= 0:
+                told[of, other] -= impulse
+    assert 0 < world.event_counts.max() <= 64
+    errors = np.abs(told - (masses * world.linvel - before)).max(axis=(1, 2))
+    assert (errors < 1e-12).mean() > 0.97  # the rest lands so softly, or turns into a contact, that a stage stops it
+    assert np.median(np.abs(told).max(axis=(1, 2))) > 1.0 or count == 2

@@ -118,7 +118,7 @@ def store(n, world, h, sleep, memory, many):
 
 @inlined
 def forget(world, memory):
-    """Nothing touches any more."""
+    """Nothing is remembered, as where the bodies were put."""
     memory[world, STAGE_LENGTH] = memory[world, CONTACT_COUNT] = 0.0
 
 
@@ -126,7 +126,7 @@ def forget(world, memory):
 def forget_awake(world, h, sleep, memory, many):
     """Nothing touches any more but what sleeps, in a stage that took h."""
     if sleep is None:
-        forget(world, memory)
+        memory[world, STAGE_LENGTH], memory[world, CONTACT_COUNT] = h, 0.0
     else:
         store(0, world, h, sleep, memory, many)
 

@@ -37,7 +37,7 @@ OVERLAP_SHARE = 1.0e-2
 def note_depth(n, world, memory, report, many):
     """Deepest penetration of the set into the world's report, and contacts for which there was no room.
 
-    Nothing is remembered of a stage where the bodies were put: what overlaps there is told as such.
+    Nothing is remembered, not even the length of a stage, where the bodies were put: what overlaps there is told.
     """
     is_start = memory[world, STAGE_LENGTH] == 0.0
     for k in range(n):
