@@ -33,18 +33,38 @@ FLOAT64 = np.dtype(np.float64)
 
 def floats(value: ArrayLike, field: str, allowed: str) -> np.ndarray:
     """`value` as a float64 array, where it holds real numbers: no bools, strings, complex or masked ones, no None."""
-    if type(value) is np.ndarray and value.dtype is FLOAT64:
-        return value
-    try:
-        array = np.asarray(value)
-        if array.dtype.kind == "O" and all(_is_real(item) for item in array.flat):
-            return array.astype(np.float64)
-    except (TypeError, ValueError, OverflowError):  # ragged, or too large for a float
-        raise ValueError(f"{field} is {shown(value)}; allowed {allowed}") from None
-    has_bool = isinstance(value, (list, tuple)) and any(type(item) is bool for item in value)  # NumPy makes it 1.0
-    if array.dtype.kind not in "fiu" or has_bool or np.ma.is_masked(value):
+    array = _real(value)
+    if array is None:
         raise ValueError(f"{field} is {shown(value)}; allowed {allowed}")
-    return array.astype(np.float64, copy=False)
+    return array
+
+
+def _real(value: ArrayLike) -> np.ndarray | None:
+    """`value` as a float64 array, or None where it is no array of real numbers."""
+    if type(value) is np.ndarray:
+        array = value
+    else:
+        try:
+            array = np.asarray(value)
+        except (TypeError, ValueError, OverflowError):  # ragged
+            return None
+        if isinstance(value, (list, tuple)) and bool in map(type, value):  # NumPy makes them numbers
+            return None
+        if isinstance(value, np.ma.MaskedArray) and np.ma.is_masked(value):
+            return None
+    if array.dtype is FLOAT64:
+        return array
+    if array.dtype.kind in "fiu":
+        return array.astype(np.float64)
+    return _of_objects(array) if array.dtype.kind == "O" else None
+
+
+def _of_objects(array: np.ndarray) -> np.ndarray | None:
+    """An array of fractions, decimals or large integers as float64."""
+    try:
+        return array.astype(np.float64) if all(map(_is_real, array.flat)) else None
+    except OverflowError:  # too large for a float
+        return None
 
 
 def _is_real(item) -> bool:
@@ -76,14 +96,19 @@ def batch(value: ArrayLike, shape: tuple[int, int, int], field: str) -> np.ndarr
     whatever the number of worlds.
     """
     worlds, bodies, size = shape
+    array = _real(value)
+    if array is not None:
+        if array.shape == shape:
+            return array
+        if bodies == 1 and array.shape == (worlds, size):
+            return array[:, None]
+        if array.shape == shape[1:] or (bodies == 1 and array.shape == (size,)):
+            return np.broadcast_to(array, shape)
     alone = [(size,), (worlds, size)] if bodies == 1 else []
-    allowed = list(dict.fromkeys((*alone, (bodies, size), shape)))
-    array = floats(value, field, f"are numbers in {_shapes(allowed)}")
-    if array.shape not in allowed:
-        raise ValueError(f"{field} {_given(array)}; allowed is {_shapes(allowed)}")
-    if bodies == 1 and array.shape == (worlds, size):
-        return array[:, None]
-    return np.broadcast_to(array, shape)
+    allowed = " or ".join(map(str, dict.fromkeys((*alone, (bodies, size), shape))))
+    if array is None:
+        raise ValueError(f"{field} is {shown(value)}; allowed are numbers in shape {allowed}")
+    raise ValueError(f"{field} {_given(array)}; allowed is shape {allowed}")
 
 
 def _given(array: np.ndarray) -> str:
@@ -91,20 +116,16 @@ def _given(array: np.ndarray) -> str:
     return f"has shape {array.shape}" if array.ndim else f"is {shown(array)}"
 
 
-def _shapes(allowed: list[tuple[int, ...]]) -> str:
-    return "shape " + " or ".join(map(str, allowed))
-
-
 def take_finite(value: ArrayLike, target: np.ndarray, field: str) -> None:
     """Copy `value` to `target`, a contiguous float64 array (worlds, bodies, n); `value` as in `batch`, all finite.
 
     Copied and looked at in one pass: after an error `target` is changed, too. For what is handed in with every step.
     """
-    if type(value) is np.ndarray and value.dtype is FLOAT64 and value.shape == target.shape:
+    if type(value) is np.ndarray and value.shape == target.shape and value.dtype.kind in "fiu":
         array = value
     else:
         array = batch(value, target.shape, field)
-    if not _taking()(np.ascontiguousarray(array).reshape(1, -1), target.reshape(1, -1)):
+    if not _taking()(np.ascontiguousarray(array, np.float64).reshape(1, -1), target.reshape(1, -1)):
         raise _not_finite(array, field)
 
 

@@ -77,6 +77,15 @@ def _numbers(element: ET.Element, key: str, default: str | None, count: int) -> 
     return found[:count]
 
 
+def _integer(element: ET.Element, key: str, default: int) -> int:
+    """An integer of an attribute."""
+    text = element.get(key, str(default))
+    try:
+        return int(text)
+    except ValueError:
+        raise ValueError(f"{key} of {_name(element)} is {text!r}; allowed is an integer") from None
+
+
 def _refuse(element: ET.Element, *keys: str) -> None:
     for key in keys:
         if element.get(key) is not None:
@@ -154,7 +163,10 @@ def _mass_properties(element: ET.Element, geom: ET.Element) -> tuple[float, np.n
     inertial = element.find("inertial")
     if inertial is None:
         volume = float(np.prod(_half_axes(geom))) * (8.0 if _type(geom) == "box" else 4 * np.pi / 3)
-        mass = float(geom.get("mass", volume * float(geom.get("density", DENSITY))))
+        if geom.get("mass") is not None:
+            mass = float(_numbers(geom, "mass", None, 1)[0])
+        else:
+            mass = volume * float(_numbers(geom, "density", str(DENSITY), 1)[0])
         return mass, None, _numbers(geom, "pos", "0 0 0", 3)
     _refuse(inertial, "euler", "axisangle", "xyaxes", "zaxis")
     R = rotation_matrices(_unit(inertial))
@@ -196,9 +208,9 @@ def _contact_effects(elements: list[ET.Element], planes: list[ET.Element]) -> li
 
 def _pair(a: ET.Element, b: ET.Element) -> tuple[bool, float]:
     """Whether two geoms touch, and with what friction."""
-    (own, mine), (other, its) = ((int(g.get("contype", 1)), int(g.get("conaffinity", 1))) for g in (a, b))
+    (own, mine), (other, its) = ((_integer(g, "contype", 1), _integer(g, "conaffinity", 1)) for g in (a, b))
     if not (own & its or other & mine):
         return False, 0.0
-    if max(int(g.get("condim", 3)) for g in (a, b)) == 1:
+    if max(_integer(g, "condim", 3) for g in (a, b)) == 1:
         return True, 0.0
     return True, float(max(_numbers(g, "friction", FRICTION, 1)[0] for g in (a, b)))

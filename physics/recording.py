@@ -11,6 +11,7 @@ import platform
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
+from zipfile import BadZipFile
 
 import numba
 import numpy as np
@@ -159,7 +160,7 @@ class Recording:
             head = json.loads(str(content["head"]))
             content["start_report_table"] = _widened(content["start_report_table"])
             columns = [content[f"start_{name}"] for name in KEPT if name != "sleep" or "start_sleep" in content]
-        except (KeyError, ValueError, EOFError) as error:
+        except (KeyError, ValueError, TypeError, EOFError, BadZipFile) as error:
             raise ValueError(f"{path} is no recording ({error}); allowed is what physics.Recorder writes") from None
         if head["format"] > FORMAT:
             raise ValueError(f"{path} has format {head['format']}; allowed are formats up to {FORMAT}")

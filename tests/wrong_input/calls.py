@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import tempfile
 from pathlib import Path
 
@@ -14,10 +15,19 @@ from tests.wrong_input.constructors import ball, rows, scene
 BOX = scene(p.Gravity(), p.Contact())
 TILTED = p.Scene([p.Block((1, 1, 1), 1, pos=(0, 3, 0))], p.three_walls(), [p.Contact(tangential=0.5), p.Friction()])
 
+BALL_MJCF = "<mujoco><worldbody><body><freejoint/><geom size='1' {}/></body></worldbody></mujoco>"
+
 
 def world(**more) -> p.World:
     """The ball in the box."""
     return p.World(BOX, **more)
+
+
+def cut_recording() -> bytes:
+    """The first half of a NumPy archive."""
+    file = io.BytesIO()
+    np.savez(file, head="{}")
+    return file.getvalue()[: len(file.getvalue()) // 2]
 
 
 def loaded(text: str | bytes, load=p.load_scene):
@@ -86,6 +96,7 @@ KEEPERS = rows(
     ("recorder-keyword", lambda: p.Recorder(world(), kep=3), ("'kep' (given: 3)", "allowed are keep,")),
     ("recording-path", lambda: p.Recording.load(3), ("path is 3", "the path of a file")),
     ("recording-foreign", lambda: loaded("x = 1", p.Recording.load), ("scene.toml is no recording", "Recorder writes")),
+    ("recording-cut", lambda: loaded(cut_recording(), p.Recording.load), ("scene.toml is no recording", "Recorder")),
     ("stepper-world", lambda: p.Stepper(None), ("world is None", "a physics.World")),
     ("stepper-steps", lambda: p.Stepper(world(), steps=0), ("steps is 0", "at least 1")),
     ("stepper-dt", lambda: p.Stepper(world(), dt=-1), ("dt is -1.0", "greater than 0")),
@@ -105,6 +116,9 @@ FILES = rows(
     ("mjcf-load-none", lambda: p.load_mjcf(None), ("path is None", "the path of a file")),
     ("mjcf-syntax", lambda: loaded("<mujoco>", p.load_mjcf), ("scene.toml: ", "line 1")),
     ("mjcf-no-counterpart", lambda: loaded("<mujoco><tendon/></mujoco>", p.load_mjcf), ("<tendon>", "allowed are")),
+    ("mjcf-mass", lambda: loaded(BALL_MJCF.format("mass='heavy'"), p.load_mjcf), ("mass of <geom> is 'heavy'",)),
+    ("mjcf-contype", lambda: loaded(BALL_MJCF.format("contype='x'"), p.load_mjcf), ("contype of <geom> is 'x'",)),
+    ("mjcf-size", lambda: loaded(BALL_MJCF.format("type='box'"), p.load_mjcf), ("size of <geom> is '1'", "3 finite")),
     ("mjcf-save-none", lambda: p.save_mjcf(None, "x.xml"), ("scene is None", "a physics.Scene")),
     ("mjcf-save-drag", lambda: p.save_mjcf(scene(p.Drag()), "x.xml"), ("cannot express Drag(", "drop=True")),
 )
