@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 
 from physics import checks
 from physics.kernels import schemes
+from physics.keywords import known_keywords
 
 # Schemes by name; 0 is time stepping with the exact flow, -1 the event-driven scheme.
 EVENTS = -1
@@ -22,6 +23,7 @@ SLIPS = ("mean", "end")
 COLLISIONS = ("simultaneous", "sequential")
 
 
+@known_keywords
 @dataclass(frozen=True)
 class Accuracy:
     """Every knob of a simulation; `Accuracy()` is the preset ``balanced``.

@@ -13,8 +13,10 @@ import numpy as np
 
 from physics import checks
 from physics.field import Field
+from physics.keywords import known_keywords
 
 
+@known_keywords
 @dataclass(frozen=True)
 class Gravity:
     """A uniform force field: every body accelerates by the same vector, and it exerts no torque.
@@ -32,6 +34,7 @@ class Gravity:
         object.__setattr__(self, "acceleration", tuple(value.tolist()))
 
 
+@known_keywords
 @dataclass(frozen=True)
 class Contact:
     """Bodies do not pass through walls, nor through each other.
@@ -88,6 +91,7 @@ class Contact:
                 )
 
 
+@known_keywords
 @dataclass(frozen=True)
 class Friction:
     """Coulomb friction with the exact cone: |f_t| <= μ f_n, opposed to sliding.
@@ -154,6 +158,7 @@ class _Resistance:
         object.__setattr__(self, "radius", float(checks.non_negative(self.radius, (), name)))
 
 
+@known_keywords
 @dataclass(frozen=True)
 class RollingFriction(_Resistance):
     """Rolling resistance of spheres and ellipsoids at walls: a torque of at most ``radius`` times the normal force.
@@ -169,6 +174,7 @@ class RollingFriction(_Resistance):
     radius: float = 0.001
 
 
+@known_keywords
 @dataclass(frozen=True)
 class SpinFriction(_Resistance):
     """Friction of spheres and ellipsoids spinning on a wall: a torque of at most ``radius`` times the normal force.
@@ -185,6 +191,7 @@ class SpinFriction(_Resistance):
     radius: float = 0.001
 
 
+@known_keywords
 @dataclass(frozen=True)
 class Actuator:
     """What lies between the wrench of `World.step` and the bodies: delay, then limits, then lag, in this order.
@@ -219,6 +226,7 @@ class Actuator:
         return self.lag > 0.0 or self.delay > 0.0
 
 
+@known_keywords
 @dataclass(frozen=True)
 class Sleeping:
     """Bodies at rest are left out of the step until something changes that acts on them.

@@ -10,12 +10,14 @@ import numpy as np
 from physics import checks
 from physics.field import Checked
 from physics.kernels.fields import angular_drag, buoyancy, drag, magnus, wind
+from physics.keywords import known_keywords
 from physics.springs import Push, Spring
 
 AIR_DENSITY = 1.225  # at sea level, 15 °C (ISO 2533, standard atmosphere) [kg/m³]
 WATER_DENSITY = 1000.0  # [kg/m³]
 
 
+@known_keywords
 @dataclass(frozen=True)
 class Drag(Checked):
     """Drag of the air (or water) on every body: ``F = -(½ ρ C A |u| + c) u``, A the area of its shadow along u.
@@ -52,6 +54,7 @@ class Drag(Checked):
         return np.array([0.5 * self.density * self.coefficient, self.linear])
 
 
+@known_keywords
 @dataclass(frozen=True)
 class AngularDrag(Checked):
     """Drag on the spin of every body: ``T = -(c + d |ω|) ω``.
@@ -81,6 +84,7 @@ class AngularDrag(Checked):
         return np.array([self.linear, self.quadratic])
 
 
+@known_keywords
 @dataclass(frozen=True)
 class Magnus(Checked):
     """Lift of every body that spins: ``F = ½ ρ C π r³ ω x u``, r the radius of the sphere of the same volume.
@@ -111,6 +115,7 @@ class Magnus(Checked):
         return np.array([0.5 * self.density * self.coefficient])
 
 
+@known_keywords
 @dataclass(frozen=True)
 class Wind(Checked):
     """Velocity of the air, the same everywhere, with gusts; it acts through `Drag`, `Magnus` and fields of your own.
@@ -154,6 +159,7 @@ class Wind(Checked):
         return np.concatenate((np.broadcast_to(head, (len(worlds), len(head))), phases), axis=1)
 
 
+@known_keywords
 @dataclass(frozen=True)
 class Buoyancy(Checked):
     """Lift of a fluid at rest that fills a half-space: its weight where the body is, at the centre of that part.

@@ -16,6 +16,7 @@ from physics.frontier_contender import OURS, Contender, EngineContender, TooSlow
 from physics.frontier_errors import deepest_penetration, energy_error
 from physics.frontier_result import Frontier, FrontierPoint
 from physics.frontier_truth import UNITS, ReferenceTruth, Truth
+from physics.keywords import known_keywords
 from physics.report import Status
 from physics.scene import Scene
 from physics.trajectory import Trajectory
@@ -43,6 +44,7 @@ LARGEST_DENOMINATOR = 10**6
 Progress = Callable[[int, int, str], None]
 
 
+@known_keywords
 def ladder(
     accuracies: Sequence[str | Accuracy] = PRESETS, steps: Sequence[float] | None = None
 ) -> list[tuple[str | Accuracy, float]]:
@@ -59,6 +61,7 @@ def ladder(
     ]
 
 
+@known_keywords
 def frontier(
     scene: Scene,
     duration: float,

@@ -11,6 +11,7 @@ import numpy as np
 from physics import checks
 from physics.accuracy import Accuracy, resolve
 from physics.frontier_errors import angles_between, distances, event_error, root_mean_square
+from physics.keywords import known_keywords
 from physics.scene import Scene
 from physics.trajectory import Trajectory, simulate
 
@@ -33,6 +34,7 @@ LOOSER = 10.0
 SAME_TIME = 1e-6
 
 
+@known_keywords
 @dataclass(frozen=True)
 class Truth:
     """An outcome that the caller knows.

@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from physics import checks
+from physics.keywords import known_keywords
 from physics.recording import Recording, Start, origin
 from physics.report import Status, gravest
 from physics.world import Snapshot, World
@@ -25,6 +26,7 @@ class _Chapter:
     states: list[np.ndarray] = field(default_factory=list)
 
 
+@known_keywords
 class Recorder:
     """Keeps the last steps of a `World` and writes those of a world with a fault to a file.
 

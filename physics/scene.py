@@ -10,6 +10,7 @@ import numpy as np
 from physics import checks
 from physics.effects import EFFECTS, RESISTANCES, Contact, Friction, Sleeping
 from physics.field import Field
+from physics.keywords import known_keywords
 from physics.shapes import Body
 
 # An axis of friction and the normal of a wall count as parallel below this sine of the angle between them [rad]: of the
@@ -17,6 +18,7 @@ from physics.shapes import Body
 LEAST_SINE = 1e-6
 
 
+@known_keywords
 @dataclass(frozen=True)
 class HalfSpace:
     """The region {x : normal·x >= offset} that bodies may be in.
@@ -41,6 +43,7 @@ class HalfSpace:
         object.__setattr__(self, "offset", checks.number(self.offset, "HalfSpace.offset"))
 
 
+@known_keywords
 def three_walls(half_width: float = 10.0) -> list[HalfSpace]:
     """The three-wall box: the floor y = 0 between walls at x = ±half_width [m], open to front, back and top."""
     half_width = float(checks.positive(half_width, (), "half_width"))
@@ -52,6 +55,7 @@ def corner() -> list[HalfSpace]:
     return [HalfSpace((0, 1, 0), 0.0), HalfSpace((1, 0, 0), 0.0), HalfSpace((0, 0, 1), 0.0)]
 
 
+@known_keywords
 @dataclass(frozen=True)
 class Scene:
     """Bodies, walls and effects.

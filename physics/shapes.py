@@ -8,6 +8,7 @@ from typing import ClassVar
 import numpy as np
 
 from physics import checks, inertia
+from physics.keywords import known_keywords
 from physics.polyhedron import Polyhedron, convex_hull
 
 
@@ -55,6 +56,7 @@ class Body:
         return np.diag(self.uniform_moments(self.dimensions, self.mass))
 
 
+@known_keywords
 @dataclass(frozen=True)
 class Block(Body):
     """A rectangular block; its body axes are its edges.
@@ -103,6 +105,7 @@ class Block(Body):
         return np.sqrt(a + b + c)
 
 
+@known_keywords
 @dataclass(frozen=True)
 class Sphere(Body):
     """A solid sphere.
@@ -139,6 +142,7 @@ class Sphere(Body):
         return dimensions[..., 0]
 
 
+@known_keywords
 @dataclass(frozen=True)
 class Ellipsoid(Body):
     """A solid ellipsoid.
@@ -175,6 +179,7 @@ class Ellipsoid(Body):
         return np.max(dimensions, axis=-1)
 
 
+@known_keywords
 @dataclass(frozen=True)
 class Hull(Body):
     """The convex hull of points, of uniform density: a wedge, a prism, a rock.

@@ -10,6 +10,7 @@ import numpy as np
 from physics import checks
 from physics.field import Checked
 from physics.kernels.fields import linked, spring
+from physics.keywords import known_keywords
 
 
 def _check_body(effect, body_count: int, name: str) -> None:
@@ -18,6 +19,7 @@ def _check_body(effect, body_count: int, name: str) -> None:
         raise ValueError(f"{type(effect).__name__}.{name} is {index}; allowed are indices below {body_count}")
 
 
+@known_keywords
 @dataclass(frozen=True)
 class Spring(Checked):
     """Spring and damper from a point of a body to an anchor: ``-(k (l - l0) + c dl/dt)`` along the line. Any number.
@@ -102,6 +104,7 @@ class _LinkedSpring(Spring):
     is_linked: ClassVar[bool] = True
 
 
+@known_keywords
 @dataclass(frozen=True)
 class Push(Checked):
     """A constant force at a point of a body. Any number.

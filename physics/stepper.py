@@ -12,6 +12,7 @@ from physics.kernels.events.hybrid import step_events
 from physics.kernels.linked import step_linked
 from physics.kernels.many.step import step_many
 from physics.kernels.step import step_worlds
+from physics.keywords import known_keywords
 from physics.machine_code import Work, compiled
 
 # Which arguments of all step kernels the number of steps is, and the length of a substep.
@@ -22,6 +23,7 @@ if TYPE_CHECKING:
     from physics.world import World
 
 
+@known_keywords
 class Stepper:
     """The same step of a world again and again, with all that can be checked or looked up done before.
 

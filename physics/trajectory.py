@@ -16,6 +16,7 @@ from physics import checks
 from physics.accuracy import Accuracy
 from physics.diagnostics import diagnose
 from physics.kernels.events.log import KINDS
+from physics.keywords import known_keywords
 from physics.report import StepReport
 from physics.scene import Scene
 from physics.world import World
@@ -111,6 +112,7 @@ class Trajectory:
                     writer.writerow((repr(float(t)), b, *map(repr, row.tolist()), repr(float(self.energy[k, b]))))
 
 
+@known_keywords
 def simulate(
     scene: Scene,
     duration: float,

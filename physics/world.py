@@ -20,6 +20,7 @@ from physics.kernels.events.log import EVENT_SIZE
 from physics.kernels.fields.terms import declare
 from physics.kernels.sleep import GROUP, SLEEP_SIZE, Sleep
 from physics.kernels.workspace import body_records
+from physics.keywords import known_keywords
 from physics.machine_code import Work
 from physics.plan import SHAPE_CODES, make_plan
 from physics.report import StepReport
@@ -43,6 +44,7 @@ class Snapshot:
     actuation: tuple | None = None
 
 
+@known_keywords
 class World:
     """Many worlds of one scene, stepped together and independent of each other.
 
@@ -220,6 +222,7 @@ class World:
 
     # --- changing ----------------------------------------------------------------------------------------------
 
+    @known_keywords
     def set_state(
         self,
         pos: ArrayLike | None = None,
@@ -244,6 +247,7 @@ class World:
         """
         changes.set_state(self, pos, quat, linvel, angvel, worlds)
 
+    @known_keywords
     def set_parameters(
         self,
         mass: ArrayLike | None = None,

@@ -6,11 +6,13 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from physics.frontier_errors import rotation_matrices
+from physics.keywords import known_keywords
 from physics.world import World
 
 FRAMES = ("world", "body")
 
 
+@known_keywords
 def wrench_at(
     world: World, force: ArrayLike, point: ArrayLike = (0.0, 0.0, 0.0), frame: str = "world", point_frame: str = "body"
 ) -> np.ndarray:

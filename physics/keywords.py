@@ -1,0 +1,66 @@
+"""Unknown keywords of public constructors: an error that lists the known ones, the nearest first."""
+
+from __future__ import annotations
+
+import difflib
+import functools
+import inspect
+import reprlib
+from collections.abc import Callable, Iterable
+from typing import TypeVar
+
+T = TypeVar("T", bound=Callable)
+
+
+def nearest_first(name: object, allowed: Iterable[str]) -> list[str]:
+    """The names `allowed`, the one most like `name` first; names that are equally alike keep their order."""
+    name = str(name).lower()
+    return sorted(allowed, key=lambda known: -difflib.SequenceMatcher(None, name, known.lower()).ratio())
+
+
+def known_keywords(target: T) -> T:
+    """Let a function, or a class when it is made, refuse unknown keywords with the list of those it knows.
+
+    A decorator; above `dataclass` where both are used. The signature stays, for editors, `help` and
+    `inspect.signature`. Nothing is looked up in a call but the names given; calls in a step do without it.
+
+    Parameters
+    ----------
+    target : function or method, or class with an ``__init__`` of its own
+        Without ``**kwargs``: such a target knows every keyword.
+
+    Returns
+    -------
+    The class itself, or a function in place of the one given.
+
+    Raises
+    ------
+    TypeError
+        When called: ``World has no argument 'acuracy' (given: 'fast'); allowed are accuracy, scene, ...``.
+    """
+    if isinstance(target, type):
+        target.__init__ = _checked(target.__init__, target.__name__, first=1)
+        return target
+    is_method = next(iter(inspect.signature(target).parameters), None) == "self"
+    return _checked(target, target.__qualname__, first=int(is_method))
+
+
+def _checked(function: Callable, name: str, first: int = 0) -> Callable:
+    """`function` with its keywords looked at; its parameters from number `first` on are the user's."""
+    parameters = list(inspect.signature(function).parameters.values())[first:]
+    keywords = [p.name for p in parameters if p.kind in (p.POSITIONAL_OR_KEYWORD, p.KEYWORD_ONLY)]
+    if any(p.kind == p.VAR_KEYWORD for p in parameters):
+        raise TypeError(f"{name} takes **kwargs; allowed under known_keywords are explicit parameters")
+    known = frozenset(keywords)
+
+    @functools.wraps(function)
+    def checked(*args, **kwargs):
+        if not known.issuperset(kwargs):
+            raise _unknown(next(key for key in kwargs if key not in known), kwargs)
+        return function(*args, **kwargs)
+
+    def _unknown(key: str, kwargs: dict) -> TypeError:
+        allowed = ", ".join(nearest_first(key, keywords)) or "none"
+        return TypeError(f"{name} has no argument {key!r} (given: {reprlib.repr(kwargs[key])}); allowed are {allowed}")
+
+    return checked

@@ -1,0 +1,86 @@
+"""Misspelt keywords: the message lists the known ones with the nearest first, and signatures stay."""
+
+from __future__ import annotations
+
+import dataclasses
+import inspect
+import pickle
+
+import pytest
+
+from physics.keywords import known_keywords, nearest_first
+
+
+@known_keywords
+@dataclasses.dataclass(frozen=True)
+class Ball:
+    """A frozen dataclass."""
+
+    radius: float
+    mass: float = 1.0
+    pos: tuple = dataclasses.field(default=(0.0, 0.0, 0.0), kw_only=True)
+
+
+@known_keywords
+class Room:
+    """A class with its own constructor."""
+
+    def __init__(self, width: float, *, accuracy: str = "fast"):
+        self.width, self.accuracy = width, accuracy
+
+
+@known_keywords
+def throw(ball: Ball, speed: float = 1.0) -> float:
+    """A function."""
+    return ball.mass * speed
+
+
+@pytest.mark.parametrize(
+    ("call", "message"),
+    [
+        (
+            lambda: Room(2.0, acuracy="fast"),
+            "Room has no argument 'acuracy' (given: 'fast'); allowed are accuracy, width",
+        ),
+        (lambda: Ball(1.0, mas=2), "Ball has no argument 'mas' (given: 2); allowed are mass, radius, pos"),
+        (lambda: throw(Ball(1.0), sped=3), "throw has no argument 'sped' (given: 3); allowed are speed, ball"),
+        (lambda: dataclasses.replace(Ball(1.0), Pos=1), "Ball has no argument 'Pos' (given: 1); allowed are pos"),
+    ],
+)
+def test_a_misspelt_keyword_is_told_with_the_nearest_first(call, message):
+    with pytest.raises(TypeError) as told:
+        call()
+    assert str(told.value).startswith(message)
+
+
+def test_a_long_value_is_told_in_short():
+    with pytest.raises(TypeError) as told:
+        Ball(1.0, poss=list(range(100_000)))
+    assert len(str(told.value)) < 160
+
+
+def test_nothing_else_changes():
+    assert list(inspect.signature(Ball).parameters) == ["radius", "mass", "pos"]
+    assert str(inspect.signature(Room)).replace("'", "") == "(width: float, *, accuracy: str = fast)"
+    assert str(inspect.signature(throw)).endswith("-> 'float'")
+    assert (Room.__name__, throw.__name__, throw.__doc__) == ("Room", "throw", "A function.")
+    ball = Ball(2.0, pos=(1, 2, 3))
+    assert pickle.loads(pickle.dumps(ball)) == ball == dataclasses.replace(ball)
+    assert throw(ball, speed=3.0) == 3.0
+    with pytest.raises(dataclasses.FrozenInstanceError):
+        ball.mass = 2.0
+    with pytest.raises(TypeError, match="missing 1 required positional argument: 'radius'"):
+        Ball()
+
+
+def test_what_takes_every_keyword_is_refused():
+    with pytest.raises(TypeError, match=r"gather takes \*\*kwargs"):
+
+        @known_keywords
+        def gather(**kwargs):
+            """Anything."""
+
+
+def test_equally_near_names_keep_their_order():
+    assert nearest_first("zzz", ["b", "a", "c"]) == ["b", "a", "c"]
+    assert nearest_first("Gravty", ["Contact", "Friction", "Gravity"])[0] == "Gravity"
