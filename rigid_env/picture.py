@@ -10,6 +10,7 @@ import numpy as np
 
 from physics import World
 from physics.kernels import layout as at
+from rigid_env.extras import require
 from rigid_env.rendering import BodyView, Camera, Frame, GoalView, WallView
 from rigid_env.rendering.geometry import rotation_matrix
 from rigid_env.view import WEIGHT_ARROW
@@ -125,12 +126,7 @@ def write_gif(path: Path, pictures: Sequence[np.ndarray], fps: float) -> None:
 
 
 def _image_class():
-    try:
-        from PIL import Image
-    except ImportError as error:
-        from gymnasium.error import DependencyNotInstalled
+    require("render", "PIL", purpose="writing pictures")
+    from PIL import Image
 
-        raise DependencyNotInstalled(
-            'writing pictures needs Pillow, which is not installed; run `pip install "rigid-env[render]"`'
-        ) from error
     return Image

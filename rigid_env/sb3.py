@@ -8,10 +8,16 @@ from typing import Any
 import gymnasium as gym
 import numpy as np
 from gymnasium.vector import AutoresetMode
-from stable_baselines3.common.monitor import Monitor
-from stable_baselines3.common.vec_env import VecEnv
 
+from rigid_env.extras import require
 from rigid_env.vector_env import RigidVectorEnv
+
+try:
+    from stable_baselines3.common.monitor import Monitor
+    from stable_baselines3.common.vec_env import VecEnv
+except ImportError:
+    require("agents", "torch", "stable_baselines3", purpose="rigid_env.sb3")
+    raise
 
 
 class RigidVecEnv(VecEnv):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from rigid_env.extras import require
 from rigid_env.rendering import BodyView, Frame, GoalView, Renderer, WallView
 from rigid_env.tasks import Task
 from rigid_env.tasks import layout as col
@@ -84,6 +85,8 @@ class View:
     ------
     ValueError
         On an unknown mode or a size that is not positive.
+    gymnasium.error.DependencyNotInstalled
+        If there is a mode, but no pygame.
     """
 
     def __init__(self, mode: str | None, width: int, height: int, fps: float, title: str):
@@ -92,6 +95,8 @@ class View:
         for name, value in (("width", width), ("height", height)):
             if isinstance(value, bool) or not isinstance(value, (int, np.integer)) or value < 1:
                 raise ValueError(f"{name} is {value!r}; allowed are integers of at least 1")
+        if mode is not None:
+            require("render", "pygame", purpose="rendering")
         self.mode, self.width, self.height, self.fps, self.title = mode, width, height, fps, title
         self._renderer: Renderer | None = None
 

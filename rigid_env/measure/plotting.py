@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from importlib.util import find_spec
-
-from gymnasium.error import DependencyNotInstalled
+from rigid_env.extras import require
 
 
 def require_matplotlib() -> None:
@@ -15,5 +13,4 @@ def require_matplotlib() -> None:
     gymnasium.error.DependencyNotInstalled
         matplotlib is missing.
     """
-    if find_spec("matplotlib") is None:
-        raise DependencyNotInstalled('a plot needs matplotlib: pip install "rigid-env[agents]"')
+    require("agents", "matplotlib", purpose="a plot")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from rigid_env.extras import require
 from rigid_env.rendering import palette
 from rigid_env.rendering.backdrop import draw_backdrop
 from rigid_env.rendering.bodies import draw_bodies
@@ -174,15 +175,10 @@ class Renderer:
 
 
 def _import_pygame():
-    try:
-        import pygame
-        import pygame.gfxdraw
-    except ImportError as error:
-        from gymnasium.error import DependencyNotInstalled
+    require("render", "pygame", purpose="rendering")
+    import pygame
+    import pygame.gfxdraw
 
-        raise DependencyNotInstalled(
-            'rendering needs pygame, which is not installed; run `pip install "rigid-env[render]"`'
-        ) from error
     return pygame
 
 

@@ -22,6 +22,8 @@ from pathlib import Path
 
 import numpy as np
 
+from rigid_env.extras import require
+
 SAMPLE_DT = 1.0 / 148.0  # [s]
 HALF_WIDTH = 0.0524  # of the cube [m]
 SIDE = 2.0 * HALF_WIDTH  # nominal [m]
@@ -165,12 +167,9 @@ def _load_folder(path: Path) -> Tosses:
 
 
 def _torch():
-    try:
-        import torch
-    except ImportError as error:
-        from gymnasium.error import DependencyNotInstalled
+    require("agents", "torch", purpose="reading .pt files")
+    import torch
 
-        raise DependencyNotInstalled('reading .pt files needs torch: pip install "rigid-env[agents]"') from error
     return torch
 
 

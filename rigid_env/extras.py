@@ -1,0 +1,72 @@
+"""Optional dependencies: which package of an extra is missing, and the line that installs it.
+
+A command calls `require` before anything runs; nothing is imported to find out.
+"""
+
+from __future__ import annotations
+
+from importlib.util import find_spec
+from pathlib import Path
+
+from gymnasium.error import DependencyNotInstalled
+
+EXTRAS: dict[str, dict[str, str]] = {
+    "render": {"pygame": "pygame", "PIL": "Pillow"},
+    "agents": {
+        "torch": "torch",
+        "stable_baselines3": "Stable-Baselines3",
+        "matplotlib": "matplotlib",
+        "yaml": "PyYAML",
+        "pygame": "pygame",
+        "PIL": "Pillow",
+    },
+    "bench": {"mujoco": "MuJoCo"},
+    "peers": {"mujoco": "MuJoCo", "pybullet": "PyBullet", "pydrake": "Drake"},
+}
+"""Modules of each extra of `pyproject.toml` that are imported, with the names by which users know them.
+
+The extra `agents` brings tensorboard, moviepy and imageio-ffmpeg as well: name them where one is needed.
+"""
+
+SOURCES = Path(__file__).parents[1]
+
+
+def require(extra: str, *modules: str, purpose: str = "this command") -> None:
+    """Raise if modules of an extra are not installed.
+
+    Parameters
+    ----------
+    extra : {"render", "agents", "bench", "peers"}
+    *modules : str
+        Names as imported; the default is all of `EXTRAS[extra]`.
+    purpose : str
+        The subject of the message: "a plot", "training an agent".
+
+    Raises
+    ------
+    gymnasium.error.DependencyNotInstalled
+        Naming the missing packages and the line that installs them.
+    """
+    names = [EXTRAS[extra].get(module, module) for module in modules or EXTRAS[extra] if not is_installed(module)]
+    if names:
+        listed = " and ".join(filter(None, [", ".join(names[:-1]), names[-1]]))
+        verb = "is" if len(names) == 1 else "are"
+        raise DependencyNotInstalled(f"{purpose} needs {listed}, which {verb} not installed: {install_line(extra)}")
+
+
+def is_installed(module: str) -> bool:
+    """Whether a top-level module can be found; it is not imported."""
+    try:
+        return find_spec(module) is not None
+    except ImportError:
+        return False
+    except ValueError:  # in sys.modules without a spec: it is there
+        return True
+
+
+def install_line(extra: str) -> str:
+    """The line that installs an extra: in a checkout of the sources the editable one, too."""
+    line = f'pip install "rigid-env[{extra}]"'
+    if (SOURCES / "pyproject.toml").is_file() and (SOURCES / "constraints.txt").is_file():
+        line += f', or in {SOURCES}: pip install -c constraints.txt -e ".[{extra}]"'
+    return line
