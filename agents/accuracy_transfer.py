@@ -15,9 +15,7 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import typer
-from rich import box
 from rich.console import Console
-from rich.table import Table
 
 from agents.checkpoint import load_policy
 from agents.config import HYPERPARAMETERS, RunConfig, RunFolder, make_config
@@ -26,6 +24,7 @@ from agents.evaluate import JsonOption, evaluate, write_json
 from agents.train import DEFAULTS, INTERRUPTED, Interrupted, train
 from physics.accuracy import PRESETS
 from rigid_env.measure import machine
+from rigid_env.terminal import Table, make_console, number_columns
 
 TRUTH = "reference"
 TRAINED_AT = "fast,balanced,precise"
@@ -115,9 +114,8 @@ def transfer(config: RunConfig, run: RunFolder, episodes: int, console: Console)
 
 def make_table(env: str, rows: list[Transfer]) -> Table:
     """Success against training time."""
-    table = Table(title=f"{env}: trained at an accuracy, judged at {TRUTH}", title_justify="left", box=box.SIMPLE_HEAD)
-    for name in ("trained at", "training, s", "million steps", "success there", f"success at {TRUTH}", "95 %"):
-        table.add_column(name, justify="left" if name == "trained at" else "right")
+    names = "training, s", "million\nsteps", "success\nthere", f"success at\n{TRUTH}", "95 %"
+    table = Table(["trained at", *number_columns(*names)], f"{env}: trained at an accuracy, judged at {TRUTH}")
     for row in rows:
         low, high = row.truth["interval"]
         table.add_row(
@@ -142,7 +140,7 @@ def main(
     plot: Annotated[Path | None, typer.Option(metavar="FILE", help="Draw the picture here.")] = None,
 ) -> None:
     """Train one policy per accuracy, evaluate each at `reference`: success against training time."""
-    console, rows = Console(), []
+    console, rows = make_console(), []
     try:
         for name in parse_accuracies(accuracies):
             config = make_config(

@@ -16,13 +16,13 @@ import numpy as np
 import typer
 from gymnasium.vector import AutoresetMode
 from rich.console import Console
-from rich.table import Table
 
 from agents.algorithms import make_vector_env
 from agents.baselines import Policy, baseline_policy
 from agents.checkpoint import load_policy
 from agents.config import RunFolder
 from agents.interval import wilson
+from rigid_env.terminal import Column, Table, make_console
 
 BATCH = 500  # episodes at a time
 
@@ -161,17 +161,22 @@ def write_json(path: Path, content: dict[str, Any]) -> None:
     path.write_text(json.dumps(content, indent=2) + "\n", encoding="utf-8")
 
 
-def print_evaluation(result: dict[str, Any], title: str, console: Console) -> None:
-    """Print an evaluation as a table."""
+def make_table(result: dict[str, Any], title: str) -> Table:
+    """An evaluation as a table."""
     low, high = result["interval"]
-    table = Table(title=title, show_header=False, title_justify="left")
+    table = Table([Column("of the episodes", is_whole=True), "value"], title)
     table.add_row("environment", result["env"])
     table.add_row("episodes", f"{result['episodes']} (seed {result['seed']})")
     table.add_row("success rate", f"{result['success_rate']:.1%}  ({low:.1%} to {high:.1%}, 95 %)")
     table.add_row("return", f"{result['return_mean']:.3f} ± {result['return_std']:.3f}")
     table.add_row("length", f"{result['length_mean']:.1f} steps, at most {result['length_max']}")
     table.add_row("time", f"{result['seconds']:.1f} s")
-    console.print(table)
+    return table
+
+
+def print_evaluation(result: dict[str, Any], title: str, console: Console) -> None:
+    """Print an evaluation as a table."""
+    console.print(make_table(result, title))
 
 
 @dataclass(frozen=True)
@@ -217,7 +222,7 @@ def main(
         result = evaluate(subject.env, subject.policy, episodes, seed, **subject.arguments)
     except ValueError as error:
         raise typer.BadParameter(str(error)) from error
-    print_evaluation(result, subject.title, Console())
+    print_evaluation(result, subject.title, make_console())
     if json_file is not None:
         write_json(json_file, {"policy": subject.title, **result})
 

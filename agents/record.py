@@ -9,7 +9,6 @@ from typing import Annotated, Any
 import gymnasium as gym
 import numpy as np
 import typer
-from rich.console import Console
 
 from agents.algorithms import make_single_env
 from agents.baselines import Policy
@@ -23,6 +22,7 @@ from agents.evaluate import (
     choose_subject,
     evaluation_seeds,
 )
+from rigid_env.terminal import make_console
 
 SIZE = (640, 400)  # width and height of the picture [px]; even, as the video's colour format asks
 PAUSE = 0.5  # the last picture of an episode is shown so long [s]
@@ -130,7 +130,7 @@ def main(
         path = record(subject.env, subject.policy, seeds, path, **subject.arguments)
     except ValueError as error:
         raise typer.BadParameter(str(error)) from error
-    Console().print(f"{subject.title}: {episodes} episodes in {path}", soft_wrap=True, highlight=False)
+    make_console().print(f"{subject.title}: {episodes} episodes in {path}", soft_wrap=True)
 
 
 if __name__ == "__main__":

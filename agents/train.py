@@ -30,6 +30,7 @@ from agents.evaluate import JsonOption, evaluate, evaluation_seeds, print_evalua
 from agents.progress import ProgressDisplay
 from agents.record import record
 from agents.supervisor import Supervisor
+from rigid_env.terminal import make_console
 
 DEFAULTS = {"env": "rigid_env/BlockReach-v0", "algo": "ppo", "seed": 0}
 EVALUATION_EPISODES = 1000
@@ -73,7 +74,7 @@ def train(
     ValueError
         If a resumed run has no checkpoint, or has done `config.max_steps` already.
     """
-    console = console or Console()
+    console = console or make_console()
     torch.set_num_threads(config.torch_threads)
     if is_resumed:
         model, history = load_checkpoint(run, config)
@@ -165,7 +166,7 @@ def finish(config: RunConfig, run: RunFolder, policy, with_video: bool, console:
     if with_video:
         seeds = evaluation_seeds(config.seed, VIDEO_EPISODES)
         path = record(config.env, policy, seeds, run.video, **arguments)
-        console.print(f"video       {path}", soft_wrap=True, highlight=False)
+        console.print(f"video       {path}", soft_wrap=True)
     return evaluation
 
 
@@ -200,22 +201,22 @@ def main(
     What is not given comes from the hyperparameters of the environment and the algorithm. With --resume,
     only target, limit and threads can be changed.
     """
-    start, console = time.perf_counter(), Console()
+    start, console = time.perf_counter(), make_console()
     try:
         fixed = {"env": env, "algo": algo, "seed": seed, "num_envs": num_envs, "accuracy": accuracy}
         config = choose_config(resume, hyperparameters, fixed)
         config = change(config, target=target, max_steps=max_steps, threads=threads)
         run = new_folder(out, config) if resume is None else RunFolder(resume)
-        console.print(f"run         {run.path}", soft_wrap=True, highlight=False)
+        console.print(f"run         {run.path}", soft_wrap=True)
         is_resumed = resume is not None
         result = train(config, run, is_resumed=is_resumed, with_tensorboard=tensorboard, console=console)
     except ValueError as error:
         raise typer.BadParameter(str(error)) from error
     except Interrupted as interruption:
-        console.print(str(interruption), soft_wrap=True, highlight=False)
+        console.print(str(interruption), soft_wrap=True)
         raise typer.Exit(INTERRUPTED) from interruption
     goal = "target reached" if result["is_target_reached"] else "target not reached within the limit"
-    console.print(f"{goal}: {result['steps']:,} steps in {result['training_seconds']:.1f} s", highlight=False)
+    console.print(f"{goal}: {result['steps']:,} steps in {result['training_seconds']:.1f} s")
     evaluation = finish(config, run, result.pop("policy"), video, console)
     seconds = round(time.perf_counter() - start, 3)
     head = {"run": str(run.path), "env": config.env, "algo": config.algo, "seed": config.seed}
@@ -223,7 +224,7 @@ def main(
     write_json(run.result, result)
     if json_file is not None:
         write_json(json_file, result)
-    console.print(f"all         {seconds:.1f} s", highlight=False)
+    console.print(f"all         {seconds:.1f} s")
 
 
 if __name__ == "__main__":

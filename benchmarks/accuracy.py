@@ -14,7 +14,7 @@ import typer
 from benchmarks import machine
 from rigid_env.measure.accuracy import QUICK, Ladder, names
 from rigid_env.measure.accuracy_report import measure_and_show, write_result
-from rigid_env.measure.table import make_console
+from rigid_env.terminal import make_console
 
 
 def main(

@@ -18,12 +18,10 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
-from rich import box
-from rich.table import Table
 
 import physics
 from benchmarks import machine
-from rigid_env.measure.table import make_console
+from rigid_env.terminal import Column, Table, make_console, number_columns
 
 PROGRAM = """
 import json, sys, time
@@ -87,15 +85,23 @@ def main(
     scene: Annotated[list[str] | None, typer.Option(help="Scenes with gravity.")] = None,
 ) -> None:
     """Measure the first step of a scene with nothing compiled, with another plan compiled, and with its own."""
-    table = Table(title=machine.headline(), title_justify="left", box=box.SIMPLE_HEAD)
-    for name in ("scene", "accuracy", "in the cache", "compiled", "CPU [s]", "wall clock [s]"):
-        table.add_column(name, justify="left" if name in ("scene", "accuracy", "in the cache") else "right")
-    for one in scene or ("drop", "tower"):
-        for preset in accuracy or ("fast", "balanced", "precise"):
-            for state, found in measure(one, preset, repeats).items():
-                medians = [statistics.median(getattr(step, clock) for step in found) for clock in ("cpu", "wall")]
-                table.add_row(one, preset, state, str(found[0].kernels), *(f"{seconds:.2f}" for seconds in medians))
-    make_console().print(table)
+    rows = [
+        (one, preset, measure(one, preset, repeats))
+        for one in scene or ("drop", "tower")
+        for preset in accuracy or ("fast", "balanced", "precise")
+    ]
+    make_console().print(make_table(rows, machine.headline()))
+
+
+def make_table(rows: list[tuple[str, str, dict[str, list[FirstStep]]]], title: str) -> Table:
+    """A row for each scene, preset and state of the cache: medians over the repeats."""
+    columns = [Column("scene"), Column("accuracy"), Column("in the cache")]
+    table = Table([*columns, *number_columns("compiled", "CPU [s]", "wall clock [s]")], title)
+    for scene, preset, states in rows:
+        for state, found in states.items():
+            medians = [statistics.median(getattr(step, clock) for step in found) for clock in ("cpu", "wall")]
+            table.add_row(scene, preset, state, str(found[0].kernels), *(f"{seconds:.2f}" for seconds in medians))
+    return table
 
 
 if __name__ == "__main__":

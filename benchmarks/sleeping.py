@@ -16,9 +16,10 @@ import typer
 import physics
 from benchmarks import machine
 from physics import scenes
-from rigid_env.measure.table import make_console, make_table
+from rigid_env.measure.table import make_table
 from rigid_env.measure.timing import Row, Stopwatch, interleave
 from rigid_env.measure.workloads import FLIGHT_STEPS, STEP
+from rigid_env.terminal import make_console
 
 REPEATS, QUICK_REPEATS = 11, 1
 TOWERS = (10, 50)

@@ -17,7 +17,6 @@ from typing import Annotated
 
 import numpy as np
 import typer
-from rich.table import Table
 
 from benchmarks import machine, problems
 from physics.kernels import layout as at
@@ -35,7 +34,7 @@ from physics.kernels.pyramid import pyramid_fallback
 from physics.kernels.sweeps import cone_sweeps, factor_blocks, normal_sweeps
 from physics.kernels.workspace import make_workspace
 from rigid_env.measure.machine import write_json
-from rigid_env.measure.table import make_console
+from rigid_env.terminal import Column, Table, make_console, number_columns
 
 LIMIT = 1000  # sweeps, steps or iterations
 PIVOTS = 10_000
@@ -235,10 +234,8 @@ def with_friction(problem: problems.Frictional, samples: int) -> list[Outcome]:
 
 def table(title: str, outcomes: list[Outcome]) -> Table:
     """One row for each outcome."""
-    found = Table(title=title, title_justify="left")
-    for heading, side in (("problem", "left"), ("contacts", "right"), ("solver", "left"), ("iterations", "right"),
-                          ("residual", "right"), ("µs", "right")):  # fmt: skip
-        found.add_column(heading, justify=side)
+    contacts = Column("contacts", is_number=True)
+    found = Table(["problem", contacts, "solver", *number_columns("iterations", "residual", "µs")], title)
     last = ""
     for o in outcomes:
         name, last = (o.problem if o.problem != last else ""), o.problem

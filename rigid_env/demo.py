@@ -1,31 +1,30 @@
-"""What `rigid-env demo` does: simulate a scene, tell what happened, and draw it."""
+"""One run of a scene for `rigid-env demo` and `rigid-env run`: its numbers, its picture and its animation."""
 
 from __future__ import annotations
 
 import itertools
+import math
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-from rich import box
-from rich.console import Console
-from rich.table import Table
 
 import physics
 from physics import checks, scenes
 from rigid_env.picture import stroboscope, without_bodies, world_frame, write_gif, write_png
-from rigid_env.rendering import Frame, Renderer
+from rigid_env.rendering import Renderer
+from rigid_env.staging import Stage
 
-SAMPLE_DT = 0.01  # [s]
-FRAME_SAMPLES = 4  # samples per picture of the GIF: 25 pictures a second
+SAMPLE_DT = 0.01  # step, and time between samples, where none is given [s]
+FRAME_TIME = 0.04  # least time between pictures of the GIF, which counts in hundredths of a second [s]
+GIF_TICK = 0.01  # [s]
+LARGEST_GIF = 600  # pictures; a longer motion is shown faster than it is
 PICTURE_SIZE = (960, 600)  # [px]
 GIF_SIZE = (640, 400)  # [px]
 STROBES = 7  # positions in the picture
-SIGHT = 100.0  # further from the origin than this no wall is drawn [m]
 SEEN_SPEED = 0.05  # below which nothing seems to move [m/s, rad/s]
 REST_SPEED = 1e-6  # below which a body is at rest [m/s, rad/s]
-SHOWN_EVENTS = 24
 
 
 class Demo:
@@ -36,33 +35,40 @@ class Demo:
     name : str
         Of a canonical scene, see `physics.scenes`, or of `scene`.
     duration : float
-        Rounded to whole samples of `SAMPLE_DT` [s].
+        Rounded to whole steps [s].
     accuracy : str
         Preset.
     scene : physics.Scene, optional
         Instead of the canonical one.
+    dt : float
+        Step, and time between samples [s].
 
     Raises
     ------
     ValueError
-        An unknown scene or accuracy, or a negative duration.
+        An unknown scene or accuracy, a negative duration, or a step that is not positive.
     """
 
-    def __init__(self, name: str, duration: float, accuracy: str, scene: physics.Scene | None = None):
+    def __init__(
+        self, name: str, duration: float, accuracy: str, scene: physics.Scene | None = None, dt: float = SAMPLE_DT
+    ):
         self.scene = scenes.by_name(name) if scene is None else scene
-        self._sample_count = round(float(checks.non_negative(duration, (), "duration")) / SAMPLE_DT)
-        self.name, self.duration, self.accuracy = name, self._sample_count * SAMPLE_DT, accuracy
-        self.trajectory = physics.simulate(self.scene, self.duration, accuracy, sample_dt=SAMPLE_DT)
-        self.world = physics.World(self.scene, dt=SAMPLE_DT, accuracy=accuracy)
-        self.start = self.world.snapshot()
-        self._is_far = bool(np.abs(self.world.pos).max() > SIGHT)
-        self._replay(self._sample_count)
+        self.dt = float(checks.positive(dt, (), "dt"))
+        self._sample_count = round(float(checks.non_negative(duration, (), "duration")) / self.dt)
+        self.name, self.duration, self.accuracy = name, self._sample_count * self.dt, accuracy
+        self.trajectory = physics.simulate(self.scene, self.duration, accuracy, sample_dt=self.dt)
+        self.world = physics.World(self.scene, dt=self.dt, accuracy=accuracy)
+        self.start, self._sample = self.world.snapshot(), 0
+        self._go_to(self._sample_count)
 
-    def _replay(self, samples: int) -> None:
-        """Take the world from the start to a sample of the trajectory, with the same steps."""
-        self.world.restore(self.start)
-        for _ in range(samples):
+    def _go_to(self, sample: int) -> None:
+        """Take the world to a sample of the trajectory, with the same steps."""
+        if sample < self._sample:
+            self.world.restore(self.start)
+            self._sample = 0
+        for _ in range(sample - self._sample):
             self.world.step()
+        self._sample = sample
 
     # --- numbers -------------------------------------------------------------------------------------------
 
@@ -86,7 +92,7 @@ class Demo:
             "scene": self.name,
             "accuracy": self.accuracy,
             "duration": self.duration,
-            "sample_dt": SAMPLE_DT,
+            "sample_dt": self.dt,
             "energy": {
                 "start": float(energy[0]), "end": float(energy[-1]),
                 "dissipated": float(energy[0] - energy[-1]),
@@ -116,34 +122,51 @@ class Demo:
     # --- pictures ------------------------------------------------------------------------------------------
 
     @property
+    def frame_time(self) -> float:
+        """Simulated time between two pictures of the GIF [s]."""
+        least = max(FRAME_TIME, self.dt, self.duration / LARGEST_GIF)
+        return math.ceil(least / GIF_TICK - 1e-9) * GIF_TICK
+
+    @property
     def frame_count(self) -> int:
         """Pictures of the GIF."""
-        return self._sample_count // FRAME_SAMPLES + 1
+        return math.floor(self.duration / self.frame_time + 1e-9) + 1
+
+    @property
+    def speed(self) -> float:
+        """Simulated seconds that the GIF shows in one."""
+        return 1.0 if self.duration <= LARGEST_GIF * FRAME_TIME else self.frame_time / FRAME_TIME
+
+    def write_picture(self, path: Path, tick: Callable[[], None] = lambda: None) -> None:
+        """Write a PNG or a GIF, by the ending of its name; `tick` is called for each picture of a GIF."""
+        if path.suffix.lower() == ".gif":
+            self.write_gif(path, tick)
+        else:
+            self.write_png(path)
 
     def write_gif(self, path: Path, tick: Callable[[], None]) -> None:
         """Draw and write the animation; `tick` is called once per picture."""
-        renderer = Renderer(*GIF_SIZE)
-        self.world.restore(self.start)
+        stage = self._stage()
+        renderer = Renderer(*GIF_SIZE, bounds=stage.bounds)
         pictures = []
         for k in range(self.frame_count):
-            if k > 0:
-                for _ in range(FRAME_SAMPLES):
-                    self.world.step()
-            pictures.append(renderer.draw(self._frame(f"t = {self.world.time:.2f} s")))
+            self._go_to(min(round(k * self.frame_time / self.dt), self._sample_count))
+            pictures.append(renderer.draw(stage.place(world_frame(self.world, text=[f"t = {self.world.time:.2f} s"]))))
             tick()
         renderer.close()
-        write_gif(path, pictures, 1.0 / (SAMPLE_DT * FRAME_SAMPLES))
+        write_gif(path, pictures, self.speed / self.frame_time)
 
     def write_png(self, path: Path) -> None:
         """Draw and write the stroboscopic picture: where the bodies were, and how they end."""
-        renderer = Renderer(*PICTURE_SIZE)
+        stage = self._stage()
+        renderer = Renderer(*PICTURE_SIZE, bounds=stage.bounds)
         pictures = []
         for sample in np.linspace(0, self._last_motion(), STROBES).astype(int):
-            self._replay(int(sample))
-            frame = replace(self._frame(), contact_points=(), contact_forces=())
+            self._go_to(int(sample))
+            frame = replace(stage.place(world_frame(self.world)), contact_points=(), contact_forces=())
             pictures.append(renderer.draw(frame))
-        self._replay(self._sample_count)
-        frame = self._frame(f"{self.name}, t = 0 .. {self.world.time:g} s")
+        self._go_to(self._sample_count)
+        frame = stage.place(world_frame(self.world, text=[f"{self.name}, t = 0 .. {self.world.time:g} s"]))
         pictures.append(renderer.draw(frame))
         empty = without_bodies(frame, renderer.camera(frame))
         write_png(path, stroboscope(pictures, renderer.draw(empty)))
@@ -155,55 +178,5 @@ class Demo:
         moving = np.flatnonzero(speed > SEEN_SPEED)
         return int(moving[-1]) if len(moving) else 0
 
-    def _frame(self, *text: str) -> Frame:
-        """The world now; far from the walls the picture is without them and travels with body 0."""
-        frame = world_frame(self.world, text=text)
-        if not self._is_far:
-            return frame
-        origin = frame.bodies[0].pos
-        bodies = tuple(replace(body, pos=body.pos - origin) for body in frame.bodies)
-        return replace(frame, bodies=bodies, walls=())
-
-
-def show(demo: Demo, summary: dict, console: Console) -> None:
-    """Print what happened."""
-    console.print(f"[bold]{demo.name}[/bold], accuracy {demo.accuracy}, {demo.duration:g} s")
-    console.print(_event_table(summary["events"]))
-    energy = summary["energy"]
-    console.print(
-        f"energy      {energy['start']:.4f} J at the start, {energy['end']:.4f} J at the end, "
-        f"{energy['dissipated']:.4f} J dissipated"
-    )
-    final = summary["final"]
-    for name, unit in (("pos", "m"), ("quat", ""), ("linvel", "m/s"), ("angvel", "rad/s")):
-        for values in final[name]:
-            console.print(f"{name:<11} ({_numbers(values)}) {unit}")
-    console.print("at rest     " + ("yes" if final["is_at_rest"] else "no"))
-    for point, force in zip(summary["contacts"]["points"], summary["contacts"]["forces"]):
-        console.print(f"contact     ({_numbers(point)}) m, force ({_numbers(force)}) N")
-    status = summary["status"]
-    colour = "green" if status["name"] == "ok" else "yellow"
-    console.print(f"status      [{colour}]{status['name']}[/{colour}]: {status['message']}")
-    console.print(
-        f"            {status['solves']} contact problems, {status['iterations']} sweeps, "
-        f"{status['fallbacks']} by pivoting, {status['unconverged']} above the tolerance; "
-        f"worst residual {status['residual']:.2g}, deepest penetration {status['penetration']:.2g} m"
-    )
-
-
-def _event_table(events: list[dict]) -> Table:
-    table = Table(title="events", title_justify="left", box=box.SIMPLE_HEAD)
-    for name in ("time [s]", "what", "body", "wall", "other"):
-        table.add_column(name, justify="left" if name == "what" else "right")
-    for event in events[:SHOWN_EVENTS]:
-        times = f" x {event['count']}" if event["count"] > 1 else ""
-        who = [str(event[name]) if event[name] >= 0 else "-" for name in ("body", "wall", "other")]
-        table.add_row(f"{event['t']:.2f}", event["kind"] + times, *who)
-    if len(events) > SHOWN_EVENTS:
-        table.caption = f"and {len(events) - SHOWN_EVENTS} more; --json has all"
-    return table
-
-
-def _numbers(values) -> str:
-    """To four decimals, without negative zeros."""
-    return ", ".join(f"{round(value, 4) + 0.0:.4f}" for value in values)
+    def _stage(self) -> Stage:
+        return Stage(self.scene, world_frame(self.world), self.trajectory.pos)

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-from rich import box
 from rich.console import Console
-from rich.table import Table
 
 from physics import Replay, Status
 from physics.recording import origin
+from rigid_env.terminal import Table, number_columns, say
 
 # Rows of the table where a recording is long: its last steps, in which what it was kept for happens.
 LAST_ROWS = 20
@@ -46,22 +45,26 @@ def _row(replay: Replay, k: int) -> dict:
 
 def show(content: dict, console: Console) -> None:
     """Print a `summary`."""
-    console.print(f"kept        {content['reason']}", soft_wrap=True, highlight=False)
-    console.print(f"scene       {content['bodies']} bodies, {content['steps']} steps")
+    say(console, "kept", content["reason"])
+    say(console, "scene", f"{content['bodies']} bodies, {content['steps']} steps")
     rows, shown = content["rows"], _shown(content["rows"])
     if len(shown) < len(rows):
-        console.print(f"table       the last {LAST_ROWS} steps, and those that went wrong; all with --json")
-    table = Table(box=box.SIMPLE_HEAD)
-    for name in ("step", "t [s]", "status", "depth [m]", "residual", "impacts", "energy [J]", "same bits"):
-        table.add_column(name, justify="right")
+        say(console, "table", f"the last {LAST_ROWS} steps, and those that went wrong; all with --json")
+    console.print(make_table(rows, shown))
+    say(console, "replayed", _verdict(content))
+
+
+def make_table(rows: list[dict], shown: list[int]) -> Table:
+    """The rows of a `summary` with these numbers."""
+    names = "step", "t [s]", "status", "depth [m]", "residual", "impacts", "energy [J]", "same bits"
+    table = Table(number_columns(*names))
     for k in shown:
         row = rows[k]
         table.add_row(
             str(k), f"{row['t']:.6g}", row["status"], f"{row['penetration']:.3g}", f"{row['residual']:.3g}",
             str(row["impacts"]), f"{row['energy']:.9g}", "yes" if row["is_identical"] else "no",
         )  # fmt: skip
-    console.print(table)
-    console.print(_verdict(content), soft_wrap=True, highlight=False)
+    return table
 
 
 def _shown(rows: list[dict]) -> list[int]:
@@ -72,11 +75,8 @@ def _shown(rows: list[dict]) -> list[int]:
 
 def _verdict(content: dict) -> str:
     if content["is_identical"]:
-        return "replayed    bit for bit as recorded"
+        return "bit for bit as recorded"
     ours, theirs = content["replayed_with"], content["recorded_with"]
     other = ", ".join(f"{key} {theirs.get(key)} then, {ours[key]} now" for key in ours if ours[key] != theirs.get(key))
     cause = other or "all versions are the same: please report this"
-    return (
-        f"replayed    differs from step {content['first_difference']} on, by up to {content['largest_distance']:.3g} m"
-        f" ({cause})"
-    )
+    return f"differs from step {content['first_difference']} on, by up to {content['largest_distance']:.3g} m ({cause})"

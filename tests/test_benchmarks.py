@@ -81,7 +81,7 @@ def test_table_shows_numbers_in_three_digits():
         "4.32 k",
         "16.1 M",
     ]
-    text = cells(row((26.0, 24.0, 25.0), (1.0, 1.0, 1.0), 25.0, peer_name="peer"))
+    text = [cell.plain for cell in cells(row((26.0, 24.0, 25.0), (1.0, 1.0, 1.0), 25.0, peer_name="peer"))]
     assert "against peer" in text[0]
     assert text[4].startswith("25\n")
     assert text[5] == "≥ 25"

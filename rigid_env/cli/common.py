@@ -1,42 +1,88 @@
-"""What the commands share: the application, options, errors as messages, progress, files."""
+"""Parts of every command: the application, options, errors as messages, files."""
 
 from __future__ import annotations
 
 import contextlib
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Annotated
 
 import typer
 from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
-app = typer.Typer(no_args_is_help=True, add_completion=False, help="A rigid-body engine you can check.")
+from rigid_env.cli import names
+from rigid_env.cli.files import output_option
 
-Json = Annotated[Path | None, typer.Option("--json", metavar="FILE", help="Write the numbers here, too.")]
-Accuracy = Annotated[str, typer.Option(help="Preset: fast, balanced, precise or reference.")]
+INTERRUPTED = 130  # exit status after Ctrl-C, as a shell gives it
+
+# Without markup: square brackets in a help text are printed, and an error is one line that is never framed or broken.
+app = typer.Typer(
+    no_args_is_help=True,
+    help="A rigid-body engine you can check.",
+    rich_markup_mode=None,
+    pretty_exceptions_enable=False,
+    context_settings={"help_option_names": ["--help", "-h"]},
+)
+
+Json = Annotated[Path | None, output_option("--json", ".json", help="Write the numbers here, too.")]
+Accuracy = Annotated[
+    str, typer.Option(help="Preset: fast, balanced, precise or reference.", autocompletion=names.complete_preset)
+]
+SceneArgument = Annotated[
+    str,
+    typer.Argument(
+        metavar="SCENE", help="A canonical scene, or a scene file (.toml).", autocompletion=names.complete_scene
+    ),
+]
+
+
+def at_least(least: int):
+    """A check of an option's number, for its `callback`: the error names the value and what is allowed."""
+
+    def check(value: float) -> float:
+        if not value >= least:
+            raise typer.BadParameter(f"{value!r}; allowed are numbers from {least} on")
+        return value
+
+    return check
 
 
 @contextlib.contextmanager
 def told_errors():
-    """Turn what a user can put right into a message without a traceback."""
+    """Turn what a user can put right into a message without a traceback, and Ctrl-C into an exit status."""
     from gymnasium.error import DependencyNotInstalled
 
     try:
         yield
-    except ValueError as error:
+    except (ValueError, FileNotFoundError) as error:
         raise typer.BadParameter(str(error)) from error
     except (DependencyNotInstalled, OSError) as error:
         typer.echo(f"Error: {error}", err=True)
         raise typer.Exit(1) from error
+    except KeyboardInterrupt:
+        typer.echo("interrupted", err=True)
+        raise typer.Exit(INTERRUPTED) from None
 
 
-def progress_bar(console: Console, has_thread: bool = True) -> Progress:
-    """A progress bar; without its thread, which would disturb what is measured, refresh it yourself."""
-    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
-    return Progress(*columns, console=console, transient=True, auto_refresh=has_thread)
+def collect(found: list, parts: Iterable[list]) -> bool:
+    """Add every part to the list as soon as it is there; False if Ctrl-C came before the last."""
+    try:
+        for part in parts:
+            found += part
+    except KeyboardInterrupt:
+        return False
+    return True
+
+
+def end(is_complete: bool) -> None:
+    """Say that a measurement was interrupted, and exit with the status for it."""
+    if not is_complete:
+        typer.echo("interrupted: only what was measured by then is shown", err=True)
+        raise typer.Exit(INTERRUPTED)
 
 
 def write(path: Path | None, content: dict, console: Console) -> None:
+    """Write numbers as JSON, with the machine they are from, and say where."""
     if path is None:
         return
     from rigid_env.measure.machine import write_json
@@ -46,4 +92,5 @@ def write(path: Path | None, content: dict, console: Console) -> None:
 
 
 def tell_file(path: Path, console: Console) -> None:
-    console.print(f"written     {path}", soft_wrap=True, highlight=False)
+    """Say that a file was written."""
+    console.print(f"written     {path}", soft_wrap=True)

@@ -3,81 +3,121 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
-from rich import box
 from rich.console import Console
-from rich.table import Table
 
-from rigid_env.cli.common import Accuracy, Json, app, progress_bar, tell_file, told_errors, write
+from rigid_env.cli import names
+from rigid_env.cli.common import Accuracy, Json, SceneArgument, app, at_least, tell_file, told_errors, write
+from rigid_env.cli.files import PICTURES, checked_folder, make_parents, output_option
+from rigid_env.terminal import make_console, progress_bar, say
+
+if TYPE_CHECKING:
+    from physics import Scene
+    from rigid_env.demo import Demo
+
+Duration = Annotated[float, typer.Option(callback=at_least(0), help="Simulated time [s].")]
+Dt = Annotated[float, typer.Option("--dt", help="Step, and time between samples [s].")]
 
 
-@app.command()
+@app.command(short_help="Drop the block; print what happens, write a picture and a GIF.")
 def demo(
-    scene: Annotated[str, typer.Argument(help="A canonical scene.")] = "drop",
-    duration: Annotated[float, typer.Option(min=0.0, help="Simulated time [s].")] = 5.0,
+    scene: Annotated[
+        str, typer.Argument(help="A canonical scene, or a scene file.", autocompletion=names.complete_scene)
+    ] = "drop",
+    duration: Duration = 5.0,
     accuracy: Accuracy = "balanced",
-    out: Annotated[Path, typer.Option(metavar="DIR", help="Where PNG and GIF go.")] = Path("demo"),
+    dt: Dt = 0.01,
+    out: Annotated[Path, typer.Option(metavar="DIR", help="Where PNG and GIF go.", callback=checked_folder)] = Path(
+        "demo"
+    ),
     json: Json = None,
 ) -> None:
     """Drop the block in the three-wall box; print what happens, write a picture and a GIF."""
-    console = Console()
     with told_errors():
-        from rigid_env.demo import Demo, show
-
-        with console.status("simulating"):
-            run = Demo(scene, duration, accuracy)
-        summary = run.summary()
-        show(run, summary, console)
-        out.mkdir(parents=True, exist_ok=True)
-        files = {kind: out / f"{scene}.{kind}" for kind in ("png", "gif")}
-        run.write_png(files["png"])
-        with progress_bar(console) as progress:
-            task = progress.add_task("drawing", total=run.frame_count)
-            run.write_gif(files["gif"], lambda: progress.advance(task))
-        for path in files.values():
-            tell_file(path, console)
-        summary["files"] = {kind: str(path) for kind, path in files.items()}
+        _require_pictures()
+        name, built = names.load_scene(scene)
+        pictures = [out / f"{name}{ending}" for ending in PICTURES]
+        make_parents(*pictures, json)
+        console = make_console()
+        done = _simulate(name, built, duration, accuracy, dt, console)
+        summary = done.summary()
+        _draw(done, pictures, console)
+        summary["files"] = {path.suffix[1:]: str(path) for path in pictures}
         write(json, summary, console)
 
 
-@app.command()
+@app.command(short_help="Simulate a scene; print what happens, write samples, draw it.")
 def run(
-    scene: Annotated[Path, typer.Argument(metavar="SCENE.toml", help="A scene file (docs/scene-files.md).")],
-    duration: Annotated[float, typer.Option(min=0.0, help="Simulated time [s].")] = 5.0,
+    scene: SceneArgument,
+    duration: Duration = 5.0,
     accuracy: Accuracy = "balanced",
-    npz: Annotated[Path | None, typer.Option(metavar="FILE", help="Write the samples here.")] = None,
+    dt: Dt = 0.01,
+    plot: Annotated[Path | None, output_option("--plot", *PICTURES, help="Draw the motion.")] = None,
+    npz: Annotated[Path | None, output_option("--npz", ".npz", help="Write the samples as a NumPy archive.")] = None,
+    csv: Annotated[Path | None, output_option("--csv", ".csv", help="Write the samples as a table.")] = None,
     json: Json = None,
 ) -> None:
-    """Simulate a scene from a file; print what happens."""
-    console = Console()
+    """Simulate a scene; print what happens, and write samples or a picture."""
     with told_errors():
-        from physics import load_scene
-        from rigid_env.demo import Demo, show
+        if plot is not None:
+            _require_pictures()
+        name, built = names.load_scene(scene)
+        make_parents(plot, npz, csv, json)
+        console = make_console()
+        done = _simulate(name, built, duration, accuracy, dt, console)
+        for path, save in ((npz, done.trajectory.to_npz), (csv, done.trajectory.to_csv)):
+            if path is not None:
+                save(path)
+                tell_file(path, console)
+        _draw(done, [] if plot is None else [plot], console)
+        write(json, {"file": scene, **done.summary()}, console)
 
-        with console.status("simulating"):
-            done = Demo(scene.stem, duration, accuracy, load_scene(scene))
-        summary = done.summary()
-        show(done, summary, console)
-        if npz is not None:
-            done.trajectory.to_npz(npz)
-            tell_file(npz, console)
-        write(json, {"file": str(scene), **summary}, console)
+
+def _require_pictures() -> None:
+    from rigid_env.extras import require
+
+    require("render", purpose="drawing a motion")
 
 
-@app.command()
+def _simulate(name: str, scene: Scene, duration: float, accuracy: str, dt: float, console: Console) -> Demo:
+    """Run a scene and print what happened."""
+    from rigid_env.demo import Demo
+    from rigid_env.demo_report import show
+
+    with console.status("simulating"):
+        done = Demo(name, duration, accuracy, scene, dt)
+    show(done, done.summary(), console)
+    return done
+
+
+def _draw(done: Demo, paths: list[Path], console: Console) -> None:
+    """Draw and write pictures, and say where."""
+    for path in paths:
+        with progress_bar(console) as progress:
+            task = progress.add_task("drawing", total=done.frame_count)
+            done.write_picture(path, lambda task=task: progress.advance(task))
+        tell_file(path, console)
+        if path.suffix == ".gif" and done.speed != 1.0:
+            say(console, "", f"shows {done.speed:.3g} s in one second")
+
+
+@app.command(short_help="Take recorded steps again: are they the same, bit for bit?")
 def replay(
-    file: Annotated[Path, typer.Argument(metavar="FILE", help="What physics.Recorder wrote.")],
+    file: Annotated[Path, typer.Argument(metavar="FILE", help="Recording that physics.Recorder wrote.")],
     json: Json = None,
 ) -> None:
     """Take recorded steps again, and say whether they come out the same, bit for bit."""
-    console = Console()
     with told_errors():
+        if not file.is_file():
+            raise ValueError(f"file is {str(file)!r}, which does not exist; allowed is a recording (.npz)")
         from physics import Recording
         from rigid_env.replaying import show, summary
 
         recording = Recording.load(file)
+        make_parents(json)
+        console = make_console()
         with console.status("replaying"):
             content = summary(recording.replay())
         show(content, console)
@@ -86,9 +126,9 @@ def replay(
         raise typer.Exit(1)
 
 
-@app.command()
+@app.command(short_help="Say which effects a scene has, why, and what is compiled.")
 def explain(
-    scene: Annotated[str, typer.Argument(help="A canonical scene, or a scene file (docs/scene-files.md).")],
+    scene: SceneArgument,
     accuracy: Accuracy = "balanced",
     duration: Annotated[
         float | None, typer.Option(help="Run it so long [s]: when does each effect act, what time does it take?")
@@ -96,25 +136,21 @@ def explain(
     json: Json = None,
 ) -> None:
     """Say which effects a scene has, why, and what is compiled for them."""
-    console = Console()
     with told_errors():
         from dataclasses import asdict
 
         from physics import accuracy as knobs
-        from physics import load_scene, make_plan, scenes
+        from physics import make_plan
+        from rigid_env.plan_report import make_table
 
         settings = knobs.resolve(accuracy)
-        built = load_scene(scene) if scene.endswith(".toml") else scenes.by_name(scene)
+        _, built = names.load_scene(scene)
+        make_parents(json)
+        console = make_console()
         plan = make_plan(built, settings)
-        table = Table(title=f"{scene}, accuracy {accuracy}", title_justify="left", box=box.SIMPLE_HEAD)
-        for name in ("effect", "", "why", "compiled"):
-            table.add_column(name)
-        for row in plan.rows:
-            state = "[green]on[/green]" if row.is_on else "[dim]off[/dim]"
-            table.add_row(row.effect, state, row.reason, row.compiled if row.is_on else "nothing")
-        console.print(table)
+        console.print(make_table(plan, f"{scene}, accuracy {accuracy}"))
         values = asdict(settings)
-        console.print("accuracy    " + ", ".join(f"{name} {value}" for name, value in values.items()))
+        say(console, "accuracy", ", ".join(f"{name} {value}" for name, value in values.items()))
         rows = [asdict(row) for row in plan.rows]
         content = {"scene": scene, "accuracy": accuracy, "effects": rows, "settings": values}
         if duration is not None:
@@ -122,7 +158,7 @@ def explain(
         write(json, {**content, "explanation": plan.explain()}, console)
 
 
-def _effect_shares(scene, duration: float, accuracy: str, console: Console) -> list[dict]:
+def _effect_shares(scene: Scene, duration: float, accuracy: str, console: Console) -> list[dict]:
     """Measure and print what the effects of a scene do in a run; the same for JSON."""
     from rigid_env.measure import shares
 
@@ -138,15 +174,14 @@ def _effect_shares(scene, duration: float, accuracy: str, console: Console) -> l
     return [share.to_dict() for share in found]
 
 
-@app.command()
+@app.command(short_help="Compile the common plans ahead.")
 def warmup(json: Json = None) -> None:
     """Compile the common plans ahead; what is compiled already takes no time."""
-    console = Console()
     with told_errors():
         from rigid_env.warmup import jobs, warm
 
-        todo = jobs()
-        done = []
+        make_parents(json)
+        console, todo, done = make_console(), jobs(), []
         with progress_bar(console) as progress:
             task = progress.add_task("compiling", total=len(todo))
             for job, result in zip(todo, warm(todo)):

@@ -37,6 +37,8 @@ def run(
     if plot:
         require_matplotlib()
     plan = make_plan(registry.find(cases), accuracy, dt, steps, not is_quick, has_peers)
+    for path in filter(None, (json, plot, markdown)):
+        path.parent.mkdir(parents=True, exist_ok=True)
     report = run_and_show(console, plan, json)
     if markdown:  # first: it says whether the checkout is that of the commit
         page.write_page(markdown, report, plot, " ".join(["rigid-env", *sys.argv[1:]]))

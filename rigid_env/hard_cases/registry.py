@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from importlib import import_module
 
+from physics.keywords import nearest_first
 from rigid_env.hard_cases.case import Case
 
 # Each has a tuple CASES.
@@ -40,7 +41,7 @@ def find(wanted: Sequence[str] = ()) -> tuple[Case, ...]:
         if name not in known:
             raise ValueError(
                 f"case is {name!r}; allowed are numbers from {CASES[0].number} to {CASES[-1].number}, and "
-                + ", ".join(case.name for case in CASES)
+                + ", ".join(nearest_first(name, [case.name for case in CASES]))
             )
     chosen = {known[name].number for name in wanted} or {case.number for case in CASES}
     return tuple(case for case in CASES if case.number in chosen)

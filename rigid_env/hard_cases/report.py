@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
 from physics import accuracy as knobs
 from physics import checks
@@ -16,6 +15,7 @@ from rigid_env.hard_cases import show
 from rigid_env.hard_cases.case import Case, Setting
 from rigid_env.hard_cases.run import OURS, Outcome, Status, run_all
 from rigid_env.measure.machine import write_json
+from rigid_env.terminal import progress_bar
 
 
 @dataclass(frozen=True)
@@ -117,12 +117,11 @@ def run_and_show(console: Console, plan: Plan, keep: Path | None = None) -> Repo
     """
     engines, missing = others.load_engines() if plan.has_peers else ({}, [])
     if missing:
-        console.print(f"not installed: {', '.join(missing)}", markup=False)
+        console.print(f"not installed: {', '.join(missing)}")
     peer_runs = len(engines) * sum(case.peers for case in plan.cases)
     done, theirs = [], []
     total = len(plan.cases) * len(plan.settings)
-    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
-    with Progress(*columns, console=console, transient=True) as progress:
+    with progress_bar(console) as progress:
         task = progress.add_task("hard cases", total=total + peer_runs)
 
         def tick(what: str) -> None:
@@ -151,13 +150,13 @@ def _print(console: Console, report: Report) -> None:
         found = [one for one in report.details if one.accuracy == accuracy]
         if found:
             console.print(show.detail_table(found, f"{accuracy}, {1e3 * report.plan.dt:g} ms"))
-            console.print(f"{accuracy}: {show.summary(found)}", highlight=False)
+            console.print(f"{accuracy}: {show.summary(found)}")
     if report.plan.steps:
         console.print(show.grid_table(report.outcomes, "at which steps each holds"))
     if report.peers:
         console.print(show.detail_table(_beside(report), "beside other engines"))
     if not report.is_complete:
-        console.print("interrupted: what is shown is what was done", markup=False)
+        console.print("interrupted: what is shown is what was done")
 
 
 def _beside(report: Report) -> Sequence[Outcome]:

@@ -5,12 +5,12 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from rich import box
-from rich.table import Table
+from rich.text import Text
 
 from rigid_env.hard_cases.case import WITHIN, Check
 from rigid_env.hard_cases.run import Outcome, Status
 from rigid_env.measure.table import number
+from rigid_env.terminal import Column, Table, number_columns
 
 COLOURS = {Status.HOLDS: "green", Status.FAILS: "red", Status.UNSUPPORTED: "yellow", Status.MISSING: "yellow"}
 MARKS = {Status.HOLDS: "✓", Status.FAILS: "✗", Status.UNSUPPORTED: "-", Status.MISSING: "·"}
@@ -45,34 +45,29 @@ def margin(outcome: Outcome) -> str:
 
 def detail_table(outcomes: Sequence[Outcome], title: str) -> Table:
     """Number, name, what came out, what must, margin, time, status; a row per outcome."""
-    table = Table(title=title, title_justify="left", box=box.SIMPLE_HEAD)
-    table.add_column("#", justify="right")
-    table.add_column("case", no_wrap=True)
-    table.add_column("what came out, tightest check", ratio=3)
-    table.add_column("what must", ratio=2)
-    table.add_column("margin", justify="right", no_wrap=True)
-    table.add_column("time", justify="right", no_wrap=True)
-    table.add_column("status", no_wrap=True)
+    must = Column("what must", under="what came out, tightest check")
+    columns = [
+        Column("#", is_number=True), Column("case", is_whole=True), Column("what came out, tightest check"), must,
+        *number_columns("margin", "time"), Column("status"),
+    ]  # fmt: skip
+    table = Table(columns, title)
     for one in outcomes:
-        colour = COLOURS[one.status]
         table.add_row(
             str(one.case.number), one.case.name, came_out(one), one.case.must, margin(one),
-            f"{number(one.seconds)} s", f"[{colour}]{one.status.value}[/{colour}]",
+            f"{number(one.seconds)} s", Text(one.status.value, style=COLOURS[one.status]),
         )  # fmt: skip
     return table
 
 
 def grid_table(outcomes: Sequence[Outcome], title: str) -> Table:
     """A row per case, a column per accuracy and step."""
-    columns = list(dict.fromkeys((one.accuracy, one.dt) for one in outcomes))
-    table = Table(title=title, caption=LEGEND, title_justify="left", caption_justify="left", box=box.SIMPLE_HEAD)
-    table.add_column("#", justify="right")
-    table.add_column("case", no_wrap=True)
-    for accuracy, dt in columns:
-        table.add_column(f"{accuracy}\n{1e3 * dt:g} ms", justify="center")
+    settings = list(dict.fromkeys((one.accuracy, one.dt) for one in outcomes))
+    names = [f"{accuracy}\n{1e3 * dt:g} ms" for accuracy, dt in settings]
+    columns = [Column("#", is_number=True), Column("case", is_whole=True), *number_columns(*names)]
+    table = Table(columns, title, LEGEND)
     for row in _rows(outcomes):
         found = {(one.accuracy, one.dt): one.status for one in row}
-        marks = [f"[{COLOURS[found[key]]}]{MARKS[found[key]]}[/]" if key in found else "" for key in columns]
+        marks = [Text(MARKS[found[key]], style=COLOURS[found[key]]) if key in found else "" for key in settings]
         table.add_row(str(row[0].case.number), row[0].case.name, *marks)
     return table
 

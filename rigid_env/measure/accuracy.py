@@ -9,6 +9,7 @@ import physics
 from physics import frontier_run, scenes
 from physics.frontier_contender import OURS, Contender, EngineContender
 from physics.frontier_run import REPEATS, STEPS
+from physics.keywords import nearest_first
 from rigid_env.measure import peers
 from rigid_env.measure.truths import CASES, Case
 
@@ -149,7 +150,9 @@ def make_jobs(
     """
     unknown = sorted(set(wanted) - set(names()))
     if unknown:
-        raise ValueError(f"scene is {', '.join(map(repr, unknown))}; allowed are {', '.join(names())}")
+        raise ValueError(
+            f"scene is {', '.join(map(repr, unknown))}; allowed are {', '.join(nearest_first(unknown[0], names()))}"
+        )
     chosen = list(dict.fromkeys(wanted)) or [*(case.key for case in CASES), *OPEN]
     return [_make_job(name, engines or {}, ladder or Ladder()) for name in chosen]
 

@@ -7,7 +7,6 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 
 from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
 import physics
 from physics import checks
@@ -16,6 +15,7 @@ from rigid_env.measure.accuracy import Found, Ladder
 from rigid_env.measure.accuracy_table import MARKS, answers, make_table, summary
 from rigid_env.measure.machine import write_json
 from rigid_env.measure.mujoco_scene import elsewhere
+from rigid_env.terminal import progress_bar
 
 
 @dataclass(frozen=True)
@@ -68,12 +68,12 @@ def measure_and_show(
     ladder = ladder or Ladder()
     engines, missing = accuracy.load_peers([name.strip() for name in peers.split(",") if name.strip()])
     for message in missing:
-        console.print(f"skipped: {message}", markup=False)
+        console.print(f"skipped: {message}")
     if engines:
-        console.print("peers: " + ", ".join(f"{e.name} {e.version}" for e in engines.values()), highlight=False)
+        console.print("peers: " + ", ".join(f"{e.name} {e.version}" for e in engines.values()))
     jobs = accuracy.make_jobs(scenes, engines, ladder)
     results = []
-    with _progress(console) as progress, elsewhere():
+    with progress_bar(console, has_thread=False) as progress, elsewhere():
         task = progress.add_task("accuracy", total=accuracy.run_count(jobs, ladder))
 
         def tick(what: str) -> None:
@@ -82,9 +82,9 @@ def measure_and_show(
         for found in accuracy.run(jobs, ladder, tick):
             results.append(found)
             _show(console, found, is_full)
-    console.print(MARKS, markup=False, style="dim")
+    console.print(MARKS, style="dim")
     for line in [line for found in results for line in (answers(found, below) if below else ())]:
-        console.print(line, markup=False, highlight=False, soft_wrap=True)
+        console.print(line, soft_wrap=True)
     is_complete = len(results) == len(jobs) and all(found.frontier.is_complete for found in results)
     return Report(tuple(results), ladder, is_complete)
 
@@ -112,11 +112,5 @@ def _row(case: str, measure: str, point: dict) -> dict:
 def _show(console: Console, found: Found, is_full: bool) -> None:
     console.print(make_table(found, is_full))
     for line in summary(found):
-        console.print(f"  {line}", markup=False, highlight=False, soft_wrap=True)
+        console.print(f"  {line}", soft_wrap=True)
     console.print()
-
-
-def _progress(console: Console) -> Progress:
-    """Without a thread, which would disturb what is measured: it is refreshed between runs."""
-    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
-    return Progress(*columns, console=console, transient=True, auto_refresh=False)

@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-from rich import box
-from rich.table import Table
-from rich.text import Text
-
 import physics
 from physics.frontier_contender import OURS
 from rigid_env.measure.accuracy import Found
+from rigid_env.terminal import Column, Table, number_columns
 
 MARKS = "* nothing is better in less time   = as good as the truth is known   ! lost: no likeness of the truth"
 
@@ -25,12 +22,9 @@ def make_table(found: Found, is_full: bool = False) -> Table:
     frontier = found.frontier
     shown = frontier.points if is_full or not _has_peers(found) else _own_fronts(frontier)
     front = frontier.front()
-    table = Table(title=_title(found, len(shown)), title_justify="left", box=box.SIMPLE_HEAD)
-    for name in ("engine", "setting"):
-        table.add_column(name)
-    for name in ("dt, ms", f"error, {frontier.units[frontier.measure]}", "µs per s"):
-        table.add_column(name, justify="right", no_wrap=True)
-    table.add_column("")
+    names = "dt, ms", f"error, {frontier.units[frontier.measure]}", "µs per s"
+    columns = [Column("engine", is_whole=True), Column("setting"), *number_columns(*names), Column("", is_whole=True)]
+    table = Table(columns, _title(found, len(shown)))
     for p in sorted(shown, key=lambda p: p.cost):
         marks = ("*" if p in front else "") + ("!" if p.is_lost else "=" if frontier.is_at_floor(p) else "")
         style = "bold" if p.engine == OURS else "" if p in front else "dim"
@@ -75,13 +69,13 @@ def _behaviour(frontier: physics.Frontier, setting: str) -> str:
     return ", ".join(parts)
 
 
-def _title(found: Found, shown: int) -> Text:
+def _title(found: Found, shown: int) -> str:
     frontier = found.frontier
     unit = frontier.units[frontier.measure]
     known = f", known to {frontier.own_error():.1e} {unit}" if frontier.own_error() else ""
     hidden = len(frontier.points) - shown
     more = f"\n{hidden} more points are beaten by their own engine: --all shows them" if hidden else ""
-    return Text(f"{found.job.key}: {found.job.what}\ntruth: {frontier.truth}{known}{more}")
+    return f"{found.job.key}: {found.job.what}\ntruth: {frontier.truth}{known}{more}"
 
 
 def _has_peers(found: Found) -> bool:

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import physics
 from physics import scenes
+from physics.keywords import nearest_first
 from rigid_env.measure.timing import Row, Stopwatch, interleave
 
 STEP = 0.005  # [s]
@@ -133,7 +134,7 @@ def chosen(names: Sequence[str], page: Path | None) -> list[str]:
     """
     for name in names:
         if name not in CASES:
-            raise ValueError(f"effect is {name!r}; allowed are {', '.join(CASES)}")
+            raise ValueError(f"effect is {name!r}; allowed are {', '.join(nearest_first(name, CASES))}")
     if names and page is not None:
         raise ValueError(f"markdown is {str(page)!r} for {', '.join(names)} only; a page is written for all effects")
     return list(names or CASES)

@@ -11,11 +11,11 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
-from rich import box
-from rich.table import Table
+from rich.text import Text
 
 import physics
 from rigid_env.measure.timing import Spread, Stopwatch, interleave
+from rigid_env.terminal import Column, Table, number_columns
 
 STEP = 0.01  # [s], as `rigid-env run` takes
 WHOLE = "whole"
@@ -142,12 +142,9 @@ def measure(
 
 def make_table(shares: list[Share], title: str) -> Table:
     """Effect, share of the steps in which it acted, share of the time: median and range."""
-    table = Table(title=title, title_justify="left", box=box.SIMPLE_HEAD)
-    table.add_column("effect")
-    table.add_column("acted in", justify="right")
-    table.add_column("of the time", justify="right")
+    table = Table([Column("effect"), *number_columns("acted in", "of the time")], title)
     for share in shares:
         time = f"{share.time.median:.1%}" if share.is_seen else "below noise"
-        spread = f"  [dim]{share.time.lowest:.1%} .. {share.time.highest:.1%}[/dim]"
-        table.add_row(share.effect, f"{share.acted:.1%} of steps", time + spread)
+        spread = (f"\n{share.time.lowest:.1%} .. {share.time.highest:.1%}", "dim")
+        table.add_row(share.effect, f"{share.acted:.1%} of steps", Text.assemble(time, spread))
     return table

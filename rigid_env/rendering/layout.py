@@ -108,7 +108,7 @@ def faces_point(wall, point):
     return wall.normal @ np.asarray(point) > wall.offset
 
 
-def make_room(walls, bodies):
+def make_room(walls, bodies, bounds=None):
     """Room between the walls; where there are none, as large as the bodies need.
 
     Parameters
@@ -116,6 +116,8 @@ def make_room(walls, bodies):
     walls : tuple of WallView
     bodies : tuple of BodyView
         Without walls the room is centred on the mean of their positions, otherwise only their sizes count.
+    bounds : pair of (3,) float, optional
+        [m]. Lower and upper corner of a box that the open sides of the room reach.
 
     Returns
     -------
@@ -131,6 +133,7 @@ def make_room(walls, bodies):
             lower[axis] = max(lower[axis], wall.offset)
         elif wall.normal[axis] < -AXIS_ALIGNED:
             upper[axis] = min(upper[axis], -wall.offset)
+    is_open = np.isinf(lower), np.isinf(upper)
     for axis in range(3):
         length = ROOM_HEIGHT * unit if axis == 1 else OPEN_LENGTH * unit
         if np.isinf(lower[axis]) and np.isinf(upper[axis]):
@@ -140,6 +143,9 @@ def make_room(walls, bodies):
             upper[axis] = lower[axis] + length
         elif np.isinf(lower[axis]):
             lower[axis] = upper[axis] - length
+    if bounds is not None:
+        lower = np.where(is_open[0], np.minimum(lower, bounds[0]), lower)
+        upper = np.where(is_open[1], np.maximum(upper, bounds[1]), upper)
     return Room(lower, upper, FADE_LENGTH * unit, tuple(walls))
 
 

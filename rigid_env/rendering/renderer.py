@@ -42,6 +42,8 @@ class Renderer:
     camera : Camera or None
         None chooses one that has the room between the walls in sight: for frames with walls it depends on the
         walls and the bodies' sizes, without walls also on the positions in the first frame drawn.
+    bounds : pair of (3,) float, optional
+        [m]. Lower and upper corner of a box that is in sight, too, where no wall bounds the room.
 
     Raises
     ------
@@ -51,14 +53,14 @@ class Renderer:
         On an unknown mode or a size that is not positive.
     """
 
-    def __init__(self, width=960, height=600, mode="rgb_array", fps=40, title="rigid-env", camera=None):
+    def __init__(self, width=960, height=600, mode="rgb_array", fps=40, title="rigid-env", camera=None, bounds=None):
         if mode not in MODES:
             raise ValueError(f"mode must be one of {MODES}, not {mode!r}")
         if width < 1 or height < 1:
             raise ValueError(f"width and height must be positive, not {width} x {height}")
         self._pygame = _import_pygame()
         self.width, self.height, self.mode, self.fps, self.title = int(width), int(height), mode, fps, title
-        self._camera = camera
+        self._camera, self._bounds = camera, bounds
         self._canvas_size = (SUPERSAMPLING * self.width, SUPERSAMPLING * self.height)
         surface = self._pygame.Surface
         self._large = surface(self._canvas_size, 0, 32)
@@ -127,7 +129,7 @@ class Renderer:
         if key == self._scene_key:
             return
         self._scene_key = key
-        self._room = make_room(frame.walls, frame.bodies)
+        self._room = make_room(frame.walls, frame.bodies, self._bounds)
         self._scene_camera = self._camera or default_camera(self._room, (self.width, self.height))
         pixels = draw_backdrop(self._scene_camera, (self.width, self.height), self._room)
         small = self._pygame.image.frombuffer(pixels.tobytes(), (self.width, self.height), "RGB")

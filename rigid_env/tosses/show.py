@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
-from rich import box
 from rich.console import Console
-from rich.table import Table
+from rich.text import Text
 
+from rigid_env.measure.table import VERDICTS
+from rigid_env.terminal import Column, Table, number_columns
+from rigid_env.tosses.limits import Limits
 from rigid_env.tosses.metric import Summary
 from rigid_env.tosses.report import PEERS, TARGETS, Case, Report
+
+ERRORS = "position\nmean", "position\nmedian", "rotation\nmean", "rotation\nmedian"
 
 
 def show(report: Report, case: Case, console: Console) -> None:
@@ -18,12 +22,13 @@ def show(report: Report, case: Case, console: Console) -> None:
         f"{report.seed}), errors over the other {first.rest.tosses} and over all"
     )
     if not report.is_complete:
-        console.print("[yellow]interrupted[/yellow]: the last fit is the best found until then")
-    console.print(_case_table(report))
+        console.print(Text.assemble(("interrupted", "yellow"), ": the last fit is the best found until then"))
+    console.print(case_table(report))
     for one in report.cases:
-        console.print(f"{one.setup.name}: {_parameters(one)}", highlight=False)
-    console.print(_ladder_table(report, case))
-    _show_limits(report, console)
+        console.print(f"{one.setup.name}: {_parameters(one)}")
+    console.print(ladder_table(report, case))
+    console.print(limits_table(report.limits))
+    _show_flight(report, console)
 
 
 def _pair(summary: Summary) -> tuple[str, ...]:
@@ -35,24 +40,21 @@ def _pair(summary: Summary) -> tuple[str, ...]:
 
 
 def _table(title: str, *names: str) -> Table:
-    table = Table(title=title, title_justify="left", box=box.SIMPLE_HEAD)
-    table.add_column(names[0])
-    for name in names[1:]:
-        table.add_column(name, justify="right")
-    return table
+    return Table([Column(names[0]), *number_columns(*names[1:])], title)
 
 
-def _case_table(report: Report) -> Table:
-    title = "mean and median over tosses of position error (cube widths) and rotation error (degrees)"
-    table = _table(title, "what was fitted", "tosses", "position", "median", "rotation", "median", "target")
+def case_table(report: Report) -> Table:
+    """Errors of each fit over the tosses fitted, the rest and all, and those of other engines."""
+    title = "over tosses: position error [cube widths], rotation error [degrees]"
+    table = _table(title, "fit", "tosses", *ERRORS, "target")
     for case in report.cases:
         for name, summary in (("fitted", case.trained), ("rest", case.rest), ("all", case.every)):
             is_good = summary.position_mean <= TARGETS["position_mean"]
             is_good = is_good and summary.rotation_mean <= TARGETS["rotation_mean"]
-            verdict = {True: "[green]yes[/green]", False: "[red]no[/red]"}[is_good] if name == "rest" else ""
+            verdict = VERDICTS[is_good] if name == "rest" else ""
             table.add_row(case.setup.name if name == "fitted" else "", name, *_pair(summary), verdict)
     for name, (position, rotation) in PEERS.items():
-        table.add_row(f"[dim]{name}[/dim]", "all", f"{position:.3f}", "", f"{rotation:.1f}", "", "")
+        table.add_row(name, "all", f"{position:.3f}", "", f"{rotation:.1f}", "", "", style="dim")
     return table
 
 
@@ -61,19 +63,18 @@ def _parameters(case: Case) -> str:
     return f"{values}; {case.lifted} tosses lifted onto the table"
 
 
-def _ladder_table(report: Report, case: Case) -> Table:
-    table = _table(
-        f"the parameters of {case.setup.name!r}, rest, at each accuracy", "accuracy", "position", "median",
-        "rotation", "median", "µs per simulated s",
-    )  # fmt: skip
+def ladder_table(report: Report, case: Case) -> Table:
+    """Errors over the rest, and time, at each accuracy."""
+    title = f"the parameters of {case.setup.name!r}, rest, at each accuracy"
+    table = _table(title, "accuracy", *ERRORS, "µs per\nsimulated s")
     for rung in report.ladder:
         table.add_row(rung.accuracy, *_pair(rung.rest), f"{rung.us:.0f}")
     return table
 
 
-def _show_limits(report: Report, console: Console) -> None:
-    limits, flight = report.limits, report.flight
-    table = _table("what limits it", "rest", "tosses", "position", "median", "rotation", "median")
+def limits_table(limits: Limits) -> Table:
+    """Errors that come from the start, and of tosses that end on the measured face and on another."""
+    table = _table("what limits it", "rest", "tosses", *ERRORS)
     rows = (
         ("noise of the first frame alone", limits.noise), ("ends on the measured face", limits.landed),
         ("ends on another face", limits.missed),
@@ -81,10 +82,13 @@ def _show_limits(report: Report, console: Console) -> None:
     for name, summary in rows:
         if summary is not None:
             table.add_row(name, str(summary.tosses), *_pair(summary))
-    console.print(table)
+    return table
+
+
+def _show_flight(report: Report, console: Console) -> None:
+    flight = report.flight
     center = ", ".join(f"{1e3 * value:.1f}" for value in flight.center_of_mass)
     console.print(
         f"free flight  gravity {flight.gravity:.3f} m/s² in recorded lengths; true per recorded length at rest "
-        f"{report.scale:.4f}; centre of mass at ({center}) mm from the tracked centre, body frame",
-        highlight=False,
+        f"{report.scale:.4f}; centre of mass at ({center}) mm from the tracked centre, body frame"
     )

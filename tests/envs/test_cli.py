@@ -302,7 +302,7 @@ def test_run_tells_what_is_wrong_with_a_file(tmp_path):
     output = " ".join(run("run", path, code=2).replace("│", " ").split())
     assert "line 3" in output
     assert "radius is -1" in output
-    run("run", tmp_path / "none.toml", code=1)
+    assert "does not exist" in run("run", tmp_path / "none.toml", code=2)
 
 
 # effects

@@ -42,7 +42,7 @@ def test_one_fit_of_named_parameters(npz):
 
 
 def test_mistakes_are_named(npz, tmp_path):
-    assert "does not exist" in run(tmp_path / "no.npz", code=1)
+    assert "does not exist" in run(tmp_path / "no.npz", code=2)
     assert "'best'" in run(npz, "--accuracy", "best", code=2)
     assert "'mass'" in run(npz, "--fit", "mass", code=2)
     np.savez(tmp_path / "wrong.npz", states=np.zeros((3, 13)))

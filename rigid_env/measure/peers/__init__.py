@@ -10,6 +10,7 @@ from __future__ import annotations
 import importlib
 import importlib.util
 
+from physics.keywords import nearest_first
 from rigid_env.measure.peers.contender import Engine, PeerContender, Unsupported
 
 # Name: (module of ours, its class, what has to be importable)
@@ -51,5 +52,5 @@ def load(name: str) -> Engine:
 
 def _entry(name: str) -> tuple[str, str, str]:
     if name not in ENGINES:
-        raise ValueError(f"peer is {name!r}; allowed are {', '.join(ENGINES)}")
+        raise ValueError(f"peer is {name!r}; allowed are {', '.join(nearest_first(name, ENGINES))}")
     return ENGINES[name]

@@ -1,0 +1,110 @@
+"""Names that a user types: scenes, presets, effects and cases, found and completed."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from physics import Scene
+
+SCENE_FILE = ".toml"
+
+
+def load_scene(name: str) -> tuple[str, Scene]:
+    """A canonical scene, or that of a file, and a short name for it.
+
+    Raises
+    ------
+    ValueError
+        No such scene or file, or a mistake in the file: it is named with file, line and key.
+    """
+    import physics
+    from physics import scenes
+    from physics.keywords import nearest_first
+
+    path = Path(name)
+    if path.suffix.lower() == SCENE_FILE or path.is_file():
+        if not path.is_file():
+            what = "is a folder" if path.is_dir() else "does not exist"
+            raise ValueError(f"scene is {name!r}, which {what}; allowed is a scene file, or a canonical scene")
+        return path.stem, physics.load_scene(path)
+    if name in scenes.SCENES:
+        return name, scenes.by_name(name)
+    known = ", ".join(nearest_first(name, scenes.SCENES))
+    raise ValueError(f"scene is {name!r}; allowed are {known}, or a scene file ({SCENE_FILE})")
+
+
+# --- completion in a shell -------------------------------------------------------------------------------------------
+
+
+def complete_scene(incomplete: str) -> list[str]:
+    """Canonical scenes and scene files that begin like this."""
+    from physics import scenes
+
+    folder, _, start = incomplete.rpartition("/")
+    place = Path(folder + "/") if folder or incomplete.startswith("/") else Path()
+    files = (path for path in sorted(place.glob("*")) if path.is_dir() or path.suffix == SCENE_FILE)
+    prefix = incomplete.removesuffix(start)
+    paths = [prefix + path.name + ("/" if path.is_dir() else "") for path in files if path.name.startswith(start)]
+    return [*_starting(incomplete, scenes.SCENES), *paths]
+
+
+def complete_canonical(incomplete: str) -> list[str]:
+    """Canonical scenes that begin like this."""
+    from physics import scenes
+
+    return _starting(incomplete, scenes.SCENES)
+
+
+def complete_preset(incomplete: str) -> list[str]:
+    """Presets that begin like this."""
+    from physics import PRESETS
+
+    return _starting(incomplete, PRESETS)
+
+
+def complete_presets(incomplete: str) -> list[str]:
+    """Presets with commas between them."""
+    from physics import PRESETS
+
+    return _listed(incomplete, PRESETS)
+
+
+def complete_truth(incomplete: str) -> list[str]:
+    """Scenes whose accuracy can be measured."""
+    from rigid_env.measure import accuracy
+
+    return _starting(incomplete, accuracy.names())
+
+
+def complete_peers(incomplete: str) -> list[str]:
+    """Other engines with commas between them."""
+    from rigid_env.measure import peers
+
+    return _listed(incomplete, peers.ENGINES)
+
+
+def complete_effect(incomplete: str) -> list[str]:
+    """Effects whose cost can be measured."""
+    from rigid_env.measure.effects import CASES
+
+    return _starting(incomplete, CASES)
+
+
+def complete_case(incomplete: str) -> list[str]:
+    """Names of hard cases."""
+    from rigid_env.hard_cases import registry
+
+    return _starting(incomplete, (case.name for case in registry.CASES))
+
+
+def _starting(incomplete: str, known: Iterable[str]) -> list[str]:
+    return [name for name in known if name.startswith(incomplete)]
+
+
+def _listed(incomplete: str, known: Iterable[str]) -> list[str]:
+    """Completions of the last of some names with commas."""
+    done, comma, last = incomplete.rpartition(",")
+    return [done + comma + name for name in _starting(last, known) if name not in done.split(",")]

@@ -1,0 +1,93 @@
+"""Put a motion before the camera: upright, at a size that can be drawn, and all of it in sight."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from physics import Gravity, Scene
+from rigid_env.rendering import BodyView, Frame, WallView
+from rigid_env.rendering.geometry import rotation_matrix
+
+Y = np.array((0.0, 1.0, 0.0))
+FAR_SPAN = 40.0  # largest extent of a motion that is shown whole, in sizes of its largest body
+SIGHT = 100.0  # further from the origin than this the camera travels with the bodies [m]
+DRAWN_SIZE = 2.0  # a largest body smaller than this is drawn that large [m]
+LONGEST_ARROW = 0.3  # of the extent of the picture
+MOST_ARROWS = 16  # contact points; of more of them no forces are drawn
+
+
+class Stage:
+    """One camera's view of a whole motion.
+
+    Parameters
+    ----------
+    scene : Scene
+        Its gravity says which of the axes is up.
+    frame : Frame
+        The world at any time.
+    pos : (samples, bodies, 3) float
+        Positions over the motion, world frame [m].
+    """
+
+    def __init__(self, scene: Scene, frame: Frame, pos: np.ndarray):
+        self._turn = _upright(scene)
+        size = max((_extent(body) for body in frame.bodies), default=1.0)
+        self._scale = max(1.0, DRAWN_SIZE / size)
+        size *= self._scale
+        turned = self._scale * np.asarray(pos) @ rotation_matrix(self._turn).T
+        lower, upper = turned.min(axis=(0, 1)) - 0.5 * size, turned.max(axis=(0, 1)) + 0.5 * size
+        span = float((upper - lower).max())
+        self._travels = span > FAR_SPAN * size or bool(np.abs(turned[0]).max() > SIGHT * self._scale)
+        self._span = size if self._travels else span
+        self.bounds = None if self._travels else (lower, upper)
+
+    def place(self, frame: Frame) -> Frame:
+        """A frame of the motion as it is drawn.
+
+        Where the bodies go too far to be shown whole, the picture is without walls and travels with body 0.
+        """
+        matrix, scale = rotation_matrix(self._turn), self._scale
+        bodies = [self._placed(body, matrix) for body in frame.bodies]
+        walls = [WallView(matrix @ wall.normal, scale * wall.offset) for wall in frame.walls]
+        points, forces = scale * frame.contact_points @ matrix.T, frame.contact_forces @ matrix.T
+        if self._travels:
+            origin = bodies[0].pos
+            bodies, walls, points = [replace(body, pos=body.pos - origin) for body in bodies], [], points - origin
+        if len(points) > MOST_ARROWS:
+            points, forces = points[:0], forces[:0]
+        longest = np.linalg.norm(forces, axis=1).max(initial=0.0)
+        arrow = min(scale * frame.force_scale, LONGEST_ARROW * self._span / longest if longest else np.inf)
+        return replace(
+            frame, bodies=bodies, walls=walls, contact_points=points, contact_forces=forces, force_scale=arrow
+        )
+
+    def _placed(self, body: BodyView, matrix: np.ndarray) -> BodyView:
+        corners = {} if body.corners is None else {"corners": self._scale * np.asarray(body.corners)}
+        return replace(
+            body, pos=self._scale * matrix @ body.pos, quat=_product(self._turn, body.quat),
+            dimensions=self._scale * body.dimensions, **corners,
+        )  # fmt: skip
+
+
+def _extent(body: BodyView) -> float:
+    return float(body.dimensions.max() * (1.0 if body.kind == "block" else 2.0))
+
+
+def _upright(scene: Scene) -> np.ndarray:
+    """Quaternion (4,) of the turn that takes the axis nearest to up onto y; none where y is, or nothing pulls."""
+    gravity = scene.effect(Gravity)
+    up = -np.asarray(gravity.acceleration) if gravity is not None else Y
+    k = int(np.abs(up).argmax())
+    axis = np.sign(up[k]) * np.eye(3)[k] if up[k] else Y
+    if axis @ Y < -0.5:
+        return np.array((0.0, 1.0, 0.0, 0.0))
+    half = np.concatenate(([1.0 + axis @ Y], np.cross(axis, Y)))
+    return half / np.linalg.norm(half)
+
+
+def _product(p: np.ndarray, q: np.ndarray) -> np.ndarray:
+    """Quaternion (4,) of the turn q, then p; scalar first."""
+    vector = p[0] * q[1:] + q[0] * p[1:] + np.cross(p[1:], q[1:])
+    return np.concatenate(([p[0] * q[0] - p[1:] @ q[1:]], vector))

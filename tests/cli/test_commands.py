@@ -1,0 +1,374 @@
+"""Commands: files, mistakes, help, completion, interruptions and missing packages."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+
+import numpy as np
+import pytest
+import typer
+from typer.testing import CliRunner
+
+import physics
+from physics import scenes
+from rigid_env.cli import app, files
+from rigid_env.cli.common import INTERRUPTED
+from rigid_env.demo import LARGEST_GIF, Demo
+from rigid_env.measure import effects as costs
+from rigid_env.terminal.console import UNBROKEN
+
+runner = CliRunner()
+COMMANDS = {
+    "demo": (), "run": ("rest",), "replay": ("none.npz",), "explain": ("rest",), "warmup": (), "bench": (),
+    "effects": (), "accuracy": (), "tosses": ("none.npz",), "hard-cases": (),
+}  # fmt: skip
+
+BALL = physics.Scene([physics.Sphere(0.5, 2.0, linvel=(1.0, 0.0, 0.0))], effects=[physics.Gravity()])
+
+
+def run(*arguments, code=0, **environment):
+    result = runner.invoke(app, list(map(str, arguments)), env=environment)
+    assert result.exit_code == code, result.output
+    return result.output
+
+
+@pytest.fixture
+def ball(tmp_path):
+    """A scene file."""
+    path = tmp_path / "ball.toml"
+    physics.save_scene(BALL, path)
+    return path
+
+
+# help
+
+
+def commands():
+    return {name: command.params for name, command in typer.main.get_command(app).commands.items()}
+
+
+def test_every_command_is_looked_at():
+    assert set(COMMANDS) == set(commands())
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_help_is_printed_as_it_is_written(command):
+    """Units in square brackets are there: ``[s]`` is no markup."""
+    text = " ".join(run(command, "--help", COLUMNS="80").split())
+    assert max(map(len, run(command, "--help", COLUMNS="80").splitlines())) <= 80
+    for parameter in commands()[command]:
+        told = getattr(parameter, "help", None)
+        if told:
+            assert " ".join(told.split()) in text
+
+
+def test_units_are_there():
+    assert "Simulated time [s]." in run("demo", "--help")
+    assert "Step [s]." in run("hard-cases", "--help")
+
+
+def test_no_summary_of_a_command_is_cut():
+    output = run("--help", COLUMNS="80")
+    assert "..." not in output[output.index("Commands") :]
+
+
+# files
+
+
+def written_options():
+    return [
+        (name, parameter.opts[0])
+        for name, parameters in commands().items()
+        for parameter in parameters
+        if getattr(parameter, "metavar", None) == "FILE" and parameter.opts[0].startswith("--")
+    ]
+
+
+def test_every_command_that_measures_has_json():
+    assert {name for name, option in written_options() if option == "--json"} == set(COMMANDS)
+
+
+ENDINGS = {"--json": ".json", "--npz": ".npz", "--csv": ".csv", "--plot": ".png", "--markdown": ".md"}
+
+
+@pytest.mark.parametrize(("command", "option"), written_options())
+def test_files_are_refused_before_anything_is_computed(command, option, tmp_path, monkeypatch):
+    """The same rule for each of them; nothing is made."""
+    monkeypatch.chdir(tmp_path)
+    ending = ENDINGS[option]
+    (tmp_path / "file").write_text("kept")
+    (tmp_path / f"folder{ending}").mkdir()
+    before = sorted(tmp_path.rglob("*"))
+    for name, words in (
+        ("x.xyz", ("ends in '.xyz'", ending)),
+        ("x", ("ends in ''", ending)),
+        (f"folder{ending}", ("is a folder", ending)),
+        (f"file/deep/x{ending}", ("is a file", "file")),
+    ):
+        output = run(command, *COMMANDS[command], option, name, code=2)
+        assert f"'{option}'" in output
+        assert name in output
+        for word in words:
+            assert word in output
+    assert sorted(tmp_path.rglob("*")) == before
+
+
+def test_what_cannot_be_written_is_refused(tmp_path, monkeypatch):
+    monkeypatch.setattr(files.os, "access", lambda path, mode: False)
+    output = run("run", "rest", "--json", tmp_path / "x.json", code=2)
+    assert "read-only" in output
+
+
+def test_devices_need_no_ending():
+    path = files.Path(os.devnull)
+    assert files.checked(path, [".json"]) == path
+
+
+def test_run_makes_missing_folders(ball, tmp_path):
+    pytest.importorskip("PIL")
+    pytest.importorskip("pygame")
+    made = {
+        option: tmp_path / "a" / option[2:] / f"x{ENDINGS[option]}" for option in ("--npz", "--csv", "--plot", "--json")
+    }
+    output = run("run", ball, "--duration", 0.1, *(part for pair in made.items() for part in pair))
+    for path in made.values():
+        assert path.stat().st_size > 0
+        assert str(path) in output
+    with np.load(made["--npz"]) as found:
+        assert found["t"][-1] == pytest.approx(0.1)
+    assert len(made["--csv"].read_text().splitlines()) == 12
+    assert json.loads(made["--json"].read_text())["sample_dt"] == 0.01
+
+
+# run and demo
+
+
+def test_run_takes_a_step(ball, tmp_path):
+    numbers = tmp_path / "x.json"
+    run("run", ball, "--duration", 1, "--dt", 0.05, "--json", numbers)
+    found = json.loads(numbers.read_text())
+    assert (found["sample_dt"], found["duration"]) == (0.05, 1.0)
+    assert found["final"]["pos"][0] == pytest.approx([1.0, -9.81 / 2, 0.0], abs=1e-12)
+    assert "dt is 0" in run("run", ball, "--dt", 0, code=2)
+
+
+def test_run_and_demo_take_scenes_and_files_alike(ball, tmp_path):
+    pytest.importorskip("PIL")
+    pytest.importorskip("pygame")
+    assert "tumble, accuracy balanced" in run("run", "tumble", "--duration", 0.05)
+    out = tmp_path / "pictures"
+    assert "ball, accuracy balanced" in run("demo", ball, "--duration", 0.05, "--out", out)
+    assert sorted(path.name for path in out.iterdir()) == ["ball.gif", "ball.png"]
+
+
+def test_gif_keeps_the_time_of_the_motion():
+    for dt in (0.003, 0.01, 0.04, 0.07):
+        run_ = Demo("ball", 0.5, "balanced", BALL, dt)
+        assert run_.frame_time >= 0.04
+        assert run_.frame_time == pytest.approx(round(run_.frame_time, 2), abs=1e-12)
+        assert abs((run_.frame_count - 1) * run_.frame_time - run_.duration) <= run_.frame_time
+        assert run_.speed == 1.0
+
+
+def test_gif_of_a_long_motion_is_short():
+    long = Demo("ball", 100.0, "balanced", BALL, 1.0)
+    assert long.frame_count <= LARGEST_GIF
+    assert long.speed == pytest.approx(long.frame_time / 0.04)
+
+
+def test_many_bodies_are_summarised(tmp_path):
+    path, numbers = tmp_path / "many.toml", tmp_path / "many.json"
+    bodies = [physics.Sphere(0.1, 1.0, pos=(2.0 * k, 0, 0)) for k in range(50)]
+    physics.save_scene(physics.Scene(bodies, effects=[physics.Gravity()]), path)
+    output = run("run", path, "--duration", 0.05, "--json", numbers)
+    assert len(output.splitlines()) < 20
+    assert "50 Sphere" in output
+    assert len(json.loads(numbers.read_text())["final"]["pos"]) == 50
+
+
+# mistakes
+
+
+def test_mistakes_name_field_value_and_what_is_allowed(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "bad.toml").write_text('[[bodies]]\nkind = "Sphere"\nradius = -1\nmass = 2\n')
+    (tmp_path / "folder.toml").mkdir()
+    (tmp_path / "binary.toml").write_bytes(b"\xff\xfe\x00")
+    for arguments, words in (
+        (("run", "dorp"), ("scene is 'dorp'", "allowed are drop,")),
+        (("explain", "tumbel"), ("scene is 'tumbel'", "allowed are tumble,")),
+        (("demo", "nix.toml"), ("scene is 'nix.toml'", "does not exist")),
+        (("run", "folder.toml"), ("folder.toml", "is a folder")),
+        (("run", "bad.toml"), ("bad.toml, line 3", "radius is -1")),
+        (("run", "binary.toml"), ("can't decode",)),
+        (("run", "rest", "--accuracy", "best"), ("accuracy is 'best'", "balanced")),
+        (("run", "rest", "--duration", "-1"), ("--duration", "-1.0; allowed")),
+        (("run", "rest", "--duration", "long"), ("--duration",)),
+        (("tosses", "none.npz", "--threads", "0"), ("--threads", "0; allowed")),
+        (("tosses", "none.npz", "--seed", "-1"), ("--seed", "-1; allowed")),
+        (("run", "rest", "--frames", "3"), ("--frames",)),
+        (("replay", "none.npz"), ("file is 'none.npz'", "does not exist")),
+        (("effects", "gravitation"), ("effect is 'gravitation'", "allowed are gravity,")),
+        (("accuracy", "tumbel"), ("scene is 'tumbel'", "allowed are tumble,")),
+        (("accuracy", "--peers", "mujocco"), ("peer is 'mujocco'", "allowed are mujoco,")),
+        (("hard-cases", "zenno"), ("case is 'zenno'", "zeno")),
+        (("runn", "rest"), ("runn",)),
+    ):
+        output = run(*arguments, code=2)
+        assert "Traceback" not in output
+        lines = [line for line in output.splitlines() if line.startswith("Error")]
+        assert len(lines) == 1, output  # not broken, not framed
+        for word in words:
+            assert word in lines[0]
+
+
+# Ctrl-C
+
+
+def test_a_measurement_that_is_interrupted_shows_what_was_done(tmp_path, monkeypatch):
+    measure, count = costs.effect_row, []
+
+    def interrupted(name, *rest):
+        count.append(name)
+        if len(count) == 2:
+            raise KeyboardInterrupt
+        return measure(name, *rest)
+
+    monkeypatch.setattr(costs, "effect_row", interrupted)
+    numbers = tmp_path / "x.json"
+    output = run("effects", "gravity", "contact", "drag", "--quick", "--json", numbers, code=INTERRUPTED)
+    assert "interrupted" in output
+    found = json.loads(numbers.read_text())
+    assert found["is_complete"] is False
+    assert [row["key"] for row in found["rows"]] == ["gravity"]
+
+
+def test_interrupting_a_simulation_ends_it_cleanly(monkeypatch):
+    def interrupted(*arguments, **more):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(physics, "simulate", interrupted)
+    assert "interrupted" in run("run", "rest", code=INTERRUPTED)
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(sys.platform == "win32", reason="signals")
+def test_a_signal_ends_a_process_cleanly(tmp_path):
+    command = [sys.executable, "-m", "rigid_env", "run", "tumble", "--duration", "1e5", "--dt", "0.001"]
+    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, cwd=tmp_path)
+    time.sleep(6.0)
+    process.send_signal(signal.SIGINT)
+    _, told = process.communicate(timeout=60)
+    assert process.returncode == INTERRUPTED
+    assert "interrupted" in told
+    assert "Traceback" not in told
+
+
+# shell completion
+
+
+def completions(folder, *words, shell="bash"):
+    """What the shell is offered for the last word."""
+    line = " ".join(("rigid-env", *words))
+    given = {"_RIGID_ENV_COMPLETE": f"complete_{shell}", "COMP_WORDS": line, "COMP_CWORD": str(len(words))}
+    given["_TYPER_COMPLETE_ARGS"] = line
+    code = "from rigid_env.cli import app; app(prog_name='rigid-env')"
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, cwd=folder, env={**os.environ, **given}
+    )
+    assert not done.stderr, done.stderr
+    return done.stdout
+
+
+def test_commands_scenes_presets_and_cases_are_completed(tmp_path):
+    assert set(completions(tmp_path, "e").split()) == {"explain", "effects"}
+    assert set(completions(tmp_path, "explain", "t").split()) == {
+        name for name in scenes.SCENES if name.startswith("t")
+    }
+    assert completions(tmp_path, "run", "drop", "--accuracy", "bal").split() == ["balanced"]
+    assert completions(tmp_path, "hard-cases", "zen").split() == ["zeno"]
+    assert completions(tmp_path, "hard-cases", "--accuracy", "fast,bal").split() == ["fast,balanced"]
+    assert completions(tmp_path, "accuracy", "--peers", "mu").split() == ["mujoco"]
+    assert "creep" in completions(tmp_path, "accuracy", "cr")
+    assert completions(tmp_path, "effects", "grav").split() == ["gravity"]
+    assert "explain" in completions(tmp_path, "e", shell="zsh")
+
+
+def test_scene_files_are_completed(tmp_path, monkeypatch):
+    from rigid_env.cli.names import complete_scene
+
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "dropped.toml").touch()
+    (tmp_path / "deep").mkdir()
+    (tmp_path / "deep" / "one.toml").touch()
+    (tmp_path / "data.csv").touch()
+    assert complete_scene("d") == ["drop", "deep/", "dropped.toml"]
+    assert complete_scene("deep/") == ["deep/one.toml"]
+    assert complete_scene(f"{tmp_path}/deep/o") == [f"{tmp_path}/deep/one.toml"]
+
+
+def test_completion_can_be_shown(monkeypatch):
+    code = "from rigid_env.cli import app; app(prog_name='rigid-env')"
+    given = {**os.environ, "_TYPER_COMPLETE_TEST_DISABLE_SHELL_DETECTION": "1"}
+    done = subprocess.run(
+        [sys.executable, "-c", code, "--show-completion", "bash"], capture_output=True, text=True, env=given
+    )  # fmt: skip
+    assert "_RIGID_ENV_COMPLETE" in done.stdout
+    assert "--install-completion" in run("--help")
+
+
+# packages that are missing
+
+HIDING = """
+import sys
+class Hidden:
+    def find_spec(self, name, path=None, target=None):
+        if name.partition(".")[0] in {hidden}:
+            raise ModuleNotFoundError(name)
+sys.meta_path.insert(0, Hidden())
+import physics
+def refuse(*arguments, **more):
+    raise AssertionError("something was computed")
+physics.simulate = physics.World.step = refuse
+from rigid_env.cli import app
+app({arguments}, prog_name="rigid-env")
+"""
+
+
+@pytest.mark.parametrize(
+    ("arguments", "hidden", "words"),
+    [
+        (["demo", "rest"], ["pygame"], ("pygame", "rigid-env[render]")),
+        (["demo", "rest"], ["PIL"], ("Pillow", "rigid-env[render]")),
+        (["run", "rest", "--plot", "x.gif"], ["pygame", "PIL"], ("pygame and Pillow", "rigid-env[render]")),
+        (["accuracy", "--plot", "x.png"], ["matplotlib"], ("matplotlib", "rigid-env[agents]")),
+        (["hard-cases", "--plot", "x.png"], ["matplotlib"], ("matplotlib", "rigid-env[agents]")),
+        (["tosses", "made.npz", "--plot", "x.png"], ["matplotlib"], ("matplotlib", "rigid-env[agents]")),
+    ],
+)
+def test_missing_packages_are_named_before_anything_runs(arguments, hidden, words, tmp_path):
+    code = HIDING.format(hidden=set(hidden), arguments=arguments)
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, cwd=tmp_path)
+    assert done.returncode == 1, done.stderr
+    assert "Traceback" not in done.stderr
+    for word in ("pip install", *words):
+        assert word in done.stderr
+    assert not list(tmp_path.iterdir())
+
+
+# piped
+
+
+def test_output_in_a_pipe_is_not_broken():
+    output = run("explain", "drop")
+    assert any(len(line) > 100 for line in output.splitlines())
+    assert max(map(len, output.splitlines())) < UNBROKEN
+    narrow = run("explain", "drop", COLUMNS="80")
+    assert max(map(len, narrow.splitlines())) <= 80
+    for word in ("effect", "state", "why", "compiled", "acceleration", "declared:"):
+        assert word in narrow

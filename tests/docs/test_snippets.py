@@ -1,0 +1,97 @@
+"""Snippets of the README and the docs run as they stand."""
+
+from __future__ import annotations
+
+import os
+import shlex
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+import typer
+
+import physics
+from rigid_env.cli import app
+from tests.docs import snippets
+
+ROOT = snippets.ROOT
+
+
+def program(page: Path) -> str:
+    """The blocks of a page, each on its own lines of the page, so that an error names the line in it."""
+    lines: list[str] = []
+    for block in snippets.blocks(page, "python"):
+        if not block.skipped:
+            lines += [""] * (block.line - 1 - len(lines)) + block.code.splitlines()
+    return "\n".join(lines) + "\n"
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("page", snippets.pages_with("python"), ids=snippets.name_of)
+def test_python_runs_as_it_stands(page, tmp_path):
+    """All blocks of a page in their order, in one new process, in an empty folder."""
+    folder = tmp_path / "empty"
+    folder.mkdir()
+    code = tmp_path / page.name.replace(".md", ".py")
+    code.write_text(program(page), encoding="utf-8")
+    path = os.pathsep.join([str(ROOT), *filter(None, [os.environ.get("PYTHONPATH")])])
+    environment = {**os.environ, "PYTHONPATH": path, "SDL_VIDEODRIVER": "dummy"}
+    done = subprocess.run(
+        [sys.executable, str(code)], capture_output=True, text=True, cwd=folder, env=environment, timeout=600
+    )  # fmt: skip
+    assert done.returncode == 0, f"{snippets.name_of(page)}:\n{done.stderr}"
+
+
+def shell_lines():
+    """Command lines of all pages, without comments; a line that ends in a backslash goes on in the next."""
+    for page in snippets.PAGES:
+        for block in snippets.blocks(page, "sh"):
+            for line in block.code.replace("\\\n", " ").splitlines():
+                words = shlex.split(line, comments=True)
+                if words:
+                    yield pytest.param(page, words, id=f"{snippets.name_of(page)}: {' '.join(words)[:60]}")
+
+
+@pytest.mark.parametrize(("page", "words"), shell_lines())
+def test_commands_have_the_options_that_are_written(page, words, tmp_path, monkeypatch):
+    if words[0] == "rigid-env":
+        monkeypatch.chdir(tmp_path)
+        group = typer.main.get_command(app)
+        name, context, rest = group.resolve_command(group.make_context("rigid-env", words[1:]), words[1:])
+        context.make_context(name, list(rest))  # an unknown option or a wrong number is an error
+    elif words[:2] == ["python", "-m"]:
+        assert (ROOT / Path(*words[2].split("."))).with_suffix(".py").is_file()
+    else:
+        assert words[0] in ("python3", "pip")
+
+
+def test_scene_files_are_scenes(tmp_path):
+    for page in snippets.pages_with("toml"):
+        for block in snippets.blocks(page, "toml"):
+            path = tmp_path / "scene.toml"
+            path.write_text(block.code, encoding="utf-8")
+            assert physics.load_scene(path).bodies
+
+
+def test_the_readme_is_short_and_its_two_commands_stand():
+    text = (ROOT / "README.md").read_text(encoding="utf-8")
+    assert len(text.splitlines()) <= 150
+    install = "python3 -m venv .venv && . .venv/bin/activate && pip install -c constraints.txt -e "
+    commands = [block.code.strip() for block in snippets.blocks(ROOT / "README.md", "sh")]
+    assert f'{install}".[agents]" && python -m agents.train' in commands
+    assert f'{install}".[dev]" && python -m pytest -n 2 --dist loadfile' in commands
+
+
+@pytest.mark.parametrize("page", snippets.PAGES, ids=snippets.name_of)
+def test_links_lead_somewhere(page):
+    for target in snippets.links(page):
+        assert (page.parent / target).exists(), target
+
+
+def test_a_block_that_is_not_run_says_why(tmp_path):
+    page = tmp_path / "page.md"
+    page.write_text("<!-- not run: needs a day -->\n\n```python\nx = 1\n```\n\ntext\n\n```python\ny = 2\n```\n")
+    first, second = snippets.blocks(page, "python")
+    assert (first.skipped, first.line, second.skipped, second.line) == ("needs a day", 4, "", 10)
+    assert program(page).splitlines() == [""] * 9 + ["y = 2"]
