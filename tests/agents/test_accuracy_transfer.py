@@ -8,6 +8,8 @@ from dataclasses import replace
 import pytest
 from rich.console import Console
 
+pytest.importorskip("stable_baselines3")
+
 from agents import accuracy_transfer as module
 from agents.config import RunFolder
 from agents.curve import plot_transfer

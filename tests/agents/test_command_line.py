@@ -8,6 +8,8 @@ import pytest
 import typer
 from typer.testing import CliRunner
 
+pytest.importorskip("stable_baselines3")
+
 from agents import evaluate, record, train
 from agents.supervisor import Supervisor
 from agents.train import INTERRUPTED

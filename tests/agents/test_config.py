@@ -7,6 +7,9 @@ import inspect
 import gymnasium as gym
 import pytest
 import yaml
+
+pytest.importorskip("stable_baselines3")
+
 from stable_baselines3.common.policies import ActorCriticPolicy
 from stable_baselines3.sac.policies import SACPolicy
 

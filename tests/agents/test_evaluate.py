@@ -6,6 +6,8 @@ import gymnasium as gym
 import numpy as np
 import pytest
 
+pytest.importorskip("stable_baselines3")
+
 from agents import evaluate as module
 from agents.baselines import baseline_policy, random_policy, reach_controller
 from agents.evaluate import evaluate, evaluation_seeds, run_episodes

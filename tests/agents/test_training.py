@@ -7,8 +7,11 @@ import json
 
 import numpy as np
 import pytest
-import torch
 from rich.console import Console
+
+pytest.importorskip("stable_baselines3")
+
+import torch
 
 from agents.checkpoint import KEPT, list_checkpoints, load_checkpoint, load_policy
 from agents.config import RunFolder, change, make_config
