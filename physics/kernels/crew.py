@@ -25,10 +25,11 @@ from physics.kernels.turns import APART, TAKEN, deal
 
 AWAY, WAITING, CALLED, BUSY, LEAVING = range(5)
 
-# Of a crew: how many members' calls raised an exception, the address of the function that gives way (0: none), and the
-# number of pauses between two calls of it. Then, a row for each member: its state, its jobs and their number, and
+# Of a crew: how many members' calls raised an exception, whether the leader has done its part of the run, the address
+# of the function that gives way (0: none), the number of pauses between two calls of it, and before the first one of a
+# member that waits while the leader is busy. Then, a row for each member: its state, its jobs and their number, and
 # whether it was away when it was called.
-FAILED, GIVE_WAY, BETWEEN = range(3)
+FAILED, IS_OVER, GIVE_WAY, BETWEEN, BRIEF = range(5)
 STATE, JOBS, COUNT, WAS_AWAY = range(4)
 
 # What became of a run: all went well, someone has not finished, a call raised an exception.
@@ -44,7 +45,7 @@ def make_crew(members: int) -> np.ndarray:
 def summon(crew, turns, members):
     """Call the first members to a batch of which nothing is taken; how many were away and have to be sent for."""
     deal(turns)
-    crew[0, FAILED] = away = 0
+    crew[0, FAILED] = crew[0, IS_OVER] = away = 0
     for k in range(1, 1 + members):
         crew[k, WAS_AWAY] = 1 if exchange(crew, k, STATE, CALLED) == AWAY else 0
         away += crew[k, WAS_AWAY]
@@ -63,9 +64,9 @@ def dismiss(crew):
 
 @inlined
 def _rest(crew, look):
-    """Wait for a moment after so many looks."""
+    """Wait for a moment after so many looks; the leader may need this processor for its part of the run."""
     pause()
-    if look % crew[0, BETWEEN] == 0:
+    if look % crew[0, BETWEEN] == 0 or (look == crew[0, BRIEF] and seen(crew, 0, IS_OVER) == 0):
         give_way(crew[0, GIVE_WAY])
 
 
@@ -84,6 +85,7 @@ def lead(crew, taken, members, jobs, count, patience):
     """Make calls, and wait until all members who have begun have finished or `patience` is over; what became of it."""
     if perform(jobs, count):
         add(crew, 0, FAILED, 1)
+    exchange(crew, 0, IS_OVER, 1)
     for k in range(1, 1 + members):
         if exchange_if(crew, k, STATE, CALLED, WAITING):
             taken[k, TAKEN] = 0
