@@ -104,7 +104,8 @@ class Team:
         self._pid, self._told, self._futures, self._is_interrupted = os.getpid(), None, {}, False
         self._crew[...] = self.taken[:, at.TAKEN] = 0
         is_fixed = os.environ.get(SWITCH) == "fixed"
-        self._crew[0, crew.GIVE_WAY] = 0 if is_fixed else processors.giving_way()
+        if not is_fixed:
+            self._crew[0, crew.GIVE_WAY], self._crew[0, crew.PROCESSOR] = processors.giving_way(), processors.telling()
         self._crew[0, crew.BETWEEN], self._crew[0, crew.BRIEF] = _pauses(BETWEEN), _pauses(BRIEF)
         self._patience, self._stay = _pauses(PATIENCE), _pauses(STAY)
         self._members = (self.size if is_fixed else min(self.size, processors.usable())) - 1
