@@ -1,4 +1,4 @@
-"""Processors of a process: how many it may use, and how a thread lets another one have its own."""
+"""Processors of a process: how many it may use, and the functions by which threads share them."""
 
 from __future__ import annotations
 
@@ -68,11 +68,20 @@ def _text(path: Path) -> str:
         return ""
 
 
-@cache
 def giving_way() -> int:
     """Address of the system's function that lets another thread have the processor; 0 where there is none."""
+    return _address("SwitchToThread" if os.name == "nt" else "sched_yield")
+
+
+def telling() -> int:
+    """Address of the system's function that tells which processor a thread has; 0 where there is none."""
+    return _address("GetCurrentProcessorNumber" if os.name == "nt" else "sched_getcpu")
+
+
+@cache
+def _address(name: str) -> int:
     try:
-        function = ctypes.WinDLL("kernel32").SwitchToThread if os.name == "nt" else ctypes.CDLL(None).sched_yield
+        library = ctypes.WinDLL("kernel32") if os.name == "nt" else ctypes.CDLL(None)
+        return ctypes.cast(getattr(library, name), ctypes.c_void_p).value or 0
     except (AttributeError, OSError):
         return 0
-    return ctypes.cast(function, ctypes.c_void_p).value or 0

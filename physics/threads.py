@@ -35,6 +35,7 @@ TURNS_PER_THREAD = 4
 PATIENCE = 2.0e-4
 STAY = 3.0e-4
 BETWEEN = 1.0e-4
+BRIEF = 2.5e-5  # and for the first time, if the one that leads is still busy
 
 # Turns off that threads give way and that a quota counts; for measurements.
 SWITCH = "RIGID_ENV_THREADS"
@@ -103,8 +104,10 @@ class Team:
         self._pid, self._told, self._futures, self._is_interrupted = os.getpid(), None, {}, False
         self._crew[...] = self.taken[:, at.TAKEN] = 0
         is_fixed = os.environ.get(SWITCH) == "fixed"
-        self._crew[0, crew.GIVE_WAY] = 0 if is_fixed else processors.giving_way()
-        self._crew[0, crew.BETWEEN], self._patience, self._stay = (_pauses(s) for s in (BETWEEN, PATIENCE, STAY))
+        if not is_fixed:
+            self._crew[0, crew.GIVE_WAY], self._crew[0, crew.PROCESSOR] = processors.giving_way(), processors.telling()
+        self._crew[0, crew.BETWEEN], self._crew[0, crew.BRIEF] = _pauses(BETWEEN), _pauses(BRIEF)
+        self._patience, self._stay = _pauses(PATIENCE), _pauses(STAY)
         self._members = (self.size if is_fixed else min(self.size, processors.usable())) - 1
         self._summon = partial(compiled(crew.summon, (self._crew, self.turns, 0)), self._crew, self.turns)
         self._dismiss = partial(compiled(crew.dismiss, (self._crew,)), self._crew)

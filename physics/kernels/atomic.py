@@ -8,7 +8,7 @@ from llvmlite import ir
 from numba.core import types
 from numba.extending import intrinsic
 
-from physics.kernels.codegen.builder import word
+from physics.kernels.codegen.builder import WORD, word
 from physics.kernels.codegen.elements import pointer
 from physics.kernels.codegen.ready import WORD_SIZE
 
@@ -88,13 +88,17 @@ def pause(typing_context):
 
 
 @intrinsic
-def give_way(typing_context, address):
-    """Let another thread have the processor, by the system's function at the address; nothing if that is 0."""
+def ask(typing_context, address):
+    """Result of the system's function at the address, which takes no arguments; -1 if the address is 0."""
 
     def lower(context, builder, sig, args):
-        function = ir.FunctionType(ir.IntType(32), []).as_pointer()
+        function, before = ir.FunctionType(ir.IntType(32), []).as_pointer(), builder.basic_block
         with builder.if_then(builder.icmp_signed("!=", args[0], word(0))):
-            builder.call(builder.inttoptr(args[0], function), [])
-        return context.get_dummy_value()
+            answer = builder.sext(builder.call(builder.inttoptr(args[0], function), []), WORD)
+            asking = builder.basic_block
+        result = builder.phi(WORD)
+        result.add_incoming(word(-1), before)
+        result.add_incoming(answer, asking)
+        return result
 
-    return types.none(types.int64), lower
+    return types.int64(types.int64), lower

@@ -10,25 +10,27 @@ a member that has not begun when there is nothing left to do: its processor may 
 Whoever changes a state does so from the state it has to be in, in one atomic operation, since the other one may have
 changed it in the meantime.
 
-A thread that waits gives way every few microseconds: a program that has to share its processor runs instead, and so
-does the thread that it waits for.
+A thread that waits gives way from time to time: a program that has to share its processor runs instead, and so does
+the thread that it waits for. A member that finds itself on the leader's processor does not begin, and gives way at
+once.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
-from physics.kernels.atomic import add, exchange, exchange_if, give_way, pause, seen
+from physics.kernels.atomic import add, ask, exchange, exchange_if, pause, seen
 from physics.kernels.compiler import inlined, kernel
 from physics.kernels.jobs import perform
 from physics.kernels.turns import APART, TAKEN, deal
 
 AWAY, WAITING, CALLED, BUSY, LEAVING = range(5)
 
-# Of a crew: how many members' calls raised an exception, the address of the function that gives way (0: none), and the
-# number of pauses between two calls of it. Then, a row for each member: its state, its jobs and their number, and
-# whether it was away when it was called.
-FAILED, GIVE_WAY, BETWEEN = range(3)
+# Of a crew: how many members' calls raised an exception, the leader's processor, and whether it has done its
+# part; the addresses of the functions that give way and that tell the processor (0: none); and the number of pauses
+# between two calls of the first one, and before the first call of a member that waits while the leader is busy. Then, a
+# row for each member: its state, its jobs and their number, and whether it was away when it was called.
+FAILED, LED_ON, IS_OVER, GIVE_WAY, PROCESSOR, BETWEEN, BRIEF = range(7)
 STATE, JOBS, COUNT, WAS_AWAY = range(4)
 
 # What became of a run: all went well, someone has not finished, a call raised an exception.
@@ -44,7 +46,8 @@ def make_crew(members: int) -> np.ndarray:
 def summon(crew, turns, members):
     """Call the first members to a batch of which nothing is taken; how many were away and have to be sent for."""
     deal(turns)
-    crew[0, FAILED] = away = 0
+    crew[0, FAILED] = crew[0, IS_OVER] = away = 0
+    crew[0, LED_ON] = ask(crew[0, PROCESSOR])
     for k in range(1, 1 + members):
         crew[k, WAS_AWAY] = 1 if exchange(crew, k, STATE, CALLED) == AWAY else 0
         away += crew[k, WAS_AWAY]
@@ -63,10 +66,10 @@ def dismiss(crew):
 
 @inlined
 def _rest(crew, look):
-    """Wait for a moment after so many looks."""
+    """Wait for a moment after so many looks; the leader may need this processor for its part of the run."""
     pause()
-    if look % crew[0, BETWEEN] == 0:
-        give_way(crew[0, GIVE_WAY])
+    if look % crew[0, BETWEEN] == 0 or (look == crew[0, BRIEF] and seen(crew, 0, IS_OVER) == 0):
+        ask(crew[0, GIVE_WAY])
 
 
 @inlined
@@ -84,6 +87,7 @@ def lead(crew, taken, members, jobs, count, patience):
     """Make calls, and wait until all members who have begun have finished or `patience` is over; what became of it."""
     if perform(jobs, count):
         add(crew, 0, FAILED, 1)
+    exchange(crew, 0, IS_OVER, 1)
     for k in range(1, 1 + members):
         if exchange_if(crew, k, STATE, CALLED, WAITING):
             taken[k, TAKEN] = 0
@@ -94,11 +98,21 @@ def lead(crew, taken, members, jobs, count, patience):
 
 
 @inlined
+def _is_in_the_way(crew):
+    """Whether a member has the leader's processor, so that it would only delay it; the member has given way then."""
+    processor = ask(crew[0, PROCESSOR])
+    if processor < 0 or processor != crew[0, LED_ON]:
+        return False
+    ask(crew[0, GIVE_WAY])
+    return True
+
+
+@inlined
 def _begins(crew, member, patience):
     """Whether the member, waiting, is called within so many looks; else it is away."""
     for look in range(1, patience + 1):
         state = seen(crew, member, STATE)
-        if state == CALLED and exchange_if(crew, member, STATE, CALLED, BUSY):
+        if state == CALLED and not _is_in_the_way(crew) and exchange_if(crew, member, STATE, CALLED, BUSY):
             return True
         if state == AWAY:
             return False

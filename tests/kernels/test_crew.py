@@ -7,13 +7,14 @@ thousands of runs in which members go at about the time when they are called.
 
 from __future__ import annotations
 
+import os
 from typing import NamedTuple
 
 import numpy as np
 import pytest
 
 from physics import processors, threads
-from physics.kernels.atomic import pause
+from physics.kernels.atomic import ask, pause
 from physics.kernels.compiler import kernel
 from physics.kernels.crew import AWAY, BUSY, CALLED, LEAVING, WAITING
 from physics.kernels.turns import TAKEN, begin, next_world
@@ -78,7 +79,7 @@ def of_thread(m: Moment, k: int) -> list[Moment]:
     match m.threads[k]:
         case "look":
             seen = {CALLED: "take call", AWAY: None}.get(m.state, "look")
-            return [then(seen), then("go")]
+            return [then(seen), then("look"), then("go")]  # it may be on the leader's processor
         case "take call":
             return [then("perform", state=BUSY) if m.state == CALLED else then("look")]
         case "perform":
@@ -139,6 +140,7 @@ def test_many_runs(size, patience, stay, gives_way, monkeypatch):
     monkeypatch.setattr(processors, "usable", lambda: size)
     if not gives_way:
         monkeypatch.setattr(processors, "giving_way", lambda: 0)
+        monkeypatch.setattr(processors, "telling", lambda: 0)
     team, rng = Team(size, 100), np.random.default_rng(size)
     visits, pauses = np.zeros(100, dtype=np.int64), np.zeros(size, dtype=np.int64)
     calls = [bound(visit, visits, team.turns, taken, k, pauses) for k, taken in enumerate(team.taken)]
@@ -148,3 +150,34 @@ def test_many_runs(size, patience, stay, gives_way, monkeypatch):
         assert (visits == run).all()
         assert team.taken[:, TAKEN].sum() == 100
     team.close()
+
+
+@kernel
+def answer(address):
+    return ask(address)
+
+
+def test_asking_the_system():
+    assert answer(0) == -1
+    if processors.telling():
+        assert 0 <= answer(processors.telling()) < os.cpu_count() + 1024
+
+
+@pytest.mark.skipif(not hasattr(os, "sched_setaffinity"), reason="nothing binds a thread to a processor here")
+def test_a_member_on_the_processor_of_the_leader_does_not_begin(monkeypatch):
+    """Where all threads have the same processor the one that leads makes all steps."""
+    monkeypatch.setattr(processors, "usable", lambda: 2)
+    monkeypatch.setattr(threads, "STAY", 10.0)
+    before = os.sched_getaffinity(0)
+    os.sched_setaffinity(0, {min(before)})
+    try:
+        team = Team(2, 100)
+        visits, pauses = np.zeros(100, dtype=np.int64), np.full(2, 2000)
+        calls = [bound(visit, visits, team.turns, taken, k, pauses) for k, taken in enumerate(team.taken)]
+        for run in range(1, 101):
+            team.run(calls)
+            assert (visits == run).all()
+            assert team.taken[1, TAKEN] == 0
+        team.close()
+    finally:
+        os.sched_setaffinity(0, before)

@@ -115,6 +115,7 @@ def sent(monkeypatch) -> list:
 
     monkeypatch.setattr(ThreadPoolExecutor, "submit", noted)
     monkeypatch.setattr(processors, "usable", lambda: 100)  # else there are not more threads than processors
+    monkeypatch.setattr(processors, "telling", lambda: 0)  # else nobody begins on the processor of the one that leads
     return found
 
 
@@ -246,6 +247,23 @@ def test_nobody_waits_for_a_thread_that_has_not_begun(sent, monkeypatch):
     team.close()
 
 
+def test_what_was_raised_is_not_raised_again(sent, monkeypatch):
+    """By a call that is left out in the next run, in which another one is not finished soon."""
+    monkeypatch.setattr(threads, "PATIENCE", 0.0)
+    monkeypatch.setattr(threads, "STAY", 0.0)
+    team, (calls, _, pauses), (others, visits, slow) = Team(3, 100), visitors(3), visitors(2)
+    pauses[2], slow[1] = -1, SLOW
+    with pytest.raises(ZeroDivisionError):
+        team.run(calls)
+    team._let_go()
+    held, be_member = threading.Event(), Team._be_member
+    monkeypatch.setattr(Team, "_be_member", lambda team, k: (k == 2 and held.wait(60), be_member(team, k)))
+    threading.Timer(0.3, held.set).start()
+    team.run([*others, calls[2]])
+    assert visits.tolist() == [[1, 1]]
+    team.close()
+
+
 @pytest.mark.parametrize(("switch", "others"), [("", 1), ("fixed", 3)])
 def test_no_more_threads_than_processors(switch, others, sent, monkeypatch):
     monkeypatch.setattr(processors, "usable", lambda: 2)
@@ -257,6 +275,7 @@ def test_no_more_threads_than_processors(switch, others, sent, monkeypatch):
         assert sorted(np.concatenate(taken_by(world.team))) == list(range(40))
     assert len(sent) == others
     assert (world.team._crew[0, crew.GIVE_WAY] == 0) == (switch == "fixed")
+    assert world.team._crew[0, crew.PROCESSOR] == 0
     assert not world.team.taken[1 + others :, TAKEN].any()
     world.team.close()
 
