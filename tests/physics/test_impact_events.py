@@ -223,5 +223,6 @@ def test_random_impacts_with_friction_and_rebound_add_up(accuracy, count):
                 told[of, other] -= impulse
     assert 0 < world.event_counts.max() <= 64
     errors = np.abs(told - (masses * world.linvel - before)).max(axis=(1, 2))
-    assert (errors < 1e-12).mean() > 0.97  # the rest lands so softly, or turns into a contact, that a stage stops it
+    assert errors.max() < 1e-13
+    assert not world.report.overlap.any()  # nothing was put into anything, however long it flew without contact
     assert np.median(np.abs(told).max(axis=(1, 2))) > 1.0 or count == 2
