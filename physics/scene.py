@@ -165,6 +165,7 @@ class Scene:
 
     def effect(self, kind: type):
         """The scene's effect of this class, or None."""
+        checks.instance(kind, type, "kind", "the class of an effect, as physics.Gravity")
         return next((effect for effect in self.effects if isinstance(effect, kind)), None)
 
 

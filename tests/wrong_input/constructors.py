@@ -159,6 +159,7 @@ SCENES = rows(
     ("axis-is-normal", lambda: scene(p.Contact(), p.Friction((1, 2), (0, 1, 0))), ("axis is [0.0, 1.0", "along")),
     ("axes-too-few", lambda: scene(p.Contact(), p.Friction((1, 2), ((1, 0, 0),) * 2)), ("Friction.axis has 2", "or 3")),
     ("drag-of-a-hull", lambda: p.Scene(p.Hull(TETRAHEDRON, 1), [], p.Drag()), ("Drag", "bodies[0] is a hull", "block")),
+    ("effect-by-name", lambda: scene().effect("Gravity"), ("kind is 'Gravity'", "the class of an effect")),
     ("scene-keyword", lambda: p.Scene([ball()], efects=[]), ("'efects' (given: [])", "allowed are effects,")),
 )
 
