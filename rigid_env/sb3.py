@@ -9,6 +9,7 @@ import gymnasium as gym
 import numpy as np
 from gymnasium.vector import AutoresetMode
 
+from rigid_env import vector_infos as infos_of_batches
 from rigid_env.extras import require
 from rigid_env.vector_env import RigidVectorEnv
 
@@ -120,7 +121,7 @@ class RigidVecEnv(VecEnv):
 
     def _row_of(self, infos: dict[str, Any], world: int) -> dict[str, Any]:
         """One world's info at the start of its episode."""
-        keys = (*self.vector_env.start_keys, *self.vector_env.task.own_parameters)
+        keys = (*infos_of_batches.keys(self.vector_env.task), *self.vector_env.task.own_parameters)
         return {key: infos[key][world].tolist() for key in keys}
 
     def close(self) -> None:

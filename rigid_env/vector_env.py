@@ -15,6 +15,7 @@ import physics
 from physics import checks
 from physics.keywords import known_keywords
 from rigid_env import vector_arguments as arguments
+from rigid_env import vector_infos
 from rigid_env.attributes import BatchAttributes
 from rigid_env.registration import MAX_EPISODE_STEPS
 from rigid_env.spaces import action_space, observation_space
@@ -116,11 +117,6 @@ class RigidVectorEnv(BatchAttributes):
         """The seed of each world's generator; -1 before the first reset."""
         return tuple(self._seeds)
 
-    @property
-    def start_keys(self) -> tuple[str, ...]:
-        """Keys of every info, of a step and of a start."""
-        return ("is_success", self.task.error_name, "speed", "spin", "physics_status")
-
     # --- Gymnasium's two calls ----------------------------------------------------------------------------
 
     def reset(
@@ -166,8 +162,8 @@ class RigidVectorEnv(BatchAttributes):
             raise
         self._waiting[rows] = False
         self._show()
-        infos = self._infos(mask)
-        self._tell_parameters(infos, rows)
+        infos = vector_infos.of_outcomes(self.task, mask)
+        vector_infos.add_parameters(infos, self.task, rows)
         return self.task.obs.copy(), infos
 
     def step(self, actions) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, dict[str, Any]]:
@@ -212,14 +208,14 @@ class RigidVectorEnv(BatchAttributes):
         if self.autoreset_mode is AutoresetMode.SAME_STEP:
             rows = np.flatnonzero(self._ended)
             if len(rows):
-                finals = self._finals(rows)
+                finals = vector_infos.of_ended(task, rows, self._ended)
         if self.autoreset_mode is not AutoresetMode.DISABLED and len(rows):
             ended = self._ended
             self._begin(rows, {})
             self._ended = ended & (self.autoreset_mode is AutoresetMode.NEXT_STEP)
-            self._tell_parameters(finals, rows)
+            vector_infos.add_parameters(finals, task, rows)
         self._show()
-        return task.obs.copy(), rewards, terminations, truncations, {**self._infos(), **finals}
+        return task.obs.copy(), rewards, terminations, truncations, {**vector_infos.of_outcomes(task), **finals}
 
     # --- parts of these -----------------------------------------------------------------------------------
 
@@ -241,47 +237,6 @@ class RigidVectorEnv(BatchAttributes):
         self.task.begin(rows, options)
         self._elapsed[rows] = 0
         self._ended[rows] = False
-
-    def _infos(self, mask: np.ndarray | None = None) -> dict[str, Any]:
-        """Info arrays with their masks, as `VectorEnv._add_info` makes them; zero where the mask is False."""
-        outcome = self.task.outcome
-        infos = {
-            "is_success": outcome[:, col.SUCCESS] > 0.0,
-            self.task.error_name: outcome[:, col.ERROR].copy(),
-            "speed": outcome[:, col.SPEED].copy(),
-            "spin": outcome[:, col.SPIN].copy(),
-            "physics_status": self.task.status.copy(),
-        }
-        if mask is None:
-            mask = np.ones(self.num_envs, dtype=np.bool_)
-        else:
-            for values in infos.values():
-                values[~mask] = 0
-        infos.update({f"_{key}": mask.copy() for key in tuple(infos)})
-        return infos
-
-    def _tell_parameters(self, infos: dict[str, Any], rows: np.ndarray) -> None:
-        """Add the parameters of the episodes that begin in the worlds `rows`."""
-        mask = np.zeros(self.num_envs, dtype=np.bool_)
-        mask[rows] = True
-        for field in self.task.own_parameters:
-            now = self.task.values.now[field]
-            told = np.zeros_like(now)
-            told[rows] = now[rows]
-            infos[field], infos[f"_{field}"] = told, mask.copy()
-
-    def _finals(self, rows: np.ndarray) -> dict[str, Any]:
-        """`final_obs` and `final_info` of the episodes that end, before their worlds start anew."""
-        final_obs = np.full(self.num_envs, None, dtype=object)
-        for i in rows:
-            final_obs[i] = self.task.obs[i].copy()
-        mask = self._ended
-        return {
-            "final_obs": final_obs,
-            "_final_obs": mask.copy(),
-            "final_info": self._infos(mask),
-            "_final_info": mask.copy(),
-        }
 
     # --- pictures -----------------------------------------------------------------------------------------
 

@@ -204,9 +204,7 @@ class Task(ABC):
                     self.generators[world].bit_generator.state = mark
                 raise
         self.values.begin(rows, values, chosen)
-        changed = self.values.changed(values)
-        lifted = self._lifted(values["size"]) if "size" in changed else None
-        start.place(self.world, rows, pos, quat, changed, lifted)
+        start.place(self.world, rows, pos, quat, self.values.changed(values), self._lifted)
         self._note_parameters(rows, values)
         record = self.record[rows]
         self._set_goals(record, goals, starts, values["size"], chosen)
@@ -247,15 +245,12 @@ class Task(ABC):
         Raises
         ------
         ValueError
-            A value out of range, or a size that reaches deep into a wall where the block is. Nothing has changed then.
+            Out of range, or a size that reaches deep into a wall where the block is. Nothing has changed then.
         """
         refuse_replaced(self.effects, (field,))
         if value is not None:
             value = read_parameter(field, field, value, self.worlds, self.area)
-            try:
-                self.world.set_parameters(**start.as_world({field: value}))
-            except ValueError as error:
-                raise ValueError(f"{field} is {reprlib.repr(value.tolist())}: {error}") from None
+            start.change(self.world, field, value)
         self.values.hold(field, value)
         self._note_parameters(np.arange(self.worlds), self.values.now)
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import reprlib
+
 import numpy as np
 
 import physics
@@ -45,7 +47,7 @@ def check(world: physics.World, rows: np.ndarray, pos, quat, values: dict[str, n
     check_depth(world, state, params, rows, "options place, yaw, face, size")
 
 
-def place(world: physics.World, rows: np.ndarray, pos, quat, changed: dict[str, np.ndarray], lifted=None) -> None:
+def place(world: physics.World, rows: np.ndarray, pos, quat, changed: dict[str, np.ndarray], lifted) -> None:
     """Write parameters and poses of new episodes into the world.
 
     Parameters
@@ -55,15 +57,23 @@ def place(world: physics.World, rows: np.ndarray, pos, quat, changed: dict[str, 
     pos, quat : (n, 1, 3|4) float64
     changed : dict
         Parameters to write.
-    lifted : tuple of float, optional
-        Where old and new blocks are clear of all walls [m]; needed where the size changes.
+    lifted : callable
+        From edges (n, 3) to where the old and the new blocks are clear of all walls [m].
     """
     if "size" in changed:  # where the old block lay, the new one might not fit
-        world.set_state(pos=np.broadcast_to(lifted, pos.shape), worlds=rows)
+        world.set_state(pos=np.broadcast_to(lifted(changed["size"]), pos.shape), worlds=rows)
     if changed:
         world.set_parameters(**as_world(changed), worlds=rows)
     still = np.zeros_like(pos)
     world.set_state(pos=pos, quat=quat, linvel=still, angvel=still, worlds=rows)
+
+
+def change(world: physics.World, field: str, value: np.ndarray) -> None:
+    """Give a parameter of all worlds the values (worlds,) or (worlds, 3); after an error nothing has changed."""
+    try:
+        world.set_parameters(**as_world({field: value}))
+    except ValueError as error:
+        raise ValueError(f"{field} is {reprlib.repr(value.tolist())}: {error}") from None
 
 
 def as_world(changed: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
