@@ -47,7 +47,7 @@ def test_a_small_scene_is_drawn_large_and_a_large_one_as_it_is():
 def test_all_of_the_motion_is_in_sight():
     pytest.importorskip("pygame")
     path = np.linspace((-3.0, 0.5, 8.0), (12.0, 14.0, -6.0), 9)[:, None]
-    stage, frame = staged([physics.Sphere(0.5, 1.0)], [physics.HalfSpace((0, 1, 0))], path=path)
+    stage, frame = staged([physics.Sphere(0.5, 1.0, pos=(0, 5, 0))], [physics.HalfSpace((0, 1, 0))], path=path)
     renderer = Renderer(640, 400, bounds=stage.bounds)
     pixels, depth = renderer.camera(frame).project(2.0 * path[:, 0], (640, 400))  # drawn twice as large
     renderer.close()
