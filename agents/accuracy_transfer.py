@@ -23,8 +23,9 @@ from agents.curve import plot_transfer
 from agents.evaluate import JsonOption, evaluate, write_json
 from agents.train import DEFAULTS, INTERRUPTED, Interrupted, train
 from physics.accuracy import PRESETS
+from rigid_env.cli.files import PLOTS, output_option
 from rigid_env.measure import machine
-from rigid_env.terminal import Table, make_console, number_columns
+from rigid_env.terminal import Table, make_console, number_columns, run_program
 
 TRUTH = "reference"
 TRAINED_AT = "fast,balanced,precise"
@@ -137,7 +138,7 @@ def main(
     hyperparameters: Annotated[Path, typer.Option(help="YAML file.", exists=True)] = HYPERPARAMETERS,
     out: Annotated[Path, typer.Option(help="Where the runs are kept; done ones are not repeated.")] = Path("transfer"),
     json_file: JsonOption = None,
-    plot: Annotated[Path | None, typer.Option(metavar="FILE", help="Draw the picture here.")] = None,
+    plot: Annotated[Path | None, output_option("--plot", *PLOTS, help="Draw the picture here.")] = None,
 ) -> None:
     """Train one policy per accuracy, evaluate each at `reference`: success against training time."""
     console, rows = make_console(), []
@@ -165,4 +166,4 @@ def main(
 
 
 if __name__ == "__main__":
-    typer.run(main)
+    run_program(main)

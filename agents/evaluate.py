@@ -22,7 +22,8 @@ from agents.baselines import Policy, baseline_policy
 from agents.checkpoint import load_policy
 from agents.config import RunFolder
 from agents.interval import wilson
-from rigid_env.terminal import Column, Table, make_console
+from rigid_env.cli.files import output_option
+from rigid_env.terminal import Column, Table, make_console, run_program
 
 BATCH = 500  # episodes at a time
 
@@ -35,7 +36,7 @@ BaselineOption = Annotated[str | None, typer.Option(help="Instead of a run: rand
 EnvOption = Annotated[str, typer.Option(help="Of the baseline.")]
 SeedOption = Annotated[int, typer.Option(min=0, help="Of the set of episodes.")]
 AccuracyOption = Annotated[str | None, typer.Option(help="Preset of the engine.")]
-JsonOption = Annotated[Path | None, typer.Option("--json", metavar="FILE", help="Write the numbers here, too.")]
+JsonOption = Annotated[Path | None, output_option("--json", ".json", help="Write the numbers here, too.")]
 
 
 @dataclass(frozen=True)
@@ -157,7 +158,8 @@ def evaluate(env: str, policy: Policy, episodes: int, seed: int, **arguments: An
 
 
 def write_json(path: Path, content: dict[str, Any]) -> None:
-    """Write numbers as JSON."""
+    """Write numbers as JSON; a missing folder is made."""
+    path.parent.mkdir(parents=True, exist_ok=True)
     path.write_text(json.dumps(content, indent=2) + "\n", encoding="utf-8")
 
 
@@ -228,4 +230,4 @@ def main(
 
 
 if __name__ == "__main__":
-    typer.run(main)
+    run_program(main)

@@ -22,7 +22,7 @@ from agents.evaluate import (
     choose_subject,
     evaluation_seeds,
 )
-from rigid_env.terminal import make_console
+from rigid_env.terminal import make_console, run_program
 
 SIZE = (640, 400)  # width and height of the picture [px]; even, as the video's colour format asks
 PAUSE = 0.5  # the last picture of an episode is shown so long [s]
@@ -134,4 +134,4 @@ def main(
 
 
 if __name__ == "__main__":
-    typer.run(main)
+    run_program(main)

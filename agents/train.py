@@ -30,7 +30,7 @@ from agents.evaluate import JsonOption, evaluate, evaluation_seeds, print_evalua
 from agents.progress import ProgressDisplay
 from agents.record import record
 from agents.supervisor import Supervisor
-from rigid_env.terminal import make_console
+from rigid_env.terminal import make_console, run_program
 
 DEFAULTS = {"env": "rigid_env/BlockReach-v0", "algo": "ppo", "seed": 0}
 EVALUATION_EPISODES = 1000
@@ -228,4 +228,4 @@ def main(
 
 
 if __name__ == "__main__":
-    typer.run(main)
+    run_program(main)

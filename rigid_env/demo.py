@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import itertools
 import math
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import asdict, replace
 from pathlib import Path
 
 import numpy as np
@@ -74,11 +73,15 @@ class Demo:
 
     def events(self) -> list[dict]:
         """What happened, equal things at the same time counted."""
-        keys = [(round(e.t, 9), e.kind, e.body, e.wall, e.other) for e in self.trajectory.events]
-        return [
-            {"t": t, "kind": kind, "body": body, "wall": wall, "other": other, "count": len(list(group))}
-            for (t, kind, body, wall, other), group in itertools.groupby(keys)
-        ]
+        found: list[dict] = []
+        for event in self.trajectory.events:
+            content = {key: list(value) if isinstance(value, tuple) else value for key, value in asdict(event).items()}
+            content["t"] = round(event.t, 9)
+            if found and all(found[-1][key] == value for key, value in content.items()):
+                found[-1]["count"] += 1
+            else:
+                found.append({**content, "count": 1})
+        return found
 
     def summary(self) -> dict:
         """Everything that is printed, JSON-able."""

@@ -38,18 +38,27 @@ def show(demo: Demo, summary: dict, console: Console) -> None:
 
 def event_table(events: list[dict], kinds: list[str]) -> Table:
     """The first events; `kinds` are the classes of the bodies."""
-    columns = [*number_columns("time [s]"), Column("what"), Column("body"), Column("against")]
+    columns = [*number_columns("time [s]"), Column("what"), Column("body"), Column("with")]
     more = len(events) - SHOWN_EVENTS
-    table = Table(columns, "events", f"and {more} more; --json has all" if more > 0 else "")
+    caption = f"and {more} more; --json has all" if more > 0 else ""
+    table = Table([*columns, *number_columns("impulse [N s]")], "events", caption)
     for event in events[:SHOWN_EVENTS]:
         times = f" x {event['count']}" if event["count"] > 1 else ""
-        against = f"wall {event['wall']}" if event["wall"] >= 0 else _named(event["other"], kinds)
-        table.add_row(f"{event['t']:.4f}", event["kind"] + times, _named(event["body"], kinds), against)
+        impulse = float(np.linalg.norm(event["impulse"]))
+        table.add_row(
+            f"{event['t']:.4f}", event["kind"] + times, _name_of(event["body"], kinds), _partner(event, kinds),
+            f"{impulse:.4g}" if impulse else "-",
+        )  # fmt: skip
     return table
 
 
-def _named(body: int, kinds: list[str]) -> str:
+def _name_of(body: int, kinds: list[str]) -> str:
     return f"{body} {kinds[body]}" if body >= 0 else "-"
+
+
+def _partner(event: dict, kinds: list[str]) -> str:
+    """The wall or the other body that an event is about."""
+    return f"wall {event['wall']}" if event["wall"] >= 0 else _name_of(event["other"], kinds)
 
 
 def _show_bodies(final: dict, kinds: list[str], console: Console) -> None:

@@ -33,6 +33,8 @@ def bench(
         make_parents(json)
         console = make_console()
         has_peer = mujoco_scene.is_installed()
+        if not has_peer:
+            console.print(f"without MuJoCo, which is not installed: {install_line('bench')}", soft_wrap=True)
         repeats = QUICK_REPEATS if quick else BENCH_REPEATS
         sizes, env_sizes = ((module.QUICK if quick else module.FULL) for module in (workloads, environments))
         total = rows.run_count(repeats, has_peer) + environments.run_count(repeats, with_peer=False)
@@ -46,8 +48,6 @@ def bench(
             engine = rows.engine_rows(sizes, repeats, has_peer, tick)
             is_complete = collect(found, chain(engine, environments.environment_rows(env_sizes, repeats, tick=tick)))
         console.print(make_table(found, "steps per second: median, lowest .. highest"))
-        if not has_peer:
-            console.print(f"for ratios to MuJoCo: {install_line('bench')}")
         content = {"is_quick": quick, "is_complete": is_complete, "rows": [row.to_dict() for row in found]}
         write(json, content, console)
     end(is_complete)

@@ -10,6 +10,7 @@ from rich.console import Console
 
 from physics import accuracy as knobs
 from physics import checks
+from rigid_env.extras import install_line
 from rigid_env.hard_cases import peers as others
 from rigid_env.hard_cases import show
 from rigid_env.hard_cases.case import Case, Setting
@@ -117,7 +118,7 @@ def run_and_show(console: Console, plan: Plan, keep: Path | None = None) -> Repo
     """
     engines, missing = others.load_engines() if plan.has_peers else ({}, [])
     if missing:
-        console.print(f"not installed: {', '.join(missing)}")
+        console.print(f"without {', '.join(missing)}, not installed: {install_line('peers')}", soft_wrap=True)
     peer_runs = len(engines) * sum(case.peers for case in plan.cases)
     done, theirs = [], []
     total = len(plan.cases) * len(plan.settings)

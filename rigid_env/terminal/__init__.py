@@ -1,6 +1,7 @@
 """Print in a terminal, a pipe or a file: one console, and one kind of table."""
 
 from rigid_env.terminal.console import make_console, progress_bar, say
+from rigid_env.terminal.program import run_program
 from rigid_env.terminal.table import Column, Table, number_columns
 
-__all__ = ["Column", "Table", "make_console", "number_columns", "progress_bar", "say"]
+__all__ = ["Column", "Table", "make_console", "number_columns", "progress_bar", "run_program", "say"]

@@ -113,6 +113,7 @@ def test_video_without_ffmpeg_is_a_gif(tmp_path, monkeypatch):
         (evaluate, ("--baseline", "random", "--env", "Nothing-v7"), "env is 'Nothing-v7'; allowed are"),
         (evaluate, ("--baseline", "random", "--episodes", "0"), "episodes is 0; allowed"),
         (record, ("--baseline", "random", "--out", "video.avi"), "video.avi'; allowed are files named"),
+        (evaluate, ("--baseline", "random", "--json", "x.txt"), "'x.txt' ends in '.txt'; allowed is .json"),
     ],
 )
 def test_errors_name_the_field(module, arguments, message, tmp_path, monkeypatch):

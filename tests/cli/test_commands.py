@@ -261,7 +261,7 @@ def test_interrupting_a_simulation_ends_it_cleanly(monkeypatch):
 def test_a_signal_ends_a_process_cleanly(tmp_path):
     command = [sys.executable, "-m", "rigid_env", "run", "tumble", "--duration", "1e5", "--dt", "0.001"]
     process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, cwd=tmp_path)
-    time.sleep(6.0)
+    time.sleep(10.0)
     process.send_signal(signal.SIGINT)
     _, told = process.communicate(timeout=60)
     assert process.returncode == INTERRUPTED

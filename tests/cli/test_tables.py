@@ -107,8 +107,8 @@ TOSSES = Namespace(cases=[FITTED] * 2, ladder=[Namespace(accuracy="reference", r
 
 
 def happened() -> Table:
-    against = {"wall": -1, "other": 48}
-    events = [{"t": 12.3456789, "kind": "impact", "body": 49, **against, "count": 12}]
+    events = [{"t": 12.3456789, "kind": "impact", "body": 49, "wall": 2, "impulse": [1.0, 2.0, 2.0], "count": 12}]
+    events.append({**events[0], "wall": -1, "other": 3})
     return event_table(events, ["Ellipsoid"] * 50)
 
 

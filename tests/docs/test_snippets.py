@@ -16,6 +16,7 @@ from rigid_env.cli import app
 from tests.docs import snippets
 
 ROOT = snippets.ROOT
+USAGE_ERROR = typer.BadParameter.__base__
 
 
 def program(page: Path) -> str:
@@ -53,17 +54,29 @@ def shell_lines():
                     yield pytest.param(page, words, id=f"{snippets.name_of(page)}: {' '.join(words)[:60]}")
 
 
-@pytest.mark.parametrize(("page", "words"), shell_lines())
+def parse(words: list[str]) -> None:
+    """Read a command line of `rigid-env` without running it; an unknown option or a wrong number is an error."""
+    group = typer.main.get_command(app)
+    name, command, rest = group.resolve_command(group.make_context("rigid-env", words), words)
+    command.make_context(name, list(rest))
+
+
+@pytest.mark.parametrize(("page", "words"), list(shell_lines()))
 def test_commands_have_the_options_that_are_written(page, words, tmp_path, monkeypatch):
     if words[0] == "rigid-env":
         monkeypatch.chdir(tmp_path)
-        group = typer.main.get_command(app)
-        name, context, rest = group.resolve_command(group.make_context("rigid-env", words[1:]), words[1:])
-        context.make_context(name, list(rest))  # an unknown option or a wrong number is an error
+        parse(words[1:])
     elif words[:2] == ["python", "-m"]:
         assert (ROOT / Path(*words[2].split("."))).with_suffix(".py").is_file()
     else:
         assert words[0] in ("python3", "pip")
+
+
+def test_an_option_that_is_not_there_is_seen():
+    parse(["run", "kick.toml", "--dt", "0.01"])
+    for words in (["run", "kick.toml", "--bogus"], ["run", "kick.toml", "--dt", "bogus"], ["bogus"]):
+        with pytest.raises(USAGE_ERROR):
+            parse(words)
 
 
 def test_scene_files_are_scenes(tmp_path):
