@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from physics.exclusive import exclusive
 from physics.gaps import wall_gaps
 from physics.kernels import layout as at
 from physics.kernels.fields.probe import look_at_fields
@@ -31,6 +32,7 @@ class Diagnostics:
         return self.kinetic_energy + self.potential_energy
 
 
+@exclusive
 def diagnose(world: World) -> Diagnostics:
     """Energy, momenta and gaps of every body of `world` now.
 
@@ -44,7 +46,7 @@ def diagnose(world: World) -> Diagnostics:
     gaps, which = wall_gaps(world, world.state, world.params)
     potential = -mass * np.sum(world.gravity[:, None, :] * world.pos, axis=-1)
     if world.plan.fields:
-        potential += look_at(world)[1].reshape(shape)
+        potential += _look_at(world)[1].reshape(shape)
     laws = world.plan.laws
     if STIFFNESS in laws:
         energies, column = np.empty(len(world.state)), world.params.shape[1] - len(laws) + laws.index(STIFFNESS)
@@ -59,6 +61,7 @@ def diagnose(world: World) -> Diagnostics:
     )
 
 
+@exclusive
 def look_at(world: World) -> tuple[np.ndarray, np.ndarray]:
     """What the scene's fields do now.
 
@@ -69,6 +72,11 @@ def look_at(world: World) -> tuple[np.ndarray, np.ndarray]:
     energies : (worlds * bodies,) float64
         Potential energies [J].
     """
+    return _look_at(world)
+
+
+def _look_at(world: World) -> tuple[np.ndarray, np.ndarray]:
+    """`look_at` in the workspace of a step, which therefore must not be taken meanwhile."""
     wrenches, energies = np.zeros((len(world.state), 6)), np.zeros(len(world.state))
     if world.plan.fields:
         arrays = world.state, world.params, world.shapes

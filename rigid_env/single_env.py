@@ -7,6 +7,7 @@ from typing import Any, ClassVar
 import gymnasium as gym
 import numpy as np
 
+from physics.exclusive import exclusive
 from rigid_env.spaces import action_space, observation_space
 from rigid_env.tasks import Task
 from rigid_env.tasks.kernels import AXES
@@ -29,6 +30,7 @@ class RigidEnv(gym.Env):
 
     metadata: ClassVar[dict[str, Any]] = {"render_modes": list(RENDER_MODES), "render_fps": RENDER_FPS}
     task_class: ClassVar[type[Task]]
+    is_free = True  # no thread is in a call: of `physics.exclusive`
 
     def __init__(self, render_mode: str | None = None, width: int = 960, height: int = 600, **parameters):
         for name in ("worlds", "threads"):
@@ -43,6 +45,7 @@ class RigidEnv(gym.Env):
         self._world = np.zeros(1, dtype=np.int64)
         self._has_reset = False
 
+    @exclusive
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None):
         """Start an episode; see `gymnasium.Env.reset`.
 
@@ -66,6 +69,7 @@ class RigidEnv(gym.Env):
             self.render()
         return self.task.obs[0].copy(), self._info(self.task.outcome[0].tolist())
 
+    @exclusive
     def step(self, action):
         """Hold an action for one control step; see `gymnasium.Env.step`.
 

@@ -10,6 +10,7 @@ import numpy as np
 from gymnasium.vector import AutoresetMode
 from gymnasium.vector.utils import batch_space
 
+from physics.exclusive import exclusive
 from rigid_env.registration import MAX_EPISODE_STEPS
 from rigid_env.spaces import action_space, observation_space
 from rigid_env.tasks import BlockReach, BlockReorient, Task
@@ -43,6 +44,7 @@ class RigidVectorEnv(gym.vector.VectorEnv):
     """
 
     task_class: ClassVar[type[Task]]
+    is_free = True  # no thread is in a call: of `physics.exclusive`
 
     def __init__(
         self,
@@ -93,6 +95,7 @@ class RigidVectorEnv(gym.vector.VectorEnv):
 
     # --- Gymnasium's two calls ----------------------------------------------------------------------------
 
+    @exclusive
     def reset(
         self, *, seed: int | Sequence[int | None] | None = None, options: dict[str, Any] | None = None
     ) -> tuple[np.ndarray, dict[str, Any]]:
@@ -123,6 +126,7 @@ class RigidVectorEnv(gym.vector.VectorEnv):
         self._show()
         return self.task.obs.copy(), self._infos(mask)
 
+    @exclusive
     def step(self, actions) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, dict[str, Any]]:
         """Hold actions for one control step; see `gymnasium.vector.VectorEnv.step`.
 
