@@ -339,8 +339,8 @@ def test_worlds_of_several_plans_compile_in_several_threads(tmp_path):
 EXIT = """
 import sys, threading, time
 import physics
-from physics import scenes
-world = physics.World(scenes.drop(), worlds=500, dt=0.001, accuracy="fast", threads=int(sys.argv[1]))
+scene = physics.Scene([physics.Sphere(0.5, mass=1.0, linvel=(1, 2, 3))], effects=[physics.Gravity((0, -9.81, 0))])
+world = physics.World(scene, worlds=5000, dt=0.001, accuracy="fast", threads=int(sys.argv[1]))
 world.step()
 
 def go():
