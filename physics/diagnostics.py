@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from physics import checks
+from physics.exclusive import exclusive
 from physics.field_errors import raised
 from physics.gaps import wall_gaps
 from physics.kernels import layout as at
@@ -49,6 +50,11 @@ def diagnose(world: World) -> Diagnostics:
     and springs of contact.
     """
     checks.instance(world, World, "world", "a physics.World")
+    return _diagnose(world)
+
+
+@exclusive
+def _diagnose(world: World) -> Diagnostics:
     shape = (world.worlds, world.body_count)
     mass = 1.0 / world.params[:, at.INV_MASS].reshape(shape)
     angular = world.state[:, at.ANGMOM : at.ANGMOM + 3].reshape(*shape, 3)
@@ -56,7 +62,7 @@ def diagnose(world: World) -> Diagnostics:
     gaps, which = wall_gaps(world, world.state, world.params)
     potential = -mass * np.sum(world.gravity[:, None, :] * world.pos, axis=-1)
     if world.plan.fields:
-        potential += look_at(world)[1].reshape(shape)
+        potential += _look_at(world)[1].reshape(shape)
     laws = world.plan.laws
     if STIFFNESS in laws:
         energies, column = np.empty(len(world.state)), world.params.shape[1] - len(laws) + laws.index(STIFFNESS)
@@ -82,6 +88,11 @@ def look_at(world: World) -> tuple[np.ndarray, np.ndarray]:
         Potential energies [J].
     """
     checks.instance(world, World, "world", "a physics.World")
+    return exclusive(_look_at)(world)
+
+
+def _look_at(world: World) -> tuple[np.ndarray, np.ndarray]:
+    """`look_at` in the workspace of a step, which therefore must not be taken meanwhile."""
     wrenches, energies = np.zeros((len(world.state), 6)), np.zeros(len(world.state))
     if world.plan.fields:
         arrays = world.state, world.params, world.shapes

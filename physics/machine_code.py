@@ -14,8 +14,9 @@ from itertools import accumulate
 
 import numba
 import numpy as np
+from numba.core.compiler_lock import global_compiler_lock
 
-from physics.kernels.jobs import ARGUMENTS, CODE, ENTRY_OF, JOB_SIZE, RAISED, perform, raise_again
+from physics.kernels.jobs import ARGUMENTS, CODE, ENTRY_OF, JOB_SIZE, RAISED, perform, perform_one, raise_again
 
 # Seconds after which the first step of a plan says that it is compiling.
 COMPILE_NOTICE = 1.0
@@ -45,7 +46,10 @@ class Work:
         self._table[:, ENTRY_OF] = [entry for entry, _ in calls]
         self._table[:, ARGUMENTS] = [words.ctypes.data for words in self._words]
         self.jobs, self.count = self._table.ctypes.data, len(calls)
-        self.perform = partial(_performing(), self.jobs, self.count)
+        if self.count == 1:
+            self.perform = partial(_performing_one(), self.jobs)
+        else:
+            self.perform = partial(_performing(), self.jobs, self.count)
 
     def __call__(self) -> None:
         """Make the calls."""
@@ -80,6 +84,11 @@ def _performing() -> Callable[[int, int], bool]:
     return compiled(perform, (0, 0))
 
 
+@cache
+def _performing_one() -> Callable[[int], bool]:
+    return compiled(perform_one, (0,))
+
+
 def _words(arguments: tuple) -> list[int]:
     """Arguments as a kernel finds them in memory: see `physics.kernels.codegen.ready`."""
     words: list[int] = []
@@ -100,7 +109,7 @@ def compiled(kernel: Callable, arguments: tuple) -> Callable:
 
     To call it leaves out Numba's dispatcher, which finds out the types of all arguments in each call.
     """
-    with compiling():
+    with global_compiler_lock, compiling():
         return kernel.compile(tuple(map(numba.typeof, arguments)))
 
 
@@ -114,7 +123,9 @@ def bound(kernel: Callable, *arguments) -> Work:
     *arguments
         Arrays are bound, not copied: what they hold when a call is made counts.
     """
-    return Work([(kernel.ready_entry(compiled(kernel, arguments)), arguments)])
+    with global_compiler_lock:
+        entry = kernel.ready_entry(compiled(kernel, arguments))
+    return Work([(entry, arguments)])
 
 
 @contextmanager

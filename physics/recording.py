@@ -21,7 +21,7 @@ from physics.accuracy import Accuracy
 from physics.diagnostics import diagnose
 from physics.field import Field
 from physics.kernels import layout as at
-from physics.kernels.compiler import cache_dir
+from physics.kernels.compiler import folder_name
 from physics.report import StepReport
 from physics.scene import Scene
 from physics.scene_file import from_toml, to_toml
@@ -236,7 +236,7 @@ def origin() -> dict[str, str]:
     """What a recording is made with here: where any of it differs, a replay may differ in the last bits."""
     return {
         "version": version(),
-        "kernels": cache_dir().name,  # digest of their sources
+        "kernels": folder_name(),  # digest of their sources
         "numba": numba.__version__,
         "numpy": np.__version__,
         "python": platform.python_version(),

@@ -6,8 +6,10 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numba.core.compiler_lock import global_compiler_lock
 
 from physics import checks
+from physics.exclusive import in_use
 from physics.kernels.events.hybrid import step_events
 from physics.kernels.linked import step_linked
 from physics.kernels.many.step import step_many
@@ -67,6 +69,7 @@ class Stepper:
         self._calls: list[Work] | None = None
         self._afterwards: list[Work] = []
         self._alone: Work | None = None  # of `_calls` the only one, where nothing else has a part in a step
+        self._perform: Callable[[], bool] | None = None  # of that
         self._duration = self.steps * self.dt
 
     @property
@@ -79,13 +82,35 @@ class Stepper:
         return self._wrench
 
     def __call__(self) -> None:
-        """Advance every world by `steps` times `dt`."""
-        world = self.world
-        if self._alone is not None and world.recorder is None:  # what `World.advance` comes to, in half the time
-            if self._alone.perform():
-                self._alone.raise_again()
-            world.time += self._duration
+        """Advance every world by `steps` times `dt`.
+
+        Raises
+        ------
+        RuntimeError
+            Another thread is stepping or changing the world.
+        """
+        world, perform = self.world, self._perform
+        # What `World.advance` comes to, in half the time. For the flag see `physics.exclusive`.
+        if perform is not None and world.recorder is None and world.is_free:
+            world.is_free = False
+            try:
+                if perform():
+                    self._alone.raise_again()
+                world.time += self._duration
+            finally:
+                world.is_free = True
             return
+        if world.is_free:
+            world.is_free = False
+        else:
+            raise in_use(world)
+        try:
+            self._advance()
+        finally:
+            world.is_free = True
+
+    def _advance(self) -> None:
+        world = self.world
         if self._calls is None:
             self._prepare()
         world.advance(self._calls, self._wrench, self.steps, self.dt)
@@ -102,9 +127,11 @@ class Stepper:
                 calls = [first.then(second) for first, second in zip(calls, following, strict=True)]
         self._calls = calls
         self._alone = calls[0] if _is_all(self.world, calls) else None
+        self._perform = None if self._alone is None else self._alone.perform
 
     def __getstate__(self):
-        return {**vars(self), "_calls": None, "_afterwards": [], "_alone": None}  # machine code belongs to the process
+        machine_code = {"_calls": None, "_afterwards": [], "_alone": None, "_perform": None}  # belongs to the process
+        return {**vars(self), **machine_code}
 
 
 def _takes_each_step(world: World) -> bool:
@@ -210,7 +237,8 @@ def _world_arguments(world: World, k: int) -> tuple:
 def _entry(kernel, key: tuple, arguments: tuple) -> int:
     """Entry of the step kernel for arguments of these types, which `key` determines: to look at each takes a while."""
     if key not in _ENTRIES:
-        _ENTRIES[key] = kernel.ready_entry(compiled(kernel, arguments))
+        with global_compiler_lock:  # nobody else adds to what is linked meanwhile
+            _ENTRIES[key] = kernel.ready_entry(compiled(kernel, arguments))
     return _ENTRIES[key]
 
 

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from threading import get_ident
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -14,6 +15,7 @@ from physics.accuracy import Accuracy, resolve
 from physics.actuation import Actuation
 from physics.contacts import contact_ends, contact_forces
 from physics.effects import Actuator, Friction, RollingFriction, Sleeping, SpinFriction
+from physics.exclusive import exclusive, in_use, watch
 from physics.field import Field
 from physics.kernels import layout as at
 from physics.kernels.events.log import EVENT_SIZE
@@ -81,6 +83,9 @@ class World:
         Time since the start [s].
     recorder : Recorder or None
         What is told of every step; see `physics.Recorder`.
+    is_free : bool
+        Whether no thread is in a method that changes or copies the world. Such a method raises RuntimeError while
+        another thread is in one: a world belongs to one thread at a time.
 
     Raises
     ------
@@ -109,6 +114,7 @@ class World:
         self.time = 0.0
         self.recorder: Recorder | None = None
         allocation.check_room(self.worlds, self.body_count, self.plan)
+        self.is_free = True
         self._allocate()
         allocation.fill(self)
         changes.check_place(self, self.state, self.params, np.arange(self.worlds), "scene")
@@ -135,6 +141,9 @@ class World:
         self._bind_views()
 
     def _prepare_threads(self) -> None:
+        self.is_free, self.is_torn = True, False
+        self.telling: int | None = None  # the thread that tells the recorder of its step
+        watch(self)
         self.team = Team(self.threads, self.worlds)
         declare(self.plan.terms)
         self._may_raise = self.plan.may_raise
@@ -146,6 +155,7 @@ class World:
         self._calls: list[Work] = []
         self._bound_for: tuple | None = None  # arguments of `step`: the next call with the same finds all bound
 
+    @exclusive
     def make_event_room(self, room: int) -> None:
         """Let a step log up to `room` events per body, 0 at first; for `simulate`.
 
@@ -190,9 +200,21 @@ class World:
         ------
         ValueError
             A wrench of the wrong shape or not finite, or steps or dt out of range; nothing has moved then.
+        RuntimeError
+            Another thread is stepping or changing this world.
         """
+        if self.is_free:
+            self.is_free = False
+        else:
+            raise in_use(self)
+        try:
+            return self._step(wrench, steps, dt)
+        finally:
+            self.is_free = True
+
+    def _step(self, wrench: ArrayLike | None, steps: int, dt: float | None) -> StepReport:
         if wrench is None:
-            self._wrench[...] = 0.0
+            self._wrench.fill(0.0)
         else:
             checks.take_finite(wrench, self._wrench, "wrench")
         steps = checks.count(steps, "steps")
@@ -214,7 +236,7 @@ class World:
         before = Before(self) if self._may_raise else None
         try:
             if self.recorder is not None:
-                self.recorder.before(wrench, steps, dt)
+                self._tell(self.recorder.before, wrench, steps, dt)
             if self.actuation is None:
                 self.make(calls, steps * dt)
             else:
@@ -224,7 +246,15 @@ class World:
                 raise
             before.put_back(error)
         if self.recorder is not None:
-            self.recorder.after()
+            self._tell(self.recorder.after)
+
+    def _tell(self, message: Callable[..., None], *arguments) -> None:
+        """Tell the recorder, which may take snapshots meanwhile."""
+        self.telling = get_ident()
+        try:
+            message(*arguments)
+        finally:
+            self.telling = None
 
     def make(self, calls: list[Work], duration: float) -> None:
         """Make kernel calls that take so long [s]."""
@@ -246,6 +276,7 @@ class World:
     # --- changing ----------------------------------------------------------------------------------------------
 
     @known_keywords
+    @exclusive
     def set_state(
         self,
         pos: ArrayLike | None = None,
@@ -276,6 +307,7 @@ class World:
         changes.set_state(self, pos, quat, linvel, angvel, worlds)
 
     @known_keywords
+    @exclusive
     def set_parameters(
         self,
         mass: ArrayLike | None = None,
@@ -323,6 +355,7 @@ class World:
         """The arrays themselves that a snapshot copies, in the order of `KEPT`."""
         return tuple(getattr(self, name) for name in (KEPT if self.plan.sleeping else KEPT[:-1]))
 
+    @exclusive
     def snapshot(self) -> Snapshot:
         """All that decides the future, copied; `restore` continues bit-identically, warm starts and all."""
         actuation = None if self.actuation is None else self.actuation.kept()
@@ -337,6 +370,12 @@ class World:
             It is no `Snapshot`, or one of other sizes. Nothing has changed then.
         """
         checks.instance(snapshot, Snapshot, "snapshot", "a physics.Snapshot, as `World.snapshot` gives it")
+        if self.is_torn:
+            self.is_free, self.is_torn = True, False  # the thread of the parent process is not there to finish its step
+        self._restore(snapshot)
+
+    @exclusive
+    def _restore(self, snapshot: Snapshot) -> None:
         kept = self.kept()
         if [array.shape for array in kept] != [np.shape(array) for array in snapshot.arrays]:
             raise ValueError(
@@ -395,10 +434,12 @@ class World:
     def _check_index(self, world: int) -> None:
         checks.index(world, self.worlds, "world")
 
+    @exclusive
     def __getstate__(self):
         kept = dict(vars(self))
         views = ("pos", "quat", "linvel", "angvel")
-        for name in ("plan", "team", "scratch", "motions", "_wrench", "_calls", "_bound_for", *views):
+        flags = ("is_free", "is_torn", "telling")
+        for name in ("plan", "team", "scratch", "motions", "_wrench", "_calls", "_bound_for", *flags, *views):
             del kept[name]
         return kept
 

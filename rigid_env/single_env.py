@@ -11,6 +11,7 @@ import gymnasium as gym
 import numpy as np
 
 import physics
+from physics.exclusive import exclusive
 from rigid_env.attributes import EpisodeParameters, value_of
 from rigid_env.spaces import action_space, observation_space
 from rigid_env.tasks import Task
@@ -42,6 +43,7 @@ class RigidEnv(EpisodeParameters, gym.Env):
 
     metadata: ClassVar[dict[str, Any]] = {"render_modes": list(RENDER_MODES), "render_fps": RENDER_FPS}
     task_class: ClassVar[type[Task]]
+    is_free = True  # no thread is in a call: of `physics.exclusive`
 
     def __init__(
         self,
@@ -75,6 +77,7 @@ class RigidEnv(EpisodeParameters, gym.Env):
         self._world = np.zeros(1, dtype=np.int64)
         self._has_reset = self._is_closed = False
 
+    @exclusive
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None):
         """Start an episode; see `gymnasium.Env.reset`.
 
@@ -116,6 +119,7 @@ class RigidEnv(EpisodeParameters, gym.Env):
         drawn = {field: value_of(values[field][0]) for field in self.task.own_parameters}
         return self.task.obs[0].copy(), {**self._info(self.task.outcome[0].tolist()), **drawn}
 
+    @exclusive
     def step(self, action):
         """Hold an action for one control step; see `gymnasium.Env.step`.
 

@@ -13,6 +13,7 @@ from gymnasium.vector.utils import batch_space
 
 import physics
 from physics import checks
+from physics.exclusive import exclusive
 from physics.keywords import known_keywords
 from rigid_env import vector_arguments as arguments
 from rigid_env import vector_infos
@@ -56,6 +57,7 @@ class RigidVectorEnv(BatchAttributes):
     """
 
     task_class: ClassVar[type[Task]]
+    is_free = True  # no thread is in a call: of `physics.exclusive`
 
     def __init__(
         self,
@@ -119,6 +121,7 @@ class RigidVectorEnv(BatchAttributes):
 
     # --- Gymnasium's two calls ----------------------------------------------------------------------------
 
+    @exclusive
     def reset(
         self, *, seed: int | Sequence[int | None] | None = None, options: dict[str, Any] | None = None
     ) -> tuple[np.ndarray, dict[str, Any]]:
@@ -166,6 +169,7 @@ class RigidVectorEnv(BatchAttributes):
         vector_infos.add_parameters(infos, self.task, rows)
         return self.task.obs.copy(), infos
 
+    @exclusive
     def step(self, actions) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, dict[str, Any]]:
         """Hold actions for one control step; see `gymnasium.vector.VectorEnv.step`.
 

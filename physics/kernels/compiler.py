@@ -12,31 +12,37 @@ from __future__ import annotations
 import hashlib
 import os
 import tempfile
-from contextlib import contextmanager
 from functools import cache
 from pathlib import Path
 
 from numba.core import config
 
+from physics.kernels.codegen.disk import say
 from physics.kernels.codegen.linking import FOREIGN, PART, STANDING, Kernel
 
 
-def _user_cache_root() -> Path:
-    """`NUMBA_CACHE_DIR` if the user set one, else the user's cache folder, else a temporary one."""
+def _cache_root() -> Path | None:
+    """`NUMBA_CACHE_DIR` if the user set one, else the user's cache folder, else a temporary one; None if none is his.
+
+    Files in it are looked at one by one before they are read (`codegen.disk`), wherever they are.
+    """
     if config.CACHE_DIR:
         return Path(config.CACHE_DIR)
     if os.name == "nt":
         base = Path(os.environ.get("LOCALAPPDATA", Path.home()))
     else:
         base = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
-    root = base / "rigid-env"
-    try:
-        root.mkdir(parents=True, exist_ok=True)
-        if os.access(root, os.W_OK):
-            return root
-    except OSError:
-        pass
-    return Path(tempfile.gettempdir()) / "rigid-env"
+    user = os.getuid() if hasattr(os, "getuid") else "user"
+    for root in (base / "rigid-env", Path(tempfile.gettempdir()) / f"rigid-env-{user}"):
+        try:
+            root.mkdir(mode=0o700, parents=True, exist_ok=True)
+            if hasattr(os, "getuid") and root.stat().st_uid not in (os.getuid(), 0):
+                say(f"{root} belongs to another user: kernels are not kept there")
+            elif os.access(root, os.W_OK):
+                return root
+        except OSError:
+            continue
+    return None
 
 
 def source_digest(folder: Path) -> str:
@@ -49,19 +55,19 @@ def source_digest(folder: Path) -> str:
 
 
 @cache
-def cache_dir() -> Path:
-    """Folder of the compiled kernels that belong to exactly these kernel sources, and check their indices or do not."""
-    return _user_cache_root() / (source_digest(Path(__file__).parent) + ("-checked" if config.BOUNDSCHECK else ""))
+def folder_name() -> str:
+    """Name of the folder: what tells these kernels from all others."""
+    return source_digest(Path(__file__).parent) + ("-checked" if config.BOUNDSCHECK else "")
 
 
-@contextmanager
-def _numba_cache_in(folder: Path):
-    before = config.CACHE_DIR
-    config.CACHE_DIR = str(folder)
-    try:
-        yield
-    finally:
-        config.CACHE_DIR = before
+@cache
+def cache_dir() -> Path | None:
+    """Folder of the compiled kernels that belong to exactly these kernel sources, and check their indices or do not.
+
+    None where there is no folder of this user's: then nothing is kept.
+    """
+    root = _cache_root()
+    return None if root is None else root / folder_name()
 
 
 # What all kernels have in common; see `kernel`.
@@ -82,8 +88,7 @@ def _make(function, called_as=PART, **options):
 def _compile(function, called_as=PART, **options):
     compiled = _make(function, called_as, **options)
     if not config.DISABLE_JIT:
-        with _numba_cache_in(cache_dir()):
-            compiled.enable_caching()
+        compiled.enable_caching(cache_dir())
     return compiled
 
 

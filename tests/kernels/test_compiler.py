@@ -57,5 +57,5 @@ def test_a_second_process_compiles_nothing_and_gets_the_same_bits(tmp_path: Path
     assert (first["hits"], first["misses"]) == (0, 1)
     assert (second["hits"], second["misses"]) == (1, 0)
     assert first["q"] == second["q"]
-    folders = {path.relative_to(tmp_path).parts[0] for path in tmp_path.rglob("*.nbi")}
+    folders = {path.relative_to(tmp_path).parts[0] for path in tmp_path.rglob("*.nbc")}
     assert folders == {compiler.cache_dir().name}

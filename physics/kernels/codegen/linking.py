@@ -163,9 +163,9 @@ class _Part(CPUDispatcher):
 class _Standing(_Part):
     """A kernel that other kernels call, with machine code of its own."""
 
-    def enable_caching(self):
-        """Keep it on disk."""
-        self._cache = StandingCache(self.py_func)
+    def enable_caching(self, folder=None):
+        """Keep it on disk, in a folder."""
+        self._cache = StandingCache(self.py_func, folder)
 
     def compile(self, sig):
         """Have the machine code for the types of its arguments, from disk or new."""
@@ -213,11 +213,11 @@ class Kernel(CPUDispatcher):
         self._part = self._make_part()
         RememberingTarget.forget(types.Dispatcher(self))
 
-    def enable_caching(self):
-        """Keep its machine code on disk."""
-        self._cache = WholeCache(self.py_func)
+    def enable_caching(self, folder=None):
+        """Keep its machine code on disk, in a folder."""
+        self._cache = WholeCache(self.py_func, folder)
         if isinstance(self._part, _Standing):
-            self._part.enable_caching()
+            self._part.enable_caching(folder)
 
     def stand(self, args: tuple) -> None:
         """Have the machine code that other kernels call, for these types of arguments."""
@@ -236,8 +236,9 @@ class Kernel(CPUDispatcher):
 
     def ready_entry(self, machine_code) -> int:
         """Address of the entry for other machine code (`ready`) of what `compile` gave; it must return nothing."""
-        made = next(made for made in self.overloads.values() if made.entry_point is machine_code)
-        entry = made.library.get_pointer_to_function(made.fndesc.llvm_cfunc_wrapper_name)
+        with global_compiler_lock:  # what another thread has linked so far is not to be loaded
+            made = next(made for made in self.overloads.values() if made.entry_point is machine_code)
+            entry = made.library.get_pointer_to_function(made.fndesc.llvm_cfunc_wrapper_name)
         if entry == 0:
             raise TypeError(f"{self.py_func.__name__} returns {made.signature.return_type}; allowed is nothing")
         return entry

@@ -1,0 +1,79 @@
+"""One thread at a time for a world, and for an environment.
+
+A world lends its arrays to machine code, which runs without the interpreter's lock: two steps at once would write to
+the same memory. A thread that comes while another one is at it gets an error.
+
+The flag `is_free` is tested and set in two bytecodes between which CPython (3.10 to 3.13) never switches threads: the
+branch that is not taken has neither a call nor a jump. It is written out where it is used, since a signal that arrives
+while a function of ours is called or has returned would leave it set. A lock of `threading` takes a tenth of a step.
+"""
+
+from __future__ import annotations
+
+import os
+import threading
+import weakref
+from collections.abc import Callable
+from functools import wraps
+
+
+def exclusive(method: Callable) -> Callable:
+    """Refuse a method, or a function of a world, while another thread is in one that takes the same object.
+
+    Parameters
+    ----------
+    method : Callable
+        Its first argument has an attribute `is_free`, True at first, and may have `telling` (`World`).
+
+    Returns
+    -------
+    Callable
+        Raises RuntimeError, with nothing changed.
+    """
+
+    @wraps(method)
+    def call(self, *arguments, **named):
+        if self.is_free:
+            self.is_free = False
+        elif getattr(self, "telling", None) == threading.get_ident():  # a recorder of this world, from within its step
+            return method(self, *arguments, **named)
+        else:
+            raise in_use(self)
+        try:
+            return method(self, *arguments, **named)
+        finally:
+            self.is_free = True
+
+    return call
+
+
+def in_use(thing) -> RuntimeError:
+    """The error for who comes while another thread is at it."""
+    name = type(thing).__name__
+    if getattr(thing, "is_torn", False):
+        return RuntimeError(
+            f"{name} was being stepped by another thread when this process was forked, and holds half a step; allowed "
+            "is to restore a snapshot first, or a world of this process's own"
+        )
+    return RuntimeError(
+        f"{name} is being used by another thread; allowed is one thread at a time: give each thread a {name} of its "
+        "own, or hold a lock around every call"
+    )
+
+
+_WORLDS: weakref.WeakSet = weakref.WeakSet()
+
+
+def watch(world) -> None:
+    """Have a world known in case the process is forked."""
+    _WORLDS.add(world)
+
+
+def _after_fork() -> None:
+    """Threads of the parent that were in the middle of a step are not there in the child, and will not finish it."""
+    for world in list(_WORLDS):
+        world.is_torn = not world.is_free and world.telling != threading.get_ident()
+
+
+if hasattr(os, "register_at_fork"):
+    os.register_at_fork(after_in_child=_after_fork)

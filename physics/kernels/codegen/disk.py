@@ -1,0 +1,110 @@
+"""Files of machine code: each is whole, of this kernel, and of this user, or is not read.
+
+What is kept is unpickled, which can run anything, and then run. So a file begins with a digest of all that follows and
+of what it is for, and it is read only if it belongs to this user or to root and nobody else may write to it. That is
+asked of the file that has been opened, whatever folders lead to it. A damaged file is made anew, with a line that says
+so; where files cannot be written, kernels live in memory.
+
+A file is named after a digest of what it is for, so that there is no index that two processes could both write.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import pickle
+import stat
+import sys
+import uuid
+from contextlib import suppress
+from pathlib import Path
+
+MAGIC = b"rigid-env kernel 1\n"
+DIGEST_SIZE = 32  # [bytes]
+OTHERS_WRITE = stat.S_IWGRP | stat.S_IWOTH
+
+
+class Damaged(Exception):
+    """A file is not what was written."""
+
+
+class Foreign(Exception):
+    """A file that somebody else wrote, or could have written."""
+
+
+def say(text: str) -> None:
+    """One line on standard error."""
+    print(f"rigid-env: {text}", file=sys.stderr, flush=True)
+
+
+def say_once(subject: str, text: str) -> None:
+    """The first line about a subject in this process."""
+    if subject not in _SAID:
+        _SAID.add(subject)
+        say(text)
+
+
+_SAID: set[str] = set()
+
+
+def is_own(status: os.stat_result) -> bool:
+    """Whether a file or folder is this user's or root's, and others cannot write to it; always so without such users.
+
+    Parameters
+    ----------
+    status : os.stat_result
+    """
+    if not hasattr(os, "getuid"):
+        return True
+    return status.st_uid in (os.getuid(), 0) and not status.st_mode & OTHERS_WRITE
+
+
+def _sum_of(purpose: bytes, content: bytes) -> bytes:
+    return hashlib.blake2b(content, digest_size=DIGEST_SIZE, key=hashlib.sha256(purpose).digest()).digest()
+
+
+def read(path: Path, purpose: bytes):
+    """What was written to a file for this purpose; None if there is no such file.
+
+    Raises
+    ------
+    Damaged, Foreign
+        With the reason.
+    OSError
+        The file cannot be read.
+    """
+    try:
+        file = open(path, "rb")  # noqa: SIM115 (closed below)
+    except (FileNotFoundError, NotADirectoryError):
+        return None
+    with file:
+        if not is_own(os.fstat(file.fileno())):
+            raise Foreign("other users may write to it")
+        data = file.read()
+    head = len(MAGIC) + DIGEST_SIZE
+    if data[: len(MAGIC)] != MAGIC or _sum_of(purpose, data[head:]) != data[len(MAGIC) : head]:
+        raise Damaged("it is empty" if not data else "it is not what was written")
+    return pickle.loads(data[head:])
+
+
+def write(path: Path, purpose: bytes, pickled: bytes) -> None:
+    """Write a file, which appears at once and whole; others may read it, whatever the umask allows them.
+
+    Raises
+    ------
+    OSError
+        It cannot be written. Nothing has changed then.
+    """
+    path.parent.mkdir(parents=True, exist_ok=True)
+    if path.is_dir():
+        path.rename(path.with_name(f"{path.name}.{uuid.uuid4().hex[:8]}.damaged"))
+    temporary = path.with_name(f"{path.name}.tmp.{uuid.uuid4().hex[:16]}")
+    try:
+        descriptor = os.open(temporary, os.O_WRONLY | os.O_CREAT | os.O_EXCL | getattr(os, "O_BINARY", 0), 0o644)
+        with open(descriptor, "wb") as file:
+            file.write(MAGIC + _sum_of(purpose, pickled) + pickled)
+        temporary.replace(path)
+    except BaseException:
+        with suppress(OSError):
+            temporary.unlink()
+        raise

@@ -1,0 +1,222 @@
+"""Files of machine code: whatever is wrong with one costs a line and a compilation, never a process."""
+
+from __future__ import annotations
+
+import os
+import pickle
+import resource
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from physics.kernels.codegen import disk
+
+ROOT = str(Path(__file__).parents[2])
+
+PROGRAM = """
+import physics
+from physics.kernels.step import step_worlds
+world = physics.World(physics.Scene([physics.Sphere(0.5, mass=1.0, linvel=(1, 2, 3))]), dt=0.01, accuracy="fast")
+world.step(steps=3)
+print(world.state.tobytes().hex(), sum(step_worlds.stats.cache_hits.values()))
+"""
+
+
+def command_and_environment(cache: Path) -> tuple[list, dict]:
+    return [sys.executable, "-c", PROGRAM], {**os.environ, "PYTHONPATH": ROOT, "NUMBA_CACHE_DIR": str(cache)}
+
+
+def run(cache: Path, **more) -> tuple[str, int, list[str]]:
+    """State after three steps in a new process, how often the step was loaded, lines on standard error."""
+    command, environment = command_and_environment(cache)
+    done = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=200, **more)
+    assert done.returncode == 0, done.stderr
+    state, hits = done.stdout.split()
+    lines = [line for line in done.stderr.splitlines() if "compiling the kernel of this scene" not in line]
+    return state, int(hits), lines
+
+
+@pytest.fixture(scope="module")
+def kept(tmp_path_factory) -> tuple[Path, str]:
+    """A folder of kernels, and the state that they lead to."""
+    folder = tmp_path_factory.mktemp("kept")
+    state, hits, lines = run(folder)
+    assert (hits, lines) == (0, [])
+    return folder, state
+
+
+def step_file(folder: Path) -> Path:
+    (path,) = folder.rglob("*step_worlds*.nbc")
+    return path
+
+
+def _truncated(path: Path) -> None:
+    path.write_bytes(path.read_bytes()[:-1000])
+
+
+def _empty(path: Path) -> None:
+    path.write_bytes(b"")
+
+
+def _garbage(path: Path) -> None:
+    path.write_bytes(os.urandom(5000))
+
+
+def _one_bit(path: Path) -> None:
+    """In the middle of machine code, which would run."""
+    data = bytearray(path.read_bytes())
+    data[len(data) // 2] ^= 1
+    path.write_bytes(data)
+
+
+def _foreign_pickle(path: Path) -> None:
+    path.write_bytes(pickle.dumps({"something": "else"}))
+
+
+def _of_another_kernel(path: Path) -> None:
+    other = next(each for each in path.parent.glob("*.nbc") if each != path)
+    shutil.copy(other, path)
+
+
+def _directory(path: Path) -> None:
+    path.unlink()
+    path.mkdir()
+    (path / "file").write_text("not ours")
+
+
+@pytest.mark.parametrize(
+    "damage", [_truncated, _empty, _garbage, _one_bit, _foreign_pickle, _of_another_kernel, _directory]
+)
+def test_a_damaged_file_is_compiled_anew_and_said_so_once(damage, kept, tmp_path):
+    folder, state = kept
+    cache = tmp_path / "cache"
+    shutil.copytree(folder, cache)
+    path = step_file(cache)
+    damage(path)
+    found, hits, lines = run(cache)
+    assert (found, hits) == (state, 0)
+    assert len(lines) == 1, lines
+    assert str(path) in lines[0]
+    assert "compiled anew" in lines[0]
+    assert run(cache) == (state, 1, [])  # it is healed
+
+
+class Gone:
+    """A class that is not there when it is read."""
+
+
+def test_what_cannot_be_unpickled_is_damaged_too(kept, tmp_path, monkeypatch):
+    """Whole and of this kernel, of a class that no longer exists."""
+    folder, state = kept
+    cache = tmp_path / "cache"
+    shutil.copytree(folder, cache)
+    path = step_file(cache)
+    program = (
+        "import physics\nfrom physics.kernels.codegen import keeping\n"
+        f"keeping.dumps = lambda value: {pickle.dumps(Gone()).replace(b'Gone', b'Lost')!r}\n"
+    )
+    path.unlink()
+    command, environment = command_and_environment(cache)
+    subprocess.run([command[0], "-c", program + PROGRAM], env=environment, check=True, capture_output=True, timeout=200)
+    found, _, lines = run(cache)
+    assert found == state
+    assert len(lines) == 1
+    assert "compiled anew" in lines[0]
+    assert run(cache) == (state, 1, [])
+
+
+@pytest.mark.skipif(not hasattr(os, "getuid"), reason="no owners")
+def test_a_file_that_others_may_write_is_not_unpickled(tmp_path):
+    """Nor one of another user; of root's it is."""
+
+    class Evil:
+        def __reduce__(self):
+            return os.mkdir, (str(tmp_path / "ran"),)
+
+    path = tmp_path / "file.nbc"
+    disk.write(path, b"purpose", pickle.dumps([1]))
+    assert path.stat().st_mode & 0o777 & disk.OTHERS_WRITE == 0
+    assert disk.read(path, b"purpose") == [1]
+    disk.write(path, b"purpose", pickle.dumps(Evil()))
+    for mode in (0o664, 0o646):
+        path.chmod(mode)
+        with pytest.raises(disk.Foreign):
+            disk.read(path, b"purpose")
+    path.chmod(0o644)
+    if os.getuid() == 0:
+        os.chown(path, 12345, -1)
+        with pytest.raises(disk.Foreign):
+            disk.read(path, b"purpose")
+    assert not (tmp_path / "ran").exists()
+
+
+@pytest.mark.parametrize("umask", [0o000, 0o002, 0o077])
+def test_files_are_nobody_elses_under_any_umask(umask, tmp_path):
+    before = os.umask(umask)
+    try:
+        disk.write(tmp_path / "folder" / "file.nbc", b"", pickle.dumps(3))
+    finally:
+        os.umask(before)
+    assert disk.read(tmp_path / "folder" / "file.nbc", b"") == 3
+
+
+def test_a_file_for_another_purpose_is_damaged(tmp_path):
+    disk.write(tmp_path / "file", b"one", pickle.dumps(1))
+    with pytest.raises(disk.Damaged):
+        disk.read(tmp_path / "file", b"other")
+
+
+def test_what_others_may_write_costs_a_compilation_and_a_line(kept, tmp_path):
+    folder, state = kept
+    cache = tmp_path / "cache"
+    shutil.copytree(folder, cache)
+    path = step_file(cache)
+    path.chmod(0o666)
+    content = path.read_bytes()
+    for _ in range(2):
+        found, hits, lines = run(cache)
+        assert (found, hits, len(lines)) == (state, 0, 1)
+        assert "other users may write to it" in lines[0]
+    assert path.read_bytes() == content
+
+
+def test_a_folder_that_cannot_be_made(kept, tmp_path):
+    (tmp_path / "file").write_text("in the way")
+    found, hits, lines = run(tmp_path / "file" / "cache")
+    assert (found, hits, len(lines)) == (kept[1], 0, 1)
+    assert "cannot be kept" in lines[0]
+
+
+def test_a_full_disk(kept, tmp_path):
+    """As far as a limit of the size of files can tell: nothing can be written, and nothing is left behind."""
+
+    def no_room():
+        signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+        resource.setrlimit(resource.RLIMIT_FSIZE, (1000, 1000))
+
+    found, hits, lines = run(tmp_path, preexec_fn=no_room)
+    assert (found, hits, len(lines)) == (kept[1], 0, 1)
+    assert "cannot be kept" in lines[0]
+    assert [path for path in tmp_path.rglob("*") if path.is_file()] == []
+
+
+@pytest.mark.slow
+def test_processes_at_once_and_killed_ones(kept, tmp_path):
+    """Killed at any time from before the first file until after the last."""
+    command, environment = command_and_environment(tmp_path)
+    for k in range(12):
+        process = subprocess.Popen(command, env=environment, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+        time.sleep(0.8 + 0.15 * k)
+        process.kill()
+        process.wait()
+    assert run(tmp_path)[::2] == (kept[1], [])
+    assert run(tmp_path) == (kept[1], 1, [])
+    shutil.rmtree(tmp_path)
+    both = [subprocess.Popen(command, env=environment, stdout=subprocess.PIPE, text=True) for _ in range(2)]
+    assert [each.communicate(timeout=200)[0].split()[0] for each in both] == [kept[1]] * 2
+    assert run(tmp_path) == (kept[1], 1, [])
