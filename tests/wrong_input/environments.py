@@ -86,7 +86,7 @@ CASES = [
     Case("threads-of-one", lambda: BlockReachEnv(threads=2), ("'threads'", "2", "allowed are")),
     Case("walls", lambda: BlockReachEnv(walls="four"), ("walls", "'four'", "'three', 'corner'")),
     Case("half-width", lambda: BlockReachEnv(half_width=2.0), ("half_width", "2.0", "more than 3.3")),
-    Case("half-width-text", lambda: BlockReachEnv(half_width="wide"), ("half_width", "'wide'", "numbers")),
+    Case("half-width-text", lambda: BlockReachEnv(half_width="wide"), ("half_width", "'wide'", "one number")),
     Case("mass-negative", lambda: BlockReachEnv(mass=-6), ("mass", "-6", "greater than 0")),
     Case("mass-three", lambda: BlockReachEnv(mass=(1, 2, 3)), ("mass", "(1, 2, 3)", "pair (low, high)")),
     Case("friction-range", lambda: BlockReachEnv(friction=(0.7, 0.3)), ("friction", "(0.7, 0.3)", "low at most high")),
@@ -96,7 +96,7 @@ CASES = [
     Case("gravity-zero", lambda: BlockReachEnv(gravity=0), ("gravity", "0", "greater than 0")),
     Case("frame-skip", lambda: BlockReachEnv(frame_skip=2.5), ("frame_skip", "2.5", "at least 1")),
     Case("dt-zero", lambda: BlockReachEnv(dt=0.0), ("dt", "0", "greater than 0")),
-    Case("dt-text", lambda: BlockReachEnv(dt="short"), ("dt", "'short'", "numbers")),
+    Case("dt-text", lambda: BlockReachEnv(dt="short"), ("dt", "'short'", "one number")),
     Case("effects-number", lambda: BlockReachEnv(effects=3), ("effects", "3", "sequence of effects")),
     Case("effects-text", lambda: BlockReachEnv(effects=["Drag"]), ("effects", "'Drag'", "allowed")),
     Case(
