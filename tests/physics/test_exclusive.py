@@ -211,14 +211,14 @@ def test_two_threads_in_an_environment(make, monkeypatch):
     env.reset(seed=0)
     action = np.ones(env.action_space.shape, dtype=np.float32)
     begun, go_on, found = threading.Event(), threading.Event(), []
-    advance = env.task._advance
+    step = env.task.step
 
-    def held():
+    def held(actions):
         begun.set()
         assert go_on.wait(60)
-        advance()
+        step(actions)
 
-    monkeypatch.setattr(env.task, "_advance", held)
+    monkeypatch.setattr(env.task, "step", held)
     thread = threading.Thread(target=lambda: found.append(env.step(action)))
     thread.start()
     assert begun.wait(60)
