@@ -121,7 +121,7 @@ class Team:
 
     def _send_for_all(self) -> None:
         """Have the threads of the pool take the places of those who are away."""
-        for member in np.flatnonzero(self._crew[:, crew.WAS_AWAY]):
+        for member in 1 + np.flatnonzero(self._crew[1:, crew.WAS_AWAY]):
             self._futures[member] = self._pool.submit(self._be_member, member)
 
     def _be_member(self, member: int) -> None:
