@@ -11,7 +11,7 @@ import gymnasium as gym
 import numpy as np
 
 import physics
-from physics.exclusive import exclusive
+from physics.exclusive import exclusive, in_use
 from rigid_env.attributes import EpisodeParameters, value_of
 from rigid_env.spaces import action_space, observation_space
 from rigid_env.tasks import Task
@@ -119,7 +119,6 @@ class RigidEnv(EpisodeParameters, gym.Env):
         drawn = {field: value_of(values[field][0]) for field in self.task.own_parameters}
         return self.task.obs[0].copy(), {**self._info(self.task.outcome[0].tolist()), **drawn}
 
-    @exclusive
     def step(self, action):
         """Hold an action for one control step; see `gymnasium.Env.step`.
 
@@ -145,6 +144,21 @@ class RigidEnv(EpisodeParameters, gym.Env):
         gymnasium.error.ResetNeeded, gymnasium.error.ClosedEnvironmentError
             Before the first reset, after `close`.
         """
+        if self.is_free:  # written out: the call of a decorator takes a fiftieth of a step
+            self.is_free = False
+        else:
+            raise in_use(self)
+        try:
+            self.task.step(self._checked(action)[None])
+            outcome = self.task.outcome[0].tolist()
+            info = self._info(outcome)
+            if self.render_mode == "human":
+                self.render()
+            return self.task.obs[0].copy(), outcome[0], info["is_success"], False, info
+        finally:
+            self.is_free = True
+
+    def _checked(self, action) -> np.ndarray:
         if not self._has_reset:
             raise self._not_ready("step")
         try:
@@ -153,12 +167,7 @@ class RigidEnv(EpisodeParameters, gym.Env):
             raise ValueError(f"action is {reprlib.repr(action)}; allowed are {AXES} numbers") from None
         if action.shape != (AXES,):
             raise ValueError(f"action has shape {action.shape}; allowed is shape ({AXES},)")
-        self.task.step(action[None])
-        outcome = self.task.outcome[0].tolist()
-        info = self._info(outcome)
-        if self.render_mode == "human":
-            self.render()
-        return self.task.obs[0].copy(), outcome[0], info["is_success"], False, info
+        return action
 
     def _info(self, outcome: list[float]) -> dict[str, Any]:
         _, success, error, speed, spin = outcome
