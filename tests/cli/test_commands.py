@@ -256,14 +256,36 @@ def test_interrupting_a_simulation_ends_it_cleanly(monkeypatch):
     assert "interrupted" in run("run", "rest", code=INTERRUPTED)
 
 
-@pytest.mark.slow
+ENDLESS = """
+import pathlib, signal, physics
+from rigid_env.cli import app
+
+def endless(scene, *arguments, **more):
+    world = physics.World(scene)
+    world.step()
+    pathlib.Path("stepping").touch()
+    while True:
+        world.step(steps=1000)
+
+signal.signal(signal.SIGINT, signal.default_int_handler)  # a test run in the background has it ignored
+physics.simulate = endless
+app(["run", "tumble"])
+"""
+
+
 @pytest.mark.skipif(sys.platform == "win32", reason="signals")
 def test_a_signal_ends_a_process_cleanly(tmp_path):
-    command = [sys.executable, "-m", "rigid_env", "run", "tumble", "--duration", "1e5", "--dt", "0.001"]
-    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, cwd=tmp_path)
-    time.sleep(10.0)
-    process.send_signal(signal.SIGINT)
-    _, told = process.communicate(timeout=60)
+    process = subprocess.Popen(
+        [sys.executable, "-c", ENDLESS], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, cwd=tmp_path
+    )
+    try:
+        while not (tmp_path / "stepping").exists():
+            assert process.poll() is None, process.communicate()
+            time.sleep(0.1)
+        process.send_signal(signal.SIGINT)
+        _, told = process.communicate(timeout=120)
+    finally:
+        process.kill()
     assert process.returncode == INTERRUPTED
     assert "interrupted" in told
     assert "Traceback" not in told
