@@ -35,6 +35,10 @@ _KNOWN = (
     (r"Untyped \D*? name '(\w+)': Cannot determine Numba type of <class '([\w.]+)'>", f"%s is a %s; {ALLOWED}"),
     (r"type, assigned to variable '(\w+)' in globals, is not supported", f"%s is of another kind; {ALLOWED}"),
     (r"No implementation of function Function\(<.*?>\) found for signature:\s*>>> (.*)", f"there is no %s; {ALLOWED}"),
+    (
+        r"use of yield in a closure()",
+        "comprehensions and generators%s are not compiled; write each number out",
+    ),
     (r"NRT required but not enabled()", f"it makes an object in memory%s; {ALLOWED}"),
     (r"Cannot unify (.*?) and (.*?) for", "a value is %s on one way, %s on another; allowed is one type"),
     (r"Can't unify return type from the following types: (.*)", "it returns values of the types %s; allowed is one"),

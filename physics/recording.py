@@ -11,7 +11,7 @@ import platform
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from zipfile import BadZipFile
+from zipfile import BadZipFile, is_zipfile
 
 import numba
 import numpy as np
@@ -154,6 +154,8 @@ class Recording:
             The file cannot be read.
         """
         checks.path(path)
+        if not is_zipfile(path) and Path(path).is_file():
+            raise ValueError(f"{path} is no recording; allowed is a file that physics.Recorder wrote (.npz)")
         try:
             with np.load(path, allow_pickle=False) as file:
                 content = dict(file)

@@ -48,8 +48,8 @@ _MESSAGES = {
         "substep was plastic or coarse; raise impacts or substeps if it matters"
     ),
     Status.UNCONVERGED: (
-        "a contact problem kept a residual above Accuracy.tolerance; raise iterations, use "
-        "solver='sweeps+pivoting', or loosen the tolerance"
+        "a contact problem kept a residual above Accuracy.tolerance, an error of about that share of the contact "
+        "speed; where that matters raise Accuracy.iterations or substeps, else loosen the tolerance"
     ),
     Status.FAULT: (
         "a body's loads or its new state were not finite, or beyond 1e100, and its old state was kept; look at the "
@@ -171,10 +171,17 @@ class StepReport:
                 told[w] = f"body {self.fault_body[w]}: {told[w]}"
             elif status[w] == Status.OVERLAP:
                 told[w] += f" (the deepest overlap is {self.overlap[w]:.3g} m)"
+            elif status[w] == Status.UNCONVERGED:
+                told[w] += (
+                    f" ({self.unconverged[w]} of {self.solves[w]} problems, worst residual {self.residual[w]:.2g})"
+                )
         return told
 
     def __repr__(self) -> str:
+        counts = np.bincount(self.status, minlength=len(Status)).tolist()
+        bad = [f"{Status(k).name.lower()} in {count} worlds" for k, count in enumerate(counts) if k and count]
+        why = f" ({', '.join(bad)})" if bad else ""
         return (
-            f"StepReport(worlds={len(self._table)}, ok={self.ok}, penetration={self.penetration.max():.3g} m, "
+            f"StepReport(worlds={len(self._table)}, ok={self.ok}{why}, penetration={self.penetration.max():.3g} m, "
             f"residual={self.residual.max():.3g}, iterations={self.iterations.sum()})"
         )

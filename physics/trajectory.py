@@ -18,7 +18,7 @@ from physics.accuracy import Accuracy
 from physics.diagnostics import diagnose
 from physics.kernels.events import log
 from physics.keywords import known_keywords
-from physics.report import StepReport, add_report
+from physics.report import Status, StepReport, add_report
 from physics.scene import Scene
 from physics.summary import counted, lines_repr
 from physics.world import World
@@ -115,8 +115,17 @@ class Trajectory:
         samples, bodies = self.pos.shape[:2]
         return lines_repr(
             "Trajectory", f"{samples} samples of {bodies} bodies", f"t = {self.t[0]:.6g} to {self.t[-1]:.6g} s",
-            f"events: {counted(event.kind for event in self.events)}", f"ok={self.ok}",
+            f"events: {counted(event.kind for event in self.events)}", f"ok={self.ok}{self._why()}",
         )  # fmt: skip
+
+    def _why(self) -> str:
+        """The gravest status, and when it was met first: for the `repr`; `messages` of the reports tell more."""
+        met = [int(report.status[0]) for report in self.reports]
+        worst = max(met, key=Status.severity, default=int(Status.OK))
+        if worst == Status.OK:
+            return ""
+        name, first = Status(worst).name.lower(), met.index(worst)
+        return f": {name} in {met.count(worst)} of {len(met)} reports, first in reports[{first}].messages()"
 
     @property
     def ok(self) -> bool:

@@ -10,6 +10,7 @@ from rigid_env.demo import Demo
 from rigid_env.terminal import Column, Table, number_columns, say
 
 SHOWN_EVENTS = 24
+LAST_EVENTS = 8  # of these
 FEW = 8  # bodies, and contact points, that are printed one by one
 QUANTITIES = (("pos", "m"), ("quat", ""), ("linvel", "m/s"), ("angvel", "rad/s"))
 AXES = "x", "y", "z"
@@ -40,9 +41,13 @@ def event_table(events: list[dict], kinds: list[str]) -> Table:
     """The first events; `kinds` are the classes of the bodies."""
     columns = [*number_columns("time [s]"), Column("what"), Column("body"), Column("with")]
     more = len(events) - SHOWN_EVENTS
-    caption = f"and {more} more; --json has all" if more > 0 else ""
+    caption = f"{more} more are left out; --json has all" if more > 0 else ""
     table = Table([*columns, *number_columns("impulse [N s]")], "events", caption)
-    for event in events[:SHOWN_EVENTS]:
+    shown = events if more <= 0 else [*events[: SHOWN_EVENTS - LAST_EVENTS], None, *events[-LAST_EVENTS:]]
+    for event in shown:
+        if event is None:
+            table.add_row("...", "", "", "", "")
+            continue
         times = f" x {event['count']}" if event["count"] > 1 else ""
         impulse = float(np.linalg.norm(event["impulse"]))
         table.add_row(

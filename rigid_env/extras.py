@@ -20,6 +20,7 @@ EXTRAS: dict[str, dict[str, str]] = {
         "pygame": "pygame",
         "PIL": "Pillow",
     },
+    "plot": {"matplotlib": "matplotlib"},
     "bench": {"mujoco": "MuJoCo"},
     "peers": {"mujoco": "MuJoCo", "pybullet": "PyBullet", "pydrake": "Drake"},
 }
@@ -36,7 +37,7 @@ def require(extra: str, *modules: str, purpose: str = "this command") -> None:
 
     Parameters
     ----------
-    extra : {"render", "agents", "bench", "peers"}
+    extra : {"render", "plot", "agents", "bench", "peers"}
     *modules : str
         Names as imported; the default is all of `EXTRAS[extra]`.
     purpose : str

@@ -86,7 +86,7 @@ def effects(
 
             measured = ([costs.effect_row(name, accuracy, steps, repeats, tick)] for name in chosen)
             is_complete = collect(found, measured)
-        console.print(make_table(found, "steps per second with the effect, against the scene without it"))
+        console.print(make_table(found, "steps per second", ("with it", "without")))
         if markdown is not None and is_complete:
             costs.write_markdown(markdown, found, accuracy)
             tell_file(markdown, console)

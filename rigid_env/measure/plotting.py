@@ -13,4 +13,4 @@ def require_matplotlib() -> None:
     gymnasium.error.DependencyNotInstalled
         matplotlib is missing.
     """
-    require("agents", "matplotlib", purpose="a plot")
+    require("plot", "matplotlib", purpose="a plot")

@@ -11,10 +11,10 @@ SCALES = ((1e6, " M"), (1e3, " k"))  # of large numbers, and the letter of each
 VERDICTS = {None: Text("-"), True: Text("yes", style="green"), False: Text("no", style="red")}
 
 
-def make_table(rows: list[Row], title: str) -> Table:
-    """What, ours, peer, ratio (each the median over the range), target, and whether it is reached."""
+def make_table(rows: list[Row], title: str, sides: tuple[str, str] = ("ours", "peer")) -> Table:
+    """What, both `sides`, ratio (each the median over the range), target, and whether it is reached."""
     columns = [Column("what"), Column("accuracy", is_whole=True, under="what")]
-    columns += [*number_columns("ours", "peer", "ratio", "target"), Column("pass", is_whole=True)]
+    columns += [*number_columns(*sides, "ratio", "target"), Column("pass", is_whole=True)]
     table = Table(columns, title)
     for row in rows:
         table.add_row(*cells(row))

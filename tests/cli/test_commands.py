@@ -368,9 +368,9 @@ app({arguments}, prog_name="rigid-env")
         (["demo", "rest"], ["pygame"], ("pygame", "rigid-env[render]")),
         (["demo", "rest"], ["PIL"], ("Pillow", "rigid-env[render]")),
         (["run", "rest", "--plot", "x.gif"], ["pygame", "PIL"], ("pygame and Pillow", "rigid-env[render]")),
-        (["accuracy", "--plot", "x.png"], ["matplotlib"], ("matplotlib", "rigid-env[agents]")),
-        (["hard-cases", "--plot", "x.png"], ["matplotlib"], ("matplotlib", "rigid-env[agents]")),
-        (["tosses", "made.npz", "--plot", "x.png"], ["matplotlib"], ("matplotlib", "rigid-env[agents]")),
+        (["accuracy", "--plot", "x.png"], ["matplotlib"], ("matplotlib", "rigid-env[plot]")),
+        (["hard-cases", "--plot", "x.png"], ["matplotlib"], ("matplotlib", "rigid-env[plot]")),
+        (["tosses", "made.npz", "--plot", "x.png"], ["matplotlib"], ("matplotlib", "rigid-env[plot]")),
     ],
 )
 def test_missing_packages_are_named_before_anything_runs(arguments, hidden, words, tmp_path):

@@ -228,7 +228,7 @@ def test_the_plot_has_a_panel_per_scene(tmp_path):
 def test_without_matplotlib_the_extra_is_named_before_anything_is_measured(monkeypatch, tmp_path):
     monkeypatch.setitem(sys.modules, "matplotlib", None)
     monkeypatch.setattr(accuracy_report, "measure_and_show", lambda *_: pytest.fail("measured"))
-    assert 'pip install "rigid-env[agents]"' in run("vertex", "--plot", tmp_path / "a.png", code=1)
+    assert 'pip install "rigid-env[plot]"' in run("vertex", "--plot", tmp_path / "a.png", code=1)
 
 
 def test_ladder_of_peers_is_finer_and_that_of_events_coarser():
