@@ -58,6 +58,7 @@ class RigidVectorEnv(BatchAttributes):
 
     task_class: ClassVar[type[Task]]
     is_free = True  # no thread is in a call: of `physics.exclusive`
+    _view: View | None = None  # Gymnasium closes batches, too, whose construction ended with an error
 
     def __init__(
         self,
@@ -261,7 +262,8 @@ class RigidVectorEnv(BatchAttributes):
 
     def close_extras(self, **kwargs) -> None:
         """Close the window, if any."""
-        self._view.close()
+        if self._view is not None:
+            self._view.close()
 
 
 @known_keywords

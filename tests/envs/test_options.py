@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import copy
+import gc
+import sys
 
 import gymnasium as gym
 import numpy as np
@@ -232,3 +234,12 @@ def test_refused_options_leave_the_generators_where_they_were(options):
         fresh.reset(seed=1, options={"face": 9})
     assert fresh.np_random_seed == (-1, -1)
     assert fresh.np_random == (None, None)
+
+
+def test_a_batch_whose_construction_failed_is_closed_without_a_word(monkeypatch):
+    told = []
+    monkeypatch.setattr(sys, "unraisablehook", told.append)
+    with pytest.raises(ValueError, match="render_mode is 'film'"):
+        BlockReachVectorEnv(2, render_mode="film")
+    gc.collect()
+    assert told == []
