@@ -85,7 +85,10 @@ class Supervisor(BaseCallback):
 
     def _add_point(self) -> None:
         point = self.history.point(self.num_timesteps)
-        self.history.points.append(point)
+        points = self.history.points
+        if points and points[-1].steps == point.steps:  # a resumed run begins where it was kept
+            points.pop()
+        points.append(point)
         self.display.update(point)
         self._last_point = self.history.seconds
 

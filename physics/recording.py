@@ -155,7 +155,7 @@ class Recording:
         """
         checks.path(path)
         if not is_zipfile(path) and Path(path).is_file():
-            raise ValueError(f"{path} is no recording; allowed is a file that physics.Recorder wrote (.npz)")
+            raise ValueError(f"{path} is no recording; allowed is what physics.Recorder writes (.npz)")
         try:
             with np.load(path, allow_pickle=False) as file:
                 content = dict(file)

@@ -99,11 +99,7 @@ class RigidEnv(EpisodeParameters, gym.Env):
         ------
         TypeError, ValueError
             An option that is unknown or out of range. Nothing has changed then, the generator included.
-        gymnasium.error.ClosedEnvironmentError
-            After `close`.
         """
-        if self._is_closed:
-            raise self._not_ready("reset")
         kept = self._np_random, self._np_random_seed, self.task.generators[0]
         try:
             super().reset(seed=seed)
@@ -112,7 +108,7 @@ class RigidEnv(EpisodeParameters, gym.Env):
         except (TypeError, ValueError):
             self._np_random, self._np_random_seed, self.task.generators[0] = kept
             raise
-        self._has_reset = True
+        self._has_reset, self._is_closed = True, False
         if self.render_mode == "human":
             self.render()
         values = self.task.values.now
@@ -190,11 +186,11 @@ class RigidEnv(EpisodeParameters, gym.Env):
         return picture if self.render_mode == "rgb_array" else None
 
     def close(self):
-        """Close the window, if any; the environment takes no further calls."""
+        """Close the window, if any; `reset` begins anew."""
         self._view.close()
         self._is_closed, self._has_reset = True, False
 
     def _not_ready(self, call: str) -> gym.error.Error:
         if self._is_closed:
-            return gym.error.ClosedEnvironmentError(f"{call}() after close(): allowed is a new environment")
+            return gym.error.ClosedEnvironmentError(f"{call}() after close(): allowed is reset() or a new environment")
         return gym.error.ResetNeeded(f"call reset() before {call}()")

@@ -32,7 +32,7 @@ BALL = physics.Scene([physics.Sphere(0.5, 2.0, linvel=(1.0, 0.0, 0.0))], effects
 
 
 def run(*arguments, code=0, **environment):
-    result = runner.invoke(app, list(map(str, arguments)), env=environment)
+    result = runner.invoke(app, list(map(str, arguments)), env={"COLUMNS": None, **environment})
     assert result.exit_code == code, result.output
     return result.output
 
@@ -205,7 +205,7 @@ def test_mistakes_name_field_value_and_what_is_allowed(tmp_path, monkeypatch):
         (("demo", "nix.toml"), ("scene is 'nix.toml'", "does not exist")),
         (("run", "folder.toml"), ("folder.toml", "is a folder")),
         (("run", "bad.toml"), ("bad.toml, line 3", "radius is -1")),
-        (("run", "binary.toml"), ("can't decode",)),
+        (("run", "binary.toml"), ("binary.toml", "byte 0 is no UTF-8")),
         (("run", "rest", "--accuracy", "best"), ("accuracy is 'best'", "balanced")),
         (("run", "rest", "--duration", "-1"), ("--duration", "-1.0; allowed")),
         (("run", "rest", "--duration", "long"), ("--duration",)),

@@ -203,7 +203,6 @@ CASES = [
     Case("call-mass", lambda envs: envs.call("mass", 3), ("(3,)", "'mass'", "none"), "batch"),
     # --- closed -------------------------------------------------------------------------------------------
     Case("closed-step", lambda env: env.step(STILL), ("step()", "close()", "new environment"), "closed-env", CLOSED),
-    Case("closed-reset", lambda env: env.reset(), ("reset()", "close()", "new environment"), "closed-env", CLOSED),
     Case("closed-render", lambda env: env.render(), ("render()", "close()", "new environment"), "closed-env", CLOSED),
     Case(
         "closed-batch", lambda envs: envs.step(MIXED), ("step()", "close()", "new environment"), "closed-batch", CLOSED
