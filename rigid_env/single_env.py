@@ -145,7 +145,15 @@ class RigidEnv(EpisodeParameters, gym.Env):
         else:
             raise in_use(self)
         try:
-            self.task.step(self._checked(action)[None])
+            if not self._has_reset:
+                raise self._not_ready("step")
+            try:
+                action = np.asarray(action)
+            except ValueError:  # parts of different lengths
+                raise ValueError(f"action is {reprlib.repr(action)}; allowed are {AXES} numbers") from None
+            if action.shape != (AXES,):
+                raise ValueError(f"action has shape {action.shape}; allowed is shape ({AXES},)")
+            self.task.step(action[None])
             outcome = self.task.outcome[0].tolist()
             info = self._info(outcome)
             if self.render_mode == "human":
@@ -153,17 +161,6 @@ class RigidEnv(EpisodeParameters, gym.Env):
             return self.task.obs[0].copy(), outcome[0], info["is_success"], False, info
         finally:
             self.is_free = True
-
-    def _checked(self, action) -> np.ndarray:
-        if not self._has_reset:
-            raise self._not_ready("step")
-        try:
-            action = np.asarray(action)
-        except ValueError:  # parts of different lengths
-            raise ValueError(f"action is {reprlib.repr(action)}; allowed are {AXES} numbers") from None
-        if action.shape != (AXES,):
-            raise ValueError(f"action has shape {action.shape}; allowed is shape ({AXES},)")
-        return action
 
     def _info(self, outcome: list[float]) -> dict[str, Any]:
         _, success, error, speed, spin = outcome
