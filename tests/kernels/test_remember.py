@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from numba.core import types
 from numba.core.registry import cpu_target
+from numba.np.numpy_support import from_dtype
 
 from physics.kernels.codegen.remember import RememberingTarget, remembering
 from physics.kernels.compiler import kernel
@@ -76,3 +77,12 @@ def test_functions_of_others_are_answered_by_numba():
 
     assert other(np.float32(3), np.complex64(1)) == 2
     assert len(remembering(cpu_target.typing_context).signatures) == known
+
+
+def test_the_symbol_of_a_kernel_that_stands_does_not_count_the_types_of_the_process():
+    """Two processes that compile at once keep one file for both: a whole of the other one has to find its symbol."""
+    target = RememberingTarget(cpu_target.target_context)
+    first, later = (from_dtype(np.dtype([(name, np.float64)])) for name in ("symbol_first", "symbol_later"))
+    tags = {"abi_tags": ["digest"], "uid": 0}
+    assert target.mangler("solve", (first,), **tags) == target.mangler("solve", (later,), **tags)
+    assert target.mangler("solve", (first,), abi_tags=["other"], uid=0) != target.mangler("solve", (first,), **tags)

@@ -107,6 +107,14 @@ class RememberingTarget(CPUContext):
         """The context of types that remembers."""
         return remembering(self.__dict__["typing_context"])
 
+    def mangler(self, name, types, *, abi_tags=(), uid=None):
+        """Name of a symbol; that of a kernel that stands (`uid` 0) is the same in all processes.
+
+        Numba names a record type by a number that counts the types of the process. The digest among `abi_tags` tells
+        the types (`linking`), so that the name can do without them.
+        """
+        return super().mangler(name, () if uid == 0 else types, abi_tags=abi_tags, uid=uid)
+
     def get_function(self, fn, sig, _firstcall=True):
         """How `fn` is lowered for a signature; raises NotImplementedError if there is no way."""
         # What Numba compiles for itself has an error model of its own.
