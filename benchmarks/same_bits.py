@@ -40,7 +40,7 @@ class Checkout:
         self._process.stdin.flush()
 
     def answer(self) -> dict:
-        """What `bit_scenes.record` returned."""
+        """Result of `bit_scenes.record`."""
         line = self._process.stdout.readline()
         if not line:
             raise RuntimeError(f"the process over this checkout ended with {self._process.wait()}")
