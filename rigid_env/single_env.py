@@ -154,7 +154,7 @@ class RigidEnv(EpisodeParameters, gym.Env):
             if action.shape != (AXES,):
                 raise ValueError(f"action has shape {action.shape}; allowed is shape ({AXES},)")
             self.task.step(action[None])
-            outcome = self.task.outcome[0].tolist()
+            (outcome,) = self.task.outcome.tolist()  # one world: cheaper than the row of an array
             info = self._info(outcome)
             if self.render_mode == "human":
                 self.render()
@@ -169,7 +169,7 @@ class RigidEnv(EpisodeParameters, gym.Env):
             self.task.error_name: error,
             "speed": speed,
             "spin": spin,
-            "physics_status": int(self.task.status[0]),
+            "physics_status": self.task.status.item(),
         }
 
     def render(self):
