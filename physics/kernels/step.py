@@ -43,6 +43,7 @@ from physics.kernels.quaternion import to_matrix
 from physics.kernels.restraint import kinetic_energy
 from physics.kernels.sleep import falls_asleep, laid_down, sleeps_on
 from physics.kernels.stages import CONTACT_COUNT, impact, store_warm_start, touch
+from physics.kernels.tumbling import FAR_TURN, MOST_CUTS, may_turn, stage_of_turning
 from physics.kernels.turns import begin, next_world
 
 # Trials of one time of impact: a secant, then parabolas through the last three. Three are usual.
@@ -207,13 +208,14 @@ def to_next_impact(n, y, h, friction, smooth, gyroscopic, tilted, pivots, scheme
 def substep(y, start, h, friction, smooth, gyroscopic, tilted, pivots, scheme, memory, report, work, log, counts):
     """State after h, `start` after the call [s]: impacts where they happen, flight or contact between them.
 
-    When a substep has used up its cuts its rest is one plastic stage that takes in all it would pass through.
+    When a substep has used up its cuts its rest is one plastic stage that takes in all it would pass through. Cuts for
+    what turns far (`tumbling`) are counted apart; when they are used up it is looked at as what turns little is.
     """
-    left = h
+    left, splits, cuts = h, 0, 0
     world = work.world
     work.is_last = 0
-    for split in range(work.splits + 1):
-        if split == work.splits:
+    while True:
+        if splits == work.splits:
             report[world, at.UNRESOLVED] += 1.0
             work.is_last = 1
         hold_loads(y, left, gyroscopic, tilted, work)
@@ -222,15 +224,25 @@ def substep(y, start, h, friction, smooth, gyroscopic, tilted, pivots, scheme, m
             report[world, at.PENETRATION] = max(report[world, at.PENETRATION], depth)
             if not work.is_last and not stiffness(work) > 0.0:
                 y = impact(n, y, start + (h - left), left, friction, smooth, tilted, pivots, report, work, log, counts)
+        span = left
+        if scheme is None:  # noqa: SIM102 (a branch of its own is what the compiler prunes)
+            if cuts < MOST_CUTS and may_turn(y[3], h, FAR_TURN, tilted, work) and not work.is_last:
+                span = stage_of_turning(n, y, h, left, gyroscopic, tilted, work)
         end, t, is_deep = to_next_impact(
-            n, y, left, friction, smooth, gyroscopic, tilted, pivots, scheme, memory, report, work
+            n, y, span, friction, smooth, gyroscopic, tilted, pivots, scheme, memory, report, work
         )
+        if t == span and span < left:
+            cuts += 1
+            if cuts == MOST_CUTS:
+                report[world, at.UNRESOLVED] += 1.0
+        else:
+            splits += 1
         left -= t
         pass_time(t, work)
         if is_deep and n > 0 and not stiffness(work) > 0.0:
             end = kept_out(end, tilted, work)
         y = lift_to_due(n, end, tilted, work)
-        if not left > 0.0:
+        if work.is_last or not left > 0.0:
             break
         report[world, at.SPLITS] += 1.0
     return y

@@ -76,6 +76,8 @@ class Many(NamedTuple):
     place: np.ndarray  # geometric centre, world frame [m]
     box: np.ndarray  # lower, then upper corner of the box along the world axes, motion of the stage included [m]
     touched: np.ndarray  # 1: the body is in a contact of this stage
+    spin: np.ndarray  # of `tumbling`: bound of |ω| of a body that may turn far in this stage, else 0 [rad/s]
+    simplex: np.ndarray  # of `nearest`: differences of points of two bodies [m]
     order: np.ndarray  # bodies by the lower end of their boxes
     merged: np.ndarray  # scratch of sorting; then places of the bodies in `order`
     first_entry: np.ndarray  # of `columns`: where the bodies of a column begin in `entry`, and where to go on
@@ -195,7 +197,7 @@ def make_many(
     return Many(
         bodies=rows, now=np.zeros((nb, STATE_SIZE)), rotation=np.zeros((nb, 9)), lightness=np.zeros(nb),
         turning=np.zeros((nb, 6)), twist=np.zeros((nb, 6)), place=np.zeros((nb, 3)), box=np.zeros((nb, 6)),
-        touched=np.zeros(nb, i), order=np.arange(nb, dtype=i), merged=np.zeros(nb, i),
+        touched=np.zeros(nb, i), spin=np.zeros(nb), simplex=np.zeros((4, 3)), order=np.arange(nb, dtype=i), merged=np.zeros(nb, i),
         first_entry=np.zeros(nb + 1, i), cursor=np.zeros(nb, i), entry=np.zeros(ENTRIES_PER_BODY * nb, i),
         walls=walls.copy(),
         pairs=np.zeros((pairs, 2), i), counts=np.zeros(4, i), ends=np.zeros((n, 2), i), name=np.zeros(n, i),

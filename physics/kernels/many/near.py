@@ -18,6 +18,9 @@ from physics.kernels.many.arrays import LEFT_OUT, PAIRS
 from physics.kernels.many.columns import columns_of, fill_columns
 from physics.kernels.many.contacts import minus, pair_slop, vector
 
+# By how much more than at its first pace a body that turns far may do so; see `reach`.
+GROWTH = 1.5
+
 
 @inlined
 def travel(b, h, many):
@@ -28,10 +31,16 @@ def travel(b, h, many):
 
 @inlined
 def reach(b, h, many):
-    """Bound for how far any point of body b moves in h without contact [m]; by turning no further than across it."""
+    """Bound for how far any point of body b moves in h without contact [m]; by turning no further than across it.
+
+    The angular velocity of what turns far may grow meanwhile: as |dω/dt| <= |ω|²/√3, a turn of θ at its first pace is
+    one of -√3 log(1 - θ/√3) at most, and the chord of that is no longer than 1.5 θ or 2 radii.
+    """
     t = many.twist
-    angular = abs(t[b, 3]) + abs(t[b, 4]) + abs(t[b, 5])
-    return travel(b, h, many) + many.bodies[b].radius * min(h * angular, 2.0)
+    turn = h * (abs(t[b, 3]) + abs(t[b, 4]) + abs(t[b, 5]))
+    if many.spin[b] > 0.0:
+        turn *= GROWTH
+    return travel(b, h, many) + many.bodies[b].radius * min(turn, 2.0)
 
 
 @inlined

@@ -10,6 +10,7 @@ from physics.kernels.many import memory as kept
 from physics.kernels.many.contacts import acceleration_of, pair_slop, put, vector
 from physics.kernels.many.restraint import settle_restrained
 from physics.kernels.many.told import log_impacts
+from physics.kernels.many.tumbling import arrival
 
 # A meeting is fast where it would close this share of the smaller body's radius in the time left: it is then met in
 # time, not stopped in front of.
@@ -59,11 +60,22 @@ def fast_speed(k, h, many):
 
 
 @inlined
+def is_seen_to(k, many):
+    """Whether `tumbling` finds when contact k is met: a body that turns far does not go where its features point now."""
+    a, b = many.ends[k, 0], many.ends[k, 1]
+    if not (many.spin[a] > 0.0 or (b >= 0 and many.spin[b] > 0.0)):
+        return False
+    return many.gap[k] > arrival(a, b, many)
+
+
+@inlined
 def is_meeting(k, h, many):
-    """Whether contact k is still apart and to be met in time: it bounces, or is fast."""
+    """Whether contact k is still apart and to be met in time: it bounces, or is fast, or turns far."""
     a, b = many.ends[k, 0], many.ends[k, 1]
     if not (many.gap[k] > pair_slop(a, b, many) and many.speed[k] < 0.0):
         return False
+    if is_seen_to(k, many):
+        return True
     return bounces(k, h, many) or -many.speed[k] > fast_speed(k, h, many)
 
 
@@ -169,13 +181,13 @@ def time_until_meeting(n, h, is_last, many):
     """Time until the first of the meetings that matter, at the latest h [s]: never too late.
 
     Two points approach by no more than s t + a t²/2 with a the bound of their acceleration by loads and turning, so
-    that the gap lasts at least until t = 2 gap/(s + √(s² + 2 a gap)).
+    that the gap lasts at least until t = 2 gap/(s + √(s² + 2 a gap)). What turns far is looked at by `tumbling`.
     """
     first = h
     if is_last:
         return first
     for k in range(n):
-        if not is_meeting(k, h, many):
+        if not is_meeting(k, h, many) or is_seen_to(k, many):
             continue
         a, b, s = many.ends[k, 0], many.ends[k, 1], -many.speed[k]
         w = vector(many.twist, a, 3)

@@ -24,6 +24,8 @@ from physics.kernels.many.glide import glide, hold_all_loads
 from physics.kernels.many.place import place_bodies
 from physics.kernels.many.strike import strike
 from physics.kernels.many.touch import find_contacts
+from physics.kernels.many.tumbling import forget_turning, note_turning, time_until_turned
+from physics.kernels.tumbling import MOST_CUTS
 
 # Cuts of a substep per impact allowed: a meeting is approached from before it, in two or three.
 CUTS_PER_IMPACT = 4
@@ -67,10 +69,14 @@ def substep_world(
     world, start, h, friction, gyroscopic, tilted, ellipsoids, hulls, scheme, sleep, memory, report, many, log, counts
 ):  # fmt: skip
     """Advance the bodies of one world by h, `start` after the call [s]: the stages of the module's list."""
-    left, impacts = h, 0
-    for cut in range(CUTS_PER_IMPACT * many.settings[0].splits + 1):
-        is_last = impacts >= many.settings[0].splits or cut == CUTS_PER_IMPACT * many.settings[0].splits
+    left, impacts, cuts, turns = h, 0, 0, 0
+    while True:
+        is_last = impacts >= many.settings[0].splits or cuts == CUTS_PER_IMPACT * many.settings[0].splits
         hold_all_loads(left, gyroscopic, tilted, many)
+        is_turning = note_turning(h, tilted, many)
+        if is_turning and (is_last or turns >= MOST_CUTS):
+            forget_turning(many)
+            is_turning = False
         place_bodies(tilted, many)
         find_contacts(left, ellipsoids, hulls, world, sleep, many)
         n = many.counts[CONTACTS]
@@ -81,10 +87,21 @@ def substep_world(
         many.counts[CONTACTS] = n
         if is_impact and not is_last:
             impacts += 1
+            cuts += 1
             continue  # what may be met in the time left is another set now
         mark_touched(n, many)
         if is_last:
             report[world, at.UNRESOLVED] += 1.0
+        first = t
+        if scheme is None:  # noqa: SIM102 (a branch of its own is what the compiler prunes)
+            if is_turning:
+                t = time_until_turned(first, gyroscopic, tilted, hulls, many)
+        if t < first:
+            turns += 1
+            if turns == MOST_CUTS:
+                report[world, at.UNRESOLVED] += 1.0
+        else:
+            cuts += 1
         if t < left:
             report[world, at.SPLITS] += 1.0
         glide(n, world, t, friction, gyroscopic, tilted, scheme, sleep, memory, report, many)
@@ -93,5 +110,5 @@ def substep_world(
             pass_time(t, many.bodies[b])
         if n > 0:
             push_apart(n, tilted, many)
-        if not left > 0.0:
+        if is_last or not left > 0.0:
             break
