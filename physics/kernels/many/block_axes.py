@@ -103,13 +103,23 @@ def lie_flat(face, many):
 
 @inlined
 def is_along_face(edges, face, many):
-    """Whether the product of two edges is nearly a face normal: the faces then lie flat on each other."""
-    C, i, j = many.mix[AXES], edges // 3, edges % 3
-    square = 1.0 - C[i, j] * C[i, j]
+    """Whether the product of two edges is nearly a face normal: the faces then lie flat on each other.
+
+    Both turned towards the other block's centre: of slender blocks that cross far from their centres, the face that
+    looks there may be on the far side of the one that touches.
+    """
+    C, i, j, way = many.mix[AXES], edges // 3, edges % 3, many.mix[FROM_A, 0]
+    square, ip, iq = 1.0 - C[i, j] * C[i, j], (i + 1) % 3, (i + 2) % 3
+    towards = way[iq] * C[ip, j] - way[ip] * C[iq, j]
     # Component of (edge i of a) x (edge j of b) along the face normal: on axis k of a it is the determinant
     # e_k · (e_i x b_j), one entry of C; on axis k of b likewise, with the transpose.
     if face < 3:
-        c = 0.0 if face == i else C[3 - face - i, j]
+        c = 0.0 if face == i else math.copysign(C[3 - face - i, j], C[3 - face - i, j] * towards * way[face])
+        if face == ip:
+            c = -c
     else:
-        c = 0.0 if face - 3 == j else C[i, 6 - face - j]
-    return c * c >= FLAT * FLAT * square
+        k, towards = face - 3, towards * many.mix[FROM_B, 0, face - 3]
+        c = 0.0 if k == j else math.copysign(C[i, 3 - k - j], C[i, 3 - k - j] * towards)
+        if k == (j + 2) % 3:
+            c = -c
+    return c > 0.0 and c * c >= FLAT * FLAT * square

@@ -208,7 +208,8 @@ def touch_hulls(a, b, margin, h, many):
     n = (0.0, 0.0, 0.0)
     if not is_face:
         n = _edge_normal(a, b, i, j, many)
-    if is_face or abs(qt.dot(n, vector(many.hulls.normal[which], face, 0))) >= FLAT:
+    out = vector(many.hulls.normal[which], face, 0)
+    if is_face or (qt.dot(n, out) if which == 0 else -qt.dot(n, out)) >= FLAT:
         if not is_clipped:
             source, count = clip_face(which, r, o, face, slop, many)
         if is_face and count == 0:
