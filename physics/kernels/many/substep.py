@@ -73,11 +73,11 @@ def substep_world(
     while True:
         is_last = impacts >= many.settings[0].splits or cuts == CUTS_PER_IMPACT * many.settings[0].splits
         hold_all_loads(left, gyroscopic, tilted, many)
+        place_bodies(tilted, many)
         is_turning = note_turning(h, tilted, many)
         if is_turning and (is_last or turns >= MOST_CUTS):
             forget_turning(many)
             is_turning = False
-        place_bodies(tilted, many)
         find_contacts(left, ellipsoids, hulls, world, sleep, many)
         n = many.counts[CONTACTS]
         note_depth(n, world, memory, report, many)

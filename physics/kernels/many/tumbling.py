@@ -59,18 +59,34 @@ def arrival(a, b, many):
 
 @inlined
 def note_turning(h, tilted, many):
-    """Write `many.spin`, bounds of |ω| of bodies that may turn far within h and 0 of all others: whether there are any."""
+    """Write `many.spin`, bounds of |ω| of bodies that may turn far within h and 0 of all others: whether there are any.
+
+    Most are told by a glance: loads turn a body by h times its acceleration over its radius at most, and while it turns
+    by less than `FAR_TURN` it gets no faster by a factor of √2 (see `tumbling.spin_bound`).
+    """
     least, found = FAR_TURN, False
     if many.settings[0].in_time == 1:
         least = LEAST_TURN
+    limit = 0.5 * (least / h) ** 2
     for b in range(many.now.shape[0]):
         many.spin[b] = 0.0
-        _, q, _, L = read_state(many.now, b)
-        if may_turn(L, h, least, tilted, many.bodies[b]):
-            spin = spin_bound(q, L, h, tilted, many.bodies[b])
-            if spin * h > least:
-                many.spin[b], found = spin, True
+        w, r, push = vector(many.twist, b, 3), many.bodies[b].radius, h * many.bodies[b].acceleration
+        if r * r * (qt.dot(w, w) - limit) + push * push > 0.0:
+            found = _note_spin(b, h, least, tilted, many) or found
     return found
+
+
+@kernel
+def _note_spin(b, h, least, tilted, many):
+    """Write `many.spin` of one body: whether it turns far."""
+    _, q, _, L = read_state(many.now, b)
+    if not may_turn(L, h, least, tilted, many.bodies[b]):
+        return False
+    spin = spin_bound(q, L, h, tilted, many.bodies[b])
+    if not spin * h > least:
+        return False
+    many.spin[b] = spin
+    return True
 
 
 @inlined
