@@ -1,7 +1,7 @@
 """Turning rods past things: ``python -m benchmarks.turning [--placements N] [--json FILE]``.
 
 A rod of 2 x 0.02 x 0.02 m turns by 0.3 to 3 rad a step past a ball, a cube, a hull, another rod that turns as well, and
-a wall. An oracle (`tests.reference.turning`) says of each placement whether the rod meets the thing; a third of them are
+a wall; an ellipsoid of these axes past a ball and a wall. An oracle (`tests.reference.turning`) says of each placement whether the rod meets the thing; a third of them are
 drawn near to grazing. Missed: it does, by more than `MARGIN` where nothing hinders it, and the run has no impulse.
 Invented: it stays clear by more than that, and there is one.
 """
@@ -30,7 +30,7 @@ DT = 0.01  # [s]
 STEPS = 3
 MARGIN = 1e-4  # [m], ten slops at `fast`
 APART = 0.01  # at the start, at least [m]
-THINGS = ("ball", "cube", "hull", "rod", "wall")
+THINGS = ("ball", "cube", "hull", "rod", "wall", "ellipsoid", "ellipsoid-wall")
 PRESETS = ("fast", "balanced", "precise", "reference")
 
 
@@ -49,11 +49,14 @@ class Drawn:
 
 def _scene(thing: str) -> physics.Scene:
     rod = physics.Block(tuple(SIZE), 1.0, pos=(0, 3, 0))
+    if thing.startswith("ellipsoid"):
+        rod = physics.Ellipsoid(tuple(0.5 * SIZE), 1.0, pos=(0, 3, 0))
     contact = [physics.Contact(0.5), physics.Friction(0.3)]
-    if thing == "wall":
+    if thing.endswith("wall"):
         return physics.Scene([rod], [physics.HalfSpace((0, 1, 0), 0.0)], [physics.Gravity((0, -9.81, 0)), *contact])
     other = {
         "ball": lambda: physics.Sphere(BALL, 1.0),
+        "ellipsoid": lambda: physics.Sphere(BALL, 1.0),
         "cube": lambda: physics.Block((CUBE, CUBE, CUBE), 1.0),
         "hull": lambda: physics.Hull(tuple(map(tuple, HULL)), 1.0),
         "rod": lambda: physics.Block(tuple(SIZE), 1.0),
@@ -77,6 +80,10 @@ def _tops(scene, pos, quat, linvel, angvel) -> list[truth.Top]:
 def _distance(thing: str, scene, tops, k: int):
     """Distance over the time of placement k."""
     rod = truth.polyhedron(truth.box_corners(SIZE))
+    if thing == "ellipsoid-wall":
+        return lambda t: truth.ellipsoid_from_wall(*tops[0].at(k, t), 0.5 * SIZE, np.array([0, 1.0, 0]), 0.0)
+    if thing == "ellipsoid":
+        return lambda t: truth.ellipsoid_from_ball(*tops[0].at(k, t), 0.5 * SIZE, tops[1].pos[k], BALL)
     if thing == "wall":
         return lambda t: truth.apart_from_wall(*tops[0].at(k, t), rod.corners, np.array([0, 1.0, 0]), 0.0)
     if thing == "ball":
@@ -101,10 +108,10 @@ def _draw_some(thing: str, scene, n: int, rng) -> tuple[np.ndarray, ...]:
     angvel[:, 0] = (turn[:, None] * across + rng.uniform(-0.5, 0.5, (n, 1)) * R[:, :, 0]) / DT
     linvel[:, 0] = rng.uniform(0, 0.2, (n, 1)) * _units(rng, n, 3) / DT
     is_grazing = rng.random(n) < 0.35
-    if thing == "wall":
+    if thing.endswith("wall"):
         pos[:, 0, 1] = np.where(is_grazing, rng.uniform(0.97, 1.02, n), rng.uniform(0.1, 1.2, n))
         return pos, quat, linvel, angvel
-    reach = {"ball": BALL, "cube": 0.87 * CUBE, "hull": 0.12, "rod": 1.0}[thing]
+    reach = {"ball": BALL, "ellipsoid": BALL, "cube": 0.87 * CUBE, "hull": 0.12, "rod": 1.0}[thing]
     far = np.where(is_grazing, 1.0 + reach * rng.uniform(0.8, 1.05, n), rng.uniform(0.1, 1.0, n) * (1 + reach))
     lift = rng.uniform(-1, 1, n) * reach * np.where(rng.random(n) < 0.5, 1.0, 0.1)
     way = np.cross(across, _units(rng, n, 3))

@@ -28,7 +28,7 @@ from physics.kernels.arms import center_arm, wall_normal
 from physics.kernels.body import angular_velocity
 from physics.kernels.compiler import inlined, kernel
 from physics.kernels.flight import fly
-from physics.kernels.layout import OFFSET, SPHERE
+from physics.kernels.layout import ELLIPSOID, OFFSET, SPHERE
 from physics.kernels.quaternion import to_matrix
 
 # A body turns far where it turns by more than this within a step [rad]; less is looked for at the ends of stages.
@@ -174,8 +174,24 @@ def may_reach(wall, y, h, work):
 
 
 @inlined
-def tilting_time(n, w):
+def sweeping(R, w, work):
+    """Angular velocity without that about axes of symmetry of an ellipsoid, which sweeps nothing [rad/s]."""
+    d = work.dims
+    if work.shape != ELLIPSOID or not (d[0] == d[1] or d[1] == d[2] or d[0] == d[2]):
+        return w
+    if d[0] == d[1] and d[1] == d[2]:
+        return (0.0, 0.0, 0.0)
+    e = (R[0], R[3], R[6]) if d[1] == d[2] else ((R[1], R[4], R[7]) if d[0] == d[2] else (R[2], R[5], R[8]))
+    s = qt.dot(e, w)
+    return (w[0] - s * e[0], w[1] - s * e[1], w[2] - s * e[2])
+
+
+@inlined
+def tilting_time(n, y, tilted, work):
     """Time in which a body turns by `FAR_TURN` about what is across n [s]: about n itself nothing comes nearer."""
+    w = angular_velocity(y[1], y[3], work, tilted)
+    if is_centred(tilted, work):
+        w = sweeping(to_matrix(y[1]), w, work)
     m = qt.cross(n, w)
     rate = math.sqrt(qt.dot(m, m))
     return FAR_TURN / rate if rate > 0.0 else math.inf
@@ -207,14 +223,13 @@ def stage_of_turning(n, y, h, left, gyroscopic, tilted, work):
     if not spin * h > FAR_TURN:
         return left
     first = left
-    w = angular_velocity(y[1], y[3], work, tilted)
     for wall in range(work.walls.shape[0]):
         if not may_reach(wall, y, first, work):
             continue
         normal, met = wall_normal(work.walls, wall), 0.0
         if work.mask[wall] == 0:
             met = _fly_near(y, wall, first, spin, gyroscopic, tilted, work)
-        limit = tilting_time(normal, w)
+        limit = tilting_time(normal, y, tilted, work)
         if not met > 0.0:
             met = limit
         if n > 0:

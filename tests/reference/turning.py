@@ -106,6 +106,28 @@ def apart_from_ball(x, R, half, center, radius) -> np.ndarray:
     return outside + np.minimum(local.max(axis=1), 0.0) - radius
 
 
+def ellipsoid_from_wall(x, R, axes, normal, offset) -> np.ndarray:
+    """Distance (T,) of an ellipsoid with these semi-axes from a wall."""
+    return x @ normal - offset - np.linalg.norm(axes * np.einsum("tji,j->ti", R, normal), axis=1)
+
+
+def ellipsoid_from_ball(x, R, axes, center, radius) -> np.ndarray:
+    """Distance (T,) of an ellipsoid from a ball; minus the radius where the ball's centre is inside.
+
+    The nearest point y of a point p outside is y_i = a_i² p_i/(a_i² + t) with Σ (a_i p_i/(a_i² + t))² = 1: a sum that
+    falls with t >= 0, which is found by halving.
+    """
+    p, a = np.einsum("tji,tj->ti", R, np.asarray(center) - x), np.asarray(axes, dtype=float)
+    low, high = np.zeros(len(p)), a.max() * np.linalg.norm(p, axis=1)
+    for _ in range(60):
+        t = 0.5 * (low + high)
+        is_short = (((a * p) / (a**2 + t[:, None])) ** 2).sum(axis=1) > 1
+        low, high = np.where(is_short, t, low), np.where(is_short, high, t)
+    y = a**2 * p / (a**2 + low[:, None])
+    is_outside = ((p / a) ** 2).sum(axis=1) > 1
+    return np.where(is_outside, np.linalg.norm(p - y, axis=1), 0.0) - radius
+
+
 def apart_from_small(x, R, half, y, S, b: Polyhedron) -> np.ndarray:
     """`apart` of a block (half edges `half`): of a ball around b where that is `FAR` away, which is no more."""
     d = np.array(apart_from_ball(x, R, half, y, np.linalg.norm(b.corners, axis=1).max()))

@@ -70,12 +70,10 @@ def is_seen_to(k, many):
 
 @inlined
 def is_meeting(k, h, many):
-    """Whether contact k is still apart and to be met in time: it bounces, or is fast, or turns far."""
+    """Whether contact k is still apart and to be met in time: it bounces, or is fast."""
     a, b = many.ends[k, 0], many.ends[k, 1]
     if not (many.gap[k] > pair_slop(a, b, many) and many.speed[k] < 0.0):
         return False
-    if is_seen_to(k, many):
-        return True
     return bounces(k, h, many) or -many.speed[k] > fast_speed(k, h, many)
 
 
@@ -95,7 +93,7 @@ def aim_impact(n, h, is_last, many):
         slow = min(slow_speed(k, h, many), fast_speed(k, h, many))
         if gap > slop:
             goal = -gap / h
-            if not is_last and is_meeting(k, h, many):
+            if is_seen_to(k, many) or (not is_last and is_meeting(k, h, many)):
                 goal = -FAR
             elif goal - speed > slow:
                 is_hit = True
@@ -187,7 +185,7 @@ def time_until_meeting(n, h, is_last, many):
     if is_last:
         return first
     for k in range(n):
-        if not is_meeting(k, h, many) or is_seen_to(k, many):
+        if is_seen_to(k, many) or not is_meeting(k, h, many):
             continue
         a, b, s = many.ends[k, 0], many.ends[k, 1], -many.speed[k]
         w = vector(many.twist, a, 3)

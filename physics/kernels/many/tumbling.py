@@ -212,9 +212,9 @@ def _meeting(a, b, h, gyroscopic, tilted, hulls, many):
             gap = _apart(0.0, a, b, n, left, right, 0.0, 0.0, hulls, many)
         if gone == 0.0 and (is_held or not gap > touch):
             if many.spin[a] > 0.0:
-                first = min(first, tilting_time(n, angular_velocity(one[1], one[3], many.bodies[a], tilted)))
+                first = min(first, tilting_time(n, one, tilted, many.bodies[a]))
             if many.spin[partner] > 0.0:
-                first = min(first, tilting_time(n, angular_velocity(other[1], other[3], many.bodies[partner], tilted)))
+                first = min(first, tilting_time(n, other, tilted, many.bodies[partner]))
             if not gap > touch:
                 return first
         if not gap > touch:
