@@ -14,8 +14,8 @@ zero at a time where it is positive. The body is flown there, and looked at agai
 1996, to second order).
 
 With the principal moments' inverses J, J² <= (J_max + J_min) J - J_max J_min between the least and the largest, so that
-|ω|² <= (J_max + J_min) ω·L - J_max J_min |L|²: equal for a rod that turns across its axis. In Euler's equations the factors are
-between -1 and 1, |dω/dt| <= |ω|²/√3 + J_max |τ|. So a <= |a_center| + R (1 + 1/√3) |ω|² + R J_max |τ|.
+|ω|² <= (J_max + J_min) ω·L - J_max J_min |L|²: equal for a rod that turns across its axis. In Euler's equations the
+factors are between -1 and 1, |dω/dt| <= |ω|²/√3 + J_max |τ|. So a <= |a_centre| + R (1 + 1/√3) |ω|² + R J_max |τ|.
 """
 
 from __future__ import annotations

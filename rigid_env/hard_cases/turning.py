@@ -45,7 +45,7 @@ def _spread(count: int, k: float) -> np.ndarray:
 
 
 def past_things(on: Setting) -> Sequence[Check]:
-    """A rod turns about its middle by 0.3 to 3 rad a step: in half a turn it sweeps a disc, and meets all that is in it.
+    """A rod turns about its middle by 0.3 to 3 rad a step: in half a turn it sweeps a disc, and meets all in it.
 
     The disc has the radius 1 m of its ends' middles. A body whose centre is in the plane of the disc and which holds a
     ball of radius r is met if its centre is nearer than 1 m + r to the rod's, and one that is held by a ball of radius
@@ -56,7 +56,8 @@ def past_things(on: Setting) -> Sequence[Check]:
     turn = np.resize(TURNS, count)
     missed = moved = 0
     for thing, inner, outer in _things().values():
-        world = on.world(physics.Scene([_rod(), thing], [], [physics.Contact(0.5), physics.Friction(0.3)]), count)
+        effects = [physics.Contact(0.5), physics.Friction(0.3)]
+        world = on.world(physics.Scene([_rod(pos=(0, 9, 0)), thing], [], effects), count)
         is_far = np.arange(count) % 5 == 4
         far = 2 * outer + (HALF + inner - MARGIN - 2 * outer) * _spread(count, 2)
         far = np.where(is_far, REACH * 1.0001 + outer + MARGIN, far)

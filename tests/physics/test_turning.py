@@ -32,8 +32,9 @@ def test_the_truth_knows_a_disc():
         one, rest = np.array([[1.0, 0, 0, 0]]), np.zeros((1, 3))
         top = truth.Top(1.0, 2.0, rest, one, rest, np.array([[0.0, 0.0, 100.0]]), np.zeros(3))
         ball = far * np.array([0.0, 1.0, 0.0])
+        half = np.array([1, 0.01, 0.01])
         found, _ = truth.least(
-            lambda t, ball=ball, top=top: truth.apart_from_ball(*top.at(0, t), np.array([1, 0.01, 0.01]), ball, 0.1), 0.03
+            lambda t, ball=ball, top=top: truth.apart_from_ball(*top.at(0, t), half, ball, 0.1), 0.03
         )
         if least > 0:
             assert found == pytest.approx(far - 0.1 - np.hypot(1, 0.01), abs=1e-5)
@@ -51,7 +52,7 @@ def test_separating_axes_agree_with_a_ball_about_a_point():
     x[::2] *= 0.4
     other = truth.apart(x, R, rod, np.zeros((20, 3)), eye, cube)
     ball = truth.apart_from_ball(x, R, half, np.zeros(3), tiny)
-    assert (other[ball > 0] <= ball[ball > 0] + 2 * tiny).all()  # at a corner no axis of these is as far as the distance
+    assert (other[ball > 0] <= ball[ball > 0] + 2 * tiny).all()  # near a corner no axis is as far as the distance
     assert (other[ball > 0] > 0).all()
     assert np.abs(other[ball < 0] - ball[ball < 0]).max() < 2 * tiny
 

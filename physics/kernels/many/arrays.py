@@ -197,7 +197,8 @@ def make_many(
     return Many(
         bodies=rows, now=np.zeros((nb, STATE_SIZE)), rotation=np.zeros((nb, 9)), lightness=np.zeros(nb),
         turning=np.zeros((nb, 6)), twist=np.zeros((nb, 6)), place=np.zeros((nb, 3)), box=np.zeros((nb, 6)),
-        touched=np.zeros(nb, i), spin=np.zeros(nb), simplex=np.zeros((4, 3)), order=np.arange(nb, dtype=i), merged=np.zeros(nb, i),
+        touched=np.zeros(nb, i), spin=np.zeros(nb), simplex=np.zeros((4, 3)),
+        order=np.arange(nb, dtype=i), merged=np.zeros(nb, i),
         first_entry=np.zeros(nb + 1, i), cursor=np.zeros(nb, i), entry=np.zeros(ENTRIES_PER_BODY * nb, i),
         walls=walls.copy(),
         pairs=np.zeros((pairs, 2), i), counts=np.zeros(4, i), ends=np.zeros((n, 2), i), name=np.zeros(n, i),

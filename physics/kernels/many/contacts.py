@@ -13,6 +13,10 @@ from physics.kernels.many.arrays import CONTACTS, LEFT_OUT
 # Contact features that two bodies, or a body and a wall, have unless one is a hull: what a contact's name is made with.
 FEATURES = 512
 
+# Distance at which bodies that turn far have arrived, where the slop is less, in the smaller bounding radius: what is
+# left is small enough for contacts to be foretold by their speed, and large beside rounding.
+ARRIVED = 1.0e-7
+
 
 @inlined
 def vector(rows, i, first):
@@ -105,6 +109,21 @@ def pair_slop(a, b, many):
 
 
 @inlined
+def arrival(a, b, many):
+    """Gap at which what turns far has arrived at a wall (b < 0) or another body [m]."""
+    radius = many.bodies[a].radius
+    if b >= 0:
+        radius = min(radius, many.bodies[b].radius)
+    return max(pair_slop(a, b, many), ARRIVED * radius)
+
+
+@inlined
+def _turns_far(a, b, many):
+    """Whether one of them may turn far in this stage (`tumbling`)."""
+    return many.spin[a] > 0.0 or (b >= 0 and many.spin[b] > 0.0)
+
+
+@inlined
 def acceleration_of(k, many):
     """Bound for the relative acceleration of a contact's points without contact [m/s²]."""
     a, b = many.ends[k, 0], many.ends[k, 1]
@@ -134,6 +153,8 @@ def _anchor(k, b, first, point, many):
 def record(a, b, feature, owner, normal, point_a, point_b, gap, h, many):
     """Add a contact to the set if it touches, or could within h: whether there was room for it.
 
+    What turns far touches from its `arrival` on.
+
     Parameters
     ----------
     a, b : int
@@ -162,7 +183,8 @@ def record(a, b, feature, owner, normal, point_a, point_b, gap, h, many):
     put_frame(k, normal, many)
     speed = qt.dot(normal, relative_velocity(k, many.twist, many))
     slop = pair_slop(a, b, many)
-    if gap > slop and gap + h * speed - 0.5 * h * h * acceleration > slop:
+    is_out_of_reach = gap > slop and gap + h * speed - 0.5 * h * h * acceleration > slop
+    if is_out_of_reach and not (_turns_far(a, b, many) and gap <= arrival(a, b, many)):
         return True
     many.gap[k], many.speed[k], many.owner[k] = gap, speed, owner
     local = normal

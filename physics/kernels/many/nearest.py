@@ -86,9 +86,9 @@ def nearest_to_origin(count, many):
                 is_inside = False
             u = (height / area * n[0], height / area * n[1], height / area * n[2])
             a, b, c = minus(p, u), minus(q, u), minus(w, u)
-            if qt.dot(n, qt.cross(a, b)) > 0.0 and qt.dot(n, qt.cross(b, c)) > 0.0 and qt.dot(n, qt.cross(c, a)) > 0.0:
-                if qt.dot(u, u) < best:
-                    best, v, i_best, j_best = qt.dot(u, u), u, i, j
+            is_above = qt.dot(n, qt.cross(a, b)) > 0.0 and qt.dot(n, qt.cross(b, c)) > 0.0
+            if is_above and qt.dot(n, qt.cross(c, a)) > 0.0 and qt.dot(u, u) < best:
+                best, v, i_best, j_best = qt.dot(u, u), u, i, j
     if is_inside:
         p, q, r = vector(S, 0, 0), vector(S, 1, 0), vector(S, 2, 0)
         n = qt.cross(minus(q, p), minus(r, p))

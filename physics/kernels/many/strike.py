@@ -7,10 +7,10 @@ import math
 from physics.kernels import quaternion as qt
 from physics.kernels.compiler import inlined, kernel
 from physics.kernels.many import memory as kept
-from physics.kernels.many.contacts import acceleration_of, pair_slop, put, vector
+from physics.kernels.many.arrays import CONTACTS
+from physics.kernels.many.contacts import acceleration_of, arrival, pair_slop, put, vector
 from physics.kernels.many.restraint import settle_restrained
 from physics.kernels.many.told import log_impacts
-from physics.kernels.many.tumbling import arrival
 
 # A meeting is fast where it would close this share of the smaller body's radius in the time left: it is then met in
 # time, not stopped in front of.
@@ -60,12 +60,27 @@ def fast_speed(k, h, many):
 
 
 @inlined
+def _pair_touches(k, step, many):
+    """Whether contact k, or one that follows it in the set by steps of `step`, is one of the same pair that touches."""
+    a, b = many.ends[k, 0], many.ends[k, 1]
+    least = arrival(a, b, many)
+    while 0 <= k < many.counts[CONTACTS] and many.ends[k, 0] == a and many.ends[k, 1] == b:
+        if not many.gap[k] > least:
+            return True
+        k += step
+    return False
+
+
+@inlined
 def is_seen_to(k, many):
-    """Whether `tumbling` finds when contact k is met: a body that turns far does not go where its features point now."""
+    """Whether `tumbling` finds when contact k is met: a body that turns far does not go where its features point now.
+
+    It looks at what is apart: where the pair touches elsewhere the contact is foretold as any other.
+    """
     a, b = many.ends[k, 0], many.ends[k, 1]
     if not (many.spin[a] > 0.0 or (b >= 0 and many.spin[b] > 0.0)):
         return False
-    return many.gap[k] > arrival(a, b, many)
+    return not _pair_touches(k, 1, many) and not _pair_touches(k, -1, many)
 
 
 @inlined

@@ -18,7 +18,7 @@ from physics.kernels.compiler import inlined, kernel
 from physics.kernels.flight import fly
 from physics.kernels.layout import HULL, NORMAL, OFFSET
 from physics.kernels.many.arrays import PAIRS
-from physics.kernels.many.contacts import minus, pair_slop, plus, vector
+from physics.kernels.many.contacts import arrival, minus, plus, vector
 from physics.kernels.many.near import may_meet, may_reach_wall
 from physics.kernels.many.nearest import corner_of_hull, distance_between
 from physics.kernels.quaternion import to_matrix
@@ -37,24 +37,13 @@ from physics.kernels.tumbling import (
     tilting_time,
 )
 
-# Turn from which bodies are looked at where an error is asked for [rad]: the points of a body that turns by less within a
-# part are off the line along which contacts are foretold by θ²/8 of its radius, 5e-5.
+# Turn from which bodies are looked at where an error is asked for [rad]: of a body that turns by less within a part the
+# points are off the line along which contacts are foretold by θ²/8 of its radius, 5e-5.
 LEAST_TURN = 0.02
 
-# Distance at which two bodies have arrived, where the slop is less, in the smaller bounding radius: what is left is
-# small enough for contacts to be foretold by their speed, and large beside rounding. They are flown to `NEAR` of it:
-# a contact's gap is along its own normal, which may be 11 degrees off, and none must be left to the other's care.
-ARRIVED = 1.0e-7
+# Share of `contacts.arrival` to which they are flown: a contact's gap is along its own normal, which may be 11 degrees
+# off, and none must be left to the other's care.
 NEAR = 0.5
-
-
-@inlined
-def arrival(a, b, many):
-    """Gap at which what turns far has arrived at a wall (b < 0) or another body [m]."""
-    radius = many.bodies[a].radius
-    if b >= 0:
-        radius = min(radius, many.bodies[b].radius)
-    return max(pair_slop(a, b, many), ARRIVED * radius)
 
 
 @inlined
