@@ -2,8 +2,8 @@
 
 A rod of 2 x 0.02 x 0.02 m turns by 0.3 to 3 rad a step past a ball, a cube, a hull, another rod that turns as well, and
 a wall; an ellipsoid of these axes past a ball and a wall. An oracle (`tests.reference.turning`) says of each placement
-whether the rod meets the thing; a third of them are drawn near to grazing. Missed: it does, by more than `MARGIN` where nothing hinders it, and the run has no impulse.
-Invented: it stays clear by more than that, and there is one.
+whether the rod meets the thing; a third of them are drawn near to grazing. Missed: it does, by more than `MARGIN` where
+nothing hinders it, and the run has no impulse. Invented: it stays clear by more than that, and there is one.
 """
 
 from __future__ import annotations

@@ -34,7 +34,7 @@ def test_the_truth_knows_a_disc():
         ball = far * np.array([0.0, 1.0, 0.0])
         half = np.array([1, 0.01, 0.01])
         found, _ = truth.least(
-            lambda t, ball=ball, top=top: truth.apart_from_ball(*top.at(0, t), half, ball, 0.1), 0.03
+            lambda t, ball=ball, top=top, half=half: truth.apart_from_ball(*top.at(0, t), half, ball, 0.1), 0.03
         )
         if least > 0:
             assert found == pytest.approx(far - 0.1 - np.hypot(1, 0.01), abs=1e-5)
