@@ -28,6 +28,7 @@ from physics.kernels.clearance import clear_substeps
 from physics.kernels.compiler import inlined, kernel
 from physics.kernels.compliance import lift_to_due, stiffness
 from physics.kernels.contact import gap_of, gap_rate, gather, nearest_outside_set, push_out, what_is_behind
+from physics.kernels.crossing import crossing, second_difference
 from physics.kernels.events.log import drop_events, forget_events
 from physics.kernels.fields.loads import (
     bind_fields,
@@ -124,29 +125,6 @@ def kept_out(y, tilted, work):
         s = math.sqrt(1.0 - lift / kinetic) if lift < kinetic else 0.0
         v, L = (s * v[0], s * v[1], s * v[2]), (s * L[0], s * L[1], s * L[2])
     return z, q, v, L
-
-
-@inlined
-def second_difference(a, fa, b, fb, c, fc):
-    """Second divided difference of three values: half of a parabola's second derivative; 0 of equal places."""
-    if not (a < b < c):
-        return 0.0
-    return ((fc - fb) / (c - b) - (fb - fa) / (b - a)) / (c - a)
-
-
-@inlined
-def crossing(low_gap, high_gap, width, bend):
-    """Where the parabola from low_gap >= 0 to high_gap < 0, `width` later, is zero: within [0, width].
-
-    With the slope B at its start and `bend` c, c x² + B x + low_gap = 0: of the root's two forms the one that does not
-    cancel. A gap that grows at first (B > 0) comes down again: c < 0.
-    """
-    if not low_gap > 0.0:
-        return 0.0
-    B = (high_gap - low_gap) / width - bend * width
-    root = math.sqrt(max(B * B - 4.0 * bend * low_gap, 0.0))
-    x = 2.0 * low_gap / (root - B) if B < 0.0 else (B + root) / (-2.0 * bend)
-    return min(x, width)
 
 
 @kernel

@@ -16,6 +16,9 @@ zero at a time where it is positive. The body is flown there, and looked at agai
 With the principal moments' inverses J, J² <= (J_max + J_min) J - J_max J_min between the least and the largest, so that
 |ω|² <= (J_max + J_min) ω·L - J_max J_min |L|²: equal for a rod that turns across its axis. In Euler's equations the
 factors are between -1 and 1, |dω/dt| <= |ω|²/√3 + J_max |τ|. So a <= |a_centre| + R (1 + 1/√3) |ω|² + R J_max |τ|.
+By components along the principal axes, ρ_i the largest distance of points from axis i and w_i the bound
+min(√(J_i ω·L), J_i |L|) of |ω_i|: |ω x r| <= Σ w_i ρ_i and |dω/dt x r| <= Σ (w_j w_k + J_i |τ|) ρ_i, which is less
+where a rod turns fast about its own axis. The smaller one counts.
 """
 
 from __future__ import annotations
@@ -28,7 +31,7 @@ from physics.kernels.arms import center_arm, wall_normal
 from physics.kernels.body import angular_velocity
 from physics.kernels.compiler import inlined, kernel
 from physics.kernels.flight import fly
-from physics.kernels.layout import ELLIPSOID, OFFSET, SPHERE
+from physics.kernels.layout import ELLIPSOID, HULL, OFFSET, SPHERE
 from physics.kernels.quaternion import to_matrix
 
 # A body turns far where it turns by more than this within a step [rad]; less is looked for at the ends of stages.
@@ -84,10 +87,30 @@ def spin_bound(q, L, h, tilted, work):
 
 
 @inlined
-def bend_bound(spin, work):
-    """Bound of what turning accelerates a point by, `spin` that of |ω| [m/s²]."""
+def _arm(i, tilted, work):
+    """How far points of a body are from its principal axis i, at most [m]."""
+    if tilted is not None or work.shape == HULL:
+        return work.radius
+    b, c = work.dims[(i + 1) % 3], work.dims[(i + 2) % 3]
+    return math.sqrt(b * b + c * c)
+
+
+@kernel
+def bend_bound(spin, q, L, h, tilted, work):
+    """Bound of what turning accelerates points by within h [m/s²], `spin` that of |ω|; 0 of a sphere about its centre."""
+    if work.shape == SPHERE and is_centred(tilted, work):
+        return 0.0
     torque = math.sqrt(work.torque[0] ** 2 + work.torque[1] ** 2 + work.torque[2] ** 2)
-    return work.radius * (ACCELERATION_SHARE * spin * spin + largest_moment(work) * torque)
+    w, most, J = angular_velocity(q, L, work, tilted), largest_moment(work), work.J
+    size = math.sqrt(qt.dot(L, L)) + h * torque
+    energy = math.sqrt(max(0.0, qt.dot(w, L))) + math.sqrt(most) * h * torque
+    u = min(math.sqrt(J[0]) * energy, J[0] * size)
+    v = min(math.sqrt(J[1]) * energy, J[1] * size)
+    t = min(math.sqrt(J[2]) * energy, J[2] * size)
+    a, b, c = _arm(0, tilted, work), _arm(1, tilted, work), _arm(2, tilted, work)
+    bend = spin * (u * a + v * b + t * c)
+    bend += (v * t + J[0] * torque) * a + (t * u + J[1] * torque) * b + (u * v + J[2] * torque) * c
+    return min(bend, work.radius * (ACCELERATION_SHARE * spin * spin + most * torque))
 
 
 @inlined
@@ -139,7 +162,7 @@ def safe_time(y, wall, horizon, spin, tilted, work):
     if tilted is not None:
         c = center_arm(R, work)
     rate = qt.dot(n, v)
-    bend = bend_bound(spin, work) - min(0.0, n[0] * a[0] + n[1] * a[1] + n[2] * a[2])
+    bend = bend_bound(spin, q, L, horizon, tilted, work) - min(0.0, n[0] * a[0] + n[1] * a[1] + n[2] * a[2])
     gap = _height(0.0, n, m, d, rate, bend, c, R, work)
     if not gap > 0.0 or not bend > 0.0:
         return gap, horizon

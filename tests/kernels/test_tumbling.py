@@ -88,7 +88,7 @@ def _dims(body):
 
 @pytest.mark.parametrize("shape", ["block", "ellipsoid"])
 def test_no_wall_is_reached_within_the_safe_time(shape):
-    """Against the closed form of the free motion, at 400 moments; mostly it is more than the gap over a point's speed."""
+    """Against the closed form of free motion, at 400 moments; mostly it is more than the gap over a point's speed."""
     rng, half = np.random.default_rng(6), np.array([1.0, 0.05, 0.05])
     body = physics.Block(tuple(2 * half), 1.0) if shape == "block" else physics.Ellipsoid(tuple(half), 1.0)
     moved = type(body)(**{**_parts(body), "pos": (0.0, 5.0, 0.0)})

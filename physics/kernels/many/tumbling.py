@@ -16,7 +16,7 @@ from physics.kernels.arms import center_arm
 from physics.kernels.body import angular_velocity, read_state
 from physics.kernels.compiler import inlined, kernel
 from physics.kernels.flight import fly
-from physics.kernels.layout import HULL, NORMAL, OFFSET
+from physics.kernels.layout import HULL, NORMAL, OFFSET, SPHERE
 from physics.kernels.many.arrays import PAIRS
 from physics.kernels.many.contacts import arrival, minus, plus, vector
 from physics.kernels.many.near import may_meet, may_reach_wall
@@ -30,6 +30,7 @@ from physics.kernels.tumbling import (
     bend_bound,
     chord,
     first_bracket,
+    is_centred,
     lowest,
     may_turn,
     spin_bound,
@@ -87,12 +88,14 @@ def forget_turning(many):
 
 @inlined
 def _side(b, y, n, tilted, many):
-    """(geometric centre, rotation, its arm, velocity along n, n x ω) of body b in state y."""
+    """(geometric centre, rotation, its arm, velocity along n, n x ω) of body b in state y; a sphere's ω is left out."""
     x, q, v, L = y
-    R, c = to_matrix(q), (0.0, 0.0, 0.0)
+    R, c, m = to_matrix(q), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
     if tilted is not None:
         c = center_arm(R, many.bodies[b])
-    return plus(x, 1.0, c), R, c, qt.dot(n, v), qt.cross(n, angular_velocity(q, L, many.bodies[b], tilted))
+    if not (many.bodies[b].shape == SPHERE and is_centred(tilted, many.bodies[b])):
+        m = qt.cross(n, angular_velocity(q, L, many.bodies[b], tilted))
+    return plus(x, 1.0, c), R, c, qt.dot(n, v), m
 
 
 @inlined
@@ -134,6 +137,8 @@ def _safe_time(a, b, n, one, other, bend, horizon, hulls, many):
     gap = _apart(0.0, a, b, n, one, other, rate, bend, hulls, many)
     if not gap > 0.0:
         return 0.0
+    if not bend > 0.0:
+        return horizon
     low, high = first_bracket(gap, rate, turning, bend, horizon)
     at_low = _apart(low, a, b, n, one, other, rate, bend, hulls, many)
     at_high = _apart(high, a, b, n, one, other, rate, bend, hulls, many)
@@ -156,21 +161,20 @@ def _safe_time(a, b, n, one, other, bend, horizon, hulls, many):
 
 
 @inlined
-def _bend(a, b, n, h, tilted, many):
-    """Bound of what takes the gap of a and b off its line [m/s²]."""
-    g = many.bodies[a].free_acceleration
-    towards, bend = n[0] * g[0] + n[1] * g[1] + n[2] * g[2], bend_bound(many.spin[a], many.bodies[a])
-    if not many.spin[a] > 0.0:
-        _, q, _, L = read_state(many.now, a)
-        bend = bend_bound(spin_bound(q, L, h, tilted, many.bodies[a]), many.bodies[a])
-    if b >= 0:
-        g, spin = many.bodies[b].free_acceleration, many.spin[b]
-        towards -= n[0] * g[0] + n[1] * g[1] + n[2] * g[2]
-        if not spin > 0.0:
-            _, q, _, L = read_state(many.now, b)
-            spin = spin_bound(q, L, h, tilted, many.bodies[b])
-        bend += bend_bound(spin, many.bodies[b])
-    return bend - min(0.0, towards)
+def _bend(b, h, tilted, many):
+    """Bound of what turning accelerates a point of body b by within h [m/s²]."""
+    _, q, _, L = read_state(many.now, b)
+    spin = many.spin[b]
+    if not spin > 0.0:
+        spin = spin_bound(q, L, h, tilted, many.bodies[b])
+    return bend_bound(spin, q, L, h, tilted, many.bodies[b])
+
+
+@inlined
+def _pull(b, n, many):
+    """Acceleration of body b along n [m/s²]."""
+    g = many.bodies[b].free_acceleration
+    return n[0] * g[0] + n[1] * g[1] + n[2] * g[2]
 
 
 @kernel
@@ -185,6 +189,7 @@ def _meeting(a, b, h, gyroscopic, tilted, hulls, many):
     other, partner = one, a
     if b >= 0:
         other, partner = read_state(many.now, b), b
+    bend = _bend(a, h, tilted, many) + (_bend(b, h, tilted, many) if b >= 0 else 0.0)
     is_held = many.touched[a] == 1 or many.touched[partner] == 1
     n = (1.0, 0.0, 0.0)
     if b < 0:
@@ -208,8 +213,8 @@ def _meeting(a, b, h, gyroscopic, tilted, hulls, many):
                 return first
         if not gap > touch:
             return gone
-        bend = _bend(a, b, n, h, tilted, many)
-        step = _safe_time(a, b, n, left, right, bend, first - gone, hulls, many)
+        pull = _pull(a, n, many) - (_pull(b, n, many) if b >= 0 else 0.0)
+        step = _safe_time(a, b, n, left, right, bend - min(0.0, pull), first - gone, hulls, many)
         if not step > 0.0:
             break
         gone += step
