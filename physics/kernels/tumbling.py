@@ -44,7 +44,7 @@ MOST_CUTS = 64
 MOST_ADVANCES = 100
 
 # Chords and halvings of one advance, and the share of the gap that may be left.
-CHORDS = 6
+CHORDS = 8
 LEFT_SHARE = 0.2
 
 ACCELERATION_SHARE = 1.0 + 1.0 / math.sqrt(3.0)
@@ -97,7 +97,7 @@ def _arm(i, tilted, work):
 
 @kernel
 def bend_bound(spin, q, L, h, tilted, work):
-    """Bound of what turning accelerates points by within h [m/s²], `spin` that of |ω|; 0 of a sphere about its centre."""
+    """Bound of what turning accelerates points by within h [m/s²], `spin` that of |ω|; 0 of a centred sphere."""
     if work.shape == SPHERE and is_centred(tilted, work):
         return 0.0
     torque = math.sqrt(work.torque[0] ** 2 + work.torque[1] ** 2 + work.torque[2] ** 2)
@@ -146,6 +146,12 @@ def chord(low, at_low, high, at_high):
 
 
 @inlined
+def middle(low, high):
+    """Between low and high > low >= 0, so that few halvings find a time of any size."""
+    return math.sqrt(low * high) if high > 4.0 * low else 0.5 * (low + high)
+
+
+@inlined
 def _height(t, n, m, gap, rate, bend, c, R, work):
     """Bound of the gap to a wall after t, see the module; c is the geometric centre from the centre of mass."""
     k = tilted_normal(n, m, t)
@@ -178,7 +184,7 @@ def safe_time(y, wall, horizon, spin, tilted, work):
             low, at_low = t, found
         if at_low <= LEFT_SHARE * gap:
             break
-        t = 0.5 * (low + high)
+        t = middle(low, high)
         found = _height(t, n, m, d, rate, bend, c, R, work)
         if found > 0.0:
             low, at_low = t, found

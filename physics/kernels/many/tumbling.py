@@ -33,6 +33,7 @@ from physics.kernels.tumbling import (
     is_centred,
     lowest,
     may_turn,
+    middle,
     spin_bound,
     tilted_normal,
     tilting_time,
@@ -151,7 +152,7 @@ def _safe_time(a, b, n, one, other, bend, horizon, hulls, many):
         found = _apart(t, a, b, n, one, other, rate, bend, hulls, many)
         if found > 0.0:
             low, at_low = t, found
-        t = 0.5 * (low + high)
+        t = middle(low, high)
         found = _apart(t, a, b, n, one, other, rate, bend, hulls, many)
         if found > 0.0:
             low, at_low = t, found
