@@ -40,8 +40,9 @@ from physics.kernels.tumbling import (
 )
 
 # Turn from which bodies are looked at where an error is asked for [rad]: of a body that turns by less within a part the
-# points are off the line along which contacts are foretold by θ²/8 of its radius, 5e-5.
-LEAST_TURN = 0.02
+# points are off the line along which contacts are foretold by θ²/8 of its radius, 1.3e-3. A part of longer turns that
+# meets something differs from its halves if these do not, and is refused.
+LEAST_TURN = 0.1
 
 # Share of `contacts.arrival` to which they are flown: a contact's gap is along its own normal, which may be 11 degrees
 # off, and none must be left to the other's care.
