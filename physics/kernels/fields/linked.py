@@ -12,12 +12,13 @@ from numba.extending import overload
 
 from physics.kernels import layout as at
 from physics.kernels import quaternion as qt
-from physics.kernels.body import angular_velocity, read_state
+from physics.kernels.body import angular_velocity, principal_attitude, read_state, turning
 from physics.kernels.compiler import CHOSEN, inlined, kernel
-from physics.kernels.fields.loads import field_load, put_loads
-from physics.kernels.fields.spring import DAMPING, LENGTH, STIFFNESS, stretch
+from physics.kernels.fields.loads import all_loads, field_load, field_state, note_rates, put_all, put_loads
+from physics.kernels.fields.spring import DAMPING, LENGTH, STIFFNESS, line_stiffness, stretch
 from physics.kernels.fields.state import ZERO, acting_at, minus, plus, times, velocity_at
-from physics.kernels.fields.terms import LOAD, instances
+from physics.kernels.fields.stiffness import answer_of, answer_to, arm_square, axes_across, mobility_bound, soften_arm
+from physics.kernels.fields.terms import LOAD, instances, softened, total_load
 from physics.kernels.flight import drift
 from physics.kernels.many.islands import join
 
@@ -26,7 +27,8 @@ ANCHOR = 3
 VELOCITY = 9  # of the anchor, world frame [m/s]
 OTHER = 12  # index of the other body, -1: the spring is not at this one
 OTHER_POINT = 13  # in the other body's frame, from its centre of mass [m]
-SIZE = 16
+OTHER_MOBILITY = 16  # bound of the inverse mass of that point [1/kg]
+SIZE = 17
 
 
 @inlined
@@ -40,6 +42,27 @@ def linked_spring(state, p, t):
         return acting_at(arm, times(-p[DAMPING], u))
     s = p[STIFFNESS] * (l - p[LENGTH]) + p[DAMPING] * qt.dot(u, e) / l
     return acting_at(arm, times(-s / l, e))
+
+
+@inlined
+def linked_spring_rates(state, p, J):
+    """Rates of `stiffness`, of the two ends against each other."""
+    if p[OTHER] < 0.0:
+        return ZERO
+    force, _ = linked_spring(state, p, 0.0)
+    arm, _, _ = stretch(state, p)
+    w = mobility_bound(arm, state.mass, J) + p[OTHER_MOBILITY]
+    return (p[DAMPING] * w, p[STIFFNESS] * w + arm_square(force, arm, J), 0.0)
+
+
+@inlined
+def soften_linked_arm(loads, h, R, state, p, J):
+    """Torque as `stiffness` has it under the force at its arm; the rest is for both ends at once (`hold_linked_loads`)."""
+    if p[OTHER] < 0.0:
+        return loads
+    force, _ = linked_spring(state, p, 0.0)
+    arm, _, _ = stretch(state, p)
+    return soften_arm(loads, h, force, arm, R, J)
 
 
 @inlined
@@ -93,14 +116,15 @@ def _record(world):
 
 
 @inlined
-def _put_anchor(first, columns, x, R, v, w):
-    """Write point and velocity of the other body, whose state this is, into the columns of a spring."""
+def _put_anchor(first, columns, x, R, v, w, mobility):
+    """Write point and velocity of the other body, whose state this is, and its mobility, into the columns of a spring."""
     o = first + OTHER_POINT
     r = qt.matvec(R, (columns[o], columns[o + 1], columns[o + 2]))
     place, speed = plus(x, r), plus(v, qt.cross(w, r))
     for c in range(3):
         columns[first + ANCHOR + c] = place[c]
         columns[first + VELOCITY + c] = speed[c]
+    columns[first + OTHER_MOBILITY] = mobility
 
 
 @inlined
@@ -130,7 +154,90 @@ def _put_anchors(first, count, tilted, bodies):
             if columns[k + OTHER] >= 0.0:
                 other = bodies[int(columns[k + OTHER])]
                 x, q, v, L = middle(other)
-                _put_anchor(k, columns, x, qt.to_matrix(q), v, angular_velocity(q, L, other, tilted))
+                w = angular_velocity(q, L, other, tilted)
+                o = k + OTHER_POINT
+                mobility = mobility_bound((columns[o], columns[o + 1], columns[o + 2]), other.mass, other.J)
+                _put_anchor(k, columns, x, qt.to_matrix(q), v, w, mobility)
+
+
+@inlined
+def _state_of(body, later, tilted):
+    """State that the fields of a body are told in its middle."""
+    x, q, v, L = middle(body)
+    return field_state(x, q, v, L, body.now + later, tilted, body)
+
+
+@inlined
+def _principal(body, tilted):
+    """Principal axes of a body in its middle."""
+    return qt.to_matrix(principal_attitude(middle(body)[1], body, tilted))
+
+
+@inlined
+def _soften_own(body, h, tilted):
+    """Let the loads of a body act that the implicit step over h of its own fields has, with those of its springs as given.
+
+    A body may be held by others alone: its springs to them follow (`_soften_pair`).
+    """
+    state = _state_of(body, 0.5 * h, tilted)
+    F, T = total_load(state, body.now + 0.5 * h, body)
+    put_all(softened(all_loads(F, T, body), h, _principal(body, tilted), state, body), body)
+
+
+@inlined
+def _loads_now(body):
+    """Acceleration and torque that act on a body."""
+    a, T = body.free_acceleration, body.torque
+    return (a[0], a[1], a[2]), (T[0], T[1], T[2])
+
+
+@kernel
+def _soften_pair(k, one, other, h, tilted):
+    """Loads of two bodies as the implicit step over h of the spring in columns k has them: equal and opposite changes."""
+    columns = one.columns
+    state, p = _state_of(one, 0.5 * h, tilted), columns[k : k + SIZE]
+    arm, e, l = stretch(state, p)
+    x, q, _, _ = middle(other)
+    o = k + OTHER_POINT
+    lever = qt.matvec(qt.to_matrix(q), (columns[o], columns[o + 1], columns[o + 2]))
+    J, R = (one.J[0], one.J[1], one.J[2]), _principal(one, tilted)
+    K, S = (other.J[0], other.J[1], other.J[2]), _principal(other, tilted)
+    w = mobility_bound(arm, one.mass, J) + mobility_bound(lever, other.mass, K)
+    n, along, across = line_stiffness(h, w, e, l, p)
+    s, t = axes_across(n)
+    first, second = _loads_now(one), _loads_now(other)
+    u = minus(
+        plus(first[0], qt.cross(turning(R, first[1], J), arm)),
+        plus(second[0], qt.cross(turning(S, second[1], K), lever)),
+    )
+    wn = plus(answer_of(n, arm, R, one.mass, J), answer_of(n, lever, S, other.mass, K))
+    ws = plus(answer_of(s, arm, R, one.mass, J), answer_of(s, lever, S, other.mass, K))
+    wt = plus(answer_of(t, arm, R, one.mass, J), answer_of(t, lever, S, other.mass, K))
+    f = answer_to(u, n, s, t, wn, ws, wt, along, across)
+    put_all((minus(first[0], times(1.0 / one.mass, f)), minus(first[1], qt.cross(arm, f))), one)
+    put_all((plus(second[0], times(1.0 / other.mass, f)), plus(second[1], qt.cross(lever, f))), other)
+
+
+@inlined
+def _soften_pairs(first, count, h, tilted, bodies):
+    """Loads as the implicit step over h of all springs between bodies has them, one spring after the other."""
+    for b in range(bodies.shape[0]):
+        for k in range(first, first + SIZE * count, SIZE):
+            j = int(bodies[b].columns[k + OTHER])
+            if j > b:  # each spring once
+                _soften_pair(k, bodies[b], bodies[j], h, tilted)
+
+
+@kernel
+def _note_all_rates(h, tilted, bodies):
+    """Note for all bodies whether a stage of length h is too long for the explicit midpoint rule: whether it is for one."""
+    stiff = 0
+    for b in range(bodies.shape[0]):
+        note_rates(_state_of(bodies[b], 0.5 * h, tilted), h, bodies[b])
+        stiff = max(stiff, bodies[b].is_stiff)
+    for b in range(bodies.shape[0]):
+        bodies[b].is_stiff = stiff
+    return stiff == 1
 
 
 @_if_linked(lambda arguments: _record(arguments[-1]), False)
@@ -145,6 +252,11 @@ def hold_linked_loads(first, count, h, gyroscopic, tilted, world):
         q = drift(q, L, bodies[b], half, gyroscopic, tilted)
         put_middle(bodies[b], (plus(x, times(half, v)), q, v, L))
     _put_anchors(first, count, tilted, bodies)
+    if _note_all_rates(h, tilted, bodies):
+        for b in range(bodies.shape[0]):
+            _soften_own(bodies[b], h, tilted)
+        _soften_pairs(first, count, h, tilted, bodies)
+        return True
     for b in range(bodies.shape[0]):
         if world.touched[b] == 0:
             _kick(bodies[b], half, tilted)
@@ -159,6 +271,14 @@ def hold_linked_loads(first, count, h, gyroscopic, tilted, world):
 @_if_linked(lambda arguments: _record(arguments[-1]), None)
 def place_anchors(first, count, tilted, world):
     """Put the anchors of all springs where the bodies' `middle` says."""
+    _put_anchors(first, count, tilted, world.bodies)
+
+
+@_if_linked(lambda arguments: _record(arguments[-1]), None)
+def place_anchors_now(first, count, tilted, world):
+    """Put the anchors of all springs where the bodies are now."""
+    for b in range(world.bodies.shape[0]):
+        put_middle(world.bodies[b], read_state(world.now, b))
     _put_anchors(first, count, tilted, world.bodies)
 
 
@@ -191,4 +311,4 @@ def look_for_anchors(first, count, i, state, bodies, work):
             j = i - i % bodies + int(work.columns[k + OTHER])
             x, q, v, _ = read_state(state, j)
             w = (state[j, at.ANGVEL], state[j, at.ANGVEL + 1], state[j, at.ANGVEL + 2])
-            _put_anchor(k, work.columns, x, qt.to_matrix(q), v, w)
+            _put_anchor(k, work.columns, x, qt.to_matrix(q), v, w, 0.0)
