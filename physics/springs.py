@@ -54,6 +54,7 @@ class Spring(Checked):
     energy: ClassVar = spring.spring_energy
     _rates: ClassVar = spring.spring_rates
     _soften: ClassVar = spring.soften_spring
+    _mean: ClassVar = spring.mean_spring
     has_many: ClassVar[bool] = True
 
     def __post_init__(self):
@@ -105,6 +106,7 @@ class _LinkedSpring(Spring):
     energy: ClassVar = linked.linked_spring_energy
     _rates: ClassVar = linked.linked_spring_rates
     _soften: ClassVar = linked.soften_linked_arm
+    _mean: ClassVar = None
     is_linked: ClassVar[bool] = True
 
 

@@ -12,8 +12,8 @@ moment: the norm of its impulse in the kinetic metric. So W <= p √(2 E_kin) + 
 *Work of the wind.* With κ the coefficient of the drag F = -κ (v - w), F·v <= κ w²/4, κ at speeds up to 2 w. Magnus lift has
 the power m γ (u x w)·e <= m γ |u| |w|, γ the rate at which it turns velocities.
 
-*Share.* A spring or a fluid with h Ω <= ½ is stepped by leapfrog, which keeps ½ k x² + ½ m v² (1 - (h Ω)²/4): E_n <=
-E_0/(1 - 1/16), a share of 1/15 of the energy of the motion and its potential. Contact is solved to the tolerance of the
+*Share.* A spring or a fluid with h Ω <= 1 is stepped by leapfrog, which keeps ½ k x² + ½ m v² (1 - (h Ω)²/4): E_n <=
+E_0/(1 - 1/4), a share of 1/3 of the energy of the motion and its potential. Contact is solved to the tolerance of the
 preset and may gain `GAIN_SHARE` of the kinetic energy in a stage.
 """
 
@@ -29,8 +29,8 @@ DECADES = 6.0  # on either side of a default
 STEPS = 30
 BODIES = 3
 
-# Energy of the motion and its potential that leapfrog may show beyond what there is, at h Ω = ½.
-LEAPFROG_SHARE = 1.0 / 15.0
+# Energy of the motion and its potential that leapfrog may show beyond what there is, at h Ω = 1.
+LEAPFROG_SHARE = 1.0 / 3.0
 
 # Per stage, by which contact may gain (`physics.kernels.stages.GAIN_SHARE`), and stages of a step: impacts cut it.
 CONTACT_SHARE = 2.0e-5
@@ -195,7 +195,8 @@ class EnergyLaw:
         self.drag, self.magnus, self.air = self._air(scene)
         now = physics.diagnose(world)
         self.start, self.kinetic = now.energy.sum(axis=1), now.kinetic_energy
-        self.low = self.high = self.start - self._gravity(now)
+        self.low = self.high = self._potential(now)
+        self.has_springs = any(isinstance(effect, physics.Spring) for effect in scene.effects)
         self.work = np.zeros(world.worlds)
         self.size = np.abs(self.start)
         self.excess = np.full(world.worlds, -np.inf)
@@ -239,6 +240,10 @@ class EnergyLaw:
         """(worlds,) energy of gravity [J]."""
         return -np.sum(self.mass * np.sum(self.world.gravity[:, None] * self.world.pos, axis=-1), axis=1)
 
+    def _potential(self, now) -> np.ndarray:
+        """(worlds,) energy of springs and fluids [J]."""
+        return now.potential_energy.sum(axis=1) - self._gravity(now)
+
     def add_step(self) -> None:
         """Add what a step may have done, and look at the energy after it."""
         now, h = physics.diagnose(self.world), self.world.dt
@@ -250,11 +255,12 @@ class EnergyLaw:
         energy, self.kinetic = now.energy.sum(axis=1), now.kinetic_energy
         self.work += gained.sum(axis=1)
         self.steps += 1
-        own = energy - self._gravity(now)
+        own = self._potential(now)
         self.low, self.high = np.minimum(self.low, own), np.maximum(self.high, own)
+        spread = self.high - (0.0 if self.has_springs else self.low)
         g = np.linalg.norm(self.world.gravity, axis=-1)[:, None]
         motion = (kinetic + 0.5 * self.mass * (g * h) ** 2).sum(axis=1)
-        allowed = LEAPFROG_SHARE * (self.high - self.low + motion) + ROUNDING * (self.size + np.abs(energy) + self.work)
+        allowed = LEAPFROG_SHARE * (spread + motion) + ROUNDING * (self.size + np.abs(energy) + self.work)
         if self.has_floor:
             allowed += CONTACT_SHARE * STAGES * self.steps * motion
         self.size = np.maximum(self.size, np.abs(energy) + np.abs(self._gravity(now)))

@@ -34,7 +34,7 @@ def _slope(state, p):
 
 
 @inlined
-def angular_drag_rates(state, p, J):
+def angular_drag_rates(state, p, J, h):
     """Rates of `stiffness`."""
     return (_slope(state, p) * max(J[0], J[1], J[2]), 0.0, 0.0)
 

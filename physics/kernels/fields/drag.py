@@ -60,7 +60,7 @@ def _slopes(state, p):
 
 
 @inlined
-def drag_rates(state, p, J):
+def drag_rates(state, p, J, h):
     """Rates of `stiffness`."""
     u, along, across = _slopes(state, p)
     return (

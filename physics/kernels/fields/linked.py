@@ -45,7 +45,7 @@ def linked_spring(state, p, t):
 
 
 @inlined
-def linked_spring_rates(state, p, J):
+def linked_spring_rates(state, p, J, h):
     """Rates of `stiffness`, of the two ends against each other."""
     if p[OTHER] < 0.0:
         return ZERO

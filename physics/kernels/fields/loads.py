@@ -30,6 +30,7 @@ from physics.kernels.fields.terms import (
     softened,
     total_air,
     total_load,
+    total_mean_load,
     total_rates,
     total_unknown,
 )
@@ -138,7 +139,7 @@ def _more(a, b):
 @kernel
 def note_rates(state, h, work):
     """Note whether a stage of length h is too long for the explicit midpoint rule, and for the fields at all."""
-    rates = total_rates(state, work.now, work)
+    rates = total_rates(state, h, work)
     work.rate = max(rates[0], rates[2])
     work.is_stiff = 1 if is_beyond(rates, h) else 0
     if is_unresolved(rates, h):
@@ -261,6 +262,33 @@ def hold_softened_loads(y, h, gyroscopic, tilted, work):
     state = field_state(plus(x, times(half, v)), q, v, L, t, tilted, work)
     F, T = total_load(state, t, work)
     put_all(softened(all_loads(F, T, work), h, _axes(q, tilted, work), state, work), work)
+
+
+@inlined
+def loads_held(work):
+    """Acceleration and torque that act."""
+    return _vector(work.free_acceleration), _vector(work.torque)
+
+
+@inlined
+def size_of(loads, work):
+    """Bound of what an acceleration and a torque do to any point of the body [m/s²]."""
+    a, T = loads
+    J = max(work.J[0], work.J[1], work.J[2])
+    return math.sqrt(qt.dot(a, a)) + work.radius * J * math.sqrt(qt.dot(T, T))
+
+
+@inlined
+def change_to_agree(y, end, loads, h, gyroscopic, tilted, work):
+    """What `loads` lack to agree with a flight over h from y to `end`, softened as `stiffness` has it."""
+    t, half = work.now + 0.5 * h, 0.5 * h
+    v, L = times(0.5, plus(y[2], end[2])), times(0.5, plus(y[3], end[3]))
+    x, q = times(0.5, plus(y[0], end[0])), drift(y[1], y[3], work, half, gyroscopic, tilted)
+    middle = field_state(x, q, v, L, t, tilted, work)
+    first = field_state(y[0], y[1], v, L, t, tilted, work)
+    last = field_state(end[0], end[1], v, L, t, tilted, work)
+    F, T = total_mean_load((middle, first, last), t, work)
+    return softened(_less(all_loads(F, T, work), loads), h, _axes(q, tilted, work), middle, work)
 
 
 @if_declared(False)

@@ -40,7 +40,7 @@ def _turning(state, p):
 
 
 @inlined
-def magnus_rates(state, p, J):
+def magnus_rates(state, p, J, h):
     """Rates of `stiffness`."""
     b = _turning(state, p)
     return (0.0, 0.0, math.sqrt(qt.dot(b, b)))

@@ -5,6 +5,10 @@ With e the vector from the anchor to the point, l = |e| and u the velocity of th
     F = -(k (l - l0) + c u·e/l) e/l,    energy ½ k (l - l0)².
 
 Where l = 0 the direction is that of the velocity (the damper's limit), and the spring does not pull.
+
+References
+----------
+O. Gonzalez, *Time integration and discrete Hamiltonian systems*, J. Nonlinear Sci. 6, 1996 (discrete gradients).
 """
 
 from __future__ import annotations
@@ -59,7 +63,27 @@ def spring_energy(state, p, t):
 
 
 @inlined
-def spring_rates(state, p, J):
+def mean_spring(states, p, t):
+    """(force, torque) of a spring between two states: the discrete gradient of its energy (Gonzalez 1996).
+
+    With e the mean of the vectors at both ends and l the mean of their lengths, F = -k (1 - l0/l) e does just what the
+    energy loses, F·(e1 - e0) = ½ k (l_0 - l0)² - ½ k (l_1 - l0)², since (e1 - e0)·(e1 + e0) = l_1² - l_0².
+    """
+    if p[STIFFNESS] == 0.0 and p[DAMPING] == 0.0:
+        return ZERO, ZERO
+    middle, first, last = states
+    r0, e0, l0 = stretch(first, p)
+    r1, e1, l1 = stretch(last, p)
+    arm, e, l = times(0.5, plus(r0, r1)), times(0.5, plus(e0, e1)), 0.5 * (l0 + l1)
+    u = velocity_at(middle, arm)
+    if l == 0.0:
+        return acting_at(arm, times(-p[DAMPING], u))
+    s = p[STIFFNESS] * (l - p[LENGTH]) + p[DAMPING] * qt.dot(u, e) / l
+    return acting_at(arm, times(-s / l, e))
+
+
+@inlined
+def spring_rates(state, p, J, h):
     """Rates of `stiffness`."""
     if p[STIFFNESS] == 0.0 and p[DAMPING] == 0.0:
         return ZERO
@@ -103,7 +127,7 @@ def push(state, p, t):
 
 
 @inlined
-def push_rates(state, p, J):
+def push_rates(state, p, J, h):
     """Rates of `stiffness`: a force along the world's axes swings the body."""
     if p[TURNS] != 0.0:
         return ZERO

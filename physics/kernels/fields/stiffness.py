@@ -30,12 +30,10 @@ from physics.kernels.body import turning
 from physics.kernels.compiler import inlined, kernel
 from physics.kernels.fields.state import minus, plus, times
 
-# A stage is taken implicitly where h λ, (h Ω)² or h γ is more.
+# A stage is taken implicitly where h λ is more, or where it does not resolve a field.
 DAMPING_LIMIT = 0.5
-SQUARE_LIMIT = 0.25
-TURNING_LIMIT = 0.5
 
-# It does not resolve a field where h Ω or h γ, the angle that it swings or turns by, is more.
+# It does not resolve a field where h Ω or h γ, the angle that it swings or turns by [rad], is more.
 ANGLE_LIMIT = 1.0
 
 
@@ -48,15 +46,15 @@ def implicit_share(z):
 
 
 @inlined
-def is_beyond(rates, h):
-    """Whether the explicit midpoint rule should not be used over h."""
-    return h * rates[0] > DAMPING_LIMIT or h * h * rates[1] > SQUARE_LIMIT or h * rates[2] > TURNING_LIMIT
-
-
-@inlined
 def is_unresolved(rates, h):
     """Whether a step of h does not resolve the swinging or turning of a field; damping is resolved by `graded_flight`."""
     return h * h * rates[1] > ANGLE_LIMIT * ANGLE_LIMIT or h * rates[2] > ANGLE_LIMIT
+
+
+@inlined
+def is_beyond(rates, h):
+    """Whether the explicit midpoint rule should not be used over h."""
+    return h * rates[0] > DAMPING_LIMIT or is_unresolved(rates, h)
 
 
 @inlined

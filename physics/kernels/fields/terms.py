@@ -42,7 +42,10 @@ class Term(NamedTuple):
     is_linked : bool
         Whether its loads depend on other bodies, too.
     rates : dispatcher or None
-        (state, parameters, inverse moments) -> the three rates of `stiffness`; None of a user's field.
+        (state, parameters, inverse moments, step) -> the three rates of `stiffness`; None of a user's field.
+    mean : dispatcher or None
+        (states in the middle, at the start and at the end, parameters, time) -> the load of a discrete gradient; None:
+        that of the middle.
     soften : dispatcher or None
         (acceleration and torque, step, principal axes, state, parameters, inverse moments) -> the same, as the
         implicit step would have them; None of a field whose loads depend neither on place nor on velocity.
@@ -56,6 +59,7 @@ class Term(NamedTuple):
     is_linked: bool = False
     rates: Callable | None = None
     soften: Callable | None = None
+    mean: Callable | None = None
 
 
 _KNOWN: dict[str, Term] = {}
@@ -84,8 +88,8 @@ def members(terms: tuple[Term, ...]) -> list[tuple]:
         ("columns", float, (max(columns, 1),)),  # parameters of all fields, in the order of the markers
         *((term.marker, float) for term in terms),
         *([("middle", float, (13,))] if is_linked else []),  # state in the middle of the stage: x, q, v, L
-        ("start", float, (13,)),  # of many bodies: state at the start of a stiff stage
-        ("low", float),  # of the first of many bodies: their potential energy then [J]
+        ("stage_start", float, (13,)),  # of many bodies: state at the start of a stiff stage
+        ("stage_energy", float),  # of the first of many bodies: their potential energy then [J]
     ]
 
 
@@ -181,6 +185,24 @@ def _no_air(state, t, work):
     return ZERO
 
 
+def _add_mean_load(before, function, first, last):
+    def add(states, t, work):
+        F, T = before(states, t, work)
+        f, m = function(states, work.columns[first:last], t)
+        return plus(F, f), plus(T, m)
+
+    return add
+
+
+def _add_middle_load(before, function, first, last):
+    def add(states, t, work):
+        F, T = before(states, t, work)
+        f, m = function(states[0], work.columns[first:last], t)
+        return plus(F, f), plus(T, m)
+
+    return add
+
+
 def _no_energy(state, t, work):
     return 0.0
 
@@ -194,13 +216,13 @@ def _add_load(before, function, first, last):
     return add
 
 
-def _no_rates(state, t, work):
+def _no_rates(state, h, work):
     return ZERO
 
 
 def _add_rates(before, function, first, last):
-    def add(state, t, work):
-        return plus(before(state, t, work), function(state, work.columns[first:last], work.J))
+    def add(state, h, work):
+        return plus(before(state, h, work), function(state, work.columns[first:last], work.J, h))
 
     return add
 
@@ -234,6 +256,26 @@ total_rates = _sum(LOAD, _no_rates, lambda term: term.rates, _add_rates)
 total_potential = _sum(LOAD, _no_load, lambda term: term.function if term.energy is not None else None, _add_load)
 total_supply = _sum(LOAD, _no_energy, lambda term: term.function if term.energy is None else None, _add_supply)
 total_unknown = _sum(LOAD, _no_load, lambda term: term.function if term.rates is None else None, _add_load)
+
+
+def total_mean_load(states, t, work):
+    """Load of all fields between two states, `states` in the middle, at the start and at the end: of discrete gradients."""
+    return _mean_load(work)(states, t, work)
+
+
+def _mean_load(work):
+    result = _no_load
+    for term, first, last in instances(work, LOAD):
+        if term.mean is not None:
+            result = _add_mean_load(composed(result), term.mean, first, last)
+        else:
+            result = _add_middle_load(composed(result), term.function, first, last)
+    return result
+
+
+@overload(total_mean_load, jit_options=CHOSEN, strict=False)
+def _choose_mean_load(states, t, work):
+    return _mean_load(work)
 
 
 def _as_it_is(loads, h, R, state, work):

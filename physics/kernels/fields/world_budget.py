@@ -22,7 +22,7 @@ from physics.kernels.restraint import kinetic_energy
 @inlined
 def _start(body):
     """(x, q, v, L) of a body at the start of the stage."""
-    m = body.start
+    m = body.stage_start
     return (m[0], m[1], m[2]), (m[3], m[4], m[5], m[6]), (m[7], m[8], m[9]), (m[10], m[11], m[12])
 
 
@@ -49,9 +49,9 @@ def note_start(tilted, world, first):
     """Keep states and potential energy at the start of a stage, if it is stiff; `first` is the first body's record."""
     if not _any_is_stiff(world.bodies):
         return
-    first.low = _potential(0.0, tilted, world)
+    first.stage_energy = _potential(0.0, tilted, world)
     for b in range(world.bodies.shape[0]):
-        (x, q, v, L), m = read_state(world.now, b), world.bodies[b].start
+        (x, q, v, L), m = read_state(world.now, b), world.bodies[b].stage_start
         m[0], m[1], m[2] = x
         m[3], m[4], m[5], m[6] = q
         m[7], m[8], m[9] = v
@@ -110,7 +110,7 @@ def pay_together(h, ties, tilted, world, first):
     if not _any_is_stiff(world.bodies):
         return
     high = _potential(h, tilted, world)
-    gain, size = high - first.low, abs(high) + abs(first.low)
+    gain, size = high - first.stage_energy, abs(high) + abs(first.stage_energy)
     for b in range(world.bodies.shape[0]):
         more, measure = _gain_of(b, h, tilted, world)
         gain, size = gain + more, size + measure
