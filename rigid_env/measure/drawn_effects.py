@@ -9,8 +9,8 @@ step the energy is held to
 *Work of loads.* A load of force F and torque T changes √(2 E_kin) by at most p = h √(F²/m + T² J), J the largest inverse
 moment: the norm of its impulse in the kinetic metric. So W <= p √(2 E_kin) + p².
 
-*Work of the wind.* With κ the coefficient of the drag F = -κ (v - w), F·v <= κ w²/4, κ at speeds up to 2 w. Magnus lift has
-the power m γ (u x w)·e <= m γ |u| |w|, γ the rate at which it turns velocities.
+*Work of the wind.* With κ the coefficient of the drag F = -κ (v - e) in air of velocity e, F·v <= κ e²/4, κ at speeds up to
+2 |e|. Lift F = s ω x u has the power s (ω x u)·e <= s |ω| |u| |e|.
 
 *Share.* A spring or a fluid with h Ω <= 1 is stepped by leapfrog, which keeps ½ k x² + ½ m v² (1 - (h Ω)²/4): E_n <=
 E_0/(1 - 1/4), a share of 1/3 of the energy of the motion and its potential. Contact is solved to the tolerance of the
@@ -223,7 +223,7 @@ class EnergyLaw:
         return self.world.dt * np.sqrt(force**2 / self.mass + torque**2 * self.J)
 
     def _air(self, scene) -> tuple[np.ndarray, np.ndarray, float]:
-        """κ of the drag at twice the speed of the air (bodies,), γ of the lift by ω (bodies,), speed of the air."""
+        """κ of the drag at twice the speed of the air (bodies,), lift by spin and speed (bodies,), speed of the air."""
         wind, drag, magnus = (scene.effect(kind) for kind in (physics.Wind, physics.Drag, physics.Magnus))
         speed = 0.0
         if wind is not None:
@@ -251,7 +251,7 @@ class EnergyLaw:
         gained = self.kick * np.sqrt(2 * kinetic) + self.kick**2
         spin = np.linalg.norm(self.world.angvel, axis=-1)
         speed = np.sqrt(2 * kinetic / self.mass) + self.air
-        gained = gained + h * (0.25 * self.drag + self.magnus * spin * speed / max(self.air, 1e-300)) * self.air**2
+        gained = gained + h * (0.25 * self.drag * self.air + self.magnus * spin * speed) * self.air
         energy, self.kinetic = now.energy.sum(axis=1), now.kinetic_energy
         self.work += gained.sum(axis=1)
         self.steps += 1
