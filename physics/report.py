@@ -57,9 +57,9 @@ _MESSAGES = {
         "wrench and parameters of this world, and shorten the step"
     ),
     Status.COARSE: (
-        "an effect changes too much within a step to be followed (a spring that swings, a lift that turns, buoyancy that "
-        "bobs by more than a radian, a field of your own): motion stays bounded, but its details are not right; shorten "
-        "dt, raise Accuracy.substeps, or weaken the effect"
+        "an effect changes too much within a step to be followed (a spring, a fluid or a lift that swings by more than "
+        "a radian, or a field of your own): its details are not right; shorten dt, raise Accuracy.substeps, or weaken "
+        "the effect"
     ),
     Status.LEFT_OUT: (
         "more bodies were near each other than there is room for, and contacts were left out; spread the bodies, or "
@@ -72,7 +72,9 @@ _MESSAGES = {
 }
 
 
-_GRAVITY = (Status.OK, Status.UNRESOLVED, Status.UNCONVERGED, Status.COARSE, Status.OVERLAP, Status.LEFT_OUT, Status.FAULT)
+_GRAVITY = (
+    Status.OK, Status.UNRESOLVED, Status.UNCONVERGED, Status.COARSE, Status.OVERLAP, Status.LEFT_OUT, Status.FAULT,
+)  # fmt: skip
 
 # What the kernel below compares with: Numba takes plain integers from a module.
 _UNRESOLVED, _UNCONVERGED, _FAULT = int(Status.UNRESOLVED), int(Status.UNCONVERGED), int(Status.FAULT)
@@ -123,8 +125,8 @@ class StepReport:
         the pivoting fallback (with the scheme ``events`` small leaps of first order, and parts of the shortest length
         with more than the error asked for); above the tolerance;
         impacts that cut a substep; substeps with more impacts than allowed; bodies whose loads or new state were not
-        finite, or beyond 1e100; contacts and near pairs of bodies for which there was no room; bodies that moved in fields
-        which the step does not resolve.
+        finite, or beyond 1e100; contacts and near pairs of bodies for which there was no room; bodies that moved in
+        fields which the step does not resolve.
     overlap : (worlds,) float64
         Deepest overlap of two bodies that this step began with [m], where they were put into each other by more than a
         hundredth of the smaller one's bounding radius; else 0.

@@ -1,25 +1,18 @@
 """Flight in fields that are stiff: a step cut into parts that begin short and grow.
 
-What damping does to a velocity is over after a few times 1/λ, and then λ may still be as large: of a linear drag it is. So
-the first part is a share of 1/λ, and each next one is longer than the one before by a constant factor: local errors are a
-share of what is left of the velocity, which falls faster. λ h = 10¹² takes 68 parts; the last one that there may be takes
-all that is left, by an implicit step, when nothing is left to err about.
+What damping does to a velocity is over after a few times 1/λ, and then λ may still be as large: of a linear drag it
+is. So the first part is a share of 1/λ, and each next one is longer than the one before by a constant factor: local
+errors are a share of what is left of the velocity, which falls faster. λ h = 10¹² takes 68 parts; the last one that
+there may be takes all that is left, by an implicit step, when nothing is left to err about.
 """
 
 from __future__ import annotations
 
 from physics.kernels.compiler import kernel
 from physics.kernels.fields.budget import paid
-from physics.kernels.fields.loads import (
-    change_to_agree,
-    hold_loads,
-    loads_held,
-    pass_time,
-    put_all,
-    set_now,
-    size_of,
-    time_now,
-)
+from physics.kernels.fields.field_loads import loads_held, put_all, size_of
+from physics.kernels.fields.loads import hold_loads, pass_time, set_now, time_now
+from physics.kernels.fields.resolution import change_to_agree
 from physics.kernels.fields.state import plus
 from physics.kernels.fields.terms import if_declared
 from physics.kernels.flight import coast
@@ -44,7 +37,7 @@ def implicit_flight(y, h, gyroscopic, tilted, scheme, work):
     """
     start = loads_held(work)
     size, loads = size_of(start, work), start
-    for k in range(ROUNDS):
+    for _ in range(ROUNDS):
         end = coast(y, h, gyroscopic, tilted, scheme, work)
         change = change_to_agree(y, end, loads, h, gyroscopic, tilted, work)
         loads = plus(loads[0], change[0]), plus(loads[1], change[1])

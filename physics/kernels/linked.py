@@ -25,8 +25,8 @@ from physics.kernels.fields.linked import hold_linked_loads
 from physics.kernels.fields.loads import bind_fields, set_clock
 from physics.kernels.fields.terms import Term
 from physics.kernels.fields.world_budget import note_reports, note_start, pay_together
-from physics.kernels.linked_smooth import PLANES, SIZE, step_smooth
 from physics.kernels.flight import coast
+from physics.kernels.linked_smooth import PLANES, SIZE, step_smooth
 from physics.kernels.turns import begin, next_world
 from physics.kernels.workspace import body_fields
 

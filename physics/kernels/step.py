@@ -36,11 +36,10 @@ from physics.kernels.fields.loads import (
     hold_loads,
     hold_mean_loads,
     hold_softened_loads,
-    is_stiff,
-    note_report,
     pass_time,
     set_clock,
 )
+from physics.kernels.fields.resolution import is_stiff, note_report
 from physics.kernels.flight import coast
 from physics.kernels.graded_flight import graded_flight
 from physics.kernels.laws import bind_laws

@@ -13,9 +13,10 @@ from rigid_env.hard_cases.case import Case, Check, Setting, none_of, within
 def balloon(on: Setting) -> Sequence[Check]:
     """A balloon of 3 g and radius 0.14 m, thrown at 40 m/s: x = ln(1 + k v₀ t)/k, v = v₀/(1 + k v₀ t), k = ½ρCπr²/m.
 
-    m v' = -½ρCπr² v² (Rayleigh). h λ = 2 h k v₀ is 4.7 at 10 ms: the explicit midpoint rule turns the velocity round and
-    multiplies it. A step is cut into parts that begin at h λ = ¼ and grow by half, each with v' = v/(1 + h k v), exact, and
-    x = h (v + v')/2, which errs by (h k v)²/12: 1/768 of the first part's way, more of later ones, 5 % of them all at most.
+    m v' = -½ρCπr² v² (Rayleigh). h λ = 2 h k v₀ is 4.7 at 10 ms: the explicit midpoint rule turns the velocity round
+    and multiplies it. A step is cut into parts that begin at h λ = ¼ and grow by half, each with v' = v/(1 + h k v),
+    exact, and x = h (v + v')/2, which errs by (h k v)²/12: 1/768 of the first part's way, more of later ones, 5 % of
+    them all at most.
     """
     radius, mass, v = 0.14, 0.003, 40.0
     drag = physics.Drag()
@@ -42,9 +43,9 @@ def rod_like_spring(on: Setting) -> Sequence[Check]:
     """A pendulum on a spring of Ω = 3000 rad/s, from 0.1 rad: it swings as on a rod, and no energy comes of it.
 
     The period of a pendulum is 2π √(l/g) (1 + θ₀²/16 + ...). No step of time stepping here resolves the spring, which a
-    report must say. With the mean of the lengths before and after a step in its force (Gonzalez's discrete gradient) the
-    spring keeps the energy, and the midpoint rule swings with tan(hω'/2) = hω/2: a share (hω)²/12 too slowly. Half a
-    step of either crossing may be lost where the length rings.
+    report must say. With the mean of the lengths before and after a step in its force (Gonzalez's discrete gradient)
+    the spring keeps the energy, and the midpoint rule swings with tan(hω'/2) = hω/2: a share (hω)²/12 too slowly.
+    Half a step of either crossing may be lost where the length rings.
     """
     length, mass, theta = 1.0, 1.0, 0.1
     rate = math.sqrt(GRAVITY / length)

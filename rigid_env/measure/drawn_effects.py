@@ -1,16 +1,16 @@
 """Worlds with drawn effects: no energy from nowhere, whatever the parameters and the step.
 
-Each draw is a scene of a sphere, a block and an ellipsoid that do not meet, in flight or on a floor, with one effect of the
-catalogue or two; parameters are drawn over twelve decades about their defaults, the step from 1 ms to 0.1 s. After every
-step the energy is held to
+Each draw is a scene of a sphere, a block and an ellipsoid that do not meet, in flight or on a floor, with one effect
+of the catalogue or two; parameters are drawn over twelve decades about their defaults, the step from 1 ms to 0.1 s.
+After every step the energy is held to
 
     E_n <= E_0 + Σ W_k + (share of the largest energy at hand) + rounding.
 
-*Work of loads.* A load of force F and torque T changes √(2 E_kin) by at most p = h √(F²/m + T² J), J the largest inverse
-moment: the norm of its impulse in the kinetic metric. So W <= p √(2 E_kin) + p².
+*Work of loads.* A load of force F and torque T changes √(2 E_kin) by at most p = h √(F²/m + T² J), J the largest
+inverse moment: the norm of its impulse in the kinetic metric. So W <= p √(2 E_kin) + p².
 
-*Work of the wind.* With κ the coefficient of the drag F = -κ (v - e) in air of velocity e, F·v <= κ e²/4, κ at speeds up to
-2 |e|. Lift F = s ω x u has the power s (ω x u)·e <= s |ω| |u| |e|.
+*Work of the wind.* With κ the coefficient of the drag F = -κ (v - e) in air of velocity e, F·v <= κ e²/4, κ at speeds
+up to 2 |e|. Lift F = s ω x u has the power s (ω x u)·e <= s |ω| |u| |e|.
 
 *Share.* A spring or a fluid with h Ω <= 1 is stepped by leapfrog, which keeps ½ k x² + ½ m v² (1 - (h Ω)²/4): E_n <=
 E_0/(1 - 1/4), a share of 1/3 of the energy of the motion and its potential. Contact is solved to the tolerance of the
@@ -92,10 +92,14 @@ ON_FLOOR = {
     "plastic contact": lambda rng: [physics.Contact(between_bodies=False)],
     "restitution": lambda rng: [physics.Contact(float(rng.random()), between_bodies=False)],
     "compliance": lambda rng: [
-        physics.Contact(between_bodies=False, stiffness=_decades(rng, 1e4), damping=_decades(rng, 10.0) * rng.integers(2))
+        physics.Contact(
+            between_bodies=False, stiffness=_decades(rng, 1e4), damping=_decades(rng, 10.0) * rng.integers(2)
+        )
     ],
     "friction": lambda rng: [physics.Friction(_decades(rng, 0.5))],
-    "friction of two coefficients": lambda rng: [physics.Friction((_decades(rng, 0.5), _decades(rng, 0.5)), _axis(rng))],
+    "friction of two coefficients": lambda rng: [
+        physics.Friction((_decades(rng, 0.5), _decades(rng, 0.5)), _axis(rng))
+    ],
     "rolling friction": lambda rng: [physics.RollingFriction(_decades(rng, 0.001)), physics.Friction()],
     "spin friction": lambda rng: [physics.SpinFriction(_decades(rng, 0.001)), physics.Friction()],
     "sleeping": lambda rng: [physics.Sleeping()],

@@ -23,11 +23,14 @@ def world_of(bodies, effects, dt, **options):
     return physics.World(physics.Scene(bodies, effects=effects), dt=dt, **options)
 
 
-@pytest.mark.parametrize("dt", (0.001, 0.005, 0.01, 0.02, 0.05, 0.1))
-@pytest.mark.parametrize("effects", ((), (physics.Gravity(),)), ids=("level", "falling"))
+@pytest.mark.parametrize("dt", [0.001, 0.005, 0.01, 0.02, 0.05, 0.1])
+@pytest.mark.parametrize("effects", [(), (physics.Gravity(),)], ids=("level", "falling"))
 def test_a_balloon_that_is_thrown(dt, effects):
-    """3 g, radius 0.14 m, 40 m/s: h λ = 2 h k v/m is 4.7 at 10 ms. Parts of the step have h λ = 1/4 at first; of the
-    first of them the trapezoid x = h (v + v')/2 errs by (h λ/2)²/12 of h v, and they are longer by half each: 2 % in all."""
+    """3 g, radius 0.14 m, 40 m/s: h λ = 2 h k v/m is 4.7 at 10 ms.
+
+    The first part of a step has h λ = 1/4. Its way x = h (v + v')/2 errs by (h λ/2)²/12 of h v, and the next parts are
+    longer by half each: 3 % in all.
+    """
     world = world_of([physics.Sphere(0.14, 0.003, linvel=(40.0, 0.0, 0.0))], [physics.Drag(), *effects], dt)
     report = world.step(steps=round(1.0 / dt))
     truth = flight_with_drag(0.14, 0.003, (40.0, 0.0, 0.0), 9.81 * len(effects), 1.0)
@@ -45,7 +48,8 @@ def test_drag_never_gives(c, dt, quadratic):
     for k in range(1, 6):
         report = world.step()
         now = world.linvel[0, 0]
-        assert 0.0 <= now[0] <= 0.75 * now[1] * (1 + 1e-12) + 1e-300 and np.linalg.norm(now) <= speed * (1 + 1e-14)
+        assert 0.0 <= now[0] <= 0.75 * now[1] * (1 + 1e-12) + 1e-300
+        assert np.linalg.norm(now) <= speed * (1 + 1e-14)
         speed = np.linalg.norm(now)
         assert report.ok
         if quadratic:
@@ -145,12 +149,13 @@ class Brake(physics.Field):
 
 
 @pytest.mark.parametrize(
-    ("kind", "limit"), ((Trough, 4.0 / 0.01**2), (Brake, 2.0 / 0.01)), ids=("stiff in place", "stiff in velocity")
+    ("kind", "limit"), [(Trough, 4.0 / 0.01**2), (Brake, 2.0 / 0.01)], ids=("stiff in place", "stiff in velocity")
 )
-@pytest.mark.parametrize("share", (1e-6, 0.2, 5.0, 1e6))
+@pytest.mark.parametrize("share", [1e-6, 0.2, 5.0, 1e6])
 def test_a_field_of_a_users_own_is_reported_where_it_is_not_resolved(kind, limit, share):
     """(h Ω)² = 4 and h λ = 2 are where the explicit rule begins to grow; 1 kg, 10 ms."""
-    world = world_of([physics.Sphere(0.1, 1.0, pos=(1.0, 0.0, 0.0), linvel=(0.0, 1.0, 0.0))], [kind(share * limit)], 0.01)
+    ball = physics.Sphere(0.1, 1.0, pos=(1.0, 0.0, 0.0), linvel=(0.0, 1.0, 0.0))
+    world = world_of([ball], [kind(share * limit)], 0.01)
     told = [world.step().status[0] == physics.Status.COARSE for _ in range(3)]
     assert any(told) == (share > 1.0)
 
@@ -158,7 +163,8 @@ def test_a_field_of_a_users_own_is_reported_where_it_is_not_resolved(kind, limit
 def test_what_lies_still_under_a_stiff_spring_is_not_reported():
     """Nothing moves: nothing is missed. The floor carries what the spring pushes with."""
     block = physics.Block((0.4, 0.3, 0.2), 2.0, pos=(0.0, 0.15, 0.0))
-    effects = [physics.Gravity(), physics.Contact(), physics.Friction(), physics.Spring((0, 1, 0), stiffness=1e7, length=1.0)]
+    spring = physics.Spring((0, 1, 0), stiffness=1e7, length=1.0)
+    effects = [physics.Gravity(), physics.Contact(), physics.Friction(), spring]
     world = physics.World(physics.Scene([block], [physics.HalfSpace((0, 1, 0))], effects), dt=0.01)
     for _ in range(20):
         report = world.step()

@@ -1,9 +1,10 @@
 """Energy of a stage whose fields are stiff: none comes from nowhere.
 
-An implicit step (`stiffness`) keeps the energy of a linear spring. Where springs have a rest length, act beside the centre
-of mass, or fluids end at a surface, it may gain. So the energy after such a stage is held to what was there before, what
-the held loads did on the way, and what fields without an energy gave: pushes, the wind. What is too much is taken from the
-motion. Where the motion has not as much the way was too far up a potential: the body stays where it was.
+An implicit step (`stiffness`) keeps the energy of a linear spring. Where springs have a rest length, act beside the
+centre of mass, or fluids end at a surface, it may gain. So the energy after such a stage is held to what was there
+before, what the held loads did on the way, and what fields without an energy gave: pushes, the wind. What is too much
+is taken from the motion. Where the motion has not as much the way was too far up a potential: the body stays where it
+was.
 """
 
 from __future__ import annotations
@@ -13,7 +14,7 @@ import math
 from physics.kernels import quaternion as qt
 from physics.kernels.body import angular_velocity
 from physics.kernels.compiler import inlined, kernel
-from physics.kernels.fields.loads import field_state
+from physics.kernels.fields.field_loads import field_state
 from physics.kernels.fields.state import minus, plus, times
 from physics.kernels.fields.terms import if_declared, total_energy, total_potential, total_supply
 from physics.kernels.restraint import kinetic_energy
@@ -21,8 +22,8 @@ from physics.kernels.restraint import kinetic_energy
 # Share of the energies at hand that rounding may add in a stage.
 ROUNDING = 1.0e-13
 
-# Share of the kinetic energy by which explicit loads of a stage in contact may miss the work of their fields, and beyond
-# which a stage that gains has not resolved them.
+# Share of the kinetic energy by which explicit loads of a stage in contact may miss the work of their fields, and
+# beyond which a stage that gains has not resolved them.
 EXPLICIT_SHARE = COARSE_SHARE = 0.01
 
 
@@ -49,7 +50,7 @@ def held_loads(work):
 
 @kernel
 def gain_of(y, end, h, tilted, work):
-    """(energy that a stage from y to `end` has gained from nowhere [J], its kinetic energy [J], rounding of both [J])."""
+    """(energy that a stage from y to `end` has gained from nowhere, its kinetic energy, rounding of both) [J]."""
     x, q, v, L = _middle(y, end)
     before, after = kinetic_energy(y[1], y[2], y[3], work, tilted), kinetic_energy(end[1], end[2], end[3], work, tilted)
     low, high = potential_energy(y, 0.0, tilted, work), potential_energy(end, h, tilted, work)

@@ -65,10 +65,10 @@ def _largest_section(state):
 def _squares(state, p, J, h):
     """Bounds of the squared frequencies of heaving and of rolling [1/s²].
 
-    Heaving: ρ g A/m. Rolling about an axis: the second moment of the section about it is at most A (d_j² + d_k²)/3 for a
-    block and A (d_j² + d_k²)/4 for an ellipsoid, whose moments of inertia are m (d_j² + d_k²)/3 and m (d_j² + d_k²)/5: at
-    most 5/4 of ρ g A/m. A centre of mass at c from the centre adds ρ g V |c| J, V <= 2 A |d|. None where the surface stays
-    clear of the body in the half step on either side.
+    Heaving: ρ g A/m. Rolling about an axis: the second moment of the section about it is at most A (d_j² + d_k²)/3
+    for a block and A (d_j² + d_k²)/4 for an ellipsoid, whose moments of inertia are m (d_j² + d_k²)/3 and m (d_j² +
+    d_k²)/5: at most 5/4 of ρ g A/m. A centre of mass at c from the centre adds ρ g V |c| J, V <= 2 A |d|. None where
+    the surface stays clear of the body in the half step on either side.
     """
     d, c = state.dims, state.center
     height = qt.dot((p[NORMAL], p[NORMAL + 1], p[NORMAL + 2]), plus(state.x, c)) - p[OFFSET]

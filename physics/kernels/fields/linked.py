@@ -12,23 +12,28 @@ from numba.extending import overload
 
 from physics.kernels import layout as at
 from physics.kernels import quaternion as qt
-from physics.kernels.body import angular_velocity, principal_attitude, read_state, turning
+from physics.kernels.body import angular_velocity, read_state
 from physics.kernels.compiler import CHOSEN, inlined, kernel
-from physics.kernels.fields.loads import all_loads, field_load, field_state, note_rates, put_all, put_loads
-from physics.kernels.fields.spring import DAMPING, LENGTH, STIFFNESS, line_stiffness, stretch
+from physics.kernels.fields.field_loads import field_load, put_loads
+from physics.kernels.fields.linked_implicit import (
+    ANCHOR,
+    OTHER,
+    OTHER_MOBILITY,
+    OTHER_POINT,
+    SIZE,
+    VELOCITY,
+    middle,
+    note_all_rates,
+    put_middle,
+    soften_own,
+    soften_pairs,
+)
+from physics.kernels.fields.spring import DAMPING, LENGTH, STIFFNESS, stretch
 from physics.kernels.fields.state import ZERO, acting_at, minus, plus, times, velocity_at
-from physics.kernels.fields.stiffness import answer_of, answer_to, arm_square, axes_across, mobility_bound, soften_arm
-from physics.kernels.fields.terms import LOAD, instances, softened, total_load
+from physics.kernels.fields.stiffness import arm_square, mobility_bound, soften_arm
+from physics.kernels.fields.terms import LOAD, instances
 from physics.kernels.flight import drift
 from physics.kernels.many.islands import join
-
-# Columns: those of a spring, whose anchor is the other body's point now, and after them
-ANCHOR = 3
-VELOCITY = 9  # of the anchor, world frame [m/s]
-OTHER = 12  # index of the other body, -1: the spring is not at this one
-OTHER_POINT = 13  # in the other body's frame, from its centre of mass [m]
-OTHER_MOBILITY = 16  # bound of the inverse mass of that point [1/kg]
-SIZE = 17
 
 
 @inlined
@@ -57,7 +62,7 @@ def linked_spring_rates(state, p, J, h):
 
 @inlined
 def soften_linked_arm(loads, h, R, state, p, J):
-    """Torque as `stiffness` has it under the force at its arm; the rest is for both ends at once (`hold_linked_loads`)."""
+    """Torque as `stiffness` has it under the force at its arm; the rest is done for both ends at once."""
     if p[OTHER] < 0.0:
         return loads
     force, _ = linked_spring(state, p, 0.0)
@@ -117,7 +122,7 @@ def _record(world):
 
 @inlined
 def _put_anchor(first, columns, x, R, v, w, mobility):
-    """Write point and velocity of the other body, whose state this is, and its mobility, into the columns of a spring."""
+    """Write point, velocity and mobility of the other body, whose state this is, into the columns of a spring."""
     o = first + OTHER_POINT
     r = qt.matvec(R, (columns[o], columns[o + 1], columns[o + 2]))
     place, speed = plus(x, r), plus(v, qt.cross(w, r))
@@ -125,24 +130,6 @@ def _put_anchor(first, columns, x, R, v, w, mobility):
         columns[first + ANCHOR + c] = place[c]
         columns[first + VELOCITY + c] = speed[c]
     columns[first + OTHER_MOBILITY] = mobility
-
-
-@inlined
-def middle(body):
-    """(x, q, v, L) of a body in the middle of the stage."""
-    m = body.middle
-    return (m[0], m[1], m[2]), (m[3], m[4], m[5], m[6]), (m[7], m[8], m[9]), (m[10], m[11], m[12])
-
-
-@inlined
-def put_middle(body, y):
-    """Write it."""
-    x, q, v, L = y
-    m = body.middle
-    m[0], m[1], m[2] = x
-    m[3], m[4], m[5], m[6] = q
-    m[7], m[8], m[9] = v
-    m[10], m[11], m[12] = L
 
 
 @inlined
@@ -160,86 +147,6 @@ def _put_anchors(first, count, tilted, bodies):
                 _put_anchor(k, columns, x, qt.to_matrix(q), v, w, mobility)
 
 
-@inlined
-def _state_of(body, later, tilted):
-    """State that the fields of a body are told in its middle."""
-    x, q, v, L = middle(body)
-    return field_state(x, q, v, L, body.now + later, tilted, body)
-
-
-@inlined
-def _principal(body, tilted):
-    """Principal axes of a body in its middle."""
-    return qt.to_matrix(principal_attitude(middle(body)[1], body, tilted))
-
-
-@inlined
-def _soften_own(body, h, tilted):
-    """Let the loads of a body act that the implicit step over h of its own fields has, with those of its springs as given.
-
-    A body may be held by others alone: its springs to them follow (`_soften_pair`).
-    """
-    state = _state_of(body, 0.5 * h, tilted)
-    F, T = total_load(state, body.now + 0.5 * h, body)
-    put_all(softened(all_loads(F, T, body), h, _principal(body, tilted), state, body), body)
-
-
-@inlined
-def _loads_now(body):
-    """Acceleration and torque that act on a body."""
-    a, T = body.free_acceleration, body.torque
-    return (a[0], a[1], a[2]), (T[0], T[1], T[2])
-
-
-@kernel
-def _soften_pair(k, one, other, h, tilted):
-    """Loads of two bodies as the implicit step over h of the spring in columns k has them: equal and opposite changes."""
-    columns = one.columns
-    state, p = _state_of(one, 0.5 * h, tilted), columns[k : k + SIZE]
-    arm, e, l = stretch(state, p)
-    x, q, _, _ = middle(other)
-    o = k + OTHER_POINT
-    lever = qt.matvec(qt.to_matrix(q), (columns[o], columns[o + 1], columns[o + 2]))
-    J, R = (one.J[0], one.J[1], one.J[2]), _principal(one, tilted)
-    K, S = (other.J[0], other.J[1], other.J[2]), _principal(other, tilted)
-    w = mobility_bound(arm, one.mass, J) + mobility_bound(lever, other.mass, K)
-    n, along, across = line_stiffness(h, w, e, l, p)
-    s, t = axes_across(n)
-    first, second = _loads_now(one), _loads_now(other)
-    u = minus(
-        plus(first[0], qt.cross(turning(R, first[1], J), arm)),
-        plus(second[0], qt.cross(turning(S, second[1], K), lever)),
-    )
-    wn = plus(answer_of(n, arm, R, one.mass, J), answer_of(n, lever, S, other.mass, K))
-    ws = plus(answer_of(s, arm, R, one.mass, J), answer_of(s, lever, S, other.mass, K))
-    wt = plus(answer_of(t, arm, R, one.mass, J), answer_of(t, lever, S, other.mass, K))
-    f = answer_to(u, n, s, t, wn, ws, wt, along, across)
-    put_all((minus(first[0], times(1.0 / one.mass, f)), minus(first[1], qt.cross(arm, f))), one)
-    put_all((plus(second[0], times(1.0 / other.mass, f)), plus(second[1], qt.cross(lever, f))), other)
-
-
-@inlined
-def _soften_pairs(first, count, h, tilted, bodies):
-    """Loads as the implicit step over h of all springs between bodies has them, one spring after the other."""
-    for b in range(bodies.shape[0]):
-        for k in range(first, first + SIZE * count, SIZE):
-            j = int(bodies[b].columns[k + OTHER])
-            if j > b:  # each spring once
-                _soften_pair(k, bodies[b], bodies[j], h, tilted)
-
-
-@kernel
-def _note_all_rates(h, tilted, bodies):
-    """Note for all bodies whether a stage of length h is too long for the explicit midpoint rule: whether it is for one."""
-    stiff = 0
-    for b in range(bodies.shape[0]):
-        note_rates(_state_of(bodies[b], 0.5 * h, tilted), h, bodies[b])
-        stiff = max(stiff, bodies[b].is_stiff)
-    for b in range(bodies.shape[0]):
-        bodies[b].is_stiff = stiff
-    return stiff == 1
-
-
 @_if_linked(lambda arguments: _record(arguments[-1]), False)
 def hold_linked_loads(first, count, h, gyroscopic, tilted, world):
     """`loads.hold_loads` for bodies that springs tie together: all at once. False, and nothing done, without those.
@@ -252,10 +159,10 @@ def hold_linked_loads(first, count, h, gyroscopic, tilted, world):
         q = drift(q, L, bodies[b], half, gyroscopic, tilted)
         put_middle(bodies[b], (plus(x, times(half, v)), q, v, L))
     _put_anchors(first, count, tilted, bodies)
-    if _note_all_rates(h, tilted, bodies):
+    if note_all_rates(h, tilted, bodies):
         for b in range(bodies.shape[0]):
-            _soften_own(bodies[b], h, tilted)
-        _soften_pairs(first, count, h, tilted, bodies)
+            soften_own(bodies[b], h, tilted)
+        soften_pairs(first, count, h, tilted, bodies)
         return True
     for b in range(bodies.shape[0]):
         if world.touched[b] == 0:

@@ -97,7 +97,8 @@ def spring_rates(state, p, J, h):
 def line_stiffness(h, w, e, l, p):
     """Direction of a spring, and Z of `stiffness` along it and across [kg]; w the mobility of its points [1/kg].
 
-    Across the line it is as stiff as it is tight, k (1 - l0/l); a spring that pushes would push over, which is left out.
+    Across the line it is as stiff as it is tight, k (1 - l0/l); a spring that pushes would push over, which is left
+    out.
     """
     spring, damper = 0.25 * h * h * p[STIFFNESS], h * implicit_share(h * p[DAMPING] * w) * p[DAMPING]
     if l == 0.0:

@@ -5,15 +5,16 @@ With the loads A = (a, T) of the middle, z = (v, ω) and the generalised mass M,
     z' = z + h (1 + M⁻¹ Z)⁻¹ M⁻¹ A,    Z = θ h D + (h²/4) K,
 
 D the damping and K the stiffness of the field: both positive, so that no step can amplify, whatever h. Loads in balance
-(A = 0) stay so. A spring has θ = ½ beside its h²/4: the implicit midpoint rule, which keeps a quadratic energy. Damping has
+(A = 0) stay so. A spring has θ = ½ beside its h²/4: the implicit midpoint rule, which keeps a quadratic energy.
+Damping has
 
     θ = max(½, 1 - 1/(h λ)),
 
 second order while it resolves the rate λ, and monotone beyond, towards implicit Euler. Several fields take their turn:
 Π (1 + M⁻¹ Z_i)⁻¹ differs from (1 + M⁻¹ Σ Z_i)⁻¹ by O(h²), and damps no less.
 
-A field says how stiff it is by three `rates`: of damping λ [1/s], the square of a frequency Ω² [1/s²], and of turning the
-velocity γ [1/s]. Each is a bound for one body alone.
+A field says how stiff it is by three `rates`: of damping λ [1/s], the square of a frequency Ω² [1/s²], and of turning
+the velocity γ [1/s]. Each is a bound for one body alone.
 
 References
 ----------
@@ -47,7 +48,7 @@ def implicit_share(z):
 
 @inlined
 def is_unresolved(rates, h):
-    """Whether a step of h does not resolve the swinging or turning of a field; damping is resolved by `graded_flight`."""
+    """Whether a step of h does not resolve the swinging or turning of a field; `graded_flight` resolves damping."""
     return h * h * rates[1] > ANGLE_LIMIT * ANGLE_LIMIT or h * rates[2] > ANGLE_LIMIT
 
 

@@ -138,7 +138,7 @@ def if_declared(otherwise=None):
 
 
 def if_unknown(otherwise=None):
-    """Make a function such a kernel that returns `otherwise` unless some field does not tell its rates: a user's own."""
+    """As `if_declared`, where some field does not tell its rates: a user's own."""
     return _chosen_by(_has_unknown, otherwise)
 
 
@@ -259,7 +259,7 @@ total_unknown = _sum(LOAD, _no_load, lambda term: term.function if term.rates is
 
 
 def total_mean_load(states, t, work):
-    """Load of all fields between two states, `states` in the middle, at the start and at the end: of discrete gradients."""
+    """Load of all fields over a stage, `states` in its middle, at its start and at its end: of discrete gradients."""
     return _mean_load(work)(states, t, work)
 
 

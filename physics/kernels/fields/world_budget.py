@@ -1,7 +1,7 @@
 """`budget` for worlds of many bodies: the energy of a stiff stage is that of all of them together.
 
-Springs carry energy from body to body, and so does contact. What is too much is taken from the motion of all bodies: where
-nothing but each other holds them, from that against their common centre, so that they keep their momentum.
+Springs carry energy from body to body, and so does contact. What is too much is taken from the motion of all bodies:
+where nothing but each other holds them, from that against their common centre, so that they keep their momentum.
 """
 
 from __future__ import annotations
@@ -12,8 +12,9 @@ from physics.kernels import quaternion as qt
 from physics.kernels.body import angular_velocity, read_state, write_state
 from physics.kernels.compiler import inlined, kernel
 from physics.kernels.fields.budget import COARSE_SHARE, ROUNDING, held_loads, potential_energy
+from physics.kernels.fields.field_loads import field_state
 from physics.kernels.fields.linked import place_anchors_now
-from physics.kernels.fields.loads import field_state, note_report
+from physics.kernels.fields.resolution import note_report
 from physics.kernels.fields.state import ZERO, minus, plus, times
 from physics.kernels.fields.terms import if_declared, total_supply
 from physics.kernels.restraint import kinetic_energy
@@ -60,7 +61,7 @@ def note_start(tilted, world, first):
 
 @kernel
 def _gain_of(b, h, tilted, world):
-    """(kinetic energy that body b has gained beyond the work of what is held and of fields without an energy, sizes) [J]."""
+    """(kinetic energy gained by body b beyond the work of held loads and of fields without an energy, sizes) [J]."""
     body, y, end = world.bodies[b], _start(world.bodies[b]), read_state(world.now, b)
     v, L = times(0.5, plus(y[2], end[2])), times(0.5, plus(y[3], end[3]))
     before, after = kinetic_energy(y[1], y[2], y[3], body, tilted), kinetic_energy(end[1], end[2], end[3], body, tilted)

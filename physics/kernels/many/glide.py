@@ -13,7 +13,7 @@ from physics.kernels.compiler import inlined, kernel
 from physics.kernels.fields.linked import hold_linked_loads
 from physics.kernels.fields.loads import hold_contact_loads, hold_loads
 from physics.kernels.fields.world_budget import note_start, pay_together
-from physics.kernels.flight import drift
+from physics.kernels.flight import coast, drift
 from physics.kernels.layout import ELLIPSOID, SPHERE
 from physics.kernels.many import memory as kept
 from physics.kernels.many.contacts import (
@@ -40,7 +40,6 @@ from physics.kernels.many.thrift import (
 )
 from physics.kernels.sleep import sleeps
 from physics.kernels.stages import STILL_SHARE
-from physics.kernels.flight import coast
 
 
 @inlined
