@@ -15,7 +15,7 @@ from physics.kernels.fields.field_loads import (
     principal_axes,
 )
 from physics.kernels.fields.state import minus, plus, times
-from physics.kernels.fields.stiffness import is_beyond, is_unresolved
+from physics.kernels.fields.stiffness import implicit_share, is_beyond, is_unresolved
 from physics.kernels.fields.terms import (
     if_declared,
     if_unknown,
@@ -25,6 +25,7 @@ from physics.kernels.fields.terms import (
     total_unknown,
 )
 from physics.kernels.flight import drift
+from physics.kernels.restraint import between
 
 # A user's field is not resolved where its loads change by more than this until the middle of a step, times speed/step.
 COARSE = 2.0
@@ -34,7 +35,7 @@ COARSE = 2.0
 def note_rates(state, h, work):
     """Note whether a stage of length h is too long for the explicit midpoint rule, and for the fields at all."""
     rates = total_rates(state, h, work)
-    work.rate = max(rates[0], rates[2])
+    work.rate, work.damping = max(rates[0], rates[2]), rates[0]
     work.is_stiff = 1 if is_beyond(rates, h) else 0
     if is_unresolved(rates, h):
         work.is_coarse = 1
@@ -80,7 +81,8 @@ def look_over_stage(y, middle, x, q, h, tilted, work):
 def change_to_agree(y, end, loads, h, gyroscopic, tilted, work):
     """What `loads` lack to agree with a flight over h from y to `end`, softened as `stiffness` has it."""
     t, half = work.now + 0.5 * h, 0.5 * h
-    v, L = times(0.5, plus(y[2], end[2])), times(0.5, plus(y[3], end[3]))
+    share = implicit_share(h * work.damping)
+    v, L = between(y[2], end[2], share), between(y[3], end[3], share)
     x, q = times(0.5, plus(y[0], end[0])), drift(y[1], y[3], work, half, gyroscopic, tilted)
     middle = field_state(x, q, v, L, t, tilted, work)
     first = field_state(y[0], y[1], v, L, t, tilted, work)

@@ -85,6 +85,7 @@ def members(terms: tuple[Term, ...]) -> list[tuple]:
         ("is_stiff", int),  # 1: loads of the stage are those of an implicit step (`stiffness`)
         ("is_coarse", int),  # 1: a field was not resolved by some stage of this call
         ("rate", float),  # fastest damping or turning of the stage [1/s]
+        ("damping", float),  # fastest damping [1/s]
         ("columns", float, (max(columns, 1),)),  # parameters of all fields, in the order of the markers
         *((term.marker, float) for term in terms),
         *([("middle", float, (13,))] if is_linked else []),  # state in the middle of the stage: x, q, v, L
