@@ -60,6 +60,9 @@ class Field:
     is_air: ClassVar[bool] = False
     is_linked: ClassVar[bool] = False
     needs_axes: ClassVar[bool] = False
+    _rates: ClassVar = None  # of the built-in ones: see `physics.kernels.fields.stiffness`
+    _soften: ClassVar = None
+    _mean: ClassVar = None
 
     def __new__(cls, *values, **named):
         field_check.check_class(cls, Field)
@@ -172,7 +175,7 @@ def field_slots(effects: tuple, body_count: int) -> tuple[FieldSlot, ...]:
         is_users = not _is_built_in(functions[0])
         if is_users:
             functions = [each and as_it_is(each) for each in functions]
-        term = Term(marker, *functions, size, len(found), kind.is_linked)
+        term = Term(marker, *functions, size, len(found), kind.is_linked, kind._rates, kind._soften, kind._mean)
         may_raise = is_users and _check_functions(kind, term)
         slots.append(FieldSlot(kind, term, first, tuple(found), is_users, may_raise))
         first += size * len(found)

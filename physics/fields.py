@@ -40,6 +40,8 @@ class Drag(Checked):
     linear: float = 0.0
 
     function: ClassVar = drag.drag
+    _rates: ClassVar = drag.drag_rates
+    _soften: ClassVar = drag.soften_drag
     needs_axes: ClassVar = True
 
     def __post_init__(self):
@@ -71,6 +73,8 @@ class AngularDrag(Checked):
     quadratic: float = 0.0
 
     function: ClassVar = angular_drag.angular_drag
+    _rates: ClassVar = angular_drag.angular_drag_rates
+    _soften: ClassVar = angular_drag.soften_angular_drag
 
     def __post_init__(self):
         self._set("linear", checks.non_negative)
@@ -101,6 +105,8 @@ class Magnus(Checked):
     density: float = AIR_DENSITY
 
     function: ClassVar = magnus.magnus
+    _rates: ClassVar = magnus.magnus_rates
+    _soften: ClassVar = magnus.soften_magnus
     needs_axes: ClassVar = True
 
     def __post_init__(self):
@@ -182,6 +188,8 @@ class Buoyancy(Checked):
     gravity: float = 9.81
 
     function: ClassVar = buoyancy.buoyancy
+    _rates: ClassVar = buoyancy.buoyancy_rates
+    _soften: ClassVar = buoyancy.soften_buoyancy
     needs_axes: ClassVar = True
     energy: ClassVar = buoyancy.buoyancy_energy
 

@@ -29,6 +29,7 @@ class Status(IntEnum):
     FAULT = 3
     LEFT_OUT = 4
     OVERLAP = 5
+    COARSE = 6
 
     @property
     def message(self) -> str:
@@ -55,6 +56,11 @@ _MESSAGES = {
         "a body's loads or its new state were not finite, or beyond 1e100, and its old state was kept; look at the "
         "wrench and parameters of this world, and shorten the step"
     ),
+    Status.COARSE: (
+        "an effect changes too much within a step to be followed (a spring, a fluid or a lift that swings by more than "
+        "a radian, or a field of your own): its details are not right; shorten dt, raise Accuracy.substeps, or weaken "
+        "the effect"
+    ),
     Status.LEFT_OUT: (
         "more bodies were near each other than there is room for, and contacts were left out; spread the bodies, or "
         "give the scene fewer"
@@ -66,11 +72,13 @@ _MESSAGES = {
 }
 
 
-_GRAVITY = (Status.OK, Status.UNRESOLVED, Status.UNCONVERGED, Status.OVERLAP, Status.LEFT_OUT, Status.FAULT)
+_GRAVITY = (
+    Status.OK, Status.UNRESOLVED, Status.UNCONVERGED, Status.COARSE, Status.OVERLAP, Status.LEFT_OUT, Status.FAULT,
+)  # fmt: skip
 
 # What the kernel below compares with: Numba takes plain integers from a module.
 _UNRESOLVED, _UNCONVERGED, _FAULT = int(Status.UNRESOLVED), int(Status.UNCONVERGED), int(Status.FAULT)
-_LEFT_OUT, _OVERLAP = int(Status.LEFT_OUT), int(Status.OVERLAP)
+_LEFT_OUT, _OVERLAP, _COARSE = int(Status.LEFT_OUT), int(Status.OVERLAP), int(Status.COARSE)
 
 
 @kernel
@@ -84,6 +92,8 @@ def gravest(table, status):
             status[world] = _LEFT_OUT
         elif table[world, at.OVERLAP] > 0.0:
             status[world] = _OVERLAP
+        elif table[world, at.COARSE] > 0.0:
+            status[world] = _COARSE
         elif table[world, at.UNCONVERGED] > 0.0:
             status[world] = _UNCONVERGED
         elif table[world, at.UNRESOLVED] > 0.0:
@@ -110,12 +120,13 @@ class StepReport:
         Worst depth of a contact [m].
     residual : (worlds,) float64
         Worst natural-map residual accepted, relative to the free contact speed (see `physics.kernels.sweeps`).
-    iterations, solves, fallbacks, unconverged, impacts, unresolved, faults, left_out : (worlds,) int64
+    iterations, solves, fallbacks, unconverged, impacts, unresolved, faults, left_out, coarse : (worlds,) int64
         Sweeps and Newton steps; contact problems (with an error asked for, those of refused parts, too); of these, by
         the pivoting fallback (with the scheme ``events`` small leaps of first order, and parts of the shortest length
         with more than the error asked for); above the tolerance;
         impacts that cut a substep; substeps with more impacts than allowed; bodies whose loads or new state were not
-        finite, or beyond 1e100; contacts and near pairs of bodies for which there was no room.
+        finite, or beyond 1e100; contacts and near pairs of bodies for which there was no room; bodies that moved in
+        fields which the step does not resolve.
     overlap : (worlds,) float64
         Deepest overlap of two bodies that this step began with [m], where they were put into each other by more than a
         hundredth of the smaller one's bounding radius; else 0.
@@ -139,6 +150,7 @@ class StepReport:
     unresolved = property(lambda self: self._table[:, at.UNRESOLVED].astype(np.int64))
     faults = property(lambda self: self._table[:, at.FAULTS].astype(np.int64))
     left_out = property(lambda self: self._table[:, at.LEFT_OUT].astype(np.int64))
+    coarse = property(lambda self: self._table[:, at.COARSE].astype(np.int64))
     overlap = property(lambda self: self._table[:, at.OVERLAP])
     fault_body = property(lambda self: self._table[:, at.FAULTY].astype(np.int64) - 1)
 
@@ -160,7 +172,7 @@ class StepReport:
         into another.
         """
         return not (self._table[:, at.UNCONVERGED : at.FAULTS + 1].any() or self._table[:, at.LEFT_OUT].any()
-                    or self._table[:, at.OVERLAP].any())  # fmt: skip
+                    or self._table[:, at.OVERLAP].any() or self._table[:, at.COARSE].any())  # fmt: skip
 
     def messages(self) -> dict[int, str]:
         """World index -> message, for the worlds whose status is not OK."""

@@ -52,6 +52,9 @@ class Spring(Checked):
 
     function: ClassVar = spring.spring
     energy: ClassVar = spring.spring_energy
+    _rates: ClassVar = spring.spring_rates
+    _soften: ClassVar = spring.soften_spring
+    _mean: ClassVar = spring.mean_spring
     has_many: ClassVar[bool] = True
 
     def __post_init__(self):
@@ -101,6 +104,9 @@ class _LinkedSpring(Spring):
 
     function: ClassVar = linked.linked_spring
     energy: ClassVar = linked.linked_spring_energy
+    _rates: ClassVar = linked.linked_spring_rates
+    _soften: ClassVar = linked.soften_linked_arm
+    _mean: ClassVar = None
     is_linked: ClassVar[bool] = True
 
 
@@ -127,6 +133,8 @@ class Push(Checked):
     body: int = 0
 
     function: ClassVar = spring.push
+    _rates: ClassVar = spring.push_rates
+    _soften: ClassVar = spring.soften_push
     has_many: ClassVar[bool] = True
 
     def __post_init__(self):

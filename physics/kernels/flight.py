@@ -47,6 +47,14 @@ def fly(y, work, h, gyroscopic, tilted):
     return x, drift(q, L, work, 0.5 * h, gyroscopic, tilted), v, L
 
 
+@inlined
+def coast(y, h, gyroscopic, tilted, scheme, work):
+    """Free motion over h, by the exact flow or by the scheme that was chosen."""
+    if scheme is None:
+        return fly(y, work, h, gyroscopic, tilted)
+    return fly_by_scheme(scheme, y, work, h, tilted)
+
+
 @kernel
 def fly_by_scheme(scheme, y, work, h, tilted):
     """`fly` by a textbook scheme (codes of `physics.kernels.schemes`) instead of the exact flow."""

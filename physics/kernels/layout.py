@@ -63,4 +63,5 @@ SOLVER = 9  # the strongest method needed: 0 none, 1 direct, 2 sweeps, 3 pivotin
 LEFT_OUT = 10  # contacts and near pairs for which there was no room
 OVERLAP = 11  # deepest overlap of two bodies that were put where they overlap [m], 0 where that is little
 FAULTY = 12  # 1 + the first body at fault, 0: none
-REPORT_SIZE = 13
+COARSE = 13  # bodies that moved in fields which the step does not resolve
+REPORT_SIZE = 14

@@ -24,8 +24,9 @@ from physics.kernels.compiler import kernel
 from physics.kernels.fields.linked import hold_linked_loads
 from physics.kernels.fields.loads import bind_fields, set_clock
 from physics.kernels.fields.terms import Term
+from physics.kernels.fields.world_budget import note_reports, note_start, pay_together
+from physics.kernels.flight import coast
 from physics.kernels.linked_smooth import PLANES, SIZE, step_smooth
-from physics.kernels.step import coast
 from physics.kernels.turns import begin, next_world
 from physics.kernels.workspace import body_fields
 
@@ -55,9 +56,11 @@ def make_linked(
 def _substep(h, gyroscopic, tilted, scheme, linked):
     """All bodies after h by the loads of the middle."""
     hold_linked_loads(h, gyroscopic, tilted, linked)
+    note_start(tilted, linked, linked.bodies[0])
     for b in range(linked.now.shape[0]):
         y = coast(read_state(linked.now, b), h, gyroscopic, tilted, scheme, linked.bodies[b])
         write_state(linked.now, b, y)
+    pay_together(h, 1, tilted, linked, linked.bodies[0])
 
 
 @kernel
@@ -100,6 +103,7 @@ def step_linked(
                 break
             for b in range(bodies):
                 write_state(state, world * bodies + b, read_state(linked.now, b))
+        note_reports(report, linked, linked.bodies[0])
         for b in range(bodies):
             i = world * bodies + b
             _, q, _, L = read_state(state, i)

@@ -14,8 +14,8 @@ from physics.kernels import layout as at
 from physics.kernels import quaternion as qt
 from physics.kernels.body import angular_velocity, read_state, write_state
 from physics.kernels.compiler import inlined, kernel
+from physics.kernels.fields.field_loads import field_load
 from physics.kernels.fields.linked import middle, place_anchors, put_middle
-from physics.kernels.fields.loads import field_load
 
 # Rules of 2, 4, 6, ... parts: order 16 with eight.
 RULES = 8

@@ -30,15 +30,19 @@ from physics.kernels.compliance import lift_to_due, stiffness
 from physics.kernels.contact import gap_of, gap_rate, gather, nearest_outside_set, push_out, what_is_behind
 from physics.kernels.crossing import crossing, second_difference
 from physics.kernels.events.log import drop_events, forget_events
+from physics.kernels.fields.budget import misses_work, paid
 from physics.kernels.fields.loads import (
     bind_fields,
     hold_contact_loads,
     hold_loads,
     hold_mean_loads,
+    hold_softened_loads,
     pass_time,
     set_clock,
 )
-from physics.kernels.flight import fly, fly_by_scheme
+from physics.kernels.fields.resolution import is_stiff, note_report
+from physics.kernels.flight import coast
+from physics.kernels.graded_flight import graded_flight
 from physics.kernels.laws import bind_laws
 from physics.kernels.quaternion import to_matrix
 from physics.kernels.restraint import kinetic_energy
@@ -68,11 +72,9 @@ def forget_contacts(memory, i, work):
 
 
 @inlined
-def coast(y, h, gyroscopic, tilted, scheme, work):
-    """Free motion over h, by the exact flow or by the scheme asked for."""
-    if scheme is None:
-        return fly(y, work, h, gyroscopic, tilted)
-    return fly_by_scheme(scheme, y, work, h, tilted)
+def fly_stage(y, h, gyroscopic, tilted, scheme, work):
+    """Free motion over h under the loads that are held; where these are stiff, cut into parts."""
+    return graded_flight(coast(y, h, gyroscopic, tilted, scheme, work), y, h, gyroscopic, tilted, scheme, work)
 
 
 @inlined
@@ -83,10 +85,13 @@ def advance(n, y, h, friction, smooth, gyroscopic, tilted, pivots, scheme, memor
         end = touch(n, y, h, friction, smooth, gyroscopic, tilted, pivots, memory, report, work)
         if hold_mean_loads(y, end, h, gyroscopic, tilted, work):
             end = touch(n, y, h, friction, smooth, gyroscopic, tilted, pivots, memory, report, work)
-        return end
+        if is_stiff(work) and misses_work(y, end, h, tilted, work):
+            hold_softened_loads(y, h, gyroscopic, tilted, work)
+            end = touch(n, y, h, friction, smooth, gyroscopic, tilted, pivots, memory, report, work)
+        return paid(y, end, h, False, tilted, work)
     hold_loads(y, h, gyroscopic, tilted, work)
     forget_contacts(memory, work.i, work)
-    return coast(y, h, gyroscopic, tilted, scheme, work)
+    return fly_stage(y, h, gyroscopic, tilted, scheme, work)
 
 
 @inlined
@@ -273,7 +278,7 @@ def step_worlds(
                     )  # fmt: skip
                 else:
                     clear -= 1
-                    new = coast(y, h, gyroscopic, tilted, scheme, work)
+                    new = fly_stage(y, h, gyroscopic, tilted, scheme, work)
                 if not is_finite(new):
                     note_fault(world, b, report)
                     drop_events(i, 1, k * h, log, counts)
@@ -282,6 +287,7 @@ def step_worlds(
                 if sleep is not None and falls_asleep(i, y, h, work, sleep):
                     y = laid_down(y)
                     break
+            note_report(not has_same_pose(y, read_state(state, i)), report, work)
             write_state(state, i, y)
             w = angular_velocity(y[1], y[3], work, tilted)
             state[i, at.ANGVEL], state[i, at.ANGVEL + 1], state[i, at.ANGVEL + 2] = w

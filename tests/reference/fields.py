@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
+from scipy.integrate import solve_ivp
 from scipy.spatial import ConvexHull, HalfspaceIntersection, QhullError
 
 from tests.reference.rigid_body import RigidState, Wrench, integrate_rigid_body, rotation_matrix
@@ -63,3 +64,15 @@ def cut_block(half: np.ndarray, normal: np.ndarray, height: float) -> tuple[floa
         volume += part
         moment += part * (a + b + c + inside) / 4
     return volume, moment / volume
+
+
+def flight_with_drag(radius: float, mass: float, velocity, gravity: float, duration: float) -> np.ndarray:
+    """Where a sphere thrown from the origin is after `duration` [m], by DOP853: m v' = -½ ρ C π r² |v| v - m g e_y."""
+    k = 0.5 * 1.225 * 0.47 * np.pi * radius**2 / mass
+
+    def rate(t: float, y: np.ndarray) -> np.ndarray:
+        v = y[3:]
+        return np.concatenate((v, -k * np.linalg.norm(v) * v - np.array([0.0, gravity, 0.0])))
+
+    start = np.concatenate((np.zeros(3), velocity))
+    return solve_ivp(rate, (0.0, duration), start, method="DOP853", rtol=1e-12, atol=1e-13).y[:3, -1]

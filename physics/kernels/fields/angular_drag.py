@@ -12,6 +12,7 @@ import math
 from physics.kernels import quaternion as qt
 from physics.kernels.compiler import inlined
 from physics.kernels.fields.state import ZERO, times
+from physics.kernels.fields.stiffness import implicit_share
 
 # Columns.
 LINEAR = 0  # c [N m s]
@@ -24,3 +25,28 @@ def angular_drag(state, p, t):
     """(force, torque) of the drag on the spin."""
     w = state.w
     return ZERO, times(-(p[LINEAR] + p[QUADRATIC] * math.sqrt(qt.dot(w, w))), w)
+
+
+@inlined
+def _slope(state, p):
+    """How fast the torque grows with ω, along it [N m s]."""
+    return p[LINEAR] + 2.0 * p[QUADRATIC] * math.sqrt(qt.dot(state.w, state.w))
+
+
+@inlined
+def angular_drag_rates(state, p, J, h):
+    """Rates of `stiffness`."""
+    return (_slope(state, p) * max(J[0], J[1], J[2]), 0.0, 0.0)
+
+
+@inlined
+def soften_angular_drag(loads, h, R, state, p, J):
+    """Loads as `stiffness` has them, axis by axis."""
+    a, T = loads
+    z, m = h * _slope(state, p), qt.transposed_matvec(R, T)
+    m = (
+        m[0] / (1.0 + implicit_share(z * J[0]) * z * J[0]),
+        m[1] / (1.0 + implicit_share(z * J[1]) * z * J[1]),
+        m[2] / (1.0 + implicit_share(z * J[2]) * z * J[2]),
+    )
+    return a, qt.matvec(R, m)

@@ -22,6 +22,7 @@ import math
 from physics.kernels import quaternion as qt
 from physics.kernels.compiler import inlined
 from physics.kernels.fields.state import acting_at, minus, times, velocity_at
+from physics.kernels.fields.stiffness import arm_square, implicit_share, mobility_bound, soften_arm, soften_at
 from physics.kernels.layout import BLOCK, SPHERE
 
 # Columns.
@@ -48,3 +49,35 @@ def drag(state, p, t):
     u = minus(velocity_at(state, state.center), state.air)
     k = p[STRENGTH] * swept(state.shape, state.dims, state.R, u) + p[LINEAR]
     return acting_at(state.center, times(-k, u))
+
+
+@inlined
+def _slopes(state, p):
+    """Relative velocity u, and how fast the force grows along it and across [N s/m]: the quadratic part twice along."""
+    u = minus(velocity_at(state, state.center), state.air)
+    quadratic = p[STRENGTH] * swept(state.shape, state.dims, state.R, u)
+    return u, 2.0 * quadratic + p[LINEAR], quadratic + p[LINEAR]
+
+
+@inlined
+def drag_rates(state, p, J, h):
+    """Rates of `stiffness`."""
+    u, along, across = _slopes(state, p)
+    return (
+        along * mobility_bound(state.center, state.mass, J),
+        arm_square(times(across, u), state.center, J),
+        0.0,
+    )
+
+
+@inlined
+def soften_drag(loads, h, R, state, p, J):
+    """Loads as `stiffness` has them; exact for the quadratic law along a line: v' = v/(1 + h k v/m)."""
+    u, along, across = _slopes(state, p)
+    speed = math.sqrt(qt.dot(u, u))
+    n = (1.0, 0.0, 0.0)
+    if speed > 0.0:
+        n = times(1.0 / speed, u)
+    s = h * implicit_share(h * along * mobility_bound(state.center, state.mass, J))
+    loads = soften_at(loads, state.center, n, s * along, s * across, R, state.mass, J)
+    return soften_arm(loads, h, times(across, u), state.center, R, J)

@@ -14,19 +14,26 @@ from physics.kernels import layout as at
 from physics.kernels import quaternion as qt
 from physics.kernels.body import angular_velocity, read_state
 from physics.kernels.compiler import CHOSEN, inlined, kernel
-from physics.kernels.fields.loads import field_load, put_loads
+from physics.kernels.fields.field_loads import field_load, put_loads
+from physics.kernels.fields.linked_implicit import (
+    ANCHOR,
+    OTHER,
+    OTHER_MOBILITY,
+    OTHER_POINT,
+    SIZE,
+    VELOCITY,
+    middle,
+    note_all_rates,
+    put_middle,
+    soften_own,
+    soften_pairs,
+)
 from physics.kernels.fields.spring import DAMPING, LENGTH, STIFFNESS, stretch
 from physics.kernels.fields.state import ZERO, acting_at, minus, plus, times, velocity_at
+from physics.kernels.fields.stiffness import arm_square, mobility_bound, soften_arm
 from physics.kernels.fields.terms import LOAD, instances
 from physics.kernels.flight import drift
 from physics.kernels.many.islands import join
-
-# Columns: those of a spring, whose anchor is the other body's point now, and after them
-ANCHOR = 3
-VELOCITY = 9  # of the anchor, world frame [m/s]
-OTHER = 12  # index of the other body, -1: the spring is not at this one
-OTHER_POINT = 13  # in the other body's frame, from its centre of mass [m]
-SIZE = 16
 
 
 @inlined
@@ -40,6 +47,27 @@ def linked_spring(state, p, t):
         return acting_at(arm, times(-p[DAMPING], u))
     s = p[STIFFNESS] * (l - p[LENGTH]) + p[DAMPING] * qt.dot(u, e) / l
     return acting_at(arm, times(-s / l, e))
+
+
+@inlined
+def linked_spring_rates(state, p, J, h):
+    """Rates of `stiffness`, of the two ends against each other."""
+    if p[OTHER] < 0.0:
+        return ZERO
+    force, _ = linked_spring(state, p, 0.0)
+    arm, _, _ = stretch(state, p)
+    w = mobility_bound(arm, state.mass, J) + p[OTHER_MOBILITY]
+    return (p[DAMPING] * w, p[STIFFNESS] * w + arm_square(force, arm, J), 0.0)
+
+
+@inlined
+def soften_linked_arm(loads, h, R, state, p, J):
+    """Torque as `stiffness` has it under the force at its arm; the rest is done for both ends at once."""
+    if p[OTHER] < 0.0:
+        return loads
+    force, _ = linked_spring(state, p, 0.0)
+    arm, _, _ = stretch(state, p)
+    return soften_arm(loads, h, force, arm, R, J)
 
 
 @inlined
@@ -93,32 +121,15 @@ def _record(world):
 
 
 @inlined
-def _put_anchor(first, columns, x, R, v, w):
-    """Write point and velocity of the other body, whose state this is, into the columns of a spring."""
+def _put_anchor(first, columns, x, R, v, w, mobility):
+    """Write point, velocity and mobility of the other body, whose state this is, into the columns of a spring."""
     o = first + OTHER_POINT
     r = qt.matvec(R, (columns[o], columns[o + 1], columns[o + 2]))
     place, speed = plus(x, r), plus(v, qt.cross(w, r))
     for c in range(3):
         columns[first + ANCHOR + c] = place[c]
         columns[first + VELOCITY + c] = speed[c]
-
-
-@inlined
-def middle(body):
-    """(x, q, v, L) of a body in the middle of the stage."""
-    m = body.middle
-    return (m[0], m[1], m[2]), (m[3], m[4], m[5], m[6]), (m[7], m[8], m[9]), (m[10], m[11], m[12])
-
-
-@inlined
-def put_middle(body, y):
-    """Write it."""
-    x, q, v, L = y
-    m = body.middle
-    m[0], m[1], m[2] = x
-    m[3], m[4], m[5], m[6] = q
-    m[7], m[8], m[9] = v
-    m[10], m[11], m[12] = L
+    columns[first + OTHER_MOBILITY] = mobility
 
 
 @inlined
@@ -130,7 +141,10 @@ def _put_anchors(first, count, tilted, bodies):
             if columns[k + OTHER] >= 0.0:
                 other = bodies[int(columns[k + OTHER])]
                 x, q, v, L = middle(other)
-                _put_anchor(k, columns, x, qt.to_matrix(q), v, angular_velocity(q, L, other, tilted))
+                w = angular_velocity(q, L, other, tilted)
+                o = k + OTHER_POINT
+                mobility = mobility_bound((columns[o], columns[o + 1], columns[o + 2]), other.mass, other.J)
+                _put_anchor(k, columns, x, qt.to_matrix(q), v, w, mobility)
 
 
 @_if_linked(lambda arguments: _record(arguments[-1]), False)
@@ -145,6 +159,11 @@ def hold_linked_loads(first, count, h, gyroscopic, tilted, world):
         q = drift(q, L, bodies[b], half, gyroscopic, tilted)
         put_middle(bodies[b], (plus(x, times(half, v)), q, v, L))
     _put_anchors(first, count, tilted, bodies)
+    if note_all_rates(h, tilted, bodies):
+        for b in range(bodies.shape[0]):
+            soften_own(bodies[b], h, tilted)
+        soften_pairs(first, count, h, tilted, bodies)
+        return True
     for b in range(bodies.shape[0]):
         if world.touched[b] == 0:
             _kick(bodies[b], half, tilted)
@@ -159,6 +178,14 @@ def hold_linked_loads(first, count, h, gyroscopic, tilted, world):
 @_if_linked(lambda arguments: _record(arguments[-1]), None)
 def place_anchors(first, count, tilted, world):
     """Put the anchors of all springs where the bodies' `middle` says."""
+    _put_anchors(first, count, tilted, world.bodies)
+
+
+@_if_linked(lambda arguments: _record(arguments[-1]), None)
+def place_anchors_now(first, count, tilted, world):
+    """Put the anchors of all springs where the bodies are now."""
+    for b in range(world.bodies.shape[0]):
+        put_middle(world.bodies[b], read_state(world.now, b))
     _put_anchors(first, count, tilted, world.bodies)
 
 
@@ -191,4 +218,4 @@ def look_for_anchors(first, count, i, state, bodies, work):
             j = i - i % bodies + int(work.columns[k + OTHER])
             x, q, v, _ = read_state(state, j)
             w = (state[j, at.ANGVEL], state[j, at.ANGVEL + 1], state[j, at.ANGVEL + 2])
-            _put_anchor(k, work.columns, x, qt.to_matrix(q), v, w)
+            _put_anchor(k, work.columns, x, qt.to_matrix(q), v, w, 0.0)

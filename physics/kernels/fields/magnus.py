@@ -17,7 +17,7 @@ import math
 
 from physics.kernels import quaternion as qt
 from physics.kernels.compiler import inlined
-from physics.kernels.fields.state import ZERO, minus, times
+from physics.kernels.fields.state import ZERO, minus, plus, times
 
 # Columns.
 STRENGTH = 0  # ½ ρ C [kg/m³]
@@ -30,3 +30,26 @@ def magnus(state, p, t):
     d = state.dims
     u = minus(state.v, state.air)
     return times(p[STRENGTH] * math.pi * d[0] * d[1] * d[2], qt.cross(state.w, u)), ZERO
+
+
+@inlined
+def _turning(state, p):
+    """Angular velocity at which the lift turns the velocity [rad/s]."""
+    d = state.dims
+    return times(p[STRENGTH] * math.pi * d[0] * d[1] * d[2] / state.mass, state.w)
+
+
+@inlined
+def magnus_rates(state, p, J, h):
+    """Rates of `stiffness`."""
+    b = _turning(state, p)
+    return (0.0, 0.0, math.sqrt(qt.dot(b, b)))
+
+
+@inlined
+def soften_magnus(loads, h, R, state, p, J):
+    """Loads as the implicit midpoint rule has them, which keeps the speed: x of x - b x x = a, b half the turn of h."""
+    a, T = loads
+    b = times(0.5 * h, _turning(state, p))
+    x = plus(a, plus(qt.cross(b, a), times(qt.dot(b, a), b)))
+    return times(1.0 / (1.0 + qt.dot(b, b)), x), T

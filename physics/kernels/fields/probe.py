@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from physics.kernels.body import bind_body, read_state
 from physics.kernels.compiler import kernel
+from physics.kernels.fields.field_loads import field_state
 from physics.kernels.fields.linked import look_for_anchors
-from physics.kernels.fields.loads import bind_fields, field_state
+from physics.kernels.fields.loads import bind_fields
 from physics.kernels.fields.terms import total_energy, total_load
 
 

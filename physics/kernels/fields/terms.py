@@ -18,6 +18,7 @@ from numba.extending import overload
 
 from physics.kernels.compiler import CHOSEN, composed, kernel
 from physics.kernels.fields.state import ZERO, plus
+from physics.kernels.quaternion import dot
 
 # First word of a marker: what the field's function gives, a (force, torque) or the velocity of the air.
 LOAD, AIR = "load", "air"
@@ -40,6 +41,14 @@ class Term(NamedTuple):
         Fields of this kind.
     is_linked : bool
         Whether its loads depend on other bodies, too.
+    rates : dispatcher or None
+        (state, parameters, inverse moments, step) -> the three rates of `stiffness`; None of a user's field.
+    mean : dispatcher or None
+        (states in the middle, at the start and at the end, parameters, time) -> the load of a discrete gradient; None:
+        that of the middle.
+    soften : dispatcher or None
+        (acceleration and torque, step, principal axes, state, parameters, inverse moments) -> the same, as the
+        implicit step would have them; None of a field whose loads depend neither on place nor on velocity.
     """
 
     marker: str
@@ -48,6 +57,9 @@ class Term(NamedTuple):
     size: int
     count: int
     is_linked: bool = False
+    rates: Callable | None = None
+    soften: Callable | None = None
+    mean: Callable | None = None
 
 
 _KNOWN: dict[str, Term] = {}
@@ -70,9 +82,15 @@ def members(terms: tuple[Term, ...]) -> list[tuple]:
         ("call_start", float),  # time at the start of the call [s]
         ("now", float),  # of the stage [s]
         ("is_felt", int),  # 1: some field was not zero since this was set to 0
+        ("is_stiff", int),  # 1: loads of the stage are those of an implicit step (`stiffness`)
+        ("is_coarse", int),  # 1: a field was not resolved by some stage of this call
+        ("rate", float),  # fastest damping or turning of the stage [1/s]
+        ("damping", float),  # fastest damping [1/s]
         ("columns", float, (max(columns, 1),)),  # parameters of all fields, in the order of the markers
         *((term.marker, float) for term in terms),
         *([("middle", float, (13,))] if is_linked else []),  # state in the middle of the stage: x, q, v, L
+        ("stage_start", float, (13,)),  # of many bodies: state at the start of a stiff stage
+        ("stage_energy", float),  # of the first of many bodies: their potential energy then [J]
     ]
 
 
@@ -85,11 +103,13 @@ def _names(work) -> list[str]:
     return list(work.fields) if hasattr(work, "fields") else list(work.dtype.names)
 
 
-def if_declared(otherwise=None):
-    """Make a function, whose last argument is the workspace, a kernel that only returns `otherwise` without fields.
+def _chosen_by(is_chosen: Callable, otherwise):
+    """`if_declared`, where `is_chosen` decides by the members of the workspace."""
 
-    That is inlined: nothing is left of it.
-    """
+    def constant(*arguments):
+        return otherwise
+
+    skip = otherwise if callable(otherwise) else constant
 
     def decorate(function):
         compiled = kernel(function)
@@ -97,20 +117,34 @@ def if_declared(otherwise=None):
         def call(*arguments):
             return compiled(*arguments)
 
-        def skip(*arguments):
-            return otherwise
-
         def stub(*arguments):
-            return function(*arguments) if _markers(_names(arguments[-1])) else otherwise
+            return function(*arguments) if is_chosen(_names(arguments[-1])) else skip(*arguments)
 
         @overload(stub, jit_options=CHOSEN, strict=False)
         def choose(*types):
-            return call if _markers(_names(types[-1])) else skip
+            return call if is_chosen(_names(types[-1])) else skip
 
         stub.__doc__ = function.__doc__
         return stub
 
     return decorate
+
+
+def if_declared(otherwise=None):
+    """Make a function, whose last argument is the workspace, a kernel that only returns `otherwise` without fields.
+
+    A function for `otherwise` is called instead. That is inlined: nothing is left of it.
+    """
+    return _chosen_by(lambda names: bool(_markers(names)), otherwise)
+
+
+def if_unknown(otherwise=None):
+    """As `if_declared`, where some field does not tell its rates: a user's own."""
+    return _chosen_by(_has_unknown, otherwise)
+
+
+def _has_unknown(names: list[str]) -> bool:
+    return any(_KNOWN[name].rates is None for name in _markers(names) if name.startswith(LOAD))
 
 
 def instances(work, kind: str) -> Iterator[tuple[Term, int, int]]:
@@ -152,6 +186,24 @@ def _no_air(state, t, work):
     return ZERO
 
 
+def _add_mean_load(before, function, first, last):
+    def add(states, t, work):
+        F, T = before(states, t, work)
+        f, m = function(states, work.columns[first:last], t)
+        return plus(F, f), plus(T, m)
+
+    return add
+
+
+def _add_middle_load(before, function, first, last):
+    def add(states, t, work):
+        F, T = before(states, t, work)
+        f, m = function(states[0], work.columns[first:last], t)
+        return plus(F, f), plus(T, m)
+
+    return add
+
+
 def _no_energy(state, t, work):
     return 0.0
 
@@ -161,6 +213,25 @@ def _add_load(before, function, first, last):
         F, T = before(state, t, work)
         f, m = function(state, work.columns[first:last], t)
         return plus(F, f), plus(T, m)
+
+    return add
+
+
+def _no_rates(state, h, work):
+    return ZERO
+
+
+def _add_rates(before, function, first, last):
+    def add(state, h, work):
+        return plus(before(state, h, work), function(state, work.columns[first:last], work.J, h))
+
+    return add
+
+
+def _add_supply(before, function, first, last):
+    def add(state, t, work):
+        F, T = function(state, work.columns[first:last], t)
+        return before(state, t, work) + max(dot(F, state.v) + dot(T, state.w), 0.0)
 
     return add
 
@@ -182,3 +253,56 @@ def _add_vector(before, function, first, last):
 total_load = _sum(LOAD, _no_load, lambda term: term.function, _add_load)
 total_air = _sum(AIR, _no_air, lambda term: term.function, _add_vector)
 total_energy = _sum(LOAD, _no_energy, lambda term: term.energy, _add_number)
+total_rates = _sum(LOAD, _no_rates, lambda term: term.rates, _add_rates)
+total_potential = _sum(LOAD, _no_load, lambda term: term.function if term.energy is not None else None, _add_load)
+total_supply = _sum(LOAD, _no_energy, lambda term: term.function if term.energy is None else None, _add_supply)
+total_unknown = _sum(LOAD, _no_load, lambda term: term.function if term.rates is None else None, _add_load)
+
+
+def total_mean_load(states, t, work):
+    """Load of all fields over a stage, `states` in its middle, at its start and at its end: of discrete gradients."""
+    return _mean_load(work)(states, t, work)
+
+
+def _mean_load(work):
+    result = _no_load
+    for term, first, last in instances(work, LOAD):
+        if term.mean is not None:
+            result = _add_mean_load(composed(result), term.mean, first, last)
+        else:
+            result = _add_middle_load(composed(result), term.function, first, last)
+    return result
+
+
+@overload(total_mean_load, jit_options=CHOSEN, strict=False)
+def _choose_mean_load(states, t, work):
+    return _mean_load(work)
+
+
+def _as_it_is(loads, h, R, state, work):
+    return loads
+
+
+def _then_soften(before, function, first, last):
+    def soften(loads, h, R, state, work):
+        return function(before(loads, h, R, state, work), h, R, state, work.columns[first:last], work.J)
+
+    return soften
+
+
+def softened(loads, h, R, state, work):
+    """Acceleration and torque as the implicit step over h of all fields has them, one field after the other."""
+    return _softened(work)(loads, h, R, state, work)
+
+
+def _softened(work):
+    result = _as_it_is
+    for term, first, last in instances(work, LOAD):
+        if term.soften is not None:
+            result = _then_soften(composed(result), term.soften, first, last)
+    return result
+
+
+@overload(softened, jit_options=CHOSEN, strict=False)
+def _choose_softened(loads, h, R, state, work):
+    return _softened(work)

@@ -12,7 +12,8 @@ from physics.kernels.body import angular_velocity, read_state, write_state
 from physics.kernels.compiler import inlined, kernel
 from physics.kernels.fields.linked import hold_linked_loads
 from physics.kernels.fields.loads import hold_contact_loads, hold_loads
-from physics.kernels.flight import drift
+from physics.kernels.fields.world_budget import note_start, pay_together
+from physics.kernels.flight import coast, drift
 from physics.kernels.layout import ELLIPSOID, SPHERE
 from physics.kernels.many import memory as kept
 from physics.kernels.many.contacts import (
@@ -39,7 +40,6 @@ from physics.kernels.many.thrift import (
 )
 from physics.kernels.sleep import sleeps
 from physics.kernels.stages import STILL_SHARE
-from physics.kernels.step import coast
 
 
 @inlined
@@ -143,11 +143,10 @@ def load_speed(h, many):
     return most
 
 
-@kernel
-def glide(n, world, h, friction, gyroscopic, tilted, scheme, sleep, memory, report, many):
-    """Every body after h: exact flight, or Moreau's midpoint step with the n contacts of the set."""
+@inlined
+def move_all(n, world, h, friction, gyroscopic, tilted, scheme, sleep, memory, report, many):
+    """`glide` under the loads that are held."""
     half, first = 0.5 * h, world * many.now.shape[0]
-    hold_all_loads(h, gyroscopic, tilted, many)
     for b in range(many.now.shape[0]):
         if sleeps(first + b, sleep):
             continue
@@ -187,3 +186,12 @@ def glide(n, world, h, friction, gyroscopic, tilted, scheme, sleep, memory, repo
     for b in range(many.now.shape[0]):
         if many.touched[b] == 1:
             drift_body(b, half, gyroscopic, tilted, many)
+
+
+@kernel
+def glide(n, world, h, friction, gyroscopic, tilted, scheme, sleep, memory, report, many):
+    """Every body after h: exact flight, or Moreau's midpoint step with the n contacts of the set."""
+    hold_all_loads(h, gyroscopic, tilted, many)
+    note_start(tilted, many, many.bodies[0])
+    move_all(n, world, h, friction, gyroscopic, tilted, scheme, sleep, memory, report, many)
+    pay_together(h, 0, tilted, many, many.bodies[0])

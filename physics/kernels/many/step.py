@@ -22,6 +22,7 @@ from physics.kernels.body import (
 from physics.kernels.compiler import kernel
 from physics.kernels.events.log import drop_events, forget_events
 from physics.kernels.fields.loads import bind_fields, set_clock
+from physics.kernels.fields.world_budget import note_reports
 from physics.kernels.many.contacts import put
 from physics.kernels.many.memory import forget
 from physics.kernels.many.refine import refine
@@ -88,6 +89,7 @@ def step_many(
                 write_state(state, world * bodies + b, read_state(many.now, b))
             if sleep is not None and all_sleep(world, bodies, sleep):
                 break
+        note_reports(report, many, many.bodies[0])
         for b in range(bodies):
             i = world * bodies + b
             _, q, _, L = read_state(state, i)

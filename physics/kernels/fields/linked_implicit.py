@@ -1,0 +1,112 @@
+"""Springs between bodies that a step does not resolve: implicit loads of both ends at once (`stiffness`).
+
+Also where the columns of such a spring stand, and the state of a body in the middle of a stage.
+"""
+
+from __future__ import annotations
+
+from physics.kernels import quaternion as qt
+from physics.kernels.body import principal_attitude, turning
+from physics.kernels.compiler import inlined, kernel
+from physics.kernels.fields.field_loads import all_loads, field_state, loads_held, put_all
+from physics.kernels.fields.resolution import note_rates
+from physics.kernels.fields.spring import line_stiffness, stretch
+from physics.kernels.fields.state import minus, plus, times
+from physics.kernels.fields.stiffness import answer_of, answer_to, axes_across, mobility_bound
+from physics.kernels.fields.terms import softened, total_load
+
+# Columns: those of a spring, whose anchor is the other body's point now, and after them
+ANCHOR = 3
+VELOCITY = 9  # of the anchor, world frame [m/s]
+OTHER = 12  # index of the other body, -1: the spring is not at this one
+OTHER_POINT = 13  # in the other body's frame, from its centre of mass [m]
+OTHER_MOBILITY = 16  # bound of the inverse mass of that point [1/kg]
+SIZE = 17
+
+
+@inlined
+def middle(body):
+    """(x, q, v, L) of a body in the middle of the stage."""
+    m = body.middle
+    return (m[0], m[1], m[2]), (m[3], m[4], m[5], m[6]), (m[7], m[8], m[9]), (m[10], m[11], m[12])
+
+
+@inlined
+def put_middle(body, y):
+    """Write it."""
+    x, q, v, L = y
+    m = body.middle
+    m[0], m[1], m[2] = x
+    m[3], m[4], m[5], m[6] = q
+    m[7], m[8], m[9] = v
+    m[10], m[11], m[12] = L
+
+
+@inlined
+def state_of(body, later, tilted):
+    """State that the fields of a body are told in its middle."""
+    x, q, v, L = middle(body)
+    return field_state(x, q, v, L, body.now + later, tilted, body)
+
+
+@inlined
+def _principal(body, tilted):
+    """Principal axes of a body in its middle."""
+    return qt.to_matrix(principal_attitude(middle(body)[1], body, tilted))
+
+
+@inlined
+def soften_own(body, h, tilted):
+    """Let the loads of a body act that the implicit step over h of its own fields has; springs to others follow."""
+    state = state_of(body, 0.5 * h, tilted)
+    F, T = total_load(state, body.now + 0.5 * h, body)
+    put_all(softened(all_loads(F, T, body), h, _principal(body, tilted), state, body), body)
+
+
+@kernel
+def _soften_pair(k, one, other, h, tilted):
+    """Soften the loads of two bodies by the spring in columns k over h: equal and opposite changes."""
+    columns = one.columns
+    state, p = state_of(one, 0.5 * h, tilted), columns[k : k + SIZE]
+    arm, e, l = stretch(state, p)
+    _, q, _, _ = middle(other)
+    o = k + OTHER_POINT
+    lever = qt.matvec(qt.to_matrix(q), (columns[o], columns[o + 1], columns[o + 2]))
+    J, R = (one.J[0], one.J[1], one.J[2]), _principal(one, tilted)
+    K, S = (other.J[0], other.J[1], other.J[2]), _principal(other, tilted)
+    w = mobility_bound(arm, one.mass, J) + mobility_bound(lever, other.mass, K)
+    n, along, across = line_stiffness(h, w, e, l, p)
+    s, t = axes_across(n)
+    first, second = loads_held(one), loads_held(other)
+    u = minus(
+        plus(first[0], qt.cross(turning(R, first[1], J), arm)),
+        plus(second[0], qt.cross(turning(S, second[1], K), lever)),
+    )
+    wn = plus(answer_of(n, arm, R, one.mass, J), answer_of(n, lever, S, other.mass, K))
+    ws = plus(answer_of(s, arm, R, one.mass, J), answer_of(s, lever, S, other.mass, K))
+    wt = plus(answer_of(t, arm, R, one.mass, J), answer_of(t, lever, S, other.mass, K))
+    f = answer_to(u, n, s, t, wn, ws, wt, along, across)
+    put_all((minus(first[0], times(1.0 / one.mass, f)), minus(first[1], qt.cross(arm, f))), one)
+    put_all((plus(second[0], times(1.0 / other.mass, f)), plus(second[1], qt.cross(lever, f))), other)
+
+
+@inlined
+def soften_pairs(first, count, h, tilted, bodies):
+    """Loads as the implicit step over h of all springs between bodies has them, one spring after the other."""
+    for b in range(bodies.shape[0]):
+        for k in range(first, first + SIZE * count, SIZE):
+            j = int(bodies[b].columns[k + OTHER])
+            if j > b:  # each spring once
+                _soften_pair(k, bodies[b], bodies[j], h, tilted)
+
+
+@kernel
+def note_all_rates(h, tilted, bodies):
+    """Note for all bodies whether a stage of length h is too long for the explicit midpoint rule for one of them."""
+    stiff = 0
+    for b in range(bodies.shape[0]):
+        note_rates(state_of(bodies[b], 0.5 * h, tilted), h, bodies[b])
+        stiff = max(stiff, bodies[b].is_stiff)
+    for b in range(bodies.shape[0]):
+        bodies[b].is_stiff = stiff
+    return stiff == 1

@@ -1,0 +1,104 @@
+"""Whether a stage resolves the fields: by the rates that built-in ones tell, and by how the loads of others change."""
+
+from __future__ import annotations
+
+import math
+
+from physics.kernels import layout as at
+from physics.kernels import quaternion as qt
+from physics.kernels.body import angular_velocity
+from physics.kernels.compiler import inlined, kernel
+from physics.kernels.fields.field_loads import (
+    all_loads,
+    field_state,
+    less,
+    principal_axes,
+)
+from physics.kernels.fields.state import minus, plus, times
+from physics.kernels.fields.stiffness import implicit_share, is_beyond, is_unresolved
+from physics.kernels.fields.terms import (
+    if_declared,
+    if_unknown,
+    softened,
+    total_mean_load,
+    total_rates,
+    total_unknown,
+)
+from physics.kernels.flight import drift
+from physics.kernels.restraint import between
+
+# A user's field is not resolved where its loads change by more than this until the middle of a step, times speed/step.
+COARSE = 2.0
+
+
+@kernel
+def note_rates(state, h, work):
+    """Note whether a stage of length h is too long for the explicit midpoint rule, and for the fields at all."""
+    rates = total_rates(state, h, work)
+    work.rate, work.damping = max(rates[0], rates[2]), rates[0]
+    work.is_stiff = 1 if is_beyond(rates, h) else 0
+    if is_unresolved(rates, h):
+        work.is_coarse = 1
+    return rates[2]
+
+
+@inlined
+def note_coarse(first, second, scale, work):
+    """Note that loads (F, T) of fields which do not tell their rates have changed too much within a stage.
+
+    `scale` [m/s²] is the change at which they count as not resolved.
+    """
+    F, T = minus(second[0], first[0]), minus(second[1], first[1])
+    J = max(work.J[0], work.J[1], work.J[2])
+    change = math.sqrt(qt.dot(F, F)) / work.mass + work.radius * J * math.sqrt(qt.dot(T, T))
+    if change > scale:
+        work.is_coarse = 1
+
+
+@if_unknown()
+def look_over_stage(y, middle, x, q, h, tilted, work):
+    """Note whether loads of a user's fields change too much over a stage from y; `middle` are all loads at (x, q).
+
+    Under a stiffness of frequency Ω the loads change by Ω² h v/2 until the middle: h times that is more than 2 v where
+    h Ω > 2. Half a kick of a damping λ changes the loads by λ h/2 of what they are: more than 1 where h λ > 2.
+    """
+    t = work.now
+    v, L = y[2], y[3]
+    start = total_unknown(field_state(y[0], y[1], v, L, t, tilted, work), t, work)
+    moved = total_unknown(field_state(x, q, v, L, t, tilted, work), t, work)
+    w = angular_velocity(q, L, work, tilted)
+    speed = math.sqrt(qt.dot(v, v)) + work.radius * math.sqrt(qt.dot(w, w))
+    note_coarse(start, moved, COARSE * speed / h, work)
+    a, T = all_loads(middle[0], middle[1], work)
+    v, L = plus(v, times(0.5 * h, a)), plus(L, times(0.5 * h, T))
+    kicked = total_unknown(field_state(x, q, v, L, t, tilted, work), t, work)
+    J = max(work.J[0], work.J[1], work.J[2])
+    size = math.sqrt(qt.dot(a, a)) + work.radius * J * math.sqrt(qt.dot(T, T))
+    note_coarse(moved, kicked, size, work)
+
+
+@inlined
+def change_to_agree(y, end, loads, h, gyroscopic, tilted, work):
+    """What `loads` lack to agree with a flight over h from y to `end`, softened as `stiffness` has it."""
+    t, half = work.now + 0.5 * h, 0.5 * h
+    share = implicit_share(h * work.damping)
+    v, L = between(y[2], end[2], share), between(y[3], end[3], share)
+    x, q = times(0.5, plus(y[0], end[0])), drift(y[1], y[3], work, half, gyroscopic, tilted)
+    middle = field_state(x, q, v, L, t, tilted, work)
+    first = field_state(y[0], y[1], v, L, t, tilted, work)
+    last = field_state(end[0], end[1], v, L, t, tilted, work)
+    F, T = total_mean_load((middle, first, last), t, work)
+    return softened(less(all_loads(F, T, work), loads), h, principal_axes(q, tilted, work), middle, work)
+
+
+@if_declared(False)
+def is_stiff(work):
+    """Whether the loads that are held are those of an implicit step."""
+    return work.is_stiff == 1
+
+
+@if_declared()
+def note_report(is_moved, report, work):
+    """Count a body that has moved in fields which some stage of the call did not resolve."""
+    if work.is_coarse == 1 and is_moved:
+        report[work.world, at.COARSE] += 1.0

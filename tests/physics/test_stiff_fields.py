@@ -1,0 +1,192 @@
+"""Effects that a step is too long for: nothing explodes, damping stays right, and what is not resolved is reported."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import physics
+from rigid_env.measure import drawn_effects
+from tests.reference.fields import flight_with_drag
+
+DECADES = st.floats(-6.0, 6.0).map(lambda e: 10.0**e)
+STEPS = st.floats(-3.0, -1.0).map(lambda e: 10.0**e)
+
+
+def world_of(bodies, effects, dt, **options):
+    return physics.World(physics.Scene(bodies, effects=effects), dt=dt, **options)
+
+
+@pytest.mark.parametrize("dt", [0.001, 0.005, 0.01, 0.02, 0.05, 0.1])
+@pytest.mark.parametrize("effects", [(), (physics.Gravity(),)], ids=("level", "falling"))
+def test_a_balloon_that_is_thrown(dt, effects):
+    """3 g, radius 0.14 m, 40 m/s: h λ = 2 h k v/m is 4.7 at 10 ms.
+
+    The first part of a step has h λ = 1/4. Its way x = h (v + v')/2 errs by (h λ/2)²/12 of h v, and the next parts are
+    longer by half each: 3 % in all.
+    """
+    world = world_of([physics.Sphere(0.14, 0.003, linvel=(40.0, 0.0, 0.0))], [physics.Drag(), *effects], dt)
+    report = world.step(steps=round(1.0 / dt))
+    truth = flight_with_drag(0.14, 0.003, (40.0, 0.0, 0.0), 9.81 * len(effects), 1.0)
+    assert np.linalg.norm(world.pos[0, 0] - truth) <= 0.03 * np.linalg.norm(truth)
+    assert report.ok
+
+
+@settings(max_examples=60, deadline=None)
+@given(c=DECADES, dt=STEPS, quadratic=st.booleans())
+def test_drag_never_gives(c, dt, quadratic):
+    """A speed falls, step by step, and does not turn round; the closed forms say to what."""
+    drag = physics.Drag(0.47 * c) if quadratic else physics.Drag(0.0, linear=c)
+    world = world_of([physics.Sphere(0.3, 0.5, linvel=(3.0, 4.0, 0.0))], [drag], dt)
+    speed = 5.0
+    for k in range(1, 6):
+        report = world.step()
+        now = world.linvel[0, 0]
+        assert now.min() >= -1e-15 * 5.0  # rounding of what is all gone
+        assert np.linalg.norm(now) <= speed * (1 + 1e-14)
+        speed = np.linalg.norm(now)
+        assert report.ok
+        if quadratic:
+            strength = 0.5 * 1.225 * 0.47 * c * math.pi * 0.09 / 0.5
+            assert speed == pytest.approx(5.0 / (1.0 + strength * 5.0 * k * dt), rel=0.06)
+
+
+@settings(max_examples=60, deadline=None)
+@given(c=DECADES, d=DECADES, dt=STEPS)
+def test_drag_on_the_spin_never_gives(c, d, dt):
+    """ω·L, twice the energy of turning, falls from step to step."""
+    block = physics.Block((0.5, 0.3, 0.1), 0.5, angvel=(3.0, 4.0, 5.0))
+    world = world_of([block], [physics.AngularDrag(0.01 * c, 0.01 * d)], dt)
+    energy = physics.diagnose(world).energy[0, 0]
+    for _ in range(5):
+        assert world.step().ok
+        now = physics.diagnose(world).energy[0, 0]
+        assert now <= energy * (1 + 1e-13)
+        energy = now
+
+
+@settings(max_examples=60, deadline=None)
+@given(k=DECADES, length=st.sampled_from((0.0, 0.5, 3.0)), dt=STEPS, corner=st.booleans())
+def test_a_spring_is_bounded_at_any_stiffness(k, length, dt, corner):
+    """E_n <= 4/3 E_0 where h Ω <= 1 (leapfrog keeps ½ k x² + ½ m v² (1 - (h Ω)²/4)); no gain, and a report, beyond."""
+    point = (0.2, 0.1, 0.05) if corner else (0.0, 0.0, 0.0)
+    block = physics.Block((0.4, 0.3, 0.2), 2.0, pos=(0.0, 1.0, 0.0), linvel=(1.0, 0.0, 0.5))
+    world = world_of([block], [physics.Spring((0.0, 2.0, 0.0), point, 100.0 * k, length=length)], dt)
+    start = physics.diagnose(world).energy[0, 0]
+    is_told = False
+    for _ in range(40):
+        is_told |= not world.step().ok
+        assert physics.diagnose(world).energy[0, 0] <= start * (4.0 / 3.0 + 1e-9)
+    if dt * math.sqrt(100.0 * k / 2.0) > 1.0:
+        assert is_told
+
+
+def test_a_pendulum_on_a_spring_that_no_step_resolves():
+    """h Ω = 300: the spring is as good as a rod, and what hangs on it swings: 2π √(l/g) there and back, within 5 %."""
+    l, k, m, dt = 1.0, 9e6, 1.0, 0.1
+    x = (l * math.sin(0.1), -l * math.cos(0.1), 0.0)
+    ball = physics.Sphere(0.05, m, pos=x)
+    scene = physics.Scene([ball], effects=[physics.Gravity(), physics.Spring(stiffness=k, length=l)])
+    world = physics.World(scene, dt=dt)
+    crossings, before = [], x[0]
+    for n in range(200):
+        report = world.step()
+        assert report.status[0] == physics.Status.COARSE
+        now = world.pos[0, 0, 0]
+        if before > 0.0 >= now:
+            crossings.append((n + 1 - now / (now - before)) * dt)
+        assert np.linalg.norm(world.pos[0, 0]) == pytest.approx(l, abs=0.01)
+        before = now
+    period = np.diff(crossings).mean()
+    assert period == pytest.approx(2 * math.pi * math.sqrt(l / 9.81), rel=0.05)
+
+
+@settings(max_examples=40, deadline=None)
+@given(k=DECADES, c=DECADES, dt=STEPS, damped=st.booleans())
+def test_springs_between_bodies_keep_momentum_at_any_stiffness(k, c, dt, damped):
+    """What one end gets the other loses; the energy is at most 4/3 of what it was."""
+    bodies = [
+        physics.Block((0.4, 0.3, 0.2), 2.0, linvel=(1.0, 0.0, 0.5)),
+        physics.Ellipsoid((0.2, 0.1, 0.3), 0.5, pos=(1.0, 0.5, 0.0), linvel=(0.0, -1.0, 0.0)),
+    ]
+    spring = physics.Spring((0.1, 0.0, 0.0), (0.2, 0.1, 0.0), 100.0 * k, c * damped, 0.7, other=1)
+    world = world_of(bodies, [spring], dt)
+    start = physics.diagnose(world)
+    for _ in range(20):
+        world.step()
+    now = physics.diagnose(world)
+    scale = np.abs(start.momentum).sum() + np.sqrt(start.energy.sum() * 5.0)
+    assert np.abs(now.momentum.sum(axis=1) - start.momentum.sum(axis=1)).max() <= 1e-12 * scale
+    assert now.energy.sum() <= start.energy.sum() * (4.0 / 3.0 + 1e-9)
+
+
+@physics.field_function
+def _pull(state, p, t):
+    return (-p[0] * state.x[0], -p[0] * state.x[1], -p[0] * state.x[2]), (0.0, 0.0, 0.0)
+
+
+@physics.field_function
+def _brake(state, p, t):
+    return (-p[0] * state.v[0], -p[0] * state.v[1], -p[0] * state.v[2]), (0.0, 0.0, 0.0)
+
+
+@dataclass(frozen=True)
+class Trough(physics.Field):
+    stiffness: float = 1.0  # [N/m]
+    function: ClassVar = _pull
+
+
+@dataclass(frozen=True)
+class Brake(physics.Field):
+    coefficient: float = 1.0  # [N s/m]
+    function: ClassVar = _brake
+
+
+@pytest.mark.parametrize(
+    ("kind", "limit"), [(Trough, 4.0 / 0.01**2), (Brake, 2.0 / 0.01)], ids=("stiff in place", "stiff in velocity")
+)
+@pytest.mark.parametrize("share", [1e-6, 0.2, 5.0, 1e6])
+def test_a_field_of_a_users_own_is_reported_where_it_is_not_resolved(kind, limit, share):
+    """(h Ω)² = 4 and h λ = 2 are where the explicit rule begins to grow; 1 kg, 10 ms."""
+    ball = physics.Sphere(0.1, 1.0, pos=(1.0, 0.0, 0.0), linvel=(0.0, 1.0, 0.0))
+    world = world_of([ball], [kind(share * limit)], 0.01)
+    told = [world.step().status[0] == physics.Status.COARSE for _ in range(3)]
+    assert any(told) == (share > 1.0)
+
+
+def test_what_lies_still_under_a_stiff_spring_is_not_reported():
+    """Nothing moves: nothing is missed. The floor carries what the spring pushes with."""
+    block = physics.Block((0.4, 0.3, 0.2), 2.0, pos=(0.0, 0.15, 0.0))
+    spring = physics.Spring((0, 1, 0), stiffness=1e7, length=1.0)
+    effects = [physics.Gravity(), physics.Contact(), physics.Friction(), spring]
+    world = physics.World(physics.Scene([block], [physics.HalfSpace((0, 1, 0))], effects), dt=0.01)
+    for _ in range(20):
+        report = world.step()
+    assert report.ok
+    np.testing.assert_allclose(world.pos[0, 0], (0.0, 0.15, 0.0), atol=1e-6)
+    _, forces = world.contacts()
+    assert forces[:, 1].sum() == pytest.approx(1e7 * (1.0 - 0.85) + 2.0 * 9.81, rel=1e-3)
+
+
+PAIRS = [pair for pair in drawn_effects.pairs() if len(pair) == 2]
+DRAWN = np.random.default_rng(35).choice(len(PAIRS), 10, replace=False).tolist()
+
+
+@pytest.mark.parametrize("index", DRAWN, ids=lambda index: " and ".join(PAIRS[index]))
+def test_no_energy_from_nowhere(index):
+    """Ten pairs of effects with drawn parameters; all pairs: `python -m benchmarks.drawn_effects`."""
+    found = 0
+    for seed in range(5):
+        rng = np.random.default_rng([35, index, seed])
+        scene = drawn_effects.draw_scene(rng, PAIRS[index], on_floor=True)
+        outcome = drawn_effects.run(rng, scene, ("fast", "balanced")[seed % 2], 4)
+        assert outcome.is_finite.all()
+        assert (outcome.excess <= 0.0).all()
+        found += 1
+    assert found == 5
