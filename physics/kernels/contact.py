@@ -7,10 +7,10 @@ from physics.kernels import quaternion as qt
 from physics.kernels.arms import center_arm, feature_of, geometric_center, wall_normal, wall_of
 from physics.kernels.body import angular_velocity
 from physics.kernels.compiler import inlined, kernel
-from physics.kernels.held import holds_on, turning_acceleration
+from physics.kernels.held import last_push, stays, turning_acceleration
 from physics.kernels.lanes import WIDTH, put_row
 from physics.kernels.laws import STIFFNESS, number_of
-from physics.kernels.layout import BLOCK, OFFSET, VERTEX_COUNT
+from physics.kernels.layout import BLOCK, ELLIPSOID, OFFSET, VERTEX_COUNT
 
 # Slops within which what approaches has arrived. Features that touched together may be two slops apart, and the place
 # of the first one's impact is half a slop off: an edge that comes down again does so with both its ends at once.
@@ -38,20 +38,18 @@ def is_clear(x, v, h, work):
 
 
 @inlined
-def _admit(gap, speed, slop, reach, soft, slot, y, h, tilted, memory, work):
+def _admit(gap, speed, slop, reach, soft, slot, h, memory, work):
     """Whether a feature belongs to the contact set of this stage.
 
     It does when it touches (gap <= slop); when loads can make it no faster at the wall than `soft` (it then rests:
-    its rebound would be over within the step); in the last stage that a substep may have, when it would pass through
-    the wall before the substep ends; and when it holds on from the last stage (`held`).
+    its rebound would be over within the step); and when loads can bring it to the wall within the step, if it pushed in
+    the last one (`held`), or if this is the last stage that the substep may have.
     """
     if gap <= slop or (gap <= TOGETHER * slop and speed < 0.0):
         return True
-    if work.is_last and gap + h * speed - reach <= slop:
-        return True
     if speed <= 0.0 and speed * speed + 2.0 * work.acceleration * gap <= soft * soft:
         return True
-    return holds_on(gap, slot, y, h, tilted, memory, work)
+    return gap + h * speed - reach <= slop and (work.is_last == 1 or last_push(slot, memory, work) > 0.0)
 
 
 @inlined
@@ -82,7 +80,9 @@ def gather(y, w, h, tilted, memory, work):
     dims = (work.dims[0], work.dims[1], work.dims[2])
     center = geometric_center(x, R, work, tilted)
     reach, soft = 0.5 * acceleration * h * h, work.rest_share * acceleration * h
-    near = max(slop + reach + 0.5 * h * h * turning_acceleration(w, work), TOGETHER * slop)
+    near = max(slop + reach, TOGETHER * slop)
+    if shape == ELLIPSOID:
+        near += 0.5 * h * h * turning_acceleration(w, work)
     if work.is_last:
         near += h * (abs(v[0]) + abs(v[1]) + abs(v[2]) + radius * (abs(w[0]) + abs(w[1]) + abs(w[2])))
     count = 0
@@ -112,13 +112,13 @@ def gather(y, w, h, tilted, memory, work):
                 gap, speed = work.vertices[0, vertex], work.vertices[1, vertex]
                 if gap > near:
                     continue
-                if _admit(gap, speed, slop, reach, soft, k * features + vertex, y, h, tilted, memory, work):
+                if _admit(gap, speed, slop, reach, soft, k * features + vertex, h, memory, work):
                     count = _record(count, k, vertex, features, gap, speed, work)
                     depth, widest, approach = max(depth, -gap), max(widest, gap), max(approach, -speed)
         else:
             gap = d - geo.support(shape, dims, e)
             speed = vn + qt.dot(m, geo.support_arm(shape, dims, R, n, e))
-            if _admit(gap, speed, slop, reach, soft, k * features, y, h, tilted, memory, work):
+            if _admit(gap, speed, slop, reach, soft, k, h, memory, work) or stays(gap, k, y, h, tilted, memory, work):
                 count = _record(count, k, 0, features, gap, speed, work)
                 depth, widest, approach = max(depth, -gap), max(widest, gap), max(approach, -speed)
     work.widest, work.approach = widest, approach

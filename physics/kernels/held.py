@@ -9,7 +9,7 @@ left it nor hit it.
 from __future__ import annotations
 
 from physics.kernels import quaternion as qt
-from physics.kernels.arms import arm_and_rate, feature_of, wall_normal, wall_of
+from physics.kernels.arms import arm_and_rate, feature_of, place_arms, wall_normal, wall_of
 from physics.kernels.body import angular_velocity, principal_attitude, turning
 from physics.kernels.compiler import inlined, kernel
 from physics.kernels.layout import ELLIPSOID
@@ -42,10 +42,10 @@ def free_acceleration(slot, y, tilted, work):
     return n[0] * (a[0] + b[0] + c[0]) + n[1] * (a[1] + b[1] + c[1]) + n[2] * (a[2] + b[2] + c[2])
 
 
-@inlined
-def holds_on(gap, slot, y, h, tilted, memory, work):
-    """Whether a feature that the last stage has left with a gap is in contact still: it is pressed, and h closes it."""
-    if not last_push(slot, memory, work) > 0.0:
+@kernel
+def stays(gap, slot, y, h, tilted, memory, work):
+    """Whether a round body that pushed in the last stage is pressed still, so that the gap it was left with closes."""
+    if not (work.shape == ELLIPSOID and last_push(slot, memory, work) > 0.0):
         return False
     return gap + 0.5 * h * h * min(free_acceleration(slot, y, tilted, work), 0.0) <= work.slop
 
@@ -63,14 +63,20 @@ def turning_acceleration(w, work):
     return qt.dot(w, w) * reach
 
 
-@inlined
-def largest_residue(y, h, tilted, work):
-    """Speed that a stage of length h can leave a contact that holds [m/s]: what loads and turning make in it."""
-    return h * (work.acceleration + turning_acceleration(angular_velocity(y[1], y[3], work, tilted), work))
+@kernel
+def goes_on(i, y, h, tilted, memory, work):
+    """Whether the speed of contact i of the set is an error of the last stage: it pushed then, and is no faster.
+
+    A stage of length h can leave a contact that holds the speed that loads and turning make in it.
+    """
+    if not last_push(work.slot[i], memory, work) > 0.0:
+        return False
+    w = angular_velocity(y[1], y[3], work, tilted)
+    return abs(work.speed[i]) <= h * (work.acceleration + turning_acceleration(w, work))
 
 
 @kernel
-def hold_back(y, h, most, tilted, memory, work):
+def hold_back(y, h, tilted, memory, work):
     """State with the one contact of the set at rest along its normal, if it holds on but h would not bring it back.
 
     What leaves at u after a push p, though it is pressed against its wall still, got u/(n·W n) more than it should
@@ -79,9 +85,12 @@ def hold_back(y, h, most, tilted, memory, work):
     """
     x, q, v, L = y
     gap, u, slot = work.gap[0], work.speed[0], work.slot[0]
-    a = free_acceleration(slot, y, tilted, work)
-    if not (a < 0.0 < last_push(slot, memory, work) and u <= most and gap + h * (u + 0.5 * h * a) > 0.0):
+    if not goes_on(0, y, h, tilted, memory, work):
         return y
+    a = free_acceleration(slot, y, tilted, work)
+    if not (a < 0.0 and gap + h * (u + 0.5 * h * a) > 0.0):
+        return y
+    place_arms(1, qt.to_matrix(q), tilted, work)
     n, r = wall_normal(work.walls, wall_of(slot, work)), (work.arm[0, 0], work.arm[0, 1], work.arm[0, 2])
     m = qt.cross(r, n)
     spin = turning(qt.to_matrix(principal_attitude(q, work, tilted)), m, work.J)

@@ -6,15 +6,16 @@ import math
 
 from physics.kernels import layout as at
 from physics.kernels import quaternion as qt
-from physics.kernels.aims import HIT, NOTHING, aim_impact, aim_rest
+from physics.kernels.aims import HIT, NOTHING, aim_impact, aim_rest, may_hit
 from physics.kernels.arms import place_arms
 from physics.kernels.body import principal_attitude, turning
 from physics.kernels.compiler import inlined, kernel
 from physics.kernels.compliance import aim_springs, foretell_gaps, parts_of_stage
 from physics.kernels.events.log import log_wall_impacts
 from physics.kernels.flight import drift
-from physics.kernels.held import CONTACT_COUNT, MEMORY_HEAD, MODE, STAGE_LENGTH, hold_back, largest_residue
+from physics.kernels.held import CONTACT_COUNT, MEMORY_HEAD, MODE, STAGE_LENGTH, hold_back
 from physics.kernels.laws import STIFFNESS, if_law
+from physics.kernels.layout import ELLIPSOID
 from physics.kernels.resist import aim_tangential, resist_turning, without_gain
 from physics.kernels.restraint import ROUNDING, kinetic_energy, part_of_rebound, shortened
 from physics.kernels.slide import SLIDE
@@ -178,12 +179,13 @@ def impact(n, y, t, h, friction, smooth, tilted, pivots, memory, report, work, l
     bounce_speed = work.rest_share * work.acceleration * h
     if work.restitution > 0.0:
         bounce_speed /= work.restitution
-    residue = largest_residue(y, h, tilted, work)
-    found = aim_impact(n, bounce_speed, work.slop / h, 1.0 / h, residue, memory, work)
+    slop_speed = work.slop / h
+    if not may_hit(bounce_speed, slop_speed, work):
+        if n == 1 and work.shape == ELLIPSOID and work.speed[0] > slop_speed:
+            return hold_back(y, h, tilted, memory, work)
+        return y
+    found = aim_impact(n, bounce_speed, slop_speed, y, h, tilted, memory, work)
     if found == NOTHING:
-        if n == 1 and work.speed[0] > work.slop / h:
-            place_arms(n, qt.to_matrix(q), tilted, work)
-            return hold_back(y, h, residue, tilted, memory, work)
         return y
     place_arms(n, qt.to_matrix(q), tilted, work)
     aim_tangential(n, bounce_speed, y, tilted, work)

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from physics.kernels.compiler import kernel
 from physics.kernels.contact import TOGETHER, gather
-from physics.kernels.layout import BLOCK
+from physics.kernels.layout import BLOCK, ELLIPSOID
 from physics.kernels.quaternion import to_matrix
 from physics.kernels.stages import CONTACT_COUNT, MEMORY_HEAD, load_warm_start, memory_size, store_warm_start
 from physics.kernels.workspace import make_workspace
@@ -78,21 +78,34 @@ G = 10.0
 
 
 @pytest.mark.parametrize("pushed", [False, True])
-@pytest.mark.parametrize("loads", [-G, G])
-@pytest.mark.parametrize("gap", [0.9, 1.1])
-@pytest.mark.parametrize("speed", [0.1, 10.0])
-def test_what_pushed_and_is_pressed_still_belongs_to_the_set(pushed, loads, gap, speed):
-    """A vertex that leaves, `gap` times G H²/2 above the slop: loads towards the wall close up to that within H."""
+@pytest.mark.parametrize("gap", [0.4, 0.6, 1.1])
+@pytest.mark.parametrize("speed", [0.0, 0.5])
+def test_what_pushed_and_may_be_back_within_the_step_belongs_to_the_set(pushed, gap, speed):
+    """A vertex `gap` times G H²/2 above the slop that leaves at `speed` times G H/2; loads of G bring it back."""
     work, memory = block_at_walls(), np.zeros((1, memory_size(2 * FEATURES)))
     one, q = work[0], (math.cos(0.3), math.sin(0.3), 0.0, 0.0)
-    one["acceleration"], one["free_acceleration"], one["features"], one["feature_bits"] = G, (0.0, loads, 0.0), 8, 3
+    one["acceleration"] = G
     arms = CORNERS @ np.reshape(to_matrix(q), (3, 3)).T
     lowest = np.flatnonzero(arms[:, 1] < arms[:, 1].min() + 1e-9)
     memory[0, MEMORY_HEAD + 2 * FEATURES + 3 * lowest] = float(pushed)
     x = (50.0, SLOP + gap * G * H**2 / 2 - arms[:, 1].min(), 0.0)
-    count, _ = _gather((x, q, (0.0, speed, 0.0), NONE), NONE, H, None, memory, work)
-    belongs = pushed and loads < 0.0 and gap < 1.0
-    assert list(one["slot"][:count]) == (list(lowest) if belongs else [])
+    count, _ = _gather((x, q, (0.0, speed * G * H / 2, 0.0), NONE), NONE, H, None, memory, work)
+    assert list(one["slot"][:count]) == (list(lowest) if pushed and gap + speed < 1.0 else [])
+
+
+@pytest.mark.parametrize("pushed", [False, True])
+@pytest.mark.parametrize("loads", [-G, G])
+@pytest.mark.parametrize("gap", [0.9, 1.1])
+def test_a_round_body_that_pushed_and_is_pressed_still_belongs_to_the_set(pushed, loads, gap):
+    """It leaves however fast: loads towards the wall close `gap` times G H²/2 within H, and it has no other cause."""
+    work, memory = make_workspace(np.array([FLOOR, SIDE]), 1), np.zeros((1, memory_size(2)))
+    one = work[0]
+    one["shape"], one["dims"], one["radius"], one["slop"] = ELLIPSOID, SIZE, SIZE.max(), SLOP
+    one["acceleration"], one["free_acceleration"] = G, (0.0, loads, 0.0)
+    memory[0, MEMORY_HEAD + 2] = float(pushed)
+    y = ((50.0, SIZE[1] + SLOP + gap * G * H**2 / 2, 0.0), (1.0, 0.0, 0.0, 0.0), (0.0, 10.0, 0.0), NONE)
+    count, _ = _gather(y, NONE, H, None, memory, work)
+    assert count == (pushed and loads < 0.0 and gap < 1.0)
 
 
 @pytest.mark.parametrize("share", [0.0, 0.5, 0.99, 1.01])
