@@ -41,9 +41,9 @@ def is_clear(x, v, h, work):
 def _admit(gap, speed, slop, reach, soft, slot, h, memory, work):
     """Whether a feature belongs to the contact set of this stage.
 
-    It does when it touches (gap <= slop); when loads can make it no faster at the wall than `soft` (it then rests:
-    its rebound would be over within the step); and when loads can bring it to the wall within the step, if it pushed in
-    the last one (`held`), or if this is the last stage that the substep may have.
+    It does when it touches (gap <= slop); when loads make it no faster at the wall than from rest in the step, `soft`
+    (it then rests, and restitution would not act); and when loads can bring it to the wall within the step, if it
+    pushed in the last stage (`held`), or if this is the last one that the substep may have.
     """
     if gap <= slop or (gap <= TOGETHER * slop and speed < 0.0):
         return True
@@ -79,7 +79,7 @@ def gather(y, w, h, tilted, memory, work):
         acceleration = 0.0
     dims = (work.dims[0], work.dims[1], work.dims[2])
     center = geometric_center(x, R, work, tilted)
-    reach, soft = 0.5 * acceleration * h * h, work.rest_share * acceleration * h
+    reach, soft = 0.5 * acceleration * h * h, acceleration * h
     near = max(slop + reach, TOGETHER * slop)
     if shape == ELLIPSOID:
         near += 0.5 * h * h * turning_acceleration(w, work)
