@@ -6,6 +6,7 @@ from physics.kernels import quaternion as qt
 from physics.kernels.arms import arm_and_rate, wall_normal, wall_of
 from physics.kernels.columns import column_from, numbers_from, put_columns, spread
 from physics.kernels.compiler import inlined, kernel
+from physics.kernels.held import goes_on
 from physics.kernels.lanes import WIDTH, chosen, larger, smaller
 from physics.kernels.layout import BLOCK, SPHERE
 
@@ -19,20 +20,30 @@ LARGEST_TURN = 0.5
 # Share of the slop below which the displacement of a contact in one step does not count.
 UNSEEN = 1.0e-3
 
+# Of the contacts of a set: none is fast enough for an impact, some are left so by the last stage, some hit their wall.
+NOTHING, RESIDUE, HIT = range(3)
+
 
 @inlined
-def aim_impact(n, bounce_speed, slop_speed, rate, work):
-    """Targets of an impact, and whether there is one: where no contact is fast enough for it, none is looked at.
+def may_hit(bounce_speed, slop_speed, work):
+    """Whether a contact of the set is fast enough for an impact: where none is, none is looked at."""
+    return work.approach > (min(bounce_speed, slop_speed) if work.restitution > 0.0 else slop_speed)
+
+
+@inlined
+def aim_impact(n, bounce_speed, slop_speed, y, h, tilted, memory, work):
+    """Targets of an impact, and what there is: nothing, contacts to bring back to rest, or an impact.
 
     A contact that approaches faster than `bounce_speed` leaves with e times that speed (Newton's law); one that
     approaches slower is brought to rest, since its rebound would be over within the step, and if it also is slower
-    than `slop_speed` plus its gap times `rate` (1/h) it closes less than the slop within the step and is left to
+    than `slop_speed` plus its gap by h it closes less than the slop within the step and is left to
     the resting stage. One that leaves may be turned round, to e times its speed: with that, and only with that, no
     frictionless impact of several contacts gains energy (Moreau; theory, section 8).
+
+    A contact that goes on from the last stage has hit nothing (`held`): it is brought to rest, and its speed set to
+    zero, but that is no impact.
     """
-    if not work.approach > (min(bounce_speed, slop_speed) if work.restitution > 0.0 else slop_speed):
-        return False
-    is_impact = False
+    found, rate = NOTHING, 1.0 / h
     for i in range(n):
         s = -work.speed[i]
         goal = 0.0
@@ -40,11 +51,15 @@ def aim_impact(n, bounce_speed, slop_speed, rate, work):
         if is_bounce or s < 0.0:
             goal = work.restitution * s
         if is_bounce or s > slop_speed + max(work.gap[i], 0.0) * rate:
-            is_impact = True
+            if goes_on(i, y, h, tilted, memory, work):
+                work.speed[i] = goal = 0.0
+                found = max(found, RESIDUE)
+            else:
+                found = HIT
         work.target[i, 0] = goal
         work.target[i, 1] = 0.0
         work.target[i, 2] = 0.0
-    return is_impact
+    return found
 
 
 @inlined

@@ -7,9 +7,10 @@ from physics.kernels import quaternion as qt
 from physics.kernels.arms import center_arm, feature_of, geometric_center, wall_normal, wall_of
 from physics.kernels.body import angular_velocity
 from physics.kernels.compiler import inlined, kernel
+from physics.kernels.held import last_push, stays, turning_acceleration
 from physics.kernels.lanes import WIDTH, put_row
 from physics.kernels.laws import STIFFNESS, number_of
-from physics.kernels.layout import BLOCK, OFFSET, VERTEX_COUNT
+from physics.kernels.layout import BLOCK, ELLIPSOID, OFFSET, VERTEX_COUNT
 
 # Slops within which what approaches has arrived. Features that touched together may be two slops apart, and the place
 # of the first one's impact is half a slop off: an edge that comes down again does so with both its ends at once.
@@ -37,30 +38,30 @@ def is_clear(x, v, h, work):
 
 
 @inlined
-def _admit(gap, speed, slop, margin, reach, acceleration, h, is_last):
+def _admit(gap, speed, slop, reach, soft, slot, h, memory, work):
     """Whether a feature belongs to the contact set of this stage.
 
-    It does when it touches (gap <= slop); when it is so near and so slow that the step's own acceleration
-    could bring it to the wall (it then rests, and restitution would not act); and, in the last stage that a
-    substep may have, when it would pass through the wall before the substep ends.
+    It does when it touches (gap <= slop); when loads make it no faster at the wall than from rest in the step, `soft`
+    (it then rests, and restitution would not act); and when loads can bring it to the wall within the step, if it
+    pushed in the last stage (`held`), or if this is the last one that the substep may have.
     """
     if gap <= slop or (gap <= TOGETHER * slop and speed < 0.0):
         return True
-    if is_last and gap + h * speed - reach <= slop:
+    if speed <= 0.0 and speed * speed + 2.0 * work.acceleration * gap <= soft * soft:
         return True
-    return gap <= margin and speed >= -acceleration * h and speed <= 0.0
+    return gap + h * speed - reach <= slop and (work.is_last == 1 or last_push(slot, memory, work) > 0.0)
 
 
 @inlined
-def gather(x, R, v, w, h, tilted, work):
+def gather(y, w, h, tilted, memory, work):
     """Fill `work` (slot, gap, speed, mask, and of all together widest and approach) with the contact set at this pose.
 
     Parameters
     ----------
-    x, v, w : tuples of 3 floats
-        Position, velocity, angular velocity, world frame [m, m/s, rad/s].
-    R : tuple of 9 floats
-        Body frame to world.
+    y : tuple
+        State: position, attitude, velocity, angular momentum.
+    w : tuple of 3 floats
+        Angular velocity, world frame [rad/s].
     h : float
         Time that the stage is to cover [s].
 
@@ -72,14 +73,16 @@ def gather(x, R, v, w, h, tilted, work):
         Deepest penetration among them [m], 0 if none.
     """
     walls, features, shape, radius = work.walls, work.features, work.shape, work.radius
-    slop, acceleration = work.slop, work.acceleration
+    x, q, v, _ = y
+    R, slop, acceleration = qt.to_matrix(q), work.slop, work.acceleration
     if stiffness(work) > 0.0:  # springs push where there is no gap left
         acceleration = 0.0
     dims = (work.dims[0], work.dims[1], work.dims[2])
     center = geometric_center(x, R, work, tilted)
-    reach = 0.5 * acceleration * h * h
-    margin = slop + reach
-    near = max(margin, TOGETHER * slop)
+    reach, soft = 0.5 * acceleration * h * h, acceleration * h
+    near = max(slop + reach, TOGETHER * slop)
+    if shape == ELLIPSOID:
+        near += 0.5 * h * h * turning_acceleration(w, work)
     if work.is_last:
         near += h * (abs(v[0]) + abs(v[1]) + abs(v[2]) + radius * (abs(w[0]) + abs(w[1]) + abs(w[2])))
     count = 0
@@ -109,13 +112,13 @@ def gather(x, R, v, w, h, tilted, work):
                 gap, speed = work.vertices[0, vertex], work.vertices[1, vertex]
                 if gap > near:
                     continue
-                if _admit(gap, speed, slop, margin, reach, acceleration, h, work.is_last):
+                if _admit(gap, speed, slop, reach, soft, k * features + vertex, h, memory, work):
                     count = _record(count, k, vertex, features, gap, speed, work)
                     depth, widest, approach = max(depth, -gap), max(widest, gap), max(approach, -speed)
         else:
             gap = d - geo.support(shape, dims, e)
             speed = vn + qt.dot(m, geo.support_arm(shape, dims, R, n, e))
-            if _admit(gap, speed, slop, margin, reach, acceleration, h, work.is_last):
+            if _admit(gap, speed, slop, reach, soft, k, h, memory, work) or stays(gap, k, y, h, tilted, memory, work):
                 count = _record(count, k, 0, features, gap, speed, work)
                 depth, widest, approach = max(depth, -gap), max(widest, gap), max(approach, -speed)
     work.widest, work.approach = widest, approach

@@ -6,25 +6,21 @@ import math
 
 from physics.kernels import layout as at
 from physics.kernels import quaternion as qt
-from physics.kernels.aims import aim_impact, aim_rest
+from physics.kernels.aims import HIT, NOTHING, aim_impact, aim_rest, may_hit
 from physics.kernels.arms import place_arms
 from physics.kernels.body import principal_attitude, turning
 from physics.kernels.compiler import inlined, kernel
 from physics.kernels.compliance import aim_springs, foretell_gaps, parts_of_stage
 from physics.kernels.events.log import log_wall_impacts
 from physics.kernels.flight import drift
+from physics.kernels.held import CONTACT_COUNT, MEMORY_HEAD, MODE, STAGE_LENGTH, hold_back
 from physics.kernels.laws import STIFFNESS, if_law
+from physics.kernels.layout import ELLIPSOID
 from physics.kernels.resist import aim_tangential, resist_turning, without_gain
 from physics.kernels.restraint import ROUNDING, kinetic_energy, part_of_rebound, shortened
 from physics.kernels.slide import SLIDE
 from physics.kernels.slip import has_turned_round, oppose_end_slip, oppose_mean_slip, without_gift
 from physics.kernels.solve import PIVOTING, solve_contacts
-
-# Row of `memory`: length of the last resting stage [s], its contact count, which direct solve worked last
-# (`slide.HOLD`, `SLIDE`, `MIXED`), the slots of its contacts, then the impulses of all slots, zero where
-# there is no contact.
-STAGE_LENGTH, CONTACT_COUNT, MODE = range(3)
-MEMORY_HEAD = 3
 
 # Share of its energy that a body may gain in a resting stage by what is of third order in the step: more is a step that
 # turns it too far, and is taken without targets that know how it turns.
@@ -174,7 +170,7 @@ def aim_plastic(n, work):
 
 
 @inlined
-def impact(n, y, t, h, friction, smooth, tilted, pivots, report, work, log, counts):
+def impact(n, y, t, h, friction, smooth, tilted, pivots, memory, report, work, log, counts):
     """State after the impulses of the contacts that approach; unchanged when none does.
 
     It happens t [s] after the start of the call, with h [s] left of the substep.
@@ -183,7 +179,13 @@ def impact(n, y, t, h, friction, smooth, tilted, pivots, report, work, log, coun
     bounce_speed = work.rest_share * work.acceleration * h
     if work.restitution > 0.0:
         bounce_speed /= work.restitution
-    if not aim_impact(n, bounce_speed, work.slop / h, 1.0 / h, work):
+    slop_speed = work.slop / h
+    if not may_hit(bounce_speed, slop_speed, work):
+        if n == 1 and work.shape == ELLIPSOID and work.speed[0] > slop_speed:
+            return hold_back(y, h, tilted, memory, work)
+        return y
+    found = aim_impact(n, bounce_speed, slop_speed, y, h, tilted, memory, work)
+    if found == NOTHING:
         return y
     place_arms(n, qt.to_matrix(q), tilted, work)
     aim_tangential(n, bounce_speed, y, tilted, work)
@@ -211,7 +213,7 @@ def impact(n, y, t, h, friction, smooth, tilted, pivots, report, work, log, coun
             v_new, L_new, s = part_of_rebound(q, before, (v0, L0), (v_new, L_new), work, tilted)
             for k in range(3 * n):
                 work.impulse[k] += s * (work.rebound[k] - work.impulse[k])
-    if log.shape[1] > 0:
+    if log.shape[1] > 0 and found == HIT:
         log_wall_impacts(n, 1 if friction is None else 3, x, 0.0, t, work, log, counts)
     return x, q, v_new, L_new
 

@@ -101,11 +101,9 @@ def outside_gap(y, tilted, work):
 
 
 @inlined
-def contact_set(y, h, tilted, work):
+def contact_set(y, h, tilted, memory, work):
     """Gather the contact set at y for a stage of length h: (count, depth)."""
-    x, q, v, L = y
-    w = angular_velocity(q, L, work, tilted)
-    return gather(x, to_matrix(q), v, w, h, tilted, work)
+    return gather(y, angular_velocity(y[1], y[3], work, tilted), h, tilted, memory, work)
 
 
 @inlined
@@ -202,11 +200,13 @@ def substep(y, start, h, friction, smooth, gyroscopic, tilted, pivots, scheme, m
             report[world, at.UNRESOLVED] += 1.0
             work.is_last = 1
         hold_loads(y, left, gyroscopic, tilted, work)
-        n, depth = contact_set(y, left, tilted, work)
+        n, depth = contact_set(y, left, tilted, memory, work)
         if n > 0:
             report[world, at.PENETRATION] = max(report[world, at.PENETRATION], depth)
             if not work.is_last and not stiffness(work) > 0.0:
-                y = impact(n, y, start + (h - left), left, friction, smooth, tilted, pivots, report, work, log, counts)
+                y = impact(
+                    n, y, start + (h - left), left, friction, smooth, tilted, pivots, memory, report, work, log, counts
+                )  # fmt: skip
         span = left
         if scheme is None:  # noqa: SIM102 (a branch of its own is what the compiler prunes)
             if cuts < MOST_CUTS and may_turn(y[3], h, FAR_TURN, tilted, work) and not work.is_last:

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 
 import physics
+from physics.kernels.events import log
 from physics.scenes import GRAVITY
-from rigid_env.hard_cases.case import Case, Check, Setting, within
+from rigid_env.hard_cases.case import Case, Check, Setting, UnsupportedError, none_of, within
 from rigid_env.hard_cases.scenery import (
     EPS,
     attitude,
@@ -84,7 +86,90 @@ def euler_disk(on: Setting) -> Sequence[Check]:
     ]
 
 
+class Ellipse(NamedTuple):
+    """Upright section of an ellipsoid that turns by θ about its axis z: height H(θ) of its centre on a floor [m]."""
+
+    a: float
+    b: float  # half-axis that is upright at θ = 0
+
+    def height(self, angle):
+        """H = √(a² sin²θ + b² cos²θ)."""
+        return math.hypot(self.a * math.sin(angle), self.b * math.cos(angle))
+
+    def slope(self, angle):
+        """H' = (a² - b²) sinθ cosθ/H."""
+        return (self.a**2 - self.b**2) * math.sin(angle) * math.cos(angle) / self.height(angle)
+
+    def body(self, angle: float = 0.0, lift: float = 0.0, spin: float = 0.0) -> physics.Ellipsoid:
+        """1 kg, `lift` above the floor, turned by `angle` about z; at `spin` it rolls, with its lowest point still."""
+        height = self.height(angle)
+        return physics.Ellipsoid(
+            (self.a, self.b, 0.4), 1.0, pos=(0, height + lift, 0), quat=turned(angle),
+            linvel=(-spin * height, spin * self.slope(angle), 0), angvel=(0, 0, spin),
+        )  # fmt: skip
+
+
+def rolls_without_impact(on: Setting) -> Sequence[Check]:
+    """An ellipsoid rolls, rocks and lands: impacts are where it meets the floor, and nowhere else.
+
+    Half-axes 0.5 and 0.3 m across the axis it turns about, I = m (a² + b²)/5, centre at H(θ) above the floor, θ from
+    lying flat. The floor's push is N = m (g + d²H/dt²) = m (g + H'θ̈ + H''θ̇²). On a smooth floor the energy
+    ½ (I + m H'²) θ̇² + m g H is kept, so that θ̈ = -(m H'H''θ̇² + m g H')/(I + m H'²) and
+
+        N = m I (g + H''θ̇²)/(I + m H'²).
+
+    Let go at θ = 0.5 it rocks with N >= 0.65 m g. Dropped there from 0.05 m, e = 0, it lands after √(2h/g), by one
+    impact, with θ̇ = -H' v/(I/m + H'²), and rocks with N >= 0.63 m g. On a rough floor it rolls, r² = H² + H'² from its
+    centre to the contact, (I + m r²) θ̈ = -m H'((H + H'')θ̇² + g): over and over, upright at 1 rad/s, N >= 0.76 m g, with
+    friction of 0.29 N at most. Contact never breaks, so nothing hits. Bouncing flat from 1 m at e = 1/2 it hits at
+    √(2h/g) (1, 2, 5/2, ...) = √(2h/g) (3 - 2/2^k), each by
+    m (1 + e) times its speed. (`tests/physics/test_rolling_ellipsoid.py` computes these N.)
+
+    An impact is made within half a slop of the floor; gravity grows the error of one bounce by 1/e into the next.
+    """
+    ellipse, seconds = Ellipse(0.5, 0.3), on.pick(4.0, 2.0)
+    if not on.is_ours:
+        raise UnsupportedError("events are not told by this engine")
+    upright = ellipse.body(math.pi / 2, spin=1.0)
+    rocks = _impacts(on, on_floor(ellipse.body(0.5), 0.5, 0.0), seconds)
+    rolls = _impacts(on, on_floor(upright, 0.5, 2.0), seconds)
+    lands = _impacts(on, on_floor(ellipse.body(0.5, lift=0.05), 0.0, 0.0), seconds)
+    bounces = _impacts(on, on_floor(ellipse.body(lift=1.0), 0.5, 0.0), 1.7)
+    speed, loose = math.sqrt(2 * GRAVITY), 8 * (on.slop * 0.5 + on.tolerance)
+    first = [*bounces[:3], *[(math.nan, math.nan)] * (3 - len(bounces))]
+    return [
+        none_of("impacts while it rocks on a smooth floor", len(rocks)),
+        none_of("impacts while it rolls on a rough floor", len(rolls)),
+        none_of("impacts of one landing but one", abs(len(lands) - 1)),
+        within("time of the landing", lands[0][0] if lands else math.nan, math.sqrt(0.1 / GRAVITY), loose, "s"),
+        *(
+            within(f"time of bounce {k + 1}", t, math.sqrt(2 / GRAVITY) * (3 - 2 * 0.5**k), loose, "s")
+            for k, (t, _) in enumerate(first)
+        ),
+        *(
+            within(f"impulse of bounce {k + 1}", p, 1.5 * speed * 0.5**k, 16 * loose, "N s")
+            for k, (_, p) in enumerate(first)
+        ),
+    ]
+
+
+def _impacts(on: Setting, scene: physics.Scene, seconds: float) -> list[tuple[float, float]]:
+    """(time [s], impulse [N s]) of each impact of the body."""
+    world, found = on.world(scene), []
+    world.make_event_room(64)
+    for k in range(on.steps(seconds)):
+        world.step()
+        for event in world.event_log[0, : world.event_counts[0]]:
+            if event[log.KIND] == log.IMPACT:
+                found.append((k * on.dt + event[log.TIME], float(np.linalg.norm(event[log.IMPULSE : log.IMPULSE + 3]))))
+    return found
+
+
 CASES = (
     Case(12, "rolling", "sliding sphere starts to roll", "5v₀/7 from t = 2v₀/(7μg) on", rolling, peers=True),
+    Case(
+        55, "rolls-without-impact", "an ellipsoid rolls and rocks: is anything hit?",
+        "no impact while the push is positive; one of each landing", rolls_without_impact,
+    ),
     Case(43, "euler-disk", "Euler's disk without dissipation", "Ω² sinα = 4g/a, does not grow", euler_disk),
 )  # fmt: skip

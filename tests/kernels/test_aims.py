@@ -7,13 +7,16 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from physics.kernels.aims import CLOSING_SHARE, UNSEEN, aim_impact, aim_rest
+from physics.kernels.aims import CLOSING_SHARE, HIT, NOTHING, RESIDUE, UNSEEN, aim_impact, aim_rest, may_hit
 from physics.kernels.compiler import kernel
+from physics.kernels.held import MEMORY_HEAD
+from physics.kernels.stages import memory_size
 from physics.kernels.workspace import make_workspace
 from tests.kernels.contact_problem import FLOOR, SIDE
 
 EPS = np.finfo(float).eps
 H, SLOP = 0.01, 1e-4
+NONE = (0.0, 0.0, 0.0)
 EVEN = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
 
 
@@ -91,8 +94,11 @@ def test_what_is_next_to_nothing_is_not_asked_for():
 
 
 @kernel
-def _aim_impact(n, bounce_speed, slop_speed, rate, scratch):
-    return aim_impact(n, bounce_speed, slop_speed, rate, scratch[0])
+def _aim_impact(n, bounce_speed, slop_speed, h, memory, scratch):
+    if not may_hit(bounce_speed, slop_speed, scratch[0]):
+        return NOTHING
+    y = (NONE, (1.0, 0.0, 0.0, 0.0), NONE, NONE)
+    return aim_impact(n, bounce_speed, slop_speed, y, h, None, memory, scratch[0])
 
 
 speeds = st.sampled_from([-2.0, -0.5, -0.1, -0.011, -0.01, -0.009, 0.0, 0.3])
@@ -100,22 +106,31 @@ gaps = st.sampled_from([-SLOP, 0.0, SLOP, 3 * SLOP])
 
 
 @given(
-    contacts=st.lists(st.tuples(speeds, gaps), min_size=1, max_size=8),
+    contacts=st.lists(st.tuples(speeds, gaps, st.booleans()), min_size=1, max_size=8),
     restitution=st.sampled_from([0.0, 0.1, 0.5, 1.0]),
     bounce_speed=st.sampled_from([0.001, 0.05, 1.0]),
+    residue=st.sampled_from([0.0, 0.05, 1.0]),
 )
-def test_an_impact_is_what_one_contact_of_it_is(contacts, restitution, bounce_speed):
-    """Newton's law for each, and whether one of them bounces, or would close by more than a slop within the step."""
-    work, n = posed(list(range(len(contacts))), [gap for _, gap in contacts], seed=0), len(contacts)
-    work["restitution"], work["target"] = restitution, 7.0
-    work["speed"][0, :n] = [speed for speed, _ in contacts]
-    work["approach"] = max(0.0, *(-speed for speed, _ in contacts))
-    slop_speed, goals, is_impact = SLOP / H, [], False
-    for speed, gap in contacts:
+def test_an_impact_is_what_one_contact_of_it_is(contacts, restitution, bounce_speed, residue):
+    """Newton's law for each, and whether one of them bounces, or would close by more than a slop within the step.
+
+    One that pushed in the last stage, and is no faster than that may leave it, has hit nothing: it is stopped.
+    """
+    work, n = posed(list(range(len(contacts))), [gap for _, gap, _ in contacts], seed=0), len(contacts)
+    work["restitution"], work["target"], work["acceleration"] = restitution, 7.0, residue / H
+    work["speed"][0, :n] = [speed for speed, _, _ in contacts]
+    work["approach"] = max(0.0, *(-speed for speed, _, _ in contacts))
+    memory = np.zeros((1, memory_size(work["slot"].shape[1])))
+    memory[0, MEMORY_HEAD + work["slot"].shape[1] :: 3][:n] = [pushed for _, _, pushed in contacts]
+    slop_speed, goals, found = SLOP / H, [], NOTHING
+    for speed, gap, pushed in contacts:
+        is_left_over = pushed and -speed <= residue
         bounces = restitution > 0.0 and -speed > bounce_speed
         goals.append(-restitution * speed if bounces or speed > 0.0 else 0.0)
-        is_impact |= bounces or -speed > slop_speed + max(gap, 0.0) / H
-    assert _aim_impact(n, bounce_speed, slop_speed, 1.0 / H, work) == is_impact
-    if is_impact:
+        if bounces or -speed > slop_speed + max(gap, 0.0) / H:
+            found = max(found, RESIDUE if is_left_over else HIT)
+            goals[-1] *= not is_left_over
+    assert _aim_impact(n, bounce_speed, slop_speed, H, memory, work) == found
+    if found:
         np.testing.assert_array_equal(work[0]["target"][:n], [(goal, 0.0, 0.0) for goal in goals])
         assert (work[0]["target"][n:] == 7.0).all()

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -9,7 +11,7 @@ from hypothesis import strategies as st
 
 from physics.kernels.compiler import kernel
 from physics.kernels.contact import TOGETHER, gather
-from physics.kernels.layout import BLOCK
+from physics.kernels.layout import BLOCK, ELLIPSOID
 from physics.kernels.quaternion import to_matrix
 from physics.kernels.stages import CONTACT_COUNT, MEMORY_HEAD, load_warm_start, memory_size, store_warm_start
 from physics.kernels.workspace import make_workspace
@@ -23,8 +25,8 @@ CORNERS = SIZE * (2.0 * (np.arange(FEATURES)[:, None] >> np.arange(3) & 1) - 1.0
 
 
 @kernel
-def _gather(x, R, v, w, h, tilted, scratch):
-    return gather(x, R, v, w, h, tilted, scratch[0])
+def _gather(y, w, h, tilted, memory, scratch):
+    return gather(y, w, h, tilted, memory, scratch[0])
 
 
 def block_at_walls():
@@ -35,6 +37,7 @@ def block_at_walls():
     return work
 
 
+NONE = (0.0, 0.0, 0.0)
 small = st.floats(-3.0, 3.0)
 turns = st.one_of(st.just(0.0), st.floats(-2e-3, 2e-3), st.floats(-1.0, 1.0))
 
@@ -47,12 +50,14 @@ turns = st.one_of(st.just(0.0), st.floats(-2e-3, 2e-3), st.floats(-1.0, 1.0))
 )
 def test_the_set_is_what_touches_or_arrives(turn, depth, v, w):
     """Of both walls: slots, gaps, speeds and, of all of them, the deepest, the widest and the fastest."""
-    R = np.reshape(to_matrix(tuple(np.array([1.0, *turn]) / np.linalg.norm([1.0, *turn]))), (3, 3))
+    q = tuple(np.array([1.0, *turn]) / np.linalg.norm([1.0, *turn]))
+    R = np.reshape(to_matrix(q), (3, 3))
     arms = CORNERS @ R.T
     least = arms.min(axis=0)
     x = np.array([-least[0] + SLOP * depth[0], -least[1] + SLOP * depth[1], 0.3])
     work = block_at_walls()
-    count, deepest = _gather(tuple(x), tuple(R.ravel()), v, w, H, None, work)
+    memory = np.zeros((1, memory_size(2 * FEATURES)))
+    count, deepest = _gather((tuple(x), q, v, NONE), w, H, None, memory, work)
     gaps = np.concatenate([(x + arms)[:, 1], (x + arms)[:, 0]])
     speeds = np.concatenate([(v + np.cross(w, arms))[:, 1], (v + np.cross(w, arms))[:, 0]])
     clear = 1e-12  # of what is within rounding of a limit either is right
@@ -67,6 +72,53 @@ def test_the_set_is_what_touches_or_arrives(turn, depth, v, w):
     assert deepest == max(0.0, *-work[0]["gap"][:count], 0.0)
     assert work[0]["widest"] == max(0.0, *work[0]["gap"][:count], 0.0)
     assert work[0]["approach"] == max(0.0, *-work[0]["speed"][:count], 0.0)
+
+
+G = 10.0
+
+
+@pytest.mark.parametrize("pushed", [False, True])
+@pytest.mark.parametrize("gap", [0.4, 0.6, 1.1])
+@pytest.mark.parametrize("speed", [0.0, 0.5])
+def test_what_pushed_and_may_be_back_within_the_step_belongs_to_the_set(pushed, gap, speed):
+    """A vertex `gap` times G H²/2 above the slop that leaves at `speed` times G H/2; loads of G bring it back."""
+    work, memory = block_at_walls(), np.zeros((1, memory_size(2 * FEATURES)))
+    one, q = work[0], (math.cos(0.3), math.sin(0.3), 0.0, 0.0)
+    one["acceleration"] = G
+    arms = CORNERS @ np.reshape(to_matrix(q), (3, 3)).T
+    lowest = np.flatnonzero(arms[:, 1] < arms[:, 1].min() + 1e-9)
+    memory[0, MEMORY_HEAD + 2 * FEATURES + 3 * lowest] = float(pushed)
+    x = (50.0, SLOP + gap * G * H**2 / 2 - arms[:, 1].min(), 0.0)
+    count, _ = _gather((x, q, (0.0, speed * G * H / 2, 0.0), NONE), NONE, H, None, memory, work)
+    assert list(one["slot"][:count]) == (list(lowest) if pushed and gap + speed < 1.0 else [])
+
+
+@pytest.mark.parametrize("pushed", [False, True])
+@pytest.mark.parametrize("loads", [-G, G])
+@pytest.mark.parametrize("gap", [0.9, 1.1])
+def test_a_round_body_that_pushed_and_is_pressed_still_belongs_to_the_set(pushed, loads, gap):
+    """It leaves however fast: loads towards the wall close `gap` times G H²/2 within H, and it has no other cause."""
+    work, memory = make_workspace(np.array([FLOOR, SIDE]), 1), np.zeros((1, memory_size(2)))
+    one = work[0]
+    one["shape"], one["dims"], one["radius"], one["slop"] = ELLIPSOID, SIZE, SIZE.max(), SLOP
+    one["acceleration"], one["free_acceleration"] = G, (0.0, loads, 0.0)
+    memory[0, MEMORY_HEAD + 2] = float(pushed)
+    y = ((50.0, SIZE[1] + SLOP + gap * G * H**2 / 2, 0.0), (1.0, 0.0, 0.0, 0.0), (0.0, 10.0, 0.0), NONE)
+    count, _ = _gather(y, NONE, H, None, memory, work)
+    assert count == (pushed and loads < 0.0 and gap < 1.0)
+
+
+@pytest.mark.parametrize("share", [0.0, 0.5, 0.99, 1.01])
+@pytest.mark.parametrize("high", [0.0, 0.5, 0.99, 1.01])
+def test_what_arrives_belongs_where_loads_could_have_made_it_as_fast(share, high):
+    """Falling under G from a gap g at speed s it hits at √(s² + 2 G g): up to G H it is no impact."""
+    work, memory = block_at_walls(), np.zeros((1, memory_size(2 * FEATURES)))
+    one, soft = work[0], G * H
+    one["acceleration"], one["slop"] = G, 1e-9
+    x = (50.0, SIZE[1] + high * soft**2 / (2 * G) + 4e-9, 0.0)
+    v = (0.0, -share * soft, 0.0)
+    count, _ = _gather((x, (1.0, 0.0, 0.0, 0.0), v, NONE), NONE, H, None, memory, work)
+    assert count == (4 if share**2 + high < 0.9999 else 0)
 
 
 # --- the memory ----------------------------------------------------------------------------------------------------
