@@ -239,10 +239,12 @@ def list_unknowns(mu, holding, work, motion):
 
 @kernel
 def spread(mu, work, motion):
-    """Force of each contact that acts (`force`, `normal`) from the unknowns."""
+    """Force of each contact that acts (`force`, `normal`) from the unknowns, and the shares where they are in it."""
     for j in range(motion.count):
         axes = wall_axes(work.walls, wall_of(motion.slot[j], work))
         k, p, f = motion.first[j], motion.patch[j], vector(motion.share, j)
+        if not mu > 0.0:  # `_add_shares` leaves them out: the unknowns are all of the force
+            f = (0.0, 0.0, 0.0)
         if p != NO_PATCH:
             s = motion.unknown[p]
             s += motion.place[j, 0] * motion.unknown[p + 1] + motion.place[j, 1] * motion.unknown[p + 2]

@@ -9,7 +9,18 @@ from physics.kernels.body import angular_velocity
 from physics.kernels.compiler import inlined, kernel
 from physics.kernels.events.candidates import set_down
 from physics.kernels.events.forces import keep_forces
-from physics.kernels.events.guards import GAP, NO_GUARD, NO_STEP, SPEED, WATCH, least_margin, look_around
+from physics.kernels.events.guards import (
+    FORCES,
+    GAP,
+    MARGIN,
+    NO_GUARD,
+    NO_STEP,
+    SPEED,
+    WATCH,
+    least_force_at_start,
+    least_margin,
+    look_around,
+)
 from physics.kernels.events.motion import END, SIZE, START
 from physics.kernels.events.smooth import (
     CUT,
@@ -54,8 +65,15 @@ def locate(h, margin, guard, which, heeds, tilted, work, motion):
     Newton's steps for a gap. Else false position with the Illinois rule, and a half where PATIENCE trials have not
     halved what is left. NO_STEP where a shorter step fails that was to be smooth: the margin changes its sign at a pole
     (Painlevé), which the whole step did not see.
+
+    A force that was there at the start ends where it is zero, not where it is missed by more than rounding.
     """
     low, high, low_margin, high_margin = 0.0, h, -margin, margin
+    slack = MARGIN
+    if guard in FORCES:
+        least = least_force_at_start(tilted, work, motion)
+        if least > MARGIN:
+            slack, low_margin, high_margin = 0.0, least, margin - MARGIN
     side, width, stale = 0, h, 0
     newton = towards_gap(h, margin, guard, which, work, motion)
     for _ in range(LOCATIONS):
@@ -67,7 +85,7 @@ def locate(h, margin, guard, which, heeds, tilted, work, motion):
         error, _ = try_step(t, tilted, work, motion)
         if not error <= work.tolerance:
             return t, NO_STEP, which
-        margin, g, w = least_margin(t, heeds, tilted, work, motion)
+        margin, g, w = least_margin(t, heeds, slack, tilted, work, motion)
         newton = -1.0
         if margin < 0.0:
             high, high_margin, guard, which = t, margin, g, w
@@ -89,7 +107,7 @@ def locate(h, margin, guard, which, heeds, tilted, work, motion):
             break
     if margin >= 0.0:
         try_step(high, tilted, work, motion)
-        _, guard, which = least_margin(high, heeds, tilted, work, motion)
+        _, guard, which = least_margin(high, heeds, slack, tilted, work, motion)
     return high, guard, which
 
 
@@ -127,7 +145,7 @@ def move(y, left, tilted, work, motion):
         error, used = try_step(h, tilted, work, motion)
         is_over, guard = False, NO_STEP
         if error <= work.tolerance:
-            margin, guard, which = least_margin(h, heeds, tilted, work, motion)
+            margin, guard, which = least_margin(h, heeds, MARGIN, tilted, work, motion)
             is_over = margin < 0.0
             if is_over and not has_stopped(guard, which, work, motion):
                 h, guard, which = locate(h, margin, guard, which, heeds, tilted, work, motion)
