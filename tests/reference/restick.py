@@ -10,8 +10,8 @@ which u vanishes. With the time σ of dt = |u| dσ and u = e^s (cos φ, sin φ) 
 
     dφ/dσ = u̇·d⊥,    ds/dσ = u̇·d,
 
-smooth: s falls at a steady rate, φ goes to a direction that stays, and t = ∫ e^s dσ to its end. u is a part of the state
-and v what follows from it, so that nothing is lost where u is small.
+smooth: s falls at a steady rate, φ goes to a direction that stays, and t = ∫ e^s dσ to its end. u is a part of the
+state and v what follows from it, so that nothing is lost where u is small.
 *Holding*: u = 0 and u̇ = 0 give the three components of f, up to the moment at which f_t is as large as μ f_n.
 *Slip that begins*: then |u| grows with the square of the time, and d follows what acts at a rate of 1/|u|: stiff, but
 without a jump. Radau integrates that up to a small |u|, from one of rounding; DOP853 all the rest.
@@ -125,7 +125,7 @@ def slide(body: Ellipsoid, start: State) -> State:
     """
 
     def rates(_, y):
-        quat, omega, phi, s, = y[2:6], y[6:9], y[9], y[10]
+        quat, omega, phi, s = y[2:6], y[6:9], y[9], y[10]
         speed = np.exp(s)
         d, across = np.array([np.cos(phi), np.sin(phi)]), np.array([-np.sin(phi), np.cos(phi)])
         f, change = sliding_force(body, quat, omega, phi)

@@ -23,7 +23,7 @@ def test_a_rod_leaves_the_wall_when_its_top_has_fallen_by_a_third():
 
 
 def test_an_ellipse_leaves_the_floor_where_the_equations_of_motion_let_it():
-    """Lagrange's equation by DOP853, without the energy; it is let go where y'' ω² = -g, since then nothing turns it."""
+    """Lagrange's equation by DOP853, without the energy: let go where y'' ω² = -g, since then nothing turns it."""
     a, b, mass, rate = 0.3, 0.15, 2.0, 14.0
     inertia = mass * (a * a + b * b) / 5
     c = a * a - b * b

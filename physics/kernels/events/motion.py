@@ -53,7 +53,11 @@ def motion_dtype(wall_count: int, features: int) -> np.dtype:
         ("holds", i, (n,)),  # 1: no velocity at all; 0: slides
         ("way", f, (n, 3)),  # direction of sliding
         ("reference", f, (n, 3)),  # the one at the start of the step
-        ("is_starting", i, (n,)),  # 1: the contact was at rest at the start of the step
+        ("is_starting", i, (n,)),  # 1: the contact was at rest at the start of the step, or all but
+        ("turning", f),  # rate at which the direction turns in which the only contact begins to slide [rad/s]
+        ("stiffness", f),  # what friction changes of its acceleration across that, for each radian [m/s²]
+        ("first_speed", f),  # of it, at the start of the step [m/s]
+        ("growth", f),  # of that [m/s²]
         ("arm", f, (n, 3)),  # contact point relative to the centre of mass [m]
         ("velocity", f, (n, 3)),  # of the body there [m/s]
         ("goal", f, (n, 3)),  # what the unknowns are to cancel: acceleration, velocity or gap

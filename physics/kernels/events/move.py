@@ -8,7 +8,7 @@ from physics.kernels import quaternion as qt
 from physics.kernels.body import angular_velocity
 from physics.kernels.compiler import inlined, kernel
 from physics.kernels.events.candidates import set_down
-from physics.kernels.events.forces import keep_forces
+from physics.kernels.events.forces import free_turning, keep_forces, vector
 from physics.kernels.events.guards import (
     FORCES,
     GAP,
@@ -22,15 +22,16 @@ from physics.kernels.events.guards import (
     look_around,
 )
 from physics.kernels.events.motion import END, SIZE, START
+from physics.kernels.events.onset import contact_rate, outruns, sliding_velocity
 from physics.kernels.events.smooth import (
     CUT,
     EASY,
     GROWTH,
     SHORTEST,
     cancel,
+    find_rate,
     get_state,
     put_state,
-    sliding_velocity,
     start_step,
     try_step,
 )
@@ -119,6 +120,40 @@ def has_stopped(guard, which, work, motion):
     return sliding_velocity(which, work, motion)[1] <= motion.slow
 
 
+@kernel
+def finish_stop(which, left, heeds, tilted, work, motion):
+    """Let contact `which`, which slides at END as slowly as counts as none, do so until it stands still: the time [s].
+
+    Its direction stays what it is. Not where something else would end within that time, or it began to slide only now.
+    """
+    if motion.is_starting[which]:
+        return 0.0
+    slip, speed = sliding_velocity(which, work, motion)
+    if not motion.noise < speed <= 2.0 * motion.slow:
+        return 0.0
+    before = get_state(motion, START)
+    end = get_state(motion, END)
+    for c in range(3):
+        motion.reference[which, c] = slip[c] / speed
+    put_state(motion, START, end)
+    find_rate(START, 0.0, tilted, work, motion)
+    for c in range(SIZE):
+        motion.first_rate[c] = motion.rate[c]
+    _, P, _, _ = free_turning(end, tilted, work)
+    along = qt.dot(contact_rate(which, P, work, motion), vector(motion.reference, which))
+    if along < 0.0:
+        h = min(left, -speed / along)
+        error, _ = try_step(h, tilted, work, motion)
+        margin, guard, _ = least_margin(h, heeds, MARGIN, tilted, work, motion)
+        if error <= work.tolerance and (margin >= 0.0 or guard == SPEED):
+            pass_time(h, work)
+            return h
+    put_state(motion, START, before)
+    put_state(motion, END, end)
+    least_margin(0.0, heeds, MARGIN, tilted, work, motion)  # forces and gaps are those of END again
+    return 0.0
+
+
 @inlined
 def body_speed(y, tilted, work):
     """Speed that no point of the body exceeds [m/s]."""
@@ -147,7 +182,9 @@ def move(y, left, tilted, work, motion):
         if error <= work.tolerance:
             margin, guard, which = least_margin(h, heeds, MARGIN, tilted, work, motion)
             is_over = margin < 0.0
-            if is_over and not has_stopped(guard, which, work, motion):
+            if outruns(h, work, motion):
+                guard = NO_STEP
+            elif is_over and not has_stopped(guard, which, work, motion):
                 h, guard, which = locate(h, margin, guard, which, heeds, tilted, work, motion)
         if guard == NO_STEP:
             if not h > SHORTEST * left:
@@ -158,6 +195,8 @@ def move(y, left, tilted, work, motion):
             continue
         t += h
         pass_time(h, work)
+        if is_over and guard == SPEED:
+            t += finish_stop(which, left - t, heeds, tilted, work, motion)
         motion.step = GROWTH * h if used <= EASY else h
         keep_forces(work, motion)
         y = cancel(get_state(motion, END), tilted, work, motion)

@@ -17,6 +17,7 @@ from physics.kernels.arms import wall_normal, wall_of
 from physics.kernels.compiler import inlined, kernel
 from physics.kernels.events.forces import free_turning, list_unknowns, place, plus, turned_by, vector
 from physics.kernels.events.motion import END, LAST, NOW, ORDERS, SIZE, START, L, Q, V, X
+from physics.kernels.events.onset import contact_rate, creeps, has_one_slide, sliding_velocity, stiffness_across
 from physics.kernels.events.unknowns import regime_forces, solve_unknowns
 from physics.kernels.fields.loads import has_fields, refresh_loads
 from physics.kernels.layout import OFFSET, SPHERE
@@ -40,6 +41,11 @@ BENT = 1.0e-4
 TURNED = 0.5
 STRAIGHT = 1.0e-12
 SHORT_OF_STOP = 0.75
+
+# A slip that is accelerated by less than LIGHT of what friction gives across it for each radian has a direction that
+# follows what acts within much less than the motion's time. A step is no longer than STIFF of these.
+LIGHT = 0.1
+STIFF = 1.5
 
 # Rules after which it shows whether an extrapolation will settle: when its errors, falling twice as fast as they did
 # last, would not.
@@ -160,16 +166,6 @@ def try_step(h, tilted, work, motion):
     return error, used
 
 
-@inlined
-def sliding_velocity(j, work, motion):
-    """Tangential velocity of contact j and its size."""
-    n = wall_normal(work.walls, wall_of(motion.slot[j], work))
-    u = vector(motion.velocity, j)
-    un = qt.dot(n, u)
-    t = (u[0] - un * n[0], u[1] - un * n[1], u[2] - un * n[2])
-    return t, math.sqrt(qt.dot(t, t))
-
-
 @kernel
 def start_step(left, tilted, work, motion):
     """Make row START ready for `try_step`; how long the step should be at most.
@@ -190,10 +186,11 @@ def start_step(left, tilted, work, motion):
         if speed > motion.slow:
             for c in range(3):
                 motion.reference[j, c] = t[c] / speed
-    find_rate(START, 0.0, tilted, work, motion)
-    for c in range(SIZE):
-        motion.first_rate[c] = motion.rate[c]
+    motion.turning = motion.stiffness = 0.0
+    _set_first_rate(tilted, work, motion)
     turn = motion.spin = math.sqrt(qt.dot(w, w))
+    if has_one_slide(work, motion):
+        _begin_slide(P, tilted, work, motion)
     motion.weight = work.mass * (work.acceleration + work.radius * turn * turn)
     h = min(left, motion.step)
     if work.shape != SPHERE and h * turn > TURN_AT_MOST:
@@ -204,22 +201,51 @@ def start_step(left, tilted, work, motion):
 
 
 @inlined
+def _set_first_rate(tilted, work, motion):
+    """`first_rate`: that of START."""
+    find_rate(START, 0.0, tilted, work, motion)
+    for c in range(SIZE):
+        motion.first_rate[c] = motion.rate[c]
+
+
+@kernel
+def _begin_slide(P, tilted, work, motion):
+    """What is known of the only contact, which slides, at START; one that creeps has the direction of `onset`."""
+    motion.stiffness = stiffness_across(P, work, motion)
+    _, motion.first_speed = sliding_velocity(0, work, motion)
+    motion.growth = qt.dot(contact_rate(0, P, work, motion), vector(motion.reference, 0))
+    if motion.growth >= 0.0 and creeps(motion.growth, motion.first_speed, work, motion):
+        motion.is_starting[0] = 1
+        _set_first_rate(tilted, work, motion)
+    if motion.is_starting[0]:
+        _set_turning(tilted, work, motion)
+        _set_first_rate(tilted, work, motion)
+
+
+@inlined
+def _set_turning(tilted, work, motion):
+    """`turning` of the only contact, by a look a moment ahead."""
+    d = vector(motion.way, 0)
+    for c in range(SIZE):
+        motion.y[NOW, c] = motion.y[START, c] + motion.nearest * motion.first_rate[c]
+    find_rate(NOW, motion.nearest, tilted, work, motion)
+    n = wall_normal(work.walls, wall_of(motion.slot[0], work))
+    motion.turning = qt.dot(qt.cross(n, d), vector(motion.way, 0)) / motion.nearest
+
+
+@inlined
 def _until_stop(h, P, w, work, motion):
     """h, or less: until the first contact stops sliding if it is slowed as at the start, or has turned its sliding.
 
     The direction of a velocity u + a t is analytic up to the time |u|/|a| (where a complex t makes it vanish), and no
     step much longer than that is of any high order.
     """
-    rate, a, torque = motion.first_rate, work.free_acceleration, work.torque
-    T = (rate[L] - torque[0], rate[L + 1] - torque[1], rate[L + 2] - torque[2])
-    F = (rate[V] - a[0], rate[V + 1] - a[1], rate[V + 2] - a[2])
-    turning = turned_by(P, work.J, T)
     for j in range(motion.count):
         if motion.holds[j] or motion.is_starting[j] or not work.mu > 0.0:
             continue
         d = vector(motion.reference, j)
         _, speed = sliding_velocity(j, work, motion)
-        change = plus(plus(vector(motion.goal, j), qt.cross(turning, vector(motion.arm, j))), F)
+        change = contact_rate(j, P, work, motion)
         along, size = qt.dot(d, change), math.sqrt(qt.dot(change, change))
         bend = size - abs(along)
         if along < 0.0 and -along * h > speed:
@@ -228,6 +254,8 @@ def _until_stop(h, P, w, work, motion):
                 h *= SHORT_OF_STOP
         if bend > BENT * size:
             h = min(h, TURNED * speed / size)
+        if bend > STRAIGHT * size and size < LIGHT * motion.stiffness:  # 0 of more contacts than one
+            h = min(h, STIFF * speed / motion.stiffness)
     return h
 
 
