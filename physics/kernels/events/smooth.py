@@ -39,13 +39,17 @@ UNSEEN_SPEED = 0.01
 # |u|/|a|. Where it is straight but for less than that it turns just before it stops: there a step goes so far.
 BENT = 1.0e-4
 TURNED = 0.5
-STRAIGHT = 1.0e-12
+STRAIGHT = 1.0e-14
 SHORT_OF_STOP = 0.75
 
-# A slip that is accelerated by less than LIGHT of what friction gives across it for each radian has a direction that
-# follows what acts within much less than the motion's time. A step is no longer than STIFF of these.
-LIGHT = 0.1
+# The direction of a slip follows what acts within the time |u|/K, K the acceleration that friction gives across it for
+# each radian. No step is longer than STIFF of these: beyond it is not stable, by less than the tolerance of a speed.
 STIFF = 1.5
+
+# In contact an extrapolation goes on to FINER of the tolerance, and no further than to rounding, FINEST: the time at
+# which a force or a slip is used up may be off by many times as much as the state.
+FINER = 1.0e-2
+FINEST = 1.0e-13
 
 # Rules after which it shows whether an extrapolation will settle: when its errors, falling twice as fast as they did
 # last, would not.
@@ -134,6 +138,7 @@ def try_step(h, tilted, work, motion):
     """Row END from row START, h later (`first_rate` known): (relative error, rules used)."""
     table, y = motion.table, motion.y
     goal = work.tolerance
+    aim = max(FINER * goal, min(goal, FINEST)) if motion.count > 0 else goal
     set_scale(h, work, motion)
     error = math.inf
     used = ORDERS
@@ -156,10 +161,10 @@ def try_step(h, tilted, work, motion):
                 error = max(error, abs(change) / motion.scale[c])
         if not math.isfinite(total):
             return math.inf, ORDERS
-        if error <= goal:
+        if error <= aim:
             used = k + 1
             break
-        if k >= TOLD and error * (error / before) ** (2 * (ORDERS - 1 - k)) > goal:
+        if k >= TOLD and error * (error / before) ** (2 * (ORDERS - 1 - k)) > (aim if error <= goal else goal):
             break
     x, q, v, m = get_state(motion, END)
     put_state(motion, END, (x, qt.normalise(q), v, m))
@@ -254,7 +259,7 @@ def _until_stop(h, P, w, work, motion):
                 h *= SHORT_OF_STOP
         if bend > BENT * size:
             h = min(h, TURNED * speed / size)
-        if bend > STRAIGHT * size and size < LIGHT * motion.stiffness:  # 0 of more contacts than one
+        if bend > STRAIGHT * size and motion.stiffness > 0.0:  # 0 of more contacts than one
             h = min(h, STIFF * speed / motion.stiffness)
     return h
 
