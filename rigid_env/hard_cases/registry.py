@@ -11,7 +11,7 @@ from rigid_env.hard_cases.case import Case
 # Each has a tuple CASES.
 MODULES = (
     "flight", "bounces", "impacts", "friction", "rolling", "tipping", "scaling", "piles", "leaning", "arch",
-    "chains", "random_scenes",
+    "chains", "random_scenes", "letting_go",
 )  # fmt: skip
 
 

@@ -15,10 +15,14 @@ state and v what follows from it, so that nothing is lost where u is small.
 *Holding*: u = 0 and u̇ = 0 give the three components of f, up to the moment at which f_t is as large as μ f_n.
 *Slip that begins*: then |u| grows with the square of the time, and d follows what acts at a rate of 1/|u|: stiff, but
 without a jump. Radau integrates that up to a small |u|, from one of rounding; DOP853 all the rest.
+
+`python -m tests.reference.restick` writes `data/restick.json`: bodies that roll, slip and stick again, drawn at random.
 """
 
 from __future__ import annotations
 
+import json
+from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
@@ -195,3 +199,89 @@ def begin_slip(body: Ellipsoid, start: State) -> State:
     y = run.y_events[0][0]
     slip = y[10] * np.array([np.cos(y[9]), np.sin(y[9])])
     return State(start.t + run.t_events[0][0], y[:2], y[2:6] / np.linalg.norm(y[2:6]), y[6:9], slip)
+
+
+DATA = Path(__file__).with_name("data") / "restick.json"
+STARTS, SEED, GRAVITY = 20, 0, 9.81
+
+
+class Truth(NamedTuple):
+    """A body that rolls from its start, slips and sticks again."""
+
+    body: Ellipsoid
+    start: State
+    slips: float  # [s]
+    sticks: State
+
+
+def run(body: Ellipsoid, start: State) -> Truth | None:
+    """The way of a body up to where it sticks again; None where it is another one."""
+    slipping, holds = roll(body, start, 0.3)
+    if holds or holding_force(body, slipping.quat, slipping.angvel)[1] < 0.1 * body.mass * GRAVITY:
+        return None
+    try:
+        sticks = slide(body, begin_slip(body, slipping))
+    except (RuntimeError, IndexError):
+        return None
+    return Truth(body, start, slipping.t, sticks)
+
+
+def is_plain(truth: Truth) -> bool:
+    """Whether it sticks within 2 s, with a hundredth of what friction can do left, and holds for 20 ms."""
+    body, end = truth.body, truth.sticks
+    has_room = cone_margin(body, end.quat, end.angvel) > 0.01 * body.friction * body.mass * body.gravity
+    return has_room and end.t < 2.0 and roll(body, end, 0.02)[1]
+
+
+def drawn(rng: np.random.Generator) -> tuple[Ellipsoid, State]:
+    """A body that rolls, at random."""
+    body = Ellipsoid(rng.uniform(0.1, 0.3, 3), rng.uniform(0.5, 3.0), rng.uniform(0.1, 0.6), GRAVITY)
+    quat, omega = rng.normal(size=4), 4 * rng.normal(size=3)
+    return body, State(0.0, np.zeros(2), quat / np.linalg.norm(quat), omega, np.zeros(2))
+
+
+def find(count: int, seed: int):
+    """Truths from the first drawn starts that hold and press at first, and slip and stick again."""
+    rng, found = np.random.default_rng(seed), 0
+    while found < count:
+        body, start = drawn(rng)
+        weight = body.mass * body.gravity
+        if cone_margin(body, start.quat, start.angvel) < 0.1 * body.friction * weight:
+            continue
+        if holding_force(body, start.quat, start.angvel)[1] < 0.2 * weight:
+            continue
+        truth = run(body, start)
+        if truth is not None and is_plain(truth):
+            found += 1
+            yield truth
+
+
+def load() -> list[Truth]:
+    """The stored truths."""
+    truths = []
+    for row in json.loads(DATA.read_text(encoding="utf-8"))["truths"]:
+        body = Ellipsoid(np.array(row["axes"]), row["mass"], row["friction"], GRAVITY)
+        start = State(0.0, np.zeros(2), np.array(row["quat"]), np.array(row["angvel"]), np.zeros(2))
+        t, place, quat, angvel = row["sticks"]
+        end = State(t, np.array(place), np.array(quat), np.array(angvel), np.zeros(2))
+        truths.append(Truth(body, start, row["slips"], end))
+    return truths
+
+
+def write() -> None:
+    """Store the truths, a line each."""
+    lines = []
+    for k, truth in enumerate(find(STARTS, SEED)):
+        body, start, slips, end = truth
+        row = {"axes": body.axes.tolist(), "mass": body.mass, "friction": body.friction, "quat": start.quat.tolist(),
+               "angvel": start.angvel.tolist(), "slips": slips,
+               "sticks": [end.t, end.place.tolist(), end.quat.tolist(), end.angvel.tolist()]}  # fmt: skip
+        lines.append(json.dumps(row))
+        print(k, slips, end.t, flush=True)
+    head = {"command": "python -m tests.reference.restick", "units": "SI; place (x, z) of the centre; world frame"}
+    text = json.dumps(head)[:-1] + ',\n"truths": [\n' + ",\n".join(lines) + "\n]}\n"
+    DATA.write_text(text, encoding="utf-8")
+
+
+if __name__ == "__main__":
+    write()

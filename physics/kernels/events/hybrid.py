@@ -82,6 +82,7 @@ def begin_part(y, start, tilted, memory, work, motion):
     set_clock(start, work)
     refresh_loads(y, 0.0, tilted, work)
     set_thresholds(y, tilted, work, motion)
+    motion.assured = 0.0
     recall_contacts(memory, work.i, work, motion)
     motion.left_out, motion.turns = 0.0, 0
 
@@ -95,6 +96,7 @@ def find_what(y, is_foretold, watched, friction, smooth, tilted, pivots, work, m
     seen, later = y, 0.0
     if is_foretold:
         seen, later = look_ahead(y, tilted, work, motion), motion.ahead
+    motion.assured = later
     refresh_loads(seen, later, tilted, work)
     what, n, v, L = find_regime(seen, friction, tilted, work, motion)
     what = judge(what, watched, y, tilted, work, motion)

@@ -38,6 +38,7 @@ def motion_dtype(wall_count: int, features: int) -> np.dtype:
         ("turns", i),  # impacts in turn so far at this moment
         ("ahead", f),  # time by which the next regime is looked for [s]
         ("nearest", f),  # the least of these [s]
+        ("assured", f),  # time for which contacts that a guard has let go are known to stay open [s]
         ("leap", f),  # length of the next leap, and when events began to crowd and their number since; see `pace`
         ("since", f),
         ("crowd", i),
