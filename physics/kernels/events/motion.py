@@ -64,6 +64,8 @@ def motion_dtype(wall_count: int, features: int) -> np.dtype:
         ("goal", f, (n, 3)),  # what the unknowns are to cancel: acceleration, velocity or gap
         ("force", f, (n, 3)),  # [N]
         ("normal", f, (n,)),  # of it, along the normal [N]
+        ("margin", f, (3, 2, n)),  # of push and cone at the ends of a step and inside; see `dips` [weights]
+        ("fall", f, (2, n)),  # their rates of change at its start
         ("first", i, (n,)),  # first unknown of the contact alone
         ("patch", i, (n,)),  # first of the three of its wall's normal forces, NO_PATCH: its normal force is its own
         ("place", f, (n, 2)),  # coordinates in the patch, in radii
@@ -96,6 +98,7 @@ def motion_dtype(wall_count: int, features: int) -> np.dtype:
         ("y", f, (ROWS, SIZE)),
         ("rate", f, (SIZE,)),
         ("first_rate", f, (SIZE,)),
+        ("last_rate", f, (SIZE,)),
         ("scale", f, (SIZE,)),
         ("table", f, (ORDERS, SIZE)),
     ])  # fmt: skip

@@ -8,6 +8,7 @@ from physics.kernels import quaternion as qt
 from physics.kernels.body import angular_velocity
 from physics.kernels.compiler import inlined, kernel
 from physics.kernels.events.candidates import set_down
+from physics.kernels.events.dips import find_dip, note_margins
 from physics.kernels.events.forces import free_turning, keep_forces, vector
 from physics.kernels.events.guards import (
     FORCES,
@@ -176,6 +177,7 @@ def move(y, left, tilted, work, motion):
     look_around(START, tilted, work, motion)
     motion.step = left if heeds else motion.trust
     t, h = 0.0, start_step(left, tilted, work, motion)
+    note_margins(START, work, motion)
     for _ in range(STEPS):
         error, used = try_step(h, tilted, work, motion)
         is_over, guard = False, NO_STEP
@@ -186,6 +188,12 @@ def move(y, left, tilted, work, motion):
                 guard = NO_STEP
             elif is_over and not has_stopped(guard, which, work, motion):
                 h, guard, which = locate(h, margin, guard, which, heeds, tilted, work, motion)
+        if guard != NO_STEP and heeds:
+            dip = find_dip(h, used, tilted, work, motion)
+            if dip < h:
+                h = dip
+                refresh_loads(get_state(motion, START), 0.0, tilted, work)
+                continue
         if guard == NO_STEP:
             if not h > SHORTEST * left:
                 return get_state(motion, START), t, NO_STEP
@@ -212,6 +220,7 @@ def move(y, left, tilted, work, motion):
         for s in range(motion.is_active.shape[0]):
             motion.gap[START, s], motion.gap_rate[START, s] = motion.gap[END, s], motion.gap_rate[END, s]
         h = start_step(left - t, tilted, work, motion)
+        note_margins(START, work, motion)
     if t < left:
         return get_state(motion, START), t, NO_STEP
     return y, left, NO_GUARD
