@@ -14,7 +14,8 @@ from physics.kernels.events.forces import (
 )
 from physics.kernels.events.guards import look_around
 from physics.kernels.events.motion import START
-from physics.kernels.events.smooth import cancel_normal_speeds, put_state
+from physics.kernels.events.projection import cancel_normal_speeds
+from physics.kernels.events.smooth import put_state
 
 # What a body does; the last: nothing, since its last step went too far (`trust`).
 FLIES, COLLIDES, MOVES, RESTS, IS_LOST, ASKS, ASKS_SLIDING, GOES_BACK = range(8)

@@ -33,9 +33,9 @@ from physics.kernels.events.collide import carry_on, collide, jump, note, princi
 from physics.kernels.events.guards import FORCES, NO_GUARD, NO_STEP, WATCH
 from physics.kernels.events.move import body_speed, look_ahead, move
 from physics.kernels.events.pace import is_crowded, note_leap, note_step, set_pace
+from physics.kernels.events.projection import cancel
 from physics.kernels.events.regime import find_regime
 from physics.kernels.events.resting import read_resting
-from physics.kernels.events.smooth import cancel
 from physics.kernels.events.state import keep_contacts, log_changes, recall_contacts
 from physics.kernels.events.trust import GROWTH, SHORTER, judge
 from physics.kernels.fields.loads import bind_fields, refresh_loads, set_clock

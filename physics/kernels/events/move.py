@@ -24,12 +24,12 @@ from physics.kernels.events.guards import (
 )
 from physics.kernels.events.motion import END, SIZE, START
 from physics.kernels.events.onset import contact_rate, outruns, sliding_velocity
+from physics.kernels.events.projection import cancel
 from physics.kernels.events.smooth import (
     CUT,
     EASY,
     GROWTH,
     SHORTEST,
-    cancel,
     find_rate,
     get_state,
     put_state,

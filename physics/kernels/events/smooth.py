@@ -15,12 +15,12 @@ import math
 from physics.kernels import quaternion as qt
 from physics.kernels.arms import wall_normal, wall_of
 from physics.kernels.compiler import inlined, kernel
-from physics.kernels.events.forces import free_turning, list_unknowns, place, plus, turned_by, vector
+from physics.kernels.events.forces import free_turning, place, vector
 from physics.kernels.events.motion import END, LAST, NOW, ORDERS, SIZE, START, L, Q, V, X
 from physics.kernels.events.onset import contact_rate, creeps, has_one_slide, sliding_velocity, stiffness_across
-from physics.kernels.events.unknowns import regime_forces, solve_unknowns
+from physics.kernels.events.unknowns import regime_forces
 from physics.kernels.fields.loads import has_fields, refresh_loads
-from physics.kernels.layout import OFFSET, SPHERE
+from physics.kernels.layout import SPHERE
 
 # A step is cut to this share when the extrapolation does not settle, and no further than to SHORTEST of the time
 # asked for.
@@ -30,10 +30,6 @@ SHORTEST = 1.0e-12
 # The next step is this many times as long when at most EASY rules were needed.
 GROWTH = 4.0
 EASY = 4
-
-# Gaps and velocities of contacts below these shares of `motion.touch` and `motion.noise` are left as they are.
-UNSEEN_GAP = 0.1
-UNSEEN_SPEED = 0.01
 
 # Sliding turns when its acceleration is off its direction by this share, and then a step is so long at most, in times
 # |u|/|a|. Where it is straight but for less than that it turns just before it stops: there a step goes so far.
@@ -262,76 +258,3 @@ def _until_stop(h, P, w, work, motion):
         if bend > STRAIGHT * size and motion.stiffness > 0.0:  # 0 of more contacts than one
             h = min(h, STIFF * speed / motion.stiffness)
     return h
-
-
-@inlined
-def _push_along(holding, P, work, motion):
-    """Velocity and turn, both per kinetic metric, that take off `goal` along the rows of the regime."""
-    k = list_unknowns(0.0, holding, work, motion)
-    F, T = solve_unknowns(k, P, work, motion)
-    s = 1.0 / work.mass
-    return (s * F[0], s * F[1], s * F[2]), T
-
-
-@inlined
-def _speed_goals(motion, work):
-    """`goal`: the velocities of the contacts that act; the largest that the regime does not allow [m/s]."""
-    worst = 0.0
-    for j in range(motion.count):
-        n = wall_normal(work.walls, wall_of(motion.slot[j], work))
-        u = vector(motion.velocity, j)
-        worst = max(worst, abs(qt.dot(n, u)))
-        if motion.holds[j]:
-            worst = max(worst, max(abs(u[0]), max(abs(u[1]), abs(u[2]))))
-        for c in range(3):
-            motion.goal[j, c] = u[c]
-    return worst
-
-
-@inlined
-def _cancel_speeds(holding, v, m, P, work, motion):
-    """Velocity and angular momentum without the velocities of contacts that the regime does not allow (placed)."""
-    worst = _speed_goals(motion, work)
-    if not worst > UNSEEN_SPEED * motion.noise:
-        return v, m
-    change, turn = _push_along(holding, P, work, motion)
-    return plus(v, change), plus(m, turn)
-
-
-@kernel
-def cancel_normal_speeds(y, tilted, work, motion):
-    """State without the normal velocities of the contacts that act."""
-    x, q, v, m = y
-    R, P, w, alpha = free_turning(y, tilted, work)
-    place(y, R, w, alpha, tilted, work, motion)
-    v, m = _cancel_speeds(False, v, m, P, work, motion)
-    return x, q, v, m
-
-
-@kernel
-def cancel(y, tilted, work, motion):
-    """State without the gaps and velocities of contacts that the regime does not allow, where above rounding.
-
-    Least change in the kinetic metric: along M⁻¹ Jᵀ.
-    """
-    if motion.count == 0:
-        return y
-    x, q, v, m = y
-    R, P, w, alpha = free_turning(y, tilted, work)
-    place(y, R, w, alpha, tilted, work, motion)
-    worst = 0.0
-    for j in range(motion.count):
-        wall = wall_of(motion.slot[j], work)
-        n = wall_normal(work.walls, wall)
-        gap = qt.dot(n, x) + qt.dot(n, vector(motion.arm, j)) - work.walls[wall, OFFSET]
-        worst = max(worst, abs(gap))
-        for c in range(3):
-            motion.goal[j, c] = gap * n[c]
-    if worst > UNSEEN_GAP * motion.touch:
-        move, turn = _push_along(False, P, work, motion)
-        x = plus(x, move)
-        q = qt.normalise(qt.multiply(qt.exponential(turned_by(P, work.J, turn)), q))
-        R, P, w, alpha = free_turning((x, q, v, m), tilted, work)
-        place((x, q, v, m), R, w, alpha, tilted, work, motion)
-    v, m = _cancel_speeds(True, v, m, P, work, motion)
-    return x, q, v, m
