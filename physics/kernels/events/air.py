@@ -101,8 +101,12 @@ def third_bound(y, left, tilted, work):
 
 
 @kernel
-def safe_flight(y, left, third, tilted, work, motion):
-    """A time within which no feature at y reaches a wall, at most `left`."""
+def safe_flight(y, left, third, assured, tilted, work, motion):
+    """A time within which no feature at y reaches a wall, at most `left`.
+
+    Those that touch and do not come stay away for the time `assured` at least: where a push has just ended, what lifts
+    them is still zero.
+    """
     x, v = y[0], y[2]
     R, _, w, alpha = free_turning(y, tilted, work)
     dims, a, shape = load(work.dims), load(work.free_acceleration), work.shape
@@ -118,9 +122,10 @@ def safe_flight(y, left, third, tilted, work, motion):
             gap = d + qt.dot(n, r)
             speed = vn + qt.dot(n, qt.cross(w, r))
             bend = an + qt.dot(n, plus(qt.cross(alpha, r), qt.cross(w, rate)))
+            least = 0.0
             if gap <= motion.touch and speed >= -motion.still:
-                gap, speed = max(gap, 0.0), max(speed, 0.0)
-            t = min(t, safe_time(max(gap, 0.0), speed, bend, third, t))
+                gap, speed, least = max(gap, 0.0), max(speed, 0.0), assured
+            t = min(t, max(safe_time(max(gap, 0.0), speed, bend, third, t), least))
     return t
 
 
@@ -188,7 +193,8 @@ def fly_to_wall(y, left, gyroscopic, tilted, work, motion, report):
     third = third_bound(y, left, tilted, work)
     now, t = y, 0.0
     for _ in range(ADVANCES):
-        step = safe_flight(now, left - t, third, tilted, work, motion)
+        assured = motion.assured if t == 0.0 else 0.0
+        step = safe_flight(now, left - t, third, assured, tilted, work, motion)
         if t + step >= left:
             return fly_freely(y, left, gyroscopic, tilted, work, motion, report), left, True
         t += step

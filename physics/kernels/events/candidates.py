@@ -14,7 +14,8 @@ from physics.kernels.events.forces import (
 )
 from physics.kernels.events.guards import look_around
 from physics.kernels.events.motion import START
-from physics.kernels.events.smooth import cancel_normal_speeds, put_state
+from physics.kernels.events.projection import cancel_normal_speeds
+from physics.kernels.events.smooth import put_state
 
 # What a body does; the last: nothing, since its last step went too far (`trust`).
 FLIES, COLLIDES, MOVES, RESTS, IS_LOST, ASKS, ASKS_SLIDING, GOES_BACK = range(8)
@@ -71,17 +72,29 @@ def has_open(motion):
     return False
 
 
+@inlined
+def has_speed(motion):
+    """Whether a candidate that acts moves along its normal, or one that does not approaches, by more than rounding."""
+    for i in range(motion.candidates):
+        rate = motion.gap_rate[START, motion.candidate[i]]
+        if rate < -motion.noise or (rate > motion.noise and motion.kind[i] != OPEN):
+            return True
+    return False
+
+
 @kernel
 def set_down(y, tilted, work, motion):
     """State without the normal velocities of all candidates that neither come nor go, whether they act or not.
 
     A body that lies on two contacts and rocks lower than counts would else come down on the one whenever it is set
-    down on the other.
+    down on the other. Where those that act have no such velocity one that has just been let go keeps its own.
     """
     if not has_open(motion):
         return y
     put_state(motion, START, y)
     look_around(START, tilted, work, motion)
+    if not has_speed(motion):
+        return y
     motion.count = 0
     for i in range(motion.candidates):
         s = motion.candidate[i]

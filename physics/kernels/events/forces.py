@@ -118,7 +118,8 @@ def _add(m, r, push, row, share, motion):
 
 
 @inlined
-def _slide_push(mu, axes, j, work, motion):
+def slide_push(mu, axes, j, work, motion):
+    """Force of contact j, which slides, for each newton along the normal."""
     n, d = axes[0], opposing(vector(motion.way, j), axes, work)
     return (n[0] - mu * d[0], n[1] - mu * d[1], n[2] - mu * d[2])
 
@@ -128,7 +129,7 @@ def _push_of(mu, axes, j, work, motion):
     """Force of contact j for each newton along the normal."""
     if motion.holds[j]:
         return axes[0]
-    return _slide_push(mu, axes, j, work, motion)
+    return slide_push(mu, axes, j, work, motion)
 
 
 @inlined
@@ -229,7 +230,7 @@ def list_unknowns(mu, holding, work, motion):
                 m = _add_held(m, j, own, axes, motion)
             elif own == 0:
                 _clear(m, 1, motion)
-                _add(m, vector(motion.arm, j), _slide_push(mu, axes, j, work, motion), axes[0], 1.0, motion)
+                _add(m, vector(motion.arm, j), slide_push(mu, axes, j, work, motion), axes[0], 1.0, motion)
                 motion.asked[m] = -qt.dot(axes[0], vector(motion.goal, j))
                 motion.first[j] = m
                 m += 1
@@ -239,10 +240,12 @@ def list_unknowns(mu, holding, work, motion):
 
 @kernel
 def spread(mu, work, motion):
-    """Force of each contact that acts (`force`, `normal`) from the unknowns."""
+    """Force of each contact that acts (`force`, `normal`) from the unknowns, and the shares where they are in it."""
     for j in range(motion.count):
         axes = wall_axes(work.walls, wall_of(motion.slot[j], work))
         k, p, f = motion.first[j], motion.patch[j], vector(motion.share, j)
+        if not mu > 0.0:  # `_add_shares` leaves them out: the unknowns are all of the force
+            f = (0.0, 0.0, 0.0)
         if p != NO_PATCH:
             s = motion.unknown[p]
             s += motion.place[j, 0] * motion.unknown[p + 1] + motion.place[j, 1] * motion.unknown[p + 2]

@@ -192,28 +192,36 @@ def opposite(slot, wall, work, motion):
 
 
 @kernel
-def force_margin(work, motion):
-    """Smallest margin of the guards of force: (margin, guard, contact or slot)."""
+def force_margin(slack, work, motion):
+    """Smallest margin of the guards of force, of which `slack` counts as none: (margin, guard, contact or slot)."""
     margin, guard, which = math.inf, NO_GUARD, -1
     for j in range(motion.count):
-        push = motion.normal[j] / motion.weight + MARGIN
+        push = motion.normal[j] / motion.weight + slack
         if push < margin:
             margin, guard, which = push, PUSH, j
         if motion.holds[j]:
-            cone = MARGIN - cone_excess(j, work, motion) / motion.weight
+            cone = slack - cone_excess(j, work, motion) / motion.weight
             if cone < margin:
                 margin, guard, which = cone, CONE, j
     pull, slot = idle_pull(work, motion)
-    if pull / motion.weight + MARGIN < margin:
-        margin, guard, which = pull / motion.weight + MARGIN, LOAD, slot
+    if pull / motion.weight + slack < margin:
+        margin, guard, which = pull / motion.weight + slack, LOAD, slot
     return margin, guard, which
 
 
 @kernel
-def least_margin(h, heeds, tilted, work, motion):
+def least_force_at_start(tilted, work, motion):
+    """Smallest margin of force at START, nothing of it rounding."""
+    find_rate(START, 0.0, tilted, work, motion)
+    spread(work.mu, work, motion)
+    return force_margin(0.0, work, motion)[0]
+
+
+@kernel
+def least_margin(h, heeds, slack, tilted, work, motion):
     """Smallest margin at END, a step of h after START: (margin, guard, contact or slot).
 
-    `heeds`: the guards of force count.
+    `heeds`: the guards of force count, where they are missed by more than `slack`.
     """
     find_rate(END, h, tilted, work, motion)
     spread(work.mu, work, motion)
@@ -221,7 +229,7 @@ def least_margin(h, heeds, tilted, work, motion):
     gap, which = gap_margin(h, work, motion)
     margin, guard = gap / work.radius, GAP
     if heeds and motion.weight > 0.0:
-        least, sort, j = force_margin(work, motion)
+        least, sort, j = force_margin(slack, work, motion)
         if least < margin:
             margin, guard, which = least, sort, j
     if work.mu > 0.0 and margin >= 0.0:  # a contact may stop within the step, unless something ends it before

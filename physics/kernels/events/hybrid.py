@@ -33,9 +33,9 @@ from physics.kernels.events.collide import carry_on, collide, jump, note, princi
 from physics.kernels.events.guards import FORCES, NO_GUARD, NO_STEP, WATCH
 from physics.kernels.events.move import body_speed, look_ahead, move
 from physics.kernels.events.pace import is_crowded, note_leap, note_step, set_pace
+from physics.kernels.events.projection import cancel
 from physics.kernels.events.regime import find_regime
 from physics.kernels.events.resting import read_resting
-from physics.kernels.events.smooth import cancel
 from physics.kernels.events.state import keep_contacts, log_changes, recall_contacts
 from physics.kernels.events.trust import GROWTH, SHORTER, judge
 from physics.kernels.fields.loads import bind_fields, refresh_loads, set_clock
@@ -82,6 +82,7 @@ def begin_part(y, start, tilted, memory, work, motion):
     set_clock(start, work)
     refresh_loads(y, 0.0, tilted, work)
     set_thresholds(y, tilted, work, motion)
+    motion.assured = 0.0
     recall_contacts(memory, work.i, work, motion)
     motion.left_out, motion.turns = 0.0, 0
 
@@ -95,6 +96,7 @@ def find_what(y, is_foretold, watched, friction, smooth, tilted, pivots, work, m
     seen, later = y, 0.0
     if is_foretold:
         seen, later = look_ahead(y, tilted, work, motion), motion.ahead
+    motion.assured = later
     refresh_loads(seen, later, tilted, work)
     what, n, v, L = find_regime(seen, friction, tilted, work, motion)
     what = judge(what, watched, y, tilted, work, motion)

@@ -38,6 +38,7 @@ def motion_dtype(wall_count: int, features: int) -> np.dtype:
         ("turns", i),  # impacts in turn so far at this moment
         ("ahead", f),  # time by which the next regime is looked for [s]
         ("nearest", f),  # the least of these [s]
+        ("assured", f),  # time for which contacts that a guard has let go are known to stay open [s]
         ("leap", f),  # length of the next leap, and when events began to crowd and their number since; see `pace`
         ("since", f),
         ("crowd", i),
@@ -53,12 +54,18 @@ def motion_dtype(wall_count: int, features: int) -> np.dtype:
         ("holds", i, (n,)),  # 1: no velocity at all; 0: slides
         ("way", f, (n, 3)),  # direction of sliding
         ("reference", f, (n, 3)),  # the one at the start of the step
-        ("is_starting", i, (n,)),  # 1: the contact was at rest at the start of the step
+        ("is_starting", i, (n,)),  # 1: the contact was at rest at the start of the step, or all but
+        ("turning", f),  # rate at which the direction turns in which the only contact begins to slide [rad/s]
+        ("stiffness", f),  # what friction changes of its acceleration across that, for each radian [m/s²]
+        ("first_speed", f),  # of it, at the start of the step [m/s]
+        ("growth", f),  # of that [m/s²]
         ("arm", f, (n, 3)),  # contact point relative to the centre of mass [m]
         ("velocity", f, (n, 3)),  # of the body there [m/s]
         ("goal", f, (n, 3)),  # what the unknowns are to cancel: acceleration, velocity or gap
         ("force", f, (n, 3)),  # [N]
         ("normal", f, (n,)),  # of it, along the normal [N]
+        ("margin", f, (3, 2, n)),  # of push and cone at the ends of a step and inside; see `dips` [weights]
+        ("fall", f, (2, n)),  # their rates of change at its start
         ("first", i, (n,)),  # first unknown of the contact alone
         ("patch", i, (n,)),  # first of the three of its wall's normal forces, NO_PATCH: its normal force is its own
         ("place", f, (n, 2)),  # coordinates in the patch, in radii
@@ -91,6 +98,7 @@ def motion_dtype(wall_count: int, features: int) -> np.dtype:
         ("y", f, (ROWS, SIZE)),
         ("rate", f, (SIZE,)),
         ("first_rate", f, (SIZE,)),
+        ("last_rate", f, (SIZE,)),
         ("scale", f, (SIZE,)),
         ("table", f, (ORDERS, SIZE)),
     ])  # fmt: skip

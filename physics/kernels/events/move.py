@@ -8,18 +8,31 @@ from physics.kernels import quaternion as qt
 from physics.kernels.body import angular_velocity
 from physics.kernels.compiler import inlined, kernel
 from physics.kernels.events.candidates import set_down
-from physics.kernels.events.forces import keep_forces
-from physics.kernels.events.guards import GAP, NO_GUARD, NO_STEP, SPEED, WATCH, least_margin, look_around
+from physics.kernels.events.dips import find_dip, note_margins
+from physics.kernels.events.forces import free_turning, keep_forces, vector
+from physics.kernels.events.guards import (
+    FORCES,
+    GAP,
+    MARGIN,
+    NO_GUARD,
+    NO_STEP,
+    SPEED,
+    WATCH,
+    least_force_at_start,
+    least_margin,
+    look_around,
+)
 from physics.kernels.events.motion import END, SIZE, START
+from physics.kernels.events.onset import contact_rate, outruns, sliding_velocity
+from physics.kernels.events.projection import cancel
 from physics.kernels.events.smooth import (
     CUT,
     EASY,
     GROWTH,
     SHORTEST,
-    cancel,
+    find_rate,
     get_state,
     put_state,
-    sliding_velocity,
     start_step,
     try_step,
 )
@@ -54,8 +67,15 @@ def locate(h, margin, guard, which, heeds, tilted, work, motion):
     Newton's steps for a gap. Else false position with the Illinois rule, and a half where PATIENCE trials have not
     halved what is left. NO_STEP where a shorter step fails that was to be smooth: the margin changes its sign at a pole
     (Painlevé), which the whole step did not see.
+
+    A force that was there at the start ends where it is zero, not where it is missed by more than rounding.
     """
     low, high, low_margin, high_margin = 0.0, h, -margin, margin
+    slack = MARGIN
+    if guard in FORCES:
+        least = least_force_at_start(tilted, work, motion)
+        if least > MARGIN:
+            slack, low_margin, high_margin = 0.0, least, margin - MARGIN
     side, width, stale = 0, h, 0
     newton = towards_gap(h, margin, guard, which, work, motion)
     for _ in range(LOCATIONS):
@@ -67,7 +87,7 @@ def locate(h, margin, guard, which, heeds, tilted, work, motion):
         error, _ = try_step(t, tilted, work, motion)
         if not error <= work.tolerance:
             return t, NO_STEP, which
-        margin, g, w = least_margin(t, heeds, tilted, work, motion)
+        margin, g, w = least_margin(t, heeds, slack, tilted, work, motion)
         newton = -1.0
         if margin < 0.0:
             high, high_margin, guard, which = t, margin, g, w
@@ -89,7 +109,7 @@ def locate(h, margin, guard, which, heeds, tilted, work, motion):
             break
     if margin >= 0.0:
         try_step(high, tilted, work, motion)
-        _, guard, which = least_margin(high, heeds, tilted, work, motion)
+        _, guard, which = least_margin(high, heeds, slack, tilted, work, motion)
     return high, guard, which
 
 
@@ -99,6 +119,40 @@ def has_stopped(guard, which, work, motion):
     if guard != SPEED:
         return False
     return sliding_velocity(which, work, motion)[1] <= motion.slow
+
+
+@kernel
+def finish_stop(which, left, heeds, tilted, work, motion):
+    """Let contact `which`, which slides at END as slowly as counts as none, do so until it stands still: the time [s].
+
+    Its direction stays what it is. Not where something else would end within that time, or it began to slide only now.
+    """
+    if motion.is_starting[which]:
+        return 0.0
+    slip, speed = sliding_velocity(which, work, motion)
+    if not motion.noise < speed <= 2.0 * motion.slow:
+        return 0.0
+    before = get_state(motion, START)
+    end = get_state(motion, END)
+    for c in range(3):
+        motion.reference[which, c] = slip[c] / speed
+    put_state(motion, START, end)
+    find_rate(START, 0.0, tilted, work, motion)
+    for c in range(SIZE):
+        motion.first_rate[c] = motion.rate[c]
+    _, P, _, _ = free_turning(end, tilted, work)
+    along = qt.dot(contact_rate(which, P, work, motion), vector(motion.reference, which))
+    if along < 0.0:
+        h = min(left, -speed / along)
+        error, _ = try_step(h, tilted, work, motion)
+        margin, guard, _ = least_margin(h, heeds, MARGIN, tilted, work, motion)
+        if error <= work.tolerance and (margin >= 0.0 or guard == SPEED):
+            pass_time(h, work)
+            return h
+    put_state(motion, START, before)
+    put_state(motion, END, end)
+    least_margin(0.0, heeds, MARGIN, tilted, work, motion)  # forces and gaps are those of END again
+    return 0.0
 
 
 @inlined
@@ -123,14 +177,23 @@ def move(y, left, tilted, work, motion):
     look_around(START, tilted, work, motion)
     motion.step = left if heeds else motion.trust
     t, h = 0.0, start_step(left, tilted, work, motion)
+    note_margins(START, work, motion)
     for _ in range(STEPS):
         error, used = try_step(h, tilted, work, motion)
         is_over, guard = False, NO_STEP
         if error <= work.tolerance:
-            margin, guard, which = least_margin(h, heeds, tilted, work, motion)
+            margin, guard, which = least_margin(h, heeds, MARGIN, tilted, work, motion)
             is_over = margin < 0.0
-            if is_over and not has_stopped(guard, which, work, motion):
+            if outruns(h, work, motion):
+                guard = NO_STEP
+            elif is_over and not has_stopped(guard, which, work, motion):
                 h, guard, which = locate(h, margin, guard, which, heeds, tilted, work, motion)
+        if guard != NO_STEP and heeds:
+            dip = find_dip(h, used, tilted, work, motion)
+            if dip < h:
+                h = dip
+                refresh_loads(get_state(motion, START), 0.0, tilted, work)
+                continue
         if guard == NO_STEP:
             if not h > SHORTEST * left:
                 return get_state(motion, START), t, NO_STEP
@@ -140,6 +203,8 @@ def move(y, left, tilted, work, motion):
             continue
         t += h
         pass_time(h, work)
+        if is_over and guard == SPEED:
+            t += finish_stop(which, left - t, heeds, tilted, work, motion)
         motion.step = GROWTH * h if used <= EASY else h
         keep_forces(work, motion)
         y = cancel(get_state(motion, END), tilted, work, motion)
@@ -155,6 +220,7 @@ def move(y, left, tilted, work, motion):
         for s in range(motion.is_active.shape[0]):
             motion.gap[START, s], motion.gap_rate[START, s] = motion.gap[END, s], motion.gap_rate[END, s]
         h = start_step(left - t, tilted, work, motion)
+        note_margins(START, work, motion)
     if t < left:
         return get_state(motion, START), t, NO_STEP
     return y, left, NO_GUARD

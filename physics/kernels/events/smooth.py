@@ -15,11 +15,12 @@ import math
 from physics.kernels import quaternion as qt
 from physics.kernels.arms import wall_normal, wall_of
 from physics.kernels.compiler import inlined, kernel
-from physics.kernels.events.forces import free_turning, list_unknowns, place, plus, turned_by, vector
+from physics.kernels.events.forces import free_turning, place, vector
 from physics.kernels.events.motion import END, LAST, NOW, ORDERS, SIZE, START, L, Q, V, X
-from physics.kernels.events.unknowns import regime_forces, solve_unknowns
+from physics.kernels.events.onset import contact_rate, creeps, has_one_slide, sliding_velocity, stiffness_across
+from physics.kernels.events.unknowns import regime_forces
 from physics.kernels.fields.loads import has_fields, refresh_loads
-from physics.kernels.layout import OFFSET, SPHERE
+from physics.kernels.layout import SPHERE
 
 # A step is cut to this share when the extrapolation does not settle, and no further than to SHORTEST of the time
 # asked for.
@@ -30,16 +31,21 @@ SHORTEST = 1.0e-12
 GROWTH = 4.0
 EASY = 4
 
-# Gaps and velocities of contacts below these shares of `motion.touch` and `motion.noise` are left as they are.
-UNSEEN_GAP = 0.1
-UNSEEN_SPEED = 0.01
-
 # Sliding turns when its acceleration is off its direction by this share, and then a step is so long at most, in times
 # |u|/|a|. Where it is straight but for less than that it turns just before it stops: there a step goes so far.
 BENT = 1.0e-4
 TURNED = 0.5
-STRAIGHT = 1.0e-12
+STRAIGHT = 1.0e-14
 SHORT_OF_STOP = 0.75
+
+# The direction of a slip follows what acts within the time |u|/K, K the acceleration that friction gives across it for
+# each radian. No step is longer than STIFF of these: beyond it is not stable, by less than the tolerance of a speed.
+STIFF = 1.5
+
+# In contact an extrapolation goes on to FINER of the tolerance, and no further than to rounding, FINEST: the time at
+# which a force or a slip is used up may be off by many times as much as the state.
+FINER = 1.0e-2
+FINEST = 1.0e-13
 
 # Rules after which it shows whether an extrapolation will settle: when its errors, falling twice as fast as they did
 # last, would not.
@@ -128,6 +134,7 @@ def try_step(h, tilted, work, motion):
     """Row END from row START, h later (`first_rate` known): (relative error, rules used)."""
     table, y = motion.table, motion.y
     goal = work.tolerance
+    aim = max(FINER * goal, min(goal, FINEST)) if motion.count > 0 else goal
     set_scale(h, work, motion)
     error = math.inf
     used = ORDERS
@@ -150,24 +157,14 @@ def try_step(h, tilted, work, motion):
                 error = max(error, abs(change) / motion.scale[c])
         if not math.isfinite(total):
             return math.inf, ORDERS
-        if error <= goal:
+        if error <= aim:
             used = k + 1
             break
-        if k >= TOLD and error * (error / before) ** (2 * (ORDERS - 1 - k)) > goal:
+        if k >= TOLD and error * (error / before) ** (2 * (ORDERS - 1 - k)) > (aim if error <= goal else goal):
             break
     x, q, v, m = get_state(motion, END)
     put_state(motion, END, (x, qt.normalise(q), v, m))
     return error, used
-
-
-@inlined
-def sliding_velocity(j, work, motion):
-    """Tangential velocity of contact j and its size."""
-    n = wall_normal(work.walls, wall_of(motion.slot[j], work))
-    u = vector(motion.velocity, j)
-    un = qt.dot(n, u)
-    t = (u[0] - un * n[0], u[1] - un * n[1], u[2] - un * n[2])
-    return t, math.sqrt(qt.dot(t, t))
 
 
 @kernel
@@ -190,10 +187,11 @@ def start_step(left, tilted, work, motion):
         if speed > motion.slow:
             for c in range(3):
                 motion.reference[j, c] = t[c] / speed
-    find_rate(START, 0.0, tilted, work, motion)
-    for c in range(SIZE):
-        motion.first_rate[c] = motion.rate[c]
+    motion.turning = motion.stiffness = 0.0
+    _set_first_rate(tilted, work, motion)
     turn = motion.spin = math.sqrt(qt.dot(w, w))
+    if has_one_slide(work, motion):
+        _begin_slide(P, tilted, work, motion)
     motion.weight = work.mass * (work.acceleration + work.radius * turn * turn)
     h = min(left, motion.step)
     if work.shape != SPHERE and h * turn > TURN_AT_MOST:
@@ -204,22 +202,51 @@ def start_step(left, tilted, work, motion):
 
 
 @inlined
+def _set_first_rate(tilted, work, motion):
+    """`first_rate`: that of START."""
+    find_rate(START, 0.0, tilted, work, motion)
+    for c in range(SIZE):
+        motion.first_rate[c] = motion.rate[c]
+
+
+@kernel
+def _begin_slide(P, tilted, work, motion):
+    """What is known of the only contact, which slides, at START; one that creeps has the direction of `onset`."""
+    motion.stiffness = stiffness_across(P, work, motion)
+    _, motion.first_speed = sliding_velocity(0, work, motion)
+    motion.growth = qt.dot(contact_rate(0, P, work, motion), vector(motion.reference, 0))
+    if motion.growth >= 0.0 and creeps(motion.growth, motion.first_speed, work, motion):
+        motion.is_starting[0] = 1
+        _set_first_rate(tilted, work, motion)
+    if motion.is_starting[0]:
+        _set_turning(tilted, work, motion)
+        _set_first_rate(tilted, work, motion)
+
+
+@inlined
+def _set_turning(tilted, work, motion):
+    """`turning` of the only contact, by a look a moment ahead."""
+    d = vector(motion.way, 0)
+    for c in range(SIZE):
+        motion.y[NOW, c] = motion.y[START, c] + motion.nearest * motion.first_rate[c]
+    find_rate(NOW, motion.nearest, tilted, work, motion)
+    n = wall_normal(work.walls, wall_of(motion.slot[0], work))
+    motion.turning = qt.dot(qt.cross(n, d), vector(motion.way, 0)) / motion.nearest
+
+
+@inlined
 def _until_stop(h, P, w, work, motion):
     """h, or less: until the first contact stops sliding if it is slowed as at the start, or has turned its sliding.
 
     The direction of a velocity u + a t is analytic up to the time |u|/|a| (where a complex t makes it vanish), and no
     step much longer than that is of any high order.
     """
-    rate, a, torque = motion.first_rate, work.free_acceleration, work.torque
-    T = (rate[L] - torque[0], rate[L + 1] - torque[1], rate[L + 2] - torque[2])
-    F = (rate[V] - a[0], rate[V + 1] - a[1], rate[V + 2] - a[2])
-    turning = turned_by(P, work.J, T)
     for j in range(motion.count):
         if motion.holds[j] or motion.is_starting[j] or not work.mu > 0.0:
             continue
         d = vector(motion.reference, j)
         _, speed = sliding_velocity(j, work, motion)
-        change = plus(plus(vector(motion.goal, j), qt.cross(turning, vector(motion.arm, j))), F)
+        change = contact_rate(j, P, work, motion)
         along, size = qt.dot(d, change), math.sqrt(qt.dot(change, change))
         bend = size - abs(along)
         if along < 0.0 and -along * h > speed:
@@ -228,77 +255,6 @@ def _until_stop(h, P, w, work, motion):
                 h *= SHORT_OF_STOP
         if bend > BENT * size:
             h = min(h, TURNED * speed / size)
+        if bend > STRAIGHT * size and motion.stiffness > 0.0:  # 0 of more contacts than one
+            h = min(h, STIFF * speed / motion.stiffness)
     return h
-
-
-@inlined
-def _push_along(holding, P, work, motion):
-    """Velocity and turn, both per kinetic metric, that take off `goal` along the rows of the regime."""
-    k = list_unknowns(0.0, holding, work, motion)
-    F, T = solve_unknowns(k, P, work, motion)
-    s = 1.0 / work.mass
-    return (s * F[0], s * F[1], s * F[2]), T
-
-
-@inlined
-def _speed_goals(motion, work):
-    """`goal`: the velocities of the contacts that act; the largest that the regime does not allow [m/s]."""
-    worst = 0.0
-    for j in range(motion.count):
-        n = wall_normal(work.walls, wall_of(motion.slot[j], work))
-        u = vector(motion.velocity, j)
-        worst = max(worst, abs(qt.dot(n, u)))
-        if motion.holds[j]:
-            worst = max(worst, max(abs(u[0]), max(abs(u[1]), abs(u[2]))))
-        for c in range(3):
-            motion.goal[j, c] = u[c]
-    return worst
-
-
-@inlined
-def _cancel_speeds(holding, v, m, P, work, motion):
-    """Velocity and angular momentum without the velocities of contacts that the regime does not allow (placed)."""
-    worst = _speed_goals(motion, work)
-    if not worst > UNSEEN_SPEED * motion.noise:
-        return v, m
-    change, turn = _push_along(holding, P, work, motion)
-    return plus(v, change), plus(m, turn)
-
-
-@kernel
-def cancel_normal_speeds(y, tilted, work, motion):
-    """State without the normal velocities of the contacts that act."""
-    x, q, v, m = y
-    R, P, w, alpha = free_turning(y, tilted, work)
-    place(y, R, w, alpha, tilted, work, motion)
-    v, m = _cancel_speeds(False, v, m, P, work, motion)
-    return x, q, v, m
-
-
-@kernel
-def cancel(y, tilted, work, motion):
-    """State without the gaps and velocities of contacts that the regime does not allow, where above rounding.
-
-    Least change in the kinetic metric: along M⁻¹ Jᵀ.
-    """
-    if motion.count == 0:
-        return y
-    x, q, v, m = y
-    R, P, w, alpha = free_turning(y, tilted, work)
-    place(y, R, w, alpha, tilted, work, motion)
-    worst = 0.0
-    for j in range(motion.count):
-        wall = wall_of(motion.slot[j], work)
-        n = wall_normal(work.walls, wall)
-        gap = qt.dot(n, x) + qt.dot(n, vector(motion.arm, j)) - work.walls[wall, OFFSET]
-        worst = max(worst, abs(gap))
-        for c in range(3):
-            motion.goal[j, c] = gap * n[c]
-    if worst > UNSEEN_GAP * motion.touch:
-        move, turn = _push_along(False, P, work, motion)
-        x = plus(x, move)
-        q = qt.normalise(qt.multiply(qt.exponential(turned_by(P, work.J, turn)), q))
-        R, P, w, alpha = free_turning((x, q, v, m), tilted, work)
-        place((x, q, v, m), R, w, alpha, tilted, work, motion)
-    v, m = _cancel_speeds(True, v, m, P, work, motion)
-    return x, q, v, m

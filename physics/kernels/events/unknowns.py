@@ -6,6 +6,7 @@ from physics.kernels import quaternion as qt
 from physics.kernels.compiler import kernel
 from physics.kernels.events.forces import free_turning, list_unknowns, place, plus, times, turned_by, vector
 from physics.kernels.events.linear import eliminate, solve_least
+from physics.kernels.events.onset import turn_to_slip
 
 # A pivot of less than this share of the largest may be that of a row which says what others say.
 DOUBTFUL = 1.0e-7
@@ -85,6 +86,7 @@ def regime_forces(y, tilted, work, motion):
     if motion.count == 0:
         return zero, zero, w, alpha, P
     place(y, R, w, alpha, tilted, work, motion)
+    turn_to_slip(P, work, motion)
     m = list_unknowns(work.mu, True, work, motion)
     force, moment = solve_unknowns(m, P, work, motion)
     return force, moment, w, alpha, P
