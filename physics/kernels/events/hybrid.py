@@ -59,15 +59,16 @@ NOTHING = -1
 
 
 @kernel
-def set_thresholds(y, tilted, work, motion):
+def set_thresholds(y, h, tilted, work, motion):
     """What counts as no gap and no speed, and how far a regime is looked ahead; problems are solved to rounding.
 
+    Gaps are differences of places, wherever the body may go within h.
     A contact is still when the speed would not lift it by HOP gaps that count as none: a bounce as low as that would
     gain from being set down on the wall what it loses in the impact.
     """
     work.still = work.unseen = 0.0
     x, speed = y[0], body_speed(y, tilted, work)
-    motion.touch = max(work.slop, ROUNDING * (work.radius + math.sqrt(qt.dot(x, x))))
+    motion.touch = max(work.slop, ROUNDING * (work.radius + math.sqrt(qt.dot(x, x)) + h * speed))
     motion.noise = 1.0e-13 * speed
     motion.still = math.sqrt(2.0 * HOP * work.acceleration * motion.touch) + motion.noise
     motion.slow = SLOW * motion.still + motion.noise
@@ -77,11 +78,11 @@ def set_thresholds(y, tilted, work, motion):
 
 
 @inlined
-def begin_part(y, start, tilted, memory, work, motion):
-    """What is known when a part begins at the time `start` of the step."""
+def begin_part(y, start, h, tilted, memory, work, motion):
+    """What is known when a part of length h begins at the time `start` of the step."""
     set_clock(start, work)
     refresh_loads(y, 0.0, tilted, work)
-    set_thresholds(y, tilted, work, motion)
+    set_thresholds(y, h, tilted, work, motion)
     motion.assured = 0.0
     recall_contacts(memory, work.i, work, motion)
     motion.left_out, motion.turns = 0.0, 0
@@ -145,7 +146,7 @@ def advance(y, h, friction, smooth, gyroscopic, tilted, pivots, work, motion, me
     Each turn asks what the body does (`told` says so beforehand where it is known) and does that. A step whose end has
     to be looked at (`trust`) has begun at `kept` and has the length `watched`.
     """
-    begin_part(y, start, tilted, memory, work, motion)
+    begin_part(y, start, h, tilted, memory, work, motion)
     t, told, is_foretold, kept, watched = 0.0, NOTHING, False, y, 0.0
     for k in range(work.splits + 1):
         if k == work.splits:
