@@ -41,9 +41,9 @@ def is_clear(x, v, h, work):
 def _admit(gap, speed, slop, reach, soft, slot, h, memory, work):
     """Whether a feature belongs to the contact set of this stage.
 
-    It does when it touches (gap <= slop); when loads make it no faster at the wall than from rest in the step, `soft`
-    (it then rests, and restitution would not act); and when loads can bring it to the wall within the step, if it
-    pushed in the last stage (`held`), or if this is the last one that the substep may have.
+    It does when it touches (gap <= slop); when loads make it no faster at the wall than `soft`: than from rest in the
+    step, and than what rests as it is (`aims.aim_impact`); and when loads can bring it to the wall within the step, if
+    it pushed in the last stage (`held`), or if this is the last one that the substep may have.
     """
     if gap <= slop or (gap <= TOGETHER * slop and speed < 0.0):
         return True
@@ -80,6 +80,8 @@ def gather(y, w, h, tilted, memory, work):
     dims = (work.dims[0], work.dims[1], work.dims[2])
     center = geometric_center(x, R, work, tilted)
     reach, soft = 0.5 * acceleration * h * h, acceleration * h
+    if work.restitution > work.rest_share:  # nor is what would rebound for longer than its share of the step
+        soft *= work.rest_share / work.restitution
     near = max(slop + reach, TOGETHER * slop)
     if shape == ELLIPSOID:
         near += 0.5 * h * h * turning_acceleration(w, work)

@@ -231,7 +231,7 @@ CASES = (
         peers=True,
     ),
     Case(
-        53, "ladder-leaves-wall", "smooth ladder that slides down a wall",
+        53, "ladder-lets-go", "smooth ladder that slides down a wall",
         "leaves it where the wall would have to pull; its sideways speed stays", ladder_leaves_wall, peers=True,
     ),
     Case(

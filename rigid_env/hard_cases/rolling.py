@@ -168,7 +168,7 @@ def _impacts(on: Setting, scene: physics.Scene, seconds: float) -> list[tuple[fl
 CASES = (
     Case(12, "rolling", "sliding sphere starts to roll", "5v₀/7 from t = 2v₀/(7μg) on", rolling, peers=True),
     Case(
-        55, "rolls-without-impact", "an ellipsoid rolls and rocks: is anything hit?",
+        55, "rolling-ellipsoid", "an ellipsoid rolls and rocks: is anything hit?",
         "no impact while the push is positive; one of each landing", rolls_without_impact,
     ),
     Case(43, "euler-disk", "Euler's disk without dissipation", "Ω² sinα = 4g/a, does not grow", euler_disk),

@@ -321,7 +321,7 @@ def test_every_effect_has_a_case_that_stores_what_its_plan_says():
         stored[name] = on - off
     assert (stored["gravity"], stored["contact"], stored["drag"], stored["spring"]) == (0, 0, 16, 72)
     names = "spring between bodies", "tangential restitution", "rolling friction", "spin friction", "actuator"
-    assert [stored[name] for name in names] == [128, 8, 8, 8, 0]
+    assert [stored[name] for name in names] == [136, 8, 8, 8, 0]
     assert stored["sleeping"] == 8 * SLEEP_SIZE
 
 

@@ -72,9 +72,9 @@ def mean_spring(states, p, t):
     if p[STIFFNESS] == 0.0 and p[DAMPING] == 0.0:
         return ZERO, ZERO
     middle, first, last = states
-    r0, e0, l0 = stretch(first, p)
-    r1, e1, l1 = stretch(last, p)
-    arm, e, l = times(0.5, plus(r0, r1)), times(0.5, plus(e0, e1)), 0.5 * (l0 + l1)
+    before, after = stretch(first, p), stretch(last, p)
+    arm, e = times(0.5, plus(before[0], after[0])), times(0.5, plus(before[1], after[1]))
+    l = 0.5 * (before[2] + after[2])
     u = velocity_at(middle, arm)
     if l == 0.0:
         return acting_at(arm, times(-p[DAMPING], u))
