@@ -114,7 +114,7 @@ def far_away(on: Setting) -> Sequence[Check]:
 
     Places 2^20 m away are rounded to 1.2e-10 m, a few times a step, and multiplied by what the scene makes of it; where
     contact problems are solved to a tolerance they may come out another way: by that of the body's radius. In the
-    moving frame each step adds the same way h v to the place. While the place keeps its power of two, all these sums are
+    moving frame each step adds the same way h v to the place. While the place keeps its power of two, these sums are
     rounded to the same side: by up to half a last digit of the 256 m at the end in each step.
     """
     far, fast = 2.0**20, 128.0
