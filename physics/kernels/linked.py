@@ -84,7 +84,7 @@ def step_linked(
         for b in range(bodies):
             i = world * bodies + b
             bind_body(world, i, shapes[b], params, gravity, wrench, None, None, tilted, linked.bodies[b])
-            bind_fields(params, i, linked.bodies[b])
+            bind_fields(params, i, scheme, linked.bodies[b])
             write_state(linked.now, b, read_state(state, i))
         lost = first_overloaded(linked.bodies)
         if lost >= 0:

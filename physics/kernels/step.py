@@ -261,7 +261,7 @@ def step_worlds(
             if not can_bear(work):
                 note_fault(world, b, report)
                 continue
-            bind_fields(params, i, work)
+            bind_fields(params, i, scheme, work)
             bind_laws(params, i, work)
             y, clear = read_state(state, i), 0
             for k in range(steps * substeps):

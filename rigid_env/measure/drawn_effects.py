@@ -108,7 +108,7 @@ ON_FLOOR = {
 
 @dataclass(frozen=True)
 class Outcome:
-    """Of one draw.
+    """Result of one draw.
 
     Attributes
     ----------

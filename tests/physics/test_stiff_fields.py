@@ -110,7 +110,7 @@ def test_a_pendulum_on_a_spring_that_no_step_resolves():
 @settings(max_examples=40, deadline=None)
 @given(k=DECADES, c=DECADES, dt=STEPS, damped=st.booleans())
 def test_springs_between_bodies_keep_momentum_at_any_stiffness(k, c, dt, damped):
-    """What one end gets the other loses; the energy is at most 4/3 of what it was."""
+    """One end gets the momentum that the other loses; the energy is at most 4/3 of what it was."""
     bodies = [
         physics.Block((0.4, 0.3, 0.2), 2.0, linvel=(1.0, 0.0, 0.5)),
         physics.Ellipsoid((0.2, 0.1, 0.3), 0.5, pos=(1.0, 0.5, 0.0), linvel=(0.0, -1.0, 0.0)),
@@ -158,6 +158,16 @@ def test_a_field_of_a_users_own_is_reported_where_it_is_not_resolved(kind, limit
     world = world_of([ball], [kind(share * limit)], 0.01)
     told = [world.step().status[0] == physics.Status.COARSE for _ in range(3)]
     assert any(told) == (share > 1.0)
+
+
+@pytest.mark.parametrize("scheme", ["explicit_euler", "semi_implicit_euler", "midpoint", "rk4"])
+def test_a_textbook_scheme_keeps_its_explicit_loads(scheme):
+    """v' = v (1 - z + z²/2) a step, z = h c/m = 4: its loads are those of the middle, and it must gain; it is told."""
+    ball = physics.Sphere(0.1, 1.0, linvel=(1.0, 0.0, 0.0))
+    world = world_of([ball], [physics.Drag(0.0, linear=400.0)], 0.01, accuracy=physics.Accuracy(scheme=scheme))
+    report = world.step(steps=3)
+    assert world.linvel[0, 0, 0] == pytest.approx(5.0**3, rel=1e-12)
+    assert report.status[0] == physics.Status.COARSE
 
 
 def test_what_lies_still_under_a_stiff_spring_is_not_reported():

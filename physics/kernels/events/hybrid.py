@@ -229,7 +229,7 @@ def step_events(
                 note_fault(world, b, report)
                 ev.note_change(log, counts, i, 0.0, ev.FAULT, -1)
                 continue
-            bind_fields(params, i, work)
+            bind_fields(params, i, None, work)
             bind_laws(params, i, work)
             y = read_state(state, i)
             for k in range(steps * substeps):

@@ -29,7 +29,7 @@ EXPLICIT_SHARE = COARSE_SHARE = 0.01
 
 @inlined
 def potential_energy(y, later, tilted, work):
-    """Of all fields at y, `later` [s] than now [J]."""
+    """Potential energy of all fields at y, `later` [s] than now [J]."""
     x, q, v, L = y
     t = work.now + later
     return total_energy(field_state(x, q, v, L, t, tilted, work), t, work)
@@ -64,7 +64,7 @@ def gain_of(y, end, h, tilted, work):
 
 @if_declared(False)
 def misses_work(y, end, h, tilted, work):
-    """Whether the loads of fields with an energy, at the places of the start, miss what they do from y to `end`."""
+    """True where the work from y to `end` of explicit loads misses the change of the fields' energy."""
     x, q, v, L = _middle(y, end)
     t = work.now + 0.5 * h
     state = field_state(plus(x, times(0.5 * h, y[2])), q, v, L, t, tilted, work)

@@ -21,7 +21,7 @@ def vector(a):
 
 @inlined
 def field_state(x, q, v, L, t, tilted, work):
-    """What the fields are told."""
+    """State that the fields are told."""
     R = qt.to_matrix(q)
     w = angular_velocity(q, L, work, tilted)
     center = ZERO

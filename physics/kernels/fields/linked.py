@@ -28,8 +28,8 @@ from physics.kernels.fields.linked_implicit import (
     soften_own,
     soften_pairs,
 )
-from physics.kernels.fields.spring import DAMPING, LENGTH, STIFFNESS, stretch
-from physics.kernels.fields.state import ZERO, acting_at, minus, plus, times, velocity_at
+from physics.kernels.fields.spring import DAMPING, LENGTH, STIFFNESS, line_load, stretch
+from physics.kernels.fields.state import ZERO, minus, plus, times, velocity_at
 from physics.kernels.fields.stiffness import arm_square, mobility_bound, soften_arm
 from physics.kernels.fields.terms import LOAD, instances
 from physics.kernels.flight import drift
@@ -43,10 +43,7 @@ def linked_spring(state, p, t):
         return ZERO, ZERO
     arm, e, l = stretch(state, p)
     u = minus(velocity_at(state, arm), (p[VELOCITY], p[VELOCITY + 1], p[VELOCITY + 2]))
-    if l == 0.0:
-        return acting_at(arm, times(-p[DAMPING], u))
-    s = p[STIFFNESS] * (l - p[LENGTH]) + p[DAMPING] * qt.dot(u, e) / l
-    return acting_at(arm, times(-s / l, e))
+    return line_load(arm, e, l, u, p)
 
 
 @inlined

@@ -44,14 +44,18 @@ EXPLICIT_TURN = 1.0e-4
 
 
 @if_declared()
-def bind_fields(params, i, work):
-    """Take the fields' parameters of body i, and what the step holds, into `work`."""
+def bind_fields(params, i, scheme, work):
+    """Take the fields' parameters of body i, and what the step holds, into `work`.
+
+    A textbook scheme (`scheme` not None) keeps its explicit loads at any step: it is there to show what they do.
+    """
     for c in range(work.columns.shape[0]):
         work.columns[c] = params[i, at.PARAM_SIZE + c]
     for c in range(3):
         work.held_acceleration[c] = work.free_acceleration[c]
         work.held_torque[c] = work.torque[c]
     work.is_stiff = work.is_coarse = 0
+    work.is_textbook = 0 if scheme is None else 1
 
 
 @if_declared()
@@ -85,7 +89,7 @@ def hold_loads(y, h, gyroscopic, tilted, work):
         a, torque = all_loads(F, T, work)
         state = field_state(x, q, plus(v, times(half, a)), plus(L, times(half, torque)), t, tilted, work)
         before, (F, T) = (F, T), total_load(state, t, work)
-        if not half * turn > EXPLICIT_TURN or (before[0] == F and before[1] == T):
+        if work.is_textbook == 1 or not half * turn > EXPLICIT_TURN or (before[0] == F and before[1] == T):
             break
     put_loads(F, T, work)
 

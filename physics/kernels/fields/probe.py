@@ -21,7 +21,7 @@ def look_at_fields(state, params, shapes, tilted, start, scratch, wrenches, ener
         bind_body(
             i // shapes.shape[0], i, shapes[i % shapes.shape[0]], params, None, wrenches, None, None, tilted, work
         )
-        bind_fields(params, i, work)
+        bind_fields(params, i, None, work)
         look_for_anchors(i, state, shapes.shape[0], work)
         x, q, v, L = read_state(state, i)
         told = field_state(x, q, v, L, start, tilted, work)

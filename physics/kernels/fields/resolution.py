@@ -1,4 +1,4 @@
-"""Whether a stage resolves the fields: by the rates that built-in ones tell, and by how the loads of others change."""
+"""Resolution of the fields by a stage: by the rates that built-in ones tell, and by how the loads of others change."""
 
 from __future__ import annotations
 
@@ -36,8 +36,8 @@ def note_rates(state, h, work):
     """Note whether a stage of length h is too long for the explicit midpoint rule, and for the fields at all."""
     rates = total_rates(state, h, work)
     work.rate, work.damping = max(rates[0], rates[2]), rates[0]
-    work.is_stiff = 1 if is_beyond(rates, h) else 0
-    if is_unresolved(rates, h):
+    work.is_stiff = 1 if is_beyond(rates, h) and work.is_textbook == 0 else 0
+    if is_unresolved(rates, h) or (work.is_textbook == 1 and is_beyond(rates, h)):
         work.is_coarse = 1
     return rates[2]
 
@@ -79,7 +79,7 @@ def look_over_stage(y, middle, x, q, h, tilted, work):
 
 @inlined
 def change_to_agree(y, end, loads, h, gyroscopic, tilted, work):
-    """What `loads` lack to agree with a flight over h from y to `end`, softened as `stiffness` has it."""
+    """Softened difference between the loads of a flight over h from y to `end` and `loads` (`stiffness`)."""
     t, half = work.now + 0.5 * h, 0.5 * h
     share = implicit_share(h * work.damping)
     v, L = between(y[2], end[2], share), between(y[3], end[3], share)
@@ -93,7 +93,7 @@ def change_to_agree(y, end, loads, h, gyroscopic, tilted, work):
 
 @if_declared(False)
 def is_stiff(work):
-    """Whether the loads that are held are those of an implicit step."""
+    """True where the held loads are those of an implicit step."""
     return work.is_stiff == 1
 
 

@@ -43,16 +43,21 @@ def stretch(state, p):
 
 
 @inlined
+def line_load(arm, e, l, u, p):
+    """(force, torque) at a point of velocity u, on a line along e whose length is l."""
+    if l == 0.0:
+        return acting_at(arm, times(-p[DAMPING], u))
+    s = p[STIFFNESS] * (l - p[LENGTH]) + p[DAMPING] * qt.dot(u, e) / l
+    return acting_at(arm, times(-s / l, e))
+
+
+@inlined
 def spring(state, p, t):
     """(force, torque) of a spring."""
     if p[STIFFNESS] == 0.0 and p[DAMPING] == 0.0:
         return ZERO, ZERO
     arm, e, l = stretch(state, p)
-    u = velocity_at(state, arm)
-    if l == 0.0:
-        return acting_at(arm, times(-p[DAMPING], u))
-    s = p[STIFFNESS] * (l - p[LENGTH]) + p[DAMPING] * qt.dot(u, e) / l
-    return acting_at(arm, times(-s / l, e))
+    return line_load(arm, e, l, velocity_at(state, arm), p)
 
 
 @inlined
@@ -75,11 +80,7 @@ def mean_spring(states, p, t):
     before, after = stretch(first, p), stretch(last, p)
     arm, e = times(0.5, plus(before[0], after[0])), times(0.5, plus(before[1], after[1]))
     l = 0.5 * (before[2] + after[2])
-    u = velocity_at(middle, arm)
-    if l == 0.0:
-        return acting_at(arm, times(-p[DAMPING], u))
-    s = p[STIFFNESS] * (l - p[LENGTH]) + p[DAMPING] * qt.dot(u, e) / l
-    return acting_at(arm, times(-s / l, e))
+    return line_load(arm, e, l, velocity_at(middle, arm), p)
 
 
 @inlined

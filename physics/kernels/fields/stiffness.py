@@ -48,13 +48,13 @@ def implicit_share(z):
 
 @inlined
 def is_unresolved(rates, h):
-    """Whether a step of h does not resolve the swinging or turning of a field; `graded_flight` resolves damping."""
+    """True where a step of h does not resolve how a field swings or turns; `graded_flight` resolves damping."""
     return h * h * rates[1] > ANGLE_LIMIT * ANGLE_LIMIT or h * rates[2] > ANGLE_LIMIT
 
 
 @inlined
 def is_beyond(rates, h):
-    """Whether the explicit midpoint rule should not be used over h."""
+    """True where a step of h is too long for the explicit midpoint rule."""
     return h * rates[0] > DAMPING_LIMIT or is_unresolved(rates, h)
 
 

@@ -82,6 +82,7 @@ def members(terms: tuple[Term, ...]) -> list[tuple]:
         ("call_start", float),  # time at the start of the call [s]
         ("now", float),  # of the stage [s]
         ("is_felt", int),  # 1: some field was not zero since this was set to 0
+        ("is_textbook", int),  # 1: a textbook scheme moves the body
         ("is_stiff", int),  # 1: loads of the stage are those of an implicit step (`stiffness`)
         ("is_coarse", int),  # 1: a field was not resolved by some stage of this call
         ("rate", float),  # fastest damping or turning of the stage [1/s]
@@ -186,22 +187,13 @@ def _no_air(state, t, work):
     return ZERO
 
 
-def _add_mean_load(before, function, first, last):
-    def add(states, t, work):
-        F, T = before(states, t, work)
-        f, m = function(states, work.columns[first:last], t)
-        return plus(F, f), plus(T, m)
+def _of_middle(function):
+    """A field's function of the three states of a stage that looks at the middle one."""
 
-    return add
+    def load(states, p, t):
+        return function(states[0], p, t)
 
-
-def _add_middle_load(before, function, first, last):
-    def add(states, t, work):
-        F, T = before(states, t, work)
-        f, m = function(states[0], work.columns[first:last], t)
-        return plus(F, f), plus(T, m)
-
-    return add
+    return load
 
 
 def _no_energy(state, t, work):
@@ -267,10 +259,8 @@ def total_mean_load(states, t, work):
 def _mean_load(work):
     result = _no_load
     for term, first, last in instances(work, LOAD):
-        if term.mean is not None:
-            result = _add_mean_load(composed(result), term.mean, first, last)
-        else:
-            result = _add_middle_load(composed(result), term.function, first, last)
+        mean = composed(_of_middle(term.function)) if term.mean is None else term.mean
+        result = _add_load(composed(result), mean, first, last)
     return result
 
 

@@ -56,7 +56,7 @@ def step_many(
             i = world * bodies + b
             bind_body(world, i, shapes[b], params, gravity, wrench, friction, restitution, tilted, many.bodies[b])
             many.lightness[b] = params[i, at.INV_MASS]
-            bind_fields(params, i, many.bodies[b])
+            bind_fields(params, i, scheme, many.bodies[b])
             write_state(many.now, b, read_state(state, i))
             many.touched[b] = 0
         lost = max(first_overloaded(many.bodies), first_lost(many.now))
