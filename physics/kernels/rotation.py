@@ -30,7 +30,13 @@ coefficients below were derived in exact rational arithmetic by matching the
 Taylor series of the flow; `tests/kernels/test_rotation.py` derives them anew.
 From e0 e follows e0² = (1 + √(1 - 4 |e0 e|²)) / 2.
 
-A step whose angle h |ω| exceeds `ANGLE_LIMIT` is cut into equal parts.
+A step whose angle h |ω| exceeds `ANGLE_LIMIT` is cut into equal parts. One of many turns is taken by periods of m,
+which is made of elliptic functions: with the axes in the order of their moments, so that 2 is the middle one,
+
+    T = 4 K(k) / √max(P, Q) = 2π / agm(√max(P, Q), √|P - Q|).
+
+Where m returns, only a turn about the constant L is left of the rotation. It is found for one period by parts, and
+multiplied by the number of periods.
 
 References
 ----------
@@ -40,7 +46,7 @@ References
    Found. Comput. Math. 5, 2005.
 .. [3] E. Hairer, G. Vilmart, *Preprocessed discrete Moser-Veselov algorithm for the full dynamics of the
    rigid body*, J. Phys. A 39, 2006 (the first terms of s and d, and their use as an integrator).
-.. [4] DLMF, section 22.8 (addition theorems) and 22.10 (series of sn).
+.. [4] DLMF, section 22.8 (addition theorems), 22.10 (series of sn) and 19.8 (K by the arithmetic-geometric mean).
 """
 
 from __future__ import annotations
@@ -69,9 +75,13 @@ TINY_SQUARE = 2.5e-6
 # than 0.037 (4e-4)⁴ = 1e-15 of its size, and the attitude, where m(h) enters times θ/4, by less than 1e-17.
 SHORT_SERIES = 4.0e-4
 
-# A step with more parts than this, 6e5 rad, leaves the attitude as it is: energy and momentum are kept, and where in
-# its turn the body is matters to nothing that a step of that length can resolve.
+# Turns with more parts than this, 6e5 rad in one period of the momentum or without a whole one, leave the attitude as
+# it is: energy and momentum are kept, and where in its turn the body is matters to nothing that such a step resolves.
 PARTS_LIMIT = 1.0e7
+
+# Beyond this angle [rad] a step of at least two periods is taken by periods. An error of one period's turn, a few 1e-16
+# rad per part, counts once per period: less than EPS h |ω|, which the rounding of h alone makes.
+MANY_TURNS = 50.0
 
 # Coefficients of s and d, two of first, three of second and four of third order in (|m|², 2E).
 SERIES_SIZE = 18
@@ -192,6 +202,55 @@ def _part(q, m_body, J_body, c, mm, energy2, square, h):
     return qt.multiply(q, (e0, v1 * inv_e0, v2 * inv_e0, v3 * inv_e0)), (n1, n2, n3)
 
 
+@kernel
+def momentum_period(m, J):
+    """Time [s] after which the momentum m in the principal frame returns; inf where it does not (on the separatrix)."""
+    one, two, three = (J[0], m[0] * m[0]), (J[1], m[1] * m[1]), (J[2], m[2] * m[2])
+    if one[0] > two[0]:
+        one, two = two, one
+    if two[0] > three[0]:
+        two, three = three, two
+    if one[0] > two[0]:
+        one, two = two, one
+    a1, a2, a3 = three[0] - two[0], three[0] - one[0], two[0] - one[0]
+    first, third = a1 * three[1], a3 * one[1]
+    high = math.sqrt(a1 * a3 * two[1] + a2 * max(first, third))  # √max(P, Q)
+    low = math.sqrt(a2 * abs(first - third))
+    if low == 0.0:
+        return math.inf
+    while high - low > 4.0e-16 * high:
+        high, low = 0.5 * (high + low), math.sqrt(high * low)
+    return 2.0 * math.pi / high
+
+
+@inlined
+def _turn_by_parts(q, m, J, series, mm, energy2, h, angle):
+    """(Quaternion, momentum) after h, in equal parts of at most `ANGLE_LIMIT`."""
+    if angle <= ANGLE_LIMIT * PARTS_LIMIT:
+        parts = int(angle / ANGLE_LIMIT) + 1
+        for _ in range(parts):
+            q, m = _part(q, m, J, series, mm, energy2, ANGLE_LIMIT * ANGLE_LIMIT, h / parts)
+    return q, m
+
+
+@kernel
+def _turn_by_periods(q, m, L, J, series, mm, energy2, h, angle):
+    """`_turn_by_parts` of many turns."""
+    period = momentum_period(m, J)
+    count = math.floor(abs(h) / period)
+    if count >= 2.0:
+        turned, _ = _turn_by_parts(q, m, J, series, mm, energy2, period, angle * (period / abs(h)))
+        e = qt.multiply(turned, qt.conjugate(q))  # about L, since m is again what it was
+        size = math.sqrt(mm)
+        turn = 2.0 * math.atan2(qt.dot((e[1], e[2], e[3]), L) / size, e[0]) * math.copysign(count, h)
+        q = qt.multiply(qt.exponential((turn * L[0] / size, turn * L[1] / size, turn * L[2] / size)), q)
+        rest = max(abs(h) - count * period, 0.0)
+        angle *= rest / abs(h)
+        h = math.copysign(rest, h)
+    q, m = _turn_by_parts(q, m, J, series, mm, energy2, h, angle)
+    return q
+
+
 @inlined
 def free_rotation(q, L, J, series, h):
     """Attitude after a time h of torque-free rotation.
@@ -226,10 +285,9 @@ def free_rotation(q, L, J, series, h):
     angle = abs(h) * math.sqrt(max(J[0], J[1], J[2]) * energy2)
     if not angle < math.inf:
         return (math.nan, math.nan, math.nan, math.nan)  # its energy overflows: the caller's guard reports it
-    if angle <= ANGLE_LIMIT * PARTS_LIMIT:
-        parts = int(angle / ANGLE_LIMIT) + 1
-        for _ in range(parts):
-            q, m = _part(q, m, J, series, mm, energy2, ANGLE_LIMIT * ANGLE_LIMIT, h / parts)
+    if angle > MANY_TURNS:
+        return _turn_by_periods(q, m, L, J, series, mm, energy2, h, angle)
+    q, m = _turn_by_parts(q, m, J, series, mm, energy2, h, angle)
     return q
 
 

@@ -159,6 +159,45 @@ def test_a_long_step_equals_many_short_ones():
         assert ref.orientation_error(turn(BLOCK, (1, 0, 0, 0), L, 1.0 / pieces, pieces), whole) < 20 * pieces * EPS
 
 
+def test_period_of_the_momentum_is_that_of_the_elliptic_functions():
+    """4 K(k)/ω_p by SciPy's K, whatever the order of the axes; a plate's own frame turns at (1/I1 - 1/I3) L3."""
+    rng = np.random.default_rng(0)
+    for _ in range(200):
+        moments, angvel = np.sort(1.0 + rng.random(3)), rng.normal(size=3)  # within the triangle's bound
+        order = rng.permutation(3)
+        found = rotation.momentum_period(tuple((moments * angvel)[order]), tuple(1.0 / moments[order]))
+        # K has the condition k²/k'² in its modulus; JacobiTop has it from differences of energies.
+        assert found == pytest.approx(ref.JacobiTop(moments, angvel).period, rel=1e-9)
+    found = rotation.momentum_period((0.1, 0.2, 5.0), (1.0, 1.0, 0.5))
+    assert found == pytest.approx(2 * np.pi / (0.5 * 5.0), rel=8 * EPS)
+    assert rotation.momentum_period((0.0, 1.0, 0.0), (1.0, 0.5, 0.25)) == np.inf  # about the middle axis
+
+
+def test_many_turns_at_once_follow_the_elliptic_functions_and_the_parts():
+    """60 to 20,000 rad at once: the momentum in the body's frame is that of the closed form, the attitude of many pieces.
+
+    A part rounds the momentum by EPS, which changes the rate of the rest: at worst EPS times parts times angle. By
+    periods that is so for one period only; the pieces, too short for periods, have all of it.
+    """
+    rng = np.random.default_rng(1)
+    for _ in range(60):
+        spread = 0.05 + rng.random(3)
+        moments, angvel = spread.sum() - spread, rng.normal(size=3)
+        m = moments * angvel
+        angle = 10.0 ** rng.uniform(np.log10(60.0), np.log10(2e4))
+        h = angle / np.sqrt((m * m / moments).sum() / moments.min())
+        at_once = turn(moments, (1, 0, 0, 0), m, h)
+        top = ref.JacobiTop(moments, angvel)
+        parts = top.period * angle / h / rotation.ANGLE_LIMIT
+        found = ref.rotation_matrix(at_once).T @ m
+        assert np.abs(found - moments * top.angvel_body(h)).max() < EPS * parts * angle * np.linalg.norm(m)
+        if angle < 1000.0:
+            pieces = int(angle / 40.0) + 1
+            in_pieces = turn(moments, (1, 0, 0, 0), m, h / pieces, pieces)
+            assert ref.orientation_error(at_once, in_pieces) < EPS * angle / rotation.ANGLE_LIMIT * angle
+            assert ref.orientation_error(turn(moments, at_once, m, -h), (1, 0, 0, 0)) < 2 * EPS * parts * angle
+
+
 def _part_of_many_digits():
     """One part of the flow as plain Python: of extended numbers, it has no rounding of doubles."""
     product, unit = (types.FunctionType(f.py_func.__code__, {}) for f in (qt.multiply, qt.renormalise))
