@@ -174,7 +174,7 @@ def test_period_of_the_momentum_is_that_of_the_elliptic_functions():
 
 
 def test_many_turns_at_once_follow_the_elliptic_functions_and_the_parts():
-    """60 to 20,000 rad at once: the momentum in the body's frame is that of the closed form, the attitude of many pieces.
+    """60 to 20,000 rad at once: momentum in the body's frame by the closed form, attitude by many pieces.
 
     A part rounds the momentum by EPS, which changes the rate of the rest: at worst EPS times parts times angle. By
     periods that is so for one period only; the pieces, too short for periods, have all of it.
