@@ -40,10 +40,11 @@ import math
 from physics.kernels import quaternion as qt
 from physics.kernels.aims import LARGEST_TURN, UNSEEN
 from physics.kernels.arms import arm_and_rate, feature_of, place_arms, wall_normal, wall_of
-from physics.kernels.body import principal_attitude, turning
+from physics.kernels.body import angular_velocity, principal_attitude, turning
 from physics.kernels.compiler import inlined
 from physics.kernels.contact import gap_of, nearest_outside_set
 from physics.kernels.laws import DAMPING, STIFFNESS, if_law, number_of
+from physics.kernels.restraint import kinetic_energy, lifted_to
 from physics.kernels.share import contact_arm
 
 stiffness = number_of(STIFFNESS)
@@ -115,23 +116,57 @@ def foretell_gaps(n, v, w, after, work):
         work.due[i] += after * (qt.dot(normal, v) + qt.dot(normal, qt.cross(w, contact_arm(work, i))))
 
 
-def _as_it_ends(n, y, tilted, work):
-    return y
+def _as_it_ends(n, y, end, h, tilted, work):
+    return end
+
+
+@inlined
+def _lifted(n, x, R, share, tilted, work):
+    """x moved out of the walls until no point is deeper than `share` of what its spring is due to be."""
+    least = UNSEEN * work.slop
+    for i in range(n):
+        lift = share * min(work.due[i], 0.0) - gap_of(work.slot[i], x, R, tilted, work)
+        if lift > least:
+            x = _along(x, lift, wall_normal(work.walls, wall_of(work.slot[i], work)))
+    return x
+
+
+@inlined
+def _work_of_loads(y, end, h, tilted, work):
+    """Work that the loads which are held have done from y to `end`, and what the motion has lost [J]."""
+    a, T, v, L = work.free_acceleration, work.torque, end[2], end[3]
+    d = end[0][0] - y[0][0], end[0][1] - y[0][1], end[0][2] - y[0][2]
+    lost = kinetic_energy(y[1], y[2], y[3], work, tilted) - kinetic_energy(end[1], v, L, work, tilted)
+    if T[0] != 0.0 or T[1] != 0.0 or T[2] != 0.0:
+        first, last = angular_velocity(y[1], y[3], work, tilted), angular_velocity(end[1], L, work, tilted)
+        turn = 0.5 * (first[0] + last[0]), 0.5 * (first[1] + last[1]), 0.5 * (first[2] + last[2])
+        lost += h * (T[0] * turn[0] + T[1] * turn[1] + T[2] * turn[2])
+    return lost + work.mass * (a[0] * d[0] + a[1] * d[1] + a[2] * d[2])
 
 
 @if_law((STIFFNESS,), _as_it_ends)
-def lift_to_due(n, y, tilted, work):
-    """The state y with no point deeper than its spring is due to be, and no other one in a wall."""
-    x, q, v, L = y
+def lift_to_due(n, y, end, h, tilted, work):
+    """The end of a stage from y with no point deeper than its spring is due to be, and no other one in a wall.
+
+    Nor is more stored in the springs than there was, and than the motion has lost and the loads have done on the way.
+    (Damping stops a point that turns as it does at the start of the stage: what turns less by then it leaves deeper.)
+    """
+    x, q, v, L = end
     R, least = qt.to_matrix(q), UNSEEN * work.slop
+    x = _lifted(n, x, R, 1.0, tilted, work)
+    stored = before = 0.0
     for i in range(n):
-        lift = min(work.due[i], 0.0) - gap_of(work.slot[i], x, R, tilted, work)
-        if lift > least:
-            x = _along(x, lift, wall_normal(work.walls, wall_of(work.slot[i], work)))
+        gap = min(gap_of(work.slot[i], x, R, tilted, work), 0.0)
+        stored += 0.5 * stiffness(work) * gap * gap
+        before += 0.5 * stiffness(work) * min(work.gap[i], 0.0) ** 2
+    if stored > before:
+        budget = before + _work_of_loads(y, (x, q, v, L), h, tilted, work)
+        if stored > budget:
+            x = _lifted(n, x, R, math.sqrt(max(budget, 0.0) / stored), tilted, work)
     gap, slot = nearest_outside_set(x, R, tilted, work)
     if gap < -least:
         x = _along(x, -gap, wall_normal(work.walls, wall_of(slot, work)))
-    return x, q, v, L
+    return lifted_to(x, end, tilted, work)
 
 
 def _as_it_is(block, work):

@@ -25,11 +25,27 @@ from physics.kernels.compiler import inlined, kernel
 # Share of the energy by which rounding of an impact may raise it: of the dozen products and sums behind a momentum.
 ROUNDING = 1.0e-14
 
+# Slops that a body is lifted out of a wall for nothing.
+FREE_LIFT = 10.0
+
 
 @inlined
 def kinetic_energy(q, v, L, work, tilted):
     """Of one body [J]."""
     return 0.5 * (work.mass * qt.dot(v, v) + qt.dot(L, angular_velocity(q, L, work, tilted)))
+
+
+@inlined
+def lifted_to(z, y, tilted, work):
+    """y at the place z out of a wall. The work of the lift against the loads is paid with motion, if there is any."""
+    x, q, v, L = y
+    d, a = (z[0] - x[0], z[1] - x[1], z[2] - x[2]), work.free_acceleration
+    lift = -work.mass * (a[0] * d[0] + a[1] * d[1] + a[2] * d[2])
+    if qt.dot(d, d) > (FREE_LIFT * work.slop) ** 2 and lift > 0.0:
+        kinetic = kinetic_energy(q, v, L, work, tilted)
+        s = math.sqrt(1.0 - lift / kinetic) if lift < kinetic else 0.0
+        v, L = (s * v[0], s * v[1], s * v[2]), (s * L[0], s * L[1], s * L[2])
+    return z, q, v, L
 
 
 @inlined

@@ -19,10 +19,7 @@ call after call in the longest chain of the step, took a quarter of the time of 
 
 from __future__ import annotations
 
-import math
-
 from physics.kernels import layout as at
-from physics.kernels import quaternion as qt
 from physics.kernels.body import angular_velocity, bind_body, can_bear, is_finite, note_fault, read_state, write_state
 from physics.kernels.clearance import clear_substeps
 from physics.kernels.compiler import inlined, kernel
@@ -45,7 +42,7 @@ from physics.kernels.flight import coast
 from physics.kernels.graded_flight import graded_flight
 from physics.kernels.laws import bind_laws
 from physics.kernels.quaternion import to_matrix
-from physics.kernels.restraint import kinetic_energy
+from physics.kernels.restraint import lifted_to
 from physics.kernels.sleep import falls_asleep, laid_down, sleeps_on
 from physics.kernels.stages import CONTACT_COUNT, impact, store_warm_start, touch
 from physics.kernels.tumbling import FAR_TURN, MOST_CUTS, may_turn, stage_of_turning
@@ -53,9 +50,6 @@ from physics.kernels.turns import begin, next_world
 
 # Trials of one time of impact: a secant, then parabolas through the last three. Three are usual.
 IMPACT_TRIALS = 16
-
-# Slops that a body is lifted out of a wall for nothing.
-FREE_LIFT = 10.0
 
 
 @inlined
@@ -114,20 +108,8 @@ def has_same_pose(y, z):
 
 @inlined
 def kept_out(y, tilted, work):
-    """y, pushed out of the walls where it is deeper in than the slop.
-
-    What turns by radians in a step may be found deep in a wall. To lift it out against its loads takes work: that is
-    paid with its motion, as far as there is any.
-    """
-    x, q, v, L = y
-    z = push_out(x, to_matrix(q), tilted, work)
-    d, a = (z[0] - x[0], z[1] - x[1], z[2] - x[2]), work.free_acceleration
-    lift = -work.mass * (a[0] * d[0] + a[1] * d[1] + a[2] * d[2])
-    if qt.dot(d, d) > (FREE_LIFT * work.slop) ** 2 and lift > 0.0:
-        kinetic = kinetic_energy(q, v, L, work, tilted)
-        s = math.sqrt(1.0 - lift / kinetic) if lift < kinetic else 0.0
-        v, L = (s * v[0], s * v[1], s * v[2]), (s * L[0], s * L[1], s * L[2])
-    return z, q, v, L
+    """y, pushed out of the walls where it is deeper in than the slop: what turns by radians in a step may be so."""
+    return lifted_to(push_out(y[0], to_matrix(y[1]), tilted, work), y, tilted, work)
 
 
 @kernel
@@ -224,7 +206,7 @@ def substep(y, start, h, friction, smooth, gyroscopic, tilted, pivots, scheme, m
         pass_time(t, work)
         if is_deep and n > 0 and not stiffness(work) > 0.0:
             end = kept_out(end, tilted, work)
-        y = lift_to_due(n, end, tilted, work)
+        y = lift_to_due(n, y, end, t, tilted, work)
         if work.is_last or not left > 0.0:
             break
         report[world, at.SPLITS] += 1.0

@@ -33,6 +33,13 @@ def field_state(x, q, v, L, t, tilted, work):
 
 
 @inlined
+def kicked(x, q, v, L, loads, kick, later, tilted, work):
+    """State that fields are told, `later` [s] than now, once loads (F, T) and those held have acted for `kick` [s]."""
+    a, torque = all_loads(loads[0], loads[1], work)
+    return field_state(x, q, plus(v, times(kick, a)), plus(L, times(kick, torque)), work.now + later, tilted, work)
+
+
+@inlined
 def field_load(x, q, v, L, t, tilted, work):
     """(force, torque about the centre of mass) of all fields at a state and a time."""
     return total_load(field_state(x, q, v, L, t, tilted, work), t, work)

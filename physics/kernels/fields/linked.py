@@ -22,11 +22,10 @@ from physics.kernels.fields.linked_implicit import (
     OTHER_POINT,
     SIZE,
     VELOCITY,
+    hold_implicit,
     middle,
     note_all_rates,
     put_middle,
-    soften_own,
-    soften_pairs,
 )
 from physics.kernels.fields.spring import DAMPING, LENGTH, STIFFNESS, line_load, stretch
 from physics.kernels.fields.state import ZERO, minus, plus, times, velocity_at
@@ -157,9 +156,7 @@ def hold_linked_loads(first, count, h, gyroscopic, tilted, world):
         put_middle(bodies[b], (plus(x, times(half, v)), q, v, L))
     _put_anchors(first, count, tilted, bodies)
     if note_all_rates(h, tilted, bodies):
-        for b in range(bodies.shape[0]):
-            soften_own(bodies[b], h, tilted)
-        soften_pairs(first, count, h, tilted, bodies)
+        hold_implicit(first, count, h, tilted, bodies)
         return True
     for b in range(bodies.shape[0]):
         if world.touched[b] == 0:

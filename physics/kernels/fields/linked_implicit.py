@@ -8,12 +8,20 @@ from __future__ import annotations
 from physics.kernels import quaternion as qt
 from physics.kernels.body import principal_attitude, turning
 from physics.kernels.compiler import inlined, kernel
-from physics.kernels.fields.field_loads import all_loads, field_state, loads_held, put_all
+from physics.kernels.fields.field_loads import (
+    all_loads,
+    field_state,
+    kicked,
+    less,
+    loads_held,
+    more,
+    put_all,
+)
 from physics.kernels.fields.resolution import note_rates
 from physics.kernels.fields.spring import line_stiffness, stretch
 from physics.kernels.fields.state import minus, plus, times
 from physics.kernels.fields.stiffness import answer_of, answer_to, axes_across, mobility_bound
-from physics.kernels.fields.terms import softened, total_load
+from physics.kernels.fields.terms import softened, total_linked_load, total_load, total_own_load
 
 # Columns: those of a spring, whose anchor is the other body's point now, and after them
 ANCHOR = 3
@@ -56,11 +64,27 @@ def _principal(body, tilted):
 
 
 @inlined
-def soften_own(body, h, tilted):
-    """Let the loads of a body act that the implicit step over h of its own fields has; springs to others follow."""
+def _own_loads(body, h, tilted):
+    """Loads of a body that the implicit step over h of its own fields has, as if no spring tied it to others."""
     state = state_of(body, 0.5 * h, tilted)
-    F, T = total_load(state, body.now + 0.5 * h, body)
-    put_all(softened(all_loads(F, T, body), h, _principal(body, tilted), state, body), body)
+    F, T = total_own_load(state, body.now + 0.5 * h, body)
+    return softened(all_loads(F, T, body), h, _principal(body, tilted), state, body)
+
+
+@inlined
+def _hold_unsoftened_springs(body, h, tilted):
+    """Let the springs to others act besides the body's own softened loads."""
+    F, T = total_linked_load(state_of(body, 0.5 * h, tilted), body.now + 0.5 * h, body)
+    a, torque = _own_loads(body, h, tilted)
+    put_all((plus(a, times(1.0 / body.mass, F)), plus(torque, T)), body)
+
+
+@inlined
+def _soften_springs(body, h, tilted):
+    """Soften by the body's own fields what springs to others, themselves softened by now, add to its own loads."""
+    own = _own_loads(body, h, tilted)
+    added, state = less(loads_held(body), own), state_of(body, 0.5 * h, tilted)
+    put_all(more(own, softened(added, h, _principal(body, tilted), state, body)), body)
 
 
 @kernel
@@ -91,13 +115,21 @@ def _soften_pair(k, one, other, h, tilted):
 
 
 @inlined
-def soften_pairs(first, count, h, tilted, bodies):
-    """Loads as the implicit step over h of all springs between bodies has them, one spring after the other."""
+def hold_implicit(first, count, h, tilted, bodies):
+    """Let loads act as the implicit step over h has them: own fields, then springs between bodies, one after another.
+
+    A field softens the loads of a spring after the spring has: of loads that a damper makes small, even a small share
+    that is left to one of the two bodies would be large.
+    """
+    for b in range(bodies.shape[0]):
+        _hold_unsoftened_springs(bodies[b], h, tilted)
     for b in range(bodies.shape[0]):
         for k in range(first, first + SIZE * count, SIZE):
             j = int(bodies[b].columns[k + OTHER])
             if j > b:  # each spring once
                 _soften_pair(k, bodies[b], bodies[j], h, tilted)
+    for b in range(bodies.shape[0]):
+        _soften_springs(bodies[b], h, tilted)
 
 
 @kernel
@@ -105,7 +137,10 @@ def note_all_rates(h, tilted, bodies):
     """Note for all bodies whether a stage of length h is too long for the explicit midpoint rule for one of them."""
     stiff = 0
     for b in range(bodies.shape[0]):
-        note_rates(state_of(bodies[b], 0.5 * h, tilted), h, bodies[b])
+        body, state = bodies[b], state_of(bodies[b], 0.5 * h, tilted)
+        x, q, v, L = middle(body)
+        loads = total_load(state, body.now + 0.5 * h, body)
+        note_rates(state, kicked(x, q, v, L, loads, h, h, tilted, body), h, body)
         stiff = max(stiff, bodies[b].is_stiff)
     for b in range(bodies.shape[0]):
         bodies[b].is_stiff = stiff

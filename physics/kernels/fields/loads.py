@@ -21,6 +21,7 @@ from physics.kernels.fields.field_loads import (
     all_loads,
     field_load,
     field_state,
+    kicked,
     less,
     more,
     principal_axes,
@@ -81,13 +82,12 @@ def hold_loads(y, h, gyroscopic, tilted, work):
     state = field_state(x, q, v, L, t, tilted, work)
     F, T = total_load(state, t, work)
     look_over_stage(y, (F, T), x, q, h, tilted, work)
-    turn = note_rates(state, h, work)
+    turn = note_rates(state, kicked(x, q, v, L, (F, T), h, h, tilted, work), h, work)
     if work.is_stiff == 1:
         put_all(softened(all_loads(F, T, work), h, principal_axes(q, tilted, work), state, work), work)
         return
     for _ in range(MIDPOINT_ROUNDS):
-        a, torque = all_loads(F, T, work)
-        state = field_state(x, q, plus(v, times(half, a)), plus(L, times(half, torque)), t, tilted, work)
+        state = kicked(x, q, v, L, (F, T), half, half, tilted, work)
         before, (F, T) = (F, T), total_load(state, t, work)
         if work.is_textbook == 1 or not half * turn > EXPLICIT_TURN or (before[0] == F and before[1] == T):
             break
@@ -108,7 +108,7 @@ def hold_contact_loads(y, h, gyroscopic, tilted, work):
     state = field_state(x, q, v, L, t, tilted, work)
     F, T = total_load(state, t, work)
     look_over_stage(y, (F, T), x, q, h, tilted, work)
-    note_rates(state, h, work)
+    note_rates(state, kicked(x, q, v, L, (F, T), h, h, tilted, work), h, work)
     if work.is_stiff == 1:
         still = all_loads(*field_load(x, q, state.air, ZERO, t, tilted, work), work)
         slowed = softened(less(all_loads(F, T, work), still), h, principal_axes(q, tilted, work), state, work)
@@ -121,7 +121,8 @@ def hold_contact_loads(y, h, gyroscopic, tilted, work):
 def hold_mean_loads(y, end, h, gyroscopic, tilted, work):
     """Hold the loads of the middle of a stage in contact from y to `end`: whether they are others than before.
 
-    Where the stage is stiff, the change is softened: with A' = A + (1 + M⁻¹ Z)⁻¹ (A(middle) - A) loads and motion
+    Contacts may have made motion that the start of the stage did not have, so it is looked at anew whether it is stiff.
+    Where it is, the change is softened: with A' = A + (1 + M⁻¹ Z)⁻¹ (A(middle) - A) loads and motion
     agree, if the contacts push as they did.
     """
     x, q, v, L = y
@@ -132,6 +133,10 @@ def hold_mean_loads(y, end, h, gyroscopic, tilted, work):
     state = field_state(x, q, v, L, t, tilted, work)
     F, T = total_load(state, t, work)
     a, torque = vector(work.free_acceleration), vector(work.torque)
+    was_stiff = work.is_stiff
+    note_rates(state, field_state(x, q, end[2], end[3], t, tilted, work), h, work)
+    if was_stiff == 1:
+        work.is_stiff = 1
     if work.is_stiff == 1:
         change = softened(less(all_loads(F, T, work), (a, torque)), h, principal_axes(q, tilted, work), state, work)
         put_all(more((a, torque), change), work)

@@ -32,9 +32,14 @@ COARSE = 2.0
 
 
 @kernel
-def note_rates(state, h, work):
-    """Note whether a stage of length h is too long for the explicit midpoint rule, and for the fields at all."""
-    rates = total_rates(state, h, work)
+def note_rates(state, late, h, work):
+    """Note whether a stage of length h is too long for the explicit midpoint rule, and for the fields at all.
+
+    `state` and `late` are at the same place, with the velocities of the stage's start and those that its loads lead to:
+    between them damping may grow, and a body reach a surface.
+    """
+    first, last = total_rates(state, h, work), total_rates(late, h, work)
+    rates = max(first[0], last[0]), max(first[1], last[1]), max(first[2], last[2])
     work.rate, work.damping = max(rates[0], rates[2]), rates[0]
     work.is_stiff = 1 if is_beyond(rates, h) and work.is_textbook == 0 else 0
     if is_unresolved(rates, h) or (work.is_textbook == 1 and is_beyond(rates, h)):

@@ -243,6 +243,8 @@ def _add_vector(before, function, first, last):
 
 
 total_load = _sum(LOAD, _no_load, lambda term: term.function, _add_load)
+total_own_load = _sum(LOAD, _no_load, lambda term: None if term.is_linked else term.function, _add_load)
+total_linked_load = _sum(LOAD, _no_load, lambda term: term.function if term.is_linked else None, _add_load)
 total_air = _sum(AIR, _no_air, lambda term: term.function, _add_vector)
 total_energy = _sum(LOAD, _no_energy, lambda term: term.energy, _add_number)
 total_rates = _sum(LOAD, _no_rates, lambda term: term.rates, _add_rates)

@@ -73,21 +73,26 @@ def _gain_of(b, h, tilted, world):
 
 
 @inlined
-def _common_velocity(ties, world):
-    """Velocity of the common centre of mass; zero where walls hold the bodies."""
-    mass, p = 0.0, ZERO
+def _common_velocities(ties, world):
+    """Velocity of the common centre of mass now and at the start of the stage; zero where walls hold the bodies."""
+    mass, p, start = 0.0, ZERO, ZERO
     for b in range(world.bodies.shape[0]):
         m = world.bodies[b].mass
         mass, p = mass + m, plus(p, times(m, read_state(world.now, b)[2]))
+        start = plus(start, times(m, _start(world.bodies[b])[2]))
     if ties == 0:
-        return ZERO
-    return times(1.0 / mass, p)
+        return ZERO, ZERO
+    return times(1.0 / mass, p), times(1.0 / mass, start)
 
 
 @kernel
 def _take(gain, ties, tilted, world):
-    """Take an energy from the motion of all bodies; where there is too little, they are back where they were."""
-    c, motion = _common_velocity(ties, world), 0.0
+    """Take an energy from the motion of all bodies; where there is too little, they are back where they were.
+
+    Their common velocity then is that of the start, too: what the stage made of it is as wrong as the rest.
+    """
+    c, start = _common_velocities(ties, world)
+    motion = 0.0
     for b in range(world.bodies.shape[0]):
         _, q, v, L = read_state(world.now, b)
         motion += kinetic_energy(q, minus(v, c), L, world.bodies[b], tilted)
@@ -95,11 +100,12 @@ def _take(gain, ties, tilted, world):
         for b in range(world.bodies.shape[0]):
             world.bodies[b].is_coarse = 1
     s = math.sqrt(1.0 - gain / motion) if gain < motion else 0.0
+    new = c if gain < motion else start
     for b in range(world.bodies.shape[0]):
         x, q, v, L = read_state(world.now, b)
         if not gain < motion:
             x, q, _, _ = _start(world.bodies[b])
-        write_state(world.now, b, (x, q, plus(c, times(s, minus(v, c))), times(s, L)))
+        write_state(world.now, b, (x, q, plus(new, times(s, minus(v, c))), times(s, L)))
 
 
 @if_declared()
