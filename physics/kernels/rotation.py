@@ -234,10 +234,15 @@ def _turn_by_parts(q, m, J, series, mm, energy2, h, angle):
 
 
 @kernel
-def _turn_by_periods(q, m, L, J, series, mm, energy2, h, angle):
-    """`_turn_by_parts` of many turns."""
-    period = momentum_period(m, J)
-    count = math.floor(abs(h) / period)
+def _turn_far(q, m, L, J, series, mm, energy2, h):
+    """Attitude after a turn beyond `ANGLE_LIMIT`: by parts, and of many turns by periods of the momentum."""
+    angle = abs(h) * math.sqrt(max(J[0], J[1], J[2]) * energy2)
+    if not angle < math.inf:
+        return (math.nan, math.nan, math.nan, math.nan)  # its energy overflows: the caller's guard reports it
+    count = 0.0
+    if angle > MANY_TURNS:
+        period = momentum_period(m, J)
+        count = math.floor(abs(h) / period)
     if count >= 2.0:
         turned, _ = _turn_by_parts(q, m, J, series, mm, energy2, period, angle * (period / abs(h)))
         e = qt.multiply(turned, qt.conjugate(q))  # about L, since m is again what it was
@@ -282,13 +287,7 @@ def free_rotation(q, L, J, series, h):
     if square <= ANGLE_LIMIT * ANGLE_LIMIT:
         q, m = _part(q, m, J, series, mm, energy2, square, h)
         return q
-    angle = abs(h) * math.sqrt(max(J[0], J[1], J[2]) * energy2)
-    if not angle < math.inf:
-        return (math.nan, math.nan, math.nan, math.nan)  # its energy overflows: the caller's guard reports it
-    if angle > MANY_TURNS:
-        return _turn_by_periods(q, m, L, J, series, mm, energy2, h, angle)
-    q, m = _turn_by_parts(q, m, J, series, mm, energy2, h, angle)
-    return q
+    return _turn_far(q, m, L, J, series, mm, energy2, h)
 
 
 @kernel
