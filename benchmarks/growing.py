@@ -1,4 +1,4 @@
-"""How cost grows as a pile does: ``python -m benchmarks.growing [--quick] [--peer] [--json FILE] [--plot FILE]``.
+"""Cost of a step as a pile grows: ``python -m benchmarks.growing [--quick] [--peer] [--json FILE] [--plot FILE]``.
 
 Layer upon layer of 5 x 5 unit cubes, turned at random, falls onto a pile in a shaft (that of `scenes.heap`), each a
 diagonal above the highest cube, each 1.5 s after the one before: whatever its height, the pile is given the same to do,
@@ -68,7 +68,7 @@ def grow(layers: int, accuracy: str) -> Iterator[tuple[physics.Scene, Ours]]:
 
 
 def measure(count: int, pile: Ours | Theirs, parts: int) -> Sample:
-    """What a step of a pile of `count` cubes costs, the mean over so many parts."""
+    """Measure a step of a pile of `count` cubes, the mean over so many parts."""
     watch = Watch(pile)
     for _ in range(parts):
         watch.part(PART)

@@ -1,4 +1,4 @@
-"""How cost grows with a pile: ``python -m benchmarks.piles [--quick] [--peer] [--json FILE] [--plot FILE]``.
+"""Cost of a step by the size of a pile: ``python -m benchmarks.piles [--quick] [--peer] [--json FILE] [--plot FILE]``.
 
 A pile of cubes that settles in a shaft (`scenes.heap`), from a few to many: time of a step against its contacts once
 it lies, and while it falls and settles, and the exponents that fit. And the broad phase alone, for cubes spread evenly

@@ -49,7 +49,7 @@ CHAIN, SWEEPS, NEWTON, INTERIOR = range(4)
 
 @dataclass(frozen=True)
 class Outcome:
-    """What one solver made of one problem.
+    """Outcome of one solver on one problem.
 
     Attributes
     ----------

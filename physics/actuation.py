@@ -102,7 +102,7 @@ class Actuation:
             rows.reshape(self._shape)[worlds] = 0.0
 
     def kept(self) -> tuple:
-        """What decides how it goes on, for `put_back`."""
+        """State of the actuator, for `put_back`."""
         return self._output.copy(), [(given, command.copy()) for given, command in self._late]
 
     def put_back(self, kept: tuple) -> None:

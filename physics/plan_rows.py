@@ -1,4 +1,4 @@
-"""What a plan says of each effect: on or off, why, and what is compiled for it."""
+"""Rows of a plan, one for each effect: on or off, the reason, and the kernels compiled for it."""
 
 from __future__ import annotations
 
@@ -83,7 +83,7 @@ def _center_row(uneven) -> Row:
 
 
 def _field_rows(fields: tuple[FieldSlot, ...]) -> list[Row]:
-    """What is declared, then the built-in fields that are not."""
+    """Rows of the declared fields, then of the built-in fields that are not."""
     rows = [
         Row(slot.effects[0].label, True, f"declared: {', '.join(map(repr, slot.effects))}",
             f"{slot.term.count * slot.term.size} parameters per body, one function"

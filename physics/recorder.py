@@ -183,7 +183,7 @@ def _rows(array: np.ndarray, worlds: int, chosen: np.ndarray) -> np.ndarray:
 
 
 def _starts_of(chapter: _Chapter, world: int, first: int, count: int) -> list[Start]:
-    """Where one world went on from in a chapter whose first step is number `first` of the recording."""
+    """Find the starts of one world in a chapter whose first step is number `first` of the recording."""
     found = []
     for step, worlds, rows, time in chapter.starts:
         place = np.flatnonzero(worlds == world)

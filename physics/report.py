@@ -1,4 +1,4 @@
-"""What a step says about itself, per world. Nothing fails silently."""
+"""Report of a step, per world. Nothing fails silently."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ class Solver(IntEnum):
 
 
 class Status(IntEnum):
-    """How a world's step went."""
+    """Outcome of a world's step."""
 
     OK = 0
     UNRESOLVED = 1
@@ -33,7 +33,7 @@ class Status(IntEnum):
 
     @property
     def message(self) -> str:
-        """What happened, and what to do."""
+        """Explanation of the status, and advice."""
         return _MESSAGES[self]
 
     @staticmethod
@@ -168,7 +168,7 @@ class StepReport:
 
     @property
     def ok(self) -> bool:
-        """Whether every contact problem met its tolerance and was whole, states stayed finite, and no body was put deep
+        """Test whether every contact problem met its tolerance and was whole, states stayed finite, and no body was put deep
         into another.
         """
         return not (self._table[:, at.UNCONVERGED : at.FAULTS + 1].any() or self._table[:, at.LEFT_OUT].any()

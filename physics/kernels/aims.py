@@ -1,4 +1,4 @@
-"""What velocity is asked of each contact of a set: at an impact, and at the end of a stage that it rests through."""
+"""Target velocities of the contacts of a set: at an impact, and at the end of a stage that they rest through."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ NOTHING, RESIDUE, HIT = range(3)
 
 @inlined
 def may_hit(bounce_speed, slop_speed, work):
-    """Whether a contact of the set is fast enough for an impact: where none is, none is looked at."""
+    """Test whether a contact of the set is fast enough for an impact: where none is, none is looked at."""
     return work.approach > (min(bounce_speed, slop_speed) if work.restitution > 0.0 else slop_speed)
 
 
@@ -64,7 +64,7 @@ def aim_impact(n, bounce_speed, slop_speed, y, h, tilted, memory, work):
 
 @inlined
 def is_closing(i, n, work):
-    """Whether a contact of the wall of contact i is still above it."""
+    """Test whether a contact of the wall of contact i is still above it."""
     if not work.widest > work.slop:
         return False
     wall = wall_of(work.slot[i], work)
@@ -108,7 +108,7 @@ def _wandering(k, R, w, tilted, work):
 
 @inlined
 def _wandering_point(k, R, w, alpha, tilted, work):
-    """Of a body without vertices ω x r, ω x ṙ and α x r at wall k, four times each."""
+    """Return ω x r, ω x ṙ and α x r of a body without vertices at wall k, four times each."""
     r, rate = _wandering(k, R, w, tilted, work)
     turn, a, b = qt.cross(w, r), qt.cross(w, rate), qt.cross(alpha, r)
     return (

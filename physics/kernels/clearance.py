@@ -1,4 +1,4 @@
-"""How long a body in flight is sure to stay clear of every wall: collision detection is left out for as long."""
+"""Time for which a body in flight is sure to stay clear of every wall and needs no collision detection."""
 
 from __future__ import annotations
 

@@ -196,5 +196,5 @@ def _unyielding(value, rho, work):
 
 @if_law((STIFFNESS,), _unyielding)
 def yielding(value, rho, work):
-    """What is left of value, a normal impulse q - ρ u or its slope, with γ: p = q - ρ (u + γ p)."""
+    """Scale a value, a normal impulse q - ρ u or its slope, by the compliance γ: p = q - ρ (u + γ p)."""
     return value / (1.0 + rho * work.give)

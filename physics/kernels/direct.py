@@ -124,7 +124,7 @@ def _target_moments(n, count, c, work):
 
 @inlined
 def _miss(n, v, w, work):
-    """How far contact velocities are from their targets, at most.
+    """Largest distance of contact velocities from their targets.
 
     A contact without impulse may separate faster than asked.
     """

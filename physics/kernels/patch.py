@@ -83,7 +83,7 @@ def _spread(n, a, b, on):
 
 @inlined
 def may_hold(n, axes, v, L, work):
-    """Whether friction may stop a face, with the velocity v and angular momentum L that it has without it.
+    """Test whether friction may stop a face, with the velocity v and angular momentum L that it has without it.
 
     What holds stops at its wall: the pushes P take away the normal momentum, and friction, μP at most, the tangential
     one; its moment about the centroid is μ Σ p_i |d_i| <= μP max |d_i| at most. Of a face that can hold this is true;
@@ -280,14 +280,14 @@ def across_misses(patch, p, slip, mu, delta):
 
 @inlined
 def is_turned(on, d, size, change):
-    """Which slips, of direction d and this size [m/s], turn by more than about 70 degrees when they change."""
+    """Mark the slips, of direction d and this size [m/s], that turn by more than about 70 degrees when they change."""
     along, across = size + (d[0] * change[0] + d[1] * change[1]), d[0] * change[1] - d[1] * change[0]
     return (on * size > 0.0) & ~((along > 0.1 * size) & (abs(across) <= 3.0 * along))
 
 
 @inlined
 def turns_little(patch, on, slip, mu, step):
-    """Whether no direction turns by more than about 70 degrees, and none backwards, in a step of the motion."""
+    """Test whether no direction turns by more than about 70 degrees, and none backwards, in a step of the motion."""
     (_, a, b), _, _ = patch
     x, y, size = slip
     s = -1.0 / mu

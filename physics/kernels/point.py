@@ -104,7 +104,7 @@ def inverse_root(square):
 
 @inlined
 def is_warm(push, needed):
-    """Whether what a warm start pushes with is near enough to what the loads of now need, for its friction to be so."""
+    """Test whether a warm start's push is so near to the push that the present loads need that its friction is, too."""
     return abs(push - needed) <= WARM_SHARE * abs(needed)
 
 

@@ -31,7 +31,7 @@ FREE_LIFT = 10.0
 
 @inlined
 def kinetic_energy(q, v, L, work, tilted):
-    """Of one body [J]."""
+    """Kinetic energy of one body [J]."""
     return 0.5 * (work.mass * qt.dot(v, v) + qt.dot(L, angular_velocity(q, L, work, tilted)))
 
 
@@ -85,7 +85,7 @@ def part_of_rebound(q, before, plastic, full, work, tilted):
 
 @kernel
 def shortened(n, friction, before, w, solved, free, R, work):
-    """What `solve_contacts` gave for `free` (v, L), with impulses so short that they give no energy.
+    """Result of `solve_contacts` for `free` (v, L), with impulses so short that they give no energy.
 
     For a problem that no method solved. Its impulses lie in their cones, and so does any share s of them, whose work is
     ½ s (A + s B), A = P·(v + v_free) + Q·(ω + ω_free), B = P·P/m + Q·I⁻¹ Q >= 0, with v and ω (`before`, `w`) before

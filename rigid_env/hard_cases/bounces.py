@@ -133,7 +133,7 @@ def restitution(on: Setting) -> Sequence[Check]:
 
 
 def _unfolded(place, velocity, t, half):
-    """Where a point that flies between walls at ±half [m] and is reflected is: the straight line, folded."""
+    """Place of a point that flies between walls at ±half [m] and is reflected: the straight line, folded."""
     along = np.mod(place + velocity * t + half, 4 * half)
     return np.where(along < 2 * half, along, 4 * half - along) - half
 

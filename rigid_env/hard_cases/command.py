@@ -1,4 +1,4 @@
-"""What `rigid-env hard-cases` does with what a user typed."""
+"""Command `rigid-env hard-cases`: runs the cases that a user typed."""
 
 from __future__ import annotations
 

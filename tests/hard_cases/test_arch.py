@@ -88,7 +88,7 @@ def test_parts_of_a_substep_are_solved_as_finely_as_it_and_no_finer():
 
 
 def test_a_high_arch_at_its_limit_stays_solved_at_precise():
-    """What stands is not swept on where goals are next to rounding: every solve ends within its tolerance."""
+    """An arch that stands is not swept on where goals are next to rounding: every solve ends within its tolerance."""
     world = physics.World(arch(51, (1 + NEAR) * least_thickness(51)), dt=0.01, accuracy="precise")
     for _ in range(20):  # the first second in which one did not was the fourteenth
         report = world.step(steps=100)

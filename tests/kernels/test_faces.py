@@ -133,7 +133,7 @@ def test_eight_contacts_of_one_wall_are_solved_by_sweeps(mode):
 
 @kernel
 def begun(n, mu, u, w, inv_mass, K, work):
-    """Where a face begins under new loads (`patch.cold_motion`), on the wall whose axes are x, y, z."""
+    """Start of a face under new loads (`patch.cold_motion`), on the wall whose axes are x, y, z."""
     axes = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
     return cold_motion(n, place_patch(n, axes, inv_mass, K, work), present(n), mu, u, w, inv_mass, K)
 

@@ -78,7 +78,7 @@ def test_of_piles_that_wedge_nine_in_ten_are_solved():
 
 
 def test_piles_that_slip_a_little_in_all_directions_are_solved_and_soon():
-    """Where slips are small their directions turn with every step, and the interior-point method stuck for that.
+    """Directions of small slips turn with every step; the interior-point method once stuck for that.
 
     Then 5 of these 120 were not solved, and they took 49 iterations each; now it is one of them, and 36.
     """

@@ -203,7 +203,7 @@ def balance(world, index=0):
 
 
 def test_at_fast_too_a_tower_gathers_no_speed():
-    """What a solve leaves is left again at every step: 1e-9 of the largest free speed g h, whatever is asked."""
+    """A solve leaves its residual at every step: 1e-9 of the largest free speed g h, whatever the tolerance."""
     world = physics.World(scenes.tower(10), dt=0.005, accuracy="fast")
     world.step(steps=100)
     # A velocity is made up of what is left at each of the ten faces below; g h = 0.049 m/s.

@@ -65,7 +65,7 @@ def play(name):
 
 
 def test_a_bounce_ends_no_deeper_than_it_began():
-    """Where each ended a slop deeper it gained by that what the impact had taken: 42,000 impacts, 5e-10 m deep.
+    """Impacts that ended a slop deeper once gained by that what they had taken: 42,000 impacts, 5e-10 m deep.
 
     Impacts are met where the gap is zero to a slop, and a contact that acts drifts by rounding until it is corrected.
     """
@@ -112,7 +112,7 @@ def door(tilt):
 
 @pytest.mark.parametrize("tilt", [1e-9, 1e-8, 1e-7, 1e-6, 1e-5, 1e-4, 1e-3])
 def test_a_door_turns_as_it_does_when_it_leans_a_little_more(tilt):
-    """What a lean of t changes is some t of it; a lean of rounding once stopped the door, through friction.
+    """A lean of t changes the motion by some t of it; a lean of rounding once stopped the door, through friction.
 
     Upright, the corners of the edge share what they bear as they like, and with it what the third one rubs: measured,
     up to 3 % of the turning.

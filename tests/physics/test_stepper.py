@@ -125,7 +125,7 @@ def test_changes_of_arguments_between_steps_of_a_world_are_heeded():
 
 
 def test_a_world_is_freed_with_its_last_user():
-    """What a step keeps ready holds the world's arrays, not the world: no cycle for the collector to find."""
+    """Prepared steps hold the world's arrays, not the world: no cycle for the collector to find."""
     world = shoved()
     world.step()
     gone = weakref.ref(world)

@@ -47,7 +47,7 @@ def run(world, names, steps=60):
 
 @pytest.fixture(scope="module")
 def alone():
-    """What world 7 does when it is the only one."""
+    """Motion of world 7 when it is the only one."""
     world = shoved(1)
     spread(world, [7])
     return run(world, [7])

@@ -1,4 +1,4 @@
-"""Whether bodies that turn freely meet, by looking very often: a slow oracle that shares nothing with the engine.
+"""Test whether bodies that turn freely meet, by looking very often: a slow oracle that shares nothing with the engine.
 
 Free motion of a symmetric top is in closed form (Landau and Lifshitz, *Mechanics*, section 33): its axis goes about L
 at |L|/I_t, and the body turns about that axis at ω_a (1 - I_a/I_t) besides. Its centre is on the parabola. The distance

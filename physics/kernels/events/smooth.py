@@ -211,7 +211,7 @@ def _set_first_rate(tilted, work, motion):
 
 @kernel
 def _begin_slide(P, tilted, work, motion):
-    """What is known of the only contact, which slides, at START; one that creeps has the direction of `onset`."""
+    """Prepare the only contact, which slides, at START; one that creeps has the direction of `onset`."""
     motion.stiffness = stiffness_across(P, work, motion)
     _, motion.first_speed = sliding_velocity(0, work, motion)
     motion.growth = qt.dot(contact_rate(0, P, work, motion), vector(motion.reference, 0))

@@ -1,4 +1,4 @@
-"""What overlaps is pushed apart: positions only; velocities change where that would gain energy (`thrift`).
+"""Push overlapping bodies apart: positions only; velocities change where that would gain energy (`thrift`).
 
 The displacements of the bodies solve the frictionless contact problem whose targets are depths instead of velocities:
 the least displacement, in the metric of mass, that brings every contact of the set back to half a slop. A quarter of
@@ -55,7 +55,7 @@ def _aim_apart(n, many):
 
 @inlined
 def _place_inside(b, tilted, many):
-    """Where body b is, inside all walls with its centre."""
+    """Place of body b with its centre inside all walls."""
     place_body(b, tilted, many)
     bring_inside(b, tilted, many)
 

@@ -84,7 +84,7 @@ def separation(A, is_block, B, dims, d, n):
 
 @inlined
 def _kept(free, size):
-    """What is left of one component of the gradient where nᵢ = 0, for a half edge `size`: 0 keeps it there."""
+    """Reduce one component of the gradient where nᵢ = 0, for a half edge `size`: 0 keeps it there."""
     return free - math.copysign(size, free) if abs(free) > size else 0.0
 
 

@@ -27,7 +27,7 @@ FAR = 1.0e300
 
 @inlined
 def bounces(k, h, many):
-    """Whether contact k would leave again for longer than `rest_share` of h after an impact at its speed now."""
+    """Test whether contact k would leave again for longer than `rest_share` of h after an impact at its speed now."""
     least = many.settings[0].rest_share * acceleration_of(k, many) * h
     return many.bounce[k] > 0.0 and -many.bounce[k] * many.speed[k] > least
 
@@ -61,7 +61,7 @@ def fast_speed(k, h, many):
 
 @inlined
 def _pair_touches(k, step, many):
-    """Whether contact k, or one that follows it in the set by steps of `step`, is one of the same pair that touches."""
+    """Test whether contact k, or one after it in the set by steps of `step`, touches and is of the same pair."""
     a, b = many.ends[k, 0], many.ends[k, 1]
     least = arrival(a, b, many)
     while 0 <= k < many.counts[CONTACTS] and many.ends[k, 0] == a and many.ends[k, 1] == b:
@@ -73,7 +73,7 @@ def _pair_touches(k, step, many):
 
 @inlined
 def is_seen_to(k, many):
-    """Whether `tumbling` finds when contact k is met: a body that turns far does not go where its features point now.
+    """Test whether `tumbling` finds the time of contact k: a body that turns far leaves its present tangent.
 
     It looks at what is apart: where the pair touches elsewhere the contact is foretold as any other.
     """
@@ -85,7 +85,7 @@ def is_seen_to(k, many):
 
 @inlined
 def is_meeting(k, h, many):
-    """Whether contact k is still apart and to be met in time: it bounces, or is fast."""
+    """Test whether contact k is still apart and to be met in time: it bounces, or is fast."""
     a, b = many.ends[k, 0], many.ends[k, 1]
     if not (many.gap[k] > pair_slop(a, b, many) and many.speed[k] < 0.0):
         return False

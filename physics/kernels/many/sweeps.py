@@ -56,13 +56,13 @@ NO_MARK = -2
 
 @inlined
 def _is_answered(i, a, b, many):
-    """Whether neither of two bodies (b < 0: a wall) has been pushed since the last visit i."""
+    """Test whether neither of two bodies (b < 0: a wall) has been pushed since the last visit i."""
     return many.visited[i] >= many.pushed[a] and (b < 0 or many.visited[i] >= many.pushed[b])
 
 
 @inlined
 def is_answered(k, many):
-    """Whether no body of contact k has been pushed since its last visit."""
+    """Test whether no body of contact k has been pushed since its last visit."""
     return _is_answered(k, many.ends[k, 0], many.ends[k, 1], many)
 
 
@@ -183,7 +183,7 @@ def _visit(i, number, marks, small, many):
 
 @inlined
 def _ratio(count, marks, many):
-    """How the last change of the impulses is to the one before, weighed by W_nn as kinetic energy; 0: not along it."""
+    """Ratio of the last change of the impulses to the one before, in the metric of W_nn; 0: not along it."""
     product = square = 0.0
     for i in range(count):
         if many.visited[i] <= marks[0]:

@@ -102,7 +102,7 @@ def _side(b, y, n, tilted, many):
 
 @inlined
 def _reach(b, R, k, hulls, many):
-    """How far body b reaches along k from its geometric centre, in |k|."""
+    """Reach of body b along k from its geometric centre, in |k|."""
     d, shape = many.bodies[b].dims, many.bodies[b].shape
     if hulls is not None:  # noqa: SIM102 (a branch of its own is what the compiler prunes)
         if shape == HULL:
