@@ -27,7 +27,7 @@ class Complementarity:
     M : (n, n) float64
     q : (n,) float64
     is_feasible : bool
-        False: there is no solution, and to say so is what is asked for.
+        False: there is no solution, and the right answer is to say so.
     """
 
     name: str

@@ -53,7 +53,7 @@ class Contact:
         slides on. None: as 0, and nothing of it is compiled.
     stiffness : float, optional
         k of a spring between each contact point (a vertex, the lowest point of a round body) and a wall, which pushes
-        with k times the depth [N/m]; greater than 0. It bounces by itself: not with a restitution. None: rigid.
+        with k times the depth [N/m]; greater than 0. It bounces without a restitution. None: rigid.
     damping : float, optional
         c of a damper beside it [N s/m]; at least 0. The two together never pull (Kelvin and Voigt's model, without
         adhesion).

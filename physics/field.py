@@ -1,7 +1,7 @@
 """Force fields as effects, and compiling and keeping a user's own one.
 
 A field is a frozen dataclass with a compiled function: force and torque on a body from its state, the field's
-parameters and the time. The built-in ones stand in `physics.fields`; your own needs no more than they do::
+parameters and the time. The built-in ones stand in `physics.fields`; your own needs at most they do::
 
     @physics.field_function
     def pull(state, p, t):
@@ -106,7 +106,7 @@ class Field:
     def is_steady(self) -> bool:
         """Test whether what it does to a body that does not move stays the same; not known of fields of your own.
 
-        `Sleeping` needs to know: under a load that may change by itself nothing sleeps.
+        `Sleeping` needs to know: under a load that may change on its own nothing sleeps.
         """
         return False
 

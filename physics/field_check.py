@@ -1,6 +1,6 @@
 """Checks of a user's field before anything moves: its class, its numbers, and all that its functions read.
 
-A kernel has no exceptions and asks for no bounds. A user's function is compiled by itself first, for the types that it
+A kernel has no exceptions and asks for no bounds. A user's function is compiled alone first, for the types that it
 is called with later, so that nothing is compiled twice; what Numba made of it is then looked through.
 """
 

@@ -35,8 +35,8 @@ class Plan:
     its body axes, or its geometric centre is not its centre of mass. `many` is on where bodies touch each other, or
     touch walls and are tied together by springs, or a hull touches walls; `meeting` says whether they touch each other,
     `ellipsoids` whether there are any among those, `hulls` whether any touch anything. `refined` is on where `many` is
-    and an error is asked for: by the scheme ``events``. `linked` is on where they are tied together and touch nothing.
-    `sleeping` is on where bodies may sleep. `laws` are those of `physics.kernels.laws`.
+    and steps have an error tolerance: by the scheme ``events``. `linked` is on where they are tied together and touch
+    nothing. `sleeping` is on where bodies may sleep. `laws` are those of `physics.kernels.laws`.
     """
 
     contact: bool | None

@@ -139,7 +139,7 @@ def _sleeping_row(scene, touching, sleeping) -> Row:
         return Row("sleeping", False, "declared, but nothing can touch", "")
     restless = [field for field in scene.effects if isinstance(field, Field) and not field.is_steady]
     names = ", ".join(field.label for field in restless)
-    return Row("sleeping", False, f"declared, but nothing rests under what may change by itself: {names}", "")
+    return Row("sleeping", False, f"declared, but nothing rests under what may change on its own: {names}", "")
 
 
 def make_rows(scene, accuracy, seen, refined) -> tuple[Row, ...]:

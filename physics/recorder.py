@@ -139,11 +139,11 @@ class Recorder:
 
     # --- asked by the user -------------------------------------------------------------------------------------
 
-    def save(self, path: str | Path, world: int = 0, reason: str = "asked for") -> Path:
+    def save(self, path: str | Path, world: int = 0, reason: str = "requested") -> Path:
         """Write the last steps of one world; returns the path."""
         return self.recording(world, reason).save(path)
 
-    def recording(self, world: int = 0, reason: str = "asked for") -> Recording:
+    def recording(self, world: int = 0, reason: str = "requested") -> Recording:
         """The last steps of one world, at least `keep` if so many were taken.
 
         Raises

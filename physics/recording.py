@@ -144,7 +144,7 @@ class Recording:
         ----------
         path : str or Path
         kinds : sequence of classes, optional
-            Fields of your own that its scene may name; a file never imports code by itself.
+            Fields of your own that its scene may name; a file never imports code on its own.
 
         Raises
         ------

@@ -6,8 +6,8 @@ the same way:
 
     p = -h (k g_θ + c g'_θ),    g_θ = (1 - θ) g⁰ + θ g¹,    g'_θ likewise.
 
-(Of a point that is still above the wall, g⁰ > 0, 0 stands for g⁰ there: what is stored in the spring is then no more
-than was paid for.) With g, the gap after the first drift, g¹ = g + θh u + (θh)² b/2 and g'¹ = u + θh b, u the new
+(Of a point that is still above the wall, g⁰ > 0, 0 stands for g⁰ there: the spring then stores at most the energy
+that was paid for.) With g, the gap after the first drift, g¹ = g + θh u + (θh)² b/2 and g'¹ = u + θh b, u the new
 velocity of the point where it is then and b what it gains there per time by turning (`aims.aim_rest`), that is
 linear in u. In a contact problem
 

@@ -55,7 +55,7 @@ def turning_acceleration(w, work):
     """Largest acceleration that turning at w alone gives to a contact along its normal [m/s²].
 
     |n·(ω x ṙ)| <= ω² ρ with the largest radius ρ of curvature of an ellipsoid, its largest half-axis squared by its
-    smallest; of a vertex ω² times its distance. (n·(α x r) of free turning is no more than as much again.)
+    smallest; of a vertex ω² times its distance. (n·(α x r) of free turning is at most as much again.)
     """
     reach = work.radius
     if work.shape == ELLIPSOID:

@@ -1,6 +1,6 @@
 """One or two contacts of one wall: every mixture of holding, sliding and opening, without a Delassus matrix.
 
-Two contacts that slide are two angles. For given directions "both normal velocities are the ones asked for" is a
+Two contacts that slide are two angles. For given directions "both normal velocities are on target" is a
 2 x 2 system for the normal impulses, and Newton's method turns both directions at once until no velocity is left
 across them (`point` has the same for a single contact).
 

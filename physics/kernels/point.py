@@ -149,7 +149,7 @@ def answer(W, b, mu, trace, goal, x, y, may_hold):
     trace : float
         W_aa + W_bb of the contact, which the residual is measured with: `W` may be less, when others give way.
     goal : float
-        Residual asked for [m/s].
+        Tolerance of the residual [m/s].
     x, y : float
         First guess of -μ d; 0, 0: none.
     may_hold : bool

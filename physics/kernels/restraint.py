@@ -50,7 +50,7 @@ def lifted_to(z, y, tilted, work):
 
 @inlined
 def rebound_share(before, plastic, full, middle):
-    """Largest s in [0, 1] at which the energy is no more than `before`.
+    """Largest s in [0, 1] at which the energy is at most `before`.
 
     `plastic`, `middle` and `full` are the energies at s = 0, 1/2 and 1 [J]: f(s) = plastic + B s + C s² with
     C = 2 (full + plastic) - 4 middle >= 0 and f(1) > before >= f(0). The root in the form that does not cancel.

@@ -72,7 +72,7 @@ def is_pushed_anew(i, wrench, sleep):
 def _way_from_start(i, y, radius, rows):
     """Bound for the distance of any point of the body from where it was at the window's start [m].
 
-    A turn by θ moves a point by 2 r sin(θ/2) at most, and |q - q0| = 2 sin(θ/4): no more than 2 r |q - q0|. Sums of
+    A turn by θ moves a point by 2 r sin(θ/2) at most, and |q - q0| = 2 sin(θ/4): at most 2 r |q - q0|. Sums of
     absolute values are no less than norms.
     """
     x, q, _, _ = y

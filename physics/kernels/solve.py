@@ -36,7 +36,7 @@ PIVOTING = 3
 # is.
 PIVOT_ABOVE = 0.01
 
-# Residual that rounding leaves, relative to the largest free contact speed: no more is asked for.
+# Residual that rounding leaves, relative to the largest free contact speed: the smallest tolerance.
 ROUNDING = 1.0e-12
 
 # Sweeps before Newton's method has a turn: most problems that are left for sweeps need fewer than ten.

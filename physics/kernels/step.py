@@ -8,7 +8,7 @@ bodies meet, and between the cuts
   half a free drift.
 
 Moreau, *Unilateral contact and dry friction in finite freedom dynamics*, 1988, for the midpoint step; what
-differs are the cut at impacts, the velocity asked for at the step's end (`aims.aim_rest`) and friction against the
+differs are the cut at impacts, the target velocity at the step's end (`aims.aim_rest`) and friction against the
 mean slip of few contacts (`slip`), which together make the scheme second order between impacts and exact on parabolas.
 
 What a scene does not have arrives here as None and is pruned by the compiler (see `compiler.kernel`).

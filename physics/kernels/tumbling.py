@@ -131,7 +131,7 @@ def lowest(shape, dims, R, k):
 def first_bracket(gap, rate, turning, bend, horizon):
     """Times (before, after) between which a bound gap + rate t - (points turn) - bend t²/2 falls to zero.
 
-    Points move along the normal by no more than `turning` [m/s] at first, towards the wall or away from it.
+    Points move along the normal by at most `turning` [m/s] at first, towards the wall or away from it.
     """
     s, u = max(0.0, turning - rate), max(0.0, turning + rate)
     before = 2.0 * gap / (s + math.sqrt(s * s + 2.0 * bend * gap))

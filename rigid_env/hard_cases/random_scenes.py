@@ -275,9 +275,10 @@ def random_scenes(setting: Setting) -> list[Check]:
     without a velocity, which moves it by twice the slop in the field of gravity and so turns it by as much of a radian
     (body on body, where its energy is that of its angular momentum in the new attitude).
 
-    To an error (`precise`, `reference`) a smooth step is off by a tolerance of speed, and by two of the energy, no more
-    than a contact problem; a part of a step of several bodies has its own problems. The limit is for as many of them as
-    a step may have impacts, 10,001. Most have hundreds; where something rattles it is millions, and the limit the same.
+    To an error (`precise`, `reference`) a smooth step is off by a tolerance of speed, and by two of the energy, at most
+    as much as a contact problem; a part of a step of several bodies has its own problems. The limit is for as many of
+    them as a step may have impacts, 10,001. Most have hundreds; where a body rattles it is millions, and the limit the
+    same.
     """
     limit = gain_limit(setting.accuracy)
     checks, scale = [], setting.pick(1.0, 0.004)

@@ -63,7 +63,7 @@ class Single:
 
 
 class Vector:
-    """A vector environment, stepped with random actions; it resets its environments by itself."""
+    """A vector environment, stepped with random actions; it resets its environments automatically."""
 
     def __init__(self, envs: gymnasium.vector.VectorEnv, steps: int):
         self.envs, self.steps = envs, steps

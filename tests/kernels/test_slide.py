@@ -68,7 +68,7 @@ def impulse_error(problem):
     """Bound of the error of impulses solved to TOLERANCE of the largest free contact speed [N s].
 
     Four contacts of a face fix the planar motion and the normals, six of twelve impulses; pushes of least norm and
-    directions of sliding fix the rest. A velocity off by ε makes impulses off by no more than a dozen m ε here.
+    directions of sliding fix the rest. A velocity off by ε makes impulses off by at most a dozen m ε here.
     """
     return 12 * MASS * TOLERANCE * np.abs(problem.matrices()[1]).max()
 
@@ -149,7 +149,7 @@ LEFT_FOR_SWEEPS = {
         (0.9912, 0.0, 0.1322, 0.0),
         (0.0, 0.0, 0.0, 0.0),
     ),
-    # Newton's method turns directions round: one contact all but stops, or holds, or all four do.
+    # Newton's method turns directions round: one contact nearly stops, or holds, or all four do.
     "creeps": (
         (0, 1, 4, 5),
         (-0.01181, -0.04624, -0.02078),
@@ -164,7 +164,7 @@ LEFT_FOR_SWEEPS = {
         (-0.2874, 0.2874, 0.646, 0.646),
         (0.0, 0.0, 0.0, 0.0),
     ),
-    "all but holds": (
+    "nearly holds": (
         (0, 1, 2, 3),
         (0.0258, -0.06091, 0.01423),
         (0.02239, 0.00391, -0.02076),

@@ -100,7 +100,7 @@ def test_a_plastic_landing_stops_in_front_of_what_it_meets():
     pos[:, 1, 1] += speed * dt * np.arange(8) / 8
     world.set_state(pos=pos)
     worst = np.max([world.step().penetration for _ in range(60)], axis=0)
-    # A hundred slops is what the resting stage may stop by itself; without the limit half a step's way, 16 mm.
+    # A hundred slops is what the resting stage may stop alone; without the limit half a step's way, 16 mm.
     assert worst.max() <= 101 * 1e-6 * np.sqrt(0.75)
     assert world.pos[:, 1, 1] == pytest.approx(1.5, abs=1e-4)
 

@@ -108,7 +108,7 @@ def test_a_copy_steps_its_own_world(loads, copier):
 
 
 def test_changes_of_arguments_between_steps_of_a_world_are_heeded():
-    """step() prepares what the last call asked for: other steps, dt or wrench must not meet what is prepared."""
+    """step() prepares for the last call: other steps, dt or wrench must not meet what is prepared."""
     world, push = shoved(), np.full((WORLDS, 1, 6), 20.0)
     world.step(push)
     assert world.time == pytest.approx(0.005)

@@ -7,7 +7,7 @@ along the normals of their faces and the products of their edges (separating axe
 axis where it is least.
 
 The least distance over a time is looked for at `LOOKS` moments, then twice more around the `BEST` smallest of them.
-A distance changes by no more than the speed of a point, so that between two of N looks over a turn of Θ it can fall by
+A distance changes by at most the speed of a point, so that between two of N looks over a turn of Θ it can fall by
 (|v| T + Θ R)/(2N): with N = 1500, Θ = 9 and R = 1 m by 3e-3 m, after two refinements with 60 looks over two intervals
 by 3e-6 m.
 """

@@ -209,7 +209,7 @@ class Kernel(CPUDispatcher):
         self._part = self._make_part()
 
     def renew(self) -> None:
-        """Forget what is compiled for other kernels: what the function reads around it is another thing now."""
+        """Forget what is compiled for other kernels: what the function reads around it has changed."""
         self._part = self._make_part()
         RememberingTarget.forget(types.Dispatcher(self))
 

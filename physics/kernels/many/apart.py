@@ -25,7 +25,7 @@ APART_SHARE = 0.5
 ROUNDS = 30
 DEEP = 100.0
 
-# Error of the displacements at most, relative to the largest that is asked for, or to so many slops where that is less,
+# Error of the displacements at most, relative to the largest target, or to so many slops where that is less,
 # and sweeps for it at most, if a contact problem may take as many: something light between a wall and something heavy
 # needs as many as their masses differ. A stage leaves half of the depth anyway, and half a slop less than the slop:
 # what is off by less is done with. Where solves are finer than that the error is the root of their tolerance, since
@@ -38,8 +38,8 @@ DEEP_SWEEPS = 1000
 
 @inlined
 def _aim_apart(n, many):
-    """Displacements asked for along the normals: the deepest that anything is, in its slop (from 1 on some are asked
-    for), and the error of them that does not matter [m].
+    """Target displacements along the normals: the deepest that anything is, in its slop (from 1 on there are
+    some), and the error of them that does not matter [m].
     """
     deepest, largest, least = 0.0, 0.0, math.inf
     for k in range(n):

@@ -8,7 +8,7 @@ where they grow again. So a pile that lies would go on at some goals of speed, e
 that is hard would be solved anew in each of them.
 
 An island is left alone where every body keeps its velocity to a small share of the goal: loads and impulses balance.
-One that holds as a whole does after one linear system, and for long; others are swept. Where an error is asked for
+One that holds as a whole does after one linear system, and for long; others are swept. Under error control
 nothing is: goals are next to rounding there, and a high arch at its limit, swept in every part, was solved no more.
 """
 
@@ -54,7 +54,7 @@ def point_speed(v, w, b, many):
 
 @inlined
 def _keeps_velocity(b, most, many):
-    """Test whether the velocity of body b has changed by no more than `most` in this resting stage [m/s].
+    """Test whether the velocity of body b has changed by at most `most` in this resting stage [m/s].
 
     Velocities before the stage are in `many.momenta`, those after it in `many.twist`.
     """
@@ -86,7 +86,7 @@ def _may_calm(part, speed, change, many):
 
 @kernel
 def calm(part, friction, residual, goal, deep, least, many):
-    """Solve an island that is solved to the goal and all but at rest further: (iterations, residual [m/s], method).
+    """Solve an island that is solved to the goal and nearly at rest further: (iterations, residual [m/s], method).
 
     To `deep` where all of it holds, else by some sweeps as far as `least`. Nothing happens outside resting stages, and
     where that would make more of the residual than the goal.

@@ -176,7 +176,7 @@ def _touch_edges(a, b, i, j, n, gap, h, many):
 
 @kernel
 def touch_hulls(a, b, margin, h, many):
-    """Add the contacts of polyhedra a and b (hulls or blocks) that are no more than `margin` [m] apart.
+    """Add the contacts of polyhedra a and b (hulls or blocks) that are at most `margin` [m] apart.
 
     Where a face separates them or nearly does, and something of the other body is above it, no pair of edges can say
     that they are further apart: that something touches. Where edges do say so, and lie nearly flat on that face, what

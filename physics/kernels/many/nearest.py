@@ -107,7 +107,7 @@ def nearest_to_origin(count, many):
 
 @inlined
 def _core(b, many):
-    """Radius of the sphere around a core [m]."""
+    """Radius around the core of body b [m]: a sphere's own, 0 of other shapes."""
     return many.bodies[b].dims[0] if many.bodies[b].shape == SPHERE else 0.0
 
 

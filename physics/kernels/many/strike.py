@@ -46,7 +46,7 @@ def slow_speed(k, h, many):
 def fast_speed(k, h, many):
     """Speed that is to be met in time: one that closes `FAST_SHARE` of the smaller radius within h [m/s].
 
-    Where an error is asked for (`refine`) all that is not slow, so that no part has to be as short as the error of
+    Under error control (`refine`) all that is not slow, so that no part has to be as short as the error of
     where bodies meet.
     """
     one, other = many.ends[k, 0], many.ends[k, 1]
@@ -193,7 +193,7 @@ def strike(n, world, t, h, is_last, friction, tilted, report, many, log, counts)
 def time_until_meeting(n, h, is_last, many):
     """Time until the first of the meetings that matter, at the latest h [s]: never too late.
 
-    Two points approach by no more than s t + a t²/2 with a the bound of their acceleration by loads and turning, so
+    Two points approach by at most s t + a t²/2 with a the bound of their acceleration by loads and turning, so
     that the gap lasts at least until t = 2 gap/(s + √(s² + 2 a gap)). What turns far is looked at by `tumbling`.
     """
     first = h

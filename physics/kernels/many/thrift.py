@@ -1,7 +1,7 @@
 """No more energy than there is, where bodies touch each other: resting stages, and places put right.
 
-A contact's target that knows how the bodies turn (`glide.aim_rest`) is gainless by itself where bodies answer alike in
-all directions; others, and many contacts together, may gain. To push bodies apart may lift them against their loads,
+A contact's target that knows how the bodies turn (`glide.aim_rest`) is gainless where bodies answer alike in all
+directions; others, and many contacts together, may gain. To push bodies apart may lift them against their loads,
 which is paid with their motion, and turns them, which changes ½ L·I⁻¹L at the same L. For impacts see
 `physics.kernels.restraint`.
 """

@@ -39,7 +39,7 @@ from physics.kernels.tumbling import (
     tilting_time,
 )
 
-# Turn from which bodies are looked at where an error is asked for [rad]: of a body that turns by less within a part the
+# Turn from which bodies are looked at under error control [rad]: of a body that turns by less within a part the
 # points are off the line along which contacts are foretold by θ²/8 of its radius, 1.3e-3. A part of longer turns that
 # meets something differs from its halves if these do not, and is refused.
 LEAST_TURN = 0.1
