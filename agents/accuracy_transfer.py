@@ -1,4 +1,4 @@
-"""What training at a coarse accuracy costs when the world is exact: ``python -m agents.accuracy_transfer``.
+"""Cost of training at a coarse accuracy when the world is exact: ``python -m agents.accuracy_transfer``.
 
 One policy is trained per accuracy, with the same hyperparameters, seed and target; when to stop is judged at the
 accuracy that it trains at, as one would who has no other. Each is then evaluated on the same fresh episodes at its
@@ -73,7 +73,7 @@ def parse_accuracies(names: str) -> list[str]:
 
 
 def trained(config: RunConfig, run: RunFolder, console: Console) -> dict[str, Any]:
-    """What `agents.train.train` says of a run; it trains if that has not been done in this folder.
+    """Return the result of `agents.train.train` for a run; train if that has not been done in this folder.
 
     Raises
     ------

@@ -19,7 +19,7 @@ CLASSES: dict[str, type[BaseAlgorithm]] = {"ppo": PPO, "sac": SAC}
 
 
 def make_single_env(env: str, **arguments: Any) -> gym.Env:
-    """A single environment; arguments as `make_vector_env`, all but `num_envs`."""
+    """A single environment; arguments as `make_vector_env`, all except `num_envs`."""
     return _make(gym.make, env, arguments)
 
 

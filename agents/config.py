@@ -1,4 +1,4 @@
-"""What a run does, from YAML keyed by environment id and algorithm, and where its files are."""
+"""Settings of a run, from YAML keyed by environment id and algorithm, and the places of its files."""
 
 from __future__ import annotations
 
@@ -136,7 +136,7 @@ def change(config: RunConfig, **changes: Any) -> RunConfig:
 
 @dataclass(frozen=True)
 class RunFolder:
-    """Where the files of a run are.
+    """Places of the files of a run.
 
     Parameters
     ----------
@@ -172,12 +172,12 @@ class RunFolder:
 
     @property
     def evaluation(self) -> Path:
-        """Of the trained model on fresh episodes, JSON."""
+        """Evaluation of the trained model on fresh episodes, JSON."""
         return self.path / "evaluation.json"
 
     @property
     def result(self) -> Path:
-        """What `--json` writes."""
+        """Result that `--json` writes."""
         return self.path / "result.json"
 
     @property

@@ -37,7 +37,7 @@ class CurvePoint:
 
 @dataclass
 class History:
-    """What a run remembers of its episodes; part of every checkpoint.
+    """Record of a run's episodes; part of every checkpoint.
 
     Parameters
     ----------
@@ -69,7 +69,7 @@ class History:
         self.window.append((success, episode_return, length))
 
     def point(self, steps: int) -> CurvePoint:
-        """Where the run stands now."""
+        """Return the present point of the run's curve."""
         columns = zip(*self.window) if self.window else ((float("nan"),),) * 3
         means = [sum(column) / len(column) for column in columns]
         return CurvePoint(steps, round(self.seconds, 3), self.episodes, *means)

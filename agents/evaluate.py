@@ -41,7 +41,7 @@ JsonOption = Annotated[Path | None, output_option("--json", ".json", help="Write
 
 @dataclass(frozen=True)
 class Episodes:
-    """What came of episodes, one row each.
+    """Outcomes of episodes, one row each.
 
     Parameters
     ----------
@@ -192,7 +192,7 @@ class Subject:
 
 
 def choose_subject(run: Path | None, baseline: str | None, env: str, seed: int, accuracy: str | None) -> Subject:
-    """What a command line asks for: a run, or a baseline.
+    """Choose the subject of a command line: a run, or a baseline.
 
     Raises
     ------

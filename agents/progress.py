@@ -1,4 +1,4 @@
-"""What a run shows while it trains: a progress bar, or a line now and then where there is no terminal."""
+"""Progress of a training run: a bar, or a line now and then where there is no terminal."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What watches over training: counts episodes, draws the curve, writes checkpoints, stops at the target."""
+"""Supervisor of training: counts episodes, draws the curve, writes checkpoints, stops at the target."""
 
 from __future__ import annotations
 
@@ -93,7 +93,7 @@ class Supervisor(BaseCallback):
         self._last_point = self.history.seconds
 
     def _is_confirmed(self) -> bool:
-        """Whether the target is reached, by the last episodes and then by an evaluation."""
+        """Test whether the target is reached, by the last episodes and then by an evaluation."""
         history = self.history
         if len(history.window) < WINDOW or history.episodes < history.next_confirmation:
             return False

@@ -116,7 +116,7 @@ def train(
 
 
 def interruption_message(run: RunFolder, step: int) -> str:
-    """What is left of an interrupted run, and how to go on."""
+    """Say what an interrupted run has left, and how to go on."""
     kept = list_checkpoints(run.checkpoints)
     if not kept:
         return f"Interrupted before the first checkpoint; {run.path} holds nothing to go on from."

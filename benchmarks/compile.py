@@ -42,7 +42,7 @@ print(json.dumps({**seconds, "kernels": sum(what.is_start for _, what in recorde
 
 @dataclass(frozen=True)
 class FirstStep:
-    """What making a world and its first step took, after the imports.
+    """Time of making a world and of its first step, after the imports.
 
     Attributes
     ----------

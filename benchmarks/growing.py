@@ -1,13 +1,13 @@
-"""How cost grows as a pile does: ``python -m benchmarks.growing [--quick] [--peer] [--json FILE] [--plot FILE]``.
+"""Cost of a step as a pile grows: ``python -m benchmarks.growing [--quick] [--peer] [--json FILE] [--plot FILE]``.
 
 Layer upon layer of 5 x 5 unit cubes, turned at random, falls onto a pile in a shaft (that of `scenes.heap`), each a
 diagonal above the highest cube, each 1.5 s after the one before: whatever its height, the pile is given the same to do,
 and all of the rest has to be held. Time of a step against its contacts, the mean over those 1.5 s, and the exponent
 that fits from the pile on that is `DEEP` layers deep: of the first two layers nearly all lie side by side on the floor,
-each body with contacts of its own, which is another thing than a pile.
+each body with contacts of its own, which differs from a pile.
 
 With ``--peer`` MuJoCo takes the same 300 steps of some of these piles, from where ours are, once with each of two of
-its solvers. What is found is written after each layer, and only where asked for.
+its solvers. With ``--json`` the result is written after each layer.
 """
 
 from __future__ import annotations
@@ -68,7 +68,7 @@ def grow(layers: int, accuracy: str) -> Iterator[tuple[physics.Scene, Ours]]:
 
 
 def measure(count: int, pile: Ours | Theirs, parts: int) -> Sample:
-    """What a step of a pile of `count` cubes costs, the mean over so many parts."""
+    """Measure a step of a pile of `count` cubes, the mean over so many parts."""
     watch = Watch(pile)
     for _ in range(parts):
         watch.part(PART)

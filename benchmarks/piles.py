@@ -1,10 +1,10 @@
-"""How cost grows with a pile: ``python -m benchmarks.piles [--quick] [--peer] [--json FILE] [--plot FILE]``.
+"""Cost of a step by the size of a pile: ``python -m benchmarks.piles [--quick] [--peer] [--json FILE] [--plot FILE]``.
 
 A pile of cubes that settles in a shaft (`scenes.heap`), from a few to many: time of a step against its contacts once
 it lies, and while it falls and settles, and the exponents that fit. And the broad phase alone, for cubes spread evenly
 in a box at one density: time against the pairs that it finds. With ``--peer`` MuJoCo takes the same steps of the same
-piles, once with each of two of its solvers (a quarter of an hour). What is found is written after each pile, and only
-where asked for.
+piles, once with each of two of its solvers (a quarter of an hour). With ``--json`` the
+result is written after each pile.
 """
 
 from __future__ import annotations

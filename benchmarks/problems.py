@@ -27,7 +27,7 @@ class Complementarity:
     M : (n, n) float64
     q : (n,) float64
     is_feasible : bool
-        False: there is no solution, and to say so is what is asked for.
+        False: there is no solution, and the right answer is to say so.
     """
 
     name: str
@@ -138,7 +138,7 @@ def beginning(name: str, scene: physics.Scene) -> Frictional:
 
 
 def hard() -> Iterator[Frictional]:
-    """What hard cases pose: high, heavy, wide, and on the limit."""
+    """Contact problems of hard cases: high, heavy, wide, and on the limit."""
     yield beginning("tower of 10", scenes.tower(10))
     yield beginning("tower of 50", scenes.tower(50))
     yield beginning("1,000,000 kg on 1 kg", stacks.tower([1.0, 1e6]))

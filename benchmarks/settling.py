@@ -17,7 +17,7 @@ PARTS = 5  # of what is measured; the median part counts
 
 @dataclass(frozen=True)
 class Sample:
-    """What one size costs.
+    """Cost of one size.
 
     Attributes
     ----------
@@ -123,11 +123,11 @@ class Watch:
         self.steps += steps
 
     def lies(self, parts: int) -> bool:
-        """Whether nothing was fast at the end of any of the last parts."""
+        """Test whether nothing was fast at the end of any of the last parts."""
         return len(self.speeds) >= parts and max(self.speeds[-parts:]) <= LIES
 
     def sample(self, bodies: int, seconds: float) -> Sample:
-        """What was seen, a step of it at `seconds`."""
+        """Return the sample of a run with a step at `seconds`."""
         solves, failed = self.pile.solves - self.solves, self.pile.failed - self.failed
         share = failed / solves if solves else None
         depth = float(np.median(self.depths))

@@ -1,4 +1,4 @@
-"""What a body that does nothing costs: ``python -m benchmarks.sleeping [--quick] [--json FILE]``.
+"""Cost of a body that does nothing: ``python -m benchmarks.sleeping [--quick] [--json FILE]``.
 
 Towers asleep against the same ones awake, many steps in one call and one step in each; and a block that flies: without
 contact in its kernel, with it in a large box, and beside walls that it could touch at any step. All in turns.
@@ -34,7 +34,7 @@ LARGE, NARROW = 1e3, 3.0
 
 @dataclass(frozen=True)
 class Sizes:
-    """How many steps of towers awake, calls, and flights of `FLIGHT_STEPS` steps one run takes."""
+    """Numbers of steps of towers awake, of calls, and of flights of `FLIGHT_STEPS` steps in one run."""
 
     tower: int = 2000
     calls: int = 20_000

@@ -119,7 +119,7 @@ class Judge:
         return np.arccos(np.clip(-height, -1.0, 1.0))
 
     def wrongs(self, envs, obs, reward, terminated, action) -> dict[str, int]:
-        """What went wrong in a control step, by kind: how many worlds."""
+        """Count the worlds in which a control step went wrong, by kind."""
         task, world = self.task, self.task.world
         met = self._potential(self.hold)[1]
         hold = np.where(met, np.minimum(self.hold + 1, HOLD_STEPS), 0.0)

@@ -38,7 +38,7 @@ from rigid_env.terminal import Column, Table, make_console, number_columns
 
 LIMIT = 1000  # sweeps, steps or iterations
 PIVOTS = 10_000
-TOLERANCE = 1e-6  # residual that is asked for
+TOLERANCE = 1e-6  # tolerance of the residual
 FEATURES = 8  # contacts of one wall in a workspace
 MOST_DENSE = 60  # contacts for which Lemke's method is given a matrix: ten unknowns each
 SAMPLES, QUICK_SAMPLES = 7, 1
@@ -49,7 +49,7 @@ CHAIN, SWEEPS, NEWTON, INTERIOR = range(4)
 
 @dataclass(frozen=True)
 class Outcome:
-    """What one solver made of one problem.
+    """Outcome of one solver on one problem.
 
     Attributes
     ----------

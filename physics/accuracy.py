@@ -1,4 +1,4 @@
-"""How finely a scene is simulated: presets and their knobs."""
+"""Accuracy of a simulation: presets and their knobs."""
 
 from __future__ import annotations
 

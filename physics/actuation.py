@@ -1,4 +1,4 @@
-"""From the wrench that is asked for to the wrench that acts: the actuator of a world, before its kernel.
+"""From the commanded wrench to the wrench that acts: the actuator of a world, before its kernel.
 
 A command is held over a step. Delayed, it is a staircase whose treads begin `delay` after the steps in which it was
 given; each tread is clipped. Behind it stands the lag τ w' = c - w, which over a tread of length h with command c takes
@@ -102,7 +102,7 @@ class Actuation:
             rows.reshape(self._shape)[worlds] = 0.0
 
     def kept(self) -> tuple:
-        """What decides how it goes on, for `put_back`."""
+        """State of the actuator, for `put_back`."""
         return self._output.copy(), [(given, command.copy()) for given, command in self._late]
 
     def put_back(self, kept: tuple) -> None:

@@ -52,7 +52,7 @@ def make_scratch(scene: Scene, plan: Plan, walls: np.ndarray, accuracy: Accuracy
 
 
 def make_motion(scene: Scene, plan: Plan, accuracy: Accuracy):
-    """What one thread needs besides where an error is asked for: a smooth motion, or the world at some moments."""
+    """Make the scratch of one thread for error control: a smooth motion, or the world at some moments."""
     bodies, walls = len(scene.bodies), len(scene.walls)
     if plan.events:
         return motion.make_motion(walls, plan.features, accuracy.collisions == "sequential")
@@ -62,7 +62,7 @@ def make_motion(scene: Scene, plan: Plan, accuracy: Accuracy):
 
 
 def make_memory(scene: Scene, plan: Plan, worlds: int) -> np.ndarray:
-    """What is remembered of contacts: a row per world where bodies touch each other, else a row per body."""
+    """Make the memory of contacts: a row per world where bodies touch each other, else a row per body."""
     bodies, walls = len(scene.bodies), len(scene.walls)
     if plan.many:
         polyhedra = parameters.polyhedra(scene.bodies)

@@ -197,7 +197,7 @@ def _changed_slots(world: World, effects) -> list[FieldSlot]:
         effect.check(world.body_count)
         if world.plan.sleeping and not effect.is_steady:
             raise ValueError(
-                f"effects holds {effect!r}, which may change by itself, in a scene in which bodies sleep; allowed is "
+                f"effects holds {effect!r}, which may change on its own, in a scene in which bodies sleep; allowed is "
                 "what is steady, or a scene that declares such a field, in which nothing sleeps"
             )
         kinds.setdefault(effect.kind, []).append(effect)

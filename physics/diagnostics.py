@@ -78,7 +78,7 @@ def _diagnose(world: World) -> Diagnostics:
 
 
 def look_at(world: World) -> tuple[np.ndarray, np.ndarray]:
-    """What the scene's fields do now.
+    """Loads and energies of the scene's fields now.
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""What acts in a scene: one small frozen dataclass per effect.
+"""Effects of a scene: one small frozen dataclass each.
 
 A scene declares its effects; what it does not declare is not compiled into its
 kernel. The gyroscopic torque declares itself where a body's moments differ.
@@ -53,7 +53,7 @@ class Contact:
         slides on. None: as 0, and nothing of it is compiled.
     stiffness : float, optional
         k of a spring between each contact point (a vertex, the lowest point of a round body) and a wall, which pushes
-        with k times the depth [N/m]; greater than 0. It bounces by itself: not with a restitution. None: rigid.
+        with k times the depth [N/m]; greater than 0. It bounces without a restitution. None: rigid.
     damping : float, optional
         c of a damper beside it [N s/m]; at least 0. The two together never pull (Kelvin and Voigt's model, without
         adhesion).
@@ -198,7 +198,7 @@ class SpinFriction(_Resistance):
 @known_keywords
 @dataclass(frozen=True)
 class Actuator:
-    """What lies between the wrench of `World.step` and the bodies: delay, then limits, then lag, in this order.
+    """Actuator between the wrench of `World.step` and the bodies: delay, then limits, then lag, in this order.
 
     Parameters
     ----------
@@ -226,7 +226,7 @@ class Actuator:
 
     @property
     def remembers(self) -> bool:
-        """Whether what it gives depends on earlier commands."""
+        """Test whether what it gives depends on earlier commands."""
         return self.lag > 0.0 or self.delay > 0.0
 
 

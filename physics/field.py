@@ -1,7 +1,7 @@
-"""What makes an effect a force field, and how a user's own one is compiled and kept.
+"""Force fields as effects, and compiling and keeping a user's own one.
 
 A field is a frozen dataclass with a compiled function: force and torque on a body from its state, the field's
-parameters and the time. The built-in ones stand in `physics.fields`; your own needs no more than they do::
+parameters and the time. The built-in ones stand in `physics.fields`; your own needs at most they do::
 
     @physics.field_function
     def pull(state, p, t):
@@ -99,14 +99,14 @@ class Field:
 
     @property
     def takes_energy(self) -> bool | None:
-        """Whether it only ever takes mechanical energy (True), keeps it, its own included (False), or neither."""
+        """Test whether it only ever takes mechanical energy (True), keeps it, its own included (False), or neither."""
         return None
 
     @property
     def is_steady(self) -> bool:
-        """Whether what it does to a body that does not move stays the same; not known of fields of your own.
+        """Test whether what it does to a body that does not move stays the same; not known of fields of your own.
 
-        `Sleeping` needs to know: under a load that may change by itself nothing sleeps.
+        `Sleeping` needs to know: under a load that may change on its own nothing sleeps.
         """
         return False
 
@@ -211,7 +211,7 @@ def _compiled(kind: type, name: str) -> Kernel | None:
 
 
 def _name(kind: type) -> str:
-    """What tells this kind of field from all others: its function's name, and of a user's own its content, too."""
+    """Return the name that tells this kind of field from all others: its function's, for a user's own with a digest."""
     function = _compiled(kind, "function")
     name = function.py_func.__name__.replace("_", "")
     if _is_built_in(function):

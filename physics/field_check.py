@@ -1,6 +1,6 @@
 """Checks of a user's field before anything moves: its class, its numbers, and all that its functions read.
 
-A kernel has no exceptions and asks for no bounds. A user's function is compiled by itself first, for the types that it
+A kernel has no exceptions and asks for no bounds. A user's function is compiled alone first, for the types that it
 is called with later, so that nothing is compiled twice; what Numba made of it is then looked through.
 """
 
@@ -176,7 +176,7 @@ def _also_called(own: set[str], assigned: list[ir.Assign]) -> set[str]:
 
 
 def _asks_for_size(value, own: set[str]) -> bool:
-    """Whether this may be p's length: an index that is written down may stand behind a question."""
+    """Test whether this may be p's length: an index that is written down may stand behind a question."""
     if not isinstance(value, ir.Expr):
         return False
     if value.op == "getattr":
@@ -257,7 +257,7 @@ def _in_words(type_: types.Type) -> str:
 
 
 def describe(kind: type, base: type, size: int) -> str:
-    """What p holds, in words."""
+    """Describe the columns of p in words."""
     if kind.columns is base.columns:
         names = ", ".join(each.name for each in fields(kind))
         return f"the fields of {kind.__name__}, {names}" if names else f"{kind.__name__} has no fields"

@@ -1,4 +1,4 @@
-"""What tells a user's function from others, and from itself before an edit; and its machine code as it is now."""
+"""Digest that tells a user's function from others, and from itself before an edit; and its machine code now."""
 
 from __future__ import annotations
 

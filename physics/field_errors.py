@@ -72,7 +72,7 @@ def placed(what: str, place: Place) -> str:
 
 
 def not_compiled(name: str, function: Dispatcher, error: Exception) -> ValueError:
-    """What is wrong with a function that Numba cannot compile.
+    """Return the error of a function that Numba cannot compile.
 
     Parameters
     ----------
@@ -116,7 +116,7 @@ def _holds(function: Dispatcher, file: str, line: int) -> bool:
 
 
 def raised(error: Exception, slots: tuple) -> Exception:
-    """What a compiled function raised, with the class of the field that it is of: only that of an index is reworded.
+    """Return the error that a compiled function raised, with the class of its field; only an IndexError is reworded.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""What a ladder of errors and times says: the front, the order, the floor. Pure functions of numbers."""
+"""Front, order and floor of a ladder of errors and times. Pure functions of numbers."""
 
 from __future__ import annotations
 

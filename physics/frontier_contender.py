@@ -1,4 +1,4 @@
-"""What takes part in a measurement of error against time: an engine at one setting and one step."""
+"""Contender in a measurement of error against time: an engine at one setting and one step."""
 
 from __future__ import annotations
 

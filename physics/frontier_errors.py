@@ -1,4 +1,4 @@
-"""How far a trajectory is from another one, and from the laws: plain NumPy on samples, the same for every engine."""
+"""Errors of a trajectory against another one, and against the laws: plain NumPy, the same for every engine."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def angles_between(quat: np.ndarray, true: np.ndarray) -> np.ndarray:
 
 
 def distances(scene: Scene, pos, quat, true_pos, true_quat) -> np.ndarray:
-    """How far a point of each body can be from where it should be [m], (samples, bodies).
+    """Largest distance of a point of each body from its true place [m], (samples, bodies).
 
     |Δx| + 2 r sin(θ/2): a turn by θ moves no point of a body of bounding radius r by more than the chord.
 
@@ -75,7 +75,7 @@ def mechanical_energy(scene: Scene, pos, quat, linvel, angvel) -> np.ndarray:
 
 
 def conserves_energy(scene: Scene) -> bool:
-    """Whether nothing in the scene takes energy: no contact, or elastic contact without friction; no drag."""
+    """Test whether nothing in the scene takes energy: no contact, or elastic contact without friction; no drag."""
     if any(law is not False for law in _field_laws(scene)):
         return False
     contact, friction = scene.effect(Contact), scene.effect(Friction)

@@ -1,4 +1,4 @@
-"""What a measurement of error against time found: the points, and the answers that they give."""
+"""Result of a measurement of error against time: the points, and the answers that they give."""
 
 from __future__ import annotations
 
@@ -98,7 +98,7 @@ class Frontier:
         return float(self.floors.get(self._measure(measure), 0.0))
 
     def is_at_floor(self, point: FrontierPoint, measure: str | None = None) -> bool:
-        """Whether a point is as good as the truth itself is known; it may be better than it looks."""
+        """Test whether a point is as good as the truth itself is known; it may be better than it looks."""
         return self.error(point, measure) <= self.own_error(measure)
 
     def of(self, setting: object = None, engine: str | None = None) -> tuple[FrontierPoint, ...]:

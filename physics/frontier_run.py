@@ -198,7 +198,7 @@ class _Turn:
             self.seconds.append(self._seconds(self.runs))
 
     def point(self) -> FrontierPoint:
-        """What was found; a contender that was never timed has its warm-up's time."""
+        """Return the measured point; a contender that was never timed has its warm-up's time."""
         c, simulated = self.contender, self.steps * self.contender.dt
         costs = tuple(value / simulated for value in self.seconds or [self.first])
         return FrontierPoint(c.engine, c.setting, c.dt, self.errors, costs, self.is_lost, self.note)

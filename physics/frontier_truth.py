@@ -1,4 +1,4 @@
-"""What a trajectory is measured against: something the caller knows, or our own reference at two settings."""
+"""Truth for a trajectory: one that the caller knows, or our own reference at two settings."""
 
 from __future__ import annotations
 
@@ -84,7 +84,7 @@ class Truth:
         return {"error": self.unit}
 
     def errors(self, trajectory: Trajectory) -> dict[str, float]:
-        """What is wrong with a trajectory."""
+        """Errors of a trajectory."""
         return {"error": float(self.error(trajectory))}
 
 
@@ -139,11 +139,11 @@ class ReferenceTruth:
 
     @property
     def text(self) -> str:
-        """What it is, for people."""
+        """Describe the truth in words."""
         return f"reference at {500 * self.dt:g} ms, against itself at {1e3 * self.dt:g} ms with looser tolerances"
 
     def errors(self, trajectory: Trajectory) -> dict[str, float]:
-        """What is wrong with a trajectory, at the times that are compared.
+        """Errors of a trajectory at the times that are compared.
 
         Returns
         -------

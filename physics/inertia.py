@@ -139,7 +139,7 @@ def disk(radius: float, mass: float) -> np.ndarray:
 
 
 def rod(length: float, mass: float) -> np.ndarray:
-    """Inertia of a thin rod along body y: M L²/12 across, 0 along (a part, but no body by itself)."""
+    """Inertia of a thin rod along body y: M L²/12 across, 0 along (a part, but no body alone)."""
     length = float(_positive(length, (), "length"))
     return _of_revolution(across=float(_positive(mass, (), "mass")) * length**2 / 12, along=0.0)
 

@@ -17,7 +17,7 @@ PSD_TOLERANCE = 2.0**-46  # times n and the largest entry: what rounding may do 
 
 
 class LcpStatus(IntEnum):
-    """How a pivoting solver ended. `message` says what to do."""
+    """End of a pivoting solver. `message` says what to do."""
 
     SOLVED = complementarity.SOLVED
     RAY = complementarity.RAY
@@ -27,7 +27,7 @@ class LcpStatus(IntEnum):
 
     @property
     def message(self) -> str:
-        """What happened, and what to do about it."""
+        """Explanation of the status, and advice."""
         return _MESSAGES[self]
 
 

@@ -71,7 +71,7 @@ class Work:
 
     @cached_property
     def _places(self) -> list[int]:
-        """Where the words of each argument of the first call begin."""
+        """Return the offsets of the words of each argument of the first call."""
         return list(accumulate((len(_words((value,))) for value in self._calls[0][1]), initial=0))
 
     def then(self, other: Work) -> Work:

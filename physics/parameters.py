@@ -47,7 +47,7 @@ def write_bodies(params: np.ndarray, bodies: tuple[Body, ...]) -> None:
 
 
 def polyhedra(bodies: tuple[Body, ...]) -> list:
-    """What `physics.kernels.many.hulls.make_hulls` reads of a scene's bodies; empty where none is a hull."""
+    """Polyhedra of a scene's bodies for `physics.kernels.many.hulls.make_hulls`; empty where none is a hull."""
     if not any(body.kind == "hull" for body in bodies):
         return []
     blocks = {"block": CUBE}

@@ -35,8 +35,8 @@ class Plan:
     its body axes, or its geometric centre is not its centre of mass. `many` is on where bodies touch each other, or
     touch walls and are tied together by springs, or a hull touches walls; `meeting` says whether they touch each other,
     `ellipsoids` whether there are any among those, `hulls` whether any touch anything. `refined` is on where `many` is
-    and an error is asked for: by the scheme ``events``. `linked` is on where they are tied together and touch nothing.
-    `sleeping` is on where bodies may sleep. `laws` are those of `physics.kernels.laws`.
+    and steps have an error tolerance: by the scheme ``events``. `linked` is on where they are tied together and touch
+    nothing. `sleeping` is on where bodies may sleep. `laws` are those of `physics.kernels.laws`.
     """
 
     contact: bool | None
@@ -74,7 +74,7 @@ class Plan:
 
     @property
     def key(self) -> tuple:
-        """What distinguishes one compiled kernel from another."""
+        """Key that distinguishes one compiled kernel from another."""
         return (
             self.contact, self.friction, self.restitution, self.gravity, self.gyroscopic, self.tilted,
             self.pivots, self.scheme is None, self.events, self.many, self.refined, self.ellipsoids, self.hulls,
@@ -90,7 +90,7 @@ class Plan:
 
     @property
     def may_raise(self) -> bool:
-        """Whether a step may end in an exception: that of a user's field."""
+        """Test whether a step may end in an exception: that of a user's field."""
         return any(slot.may_raise for slot in self.fields)
 
     @property
@@ -99,7 +99,7 @@ class Plan:
         return sum(term.count * term.size for term in self.terms)
 
     def allows(self, moments: np.ndarray, R: np.ndarray) -> np.ndarray:
-        """Whether the kernel of this plan can turn bodies with these `physics.inertia.principal_axes`.
+        """Test whether the kernel of this plan can turn bodies with these `physics.inertia.principal_axes`.
 
         Parameters
         ----------
@@ -128,18 +128,18 @@ class Plan:
 
 
 def is_isotropic(moments: np.ndarray) -> np.ndarray:
-    """Whether all `moments` (..., 3) are equal to rounding: then ω stays constant in free flight."""
+    """Test whether all `moments` (..., 3) are equal to rounding: then ω stays constant in free flight."""
     return np.ptp(moments, axis=-1) <= ISOTROPY_TOLERANCE * np.max(moments, axis=-1)
 
 
 def is_tilted(R: np.ndarray) -> np.ndarray:
-    """Whether the principal axes `R` (..., 3, 3) are not the body axes."""
+    """Test whether the principal axes `R` (..., 3, 3) are not the body axes."""
     return (R - np.eye(3)).any(axis=(-2, -1))
 
 
 @dataclass(frozen=True)
 class _Seen:
-    """What a plan is made of."""
+    """Findings that a plan is made of."""
 
     contact: Contact | None
     friction: Friction | None
@@ -156,7 +156,7 @@ class _Seen:
 
 
 def _see(scene: Scene) -> _Seen:
-    """Which effects can act in a scene."""
+    """Find the effects that can act in a scene."""
     contact, friction, gravity = (scene.effect(kind) for kind in (Contact, Friction, Gravity))
     meeting = contact is not None and contact.between_bodies and len(scene.bodies) > 1
     touching = contact is not None and (bool(scene.walls) or meeting)

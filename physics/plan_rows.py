@@ -1,4 +1,4 @@
-"""What a plan says of each effect: on or off, why, and what is compiled for it."""
+"""Rows of a plan, one for each effect: on or off, the reason, and the kernels compiled for it."""
 
 from __future__ import annotations
 
@@ -83,7 +83,7 @@ def _center_row(uneven) -> Row:
 
 
 def _field_rows(fields: tuple[FieldSlot, ...]) -> list[Row]:
-    """What is declared, then the built-in fields that are not."""
+    """Rows of the declared fields, then of the built-in fields that are not."""
     rows = [
         Row(slot.effects[0].label, True, f"declared: {', '.join(map(repr, slot.effects))}",
             f"{slot.term.count * slot.term.size} parameters per body, one function"
@@ -139,7 +139,7 @@ def _sleeping_row(scene, touching, sleeping) -> Row:
         return Row("sleeping", False, "declared, but nothing can touch", "")
     restless = [field for field in scene.effects if isinstance(field, Field) and not field.is_steady]
     names = ", ".join(field.label for field in restless)
-    return Row("sleeping", False, f"declared, but nothing rests under what may change by itself: {names}", "")
+    return Row("sleeping", False, f"declared, but nothing rests under what may change on its own: {names}", "")
 
 
 def make_rows(scene, accuracy, seen, refined) -> tuple[Row, ...]:

@@ -73,7 +73,7 @@ class Polyhedron:
 
     @property
     def radius(self) -> float:
-        """Of the sphere about the centre of mass that holds it [m]."""
+        """Radius of the sphere about the centre of mass that holds it [m]."""
         return float(np.linalg.norm(self.vertices, axis=1).max())
 
     @property

@@ -139,11 +139,11 @@ class Recorder:
 
     # --- asked by the user -------------------------------------------------------------------------------------
 
-    def save(self, path: str | Path, world: int = 0, reason: str = "asked for") -> Path:
+    def save(self, path: str | Path, world: int = 0, reason: str = "requested") -> Path:
         """Write the last steps of one world; returns the path."""
         return self.recording(world, reason).save(path)
 
-    def recording(self, world: int = 0, reason: str = "asked for") -> Recording:
+    def recording(self, world: int = 0, reason: str = "requested") -> Recording:
         """The last steps of one world, at least `keep` if so many were taken.
 
         Raises
@@ -183,7 +183,7 @@ def _rows(array: np.ndarray, worlds: int, chosen: np.ndarray) -> np.ndarray:
 
 
 def _starts_of(chapter: _Chapter, world: int, first: int, count: int) -> list[Start]:
-    """Where one world went on from in a chapter whose first step is number `first` of the recording."""
+    """Find the starts of one world in a chapter whose first step is number `first` of the recording."""
     found = []
     for step, worlds, rows, time in chapter.starts:
         place = np.flatnonzero(worlds == world)

@@ -144,7 +144,7 @@ class Recording:
         ----------
         path : str or Path
         kinds : sequence of classes, optional
-            Fields of your own that its scene may name; a file never imports code by itself.
+            Fields of your own that its scene may name; a file never imports code on its own.
 
         Raises
         ------
@@ -184,7 +184,7 @@ def _widened(table: np.ndarray) -> np.ndarray:
 
 @dataclass(frozen=True)
 class Replay:
-    """What came out when the steps of a `Recording` were taken again.
+    """Outcome of taking the steps of a `Recording` again.
 
     Parameters
     ----------
@@ -214,7 +214,7 @@ class Replay:
 
     @property
     def is_identical(self) -> bool:
-        """Whether every state came out the same, bit for bit."""
+        """Test whether every state came out the same, bit for bit."""
         return self.first_difference is None
 
     @property
@@ -235,7 +235,7 @@ class Replay:
 
 
 def origin() -> dict[str, str]:
-    """What a recording is made with here: where any of it differs, a replay may differ in the last bits."""
+    """Software and processor of a recording made here: where any differs, a replay may differ in the last bits."""
     return {
         "version": version(),
         "kernels": folder_name(),  # digest of their sources

@@ -1,4 +1,4 @@
-"""What a step says about itself, per world. Nothing fails silently."""
+"""Report of a step, per world. Nothing fails silently."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ class Solver(IntEnum):
 
 
 class Status(IntEnum):
-    """How a world's step went."""
+    """Outcome of a world's step."""
 
     OK = 0
     UNRESOLVED = 1
@@ -33,7 +33,7 @@ class Status(IntEnum):
 
     @property
     def message(self) -> str:
-        """What happened, and what to do."""
+        """Explanation of the status, and advice."""
         return _MESSAGES[self]
 
     @staticmethod
@@ -121,9 +121,9 @@ class StepReport:
     residual : (worlds,) float64
         Worst natural-map residual accepted, relative to the free contact speed (see `physics.kernels.sweeps`).
     iterations, solves, fallbacks, unconverged, impacts, unresolved, faults, left_out, coarse : (worlds,) int64
-        Sweeps and Newton steps; contact problems (with an error asked for, those of refused parts, too); of these, by
+        Sweeps and Newton steps; contact problems (under error control, those of refused parts, too); of these, by
         the pivoting fallback (with the scheme ``events`` small leaps of first order, and parts of the shortest length
-        with more than the error asked for); above the tolerance;
+        with more than the error tolerance); above the tolerance;
         impacts that cut a substep; substeps with more impacts than allowed; bodies whose loads or new state were not
         finite, or beyond 1e100; contacts and near pairs of bodies for which there was no room; bodies that moved in
         fields which the step does not resolve.
@@ -168,8 +168,10 @@ class StepReport:
 
     @property
     def ok(self) -> bool:
-        """Whether every contact problem met its tolerance and was whole, states stayed finite, and no body was put deep
-        into another.
+        """True if nothing went wrong in any world.
+
+        Contact problems met their tolerances and were whole, states stayed finite, fields were resolved, and no body was
+        put deep into another.
         """
         return not (self._table[:, at.UNCONVERGED : at.FAULTS + 1].any() or self._table[:, at.LEFT_OUT].any()
                     or self._table[:, at.OVERLAP].any() or self._table[:, at.COARSE].any())  # fmt: skip

@@ -93,7 +93,7 @@ def load_scene(path: str | Path, kinds: Sequence[type[Field]] = ()) -> Scene:
     ----------
     path : str or Path
     kinds : sequence of classes, optional
-        Fields of your own that the file may name. A file never imports code by itself.
+        Fields of your own that the file may name. A file never imports code on its own.
 
     Raises
     ------

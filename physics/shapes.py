@@ -20,7 +20,7 @@ def _tuple(array: np.ndarray) -> tuple:
 
 @dataclass(frozen=True, kw_only=True)
 class Body:
-    """What all bodies have in common; use `Block`, `Sphere`, `Ellipsoid` or `Hull`.
+    """Base of all bodies; use `Block`, `Sphere`, `Ellipsoid` or `Hull`.
 
     Parameters
     ----------

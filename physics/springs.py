@@ -88,7 +88,7 @@ class Spring(Checked):
         return np.array([*self.point, *self.anchor, self.length, acts * self.stiffness, acts * self.damping])
 
     def _linked_columns(self, body: int) -> np.ndarray:
-        """Of one end of a spring between bodies, or of a body at neither."""
+        """Columns of one end of a spring between bodies, or of a body at neither."""
         ends = {self.body: (self.point, self.other, self.anchor), self.other: (self.anchor, self.body, self.point)}
         here, other, there = ends.get(body, ((0.0, 0.0, 0.0), -1, (0.0, 0.0, 0.0)))
         columns = np.zeros(linked.SIZE)
@@ -100,7 +100,7 @@ class Spring(Checked):
 
 
 class _LinkedSpring(Spring):
-    """What is compiled for springs between bodies."""
+    """Field that is compiled for springs between bodies."""
 
     function: ClassVar = linked.linked_spring
     energy: ClassVar = linked.linked_spring_energy

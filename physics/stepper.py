@@ -140,9 +140,9 @@ def _takes_each_step(world: World) -> bool:
 
 
 def _is_all(world: World, calls: list[Work]) -> bool:
-    """Whether a step is this call: there is one thread, no actuator, and no field that is told the time.
+    """Test whether a step is this call: there is one thread, no actuator, and no field that is told the time.
 
-    What `World.advance` does besides; a recorder, which comes and goes, is asked for in each call.
+    What `World.advance` does besides; a recorder, which comes and goes, is looked up in each call.
     """
     return len(calls) == 1 and world.actuation is None and not world.plan.fields
 

@@ -37,7 +37,7 @@ class _Short(reprlib.Repr):
         return repr(x) if x.bit_length() <= MOST_BITS else f"an integer of {x.bit_length()} bits"
 
     def repr_float64(self, x, level):
-        """Of NumPy's, as Python's."""
+        """Represent a NumPy float as Python's own."""
         return repr(float(x))
 
     def repr_ndarray(self, x, level):

@@ -125,7 +125,7 @@ class Team:
             self._futures[member] = self._pool.submit(self._be_member, member)
 
     def _be_member(self, member: int) -> None:
-        """What a thread of the pool does; meanwhile the team is in use, and with it all that it was told to call."""
+        """Run a thread of the pool; meanwhile the team is in use, and with it the prepared calls."""
         self._serve(member, self._stay)
 
     def _let_go(self) -> None:

@@ -129,7 +129,7 @@ class Trajectory:
 
     @property
     def ok(self) -> bool:
-        """Whether every interval's report was."""
+        """Test whether every interval's report was."""
         return all(report.ok for report in self.reports)
 
     def to_npz(self, path: str | Path) -> None:
@@ -236,7 +236,7 @@ def _times(duration, sample_dt, dt) -> tuple[float, float, float]:
 
 
 def _loads(wrench, world: World) -> Callable[[float], np.ndarray | None]:
-    """What gives the wrench (1, bodies, 6), or None, from a time [s]."""
+    """Return a function of the time [s] that gives the wrench (1, bodies, 6), or None."""
     shape = (1, world.body_count, 6)
     if wrench is None:
         return lambda t: None

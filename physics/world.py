@@ -68,7 +68,7 @@ class World:
     accuracy : str or Accuracy
         ``fast``, ``balanced``, ``precise``, ``reference``, or a `physics.Accuracy`.
     threads : int
-        Threads that share a step, no more than there are processors: each takes worlds of its own range, then of the
+        Threads that share a step, at most there are processors: each takes worlds of its own range, then of the
         others'. Between steps that follow each other within 0.3 ms they wait without sleeping.
 
     Attributes
@@ -270,7 +270,7 @@ class World:
 
     @property
     def report(self) -> StepReport:
-        """Of the last step, whoever took it."""
+        """Report of the last step, whoever took it."""
         return StepReport(self.report_table.copy())
 
     # --- changing ----------------------------------------------------------------------------------------------
@@ -425,7 +425,7 @@ class World:
         return self.sleep[:, GROUP].reshape(self.worlds, self.body_count) > 0.0
 
     def sleep_of_kernel(self) -> Sleep | None:
-        """What the step is told of sleep; None where no body may."""
+        """Sleep record for the step; None where no body may sleep."""
         if not self.plan.sleeping:
             return None
         effect = self.scene.effect(Sleeping)

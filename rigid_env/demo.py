@@ -72,7 +72,7 @@ class Demo:
     # --- numbers -------------------------------------------------------------------------------------------
 
     def events(self) -> list[dict]:
-        """What happened, equal things at the same time counted."""
+        """List the events, equal ones at the same time counted."""
         found: list[dict] = []
         for event in self.trajectory.events:
             content = {key: list(value) if isinstance(value, tuple) else value for key, value in asdict(event).items()}

@@ -29,7 +29,7 @@ def world_frame(
     goal: GoalView | None = None,
     applied: np.ndarray | None = None,
 ) -> Frame:
-    """What is to be drawn of one world now.
+    """Make the frame to draw of one world now.
 
     Parameters
     ----------

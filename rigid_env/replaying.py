@@ -1,4 +1,4 @@
-"""What ``rigid-env replay`` shows: a recording taken again, step by step."""
+"""Command ``rigid-env replay``: takes a recording again, step by step."""
 
 from __future__ import annotations
 

@@ -93,7 +93,7 @@ class RigidEnv(EpisodeParameters, gym.Env):
         observation : (entries,) float32
         info : dict
             As of `step`, and the parameters of the episode: ``mass``, ``size``, ``friction``, ``restitution``,
-            ``gravity``, all but those that `effects` take the place of.
+            ``gravity``, all except those that `effects` take the place of.
 
         Raises
         ------

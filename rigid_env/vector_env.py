@@ -141,7 +141,7 @@ class RigidVectorEnv(BatchAttributes):
         observations : (num_envs, entries) float32
         infos : dict of arrays
             With the parameters of the new episodes: ``mass``, ``size``, ``friction``, ``restitution``, ``gravity``,
-            all but those that `effects` take the place of.
+            all except those that `effects` take the place of.
 
         Raises
         ------

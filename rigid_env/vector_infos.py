@@ -16,7 +16,7 @@ def keys(task: Task) -> tuple[str, ...]:
 
 
 def of_outcomes(task: Task, mask: np.ndarray | None = None) -> dict[str, Any]:
-    """What the last step or start left behind, of the worlds of `mask` (worlds,) bool; zero in the others."""
+    """Infos that the last step or start left, of the worlds of `mask` (worlds,) bool; zero in the others."""
     outcome = task.outcome
     infos = {
         "is_success": outcome[:, col.SUCCESS] > 0.0,

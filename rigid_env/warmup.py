@@ -1,4 +1,4 @@
-"""What `rigid-env warmup` does: one step of everything common, so that its kernels are compiled."""
+"""Command `rigid-env warmup`: one step of all common scenes, so that their kernels are compiled."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ class Job:
 
 @dataclass(frozen=True)
 class Warmed:
-    """What a job took.
+    """Time of a job.
 
     Attributes
     ----------
@@ -51,7 +51,7 @@ class Warmed:
 
 
 def jobs() -> list[Job]:
-    """What is worth compiling ahead: environments, the three-wall box, then the other canonical scenes."""
+    """List the jobs worth compiling ahead: environments, the three-wall box, then the other canonical scenes."""
     found = [job for accuracy in ACCURACIES for job in _environment_jobs(accuracy)]
     seen: set[tuple] = set()
     names = [FIRST_SCENE, *(name for name in scenes.SCENES if name != FIRST_SCENE)]

@@ -1,4 +1,4 @@
-"""What an actuator does to a command: limits, and the exact first-order lag over a time in which it is held."""
+"""Actuator law of a command: limits, and the exact first-order lag over a time in which it is held."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What velocity is asked of each contact of a set: at an impact, and at the end of a stage that it rests through."""
+"""Target velocities of the contacts of a set: at an impact, and at the end of a stage that they rest through."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ NOTHING, RESIDUE, HIT = range(3)
 
 @inlined
 def may_hit(bounce_speed, slop_speed, work):
-    """Whether a contact of the set is fast enough for an impact: where none is, none is looked at."""
+    """Test whether a contact of the set is fast enough for an impact: where none is, none is looked at."""
     return work.approach > (min(bounce_speed, slop_speed) if work.restitution > 0.0 else slop_speed)
 
 
@@ -64,7 +64,7 @@ def aim_impact(n, bounce_speed, slop_speed, y, h, tilted, memory, work):
 
 @inlined
 def is_closing(i, n, work):
-    """Whether a contact of the wall of contact i is still above it."""
+    """Test whether a contact of the wall of contact i is still above it."""
     if not work.widest > work.slop:
         return False
     wall = wall_of(work.slot[i], work)
@@ -76,12 +76,12 @@ def is_closing(i, n, work):
 
 @inlined
 def gainless(target, u):
-    """A target for the velocity of a contact (normal, tangents), no more than what turns its velocity u round.
+    """A target for the velocity of a contact (normal, tangents), at most what turns its velocity u round.
 
     Impulses p that change contact velocities from u to u' change the energy by p·(u + u')/2: a push with u' <= -u adds
-    nothing, nor does what holds at |u'| <= |u|. Where a body turns by much less than a radian in a stage what is asked
-    for is just -u. Where it turns by more, ω x ṙ says nothing about the end of the stage, and is as large as one likes.
-    Along the wall a target t longer than u is shortened to |u|²/|t| <= |u|: the same where they are all but equal, and
+    nothing, nor does what holds at |u'| <= |u|. Where a body turns by much less than a radian in a stage the target
+    is just -u. Where it turns by more, ω x ṙ says nothing about the end of the stage, and is as large as one likes.
+    Along the wall a target t longer than u is shortened to |u|²/|t| <= |u|: the same where they are nearly equal, and
     one division.
     """
     most, square = u[1] * u[1] + u[2] * u[2], target[1] * target[1] + target[2] * target[2]
@@ -108,7 +108,7 @@ def _wandering(k, R, w, tilted, work):
 
 @inlined
 def _wandering_point(k, R, w, alpha, tilted, work):
-    """Of a body without vertices ω x r, ω x ṙ and α x r at wall k, four times each."""
+    """Return ω x r, ω x ṙ and α x r of a body without vertices at wall k, four times each."""
     r, rate = _wandering(k, R, w, tilted, work)
     turn, a, b = qt.cross(w, r), qt.cross(w, rate), qt.cross(alpha, r)
     return (
@@ -154,8 +154,8 @@ def _aim_at_others(first, n, v, w, alpha, half, is_turning, negligible, rate, R,
 def aim_rest(n, v, w, alpha, R, h, tilted, work):
     """Targets of the resting stage over h; R is the attitude at its middle, v and w are the velocities there before it.
 
-    The impulses act at the middle of the step, the velocity is asked for at its end, half a step later: a point has by
-    then gained h/2 (ω x ṙ + α x r), α the angular acceleration of free turning, and that is taken off. Of a vertex
+    The impulses act at the middle of the step, the target is the velocity at its end, half a step later: by then a
+    point has gained h/2 (ω x ṙ + α x r), α the angular acceleration of free turning, and that is taken off. Of a vertex
     ṙ = ω x r; the lowest point of an ellipsoid wanders over it; of a sphere it is 0. A feature still above the wall
     may close `CLOSING_SHARE` of its gap (all of it in a substep's last stage). What is smaller than the tolerance of
     the solve, or would move a contact by less than `UNSEEN` slops in the step, is 0: a body comes to rest to the last

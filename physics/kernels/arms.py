@@ -1,4 +1,4 @@
-"""Where the features of a body are: contact points relative to its centre of mass, and how they move over it."""
+"""Features of a body: contact points relative to its centre of mass, and their motion over the body."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What threads change and see of the same array at once, without a lock."""
+"""Atomic changes and reads of an array that threads share without a lock."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ _PAUSES = {
 
 
 def _pointer(context, builder, sig, args):
-    """Where table[row, column] is, for the first three arguments."""
+    """Pointer to table[row, column], from the first three arguments."""
     return pointer(context, builder, sig.args[0], args[0], sig.args[1:3], args[1:3])
 
 
@@ -29,7 +29,7 @@ def _word(context, builder, sig, args, k):
 
 
 def _changed_by(operation: str):
-    """How to lower a change of an element by a number, after which what was there before is returned."""
+    """Lower a change of an element by a number that returns the element's value before it."""
 
     def lower(context, builder, sig, args):
         number = _word(context, builder, sig, args, 3)

@@ -1,4 +1,4 @@
-"""What one step knows of one body: read and prepared once, then handed from stage to stage."""
+"""Record of one body for one step: read and prepared once, then handed from stage to stage."""
 
 from __future__ import annotations
 
@@ -69,7 +69,7 @@ def write_state(state, i, y):
 
 @inlined
 def is_finite(y):
-    """Whether every number of the state is finite, and their squares are far from not being so (`layout.LARGEST`)."""
+    """Test whether all numbers of the state are finite, and their squares far from overflow (`layout.LARGEST`)."""
     x, q, v, L = y
     turn = (q[0] * q[0] + q[1] * q[1]) + (q[2] * q[2] + q[3] * q[3])
     return (qt.dot(x, x) + qt.dot(v, v)) + (qt.dot(L, L) + turn) <= at.LARGEST * at.LARGEST
@@ -77,7 +77,7 @@ def is_finite(y):
 
 @inlined
 def all_finite(now):
-    """Whether every number of every state in `now` (bodies, STATE_SIZE) is."""
+    """Test whether every number of every state in `now` (bodies, STATE_SIZE) is."""
     return first_lost(now) < 0
 
 
@@ -92,7 +92,7 @@ def first_lost(now):
 
 @inlined
 def can_bear(work):
-    """Whether the loads that `bind_body` has found are finite, and far from overflowing (`layout.LARGEST`)."""
+    """Test whether the loads that `bind_body` has found are finite, and far from overflowing (`layout.LARGEST`)."""
     return work.acceleration <= at.LARGEST
 
 

@@ -1,4 +1,4 @@
-"""How long a body in flight is sure to stay clear of every wall: collision detection is left out for as long."""
+"""Time for which a body in flight is sure to stay clear of every wall and needs no collision detection."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ def clear_substeps(x, v, h, left, work):
 
     The first is `is_clear`'s. It would say the same of the next ones, as long as the acceleration stays what it is:
     with s and c the parts of velocity and acceleration towards a wall, its gap, and the bound for that at any time
-    before, loses no more than s t + c t²/2 in t. Half of each gap is spent on this, the other half is left for
+    before, loses at most s t + c t²/2 in t. Half of each gap is spent on this, the other half is left for
     rounding, and for textbook schemes, which go up to c t h/2 further: to leave out looks changes nothing.
     """
     if not is_clear(x, v, h, work):

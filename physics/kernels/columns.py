@@ -68,5 +68,5 @@ def present(n):
 
 @inlined
 def lane(k):
-    """Where lane k is."""
+    """Index of lane k."""
     return Lanes(0.0, 1.0, 2.0, 3.0) == k

@@ -1,4 +1,4 @@
-"""What the solvers of linear complementarity problems share: statuses, exact scaling, the final check.
+"""Statuses, exact scaling and the final check that the solvers of linear complementarity problems share.
 
 Every solver scales its problem by powers of two first. That is exact in floating
 point, makes tolerances dimensionless, and lets units of any size stand side by side.
@@ -30,7 +30,7 @@ def inverse_power_of_two(x):
 
 @kernel
 def are_finite(M, q):
-    """Whether q (n,) and the leading n x n block of M hold neither NaN nor infinity."""
+    """Test whether q (n,) and the leading n x n block of M hold neither NaN nor infinity."""
     n = q.shape[0]
     for i in range(n):
         if not math.isfinite(q[i]):

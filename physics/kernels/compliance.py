@@ -6,8 +6,8 @@ the same way:
 
     p = -h (k g_θ + c g'_θ),    g_θ = (1 - θ) g⁰ + θ g¹,    g'_θ likewise.
 
-(Of a point that is still above the wall, g⁰ > 0, 0 stands for g⁰ there: what is stored in the spring is then no more
-than was paid for.) With g, the gap after the first drift, g¹ = g + θh u + (θh)² b/2 and g'¹ = u + θh b, u the new
+(Of a point that is still above the wall, g⁰ > 0, 0 stands for g⁰ there: the spring then stores at most the energy
+that was paid for.) With g, the gap after the first drift, g¹ = g + θh u + (θh)² b/2 and g'¹ = u + θh b, u the new
 velocity of the point where it is then and b what it gains there per time by turning (`aims.aim_rest`), that is
 linear in u. In a contact problem
 
@@ -196,5 +196,5 @@ def _unyielding(value, rho, work):
 
 @if_law((STIFFNESS,), _unyielding)
 def yielding(value, rho, work):
-    """What is left of value, a normal impulse q - ρ u or its slope, with γ: p = q - ρ (u + γ p)."""
+    """Scale a value, a normal impulse q - ρ u or its slope, by the compliance γ: p = q - ρ (u + γ p)."""
     return value / (1.0 + rho * work.give)

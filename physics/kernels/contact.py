@@ -21,7 +21,7 @@ stiffness = number_of(STIFFNESS)  # of contact that gives (`compliance`)
 
 @inlined
 def is_clear(x, v, h, work):
-    """Whether the bounding sphere stays clear of every wall during a free flight of h from x with velocity v.
+    """Test whether the bounding sphere stays clear of every wall during a free flight of h from x with velocity v.
 
     The gap of the sphere is a parabola in time; it is bounded below by its start plus what the velocity and
     the acceleration can each take off. A contact could only matter when this is false.
@@ -39,7 +39,7 @@ def is_clear(x, v, h, work):
 
 @inlined
 def _admit(gap, speed, slop, reach, soft, slot, h, memory, work):
-    """Whether a feature belongs to the contact set of this stage.
+    """Test whether a feature belongs to the contact set of this stage.
 
     It does when it touches (gap <= slop); when loads make it no faster at the wall than `soft`: than from rest in the
     step, and than what rests as it is (`aims.aim_impact`); and when loads can bring it to the wall within the step, if
@@ -138,7 +138,7 @@ def _record(count, wall, feature, features, gap, speed, work):
 
 @inlined
 def what_is_behind(x, R, tilted, work):
-    """What is behind walls: (whether a feature outside the contact set, by more than half a slop; anything, by a slop).
+    """Test for features behind walls: (one outside the contact set, by more than half a slop; any, by a slop).
 
     Once a feature outside the set is, the other walls are not looked at: both are true then.
     """
@@ -211,7 +211,7 @@ def gap_of(slot, x, R, tilted, work):
 
 @kernel
 def gap_rate(slot, y, tilted, work):
-    """How fast the gap of one feature grows [m/s]: its normal velocity. A point that wanders does so along the wall."""
+    """Rate of the gap of one feature [m/s]: its normal velocity. A point that wanders does so along the wall."""
     _, q, v, L = y
     walls, R, shape = work.walls, qt.to_matrix(q), work.shape
     dims = (work.dims[0], work.dims[1], work.dims[2])

@@ -1,4 +1,4 @@
-"""Where a gap is used up, by the parabola through what is known of it."""
+"""Root of a gap, by the parabola through its known values."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ def second_difference(a, fa, b, fb, c, fc):
 
 @inlined
 def crossing(low_gap, high_gap, width, bend):
-    """Where the parabola from low_gap >= 0 to high_gap < 0, `width` later, is zero: within [0, width].
+    """Root in [0, width] of the parabola from low_gap >= 0 to high_gap < 0, `width` later.
 
     With the slope B at its start and `bend` c, c x² + B x + low_gap = 0: of the root's two forms the one that does not
     cancel. A gap that grows at first (B > 0) comes down again: c < 0.

@@ -15,7 +15,7 @@ at r_i, centroid r̄, d_i = r_i - r̄ and second moment K = Σ (|d_i|² 1 - d_i 
 F the total impulse and T its moment about the centroid (K⁻¹ is 1/Σ|d_i|² on a line, 0 at a point). A body at
 rest gets velocity zero, to the last bit, and a symmetric patch symmetric impulses. Where this one leaves a
 cone although every contact pushes, the tangential impulses are shared out in the proportion of the normal
-ones instead, the same formula with the weights p_n: a lightly loaded contact is then asked for little. A
+ones instead, the same formula with the weights p_n: a lightly loaded contact then has a small target. A
 contact that would have to pull is left out, the one that pulls most first. If each p_i lies in its friction
 cone at the end, this solves the contact problem exactly; otherwise the contacts slide (`slide`, `sweeps`).
 
@@ -50,7 +50,7 @@ from physics.kernels.share import (
 # 1e-6 (edges 1 : 350) the patch counts as a line and is left to the sweeps.
 LINE_LIMIT = 1.0e-6
 
-# The contact velocities asked for must be those of one rigid twist, to this share of the largest of them
+# The target velocities must be those of one rigid twist, to this share of the largest of them
 # (rounding of a least-squares fit over a patch that is not a line).
 RIGID_LIMIT = 1.0e-11
 
@@ -124,7 +124,7 @@ def _target_moments(n, count, c, work):
 
 @inlined
 def _miss(n, v, w, work):
-    """How far contact velocities are from their targets, at most.
+    """Largest distance of contact velocities from their targets.
 
     A contact without impulse may separate faster than asked.
     """

@@ -1,6 +1,6 @@
 """Friction of a patch whose directions would turn right round: impulses anywhere in the disc, primal-dual Newton.
 
-Of a contact that stops, or all but stops, a direction says nothing. So its friction -μ p z, |z| <= 1, is sought beside
+Of a contact that stops, or nearly stops, a direction says nothing. So its friction -μ p z, |z| <= 1, is sought beside
 the planar motion τ: z |u| = u, so that what slides has z = d, and what holds has u = 0 and any z in the disc.
 Linearised about both, with d = u/|u|,
 
@@ -35,7 +35,7 @@ from physics.kernels.point import inverse_root
 # Rounds at most.
 DUAL_LIMIT = 24
 
-# Share of the residual asked for below which a slip has no direction.
+# Share of the tolerance below which a slip has no direction.
 TINY = 1.0e-3
 
 # Share of the largest free contact speed that s is, and below which a slip is too small for u/|u|: that would be off by

@@ -29,7 +29,7 @@ def last_push(slot, memory, work):
 
 @kernel
 def free_acceleration(slot, y, tilted, work):
-    """How a feature's gap accelerates without contact, n·(v̇ + ω̇ x r + ω x ṙ) [m/s²]; < 0: it is pressed."""
+    """Acceleration of a feature's gap without contact, n·(v̇ + ω̇ x r + ω x ṙ) [m/s²]; < 0: it is pressed."""
     _, q, _, L = y
     n, a, torque = wall_normal(work.walls, wall_of(slot, work)), work.free_acceleration, work.torque
     dims = (work.dims[0], work.dims[1], work.dims[2])
@@ -44,7 +44,7 @@ def free_acceleration(slot, y, tilted, work):
 
 @kernel
 def stays(gap, slot, y, h, tilted, memory, work):
-    """Whether a round body that pushed in the last stage is pressed still, so that the gap it was left with closes."""
+    """Test whether a round body that pushed in the last stage is still pressed, so that its gap closes."""
     if not (work.shape == ELLIPSOID and last_push(slot, memory, work) > 0.0):
         return False
     return gap + 0.5 * h * h * min(free_acceleration(slot, y, tilted, work), 0.0) <= work.slop
@@ -55,7 +55,7 @@ def turning_acceleration(w, work):
     """Largest acceleration that turning at w alone gives to a contact along its normal [m/s²].
 
     |n·(ω x ṙ)| <= ω² ρ with the largest radius ρ of curvature of an ellipsoid, its largest half-axis squared by its
-    smallest; of a vertex ω² times its distance. (n·(α x r) of free turning is no more than as much again.)
+    smallest; of a vertex ω² times its distance. (n·(α x r) of free turning is at most as much again.)
     """
     reach = work.radius
     if work.shape == ELLIPSOID:
@@ -65,7 +65,7 @@ def turning_acceleration(w, work):
 
 @kernel
 def goes_on(i, y, h, tilted, memory, work):
-    """Whether the speed of contact i of the set is an error of the last stage: it pushed then, and is no faster.
+    """Test whether the speed of contact i of the set is an error of the last stage: it pushed then, and is no faster.
 
     A stage of length h can leave a contact that holds the speed that loads and turning make in it.
     """

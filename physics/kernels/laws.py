@@ -19,7 +19,7 @@ _PREFIX = "law_"
 
 
 def members(laws: tuple[str, ...]) -> list[tuple]:
-    """What a workspace holds for these laws: nothing when there are none."""
+    """Members of a workspace for these laws; none without laws."""
     if not laws:
         return []
     numbers = [("laws", float, (len(laws),)), *((_PREFIX + name, float) for name in laws)]

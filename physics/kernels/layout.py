@@ -1,4 +1,4 @@
-"""Where each number of a body stands: columns of the arrays that the kernels share.
+"""Columns of the arrays that the kernels share: the place of each number of a body.
 
 One row per (world, body), contiguous, so that a step reads what it needs from
 two or three cache lines. `i` is always the flat index world * body_count + body.

@@ -132,7 +132,7 @@ def inverse_entry(tableau, basis, n, i, k):
 
 @kernel
 def keep_tied(tableau, basis, n, c, k, count):
-    """Of the first `count` tied rows keep those of least ratio in column k of [q | inverse].
+    """Keep those of the first `count` tied rows that have the least ratio in column k of [q | inverse].
 
     k = -1 stands for the right-hand side. Returns how many are left.
     """

@@ -1,6 +1,6 @@
 """One or two contacts of one wall: every mixture of holding, sliding and opening, without a Delassus matrix.
 
-Two contacts that slide are two angles. For given directions "both normal velocities are the ones asked for" is a
+Two contacts that slide are two angles. For given directions "both normal velocities are on target" is a
 2 x 2 system for the normal impulses, and Newton's method turns both directions at once until no velocity is left
 across them (`point` has the same for a single contact).
 
@@ -248,7 +248,7 @@ def solve_one(first, mu, goal, inv_mass, K, work):
 
 @inlined
 def _pushed_apart(W11, W12, W22, b1, b2):
-    """What impulses without friction do to the velocities of two contacts that approach with b1 and b2 (< 0) [m/s]."""
+    """Velocities of two contacts that approach with b1 and b2 (< 0) after impulses without friction [m/s]."""
     s = 1.0 / (W11[0] * W22[0] - W12[0] * W12[0])
     p1, p2 = s * (W12[0] * b2 - W22[0] * b1), s * (W12[0] * b1 - W11[0] * b2)
     if p1 < 0.0:

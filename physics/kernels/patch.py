@@ -3,7 +3,7 @@
 A patch has three or four contacts, a lane each (`lanes`); the fourth lane of three is the third contact once more, and
 never pushes. `on` is 1 for a contact that pushes and 0 for one that is open. All is in the stretched frame of `ellipse`
 (of an even wall: its frame): `place` are coordinates (normal, tangents) relative to the centre of mass, `target` is
-what is asked for along the same axes, and `mobility` W_aa + W_bb of each contact.
+the targets along the same axes, and `mobility` W_aa + W_bb of each contact.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from physics.kernels.point import LEAST_SQUARE, inverse_root, is_warm, point_vel
 # Second moments of a patch: below this share of det to trace² it counts as a line (edges 1 : 1000).
 LINE_LIMIT = 1.0e-6
 
-# Share of its free slip that a face which all but holds starts with.
+# Share of its free slip that a face which nearly holds starts with.
 LEAST_SLIP = 0.01
 
 
@@ -83,7 +83,7 @@ def _spread(n, a, b, on):
 
 @inlined
 def may_hold(n, axes, v, L, work):
-    """Whether friction may stop a face, with the velocity v and angular momentum L that it has without it.
+    """Test whether friction may stop a face, with the velocity v and angular momentum L that it has without it.
 
     What holds stops at its wall: the pushes P take away the normal momentum, and friction, μP at most, the tangential
     one; its moment about the centroid is μ Σ p_i |d_i| <= μP max |d_i| at most. Of a face that can hold this is true;
@@ -105,13 +105,13 @@ def may_hold(n, axes, v, L, work):
 def cold_motion(n, patch, on, mu, u, w, inv_mass, K):
     """Planar motion that friction leaves of one without impulses, if the planar friction is that of an ellipsoid.
 
-    The forces and moments about the centroid that equal pushes, P in all, can exert while a face slides are all but an
+    The forces and moments about the centroid that equal pushes, P in all, can exert while a face slides are nearly an
     ellipsoid, (|f|/μP)² + (T/μPρ)² <= 1, and the slip is along its normal, (v, ρ² ω) (Goyal et al. 1991; Howe and
     Cutkosky 1996). With ρ² = Σ|d_i|²/n, β = μP/m, γ = μPρ²/I and the slip's size s, s² = v² + ρ²ω²,
 
         v = v₀ s/(s + β),   ω = ω₀ s/(s + γ),   φ(s)² = v₀²/(s + β)² + ρ²ω₀²/(s + γ)² = 1.
 
-    1/φ is all but a straight line and concave: one step of Newton's, from where it is not above 1, is near enough. What
+    1/φ is nearly a straight line and concave: one step of Newton's, from where it is not above 1, is near enough. What
     φ(0) <= 1 says would hold is given a small part of its slip, since directions are wanted.
     """
     (_, a, b), _, _ = patch
@@ -280,14 +280,14 @@ def across_misses(patch, p, slip, mu, delta):
 
 @inlined
 def is_turned(on, d, size, change):
-    """Which slips, of direction d and this size [m/s], turn by more than about 70 degrees when they change."""
+    """Mark the slips, of direction d and this size [m/s], that turn by more than about 70 degrees when they change."""
     along, across = size + (d[0] * change[0] + d[1] * change[1]), d[0] * change[1] - d[1] * change[0]
     return (on * size > 0.0) & ~((along > 0.1 * size) & (abs(across) <= 3.0 * along))
 
 
 @inlined
 def turns_little(patch, on, slip, mu, step):
-    """Whether no direction turns by more than about 70 degrees, and none backwards, in a step of the motion."""
+    """Test whether no direction turns by more than about 70 degrees, and none backwards, in a step of the motion."""
     (_, a, b), _, _ = patch
     x, y, size = slip
     s = -1.0 / mu

@@ -104,7 +104,7 @@ def inverse_root(square):
 
 @inlined
 def is_warm(push, needed):
-    """Whether what a warm start pushes with is near enough to what the loads of now need, for its friction to be so."""
+    """Test whether a warm start's push is so near to the push that the present loads need that its friction is, too."""
     return abs(push - needed) <= WARM_SHARE * abs(needed)
 
 
@@ -149,7 +149,7 @@ def answer(W, b, mu, trace, goal, x, y, may_hold):
     trace : float
         W_aa + W_bb of the contact, which the residual is measured with: `W` may be less, when others give way.
     goal : float
-        Residual asked for [m/s].
+        Tolerance of the residual [m/s].
     x, y : float
         First guess of -μ d; 0, 0: none.
     may_hold : bool

@@ -30,7 +30,7 @@ from physics.kernels.compliance import yielding
 from physics.kernels.sweeps import NORMAL_STEP, cone_residual, velocities
 
 # ρ in units of a contact's normal mass 1/W_nn: of the first round, its growth from round to round, and the
-# largest, where rounding times ρ is still below what is asked for. Large: fewer rounds, Newton steps that
+# largest, where rounding times ρ is still below the tolerance. Large: fewer rounds, Newton steps that
 # overshoot more often.
 PROXIMAL_FACTOR = 1.0e3
 FACTOR_GROWTH = 10.0
@@ -47,7 +47,7 @@ FAILURES = 5
 QUICK_ROUNDS = 6
 QUICK_STEPS = 8
 
-# A round is solved to this share of the residual that is asked for.
+# A round is solved to this share of the tolerance.
 ROUND_SHARE = 0.01
 
 
@@ -186,7 +186,7 @@ def proximal_newton(n, residual, goal, is_quick, work):
         Contacts in `work`: what `assemble` and `factor_blocks` fill is read; `work.impulse` is the start and
         receives the result, `work.velocity` the contact velocities.
     residual, goal : float
-        Of the start, and asked for [m/s].
+        Residual of the start, and tolerance [m/s].
     is_quick : bool
         Whether to give up early: there is another turn.
 

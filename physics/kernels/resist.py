@@ -1,4 +1,4 @@
-"""What contact of round bodies takes from their turning, and gives to it: rolling and spin friction, superballs.
+"""Torques of contact on round bodies: rolling friction, spin friction and tangential restitution.
 
 Rolling and spin friction are torques. With the normal impulse p of a contact, ω its angular velocity, n the normal,
 
@@ -100,7 +100,7 @@ def _as_solved(n, friction, smooth, pivots, v, L, solved, R, work):
 
 @if_law((ROLLING, SPIN), _as_solved)
 def resist_turning(n, friction, smooth, pivots, v, L, solved, R, work):
-    """What `solve_contacts` gave for v and L, with the torques of rolling and spin friction on a round body."""
+    """Result of `solve_contacts` for v and L, with the torques of rolling and spin friction on a round body."""
     if work.shape == BLOCK:
         return solved
     across, along = rolling_radius(work), spin_radius(work)
@@ -146,7 +146,7 @@ def _energy(v, L, R, work):
 
 @if_law((TANGENTIAL,), _as_solved)
 def without_gain(n, friction, smooth, pivots, v, L, solved, R, work):
-    """What `solve_contacts` gave for v and L, or, where that has gained energy, what it gives without `aim_tangential`.
+    """Result of `solve_contacts` for v and L; where that has gained energy, the one without `aim_tangential`.
 
     A sphere's only contact cannot gain any: what it does along the wall and across does not mix. That of a sphere
     which at the same time rests on another wall can, its coefficients there being others.

@@ -31,7 +31,7 @@ FREE_LIFT = 10.0
 
 @inlined
 def kinetic_energy(q, v, L, work, tilted):
-    """Of one body [J]."""
+    """Kinetic energy of one body [J]."""
     return 0.5 * (work.mass * qt.dot(v, v) + qt.dot(L, angular_velocity(q, L, work, tilted)))
 
 
@@ -50,7 +50,7 @@ def lifted_to(z, y, tilted, work):
 
 @inlined
 def rebound_share(before, plastic, full, middle):
-    """Largest s in [0, 1] at which the energy is no more than `before`.
+    """Largest s in [0, 1] at which the energy is at most `before`.
 
     `plastic`, `middle` and `full` are the energies at s = 0, 1/2 and 1 [J]: f(s) = plastic + B s + C s² with
     C = 2 (full + plastic) - 4 middle >= 0 and f(1) > before >= f(0). The root in the form that does not cancel.
@@ -85,7 +85,7 @@ def part_of_rebound(q, before, plastic, full, work, tilted):
 
 @kernel
 def shortened(n, friction, before, w, solved, free, R, work):
-    """What `solve_contacts` gave for `free` (v, L), with impulses so short that they give no energy.
+    """Result of `solve_contacts` for `free` (v, L), with impulses so short that they give no energy.
 
     For a problem that no method solved. Its impulses lie in their cones, and so does any share s of them, whose work is
     ½ s (A + s B), A = P·(v + v_free) + Q·(ω + ω_free), B = P·P/m + Q·I⁻¹ Q >= 0, with v and ω (`before`, `w`) before

@@ -37,7 +37,7 @@ GROWTH = 2.0
 
 
 class Sleep(NamedTuple):
-    """What a step knows of sleep; None where the scene does not declare it."""
+    """Sleep of bodies as a step reads it; None where the scene does not declare it."""
 
     rows: np.ndarray  # (worlds * bodies, SLEEP_SIZE)
     way: float  # that counts as none [bounding radii]
@@ -46,7 +46,7 @@ class Sleep(NamedTuple):
 
 @inlined
 def sleeps(i, sleep):
-    """Whether body i sleeps: never, where the scene does not declare it."""
+    """Test whether body i sleeps: never, where the scene does not declare it."""
     if sleep is None:
         return False
     return sleep.rows[i, GROUP] > 0.0
@@ -60,7 +60,7 @@ def stir(i, sleep):
 
 @inlined
 def is_pushed_anew(i, wrench, sleep):
-    """Whether another wrench acts on body i than so far; it is the one that counts from now on."""
+    """Test whether another wrench acts on body i than so far; it is the one that counts from now on."""
     is_other = False
     for c in range(6):
         if wrench[i, c] != sleep.rows[i, WRENCH + c]:
@@ -72,7 +72,7 @@ def is_pushed_anew(i, wrench, sleep):
 def _way_from_start(i, y, radius, rows):
     """Bound for the distance of any point of the body from where it was at the window's start [m].
 
-    A turn by θ moves a point by 2 r sin(θ/2) at most, and |q - q0| = 2 sin(θ/4): no more than 2 r |q - q0|. Sums of
+    A turn by θ moves a point by 2 r sin(θ/2) at most, and |q - q0| = 2 sin(θ/4): at most 2 r |q - q0|. Sums of
     absolute values are no less than norms.
     """
     x, q, _, _ = y
@@ -104,7 +104,7 @@ def _begin(i, y, rows):
 
 @inlined
 def _is_over(clock, work, sleep):
-    """Whether a window that has lasted so long is over: √(2 r/a) is how long it takes to fall r at a."""
+    """Test whether a window that has lasted so long is over: √(2 r/a) is how long it takes to fall r at a."""
     if sleep.time > 0.0:
         return clock >= sleep.time
     return clock * clock * work.acceleration >= 2.0 * work.radius
@@ -132,7 +132,7 @@ def watch(i, y, h, work, sleep):
 
 @inlined
 def is_growing(last, before):
-    """Whether the way in the last window says that what moves will move further."""
+    """Test whether the way in the last window says that what moves will move further."""
     return not last <= GROWTH * before
 
 
@@ -144,7 +144,7 @@ def laid_down(y):
 
 @inlined
 def sleeps_on(i, wrench, sleep):
-    """Whether body i, which meets walls only, sleeps and goes on to do so under this wrench."""
+    """Test whether body i, which meets walls only, sleeps and goes on to do so under this wrench."""
     if is_pushed_anew(i, wrench, sleep):
         stir(i, sleep)
     return sleep.rows[i, GROUP] > 0.0

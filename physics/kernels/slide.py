@@ -1,7 +1,7 @@
 """A patch of contacts that slide: their impulses from a few small linear systems, without a Delassus matrix.
 
 A sliding contact has the impulse p_i (n - μ d_i) along the direction d_i = u_t/|u_t| of its own sliding (u_t
-less what is asked of it). Given the directions, "every normal velocity is the one asked for" is linear in the
+less what is asked of it). Given the directions, "every normal velocity is on target" is linear in the
 normal impulses; given the impulses so are the velocities, and these give new directions. What remains is to
 turn a few unit vectors the right way.
 
@@ -195,7 +195,7 @@ def search(n, patient, mu, goal, loose, patch, start, is_mixed, axes, u, w, inv_
         Whether a contact that pulls may push again while directions still turn. Otherwise it opens at once, which
         is quick and nearly always right.
     goal : float
-        Residual asked for [m/s].
+        Tolerance of the residual [m/s].
     loose : float
         Speed up to which an open contact may close while it is sought which others push [m/s].
     start : tuple of 3 floats

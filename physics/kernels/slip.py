@@ -97,7 +97,7 @@ def oppose_end_slip(n, work):
 
 @inlined
 def has_turned_round(n, v, w, work):
-    """Whether the slip of a contact that pushes is against the one before, -`work.target`, after impulses."""
+    """Test whether the slip of a contact that pushes is against the one before, -`work.target`, after impulses."""
     ratio = friction_ratio(work)
     for i in range(n):
         a, b = _tangential(i, v, w, work)
@@ -113,7 +113,7 @@ def _as_solved(n, friction, smooth, pivots, v, w, solved, free, R, h, work):
 
 @if_law((STIFFNESS,), _as_solved)
 def without_gift(n, friction, smooth, pivots, v, w, solved, free, R, h, work):
-    """What `solve_contacts` gave for `free` (v, L); if friction gave energy, that with friction against the mean slip.
+    """Result of `solve_contacts` for `free` (v, L); if friction gave energy, that with friction against the mean slip.
 
     An impulse p adds p·½(u⁰ + u¹). Friction that stops a contact adds ½ p_t·u⁰, which in a rigid impact the normal
     impulse outweighs. A spring pushes as much as it is deep, not as much as would do that.

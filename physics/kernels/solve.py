@@ -36,7 +36,7 @@ PIVOTING = 3
 # is.
 PIVOT_ABOVE = 0.01
 
-# Residual that rounding leaves, relative to the largest free contact speed: no more is asked for.
+# Residual that rounding leaves, relative to the largest free contact speed: the smallest tolerance.
 ROUNDING = 1.0e-12
 
 # Sweeps before Newton's method has a turn: most problems that are left for sweeps need fewer than ten.
@@ -187,7 +187,7 @@ def _iterate(n, friction, smooth, goal, work):
 
 @standing
 def _by_sweeps(n, friction, smooth, pivots, v, L, R, work):
-    """What `solve_contacts` returns, by sweeps and what follows: apart, since most problems are not left for it."""
+    """Result of `solve_contacts` by sweeps and later solvers: out of line, since few problems come to it."""
     width = 1 if friction is None else 3
     scale = _assemble(n, width, R, v, L, work)
     goal = max(min(work.tolerance * scale, work.still), ROUNDING * scale)

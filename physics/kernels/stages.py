@@ -53,7 +53,7 @@ def load_warm_start(n, width, memory, i, h, work):
 
 @inlined
 def _are_kept(n, memory, i, work):
-    """Whether the contacts of the last resting stage are those of this one, in the same order."""
+    """Test whether the contacts of the last resting stage are those of this one, in the same order."""
     if memory[i, CONTACT_COUNT] != n:
         return False
     for k in range(n):
@@ -116,7 +116,7 @@ def note_solve(report, world, residual, sweeps, method, tolerance):
 
 @inlined
 def contacts_gain(before, w, v, L, solved, R, h, work):
-    """Whether the impulses of a resting stage raise the energy by more than its solve and its step may be off.
+    """Test whether the impulses of a resting stage raise the energy by more than its solve and its step may be off.
 
     Impulses P at the centre of mass and moments Q about it change it by ½ P·(v + v') + ½ Q·(ω + ω'), v and ω before
     the stage (`before`, w), v' and ω' after it. `v`, `L` are those with loads and without impulses.
@@ -153,7 +153,7 @@ def _calmed_if_it_gains(n, friction, smooth, pivots, before, w, solved, free, R,
 
 @if_law((STIFFNESS,), _calmed_if_it_gains)
 def calmed_stage(n, friction, smooth, pivots, before, w, solved, free, R, h, work):
-    """What `solve_contacts` gave for `free` (v, L); if that raises the energy, what it gives for calm targets.
+    """Result of `solve_contacts` for `free` (v, L); if that raises the energy, the one for calm targets.
 
     If even that does, since no method solved it, as much of it as does not. Springs give back what they hold.
     """

@@ -8,7 +8,7 @@ bodies meet, and between the cuts
   half a free drift.
 
 Moreau, *Unilateral contact and dry friction in finite freedom dynamics*, 1988, for the midpoint step; what
-differs are the cut at impacts, the velocity asked for at the step's end (`aims.aim_rest`) and friction against the
+differs are the cut at impacts, the target velocity at the step's end (`aims.aim_rest`) and friction against the
 mean slip of few contacts (`slip`), which together make the scheme second order between impacts and exact on parabolas.
 
 What a scene does not have arrives here as None and is pruned by the compiler (see `compiler.kernel`).
@@ -54,7 +54,7 @@ IMPACT_TRIALS = 16
 
 @inlined
 def has_touched(memory, i):
-    """Whether a body had contacts in its last stage: then its bounding sphere touches a wall, or has just left it."""
+    """Test whether a body had contacts in its last stage: its bounding sphere touches a wall, or has just left it."""
     return memory[i, CONTACT_COUNT] > 0.0
 
 
@@ -102,7 +102,7 @@ def contact_set(y, h, tilted, memory, work):
 
 @inlined
 def has_same_pose(y, z):
-    """Whether two states have the same position and attitude, to the last bit."""
+    """Test whether two states have the same position and attitude, to the last bit."""
     return y[0] == z[0] and y[1] == z[1]
 
 

@@ -58,13 +58,13 @@ def largest_moment(work):
 
 @inlined
 def is_centred(tilted, work):
-    """Whether the geometric centre is the centre of mass."""
+    """Test whether the geometric centre is the centre of mass."""
     return tilted is None or (work.center[0] == 0.0 and work.center[1] == 0.0 and work.center[2] == 0.0)
 
 
 @inlined
 def may_turn(L, h, least, tilted, work):
-    """Whether a body of angular momentum L could turn by more than `least` [rad] in h: a glance, which never misses.
+    """Test whether a body of angular momentum L could turn by more than `least` [rad] in h: a cheap, safe bound.
 
     A sphere does not where its centre is its centre of mass.
     """
@@ -88,7 +88,7 @@ def spin_bound(q, L, h, tilted, work):
 
 @inlined
 def _arm(i, tilted, work):
-    """How far points of a body are from its principal axis i, at most [m]."""
+    """Largest distance of a body's points from its principal axis i [m]."""
     if tilted is not None or work.shape == HULL:
         return work.radius
     b, c = work.dims[(i + 1) % 3], work.dims[(i + 2) % 3]
@@ -131,7 +131,7 @@ def lowest(shape, dims, R, k):
 def first_bracket(gap, rate, turning, bend, horizon):
     """Times (before, after) between which a bound gap + rate t - (points turn) - bend t²/2 falls to zero.
 
-    Points move along the normal by no more than `turning` [m/s] at first, towards the wall or away from it.
+    Points move along the normal by at most `turning` [m/s] at first, towards the wall or away from it.
     """
     s, u = max(0.0, turning - rate), max(0.0, turning + rate)
     before = 2.0 * gap / (s + math.sqrt(s * s + 2.0 * bend * gap))
@@ -141,7 +141,7 @@ def first_bracket(gap, rate, turning, bend, horizon):
 
 @inlined
 def chord(low, at_low, high, at_high):
-    """Where the chord from (low, at_low > 0) to (high, at_high < 0) is zero."""
+    """Root of the chord from (low, at_low > 0) to (high, at_high < 0)."""
     return low + (high - low) * (at_low / (at_low - at_high))
 
 
@@ -195,7 +195,7 @@ def safe_time(y, wall, horizon, spin, tilted, work):
 
 @inlined
 def may_reach(wall, y, h, work):
-    """Whether the bounding sphere may touch a wall in a free flight of h."""
+    """Test whether the bounding sphere may touch a wall in a free flight of h."""
     n, a = wall_normal(work.walls, wall), work.free_acceleration
     gap = qt.dot(n, y[0]) - work.walls[wall, OFFSET] - work.radius
     gap += min(0.0, h * qt.dot(n, y[2])) + min(0.0, 0.5 * h * h * (n[0] * a[0] + n[1] * a[1] + n[2] * a[2]))

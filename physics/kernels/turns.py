@@ -1,4 +1,4 @@
-"""How threads share a batch: each takes worlds of its own range, the next few at once, and then of the others' ranges.
+"""Work stealing of threads over a batch: each takes the next few worlds of its own range, then of the others' ranges.
 
 They do so in machine code, without the interpreter in between: its lock changes hands only when a thread begins and
 ends. A thread finds the worlds of its own range where it left them, in the cache of its processor: where it took what

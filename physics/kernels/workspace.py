@@ -71,7 +71,7 @@ def workspace_dtype(
     ]
     stage = [
         ("mode", i),  # which direct solve to try first, then which one did it (`slide.HOLD`, `SLIDE`, `MIXED`)
-        ("still", f),  # residual that is asked for beside the tolerance [m/s]: see `stages.still_speed`
+        ("still", f),  # residual allowed beside the tolerance [m/s]: see `stages.still_speed`
         ("unseen", f),  # by what the targets of contacts that hold may be off [m/s]: see `direct`
         ("is_last", i),  # 1 in the last stage a substep may have: take in all that would pass through a wall
     ]

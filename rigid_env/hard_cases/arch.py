@@ -53,7 +53,7 @@ def least_thickness(stones: int) -> float:
 
 
 def missing_force(stones: int, thickness: float) -> float:
-    """The least sum of forces, by the weight, that must help to hold the arch: 0 where it stands by itself.
+    """The least sum of forces, by the weight, that must help to hold the arch: 0 where it stands unaided.
 
     The linear program of limit analysis: forces at both ends of every joint that push, with friction within Coulomb's
     law, and the weight are in equilibrium on every stone, with the help of forces and moments of any sign, whose sizes

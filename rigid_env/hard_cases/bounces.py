@@ -110,7 +110,7 @@ def _leaving(on: Setting, e: float, speed: float) -> float:
 
 
 def restitution(on: Setting) -> Sequence[Check]:
-    """The block hits the floor flat: -v⁺/v⁻ is the e asked for, 0 to 1, from 1 mm/s to 100 m/s.
+    """The block hits the floor flat: -v⁺/v⁻ is the scene's e, 0 to 1, from 1 mm/s to 100 m/s.
 
     Without gravity the velocity after it is that of the impact; rounded a few times. Time stepping does not make a
     rebound that would be over within `rest_share` of the step: the threshold is there to be set, and 0 lets a
@@ -133,7 +133,7 @@ def restitution(on: Setting) -> Sequence[Check]:
 
 
 def _unfolded(place, velocity, t, half):
-    """Where a point that flies between walls at ±half [m] and is reflected is: the straight line, folded."""
+    """Place of a point that flies between walls at ±half [m] and is reflected: the straight line, folded."""
     along = np.mod(place + velocity * t + half, 4 * half)
     return np.where(along < 2 * half, along, 4 * half - along) - half
 

@@ -1,4 +1,4 @@
-"""What a hard case is: a known outcome, and a run that holds the engine against it."""
+"""Hard cases: a known outcome, and a run that holds the engine against it."""
 
 from __future__ import annotations
 
@@ -54,14 +54,14 @@ class Check:
 
     @property
     def passes(self) -> bool:
-        """Whether the value obeys; NaN never does."""
+        """Test whether the value obeys; NaN never does."""
         if self.kind == AT_LEAST:
             return self.value >= self.limit
         return self.distance <= self.limit
 
     @property
     def distance(self) -> float:
-        """What is held against the limit, in the unit of the value."""
+        """Distance that is compared with the limit, in the unit of the value."""
         return abs(self.value - self.expected) if self.kind == WITHIN else self.value
 
     @property
@@ -89,7 +89,7 @@ def at_least(what: str, value: float, limit: float, unit: str = "") -> Check:
 
 
 def none_of(what: str, wrong: int | bool) -> Check:
-    """What must not have happened has not: `wrong` counts how often it has."""
+    """Check that something has never happened: `wrong` counts how often it has."""
     return Check(what, float(wrong), 0.0)
 
 
@@ -133,17 +133,17 @@ class Setting:
 
     @property
     def is_event_driven(self) -> bool:
-        """Whether events are located, so that outcomes do not depend on the step."""
+        """Test whether events are located, so that outcomes do not depend on the step."""
         return self.maker is None and resolve(self.accuracy).scheme == "events"
 
     @property
     def meets_an_error(self) -> bool:
-        """Whether bodies that touch each other are stepped to an error: dear, so that quick runs have fewer bodies."""
+        """Test whether bodies that touch each other are stepped to an error: quick runs then have fewer bodies."""
         return self.is_event_driven
 
     @property
     def is_ours(self) -> bool:
-        """Whether the engine is ours: only then there are reports, contact forces and parameters to look at."""
+        """Test whether the engine is ours: only then there are reports, contact forces and parameters to look at."""
         return self.maker is None
 
     @property

@@ -1,4 +1,4 @@
-"""What `rigid-env hard-cases` does with what a user typed."""
+"""Command `rigid-env hard-cases`: runs the cases that a user typed."""
 
 from __future__ import annotations
 
@@ -25,14 +25,14 @@ def run(
     plot: Path | None,
     markdown: Path | None,
 ) -> tuple[Report, list[Path]]:
-    """Run the cases, print them, write what is asked for: the report, and the files written.
+    """Run the cases, print them, write the files of the options: the report, and the files written.
 
     Raises
     ------
     ValueError
         No such case or preset, or a step out of range; nothing has run then.
     gymnasium.error.DependencyNotInstalled
-        A picture is asked for without matplotlib; likewise.
+        An option wants a picture, without matplotlib; likewise.
     """
     if plot:
         require_matplotlib()

@@ -1,4 +1,4 @@
-"""What leans: cards, a ladder, dominoes."""
+"""Leaning bodies: cards, a ladder, dominoes."""
 
 from __future__ import annotations
 

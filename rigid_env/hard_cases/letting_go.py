@@ -22,7 +22,7 @@ LOOKS = 400  # at a push along its way, for the first sign
 
 
 class Release(NamedTuple):
-    """Where a body is let go that turns by an angle about z: [s], [rad], [rad/s]."""
+    """Release of a body that turns by an angle about z: [s], [rad], [rad/s]."""
 
     time: float
     angle: float
@@ -30,7 +30,7 @@ class Release(NamedTuple):
 
 
 def _release(square: Callable, push: Callable, start: float, end: float) -> Release:
-    """Where `push` ends between two angles, for ω² = `square`(angle); the time is ∫ dθ/ω.
+    """Find the end of `push` between two angles, for ω² = `square`(angle); the time is ∫ dθ/ω.
 
     A body at rest at the start begins as the square root of the angle: with θ = start + s² the integrand is smooth.
     """

@@ -96,7 +96,7 @@ def begin(world: physics.World, rng: np.random.Generator) -> None:
 
 
 def _places(rng: np.random.Generator, world: physics.World, size: np.ndarray) -> np.ndarray:
-    """Where bodies start (worlds, bodies, 3): one anywhere in the box, several each in a cell of its own."""
+    """Draw starts of bodies (worlds, bodies, 3): one anywhere in the box, several each in a cell of its own."""
     if world.body_count == 1:
         return (HALF_WIDTH - 0.5 * np.linalg.norm(size, axis=-1, keepdims=True)) * rng.uniform(-1, 1, size.shape)
     cells = CELL * (np.array(list(np.ndindex(3, 3, 3))) - 1.0)
@@ -123,7 +123,7 @@ def draw_wrench(world: physics.World, rng: np.random.Generator) -> np.ndarray:
 
 @dataclass(frozen=True)
 class Look:
-    """What the laws ask of the worlds at one moment, each (worlds,) but for `gap`."""
+    """Quantities of the laws at one moment, each (worlds,) but for `gap`."""
 
     kinetic: np.ndarray  # [J]
     energy: np.ndarray  # kinetic and potential [J]
@@ -169,7 +169,7 @@ def _put_away(world: physics.World, lost: np.ndarray) -> None:
 
 @dataclass
 class Outcome:
-    """What went wrong in each of the worlds so far, each (worlds,).
+    """Faults of each of the worlds so far, each (worlds,).
 
     Attributes
     ----------
@@ -195,7 +195,7 @@ class Outcome:
         return self.is_broken | (self.escaped > 0) | (self.gain > limit)
 
     def law(self, index: int, limit: float) -> str:
-        """What went wrong in one world; empty where nothing did."""
+        """Name the law that one world broke; empty where it broke none."""
         if self.is_broken[index]:
             return "not finite, a fault, or contacts left out"
         if self.escaped[index] > 0:
@@ -275,9 +275,10 @@ def random_scenes(setting: Setting) -> list[Check]:
     without a velocity, which moves it by twice the slop in the field of gravity and so turns it by as much of a radian
     (body on body, where its energy is that of its angular momentum in the new attitude).
 
-    To an error (`precise`, `reference`) a smooth step is off by a tolerance of speed, and by two of the energy, no more
-    than a contact problem; a part of a step of several bodies has its own problems. The limit is for as many of them as
-    a step may have impacts, 10,001. Most have hundreds; where something rattles it is millions, and the limit the same.
+    To an error (`precise`, `reference`) a smooth step is off by a tolerance of speed, and by two of the energy, at most
+    as much as a contact problem; a part of a step of several bodies has its own problems. The limit is for as many of
+    them as a step may have impacts, 10,001. Most have hundreds; where a body rattles it is millions, and the limit the
+    same.
     """
     limit = gain_limit(setting.accuracy)
     checks, scale = [], setting.pick(1.0, 0.004)

@@ -21,7 +21,7 @@ from rigid_env.terminal import progress_bar
 
 @dataclass(frozen=True)
 class Plan:
-    """What is asked for.
+    """Settings of a run of hard cases.
 
     Attributes
     ----------
@@ -77,7 +77,7 @@ def make_plan(
 
 @dataclass(frozen=True)
 class Report:
-    """What came out.
+    """Outcomes of a run of hard cases.
 
     Attributes
     ----------
@@ -100,7 +100,7 @@ class Report:
 
     @property
     def has_failed(self) -> bool:
-        """Whether a case of ours fails at that step; coarser and finer ones are there to show where it ends."""
+        """Test whether a case of ours fails at that step; coarser and finer ones are there to show where it ends."""
         return any(one.status is Status.FAILS for one in self.details)
 
     def to_dict(self) -> dict:

@@ -16,7 +16,7 @@ OURS = "rigid-env"
 
 
 class Status(Enum):
-    """How a case came out. Only `HOLDS` is a pass; only `FAILS` is a failure."""
+    """Status of a case. Only `HOLDS` is a pass; only `FAILS` is a failure."""
 
     HOLDS = "holds"
     FAILS = "fails"
@@ -26,7 +26,7 @@ class Status(Enum):
 
 @dataclass(frozen=True)
 class Outcome:
-    """What came out of a case.
+    """Outcome of a case.
 
     Attributes
     ----------

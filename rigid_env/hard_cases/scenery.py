@@ -67,7 +67,7 @@ def energy(world, scene: physics.Scene) -> float:
 
 
 def kinetic_energy(world, scene: physics.Scene) -> float:
-    """Of all bodies [J]."""
+    """Kinetic energy of all bodies [J]."""
     weightless = physics.Scene(scene.bodies)
     return energy(world, weightless)
 
@@ -89,7 +89,7 @@ def tilt_about_z(world) -> float:
 
 
 def is_finite(world) -> bool:
-    """Whether every number of the state is."""
+    """Test whether every number of the state is."""
     return all(np.isfinite(np.asarray(part)).all() for part in (world.pos, world.quat, world.linvel, world.angvel))
 
 

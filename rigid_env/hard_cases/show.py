@@ -18,7 +18,7 @@ LEGEND = "✓ holds   ✗ fails   - not supported   · not built"
 
 
 def came_out(outcome: Outcome) -> str:
-    """What came out, of the check with the least margin; else why nothing did."""
+    """Describe the check with the least margin; else the reason why there is none."""
     check = outcome.tightest
     if check is None:
         return outcome.reason
@@ -81,7 +81,7 @@ def _rows(outcomes: Sequence[Outcome]) -> list[list[Outcome]]:
 
 
 def summary(outcomes: Sequence[Outcome]) -> str:
-    """How many hold, fail, and so on."""
+    """Count those that hold, fail, and so on."""
     counts = {status: sum(one.status is status for one in outcomes) for status in Status}
     return ", ".join(f"{count} {status.value}" for status, count in counts.items() if count)
 

@@ -1,4 +1,4 @@
-"""What the piles share: their scene, how far bodies have moved, and what each carries."""
+"""Common parts of the piles: their scene, the displacement of bodies, and the load of each."""
 
 from __future__ import annotations
 

@@ -25,7 +25,7 @@ Tick = Callable[[str], None]
 
 @dataclass(frozen=True)
 class Ladder:
-    """What is measured of each scene.
+    """Settings that are measured for each scene.
 
     Attributes
     ----------
@@ -158,7 +158,7 @@ def make_jobs(
 
 
 def run_count(jobs: Sequence[Job], ladder: Ladder) -> int:
-    """How often `run` calls `tick`, if it is not interrupted."""
+    """Number of calls of `tick` by `run`, if it is not interrupted."""
     return sum(1 + len(job.contenders) * (1 + ladder.repeats) for job in jobs)
 
 

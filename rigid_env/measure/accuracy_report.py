@@ -20,7 +20,7 @@ from rigid_env.terminal import progress_bar
 
 @dataclass(frozen=True)
 class Report:
-    """What was measured.
+    """Measurements of a run.
 
     Attributes
     ----------

@@ -98,7 +98,7 @@ class Theirs:
 
 
 def run_count(repeats: int, with_peer: bool) -> int:
-    """How often `body_rows` calls `tick`."""
+    """Number of calls of `tick` by `body_rows`."""
     return len(cases(True)) * (len(ACCURACIES) + with_peer) * (repeats + 1)
 
 

@@ -97,7 +97,7 @@ def crowded_rows(sizes: Sizes, repeats: int, with_peer: bool, tick: Tick | None 
 
 
 def run_count(repeats: int, with_peer: bool) -> int:
-    """How often `crowded_rows` calls `tick`."""
+    """Number of calls of `tick` by `crowded_rows`."""
     return len(_loads()) * (4 if with_peer else 2) * (repeats + 1)
 
 

@@ -1,4 +1,4 @@
-"""What an effect costs: a scene with it and the same scene without, step for step, in turns."""
+"""Cost of an effect: a scene with it and the same scene without, step for step, in turns."""
 
 from __future__ import annotations
 
@@ -141,7 +141,7 @@ def chosen(names: Sequence[str], page: Path | None) -> list[str]:
 
 
 def run_count(effects: int, repeats: int) -> int:
-    """How often `effect_row` calls `tick`, over so many effects."""
+    """Number of calls of `tick` by `effect_row`, over so many effects."""
     return effects * 2 * (repeats + 1)
 
 

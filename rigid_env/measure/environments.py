@@ -25,7 +25,7 @@ SINGLE_TARGET = 3.0
 
 @dataclass(frozen=True)
 class EnvSizes:
-    """How much work one run is: environments and steps, ours and the peer's."""
+    """Work of one run: environments and steps, ours and the peer's."""
 
     envs: int = 1024
     vector_steps: int = 100
@@ -63,7 +63,7 @@ class Single:
 
 
 class Vector:
-    """A vector environment, stepped with random actions; it resets its environments by itself."""
+    """A vector environment, stepped with random actions; it resets its environments automatically."""
 
     def __init__(self, envs: gymnasium.vector.VectorEnv, steps: int):
         self.envs, self.steps = envs, steps
@@ -117,7 +117,7 @@ def environment_rows(
 
 
 def run_count(repeats: int, with_peer: bool) -> int:
-    """How often `environment_rows` calls `tick`."""
+    """Number of calls of `tick` by `environment_rows`."""
     return (len(THREADS) + 2) * (len(ACCURACIES) + with_peer) * (repeats + 1)
 
 

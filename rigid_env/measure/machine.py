@@ -1,4 +1,4 @@
-"""Where and with what a number was measured: no result without it."""
+"""Machine and versions with which a number was measured: no result without them."""
 
 from __future__ import annotations
 

@@ -31,7 +31,7 @@ BLOCK = 1  # index of the block among the bodies; 0 is the world
 
 
 def is_installed() -> bool:
-    """Whether MuJoCo can be imported."""
+    """Test whether MuJoCo can be imported."""
     return importlib.util.find_spec("mujoco") is not None
 
 
@@ -206,5 +206,5 @@ class Rollout:
 
 
 def has_batch() -> bool:
-    """Whether this MuJoCo has `mujoco.batch` (since 4.0)."""
+    """Test whether this MuJoCo has `mujoco.batch` (since 4.0)."""
     return is_installed() and importlib.util.find_spec("mujoco.batch") is not None

@@ -1,4 +1,4 @@
-"""What every plot of the command line needs."""
+"""Requirements of every plot of the command line."""
 
 from __future__ import annotations
 

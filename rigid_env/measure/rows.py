@@ -68,7 +68,7 @@ def paired_rows(spreads: dict[str, Spread], peers: dict[str, str], notes: dict |
 
 
 def run_count(repeats: int, with_peer: bool) -> int:
-    """How often `engine_rows` calls `tick`."""
+    """Number of calls of `tick` by `engine_rows`."""
     batch_peers = 1 + mujoco_scene.has_batch()
     contestants = 4 * len(ACCURACIES) + (len(SINGLE) + batch_peers if with_peer else 0)
     return contestants * (repeats + 1)

@@ -1,4 +1,4 @@
-"""What each effect of a scene does in a run: in how many steps it acts, and what share of the time it takes.
+"""Share of each effect in a run: the number of steps in which it acts, and its share of the time.
 
 An effect acts in a step if the step from the same state without it ends elsewhere, by one bit at least. Its time is
 that of the run less that of the same scene's run without it, in turns; without it the bodies may take another course
@@ -42,7 +42,7 @@ class Share:
 
     @property
     def is_seen(self) -> bool:
-        """Whether the time is above the noise: of one sign in every turn."""
+        """Test whether the time is above the noise: of one sign in every turn."""
         return self.time.lowest > 0 or self.time.highest < 0
 
     def to_dict(self) -> dict:
@@ -104,7 +104,7 @@ class _Run:
 
 
 def run_count(scene: physics.Scene, repeats: int = REPEATS) -> int:
-    """How often `measure` calls `tick`."""
+    """Number of calls of `tick` by `measure`."""
     return (len(scene.effects) + 1) * (repeats + 1)
 
 

@@ -24,7 +24,7 @@ INCLINE = math.radians(20.0)
 
 @dataclass(frozen=True)
 class Path:
-    """What was seen of one body after each step: t (n,), pos (n, 3), quat (n, 4), linvel (n, 3), angvel (n, 3).
+    """Path of one body after each step: t (n,), pos (n, 3), quat (n, 4), linvel (n, 3), angvel (n, 3).
 
     And, of our own engine, the events between the steps.
     """

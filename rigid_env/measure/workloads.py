@@ -25,7 +25,7 @@ LANDING_STEPS = 400  # before the batch is timed: two seconds
 
 @dataclass(frozen=True)
 class Sizes:
-    """How much work one run is.
+    """Work of one run.
 
     Attributes
     ----------

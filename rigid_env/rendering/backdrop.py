@@ -1,4 +1,4 @@
-"""What does not move: background, floor and walls, shaded pixel by pixel once and then kept."""
+"""Backdrop of a picture: background, floor and walls, shaded pixel by pixel once and then kept."""
 
 from __future__ import annotations
 
@@ -94,7 +94,7 @@ def _inside_bounds(points, room):
 
 
 def _pixel_footprint(values):
-    """How much a field changes from one pixel to the next."""
+    """Change of a field from one pixel to the next."""
     down, right = np.gradient(values)
     return np.abs(down) + np.abs(right) + 1e-9
 

@@ -1,4 +1,4 @@
-"""What to draw: the interface between simulation and renderer. Plain arrays, world frame, SI units."""
+"""Frame to draw: the interface between simulation and renderer. Plain arrays, world frame, SI units."""
 
 from __future__ import annotations
 
@@ -91,7 +91,7 @@ class WallView:
 
 @dataclass(frozen=True, eq=False)
 class GoalView:
-    """What the agent is after: a place on the floor, a face of body 0 to be turned, or both.
+    """Goal of the agent: a place on the floor, a face of body 0 to be turned, or both.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""How much of the endless walls to show, and from where: a room around the scene and its camera."""
+"""Part of the endless walls to show, and viewpoint: a room around the scene and its camera."""
 
 from __future__ import annotations
 
@@ -99,12 +99,12 @@ class Room:
 
 
 def is_floor(wall):
-    """Whether a `WallView` looks upwards."""
+    """Test whether a `WallView` looks upwards."""
     return wall.normal[1] > FLOOR_SLOPE
 
 
 def faces_point(wall, point):
-    """Whether a point (3,) [m] is on the free side of a `WallView`."""
+    """Test whether a point (3,) [m] is on the free side of a `WallView`."""
     return wall.normal @ np.asarray(point) > wall.offset
 
 

@@ -1,4 +1,4 @@
-"""What explains the picture: the goal's disc, contact points, arrows of forces and torques, near walls."""
+"""Overlays that explain the picture: the goal's disc, contact points, arrows of forces and torques, near walls."""
 
 from __future__ import annotations
 
@@ -116,7 +116,7 @@ def draw_far_outlines(canvas, room):
 
 
 def hidden_points(points, bodies, eye):
-    """Whether a body is between points and eye.
+    """Test whether a body is between points and eye.
 
     A point eye + s (point - eye) is inside a convex polyhedron if n·x ≤ n·vertex for all its faces; each face
     bounds s on one side. The point is hidden if the bounds leave room before s = 1.

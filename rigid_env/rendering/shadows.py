@@ -59,7 +59,7 @@ def outline(body):
 
 
 def fall(points, wall, lights):
-    """Where light through points meets a wall.
+    """Points where light through other points meets a wall.
 
     Parameters
     ----------

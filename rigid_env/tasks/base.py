@@ -1,4 +1,4 @@
-"""What the tasks share: the batch of worlds, starts, actions, and the order of things in a control step."""
+"""Base of the tasks: the batch of worlds, starts, actions, and the order of stages in a control step."""
 
 from __future__ import annotations
 
@@ -285,7 +285,7 @@ class Task(ABC):
         gravest(self.world.report_table, self.status)
 
     def _observer(self, taken: np.ndarray) -> Callable[[], object]:
-        """What observes the worlds that a thread has stepped."""
+        """Return the kernel that observes the worlds that a thread has stepped."""
         world = self.world
         return bound(
             self._kernel, taken, world.state, self.record, world.walls, self._actions, self.obs, self.outcome

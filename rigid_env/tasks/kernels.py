@@ -1,4 +1,4 @@
-"""What a task computes in every control step, compiled: wrenches, observations, rewards, success.
+"""Compiled parts of a task's control step: wrenches, observations, rewards, success.
 
 Everything is in this one file because Numba's disk cache notices a change only in the file of the function it
 calls (callees in `physics.kernels` are covered by the name of the cache folder).

@@ -1,4 +1,4 @@
-"""Where each number of a task stands: columns of the arrays that the task kernels share.
+"""Columns of the arrays that the task kernels share: the place of each number of a task.
 
 Row `world` of each array belongs to one world; the block is the only body, so that row `world` of
 `physics.World.state` is its state.

@@ -48,7 +48,7 @@ class Range:
 
     @property
     def is_fixed(self) -> bool:
-        """Whether there is nothing to draw."""
+        """Test whether there is nothing to draw."""
         return bool((self.low == self.high).all())
 
     @property

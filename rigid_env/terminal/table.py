@@ -43,7 +43,7 @@ class Column:
 
     @property
     def may_break(self) -> bool:
-        """Whether its text may go on in the next line."""
+        """Test whether its text may go on in the next line."""
         return not (self.is_number or self.is_whole)
 
 

@@ -82,7 +82,7 @@ class Tosses:
 
     @property
     def duration(self) -> float:
-        """Of all tosses together [s]."""
+        """Duration of all tosses together [s]."""
         return float((self.lengths - 1).sum() * SAMPLE_DT)
 
     def subset(self, chosen) -> Tosses:

@@ -42,7 +42,7 @@ FIRST_SIMPLEX = 0.08  # its first edges, in widths of the box
 
 @dataclass(frozen=True)
 class Effort:
-    """How long to search.
+    """Effort of a search.
 
     Parameters
     ----------
@@ -113,13 +113,13 @@ def check_names(names) -> tuple[str, ...]:
 
 
 def mean_error(errors: Errors) -> float:
-    """What is minimised, of one replay [cube widths]."""
+    """Mean error of one replay, which the fit minimises [cube widths]."""
     position, rotation = errors.per_toss()
     return float(position.mean() + 0.5 * np.radians(rotation).mean())
 
 
 class Objective:
-    """What is minimised, as a function of the parameters.
+    """Objective of the fit, as a function of the parameters.
 
     Parameters
     ----------

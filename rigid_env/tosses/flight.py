@@ -1,4 +1,4 @@
-"""What the first flight of each toss, before any contact, says about the measurement and the cube.
+"""First flights of the tosses, before any contact: what they say about the measurement and the cube.
 
 In flight the centre of mass follows a parabola and nothing of the contact model acts. So the first flights of the
 tosses to fit give the scale of the recorded lengths, the noise of the first frame (how far its velocities are from
@@ -69,7 +69,7 @@ def first_flight(toss: np.ndarray) -> np.ndarray:
 
 
 def measure_flight(tosses: Tosses) -> Flight:
-    """What the first flights say.
+    """Measure gravity, noise and drift in the first flights.
 
     Position = c + v t + g t²/2 + R(q) s, least squares over all flights for c and v of each and g and s of all: the
     tracked point is at s from the centre of mass.

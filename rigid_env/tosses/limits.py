@@ -1,4 +1,4 @@
-"""Where the error of replayed tosses comes from: the start's noise, the face they land on, when it grows."""
+"""Sources of the error of replayed tosses: the start's noise, the face they land on, the time when it grows."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ ALONG_PARTS = 20
 
 @dataclass(frozen=True)
 class Limits:
-    """Where the headline's error comes from, over the tosses that were not fitted.
+    """Sources of the headline's error, over the tosses that were not fitted.
 
     Attributes
     ----------

@@ -1,4 +1,4 @@
-"""How far a replayed toss is from the measured one.
+"""Distance of a replayed toss from the measured one.
 
 Per frame: the distance of the positions in cube widths, and the geodesic angle between the orientations in degrees.
 Per toss: the mean over its frames, the first (where both agree) included. Of many tosses: mean and median of these.
@@ -34,7 +34,7 @@ class Summary:
 
     @classmethod
     def of(cls, position: np.ndarray, rotation: np.ndarray) -> Summary:
-        """Of errors per toss (tosses,) [cube widths, deg]."""
+        """Make the summary of errors per toss (tosses,) [cube widths, deg]."""
         return cls(
             len(position), float(position.mean()), float(np.median(position)), float(rotation.mean()),
             float(np.median(rotation)),

@@ -68,7 +68,7 @@ class Cube:
 
 @dataclass(frozen=True)
 class Recording:
-    """What the recorded numbers mean: the measurement model, without anything that differs from toss to toss.
+    """Measurement model of the recorded numbers, without anything that differs from toss to toss.
 
     Parameters
     ----------

@@ -113,7 +113,7 @@ class Report:
 
     @property
     def is_complete(self) -> bool:
-        """Whether no fit was interrupted."""
+        """Test whether no fit was interrupted."""
         return all(case.fit.is_complete for case in self.cases)
 
     def to_dict(self) -> dict:
@@ -129,7 +129,7 @@ class Report:
 
 
 def setups(scale: float, flight: Flight, names: tuple[str, ...] | None = None) -> list[Setup]:
-    """What is fitted: the headline, what leads to it and its two variants; or only `names` in the headline's way.
+    """List the fits: the headline, those that lead to it and its two variants; or only `names` in the headline's way.
 
     Second is the contact with the centre of mass where the free flights show it: not fitted to any error.
     """
@@ -172,7 +172,7 @@ class Measurement:
         self.setups = setups(scale, flight, names)
 
     def evaluations(self) -> int:
-        """Of all fits together, at most."""
+        """Largest number of evaluations of all fits together."""
         return sum(self.effort.evaluations(len(setup.parameters)) for setup in self.setups)
 
     def run(self, tick: Callable[[str, int], None] = lambda what, done: None) -> Report:

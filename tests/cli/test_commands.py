@@ -295,7 +295,7 @@ def test_a_signal_ends_a_process_cleanly(tmp_path):
 
 
 def completions(folder, *words, shell="bash"):
-    """What the shell is offered for the last word."""
+    """Return the completions that the shell is offered for the last word."""
     line = " ".join(("rigid-env", *words))
     given = {"_RIGID_ENV_COMPLETE": f"complete_{shell}", "COMP_WORDS": line, "COMP_CWORD": str(len(words))}
     given["_TYPER_COMPLETE_ARGS"] = line

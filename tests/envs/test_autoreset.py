@@ -1,4 +1,4 @@
-"""What happens at the end of an episode, in each of Gymnasium's autoreset modes; reset masks and options."""
+"""End of an episode in each of Gymnasium's autoreset modes; reset masks and options."""
 
 from __future__ import annotations
 

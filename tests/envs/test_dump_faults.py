@@ -1,4 +1,4 @@
-"""What leads to a state that is not finite is written where an environment was asked to."""
+"""Recordings of steps that lead to a state that is not finite, written for environments that want them."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What is said where a package of an extra is missing: which, and the line that installs it, before anything runs."""
+"""Messages for a missing package of an extra: its name and the line that installs it, before anything runs."""
 
 from __future__ import annotations
 

@@ -37,7 +37,7 @@ def test_the_limit_of_many_stones_is_milankovitchs():
     limit = continuous_limit()
     assert limit == pytest.approx(0.1075, abs=5e-5)
     # The hinge in the haunch is at one of the joints, π/n apart: at most π/(2 n) off the best place, where the thrust
-    # asked for is largest. That is an error of second order, C/n²; so is the area of a stone whose arcs are chords.
+    # target is largest. That is an error of second order, C/n²; so is the area of a stone whose arcs are chords.
     # C is read off at 51 stones and must hold, twice over, at 101 and 201.
     C = (limit - least_thickness(51)) * 51**2
     assert C > 0
@@ -88,7 +88,7 @@ def test_parts_of_a_substep_are_solved_as_finely_as_it_and_no_finer():
 
 
 def test_a_high_arch_at_its_limit_stays_solved_at_precise():
-    """What stands is not swept on where goals are next to rounding: every solve ends within its tolerance."""
+    """An arch that stands is not swept on where goals are next to rounding: every solve ends within its tolerance."""
     world = physics.World(arch(51, (1 + NEAR) * least_thickness(51)), dt=0.01, accuracy="precise")
     for _ in range(20):  # the first second in which one did not was the fourteenth
         report = world.step(steps=100)

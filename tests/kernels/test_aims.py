@@ -1,4 +1,4 @@
-"""What is asked of resting contacts: the formulas of `aims`, one contact after the other in plain NumPy."""
+"""Targets of resting contacts: the formulas of `aims`, one contact after the other in plain NumPy."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How kernels become instructions: what our lowering writes means what Python means, and is short."""
+"""Instructions of kernels: our lowering keeps Python's meaning, and is short."""
 
 from __future__ import annotations
 
@@ -171,7 +171,7 @@ def test_indices_are_checked_where_that_is_asked_for(tmp_path):
 
 @kernel
 def reshaped(a, rows, columns, i, j):
-    """Of the elements from the third on: a matrix."""
+    """Reshape the elements from the third on to a matrix."""
     matrix = a[2 : 2 + rows * columns].reshape((rows, columns))
     return matrix[i, j] + 100.0 * matrix.shape[0] + 1000.0 * matrix.shape[1]
 
@@ -605,7 +605,7 @@ def calls_straight(record, a, i):
 
 
 def instructions_of(function, monkeypatch, *args) -> dict[str, list[str]]:
-    """What is written for a kernel that is not kept, and for the parts it is the first to call: instructions' names."""
+    """Names of the instructions of a kernel that is not kept, and of the parts it is the first to call."""
     written = {}
     for library_class in (CPUCodeLibrary, PartLibrary):
 

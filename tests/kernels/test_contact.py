@@ -49,7 +49,7 @@ turns = st.one_of(st.just(0.0), st.floats(-2e-3, 2e-3), st.floats(-1.0, 1.0))
     w=st.tuples(small, small, small),
 )
 def test_the_set_is_what_touches_or_arrives(turn, depth, v, w):
-    """Of both walls: slots, gaps, speeds and, of all of them, the deepest, the widest and the fastest."""
+    """Compare both walls: slots, gaps, speeds and, of all of them, the deepest, the widest and the fastest."""
     q = tuple(np.array([1.0, *turn]) / np.linalg.norm([1.0, *turn]))
     R = np.reshape(to_matrix(q), (3, 3))
     arms = CORNERS @ R.T
@@ -140,7 +140,7 @@ stages = st.lists(st.sets(st.integers(0, 2 * FEATURES - 1), max_size=5).map(sort
 @pytest.mark.parametrize("width", [1, 3])
 @given(stages=stages)
 def test_impulses_are_found_by_the_name_of_their_contact(width, stages):
-    """Of the stage before, times the ratio of the lengths; zero of what did not touch then; and no others are kept."""
+    """Impulses of the stage before, times the ratio of the lengths; zero for new contacts; no others are kept."""
     work, memory = block_at_walls(), np.zeros((1, memory_size(2 * FEATURES)))
     known, length = {}, 0.0
     for k, slots in enumerate(stages + stages[-1:]):

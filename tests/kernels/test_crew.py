@@ -25,7 +25,7 @@ RUNS = 3
 
 
 class Moment(NamedTuple):
-    """What one who leads and one member are at; of the member there may be two threads, one that is going."""
+    """States of a leader and of one member; of the member there may be two threads, one that is going."""
 
     state: int = AWAY
     left: int = 0  # worlds that nobody has taken: a run has one
@@ -37,7 +37,7 @@ class Moment(NamedTuple):
 
 
 def of_leader(m: Moment) -> list[Moment]:
-    """What may follow by the one that leads, who runs out of patience at any time, and may be interrupted."""
+    """Moments that may follow by the leader, which runs out of patience at any time, and may be interrupted."""
     match m.leader:
         case "begin":
             return [m._replace(left=1, leader="summon")] if m.run < RUNS else []
@@ -70,7 +70,7 @@ def of_leader(m: Moment) -> list[Moment]:
 
 
 def of_thread(m: Moment, k: int) -> list[Moment]:
-    """What may follow by thread k of the member, which runs out of patience at any time."""
+    """Moments that may follow by thread k of the member, which runs out of patience at any time."""
 
     def then(what: str | None, **more) -> Moment:
         rest = m.threads[:k] + ((what,) if what else ()) + m.threads[k + 1 :]
@@ -165,7 +165,7 @@ def test_asking_the_system():
 
 @pytest.mark.skipif(not hasattr(os, "sched_setaffinity"), reason="nothing binds a thread to a processor here")
 def test_a_member_on_the_processor_of_the_leader_does_not_begin(monkeypatch):
-    """Where all threads have the same processor the one that leads makes all steps."""
+    """The leader makes all steps if all threads have the same processor."""
     monkeypatch.setattr(processors, "usable", lambda: 2)
     monkeypatch.setattr(threads, "STAY", 10.0)
     before = os.sched_getaffinity(0)

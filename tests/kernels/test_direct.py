@@ -60,7 +60,7 @@ def test_fast_motion_obeys_coulombs_law(vertices, v, w, mu, mode):
 @settings(max_examples=300, deadline=None)
 @given(subset, slow, slow, st.sampled_from([0.1, 0.5, 1.0]), st.sampled_from([HOLD, SLIDE]))
 def test_slow_motion_under_gravity_obeys_coulombs_law(vertices, v, w, mu, mode):
-    """Of the order of one step of gravity: contacts hold, slide, creep and open in all mixtures."""
+    """Speeds of the order of one step of gravity: contacts hold, slide, creep and open in all mixtures."""
     problem = Problem(floor(vertices), (v[0], v[1] + FALL, v[2]), w, mu)
     if np.abs(problem.matrices()[1]).max() > 1e-3:
         assert_solved(problem, *problem.solve(mode))

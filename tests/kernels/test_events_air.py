@@ -1,4 +1,4 @@
-"""How long a body that flies is sure to reach no wall."""
+"""Bound of the time for which a flying body reaches no wall."""
 
 from __future__ import annotations
 

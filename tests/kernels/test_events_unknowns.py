@@ -17,7 +17,7 @@ AXES = tuple(np.eye(3).ravel())
 
 
 def solved(rows, pushes, asked, is_skew):
-    """(total force and moment, acceleration) of contacts that push along `pushes`, each row asked for its own.
+    """(total force and moment, acceleration) of contacts that push along `pushes`, each row with a target of its own.
 
     The body has unit mass and unit moments of inertia: its acceleration is the force and the moment.
     """
@@ -43,7 +43,7 @@ def problem(seed, count, tilt, skew):
 
 @given(st.integers(0, 2**32 - 1), st.integers(2, 5), st.sampled_from([0.0, 0.3]), st.floats(1e-16, 1e-9))
 def test_a_tilt_that_is_rounding_changes_nothing(seed, count, skew, tilt):
-    """Friction gives a row that others all but imply a pivot of the order of the tilt: it is none all the same.
+    """Friction gives a row that others nearly imply a pivot of the order of the tilt: it is none all the same.
 
     A row off by the tilt t of a system with condition number κ changes the forces by t κ of themselves, a few times
     over; were it met, the force that does so would be (the row's rest)/t, of the order of the others, whatever t.

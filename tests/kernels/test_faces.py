@@ -57,7 +57,7 @@ def test_a_face_holds_up_to_the_verge_of_turning_about_any_point(centre, sense, 
 @settings(max_examples=200, deadline=None)
 @given(centres, st.sampled_from([-1, 1]), st.sampled_from([HOLD, SLIDE]))
 def test_a_face_slips_beyond_the_verge(centre, sense, mode):
-    """Asked for 5 % more than friction can give it does not hold, whatever is tried first."""
+    """A target 5 % beyond friction does not hold, whatever is tried first."""
     problem = loaded(np.full(4, -MASS * FALL / 4), 1.05 * motion_of(centre, sense))
     p, result = problem.solve(mode)
     assert problem.one["mode"] != HOLD
@@ -98,7 +98,7 @@ def test_targets_of_no_rigid_motion_are_met_by_three_contacts(targets, slip):
 
 @pytest.mark.parametrize("bounces", range(4))
 def test_one_contact_that_bounces_off_takes_another_along(bounces):
-    """All but it are asked to stay, which no rigid motion does: one of the two beside it leaves as well."""
+    """All except it are asked to stay, which no rigid motion does: one of the two beside it leaves as well."""
     target = np.zeros((4, 3))
     target[bounces, 0] = 0.1
     problem = Problem(floor(FACE), (0.3, -0.5, 0.2), (0, 0.1, 0), 0.2, target=target)
@@ -133,7 +133,7 @@ def test_eight_contacts_of_one_wall_are_solved_by_sweeps(mode):
 
 @kernel
 def begun(n, mu, u, w, inv_mass, K, work):
-    """Where a face begins under new loads (`patch.cold_motion`), on the wall whose axes are x, y, z."""
+    """Start of a face under new loads (`patch.cold_motion`), on the wall whose axes are x, y, z."""
     axes = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
     return cold_motion(n, place_patch(n, axes, inv_mass, K, work), present(n), mu, u, w, inv_mass, K)
 

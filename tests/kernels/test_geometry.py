@@ -1,4 +1,4 @@
-"""Where the vertices of a block are along a normal, one by one and all at once."""
+"""Heights of a block's vertices along a normal, one by one and all at once."""
 
 from __future__ import annotations
 

@@ -95,7 +95,7 @@ def test_a_sum_is_taken_in_one_order():
 
 @kernel
 def compute_one(a, b, s, out):
-    """What is for numbers as well."""
+    """Compute an expression that is valid for numbers as well."""
     out[0], out[1], out[2] = larger(a, b), smaller(a, b), chosen(a <= b, s, a)
 
 
@@ -131,7 +131,7 @@ def test_columns_of_some_contacts_are_read_and_written(first, last):
 
 @kernel
 def put(values, table, thirds, n, out):
-    """What `columns` makes of n contacts: six rows of four."""
+    """Put n contacts into rows with `columns`: six rows of four."""
     for row, z in enumerate(
         (
             columns.numbers(values, n),

@@ -151,7 +151,7 @@ print(json.dumps({"optimised": optimised, "lowered": lowered, "statuses": status
 
 
 def first_use(accuracies: str, cache: Path, *and_bodies: str) -> dict:
-    """What is compiled for the three-wall box in a new process that keeps its kernels in `cache`."""
+    """List the kernels compiled for the three-wall box in a new process that keeps its kernels in `cache`."""
     done = subprocess.run(
         [sys.executable, "-c", PROGRAM, accuracies, *and_bodies], env={**os.environ, "NUMBA_CACHE_DIR": str(cache)},
         capture_output=True, text=True, check=True, timeout=900,

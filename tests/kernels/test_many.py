@@ -83,7 +83,7 @@ def test_pairs_are_those_whose_boxes_overlap_in_the_order_of_the_sweep(count, ra
 
 @pytest.mark.parametrize("seed", range(5))
 def test_pairs_are_found_within_columns_not_by_comparing_all(seed):
-    """What the columns are for: the bodies listed in one are few, however many there are."""
+    """The bodies listed in one column are few, however many there are."""
     count = 400
     many = spread_out(seed, count, 1.0, (6, 6, 6))
     find_pairs(0.0, many)

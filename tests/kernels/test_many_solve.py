@@ -61,7 +61,7 @@ def test_piles_with_more_contacts_than_are_determined_obey_the_law(seed, bodies,
     # Twists and impulses belong to each other, to rounding of some hundred additions.
     np.testing.assert_allclose(many.twist.ravel(), free + inverse @ J.T @ p, atol=1e-12 * np.abs(b).max())
     assert residual <= 1e-6
-    # The oracle's defect is p - proj(p - s ũ) with one s for all: no more than s times the velocity that is missing.
+    # The oracle's defect is p - proj(p - s ũ) with one s for all: at most s times the velocity that is missing.
     W = J @ inverse @ J.T
     step = 1 / np.linalg.eigvalsh(W).max()
     assert np.abs(coulomb_defect(W, b, np.full(n, 0.2), p, step)).max() <= 10 * step * 1e-6 * np.abs(b).max()
@@ -78,7 +78,7 @@ def test_of_piles_that_wedge_nine_in_ten_are_solved():
 
 
 def test_piles_that_slip_a_little_in_all_directions_are_solved_and_soon():
-    """Where slips are small their directions turn with every step, and the interior-point method stuck for that.
+    """Directions of small slips turn with every step; the interior-point method once stuck for that.
 
     Then 5 of these 120 were not solved, and they took 49 iterations each; now it is one of them, and 36.
     """

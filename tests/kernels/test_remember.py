@@ -68,7 +68,7 @@ def test_a_size_is_the_one_that_llvm_gives():
 
 
 def test_functions_of_others_are_answered_by_numba():
-    """What is asked in Numba's own context leaves no trace in what is remembered."""
+    """Questions in Numba's own context leave no trace in the remembered answers."""
     known = len(remembering(cpu_target.typing_context).signatures)
 
     @numba.njit

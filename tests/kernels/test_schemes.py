@@ -144,7 +144,7 @@ def test_free_flight_is_the_discrete_parabola(code, x, v, force, g, h, n):
 
 
 def factor(code, start, middle, end):
-    """What a step multiplies q by about a fixed axis: the scheme on h z' = i y z, y = h ω / 2 at three times.
+    """Factor of q in a step about a fixed axis: the scheme on h z' = i y z, y = h ω / 2 at three times.
 
     With y constant it is the stability polynomial at iy.
     """

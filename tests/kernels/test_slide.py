@@ -65,10 +65,10 @@ def test_a_face_turns_about_a_vertex(held, sense):
 
 
 def impulse_error(problem):
-    """What impulses may be off by, solved to TOLERANCE of the largest free contact speed [N s].
+    """Bound of the error of impulses solved to TOLERANCE of the largest free contact speed [N s].
 
     Four contacts of a face fix the planar motion and the normals, six of twelve impulses; pushes of least norm and
-    directions of sliding fix the rest. A velocity off by ε makes impulses off by no more than a dozen m ε here.
+    directions of sliding fix the rest. A velocity off by ε makes impulses off by at most a dozen m ε here.
     """
     return 12 * MASS * TOLERANCE * np.abs(problem.matrices()[1]).max()
 
@@ -87,7 +87,7 @@ def test_the_impulses_of_the_last_step_are_the_start_where_some_contacts_held():
 @pytest.mark.parametrize("tolerance", [1e-6, 1e-10])
 @pytest.mark.parametrize(("speed", "spin"), [(0.03, 0.01), (0.015, 0.015)])
 def test_random_shoves_of_a_face_are_solved_directly(tolerance, speed, spin):
-    """What the engine is built for: a face at rest or nearly so, pushed at random, is hardly ever left for sweeps.
+    """A face at rest or nearly so, pushed at random, is hardly ever left for sweeps.
 
     None of these 1,600 was when this was written, and 12 were where contacts that might hold were tried one by one: an
     error in one of the direct solvers costs many.
@@ -149,7 +149,7 @@ LEFT_FOR_SWEEPS = {
         (0.9912, 0.0, 0.1322, 0.0),
         (0.0, 0.0, 0.0, 0.0),
     ),
-    # Newton's method turns directions round: one contact all but stops, or holds, or all four do.
+    # Newton's method turns directions round: one contact nearly stops, or holds, or all four do.
     "creeps": (
         (0, 1, 4, 5),
         (-0.01181, -0.04624, -0.02078),
@@ -164,7 +164,7 @@ LEFT_FOR_SWEEPS = {
         (-0.2874, 0.2874, 0.646, 0.646),
         (0.0, 0.0, 0.0, 0.0),
     ),
-    "all but holds": (
+    "nearly holds": (
         (0, 1, 2, 3),
         (0.0258, -0.06091, 0.01423),
         (0.02239, 0.00391, -0.02076),
@@ -195,7 +195,7 @@ def test_what_was_left_for_sweeps_is_solved_directly(key):
 
 
 def test_two_contacts_that_slid_are_not_asked_to_hold_first():
-    """Where two contacts slide, that is what the next step tries first, whatever held before."""
+    """Two contacts that slide are tried so first in the next step, whatever held before."""
     problem = Problem(floor((0, 1)), (0.3, FALL, 0.1), (0, 0, 0), 0.5)
     p, (_, _, _, _, method) = problem.solve(HOLD)
     assert method == DIRECT
@@ -240,7 +240,7 @@ def test_one_contact_opens_holds_or_slides():
 
 
 def test_a_contact_that_may_not_hold_and_cannot_slide_is_lost():
-    """Where holding is ruled out though it is the answer, no direction of sliding is consistent."""
+    """No direction of sliding is consistent if holding, which is the answer, is ruled out."""
     W, b, _, trace, goal = one_contact((0.01, -1, 0), (0, 0, 0), 5.0)
     assert answer(W, b, 5.0, trace, goal, 0.0, 0.0, False)[0] == LOST
 

@@ -1,4 +1,4 @@
-"""Where a gap is zero: the parabola that shortens a stage, against exact fractions."""
+"""Root of a gap: the parabola that shortens a stage, against exact fractions."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How long what turns far stays clear: the bounds hold, and are good enough to get there."""
+"""Time for which bodies that turn far stay clear: the bounds hold, and are good enough to get there."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def safe_time_of(y, horizon, scratch):
 
 
 def support(body, R, n) -> np.ndarray:
-    """How far a body reaches along the directions n (k, 3) from its place."""
+    """Reach of a body along the directions n (k, 3) from its place."""
     local = np.atleast_2d(n) @ R
     if isinstance(body, physics.Hull):
         return (local @ np.array(body.polyhedron.vertices).T).max(axis=1)
@@ -43,9 +43,9 @@ def support(body, R, n) -> np.ndarray:
 @pytest.mark.parametrize("second", SHAPES)
 @pytest.mark.parametrize("first", SHAPES)
 def test_the_distance_of_two_bodies_is_a_bound_that_falls_short_by_a_tenth_at_most(first, second):
-    """What comes out is n·d - s_a(-n) - s_b(n) for the direction that comes out, which no distance is below."""
+    """The result is n·d - s_a(-n) - s_b(n) for the direction that comes out, which no distance is below."""
     if first == second == "sphere":
-        pytest.skip("their distance is asked for nowhere")
+        pytest.skip("their distance is needed nowhere")
     a, b = SHAPES[first], SHAPES[second]
     place = (5.0, 0.0, 0.0)
     scene = physics.Scene([type(a)(**{**_parts(a), "pos": place}), b], [], [physics.Contact(0.0)])
@@ -66,7 +66,7 @@ def test_the_distance_of_two_bodies_is_a_bound_that_falls_short_by_a_tenth_at_mo
         n = np.array(n)
         if gap > 0:
             assert gap == pytest.approx(n @ d - support(a, R, -n)[0] - support(b, S, n)[0], abs=1e-12)
-        assert gap >= 0.89 * best  # the search's largest: no more than the distance
+        assert gap >= 0.89 * best  # the search's largest: at most the distance
 
 
 def _parts(body) -> dict:

@@ -181,7 +181,7 @@ vectors = st.tuples(*[st.floats(-5, 5)] * 3)
     axis=st.tuples(st.floats(-1, 1), st.just(0.0), st.floats(0.1, 1)), height=st.floats(0.9, 1.5),
 )  # fmt: skip
 def test_contact_never_gives_energy(linvel, angvel, mu, e, axis, height):
-    """Whatever the axes: energy grows by no more than rounding and the place of an impact (half a slop) in each of a
+    """Whatever the axes: energy grows by at most rounding and the place of an impact (half a slop) in each of a
     few impacts a step."""
     body = physics.Block((1, 0.6, 0.4), M, pos=(0, height, 0), linvel=linvel, angvel=angvel)
     built = world(body, mu, axis, e=e)

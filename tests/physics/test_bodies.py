@@ -100,7 +100,7 @@ def test_a_plastic_landing_stops_in_front_of_what_it_meets():
     pos[:, 1, 1] += speed * dt * np.arange(8) / 8
     world.set_state(pos=pos)
     worst = np.max([world.step().penetration for _ in range(60)], axis=0)
-    # A hundred slops is what the resting stage may stop by itself; without the limit half a step's way, 16 mm.
+    # A hundred slops is what the resting stage may stop alone; without the limit half a step's way, 16 mm.
     assert worst.max() <= 101 * 1e-6 * np.sqrt(0.75)
     assert world.pos[:, 1, 1] == pytest.approx(1.5, abs=1e-4)
 
@@ -203,7 +203,7 @@ def balance(world, index=0):
 
 
 def test_at_fast_too_a_tower_gathers_no_speed():
-    """What a solve leaves is left again at every step: 1e-9 of the largest free speed g h, whatever is asked."""
+    """A solve leaves its residual at every step: 1e-9 of the largest free speed g h, whatever the tolerance."""
     world = physics.World(scenes.tower(10), dt=0.005, accuracy="fast")
     world.step(steps=100)
     # A velocity is made up of what is left at each of the ten faces below; g h = 0.049 m/s.

@@ -196,7 +196,7 @@ def test_pictures_and_error_measures_have_the_block_where_it_is():
     pos, quat = world.pos.copy(), world.quat.copy()
     pos[0, 0, 1] = 0.1 - (CORNERS @ R.T)[:, 1].min() - 0.3  # 0.2 deep
     assert deepest_penetration(world.scene, pos, quat) == pytest.approx(0.2, rel=1e-12)
-    # half a turn about an axis: a corner moves by no more than twice its distance from the centre of mass
+    # half a turn about an axis: a corner moves by at most twice its distance from the centre of mass
     bound = distances(world.scene, pos, np.array([[[1.0, 0, 0, 0]]]), pos, np.array([[[0, 0, 0, 1.0]]]))[0, 0]
     assert bound >= 2 * np.linalg.norm(CORNERS, axis=1).max()
 

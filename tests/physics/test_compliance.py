@@ -238,7 +238,7 @@ def test_a_soft_floor_with_a_grain():
 
 
 def test_a_slab_holds_on_a_soft_slope():
-    """Friction alone holds it: it creeps by no more than the tolerance."""
+    """Friction alone holds it: it creeps by at most the tolerance."""
     slope = 0.3
     built = world(slab(), 1e5, 300.0, physics.Friction(0.5), gravity=(G * math.sin(slope), -G * math.cos(slope), 0))
     built.step(steps=300)

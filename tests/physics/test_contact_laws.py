@@ -166,7 +166,7 @@ def test_hard_case_10_sphere_into_a_corner_comes_straight_back():
 
 
 def test_an_impact_is_found_beside_a_wall_that_is_almost_in_reach():
-    """A vertex hits the wall y = -5 within the step, while the bounding sphere all but reaches another wall.
+    """A vertex hits the wall y = -5 within the step, while the bounding sphere nearly reaches another wall.
 
     The smallest gap of all had a kink there, its parabola crept along the wall that nothing hits, cuts ran out, and the
     elastic impact became plastic: a third of the energy was gone.

@@ -68,7 +68,7 @@ def test_a_force_without_bound_is_not_stepped_over(spread):
 def test_a_rebound_that_a_wedge_does_not_allow():
     """Between two walls, with μ = 1.9 at both: friction holds any stress along the line between the two contacts.
 
-    No impulse moves one of them along it, so the rebound that is asked for there has no solution. It was asked for
+    No impulse moves one of them along it, so the rebound that the law wants there has no solution. It was tried
     again and again, between leaps, ten thousand times in 10 ms, for 70 s; now such an impact has no rebound.
     """
     body = physics.Ellipsoid(

@@ -30,7 +30,7 @@ FOUND = {
         },
     },
     # eight events round and round, a tenth of a look-ahead long
-    "a face that all but holds": {
+    "a face that nearly holds": {
         "pos": (-1.1128525658589496, 0.3963305167830003, -0.004878894379414615),
         "quat": (-0.017027354856691282, -0.7069018604433345, 0.706901618244186, 0.017027360690616018),
         "linvel": (0.0028825054902547106, -0.0022334356533974926, -0.00013894419277502392),
@@ -65,7 +65,7 @@ def play(name):
 
 
 def test_a_bounce_ends_no_deeper_than_it_began():
-    """Where each ended a slop deeper it gained by that what the impact had taken: 42,000 impacts, 5e-10 m deep.
+    """Impacts that ended a slop deeper once gained by that what they had taken: 42,000 impacts, 5e-10 m deep.
 
     Impacts are met where the gap is zero to a slop, and a contact that acts drifts by rounding until it is corrected.
     """
@@ -77,7 +77,7 @@ def test_a_bounce_ends_no_deeper_than_it_began():
 
 def test_events_that_come_round_again_and_again_are_left_by_an_impulse():
     """Regimes that follow each other for ever, a tenth of a look-ahead in all: the body is at rest in the end."""
-    world, _, solves = play("a face that all but holds")
+    world, _, solves = play("a face that nearly holds")
     assert solves <= 500
     assert not world.linvel.any()
     assert not world.angvel.any()
@@ -112,7 +112,7 @@ def door(tilt):
 
 @pytest.mark.parametrize("tilt", [1e-9, 1e-8, 1e-7, 1e-6, 1e-5, 1e-4, 1e-3])
 def test_a_door_turns_as_it_does_when_it_leans_a_little_more(tilt):
-    """What a lean of t changes is some t of it; a lean of rounding once stopped the door, through friction.
+    """A lean of t changes the motion by some t of it; a lean of rounding once stopped the door, through friction.
 
     Upright, the corners of the edge share what they bear as they like, and with it what the third one rubs: measured,
     up to 3 % of the turning.

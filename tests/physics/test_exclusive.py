@@ -156,7 +156,7 @@ def test_a_copy_is_free_and_goes_on():
 
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="no fork")
 def test_a_forked_child_does_not_inherit_the_other_thread(monkeypatch):
-    """What that thread was stepping is half a step in the child, which is said, until it has a whole state again."""
+    """A world that thread was stepping is half a step in the child; errors say so until it has a whole state again."""
     world, other = ball(), ball()
     snapshot = world.snapshot()
     with Held(world, monkeypatch):

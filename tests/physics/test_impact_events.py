@@ -79,7 +79,7 @@ def test_a_cradle_of_blocks_hands_the_momentum_on_pair_by_pair(accuracy):
 
 @pytest.mark.parametrize("accuracy", ["fast", "balanced", "precise"])
 def test_a_tower_thrown_at_the_floor_tells_the_floor_from_its_blocks(accuracy):
-    """What each block loses is what its impulses sum up to, the floor's and its neighbours'; no more pairs than met."""
+    """Each block loses the sum of its impulses, the floor's and its neighbours'; no more pairs than met."""
     masses = (2.0, 1.0, 3.0)
     bodies = [physics.Block((1, 1, 1), m, pos=(0, 1 + 1.1 * k, 0), linvel=(0, -2, 0)) for k, m in enumerate(masses)]
     run = physics.simulate(physics.Scene(bodies, [FLOOR], laws(0.5)), 1.0, accuracy)
@@ -186,7 +186,7 @@ def test_bodies_that_come_to_lie_on_each_other_touch_and_part():
 
 
 def test_a_step_that_is_not_kept_logs_nothing():
-    """Where a world keeps its old state nothing has hit anything."""
+    """No impact is logged for a world that keeps its old state."""
     world = physics.World(_thrown())
     world.make_event_room(16)
     wrench = world.no_wrench()

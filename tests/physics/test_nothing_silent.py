@@ -1,4 +1,4 @@
-"""What a scene or a step cannot do is refused, warned of or reported."""
+"""Refusals, warnings and reports of scenes and steps that cannot do something."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a scene declares is compiled; what it does not, is not there."""
+"""Plans: declared effects are compiled, others are not there."""
 
 from __future__ import annotations
 
@@ -77,7 +77,7 @@ print(json.dumps([name for name in names if any(name in function for function in
 
 
 def compiled_names(effects: str, cache: Path) -> set[str]:
-    """Which kernels become machine code with the step of a scene, compiled afresh in a process of its own."""
+    """Names of the kernels that become machine code with the step of a scene, compiled in a process of its own."""
     done = subprocess.run(
         [sys.executable, "-c", PROGRAM, effects], env={**os.environ, "NUMBA_CACHE_DIR": str(cache)},
         capture_output=True, text=True, check=True, timeout=600,

@@ -24,7 +24,7 @@ def ball(**start) -> physics.Sphere:
 
 
 def world(body, rolling=0.0, spin=0.0, mu=0.8, e=0.6, tangential=0.0, *, dt=0.01, gravity=(0, -G, 0), worlds=1):
-    """One plan for all tests here: every law declared, those not asked for at no strength."""
+    """One plan for all tests here: every law declared, those not wanted at no strength."""
     effects = [
         physics.Gravity(gravity), physics.Contact(e, tangential=tangential), physics.Friction(mu),
         physics.RollingFriction(rolling), physics.SpinFriction(spin),
@@ -173,7 +173,7 @@ vectors = st.tuples(*[st.floats(-5, 5)] * 3)
     tangential=st.floats(-1, 1), e=st.floats(0, 1), height=st.floats(0, 0.3),
 )  # fmt: skip
 def test_contact_never_gives_energy(linvel, angvel, rolling, spin, mu, tangential, e, height):
-    """Whatever the laws' numbers: energy grows by no more than rounding and the place of an impact (half a slop)."""
+    """Whatever the laws' numbers: energy grows by at most rounding and the place of an impact (half a slop)."""
     body = ball(pos=(0, R + height, 0), linvel=linvel, angvel=angvel)
     built = world(body, rolling, spin, mu, e, tangential)
     allowed = 1e-9 * energy(built) + M * G * 1e-6 * R * 10

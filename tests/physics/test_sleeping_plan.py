@@ -33,11 +33,11 @@ def test_undeclared_nothing_of_it_is_there():
 def test_under_loads_that_may_change_by_themselves_nothing_sleeps():
     gusts = (physics.Sleeping(), physics.Drag(), physics.Wind(gust=1.0))
     assert not plan(*gusts).sleeping
-    assert "nothing rests under what may change by itself: wind" in plan(*gusts).explain()
+    assert "nothing rests under what may change on its own: wind" in plan(*gusts).explain()
     calm = (physics.Sleeping(), physics.Drag(), physics.Wind(gust=0.0))
     assert plan(*calm).sleeping
     world = physics.World(physics.Scene(BLOCK.bodies, BLOCK.walls, [*BLOCK.effects, *calm]))
-    with pytest.raises(ValueError, match=r"Wind.*may change by itself, in a scene in which bodies sleep"):
+    with pytest.raises(ValueError, match=r"Wind.*may change on its own, in a scene in which bodies sleep"):
         world.set_parameters(effects=[physics.Wind(gust=1.0)])
 
 

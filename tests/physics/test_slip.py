@@ -68,7 +68,7 @@ def sphere_slip(world):
 @given(st.floats(-3, 3), st.floats(-3, 3), st.floats(-3, 3), st.floats(0.05, 1.0), st.floats(0.001, 0.05))
 @settings(max_examples=40, deadline=None)
 def test_friction_takes_what_its_impulse_does_at_the_mean_slip(vx, vz, spin, mu, h):
-    """Of a sphere that goes on slipping: ΔE = -μ m g h |½ (u⁰ + u¹)|; and never does a step add energy."""
+    """A sphere that goes on slipping has ΔE = -μ m g h |½ (u⁰ + u¹)|; and never does a step add energy."""
     mass = 2.0
     body = physics.Sphere(1.0, mass, pos=(0, 1, 0), linvel=(vx, 0, vz), angvel=(spin, 0, -spin))
     world = physics.World(scene(body, mu), dt=h, accuracy=TIGHT)

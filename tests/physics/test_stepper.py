@@ -108,7 +108,7 @@ def test_a_copy_steps_its_own_world(loads, copier):
 
 
 def test_changes_of_arguments_between_steps_of_a_world_are_heeded():
-    """step() prepares what the last call asked for: other steps, dt or wrench must not meet what is prepared."""
+    """step() prepares for the last call: other steps, dt or wrench must not meet what is prepared."""
     world, push = shoved(), np.full((WORLDS, 1, 6), 20.0)
     world.step(push)
     assert world.time == pytest.approx(0.005)
@@ -125,7 +125,7 @@ def test_changes_of_arguments_between_steps_of_a_world_are_heeded():
 
 
 def test_a_world_is_freed_with_its_last_user():
-    """What a step keeps ready holds the world's arrays, not the world: no cycle for the collector to find."""
+    """Prepared steps hold the world's arrays, not the world: no cycle for the collector to find."""
     world = shoved()
     world.step()
     gone = weakref.ref(world)

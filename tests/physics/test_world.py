@@ -47,7 +47,7 @@ def run(world, names, steps=60):
 
 @pytest.fixture(scope="module")
 def alone():
-    """What world 7 does when it is the only one."""
+    """Motion of world 7 when it is the only one."""
     world = shoved(1)
     spread(world, [7])
     return run(world, [7])
@@ -110,7 +110,7 @@ def test_two_python_threads_step_two_worlds():
 def test_every_step_is_reported_and_what_is_left_above_tolerance_is_rare_and_small():
     """1200 steps of 12 shoved worlds: depth within the slop, nothing unresolved, every residual above the tolerance
     counted. The sweeps do not reach 1e-6 on every mixed stick-slip problem: at most 1 solve in 1000 may miss it, and
-    by no more than a hundredfold."""
+    by at most a hundredfold."""
     world = shoved()
     solves = missed = 0
     for load in wrenches(range(WORLDS), 240):

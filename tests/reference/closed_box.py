@@ -77,7 +77,7 @@ class ElasticBlock:
         values = gaps.astype(float) @ self.powers.T
         rates = (gaps[:, 1:] * np.arange(1, self.order + 1)).astype(float) @ self.powers[:, :-1].T
         best = None
-        # Between samples a gap is above the chord by no more than (its greatest change of slope) x (sample) / 8.
+        # Between samples a gap is above the chord by at most (its greatest change of slope) x (sample) / 8.
         sag = np.abs(np.diff(rates)).max(axis=1) * float(self.step) / 32 / 4
         for c in np.flatnonzero(values.min(axis=1) < sag + NEAR):
             h = self._root(gaps[c], c == just_hit)

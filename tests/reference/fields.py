@@ -67,7 +67,7 @@ def cut_block(half: np.ndarray, normal: np.ndarray, height: float) -> tuple[floa
 
 
 def flight_with_drag(radius: float, mass: float, velocity, gravity: float, duration: float) -> np.ndarray:
-    """Where a sphere thrown from the origin is after `duration` [m], by DOP853: m v' = -½ ρ C π r² |v| v - m g e_y."""
+    """Place of a sphere thrown from the origin after `duration` [m], by DOP853: m v' = -½ ρ C π r² |v| v - m g e_y."""
     k = 0.5 * 1.225 * 0.47 * np.pi * radius**2 / mass
 
     def rate(t: float, y: np.ndarray) -> np.ndarray:

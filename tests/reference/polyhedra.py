@@ -70,13 +70,13 @@ def nearest_point(points: np.ndarray, x: np.ndarray) -> tuple[np.ndarray, float]
 
 
 def is_inside(points: np.ndarray, x: np.ndarray, reach: float) -> bool:
-    """Whether x (3,) is in the convex hull of the points, or within `reach` of each of its planes [m]."""
+    """Test whether x (3,) is in the convex hull of the points, or within `reach` of each of its planes [m]."""
     equations = ConvexHull(points).equations
     return bool((equations[:, :3] @ x + equations[:, 3]).max() <= reach)
 
 
 def are_disjoint(a: np.ndarray, b: np.ndarray) -> bool:
-    """Whether a plane separates two hulls strictly: a linear program for n and c with n·a <= c - 1, n·b >= c + 1."""
+    """Test whether a plane separates two hulls: a linear program for n and c with n·a <= c - 1, n·b >= c + 1."""
     rows = np.vstack([np.c_[a, -np.ones(len(a))], np.c_[-b, np.ones(len(b))]])
     found = linprog(np.zeros(4), A_ub=rows, b_ub=-np.ones(len(rows)), bounds=[(None, None)] * 4)
     return found.status == 0

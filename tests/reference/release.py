@@ -31,7 +31,7 @@ class Planar(NamedTuple):
 
 
 class Release(NamedTuple):
-    """What the body does as it is let go."""
+    """Motion of the body as it is let go."""
 
     time: mpmath.mpf  # [s]
     angle: mpmath.mpf  # [rad]

@@ -53,7 +53,7 @@ class Ellipsoid(NamedTuple):
 
 
 class State(NamedTuple):
-    """Of a body that touches the floor; v and the height of the centre follow from the rest."""
+    """State of a body that touches the floor; v and the height of the centre follow from the rest."""
 
     t: float
     place: np.ndarray  # (2,) of the centre, x and z
@@ -105,7 +105,7 @@ def holding_force(body: Ellipsoid, quat, omega):
 
 
 def cone_margin(body: Ellipsoid, quat, omega):
-    """What friction can do beyond what sticking asks for [N]."""
+    """Margin of friction beyond the force that sticking needs [N]."""
     f = holding_force(body, quat, omega)
     return body.friction * f[1] - np.hypot(f[0], f[2])
 
@@ -227,7 +227,7 @@ def run(body: Ellipsoid, start: State) -> Truth | None:
 
 
 def is_plain(truth: Truth) -> bool:
-    """Whether it sticks within 2 s, with a hundredth of what friction can do left, and holds for 20 ms."""
+    """Test whether it sticks within 2 s, with a hundredth of what friction can do left, and holds for 20 ms."""
     body, end = truth.body, truth.sticks
     has_room = cone_margin(body, end.quat, end.angvel) > 0.01 * body.friction * body.mass * body.gravity
     return has_room and end.t < 2.0 and roll(body, end, 0.02)[1]

@@ -1,4 +1,4 @@
-"""How far two symmetric convex bodies are apart, by looking in all directions: a slow oracle for `many.rounds`."""
+"""Distance of two symmetric convex bodies, by search over all directions: a slow oracle for `many.rounds`."""
 
 from __future__ import annotations
 

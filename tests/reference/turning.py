@@ -1,4 +1,4 @@
-"""Whether bodies that turn freely meet, by looking very often: a slow oracle that shares nothing with the engine.
+"""Test whether bodies that turn freely meet, by looking very often: a slow oracle that shares nothing with the engine.
 
 Free motion of a symmetric top is in closed form (Landau and Lifshitz, *Mechanics*, section 33): its axis goes about L
 at |L|/I_t, and the body turns about that axis at ω_a (1 - I_a/I_t) besides. Its centre is on the parabola. The distance
@@ -7,7 +7,7 @@ along the normals of their faces and the products of their edges (separating axe
 axis where it is least.
 
 The least distance over a time is looked for at `LOOKS` moments, then twice more around the `BEST` smallest of them.
-A distance changes by no more than the speed of a point, so that between two of N looks over a turn of Θ it can fall by
+A distance changes by at most the speed of a point, so that between two of N looks over a turn of Θ it can fall by
 (|v| T + Θ R)/(2N): with N = 1500, Θ = 9 and R = 1 m by 3e-3 m, after two refinements with 60 looks over two intervals
 by 3e-6 m.
 """

@@ -31,7 +31,7 @@ def cut_recording() -> bytes:
 
 
 def loaded(text: str | bytes, load=p.load_scene):
-    """What is read of a file with this content."""
+    """Load a file with this content."""
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "scene.toml"
         path.write_bytes(text.encode() if isinstance(text, str) else text)

@@ -1,4 +1,4 @@
-"""Wrong input to environments: made, reset, stepped, asked for attributes, closed."""
+"""Wrong input to environments: made, reset, stepped, read, closed."""
 
 from __future__ import annotations
 

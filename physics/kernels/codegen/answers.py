@@ -1,4 +1,4 @@
-"""What is said of an operation at once, in Numba's place: of what type its result is, and how it is lowered.
+"""Table of operations that answers in Numba's place: the type of a result, and how the operation is lowered.
 
 Numba has a dozen templates for `a[i]` and asks each, and for what follows it writes many times what is needed. Each
 module here knows some operations; of all others Numba is asked.
@@ -31,7 +31,7 @@ def signature_of(function: types.Function, context: typing.Context, args: tuple)
 
 
 def lowering_of(function, sig: typing.Signature) -> Callable | None:
-    """How to lower `function` for a signature, or None where Numba's way is taken.
+    """Return the function that lowers `function` for a signature, or None to leave it to Numba.
 
     Parameters
     ----------

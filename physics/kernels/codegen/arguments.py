@@ -1,4 +1,4 @@
-"""How kernels hand on what has many words: by where it stands, not word by word.
+"""Arguments of many words between kernels: passed by address, not word by word.
 
 The scratch of many bodies is a tuple of a hundred arrays, seven words each. Numba hands each word on as an argument of
 its own: of all instructions written for a step of bodies four in five took that tuple apart or put it together. Here a

@@ -1,4 +1,4 @@
-"""What writes the instructions of a kernel: those that are known beforehand are left out.
+"""Builder of a kernel's instructions that folds those with known results.
 
 Numba hands structures about (an array is one of seven words): puts a word in, takes another out, and leaves it to LLVM
 to see that nothing happened. Writing that down, reading it and seeing it was most of the time a kernel took.

@@ -1,4 +1,4 @@
-"""How kernels call kernels: values in, a value out.
+"""Calling convention between kernels: values in, a value out.
 
 A function that Numba compiles writes its result where its caller tells it, and returns a status; its caller reads the
 status, hands an exception on, and reads the result. Kernels raise none; only functions of users may. Here a part
@@ -26,7 +26,7 @@ def gives_value(function) -> bool:
 
 
 class ValueDescriptor(PythonFunctionDescriptor):
-    """Of a function that returns its value."""
+    """Descriptor of a function that returns its value."""
 
     __slots__ = ()
     gives_value = True
@@ -78,7 +78,7 @@ class Convention(CPUCallConv):
             raise MayRaise(builder.function.name)
 
     def get_arguments(self, func):
-        """What of a function's arguments is a kernel's."""
+        """Return those of a function's arguments that are a kernel's."""
         return func.args if gives_value(func) else super().get_arguments(func)
 
     def return_value(self, builder, retval):

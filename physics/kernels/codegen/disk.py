@@ -48,7 +48,7 @@ _SAID: set[str] = set()
 
 
 def is_own(status: os.stat_result) -> bool:
-    """Whether a file or folder is this user's or root's, and others cannot write to it; always so without such users.
+    """Test whether only this user or root owns and can write a file or folder; always so without such users.
 
     Parameters
     ----------
@@ -64,7 +64,7 @@ def _sum_of(purpose: bytes, content: bytes) -> bytes:
 
 
 def read(path: Path, purpose: bytes):
-    """What was written to a file for this purpose; None if there is no such file.
+    """Return the content of a file written for this purpose; None if there is no such file.
 
     Raises
     ------

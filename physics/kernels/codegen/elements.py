@@ -41,7 +41,7 @@ def _from_front(context, builder, index, type_, length):
 
 
 def pointer(context, builder, array_type, array, index_types, indices):
-    """Where an element is; under NUMBA_BOUNDSCHECK=1 an index outside its axis raises IndexError."""
+    """Pointer to an element; under NUMBA_BOUNDSCHECK=1 an index outside its axis raises IndexError."""
     shape = _lengths(builder, array_type, array, SHAPE, lambda known: known.shape)
     data = builder.extract_value(array, DATA)
     from_front = []
@@ -136,7 +136,7 @@ def _as_words(index: types.Type) -> types.Type:
 
 
 def lowering(key, sig: typing.Signature) -> Callable | None:
-    """What lowers an element, or the array with another shape."""
+    """Return the function that lowers an element, or the array with another shape."""
     if key is operator.getitem and _is_element(*sig.args):
         return _read
     if key is operator.setitem and _is_element(*sig.args[:2]):

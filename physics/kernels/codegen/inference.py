@@ -1,4 +1,4 @@
-"""Of what type each variable of a kernel is."""
+"""Types of the variables of a kernel."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ def infer_types(state) -> None:
 
 
 class _Network(ConstraintNetwork):
-    """What is known of types; a constraint is looked at again if a variable it is about has another type since.
+    """Network of type constraints; one is looked at again if a variable of it has changed its type since.
 
     Numba looks at all of them until a round changes nothing, which is twice for most kernels.
     """

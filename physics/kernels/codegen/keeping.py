@@ -24,7 +24,7 @@ from physics.kernels.codegen.libraries import StandingLibrary
 
 
 class Origin(NamedTuple):
-    """What machine code that stands was made of: a kernel, and the types of its arguments.
+    """Origin of shared machine code: a kernel, and the types of its arguments.
 
     Parameters
     ----------
@@ -108,7 +108,7 @@ class _Cache:
 
     @cached_property
     def _about(self) -> bytes:
-        """What machine code depends on besides the types of arguments and the processor."""
+        """Return the settings that machine code depends on besides the types of arguments and the processor."""
         function = self._function
         around = dumps(tuple(cell.cell_contents for cell in function.__closure__)) if function.__closure__ else b""
         versions = (sys.version_info[:3], sys.abiflags if hasattr(sys, "abiflags") else "", numba.__version__)
@@ -131,7 +131,7 @@ class WholeCache(_Cache):
     """The wholes of one kernel: what each calls, and what Numba keeps."""
 
     def reduce(self, made):
-        """What is written."""
+        """Return the content to write."""
         return made.library.called, made._reduce()
 
     def rebuild(self, target_context, payload):
@@ -148,7 +148,7 @@ class StandingCache(_Cache):
     kind = "-standing"  # its file is not that of the whole of the same kernel
 
     def reduce(self, made):
-        """What is written."""
+        """Return the content to write."""
         library, about = made.library, made.fndesc
         code = library.machine_code()
         about.typemap = about.calltypes = None

@@ -22,14 +22,14 @@ NUMBER_SIZE = 8  # [bytes]
 
 
 class LanesType(types.Type):
-    """Of four numbers."""
+    """Type of four numbers."""
 
     def __init__(self):
         super().__init__("lanes")
 
 
 class MarksType(types.Type):
-    """Of what is true of each of four."""
+    """Type of four truth values."""
 
     def __init__(self):
         super().__init__("marks")
@@ -287,6 +287,6 @@ _LOWERINGS = {
 
 
 def lowering(key, sig: typing.Signature) -> Callable | None:
-    """What lowers an operation on lanes."""
+    """Return the function that lowers an operation on lanes."""
     is_ours = key in _NAMED or LANES in sig.args or MARKS in sig.args
     return _LOWERINGS.get(key) if is_ours else None

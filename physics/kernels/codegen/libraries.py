@@ -1,4 +1,4 @@
-"""What kernels are linked to: the IR of parts, and the machine code of wholes and of kernels that stand (`linking`).
+"""Code libraries that kernels are linked to: IR of parts, machine code of entry kernels and shared ones (`linking`).
 
 What is not public of Numba here is `JITCodeLibrary`, the IR of one function with the libraries that it calls.
 """

@@ -1,4 +1,4 @@
-"""How kernels are compiled together: each to LLVM IR once, all of them to machine code once.
+"""Dispatchers that compile kernels together: each to LLVM IR once, all of them to machine code once.
 
 Left to itself Numba optimises a kernel and makes machine code of it as soon as it is typed, and then once more in
 every caller it is linked into, up to a dozen levels of a step. Here a kernel that is called from another one is a
@@ -209,7 +209,7 @@ class Kernel(CPUDispatcher):
         self._part = self._make_part()
 
     def renew(self) -> None:
-        """Forget what is compiled for other kernels: what the function reads around it is another thing now."""
+        """Forget what is compiled for other kernels: what the function reads around it has changed."""
         self._part = self._make_part()
         RememberingTarget.forget(types.Dispatcher(self))
 
@@ -244,9 +244,9 @@ class Kernel(CPUDispatcher):
         return entry
 
     def get_call_template(self, args, kws):
-        """How another kernel calls this one."""
+        """Return the template by which another kernel calls this one."""
         return self._part.get_call_template(args, kws)
 
     def get_overload(self, sig):
-        """What another kernel calls."""
+        """Return the function that another kernel calls."""
         return self._part.get_overload(sig)

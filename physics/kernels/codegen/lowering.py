@@ -1,4 +1,4 @@
-"""How a kernel's statements become LLVM IR, without what Numba does for reference counts.
+"""Lowering of a kernel's statements to LLVM IR, without Numba's reference counts.
 
 Kernels own nothing (`physics.kernels.compiler`), so no variable has to be released or kept where a release would find
 it. Numba's lowering reads what a variable held before each assignment, and reads and clears it at the end of its life;

@@ -1,4 +1,4 @@
-"""What Numba does to a kernel before it is lowered, without what kernels have no use for.
+"""Numba's passes over a kernel before lowering, without those that kernels have no use for.
 
 Numba's own pipeline looks for closures, comprehensions, `with`, `raise`, array expressions and functions inlined by
 it, none of which a kernel has, and determines after most passes which variable lives where, which nobody asks for
@@ -76,7 +76,7 @@ class _SingleAssignment(_Plain):
 
 @register_pass(mutates_CFG=False, analysis_only=False)
 class _Types(_Plain):
-    """Of what type each variable is, and what each call calls."""
+    """Types of variables and targets of calls."""
 
     _name = "kernel_types"
 
@@ -86,7 +86,7 @@ class _Types(_Plain):
 
 @register_pass(mutates_CFG=True, analysis_only=False)
 class _NoPhis(PreLowerStripPhis):
-    """What a variable is where branches meet becomes assignments at their ends."""
+    """Replace phi nodes by assignments at the ends of the branches that meet."""
 
     _name = "kernel_no_phis"
 

@@ -41,7 +41,7 @@ def _advance(context, builder, sig, args):
 
 
 def lowering(key, sig: typing.Signature) -> Callable | None:
-    """What lowers a range of words, the start of a loop over it, or its next number."""
+    """Return the function that lowers a range of words, the start of a loop over it, or its next number."""
     if key is range:
         return _count if sig.return_type == types.range_state64_type else None
     if key == "getiter":

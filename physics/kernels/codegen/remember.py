@@ -31,7 +31,7 @@ from physics.kernels.codegen.elements import array_in_record
 
 
 class RememberingTyping(typing.Context):
-    """What Numba knows of types.
+    """Typing context of Numba that remembers its answers.
 
     Parameters
     ----------
@@ -80,7 +80,7 @@ types.Function.get_call_type = _get_call_type
 
 
 class RememberingTarget(CPUContext):
-    """How Numba lowers operations, and how kernels do where that takes fewer instructions.
+    """Target context that lowers operations as Numba does, or as kernels do where that takes fewer instructions.
 
     Parameters
     ----------
@@ -116,7 +116,7 @@ class RememberingTarget(CPUContext):
         return super().mangler(name, () if uid == 0 else types, abi_tags=abi_tags, uid=uid)
 
     def get_function(self, fn, sig, _firstcall=True):
-        """How `fn` is lowered for a signature; raises NotImplementedError if there is no way."""
+        """Return the function that lowers `fn` for a signature; raise NotImplementedError if there is none."""
         # What Numba compiles for itself has an error model of its own.
         key = fn, sig, type(self.error_model), self.enable_boundscheck
         lowering = self.lowerings.get(key)
@@ -127,7 +127,7 @@ class RememberingTarget(CPUContext):
         return lowering
 
     def numba_function(self, fn, sig):
-        """How Numba lowers `fn`; its registries are looked through once for each, not for each signature."""
+        """Return Numba's way to lower `fn`; its registries are searched once for each `fn`, not for each signature."""
         if (fn, sig) in self.absent:
             raise NotImplementedError(f"No definition for lowering {fn}{sig}")
         is_new = fn not in self.asked
@@ -140,7 +140,7 @@ class RememberingTarget(CPUContext):
 
     @property
     def call_conv(self):
-        """How functions are called."""
+        """Calling convention of functions."""
         return calls.Convention(self)
 
     def declare_function(self, module, fndesc):
@@ -154,17 +154,17 @@ class RememberingTarget(CPUContext):
         return Arguments(self.data_model_manager, fe_args)
 
     def get_getattr(self, typ, attr):
-        """How a member of a value is read."""
+        """Return the function that reads a member of a value."""
         if isinstance(typ, types.Record) and isinstance(typ.typeof(attr), types.NestedArray):
             return array_in_record
         return super().get_getattr(typ, attr)
 
     def pair_first(self, builder, val, ty):
-        """What an iterator gave."""
+        """Lower the value that an iterator gave."""
         return builder.extract_value(val, 0)
 
     def pair_second(self, builder, val, ty):
-        """Whether it gave something."""
+        """Lower the test whether an iterator gave a value."""
         return builder.extract_value(val, 1)
 
     def insert_user_function(self, func, fndesc, libs=()):

@@ -59,7 +59,7 @@ def signature(key, context, args) -> typing.Signature | None:
 
 
 def lowering(key, sig: typing.Signature) -> Callable | None:
-    """What lowers a function of numbers."""
+    """Return the function that lowers a function of numbers."""
     if key in OF_NUMBERS and _are_numbers(sig.args):
         return OF_NUMBERS[key]
     if key is operator.pow and isinstance(sig.args[0], types.Float) and isinstance(sig.args[1], types.Integer):

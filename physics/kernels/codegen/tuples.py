@@ -70,7 +70,7 @@ def _put_together(builder, type_: ir.Type, words):
 
 
 def lowering(key, sig: typing.Signature) -> Callable | None:
-    """What lowers a member that an index chooses, or the question whether a number is a member."""
+    """Return the function that lowers a member chosen by an index, or the test whether a number is a member."""
     if len(sig.args) != 2 or not isinstance(sig.args[0], types.UniTuple):
         return None
     members, other = sig.args

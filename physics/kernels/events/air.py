@@ -131,7 +131,7 @@ def safe_flight(y, left, third, assured, tilted, work, motion):
 
 @inlined
 def has_torque(work):
-    """Whether a torque acts."""
+    """Test whether a torque acts."""
     t = work.torque
     return t[0] != 0.0 or t[1] != 0.0 or t[2] != 0.0
 

@@ -61,7 +61,7 @@ def rebound(speed, normal, r, rate, w, alpha, work, motion):
 
 @inlined
 def touches(s, motion):
-    """Whether feature s takes part in an impact: it touches, or would in no time."""
+    """Test whether feature s takes part in an impact: it touches, or would in no time."""
     return motion.gap[START, s] <= max(motion.touch, -motion.gap_rate[START, s] * motion.together)
 
 
@@ -142,7 +142,7 @@ def _without_rebound(n, friction, smooth, pivots, v, L, solved, P, work, report)
 
 @kernel
 def or_plastic(n, friction, smooth, pivots, v, L, solved, P, work, report):
-    """What `solve_contacts` gave for a collision, or an impact without rebound where that was no solution.
+    """Result of `solve_contacts` for a collision, or an impact without rebound where that was no solution.
 
     With friction two contacts may hold any stress along the line between them, which no impulse lengthens: where one is
     asked to rebound along it and neither slides, Newton's law and Coulomb's have no solution together.
@@ -157,7 +157,7 @@ def or_plastic(n, friction, smooth, pivots, v, L, solved, P, work, report):
 
 @kernel
 def within_energy(n, y, friction, smooth, tilted, pivots, solved, P, work, motion, report):
-    """What `solve_contacts` gave for a collision with friction, or as much of its rebound as there is energy for.
+    """Result of `solve_contacts` for a collision with friction, or as much of its rebound as there is energy for.
 
     Impulses are those of what is returned. See `physics.kernels.restraint`.
     """

@@ -1,4 +1,4 @@
-"""What ends a regime: the smallest of the quantities that have to stay positive during a smooth step.
+"""Guards that end a regime: the smallest of the quantities that have to stay positive during a smooth step.
 
 - *Gap* of every feature that does not act, in radii. A dip between the ends of a step shows in the cubic through the
   gaps and their rates at both ends.
@@ -135,7 +135,7 @@ def _pair_excess(i, j, mu, work, motion):
 
 @kernel
 def cone_excess(j, work, motion):
-    """How far the contact j that holds, with the others of its wall that hold, leaves its cone [N]."""
+    """Excess of contact j, which holds with the others of its wall that hold, over its friction cone [N]."""
     wall, other, holding = wall_of(motion.slot[j], work), j, 1
     for k in range(motion.count):
         if k != j and motion.holds[k] and wall_of(motion.slot[k], work) == wall:

@@ -60,7 +60,7 @@ NOTHING = -1
 
 @kernel
 def set_thresholds(y, h, tilted, work, motion):
-    """What counts as no gap and no speed, and how far a regime is looked ahead; problems are solved to rounding.
+    """Set the gap and speed that count as zero, and the time a regime is looked ahead; problems are solved to rounding.
 
     Gaps are differences of places, wherever the body may go within h.
     A contact is still when the speed would not lift it by HOP gaps that count as none: a bounce as low as that would
@@ -79,7 +79,7 @@ def set_thresholds(y, h, tilted, work, motion):
 
 @inlined
 def begin_part(y, start, h, tilted, memory, work, motion):
-    """What is known when a part of length h begins at the time `start` of the step."""
+    """Prepare a part of length h that begins at the time `start` of the step."""
     set_clock(start, work)
     refresh_loads(y, 0.0, tilted, work)
     set_thresholds(y, h, tilted, work, motion)
@@ -90,7 +90,7 @@ def begin_part(y, start, h, tilted, memory, work, motion):
 
 @kernel
 def find_what(y, is_foretold, watched, friction, smooth, tilted, pivots, work, motion, report):
-    """What the body does from y on, and whether a contact problem had to be asked, since it may come to rest.
+    """Find the regime from y on, and whether a contact problem had to be solved, since the body may come to rest.
 
     It is looked for a moment ahead where a guard has foretold that the regime ends.
     """

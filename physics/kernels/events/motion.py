@@ -54,7 +54,7 @@ def motion_dtype(wall_count: int, features: int) -> np.dtype:
         ("holds", i, (n,)),  # 1: no velocity at all; 0: slides
         ("way", f, (n, 3)),  # direction of sliding
         ("reference", f, (n, 3)),  # the one at the start of the step
-        ("is_starting", i, (n,)),  # 1: the contact was at rest at the start of the step, or all but
+        ("is_starting", i, (n,)),  # 1: the contact was at rest at the start of the step, or nearly
         ("turning", f),  # rate at which the direction turns in which the only contact begins to slide [rad/s]
         ("stiffness", f),  # what friction changes of its acceleration across that, for each radian [m/s²]
         ("first_speed", f),  # of it, at the start of the step [m/s]

@@ -115,7 +115,7 @@ def locate(h, margin, guard, which, heeds, tilted, work, motion):
 
 @inlined
 def has_stopped(guard, which, work, motion):
-    """Whether the contact that ended a step all but stands still there: then that is the end, not before."""
+    """Test whether the contact that ended a step nearly stands still there: then that is the end, not before."""
     if guard != SPEED:
         return False
     return sliding_velocity(which, work, motion)[1] <= motion.slow
@@ -228,7 +228,7 @@ def move(y, left, tilted, work, motion):
 
 @kernel
 def look_ahead(y, tilted, work, motion):
-    """Where the regime would lead in a moment."""
+    """State to which the regime would lead in a moment."""
     put_state(motion, START, y)
     motion.step = motion.ahead
     start_step(motion.ahead, tilted, work, motion)

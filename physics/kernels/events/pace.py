@@ -1,4 +1,4 @@
-"""How far a regime is looked for ahead, and what is done where events crowd: small leaps of first order."""
+"""Look-ahead of a regime, and small leaps of first order where events crowd."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Which contacts act, and how: the acceleration-level complementarity problem of a moment.
+"""Acceleration-level complementarity problem of a moment: the contacts that act, and their modes.
 
     a_n >= 0,  f_n >= 0,  a_n f_n = 0;    a contact that has no tangential velocity holds (a_t = 0, |f_t| <= μ f_n)
     or starts to slide (f_t = -μ f_n a_t/|a_t|); one that has slides on (f_t = -μ f_n u_t/|u_t|)
@@ -32,7 +32,7 @@ from physics.kernels.events.resting import pose_resting
 
 @kernel
 def find_regime(y, friction, tilted, work, motion):
-    """What the body does at y, and the contacts that act: (what, number of candidates, acceleration, moment).
+    """Find the regime at y and the contacts that act: (regime, number of candidates, acceleration, moment).
 
     `ASKS`: none of the candidates slides, and the contact problem with this acceleration and moment, which is posed
     in `work`, decides (`read_resting`). `ASKS_SLIDING`: some do, no mixture was found, and that problem decides for

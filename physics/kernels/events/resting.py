@@ -79,13 +79,13 @@ def pose_resting(count, y, R, w, has_sliding, tilted, work, motion):
 
 @inlined
 def is_way(way, i):
-    """Whether a contact has a direction of sliding."""
+    """Test whether a contact has a direction of sliding."""
     return way[i, 0] != 0.0 or way[i, 1] != 0.0 or way[i, 2] != 0.0
 
 
 @inlined
 def is_idle(i, count, width, small, work):
-    """Whether contact i without a force may be left to the others of its wall: at least three push."""
+    """Test whether contact i without a force may be left to the others of its wall: at least three push."""
     wall, pushing = wall_of(work.slot[i], work), 0
     for j in range(count):
         if wall_of(work.slot[j], work) == wall and work.impulse[width * j] > small * work.mass:
@@ -104,7 +104,7 @@ def take_forces(count, width, work, motion):
 
 @kernel
 def is_still(y, w, acceleration, work, motion):
-    """Whether the body neither moves nor begins to: what is left is rounding."""
+    """Test whether the body neither moves nor begins to: what is left is rounding."""
     v = y[2]
     speed = math.sqrt(qt.dot(v, v)) + work.radius * math.sqrt(qt.dot(w, w))
     return speed <= 2.0 * motion.still and acceleration <= 4.0 * SMALL * work.acceleration
@@ -112,7 +112,7 @@ def is_still(y, w, acceleration, work, motion):
 
 @kernel
 def read_resting(count, y, a, moment, friction, has_sliding, tilted, work, motion):
-    """What the body does by the solution of `pose_resting`'s problem; the contacts that act are set."""
+    """Read the regime from the solution of `pose_resting`'s problem, and set the contacts that act."""
     R, P, w, _ = free_turning(y, tilted, work)
     alpha = turned_by(P, work.J, moment)
     width = 3

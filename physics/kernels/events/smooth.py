@@ -23,7 +23,7 @@ from physics.kernels.fields.loads import has_fields, refresh_loads
 from physics.kernels.layout import SPHERE
 
 # A step is cut to this share when the extrapolation does not settle, and no further than to SHORTEST of the time
-# asked for.
+# requested.
 CUT = 0.25
 SHORTEST = 1.0e-12
 
@@ -51,7 +51,7 @@ FINEST = 1.0e-13
 # last, would not.
 TOLD = 3
 
-# A body with corners turns by no more than this in a step, so that the gaps at its ends and their rates show whether
+# A body with corners turns by at most this in a step, so that the gaps at its ends and their rates show whether
 # a corner dipped into a wall between them [rad].
 TURN_AT_MOST = 0.25
 
@@ -211,7 +211,7 @@ def _set_first_rate(tilted, work, motion):
 
 @kernel
 def _begin_slide(P, tilted, work, motion):
-    """What is known of the only contact, which slides, at START; one that creeps has the direction of `onset`."""
+    """Prepare the only contact, which slides, at START; one that creeps has the direction of `onset`."""
     motion.stiffness = stiffness_across(P, work, motion)
     _, motion.first_speed = sliding_velocity(0, work, motion)
     motion.growth = qt.dot(contact_rate(0, P, work, motion), vector(motion.reference, 0))

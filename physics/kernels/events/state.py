@@ -1,4 +1,4 @@
-"""What a body does at the walls: told as events when it changes, and remembered from step to step."""
+"""Regime of a body at the walls: logged as events when it changes, and remembered from step to step."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def log_changes(work, motion, log, counts, t):
 
 @kernel
 def keep_contacts(memory, i, work, motion):
-    """What the body does at the walls, and its contact forces, for those who ask (`stages.store_warm_start`)."""
+    """Store the regime at the walls and the contact forces for later reads (`stages.store_warm_start`)."""
     slots = work.slot.shape[0]
     row = MEMORY_HEAD + slots
     for k in range(int(memory[i, 1])):
@@ -56,7 +56,7 @@ def keep_contacts(memory, i, work, motion):
 
 @inlined
 def recall_contacts(memory, i, work, motion):
-    """What the body did at the end of the last step, and its forces: the opposite of `keep_contacts`."""
+    """Read the regime at the end of the last step, and its forces: the opposite of `keep_contacts`."""
     row = MEMORY_HEAD + work.slot.shape[0]
     for s in range(motion.last.shape[0]):
         for c in range(3):

@@ -36,7 +36,7 @@ def name_of_regime(motion):
 
 @inlined
 def is_heeded(motion):
-    """Whether the guards of force say something of this regime."""
+    """Test whether the guards of force say something of this regime."""
     return motion.unheeded == NONE or name_of_regime(motion) != motion.unheeded
 
 
@@ -49,7 +49,7 @@ def distrust(nearest, motion):
 
 @kernel
 def has_jumped(what, y, tilted, work, motion):
-    """Whether the step that led to y went too far: what the body does there does not go on from what it did."""
+    """Test whether the step that led to y went too far: what the body does there does not go on from what it did."""
     if what in (RESTS, ASKS, ASKS_SLIDING):
         return False
     if what != MOVES:
@@ -66,7 +66,7 @@ def has_jumped(what, y, tilted, work, motion):
 
 @kernel
 def judge(what, watched, y, tilted, work, motion):
-    """What the body does at y; GOES_BACK where the watched step that led there was too long, and no mere look-ahead."""
+    """Judge the regime at y; GOES_BACK where the watched step that led there was too long, and no mere look-ahead."""
     if watched > motion.nearest and has_jumped(what, y, tilted, work, motion):
         return GOES_BACK
     return what

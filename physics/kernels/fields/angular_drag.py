@@ -29,7 +29,7 @@ def angular_drag(state, p, t):
 
 @inlined
 def _slope(state, p):
-    """How fast the torque grows with ω, along it [N m s]."""
+    """Slope of the torque with ω, along it [N m s]."""
     return p[LINEAR] + 2.0 * p[QUADRATIC] * math.sqrt(qt.dot(state.w, state.w))
 
 

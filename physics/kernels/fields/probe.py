@@ -1,4 +1,4 @@
-"""What the fields do to bodies now, for those who look at a world."""
+"""Loads and energies of the fields now, for diagnostics of a world."""
 
 from __future__ import annotations
 

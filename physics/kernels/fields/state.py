@@ -1,4 +1,4 @@
-"""What a force field is told of a body, and the little vector algebra that fields need."""
+"""State of a body as force fields read it, and the vector algebra that fields need."""
 
 from __future__ import annotations
 

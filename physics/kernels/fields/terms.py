@@ -1,4 +1,4 @@
-"""Which fields a kernel is compiled for: read off the *type* of the workspace.
+"""Fields that a kernel is compiled for, read off the *type* of the workspace.
 
 A scene's fields are members of its workspace record: one marker per kind of field, `load_drag_1x3` for one `Drag` of
 three columns. Numba compiles a kernel per type of its arguments, so that a record without markers has kernels without
@@ -71,7 +71,7 @@ def declare(terms: tuple[Term, ...]) -> None:
 
 
 def members(terms: tuple[Term, ...]) -> list[tuple]:
-    """What a workspace holds for these terms: nothing when there are none."""
+    """Members of a workspace for these terms; none without terms."""
     if not terms:
         return []
     columns = sum(term.count * term.size for term in terms)

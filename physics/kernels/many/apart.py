@@ -1,4 +1,4 @@
-"""What overlaps is pushed apart: positions only; velocities change where that would gain energy (`thrift`).
+"""Push overlapping bodies apart: positions only; velocities change where that would gain energy (`thrift`).
 
 The displacements of the bodies solve the frictionless contact problem whose targets are depths instead of velocities:
 the least displacement, in the metric of mass, that brings every contact of the set back to half a slop. A quarter of
@@ -25,7 +25,7 @@ APART_SHARE = 0.5
 ROUNDS = 30
 DEEP = 100.0
 
-# Error of the displacements at most, relative to the largest that is asked for, or to so many slops where that is less,
+# Error of the displacements at most, relative to the largest target, or to so many slops where that is less,
 # and sweeps for it at most, if a contact problem may take as many: something light between a wall and something heavy
 # needs as many as their masses differ. A stage leaves half of the depth anyway, and half a slop less than the slop:
 # what is off by less is done with. Where solves are finer than that the error is the root of their tolerance, since
@@ -38,8 +38,8 @@ DEEP_SWEEPS = 1000
 
 @inlined
 def _aim_apart(n, many):
-    """Displacements asked for along the normals: the deepest that anything is, in its slop (from 1 on some are asked
-    for), and the error of them that does not matter [m].
+    """Target displacements along the normals: the deepest that anything is, in its slop (from 1 on there are
+    some), and the error of them that does not matter [m].
     """
     deepest, largest, least = 0.0, 0.0, math.inf
     for k in range(n):
@@ -55,7 +55,7 @@ def _aim_apart(n, many):
 
 @inlined
 def _place_inside(b, tilted, many):
-    """Where body b is, inside all walls with its centre."""
+    """Place of body b with its centre inside all walls."""
     place_body(b, tilted, many)
     bring_inside(b, tilted, many)
 

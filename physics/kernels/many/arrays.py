@@ -178,8 +178,8 @@ def make_many(
     """Scratch for worlds of `bodies` bodies among `walls` ((walls, WALL_SIZE)), in fields, with numerical settings.
 
     `polyhedra` are those of `make_hulls`, empty where there is no hull. `meet` says whether bodies touch each other, or
-    walls only; `in_turn` whether contacts that collide do so one after the other; `in_time` whether an error is asked
-    for.
+    walls only; `in_turn` whether contacts that collide do so one after the other; `in_time` whether steps have an error
+    tolerance.
     """
     f, i, nb = np.float64, np.int64, bodies
     pairs, n = pair_room(bodies), contact_room(bodies, len(walls), polyhedra)

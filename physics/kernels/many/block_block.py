@@ -157,7 +157,7 @@ def _touch_edges(a, b, edges, gap, h, many):
 
 @kernel
 def touch_blocks(a, b, margin, h, many):
-    """Add the contacts of blocks a and b that are no more than `margin` [m] apart.
+    """Add the contacts of blocks a and b that are at most `margin` [m] apart.
 
     Where a face separates them or nearly does, and something of the other block is above it, no product of edges can
     say that they are further apart: that something touches.

@@ -45,7 +45,7 @@ def clear(begin, end, many):
 
 @inlined
 def place_of(b, c, many):
-    """Where the blocks of b and its later neighbour c are in `lower` and `upper`."""
+    """Indices of the blocks of b and its later neighbour c in `lower` and `upper`."""
     k = many.start[b]
     while many.column[k] != c:
         k += 1
@@ -93,13 +93,13 @@ def _times(A, k, D, b):
 
 @inlined
 def _is_at(k):
-    """Where lane k is."""
+    """Index of lane k."""
     return Lanes(0.0, 1.0, 2.0, 3.0) == k
 
 
 @inlined
 def _is_behind(k):
-    """Which lanes come after lane k."""
+    """Marks of the lanes after lane k."""
     return Lanes(0.0, 1.0, 2.0, 3.0) > k
 
 
@@ -175,7 +175,7 @@ def _inverted_in_order(A, k):
 
 @inlined
 def _place(r, c):
-    """Where row r of column c is in a block."""
+    """Index of row r of column c in a block."""
     return COLUMN_SIZE * c + r + r // 3
 
 

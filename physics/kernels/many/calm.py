@@ -1,4 +1,4 @@
-"""What is all but at rest comes to rest: it is solved a little beyond what is asked for.
+"""Solve islands that are nearly at rest below the tolerance, so that residual velocities decay instead of cycling.
 
 A solve leaves velocities within a goal, and stops. What stands would have no velocity; so the next stage has to stop
 that, and its impulses hold the load and stop motion that is over afterwards. They start the solve of the stage that
@@ -8,7 +8,7 @@ where they grow again. So a pile that lies would go on at some goals of speed, e
 that is hard would be solved anew in each of them.
 
 An island is left alone where every body keeps its velocity to a small share of the goal: loads and impulses balance.
-One that holds as a whole does after one linear system, and for long; others are swept. Where an error is asked for
+One that holds as a whole does after one linear system, and for long; others are swept. Under error control
 nothing is: goals are next to rounding there, and a high arch at its limit, swept in every part, was solved no more.
 """
 
@@ -41,7 +41,7 @@ CALM_SWEEPS = 4
 
 @inlined
 def _fine(goal, least):
-    """What is swept to; velocities may change by twice as much where loads and impulses balance [m/s]."""
+    """Tolerance of the sweeps; velocities may change by twice as much where loads and impulses balance [m/s]."""
     return max(BALANCE_SHARE * goal, least)
 
 
@@ -54,7 +54,7 @@ def point_speed(v, w, b, many):
 
 @inlined
 def _keeps_velocity(b, most, many):
-    """Whether the velocity of body b has changed by no more than `most` in this resting stage [m/s].
+    """Test whether the velocity of body b has changed by at most `most` in this resting stage [m/s].
 
     Velocities before the stage are in `many.momenta`, those after it in `many.twist`.
     """
@@ -64,7 +64,7 @@ def _keeps_velocity(b, most, many):
 
 @kernel
 def is_in_balance(goal, least, many):
-    """Whether nothing is left for `calm` to do in any island."""
+    """Test whether nothing is left for `calm` to do in any island."""
     if many.settings[0].rests == 1:
         for b in range(many.twist.shape[0]):
             if many.touched[b] == 1 and not _keeps_velocity(b, 2.0 * _fine(goal, least), many):
@@ -74,7 +74,7 @@ def is_in_balance(goal, least, many):
 
 @inlined
 def _may_calm(part, speed, change, many):
-    """Whether all bodies of an island were slower than `speed`, and one has changed by more than `change` [m/s]."""
+    """Test whether all bodies of an island were slower than `speed`, and one changed by more than `change` [m/s]."""
     is_balanced = True
     for i in range(part[2], part[3]):
         b = many.order[i]
@@ -86,7 +86,7 @@ def _may_calm(part, speed, change, many):
 
 @kernel
 def calm(part, friction, residual, goal, deep, least, many):
-    """Solve an island that is solved to the goal and all but at rest further: (iterations, residual [m/s], method).
+    """Solve an island that is solved to the goal and nearly at rest further: (iterations, residual [m/s], method).
 
     To `deep` where all of it holds, else by some sweeps as far as `least`. Nothing happens outside resting stages, and
     where that would make more of the residual than the goal.

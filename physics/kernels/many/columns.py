@@ -18,7 +18,7 @@ BOXES_PER_STRIP = 2.0
 
 @inlined
 def _cut(k, many):
-    """How to cut axis k into strips: (lowest coordinate, strips per metre, strips)."""
+    """Cut axis k into strips: (lowest coordinate, strips per metre, strips)."""
     box, count = many.box, many.box.shape[0]
     low, high, total = box[0, k], box[0, k + 3], 0.0
     for b in range(count):

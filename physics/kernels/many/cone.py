@@ -76,9 +76,9 @@ def quotient(b, a, inverse):
 
 @inlined
 def way_out(a, inverse, d):
-    """1/t for the largest t for which a + t d is in the cone, a being inside; no more than 0: any.
+    """1/t for the largest t for which a + t d is in the cone, a being inside; at most 0: any.
 
-    The scaling with a/√det a takes a to √det a e and d to h √det a: 1 + t h₀ ≥ t |h'| is asked for.
+    The scaling with a/√det a takes a to √det a e and d to h √det a: 1 + t h₀ ≥ t |h'| is required.
     """
     s = inverse
     h = unscaled((s * a[0], s * a[1], s * a[2], 1.0), (s * d[0], s * d[1], s * d[2]))

@@ -119,7 +119,7 @@ def arrival(a, b, many):
 
 @inlined
 def _turns_far(a, b, many):
-    """Whether one of them may turn far in this stage (`tumbling`)."""
+    """Test whether one of them may turn far in this stage (`tumbling`)."""
     return many.spin[a] > 0.0 or (b >= 0 and many.spin[b] > 0.0)
 
 

@@ -84,7 +84,7 @@ def aim_rest(n, h, many):
     """Targets of the resting stage over h, with gaps at its middle; see `physics.kernels.aims.aim_rest`.
 
     A contact that was apart at the start may close what is left of its gap at the middle in the half that follows.
-    Where an error is asked for, what a point on a circle has risen by then is no gap: it would make the velocity an
+    Under error control, what a point on a circle has risen by then is no gap: it would make the velocity an
     error of first order.
     """
     half = 0.5 * h

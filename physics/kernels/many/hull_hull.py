@@ -71,7 +71,7 @@ def edge_of(which, b, e, many):
 
 @inlined
 def _arcs_cross(d, left, right, e, other_left, other_right):
-    """Whether the arc between the normals of an edge crosses that between the opposite normals of another edge.
+    """Test whether the arc between the normals of an edge crosses that between the opposite normals of another edge.
 
     The arc's great circle is perpendicular to the edge: its ends must be on both sides of the other's circle, and the
     other way round, on the same hemisphere.
@@ -176,7 +176,7 @@ def _touch_edges(a, b, i, j, n, gap, h, many):
 
 @kernel
 def touch_hulls(a, b, margin, h, many):
-    """Add the contacts of polyhedra a and b (hulls or blocks) that are no more than `margin` [m] apart.
+    """Add the contacts of polyhedra a and b (hulls or blocks) that are at most `margin` [m] apart.
 
     Where a face separates them or nearly does, and something of the other body is above it, no pair of edges can say
     that they are further apart: that something touches. Where edges do say so, and lie nearly flat on that face, what

@@ -13,7 +13,7 @@ from physics.kernels.many.hulls import FIRST_CORNER, FIRST_FACE, LAST_CORNER, LA
 
 @inlined
 def scale_of(b, many):
-    """What the corners of body b in the tables are scaled by."""
+    """Scale of the corners of body b in the tables."""
     d = many.bodies[b].dims
     if many.bodies[b].shape == BLOCK:
         return (d[0], d[1], d[2])
@@ -52,7 +52,7 @@ def nearest_on_segment(x, p, q):
 
 @kernel
 def is_above_face(which, b, face, x, many):
-    """Whether a face of body b, number `which` of the pair, has a point whose normal goes through x, above or below."""
+    """Test whether a face of body b, number `which` of the pair, has a normal through x, above or below."""
     hulls = many.hulls
     out, k = vector(hulls.normal[which], face, 0), hulls.of[b, FIRST_FACE] + face
     first, last = hulls.loops[k, 0], hulls.loops[k, 1]

@@ -1,4 +1,4 @@
-"""What a world remembers of its contacts from stage to stage: their impulses, to start the next solve with.
+"""Warm start of a world's contacts: impulses of the last stage, to start the next solve with.
 
 Contacts are known again by their names. Impulses are kept in the world frame, so that a contact whose frame has turned
 starts with the same force.
@@ -31,7 +31,7 @@ def _row(k):
 
 @inlined
 def _place(name, table):
-    """Where the search for a name begins: its low bits, well mixed (Knuth's multiplicative method)."""
+    """Start of the search for a name: its low bits, well mixed (Knuth's multiplicative method)."""
     return ((name * 2654435761) >> 16) & (table.shape[0] - 1)
 
 

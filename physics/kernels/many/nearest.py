@@ -1,4 +1,4 @@
-"""How far two convex bodies are apart, at any places: Gilbert, Johnson and Keerthi's algorithm on support functions.
+"""Distance of two convex bodies at any places: Gilbert, Johnson and Keerthi's algorithm on support functions.
 
 The differences of points of the two fill a convex body A - B; its point v nearest to the origin is sought. Each round
 adds its corner w farthest against v to a simplex and takes the point of that nearest to the origin. Along n = v/|v| the
@@ -107,7 +107,7 @@ def nearest_to_origin(count, many):
 
 @inlined
 def _core(b, many):
-    """What a sphere has around its centre [m]."""
+    """Radius around the core of body b [m]: a sphere's own, 0 of other shapes."""
     return many.bodies[b].dims[0] if many.bodies[b].shape == SPHERE else 0.0
 
 

@@ -40,7 +40,7 @@ NEWTON_STEPS = 20
 HALVINGS = 10
 FAILED_STEPS = 2
 
-# A round is solved to this share of the residual met so far, or of a hundred times the one that is asked for.
+# A round is solved to this share of the residual met so far, or of a hundred times the tolerance.
 ROUND_SHARE = 0.01
 ENOUGH = 100.0
 
@@ -50,7 +50,7 @@ CONTACT_WORK = 230.0
 BLOCK_WORK = 60.0
 
 # Work that iterations with the system may take, in that of the sweeps allowed: while a pile moves and all is new in the
-# next step; and once it all but lies, where what is solved once holds for long, and what is not creeps for ever.
+# next step; and once it nearly lies, where what is solved once holds for long, and what is not creeps for ever.
 # Fewer iterations than these lead nowhere.
 WORTH_MOVING = 10.0
 WORTH_LYING = 200.0
@@ -200,7 +200,7 @@ def bring_back_best(part, many):
 
 @inlined
 def all_push(part, many):
-    """Whether all contacts of an island push: else not all of them will hold."""
+    """Test whether all contacts of an island push: else not all of them will hold."""
     for i in range(part[0], part[1]):
         if not many.impulse[many.queue[i], 0] > 0.0:
             return False
@@ -246,7 +246,7 @@ def newton_contacts(part, friction, residual, goal, limit, scale, many):
         start, `many.free` the twists without any impulse; `many.impulse` and `many.twist` receive the best that was
         met.
     residual, goal : float
-        Of the start, and asked for [m/s].
+        Residual of the start, and tolerance [m/s].
     limit : int
         Newton steps at most.
     scale : float

@@ -1,4 +1,4 @@
-"""Where the bodies of a world are: rotations, centres, inverse inertias and twists of this moment."""
+"""Kinematics of the bodies of a world: rotations, centres, inverse inertias and twists of this moment."""
 
 from __future__ import annotations
 

@@ -82,7 +82,7 @@ def _length(a):
 
 @inlined
 def _apart(b, tilted, kept, many):
-    """How far body b is from where `COARSE` has it, in its radius; and by how much faster, in its speed.
+    """Distance of body b from its state `COARSE`, in its radius; and the difference in velocity, in its speed.
 
     Of its speed counts no less than what its loads give it over its radius.
     """

@@ -1,4 +1,4 @@
-"""What impulses at the contacts of a world do to its bodies, and how far they are from solving the contact problem.
+"""Response of a world's bodies to impulses at its contacts, and the residual of the contact problem.
 
 The problem and its natural-map residual are those of `physics.kernels.sweeps`; here u is not kept per contact through
 a matrix W, which would be full, but follows from the twists of the bodies,

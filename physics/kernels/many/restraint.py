@@ -35,7 +35,7 @@ def _turn(tilted, many):
 
 @kernel
 def kinetic_energy(tilted, many):
-    """Of all bodies of the world [J]; their twists are made anew."""
+    """Kinetic energy of all bodies of the world [J]; their twists are computed anew."""
     _turn(tilted, many)
     total = 0.0
     for b in range(many.now.shape[0]):
@@ -83,7 +83,7 @@ def _aim_plastic(n, many):
 
 @inlined
 def _has_rebound(n, many):
-    """Whether any contact that touches is to leave with a speed."""
+    """Test whether any contact that touches is to leave with a speed."""
     for k in range(n):
         if many.target[k, 0] != 0.0 and not many.gap[k] > pair_slop(many.ends[k, 0], many.ends[k, 1], many):
             return True

@@ -36,7 +36,7 @@ HALVINGS = 12
 
 @inlined
 def squares_of(C, dims):
-    """D = C diag(dims²) Cᵀ (00, 01, 02, 11, 12, 22), C from the ellipsoid's frame to that asked for."""
+    """D = C diag(dims²) Cᵀ (00, 01, 02, 11, 12, 22), C from the ellipsoid's frame to the target frame."""
     a, b, c = dims[0] * dims[0], dims[1] * dims[1], dims[2] * dims[2]
     return (
         a * C[0] * C[0] + b * C[1] * C[1] + c * C[2] * C[2],
@@ -84,7 +84,7 @@ def separation(A, is_block, B, dims, d, n):
 
 @inlined
 def _kept(free, size):
-    """What is left of one component of the gradient where nᵢ = 0, for a half edge `size`: 0 keeps it there."""
+    """Reduce one component of the gradient where nᵢ = 0, for a half edge `size`: 0 keeps it there."""
     return free - math.copysign(size, free) if abs(free) > size else 0.0
 
 

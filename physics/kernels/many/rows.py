@@ -64,7 +64,7 @@ def set_twists(first, last, many):
 
 @inlined
 def _normal_mobility(k, b, first, moment, many):
-    """What one end adds to W_nn of a contact; writes its vectors of the normal to `many.rows`."""
+    """Share of one end in W_nn of a contact; write its vectors of the normal to `many.rows`."""
     g = qt.cross(vector(many.arm, k, first), vector(many.frame, k, 0))
     h = turned(b, g, many)
     put_padded(many.rows, k, moment, g)

@@ -14,13 +14,13 @@ A warm start that still solves the problem costs one look at the residual. Else 
 
 An impact that is not to be solved finely begins with sweeps up to their limit: few contacts have anything to do in it.
 
-In a resting stage, what is all but at rest is solved a little further (`calm`).
+In a resting stage, what is nearly at rest is solved a little further (`calm`).
 
 What has a residual then that no impulses at all would beat, or a stress beyond reason, is solved without friction.
 
 Where the linear system is dear for what it is worth (`newton.prepare_system`: many bodies that all lie on each other,
 and move), sweeps up to their limit take the place of 2 to 5, so that what a step costs is in proportion to its
-contacts; what they leave is reported. Iterations with the system are no more than the sweeps allowed, either, but for
+contacts; what they leave is reported. Iterations with the system are at most the sweeps allowed, either, but for
 those of the last method begun.
 """
 
@@ -48,7 +48,7 @@ from physics.kernels.many.newton import (
 from physics.kernels.many.response import assemble, residual_of, velocity_missed
 from physics.kernels.many.sweeps import sweep_contacts, sweep_normals
 
-# Share of the residual asked for, or of this finer one, relative to the largest free velocity, that the guess that all
+# Share of the tolerance, or of this finer one, relative to the largest free velocity, that the guess that all
 # holds is solved to: what stands finds nothing to do in the steps to come.
 HOLD_SHARE = 1.0e-3
 FINE = 1.0e-6
@@ -56,14 +56,14 @@ FINE = 1.0e-6
 # Sweeps before the interior-point method.
 FIRST_SWEEPS = 5
 
-# A pile all but lies where without impulses no contact would be faster than this many times what loads give in the
+# A pile nearly lies where without impulses no contact would be faster than this many times what loads give in the
 # stage.
 LYING = 3.0
 
 # Tolerance from which on impacts are swept first.
 COARSE = 1.0e-4
 
-# Residual that rounding leaves, relative to the largest free velocity: no more is asked for.
+# Residual that rounding leaves, relative to the largest free velocity: the smallest tolerance.
 ROUNDING = 1.0e-12
 
 # Where bodies of one velocity touch, all that is left to solve is the rounding of that velocity, and nothing can be
@@ -164,7 +164,7 @@ def sweep_at_last(part, friction, residual, goal, limit, many):
 
 @inlined
 def none_pushes_or_parts(part, goal, many):
-    """Whether no contact of an island pushes, and none opens faster than `goal` [m/s] without that."""
+    """Test whether no contact of an island pushes, and none opens faster than `goal` [m/s] without that."""
     for i in range(part[0], part[1]):
         k = many.queue[i]
         if many.impulse[k, 0] > 0.0 or velocity_missed(k, many)[0] > goal:
@@ -174,7 +174,7 @@ def none_pushes_or_parts(part, goal, many):
 
 @inlined
 def _is_swept_first(part, goal, scale, many):
-    """Whether sweeps have the first try at an island: it has one contact, or poses an impact that is not solved finely.
+    """Test whether sweeps try an island first: it has one contact, or an impact at a coarse tolerance.
 
     An impact begins from no impulses, and asks something of the few contacts near it.
     """

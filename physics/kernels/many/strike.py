@@ -27,7 +27,7 @@ FAR = 1.0e300
 
 @inlined
 def bounces(k, h, many):
-    """Whether contact k would leave again for longer than `rest_share` of h after an impact at its speed now."""
+    """Test whether contact k would leave again for longer than `rest_share` of h after an impact at its speed now."""
     least = many.settings[0].rest_share * acceleration_of(k, many) * h
     return many.bounce[k] > 0.0 and -many.bounce[k] * many.speed[k] > least
 
@@ -46,7 +46,7 @@ def slow_speed(k, h, many):
 def fast_speed(k, h, many):
     """Speed that is to be met in time: one that closes `FAST_SHARE` of the smaller radius within h [m/s].
 
-    Where an error is asked for (`refine`) all that is not slow, so that no part has to be as short as the error of
+    Under error control (`refine`) all that is not slow, so that no part has to be as short as the error of
     where bodies meet.
     """
     one, other = many.ends[k, 0], many.ends[k, 1]
@@ -61,7 +61,7 @@ def fast_speed(k, h, many):
 
 @inlined
 def _pair_touches(k, step, many):
-    """Whether contact k, or one that follows it in the set by steps of `step`, is one of the same pair that touches."""
+    """Test whether contact k, or one after it in the set by steps of `step`, touches and is of the same pair."""
     a, b = many.ends[k, 0], many.ends[k, 1]
     least = arrival(a, b, many)
     while 0 <= k < many.counts[CONTACTS] and many.ends[k, 0] == a and many.ends[k, 1] == b:
@@ -73,7 +73,7 @@ def _pair_touches(k, step, many):
 
 @inlined
 def is_seen_to(k, many):
-    """Whether `tumbling` finds when contact k is met: a body that turns far does not go where its features point now.
+    """Test whether `tumbling` finds the time of contact k: a body that turns far leaves its present tangent.
 
     It looks at what is apart: where the pair touches elsewhere the contact is foretold as any other.
     """
@@ -85,7 +85,7 @@ def is_seen_to(k, many):
 
 @inlined
 def is_meeting(k, h, many):
-    """Whether contact k is still apart and to be met in time: it bounces, or is fast."""
+    """Test whether contact k is still apart and to be met in time: it bounces, or is fast."""
     a, b = many.ends[k, 0], many.ends[k, 1]
     if not (many.gap[k] > pair_slop(a, b, many) and many.speed[k] < 0.0):
         return False
@@ -193,7 +193,7 @@ def strike(n, world, t, h, is_last, friction, tilted, report, many, log, counts)
 def time_until_meeting(n, h, is_last, many):
     """Time until the first of the meetings that matter, at the latest h [s]: never too late.
 
-    Two points approach by no more than s t + a t²/2 with a the bound of their acceleration by loads and turning, so
+    Two points approach by at most s t + a t²/2 with a the bound of their acceleration by loads and turning, so
     that the gap lasts at least until t = 2 gap/(s + √(s² + 2 a gap)). What turns far is looked at by `tumbling`.
     """
     first = h

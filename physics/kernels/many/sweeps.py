@@ -4,8 +4,8 @@ A visit of one contact answers it alone (`point.answer`), and sweeps go up and d
 travel through a stack in both senses.
 
 Most contacts are soon answered and stay so: where something lands on a pile, few others have anything to do. A contact
-is visited only if one of its bodies has been pushed since, and it is left as it is where it is off by less than what is
-asked for. What is returned is looked at whole.
+is visited only if one of its bodies has been pushed since, and it is left as it is where it is off by less than the
+tolerance. The returned impulses are checked whole.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ from physics.kernels.many.visits import (
 )
 from physics.kernels.point import LOST, answer, heading
 
-# Share of the residual asked for to which one contact is answered, and within which it is left as it is, each that is
+# Share of the tolerance to which one contact is answered, and within which it is left as it is, each that is
 # answered leaving those of two bodies to be visited again; and the same without friction.
 LEFT_SHARE = 0.9
 NORMAL_SHARE = 0.1
@@ -45,8 +45,8 @@ PASSES = 10
 # Half of the sweeps between two extrapolations, an even number: those up and down belong together. Slow sweeps contract
 # along one direction with a ratio q near 1, which two changes tell; the rest of that series, q/(1 - q) times the last
 # change, is added at once. See `physics.kernels.sweeps`. (Two more sweeps between them save a tenth of the visits where
-# little is asked for, and leave arches at their limit unsolved five times as often at `precise`.) Where no more sweeps
-# than that are allowed there is no extrapolation: what little is left is no series.
+# the tolerance is loose, and leave arches at their limit unsolved five times as often at `precise`.) There is no
+# extrapolation if so few sweeps are allowed: the small rest is no series.
 HALF_PERIOD = 2
 RATIO_LIMIT = 0.998
 
@@ -56,13 +56,13 @@ NO_MARK = -2
 
 @inlined
 def _is_answered(i, a, b, many):
-    """Whether neither of two bodies (b < 0: a wall) has been pushed since the last visit i."""
+    """Test whether neither of two bodies (b < 0: a wall) has been pushed since the last visit i."""
     return many.visited[i] >= many.pushed[a] and (b < 0 or many.visited[i] >= many.pushed[b])
 
 
 @inlined
 def is_answered(k, many):
-    """Whether no body of contact k has been pushed since its last visit."""
+    """Test whether no body of contact k has been pushed since its last visit."""
     return _is_answered(k, many.ends[k, 0], many.ends[k, 1], many)
 
 
@@ -183,7 +183,7 @@ def _visit(i, number, marks, small, many):
 
 @inlined
 def _ratio(count, marks, many):
-    """How the last change of the impulses is to the one before, weighed by W_nn as kinetic energy; 0: not along it."""
+    """Ratio of the last change of the impulses to the one before, in the metric of W_nn; 0: not along it."""
     product = square = 0.0
     for i in range(count):
         if many.visited[i] <= marks[0]:

@@ -1,7 +1,7 @@
 """No more energy than there is, where bodies touch each other: resting stages, and places put right.
 
-A contact's target that knows how the bodies turn (`glide.aim_rest`) is gainless by itself where bodies answer alike in
-all directions; others, and many contacts together, may gain. To push bodies apart may lift them against their loads,
+A contact's target that knows how the bodies turn (`glide.aim_rest`) is gainless where bodies answer alike in all
+directions; others, and many contacts together, may gain. To push bodies apart may lift them against their loads,
 which is paid with their motion, and turns them, which changes ½ L·I⁻¹L at the same L. For impacts see
 `physics.kernels.restraint`.
 """
@@ -50,7 +50,7 @@ def keep_loaded(b, many):
 
 @kernel
 def stage_has_gained(n, h, many):
-    """Whether the impulses of a resting stage of n contacts raised the energy by more than solve and step may be off.
+    """Test whether the impulses of a resting stage of n contacts raised the energy by more than solve and step may.
 
     Impulses P and moments Q of a body change its energy by ½ P·(v + v') + ½ Q·(ω + ω'). A contact that pushes may keep
     a residual r = tolerance · s, s the largest free speed, and so give ½ p r, which in a tower is far more than what

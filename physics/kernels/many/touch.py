@@ -31,7 +31,7 @@ from physics.kernels.sleep import sleeps
 
 @kernel
 def touch_wall(b, wall, margin, h, many):
-    """Add the contacts of body b with a wall that are no more than `margin` [m] from it."""
+    """Add the contacts of body b with a wall that are at most `margin` [m] from it."""
     body, R = many.bodies[b], matrix(many.rotation, b)
     n, x = vector(many.walls, wall, NORMAL), vector(many.place, b, 0)
     d = qt.dot(n, x) - many.walls[wall, OFFSET]
@@ -55,7 +55,7 @@ def touch_wall(b, wall, margin, h, many):
 
 @kernel
 def touch_hull_wall(b, wall, margin, h, many):
-    """Add the contacts of hull b with a wall: its corners that are no more than `margin` [m] from it, by number."""
+    """Add the contacts of hull b with a wall: its corners that are at most `margin` [m] from it, by number."""
     n, x, first = vector(many.walls, wall, NORMAL), vector(many.place, b, 0), many.hulls.of[b, FIRST_CORNER]
     d = qt.dot(n, x) - many.walls[wall, OFFSET]
     if d > many.bodies[b].radius + margin:

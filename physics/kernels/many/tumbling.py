@@ -39,7 +39,7 @@ from physics.kernels.tumbling import (
     tilting_time,
 )
 
-# Turn from which bodies are looked at where an error is asked for [rad]: of a body that turns by less within a part the
+# Turn from which bodies are looked at under error control [rad]: of a body that turns by less within a part the
 # points are off the line along which contacts are foretold by θ²/8 of its radius, 1.3e-3. A part of longer turns that
 # meets something differs from its halves if these do not, and is refused.
 LEAST_TURN = 0.1
@@ -102,7 +102,7 @@ def _side(b, y, n, tilted, many):
 
 @inlined
 def _reach(b, R, k, hulls, many):
-    """How far body b reaches along k from its geometric centre, in |k|."""
+    """Reach of body b along k from its geometric centre, in |k|."""
     d, shape = many.bodies[b].dims, many.bodies[b].shape
     if hulls is not None:  # noqa: SIM102 (a branch of its own is what the compiler prunes)
         if shape == HULL:

@@ -1,4 +1,4 @@
-"""What a peer has to offer, and how it then takes part in a measurement beside our own engine."""
+"""Interface of a peer, and its part in a measurement beside our own engine."""
 
 from __future__ import annotations
 

@@ -6,7 +6,7 @@ u = v + ω x r, a = v̇ + ω̇ x r + ω x ṙ (of a sphere ṙ = 0).
 1. Flight (`regime`): ẋ = v, q̇ = ½ ω q, v̇ = g + F/m, I ω̇ = τ - ω x I ω, by DOP853. The gaps are integrated along,
    so that a hop of 1e-17 m is still a parabola.
 2. Impact (`motion.collide`, `contact.solve`): Newton's law of restitution and Coulomb's cone at once at all touching
-   contacts, u⁺ = u⁻ + W p; a contact that does not approach is asked for u_n⁺ >= 0.
+   contacts, u⁺ = u⁻ + W p; a contact that does not approach has the target u_n⁺ >= 0.
 3. Rest (`contact.solve`, `regime.choose`): the same problem for accelerations and forces, a = A f + b, with the
    friction of contacts that slide opposed to their velocity; four contacts of one wall share the normal force as
    max(0, ℓ(place)), ℓ affine.

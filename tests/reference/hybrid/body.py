@@ -22,7 +22,7 @@ def skew(a):
 
 
 class Problem(NamedTuple):
-    """What moves, among what, under what; SI units, world frame unless said otherwise.
+    """Problem of one body, its walls and its loads; SI units, world frame unless said otherwise.
 
     A contact is a pair of a wall and a point of the body; its number is ``wall * len(points) + point``.
     A block's points are its vertices (bit j of the number set: the + side of body axis j). A sphere has one,

@@ -41,7 +41,7 @@ class Contacts(NamedTuple):
 
 
 class Answer(NamedTuple):
-    """What each contact does, the forces or impulses (n, 3), accelerations or velocities (n, 3)."""
+    """Modes of the contacts, forces or impulses (n, 3), accelerations or velocities (n, 3)."""
 
     modes: tuple
     f: np.ndarray
@@ -86,7 +86,7 @@ def regime_forces(A, b, walls, places, modes, directions, mu):
 
 
 def hold_margin(A, modes, f, mu):
-    """How far the contacts that hold are inside their cones, >= 0 if their friction can be had; [N] or [N s].
+    """Margin of the contacts that hold inside their cones, >= 0 if their friction can be had; [N] or [N s].
 
     Tangential forces that give no acceleration may be added: none for one
     contact, those along the connecting line for two (then the margin is the
@@ -212,7 +212,7 @@ def _angles(across, count):
 
 
 def _obeys(problem, answer, scale):
-    """Whether forces push, cones hold, open contacts open, and constraints are met."""
+    """Test whether forces push, cones hold, open contacts open, and constraints are met."""
     modes, f, a = answer
     active = np.array([mode != OPEN for mode in modes])
     size = max(np.abs(f).max(), 1e-300)

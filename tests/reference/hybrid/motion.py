@@ -35,7 +35,7 @@ class Options(NamedTuple):
 
 
 class Event(NamedTuple):
-    """What happened: kind impact, touch, release, slip, stick or rest; impulse (normal, tangents) [N s] of impacts."""
+    """Event of kind impact, touch, release, slip, stick or rest; impulse (normal, tangents) [N s] of impacts."""
 
     t: float
     kind: str
@@ -291,7 +291,7 @@ def follow(run, now, kind, contacts):
 
 
 def is_at_rest(run, now) -> bool:
-    """Whether nothing moves nor will: no velocity, no acceleration."""
+    """Test whether nothing moves nor will: no velocity, no acceleration."""
     if not now.active or (SLIDE in now.modes and run.problem.friction > 0.0):
         return False
     speed = np.abs(run.y[TWIST]).max()

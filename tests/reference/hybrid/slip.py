@@ -1,4 +1,4 @@
-"""How sliding begins: the direction of a velocity that is still zero, by collocation.
+"""Onset of sliding: the direction of a velocity that is still zero, by collocation.
 
 Friction is opposed to u_t, and where |u_t| grows from zero its direction follows what acts at the rate μ f_n/(m |u_t|):
 an explicit integrator would need steps as short as the inverse, an implicit one of low order very many. So the
