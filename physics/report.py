@@ -170,8 +170,8 @@ class StepReport:
     def ok(self) -> bool:
         """True if nothing went wrong in any world.
 
-        Contact problems met their tolerances and were whole, states stayed finite, fields were resolved, and no body was
-        put deep into another.
+        Contact problems met their tolerances and were whole, states stayed finite, fields were resolved, and no body
+        was put deep into another.
         """
         return not (self._table[:, at.UNCONVERGED : at.FAULTS + 1].any() or self._table[:, at.LEFT_OUT].any()
                     or self._table[:, at.OVERLAP].any() or self._table[:, at.COARSE].any())  # fmt: skip

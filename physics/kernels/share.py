@@ -50,11 +50,13 @@ def solve_symmetric(k, b):
 
 @inlined
 def minus(a, b):
+    """a - b of vectors."""
     return (a[0] - b[0], a[1] - b[1], a[2] - b[2])
 
 
 @inlined
 def contact_arm(work, i):
+    """Arm of contact i from the centre of mass [m]."""
     return (work.arm[i, 0], work.arm[i, 1], work.arm[i, 2])
 
 

@@ -105,9 +105,9 @@ def _places(rng: np.random.Generator, world: physics.World, size: np.ndarray) ->
 
 
 def draw_wrench(world: physics.World, rng: np.random.Generator) -> np.ndarray:
-    """Wrenches (worlds, bodies, 6): forces of 0.01 to 1,000,000 times the weight, torques to 1,000 times it by the
-    radius.
+    """Draw wrenches (worlds, bodies, 6): forces of 0.01 to 1,000,000 times the weight.
 
+    Torques go up to 1,000 times the weight by the radius.
     Strong ones are rarer: the exponent is -2 + 8 u⁴ with u uniform, above 5 in 3 % of the draws.
     """
     shape = (world.worlds, world.body_count, 1)

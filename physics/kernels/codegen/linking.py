@@ -150,8 +150,10 @@ class _Part(CPUDispatcher):
     """A kernel that other kernels call."""
 
     def compile(self, sig):
-        """Have it compiled for the types of its arguments, without the two clocks that Numba starts for each: they tell
-        each other of every call of LLVM, as many of them as calls are nested."""
+        """Compile it for the types of its arguments, without the two clocks that Numba starts for each.
+
+        They tell each other of every call of LLVM, as many of them as calls are nested.
+        """
         args, return_type = normalize_signature(sig)
         if args not in self.overloads:
             about = {"dispatcher": self, "args": args, "return_type": return_type}

@@ -49,11 +49,13 @@ def vector(a, k):
 
 @inlined
 def plus(a, b):
+    """a + b of vectors."""
     return (a[0] + b[0], a[1] + b[1], a[2] + b[2])
 
 
 @inlined
 def times(s, a):
+    """s a of a vector."""
     return (s * a[0], s * a[1], s * a[2])
 
 

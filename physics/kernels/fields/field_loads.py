@@ -16,12 +16,13 @@ from physics.kernels.fields.terms import (
 
 @inlined
 def vector(a):
+    """Vector as a tuple."""
     return (a[0], a[1], a[2])
 
 
 @inlined
 def field_state(x, q, v, L, t, tilted, work):
-    """State that the fields are told."""
+    """State of a body as its fields read it."""
     R = qt.to_matrix(q)
     w = angular_velocity(q, L, work, tilted)
     center = ZERO
@@ -86,6 +87,7 @@ def less(b, a):
 
 @inlined
 def more(a, b):
+    """Sum of two pairs of acceleration and torque."""
     return plus(a[0], b[0]), plus(a[1], b[1])
 
 

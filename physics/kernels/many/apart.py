@@ -38,8 +38,9 @@ DEEP_SWEEPS = 1000
 
 @inlined
 def _aim_apart(n, many):
-    """Target displacements along the normals: the deepest that anything is, in its slop (from 1 on there are
-    some), and the error of them that does not matter [m].
+    """Set the target displacements along the normals: (deepest penetration, negligible error of a displacement [m]).
+
+    The penetration is in slops of its pair: from 1 on there are some displacements.
     """
     deepest, largest, least = 0.0, 0.0, math.inf
     for k in range(n):

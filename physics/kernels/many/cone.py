@@ -1,5 +1,4 @@
-"""The Lorentz cone x₀ ≥ |(x₁, x₂)| and its scaling, contact by contact or of four at once: what `interior` is
-made of.
+"""Lorentz cone x₀ ≥ |(x₁, x₂)| and its scaling, of one contact or of four at once, for `interior`.
 
 With the product a ∘ b = (a·b, a₀ b' + b₀ a') the cone is that of squares. The scaling of Nesterov and Todd is the
 symmetric W with W p = W⁻¹ u = λ: for the unit vector w = (ū + R p̄)/(2γ), R = diag(1, -1, -1), and η⁴ = det u/det p

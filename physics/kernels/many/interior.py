@@ -195,7 +195,7 @@ def _set_right_side(part, many):
 
 @inlined
 def _correct(part, center, many):
-    """Right side with σ ν = `center` and the second-order term of the changes found so far: f = λ \\ (σ ν e - ...)."""
+    """Right side with σ ν = `center` and the second-order term of the changes found so far: λ ∘ f = σ ν e - … ."""
     _set_right_side(part, many)
     for g in range(many.counts[BUNDLES]):
         own, a = of.three(g, of.OWN, many), of.three(g, of.CHANGE, many)

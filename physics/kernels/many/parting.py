@@ -38,8 +38,9 @@ def _begin(n, many):
 
 @inlined
 def _sweep(count, is_up, visits, goal, many):
-    """One sweep over `many.queue[:count]`: how far an impulse was off at most, visits so far, whether it spread to a
-    body that had not been pushed.
+    """Sweep once over `many.queue[:count]`: (largest error of an impulse, visits so far, whether it spread).
+
+    It has spread if it pushed a body that had not been pushed before.
     """
     worst, has_spread = 0.0, False
     for i in range(count):

@@ -76,8 +76,9 @@ def _mark_pushed(a, b, visit, many):
 
 @inlined
 def answer_normal(k, visit, small, many):
-    """Answer contact k along its normal if it is off by more than `small`: how far its impulse was off, as a velocity
-    [m/s]. `visit` is the number of this visit.
+    """Answer contact k along its normal if it is off by more than `small`: its error before, as a velocity [m/s].
+
+    `visit` is the number of this visit.
     """
     many.visited[k] = visit
     p, normal = many.impulse[k, 0], many.block[k, 0]
@@ -161,8 +162,9 @@ def _keep_before(i, p, marks, many):
 
 @inlined
 def _visit(i, number, marks, small, many):
-    """Answer visit i if it is off by more than `small`, or has been seen to be: how far its impulse was off, as a
-    velocity [m/s]: its residual or a little more. `number` is that of this visit.
+    """Answer visit i if it is off by more than `small`, or has been seen to be: its error before [m/s].
+
+    The error is a velocity, the contact's residual or a little more. `number` is that of this visit.
     """
     W, p = six(i, BLOCK, many), vector(many.visit, i, IMPULSE)
     _keep_before(i, p, marks, many)
@@ -198,8 +200,9 @@ def _ratio(count, marks, many):
 
 @inlined
 def _extrapolate(count, ratio, number, marks, small, many):
-    """Impulses plus the rest of the series that their last change belongs to, back in the cones, and the motion that
-    belongs to them.
+    """Add to the impulses the rest of the series of their last change, and bring them back into the cones.
+
+    The motion of the bodies follows.
     """
     s = ratio / (1.0 - ratio)
     for i in range(count):
