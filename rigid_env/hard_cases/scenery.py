@@ -89,7 +89,7 @@ def tilt_about_z(world) -> float:
 
 
 def is_finite(world) -> bool:
-    """Test whether every number of the state is."""
+    """Return True if every number of the state is finite."""
     return all(np.isfinite(np.asarray(part)).all() for part in (world.pos, world.quat, world.linvel, world.angvel))
 
 

@@ -36,8 +36,8 @@ def continuous_limit() -> float:
 def test_the_limit_of_many_stones_is_milankovitchs():
     limit = continuous_limit()
     assert limit == pytest.approx(0.1075, abs=5e-5)
-    # The hinge in the haunch is at one of the joints, π/n apart: at most π/(2 n) off the best place, where the thrust
-    # target is largest. That is an error of second order, C/n²; so is the area of a stone whose arcs are chords.
+    # The hinge in the haunch is at one of the joints, π/n apart: at most π/(2 n) off the best place, where the required
+    # thrust is largest. That is an error of second order, C/n²; so is the area of a stone whose arcs are chords.
     # C is read off at 51 stones and must hold, twice over, at 101 and 201.
     C = (limit - least_thickness(51)) * 51**2
     assert C > 0

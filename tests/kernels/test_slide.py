@@ -195,7 +195,7 @@ def test_what_was_left_for_sweeps_is_solved_directly(key):
 
 
 def test_two_contacts_that_slid_are_not_asked_to_hold_first():
-    """Two contacts that slide are tried so first in the next step, whatever held before."""
+    """Two contacts that slide are tried as sliding first in the next step, whatever held before."""
     problem = Problem(floor((0, 1)), (0.3, FALL, 0.1), (0, 0, 0), 0.5)
     p, (_, _, _, _, method) = problem.solve(HOLD)
     assert method == DIRECT

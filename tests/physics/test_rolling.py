@@ -24,7 +24,7 @@ def ball(**start) -> physics.Sphere:
 
 
 def world(body, rolling=0.0, spin=0.0, mu=0.8, e=0.6, tangential=0.0, *, dt=0.01, gravity=(0, -G, 0), worlds=1):
-    """One plan for all tests here: every law declared, those not wanted at no strength."""
+    """One plan for all tests here: every law declared, unused ones with strength 0."""
     effects = [
         physics.Gravity(gravity), physics.Contact(e, tangential=tangential), physics.Friction(mu),
         physics.RollingFriction(rolling), physics.SpinFriction(spin),

@@ -34,7 +34,7 @@ def started(seed: int, mode: str) -> physics.Ellipsoid:
 @pytest.mark.parametrize("accuracy", ["fast", "balanced"])
 @pytest.mark.parametrize(("mode", "mu"), [(truth.SMOOTH, 0.0), (truth.ROLLS, 10.0)])
 def test_what_is_pressed_to_the_floor_neither_hits_nor_leaves_it(mode, mu, accuracy):
-    """None of the bodies does whose push stays above a twentieth of the weight (and within the cone), by DOP853."""
+    """No body does whose push stays above a twentieth of its weight (and within the cone), by DOP853."""
     times, tried = np.linspace(0.0, SECONDS, 101), 0
     for seed in range(12):
         body = started(seed, mode)
