@@ -138,7 +138,7 @@ class Setting:
 
     @property
     def meets_an_error(self) -> bool:
-        """Test whether bodies that touch each other are stepped to an error: that is dear, so quick runs are smaller."""
+        """Test whether bodies that touch each other are stepped to an error: it is dear, so quick runs are smaller."""
         return self.is_event_driven
 
     @property

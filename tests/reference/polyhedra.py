@@ -76,7 +76,7 @@ def is_inside(points: np.ndarray, x: np.ndarray, reach: float) -> bool:
 
 
 def are_disjoint(a: np.ndarray, b: np.ndarray) -> bool:
-    """Test whether a plane strictly separates two hulls: linear program for n and c with n·a <= c - 1, n·b >= c + 1."""
+    """Test whether a plane strictly separates two hulls: linear program for n, c with n·a <= c - 1, n·b >= c + 1."""
     rows = np.vstack([np.c_[a, -np.ones(len(a))], np.c_[-b, np.ones(len(b))]])
     found = linprog(np.zeros(4), A_ub=rows, b_ub=-np.ones(len(rows)), bounds=[(None, None)] * 4)
     return found.status == 0
