@@ -29,7 +29,7 @@ def _word(context, builder, sig, args, k):
 
 
 def _changed_by(operation: str):
-    """Lower a change of an element by a number that returns the element's value before it."""
+    """Return the lowering of a change by a number that returns the element's value before it."""
 
     def lower(context, builder, sig, args):
         number = _word(context, builder, sig, args, 3)

@@ -77,7 +77,7 @@ def is_finite(y):
 
 @inlined
 def all_finite(now):
-    """Test whether every number of every state in `now` (bodies, STATE_SIZE) is."""
+    """Test whether every number of every state in `now` (bodies, STATE_SIZE) is finite."""
     return first_lost(now) < 0
 
 

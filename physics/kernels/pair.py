@@ -248,7 +248,7 @@ def solve_one(first, mu, goal, inv_mass, K, work):
 
 @inlined
 def _pushed_apart(W11, W12, W22, b1, b2):
-    """Velocities of two contacts that approach with b1 and b2 (< 0) after impulses without friction [m/s]."""
+    """Changes of velocity, by impulses without friction, of two contacts that approach with b1 and b2 (< 0) [m/s]."""
     s = 1.0 / (W11[0] * W22[0] - W12[0] * W12[0])
     p1, p2 = s * (W12[0] * b2 - W22[0] * b1), s * (W12[0] * b1 - W11[0] * b2)
     if p1 < 0.0:
