@@ -1,7 +1,7 @@
 """Force fields as effects, and compiling and keeping a user's own one.
 
 A field is a frozen dataclass with a compiled function: force and torque on a body from its state, the field's
-parameters and the time. The built-in ones stand in `physics.fields`; your own needs at most they do::
+parameters and the time. The built-in ones stand in `physics.fields`; your own needs nothing beyond these::
 
     @physics.field_function
     def pull(state, p, t):

@@ -26,7 +26,7 @@ def angles_between(quat: np.ndarray, true: np.ndarray) -> np.ndarray:
 
 
 def distances(scene: Scene, pos, quat, true_pos, true_quat) -> np.ndarray:
-    """Largest distance of a point of each body from its true place [m], (samples, bodies).
+    """Upper bound of the distance of a body's points from their true places [m], (samples, bodies).
 
     |Δx| + 2 r sin(θ/2): a turn by θ moves no point of a body of bounding radius r by more than the chord.
 

@@ -168,7 +168,7 @@ class StepReport:
 
     @property
     def ok(self) -> bool:
-        """True if nothing went wrong in any world.
+        """True if every step can be trusted to its tolerance; `Status.UNRESOLVED` alone does not count against it.
 
         Contact problems met their tolerances and were whole, states stayed finite, fields were resolved, and no body
         was put deep into another.

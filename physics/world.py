@@ -68,7 +68,7 @@ class World:
     accuracy : str or Accuracy
         ``fast``, ``balanced``, ``precise``, ``reference``, or a `physics.Accuracy`.
     threads : int
-        Threads that share a step, at most there are processors: each takes worlds of its own range, then of the
+        Threads that share a step, at most as many as processors: each takes worlds of its own range, then of the
         others'. Between steps that follow each other within 0.3 ms they wait without sleeping.
 
     Attributes

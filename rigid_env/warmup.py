@@ -1,4 +1,4 @@
-"""Command `rigid-env warmup`: one step of all common scenes, so that their kernels are compiled."""
+"""Command `rigid-env warmup`: one step of all common scenes and environments, to compile their kernels."""
 
 from __future__ import annotations
 

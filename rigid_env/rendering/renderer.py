@@ -33,7 +33,7 @@ class Renderer:
     width, height : int
         [px]. Of the picture.
     mode : {"rgb_array", "human"}
-        "human" shows the pictures in a window too, at at most `fps` a second. "rgb_array" opens no
+        "human" shows the pictures in a window too, at most `fps` a second. "rgb_array" opens no
         window and needs no display.
     fps : float
         [1/s].
