@@ -2,7 +2,7 @@
 
 Every effect of the catalogue and every two, in flight and on a floor, at `fast` and `balanced`: see
 `rigid_env.measure.drawn_effects` for what is drawn and for the law. Draws that break it are listed with what makes them
-again: ``--pair "spring,drag" --seed 17``.
+again: ``--pair "spring,drag" --seed 17``. A file of results grows by seeds that are not in it yet: ``--seed 20``.
 """
 
 from __future__ import annotations
@@ -39,7 +39,8 @@ def one(names: tuple[str, ...], on_floor: bool, preset: str, seed: int) -> drawn
 
 def run_kind(names: tuple[str, ...], on_floor: bool, preset: str, seeds: range) -> dict:
     """Some draws of one kind: counts, and the draws that break the law."""
-    row = {"effects": list(names), "floor": on_floor, "preset": preset, "worlds": 0, "told": 0, "beyond": []}
+    row = {"effects": list(names), "floor": on_floor, "preset": preset, "seeds": [seeds.start, seeds.stop]}
+    row |= {"worlds": 0, "told": 0, "beyond": []}
     for seed in seeds:
         outcome = one(names, on_floor, preset, seed)
         if outcome is None:
@@ -77,7 +78,7 @@ def main(
     per_kind = worlds / len(kinds(pair, PRESETS))
     seeds = range(seed, seed + max(1, math.ceil(per_kind / WORLDS_PER_DRAW)))
     rows = read_json(json) if json and Path(json).exists() else []
-    done = {(tuple(row["effects"]), row["floor"], row["preset"]) for row in rows}
+    done = {(tuple(row["effects"]), row["floor"], row["preset"]) for row in rows if seed in range(*row["seeds"])}
     for kind in track([kind for kind in todo if kind not in done], description="pairs of effects"):
         row = run_kind(*kind, seeds)
         rows.append(row)

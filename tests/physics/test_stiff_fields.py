@@ -178,6 +178,25 @@ def test_a_field_of_a_users_own_is_reported_where_it_is_not_resolved(kind, limit
     assert any(told) == (share > 1.0)
 
 
+@physics.field_function
+def _deflect(state, p, t):
+    return (p[0] * state.v[1], -p[0] * state.v[0], 0.0), (0.0, 0.0, 0.0)
+
+
+@dataclass(frozen=True)
+class Deflection(physics.Field):
+    rate: float = 1.0  # of turning the velocity, by the mass [N s/m]
+    function: ClassVar = _deflect
+
+
+@pytest.mark.parametrize("turn", [0.01, 0.5, 0.9, 1.1, 3.0, 1e4])
+def test_a_field_of_a_users_own_that_turns_the_velocity_by_a_radian_a_step_is_reported(turn):
+    """The explicit midpoint rule then gains z⁴/4 of the energy in a step, z the turn; 1 kg, 10 ms."""
+    ball = physics.Sphere(0.1, 1.0, linvel=(0.6, 0.8, 0.0))
+    report = world_of([ball], [Deflection(turn / 0.01)], 0.01).step()
+    assert (report.status[0] == physics.Status.COARSE) == (turn > 1.0)
+
+
 @pytest.mark.parametrize("scheme", ["explicit_euler", "semi_implicit_euler", "midpoint", "rk4"])
 def test_a_textbook_scheme_keeps_its_explicit_loads(scheme):
     """v' = v (1 - z + z²/2) a step, z = h c/m = 4: its loads are those of the middle, and it must gain; it is told."""
@@ -186,6 +205,40 @@ def test_a_textbook_scheme_keeps_its_explicit_loads(scheme):
     report = world.step(steps=3)
     assert world.linvel[0, 0, 0] == pytest.approx(5.0**3, rel=1e-12)
     assert report.status[0] == physics.Status.COARSE
+
+
+@pytest.mark.parametrize("accuracy", ["precise", "reference"])
+@pytest.mark.parametrize("has_wall", [False, True], ids=("in flight", "above a wall"))
+@pytest.mark.parametrize("stiffness", [1e6, 1e9, 1e12])
+def test_events_go_on_as_time_stepping_where_they_cannot_follow_a_spring(accuracy, has_wall, stiffness):
+    """1 kg on 10⁶ N/m swings by 100 rad in 0.1 s and is followed; on 10⁹ N/m by 3,000, on 10¹² N/m by 10⁵.
+
+    The energy is kept to the tolerance by the first (2e-10 a radian, 300 of them), by time stepping it does not grow.
+    """
+    walls = [physics.HalfSpace((0.0, 1.0, 0.0), offset=-5.0)] if has_wall else []
+    effects = [physics.Spring(stiffness=stiffness), *([physics.Contact()] if has_wall else [])]
+    scene = physics.Scene([physics.Sphere(0.1, 1.0, pos=(1.0, 0.0, 0.0))], walls, effects)
+    world = physics.World(scene, dt=0.1, accuracy=accuracy)
+    start = physics.diagnose(world).energy[0, 0]
+    for _ in range(3):
+        report = world.step()
+        assert physics.diagnose(world).energy[0, 0] <= start * (1.0 + 1e-7)
+        assert (report.status[0] == physics.Status.COARSE) == (stiffness > 1e6)
+        assert report.ok == (stiffness == 1e6)
+
+
+@pytest.mark.parametrize("other", [None, 1], ids=("to an anchor", "to another body"))
+def test_a_body_that_a_step_puts_back_is_reported(other):
+    """On a stiff spring at an arm no step finds a way that its energy allows: that it does not move is not rest."""
+    ball = physics.Sphere(0.1, 1.0, pos=(0.5, 0.0, 0.0))
+    anchor = (0.0, 0.0, 0.0)
+    spring = physics.Spring(anchor, (0.1, 0.0, 0.0), stiffness=1e9, body=0, other=other)
+    bodies = [ball] if other is None else [ball, physics.Sphere(0.1, 1.0, pos=(0.5, 1.0, 0.0))]
+    world = world_of(bodies, [spring, physics.Gravity()], 0.1)
+    for _ in range(20):
+        report = world.step()
+        assert report.status[0] == physics.Status.COARSE
+        assert not report.ok
 
 
 def test_what_lies_still_under_a_stiff_spring_is_not_reported():

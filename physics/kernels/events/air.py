@@ -35,8 +35,17 @@ from physics.kernels.events.guards import NO_STEP
 from physics.kernels.events.motion import END, SIZE, START
 from physics.kernels.events.move import move
 from physics.kernels.events.smooth import CUT, SHORTEST, get_state, put_state, start_step, try_step
-from physics.kernels.fields.loads import has_fields, pass_time, refresh_loads, set_now, start_feeling, was_felt
+from physics.kernels.fields.loads import (
+    has_fields,
+    hold_loads,
+    pass_time,
+    refresh_loads,
+    set_now,
+    start_feeling,
+    was_felt,
+)
 from physics.kernels.flight import fly
+from physics.kernels.graded_flight import graded_flight
 from physics.kernels.layout import ELLIPSOID, OFFSET, SPHERE
 
 # Advances towards one impact at most; six are usual, more where a body grazes a wall.
@@ -157,18 +166,28 @@ def fly_smoothly(y, t, tilted, work, motion):
     return get_state(motion, START), left
 
 
+@inlined
+def note_unresolved(report, work):
+    """Count a flight that extrapolated steps cannot follow; if there are fields, it is they that are not resolved."""
+    report[work.world, at.UNRESOLVED] += 1.0
+    if has_fields(work):
+        report[work.world, at.COARSE] += 1.0
+
+
 @kernel
 def fly_freely(y, t, gyroscopic, tilted, work, motion, report):
     """State after the time t without contact.
 
-    Turned by more than extrapolated steps can follow the rest of t is of second order in a torque, which is reported.
+    Turned or swung by more than extrapolated steps can follow, the rest of t is time stepping's, which is reported.
     """
     if has_torque(work) or has_fields(work):
         start_feeling(work)
         end, left = fly_smoothly(y, t, tilted, work, motion)
         if left > 0.0:
-            report[work.world, at.UNRESOLVED] += 1.0
-            end = fly(end, work, left, gyroscopic, tilted)
+            note_unresolved(report, work)
+            hold_loads(end, left, gyroscopic, tilted, work)
+            rest = fly(end, work, left, gyroscopic, tilted)
+            end = graded_flight(rest, end, left, gyroscopic, tilted, None, work)
         if was_felt(work):
             return end
     return fly(y, work, t, gyroscopic, tilted)

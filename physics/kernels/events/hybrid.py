@@ -27,7 +27,7 @@ from physics.kernels import quaternion as qt
 from physics.kernels.body import angular_velocity, bind_body, can_bear, is_finite, note_fault, read_state, write_state
 from physics.kernels.compiler import inlined, kernel
 from physics.kernels.events import log as ev
-from physics.kernels.events.air import fly_freely, fly_to_wall
+from physics.kernels.events.air import fly_freely, fly_to_wall, note_unresolved
 from physics.kernels.events.candidates import ASKS, ASKS_SLIDING, COLLIDES, FLIES, GOES_BACK, IS_LOST, RESTS
 from physics.kernels.events.collide import carry_on, collide, jump, note, principal_axes
 from physics.kernels.events.guards import FORCES, NO_GUARD, NO_STEP, WATCH
@@ -134,7 +134,7 @@ def go_on(what, y, t, h, gyroscopic, tilted, work, motion, report):
     if what == FLIES:
         y, step, is_found = fly_to_wall(y, h - t, gyroscopic, tilted, work, motion, report)
         if not is_found:
-            report[work.world, at.UNRESOLVED] += 1.0
+            note_unresolved(report, work)
         return y, step, NO_GUARD
     return move(y, h - t, tilted, work, motion)
 

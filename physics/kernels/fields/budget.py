@@ -97,6 +97,7 @@ def paid(y, end, h, is_free, tilted, work):
     if gain < motion:
         s = math.sqrt(1.0 - gain / motion)
     else:
+        work.is_put_back = 1
         x, q, v, L = y
         s = -1.0 if is_free else 0.0
     return x, q, times(s, v), times(s, L)

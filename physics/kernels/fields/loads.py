@@ -55,7 +55,7 @@ def bind_fields(params, i, scheme, work):
     for c in range(3):
         work.held_acceleration[c] = work.free_acceleration[c]
         work.held_torque[c] = work.torque[c]
-    work.is_stiff = work.is_coarse = 0
+    work.is_stiff = work.is_coarse = work.is_put_back = 0
     work.is_textbook = 0 if scheme is None else 1
 
 

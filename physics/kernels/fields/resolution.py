@@ -13,6 +13,7 @@ from physics.kernels.fields.field_loads import (
     field_state,
     less,
     principal_axes,
+    size_of,
 )
 from physics.kernels.fields.state import minus, plus, times
 from physics.kernels.fields.stiffness import implicit_share, is_beyond, is_unresolved
@@ -29,6 +30,9 @@ from physics.kernels.restraint import between
 
 # A user's field is not resolved where its loads change by more than this until the middle of a step, times speed/step.
 COARSE = 2.0
+
+# Share of all loads by which those of a user's field may change in half a kick without opposing it: a radian a step.
+TURNING = 0.5
 
 
 @kernel
@@ -48,16 +52,11 @@ def note_rates(state, late, h, work):
 
 
 @inlined
-def note_coarse(first, second, scale, work):
-    """Note that loads (F, T) of fields which do not tell their rates have changed too much within a stage.
-
-    `scale` [m/s²] is the change at which they count as not resolved.
-    """
+def _change_of(first, second, work):
+    """Change between two loads (F, T): acceleration and torque, and the bound of what it does to any point [m/s²]."""
     F, T = minus(second[0], first[0]), minus(second[1], first[1])
-    J = max(work.J[0], work.J[1], work.J[2])
-    change = math.sqrt(qt.dot(F, F)) / work.mass + work.radius * J * math.sqrt(qt.dot(T, T))
-    if change > scale:
-        work.is_coarse = 1
+    change = times(1.0 / work.mass, F), T
+    return change, size_of(change, work)
 
 
 @if_unknown()
@@ -65,7 +64,9 @@ def look_over_stage(y, middle, x, q, h, tilted, work):
     """Note whether loads of a user's fields change too much over a stage from y; `middle` are all loads at (x, q).
 
     Under a stiffness of frequency Ω the loads change by Ω² h v/2 until the middle: h times that is more than 2 v where
-    h Ω > 2. Half a kick of a damping λ changes the loads by λ h/2 of what they are: more than 1 where h λ > 2.
+    h Ω > 2. Half a kick changes the loads by λ h/2 of what they are. If they oppose it, as damping does, the explicit
+    rule grows from h λ = 2 on. Loads that turn with the velocity, at λ [rad/s], make it grow at any h λ. From 1 rad a
+    step on they count as not resolved, as built-in ones do.
     """
     t = work.now
     v, L = y[2], y[3]
@@ -73,13 +74,18 @@ def look_over_stage(y, middle, x, q, h, tilted, work):
     moved = total_unknown(field_state(x, q, v, L, t, tilted, work), t, work)
     w = angular_velocity(q, L, work, tilted)
     speed = math.sqrt(qt.dot(v, v)) + work.radius * math.sqrt(qt.dot(w, w))
-    note_coarse(start, moved, COARSE * speed / h, work)
+    _, change = _change_of(start, moved, work)
+    if change > COARSE * speed / h:
+        work.is_coarse = 1
     a, T = all_loads(middle[0], middle[1], work)
     v, L = plus(v, times(0.5 * h, a)), plus(L, times(0.5 * h, T))
     kicked = total_unknown(field_state(x, q, v, L, t, tilted, work), t, work)
-    J = max(work.J[0], work.J[1], work.J[2])
-    size = math.sqrt(qt.dot(a, a)) + work.radius * J * math.sqrt(qt.dot(T, T))
-    note_coarse(moved, kicked, size, work)
+    (b, S), change = _change_of(moved, kicked, work)
+    arm = work.radius * max(work.J[0], work.J[1], work.J[2])
+    size = size_of((a, T), work)
+    opposes = qt.dot(a, b) + arm * arm * qt.dot(T, S) <= -0.5 * change * size
+    if change > (size if opposes else TURNING * size):
+        work.is_coarse = 1
 
 
 @inlined
@@ -104,6 +110,6 @@ def is_stiff(work):
 
 @if_declared()
 def note_report(is_moved, report, work):
-    """Count a body that has moved in fields which some stage of the call did not resolve."""
-    if work.is_coarse == 1 and is_moved:
+    """Count a body that has moved in fields which some stage of the call did not resolve, or was put back by one."""
+    if work.is_put_back == 1 or (work.is_coarse == 1 and is_moved):
         report[work.world, at.COARSE] += 1.0

@@ -85,6 +85,7 @@ def members(terms: tuple[Term, ...]) -> list[tuple]:
         ("is_textbook", int),  # 1: a textbook scheme moves the body
         ("is_stiff", int),  # 1: loads of the stage are those of an implicit step (`stiffness`)
         ("is_coarse", int),  # 1: a field was not resolved by some stage of this call
+        ("is_put_back", int),  # 1: some stage of this call was given up, and the body put back at its start
         ("rate", float),  # fastest damping or turning of the stage [1/s]
         ("damping", float),  # fastest damping [1/s]
         ("columns", float, (max(columns, 1),)),  # parameters of all fields, in the order of the markers

@@ -104,6 +104,7 @@ def _take(gain, ties, tilted, world):
     for b in range(world.bodies.shape[0]):
         x, q, v, L = read_state(world.now, b)
         if not gain < motion:
+            world.bodies[b].is_put_back = 1
             x, q, _, _ = _start(world.bodies[b])
         write_state(world.now, b, (x, q, plus(new, times(s, minus(v, c))), times(s, L)))
 
