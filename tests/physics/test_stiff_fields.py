@@ -260,7 +260,7 @@ DRAWN = np.random.default_rng(35).choice(len(PAIRS), 10, replace=False).tolist()
 
 
 # Draws that once broke the law: drag that grows within a step, a fluid left or reached within one, spin that contact
-# makes, soft walls that stop a turning corner or lift a body far, a stiff damper in air.
+# makes, soft walls that stop a turning corner or lift a body far, a stiff damper in air, a pair put back as it falls.
 FOUND = [
     (("gravity", "drag"), False, 2),
     (("buoyancy",), False, 32),
@@ -269,6 +269,7 @@ FOUND = [
     (("gravity", "compliance"), True, 7),
     (("gravity", "compliance"), True, 19),
     (("drag", "spring between bodies"), False, 18),
+    (("gravity", "spring between bodies"), False, 28),
 ]
 
 
