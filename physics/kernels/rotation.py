@@ -36,7 +36,7 @@ which is made of elliptic functions: with the axes in the order of their moments
     T = 4 K(k) / √max(P, Q) = 2π / agm(√max(P, Q), √|P - Q|).
 
 Where m returns, only a turn about the constant L is left of the rotation. It is found for one period by parts, and
-multiplied by the number of periods.
+multiplied by the number of periods. Where m stays as it is, the body turns about L at ω·L/|L| = 2E/|L|.
 
 References
 ----------
@@ -75,8 +75,8 @@ TINY_SQUARE = 2.5e-6
 # than 0.037 (4e-4)⁴ = 1e-15 of its size, and the attitude, where m(h) enters times θ/4, by less than 1e-17.
 SHORT_SERIES = 4.0e-4
 
-# Turns with more parts than this, 6e5 rad in one period of the momentum or without a whole one, leave the attitude as
-# it is: energy and momentum are kept, and where in its turn the body is matters to nothing that such a step resolves.
+# Turns with more parts than this, 6e5 rad in one period of the momentum or without a whole one, are those of bodies
+# whose moments are nearly equal. They are taken as if m stayed as it is: that keeps energy and momentum.
 PARTS_LIMIT = 1.0e7
 
 # Beyond this angle [rad] a step of at least two periods is taken by periods. An error of one period's turn, a few 1e-16
@@ -224,13 +224,28 @@ def momentum_period(m, J):
 
 
 @inlined
-def _turn_by_parts(q, m, J, series, mm, energy2, h, angle):
-    """(Quaternion, momentum) after h, in equal parts of at most `ANGLE_LIMIT`."""
-    if angle <= ANGLE_LIMIT * PARTS_LIMIT:
-        parts = int(angle / ANGLE_LIMIT) + 1
-        for _ in range(parts):
-            q, m = _part(q, m, J, series, mm, energy2, ANGLE_LIMIT * ANGLE_LIMIT, h / parts)
-    return q, m
+def _is_steady(m, J):
+    """Test whether the momentum m in the principal frame stays as it is: no gyroscopic torque."""
+    first, second, third = (J[2] - J[1]) * m[1] * m[2], (J[0] - J[2]) * m[2] * m[0], (J[1] - J[0]) * m[0] * m[1]
+    return first == 0.0 and second == 0.0 and third == 0.0
+
+
+@inlined
+def _turn_steadily(q, L, mm, energy2, h):
+    """Attitude after h of a body whose momentum in the principal frame stays as it is."""
+    s = h * (energy2 / mm)
+    return qt.renormalise(qt.multiply(qt.exponential((s * L[0], s * L[1], s * L[2])), q))
+
+
+@inlined
+def _turn_by_parts(q, m, L, J, series, mm, energy2, h, angle):
+    """Attitude after h, in equal parts of at most `ANGLE_LIMIT`."""
+    if angle > ANGLE_LIMIT * PARTS_LIMIT:
+        return _turn_steadily(q, L, mm, energy2, h)
+    parts = int(angle / ANGLE_LIMIT) + 1
+    for _ in range(parts):
+        q, m = _part(q, m, J, series, mm, energy2, ANGLE_LIMIT * ANGLE_LIMIT, h / parts)
+    return q
 
 
 @kernel
@@ -239,12 +254,14 @@ def _turn_far(q, m, L, J, series, mm, energy2, h):
     angle = abs(h) * math.sqrt(max(J[0], J[1], J[2]) * energy2)
     if not angle < math.inf:
         return (math.nan, math.nan, math.nan, math.nan)  # its energy overflows: the caller's guard reports it
+    if _is_steady(m, J):
+        return _turn_steadily(q, L, mm, energy2, h)
     count = 0.0
     if angle > MANY_TURNS:
         period = momentum_period(m, J)
         count = math.floor(abs(h) / period)
     if count >= 2.0:
-        turned, _ = _turn_by_parts(q, m, J, series, mm, energy2, period, angle * (period / abs(h)))
+        turned = _turn_by_parts(q, m, L, J, series, mm, energy2, period, angle * (period / abs(h)))
         e = qt.multiply(turned, qt.conjugate(q))  # about L, since m is again what it was
         size = math.sqrt(mm)
         turn = 2.0 * math.atan2(qt.dot((e[1], e[2], e[3]), L) / size, e[0]) * math.copysign(count, h)
@@ -252,8 +269,7 @@ def _turn_far(q, m, L, J, series, mm, energy2, h):
         rest = max(abs(h) - count * period, 0.0)
         angle *= rest / abs(h)
         h = math.copysign(rest, h)
-    q, m = _turn_by_parts(q, m, J, series, mm, energy2, h, angle)
-    return q
+    return _turn_by_parts(q, m, L, J, series, mm, energy2, h, angle)
 
 
 @inlined

@@ -7,7 +7,7 @@ import math
 from physics.kernels import layout as at
 from physics.kernels import quaternion as qt
 from physics.kernels.aims import HIT, NOTHING, aim_impact, aim_rest, may_hit
-from physics.kernels.arms import place_arms
+from physics.kernels.arms import place_arms, wall_normal, wall_of
 from physics.kernels.body import principal_attitude, turning
 from physics.kernels.compiler import inlined, kernel
 from physics.kernels.compliance import aim_springs, foretell_gaps, parts_of_stage
@@ -16,8 +16,10 @@ from physics.kernels.flight import drift
 from physics.kernels.held import CONTACT_COUNT, MEMORY_HEAD, MODE, STAGE_LENGTH, hold_back
 from physics.kernels.laws import STIFFNESS, if_law
 from physics.kernels.layout import ELLIPSOID
+from physics.kernels.point import point_velocity
 from physics.kernels.resist import aim_tangential, resist_turning, without_gain
 from physics.kernels.restraint import ROUNDING, kinetic_energy, part_of_rebound, shortened
+from physics.kernels.share import contact_arm
 from physics.kernels.slide import SLIDE
 from physics.kernels.slip import has_turned_round, oppose_end_slip, oppose_mean_slip, without_gift
 from physics.kernels.solve import PIVOTING, solve_contacts
@@ -135,16 +137,23 @@ def contacts_gain(before, w, v, L, solved, R, h, work):
 
 
 @inlined
-def calm_targets(n, work):
-    """Targets that cannot raise the energy: no contact is pushed off or along, and with p·u' <= 0 none gives any."""
+def calm_targets(n, before, w, work):
+    """Targets that cannot raise the energy: no contact is pushed off or along, and what leaves is turned round.
+
+    A push p changes the energy by p·½(u + u'), with u and u' the normal velocities of its contact before and after. So
+    one that loads bring back within the stage, u > 0, comes back as fast as it left, instead of being stopped above
+    its wall.
+    """
     for i in range(n):
-        work.target[i, 0] = min(work.target[i, 0], 0.0)
+        normal = wall_normal(work.walls, wall_of(work.slot[i], work))
+        u = qt.dot(normal, point_velocity(contact_arm(work, i), before, w))
+        work.target[i, 0] = min(work.target[i, 0], -max(u, 0.0))
         work.target[i, 1] = work.target[i, 2] = 0.0
 
 
 def _calmed_if_it_gains(n, friction, smooth, pivots, before, w, solved, free, R, h, work):
     if contacts_gain(before, w, free[0], free[1], solved, R, h, work):
-        calm_targets(n, work)
+        calm_targets(n, before, w, work)
         solved = solve_contacts(n, friction, smooth, pivots, free[0], free[1], R, work)
         if not solved[2] <= work.tolerance and contacts_gain(before, w, free[0], free[1], solved, R, h, work):
             return shortened(n, friction, before, w, solved, free, R, work)

@@ -198,6 +198,25 @@ def test_many_turns_at_once_follow_the_elliptic_functions_and_the_parts():
             assert ref.orientation_error(turn(moments, at_once, m, -h), (1, 0, 0, 0)) < 2 * EPS * parts * angle
 
 
+@pytest.mark.parametrize("axis", range(3))
+@pytest.mark.parametrize("angle", [0.05, 1.0, 1e5, 1e8, 1e12])
+def test_a_turn_about_a_principal_axis_is_plain_at_any_angle(axis, angle):
+    """Also about the middle one, where the momentum has no period. The angle is rounded to EPS of itself."""
+    L = np.zeros(3)
+    L[axis] = BLOCK[axis]  # 1 rad/s
+    expected = np.zeros(4)
+    expected[0], expected[1 + axis] = np.cos(angle / 2), np.sin(angle / 2)
+    assert ref.orientation_error(turn(BLOCK, (1, 0, 0, 0), L, angle), expected) < 4 * EPS * (1 + angle)
+
+
+@pytest.mark.parametrize("moments", [(1.0, 1.0 + 1e-9, 1.5), (1.0 - 1e-13, 1.0, 1.0 + 1e-13)])
+def test_a_turn_too_far_to_follow_keeps_the_energy(moments):
+    """1e9 rad of a body whose moments are equal to 1e-9: attitude unknown, energy as it was to rounding."""
+    m = np.array([0.6, 0.8, 1e-10])
+    end = ref.rotation_matrix(turn(moments, (1, 0, 0, 0), m, 1e9)).T @ m
+    assert (end**2 / moments).sum() == pytest.approx((m**2 / moments).sum(), rel=20 * EPS)
+
+
 def _part_of_many_digits():
     """One part of the flow as plain Python: of extended numbers, it has no rounding of doubles."""
     product, unit = (types.FunctionType(f.py_func.__code__, {}) for f in (qt.multiply, qt.renormalise))

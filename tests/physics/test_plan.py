@@ -199,5 +199,5 @@ def test_machine_code_holds_only_the_fields_that_are_declared(tmp_path):
     stored = set(air["members"]) - set(bare["members"])
     assert stored == {
         "held_acceleration", "held_torque", "call_start", "now", "is_felt", "columns", "load_drag_1x2",
-        "is_textbook", "is_stiff", "is_coarse", "rate", "damping", "stage_start", "stage_energy",
+        "is_textbook", "is_stiff", "is_coarse", "is_put_back", "rate", "damping", "stage_start", "stage_energy",
     }  # fmt: skip

@@ -197,6 +197,17 @@ def test_a_field_of_a_users_own_that_turns_the_velocity_by_a_radian_a_step_is_re
     assert (report.status[0] == physics.Status.COARSE) == (turn > 1.0)
 
 
+@pytest.mark.parametrize("turn", [0.5, 0.9, 1.1, 1.5])
+@pytest.mark.parametrize("gravity", [9.81, 1e3, 1e6])
+@pytest.mark.parametrize("axis", [(0.0, 0.0, -1.0), (0.0, 0.6, -0.8)])
+def test_other_loads_do_not_hide_a_field_that_turns_the_velocity(turn, gravity, axis):
+    """Along its axis gravity is not turned at all, however strong it is."""
+    ball = physics.Sphere(0.1, 1.0, linvel=(0.6, 0.8, 0.0))
+    fields = [physics.Gravity(tuple(gravity * c for c in axis)), Deflection(turn / 0.01)]
+    report = world_of([ball], fields, 0.01).step()
+    assert (report.status[0] == physics.Status.COARSE) == (turn > 1.0)
+
+
 @pytest.mark.parametrize("scheme", ["explicit_euler", "semi_implicit_euler", "midpoint", "rk4"])
 def test_a_textbook_scheme_keeps_its_explicit_loads(scheme):
     """v' = v (1 - z + z²/2) a step, z = h c/m = 4: its loads are those of the middle, and it must gain; it is told."""

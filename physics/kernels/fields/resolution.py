@@ -31,8 +31,12 @@ from physics.kernels.restraint import between
 # A user's field is not resolved where its loads change by more than this until the middle of a step, times speed/step.
 COARSE = 2.0
 
-# Share of all loads by which those of a user's field may change in half a kick without opposing it: a radian a step.
+# Share of a kick's cause by which the loads of a user's field may change in half of it without opposing it: a radian a
+# step.
 TURNING = 0.5
+
+# Share of all loads up to which a change of them is rounding.
+ROUNDING = 1.0e-9
 
 
 @kernel
@@ -59,6 +63,22 @@ def _change_of(first, second, work):
     return change, size_of(change, work)
 
 
+@inlined
+def _change_by_kick(kick, moved, v, L, place, work):
+    """Change of the loads of a user's fields from `moved`, by half a step of the loads `kick`, and its bound [m/s²]."""
+    x, q, h, tilted = place
+    v, L = plus(v, times(0.5 * h, kick[0])), plus(L, times(0.5 * h, kick[1]))
+    return _change_of(moved, total_unknown(field_state(x, q, v, L, work.now, tilted, work), work.now, work), work)
+
+
+@inlined
+def _is_too_much(change, size, cause, cause_size, work):
+    """True where a change of loads is more of its cause than the explicit rule bears; more where it opposes that."""
+    arm = work.radius * max(work.J[0], work.J[1], work.J[2])
+    product = qt.dot(cause[0], change[0]) + arm * arm * qt.dot(cause[1], change[1])
+    return size > (cause_size if product <= -0.5 * size * cause_size else TURNING * cause_size)
+
+
 @if_unknown()
 def look_over_stage(y, middle, x, q, h, tilted, work):
     """Note whether loads of a user's fields change too much over a stage from y; `middle` are all loads at (x, q).
@@ -66,7 +86,8 @@ def look_over_stage(y, middle, x, q, h, tilted, work):
     Under a stiffness of frequency Ω the loads change by Ω² h v/2 until the middle: h times that is more than 2 v where
     h Ω > 2. Half a kick changes the loads by λ h/2 of what they are. If they oppose it, as damping does, the explicit
     rule grows from h λ = 2 on. Loads that turn with the velocity, at λ [rad/s], make it grow at any h λ. From 1 rad a
-    step on they count as not resolved, as built-in ones do.
+    step on they count as not resolved, as built-in ones do. A kick by all loads says little of λ where most of them do
+    not depend on the velocity, so the change that it makes is itself taken for a kick, as a power iteration does.
     """
     t = work.now
     v, L = y[2], y[3]
@@ -77,14 +98,14 @@ def look_over_stage(y, middle, x, q, h, tilted, work):
     _, change = _change_of(start, moved, work)
     if change > COARSE * speed / h:
         work.is_coarse = 1
-    a, T = all_loads(middle[0], middle[1], work)
-    v, L = plus(v, times(0.5 * h, a)), plus(L, times(0.5 * h, T))
-    kicked = total_unknown(field_state(x, q, v, L, t, tilted, work), t, work)
-    (b, S), change = _change_of(moved, kicked, work)
-    arm = work.radius * max(work.J[0], work.J[1], work.J[2])
-    size = size_of((a, T), work)
-    opposes = qt.dot(a, b) + arm * arm * qt.dot(T, S) <= -0.5 * change * size
-    if change > (size if opposes else TURNING * size):
+    place = x, q, h, tilted
+    loads = all_loads(middle[0], middle[1], work)
+    size = size_of(loads, work)
+    first, by_loads = _change_by_kick(loads, moved, v, L, place, work)
+    second, by_change = _change_by_kick(first, moved, v, L, place, work)
+    if _is_too_much(first, by_loads, loads, size, work):
+        work.is_coarse = 1
+    if by_loads > ROUNDING * size and _is_too_much(second, by_change, first, by_loads, work):
         work.is_coarse = 1
 
 
