@@ -124,6 +124,8 @@ def contacts_gain(before, w, v, L, solved, R, h, work):
     the stage (`before`, w), v' and ω' after it. `v`, `L` are those with loads and without impulses.
     """
     v1, L1, _, _, _ = solved
+    if qt.dot(before, before) + qt.dot(v1, v1) + qt.dot(w, w) + qt.dot(L1, L1) == 0.0:  # at rest, as most are
+        return False
     w1, a = turning(R, L1, work.J), work.free_acceleration
     push = work.mass * (
         (v1[0] - v[0]) * (before[0] + v1[0])
