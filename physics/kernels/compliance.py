@@ -37,6 +37,7 @@ from __future__ import annotations
 
 import math
 
+from physics.kernels import layout as at
 from physics.kernels import quaternion as qt
 from physics.kernels.aims import LARGEST_TURN, UNSEEN
 from physics.kernels.arms import arm_and_rate, feature_of, place_arms, wall_normal, wall_of
@@ -46,6 +47,9 @@ from physics.kernels.contact import gap_of, nearest_outside_set
 from physics.kernels.laws import DAMPING, STIFFNESS, if_law, number_of
 from physics.kernels.restraint import kinetic_energy, lifted_to
 from physics.kernels.share import contact_arm
+
+# Share of its energy that a body may gain in a resting stage by what is of third order in the step.
+GAIN_SHARE = 2.0e-5
 
 stiffness = number_of(STIFFNESS)
 damping = number_of(DAMPING)
@@ -116,7 +120,7 @@ def foretell_gaps(n, v, w, after, work):
         work.due[i] += after * (qt.dot(normal, v) + qt.dot(normal, qt.cross(w, contact_arm(work, i))))
 
 
-def _as_it_ends(n, y, end, h, tilted, work):
+def _as_it_ends(n, y, end, h, tilted, report, work):
     return end
 
 
@@ -144,29 +148,61 @@ def _work_of_loads(y, end, h, tilted, work):
     return lost + work.mass * (a[0] * d[0] + a[1] * d[1] + a[2] * d[2])
 
 
+@inlined
+def _stored(n, x, R, tilted, work):
+    """Energy of the springs at x [J]."""
+    stored = 0.0
+    for i in range(n):
+        gap = min(gap_of(work.slot[i], x, R, tilted, work), 0.0)
+        stored += 0.5 * stiffness(work) * gap * gap
+    return stored
+
+
+@inlined
+def _without_excess(y, end, excess, h, tilted, report, work):
+    """`end` without the energy `excess` [J] that came from nowhere, if that is more than the stage and its solve miss.
+
+    Where there is too little motion to pay with the body stays at y without velocity, and is reported as coarse.
+    """
+    x, q, v, L = end
+    size = kinetic_energy(y[1], y[2], y[3], work, tilted)
+    size += work.mass * h * h * qt.dot(work.free_acceleration, work.free_acceleration)
+    if not excess > max(work.tolerance, GAIN_SHARE) * size:
+        return end
+    motion = kinetic_energy(q, v, L, work, tilted)
+    if not excess < motion:
+        report[work.world, at.COARSE] += 1.0
+        return y[0], y[1], (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
+    s = math.sqrt(1.0 - excess / motion)
+    return x, q, (s * v[0], s * v[1], s * v[2]), (s * L[0], s * L[1], s * L[2])
+
+
 @if_law((STIFFNESS,), _as_it_ends)
-def lift_to_due(n, y, end, h, tilted, work):
+def lift_to_due(n, y, end, h, tilted, report, work):
     """The end of a stage from y with no point deeper than its spring is due to be, and no other one in a wall.
 
     Nor is more stored in the springs than there was, and than the motion has lost and the loads have done on the way.
     (Damping stops a point that turns as it does at the start of the stage: what turns less by then it leaves deeper.)
+    Friction far beyond 1 may push a point that turns more than its spring takes: that is taken from the motion.
     """
     x, q, v, L = end
     R, least = qt.to_matrix(q), UNSEEN * work.slop
     x = _lifted(n, x, R, 1.0, tilted, work)
-    stored = before = 0.0
+    before = 0.0
     for i in range(n):
-        gap = min(gap_of(work.slot[i], x, R, tilted, work), 0.0)
-        stored += 0.5 * stiffness(work) * gap * gap
         before += 0.5 * stiffness(work) * min(work.gap[i], 0.0) ** 2
+    stored = _stored(n, x, R, tilted, work)
     if stored > before:
         budget = before + _work_of_loads(y, (x, q, v, L), h, tilted, work)
         if stored > budget:
             x = _lifted(n, x, R, math.sqrt(max(budget, 0.0) / stored), tilted, work)
+            stored = _stored(n, x, R, tilted, work)
     gap, slot = nearest_outside_set(x, R, tilted, work)
     if gap < -least:
         x = _along(x, -gap, wall_normal(work.walls, wall_of(slot, work)))
-    return lifted_to(x, end, tilted, work)
+    end = lifted_to(x, end, tilted, work)
+    excess = stored - before - _work_of_loads(y, end, h, tilted, work)
+    return _without_excess(y, end, excess, h, tilted, report, work)
 
 
 def _as_it_is(block, work):

@@ -10,7 +10,7 @@ from physics.kernels.aims import HIT, NOTHING, aim_impact, aim_rest, may_hit
 from physics.kernels.arms import place_arms, wall_normal, wall_of
 from physics.kernels.body import principal_attitude, turning
 from physics.kernels.compiler import inlined, kernel
-from physics.kernels.compliance import aim_springs, foretell_gaps, parts_of_stage
+from physics.kernels.compliance import GAIN_SHARE, aim_springs, foretell_gaps, parts_of_stage
 from physics.kernels.events.log import log_wall_impacts
 from physics.kernels.flight import drift
 from physics.kernels.held import CONTACT_COUNT, MEMORY_HEAD, MODE, STAGE_LENGTH, hold_back
@@ -23,10 +23,6 @@ from physics.kernels.share import contact_arm
 from physics.kernels.slide import SLIDE
 from physics.kernels.slip import has_turned_round, oppose_end_slip, oppose_mean_slip, without_gift
 from physics.kernels.solve import PIVOTING, solve_contacts
-
-# Share of its energy that a body may gain in a resting stage by what is of third order in the step: more is a step that
-# turns it too far, and is taken without targets that know how it turns.
-GAIN_SHARE = 2.0e-5
 
 # Slops that what is pressed by strong loads may move in a step.
 STILL_SHARE = 0.01
@@ -123,18 +119,24 @@ def contacts_gain(before, w, v, L, solved, R, h, work):
     Impulses P at the centre of mass and moments Q about it change it by ½ P·(v + v') + ½ Q·(ω + ω'), v and ω before
     the stage (`before`, w), v' and ω' after it. `v`, `L` are those with loads and without impulses.
     """
-    v1, L1, _, _, _ = solved
-    if qt.dot(before, before) + qt.dot(v1, v1) + qt.dot(w, w) + qt.dot(L1, L1) == 0.0:  # at rest, as most are
+    v_new, L_new, _, _, _ = solved
+    if (
+        qt.dot(before, before) + qt.dot(v_new, v_new) + qt.dot(w, w) + qt.dot(L_new, L_new) == 0.0
+    ):  # at rest, as most are
         return False
-    w1, a = turning(R, L1, work.J), work.free_acceleration
+    w_new, a = turning(R, L_new, work.J), work.free_acceleration
     push = work.mass * (
-        (v1[0] - v[0]) * (before[0] + v1[0])
-        + (v1[1] - v[1]) * (before[1] + v1[1])
-        + (v1[2] - v[2]) * (before[2] + v1[2])
+        (v_new[0] - v[0]) * (before[0] + v_new[0])
+        + (v_new[1] - v[1]) * (before[1] + v_new[1])
+        + (v_new[2] - v[2]) * (before[2] + v_new[2])
     )
-    turn = (L1[0] - L[0]) * (w[0] + w1[0]) + (L1[1] - L[1]) * (w[1] + w1[1]) + (L1[2] - L[2]) * (w[2] + w1[2])
+    turn = (
+        (L_new[0] - L[0]) * (w[0] + w_new[0])
+        + (L_new[1] - L[1]) * (w[1] + w_new[1])
+        + (L_new[2] - L[2]) * (w[2] + w_new[2])
+    )
     square = h * h * (a[0] * a[0] + a[1] * a[1] + a[2] * a[2])
-    size = work.mass * (qt.dot(before, before) + square) + abs(qt.dot(L1, w1))
+    size = work.mass * (qt.dot(before, before) + square) + abs(qt.dot(L_new, w_new))
     return push + turn > max(work.tolerance, GAIN_SHARE) * size
 
 

@@ -206,7 +206,7 @@ def substep(y, start, h, friction, smooth, gyroscopic, tilted, pivots, scheme, m
         pass_time(t, work)
         if is_deep and n > 0 and not stiffness(work) > 0.0:
             end = kept_out(end, tilted, work)
-        y = lift_to_due(n, y, end, t, tilted, work)
+        y = lift_to_due(n, y, end, t, tilted, report, work)
         if work.is_last or not left > 0.0:
             break
         report[world, at.SPLITS] += 1.0

@@ -35,11 +35,12 @@ def zeno(on: Setting) -> Sequence[Check]:
 
     A fall of √(2h/g), then flights of 2 e^k √(2h/g) to heights e^2k h: two geometric series (Stronge, *Impact
     Mechanics*, section 1). The event-driven scheme states the time of rest: places are rounded to 4e-16 m, at the last
-    speeds, 1e-5 m/s, 4e-11 s, again a series. Else the body rests when it rises no more above H = g dt²/8, the height
-    of a flight of dt, and the slop: flights of t = √(8H/g) and what follows, t/(1-e), are left then; seen at whole
-    steps. The way of a step with an impact is taken as that from start to floor to end; an apex between floor and end
-    of one step is not seen, which is no higher than g dt²/2 = 4 H, nor all after it, up and down; and each of
-    ln(h/H)/ln(1/e²) bounces may happen a slop too high.
+    speeds, 1e-5 m/s, 4e-11 s, again a series. Else the body rests when it is seen no more above H = g dt²/8, the height
+    of a flight of dt, and the slop. A flight of t is seen at g (t² - dt²)/8 or higher, wherever in it the steps end:
+    those of t <= √(dt² + 8H/g), and what follows, t/(1-e), are not seen; the last sight is up to a step old.
+    The way of a step with an impact is taken as that from start to floor to end; an apex between floor and end of one
+    step is not seen, which is no higher than g dt²/2 = 4 H, nor all after it, up and down; and each of ln(h/H)/ln(1/e²)
+    bounces may happen a slop too high.
     """
     checks = []
     for e in (0.3, 0.5, 0.8):
@@ -49,7 +50,7 @@ def zeno(on: Setting) -> Sequence[Check]:
         low = GRAVITY * on.dt**2 / 8 + slop
         high = np.flatnonzero(heights > low)[-1]
         rest = times[min(high + 1, len(times) - 1)]
-        limit = on.dt + math.sqrt(8 * low / GRAVITY) / (1 - e)
+        limit = on.dt + math.sqrt(on.dt**2 + 8 * low / GRAVITY) / (1 - e)
         if on.is_event_driven:
             events = physics.simulate(_dropped(e), 1.5 * truth, on.accuracy, on.dt).events
             rest, limit = next((event.t for event in events if event.kind == "rest"), math.nan), 4e-11 / (1 - e)

@@ -271,7 +271,8 @@ DRAWN = np.random.default_rng(35).choice(len(PAIRS), 10, replace=False).tolist()
 
 
 # Draws that once broke the law: drag that grows within a step, a fluid left or reached within one, spin that contact
-# makes, soft walls that stop a turning corner or lift a body far, a stiff damper in air, a pair put back as it falls.
+# makes, soft walls that stop a turning corner or lift a body far, a stiff damper in air, a pair put
+# back as it falls, friction of 7e4 at a soft wall.
 FOUND = [
     (("gravity", "drag"), False, 2),
     (("buoyancy",), False, 32),
@@ -281,6 +282,7 @@ FOUND = [
     (("gravity", "compliance"), True, 19),
     (("drag", "spring between bodies"), False, 18),
     (("gravity", "spring between bodies"), False, 28),
+    (("compliance", "friction of two coefficients"), True, 36),
 ]
 
 

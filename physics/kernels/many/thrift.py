@@ -15,9 +15,9 @@ from physics.kernels import layout as at
 from physics.kernels import quaternion as qt
 from physics.kernels.body import angular_velocity, read_state
 from physics.kernels.compiler import inlined, kernel
+from physics.kernels.compliance import GAIN_SHARE
 from physics.kernels.layout import HULL, NORMAL, OFFSET
 from physics.kernels.many.contacts import matrix, minus, plus, put, vector
-from physics.kernels.stages import GAIN_SHARE
 
 # Columns of `many.momenta` in a resting stage: velocities before it, then momenta with its loads.
 VELOCITY, LOADED = 0, 6
