@@ -13,7 +13,7 @@ from stable_baselines3.common.base_class import BaseAlgorithm
 
 import physics
 from agents.config import RunConfig
-from rigid_env.sb3 import RigidVecEnv
+from rigid_env import RigidVecEnv
 
 CLASSES: dict[str, type[BaseAlgorithm]] = {"ppo": PPO, "sac": SAC}
 

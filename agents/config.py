@@ -117,7 +117,7 @@ def read_hyperparameters(env: str, algo: str, path: Path = HYPERPARAMETERS) -> d
 
 
 def make_config(env: str, algo: str, seed: int, path: Path = HYPERPARAMETERS, **changes: Any) -> RunConfig:
-    """The configuration of a new run: hyperparameters of the file, with `changes` that are not None.
+    """The configuration of a new run: hyperparameters of the file, with `setters` that are not None.
 
     Raises
     ------
@@ -130,7 +130,7 @@ def make_config(env: str, algo: str, seed: int, path: Path = HYPERPARAMETERS, **
 
 
 def change(config: RunConfig, **changes: Any) -> RunConfig:
-    """The same configuration with those `changes` that are not None."""
+    """The same configuration with those `setters` that are not None."""
     return replace(config, **{name: value for name, value in changes.items() if value is not None})
 
 

@@ -107,7 +107,7 @@ def _write_mp4(path: Path, pictures: Iterator[np.ndarray], fps: float) -> Path:
 
 
 def _write_gif(path: Path, pictures: Iterator[np.ndarray], fps: float) -> Path:
-    from rigid_env.picture import write_gif
+    from rigid_env.rendering.picture import write_gif
 
     write_gif(path, [picture for k, picture in enumerate(pictures) if k % GIF_STEP == 0], fps / GIF_STEP)
     return path

@@ -12,8 +12,8 @@ from typing import Annotated
 import typer
 
 from benchmarks import machine
-from rigid_env.measure.accuracy import QUICK, Ladder, names
-from rigid_env.measure.accuracy_report import measure_and_show, write_result
+from rigid_env.lab.measure.accuracy import QUICK, Ladder, names
+from rigid_env.lab.measure.accuracy_report import measure_and_show, write_result
 from rigid_env.terminal import make_console
 
 

@@ -1,8 +1,8 @@
 """Energy of worlds with drawn effects: ``python -m benchmarks.drawn_effects``.
 
 Every effect of the catalogue and every two, in flight and on a floor, at `fast` and `balanced`: see
-`rigid_env.measure.drawn_effects` for what is drawn and for the law. Draws that break it are listed with what makes them
-again: ``--pair "spring,drag" --seed 17``. A file of results grows by seeds that are not in it yet: ``--seed 20``.
+`rigid_env.lab.measure.drawn_effects` for what is drawn and for the law. Draws that break it are listed with what makes
+them again: ``--pair "spring,drag" --seed 17``. A file of results grows by seeds that are not in it yet: ``--seed 20``.
 """
 
 from __future__ import annotations
@@ -18,8 +18,8 @@ import numpy as np
 import typer
 from rich.progress import track
 
-from rigid_env.measure import drawn_effects
-from rigid_env.measure.machine import describe, write_json
+from rigid_env.lab.measure import drawn_effects
+from rigid_env.lab.measure.machine import describe, write_json
 
 PRESETS = ("fast", "balanced")
 WORLDS_PER_DRAW = 4

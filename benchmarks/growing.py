@@ -1,10 +1,10 @@
 """Cost of a step as a pile grows: ``python -m benchmarks.growing [--quick] [--peer] [--json FILE] [--plot FILE]``.
 
-Layer upon layer of 5 x 5 unit cubes, turned at random, falls onto a pile in a shaft (that of `scenes.heap`), each a
-diagonal above the highest cube, each 1.5 s after the one before: whatever its height, the pile is given the same to do,
-and all of the rest has to be held. Time of a step against its contacts, the mean over those 1.5 s, and the exponent
-that fits from the pile on that is `DEEP` layers deep: of the first two layers nearly all lie side by side on the floor,
-each body with contacts of its own, which differs from a pile.
+Layer upon layer of 5 x 5 unit cubes, turned at random, falls onto a pile in a shaft (that of `canonical_scenes.heap`),
+each a diagonal above the highest cube, each 1.5 s after the one before: whatever its height, the pile is given the same
+to do, and all of the rest has to be held. Time of a step against its contacts, the mean over those 1.5 s, and the
+exponent that fits from the pile on that is `DEEP` layers deep: of the first two layers nearly all lie side by side on
+the floor, each body with contacts of its own, which differs from a pile.
 
 With ``--peer`` MuJoCo takes the same 300 steps of some of these piles, from where ours are, once with each of two of
 its solvers. With ``--json`` the result is written after each layer.
@@ -26,14 +26,14 @@ from benchmarks import machine
 from benchmarks.piles import OURS, SOLVERS, exponent
 from benchmarks.settling import Ours, Sample, Theirs, Watch
 from physics import scenes
-from rigid_env.measure import mujoco_scene
-from rigid_env.measure.plotting import require_matplotlib
+from rigid_env.lab.measure import mujoco_scene
+from rigid_env.lab.measure.plotting import require_matplotlib
 
 LAYERS, QUICK_LAYERS = 32, 2
 PEER_LAYERS = (4, 8, 16)  # MuJoCo takes a minute for the last one
 DEEP = 4  # layers from which on it is a pile
 WIDTH = 5  # of a layer, in cubes
-PITCH = 1.75  # of its grid [m], as in `scenes.heap`
+PITCH = 1.75  # of its grid [m], as in `canonical_scenes.heap`
 DIAGONAL = 1.7321  # of a cube, rounded up [m]
 PART, PARTS, QUICK_PARTS = 20, 15, 1  # steps of a part, and parts for each layer
 

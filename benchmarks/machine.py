@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from rigid_env.measure.machine import describe, write_json
-from rigid_env.measure.timing import Row
+from rigid_env.lab.measure.machine import describe, write_json
+from rigid_env.lab.measure.timing import Row
 
 RESULTS = Path(__file__).parent / "results"
 

@@ -15,8 +15,8 @@ from numba.core.runtime import _nrt_python, rtsys
 
 import physics
 from physics import scenes
-from rigid_env.measure.timing import Row, Spread
-from rigid_env.measure.workloads import HOLD, STEP, random_wrenches
+from rigid_env.lab.measure.timing import Row, Spread
+from rigid_env.lab.measure.workloads import HOLD, STEP, random_wrenches
 
 COUNTED_STEPS = 1000
 STRETCHES = 5

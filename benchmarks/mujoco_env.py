@@ -13,9 +13,9 @@ from gymnasium import spaces
 from gymnasium.envs.mujoco import MujocoEnv
 
 from physics import scenes
-from rigid_env.measure.environments import ENV_ID, SUBSTEPS, EnvPeer
-from rigid_env.measure.mujoco_scene import BLOCK, model_xml
-from rigid_env.measure.workloads import STEP
+from rigid_env.lab.measure.environments import ENV_ID, SUBSTEPS, EnvPeer
+from rigid_env.lab.measure.mujoco_scene import BLOCK, model_xml
+from rigid_env.lab.measure.workloads import STEP
 from rigid_env.tasks.base import FORCE_SHARE, TORQUE_SHARE
 
 PEER_ID = "MujocoBlockReach-v0"

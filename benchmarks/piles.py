@@ -1,10 +1,10 @@
 """Cost of a step by the size of a pile: ``python -m benchmarks.piles [--quick] [--peer] [--json FILE] [--plot FILE]``.
 
-A pile of cubes that settles in a shaft (`scenes.heap`), from a few to many: time of a step against its contacts once
-it lies, and while it falls and settles, and the exponents that fit. And the broad phase alone, for cubes spread evenly
-in a box at one density: time against the pairs that it finds. With ``--peer`` MuJoCo takes the same steps of the same
-piles, once with each of two of its solvers (a quarter of an hour). With ``--json`` the
-result is written after each pile.
+A pile of cubes that settles in a shaft (`canonical_scenes.heap`), from a few to many: time of a step against its
+contacts once it lies, and while it falls and settles, and the exponents that fit. And the broad phase alone, for cubes
+spread evenly in a box at one density: time against the pairs that it finds. With ``--peer`` MuJoCo takes the same steps
+of the same piles, once with each of two of its solvers (a quarter of an hour). With ``--json`` the result is written
+after each pile.
 """
 
 from __future__ import annotations
@@ -22,11 +22,11 @@ import physics
 from benchmarks import machine
 from benchmarks.settling import PARTS, Ours, Sample, Theirs, settle
 from physics import scenes
-from physics.kernels.many.arrays import PAIRS
-from physics.kernels.many.near import find_pairs
-from rigid_env.measure import mujoco_scene
-from rigid_env.measure.plotting import require_matplotlib
-from rigid_env.measure.workloads import STEP
+from physics.kernels.multibody.broadphase.sweep_and_prune import find_pairs
+from physics.kernels.multibody.data.arrays import PAIRS
+from rigid_env.lab.measure import mujoco_scene
+from rigid_env.lab.measure.plotting import require_matplotlib
+from rigid_env.lab.measure.workloads import STEP
 
 PILES, QUICK_PILES = (25, 50, 100, 200, 400), (5, 10)
 SPREADS, QUICK_SPREADS = (10, 100, 1000), (10, 100)

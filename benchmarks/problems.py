@@ -9,9 +9,9 @@ import numpy as np
 
 import physics
 from physics import scenes
-from physics.kernels import layout as at
-from physics.kernels.many.arrays import CONTACTS, Many, make_many
-from rigid_env.hard_cases import arch, stacks
+from physics.kernels.multibody.data.arrays import CONTACTS, Many, make_many
+from physics.kernels.state import layout as at
+from rigid_env.lab.hard_cases.cases import arch, stacks
 
 SETTINGS = {"relative_slop": 1e-6, "tolerance": 1e-6, "sweeps": 200, "splits": 8, "rest_share": 0.5}
 STEP = 0.01  # of the worlds whose first problem is taken [s]

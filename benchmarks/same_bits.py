@@ -19,7 +19,7 @@ from rich.progress import track
 
 from benchmarks import machine
 from benchmarks.bit_scenes import PRESETS, SCENES, STEPS
-from rigid_env.measure.machine import write_json
+from rigid_env.lab.measure.machine import write_json
 
 WORKER = Path(__file__).with_name("bit_scenes.py")
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 import physics
-from rigid_env.measure.workloads import STEP
+from rigid_env.lab.measure.workloads import STEP
 
 LIES = 1e-3  # a pile lies once no body of it has been faster than this [m/s] ...
 LIES_FOR = 400  # ... for so many steps; and so many are measured then
@@ -81,7 +81,7 @@ class Theirs:
     solves, failed, residual = 0, 0, None  # it does not say
 
     def __init__(self, scene: physics.Scene, solver: str) -> None:
-        from rigid_env.measure.peers.mujoco import MuJoCo
+        from rigid_env.lab.measure.peers.mujoco import MuJoCo
 
         self.run = MuJoCo().open(scene, STEP, solver=solver)
         self.run.restart()

@@ -7,9 +7,9 @@ from dataclasses import replace
 import numpy as np
 
 import physics
-from physics.recording import Recording, Start
-from physics.world import KEPT, Snapshot
-from rigid_env.hard_cases.random_scenes import Outcome, gain_limit, look, push
+from physics.io.recording import Recording, Start
+from physics.world.world import KEPT, Snapshot
+from rigid_env.lab.hard_cases.cases.random_scenes import Outcome, gain_limit, look, push
 
 
 def law_broken(recording: Recording) -> str:

@@ -16,9 +16,9 @@ import typer
 import physics
 from benchmarks import machine
 from physics import scenes
-from rigid_env.measure.table import make_table
-from rigid_env.measure.timing import Row, Stopwatch, interleave
-from rigid_env.measure.workloads import FLIGHT_STEPS, STEP
+from rigid_env.lab.measure.table import make_table
+from rigid_env.lab.measure.timing import Row, Stopwatch, interleave
+from rigid_env.lab.measure.workloads import FLIGHT_STEPS, STEP
 from rigid_env.terminal import make_console
 
 REPEATS, QUICK_REPEATS = 11, 1

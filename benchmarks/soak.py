@@ -1,9 +1,9 @@
 """Look for failures as long as one likes: ``python -m benchmarks.soak --minutes 5 --seed 0 --keep DIR [--env ID]``.
 
-Without ``--env``: random scenes, parameters, states and wrenches (`rigid_env.hard_cases.random_scenes`), held against
-its laws. With it: an agent that pushes with all its strength, at random and for long into the walls, at every accuracy;
-states stay finite and inside, rewards and successes are computed anew from the states. Each failure is kept, shrunk, as
-a recording for ``rigid-env replay``. Ctrl-C ends it early; what was found is written all the same.
+Without ``--env``: random scenes, parameters, states and wrenches (`rigid_env.lab.hard_cases.cases.random_scenes`), held
+against its laws. With it: an agent that pushes with all its strength, at random and for long into the walls, at every
+accuracy; states stay finite and inside, rewards and successes are computed anew from the states. Each failure is kept,
+shrunk, as a recording for ``rigid-env replay``. Ctrl-C ends it early; what was found is written all the same.
 """
 
 from __future__ import annotations
@@ -20,8 +20,8 @@ from rich.progress import Progress
 import physics
 from benchmarks import machine, soak_env
 from benchmarks.shrink import shrink
-from rigid_env.hard_cases import random_scenes
-from rigid_env.measure.machine import write_json
+from rigid_env.lab.hard_cases.cases import random_scenes
+from rigid_env.lab.measure.machine import write_json
 
 BATCH = 200
 RECORDED = 40  # steps: a whole run of `random_scenes.drive`
@@ -88,7 +88,7 @@ def main(
     console = Console()
     presets = accuracy or (list(physics.PRESETS) if env else ["balanced"])
     for name in presets:
-        physics.accuracy.resolve(name)
+        physics.plan.accuracy.resolve(name)
     jobs = [(preset, name) for preset in presets for name in env or [None]]
     found: dict = {}
     console.print(machine.headline())

@@ -4,7 +4,8 @@ Two tables. Linear complementarity problems (no friction): sweeps, Dantzig's and
 Coulomb's law: sweeps over the bodies' twists, Newton's method, the interior-point method, all of them as `many.solve`
 takes them in turn (the default), and on the dense matrix W = J M⁻¹ Jᵀ sweeps and Lemke's method with a pyramid of eight
 directions in place of the cone. All start from no impulses. The residual is the natural-map residual of
-`physics.kernels.sweeps`, relative to the largest velocity without impulses, measured here on what each returns.
+`physics.kernels.contact_solver.gauss_seidel`, relative to the largest velocity without impulses, measured here on what
+each returns.
 """
 
 from __future__ import annotations
@@ -19,21 +20,21 @@ import numpy as np
 import typer
 
 from benchmarks import machine, problems
-from physics.kernels import layout as at
-from physics.kernels.compiler import kernel
-from physics.kernels.complementarity import SOLVED
-from physics.kernels.dantzig import dantzig, dantzig_sizes
-from physics.kernels.lemke import lemke, lemke_sizes
-from physics.kernels.many.interior import interior_point
-from physics.kernels.many.islands import find_islands
-from physics.kernels.many.newton import LEAST_STEPS, WORTH_LYING, newton_contacts, prepare_system
-from physics.kernels.many.response import assemble, residual_of
-from physics.kernels.many.solve import POLISH, forget_all, solve_contacts
-from physics.kernels.many.sweeps import sweep_contacts
-from physics.kernels.pyramid import pyramid_fallback
-from physics.kernels.sweeps import cone_sweeps, factor_blocks, normal_sweeps
-from physics.kernels.workspace import make_workspace
-from rigid_env.measure.machine import write_json
+from physics.kernels.compile.decorators import kernel
+from physics.kernels.contact_solver.friction_pyramid import pyramid_fallback
+from physics.kernels.contact_solver.gauss_seidel import cone_sweeps, factor_blocks, normal_sweeps
+from physics.kernels.lcp.dantzig import dantzig, dantzig_sizes
+from physics.kernels.lcp.lemke import lemke, lemke_sizes
+from physics.kernels.lcp.scaling_and_certificate import SOLVED
+from physics.kernels.multibody.solver.contact_operator import assemble, residual_of
+from physics.kernels.multibody.solver.gauss_seidel import sweep_contacts
+from physics.kernels.multibody.solver.interior_point import interior_point
+from physics.kernels.multibody.solver.islands import find_islands
+from physics.kernels.multibody.solver.proximal_newton import LEAST_STEPS, WORTH_LYING, newton_contacts, prepare_system
+from physics.kernels.multibody.solver.solve import POLISH, forget_all, solve_contacts
+from physics.kernels.state import layout as at
+from physics.kernels.time_stepping.workspace import make_workspace
+from rigid_env.lab.measure.machine import write_json
 from rigid_env.terminal import Column, Table, make_console, number_columns
 
 LIMIT = 1000  # sweeps, steps or iterations

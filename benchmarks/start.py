@@ -10,7 +10,7 @@ import time
 from pathlib import Path
 
 import physics
-from rigid_env.measure.timing import Row, Spread
+from rigid_env.lab.measure.timing import Row, Spread
 
 LIMIT = 1.5  # [s]
 

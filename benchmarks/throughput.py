@@ -15,9 +15,9 @@ import typer
 from rich.progress import Progress
 
 from benchmarks import machine, memory, start
-from rigid_env.measure import bodies, crowded, environments, mujoco_scene, rows, workloads
-from rigid_env.measure.table import make_table
-from rigid_env.measure.timing import Row
+from rigid_env.lab.measure import bodies, crowded, environments, mujoco_scene, rows, workloads
+from rigid_env.lab.measure.table import make_table
+from rigid_env.lab.measure.timing import Row
 from rigid_env.terminal import make_console
 
 REPEATS = 7

@@ -18,7 +18,7 @@ import typer
 
 import physics
 from benchmarks import machine
-from rigid_env.measure.machine import write_json
+from rigid_env.lab.measure.machine import write_json
 from rigid_env.terminal import make_console
 from tests.reference import turning as truth
 

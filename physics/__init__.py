@@ -9,27 +9,28 @@ The contract in five lines::
     report = world.step(wrench)
 """
 
-from physics.accuracy import PRESETS, Accuracy
-from physics.diagnostics import Diagnostics, diagnose, look_at
-from physics.effects import Actuator, Contact, Friction, Gravity, RollingFriction, Sleeping, SpinFriction
-from physics.field import Field, field_function
-from physics.fields import AngularDrag, Buoyancy, Drag, Magnus, Push, Spring, Wind
-from physics.frontier_result import Frontier, FrontierPoint
-from physics.frontier_run import frontier, ladder
-from physics.frontier_truth import Truth
-from physics.mjcf import load_mjcf, save_mjcf
-from physics.plan import make_plan
-from physics.recorder import Recorder
-from physics.recording import Recording, Replay
-from physics.report import Solver, Status, StepReport
-from physics.scene import HalfSpace, Scene, SceneWarning, corner, three_walls
-from physics.scene_file import load_scene, save_scene
-from physics.shapes import Block, Body, Ellipsoid, Hull, Sphere
-from physics.stepper import Stepper
-from physics.trajectory import Event, Trajectory, simulate
+from physics.analysis.diagnostics import Diagnostics, diagnose, look_at
+from physics.analysis.simulate import Event, Trajectory, simulate
+from physics.io.mjcf import load_mjcf, save_mjcf
+from physics.io.recorder import Recorder
+from physics.io.recording import Recording, Replay
+from physics.io.toml import load_scene, save_scene
+from physics.plan.accuracy import PRESETS, Accuracy
+from physics.plan.plan import make_plan
+from physics.scene import canonical_scenes as scenes
+from physics.scene.bodies import Block, Body, Ellipsoid, Hull, Sphere
+from physics.scene.effects import Actuator, Contact, Friction, Gravity, RollingFriction, Sleeping, SpinFriction
+from physics.scene.force_field import Field, field_function
+from physics.scene.force_fields import AngularDrag, Buoyancy, Drag, Magnus, Push, Spring, Wind
+from physics.scene.scene import HalfSpace, Scene, SceneWarning, corner, three_walls
 from physics.version import version as _version
-from physics.world import Snapshot, World
-from physics.wrench import wrench_at
+from physics.work_precision.result import Frontier, FrontierPoint
+from physics.work_precision.run import frontier, ladder
+from physics.work_precision.truth import Truth
+from physics.world.report import Solver, Status, StepReport
+from physics.world.stepper import Stepper
+from physics.world.world import Snapshot, World
+from physics.world.wrench import wrench_at
 
 __version__ = _version()
 
@@ -86,6 +87,7 @@ __all__ = [
     "make_plan",
     "save_mjcf",
     "save_scene",
+    "scenes",
     "simulate",
     "three_walls",
     "wrench_at",

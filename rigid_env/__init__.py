@@ -7,12 +7,12 @@ the first environment.
 from importlib import import_module
 from typing import TYPE_CHECKING
 
-from rigid_env.registration import register_envs
+from rigid_env.envs.registration import register_envs
 from rigid_env.shadowing import check_engine_is_found
 
 if TYPE_CHECKING:
-    from rigid_env.env import BlockReachEnv, BlockReorientEnv
-    from rigid_env.vector_env import BlockReachVectorEnv, BlockReorientVectorEnv
+    from rigid_env.envs.documentation import BlockReachEnv, BlockReorientEnv
+    from rigid_env.envs.vector_env import BlockReachVectorEnv, BlockReorientVectorEnv
 
     __version__: str
 
@@ -20,10 +20,11 @@ check_engine_is_found()
 register_envs()
 
 _LAZY = {
-    "BlockReachEnv": "rigid_env.env",
-    "BlockReachVectorEnv": "rigid_env.vector_env",
-    "BlockReorientEnv": "rigid_env.env",
-    "BlockReorientVectorEnv": "rigid_env.vector_env",
+    "BlockReachEnv": "rigid_env.envs.documentation",
+    "BlockReachVectorEnv": "rigid_env.envs.vector_env",
+    "BlockReorientEnv": "rigid_env.envs.documentation",
+    "BlockReorientVectorEnv": "rigid_env.envs.vector_env",
+    "RigidVecEnv": "rigid_env.envs.sb3",  # needs the extra `agents`, so it is not in `__all__`
 }
 
 __all__ = [

@@ -10,7 +10,7 @@ import sys
 from importlib.machinery import ModuleSpec, PathFinder
 from importlib.util import find_spec
 
-ENGINE, MARK, IMPORTED = "physics", "kernels", "physics.world"
+ENGINE, MARK, IMPORTED = "physics", "kernels", "physics.world.world"
 """The package looked for, a subpackage that only the engine's has, and a module that its first file imports: another
 distribution installed into the same folder overwrites that file alone."""
 

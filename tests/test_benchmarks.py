@@ -14,10 +14,10 @@ import pytest
 import physics
 from benchmarks import machine, memory, start
 from physics import scenes
-from rigid_env.measure import mujoco_scene, rows, workloads
-from rigid_env.measure.machine import describe
-from rigid_env.measure.table import cells, make_table, number
-from rigid_env.measure.timing import Row, Spread, fastest, interleave
+from rigid_env.lab.measure import mujoco_scene, rows, workloads
+from rigid_env.lab.measure.machine import describe
+from rigid_env.lab.measure.table import cells, make_table, number
+from rigid_env.lab.measure.timing import Row, Spread, fastest, interleave
 
 ROOT = Path(__file__).parents[1]
 # The peer is an extra (`bench`, part of `dev`): without it the benchmarks run alone, and so do their tests.

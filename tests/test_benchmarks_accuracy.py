@@ -1,4 +1,4 @@
-"""`benchmarks.accuracy`: the program over `rigid_env.measure.accuracy` writes what it measured."""
+"""`benchmarks.accuracy`: the program over `rigid_env.lab.measure.accuracy` writes what it measured."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import typer
 from typer.testing import CliRunner
 
 from benchmarks import accuracy
-from rigid_env.measure.accuracy import QUICK
+from rigid_env.lab.measure.accuracy import QUICK
 
 
 def test_the_program_writes_what_it_measured(tmp_path):

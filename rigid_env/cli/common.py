@@ -85,7 +85,7 @@ def write(path: Path | None, content: dict, console: Console) -> None:
     """Write numbers as JSON, with the machine they are from, and say where."""
     if path is None:
         return
-    from rigid_env.measure.machine import write_json
+    from rigid_env.lab.measure.machine import write_json
 
     write_json(path, content)
     tell_file(path, console)

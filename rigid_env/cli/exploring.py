@@ -15,7 +15,7 @@ from rigid_env.terminal import make_console, progress_bar, say
 
 if TYPE_CHECKING:
     from physics import Scene
-    from rigid_env.demo import Demo
+    from rigid_env.lab.demo import Demo
 
 Duration = Annotated[float, typer.Option(callback=at_least(0), help="Simulated time [s].")]
 Dt = Annotated[float, typer.Option("--dt", help="Step, and time between samples [s].")]
@@ -83,8 +83,8 @@ def _require_pictures() -> None:
 
 def _simulate(name: str, scene: Scene, duration: float, accuracy: str, dt: float, console: Console) -> Demo:
     """Run a scene and print what happened."""
-    from rigid_env.demo import Demo
-    from rigid_env.demo_report import show
+    from rigid_env.lab.demo import Demo
+    from rigid_env.lab.demo_report import show
 
     with console.status("simulating"):
         done = Demo(name, duration, accuracy, scene, dt)
@@ -113,7 +113,7 @@ def replay(
         if not file.is_file():
             raise ValueError(f"file is {str(file)!r}, which does not exist; allowed is a recording (.npz)")
         from physics import Recording
-        from rigid_env.replaying import show, summary
+        from rigid_env.lab.replaying import show, summary
 
         recording = Recording.load(file)
         make_parents(json)
@@ -139,9 +139,9 @@ def explain(
     with told_errors():
         from dataclasses import asdict
 
-        from physics import accuracy as knobs
         from physics import make_plan
-        from rigid_env.plan_report import make_table
+        from physics.plan import accuracy as knobs
+        from rigid_env.lab.plan_report import make_table
 
         settings = knobs.resolve(accuracy)
         _, built = names.load_scene(scene)
@@ -160,7 +160,7 @@ def explain(
 
 def _effect_shares(scene: Scene, duration: float, accuracy: str, console: Console) -> list[dict]:
     """Measure and print what the effects of a scene do in a run; the same for JSON."""
-    from rigid_env.measure import shares
+    from rigid_env.lab.measure import shares
 
     with progress_bar(console, has_thread=False) as progress:
         task = progress.add_task("measuring", total=shares.run_count(scene))
@@ -178,7 +178,7 @@ def _effect_shares(scene: Scene, duration: float, accuracy: str, console: Consol
 def warmup(json: Json = None) -> None:
     """Compile the common plans ahead; what is compiled already takes no time."""
     with told_errors():
-        from rigid_env.warmup import jobs, warm
+        from rigid_env.lab.warmup import jobs, warm
 
         make_parents(json)
         console, todo, done = make_console(), jobs(), []

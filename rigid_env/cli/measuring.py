@@ -27,8 +27,8 @@ def bench(
     """Measure steps per second, beside MuJoCo if it is installed."""
     with told_errors():
         from rigid_env.extras import install_line
-        from rigid_env.measure import environments, mujoco_scene, rows, workloads
-        from rigid_env.measure.table import make_table
+        from rigid_env.lab.measure import environments, mujoco_scene, rows, workloads
+        from rigid_env.lab.measure.table import make_table
 
         make_parents(json)
         console = make_console()
@@ -68,9 +68,9 @@ def effects(
 ) -> None:
     """Measure what each effect costs: steps per second of its scene with it and without."""
     with told_errors():
-        from physics import accuracy as knobs
-        from rigid_env.measure import effects as costs
-        from rigid_env.measure.table import make_table
+        from physics.plan import accuracy as knobs
+        from rigid_env.lab.measure import effects as costs
+        from rigid_env.lab.measure.table import make_table
 
         knobs.resolve(accuracy)
         chosen = costs.chosen(effect or (), markdown)
@@ -115,9 +115,9 @@ def accuracy(
 ) -> None:
     """Show what accuracy costs in time: error against truth and wall-clock time, beside other engines."""
     with told_errors():
-        from rigid_env.measure import accuracy_plot, accuracy_report
-        from rigid_env.measure.accuracy import QUICK, Ladder
-        from rigid_env.measure.plotting import require_matplotlib
+        from rigid_env.lab.measure import accuracy_plot, accuracy_report
+        from rigid_env.lab.measure.accuracy import QUICK, Ladder
+        from rigid_env.lab.measure.plotting import require_matplotlib
 
         if plot:
             require_matplotlib()
@@ -148,13 +148,13 @@ def tosses(
 ) -> None:
     """Replay measured cube tosses: fit a quarter of them, report errors over the rest."""
     with told_errors():
-        from physics import accuracy as knobs
-        from rigid_env.measure.plotting import require_matplotlib
-        from rigid_env.tosses import data as files
-        from rigid_env.tosses import plot as pictures
-        from rigid_env.tosses.fit import QUICK, Effort
-        from rigid_env.tosses.report import Measurement
-        from rigid_env.tosses.show import show
+        from physics.plan import accuracy as knobs
+        from rigid_env.lab.measure.plotting import require_matplotlib
+        from rigid_env.lab.tosses import data as files
+        from rigid_env.lab.tosses import plot as pictures
+        from rigid_env.lab.tosses.fit import QUICK, Effort
+        from rigid_env.lab.tosses.report import Measurement
+        from rigid_env.lab.tosses.show import show
 
         knobs.resolve(accuracy)
         if plot is not None:
@@ -197,7 +197,7 @@ def hard_cases(
 ) -> None:
     """Run the hard cases, each with a known outcome; exit status 1 where one does not hold."""
     with told_errors():
-        from rigid_env.hard_cases.command import run as run_them
+        from rigid_env.lab.hard_cases.command import run as run_them
 
         console, files = make_console(), (json, plot, markdown)
         report, written = run_them(console, cases or (), accuracy, dt, steps, peers, quick, *files)

@@ -74,28 +74,28 @@ def complete_presets(incomplete: str) -> list[str]:
 
 def complete_truth(incomplete: str) -> list[str]:
     """Scenes whose accuracy can be measured."""
-    from rigid_env.measure import accuracy
+    from rigid_env.lab.measure import accuracy
 
     return _starting(incomplete, accuracy.names())
 
 
 def complete_peers(incomplete: str) -> list[str]:
     """Other engines with commas between them."""
-    from rigid_env.measure import peers
+    from rigid_env.lab.measure import peers
 
     return _listed(incomplete, peers.ENGINES)
 
 
 def complete_effect(incomplete: str) -> list[str]:
     """Effects whose cost can be measured."""
-    from rigid_env.measure.effects import CASES
+    from rigid_env.lab.measure.effects import CASES
 
     return _starting(incomplete, CASES)
 
 
 def complete_case(incomplete: str) -> list[str]:
     """Names of hard cases."""
-    from rigid_env.hard_cases import registry
+    from rigid_env.lab.hard_cases import registry
 
     return _starting(incomplete, (case.name for case in registry.CASES))
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 import physics
-from physics import checks
+from physics import validation
 
 LAYOUTS = ("three", "corner")
 
@@ -40,7 +40,7 @@ class Area:
     def __post_init__(self):
         if self.walls not in LAYOUTS:
             raise ValueError(f"walls is {self.walls!r}; allowed are {', '.join(map(repr, LAYOUTS))}")
-        object.__setattr__(self, "half_width", float(checks.positive(self.half_width, (), "half_width")))
+        object.__setattr__(self, "half_width", float(validation.positive(self.half_width, (), "half_width")))
 
     @property
     def half_spaces(self) -> list[physics.HalfSpace]:

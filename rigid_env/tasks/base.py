@@ -11,10 +11,10 @@ import numpy as np
 from gymnasium.utils import seeding
 
 import physics
-from physics import checks
-from physics.machine_code import bound
-from physics.report import gravest
-from physics.threads import listed
+from physics import validation
+from physics.parallel.bound_call import bound
+from physics.parallel.thread_team import listed
+from physics.world.report import gravest
 from rigid_env.tasks import layout as col
 from rigid_env.tasks import start
 from rigid_env.tasks.area import Area
@@ -112,7 +112,7 @@ class Task(ABC):
         self.area = Area(walls, half_width)
         self.parameters = Parameters(mass=mass, size=size, friction=friction, restitution=restitution, gravity=gravity)
         self.area.check_room(self.parameters["size"].high)
-        self.frame_skip = checks.count(frame_skip, "frame_skip")
+        self.frame_skip = validation.count(frame_skip, "frame_skip")
         self.effects = checked_effects(effects, self.parameters.randomised)
         self.world = physics.World(self._scene(), worlds=worlds, dt=dt, accuracy=accuracy, threads=threads)
         self.generators: list[np.random.Generator | None] = [None] * worlds

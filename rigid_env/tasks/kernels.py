@@ -12,10 +12,10 @@ from __future__ import annotations
 
 import math
 
-from physics.kernels import layout as at
-from physics.kernels.compiler import inlined, kernel
-from physics.kernels.quaternion import multiply, to_matrix
-from physics.kernels.turns import FIRST, TAKEN
+from physics.kernels.compile.decorators import inlined, kernel
+from physics.kernels.math.quaternion import multiply, to_matrix
+from physics.kernels.parallel.work_stealing import FIRST, TAKEN
+from physics.kernels.state import layout as at
 from rigid_env.tasks import layout as col
 
 AXES = 6  # of an action: force x, y, z, torque x, y, z
@@ -203,7 +203,7 @@ def observe_reach(taken, state, record, walls, actions, obs, outcome):
     Parameters
     ----------
     taken : (FIRST + n or more,) int64
-        Worlds to look at, listed as in `physics.kernels.turns`; the rest of the outputs is left alone.
+        Worlds to look at, listed as in `physics.kernels.parallel.work_stealing`; the rest of the outputs is left alone.
     state : (worlds, STATE_SIZE) float64
     record : (worlds, RECORD_SIZE) float64, in and out
         POTENTIAL and HOLD are renewed.

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from physics import checks
+from physics import validation
 
 Number = float | tuple[float, float]
 """A value, or a range (low, high) to draw from."""
@@ -15,11 +15,11 @@ Edges = tuple[float, float, float] | tuple[tuple[float, float, float], tuple[flo
 """Edges of the block [m], or a range of them."""
 
 CHECKS = {
-    "mass": checks.positive,
-    "size": checks.positive,
-    "friction": checks.non_negative,
-    "restitution": checks.share,
-    "gravity": checks.positive,
+    "mass": validation.positive,
+    "size": validation.positive,
+    "friction": validation.non_negative,
+    "restitution": validation.share,
+    "gravity": validation.positive,
 }
 """What each parameter may be."""
 

@@ -7,9 +7,9 @@ import reprlib
 import numpy as np
 
 import physics
-from physics.changes import check_depth
-from physics.kernels import layout as at
-from physics.parameters import change_inertia
+from physics.kernels.state import layout as at
+from physics.world.parameters import change_inertia
+from physics.world.setters import check_depth
 from rigid_env.tasks import layout as col
 from rigid_env.tasks.area import Area
 from rigid_env.tasks.kernels import start_poses

@@ -18,8 +18,8 @@ import physics
 from physics import scenes
 from rigid_env.cli import app, files
 from rigid_env.cli.common import INTERRUPTED
-from rigid_env.demo import LARGEST_GIF, Demo
-from rigid_env.measure import effects as costs
+from rigid_env.lab.demo import LARGEST_GIF, Demo
+from rigid_env.lab.measure import effects as costs
 from rigid_env.terminal.console import UNBROKEN
 
 runner = CliRunner()

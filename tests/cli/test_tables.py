@@ -13,21 +13,21 @@ from agents.evaluate import make_table as evaluation_table
 from benchmarks import compile as compiling
 from benchmarks import solvers
 from physics import Frontier, FrontierPoint, scenes
-from rigid_env import plan_report, replaying
-from rigid_env.demo_report import event_table, show
-from rigid_env.hard_cases import registry
-from rigid_env.hard_cases import show as cases
-from rigid_env.hard_cases.case import Check
-from rigid_env.hard_cases.run import Outcome, Status
-from rigid_env.measure import accuracy_table, effects, rows, shares
-from rigid_env.measure.accuracy import Found, Job
-from rigid_env.measure.table import make_table
-from rigid_env.measure.timing import Row, Spread
-from rigid_env.measure.truths import CASES as TRUTHS
+from rigid_env.lab import plan_report, replaying
+from rigid_env.lab.demo_report import event_table, show
+from rigid_env.lab.hard_cases import registry
+from rigid_env.lab.hard_cases import show as cases
+from rigid_env.lab.hard_cases.case import Check
+from rigid_env.lab.hard_cases.run import Outcome, Status
+from rigid_env.lab.measure import accuracy_table, effects, rows, shares
+from rigid_env.lab.measure.accuracy import Found, Job
+from rigid_env.lab.measure.table import make_table
+from rigid_env.lab.measure.timing import Row, Spread
+from rigid_env.lab.measure.truths import CASES as TRUTHS
+from rigid_env.lab.tosses.metric import Summary
+from rigid_env.lab.tosses.show import case_table, ladder_table, limits_table
 from rigid_env.terminal import Table
 from rigid_env.terminal.console import UNBROKEN
-from rigid_env.tosses.metric import Summary
-from rigid_env.tosses.show import case_table, ladder_table, limits_table
 
 WIDTHS = (80, 120, UNBROKEN)
 

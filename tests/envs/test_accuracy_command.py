@@ -12,12 +12,13 @@ from rich.console import Console
 from typer.testing import CliRunner
 
 import physics
-from physics import Frontier, FrontierPoint, frontier_run
+from physics import Frontier, FrontierPoint
+from physics.work_precision import run as frontier_run
 from rigid_env.cli import app
-from rigid_env.measure import accuracy, accuracy_report, peers
-from rigid_env.measure.accuracy import QUICK, Found, Job, Ladder
-from rigid_env.measure.accuracy_table import answers, make_table, summary
-from rigid_env.measure.truths import CASES
+from rigid_env.lab.measure import accuracy, accuracy_report, peers
+from rigid_env.lab.measure.accuracy import QUICK, Found, Job, Ladder
+from rigid_env.lab.measure.accuracy_table import answers, make_table, summary
+from rigid_env.lab.measure.truths import CASES
 
 runner = CliRunner()
 
@@ -210,7 +211,7 @@ def test_an_interrupted_command_writes_what_it_has_and_says_so(tmp_path, monkeyp
 def test_the_plot_has_a_panel_per_scene(tmp_path):
     pytest.importorskip("matplotlib")
     image = pytest.importorskip("PIL.Image")
-    from rigid_env.measure.accuracy_plot import write_plot
+    from rigid_env.lab.measure.accuracy_plot import write_plot
 
     exact = point("rigid-env", "exact", 0.02, 0.0, 50.0)
     results = [found((*POINTS, exact), own_error=1e-9), found(POINTS[:2]), found(POINTS[4:5])]

@@ -35,7 +35,7 @@ def parameters(request):
 @pytest.fixture
 def pair(env_class):
     """(single class, vector class) of one task."""
-    import rigid_env.vector_env as module
+    import rigid_env.envs.vector_env as module
 
     return env_class, getattr(module, env_class.__name__.replace("Env", "VectorEnv"))
 

@@ -10,15 +10,15 @@ import pytest
 from typer.testing import CliRunner
 
 import physics
-import rigid_env.warmup
+import rigid_env.lab.warmup
 from physics import scenes
-from physics.fields import FIELDS
-from physics.kernels.sleep import SLEEP_SIZE
+from physics.kernels.state.sleeping import SLEEP_SIZE
+from physics.scene.force_fields import FIELDS
 from rigid_env.cli import app
-from rigid_env.measure import effects as costs
-from rigid_env.measure.shares import names_of, without
-from rigid_env.picture import stroboscope, without_bodies, world_frame
+from rigid_env.lab.measure import effects as costs
+from rigid_env.lab.measure.shares import names_of, without
 from rigid_env.rendering import Camera
+from rigid_env.rendering.picture import stroboscope, without_bodies, world_frame
 
 runner = CliRunner()
 
@@ -205,7 +205,7 @@ def test_an_effect_is_left_out_with_what_needs_it():
 
 
 def test_warmup_covers_environments_and_scenes_once():
-    found = rigid_env.warmup.jobs()
+    found = rigid_env.lab.warmup.jobs()
     names = [(job.name, job.accuracy) for job in found]
     assert len(set(names)) == len(names)
     for name in ("rigid_env/BlockReach-v0", "rigid_env/BlockReorient-v0"):
@@ -217,9 +217,9 @@ def test_warmup_covers_environments_and_scenes_once():
 
 
 def test_second_warmup_compiles_nothing(tmp_path, monkeypatch):
-    few = [job for job in rigid_env.warmup.jobs() if "scene drop" in job.name and job.accuracy == "balanced"]
+    few = [job for job in rigid_env.lab.warmup.jobs() if "scene drop" in job.name and job.accuracy == "balanced"]
     assert len(few) == 1
-    monkeypatch.setattr(rigid_env.warmup, "jobs", lambda: few)
+    monkeypatch.setattr(rigid_env.lab.warmup, "jobs", lambda: few)
     run("warmup")
     path = tmp_path / "warmup.json"
     output = run("warmup", "--json", path)

@@ -9,8 +9,8 @@ import gymnasium as gym
 import numpy as np
 import pytest
 
-from rigid_env.env import BlockReachEnv
-from rigid_env.registration import MAX_EPISODE_STEPS
+from rigid_env.envs.documentation import BlockReachEnv
+from rigid_env.envs.registration import MAX_EPISODE_STEPS
 from rigid_env.tasks import Task, base, kernels
 
 SECTIONS = [

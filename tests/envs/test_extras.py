@@ -72,16 +72,22 @@ def test_baselines_do_without_the_extra(tmp_path):
 @pytest.mark.parametrize(
     ("names", "code", "message"),
     [
-        (("torch", "stable_baselines3"), "import rigid_env.sb3", "rigid_env.sb3 needs torch and Stable-Baselines3"),
-        (("stable_baselines3",), "import rigid_env.sb3", "rigid_env.sb3 needs Stable-Baselines3, which is not"),
+        (
+            ("torch", "stable_baselines3"), "import rigid_env.envs.sb3",
+            "rigid_env.envs.sb3 needs torch and Stable-Baselines3",
+        ),
+        (
+            ("stable_baselines3",), "import rigid_env.envs.sb3",
+            "rigid_env.envs.sb3 needs Stable-Baselines3, which is not",
+        ),
         (
             ("pygame",),
-            "import rigid_env.env as e; e.BlockReachEnv(render_mode='rgb_array')",
+            "import rigid_env.envs.documentation as e; e.BlockReachEnv(render_mode='rgb_array')",
             "rendering needs pygame, which is not",
         ),
         (
             ("PIL",),
-            "import numpy, rigid_env.picture as p; p.write_png('a.png', numpy.zeros((4, 4, 3), 'uint8'))",
+            "import numpy, rigid_env.rendering.picture as p; p.write_png('a.png', numpy.zeros((4, 4, 3), 'uint8'))",
             "writing pictures needs Pillow, which is not",
         ),
     ],

@@ -8,11 +8,11 @@ import pytest
 from typer.testing import CliRunner
 
 from rigid_env.cli import app
-from rigid_env.hard_cases import page, registry, report
-from rigid_env.hard_cases.case import Case, Check, Setting, UnsupportedError
-from rigid_env.hard_cases.peers import run_peer
-from rigid_env.hard_cases.run import Outcome, Status, run_case
-from rigid_env.measure.peers import load
+from rigid_env.lab.hard_cases import page, registry, report
+from rigid_env.lab.hard_cases.case import Case, Check, Setting, UnsupportedError
+from rigid_env.lab.hard_cases.peers import run_peer
+from rigid_env.lab.hard_cases.run import Outcome, Status, run_case
+from rigid_env.lab.measure.peers import load
 
 runner = CliRunner()
 

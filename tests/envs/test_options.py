@@ -12,7 +12,7 @@ import pytest
 from gymnasium.vector import AsyncVectorEnv, SyncVectorEnv
 
 import physics
-from physics.kernels import layout as at
+from physics.kernels.state import layout as at
 from rigid_env import BlockReachEnv, BlockReachVectorEnv, BlockReorientEnv, BlockReorientVectorEnv
 from tests.envs.conftest import random_actions
 from tests.wrong_input.environments import state_of

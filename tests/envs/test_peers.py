@@ -10,10 +10,10 @@ import pytest
 
 import physics
 from physics import scenes
-from physics.frontier_contender import TooSlow
-from rigid_env.measure import peers
-from rigid_env.measure.peers import PeerContender, Unsupported, contender
-from rigid_env.measure.peers.contender import friction, gravity, restitution, walls
+from physics.work_precision.contender import TooSlow
+from rigid_env.lab.measure import peers
+from rigid_env.lab.measure.peers import PeerContender, Unsupported, contender
+from rigid_env.lab.measure.peers.contender import friction, gravity, restitution, walls
 
 G = 9.81
 
@@ -147,7 +147,7 @@ def test_pybullet_bounces():
 
 def test_drakes_dissipation_gives_the_restitution_of_the_first_impact():
     pytest.importorskip("pydrake")
-    from rigid_env.measure.peers.drake import dissipation
+    from rigid_env.lab.measure.peers.drake import dissipation
 
     d = dissipation(scenes.bounce(1.0, 0.5))
     s = d * math.sqrt(2 * G)
@@ -175,7 +175,7 @@ def test_drakes_dissipation_gives_the_restitution_of_the_first_impact():
 )
 def test_drake_has_no_restitution_at_many_speeds(scene):
     pytest.importorskip("pydrake")
-    from rigid_env.measure.peers.drake import dissipation
+    from rigid_env.lab.measure.peers.drake import dissipation
 
     if restitution(scene) == 1.0:
         assert dissipation(scene) == 0.0

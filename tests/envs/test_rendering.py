@@ -11,13 +11,13 @@ import numpy as np
 import pytest
 
 import physics
-from rigid_env.picture import without_bodies, world_frame
 from rigid_env.rendering import BodyView, Camera, Frame, GoalView, Renderer, WallView, palette
 from rigid_env.rendering.camera import NEAR, fit_camera
 from rigid_env.rendering.geometry import clip_polygon, convex_hull, plane_axes, rotation_matrix
 from rigid_env.rendering.layout import faces_point, make_room
 from rigid_env.rendering.meshes import block_mesh, body_mesh, ellipsoid_mesh
 from rigid_env.rendering.overlays import hidden_points
+from rigid_env.rendering.picture import without_bodies, world_frame
 from rigid_env.rendering.shadows import fall, outline
 
 pytest.importorskip("pygame")

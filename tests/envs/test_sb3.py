@@ -7,7 +7,7 @@ import warnings
 import numpy as np
 import pytest
 
-from rigid_env.vector_env import BlockReachVectorEnv
+from rigid_env.envs.vector_env import BlockReachVectorEnv
 
 pytest.importorskip("stable_baselines3")
 
@@ -16,7 +16,7 @@ from stable_baselines3.common.evaluation import evaluate_policy
 from stable_baselines3.common.monitor import Monitor
 from stable_baselines3.common.vec_env import VecCheckNan, VecMonitor, VecNormalize
 
-from rigid_env.sb3 import RigidVecEnv
+from rigid_env.envs.sb3 import RigidVecEnv
 from tests.envs.conftest import push, random_actions
 
 

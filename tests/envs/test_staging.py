@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 import physics
-from rigid_env.picture import world_frame
 from rigid_env.rendering import Renderer
 from rigid_env.rendering.geometry import rotation_matrix
-from rigid_env.staging import DRAWN_SIZE, MOST_ARROWS, Stage
+from rigid_env.rendering.picture import world_frame
+from rigid_env.rendering.staging import DRAWN_SIZE, MOST_ARROWS, Stage
 
 UPS = [(0, 1, 0), (0, 0, 1), (1, 0, 0), (-1, 0, 0), (0, -1, 0), (0, 0, -1)]
 

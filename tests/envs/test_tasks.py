@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 
 import physics
-from rigid_env.env import BlockReachEnv, BlockReorientEnv
+from rigid_env.envs.documentation import BlockReachEnv, BlockReorientEnv
+from rigid_env.envs.vector_env import BlockReachVectorEnv, BlockReorientVectorEnv
 from rigid_env.tasks import base, kernels
 from rigid_env.tasks import layout as col
-from rigid_env.vector_env import BlockReachVectorEnv, BlockReorientVectorEnv
 from tests.envs.conftest import push, random_actions
 
 FACE_NORMALS = np.array([[-1, 0, 0], [1, 0, 0], [0, -1, 0], [0, 1, 0], [0, 0, -1], [0, 0, 1]], dtype=float)
@@ -184,7 +184,7 @@ def test_randomised_parameters_stay_in_their_ranges_and_fill_them(vector_class):
     envs = vector_class(200, size=((2.0, 2.0, 1.0), (5.0, 2.0, 4.0)), **ranges)
     envs.reset(seed=0)
     p, gravity = envs.task.world.params, envs.task.world.gravity
-    at = physics.kernels.layout
+    at = physics.kernels.state.layout
     values = {
         "mass": 1.0 / p[:, at.INV_MASS],
         "friction": p[:, at.FRICTION],
@@ -295,8 +295,8 @@ def test_a_physics_fault_is_told():
     envs.reset(seed=0)
     still = np.zeros((2, 6))
     assert env.step(still[0])[4]["physics_status"] == physics.Status.OK
-    env.task.world.state[0, physics.kernels.layout.LINVEL] = np.inf
-    envs.task.world.state[1, physics.kernels.layout.LINVEL] = np.inf
+    env.task.world.state[0, physics.kernels.state.layout.LINVEL] = np.inf
+    envs.task.world.state[1, physics.kernels.state.layout.LINVEL] = np.inf
     assert env.step(still[0])[4]["physics_status"] == physics.Status.FAULT
     assert envs.step(still)[4]["physics_status"].tolist() == [physics.Status.OK, physics.Status.FAULT]
     assert env.reset()[1]["physics_status"] == physics.Status.OK

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 import physics
-from physics.frontier_contender import EngineContender
-from rigid_env.measure import truths
+from physics.work_precision.contender import EngineContender
+from rigid_env.lab.measure import truths
 
 CASES = {case.key: case for case in truths.CASES}
 G = truths.G

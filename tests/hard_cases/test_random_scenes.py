@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import physics
-from rigid_env.hard_cases import random_scenes
+from rigid_env.lab.hard_cases.cases import random_scenes
 
 # Family, worlds, seed, accuracy: before resting stages, places put right and failed solves were kept from giving energy
 # (decision 14), 1, 3 and 2 worlds of ellipsoids broke a law in these, 5, 7 and 5 of several bodies, and 2, 1 and 1 of
@@ -37,7 +37,8 @@ def test_what_is_deep_in_a_wall_is_taken_out_under_any_load():
     wrench = np.zeros((1, 2, 6))
     wrench[0, 0, 1] = -1e6 * 9.81
     world.step(wrench)
-    # Out to a hundred slops (`apart.DEEP`) of a bounding radius of 0.87 m; halves of what is left are taken per step.
+    # Out to a hundred slops (`position_correction.DEEP`) of a bounding radius of 0.87 m; halves of what is left are
+    # taken per step.
     assert physics.diagnose(world).gap[0, 0] >= -100 * 1e-6 * 0.87
     assert np.abs(world.linvel[0, 0]).max() <= 1e-6 * 1e6 * 9.81 * 0.01  # the tolerance, of the speed its loads give
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from physics.kernels.compiler import _make
+from physics.kernels.compile.decorators import _make
 
 
 def anew(kernel):

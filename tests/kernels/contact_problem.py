@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from physics.kernels.laws import ANISOTROPY, DAMPING, STIFFNESS
-from physics.kernels.quaternion import to_matrix
-from physics.kernels.solve import solve_contacts
-from physics.kernels.workspace import make_workspace
+from physics.kernels.contact_solver.solve import solve_contacts
+from physics.kernels.math.quaternion import to_matrix
+from physics.kernels.state.contact_law_dispatch import ANISOTROPY, DAMPING, STIFFNESS
+from physics.kernels.time_stepping.workspace import make_workspace
 
 SIZE = np.array([2.5, 1.5, 1.0])
 MASS = 6.0
@@ -81,7 +81,7 @@ class Problem:
         return W, J @ twist - self.one["target"][:n].ravel()
 
     def residual(self, p):
-        """Natural-map residual of impulses (n, 3), see `physics.kernels.sweeps`, in plain NumPy: relative."""
+        """Natural-map residual of impulses (n, 3), see `contact_solver.gauss_seidel`, in plain NumPy: relative."""
         W, b = self.matrices()
         u, worst = (W @ p.ravel() + b).reshape(-1, 3), 0.0
         for i, (pn, *pt) in enumerate(p):

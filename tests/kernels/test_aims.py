@@ -1,4 +1,4 @@
-"""Targets of resting contacts: the formulas of `aims`, one contact after the other in plain NumPy."""
+"""Targets of resting contacts: the formulas of `target_velocity`, one contact after the other in plain NumPy."""
 
 from __future__ import annotations
 
@@ -7,11 +7,20 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from physics.kernels.aims import CLOSING_SHARE, HIT, NOTHING, RESIDUE, UNSEEN, aim_impact, aim_rest, may_hit
-from physics.kernels.compiler import kernel
-from physics.kernels.held import MEMORY_HEAD
-from physics.kernels.stages import memory_size
-from physics.kernels.workspace import make_workspace
+from physics.kernels.compile.decorators import kernel
+from physics.kernels.contact_law.target_velocity import (
+    CLOSING_SHARE,
+    HIT,
+    NOTHING,
+    RESIDUE,
+    UNSEEN,
+    aim_impact,
+    aim_rest,
+    may_hit,
+)
+from physics.kernels.half_space.persistent_contacts import MEMORY_HEAD
+from physics.kernels.time_stepping.contact_stages import memory_size
+from physics.kernels.time_stepping.workspace import make_workspace
 from tests.kernels.contact_problem import FLOOR, SIDE
 
 EPS = np.finfo(float).eps

@@ -5,31 +5,51 @@ from __future__ import annotations
 
 import json
 import os
+import shutil
 import subprocess
 import sys
 from pathlib import Path
 
 import pytest
 
-from physics.kernels import compiler
+import physics
+from physics.kernels.compile import decorators
 
 
 def test_digest_changes_with_any_edit_and_any_rename(tmp_path: Path):
     (tmp_path / "a.py").write_text("x = 1\n")
     (tmp_path / "sub").mkdir()
     (tmp_path / "sub" / "b.py").write_text("y = 2\n")
-    first = compiler.source_digest(tmp_path)
-    assert compiler.source_digest(tmp_path) == first
+    first = decorators.source_digest(tmp_path)
+    assert decorators.source_digest(tmp_path) == first
     (tmp_path / "sub" / "b.py").write_text("y = 3\n")
-    second = compiler.source_digest(tmp_path)
+    second = decorators.source_digest(tmp_path)
     (tmp_path / "sub" / "b.py").rename(tmp_path / "sub" / "c.py")
-    third = compiler.source_digest(tmp_path)
+    third = decorators.source_digest(tmp_path)
     assert len({first, second, third}) == 3
+
+
+def test_an_edit_of_any_kernel_makes_other_machine_code(tmp_path: Path):
+    """Kernels stand in many folders, and none of them holds the decorators."""
+    shutil.copytree(Path(physics.__file__).parent, tmp_path / "physics", ignore=shutil.ignore_patterns("__pycache__"))
+    program = "from physics.kernels.compile.decorators import folder_name; print(folder_name())"
+
+    def name() -> str:
+        environment = {**os.environ, "PYTHONPATH": str(tmp_path)}
+        command = [sys.executable, "-c", program]
+        return subprocess.run(command, env=environment, cwd=tmp_path, capture_output=True, text=True, check=True).stdout
+
+    names = [name()]
+    for edited in ("flight/free_flight.py", "multibody/solver/solve.py"):
+        path = tmp_path / "physics" / "kernels" / edited
+        path.write_text(path.read_text(encoding="utf-8") + "# edited\n", encoding="utf-8")
+        names.append(name())
+    assert len(set(names)) == 3
 
 
 PROGRAM = """
 import json, physics
-from physics.kernels.step import step_worlds
+from physics.kernels.time_stepping.step import step_worlds
 world = physics.World(physics.Scene([physics.Block((5, 3, 2), 6.0, angvel=(1, 2, 3))]), dt=0.01)
 world.step()
 stats = step_worlds.stats
@@ -58,4 +78,4 @@ def test_a_second_process_compiles_nothing_and_gets_the_same_bits(tmp_path: Path
     assert (second["hits"], second["misses"]) == (1, 0)
     assert first["q"] == second["q"]
     folders = {path.relative_to(tmp_path).parts[0] for path in tmp_path.rglob("*.nbc")}
-    assert folders == {compiler.cache_dir().name}
+    assert folders == {decorators.cache_dir().name}

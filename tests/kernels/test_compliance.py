@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from physics.kernels.solve import PIVOTING
+from physics.kernels.contact_solver.solve import PIVOTING
 from tests.kernels.contact_problem import FACE, Problem
 from tests.kernels.test_direct import FALL, floor, law_defect
 

@@ -9,12 +9,18 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from physics.kernels.compiler import kernel
-from physics.kernels.contact import TOGETHER, gather
-from physics.kernels.layout import BLOCK, ELLIPSOID
-from physics.kernels.quaternion import to_matrix
-from physics.kernels.stages import CONTACT_COUNT, MEMORY_HEAD, load_warm_start, memory_size, store_warm_start
-from physics.kernels.workspace import make_workspace
+from physics.kernels.compile.decorators import kernel
+from physics.kernels.half_space.contact_set import TOGETHER, gather
+from physics.kernels.math.quaternion import to_matrix
+from physics.kernels.state.layout import BLOCK, ELLIPSOID
+from physics.kernels.time_stepping.contact_stages import (
+    CONTACT_COUNT,
+    MEMORY_HEAD,
+    load_warm_start,
+    memory_size,
+    store_warm_start,
+)
+from physics.kernels.time_stepping.workspace import make_workspace
 from tests.kernels.contact_problem import FLOOR, SIDE, SIZE
 
 SLOP, H, FEATURES = 1e-3, 0.01, 8

@@ -1,8 +1,8 @@
 """Nobody is forgotten, and nothing is done twice, however threads come and go.
 
 The order in which the threads of a crew look at what a member is, and change it, is up to chance. A model of it, one
-line for each such look or change of `physics.kernels.crew`, goes through all orders; the kernels themselves go through
-thousands of runs in which members go at about the time when they are called.
+line for each such look or change of `physics.kernels.parallel.spin_wait_workers`, goes through all orders; the kernels
+themselves go through thousands of runs in which members go at about the time when they are called.
 """
 
 from __future__ import annotations
@@ -13,13 +13,13 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
-from physics import processors, threads
-from physics.kernels.atomic import ask, pause
-from physics.kernels.compiler import kernel
-from physics.kernels.crew import AWAY, BUSY, CALLED, LEAVING, WAITING
-from physics.kernels.turns import TAKEN, begin, next_world
-from physics.machine_code import bound
-from physics.threads import Team
+from physics.kernels.compile.decorators import kernel
+from physics.kernels.parallel.atomics import ask, pause
+from physics.kernels.parallel.spin_wait_workers import AWAY, BUSY, CALLED, LEAVING, WAITING
+from physics.kernels.parallel.work_stealing import TAKEN, begin, next_world
+from physics.parallel import processors, thread_team
+from physics.parallel.bound_call import bound
+from physics.parallel.thread_team import Team
 
 RUNS = 3
 
@@ -33,7 +33,7 @@ class Moment(NamedTuple):
     run: int = 0
     leader: str = "begin"
     is_interrupted: bool = False
-    threads: tuple[str, ...] = ()
+    thread_team: tuple[str, ...] = ()
 
 
 def of_leader(m: Moment) -> list[Moment]:
@@ -134,9 +134,9 @@ def visit(visits, turns, taken, k, pauses):
 @pytest.mark.parametrize("size", [2, 4])
 def test_many_runs(size, patience, stay, gives_way, monkeypatch):
     """4,000 runs; the mistakes that were made in it showed after some thousands."""
-    monkeypatch.setattr(threads, "PATIENCE", patience)
-    monkeypatch.setattr(threads, "STAY", stay)
-    monkeypatch.setattr(threads, "BETWEEN", 1e-6)
+    monkeypatch.setattr(thread_team, "PATIENCE", patience)
+    monkeypatch.setattr(thread_team, "STAY", stay)
+    monkeypatch.setattr(thread_team, "BETWEEN", 1e-6)
     monkeypatch.setattr(processors, "usable", lambda: size)
     if not gives_way:
         monkeypatch.setattr(processors, "giving_way", lambda: 0)
@@ -167,7 +167,7 @@ def test_asking_the_system():
 def test_a_member_on_the_processor_of_the_leader_does_not_begin(monkeypatch):
     """The leader makes all steps if all threads have the same processor."""
     monkeypatch.setattr(processors, "usable", lambda: 2)
-    monkeypatch.setattr(threads, "STAY", 10.0)
+    monkeypatch.setattr(thread_team, "STAY", 10.0)
     before = os.sched_getaffinity(0)
     os.sched_setaffinity(0, {min(before)})
     try:

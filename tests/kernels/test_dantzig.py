@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from physics.kernels.complementarity import BAD_DATA, PIVOT_LIMIT, RAY, SOLVED
-from physics.kernels.dantzig import dantzig, dantzig_sizes
+from physics.kernels.lcp.dantzig import dantzig, dantzig_sizes
+from physics.kernels.lcp.scaling_and_certificate import BAD_DATA, PIVOT_LIMIT, RAY, SOLVED
 from tests.reference.lcp import enumerate_solutions
 
 EPS = np.finfo(float).eps

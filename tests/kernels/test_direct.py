@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from physics.kernels.slide import HOLD, SLIDE
-from physics.kernels.solve import DIRECT, PIVOTING
+from physics.kernels.contact_solver.sliding_patch import HOLD, SLIDE
+from physics.kernels.contact_solver.solve import DIRECT, PIVOTING
 from tests.kernels.contact_problem import FACE, INERTIA, MASS, SIZE, Problem
 from tests.reference.lcp import coulomb_defect, solve_coulomb
 

@@ -14,13 +14,13 @@ from pathlib import Path
 
 import pytest
 
-from physics.kernels.codegen import disk
+from physics.kernels.compile.fused import cache_files
 
 ROOT = str(Path(__file__).parents[2])
 
 PROGRAM = """
 import physics
-from physics.kernels.step import step_worlds
+from physics.kernels.time_stepping.step import step_worlds
 world = physics.World(physics.Scene([physics.Sphere(0.5, mass=1.0, linvel=(1, 2, 3))]), dt=0.01, accuracy="fast")
 world.step(steps=3)
 print(world.state.tobytes().hex(), sum(step_worlds.stats.cache_hits.values()))
@@ -117,8 +117,8 @@ def test_what_cannot_be_unpickled_is_damaged_too(kept, tmp_path, monkeypatch):
     shutil.copytree(folder, cache)
     path = step_file(cache)
     program = (
-        "import physics\nfrom physics.kernels.codegen import keeping\n"
-        f"keeping.dumps = lambda value: {pickle.dumps(Gone()).replace(b'Gone', b'Lost')!r}\n"
+        "import physics\nfrom physics.kernels.compile.fused import disk_cache\n"
+        f"disk_cache.dumps = lambda value: {pickle.dumps(Gone()).replace(b'Gone', b'Lost')!r}\n"
     )
     path.unlink()
     command, environment = command_and_environment(cache)
@@ -139,19 +139,19 @@ def test_a_file_that_others_may_write_is_not_unpickled(tmp_path):
             return os.mkdir, (str(tmp_path / "ran"),)
 
     path = tmp_path / "file.nbc"
-    disk.write(path, b"purpose", pickle.dumps([1]))
-    assert path.stat().st_mode & 0o777 & disk.OTHERS_WRITE == 0
-    assert disk.read(path, b"purpose") == [1]
-    disk.write(path, b"purpose", pickle.dumps(Evil()))
+    cache_files.write(path, b"purpose", pickle.dumps([1]))
+    assert path.stat().st_mode & 0o777 & cache_files.OTHERS_WRITE == 0
+    assert cache_files.read(path, b"purpose") == [1]
+    cache_files.write(path, b"purpose", pickle.dumps(Evil()))
     for mode in (0o664, 0o646):
         path.chmod(mode)
-        with pytest.raises(disk.Foreign):
-            disk.read(path, b"purpose")
+        with pytest.raises(cache_files.Foreign):
+            cache_files.read(path, b"purpose")
     path.chmod(0o644)
     if os.getuid() == 0:
         os.chown(path, 12345, -1)
-        with pytest.raises(disk.Foreign):
-            disk.read(path, b"purpose")
+        with pytest.raises(cache_files.Foreign):
+            cache_files.read(path, b"purpose")
     assert not (tmp_path / "ran").exists()
 
 
@@ -159,16 +159,16 @@ def test_a_file_that_others_may_write_is_not_unpickled(tmp_path):
 def test_files_are_nobody_elses_under_any_umask(umask, tmp_path):
     before = os.umask(umask)
     try:
-        disk.write(tmp_path / "folder" / "file.nbc", b"", pickle.dumps(3))
+        cache_files.write(tmp_path / "folder" / "file.nbc", b"", pickle.dumps(3))
     finally:
         os.umask(before)
-    assert disk.read(tmp_path / "folder" / "file.nbc", b"") == 3
+    assert cache_files.read(tmp_path / "folder" / "file.nbc", b"") == 3
 
 
 def test_a_file_for_another_purpose_is_damaged(tmp_path):
-    disk.write(tmp_path / "file", b"one", pickle.dumps(1))
-    with pytest.raises(disk.Damaged):
-        disk.read(tmp_path / "file", b"other")
+    cache_files.write(tmp_path / "file", b"one", pickle.dumps(1))
+    with pytest.raises(cache_files.Damaged):
+        cache_files.read(tmp_path / "file", b"other")
 
 
 def test_what_others_may_write_costs_a_compilation_and_a_line(kept, tmp_path):

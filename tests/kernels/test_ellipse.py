@@ -7,8 +7,8 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from physics.kernels.slide import HOLD, SLIDE
-from physics.kernels.solve import DIRECT, PIVOTING
+from physics.kernels.contact_solver.sliding_patch import HOLD, SLIDE
+from physics.kernels.contact_solver.solve import DIRECT, PIVOTING
 from tests.kernels.contact_problem import FACE, Problem
 from tests.kernels.test_direct import FALL, floor
 
@@ -58,7 +58,7 @@ def test_impulses_dissipate_most(contacts, motion, mu, ratio, mode):
 
 @pytest.mark.parametrize("ratio", [0.3, 1.0, 2.5])
 def test_a_shoved_face_is_solved_directly(ratio):
-    """The stretched frame of a wall leaves `slide`, `pair` and `pivot` as quick as on an even one."""
+    """The stretched frame of a wall leaves `sliding_patch`, `two_contacts` and `pivot` as quick as on an even one."""
     rng = np.random.default_rng(5)
     direct = 0
     for _ in range(400):

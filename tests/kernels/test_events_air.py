@@ -13,7 +13,7 @@ from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
 
 import physics
-from physics.kernels.events.air import parabola_root, safe_time, third_bound
+from physics.kernels.event_driven.time_of_impact import parabola_root, safe_time, third_bound
 
 EPS = np.finfo(float).eps
 

@@ -8,9 +8,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.linalg import expm
 
-from physics.kernels.arms import arm_and_rate
-from physics.kernels.events.linear import PIVOT_SHARE, eliminate, solve_least
-from physics.kernels.layout import BLOCK, ELLIPSOID, SPHERE
+from physics.kernels.half_space.contact_point import arm_and_rate
+from physics.kernels.math.full_pivot_solve import PIVOT_SHARE, eliminate, solve_least
+from physics.kernels.state.layout import BLOCK, ELLIPSOID, SPHERE
 
 EPS = np.finfo(float).eps
 

@@ -7,9 +7,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from physics.kernels.events.motion import make_motion
-from physics.kernels.events.unknowns import solve_unknowns
-from physics.kernels.layout import VERTEX_COUNT
+from physics.kernels.event_driven.force_system import solve_unknowns
+from physics.kernels.event_driven.workspace import make_motion
+from physics.kernels.state.layout import VERTEX_COUNT
 
 EPS = np.finfo(float).eps
 WORK = np.dtype([("mass", float), ("J", float, (3,))])

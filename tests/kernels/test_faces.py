@@ -7,11 +7,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from physics.kernels.columns import present
-from physics.kernels.compiler import kernel
-from physics.kernels.patch import cold_motion, place_patch
-from physics.kernels.slide import HOLD, SLIDE
-from physics.kernels.solve import DIRECT
+from physics.kernels.compile.decorators import kernel
+from physics.kernels.contact_solver.patch_algebra import cold_motion, place_patch
+from physics.kernels.contact_solver.sliding_patch import HOLD, SLIDE
+from physics.kernels.contact_solver.solve import DIRECT
+from physics.kernels.math.simd_gather import present
 from tests.kernels.contact_problem import FACE, MASS, Problem
 from tests.kernels.test_direct import FALL, assert_solved, floor, law_defect
 
@@ -133,7 +133,7 @@ def test_eight_contacts_of_one_wall_are_solved_by_sweeps(mode):
 
 @kernel
 def begun(n, mu, u, w, inv_mass, K, work):
-    """Start of a face under new loads (`patch.cold_motion`), on the wall whose axes are x, y, z."""
+    """Start of a face under new loads (`patch_algebra.cold_motion`), on the wall whose axes are x, y, z."""
     axes = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
     return cold_motion(n, place_patch(n, axes, inv_mass, K, work), present(n), mu, u, w, inv_mass, K)
 

@@ -11,11 +11,11 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 import physics
-from physics import parameters
-from physics.kernels.many.arrays import CONTACTS, make_many
-from physics.kernels.many.hulls import CUBE, make_hulls
-from physics.kernels.many.touch import find_contacts
-from physics.plan import SHAPE_CODES
+from physics.kernels.multibody.data.arrays import CONTACTS, make_many
+from physics.kernels.multibody.data.hull_tables import CUBE, make_hulls
+from physics.kernels.multibody.narrowphase.dispatch import find_contacts
+from physics.plan.plan import SHAPE_CODES
+from physics.world import parameters
 from tests.reference import polyhedra, separation
 
 SETTINGS = {"relative_slop": 1e-6, "tolerance": 1e-6, "sweeps": 100, "splits": 8, "rest_share": 0.5}

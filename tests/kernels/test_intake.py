@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from physics.kernels.intake import take_in
+from physics.kernels.state.copy_if_finite import take_in
 
 # Signed zero, the smallest and the largest numbers: all finite, and x - x is 0 for each.
 KINDS = np.array([0.0, -0.0, 5e-324, -1.7e308, 1.7e308, 1.0])

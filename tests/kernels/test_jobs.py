@@ -8,8 +8,8 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
-from physics.kernels.compiler import kernel
-from physics.machine_code import Work, bound
+from physics.kernels.compile.decorators import kernel
+from physics.parallel.bound_call import Work, bound
 
 
 class Pair(NamedTuple):

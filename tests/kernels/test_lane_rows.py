@@ -1,12 +1,12 @@
-"""Lanes (`physics.kernels.lanes`) as they are compiled against what they mean in plain Python: the same bits."""
+"""Lanes (`physics.kernels.compile.simd`) as they are compiled against what they mean in plain Python: the same bits."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
 
-from physics.kernels.compiler import kernel
-from physics.kernels.lanes import put_row, root, row, total, totals
+from physics.kernels.compile.decorators import kernel
+from physics.kernels.compile.simd import put_row, root, row, total, totals
 
 
 @kernel

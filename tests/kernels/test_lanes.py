@@ -10,9 +10,9 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from physics.kernels import columns
-from physics.kernels.compiler import inlined, kernel
-from physics.kernels.lanes import Lanes, chosen, first_of, larger, largest, least, root, smaller, total
+from physics.kernels.compile.decorators import inlined, kernel
+from physics.kernels.compile.simd import Lanes, chosen, first_of, larger, largest, least, root, smaller, total
+from physics.kernels.math import simd_gather
 
 FOUR = st.tuples(*[st.floats(width=64, allow_subnormal=False)] * 4)
 NAN, INF = math.nan, math.inf
@@ -114,10 +114,10 @@ def test_of_numbers_they_are_what_they_are_of_lanes(a, b, s):
 @kernel
 def copy_columns(table, first, last, out):
     """Columns of some contacts, doubled, to another table."""
-    x = columns.column_from(table, 0, first, last)
-    y = columns.column_from(table, 1, first, last)
-    z = columns.column_from(table, 2, first, last)
-    columns.put_columns(out, first, last, 2.0 * x, 2.0 * y, 2.0 * z)
+    x = simd_gather.column_from(table, 0, first, last)
+    y = simd_gather.column_from(table, 1, first, last)
+    z = simd_gather.column_from(table, 2, first, last)
+    simd_gather.put_columns(out, first, last, 2.0 * x, 2.0 * y, 2.0 * z)
 
 
 @pytest.mark.parametrize(("first", "last"), [(0, 0), (2, 2), (1, 2), (0, 2), (3, 5), (1, 4), (4, 7)])
@@ -134,11 +134,11 @@ def put(values, table, thirds, n, out):
     """Put n contacts into rows with `columns`: six rows of four."""
     for row, z in enumerate(
         (
-            columns.numbers(values, n),
-            columns.column(table, 1, n),
-            columns.part(thirds, 2, n),
-            columns.present(n),
-            chosen(columns.lane(n - 1), 1.0, 0.0),
+            simd_gather.numbers(values, n),
+            simd_gather.column(table, 1, n),
+            simd_gather.part(thirds, 2, n),
+            simd_gather.present(n),
+            chosen(simd_gather.lane(n - 1), 1.0, 0.0),
         )
     ):
         for k in range(4):

@@ -10,8 +10,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.optimize import linprog
 
-from physics.kernels.complementarity import BAD_DATA, PIVOT_LIMIT, RAY, SOLVED
-from physics.kernels.lemke import lemke, lemke_sizes
+from physics.kernels.lcp.lemke import lemke, lemke_sizes
+from physics.kernels.lcp.scaling_and_certificate import BAD_DATA, PIVOT_LIMIT, RAY, SOLVED
 from tests.reference.lcp import enumerate_solutions
 
 

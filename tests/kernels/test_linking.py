@@ -14,7 +14,7 @@ from pathlib import Path
 import pytest
 from numba.core.codegen import JITCodeLibrary
 
-from physics.kernels.compiler import composed, inlined, kernel, standing
+from physics.kernels.compile.decorators import composed, inlined, kernel, standing
 from tests.kernels.anew import anew
 
 
@@ -122,7 +122,7 @@ from numba.core.codegen import JITCodeLibrary
 import numpy as np
 import physics
 from physics import scenes
-from physics.kernels.codegen.calls import MayRaise
+from physics.kernels.compile.fused.calling_convention import MayRaise
 
 optimised, lowered, statuses = collections.Counter(), collections.Counter(), []
 MayRaise.__init__ = lambda self, name: statuses.append(name)
@@ -189,7 +189,7 @@ def test_a_contact_plan_is_optimised_once_and_compiled_once_for_all_processes(tm
 STANDING = """
 import collections, sys
 from numba.core.codegen import JITCodeLibrary
-from physics.kernels.compiler import kernel, standing
+from physics.kernels.compile.decorators import kernel, standing
 
 optimised, optimise = collections.Counter(), JITCodeLibrary._optimize_final_module
 
@@ -267,7 +267,7 @@ def test_nothing_of_what_stands_is_in_what_calls_it():
 RECORDS = """
 import sys
 import numpy as np
-from physics.kernels.compiler import kernel
+from physics.kernels.compile.decorators import kernel
 
 @kernel
 def total(row):

@@ -12,16 +12,16 @@ from hypothesis import strategies as st
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import connected_components
 
-from physics.kernels import layout as at
-from physics.kernels.compiler import kernel
-from physics.kernels.many import blocks as blocks_of
-from physics.kernels.many import bundles, cone, system
-from physics.kernels.many.arrays import BUNDLES, CONTACTS, LEFT_OUT, PAIRS, make_many
-from physics.kernels.many.block_axes import FLAT
-from physics.kernels.many.elimination import order_bodies
-from physics.kernels.many.islands import find_islands
-from physics.kernels.many.near import find_pairs
-from physics.kernels.many.touch import find_contacts
+from physics.kernels.compile.decorators import kernel
+from physics.kernels.multibody.broadphase.sweep_and_prune import find_pairs
+from physics.kernels.multibody.data.arrays import BUNDLES, CONTACTS, LEFT_OUT, PAIRS, make_many
+from physics.kernels.multibody.narrowphase.box_sat import FLAT
+from physics.kernels.multibody.narrowphase.dispatch import find_contacts
+from physics.kernels.multibody.solver import block_lu as blocks_of
+from physics.kernels.multibody.solver import contact_batches, newton_system, second_order_cone
+from physics.kernels.multibody.solver.islands import find_islands
+from physics.kernels.multibody.solver.minimum_degree import order_bodies
+from physics.kernels.state import layout as at
 
 SETTINGS = {"relative_slop": 1e-6, "tolerance": 1e-6, "sweeps": 100, "splits": 8, "rest_share": 0.5}
 
@@ -254,7 +254,7 @@ def test_faces_that_end_together_touch_all_over(yaw, shift):
 
 
 def numbers_of(block):
-    """The numbers of a 6 x 6 block as `blocks` has them: column by column, one unused after each three."""
+    """The numbers of a 6 x 6 block as `block_lu` has them: column by column, one unused after each three."""
     return np.pad(block.T.reshape(6, 2, 3), ((0, 0), (0, 0), (0, 1))).ravel()
 
 
@@ -369,8 +369,12 @@ def test_a_block_is_inverted(kind):
 def add_bundles(rho, D, E, F, many):
     """`add_bundle` of all bundles; D, E, F: three numbers of each contact, its matrix."""
     for g in range(many.counts[BUNDLES]):
-        x, y, z = bundles.gather(g, D, many), bundles.gather(g, E, many), bundles.gather(g, F, many)
-        system.add_bundle(g, (x[0], x[1], x[2], y[0], y[1], y[2], z[0], z[1], z[2]), rho, many)
+        x, y, z = (
+            contact_batches.gather(g, D, many),
+            contact_batches.gather(g, E, many),
+            contact_batches.gather(g, F, many),
+        )
+        newton_system.add_bundle(g, (x[0], x[1], x[2], y[0], y[1], y[2], z[0], z[1], z[2]), rho, many)
 
 
 @pytest.mark.parametrize("contacts", [1, 3, 4, 6])
@@ -391,7 +395,7 @@ def test_the_matrix_is_that_of_the_contacts(count, links, contacts):
         many.turning[b] = K[np.triu_indices(3)]
         M[6 * b : 6 * b + 3, 6 * b : 6 * b + 3] = many.lightness[b] * np.eye(3)
         M[6 * b + 3 : 6 * b + 6, 6 * b + 3 : 6 * b + 6] = K
-    assert bundles.bundle_contacts(0, n, many)
+    assert contact_batches.bundle_contacts(0, n, many)
     blocks_of.clear(0, count, many)
     A, found = np.eye(6 * count), np.zeros((6 * count, 6 * count))
     for k in range(n):
@@ -403,7 +407,7 @@ def test_the_matrix_is_that_of_the_contacts(count, links, contacts):
         J = many.frame[k].reshape(3, 3) @ J
         A += M @ J.T @ (rho * D[k].reshape(3, 3)) @ J
     add_bundles(rho, *(np.ascontiguousarray(D[:, k : k + 3]) for k in (0, 3, 6)), many)
-    system.complete_matrix(0, count, many)
+    newton_system.complete_matrix(0, count, many)
     for b in range(count):
         found[6 * b : 6 * b + 6, 6 * b : 6 * b + 6] = block_of(many.diagonal[b])
         for k in range(many.start[b], many.stop[b]):
@@ -455,16 +459,20 @@ def inside(rng):
 def test_the_scaling_takes_p_and_u_to_the_same_point(seed):
     rng = np.random.default_rng(seed)
     p, u, x = inside(rng), inside(rng), tuple(rng.normal(size=3))
-    w, own, inverse = cone.scaling(p, u)
+    w, own, inverse = second_order_cone.scaling(p, u)
     # Rounding of W and its inverse: they are within the condition of the scaling, (w₀ + |w'|)² (η cancels), of exact.
     bound = 1e-14 * (w[0] + np.hypot(w[1], w[2])) ** 2
-    size = np.abs(cone.scaled(w, p)).max()
-    np.testing.assert_allclose(own, cone.scaled(w, p), atol=10 * bound * size)
-    np.testing.assert_allclose(own, cone.unscaled(w, u), atol=10 * bound * size)
-    np.testing.assert_allclose(inverse**-4, cone.determinant(p) * cone.determinant(u))  # det W x = η² det x
-    np.testing.assert_allclose(cone.unscaled(w, cone.scaled(w, x)), x, atol=10 * bound)
-    twice = cone.unscaled(w, cone.unscaled(w, x))
-    np.testing.assert_allclose(cone.unscaled_twice(w, x), twice, atol=10 * bound * np.abs(twice).max() + 1e-14)
+    size = np.abs(second_order_cone.scaled(w, p)).max()
+    np.testing.assert_allclose(own, second_order_cone.scaled(w, p), atol=10 * bound * size)
+    np.testing.assert_allclose(own, second_order_cone.unscaled(w, u), atol=10 * bound * size)
+    np.testing.assert_allclose(
+        inverse**-4, second_order_cone.determinant(p) * second_order_cone.determinant(u)
+    )  # det W x = η² det x
+    np.testing.assert_allclose(second_order_cone.unscaled(w, second_order_cone.scaled(w, x)), x, atol=10 * bound)
+    twice = second_order_cone.unscaled(w, second_order_cone.unscaled(w, x))
+    np.testing.assert_allclose(
+        second_order_cone.unscaled_twice(w, x), twice, atol=10 * bound * np.abs(twice).max() + 1e-14
+    )
 
 
 @settings(max_examples=100, deadline=None)
@@ -474,10 +482,10 @@ def test_the_quotient_undoes_the_product_and_the_way_out_ends_at_the_boundary(se
     a, b = inside(rng), tuple(rng.normal(size=3))
     # The product's matrix has eigenvalues a₀ ± |a'|.
     condition = (a[0] + np.hypot(a[1], a[2])) / (a[0] - np.hypot(a[1], a[2]))
-    inverse = 1 / np.sqrt(cone.determinant(a))
-    quotient = cone.quotient(cone.product(a, b), a, inverse)
+    inverse = 1 / np.sqrt(second_order_cone.determinant(a))
+    quotient = second_order_cone.quotient(second_order_cone.product(a, b), a, inverse)
     np.testing.assert_allclose(quotient, b, atol=1e-14 * condition * np.abs(b).max())
-    rate = cone.way_out(a, inverse, b)
+    rate = second_order_cone.way_out(a, inverse, b)
     far = np.array(a) * 1e-3 + np.array(b) if rate <= 0 else np.array(a) + np.array(b) / rate
     slack = far[0] - np.hypot(far[1], far[2])
     bound = 1e-12 * condition * (np.abs(a).max() + np.abs(b).max() * max(1, 1 / abs(rate)))

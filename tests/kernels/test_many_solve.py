@@ -8,9 +8,17 @@ import pytest
 from benchmarks import problems
 from benchmarks.problems import SETTINGS
 from physics import scenes
-from physics.kernels import layout as at
-from physics.kernels.many import calm, interior, islands, newton, response, solve, sweeps
-from physics.kernels.many.arrays import Many, make_many
+from physics.kernels.multibody.data.arrays import Many, make_many
+from physics.kernels.multibody.solver import (
+    contact_operator,
+    gauss_seidel,
+    interior_point,
+    islands,
+    near_rest_refinement,
+    proximal_newton,
+    solve,
+)
+from physics.kernels.state import layout as at
 from tests.reference.lcp import coulomb_defect, solve_coulomb
 
 
@@ -28,10 +36,10 @@ def dense(many: Many, n: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 def one_island(many: Many, n: int, bodies: int) -> tuple[tuple[int, int, int, int], float]:
     """A problem made ready for the methods with a linear system: its only island, and its largest free velocity."""
     many.free[:] = many.twist
-    scale = response.assemble(n, many)
+    scale = contact_operator.assemble(n, many)
     assert islands.find_islands(n, many) == 1
     part = (0, n, 0, bodies)
-    assert newton.prepare_system(part, 200, newton.WORTH_LYING, newton.LEAST_STEPS, many) > 0
+    assert proximal_newton.prepare_system(part, 200, proximal_newton.WORTH_LYING, proximal_newton.LEAST_STEPS, many) > 0
     return part, scale
 
 
@@ -106,7 +114,7 @@ def test_rounding_does_not_lead_out_of_the_cones(seed):
     """Masses of 1 : 1,000,000: an impulse may be as near to the boundary of its cone as its last place."""
     many, n = pile(seed, 12, 4, 0.2, 1000.0)
     part, scale = one_island(many, n, 12)
-    interior.interior_point(part, response.residual_of(0, n, True, many), 1e-6 * scale, 200, many)
+    interior_point.interior_point(part, contact_operator.residual_of(0, n, True, many), 1e-6 * scale, 200, many)
     assert np.isfinite(many.impulse[:n]).all()
     assert np.isfinite(many.twist).all()
 
@@ -116,10 +124,10 @@ def test_rounding_does_not_lead_out_of_the_cones(seed):
 def test_the_interior_point_method_alone_comes_near_from_any_start(seed, mu):
     many, n = pile(seed, 8, 4, mu)
     part, scale = one_island(many, n, 8)
-    count = interior.interior_point(part, scale, 1e-4 * scale, 30, many)
+    count = interior_point.interior_point(part, scale, 1e-4 * scale, 30, many)
     assert count < 30
     # It stops at 1e-4 on twists of its own; those that belong to the impulses differ by what is left of its equations.
-    assert response.residual_of(0, n, True, many) <= 1e-3 * scale
+    assert contact_operator.residual_of(0, n, True, many) <= 1e-3 * scale
 
 
 @pytest.mark.parametrize("seed", range(5))
@@ -127,8 +135,8 @@ def test_sweeps_without_friction_solve_the_complementarity_problem(seed):
     """u = W p + b, 0 <= p ⟂ u >= 0 along the normals: no contact is passed over that a push has changed."""
     many, n = pile(seed, 12, 4, 0.0)
     J, inverse, b = dense(many, n)
-    goal = 1e-6 * response.assemble(n, many)
-    count, residual = sweeps.sweep_normals(0, n, np.inf, goal, 2000, many)
+    goal = 1e-6 * contact_operator.assemble(n, many)
+    count, residual = gauss_seidel.sweep_normals(0, n, np.inf, goal, 2000, many)
     assert count < 2000
     assert residual <= goal
     p, normals = many.impulse[:n, 0], J[::3]
@@ -142,8 +150,8 @@ def test_sweeps_without_friction_solve_the_complementarity_problem(seed):
 def test_slow_sweeps_are_extrapolated():
     """Without that this pile takes 865 of them."""
     many, n = pile(0, 12, 4, 0.2)
-    goal = 1e-6 * response.assemble(n, many)
-    count, residual = sweeps.sweep_contacts(0, n, True, np.inf, goal, 1000, many)
+    goal = 1e-6 * contact_operator.assemble(n, many)
+    count, residual = gauss_seidel.sweep_contacts(0, n, True, np.inf, goal, 1000, many)
     assert residual <= goal
     assert count <= 400
 
@@ -172,15 +180,15 @@ def test_sweeps_visit_only_what_has_something_to_do(seed):
     both, resting = with_resting(one, n, 4, 200), 200
     found = []
     for many, contacts in ((one, n), (both, n + resting)):
-        goal = 1e-6 * response.assemble(contacts, many)
-        found.append(sweeps.sweep_contacts(0, contacts, True, np.inf, goal, 2000, many))
+        goal = 1e-6 * contact_operator.assemble(contacts, many)
+        found.append(gauss_seidel.sweep_contacts(0, contacts, True, np.inf, goal, 2000, many))
         assert found[-1][1] <= goal
     (alone, _), (together, _) = found
     assert alone >= 10
     # The contacts stand in another order then, and take other sweeps: up to twice as many are allowed for that.
     assert together <= 1 + 2 * alone * n / (n + resting)
     assert not both.impulse[n : n + resting].any()
-    assert response.residual_of(0, n + resting, True, both) == found[1][1]
+    assert contact_operator.residual_of(0, n + resting, True, both) == found[1][1]
 
 
 def crowd(bodies: int) -> tuple[Many, int]:
@@ -208,7 +216,7 @@ def test_what_is_too_dear_for_its_system_is_swept_while_it_moves(load):
     iterations, residual, method = solve.solve_contacts(n, True, many)
     assert method == (solve.SWEEPS if load == 0.0 else solve.NEWTON)
     assert iterations <= (20 if load == 0.0 else 3 * 20)
-    assert residual == pytest.approx(response.residual_of(0, n, True, many) / scale_of(many, n), rel=1e-9)
+    assert residual == pytest.approx(contact_operator.residual_of(0, n, True, many) / scale_of(many, n), rel=1e-9)
 
 
 def scale_of(many: Many, n: int) -> float:
@@ -232,12 +240,14 @@ def test_calming_keeps_what_is_solved_solved(seed):
     many, n = pile(seed, 12, 4, 0.5, 10.0)
     many.settings["tolerance"] = 1e-2
     solve.solve_contacts(n, True, many)
-    goal = response.residual_of(0, n, True, many)
+    goal = contact_operator.residual_of(0, n, True, many)
     many.settings["rests"] = 1  # and all bodies were at rest before the stage: `momenta` are zero
-    count, residual, _ = calm.calm((0, n, 0, 12), True, goal, goal, 1e-12, 1e-12, many)
+    count, residual, _ = near_rest_refinement.calm((0, n, 0, 12), True, goal, goal, 1e-12, 1e-12, many)
     assert count > 0
     assert residual <= goal
-    assert response.residual_of(0, n, True, many) == pytest.approx(residual, abs=1e-12 * np.abs(many.free).max())
+    assert contact_operator.residual_of(0, n, True, many) == pytest.approx(
+        residual, abs=1e-12 * np.abs(many.free).max()
+    )
 
 
 def test_what_stands_is_calmed_by_one_linear_system():

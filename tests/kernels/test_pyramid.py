@@ -3,8 +3,13 @@
 import numpy as np
 import pytest
 
-from physics.kernels.complementarity import BAD_DATA, PIVOT_LIMIT, RAY, SOLVED
-from physics.kernels.pyramid import normal_fallback, normal_sizes, pyramid_fallback, pyramid_sizes
+from physics.kernels.contact_solver.friction_pyramid import (
+    normal_fallback,
+    normal_sizes,
+    pyramid_fallback,
+    pyramid_sizes,
+)
+from physics.kernels.lcp.scaling_and_certificate import BAD_DATA, PIVOT_LIMIT, RAY, SOLVED
 from tests.reference.lcp import coulomb_defect, solve_coulomb
 
 N_MAX = 8

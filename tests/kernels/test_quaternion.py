@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from physics.kernels import quaternion as kernels
+from physics.kernels.math import quaternion as kernels
 from tests.reference.rigid_body import orientation_error
 
 EPS = np.finfo(float).eps

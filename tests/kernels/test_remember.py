@@ -11,8 +11,8 @@ from numba.core import types
 from numba.core.registry import cpu_target
 from numba.np.numpy_support import from_dtype
 
-from physics.kernels.codegen.remember import RememberingTarget, remembering
-from physics.kernels.compiler import kernel
+from physics.kernels.compile.decorators import kernel
+from physics.kernels.compile.fused.memoised_contexts import RememberingTarget, remembering
 
 PAIRS = [
     (types.float64, types.float64),

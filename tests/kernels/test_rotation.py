@@ -10,9 +10,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from physics.kernels import quaternion as qt
-from physics.kernels import rotation
-from physics.kernels.compiler import kernel
+from physics.kernels.compile.decorators import kernel
+from physics.kernels.flight import free_rotation
+from physics.kernels.math import quaternion as qt
 from tests.reference import rigid_body as ref
 
 BLOCK = np.array([6.5, 14.5, 17.0])
@@ -22,15 +22,15 @@ EPS = np.finfo(float).eps
 @kernel
 def _repeat(q, L, J, series, h, steps):
     for _ in range(steps):
-        q = rotation.free_rotation(q, L, J, series, h)
+        q = free_rotation.free_rotation(q, L, J, series, h)
     return q
 
 
 def turn(moments, quat, L, h, steps=1):
     """Attitude after `steps` flows of h each."""
     J = tuple(1.0 / np.asarray(moments, float))
-    series = np.zeros(rotation.SERIES_SIZE)
-    rotation.attitude_series(*J, series)
+    series = np.zeros(free_rotation.SERIES_SIZE)
+    free_rotation.attitude_series(*J, series)
     return np.array(_repeat(tuple(map(float, quat)), tuple(map(float, L)), J, series, float(h), steps))
 
 
@@ -83,8 +83,8 @@ def test_modified_inertia_series_is_that_of_the_exact_flow(m):
     s, d, f = _exact_modification(J, m, 6)
     for n in range(7):
         assert f[2][n] == s[n] * J[2] + d[n]
-    series = np.zeros(rotation.SERIES_SIZE)
-    rotation.attitude_series(*map(float, J), series)
+    series = np.zeros(free_rotation.SERIES_SIZE)
+    free_rotation.attitude_series(*map(float, J), series)
     mm = float(sum(x * x for x in m))
     ee = float(sum(j * x * x for j, x in zip(J, m)))
     first = {1: (0, 2), 2: (2, 3), 3: (5, 4)}
@@ -116,7 +116,7 @@ def test_tumbling_near_the_intermediate_axis_agrees_with_the_reference(angvel, d
 
 @kernel
 def _turned(q, L, J, series, h):
-    return rotation.free_rotation(q, L, J, series, h)
+    return free_rotation.free_rotation(q, L, J, series, h)
 
 
 def storing(moments, angvel, h, steps):
@@ -124,8 +124,8 @@ def storing(moments, angvel, h, steps):
 
     A component is off by ulp/√12 (rms), along no radius; the linearised flow, by differences, takes that to the end.
     """
-    J, series = tuple(1.0 / moments), np.zeros(rotation.SERIES_SIZE)
-    rotation.attitude_series(*J, series)
+    J, series = tuple(1.0 / moments), np.zeros(free_rotation.SERIES_SIZE)
+    free_rotation.attitude_series(*J, series)
     held, offset = (tuple(map(float, moments * angvel)), J, series, h), 1e-5
     q, attitudes, flows = (1.0, 0.0, 0.0, 0.0), [], []
     for _ in range(steps):
@@ -165,12 +165,12 @@ def test_period_of_the_momentum_is_that_of_the_elliptic_functions():
     for _ in range(200):
         moments, angvel = np.sort(1.0 + rng.random(3)), rng.normal(size=3)  # within the triangle's bound
         order = rng.permutation(3)
-        found = rotation.momentum_period(tuple((moments * angvel)[order]), tuple(1.0 / moments[order]))
+        found = free_rotation.momentum_period(tuple((moments * angvel)[order]), tuple(1.0 / moments[order]))
         # K has the condition k²/k'² in its modulus; JacobiTop has it from differences of energies.
         assert found == pytest.approx(ref.JacobiTop(moments, angvel).period, rel=1e-9)
-    found = rotation.momentum_period((0.1, 0.2, 5.0), (1.0, 1.0, 0.5))
+    found = free_rotation.momentum_period((0.1, 0.2, 5.0), (1.0, 1.0, 0.5))
     assert found == pytest.approx(2 * np.pi / (0.5 * 5.0), rel=8 * EPS)
-    assert rotation.momentum_period((0.0, 1.0, 0.0), (1.0, 0.5, 0.25)) == np.inf  # about the middle axis
+    assert free_rotation.momentum_period((0.0, 1.0, 0.0), (1.0, 0.5, 0.25)) == np.inf  # about the middle axis
 
 
 def test_many_turns_at_once_follow_the_elliptic_functions_and_the_parts():
@@ -188,13 +188,13 @@ def test_many_turns_at_once_follow_the_elliptic_functions_and_the_parts():
         h = angle / np.sqrt((m * m / moments).sum() / moments.min())
         at_once = turn(moments, (1, 0, 0, 0), m, h)
         top = ref.JacobiTop(moments, angvel)
-        parts = top.period * angle / h / rotation.ANGLE_LIMIT
+        parts = top.period * angle / h / free_rotation.ANGLE_LIMIT
         found = ref.rotation_matrix(at_once).T @ m
         assert np.abs(found - moments * top.angvel_body(h)).max() < EPS * parts * angle * np.linalg.norm(m)
         if angle < 1000.0:
             pieces = int(angle / 40.0) + 1
             in_pieces = turn(moments, (1, 0, 0, 0), m, h / pieces, pieces)
-            assert ref.orientation_error(at_once, in_pieces) < EPS * angle / rotation.ANGLE_LIMIT * angle
+            assert ref.orientation_error(at_once, in_pieces) < EPS * angle / free_rotation.ANGLE_LIMIT * angle
             assert ref.orientation_error(turn(moments, at_once, m, -h), (1, 0, 0, 0)) < 2 * EPS * parts * angle
 
 
@@ -220,13 +220,17 @@ def test_a_turn_too_far_to_follow_keeps_the_energy(moments):
 def _part_of_many_digits():
     """One part of the flow as plain Python: of extended numbers, it has no rounding of doubles."""
     product, unit = (types.FunctionType(f.py_func.__code__, {}) for f in (qt.multiply, qt.renormalise))
-    half = types.FunctionType(rotation._half_angle.py_func.__code__, vars(rotation))
-    names = {**vars(rotation), "qt": types.SimpleNamespace(multiply=product, renormalise=unit), "_half_angle": half}
-    return types.FunctionType(rotation._part.py_func.__code__, names)
+    half = types.FunctionType(free_rotation._half_angle.py_func.__code__, vars(free_rotation))
+    names = {
+        **vars(free_rotation),
+        "qt": types.SimpleNamespace(multiply=product, renormalise=unit),
+        "_half_angle": half,
+    }
+    return types.FunctionType(free_rotation._part.py_func.__code__, names)
 
 
 @pytest.mark.skipif(np.finfo(np.longdouble).eps > 1e-18, reason="no extended numbers on this machine")
-@pytest.mark.parametrize("limit", [rotation.TINY_SQUARE, rotation.SMALL_SQUARE])
+@pytest.mark.parametrize("limit", [free_rotation.TINY_SQUARE, free_rotation.SMALL_SQUARE])
 def test_terms_are_left_out_only_where_rounding_is_larger(limit):
     """At the very angle up to which terms are left out they change an attitude by less than half a last digit of 1.
 
@@ -239,8 +243,8 @@ def test_terms_are_left_out_only_where_rounding_is_larger(limit):
         J = (1.0 / (spread.sum() - spread)).astype(wide)
         m = (rng.normal(size=3) * 10.0 ** rng.uniform(-4, 0, 3)).astype(wide)
         m *= np.sqrt(wide(limit) / (J.max() * (J * m) @ m))
-        series = np.zeros(rotation.SERIES_SIZE, dtype=wide)
-        rotation.write_attitude_series(*J, series)
+        series = np.zeros(free_rotation.SERIES_SIZE, dtype=wide)
+        free_rotation.write_attitude_series(*J, series)
         start, sums = (wide(1), wide(0), wide(0), wide(0)), (m @ m, (J * m) @ m)
         without, fully = (
             np.array(part(start, tuple(m), tuple(J), series, *sums, limit * factor, wide(1))[0])
@@ -255,7 +259,7 @@ def test_flow_keeps_unit_length_energy_and_reverses(angvel, h):
     """|q| = 1 and 2E = Σ L_k²/I_k to rounding, and the flow of -h undoes that of h."""
     L = BLOCK * np.array(angvel)
     q = turn(BLOCK, (1, 0, 0, 0), L, h)
-    parts = 1 + 17 * np.linalg.norm(angvel) / 6.5 * h / rotation.ANGLE_LIMIT
+    parts = 1 + 17 * np.linalg.norm(angvel) / 6.5 * h / free_rotation.ANGLE_LIMIT
     assert abs(np.linalg.norm(q) - 1) < 8 * EPS
     m = ref.rotation_matrix(q).T @ L
     energy, start = np.sum(m * m / BLOCK), np.sum(L * L / BLOCK)
@@ -310,6 +314,6 @@ def test_hard_case_2_period_of_the_intermediate_axis_flip():
 def test_isotropic_rotation_is_constant_spin():
     """All moments equal: ω stays, whatever the axis."""
     w = np.array([0.3, -1.0, 2.0])
-    q = np.array(rotation.isotropic_rotation((1.0, 0.0, 0.0, 0.0), tuple(2.5 * w), 0.4, 0.5))
+    q = np.array(free_rotation.isotropic_rotation((1.0, 0.0, 0.0, 0.0), tuple(2.5 * w), 0.4, 0.5))
     half = 0.25 * np.linalg.norm(w)
     assert np.abs(q - np.r_[np.cos(half), np.sin(half) * w / np.linalg.norm(w)]).max() < 8 * EPS

@@ -8,7 +8,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from physics.kernels import quaternion, schemes
+from physics.kernels.flight import integrators
+from physics.kernels.math import quaternion
 from tests.reference.rigid_body import (
     JacobiTop,
     RigidState,
@@ -20,10 +21,10 @@ from tests.reference.rigid_body import (
 
 EPS = np.finfo(float).eps
 SCHEMES = {
-    schemes.EXPLICIT_EULER: schemes.explicit_euler,
-    schemes.SEMI_IMPLICIT_EULER: schemes.semi_implicit_euler,
-    schemes.MIDPOINT: schemes.midpoint,
-    schemes.RK4: schemes.rk4,
+    integrators.EXPLICIT_EULER: integrators.explicit_euler,
+    integrators.SEMI_IMPLICIT_EULER: integrators.semi_implicit_euler,
+    integrators.MIDPOINT: integrators.midpoint,
+    integrators.RK4: integrators.rk4,
 }
 every_scheme = pytest.mark.parametrize("code", SCHEMES)
 
@@ -78,27 +79,27 @@ def assert_order(errors, order):
 
 
 ORDERS = [
-    (schemes.EXPLICIT_EULER, 1, 512),
-    (schemes.SEMI_IMPLICIT_EULER, 1, 512),
-    (schemes.MIDPOINT, 2, 128),
-    (schemes.RK4, 4, 32),
+    (integrators.EXPLICIT_EULER, 1, 512),
+    (integrators.SEMI_IMPLICIT_EULER, 1, 512),
+    (integrators.MIDPOINT, 2, 128),
+    (integrators.RK4, 4, 32),
 ]
 
 
 @pytest.mark.parametrize(("code", "order", "fewest"), ORDERS)
 def test_order_of_the_attitude_of_a_tumbling_block(code, order, fewest):
-    ends = [schemes.integrate(code, **TUMBLE, h=1 / n, steps=n) for n in (fewest, 2 * fewest, 4 * fewest)]
+    ends = [integrators.integrate(code, **TUMBLE, h=1 / n, steps=n) for n in (fewest, 2 * fewest, 4 * fewest)]
     assert_order([orientation_error(q, truth().quat) for _, q, _, _ in ends], order)
 
 
 @pytest.mark.parametrize(("code", "order", "fewest"), ORDERS[:2])
 def test_order_of_the_position_by_the_two_euler_methods(code, order, fewest):
-    ends = [schemes.integrate(code, **TUMBLE, h=1 / n, steps=n) for n in (fewest, 2 * fewest)]
+    ends = [integrators.integrate(code, **TUMBLE, h=1 / n, steps=n) for n in (fewest, 2 * fewest)]
     assert_order([np.linalg.norm(x - truth().pos) for x, _, _, _ in ends], order)
 
 
 @pytest.mark.parametrize(
-    ("scheme", "order", "fewest"), [(schemes.matrix_explicit_euler, 1, 1024), (schemes.matrix_rk4, 4, 64)]
+    ("scheme", "order", "fewest"), [(integrators.matrix_explicit_euler, 1, 1024), (integrators.matrix_rk4, 4, 64)]
 )
 def test_order_of_the_matrix_formulation(scheme, order, fewest):
     exact = rotation_matrix(truth().quat)
@@ -115,12 +116,12 @@ def test_order_of_the_matrix_formulation(scheme, order, fewest):
 @every_scheme
 def test_momenta_of_the_tumbling_block_are_exact(code):
     n = 256
-    x, q, v, L = schemes.integrate(code, **TUMBLE, h=1 / n, steps=n)
+    x, q, v, L = integrators.integrate(code, **TUMBLE, h=1 / n, steps=n)
     # n additions to numbers ≤ 32.
     assert np.abs(np.array(L) - truth().angular_momentum).max() <= n * EPS * 32
     assert np.abs(np.array(v) - truth().momentum / MASS).max() <= n * EPS * 32
     assert abs(math.hypot(*q) - 1) <= 4 * EPS
-    if code in (schemes.MIDPOINT, schemes.RK4):
+    if code in (integrators.MIDPOINT, integrators.RK4):
         assert np.abs(x - truth().pos).max() <= n * EPS * 32
 
 
@@ -132,8 +133,10 @@ def test_momenta_of_the_tumbling_block_are_exact(code):
 @given(x=vectors, v=vectors, force=vectors, g=vectors, h=steps_sizes, n=st.integers(0, 200))
 def test_free_flight_is_the_discrete_parabola(code, x, v, force, g, h, n):
     """x_n = x_0 + n h v_0 + c h² a with c = n (n - 1) / 2, n (n + 1) / 2 or n² / 2."""
-    c = {schemes.EXPLICIT_EULER: n * (n - 1) / 2, schemes.SEMI_IMPLICIT_EULER: n * (n + 1) / 2}.get(code, n * n / 2)
-    x_n, _, v_n, _ = schemes.integrate(code, x, START, v, ZERO, force, ZERO, g, 0.5, J, h, n)
+    c = {integrators.EXPLICIT_EULER: n * (n - 1) / 2, integrators.SEMI_IMPLICIT_EULER: n * (n + 1) / 2}.get(
+        code, n * n / 2
+    )
+    x_n, _, v_n, _ = integrators.integrate(code, x, START, v, ZERO, force, ZERO, g, 0.5, J, h, n)
     a = np.array(g) + 0.5 * np.array(force)
     # |a| ≤ 15, so |v| ≤ 10 + 15 n h ≤ 310 and |x| ≤ 10 + 310 n h; each of n steps rounds v and x by EPS,
     # and what v has lost is moved on for n h ≤ 20 s.
@@ -149,13 +152,13 @@ def factor(code, start, middle, end):
     With y constant it is the stability polynomial at iy.
     """
     a, m, b = 1j * start, 1j * middle, 1j * end
-    if code == schemes.MIDPOINT:
+    if code == integrators.MIDPOINT:
         return 1 + m * (1 + a / 2)
-    if code == schemes.RK4:
+    if code == integrators.RK4:
         k2 = m * (1 + a / 2)
         k3 = m * (1 + k2 / 2)
         return 1 + (a + 2 * k2 + 2 * k3 + b * (1 + k3)) / 6
-    return 1 + (a if code == schemes.EXPLICIT_EULER else b)
+    return 1 + (a if code == integrators.EXPLICIT_EULER else b)
 
 
 @every_scheme
@@ -166,7 +169,7 @@ def test_a_sphere_spun_up_about_a_fixed_axis_turns_by_the_phases_of_its_steps(co
     n, inverse = 50, 0.5
     axis = np.array(axis) / math.hypot(*axis) if math.hypot(*axis) > 1e-3 else np.array([0.6, 0.0, 0.8])
     L, tau = (tuple(float(a) for a in axis * f) for f in (size, torque))
-    _, q_n, _, _ = schemes.integrate(code, ZERO, q, ZERO, L, ZERO, tau, ZERO, 1.0, (inverse,) * 3, h, n)
+    _, q_n, _, _ = integrators.integrate(code, ZERO, q, ZERO, L, ZERO, tau, ZERO, 1.0, (inverse,) * 3, h, n)
     y = h * inverse / 2 * (size + torque * h * np.arange(0, n + 0.5, 0.5))
     angle = sum(2 * np.angle(factor(code, *y[2 * k : 2 * k + 3])) for k in range(n))
     turn = quaternion.exponential(tuple(float(a) for a in axis * angle))
@@ -178,12 +181,12 @@ def test_a_sphere_spun_up_about_a_fixed_axis_turns_by_the_phases_of_its_steps(co
 @settings(deadline=None, max_examples=20)
 @given(q=unit_quaternions, L=vectors, h=steps_sizes)
 def test_angular_momentum_without_torque_is_constant_bit_for_bit(code, q, L, h):
-    assert schemes.integrate(code, ZERO, q, ZERO, L, ZERO, ZERO, ZERO, 1.0, J, h, 50)[3] == L
+    assert integrators.integrate(code, ZERO, q, ZERO, L, ZERO, ZERO, ZERO, 1.0, J, h, 50)[3] == L
 
 
 @pytest.mark.parametrize(
     ("attitude", "code"),
-    [(schemes.euler_attitude, 1), (schemes.midpoint_attitude, 3), (schemes.rk4_attitude, 4)],
+    [(integrators.euler_attitude, 1), (integrators.midpoint_attitude, 3), (integrators.rk4_attitude, 4)],
 )
 def test_the_quaternion_left_alone_grows_by_the_stability_polynomial(attitude, code):
     """Explicit Euler: |q| by sqrt(1 + (h |ω| / 2)²) a step."""
@@ -201,7 +204,7 @@ def test_the_quaternion_left_alone_grows_by_the_stability_polynomial(attitude, c
 
 @pytest.mark.parametrize(
     ("scheme", "code"),
-    [(schemes.matrix_explicit_euler, schemes.EXPLICIT_EULER), (schemes.matrix_rk4, schemes.RK4)],
+    [(integrators.matrix_explicit_euler, integrators.EXPLICIT_EULER), (integrators.matrix_rk4, integrators.RK4)],
 )
 def test_the_matrix_left_alone_drifts_in_the_two_columns_across_the_axis(scheme, code):
     """RᵀR = a aᵀ + |p(ih|ω|)|²ⁿ (1 - a aᵀ), a the axis in the body; |p|² = 1 + (h |ω|)² for Euler."""
@@ -215,7 +218,7 @@ def test_the_matrix_left_alone_drifts_in_the_two_columns_across_the_axis(scheme,
     # linearised map says so; after 400 steps 7 million, as ω = R J RᵀL tilts with R); six of them, relative to the
     # largest entry, are n 10 EPS.
     assert np.abs(R.T @ R - expected).max() <= n * 10 * EPS * max(growth, 1)
-    if code == schemes.RK4:
+    if code == integrators.RK4:
         y = h * 1.5
         assert growth == pytest.approx((1 - y**6 / 72 + y**8 / 576) ** n, rel=n * 4 * EPS)
 
@@ -225,8 +228,8 @@ def test_the_matrix_drifts_64_times_as_fast_as_the_quaternion_by_rk4():
     h, n, L, inverse = 0.2, 100, (0.0, 0.0, 2.0), 1.0
     q, y = START, 0.4
     for _ in range(n):
-        q = schemes.rk4_attitude(q, L, ZERO, (inverse,) * 3, h)
-    R = np.reshape(spinning(schemes.matrix_rk4, quaternion.to_matrix(START), L, (inverse,) * 3, h, n), (3, 3))
+        q = integrators.rk4_attitude(q, L, ZERO, (inverse,) * 3, h)
+    R = np.reshape(spinning(integrators.matrix_rk4, quaternion.to_matrix(START), L, (inverse,) * 3, h, n), (3, 3))
     ratio = math.log(R[:, 0] @ R[:, 0]) / math.log(np.dot(q, q))
     # log(1 - s) = -s (1 + s/2 ...) with s = 6e-5 per step; |q|² is off 1 by 1e-4 and known to 1e-13: 1e-9.
     assert ratio == pytest.approx(64 * (1 - y**2 / 8) / (1 - y**2 / 32), rel=4e-5)
@@ -239,9 +242,9 @@ def test_the_matrix_drifts_64_times_as_fast_as_the_quaternion_by_rk4():
 @given(codes, unit_quaternions, unit_quaternions, vectors, vectors, vectors, steps_sizes)
 def test_a_turned_world_gives_the_turned_result(code, turn, q, v, L, torque, h):
     args = (1 / MASS, J, h, 5)
-    x, q_n, v_n, L_n = schemes.integrate(code, ZERO, q, v, L, ZERO, torque, (0.0, -9.81, 0.0), *args)
+    x, q_n, v_n, L_n = integrators.integrate(code, ZERO, q, v, L, ZERO, torque, (0.0, -9.81, 0.0), *args)
     v, L, torque, g = (quaternion.rotate(turn, a) for a in (v, L, torque, (0.0, -9.81, 0.0)))
-    turned = schemes.integrate(code, ZERO, quaternion.multiply(turn, q), v, L, ZERO, torque, g, *args)
+    turned = integrators.integrate(code, ZERO, quaternion.multiply(turn, q), v, L, ZERO, torque, g, *args)
     # `rotate` loses 30 EPS of a vector ≤ 22; five steps of about 20 roundings.
     for before, after in ((x, turned[0]), (v_n, turned[2]), (L_n, turned[3])):
         assert np.abs(np.subtract(quaternion.rotate(turn, before), after)).max() <= 150 * EPS * 22
@@ -252,15 +255,15 @@ def test_a_turned_world_gives_the_turned_result(code, turn, q, v, L, torque, h):
 @given(codes, unit_quaternions, vectors, vectors, steps_sizes)
 def test_opposite_quaternions_are_the_same_body(code, q, L, torque, h):
     args = (ZERO, L, ZERO, torque, ZERO, 1.0, J, h, 5)
-    one = schemes.integrate(code, ZERO, q, *args)
-    other = schemes.integrate(code, ZERO, tuple(-a for a in q), *args)
+    one = integrators.integrate(code, ZERO, q, *args)
+    other = integrators.integrate(code, ZERO, tuple(-a for a in q), *args)
     assert np.array_equal(one[1], np.negative(other[1]))
 
 
 @settings(deadline=None, max_examples=60)
 @given(codes, unit_quaternions, vectors, vectors, steps_sizes)
 def test_what_has_no_inverse_mass_and_inertia_stays(code, q, force, torque, h):
-    x, q_n, v, _ = schemes.integrate(code, (1.0, 2.0, 3.0), q, ZERO, ZERO, force, torque, ZERO, 0.0, ZERO, h, 5)
+    x, q_n, v, _ = integrators.integrate(code, (1.0, 2.0, 3.0), q, ZERO, ZERO, force, torque, ZERO, 0.0, ZERO, h, 5)
     assert x == (1, 2, 3)
     assert v == ZERO
     # Normalisation rounds each part by 2.5 EPS a step at most.
@@ -272,15 +275,15 @@ def test_the_loop_is_its_steps_bit_for_bit(code):
     held = {name: value for name, value in TUMBLE.items() if name not in "xqvL"}
     state = tuple(TUMBLE[name] for name in "xqvL")
     for _ in range(7):
-        by_code = schemes.step(code, *state, **held, h=0.01)
+        by_code = integrators.step(code, *state, **held, h=0.01)
         state = SCHEMES[code](*state, **held, h=0.01)
         assert by_code == state
-    assert schemes.integrate(code, **TUMBLE, h=0.01, steps=7) == state
+    assert integrators.integrate(code, **TUMBLE, h=0.01, steps=7) == state
 
 
 @pytest.mark.parametrize("code", [-1, 0, 5])
 def test_an_unknown_scheme_cannot_be_taken_for_a_result(code):
-    assert all(np.isnan(part).all() for part in schemes.step(code, **TUMBLE, h=0.01))
+    assert all(np.isnan(part).all() for part in integrators.step(code, **TUMBLE, h=0.01))
 
 
 # --- the oracles agree with each other ---------------------------------------------------------------

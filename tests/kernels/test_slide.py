@@ -9,9 +9,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from physics.kernels.compiler import kernel
-from physics.kernels.lanes import Lanes
-from physics.kernels.point import (
+from physics.kernels.compile.decorators import kernel
+from physics.kernels.compile.simd import Lanes
+from physics.kernels.contact_solver.one_contact import (
     HELD,
     LEAST_SQUARE,
     LOST,
@@ -23,8 +23,8 @@ from physics.kernels.point import (
     inverse_root,
     own_block,
 )
-from physics.kernels.slide import HOLD, MIXED, SLIDE
-from physics.kernels.solve import DIRECT
+from physics.kernels.contact_solver.sliding_patch import HOLD, MIXED, SLIDE
+from physics.kernels.contact_solver.solve import DIRECT
 from tests.kernels.contact_problem import FACE, MASS, Problem
 from tests.kernels.test_direct import FALL, assert_solved, floor, law_defect
 

@@ -7,8 +7,8 @@ from fractions import Fraction
 from hypothesis import given
 from hypothesis import strategies as st
 
-from physics.kernels.compiler import kernel
-from physics.kernels.step import crossing
+from physics.kernels.compile.decorators import kernel
+from physics.kernels.time_stepping.step import crossing
 
 EPS = 2.0**-52
 

@@ -9,8 +9,8 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from physics.kernels.fields.submerged import submerged
-from physics.kernels.layout import BLOCK, ELLIPSOID, SPHERE
+from physics.kernels.forces.submerged_volume import submerged
+from physics.kernels.state.layout import BLOCK, ELLIPSOID, SPHERE
 from tests.reference.fields import cut_block
 
 EPS = np.finfo(float).eps

@@ -7,9 +7,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from physics.kernels.proximal import proximal_newton
-from physics.kernels.solve import solve_contacts
-from physics.kernels.sweeps import assemble, cone_residual, cone_sweeps, factor_blocks, velocities
+from physics.kernels.contact_solver.gauss_seidel import assemble, cone_residual, cone_sweeps, factor_blocks, velocities
+from physics.kernels.contact_solver.proximal_newton import proximal_newton
+from physics.kernels.contact_solver.solve import solve_contacts
 from tests.kernels.contact_problem import FACE, Problem
 from tests.reference.lcp import coulomb_defect
 

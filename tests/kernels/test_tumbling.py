@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 import physics
-from physics.kernels.compiler import kernel
-from physics.kernels.layout import HULL, SPHERE
-from physics.kernels.many.nearest import distance_between
-from physics.kernels.tumbling import safe_time, spin_bound
+from physics.kernels.compile.decorators import kernel
+from physics.kernels.half_space.conservative_advancement import safe_time, spin_bound
+from physics.kernels.multibody.narrowphase.gjk import distance_between
+from physics.kernels.state.layout import HULL, SPHERE
 from tests.reference import turning as truth
 from tests.reference.separation import largest_separation
 

@@ -29,7 +29,8 @@ import physics
 
 PACKAGE = Path(physics.__file__).parent
 # Kernels, and the modules with kernels of their own besides.
-SOURCES = sorted([*(PACKAGE / "kernels").rglob("*.py"), PACKAGE / "report.py", PACKAGE / "parameters.py"])
+WORLD = PACKAGE / "world"  # with kernels of its own
+SOURCES = sorted([*(PACKAGE / "kernels").rglob("*.py"), WORLD / "report.py", WORLD / "parameters.py"])
 
 # Prefixes that Numba itself puts before the byte: a variable `phi3` meets them like one called `phi`.
 OF_NUMBA = {"assertion_error", "common_constant", "const", "exception", "phi", "predicate", "setup_with_exitfn"}
@@ -118,7 +119,7 @@ def test_no_two_names_of_a_kernel_could_meet(path: Path):
 def test_no_two_temporaries_of_a_kernel_meet():
     looked_at, met = 0, []
     for path in SOURCES:
-        if path.parent.name == "codegen":  # no kernels there
+        if path.parent.name == "fused":  # no kernels there
             continue
         for code in _code_objects(compile(path.read_text(encoding="utf-8"), str(path), "exec")):
             try:
@@ -133,7 +134,7 @@ def test_no_two_temporaries_of_a_kernel_meet():
 
 # --- the checks ----------------------------------------------------------------------------------------------------
 
-# As it stood in `pair`, where no Python 3.12 could compile it.
+# As it stood in `two_contacts`, where no Python 3.12 could compile it.
 PUSHED_APART = """
 def pushed_apart({0}, W12, {1}, b1, b2):
     s = 1.0 / ({0}[0] * {1}[0] - W12[0] * W12[0])

@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 
 import physics
 from physics import scenes
-from physics.kernels.many.arrays import PAIRS
-from physics.report import Solver, Status
+from physics.kernels.multibody.data.arrays import PAIRS
+from physics.world.report import Solver, Status
 
 G = 9.81
 FLOOR = [physics.HalfSpace((0, 1, 0))]
@@ -92,7 +92,7 @@ def test_a_ball_turns_the_block_that_it_hits_off_centre(restitution, ball_first,
 def test_a_plastic_landing_stops_in_front_of_what_it_meets():
     """At whatever moment of a step it comes: eight heights, spread over the way of one step."""
     speed, dt = np.sqrt(2 * G * 0.5), 0.01
-    assert speed * dt < 0.1 * np.sqrt(0.75)  # too slow to be met in time: `strike.FAST_SHARE`
+    assert speed * dt < 0.1 * np.sqrt(0.75)  # too slow to be met in time: `impact.FAST_SHARE`
     bodies = [physics.Block(CUBE, 1.0, pos=(0, 0.5, 0)), physics.Block(CUBE, 1.0, pos=(0, 2.0, 0))]
     effects = [physics.Gravity((0, -G, 0)), physics.Contact(), physics.Friction(0.5)]
     world = physics.World(physics.Scene(bodies, FLOOR, effects), worlds=8, dt=dt)

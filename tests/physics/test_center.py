@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 import physics
-from physics.frontier_errors import deepest_penetration, distances
-from physics.resting import resting_contact
-from rigid_env.picture import world_frame
+from physics.analysis.resting_contact import resting_contact
+from physics.work_precision.errors import deepest_penetration, distances
+from rigid_env.rendering.picture import world_frame
 from tests.reference import hybrid
 from tests.reference.rigid_body import rotation_matrix
 

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 import physics
 from physics import scenes
-from physics.accuracy import PRESETS
+from physics.plan.accuracy import PRESETS
 from tests.reference import impacts
 
 MASS, RADIUS = 2.0, 0.5

@@ -196,7 +196,7 @@ def test_one_vertex_hits_with_newtons_impulse(e):
 )
 @settings(max_examples=25)
 def test_energy_never_grows_and_impulses_are_jumps_of_momentum(q, v, w, e, rubs):
-    """With friction, too, where Newton's law asks for more than there is (`physics.kernels.restraint`)."""
+    """With friction, too, where Newton's law asks for more than there is (`contact_law.restitution_energy`)."""
     quat = tuple(np.array(q) / np.linalg.norm(q))
     mu = 0.5 if rubs else 0.0
     run = physics.simulate(on_floor(block((0, 3.5, 0), quat=quat, linvel=v, angvel=w), e, mu), 2.0, "precise", 0.02)

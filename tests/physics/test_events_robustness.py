@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 import physics
-from physics import accuracy, scenes
+from physics import scenes
+from physics.plan import accuracy
 
 WORLDS, STEPS, DT = 4, 200, 0.02
 RADIUS = float(np.linalg.norm(scenes.SIZE)) / 2

@@ -17,7 +17,7 @@ import numpy as np
 import pytest
 
 import physics
-from physics.machine_code import Work
+from physics.parallel.bound_call import Work
 
 ROOT = str(Path(__file__).parents[2])
 

@@ -10,9 +10,12 @@ import numpy as np
 import pytest
 
 import physics
-from physics import Accuracy, Frontier, FrontierPoint, Truth, frontier_analysis, frontier_errors, frontier_run, scenes
-from physics.frontier_contender import EngineContender, TooSlow, setting_name
-from physics.frontier_truth import ReferenceTruth, rows_at
+from physics import Accuracy, Frontier, FrontierPoint, Truth, scenes
+from physics.work_precision import analysis as frontier_analysis
+from physics.work_precision import errors as frontier_errors
+from physics.work_precision import run as frontier_run
+from physics.work_precision.contender import EngineContender, TooSlow, setting_name
+from physics.work_precision.truth import ReferenceTruth, rows_at
 
 G = 9.81
 

@@ -13,7 +13,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 import physics
-from physics.report import Status
+from physics.world.report import Status
 
 SPACING = 3.0  # of the bodies' places [m]: blocks of edges up to 1.7 m have room to turn
 STEPS = 30

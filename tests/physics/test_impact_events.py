@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 import physics
-from physics import trajectory
-from physics.kernels.events import log
+from physics.analysis import simulate
+from physics.kernels.event_driven import event_log
 
 PRESETS = ("fast", "balanced", "precise", "reference")
 FLOOR = physics.HalfSpace((0, 1, 0), 0.0)
@@ -153,8 +153,8 @@ def test_a_log_changes_nothing_and_tells_when_it_is_full(accuracy):
         np.testing.assert_array_equal(logged.event_counts, small.event_counts)
         most = max(most, int(small.event_counts.max()))
         for body, count in enumerate(logged.event_counts):
-            assert (np.diff(logged.event_log[body, :count, log.TIME]) >= 0).all()
-            assert (logged.event_log[body, :count, log.KIND] == log.IMPACT).all()
+            assert (np.diff(logged.event_log[body, :count, event_log.TIME]) >= 0).all()
+            assert (logged.event_log[body, :count, event_log.KIND] == event_log.IMPACT).all()
     assert most > 1
 
 
@@ -162,7 +162,7 @@ def test_a_log_changes_nothing_and_tells_when_it_is_full(accuracy):
 def test_a_step_with_more_events_than_room_is_taken_again(accuracy, monkeypatch):
     """`simulate` loses none."""
     whole = physics.simulate(_thrown(), 0.6, accuracy, sample_dt=0.1)
-    monkeypatch.setattr(trajectory, "EVENT_ROOM", 1)
+    monkeypatch.setattr(simulate, "EVENT_ROOM", 1)
     again = physics.simulate(_thrown(), 0.6, accuracy, sample_dt=0.1)
     assert whole.events == again.events
     assert len(impacts(whole)) > 3
@@ -199,7 +199,7 @@ def test_a_step_that_is_not_kept_logs_nothing():
 @pytest.mark.parametrize("accuracy", ["balanced", "precise"])
 @pytest.mark.parametrize("count", [1, 2])
 def test_random_impacts_with_friction_and_rebound_add_up(accuracy, count):
-    """Also where only a part of the rebound is made, since the whole would gain energy (`kernels/restraint.py`)."""
+    """Also where only a part of the rebound is made, since the whole would gain energy."""
     worlds, rng = 100 if count == 1 or accuracy == "balanced" else 10, np.random.default_rng(0)
     flying = physics.Block((1, 4, 0.5), 2.0, pos=(0, 8, 0))
     bodies, floor = ([flying], 0.0) if count == 1 else ([physics.Block((5, 3, 2), 6.0), flying], -1000.0)
@@ -217,7 +217,7 @@ def test_random_impacts_with_friction_and_rebound_add_up(accuracy, count):
     for row, (number, events) in enumerate(zip(world.event_counts, world.event_log)):
         of, body = divmod(row, count)
         for event in events[:number]:
-            impulse, other = event[log.IMPULSE : log.IMPULSE + 3], int(event[log.OTHER])
+            impulse, other = event[event_log.IMPULSE : event_log.IMPULSE + 3], int(event[event_log.OTHER])
             told[of, body] += impulse
             if other >= 0:
                 told[of, other] -= impulse

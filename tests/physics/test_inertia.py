@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from physics import inertia
-from physics.inertia import MassProperties, check_inertia, compose, parallel_axis, point_cloud, principal_axes
+from physics.mass import inertia
+from physics.mass.inertia import MassProperties, check_inertia, compose, parallel_axis, point_cloud, principal_axes
 
 EPS = np.finfo(float).eps
 # Clouds below sum at most 100 terms of one sign; each addition rounds by EPS/2 and the products by 3 EPS.

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import physics
-from physics import checks
+from physics import validation
 
 WORLDS = 3
 
@@ -65,8 +65,8 @@ def test_a_quaternion_of_four_digits_is_normalised(rng):
     exact /= np.linalg.norm(exact, axis=1, keepdims=True)
     rounded = np.round(exact, 4)
     assert np.abs(np.linalg.norm(rounded, axis=1) - 1).max() > 3e-5  # to be seen at all
-    unit = checks.unit_quaternion(rounded, rounded.shape, "quat")
-    assert np.abs(np.linalg.norm(unit, axis=1) - 1).max() <= checks.UNIT_ROUNDING
+    unit = validation.unit_quaternion(rounded, rounded.shape, "quat")
+    assert np.abs(np.linalg.norm(unit, axis=1) - 1).max() <= validation.UNIT_ROUNDING
     assert np.abs(unit - exact).max() <= 1.5e-4
     body = physics.Sphere(1, 1, quat=(0.7071, 0.7071, 0, 0))
     assert body.quat == pytest.approx((math.sqrt(0.5), math.sqrt(0.5), 0, 0), rel=1e-15)
@@ -78,7 +78,7 @@ def test_a_quaternion_of_four_digits_is_normalised(rng):
 def test_a_unit_quaternion_keeps_its_bits(rng):
     exact = rng.normal(size=(2000, 4))
     exact /= np.linalg.norm(exact, axis=1, keepdims=True)
-    assert checks.unit_quaternion(exact, exact.shape, "quat").tobytes() == exact.tobytes()
+    assert validation.unit_quaternion(exact, exact.shape, "quat").tobytes() == exact.tobytes()
 
 
 @pytest.mark.parametrize("off", [1.02e-4, -1.02e-4])

@@ -5,7 +5,7 @@ import dataclasses
 import numpy as np
 import pytest
 
-from physics.lcp import METHODS, LcpStatus, lcp
+from physics.analysis.lcp import METHODS, LcpStatus, lcp
 
 M = [[2.0, 1.0], [1.0, 2.0]]
 Q = [-5.0, -6.0]

@@ -9,7 +9,7 @@ import pytest
 
 import physics
 from physics import Status, scenes
-from physics.kernels import layout as at
+from physics.kernels.state import layout as at
 
 PRESETS = ("fast", "balanced", "precise", "reference")
 FLOOR = physics.HalfSpace((0, 1, 0), 0.0)

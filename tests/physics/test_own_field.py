@@ -14,7 +14,7 @@ from typing import ClassVar
 import pytest
 
 import physics
-from physics.field import digest
+from physics.scene.force_field import digest
 
 # The page's example is what is tested.
 PAGE = Path(__file__).parents[2] / "docs" / "effects.md"
@@ -23,7 +23,7 @@ PROGRAM = """
 import json, sys, physics
 sys.path.insert(0, sys.argv[1])
 from attraction import Attraction
-from physics.kernels.step import step_worlds
+from physics.kernels.time_stepping.step import step_worlds
 body = physics.Sphere(0.1, 2.0, pos=(1.0, 0, 0), linvel=(0, 1.5, 0))
 world = physics.World(physics.Scene([body], effects=[Attraction(4.5)]), dt=0.001)
 world.step(steps=1000)

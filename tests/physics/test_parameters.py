@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 import physics
-from physics import inertia, scenes
+from physics import scenes
+from physics.mass import inertia
 
 WORLDS = 40
 TILTED = np.array([[6.0, 0.5, 0.2], [0.5, 8.0, 0.1], [0.2, 0.1, 9.0]])
@@ -63,7 +64,7 @@ def test_parameters_set_are_those_of_a_scene_with_such_bodies(drawn):
 def test_a_body_with_its_own_inertia_scales_it_with_the_mass(drawn):
     world = make(WORLDS)
     world.set_parameters(mass=drawn["mass"], size=drawn["size"])
-    at = physics.kernels.layout
+    at = physics.kernels.state.layout
     moments = 1 / world.params[1 :: len(BODIES), at.INV_INERTIA : at.INV_INERTIA + 3]
     expected = inertia.principal_axes(TILTED)[0] * (drawn["mass"][:, 1] / 6.0)[:, None]
     np.testing.assert_allclose(moments, expected, rtol=4 * np.finfo(float).eps)  # a quotient, a product, two inverses

@@ -5,7 +5,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from physics import inertia, particles
+from physics.analysis import particles
+from physics.mass import inertia
 
 EPS = np.finfo(float).eps
 

@@ -12,7 +12,7 @@ import pytest
 
 import physics
 from physics import scenes
-from physics.accuracy import resolve
+from physics.plan.accuracy import resolve
 
 BLOCK = physics.Block((5, 3, 2), 6.0, pos=(0, 5, 0))
 CUBE = physics.Block((2, 2, 2), 6.0, pos=(0, 5, 0))
@@ -51,7 +51,7 @@ def test_explain_names_every_effect_and_its_reason():
 LINKED = """
 import json, sys, physics
 from numba.core.codegen import JITCodeLibrary
-from physics.kernels.codegen.libraries import StandingLibrary
+from physics.kernels.compile.fused.code_libraries import StandingLibrary
 linked, optimise = set(), JITCodeLibrary._optimize_final_module
 
 def noted(library):

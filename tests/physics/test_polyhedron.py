@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 import physics
-from physics import inertia
-from physics.polyhedron import COPLANAR, MOST_CORNERS, convex_hull
+from physics.mass import inertia
+from physics.mass.polyhedron import COPLANAR, MOST_CORNERS, convex_hull
 from tests.reference import polyhedra
 
 EPS = np.finfo(float).eps

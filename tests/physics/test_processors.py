@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from physics import processors
+from physics.parallel import processors
 
 V1, V2 = "5:memory:/\n4:cpu,cpuacct:{}\n1:name=systemd:/\n", "0::{}\n"
 

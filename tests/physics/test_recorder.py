@@ -11,7 +11,7 @@ import pytest
 
 import physics
 from physics import scenes
-from physics.kernels import layout as at
+from physics.kernels.state import layout as at
 from tests.physics.test_bodies import heap
 
 

@@ -1,4 +1,4 @@
-"""Error control where bodies touch each other (`physics.kernels.many.refine`): what `precise` means there."""
+"""Error control where bodies touch each other (`adaptive_substep`): what `precise` means there."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 import physics
-from physics.accuracy import PRESETS
-from physics.kernels.many.refine import PART_ERROR
+from physics.kernels.multibody.stepping.adaptive_substep import PART_ERROR
+from physics.plan.accuracy import PRESETS
 
 G = 9.81
 FLOOR = physics.HalfSpace((0, 1, 0))

@@ -10,7 +10,7 @@ import pytest
 
 import physics
 from physics import scenes, version
-from physics.polyhedron import convex_hull
+from physics.mass.polyhedron import convex_hull
 from physics.summary import LINE, lines_repr, shown
 
 ROWS = 10

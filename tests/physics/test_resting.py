@@ -9,7 +9,7 @@ import pytest
 
 import physics
 from physics import scenes
-from physics.resting import resting_contact
+from physics.analysis.resting_contact import resting_contact
 
 
 def test_block_at_rest_is_carried_by_its_corners():

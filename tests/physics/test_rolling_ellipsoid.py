@@ -9,8 +9,8 @@ import pytest
 from scipy.optimize import brentq
 
 import physics
-from rigid_env.hard_cases.rolling import Ellipse
-from rigid_env.hard_cases.scenery import on_floor
+from rigid_env.lab.hard_cases.cases.rolling import Ellipse
+from rigid_env.lab.hard_cases.cases.scenery import on_floor
 from tests.reference import ellipsoid_on_floor as truth
 
 G = 9.81
@@ -55,7 +55,7 @@ def test_the_reference_keeps_the_energy_and_the_contact():
         motion = truth.move(body, mode, np.linspace(0.0, SECONDS, 21), mu=mu)
         scene = on_floor(body, 0.0, mu)
         parts = (x[:, None] for x in (motion.pos, motion.quat, motion.linvel, motion.angvel))
-        energy = physics.frontier_errors.mechanical_energy(scene, *parts).sum(axis=-1)
+        energy = physics.work_precision.errors.mechanical_energy(scene, *parts).sum(axis=-1)
         np.testing.assert_allclose(energy, energy[0], rtol=1e-9)
         gaps = [
             x[1] + truth.contact_point(np.array(body.semi_axes), truth.rotation_matrix(q))[1]

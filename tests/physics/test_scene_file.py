@@ -11,7 +11,7 @@ import pytest
 
 import physics
 from physics import scenes
-from physics.scene_file import from_toml, to_toml
+from physics.io.toml import from_toml, to_toml
 
 EVERYTHING = physics.Scene(
     [

@@ -12,9 +12,9 @@ from hypothesis import strategies as st
 
 import physics
 from physics import scenes
-from physics.accuracy import resolve
-from rigid_env.hard_cases import registry
-from rigid_env.hard_cases.case import Setting
+from physics.plan.accuracy import resolve
+from rigid_env.lab.hard_cases import registry
+from rigid_env.lab.hard_cases.case import Setting
 
 DT, G, MU = 0.01, scenes.GRAVITY, 0.3
 WEIGHT = scenes.MASS * G

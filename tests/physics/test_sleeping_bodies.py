@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 import physics
-from physics.accuracy import resolve
-from physics.kernels.many.arrays import CONTACTS
+from physics.kernels.multibody.data.arrays import CONTACTS
+from physics.plan.accuracy import resolve
 
 DT, G, MU = 0.01, 9.81, 0.5
 RADIUS = math.sqrt(0.75)  # of a unit cube [m]

@@ -5,8 +5,8 @@ from __future__ import annotations
 import pytest
 
 import physics
-from physics.accuracy import resolve
-from physics.plan_rows import Row
+from physics.plan.accuracy import resolve
+from physics.plan.explanation import Row
 from tests.physics.test_sleeping import BLOCK, sleeping
 
 

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 import physics
 from physics import scenes
-from physics.frontier_errors import distances
+from physics.work_precision.errors import distances
 
 G = scenes.GRAVITY
 TIGHT = physics.Accuracy(tolerance=1e-9)

@@ -12,9 +12,9 @@ import pytest
 
 import physics
 from physics import scenes
-from physics.kernels import layout as at
-from physics.kernels.step import step_worlds
-from physics.report import StepReport
+from physics.kernels.state import layout as at
+from physics.kernels.time_stepping.step import step_worlds
+from physics.world.report import StepReport
 
 WORLDS = 5
 STEPS = 5

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 import physics
 from benchmarks.drawn_effects import one
-from rigid_env.measure import drawn_effects
+from rigid_env.lab.measure import drawn_effects
 from tests.reference.fields import flight_with_drag
 
 DECADES = st.floats(-6.0, 6.0).map(lambda e: 10.0**e)
@@ -288,7 +288,7 @@ FOUND = [
 
 @pytest.mark.parametrize(("names", "on_floor", "seed"), FOUND, ids=lambda value: str(value).replace(" ", "-"))
 def test_draws_that_once_gave_energy(names, on_floor, seed):
-    """The energy of each stays within the law of `rigid_env.measure.drawn_effects`."""
+    """The energy of each stays within the law of `rigid_env.lab.measure.drawn_effects`."""
     outcome = one(names, on_floor, "fast", seed)
     assert outcome.is_finite.all()
     assert (outcome.excess <= 0.0).all()

@@ -12,15 +12,16 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import physics
-from physics import processors, scenes, threads
-from physics.kernels import crew, turns
-from physics.kernels.atomic import add, pause, seen
-from physics.kernels.compiler import kernel
-from physics.kernels.turns import FIRST, TAKEN, next_world
-from physics.kernels.turns import begin as turns_begin
-from physics.machine_code import bound
-from physics.stepper import kernel_calls
-from physics.threads import Team, listed
+from physics import scenes
+from physics.kernels.compile.decorators import kernel
+from physics.kernels.parallel import spin_wait_workers, work_stealing
+from physics.kernels.parallel.atomics import add, pause, seen
+from physics.kernels.parallel.work_stealing import FIRST, TAKEN, next_world
+from physics.kernels.parallel.work_stealing import begin as turns_begin
+from physics.parallel import processors, thread_team
+from physics.parallel.bound_call import bound
+from physics.parallel.thread_team import Team, listed
+from physics.world.stepper import kernel_calls
 
 
 def taken_by(team: Team) -> list[list[int]]:
@@ -68,14 +69,14 @@ def test_worlds_listed_for_a_kernel():
 @given(st.integers(1, 5), st.integers(1, 60), st.integers(1, 9), st.randoms(use_true_random=False))
 def test_whoever_is_fast_each_world_is_taken_once(size, worlds, chunk, random):
     """And a thread takes those of its own range first."""
-    table, lists = turns.make_turns(size, worlds, chunk), turns.make_taken(size, worlds)
-    turns.deal(table)
+    table, lists = work_stealing.make_turns(size, worlds, chunk), work_stealing.make_taken(size, worlds)
+    work_stealing.deal(table)
     for taken in lists:
-        turns.begin(table, taken)
+        work_stealing.begin(table, taken)
     last, busy = [-1] * size, list(range(size))
     while busy:
         k = random.choice(busy)
-        last[k] = turns.next_world(last[k], table, lists[k])
+        last[k] = work_stealing.next_world(last[k], table, lists[k])
         if last[k] < 0:
             busy.remove(k)
     each = [taken[FIRST : FIRST + taken[TAKEN]].tolist() for taken in lists]
@@ -125,8 +126,8 @@ SLOW = 2_000_000  # pauses: some hundredths of a second
 @pytest.mark.parametrize(("patience", "stay"), [(0.0, 0.0), (10.0, 0.0), (0.0, 10.0), (10.0, 10.0)])
 @pytest.mark.parametrize("slow", [0, 1, 2])
 def test_a_run_ends_when_the_slowest_is_done(slow, patience, stay, sent, monkeypatch):
-    monkeypatch.setattr(threads, "PATIENCE", patience)
-    monkeypatch.setattr(threads, "STAY", stay)
+    monkeypatch.setattr(thread_team, "PATIENCE", patience)
+    monkeypatch.setattr(thread_team, "STAY", stay)
     team, (calls, visits, pauses) = Team(3, 100), visitors(3)
     pauses[slow] = SLOW
     for times in range(1, 4):
@@ -137,8 +138,8 @@ def test_a_run_ends_when_the_slowest_is_done(slow, patience, stay, sent, monkeyp
 
 def test_who_stays_is_not_sent_for_again(sent, monkeypatch):
     """Also for other calls; who is gone is, and who leads does not wait for those who stay when all is over."""
-    monkeypatch.setattr(threads, "PATIENCE", 10.0)
-    monkeypatch.setattr(threads, "STAY", 100.0)
+    monkeypatch.setattr(thread_team, "PATIENCE", 10.0)
+    monkeypatch.setattr(thread_team, "STAY", 100.0)
     team, (calls, visits, _), (others, seen, _) = Team(3, 100), visitors(3), visitors(3)
     for _ in range(5):
         team.run(calls)
@@ -155,14 +156,14 @@ def test_who_stays_is_not_sent_for_again(sent, monkeypatch):
 
 
 def test_who_is_not_called_soon_goes(sent, monkeypatch):
-    monkeypatch.setattr(threads, "PATIENCE", 10.0)
-    monkeypatch.setattr(threads, "STAY", 0.0)
+    monkeypatch.setattr(thread_team, "PATIENCE", 10.0)
+    monkeypatch.setattr(thread_team, "STAY", 0.0)
     team, (calls, visits, _) = Team(2, 100), visitors(2)
     for times in range(1, 4):
         team.run(calls)
         for future in team._futures.values():
             future.result(timeout=60)
-        assert team._crew[1, crew.STATE] == crew.AWAY
+        assert team._crew[1, spin_wait_workers.STATE] == spin_wait_workers.AWAY
         assert len(sent) == times
     assert visits.tolist() == [[3, 3]]
     team.close()
@@ -171,7 +172,7 @@ def test_who_is_not_called_soon_goes(sent, monkeypatch):
 @pytest.mark.parametrize("stay", [0.0, 10.0])
 @pytest.mark.parametrize("guilty", [0, 1])
 def test_what_a_thread_raises_is_raised_and_the_team_goes_on(guilty, stay, sent, monkeypatch):
-    monkeypatch.setattr(threads, "STAY", stay)
+    monkeypatch.setattr(thread_team, "STAY", stay)
     team, (calls, visits, pauses) = Team(2, 100), visitors(2)
     for times in (1, 2):
         pauses[guilty] = -1
@@ -190,7 +191,7 @@ def test_after_an_interrupt_the_team_waits_for_who_is_busy(delay, sent, monkeypa
     something else to do.
     """
     be_member = Team._be_member
-    monkeypatch.setattr(threads, "PATIENCE", 0.0)
+    monkeypatch.setattr(thread_team, "PATIENCE", 0.0)
     monkeypatch.setattr(Team, "_be_member", lambda team, member: (time.sleep(delay), be_member(team, member)))
     team, (calls, visits, pauses) = Team(2, 100), visitors(2)
     team.run(calls)
@@ -224,7 +225,7 @@ def take_all(turns, taken, visits, failing):
 
 def test_nobody_waits_for_a_thread_that_has_not_begun(sent, monkeypatch):
     """Its list is empty then, also where it was not before, and it is sent for once."""
-    monkeypatch.setattr(threads, "STAY", 0.0)
+    monkeypatch.setattr(thread_team, "STAY", 0.0)
     team, (calls, _, pauses), visits = Team(2, 100), visitors(2), np.zeros(100, dtype=np.int64)
     pauses[1] = -1
     with pytest.raises(ZeroDivisionError):  # the member's call has raised the last time that it was made
@@ -249,8 +250,8 @@ def test_nobody_waits_for_a_thread_that_has_not_begun(sent, monkeypatch):
 
 def test_what_was_raised_is_not_raised_again(sent, monkeypatch):
     """By a call that is left out in the next run, in which another one is not finished soon."""
-    monkeypatch.setattr(threads, "PATIENCE", 0.0)
-    monkeypatch.setattr(threads, "STAY", 0.0)
+    monkeypatch.setattr(thread_team, "PATIENCE", 0.0)
+    monkeypatch.setattr(thread_team, "STAY", 0.0)
     team, (calls, _, pauses), (others, visits, slow) = Team(3, 100), visitors(3), visitors(2)
     pauses[2], slow[1] = -1, SLOW
     with pytest.raises(ZeroDivisionError):
@@ -267,15 +268,15 @@ def test_what_was_raised_is_not_raised_again(sent, monkeypatch):
 @pytest.mark.parametrize(("switch", "others"), [("", 1), ("fixed", 3)])
 def test_no_more_threads_than_processors(switch, others, sent, monkeypatch):
     monkeypatch.setattr(processors, "usable", lambda: 2)
-    monkeypatch.setenv(threads.SWITCH, switch)
-    monkeypatch.setattr(threads, "STAY", 100.0)
+    monkeypatch.setenv(thread_team.SWITCH, switch)
+    monkeypatch.setattr(thread_team, "STAY", 100.0)
     world = physics.World(scenes.shove(), worlds=40, dt=0.01, accuracy="fast", threads=4)
     for _ in range(3):
         world.step()
         assert sorted(np.concatenate(taken_by(world.team))) == list(range(40))
     assert len(sent) == others
-    assert (world.team._crew[0, crew.GIVE_WAY] == 0) == (switch == "fixed")
-    assert world.team._crew[0, crew.PROCESSOR] == 0
+    assert (world.team._crew[0, spin_wait_workers.GIVE_WAY] == 0) == (switch == "fixed")
+    assert world.team._crew[0, spin_wait_workers.PROCESSOR] == 0
     assert not world.team.taken[1 + others :, TAKEN].any()
     world.team.close()
 

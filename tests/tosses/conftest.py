@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from rigid_env.tosses import data
-from rigid_env.tosses.replay import Cube, Starts, attitude, replay
+from rigid_env.lab.tosses import data
+from rigid_env.lab.tosses.replay import Cube, Starts, attitude, replay
 
 MEASURED = Path(__file__).parents[3] / "shared" / "data" / "cube_tosses.npz"
 FRAMES = 70

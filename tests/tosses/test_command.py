@@ -7,10 +7,10 @@ import pytest
 from typer.testing import CliRunner
 
 from rigid_env.cli import app
-from rigid_env.tosses import report as reports
-from rigid_env.tosses.fit import QUICK
-from rigid_env.tosses.limits import faces_down
-from rigid_env.tosses.report import Measurement
+from rigid_env.lab.tosses import report as reports
+from rigid_env.lab.tosses.fit import QUICK
+from rigid_env.lab.tosses.limits import faces_down
+from rigid_env.lab.tosses.report import Measurement
 
 runner = CliRunner()
 
@@ -88,7 +88,7 @@ def test_faces_down_by_hand():
 
 def test_real_tosses_are_within_reach(measured):
     """With friction and restitution as fitted by hand; MuJoCo, Drake and PyBullet have 0.133 to 0.145 and more."""
-    from rigid_env.tosses.replay import Cube, Recording
+    from rigid_env.lab.tosses.replay import Cube, Recording
 
     measurement = Measurement(measured, effort=QUICK)
     cube = Cube(friction=0.18, restitution=0.2, side=0.098, inertia=0.00122)

@@ -5,7 +5,7 @@ import re
 import numpy as np
 import pytest
 
-from rigid_env.tosses import data
+from rigid_env.lab.tosses import data
 
 
 def saved(path, **arrays):

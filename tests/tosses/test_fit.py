@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from rigid_env.tosses.fit import BOUNDS, Effort, Objective, check_names, fit
-from rigid_env.tosses.flight import measure_flight
-from rigid_env.tosses.replay import Cube, Recording
+from rigid_env.lab.tosses.fit import BOUNDS, Effort, Objective, check_names, fit
+from rigid_env.lab.tosses.flight import measure_flight
+from rigid_env.lab.tosses.replay import Cube, Recording
 
 
 def test_fit_finds_the_friction_and_restitution_of_the_engines_own_tosses(made, true_cube):

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from rigid_env.tosses.data import SIDE
-from rigid_env.tosses.metric import Summary, angle, compare
+from rigid_env.lab.tosses.data import SIDE
+from rigid_env.lab.tosses.metric import Summary, angle, compare
 
 
 def about_x(degrees):

@@ -5,10 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rigid_env.tosses import data
-from rigid_env.tosses.flight import disturb, first_flight, measure_flight, rest_scale
-from rigid_env.tosses.metric import compare
-from rigid_env.tosses.replay import BATCH, Cube, Recording, Starts, attitude, batches, replay, starts, sunken
+from rigid_env.lab.tosses import data
+from rigid_env.lab.tosses.flight import disturb, first_flight, measure_flight, rest_scale
+from rigid_env.lab.tosses.metric import compare
+from rigid_env.lab.tosses.replay import BATCH, Cube, Recording, Starts, attitude, batches, replay, starts, sunken
 
 
 def test_own_tosses_are_replayed_to_rounding(made, true_cube):

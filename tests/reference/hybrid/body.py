@@ -7,8 +7,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from physics.effects import Contact, Friction, Gravity
-from physics.scene import Scene
+from physics.scene.effects import Contact, Friction, Gravity
+from physics.scene.scene import Scene
 from tests.reference.rigid_body import rotation_matrix
 
 POS, QUAT, VEL, ANGVEL, GAPS = slice(0, 3), slice(3, 7), slice(7, 10), slice(10, 13), slice(13, -1)

@@ -1,0 +1,1 @@
+"""Energies, trajectories, and the exercises of the course notes."""

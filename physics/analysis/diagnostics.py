@@ -1,0 +1,103 @@
+"""Energy, momenta and gaps of a world: what one looks at, never what the step needs."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from physics import validation
+from physics.kernels.forces.queries import look_at_fields
+from physics.kernels.half_space.gap_queries import spring_energies
+from physics.kernels.state import layout as at
+from physics.kernels.state.contact_law_dispatch import STIFFNESS
+from physics.kernels.time_stepping.workspace import body_records
+from physics.parallel.exclusive import exclusive
+from physics.scene.field_errors import raised
+from physics.summary import lines_repr
+from physics.world.wall_distance import wall_gaps
+from physics.world.world import World
+
+
+@dataclass(frozen=True)
+class Diagnostics:
+    """Per world and body, shape (worlds, bodies) or (worlds, bodies, 3)."""
+
+    kinetic_energy: np.ndarray  # [J]
+    potential_energy: np.ndarray  # [J]: of gravity (0 at the origin), springs of contact, and fields that have one
+    momentum: np.ndarray  # [kg m/s], world frame
+    angular_momentum: np.ndarray  # about the centre of mass [kg m²/s], world frame
+    gap: np.ndarray  # smallest distance to a wall [m], negative when penetrating, inf without walls
+
+    def __repr__(self) -> str:
+        worlds, bodies = self.gap.shape
+        return lines_repr(
+            "Diagnostics", f"{worlds} worlds of {bodies} bodies",
+            f"energy {self.energy.min():.6g} to {self.energy.max():.6g} J",
+            f"gap {self.gap.min():.6g} to {self.gap.max():.6g} m",
+        )  # fmt: skip
+
+    @property
+    def energy(self) -> np.ndarray:
+        """Kinetic and potential energy [J], (worlds, bodies)."""
+        return self.kinetic_energy + self.potential_energy
+
+
+def diagnose(world: World) -> Diagnostics:
+    """Energy, momenta and gaps of every body of `world` now.
+
+    Kinetic energy is ½ P·v + ½ L·ω, potential energy -m g·x and what fields (`Field.energy`) add,
+    and springs of contact.
+    """
+    validation.instance(world, World, "world", "a physics.World")
+    return _diagnose(world)
+
+
+@exclusive
+def _diagnose(world: World) -> Diagnostics:
+    shape = (world.worlds, world.body_count)
+    mass = 1.0 / world.params[:, at.INV_MASS].reshape(shape)
+    angular = world.state[:, at.ANGMOM : at.ANGMOM + 3].reshape(*shape, 3)
+    momentum = mass[..., None] * world.linvel
+    gaps, which = wall_gaps(world, world.state, world.params)
+    potential = -mass * np.sum(world.gravity[:, None, :] * world.pos, axis=-1)
+    if world.plan.fields:
+        potential += _look_at(world)[1].reshape(shape)
+    laws = world.plan.laws
+    if STIFFNESS in laws:
+        energies, column = np.empty(len(world.state)), world.params.shape[1] - len(laws) + laws.index(STIFFNESS)
+        spring_energies(world.state, world.params, world.shapes, world.walls, column, energies)
+        potential += energies.reshape(shape)
+    return Diagnostics(
+        kinetic_energy=0.5 * np.sum(momentum * world.linvel + angular * world.angvel, axis=-1),
+        potential_energy=potential,
+        momentum=momentum,
+        angular_momentum=angular.copy(),
+        gap=np.where(which < 0, np.inf, gaps).reshape(shape),
+    )
+
+
+def look_at(world: World) -> tuple[np.ndarray, np.ndarray]:
+    """Loads and energies of the scene's fields now.
+
+    Returns
+    -------
+    wrenches : (worlds * bodies, 6) float64
+        Force [N] and torque about the centre of mass [N m], world frame.
+    energies : (worlds * bodies,) float64
+        Potential energies [J].
+    """
+    validation.instance(world, World, "world", "a physics.World")
+    return exclusive(_look_at)(world)
+
+
+def _look_at(world: World) -> tuple[np.ndarray, np.ndarray]:
+    """`look_at` in the workspace of a step, which therefore must not be taken meanwhile."""
+    wrenches, energies = np.zeros((len(world.state), 6)), np.zeros(len(world.state))
+    if world.plan.fields:
+        arrays = world.state, world.params, world.shapes
+        try:
+            look_at_fields(*arrays, world.plan.tilted, world.time, body_records(world.scratch[0]), wrenches, energies)
+        except IndexError as error:
+            raise raised(error, world.plan.fields) from error
+    return wrenches, energies

@@ -1,0 +1,177 @@
+"""Scenes as MJCF, MuJoCo's format: what it can express is written, free bodies and planes are read.
+
+Frames: a body's frame here is at its centre of mass, so the exported bodies have `inertial pos="0 0 0"`. A free joint
+turns in the body's frame there, in the world's here; the start velocities stand in a keyframe `start`.
+"""
+
+from __future__ import annotations
+
+import xml.etree.ElementTree as ET
+from pathlib import Path
+
+import numpy as np
+
+from physics import validation
+from physics.io.mjcf_reader import read_scene
+from physics.scene.effects import Contact, Friction, Gravity
+from physics.scene.force_fields import Spring
+from physics.scene.scene import Scene
+from physics.work_precision.errors import rotation_matrices
+
+GEOMS = {"block": "box", "sphere": "sphere", "ellipsoid": "ellipsoid", "hull": "mesh"}
+KEYFRAME = "start"
+
+
+def save_mjcf(scene: Scene, path: str | Path, drop: bool = False) -> None:
+    """Write a scene for MuJoCo.
+
+    Bodies with mass, inertia, pose and velocity (hulls as meshes, which `load_mjcf` does not read), planes, gravity,
+    friction and springs. The contacts are MuJoCo's soft
+    ones with its defaults, its time step too.
+
+    Parameters
+    ----------
+    scene : Scene
+    path : str or Path
+    drop : bool
+        Leave out what MJCF cannot express instead of refusing; a comment in the file names it.
+
+    Raises
+    ------
+    ValueError
+        Naming the effects that MJCF cannot express, unless `drop`.
+    """
+    validation.instance(scene, Scene, "scene", "a physics.Scene")
+    validation.path(path)
+    Path(path).write_text(to_mjcf(scene, drop), encoding="utf-8")
+
+
+def load_mjcf(path: str | Path) -> Scene:
+    """Read a scene of free bodies and planes from MJCF.
+
+    Free bodies of one box, sphere or ellipsoid each in the world body, planes, gravity, one coefficient of friction,
+    and the velocities of the first keyframe.
+
+    Raises
+    ------
+    ValueError
+        Naming the element that a scene here cannot hold.
+    OSError
+        The file cannot be read.
+    """
+    validation.path(path)
+    try:
+        text = Path(path).read_text(encoding="utf-8")
+    except UnicodeDecodeError as error:
+        raise ValueError(f"{path}: byte {error.start} is no UTF-8; allowed is a text file in MJCF") from None
+    return from_mjcf(text, str(path))
+
+
+def from_mjcf(text: str, source: str = "model") -> Scene:
+    """The scene of an MJCF text; `source` is what messages call it."""
+    try:
+        root = ET.fromstring(text)
+    except ET.ParseError as error:
+        raise ValueError(f"{source}: {error}") from None
+    try:
+        return read_scene(root)
+    except ValueError as error:
+        raise ValueError(f"{source}: {error}") from None
+
+
+def to_mjcf(scene: Scene, drop: bool = False) -> str:
+    """The text that `save_mjcf` writes."""
+    lost = _inexpressible(scene)
+    if lost and not drop:
+        raise ValueError(f"MJCF cannot express {', '.join(map(repr, lost))}; pass drop=True to leave that out")
+    root = ET.Element("mujoco", model="scene")
+    if lost:
+        root.append(ET.Comment(f" left out: {', '.join(map(repr, lost))} ".replace("--", "- -")))
+    ET.SubElement(root, "compiler", angle="radian")
+    gravity = scene.effect(Gravity)
+    ET.SubElement(root, "option", gravity=_text(gravity.acceleration if gravity else (0, 0, 0)))
+    _add_meshes(root, scene)
+    world = ET.SubElement(root, "worldbody")
+    surface = _surface(scene)
+    for wall in scene.walls:
+        touch = {"contype": "0", "conaffinity": "1" if scene.effect(Contact) else "0"}
+        place = {"pos": _text(wall.offset * np.array(wall.normal)), "zaxis": _text(wall.normal), "size": "0 0 1"}
+        ET.SubElement(world, "geom", type="plane", **place, **touch, **surface)
+    springs = [effect for effect in scene.effects if isinstance(effect, Spring)]
+    for b, body in enumerate(scene.bodies):
+        _add_body(world, b, body, scene.effect(Contact), surface, springs)
+    if springs:
+        _add_springs(root, world, springs)
+    _add_keyframe(root, scene)
+    ET.indent(root)
+    return ET.tostring(root, encoding="unicode") + "\n"
+
+
+def _add_meshes(root: ET.Element, scene: Scene) -> None:
+    """Corners of the hulls, about their centres of mass."""
+    hulls = {f"hull{b}": body for b, body in enumerate(scene.bodies) if body.kind == "hull"}
+    assets = ET.SubElement(root, "asset") if hulls else None
+    for name, body in hulls.items():
+        ET.SubElement(assets, "mesh", name=name, vertex=_text(body.polyhedron.vertices))
+
+
+def _inexpressible(scene: Scene) -> list:
+    contact = scene.effect(Contact)
+    lost = [contact] if contact and (contact.restitution or contact.tangential or contact.stiffness) else []
+    friction = scene.effect(Friction)
+    lost += [friction] if friction and friction.axis is not None else []
+    return lost + [e for e in scene.effects if not isinstance(e, (Gravity, Contact, Friction, Spring))]
+
+
+def _text(numbers) -> str:
+    """Numbers to the last bit."""
+    return " ".join(repr(float(number)) for number in np.ravel(numbers))
+
+
+def _surface(scene: Scene) -> dict[str, str]:
+    """Friction of all geoms: MuJoCo takes the larger of two, and condim 1 has none."""
+    friction = scene.effect(Friction)
+    if friction is None or friction.axis is not None:
+        return {"condim": "1"}
+    return {"condim": "3", "friction": _text((friction.coefficient, 0, 0))}
+
+
+def _add_body(world: ET.Element, b: int, body, contact: Contact | None, surface: dict, springs: list[Spring]) -> None:
+    """One free body; its frame is that of the scene's body."""
+    element = ET.SubElement(world, "body", name=f"body{b}", pos=_text(body.pos), quat=_text(body.quat))
+    ET.SubElement(element, "freejoint")
+    I = body.inertia
+    full = _text((I[0, 0], I[1, 1], I[2, 2], I[0, 1], I[0, 2], I[1, 2]))
+    ET.SubElement(element, "inertial", pos="0 0 0", mass=_text(body.mass), fullinertia=full)
+    size = body.dimensions[:1] if body.kind == "sphere" else body.dimensions
+    extent = {"mesh": f"hull{b}"} if body.kind == "hull" else {"size": _text(size)}
+    shape = {"type": GEOMS[body.kind], **extent, "pos": _text(body.center)}
+    touch = {
+        "contype": str(int(contact is not None)),
+        "conaffinity": str(int(bool(contact and contact.between_bodies))),
+    }
+    ET.SubElement(element, "geom", **shape, **touch, **surface)
+    for k, spring in enumerate(springs):
+        if spring.body == b:
+            ET.SubElement(element, "site", name=f"point{k}", pos=_text(spring.point))
+        if spring.other == b:
+            ET.SubElement(element, "site", name=f"anchor{k}", pos=_text(spring.anchor))
+
+
+def _add_springs(root: ET.Element, world: ET.Element, springs: list[Spring]) -> None:
+    """A spring is a straight tendon from a site of the world, or of another body, to one of the body."""
+    tendons = ET.SubElement(root, "tendon")
+    for k, spring in enumerate(springs):
+        if spring.other is None:
+            ET.SubElement(world, "site", name=f"anchor{k}", pos=_text(spring.anchor))
+        law = {"stiffness": spring.stiffness, "damping": spring.damping, "springlength": spring.length}
+        line = ET.SubElement(tendons, "spatial", {name: _text(value) for name, value in law.items()})
+        for end in ("anchor", "point"):
+            ET.SubElement(line, "site", site=f"{end}{k}")
+
+
+def _add_keyframe(root: ET.Element, scene: Scene) -> None:
+    qpos = [(*body.pos, *body.quat) for body in scene.bodies]
+    qvel = [(*body.linvel, *(rotation_matrices(np.array(body.quat)).T @ body.angvel)) for body in scene.bodies]
+    keys = ET.SubElement(root, "keyframe")
+    ET.SubElement(keys, "key", name=KEYFRAME, qpos=_text(qpos), qvel=_text(qvel))

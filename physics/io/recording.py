@@ -1,0 +1,246 @@
+"""A stretch of one world's steps as a file, and its replay, bit for bit.
+
+A world's future is decided by its `Snapshot`, the wrenches and the lengths of its steps: a recording holds these, the
+scene as text, and the state after every step, so that a replay can tell whether it came out the same.
+"""
+
+from __future__ import annotations
+
+import json
+import platform
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from zipfile import BadZipFile, is_zipfile
+
+import numba
+import numpy as np
+
+from physics import validation
+from physics.analysis.diagnostics import diagnose
+from physics.io.toml import from_toml, to_toml
+from physics.kernels.compile.decorators import folder_name
+from physics.kernels.state import layout as at
+from physics.plan.accuracy import Accuracy
+from physics.scene.force_field import Field
+from physics.scene.scene import Scene
+from physics.summary import lines_repr
+from physics.version import version
+from physics.world.report import StepReport
+from physics.world.stepper import Stepper
+from physics.world.world import KEPT, Snapshot, World
+
+# Number of the format; a reader refuses what is newer than itself.
+FORMAT = 1
+
+
+@dataclass(frozen=True)
+class Start:
+    """A point from which the recorded world went on: the first one, and each at which it was changed from outside.
+
+    Parameters
+    ----------
+    step : int
+        Number of the recorded step that it is before.
+    snapshot : Snapshot
+        Of one world.
+    """
+
+    step: int
+    snapshot: Snapshot
+
+
+@dataclass(frozen=True)
+class Recording:
+    """Consecutive calls of `World.step` of one world.
+
+    Parameters
+    ----------
+    scene : Scene
+    accuracy : Accuracy
+    starts : tuple of Start
+        The first is before step 0.
+    wrenches : (n, bodies, 6) float64
+        Force [N] and torque [N m] of each call, world frame.
+    steps : (n,) int64
+        Steps that each call took at once.
+    dt : (n,) float64
+        Length of one of them [s].
+    states : (n, bodies, STATE_SIZE) float64
+        After each call; columns in `physics.kernels.state.layout`.
+    reason : str
+        Why it was kept.
+    origin : dict of str to str
+        What it was made with: version, kernels, numba, numpy, python, machine.
+    """
+
+    scene: Scene
+    accuracy: Accuracy
+    starts: tuple[Start, ...]
+    wrenches: np.ndarray
+    steps: np.ndarray
+    dt: np.ndarray
+    states: np.ndarray
+    reason: str
+    origin: dict
+
+    def __repr__(self) -> str:
+        return lines_repr(
+            "Recording", f"{len(self)} calls of step", f"{len(self.scene.bodies)} bodies",
+            f"{len(self.starts)} starts", f"reason={self.reason!r}",
+        )  # fmt: skip
+
+    def __len__(self) -> int:
+        return len(self.states)
+
+    def world(self) -> World:
+        """A `World` of one world as it was before the first step."""
+        world = World(self.scene, dt=float(self.dt[0]) if len(self) else 0.01, accuracy=self.accuracy)
+        world.restore(self.starts[0].snapshot)
+        return world
+
+    def replay(self) -> Replay:
+        """Take the recorded steps again, in a new `World`."""
+        world = self.world()
+        starts = {start.step: start.snapshot for start in self.starts}
+        steppers: dict[tuple[int, float], Stepper] = {}
+        states, reports, energies = [], [], []
+        for k, (wrench, steps, dt) in enumerate(zip(self.wrenches, self.steps.tolist(), self.dt.tolist())):
+            if k in starts:
+                world.restore(starts[k])
+            if (steps, dt) not in steppers:
+                steppers[steps, dt] = Stepper(world, steps, dt)
+            stepper = steppers[steps, dt]
+            stepper.wrench[0] = wrench  # as it was: `World.step` would refuse one that is not finite
+            stepper()
+            states.append(world.state.copy())
+            reports.append(world.report)
+            energies.append(float(diagnose(world).energy.sum()))
+        return Replay(self, np.array(states).reshape(self.states.shape), tuple(reports), np.array(energies))
+
+    def save(self, path: str | Path) -> Path:
+        """Write it as ``.npz`` (`load` reads it); returns the path."""
+        head = {
+            "format": FORMAT, "scene": to_toml(self.scene), "accuracy": asdict(self.accuracy), "reason": self.reason,
+            "origin": self.origin,
+        }  # fmt: skip
+        columns = zip(*(start.snapshot.arrays for start in self.starts))
+        with open(path, "wb") as file:
+            np.savez_compressed(
+                file,
+                head=json.dumps(head),
+                wrenches=self.wrenches, steps=self.steps, dt=self.dt, states=self.states,
+                start_steps=[start.step for start in self.starts],
+                start_times=[start.snapshot.time for start in self.starts],
+                **{f"start_{name}": np.array(column) for name, column in zip(KEPT, columns)},
+            )  # fmt: skip
+        return Path(path)
+
+    @classmethod
+    def load(cls, path: str | Path, kinds: Sequence[type[Field]] = ()) -> Recording:
+        """Read a recording.
+
+        Parameters
+        ----------
+        path : str or Path
+        kinds : sequence of classes, optional
+            Fields of your own that its scene may name; a file never imports code on its own.
+
+        Raises
+        ------
+        ValueError
+            It is no recording, or one of a newer format.
+        OSError
+            The file cannot be read.
+        """
+        validation.path(path)
+        if not is_zipfile(path) and Path(path).is_file():
+            raise ValueError(f"{path} is no recording; allowed is what physics.Recorder writes (.npz)")
+        try:
+            with np.load(path, allow_pickle=False) as file:
+                content = dict(file)
+            head = json.loads(str(content["head"]))
+            content["start_report_table"] = _widened(content["start_report_table"])
+            columns = [content[f"start_{name}"] for name in KEPT if name != "sleep" or "start_sleep" in content]
+        except (KeyError, ValueError, TypeError, EOFError, BadZipFile) as error:
+            raise ValueError(f"{path} is no recording ({error}); allowed is what physics.Recorder writes") from None
+        if head["format"] > FORMAT:
+            raise ValueError(f"{path} has format {head['format']}; allowed are formats up to {FORMAT}")
+        starts = zip(content["start_steps"].tolist(), content["start_times"].tolist(), zip(*columns))
+        return cls(
+            scene=from_toml(head["scene"], str(path), kinds),
+            accuracy=Accuracy(**head["accuracy"]),
+            starts=tuple(Start(step, Snapshot(arrays, time)) for step, time, arrays in starts),
+            **{name: content[name] for name in ("wrenches", "steps", "dt", "states")},
+            reason=head["reason"],
+            origin=head["origin"],
+        )
+
+
+def _widened(table: np.ndarray) -> np.ndarray:
+    """A report table (..., columns) of a version with fewer columns, with zeros for the others."""
+    return np.pad(table, [(0, 0)] * (table.ndim - 1) + [(0, max(0, at.REPORT_SIZE - table.shape[-1]))])
+
+
+@dataclass(frozen=True)
+class Replay:
+    """Outcome of taking the steps of a `Recording` again.
+
+    Parameters
+    ----------
+    recording : Recording
+    states : (n, bodies, STATE_SIZE) float64
+    reports : tuple of StepReport
+    energies : (n,) float64
+        Of all bodies, kinetic and potential [J].
+    """
+
+    recording: Recording
+    states: np.ndarray
+    reports: tuple[StepReport, ...]
+    energies: np.ndarray
+
+    def __repr__(self) -> str:
+        first = self.first_difference
+        told = "identical" if first is None else f"the first difference is after call {first}"
+        return lines_repr("Replay", f"{len(self.states)} calls of step", told)
+
+    @property
+    def first_difference(self) -> int | None:
+        """The first step after which a state differs in a bit from what was recorded; None: none does."""
+        ours, theirs = self.states.view(np.int64), self.recording.states.view(np.int64)
+        different = np.flatnonzero((ours != theirs).any(axis=(1, 2)))
+        return int(different[0]) if len(different) else None
+
+    @property
+    def is_identical(self) -> bool:
+        """Test whether every state came out the same, bit for bit."""
+        return self.first_difference is None
+
+    @property
+    def distances(self) -> np.ndarray:
+        """(n,) largest distance of any body from where it was recorded [m]."""
+        offset = (self.states - self.recording.states)[:, :, at.POS : at.POS + 3]
+        return np.sqrt((offset * offset).sum(axis=-1)).max(axis=1, initial=0.0)
+
+    @property
+    def times(self) -> np.ndarray:
+        """(n,) time after each call since the world began [s]."""
+        recording, times, now = self.recording, [], 0.0
+        starts = {start.step: start.snapshot.time for start in recording.starts}
+        for k, (steps, dt) in enumerate(zip(recording.steps.tolist(), recording.dt.tolist())):
+            now = starts.get(k, now) + steps * dt
+            times.append(now)
+        return np.array(times)
+
+
+def origin() -> dict[str, str]:
+    """Software and processor of a recording made here: where any differs, a replay may differ in the last bits."""
+    return {
+        "version": version(),
+        "kernels": folder_name(),  # digest of their sources
+        "numba": numba.__version__,
+        "numpy": np.__version__,
+        "python": platform.python_version(),
+        "machine": platform.platform(),
+    }

@@ -1,0 +1,189 @@
+"""Scenes as TOML files: what a scene is, written down without its code.
+
+One table per body, wall and effect; `kind` is the class, the other keys are its parameters under their names, in SI
+units. What is left out keeps its default. Files are read with the standard library's reader and written with tomlkit.
+"""
+
+from __future__ import annotations
+
+import re
+import sys
+from collections.abc import Iterable, Sequence
+from dataclasses import MISSING, fields
+from pathlib import Path
+
+import tomlkit
+
+from physics import validation
+from physics.io.scene_places import Places
+from physics.keywords import known_keywords, nearest_first
+from physics.scene.bodies import Block, Ellipsoid, Hull, Sphere
+from physics.scene.effects import Actuator, Contact, Friction, Gravity, RollingFriction, Sleeping, SpinFriction
+from physics.scene.force_field import Field
+from physics.scene.force_fields import FIELDS
+from physics.scene.scene import HalfSpace, Scene
+from physics.summary import shown
+
+if sys.version_info >= (3, 11):
+    import tomllib
+else:
+    import tomli as tomllib
+
+# Number of the format; a reader refuses what is newer than itself.
+FORMAT = 1
+
+BODIES = (Block, Sphere, Ellipsoid, Hull)
+EFFECTS = (Gravity, Contact, Friction, RollingFriction, SpinFriction, Actuator, Sleeping, *FIELDS)
+LISTS = ("bodies", "walls", "effects")
+
+
+def save_scene(scene: Scene, path: str | Path) -> None:
+    """Write a scene as TOML; `load_scene` gives an equal one.
+
+    Fields of your own are written by the name of their class; `load_scene` wants that class among its `kinds`.
+
+    Parameters
+    ----------
+    scene : Scene
+    path : str or Path
+    """
+    validation.instance(scene, Scene, "scene", "a physics.Scene")
+    validation.path(path)
+    Path(path).write_text(to_toml(scene), encoding="utf-8")
+
+
+def to_toml(scene: Scene) -> str:
+    """The text that `save_scene` writes."""
+    document = tomlkit.document()
+    document.add(tomlkit.comment("Metres, kilograms, seconds, radians; quaternions (w, x, y, z), body to world."))
+    document.add("format", FORMAT)
+    for name in LISTS:
+        tables = tomlkit.aot()
+        for item in getattr(scene, name):
+            table = tomlkit.table()
+            if name != "walls":
+                table.add("kind", type(item).__name__)
+            for key, value in _parameters(item).items():
+                table.add(key, value)
+            tables.append(table)
+        if len(tables):
+            document.add(name, tables)
+    return tomlkit.dumps(document)
+
+
+def _parameters(item) -> dict:
+    """Parameters of a body, wall or effect that are not at their defaults, as lists and numbers."""
+    found = {}
+    for field in fields(item):
+        value = getattr(item, field.name)
+        if field.default is MISSING or value != field.default:
+            found[field.name] = _plain(value)
+    return found
+
+
+def _plain(value):
+    return [_plain(part) for part in value] if isinstance(value, tuple) else value
+
+
+@known_keywords
+def load_scene(path: str | Path, kinds: Sequence[type[Field]] = ()) -> Scene:
+    """Read a scene from a TOML file.
+
+    Parameters
+    ----------
+    path : str or Path
+    kinds : sequence of classes, optional
+        Fields of your own that the file may name. A file never imports code on its own.
+
+    Raises
+    ------
+    ValueError
+        Naming file, line and key, the value, and what is allowed.
+    OSError
+        The file cannot be read.
+    """
+    validation.path(path)
+    try:
+        text = Path(path).read_text(encoding="utf-8")
+    except UnicodeDecodeError as error:
+        raise ValueError(f"{path}: byte {error.start} is no UTF-8; allowed is a text file in TOML") from None
+    return from_toml(text, str(path), kinds)
+
+
+def from_toml(text: str, source: str = "scene", kinds: Sequence[type[Field]] = ()) -> Scene:
+    """The scene that a text describes; `source` is what messages call it."""
+    kinds = _own_kinds(kinds)
+    try:
+        content = tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        raise ValueError(_syntax_error(text, source, str(error))) from None
+    places = Places(text, source)
+    for key in content:
+        if key not in ("format", *LISTS):
+            allowed = ", ".join(nearest_first(key, ("format", *LISTS)))
+            raise places.error(None, 0, key, f"{key} is not known; allowed are {allowed}")
+    number = content.get("format", FORMAT)
+    if type(number) is not int or number not in range(1, FORMAT + 1):
+        raise places.error(None, 0, "format", f"format is {shown(number)}; allowed is {FORMAT}")
+    known = {"bodies": BODIES, "walls": (HalfSpace,), "effects": (*EFFECTS, *kinds)}
+    lists = {name: _build_all(places, name, content.get(name, []), known[name]) for name in LISTS}
+    try:
+        return Scene(**lists)
+    except ValueError as error:
+        raise places.error_of_scene(lists, str(error)) from None
+
+
+def _own_kinds(kinds) -> tuple:
+    """The classes of a user's fields that a file may name."""
+    found = tuple(kinds) if isinstance(kinds, Iterable) else (kinds,)
+    for kind in found:
+        if not isinstance(kind, type) or not issubclass(kind, Field):
+            raise ValueError(f"kinds holds {shown(kind)}; allowed are subclasses of physics.Field")
+    return found
+
+
+def _syntax_error(text: str, source: str, message: str) -> str:
+    """The reader's message, its place in front and the line itself behind."""
+    told = re.fullmatch(r"(.*) \(at (?:line (\d+), column (\d+)|end of document)\)", message, re.DOTALL)
+    if told is None:
+        return f"{source}: {message}"
+    lines = text.splitlines()
+    line = int(told.group(2) or max(len(lines), 1))
+    place = f"line {line}" + (f", column {told.group(3)}" if told.group(3) else ", at its end")
+    stands = shown(lines[line - 1].strip()) if line <= len(lines) else "''"
+    return f"{source}, {place}: {told.group(1)}, in {stands}; allowed is TOML, as `physics.save_scene` writes it"
+
+
+def _build_all(places: Places, name: str, tables, known: tuple[type, ...]) -> list:
+    """The objects of a list of tables."""
+    if not isinstance(tables, list) or not all(isinstance(table, dict) for table in tables):
+        raise places.error(None, 0, name, f"{name} is {shown(tables)}; allowed are tables [[{name}]]")
+    return [_build(places, name, k, dict(table), known) for k, table in enumerate(tables)]
+
+
+def _build(places: Places, name: str, index: int, table: dict, known: tuple[type, ...]):
+    kinds = {kind.__name__: kind for kind in known}
+    if len(known) == 1:
+        chosen = next(iter(kinds))
+    elif "kind" in table:
+        chosen = table.pop("kind")
+    else:
+        raise places.error(name, index, None, f"kind is missing; allowed are {', '.join(kinds)}")
+    if not isinstance(chosen, str) or chosen not in kinds:
+        allowed = ", ".join(nearest_first(chosen, kinds) if isinstance(chosen, str) else kinds)
+        raise places.error(name, index, "kind", f"kind is {shown(chosen)}; allowed are {allowed}")
+    kind = kinds[chosen]
+    parameters = {field.name: field for field in fields(kind) if field.init}
+    for key in table:
+        if key not in parameters:
+            allowed = ", ".join(nearest_first(key, parameters))
+            raise places.error(name, index, key, f"{key} is not known; allowed are {allowed}")
+    for key, field in parameters.items():
+        if field.default is MISSING and field.default_factory is MISSING and key not in table:
+            raise places.error(name, index, None, f"{key} is missing; a {kind.__name__} needs it")
+    try:
+        return kind(**table)
+    except (ValueError, TypeError) as error:
+        told = re.match(r"(?:\w+\.)?(\w+)(?:\[[^]]*\])? ", str(error))
+        key = told.group(1) if told and told.group(1) in parameters else None
+        raise places.error(name, index, key, str(error)) from None

@@ -1,0 +1,69 @@
+"""Arguments of many words between kernels: passed by address, not word by word.
+
+The scratch of many bodies is a tuple of a hundred arrays, seven words each. Numba hands each word on as an argument of
+its own: of all instructions written for a step of bodies four in five took that tuple apart or put it together. Here a
+call hands on one address, and a kernel reads from there what it reads of the tuple.
+"""
+
+from __future__ import annotations
+
+from llvmlite import ir
+from numba.core import types
+from numba.core.datamodel.packer import ArgPacker, _flatten, _Unflattener
+
+from physics.kernels.compile.fused.folding_builder import Elsewhere, FoldingBuilder, slot
+
+FEW_WORDS = 64  # A tuple of more is handed on by its address.
+
+
+class Arguments(ArgPacker):
+    """Numba's arguments of a call, but for large tuples.
+
+    Parameters
+    ----------
+    models : numba.core.datamodel.DataModelManager
+    fe_args : sequence of numba.types.Type
+    """
+
+    def __init__(self, models, fe_args):
+        super().__init__(models, fe_args)
+        self._dm_args = [_ByAddress(model) if _is_large(model) else model for model in self._dm_args]
+        self._addresses = [model.get_argument_type() for model in self._dm_args if isinstance(model, _ByAddress)]
+        words = [model.get_argument_type() for model in self._dm_args]
+        self._unflattener = _Unflattener(words)
+        self._be_args = list(_flatten(words))
+
+    def assign_names(self, args, names):
+        """Name the words, and say of addresses that nothing is changed there."""
+        super().assign_names(args, names)
+        for word in args:
+            if isinstance(word.type, ir.PointerType) and word.type in self._addresses:
+                for attribute in ("noalias", "nonnull"):
+                    word.add_attribute(attribute)
+
+
+def _is_large(model) -> bool:
+    if not isinstance(model.fe_type, types.BaseTuple):
+        return False
+    return sum(1 for _ in _flatten([model.get_argument_type()])) > FEW_WORDS
+
+
+class _ByAddress:
+    """The model of a tuple as an argument that is its address."""
+
+    def __init__(self, model):
+        self._type = model.get_value_type()
+
+    def get_argument_type(self) -> ir.Type:
+        return self._type.as_pointer()
+
+    def as_argument(self, builder, value):
+        """Address of a value: where it stands already, if it was handed to the caller."""
+        if isinstance(value, Elsewhere):
+            return value.address
+        address = slot(builder, self._type)
+        builder.store(value, address)
+        return address
+
+    def from_argument(self, builder, address):
+        return Elsewhere(address) if isinstance(builder, FoldingBuilder) else builder.load(address)

@@ -1,0 +1,120 @@
+"""Calling convention between kernels: values in, a value out.
+
+A function that Numba compiles writes its result where its caller tells it, and returns a status; its caller reads the
+status, hands an exception on, and reads the result. Kernels raise none; only functions of users may. Here a part
+returns its value; one that may raise is lowered again as Numba does it, and so are those that call it, so that the
+exception gets through.
+"""
+
+from __future__ import annotations
+
+from llvmlite import ir
+from numba.core import cgutils
+from numba.core.callconv import RETCODE_OK, CPUCallConv, excinfo_ptr_t
+from numba.core.funcdesc import PythonFunctionDescriptor
+
+from physics.kernels.compile.fused.folding_builder import slot
+
+
+class MayRaise(Exception):
+    """A kernel that was to return its value may raise an exception, or return None for a number."""
+
+
+def gives_value(function) -> bool:
+    """A function, or one that is described, returns its value and not a status."""
+    return getattr(function, "gives_value", False)
+
+
+class ValueDescriptor(PythonFunctionDescriptor):
+    """Descriptor of a function that returns its value."""
+
+    __slots__ = ()
+    gives_value = True
+
+
+def declare(context, module: ir.Module, about) -> ir.Function:
+    """A function that returns its value, in a module that defines or calls it.
+
+    Parameters
+    ----------
+    context : numba.core.base.BaseContext
+    module : llvmlite.ir.Module
+    about : ValueDescriptor
+    """
+    packer = context.get_arg_packer(about.argtypes)
+    result = context.data_model_manager[about.restype].get_return_type()
+    function = cgutils.get_or_insert_function(
+        module, ir.FunctionType(result, packer.argument_types), about.mangled_name
+    )  # fmt: skip
+    packer.assign_names(function.args, [f"arg.{name}" for name in about.args])
+    if about.inline:
+        function.attributes.add("alwaysinline")
+    function.gives_value = True
+    return function
+
+
+def call(context, builder, about, args):
+    """Result of a call; an exception is handed on, since no kernel catches one."""
+    words = context.get_arg_packer(about.argtypes).as_arguments(builder, args)
+    if gives_value(about):
+        result = builder.call(declare(context, builder.module, about), words)
+        return context.get_returned_value(builder, about.restype, result)
+    convention, function = context.call_conv, context.declare_function(builder.module, about)
+    result = slot(builder, convention.get_return_type(about.restype).pointee)
+    convention.must_give_status(builder)
+    raised = convention._get_excinfo_argument(builder.function)
+    status = builder.call(function, [result, raised, *words])
+    with builder.if_then(builder.icmp_unsigned("!=", status, status.type(0))):
+        builder.ret(status)
+    return context.get_returned_value(builder, about.restype, builder.load(result))
+
+
+class Convention(CPUCallConv):
+    """Numba's convention, and that of functions that return their value."""
+
+    def must_give_status(self, builder: ir.IRBuilder) -> None:
+        """Raise MayRaise if the function being written is one that returns its value."""
+        if gives_value(builder.function):
+            raise MayRaise(builder.function.name)
+
+    def get_arguments(self, func):
+        """Return those of a function's arguments that are a kernel's."""
+        return func.args if gives_value(func) else super().get_arguments(func)
+
+    def return_value(self, builder, retval):
+        """Leave a function with a value."""
+        if gives_value(builder.function):
+            builder.ret(retval)
+        else:
+            super().return_value(builder, retval)
+
+    def return_user_exc(self, builder, exc, exc_args=None, loc=None, func_name=None):
+        """Leave a function with an exception; where none is given its place is that of the user's statement at hand."""
+        self.must_give_status(builder)
+        if loc is None:
+            loc, func_name = getattr(builder, "place", (None, func_name))
+        super().return_user_exc(builder, exc, exc_args, loc, func_name)
+
+    def return_dynamic_user_exc(self, builder, *about, **more):
+        """Leave a function with an exception whose arguments are computed."""
+        self.must_give_status(builder)
+        super().return_dynamic_user_exc(builder, *about, **more)
+
+    def return_status_propagate(self, builder, status):
+        """Leave a function with the exception of one that it called, if there is one."""
+        if status.code is not RETCODE_OK:
+            self.must_give_status(builder)
+            super().return_status_propagate(builder, status)
+
+    def _return_errcode_raw(self, builder, code):
+        self.must_give_status(builder)
+        super()._return_errcode_raw(builder, code)
+
+    def call_function(self, builder, callee, resty, argtys, args, attrs=None):
+        """Status and result of a call that Numba writes."""
+        if not gives_value(callee):
+            return super().call_function(builder, callee, resty, argtys, args, attrs)
+        words = self.context.get_arg_packer(argtys).as_arguments(builder, args)
+        result = self.context.get_returned_value(builder, resty, builder.call(callee, words))
+        no_exception = cgutils.get_null_value(excinfo_ptr_t)
+        return self._get_return_status(builder, RETCODE_OK, no_exception), result

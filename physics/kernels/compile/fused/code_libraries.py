@@ -1,0 +1,95 @@
+"""Code libraries that kernels are linked to: IR of parts, machine code of entry kernels and shared ones (`dispatcher`).
+
+What is not public of Numba here is `JITCodeLibrary`, the IR of one function with the libraries that it calls.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from llvmlite import binding as llvm
+from numba.core import cgutils
+from numba.core.codegen import CodeLibrary, JITCodeLibrary
+
+if TYPE_CHECKING:
+    from physics.kernels.compile.fused.disk_cache import Origin
+
+
+class PartLibrary(JITCodeLibrary):
+    """IR of one part, neither linked nor optimised."""
+
+    def add_ir_module(self, ir_module):
+        """Take the module in: every whole that calls the part has the same one."""
+        for function in ir_module.functions:
+            if not function.is_declaration:
+                function.linkage = "linkonce_odr"
+        self._final_module = llvm.parse_assembly(cgutils.normalize_ir_text(str(ir_module)))
+        self._final_module.data_layout = self._codegen._data_layout
+
+    def _get_module_for_linking(self):
+        return self._final_module
+
+    def finalize(self):
+        self._finalized = True
+
+
+class WholeLibrary(JITCodeLibrary):
+    """IR of a whole, linked with that of every part below it before it is optimised.
+
+    Attributes
+    ----------
+    called : tuple of Origin
+        The kernels that stand, of those below it.
+    """
+
+    called: tuple[Origin, ...] = ()
+
+    def finalize(self):
+        below = _callers_first(self)
+        self.called = tuple(each.origin for each in below if isinstance(each, StandingLibrary))
+        self._linking_libraries = [each for each in below if not isinstance(each, StandingLibrary)]
+        super().finalize()
+
+    def _optimize_final_module(self):
+        for function in self._final_module.functions:
+            if function.linkage.name == "linkonce_odr" and not function.is_declaration:  # a part
+                function.linkage = "internal"
+        super()._optimize_final_module()
+
+
+class StandingLibrary(WholeLibrary):
+    """The same of a kernel that others call by its name.
+
+    Attributes
+    ----------
+    origin : Origin
+        What it was made of.
+    """
+
+    origin: Origin
+
+    def machine_code(self) -> bytes:
+        """As it is kept."""
+        self._ensure_finalized()
+        return self._get_compiled_object()
+
+    def take(self, machine_code: bytes) -> None:
+        """Have machine code that was kept."""
+        self.enable_object_caching()
+        self._set_compiled_object(machine_code)
+        self._finalize_final_module()
+
+
+def _callers_first(whole: WholeLibrary) -> list[CodeLibrary]:
+    """Every library below `whole` once, after all that call it: the linker drops what nobody has called so far."""
+    callees_first: dict[CodeLibrary, None] = {}
+
+    def visit(library):
+        for callee in library._linking_libraries:
+            if callee not in callees_first:
+                if isinstance(callee, PartLibrary):
+                    visit(callee)
+                callees_first[callee] = None
+
+    visit(whole)
+    return list(reversed(callees_first))

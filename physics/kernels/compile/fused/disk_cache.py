@@ -1,0 +1,175 @@
+"""Machine code on disk: that of wholes, and that of kernels that stand (`dispatcher`).
+
+What is kept of either names the kernels that it calls and that stand: they are loaded before it.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import importlib
+import inspect
+import sys
+from functools import cache, cached_property
+from pathlib import Path
+from typing import NamedTuple
+
+import numba
+from numba import _dynfunc
+from numba.core.compiler import CompileResult, compile_result
+from numba.core.environment import Environment
+from numba.core.serialize import dumps
+
+from physics.kernels.compile.fused import cache_files
+from physics.kernels.compile.fused.code_libraries import StandingLibrary
+
+
+class Origin(NamedTuple):
+    """Origin of shared machine code: a kernel, and the types of its arguments.
+
+    Parameters
+    ----------
+    module, name : str
+    args : tuple of numba.types.Type
+    """
+
+    module: str
+    name: str
+    args: tuple
+
+    def load(self) -> None:
+        """Have the machine code in memory."""
+        getattr(importlib.import_module(self.module), self.name).stand(self.args)
+
+
+class _Cache:
+    """Machine codes of one kernel on disk, in Numba's place for it.
+
+    Parameters
+    ----------
+    function : Callable
+    folder : Path or None
+        None: nothing is kept.
+    """
+
+    kind = ""
+
+    def __init__(self, function, folder: Path | None):
+        self._function, self._source = function, Path(inspect.getfile(function))
+        self.cache_path = folder
+        self._is_enabled = folder is not None and self._source.exists()  # else it was typed in
+
+    def enable(self):
+        """Use the disk."""
+        self._is_enabled = self.cache_path is not None and self._source.exists()
+
+    def disable(self):
+        """Do not."""
+        self._is_enabled = False
+
+    def flush(self):
+        """Forget all that is kept of this kernel."""
+        for path in self.cache_path.glob(f"{self._name}.*.nbc") if self._is_enabled else ():
+            path.unlink(missing_ok=True)
+
+    def load_overload(self, sig, target_context):
+        """Machine code for the types `sig` of arguments; None if there is none that can be used."""
+        if not self._is_enabled:
+            return None
+        target_context.refresh()
+        path, purpose = self._place(sig, target_context.codegen())
+        try:
+            payload = cache_files.read(path, purpose)
+            return None if payload is None else self.rebuild(target_context, payload)
+        except cache_files.Foreign as reason:
+            cache_files.say_once("foreign", f"{path} is not read, since {reason}: kernels are compiled in memory")
+        except Exception as error:  # whatever is wrong with it, the kernel can be compiled
+            cache_files.say(f"{path} is damaged ({type(error).__name__}: {str(error)[:200]}): compiled anew")
+        return None
+
+    def save_overload(self, sig, made):
+        """Keep machine code, if it can be kept."""
+        if not self._is_enabled or made.library.has_dynamic_globals:
+            return
+        path, purpose = self._place(sig, made.codegen)
+        if path.is_file() and not cache_files.is_own(path.stat()):
+            return  # somebody else's, who would find it changed
+        try:
+            cache_files.write(path, purpose, dumps(self.reduce(made)))
+        except OSError as error:
+            about = (
+                f"kernels cannot be kept in {self.cache_path} ({error.strerror or error}): each process compiles them"
+            )
+            cache_files.say_once("unwritable", about)
+
+    @cached_property
+    def _name(self) -> str:
+        name = f"{self._source.stem}.{self._function.__qualname__}".replace("<", "").replace(">", "")
+        return f"{name}-{self._function.__code__.co_firstlineno}{self.kind}"
+
+    @cached_property
+    def _about(self) -> bytes:
+        """Return the settings that machine code depends on besides the types of arguments and the processor."""
+        function = self._function
+        around = dumps(tuple(cell.cell_contents for cell in function.__closure__)) if function.__closure__ else b""
+        versions = (sys.version_info[:3], sys.abiflags if hasattr(sys, "abiflags") else "", numba.__version__)
+        parts = (repr(versions).encode(), str(self._source.resolve()).encode(), self._name.encode(),
+                 _digest_of_file(self._source), function.__code__.co_code, around)  # fmt: skip
+        return b"".join(hashlib.sha256(part).digest() for part in parts)
+
+    def _place(self, sig, codegen) -> tuple[Path, bytes]:
+        """File of machine code, and what it is for."""
+        purpose = self._about + repr((str(sig), codegen.magic_tuple())).encode()
+        return self.cache_path / f"{self._name}.{hashlib.sha256(purpose).hexdigest()[:24]}.nbc", purpose
+
+
+@cache
+def _digest_of_file(path: Path) -> bytes:
+    return hashlib.sha256(path.read_bytes()).digest()
+
+
+class WholeCache(_Cache):
+    """The wholes of one kernel: what each calls, and what Numba keeps."""
+
+    def reduce(self, made):
+        """Return the content to write."""
+        return made.library.called, made._reduce()
+
+    def rebuild(self, target_context, payload):
+        """The whole, from what was read."""
+        called, kept = payload
+        for origin in called:
+            origin.load()
+        return CompileResult._rebuild(target_context, *kept)
+
+
+class StandingCache(_Cache):
+    """The machine codes of one kernel that stands: without their IR, since nothing is linked with it."""
+
+    kind = "-standing"  # its file is not that of the whole of the same kernel
+
+    def reduce(self, made):
+        """Return the content to write."""
+        library, about = made.library, made.fndesc
+        code = library.machine_code()
+        about.typemap = about.calltypes = None
+        return library.called, library.origin, code, about, made.signature
+
+    def rebuild(self, target_context, payload):
+        """The kernel, from what was read."""
+        called, origin, code, about, signature = payload
+        for each in called:
+            each.load()
+        library = StandingLibrary(target_context.codegen(), about.qualname)
+        library.called, library.origin = called, origin
+        library.take(code)
+        return compile_result(
+            target_context=target_context, fndesc=about, library=library, signature=signature, objectmode=False,
+            entry_point=made_known(target_context, about, Environment.from_fndesc(about), library),
+        )  # fmt: skip
+
+
+def made_known(target_context, about, environment, library):
+    """Have Numba, which knows functions by their entry points, know a kernel under one that must not be called."""
+    entry = _dynfunc.make_function(about.lookup_module(), about.qualname, "", 0, environment, (library,))
+    target_context.insert_user_function(entry, about, [library])
+    return entry

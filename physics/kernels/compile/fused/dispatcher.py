@@ -1,0 +1,254 @@
+"""Dispatchers that compile kernels together: each to LLVM IR once, all of them to machine code once.
+
+Left to itself Numba optimises a kernel and makes machine code of it as soon as it is typed, and then once more in
+every caller it is linked into, up to a dozen levels of a step. Here a kernel that is called from another one is a
+*part*: lowered to IR and no further. Only a *whole*, which Python calls, links all parts below it, is optimised and
+becomes machine code; it alone is kept on disk.
+
+In a whole nobody else can call a part, and the optimiser is told so: it leaves out what a part does not read of its
+arguments, and a part with one caller becomes part of that. The scratch of many bodies is a hundred arrays of seven
+words each, and a part that is handed it reads a dozen: with all of them on the stack calls took a third of a step.
+
+A kernel that *stands* is in between: machine code of its own, for all wholes that call it by its name, with all parts
+below it, made once for the types of its arguments and kept on disk beside the wholes. The optimiser sees nothing across
+that call, and without it each plan would have its solvers made machine code once more: it is for what is large, does
+not know the plan, and takes long, or is hardly ever needed.
+
+A symbol is named after its function and the types of its arguments. Numba names a record type by a number that counts
+the types of the process: machine code made in two processes, for two records of the same number, would have the same
+names in it, and a third process that loads both from disk would run the parts of one in the other. Here a digest of the
+types is part of each name.
+
+`pipeline_class` is Numba's documented way to have a function compiled otherwise; what is not public of Numba stands in
+`code_libraries` and `disk_cache`.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from functools import cache
+
+from numba.core import event, types
+from numba.core.codegen import JITCodeLibrary
+from numba.core.compiler import CompilerBase, DefaultPassBuilder, Flags
+from numba.core.compiler_lock import global_compiler_lock
+from numba.core.compiler_machinery import LoweringPass, PassManager, register_pass
+from numba.core.registry import CPUDispatcher
+from numba.core.sigutils import normalize_signature
+from numba.core.typed_passes import NativeLowering, NoPythonBackend
+
+from physics.kernels.compile.fused.code_libraries import PartLibrary, StandingLibrary, WholeLibrary
+from physics.kernels.compile.fused.disk_cache import Origin, StandingCache, WholeCache, made_known
+from physics.kernels.compile.fused.lowering import PartLowering, UsersLowering, WholeLowering
+from physics.kernels.compile.fused.memoised_contexts import RememberingTarget, remembering
+from physics.kernels.compile.fused.passes import KernelPasses
+
+
+class _Flags(Flags):
+    """Flags of a compilation that are equal when the same ones are set alike.
+
+    Numba looks them up for each subscript it types; comparing the two dozen that are not set took a fifth of all time.
+    What it puts into the names of symbols for them also tells the types of the arguments.
+    """
+
+    types = ""
+
+    def values(self):
+        return self._values
+
+    def get_mangle_string(self):
+        return super().get_mangle_string() + self.types
+
+
+@cache
+def _passes(*at_last: type) -> KernelPasses:
+    return KernelPasses(*at_last)
+
+
+class _WholeCompiler(CompilerBase):
+    """Passes of ours, into a library of ours."""
+
+    library_class: type[JITCodeLibrary] = WholeLibrary
+    is_entered = True  # from outside: see `prepared_entry`
+
+    def __init__(self, typingctx, targetctx, library, args, return_type, flags, local_types):
+        flags = _Flags(flags)
+        flags.types = hashlib.sha256(str(args).encode()).hexdigest()[:16]
+        contexts = remembering(typingctx), RememberingTarget(targetctx)
+        super().__init__(*contexts, library, args, return_type, flags, local_types)
+        self.state.flags.no_cfunc_wrapper = not self.is_entered
+
+    def passes(self) -> PassManager:
+        """To be run one after another."""
+        return _passes(WholeLowering, NoPythonBackend)
+
+    def define_pipelines(self):
+        state = self.state
+        state.library = self.library_class(state.targetctx.codegen(), state.func_id.func_qualname)
+        state.library.enable_object_caching()
+        return [self.passes()]
+
+
+@register_pass(mutates_CFG=False, analysis_only=True)
+class _KeepAsPart(LoweringPass):
+    """Make the part known to Numba."""
+
+    _name = "keep_as_part"
+
+    def __init__(self):
+        super().__init__()
+
+    def run_pass(self, state):
+        lowered = state["cr"]
+        about = lowered.fndesc
+        entry = made_known(state.targetctx, about, lowered.env, state.library)
+        state["cr"] = lowered._replace(cfunc=entry)
+        return True
+
+
+class _PartCompiler(_WholeCompiler):
+    """Up to the IR."""
+
+    library_class = PartLibrary
+    is_entered = False
+
+    def __init__(self, *arguments):
+        super().__init__(*arguments)
+        self.state.flags.no_cpython_wrapper = True
+        self.state.flags.no_compile = True
+
+    def passes(self):
+        return _passes(PartLowering, _KeepAsPart, NoPythonBackend)
+
+
+class _StandingCompiler(_PartCompiler):
+    """Up to machine code, under a name that is the same in all processes: what calls it was made in any of them."""
+
+    library_class = StandingLibrary
+
+    def define_pipelines(self):
+        about = self.state.func_id
+        about.unique_id = 0
+        pipelines = super().define_pipelines()
+        self.state.library.origin = Origin(about.modname, about.func_qualname, self.state.args)
+        return pipelines
+
+
+class _AnyPartCompiler(_PartCompiler):
+    """For a function of which nothing is known: all that Numba's own pipeline does."""
+
+    def passes(self):
+        pipeline = DefaultPassBuilder.define_nopython_pipeline(self.state)
+        own = {NativeLowering: UsersLowering}
+        pipeline.passes = [(own.get(each, each), about) for each, about in pipeline.passes]
+        pipeline.add_pass_after(_KeepAsPart, UsersLowering)
+        pipeline.finalize()
+        return pipeline
+
+
+class _Part(CPUDispatcher):
+    """A kernel that other kernels call."""
+
+    def compile(self, sig):
+        """Compile it for the types of its arguments, without the two clocks that Numba starts for each.
+
+        They tell each other of every call of LLVM, as many of them as calls are nested.
+        """
+        args, return_type = normalize_signature(sig)
+        if args not in self.overloads:
+            about = {"dispatcher": self, "args": args, "return_type": return_type}
+            with global_compiler_lock, self._compiling_counter, event.trigger_event("numba:compile", data=about):
+                self.add_overload(self._compiler.compile(args, return_type))
+        return self.overloads[args].entry_point
+
+
+class _Standing(_Part):
+    """A kernel that other kernels call, with machine code of its own."""
+
+    def enable_caching(self, folder=None):
+        """Keep it on disk, in a folder."""
+        self._cache = StandingCache(self.py_func, folder)
+
+    def compile(self, sig):
+        """Have the machine code for the types of its arguments, from disk or new."""
+        args, _ = normalize_signature(sig)
+        if args not in self.overloads:
+            with global_compiler_lock:
+                kept = self._cache.load_overload(args, RememberingTarget(self.targetctx))
+                if kept is None:
+                    super().compile(sig)
+                    self._cache.save_overload(args, self.overloads[args])
+                else:
+                    self.add_overload(kept)
+        return self.overloads[args].entry_point
+
+
+PART = _Part, _PartCompiler
+STANDING = _Standing, _StandingCompiler
+FOREIGN = CPUDispatcher, _AnyPartCompiler  # may be more than a kernel is, and is only called from kernels
+
+
+class Kernel(CPUDispatcher):
+    """A function compiled for the types of its arguments: a whole for Python, a part for other kernels.
+
+    Parameters
+    ----------
+    function : Callable
+    local_types : dict, optional
+        Must be empty; Numba passes it.
+    options : dict
+        Numba's options, as of `numba.njit`.
+    called_as : tuple
+        What it is for other kernels: `PART`, `FOREIGN` or `STANDING`.
+    """
+
+    part_pipeline = _PartCompiler
+
+    def __init__(self, function, local_types=None, options=None, called_as=PART):
+        super().__init__(function, local_types, options, pipeline_class=_WholeCompiler)
+        dispatcher, compiler = called_as
+        self._make_part = lambda: dispatcher(function, local_types, options, pipeline_class=compiler)
+        self._part = self._make_part()
+
+    def renew(self) -> None:
+        """Forget what is compiled for other kernels: what the function reads around it has changed."""
+        self._part = self._make_part()
+        RememberingTarget.forget(types.Dispatcher(self))
+
+    def enable_caching(self, folder=None):
+        """Keep its machine code on disk, in a folder."""
+        self._cache = WholeCache(self.py_func, folder)
+        if isinstance(self._part, _Standing):
+            self._part.enable_caching(folder)
+
+    def stand(self, args: tuple) -> None:
+        """Have the machine code that other kernels call, for these types of arguments."""
+        self._part.compile(args)
+
+    def as_part(self, args: tuple):
+        """Have it compiled for other kernels and these types of arguments: what Numba keeps of that.
+
+        Raises
+        ------
+        Exception
+            In Numba's words: the function cannot be compiled for them.
+        """
+        self._part.compile(args)
+        return self._part.overloads[args]
+
+    def ready_entry(self, machine_code) -> int:
+        """Address of the entry for other machine code (`prepared_entry`) of a kernel that returns nothing."""
+        with global_compiler_lock:  # what another thread has linked so far is not to be loaded
+            made = next(made for made in self.overloads.values() if made.entry_point is machine_code)
+            entry = made.library.get_pointer_to_function(made.fndesc.llvm_cfunc_wrapper_name)
+        if entry == 0:
+            raise TypeError(f"{self.py_func.__name__} returns {made.signature.return_type}; allowed is nothing")
+        return entry
+
+    def get_call_template(self, args, kws):
+        """Return the template by which another kernel calls this one."""
+        return self._part.get_call_template(args, kws)
+
+    def get_overload(self, sig):
+        """Return the function that another kernel calls."""
+        return self._part.get_overload(sig)

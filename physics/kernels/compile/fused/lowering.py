@@ -1,0 +1,139 @@
+"""Lowering of a kernel's statements to LLVM IR, without Numba's reference counts.
+
+Kernels own nothing (`physics.kernels.compile.decorators`), so no variable has to be released or kept where a release
+would find it. Numba's lowering reads what a variable held before each assignment, and reads and clears it at the end of
+its life; what was an array has seven words to read and to clear. A third of all instructions said nothing else.
+
+In single assignment form a variable that is assigned once is a value: wherever it is used, its assignment has been
+passed. Numba makes it one only if it is used in a single block, and gives it memory otherwise.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+
+from numba.core import ir
+from numba.core.compiler_machinery import register_pass
+from numba.core.lowering import Lower
+from numba.core.typed_passes import NativeLowering
+
+from physics.kernels.compile.fused.calling_convention import MayRaise, ValueDescriptor
+from physics.kernels.compile.fused.folding_builder import FoldingBuilder, slot
+from physics.kernels.compile.fused.prepared_entry import write_ready_entry
+
+
+class _KernelLower(Lower):
+    """Numba's lowering of one function: a variable is a value, if it is assigned once."""
+
+    def setup_function(self, fndesc):
+        """Declare the function, with our builder for its body."""
+        super().setup_function(fndesc)
+        self.builder = FoldingBuilder(self.entry_block)
+        self.call_helper = self.call_conv.init_call_helper(self.builder)
+
+    def create_cfunc_wrapper(self):
+        """The entry for machine code, in place of Numba's for C; see `prepared_entry`."""
+        write_ready_entry(self.context, self.library, self.fndesc)
+
+    def _find_singly_assigned_variable(self):
+        times = Counter(
+            each.target.name for block in self.blocks.values() for each in block.body if isinstance(each, ir.Assign)
+        )
+        self._singly_assigned_vars = {name for name, count in times.items() if count == 1}
+        self._blk_local_varmap = {}
+
+    def lower_block(self, block):
+        """Lower the statements of a block; what cannot be lowered says so in its own words."""
+        self._cur_ir_block = block
+        for each in block.body:
+            self.loc = each.loc
+            if isinstance(each, ir.Assign):
+                name = each.target.name
+                self.storevar(self.lower_assign(self.typeof(name), each), name)
+            else:
+                self.lower_inst(each)
+
+    def lower_binop(self, resty, expr, op):
+        """An operation on two values; those with a number that is written down are no others (`scalars` sees one)."""
+        context, builder = self.context, self.builder
+        function = context.typing_context.resolve_value_type(op)
+        sig = function.get_call_type(context.typing_context, self.fndesc.calltypes[expr].args, {})
+        operands = [
+            context.cast(builder, self.loadvar(each.name), self.typeof(each.name), type_)
+            for each, type_ in zip((expr.lhs, expr.rhs), sig.args, strict=True)
+        ]
+        value = context.get_function(function, sig)(builder, operands)
+        return context.cast(builder, value, sig.return_type, resty)
+
+    def loadvar(self, name):
+        """Value of a variable."""
+        value = self._blk_local_varmap.get(name)
+        if value is not None:
+            return value
+        self._singly_assigned_vars.discard(name)  # a block used it that is lowered before the one that assigns it
+        return self.builder.load(self.getvar(name))
+
+    def alloca_lltype(self, name, lltype, datamodel=None):
+        """Memory of a variable that is assigned more than once."""
+        return slot(self.builder, lltype)
+
+    def storevar(self, value, name, argidx=None):
+        """Give a variable a value."""
+        if name in self._singly_assigned_vars:
+            self._blk_local_varmap[name] = value
+        else:
+            self.builder.store(value, self.getvar(name))
+
+
+class _ValueLower(_KernelLower):
+    """The lowering of a function that returns its value, not a status."""
+
+    def setup_function(self, fndesc):
+        """Declare the function."""
+        fndesc.__class__ = ValueDescriptor
+        super().setup_function(fndesc)
+
+
+class _UsersLower(Lower):
+    """Numba's lowering of a user's function, which remembers at which statement it is: for exceptions."""
+
+    def lower_inst(self, inst):
+        """Lower a statement."""
+        self.builder.place = self.loc, self.func_ir.func_id.func_name
+        super().lower_inst(inst)
+
+
+@register_pass(mutates_CFG=True, analysis_only=False)
+class UsersLowering(NativeLowering):
+    """The pass in which a user's function is lowered."""
+
+    _name = "users_lowering"
+    lowering_class = _UsersLower
+
+
+@register_pass(mutates_CFG=True, analysis_only=False)
+class WholeLowering(NativeLowering):
+    """The pass in which a kernel is lowered as Python calls it."""
+
+    _name = "whole_lowering"
+    lowering_class = _KernelLower
+
+
+@register_pass(mutates_CFG=True, analysis_only=False)
+class PartLowering(WholeLowering):
+    """The pass in which a kernel is lowered as other kernels call it."""
+
+    _name = "part_lowering"
+    lowering_class = _ValueLower
+
+    def run_pass(self, state):
+        """Lower a kernel; one that may raise an exception gives a status, as all do whose indices are checked."""
+        if not state.targetctx.enable_boundscheck:
+            try:
+                return super().run_pass(state)
+            except MayRaise:
+                pass
+        return WholeLowering.run_pass(_WITH_STATUS, state)
+
+
+_WITH_STATUS = WholeLowering()

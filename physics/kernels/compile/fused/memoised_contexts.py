@@ -1,0 +1,198 @@
+"""Numba's two contexts, asked each question once.
+
+To type `a * b` for two floats Numba tries every meaning of `*`, those of arrays, lists and strings as well, and does so
+again for each product of each kernel, in every round of inference and once more while lowering: that was a quarter of
+the time until the first step. The answer depends on the types alone. Here a context shares all that Numba's own one
+holds (and what is registered later), and remembers
+
+- what a built-in function gives for arguments of some types,
+- of what type a member of a record or an array is,
+- how an operation is lowered, or that there is no special way to,
+- how many bytes a type takes.
+
+Only kernels of ours are compiled in these contexts; others in the same process see Numba's.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import cache
+from typing import ClassVar
+
+from numba.core import types, typing
+from numba.core.cpu import CPUContext
+from numba.core.imputils import user_function
+
+from physics.kernels.compile.fused import calling_convention
+from physics.kernels.compile.fused.argument_passing import Arguments
+from physics.kernels.compile.fused.array_elements import array_in_record
+from physics.kernels.compile.fused.folding_builder import FoldingBuilder
+from physics.kernels.compile.fused.operation_table import lowering_of, signature_of
+
+
+class RememberingTyping(typing.Context):
+    """Typing context of Numba that remembers its answers.
+
+    Parameters
+    ----------
+    context : numba.core.typing.Context
+        Whose knowledge is shared.
+    """
+
+    signatures: ClassVar[dict[tuple, typing.Signature]] = {}  # by function and types of its arguments
+    members: ClassVar[dict[tuple, types.Type]] = {}  # by type and name
+
+    def __init__(self, context):
+        self.__dict__ = context.__dict__
+
+    def resolve_getattr(self, typ, attr):
+        """Type of a member; None if there is none."""
+        if isinstance(typ, types.Module):  # whose members may be set anew
+            return super().resolve_getattr(typ, attr)
+        found = self.members.get((typ, attr))
+        if found is None:
+            found = super().resolve_getattr(typ, attr)
+            if found is not None:
+                self.members[typ, attr] = found
+        return found
+
+
+@cache
+def remembering(context: typing.Context) -> RememberingTyping:
+    """The one that remembers for a context: Numba keeps what it compiles of its own by the context it was asked in."""
+    return RememberingTyping(context)
+
+
+def _get_call_type(function, context, args, kws, asked=types.Function.get_call_type):
+    """Signature of a built-in function for arguments of these types: `types.Function.get_call_type`."""
+    if kws or not isinstance(context, RememberingTyping):
+        return asked(function, context, args, kws)
+    key = (function, tuple(args))
+    found = context.signatures.get(key)
+    if found is None:
+        found = signature_of(function, context, args) or asked(function, context, args, kws)
+        context.signatures[key] = found
+    return found
+
+
+# Where Numba lowers an operation it asks the function itself, past every context that it could be given.
+types.Function.get_call_type = _get_call_type
+
+
+class RememberingTarget(CPUContext):
+    """Target context that lowers operations as Numba does, or as kernels do where that takes fewer instructions.
+
+    Parameters
+    ----------
+    context : CPUContext
+        Whose knowledge is shared.
+    """
+
+    lowerings: ClassVar[dict[tuple, Callable]] = {}  # by operation, signature, and what is an error
+    absent: ClassVar[set[tuple]] = set()  # operations without a lowering of their own, and their signatures
+    asked: ClassVar[set] = set()  # operations for which Numba has looked through its registries
+    sizes: ClassVar[dict] = {}  # of LLVM types [bytes]
+
+    def __init__(self, context):
+        self.__dict__ = context.__dict__
+
+    @classmethod
+    def forget(cls, fn) -> None:
+        """Forget how calls of `fn` are lowered."""
+        for key in [key for key in cls.lowerings if key[0] == fn]:
+            del cls.lowerings[key]
+
+    @property
+    def typing_context(self):
+        """The context of types that remembers."""
+        return remembering(self.__dict__["typing_context"])
+
+    def mangler(self, name, types, *, abi_tags=(), uid=None):
+        """Name of a symbol; that of a kernel that stands (`uid` 0) is the same in all processes.
+
+        Numba names a record type by a number that counts the types of the process. The digest among `abi_tags` tells
+        the types (`dispatcher`), so that the name can do without them.
+        """
+        return super().mangler(name, () if uid == 0 else types, abi_tags=abi_tags, uid=uid)
+
+    def get_function(self, fn, sig, _firstcall=True):
+        """Return the function that lowers `fn` for a signature; raise NotImplementedError if there is none."""
+        # What Numba compiles for itself has an error model of its own.
+        key = fn, sig, type(self.error_model), self.enable_boundscheck
+        lowering = self.lowerings.get(key)
+        if lowering is None:
+            lower = lowering_of(fn, sig)
+            lowering = self.numba_function(fn, sig) if lower is None else _bound(lower, self, fn, sig)
+            self.lowerings[key] = lowering
+        return lowering
+
+    def numba_function(self, fn, sig):
+        """Return Numba's way to lower `fn`; its registries are searched once for each `fn`, not for each signature."""
+        if (fn, sig) in self.absent:
+            raise NotImplementedError(f"No definition for lowering {fn}{sig}")
+        is_new = fn not in self.asked
+        self.asked.add(fn)
+        try:
+            return super().get_function(fn, sig, is_new)
+        except NotImplementedError:
+            self.absent.add((fn, sig))
+            raise
+
+    @property
+    def call_conv(self):
+        """Calling convention of functions."""
+        return calling_convention.Convention(self)
+
+    def declare_function(self, module, fndesc):
+        """A function in a module that defines or calls it."""
+        if calling_convention.gives_value(fndesc):
+            return calling_convention.declare(self, module, fndesc)
+        return super().declare_function(module, fndesc)
+
+    def get_arg_packer(self, fe_args):
+        """The words of a call's arguments."""
+        return Arguments(self.data_model_manager, fe_args)
+
+    def get_getattr(self, typ, attr):
+        """Return the function that reads a member of a value."""
+        if isinstance(typ, types.Record) and isinstance(typ.typeof(attr), types.NestedArray):
+            return array_in_record
+        return super().get_getattr(typ, attr)
+
+    def pair_first(self, builder, val, ty):
+        """Lower the value that an iterator gave."""
+        return builder.extract_value(val, 0)
+
+    def pair_second(self, builder, val, ty):
+        """Lower the test whether an iterator gave a value."""
+        return builder.extract_value(val, 1)
+
+    def insert_user_function(self, func, fndesc, libs=()):
+        """Have a kernel known by its entry point, and how it is called."""
+
+        def call(context, builder, sig, args):
+            is_kernel = isinstance(builder, FoldingBuilder) and not isinstance(fndesc.restype, types.Optional)
+            if is_kernel or calling_convention.gives_value(fndesc):
+                return calling_convention.call(context, builder, fndesc, args)
+            return numbas_call(context, builder, sig, args)
+
+        numbas_call = user_function(fndesc, libs)
+        call.signature, call.libs = fndesc.argtypes, tuple(libs)
+        self._defns[func].append(call, call.signature)
+
+    def get_abi_sizeof(self, ty):
+        """Size of an LLVM type [bytes]: Numba writes and parses a module for each question."""
+        size = self.sizes.get(ty)
+        if size is None:
+            size = self.sizes[ty] = super().get_abi_sizeof(ty)
+        return size
+
+
+def _bound(lower: Callable, context: RememberingTarget, fn, sig) -> Callable:
+    """A lowering of ours, to be called as Numba calls its own."""
+
+    def lowered(builder, args, loc=None):
+        value = lower(context, builder, sig, args)
+        return context.numba_function(fn, sig)(builder, args) if value is NotImplemented else value
+
+    return lowered

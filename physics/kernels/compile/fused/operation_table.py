@@ -1,0 +1,52 @@
+"""Table of operations that answers in Numba's place: the type of a result, and how the operation is lowered.
+
+Numba has a dozen templates for `a[i]` and asks each, and for what follows it writes many times what is needed. Each
+module here knows some operations; of all others Numba is asked.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from numba.core import types, typing
+
+from physics.kernels.compile.fused import array_elements, ranges, scalars, simd_types, tuples
+
+
+def signature_of(function: types.Function, context: typing.Context, args: tuple) -> typing.Signature | None:
+    """Signature of `function` for types of arguments, or None where Numba has to be asked.
+
+    Parameters
+    ----------
+    function : types.Function
+    context : typing.Context
+    args : tuple of types.Type
+    """
+    key = function.typing_key
+    for module in (array_elements, scalars, simd_types):
+        found = module.signature(key, context, args)
+        if found is not None:
+            return found
+    return None
+
+
+def lowering_of(function, sig: typing.Signature) -> Callable | None:
+    """Return the function that lowers `function` for a signature, or None to leave it to Numba.
+
+    Parameters
+    ----------
+    function : types.Function or str
+    sig : typing.Signature
+
+    Returns
+    -------
+    Callable, optional
+        Of a context, a builder, the signature and the values of the arguments; what it returns is NotImplemented where
+        Numba's way is taken after all.
+    """
+    key = function if isinstance(function, str) else getattr(function, "typing_key", None)
+    for module in (array_elements, ranges, tuples, scalars, simd_types):
+        found = module.lowering(key, sig)
+        if found is not None:
+            return found
+    return None

@@ -1,0 +1,42 @@
+"""Calls whose arguments stand ready in memory, so that machine code can make them.
+
+Python hands a kernel two dozen arguments, and of each that is an array seven words are read from a Python object; and
+only one thread at a time runs Python. Here a kernel that returns nothing has a second entry, which takes the address of
+all those words. They are written once (`physics.parallel.bound_call`), in the order of the arguments: of an array those
+that Numba has for it, of a tuple those of its members. The entry gives Numba's status: not 0 if the kernel raised an
+exception, of which the address is written then.
+"""
+
+from __future__ import annotations
+
+from llvmlite import ir
+from numba.core import types
+from numba.core.callconv import excinfo_ptr_t
+
+from physics.kernels.compile.fused.folding_builder import WORD, Elsewhere, FoldingBuilder, word
+
+WORD_SIZE = 8  # [bytes]
+STATUS = ir.IntType(32)
+ENTRY = ir.FunctionType(STATUS, [WORD.as_pointer(), excinfo_ptr_t.as_pointer()])
+
+
+def write_ready_entry(context, library, about) -> None:
+    """Add the second entry of a kernel to its library."""
+    if about.restype != types.none:
+        return
+    module = context.create_module("ready")
+    kernel = context.declare_function(module, about)
+    entry = ir.Function(module, ENTRY, about.llvm_cfunc_wrapper_name)
+    builder = FoldingBuilder(entry.append_basic_block())
+    values, place = [], 0
+    for type_ in about.argtypes:
+        form = context.get_value_type(type_)
+        address = builder.bitcast(builder.gep(entry.args[0], [word(place)]), form.as_pointer())
+        values.append(Elsewhere(address) if isinstance(form, ir.Aggregate) else builder.load(address))
+        place += -(-context.get_abi_sizeof(form) // WORD_SIZE)
+    status, _ = context.call_conv.call_function(builder, kernel, about.restype, about.argtypes, values)
+    with builder.if_then(status.is_error):
+        builder.store(status.excinfoptr, entry.args[1])
+        builder.ret(status.code)
+    builder.ret(STATUS(0))
+    library.add_ir_module(module)

@@ -1,0 +1,51 @@
+"""Counting loops, in as few instructions as they need: Numba asks of each range whether its step is zero."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from numba.core import types, typing
+
+from physics.kernels.compile.fused.folding_builder import INSIDE, WORD, constant_of, slot, together, word
+
+
+def _count(context, builder, sig, args):
+    """`range(stop)`, `range(start, stop)` or `range(start, stop, step)`."""
+    start, stop, step = (word(0), args[0], word(1)) if len(args) == 1 else (*args, word(1))[:3]
+    return together(builder, context.get_value_type(sig.return_type), [start, stop, step])
+
+
+def _iterate(context, builder, sig, args):
+    """An iterator over a range: where its next number is, the end, the step, and where the count of those left is."""
+    start, stop, step = (builder.extract_value(args[0], k) for k in range(3))
+    stride = constant_of(step)
+    if not stride:
+        return NotImplemented
+    members = slot(builder, WORD), stop, step, slot(builder, WORD)
+    builder.store(start, members[0])
+    left = builder.sub(stop, start) if stride > 0 else builder.sub(start, stop)  # none is left if it is negative
+    if abs(stride) > 1:
+        left = builder.sdiv(builder.add(left, word(abs(stride) - 1)), word(abs(stride)))
+    builder.store(left, members[3])
+    return together(builder, context.get_value_type(sig.return_type), members)
+
+
+def _advance(context, builder, sig, args):
+    """The next number, and whether there is one."""
+    following, step, left = (builder.extract_value(args[0], k) for k in (0, 2, 3))
+    number, left_before = builder.load(following), builder.load(left)
+    builder.store(builder.add(number, step, flags=INSIDE), following)
+    builder.store(builder.sub(left_before, word(1), flags=INSIDE), left)
+    valid = builder.icmp_signed(">", left_before, word(0))
+    return together(builder, context.get_value_type(sig.return_type), [number, valid])
+
+
+def lowering(key, sig: typing.Signature) -> Callable | None:
+    """Return the function that lowers a range of words, the start of a loop over it, or its next number."""
+    if key is range:
+        return _count if sig.return_type == types.range_state64_type else None
+    if key == "getiter":
+        return _iterate if sig.args == (types.range_state64_type,) else None
+    if key == "iternext":
+        return _advance if sig.args == (types.range_iter64_type,) else None
+    return None

@@ -1,0 +1,294 @@
+"""Four numbers at once as a vector of LLVM's: `physics.kernels.compile.simd` says what each operation means."""
+
+from __future__ import annotations
+
+import operator
+from collections.abc import Callable
+from functools import partial
+
+from llvmlite import ir
+from numba.core import cgutils, types, typing
+from numba.core.typing.templates import AbstractTemplate, infer_global
+from numba.extending import models as data_models
+from numba.extending import register_model
+
+from physics.kernels.compile import simd
+from physics.kernels.compile.fused import array_elements
+from physics.kernels.compile.fused.folding_builder import WORD, word
+
+_DOUBLE, _INDEX = ir.DoubleType(), ir.IntType(32)
+
+NUMBER_SIZE = 8  # [bytes]
+
+
+class LanesType(types.Type):
+    """Type of four numbers."""
+
+    def __init__(self):
+        super().__init__("lanes")
+
+
+class MarksType(types.Type):
+    """Type of four truth values."""
+
+    def __init__(self):
+        super().__init__("marks")
+
+
+LANES, MARKS = LanesType(), MarksType()
+
+
+def _model_of(type_: type, one: ir.Type) -> None:
+    """A value of the type is a vector."""
+
+    @register_model(type_)
+    class Model(data_models.PrimitiveModel):
+        def __init__(self, manager, type_):
+            super().__init__(manager, type_, ir.VectorType(one, simd.WIDTH))
+
+
+_model_of(LanesType, _DOUBLE)
+_model_of(MarksType, ir.IntType(1))
+
+
+# --- of what type ------------------------------------------------------------------------------------------------
+
+_SUMS = {operator.add: "fadd", operator.sub: "fsub", operator.mul: "fmul", operator.truediv: "fdiv"}
+_ORDERS = {operator.lt: "<", operator.le: "<=", operator.gt: ">", operator.ge: ">=", operator.eq: "=="}
+_BOTH = {operator.and_: "and_", operator.or_: "or_"}
+_OF_TWO = (simd.larger, simd.smaller)
+_OF_ALL = (simd.total, simd.largest, simd.least)
+_OF_EACH = (operator.neg, abs, simd.root)
+_ROWS = (simd.row, simd.put_row)
+_NAMED = (simd.Lanes, simd.root, simd.chosen, simd.first_of, simd.totals, *_OF_TWO, *_OF_ALL, *_ROWS)
+
+
+def _are_numbers(args) -> bool:
+    return all(isinstance(each, types.Number) for each in args)
+
+
+def _are_lanes(args) -> bool:
+    """Lanes and numbers beside them, at least one of the former."""
+    return LANES in args and all(each is LANES or isinstance(each, types.Number) for each in args)
+
+
+def _is_place_of_row(args) -> bool:
+    """A table of numbers, and where in it a row begins."""
+    return (
+        isinstance(args[0], types.Array)
+        and (args[0].dtype, args[0].ndim, args[0].layout) == (types.float64, 2, "C")
+        and all(isinstance(each, types.Integer) for each in args[1:])
+    )
+
+
+def _result(key, args) -> types.Type | None:
+    """Type of the result of an operation, or None where it is none of ours."""
+    if key is simd.Lanes:
+        return LANES if len(args) == simd.WIDTH and _are_numbers(args) else None
+    if key is simd.chosen and args[0] is types.boolean:
+        return types.float64 if _are_numbers(args[1:]) else None
+    if key is simd.chosen:
+        return LANES if args[0] is MARKS and (_are_lanes(args[1:]) or _are_numbers(args[1:])) else None
+    if key is simd.first_of or key is operator.invert:
+        return (types.intp if key is simd.first_of else MARKS) if args == (MARKS,) else None
+    if key in _BOTH:
+        return MARKS if args == (MARKS, MARKS) else None
+    if key in _ROWS:
+        result = LANES if key is simd.row else types.none
+        return result if _is_place_of_row(args[:3]) and _are_lanes((LANES, *args[3:])) else None
+    if (key is simd.root or key in _OF_TWO) and _are_numbers(args):
+        return types.float64
+    if key is simd.totals:
+        return LANES if len(args) == simd.WIDTH and _are_lanes((LANES, *args)) else None
+    if not _are_lanes(args[:2]):
+        return None
+    if key is operator.getitem or key in _OF_ALL:
+        return types.float64
+    if key in _ORDERS:
+        return MARKS
+    return LANES if key in _SUMS or key in _OF_TWO or key in _OF_EACH else None
+
+
+def signature(key, context, args) -> typing.Signature | None:
+    """Signature of an operation on lanes, or None."""
+    args = tuple(map(types.unliteral, args))
+    result = _result(key, args)
+    if result is None:
+        return None
+    number = types.intp if key is operator.getitem else types.float64
+    if key in _ROWS:
+        return typing.signature(result, args[0], types.intp, types.intp, *args[3:])
+    return typing.signature(result, *(number if isinstance(each, types.Number) else each for each in args))
+
+
+class _Named(AbstractTemplate):
+    """A function that Numba knows of: `signature` has an answer for it before it is asked."""
+
+    def generic(self, args, kws):
+        return signature(self.key, self.context, args)
+
+
+for _function in _NAMED:
+    infer_global(_function)(type(f"Of_{_function.__name__}", (_Named,), {"key": _function}))
+
+
+# --- how it is lowered -------------------------------------------------------------------------------------------
+
+
+def _spread(builder, value):
+    """A number four times; lanes as they are."""
+    if isinstance(value.type, ir.VectorType):
+        return value
+    nothing = ir.Constant(ir.VectorType(value.type, simd.WIDTH), ir.Undefined)
+    first = builder.insert_element(nothing, value, _INDEX(0))
+    return builder.shuffle_vector(first, nothing, ir.Constant(ir.VectorType(_INDEX, simd.WIDTH), [0] * simd.WIDTH))
+
+
+def _make(context, builder, sig, args):
+    """`Lanes(a, b, c, d)`."""
+    made = ir.Constant(context.get_value_type(LANES), ir.Undefined)
+    for k, value in enumerate(args):
+        made = builder.insert_element(made, value, _INDEX(k))
+    return made
+
+
+def _compute(name, context, builder, sig, args):
+    return getattr(builder, name)(*(_spread(builder, each) for each in args))
+
+
+def _compare(order, context, builder, sig, args):
+    return builder.fcmp_ordered(order, *(_spread(builder, each) for each in args))
+
+
+def _choose(context, builder, sig, args):
+    if sig.args[0] is types.boolean:
+        return builder.select(context.cast(builder, args[0], types.boolean, types.boolean), *args[1:])
+    return builder.select(args[0], _spread(builder, args[1]), _spread(builder, args[2]))
+
+
+def _one_of_two(order, context, builder, sig, args):
+    """`larger` and `smaller`."""
+    x, y = (_spread(builder, each) for each in args) if LANES in sig.args else args
+    return builder.select(builder.fcmp_ordered(order, y, x), y, x)
+
+
+def _negate(context, builder, sig, args):
+    return builder.fneg(args[0])
+
+
+def _not(context, builder, sig, args):
+    return builder.xor(args[0], ir.Constant(args[0].type, [1] * simd.WIDTH))
+
+
+def _call(name, context, builder, sig, args):
+    """A function of LLVM's for vectors and numbers."""
+    type_ = args[0].type
+    width = f"v{simd.WIDTH}" if isinstance(type_, ir.VectorType) else ""
+    function = cgutils.get_or_insert_function(
+        builder.module, ir.FunctionType(type_, [type_]), f"llvm.{name}.{width}f64"
+    )
+    return builder.call(function, args)
+
+
+def _place_of_row(context, builder, sig, args):
+    """Pointer to four numbers of a table."""
+    if context.enable_boundscheck:
+        array_elements.pointer(
+            context, builder, sig.args[0], args[0], sig.args[1:3], [args[1], _last(builder, args[2])]
+        )
+    place = array_elements.pointer(context, builder, sig.args[0], args[0], sig.args[1:3], args[1:3])
+    return builder.bitcast(place, context.get_value_type(LANES).as_pointer())
+
+
+def _last(builder, first):
+    """Column of the last number of a row."""
+    return builder.add(first, word(simd.WIDTH - 1))
+
+
+def _read_row(context, builder, sig, args):
+    """`row`: a table begins anywhere, so that nothing is known of the place but that it is one of a number."""
+    return builder.load(_place_of_row(context, builder, sig, args), align=NUMBER_SIZE)
+
+
+def _write_row(context, builder, sig, args):
+    """`put_row`."""
+    builder.store(_spread(builder, args[3]), _place_of_row(context, builder, sig, args), align=NUMBER_SIZE)
+    return context.get_dummy_value()
+
+
+def _totals(context, builder, sig, args):
+    """`totals`: halves of two and two beside each other, and halves of those."""
+    a, b, c, d = (_spread(builder, each) for each in args)
+
+    def joined(x, y, first, second):
+        parts = [
+            builder.shuffle_vector(x, y, ir.Constant(ir.VectorType(_INDEX, simd.WIDTH), which))
+            for which in (first, second)
+        ]
+        return builder.fadd(*parts)
+
+    x, y = joined(a, b, (0, 1, 4, 5), (2, 3, 6, 7)), joined(c, d, (0, 1, 4, 5), (2, 3, 6, 7))
+    return joined(x, y, (0, 2, 4, 6), (1, 3, 5, 7))
+
+
+def _halves(builder, value, join: Callable):
+    """All four joined: the halves with one another, and what is left of them."""
+    for width in (2, 1):
+        nothing = ir.Constant(value.type, ir.Undefined)
+        parts = [
+            builder.shuffle_vector(
+                value, nothing, ir.Constant(ir.VectorType(_INDEX, width), [k + start for k in range(width)])
+            )
+            for start in (0, width)
+        ]
+        value = join(*parts)
+    return builder.extract_element(value, _INDEX(0))
+
+
+def _total(context, builder, sig, args):
+    return _halves(builder, args[0], builder.fadd)
+
+
+def _extreme(order, context, builder, sig, args):
+    """`largest` and `least`."""
+    return _halves(builder, args[0], lambda x, y: builder.select(builder.fcmp_ordered(order, y, x), y, x))
+
+
+def _first(context, builder, sig, args):
+    """`first_of`: of four bits that are a number, how many are zero before the first one."""
+    bits = builder.bitcast(args[0], ir.IntType(simd.WIDTH))
+    place = builder.cttz(builder.zext(bits, WORD), ir.IntType(1)(0))
+    return builder.select(builder.icmp_unsigned("==", bits, bits.type(0)), word(-1), place)
+
+
+def _read(context, builder, sig, args):
+    """`x[k]`."""
+    return builder.extract_element(args[0], args[1])
+
+
+_LOWERINGS = {
+    simd.Lanes: _make,
+    simd.chosen: _choose,
+    simd.first_of: _first,
+    simd.root: partial(_call, "sqrt"),
+    simd.row: _read_row,
+    simd.put_row: _write_row,
+    simd.totals: _totals,
+    simd.larger: partial(_one_of_two, ">"),
+    simd.smaller: partial(_one_of_two, "<"),
+    simd.total: _total,
+    simd.largest: partial(_extreme, ">"),
+    simd.least: partial(_extreme, "<"),
+    abs: partial(_call, "fabs"),
+    operator.neg: _negate,
+    operator.invert: _not,
+    operator.getitem: _read,
+    **{key: partial(_compute, name) for key, name in (_SUMS | _BOTH).items()},
+    **{key: partial(_compare, order) for key, order in _ORDERS.items()},
+}
+
+
+def lowering(key, sig: typing.Signature) -> Callable | None:
+    """Return the function that lowers an operation on lanes."""
+    is_ours = key in _NAMED or LANES in sig.args or MARKS in sig.args
+    return _LOWERINGS.get(key) if is_ours else None

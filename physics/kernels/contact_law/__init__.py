@@ -1,0 +1,1 @@
+"""Laws at a contact: target velocities, friction, restitution, compliance."""

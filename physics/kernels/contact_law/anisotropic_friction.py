@@ -1,0 +1,101 @@
+"""Friction with two coefficients along a wall: Coulomb's circle in stretched tangents.
+
+The tangential forces that a surface with coefficients μ1, μ2 along its tangents can exert fill an ellipse, and of these
+it exerts the one that dissipates most:
+
+    (f1/μ1)² + (f2/μ2)² <= f_n²,      f·u least:      f = -(μ1² u1, μ2² u2) f_n / sqrt(μ1² u1² + μ2² u2²).
+
+With k = μ2/μ1, S = diag(1, k), f = S g and u' = S u the power is g·u', and the ellipse the circle |g| <= μ1 f_n. So g
+and u' obey the isotropic law with the one coefficient μ1, and a contact problem with the rows S J of the tangents is an
+isotropic one: W' = S W S, b' = S b, p = S p'.
+
+A body whose tangent velocities are stretched moves like a rigid one again. By (S a) x (S b) = cof(S) (a x b), now with
+S = diag(1, 1, k) in the frame (normal, tangents) of a wall, u' = v' + ω' x r' with
+
+    v' = S v,    ω' = S⁻¹ ω,    r' = cof(S) r = (k c, k a, b),    K' = S⁻¹ K S⁻¹,    M'⁻¹ = S M⁻¹ S,
+
+so that the direct solves (`sliding_patch`) take these for u, ω, r, K; the inverse mass along tangent 2 alone differs,
+by k².
+
+References
+----------
+S. Goyal, A. Ruina, J. Papadopoulos, *Planar sliding with dry friction, part 1*, Wear 143, 1991, for forces of greatest
+dissipation.
+"""
+
+from __future__ import annotations
+
+import math
+
+from physics.kernels.compile.decorators import inlined
+from physics.kernels.math import quaternion as qt
+from physics.kernels.state.contact_law_dispatch import ANISOTROPY, if_law, number_of
+
+# k = μ2/μ1 of the body in the workspace; the literal 1 where it is not declared, which the compiler multiplies out.
+friction_ratio = number_of(ANISOTROPY, 1.0)
+
+
+@inlined
+def stretched_frame(K, u, w, k):
+    """Inverse inertia (00, 01, 02, 11, 12, 22), velocity and angular velocity in the stretched frame of a wall."""
+    s = 1.0 / k
+    return (
+        (K[0], K[1], s * K[2], K[3], s * K[4], s * (s * K[5])),
+        (u[0], u[1], k * u[2]),
+        (w[0], w[1], s * w[2]),
+    )
+
+
+def _as_assembled(n, work):
+    return None
+
+
+@if_law((ANISOTROPY,), _as_assembled)
+def stretch(n, work):
+    """Stretch the rows of tangent 2 in the contact problem that is assembled in `work`, and its impulses with them."""
+    k = friction_ratio(work)
+    for i in range(n):
+        r = 3 * i + 2
+        for c in range(3):
+            work.frame[r, c] *= k
+            work.angular[r, c] *= k
+            work.response[r, c] *= k
+        work.bias[r] *= k
+        work.impulse[r] /= k
+        for s in range(3 * n):
+            work.delassus[r, s] *= k
+            work.delassus[s, r] *= k
+
+
+@if_law((ANISOTROPY,), _as_assembled)
+def unstretch(n, work):
+    """The impulses along the unit tangents again."""
+    k = friction_ratio(work)
+    for i in range(n):
+        work.impulse[3 * i + 2] *= k
+
+
+def _as_it_is(vector, axes, work):
+    return vector
+
+
+@if_law((ANISOTROPY,), _as_it_is)
+def eased(f, axes, work):
+    """S⁻¹ f: a force whose size along the wall is to be held against μ1 times the push; `axes` are the wall's."""
+    k = friction_ratio(work)
+    s = (1.0 / k - 1.0) * qt.dot(axes[2], f)
+    return f[0] + s * axes[2][0], f[1] + s * axes[2][1], f[2] + s * axes[2][2]
+
+
+@if_law((ANISOTROPY,), _as_it_is)
+def opposing(d, axes, work):
+    """S² d/|S d|: what friction of sliding along the unit vector d is -μ1 f_n times of; d itself on an even wall."""
+    k = friction_ratio(work)
+    a, b = qt.dot(axes[1], d), k * qt.dot(axes[2], d)
+    size = math.sqrt(a * a + b * b)
+    if not size > 0.0:
+        return d
+    a, b = a / size, k * b / size
+    return (
+        a * axes[1][0] + b * axes[2][0], a * axes[1][1] + b * axes[2][1], a * axes[1][2] + b * axes[2][2]
+    )  # fmt: skip

@@ -1,0 +1,236 @@
+"""Contact that gives: springs and dampers between contact points and walls, implicit, stable at any stiffness.
+
+A point with the gap g pushes with f = -k g - c g', and never pulls: 0 <= f ⟂ f + k g + c g' >= 0. A stage of length h
+drifts (1 - θ) h with the old velocities and θ h with the new ones, and its impulse is that of gap and rate weighted in
+the same way:
+
+    p = -h (k g_θ + c g'_θ),    g_θ = (1 - θ) g⁰ + θ g¹,    g'_θ likewise.
+
+(Of a point that is still above the wall, g⁰ > 0, 0 stands for g⁰ there: the spring then stores at most the energy
+that was paid for.) With g, the gap after the first drift, g¹ = g + θh u + (θh)² b/2 and g'¹ = u + θh b, u the new
+velocity of the point where it is then and b what it gains there per time by turning (`target_velocity.aim_rest`), that
+is linear in u. In a contact problem
+
+    0 <= p ⟂ u + γ p - t >= 0,    γ = 1/(h D),    D = θ (θhk + c),
+    t = -[k (θ (g + (θh)² b/2) + (1 - θ) g⁰) + c (θ²h b + (1 - θ) g'⁰)]/D,
+
+a number γ more on the diagonal of W, and a target. In equilibrium g = g⁰ = -p/(hk) at any h and θ: the sag is exact.
+A point that ends up deeper than g¹, since turning is no parabola, is lifted there (`lift_to_due`): by moving the body,
+as in `contact_set.push_out`. A depth that no force has worked for would be energy for a stiff spring.
+
+This is the θ-method. θ = ½ is the midpoint rule: of second order, and a spring keeps its energy, p (u⁰ + u¹)/2 =
+-k (g¹² - g⁰²)/2. θ = 1 is implicit Euler, which brings what a step cannot resolve to rest in one step. For ½ <= θ <= 1
+no energy is gained. With λ the fastest rate of the contacts, √(k w) or c w, w = Σ W_nn of them all (no less than the
+largest eigenvalue),
+
+    θ = max(½, 1 - 1/(λh)):
+
+the midpoint rule where λh <= 2, and towards implicit Euler beyond.
+
+References
+----------
+E. Hairer, G. Wanner, *Solving Ordinary Differential Equations II*, 2nd ed., 1996, section IV.3, for the stability of
+θ-methods.
+"""
+
+from __future__ import annotations
+
+import math
+
+from physics.kernels.compile.decorators import inlined
+from physics.kernels.contact_law.restitution_energy import kinetic_energy, lifted_to
+from physics.kernels.contact_law.target_velocity import LARGEST_TURN, UNSEEN
+from physics.kernels.contact_solver.impulse_distribution import contact_arm
+from physics.kernels.half_space.contact_point import arm_and_rate, feature_of, place_arms, wall_normal, wall_of
+from physics.kernels.half_space.contact_set import gap_of, nearest_outside_set
+from physics.kernels.math import quaternion as qt
+from physics.kernels.state import layout as at
+from physics.kernels.state.body import angular_velocity, principal_attitude, turning
+from physics.kernels.state.contact_law_dispatch import DAMPING, STIFFNESS, if_law, number_of
+
+# Share of its energy that a body may gain in a resting stage by what is of third order in the step.
+GAIN_SHARE = 2.0e-5
+
+stiffness = number_of(STIFFNESS)
+damping = number_of(DAMPING)
+
+
+@inlined
+def _along(x, s, n):
+    return x[0] + s * n[0], x[1] + s * n[1], x[2] + s * n[2]
+
+
+def _halves(n, y, h, tilted, work):
+    return 0.5 * h, 0.5 * h
+
+
+@if_law((STIFFNESS,), _halves)
+def parts_of_stage(n, y, h, tilted, work):
+    """Lengths (1 - θ) h and θ h of the drifts before and after the impulses [s]."""
+    q = y[1]
+    place_arms(n, qt.to_matrix(q), tilted, work)
+    R = qt.to_matrix(principal_attitude(q, work, tilted))
+    w = n / work.mass
+    for i in range(n):
+        m = qt.cross(contact_arm(work, i), wall_normal(work.walls, wall_of(work.slot[i], work)))
+        w += qt.dot(m, turning(R, m, work.J))
+    rate = max(math.sqrt(stiffness(work) * w), damping(work) * w)
+    theta = max(0.5, 1.0 - 1.0 / (rate * h))
+    return (1.0 - theta) * h, theta * h
+
+
+def _no_aim(*arguments):
+    return None
+
+
+@if_law((STIFFNESS,), _no_aim)
+def aim_springs(n, x, R, v, w, alpha, before, after, tilted, work):
+    """Targets along the normals, and the γ of the stage, in place of what `target_velocity.aim_rest` asks for.
+
+    x, R, v, w, alpha are those of the body between the drifts of `before` and `after`, before the impulses;
+    `work.gap` is that at the start.
+    """
+    h = before + after
+    k, c = stiffness(work), damping(work)
+    theta = after / h
+    D = theta * (after * k + c)
+    work.give = 1.0 / (h * D)
+    dims = (work.dims[0], work.dims[1], work.dims[2])
+    is_turning = qt.dot(w, w) * h * h <= LARGEST_TURN * LARGEST_TURN
+    for i in range(n):
+        wall = wall_of(work.slot[i], work)
+        normal = wall_normal(work.walls, wall)
+        r, rate = arm_and_rate(work.shape, dims, R, w, normal, feature_of(work.slot[i], work), tilted, work)
+        gain = 0.0
+        if is_turning:
+            gain = qt.dot(normal, qt.cross(w, rate)) + qt.dot(normal, qt.cross(alpha, r))
+        speed = qt.dot(normal, v) + qt.dot(normal, qt.cross(w, r)) - before * gain
+        gap = gap_of(work.slot[i], x, R, tilted, work) + 0.5 * after * after * gain
+        push = k * (theta * gap + (1.0 - theta) * min(work.gap[i], 0.0))
+        push += c * (theta * after * gain + (1.0 - theta) * speed)
+        work.target[i, 0] = -push / D
+        work.due[i] = gap
+
+
+@if_law((STIFFNESS,), _no_aim)
+def foretell_gaps(n, v, w, after, work):
+    """Gaps at the end of the stage into `work.due`, from the velocities after the impulses."""
+    for i in range(n):
+        normal = wall_normal(work.walls, wall_of(work.slot[i], work))
+        work.due[i] += after * (qt.dot(normal, v) + qt.dot(normal, qt.cross(w, contact_arm(work, i))))
+
+
+def _as_it_ends(n, y, end, h, tilted, report, work):
+    return end
+
+
+@inlined
+def _lifted(n, x, R, share, tilted, work):
+    """x moved out of the walls until no point is deeper than `share` of what its spring is due to be."""
+    least = UNSEEN * work.slop
+    for i in range(n):
+        lift = share * min(work.due[i], 0.0) - gap_of(work.slot[i], x, R, tilted, work)
+        if lift > least:
+            x = _along(x, lift, wall_normal(work.walls, wall_of(work.slot[i], work)))
+    return x
+
+
+@inlined
+def _work_of_loads(y, end, h, tilted, work):
+    """Work that the loads which are held have done from y to `end`, and what the motion has lost [J]."""
+    a, T, v, L = work.free_acceleration, work.torque, end[2], end[3]
+    d = end[0][0] - y[0][0], end[0][1] - y[0][1], end[0][2] - y[0][2]
+    lost = kinetic_energy(y[1], y[2], y[3], work, tilted) - kinetic_energy(end[1], v, L, work, tilted)
+    if T[0] != 0.0 or T[1] != 0.0 or T[2] != 0.0:
+        first, last = angular_velocity(y[1], y[3], work, tilted), angular_velocity(end[1], L, work, tilted)
+        turn = 0.5 * (first[0] + last[0]), 0.5 * (first[1] + last[1]), 0.5 * (first[2] + last[2])
+        lost += h * (T[0] * turn[0] + T[1] * turn[1] + T[2] * turn[2])
+    return lost + work.mass * (a[0] * d[0] + a[1] * d[1] + a[2] * d[2])
+
+
+@inlined
+def _stored(n, x, R, tilted, work):
+    """Energy of the springs at x [J]."""
+    stored = 0.0
+    for i in range(n):
+        gap = min(gap_of(work.slot[i], x, R, tilted, work), 0.0)
+        stored += 0.5 * stiffness(work) * gap * gap
+    return stored
+
+
+@inlined
+def _without_excess(y, end, excess, h, tilted, report, work):
+    """`end` without the energy `excess` [J] that came from nowhere, if that is more than the stage and its solve miss.
+
+    Where there is too little motion to pay with the body stays at y without velocity, and is reported as coarse.
+    """
+    x, q, v, L = end
+    size = kinetic_energy(y[1], y[2], y[3], work, tilted)
+    size += work.mass * h * h * qt.dot(work.free_acceleration, work.free_acceleration)
+    if not excess > max(work.tolerance, GAIN_SHARE) * size:
+        return end
+    motion = kinetic_energy(q, v, L, work, tilted)
+    if not excess < motion:
+        report[work.world, at.COARSE] += 1.0
+        return y[0], y[1], (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
+    s = math.sqrt(1.0 - excess / motion)
+    return x, q, (s * v[0], s * v[1], s * v[2]), (s * L[0], s * L[1], s * L[2])
+
+
+@if_law((STIFFNESS,), _as_it_ends)
+def lift_to_due(n, y, end, h, tilted, report, work):
+    """The end of a stage from y with no point deeper than its spring is due to be, and no other one in a wall.
+
+    Nor is more stored in the springs than there was, and than the motion has lost and the loads have done on the way.
+    (Damping stops a point that turns as it does at the start of the stage: what turns less by then it leaves deeper.)
+    Friction far beyond 1 may push a point that turns more than its spring takes: that is taken from the motion.
+    """
+    x, q, v, L = end
+    R, least = qt.to_matrix(q), UNSEEN * work.slop
+    x = _lifted(n, x, R, 1.0, tilted, work)
+    before = 0.0
+    for i in range(n):
+        before += 0.5 * stiffness(work) * min(work.gap[i], 0.0) ** 2
+    stored = _stored(n, x, R, tilted, work)
+    if stored > before:
+        budget = before + _work_of_loads(y, (x, q, v, L), h, tilted, work)
+        if stored > budget:
+            x = _lifted(n, x, R, math.sqrt(max(budget, 0.0) / stored), tilted, work)
+            stored = _stored(n, x, R, tilted, work)
+    gap, slot = nearest_outside_set(x, R, tilted, work)
+    if gap < -least:
+        x = _along(x, -gap, wall_normal(work.walls, wall_of(slot, work)))
+    end = lifted_to(x, end, tilted, work)
+    excess = stored - before - _work_of_loads(y, end, h, tilted, work)
+    return _without_excess(y, end, excess, h, tilted, report, work)
+
+
+def _as_it_is(block, work):
+    return block
+
+
+@if_law((STIFFNESS,), _as_it_is)
+def give_way(W, work):
+    """The block of a contact with itself, and γ."""
+    return W[0] + work.give, W[1], W[2], W[3], W[4], W[5], W[6], W[7], W[8]
+
+
+def _as_assembled(n, width, work):
+    return None
+
+
+@if_law((STIFFNESS,), _as_assembled)
+def soften(n, width, work):
+    """Add γ to the assembled W."""
+    for i in range(n):
+        work.delassus[width * i, width * i] += work.give
+
+
+def _unyielding(value, rho, work):
+    return value
+
+
+@if_law((STIFFNESS,), _unyielding)
+def yielding(value, rho, work):
+    """Scale a value, a normal impulse q - ρ u or its slope, by the compliance γ: p = q - ρ (u + γ p)."""
+    return value / (1.0 + rho * work.give)

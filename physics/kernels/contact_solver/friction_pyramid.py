@@ -1,0 +1,261 @@
+"""Contact with friction as one linear complementarity problem: the fallback that pivots.
+
+n contacts with impulses p = (normal, tangent 1, tangent 2) each [N s] and
+velocities u = W p + b [m/s]. Coulomb's cone |p_t| <= mu p_n is replaced by the
+pyramid *inscribed* in it whose base is a regular octagon with unit directions
+d_k, k = 0..7: p_t = sum beta_k d_k with sum beta_k <= mu p_n. With the sliding
+speed lambda as the last unknown the conditions of each contact are
+
+    0 <= p_n     perpendicular to  u_n >= 0,
+    0 <= beta_k  perpendicular to  lambda + d_k·u_t >= 0,
+    0 <= lambda  perpendicular to  mu p_n - sum beta_k >= 0.
+
+The matrix is copositive, and Lemke's method finds a solution whenever contacts
+are not wedged (without friction the problem has one).
+
+An inscribed pyramid never gives more friction than the cone, and at least
+cos(pi/8) = 0.924 of it against the sliding velocity. It is turned so that d_0
+is opposite the sliding velocity of the start p, so that sliding that way is
+exact: a call that returns its own start has solved the problem of the cone.
+
+References
+----------
+.. [1] D. E. Stewart, J. C. Trinkle, *An implicit time-stepping scheme for rigid
+   body dynamics with inelastic collisions and Coulomb friction*, IJNME 39, 1996,
+   doi:10.1002/(SICI)1097-0207(19960815)39:15<2673::AID-NME972>3.0.CO;2-I.
+.. [2] M. Anitescu, F. A. Potra, *Formulating dynamic multi-rigid-body contact
+   problems with friction as solvable linear complementarity problems*, Nonlinear
+   Dynamics 14, 1997, doi:10.1023/A:1008292328909.
+"""
+
+from __future__ import annotations
+
+import math
+
+from physics.kernels.compile.decorators import kernel
+from physics.kernels.lcp.dantzig import dantzig, dantzig_sizes
+from physics.kernels.lcp.lemke import lemke, lemke_sizes
+from physics.kernels.lcp.scaling_and_certificate import BAD_DATA, INACCURATE, RAY, SOLVED, inverse_power_of_two
+
+DIRECTIONS = 8
+UNKNOWNS = DIRECTIONS + 2  # per contact: p_n, beta_0 .. beta_7, lambda
+SLIDING_TOLERANCE = 2.0**-30  # of the velocities that add up to u_t: slower than this is rounding
+RETRY_ANGLE = 1.0  # [rad], no fraction of a turn: no two pyramids come to stand alike
+
+_R = math.sqrt(0.5)
+COSINE = (1.0, _R, 0.0, -_R, -1.0, -_R, 0.0, _R)
+SINE = (0.0, _R, 1.0, _R, 0.0, -_R, -1.0, -_R)
+
+
+def pyramid_sizes(n_max: int) -> tuple[int, int]:
+    """Lengths of `work` (float64) and `index` (int64) for up to n_max contacts: 200 n_max² numbers.
+
+    About 1 MB for 24 contacts: one work space per thread, not one per world.
+    """
+    size = UNKNOWNS * n_max
+    (rows, columns), integers = lemke_sizes(size)
+    return size * size + 2 * size + rows * columns + 2 * n_max, integers
+
+
+def normal_sizes(n_max: int) -> tuple[int, int]:
+    """Lengths of `work` (float64) and `index` (int64) of `normal_fallback` for up to n_max contacts."""
+    (rows, columns), integers = dantzig_sizes(n_max)
+    return rows * columns + n_max, integers
+
+
+def workspace_sizes(n_max: int) -> tuple[int, int]:
+    """Lengths of `work` (float64) and `index` (int64) that serve either fallback."""
+    pyramid, normal = pyramid_sizes(n_max), normal_sizes(n_max)
+    return max(pyramid[0], normal[0]), max(pyramid[1], normal[1])
+
+
+@kernel
+def orient(W, b, n, p, heading):
+    """Direction d_0 of each contact into `heading` (n, 2): against u_t; if that vanishes, along p_t."""
+    for i in range(n):
+        ux, uy = b[3 * i + 1], b[3 * i + 2]
+        magnitude = abs(ux) + abs(uy)
+        for j in range(3 * n):
+            x, y = W[3 * i + 1, j] * p[j], W[3 * i + 2, j] * p[j]
+            ux += x
+            uy += y
+            magnitude += abs(x) + abs(y)
+        speed = math.sqrt(ux * ux + uy * uy)
+        px, py = p[3 * i + 1], p[3 * i + 2]
+        length = math.sqrt(px * px + py * py)
+        if speed > SLIDING_TOLERANCE * magnitude:
+            heading[i, 0], heading[i, 1] = -ux / speed, -uy / speed
+        elif length > 0.0:
+            heading[i, 0], heading[i, 1] = px / length, py / length
+        else:
+            heading[i, 0], heading[i, 1] = 1.0, 0.0
+
+
+@kernel
+def turn(n, heading):
+    """Turn each contact's pyramid by its own multiple of `RETRY_ANGLE`."""
+    for i in range(n):
+        c, s = math.cos((i + 1) * RETRY_ANGLE), math.sin((i + 1) * RETRY_ANGLE)
+        x, y = heading[i, 0], heading[i, 1]
+        heading[i, 0], heading[i, 1] = c * x - s * y, s * x + c * y
+
+
+@kernel
+def direction(heading, i, k):
+    """d_k of contact i: d_0 turned by k pi / 4."""
+    x, y = heading[i, 0], heading[i, 1]
+    return COSINE[k] * x - SINE[k] * y, SINE[k] * x + COSINE[k] * y
+
+
+@kernel
+def fill_pair(W, w_scale, heading, i, j, M):
+    """Block of contacts i, j of the complementarity problem: W between normals and directions."""
+    row, column = UNKNOWNS * i, UNKNOWNS * j
+    for c in range(DIRECTIONS + 1):
+        if c == 0:
+            gn, gx, gy = 1.0, 0.0, 0.0
+        else:
+            gn = 0.0
+            gx, gy = direction(heading, j, c - 1)
+        un = w_scale * (W[3 * i, 3 * j] * gn + W[3 * i, 3 * j + 1] * gx + W[3 * i, 3 * j + 2] * gy)
+        ux = w_scale * (W[3 * i + 1, 3 * j] * gn + W[3 * i + 1, 3 * j + 1] * gx + W[3 * i + 1, 3 * j + 2] * gy)
+        uy = w_scale * (W[3 * i + 2, 3 * j] * gn + W[3 * i + 2, 3 * j + 1] * gx + W[3 * i + 2, 3 * j + 2] * gy)
+        M[row, column + c] = un
+        for k in range(DIRECTIONS):
+            dx, dy = direction(heading, i, k)
+            M[row + 1 + k, column + c] = dx * ux + dy * uy
+
+
+@kernel
+def fill_problem(W, b, mu, n, w_scale, heading, M, q):
+    """The complementarity problem of all contacts, with W times `w_scale`."""
+    M[:] = 0.0
+    for i in range(n):
+        row = UNKNOWNS * i
+        last = row + UNKNOWNS - 1
+        for j in range(n):
+            fill_pair(W, w_scale, heading, i, j, M)
+        q[row] = b[3 * i]
+        for k in range(DIRECTIONS):
+            dx, dy = direction(heading, i, k)
+            q[row + 1 + k] = dx * b[3 * i + 1] + dy * b[3 * i + 2]
+            M[row + 1 + k, last] = 1.0
+            M[last, row + 1 + k] = -1.0
+        q[last] = 0.0
+        M[last, row] = mu[i]
+
+
+@kernel
+def write_impulses(z, mu, n, w_scale, heading, p):
+    """p from the multipliers, pulled back into the cone by what rounding put outside."""
+    for i in range(n):
+        row = UNKNOWNS * i
+        x, y = 0.0, 0.0
+        for k in range(DIRECTIONS):
+            dx, dy = direction(heading, i, k)
+            x += z[row + 1 + k] * dx
+            y += z[row + 1 + k] * dy
+        bound = mu[i] * z[row]
+        length = math.sqrt(x * x + y * y)
+        shrink = bound / length if length > bound else 1.0
+        p[3 * i] = z[row] * w_scale
+        p[3 * i + 1] = x * shrink * w_scale
+        p[3 * i + 2] = y * shrink * w_scale
+
+
+@kernel
+def pyramid_fallback(W, b, mu, n, p, work, index, max_pivots):
+    """Solve the contact problem with a friction pyramid of eight directions by Lemke's method.
+
+    Parameters
+    ----------
+    W : (3 n or more, 3 n or more) float64
+        [1/kg]. Delassus matrix, symmetric positive semidefinite; the leading block is read.
+    b : (3 n or more,) float64
+        [m/s]. Free contact velocities, bias included.
+    mu : (n or more,) float64
+        Coefficients of friction, >= 0.
+    n : int
+        How many contacts.
+    p : (3 n or more,) float64, in and out
+        [N s]. In: where to turn the pyramids from; zeros if nothing is known. Out:
+        the solution if the status is `SOLVED`, else unchanged.
+    work, index : float64, int64, work
+        Of the lengths that `pyramid_sizes` gives, or longer.
+    max_pivots : int
+        About 10 n are usual.
+
+    Returns
+    -------
+    status : int
+        0 solved, 1 ray (wedged), 2 pivot limit, 3 data not finite or mu negative, 4 inaccurate.
+    pivots : int
+        Exchanges done.
+
+    Notes
+    -----
+    Redundant contacts seen from near a solution make paths so degenerate that, once in about
+    10⁵ problems, rounding loses one: a path without a result is followed once more with every
+    pyramid turned. Multiplying W, or b, by a power of two gives exactly the scaled p.
+    """
+    size = UNKNOWNS * n
+    (rows, columns) = (size + 3, size + 2)
+    end_M = size * size
+    end_tableau = end_M + rows * columns
+    M = work[:end_M].reshape((size, size))
+    tableau = work[end_M:end_tableau].reshape((rows, columns))
+    q = work[end_tableau : end_tableau + size]
+    z = work[end_tableau + size : end_tableau + 2 * size]
+    heading = work[end_tableau + 2 * size : end_tableau + 2 * size + 2 * n].reshape((n, 2))
+    largest = 0.0
+    for i in range(3 * n):
+        if not mu[i // 3] >= 0.0 or not math.isfinite(p[i]):
+            return BAD_DATA, 0
+        largest = max(largest, W[i, i])
+    if not math.isfinite(largest):
+        return BAD_DATA, 0
+    w_scale = inverse_power_of_two(largest)
+    orient(W, b, n, p, heading)
+    fill_problem(W, b, mu, n, w_scale, heading, M, q)
+    status, pivots = lemke(M, q, z, tableau, index, max_pivots)
+    if status in (RAY, INACCURATE):
+        turn(n, heading)
+        fill_problem(W, b, mu, n, w_scale, heading, M, q)
+        status, again = lemke(M, q, z, tableau, index, max_pivots - pivots)
+        pivots += again
+    if status == SOLVED:
+        write_impulses(z, mu, n, w_scale, heading, p)
+    return status, pivots
+
+
+@kernel
+def normal_fallback(W, b, n, p, work, index, max_pivots):
+    """Solve the contact problem without friction: p >= 0, u = W p + b >= 0, p·u = 0.
+
+    Parameters
+    ----------
+    W : (n or more, n or more) float64
+        [1/kg]. Delassus matrix of the normals alone; the leading block is read.
+    b : (n or more,) float64
+        [m/s]. Free normal velocities, bias included.
+    n : int
+        How many contacts.
+    p : (n or more,) float64, out
+        [N s]. The solution if the status is `SOLVED`, else unchanged.
+    work, index : float64, int64, work
+        Of the lengths that `normal_sizes` gives, or longer.
+    max_pivots : int
+        About 2 n are usual.
+
+    Returns
+    -------
+    status, pivots : int
+        As `physics.kernels.lcp.dantzig.dantzig`.
+    """
+    size = (2 * n + 6) * n
+    z = work[size : size + n]
+    status, pivots = dantzig(W, b[:n], z, work[:size].reshape((2 * n + 6, n)), index, max_pivots)
+    if status == SOLVED:
+        for i in range(n):
+            p[i] = z[i]
+    return status, pivots

@@ -1,0 +1,150 @@
+"""Sharing out a total impulse and its moment among contacts that hold; see `sticking`."""
+
+from __future__ import annotations
+
+from physics.kernels.compile.decorators import inlined
+from physics.kernels.compile.simd import WIDTH, chosen, first_of, root, total
+from physics.kernels.contact_law.anisotropic_friction import friction_ratio
+from physics.kernels.half_space.contact_point import wall_of
+from physics.kernels.math import quaternion as qt
+from physics.kernels.math.simd_gather import column, numbers, present
+from physics.kernels.state.layout import NORMAL, TANGENT_1, TANGENT_2
+
+# Weighted sharings of the tangential impulses at most: nine in ten of those that hold take ten.
+SHARE_LIMIT = 40
+
+
+@inlined
+def wall_axis(walls, wall, first):
+    """Three columns of a wall's row: its normal or a tangent."""
+    return (walls[wall, first], walls[wall, first + 1], walls[wall, first + 2])
+
+
+@inlined
+def wall_axes(walls, wall):
+    """Normal and the two tangents of a wall."""
+    return (
+        wall_axis(walls, wall, NORMAL),
+        wall_axis(walls, wall, TANGENT_1),
+        wall_axis(walls, wall, TANGENT_2),
+    )
+
+
+@inlined
+def solve_symmetric(k, b):
+    """x of K x = b for K = (k11, k12, k13, k22, k23, k33), by cofactors."""
+    k11, k12, k13, k22, k23, k33 = k
+    c11 = k22 * k33 - k23 * k23
+    c12 = k13 * k23 - k12 * k33
+    c13 = k12 * k23 - k13 * k22
+    c22 = k11 * k33 - k13 * k13
+    c23 = k12 * k13 - k11 * k23
+    c33 = k11 * k22 - k12 * k12
+    s = 1.0 / (k11 * c11 + k12 * c12 + k13 * c13)
+    return (
+        (c11 * b[0] + c12 * b[1] + c13 * b[2]) * s,
+        (c12 * b[0] + c22 * b[1] + c23 * b[2]) * s,
+        (c13 * b[0] + c23 * b[1] + c33 * b[2]) * s,
+    )
+
+
+@inlined
+def minus(a, b):
+    """a - b of vectors."""
+    return (a[0] - b[0], a[1] - b[1], a[2] - b[2])
+
+
+@inlined
+def contact_arm(work, i):
+    """Arm of contact i from the centre of mass [m]."""
+    return (work.arm[i, 0], work.arm[i, 1], work.arm[i, 2])
+
+
+@inlined
+def first_active(n, work):
+    """First contact that is not left out."""
+    for i in range(n):
+        if work.active[i] != 0:
+            return i
+    return 0
+
+
+@inlined
+def is_in_cone(pn, pa, pb, work):
+    """Test whether an impulse (normal, tangents) is in the cone of friction."""
+    limit, b = work.mu * pn, pb / friction_ratio(work)
+    return pa * pa + b * b <= limit * limit
+
+
+@inlined
+def share_out(n, count, c, F, a, work):
+    """Bolt-group impulses: (the contact that pulls most or -1, whether all are in their cones)."""
+    walls = work.walls
+    lowest = 0.0
+    loser = -1
+    holds = True
+    s = 1.0 / count
+    for i in range(n):
+        if work.active[i] == 0:
+            continue
+        wall = wall_of(work.slot[i], work)
+        m = qt.cross(a, minus(contact_arm(work, i), c))
+        p = (s * F[0] + m[0], s * F[1] + m[1], s * F[2] + m[2])
+        pn = qt.dot(wall_axis(walls, wall, NORMAL), p)
+        pa, pb = qt.dot(wall_axis(walls, wall, TANGENT_1), p), qt.dot(wall_axis(walls, wall, TANGENT_2), p)
+        work.normal[i] = pn
+        work.across[i, 0], work.across[i, 1] = pa, pb
+        if not pn >= lowest:
+            lowest = pn
+            loser = i
+        if not is_in_cone(pn, pa, pb, work):
+            holds = False
+    return loser, holds
+
+
+@inlined
+def _along(axis, n, work):
+    """Coordinates of the contacts along an axis."""
+    return axis[0] * column(work.arm, 0, n) + axis[1] * column(work.arm, 1, n) + axis[2] * column(work.arm, 2, n)
+
+
+@inlined
+def share_by_load(n, work):
+    """Share the tangential impulses of one wall out in proportion to the normal ones; whether that holds.
+
+    With weights g_i, at first the normal impulses, their centre r_g, ρ_i = r_i - r_g: p_t,i = g_i u_i, where
+
+        u_i = P_t / Σg + α n x ρ_i,    α = T_n / Σ g ρ²
+
+    and T_n is the moment of the tangential impulses about r_g. The weights go half the way (their roots do) to where
+    all would be equally near to their cones, μ p_n / |u| (Weiszfeld's). The u_i are those of a rigid motion, in which
+    friction takes up Σ μ p_n,i |u_i| at most: where Σ p_t,i·u_i is more, no sharing holds.
+    """
+    walls, active, ratio = work.walls, work.active, friction_ratio(work)
+    wall = wall_of(work.slot[first_active(n, work)], work)
+    for i in range(n):
+        if n > WIDTH or (active[i] != 0 and wall_of(work.slot[i], work) != wall):
+            return False
+    on = numbers(active, n) * present(n)
+    a, b = _along(wall_axis(walls, wall, TANGENT_1), n, work), _along(wall_axis(walls, wall, TANGENT_2), n, work)
+    p, x, y = on * numbers(work.normal, n), on * column(work.across, 0, n), on * column(work.across, 1, n)
+    fa, fb, spin, limit, g = total(x), total(y), total(a * y - b * x), work.mu * p, p
+    for _ in range(SHARE_LIMIT):
+        s = 1.0 / total(g)
+        ca, cb = s * total(g * a), s * total(g * b)
+        da, db = a - ca, b - cb
+        moment, second = spin - (ca * fb - cb * fa), total(g * (da * da + db * db))
+        alpha = moment / second if second > 0.0 else 0.0
+        x, y = s * fa - alpha * db, s * fb + alpha * da
+        stretched = y / ratio
+        size = g * root(x * x + stretched * stretched)
+        if first_of(~(size <= limit)) < 0:
+            for i in range(n):
+                if active[i] != 0:
+                    work.across[i, 0], work.across[i, 1] = (g * x)[i], (g * y)[i]
+            return True
+        slip = ratio * y
+        if total(g * (x * x + y * y)) > total(limit * root(x * x + slip * slip)):
+            return False
+        g = chosen(size > 0.0, g * root(limit / size), g)
+    return False

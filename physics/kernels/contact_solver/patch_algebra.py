@@ -1,0 +1,295 @@
+"""Sums over the contacts of a patch on one wall, with the formulas of `sliding_patch` and `primal_dual_friction`.
+
+A patch has three or four contacts, a lane each (`simd`); the fourth lane of three is the third contact once more, and
+never pushes. `on` is 1 for a contact that pushes and 0 for one that is open. All is in the stretched frame of
+`anisotropic_friction` (of an even wall: its frame): `place` are coordinates (normal, tangents) relative to the centre
+of mass, `target` is the targets along the same axes, and `mobility` W_aa + W_bb of each contact.
+"""
+
+from __future__ import annotations
+
+import math
+
+from physics.kernels.compile.decorators import inlined
+from physics.kernels.compile.simd import chosen, first_of, larger, largest, least, root, total
+from physics.kernels.contact_law.anisotropic_friction import friction_ratio
+from physics.kernels.contact_solver.one_contact import LEAST_SQUARE, inverse_root, is_warm, point_velocity
+from physics.kernels.math import quaternion as qt
+from physics.kernels.math.simd_gather import column, part, present
+
+# Second moments of a patch: below this share of det to trace² it counts as a line (edges 1 : 1000).
+LINE_LIMIT = 1.0e-6
+
+# Share of its free slip that a face which nearly holds starts with.
+LEAST_SLIP = 0.01
+
+
+@inlined
+def _along(axis, n, work):
+    """Coordinates of the contacts along an axis, from the centre of mass."""
+    return axis[0] * column(work.arm, 0, n) + axis[1] * column(work.arm, 1, n) + axis[2] * column(work.arm, 2, n)
+
+
+@inlined
+def place_patch(n, axes, inv_mass, K, work):
+    """The patch (place, target, mobility) of the n contacts in `work`, on the wall with these axes."""
+    ratio = friction_ratio(work)
+    c, a, b = ratio * _along(axes[0], n, work), ratio * _along(axes[1], n, work), _along(axes[2], n, work)
+    target = (column(work.target, 0, n), column(work.target, 1, n), ratio * column(work.target, 2, n))
+    mass_b = ratio * ratio * inv_mass
+    mobility = (inv_mass + mass_b) + K[0] * (a * a + b * b) - 2.0 * c * (K[1] * a + K[2] * b) + c * c * (K[3] + K[5])
+    return (c, a, b), target, mobility
+
+
+@inlined
+def free_speed(friction, patch, u, w):
+    """Largest velocity of a contact without impulses, less its target [m/s]."""
+    place, target, _ = patch
+    speed = point_velocity(place, u, w)
+    worst = abs(speed[0] - target[0])
+    if friction is not None:
+        worst = larger(worst, larger(abs(speed[1] - target[1]), abs(speed[2] - target[2])))
+    return largest(larger(0.0, worst))
+
+
+@inlined
+def warm_motion(n, patch, on, u, w, inv_mass, K, work):
+    """Planar motion after the impulses in `work`, those of the warm start, and whether they are of these loads."""
+    (c, a, b), _, _ = patch
+    ratio = friction_ratio(work)
+    p, x = on * part(work.impulse, 0, n), on * part(work.impulse, 1, n)
+    y = on * part(work.impulse, 2, n) / ratio
+    spin = K[0] * (a * y - b * x) + K[1] * (b * p - c * y) + K[2] * (c * x - a * p)
+    motion = u[1] + inv_mass * total(x), u[2] + ratio * ratio * inv_mass * total(y), w[0] + total(spin)
+    return motion, is_warm(inv_mass * total(p), -u[0])
+
+
+@inlined
+def warm_slip(n, patch, on, work):
+    """Impulses per normal impulse along the tangents (two lanes) of those in `work`; 0 where nothing pushes."""
+    p = on * part(work.impulse, 0, n)
+    s = chosen(p > 0.0, 1.0 / p, 0.0)
+    return s * part(work.impulse, 1, n), s * part(work.impulse, 2, n) / friction_ratio(work)
+
+
+@inlined
+def _spread(n, a, b, on):
+    """Centroid of the contacts along the tangents, and mean square of their distance from it."""
+    share = 1.0 / n
+    ca, cb = share * total(on * a), share * total(on * b)
+    a, b = on * (a - ca), on * (b - cb)
+    return ca, cb, share * (total(a * a) + total(b * b))
+
+
+@inlined
+def may_hold(n, axes, v, L, work):
+    """Test whether friction may stop a face, with the velocity v and angular momentum L that it has without it.
+
+    What holds stops at its wall: the pushes P take away the normal momentum, and friction, μP at most, the tangential
+    one; its moment about the centroid is μ Σ p_i |d_i| <= μP max |d_i| at most. Of a face that can hold this is true;
+    one that slips within the tolerance of a solve would be taken for it, and creep.
+    """
+    ratio, friction = friction_ratio(work), work.mu * qt.dot(axes[0], v)
+    va, vb, limit = qt.dot(axes[1], v), qt.dot(axes[2], v) / ratio, friction * friction
+    spin, slip = qt.dot(axes[0], L) / work.mass, va * va + vb * vb
+    if slip > limit or (slip == 0.0 and spin == 0.0):
+        return slip <= limit
+    a, b = ratio * _along(axes[1], n, work), _along(axes[2], n, work)
+    ca, cb, _ = _spread(n, a, b, present(n))
+    moment = ca * vb - cb * va - spin
+    a, b = a - ca, b - cb
+    return moment * moment <= largest(a * a + b * b) * limit
+
+
+@inlined
+def cold_motion(n, patch, on, mu, u, w, inv_mass, K):
+    """Planar motion that friction leaves of one without impulses, if the planar friction is that of an ellipsoid.
+
+    The forces and moments about the centroid that equal pushes, P in all, can exert while a face slides are nearly an
+    ellipsoid, (|f|/μP)² + (T/μPρ)² <= 1, and the slip is along its normal, (v, ρ² ω) (Goyal et al. 1991; Howe and
+    Cutkosky 1996). With ρ² = Σ|d_i|²/n, β = μP/m, γ = μPρ²/I and the slip's size s, s² = v² + ρ²ω²,
+
+        v = v₀ s/(s + β),   ω = ω₀ s/(s + γ),   φ(s)² = v₀²/(s + β)² + ρ²ω₀²/(s + γ)² = 1.
+
+    1/φ is nearly a straight line and concave: one step of Newton's, from where it is not above 1, is near enough. What
+    φ(0) <= 1 says would hold is given a small part of its slip, since directions are wanted.
+    """
+    (_, a, b), _, _ = patch
+    ca, cb, second = _spread(n, a, b, on)
+    va, vb = u[1] - w[0] * cb, u[2] + w[0] * ca
+    slip2, turn2, beta = va * va + vb * vb, second * w[0] * w[0], mu * max(-u[0], 0.0)
+    free, gamma = math.sqrt(slip2 + turn2), beta * second * K[0] / inv_mass
+    s = max(free - max(beta, gamma), 0.0)
+    p, q = 1.0 / (s + beta), 1.0 / (s + gamma)
+    square = slip2 * p * p + turn2 * q * q
+    s += (math.sqrt(square) - 1.0) * square / (slip2 * p * p * p + turn2 * q * q * q)
+    s = max(s, LEAST_SLIP * free)
+    p, q = s / (s + beta), s / (s + gamma)
+    wn = q * w[0]
+    return p * va + wn * cb, p * vb - wn * ca, wn
+
+
+@inlined
+def centroid(count, patch, on):
+    """Centroid of the active contacts."""
+    (c, a, b), _, _ = patch
+    s = 1.0 / count
+    return s * total(on * c), s * total(on * a), s * total(on * b)
+
+
+@inlined
+def fit_targets(count, patch, on):
+    """The normal motion that fits the targets of the active contacts best: (is one, centroid, (v_n, ω_a, ω_b)).
+
+    Of contacts on a line it is not finite, or no longer accurate: then there is none.
+    """
+    (_, a, b), (target, _, _), _ = patch
+    center, t0 = centroid(count, patch, on), (1.0 / count) * total(on * target)
+    a, b = on * (a - center[1]), on * (b - center[2])
+    saa, sab, sbb, ta, tb = total(a * a), total(a * b), total(b * b), total(a * target), total(b * target)
+    det, trace = saa * sbb - sab * sab, saa + sbb
+    s = 1.0 / det
+    ga, gb = s * (sbb * ta - sab * tb), s * (saa * tb - sab * ta)
+    return det > LINE_LIMIT * trace * trace, center, (t0 - (ga * center[1] + gb * center[2]), gb, -ga)
+
+
+@inlined
+def spare_speed(patch, vn, wa, wb):
+    """Normal velocities of the contacts less their targets [m/s] in a normal motion; of an open one it may be > 0."""
+    (_, a, b), (target, _, _), _ = patch
+    return (vn + wa * b - wb * a) - target
+
+
+@inlined
+def opposed(ua, ub, on, mu):
+    """Impulse per normal impulse that opposes a slip (ua, ub), -μ d, and its speed: none of what is open or still."""
+    square = ua * ua + ub * ub
+    s = chosen(square > LEAST_SQUARE, -mu * on * inverse_root(square), 0.0)
+    return s * ua, s * ub, root(square)
+
+
+@inlined
+def slips(patch, motion, wa, wb):
+    """Tangential velocities of the contacts less their targets [m/s] in a planar motion."""
+    (c, a, b), (_, target_a, target_b), _ = patch
+    return motion[0] + wb * c - motion[2] * b - target_a, motion[1] + motion[2] * a - wa * c - target_b
+
+
+@inlined
+def respond(patch, on, center, y0, gain, slip, K):
+    """The y_1, y_2 that go with some directions, `slip`: impulses per normal impulse along the tangents (and speeds).
+
+    Returns
+    -------
+    y : tuple of 2 floats
+    turning : tuple of 6 floats
+        (ω_a per y_1, y_2; ω_b per y_1, y_2; ω_n per y_1, y_2), friction along with them.
+    """
+    (c, a, b), _, _ = patch
+    x, y, _ = slip
+    mn, ma, mb = a * y - b * x, on * b - c * y, c * x - on * a
+    a, b = a - center[1], b - center[2]
+    n0, n1, n2 = total(mn), total(a * mn), total(b * mn)
+    a0, a1, a2 = total(ma), total(a * ma), total(b * ma)
+    b0, b1, b2 = total(mb), total(a * mb), total(b * mb)
+    g0, h0 = K[1] * n0 + K[3] * a0 + K[4] * b0, K[2] * n0 + K[4] * a0 + K[5] * b0
+    g1, g2 = K[1] * n1 + K[3] * a1 + K[4] * b1, K[1] * n2 + K[3] * a2 + K[4] * b2
+    h1, h2 = K[2] * n1 + K[4] * a1 + K[5] * b1, K[2] * n2 + K[4] * a2 + K[5] * b2
+    f1, f2 = K[0] * n1 + K[1] * a1 + K[2] * b1, K[0] * n2 + K[1] * a2 + K[2] * b2
+    s = 1.0 / (g1 * h2 - g2 * h1)
+    ra, rb = gain[0] - g0 * y0, gain[1] - h0 * y0
+    return (s * (h2 * ra - g2 * rb), s * (g1 * rb - h1 * ra)), (g1, g2, h1, h2, f1, f2)
+
+
+@inlined
+def comply(patch, center, slip, turning, inv_mass, K, work):
+    """Planar motion per planar impulse at the centroid, row by row (9): with the normal motion held by y_1, y_2.
+
+    `slip` and `turning` are those of `respond`, which only a step of Newton's has a use for this after.
+    """
+    (_, a, b), _, _ = patch
+    x, y, _ = slip
+    ratio = friction_ratio(work)
+    mass_b = ratio * ratio * inv_mass
+    cc, ca, cb = center
+    g1, g2, h1, h2, f1, f2 = turning
+    s = 1.0 / (g1 * h2 - g2 * h1)
+    a, b = a - ca, b - cb
+    # Rows (ω_a, ω_b) of the response to the impulse (D_a, D_b, D_n), moments (D_n, -c D_b, c D_a).
+    sa = (cc * K[4], -cc * K[3], K[1])
+    sb = (cc * K[5], -cc * K[4], K[2])
+    x1, x2, y1, y2 = inv_mass * total(a * x), inv_mass * total(b * x), mass_b * total(a * y), mass_b * total(b * y)
+    # Motion per δω_a, δω_b made up for by y.
+    pa, pb = s * (x1 * h2 - x2 * h1), s * (x2 * g1 - x1 * g2)
+    qa, qb = s * (y1 * h2 - y2 * h1), s * (y2 * g1 - y1 * g2)
+    ra, rb = s * (f1 * h2 - f2 * h1), s * (f2 * g1 - f1 * g2)
+    return (
+        inv_mass - pa * sa[0] - pb * sb[0], -pa * sa[1] - pb * sb[1], -pa * sa[2] - pb * sb[2],
+        -qa * sa[0] - qb * sb[0], mass_b - qa * sa[1] - qb * sb[1], -qa * sa[2] - qb * sb[2],
+        cc * K[2] - ra * sa[0] - rb * sb[0],
+        -cc * K[1] - ra * sa[1] - rb * sb[1],
+        K[0] - ra * sa[2] - rb * sb[2],
+    )  # fmt: skip
+
+
+@inlined
+def resultant(patch, on, center, y0, y, slip):
+    """Normal impulses of the active contacts: which pull (1), which most (or -1), what pushes, what it exerts."""
+    (c, a, b), _, _ = patch
+    p = chosen(on > 0.0, y0 + (y[0] * (a - center[1]) + y[1] * (b - center[2])), 0.0)
+    pulling, loser = chosen(p < 0.0, 1.0, 0.0), -1
+    if first_of(~(p >= 0.0)) >= 0:  # so that what is no number also pulls
+        loser = first_of((on > 0.0) & ~(p > least(p)))
+    p = larger(p, 0.0)
+    px, py = p * slip[0], p * slip[1]
+    exerted = total(px), total(py), total(a * py - b * px), total(b * p - c * py), total(c * px - a * p)
+    return pulling, loser, p, exerted
+
+
+@inlined
+def moved(exerted, u, w, inv_mass, mass_b, K):
+    """Planar motion that impulses along the tangents, and moments, lead to."""
+    fa, fb, tn, ta, tb = exerted
+    return u[1] + inv_mass * fa, u[2] + mass_b * fb, w[0] + (K[0] * tn + K[1] * ta + K[2] * tb)
+
+
+@inlined
+def across_misses(patch, p, slip, mu, delta):
+    """Largest tangential residual [m/s] when the motion that the directions are of is left by delta: if all slide.
+
+    Of the contacts with a push p > 0. Of one that moves backwards the whole velocity counts: its impulse is in the
+    cone, and projections do not lengthen.
+
+    Also H = Σ κ h hᵀ (11, 12, 13, 22, 23, 33): how the friction across grows with the planar motion.
+    """
+    if not mu > 0.0:
+        return 0.0, (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    (_, a, b), _, mobility = patch
+    inv_mu = 1.0 / mu
+    x, y, size = slip[0] * inv_mu, slip[1] * inv_mu, slip[2]  # (x, y) = -d
+    da, db = delta[0] - delta[2] * b, delta[1] + delta[2] * a
+    load = mu * p
+    weight = load * mobility  # μ p trace(W_tt), which is at least μ p / ρ_t
+    along, across = size - (x * da + y * db), abs(x * db - y * da)
+    miss = chosen(along > 0.0, across * weight / (weight + along), across - along)
+    worst = largest(larger(0.0, chosen(weight > 0.0, miss, 0.0)))
+    s, h = chosen(size > 0.0, load / size, 0.0), -(a * x + b * y)
+    sx, sy = s * x, s * y
+    return worst, (total(sy * y), -total(sx * y), total(sy * h), total(sx * x), -total(sx * h), total(s * h * h))
+
+
+@inlined
+def is_turned(on, d, size, change):
+    """Mark the slips, of direction d and this size [m/s], that turn by more than about 70 degrees when they change."""
+    along, across = size + (d[0] * change[0] + d[1] * change[1]), d[0] * change[1] - d[1] * change[0]
+    return (on * size > 0.0) & ~((along > 0.1 * size) & (abs(across) <= 3.0 * along))
+
+
+@inlined
+def turns_little(patch, on, slip, mu, step):
+    """Test whether no direction turns by more than about 70 degrees, and none backwards, in a step of the motion."""
+    (_, a, b), _, _ = patch
+    x, y, size = slip
+    s = -1.0 / mu
+    change = step[0] - step[2] * b, step[1] + step[2] * a
+    return first_of(is_turned(on, (s * x, s * y), size, change)) < 0

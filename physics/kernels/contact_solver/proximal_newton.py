@@ -1,0 +1,236 @@
+"""Contact problems on which sweeps crawl: Newton's method on the twist, inside a proximal-point iteration.
+
+On the verge of sliding (all contacts nearly hold, or creep, or one holds while others slide) sweeps converge
+as slowly as one likes, and four contacts of a face leave the impulses undetermined. The change x of the
+body's twist is determined, and has six components however many contacts there are. For impulses q near the
+solution let
+
+    p(x) = law(q - ρ u(x)),    u(x) = J x + b,
+
+where the law takes max(0, p_n) and then projects p_t on the disk |p_t| <= μ p_n, contact by contact, with ρ a
+large multiple of the contact's mass. Then x = M⁻¹ Jᵀ p(x) is a nonlinear system for the twist alone, at most a
+few pieces away from linear; its Newton matrix 1 - M⁻¹ Jᵀ p'(u) J is never singular for want of determined
+impulses. Setting q = p(x) and starting again converges to the contact law itself, by about the factor
+1/(1 + ρ W) each time, so that a few rounds of growing ρ do.
+
+References
+----------
+.. [1] R. T. Rockafellar, *Monotone operators and the proximal point algorithm*, SIAM J. Control Optim. 14,
+   1976.
+.. [2] P. Alart, A. Curnier, *A mixed formulation for frictional contact problems prone to Newton like
+   solution methods*, Comput. Methods Appl. Mech. Eng. 92, 1991 (`law` and its derivative).
+"""
+
+from __future__ import annotations
+
+import math
+
+from physics.kernels.compile.decorators import inlined, kernel
+from physics.kernels.contact_law.compliance import yielding
+from physics.kernels.contact_solver.gauss_seidel import NORMAL_STEP, cone_residual, velocities
+
+# ρ in units of a contact's normal mass 1/W_nn: of the first round, its growth from round to round, and the
+# largest, where rounding times ρ is still below the tolerance. Large: fewer rounds, Newton steps that
+# overshoot more often.
+PROXIMAL_FACTOR = 1.0e3
+FACTOR_GROWTH = 10.0
+FACTOR_LIMIT = 1.0e6
+
+# Rounds; Newton steps of a round, halvings of a step, and steps that did not make the defect smaller, at most.
+ROUNDS = 12
+NEWTON_STEPS = 20
+HALVINGS = 6
+FAILURES = 5
+
+# Rounds and Newton steps of a quick turn: what has not settled by then profits more from a few sweeps in between than
+# from more steps. A few problems in a thousand used to take two thirds of all steps.
+QUICK_ROUNDS = 6
+QUICK_STEPS = 8
+
+# A round is solved to this share of the tolerance.
+ROUND_SHARE = 0.01
+
+
+@inlined
+def _defect(n, factor, inv_mass, work):
+    """x - M⁻¹ Jᵀ p(x) into `work.defect`, p(x) into `work.trial`; its size as a velocity [m/s].
+
+    `work.velocity` receives q - ρ u, which the derivative of the law is taken at.
+    """
+    frame, angular, response = work.frame, work.angular, work.response
+    x, g, p, y, q = work.twist, work.defect, work.trial, work.velocity, work.impulse
+    for c in range(6):
+        g[c] = x[c]
+    for i in range(n):
+        r = 3 * i
+        rho = factor * work.local[i, NORMAL_STEP]
+        for s in range(r, r + 3):
+            u = work.bias[s] + (
+                (frame[s, 0] * x[0] + frame[s, 1] * x[1] + frame[s, 2] * x[2])
+                + (angular[s, 0] * x[3] + angular[s, 1] * x[4] + angular[s, 2] * x[5])
+            )
+            y[s] = q[s] - rho * u
+        y[r] = yielding(y[r], rho, work)
+        size, limit = math.sqrt(y[r + 1] * y[r + 1] + y[r + 2] * y[r + 2]), work.mu * max(y[r], 0.0)
+        s = limit / size if size > limit else 1.0
+        p[r], p[r + 1], p[r + 2] = max(y[r], 0.0), s * y[r + 1], s * y[r + 2]
+        for s in range(r, r + 3):
+            for c in range(3):
+                g[c] -= inv_mass * frame[s, c] * p[s]
+                g[c + 3] -= response[s, c] * p[s]
+    linear = g[0] * g[0] + g[1] * g[1] + g[2] * g[2]
+    return math.sqrt(linear + work.radius * work.radius * (g[3] * g[3] + g[4] * g[4] + g[5] * g[5]))
+
+
+@inlined
+def _row(s, c, work):
+    """Entry c of row s of J."""
+    return work.frame[s, c] if c < 3 else work.angular[s, c - 3]
+
+
+@inlined
+def _fill_matrix(n, factor, inv_mass, work):
+    """Newton matrix 1 - M⁻¹ Jᵀ p'(u) J at the point of the last `_defect`, and -defect beside it (6 x 7)."""
+    A, y, frame, response = work.newton, work.velocity, work.frame, work.response
+    for a in range(6):
+        for b in range(6):
+            A[a, b] = 0.0
+        A[a, a] = 1.0
+        A[a, 6] = -work.defect[a]
+    for i in range(n):
+        r = 3 * i
+        if not y[r] > 0.0:
+            continue
+        rho = factor * work.local[i, NORMAL_STEP]
+        size, limit = math.sqrt(y[r + 1] * y[r + 1] + y[r + 2] * y[r + 2]), work.mu * y[r]
+        da = db = 0.0
+        k11 = k22 = 1.0
+        k12 = 0.0
+        if size > limit:
+            da, db, s = y[r + 1] / size, y[r + 2] / size, limit / size
+            k11, k12, k22 = s * (1.0 - da * da), -s * da * db, s * (1.0 - db * db)
+        for b in range(6):
+            jn = yielding(rho, rho, work) * _row(r, b, work)
+            ja, jb = rho * _row(r + 1, b, work), rho * _row(r + 2, b, work)
+            pa = k11 * ja + k12 * jb
+            pb = k12 * ja + k22 * jb
+            if size > limit:
+                pa += work.mu * da * jn
+                pb += work.mu * db * jn
+            for a in range(3):
+                A[a, b] += inv_mass * (frame[r, a] * jn + frame[r + 1, a] * pa + frame[r + 2, a] * pb)
+                A[a + 3, b] += response[r, a] * jn + response[r + 1, a] * pa + response[r + 2, a] * pb
+
+
+@inlined
+def _eliminate(A):
+    """Solve the 6 x 6 system with its right side in column 6 by elimination; the result in column 6."""
+    for k in range(6):
+        best = k
+        for a in range(k + 1, 6):
+            if abs(A[a, k]) > abs(A[best, k]):
+                best = a
+        if best != k:
+            for b in range(k, 7):
+                A[k, b], A[best, b] = A[best, b], A[k, b]
+        s = 1.0 / A[k, k]
+        for a in range(k + 1, 6):
+            f = s * A[a, k]
+            for b in range(k + 1, 7):
+                A[a, b] -= f * A[k, b]
+    for k in range(5, -1, -1):
+        for b in range(k + 1, 6):
+            A[k, 6] -= A[k, b] * A[b, 6]
+        A[k, 6] /= A[k, k]
+
+
+@inlined
+def _newton_step(n, size, factor, inv_mass, work):
+    """One damped Newton step on the twist; the new size of the defect."""
+    x, start, step = work.twist, work.start, work.newton
+    _fill_matrix(n, factor, inv_mass, work)
+    _eliminate(work.newton)
+    for c in range(6):
+        start[c] = x[c]
+    after = size
+    t = 1.0
+    for _ in range(HALVINGS):
+        for c in range(6):
+            x[c] = start[c] + t * step[c, 6]
+        after = _defect(n, factor, inv_mass, work)
+        if after < size:
+            break
+        t *= 0.5
+    return after
+
+
+@inlined
+def _twist_of_impulses(n, inv_mass, work):
+    """x = M⁻¹ Jᵀ p of `work.impulse`."""
+    x, p = work.twist, work.impulse
+    for c in range(6):
+        x[c] = 0.0
+    for s in range(3 * n):
+        for c in range(3):
+            x[c] += inv_mass * work.frame[s, c] * p[s]
+            x[c + 3] += work.response[s, c] * p[s]
+
+
+@kernel
+def proximal_newton(n, residual, goal, is_quick, work):
+    """Improve the impulses of an assembled contact problem with friction until the residual is within `goal`.
+
+    Parameters
+    ----------
+    n : int
+        Contacts in `work`: what `assemble` and `factor_blocks` fill is read; `work.impulse` is the start and
+        receives the result, `work.velocity` the contact velocities.
+    residual, goal : float
+        Residual of the start, and tolerance [m/s].
+    is_quick : bool
+        Whether to give up early: there is another turn.
+
+    Returns
+    -------
+    steps : int
+        Newton steps.
+    residual : float
+        [m/s], measured on the impulses returned: the best met.
+    """
+    p, u, W = work.impulse, work.velocity, work.delassus
+    rows = 3 * n
+    inv_mass = 1.0 / work.mass
+    steps = 0
+    factor = PROXIMAL_FACTOR
+    rounds, most = (QUICK_ROUNDS, QUICK_STEPS) if is_quick else (ROUNDS, NEWTON_STEPS)
+    for s in range(rows):
+        work.saved[s] = p[s]
+    for _ in range(rounds):
+        _twist_of_impulses(n, inv_mass, work)
+        size = _defect(n, factor, inv_mass, work)
+        failures = 0
+        for _ in range(most):
+            if not size > ROUND_SHARE * goal:
+                break
+            after = _newton_step(n, size, factor, inv_mass, work)
+            steps += 1
+            if not after < size:
+                failures += 1
+                if failures > FAILURES:
+                    break
+            size = after
+        for s in range(rows):
+            p[s] = work.trial[s]
+        velocities(rows, W, p, work.bias, u)
+        now = cone_residual(n, p, u, work.friction, work.local)
+        if now < residual:
+            residual = now
+            for s in range(rows):
+                work.saved[s] = p[s]
+        if residual <= goal:
+            break
+        factor = min(FACTOR_GROWTH * factor, FACTOR_LIMIT)
+    for s in range(rows):
+        p[s] = work.saved[s]
+    velocities(rows, W, p, work.bias, u)
+    return steps, residual

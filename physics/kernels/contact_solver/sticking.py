@@ -1,0 +1,318 @@
+"""Contacts that all hold: the impulse of a patch, an edge or a point without a single sweep.
+
+When every contact keeps the velocity asked of it (nothing slides, nothing lifts off) the twist after the
+solve is known before the impulses are, up to what the contacts do not fix:
+
+- three points that are not on a line fix all of it;
+- points on a line leave the rotation ω·e about it, whose angular momentum no impulse on the line can change;
+- one point leaves every rotation about it: the impulse is W⁻¹ (t - u), W the 3x3 inverse mass at the point.
+
+Of the impulses that produce the twist the one of least norm is the bolt-group formula: with n contact points
+at r_i, centroid r̄, d_i = r_i - r̄ and second moment K = Σ (|d_i|² 1 - d_i d_iᵀ),
+
+    p_i = F / n + (K⁻¹ T) x d_i,
+
+F the total impulse and T its moment about the centroid (K⁻¹ is 1/Σ|d_i|² on a line, 0 at a point). A body at
+rest gets velocity zero, to the last bit, and a symmetric patch symmetric impulses. Where this one leaves a
+cone although every contact pushes, the tangential impulses are shared out in the proportion of the normal
+ones instead, the same formula with the weights p_n: a lightly loaded contact then has a small target. A
+contact that would have to pull is left out, the one that pulls most first. If each p_i lies in its friction
+cone at the end, this solves the contact problem exactly; otherwise the contacts slide (`sliding_patch`,
+`gauss_seidel`).
+
+Targets of contacts that hold need not be those of a rigid motion: points of a body that turns are asked to move apart
+(`target_velocity.aim_rest`), by next to nothing when it is about to hold. Held to the letter they would all slide,
+nanometres a step, and friction would be spent on that. They are taken for those of the twist that fits them best where
+that changes them by less than `work.unseen`.
+"""
+
+from __future__ import annotations
+
+import math
+
+from physics.kernels.compile.decorators import inlined
+from physics.kernels.contact_solver.impulse_distribution import (
+    contact_arm,
+    first_active,
+    is_in_cone,
+    minus,
+    share_by_load,
+    share_out,
+    solve_symmetric,
+    wall_axes,
+    wall_axis,
+)
+from physics.kernels.contact_solver.one_contact import to_world
+from physics.kernels.half_space.contact_point import wall_of
+from physics.kernels.math import quaternion as qt
+from physics.kernels.state.layout import NORMAL, TANGENT_1, TANGENT_2
+
+# det K / tr(K)³ of a patch is (1 - s) s / 8 for a rectangle, s the smaller share of its second moment. Below
+# 1e-6 (edges 1 : 350) the patch counts as a line and is left to the sweeps.
+LINE_LIMIT = 1.0e-6
+
+# The target velocities must be those of one rigid twist, to this share of the largest of them
+# (rounding of a least-squares fit over a patch that is not a line).
+RIGID_LIMIT = 1.0e-11
+
+
+@inlined
+def _patch(n, count, work):
+    """Centroid of the active contact points and their second moment about it."""
+    cx = cy = cz = 0.0
+    for i in range(n):
+        if work.active[i] == 0:
+            continue
+        cx += work.arm[i, 0]
+        cy += work.arm[i, 1]
+        cz += work.arm[i, 2]
+    c = (cx / count, cy / count, cz / count)
+    xx = xy = xz = yy = yz = zz = 0.0
+    for i in range(n):
+        if work.active[i] == 0:
+            continue
+        x, y, z = minus(contact_arm(work, i), c)
+        xx += x * x
+        xy += x * y
+        xz += x * z
+        yy += y * y
+        yz += y * z
+        zz += z * z
+    return c, (yy + zz, -xy, -xz, xx + zz, -yz, xx + yy)
+
+
+@inlined
+def _is_line(k):
+    det = k[0] * (k[3] * k[5] - k[4] * k[4]) - k[1] * (k[1] * k[5] - k[4] * k[2]) + k[2] * (k[1] * k[4] - k[3] * k[2])
+    return not det > LINE_LIMIT * (k[0] + k[3] + k[5]) ** 3
+
+
+@inlined
+def _world_target(i, work):
+    """Target velocity of contact i in the world frame."""
+    n, a, b = work.target[i, 0], work.target[i, 1], work.target[i, 2]
+    walls, wall = work.walls, wall_of(work.slot[i], work)
+    return (
+        n * walls[wall, NORMAL] + a * walls[wall, TANGENT_1] + b * walls[wall, TANGENT_2],
+        n * walls[wall, NORMAL + 1] + a * walls[wall, TANGENT_1 + 1] + b * walls[wall, TANGENT_2 + 1],
+        n * walls[wall, NORMAL + 2] + a * walls[wall, TANGENT_1 + 2] + b * walls[wall, TANGENT_2 + 2],
+    )
+
+
+@inlined
+def _largest_target(n, work):
+    largest = 0.0
+    for i in range(n):
+        for c in range(3):
+            largest = max(largest, abs(work.target[i, c]))
+    return largest
+
+
+@inlined
+def _target_moments(n, count, c, work):
+    """Mean of the target velocities, and Σ d_i x t_i."""
+    s = (0.0, 0.0, 0.0)
+    m = (0.0, 0.0, 0.0)
+    for i in range(n):
+        if work.active[i] == 0:
+            continue
+        t = _world_target(i, work)
+        d = qt.cross(minus(contact_arm(work, i), c), t)
+        s = (s[0] + t[0], s[1] + t[1], s[2] + t[2])
+        m = (m[0] + d[0], m[1] + d[1], m[2] + d[2])
+    return (s[0] / count, s[1] / count, s[2] / count), m
+
+
+@inlined
+def _miss(n, v, w, work):
+    """Largest distance of contact velocities from their targets.
+
+    A contact without impulse may separate faster than asked.
+    """
+    walls = work.walls
+    worst = 0.0
+    for i in range(n):
+        m = qt.cross(w, contact_arm(work, i))
+        t = _world_target(i, work)
+        d = (v[0] + m[0] - t[0], v[1] + m[1] - t[1], v[2] + m[2] - t[2])
+        if work.normal[i] > 0.0:
+            worst = max(worst, math.sqrt(qt.dot(d, d)))
+        else:
+            worst = max(worst, -qt.dot(wall_axis(walls, wall_of(work.slot[i], work), NORMAL), d))
+    return worst
+
+
+@inlined
+def _turned_about_line(n, c, k, vc, m, R, v, L, work):
+    """Angular velocity of a body held at points on a line.
+
+    Across the line it is the least-squares fit Σ d x t / Σ|d|². Along the unit vector e it is α with
+    e·(I ω - L - c x m (v₁ - v)) = 0, v₁ = v_c - ω x c: the contacts exert no moment about the line.
+    """
+    J = work.J
+    first = minus(contact_arm(work, first_active(n, work)), c)
+    size2 = 0.5 * (k[0] + k[3] + k[5])
+    s = 1.0 / math.sqrt(first[0] * first[0] + first[1] * first[1] + first[2] * first[2])
+    e = (s * first[0], s * first[1], s * first[2])
+    s = 1.0 / size2
+    w = (s * m[0], s * m[1], s * m[2])
+    eb, wb = qt.transposed_matvec(R, e), qt.transposed_matvec(R, w)
+    Ie = (eb[0] / J[0], eb[1] / J[1], eb[2] / J[2])
+    wc = qt.cross(w, c)
+    ec = qt.cross(e, c)
+    gain = (vc[0] - wc[0] - v[0], vc[1] - wc[1] - v[1], vc[2] - wc[2] - v[2])
+    top = qt.dot(e, L) - qt.dot(Ie, wb) + work.mass * qt.dot(ec, gain)
+    alpha = top / (qt.dot(Ie, eb) + work.mass * qt.dot(ec, ec))
+    return (w[0] + alpha * e[0], w[1] + alpha * e[1], w[2] + alpha * e[2])
+
+
+@inlined
+def _point_impulse(r, t, R, v, L, work):
+    """Impulse at r that gives the point the velocity t, by its inverse mass in the principal frame."""
+    J, q = work.J, 1.0 / work.mass
+    x, y, z = qt.transposed_matvec(R, r)
+    Lb = qt.transposed_matvec(R, L)
+    wb = (J[0] * Lb[0], J[1] * Lb[1], J[2] * Lb[2])
+    turn = qt.cross(wb, (x, y, z))
+    goal = minus(qt.transposed_matvec(R, minus(t, v)), turn)
+    W = (
+        q + J[2] * y * y + J[1] * z * z, -J[2] * x * y, -J[1] * x * z,
+        q + J[2] * x * x + J[0] * z * z, -J[0] * y * z,
+        q + J[1] * x * x + J[0] * y * y,
+    )  # fmt: skip
+    return qt.matvec(R, solve_symmetric(W, goal))
+
+
+@inlined
+def _twist(n, count, c, k, is_line, no_target, R, v, L, work):
+    """Velocity and angular velocity of the body when the active contacts take their targets."""
+    zero = (0.0, 0.0, 0.0)
+    if no_target and not is_line:
+        return zero, zero
+    vc, m = _target_moments(n, count, c, work)
+    if count == 1:
+        J = work.J
+        P = _point_impulse(c, vc, R, v, L, work)
+        m = qt.cross(c, P)
+        b = qt.transposed_matvec(R, (L[0] + m[0], L[1] + m[1], L[2] + m[2]))
+        w = qt.matvec(R, (J[0] * b[0], J[1] * b[1], J[2] * b[2]))
+    elif is_line:
+        w = _turned_about_line(n, c, k, vc, m, R, v, L, work)
+    else:
+        w = solve_symmetric(k, m)
+    return minus(vc, qt.cross(w, c)), w
+
+
+@inlined
+def _bolt(count, k, is_line, T):
+    """K⁻¹ T of the bolt group: 2 T / tr K on a line, 0 at a point."""
+    if count == 1:
+        return (0.0, 0.0, 0.0)
+    if is_line:
+        s = 2.0 / (k[0] + k[3] + k[5])
+        return (s * T[0], s * T[1], s * T[2])
+    return solve_symmetric(k, T)
+
+
+@inlined
+def _mend(n, count, c, k, is_line, T, work):
+    """Give the impulses of `share_by_load` the moment T about the centroid again: whether they stay in their cones.
+
+    It shares them out as if all contacts were equally deep in the wall, which is so to a few slops; the moment
+    that is missing for it makes one more bolt group, (K⁻¹ ΔT) x d_i.
+    """
+    walls = work.walls
+    mx, my, mz = T
+    for i in range(n):
+        if work.active[i] == 0:
+            continue
+        wall, d = wall_of(work.slot[i], work), minus(contact_arm(work, i), c)
+        pn, pa, pb = work.normal[i], work.across[i, 0], work.across[i, 1]
+        p = to_world(wall_axes(walls, wall), pn, pa, pb, (0.0, 0.0, 0.0))
+        m = qt.cross(d, p)
+        mx, my, mz = mx - m[0], my - m[1], mz - m[2]
+    a = _bolt(count, k, is_line, (mx, my, mz))
+    for i in range(n):
+        if work.active[i] == 0:
+            continue
+        wall = wall_of(work.slot[i], work)
+        p = qt.cross(a, minus(contact_arm(work, i), c))
+        pn = work.normal[i] + qt.dot(wall_axis(walls, wall, NORMAL), p)
+        pa = work.across[i, 0] + qt.dot(wall_axis(walls, wall, TANGENT_1), p)
+        pb = work.across[i, 1] + qt.dot(wall_axis(walls, wall, TANGENT_2), p)
+        work.normal[i], work.across[i, 0], work.across[i, 1] = pn, pa, pb
+        if not (pn >= 0.0 and is_in_cone(pn, pa, pb, work)):
+            return False
+    return True
+
+
+@inlined
+def _free_speed(n, R, v, L, work):
+    """Largest contact velocity without impulses, relative to the target [m/s]: the scale of a residual."""
+    J = work.J
+    b = qt.transposed_matvec(R, L)
+    w = qt.matvec(R, (J[0] * b[0], J[1] * b[1], J[2] * b[2]))
+    largest = 0.0
+    for i in range(n):
+        m = qt.cross(w, contact_arm(work, i))
+        t = _world_target(i, work)
+        largest = max(largest, abs(v[0] + m[0] - t[0]), abs(v[1] + m[1] - t[1]), abs(v[2] + m[2] - t[2]))
+    return largest
+
+
+@inlined
+def hold_all(n, R, v, L, work):
+    """Try the impulses with which all n contacts take their target velocity.
+
+    Parameters
+    ----------
+    n : int
+        Contacts in `work` (arm, target and slot are read; impulse is written when it succeeds).
+    R : tuple of 9 floats
+        Principal frame to world.
+    v, L : tuple of 3 floats
+        Velocity [m/s] and angular momentum [kg m²/s] without contact impulses, world frame.
+
+    Returns
+    -------
+    found : bool
+        False: some contact would have to pull or to slide. `work.impulse` is then as it was.
+    v, L : tuple of 3 floats
+        With the contact impulses, when found.
+    """
+    J, mass = work.J, work.mass
+    largest = _largest_target(n, work)
+    for i in range(n):
+        work.active[i] = 1
+    count = n
+    while count > 0:
+        c, k = _patch(n, count, work)
+        is_line = count < 3 or _is_line(k)
+        v_new, w_new = _twist(n, count, c, k, is_line, largest == 0.0, R, v, L, work)
+        wb = qt.transposed_matvec(R, w_new)
+        L_new = qt.matvec(R, (wb[0] / J[0], wb[1] / J[1], wb[2] / J[2]))
+        F = (mass * (v_new[0] - v[0]), mass * (v_new[1] - v[1]), mass * (v_new[2] - v[2]))
+        m = qt.cross(c, F)
+        T = (L_new[0] - L[0] - m[0], L_new[1] - L[1] - m[1], L_new[2] - L[2] - m[2])
+        a = _bolt(count, k, is_line, T)
+        loser, holds = share_out(n, count, c, F, a, work)
+        if loser < 0:
+            if not holds and not (share_by_load(n, work) and _mend(n, count, c, k, is_line, T, work)):
+                return False, v, L, 0.0
+            residual = 0.0
+            if largest > 0.0 or count < n:
+                miss = _miss(n, v_new, w_new, work)
+                if not miss <= RIGID_LIMIT * largest:
+                    if miss > work.unseen:
+                        residual = miss / _free_speed(n, R, v, L, work)
+                    if not residual <= work.tolerance:
+                        return False, v, L, 0.0
+            for i in range(n):
+                work.impulse[3 * i] = work.normal[i]
+                work.impulse[3 * i + 1] = work.across[i, 0]
+                work.impulse[3 * i + 2] = work.across[i, 1]
+            return True, v_new, L_new, residual
+        work.active[loser] = 0
+        work.normal[loser] = work.across[loser, 0] = work.across[loser, 1] = 0.0
+        count -= 1
+    return False, v, L, 0.0

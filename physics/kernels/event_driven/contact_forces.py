@@ -1,0 +1,279 @@
+"""Forces of the contacts that act: the acceleration-level problem a = A f + b of a regime, and its velocities.
+
+A regime says of each contact whether it *holds* (its point has no acceleration) or *slides* (no normal
+acceleration; the force is f_n (n - μ d) along the direction d of its sliding). With the acceleration of a contact
+
+    a_i = dv/dt + dω/dt x r_i + ω x dr_i/dt
+
+(dr/dt = ω x r for a vertex; a sphere's and an ellipsoid's contact point wander over the body) that is a linear
+system: as many unknowns as equations, three for a contact that holds, one for one that slides. The normal forces of
+more than two contacts of one wall have three unknowns: those that are affine in the place on the wall,
+f_i = y_0 + y_1 a_i + y_2 b_i, have the least norm of all with their resultant, and with them the three combinations of
+rows with the same coefficients stand for the equations. So it stays when one of them holds, which then adds its two
+tangential forces: what a face presses with does not jump where a corner of it stops.
+
+The forces that were last known (`share`) are a part of the answer, and the unknowns only what is still to be added to
+them: a rigid body does not tell which of its corners presses on the floor, or on the wall beside it, and what the
+contact problem of a moment has found to hold (`resting`) does so from then on.
+
+The same rows, with velocities or gaps in place of accelerations and pushes along the rows, bring a state back to
+what the regime says (`cancel`): the least change in the kinetic metric.
+
+Witkin and Baraff, *Physically Based Modeling*, SIGGRAPH course notes, 1997, part II, section 8, for a = A f + b;
+what differs is friction in it, and that the regime is known.
+"""
+
+from __future__ import annotations
+
+import math
+
+from physics.kernels.compile.decorators import inlined, kernel
+from physics.kernels.contact_law.anisotropic_friction import opposing
+from physics.kernels.contact_solver.impulse_distribution import wall_axes
+from physics.kernels.half_space.contact_point import arm_and_rate, feature_of, wall_normal, wall_of
+from physics.kernels.math import quaternion as qt
+from physics.kernels.state.body import principal_attitude
+
+# Contacts of one wall from which on their normal forces are taken as affine.
+PATCH = 3
+
+# `motion.patch` of a contact whose normal force is an unknown of its own.
+NO_PATCH = -1
+
+
+@inlined
+def vector(a, k):
+    """Row k of an array (n, 3)."""
+    return (a[k, 0], a[k, 1], a[k, 2])
+
+
+@inlined
+def plus(a, b):
+    """a + b of vectors."""
+    return (a[0] + b[0], a[1] + b[1], a[2] + b[2])
+
+
+@inlined
+def times(s, a):
+    """s a of a vector."""
+    return (s * a[0], s * a[1], s * a[2])
+
+
+@inlined
+def load(work_field):
+    """A field (3,) of the workspace."""
+    return (work_field[0], work_field[1], work_field[2])
+
+
+@inlined
+def turned_by(P, J, h):
+    """I⁻¹ h for the principal axes P and inverse moments J, world frame."""
+    m = qt.transposed_matvec(P, h)
+    return qt.matvec(P, (J[0] * m[0], J[1] * m[1], J[2] * m[2]))
+
+
+@kernel
+def free_turning(y, tilted, work):
+    """Body axes, principal axes, ω and the rate of change of ω without contact: (R, P, ω, I⁻¹(τ - ω x L))."""
+    q, L = y[1], y[3]
+    R = qt.to_matrix(q)
+    P = R
+    if tilted is not None:
+        P = qt.to_matrix(principal_attitude(q, work, tilted))
+    J = work.J
+    w = turned_by(P, J, L)
+    g = qt.cross(w, L)
+    t = work.torque
+    return R, P, w, turned_by(P, J, (t[0] - g[0], t[1] - g[1], t[2] - g[2]))
+
+
+@kernel
+def place(y, R, w, alpha, tilted, work, motion):
+    """Arms, velocities, directions of sliding and free accelerations (`goal`) of the contacts that act."""
+    shape, walls = work.shape, work.walls
+    dims, a, v = load(work.dims), load(work.free_acceleration), y[2]
+    for j in range(motion.count):
+        n = wall_normal(walls, wall_of(motion.slot[j], work))
+        r, rate = arm_and_rate(shape, dims, R, w, n, feature_of(motion.slot[j], work), tilted, work)
+        u = plus(v, qt.cross(w, r))
+        b = plus(plus(a, qt.cross(alpha, r)), qt.cross(w, rate))
+        un = qt.dot(n, u)
+        t = (u[0] - un * n[0], u[1] - un * n[1], u[2] - un * n[2])
+        speed = math.sqrt(qt.dot(t, t))
+        d = vector(motion.reference, j)
+        if speed > motion.slow and qt.dot(t, d) > 0.0:
+            d = times(1.0 / speed, t)
+        for c in range(3):
+            motion.arm[j, c], motion.velocity[j, c], motion.goal[j, c] = r[c], u[c], b[c]
+            motion.way[j, c] = d[c]
+
+
+@inlined
+def _add(m, r, push, row, share, motion):
+    """Add `share` of a contact at r to unknown m."""
+    h, e = qt.cross(r, push), qt.cross(r, row)
+    for c in range(3):
+        motion.push[m, c] += share * push[c]
+        motion.turn[m, c] += share * h[c]
+        motion.row[m, c] += share * row[c]
+        motion.row_turn[m, c] += share * e[c]
+
+
+@inlined
+def slide_push(mu, axes, j, work, motion):
+    """Force of contact j, which slides, for each newton along the normal."""
+    n, d = axes[0], opposing(vector(motion.way, j), axes, work)
+    return (n[0] - mu * d[0], n[1] - mu * d[1], n[2] - mu * d[2])
+
+
+@inlined
+def _push_of(mu, axes, j, work, motion):
+    """Force of contact j for each newton along the normal."""
+    if motion.holds[j]:
+        return axes[0]
+    return slide_push(mu, axes, j, work, motion)
+
+
+@inlined
+def _contact_force(normal, first, second, mu, axes, j, work, motion):
+    """Force of contact j that presses with `normal` and, where it holds, has these along the other two axes."""
+    f = times(normal, _push_of(mu, axes, j, work, motion))
+    if motion.holds[j]:
+        f = plus(f, plus(times(first, axes[1]), times(second, axes[2])))
+    return f
+
+
+@kernel
+def _add_shares(mu, work, motion):
+    """`known`: force and moment of all shares. Without friction they make no difference, and are left out."""
+    force = moment = (0.0, 0.0, 0.0)
+    if mu > 0.0:
+        for j in range(motion.count):
+            axes = wall_axes(work.walls, wall_of(motion.slot[j], work))
+            p = vector(motion.share, j)
+            f = _contact_force(p[0], p[1], p[2], mu, axes, j, work, motion)
+            force, moment = plus(force, f), plus(moment, qt.cross(vector(motion.arm, j), f))
+    for c in range(3):
+        motion.known[0, c], motion.known[1, c] = force[c], moment[c]
+
+
+@inlined
+def _clear(m, count, motion):
+    """Empty the unknowns m <= k < m + count."""
+    for k in range(m, m + count):
+        motion.asked[k] = 0.0
+        for c in range(3):
+            motion.push[k, c] = motion.turn[k, c] = motion.row[k, c] = motion.row_turn[k, c] = 0.0
+
+
+@kernel
+def _add_held(m, j, first_axis, axes, motion):
+    """Unknowns of contact j from the axis `first_axis` on: the force along each."""
+    r, b = vector(motion.arm, j), vector(motion.goal, j)
+    motion.first[j] = m
+    _clear(m, 3 - first_axis, motion)
+    for c in range(first_axis, 3):
+        _add(m, r, axes[c], axes[c], 1.0, motion)
+        motion.asked[m] = -qt.dot(axes[c], b)
+        m += 1
+    return m
+
+
+@kernel
+def _add_patch(m, first, last, mu, axes, work, motion):
+    """Three unknowns of the normal forces of the contacts first <= j < last, those of one wall."""
+    _clear(m, 3, motion)
+    radius = work.radius
+    ca = cb = 0.0
+    for j in range(first, last):
+        r = vector(motion.arm, j)
+        ca += qt.dot(axes[1], r) / (last - first)
+        cb += qt.dot(axes[2], r) / (last - first)
+    for j in range(first, last):
+        r, b = vector(motion.arm, j), -qt.dot(axes[0], vector(motion.goal, j))
+        push = _push_of(mu, axes, j, work, motion)
+        s = (qt.dot(axes[1], r) - ca) / radius
+        t = (qt.dot(axes[2], r) - cb) / radius
+        motion.patch[j] = m
+        motion.place[j, 0], motion.place[j, 1] = s, t
+        _add(m, r, push, axes[0], 1.0, motion)
+        _add(m + 1, r, push, axes[0], s, motion)
+        _add(m + 2, r, push, axes[0], t, motion)
+        motion.asked[m] += b
+        motion.asked[m + 1] += s * b
+        motion.asked[m + 2] += t * b
+    return m + 3
+
+
+@kernel
+def list_unknowns(mu, holding, work, motion):
+    """Fill push, turn, row, row_turn, `known` and the right-hand sides (`asked`) from `goal`; their number.
+
+    `holding`: contacts that hold do so along the wall, too.
+    """
+    m = first = motion.is_skew = 0
+    _add_shares(mu, work, motion)
+    for j in range(motion.count):
+        if mu > 0.0 and not motion.holds[j]:
+            motion.is_skew = 1
+    while first < motion.count:
+        wall = wall_of(motion.slot[first], work)
+        axes = wall_axes(work.walls, wall)
+        last = first
+        while last < motion.count and wall_of(motion.slot[last], work) == wall:
+            motion.patch[last] = NO_PATCH
+            last += 1
+        own = 0  # the first axis along which a contact that holds has a force of its own
+        if last - first >= PATCH:
+            m = _add_patch(m, first, last, mu, axes, work, motion)
+            own = 1
+        for j in range(first, last):
+            if holding and motion.holds[j]:
+                m = _add_held(m, j, own, axes, motion)
+            elif own == 0:
+                _clear(m, 1, motion)
+                _add(m, vector(motion.arm, j), slide_push(mu, axes, j, work, motion), axes[0], 1.0, motion)
+                motion.asked[m] = -qt.dot(axes[0], vector(motion.goal, j))
+                motion.first[j] = m
+                m += 1
+        first = last
+    return m
+
+
+@kernel
+def spread(mu, work, motion):
+    """Force of each contact that acts (`force`, `normal`) from the unknowns, and the shares where they are in it."""
+    for j in range(motion.count):
+        axes = wall_axes(work.walls, wall_of(motion.slot[j], work))
+        k, p, f = motion.first[j], motion.patch[j], vector(motion.share, j)
+        if not mu > 0.0:  # `_add_shares` leaves them out: the unknowns are all of the force
+            f = (0.0, 0.0, 0.0)
+        if p != NO_PATCH:
+            s = motion.unknown[p]
+            s += motion.place[j, 0] * motion.unknown[p + 1] + motion.place[j, 1] * motion.unknown[p + 2]
+        else:
+            s = motion.unknown[k]
+            k += 1
+        motion.normal[j] = f[0] + s
+        first = second = 0.0
+        if motion.holds[j]:
+            first, second = f[1] + motion.unknown[k], f[2] + motion.unknown[k + 1]
+        f = _contact_force(motion.normal[j], first, second, mu, axes, j, work, motion)
+        motion.force[j, 0], motion.force[j, 1], motion.force[j, 2] = f
+
+
+@inlined
+def forget_forces(motion):
+    """No force is known from before."""
+    for s in range(motion.last.shape[0]):
+        motion.last[s, 0] = motion.last[s, 1] = motion.last[s, 2] = 0.0
+
+
+@kernel
+def keep_forces(work, motion):
+    """`last`: the forces of the contacts that act, none of all others."""
+    forget_forces(motion)
+    for j in range(motion.count):
+        axes, f = wall_axes(work.walls, wall_of(motion.slot[j], work)), vector(motion.force, j)
+        for c in range(3):
+            motion.last[motion.slot[j], c] = qt.dot(axes[c], f)

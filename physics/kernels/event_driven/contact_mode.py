@@ -1,0 +1,64 @@
+"""Acceleration-level complementarity problem of a moment: the contacts that act, and their modes.
+
+    a_n >= 0,  f_n >= 0,  a_n f_n = 0;    a contact that has no tangential velocity holds (a_t = 0, |f_t| <= μ f_n)
+    or starts to slide (f_t = -μ f_n a_t/|a_t|); one that has slides on (f_t = -μ f_n u_t/|u_t|)
+
+When no contact slides, these are the conditions of an impact with accelerations in place of velocities, and the same
+solver gives them: exact cones, pivoting behind it. When some slide, contacts change between open, held and sliding
+until all conditions hold; each trial is one linear system (`contact_forces`). Where that goes round in circles the
+solver is asked again, with a large tangential acceleration in place of each contact's sliding. If it can only stop the
+sliding (Painlevé's paradox: a sliding contact may have no force) the velocities have to jump: `step` makes an impulse
+of it.
+"""
+
+from __future__ import annotations
+
+from physics.kernels.compile.decorators import kernel
+from physics.kernels.event_driven.acceleration_problem import pose_resting
+from physics.kernels.event_driven.contact_candidates import (
+    ASKS,
+    ASKS_SLIDING,
+    COLLIDES,
+    FLIES,
+    MOVES,
+    closes,
+    find_candidates,
+    sliding_now,
+)
+from physics.kernels.event_driven.contact_forces import (
+    free_turning,
+)
+from physics.kernels.event_driven.contact_mode_search import mixed_forces
+
+
+@kernel
+def find_regime(y, friction, tilted, work, motion):
+    """Find the regime at y and the contacts that act: (regime, number of candidates, acceleration, moment).
+
+    `ASKS`: none of the candidates slides, and the contact problem with this acceleration and moment, which is posed
+    in `work`, decides (`read_resting`). `ASKS_SLIDING`: some do, no mixture was found, and that problem decides for
+    them, too.
+    """
+    zero = (0.0, 0.0, 0.0)
+    motion.count = 0
+    count, approaches = find_candidates(y, tilted, work, motion)
+    for s in range(motion.is_active.shape[0]):
+        motion.is_active[s] = 0
+    if approaches:
+        return COLLIDES, 0, zero, zero
+    if count == 0:
+        return FLIES, 0, zero, zero
+    R, P, w, alpha = free_turning(y, tilted, work)
+    slides = False
+    if friction is not None:
+        for i in range(count):
+            slides = sliding_now(i, y, R, w, tilted, work, motion) or slides
+    if not slides or not mixed_forces(count, y, R, P, w, alpha, tilted, work, motion):
+        if slides:
+            for i in range(count):
+                sliding_now(i, y, R, w, tilted, work, motion)
+        a, moment = pose_resting(count, y, R, w, slides, tilted, work, motion)
+        return (ASKS_SLIDING if slides else ASKS), count, a, moment
+    if closes(count, motion):
+        return COLLIDES, 0, zero, zero
+    return (MOVES if motion.count > 0 else FLIES), count, zero, zero

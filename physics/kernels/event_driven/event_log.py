@@ -1,0 +1,111 @@
+"""The record of what happened: one row per event, in the order of the bodies that it happened to.
+
+A step that has no room for events (`World.make_event_room`) logs none, and asks once per impact whether it has.
+"""
+
+from __future__ import annotations
+
+import math
+
+from physics.kernels.compile.decorators import inlined, kernel
+from physics.kernels.half_space.contact_point import wall_of
+from physics.kernels.math import quaternion as qt
+
+# Kinds of event.
+IMPACT, TOUCH, RELEASE, STICK, SLIP, REST, FAULT = range(7)
+KINDS = ("impact", "touch", "release", "stick", "slip", "rest", "fault")
+
+# Columns: time since the start of the step [s], kind, wall and other body (-1: none), and of an impact the impulse on
+# the body [N s], the point where it acts [m] and the unit normal towards the body, all three in the world frame.
+TIME, KIND, WALL, OTHER, IMPULSE, POINT, NORMAL = 0, 1, 2, 3, 4, 7, 10
+EVENT_SIZE = 13
+
+NOBODY = -1
+
+# An impulse of this share of the largest of the same impact is rounding.
+ROUNDING = 1.0e-14
+
+
+@kernel
+def note_event(log, counts, i, t, kind, wall, other, impulse, point, normal):
+    """Add an event of body i; what finds no room is counted."""
+    k = counts[i]
+    counts[i] = k + 1
+    if k < log.shape[1]:
+        log[i, k, TIME], log[i, k, KIND], log[i, k, WALL], log[i, k, OTHER] = t, kind, wall, other
+        for c in range(3):
+            log[i, k, IMPULSE + c], log[i, k, POINT + c], log[i, k, NORMAL + c] = impulse[c], point[c], normal[c]
+
+
+@inlined
+def forget_events(world, bodies, log, counts):
+    """No event of a world yet; nothing to do where there is no room for any."""
+    if log.shape[1] > 0:
+        for i in range(world * bodies, (world + 1) * bodies):
+            counts[i] = 0
+
+
+@kernel
+def drop_events(world, bodies, t, log, counts):
+    """Take back what was logged of a world from the time t on: its state is not what came of it."""
+    for i in range(world * bodies, (world + 1) * bodies):
+        while 0 < counts[i] <= log.shape[1] and log[i, counts[i] - 1, TIME] >= t:
+            counts[i] -= 1
+
+
+@inlined
+def note_change(log, counts, i, t, kind, wall):
+    """Add an event of body i that has no impulse."""
+    zero = (0.0, 0.0, 0.0)
+    note_event(log, counts, i, t, kind, wall, NOBODY, zero, zero, zero)
+
+
+@inlined
+def add_share(sums, normal, pushed, point):
+    """Weighted sums of the contacts of a pair: of the normals, of the points, and of the weights.
+
+    The weights are the normal impulses: where the normals are the same the mean point is that about which these have
+    no moment.
+    """
+    n, r, weight = sums
+    s = max(pushed, 0.0)
+    return (
+        (n[0] + s * normal[0], n[1] + s * normal[1], n[2] + s * normal[2]),
+        (r[0] + s * point[0], r[1] + s * point[1], r[2] + s * point[2]),
+        weight + s,
+    )
+
+
+@inlined
+def note_impact(log, counts, i, t, wall, other, impulse, sums):
+    """Add the impact of body i with a wall or another body, from its impulse and what `add_share` has summed."""
+    n, r, weight = sums
+    size = math.sqrt(qt.dot(n, n))
+    if not (weight > 0.0 and size > 0.0):
+        return
+    normal, point = (n[0] / size, n[1] / size, n[2] / size), (r[0] / weight, r[1] / weight, r[2] / weight)
+    note_event(log, counts, i, t, IMPACT, wall, other, impulse, point, normal)
+
+
+@kernel
+def log_wall_impacts(n, width, x, least, t, work, log, counts):
+    """One event per wall with the sum of the impulses of its contacts in `work`, if that is more than `least` [N s].
+
+    `width` is the number of impulses of a contact, 1 without friction and 3 with it; x where the body is [m].
+    """
+    walls = work.walls
+    for wall in range(walls.shape[0]):
+        px = py = pz = 0.0
+        sums = ((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), 0.0)
+        for i in range(n):
+            if wall_of(work.slot[i], work) == wall:
+                for c in range(width):
+                    s = work.impulse[width * i + c]
+                    px += s * walls[wall, 3 * c]
+                    py += s * walls[wall, 3 * c + 1]
+                    pz += s * walls[wall, 3 * c + 2]
+                point = (x[0] + work.arm[i, 0], x[1] + work.arm[i, 1], x[2] + work.arm[i, 2])
+                normal = (walls[wall, 0], walls[wall, 1], walls[wall, 2])
+                sums = add_share(sums, normal, work.impulse[width * i], point)
+        if px * px + py * py + pz * pz > least * least:
+            note_impact(log, counts, work.i, t, wall, NOBODY, (px, py, pz), sums)

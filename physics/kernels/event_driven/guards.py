@@ -1,0 +1,244 @@
+"""Guards that end a regime: the smallest of the quantities that have to stay positive during a smooth step.
+
+- *Gap* of every feature that does not act, in radii. A dip between the ends of a step shows in the cubic through the
+  gaps and their rates at both ends.
+- *Push* of every contact that acts, in weights.
+- *Load*: of a touching vertex that was left to the other three of a sliding face because the affine force pulled there,
+  what that force still pulls, in weights.
+- *Cone*: what friction could do beyond what a contact that holds asks of it, in weights. Two contacts that hold on
+  one wall may share what acts along their line as they like, so that for them it is what is left of both.
+- *Speed* of every contact that slides, against the direction at the start of the step, in the speed of the body.
+
+The forces of contacts that are more than the body's motion needs (a corner that holds on the floor and at a wall) can
+be shared out in many ways, of which a linear solve takes one: `mode_acceptance` is for what that one says in vain.
+"""
+
+from __future__ import annotations
+
+import math
+
+from physics.kernels.compile.decorators import inlined, kernel
+from physics.kernels.contact_law.anisotropic_friction import eased
+from physics.kernels.contact_solver.impulse_distribution import wall_axes
+from physics.kernels.event_driven.contact_forces import NO_PATCH, free_turning, load, spread, vector
+from physics.kernels.event_driven.extrapolated_midpoint import find_rate, get_state, sliding_velocity
+from physics.kernels.event_driven.workspace import END, START, V
+from physics.kernels.half_space import support_function as geo
+from physics.kernels.half_space.contact_point import center_arm, feature_of, geometric_center, wall_normal, wall_of
+from physics.kernels.math import quaternion as qt
+from physics.kernels.state.layout import BLOCK, OFFSET, VERTEX_COUNT
+
+NO_GUARD, GAP, PUSH, CONE, SPEED, LOAD, NO_STEP, WATCH = range(8)
+
+# Guards of force.
+FORCES = (PUSH, CONE, LOAD)
+
+# Forces of this many weights are rounding: a push or a cone is given up only when it is missed by more.
+MARGIN = 1.0e-9
+
+
+@kernel
+def look_around(row, tilted, work, motion):
+    """Gaps and their rates of all features into column `row` of `gap`; of a wall out of reach infinite."""
+    x, q, v, m = get_state(motion, row)
+    R, _, w, _ = free_turning((x, q, v, m), tilted, work)
+    dims, features, shape = load(work.dims), work.features, work.shape
+    center = geometric_center(x, R, work, tilted)
+    for k in range(work.walls.shape[0]):
+        n = wall_normal(work.walls, k)
+        d = qt.dot(n, center) - work.walls[k, OFFSET]
+        if d > 2.0 * work.radius:
+            for feature in range(features):
+                motion.gap[row, k * features + feature] = math.inf
+            continue
+        e = geo.scaled_normal(shape, dims, R, n)
+        vn, turn = qt.dot(n, v), qt.cross(n, w)
+        if shape == BLOCK:
+            if tilted is not None:
+                vn += qt.dot(turn, center_arm(R, work))
+            b = qt.transposed_matvec(R, turn)
+            f = (dims[0] * b[0], dims[1] * b[1], dims[2] * b[2])
+            for vertex in range(VERTEX_COUNT):
+                motion.gap[row, k * features + vertex] = d + geo.vertex_height(e, vertex)
+                motion.gap_rate[row, k * features + vertex] = vn + geo.vertex_height(f, vertex)
+        else:
+            motion.gap[row, k * features] = d - geo.support(shape, dims, e)
+            motion.gap_rate[row, k * features] = vn + qt.dot(turn, geo.support_arm(shape, dims, R, n, e))
+
+
+@inlined
+def lowest(g0, r0, g1, r1, h):
+    """Smallest value on (0, h] of the cubic with these values and slopes at 0 and h."""
+    low = g1
+    if r0 < 0.0 and r1 > 0.0 and g0 < math.inf:
+        # g0 + r0 t + c t² + k t³; its slope vanishes where 3 k t² + 2 c t + r0 = 0, r0 < 0 at the start.
+        c = (3.0 * (g1 - g0) / h - 2.0 * r0 - r1) / h
+        k = (r0 + r1 - 2.0 * (g1 - g0) / h) / (h * h)
+        disc = c * c - 3.0 * k * r0
+        if disc > 0.0:
+            t = -r0 / (c + math.sqrt(disc))
+            if 0.0 < t < h:
+                low = min(low, g0 + t * (r0 + t * (c + t * k)))
+    return low
+
+
+@inlined
+def gap_margin(h, work, motion):
+    """Smallest gap of the features that do not act [m] over a step of h.
+
+    Of one that leaves: what it is above where it left, so that a bounce does not end deeper, and gain by it. Of one
+    that touches and neither comes nor goes: what it is above there, and the slop.
+    """
+    least, which = math.inf, -1
+    for s in range(motion.is_active.shape[0]):
+        if motion.is_active[s] or motion.gap[END, s] == math.inf:
+            continue
+        g0, g1 = motion.gap[START, s], motion.gap[END, s]
+        if g0 <= motion.touch and motion.gap_rate[START, s] > motion.still:
+            low = g1 - g0
+        elif g0 <= motion.touch:
+            low = g1 - min(g0, 0.0) + motion.touch
+        else:
+            low = lowest(g0, motion.gap_rate[START, s], g1, motion.gap_rate[END, s], h)
+        if low < least:
+            least, which = low, s
+    return least, which
+
+
+@inlined
+def _cone_excess(j, mu, work, motion):
+    """Tangential force of contact j less μ times its push [N]."""
+    axes = wall_axes(work.walls, wall_of(motion.slot[j], work))
+    n, f = axes[0], eased(vector(motion.force, j), axes, work)
+    p = motion.normal[j]
+    return math.sqrt(max(0.0, qt.dot(f, f) - qt.dot(n, f) * qt.dot(n, f))) - mu * p
+
+
+@inlined
+def _pair_excess(i, j, mu, work, motion):
+    """The same of two contacts on one wall, whatever they share of the force along their line [N]."""
+    axes = wall_axes(work.walls, wall_of(motion.slot[i], work))
+    a, b = vector(motion.arm, i), vector(motion.arm, j)
+    e = eased((b[0] - a[0], b[1] - a[1], b[2] - a[2]), axes, work)
+    s = 1.0 / math.sqrt(qt.dot(e, e))
+    e = (s * e[0], s * e[1], s * e[2])
+    across = qt.cross(axes[0], e)
+    f, g = eased(vector(motion.force, i), axes, work), eased(vector(motion.force, j), axes, work)
+    p, q = mu * motion.normal[i], mu * motion.normal[j]
+    fa, ga = abs(qt.dot(across, f)), abs(qt.dot(across, g))
+    worst = max(fa - p, ga - q)
+    if worst > 0.0:
+        return worst
+    along = abs(qt.dot(e, f) + qt.dot(e, g))
+    return along - math.sqrt((p - fa) * (p + fa)) - math.sqrt((q - ga) * (q + ga))
+
+
+@kernel
+def cone_excess(j, work, motion):
+    """Excess of contact j, which holds with the others of its wall that hold, over its friction cone [N]."""
+    wall, other, holding = wall_of(motion.slot[j], work), j, 1
+    for k in range(motion.count):
+        if k != j and motion.holds[k] and wall_of(motion.slot[k], work) == wall:
+            other = k
+            holding += 1
+    if holding == 2 and motion.normal[j] >= 0.0 and motion.normal[other] >= 0.0:
+        return _pair_excess(j, other, work.mu, work, motion)
+    return _cone_excess(j, work.mu, work, motion)
+
+
+@inlined
+def idle_pull(work, motion):
+    """Least pull [N] that the affine force of a sliding face has at a touching vertex which does not act."""
+    least, which = math.inf, -1
+    for j in range(motion.count):
+        if motion.patch[j] == NO_PATCH or (
+            j > 0 and wall_of(motion.slot[j], work) == wall_of(motion.slot[j - 1], work)
+        ):
+            continue
+        wall, k = wall_of(motion.slot[j], work), motion.patch[j]
+        axes = wall_axes(work.walls, wall)
+        r = vector(motion.arm, j)
+        for s in range(wall * work.features, (wall + 1) * work.features):
+            if motion.is_active[s] or not motion.gap[START, s] <= motion.touch:
+                continue
+            # The vertices of a face are its corners: the missing one is the sum of its neighbours less the opposite.
+            p = vector(motion.arm, opposite(s, wall, work, motion))
+            a = b = 0.0
+            for i in range(motion.count):
+                if wall_of(motion.slot[i], work) == wall:
+                    a += qt.dot(axes[1], vector(motion.arm, i))
+                    b += qt.dot(axes[2], vector(motion.arm, i))
+            a -= 2.0 * qt.dot(axes[1], p) + qt.dot(axes[1], r)
+            b -= 2.0 * qt.dot(axes[2], p) + qt.dot(axes[2], r)
+            pull = -motion.unknown[k]
+            pull -= (motion.place[j, 0] + a / work.radius) * motion.unknown[k + 1]
+            pull -= (motion.place[j, 1] + b / work.radius) * motion.unknown[k + 2]
+            if pull < least:
+                least, which = pull, s
+    return least, which
+
+
+@inlined
+def opposite(slot, wall, work, motion):
+    """The contact of a face of three that is farthest from the vertex `slot`: all its bits but the face's differ."""
+    best, most = -1, -1
+    for i in range(motion.count):
+        if wall_of(motion.slot[i], work) == wall:
+            bits = feature_of(motion.slot[i], work) ^ feature_of(slot, work)
+            differing = (bits & 1) + ((bits >> 1) & 1) + ((bits >> 2) & 1)
+            if differing > most:
+                best, most = i, differing
+    return best
+
+
+@kernel
+def force_margin(slack, work, motion):
+    """Smallest margin of the guards of force, of which `slack` counts as none: (margin, guard, contact or slot)."""
+    margin, guard, which = math.inf, NO_GUARD, -1
+    for j in range(motion.count):
+        push = motion.normal[j] / motion.weight + slack
+        if push < margin:
+            margin, guard, which = push, PUSH, j
+        if motion.holds[j]:
+            cone = slack - cone_excess(j, work, motion) / motion.weight
+            if cone < margin:
+                margin, guard, which = cone, CONE, j
+    pull, slot = idle_pull(work, motion)
+    if pull / motion.weight + slack < margin:
+        margin, guard, which = pull / motion.weight + slack, LOAD, slot
+    return margin, guard, which
+
+
+@kernel
+def least_force_at_start(tilted, work, motion):
+    """Smallest margin of force at START, nothing of it rounding."""
+    find_rate(START, 0.0, tilted, work, motion)
+    spread(work.mu, work, motion)
+    return force_margin(0.0, work, motion)[0]
+
+
+@kernel
+def least_margin(h, heeds, slack, tilted, work, motion):
+    """Smallest margin at END, a step of h after START: (margin, guard, contact or slot).
+
+    `heeds`: the guards of force count, where they are missed by more than `slack`.
+    """
+    find_rate(END, h, tilted, work, motion)
+    spread(work.mu, work, motion)
+    look_around(END, tilted, work, motion)
+    gap, which = gap_margin(h, work, motion)
+    margin, guard = gap / work.radius, GAP
+    if heeds and motion.weight > 0.0:
+        least, sort, j = force_margin(slack, work, motion)
+        if least < margin:
+            margin, guard, which = least, sort, j
+    if work.mu > 0.0 and margin >= 0.0:  # a contact may stop within the step, unless something ends it before
+        scale = motion.scale[V]
+        for j in range(motion.count):
+            if not motion.holds[j]:
+                t, _ = sliding_velocity(j, work, motion)
+                speed = qt.dot(t, vector(motion.reference, j))
+                speed = (speed + 0.5 * motion.slow if motion.is_starting[j] else speed - motion.slow) / scale
+                if speed < margin:
+                    margin, guard, which = speed, SPEED, j
+    return margin, guard, which

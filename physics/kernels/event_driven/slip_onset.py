@@ -1,0 +1,141 @@
+"""The direction in which a contact begins to slide, while it is too slow to have one.
+
+Friction that is used up lets go without a jump: the acceleration grows from zero, and the slip |u| with the square of
+the time. Its direction follows what acts at the rate K/|u|, K the acceleration that friction gives across it for each
+radian: stiff beyond all bounds. But it is known without: with φ the angle of u and a(φ) the acceleration under the
+friction opposed to it,
+
+    a(φ)·d⊥ = |u| φ'.
+
+Without the right-hand side that is the direction which nothing turns. With it, φ' the rate at which that one turns, and
+over 1 + |u|'/K since φ lags behind it by |u| φ'/K, which grows, what is left out is of the order (|u|'/K)² of it.
+"""
+
+from __future__ import annotations
+
+import math
+
+from physics.kernels.compile.decorators import inlined, kernel
+from physics.kernels.contact_solver.impulse_distribution import wall_axes
+from physics.kernels.event_driven.contact_forces import plus, slide_push, times, turned_by, vector
+from physics.kernels.event_driven.workspace import L, V
+from physics.kernels.half_space.contact_point import wall_normal, wall_of
+from physics.kernels.math import quaternion as qt
+
+# Newton's steps for an angle that is known to some 1e-3, the difference for its derivative [rad], and the angle that is
+# none; steps of more than FAR are not of this direction.
+STEPS = 6
+NUDGE = 1.0e-5
+SAME = 1.0e-15
+FAR = 0.5
+
+# A contact creeps that is accelerated by less than CREEPING of K, and whose speed is less than SLOWLY of K in the time
+# in which the body turns. A step in which it begins to slide may go PAST times as far.
+CREEPING = 2.0e-3
+SLOWLY = 1.0e-5
+PAST = 2.0
+
+
+@inlined
+def sliding_velocity(j, work, motion):
+    """Tangential velocity of contact j and its size."""
+    n = wall_normal(work.walls, wall_of(motion.slot[j], work))
+    u = vector(motion.velocity, j)
+    un = qt.dot(n, u)
+    t = (u[0] - un * n[0], u[1] - un * n[1], u[2] - un * n[2])
+    return t, math.sqrt(qt.dot(t, t))
+
+
+@inlined
+def contact_rate(j, P, work, motion):
+    """Rate at which the velocity of contact j changes at START: `first_rate`, and `goal` as placed there."""
+    rate, a, torque = motion.first_rate, work.free_acceleration, work.torque
+    T = (rate[L] - torque[0], rate[L + 1] - torque[1], rate[L + 2] - torque[2])
+    F = (rate[V] - a[0], rate[V + 1] - a[1], rate[V + 2] - a[2])
+    return plus(plus(vector(motion.goal, j), qt.cross(turned_by(P, work.J, T), vector(motion.arm, j))), F)
+
+
+@inlined
+def stiffness_across(P, work, motion):
+    """K of the only contact, from `first_rate` [m/s²]."""
+    n = wall_normal(work.walls, wall_of(motion.slot[0], work))
+    across = qt.cross(n, vector(motion.reference, 0))
+    moment = qt.cross(vector(motion.arm, 0), across)
+    a, rate = work.free_acceleration, motion.first_rate
+    push = work.mass * (n[0] * (rate[V] - a[0]) + n[1] * (rate[V + 1] - a[1]) + n[2] * (rate[V + 2] - a[2]))
+    return work.mu * push * (1.0 / work.mass + qt.dot(moment, turned_by(P, work.J, moment)))
+
+
+@inlined
+def has_one_slide(work, motion):
+    """Test whether one contact acts, which slides with friction."""
+    return motion.count == 1 and motion.holds[0] == 0 and work.mu > 0.0
+
+
+@inlined
+def _is_small(share, speed, work, motion):
+    """Test whether the speed of a slip is below `share` times SLOWLY."""
+    return speed * (motion.spin + math.sqrt(work.acceleration / work.radius)) < share * SLOWLY * motion.stiffness
+
+
+@inlined
+def creeps(growth, speed, work, motion):
+    """Test whether a slip that grows at the rate `growth` is so slow, and grows so little, that only loads turn it."""
+    return growth < CREEPING * motion.stiffness and _is_small(1.0, speed, work, motion)
+
+
+@inlined
+def outruns(h, work, motion):
+    """Test whether the only contact begins to slide, and goes too far for that in the step of h to END, placed."""
+    if not has_one_slide(work, motion) or not motion.is_starting[0]:
+        return False
+    _, speed = sliding_velocity(0, work, motion)
+    if not speed > PAST * motion.slow:
+        return False
+    if not _is_small(PAST * PAST, speed, work, motion):
+        return True
+    limit = CREEPING * motion.stiffness
+    return motion.growth < limit and speed - motion.first_speed > PAST * limit * h
+
+
+@inlined
+def _rates(angle, first, second, axes, P, work, motion):
+    """Acceleration of contact 0 (across, along) the direction in which it slides: `angle` from `first` to `second`."""
+    c, s = math.cos(angle), math.sin(angle)
+    d = plus(times(c, first), times(s, second))
+    for k in range(3):
+        motion.way[0, k] = d[k]
+    n, r, b = axes[0], vector(motion.arm, 0), vector(motion.goal, 0)
+    f = slide_push(work.mu, axes, 0, work, motion)
+    a = plus(times(1.0 / work.mass, f), qt.cross(turned_by(P, work.J, qt.cross(r, f)), r))
+    a = plus(b, times(-qt.dot(n, b) / qt.dot(n, a), a))
+    return c * qt.dot(second, a) - s * qt.dot(first, a), qt.dot(d, a)
+
+
+@kernel
+def turn_to_slip(P, work, motion):
+    """Let the one contact that acts begin to slide in the direction above; `way`, placed (`contact_forces.place`).
+
+    More contacts than one begin in the directions that they were found with.
+    """
+    if not has_one_slide(work, motion) or not motion.is_starting[0]:
+        return
+    axes = wall_axes(work.walls, wall_of(motion.slot[0], work))
+    n, u, first = axes[0], vector(motion.velocity, 0), vector(motion.reference, 0)
+    second, speed = qt.cross(n, first), math.sqrt(max(0.0, qt.dot(u, u) - qt.dot(n, u) * qt.dot(n, u)))
+    angle = 0.0
+    for _ in range(STEPS):
+        across, along = _rates(angle, first, second, axes, P, work, motion)
+        nudged, _ = _rates(angle + NUDGE, first, second, axes, P, work, motion)
+        stiffness = (across - nudged) / NUDGE
+        if not stiffness > 0.0:
+            angle = 0.0
+            break
+        step = (across - speed * motion.turning / (1.0 + along / stiffness)) / stiffness
+        if not abs(step) < FAR:
+            angle = 0.0
+            break
+        angle += step
+        if abs(step) <= SAME:
+            break
+    _rates(angle, first, second, axes, P, work, motion)

@@ -1,0 +1,223 @@
+"""Flight: the time at which the first feature of a body reaches a wall, to rounding and without a miss.
+
+Over a time τ_h the gap of a feature is bounded below by
+
+    g + g' τ + (g'' - C τ_h / 3) τ²/2,    τ <= τ_h,
+
+where C bounds its third derivative. The first zero of that parabola comes no later than an impact could, so the body
+may fly up to it; from there again, until the zero is reached. The bound is exact on a parabola, and near a wall the
+steps converge like Newton's with the third derivative neglected (conservative advancement, Mirtich 1996, to second
+order).
+
+A body turns with |ω|² <= J_max ω·L, and √(ω·L) grows by |τ| √J_max at most: over τ_h, |ω| <= Ω = √(J_max ω·L) +
+J_max |τ| τ_h. In Euler's equations J_i (I_j - I_k) is between -1 and 1 (the triangle inequality of moments of inertia),
+so that |α| <= A = J_max |τ| + Ω² and |dα/dt| <= B = (1 + √2) Ω A + J_max Ω |τ|. The third derivative of a point at
+distance ρ is then at most ρ (B + 3 Ω A + Ω³). A sphere's gap has none. The support function of an ellipsoid,
+s = |D Rᵀ n|, has derivatives that exceed those of a point at its largest semi-axis by at most 3 κ², κ the ratio of its
+largest to its smallest.
+
+In a field there is no such bound: the body moves as it does in contact, by smooth steps with gaps and their rates
+watched at both ends (`move`), unless it felt nothing of any field on its way.
+"""
+
+from __future__ import annotations
+
+import math
+
+from physics.kernels.compile.decorators import inlined, kernel
+from physics.kernels.event_driven.contact_forces import free_turning, load, plus
+from physics.kernels.event_driven.extrapolated_midpoint import CUT, SHORTEST, get_state, put_state, start_step, try_step
+from physics.kernels.event_driven.guards import NO_STEP
+from physics.kernels.event_driven.smooth_segment import move
+from physics.kernels.event_driven.workspace import END, SIZE, START
+from physics.kernels.flight.free_flight import fly
+from physics.kernels.forces.held_loads import (
+    has_fields,
+    hold_loads,
+    pass_time,
+    refresh_loads,
+    set_now,
+    start_feeling,
+    was_felt,
+)
+from physics.kernels.forces.stiff_flight import graded_flight
+from physics.kernels.half_space.contact_point import arm_and_rate, wall_normal
+from physics.kernels.half_space.contact_set import is_clear
+from physics.kernels.math import quaternion as qt
+from physics.kernels.state import layout as at
+from physics.kernels.state.body import angular_velocity
+from physics.kernels.state.layout import ELLIPSOID, OFFSET, SPHERE
+
+# Advances towards one impact at most; six are usual, more where a body grazes a wall.
+ADVANCES = 200
+
+# An advance by less than this share of the time left is the last one: what it leaves is of third order in it.
+FINEST = 1.0e-13
+
+# The time over which the parabola bounds the gap is doubled as long as it is not used up: from the first guess, which
+# is as short as the bound of the third derivative is loose, by as much as rounding tells apart at most.
+DOUBLINGS = 52
+
+# Extrapolated steps of one flight at most, those that are refused included.
+MOST_TRIES = 10_000
+
+
+@inlined
+def parabola_root(g, r, b):
+    """First positive zero of g + r τ + b τ²/2 for g >= 0; infinite if there is none."""
+    if b == 0.0:
+        return g / -r if r < 0.0 else math.inf
+    disc = r * r - 2.0 * b * g
+    if disc < 0.0:
+        return math.inf
+    if r < 0.0:
+        return 2.0 * g / (math.sqrt(disc) - r)
+    if b < 0.0:
+        return (r + math.sqrt(disc)) / -b
+    return math.inf
+
+
+@inlined
+def safe_time(g, r, b, third, horizon):
+    """A time within which a gap g with rate r, second derivative b and third at most `third` is not used up."""
+    t = min(horizon, parabola_root(g, r, b - third * horizon / 3.0))
+    for _ in range(DOUBLINGS):
+        over = min(horizon, 2.0 * t)
+        t = max(t, min(over, parabola_root(g, r, b - third * over / 3.0)))
+        if t < over or over == horizon:
+            break
+    if b > 0.0 and r >= 0.0 and third > 0.0:
+        t = max(t, min(horizon, 3.0 * b / third))
+    return t
+
+
+@kernel
+def third_bound(y, left, tilted, work):
+    """Bound of the third derivative of any feature's gap over the time `left` [m/s³]."""
+    if work.shape == SPHERE:
+        return 0.0
+    t = math.sqrt(work.torque[0] ** 2 + work.torque[1] ** 2 + work.torque[2] ** 2)
+    j = max(work.J[0], work.J[1], work.J[2])
+    w = math.sqrt(j * max(0.0, qt.dot(angular_velocity(y[1], y[3], work, tilted), y[3]))) + j * left * t
+    a = j * t + w * w
+    b = (1.0 + math.sqrt(2.0)) * w * a + j * w * t
+    bound = work.radius * (b + 3.0 * w * a + w * w * w)
+    if work.shape == ELLIPSOID:
+        d = work.dims
+        ratio = max(d[0], d[1], d[2]) / min(d[0], d[1], d[2])
+        bound *= 3.0 * ratio * ratio
+    return bound
+
+
+@kernel
+def safe_flight(y, left, third, assured, tilted, work, motion):
+    """A time within which no feature at y reaches a wall, at most `left`.
+
+    Those that touch and do not come stay away for the time `assured` at least: where a push has just ended, what lifts
+    them is still zero.
+    """
+    x, v = y[0], y[2]
+    R, _, w, alpha = free_turning(y, tilted, work)
+    dims, a, shape = load(work.dims), load(work.free_acceleration), work.shape
+    t = left
+    for k in range(work.walls.shape[0]):
+        n = wall_normal(work.walls, k)
+        d = qt.dot(n, x) - work.walls[k, OFFSET]
+        vn, an = qt.dot(n, v), qt.dot(n, a)
+        if d - work.radius + min(0.0, t * vn) + min(0.0, 0.5 * t * t * an) > 0.0:
+            continue
+        for feature in range(work.features):
+            r, rate = arm_and_rate(shape, dims, R, w, n, feature, tilted, work)
+            gap = d + qt.dot(n, r)
+            speed = vn + qt.dot(n, qt.cross(w, r))
+            bend = an + qt.dot(n, plus(qt.cross(alpha, r), qt.cross(w, rate)))
+            least = 0.0
+            if gap <= motion.touch and speed >= -motion.still:
+                gap, speed, least = max(gap, 0.0), max(speed, 0.0), assured
+            t = min(t, max(safe_time(max(gap, 0.0), speed, bend, third, t), least))
+    return t
+
+
+@inlined
+def has_torque(work):
+    """Test whether a torque acts."""
+    t = work.torque
+    return t[0] != 0.0 or t[1] != 0.0 or t[2] != 0.0
+
+
+@kernel
+def fly_smoothly(y, t, tilted, work, motion):
+    """Free motion under a torque or in fields over t by extrapolated steps: (state, what MOST_TRIES left of t)."""
+    put_state(motion, START, y)
+    left, tries = t, 0
+    motion.step = left
+    while left > 0.0 and tries < MOST_TRIES:
+        tries += 1
+        h = start_step(left, tilted, work, motion)
+        error, _ = try_step(h, tilted, work, motion)
+        if not error <= work.tolerance and h > SHORTEST * t:
+            motion.step = CUT * h
+            continue
+        for c in range(SIZE):
+            motion.y[START, c] = motion.y[END, c]
+        left -= h
+        pass_time(h, work)
+        motion.step = 2.0 * h
+    return get_state(motion, START), left
+
+
+@inlined
+def note_unresolved(report, work):
+    """Count a flight that extrapolated steps cannot follow; if there are fields, it is they that are not resolved."""
+    report[work.world, at.UNRESOLVED] += 1.0
+    if has_fields(work):
+        report[work.world, at.COARSE] += 1.0
+
+
+@kernel
+def fly_freely(y, t, gyroscopic, tilted, work, motion, report):
+    """State after the time t without contact.
+
+    Turned or swung by more than extrapolated steps can follow, the rest of t is time stepping's, which is reported.
+    """
+    if has_torque(work) or has_fields(work):
+        start_feeling(work)
+        end, left = fly_smoothly(y, t, tilted, work, motion)
+        if left > 0.0:
+            note_unresolved(report, work)
+            hold_loads(end, left, gyroscopic, tilted, work)
+            rest = fly(end, work, left, gyroscopic, tilted)
+            end = graded_flight(rest, end, left, gyroscopic, tilted, None, work)
+        if was_felt(work):
+            return end
+    return fly(y, work, t, gyroscopic, tilted)
+
+
+@kernel
+def fly_to_wall(y, left, gyroscopic, tilted, work, motion, report):
+    """Fly for `left` or until a feature reaches a wall: (state, time, whether the flight was found).
+
+    It may end earlier, where a feature flies so close along a wall that ADVANCES steps did not tell: no wall is missed.
+    """
+    motion.count = 0
+    if has_fields(work):
+        now = start_feeling(work)
+        end, t, guard = move(y, left, tilted, work, motion)
+        if was_felt(work):
+            return end, t, guard != NO_STEP
+        set_now(now, work)
+        refresh_loads(y, 0.0, tilted, work)
+    if is_clear(y[0], y[2], left, work):
+        return fly_freely(y, left, gyroscopic, tilted, work, motion, report), left, True
+    third = third_bound(y, left, tilted, work)
+    now, t = y, 0.0
+    for _ in range(ADVANCES):
+        assured = motion.assured if t == 0.0 else 0.0
+        step = safe_flight(now, left - t, third, assured, tilted, work, motion)
+        if t + step >= left:
+            return fly_freely(y, left, gyroscopic, tilted, work, motion, report), left, True
+        t += step
+        now = fly_freely(y, t, gyroscopic, tilted, work, motion, report)
+        if step <= FINEST * left:
+            break
+    return now, t, True

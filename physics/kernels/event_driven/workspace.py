@@ -1,0 +1,112 @@
+"""Scratch memory of the event-driven scheme: the contacts that act now, their forces, the smooth motion's stages.
+
+Besides the workspace of `physics.kernels.time_stepping.workspace`, which the impact solver shares with the
+time-stepping scheme.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from physics.kernels.state.layout import VERTEX_COUNT
+
+# Vertices of a block that can lie in one plane.
+FACE = 4
+
+# Columns of a smooth state: position, quaternion, velocity, angular momentum.
+X, Q, V, L, SIZE = 0, 3, 7, 10, 13
+
+# Rows of `y`: where the step starts, where it ends, two of the midpoint rule.
+START, END, LAST, NOW, ROWS = 0, 1, 2, 3, 4
+
+# Midpoint rules with 2, 4, 6, ... parts that are extrapolated at most: order 16.
+ORDERS = 8
+
+
+def motion_dtype(wall_count: int, features: int) -> np.dtype:
+    """Record type for bodies with `features` contact features each against `wall_count` walls."""
+    n = max(wall_count, 1) * (FACE if features == VERTEX_COUNT else 1)
+    m = 3 * n
+    n_slots = max(wall_count, 1) * features
+    f, i = np.float64, np.int64
+    return np.dtype([
+        ("touch", f),  # gap within which a feature touches [m]
+        ("still", f),  # speed of a contact that counts as none [m/s]
+        ("slow", f),  # speed along the wall that counts as none [m/s]
+        ("noise", f),  # speed that is rounding [m/s]
+        ("together", f),  # impacts within this time are one [s]
+        ("is_sequential", i),  # 1: contacts collide in turn, 0: at once
+        ("turns", i),  # impacts in turn so far at this moment
+        ("ahead", f),  # time by which the next regime is looked for [s]
+        ("nearest", f),  # the least of these [s]
+        ("assured", f),  # time for which contacts that a guard has let go are known to stay open [s]
+        ("leap", f),  # next leap, since when events crowd, and their number (`chatter_control`)
+        ("since", f),
+        ("crowd", i),
+        ("ended", i),  # the regime that a guard of force has ended
+        ("step", f),  # length of the last smooth step [s]
+        ("unheeded", i),  # the regime whose guards of force say nothing; see `mode_acceptance`
+        ("trust", f),  # length of a step without them [s]
+        ("end_rate", f, (SIZE,)),  # rate of change at the end of such a step
+        ("left_out", f),  # time that a sequence of bounces would have taken on [s]
+        ("rebound", f, (3 * n_slots,)),  # impulses of a rebound that there is not enough energy for [N s]
+        ("count", i),  # contacts that act
+        ("slot", i, (n,)),  # wall * features + feature
+        ("holds", i, (n,)),  # 1: no velocity at all; 0: slides
+        ("way", f, (n, 3)),  # direction of sliding
+        ("reference", f, (n, 3)),  # the one at the start of the step
+        ("is_starting", i, (n,)),  # 1: the contact was at rest at the start of the step, or nearly
+        ("turning", f),  # rate at which the direction turns in which the only contact begins to slide [rad/s]
+        ("stiffness", f),  # what friction changes of its acceleration across that, for each radian [m/s²]
+        ("first_speed", f),  # of it, at the start of the step [m/s]
+        ("growth", f),  # of that [m/s²]
+        ("arm", f, (n, 3)),  # contact point relative to the centre of mass [m]
+        ("velocity", f, (n, 3)),  # of the body there [m/s]
+        ("goal", f, (n, 3)),  # what the unknowns are to cancel: acceleration, velocity or gap
+        ("force", f, (n, 3)),  # [N]
+        ("normal", f, (n,)),  # of it, along the normal [N]
+        ("margin", f, (3, 2, n)),  # of push and cone at the ends of a step and inside; see `force_minima` [weights]
+        ("fall", f, (2, n)),  # their rates of change at its start
+        ("first", i, (n,)),  # first unknown of the contact alone
+        ("patch", i, (n,)),  # first of the three of its wall's normal forces, NO_PATCH: its normal force is its own
+        ("place", f, (n, 2)),  # coordinates in the patch, in radii
+        ("share", f, (n, 3)),  # part of its force that is given, along the wall's axes [N]
+        ("last", f, (n_slots, 3)),  # force of every feature when it was last known, along the wall's axes [N]
+        ("known", f, (2, 3)),  # force and moment of the shares, which the unknowns add to
+        ("push", f, (m, 3)),  # force per unknown
+        ("turn", f, (m, 3)),  # moment per unknown about the centre of mass
+        ("row", f, (m, 3)),  # direction of the constraint
+        ("row_turn", f, (m, 3)),  # its moment
+        ("is_skew", i),  # 1: some contact pushes along another line than its row
+        ("chosen", i, (m,)),  # rows that are equations
+        ("matrix", f, (m, m + 1)),
+        ("order", i, (m,)),
+        ("asked", f, (m,)),  # right-hand sides
+        ("unknown", f, (m,)),
+        ("candidates", i),  # of a regime: contacts that touch and do not leave
+        ("kind", i, (n,)),  # of them: open, held, sliding
+        ("is_fresh", i, (n,)),  # slides from rest
+        ("changes", i, (n,)),
+        ("candidate", i, (n,)),  # their slots
+        ("candidate_way", f, (n, 3)),
+        ("is_resting", i),
+        ("state", i, (max(wall_count, 1),)),  # what the body did at each wall after the last event
+        ("gap", f, (2, n_slots)),  # of every feature, at the start and at the end of the step [m]
+        ("gap_rate", f, (2, n_slots)),  # [m/s]
+        ("is_active", i, (n_slots,)),
+        ("weight", f),  # scale of the forces [N]
+        ("spin", f),  # angular speed at the start of the step [rad/s]
+        ("y", f, (ROWS, SIZE)),
+        ("rate", f, (SIZE,)),
+        ("first_rate", f, (SIZE,)),
+        ("last_rate", f, (SIZE,)),
+        ("scale", f, (SIZE,)),
+        ("table", f, (ORDERS, SIZE)),
+    ])  # fmt: skip
+
+
+def make_motion(wall_count: int, features: int, is_sequential: bool) -> np.ndarray:
+    """One such record, shape (1,)."""
+    motion = np.zeros(1, motion_dtype(wall_count, features))
+    motion["is_sequential"] = is_sequential
+    return motion

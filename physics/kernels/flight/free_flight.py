@@ -1,0 +1,77 @@
+"""Free motion of one body over a time: the parabola and the rotation, exact; and the textbook schemes."""
+
+from __future__ import annotations
+
+from physics.kernels.compile.decorators import inlined, kernel
+from physics.kernels.flight import integrators
+from physics.kernels.flight.free_rotation import free_rotation, isotropic_rotation
+from physics.kernels.state.body import body_attitude, principal_attitude
+
+
+@inlined
+def _vector(a):
+    return (a[0], a[1], a[2])
+
+
+@inlined
+def drift(q, L, work, h, gyroscopic, tilted):
+    """Attitude after h with constant angular momentum L, exact to rounding."""
+    if L[0] == 0.0 and L[1] == 0.0 and L[2] == 0.0:
+        return q
+    if gyroscopic is None:
+        return isotropic_rotation(q, L, work.J[0], h)
+    principal = principal_attitude(q, work, tilted)
+    return body_attitude(free_rotation(principal, L, _vector(work.J), work.series, h), work, tilted)
+
+
+@inlined
+def fly(y, work, h, gyroscopic, tilted):
+    """State (x, q, v, L) after h under the constant acceleration and torque of the step.
+
+    The parabola is exact. Without torque so is the rotation; with torque it is the Strang splitting of second
+    order: half a free rotation, the angular impulse, half a free rotation.
+    """
+    x, q, v, L = y
+    a, torque = work.free_acceleration, work.torque
+    half = 0.5 * h * h
+    x = (
+        x[0] + h * v[0] + half * a[0],
+        x[1] + h * v[1] + half * a[1],
+        x[2] + h * v[2] + half * a[2],
+    )
+    v = (v[0] + h * a[0], v[1] + h * a[1], v[2] + h * a[2])
+    if torque[0] == 0.0 and torque[1] == 0.0 and torque[2] == 0.0:
+        return x, drift(q, L, work, h, gyroscopic, tilted), v, L
+    q = drift(q, L, work, 0.5 * h, gyroscopic, tilted)
+    L = (L[0] + h * torque[0], L[1] + h * torque[1], L[2] + h * torque[2])
+    return x, drift(q, L, work, 0.5 * h, gyroscopic, tilted), v, L
+
+
+@inlined
+def coast(y, h, gyroscopic, tilted, scheme, work):
+    """Free motion over h, by the exact flow or by the scheme that was chosen."""
+    if scheme is None:
+        return fly(y, work, h, gyroscopic, tilted)
+    return fly_by_scheme(scheme, y, work, h, tilted)
+
+
+@kernel
+def fly_by_scheme(scheme, y, work, h, tilted):
+    """`fly` by a textbook scheme (codes of `physics.kernels.flight.integrators`) instead of the exact flow."""
+    x, q, v, L = y
+    q = principal_attitude(q, work, tilted)
+    zero = (0.0, 0.0, 0.0)
+    x, q, v, L = integrators.step(
+        scheme,
+        x,
+        q,
+        v,
+        L,
+        zero,
+        _vector(work.torque),
+        _vector(work.free_acceleration),
+        1.0,
+        _vector(work.J),
+        h,
+    )
+    return x, body_attitude(q, work, tilted), v, L

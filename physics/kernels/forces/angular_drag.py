@@ -1,0 +1,52 @@
+"""Drag on the spin: T = -(c + d |ω|) ω, about the centre of mass.
+
+References
+----------
+G. Kirchhoff 1876 for the linear law of a slowly turning sphere, c = 8π η r³.
+"""
+
+from __future__ import annotations
+
+import math
+
+from physics.kernels.compile.decorators import inlined
+from physics.kernels.forces.force_field_state import ZERO, times
+from physics.kernels.forces.implicit_loads import implicit_share
+from physics.kernels.math import quaternion as qt
+
+# Columns.
+LINEAR = 0  # c [N m s]
+QUADRATIC = 1  # d [N m s²]
+SIZE = 2
+
+
+@inlined
+def angular_drag(state, p, t):
+    """(force, torque) of the drag on the spin."""
+    w = state.w
+    return ZERO, times(-(p[LINEAR] + p[QUADRATIC] * math.sqrt(qt.dot(w, w))), w)
+
+
+@inlined
+def _slope(state, p):
+    """Slope of the torque with ω, along it [N m s]."""
+    return p[LINEAR] + 2.0 * p[QUADRATIC] * math.sqrt(qt.dot(state.w, state.w))
+
+
+@inlined
+def angular_drag_rates(state, p, J, h):
+    """Rates of `implicit_loads`."""
+    return (_slope(state, p) * max(J[0], J[1], J[2]), 0.0, 0.0)
+
+
+@inlined
+def soften_angular_drag(loads, h, R, state, p, J):
+    """Loads as `implicit_loads` has them, axis by axis."""
+    a, T = loads
+    z, m = h * _slope(state, p), qt.transposed_matvec(R, T)
+    m = (
+        m[0] / (1.0 + implicit_share(z * J[0]) * z * J[0]),
+        m[1] / (1.0 + implicit_share(z * J[1]) * z * J[1]),
+        m[2] / (1.0 + implicit_share(z * J[2]) * z * J[2]),
+    )
+    return a, qt.matvec(R, m)

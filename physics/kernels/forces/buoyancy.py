@@ -1,0 +1,101 @@
+"""Buoyancy in a fluid at rest below a plane: F = ρ g V n at the centre of the submerged part.
+
+Its energy is ρ g V times the depth of that centre: lifting the body lets the fluid fill what it leaves.
+
+References
+----------
+Archimedes, *On Floating Bodies*, book I, proposition 5.
+"""
+
+from __future__ import annotations
+
+import math
+
+from physics.kernels.compile.decorators import inlined
+from physics.kernels.forces.force_field_state import ZERO, acting_at, plus, times
+from physics.kernels.forces.implicit_loads import soften_at
+from physics.kernels.forces.submerged_volume import submerged
+from physics.kernels.math import quaternion as qt
+from physics.kernels.state.layout import BLOCK, SPHERE
+
+# Columns.
+NORMAL = 0  # of the surface, up
+OFFSET = 3  # the fluid is where normal·x <= offset [m]
+WEIGHT = 4  # ρ g [N/m³]
+SIZE = 5
+
+
+@inlined
+def _wet(state, p):
+    """Volume of the submerged part, its centre relative to the centre of mass, and the height of that."""
+    n = (p[NORMAL], p[NORMAL + 1], p[NORMAL + 2])
+    height = qt.dot(n, plus(state.x, state.center)) - p[OFFSET]
+    volume, centre = submerged(state.shape, state.dims, qt.transposed_matvec(state.R, n), height)
+    r = qt.matvec(state.R, centre)
+    return volume, plus(state.center, r), height + qt.dot(n, r), n
+
+
+@inlined
+def buoyancy(state, p, t):
+    """(force, torque) of the fluid."""
+    volume, arm, _, n = _wet(state, p)
+    force = times(p[WEIGHT] * volume, n)
+    if state.shape == SPHERE and state.center == ZERO:
+        return force, ZERO  # along the line through the centre, whatever rounding says
+    return acting_at(arm, force)
+
+
+@inlined
+def buoyancy_energy(state, p, t):
+    """ρ g V times the depth of the submerged part's centre [J]."""
+    volume, _, height, _ = _wet(state, p)
+    return -p[WEIGHT] * volume * height
+
+
+@inlined
+def _largest_section(state):
+    """Bound of the area in which a plane cuts the body [m²]: of its largest shadow."""
+    d = state.dims
+    a = (d[1] * d[2], d[2] * d[0], d[0] * d[1])
+    size = math.sqrt(qt.dot(a, a))
+    return 4.0 * size if state.shape == BLOCK else math.pi * size
+
+
+@inlined
+def _squares(state, p, J, h):
+    """Bounds of the squared frequencies of heaving and of rolling [1/s²].
+
+    Heaving: ρ g A/m. Rolling about an axis: the second moment of the section about it is at most A (d_j² + d_k²)/3
+    for a block and A (d_j² + d_k²)/4 for an ellipsoid, whose moments of inertia are m (d_j² + d_k²)/3 and m (d_j² +
+    d_k²)/5: at most 5/4 of ρ g A/m. A centre of mass at c from the centre adds ρ g V |c| J, V <= 2 A |d|. None where
+    the surface stays clear of the body in the half step on either side.
+    """
+    d, c = state.dims, state.center
+    height = qt.dot((p[NORMAL], p[NORMAL + 1], p[NORMAL + 2]), plus(state.x, c)) - p[OFFSET]
+    reach = math.sqrt(qt.dot(d, d)) + 0.5 * h * math.sqrt(qt.dot(state.v, state.v))
+    if abs(height) > reach:
+        return 0.0, 0.0
+    heave = p[WEIGHT] * _largest_section(state) / state.mass
+    offset = 2.0 * math.sqrt(qt.dot(d, d) * qt.dot(c, c)) * state.mass * max(J[0], J[1], J[2])
+    return heave, heave * (1.25 + offset)
+
+
+@inlined
+def buoyancy_rates(state, p, J, h):
+    """Rates of `implicit_loads`."""
+    heave, roll = _squares(state, p, J, h)
+    if state.shape == SPHERE and state.center == ZERO:
+        return (0.0, heave, 0.0)
+    return (0.0, max(heave, roll), 0.0)
+
+
+@inlined
+def soften_buoyancy(loads, h, R, state, p, J):
+    """Loads as `implicit_loads` has them, with the bounds of the stiffness."""
+    heave, roll = _squares(state, p, J, h)
+    n = (p[NORMAL], p[NORMAL + 1], p[NORMAL + 2])
+    s = 0.25 * h * h
+    a, T = soften_at(loads, ZERO, n, s * heave * state.mass, 0.0, R, state.mass, J)
+    if state.shape == SPHERE and state.center == ZERO:
+        return a, T
+    return a, times(1.0 / (1.0 + s * roll), T)

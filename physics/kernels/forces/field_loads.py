@@ -1,0 +1,105 @@
+"""Loads of all fields at a state, and how they are put beside what is held over the step."""
+
+from __future__ import annotations
+
+import math
+
+from physics.kernels.compile.decorators import inlined
+from physics.kernels.forces.force_field_dispatch import (
+    total_air,
+    total_load,
+)
+from physics.kernels.forces.force_field_state import ZERO, FieldState, minus, plus, times
+from physics.kernels.math import quaternion as qt
+from physics.kernels.state.body import angular_velocity, principal_attitude
+
+
+@inlined
+def vector(a):
+    """Vector as a tuple."""
+    return (a[0], a[1], a[2])
+
+
+@inlined
+def field_state(x, q, v, L, t, tilted, work):
+    """State of a body as its fields read it."""
+    R = qt.to_matrix(q)
+    w = angular_velocity(q, L, work, tilted)
+    center = ZERO
+    if tilted is not None:
+        center = qt.matvec(R, vector(work.center))
+    still = FieldState(x, v, w, R, center, ZERO, work.mass, work.shape, vector(work.dims))
+    air = total_air(still, t, work)
+    return FieldState(x, v, w, R, center, air, work.mass, work.shape, vector(work.dims))
+
+
+@inlined
+def kicked(x, q, v, L, loads, kick, later, tilted, work):
+    """State that fields are told, `later` [s] than now, once loads (F, T) and those held have acted for `kick` [s]."""
+    a, torque = all_loads(loads[0], loads[1], work)
+    return field_state(x, q, plus(v, times(kick, a)), plus(L, times(kick, torque)), work.now + later, tilted, work)
+
+
+@inlined
+def field_load(x, q, v, L, t, tilted, work):
+    """(force, torque about the centre of mass) of all fields at a state and a time."""
+    return total_load(field_state(x, q, v, L, t, tilted, work), t, work)
+
+
+@inlined
+def put_loads(force, torque, work):
+    """Let them act, besides what is held; `work.acceleration` bounds what they do to any point of the body."""
+    inv_mass, J = 1.0 / work.mass, work.J
+    for c in range(3):
+        work.free_acceleration[c] = work.held_acceleration[c] + inv_mass * force[c]
+        work.torque[c] = work.held_torque[c] + torque[c]
+    a, t = work.free_acceleration, work.torque
+    work.acceleration = math.sqrt(a[0] * a[0] + a[1] * a[1] + a[2] * a[2])
+    turning = max(J[0], J[1], J[2]) * math.sqrt(t[0] * t[0] + t[1] * t[1] + t[2] * t[2])
+    work.acceleration += work.radius * turning
+
+
+@inlined
+def principal_axes(q, tilted, work):
+    """Principal axes in the world."""
+    return qt.to_matrix(principal_attitude(q, work, tilted))
+
+
+@inlined
+def all_loads(F, T, work):
+    """Acceleration [m/s²] and torque [N m] of fields' loads and of what is held."""
+    return plus(vector(work.held_acceleration), times(1.0 / work.mass, F)), plus(vector(work.held_torque), T)
+
+
+@inlined
+def put_all(loads, work):
+    """Let them act."""
+    a, T = loads
+    F = times(work.mass, minus(a, vector(work.held_acceleration)))
+    put_loads(F, minus(T, vector(work.held_torque)), work)
+
+
+@inlined
+def less(b, a):
+    """Difference of two pairs of acceleration and torque."""
+    return minus(b[0], a[0]), minus(b[1], a[1])
+
+
+@inlined
+def more(a, b):
+    """Sum of two pairs of acceleration and torque."""
+    return plus(a[0], b[0]), plus(a[1], b[1])
+
+
+@inlined
+def loads_held(work):
+    """Acceleration and torque that act."""
+    return vector(work.free_acceleration), vector(work.torque)
+
+
+@inlined
+def size_of(loads, work):
+    """Bound of what an acceleration and a torque do to any point of the body [m/s²]."""
+    a, T = loads
+    J = max(work.J[0], work.J[1], work.J[2])
+    return math.sqrt(qt.dot(a, a)) + work.radius * J * math.sqrt(qt.dot(T, T))

@@ -1,0 +1,301 @@
+"""Fields that a kernel is compiled for, read off the *type* of the workspace.
+
+A scene's fields are members of its workspace record: one marker per kind of field, `load_drag_1x3` for one `Drag` of
+three columns. Numba compiles a kernel per type of its arguments, so that a record without markers has kernels without
+fields, and one with them is found in the disk cache by its markers, from any process. A user's own field is marked
+with a digest of its source: an edit is another type.
+
+What is compiled for a type is chosen while Numba finds out types (`numba.extending.overload`): functions here are
+chosen by the record, and nothing is passed for it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from typing import NamedTuple
+
+from numba.extending import overload
+
+from physics.kernels.compile.decorators import CHOSEN, composed, kernel
+from physics.kernels.forces.force_field_state import ZERO, plus
+from physics.kernels.math.quaternion import dot
+
+# First word of a marker: what the field's function gives, a (force, torque) or the velocity of the air.
+LOAD, AIR = "load", "air"
+
+
+class Term(NamedTuple):
+    """A kind of field in a scene.
+
+    Attributes
+    ----------
+    marker : str
+        Member of the workspace.
+    function : dispatcher
+        (state, parameters, time) -> (force, torque), or -> velocity of the air.
+    energy : dispatcher or None
+        (state, parameters, time) -> potential energy [J].
+    size : int
+        Columns of one field.
+    count : int
+        Fields of this kind.
+    is_linked : bool
+        Whether its loads depend on other bodies, too.
+    rates : dispatcher or None
+        (state, parameters, inverse moments, step) -> the three rates of `implicit_loads`; None of a user's field.
+    mean : dispatcher or None
+        (states in the middle, at the start and at the end, parameters, time) -> the load of a discrete gradient; None:
+        that of the middle.
+    soften : dispatcher or None
+        (acceleration and torque, step, principal axes, state, parameters, inverse moments) -> the same, as the
+        implicit step would have them; None of a field whose loads depend neither on place nor on velocity.
+    """
+
+    marker: str
+    function: Callable
+    energy: Callable | None
+    size: int
+    count: int
+    is_linked: bool = False
+    rates: Callable | None = None
+    soften: Callable | None = None
+    mean: Callable | None = None
+
+
+_KNOWN: dict[str, Term] = {}
+
+
+def declare(terms: tuple[Term, ...]) -> None:
+    """Make terms known before a kernel is compiled for a workspace that holds their markers."""
+    _KNOWN.update((term.marker, term) for term in terms)
+
+
+def members(terms: tuple[Term, ...]) -> list[tuple]:
+    """Members of a workspace for these terms; none without terms."""
+    if not terms:
+        return []
+    columns = sum(term.count * term.size for term in terms)
+    is_linked = any(term.is_linked for term in terms)
+    return [
+        ("held_acceleration", float, (3,)),  # of gravity and wrench [m/s²]
+        ("held_torque", float, (3,)),  # of the wrench [N m]
+        ("call_start", float),  # time at the start of the call [s]
+        ("now", float),  # of the stage [s]
+        ("is_felt", int),  # 1: some field was not zero since this was set to 0
+        ("is_textbook", int),  # 1: a textbook scheme moves the body
+        ("is_stiff", int),  # 1: loads of the stage are those of an implicit step (`implicit_loads`)
+        ("is_coarse", int),  # 1: a field was not resolved by some stage of this call
+        ("is_put_back", int),  # 1: some stage of this call was given up, and the body put back at its start
+        ("rate", float),  # fastest damping or turning of the stage [1/s]
+        ("damping", float),  # fastest damping [1/s]
+        ("columns", float, (max(columns, 1),)),  # parameters of all fields, in the order of the markers
+        *((term.marker, float) for term in terms),
+        *([("middle", float, (13,))] if is_linked else []),  # state in the middle of the stage: x, q, v, L
+        ("stage_start", float, (13,)),  # of many bodies: state at the start of a stiff stage
+        ("stage_energy", float),  # of the first of many bodies: their potential energy then [J]
+    ]
+
+
+def _markers(names) -> list[str]:
+    return [name for name in names if name.split("_")[0] in (LOAD, AIR)]
+
+
+def _names(work) -> list[str]:
+    """Members of a workspace, or of the type of one."""
+    return list(work.fields) if hasattr(work, "fields") else list(work.dtype.names)
+
+
+def _chosen_by(is_chosen: Callable, otherwise):
+    """`if_declared`, where `is_chosen` decides by the members of the workspace."""
+
+    def constant(*arguments):
+        return otherwise
+
+    skip = otherwise if callable(otherwise) else constant
+
+    def decorate(function):
+        compiled = kernel(function)
+
+        def call(*arguments):
+            return compiled(*arguments)
+
+        def stub(*arguments):
+            return function(*arguments) if is_chosen(_names(arguments[-1])) else skip(*arguments)
+
+        @overload(stub, jit_options=CHOSEN, strict=False)
+        def choose(*types):
+            return call if is_chosen(_names(types[-1])) else skip
+
+        stub.__doc__ = function.__doc__
+        return stub
+
+    return decorate
+
+
+def if_declared(otherwise=None):
+    """Make a function, whose last argument is the workspace, a kernel that only returns `otherwise` without fields.
+
+    A function for `otherwise` is called instead. That is inlined: nothing is left of it.
+    """
+    return _chosen_by(lambda names: bool(_markers(names)), otherwise)
+
+
+def if_unknown(otherwise=None):
+    """As `if_declared`, where some field does not tell its rates: a user's own."""
+    return _chosen_by(_has_unknown, otherwise)
+
+
+def _has_unknown(names: list[str]) -> bool:
+    return any(_KNOWN[name].rates is None for name in _markers(names) if name.startswith(LOAD))
+
+
+def instances(work, kind: str) -> Iterator[tuple[Term, int, int]]:
+    """Each field of this kind in a workspace: its term, first and last column."""
+    first = 0
+    for marker in _markers(_names(work)):
+        term = _KNOWN[marker]
+        for _ in range(term.count):
+            if marker.startswith(kind):
+                yield term, first, first + term.size
+            first += term.size
+
+
+def _sum(kind: str, start: Callable, chosen: Callable, add: Callable):
+    """A kernel (state, t, work) that adds up what the chosen functions of a workspace's fields give."""
+
+    def stub(state, t, work):
+        return total(work)(state, t, work)
+
+    def total(work):
+        result = start
+        for term, first, last in instances(work, kind):
+            if chosen(term) is not None:
+                result = add(composed(result), chosen(term), first, last)
+        return result
+
+    @overload(stub, jit_options=CHOSEN, strict=False)
+    def choose(state, t, work):
+        return total(work)
+
+    return stub
+
+
+def _no_load(state, t, work):
+    return ZERO, ZERO
+
+
+def _no_air(state, t, work):
+    return ZERO
+
+
+def _of_middle(function):
+    """A field's function of the three states of a stage that looks at the middle one."""
+
+    def load(states, p, t):
+        return function(states[0], p, t)
+
+    return load
+
+
+def _no_energy(state, t, work):
+    return 0.0
+
+
+def _add_load(before, function, first, last):
+    def add(state, t, work):
+        F, T = before(state, t, work)
+        f, m = function(state, work.columns[first:last], t)
+        return plus(F, f), plus(T, m)
+
+    return add
+
+
+def _no_rates(state, h, work):
+    return ZERO
+
+
+def _add_rates(before, function, first, last):
+    def add(state, h, work):
+        return plus(before(state, h, work), function(state, work.columns[first:last], work.J, h))
+
+    return add
+
+
+def _add_supply(before, function, first, last):
+    def add(state, t, work):
+        F, T = function(state, work.columns[first:last], t)
+        return before(state, t, work) + max(dot(F, state.v) + dot(T, state.w), 0.0)
+
+    return add
+
+
+def _add_number(before, function, first, last):
+    def add(state, t, work):
+        return before(state, t, work) + function(state, work.columns[first:last], t)
+
+    return add
+
+
+def _add_vector(before, function, first, last):
+    def add(state, t, work):
+        return plus(before(state, t, work), function(state, work.columns[first:last], t))
+
+    return add
+
+
+total_load = _sum(LOAD, _no_load, lambda term: term.function, _add_load)
+total_own_load = _sum(LOAD, _no_load, lambda term: None if term.is_linked else term.function, _add_load)
+total_linked_load = _sum(LOAD, _no_load, lambda term: term.function if term.is_linked else None, _add_load)
+total_air = _sum(AIR, _no_air, lambda term: term.function, _add_vector)
+total_energy = _sum(LOAD, _no_energy, lambda term: term.energy, _add_number)
+total_rates = _sum(LOAD, _no_rates, lambda term: term.rates, _add_rates)
+total_potential = _sum(LOAD, _no_load, lambda term: term.function if term.energy is not None else None, _add_load)
+total_supply = _sum(LOAD, _no_energy, lambda term: term.function if term.energy is None else None, _add_supply)
+total_unknown = _sum(LOAD, _no_load, lambda term: term.function if term.rates is None else None, _add_load)
+
+
+def total_mean_load(states, t, work):
+    """Load of all fields over a stage, `states` in its middle, at its start and at its end: of discrete gradients."""
+    return _mean_load(work)(states, t, work)
+
+
+def _mean_load(work):
+    result = _no_load
+    for term, first, last in instances(work, LOAD):
+        mean = composed(_of_middle(term.function)) if term.mean is None else term.mean
+        result = _add_load(composed(result), mean, first, last)
+    return result
+
+
+@overload(total_mean_load, jit_options=CHOSEN, strict=False)
+def _choose_mean_load(states, t, work):
+    return _mean_load(work)
+
+
+def _as_it_is(loads, h, R, state, work):
+    return loads
+
+
+def _then_soften(before, function, first, last):
+    def soften(loads, h, R, state, work):
+        return function(before(loads, h, R, state, work), h, R, state, work.columns[first:last], work.J)
+
+    return soften
+
+
+def softened(loads, h, R, state, work):
+    """Acceleration and torque as the implicit step over h of all fields has them, one field after the other."""
+    return _softened(work)(loads, h, R, state, work)
+
+
+def _softened(work):
+    result = _as_it_is
+    for term, first, last in instances(work, LOAD):
+        if term.soften is not None:
+            result = _then_soften(composed(result), term.soften, first, last)
+    return result
+
+
+@overload(softened, jit_options=CHOSEN, strict=False)
+def _choose_softened(loads, h, R, state, work):
+    return _softened(work)

@@ -1,0 +1,72 @@
+"""State of a body as force fields read it, and the vector algebra that fields need."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from physics.kernels.compile.decorators import inlined
+from physics.kernels.math import quaternion as qt
+
+ZERO = (0.0, 0.0, 0.0)
+
+
+class FieldState(NamedTuple):
+    """A body at a moment; world frame unless it says otherwise.
+
+    Attributes
+    ----------
+    x, v, w : tuples of 3 floats
+        Centre of mass, its velocity, angular velocity [m, m/s, rad/s].
+    R : tuple of 9 floats
+        Rotation matrix from body to world, row by row.
+    center : tuple of 3 floats
+        Geometric centre relative to the centre of mass [m].
+    air : tuple of 3 floats
+        Velocity of the air [m/s]: of `physics.Wind`, or zero.
+    mass : float
+        [kg].
+    shape : int
+        `layout.BLOCK`, `SPHERE` or `ELLIPSOID`.
+    dims : tuple of 3 floats
+        Half edges, semi-axes, or the radius three times, along the body axes [m].
+    """
+
+    x: tuple
+    v: tuple
+    w: tuple
+    R: tuple
+    center: tuple
+    air: tuple
+    mass: float
+    shape: int
+    dims: tuple
+
+
+@inlined
+def plus(a, b):
+    """a + b."""
+    return (a[0] + b[0], a[1] + b[1], a[2] + b[2])
+
+
+@inlined
+def minus(a, b):
+    """a - b."""
+    return (a[0] - b[0], a[1] - b[1], a[2] - b[2])
+
+
+@inlined
+def times(s, a):
+    """The number s times the vector a."""
+    return (s * a[0], s * a[1], s * a[2])
+
+
+@inlined
+def velocity_at(s, arm):
+    """Velocity of the body at a point `arm` away from its centre of mass [m/s]."""
+    return plus(s.v, qt.cross(s.w, arm))
+
+
+@inlined
+def acting_at(arm, force):
+    """(force, torque about the centre of mass) of a force at a point `arm` away from it."""
+    return force, qt.cross(arm, force)

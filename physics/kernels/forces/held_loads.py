@@ -1,0 +1,198 @@
+"""Acceleration and torque of a step with fields in it: what is held, and the fields where the step needs them.
+
+Without fields `work.free_acceleration` and `work.torque` are what gravity and the wrench make them, for the whole
+call. With fields they are set anew:
+
+- time stepping holds over a stage of length h the loads of its *middle* (`hold_loads`): place and attitude there are
+  those of a free drift over h/2, velocities have half a kick of all loads. That is the Strang splitting of drift and
+  kick, the kick by the midpoint rule: second order, leapfrog for a field of the position alone, exact where the field
+  is zero, and what is in equilibrium stays there;
+- in contact the velocity at the middle is that of the start, then, where the loads depend on it, the mean of start and
+  end of a first trial (`hold_mean_loads`);
+- the event-driven scheme asks for them at every state it looks at (`refresh_loads`).
+
+None of this is in a kernel whose scene declares no field (`force_field_dispatch.if_declared`).
+"""
+
+from __future__ import annotations
+
+from physics.kernels.flight.free_flight import drift
+from physics.kernels.forces.field_loads import (
+    all_loads,
+    field_load,
+    field_state,
+    kicked,
+    less,
+    more,
+    principal_axes,
+    put_all,
+    put_loads,
+    vector,
+)
+from physics.kernels.forces.force_field_dispatch import (
+    if_declared,
+    softened,
+    total_load,
+)
+from physics.kernels.forces.force_field_state import ZERO, plus, times
+from physics.kernels.forces.resolution_limits import look_over_stage, note_rates
+from physics.kernels.state import layout as at
+
+# Evaluations of the midpoint rule beyond the first, and half a turn of the velocity [rad] up to which one will do: it
+# gains z⁴/2 of the energy of what turns by 2 z. Fixed point rounds gain z^(2k + 2) after k: rounding, up to z = 1/4.
+MIDPOINT_ROUNDS = 13
+EXPLICIT_TURN = 1.0e-4
+
+
+@if_declared()
+def bind_fields(params, i, scheme, work):
+    """Take the fields' parameters of body i, and what the step holds, into `work`.
+
+    A textbook scheme (`scheme` not None) keeps its explicit loads at any step: it is there to show what they do.
+    """
+    for c in range(work.columns.shape[0]):
+        work.columns[c] = params[i, at.PARAM_SIZE + c]
+    for c in range(3):
+        work.held_acceleration[c] = work.free_acceleration[c]
+        work.held_torque[c] = work.torque[c]
+    work.is_stiff = work.is_coarse = work.is_put_back = 0
+    work.is_textbook = 0 if scheme is None else 1
+
+
+@if_declared()
+def set_clock(elapsed, work):
+    """Say that so much time has passed since the start of the call [s]."""
+    work.now = work.call_start + elapsed
+
+
+@if_declared()
+def pass_time(h, work):
+    """Say that so much time has passed since it was last said [s]."""
+    work.now += h
+
+
+@if_declared()
+def hold_loads(y, h, gyroscopic, tilted, work):
+    """Hold the loads of the middle of a flight of length h that starts at y, now."""
+    x, q, v, L = y
+    half = 0.5 * h
+    t = work.now + half
+    q = drift(q, L, work, half, gyroscopic, tilted)
+    x = plus(x, times(half, v))
+    state = field_state(x, q, v, L, t, tilted, work)
+    F, T = total_load(state, t, work)
+    look_over_stage(y, (F, T), x, q, h, tilted, work)
+    turn = note_rates(state, kicked(x, q, v, L, (F, T), h, h, tilted, work), h, work)
+    if work.is_stiff == 1:
+        put_all(softened(all_loads(F, T, work), h, principal_axes(q, tilted, work), state, work), work)
+        return
+    for _ in range(MIDPOINT_ROUNDS):
+        state = kicked(x, q, v, L, (F, T), half, half, tilted, work)
+        before, (F, T) = (F, T), total_load(state, t, work)
+        if work.is_textbook == 1 or not half * turn > EXPLICIT_TURN or (before[0] == F and before[1] == T):
+            break
+    put_loads(F, T, work)
+
+
+@if_declared()
+def hold_contact_loads(y, h, gyroscopic, tilted, work):
+    """Hold the loads of the middle of a stage in contact, with the velocities of its start.
+
+    Where the stage is stiff, those that depend on velocities are softened as if there were no contact.
+    """
+    x, q, v, L = y
+    half = 0.5 * h
+    t = work.now + half
+    q = drift(q, L, work, half, gyroscopic, tilted)
+    x = plus(x, times(half, v))
+    state = field_state(x, q, v, L, t, tilted, work)
+    F, T = total_load(state, t, work)
+    look_over_stage(y, (F, T), x, q, h, tilted, work)
+    note_rates(state, kicked(x, q, v, L, (F, T), h, h, tilted, work), h, work)
+    if work.is_stiff == 1:
+        still = all_loads(*field_load(x, q, state.air, ZERO, t, tilted, work), work)
+        slowed = softened(less(all_loads(F, T, work), still), h, principal_axes(q, tilted, work), state, work)
+        put_all(more(still, slowed), work)
+        return
+    put_loads(F, T, work)
+
+
+@if_declared(False)
+def hold_mean_loads(y, end, h, gyroscopic, tilted, work):
+    """Hold the loads of the middle of a stage in contact from y to `end`: whether they are others than before.
+
+    Contacts may have made motion that the start of the stage did not have, so it is looked at anew whether it is stiff.
+    Where it is, the change is softened: with A' = A + (1 + M⁻¹ Z)⁻¹ (A(middle) - A) loads and motion
+    agree, if the contacts push as they did.
+    """
+    x, q, v, L = y
+    half = 0.5 * h
+    t = work.now + half
+    q = drift(q, L, work, half, gyroscopic, tilted)
+    x, v, L = plus(x, times(half, v)), times(0.5, plus(v, end[2])), times(0.5, plus(L, end[3]))
+    state = field_state(x, q, v, L, t, tilted, work)
+    F, T = total_load(state, t, work)
+    a, torque = vector(work.free_acceleration), vector(work.torque)
+    was_stiff = work.is_stiff
+    note_rates(state, field_state(x, q, end[2], end[3], t, tilted, work), h, work)
+    if was_stiff == 1:
+        work.is_stiff = 1
+    if work.is_stiff == 1:
+        change = softened(less(all_loads(F, T, work), (a, torque)), h, principal_axes(q, tilted, work), state, work)
+        put_all(more((a, torque), change), work)
+    else:
+        put_loads(F, T, work)
+    return a != vector(work.free_acceleration) or torque != vector(work.torque)
+
+
+@if_declared()
+def hold_softened_loads(y, h, gyroscopic, tilted, work):
+    """Hold the loads of an implicit step over h from y, whatever touches."""
+    x, q, v, L = y
+    half = 0.5 * h
+    t = work.now + half
+    q = drift(q, L, work, half, gyroscopic, tilted)
+    state = field_state(plus(x, times(half, v)), q, v, L, t, tilted, work)
+    F, T = total_load(state, t, work)
+    put_all(softened(all_loads(F, T, work), h, principal_axes(q, tilted, work), state, work), work)
+
+
+@if_declared()
+def refresh_loads(y, later, tilted, work):
+    """Let the loads at the state y act, `later` [s] than now."""
+    x, q, v, L = y
+    F, T = field_load(x, q, v, L, work.now + later, tilted, work)
+    put_loads(F, T, work)
+    if F != ZERO or T != ZERO or vector(work.held_torque) != ZERO:
+        work.is_felt = 1
+
+
+@if_declared(False)
+def has_fields(work):
+    """Test whether the scene declares a field."""
+    return True
+
+
+@if_declared(0.0)
+def time_now(work):
+    """The time now [s]."""
+    return work.now
+
+
+@if_declared(0.0)
+def start_feeling(work):
+    """Forget what was felt; the time now [s]."""
+    work.is_felt = 0
+    return work.now
+
+
+@if_declared()
+def set_now(t, work):
+    """Say what time it is [s]."""
+    work.now = t
+
+
+@if_declared(True)
+def was_felt(work):
+    """Test whether a field, or a held torque, was not zero anywhere since `start_feeling`."""
+    return work.is_felt == 1

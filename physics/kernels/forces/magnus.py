@@ -1,0 +1,55 @@
+"""Magnus lift: the force across the velocity of a body that spins.
+
+    F = ½ ρ C π r³ ω x u,    u = velocity relative to the air,  r = (d1 d2 d3)^(1/3)
+
+r is the radius of the sphere of the same extent. It acts at the centre of mass.
+
+References
+----------
+S. I. Rubinow, J. B. Keller, *The transverse force on a spinning sphere moving in a viscous fluid*, J. Fluid Mech. 11,
+1961: C = 2 at small Reynolds numbers. A. M. Nathan, *The effect of spin on the flight of a baseball*, Am. J. Phys. 76,
+2008: about 1 for sports balls.
+"""
+
+from __future__ import annotations
+
+import math
+
+from physics.kernels.compile.decorators import inlined
+from physics.kernels.forces.force_field_state import ZERO, minus, plus, times
+from physics.kernels.math import quaternion as qt
+
+# Columns.
+STRENGTH = 0  # ½ ρ C [kg/m³]
+SIZE = 1
+
+
+@inlined
+def magnus(state, p, t):
+    """(force, torque) of the lift."""
+    d = state.dims
+    u = minus(state.v, state.air)
+    return times(p[STRENGTH] * math.pi * d[0] * d[1] * d[2], qt.cross(state.w, u)), ZERO
+
+
+@inlined
+def _turning(state, p):
+    """Angular velocity at which the lift turns the velocity [rad/s]."""
+    d = state.dims
+    return times(p[STRENGTH] * math.pi * d[0] * d[1] * d[2] / state.mass, state.w)
+
+
+@inlined
+def magnus_rates(state, p, J, h):
+    """Rates of `implicit_loads`."""
+    b = _turning(state, p)
+    return (0.0, 0.0, math.sqrt(qt.dot(b, b)))
+
+
+@inlined
+def soften_magnus(loads, h, R, state, p, J):
+    """Loads as the implicit midpoint rule has them, which keeps the speed: x of x - b x x = a, b half the turn of h."""
+    a, T = loads
+    b = times(0.5 * h, _turning(state, p))
+    x = plus(a, plus(qt.cross(b, a), times(qt.dot(b, a), b)))
+    return times(1.0 / (1.0 + qt.dot(b, b)), x), T

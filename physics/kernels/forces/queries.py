@@ -1,0 +1,31 @@
+"""Loads and energies of the fields now, for diagnostics of a world."""
+
+from __future__ import annotations
+
+from physics.kernels.compile.decorators import kernel
+from physics.kernels.forces.field_loads import field_state
+from physics.kernels.forces.force_field_dispatch import total_energy, total_load
+from physics.kernels.forces.held_loads import bind_fields
+from physics.kernels.forces.two_body_spring import look_for_anchors
+from physics.kernels.state.body import bind_body, read_state
+
+
+@kernel
+def look_at_fields(state, params, shapes, tilted, start, scratch, wrenches, energies):
+    """Write force and torque of all fields (rows, 6) [N, N m] and potential energies (rows,) [J] at `start` [s].
+
+    `wrenches` is zero at first: it is the wrench that is bound, too.
+    """
+    work = scratch[0]
+    for i in range(state.shape[0]):
+        bind_body(
+            i // shapes.shape[0], i, shapes[i % shapes.shape[0]], params, None, wrenches, None, None, tilted, work
+        )
+        bind_fields(params, i, None, work)
+        look_for_anchors(i, state, shapes.shape[0], work)
+        x, q, v, L = read_state(state, i)
+        told = field_state(x, q, v, L, start, tilted, work)
+        F, T = total_load(told, start, work)
+        for c in range(3):
+            wrenches[i, c], wrenches[i, 3 + c] = F[c], T[c]
+        energies[i] = total_energy(told, start, work)

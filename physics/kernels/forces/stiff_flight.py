@@ -1,0 +1,81 @@
+"""Flight in fields that are stiff: a step cut into parts that begin short and grow.
+
+What damping does to a velocity is over after a few times 1/λ, and then λ may still be as large: of a linear drag it
+is. So the first part is a share of 1/λ, and each next one is longer than the one before by a constant factor: local
+errors are a share of what is left of the velocity, which falls faster. λ h = 10¹² takes 68 parts; the last one that
+there may be takes all that is left, by an implicit step, when nothing is left to err about.
+"""
+
+from __future__ import annotations
+
+from physics.kernels.compile.decorators import kernel
+from physics.kernels.flight.free_flight import coast
+from physics.kernels.forces.energy_budget import paid
+from physics.kernels.forces.field_loads import loads_held, put_all, size_of
+from physics.kernels.forces.force_field_dispatch import if_declared
+from physics.kernels.forces.force_field_state import plus
+from physics.kernels.forces.held_loads import hold_loads, pass_time, set_now, time_now
+from physics.kernels.forces.resolution_limits import change_to_agree
+
+# First part of a step, in 1/λ; growth from part to part; parts.
+FIRST = 0.25
+GROWTH = 1.5
+PARTS = 72
+
+# Rounds of Newton's method for loads that agree with the end of a part, the share of the loads at which they count as
+# settled, and the one up to which they are better than those of one round.
+ROUNDS = 12
+SETTLED = 1.0e-12
+NEARLY_SETTLED = 1.0e-3
+
+
+@kernel
+def implicit_flight(y, h, gyroscopic, tilted, scheme, work):
+    """Flight over h from y under loads that agree with its end: discrete gradients, by Newton's method from those held.
+
+    A' = A + (1 + M⁻¹ Z)⁻¹ (A(y, end) - A). Where that does not settle the loads of the first step are kept.
+    """
+    start = loads_held(work)
+    size, loads = size_of(start, work), start
+    for _ in range(ROUNDS):
+        end = coast(y, h, gyroscopic, tilted, scheme, work)
+        change = change_to_agree(y, end, loads, h, gyroscopic, tilted, work)
+        loads = plus(loads[0], change[0]), plus(loads[1], change[1])
+        put_all(loads, work)
+        if size_of(change, work) <= SETTLED * size:
+            break
+    if not size_of(change, work) <= NEARLY_SETTLED * size:
+        put_all(start, work)
+    return coast(y, h, gyroscopic, tilted, scheme, work)
+
+
+def _as_it_is(end, y, h, gyroscopic, tilted, scheme, work):
+    return end
+
+
+@if_declared(_as_it_is)
+def graded_flight(end, y, h, gyroscopic, tilted, scheme, work):
+    """`end` of a flight over h from y under the loads that are held; where these are stiff, made in parts."""
+    if work.is_stiff == 0:
+        return end
+    start, left, part = time_now(work), h, 0.0
+    for k in range(PARTS):
+        hold_loads(y, left, gyroscopic, tilted, work)
+        part = GROWTH * part
+        if work.rate > 0.0:
+            part = max(part, FIRST / work.rate)
+        if not 0.0 < part < left or k == PARTS - 1:
+            part = left
+        if part < left:
+            hold_loads(y, part, gyroscopic, tilted, work)
+        if work.is_stiff == 1:
+            end = implicit_flight(y, part, gyroscopic, tilted, scheme, work)
+        else:
+            end = coast(y, part, gyroscopic, tilted, scheme, work)
+        y = paid(y, end, part, True, tilted, work)
+        left -= part
+        pass_time(part, work)
+        if not left > 0.0:
+            break
+    set_now(start, work)
+    return y

@@ -1,0 +1,53 @@
+"""Wind: the velocity of the air, the same everywhere; steady, or with gusts.
+
+A gust is a sum of N waves per axis with phases φ of the world's own,
+
+    u_i(t) = U_i + σ √(2/N) Σ_k cos(ω_k t + φ_ik),    ω_k = tan(π (k - ½)/(2N)) / τ,  k = 1 .. N.
+
+The ω_k cut the spectrum 2τ/π / (1 + (ωτ)²) into N parts of equal energy: the variance is σ² exactly, and the
+correlation over a time s is (1/N) Σ cos(ω_k s), which tends to exp(-s/τ) with N. Being smooth it can be integrated to
+any tolerance, and being a formula in t it needs no memory.
+
+References
+----------
+H. L. Dryden, *A review of the statistical theory of turbulence*, Q. Appl. Math. 1, 1943, for the spectrum; the sum of
+waves: M. Shinozuka, G. Deodatis, *Simulation of stochastic processes by spectral representation*, Appl. Mech. Rev. 44,
+1991.
+"""
+
+from __future__ import annotations
+
+import math
+
+from physics.kernels.compile.decorators import inlined, kernel
+
+WAVES = 8  # N
+
+# Columns.
+MEAN = 0  # U [m/s]
+GUST = 3  # σ [m/s]
+TIME_SCALE = 4  # τ [s]
+PHASES = 5  # φ of the N waves of x, then y, then z [rad]
+SIZE = PHASES + 3 * WAVES
+
+
+@inlined
+def frequency(k, time_scale):
+    """ω of wave k = 0 .. N - 1 [rad/s]."""
+    return math.tan(0.5 * math.pi * (k + 0.5) / WAVES) / time_scale
+
+
+@kernel
+def _gust(axis, p, t):
+    total = 0.0
+    for k in range(WAVES):
+        total += math.cos(frequency(k, p[TIME_SCALE]) * t + p[PHASES + WAVES * axis + k])
+    return p[MEAN + axis] + p[GUST] * math.sqrt(2.0 / WAVES) * total
+
+
+@inlined
+def wind(state, p, t):
+    """Velocity of the air [m/s]."""
+    if p[GUST] == 0.0:
+        return (p[MEAN], p[MEAN + 1], p[MEAN + 2])
+    return (_gust(0, p, t), _gust(1, p, t), _gust(2, p, t))

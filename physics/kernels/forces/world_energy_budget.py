@@ -1,0 +1,134 @@
+"""`energy_budget` for worlds of many bodies: the energy of a stiff stage is that of all of them together.
+
+Springs carry energy from body to body, and so does contact. What is too much is taken from the motion of all bodies:
+where nothing but each other holds them, from that against their common centre, so that they keep their momentum.
+"""
+
+from __future__ import annotations
+
+import math
+
+from physics.kernels.compile.decorators import inlined, kernel
+from physics.kernels.contact_law.restitution_energy import kinetic_energy
+from physics.kernels.forces.energy_budget import COARSE_SHARE, ROUNDING, held_loads, potential_energy
+from physics.kernels.forces.field_loads import field_state
+from physics.kernels.forces.force_field_dispatch import if_declared, total_supply
+from physics.kernels.forces.force_field_state import ZERO, minus, plus, times
+from physics.kernels.forces.resolution_limits import note_report
+from physics.kernels.forces.two_body_spring import place_anchors_now
+from physics.kernels.math import quaternion as qt
+from physics.kernels.state.body import angular_velocity, read_state, write_state
+
+
+@inlined
+def _start(body):
+    """(x, q, v, L) of a body at the start of the stage."""
+    m = body.stage_start
+    return (m[0], m[1], m[2]), (m[3], m[4], m[5], m[6]), (m[7], m[8], m[9]), (m[10], m[11], m[12])
+
+
+@inlined
+def _any_is_stiff(bodies):
+    for b in range(bodies.shape[0]):
+        if bodies[b].is_stiff == 1:
+            return True
+    return False
+
+
+@kernel
+def _potential(later, tilted, world):
+    """Energy of all fields at the places of now, `later` [s] than the start of the stage [J]."""
+    place_anchors_now(tilted, world)
+    total = 0.0
+    for b in range(world.bodies.shape[0]):
+        total += potential_energy(read_state(world.now, b), later, tilted, world.bodies[b])
+    return total
+
+
+@if_declared()
+def note_start(tilted, world, first):
+    """Keep states and potential energy at the start of a stage, if it is stiff; `first` is the first body's record."""
+    if not _any_is_stiff(world.bodies):
+        return
+    first.stage_energy = _potential(0.0, tilted, world)
+    for b in range(world.bodies.shape[0]):
+        (x, q, v, L), m = read_state(world.now, b), world.bodies[b].stage_start
+        m[0], m[1], m[2] = x
+        m[3], m[4], m[5], m[6] = q
+        m[7], m[8], m[9] = v
+        m[10], m[11], m[12] = L
+
+
+@kernel
+def _gain_of(b, h, tilted, world):
+    """(kinetic energy gained by body b beyond the work of held loads and of fields without an energy, sizes) [J]."""
+    body, y, end = world.bodies[b], _start(world.bodies[b]), read_state(world.now, b)
+    v, L = times(0.5, plus(y[2], end[2])), times(0.5, plus(y[3], end[3]))
+    before, after = kinetic_energy(y[1], y[2], y[3], body, tilted), kinetic_energy(end[1], end[2], end[3], body, tilted)
+    a, T = held_loads(body)
+    done = body.mass * qt.dot(a, minus(end[0], y[0])) + h * qt.dot(T, angular_velocity(y[1], L, body, tilted))
+    t = body.now + 0.5 * h
+    supply = h * total_supply(field_state(y[0], y[1], v, L, t, tilted, body), t, body)
+    return after - before - done - supply, before + after + abs(done) + supply
+
+
+@inlined
+def _common_velocities(ties, world):
+    """Velocity of the common centre of mass now and at the start of the stage; zero where walls hold the bodies."""
+    mass, p, start = 0.0, ZERO, ZERO
+    for b in range(world.bodies.shape[0]):
+        m = world.bodies[b].mass
+        mass, p = mass + m, plus(p, times(m, read_state(world.now, b)[2]))
+        start = plus(start, times(m, _start(world.bodies[b])[2]))
+    if ties == 0:
+        return ZERO, ZERO
+    return times(1.0 / mass, p), times(1.0 / mass, start)
+
+
+@kernel
+def _take(gain, ties, tilted, world):
+    """Take an energy from the motion of all bodies; where there is too little, they are back where they were.
+
+    Their common velocity then is that of the start, too: what the stage made of it is as wrong as the rest.
+    """
+    c, start = _common_velocities(ties, world)
+    motion = 0.0
+    for b in range(world.bodies.shape[0]):
+        _, q, v, L = read_state(world.now, b)
+        motion += kinetic_energy(q, minus(v, c), L, world.bodies[b], tilted)
+    if gain > COARSE_SHARE * motion:
+        for b in range(world.bodies.shape[0]):
+            world.bodies[b].is_coarse = 1
+    s = math.sqrt(1.0 - gain / motion) if gain < motion else 0.0
+    new = c if gain < motion else start
+    for b in range(world.bodies.shape[0]):
+        x, q, v, L = read_state(world.now, b)
+        if not gain < motion:
+            world.bodies[b].is_put_back = 1
+            x, q, _, _ = _start(world.bodies[b])
+        write_state(world.now, b, (x, q, plus(new, times(s, minus(v, c))), times(s, L)))
+
+
+@if_declared()
+def pay_together(h, ties, tilted, world, first):
+    """Take from the bodies what energy a stiff stage of length h gave them from nowhere.
+
+    `ties` is 1 where nothing but each other holds them; `first` the first body's record.
+    """
+    if not _any_is_stiff(world.bodies):
+        return
+    high = _potential(h, tilted, world)
+    gain, size = high - first.stage_energy, abs(high) + abs(first.stage_energy)
+    for b in range(world.bodies.shape[0]):
+        more, measure = _gain_of(b, h, tilted, world)
+        gain, size = gain + more, size + measure
+    if gain > ROUNDING * size:
+        _take(gain, ties, tilted, world)
+
+
+@if_declared()
+def note_reports(report, world, first):
+    """Count the bodies that move in fields which some stage of the call did not resolve."""
+    for b in range(world.bodies.shape[0]):
+        _, _, v, L = read_state(world.now, b)
+        note_report(v != ZERO or L != ZERO, report, world.bodies[b])

@@ -1,0 +1,267 @@
+"""Bodies that turn far in a step: how long their free flight is sure to stay clear of a wall.
+
+A feature that turns by a large angle may pass through a wall and be out of it again at the end of a stage, so that a
+look at the end is not enough. All points r of a body have
+
+    n·r(t) >= n·r + t n·(v + ω x r) - a t²/2,    a a bound of their acceleration,
+
+and n·(ω x r) = (n x ω)·r: with k = n + t (n x ω) the lowest of them is above the wall at t at least by
+
+    n·x - offset + t n·v - s(-k) - a t²/2,    s the support function,
+
+for any convex shape. That is concave in t: a chord between a time where it is positive and one where it is not has its
+zero at a time where it is positive. The body is flown there, and looked at again (conservative advancement, Mirtich
+1996, to second order).
+
+With the principal moments' inverses J, J² <= (J_max + J_min) J - J_max J_min between the least and the largest, so that
+|ω|² <= (J_max + J_min) ω·L - J_max J_min |L|²: equal for a rod that turns across its axis. In Euler's equations the
+factors are between -1 and 1, |dω/dt| <= |ω|²/√3 + J_max |τ|. So a <= |a_centre| + R (1 + 1/√3) |ω|² + R J_max |τ|.
+By components along the principal axes, ρ_i the largest distance of points from axis i and w_i the bound
+min(√(J_i ω·L), J_i |L|) of |ω_i|: |ω x r| <= Σ w_i ρ_i and |dω/dt x r| <= Σ (w_j w_k + J_i |τ|) ρ_i, which is less
+where a rod turns fast about its own axis. The smaller one counts.
+"""
+
+from __future__ import annotations
+
+import math
+
+from physics.kernels.compile.decorators import inlined, kernel
+from physics.kernels.flight.free_flight import fly
+from physics.kernels.half_space import support_function as geo
+from physics.kernels.half_space.contact_point import center_arm, wall_normal
+from physics.kernels.math import quaternion as qt
+from physics.kernels.math.quaternion import to_matrix
+from physics.kernels.state.body import angular_velocity
+from physics.kernels.state.layout import ELLIPSOID, HULL, OFFSET, SPHERE
+
+# A body turns far where it turns by more than this within a step [rad]; less is looked for at the ends of stages.
+FAR_TURN = 0.25
+
+# Cuts of a substep for what turns, at most: those for impacts are counted apart.
+MOST_CUTS = 64
+
+# Advances of one flight at most; what is left of it is for the next stage.
+MOST_ADVANCES = 100
+
+# Chords and halvings of one advance, and the share of the gap that may be left.
+CHORDS = 8
+LEFT_SHARE = 0.2
+
+ACCELERATION_SHARE = 1.0 + 1.0 / math.sqrt(3.0)
+
+
+@inlined
+def largest_moment(work):
+    """Largest inverse moment of inertia [1/(kg m²)]."""
+    return max(work.J[0], max(work.J[1], work.J[2]))
+
+
+@inlined
+def is_centred(tilted, work):
+    """Test whether the geometric centre is the centre of mass."""
+    return tilted is None or (work.center[0] == 0.0 and work.center[1] == 0.0 and work.center[2] == 0.0)
+
+
+@inlined
+def may_turn(L, h, least, tilted, work):
+    """Test whether a body of angular momentum L could turn by more than `least` [rad] in h: a cheap, safe bound.
+
+    A sphere does not where its centre is its centre of mass.
+    """
+    if work.shape == SPHERE and is_centred(tilted, work):
+        return False
+    s, t = h * largest_moment(work), (work.torque[0], work.torque[1], work.torque[2])
+    return 2.0 * (qt.dot(L, L) + h * h * qt.dot(t, t)) * s * s > least * least
+
+
+@kernel
+def spin_bound(q, L, h, tilted, work):
+    """Bound of |ω| within h [rad/s]."""
+    most, least = largest_moment(work), min(work.J[0], min(work.J[1], work.J[2]))
+    w = angular_velocity(q, L, work, tilted)
+    push = h * math.sqrt(work.torque[0] ** 2 + work.torque[1] ** 2 + work.torque[2] ** 2)
+    size = max(0.0, math.sqrt(qt.dot(L, L)) - push)
+    energy = math.sqrt(max(0.0, qt.dot(w, L))) + math.sqrt(most) * push
+    square = (most + least) * energy * energy - most * least * size * size
+    return math.sqrt(max(square, qt.dot(w, w)))
+
+
+@inlined
+def _arm(i, tilted, work):
+    """Largest distance of a body's points from its principal axis i [m]."""
+    if tilted is not None or work.shape == HULL:
+        return work.radius
+    b, c = work.dims[(i + 1) % 3], work.dims[(i + 2) % 3]
+    return math.sqrt(b * b + c * c)
+
+
+@kernel
+def bend_bound(spin, q, L, h, tilted, work):
+    """Bound of what turning accelerates points by within h [m/s²], `spin` that of |ω|; 0 of a centred sphere."""
+    if work.shape == SPHERE and is_centred(tilted, work):
+        return 0.0
+    torque = math.sqrt(work.torque[0] ** 2 + work.torque[1] ** 2 + work.torque[2] ** 2)
+    w, most, J = angular_velocity(q, L, work, tilted), largest_moment(work), work.J
+    size = math.sqrt(qt.dot(L, L)) + h * torque
+    energy = math.sqrt(max(0.0, qt.dot(w, L))) + math.sqrt(most) * h * torque
+    u = min(math.sqrt(J[0]) * energy, J[0] * size)
+    v = min(math.sqrt(J[1]) * energy, J[1] * size)
+    t = min(math.sqrt(J[2]) * energy, J[2] * size)
+    a, b, c = _arm(0, tilted, work), _arm(1, tilted, work), _arm(2, tilted, work)
+    bend = spin * (u * a + v * b + t * c)
+    bend += (v * t + J[0] * torque) * a + (t * u + J[1] * torque) * b + (u * v + J[2] * torque) * c
+    return min(bend, work.radius * (ACCELERATION_SHARE * spin * spin + most * torque))
+
+
+@inlined
+def tilted_normal(n, m, t):
+    """n + t m."""
+    return (n[0] + t * m[0], n[1] + t * m[1], n[2] + t * m[2])
+
+
+@inlined
+def lowest(shape, dims, R, k):
+    """s(k) of a shape that is symmetric, for k of any length."""
+    if shape == SPHERE:
+        return dims[0] * math.sqrt(qt.dot(k, k))
+    return geo.support(shape, dims, geo.scaled_normal(shape, dims, R, k))
+
+
+@inlined
+def first_bracket(gap, rate, turning, bend, horizon):
+    """Times (before, after) between which a bound gap + rate t - (points turn) - bend t²/2 falls to zero.
+
+    Points move along the normal by at most `turning` [m/s] at first, towards the wall or away from it.
+    """
+    s, u = max(0.0, turning - rate), max(0.0, turning + rate)
+    before = 2.0 * gap / (s + math.sqrt(s * s + 2.0 * bend * gap))
+    after = (u + math.sqrt(u * u + 2.0 * bend * gap)) / bend
+    return min(before, horizon), min(after, horizon)
+
+
+@inlined
+def chord(low, at_low, high, at_high):
+    """Root of the chord from (low, at_low > 0) to (high, at_high < 0)."""
+    return low + (high - low) * (at_low / (at_low - at_high))
+
+
+@inlined
+def middle(low, high):
+    """Between low and high > low >= 0, so that few halvings find a time of any size."""
+    return math.sqrt(low * high) if high > 4.0 * low else 0.5 * (low + high)
+
+
+@inlined
+def _height(t, n, m, gap, rate, bend, c, R, work):
+    """Bound of the gap to a wall after t, see the module; c is the geometric centre from the centre of mass."""
+    k = tilted_normal(n, m, t)
+    dims = (work.dims[0], work.dims[1], work.dims[2])
+    return gap + t * (rate - 0.5 * bend * t) + qt.dot(k, c) - lowest(work.shape, dims, R, k)
+
+
+@kernel
+def safe_time(y, wall, horizon, spin, tilted, work):
+    """(gap to a wall, a time within which it is not used up in free flight from y, at most `horizon`)."""
+    x, q, v, L = y
+    n, R, w = wall_normal(work.walls, wall), to_matrix(q), angular_velocity(q, L, work, tilted)
+    m, d, c, a = qt.cross(n, w), qt.dot(n, x) - work.walls[wall, OFFSET], (0.0, 0.0, 0.0), work.free_acceleration
+    if tilted is not None:
+        c = center_arm(R, work)
+    rate = qt.dot(n, v)
+    bend = bend_bound(spin, q, L, horizon, tilted, work) - min(0.0, n[0] * a[0] + n[1] * a[1] + n[2] * a[2])
+    gap = _height(0.0, n, m, d, rate, bend, c, R, work)
+    if not gap > 0.0 or not bend > 0.0:
+        return gap, horizon
+    low, high = first_bracket(gap, rate, work.radius * math.sqrt(qt.dot(m, m)), bend, horizon)
+    at_low = _height(low, n, m, d, rate, bend, c, R, work)
+    at_high = _height(high, n, m, d, rate, bend, c, R, work)
+    if at_high >= 0.0 or not at_low > 0.0:
+        return gap, high if at_high >= 0.0 else low
+    for _ in range(CHORDS):
+        t = chord(low, at_low, high, at_high)
+        found = _height(t, n, m, d, rate, bend, c, R, work)
+        if found > 0.0:
+            low, at_low = t, found
+        if at_low <= LEFT_SHARE * gap:
+            break
+        t = middle(low, high)
+        found = _height(t, n, m, d, rate, bend, c, R, work)
+        if found > 0.0:
+            low, at_low = t, found
+        else:
+            high, at_high = t, found
+    return gap, low
+
+
+@inlined
+def may_reach(wall, y, h, work):
+    """Test whether the bounding sphere may touch a wall in a free flight of h."""
+    n, a = wall_normal(work.walls, wall), work.free_acceleration
+    gap = qt.dot(n, y[0]) - work.walls[wall, OFFSET] - work.radius
+    gap += min(0.0, h * qt.dot(n, y[2])) + min(0.0, 0.5 * h * h * (n[0] * a[0] + n[1] * a[1] + n[2] * a[2]))
+    return not gap > work.slop
+
+
+@inlined
+def sweeping(R, w, work):
+    """Angular velocity without that about axes of symmetry of an ellipsoid, which sweeps nothing [rad/s]."""
+    d = work.dims
+    if work.shape != ELLIPSOID or not (d[0] == d[1] or d[1] == d[2] or d[0] == d[2]):
+        return w
+    if d[0] == d[1] and d[1] == d[2]:
+        return (0.0, 0.0, 0.0)
+    e = (R[0], R[3], R[6]) if d[1] == d[2] else ((R[1], R[4], R[7]) if d[0] == d[2] else (R[2], R[5], R[8]))
+    s = qt.dot(e, w)
+    return (w[0] - s * e[0], w[1] - s * e[1], w[2] - s * e[2])
+
+
+@inlined
+def tilting_time(n, y, tilted, work):
+    """Time in which a body turns by `FAR_TURN` about what is across n [s]: about n itself nothing comes nearer."""
+    w = angular_velocity(y[1], y[3], work, tilted)
+    if is_centred(tilted, work):
+        w = sweeping(to_matrix(y[1]), w, work)
+    m = qt.cross(n, w)
+    rate = math.sqrt(qt.dot(m, m))
+    return FAR_TURN / rate if rate > 0.0 else math.inf
+
+
+@inlined
+def _fly_near(y, wall, h, spin, gyroscopic, tilted, work):
+    """Time of free flight, at most h, after which a wall is at the slop or not reached [s]."""
+    now, gone = y, 0.0
+    for _ in range(MOST_ADVANCES):
+        gap, step = safe_time(now, wall, h - gone, spin, tilted, work)
+        if not gap > work.slop:
+            break
+        gone += step
+        if not gone < h:
+            return h
+        now = fly(now, work, step, gyroscopic, tilted)
+    return gone
+
+
+@kernel
+def stage_of_turning(n, y, h, left, gyroscopic, tilted, work):
+    """Time, at most `left`, that a stage from y may take; less where the body turns far in h: no wall is passed [s].
+
+    In contact (n > 0) it does not fly as is foretold here: then it turns no further than a look at the end can tell. So
+    do features on a wall that others touch.
+    """
+    spin = spin_bound(y[1], y[3], h, tilted, work)
+    if not spin * h > FAR_TURN:
+        return left
+    first = left
+    for wall in range(work.walls.shape[0]):
+        if not may_reach(wall, y, first, work):
+            continue
+        normal, met = wall_normal(work.walls, wall), 0.0
+        if work.mask[wall] == 0:
+            met = _fly_near(y, wall, first, spin, gyroscopic, tilted, work)
+        limit = tilting_time(normal, y, tilted, work)
+        if not met > 0.0:
+            met = limit
+        if n > 0:
+            met = min(met, limit)
+        first = min(first, met)
+    return first

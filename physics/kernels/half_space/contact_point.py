@@ -1,0 +1,101 @@
+"""Features of a body: contact points relative to its centre of mass, and their motion over the body."""
+
+from __future__ import annotations
+
+import math
+
+from physics.kernels.compile.decorators import inlined
+from physics.kernels.half_space import support_function as geo
+from physics.kernels.math import quaternion as qt
+from physics.kernels.state.layout import BLOCK, NORMAL, SPHERE
+
+
+@inlined
+def wall_of(slot, work):
+    """Wall of a contact: `features`, 8 or 1, is a power of two, and a step asks too often for a division each time."""
+    return slot >> work.feature_bits
+
+
+@inlined
+def feature_of(slot, work):
+    """Feature of the body that touches there."""
+    return slot & (work.features - 1)
+
+
+@inlined
+def wall_normal(walls, k):
+    """Unit normal of wall k."""
+    return (walls[k, NORMAL], walls[k, NORMAL + 1], walls[k, NORMAL + 2])
+
+
+@inlined
+def center_arm(R, work):
+    """Geometric centre of a body relative to its centre of mass, world frame [m]; only of a scene that is `tilted`."""
+    return qt.matvec(R, (work.center[0], work.center[1], work.center[2]))
+
+
+@inlined
+def geometric_center(x, R, work, tilted):
+    """Geometric centre of a body whose centre of mass is at x [m] (the same unless `tilted`)."""
+    if tilted is None:
+        return x
+    r = center_arm(R, work)
+    return (x[0] + r[0], x[1] + r[1], x[2] + r[2])
+
+
+@inlined
+def _plus(a, b):
+    return (a[0] + b[0], a[1] + b[1], a[2] + b[2])
+
+
+@inlined
+def wandering_point(dims, R, w, n):
+    """Point of an ellipsoid with the normal -n from its centre, and its rate of change, world frame [m, m/s].
+
+    r = R c with c = -D e/s, e = D Rᵀ n, s = |e| and de/dt = D (Rᵀn x Rᵀω).
+    """
+    nb, wb = qt.transposed_matvec(R, n), qt.transposed_matvec(R, w)
+    e = (dims[0] * nb[0], dims[1] * nb[1], dims[2] * nb[2])
+    s = math.sqrt(qt.dot(e, e))
+    m = qt.cross(nb, wb)
+    f = (dims[0] * m[0], dims[1] * m[1], dims[2] * m[2])
+    along = qt.dot(e, f) / (s * s)
+    c = (-dims[0] * e[0] / s, -dims[1] * e[1] / s, -dims[2] * e[2] / s)
+    dc = (
+        -dims[0] * (f[0] - along * e[0]) / s,
+        -dims[1] * (f[1] - along * e[1]) / s,
+        -dims[2] * (f[2] - along * e[2]) / s,
+    )
+    r = qt.matvec(R, c)
+    return r, _plus(qt.cross(w, r), qt.matvec(R, dc))
+
+
+@inlined
+def arm_and_rate(shape, dims, R, w, n, feature, tilted, work):
+    """Contact point relative to the centre of mass, and its rate of change, world frame [m, m/s]."""
+    if shape == BLOCK:
+        r = geo.vertex_arm(dims, R, feature)
+        if tilted is not None:
+            r = _plus(r, center_arm(R, work))
+        return r, qt.cross(w, r)
+    if shape == SPHERE:
+        return (-dims[0] * n[0], -dims[0] * n[1], -dims[0] * n[2]), (0.0, 0.0, 0.0)
+    return wandering_point(dims, R, w, n)
+
+
+@inlined
+def place_arms(n, R, tilted, work):
+    """Contact points of the set at this pose: `work.arm`, relative to the centre of mass, world frame [m]."""
+    walls, shape = work.walls, work.shape
+    dims = (work.dims[0], work.dims[1], work.dims[2])
+    for i in range(n):
+        wall = wall_of(work.slot[i], work)
+        if shape == BLOCK:
+            r = geo.vertex_arm(dims, R, feature_of(work.slot[i], work))
+            if tilted is not None:
+                c = center_arm(R, work)
+                r = (r[0] + c[0], r[1] + c[1], r[2] + c[2])
+        else:
+            normal = wall_normal(walls, wall)
+            r = geo.support_arm(shape, dims, R, normal, geo.scaled_normal(shape, dims, R, normal))
+        work.arm[i, 0], work.arm[i, 1], work.arm[i, 2] = r

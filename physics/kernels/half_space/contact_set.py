@@ -1,0 +1,245 @@
+"""The contact set of one body: which features take part, and where they are."""
+
+from __future__ import annotations
+
+from physics.kernels.compile.decorators import inlined, kernel
+from physics.kernels.compile.simd import WIDTH, put_row
+from physics.kernels.half_space import support_function as geo
+from physics.kernels.half_space.contact_point import center_arm, feature_of, geometric_center, wall_normal, wall_of
+from physics.kernels.half_space.persistent_contacts import last_push, stays, turning_acceleration
+from physics.kernels.math import quaternion as qt
+from physics.kernels.state.body import angular_velocity
+from physics.kernels.state.contact_law_dispatch import STIFFNESS, number_of
+from physics.kernels.state.layout import BLOCK, ELLIPSOID, OFFSET, VERTEX_COUNT
+
+# Slops within which what approaches has arrived. Features that touched together may be two slops apart, and the place
+# of the first one's impact is half a slop off: an edge that comes down again does so with both its ends at once.
+TOGETHER = 3.0
+
+stiffness = number_of(STIFFNESS)  # of contact that gives (`compliance`)
+
+
+@inlined
+def is_clear(x, v, h, work):
+    """Test whether the bounding sphere stays clear of every wall during a free flight of h from x with velocity v.
+
+    The gap of the sphere is a parabola in time; it is bounded below by its start plus what the velocity and
+    the acceleration can each take off. A contact could only matter when this is false.
+    """
+    walls, a = work.walls, work.free_acceleration
+    half = 0.5 * h * h
+    for k in range(walls.shape[0]):
+        n = wall_normal(walls, k)
+        gap = qt.dot(n, x) - walls[k, OFFSET] - work.radius
+        gap += min(0.0, h * qt.dot(n, v)) + min(0.0, half * (n[0] * a[0] + n[1] * a[1] + n[2] * a[2]))
+        if not gap > 0.0:
+            return False
+    return True
+
+
+@inlined
+def _admit(gap, speed, slop, reach, soft, slot, h, memory, work):
+    """Test whether a feature belongs to the contact set of this stage.
+
+    It does when it touches (gap <= slop); when loads make it no faster at the wall than `soft`: than from rest in the
+    step, and than what rests as it is (`target_velocity.aim_impact`); and when loads can bring it to the wall within
+    the step, if it pushed in the last stage (`persistent_contacts`), or if this is the last one that the substep may
+    have.
+    """
+    if gap <= slop or (gap <= TOGETHER * slop and speed < 0.0):
+        return True
+    if speed <= 0.0 and speed * speed + 2.0 * work.acceleration * gap <= soft * soft:
+        return True
+    return gap + h * speed - reach <= slop and (work.is_last == 1 or last_push(slot, memory, work) > 0.0)
+
+
+@inlined
+def gather(y, w, h, tilted, memory, work):
+    """Fill `work` (slot, gap, speed, mask, and of all together widest and approach) with the contact set at this pose.
+
+    Parameters
+    ----------
+    y : tuple
+        State: position, attitude, velocity, angular momentum.
+    w : tuple of 3 floats
+        Angular velocity, world frame [rad/s].
+    h : float
+        Time that the stage is to cover [s].
+
+    Returns
+    -------
+    count : int
+        Contacts found.
+    depth : float
+        Deepest penetration among them [m], 0 if none.
+    """
+    walls, features, shape, radius = work.walls, work.features, work.shape, work.radius
+    x, q, v, _ = y
+    R, slop, acceleration = qt.to_matrix(q), work.slop, work.acceleration
+    if stiffness(work) > 0.0:  # springs push where there is no gap left
+        acceleration = 0.0
+    dims = (work.dims[0], work.dims[1], work.dims[2])
+    center = geometric_center(x, R, work, tilted)
+    reach, soft = 0.5 * acceleration * h * h, acceleration * h
+    if work.restitution > work.rest_share:  # nor is what would rebound for longer than its share of the step
+        soft *= work.rest_share / work.restitution
+    near = max(slop + reach, TOGETHER * slop)
+    if shape == ELLIPSOID:
+        near += 0.5 * h * h * turning_acceleration(w, work)
+    if work.is_last:
+        near += h * (abs(v[0]) + abs(v[1]) + abs(v[2]) + radius * (abs(w[0]) + abs(w[1]) + abs(w[2])))
+    count = 0
+    depth = widest = approach = 0.0
+    for k in range(walls.shape[0]):
+        work.mask[k] = 0
+        n = wall_normal(walls, k)
+        d = qt.dot(n, center) - walls[k, OFFSET]
+        if d > radius + near:
+            continue
+        e = geo.scaled_normal(shape, dims, R, n)
+        if d - geo.support(shape, dims, e) > near:
+            continue
+        vn = qt.dot(n, v)
+        m = qt.cross(n, w)  # n·(ω x r) = (n x ω)·r
+        if shape == BLOCK:
+            mb = qt.transposed_matvec(R, m)
+            if tilted is not None:
+                vn += qt.dot(m, center_arm(R, work))
+            lower, upper = geo.vertex_heights(e)
+            slower, faster = geo.vertex_heights((dims[0] * mb[0], dims[1] * mb[1], dims[2] * mb[2]))
+            put_row(work.vertices, 0, 0, d + lower)
+            put_row(work.vertices, 0, WIDTH, d + upper)
+            put_row(work.vertices, 1, 0, vn + slower)
+            put_row(work.vertices, 1, WIDTH, vn + faster)
+            for vertex in range(VERTEX_COUNT):
+                gap, speed = work.vertices[0, vertex], work.vertices[1, vertex]
+                if gap > near:
+                    continue
+                if _admit(gap, speed, slop, reach, soft, k * features + vertex, h, memory, work):
+                    count = _record(count, k, vertex, features, gap, speed, work)
+                    depth, widest, approach = max(depth, -gap), max(widest, gap), max(approach, -speed)
+        else:
+            gap = d - geo.support(shape, dims, e)
+            speed = vn + qt.dot(m, geo.support_arm(shape, dims, R, n, e))
+            if _admit(gap, speed, slop, reach, soft, k, h, memory, work) or stays(gap, k, y, h, tilted, memory, work):
+                count = _record(count, k, 0, features, gap, speed, work)
+                depth, widest, approach = max(depth, -gap), max(widest, gap), max(approach, -speed)
+    work.widest, work.approach = widest, approach
+    return count, depth
+
+
+@inlined
+def _record(count, wall, feature, features, gap, speed, work):
+    work.slot[count] = wall * features + feature
+    work.gap[count] = gap
+    work.speed[count] = speed
+    work.mask[wall] |= 1 << feature
+    return count + 1
+
+
+@inlined
+def what_is_behind(x, R, tilted, work):
+    """Test for features behind walls: (one outside the contact set, by more than half a slop; any, by a slop).
+
+    Once a feature outside the set is, the other walls are not looked at: both are true then.
+    """
+    walls, shape, least = work.walls, work.shape, -0.5 * work.slop
+    dims = (work.dims[0], work.dims[1], work.dims[2])
+    center, is_deep = geometric_center(x, R, work, tilted), False
+    for k in range(walls.shape[0]):
+        n = wall_normal(walls, k)
+        d = qt.dot(n, center) - walls[k, OFFSET]
+        if d > work.radius:
+            continue
+        e, mask = geo.scaled_normal(shape, dims, R, n), work.mask[k]
+        gap = d - geo.support(shape, dims, e)
+        if gap >= least:
+            continue
+        if mask == 0:
+            return True, True
+        if shape == BLOCK:
+            for vertex in range(VERTEX_COUNT):
+                if not mask & (1 << vertex) and d + geo.vertex_height(e, vertex) < least:
+                    return True, True
+        if gap < -work.slop:
+            is_deep = True
+    return False, is_deep
+
+
+@kernel
+def nearest_outside_set(x, R, tilted, work):
+    """Smallest gap [m] over all features that are not in the contact set, and the slot of its feature.
+
+    Of a wall that the bounding sphere does not reach the sphere's gap is taken: a lower bound, and positive (slot -1).
+    """
+    walls, features, shape, radius = work.walls, work.features, work.shape, work.radius
+    dims = (work.dims[0], work.dims[1], work.dims[2])
+    center = geometric_center(x, R, work, tilted)
+    best, slot = 1.0e300, -1
+    for k in range(walls.shape[0]):
+        n = wall_normal(walls, k)
+        d = qt.dot(n, center) - walls[k, OFFSET]
+        if d > radius:
+            if d - radius < best:
+                best, slot = d - radius, -1
+            continue
+        e = geo.scaled_normal(shape, dims, R, n)
+        mask = work.mask[k]
+        if mask == 0 and not d - geo.support(shape, dims, e) < best:
+            continue
+        if shape == BLOCK:
+            for vertex in range(VERTEX_COUNT):
+                gap = d + geo.vertex_height(e, vertex)
+                if not mask & (1 << vertex) and gap < best:
+                    best, slot = gap, k * features + vertex
+        elif mask == 0:
+            best, slot = d - geo.support(shape, dims, e), k * features
+    return best, slot
+
+
+@kernel
+def gap_of(slot, x, R, tilted, work):
+    """Gap [m] of one feature to its wall."""
+    walls, shape = work.walls, work.shape
+    dims = (work.dims[0], work.dims[1], work.dims[2])
+    n = wall_normal(walls, wall_of(slot, work))
+    d = qt.dot(n, geometric_center(x, R, work, tilted)) - walls[wall_of(slot, work), OFFSET]
+    e = geo.scaled_normal(shape, dims, R, n)
+    if shape == BLOCK:
+        return d + geo.vertex_height(e, feature_of(slot, work))
+    return d - geo.support(shape, dims, e)
+
+
+@kernel
+def gap_rate(slot, y, tilted, work):
+    """Rate of the gap of one feature [m/s]: its normal velocity. A point that wanders does so along the wall."""
+    _, q, v, L = y
+    walls, R, shape = work.walls, qt.to_matrix(q), work.shape
+    dims = (work.dims[0], work.dims[1], work.dims[2])
+    n = wall_normal(walls, wall_of(slot, work))
+    if shape == BLOCK:
+        r = geo.vertex_arm(dims, R, feature_of(slot, work))
+        if tilted is not None:
+            c = center_arm(R, work)
+            r = (r[0] + c[0], r[1] + c[1], r[2] + c[2])
+    else:
+        r = geo.support_arm(shape, dims, R, n, geo.scaled_normal(shape, dims, R, n))
+    u = qt.cross(angular_velocity(q, L, work, tilted), r)
+    return qt.dot(n, (v[0] + u[0], v[1] + u[1], v[2] + u[2]))
+
+
+@inlined
+def push_out(x, R, tilted, work):
+    """Position moved along the normals so that nothing is deeper than the slop in a wall. No velocity changes."""
+    walls, shape, radius, slop = work.walls, work.shape, work.radius, work.slop
+    dims = (work.dims[0], work.dims[1], work.dims[2])
+    for k in range(walls.shape[0]):
+        n = wall_normal(walls, k)
+        d = qt.dot(n, geometric_center(x, R, work, tilted)) - walls[k, OFFSET]
+        if d >= radius:
+            continue
+        gap = d - geo.support(shape, dims, geo.scaled_normal(shape, dims, R, n))
+        if gap < -slop:
+            s = -gap - 0.5 * slop
+            x = (x[0] + s * n[0], x[1] + s * n[1], x[2] + s * n[2])
+    return x

@@ -1,0 +1,86 @@
+"""Looking at a state without advancing it: gaps, contact points, momenta in and out of the stored form."""
+
+from __future__ import annotations
+
+from physics.kernels.compile.decorators import kernel
+from physics.kernels.half_space import support_function as geo
+from physics.kernels.math import quaternion as qt
+from physics.kernels.state import layout as at
+
+
+@kernel
+def principal_matrix(state, params, i):
+    """Rotation matrix (9 scalars) from the principal frame of row i to the world."""
+    q = (state[i, at.QUAT], state[i, at.QUAT + 1], state[i, at.QUAT + 2], state[i, at.QUAT + 3])
+    p = at.PRINCIPAL
+    return qt.to_matrix(qt.multiply(q, (params[i, p], params[i, p + 1], params[i, p + 2], params[i, p + 3])))
+
+
+@kernel
+def angular_momenta(rows, state, params):
+    """Write L = R I Rᵀ ω [kg m²/s] into the given rows of `state` from their ω."""
+    for k in range(rows.shape[0]):
+        i = rows[k]
+        w = (state[i, at.ANGVEL], state[i, at.ANGVEL + 1], state[i, at.ANGVEL + 2])
+        L = (0.0, 0.0, 0.0)
+        if w[0] != 0.0 or w[1] != 0.0 or w[2] != 0.0:
+            R = principal_matrix(state, params, i)
+            m = qt.transposed_matvec(R, w)
+            j = at.INV_INERTIA
+            L = qt.matvec(R, (m[0] / params[i, j], m[1] / params[i, j + 1], m[2] / params[i, j + 2]))
+        state[i, at.ANGMOM], state[i, at.ANGMOM + 1], state[i, at.ANGMOM + 2] = L
+
+
+@kernel
+def deepest_gaps(rows, state, params, shapes, walls, gaps, which):
+    """Smallest gap [m] of each given row over all walls, and the wall it is at (-1 without walls); not of hulls."""
+    for k in range(rows.shape[0]):
+        i = rows[k]
+        x = (state[i, at.POS], state[i, at.POS + 1], state[i, at.POS + 2])
+        R = qt.to_matrix((state[i, at.QUAT], state[i, at.QUAT + 1], state[i, at.QUAT + 2], state[i, at.QUAT + 3]))
+        d = (params[i, at.DIMENSIONS], params[i, at.DIMENSIONS + 1], params[i, at.DIMENSIONS + 2])
+        c = at.CENTER
+        r = qt.matvec(R, (params[i, c], params[i, c + 1], params[i, c + 2]))
+        center = (x[0] + r[0], x[1] + r[1], x[2] + r[2])
+        shape = shapes[i % shapes.shape[0]]
+        gaps[k], which[k] = 1.0e300, -1
+        for w in range(walls.shape[0]):
+            n = (walls[w, at.NORMAL], walls[w, at.NORMAL + 1], walls[w, at.NORMAL + 2])
+            gap = qt.dot(n, center) - walls[w, at.OFFSET] - geo.support(shape, d, geo.scaled_normal(shape, d, R, n))
+            if gap < gaps[k]:
+                gaps[k], which[k] = gap, w
+
+
+@kernel
+def spring_energies(state, params, shapes, walls, column, energies):
+    """Energy [J] of the springs of contact, ½ k g² of each point with a gap g < 0, of every row; k in `column`."""
+    for i in range(state.shape[0]):
+        shape, energies[i] = shapes[i % shapes.shape[0]], 0.0
+        point = (0.0, 0.0, 0.0)
+        for w in range(walls.shape[0]):
+            n = (walls[w, at.NORMAL], walls[w, at.NORMAL + 1], walls[w, at.NORMAL + 2])
+            for feature in range(at.VERTEX_COUNT if shape == at.BLOCK else 1):
+                point = point_of(state, params, shape, n, i, feature)
+                gap = min(qt.dot(n, point) - walls[w, at.OFFSET], 0.0)
+                energies[i] += 0.5 * params[i, column] * gap * gap
+
+
+@kernel
+def point_of(state, params, shape, n, i, feature):
+    """World position [m] of a feature (see `layout.VERTEX_COUNT`) of row i towards the normal n of a wall."""
+    R = qt.to_matrix((state[i, at.QUAT], state[i, at.QUAT + 1], state[i, at.QUAT + 2], state[i, at.QUAT + 3]))
+    d = (params[i, at.DIMENSIONS], params[i, at.DIMENSIONS + 1], params[i, at.DIMENSIONS + 2])
+    if shape == at.BLOCK:
+        b, c = geo.vertex_arm(d, R, feature), at.CENTER
+        m = qt.matvec(R, (params[i, c], params[i, c + 1], params[i, c + 2]))
+        r = (m[0] + b[0], m[1] + b[1], m[2] + b[2])
+    else:
+        r = geo.support_arm(shape, d, R, n, geo.scaled_normal(shape, d, R, n))
+    return (state[i, at.POS] + r[0], state[i, at.POS + 1] + r[1], state[i, at.POS + 2] + r[2])
+
+
+@kernel
+def contact_point(state, params, shapes, walls, i, wall, feature, out):
+    """`point_of` the feature of row i towards a wall, into out (3,)."""
+    n = (walls[wall, at.NORMAL], walls[wall, at.NORMAL + 1], walls[wall, at.NORMAL + 2])
+    out[0], out[1], out[2] = point_of(state, params, shapes[i % shapes.shape[0]], n, i, feature)

@@ -1,0 +1,76 @@
+"""Distance of block, sphere and ellipsoid to a half-space, and the points in contact.
+
+For a convex body with support function s(n) = max over its points r of n·r
+(relative to the centre of mass) the gap to the wall {x : n·x >= offset} is
+n·x - offset - s(-n); all three shapes are symmetric, so s(-n) = s(n). With
+e_k = dimension_k (R^T n)_k it is Σ|e_k| for a block, √Σe_k² for an ellipsoid.
+"""
+
+from __future__ import annotations
+
+import math
+
+from physics.kernels.compile.decorators import inlined
+from physics.kernels.compile.simd import Lanes
+from physics.kernels.math import quaternion as qt
+from physics.kernels.state.layout import BLOCK, SPHERE
+
+
+@inlined
+def scaled_normal(shape, dims, R, n):
+    """e_k = dimension_k (R^T n)_k [m]; a sphere needs no rotation."""
+    if shape == SPHERE:
+        return (dims[0] * n[0], dims[0] * n[1], dims[0] * n[2])
+    nb = qt.transposed_matvec(R, n)
+    return (dims[0] * nb[0], dims[1] * nb[1], dims[2] * nb[2])
+
+
+@inlined
+def support(shape, dims, e):
+    """Support function s(n) [m] from `scaled_normal`."""
+    if shape == BLOCK:
+        return abs(e[0]) + abs(e[1]) + abs(e[2])
+    if shape == SPHERE:
+        return dims[0]
+    return math.sqrt(e[0] * e[0] + e[1] * e[1] + e[2] * e[2])
+
+
+@inlined
+def vertex_height(e, k):
+    """n·r of vertex k of a block relative to its centre [m]; bit j of k set: the + side of body axis j."""
+    h = e[0] if k & 1 else -e[0]
+    h += e[1] if k & 2 else -e[1]
+    h += e[2] if k & 4 else -e[2]
+    return h
+
+
+@inlined
+def vertex_heights(e):
+    """`vertex_height` of all eight: those of the vertices 0 to 3, and of 4 to 7."""
+    h = Lanes(-1.0, 1.0, -1.0, 1.0) * e[0] + Lanes(-1.0, -1.0, 1.0, 1.0) * e[1]
+    return h - e[2], h + e[2]
+
+
+@inlined
+def vertex_arm(dims, R, k):
+    """Vertex k of a block relative to its centre, world frame [m]."""
+    return qt.matvec(
+        R,
+        (
+            dims[0] if k & 1 else -dims[0],
+            dims[1] if k & 2 else -dims[1],
+            dims[2] if k & 4 else -dims[2],
+        ),
+    )
+
+
+@inlined
+def support_arm(shape, dims, R, n, e):
+    """Point of a sphere or ellipsoid that is nearest to the wall, relative to its centre, world frame [m].
+
+    The ellipsoid's point of normal -n is -R D² Rᵀ n / s with D = diag(semi-axes).
+    """
+    if shape == SPHERE:
+        return (-dims[0] * n[0], -dims[0] * n[1], -dims[0] * n[2])
+    s = -1.0 / support(shape, dims, e)
+    return qt.matvec(R, (s * dims[0] * e[0], s * dims[1] * e[1], s * dims[2] * e[2]))

@@ -1,0 +1,1 @@
+"""Linear complementarity problems: pivoting methods, and the certificate of a solution."""

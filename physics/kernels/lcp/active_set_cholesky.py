@@ -1,0 +1,67 @@
+"""The Cholesky factor of the clamped rows and columns of a matrix, kept while indices come and go.
+
+`work` holds the factor in its first n rows and the matrix, with a diagonal scaled
+to [1/4, 1), in the next n. `index` holds the clamped indices in the order of the
+factor, then for every index its place there, negative if it is not clamped.
+An index joins by a new row of the factor; where one leaves, the rows behind it
+are computed anew from the matrix, so that no error is ever carried along.
+"""
+
+from __future__ import annotations
+
+import math
+
+from physics.kernels.compile.decorators import kernel
+
+DEPENDENT_TOLERANCE = 2.0**-40  # of its diagonal: an index with a smaller Schur complement is dependent
+
+
+@kernel
+def clamp(work, index, n, count, k):
+    """Append index k to the `count` clamped ones: one row of the Cholesky factor.
+
+    Returns whether k is independent of them; if not, nothing but scratch space has changed.
+    """
+    factor, A, clamped = work[:n], work[n : 2 * n], index[:n]
+    schur = A[k, k]
+    for r in range(count):
+        entry = A[k, clamped[r]]
+        for t in range(r):
+            entry -= factor[count, t] * factor[r, t]
+        entry /= factor[r, r]
+        factor[count, r] = entry
+        schur -= entry * entry
+    if not schur > DEPENDENT_TOLERANCE * A[k, k]:
+        return False
+    factor[count, count] = math.sqrt(schur)
+    clamped[count] = k
+    index[n + k] = count
+    return True
+
+
+@kernel
+def release(work, index, n, count, k):
+    """Remove index k from the clamped ones and rebuild the factor behind it. Returns the new count."""
+    clamped = index[:n]
+    place = index[n + k]
+    index[n + k] = -1
+    kept = place
+    for r in range(place + 1, count):
+        j = clamped[r]
+        index[n + j] = -1
+        if clamp(work, index, n, kept, j):
+            kept += 1
+    return kept
+
+
+@kernel
+def solve_clamped(factor, count, x):
+    """Overwrite the first `count` entries of x with the solution of L Lᵀ y = x."""
+    for r in range(count):
+        for t in range(r):
+            x[r] -= factor[r, t] * x[t]
+        x[r] /= factor[r, r]
+    for r in range(count - 1, -1, -1):
+        for t in range(r + 1, count):
+            x[r] -= factor[t, r] * x[t]
+        x[r] /= factor[r, r]

@@ -1,0 +1,61 @@
+"""Statuses, exact scaling and the final check that the solvers of linear complementarity problems share.
+
+Every solver scales its problem by powers of two first. That is exact in floating
+point, makes tolerances dimensionless, and lets units of any size stand side by side.
+"""
+
+from __future__ import annotations
+
+import math
+
+from physics.kernels.compile.decorators import kernel
+
+# Statuses, the same for every pivoting solver.
+SOLVED = 0
+RAY = 1  # the path ended without a solution
+PIVOT_LIMIT = 2
+BAD_DATA = 3  # not finite, or not of the class that the solver asks for
+INACCURATE = 4  # the path ended in a solution, but rounding left too large a residual
+
+RESIDUAL_TOLERANCE = 2.0**-30  # of the largest sum of magnitudes in a row of M z + q
+
+
+@kernel
+def inverse_power_of_two(x):
+    """2^-e for |x| = m 2^e with m in [1/2, 1); 1 for x = 0."""
+    if x == 0.0:
+        return 1.0
+    return math.ldexp(1.0, -math.frexp(x)[1])
+
+
+@kernel
+def are_finite(M, q):
+    """Test whether q (n,) and the leading n x n block of M hold neither NaN nor infinity."""
+    n = q.shape[0]
+    for i in range(n):
+        if not math.isfinite(q[i]):
+            return False
+        for j in range(n):
+            if not math.isfinite(M[i, j]):
+                return False
+    return True
+
+
+@kernel
+def certify(M, q, z, row_scale, column_scale, q_scale):
+    """`SOLVED` if the natural residual max |min(z, w)| of the scaled problem is small, else `INACCURATE`."""
+    n = q.shape[0]
+    worst = 0.0
+    largest = 0.0
+    for i in range(n):
+        w = q[i] * row_scale[i] * q_scale
+        magnitude = abs(w)
+        for j in range(n):
+            term = M[i, j] * row_scale[i] * column_scale[j] * z[j]
+            w += term
+            magnitude += abs(term)
+        worst = max(worst, abs(min(z[i], w)))
+        largest = max(largest, magnitude)
+    if worst <= RESIDUAL_TOLERANCE * largest:
+        return SOLVED
+    return INACCURATE

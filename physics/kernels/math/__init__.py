@@ -1,0 +1,1 @@
+"""Quaternions, roots, small dense systems."""

@@ -1,0 +1,1 @@
+"""Broad phase: which bodies may touch within a stage."""

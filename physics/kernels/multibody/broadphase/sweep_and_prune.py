@@ -1,0 +1,198 @@
+"""Broad phase: which bodies may touch within a stage.
+
+Sweep and prune: the boxes around the bodies, the motion of the stage included, are sorted along the world axis on
+which the bodies are spread most; a body is then compared with those behind it until one begins beyond its end. Many
+bodies are compared within columns along that axis only (`columns`). The pairs come in the order of the sweep, however
+the columns are cut.
+
+Reference: D. Baraff, *Dynamic simulation of non-penetrating rigid bodies*, PhD thesis, Cornell, 1992, section 2.3.
+"""
+
+from __future__ import annotations
+
+from physics.kernels.compile.decorators import inlined, kernel
+from physics.kernels.half_space import support_function as geo
+from physics.kernels.math import quaternion as qt
+from physics.kernels.multibody.broadphase.grid import columns_of, fill_columns
+from physics.kernels.multibody.data.arrays import LEFT_OUT, PAIRS
+from physics.kernels.multibody.data.contact_set import minus, pair_slop, vector
+from physics.kernels.state.layout import BLOCK, HULL, NORMAL, OFFSET, POS, SPHERE
+
+# By how much more than at its first pace a body that turns far may do so; see `reach`.
+GROWTH = 1.5
+
+
+@inlined
+def travel(b, h, many):
+    """Bound for how far body b's centre of mass moves in h without contact, and its bounding sphere with it [m]."""
+    t = many.twist
+    return h * (abs(t[b, 0]) + abs(t[b, 1]) + abs(t[b, 2])) + 0.5 * h * h * many.bodies[b].acceleration
+
+
+@inlined
+def reach(b, h, many):
+    """Bound for how far any point of body b moves in h without contact [m]; by turning no further than across it.
+
+    The angular velocity of what turns far may grow meanwhile: as |dω/dt| <= |ω|²/√3, a turn of θ at its first pace is
+    one of -√3 log(1 - θ/√3) at most, and the chord of that is no longer than 1.5 θ or 2 radii.
+    """
+    t = many.twist
+    turn = h * (abs(t[b, 3]) + abs(t[b, 4]) + abs(t[b, 5]))
+    if many.spin[b] > 0.0:
+        turn *= GROWTH
+    return travel(b, h, many) + many.bodies[b].radius * min(turn, 2.0)
+
+
+@inlined
+def may_reach_wall(b, wall, h, many):
+    """Test whether body b's bounding sphere may touch a wall within h; one that turns fast far off may not."""
+    d = qt.dot(vector(many.walls, wall, NORMAL), vector(many.now, b, POS)) - many.walls[wall, OFFSET]
+    return not d > many.bodies[b].radius + travel(b, h, many) + many.bodies[b].slop
+
+
+@inlined
+def may_meet(a, b, h, many):
+    """Test whether the bounding spheres of two bodies may touch within h."""
+    far = many.bodies[a].radius + many.bodies[b].radius + travel(a, h, many) + travel(b, h, many)
+    far += pair_slop(a, b, many)
+    d = minus(vector(many.now, a, POS), vector(many.now, b, POS))
+    return not qt.dot(d, d) > far * far
+
+
+@inlined
+def half_extent(b, axis, many):
+    """Half the width of body b along a world axis [m]; of a hull that of the block that reaches as far as it does."""
+    R, d, shape = many.rotation, many.bodies[b].dims, many.bodies[b].shape
+    if shape == SPHERE:
+        return d[0]
+    if shape == HULL:
+        shape = BLOCK
+    e = (d[0] * R[b, 3 * axis], d[1] * R[b, 3 * axis + 1], d[2] * R[b, 3 * axis + 2])
+    return geo.support(shape, (d[0], d[1], d[2]), e)
+
+
+@kernel
+def bound_bodies(h, many):
+    """Write `many.box`: every body with all it may sweep in h, and the slop."""
+    for b in range(many.now.shape[0]):
+        margin = reach(b, h, many) + many.bodies[b].slop
+        for axis in range(3):
+            half = half_extent(b, axis, many) + margin
+            many.box[b, axis] = many.place[b, axis] - half
+            many.box[b, axis + 3] = many.place[b, axis] + half
+
+
+@inlined
+def widest_axis(many):
+    """World axis with the largest variance of the bodies' centres."""
+    best, axis, count = -1.0, 0, many.place.shape[0]
+    for k in range(3):
+        total = square = 0.0
+        for b in range(count):
+            total += many.place[b, k]
+        for b in range(count):
+            d = many.place[b, k] - total / count
+            square += d * d
+        if square > best:
+            best, axis = square, k
+    return axis
+
+
+@inlined
+def _merge(first, middle, last, axis, many):
+    """Merge two sorted runs of `many.order` that follow each other."""
+    order, merged, box = many.order, many.merged, many.box
+    i, j = first, middle
+    for k in range(first, last):
+        if j >= last or (i < middle and box[order[i], axis] <= box[order[j], axis]):
+            merged[k] = order[i]
+            i += 1
+        else:
+            merged[k] = order[j]
+            j += 1
+    for k in range(first, last):
+        order[k] = merged[k]
+
+
+@inlined
+def sort_bodies(axis, many):
+    """Write `many.order`: the bodies by the lower end of their boxes, ties by index (merge sort)."""
+    count = many.order.shape[0]
+    for b in range(count):
+        many.order[b] = b
+    width = 1
+    while width < count:
+        first = 0
+        while first + width < count:
+            _merge(first, first + width, min(first + 2 * width, count), axis, many)
+            first += 2 * width
+        width *= 2
+
+
+@inlined
+def _overlap(a, b, many):
+    box = many.box
+    for k in range(3):
+        if box[a, k] > box[b, k + 3] or box[b, k] > box[a, k + 3]:
+            return False
+    return True
+
+
+@inlined
+def _sort_behind(first, last, many):
+    """Sort the new pairs `many.pairs[first:last]`, whose first body is the same, by the place of the second one."""
+    pairs, rank = many.pairs, many.merged
+    for i in range(first + 1, last):
+        b, j = pairs[i, 1], i
+        while j > first and rank[pairs[j - 1, 1]] > rank[b]:
+            pairs[j, 1] = pairs[j - 1, 1]
+            j -= 1
+        pairs[j, 1] = b
+
+
+@inlined
+def _pair_in_column(a, i, j, axes, cuts, count, many):
+    """Add the pairs of a with those behind it in a column, if their boxes overlap there first: how many pairs now."""
+    axis, u, v = axes
+    box, nv = many.box, cuts[5]
+    column = i * nv + j
+    many.cursor[column] += 1  # past a
+    for k in range(many.cursor[column], many.first_entry[column + 1]):
+        b = many.entry[k]
+        if box[b, axis] > box[a, axis + 3]:
+            break
+        if not _overlap(a, b, many):
+            continue
+        a_i, _, a_j, _ = columns_of(a, u, v, cuts, many)
+        b_i, _, b_j, _ = columns_of(b, u, v, cuts, many)
+        if max(a_i, b_i) != i or max(a_j, b_j) != j:
+            continue  # found in the column of the lower corner of what the boxes share
+        if count == many.pairs.shape[0]:
+            many.counts[LEFT_OUT] += 1
+            continue
+        many.pairs[count, 0], many.pairs[count, 1] = a, b
+        count += 1
+    return count
+
+
+@kernel
+def find_pairs(h, many):
+    """Write `many.pairs` and their number: all pairs (a < b) of bodies whose boxes overlap."""
+    bound_bodies(h, many)
+    axis = widest_axis(many)
+    sort_bodies(axis, many)
+    u, v = (axis + 1) % 3, (axis + 2) % 3
+    cuts, pairs, count = fill_columns(u, v, many), many.pairs, 0
+    for r in range(many.order.shape[0]):
+        many.merged[many.order[r]] = r
+    for r in range(many.order.shape[0]):
+        a, first = many.order[r], count
+        i_first, i_last, j_first, j_last = columns_of(a, u, v, cuts, many)
+        for i in range(i_first, i_last + 1):
+            for j in range(j_first, j_last + 1):
+                count = _pair_in_column(a, i, j, (axis, u, v), cuts, count, many)
+        _sort_behind(first, count, many)
+        for k in range(first, count):
+            b = pairs[k, 1]
+            pairs[k, 0], pairs[k, 1] = min(a, b), max(a, b)
+    many.counts[PAIRS] = count

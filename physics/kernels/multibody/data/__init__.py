@@ -1,0 +1,1 @@
+"""Arrays of a world whose bodies touch each other."""

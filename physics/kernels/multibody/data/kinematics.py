@@ -1,0 +1,41 @@
+"""Kinematics of the bodies of a world: rotations, centres, inverse inertias and twists of this moment."""
+
+from __future__ import annotations
+
+from physics.kernels.compile.decorators import inlined
+from physics.kernels.half_space.contact_point import geometric_center
+from physics.kernels.math import quaternion as qt
+from physics.kernels.multibody.data.contact_set import put, vector
+from physics.kernels.state import layout as at
+from physics.kernels.state.body import angular_velocity, principal_attitude, read_state
+
+
+@inlined
+def place_body(b, tilted, many):
+    """Rotation, geometric centre and inverse inertia of body b where it is now, world frame."""
+    x, q, _, _ = read_state(many.now, b)
+    work = many.bodies[b]
+    R = qt.to_matrix(q)
+    for c in range(9):
+        many.rotation[b, c] = R[c]
+    put(many.place, b, 0, geometric_center(x, R, work, tilted))
+    P = R
+    if tilted is not None:
+        P = qt.to_matrix(principal_attitude(q, work, tilted))
+    J, K = work.J, many.turning
+    K[b, 0] = J[0] * P[0] * P[0] + J[1] * P[1] * P[1] + J[2] * P[2] * P[2]
+    K[b, 1] = J[0] * P[0] * P[3] + J[1] * P[1] * P[4] + J[2] * P[2] * P[5]
+    K[b, 2] = J[0] * P[0] * P[6] + J[1] * P[1] * P[7] + J[2] * P[2] * P[8]
+    K[b, 3] = J[0] * P[3] * P[3] + J[1] * P[4] * P[4] + J[2] * P[5] * P[5]
+    K[b, 4] = J[0] * P[3] * P[6] + J[1] * P[4] * P[7] + J[2] * P[5] * P[8]
+    K[b, 5] = J[0] * P[6] * P[6] + J[1] * P[7] * P[7] + J[2] * P[8] * P[8]
+
+
+@inlined
+def place_bodies(tilted, many):
+    """`place_body`, and the twist, of every body."""
+    for b in range(many.now.shape[0]):
+        place_body(b, tilted, many)
+        put(many.twist, b, 0, vector(many.now, b, at.LINVEL))
+        q, L = read_state(many.now, b)[1], vector(many.now, b, at.ANGMOM)
+        put(many.twist, b, 3, angular_velocity(q, L, many.bodies[b], tilted))

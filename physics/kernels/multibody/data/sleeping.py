@@ -1,0 +1,125 @@
+"""Sleep in worlds whose bodies touch each other: what may touch falls asleep together, and wakes together.
+
+A group is what the broad phase connects: bodies whose boxes overlap, and bodies that springs tie together. Whatever is
+in contact is in one group, so that a group that sleeps has no contact with anything awake; what comes near it is met in
+the broad phase first, and wakes it before a contact is looked for.
+"""
+
+from __future__ import annotations
+
+from physics.kernels.compile.decorators import inlined, kernel
+from physics.kernels.forces.two_body_spring import join_linked
+from physics.kernels.multibody.data.arrays import PAIRS
+from physics.kernels.multibody.solver.islands import join, root_of
+from physics.kernels.state.body import read_state, write_state
+from physics.kernels.state.sleeping import (
+    BEFORE,
+    GROUP,
+    LAST,
+    QUIET,
+    WINDOWS,
+    is_growing,
+    is_pushed_anew,
+    laid_down,
+    sleeps,
+    stir,
+    watch,
+)
+
+
+@inlined
+def wake_group(world, count, group, sleep):
+    """Wake all bodies of a group of a world of `count` bodies."""
+    for i in range(world * count, (world + 1) * count):
+        if sleep.rows[i, GROUP] == group:
+            stir(i, sleep)
+
+
+@inlined
+def wake_world(world, count, sleep):
+    """Wake everything, if the scene declares sleep."""
+    if sleep is None:
+        return
+    for i in range(world * count, (world + 1) * count):
+        stir(i, sleep)
+
+
+@inlined
+def all_sleep(world, count, sleep):
+    """Test whether every body of a world of `count` bodies sleeps."""
+    for i in range(world * count, (world + 1) * count):
+        if not sleeps(i, sleep):
+            return False
+    return True
+
+
+@inlined
+def sleep_on(world, count, wrench, sleep):
+    """Test whether every body of a world sleeps and goes on to do so under these wrenches; wakes those that do not."""
+    for i in range(world * count, (world + 1) * count):
+        if is_pushed_anew(i, wrench, sleep):
+            if sleeps(i, sleep):
+                wake_group(world, count, sleep.rows[i, GROUP], sleep)
+            stir(i, sleep)
+    return all_sleep(world, count, sleep)
+
+
+@kernel
+def wake_near(world, sleep, many):
+    """Wake every group that something awake is near: a pair of the broad phase of which one body sleeps."""
+    first, is_waking = world * many.now.shape[0], True
+    while is_waking:
+        is_waking = False
+        for k in range(many.counts[PAIRS]):
+            a, b = first + many.pairs[k, 0], first + many.pairs[k, 1]
+            if sleeps(a, sleep) != sleeps(b, sleep):
+                group = max(sleep.rows[a, GROUP], sleep.rows[b, GROUP])
+                wake_group(world, many.now.shape[0], group, sleep)
+                is_waking = True
+
+
+@inlined
+def _join_near(many):
+    """Let `many.parent` lead from every body to the first one of its group."""
+    for b in range(many.parent.shape[0]):
+        many.parent[b] = b
+    for k in range(many.counts[PAIRS]):
+        join(many.pairs[k, 0], many.pairs[k, 1], many.parent)
+    join_linked(many.parent, many)
+
+
+@kernel
+def lay_down(world, sleep, many):
+    """Let every group fall asleep in which all bodies have been quiet for long enough, and no way grows.
+
+    Largest ways of a group in its last two windows, and whether one of it is not quiet, are gathered at its root in
+    `many.change`, which is free between solves.
+    """
+    count, found = many.now.shape[0], many.change
+    first = world * count
+    _join_near(many)
+    for b in range(count):
+        found[b, 0] = found[b, 1] = found[b, 2] = 0.0
+    for b in range(count):
+        root, i = root_of(b, many.parent), first + b
+        found[root, 0] = max(found[root, 0], sleep.rows[i, LAST])
+        found[root, 1] = max(found[root, 1], sleep.rows[i, BEFORE])
+        if sleep.rows[i, QUIET] < WINDOWS:
+            found[root, 2] = 1.0
+    for b in range(count):
+        root = root_of(b, many.parent)
+        if sleeps(first + b, sleep) or found[root, 2] == 1.0 or is_growing(found[root, 0], found[root, 1]):
+            continue
+        sleep.rows[first + b, GROUP] = root + 1.0
+        write_state(many.now, b, laid_down(read_state(many.now, b)))
+
+
+@kernel
+def doze(world, h, sleep, many):
+    """Watch every body that is awake after a substep of h; what has been quiet for long enough falls asleep."""
+    first, is_time = world * many.now.shape[0], False
+    for b in range(many.now.shape[0]):
+        if not sleeps(first + b, sleep) and watch(first + b, read_state(many.now, b), h, many.bodies[b], sleep):
+            is_time = True
+    if is_time:
+        lay_down(world, sleep, many)

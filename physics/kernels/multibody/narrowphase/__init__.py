@@ -1,0 +1,1 @@
+"""Narrow phase: contact points of every pair of shapes."""

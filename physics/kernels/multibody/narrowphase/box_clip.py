@@ -1,0 +1,137 @@
+"""The face of a block that looks against a face of another one, clipped by the sides of that.
+
+The polygon is in the frame of the other block's face: coordinates along it, and height above the block's centre. Every
+vertex knows the edges into and out of it, which name it while the same edges cross.
+
+References
+----------
+I. E. Sutherland, G. W. Hodgman, *Reentrant polygon clipping*, CACM 17, 1974.
+"""
+
+from __future__ import annotations
+
+import math
+
+from physics.kernels.compile.decorators import inlined
+from physics.kernels.math import quaternion as qt
+from physics.kernels.multibody.data.contact_set import minus, plus, vector
+from physics.kernels.multibody.narrowphase.box_sat import column
+
+
+@inlined
+def _crossing(p, q, axis, bound):
+    """Point of the edge from p to q at coordinate `bound`."""
+    t = (bound - p[axis]) / (q[axis] - p[axis])
+    return plus(p, t, minus(q, p))
+
+
+@inlined
+def is_within(source, count, axis, sign, bound, many):
+    """Test whether sign * coordinate <= bound for every vertex of the polygon in copy `source`: nothing to clip."""
+    furthest = -math.inf
+    for k in range(count):
+        furthest = max(furthest, sign * many.polygon[source, k, axis])
+    return furthest <= bound
+
+
+@inlined
+def clip(source, count, axis, sign, bound, side, slop, many):
+    """Clip the polygon in copy `source` by sign * coordinate <= bound; its vertices, now in the other copy.
+
+    A vertex no further than the slop outside stays: it would otherwise come and go with rounding where two faces end
+    together. It stands for the crossing of its edge then, which may be far off along an edge that the side hardly cuts.
+    """
+    p, edge, into = many.polygon, many.edge, 1 - source
+    kept = 0
+    for k in range(count):
+        m = (k + 1) % count
+        here, there = sign * p[source, k, axis] - bound, sign * p[source, m, axis] - bound
+        if here <= slop:
+            for c in range(3):
+                p[into, kept, c] = p[source, k, c]
+            edge[into, kept, 0], edge[into, kept, 1] = edge[source, k, 0], edge[source, k, 1]
+            kept += 1
+        if (here <= slop) != (there <= slop) and min(here, there) < 0.0:
+            cut = _crossing(vector(p[source], k, 0), vector(p[source], m, 0), axis, sign * bound)
+            p[into, kept, 0], p[into, kept, 1], p[into, kept, 2] = cut
+            leaving = here <= slop
+            edge[into, kept, 0] = edge[source, k, 1] if leaving else side
+            edge[into, kept, 1] = side if leaving else edge[source, k, 1]
+            kept += 1
+    return kept
+
+
+@inlined
+def write_incident_face(r, o, axis, sign, many):
+    """Write the face of block o that looks most against the face of block r into copy 0, in the frame of that face.
+
+    Coordinates along the axes behind `axis` of r, and height along sign * axis above the centre of r.
+    """
+    R, d, p = many.rotation, many.bodies[o].dims, many.polygon
+    out = column(R, r, axis)
+    out = (sign * out[0], sign * out[1], sign * out[2])
+    x, y = column(R, r, (axis + 1) % 3), column(R, r, (axis + 2) % 3)
+    best, face, side = -1.0, 0, 1.0
+    for j in range(3):
+        c = qt.dot(out, column(R, o, j))
+        if abs(c) > best:
+            best, face, side = abs(c), j, -math.copysign(1.0, c)
+    center = plus(minus(vector(many.place, o, 0), vector(many.place, r, 0)), side * d[face], column(R, o, face))
+    j, k = (face + 1) % 3, (face + 2) % 3
+    for vertex in range(4):
+        s = d[j] if vertex == 1 or vertex == 2 else -d[j]
+        t = d[k] if vertex >= 2 else -d[k]
+        q = plus(plus(center, s, column(R, o, j)), t, column(R, o, k))
+        p[0, vertex, 0], p[0, vertex, 1], p[0, vertex, 2] = qt.dot(x, q), qt.dot(y, q), qt.dot(out, q)
+        many.edge[0, vertex, 0], many.edge[0, vertex, 1] = (vertex + 3) % 4, vertex
+
+
+@inlined
+def within(s, bound):
+    """s, no further than `bound` from 0."""
+    return min(max(s, -bound), bound)
+
+
+@inlined
+def keep_lowest(x, y, many):
+    """Leave the lowest vertex of copy 0, moved above the face of half edges x and y: the copy it is in.
+
+    For blocks that are apart beside each other as well: the plane between them keeps them from each other all the same.
+    """
+    p, edge, low = many.polygon, many.edge, 0
+    for k in range(4):
+        if p[0, k, 2] < p[0, low, 2]:
+            low = k
+    p[0, 0, 0], p[0, 0, 1], p[0, 0, 2] = within(p[0, low, 0], x), within(p[0, low, 1], y), p[0, low, 2]
+    edge[0, 0, 0], edge[0, 0, 1] = (low + 3) % 4, low
+    return 0
+
+
+@inlined
+def lowest(source, count, polygon):
+    """Least height of a vertex of the polygon in copy `source`."""
+    low = math.inf
+    for k in range(count):
+        low = min(low, polygon[source, k, 2])
+    return low
+
+
+@inlined
+def edge_at_rim(d, axis, source, count, slop, many):
+    """(its ends, axis of the rim, its sense) where all that is low of the polygon is an edge along the face's rim.
+
+    What is within a slop of the lowest vertex is low; two slops from the rim are on it. Without such an edge the ends
+    are -1.
+    """
+    p, low = many.polygon, lowest(source, count, many.polygon)
+    for side in range(4):
+        k, sense = side // 2, 1.0 - 2.0 * (side % 2)
+        bound, first, last, is_rim = d[(axis + 1 + k) % 3], -1, -1, True
+        for v in range(count):
+            if p[source, v, 2] <= low + slop:
+                is_rim = is_rim and sense * p[source, v, k] >= bound - 2.0 * slop
+                first = v if first < 0 or p[source, v, 1 - k] < p[source, first, 1 - k] else first
+                last = v if last < 0 or p[source, v, 1 - k] > p[source, last, 1 - k] else last
+        if is_rim and p[source, last, 1 - k] - p[source, first, 1 - k] > 2.0 * slop:
+            return first, last, (axis + 1 + k) % 3, sense
+    return -1, -1, 0, 1.0

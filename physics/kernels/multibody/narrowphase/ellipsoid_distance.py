@@ -1,0 +1,236 @@
+"""An ellipsoid and another convex body: how far they are apart, by Newton's method on the direction between them.
+
+With support functions s(n) of the two bodies about their centres (both symmetric) and d from the centre of b to that
+of a, the bodies are apart along the unit vector n by σ(n) = n·d - s_a(n) - s_b(n). The largest σ is their distance or,
+negative, what moves them apart by the least way. Its gradient is the vector from the point of b to that of a with
+normal n: it must be along n. For an ellipsoid s = √(nᵀDn), D = R diag(a²) Rᵀ, with the point Dn/s and the second
+derivative (D - p pᵀ)/s, p that point; so that on the sphere of directions one step is
+
+    (H_a + H_b + σ) δ = g - (g·n) n,        δ ⟂ n, for H n = 0.
+
+Where the bodies overlap σ is left out: its size is small beside the radii of curvature then, and the sum stays positive
+definite. A block has s = Σ bᵢ|nᵢ|, which has a kink where nᵢ = 0, and there the largest σ mostly is: on a face two of
+the nᵢ are 0, on an edge one. Such an nᵢ stays 0 while the gradient is no larger than bᵢ; a step that would pass through
+0 ends there.
+
+All in the frame of b.
+"""
+
+from __future__ import annotations
+
+import math
+
+from physics.kernels.compile.decorators import inlined, kernel
+from physics.kernels.math import quaternion as qt
+from physics.kernels.multibody.data.contact_set import minus
+
+# Newton steps at most; five are usual from a centre to centre start.
+STEPS = 40
+
+# Turn of the direction below which it is found [rad]: σ is off by its square.
+FOUND = 1.0e-10
+
+# Halvings of a step that does not make σ larger.
+HALVINGS = 12
+
+
+@inlined
+def squares_of(C, dims):
+    """D = C diag(dims²) Cᵀ (00, 01, 02, 11, 12, 22), C from the ellipsoid's frame to the target frame."""
+    a, b, c = dims[0] * dims[0], dims[1] * dims[1], dims[2] * dims[2]
+    return (
+        a * C[0] * C[0] + b * C[1] * C[1] + c * C[2] * C[2],
+        a * C[0] * C[3] + b * C[1] * C[4] + c * C[2] * C[5],
+        a * C[0] * C[6] + b * C[1] * C[7] + c * C[2] * C[8],
+        a * C[3] * C[3] + b * C[4] * C[4] + c * C[5] * C[5],
+        a * C[3] * C[6] + b * C[4] * C[7] + c * C[5] * C[8],
+        a * C[6] * C[6] + b * C[7] * C[7] + c * C[8] * C[8],
+    )
+
+
+@inlined
+def point_of(D, n):
+    """(support s, point of normal n) of an ellipsoid."""
+    x = D[0] * n[0] + D[1] * n[1] + D[2] * n[2]
+    y = D[1] * n[0] + D[3] * n[1] + D[4] * n[2]
+    z = D[2] * n[0] + D[4] * n[1] + D[5] * n[2]
+    s = math.sqrt(n[0] * x + n[1] * y + n[2] * z)
+    return s, (x / s, y / s, z / s)
+
+
+@inlined
+def _bend(D, s, p):
+    """Second derivative of the support function (00, 01, 02, 11, 12, 22)."""
+    return (
+        (D[0] - p[0] * p[0]) / s, (D[1] - p[0] * p[1]) / s, (D[2] - p[0] * p[2]) / s,
+        (D[3] - p[1] * p[1]) / s, (D[4] - p[1] * p[2]) / s, (D[5] - p[2] * p[2]) / s,
+    )  # fmt: skip
+
+
+@inlined
+def _signed(x):
+    return math.copysign(1.0, x) if x != 0.0 else 0.0
+
+
+@inlined
+def separation(A, is_block, B, dims, d, n):
+    """σ(n); `B` is the ellipsoid b, `dims` the half edges of the block b."""
+    s, _ = point_of(A, n)
+    if is_block:
+        return qt.dot(n, d) - s - (dims[0] * abs(n[0]) + dims[1] * abs(n[1]) + dims[2] * abs(n[2]))
+    r, _ = point_of(B, n)
+    return qt.dot(n, d) - s - r
+
+
+@inlined
+def _kept(free, size):
+    """Reduce one component of the gradient where nᵢ = 0, for a half edge `size`: 0 keeps it there."""
+    return free - math.copysign(size, free) if abs(free) > size else 0.0
+
+
+@inlined
+def _way_to_kink(x, dx, t):
+    """The share t of a step dx that component x of the direction can take until it is 0."""
+    return min(t, -x / dx) if x * (x + t * dx) < 0.0 else t
+
+
+@inlined
+def _moved(x, dx, t, at_kink):
+    """Component x of the direction after t dx: exactly 0 where that is where its kink is."""
+    return 0.0 if at_kink and x * dx < 0.0 and -x / dx <= t else x + t * dx
+
+
+@inlined
+def _unit(x, y, z):
+    s = 1.0 / math.sqrt(x * x + y * y + z * z)
+    return (s * x, s * y, s * z)
+
+
+@inlined
+def _step(H, g, n, k0, k1, k2):
+    """δ of (H + tr(H) n nᵀ) δ = g in the components with k = 1, the others 0; g ⟂ n."""
+    t = H[0] + H[3] + H[5]
+    a = k0 * (H[0] + t * n[0] * n[0]) + (1.0 - k0)
+    b = k0 * k1 * (H[1] + t * n[0] * n[1])
+    c = k0 * k2 * (H[2] + t * n[0] * n[2])
+    e = k1 * (H[3] + t * n[1] * n[1]) + (1.0 - k1)
+    f = k1 * k2 * (H[4] + t * n[1] * n[2])
+    h = k2 * (H[5] + t * n[2] * n[2]) + (1.0 - k2)
+    c00, c01, c02 = e * h - f * f, c * f - b * h, b * f - c * e
+    s = 1.0 / (a * c00 + b * c01 + c * c02)
+    c11, c12, c22 = a * h - c * c, b * c - a * f, a * e - b * b
+    return (
+        s * (c00 * g[0] + c01 * g[1] + c02 * g[2]),
+        s * (c01 * g[0] + c11 * g[1] + c12 * g[2]),
+        s * (c02 * g[0] + c12 * g[1] + c22 * g[2]),
+    )
+
+
+@kernel
+def direction_between(A, is_block, B, dims, d, n):
+    """(unit vector of the largest σ found from n on, σ there).
+
+    Parameters
+    ----------
+    A, B : tuples of 6 floats
+        `squares_of` the ellipsoids a and b, in the frame of b; B of a block is not read.
+    is_block : bool
+        Whether b is a block with half edges `dims`.
+    d : tuple of 3 floats
+        From the centre of b to that of a [m].
+    n : tuple of 3 floats
+        Unit vector to start from, out of b.
+    """
+    best = separation(A, is_block, B, dims, d, n)
+    for _ in range(STEPS):
+        s, p = point_of(A, n)
+        H = _bend(A, s, p)
+        g = (d[0] - p[0], d[1] - p[1], d[2] - p[2])
+        k0 = k1 = k2 = 1.0
+        if is_block:
+            g = (
+                g[0] - math.copysign(dims[0], n[0]) if n[0] != 0.0 else _kept(g[0], dims[0]),
+                g[1] - math.copysign(dims[1], n[1]) if n[1] != 0.0 else _kept(g[1], dims[1]),
+                g[2] - math.copysign(dims[2], n[2]) if n[2] != 0.0 else _kept(g[2], dims[2]),
+            )
+            k0 = 0.0 if n[0] == 0.0 and g[0] == 0.0 else 1.0
+            k1 = 0.0 if n[1] == 0.0 and g[1] == 0.0 else 1.0
+            k2 = 0.0 if n[2] == 0.0 and g[2] == 0.0 else 1.0
+        else:
+            r, q = point_of(B, n)
+            g = (g[0] - q[0], g[1] - q[1], g[2] - q[2])
+            K = _bend(B, r, q)
+            H = (H[0] + K[0], H[1] + K[1], H[2] + K[2], H[3] + K[3], H[4] + K[4], H[5] + K[5])
+        apart, along = max(best, 0.0), qt.dot(g, n)
+        H = (H[0] + apart, H[1], H[2], H[3] + apart, H[4], H[5] + apart)
+        g = (k0 * (g[0] - along * n[0]), k1 * (g[1] - along * n[1]), k2 * (g[2] - along * n[2]))
+        e = _step(H, g, n, k0, k1, k2)
+        if is_block:  # at a kink only the side counts on which the gradient is known
+            k0 = 0.0 if n[0] == 0.0 and e[0] * g[0] < 0.0 else k0
+            k1 = 0.0 if n[1] == 0.0 and e[1] * g[1] < 0.0 else k1
+            k2 = 0.0 if n[2] == 0.0 and e[2] * g[2] < 0.0 else k2
+            g = (k0 * g[0], k1 * g[1], k2 * g[2])
+            e = _step(H, g, n, k0, k1, k2)
+        if not max(abs(e[0]), abs(e[1]), abs(e[2])) > FOUND:
+            break
+        t, found = 1.0, False
+        if is_block:
+            t = _way_to_kink(n[0], e[0], _way_to_kink(n[1], e[1], _way_to_kink(n[2], e[2], t)))
+        for trial in range(HALVINGS):
+            at_kink = is_block and trial == 0
+            m = _unit(_moved(n[0], e[0], t, at_kink), _moved(n[1], e[1], t, at_kink), _moved(n[2], e[2], t, at_kink))
+            value = separation(A, is_block, B, dims, d, m)
+            if value > best:
+                n, best, found = m, value, True
+                break
+            t *= 0.5
+        if not found:
+            break
+    return n, best
+
+
+@inlined
+def start_from(d):
+    """Direction from the centre of b, the origin, to that of a; any where they are the same."""
+    size = math.sqrt(qt.dot(d, d))
+    if size > 0.0:
+        return (d[0] / size, d[1] / size, d[2] / size)
+    return (0.0, 1.0, 0.0)
+
+
+@inlined
+def block_point(dims, n, near):
+    """Point of a block with normal n that is nearest to `near`, a point in its frame."""
+    return (
+        math.copysign(dims[0], n[0]) if n[0] != 0.0 else min(max(near[0], -dims[0]), dims[0]),
+        math.copysign(dims[1], n[1]) if n[1] != 0.0 else min(max(near[1], -dims[1]), dims[1]),
+        math.copysign(dims[2], n[2]) if n[2] != 0.0 else min(max(near[2], -dims[2]), dims[2]),
+    )
+
+
+@inlined
+def nearest_in_block(p, d):
+    """(nearest point on the surface of a block, outward normal, distance) for a point p, all in its frame."""
+    q = (min(max(p[0], -d[0]), d[0]), min(max(p[1], -d[1]), d[1]), min(max(p[2], -d[2]), d[2]))
+    w = minus(p, q)
+    size = math.sqrt(qt.dot(w, w))
+    if size > 0.0:
+        return q, (w[0] / size, w[1] / size, w[2] / size), size
+    depth = (abs(p[0]) - d[0], abs(p[1]) - d[1], abs(p[2]) - d[2])  # inside: out by the nearest face
+    if depth[0] >= depth[1] and depth[0] >= depth[2]:
+        s = math.copysign(1.0, p[0])
+        return (s * d[0], p[1], p[2]), (s, 0.0, 0.0), depth[0]
+    if depth[1] >= depth[2]:
+        s = math.copysign(1.0, p[1])
+        return (p[0], s * d[1], p[2]), (0.0, s, 0.0), depth[1]
+    s = math.copysign(1.0, p[2])
+    return (p[0], p[1], s * d[2]), (0.0, 0.0, s), depth[2]
+
+
+@inlined
+def turned_back(R, S):
+    """Rᵀ S: from the frame of S to that of R."""
+    x = qt.transposed_matvec(R, (S[0], S[3], S[6]))
+    y = qt.transposed_matvec(R, (S[1], S[4], S[7]))
+    z = qt.transposed_matvec(R, (S[2], S[5], S[8]))
+    return (x[0], y[0], z[0], x[1], y[1], z[1], x[2], y[2], z[2])

@@ -1,0 +1,139 @@
+"""A convex polyhedron and a sphere or an ellipsoid."""
+
+from __future__ import annotations
+
+import math
+
+from physics.kernels.compile.decorators import inlined, kernel
+from physics.kernels.math import quaternion as qt
+from physics.kernels.multibody.data.contact_set import matrix, minus, plus, record_either, tangents, vector
+from physics.kernels.multibody.data.hull_tables import (
+    FIRST_CORNER,
+    FIRST_EDGE,
+    FIRST_FACE,
+    LAST_CORNER,
+    LAST_EDGE,
+    LAST_FACE,
+)
+from physics.kernels.multibody.narrowphase.ellipsoid_distance import (
+    direction_between,
+    nearest_in_block,
+    point_of,
+    squares_of,
+    turned_back,
+)
+from physics.kernels.multibody.narrowphase.hull_hull import edge_of
+from physics.kernels.multibody.narrowphase.hull_pose import is_above_face, nearest_on_face, put_in_place
+from physics.kernels.state.layout import ELLIPSOID, SPHERE
+
+NO_SQUARES = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+
+
+@inlined
+def nearest_on_hull(b, x, many):
+    """(nearest point of the surface, outward normal, distance) for a point x of body b, number 0 of the pair.
+
+    Inside the way out is by the nearest face, and the distance negative. Outside the nearest point is on a face that
+    looks towards x: of the normals that meet there, which x - y is made of, at least one does.
+    """
+    hulls, best, face = many.hulls, -math.inf, 0
+    for f in range(hulls.of[b, LAST_FACE] - hulls.of[b, FIRST_FACE]):
+        height = qt.dot(vector(hulls.normal[0], f, 0), x) - hulls.offset[0, f]
+        if height > best:
+            best, face = height, f
+    n = vector(hulls.normal[0], face, 0)
+    y, distance = plus(x, -best, n), best
+    if best > 0.0:
+        square = math.inf
+        for f in range(hulls.of[b, LAST_FACE] - hulls.of[b, FIRST_FACE]):
+            if qt.dot(vector(hulls.normal[0], f, 0), x) > hulls.offset[0, f]:
+                near = nearest_on_face(0, b, f, x, many)
+                w = minus(x, near)
+                if 0.0 < qt.dot(w, w) < square:
+                    square, y = qt.dot(w, w), near
+                    distance = math.sqrt(square)
+                    n = (w[0] / distance, w[1] / distance, w[2] / distance)
+    return y, n, distance
+
+
+@kernel
+def touch_sphere_hull(a, b, margin, h, many):
+    """Add the contact of a sphere and a hull, whichever of the two is a."""
+    ball, hull = a, b
+    if many.bodies[b].shape == SPHERE:
+        ball, hull = b, a
+    origin, r = vector(many.place, hull, 0), many.bodies[ball].dims[0]
+    x = vector(many.place, ball, 0)
+    put_in_place(0, hull, origin, many)
+    y, n, distance = nearest_on_hull(hull, minus(x, origin), many)
+    if distance - r > margin:
+        return
+    record_either(a, b, ball, n, plus(x, -r, n), plus(origin, 1.0, y), distance - r, h, many)
+
+
+@inlined
+def _separation(hull, A, way, n, many):
+    """σ(n) of an ellipsoid from a hull, number 0 of the pair; see `ellipsoid_distance`."""
+    hulls, reach = many.hulls, -math.inf
+    for k in range(hulls.of[hull, LAST_CORNER] - hulls.of[hull, FIRST_CORNER]):
+        reach = max(reach, qt.dot(n, vector(hulls.corner[0], k, 0)))
+    return qt.dot(n, way) - point_of(A, n)[0] - reach
+
+
+@inlined
+def _direction_from_edge(e, hull, S, dims, way, many):
+    """Direction of the largest separation of an ellipsoid (attitude S, at `way`) from edge e of a hull alone.
+
+    That is a block without width and height: `direction_between` in the frame of the edge.
+    """
+    p, d, _, _ = edge_of(0, hull, e, many)
+    half = 0.5 * math.sqrt(qt.dot(d, d))
+    u = (0.5 * d[0] / half, 0.5 * d[1] / half, 0.5 * d[2] / half)
+    v, w = tangents(u)
+    E = (u[0], v[0], w[0], u[1], v[1], w[1], u[2], v[2], w[2])
+    there = qt.transposed_matvec(E, minus(way, plus(p, 0.5, d)))
+    segment = (half, 0.0, 0.0)
+    start = nearest_in_block(there, segment)[1]
+    n, _ = direction_between(squares_of(turned_back(E, S), dims), True, NO_SQUARES, segment, there, start)
+    return qt.matvec(E, n)
+
+
+@kernel
+def touch_ellipsoid_hull(a, b, margin, h, many):
+    """Add the contact of an ellipsoid and a hull, whichever of the two is a.
+
+    The direction is that of the largest separation, as in `ellipsoid_distance`. Where the ellipsoid's point over the
+    face that is furthest from it is above that face, this is the nearest; if not, the nearest point of the hull is on
+    an edge. All directions so found are measured against the whole hull, and the best is taken: where the two are apart
+    it is the one there is; where they overlap none of the edges may be, and a face is the way out.
+    """
+    round_, hull = a, b
+    if many.bodies[b].shape == ELLIPSOID:
+        round_, hull = b, a
+    hulls, origin, size = many.hulls, vector(many.place, hull, 0), many.bodies[round_].dims
+    put_in_place(0, hull, origin, many)
+    way, S, dims = (
+        minus(vector(many.place, round_, 0), origin),
+        matrix(many.rotation, round_),
+        (size[0], size[1], size[2]),
+    )
+    A, best, face = squares_of(S, dims), -math.inf, 0
+    for f in range(hulls.of[hull, LAST_FACE] - hulls.of[hull, FIRST_FACE]):
+        m = vector(hulls.normal[0], f, 0)
+        gap = qt.dot(m, way) - point_of(A, m)[0] - hulls.offset[0, f]
+        if gap > best:
+            best, face = gap, f
+    if best > margin:
+        return
+    n = vector(hulls.normal[0], face, 0)
+    if not is_above_face(0, hull, face, minus(way, point_of(A, n)[1]), many):
+        for e in range(hulls.of[hull, LAST_EDGE] - hulls.of[hull, FIRST_EDGE]):
+            m = _direction_from_edge(e, hull, S, dims, way, many)
+            gap = _separation(hull, A, way, m, many)
+            if gap > best:
+                best, n = gap, m
+    if best > margin:
+        return
+    on_round = plus(origin, 1.0, minus(way, point_of(A, n)[1]))
+    on_hull = plus(on_round, -best, n)
+    record_either(a, b, round_, n, on_round, on_hull, best, h, many)

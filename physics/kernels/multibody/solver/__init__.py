@@ -1,0 +1,1 @@
+"""Solvers of the contact problem of all bodies of a world."""

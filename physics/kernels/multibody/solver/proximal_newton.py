@@ -1,0 +1,275 @@
+"""Contact problems on which sweeps crawl: Newton's method on the twists of all bodies, in a proximal-point iteration.
+
+What `physics.kernels.contact_solver.proximal_newton` does for one body, for a world of them. With x the change of all
+twists, for impulses q near the solution let
+
+    p(x) = law(q - ρ u(x)),    u(x) = J x + b,
+
+contact by contact; x = M⁻¹ Jᵀ p(x) is a nonlinear system for the twists alone, whose Newton matrix
+1 + M⁻¹ Jᵀ ρ p' J has a 6 x 6 block where two bodies touch (`block_lu`). Then q = p(x) and again. A round contracts by
+about 1/(1 + ρ w) with w the smallest mobility that matters: the inverse of the heaviest mass that a contact may have to
+carry, whatever that contact's own mass is. So ρ is a multiple of the largest mass in the problem.
+
+The first guess is that everything holds: then the law is linear, and one linear system is the answer for whatever
+stands still, however high or heavy. Where ρ grows too large for Newton's method to find its pieces, the round is
+thrown away and ρ shrinks.
+"""
+
+from __future__ import annotations
+
+from physics.kernels.compile.decorators import inlined, kernel
+from physics.kernels.multibody.data.arrays import BUNDLES, COLUMN_SIZE
+from physics.kernels.multibody.data.contact_set import put, vector
+from physics.kernels.multibody.solver import contact_batches as of
+from physics.kernels.multibody.solver.block_lu import SIZE, factor, substitute
+from physics.kernels.multibody.solver.contact_operator import push, residual_of
+from physics.kernels.multibody.solver.minimum_degree import order_bodies
+from physics.kernels.multibody.solver.newton_system import defect, fill_matrix, law
+
+# ρ in units of the largest mass: of the guess that everything holds, with its rounds; its growth from round to round,
+# the largest, and what it shrinks by when a round fails.
+HOLD_FACTOR = 1.0e4
+HOLD_ROUNDS = 5
+FACTOR_GROWTH = 10.0
+FACTOR_LIMIT = 1.0e8
+FACTOR_LOSS = 30.0
+
+# Rounds that may fail; Newton steps of a round, halvings of a step, and steps without progress, at most.
+FAILED_ROUNDS = 4
+NEWTON_STEPS = 20
+HALVINGS = 10
+FAILED_STEPS = 2
+
+# A round is solved to this share of the residual met so far, or of a hundred times the tolerance.
+ROUND_SHARE = 0.01
+ENOUGH = 100.0
+
+# Time of a contact in one sweep, of one in an iteration with the linear system, and of a product of two blocks [ns].
+SWEEP_WORK = 25.0
+CONTACT_WORK = 230.0
+BLOCK_WORK = 60.0
+
+# Work that iterations with the system may take, in that of the sweeps allowed: while a pile moves and all is new in the
+# next step; and once it nearly lies, where what is solved once holds for long, and what is not creeps for ever.
+# Fewer iterations than these lead nowhere.
+WORTH_MOVING = 10.0
+WORTH_LYING = 200.0
+LEAST_STEPS = 12
+
+
+@inlined
+def _follow(part, many):
+    """Solve the factored system for the defect and take it off the twists."""
+    _, _, begin, end = part
+    substitute(begin, end, many.defect, many)
+    for i in range(begin, end):
+        b = many.order[i]
+        for c in range(SIZE):
+            many.twist[b, c] -= many.defect[b, c + c // 3]
+
+
+@kernel
+def _newton_step(part, rho, norm, many):
+    """One damped Newton step on the twists from a defect of the given norm: the new (norm, largest velocity)."""
+    _, _, begin, end = part
+    fill_matrix(part, rho, False, many)
+    factor(begin, end, many)
+    for i in range(begin, end):
+        b = many.order[i]
+        for c in range(SIZE):
+            many.before[b, c] = many.twist[b, c]
+        for c in range(COLUMN_SIZE):
+            many.change[b, c] = many.defect[b, c]
+    substitute(begin, end, many.change, many)
+    after, worst, t = norm, 0.0, 1.0
+    for _ in range(HALVINGS):
+        for i in range(begin, end):
+            b = many.order[i]
+            for c in range(SIZE):
+                many.twist[b, c] = many.before[b, c] - t * many.change[b, c + c // 3]
+        after, worst = defect(part, rho, False, many)
+        if after < norm:
+            break
+        t *= 0.5
+    return after, worst
+
+
+@inlined
+def _apply(part, many):
+    """Impulses of the bundles, also contact by contact, and twists from the free ones and them."""
+    _, _, begin, end = part
+    for i in range(begin, end):
+        b = many.order[i]
+        for c in range(SIZE):
+            many.twist[b, c] = many.free[b, c]
+    for g in range(many.counts[BUNDLES]):
+        p = of.three(g, of.IMPULSE, many)
+        of.scatter(g, p, many.impulse, many)
+        of.push(g, p, many.twist, 3, many)
+
+
+@inlined
+def _gather_impulses(many):
+    """Bundle the impulses, the best met so far."""
+    for g in range(many.counts[BUNDLES]):
+        p = of.gather(g, many.impulse, many)
+        of.put_three(g, of.IMPULSE, p, many)
+        of.put_three(g, of.SAVED, p, many)
+
+
+@inlined
+def _save(many):
+    """Remember the impulses as the best met."""
+    for g in range(many.counts[BUNDLES]):
+        of.put_three(g, of.SAVED, of.three(g, of.IMPULSE, many), many)
+
+
+@inlined
+def _take_trial(part, many):
+    """Take the impulses of the last `defect`, as the law allows them, and the twists that belong to them."""
+    for g in range(many.counts[BUNDLES]):
+        of.put_three(g, of.IMPULSE, law(of.three(g, of.TRIAL, many), of.one(g, of.MU, many)), many)
+    _apply(part, many)
+
+
+@inlined
+def _restore(part, many):
+    """Back to the best impulses met."""
+    for g in range(many.counts[BUNDLES]):
+        of.put_three(g, of.IMPULSE, of.three(g, of.SAVED, many), many)
+    _apply(part, many)
+
+
+@kernel
+def _round(part, rho, enough, limit, many):
+    """p(x) at the x that solves x = M⁻¹ Jᵀ p(x) to `enough` [m/s], into `many.impulse` and the twists: Newton steps."""
+    norm, worst = defect(part, rho, False, many)
+    steps = failures = 0
+    while worst > enough and steps < limit and failures <= FAILED_STEPS:
+        after, worst = _newton_step(part, rho, norm, many)
+        steps += 1
+        if not after < norm:
+            failures += 1
+        norm = after
+    _take_trial(part, many)
+    return steps
+
+
+@inlined
+def _heaviest(part, many):
+    """Largest mass among the bodies of the problem [kg]."""
+    mass = 0.0
+    for i in range(part[2], part[3]):
+        mass = max(mass, many.bodies[many.order[i]].mass)
+    return mass
+
+
+@kernel
+def prepare_system(part, sweeps, worth, fewest, many):
+    """Order the bodies for the linear system: the iterations with it that an island is worth, 0 where it is too dear.
+
+    A problem that may take so many sweeps is worth `worth` times their work, and dear where that is fewer than `fewest`
+    iterations: this is known before much work went into it.
+    """
+    first, last, begin, end = part
+    contacts, worth = (last - first) * CONTACT_WORK, worth * sweeps * (last - first) * SWEEP_WORK
+    products = order_bodies(first, last, begin, end, int((worth / fewest - contacts) / BLOCK_WORK), many)
+    if products < 0 or not of.bundle_contacts(first, last, many):
+        return 0
+    return min(int(worth / (contacts + products * BLOCK_WORK)), sweeps)
+
+
+@inlined
+def save_best(part, many):
+    """Remember the impulses as they are as the best of all methods."""
+    for i in range(part[0], part[1]):
+        put(many.best, many.queue[i], 0, vector(many.impulse, many.queue[i], 0))
+
+
+@inlined
+def bring_back_best(part, many):
+    """The best impulses of all methods, and the twists that belong to them."""
+    for i in range(part[2], part[3]):
+        for c in range(SIZE):
+            many.twist[many.order[i], c] = many.free[many.order[i], c]
+    for i in range(part[0], part[1]):
+        k = many.queue[i]
+        put(many.impulse, k, 0, vector(many.best, k, 0))
+        push(k, vector(many.best, k, 0), many.twist, many)
+
+
+@inlined
+def all_push(part, many):
+    """Test whether all contacts of an island push: else not all of them will hold."""
+    for i in range(part[0], part[1]):
+        if not many.impulse[many.queue[i], 0] > 0.0:
+            return False
+    return True
+
+
+@kernel
+def guess_all_hold(part, friction, residual, enough, many):
+    """Impulses as if every contact held, if that makes the residual smaller, down to `enough`; the residual then [m/s].
+
+    The law being linear, its matrix is factored once, and a few rounds of q = p(x) cost little more than one: what
+    stands still is solved so far below the goal that the steps to come find nothing to do.
+    """
+    first, last, begin, end = part
+    rho = HOLD_FACTOR * _heaviest(part, many)
+    _gather_impulses(many)
+    fill_matrix(part, rho, True, many)
+    factor(begin, end, many)
+    for _ in range(HOLD_ROUNDS):
+        defect(part, rho, True, many)
+        _follow(part, many)
+        defect(part, rho, True, many)
+        _take_trial(part, many)
+        now = residual_of(first, last, friction, many)
+        if not now < residual:
+            _restore(part, many)
+            break
+        residual = now
+        _save(many)
+        if residual <= enough:
+            break
+    return residual
+
+
+@kernel
+def newton_contacts(part, friction, residual, goal, limit, scale, many):
+    """Improve the impulses of an island until the residual is within `goal` [m/s].
+
+    Parameters
+    ----------
+    part : tuple of 4 ints
+        Its contacts `many.queue[part[0]:part[1]]` and bodies `many.order[part[2]:part[3]]`. `many.impulse` is the
+        start, `many.free` the twists without any impulse; `many.impulse` and `many.twist` receive the best that was
+        met.
+    residual, goal : float
+        Residual of the start, and tolerance [m/s].
+    limit : int
+        Newton steps at most.
+    scale : float
+        ρ of the first round, in units of the largest mass.
+
+    Returns
+    -------
+    steps : int
+    residual : float
+        [m/s], measured on what is returned.
+    """
+    mass, failures, steps = _heaviest(part, many), 0, 0
+    _gather_impulses(many)
+    while residual > goal and failures <= FAILED_ROUNDS and steps < limit:
+        enough = ROUND_SHARE * min(ENOUGH * goal, residual)
+        steps += max(1, _round(part, scale * mass, enough, min(NEWTON_STEPS, limit - steps), many))
+        now = residual_of(part[0], part[1], friction, many)
+        if now < residual:
+            residual = now
+            _save(many)
+            scale = min(FACTOR_GROWTH * scale, FACTOR_LIMIT)
+        else:
+            failures += 1
+            scale /= FACTOR_LOSS
+            _restore(part, many)
+    return steps, residual

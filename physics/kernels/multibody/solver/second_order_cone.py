@@ -1,0 +1,84 @@
+"""Lorentz cone x₀ ≥ |(x₁, x₂)| and its scaling, of one contact or of four at once, for `interior_point`.
+
+With the product a ∘ b = (a·b, a₀ b' + b₀ a') the cone is that of squares. The scaling of Nesterov and Todd is the
+symmetric W with W p = W⁻¹ u = λ: for the unit vector w = (ū + R p̄)/(2γ), R = diag(1, -1, -1), and η⁴ = det u/det p
+
+    W = η (w₀, w'ᵀ; w', 1 + w' w'ᵀ/(1 + w₀)),    W⁻² = η⁻² (2 R w (R w)ᵀ - R).
+
+References
+----------
+.. [1] Y. E. Nesterov, M. J. Todd, *Self-scaled barriers and interior-point methods for convex programming*, Math.
+       Oper. Res. 22, 1997.
+.. [2] F. Alizadeh, D. Goldfarb, *Second-order cone programming*, Math. Program. 95, 2003.
+"""
+
+from __future__ import annotations
+
+from physics.kernels.compile.decorators import inlined
+from physics.kernels.compile.simd import root
+from physics.kernels.math import quaternion as qt
+
+
+@inlined
+def determinant(a):
+    """a₀² - |a'|², as a product that does not cancel for a' of one component."""
+    size = root(a[1] * a[1] + a[2] * a[2])
+    return (a[0] - size) * (a[0] + size)
+
+
+@inlined
+def scaling(p, u):
+    """((w₀, w₁, w₂, η), λ, 1/√det λ) for p and u inside the cone."""
+    dp, du = root(determinant(p)), root(determinant(u))
+    s, t = 1.0 / dp, 1.0 / du
+    half = 1.0 / root(2.0 + 2.0 * s * t * qt.dot(p, u))  # 1/(2γ)
+    eta = root(du * s)
+    w = (half * (t * u[0] + s * p[0]), half * (t * u[1] - s * p[1]), half * (t * u[2] - s * p[2]), eta)
+    return w, scaled(w, p), 1.0 / (dp * eta)
+
+
+@inlined
+def scaled(w, x):
+    """W x."""
+    d = w[1] * x[1] + w[2] * x[2]
+    f = x[0] + d / (1.0 + w[0])
+    return (w[3] * (w[0] * x[0] + d), w[3] * (x[1] + f * w[1]), w[3] * (x[2] + f * w[2]))
+
+
+@inlined
+def unscaled(w, x):
+    """W⁻¹ x."""
+    return scaled((w[0], -w[1], -w[2], 1.0 / w[3]), x)
+
+
+@inlined
+def unscaled_twice(w, x):
+    """W⁻² x."""
+    s = 1.0 / (w[3] * w[3])
+    d = 2.0 * (w[0] * x[0] - w[1] * x[1] - w[2] * x[2])
+    return (s * (d * w[0] - x[0]), s * (x[1] - d * w[1]), s * (x[2] - d * w[2]))
+
+
+@inlined
+def product(a, b):
+    """a ∘ b."""
+    return (qt.dot(a, b), a[0] * b[1] + b[0] * a[1], a[0] * b[2] + b[0] * a[2])
+
+
+@inlined
+def quotient(b, a, inverse):
+    """x with a ∘ x = b, `inverse` being 1/√det a."""
+    x = (a[0] * b[0] - a[1] * b[1] - a[2] * b[2]) * (inverse * inverse)
+    s = 1.0 / a[0]
+    return (x, s * (b[1] - x * a[1]), s * (b[2] - x * a[2]))
+
+
+@inlined
+def way_out(a, inverse, d):
+    """1/t for the largest t for which a + t d is in the cone, a being inside; at most 0: any.
+
+    The scaling with a/√det a takes a to √det a e and d to h √det a: 1 + t h₀ ≥ t |h'| is required.
+    """
+    s = inverse
+    h = unscaled((s * a[0], s * a[1], s * a[2], 1.0), (s * d[0], s * d[1], s * d[2]))
+    return root(h[1] * h[1] + h[2] * h[2]) - h[0]

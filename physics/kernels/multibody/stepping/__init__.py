@@ -1,0 +1,1 @@
+"""Stages of a step of worlds whose bodies touch each other."""

@@ -1,0 +1,194 @@
+"""Error control of a substep: parts as long as they agree with two of half their length.
+
+Impacts are met in time by a part of any length (`impact`). What is not, and makes an error of first or second order in
+the part where it happens: contacts that open, begin to slip or hold; slow meetings; and contacts whose problem has
+another answer. Halving finds all of them, and what moves smoothly is of second order in between.
+
+Parts are `whole`, 1/2, 1/4, ... of the substep, at multiples of their length, so that a part that is refused begins
+with the first half of it, which is known already. A part that is good for twice its length is followed by one.
+"""
+
+from __future__ import annotations
+
+import math
+
+from physics.kernels.compile.decorators import inlined, kernel
+from physics.kernels.forces.held_loads import set_clock
+from physics.kernels.multibody.data.arrays import CONTACT_COUNT, MEMORY_HEAD, MEMORY_SIZE
+from physics.kernels.multibody.data.contact_set import minus
+from physics.kernels.multibody.stepping.substep import substep_world
+from physics.kernels.state import layout as at
+from physics.kernels.state.body import all_finite, angular_velocity, read_state
+
+# A substep in its shortest parts.
+WHOLE = 2**24
+
+# Error that a part may have, in tolerances of the contact problem: what is left of that in one part, as a velocity, is
+# some of them, and no shorter part shows less.
+PART_ERROR = 100.0
+
+# Where the shortest part does not meet the error, or after so many parts tried, those of the rest of the substep are no
+# shorter than four times it: what has no limit, and what rattles without end, takes no end of parts. There are 12 such
+# lengths, so that this ends after some 600 trials; the longer a part, the later it is refused for this reason.
+GIVE_UP = 4
+PATIENCE = 50
+
+# Tolerance of the contact problems of many bodies, and slop in bounding radii, below which rounding would decide.
+LEAST_TOLERANCE = 1.0e-11
+LEAST_SLOP = 1.0e-12
+
+# Rounding of a position, in units of its last place.
+ROUNDING = 16.0 * 2.0**-52
+
+START, COARSE, MIDDLE = range(3)
+
+
+@inlined
+def _keep(slot, world, kept, memory, report, many, counts):
+    """Keep the world as it is now."""
+    for b in range(many.now.shape[0]):
+        for c in range(many.now.shape[1]):
+            kept.now[slot, b, c] = many.now[b, c]
+    for c in range(MEMORY_HEAD + MEMORY_SIZE * int(memory[world, CONTACT_COUNT])):
+        kept.memory[slot, c] = memory[world, c]
+    for c in range(at.REPORT_SIZE):
+        kept.report[slot, c] = report[world, c]
+    for b in range(many.now.shape[0]):
+        kept.counts[slot, b] = counts[world * many.now.shape[0] + b]
+
+
+@inlined
+def _come_back(slot, world, kept, memory, report, many, counts):
+    """Make the world what it was when it was kept, but for the work that the report counts.
+
+    Events logged since are no more: their rows are written over.
+    """
+    for b in range(many.now.shape[0]):
+        for c in range(many.now.shape[1]):
+            many.now[b, c] = kept.now[slot, b, c]
+    for c in range(MEMORY_HEAD + MEMORY_SIZE * int(kept.memory[slot, CONTACT_COUNT])):
+        memory[world, c] = kept.memory[slot, c]
+    for c in range(at.REPORT_SIZE):
+        if c != at.SOLVES and c != at.ITERATIONS:
+            report[world, c] = kept.report[slot, c]
+    for b in range(many.now.shape[0]):
+        counts[world * many.now.shape[0] + b] = kept.counts[slot, b]
+
+
+@inlined
+def _length(a):
+    return math.sqrt(a[0] * a[0] + a[1] * a[1] + a[2] * a[2])
+
+
+@inlined
+def _apart(b, tilted, kept, many):
+    """Distance of body b from its state `COARSE`, in its radius; and the difference in velocity, in its speed.
+
+    Of its speed counts no less than what its loads give it over its radius.
+    """
+    body = many.bodies[b]
+    x, q, v, L = read_state(many.now, b)
+    y, p, u, K = read_state(kept.now[COARSE], b)
+    way, r = minus(x, y), body.radius
+    same, other = 0.0, 0.0
+    for c in range(4):
+        same += (q[c] - p[c]) ** 2
+        other += (q[c] + p[c]) ** 2
+    pose = _length(way) + 2.0 * r * math.sqrt(min(same, other))
+    pose = max(0.0, pose - ROUNDING * _length(x)) / r
+    w, z = angular_velocity(q, L, body, tilted), angular_velocity(p, K, body, tilted)
+    speed = _length(v) + r * _length(w) + math.sqrt(r * body.acceleration)
+    change = _length(minus(v, u)) + r * _length(minus(w, z))
+    return max(pose, change / speed) if change > 0.0 else pose
+
+
+@inlined
+def _error(tilted, kept, many):
+    """Largest error of any body, 1: all that is allowed."""
+    worst, allowed = 0.0, PART_ERROR * many.settings[0].tolerance
+    for b in range(many.now.shape[0]):
+        found = _apart(b, tilted, kept, many) / allowed
+        if not found <= worst:
+            worst = found
+    return worst
+
+
+@kernel
+def _advance(world, start, h, switches, memory, report, many, log, counts):
+    """One part of h [s], `start` [s] after the call."""
+    friction, gyroscopic, tilted, ellipsoids, hulls, scheme = switches
+    for b in range(many.now.shape[0]):
+        set_clock(start, many.bodies[b])
+        many.touched[b] = 0
+    substep_world(
+        world, start, h, friction, gyroscopic, tilted, ellipsoids, hulls, scheme, None, memory, report, many,
+        log, counts,
+    )  # fmt: skip
+
+
+@kernel
+def _take_part(world, start, unit, part, shortest, switches, kept, memory, report, many, log, counts):
+    """Advance by `part` units of time [s], or by half of it, or a quarter ...: (units taken, error, lengths tried)."""
+    tilted, tried = switches[2], 1
+    _keep(START, world, kept, memory, report, many, counts)
+    _advance(world, start, part * unit, switches, memory, report, many, log, counts)
+    while True:
+        half = 0.5 * part * unit
+        _keep(COARSE, world, kept, memory, report, many, counts)
+        _come_back(START, world, kept, memory, report, many, counts)
+        _advance(world, start, half, switches, memory, report, many, log, counts)
+        _keep(MIDDLE, world, kept, memory, report, many, counts)
+        _advance(world, start + half, half, switches, memory, report, many, log, counts)
+        error = _error(tilted, kept, many)
+        if error <= 1.0 or part <= shortest:
+            return part, error, tried
+        _come_back(MIDDLE, world, kept, memory, report, many, counts)  # the coarse answer of the first half
+        part //= 2
+        tried += 1
+
+
+@inlined
+def _loaded(h, many):
+    """Speed that its loads give the body that they give the least, in h [m/s].
+
+    A part is solved no finer than the halves in which every substep is stepped at least. Its share of that would be
+    less than rounding leaves where bodies turn on edges, and no error is as small.
+    """
+    least = math.inf
+    for b in range(many.now.shape[0]):
+        least = min(least, many.bodies[b].acceleration * h)
+    return least
+
+
+@kernel
+def refine(world, start, h, switches, kept, memory, report, many, log, counts):
+    """Advance the bodies of one world by h [s], `start` [s] after the call, in parts that meet the error.
+
+    Where the shortest part does not meet it either, that is counted as a fallback, and the shortest part of this
+    substep is longer from there on.
+
+    `switches` are friction, gyroscopic, tilted, ellipsoids, hulls and scheme, as in `substep_world`; `kept` is what
+    `arrays.make_kept` makes.
+    """
+    place, shortest, unit, patience = 0, 1, h / WHOLE, PATIENCE
+    next_part = memory.shape[1] - 1
+    many.settings[0].half = _loaded(0.5 * h, many)  # the scale of contact problems, at least
+    part = int(memory[world, next_part] * WHOLE)
+    if part == 0:
+        part = WHOLE
+    while place < WHOLE:
+        now = start + place * unit
+        part, error, tried = _take_part(
+            world, now, unit, part, shortest, switches, kept, memory, report, many, log, counts
+        )  # fmt: skip
+        place += part
+        patience -= tried
+        if not all_finite(many.now):
+            return
+        if error > 1.0:
+            report[world, at.FALLBACKS] += 1.0
+        if error > 1.0 or patience <= 0:
+            shortest, patience = min(GIVE_UP * shortest, WHOLE), PATIENCE
+        part = min(2 * part, WHOLE)  # what rounding leaves is no reason to stay with short ones: it is always tried
+        memory[world, next_part] = part / WHOLE
+        part = min(part, place & -place)

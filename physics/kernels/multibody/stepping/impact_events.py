@@ -1,0 +1,34 @@
+"""Impacts told as events: one for each pair of bodies, or body and wall, that an impulse has passed between."""
+
+from __future__ import annotations
+
+from physics.kernels.compile.decorators import kernel
+from physics.kernels.event_driven import event_log as ev
+from physics.kernels.math import quaternion as qt
+from physics.kernels.multibody.data.contact_set import matrix, plus, vector
+from physics.kernels.state.layout import POS
+
+
+@kernel
+def log_impacts(n, world, t, many, log, counts):
+    """Log the impulses of the n contacts of an impact, which are posed where the bodies are, at the time t [s].
+
+    Contacts of one pair follow each other in the set (`dispatch.find_contacts`). The impulse is that on the first body
+    of the pair, whose events these are, and acts at points of it.
+    """
+    first_row, largest = world * many.now.shape[0], 0.0
+    for k in range(n):
+        largest = max(largest, many.impulse[k, 0])
+    impulse, sums = (0.0, 0.0, 0.0), ((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), 0.0)
+    for k in range(n):
+        a, b = many.ends[k, 0], many.ends[k, 1]
+        p = qt.transposed_matvec(matrix(many.frame, k), vector(many.impulse, k, 0))
+        point = plus(vector(many.now, a, POS), 1.0, vector(many.arm, k, 0))
+        impulse = plus(impulse, 1.0, p)
+        sums = ev.add_share(sums, vector(many.frame, k, 0), many.impulse[k, 0], point)
+        if k + 1 < n and many.ends[k + 1, 0] == a and many.ends[k + 1, 1] == b:
+            continue
+        if sums[2] > ev.ROUNDING * largest:
+            wall, other = (-1 - b, ev.NOBODY) if b < 0 else (-1, b)
+            ev.note_impact(log, counts, first_row + a, t, wall, other, impulse, sums)
+        impulse, sums = (0.0, 0.0, 0.0), ((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), 0.0)

@@ -1,0 +1,97 @@
+"""The displacements that push bodies apart: sweeps along the normals over what an overlap comes to.
+
+Most contacts of a set never move: they begin as they are asked to be, and no body of theirs is pushed. So a contact is
+assembled where it is visited first, and once no sweep comes to a new body only the contacts of bodies that were pushed
+are gone through.
+"""
+
+from __future__ import annotations
+
+import math
+
+from physics.kernels.compile.decorators import inlined, kernel
+from physics.kernels.multibody.solver.block_lu import SPIN
+from physics.kernels.multibody.solver.gauss_seidel import answer_normal, is_answered
+from physics.kernels.multibody.solver.normal_rows import assemble_normal, put_padded, set_moved
+
+# Share of the error allowed within which a contact is left as it is: each that is answered leaves those of two bodies
+# to be visited again.
+LEFT_SHARE = 0.5
+
+# W_nn of a contact that is not assembled yet: that of any other is positive.
+UNKNOWN = 0.0
+
+
+@inlined
+def _begin(n, many):
+    """No displacements, and no contacts to visit but those that are asked to open."""
+    for b in range(many.now.shape[0]):
+        many.pushed[b] = 0
+        put_padded(many.motion, b, 0, (0.0, 0.0, 0.0))
+        put_padded(many.motion, b, SPIN, (0.0, 0.0, 0.0))
+    for k in range(n):
+        many.queue[k] = k
+        many.impulse[k, 0] = 0.0
+        many.block[k, 0] = UNKNOWN
+        many.visited[k] = -1 if many.target[k, 0] > 0.0 else 0
+
+
+@inlined
+def _sweep(count, is_up, visits, goal, many):
+    """Sweep once over `many.queue[:count]`: (largest error of an impulse, visits so far, whether it spread).
+
+    It has spread if it pushed a body that had not been pushed before.
+    """
+    worst, has_spread = 0.0, False
+    for i in range(count):
+        k = many.queue[i if is_up else count - 1 - i]
+        if is_answered(k, many):
+            continue
+        if many.block[k, 0] == UNKNOWN:
+            assemble_normal(k, many)
+        visits += 1
+        a, b = many.ends[k, 0], many.ends[k, 1]
+        is_new = many.pushed[a] == 0 or (b >= 0 and many.pushed[b] == 0)
+        off = answer_normal(k, visits, LEFT_SHARE * goal, many)
+        worst = max(worst, off)
+        has_spread = has_spread or (is_new and many.pushed[a] == visits)
+    return worst, visits, has_spread
+
+
+@inlined
+def _list_all(n, many):
+    for k in range(n):
+        many.queue[k] = k
+    return n
+
+
+@inlined
+def _list_pushed(n, many):
+    """List the contacts of bodies that were pushed: how many."""
+    count = 0
+    for k in range(n):
+        b = many.ends[k, 1]
+        if many.pushed[many.ends[k, 0]] > 0 or (b >= 0 and many.pushed[b] > 0):
+            many.queue[count] = k
+            count += 1
+    return count
+
+
+@kernel
+def part_contacts(n, goal, limit, many):
+    """Displacements `many.twist` that bring the n contacts to their targets within `goal` [m]: how many sweeps.
+
+    `many.pushed` is 0 for bodies that stay where they are.
+    """
+    _begin(n, many)
+    sweeps, visits, count, worst = 0, 0, n, math.inf
+    while worst > goal and sweeps < limit:
+        worst, visits, has_spread = _sweep(count, sweeps % 2 == 0, visits, goal, many)
+        sweeps += 1
+        if has_spread and count < n:
+            count = _list_all(n, many)
+        elif not has_spread and count == n:
+            count = _list_pushed(n, many)
+    for b in range(many.now.shape[0]):
+        set_moved(b, many)
+    return sweeps

@@ -1,0 +1,49 @@
+"""From a posed contact problem to changed momenta."""
+
+from __future__ import annotations
+
+from physics.kernels.compile.decorators import inlined, kernel
+from physics.kernels.math import quaternion as qt
+from physics.kernels.multibody.data.contact_set import matrix, plus, put, vector
+from physics.kernels.multibody.solver.solve import solve_contacts, solve_smoothly
+from physics.kernels.state import layout as at
+
+
+@inlined
+def add_impulses(n, many):
+    """Momenta of the bodies after the contact impulses; v from the solve, L + Σ r x p."""
+    for k in range(n):
+        p = qt.transposed_matvec(matrix(many.frame, k), vector(many.impulse, k, 0))
+        a, b = many.ends[k, 0], many.ends[k, 1]
+        put(many.now, a, at.ANGMOM, plus(vector(many.now, a, at.ANGMOM), 1.0, qt.cross(vector(many.arm, k, 0), p)))
+        put(many.now, a, at.LINVEL, vector(many.twist, a, 0))
+        if b >= 0:
+            put(many.now, b, at.ANGMOM, plus(vector(many.now, b, at.ANGMOM), -1.0, qt.cross(vector(many.arm, k, 3), p)))
+            put(many.now, b, at.LINVEL, vector(many.twist, b, 0))
+
+
+@inlined
+def note_solve(world, solved, tolerance, report):
+    """Add one contact solve (iterations, residual, method) to the world's report."""
+    sweeps, residual, method = solved
+    report[world, at.SOLVES] += 1.0
+    report[world, at.ITERATIONS] += sweeps
+    report[world, at.RESIDUAL] = max(report[world, at.RESIDUAL], residual)
+    report[world, at.SOLVER] = max(report[world, at.SOLVER], float(method))
+    if not residual <= tolerance:
+        report[world, at.UNCONVERGED] += 1.0
+
+
+@kernel
+def settle(n, world, friction, report, many):
+    """Solve the contact problem of the stage, change the momenta of the bodies by it, and note it in the report."""
+    solved = solve_contacts(n, friction, many)
+    add_impulses(n, many)
+    note_solve(world, solved, many.settings[0].tolerance, report)
+
+
+@kernel
+def settle_smoothly(n, many):
+    """`solve_and_apply` without friction, where a solve with it came out wrong; the report has that one already."""
+    solve_smoothly(n, many)
+    add_impulses(n, many)

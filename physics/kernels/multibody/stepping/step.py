@@ -1,0 +1,96 @@
+"""A step of worlds whose bodies touch each other: substeps, each a visible list of stages (`substep`).
+
+Where the plan asks for an error instead of a number of substeps, each of them is cut into parts that meet it
+(`adaptive_substep`).
+
+Where the scene declares it, what has been at rest for long enough then falls asleep and takes part in none of this, but
+for the broad phase, until something wakes it (`sleep`).
+"""
+
+from __future__ import annotations
+
+from physics.kernels.compile.decorators import kernel
+from physics.kernels.event_driven.event_log import drop_events, forget_events
+from physics.kernels.forces.held_loads import bind_fields, set_clock
+from physics.kernels.forces.world_energy_budget import note_reports
+from physics.kernels.multibody.data.contact_set import put
+from physics.kernels.multibody.data.sleeping import all_sleep, doze, sleep_on, wake_world
+from physics.kernels.multibody.data.warm_start import forget
+from physics.kernels.multibody.stepping.adaptive_substep import refine
+from physics.kernels.multibody.stepping.substep import substep_world
+from physics.kernels.parallel.work_stealing import begin, next_world
+from physics.kernels.state import layout as at
+from physics.kernels.state.body import (
+    angular_velocity,
+    bind_body,
+    first_lost,
+    first_overloaded,
+    note_fault,
+    read_state,
+    write_state,
+)
+
+
+@kernel
+def step_many(
+    turns, taken, steps, substeps, h, state, params, shapes, gravity, wrench, friction, restitution, gyroscopic,
+    tilted, ellipsoids, hulls, scheme, kept, sleep, memory, report, many, log, counts,
+):  # fmt: skip
+    """Advance the worlds that no other thread has taken by `steps` steps of `substeps` substeps of h seconds each.
+
+    A world in which a new state is not finite keeps the last good one, and its report counts the fault.
+    Impacts go to `log` (rows, room, EVENT_SIZE), if that has any room, their number to `counts` (rows,).
+    """
+    bodies = shapes.shape[0]
+    world = begin(turns, taken)
+    while True:
+        world = next_world(world, turns, taken)
+        if world < 0:
+            break
+        for c in range(at.REPORT_SIZE):
+            report[world, c] = 0.0
+        forget_events(world, bodies, log, counts)
+        if sleep is not None and sleep_on(world, bodies, wrench, sleep):
+            continue
+        for b in range(bodies):
+            i = world * bodies + b
+            bind_body(world, i, shapes[b], params, gravity, wrench, friction, restitution, tilted, many.bodies[b])
+            many.lightness[b] = params[i, at.INV_MASS]
+            bind_fields(params, i, scheme, many.bodies[b])
+            write_state(many.now, b, read_state(state, i))
+            many.touched[b] = 0
+        lost = max(first_overloaded(many.bodies), first_lost(many.now))
+        if lost >= 0:
+            note_fault(world, lost, report)
+            forget(world, memory)
+            wake_world(world, bodies, sleep)
+            continue
+        for k in range(steps * substeps):
+            if kept is not None:
+                switches = (friction, gyroscopic, tilted, ellipsoids, hulls, scheme)
+                refine(world, k * h, h, switches, kept, memory, report, many, log, counts)
+            else:
+                for b in range(bodies):
+                    set_clock(k * h, many.bodies[b])
+                substep_world(
+                    world, k * h, h, friction, gyroscopic, tilted, ellipsoids, hulls, scheme, sleep, memory, report,
+                    many, log, counts,
+                )  # fmt: skip
+            lost = first_lost(many.now)
+            if lost >= 0:
+                note_fault(world, lost, report)
+                forget(world, memory)
+                drop_events(world, bodies, k * h, log, counts)
+                wake_world(world, bodies, sleep)
+                break
+            if sleep is not None:
+                doze(world, h, sleep, many)
+            for b in range(bodies):
+                write_state(state, world * bodies + b, read_state(many.now, b))
+            if sleep is not None and all_sleep(world, bodies, sleep):
+                break
+        note_reports(report, many, many.bodies[0])
+        for b in range(bodies):
+            i = world * bodies + b
+            _, q, _, L = read_state(state, i)
+            put(state, i, at.ANGVEL, angular_velocity(q, L, many.bodies[b], tilted))

@@ -1,0 +1,67 @@
+"""Calls that stand ready in memory (`codegen.ready`), made one after another: a job is a row of a table of words."""
+
+from __future__ import annotations
+
+from numba.core import types
+from numba.core.callconv import excinfo_ptr_t
+from numba.extending import intrinsic
+
+from physics.kernels.compile.decorators import kernel
+from physics.kernels.compile.fused.folding_builder import WORD, word
+from physics.kernels.compile.fused.prepared_entry import ENTRY, STATUS, WORD_SIZE
+
+# A kernel's entry, the address of its arguments, and what became of the last call: its status and its exception.
+ENTRY_OF, ARGUMENTS, CODE, RAISED, JOB_SIZE = range(5)
+
+
+@intrinsic
+def _enter(typing_context, job):
+    """Make the call at an address; its status."""
+
+    def lower(context, builder, sig, args):
+        row = builder.inttoptr(args[0], WORD.as_pointer())
+        entry, arguments = (builder.load(builder.gep(row, [word(k)])) for k in (ENTRY_OF, ARGUMENTS))
+        raised = builder.bitcast(builder.gep(row, [word(RAISED)]), ENTRY.args[1])
+        code = builder.call(
+            builder.inttoptr(entry, ENTRY.as_pointer()), [builder.inttoptr(arguments, ENTRY.args[0]), raised]
+        )
+        code = builder.sext(code, WORD)
+        builder.store(code, builder.gep(row, [word(CODE)]))
+        return code
+
+    return types.int64(types.int64), lower
+
+
+@kernel
+def perform(jobs, count):
+    """Make the `count` calls of the table at the address `jobs`; whether one raised an exception, which is the last."""
+    for k in range(count):
+        if _enter(jobs + k * (JOB_SIZE * WORD_SIZE)) != 0:
+            return True
+    return False
+
+
+@kernel
+def perform_one(job):
+    """Make one call, of the row at the address `job`; whether it raised an exception. One number less to hand over."""
+    return _enter(job) != 0
+
+
+@intrinsic
+def _raise(typing_context, code, raised):
+    """Leave the kernel with an exception, if the code is that of one."""
+
+    def lower(context, builder, sig, args):
+        code, place = builder.trunc(args[0], STATUS), context.call_conv._get_excinfo_argument(builder.function)
+        with builder.if_then(builder.icmp_unsigned("!=", code, STATUS(0))):
+            builder.store(builder.inttoptr(args[1], excinfo_ptr_t), place)
+            builder.ret(code)
+        return context.get_dummy_value()
+
+    return types.none(types.int64, types.int64), lower
+
+
+@kernel
+def raise_again(code, raised):
+    """Raise what a call raised."""
+    _raise(code, raised)

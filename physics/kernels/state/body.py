@@ -1,0 +1,146 @@
+"""Record of one body for one step: read and prepared once, then handed from stage to stage."""
+
+from __future__ import annotations
+
+import math
+
+from physics.kernels.compile.decorators import inlined, kernel
+from physics.kernels.flight.free_rotation import SERIES_SIZE
+from physics.kernels.math import quaternion as qt
+from physics.kernels.state import layout as at
+
+
+@inlined
+def bind_body(world, i, shape, params, gravity, wrench, friction, restitution, tilted, work):
+    """Write what the step needs of body i into `work`: parameters, and the loads that are held over the step.
+
+    gravity, friction, restitution and tilted are None where the scene does not have them: tilted, where the
+    principal axes of every body are its body axes and its geometric centre is its centre of mass.
+    """
+    inv_mass, radius = params[i, at.INV_MASS], params[i, at.RADIUS]
+    work.i, work.world, work.shape = i, world, shape
+    work.mass, work.radius, work.slop = 1.0 / inv_mass, radius, work.relative_slop * radius
+    for c in range(3):
+        work.J[c] = params[i, at.INV_INERTIA + c]
+        work.dims[c] = params[i, at.DIMENSIONS + c]
+        work.free_acceleration[c] = 0.0
+        if gravity is not None:
+            work.free_acceleration[c] = gravity[world, c]
+        work.free_acceleration[c] += inv_mass * wrench[i, c]
+        work.torque[c] = wrench[i, 3 + c]
+    for c in range(SERIES_SIZE):
+        work.series[c] = params[i, at.SERIES + c]
+    work.mu = work.restitution = 0.0
+    if friction is not None:
+        work.mu = params[i, at.FRICTION]
+    if restitution is not None:
+        work.restitution = params[i, at.RESTITUTION]
+    if tilted is not None:
+        for c in range(4):
+            work.principal[c] = params[i, at.PRINCIPAL + c]
+        for c in range(3):
+            work.center[c] = params[i, at.CENTER + c]
+    a, t, J = work.free_acceleration, work.torque, work.J
+    work.acceleration = math.sqrt(a[0] * a[0] + a[1] * a[1] + a[2] * a[2])
+    turning = max(J[0], J[1], J[2]) * math.sqrt(t[0] * t[0] + t[1] * t[1] + t[2] * t[2])
+    work.acceleration += radius * turning
+
+
+@inlined
+def read_state(state, i):
+    """(x, q, v, L) of row i: position, attitude, velocity, angular momentum."""
+    return (
+        (state[i, at.POS], state[i, at.POS + 1], state[i, at.POS + 2]),
+        (state[i, at.QUAT], state[i, at.QUAT + 1], state[i, at.QUAT + 2], state[i, at.QUAT + 3]),
+        (state[i, at.LINVEL], state[i, at.LINVEL + 1], state[i, at.LINVEL + 2]),
+        (state[i, at.ANGMOM], state[i, at.ANGMOM + 1], state[i, at.ANGMOM + 2]),
+    )
+
+
+@inlined
+def write_state(state, i, y):
+    """Store y = (x, q, v, L) in row i."""
+    x, q, v, L = y
+    state[i, at.POS], state[i, at.POS + 1], state[i, at.POS + 2] = x
+    state[i, at.QUAT], state[i, at.QUAT + 1], state[i, at.QUAT + 2], state[i, at.QUAT + 3] = q
+    state[i, at.LINVEL], state[i, at.LINVEL + 1], state[i, at.LINVEL + 2] = v
+    state[i, at.ANGMOM], state[i, at.ANGMOM + 1], state[i, at.ANGMOM + 2] = L
+
+
+@inlined
+def is_finite(y):
+    """Test whether all numbers of the state are finite, and their squares far from overflow (`layout.LARGEST`)."""
+    x, q, v, L = y
+    turn = (q[0] * q[0] + q[1] * q[1]) + (q[2] * q[2] + q[3] * q[3])
+    return (qt.dot(x, x) + qt.dot(v, v)) + (qt.dot(L, L) + turn) <= at.LARGEST * at.LARGEST
+
+
+@inlined
+def all_finite(now):
+    """Test whether every number of every state in `now` (bodies, STATE_SIZE) is finite."""
+    return first_lost(now) < 0
+
+
+@inlined
+def first_lost(now):
+    """The first body in `now` (bodies, STATE_SIZE) whose state is not finite, -1: none."""
+    for b in range(now.shape[0]):
+        if not is_finite(read_state(now, b)):
+            return b
+    return -1
+
+
+@inlined
+def can_bear(work):
+    """Test whether the loads that `bind_body` has found are finite, and far from overflowing (`layout.LARGEST`)."""
+    return work.acceleration <= at.LARGEST
+
+
+@inlined
+def first_overloaded(bodies):
+    """The first of the records `bodies` with loads that it cannot bear, -1: none."""
+    for b in range(bodies.shape[0]):
+        if not can_bear(bodies[b]):
+            return b
+    return -1
+
+
+@inlined
+def note_fault(world, b, report):
+    """Body b of a world keeps its old state."""
+    report[world, at.FAULTS] += 1.0
+    if report[world, at.FAULTY] == 0.0:
+        report[world, at.FAULTY] = 1.0 + b
+
+
+@inlined
+def principal_attitude(q, work, tilted):
+    """Quaternion of the principal frame from that of the body frame (the same unless `tilted`)."""
+    if tilted is None:
+        return q
+    p = work.principal
+    return qt.multiply(q, (p[0], p[1], p[2], p[3]))
+
+
+@inlined
+def body_attitude(q, work, tilted):
+    """The inverse of `principal_attitude`."""
+    if tilted is None:
+        return q
+    p = work.principal
+    return qt.multiply(q, (p[0], -p[1], -p[2], -p[3]))
+
+
+@inlined
+def turning(R, L, J):
+    """ω = R I⁻¹ Rᵀ L, world frame [rad/s], R the principal frame in the world, J the inverse principal moments."""
+    m = qt.transposed_matvec(R, L)
+    return qt.matvec(R, (J[0] * m[0], J[1] * m[1], J[2] * m[2]))
+
+
+@kernel
+def angular_velocity(q, L, work, tilted):
+    """`turning` of a body with attitude q."""
+    if L[0] == 0.0 and L[1] == 0.0 and L[2] == 0.0:
+        return (0.0, 0.0, 0.0)
+    return turning(qt.to_matrix(principal_attitude(q, work, tilted)), L, work.J)

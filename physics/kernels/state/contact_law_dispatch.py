@@ -1,0 +1,89 @@
+"""Laws of contact beyond Coulomb's that only some scenes declare: which ones is read off the type of the workspace.
+
+As with force fields (`fields.terms`): the workspace has a member `law_rolling` where the scene declares rolling
+friction, its numbers stand in `contact_law_dispatch`, and a kernel that asks for them is compiled per type of the
+workspace. Where none is declared nothing of it is compiled, stored or passed on.
+"""
+
+from __future__ import annotations
+
+from numba.extending import overload
+
+from physics.kernels.compile.decorators import CHOSEN, kernel
+
+# Names of the laws, in the order of their numbers in `work.laws` and of their columns, the last of `params`.
+TANGENTIAL, ROLLING, SPIN, ANISOTROPY = "tangential", "rolling", "spin", "anisotropy"
+STIFFNESS, DAMPING = "stiffness", "damping"
+LAWS = (TANGENTIAL, ROLLING, SPIN, ANISOTROPY, STIFFNESS, DAMPING)
+_PREFIX = "law_"
+
+
+def members(laws: tuple[str, ...]) -> list[tuple]:
+    """Members of a workspace for these laws; none without laws."""
+    if not laws:
+        return []
+    numbers = [("laws", float, (len(laws),)), *((_PREFIX + name, float) for name in laws)]
+    return numbers + [("give", float)] * (STIFFNESS in laws)  # γ of a stage [1/kg], see `compliance`
+
+
+def _declared(work) -> list[str]:
+    """Laws of a workspace, or of the type of one."""
+    names = work.fields if hasattr(work, "fields") else work.dtype.names
+    return [name[len(_PREFIX) :] for name in names if name.startswith(_PREFIX)]
+
+
+def if_law(laws: tuple[str, ...], instead):
+    """Make a function, whose last argument is the workspace, a kernel; where no such law is declared it is `instead`.
+
+    `instead` takes the same arguments and is inlined.
+    """
+
+    def decorate(function):
+        compiled = kernel(function)
+
+        def call(*arguments):
+            return compiled(*arguments)
+
+        def stub(*arguments):
+            return (function if set(laws) & set(_declared(arguments[-1])) else instead)(*arguments)
+
+        @overload(stub, jit_options=CHOSEN, strict=False)
+        def choose(*types):
+            return call if set(laws) & set(_declared(types[-1])) else instead
+
+        stub.__doc__ = function.__doc__
+        return stub
+
+    return decorate
+
+
+def number_of(law: str, otherwise: float = 0.0):
+    """A kernel (work) that gives the number of a law for the body in the workspace; `otherwise` if undeclared."""
+
+    def stub(work):
+        return chosen(work)(work)
+
+    def chosen(work):
+        declared = _declared(work)
+        if law not in declared:
+            return lambda work: otherwise
+        place = declared.index(law)
+        return lambda work: work.laws[place]
+
+    @overload(stub, jit_options=CHOSEN, strict=False)
+    def choose(work):
+        return chosen(work)
+
+    return stub
+
+
+def _nothing(params, i, work):
+    return None
+
+
+@if_law(LAWS, _nothing)
+def bind_laws(params, i, work):
+    """Take the numbers of body i into `work`."""
+    count = work.laws.shape[0]
+    for k in range(count):
+        work.laws[k] = params[i, params.shape[1] - count + k]

@@ -1,0 +1,67 @@
+"""Columns of the arrays that the kernels share: the place of each number of a body.
+
+One row per (world, body), contiguous, so that a step reads what it needs from
+two or three cache lines. `i` is always the flat index world * body_count + body.
+"""
+
+from __future__ import annotations
+
+from physics.kernels.flight.free_rotation import SERIES_SIZE
+
+# --- state (rows, STATE_SIZE): what evolves -------------------------------------------------------------------
+POS = 0  # position of the centre of mass, world frame [m]
+QUAT = 3  # unit quaternion (w, x, y, z), body to world
+LINVEL = 7  # linear velocity, world frame [m/s]
+ANGMOM = 10  # angular momentum about the centre of mass, world frame [kg m²/s]
+ANGVEL = 13  # angular velocity, world frame [rad/s]: derived, refreshed at the end of a step
+STATE_SIZE = 16
+
+# --- parameters (rows, PARAM_SIZE): what a world may have its own value of -------------------------------------
+INV_MASS = 0  # [1/kg]
+INV_INERTIA = 1  # inverse principal moments [1/(kg m²)]
+DIMENSIONS = (
+    4  # half edges of a block, semi-axes of an ellipsoid, radius (three times) of a sphere, reach of a hull [m]
+)
+RADIUS = 7  # of the bounding sphere about the centre of mass [m]
+FRICTION = 8  # Coulomb coefficient against the walls
+RESTITUTION = 9  # normal coefficient against the walls
+PRINCIPAL = 10  # unit quaternion, principal frame to body frame
+SERIES = 14  # coefficients of the free-rotation series
+CENTER = SERIES + SERIES_SIZE  # geometric centre of a block from its centre of mass, body frame [m]
+PARAM_SIZE = CENTER + 3
+
+# --- walls (walls, WALL_SIZE) ----------------------------------------------------------------------------------
+NORMAL = 0  # unit normal, into the free side
+TANGENT_1 = 3
+TANGENT_2 = 6  # normal, tangent 1, tangent 2: right-handed
+OFFSET = 9  # free side: normal·x >= offset [m]
+WALL_SIZE = 10
+
+# --- shapes ----------------------------------------------------------------------------------------------------
+BLOCK = 0
+SPHERE = 1
+ELLIPSOID = 2
+HULL = 3  # its corners stand in tables: `many.hulls`
+
+# Contact features of one body on one wall: the eight vertices of a block, the one support point of the others.
+VERTEX_COUNT = 8
+
+# Numbers of a state, and accelerations, beyond this are a fault [SI]: products of three of them are still finite.
+LARGEST = 1.0e100
+
+# --- report (worlds, REPORT_SIZE) ------------------------------------------------------------------------------
+PENETRATION = 0  # worst depth met [m]
+RESIDUAL = 1  # worst natural-map residual accepted, relative to the free contact speed
+ITERATIONS = 2  # sweeps, all solves together
+SOLVES = 3  # contact problems solved
+FALLBACKS = 4  # of these, by the pivoting fallback
+UNCONVERGED = 5  # of these, with a residual above the tolerance
+FAULTS = 6  # bodies whose new state was not finite or beyond `LARGEST` (their old state was kept)
+SPLITS = 7  # impacts that split a substep
+UNRESOLVED = 8  # substeps with more impacts than allowed: the rest was treated as plastic
+SOLVER = 9  # the strongest method needed: 0 none, 1 direct, 2 sweeps, 3 pivoting, 4 Newton's on all bodies
+LEFT_OUT = 10  # contacts and near pairs for which there was no room
+OVERLAP = 11  # deepest overlap of two bodies that were put where they overlap [m], 0 where that is little
+FAULTY = 12  # 1 + the first body at fault, 0: none
+COARSE = 13  # bodies that moved in fields which the step does not resolve
+REPORT_SIZE = 14

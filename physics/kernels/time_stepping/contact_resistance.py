@@ -1,0 +1,159 @@
+"""Torques of contact on round bodies: rolling friction, spin friction and tangential restitution.
+
+Rolling and spin friction are torques. With the normal impulse p of a contact, ω its angular velocity, n the normal,
+
+    across the normal   |T| <= a p,    T against ω - (n·ω) n   (rolling)
+    along the normal    |T| <= b p,    T against (n·ω) n       (spin)
+
+each as large as it may be while there is turning for it to oppose, and no larger than stops it. The stage knows p only
+when its contacts are solved, and friction answers to the torque: a ball that rolls is slowed by it as a whole, one
+that slides is not. So the stage is solved again with the whole torque among the loads of the body, and where that
+would turn the body round, with the share of it that leaves no turning (it is found by false position: between the
+changes from sticking to sliding the contact problem is linear).
+
+Tangential restitution is a target of the impact: the point of contact leaves with -e_t times its tangential velocity,
+as far as Coulomb's cone lets it.
+
+References
+----------
+C. A. Coulomb, *Théorie des machines simples*, 1785, for rolling friction in proportion to the load; P. Contensou,
+*Couplage entre frottement de glissement et frottement de pivotement*, 1962, for the torque of a spinning contact
+(3π/16 μ times the radius of Hertz's patch); O. R. Walton, *Numerical simulation of inelastic, frictional
+particle-particle interactions*, 1993, for e_t with friction; R. L. Garwin, *Kinematics of an ultraelastic rough ball*,
+Am. J. Phys. 37, 1969, for the superball.
+"""
+
+from __future__ import annotations
+
+import math
+
+from physics.kernels.compile.decorators import inlined, kernel
+from physics.kernels.contact_solver.impulse_distribution import wall_axis
+from physics.kernels.contact_solver.solve import solve_contacts
+from physics.kernels.half_space.contact_point import wall_normal, wall_of
+from physics.kernels.math import quaternion as qt
+from physics.kernels.state.body import angular_velocity, turning
+from physics.kernels.state.contact_law_dispatch import ROLLING, SPIN, TANGENTIAL, if_law, number_of
+from physics.kernels.state.layout import BLOCK, TANGENT_1, TANGENT_2
+
+# Solutions of the contact problem for one torque at most; two are usual, one where the body goes on turning.
+TRIALS = 5
+
+# A body stands still when the torque's power is this share of what it was without it: some roundings.
+STILL = 1.0e-13
+
+# Share by which rounding may let the energy of an impact grow.
+GAIN = 1.0e-12
+
+rolling_radius = number_of(ROLLING)
+spin_radius = number_of(SPIN)
+tangential_share = number_of(TANGENTIAL)
+
+
+@inlined
+def _added(L, s, T):
+    return (L[0] + s * T[0], L[1] + s * T[1], L[2] + s * T[2])
+
+
+@inlined
+def _against(n, width, across, along, w, work):
+    """Angular impulse against the turning w, of the normal impulses in `work`, with arms across and along normals."""
+    x = y = z = 0.0
+    for k in range(n):
+        p = max(work.impulse[width * k], 0.0)
+        N = wall_normal(work.walls, wall_of(work.slot[k], work))
+        spin = qt.dot(N, w)
+        r = (w[0] - spin * N[0], w[1] - spin * N[1], w[2] - spin * N[2])
+        size = math.sqrt(qt.dot(r, r))
+        a = -across * p / size if size > 0.0 else 0.0
+        b = -math.copysign(along * p, spin) if spin != 0.0 else 0.0
+        x, y, z = x + (a * r[0] + b * N[0]), y + (a * r[1] + b * N[1]), z + (a * r[2] + b * N[2])
+    return (x, y, z)
+
+
+@kernel
+def _resist(n, friction, smooth, pivots, across, along, v, L, solved, R, work):
+    """One torque: what `solve_contacts` gives with it, and L with it but without the contacts."""
+    width = 1 if friction is None else 3
+    w = turning(R, solved[1], work.J)
+    T = _against(n, width, across, along, w, work)
+    start = qt.dot(T, w)
+    if not start < 0.0:
+        return solved, L
+    low, high, at_low, at_high, s = 0.0, 1.0, start, 0.0, 1.0
+    for trial in range(TRIALS):
+        solved = solve_contacts(n, friction, smooth, pivots, v, _added(L, s, T), R, work)
+        power = qt.dot(T, turning(R, solved[1], work.J))
+        if (s == 1.0 and not power > 0.0) or abs(power) <= -STILL * start or trial == TRIALS - 1:
+            break
+        if power > 0.0:
+            high, at_high = s, power
+        else:
+            low, at_low = s, power
+        s = low - at_low * (high - low) / (at_high - at_low)
+    return solved, _added(L, s, T)
+
+
+def _as_solved(n, friction, smooth, pivots, v, L, solved, R, work):
+    return solved
+
+
+@if_law((ROLLING, SPIN), _as_solved)
+def resist_turning(n, friction, smooth, pivots, v, L, solved, R, work):
+    """Result of `solve_contacts` for v and L, with the torques of rolling and spin friction on a round body."""
+    if work.shape == BLOCK:
+        return solved
+    across, along = rolling_radius(work), spin_radius(work)
+    if across > 0.0:
+        solved, L = _resist(n, friction, smooth, pivots, across, 0.0, v, L, solved, R, work)
+    if along > 0.0:
+        solved, L = _resist(n, friction, smooth, pivots, 0.0, along, v, L, solved, R, work)
+    return solved
+
+
+def _no_aim(*arguments):
+    return None
+
+
+@inlined
+def aim_at(k, y, tilted, work):
+    """Target along the wall of contact k, from the velocity of its point."""
+    _, q, v, L = y
+    w = angular_velocity(q, L, work, tilted)
+    u = qt.cross(w, (work.arm[k, 0], work.arm[k, 1], work.arm[k, 2]))
+    u = (u[0] + v[0], u[1] + v[1], u[2] + v[2])
+    share, wall = tangential_share(work), wall_of(work.slot[k], work)
+    work.target[k, 1] = -share * qt.dot(wall_axis(work.walls, wall, TANGENT_1), u)
+    work.target[k, 2] = -share * qt.dot(wall_axis(work.walls, wall, TANGENT_2), u)
+
+
+@if_law((TANGENTIAL,), _no_aim)
+def aim_tangential(n, bounce_speed, y, tilted, work):
+    """Targets along the wall of the one contact that bounces; where several do, friction alone acts along them."""
+    bouncing, found = 0, 0
+    for i in range(n):
+        if -work.speed[i] > bounce_speed:
+            bouncing, found = bouncing + 1, i
+    if bouncing == 1:
+        aim_at(found, y, tilted, work)
+
+
+@inlined
+def _energy(v, L, R, work):
+    """Kinetic energy [J]."""
+    return 0.5 * (work.mass * qt.dot(v, v) + qt.dot(L, turning(R, L, work.J)))
+
+
+@if_law((TANGENTIAL,), _as_solved)
+def without_gain(n, friction, smooth, pivots, v, L, solved, R, work):
+    """Result of `solve_contacts` for v and L; where that has gained energy, the one without `aim_tangential`.
+
+    A sphere's only contact cannot gain any: what it does along the wall and across does not mix. That of a sphere
+    which at the same time rests on another wall can, its coefficients there being others.
+    """
+    if n == 1 or not _energy(solved[0], solved[1], R, work) > (1.0 + GAIN) * _energy(v, L, R, work):
+        return solved
+    for i in range(n):
+        work.target[i, 1] = work.target[i, 2] = 0.0
+        work.impulse[3 * i] = work.impulse[3 * i + 1] = work.impulse[3 * i + 2] = 0.0
+    return solve_contacts(n, friction, smooth, pivots, v, L, R, work)

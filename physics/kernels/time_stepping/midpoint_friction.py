@@ -1,0 +1,141 @@
+"""Friction of a stage against the mean of the slip velocities before and after it: of second order.
+
+In Moreau's step the friction of the whole stage opposes the slip velocity u¹ at its end: an error of first order
+wherever the direction of sliding turns, and that of a vertex may turn by 90° within a few steps. Against the mean
+½ (u⁰ + u¹) it is the midpoint rule, of second order, and its work, -μ p_n |½ (u⁰ + u¹)|, is what the energy loses:
+that of any impulse is its product with the mean velocity. To the solver, which asks for friction against u less its
+target, that is the target -u⁰.
+
+Such friction cannot stop a contact, only turn it round. Where it does, u¹·u⁰ < 0, the stage is solved once more with
+friction against u¹. So are stages in which nothing slips at first.
+"""
+
+from __future__ import annotations
+
+import math
+
+from physics.kernels.compile.decorators import inlined
+from physics.kernels.contact_law.anisotropic_friction import friction_ratio
+from physics.kernels.contact_solver.impulse_distribution import contact_arm
+from physics.kernels.contact_solver.solve import solve_contacts
+from physics.kernels.half_space.contact_point import wall_of
+from physics.kernels.math import quaternion as qt
+from physics.kernels.state.body import turning
+from physics.kernels.state.contact_law_dispatch import STIFFNESS, if_law
+from physics.kernels.state.layout import SPHERE, TANGENT_1
+
+# Contacts of a stage at most, `mean_slip` of the settings, for `physics.Accuracy.slip`. The slips of a face turn
+# slowly, as a whole, and a solve more is dear there.
+FEW = 2
+
+# A contact that held slips by less than this many times the error of its target.
+MARGIN = 2.0
+
+
+@inlined
+def _tangential(i, v, w, work):
+    """Tangential velocity of the body at contact i [m/s]."""
+    walls, k = work.walls, wall_of(work.slot[i], work)
+    m = qt.cross(w, contact_arm(work, i))
+    x, y, z = v[0] + m[0], v[1] + m[1], v[2] + m[2]
+    t = TANGENT_1
+    return (
+        walls[k, t] * x + walls[k, t + 1] * y + walls[k, t + 2] * z,
+        walls[k, t + 3] * x + walls[k, t + 4] * y + walls[k, t + 5] * z,
+    )
+
+
+@inlined
+def _least_slip(w, h, work):
+    """Slip at the start of a stage up to which a contact holds [m/s].
+
+    What the target of a contact that held (`target_velocity.aim_rest`) left over in the stage before: the tolerance of
+    its solve, and h² (ω α + ω³ r) but of a sphere, whose arm does not turn with it.
+    """
+    least = work.tolerance * work.acceleration * h
+    if work.shape == SPHERE:
+        return least
+    square = qt.dot(w, w)
+    return least + MARGIN * h * math.sqrt(square) * h * (work.acceleration + work.radius * square)
+
+
+@inlined
+def oppose_mean_slip(n, v, w, h, work):
+    """Let friction oppose the mean slip of the stage: whether all contacts slip.
+
+    Parameters
+    ----------
+    v, w : tuples of 3 floats
+        Velocity and angular velocity before the impulses, at the attitude of the middle of the stage.
+    h : float
+        Length of the stage [s].
+
+    Notes
+    -----
+    Changes the tangents of `work.target`, which `target_velocity.aim_rest` has set: what the turning of its arm takes
+    from a contact in half a stage (kept in `work.held`). Added to the velocity at the middle it gives the one at the
+    start.
+    """
+    least = _least_slip(w, h, work)
+    for i in range(n):
+        a, b = _tangential(i, v, w, work)
+        a, b = a + work.target[i, 1], b + work.target[i, 2]
+        if not a * a + b * b > least * least:
+            return False
+    for i in range(n):
+        a, b = _tangential(i, v, w, work)
+        work.held[i, 0], work.held[i, 1] = work.target[i, 1], work.target[i, 2]
+        work.target[i, 1], work.target[i, 2] = -a, -b
+    return True
+
+
+@inlined
+def oppose_end_slip(n, work):
+    """Take `oppose_mean_slip` back."""
+    for i in range(n):
+        work.target[i, 1], work.target[i, 2] = work.held[i, 0], work.held[i, 1]
+
+
+@inlined
+def has_turned_round(n, v, w, work):
+    """Test whether the slip of a contact that pushes is against the one before, -`work.target`, after impulses."""
+    ratio = friction_ratio(work)
+    for i in range(n):
+        a, b = _tangential(i, v, w, work)
+        b *= ratio * ratio  # both slips stretched (`anisotropic_friction`)
+        if work.impulse[3 * i] > 0.0 and a * work.target[i, 1] + b * work.target[i, 2] > 0.0:
+            return True
+    return False
+
+
+def _as_solved(n, friction, smooth, pivots, v, w, solved, free, R, h, work):
+    return solved
+
+
+@if_law((STIFFNESS,), _as_solved)
+def without_gift(n, friction, smooth, pivots, v, w, solved, free, R, h, work):
+    """Result of `solve_contacts` for `free` (v, L); if friction gave energy, that with friction against the mean slip.
+
+    An impulse p adds p·½(u⁰ + u¹). Friction that stops a contact adds ½ p_t·u⁰, which in a rigid impact the normal
+    impulse outweighs. A spring pushes as much as it is deep, not as much as would do that.
+
+    Parameters
+    ----------
+    v, w : tuples of 3 floats
+        Velocity and angular velocity before the stage, at the attitude R of its middle.
+    """
+    if friction is None:
+        return solved
+    w_new = turning(R, solved[1], work.J)
+    gift = push = 0.0
+    for i in range(n):
+        a, b = _tangential(i, v, w, work)
+        c, d = _tangential(i, solved[0], w_new, work)
+        gift += 0.5 * (work.impulse[3 * i + 1] * (a + c) + work.impulse[3 * i + 2] * (b + d))
+        push += work.impulse[3 * i]
+    if not gift > (1.0 + work.mu) * push * work.tolerance * work.acceleration * h:
+        return solved
+    for i in range(n):
+        a, b = _tangential(i, v, w, work)
+        work.target[i, 1], work.target[i, 2] = -a, -b
+    return solve_contacts(n, friction, smooth, pivots, free[0], free[1], R, work)

@@ -1,0 +1,112 @@
+"""A step of worlds whose bodies springs tie together and that touch nothing: all bodies of a world at once.
+
+`physics.kernels.time_stepping.step` advances each body to the end of the call before it looks at the next; here all of
+them go from stage to stage together. Where bodies may touch something it is `physics.kernels.multibody.stepping.step`
+that does so.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from physics.kernels.compile.decorators import kernel
+from physics.kernels.flight.free_flight import coast
+from physics.kernels.forces.force_field_dispatch import Term
+from physics.kernels.forces.held_loads import bind_fields, set_clock
+from physics.kernels.forces.two_body_spring import hold_linked_loads
+from physics.kernels.forces.world_energy_budget import note_reports, note_start, pay_together
+from physics.kernels.parallel.work_stealing import begin, next_world
+from physics.kernels.state import layout as at
+from physics.kernels.state.body import (
+    angular_velocity,
+    bind_body,
+    first_lost,
+    first_overloaded,
+    note_fault,
+    read_state,
+    write_state,
+)
+from physics.kernels.time_stepping.spring_coupled_extrapolation import PLANES, SIZE, step_smooth
+from physics.kernels.time_stepping.workspace import body_fields
+
+
+class Linked(NamedTuple):
+    """Bodies of the world that a thread is at."""
+
+    bodies: np.ndarray  # records: parameters and loads, see `workspace.body_fields`
+    now: np.ndarray  # states, columns of `layout`
+    touched: np.ndarray  # 0: no body is in contact
+    room: np.ndarray  # states and rates of `spring_coupled_extrapolation`
+    tolerance: float
+    most: int  # steps of `spring_coupled_extrapolation` in one of the caller's at most
+
+
+def make_linked(
+    bodies: int, terms: tuple[Term, ...], *, relative_slop: float, tolerance: float, splits: int, **settings: float
+) -> Linked:
+    """Scratch for worlds of so many bodies in these fields, with numerical settings."""
+    rows = np.zeros(bodies, np.dtype(body_fields(terms)))
+    rows["relative_slop"] = relative_slop
+    now, touched, room = np.zeros((bodies, at.STATE_SIZE)), np.zeros(bodies, np.int64), np.zeros((PLANES, bodies, SIZE))
+    return Linked(rows, now, touched, room, float(tolerance), int(splits))
+
+
+@kernel
+def _substep(h, gyroscopic, tilted, scheme, linked):
+    """All bodies after h by the loads of the middle."""
+    hold_linked_loads(h, gyroscopic, tilted, linked)
+    note_start(tilted, linked, linked.bodies[0])
+    for b in range(linked.now.shape[0]):
+        y = coast(read_state(linked.now, b), h, gyroscopic, tilted, scheme, linked.bodies[b])
+        write_state(linked.now, b, y)
+    pay_together(h, 1, tilted, linked, linked.bodies[0])
+
+
+@kernel
+def step_linked(
+    turns, taken, steps, substeps, h, state, params, shapes, gravity, wrench, gyroscopic, tilted, scheme, held, events,
+    report, linked,
+):  # fmt: skip
+    """Advance the worlds that no other thread has taken by `steps` steps of `substeps` substeps of h seconds each.
+
+    Of the switches `held` and `events` one is on: loads held over the step, or motion to the tolerance. A world in
+    which a new state is not finite keeps the last good one, and its report counts the fault.
+    """
+    bodies = shapes.shape[0]
+    world = begin(turns, taken)
+    while True:
+        world = next_world(world, turns, taken)
+        if world < 0:
+            break
+        for c in range(at.REPORT_SIZE):
+            report[world, c] = 0.0
+        for b in range(bodies):
+            i = world * bodies + b
+            bind_body(world, i, shapes[b], params, gravity, wrench, None, None, tilted, linked.bodies[b])
+            bind_fields(params, i, scheme, linked.bodies[b])
+            write_state(linked.now, b, read_state(state, i))
+        lost = first_overloaded(linked.bodies)
+        if lost >= 0:
+            note_fault(world, lost, report)
+            continue
+        for k in range(steps * substeps):
+            for b in range(bodies):
+                set_clock(k * h, linked.bodies[b])
+            if held is not None:
+                _substep(h, gyroscopic, tilted, scheme, linked)
+            if events is not None:
+                step_smooth(world, h, tilted, report, linked)
+            lost = first_lost(linked.now)
+            if lost >= 0:
+                note_fault(world, lost, report)
+                break
+            for b in range(bodies):
+                write_state(state, world * bodies + b, read_state(linked.now, b))
+        note_reports(report, linked, linked.bodies[0])
+        for b in range(bodies):
+            i = world * bodies + b
+            _, q, _, L = read_state(state, i)
+            w = angular_velocity(q, L, linked.bodies[b], tilted)
+            state[i, at.ANGVEL], state[i, at.ANGVEL + 1], state[i, at.ANGVEL + 2] = w

@@ -1,0 +1,292 @@
+"""A step of every world: the visible list of stages.
+
+A body's substep is cut where a feature meets a wall (time of impact), so that impulses act where and when
+bodies meet, and between the cuts
+
+- in the air: exact flight (`free_flight.fly`);
+- touching:   Moreau's midpoint step (`contact_stages.touch`). Half a free drift, the contact problem at the middle,
+  half a free drift.
+
+Moreau, *Unilateral contact and dry friction in finite freedom dynamics*, 1988, for the midpoint step; what
+differs are the cut at impacts, the target velocity at the step's end (`target_velocity.aim_rest`) and friction against
+the mean slip of few contacts (`midpoint_friction`), which together make the scheme second order between impacts and
+exact on parabolas.
+
+What a scene does not have arrives here as None and is pruned by the compiler (see `decorators.kernel`).
+
+What takes a state and gives one is inlined here and below: to hand thirteen numbers on through memory, both ways and
+call after call in the longest chain of the step, took a quarter of the time of a block at rest.
+"""
+
+from __future__ import annotations
+
+from physics.kernels.compile.decorators import inlined, kernel
+from physics.kernels.contact_law.compliance import lift_to_due, stiffness
+from physics.kernels.contact_law.restitution_energy import lifted_to
+from physics.kernels.event_driven.event_log import drop_events, forget_events
+from physics.kernels.flight.free_flight import coast
+from physics.kernels.forces.energy_budget import misses_work, paid
+from physics.kernels.forces.held_loads import (
+    bind_fields,
+    hold_contact_loads,
+    hold_loads,
+    hold_mean_loads,
+    hold_softened_loads,
+    pass_time,
+    set_clock,
+)
+from physics.kernels.forces.resolution_limits import is_stiff, note_report
+from physics.kernels.forces.stiff_flight import graded_flight
+from physics.kernels.half_space.conservative_advancement import FAR_TURN, MOST_CUTS, may_turn, stage_of_turning
+from physics.kernels.half_space.contact_set import (
+    gap_of,
+    gap_rate,
+    gather,
+    nearest_outside_set,
+    push_out,
+    what_is_behind,
+)
+from physics.kernels.half_space.safe_substeps import clear_substeps
+from physics.kernels.math.parabolic_root import crossing, second_difference
+from physics.kernels.math.quaternion import to_matrix
+from physics.kernels.parallel.work_stealing import begin, next_world
+from physics.kernels.state import layout as at
+from physics.kernels.state.body import (
+    angular_velocity,
+    bind_body,
+    can_bear,
+    is_finite,
+    note_fault,
+    read_state,
+    write_state,
+)
+from physics.kernels.state.contact_law_dispatch import bind_laws
+from physics.kernels.state.sleeping import falls_asleep, laid_down, sleeps_on
+from physics.kernels.time_stepping.contact_stages import CONTACT_COUNT, impact, store_warm_start, touch
+
+# Trials of one time of impact: a secant, then parabolas through the last three. Three are usual.
+IMPACT_TRIALS = 16
+
+
+@inlined
+def has_touched(memory, i):
+    """Test whether a body had contacts in its last stage: its bounding sphere touches a wall, or has just left it."""
+    return memory[i, CONTACT_COUNT] > 0.0
+
+
+@inlined
+def forget_contacts(memory, i, work):
+    """Clear the contact memory of a body in the air."""
+    if has_touched(memory, i):
+        store_warm_start(0, 0, memory, i, 0.0, work)
+
+
+@inlined
+def fly_stage(y, h, gyroscopic, tilted, scheme, work):
+    """Free motion over h under the loads that are held; where these are stiff, cut into parts."""
+    return graded_flight(coast(y, h, gyroscopic, tilted, scheme, work), y, h, gyroscopic, tilted, scheme, work)
+
+
+@inlined
+def advance(n, y, h, friction, smooth, gyroscopic, tilted, pivots, scheme, memory, report, work):
+    """One stage of length h: flight when nothing touches, else Moreau's step."""
+    if n > 0:
+        hold_contact_loads(y, h, gyroscopic, tilted, work)
+        end = touch(n, y, h, friction, smooth, gyroscopic, tilted, pivots, memory, report, work)
+        if hold_mean_loads(y, end, h, gyroscopic, tilted, work):
+            end = touch(n, y, h, friction, smooth, gyroscopic, tilted, pivots, memory, report, work)
+        if is_stiff(work) and misses_work(y, end, h, tilted, work):
+            hold_softened_loads(y, h, gyroscopic, tilted, work)
+            end = touch(n, y, h, friction, smooth, gyroscopic, tilted, pivots, memory, report, work)
+        return paid(y, end, h, False, tilted, work)
+    hold_loads(y, h, gyroscopic, tilted, work)
+    forget_contacts(memory, work.i, work)
+    return fly_stage(y, h, gyroscopic, tilted, scheme, work)
+
+
+@inlined
+def outside_gap(y, tilted, work):
+    """Smallest gap of what is not in the contact set [m], and the slot of its feature."""
+    return nearest_outside_set(y[0], to_matrix(y[1]), tilted, work)
+
+
+@inlined
+def contact_set(y, h, tilted, memory, work):
+    """Gather the contact set at y for a stage of length h: (count, depth)."""
+    return gather(y, angular_velocity(y[1], y[3], work, tilted), h, tilted, memory, work)
+
+
+@inlined
+def has_same_pose(y, z):
+    """Test whether two states have the same position and attitude, to the last bit."""
+    return y[0] == z[0] and y[1] == z[1]
+
+
+@inlined
+def kept_out(y, tilted, work):
+    """y, pushed out of the walls where it is deeper in than the slop: what turns by radians in a step may be so."""
+    return lifted_to(push_out(y[0], to_matrix(y[1]), tilted, work), y, tilted, work)
+
+
+@kernel
+def shortened_stage(n, y, end, h, friction, smooth, gyroscopic, tilted, pivots, scheme, memory, report, work):
+    """A stage over h that ends at `end`, where a feature has passed through a wall, up to that: (state, time advanced).
+
+    It is shortened until that feature is within half a slop of the wall: `parabolic_root` of its gap. Another one that
+    is through the wall by then is sought instead. The gap of one feature is smooth; the smallest of all has kinks,
+    before which a parabola would creep along a wall that nothing hits. Where impulses leap from one time to the next
+    one, as those that no method solves may, nothing is between: the last state that was outside is taken.
+    """
+    t, low, low_gap, high, high_gap, bend, slot = h, 0.0, 0.0, h, 0.0, 0.0, -1
+    low_end = y
+    for _ in range(IMPACT_TRIALS):
+        gap, nearest = outside_gap(end, tilted, work)
+        if nearest != slot and gap < -0.5 * work.slop:
+            slot, high, high_gap = nearest, t, gap
+            low_gap = max(gap_of(slot, low_end[0], to_matrix(low_end[1]), tilted, work), 0.0)
+            rate = gap_rate(slot, low_end, tilted, work)
+            bend = ((high_gap - low_gap) / (high - low) - rate) / (high - low)
+        else:
+            if nearest != slot:
+                gap = gap_of(slot, end[0], to_matrix(end[1]), tilted, work)
+            if abs(gap) <= 0.5 * work.slop:
+                break
+            bend = second_difference(low, low_gap, t, gap, high, high_gap)
+            if gap > 0.0:
+                low, low_gap, low_end = t, gap, end
+            else:
+                high, high_gap = t, gap
+        t = low + crossing(low_gap, high_gap, high - low, bend)
+        if not t < high:  # nor where low and high are one, and t is not a number
+            end, t = low_end, low
+            break
+        end = advance(n, y, t, friction, smooth, gyroscopic, tilted, pivots, scheme, memory, report, work)
+        if has_same_pose(end, y):
+            break
+    return end, t
+
+
+@inlined
+def to_next_impact(n, y, h, friction, smooth, gyroscopic, tilted, pivots, scheme, memory, report, work):
+    """Advance by h, or to the first impact within h: (state, time advanced, whether it may be deep in a wall).
+
+    An end state in which a feature outside the contact set has passed through a wall is taken back, and the stage
+    shortened (`shortened_stage`: apart, so that what is hardly ever needed takes no part in what always is).
+    """
+    end = advance(n, y, h, friction, smooth, gyroscopic, tilted, pivots, scheme, memory, report, work)
+    if has_same_pose(end, y):
+        return end, h, False
+    has_passed, is_deep = what_is_behind(end[0], to_matrix(end[1]), tilted, work)
+    if work.is_last or not has_passed:
+        return end, h, is_deep
+    end, t = shortened_stage(n, y, end, h, friction, smooth, gyroscopic, tilted, pivots, scheme, memory, report, work)
+    return end, t, True
+
+
+@inlined
+def substep(y, start, h, friction, smooth, gyroscopic, tilted, pivots, scheme, memory, report, work, log, counts):
+    """State after h, `start` after the call [s]: impacts where they happen, flight or contact between them.
+
+    When a substep has used up its cuts its rest is one plastic stage that takes in all it would pass through. Cuts for
+    what turns far (`conservative_advancement`) are counted apart; when they are used up it is looked at as what turns
+    little is.
+    """
+    left, splits, cuts = h, 0, 0
+    world = work.world
+    work.is_last = 0
+    while True:
+        if splits == work.splits:
+            report[world, at.UNRESOLVED] += 1.0
+            work.is_last = 1
+        hold_loads(y, left, gyroscopic, tilted, work)
+        n, depth = contact_set(y, left, tilted, memory, work)
+        if n > 0:
+            report[world, at.PENETRATION] = max(report[world, at.PENETRATION], depth)
+            if not work.is_last and not stiffness(work) > 0.0:
+                y = impact(
+                    n, y, start + (h - left), left, friction, smooth, tilted, pivots, memory, report, work, log, counts
+                )  # fmt: skip
+        span = left
+        if scheme is None:  # noqa: SIM102 (a branch of its own is what the compiler prunes)
+            if cuts < MOST_CUTS and may_turn(y[3], h, FAR_TURN, tilted, work) and not work.is_last:
+                span = stage_of_turning(n, y, h, left, gyroscopic, tilted, work)
+        end, t, is_deep = to_next_impact(
+            n, y, span, friction, smooth, gyroscopic, tilted, pivots, scheme, memory, report, work
+        )
+        if t == span and span < left:
+            cuts += 1
+            if cuts == MOST_CUTS:
+                report[world, at.UNRESOLVED] += 1.0
+        else:
+            splits += 1
+        left -= t
+        pass_time(t, work)
+        if is_deep and n > 0 and not stiffness(work) > 0.0:
+            end = kept_out(end, tilted, work)
+        y = lift_to_due(n, y, end, t, tilted, report, work)
+        if work.is_last or not left > 0.0:
+            break
+        report[world, at.SPLITS] += 1.0
+    return y
+
+
+@kernel
+def step_worlds(
+    turns, taken, steps, substeps, h, state, params, shapes, gravity, wrench, contact, friction, smooth, restitution,
+    gyroscopic, tilted, pivots, scheme, sleep, memory, report, scratch, log, counts,
+):  # fmt: skip
+    """Advance the worlds that no other thread has taken by `steps` steps of `substeps` substeps of h seconds each.
+
+    A body in flight looks for walls only when it could be near one (`safe_substeps`; what touched is), one that sleeps
+    for nothing (`sleep`, None where the scene does not declare it). A body whose new state is not finite keeps the old
+    one, and its world's report counts the fault. Impacts go to `log` (rows, room, EVENT_SIZE), if that has any room,
+    their number to `counts` (rows,).
+    """
+    work = scratch[0]
+    bodies = shapes.shape[0]
+    world = begin(turns, taken)
+    while True:
+        world = next_world(world, turns, taken)
+        if world < 0:
+            break
+        for c in range(at.REPORT_SIZE):
+            report[world, c] = 0.0
+        forget_events(world, bodies, log, counts)
+        for b in range(bodies):
+            i = world * bodies + b
+            if sleep is not None and sleeps_on(i, wrench, sleep):
+                continue
+            bind_body(world, i, shapes[b], params, gravity, wrench, friction, restitution, tilted, work)
+            if not can_bear(work):
+                note_fault(world, b, report)
+                continue
+            bind_fields(params, i, scheme, work)
+            bind_laws(params, i, work)
+            y, clear = read_state(state, i), 0
+            for k in range(steps * substeps):
+                set_clock(k * h, work)
+                hold_loads(y, h, gyroscopic, tilted, work)
+                if contact is not None and clear == 0 and not has_touched(memory, i):
+                    clear = clear_substeps(y[0], y[2], h, steps * substeps - k, work)
+                    if clear > 0:
+                        forget_contacts(memory, i, work)
+                if contact is not None and clear == 0:
+                    new = substep(
+                        y, k * h, h, friction, smooth, gyroscopic, tilted, pivots, scheme, memory, report, work, log,
+                        counts,
+                    )  # fmt: skip
+                else:
+                    clear -= 1
+                    new = fly_stage(y, h, gyroscopic, tilted, scheme, work)
+                if not is_finite(new):
+                    note_fault(world, b, report)
+                    drop_events(i, 1, k * h, log, counts)
+                    break
+                y = new
+                if sleep is not None and falls_asleep(i, y, h, work, sleep):
+                    y = laid_down(y)
+                    break
+            note_report(not has_same_pose(y, read_state(state, i)), report, work)
+            write_state(state, i, y)
+            w = angular_velocity(y[1], y[3], work, tilted)
+            state[i, at.ANGVEL], state[i, at.ANGVEL + 1], state[i, at.ANGVEL + 2] = w

@@ -1,0 +1,131 @@
+"""Scratch memory of one thread: what a step knows of one body, and its contacts.
+
+It is one NumPy record, so that a kernel hands on a single pointer, and the compiler knows every size. It is
+filled anew for each body (`body.bind_body`); nothing in it outlives a step.
+
+Contacts here are with walls: arm and Jacobian rows belong to the body. The wall has inverse mass and inertia zero as
+in the course notes, and adds nothing. Bodies that touch each other have a memory of their own (`many.arrays`).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from physics.kernels.contact_solver.friction_pyramid import normal_sizes, pyramid_sizes
+from physics.kernels.flight.free_rotation import SERIES_SIZE
+from physics.kernels.forces.force_field_dispatch import Term, members
+from physics.kernels.state import contact_law_dispatch as contact_laws
+from physics.kernels.state.layout import VERTEX_COUNT, WALL_SIZE
+from physics.kernels.time_stepping.midpoint_friction import FEW
+
+
+def setting_fields() -> list[tuple]:
+    """Fields of the numerical settings."""
+    f, i = np.float64, np.int64
+    return [
+        ("tolerance", f),  # largest residual of a contact solve, relative to the largest free contact speed
+        ("sweeps", i),  # sweeps per solve at most
+        ("splits", i),  # cuts of a substep at impacts at most
+        ("mean_slip", i),  # contacts of a stage up to which friction opposes their mean slip (`midpoint_friction`)
+        ("rest_share", f),  # a rebound that would be over within this share of the substep is plastic
+    ]
+
+
+def body_fields(terms: tuple[Term, ...] = (), laws: tuple[str, ...] = ()) -> list[tuple]:
+    """Fields of what `body.bind_body` writes of one body, and of what the scene's fields and laws do to it."""
+    f, i = np.float64, np.int64
+    return [
+        *members(terms),  # first: a record may stand for one that it begins with, and Numba would say so
+        *contact_laws.members(laws),
+        ("relative_slop", f),  # gap within which a feature touches, in bounding radii; the one field that is read
+        ("i", i),
+        ("world", i),
+        ("shape", i),
+        ("mass", f),  # [kg]
+        ("J", f, (3,)),  # inverse principal moments [1/(kg m²)]
+        ("series", f, (SERIES_SIZE,)),  # of the free rotation
+        ("principal", f, (4,)),  # quaternion, principal frame to body frame
+        ("center", f, (3,)),  # of the block, from the centre of mass, body frame [m]; not set unless `tilted`
+        ("dims", f, (3,)),  # half edges, semi-axes, or the radius three times [m]
+        ("radius", f),  # of the bounding sphere [m]
+        ("slop", f),  # [m]
+        ("mu", f),  # Coulomb coefficient
+        ("restitution", f),
+        ("free_acceleration", f, (3,)),  # of the centre of mass without contact [m/s²]
+        ("torque", f, (3,)),  # about the centre of mass [N m]
+        ("acceleration", f),  # bound for any point of the body without contact [m/s²]
+    ]
+
+
+def workspace_dtype(
+    wall_count: int, features: int, terms: tuple[Term, ...] = (), laws: tuple[str, ...] = ()
+) -> np.dtype:
+    """Record type for bodies with `features` contact features each on `wall_count` walls, in these fields and laws."""
+    n = max(wall_count * features, 1)
+    float_size, int_size = np.maximum(pyramid_sizes(n), normal_sizes(n)).tolist()
+    f, i = np.float64, np.int64
+    scene = [
+        ("features", i),
+        ("feature_bits", i),  # log2 of it
+        ("walls", f, (max(wall_count, 1), WALL_SIZE)),  # columns of `layout`
+    ]
+    stage = [
+        ("mode", i),  # which direct solve to try first, then which one did it (`sliding_patch.HOLD`, `SLIDE`, `MIXED`)
+        ("still", f),  # residual allowed beside the tolerance [m/s]: see `contact_stages.still_speed`
+        ("unseen", f),  # by what the targets of contacts that hold may be off [m/s]: see `sticking`
+        ("is_last", i),  # 1 in the last stage a substep may have: take in all that would pass through a wall
+    ]
+    contacts = [
+        ("mask", i, (max(wall_count, 1),)),  # bit k: feature k of the body is in the contact set of this wall
+        ("vertices", f, (2, VERTEX_COUNT)),  # gap [m] and normal velocity [m/s] of each vertex at one wall
+        ("slot", i, (n,)),  # wall * features + feature, the stable name of a contact
+        ("gap", f, (n,)),  # [m], negative when penetrating
+        *[("due", f, (n,))] * (contact_laws.STIFFNESS in laws),  # gap at the end of a stage [m] (`compliance`)
+        ("speed", f, (n,)),  # normal velocity before the stage [m/s], negative when approaching
+        ("widest", f),  # largest gap of them all, 0 if there is none above a wall [m]
+        ("approach", f),  # fastest approach of them all, 0 if none does [m/s]
+        ("arm", f, (n, 3)),  # contact point relative to the centre of mass, world frame [m]
+        ("target", f, (n, 3)),  # contact velocity aimed at (normal, tangents) [m/s]
+        ("held", f, (FEW, 2)),  # tangents for which contacts hold, where `target` has others (`midpoint_friction`)
+        ("friction", f, (n,)),  # Coulomb coefficient
+        ("frame", f, (3 * n, 3)),  # directions normal, tangent 1, tangent 2 of each contact
+        ("angular", f, (3 * n, 3)),  # angular Jacobian rows arm x direction [m]
+        ("response", f, (3 * n, 3)),  # I⁻¹ (arm x direction) [1/(kg m)]
+        ("delassus", f, (3 * n, 3 * n)),  # W = J M⁻¹ Jᵀ [1/kg]
+        ("bias", f, (3 * n,)),  # b of u = W p + b [m/s]
+        ("impulse", f, (3 * n,)),  # p [N s]
+        ("saved", f, (3 * n,)),  # p of the sweeps while the fallback tries [N s]
+        ("change", f, (3 * n,)),  # of p in the last sweep [N s]
+        ("velocity", f, (3 * n,)),  # u [m/s]
+        ("active", i, (n,)),  # of a direct solve: contacts that push, flags (`sticking`) or a list (`sliding_patch`)
+        ("normal", f, (n,)),  # of a direct solve: normal impulse, negative where the contact is open [N s]
+        ("across", f, (n, 2)),  # of `sticking`: tangential impulse [N s]
+        ("twist", f, (6,)),  # of `proximal`: change of (v, ω) [m/s, rad/s]
+        ("start", f, (6,)),
+        ("defect", f, (6,)),
+        ("newton", f, (6, 7)),
+        ("trial", f, (3 * n,)),  # [N s]
+        ("local", f, (n, 12)),  # see `gauss_seidel.factor_blocks`
+        ("fallback_float", f, (float_size,)),
+        ("fallback_int", i, (int_size,)),
+        ("rebound", f, (3 * n,)),  # p of an impact with all of its rebound, where there is less energy [N s]
+    ]
+    return np.dtype(setting_fields() + scene + body_fields(terms, laws) + stage + contacts)
+
+
+def make_workspace(
+    walls: np.ndarray, features: int, terms: tuple[Term, ...] = (), laws: tuple[str, ...] = (), **settings: float
+) -> np.ndarray:
+    """One workspace record, shape (1,), for `walls` ((walls, WALL_SIZE)), fields, laws, and numerical settings."""
+    work = np.zeros(1, workspace_dtype(len(walls), features, terms, laws))
+    work["features"], work["feature_bits"], work["still"] = features, features.bit_length() - 1, np.inf
+    if len(walls):
+        work["walls"][0] = walls
+    for name, value in settings.items():
+        work[name] = value
+    return work
+
+
+def body_records(scratch) -> np.ndarray:
+    """The records of `body_fields` in a workspace, or in the `many.arrays.Many` of worlds whose bodies touch."""
+    return getattr(scratch, "bodies", scratch)

@@ -1,0 +1,182 @@
+"""A batch of worlds on threads: kernels release the GIL, so a thread pool is enough.
+
+The pool is made when first needed and belongs to one process: after a fork the child makes its own. There is no
+threading layer of Numba in it, so worlds may be stepped from several Python threads at once, and forked. What the pool
+runs is a loop in machine code (`physics.kernels.parallel.spin_wait_workers`), in which a thread stays from one run to
+the next if that comes soon. A thread that waits there lets other programs have its processor, and nobody waits for a
+thread that has not begun.
+
+At most as many threads take part as there are processors. The environment variable ``RIGID_ENV_THREADS=fixed`` makes
+all of them take part, and none give way.
+"""
+
+from __future__ import annotations
+
+import os
+import timeit
+from collections.abc import Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
+from functools import cache, partial
+
+import numpy as np
+
+from physics.kernels.parallel import spin_wait_workers
+from physics.kernels.parallel import work_stealing as at
+from physics.parallel import processors
+from physics.parallel.bound_call import Work, compiled
+
+# So many worlds a thread takes at once, or fewer where there are few: worlds in contact take several times as long as
+# others, and at the end one thread waits for the other's last ones.
+WORLDS_AT_ONCE = 8
+TURNS_PER_THREAD = 4
+
+# How long the thread that leads asks whether the others have finished before it sleeps until they say so, and how long
+# those ask whether there is more to do before they go [s]. Meanwhile they give way to other threads, so often [s].
+PATIENCE = 2.0e-4
+STAY = 3.0e-4
+BETWEEN = 1.0e-4
+BRIEF = 2.5e-5  # and for the first time, if the one that leads is still busy
+
+# Turns off that threads give way and that a quota counts; for measurements.
+SWITCH = "RIGID_ENV_THREADS"
+
+
+class Team:
+    """The threads that share a batch.
+
+    Parameters
+    ----------
+    threads : int
+    worlds : int
+        Size of the batch.
+
+    Attributes
+    ----------
+    size : int
+        Number of threads.
+    turns : (1 + size, APART) int64
+        Whose turn it is, of `physics.kernels.parallel.work_stealing`.
+    taken : (size, FIRST + worlds + APART) int64
+        For each thread the worlds that it took in the last run.
+    """
+
+    def __init__(self, threads: int, worlds: int):
+        self.size = min(threads, worlds)
+        chunk = min(WORLDS_AT_ONCE, worlds // (TURNS_PER_THREAD * self.size)) if self.size > 1 else worlds
+        self.turns = at.make_turns(self.size, worlds, max(1, chunk))
+        self.taken = at.make_taken(self.size, worlds)
+        self._crew = spin_wait_workers.make_crew(self.size - 1)
+        self._told: Sequence[Work] | None = None  # what the crew has been told to do
+        self._futures: dict[int, Future] = {}
+        self._is_interrupted = False  # members may still be busy with the last run
+        self._pool: ThreadPoolExecutor | None = None
+        self._pid = -1
+
+    def run(self, calls: Sequence[Work]) -> None:
+        """Make the calls, one per thread, of which the calling one is the first.
+
+        A call is left out if its thread has not begun when all worlds are taken: it lists no worlds then.
+        """
+        if self.size == 1:
+            if calls[0].perform():
+                calls[0].raise_again()
+            return
+        if self._pool is None or self._pid != os.getpid():
+            self._start()
+        if self._is_interrupted:
+            self._let_go()
+        if calls is not self._told:
+            self._tell(calls)
+        outcome, self._is_interrupted = spin_wait_workers.UNFINISHED, True
+        try:
+            if self._summon(self._members) > 0:
+                self._send_for_all()
+            outcome = self._lead(self._members, calls[0].jobs, calls[0].count, self._patience)
+        finally:
+            if outcome == spin_wait_workers.UNFINISHED:
+                self._let_go()
+        self._is_interrupted = False
+        if outcome != spin_wait_workers.DONE:
+            _raise(calls)
+
+    def _start(self) -> None:
+        self._pool = ThreadPoolExecutor(self.size - 1, thread_name_prefix="rigid-env")
+        self._pid, self._told, self._futures, self._is_interrupted = os.getpid(), None, {}, False
+        self._crew[...] = self.taken[:, at.TAKEN] = 0
+        is_fixed = os.environ.get(SWITCH) == "fixed"
+        if not is_fixed:
+            self._crew[0, spin_wait_workers.GIVE_WAY], self._crew[0, spin_wait_workers.PROCESSOR] = (
+                processors.giving_way(),
+                processors.telling(),
+            )
+        self._crew[0, spin_wait_workers.BETWEEN], self._crew[0, spin_wait_workers.BRIEF] = (
+            _pauses(BETWEEN),
+            _pauses(BRIEF),
+        )
+        self._patience, self._stay = _pauses(PATIENCE), _pauses(STAY)
+        self._members = (self.size if is_fixed else min(self.size, processors.usable())) - 1
+        self._summon = partial(compiled(spin_wait_workers.summon, (self._crew, self.turns, 0)), self._crew, self.turns)
+        self._dismiss = partial(compiled(spin_wait_workers.dismiss, (self._crew,)), self._crew)
+        self._lead = partial(
+            compiled(spin_wait_workers.lead, (self._crew, self.taken, 0, 0, 0, 0)), self._crew, self.taken
+        )
+        self._serve = partial(compiled(spin_wait_workers.serve, (self._crew, 0, 0)), self._crew)
+
+    def _tell(self, calls: Sequence[Work]) -> None:
+        self._told = calls
+        for member, call in enumerate(calls[1:], 1):
+            self._crew[member, spin_wait_workers.JOBS], self._crew[member, spin_wait_workers.COUNT] = (
+                call.jobs,
+                call.count,
+            )
+
+    def _send_for_all(self) -> None:
+        """Have the threads of the pool take the places of those who are away."""
+        for member in 1 + np.flatnonzero(self._crew[1:, spin_wait_workers.WAS_AWAY]):
+            self._futures[member] = self._pool.submit(self._be_member, member)
+
+    def _be_member(self, member: int) -> None:
+        """Run a thread of the pool; meanwhile the team is in use, and with it the prepared calls."""
+        self._serve(member, self._stay)
+
+    def _let_go(self) -> None:
+        """Wait until all members are away."""
+        self._dismiss()
+        for future in self._futures.values():
+            future.result()
+
+    def close(self) -> None:
+        """End the threads; the team can be used again."""
+        if self._pool is not None and self._pid == os.getpid():
+            self._dismiss()
+            self._pool.shutdown()
+        self._pool = None
+
+
+def listed(worlds: np.ndarray) -> np.ndarray:
+    """Worlds (n,) as a list (FIRST + n,) int64 of those that a thread took."""
+    taken = np.zeros(at.FIRST + len(worlds), dtype=np.int64)
+    taken[at.TAKEN], taken[at.FIRST :] = len(worlds), worlds
+    return taken
+
+
+def _raise(calls: Sequence[Work]) -> None:
+    """Raise what one of the calls raised; the next time a call that is left out has raised nothing."""
+    try:
+        for call in calls:
+            call.raise_again()
+    finally:
+        for call in calls:
+            call.forget()
+
+
+def _pauses(seconds: float) -> int:
+    """Number of pauses that take so long."""
+    return int(seconds / _pause()) + 1
+
+
+@cache
+def _pause() -> float:
+    """Length of a pause [s], which differs from processor to processor: of the trial that was disturbed least."""
+    pause, count = compiled(spin_wait_workers.pause_often, (0,)), 1000
+    return min(timeit.repeat(lambda: pause(count), number=1, repeat=7)) / count

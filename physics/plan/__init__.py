@@ -1,0 +1,1 @@
+"""Plans: what of the engine a scene needs, and at which accuracy."""

@@ -1,0 +1,166 @@
+"""Rows of a plan, one for each effect: on or off, the reason, and the kernels compiled for it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from physics.kernels.state.contact_law_dispatch import ROLLING, SPIN, STIFFNESS, TANGENTIAL
+from physics.kernels.state.sleeping import SLEEP_SIZE
+from physics.scene.effects import Actuator, RollingFriction, Sleeping, SpinFriction
+from physics.scene.force_field import Field, FieldSlot
+from physics.scene.force_fields import FIELDS
+
+
+@dataclass(frozen=True)
+class Row:
+    """One effect in the plan."""
+
+    effect: str
+    is_on: bool
+    reason: str
+    compiled: str
+
+
+def _gravity_row(gravity) -> Row:
+    if gravity is None:
+        return Row("gravity", False, "not declared", "")
+    return Row("gravity", True, f"declared: {gravity.acceleration} m/s²", "acceleration per world")
+
+
+def _contact_row(scene, contact) -> Row:
+    if contact is not None and scene.walls:
+        hulls = ", corners of hulls" if any(body.kind == "hull" for body in scene.bodies) else ""
+        return Row("wall contact", True, f"declared; {len(scene.walls)} wall(s)", f"detection{hulls}, impacts, solver")
+    if contact is not None:
+        return Row("wall contact", False, "declared, but the scene has no walls", "")
+    reason = "not declared: the walls do not act" if scene.walls else "not declared"
+    return Row("wall contact", False, reason, "")
+
+
+def _between_row(scene, contact, many) -> Row:
+    if many:
+        kinds = {body.kind for body in scene.bodies}
+        also = "".join(f", {kind}s" for kind in ("ellipsoid", "hull") if kind in kinds)
+        return Row(
+            "body contact", True, f"declared; {len(scene.bodies)} bodies", f"pairs, one problem for all bodies{also}"
+        )
+    if contact is None:
+        return Row("body contact", False, "not declared", "")
+    if len(scene.bodies) == 1:
+        return Row("body contact", False, "declared, but the scene has one body", "")
+    return Row("body contact", False, "declared without contact between bodies", "")
+
+
+def _friction_row(friction, rubbing) -> Row:
+    if rubbing:
+        cone = "circular cone" if friction.axis is None else "elliptic cone"
+        return Row("friction", True, f"declared: μ = {friction.coefficient}", f"three rows per contact, {cone}")
+    if friction is not None:
+        return Row("friction", False, "declared, but nothing can touch", "")
+    return Row("friction", False, "not declared", "")
+
+
+def _restitution_row(contact, touching) -> Row:
+    if contact is None or contact.restitution is None:
+        return Row("restitution", False, "not declared: impacts are plastic", "")
+    if not touching:
+        return Row("restitution", False, "declared, but nothing can touch", "")
+    return Row("restitution", True, f"declared: e = {contact.restitution}", "Newton's law at impacts")
+
+
+def _gyroscopic_row(isotropic, turned) -> Row:
+    if isotropic:
+        return Row("gyroscopic torque", False, "automatic: all moments of every body are equal", "")
+    note = "free-rotation flow" + (", principal axes tilted against body axes" if turned else "")
+    return Row("gyroscopic torque", True, "automatic: moments of inertia differ", note)
+
+
+def _center_row(uneven) -> Row:
+    if not uneven:
+        return Row("uneven mass", False, "automatic: every body's centre of mass is its geometric centre", "")
+    reason = f"declared: center of {'body' if len(uneven) == 1 else 'bodies'} {', '.join(map(str, uneven))} is not 0"
+    return Row("uneven mass", True, reason, "contacts about the centre of mass")
+
+
+def _field_rows(fields: tuple[FieldSlot, ...]) -> list[Row]:
+    """Rows of the declared fields, then of the built-in fields that are not."""
+    rows = [
+        Row(slot.effects[0].label, True, f"declared: {', '.join(map(repr, slot.effects))}",
+            f"{slot.term.count * slot.term.size} parameters per body, one function"
+            + (", all bodies at once" if slot.term.is_linked else ""))
+        for slot in fields
+    ]  # fmt: skip
+    declared = {type(slot.effects[0]) for slot in fields}
+    return rows + [Row(kind().label, False, "not declared", "") for kind in FIELDS if kind not in declared]
+
+
+def _tangential_row(scene, contact, laws) -> Row:
+    if contact is None or contact.tangential is None:
+        return Row("tangential restitution", False, "not declared", "")
+    if TANGENTIAL not in laws:
+        return Row("tangential restitution", False, "declared, but nothing can touch", "")
+    return Row("tangential restitution", True, f"declared: e_t = {contact.tangential}", "a target along the wall")
+
+
+def _compliance_row(contact, laws) -> Row:
+    if contact is None or contact.stiffness is None:
+        return Row("compliance", False, "not declared: contact is rigid", "")
+    if STIFFNESS not in laws:
+        return Row("compliance", False, "declared, but nothing can touch", "")
+    reason = f"declared: {contact.stiffness} N/m, {contact.damping} N s/m per contact point"
+    return Row("compliance", True, reason, "a number on the diagonal, and a target")
+
+
+def _resistance_row(scene, kind, law, laws) -> Row:
+    name = {RollingFriction: "rolling friction", SpinFriction: "spin friction"}[kind]
+    effect = scene.effect(kind)
+    if effect is None:
+        return Row(name, False, "not declared", "")
+    if law not in laws:
+        return Row(name, False, "declared, but no round body can touch a wall", "")
+    return Row(name, True, f"declared: {effect.radius} m", "the contact problem again, with a torque")
+
+
+def _actuator_row(scene) -> Row:
+    actuator = scene.effect(Actuator)
+    if actuator is None:
+        return Row("actuator", False, "not declared: the wrench acts as given", "")
+    note = "one call per step" if actuator.remembers else ""
+    return Row("actuator", True, f"declared: {actuator!r}", f"before the step{', ' + note if note else ''}")
+
+
+def _sleeping_row(scene, touching, sleeping) -> Row:
+    effect = scene.effect(Sleeping)
+    if effect is None:
+        return Row("sleeping", False, "not declared", "")
+    if sleeping:
+        return Row("sleeping", True, f"declared: {effect!r}", f"{SLEEP_SIZE} numbers per body, a look at each")
+    if not touching:
+        return Row("sleeping", False, "declared, but nothing can touch", "")
+    restless = [field for field in scene.effects if isinstance(field, Field) and not field.is_steady]
+    names = ", ".join(field.label for field in restless)
+    return Row("sleeping", False, f"declared, but nothing rests under what may change on its own: {names}", "")
+
+
+def make_rows(scene, accuracy, seen, refined) -> tuple[Row, ...]:
+    """All rows of a plan; `seen` holds what `physics.plan.plan.make_plan` found out of the scene."""
+    contact, friction, touching, rubbing = seen.contact, seen.friction, seen.touching, seen.rubbing
+    return (
+        _gravity_row(seen.gravity),
+        Row("applied wrench", True, "given to step(wrench)", "six numbers per body, zero without one"),
+        _actuator_row(scene),
+        _sleeping_row(scene, touching, seen.sleeping),
+        _contact_row(scene, contact),
+        _between_row(scene, contact, seen.meeting),
+        _friction_row(friction, rubbing),
+        _restitution_row(contact, touching),
+        _tangential_row(scene, contact, seen.laws),
+        _compliance_row(contact, seen.laws),
+        _resistance_row(scene, RollingFriction, ROLLING, seen.laws),
+        _resistance_row(scene, SpinFriction, SPIN, seen.laws),
+        _gyroscopic_row(seen.isotropic, seen.turned),
+        _center_row(seen.uneven),
+        *_field_rows(seen.fields),
+        Row("free motion", True, f"scheme {accuracy.scheme}, {accuracy.substeps} substep(s) per dt",
+            "parts that meet an error" if refined else ""),
+    )  # fmt: skip

@@ -1,0 +1,1 @@
+"""Descriptions of scenes: bodies, walls, effects. No numerics beyond mass properties."""

@@ -1,0 +1,292 @@
+"""The bodies of a scene: immutable descriptions, no numerics beyond their mass properties."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from typing import ClassVar
+
+import numpy as np
+
+from physics import validation
+from physics.keywords import known_keywords
+from physics.mass import inertia
+from physics.mass.polyhedron import Polyhedron, convex_hull
+from physics.summary import fields_repr, shown
+
+
+def _tuple(array: np.ndarray) -> tuple:
+    return tuple(float(v) for v in np.ravel(array))
+
+
+@dataclass(frozen=True, kw_only=True)
+class Body:
+    """Base of all bodies; use `Block`, `Sphere`, `Ellipsoid` or `Hull`.
+
+    Parameters
+    ----------
+    pos, quat, linvel, angvel : array_like
+        Start: centre of mass [m], unit quaternion (w, x, y, z) from body to world, velocity [m/s] and angular
+        velocity [rad/s], world frame. A quaternion of norm 1 within 1e-4, as four decimals have it, is normalised.
+    inertia_body : (3,) or (3, 3) array_like, optional
+        Moments, or tensor, about the centre of mass in the body frame [kg m²]. None: uniform density.
+    density : float, optional
+        Instead of `mass` [kg/m³]: the body has this times its `volume` as its mass, and None here.
+
+    Raises
+    ------
+    ValueError
+        A parameter out of range, or not exactly one of mass and density.
+    """
+
+    pos: tuple = (0.0, 0.0, 0.0)
+    quat: tuple = (1.0, 0.0, 0.0, 0.0)
+    linvel: tuple = (0.0, 0.0, 0.0)
+    angvel: tuple = (0.0, 0.0, 0.0)
+    inertia_body: tuple | None = None
+    density: float | None = field(default=None, repr=False, compare=False)
+    center: ClassVar[tuple] = (0.0, 0.0, 0.0)  # of the shape, from the centre of mass; a block may have another
+
+    def __post_init__(self):
+        if type(self) is Body:
+            raise TypeError("Body has no shape; allowed are Block, Sphere, Ellipsoid and Hull")
+        self._set_mass()
+        for name in ("pos", "linvel", "angvel"):
+            self._set(name, _tuple(validation.finite(getattr(self, name), (3,), name)))
+        self._set("quat", _tuple(validation.unit_quaternion(self.quat, (4,), "quat")))
+        if self.inertia_body is not None:
+            tensor = inertia.check_inertia(self.inertia_body, "inertia_body")
+            self._set("inertia_body", tuple(map(_tuple, tensor)))
+        self._check_range()
+
+    def _set_mass(self) -> None:
+        """The mass, from the density if that is given."""
+        if (self.mass is None) == (self.density is None):
+            raise ValueError(
+                f"mass is {shown(self.mass)} and density is {shown(self.density)}; allowed is exactly one of the two: "
+                "mass [kg], or density [kg/m³]"
+            )
+        mass = self.mass
+        if mass is None:
+            mass = float(validation.positive(self.density, (), "density")) * self.volume
+            self._set("density", None)
+        self._set("mass", float(validation.positive(mass, (), "mass")))
+
+    def _check_range(self) -> None:
+        """Refuse a mass or inertia whose inverse no float holds: what is divided by it would not be finite."""
+        with np.errstate(over="ignore", invalid="ignore"):
+            moments = np.diagonal(self.inertia)
+        inertia.check_range(np.array([self.mass]), moments[None])
+
+    def _set(self, name, value):
+        object.__setattr__(self, name, value)
+
+    @property
+    def inertia(self) -> np.ndarray:
+        """(3, 3) inertia tensor about the centre of mass in the body frame [kg m²]."""
+        if self.inertia_body is not None:
+            return np.array(self.inertia_body)
+        return np.diag(self.uniform_moments(self.dimensions, self.mass))
+
+
+@known_keywords
+@dataclass(frozen=True)
+class Block(Body):
+    """A rectangular block; its body axes are its edges.
+
+    Parameters
+    ----------
+    size : (3,) array_like
+        Full edge lengths along body x, y, z [m].
+    mass : float
+        [kg]; or `density` instead.
+    center : (3,) array_like
+        Position of the geometric centre, where the diagonals meet, relative to the centre of mass, along the body
+        axes [m]: a block heavy on its +x side has a negative x here. `pos` is the centre of mass, so that the block
+        occupies the space around ``pos + R(quat) center``. Where it is not 0 the density is not uniform, and
+        `inertia_body`, about the centre of mass, must be given.
+    """
+
+    size: tuple
+    mass: float | None = None
+    center: tuple = field(default=(0.0, 0.0, 0.0), kw_only=True)
+    kind = "block"
+
+    def __post_init__(self):
+        self._set("size", _tuple(validation.positive(self.size, (3,), "size")))
+        self._set("center", _tuple(validation.finite(self.center, (3,), "center")))
+        if any(self.center) and self.inertia_body is None:
+            raise ValueError(
+                f"center is {self.center!r} without inertia_body; give the inertia about the centre of mass"
+            )
+        super().__post_init__()
+
+    @property
+    def volume(self) -> float:
+        """[m³]."""
+        return math.prod(self.size)
+
+    @property
+    def dimensions(self) -> np.ndarray:
+        """(3,) half edges [m]."""
+        return 0.5 * np.array(self.size)
+
+    @staticmethod
+    def uniform_moments(dimensions, mass) -> np.ndarray:
+        """Principal moments (..., 3) [kg m²], along the body axes, of half edges `dimensions` (..., 3) [m]."""
+        return inertia.block_moments(2 * dimensions, mass)
+
+    @staticmethod
+    def bounding_radius(dimensions) -> np.ndarray:
+        """Radius (...) [m] of the sphere about the centre that holds the body."""
+        a, b, c = np.moveaxis(dimensions * dimensions, -1, 0)
+        return np.sqrt(a + b + c)
+
+
+@known_keywords
+@dataclass(frozen=True)
+class Sphere(Body):
+    """A solid sphere.
+
+    Parameters
+    ----------
+    radius : float
+        [m].
+    mass : float
+        [kg]; or `density` instead.
+    """
+
+    radius: float
+    mass: float | None = None
+    kind = "sphere"
+
+    def __post_init__(self):
+        self._set("radius", float(validation.positive(self.radius, (), "radius")))
+        super().__post_init__()
+
+    @property
+    def volume(self) -> float:
+        """[m³]."""
+        return 4 / 3 * math.pi * math.prod((self.radius,) * 3)
+
+    @property
+    def dimensions(self) -> np.ndarray:
+        """(3,) the radius three times [m]."""
+        return np.full(3, self.radius)
+
+    @staticmethod
+    def uniform_moments(dimensions, mass) -> np.ndarray:
+        """Principal moments (..., 3) [kg m²] of solid spheres; `dimensions` (..., 3) as above."""
+        return inertia.ellipsoid_moments(dimensions, mass)
+
+    @staticmethod
+    def bounding_radius(dimensions) -> np.ndarray:
+        """The radius (...) [m]."""
+        return dimensions[..., 0]
+
+
+@known_keywords
+@dataclass(frozen=True)
+class Ellipsoid(Body):
+    """A solid ellipsoid.
+
+    Parameters
+    ----------
+    semi_axes : (3,) array_like
+        Along body x, y, z [m].
+    mass : float
+        [kg]; or `density` instead.
+    """
+
+    semi_axes: tuple
+    mass: float | None = None
+    kind = "ellipsoid"
+
+    def __post_init__(self):
+        self._set("semi_axes", _tuple(validation.positive(self.semi_axes, (3,), "semi_axes")))
+        super().__post_init__()
+
+    @property
+    def volume(self) -> float:
+        """[m³]."""
+        return 4 / 3 * math.pi * math.prod(self.semi_axes)
+
+    @property
+    def dimensions(self) -> np.ndarray:
+        """(3,) semi-axes [m]."""
+        return np.array(self.semi_axes)
+
+    @staticmethod
+    def uniform_moments(dimensions, mass) -> np.ndarray:
+        """Principal moments (..., 3) [kg m²] of solid ellipsoids of semi-axes `dimensions` (..., 3) [m]."""
+        return inertia.ellipsoid_moments(dimensions, mass)
+
+    @staticmethod
+    def bounding_radius(dimensions) -> np.ndarray:
+        """The largest semi-axis (...) [m]."""
+        return np.max(dimensions, axis=-1)
+
+
+@known_keywords
+@dataclass(frozen=True)
+class Hull(Body):
+    """The convex hull of points, of uniform density: a wedge, a prism, a rock.
+
+    `pos` is the centre of mass, as of every body: the hull is shifted there. Where that is in the frame of the points
+    says `centroid`, so that a body whose points stand where it is to be in the world has ``pos=hull.centroid``.
+
+    Parameters
+    ----------
+    points : (n, 3) array_like
+        Along the body axes, from any origin [m]. Those inside the hull do not matter.
+    mass : float
+        [kg]; or `density` instead.
+
+    Raises
+    ------
+    ValueError
+        Fewer than four points, all in one plane (within 1e-9 of the size) or nearly on a line, or a hull of more than
+        `polyhedron.MOST_CORNERS` corners.
+    """
+
+    points: tuple
+    mass: float | None = None
+    kind = "hull"
+
+    def __post_init__(self):
+        self._set("points", tuple(map(_tuple, validation.rows(self.points, 3, "points"))))
+        if self.points and not np.abs(self.points).max() < 1 / inertia.LEAST:
+            raise ValueError(f"points is {shown(self.points)}; allowed are coordinates below {1 / inertia.LEAST:g}")
+        convex_hull(self.points)
+        super().__post_init__()
+
+    __repr__ = fields_repr
+
+    @property
+    def polyhedron(self) -> Polyhedron:
+        """Corners, faces and edges about the centre of mass, in the body frame; the same object for equal points."""
+        return convex_hull(self.points)
+
+    @property
+    def centroid(self) -> tuple[float, float, float]:
+        """Centre of mass in the frame of `points` [m]."""
+        return _tuple(self.polyhedron.centroid)
+
+    @property
+    def inertia(self) -> np.ndarray:
+        """(3, 3) inertia tensor about the centre of mass in the body frame [kg m²]."""
+        return np.array(self.inertia_body) if self.inertia_body is not None else self.polyhedron.inertia(self.mass)
+
+    @property
+    def volume(self) -> float:
+        """[m³]."""
+        return self.polyhedron.volume
+
+    @property
+    def dimensions(self) -> np.ndarray:
+        """(3,) how far the hull reaches from the centre of mass along each body axis, either way [m]."""
+        return np.abs(self.polyhedron.vertices).max(axis=0)
+
+    def bounding_radius(self, dimensions) -> np.ndarray:
+        """Distance (...) of the farthest corner from the centre of mass [m]; `dimensions` (..., 3) do not change it."""
+        return np.full(np.shape(dimensions)[:-1], self.polyhedron.radius)

@@ -1,0 +1,168 @@
+"""The canonical scenes: used by tests, benchmarks, environments and demonstrations alike."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from physics.scene.bodies import Block, Ellipsoid, Sphere
+from physics.scene.effects import Contact, Friction, Gravity
+from physics.scene.force_fields import AngularDrag, Drag, Magnus
+from physics.scene.scene import HalfSpace, Scene, corner, three_walls
+
+SIZE = (5.0, 3.0, 2.0)  # of the block [m]
+MASS = 6.0  # of the block [kg]
+GRAVITY = 9.81  # [m/s²]
+HALF_WIDTH = 10.0  # of the three-wall box [m]
+
+
+def block_in_box(
+    pos=(0.0, 6.0, 0.0),
+    restitution: float | None = 0.3,
+    friction: float | None = 0.5,
+    walls: str = "three",
+    **start,
+) -> Scene:
+    """The block among three walls; `start` takes quat, linvel and angvel, `walls` is ``three`` or ``corner``."""
+    layouts = {"three": lambda: three_walls(HALF_WIDTH), "corner": corner}
+    if walls not in layouts:
+        raise ValueError(f"walls is {walls!r}; allowed are {', '.join(layouts)}")
+    effects = [Gravity((0.0, -GRAVITY, 0.0)), Contact(restitution)]
+    if friction is not None:
+        effects.append(Friction(friction))
+    return Scene([Block(SIZE, MASS, pos=pos, **start)], layouts[walls](), effects)
+
+
+def drop() -> Scene:
+    """The exercise: the block, slightly turned and spinning, falls into the three-wall box."""
+    tilt = 0.25  # [rad] about (1, 1, 0)
+    s = math.sin(tilt / 2) / math.sqrt(2)
+    return block_in_box((0.0, 6.0, 0.0), quat=(math.cos(tilt / 2), s, s, 0.0), angvel=(0.3, 0.2, 0.1))
+
+
+def flight() -> Scene:
+    """The block tumbling high above the floor of the three-wall box, turning near its intermediate axis."""
+    return block_in_box((0.0, 1e6, 0.0), angvel=(0.1, 5.0, 0.1))
+
+
+def tumble() -> Scene:
+    """The block tumbling in empty space: no gravity, no walls."""
+    return Scene([Block(SIZE, MASS, angvel=(0.1, 5.0, 0.1))])
+
+
+def rest() -> Scene:
+    """The block at rest face down on the floor of the three-wall box: four contacts."""
+    return block_in_box((0.0, SIZE[1] / 2, 0.0))
+
+
+def shove() -> Scene:
+    """The block on the floor of the three-wall box, to be shoved about by random wrenches."""
+    return block_in_box((0.0, SIZE[1] / 2, 0.0))
+
+
+def corner_drop() -> Scene:
+    """The block falls, turned, into the corner of three walls at right angles."""
+    half = 0.5 * 0.7
+    s = math.sin(half) / math.sqrt(3)
+    return block_in_box((3.5, 5.0, 3.5), walls="corner", quat=(math.cos(half), s, s, s), linvel=(-1.5, 0.0, -1.0))
+
+
+def slide(speed: float = 3.0, friction: float = 0.3) -> Scene:
+    """The block slides over an endless floor along x until friction stops it: distance v²/(2 μ g)."""
+    body = Block(SIZE, MASS, pos=(0.0, SIZE[1] / 2, 0.0), linvel=(speed, 0.0, 0.0))
+    return Scene([body], [HalfSpace((0, 1, 0))], [Gravity((0, -GRAVITY, 0)), Contact(), Friction(friction)])
+
+
+def incline(angle: float, friction: float) -> Scene:
+    """The block face down on an incline of `angle` [rad] falling along +x; the wall is tilted, gravity is not."""
+    normal = (math.sin(angle), math.cos(angle), 0.0)
+    half = SIZE[1] / 2
+    body = Block(
+        SIZE, MASS, pos=(half * normal[0], half * normal[1], 0.0),
+        quat=(math.cos(angle / 2), 0.0, 0.0, -math.sin(angle / 2)),
+    )  # fmt: skip
+    return Scene([body], [HalfSpace(normal)], [Gravity((0, -GRAVITY, 0)), Contact(), Friction(friction)])
+
+
+def bounce(height: float = 1.0, restitution: float = 1.0) -> Scene:
+    """The block dropped face down from a `height` [m] of its lowest face above the floor; no friction."""
+    body = Block(SIZE, MASS, pos=(0.0, SIZE[1] / 2 + height, 0.0))
+    return Scene([body], [HalfSpace((0, 1, 0))], [Gravity((0, -GRAVITY, 0)), Contact(restitution)])
+
+
+def rolling_sphere(speed: float = 5.0, friction: float = 0.2) -> Scene:
+    """A sphere of radius 1 m and 1 kg set down sliding: it ends rolling at 5/7 of its speed."""
+    body = Sphere(1.0, 1.0, pos=(0.0, 1.0, 0.0), linvel=(speed, 0.0, 0.0))
+    return Scene([body], [HalfSpace((0, 1, 0))], [Gravity((0, -GRAVITY, 0)), Contact(), Friction(friction)])
+
+
+def vertex_drop(restitution: float = 0.3, friction: float = 0.5) -> Scene:
+    """The block dropped on a vertex from 1 m: turned by 0.7 rad about (1, 1, 0), at rest at first."""
+    half, clearance = 0.5 * 0.7, 1.0
+    s = math.sin(half) / math.sqrt(2)
+    # Height of the centre above the lowest vertex: Σ a_i |y·e_i|, the second row of the rotation matrix.
+    row = (2 * s * s, 1 - 2 * s * s, 2 * s * math.cos(half))
+    height = sum(0.5 * size * abs(c) for size, c in zip(SIZE, row))
+    body = Block(SIZE, MASS, pos=(0.0, height + clearance, 0.0), quat=(math.cos(half), s, s, 0.0))
+    effects = [Gravity((0, -GRAVITY, 0)), Contact(restitution), Friction(friction)]
+    return Scene([body], [HalfSpace((0, 1, 0))], effects)
+
+
+def closed_box(half: float = 5.0) -> Scene:
+    """The elastic block tumbling without gravity or friction between six walls at ±`half` [m]: chaotic."""
+    normals = [tuple(sign * (axis == k) for k in range(3)) for axis in range(3) for sign in (1.0, -1.0)]
+    body = Block(SIZE, MASS, linvel=(3.0, 4.0, 5.0), angvel=(1.0, 2.0, 0.5))
+    return Scene([body], [HalfSpace(normal, -half) for normal in normals], [Contact(1.0)])
+
+
+def tower(count: int = 10, top: float = 1.0) -> Scene:
+    """Unit cubes of 1 kg standing on each other on an endless floor, the top one of mass `top` [kg]."""
+    masses = [1.0] * (count - 1) + [top]
+    bodies = [Block((1.0, 1.0, 1.0), mass, pos=(0.0, k + 0.5, 0.0)) for k, mass in enumerate(masses)]
+    return Scene(bodies, [HalfSpace((0, 1, 0))], [Gravity((0, -GRAVITY, 0)), Contact(), Friction(0.5)])
+
+
+def heap(count: int = 100, seed: int = 1) -> Scene:
+    """Unit cubes of 1 kg, turned at random, falling in layers of 5 x 5 into a shaft of 9 m x 9 m."""
+    rng = np.random.default_rng(seed)
+    pitch = 1.75  # of the grid they start from; the diagonal of a cube is 1.732 m
+    bodies = []
+    for k in range(count):
+        q = rng.standard_normal(4)
+        place = (pitch * (k % 5 - 2), pitch * (k // 25) + 1.0, pitch * (k // 5 % 5 - 2))
+        bodies.append(Block((1.0, 1.0, 1.0), 1.0, pos=place, quat=q / np.linalg.norm(q)))
+    normals = [(0, 1, 0), (1, 0, 0), (-1, 0, 0), (0, 0, 1), (0, 0, -1)]
+    walls = [HalfSpace(normal, 0.0 if normal[1] else -4.5) for normal in normals]
+    return Scene(bodies, walls, [Gravity((0, -GRAVITY, 0)), Contact(), Friction(0.5)])
+
+
+def football() -> Scene:
+    """The football of the course notes in flight: kicked at 25 m/s, spinning about its long axis and a little off it.
+
+    Gravity exerts no torque on it; drag and lift are those of the air, and the spin wears off slowly.
+    """
+    launch, spin = 0.6, 50.0  # [rad] above the horizon, [rad/s] about the long axis
+    c, s = math.cos(launch), math.sin(launch)
+    ball = Ellipsoid(
+        (0.14, 0.085, 0.085), 0.41, pos=(0.0, 1.0, 0.0), quat=(math.cos(launch / 2), 0.0, 0.0, math.sin(launch / 2)),
+        linvel=(25.0 * c, 25.0 * s, 0.0), angvel=(spin * c - 2.0 * s, spin * s + 2.0 * c, 1.0),
+    )  # fmt: skip
+    return Scene([ball], [], [Gravity((0, -GRAVITY, 0)), Drag(0.2), Magnus(), AngularDrag(1e-6)])
+
+
+SCENES = {
+    function.__name__: function
+    for function in (
+        drop, flight, tumble, rest, shove, corner_drop, slide, bounce, rolling_sphere, vertex_drop, closed_box,
+        tower, heap, football,
+    )
+}  # fmt: skip
+SCENES["incline"] = lambda: incline(math.radians(20.0), 1.01 * math.tan(math.radians(20.0)))
+
+
+def by_name(name: str) -> Scene:
+    """The canonical scene of this name."""
+    if name not in SCENES:
+        raise ValueError(f"scene is {name!r}; allowed are {', '.join(sorted(SCENES))}")
+    return SCENES[name]()

@@ -1,0 +1,262 @@
+"""Effects of a scene: one small frozen dataclass each.
+
+A scene declares its effects; what it does not declare is not compiled into its
+kernel. The gyroscopic torque declares itself where a body's moments differ.
+Force fields (drag, springs, your own) stand in `physics.scene.force_fields`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from physics import validation
+from physics.keywords import known_keywords
+from physics.scene.force_field import Field
+from physics.summary import fields_repr, shown
+
+
+@known_keywords
+@dataclass(frozen=True)
+class Gravity:
+    """A uniform force field: every body accelerates by the same vector, and it exerts no torque.
+
+    Parameters
+    ----------
+    acceleration : (3,) array_like
+        World frame [m/s²].
+    """
+
+    acceleration: tuple = (0.0, -9.81, 0.0)
+
+    def __post_init__(self):
+        value = validation.finite(self.acceleration, (3,), "Gravity.acceleration")
+        object.__setattr__(self, "acceleration", tuple(value.tolist()))
+
+
+@known_keywords
+@dataclass(frozen=True)
+class Contact:
+    """Bodies do not pass through walls, nor through each other.
+
+    Parameters
+    ----------
+    restitution : float, optional
+        Newton's coefficient e in [0, 1]: the normal velocity after an impact is -e times that before. None:
+        impacts are plastic and the kernel holds no restitution.
+    between_bodies : bool, optional
+        False: bodies meet walls only, and pass through each other.
+    tangential : float, optional
+        Tangential coefficient e_t in [-1, 1] of spheres at walls (Walton 1993): the point of contact leaves an impact
+        with -e_t times its tangential velocity, as far as `Friction` holds it. 1: a superball; 0: it sticks; -1: it
+        slides on. None: as 0, and nothing of it is compiled.
+    stiffness : float, optional
+        k of a spring between each contact point (a vertex, the lowest point of a round body) and a wall, which pushes
+        with k times the depth [N/m]; greater than 0. It bounces without a restitution. None: rigid.
+    damping : float, optional
+        c of a damper beside it [N s/m]; at least 0. The two together never pull (Kelvin and Voigt's model, without
+        adhesion).
+    """
+
+    restitution: float | None = None
+    between_bodies: bool = True
+    tangential: float | None = None
+    stiffness: float | None = None
+    damping: float = 0.0
+
+    def __post_init__(self):
+        if not isinstance(self.between_bodies, (bool, np.bool_)):
+            raise ValueError(f"Contact.between_bodies is {shown(self.between_bodies)}; allowed are True and False")
+        object.__setattr__(self, "between_bodies", bool(self.between_bodies))
+        if self.restitution is not None:
+            value = float(validation.share(self.restitution, (), "Contact.restitution"))
+            object.__setattr__(self, "restitution", value)
+        if self.tangential is not None:
+            object.__setattr__(self, "tangential", validation.number(self.tangential, "Contact.tangential"))
+            if not -1.0 <= self.tangential <= 1.0:
+                raise ValueError(f"Contact.tangential is {self.tangential}; allowed are numbers from -1 to 1")
+        self._check_springs()
+
+    def _check_springs(self) -> None:
+        object.__setattr__(self, "damping", float(validation.non_negative(self.damping, (), "Contact.damping")))
+        if self.stiffness is None:
+            if self.damping > 0:
+                raise ValueError(f"Contact.damping is {self.damping}; allowed without a stiffness is 0")
+            return
+        object.__setattr__(self, "stiffness", float(validation.positive(self.stiffness, (), "Contact.stiffness")))
+        for name in ("restitution", "tangential"):
+            if getattr(self, name) is not None:
+                raise ValueError(
+                    f"Contact.{name} is {getattr(self, name)} with a stiffness; allowed is None: springs and dampers "
+                    "say how a body bounces"
+                )
+
+
+@known_keywords
+@dataclass(frozen=True)
+class Friction:
+    """Coulomb friction with the exact cone: |f_t| <= μ f_n, opposed to sliding.
+
+    Parameters
+    ----------
+    coefficient : float or (2,) array_like
+        μ, the same for sticking and sliding; at least 0. Two, greater than 0: μ1 along `axis` and μ2 across it, of
+        walls with a grain. Their tangential forces fill the ellipse (f1/μ1)² + (f2/μ2)² <= f_n², and what slides is
+        opposed by the one that dissipates most (Goyal, Ruina and Papadopoulos 1991).
+    axis : (3,) or (walls, 3) array_like, optional
+        Direction of μ1, world frame, for all walls or one for each; its part along the wall counts. Needed with two
+        coefficients, and only then.
+    """
+
+    coefficient: float | tuple = 0.5
+    axis: tuple | None = None
+
+    def __post_init__(self):
+        name, given = "Friction.coefficient", self.coefficient
+        is_even = not np.iterable(given) or isinstance(given, str)
+        if is_even:
+            object.__setattr__(self, "coefficient", float(validation.non_negative(given, (), name)))
+        else:
+            object.__setattr__(self, "coefficient", tuple(validation.positive(given, (2,), name).tolist()))
+        if is_even != (self.axis is None):
+            allowed = "None with one coefficient" if is_even else "a direction with two coefficients"
+            raise ValueError(f"Friction.axis is {shown(self.axis)}; allowed is {allowed}")
+        if not is_even:
+            object.__setattr__(self, "axis", _axes(self.axis))
+
+    __repr__ = fields_repr
+
+    @property
+    def along(self) -> float:
+        """μ, or μ1."""
+        return self.coefficient if self.axis is None else self.coefficient[0]
+
+    @property
+    def ratio(self) -> float:
+        """μ2/μ1."""
+        return 1.0 if self.axis is None else self.coefficient[1] / self.coefficient[0]
+
+    def directions(self, walls: int) -> np.ndarray | None:
+        """(walls, 3) directions of μ1, world frame; None where it is the same all around."""
+        return None if self.axis is None else np.broadcast_to(np.array(self.axis), (walls, 3))
+
+
+def _axes(axis) -> tuple:
+    """One direction or a sequence of them, checked."""
+    try:
+        shape = np.shape(axis)
+    except ValueError:
+        shape = ()
+    value = validation.finite(axis, (*shape[:-1], 3) if len(shape) == 2 else (3,), "Friction.axis")
+    if not value.any(axis=-1).all():
+        raise ValueError(f"Friction.axis is {shown(axis)}; allowed are directions, any vectors but zero")
+    return tuple(value.tolist()) if value.ndim == 1 else tuple(tuple(row) for row in value.tolist())
+
+
+class _Resistance:
+    """A torque of contact, bounded by a length times the normal force."""
+
+    def __post_init__(self):
+        name = f"{type(self).__name__}.radius"
+        object.__setattr__(self, "radius", float(validation.non_negative(self.radius, (), name)))
+
+
+@known_keywords
+@dataclass(frozen=True)
+class RollingFriction(_Resistance):
+    """Rolling resistance of spheres and ellipsoids at walls: a torque of at most ``radius`` times the normal force.
+
+    It opposes the part of the angular velocity along the wall, and stops it at most.
+
+    Parameters
+    ----------
+    radius : float
+        By how much the normal force is ahead of the middle of the contact [m] (Coulomb 1785); at least 0.
+    """
+
+    radius: float = 0.001
+
+
+@known_keywords
+@dataclass(frozen=True)
+class SpinFriction(_Resistance):
+    """Friction of spheres and ellipsoids spinning on a wall: a torque of at most ``radius`` times the normal force.
+
+    It opposes the part of the angular velocity along the wall's normal, and stops it at most.
+
+    Parameters
+    ----------
+    radius : float
+        Arm of the friction [m]; at least 0. Of a round patch of radius a under Hertz's pressure 3π/16 μ a (Contensou
+        1962).
+    """
+
+    radius: float = 0.001
+
+
+@known_keywords
+@dataclass(frozen=True)
+class Actuator:
+    """Actuator between the wrench of `World.step` and the bodies: delay, then limits, then lag, in this order.
+
+    Parameters
+    ----------
+    limit_force, limit_torque : float, optional
+        A longer force or torque is shortened to this, its direction kept [N, N m]; more than 0. None: no limit.
+    lag : float
+        Time constant τ of what follows, ``τ dw/dt = command - w`` [s]; at least 0. 0: at once.
+    delay : float
+        Time after which a command arrives [s]; at least 0.
+    """
+
+    limit_force: float | None = None
+    limit_torque: float | None = None
+    lag: float = 0.0
+    delay: float = 0.0
+
+    def __post_init__(self):
+        for name in ("limit_force", "limit_torque"):
+            value = getattr(self, name)
+            if value is not None:
+                object.__setattr__(self, name, float(validation.positive(value, (), f"Actuator.{name}")))
+        for name in ("lag", "delay"):
+            value = validation.non_negative(getattr(self, name), (), f"Actuator.{name}")
+            object.__setattr__(self, name, float(value))
+
+    @property
+    def remembers(self) -> bool:
+        """Test whether what it gives depends on earlier commands."""
+        return self.lag > 0.0 or self.delay > 0.0
+
+
+@known_keywords
+@dataclass(frozen=True)
+class Sleeping:
+    """Bodies at rest are left out of the step until something changes that acts on them.
+
+    What has gone no way in two windows of time in a row, and not ever further, sleeps with all that it touches, is near
+    to or is tied to: it keeps its place to the last bit, has no velocity, and costs next to nothing. Another wrench,
+    something awake that comes near, or a change from outside (`World.set_state`, `World.set_parameters`) wakes it.
+
+    Parameters
+    ----------
+    slops : float
+        Way of any point of a body in a window that counts as none, in `Accuracy.slop` of its bounding radius; more than
+        0.
+    time : float, optional
+        Length of a window [s]; more than 0. None: √(2 r/a), the time in which the body would fall its bounding radius r
+        at the acceleration a that it would have without contact; without any it does not sleep.
+    """
+
+    slops: float = 4.0
+    time: float | None = None
+
+    def __post_init__(self):
+        object.__setattr__(self, "slops", float(validation.positive(self.slops, (), "Sleeping.slops")))
+        if self.time is not None:
+            object.__setattr__(self, "time", float(validation.positive(self.time, (), "Sleeping.time")))
+
+
+RESISTANCES = (RollingFriction, SpinFriction)
+EFFECTS = (Gravity, Contact, Friction, *RESISTANCES, Actuator, Sleeping, Field)

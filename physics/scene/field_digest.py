@@ -1,0 +1,101 @@
+"""Digest that tells a user's function from others, and from itself before an edit; and its machine code now."""
+
+from __future__ import annotations
+
+import hashlib
+import inspect
+import types
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+from numba.core.dispatcher import Dispatcher
+
+from physics.kernels.compile.decorators import checked
+from physics.kernels.compile.fused.dispatcher import Kernel
+
+
+def digest(*functions: Dispatcher | None) -> str:
+    """Hexadecimal digest of everything that decides what these functions compile to.
+
+    Their code, the numbers and functions that they read from around them, and so on down; of other modules that they
+    name the source.
+    """
+    found = hashlib.sha256()
+    seen: set[int] = set()
+    for function in functions:
+        _feed(found, function, seen)
+    return found.hexdigest()[:16]
+
+
+def _feed(found, value, seen: set[int]) -> None:
+    """Add a value that a function reads to a digest."""
+    if isinstance(value, Dispatcher):
+        value = value.py_func
+    if isinstance(value, types.FunctionType):
+        if id(value) not in seen:
+            seen.add(id(value))
+            _feed_function(found, value, seen)
+    elif isinstance(value, types.ModuleType):
+        found.update(value.__name__.encode())
+        source = getattr(value, "__file__", None)
+        if source and Path(source).suffix == ".py":
+            found.update(Path(source).read_bytes())
+    elif isinstance(value, np.ndarray):
+        found.update(f"{value.dtype}{value.shape}".encode() + value.tobytes())
+    elif isinstance(value, (tuple, list)):
+        for item in value:
+            _feed(found, item, seen)
+    elif isinstance(value, type):
+        found.update(f"{value.__module__}.{value.__qualname__}".encode())
+    else:
+        found.update(repr(value).encode())
+
+
+def _feed_function(found, function: types.FunctionType, seen: set[int]) -> None:
+    around = inspect.getclosurevars(function)
+    code = function.__code__
+    found.update(code.co_code)
+    found.update(repr((code.co_names, code.co_varnames)).encode())
+    for constant in code.co_consts:
+        if isinstance(constant, types.CodeType):
+            found.update(constant.co_code + repr(constant.co_names).encode())
+        else:
+            found.update(repr(constant).encode())
+    for names in (around.nonlocals, around.globals):
+        for name in sorted(names):
+            found.update(name.encode())
+            _feed(found, names[name], seen)
+
+
+def called(function: Dispatcher, seen: set | None = None) -> Iterator[Dispatcher]:
+    """A compiled function and all those that it names, and so on down; not what it takes from modules."""
+    seen = set() if seen is None else seen
+    if function in seen:
+        return
+    seen.add(function)
+    yield function
+    around = inspect.getclosurevars(function.py_func)
+    for value in (*around.nonlocals.values(), *around.globals.values()):
+        if isinstance(value, Dispatcher):
+            yield from called(value, seen)
+
+
+def as_it_is(function: Kernel) -> Kernel:
+    """The same function for which nothing is compiled of before an edit of what it reads; the same one until the next.
+
+    Numba takes the numbers and functions that a function reads when it compiles it, and never again.
+    """
+    key = function.py_func, digest(function)
+    if key not in _AS_IT_IS:
+        for each in called(function):
+            found = digest(each)
+            if _COMPILED_AS.setdefault(each, found) != found:
+                _COMPILED_AS[each] = found
+                each.renew() if isinstance(each, Kernel) else each.recompile()
+        _AS_IT_IS[key] = checked(function.py_func)
+    return _AS_IT_IS[key]
+
+
+_AS_IT_IS: dict[tuple[types.FunctionType, str], Kernel] = {}
+_COMPILED_AS: dict[Dispatcher, str] = {}

@@ -1,0 +1,141 @@
+"""Errors of a field's functions in the words of its user: the class, the function, the line, and what is allowed."""
+
+from __future__ import annotations
+
+import linecache
+import re
+import traceback
+from pathlib import Path
+from typing import NamedTuple
+
+import numba
+from numba.core.dispatcher import Dispatcher
+from numba.core.ir import Loc
+
+from physics.kernels.forces.force_field_state import FieldState
+from physics.scene.field_digest import called
+
+NUMBA = str(Path(numba.__file__).parent)
+
+ALLOWED = (
+    "allowed are numbers, tuples of them, their functions of `math`, and functions under @physics.field_function; "
+    "arrays, lists and other objects cannot be made"
+)
+
+# Numba names the place of each statement that it had to do with as "at FILE (LINE)", the innermost first.
+_PLACE = re.compile(r"\b(?:at|from) (\S.*?) \((\d+)\)")
+
+# What Numba says of the statement, and what its user has to know. `%` takes the groups found.
+_KNOWN = (
+    (r"Unknown attribute '(\w+)' of type FieldState", "state has no %r; allowed are " + ", ".join(FieldState._fields)),
+    (
+        r"Untyped \D*? name '(\w+)': Cannot determine Numba type of <class 'function'>",
+        "%s is not compiled; allowed are functions under @physics.field_function",
+    ),
+    (r"Untyped \D*? name '(\w+)': Cannot determine Numba type of <class '([\w.]+)'>", f"%s is a %s; {ALLOWED}"),
+    (r"type, assigned to variable '(\w+)' in globals, is not supported", f"%s is of another kind; {ALLOWED}"),
+    (r"No implementation of function Function\(<.*?>\) found for signature:\s*>>> (.*)", f"there is no %s; {ALLOWED}"),
+    (
+        r"use of yield in a closure()",
+        "comprehensions and generators%s are not compiled; write each number out",
+    ),
+    (r"NRT required but not enabled()", f"it makes an object in memory%s; {ALLOWED}"),
+    (r"Cannot unify (.*?) and (.*?) for", "a value is %s on one way, %s on another; allowed is one type"),
+    (r"Can't unify return type from the following types: (.*)", "it returns values of the types %s; allowed is one"),
+)
+
+
+class Place(NamedTuple):
+    """A line of a user's file, and the function that it is in."""
+
+    file: str
+    line: int
+    function: str
+
+    def __str__(self):
+        source = linecache.getline(self.file, self.line).strip()
+        shown = f"\n    {source}" if source else ""
+        return f'  File "{self.file}", line {self.line}, in {self.function}{shown}'
+
+
+def at(function: Dispatcher, loc: Loc | None = None) -> Place:
+    """The place of a statement of a function; without one that of its first line."""
+    plain = function.py_func
+    if loc is None:
+        return Place(plain.__code__.co_filename, plain.__code__.co_firstlineno, plain.__name__)
+    return Place(loc.filename, loc.line, plain.__name__)
+
+
+def placed(what: str, place: Place) -> str:
+    """A message with the place that it is about."""
+    return f"{what}\n{place}"
+
+
+def not_compiled(name: str, function: Dispatcher, error: Exception) -> ValueError:
+    """Return the error of a function that Numba cannot compile.
+
+    Parameters
+    ----------
+    name : str
+        ``Class.function``.
+    function : dispatcher
+    error : Exception
+        Numba's.
+    """
+    return ValueError(placed(f"{name} cannot be compiled: {_reason(str(error))}", _place(function, error)))
+
+
+def _reason(text: str) -> str:
+    for pattern, words in _KNOWN:
+        found = re.search(pattern, text)
+        if found:
+            return words % found.groups()
+    lines = [line.strip() for line in text.splitlines() if line.strip()]
+    lines = [line for line in lines if not line.startswith(("Failed in ", "During: ", "File "))]
+    return lines[0].split(". Raised from ")[0] if lines else text
+
+
+def _place(function: Dispatcher, error: Exception) -> Place:
+    loc = getattr(error, "loc", None)
+    outermost = [(loc.filename, loc.line)] if isinstance(loc, Loc) else []
+    for file, line in (*_PLACE.findall(str(error)), *outermost):
+        if not file.startswith(NUMBA):
+            return Place(file, int(line), _name_at(function, file, int(line)))
+    return at(function)
+
+
+def _name_at(function: Dispatcher, file: str, line: int) -> str:
+    around = [each.py_func.__name__ for each in called(function) if _holds(each, file, line)]
+    return around[0] if around else function.py_func.__name__
+
+
+def _holds(function: Dispatcher, file: str, line: int) -> bool:
+    code = function.py_func.__code__
+    lines = [each for _, _, each in code.co_lines() if each is not None]
+    return code.co_filename == file and code.co_firstlineno <= line <= max(lines, default=-1)
+
+
+def raised(error: Exception, slots: tuple) -> Exception:
+    """Return the error that a compiled function raised, with the class of its field; only an IndexError is reworded.
+
+    Parameters
+    ----------
+    error : Exception
+        Its traceback ends in the user's function.
+    slots : tuple of physics.scene.force_field.FieldSlot
+        The fields of the scene.
+    """
+    if not isinstance(error, IndexError):
+        return error
+    last = traceback.extract_tb(error.__traceback__)[-1]
+    ours = [(slot, [slot.term.function, slot.term.energy]) for slot in slots if slot.is_users]
+    names = [slot.kind.__name__ for slot, _ in ours]
+    exact = [
+        slot.kind.__name__
+        for slot, functions in ours
+        if any(_holds(each, last.filename, last.lineno) for one in functions if one for each in called(one))
+    ]
+    message = f"{error} in a function of {' or '.join(exact or names)}; nothing has changed"
+    told = IndexError(placed(message, Place(last.filename, last.lineno, last.name)))
+    told.__cause__ = error
+    return told

@@ -1,0 +1,214 @@
+"""The built-in force fields: one small frozen dataclass per effect. Sources and formulas stand with their functions."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from physics import validation
+from physics.kernels.forces import angular_drag, buoyancy, drag, magnus, wind
+from physics.keywords import known_keywords
+from physics.scene.force_field import Checked
+from physics.scene.springs import Push, Spring
+
+AIR_DENSITY = 1.225  # at sea level, 15 °C (ISO 2533, standard atmosphere) [kg/m³]
+WATER_DENSITY = 1000.0  # [kg/m³]
+
+
+@known_keywords
+@dataclass(frozen=True)
+class Drag(Checked):
+    """Drag of the air (or water) on every body: ``F = -(½ ρ C A |u| + c) u``, A the area of its shadow along u.
+
+    u is the velocity of the body's geometric centre relative to the air (`Wind`), where the force acts.
+
+    Parameters
+    ----------
+    coefficient : float
+        C of the quadratic law, on the shadow's area; at least 0. 0.47: a sphere at Reynolds numbers of 10⁴ to 10⁵
+        (Hoerner, *Fluid-Dynamic Drag*, 1965).
+    density : float
+        ρ [kg/m³].
+    linear : float
+        c [N s/m], whatever the shape.
+    """
+
+    coefficient: float = 0.47
+    density: float = AIR_DENSITY
+    linear: float = 0.0
+
+    function: ClassVar = drag.drag
+    _rates: ClassVar = drag.drag_rates
+    _soften: ClassVar = drag.soften_drag
+    needs_axes: ClassVar = True
+
+    def __post_init__(self):
+        for name in ("coefficient", "density", "linear"):
+            self._set(name, validation.non_negative)
+
+    @property
+    def takes_energy(self):
+        return True
+
+    def columns(self, body, worlds):
+        return np.array([0.5 * self.density * self.coefficient, self.linear])
+
+
+@known_keywords
+@dataclass(frozen=True)
+class AngularDrag(Checked):
+    """Drag on the spin of every body: ``T = -(c + d |ω|) ω``.
+
+    Parameters
+    ----------
+    linear : float
+        c [N m s].
+    quadratic : float
+        d [N m s²].
+    """
+
+    linear: float = 0.01
+    quadratic: float = 0.0
+
+    function: ClassVar = angular_drag.angular_drag
+    _rates: ClassVar = angular_drag.angular_drag_rates
+    _soften: ClassVar = angular_drag.soften_angular_drag
+
+    def __post_init__(self):
+        self._set("linear", validation.non_negative)
+        self._set("quadratic", validation.non_negative)
+
+    @property
+    def takes_energy(self):
+        return True
+
+    def columns(self, body, worlds):
+        return np.array([self.linear, self.quadratic])
+
+
+@known_keywords
+@dataclass(frozen=True)
+class Magnus(Checked):
+    """Lift of every body that spins: ``F = ½ ρ C π r³ ω x u``, r the radius of the sphere of the same volume.
+
+    Parameters
+    ----------
+    coefficient : float
+        C; at least 0. About 1 for sports balls (Nathan, Am. J. Phys. 76, 2008), 2 in a very viscous fluid.
+    density : float
+        ρ [kg/m³].
+    """
+
+    coefficient: float = 1.0
+    density: float = AIR_DENSITY
+
+    function: ClassVar = magnus.magnus
+    _rates: ClassVar = magnus.magnus_rates
+    _soften: ClassVar = magnus.soften_magnus
+    needs_axes: ClassVar = True
+
+    def __post_init__(self):
+        self._set("coefficient", validation.non_negative)
+        self._set("density", validation.non_negative)
+
+    @property
+    def takes_energy(self):
+        return False
+
+    def columns(self, body, worlds):
+        return np.array([0.5 * self.density * self.coefficient])
+
+
+@known_keywords
+@dataclass(frozen=True)
+class Wind(Checked):
+    """Velocity of the air, the same everywhere, with gusts; it acts through `Drag`, `Magnus` and fields of your own.
+
+    Parameters
+    ----------
+    velocity : (3,) array_like
+        Mean, world frame [m/s].
+    gust : float
+        Standard deviation of each component [m/s].
+    time_scale : float
+        Over which gusts are correlated [s].
+    seed : int
+        Of the gusts; each world of a batch has its own.
+    """
+
+    velocity: tuple = (5.0, 0.0, 0.0)
+    gust: float = 0.0
+    time_scale: float = 1.0
+    seed: int = 0
+
+    function: ClassVar = wind.wind
+    is_air: ClassVar[bool] = True
+
+    def __post_init__(self):
+        self._set("velocity", validation.finite, (3,))
+        self._set("gust", validation.non_negative)
+        self._set("time_scale", validation.positive)
+        validation.count(self.seed, "Wind.seed", least=0, most=None)
+
+    @property
+    def is_steady(self):
+        return self.gust == 0
+
+    def columns(self, body, worlds):
+        phases = np.zeros((len(worlds), wind.SIZE - wind.PHASES))
+        if self.gust > 0:
+            for row, world in zip(phases, worlds):
+                row[:] = 2 * np.pi * np.random.default_rng([self.seed, int(world)]).random(len(row))
+        head = np.array([*self.velocity, self.gust, self.time_scale])
+        return np.concatenate((np.broadcast_to(head, (len(worlds), len(head))), phases), axis=1)
+
+
+@known_keywords
+@dataclass(frozen=True)
+class Buoyancy(Checked):
+    """Lift of a fluid at rest that fills a half-space: its weight where the body is, at the centre of that part.
+
+    Parameters
+    ----------
+    density : float
+        Of the fluid [kg/m³]; at least 0.
+    normal : (3,) array_like
+        Of the surface, upwards; any length but zero, it is normalised.
+    offset : float
+        The fluid is where normal·x <= offset [m].
+    gravity : float
+        Strength of gravity in the fluid [m/s²].
+    """
+
+    density: float = WATER_DENSITY
+    normal: tuple = (0.0, 1.0, 0.0)
+    offset: float = 0.0
+    gravity: float = 9.81
+
+    function: ClassVar = buoyancy.buoyancy
+    _rates: ClassVar = buoyancy.buoyancy_rates
+    _soften: ClassVar = buoyancy.soften_buoyancy
+    needs_axes: ClassVar = True
+    energy: ClassVar = buoyancy.buoyancy_energy
+
+    def __post_init__(self):
+        self._set("density", validation.non_negative)
+        self._set("offset", validation.finite)
+        self._set("gravity", validation.non_negative)
+        self._set("normal", validation.finite, (3,))
+        length = float(np.linalg.norm(self.normal))
+        if not 0 < length < np.inf:
+            raise ValueError(f"Buoyancy.normal is {self.normal!r}; allowed is any vector but zero")
+        object.__setattr__(self, "normal", tuple(validation.unit(np.array(self.normal), length).tolist()))
+
+    @property
+    def takes_energy(self):
+        return False
+
+    def columns(self, body, worlds):
+        return np.array([*self.normal, self.offset, self.density * self.gravity])
+
+
+FIELDS = (Drag, AngularDrag, Magnus, Wind, Buoyancy, Spring, Push)

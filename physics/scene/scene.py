@@ -1,0 +1,197 @@
+"""A scene: bodies, walls and effects. Immutable and validated; no numerics."""
+
+from __future__ import annotations
+
+import sys
+import warnings
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from physics import validation
+from physics.keywords import known_keywords
+from physics.scene.bodies import Block, Body, Ellipsoid, Hull, Sphere
+from physics.scene.effects import EFFECTS, RESISTANCES, Contact, Friction, Sleeping
+from physics.scene.force_field import Field
+from physics.summary import SCREEN, counted, lines_repr, shown
+
+# An axis of friction and the normal of a wall count as parallel below this sine of the angle between them [rad]: of the
+# sixteen digits of a direction ten are left for its part along the wall.
+LEAST_SINE = 1e-6
+
+# A `repr` shows every body, wall and effect of a scene with at most so many of them, if they fit on a screen.
+MOST_SHOWN = 12
+
+NO_CONTACT = (
+    "Scene.walls are given, but no effect lets bodies touch them: bodies pass through; add physics.Contact() to "
+    "Scene.effects, or leave the walls out"
+)
+
+
+class SceneWarning(UserWarning):
+    """A scene that is valid, but in which something that it declares does nothing."""
+
+
+@known_keywords
+@dataclass(frozen=True)
+class HalfSpace:
+    """The region {x : normal·x >= offset} that bodies may be in.
+
+    Parameters
+    ----------
+    normal : (3,) array_like
+        Out of the wall, into the free side; any length but zero, it is normalised.
+    offset : float
+        Of the normalised plane [m].
+    """
+
+    normal: tuple
+    offset: float = 0.0
+
+    def __post_init__(self):
+        normal = validation.finite(self.normal, (3,), "HalfSpace.normal")
+        length = float(np.linalg.norm(normal))
+        if not length > 0 or not np.isfinite(length):
+            raise ValueError(f"HalfSpace.normal is {shown(self.normal)}; allowed is any vector but zero")
+        object.__setattr__(self, "normal", tuple(validation.unit(normal, length).tolist()))
+        object.__setattr__(self, "offset", validation.number(self.offset, "HalfSpace.offset"))
+
+
+@known_keywords
+def three_walls(half_width: float = 10.0) -> list[HalfSpace]:
+    """The three-wall box: the floor y = 0 between walls at x = ±half_width [m], open to front, back and top."""
+    half_width = float(validation.positive(half_width, (), "half_width"))
+    return [HalfSpace((0, 1, 0), 0.0), HalfSpace((1, 0, 0), -half_width), HalfSpace((-1, 0, 0), -half_width)]
+
+
+def corner() -> list[HalfSpace]:
+    """The corner: the floor y = 0 and the walls x = 0 and z = 0."""
+    return [HalfSpace((0, 1, 0), 0.0), HalfSpace((1, 0, 0), 0.0), HalfSpace((0, 0, 1), 0.0)]
+
+
+@known_keywords
+@dataclass(frozen=True)
+class Scene:
+    """Bodies, walls and effects.
+
+    Parameters
+    ----------
+    bodies : sequence of Body
+        At least one.
+    walls : sequence of HalfSpace
+    effects : sequence of effects
+        At most one of each kind, but any number of `Spring` and `Push`. `Friction`, `RollingFriction`,
+        `SpinFriction` and `Sleeping` need `Contact`, `Contact.tangential` needs `Friction`, `Wind` needs a field for it
+        to act through.
+
+    Warns
+    -----
+    SceneWarning
+        Walls without `Contact`: bodies pass through them.
+
+    Raises
+    ------
+    ValueError
+        Naming what is wrong; also when a body starts deep inside a wall (checked by `World`).
+    """
+
+    bodies: Sequence[Body]
+    walls: Sequence[HalfSpace] = ()
+    effects: Sequence = ()
+
+    def __post_init__(self):
+        for name, allowed in (("bodies", Body), ("walls", HalfSpace), ("effects", EFFECTS)):
+            object.__setattr__(self, name, _items(getattr(self, name), name, allowed))
+        if not self.bodies:
+            raise ValueError("Scene.bodies is empty; allowed is at least one body")
+        kinds = [type(effect) for effect in self.effects]
+        for kind in set(kinds):
+            if kinds.count(kind) > 1 and not getattr(kind, "has_many", False):
+                raise ValueError(f"Scene.effects holds {kinds.count(kind)} {kind.__name__}; allowed is one")
+        for kind in (Friction, *RESISTANCES, Sleeping):
+            if kind in kinds and Contact not in kinds:
+                raise ValueError(f"Scene.effects holds {kind.__name__} without Contact; add physics.Contact()")
+        contact = self.effect(Contact)
+        if contact is not None and contact.tangential is not None and Friction not in kinds:
+            raise ValueError(
+                f"Contact.tangential is {contact.tangential} without Friction, which is what acts along a wall; add "
+                "physics.Friction(...)"
+            )
+        self._check_axes()
+        self._check_fields()
+        if self.walls and contact is None:
+            warnings.warn(NO_CONTACT, SceneWarning, stacklevel=_frames_of_package())
+
+    def __repr__(self) -> str:
+        if len(self.bodies) + len(self.walls) + len(self.effects) <= MOST_SHOWN:
+            text = f"Scene(bodies={self.bodies!r}, walls={self.walls!r}, effects={self.effects!r})"
+            if len(text) <= SCREEN:
+                return text
+        kinds = {name: [type(item).__name__ for item in getattr(self, name)] for name in ("bodies", "effects")}
+        return lines_repr(
+            "Scene", f"{len(self.bodies)} bodies: {counted(kinds['bodies'])}", f"{len(self.walls)} walls",
+            f"effects: {counted(kinds['effects'])}",
+        )  # fmt: skip
+
+    def _check_axes(self) -> None:
+        friction = self.effect(Friction)
+        if friction is None or friction.axis is None or not self.walls:
+            return
+        axes = np.array(friction.axis)
+        if axes.ndim == 2 and len(axes) != len(self.walls):
+            count = len(self.walls)
+            raise ValueError(f"Friction.axis has {len(axes)} directions; allowed are one, or {count}: one per wall")
+        for k, (axis, wall) in enumerate(zip(friction.directions(len(self.walls)), self.walls)):
+            if not np.linalg.norm(np.cross(axis, wall.normal)) > LEAST_SINE * np.linalg.norm(axis):
+                raise ValueError(
+                    f"Friction.axis is {axis.tolist()}, the normal of walls[{k}]; allowed are directions along a wall, "
+                    "which may be given one per wall"
+                )
+
+    def _check_fields(self) -> None:
+        fields = [effect for effect in self.effects if isinstance(effect, Field)]
+        for field in fields:
+            field.check(len(self.bodies))
+        for b, body in enumerate(self.bodies):
+            unknown = [type(field).__name__ for field in fields if field.needs_axes and body.kind == "hull"]
+            if unknown:
+                raise ValueError(
+                    f"Scene.effects holds {', '.join(unknown)}, and Scene.bodies[{b}] is a hull; allowed with it are "
+                    "blocks, spheres and ellipsoids: it depends on what their surface is like"
+                )
+        if fields and all(field.is_air for field in fields):
+            raise ValueError("Scene.effects holds Wind without what it acts through; add physics.Drag()")
+
+    def effect(self, kind: type):
+        """The scene's effect of this class, or None."""
+        validation.instance(kind, type, "kind", "the class of an effect, as physics.Gravity")
+        return next((effect for effect in self.effects if isinstance(effect, kind)), None)
+
+
+def _items(given, name: str, allowed) -> tuple:
+    """The bodies, walls or effects of a scene, as a tuple."""
+    if isinstance(given, allowed):
+        return (given,)
+    if isinstance(given, (str, bytes, dict)) or not isinstance(given, Iterable):
+        raise ValueError(f"Scene.{name} is {shown(given)}; allowed is a list of {_names(allowed)}")
+    items = tuple(given)
+    for k, item in enumerate(items):
+        if isinstance(item, allowed):
+            continue
+        hint = f": write {item.__name__}(...)" if isinstance(item, type) and issubclass(item, allowed) else ""
+        raise ValueError(f"Scene.{name}[{k}] is {shown(item)}; allowed are instances of {_names(allowed)}{hint}")
+    return items
+
+
+def _frames_of_package() -> int:
+    """The `stacklevel` with which whoever calls this warns of the line outside this package that led here."""
+    level, frame = 1, sys._getframe(1)
+    while frame.f_back is not None and frame.f_globals.get("__name__", "").split(".")[0] in ("physics", "dataclasses"):
+        level, frame = level + 1, frame.f_back
+    return level
+
+
+def _names(allowed) -> str:
+    kinds = {Body: (Block, Sphere, Ellipsoid, Hull)}.get(allowed, allowed if isinstance(allowed, tuple) else (allowed,))
+    return ", ".join(kind.__name__ for kind in kinds)

@@ -1,0 +1,151 @@
+"""Springs and pushes: fields that act at a point of one body, or between two. Formulas stand with their functions."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from physics import validation
+from physics.kernels.forces import spring, two_body_spring
+from physics.keywords import known_keywords
+from physics.scene.force_field import Checked
+
+
+def _check_body(effect, body_count: int, name: str) -> None:
+    index = getattr(effect, name)
+    if index >= body_count:
+        raise ValueError(f"{type(effect).__name__}.{name} is {index}; allowed are indices below {body_count}")
+
+
+@known_keywords
+@dataclass(frozen=True)
+class Spring(Checked):
+    """Spring and damper from a point of a body to an anchor: ``-(k (l - l0) + c dl/dt)`` along the line. Any number.
+
+    Parameters
+    ----------
+    anchor : (3,) array_like
+        World frame [m]; with `other` a point of that body: its body frame, from its centre of mass.
+    point : (3,) array_like
+        Where it is fixed to the body: body frame, from the centre of mass [m].
+    stiffness : float
+        k [N/m].
+    damping : float
+        c [N s/m].
+    length : float
+        l0, without force [m].
+    body : int
+        Index in `Scene.bodies`.
+    other : int or None
+        Index of another body that holds the anchor, and is pulled by the opposite force. None: the anchor is fixed.
+    """
+
+    anchor: tuple = (0.0, 0.0, 0.0)
+    point: tuple = (0.0, 0.0, 0.0)
+    stiffness: float = 100.0
+    damping: float = 0.0
+    length: float = 0.0
+    body: int = 0
+    other: int | None = None
+
+    function: ClassVar = spring.spring
+    energy: ClassVar = spring.spring_energy
+    _rates: ClassVar = spring.spring_rates
+    _soften: ClassVar = spring.soften_spring
+    _mean: ClassVar = spring.mean_spring
+    has_many: ClassVar[bool] = True
+
+    def __post_init__(self):
+        self._set("anchor", validation.finite, (3,))
+        self._set("point", validation.finite, (3,))
+        for name in ("stiffness", "damping", "length"):
+            self._set(name, validation.non_negative)
+        validation.count(self.body, "Spring.body", least=0)
+        if self.other is not None:
+            validation.count(self.other, "Spring.other", least=0)
+            if self.other == self.body:
+                raise ValueError(f"Spring.other is {self.other}, as Spring.body; allowed are other bodies and None")
+
+    def check(self, body_count):
+        _check_body(self, body_count, "body")
+        if self.other is not None:
+            _check_body(self, body_count, "other")
+
+    @property
+    def kind(self):
+        return Spring if self.other is None else _LinkedSpring
+
+    @property
+    def takes_energy(self):
+        return None if self.other is not None else self.damping > 0  # between bodies it carries energy across
+
+    def columns(self, body, worlds):
+        if self.other is not None:
+            return self._linked_columns(body)
+        acts = float(body == self.body)
+        return np.array([*self.point, *self.anchor, self.length, acts * self.stiffness, acts * self.damping])
+
+    def _linked_columns(self, body: int) -> np.ndarray:
+        """Columns of one end of a spring between bodies, or of a body at neither."""
+        ends = {self.body: (self.point, self.other, self.anchor), self.other: (self.anchor, self.body, self.point)}
+        here, other, there = ends.get(body, ((0.0, 0.0, 0.0), -1, (0.0, 0.0, 0.0)))
+        columns = np.zeros(two_body_spring.SIZE)
+        columns[spring.POINT : spring.POINT + 3] = here
+        columns[spring.LENGTH : spring.DAMPING + 1] = self.length, self.stiffness, self.damping
+        columns[two_body_spring.OTHER] = other
+        columns[two_body_spring.OTHER_POINT : two_body_spring.OTHER_POINT + 3] = there
+        return columns
+
+
+class _LinkedSpring(Spring):
+    """Field that is compiled for springs between bodies."""
+
+    function: ClassVar = two_body_spring.linked_spring
+    energy: ClassVar = two_body_spring.linked_spring_energy
+    _rates: ClassVar = two_body_spring.linked_spring_rates
+    _soften: ClassVar = two_body_spring.soften_linked_arm
+    _mean: ClassVar = None
+    is_linked: ClassVar[bool] = True
+
+
+@known_keywords
+@dataclass(frozen=True)
+class Push(Checked):
+    """A constant force at a point of a body. Any number.
+
+    Parameters
+    ----------
+    force : (3,) array_like
+        [N].
+    point : (3,) array_like
+        Where it acts: body frame, from the centre of mass [m].
+    frame : {"world", "body"}
+        Of `force`; ``body``: it turns with the body, as the thrust of a rocket does.
+    body : int
+        Index in `Scene.bodies`.
+    """
+
+    force: tuple = (0.0, 0.0, 0.0)
+    point: tuple = (0.0, 0.0, 0.0)
+    frame: str = "world"
+    body: int = 0
+
+    function: ClassVar = spring.push
+    _rates: ClassVar = spring.push_rates
+    _soften: ClassVar = spring.soften_push
+    has_many: ClassVar[bool] = True
+
+    def __post_init__(self):
+        self._set("force", validation.finite, (3,))
+        self._set("point", validation.finite, (3,))
+        validation.one_of(self.frame, ("world", "body"), "Push.frame")
+        validation.count(self.body, "Push.body", least=0)
+
+    def check(self, body_count):
+        _check_body(self, body_count, "body")
+
+    def columns(self, body, worlds):
+        acts = float(body == self.body)
+        return np.array([*self.point, *(acts * np.array(self.force)), float(self.frame == "body")])

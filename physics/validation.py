@@ -1,0 +1,246 @@
+"""Checks of what users hand in. Every failure is a ValueError that names field, value and what is allowed."""
+
+from __future__ import annotations
+
+import numbers
+import os
+from collections.abc import Callable, Iterable
+from decimal import Decimal
+from functools import cache
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from physics.kernels.state.copy_if_finite import take_in
+from physics.keywords import nearest_first
+from physics.parallel.bound_call import compiled
+from physics.summary import shown
+
+# A quaternion counts as a unit quaternion within this; it is then normalised to rounding. Four decimals of each
+# component are what people type and tables print: each is off by up to 5e-5, the four together by a vector of length
+# 1e-4, and by the triangle inequality so is the norm.
+UNIT_TOLERANCE = 1e-4
+
+# A vector of up to four components divided by its length has length 1 within this: half an ulp of each quotient and of
+# the length, and rounding of the length when it is measured again.
+UNIT_ROUNDING = 4 * np.finfo(float).eps
+
+# Largest count: what fits into every integer that it may be stored in.
+MOST = 2**31 - 1
+
+FLOAT64 = np.dtype(np.float64)
+
+
+def floats(value: ArrayLike, field: str, allowed: str) -> np.ndarray:
+    """`value` as a float64 array, where it holds real numbers: no bools, strings, complex or masked ones, no None."""
+    array = _real(value)
+    if array is None:
+        raise ValueError(f"{field} is {shown(value)}; allowed {allowed}")
+    return array
+
+
+def _real(value: ArrayLike) -> np.ndarray | None:
+    """`value` as a float64 array, or None where it is no array of real numbers."""
+    if type(value) is np.ndarray:
+        array = value
+    else:
+        try:
+            array = np.asarray(value)
+        except (TypeError, ValueError, OverflowError):  # ragged
+            return None
+        if isinstance(value, (list, tuple)) and bool in map(type, value):  # NumPy makes them numbers
+            return None
+        if isinstance(value, np.ma.MaskedArray) and np.ma.is_masked(value):
+            return None
+    if array.dtype is FLOAT64:
+        return array
+    if array.dtype.kind in "fiu":
+        return array.astype(np.float64)
+    return _of_objects(array) if array.dtype.kind == "O" else None
+
+
+def _of_objects(array: np.ndarray) -> np.ndarray | None:
+    """An array of fractions, decimals or large integers as float64."""
+    try:
+        return array.astype(np.float64) if all(map(_is_real, array.flat)) else None
+    except OverflowError:  # too large for a float
+        return None
+
+
+def _is_real(item) -> bool:
+    return isinstance(item, (numbers.Real, Decimal)) and not isinstance(item, (bool, np.bool_))
+
+
+def shaped(value: ArrayLike, shape: tuple[int, ...], field: str) -> np.ndarray:
+    """`value` as a float64 array of exactly `shape`."""
+    array = floats(value, field, f"are numbers in shape {shape}" if shape else "is one number")
+    if array.shape != shape:
+        allowed = f"shape {shape}" if shape else "one number"
+        raise ValueError(f"{field} {_given(array)}; allowed is {allowed}")
+    return array
+
+
+def finite(value: ArrayLike, shape: tuple[int, ...], field: str) -> np.ndarray:
+    """`value` as a float64 array of exactly `shape`, all finite."""
+    array = shaped(value, shape, field)
+    if not np.isfinite(array).all():
+        raise _not_finite(array, field)
+    return array
+
+
+def batch(value: ArrayLike, shape: tuple[int, int, int], field: str) -> np.ndarray:
+    """`value` for every world and body: float64 of `shape` (worlds, bodies, n), read-only where it is the same for all.
+
+    Allowed are (worlds, bodies, n), and (bodies, n) for all worlds alike. Of one body the axis of bodies may be left
+    out: (n,) for all worlds alike, (worlds, n) a row for each world. Of several bodies two axes are always (bodies, n),
+    whatever the number of worlds.
+    """
+    worlds, bodies, size = shape
+    array = _real(value)
+    if array is not None:
+        if array.shape == shape:
+            return array
+        if bodies == 1 and array.shape == (worlds, size):
+            return array[:, None]
+        if array.shape == shape[1:] or (bodies == 1 and array.shape == (size,)):
+            return np.broadcast_to(array, shape)
+    alone = [(size,), (worlds, size)] if bodies == 1 else []
+    allowed = " or ".join(map(str, dict.fromkeys((*alone, (bodies, size), shape))))
+    if array is None:
+        raise ValueError(f"{field} is {shown(value)}; allowed are numbers in shape {allowed}")
+    raise ValueError(f"{field} {_given(array)}; allowed is shape {allowed}")
+
+
+def _given(array: np.ndarray) -> str:
+    """An array of a wrong shape, in a message."""
+    return f"has shape {array.shape}" if array.ndim else f"is {shown(array)}"
+
+
+def take_finite(value: ArrayLike, target: np.ndarray, field: str) -> None:
+    """Copy `value` to `target`, a contiguous float64 array (worlds, bodies, n); `value` as in `batch`, all finite.
+
+    Copied and looked at in one pass: after an error `target` is changed, too. For what is handed in with every step.
+    """
+    if type(value) is np.ndarray and value.shape == target.shape and value.dtype.kind in "fiu":
+        array = value
+    else:
+        array = batch(value, target.shape, field)
+    if not _taking()(np.ascontiguousarray(array, np.float64).reshape(1, -1), target.reshape(1, -1)):
+        raise _not_finite(array, field)
+
+
+@cache
+def _taking() -> Callable[[np.ndarray, np.ndarray], bool]:
+    return compiled(take_in, (np.zeros((1, 1)), np.zeros((1, 1))))
+
+
+def _not_finite(array: np.ndarray, field: str) -> ValueError:
+    return _bad(array, np.isfinite(array), field, "are finite numbers")
+
+
+def _bad(array: np.ndarray, good: np.ndarray, field: str, allowed: str) -> ValueError:
+    """The error about an array of numbers that are not all `good`: of a long one it shows the first that is not."""
+    if array.size <= 9:
+        return ValueError(f"{field} is {shown(array)}; allowed {allowed}")
+    place = np.unravel_index(int(np.argmin(good)), array.shape)
+    return ValueError(f"{field}[{', '.join(map(str, map(int, place)))}] is {shown(array[place])}; allowed {allowed}")
+
+
+def rows(value: ArrayLike, width: int, field: str) -> np.ndarray:
+    """`value` as a finite float64 array of any number of rows of `width`."""
+    array = floats(value, field, f"are rows of {width} numbers")
+    if array.ndim != 2 or array.shape[1] != width:
+        raise ValueError(f"{field} {_given(array)}; allowed are rows of {width} numbers")
+    return finite(array, array.shape, field)
+
+
+def number(value: float, field: str) -> float:
+    """A finite float."""
+    return float(finite(value, (), field))
+
+
+def positive(value: ArrayLike, shape: tuple[int, ...], field: str) -> np.ndarray:
+    """Finite and greater than zero."""
+    array = finite(value, shape, field)
+    if not (array > 0).all():
+        raise _bad(array, array > 0, field, "are numbers greater than 0")
+    return array
+
+
+def non_negative(value: ArrayLike, shape: tuple[int, ...], field: str) -> np.ndarray:
+    """Finite and at least zero."""
+    array = finite(value, shape, field)
+    if not (array >= 0).all():
+        raise _bad(array, array >= 0, field, "are numbers of at least 0")
+    return array
+
+
+def share(value: ArrayLike, shape: tuple[int, ...], field: str) -> np.ndarray:
+    """Finite and between zero and one."""
+    array = finite(value, shape, field)
+    good = (array >= 0) & (array <= 1)
+    if not good.all():
+        raise _bad(array, good, field, "are numbers from 0 to 1")
+    return array
+
+
+def count(value: int, field: str, least: int = 1, most: int | None = MOST) -> int:
+    """An integer from `least` to `most`; None: of any size."""
+    if type(value) is int and least <= value <= MOST:
+        return value
+    if isinstance(value, bool) or not isinstance(value, (int, np.integer)) or value < least:
+        raise ValueError(f"{field} is {shown(value)}; allowed are integers of at least {least}")
+    if most is not None and value > most:
+        raise ValueError(f"{field} is {shown(value)}; allowed are integers from {least} to {most}")
+    return int(value)
+
+
+def index(value: int, count: int, field: str) -> int:
+    """An index of one of `count` things, from 0."""
+    is_integer = isinstance(value, (int, np.integer)) and not isinstance(value, bool)
+    if not is_integer or not 0 <= value < count:
+        raise ValueError(f"{field} is {shown(value)}; allowed are indices from 0 to {count - 1}")
+    return int(value)
+
+
+def one_of(value: str, names: Iterable[str], field: str, besides: str = "") -> str:
+    """One of the `names`; the message lists the nearest first, and what is allowed `besides`."""
+    names = list(names)
+    if not isinstance(value, str) or value not in names:
+        order = nearest_first(value, names) if isinstance(value, str) else names
+        raise ValueError(f"{field} is {shown(value)}; allowed are {', '.join(order)}{besides}")
+    return value
+
+
+def instance(value: object, kind: type, field: str, name: str):
+    """`value`, which must be an instance of `kind`, called `name` in the message."""
+    if not isinstance(value, kind):
+        raise ValueError(f"{field} is {shown(value)}; allowed is {name}")
+    return value
+
+
+def path(value: str | os.PathLike, field: str = "path"):
+    """A path as it is given."""
+    if not isinstance(value, (str, os.PathLike)) or not os.fspath(value):
+        raise ValueError(f"{field} is {shown(value)}; allowed is the path of a file, a str or a Path")
+    return value
+
+
+def unit_quaternion(value: ArrayLike, shape: tuple[int, ...], field: str) -> np.ndarray:
+    """Quaternions (w, x, y, z) of length 1 within `UNIT_TOLERANCE`, normalised to rounding."""
+    array = finite(value, shape, field)
+    length = np.linalg.norm(array, axis=-1, keepdims=True)
+    off = np.abs(length - 1)
+    if not (off <= UNIT_TOLERANCE).all():
+        k = int(np.argmax(~(off <= UNIT_TOLERANCE)))
+        worst = array.reshape(-1, 4)[k]
+        raise ValueError(
+            f"{field} is {shown(worst)} of norm {float(length.reshape(-1)[k]):.6g}; allowed are unit quaternions "
+            f"(w, x, y, z), of norm 1 within {UNIT_TOLERANCE:g}: divide it by its norm"
+        )
+    return unit(array, length)
+
+
+def unit(array: np.ndarray, length: np.ndarray) -> np.ndarray:
+    """`array` divided by its `length`; where that is 1 to rounding as it is, so that doing it twice changes nothing."""
+    return np.where(np.abs(length - 1) <= UNIT_ROUNDING, array, array / length)

@@ -1,0 +1,146 @@
+"""Errors of a trajectory against another one, and against the laws: plain NumPy, the same for every engine."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from physics.scene.bodies import Body
+from physics.scene.effects import RESISTANCES, Contact, Friction, Gravity
+from physics.scene.force_field import Field
+from physics.scene.scene import Scene
+
+
+def angles_between(quat: np.ndarray, true: np.ndarray) -> np.ndarray:
+    """Angle of the rotation from one attitude to another [rad], (...); accurate for small angles.
+
+    Parameters
+    ----------
+    quat, true : (..., 4) float64
+        Unit quaternions; the sign of either does not matter.
+    """
+    quat, true = np.asarray(quat, dtype=float), np.asarray(true, dtype=float)
+    chord = np.minimum(np.linalg.norm(quat - true, axis=-1), np.linalg.norm(quat + true, axis=-1))
+    return 4.0 * np.arcsin(np.minimum(1.0, 0.5 * chord))
+
+
+def distances(scene: Scene, pos, quat, true_pos, true_quat) -> np.ndarray:
+    """Upper bound of the distance of a body's points from their true places [m], (samples, bodies).
+
+    |Δx| + 2 r sin(θ/2): a turn by θ moves no point of a body of bounding radius r by more than the chord.
+
+    Parameters
+    ----------
+    pos, true_pos : (samples, bodies, 3) float64
+    quat, true_quat : (samples, bodies, 4) float64
+    """
+    radii = np.array([body.bounding_radius(body.dimensions) + np.linalg.norm(body.center) for body in scene.bodies])
+    turn = 2.0 * radii * np.sin(0.5 * angles_between(quat, true_quat))
+    return np.linalg.norm(pos - true_pos, axis=-1) + turn
+
+
+def root_mean_square(difference: np.ndarray) -> float:
+    """Root of the mean over the samples of |difference|² of the worst body; `difference` is (samples, bodies, 3).
+
+    Velocities are compared in the mean: an impact that comes a moment early makes an error as large as the impact
+    itself between the two moments, however short that is.
+    """
+    return float(np.sqrt(np.mean(np.sum(difference * difference, axis=-1).max(axis=-1))))
+
+
+def rotation_matrices(quat: np.ndarray) -> np.ndarray:
+    """(..., 3, 3) rotation matrices, body to world, of unit quaternions (..., 4)."""
+    w, x, y, z = np.moveaxis(np.asarray(quat, dtype=float), -1, 0)
+    rows = (
+        (1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)),
+        (2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)),
+        (2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)),
+    )
+    return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
+
+
+def mechanical_energy(scene: Scene, pos, quat, linvel, angvel) -> np.ndarray:
+    """Kinetic and potential energy [J], (samples, bodies), zero potential at the origin.
+
+    For samples of another engine; a `Trajectory` of ours has it.
+    """
+    gravity = scene.effect(Gravity)
+    pull = np.array(gravity.acceleration if gravity else (0.0, 0.0, 0.0))
+    mass = np.array([body.mass for body in scene.bodies])
+    inertia = np.array([body.inertia for body in scene.bodies])
+    spin = np.einsum("nbji,nbj->nbi", rotation_matrices(quat), angvel)
+    turning = 0.5 * np.einsum("nbi,bij,nbj->nb", spin, inertia, spin)
+    return 0.5 * mass * np.sum(linvel * linvel, axis=-1) + turning - mass * (pos @ pull)
+
+
+def conserves_energy(scene: Scene) -> bool:
+    """Test whether nothing in the scene takes energy: no contact, or elastic contact without friction; no drag."""
+    if any(law is not False for law in _field_laws(scene)):
+        return False
+    contact, friction = scene.effect(Contact), scene.effect(Friction)
+    if contact is None or not scene.walls:
+        return True
+    if any(scene.effect(kind) is not None and scene.effect(kind).radius > 0 for kind in RESISTANCES):
+        return False
+    return contact.restitution == 1.0 and (friction is None or friction.coefficient == 0.0)
+
+
+def _field_laws(scene: Scene) -> list[bool | None]:
+    return [effect.takes_energy for effect in scene.effects if isinstance(effect, Field)]
+
+
+def energy_error(scene: Scene, energy: np.ndarray) -> float:
+    """By how much the energy [J], (samples, bodies), breaks its law; bodies do not exchange any.
+
+    Where it is conserved: the largest departure from the start. Else: the largest rise above an earlier value, which
+    nothing passive has; what the right losses are only a truth can tell. Not a number where a field may give energy.
+    """
+    if None in _field_laws(scene):
+        return float("nan")
+    if conserves_energy(scene):
+        return float(np.abs(energy - energy[0]).max())
+    return float((energy - np.minimum.accumulate(energy, axis=0)).max())
+
+
+def deepest_penetration(scene: Scene, pos, quat) -> float:
+    """Largest depth of a body in a wall over all samples [m]; 0 where it touches none."""
+    if not scene.walls or scene.effect(Contact) is None:
+        return 0.0
+    worst = 0.0
+    for b, body in enumerate(scene.bodies):
+        R = rotation_matrices(quat[:, b])
+        for wall in scene.walls:
+            normal = np.array(wall.normal)
+            direction = np.einsum("nji,j->ni", R, normal)
+            gap = pos[:, b] @ normal + direction @ body.center - wall.offset - _support(body, -direction)
+            worst = 0.0 + float(np.maximum(worst, -gap.min()))  # keeps what is not a number, no -0.0
+    return worst
+
+
+def _support(body: Body, direction: np.ndarray) -> np.ndarray:
+    """Extent (n,) [m] of a body from its geometric centre along `direction` (n, 3), unit vectors in its own frame."""
+    if body.kind == "hull":
+        return (direction @ body.polyhedron.vertices.T).max(axis=-1)
+    scaled = direction * body.dimensions
+    if body.kind == "block":
+        return np.abs(scaled).sum(axis=-1)
+    return np.linalg.norm(scaled, axis=-1)
+
+
+def event_error(events: Sequence, true: Sequence) -> float | None:
+    """Worst difference of the times of the same events [s]; None where none can be told to be the same.
+
+    Events are paired by kind, in order of time, and only those kinds count of which both have equally many: with one
+    more or less of them, which belongs to which would be a guess. A fault is no event of the scene.
+
+    Parameters
+    ----------
+    events, true : sequence of Event
+    """
+    worst = None
+    for kind in {event.kind for event in events} - {"fault"}:
+        mine, theirs = (sorted(event.t for event in some if event.kind == kind) for some in (events, true))
+        if len(mine) == len(theirs):
+            worst = max(worst or 0.0, *(abs(a - b) for a, b in zip(mine, theirs)))
+    return worst

@@ -1,0 +1,217 @@
+"""Result of a measurement of error against time: the points, and the answers that they give."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from physics import validation
+from physics.summary import counted, fields_repr, lines_repr
+from physics.work_precision import analysis as frontier_analysis
+from physics.work_precision.contender import OURS, setting_name
+
+
+@dataclass(frozen=True)
+class FrontierPoint:
+    """One engine at one setting and one step.
+
+    Attributes
+    ----------
+    engine, setting : str
+    dt : float
+        Step [s].
+    errors : dict of float
+        By measure, in its unit (see `Frontier.units`); a measure that could not be taken is missing.
+    costs : tuple of float
+        Wall-clock time per simulated second [s], of each repeat; compiling is not in it.
+    is_lost : bool
+        It no longer follows the truth: a state or an error is not finite, or the error is larger than half of what
+        happens in the scene (`run.LOST_SHARE`).
+    note : str
+        What the engine's reports say where not all is well, else "".
+    """
+
+    engine: str
+    setting: str
+    dt: float
+    errors: Mapping[str, float]
+    costs: tuple[float, ...]
+    is_lost: bool = False
+    note: str = ""
+
+    __repr__ = fields_repr
+
+    @property
+    def cost(self) -> float:
+        """Median of `costs`: wall-clock time per simulated second [s]."""
+        ordered, half = sorted(self.costs), len(self.costs) // 2
+        return ordered[half] if len(ordered) % 2 else 0.5 * (ordered[half - 1] + ordered[half])
+
+    def __str__(self) -> str:
+        name = self.setting if self.engine == OURS else f"{self.engine} {self.setting}"
+        return f"{name} at {1e3 * self.dt:g} ms"
+
+
+@dataclass(frozen=True)
+class Frontier:
+    """Error against time of one scene.
+
+    Wherever a method takes `measure`, None stands for the one in the attribute of that name.
+
+    Attributes
+    ----------
+    points : tuple of FrontierPoint
+    measure : str
+        What `error` means where nothing else is said: ``pose`` against the reference, ``error`` against a `Truth`.
+    units : dict of str
+        Of each measure.
+    floors : dict of float
+        The truth's own error, per measure: at or below it points cannot be told apart.
+    truth : str
+        What the truth is.
+    duration : float
+        Simulated time [s].
+    is_complete : bool
+        False: interrupted; what is here is what was done.
+    skipped : tuple of str
+        Who was left out, and why.
+    """
+
+    points: tuple[FrontierPoint, ...]
+    measure: str
+    units: Mapping[str, str]
+    floors: Mapping[str, float]
+    truth: str
+    duration: float
+    is_complete: bool = True
+    skipped: tuple[str, ...] = ()
+
+    # --- points ------------------------------------------------------------------------------------------------
+
+    def error(self, point: FrontierPoint, measure: str | None = None) -> float:
+        """A point's error in a measure; infinite where it could not be taken or is not a number."""
+        value = point.errors.get(self._measure(measure), math.inf)
+        return value if not math.isnan(value) else math.inf
+
+    def own_error(self, measure: str | None = None) -> float:
+        """The truth's own error in a measure; 0 where the measure needs no truth (energy, penetration)."""
+        return float(self.floors.get(self._measure(measure), 0.0))
+
+    def is_at_floor(self, point: FrontierPoint, measure: str | None = None) -> bool:
+        """Test whether a point is as good as the truth itself is known; it may be better than it looks."""
+        return self.error(point, measure) <= self.own_error(measure)
+
+    def of(self, setting: object = None, engine: str | None = None) -> tuple[FrontierPoint, ...]:
+        """The points of a setting (a name, or an `Accuracy`) and an engine, coarsest step first; None: of all.
+
+        Raises
+        ------
+        ValueError
+            There is none.
+        """
+        name = setting if setting is None or isinstance(setting, str) else setting_name(setting)
+        found = [p for p in self.points if name in (None, p.setting) and engine in (None, p.engine)]
+        if not found and self.points:
+            known = ", ".join(dict.fromkeys(f"{p.engine} {p.setting}" for p in self.points))
+            raise ValueError(f"setting is {name!r} of engine {engine!r}; allowed are those measured: {known}")
+        return tuple(sorted(found, key=lambda p: -p.dt))
+
+    def front(self, measure: str | None = None, engine: str | None = None) -> tuple[FrontierPoint, ...]:
+        """The Pareto front, quickest first: each is more accurate than all that are quicker."""
+        some = [p for p in self.of(engine=engine) if not p.is_lost]
+        errors = [self.error(p, measure) for p in some]
+        found = frontier_analysis.front(errors, [p.cost for p in some], self.own_error(measure))
+        return tuple(some[i] for i in found)
+
+    # --- answers -----------------------------------------------------------------------------------------------
+
+    def cheapest(self, error: float, measure: str | None = None, engine: str | None = None) -> FrontierPoint | None:
+        """The quickest setting whose error is at most `error`; None where none was shown to be (see `advice`).
+
+        The truth's own error counts: below it, nothing can be shown.
+        """
+        error = float(validation.positive(error, (), "error"))
+        good = [p for p in self.front(measure, engine) if max(self.error(p, measure), self.own_error(measure)) <= error]
+        return good[0] if good else None
+
+    def advice(self, error: float, measure: str | None = None, engine: str | None = None) -> str:
+        """`cheapest` as a sentence, which also says why there is none."""
+        point, unit = self.cheapest(error, measure, engine), self.units[self._measure(measure)]
+        goal = f"{error:g} {unit}".rstrip()
+        if point is not None:
+            return f"below {goal}: {point}, error {self.error(point, measure):.2g}, {1e6 * point.cost:.0f} µs per s"
+        if self.own_error(measure) > error:
+            return f"below {goal}: cannot be shown, the truth itself is known to {self.own_error(measure):.2g} only"
+        front = self.front(measure, engine)
+        if not front:
+            return f"below {goal}: no setting that was measured; all of them are lost"
+        best = self.error(front[-1], measure)
+        return f"below {goal}: no setting that was measured; the best is {front[-1]}, error {best:.2g}"
+
+    def order(self, setting: object, measure: str | None = None, engine: str = OURS) -> float | None:
+        """Observed order of a setting: slope of log error over log step where the error falls; None: not to be seen."""
+        some = [p for p in self.of(setting, engine) if not p.is_lost]
+        errors = [self.error(p, measure) for p in some]
+        return frontier_analysis.observed_order([p.dt for p in some], errors, self.own_error(measure))
+
+    def plateau(self, setting: object, measure: str | None = None, engine: str = OURS) -> float | None:
+        """Error below which smaller steps of a setting do not get; None while its error still falls.
+
+        Rounding where the setting converges, its tolerances where they are coarser, or its model.
+        """
+        some = [p for p in self.of(setting, engine) if not p.is_lost]
+        return frontier_analysis.plateau([p.dt for p in some], [self.error(p, measure) for p in some])
+
+    def lost_from(self, setting: object, engine: str = OURS) -> float | None:
+        """Smallest step [s] from which on a setting is lost at every larger one; None where it never is."""
+        some = self.of(setting, engine)
+        return frontier_analysis.lost_from([p.dt for p in some], [p.is_lost for p in some])
+
+    def families(self) -> tuple[tuple[str, str], ...]:
+        """Every (engine, setting) that was measured, in that order."""
+        return tuple(dict.fromkeys((p.engine, p.setting) for p in self.points))
+
+    def __repr__(self) -> str:
+        return lines_repr(
+            "Frontier", f"{len(self.points)} points", f"settings: {counted(p.setting for p in self.points)}",
+            f"measure={self.measure!r}", f"duration={self.duration:.6g} s", f"is_complete={self.is_complete}",
+            f"{len(self.skipped)} skipped", f"truth: {self.truth}",
+        )  # fmt: skip
+
+    # --- showing -----------------------------------------------------------------------------------------------
+
+    def to_dict(self) -> dict:
+        """For JSON: what is not finite is None."""
+        front = self.front()
+        rows = [
+            {
+                "engine": p.engine, "setting": p.setting, "dt": p.dt, "cost": p.cost, "costs": list(p.costs),
+                "errors": {name: value if math.isfinite(value) else None for name, value in p.errors.items()},
+                "is_front": p in front, "is_at_floor": self.is_at_floor(p), "is_lost": p.is_lost, "note": p.note,
+            }
+            for p in self.points
+        ]  # fmt: skip
+        own = {name: value if math.isfinite(value) else None for name, value in self.floors.items()}
+        return {
+            "measure": self.measure, "units": dict(self.units), "truth": self.truth, "own_error": own,
+            "duration": self.duration, "is_complete": self.is_complete,
+            "skipped": list(self.skipped), "points": rows,
+        }  # fmt: skip
+
+    def __str__(self) -> str:
+        front = self.front()
+        lines = [f"{self.measure} error against time, truth: {self.truth}, known to {self.own_error():.2g}"]
+        if not self.is_complete:
+            lines.append("interrupted: not all settings were measured")
+        for p in sorted(self.points, key=lambda p: p.cost):
+            flag = "*" if p in front else "!" if p.is_lost else " "
+            error = f"{self.error(p):.2g} {self.units[self.measure]}"
+            lines.append(f"{flag} {error:>14}  {1e6 * p.cost:10.0f} µs per s  {p}")
+        return "\n".join(lines)
+
+    def _measure(self, measure: str | None) -> str:
+        name = self.measure if measure is None else measure
+        if name not in self.units:
+            raise ValueError(f"measure is {name!r}; allowed are {', '.join(self.units)}")
+        return name

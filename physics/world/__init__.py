@@ -1,0 +1,1 @@
+"""Worlds: the arrays of a batch, and the step that advances them."""

@@ -1,0 +1,120 @@
+"""From the commanded wrench to the wrench that acts: the actuator of a world, before its kernel.
+
+A command is held over a step. Delayed, it is a staircase whose treads begin `delay` after the steps in which it was
+given; each tread is clipped. Behind it stands the lag τ w' = c - w, which over a tread of length h with command c takes
+
+    w -> c + (w - c) e^(-h/τ),    mean over the tread  c + (w - c) (τ/h) (1 - e^(-h/τ)),
+
+both exact. The kernel holds over a step the mean of w over it: momentum at the end of every step is exact, place and
+attitude are of second order in the step, as with anything that is held.
+"""
+
+from __future__ import annotations
+
+import math
+from itertools import pairwise
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from physics.kernels.forces.actuator_lag import follow, shorten
+from physics.scene.effects import Actuator
+from physics.world.report import add_report
+
+if TYPE_CHECKING:
+    from physics.parallel.bound_call import Work
+    from physics.world.world import World
+
+# Treads shorter than this share of the step are rounding of the times they lie between.
+NO_TIME = 1e-9
+
+
+class Actuation:
+    """The state of an `Actuator` for a batch of worlds.
+
+    Parameters
+    ----------
+    actuator : Actuator
+    shape : tuple of int
+        (worlds, bodies, 6).
+
+    Attributes
+    ----------
+    applied : (worlds, bodies, 6) float64
+        What acts in the next step: force [N], torque [N m], world frame; renewed in place.
+    """
+
+    def __init__(self, actuator: Actuator, shape: tuple[int, int, int]):
+        self.actuator = actuator
+        self.applied = np.zeros(shape)
+        self._shape = shape
+        self._output = self._nothing()  # w
+        self._command = self._nothing()  # of this step, clipped
+        self._late: list[tuple[float, np.ndarray]] = []  # commands with a delay that still count: when given [s]
+
+    def _nothing(self) -> np.ndarray:
+        return np.zeros((self._shape[0] * self._shape[1], 6))
+
+    def advance(self, world: World, calls: list[Work], wrench: np.ndarray, steps: int, dt: float) -> None:
+        """`World.advance` through the actuator: one that remembers is asked at each step."""
+        if steps == 1 or not self.actuator.remembers:
+            self.take(wrench, world.time, dt)
+            world.make(calls, steps * dt)
+            return
+        total = np.zeros_like(world.report_table)
+        for _ in range(steps):
+            self.take(wrench, world.time, dt)
+            world.make(calls, dt)
+            add_report(total, world.report_table)
+        world.report_table[...] = total
+
+    def take(self, wrench: np.ndarray, start: float, dt: float) -> None:
+        """Take the command of the step from `start` over `dt` [s]; `applied` is then what acts in it."""
+        if self.actuator.delay > 0.0:
+            self._command = self._nothing()
+        self._command[...] = wrench.reshape(-1, 6)
+        limits = (self.actuator.limit_force, self.actuator.limit_torque)
+        shorten(self._command, *(np.inf if limit is None else limit for limit in limits))
+        applied = self.applied.reshape(-1, 6)
+        for k, (share, tread) in enumerate(self._treads(start, dt)):
+            gone, kept = 1.0, 0.0
+            if self.actuator.lag > 0.0:
+                x = share * dt / self.actuator.lag
+                gone = -math.expm1(-x)
+                kept = gone / x
+            follow(tread, gone, kept, share, k == 0, self._output, applied)
+
+    def _treads(self, start: float, dt: float) -> list[tuple[float, np.ndarray]]:
+        """(share of the step, command) of the staircase from `start` over `dt`; zero before the first command."""
+        if self.actuator.delay == 0.0:
+            return [(1.0, self._command)]
+        self._late.append((start, self._command))
+        arrivals = [-np.inf, *(_snapped((given + self.actuator.delay - start) / dt) for given, _ in self._late)]
+        commands = [self._nothing(), *(command for _, command in self._late)]
+        begun = sum(share <= 0.0 for share in arrivals) - 1
+        del self._late[: max(begun - 1, 0)]
+        edges = [min(max(share, 0.0), 1.0) for share in (*arrivals, 1.0)]
+        return [(end - begin, command) for (begin, end), command in zip(pairwise(edges), commands) if end > begin]
+
+    def forget(self, worlds: np.ndarray) -> None:
+        """Let these worlds begin at rest: no output, no commands on their way."""
+        for rows in (self._output, *(command for _, command in self._late)):
+            rows.reshape(self._shape)[worlds] = 0.0
+
+    def kept(self) -> tuple:
+        """State of the actuator, for `put_back`."""
+        return self._output.copy(), [(given, command.copy()) for given, command in self._late]
+
+    def put_back(self, kept: tuple) -> None:
+        """Go on from what `kept` gave."""
+        output, late = kept
+        self._output[...] = output
+        self._late = [(given, command.copy()) for given, command in late]
+
+
+def _snapped(share: float) -> float:
+    """A share of a step, 0 or 1 where it is so but for rounding."""
+    for edge in (0.0, 1.0):
+        if abs(share - edge) <= NO_TIME:
+            return edge
+    return share

@@ -1,0 +1,62 @@
+"""Contact points and forces of the last step, read back from the contact memory."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from physics.kernels.half_space.gap_queries import contact_point
+from physics.kernels.multibody.data import arrays as many
+from physics.kernels.state import layout as at
+from physics.kernels.time_stepping.contact_stages import MEMORY_HEAD
+
+if TYPE_CHECKING:
+    from physics.world.world import World
+
+
+def contact_ends(world: World, index: int) -> np.ndarray:
+    """Bodies and walls that touch, (n, 2) int64; see `World.contact_ends`."""
+    if not world.plan.contact:
+        return np.zeros((0, 2), dtype=np.int64)
+    if world.plan.many:
+        return _many_rows(world, index)[:, many.FIRST : many.SECOND + 1].astype(np.int64)
+    ends = [(b, -1 - slot // world.plan.features) for b in range(world.body_count) for slot in _slots(world, index, b)]
+    return np.array(ends, dtype=np.int64).reshape(-1, 2)
+
+
+def contact_forces(world: World, index: int) -> tuple[np.ndarray, np.ndarray]:
+    """Points (n, 3) [m] and forces (n, 3) [N], world frame; see `World.contacts`."""
+    if not world.plan.contact:
+        return np.zeros((0, 3)), np.zeros((0, 3))
+    if world.plan.many:
+        rows = _many_rows(world, index)
+        length = world.memory[index, many.STAGE_LENGTH] or 1.0  # no row where nothing touched yet
+        return rows[:, many.POINT : many.POINT + 3].copy(), rows[:, many.IMPULSE : many.IMPULSE + 3] / length
+    found = [_wall_contact(world, index, b, slot) for b in range(world.body_count) for slot in _slots(world, index, b)]
+    points, forces = zip(*found) if found else ((), ())
+    return np.array(points).reshape(-1, 3), np.array(forces).reshape(-1, 3)
+
+
+def _many_rows(world: World, index: int) -> np.ndarray:
+    """Remembered contacts (n, `MEMORY_SIZE`) of one world in which bodies touch each other."""
+    row = world.memory[index]
+    count = int(row[many.CONTACT_COUNT])
+    return row[many.MEMORY_HEAD : many.MEMORY_HEAD + many.MEMORY_SIZE * count].reshape(count, many.MEMORY_SIZE)
+
+
+def _slots(world: World, index: int, body: int) -> list[int]:
+    """Slots (wall * features + feature) at which a body rests."""
+    row = world.memory[index * world.body_count + body]
+    return row[MEMORY_HEAD : MEMORY_HEAD + int(row[1])].astype(int).tolist()
+
+
+def _wall_contact(world: World, index: int, body: int, slot: int) -> tuple[np.ndarray, np.ndarray]:
+    """Point [m] and force [N] at one slot, (3,) each."""
+    i = index * world.body_count + body
+    row, (wall, feature) = world.memory[i], divmod(slot, world.plan.features)
+    point = np.empty(3)
+    contact_point(world.state, world.params, world.shapes, world.walls, i, wall, feature, point)
+    impulses_at = MEMORY_HEAD + (world.memory.shape[1] - MEMORY_HEAD) // 4
+    impulse = row[impulses_at + 3 * slot : impulses_at + 3 * slot + 3]
+    return point, world.walls[wall, at.NORMAL : at.NORMAL + 9].reshape(3, 3).T @ impulse / row[0]

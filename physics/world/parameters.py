@@ -1,0 +1,199 @@
+"""Rows of physical parameters, as the kernels read them, from bodies and from per-world values."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from physics import validation
+from physics.kernels.compile.decorators import kernel
+from physics.kernels.flight.free_rotation import attitude_series, write_attitude_series
+from physics.kernels.multibody.data.hull_tables import CUBE
+from physics.kernels.state import layout as at
+from physics.kernels.state.contact_law_dispatch import ANISOTROPY, DAMPING, ROLLING, SPIN, STIFFNESS, TANGENTIAL
+from physics.mass.inertia import check_inertia, check_range, principal_axes
+from physics.scene.bodies import Body
+from physics.scene.effects import Contact, Friction, RollingFriction, SpinFriction
+from physics.scene.scene import HalfSpace
+
+
+def quaternion_of(R: np.ndarray) -> np.ndarray:
+    """Unit quaternion (w, x, y, z), w >= 0, of a rotation matrix, by the largest of its four components."""
+    trace = np.trace(R)
+    four = np.array([trace, R[0, 0], R[1, 1], R[2, 2]])
+    largest = int(np.argmax(four))
+    q = np.empty(4)
+    if largest == 0:
+        q[:] = 1 + trace, R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]
+    else:
+        i, j, k = largest - 1, largest % 3, (largest + 1) % 3
+        q[0] = R[k, j] - R[j, k]
+        q[1 + i] = 1 + 2 * R[i, i] - trace
+        q[1 + j] = R[j, i] + R[i, j]
+        q[1 + k] = R[k, i] + R[i, k]
+    q /= np.linalg.norm(q)
+    return q if q[0] >= 0 else -q
+
+
+def write_bodies(params: np.ndarray, bodies: tuple[Body, ...]) -> None:
+    """Mass properties and dimensions of a scene's bodies into `params` (worlds * bodies, PARAM_SIZE)."""
+    for b, body in enumerate(bodies):
+        moments, R = principal_axes(body.inertia)
+        _write_body(
+            params[b :: len(bodies)], body, np.array([body.mass]), moments[None], R[None], body.dimensions[None]
+        )
+    _write_series(params)
+
+
+def polyhedra(bodies: tuple[Body, ...]) -> list:
+    """Polyhedra of a scene's bodies for `hull_tables.make_hulls`; empty where none is a hull."""
+    if not any(body.kind == "hull" for body in bodies):
+        return []
+    blocks = {"block": CUBE}
+    return [body.polyhedron if body.kind == "hull" else blocks.get(body.kind) for body in bodies]
+
+
+def _write_body(rows, body, masses, moments, R, dimensions) -> None:
+    """One body into its rows (n, PARAM_SIZE), but for the series; the other arrays have n rows, or one for all."""
+    rows[:, at.INV_MASS] = 1.0 / masses
+    rows[:, at.INV_INERTIA : at.INV_INERTIA + 3] = 1.0 / moments
+    rows[:, at.PRINCIPAL : at.PRINCIPAL + 4] = np.reshape([quaternion_of(frame) for frame in R], (-1, 4))
+    rows[:, at.DIMENSIONS : at.DIMENSIONS + 3] = dimensions
+    rows[:, at.CENTER : at.CENTER + 3] = body.center
+    rows[:, at.RADIUS] = body.bounding_radius(dimensions) + np.linalg.norm(body.center)  # about the centre of mass
+
+
+# Which effect a law of contact is a number of.
+LAW_EFFECTS = {
+    TANGENTIAL: (Contact, "tangential"),
+    ROLLING: (RollingFriction, "radius"),
+    SPIN: (SpinFriction, "radius"),
+    ANISOTROPY: (Friction, "ratio"),
+    STIFFNESS: (Contact, "stiffness"),
+    DAMPING: (Contact, "damping"),
+}
+
+
+def write_laws(params: np.ndarray, laws: tuple[str, ...], effects: Sequence) -> None:
+    """Numbers of the laws of contact among `effects` into their columns, the last of `params` (n, ...)."""
+    for k, law in enumerate(laws):
+        kind, name = LAW_EFFECTS[law]
+        for effect in effects:
+            if isinstance(effect, kind):
+                params[:, params.shape[1] - len(laws) + k] = getattr(effect, name)
+
+
+def _write_series(params: np.ndarray) -> None:
+    """Coefficients of the rotation series into all rows of `params` from their moments."""
+    first, series = at.INV_INERTIA, params[:, at.SERIES : at.SERIES + at.SERIES_SIZE]
+    write_attitude_series(*params[:, first : first + 3].T, series.T)
+
+
+@kernel
+def _change_series(params):
+    """The same, compiled: worlds with bodies of their own change them at every reset."""
+    first = at.INV_INERTIA
+    for i in range(params.shape[0]):
+        series = params[i, at.SERIES : at.SERIES + at.SERIES_SIZE]
+        attitude_series(params[i, first], params[i, first + 1], params[i, first + 2], series)
+
+
+def spread(value, shape: tuple[int, ...], field: str) -> tuple[np.ndarray, tuple[int, ...], str]:
+    """(array, shape, field) for `validation`: `value` with a missing worlds or bodies axis added."""
+    allowed = f"shape {shape}, or without the axis of bodies, or of worlds and bodies"
+    array = validation.floats(value, field, f"are numbers in {allowed}")
+    given = array.shape
+    if array.ndim == len(shape) - 1 and given[:1] == shape[:1]:
+        array = array[:, None]
+    try:
+        return np.broadcast_to(array, shape), shape, field
+    except ValueError:
+        raise ValueError(f"{field} has shape {given}; allowed is {allowed}") from None
+
+
+def change_inertia(params, bodies, plan, mass, size, inertia_body, shape) -> None:
+    """Write new masses, sizes and inertias (each may be None) into `params` ((k * bodies, PARAM_SIZE))."""
+    masses = 1.0 / params[:, at.INV_MASS]
+    if mass is not None:
+        masses = validation.positive(*spread(mass, shape, "mass")).ravel()
+    halves = params[:, at.DIMENSIONS : at.DIMENSIONS + 3].copy()
+    if size is not None:
+        halves = 0.5 * validation.positive(*spread(size, (*shape, 3), "size")).reshape(-1, 3)
+    tensors = None
+    if inertia_body is not None:
+        tensors = validation.finite(*spread(inertia_body, (*shape, 3, 3), "inertia_body")).reshape(-1, 3, 3)
+    for b, body in enumerate(bodies):
+        rows = slice(b, None, len(bodies))
+        if body.kind == "sphere":
+            _check_spheres(halves[rows])
+        if body.kind == "hull":
+            _check_hull(b, body, halves[rows])
+        given = None if tensors is None else tensors[rows]
+        moments, R = _principal_axes(body, masses[rows], halves[rows], given)
+        check_range(masses[rows], moments)
+        _check_allowed(plan, moments, R)
+        _write_body(params[rows], body, masses[rows], moments, R, halves[rows])
+    _change_series(params)
+
+
+def _principal_axes(body, masses, halves, tensors) -> tuple[np.ndarray, np.ndarray]:
+    """Moments (n, 3) [kg m²] and frames (n, 3, 3), or (1, 3, 3) for all, of one body of the scene in n worlds."""
+    if tensors is not None:
+        each = [principal_axes(check_inertia(tensor, "inertia_body")) for tensor in tensors]
+        return np.array([moments for moments, _ in each]).reshape(-1, 3), np.array([R for _, R in each]).reshape(
+            -1, 3, 3
+        )
+    if body.inertia_body is not None or body.kind == "hull":
+        moments, R = principal_axes(body.inertia)
+        return moments * (masses / body.mass)[:, None], R[None]
+    return body.uniform_moments(halves, masses), np.eye(3)[None]
+
+
+def _check_spheres(halves) -> None:
+    bad = np.flatnonzero(np.ptp(halves, axis=1) > 0)
+    if len(bad):
+        size = (2 * halves[bad[0]]).tolist()
+        raise ValueError(f"size is {size} for a sphere; allowed are three equal diameters")
+
+
+def _check_hull(b, body, halves) -> None:
+    if (halves != body.dimensions).any():
+        size = (2 * halves[(halves != body.dimensions).any(axis=1)][0]).tolist()
+        raise ValueError(
+            f"size is {size} for Scene.bodies[{b}], a hull, which has its points in all worlds; allowed is twice its "
+            f"dimensions, {(2 * body.dimensions).tolist()}"
+        )
+
+
+def _check_allowed(plan, moments, R) -> None:
+    bad = np.flatnonzero(~plan.allows(moments, R))
+    if len(bad):
+        frame = np.broadcast_to(R, (len(moments), 3, 3))[bad[0]]
+        tensor = frame * moments[bad[0]] @ frame.T
+        raise ValueError(
+            f"the inertia becomes {tensor.tolist()}; the scene's bodies are all isotropic, or aligned with "
+            "their axes, and its kernel leaves the rest out: give a body of the scene such an inertia_body"
+        )
+
+
+def wall_table(walls: tuple[HalfSpace, ...], along: np.ndarray | None = None) -> np.ndarray:
+    """(walls, WALL_SIZE): normal, two tangents that complete it to a right-handed frame, offset.
+
+    The first tangent is the part along the wall of the directions `along` (walls, 3). Without them it comes from the
+    world axis that follows the one the normal is most along: for a wall normal to a world axis the frame is a
+    permutation of the world's, exactly.
+    """
+    table = np.zeros((len(walls), at.WALL_SIZE))
+    for k, (row, wall) in enumerate(zip(table, walls)):
+        n = np.array(wall.normal)
+        axis = np.eye(3)[(int(np.argmax(np.abs(n))) + 1) % 3]
+        if along is not None:
+            axis = along[k] / np.linalg.norm(along[k])
+        t1 = axis - (axis @ n) * n
+        t1 /= np.linalg.norm(t1)
+        row[at.NORMAL : at.NORMAL + 3] = n
+        row[at.TANGENT_1 : at.TANGENT_1 + 3] = t1
+        row[at.TANGENT_2 : at.TANGENT_2 + 3] = np.cross(n, t1)
+        row[at.OFFSET] = wall.offset
+    return table

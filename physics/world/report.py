@@ -1,0 +1,202 @@
+"""Report of a step, per world. Nothing fails silently."""
+
+from __future__ import annotations
+
+from enum import IntEnum
+
+import numpy as np
+
+from physics.kernels.compile.decorators import kernel
+from physics.kernels.state import layout as at
+
+
+class Solver(IntEnum):
+    """The strongest contact method that a step needed."""
+
+    NONE = 0
+    DIRECT = 1
+    SWEEPS = 2
+    PIVOTING = 3
+    NEWTON = 4
+
+
+class Status(IntEnum):
+    """Outcome of a world's step."""
+
+    OK = 0
+    UNRESOLVED = 1
+    UNCONVERGED = 2
+    FAULT = 3
+    LEFT_OUT = 4
+    OVERLAP = 5
+    COARSE = 6
+
+    @property
+    def message(self) -> str:
+        """Explanation of the status, and advice."""
+        return _MESSAGES[self]
+
+    @staticmethod
+    def severity(status: int) -> int:
+        """Place of a status in the order of gravity that `StepReport.status` follows; 0: OK."""
+        return _GRAVITY.index(status)
+
+
+_MESSAGES = {
+    Status.OK: "every contact problem met its tolerance",
+    Status.UNRESOLVED: (
+        "more impacts in one substep than Accuracy.impacts, or more turns than can be followed: the rest of the "
+        "substep was plastic or coarse; raise impacts or substeps if it matters"
+    ),
+    Status.UNCONVERGED: (
+        "a contact problem kept a residual above Accuracy.tolerance, an error of about that share of the contact "
+        "speed; where that matters raise Accuracy.iterations or substeps, else loosen the tolerance"
+    ),
+    Status.FAULT: (
+        "a body's loads or its new state were not finite, or beyond 1e100, and its old state was kept; look at the "
+        "wrench and parameters of this world, and shorten the step"
+    ),
+    Status.COARSE: (
+        "an effect changes too much within a step to be followed (a spring, a fluid or a lift that swings by more than "
+        "a radian, or a field of your own): its details are not right; shorten dt, raise Accuracy.substeps, or weaken "
+        "the effect"
+    ),
+    Status.LEFT_OUT: (
+        "more bodies were near each other than there is room for, and contacts were left out; spread the bodies, or "
+        "give the scene fewer"
+    ),
+    Status.OVERLAP: (
+        "bodies were put where they overlap deeply, and are lifted apart without speed; put them further apart if that "
+        "was not meant"
+    ),
+}
+
+
+_GRAVITY = (
+    Status.OK, Status.UNRESOLVED, Status.UNCONVERGED, Status.COARSE, Status.OVERLAP, Status.LEFT_OUT, Status.FAULT,
+)  # fmt: skip
+
+# What the kernel below compares with: Numba takes plain integers from a module.
+_UNRESOLVED, _UNCONVERGED, _FAULT = int(Status.UNRESOLVED), int(Status.UNCONVERGED), int(Status.FAULT)
+_LEFT_OUT, _OVERLAP, _COARSE = int(Status.LEFT_OUT), int(Status.OVERLAP), int(Status.COARSE)
+
+
+@kernel
+def gravest(table, status):
+    """Write the `Status` of each row of a report `table` (worlds, REPORT_SIZE) into `status` (worlds,) int64."""
+    for world in range(table.shape[0]):
+        status[world] = 0
+        if table[world, at.FAULTS] > 0.0:
+            status[world] = _FAULT
+        elif table[world, at.LEFT_OUT] > 0.0:
+            status[world] = _LEFT_OUT
+        elif table[world, at.OVERLAP] > 0.0:
+            status[world] = _OVERLAP
+        elif table[world, at.COARSE] > 0.0:
+            status[world] = _COARSE
+        elif table[world, at.UNCONVERGED] > 0.0:
+            status[world] = _UNCONVERGED
+        elif table[world, at.UNRESOLVED] > 0.0:
+            status[world] = _UNRESOLVED
+
+
+@kernel
+def add_report(total, table):
+    """Add a report `table` (worlds, REPORT_SIZE) to that of steps before: counts add up, of the rest the largest."""
+    for world in range(table.shape[0]):
+        for c in range(at.REPORT_SIZE):
+            if c in (at.PENETRATION, at.RESIDUAL, at.SOLVER, at.OVERLAP, at.FAULTY):
+                total[world, c] = max(total[world, c], table[world, c])
+            else:
+                total[world, c] += table[world, c]
+
+
+class StepReport:
+    """Report of one `World.step`; every property is an array over worlds.
+
+    Attributes
+    ----------
+    penetration : (worlds,) float64
+        Worst depth of a contact [m].
+    residual : (worlds,) float64
+        Worst natural-map residual accepted, relative to the free contact speed (see
+        `physics.kernels.contact_solver.gauss_seidel`).
+    iterations, solves, fallbacks, unconverged, impacts, unresolved, faults, left_out, coarse : (worlds,) int64
+        Sweeps and Newton steps; contact problems (under error control, those of refused parts, too); of these, by
+        the pivoting fallback (with the scheme ``events`` small leaps of first order, and parts of the shortest length
+        with more than the error tolerance); above the tolerance;
+        impacts that cut a substep; substeps with more impacts than allowed; bodies whose loads or new state were not
+        finite, or beyond 1e100; contacts and near pairs of bodies for which there was no room; bodies that moved in
+        fields which the step does not resolve.
+    overlap : (worlds,) float64
+        Deepest overlap of two bodies that this step began with [m], where they were put into each other by more than a
+        hundredth of the smaller one's bounding radius; else 0.
+    fault_body : (worlds,) int64
+        The first body that `faults` counts, of a world that was kept as a whole the first one that it was kept for;
+        -1: none.
+    """
+
+    __slots__ = ("_table",)
+
+    def __init__(self, table: np.ndarray):
+        self._table = table
+
+    penetration = property(lambda self: self._table[:, at.PENETRATION])
+    residual = property(lambda self: self._table[:, at.RESIDUAL])
+    iterations = property(lambda self: self._table[:, at.ITERATIONS].astype(np.int64))
+    solves = property(lambda self: self._table[:, at.SOLVES].astype(np.int64))
+    fallbacks = property(lambda self: self._table[:, at.FALLBACKS].astype(np.int64))
+    unconverged = property(lambda self: self._table[:, at.UNCONVERGED].astype(np.int64))
+    impacts = property(lambda self: self._table[:, at.SPLITS].astype(np.int64))
+    unresolved = property(lambda self: self._table[:, at.UNRESOLVED].astype(np.int64))
+    faults = property(lambda self: self._table[:, at.FAULTS].astype(np.int64))
+    left_out = property(lambda self: self._table[:, at.LEFT_OUT].astype(np.int64))
+    coarse = property(lambda self: self._table[:, at.COARSE].astype(np.int64))
+    overlap = property(lambda self: self._table[:, at.OVERLAP])
+    fault_body = property(lambda self: self._table[:, at.FAULTY].astype(np.int64) - 1)
+
+    @property
+    def solver(self) -> np.ndarray:
+        """(worlds,) int64, values of `Solver`."""
+        return self._table[:, at.SOLVER].astype(np.int64)
+
+    @property
+    def status(self) -> np.ndarray:
+        """(worlds,) int64, values of `Status`: the gravest thing that happened."""
+        status = np.empty(len(self._table), dtype=np.int64)
+        gravest(self._table, status)
+        return status
+
+    @property
+    def ok(self) -> bool:
+        """True if every step can be trusted to its tolerance; `Status.UNRESOLVED` alone does not count against it.
+
+        Contact problems met their tolerances and were whole, states stayed finite, fields were resolved, and no body
+        was put deep into another.
+        """
+        return not (self._table[:, at.UNCONVERGED : at.FAULTS + 1].any() or self._table[:, at.LEFT_OUT].any()
+                    or self._table[:, at.OVERLAP].any() or self._table[:, at.COARSE].any())  # fmt: skip
+
+    def messages(self) -> dict[int, str]:
+        """World index -> message, for the worlds whose status is not OK."""
+        status, told = self.status, {}
+        for w in np.flatnonzero(status).tolist():
+            told[w] = Status(int(status[w])).message
+            if status[w] == Status.FAULT:
+                told[w] = f"body {self.fault_body[w]}: {told[w]}"
+            elif status[w] == Status.OVERLAP:
+                told[w] += f" (the deepest overlap is {self.overlap[w]:.3g} m)"
+            elif status[w] == Status.UNCONVERGED:
+                told[w] += (
+                    f" ({self.unconverged[w]} of {self.solves[w]} problems, worst residual {self.residual[w]:.2g})"
+                )
+        return told
+
+    def __repr__(self) -> str:
+        counts = np.bincount(self.status, minlength=len(Status)).tolist()
+        bad = [f"{Status(k).name.lower()} in {count} worlds" for k, count in enumerate(counts) if k and count]
+        why = f" ({', '.join(bad)})" if bad else ""
+        return (
+            f"StepReport(worlds={len(self._table)}, ok={self.ok}{why}, penetration={self.penetration.max():.3g} m, "
+            f"residual={self.residual.max():.3g}, iterations={self.iterations.sum()})"
+        )

@@ -1,0 +1,242 @@
+"""Changes to a running world from outside: checked first, then written, all or nothing."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from physics import validation
+from physics.kernels.half_space.gap_queries import angular_momenta
+from physics.kernels.state import layout as at
+from physics.kernels.state.contact_law_dispatch import STIFFNESS
+from physics.scene.effects import RESISTANCES, Friction
+from physics.scene.force_field import Field, FieldSlot, write_columns
+from physics.summary import shown
+from physics.world import parameters
+from physics.world.wall_distance import geometric_centres, wall_gaps
+
+if TYPE_CHECKING:
+    from physics.world.world import World
+
+# A body may be put this deep into a wall, in bounding radii: what a rounded or hand-typed pose may be off by.
+START_DEPTH = 1e-2
+
+# And so deep into one that gives, where depth is what carries it: its centre of mass stays outside.
+SOFT_DEPTH = 1.0
+
+# Centres of two bodies are in the same place within this share of the smaller bounding radius: rounding.
+SAME_PLACE = 1e-12
+
+# A direction along which bodies are compared.
+SKEW = np.array([0.5257311121191336, 0.3090169943749474, 0.7925309171246312])
+
+
+def set_state(world: World, pos, quat, linvel, angvel, worlds) -> None:
+    """`World.set_state`, which documents it."""
+    chosen = _chosen(world, worlds)
+    rows = _rows(world, chosen)
+    state = world.state[rows]
+    given = (("pos", pos, at.POS, 3), ("quat", quat, at.QUAT, 4), ("linvel", linvel, at.LINVEL, 3),
+             ("angvel", angvel, at.ANGVEL, 3))  # fmt: skip
+    for name, value, first, size in given:
+        if value is None:
+            continue
+        shape = (len(chosen), world.body_count, size)
+        check = validation.unit_quaternion if name == "quat" else validation.finite
+        value = check(validation.batch(value, shape, name), shape, name)
+        state[:, first : first + size] = value.reshape(-1, size)
+    _adopt(world, chosen, rows, state, world.params[rows], "set_state")
+    if world.actuation is not None:
+        world.actuation.forget(chosen)
+
+
+def set_parameters(world: World, mass, size, inertia_body, friction, restitution, gravity, effects, worlds) -> None:
+    """`World.set_parameters`, which documents it."""
+    chosen = _chosen(world, worlds)
+    rows = _rows(world, chosen)
+    params = world.params[rows]
+    plan, shape = world.plan, (len(chosen), world.body_count)
+    if mass is not None or size is not None or inertia_body is not None:
+        parameters.change_inertia(params, world.scene.bodies, plan, mass, size, inertia_body, shape)
+    if friction is not None:
+        _needs("friction", plan.friction, "physics.Friction(...)")
+        params[:, at.FRICTION] = validation.non_negative(*parameters.spread(friction, shape, "friction")).ravel()
+    if restitution is not None:
+        _needs("restitution", plan.restitution, "physics.Contact(restitution=...)")
+        params[:, at.RESTITUTION] = validation.share(*parameters.spread(restitution, shape, "restitution")).ravel()
+    if effects is not None:
+        if isinstance(effects, (str, bytes)):
+            raise ValueError(f"effects is {shown(effects)}; allowed is a list of effects")
+        effects = tuple(effects) if isinstance(effects, Iterable) else (effects,)
+        laws = [effect for effect in effects if isinstance(effect, (*RESISTANCES, Friction))]
+        for effect in laws:
+            if sum(type(effect) is type(other) for other in laws) > 1:
+                raise ValueError(f"effects holds several {type(effect).__name__}; allowed is one")
+            _needs(type(effect).__name__, world.scene.effect(type(effect)), f"physics.{type(effect).__name__}(...)")
+            if isinstance(effect, Friction):
+                _check_axis(effect, world.scene.effect(Friction))
+                params[:, at.FRICTION] = effect.along
+        parameters.write_laws(params, plan.laws, laws)
+        fields = [effect for effect in effects if effect not in laws]
+        write_columns(_changed_slots(world, fields), params[:, at.PARAM_SIZE :], world.body_count, chosen)
+    field = None
+    if gravity is not None:
+        _needs("gravity", plan.gravity, "physics.Gravity(...)")
+        field = validation.batch(gravity, (len(chosen), 1, 3), "gravity")[:, 0]
+        field = validation.finite(field, field.shape, "gravity")
+    _adopt(world, chosen, rows, world.state[rows], params, "set_parameters", keep_memory=size is None)
+    if field is not None:
+        world.gravity[chosen] = field
+
+
+def check_place(world: World, state: np.ndarray, params: np.ndarray, chosen: np.ndarray, what: str) -> None:
+    """Refuse what no step could start from: bodies deep in a wall, or in the same place.
+
+    Parameters and errors are those of `check_depth`.
+    """
+    check_depth(world, state, params, chosen, what)
+    if world.plan.meeting:
+        _check_centres(world, state, params, chosen, what)
+
+
+def _check_centres(world: World, state: np.ndarray, params: np.ndarray, chosen: np.ndarray, what: str) -> None:
+    """Refuse two bodies that touch each other with their centres in the same place: no way apart is nearer than others.
+
+    Bodies in the same place are neighbours in the order along any direction, and in that along one that no scene is
+    built along hardly any others are.
+    """
+    shape = (len(chosen), world.body_count)
+    centres = geometric_centres(world, state, params).reshape(*shape, 3)
+    radii = params[:, at.RADIUS].reshape(shape)
+    with np.errstate(over="ignore", invalid="ignore"):  # a step will tell of numbers that are too large
+        order = np.argsort(centres @ SKEW, axis=1, kind="stable")
+        centres = np.take_along_axis(centres, order[:, :, None], axis=1)
+        apart = np.abs(np.diff(centres, axis=1)).max(axis=2)
+    radii = np.take_along_axis(radii, order, axis=1)
+    bad = np.argwhere(apart <= SAME_PLACE * np.minimum(radii[:, 1:], radii[:, :-1]))
+    if len(bad):
+        k, i = bad[0]
+        a, b = sorted(order[k, i : i + 2].tolist())
+        first = k * world.body_count
+        places = [state[first + body, at.POS : at.POS + 3].tolist() for body in (a, b)]
+        raise ValueError(
+            f"{what}: bodies {a} and {b} in world {int(chosen[k])} have their centres in the same place, pos "
+            f"{places[0]} and {places[1]}; allowed are different places (what overlaps otherwise is lifted apart)"
+        )
+
+
+def check_depth(world: World, state: np.ndarray, params: np.ndarray, chosen: np.ndarray, what: str) -> None:
+    """Refuse bodies that are deep inside a wall.
+
+    Parameters
+    ----------
+    world : World
+    state, params : (k * bodies, STATE_SIZE | PARAM_SIZE) float64
+        Rows to look at.
+    chosen : (k,) int64
+        The worlds that these rows belong to.
+    what : str
+        What the message begins with.
+
+    Raises
+    ------
+    ValueError
+        Naming the first such body, where it is, and how deep it may be.
+    """
+    if not world.plan.contact:
+        return
+    gaps, which = wall_gaps(world, state, params)
+    allowed = (SOFT_DEPTH if STIFFNESS in world.plan.laws else START_DEPTH) * params[:, at.RADIUS]
+    bad = np.flatnonzero(gaps < -allowed)
+    if len(bad):
+        k = int(bad[0])
+        raise ValueError(
+            f"{what}: pos {state[k, at.POS : at.POS + 3].tolist()} of body {k % world.body_count} in world "
+            f"{int(chosen[k // world.body_count])} is {-gaps[k]:.6g} m inside walls[{which[k]}]; allowed is at most "
+            f"{allowed[k]:.3g} m"
+        )
+
+
+def _adopt(world: World, chosen, rows, state, params, what, keep_memory=False) -> None:
+    """Check new rows of state and parameters, then write them."""
+    check_place(world, state, params, chosen, what)
+    angular_momenta(np.arange(len(rows)), state, params)
+    world.state[rows] = state
+    world.params[rows] = params
+    if world.plan.sleeping:
+        world.sleep[rows] = 0.0
+    if world.plan.contact and not keep_memory:
+        world.memory[chosen if world.plan.many else rows] = 0.0
+    if world.recorder is not None:
+        world.recorder.changed(chosen)
+
+
+def _needs(field: str, is_on, effect: str) -> None:
+    if not is_on:
+        raise ValueError(f"{field} was given, but the scene does not declare it; add {effect} to Scene.effects")
+
+
+def _check_axis(friction: Friction, declared: Friction) -> None:
+    if friction.axis != declared.axis:
+        raise ValueError(
+            f"Friction.axis is {friction.axis}; allowed is the scene's, {declared.axis}: it is the same in all worlds"
+        )
+
+
+def _changed_slots(world: World, effects) -> list[FieldSlot]:
+    """The scene's kinds of field that `effects` are of, with these in place of the scene's."""
+    kinds: dict[type, list[Field]] = {}
+    for effect in effects:
+        if not isinstance(effect, Field):
+            raise ValueError(
+                f"effects holds {shown(effect)}; allowed are force fields, Friction, RollingFriction and SpinFriction "
+                "(the rest has arguments of its own, or is the same in all worlds)"
+            )
+        effect.check(world.body_count)
+        if world.plan.sleeping and not effect.is_steady:
+            raise ValueError(
+                f"effects holds {effect!r}, which may change on its own, in a scene in which bodies sleep; allowed is "
+                "what is steady, or a scene that declares such a field, in which nothing sleeps"
+            )
+        kinds.setdefault(effect.kind, []).append(effect)
+    slots = {slot.kind: slot for slot in world.plan.fields}
+    for kind, given in kinds.items():
+        name = type(given[0]).__name__ + (" between bodies" if kind.is_linked else "")
+        _needs(name, kind in slots, f"physics.{type(given[0]).__name__}(...)")
+        slot = slots[kind]
+        if len(given) != len(slot.effects):
+            raise ValueError(f"effects holds {len(given)} {name}; allowed are {len(slot.effects)}, as in the scene")
+        slots[kind] = replace(slot, effects=tuple(given))
+    return [slots[kind] for kind in kinds]
+
+
+def _chosen(world: World, worlds) -> np.ndarray:
+    """Indices (k,) int64 of the worlds meant by what a user gives."""
+    if worlds is None:
+        return np.arange(world.worlds)
+    try:
+        chosen = np.asarray(worlds)
+    except ValueError:  # ragged
+        raise _no_worlds(world, worlds) from None
+    if chosen.dtype == bool and chosen.shape == (world.worlds,):
+        chosen = np.flatnonzero(chosen)
+    if chosen.ndim != 1 or (chosen.size and not np.issubdtype(chosen.dtype, np.integer)):
+        raise _no_worlds(world, worlds)
+    if chosen.size and not (chosen.min() >= 0 and chosen.max() < world.worlds):
+        raise ValueError(f"worlds is {shown(worlds)}; allowed are indices from 0 to {world.worlds - 1}")
+    if not (chosen[1:] > chosen[:-1]).all() and len(np.unique(chosen)) < len(chosen):
+        raise ValueError(f"worlds is {shown(worlds)}; allowed is each world once")
+    return chosen.astype(np.int64)
+
+
+def _no_worlds(world: World, worlds) -> ValueError:
+    allowed = f"a list of indices from 0 to {world.worlds - 1}, or a mask of {world.worlds} bools"
+    return ValueError(f"worlds is {shown(worlds)}; allowed is {allowed}")
+
+
+def _rows(world: World, chosen: np.ndarray) -> np.ndarray:
+    """Rows (k * bodies,) of these worlds in the arrays of bodies."""
+    return (chosen[:, None] * world.body_count + np.arange(world.body_count)).ravel()

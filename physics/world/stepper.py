@@ -1,0 +1,246 @@
+"""A step prepared once and taken often: from a world to bound calls of its compiled kernel."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numba.core.compiler_lock import global_compiler_lock
+
+from physics import validation
+from physics.kernels.event_driven.step import step_events
+from physics.kernels.multibody.stepping.step import step_many
+from physics.kernels.time_stepping.spring_coupled_step import step_linked
+from physics.kernels.time_stepping.step import step_worlds
+from physics.keywords import known_keywords
+from physics.parallel.bound_call import Work, compiled
+from physics.parallel.exclusive import in_use
+from physics.summary import shown
+
+# Which arguments of all step kernels the number of steps is, and the length of a substep.
+STEPS, SUBSTEP = 2, 4
+
+if TYPE_CHECKING:
+    from physics.plan.plan import Plan
+    from physics.world.world import World
+
+
+@known_keywords
+class Stepper:
+    """The same step of a world again and again, with all that can be checked or looked up done before.
+
+    For loops in which that takes longer than the step of one world itself: the wrench is an array to write into,
+    and a call is the step alone.
+
+    Parameters
+    ----------
+    world : World
+    steps : int
+        Steps that one call takes.
+    dt : float, optional
+        Time of one of them, instead of the world's [s].
+    then : Callable, optional
+        What each thread does with the worlds that it has stepped: from their list, as of
+        `physics.kernels.parallel.work_stealing`, which every call renews, to a kernel that has it
+        (`physics.parallel.bound_call.bound`).
+
+    Raises
+    ------
+    ValueError
+        `steps` is not a positive integer, or `dt` not a positive number.
+    """
+
+    def __init__(
+        self,
+        world: World,
+        steps: int = 1,
+        dt: float | None = None,
+        then: Callable[[np.ndarray], Work] | None = None,
+    ):
+        if not hasattr(world, "no_wrench"):  # the class itself knows this module
+            raise ValueError(f"world is {shown(world)}; allowed is a physics.World")
+        if then is not None and not callable(then):
+            raise ValueError(f"then is {shown(then)}; allowed are None and a function of the list of worlds taken")
+        self.world = world
+        self.steps = validation.count(steps, "steps")
+        self.dt = world.dt if dt is None else float(validation.positive(dt, (), "dt"))
+        self._wrench = world.no_wrench()
+        self._then = then
+        self._calls: list[Work] | None = None
+        self._afterwards: list[Work] = []
+        self._alone: Work | None = None  # of `_calls` the only one, where nothing else has a part in a step
+        self._perform: Callable[[], bool] | None = None  # of that
+        self._duration = self.steps * self.dt
+
+    @property
+    def wrench(self) -> np.ndarray:
+        """(worlds, bodies, 6) float64 to write into: force [N] and torque about the centre of mass [N m].
+
+        World frame, held during a call (with an actuator: the command that it is given); zeros at first. What is in
+        it is not checked: a body whose new state is not finite keeps the old one, and `World.report` says so.
+        """
+        return self._wrench
+
+    def __call__(self) -> None:
+        """Advance every world by `steps` times `dt`.
+
+        Raises
+        ------
+        RuntimeError
+            Another thread is stepping or changing the world.
+        """
+        world, perform = self.world, self._perform
+        # What `World.advance` comes to, in half the time. For the flag see `physics.parallel.exclusive`.
+        if perform is not None and world.recorder is None and world.is_free:
+            world.is_free = False
+            try:
+                if perform():
+                    self._alone.raise_again()
+                world.time += self._duration
+            finally:
+                world.is_free = True
+            return
+        if world.is_free:
+            world.is_free = False
+        else:
+            raise in_use(world)
+        try:
+            self._advance()
+        finally:
+            world.is_free = True
+
+    def _advance(self) -> None:
+        world = self.world
+        if self._calls is None:
+            self._prepare()
+        world.advance(self._calls, self._wrench, self.steps, self.dt)
+        for call in self._afterwards:
+            call()
+
+    def _prepare(self) -> None:
+        calls = kernel_calls(self.world, self._wrench, self.steps, self.dt)
+        if self._then is not None:
+            following = [self._then(taken) for taken in self.world.team.taken]
+            if _takes_each_step(self.world) and self.steps > 1:  # with calls of their own
+                self._afterwards = following
+            else:
+                calls = [first.then(second) for first, second in zip(calls, following, strict=True)]
+        self._calls = calls
+        self._alone = calls[0] if _is_all(self.world, calls) else None
+        self._perform = None if self._alone is None else self._alone.perform
+
+    def __getstate__(self):
+        machine_code = {"_calls": None, "_afterwards": [], "_alone": None, "_perform": None}  # belongs to the process
+        return {**vars(self), **machine_code}
+
+
+def _takes_each_step(world: World) -> bool:
+    """A call of several steps is made step by step, since the actuator is asked at each."""
+    return world.actuation is not None and world.actuation.actuator.remembers
+
+
+def _is_all(world: World, calls: list[Work]) -> bool:
+    """Test whether a step is this call: there is one thread, no actuator, and no field that is told the time.
+
+    What `World.advance` does besides; a recorder, which comes and goes, is looked up in each call.
+    """
+    return len(calls) == 1 and world.actuation is None and not world.plan.fields
+
+
+def kernel_calls(world: World, wrench: np.ndarray, steps: int, dt: float) -> list[Work]:
+    """One call of the step kernel for each thread, all arguments bound.
+
+    Parameters
+    ----------
+    world : World
+        Its arrays are bound, not the world itself: it may keep the calls, and is freed with its last user.
+    wrench : (worlds, bodies, 6) float64, contiguous and writable
+        What it holds when a call is made counts; of a scene with an actuator what that makes of it.
+    steps : int
+        Where an actuator remembers, a call takes one of them.
+    dt : float
+        [s].
+    """
+    plan = world.plan
+    if world.actuation is not None:
+        wrench = world.actuation.applied
+    steps, substeps, h = _times(world, steps, dt)
+    kernel, own_arguments = _step_of(plan)
+    argument_lists = [
+        (
+            world.team.turns, taken, steps, substeps, h, world.state, world.params, world.shapes,
+            world.gravity if plan.gravity else None, wrench.reshape(-1, 6), *own_arguments(world, k),
+        )
+        for k, taken in enumerate(world.team.taken)
+    ]  # fmt: skip
+    entry = _entry(kernel, (plan.key, len(world.walls)), argument_lists[0])
+    return [Work([(entry, arguments)]) for arguments in argument_lists]
+
+
+def retime(world: World, calls: list[Work], steps: int, dt: float) -> None:
+    """Let `kernel_calls` of a world take so many steps of another `dt` [s]: faster than to prepare others."""
+    steps, _, h = _times(world, steps, dt)
+    for call in calls:
+        call.put(STEPS, steps)
+        call.put(SUBSTEP, h)
+
+
+def _times(world: World, steps: int, dt: float) -> tuple[int, int, float]:
+    """Steps, substeps and the length of one [s] that a kernel is called for."""
+    substeps = world.accuracy.substeps
+    return 1 if _takes_each_step(world) else steps, substeps, dt / substeps
+
+
+def _step_of(plan: Plan) -> tuple[Callable, Callable[[World, int], tuple]]:
+    """The step kernel of a plan, and what gives the arguments that it alone has for one thread."""
+    if plan.many:
+        return step_many, _many_arguments
+    if plan.linked:
+        return step_linked, _linked_arguments
+    if plan.events:
+        return step_events, _event_arguments
+    return step_worlds, _world_arguments
+
+
+def _many_arguments(world: World, k: int) -> tuple:
+    plan = world.plan
+    switches = (plan.friction, plan.restitution, plan.gyroscopic, plan.tilted, plan.ellipsoids, plan.hulls, plan.scheme)
+    kept = (world.motions[k], world.sleep_of_kernel(), world.memory, world.report_table)
+    return *switches, *kept, world.scratch[k], *_log(world)
+
+
+def _linked_arguments(world: World, k: int) -> tuple:
+    plan = world.plan
+    held = None if plan.events else True
+    return plan.gyroscopic, plan.tilted, plan.scheme, held, plan.events, world.report_table, world.scratch[k]
+
+
+def _log(world: World) -> tuple[np.ndarray, np.ndarray]:
+    return world.event_log, world.event_counts
+
+
+def _wall_switches(plan: Plan) -> tuple:
+    return plan.contact, plan.friction, plan.smooth, plan.restitution, plan.gyroscopic, plan.tilted, plan.pivots
+
+
+def _event_arguments(world: World, k: int) -> tuple:
+    return (
+        *_wall_switches(world.plan), world.memory, world.report_table, world.scratch[k], world.motions[k], *_log(world),
+    )  # fmt: skip
+
+
+def _world_arguments(world: World, k: int) -> tuple:
+    switches = (*_wall_switches(world.plan), world.plan.scheme)
+    return *switches, world.sleep_of_kernel(), world.memory, world.report_table, world.scratch[k], *_log(world)
+
+
+def _entry(kernel, key: tuple, arguments: tuple) -> int:
+    """Entry of the step kernel for arguments of these types, which `key` determines: to look at each takes a while."""
+    if key not in _ENTRIES:
+        with global_compiler_lock:  # nobody else adds to what is linked meanwhile
+            _ENTRIES[key] = kernel.ready_entry(compiled(kernel, arguments))
+    return _ENTRIES[key]
+
+
+_ENTRIES: dict[tuple, int] = {}

@@ -1,0 +1,54 @@
+"""Distances of bodies to walls where they are, without a step."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from physics.kernels.half_space.gap_queries import deepest_gaps
+from physics.kernels.state import layout as at
+from physics.work_precision.errors import rotation_matrices
+
+if TYPE_CHECKING:
+    from physics.world.world import World
+
+
+def geometric_centres(world: World, state: np.ndarray, params: np.ndarray) -> np.ndarray:
+    """Centres of the bodies' shapes, (k * bodies, 3) float64, world frame [m]; arguments as of `wall_gaps`."""
+    centres = state[:, at.POS : at.POS + 3]
+    if world.plan.tilted:
+        R = rotation_matrices(state[:, at.QUAT : at.QUAT + 4])
+        centres = centres + np.einsum("kij,kj->ki", R, params[:, at.CENTER : at.CENTER + 3])
+    return centres
+
+
+def wall_gaps(world: World, state: np.ndarray, params: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Smallest gap of every body over all walls.
+
+    Parameters
+    ----------
+    world : World
+        Its scene says what the rows are of.
+    state, params : (k * bodies, STATE_SIZE | PARAM_SIZE) float64
+
+    Returns
+    -------
+    gaps : (k * bodies,) float64
+        [m], negative inside; very large without walls.
+    which : (k * bodies,) int64
+        The wall that it is at, -1 without walls.
+    """
+    gaps, which = np.empty(len(state)), np.empty(len(state), np.int64)
+    deepest_gaps(np.arange(len(state)), state, params, world.shapes, world.walls, gaps, which)
+    if len(world.walls):
+        normals, offsets = world.walls[:, at.NORMAL : at.NORMAL + 3], world.walls[:, at.OFFSET]
+        for b, body in enumerate(world.scene.bodies):
+            if body.kind == "hull":
+                own = state[b :: world.body_count]
+                R = rotation_matrices(own[:, at.QUAT : at.QUAT + 4])
+                reach = np.einsum("wi,kij,vj->kwv", normals, R, body.polyhedron.vertices).min(axis=-1)
+                each = own[:, at.POS : at.POS + 3] @ normals.T - offsets + reach
+                gaps[b :: world.body_count] = each.min(axis=1)
+                which[b :: world.body_count] = each.argmin(axis=1)
+    return gaps, which

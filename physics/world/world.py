@@ -1,0 +1,454 @@
+"""A batch of independent worlds of one scene, and the step that advances them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from threading import get_ident
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from physics import validation
+from physics.kernels.event_driven.event_log import EVENT_SIZE
+from physics.kernels.forces.force_field_dispatch import declare
+from physics.kernels.state import layout as at
+from physics.kernels.state.sleeping import GROUP, SLEEP_SIZE, Sleep
+from physics.kernels.time_stepping.workspace import body_records
+from physics.keywords import known_keywords
+from physics.parallel.bound_call import Work
+from physics.parallel.exclusive import exclusive, in_use, watch
+from physics.parallel.thread_team import Team
+from physics.plan.accuracy import Accuracy, resolve
+from physics.plan.plan import SHAPE_CODES, make_plan
+from physics.scene.effects import Actuator, Friction, RollingFriction, Sleeping, SpinFriction
+from physics.scene.force_field import Field
+from physics.scene.scene import Scene
+from physics.summary import lines_repr
+from physics.world import batch_arrays, parameters, setters
+from physics.world.actuator import Actuation
+from physics.world.contact_report import contact_ends, contact_forces
+from physics.world.report import StepReport
+from physics.world.rollback import Before
+from physics.world.stepper import kernel_calls, retime
+
+if TYPE_CHECKING:
+    from physics.io.recorder import Recorder
+
+# Arrays that decide how a `World` goes on, in the order of `Snapshot.arrays`; the last one where bodies may sleep.
+KEPT = ("state", "params", "gravity", "memory", "report_table", "sleep")
+
+
+@dataclass(frozen=True)
+class Snapshot:
+    """Everything that decides how a `World` goes on: states, warm starts, parameters, time, the actuator's memory."""
+
+    arrays: tuple[np.ndarray, ...]
+    time: float
+    actuation: tuple | None = None
+
+    def __repr__(self) -> str:
+        shapes = (f"{name} {array.shape}" for name, array in zip(KEPT, self.arrays))
+        return lines_repr("Snapshot", f"time={self.time:.6g} s", *shapes)
+
+
+@known_keywords
+class World:
+    """Many worlds of one scene, stepped together and independent of each other.
+
+    The same world gives the same bits whatever the batch size, its place in the batch and the number of threads.
+
+    Parameters
+    ----------
+    scene : Scene
+    worlds : int
+        Size of the batch.
+    dt : float
+        Time that one `step` advances [s].
+    accuracy : str or Accuracy
+        ``fast``, ``balanced``, ``precise``, ``reference``, or a `physics.Accuracy`.
+    threads : int
+        Threads that share a step, at most as many as processors: each takes worlds of its own range, then of the
+        others'. Between steps that follow each other within 0.3 ms they wait without sleeping.
+
+    Attributes
+    ----------
+    pos, quat, linvel, angvel : (worlds, bodies, 3|4|3|3) float64
+        Read-only views in the world frame, refreshed in place by every step; copy them to keep them.
+    state : (worlds * bodies, STATE_SIZE) float64
+        The array behind them, for kernels that read it; columns in `physics.kernels.state.layout`.
+    report_table : (worlds, REPORT_SIZE) float64
+        The array behind `report`, likewise.
+    time : float
+        Time since the start [s].
+    recorder : Recorder or None
+        What is told of every step; see `physics.Recorder`.
+    is_free : bool
+        Whether no thread is in a method that changes or copies the world. Such a method raises RuntimeError while
+        another thread is in one: a world belongs to one thread at a time.
+
+    Raises
+    ------
+    ValueError
+        A parameter out of range, a body that starts deep inside a wall, or two bodies that touch each other and start
+        with their centres in the same place. Bodies that overlap otherwise are lifted apart, and the report of the
+        first step says so (`Status.OVERLAP`).
+    """
+
+    def __init__(
+        self,
+        scene: Scene,
+        worlds: int = 1,
+        dt: float = 0.01,
+        accuracy: str | Accuracy = "balanced",
+        threads: int = 1,
+    ):
+        validation.instance(scene, Scene, "scene", "a physics.Scene")
+        self.scene = scene
+        self.worlds = validation.count(worlds, "worlds")
+        self.dt = float(validation.positive(dt, (), "dt"))
+        self.accuracy = resolve(accuracy)
+        self.threads = validation.count(threads, "threads")
+        self.plan = make_plan(scene, self.accuracy)
+        self.body_count = len(scene.bodies)
+        self.time = 0.0
+        self.recorder: Recorder | None = None
+        batch_arrays.check_room(self.worlds, self.body_count, self.plan)
+        self.is_free = True
+        self._allocate()
+        batch_arrays.fill(self)
+        setters.check_place(self, self.state, self.params, np.arange(self.worlds), "scene")
+
+    # --- memory ------------------------------------------------------------------------------------------------
+
+    def _allocate(self) -> None:
+        rows = self.worlds * self.body_count
+        self.state = np.zeros((rows, at.STATE_SIZE))
+        self.params = np.zeros((rows, at.PARAM_SIZE + self.plan.field_columns + len(self.plan.laws)))
+        self.gravity = np.zeros((self.worlds, 3))
+        friction = self.scene.effect(Friction)
+        along = friction.directions(len(self.scene.walls)) if friction else None
+        self.walls = parameters.wall_table(self.scene.walls, along)
+        self.memory = batch_arrays.make_memory(self.scene, self.plan, self.worlds)
+        self.sleep = np.zeros((rows if self.plan.sleeping else 0, SLEEP_SIZE))
+        self.report_table = np.zeros((self.worlds, at.REPORT_SIZE))
+        self.event_counts = np.zeros(rows, dtype=np.int64)
+        self.make_event_room(0)
+        self.shapes = np.array([SHAPE_CODES[body.kind] for body in self.scene.bodies])
+        actuator = self.scene.effect(Actuator)
+        self.actuation = None if actuator is None else Actuation(actuator, (self.worlds, self.body_count, 6))
+        self._prepare_threads()
+        self._bind_views()
+
+    def _prepare_threads(self) -> None:
+        self.is_free, self.is_torn = True, False
+        self.telling: int | None = None  # the thread that tells the recorder of its step
+        watch(self)
+        self.team = Team(self.threads, self.worlds)
+        declare(self.plan.terms)
+        self._may_raise = self.plan.may_raise
+        self.scratch = [
+            batch_arrays.make_scratch(self.scene, self.plan, self.walls, self.accuracy) for _ in range(self.team.size)
+        ]
+        self.motions = [batch_arrays.make_motion(self.scene, self.plan, self.accuracy) for _ in range(self.team.size)]
+        self._wrench = self.no_wrench()
+        self._calls: list[Work] = []
+        self._bound_for: tuple | None = None  # arguments of `step`: the next call with the same finds all bound
+
+    @exclusive
+    def make_event_room(self, room: int) -> None:
+        """Let a step log up to `room` events per body, 0 at first; for `simulate`.
+
+        They go to `event_log` (worlds * bodies, room, EVENT_SIZE), columns in `physics.kernels.event_driven.event_log`;
+        their number to `event_counts` (worlds * bodies,) int64, those that found no room included: more than `room`
+        says so. Prepare a `Stepper` after this.
+        """
+        self.event_log = np.zeros((len(self.event_counts), room, EVENT_SIZE))
+        self._bound_for = None
+
+    def _bind_views(self) -> None:
+        table = self.state.reshape(self.worlds, self.body_count, at.STATE_SIZE)
+        self.pos, self.quat, self.linvel, self.angvel = (
+            table[:, :, first : first + size]
+            for first, size in ((at.POS, 3), (at.QUAT, 4), (at.LINVEL, 3), (at.ANGVEL, 3))
+        )
+        for view in (self.pos, self.quat, self.linvel, self.angvel):
+            view.flags.writeable = False
+
+    # --- stepping ----------------------------------------------------------------------------------------------
+
+    def step(self, wrench: ArrayLike | None = None, steps: int = 1, dt: float | None = None) -> StepReport:
+        """Advance every world by `steps` times `dt`.
+
+        Parameters
+        ----------
+        wrench : (worlds, bodies, 6) array_like, optional
+            Force [N] and torque about the centre of mass [N m], world frame, held all the time. None: no wrench.
+            (bodies, 6): the same for all worlds. Of a scene of one body also (6,), the same for all worlds, and
+            (worlds, 6). A scene of several bodies takes two axes as (bodies, 6), whatever the number of worlds.
+        steps : int
+            Steps to take at once.
+        dt : float, optional
+            Instead of the world's, for this call [s].
+
+        Returns
+        -------
+        StepReport
+            Of all these steps together.
+
+        Raises
+        ------
+        ValueError
+            A wrench of the wrong shape or not finite, or steps or dt out of range; nothing has moved then.
+        RuntimeError
+            Another thread is stepping or changing this world.
+        """
+        if self.is_free:
+            self.is_free = False
+        else:
+            raise in_use(self)
+        try:
+            return self._step(wrench, steps, dt)
+        finally:
+            self.is_free = True
+
+    def _step(self, wrench: ArrayLike | None, steps: int, dt: float | None) -> StepReport:
+        if wrench is None:
+            self._wrench.fill(0.0)
+        else:
+            validation.take_finite(wrench, self._wrench, "wrench")
+        steps = validation.count(steps, "steps")
+        dt = self.dt if dt is None else float(validation.positive(dt, (), "dt"))
+        if self._bound_for is None:
+            self._calls = kernel_calls(self, self._wrench, steps, dt)
+        elif (steps, dt) != self._bound_for:
+            retime(self, self._calls, steps, dt)
+        self._bound_for = (steps, dt)
+        self.advance(self._calls, self._wrench, steps, dt)
+        return self.report
+
+    def advance(self, calls: list[Work], wrench: np.ndarray, steps: int, dt: float) -> None:
+        """Make the `kernel_calls` of so many steps of `dt` [s] with this wrench; for those who prepare them.
+
+        A `Stepper` leaves this out where it comes to one call: what takes part in a step here is in `stepper._is_all`.
+        Where a user's field raises an exception nothing has changed.
+        """
+        before = Before(self) if self._may_raise else None
+        try:
+            if self.recorder is not None:
+                self._tell(self.recorder.before, wrench, steps, dt)
+            if self.actuation is None:
+                self.make(calls, steps * dt)
+            else:
+                self.actuation.advance(self, calls, wrench, steps, dt)
+        except Exception as error:
+            if before is None:
+                raise
+            before.put_back(error)
+        if self.recorder is not None:
+            self._tell(self.recorder.after)
+
+    def _tell(self, message: Callable[..., None], *arguments) -> None:
+        """Tell the recorder, which may take snapshots meanwhile."""
+        self.telling = get_ident()
+        try:
+            message(*arguments)
+        finally:
+            self.telling = None
+
+    def make(self, calls: list[Work], duration: float) -> None:
+        """Make kernel calls that take so long [s]."""
+        if self.plan.fields:
+            for scratch in self.scratch:
+                body_records(scratch)["call_start"] = self.time
+        self.team.run(calls)
+        self.time += duration
+
+    def no_wrench(self) -> np.ndarray:
+        """(worlds, bodies, 6) float64 zeros: an array for wrenches."""
+        return np.zeros((self.worlds, self.body_count, 6))
+
+    @property
+    def report(self) -> StepReport:
+        """Report of the last step, whoever took it."""
+        return StepReport(self.report_table.copy())
+
+    # --- changing ----------------------------------------------------------------------------------------------
+
+    @known_keywords
+    @exclusive
+    def set_state(
+        self,
+        pos: ArrayLike | None = None,
+        quat: ArrayLike | None = None,
+        linvel: ArrayLike | None = None,
+        angvel: ArrayLike | None = None,
+        worlds: ArrayLike | None = None,
+    ) -> None:
+        """Put bodies elsewhere; what is None keeps its value.
+
+        Parameters
+        ----------
+        pos, quat, linvel, angvel : (k, bodies, 3|4|3|3) array_like, optional
+            World frame; k is the number of worlds meant. (bodies, 3|4|3|3): the same for all of them. Of a scene of
+            one body the axis of bodies may be left out: (3,) for all worlds alike, (k, 3) a row for each. A scene of
+            several bodies takes two axes as (bodies, 3), also where k is the same number. A quaternion of norm 1
+            within 1e-4 is normalised.
+        worlds : (k,) int array_like, optional
+            Indices of the worlds meant; None: all. Their contact memory is cleared, and that of their actuators.
+
+        Raises
+        ------
+        ValueError
+            A wrong shape, a number that is not finite, no unit quaternion, a world named twice or not there, a body
+            deep inside a wall, or two bodies that touch each other with their centres in the same place. Nothing has
+            changed then.
+        """
+        setters.set_state(self, pos, quat, linvel, angvel, worlds)
+
+    @known_keywords
+    @exclusive
+    def set_parameters(
+        self,
+        mass: ArrayLike | None = None,
+        size: ArrayLike | None = None,
+        inertia_body: ArrayLike | None = None,
+        friction: ArrayLike | None = None,
+        restitution: ArrayLike | None = None,
+        gravity: ArrayLike | None = None,
+        effects: Sequence[Field | Friction | RollingFriction | SpinFriction] | None = None,
+        worlds: ArrayLike | None = None,
+    ) -> None:
+        """Give worlds their own physical parameters; what is None keeps its value.
+
+        Parameters
+        ----------
+        mass, friction, restitution : (), (k,) or (k, bodies) array_like, optional
+            [kg], coefficients. One axis is that of worlds wherever its length is k; (bodies,) of another length is for
+            all worlds alike. Of a `Friction` with two coefficients the first; the second changes with it.
+        size : (3,), (k, 3) or (k, bodies, 3) array_like, optional
+            Full edges of a block, twice the semi-axes of an ellipsoid, three equal diameters of a sphere [m]; a hull
+            cannot change its size: twice its `dimensions`.
+            Position and velocity stay, and so does the `center` of a block: in metres, not as a share of the edges.
+        inertia_body : (3, 3), (k, 3, 3) or (k, bodies, 3, 3) array_like, optional
+            [kg m²]. Where it is None, a change of mass or size sets the uniform-density value, unless the
+            scene's body has an `inertia_body` of its own, which then scales with the mass.
+        gravity : (3,) or (k, 3) array_like, optional
+            [m/s²].
+        effects : sequence of effects, optional
+            Force fields in place of the scene's of the same class (of `Spring` and `Push` all, in the scene's order;
+            springs between bodies count for themselves), `Friction`, `RollingFriction` and `SpinFriction` likewise.
+        worlds : (k,) int array_like, optional
+            Indices of the worlds meant; None: all.
+
+        Raises
+        ------
+        ValueError
+            A value out of range, an effect that the scene does not declare, or a new size that reaches deep
+            into a wall. Nothing has changed then.
+        """
+        setters.set_parameters(self, mass, size, inertia_body, friction, restitution, gravity, effects, worlds)
+
+    # --- keeping and looking -----------------------------------------------------------------------------------
+
+    def kept(self) -> tuple[np.ndarray, ...]:
+        """The arrays themselves that a snapshot copies, in the order of `KEPT`."""
+        return tuple(getattr(self, name) for name in (KEPT if self.plan.sleeping else KEPT[:-1]))
+
+    @exclusive
+    def snapshot(self) -> Snapshot:
+        """All that decides the future, copied; `restore` continues bit-identically, warm starts and all."""
+        actuation = None if self.actuation is None else self.actuation.kept()
+        return Snapshot(tuple(array.copy() for array in self.kept()), self.time, actuation)
+
+    def restore(self, snapshot: Snapshot) -> None:
+        """Go back to a snapshot of this world, or of one of the same scene and batch size.
+
+        Raises
+        ------
+        ValueError
+            It is no `Snapshot`, or one of other sizes. Nothing has changed then.
+        """
+        validation.instance(snapshot, Snapshot, "snapshot", "a physics.Snapshot, as `World.snapshot` gives it")
+        if self.is_torn:
+            self.is_free, self.is_torn = True, False  # the thread of the parent process is not there to finish its step
+        self._restore(snapshot)
+
+    @exclusive
+    def _restore(self, snapshot: Snapshot) -> None:
+        kept = self.kept()
+        if [array.shape for array in kept] != [np.shape(array) for array in snapshot.arrays]:
+            raise ValueError(
+                f"snapshot is {snapshot!r}, of another scene or batch size; allowed is one of this scene, of "
+                f"{self.worlds} worlds"
+            )
+        if any(array.dtype != value.dtype for array, value in zip(kept, snapshot.arrays)):
+            raise ValueError(f"snapshot is {snapshot!r}; allowed are arrays of 64-bit numbers, as they were taken")
+        for array, value in zip(kept, snapshot.arrays):
+            array[...] = value
+        self.time = snapshot.time
+        if self.actuation is not None:
+            if snapshot.actuation is None:  # of a world without an actuator: there is nothing to go on with
+                self.actuation.forget(np.arange(self.worlds))
+            else:
+                self.actuation.put_back(snapshot.actuation)
+        if self.recorder is not None:
+            self.recorder.changed(slice(None))
+
+    def contacts(self, world: int = 0) -> tuple[np.ndarray, np.ndarray]:
+        """Contact points and forces of one world's last step.
+
+        Returns
+        -------
+        points : (n, 3) float64
+            World frame [m].
+        forces : (n, 3) float64
+            On the body, of two bodies on the first one, averaged over the last resting stage, world frame [N].
+        """
+        self._check_index(world)
+        return contact_forces(self, world)
+
+    def contact_ends(self, world: int = 0) -> np.ndarray:
+        """(n, 2) int64: body, and other body or -1 - k for wall k, of each of the `contacts` of one world."""
+        self._check_index(world)
+        return contact_ends(self, world)
+
+    def touching(self, world: int = 0) -> set[tuple[int, int]]:
+        """(body, wall) of every resting contact with a wall of one world at its last step."""
+        return {(int(body), -1 - int(other)) for body, other in self.contact_ends(world) if other < 0}
+
+    @property
+    def asleep(self) -> np.ndarray:
+        """(worlds, bodies) bool: which bodies sleep; see `physics.Sleeping`. A new array."""
+        if not self.plan.sleeping:
+            return np.zeros((self.worlds, self.body_count), dtype=np.bool_)
+        return self.sleep[:, GROUP].reshape(self.worlds, self.body_count) > 0.0
+
+    def sleep_of_kernel(self) -> Sleep | None:
+        """Sleep record for the step; None where no body may sleep."""
+        if not self.plan.sleeping:
+            return None
+        effect = self.scene.effect(Sleeping)
+        return Sleep(self.sleep, effect.slops * self.accuracy.slop, effect.time or 0.0)
+
+    def _check_index(self, world: int) -> None:
+        validation.index(world, self.worlds, "world")
+
+    @exclusive
+    def __getstate__(self):
+        kept = dict(vars(self))
+        views = ("pos", "quat", "linvel", "angvel")
+        flags = ("is_free", "is_torn", "telling")
+        for name in ("plan", "team", "scratch", "motions", "_wrench", "_calls", "_bound_for", *flags, *views):
+            del kept[name]
+        return kept
+
+    def __setstate__(self, kept):
+        vars(self).update(kept)
+        self.plan = make_plan(self.scene, self.accuracy)  # it holds compiled functions of fields
+        self._prepare_threads()
+        self._bind_views()
+
+    def __repr__(self) -> str:
+        return f"World({self.worlds} worlds of {self.body_count} bodies, dt={self.dt}, time={self.time:.6g} s)"

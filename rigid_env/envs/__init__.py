@@ -1,0 +1,1 @@
+"""Gymnasium environments: single, native vector, Stable-Baselines3."""

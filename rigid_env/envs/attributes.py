@@ -1,0 +1,170 @@
+"""Attributes of environments that belong to one world each: parameters of its episode, its generator."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import gymnasium as gym
+import numpy as np
+
+from physics.keywords import nearest_first
+from rigid_env.envs.vector_arguments import episode_limit
+from rigid_env.tasks.parameters import LENGTHS
+
+
+def _parameter(field: str, what: str) -> property:
+    def read(env) -> float | np.ndarray:
+        return value_of(env.task.values.now[field][0])
+
+    def write(env, value) -> None:
+        env.task.hold(field, value)
+
+    return property(
+        read, write, doc=f"{what}; setting it holds from now on, in all later episodes, too. None: draw again."
+    )
+
+
+def value_of(value) -> float | np.ndarray:
+    """A float of a scalar, a copy of an array."""
+    return float(value) if np.ndim(value) == 0 else value.copy()
+
+
+class EpisodeParameters:
+    """The parameters of a single environment's episode as attributes, to read and to set.
+
+    Setting raises a ValueError that names the field, the value and what is allowed; nothing has changed then.
+    """
+
+    mass = _parameter("mass", "Mass of the block [kg]")
+    size = _parameter("size", "Edges of the block (3,) [m]")
+    friction = _parameter("friction", "Coulomb coefficient against the walls")
+    restitution = _parameter("restitution", "Restitution against the walls")
+    gravity = _parameter("gravity", "Strength of gravity along -y [m/s²]")
+
+
+SHARED = (
+    "accuracy", "autoreset_mode", "control_dt", "dt", "effects", "frame_skip", "half_width", "max_episode_steps",
+    "metadata", "render_mode", "spec", "walls",
+)  # fmt: skip
+"""Attributes that are the same in all worlds of a batch."""
+
+SINGLE = ("action_space", "observation_space", "np_random", "np_random_seed")
+"""Attributes of one world under other names, or in tuples, in the batch."""
+
+
+class BatchAttributes(gym.vector.VectorEnv):
+    """`call`, `get_attr` and `set_attr` of Gymnasium's vector environments, for a native batch.
+
+    What Gymnasium's `SyncVectorEnv` asks of its environments one by one is here a look into the batch. Names that
+    mean nothing for one world of it are refused, never ignored.
+    """
+
+    def get_attr(self, name: str) -> tuple[Any, ...]:
+        """An attribute of every world.
+
+        Parameters
+        ----------
+        name : str
+            ``mass``, ``size``, ``friction``, ``restitution``, ``gravity`` of the running episodes; ``np_random``,
+            ``np_random_seed``; ``action_space`` and ``observation_space`` of one world; ``elapsed_steps``; and the
+            settings of the batch (`SHARED`), the same in all worlds.
+
+        Returns
+        -------
+        tuple of length num_envs
+
+        Raises
+        ------
+        AttributeError
+            Listing the names there are, the nearest first.
+        """
+        if name in LENGTHS:
+            return tuple(value_of(value) for value in self.task.values.now[name])
+        if name in ("np_random", "np_random_seed"):
+            return tuple(getattr(self, name))
+        if name == "elapsed_steps":
+            return tuple(self._elapsed.tolist())
+        if name in ("action_space", "observation_space"):
+            return (getattr(self, f"single_{name}"),) * self.num_envs
+        if name in SHARED:
+            return (self._shared(name),) * self.num_envs
+        raise AttributeError(self._unknown("get_attr", name, (*LENGTHS, "elapsed_steps", *SINGLE, *SHARED)))
+
+    def set_attr(self, name: str, values: Any) -> None:
+        """Set an attribute of every world.
+
+        Parameters
+        ----------
+        name : str
+            ``mass``, ``size``, ``friction``, ``restitution`` or ``gravity``: from now on, in the running and all later
+            episodes; None draws it again from the next episode on. ``max_episode_steps``, the same for all worlds.
+        values : list, tuple or anything else
+            A list or a tuple has one entry for each world; anything else, a (3,) array of a size included, is for all.
+
+        Raises
+        ------
+        AttributeError
+            A name that can only be given to the constructor, or is none.
+        ValueError
+            Naming the field, the value and what is allowed. Nothing has changed then.
+        """
+        settable = (*LENGTHS, "max_episode_steps")
+        if name not in settable:
+            raise AttributeError(self._unknown("set_attr", name, settable))
+        if isinstance(values, (list, tuple)) and len(values) != self.num_envs:
+            raise ValueError(
+                f"{name} has {len(values)} values; allowed are {self.num_envs}, one for each world, or one that is no "
+                "list or tuple for all"
+            )
+        if name == "max_episode_steps":
+            self.max_episode_steps = self._one_limit(values)
+        else:
+            self.task.hold(name, values)
+
+    def call(self, name: str, *args: Any, **kwargs: Any) -> tuple[Any, ...]:
+        """Call a method of every world, or get an attribute of it.
+
+        Parameters
+        ----------
+        name : str
+            ``render``, or a name of `get_attr`.
+
+        Returns
+        -------
+        tuple of length num_envs
+
+        Raises
+        ------
+        AttributeError
+            Any other name: a batch is reset, stepped and closed as a whole.
+        TypeError
+            Arguments, which neither takes.
+        """
+        if name in ("reset", "step", "close"):
+            raise AttributeError(
+                f"call got name {name!r}; the worlds of a native batch have no {name} of their own: use the "
+                f"environment's, of some worlds reset(options={{'reset_mask': ...}})"
+            )
+        if args or kwargs:
+            raise TypeError(f"call got arguments {args!r}, {kwargs!r} for {name!r}; allowed are none")
+        if name == "render":
+            return self.render() or (None,) * self.num_envs
+        return self.get_attr(name)
+
+    def _shared(self, name: str) -> Any:
+        if name in ("walls", "half_width"):
+            return getattr(self.task.area, name)
+        if name in ("accuracy", "dt"):
+            return getattr(self.task.world, name)
+        if name in ("control_dt", "effects", "frame_skip"):
+            return getattr(self.task, name)
+        return getattr(self, name)
+
+    def _one_limit(self, values) -> int | None:
+        limits = set(values) if isinstance(values, (list, tuple)) else {values}
+        if len(limits) > 1:
+            raise ValueError(f"max_episode_steps is {values!r}; allowed is the same number for all worlds of a batch")
+        return episode_limit(limits.pop())
+
+    def _unknown(self, method: str, name: str, allowed: tuple[str, ...]) -> str:
+        return f"{method} got name {name!r}; allowed are {', '.join(nearest_first(name, allowed))}"

@@ -1,0 +1,221 @@
+"""The single environments, and the documentation of both tasks."""
+
+from __future__ import annotations
+
+from physics.keywords import known_keywords
+from rigid_env.envs.env import RigidEnv
+from rigid_env.tasks import BlockReach, BlockReorient
+
+
+@known_keywords
+class BlockReachEnv(RigidEnv):
+    """Bring a block to a place on the floor, and leave it at rest there.
+
+    ## Description
+
+    A block of 5 x 3 x 2 m and 6 kg lies on the floor of a box with three walls. The agent pushes and
+    turns it with a force at its centre and a torque. The force is limited to 0.9 of the weight, so that
+    the block cannot fly: it slides, tips and tumbles, with the walls to lean on. World axes: x right, y
+    up, z towards the viewer.
+
+    ## Action Space
+
+    `Box(-1, 1, (6,), float32)`, held for one control step (25 ms).
+
+    | Num | Action | Min | Max | Unit |
+    | --- | --- | --- | --- | --- |
+    | 0 | force along x | -1 | 1 | 0.9 m g |
+    | 1 | force along y | -1 | 1 | 0.9 m g |
+    | 2 | force along z | -1 | 1 | 0.9 m g |
+    | 3 | torque about x | -1 | 1 | 0.5 m g a |
+    | 4 | torque about y | -1 | 1 | 0.5 m g a |
+    | 5 | torque about z | -1 | 1 | 0.5 m g a |
+
+    m is the mass of the block, g gravity, a its longest half edge. World frame; the torque is about the
+    centre. Each number is clipped to ±1, then force and torque vector are shortened to length 1 where
+    they are longer: their norms never exceed the units of the table.
+
+    ## Observation Space
+
+    `Box` of 24 float32, world frame. Each number is told in its unit and clipped to its bounds. R is the
+    rotation matrix from body to world, by rows. Walls: the floor, then left and right (`three`), or x = 0
+    and z = 0 (`corner`).
+
+    | Num | Observation | Min | Max | Unit |
+    | --- | --- | --- | --- | --- |
+    | 0 | goal x minus centre x | -10 | 10 | 5 m |
+    | 1 | goal z minus centre z | -10 | 10 | 5 m |
+    | 2 | tanh of (goal x minus centre x) / 1 m | -1 | 1 | 1 |
+    | 3 | tanh of (goal z minus centre z) / 1 m | -1 | 1 | 1 |
+    | 4 | height of the centre over the floor | 0 | 10 | 2.5 m |
+    | 5 | linear velocity x | -5 | 5 | 5 m/s |
+    | 6 | linear velocity y | -5 | 5 | 5 m/s |
+    | 7 | linear velocity z | -5 | 5 | 5 m/s |
+    | 8 | angular velocity x | -5 | 5 | 5 rad/s |
+    | 9 | angular velocity y | -5 | 5 | 5 rad/s |
+    | 10 | angular velocity z | -5 | 5 | 5 rad/s |
+    | 11 | R[0, 0] | -1 | 1 | 1 |
+    | 12 | R[0, 1] | -1 | 1 | 1 |
+    | 13 | R[0, 2] | -1 | 1 | 1 |
+    | 14 | R[1, 0] | -1 | 1 | 1 |
+    | 15 | R[1, 1] | -1 | 1 | 1 |
+    | 16 | R[1, 2] | -1 | 1 | 1 |
+    | 17 | R[2, 0] | -1 | 1 | 1 |
+    | 18 | R[2, 1] | -1 | 1 | 1 |
+    | 19 | R[2, 2] | -1 | 1 | 1 |
+    | 20 | gap between block and wall 0 | -1 | 10 | 5 m |
+    | 21 | gap between block and wall 1 | -1 | 10 | 5 m |
+    | 22 | gap between block and wall 2 | -1 | 10 | 5 m |
+    | 23 | share of the hold completed | 0 | 1 | 1 |
+
+    ## Rewards
+
+    The gain of a potential, minus costs, plus a bonus. With d the horizontal distance of the centre from
+    the goal [m], v its speed [m/s], and h the share of the hold completed, the potential is `-0.5 d - 0.2
+    v exp(-d / 2) + h`. Each step costs 0.01 and 0.0005 times the sum of the squared action (after clipping
+    to ±1). Success earns 5.
+
+    ## Starting State
+
+    At rest on the floor on a random face, with a random yaw, at a random place clear of the walls; the
+    goal is another such place. All are drawn uniformly from the square `|x|, |z| <= half_width`
+    (`corner`: `0 <= x, z <= 2 half_width`), less 0.25 m and half the block's diagonal on each side.
+    `reset(options=...)` fixes what it names, for this episode: `place` (x, z) [m], `yaw` [rad], `face` (the
+    face that is down, 0 to 5 for -x, +x, -y, +y, -z, +z), `goal` (x, z) [m], both places inside the square, and
+    the parameters `mass`, `size`, `friction`, `restitution` and `gravity`, randomised or not. The other draws of
+    a seed stay the same.
+
+    ## Episode End
+
+    Termination: success, which is a distance of at most 0.3 m, a speed of at most 0.1 m/s and a spin of
+    at most 0.1 rad/s on 10 control steps in a row. Truncation: after 300 control steps (7.5 s), by
+    `gymnasium.make`.
+
+    `info` holds `is_success`, `distance` [m], `speed` [m/s], `spin` [rad/s], and `physics_status`, a
+    `physics.Status`: 0 when nothing went wrong in the step, contact problems above their tolerance included.
+    That of `reset` also holds the parameters of the episode, `mass` [kg], `size` [m], `friction`, `restitution` and
+    `gravity` [m/s²], without those that `effects` take the place of.
+
+    ## Arguments
+
+    | Argument | Default | Meaning |
+    | --- | --- | --- |
+    | `accuracy` | `"balanced"` | preset of the engine, or a `physics.Accuracy` |
+    | `walls` | `"three"` | layout: `"three"` or `"corner"` |
+    | `half_width` | 10.0 | half the width of the floor [m] |
+    | `mass` | 6.0 | of the block [kg] |
+    | `size` | (5.0, 3.0, 2.0) | edges of the block [m] |
+    | `friction` | 0.5 | Coulomb coefficient against the walls |
+    | `restitution` | 0.2 | of the block against the walls |
+    | `gravity` | 9.81 | along -y [m/s²] |
+    | `effects` | () | `physics` effects besides (`physics.Drag()`, ...), or instead of the task's of that class |
+    | `frame_skip` | 5 | physics steps per control step |
+    | `dt` | 0.005 | physics step [s] |
+    | `dump_faults` | None | folder for what led to a state that was not finite (`rigid-env replay`) |
+    | `render_mode` | None | `"rgb_array"`, `"human"` or None |
+    | `width` | 960 | of pictures [px] |
+    | `height` | 600 | of pictures [px] |
+
+    `mass`, `size`, `friction`, `restitution` and `gravity` take a pair (low, high) as well: each episode
+    then draws its own value. What is drawn is not observed, the edges in the gaps to the walls apart. They are
+    attributes of the environment, too: a value set there holds in all later episodes.
+
+    ## Version History
+
+    - v0: first version.
+    """
+
+    task_class = BlockReach
+
+
+@known_keywords
+class BlockReorientEnv(RigidEnv):
+    """Turn a block so that a given face is down, and leave it at rest.
+
+    ## Description
+
+    The block of `BlockReachEnv`, in the same box; now one of its faces is to be turned down, wherever
+    that is on the floor. The torque alone tips the block over its shortest half edge
+    only: the others take the force's help, momentum, or a wall.
+
+    ## Action Space
+
+    `Box(-1, 1, (6,), float32)`, held for one control step (25 ms).
+
+    | Num | Action | Min | Max | Unit |
+    | --- | --- | --- | --- | --- |
+    | 0 | force along x | -1 | 1 | 0.9 m g |
+    | 1 | force along y | -1 | 1 | 0.9 m g |
+    | 2 | force along z | -1 | 1 | 0.9 m g |
+    | 3 | torque about x | -1 | 1 | 0.5 m g a |
+    | 4 | torque about y | -1 | 1 | 0.5 m g a |
+    | 5 | torque about z | -1 | 1 | 0.5 m g a |
+
+    As in `BlockReachEnv`: m mass, g gravity, a longest half edge; vectors longer than 1 are shortened to
+    1.
+
+    ## Observation Space
+
+    `Box` of 23 float32, world frame. Each number is told in its unit and clipped to its bounds. The body
+    axes are told as seen from the target: first the outward normal of the target face, then the next two
+    body axes in cyclic order (x, y, z, x, ...), and the half edges along them.
+
+    | Num | Observation | Min | Max | Unit |
+    | --- | --- | --- | --- | --- |
+    | 0 | outward normal of the target face, x | -1 | 1 | 1 |
+    | 1 | outward normal of the target face, y | -1 | 1 | 1 |
+    | 2 | outward normal of the target face, z | -1 | 1 | 1 |
+    | 3 | next body axis, x | -1 | 1 | 1 |
+    | 4 | next body axis, y | -1 | 1 | 1 |
+    | 5 | next body axis, z | -1 | 1 | 1 |
+    | 6 | body axis after that, x | -1 | 1 | 1 |
+    | 7 | body axis after that, y | -1 | 1 | 1 |
+    | 8 | body axis after that, z | -1 | 1 | 1 |
+    | 9 | half edge along normal | 0 | 10 | 2.5 m |
+    | 10 | half edge along next | 0 | 10 | 2.5 m |
+    | 11 | half edge along last | 0 | 10 | 2.5 m |
+    | 12 | height of the centre over the floor | 0 | 10 | 2.5 m |
+    | 13 | linear velocity x | -5 | 5 | 5 m/s |
+    | 14 | linear velocity y | -5 | 5 | 5 m/s |
+    | 15 | linear velocity z | -5 | 5 | 5 m/s |
+    | 16 | angular velocity x | -5 | 5 | 5 rad/s |
+    | 17 | angular velocity y | -5 | 5 | 5 rad/s |
+    | 18 | angular velocity z | -5 | 5 | 5 rad/s |
+    | 19 | gap between block and wall 0 | -1 | 10 | 5 m |
+    | 20 | gap between block and wall 1 | -1 | 10 | 5 m |
+    | 21 | gap between block and wall 2 | -1 | 10 | 5 m |
+    | 22 | share of the hold completed | 0 | 1 | 1 |
+
+    ## Rewards
+
+    The gain of a potential, minus costs, plus a bonus. With a the angle between the target face's normal
+    and straight down [rad], v the speed [m/s], w the spin [rad/s], and h the share of the hold completed,
+    the potential is `-2 a - 0.1 (v + w) exp(-a / 0.3) + h`. Each step costs 0.01 and 0.0005 times the sum
+    of the squared action (after clipping to ±1). Success earns 5.
+
+    ## Starting State
+
+    As in `BlockReachEnv`; the target is one of the five faces that are not down. `reset(options=...)`
+    takes `place`, `yaw`, `face`, the parameters, and `target_face`.
+
+    ## Episode End
+
+    Termination: success, which is an angle of at most 0.1 rad, a speed of at most 0.1 m/s and a spin of
+    at most 0.1 rad/s on 10 control steps in a row. Truncation: after 300 control steps (7.5 s), by
+    `gymnasium.make`.
+
+    `info` holds `is_success`, `angle` [rad], `speed` [m/s], `spin` [rad/s], and `physics_status`, a
+    `physics.Status`: 0 when nothing went wrong in the step, contact problems above their tolerance included.
+    That of `reset` also holds the parameters of the episode, `mass` [kg], `size` [m], `friction`, `restitution` and
+    `gravity` [m/s²], without those that `effects` take the place of.
+
+    ## Arguments
+
+    Those of `BlockReachEnv`, with the same defaults.
+
+    ## Version History
+
+    - v0: first version.
+    """
+
+    task_class = BlockReorient

@@ -1,0 +1,175 @@
+"""Stable-Baselines3 on the native batch: one call per step, not a loop over environments."""
+
+from __future__ import annotations
+
+import time
+from typing import Any
+
+import gymnasium as gym
+import numpy as np
+from gymnasium.vector import AutoresetMode
+
+from rigid_env.envs import vector_infos as infos_of_batches
+from rigid_env.envs.vector_env import RigidVectorEnv
+from rigid_env.extras import require
+
+try:
+    from stable_baselines3.common.monitor import Monitor
+    from stable_baselines3.common.vec_env import VecEnv
+except ImportError:
+    require("agents", "torch", "stable_baselines3", purpose="rigid_env.envs.sb3")
+    raise
+
+
+class RigidVecEnv(VecEnv):
+    """A `RigidVectorEnv` behind the interface that Stable-Baselines3 trains on.
+
+    Worlds start anew in the step in which their episode ends; the info of that step holds
+    ``terminal_observation``, ``TimeLimit.truncated``, ``is_success``, the error that the task names, and,
+    with `monitor`, ``episode`` (return ``r``, length ``l``, seconds since the start of training ``t``).
+    The other infos are empty. `reset_infos` holds the infos of the starts of the running episodes, with the parameters
+    of each (``mass``, ``size``, ``friction``, ``restitution``, ``gravity``).
+
+    Parameters
+    ----------
+    vector_env : RigidVectorEnv
+        In the autoreset mode ``SameStep``.
+    monitor : bool
+        Add the ``episode`` statistics, as SB3's `Monitor` would; `env_is_wrapped(Monitor)` is then True. Turn
+        off to use SB3's `VecMonitor`.
+
+    Raises
+    ------
+    ValueError
+        If the vector environment has another autoreset mode.
+    """
+
+    def __init__(self, vector_env: RigidVectorEnv, monitor: bool = True):
+        if vector_env.autoreset_mode is not AutoresetMode.SAME_STEP:
+            raise ValueError(f"vector_env has {vector_env.autoreset_mode}; allowed is AutoresetMode.SAME_STEP")
+        self.vector_env = vector_env
+        self.monitor = monitor
+        self._actions = None
+        self._returns = np.zeros(vector_env.num_envs)
+        self._lengths = np.zeros(vector_env.num_envs, dtype=np.int64)
+        self._start = time.perf_counter()
+        super().__init__(vector_env.num_envs, vector_env.single_observation_space, vector_env.single_action_space)
+        self.metadata = vector_env.metadata
+
+    def reset(self) -> np.ndarray:
+        """Start all worlds anew, with the seeds and options given since the last reset.
+
+        Returns
+        -------
+        (num_envs, entries) float32
+        """
+        options = self._options[0]
+        if any(other != options for other in self._options):
+            raise ValueError("set_options got different options; allowed is one dict for all environments")
+        seeds = None if all(seed is None for seed in self._seeds) else self._seeds
+        obs, infos = self.vector_env.reset(seed=seeds, options=options or None)
+        self.reset_infos = [self._row_of(infos, i) for i in range(self.num_envs)]
+        self._reset_seeds()
+        self._reset_options()
+        self._returns[:] = 0.0
+        self._lengths[:] = 0
+        return obs
+
+    def step_async(self, actions: np.ndarray) -> None:
+        """Keep the actions (num_envs, 6) for `step_wait`."""
+        self._actions = actions
+
+    def step_wait(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, list[dict[str, Any]]]:
+        """Step with the actions kept.
+
+        Returns
+        -------
+        observations : (num_envs, entries) float32
+        rewards : (num_envs,) float32
+        dones : (num_envs,) bool
+        infos : list of dict
+        """
+        obs, rewards, terminations, truncations, vector_infos = self.vector_env.step(self._actions)
+        dones = terminations | truncations
+        self._returns += rewards
+        self._lengths += 1
+        infos: list[dict[str, Any]] = [{} for _ in range(self.num_envs)]
+        ended = np.flatnonzero(dones)
+        for i in ended:
+            infos[i] = self._final_info(i, bool(truncations[i] and not terminations[i]), vector_infos)
+            self.reset_infos[i] = self._row_of(vector_infos, i)
+        self._returns[ended] = 0.0
+        self._lengths[ended] = 0
+        return obs, rewards.astype(np.float32), dones, infos
+
+    def _final_info(self, i: int, is_truncated: bool, vector_infos: dict[str, Any]) -> dict[str, Any]:
+        final, error = vector_infos["final_info"], self.vector_env.task.error_name
+        info = {
+            "terminal_observation": vector_infos["final_obs"][i],
+            "TimeLimit.truncated": is_truncated,
+            "is_success": bool(final["is_success"][i]),
+            error: float(final[error][i]),
+            "physics_status": int(final["physics_status"][i]),
+        }
+        if self.monitor:
+            info["episode"] = {
+                "r": round(float(self._returns[i]), 6),
+                "l": int(self._lengths[i]),
+                "t": round(time.perf_counter() - self._start, 6),
+            }
+        return info
+
+    def _row_of(self, infos: dict[str, Any], world: int) -> dict[str, Any]:
+        """One world's info at the start of its episode."""
+        keys = (*infos_of_batches.keys(self.vector_env.task), *self.vector_env.task.own_parameters)
+        return {key: infos[key][world].tolist() for key in keys}
+
+    def close(self) -> None:
+        """Close the vector environment."""
+        self.vector_env.close()
+
+    # --- one environment's attributes are every environment's ---------------------------------------------
+
+    def get_attr(self, attr_name: str, indices=None) -> list[Any]:
+        """The attribute of each world (`RigidVectorEnv.get_attr`), or of the vector environment, once per index."""
+        rows = list(self._get_indices(indices))
+        try:
+            values = self.vector_env.get_attr(attr_name)
+        except AttributeError:
+            return [getattr(self.vector_env, attr_name) for _ in rows]
+        return [values[i] for i in rows]
+
+    def set_attr(self, attr_name: str, value: Any, indices=None) -> None:
+        """Set an attribute of all worlds to one value; see `RigidVectorEnv.set_attr`.
+
+        Raises
+        ------
+        AttributeError
+            A name that has no effect.
+        ValueError
+            If `indices` leaves some out, or on a value out of range.
+        """
+        self._require_all("set_attr", indices)
+        self.vector_env.set_attr(attr_name, [value] * self.num_envs)
+
+    def env_method(self, method_name: str, *method_args, indices=None, **method_kwargs) -> list[Any]:
+        """Call a method of the vector environment once, for all environments; its result, once per index."""
+        self._require_all("env_method", indices)
+        result = getattr(self.vector_env, method_name)(*method_args, **method_kwargs)
+        return [result] * self.num_envs
+
+    def _require_all(self, what: str, indices) -> None:
+        chosen = sorted(set(self._get_indices(indices)))
+        if chosen != list(range(self.num_envs)):
+            raise ValueError(f"{what} got indices {indices!r}; allowed is None: the environments are one batch")
+
+    def env_is_wrapped(self, wrapper_class: type[gym.Wrapper], indices=None) -> list[bool]:
+        """True for SB3's `Monitor` where this adapter does its work, else False."""
+        is_wrapped = self.monitor and wrapper_class is Monitor
+        return [is_wrapped for _ in self._get_indices(indices)]
+
+    def get_images(self) -> list[np.ndarray | None]:
+        """A picture of each world, (height, width, 3) uint8."""
+        if self.render_mode != "rgb_array":
+            return [None] * self.num_envs
+        return list(self.vector_env.render())

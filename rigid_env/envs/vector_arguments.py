@@ -1,0 +1,57 @@
+"""Arguments of the native vector environments, looked at: autoreset mode, episode limit, reset mask, seeds."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from gymnasium.vector import AutoresetMode
+
+from physics import validation
+
+
+def autoreset_mode(mode: AutoresetMode | str) -> AutoresetMode:
+    """The mode, from its name, too."""
+    try:
+        return AutoresetMode(mode)
+    except ValueError:
+        allowed = ", ".join(repr(m.value) for m in AutoresetMode)
+        raise ValueError(f"autoreset_mode is {mode!r}; allowed are {allowed}") from None
+
+
+def episode_limit(value) -> int | None:
+    """Control steps of an episode; None: no limit."""
+    return None if value is None else validation.count(value, "max_episode_steps")
+
+
+def reset_mask(options: dict[str, Any], num_envs: int) -> np.ndarray:
+    """The worlds to reset, (num_envs,) bool; taken out of `options`."""
+    mask = options.pop("reset_mask", None)
+    if mask is None:
+        return np.ones(num_envs, dtype=np.bool_)
+    if not isinstance(mask, np.ndarray) or mask.dtype != np.bool_ or mask.shape != (num_envs,):
+        raise ValueError(f"options reset_mask is {mask!r}; allowed is a bool array of shape ({num_envs},)")
+    if not mask.any():
+        raise ValueError(f"options reset_mask is {mask!r}; allowed are arrays with at least one True")
+    return mask
+
+
+def seed_list(seed, num_envs: int) -> list[int | None]:
+    """One seed or None for each world."""
+    if seed is None:
+        return [None] * num_envs
+    if _is_seed(seed):
+        return [int(seed) + i for i in range(num_envs)]
+    allowed = f"an integer of at least 0, None, or a list of {num_envs} such"
+    if not isinstance(seed, (list, tuple, np.ndarray)) or np.ndim(seed) == 0:
+        raise ValueError(f"seed is {seed!r}; allowed are {allowed}")
+    if len(seed) != num_envs:
+        raise ValueError(f"seed has {len(seed)} entries; allowed are {allowed}")
+    for one in seed:
+        if one is not None and not _is_seed(one):
+            raise ValueError(f"seed holds {one!r}; allowed are {allowed}")
+    return [None if one is None else int(one) for one in seed]
+
+
+def _is_seed(value) -> bool:
+    return isinstance(value, (int, np.integer)) and not isinstance(value, bool) and value >= 0

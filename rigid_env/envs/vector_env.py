@@ -1,0 +1,280 @@
+"""The native vector environments: a batch of worlds behind Gymnasium's `VectorEnv`, stepped in one call."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any, ClassVar
+
+import gymnasium as gym
+import numpy as np
+from gymnasium.vector import AutoresetMode
+from gymnasium.vector.utils import batch_space
+
+import physics
+from physics import validation
+from physics.keywords import known_keywords
+from physics.parallel.exclusive import exclusive
+from rigid_env.envs import vector_arguments as arguments
+from rigid_env.envs import vector_infos
+from rigid_env.envs.attributes import BatchAttributes
+from rigid_env.envs.registration import MAX_EPISODE_STEPS
+from rigid_env.envs.spaces import action_space, observation_space
+from rigid_env.rendering.view import RENDER_MODES, View
+from rigid_env.tasks import BlockReach, BlockReorient, Task
+from rigid_env.tasks import layout as col
+from rigid_env.tasks.options import require_known
+from rigid_env.tasks.parameters import Edges, Number
+
+
+class RigidVectorEnv(BatchAttributes):
+    """A `Task` as a Gymnasium vector environment; subclasses name the task.
+
+    World i goes through the same bits as the single environment with the same seed, whatever `num_envs`.
+
+    Parameters
+    ----------
+    num_envs : int
+    autoreset_mode : AutoresetMode or str
+        ``NextStep`` (default), ``SameStep`` or ``Disabled``.
+    max_episode_steps : int or None
+        Control steps after which an episode is truncated; None: never. The default is the registered number.
+    render_mode : {"rgb_array", "human"} or None
+        ``human`` shows world 0.
+    width, height : int
+        Of one world's picture [px].
+    threads : int
+        Threads that share a step.
+    accuracy, walls, half_width, mass, size, friction, restitution, gravity, effects, frame_skip, dt, dump_faults
+        Of the task, see `Task`.
+
+    Raises
+    ------
+    TypeError
+        An unknown argument, with the known ones, the nearest first.
+    ValueError
+        Naming the field, the value and what is allowed.
+    """
+
+    task_class: ClassVar[type[Task]]
+    is_free = True  # no thread is in a call: of `physics.parallel.exclusive`
+    _view: View | None = None  # Gymnasium closes batches, too, whose construction ended with an error
+
+    def __init__(
+        self,
+        num_envs: int = 1,
+        autoreset_mode: AutoresetMode | str = AutoresetMode.NEXT_STEP,
+        max_episode_steps: int | str | None = "registered",
+        render_mode: str | None = None,
+        width: int = 960,
+        height: int = 600,
+        *,
+        threads: int = 1,
+        accuracy: str | physics.Accuracy = "balanced",
+        walls: str = "three",
+        half_width: float = 10.0,
+        mass: Number = 6.0,
+        size: Edges = (5.0, 3.0, 2.0),
+        friction: Number = 0.5,
+        restitution: Number = 0.2,
+        gravity: Number = 9.81,
+        effects: Sequence = (),
+        frame_skip: int = 5,
+        dt: float = 0.005,
+        dump_faults: str | Path | None = None,
+    ):
+        self.num_envs = num_envs = validation.count(num_envs, "num_envs")
+        self.autoreset_mode = arguments.autoreset_mode(autoreset_mode)
+        is_registered = isinstance(max_episode_steps, str) and max_episode_steps == "registered"
+        limit = MAX_EPISODE_STEPS[self.task_class.__name__] if is_registered else max_episode_steps
+        self.max_episode_steps = arguments.episode_limit(limit)
+        self.task = self.task_class(
+            num_envs, threads=threads, accuracy=accuracy, walls=walls, half_width=half_width, mass=mass, size=size,
+            friction=friction, restitution=restitution, gravity=gravity, effects=effects, frame_skip=frame_skip,
+            dt=dt, dump_faults=dump_faults,
+        )  # fmt: skip
+        fps = max(1, round(1.0 / self.task.control_dt))
+        self.metadata = {
+            "render_modes": list(RENDER_MODES),
+            "render_fps": fps,
+            "autoreset_mode": self.autoreset_mode,
+        }
+        self.render_mode = render_mode
+        self.single_observation_space = observation_space(self.task)
+        self.single_action_space = action_space()
+        self.observation_space = batch_space(self.single_observation_space, num_envs)
+        self.action_space = batch_space(self.single_action_space, num_envs)
+        self._view = View(render_mode, width, height, fps, self.task_class.__name__)
+        self._seeds = [-1] * num_envs
+        self._elapsed = np.zeros(num_envs, dtype=np.int64)
+        self._ended = np.zeros(num_envs, dtype=np.bool_)
+        self._waiting = np.ones(num_envs, dtype=np.bool_)  # for their first reset
+
+    @property
+    def np_random(self) -> tuple[np.random.Generator | None, ...]:
+        """One generator per world."""
+        return tuple(self.task.generators)
+
+    @property
+    def np_random_seed(self) -> tuple[int, ...]:
+        """The seed of each world's generator; -1 before the first reset."""
+        return tuple(self._seeds)
+
+    # --- Gymnasium's two calls ----------------------------------------------------------------------------
+
+    @exclusive
+    def reset(
+        self, *, seed: int | Sequence[int | None] | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[np.ndarray, dict[str, Any]]:
+        """Start episodes; see `gymnasium.vector.VectorEnv.reset`.
+
+        Parameters
+        ----------
+        seed : int, list of int or None, optional
+            An int s gives world i the seed s + i; None lets a generator go on.
+        options : dict, optional
+            ``reset_mask`` (num_envs,) bool: the worlds to reset, the others stay as they are. The other keys
+            fix what is otherwise drawn, for all worlds reset or for each of them; see the single environment.
+
+        Returns
+        -------
+        observations : (num_envs, entries) float32
+        infos : dict of arrays
+            With the parameters of the new episodes: ``mass``, ``size``, ``friction``, ``restitution``, ``gravity``,
+            all except those that `effects` take the place of.
+
+        Raises
+        ------
+        TypeError, ValueError
+            An option or a seed that is unknown or out of range. Nothing has changed then, the generators included.
+        gymnasium.error.ClosedEnvironmentError
+            After `close`.
+        """
+        self._check_open("reset")
+        options = dict(require_known(options, (*self.task.option_kinds, "reset_mask")))
+        mask = arguments.reset_mask(options, self.num_envs)
+        seeds = arguments.seed_list(seed, self.num_envs)
+        rows = np.flatnonzero(mask)
+        kept = list(self.task.generators), list(self._seeds)
+        try:
+            for i in rows:
+                if seeds[i] is not None or self.task.generators[i] is None:
+                    self._seeds[i] = self.task.seed(i, seeds[i])
+            self._begin(rows, options)
+        except (TypeError, ValueError, gym.error.Error):
+            self.task.generators[:], self._seeds[:] = kept
+            raise
+        self._waiting[rows] = False
+        self._show()
+        infos = vector_infos.of_outcomes(self.task, mask)
+        vector_infos.add_parameters(infos, self.task, rows)
+        return self.task.obs.copy(), infos
+
+    @exclusive
+    def step(self, actions) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, dict[str, Any]]:
+        """Hold actions for one control step; see `gymnasium.vector.VectorEnv.step`.
+
+        Parameters
+        ----------
+        actions : (num_envs, 6) array_like
+
+        Returns
+        -------
+        observations : (num_envs, entries) float32
+        rewards : (num_envs,) float64
+        terminations, truncations : (num_envs,) bool
+        infos : dict of arrays
+            With ``final_obs`` and ``final_info`` of the episodes that ended, in mode ``SameStep``; with the parameters
+            of the episodes that begin in this step, as `reset` tells them, in both modes that start anew.
+
+        Raises
+        ------
+        gymnasium.error.ResetNeeded
+            Before the first reset; in mode ``Disabled`` also after the end of an episode.
+        gymnasium.error.ClosedEnvironmentError
+            After `close`.
+        ValueError
+            Actions of another shape, or that are not finite numbers. Nothing has changed then.
+        """
+        self._check_ready()
+        task = self.task
+        task.step(actions)
+        self._elapsed += 1
+        rewards = task.outcome[:, col.REWARD].copy()
+        terminations = task.outcome[:, col.SUCCESS] > 0.0
+        truncations = np.zeros(self.num_envs, dtype=np.bool_)
+        if self.max_episode_steps is not None:
+            truncations = self._elapsed >= self.max_episode_steps
+        finals: dict[str, Any] = {}
+        if self.autoreset_mode is AutoresetMode.NEXT_STEP:
+            rows = np.flatnonzero(self._ended)
+            rewards[rows], terminations[rows], truncations[rows] = 0.0, False, False
+        self._ended = terminations | truncations
+        if self.autoreset_mode is AutoresetMode.SAME_STEP:
+            rows = np.flatnonzero(self._ended)
+            if len(rows):
+                finals = vector_infos.of_ended(task, rows, self._ended)
+        if self.autoreset_mode is not AutoresetMode.DISABLED and len(rows):
+            ended = self._ended
+            self._begin(rows, {})
+            self._ended = ended & (self.autoreset_mode is AutoresetMode.NEXT_STEP)
+            vector_infos.add_parameters(finals, task, rows)
+        self._show()
+        return task.obs.copy(), rewards, terminations, truncations, {**vector_infos.of_outcomes(task), **finals}
+
+    # --- parts of these -----------------------------------------------------------------------------------
+
+    def _check_open(self, call: str) -> None:
+        if self.closed:
+            raise gym.error.ClosedEnvironmentError(f"{call}() after close(): allowed is a new environment")
+
+    def _check_ready(self) -> None:
+        self._check_open("step")
+        if self._waiting.any():
+            raise gym.error.ResetNeeded("call reset() before step()")
+        if self.autoreset_mode is AutoresetMode.DISABLED and self._ended.any():
+            raise gym.error.ResetNeeded(
+                f"the episodes of the worlds {np.flatnonzero(self._ended).tolist()} have ended and autoreset "
+                "is disabled: reset(options={'reset_mask': terminations | truncations}) first"
+            )
+
+    def _begin(self, rows: np.ndarray, options: dict[str, Any]) -> None:
+        self.task.begin(rows, options)
+        self._elapsed[rows] = 0
+        self._ended[rows] = False
+
+    # --- pictures -----------------------------------------------------------------------------------------
+
+    def render(self) -> tuple[np.ndarray, ...] | None:
+        """A picture of each world, (height, width, 3) uint8; mode ``human`` shows world 0 and gives None."""
+        self._check_open("render")
+        if self.render_mode is None:
+            gym.logger.warn("render() needs a render_mode: pass render_mode='rgb_array' or 'human' to make_vec()")
+            return None
+        if self.render_mode == "human":
+            self._view.draw(self.task)
+            return None
+        return tuple(self._view.draw(self.task, i) for i in range(self.num_envs))
+
+    def _show(self) -> None:
+        if self.render_mode == "human":
+            self.render()
+
+    def close_extras(self, **kwargs) -> None:
+        """Close the window, if any."""
+        if self._view is not None:
+            self._view.close()
+
+
+@known_keywords
+class BlockReachVectorEnv(RigidVectorEnv):
+    """Many worlds of `rigid_env.envs.documentation.BlockReachEnv`, which documents the task."""
+
+    task_class = BlockReach
+
+
+@known_keywords
+class BlockReorientVectorEnv(RigidVectorEnv):
+    """Many worlds of `rigid_env.envs.documentation.BlockReorientEnv`, which documents the task."""
+
+    task_class = BlockReorient

@@ -1,0 +1,1 @@
+"""Instruments: benchmarks, hard cases, measured tosses, demonstrations."""

@@ -1,0 +1,114 @@
+"""A run of a scene in words: events, energy, where the bodies are, and how well it was solved."""
+
+from __future__ import annotations
+
+import numpy as np
+from rich.console import Console
+from rich.text import Text
+
+from rigid_env.lab.demo import Demo
+from rigid_env.terminal import Column, Table, number_columns, say
+
+SHOWN_EVENTS = 24
+LAST_EVENTS = 8  # of these
+FEW = 8  # bodies, and contact points, that are printed one by one
+QUANTITIES = (("pos", "m"), ("quat", ""), ("linvel", "m/s"), ("angvel", "rad/s"))
+AXES = "x", "y", "z"
+
+
+def show(demo: Demo, summary: dict, console: Console) -> None:
+    """Print a run and its `Demo.summary`."""
+    title = f", accuracy {demo.accuracy}, {demo.duration:g} s"
+    console.print(Text.assemble((demo.name, "bold"), title))
+    kinds = [type(body).__name__ for body in demo.scene.bodies]
+    console.print(event_table(summary["events"], kinds))
+    energy = summary["energy"]
+    told = f"{energy['start']:.4f} J at the start, {energy['end']:.4f} J at the end"
+    say(console, "energy", f"{told}, {energy['dissipated']:.4f} J dissipated")
+    final = summary["final"]
+    _show_bodies(final, kinds, console)
+    say(console, "at rest", "yes" if final["is_at_rest"] else "no")
+    _show_contacts(summary["contacts"], console)
+    status = summary["status"]
+    colour = "green" if status["name"] == "ok" else "yellow"
+    say(console, "status", Text.assemble((status["name"], colour), f": {status['message']}"))
+    effort = f"{status['solves']} contact problems, {status['iterations']} sweeps, {status['fallbacks']} by pivoting"
+    worst = f"worst residual {status['residual']:.2g}, deepest penetration {status['penetration']:.2g} m"
+    say(console, "", f"{effort}, {status['unconverged']} above the tolerance; {worst}")
+
+
+def event_table(events: list[dict], kinds: list[str]) -> Table:
+    """The first events; `kinds` are the classes of the bodies."""
+    columns = [*number_columns("time [s]"), Column("what"), Column("body"), Column("with")]
+    more = len(events) - SHOWN_EVENTS
+    caption = f"{more} more are left out; --json has all" if more > 0 else ""
+    table = Table([*columns, *number_columns("impulse [N s]")], "events", caption)
+    shown = events if more <= 0 else [*events[: SHOWN_EVENTS - LAST_EVENTS], None, *events[-LAST_EVENTS:]]
+    for event in shown:
+        if event is None:
+            table.add_row("...", "", "", "", "")
+            continue
+        times = f" x {event['count']}" if event["count"] > 1 else ""
+        impulse = float(np.linalg.norm(event["impulse"]))
+        table.add_row(
+            f"{event['t']:.4f}", event["kind"] + times, _name_of(event["body"], kinds), _partner(event, kinds),
+            f"{impulse:.4g}" if impulse else "-",
+        )  # fmt: skip
+    return table
+
+
+def _name_of(body: int, kinds: list[str]) -> str:
+    return f"{body} {kinds[body]}" if body >= 0 else "-"
+
+
+def _partner(event: dict, kinds: list[str]) -> str:
+    """The wall or the other body that an event is about."""
+    return f"wall {event['wall']}" if event["wall"] >= 0 else _name_of(event["other"], kinds)
+
+
+def _show_bodies(final: dict, kinds: list[str], console: Console) -> None:
+    if len(kinds) == 1:
+        for name, unit in QUANTITIES:
+            say(console, name, f"({_numbers(final[name][0])}) {unit}".rstrip())
+    elif len(kinds) <= FEW:
+        console.print(_body_table(final, kinds))
+    else:
+        _summarise(final, kinds, console)
+
+
+def _body_table(final: dict, kinds: list[str]) -> Table:
+    heads = [f"{name} [{unit}]" if unit else name for name, unit in QUANTITIES]
+    columns = [Column("body"), *number_columns(*heads)]
+    table = Table(columns, "bodies at the end")
+    for body, kind in enumerate(kinds):
+        cells = ("\n".join(_numbers([value]) for value in final[name][body]) for name, _ in QUANTITIES)
+        table.add_row(f"{body} {kind}", *cells)
+    return table
+
+
+def _summarise(final: dict, kinds: list[str], console: Console) -> None:
+    """Print ranges in place of bodies, and the bodies that are fastest."""
+    counts = {kind: kinds.count(kind) for kind in dict.fromkeys(kinds)}
+    say(console, "bodies", ", ".join(f"{count} {kind}" for kind, count in counts.items()))
+    pos = np.array(final["pos"])
+    ranges = (f"{axis} {low:.4g} .. {high:.4g}" for axis, low, high in zip(AXES, pos.min(axis=0), pos.max(axis=0)))
+    say(console, "pos", f"{', '.join(ranges)} m")
+    for name, unit in QUANTITIES[2:]:
+        speeds = np.linalg.norm(final[name], axis=1)
+        fastest = int(speeds.argmax())
+        told = f"{speeds.max():.3g} {unit} at most, body {fastest}; median {np.median(speeds):.3g} {unit}"
+        say(console, name, told)
+
+
+def _show_contacts(contacts: dict, console: Console) -> None:
+    points, forces = contacts["points"], contacts["forces"]
+    if len(points) > FEW:
+        say(console, "contacts", f"{len(points)} points")
+        return
+    for point, force in zip(points, forces):
+        say(console, "contact", f"({_numbers(point)}) m, force ({_numbers(force)}) N")
+
+
+def _numbers(values) -> str:
+    """To four decimals, without negative zeros."""
+    return ", ".join(f"{round(value, 4) + 0.0:.4f}" for value in values)

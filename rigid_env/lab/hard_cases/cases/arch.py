@@ -1,0 +1,150 @@
+"""The semicircular arch of wedge stones, and the thickness at which it stands, by limit analysis."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import numpy as np
+from scipy.optimize import linprog
+
+import physics
+from rigid_env.lab.hard_cases.case import Case, Check, Setting, at_least, none_of
+from rigid_env.lab.hard_cases.cases import stacks
+
+FRICTION = 0.8  # stones slide on each other only below about 0.4: what gives are hinges
+WIDTH, DENSITY = 0.25, 1000.0  # of the arch along z [m], of the stone [kg/m³]
+
+# To which a linear program is solved, and by which an arch's weight may lack support.
+SOLVED = 1e-7
+
+# Share by which the arch is thicker or thinner than the limit.
+NEAR = 0.005
+
+# An arch has fallen when a stone has moved by so much, a thickness [m].
+FALLEN = 0.1
+
+
+def joints(stones: int, thickness: float) -> np.ndarray:
+    """(stones + 1, 2, 2) inner and outer end of each joint of an arch of mean radius 1 m over y = 0 [m]."""
+    angles = np.linspace(0.0, np.pi, stones + 1)
+    rays = np.column_stack([np.cos(angles), np.sin(angles)])
+    rays[[0, -1], 1] = 0.0
+    return np.array([1 - thickness / 2, 1 + thickness / 2])[None, :, None] * rays[:, None, :]
+
+
+def arch(stones: int, thickness: float) -> physics.Scene:
+    """Wedge stones between neighbouring joints, on a floor y = 0."""
+    ends, bodies = joints(stones, thickness), []
+    for here, there in pairwise(ends):
+        outline = [*here, *there[::-1]]
+        points = [(x, y, z) for x, y in outline for z in (-WIDTH / 2, WIDTH / 2)]
+        stone = physics.Hull(points, 1.0)
+        bodies.append(physics.Hull(points, DENSITY * stone.polyhedron.volume, pos=stone.centroid))
+    return stacks.pile(bodies, FRICTION)
+
+
+def least_thickness(stones: int) -> float:
+    """Thickness by mean radius from which on the arch stands: the root of `missing_force`, to 1e-7 (the solver's)."""
+    low, high = 0.05, 0.2
+    while high - low > SOLVED:
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if missing_force(stones, middle) > SOLVED else (low, middle)
+    return high
+
+
+def missing_force(stones: int, thickness: float) -> float:
+    """The least sum of forces, by the weight, that must help to hold the arch: 0 where it stands unaided.
+
+    The linear program of limit analysis: forces at both ends of every joint that push, with friction within Coulomb's
+    law, and the weight are in equilibrium on every stone, with the help of forces and moments of any sign, whose sizes
+    are summed. Nothing of the engine is in it: the outline of a stone is all, its area and centroid by the shoelace
+    formula.
+    """
+    ends = joints(stones, thickness)
+    A = np.zeros((3 * stones, 4 * (stones + 1)))
+    cone = np.zeros((4 * (stones + 1), 4 * (stones + 1)))
+    for j, pair in enumerate(ends):
+        tangent = (pair[1] - pair[0]) / np.linalg.norm(pair[1] - pair[0])
+        normal = np.array([-tangent[1], tangent[0]])  # towards stone j, away from stone j - 1
+        for k, arm in enumerate(pair):
+            column = 4 * j + 2 * k
+            cone[column : column + 2, column : column + 2] = [[-FRICTION, 1], [-FRICTION, -1]]
+            for c, way in enumerate((normal, tangent)):
+                row = np.array([*way, arm[0] * way[1] - arm[1] * way[0]])
+                if j < stones:
+                    A[3 * j : 3 * j + 3, column + c] = row
+                if j > 0:
+                    A[3 * j - 3 : 3 * j, column + c] = -row
+    weight = np.array([_weight(np.array([*a, *b[::-1]])) for a, b in pairwise(ends)])
+    b = np.column_stack([np.zeros(stones), weight[:, 0], weight[:, 0] * weight[:, 1]]).ravel() / weight[:, 0].sum()
+    help_ = np.eye(3 * stones)
+    costs = np.r_[np.zeros(A.shape[1]), np.ones(6 * stones)]
+    bounds = [(0, None), (None, None)] * (2 * (stones + 1)) + [(0, None)] * (6 * stones)
+    rows = np.hstack([cone, np.zeros((len(cone), 6 * stones))])
+    return float(
+        linprog(
+            costs, A_ub=rows, b_ub=np.zeros(len(rows)), A_eq=np.hstack([A, help_, -help_]), b_eq=b, bounds=bounds
+        ).fun
+    )
+
+
+def _weight(outline: np.ndarray) -> tuple[float, float]:
+    """Area and x of the centroid of a polygon (n, 2), by the shoelace formula."""
+    x, y = outline.T
+    cross = x * np.roll(y, -1) - y * np.roll(x, -1)
+    return cross.sum() / 2, ((x + np.roll(x, -1)) * cross).sum() / (3 * cross.sum())
+
+
+def arches(setting: Setting) -> list[Check]:
+    """Arches of 7, 15 and 51 stones, 0.5 % thicker and 0.5 % thinner than the limit for so many.
+
+    Masonry of stiff stones that do not slide stands if and only if forces within it can balance its weight [1]: whether
+    they can is a linear program (`missing_force`) [2]. A semicircular arch gives at hinges in five joints. With few
+    stones there may be none where it would rather have them: 7 stand from thickness/radius = 0.0957 on, 15 from 0.1061,
+    51 from 0.1074; for ever thinner stones it is 0.1075 [3].
+
+    Standing, for a minute: each of n + 1 joints may open or close by one slop at one end, which turns all that is above
+    it, within 2 m, by that slop over the thickness. Falling: the least sum of helping forces, m times the weight, is by
+    duality the power of the weight in a mechanism no part of which is faster than 1 (m/s, rad/s). Its kinetic energy is
+    at most M (the stones' moments of inertia add 1 % to ½ M (1² + 1²)), so that its acceleration is at least m g/2.1
+    along it, more as it goes on: somewhere by ½ (m g/2.1) T² within the time T, here by a thickness; at the first whole
+    second after that the run ends, before the stones lie in a heap. A quick run has 7 and 15 stones.
+
+    References
+    ----------
+    .. [1] J. Heyman, *The stone skeleton*, Int. J. Solids Struct. 2, 1966.
+    .. [2] R. K. Livesley, *Limit analysis of structures formed from rigid blocks*, IJNME 12, 1978.
+    .. [3] M. Milankovitch, *Theorie der Druckkurven*, Z. Math. Phys. 55, 1907 (for radial joints, 0.1075).
+    """
+    checks = []
+    for stones in setting.pick((7, 15, 51), (7, 15)):
+        limit = least_thickness(stones)
+        for share in (1 + NEAR, 1 - NEAR):
+            thickness = share * limit
+            what = f"{stones} stones, {abs(share - 1):.1%} {'above' if share > 1 else 'below'} the limit"
+            scene = arch(stones, thickness)
+            world = setting.world(scene)
+            if share > 1:
+                moved, wrong, _ = stacks.settle(setting, world, setting.pick(60.0, 5.0))
+                slop = setting.slop * max(float(body.bounding_radius(body.dimensions)) for body in scene.bodies)
+                most = (stones + 1) * slop / thickness * 2.0 if setting.is_ours else stacks.STANDING * thickness
+                checks.append(Check(f"{what}: moved", moved, most, "m"))
+                if setting.is_ours:
+                    checks.append(none_of(f"{what}: seconds with a contact problem above its tolerance", wrong))
+            else:
+                time = np.sqrt(2 * FALLEN / (missing_force(stones, thickness) * stacks.G / 2.1))
+                moved = stacks.settle(setting, world, float(time), FALLEN)[0]
+                checks.append(at_least(f"{what}: moved within {time:.0f} s", moved, FALLEN, "m"))
+    return checks
+
+
+COARSE = (
+    "its tolerance, a thousandth, is not much finer than the 0.5 % by which the forces fit into the stones: 15 stones "
+    "slowly give way"
+)
+
+CASES = (
+    Case(32, "arch", "a semicircular arch of wedge stones",
+         "stands iff thickness/radius > 0.1075 (of 7 stones 0.0957, by limit analysis)", arches, peers=True,
+         faults={"fast": COARSE}),
+)  # fmt: skip

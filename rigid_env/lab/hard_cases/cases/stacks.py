@@ -1,0 +1,98 @@
+"""Common parts of the piles: their scene, the displacement of bodies, and the load of each."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+import physics
+from rigid_env.lab.hard_cases.case import Check, Setting, none_of
+
+G = 9.81  # [m/s²]
+CUBE = (1.0, 1.0, 1.0)  # [m]
+FLOOR = physics.HalfSpace((0, 1, 0))
+
+# Share of a body's edge that it may move and still stand, of any engine; ours is held against its slop besides.
+STANDING = 0.01
+
+
+def pile(bodies: Sequence[physics.Body], friction: float = 0.5) -> physics.Scene:
+    """Bodies on a floor, plastic and rough."""
+    return physics.Scene(bodies, [FLOOR], [physics.Gravity((0, -G, 0)), physics.Contact(), physics.Friction(friction)])
+
+
+def tower(masses: Sequence[float], shifts: np.ndarray | None = None) -> physics.Scene:
+    """Unit cubes of these masses [kg] on each other, each shifted by a row of `shifts` (n, 2) along x and z [m]."""
+    shifts = np.zeros((len(masses), 2)) if shifts is None else shifts
+    return pile(
+        [physics.Block(CUBE, m, pos=(x, k + 0.5, z)) for k, (m, (x, z)) in enumerate(zip(masses, shifts.tolist()))]
+    )
+
+
+def farthest(world, start: np.ndarray) -> float:
+    """Largest displacement of any body along any axis [m]."""
+    return float(np.abs(world.pos - start).max())
+
+
+def loads(world: physics.World) -> np.ndarray:
+    """(bodies,) vertical force from below on every body [N]; all contacts must be with what is below or above."""
+    found = np.zeros(world.body_count)
+    for (a, b), force in zip(world.contact_ends().tolist(), world.contacts()[1]):
+        lower_is_second = b < 0 or world.pos[0, b, 1] < world.pos[0, a, 1]
+        found[a if lower_is_second else b] += abs(force[1])
+    return found
+
+
+def settle(setting: Setting, world, duration: float, enough: float = math.inf) -> tuple[float, int, float]:
+    """Let a pile stand.
+
+    Parameters
+    ----------
+    setting : Setting
+    world : World
+        Or what looks like one.
+    duration : float
+        [s].
+    enough : float
+        Displacement that ends it [m]: of what falls, to show that it does.
+
+    Returns
+    -------
+    moved, wrong, depth : float, int, float
+        Largest displacement at any second [m], seconds with a report that is not OK, worst penetration [m]; the last
+        two are 0 of another engine.
+    """
+    start = world.pos.copy()
+    moved, wrong, depth = 0.0, 0, 0.0
+    left = setting.steps(duration)
+    while left and moved < enough:
+        some = min(left, setting.steps(1.0))
+        report = world.step(steps=some)
+        left -= some
+        moved = max(moved, farthest(world, start))
+        if setting.is_ours:
+            wrong += not report.ok
+            depth = max(depth, float(report.penetration[0]))
+    return moved, wrong, depth
+
+
+def standing(setting: Setting, what: str, moved: float, wrong: int, layers: int, edge: float = 1.0) -> list[Check]:
+    """Checks that a pile of so many layers of bodies with this least edge [m] stands.
+
+    Each interface may close or open by one slop, the gap that counts as none, of a cube's bounding radius; so the top
+    of n layers by n slops.
+    """
+    if not setting.is_ours:
+        return [Check(f"{what}: moved", moved, STANDING * edge, "m")]
+    slop = setting.slop * np.sqrt(0.75)
+    return [
+        Check(f"{what}: moved", moved, layers * slop, "m"),
+        none_of(f"{what}: seconds with a contact problem above its tolerance", wrong),
+    ]
+
+
+def load_error(world: physics.World, expected: np.ndarray) -> float:
+    """Largest error of what a body carries, as a share of the whole weight."""
+    return float(np.abs(loads(world) - expected).max() / expected.max())

@@ -1,0 +1,120 @@
+"""Hard cases of bodies that turn by radians in a step: a rod past a ball, a cube and a hull, and beside a wall."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+import physics
+from rigid_env.lab.hard_cases.case import Case, Check, Setting, none_of
+from rigid_env.lab.hard_cases.cases.scenery import FLOOR
+
+HALF, THIN = 1.0, 0.01  # half edges of the rod [m]
+REACH = math.hypot(HALF, THIN)  # of its corners from its axis of turning [m]
+TURNS = (0.3, 0.7, 1.0, 1.5, 2.0, 2.5, 3.0)  # per step [rad]
+MARGIN = 2e-3  # by which things are within reach or out of it [m]
+CLEAR = 0.05  # angle between rod and thing at the start, at least [rad]
+
+
+def _rod(**start) -> physics.Block:
+    return physics.Block((2 * HALF, 2 * THIN, 2 * THIN), 1.0, **start)
+
+
+def _things() -> dict[str, tuple[physics.Body, float, float]]:
+    """Body, and radii of the balls about its centre that it holds and that hold it [m]."""
+    size = 0.1
+    corners = tuple(tuple(float(s * size) for s in row) for row in (*np.eye(3), *-np.eye(3)))
+    return {
+        "ball": (physics.Sphere(size, 1.0), size, size),
+        "cube": (physics.Block((2 * size,) * 3, 1.0), size, math.sqrt(3) * size),
+        "hull": (physics.Hull(corners, 1.0), size / math.sqrt(3), size),
+    }
+
+
+def _half_turn(on: Setting) -> int:
+    """Steps in which the slowest rod has turned by more than π."""
+    return math.ceil(math.pi / min(TURNS)) + 1
+
+
+def _spread(count: int, k: float) -> np.ndarray:
+    """Numbers evenly over 0 to 1, in an order of their own for each k (multiples of an irrational number)."""
+    return np.mod(np.arange(count) * math.sqrt(k) + 0.5, 1.0)
+
+
+def past_things(on: Setting) -> Sequence[Check]:
+    """A rod turns about its middle by 0.3 to 3 rad a step: in half a turn it sweeps a disc, and meets all in it.
+
+    The disc has the radius 1 m of its ends' middles. A body whose centre is in the plane of the disc and which holds a
+    ball of radius r is met if its centre is nearer than 1 m + r to the rod's, and one that is held by a ball of radius
+    R is not if it is further than √(1 + b²) m + R, half the rod's width b included (by 2 mm each). Nothing else
+    acts, so that a body that was met has left its place, and another has not moved by one bit.
+    """
+    count = on.pick(70, 14)
+    turn = np.resize(TURNS, count)
+    missed = moved = 0
+    for thing, inner, outer in _things().values():
+        effects = [physics.Contact(0.5), physics.Friction(0.3)]
+        world = on.world(physics.Scene([_rod(pos=(0, 9, 0)), thing], [], effects), count)
+        is_far = np.arange(count) % 5 == 4
+        far = 2 * outer + (HALF + inner - MARGIN - 2 * outer) * _spread(count, 2)
+        far = np.where(is_far, REACH * 1.0001 + outer + MARGIN, far)
+        room = np.arcsin(np.minimum((outer + 2 * THIN) / far, 1.0)) + CLEAR
+        angle = room + (math.pi - 2 * room) * _spread(count, 3)
+        pos, quat, angvel = np.zeros((count, 2, 3)), np.zeros((count, 2, 4)), np.zeros((count, 2, 3))
+        pos[:, 1] = far[:, None] * np.c_[np.cos(angle), np.sin(angle), np.zeros(count)]
+        quat[:, 0, 0] = 1.0
+        quat[:, 1] = Rotation.from_euler("xyz", 6 * np.c_[_spread(count, 5), _spread(count, 6), turn]).as_quat()
+        angvel[:, 0, 2] = turn / on.dt
+        world.set_state(pos, quat, np.zeros_like(pos), angvel)
+        world.step(steps=_half_turn(on))
+        has_moved = (np.asarray(world.linvel)[:, 1] != 0).any(axis=1)
+        missed += int((~has_moved & ~is_far).sum())
+        moved += int((has_moved & is_far).sum())
+    return [none_of(f"bodies that were missed, {3 * count} placements", missed), none_of("struck out of reach", moved)]
+
+
+def beside_wall(on: Setting) -> Sequence[Check]:
+    """A rod turns by 0.3 to 3 rad a step about its middle at a height below half its length: its end meets the wall.
+
+    Its corners go round on circles of the radius √(1 + b²) m, b half its width, so that in half a turn one of them
+    would be as far below the middle: a rod higher than that (by 2 mm) keeps its velocity, 0, to the last bit; one whose
+    middle is lower is pushed up. No corner is deeper in the wall than two slops at the end.
+    """
+    count = on.pick(70, 14)
+    turn = np.resize(TURNS, count)
+    scene = physics.Scene([_rod(pos=(0, 2, 0))], [FLOOR], [physics.Contact(0.5), physics.Friction(0.3)])
+    world = on.world(scene, count)
+    is_high = np.arange(count) % 5 == 4
+    height = np.where(is_high, REACH + MARGIN, 3 * THIN + (REACH - MARGIN - 3 * THIN) * _spread(count, 2))
+    zero = np.zeros(count)
+    world.set_state(
+        np.c_[zero, height, zero], np.c_[zero + 1, zero, zero, zero], np.zeros((count, 3)),
+        np.c_[zero, zero, turn / on.dt],
+    )  # fmt: skip
+    world.step(steps=_half_turn(on))
+    has_moved = (np.asarray(world.linvel)[:, 0] != 0).any(axis=1)
+    R = Rotation.from_quat(np.asarray(world.quat)[:, 0][:, [1, 2, 3, 0]]).as_matrix()
+    lowest = np.asarray(world.pos)[:, 0, 1] - np.abs(R[:, 1] * np.array([HALF, THIN, THIN])).sum(axis=1)
+    radius = math.sqrt(HALF**2 + 2 * THIN**2)
+    return [
+        none_of(f"rods that went through the wall, {count} placements", int((~has_moved & ~is_high).sum())),
+        none_of("pushed out of reach", int((has_moved & is_high).sum())),
+        Check("deepest corner at the end", -lowest.min(), 2 * on.slop * radius + 1e-15, "m"),
+    ]
+
+
+CASES = (
+    Case(
+        50, "turning-rod", "rod that turns by 0.3 to 3 rad a step past a ball, a cube and a hull",
+        "all that is within its reach is met, and nothing else",
+        past_things,
+    ),
+    Case(
+        51, "turning-rod-wall", "rod that turns by 0.3 to 3 rad a step beside a wall",
+        "met where it is lower than half its length, and not where it is higher",
+        beside_wall,
+    ),
+)  # fmt: skip

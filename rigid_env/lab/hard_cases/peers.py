@@ -1,0 +1,83 @@
+"""Hard cases in other engines: a peer's run that looks like a `physics.World`."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+import physics
+from rigid_env.lab.hard_cases.case import Case, Setting, UnsupportedError
+from rigid_env.lab.hard_cases.run import Outcome, Status, run_case
+from rigid_env.lab.measure.peers import ENGINES, Engine, Unsupported, is_installed, load
+
+
+class PeerWorld:
+    """A scene in a peer: state, time and `step` of a `physics.World` of one world, nothing else of it."""
+
+    def __init__(self, engine: Engine, scene: physics.Scene, dt: float, options: dict):
+        try:
+            self._run = engine.open(scene, dt, **options)
+            self._run.restart()
+        except Unsupported as error:
+            raise UnsupportedError(str(error)) from error
+        self.dt, self.time = dt, 0.0
+        self._look()
+
+    def _look(self) -> None:
+        self.pos, self.quat, self.linvel, self.angvel = (np.asarray(part)[None] for part in self._run.state())
+
+    def step(self, wrench=None, steps: int = 1) -> None:
+        """Advance by `steps`; a wrench cannot be handed on."""
+        if wrench is not None:
+            raise UnsupportedError("a wrench is not handed to this engine")
+        self._run.advance(steps)
+        self.time += steps * self.dt
+        self._look()
+
+
+def load_engines() -> tuple[dict[str, Engine], list[str]]:
+    """Installed engines by name, and the names of those that are not."""
+    found = {name: load(name) for name in ENGINES if is_installed(name)}
+    return found, [name for name in ENGINES if name not in found]
+
+
+def run_peer(case: Case, engine: Engine, setting: Setting) -> Outcome:
+    """The outcome of a case at a peer's first setting with which it holds, else at its defaults."""
+    outcomes = []
+    for index in range(_setting_count(engine)):
+        used: list[str] = []
+
+        def make(scene: physics.Scene, dt: float, index=index, used=used) -> PeerWorld:
+            known = list(engine.settings(scene).items())
+            name, options = known[min(index, len(known) - 1)]
+            used.append(name)
+            return PeerWorld(engine, scene, dt, dict(options))
+
+        outcome = run_case(case, replace(setting, maker=make), engine.name, "default")
+        outcomes.append(replace(outcome, accuracy=used[0] if used else "default"))
+        if outcome.status in (Status.HOLDS, Status.UNSUPPORTED):
+            break
+    return next((one for one in outcomes if one.status is Status.HOLDS), outcomes[0])
+
+
+def _setting_count(engine: Engine) -> int:
+    """Settings that the engine has for a scene with contact, the kind with most."""
+    body = physics.Sphere(1.0, 1.0, pos=(0, 2, 0))
+    touching = [physics.Contact(0.5), physics.Friction(0.5), physics.Gravity()]
+    return len(engine.settings(physics.Scene([body], [physics.HalfSpace((0, 1, 0))], touching)))
+
+
+def run_peers(
+    cases: Sequence[Case], engines: Sequence[Engine], setting: Setting, tick: Callable[[str], None]
+) -> Iterator[Outcome]:
+    """Outcomes of all cases that look at nothing but the state, case by case; Ctrl-C ends it, not the program."""
+    try:
+        for case in cases:
+            for engine in engines:
+                if case.peers:
+                    tick(f"{case.number} {case.name}, {engine.name}")
+                    yield run_peer(case, engine, setting)
+    except KeyboardInterrupt:
+        return

@@ -1,0 +1,47 @@
+"""All hard cases, in the order of their numbers, and how they are found by number or name."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from importlib import import_module
+
+from physics.keywords import nearest_first
+from rigid_env.lab.hard_cases.case import Case
+
+# Each has a tuple CASES.
+MODULES = (
+    "flight", "bounces", "impacts", "friction", "rolling", "tipping", "scaling", "piles", "leaning", "arch",
+    "chains", "stiff", "turning", "letting_go", "random_scenes",
+)  # fmt: skip
+
+
+def _gathered() -> tuple[Case, ...]:
+    cases = [case for name in MODULES for case in import_module(f"rigid_env.lab.hard_cases.cases.{name}").CASES]
+    for key in ("number", "name"):
+        values = [getattr(case, key) for case in cases]
+        twice = sorted({value for value in values if values.count(value) > 1})
+        if twice:
+            raise ValueError(f"two hard cases have the {key} {twice[0]!r}; each must have its own")
+    return tuple(sorted(cases, key=lambda case: case.number))
+
+
+CASES = _gathered()
+
+
+def find(wanted: Sequence[str] = ()) -> tuple[Case, ...]:
+    """The cases of these names or numbers, in the order of the list; none named: all.
+
+    Raises
+    ------
+    ValueError
+        There is no such case.
+    """
+    known = {key: case for case in CASES for key in (case.name, str(case.number))}
+    for name in wanted:
+        if name not in known:
+            raise ValueError(
+                f"case is {name!r}; allowed are numbers from {CASES[0].number} to {CASES[-1].number}, and "
+                + ", ".join(nearest_first(name, [case.name for case in CASES]))
+            )
+    chosen = {known[name].number for name in wanted} or {case.number for case in CASES}
+    return tuple(case for case in CASES if case.number in chosen)

@@ -1,0 +1,214 @@
+"""Error against time of known scenes, beside other engines: what `rigid-env accuracy` and `benchmarks.accuracy` run."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+
+import physics
+from physics import scenes
+from physics.keywords import nearest_first
+from physics.work_precision import run as frontier_run
+from physics.work_precision.contender import OURS, Contender, EngineContender
+from physics.work_precision.run import REPEATS, STEPS
+from rigid_env.lab.measure import peers
+from rigid_env.lab.measure.truths import CASES, Case
+
+# Peers are measured at smaller steps, too, at which they do better.
+PEER_STEPS = (*STEPS, 0.0005)  # [s]
+
+# Scenes without a closed form that are measured where none are named, and for how long [s].
+OPEN = {"drop": 3.0, "corner_drop": 3.0, "vertex_drop": 2.0}
+DURATION = 2.0  # of other canonical scenes [s]
+
+Tick = Callable[[str], None]
+
+
+@dataclass(frozen=True)
+class Ladder:
+    """Settings that are measured for each scene.
+
+    Attributes
+    ----------
+    accuracies : tuple of str
+    steps : tuple of float, or None
+        [s]; None: those of `physics.ladder`, coarser ones for event-driven accuracies among them.
+    peer_steps : tuple of float
+        [s].
+    repeats : int
+    """
+
+    accuracies: tuple[str, ...] = frontier_run.PRESETS
+    steps: tuple[float, ...] | None = None
+    peer_steps: tuple[float, ...] = PEER_STEPS
+    repeats: int = REPEATS
+
+
+QUICK = Ladder(steps=STEPS[:2], peer_steps=STEPS[:1], repeats=1)
+
+
+@dataclass(frozen=True)
+class Job:
+    """A scene, and who is measured on it.
+
+    Attributes
+    ----------
+    key, what : str
+        Name for programs and for people.
+    scene : Scene
+    duration : float
+        [s].
+    case : Case or None
+        None: no closed form, compared with our reference.
+    contenders : tuple of Contender
+    skipped : tuple of str
+        Why some peers, or settings of theirs, do not take part.
+    """
+
+    key: str
+    what: str
+    scene: physics.Scene
+    duration: float
+    case: Case | None
+    contenders: tuple[Contender, ...]
+    skipped: tuple[str, ...]
+
+    @property
+    def goals(self) -> tuple[tuple[float, float], ...]:
+        """(error, µs per simulated second) to be reached together."""
+        return self.case.goals if self.case else ()
+
+
+@dataclass(frozen=True)
+class Found:
+    """A job and what came of it."""
+
+    job: Job
+    frontier: physics.Frontier
+
+    def goals_met(self) -> list[tuple[float, float, physics.FrontierPoint | None]]:
+        """For each goal (error, µs): our quickest setting that reaches it, or None."""
+        met = []
+        for error, us in self.job.goals:
+            point = self.frontier.cheapest(error, engine=OURS)
+            met.append((error, us, point if point and 1e6 * point.cost <= us else None))
+        return met
+
+    def to_dict(self) -> dict:
+        """For JSON: the scene, and its points as rows."""
+        content = self.frontier.to_dict()
+        goals = [
+            {"error": error, "us": us, "reached_by": None if point is None else str(point)}
+            for error, us, point in self.goals_met()
+        ]
+        orders = [
+            {
+                "setting": setting, "order": self.frontier.order(setting), "plateau": self.frontier.plateau(setting),
+                "lost_from": self.frontier.lost_from(setting),
+            }
+            for engine, setting in self.frontier.families() if engine == OURS
+        ]  # fmt: skip
+        about = {"case": self.job.key, "what": self.job.what, "goals": goals, "settings": orders}
+        return {**content, **about, "skipped": [*self.job.skipped, *self.frontier.skipped]}
+
+
+def names() -> list[str]:
+    """Every scene that can be measured: those with a closed form first.
+
+    Not those of several bodies that touch each other: the event-driven presets, truth of all others, do not know them.
+    """
+    known = [case.key for case in CASES]
+    alone = (name for name in scenes.SCENES if len(scenes.by_name(name).bodies) == 1)
+    return known + [name for name in alone if name not in known]
+
+
+def load_peers(wanted: Sequence[str]) -> tuple[dict[str, peers.Engine], list[str]]:
+    """The peers of these names that are installed, and what to say about the others.
+
+    Raises
+    ------
+    ValueError
+        There is no such peer.
+    """
+    found, missing = {}, []
+    for name in wanted:
+        try:
+            found[name] = peers.load(name)
+        except ModuleNotFoundError as error:
+            missing.append(str(error))
+    return found, missing
+
+
+def make_jobs(
+    wanted: Sequence[str] = (), engines: Mapping[str, peers.Engine] | None = None, ladder: Ladder | None = None
+) -> list[Job]:
+    """The scenes of these names, ready to be measured; without names: those with a closed form, and `OPEN`.
+
+    Raises
+    ------
+    ValueError
+        There is no such scene.
+    """
+    unknown = sorted(set(wanted) - set(names()))
+    if unknown:
+        raise ValueError(
+            f"scene is {', '.join(map(repr, unknown))}; allowed are {', '.join(nearest_first(unknown[0], names()))}"
+        )
+    chosen = list(dict.fromkeys(wanted)) or [*(case.key for case in CASES), *OPEN]
+    return [_make_job(name, engines or {}, ladder or Ladder()) for name in chosen]
+
+
+def run_count(jobs: Sequence[Job], ladder: Ladder) -> int:
+    """Number of calls of `tick` by `run`, if it is not interrupted."""
+    return sum(1 + len(job.contenders) * (1 + ladder.repeats) for job in jobs)
+
+
+def run(jobs: Sequence[Job], ladder: Ladder, tick: Tick = lambda what: None) -> Iterator[Found]:
+    """Measure jobs one by one; an interruption ends it after what was done of the current one."""
+    for job in jobs:
+        truth = job.case.truth() if job.case else None
+
+        def tell(done: int, total: int, what: str, key: str = job.key) -> None:
+            tick(f"{key}: {what}")
+
+        try:
+            found = frontier_run.measure(job.contenders, job.scene, job.duration, truth, ladder.repeats, tell)
+        except KeyboardInterrupt:  # before there was a truth
+            return
+        if found.points:
+            yield Found(job, found)
+        if not found.is_complete:
+            return
+
+
+def _make_job(name: str, engines: Mapping[str, peers.Engine], ladder: Ladder) -> Job:
+    case = next((case for case in CASES if case.key == name), None)
+    scene = case.scene() if case else scenes.by_name(name)
+    duration = case.duration if case else OPEN.get(name, DURATION)
+    what = case.what if case else f"{name}, {duration:g} s: largest error of any point of the body"
+    settings = physics.ladder(ladder.accuracies, ladder.steps)
+    ours = [EngineContender(scene, physics.PRESETS[a], dt) for a, dt in settings]
+    theirs, skipped = [], []
+    for engine in engines.values():
+        some, reasons = _peer_contenders(engine, scene, ladder.peer_steps)
+        theirs += some
+        skipped += reasons
+    return Job(name, what, scene, duration, case, (*ours, *theirs), tuple(skipped))
+
+
+def _peer_contenders(engine: peers.Engine, scene: physics.Scene, steps: Sequence[float]) -> tuple[list, list[str]]:
+    found, reasons = [], []
+    ours_alone = (physics.Field, physics.RollingFriction, physics.SpinFriction)
+    contact = scene.effect(physics.Contact)
+    friction = scene.effect(physics.Friction)
+    is_ours = (contact and (contact.tangential or contact.stiffness)) or (friction and friction.axis is not None)
+    if is_ours or any(isinstance(effect, ours_alone) for effect in scene.effects):
+        return [], [f"{engine.name}: it is not given the scene's fields and laws of contact"]
+    for setting, options in engine.settings(scene).items():
+        try:
+            engine.open(scene, steps[0], **options)
+        except peers.Unsupported as error:
+            reasons.append(f"{engine.name} {setting}: {error}")
+            continue
+        found += [peers.PeerContender(engine, scene, setting, options, dt) for dt in steps]
+    return found, reasons

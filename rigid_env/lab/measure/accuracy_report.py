@@ -1,0 +1,116 @@
+"""Run a measurement of error against time in a terminal: progress, tables, result file."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+from rich.console import Console
+
+import physics
+from physics import validation
+from rigid_env.lab.measure import accuracy
+from rigid_env.lab.measure.accuracy import Found, Ladder
+from rigid_env.lab.measure.accuracy_table import MARKS, answers, make_table, summary
+from rigid_env.lab.measure.machine import write_json
+from rigid_env.lab.measure.mujoco_scene import elsewhere
+from rigid_env.terminal import progress_bar
+
+
+@dataclass(frozen=True)
+class Report:
+    """Measurements of a run.
+
+    Attributes
+    ----------
+    results : tuple of Found
+    ladder : Ladder
+    is_complete : bool
+        False: interrupted.
+    """
+
+    results: tuple[Found, ...]
+    ladder: Ladder
+    is_complete: bool
+
+
+def measure_and_show(
+    console: Console,
+    scenes: Sequence[str] = (),
+    peers: str = "",
+    ladder: Ladder | None = None,
+    is_full: bool = False,
+    below: float | None = None,
+) -> Report:
+    """Measure scenes and print a table of each as soon as it is there.
+
+    Parameters
+    ----------
+    console : Console
+    scenes : sequence of str
+        See `accuracy.make_jobs`.
+    peers : str
+        Names with commas between them.
+    ladder : Ladder, optional
+    is_full : bool
+        Show every point.
+    below : float, optional
+        Say which setting is the cheapest below this error, in each scene's unit.
+
+    Raises
+    ------
+    ValueError
+        No such scene or peer, or `below` is not positive.
+    """
+    if below is not None:
+        validation.positive(below, (), "below")
+    ladder = ladder or Ladder()
+    engines, missing = accuracy.load_peers([name.strip() for name in peers.split(",") if name.strip()])
+    for message in missing:
+        console.print(f"skipped: {message}")
+    if engines:
+        console.print("peers: " + ", ".join(f"{e.name} {e.version}" for e in engines.values()))
+    jobs = accuracy.make_jobs(scenes, engines, ladder)
+    results = []
+    with progress_bar(console, has_thread=False) as progress, elsewhere():
+        task = progress.add_task("accuracy", total=accuracy.run_count(jobs, ladder))
+
+        def tick(what: str) -> None:
+            progress.update(task, advance=1, description=what, refresh=True)
+
+        for found in accuracy.run(jobs, ladder, tick):
+            results.append(found)
+            _show(console, found, is_full)
+    console.print(MARKS, style="dim")
+    for line in [line for found in results for line in (answers(found, below) if below else ())]:
+        console.print(line, soft_wrap=True)
+    is_complete = len(results) == len(jobs) and all(found.frontier.is_complete for found in results)
+    return Report(tuple(results), ladder, is_complete)
+
+
+def write_result(path: Path, report: Report) -> None:
+    """Write results as JSON: settings, scenes, and all points as ``rows``, with machine, versions and commit."""
+    presets = {name: asdict(physics.PRESETS[name]) for name in report.ladder.accuracies}
+    scenes, rows = [], []
+    for found in report.results:
+        about = found.to_dict()
+        rows += [_row(found.job.key, about["measure"], point) for point in about.pop("points")]
+        scenes.append(about)
+    content = {"name": "accuracy", "is_complete": report.is_complete}
+    content["settings"] = {**asdict(report.ladder), "presets": presets}
+    write_json(path, {**content, "scenes": scenes, "rows": rows})
+
+
+def _row(case: str, measure: str, point: dict) -> dict:
+    """A point with its time in µs per simulated second; `error` is null where it is not finite."""
+    rest = {name: value for name, value in point.items() if name not in ("cost", "costs")}
+    times = {"us": 1e6 * point["cost"], "us_samples": [1e6 * cost for cost in point["costs"]]}
+    return {"case": case, "error": point["errors"].get(measure), **times, **rest}
+
+
+def _show(console: Console, found: Found, is_full: bool) -> None:
+    console.print(make_table(found, is_full))
+    for line in summary(found):
+        console.print(f"  {line}", soft_wrap=True)
+    console.print()

@@ -1,0 +1,193 @@
+"""Cost of an effect: a scene with it and the same scene without, step for step, in turns."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+import physics
+from physics import scenes
+from physics.keywords import nearest_first
+from rigid_env.lab.measure.timing import Row, Stopwatch, interleave
+
+STEP = 0.005  # [s]
+STEPS = 20_000  # of one run
+QUICK_STEPS = 500
+ON, OFF = "on", "off"
+
+GRAVITY = physics.Gravity((0.0, -scenes.GRAVITY, 0.0))
+FLOATING = physics.Block((2.0, 1.0, 3.0), 3000.0, pos=(0.0, 0.1, 0.0), angvel=(0.1, 0.2, 0.1))
+CORNER = (2.5, 1.5, 1.0)
+
+
+FLOOR = physics.HalfSpace((0.0, 1.0, 0.0))
+BALL = physics.Sphere(0.5, 2.0, pos=(0.0, 0.5, 0.0), linvel=(5.0, 0.0, 0.0), angvel=(0.0, 30.0, -10.0))
+BOUNCING = physics.Sphere(0.5, 2.0, pos=(0.0, 1.5, 0.0), linvel=(5.0, 0.0, 0.0), angvel=(0.0, 3.0, 1.0))
+TOUCH = (GRAVITY, physics.Contact(), physics.Friction(50.0))
+
+# A slope on which a slab slides for ever, across the grain.
+SLAB = physics.Block((2.0, 0.2, 2.0), 2.0, pos=(0.0, 0.1, 0.0))
+SLOPE = physics.Gravity((5.0, -8.0, 3.0))
+
+# Lines of a page between which `write_markdown` puts the table.
+BEGIN, END = "<!-- costs: rigid-env effects --markdown docs/effects.md -->", "<!-- end of costs -->"
+
+
+def _flying() -> physics.Body:
+    """The tumbling block."""
+    return scenes.tumble().bodies[0]
+
+
+def _case(effect, *others, bodies=None, walls=()) -> tuple[physics.Scene, physics.Scene]:
+    """Bodies with the effect and without, and with `others` in both; one in flight if none are given."""
+    bodies = bodies or [_flying()]
+    return tuple(physics.Scene(bodies, walls, [*others, *extra]) for extra in ((effect,), ()))
+
+
+def _bouncing() -> tuple[physics.Scene, physics.Scene]:
+    """A superball, and a ball that sticks at impacts."""
+    laws = (physics.Contact(1.0, tangential=1.0), physics.Contact(1.0))
+    return tuple(physics.Scene([BOUNCING], [FLOOR], [GRAVITY, law, physics.Friction(50.0)]) for law in laws)
+
+
+def _soft() -> tuple[physics.Scene, physics.Scene]:
+    """The block at rest on springs, and on rock."""
+    scene = scenes.rest()
+    others = [effect for effect in scene.effects if not isinstance(effect, physics.Contact)]
+    laws = (physics.Contact(stiffness=1e5, damping=1e3), physics.Contact())
+    return tuple(physics.Scene(scene.bodies, scene.walls, [*others, law]) for law in laws)
+
+
+def _grained() -> tuple[physics.Scene, physics.Scene]:
+    """The slope with two coefficients of friction, and with one."""
+    laws = (physics.Friction((0.2, 0.4), axis=(0.0, 0.0, 1.0)), physics.Friction(0.3))
+    return tuple(physics.Scene([SLAB], [FLOOR], [SLOPE, physics.Contact(), law]) for law in laws)
+
+
+def _pair() -> list[physics.Body]:
+    return [_flying(), physics.Block((2.0, 1.0, 3.0), 4.0, pos=(6.0, 5.0, 0.0), angvel=(0.5, 1.0, 0.0))]
+
+
+def _touching(kind: type) -> tuple[physics.Scene, physics.Scene]:
+    """The block at rest with an effect of contact and without it: without `Contact` it falls."""
+    scene = scenes.rest()
+    gone = {physics.Contact: (physics.Contact, physics.Friction)}.get(kind, (kind,))
+    without = [effect for effect in scene.effects if not isinstance(effect, gone)]
+    return scene, physics.Scene(scene.bodies, () if kind is physics.Contact else scene.walls, without)
+
+
+def _resting() -> tuple[physics.Scene, physics.Scene]:
+    """The block at rest, which sleeps after a second and a half, and one that never does."""
+    scene = scenes.rest()
+    return physics.Scene(scene.bodies, scene.walls, [*scene.effects, physics.Sleeping()]), scene
+
+
+CASES: dict[str, Callable[[], tuple[physics.Scene, physics.Scene]]] = {
+    "gravity": lambda: _case(GRAVITY),
+    "contact": lambda: _touching(physics.Contact),
+    "friction": lambda: _touching(physics.Friction),
+    "drag": lambda: _case(physics.Drag(), GRAVITY),
+    "angular drag": lambda: _case(physics.AngularDrag(), GRAVITY),
+    "magnus": lambda: _case(physics.Magnus(), GRAVITY),
+    "wind": lambda: _case(physics.Wind(), GRAVITY, physics.Drag()),
+    "gusts": lambda: _case(physics.Wind(gust=2.0), GRAVITY, physics.Drag()),
+    "buoyancy": lambda: _case(physics.Buoyancy(), GRAVITY, bodies=[FLOATING]),
+    "spring": lambda: _case(physics.Spring((0.0, 5.0, 0.0), CORNER, 40.0, 1.0), GRAVITY),
+    "spring between bodies": lambda: _case(physics.Spring(CORNER, CORNER, 40.0, 1.0, other=1), bodies=_pair()),
+    "push": lambda: _case(physics.Push((1.0, 0.0, 0.0), CORNER), GRAVITY),
+    "tangential restitution": _bouncing,
+    "friction of two coefficients": _grained,
+    "compliance": _soft,
+    "rolling friction": lambda: _case(physics.RollingFriction(), *TOUCH, bodies=[BALL], walls=[FLOOR]),
+    "spin friction": lambda: _case(physics.SpinFriction(), *TOUCH, bodies=[BALL], walls=[FLOOR]),
+    "sleeping": _resting,
+    "actuator": lambda: _case(physics.Actuator(limit_force=1.0, lag=0.1), GRAVITY),
+}
+
+
+class Steps:
+    """Steps of one world from its start."""
+
+    def __init__(self, scene: physics.Scene, accuracy: str, steps: int):
+        self.world = physics.World(scene, dt=STEP, accuracy=accuracy)
+        self.start, self.steps = self.world.snapshot(), steps
+
+    def __call__(self) -> float:
+        self.world.restore(self.start)
+        with Stopwatch() as watch:
+            self.world.step(steps=self.steps)
+        return self.steps / watch.seconds
+
+
+def bytes_per_body(world: physics.World) -> int:
+    """Bytes of parameters, and of what is kept of its sleep, that a world stores per body."""
+    return (world.params.nbytes + world.sleep.nbytes) // (world.worlds * world.body_count)
+
+
+def chosen(names: Sequence[str], page: Path | None) -> list[str]:
+    """The effects to measure: those of the names, all where there are none.
+
+    Raises
+    ------
+    ValueError
+        A name that is none of `CASES`, or a page that would lose the rows of all others.
+    """
+    for name in names:
+        if name not in CASES:
+            raise ValueError(f"effect is {name!r}; allowed are {', '.join(nearest_first(name, CASES))}")
+    if names and page is not None:
+        raise ValueError(f"markdown is {str(page)!r} for {', '.join(names)} only; a page is written for all effects")
+    return list(names or CASES)
+
+
+def run_count(effects: int, repeats: int) -> int:
+    """Number of calls of `tick` by `effect_row`, over so many effects."""
+    return effects * 2 * (repeats + 1)
+
+
+def effect_row(name: str, accuracy: str, steps: int, repeats: int, tick: Callable[[str], None] | None = None) -> Row:
+    """Measure one effect of `CASES`.
+
+    Returns
+    -------
+    Row
+        Steps per second with the effect, against those without it. In `notes`: what the effect adds to a step
+        [ns], and the bytes of parameters that its scene stores more per body.
+    """
+    runners = {key: Steps(scene, accuracy, steps) for key, scene in zip((ON, OFF), CASES[name]())}
+    told = None if tick is None else lambda key: tick(f"{name}: {key}")
+    spreads = interleave(runners, repeats, told)
+    stored = {key: bytes_per_body(runner.world) for key, runner in runners.items()}
+    added = 1e9 / spreads[ON].median - 1e9 / spreads[OFF].median
+    return Row(
+        key=name, what=name, unit="steps/s", ours=spreads[ON], accuracy=accuracy, peer_name="the scene without it",
+        peer=spreads[OFF], notes={"added_ns_per_step": added, "added_bytes_per_body": stored[ON] - stored[OFF]},
+    )  # fmt: skip
+
+
+def markdown(rows: list[Row]) -> str:
+    """The rows as a table of a page: what an effect adds to a step, in time and in memory."""
+    lines = [
+        "| effect | its scene without it [ns a step] | adds [ns] | stores [bytes a body] |",
+        "| --- | --- | --- | --- |",
+    ]
+    for row in rows:
+        alone, added = 1e9 / row.peer.median, row.notes["added_ns_per_step"]
+        lines.append(f"| {row.what} | {alone:.0f} | {added:.0f} | {row.notes['added_bytes_per_body']} |")
+    return "\n".join(lines)
+
+
+def write_markdown(path: Path, rows: list[Row], accuracy: str) -> None:
+    """Put the table of `rows` into a page, between the lines `BEGIN` and `END`.
+
+    Raises
+    ------
+    ValueError
+        The page does not have those lines.
+    """
+    head, found, rest = path.read_text(encoding="utf-8").partition(BEGIN)
+    _, closed, tail = rest.partition(END)
+    if not (found and closed):
+        raise ValueError(f"markdown is {str(path)!r}; allowed are pages with the lines {BEGIN} and {END}")
+    text = f"\nMedians at `{accuracy}`, one world, steps of {STEP} s.\n\n{markdown(rows)}\n\n"
+    path.write_text(f"{head}{BEGIN}\n{text}{END}{tail}", encoding="utf-8")

@@ -1,0 +1,84 @@
+"""Machine and versions with which a number was measured: no result without them."""
+
+from __future__ import annotations
+
+import datetime
+import json
+import os
+import platform
+import subprocess
+from importlib import metadata
+from pathlib import Path
+
+import physics
+from physics.parallel import processors
+
+PACKAGES = (
+    "rigid-env", "numpy", "scipy", "numba", "llvmlite", "gymnasium", "mujoco", "pybullet", "drake",
+    "pygame-ce", "stable-baselines3", "matplotlib",
+)  # fmt: skip
+
+# Results of earlier measurements do not make a checkout differ from its commit.
+RESULTS = "benchmarks/results"
+
+
+def describe() -> dict:
+    """The machine, the versions, the commit and the date, JSON-able."""
+    return {
+        "date": datetime.datetime.now(datetime.timezone.utc).isoformat(timespec="seconds"),
+        "system": platform.platform(),
+        "processor": processor(),
+        "cores": usable_cores(),
+        "load_average": os.getloadavg()[0] if hasattr(os, "getloadavg") else None,
+        "python": platform.python_version(),
+        "versions": {name: version(name) for name in PACKAGES},
+        "git": git_state(Path(physics.__file__).parent),
+    }
+
+
+def processor() -> str:
+    """Name of the processor, as the system tells it."""
+    try:
+        lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
+    except OSError:
+        return platform.processor()
+    names = [line.split(":", 1)[1].strip() for line in lines if line.startswith("model name")]
+    return names[0] if names else platform.processor()
+
+
+def usable_cores() -> int:
+    """Cores that this process may use: its affinity and its container's quota allow them."""
+    return processors.usable()
+
+
+def version(package: str) -> str | None:
+    """Installed version of a distribution, or None."""
+    try:
+        return metadata.version(package)
+    except metadata.PackageNotFoundError:
+        return None
+
+
+def git_state(folder: Path) -> dict | None:
+    """Commit of the sources in `folder` and whether the checkout differs from it; None outside a checkout."""
+    try:
+        if not _git(folder, "ls-files", "__init__.py"):
+            return None
+        root = Path(_git(folder, "rev-parse", "--show-toplevel"))
+        changes = _git(root, "status", "--porcelain", "--", ".", f":(exclude){RESULTS}")
+        return {"commit": _git(root, "rev-parse", "HEAD"), "is_dirty": bool(changes)}
+    except (OSError, subprocess.CalledProcessError):
+        return None
+
+
+def _git(folder: Path, *arguments: str) -> str:
+    done = subprocess.run(["git", "-C", str(folder), *arguments], capture_output=True, text=True, check=True)
+    return done.stdout.strip()
+
+
+def write_json(path: str | Path, content: dict) -> None:
+    """Write a result, with the machine in it under ``machine``; folders are made as needed."""
+    path = Path(path)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    text = json.dumps({**content, "machine": describe()}, indent=2, allow_nan=False)
+    path.write_text(text + "\n", encoding="utf-8")

@@ -1,0 +1,153 @@
+"""Share of each effect in a run: the number of steps in which it acts, and its share of the time.
+
+An effect acts in a step if the step from the same state without it ends elsewhere, by one bit at least. Its time is
+that of the run less that of the same scene's run without it, in turns; without it the bodies may take another course
+(without contact they fall for ever), which the time then is that of.
+"""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+from rich.text import Text
+
+import physics
+from rigid_env.lab.measure.timing import Spread, Stopwatch, interleave
+from rigid_env.terminal import Column, Table, number_columns
+
+STEP = 0.01  # [s], as `rigid-env run` takes
+WHOLE = "whole"
+REPEATS = 5
+
+
+@dataclass(frozen=True)
+class Share:
+    """One effect of a scene in a run.
+
+    Attributes
+    ----------
+    effect : str
+    acted : float
+        Share of the steps in which it changed something.
+    time : Spread
+        Share of the run's time that is gone without it, turn by turn; negative where the run is slower without it.
+    """
+
+    effect: str
+    acted: float
+    time: Spread
+
+    @property
+    def is_seen(self) -> bool:
+        """Test whether the time is above the noise: of one sign in every turn."""
+        return self.time.lowest > 0 or self.time.highest < 0
+
+    def to_dict(self) -> dict:
+        """For JSON."""
+        return {"effect": self.effect, "acted": self.acted, "time": self.time.to_dict(), "is_seen": self.is_seen}
+
+
+def without(scene: physics.Scene, effect) -> physics.Scene:
+    """The scene without one of its effects, and without those that need it."""
+    left = [other for other in scene.effects if other is not effect]
+    needs_contact = (physics.Friction, physics.RollingFriction, physics.SpinFriction, physics.Sleeping)
+    if isinstance(effect, physics.Contact):
+        left = [other for other in left if not isinstance(other, needs_contact)]
+    if isinstance(effect, physics.Friction):
+        left = [replace(e, tangential=None) if isinstance(e, physics.Contact) else e for e in left]
+    fields = [other for other in left if isinstance(other, physics.Field)]
+    if all(field.is_air for field in fields):
+        left = [other for other in left if other not in fields]
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", physics.SceneWarning)  # without Contact walls do nothing: that is measured
+        return physics.Scene(scene.bodies, scene.walls, left)
+
+
+def names_of(scene: physics.Scene) -> list[str]:
+    """A name for each effect of a scene: its class, with a number where there are several."""
+    kinds = [type(effect).__name__ for effect in scene.effects]
+    return [f"{kind} {kinds[:k].count(kind) + 1}" if kinds.count(kind) > 1 else kind for k, kind in enumerate(kinds)]
+
+
+def acted_shares(world: physics.World, others: list[physics.World], steps: int) -> list[float]:
+    """Share of the steps of `world` in which each of the `others`, from the same state, ends elsewhere."""
+    acted = np.zeros(len(others))
+    for _ in range(steps):
+        before, time = world.state.copy(), world.time
+        memory, sleep = world.memory.copy(), world.sleep.copy()
+        world.step()
+        for k, other in enumerate(others):
+            other.state[...] = before
+            other.time = time
+            other.memory[...] = memory if other.memory.shape == memory.shape else 0.0
+            if other.sleep.shape == sleep.shape:
+                other.sleep[...] = sleep
+            other.step()
+            acted[k] += not np.array_equal(other.state, world.state)
+    return (acted / steps).tolist()
+
+
+class _Run:
+    """Seconds of a world's steps, one call each, from its start."""
+
+    def __init__(self, world: physics.World, steps: int):
+        self.world, self.steps, self.start = world, steps, world.snapshot()
+
+    def __call__(self) -> float:
+        self.world.restore(self.start)
+        with Stopwatch() as watch:
+            self.world.step(steps=self.steps)
+        return watch.seconds
+
+
+def run_count(scene: physics.Scene, repeats: int = REPEATS) -> int:
+    """Number of calls of `tick` by `measure`."""
+    return (len(scene.effects) + 1) * (repeats + 1)
+
+
+def measure(
+    scene: physics.Scene, duration: float, accuracy: str, repeats: int = REPEATS,
+    tick: Callable[[str], None] | None = None,
+) -> list[Share]:  # fmt: skip
+    """Run a scene for `duration` [s] in steps of `STEP`, whole and without each of its effects.
+
+    Returns
+    -------
+    list of Share
+        In the order of `scene.effects`.
+
+    Raises
+    ------
+    ValueError
+        A duration of less than one step.
+    """
+    steps = round(duration / STEP)
+    if steps < 1:
+        raise ValueError(f"duration is {duration!r}; allowed is at least one step, {STEP} s")
+    names = names_of(scene)
+    worlds = {WHOLE: physics.World(scene, dt=STEP, accuracy=accuracy)}
+    for name, effect in zip(names, scene.effects):
+        worlds[name] = physics.World(without(scene, effect), dt=STEP, accuracy=accuracy)
+    runs = {name: _Run(world, steps) for name, world in worlds.items()}
+    spreads = interleave(runs, repeats, tick)
+    for run in runs.values():
+        run.world.restore(run.start)
+    acted = acted_shares(worlds[WHOLE], [worlds[name] for name in names], steps)
+    whole = spreads[WHOLE].samples
+    return [
+        Share(name, share, Spread(tuple(1.0 - b / a for a, b in zip(whole, spreads[name].samples))))
+        for name, share in zip(names, acted)
+    ]
+
+
+def make_table(shares: list[Share], title: str) -> Table:
+    """Effect, share of the steps in which it acted, share of the time: median and range."""
+    table = Table([Column("effect"), *number_columns("acted in", "of the time")], title)
+    for share in shares:
+        time = f"{share.time.median:.1%}" if share.is_seen else "below noise"
+        spread = (f"\n{share.time.lowest:.1%} .. {share.time.highest:.1%}", "dim")
+        table.add_row(share.effect, f"{share.acted:.1%} of steps", Text.assemble(time, spread))
+    return table

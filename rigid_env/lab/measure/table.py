@@ -1,0 +1,59 @@
+"""Rows of measurements as a table in a terminal."""
+
+from __future__ import annotations
+
+from rich.text import Text
+
+from rigid_env.lab.measure.timing import Row, Spread
+from rigid_env.terminal import Column, Table, number_columns
+
+SCALES = ((1e6, " M"), (1e3, " k"))  # of large numbers, and the letter of each
+VERDICTS = {None: Text("-"), True: Text("yes", style="green"), False: Text("no", style="red")}
+
+
+def make_table(rows: list[Row], title: str, sides: tuple[str, str] = ("ours", "peer")) -> Table:
+    """Table of measurements: both `sides`, ratio (each the median over the range), target, and verdict."""
+    columns = [Column("what"), Column("accuracy", is_whole=True, under="what")]
+    columns += [*number_columns(*sides, "ratio", "target"), Column("pass", is_whole=True)]
+    table = Table(columns, title)
+    for row in rows:
+        table.add_row(*cells(row))
+    return table
+
+
+def cells(row: Row) -> tuple[Text, ...]:
+    """The columns of `make_table`."""
+    ratio = row.ratio
+    versus = f"{row.unit}, against {row.peer_name}" if row.peer else row.unit
+    return (
+        _over(row.what, versus),
+        Text(row.accuracy or "-"),
+        two_lines(row.ours),
+        two_lines(row.peer) if row.peer else Text("-"),
+        two_lines(ratio) if ratio else Text("-"),
+        Text("-" if row.target is None else f"{'≥' if row.is_ratio else '≤'} {row.target:g}"),
+        VERDICTS[row.is_passed],
+    )
+
+
+def number(value: float) -> str:
+    """Three digits, with k and M for large numbers."""
+    return number_range(value, value)
+
+
+def number_range(lowest: float, highest: float) -> str:
+    """Both numbers as `number` has them, or one if they are the same; a letter stands once, behind the second."""
+    size, letter = next(((size, letter) for size, letter in SCALES if abs(highest) >= size), (1.0, ""))
+    ends = dict.fromkeys(f"{value / size:.3g}" for value in (lowest, highest))
+    return "..".join(ends) + letter
+
+
+def two_lines(spread: Spread) -> Text:
+    """The median, and below it lowest and highest sample."""
+    if len(spread.samples) == 1:
+        return Text(number(spread.median))
+    return _over(number(spread.median), number_range(spread.lowest, spread.highest))
+
+
+def _over(first: str, second: str) -> Text:
+    return Text.assemble(first, "\n", (second, "dim"))

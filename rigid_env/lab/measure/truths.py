@@ -1,0 +1,263 @@
+"""Scenes whose outcome is known, and how far from it a simulation ends: for `rigid-env accuracy`.
+
+The truths are closed forms of the course notes' physics, but for the free rotation, which SciPy's DOP853 integrates
+at two tolerances; their difference is the truth's own error.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cache
+
+import numpy as np
+from scipy.integrate import solve_ivp
+
+import physics
+from physics import scenes
+from physics.work_precision.errors import angles_between
+
+G = scenes.GRAVITY
+INCLINE = math.radians(20.0)
+
+
+@dataclass(frozen=True)
+class Path:
+    """Path of one body after each step: t (n,), pos (n, 3), quat (n, 4), linvel (n, 3), angvel (n, 3).
+
+    And, of our own engine, the events between the steps.
+    """
+
+    t: np.ndarray
+    pos: np.ndarray
+    quat: np.ndarray
+    linvel: np.ndarray
+    angvel: np.ndarray
+    events: tuple[physics.Event, ...] = ()
+
+    @classmethod
+    def of(cls, trajectory: physics.Trajectory) -> Path:
+        """The first body of a trajectory."""
+        columns = ("pos", "quat", "linvel", "angvel")
+        return cls(trajectory.t, *(getattr(trajectory, name)[:, 0] for name in columns), trajectory.events)
+
+
+@dataclass(frozen=True)
+class Case:
+    """A scene with a known outcome.
+
+    Attributes
+    ----------
+    key, what : str
+        Name for programs, and for people what the error is of.
+    unit : str
+        Of the error.
+    duration : float
+        [s].
+    scene : callable
+        () -> Scene.
+    error : callable
+        Path -> error.
+    goals : tuple of (error, microseconds)
+        To be reached by one setting each: error, and wall-clock time per simulated second.
+    scale : float, optional
+        Size of what happens, in `unit`: an error larger than half of it is no likeness any more. None: nothing happens.
+    own_error : callable
+        () -> error of the truth itself, in `unit`. Rounding of a closed form does not count.
+    """
+
+    key: str
+    what: str
+    unit: str
+    duration: float
+    scene: Callable[[], physics.Scene]
+    error: Callable[[Path], float]
+    goals: tuple[tuple[float, float], ...]
+    scale: float | None = None
+    own_error: Callable[[], float] = float
+
+    def truth(self) -> physics.Truth:
+        """For `physics.frontier`."""
+        own = self.own_error()
+        text = "DOP853 at two tolerances" if own else "closed form"
+        return physics.Truth(lambda seen: self.error(Path.of(seen)), self.unit, own, self.scale, text)
+
+
+# --- free rotation -------------------------------------------------------------------------------------------------
+
+
+@cache
+def free_attitude(spin: tuple[float, float, float], duration: float, rtol: float = 1e-13) -> tuple[float, ...]:
+    """Attitude of the block after `duration` [s] of free rotation from (1, 0, 0, 0) with `spin` [rad/s]."""
+    x, y, z = scenes.SIZE
+    inertia = scenes.MASS / 12.0 * np.array([y * y + z * z, z * z + x * x, x * x + y * y])
+
+    def rate(_, state):
+        q, w = state[:4], state[4:]
+        turn = 0.5 * np.array([
+            -q[1] * w[0] - q[2] * w[1] - q[3] * w[2],
+            q[0] * w[0] + q[2] * w[2] - q[3] * w[1],
+            q[0] * w[1] + q[3] * w[0] - q[1] * w[2],
+            q[0] * w[2] + q[1] * w[1] - q[2] * w[0],
+        ])  # fmt: skip
+        return np.concatenate([turn, -np.cross(w, inertia * w) / inertia])
+
+    start = np.concatenate([[1.0, 0.0, 0.0, 0.0], spin])
+    end = solve_ivp(rate, (0.0, duration), start, method="DOP853", rtol=rtol, atol=rtol * 1e-2).y[:4, -1]
+    return tuple(end / np.linalg.norm(end))
+
+
+def angle_between(q, p) -> float:
+    """Angle of the rotation from one unit quaternion to another [rad]; accurate for small angles."""
+    return float(angles_between(q, p))
+
+
+def truth_error(spin: tuple[float, float, float], duration: float) -> float:
+    """Error of `free_attitude`, from a tolerance ten times as large [rad]."""
+    return angle_between(free_attitude(spin, duration), free_attitude(spin, duration, 1e-12))
+
+
+def rotation(key: str, spin: tuple[float, float, float], duration: float, goal) -> Case:
+    """The block turning in empty space."""
+    return Case(
+        key, f"free rotation, ω = {spin} rad/s, {duration:g} s: attitude", "rad", duration,
+        lambda: physics.Scene([physics.Block(scenes.SIZE, scenes.MASS, angvel=spin)]),
+        lambda path: angle_between(path.quat[-1], free_attitude(spin, duration)), (goal,),
+        scale=math.pi, own_error=lambda: truth_error(spin, duration),
+    )  # fmt: skip
+
+
+# --- bounces -------------------------------------------------------------------------------------------------------
+
+
+def flights(path: Path) -> list[tuple[float, float]]:
+    """Time of each bounce and height of the apex after it [s, m], from the first sample after the bounce."""
+    height, speed = path.pos[:, 1] - scenes.SIZE[1] / 2, path.linvel[:, 1]
+    found = []
+    for k in np.flatnonzero((speed[1:] > 0.0) & (speed[:-1] <= 0.0)) + 1:
+        apex = height[k] + speed[k] ** 2 / (2 * G)
+        found.append((path.t[k] + speed[k] / G - math.sqrt(2 * max(apex, 0.0) / G), apex))
+    return found
+
+
+def elastic_error(path: Path, bounces: int = 10) -> float:
+    """Worst of the apex heights [m] and the times [s] of the first bounces; infinite when there are fewer."""
+    found = flights(path)[:bounces]
+    if len(found) < bounces:
+        return math.inf
+    fall = math.sqrt(2.0 / G)
+    return max(max(abs(apex - 1.0), abs(t - (2 * k + 1) * fall)) for k, (t, apex) in enumerate(found))
+
+
+def damped_error(path: Path) -> float:
+    """Worst of the first apex, e² h [m], and of the time to rest, √(2h/g) (1 + e)/(1 - e) [s]."""
+    found, rest = flights(path), time_of_rest(path)
+    if not found:
+        return math.inf
+    return max(abs(found[0][1] - 0.25), abs(rest - 3.0 * math.sqrt(2.0 / G)))
+
+
+STILL = 1e-9  # speed of a block at rest [m/s]
+RESTLESS = 1e-2  # speed at the end above which a block is not at rest at all [m/s]
+
+
+def time_of_rest(path: Path) -> float:
+    """When the block came to rest [s]: by its event, else the first sample from which on it stays still on the floor.
+
+    Infinite where it never does.
+
+    Still is below `STILL`; a soft contact, which never gets there, is still below twice what its speed is in the last
+    tenth of the run, if that is small. Then it may be called at rest too early, by the bounces below that speed v:
+    4 v/g, 0.4 ms for 1 mm/s.
+    """
+    told = [event.t for event in path.events if event.kind == "rest"]
+    if told:
+        return told[-1]
+    speed, height = np.abs(path.linvel[:, 1]), path.pos[:, 1] - scenes.SIZE[1] / 2
+    residue = speed[path.t >= 0.9 * path.t[-1]].max()
+    if not residue <= RESTLESS or not height[-1] < 1e-3:
+        return math.inf
+    moving = np.flatnonzero((speed > max(STILL, 2.0 * residue)) | (height >= 1e-3))
+    return float(path.t[moving[-1] + 1])
+
+
+TILT = (math.cos(0.35), math.sin(0.35) / math.sqrt(2), math.sin(0.35) / math.sqrt(2), 0.0)  # 0.7 rad about (1, 1, 0)
+LANDING_SPEED = 3.0  # of the vertex [m/s]
+LANDING_TIME = 0.16  # [s]
+
+
+def lowest_vertex() -> tuple[np.ndarray, np.ndarray]:
+    """Arm of the lowest vertex of the tilted block [m], and its inertia tensor [kg m²], world frame."""
+    w, *v = TILT
+    v = np.array(v)
+    R = (w * w - v @ v) * np.eye(3) + 2 * np.outer(v, v) + 2 * w * np.cross(np.eye(3), -v)
+    corners = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]) * np.array(scenes.SIZE) / 2
+    x, y, z = scenes.SIZE
+    inertia = R @ np.diag(scenes.MASS / 12.0 * np.array([y * y + z * z, z * z + x * x, x * x + y * y])) @ R.T
+    return min((R @ c for c in corners), key=lambda r: r[1]), inertia
+
+
+def vertex_scene() -> physics.Scene:
+    """The tilted block flies onto a floor without gravity: its lowest vertex arrives at `LANDING_TIME`."""
+    arm, _ = lowest_vertex()
+    start = (0.0, LANDING_TIME * LANDING_SPEED - arm[1], 0.0)
+    body = physics.Block(scenes.SIZE, scenes.MASS, pos=start, quat=TILT, linvel=(0, -LANDING_SPEED, 0))
+    return physics.Scene([body], [physics.HalfSpace((0, 1, 0))], [physics.Contact(0.5)])
+
+
+def vertex_error(path: Path) -> float:
+    """Error of the vertex's velocity just after the impact [m/s], from the momentum that it left.
+
+    j = (1 + e) v / w with w = 1/m + (r x n)·I⁻¹ (r x n): the vertex then leaves at e v, and an error of j makes one of
+    w times itself in that.
+    """
+    arm, inertia = lowest_vertex()
+    turn = np.cross(arm, (0, 1, 0))
+    mobility = 1.0 / scenes.MASS + turn @ np.linalg.solve(inertia, turn)
+    impulse = scenes.MASS * (path.linvel[-1, 1] + LANDING_SPEED)
+    return abs(impulse * mobility - 1.5 * LANDING_SPEED)
+
+
+# --- friction ------------------------------------------------------------------------------------------------------
+
+
+def along_incline(path: Path) -> np.ndarray:
+    """Distance down the incline after each step [m]."""
+    down = np.array([math.cos(INCLINE), -math.sin(INCLINE), 0.0])
+    return (path.pos - np.array(scenes.incline(INCLINE, 1.0).bodies[0].pos)) @ down
+
+
+def slipping_error(path: Path) -> float:
+    """Error of the distance slid in 10 s, ½ g (sin θ - μ cos θ) t² [m]."""
+    pull = G * (math.sin(INCLINE) - 0.99 * math.tan(INCLINE) * math.cos(INCLINE))
+    return abs(along_incline(path)[-1] - 0.5 * pull * 100.0)
+
+
+def sphere_error(path: Path) -> float:
+    """Worst of the final speed, 5/7 v [m/s], and of the distance [m]: it slips until t = 2 v/(7 μ g), then rolls."""
+    v, mu = 5.0, 0.2
+    slip = 2.0 * v / (7.0 * mu * G)
+    way = v * slip - 0.5 * mu * G * slip**2 + 5.0 / 7.0 * v * (path.t[-1] - slip)
+    return max(abs(path.linvel[-1, 0] - 5.0 / 7.0 * v), abs(path.pos[-1, 0] - way))
+
+
+CASES = (
+    rotation("tumble", (0.1, 5.0, 0.1), 20.0, (1e-10, 100.0)),
+    rotation("high_spin", (1.0, 100.0, 1.0), 5.0, (1e-8, 200.0)),
+    Case("elastic", "face-down drop, e = 1: worst apex and time of 10 bounces", "m, s", 9.4,
+         lambda: scenes.bounce(1.0, 1.0), elastic_error, ((1e-9, 200.0),), 1.0),
+    Case("damped", "face-down drop, e = 0.5: first apex and time to rest", "m, s", 2.0,
+         lambda: scenes.bounce(1.0, 0.5), damped_error, ((1e-6, 300.0),), 1.0),
+    Case("slide", "slide, 3 m/s, μ = 0.3: stopping distance", "m", 2.0, scenes.slide,
+         lambda path: abs(path.pos[-1, 0] - 9.0 / (0.6 * G)), ((1e-6, 500.0), (1e-4, 150.0)), 9.0 / (0.6 * G)),
+    Case("creep", "incline 20°, μ 1 % too high, 10 s: creep", "m", 10.0,
+         lambda: scenes.incline(INCLINE, 1.01 * math.tan(INCLINE)),
+         lambda path: float(np.abs(along_incline(path)).max()), ((1e-12, 150.0),)),
+    Case("slip", "incline 20°, μ 1 % too low, 10 s: distance", "m", 10.0,
+         lambda: scenes.incline(INCLINE, 0.99 * math.tan(INCLINE)), slipping_error, ((1e-6, 500.0),), 1.7),
+    Case("vertex", "one vertex hits, e = 0.5: velocity after", "m/s", 0.2, vertex_scene, vertex_error,
+         ((1e-12, 300.0),), 1.5 * LANDING_SPEED),
+    Case("sphere", "sphere slips, then rolls: final speed and distance", "m/s, m", 2.0, scenes.rolling_sphere,
+         sphere_error, ((1e-9, 100.0),), 5.0),
+)  # fmt: skip

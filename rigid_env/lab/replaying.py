@@ -1,0 +1,82 @@
+"""Command ``rigid-env replay``: takes a recording again, step by step."""
+
+from __future__ import annotations
+
+import numpy as np
+from rich.console import Console
+
+from physics import Replay, Status
+from physics.io.recording import origin
+from rigid_env.terminal import Table, number_columns, say
+
+# Rows of the table where a recording is long: its last steps, in which what it was kept for happens.
+LAST_ROWS = 20
+
+
+def summary(replay: Replay) -> dict:
+    """The replay as numbers, JSON-able."""
+    recording, first = replay.recording, replay.first_difference
+    return {
+        "reason": recording.reason,
+        "bodies": len(recording.scene.bodies),
+        "steps": len(recording),
+        "is_identical": replay.is_identical,
+        "first_difference": first,
+        "largest_distance": float(replay.distances.max(initial=0.0)),
+        "recorded_with": recording.origin,
+        "replayed_with": origin(),
+        "rows": [_row(replay, k) for k in range(len(recording))],
+    }
+
+
+def _row(replay: Replay, k: int) -> dict:
+    report, recording = replay.reports[k], replay.recording
+    return {
+        "t": float(replay.times[k]),
+        "steps": int(recording.steps[k]),
+        "status": Status(int(report.status[0])).name,
+        "penetration": float(report.penetration[0]),
+        "residual": float(report.residual[0]),
+        "impacts": int(report.impacts[0]),
+        "energy": float(replay.energies[k]),
+        "is_identical": bool(np.array_equal(replay.states[k], recording.states[k], equal_nan=True)),
+    }
+
+
+def show(content: dict, console: Console) -> None:
+    """Print a `summary`."""
+    say(console, "kept", content["reason"])
+    say(console, "scene", f"{content['bodies']} bodies, {content['steps']} steps")
+    rows, shown = content["rows"], _shown(content["rows"])
+    if len(shown) < len(rows):
+        say(console, "table", f"the last {LAST_ROWS} steps, and those that went wrong; all with --json")
+    console.print(make_table(rows, shown))
+    say(console, "replayed", _verdict(content))
+
+
+def make_table(rows: list[dict], shown: list[int]) -> Table:
+    """The rows of a `summary` with these numbers."""
+    names = "step", "t [s]", "status", "depth [m]", "residual", "impacts", "energy [J]", "same bits"
+    table = Table(number_columns(*names))
+    for k in shown:
+        row = rows[k]
+        table.add_row(
+            str(k), f"{row['t']:.6g}", row["status"], f"{row['penetration']:.3g}", f"{row['residual']:.3g}",
+            str(row["impacts"]), f"{row['energy']:.9g}", "yes" if row["is_identical"] else "no",
+        )  # fmt: skip
+    return table
+
+
+def _shown(rows: list[dict]) -> list[int]:
+    """Numbers of the rows that a table has."""
+    last = len(rows) - LAST_ROWS
+    return [k for k, row in enumerate(rows) if k >= last or row["status"] not in ("OK", "UNCONVERGED")]
+
+
+def _verdict(content: dict) -> str:
+    if content["is_identical"]:
+        return "bit for bit as recorded"
+    ours, theirs = content["replayed_with"], content["recorded_with"]
+    other = ", ".join(f"{key} {theirs.get(key)} then, {ours[key]} now" for key in ours if ours[key] != theirs.get(key))
+    cause = other or "all versions are the same: please report this"
+    return f"differs from step {content['first_difference']} on, by up to {content['largest_distance']:.3g} m ({cause})"

@@ -1,0 +1,104 @@
+"""Command `rigid-env warmup`: one step of all common scenes and environments, to compile their kernels."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import asdict, dataclass
+
+import gymnasium
+import numpy as np
+from numba.core import event
+
+import physics
+from physics import scenes
+from rigid_env.lab.measure.environments import environment_ids
+
+ACCURACIES = ("balanced", "fast")
+FIRST_SCENE = "drop"  # the three-wall box: at all of `ACCURACIES`, the other scenes at the first
+
+
+@dataclass(frozen=True)
+class Job:
+    """One step of something, and a name for it."""
+
+    name: str
+    accuracy: str
+    run: Callable[[], None]
+
+
+@dataclass(frozen=True)
+class Warmed:
+    """Time of a job.
+
+    Attributes
+    ----------
+    name, accuracy : str
+        Of the job.
+    seconds : float
+    compiled : int
+        Kernels that were compiled for it; 0 if all came from the cache.
+    """
+
+    name: str
+    accuracy: str
+    seconds: float
+    compiled: int
+
+    def to_dict(self) -> dict:
+        """For JSON."""
+        return asdict(self)
+
+
+def jobs() -> list[Job]:
+    """List the jobs worth compiling ahead: environments, the three-wall box, then the other canonical scenes."""
+    found = [job for accuracy in ACCURACIES for job in _environment_jobs(accuracy)]
+    seen: set[tuple] = set()
+    names = [FIRST_SCENE, *(name for name in scenes.SCENES if name != FIRST_SCENE)]
+    for name in names:
+        for accuracy in ACCURACIES if name == FIRST_SCENE else ACCURACIES[:1]:
+            scene = scenes.by_name(name)
+            key = (physics.make_plan(scene, physics.PRESETS[accuracy]).key, len(scene.walls) > 0)
+            if key not in seen:
+                seen.add(key)
+                found.append(_scene_job(name, accuracy))
+    return found
+
+
+def warm(todo: list[Job]) -> Iterator[Warmed]:
+    """Run jobs one after the other; yields what each took."""
+    for job in todo:
+        with event.install_recorder("numba:compile") as recorder:
+            start = time.perf_counter()
+            job.run()
+            seconds = time.perf_counter() - start
+        compiled = sum(1 for _, what in recorder.buffer if what.is_start)
+        yield Warmed(job.name, job.accuracy, seconds, compiled)
+
+
+def _scene_job(name: str, accuracy: str) -> Job:
+    def step() -> None:
+        world = physics.World(scenes.by_name(name), accuracy=accuracy)
+        world.step()
+        physics.diagnose(world)
+        world.contacts()
+
+    return Job(f"scene {name}", accuracy, step)
+
+
+def _environment_jobs(accuracy: str) -> list[Job]:
+    return [Job(f"environment {name}", accuracy, _stepper(name, accuracy)) for name in environment_ids()]
+
+
+def _stepper(env_id: str, accuracy: str) -> Callable[[], None]:
+    def step() -> None:
+        env = gymnasium.make(env_id, accuracy=accuracy)
+        env.reset(seed=0)
+        env.step(np.zeros(env.action_space.shape, env.action_space.dtype))
+        env.close()
+        envs = gymnasium.make_vec(env_id, num_envs=2, accuracy=accuracy)
+        envs.reset(seed=0)
+        envs.step(np.zeros(envs.action_space.shape, envs.action_space.dtype))
+        envs.close()
+
+    return step

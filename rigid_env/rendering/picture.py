@@ -1,0 +1,132 @@
+"""Pictures of any `physics.World`: frames, a stroboscopic picture, PNG and GIF files."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from physics import World
+from physics.kernels.state import layout as at
+from rigid_env.extras import require
+from rigid_env.rendering import BodyView, Camera, Frame, GoalView, WallView
+from rigid_env.rendering.geometry import rotation_matrix
+from rigid_env.rendering.view import WEIGHT_ARROW
+
+FULL_CHANGE = 40.0  # of a pixel from which on it shows a body, not the rim of a shadow [of 255]
+FAINTEST = 0.25  # opacity of the first of the stroboscopic pictures; the last one has 1
+GIF_COLOURS = 128
+FAR_BEHIND = 1000.0  # times the distance between the camera and what it looks at
+UNIT_WEIGHT = 9.81  # stands in where no gravity acts, times the mass [m/s²]
+
+
+def world_frame(
+    world: World,
+    index: int = 0,
+    text: Sequence[str] = (),
+    goal: GoalView | None = None,
+    applied: np.ndarray | None = None,
+) -> Frame:
+    """Make the frame to draw of one world now.
+
+    Parameters
+    ----------
+    world : World
+    index : int
+        Of the world in its batch.
+    text : sequence of str
+        Lines in the upper left corner.
+    goal : GoalView, optional
+    applied : (6,) float, optional
+        Force [N] and torque [N m] on body 0, world frame; drawn at its geometric centre.
+
+    Returns
+    -------
+    Frame
+        Bodies, walls (if they act), contact points and forces.
+    """
+    wrench = np.zeros(6) if applied is None else np.asarray(applied, dtype=float)
+    points, forces = world.contacts(index)
+    walls = world.scene.walls if world.plan.contact else ()
+    first = index * world.body_count
+    strength = float(np.linalg.norm(world.gravity[index])) or UNIT_WEIGHT
+    return Frame(
+        bodies=tuple(_body_view(world, index, body) for body in range(world.body_count)),
+        walls=tuple(WallView(wall.normal, wall.offset) for wall in walls),
+        goal=goal,
+        contact_points=points,
+        contact_forces=forces,
+        applied_force=wrench[:3],
+        applied_torque=wrench[3:],
+        text=tuple(text),
+        force_scale=WEIGHT_ARROW * float(world.params[first, at.INV_MASS]) / strength,
+    )
+
+
+def _body_view(world: World, index: int, body: int) -> BodyView:
+    kind = world.scene.bodies[body].kind
+    params, quat = world.params[index * world.body_count + body], world.quat[index, body]
+    stored, center = params[at.DIMENSIONS : at.DIMENSIONS + 3], params[at.CENTER : at.CENTER + 3]
+    dimensions = 2.0 * stored if kind == "block" else stored
+    solid = world.scene.bodies[body].polyhedron if kind == "hull" else None
+    outline = {} if solid is None else {"corners": solid.vertices, "faces": solid.loops}
+    return BodyView(kind, dimensions, world.pos[index, body] + rotation_matrix(quat) @ center, quat, **outline)
+
+
+def without_bodies(frame: Frame, camera: Camera) -> Frame:
+    """The same frame with all bodies behind the camera and no contacts: what does not move."""
+    eye, target = np.array(camera.eye), np.array(camera.target)
+    behind = eye + FAR_BEHIND * (eye - target)
+    bodies = tuple(replace(body, pos=behind) for body in frame.bodies)
+    return replace(frame, bodies=bodies, contact_points=(), contact_forces=(), text=())
+
+
+def stroboscope(pictures: Sequence[np.ndarray], empty: np.ndarray) -> np.ndarray:
+    """One picture of a motion: earlier positions fainter, the last one solid on top.
+
+    Parameters
+    ----------
+    pictures : sequence of (height, width, 3) uint8
+        In order of time, at least one.
+    empty : (height, width, 3) uint8
+        The same scene without what moves.
+
+    Returns
+    -------
+    (height, width, 3) uint8
+    """
+    blend = empty.astype(np.float64)
+    for picture, opacity in zip(pictures, np.linspace(FAINTEST, 1.0, len(pictures) + 1)[1:]):
+        change = np.abs(picture.astype(np.float64) - empty).max(axis=2, keepdims=True)
+        blend += opacity * np.minimum(change / FULL_CHANGE, 1.0) * (picture - blend)
+    return np.rint(blend).astype(np.uint8)
+
+
+def write_png(path: Path, picture: np.ndarray) -> None:
+    """Write (height, width, 3) uint8 as PNG."""
+    _image_class().fromarray(picture).save(path)
+
+
+def write_gif(path: Path, pictures: Sequence[np.ndarray], fps: float) -> None:
+    """Write pictures (height, width, 3) uint8 as an animated GIF that plays for ever.
+
+    Parameters
+    ----------
+    path : Path
+    pictures : sequence
+    fps : float
+        A GIF counts in hundredths of a second: 25, 50 and 100 are played exactly [1/s].
+    """
+    images = [_image_class().fromarray(picture) for picture in pictures]
+    palette = images[len(images) // 2].quantize(GIF_COLOURS)
+    images = [image.quantize(GIF_COLOURS, palette=palette, dither=0) for image in images]
+    images[0].save(path, save_all=True, append_images=images[1:], duration=round(1000 / fps), loop=0)
+
+
+def _image_class():
+    require("render", "PIL", purpose="writing pictures")
+    from PIL import Image
+
+    return Image
