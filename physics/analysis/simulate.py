@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 
 from physics import validation
 from physics.analysis.diagnostics import diagnose
-from physics.kernels.event_driven import event_log
+from physics.kernels.time_stepping import event_log
 from physics.keywords import known_keywords
 from physics.plan.accuracy import Accuracy
 from physics.scene.scene import Scene

@@ -13,10 +13,10 @@ import numpy as np
 
 from physics import validation
 from physics.io.mjcf_reader import read_scene
+from physics.rotations import rotation_matrices
 from physics.scene.effects import Contact, Friction, Gravity
 from physics.scene.force_fields import Spring
 from physics.scene.scene import Scene
-from physics.work_precision.errors import rotation_matrices
 
 GEOMS = {"block": "box", "sphere": "sphere", "ellipsoid": "ellipsoid", "hull": "mesh"}
 KEYFRAME = "start"

@@ -8,10 +8,10 @@ import numpy as np
 
 from physics import validation
 from physics.mass.inertia import block_moments, ellipsoid_moments
+from physics.rotations import rotation_matrices
 from physics.scene.bodies import Block, Body, Ellipsoid, Sphere
 from physics.scene.effects import Contact, Friction, Gravity
 from physics.scene.scene import HalfSpace, Scene
-from physics.work_precision.errors import rotation_matrices
 
 DENSITY = 1000.0  # MuJoCo's default [kg/m³]
 GRAVITY = "0 0 -9.81"  # likewise

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from physics.rotations import rotation_matrices
 from physics.scene.bodies import Body
 from physics.scene.effects import RESISTANCES, Contact, Friction, Gravity
 from physics.scene.force_field import Field
@@ -47,17 +48,6 @@ def root_mean_square(difference: np.ndarray) -> float:
     itself between the two moments, however short that is.
     """
     return float(np.sqrt(np.mean(np.sum(difference * difference, axis=-1).max(axis=-1))))
-
-
-def rotation_matrices(quat: np.ndarray) -> np.ndarray:
-    """(..., 3, 3) rotation matrices, body to world, of unit quaternions (..., 4)."""
-    w, x, y, z = np.moveaxis(np.asarray(quat, dtype=float), -1, 0)
-    rows = (
-        (1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)),
-        (2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)),
-        (2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)),
-    )
-    return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
 
 
 def mechanical_energy(scene: Scene, pos, quat, linvel, angvel) -> np.ndarray:

@@ -8,7 +8,7 @@ import numpy as np
 
 from physics.kernels.half_space.gap_queries import deepest_gaps
 from physics.kernels.state import layout as at
-from physics.work_precision.errors import rotation_matrices
+from physics.rotations import rotation_matrices
 
 if TYPE_CHECKING:
     from physics.world.world import World

@@ -5,16 +5,15 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from threading import get_ident
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from physics import validation
-from physics.kernels.event_driven.event_log import EVENT_SIZE
 from physics.kernels.forces.force_field_dispatch import declare
 from physics.kernels.state import layout as at
 from physics.kernels.state.sleeping import GROUP, SLEEP_SIZE, Sleep
+from physics.kernels.time_stepping.event_log import EVENT_SIZE
 from physics.kernels.time_stepping.workspace import body_records
 from physics.keywords import known_keywords
 from physics.parallel.bound_call import Work
@@ -31,10 +30,8 @@ from physics.world.actuator import Actuation
 from physics.world.contact_report import contact_ends, contact_forces
 from physics.world.report import StepReport
 from physics.world.rollback import Before
+from physics.world.step_listener import StepListener
 from physics.world.stepper import kernel_calls, retime
-
-if TYPE_CHECKING:
-    from physics.io.recorder import Recorder
 
 # Arrays that decide how a `World` goes on, in the order of `Snapshot.arrays`; the last one where bodies may sleep.
 KEPT = ("state", "params", "gravity", "memory", "report_table", "sleep")
@@ -82,7 +79,7 @@ class World:
         The array behind `report`, likewise.
     time : float
         Time since the start [s].
-    recorder : Recorder or None
+    recorder : StepListener or None
         What is told of every step; see `physics.Recorder`.
     is_free : bool
         Whether no thread is in a method that changes or copies the world. Such a method raises RuntimeError while
@@ -113,7 +110,7 @@ class World:
         self.plan = make_plan(scene, self.accuracy)
         self.body_count = len(scene.bodies)
         self.time = 0.0
-        self.recorder: Recorder | None = None
+        self.recorder: StepListener | None = None
         batch_arrays.check_room(self.worlds, self.body_count, self.plan)
         self.is_free = True
         self._allocate()
@@ -160,9 +157,9 @@ class World:
     def make_event_room(self, room: int) -> None:
         """Let a step log up to `room` events per body, 0 at first; for `simulate`.
 
-        They go to `event_log` (worlds * bodies, room, EVENT_SIZE), columns in `physics.kernels.event_driven.event_log`;
-        their number to `event_counts` (worlds * bodies,) int64, those that found no room included: more than `room`
-        says so. Prepare a `Stepper` after this.
+        They go to `event_log` (worlds * bodies, room, EVENT_SIZE), columns in
+        `physics.kernels.time_stepping.event_log`; their number to `event_counts` (worlds * bodies,) int64, those that
+        found no room included: more than `room` says so. Prepare a `Stepper` after this.
         """
         self.event_log = np.zeros((len(self.event_counts), room, EVENT_SIZE))
         self._bound_for = None

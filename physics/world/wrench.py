@@ -7,7 +7,7 @@ from numpy.typing import ArrayLike
 
 from physics import validation
 from physics.keywords import known_keywords
-from physics.work_precision.errors import rotation_matrices
+from physics.rotations import rotation_matrices
 from physics.world.world import World
 
 FRAMES = ("world", "body")

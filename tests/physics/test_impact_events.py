@@ -7,7 +7,7 @@ import pytest
 
 import physics
 from physics.analysis import simulate
-from physics.kernels.event_driven import event_log
+from physics.kernels.time_stepping import event_log
 
 PRESETS = ("fast", "balanced", "precise", "reference")
 FLOOR = physics.HalfSpace((0, 1, 0), 0.0)

@@ -11,7 +11,7 @@ import pytest
 import physics
 from physics import scenes
 from physics.io.mjcf import from_mjcf, to_mjcf
-from physics.work_precision.errors import rotation_matrices
+from physics.rotations import rotation_matrices
 
 EPS = np.finfo(float).eps
 TURNED = (0.5, 0.5, -0.5, 0.5)

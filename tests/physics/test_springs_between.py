@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import physics
-from physics.work_precision.errors import rotation_matrices
+from physics.rotations import rotation_matrices
 
 G = 9.81
 STEPS = np.array([0.04, 0.02, 0.01, 0.005])

@@ -38,14 +38,20 @@ from __future__ import annotations
 import math
 
 from physics.kernels.compile.decorators import inlined
-from physics.kernels.contact_law.restitution_energy import kinetic_energy, lifted_to
+from physics.kernels.contact_law.restitution_energy import lifted_to
 from physics.kernels.contact_law.target_velocity import LARGEST_TURN, UNSEEN
-from physics.kernels.contact_solver.impulse_distribution import contact_arm
-from physics.kernels.half_space.contact_point import arm_and_rate, feature_of, place_arms, wall_normal, wall_of
+from physics.kernels.half_space.contact_point import (
+    arm_and_rate,
+    contact_arm,
+    feature_of,
+    place_arms,
+    wall_normal,
+    wall_of,
+)
 from physics.kernels.half_space.contact_set import gap_of, nearest_outside_set
 from physics.kernels.math import quaternion as qt
 from physics.kernels.state import layout as at
-from physics.kernels.state.body import angular_velocity, principal_attitude, turning
+from physics.kernels.state.body import angular_velocity, kinetic_energy, principal_attitude, turning
 from physics.kernels.state.contact_law_dispatch import DAMPING, STIFFNESS, if_law, number_of
 
 # Share of its energy that a body may gain in a resting stage by what is of third order in the step.

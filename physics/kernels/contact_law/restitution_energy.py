@@ -20,19 +20,14 @@ import math
 
 from physics.kernels.compile.decorators import inlined, kernel
 from physics.kernels.math import quaternion as qt
-from physics.kernels.state.body import angular_velocity, turning
+from physics.kernels.math.quaternion import between
+from physics.kernels.state.body import kinetic_energy, turning
 
 # Share of the energy by which rounding of an impact may raise it: of the dozen products and sums behind a momentum.
 ROUNDING = 1.0e-14
 
 # Slops that a body is lifted out of a wall for nothing.
 FREE_LIFT = 10.0
-
-
-@inlined
-def kinetic_energy(q, v, L, work, tilted):
-    """Kinetic energy of one body [J]."""
-    return 0.5 * (work.mass * qt.dot(v, v) + qt.dot(L, angular_velocity(q, L, work, tilted)))
 
 
 @inlined
@@ -62,12 +57,6 @@ def rebound_share(before, plastic, full, middle):
     if not below > 0.0:
         return 0.0
     return min(-2.0 * c / below, 1.0)
-
-
-@inlined
-def between(a, b, s):
-    """a + s (b - a) of vectors."""
-    return (a[0] + s * (b[0] - a[0]), a[1] + s * (b[1] - a[1]), a[2] + s * (b[2] - a[2]))
 
 
 @inlined

@@ -5,29 +5,13 @@ from __future__ import annotations
 from physics.kernels.compile.decorators import inlined
 from physics.kernels.compile.simd import WIDTH, chosen, first_of, root, total
 from physics.kernels.contact_law.anisotropic_friction import friction_ratio
-from physics.kernels.half_space.contact_point import wall_of
+from physics.kernels.half_space.contact_point import contact_arm, wall_axis, wall_of
 from physics.kernels.math import quaternion as qt
 from physics.kernels.math.simd_gather import column, numbers, present
 from physics.kernels.state.layout import NORMAL, TANGENT_1, TANGENT_2
 
 # Weighted sharings of the tangential impulses at most: nine in ten of those that hold take ten.
 SHARE_LIMIT = 40
-
-
-@inlined
-def wall_axis(walls, wall, first):
-    """Three columns of a wall's row: its normal or a tangent."""
-    return (walls[wall, first], walls[wall, first + 1], walls[wall, first + 2])
-
-
-@inlined
-def wall_axes(walls, wall):
-    """Normal and the two tangents of a wall."""
-    return (
-        wall_axis(walls, wall, NORMAL),
-        wall_axis(walls, wall, TANGENT_1),
-        wall_axis(walls, wall, TANGENT_2),
-    )
 
 
 @inlined
@@ -52,12 +36,6 @@ def solve_symmetric(k, b):
 def minus(a, b):
     """a - b of vectors."""
     return (a[0] - b[0], a[1] - b[1], a[2] - b[2])
-
-
-@inlined
-def contact_arm(work, i):
-    """Arm of contact i from the centre of mass [m]."""
-    return (work.arm[i, 0], work.arm[i, 1], work.arm[i, 2])
 
 
 @inlined

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from physics.kernels.compile.decorators import inlined
 from physics.kernels.contact_law.anisotropic_friction import friction_ratio, stretched_frame
-from physics.kernels.contact_solver.impulse_distribution import wall_axes
 from physics.kernels.contact_solver.one_contact import to_world, wall_frame
 from physics.kernels.contact_solver.patch_algebra import cold_motion, free_speed, place_patch, warm_motion
 from physics.kernels.contact_solver.sliding_patch import MIXED, SLIDE, search
 from physics.kernels.contact_solver.two_contacts import contact_at, solve_one, solve_pair
+from physics.kernels.half_space.contact_point import wall_axes
 from physics.kernels.math.simd_gather import present
 
 # Share of the free speed by which a contact that opened may close while it is sought which others push.

@@ -16,13 +16,12 @@ from physics.kernels.contact_solver.gauss_seidel import (
     normal_sweeps,
     velocities,
 )
-from physics.kernels.contact_solver.impulse_distribution import wall_axes
 from physics.kernels.contact_solver.patch_algebra import may_hold
 from physics.kernels.contact_solver.proximal_newton import proximal_newton
 from physics.kernels.contact_solver.single_wall import slide_on
 from physics.kernels.contact_solver.sliding_patch import HOLD
 from physics.kernels.contact_solver.sticking import hold_all
-from physics.kernels.half_space.contact_point import wall_of
+from physics.kernels.half_space.contact_point import wall_axes, wall_of
 from physics.kernels.math import quaternion as qt
 
 # Methods, weakest need first (column SOLVER of the report).

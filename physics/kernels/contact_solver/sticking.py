@@ -32,18 +32,15 @@ import math
 
 from physics.kernels.compile.decorators import inlined
 from physics.kernels.contact_solver.impulse_distribution import (
-    contact_arm,
     first_active,
     is_in_cone,
     minus,
     share_by_load,
     share_out,
     solve_symmetric,
-    wall_axes,
-    wall_axis,
 )
 from physics.kernels.contact_solver.one_contact import to_world
-from physics.kernels.half_space.contact_point import wall_of
+from physics.kernels.half_space.contact_point import contact_arm, wall_axes, wall_axis, wall_of
 from physics.kernels.math import quaternion as qt
 from physics.kernels.state.layout import NORMAL, TANGENT_1, TANGENT_2
 

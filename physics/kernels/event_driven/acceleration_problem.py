@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 
 from physics.kernels.compile.decorators import inlined, kernel
-from physics.kernels.contact_solver.impulse_distribution import wall_axes
 from physics.kernels.contact_solver.sliding_patch import HOLD
 from physics.kernels.event_driven.contact_candidates import (
     COLLIDES,
@@ -32,7 +31,7 @@ from physics.kernels.event_driven.contact_forces import (
     turned_by,
     vector,
 )
-from physics.kernels.half_space.contact_point import feature_of, wall_of
+from physics.kernels.half_space.contact_point import feature_of, wall_axes, wall_of
 from physics.kernels.math import quaternion as qt
 
 # Accelerations and forces of the solver below this share of the largest free ones are zero.

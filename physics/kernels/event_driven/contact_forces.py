@@ -29,8 +29,7 @@ import math
 
 from physics.kernels.compile.decorators import inlined, kernel
 from physics.kernels.contact_law.anisotropic_friction import opposing
-from physics.kernels.contact_solver.impulse_distribution import wall_axes
-from physics.kernels.half_space.contact_point import arm_and_rate, feature_of, wall_normal, wall_of
+from physics.kernels.half_space.contact_point import arm_and_rate, feature_of, wall_axes, wall_normal, wall_of
 from physics.kernels.math import quaternion as qt
 from physics.kernels.state.body import principal_attitude
 

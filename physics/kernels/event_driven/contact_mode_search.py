@@ -6,7 +6,6 @@ import math
 
 from physics.kernels.compile.decorators import inlined, kernel
 from physics.kernels.contact_law.anisotropic_friction import eased
-from physics.kernels.contact_solver.impulse_distribution import wall_axes
 from physics.kernels.event_driven.contact_candidates import (
     HELD,
     OPEN,
@@ -27,7 +26,7 @@ from physics.kernels.event_driven.contact_forces import (
 )
 from physics.kernels.event_driven.force_system import solve_unknowns
 from physics.kernels.event_driven.guards import cone_excess
-from physics.kernels.half_space.contact_point import wall_of
+from physics.kernels.half_space.contact_point import wall_axes, wall_of
 from physics.kernels.math import quaternion as qt
 
 # Accelerations and forces of an exact trial below this share of the largest free ones are zero.

@@ -19,12 +19,18 @@ import math
 
 from physics.kernels.compile.decorators import inlined, kernel
 from physics.kernels.contact_law.anisotropic_friction import eased
-from physics.kernels.contact_solver.impulse_distribution import wall_axes
 from physics.kernels.event_driven.contact_forces import NO_PATCH, free_turning, load, spread, vector
 from physics.kernels.event_driven.extrapolated_midpoint import find_rate, get_state, sliding_velocity
 from physics.kernels.event_driven.workspace import END, START, V
 from physics.kernels.half_space import support_function as geo
-from physics.kernels.half_space.contact_point import center_arm, feature_of, geometric_center, wall_normal, wall_of
+from physics.kernels.half_space.contact_point import (
+    center_arm,
+    feature_of,
+    geometric_center,
+    wall_axes,
+    wall_normal,
+    wall_of,
+)
 from physics.kernels.math import quaternion as qt
 from physics.kernels.state.layout import BLOCK, OFFSET, VERTEX_COUNT
 

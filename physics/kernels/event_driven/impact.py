@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 from physics.kernels.compile.decorators import inlined, kernel
-from physics.kernels.contact_law.restitution_energy import ROUNDING, kinetic_energy, part_of_rebound
+from physics.kernels.contact_law.restitution_energy import ROUNDING, part_of_rebound
 from physics.kernels.contact_solver.sliding_patch import SLIDE
 from physics.kernels.contact_solver.solve import solve_contacts
-from physics.kernels.event_driven import event_log as ev
 from physics.kernels.event_driven.acceleration_problem import pose_contact
 from physics.kernels.event_driven.contact_forces import free_turning, load
 from physics.kernels.event_driven.extrapolated_midpoint import put_state
@@ -16,8 +15,9 @@ from physics.kernels.forces.held_loads import refresh_loads
 from physics.kernels.half_space.contact_point import arm_and_rate, feature_of, wall_normal, wall_of
 from physics.kernels.math import quaternion as qt
 from physics.kernels.state import layout as at
-from physics.kernels.state.body import angular_velocity, principal_attitude
+from physics.kernels.state.body import angular_velocity, kinetic_energy, principal_attitude
 from physics.kernels.state.contact_law_dispatch import TANGENTIAL, if_law
+from physics.kernels.time_stepping import event_log as ev
 from physics.kernels.time_stepping.contact_resistance import aim_at, without_gain
 from physics.kernels.time_stepping.contact_stages import aim_plastic, note_solve
 

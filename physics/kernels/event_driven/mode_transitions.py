@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from physics.kernels.compile.decorators import inlined, kernel
-from physics.kernels.event_driven import event_log as ev
 from physics.kernels.half_space.contact_point import wall_of
+from physics.kernels.time_stepping import event_log as ev
 from physics.kernels.time_stepping.contact_stages import MEMORY_HEAD
 
 # State of a body at a wall (`motion.state`).

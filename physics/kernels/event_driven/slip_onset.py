@@ -16,10 +16,9 @@ from __future__ import annotations
 import math
 
 from physics.kernels.compile.decorators import inlined, kernel
-from physics.kernels.contact_solver.impulse_distribution import wall_axes
 from physics.kernels.event_driven.contact_forces import plus, slide_push, times, turned_by, vector
 from physics.kernels.event_driven.workspace import L, V
-from physics.kernels.half_space.contact_point import wall_normal, wall_of
+from physics.kernels.half_space.contact_point import wall_axes, wall_normal, wall_of
 from physics.kernels.math import quaternion as qt
 
 # Newton's steps for an angle that is known to some 1e-3, the difference for its derivative [rad], and the angle that is

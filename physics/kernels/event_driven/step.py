@@ -26,7 +26,6 @@ import math
 
 from physics.kernels.compile.decorators import inlined, kernel
 from physics.kernels.contact_solver.solve import solve_contacts
-from physics.kernels.event_driven import event_log as ev
 from physics.kernels.event_driven.acceleration_problem import read_resting
 from physics.kernels.event_driven.chatter_control import is_crowded, note_leap, note_step, set_pace
 from physics.kernels.event_driven.constraint_projection import cancel
@@ -60,6 +59,7 @@ from physics.kernels.state.body import (
     write_state,
 )
 from physics.kernels.state.contact_law_dispatch import bind_laws
+from physics.kernels.time_stepping import event_log as ev
 
 # Gaps of this share of what they are the difference of are rounding; see `set_thresholds` for HOP.
 ROUNDING = 1.0e-15

@@ -83,9 +83,6 @@ PARTS_LIMIT = 1.0e7
 # rad per part, counts once per period: less than EPS h |ω|, which the rounding of h alone makes.
 MANY_TURNS = 50.0
 
-# Coefficients of s and d, two of first, three of second and four of third order in (|m|², 2E).
-SERIES_SIZE = 18
-
 
 def write_attitude_series(J1, J2, J3, out):
     """Coefficients of the series s and d, of one body or of many at once.

@@ -12,12 +12,11 @@ from __future__ import annotations
 import math
 
 from physics.kernels.compile.decorators import inlined, kernel
-from physics.kernels.contact_law.restitution_energy import kinetic_energy
 from physics.kernels.forces.field_loads import field_state
 from physics.kernels.forces.force_field_dispatch import if_declared, total_energy, total_potential, total_supply
 from physics.kernels.forces.force_field_state import minus, plus, times
 from physics.kernels.math import quaternion as qt
-from physics.kernels.state.body import angular_velocity
+from physics.kernels.state.body import angular_velocity, kinetic_energy
 
 # Share of the energies at hand that rounding may add in a stage.
 ROUNDING = 1.0e-13

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 
 from physics.kernels.compile.decorators import inlined, kernel
-from physics.kernels.contact_law.restitution_energy import between
 from physics.kernels.flight.free_flight import drift
 from physics.kernels.forces.field_loads import (
     all_loads,
@@ -25,6 +24,7 @@ from physics.kernels.forces.force_field_dispatch import (
 from physics.kernels.forces.force_field_state import minus, plus, times
 from physics.kernels.forces.implicit_loads import implicit_share, is_beyond, is_unresolved
 from physics.kernels.math import quaternion as qt
+from physics.kernels.math.quaternion import between
 from physics.kernels.state import layout as at
 from physics.kernels.state.body import angular_velocity
 

@@ -30,7 +30,7 @@ from physics.kernels.forces.implicit_two_body_spring import (
 )
 from physics.kernels.forces.spring import DAMPING, LENGTH, STIFFNESS, line_load, stretch
 from physics.kernels.math import quaternion as qt
-from physics.kernels.multibody.solver.islands import join
+from physics.kernels.math.union_find import join
 from physics.kernels.state import layout as at
 from physics.kernels.state.body import angular_velocity, read_state
 

@@ -9,7 +9,6 @@ from __future__ import annotations
 import math
 
 from physics.kernels.compile.decorators import inlined, kernel
-from physics.kernels.contact_law.restitution_energy import kinetic_energy
 from physics.kernels.forces.energy_budget import COARSE_SHARE, ROUNDING, held_loads, potential_energy
 from physics.kernels.forces.field_loads import field_state
 from physics.kernels.forces.force_field_dispatch import if_declared, total_supply
@@ -17,7 +16,7 @@ from physics.kernels.forces.force_field_state import ZERO, minus, plus, times
 from physics.kernels.forces.resolution_limits import note_report
 from physics.kernels.forces.two_body_spring import place_anchors_now
 from physics.kernels.math import quaternion as qt
-from physics.kernels.state.body import angular_velocity, read_state, write_state
+from physics.kernels.state.body import angular_velocity, kinetic_energy, read_state, write_state
 
 
 @inlined

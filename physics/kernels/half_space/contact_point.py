@@ -7,7 +7,7 @@ import math
 from physics.kernels.compile.decorators import inlined
 from physics.kernels.half_space import support_function as geo
 from physics.kernels.math import quaternion as qt
-from physics.kernels.state.layout import BLOCK, NORMAL, SPHERE
+from physics.kernels.state.layout import BLOCK, NORMAL, SPHERE, TANGENT_1, TANGENT_2
 
 
 @inlined
@@ -99,3 +99,25 @@ def place_arms(n, R, tilted, work):
             normal = wall_normal(walls, wall)
             r = geo.support_arm(shape, dims, R, normal, geo.scaled_normal(shape, dims, R, normal))
         work.arm[i, 0], work.arm[i, 1], work.arm[i, 2] = r
+
+
+@inlined
+def wall_axis(walls, wall, first):
+    """Three columns of a wall's row: its normal or a tangent."""
+    return (walls[wall, first], walls[wall, first + 1], walls[wall, first + 2])
+
+
+@inlined
+def wall_axes(walls, wall):
+    """Normal and the two tangents of a wall."""
+    return (
+        wall_axis(walls, wall, NORMAL),
+        wall_axis(walls, wall, TANGENT_1),
+        wall_axis(walls, wall, TANGENT_2),
+    )
+
+
+@inlined
+def contact_arm(work, i):
+    """Arm of contact i from the centre of mass [m]."""
+    return (work.arm[i, 0], work.arm[i, 1], work.arm[i, 2])

@@ -127,3 +127,9 @@ def exponential(rotation):
         sinc = math.sin(half) / half
     s = 0.5 * sinc
     return (math.cos(half), s * rotation[0], s * rotation[1], s * rotation[2])
+
+
+@inlined
+def between(a, b, s):
+    """a + s (b - a) of vectors."""
+    return (a[0] + s * (b[0] - a[0]), a[1] + s * (b[1] - a[1]), a[2] + s * (b[2] - a[2]))

@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 
 from physics.kernels.compile.decorators import inlined, kernel
-from physics.kernels.flight.free_rotation import SERIES_SIZE
 from physics.kernels.math import quaternion as qt
 from physics.kernels.state import layout as at
+from physics.kernels.state.layout import SERIES_SIZE
 
 
 @inlined
@@ -144,3 +144,9 @@ def angular_velocity(q, L, work, tilted):
     if L[0] == 0.0 and L[1] == 0.0 and L[2] == 0.0:
         return (0.0, 0.0, 0.0)
     return turning(qt.to_matrix(principal_attitude(q, work, tilted)), L, work.J)
+
+
+@inlined
+def kinetic_energy(q, v, L, work, tilted):
+    """Kinetic energy of one body [J]."""
+    return 0.5 * (work.mass * qt.dot(v, v) + qt.dot(L, angular_velocity(q, L, work, tilted)))

@@ -6,7 +6,8 @@ two or three cache lines. `i` is always the flat index world * body_count + body
 
 from __future__ import annotations
 
-from physics.kernels.flight.free_rotation import SERIES_SIZE
+# Coefficients of s and d, two of first, three of second and four of third order in (|m|², 2E).
+SERIES_SIZE = 18
 
 # --- state (rows, STATE_SIZE): what evolves -------------------------------------------------------------------
 POS = 0  # position of the centre of mass, world frame [m]

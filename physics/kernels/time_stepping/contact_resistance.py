@@ -28,9 +28,8 @@ from __future__ import annotations
 import math
 
 from physics.kernels.compile.decorators import inlined, kernel
-from physics.kernels.contact_solver.impulse_distribution import wall_axis
 from physics.kernels.contact_solver.solve import solve_contacts
-from physics.kernels.half_space.contact_point import wall_normal, wall_of
+from physics.kernels.half_space.contact_point import wall_axis, wall_normal, wall_of
 from physics.kernels.math import quaternion as qt
 from physics.kernels.state.body import angular_velocity, turning
 from physics.kernels.state.contact_law_dispatch import ROLLING, SPIN, TANGENTIAL, if_law, number_of

@@ -6,22 +6,21 @@ import math
 
 from physics.kernels.compile.decorators import inlined, kernel
 from physics.kernels.contact_law.compliance import GAIN_SHARE, aim_springs, foretell_gaps, parts_of_stage
-from physics.kernels.contact_law.restitution_energy import ROUNDING, kinetic_energy, part_of_rebound, shortened
+from physics.kernels.contact_law.restitution_energy import ROUNDING, part_of_rebound, shortened
 from physics.kernels.contact_law.target_velocity import HIT, NOTHING, aim_impact, aim_rest, may_hit
-from physics.kernels.contact_solver.impulse_distribution import contact_arm
 from physics.kernels.contact_solver.one_contact import point_velocity
 from physics.kernels.contact_solver.sliding_patch import SLIDE
 from physics.kernels.contact_solver.solve import PIVOTING, solve_contacts
-from physics.kernels.event_driven.event_log import log_wall_impacts
 from physics.kernels.flight.free_flight import drift
-from physics.kernels.half_space.contact_point import place_arms, wall_normal, wall_of
+from physics.kernels.half_space.contact_point import contact_arm, place_arms, wall_normal, wall_of
 from physics.kernels.half_space.persistent_contacts import CONTACT_COUNT, MEMORY_HEAD, MODE, STAGE_LENGTH, hold_back
 from physics.kernels.math import quaternion as qt
 from physics.kernels.state import layout as at
-from physics.kernels.state.body import principal_attitude, turning
+from physics.kernels.state.body import kinetic_energy, principal_attitude, turning
 from physics.kernels.state.contact_law_dispatch import STIFFNESS, if_law
 from physics.kernels.state.layout import ELLIPSOID
 from physics.kernels.time_stepping.contact_resistance import aim_tangential, resist_turning, without_gain
+from physics.kernels.time_stepping.event_log import log_wall_impacts
 from physics.kernels.time_stepping.midpoint_friction import (
     has_turned_round,
     oppose_end_slip,

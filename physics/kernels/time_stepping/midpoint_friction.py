@@ -16,9 +16,8 @@ import math
 
 from physics.kernels.compile.decorators import inlined
 from physics.kernels.contact_law.anisotropic_friction import friction_ratio
-from physics.kernels.contact_solver.impulse_distribution import contact_arm
 from physics.kernels.contact_solver.solve import solve_contacts
-from physics.kernels.half_space.contact_point import wall_of
+from physics.kernels.half_space.contact_point import contact_arm, wall_of
 from physics.kernels.math import quaternion as qt
 from physics.kernels.state.body import turning
 from physics.kernels.state.contact_law_dispatch import STIFFNESS, if_law

@@ -23,7 +23,6 @@ from __future__ import annotations
 from physics.kernels.compile.decorators import inlined, kernel
 from physics.kernels.contact_law.compliance import lift_to_due, stiffness
 from physics.kernels.contact_law.restitution_energy import lifted_to
-from physics.kernels.event_driven.event_log import drop_events, forget_events
 from physics.kernels.flight.free_flight import coast
 from physics.kernels.forces.energy_budget import misses_work, paid
 from physics.kernels.forces.held_loads import (
@@ -63,6 +62,7 @@ from physics.kernels.state.body import (
 from physics.kernels.state.contact_law_dispatch import bind_laws
 from physics.kernels.state.sleeping import falls_asleep, laid_down, sleeps_on
 from physics.kernels.time_stepping.contact_stages import CONTACT_COUNT, impact, store_warm_start, touch
+from physics.kernels.time_stepping.event_log import drop_events, forget_events
 
 # Trials of one time of impact: a secant, then parabolas through the last three. Three are usual.
 IMPACT_TRIALS = 16

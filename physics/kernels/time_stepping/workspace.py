@@ -12,10 +12,9 @@ from __future__ import annotations
 import numpy as np
 
 from physics.kernels.contact_solver.friction_pyramid import normal_sizes, pyramid_sizes
-from physics.kernels.flight.free_rotation import SERIES_SIZE
 from physics.kernels.forces.force_field_dispatch import Term, members
 from physics.kernels.state import contact_law_dispatch as contact_laws
-from physics.kernels.state.layout import VERTEX_COUNT, WALL_SIZE
+from physics.kernels.state.layout import SERIES_SIZE, VERTEX_COUNT, WALL_SIZE
 from physics.kernels.time_stepping.midpoint_friction import FEW
 
 

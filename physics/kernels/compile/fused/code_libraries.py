@@ -5,14 +5,30 @@ What is not public of Numba here is `JITCodeLibrary`, the IR of one function wit
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+import importlib
+from typing import NamedTuple
 
 from llvmlite import binding as llvm
 from numba.core import cgutils
 from numba.core.codegen import CodeLibrary, JITCodeLibrary
 
-if TYPE_CHECKING:
-    from physics.kernels.compile.fused.disk_cache import Origin
+
+class Origin(NamedTuple):
+    """Origin of shared machine code: a kernel, and the types of its arguments.
+
+    Parameters
+    ----------
+    module, name : str
+    args : tuple of numba.types.Type
+    """
+
+    module: str
+    name: str
+    args: tuple
+
+    def load(self) -> None:
+        """Have the machine code in memory."""
+        getattr(importlib.import_module(self.module), self.name).stand(self.args)
 
 
 class PartLibrary(JITCodeLibrary):

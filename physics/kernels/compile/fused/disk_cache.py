@@ -6,12 +6,10 @@ What is kept of either names the kernels that it calls and that stand: they are 
 from __future__ import annotations
 
 import hashlib
-import importlib
 import inspect
 import sys
 from functools import cache, cached_property
 from pathlib import Path
-from typing import NamedTuple
 
 import numba
 from numba import _dynfunc
@@ -21,24 +19,6 @@ from numba.core.serialize import dumps
 
 from physics.kernels.compile.fused import cache_files
 from physics.kernels.compile.fused.code_libraries import StandingLibrary
-
-
-class Origin(NamedTuple):
-    """Origin of shared machine code: a kernel, and the types of its arguments.
-
-    Parameters
-    ----------
-    module, name : str
-    args : tuple of numba.types.Type
-    """
-
-    module: str
-    name: str
-    args: tuple
-
-    def load(self) -> None:
-        """Have the machine code in memory."""
-        getattr(importlib.import_module(self.module), self.name).stand(self.args)
 
 
 class _Cache:

@@ -37,8 +37,8 @@ from numba.core.registry import CPUDispatcher
 from numba.core.sigutils import normalize_signature
 from numba.core.typed_passes import NativeLowering, NoPythonBackend
 
-from physics.kernels.compile.fused.code_libraries import PartLibrary, StandingLibrary, WholeLibrary
-from physics.kernels.compile.fused.disk_cache import Origin, StandingCache, WholeCache, made_known
+from physics.kernels.compile.fused.code_libraries import Origin, PartLibrary, StandingLibrary, WholeLibrary
+from physics.kernels.compile.fused.disk_cache import StandingCache, WholeCache, made_known
 from physics.kernels.compile.fused.lowering import PartLowering, UsersLowering, WholeLowering
 from physics.kernels.compile.fused.memoised_contexts import RememberingTarget, remembering
 from physics.kernels.compile.fused.passes import KernelPasses

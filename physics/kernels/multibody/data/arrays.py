@@ -16,6 +16,9 @@ from physics.kernels.multibody.data.hull_tables import Hulls, make_hulls, room_o
 from physics.kernels.state.layout import REPORT_SIZE, STATE_SIZE, VERTEX_COUNT
 from physics.kernels.time_stepping.workspace import body_fields, setting_fields
 
+# Columns of `many.momenta` in a resting stage: velocities before it, then momenta with its loads.
+VELOCITY, LOADED = 0, 6
+
 # Contacts that two bodies may have at once: a rectangle clipped by another one has up to eight vertices.
 PAIR_CONTACTS = 8
 

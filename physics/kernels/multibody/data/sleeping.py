@@ -9,8 +9,8 @@ from __future__ import annotations
 
 from physics.kernels.compile.decorators import inlined, kernel
 from physics.kernels.forces.two_body_spring import join_linked
+from physics.kernels.math.union_find import join, root_of
 from physics.kernels.multibody.data.arrays import PAIRS
-from physics.kernels.multibody.solver.islands import join, root_of
 from physics.kernels.state.body import read_state, write_state
 from physics.kernels.state.sleeping import (
     BEFORE,

@@ -9,22 +9,7 @@ Reference: R. E. Tarjan, *Efficiency of a good but not linear set union algorith
 from __future__ import annotations
 
 from physics.kernels.compile.decorators import inlined, kernel
-
-
-@inlined
-def root_of(b, parent):
-    """First body of the island of b."""
-    while parent[b] != b:
-        parent[b] = parent[parent[b]]
-        b = parent[b]
-    return b
-
-
-@inlined
-def join(a, b, parent):
-    """Make one island of those of a and b."""
-    a, b = root_of(a, parent), root_of(b, parent)
-    parent[max(a, b)] = min(a, b)
+from physics.kernels.math.union_find import join, root_of
 
 
 @inlined

@@ -15,6 +15,7 @@ nothing is: goals are next to rounding there, and a high arch at its limit, swep
 from __future__ import annotations
 
 from physics.kernels.compile.decorators import inlined, kernel
+from physics.kernels.multibody.data.arrays import VELOCITY
 from physics.kernels.multibody.data.contact_set import minus, vector
 from physics.kernels.multibody.solver.gauss_seidel import sweep_contacts
 from physics.kernels.multibody.solver.proximal_newton import (
@@ -25,7 +26,6 @@ from physics.kernels.multibody.solver.proximal_newton import (
     prepare_system,
     save_best,
 )
-from physics.kernels.multibody.stepping.energy_budget import VELOCITY
 
 # The strongest method that was needed: codes of `physics.world.report.Solver`.
 SWEEPS, NEWTON = 2, 4

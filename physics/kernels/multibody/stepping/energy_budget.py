@@ -14,13 +14,11 @@ from physics.kernels.compile.decorators import inlined, kernel
 from physics.kernels.contact_law.compliance import GAIN_SHARE
 from physics.kernels.half_space import support_function as geo
 from physics.kernels.math import quaternion as qt
+from physics.kernels.multibody.data.arrays import LOADED, VELOCITY
 from physics.kernels.multibody.data.contact_set import matrix, minus, plus, put, vector
 from physics.kernels.state import layout as at
 from physics.kernels.state.body import angular_velocity, read_state
 from physics.kernels.state.layout import HULL, NORMAL, OFFSET
-
-# Columns of `many.momenta` in a resting stage: velocities before it, then momenta with its loads.
-VELOCITY, LOADED = 0, 6
 
 # Share of its energy of turning that a body gains for nothing by being put right, and slops that it is lifted for
 # nothing. What is lifted pays where walls push: bodies push each other apart in pairs, and keep their momentum.

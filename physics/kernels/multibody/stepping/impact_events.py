@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from physics.kernels.compile.decorators import kernel
-from physics.kernels.event_driven import event_log as ev
 from physics.kernels.math import quaternion as qt
 from physics.kernels.multibody.data.contact_set import matrix, plus, vector
 from physics.kernels.state.layout import POS
+from physics.kernels.time_stepping import event_log as ev
 
 
 @kernel

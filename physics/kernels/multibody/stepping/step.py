@@ -10,7 +10,6 @@ for the broad phase, until something wakes it (`sleep`).
 from __future__ import annotations
 
 from physics.kernels.compile.decorators import kernel
-from physics.kernels.event_driven.event_log import drop_events, forget_events
 from physics.kernels.forces.held_loads import bind_fields, set_clock
 from physics.kernels.forces.world_energy_budget import note_reports
 from physics.kernels.multibody.data.contact_set import put
@@ -29,6 +28,7 @@ from physics.kernels.state.body import (
     read_state,
     write_state,
 )
+from physics.kernels.time_stepping.event_log import drop_events, forget_events
 
 
 @kernel

@@ -14,8 +14,8 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 import physics
+from physics.rotations import rotation_matrices
 from physics.scene.canonical_scenes import GRAVITY, MASS, SIZE
-from physics.work_precision.errors import rotation_matrices
 from rigid_env.lab.hard_cases.case import Case, Check, Setting, none_of, within
 from rigid_env.lab.hard_cases.cases.scenery import (
     EPS,

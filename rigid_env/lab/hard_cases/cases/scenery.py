@@ -12,8 +12,9 @@ from collections.abc import Sequence
 import numpy as np
 
 import physics
+from physics.rotations import rotation_matrices
 from physics.scene.canonical_scenes import GRAVITY, MASS, SIZE
-from physics.work_precision.errors import angles_between, mechanical_energy, rotation_matrices
+from physics.work_precision.errors import angles_between, mechanical_energy
 from rigid_env.lab.hard_cases.case import Check, Setting, none_of
 
 EPS = float(np.finfo(float).eps)

@@ -20,7 +20,7 @@ import numpy as np
 from scipy.optimize import brentq
 
 import physics
-from physics.work_precision.errors import rotation_matrices
+from physics.rotations import rotation_matrices
 from rigid_env.lab.measure.machine import version
 from rigid_env.lab.measure.peers.contender import (
     State,

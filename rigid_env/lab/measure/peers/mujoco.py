@@ -13,7 +13,7 @@ from __future__ import annotations
 import numpy as np
 
 import physics
-from physics.work_precision.errors import rotation_matrices
+from physics.rotations import rotation_matrices
 from rigid_env.lab.measure.machine import version
 from rigid_env.lab.measure.peers.contender import State, friction, gravity, restitution, walls
 

@@ -1,0 +1,24 @@
+"""Disjoint sets, joined pair by pair: union-find with path halving.
+
+Reference: R. E. Tarjan, *Efficiency of a good but not linear set union algorithm*, J. ACM 22, 1975.
+"""
+
+from __future__ import annotations
+
+from physics.kernels.compile.decorators import inlined
+
+
+@inlined
+def root_of(b, parent):
+    """First body of the island of b."""
+    while parent[b] != b:
+        parent[b] = parent[parent[b]]
+        b = parent[b]
+    return b
+
+
+@inlined
+def join(a, b, parent):
+    """Make one island of those of a and b."""
+    a, b = root_of(a, parent), root_of(b, parent)
+    parent[max(a, b)] = min(a, b)

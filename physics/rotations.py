@@ -1,0 +1,16 @@
+"""Rotations of many samples at once, in NumPy."""
+
+from __future__ import annotations
+
+import numpy as np
+
+
+def rotation_matrices(quat: np.ndarray) -> np.ndarray:
+    """(..., 3, 3) rotation matrices, body to world, of unit quaternions (..., 4)."""
+    w, x, y, z = np.moveaxis(np.asarray(quat, dtype=float), -1, 0)
+    rows = (
+        (1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)),
+        (2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)),
+        (2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)),
+    )
+    return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
