@@ -8,7 +8,8 @@ import numpy as np
 
 import physics
 from physics.io.recording import Recording, Start
-from physics.world.world import KEPT, Snapshot
+from physics.world.snapshot import KEPT
+from physics.world.world import Snapshot
 from rigid_env.lab.hard_cases.cases.random_scenes import Outcome, gain_limit, look, push
 
 

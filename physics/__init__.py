@@ -28,8 +28,9 @@ from physics.work_precision.result import Frontier, FrontierPoint
 from physics.work_precision.run import frontier, ladder
 from physics.work_precision.truth import Truth
 from physics.world.report import Solver, Status, StepReport
+from physics.world.snapshot import Snapshot
 from physics.world.stepper import Stepper
-from physics.world.world import Snapshot, World
+from physics.world.world import World
 from physics.world.wrench import wrench_at
 
 __version__ = _version()

@@ -14,7 +14,8 @@ from physics.io.recording import Recording, Start, origin
 from physics.keywords import known_keywords
 from physics.summary import shown
 from physics.world.report import Status, gravest
-from physics.world.world import Snapshot, World
+from physics.world.snapshot import Snapshot
+from physics.world.world import World
 
 
 @dataclass

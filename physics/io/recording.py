@@ -27,8 +27,9 @@ from physics.scene.scene import Scene
 from physics.summary import lines_repr
 from physics.version import version
 from physics.world.report import StepReport
+from physics.world.snapshot import KEPT, Snapshot
 from physics.world.stepper import Stepper
-from physics.world.world import KEPT, Snapshot, World
+from physics.world.world import World
 
 # Number of the format; a reader refuses what is newer than itself.
 FORMAT = 1

@@ -19,11 +19,11 @@ import numpy as np
 
 from physics.kernels.forces.actuator_lag import follow, shorten
 from physics.scene.effects import Actuator
+from physics.world.batch import Batch
 from physics.world.report import add_report
 
 if TYPE_CHECKING:
     from physics.parallel.bound_call import Work
-    from physics.world.world import World
 
 # Treads shorter than this share of the step are rounding of the times they lie between.
 NO_TIME = 1e-9
@@ -55,7 +55,7 @@ class Actuation:
     def _nothing(self) -> np.ndarray:
         return np.zeros((self._shape[0] * self._shape[1], 6))
 
-    def advance(self, world: World, calls: list[Work], wrench: np.ndarray, steps: int, dt: float) -> None:
+    def advance(self, world: Batch, calls: list[Work], wrench: np.ndarray, steps: int, dt: float) -> None:
         """`World.advance` through the actuator: one that remembers is asked at each step."""
         if steps == 1 or not self.actuator.remembers:
             self.take(wrench, world.time, dt)

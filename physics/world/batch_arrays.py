@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -23,9 +22,7 @@ from physics.scene.effects import Contact, Friction, Gravity
 from physics.scene.force_field import write_columns
 from physics.scene.scene import Scene
 from physics.world import parameters
-
-if TYPE_CHECKING:
-    from physics.world.world import World
+from physics.world.batch import Batch
 
 
 def make_scratch(scene: Scene, plan: Plan, walls: np.ndarray, accuracy: Accuracy):
@@ -89,7 +86,7 @@ def _memory() -> int:
         return 2**62
 
 
-def fill(world: World) -> None:
+def fill(world: Batch) -> None:
     """Write the scene's bodies and effects into the arrays of every world."""
     scene, plan = world.scene, world.plan
     contact, friction, gravity = (scene.effect(kind) for kind in (Contact, Friction, Gravity))

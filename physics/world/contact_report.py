@@ -2,20 +2,16 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from physics.kernels.half_space.gap_queries import contact_point
 from physics.kernels.multibody.data import arrays as many
 from physics.kernels.state import layout as at
 from physics.kernels.time_stepping.contact_stages import MEMORY_HEAD
-
-if TYPE_CHECKING:
-    from physics.world.world import World
+from physics.world.batch import Batch
 
 
-def contact_ends(world: World, index: int) -> np.ndarray:
+def contact_ends(world: Batch, index: int) -> np.ndarray:
     """Bodies and walls that touch, (n, 2) int64; see `World.contact_ends`."""
     if not world.plan.contact:
         return np.zeros((0, 2), dtype=np.int64)
@@ -25,7 +21,7 @@ def contact_ends(world: World, index: int) -> np.ndarray:
     return np.array(ends, dtype=np.int64).reshape(-1, 2)
 
 
-def contact_forces(world: World, index: int) -> tuple[np.ndarray, np.ndarray]:
+def contact_forces(world: Batch, index: int) -> tuple[np.ndarray, np.ndarray]:
     """Points (n, 3) [m] and forces (n, 3) [N], world frame; see `World.contacts`."""
     if not world.plan.contact:
         return np.zeros((0, 3)), np.zeros((0, 3))
@@ -38,20 +34,20 @@ def contact_forces(world: World, index: int) -> tuple[np.ndarray, np.ndarray]:
     return np.array(points).reshape(-1, 3), np.array(forces).reshape(-1, 3)
 
 
-def _many_rows(world: World, index: int) -> np.ndarray:
+def _many_rows(world: Batch, index: int) -> np.ndarray:
     """Remembered contacts (n, `MEMORY_SIZE`) of one world in which bodies touch each other."""
     row = world.memory[index]
     count = int(row[many.CONTACT_COUNT])
     return row[many.MEMORY_HEAD : many.MEMORY_HEAD + many.MEMORY_SIZE * count].reshape(count, many.MEMORY_SIZE)
 
 
-def _slots(world: World, index: int, body: int) -> list[int]:
+def _slots(world: Batch, index: int, body: int) -> list[int]:
     """Slots (wall * features + feature) at which a body rests."""
     row = world.memory[index * world.body_count + body]
     return row[MEMORY_HEAD : MEMORY_HEAD + int(row[1])].astype(int).tolist()
 
 
-def _wall_contact(world: World, index: int, body: int, slot: int) -> tuple[np.ndarray, np.ndarray]:
+def _wall_contact(world: Batch, index: int, body: int, slot: int) -> tuple[np.ndarray, np.ndarray]:
     """Point [m] and force [N] at one slot, (3,) each."""
     i = index * world.body_count + body
     row, (wall, feature) = world.memory[i], divmod(slot, world.plan.features)

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NoReturn
+from typing import NoReturn
 
 from physics.scene.field_errors import raised
-
-if TYPE_CHECKING:
-    from physics.world.world import World
+from physics.world.batch import Batch
 
 
 class Before:
@@ -17,10 +15,10 @@ class Before:
 
     Parameters
     ----------
-    world : World
+    world : Batch
     """
 
-    def __init__(self, world: World):
+    def __init__(self, world: Batch):
         self._world, self._time = world, world.time
         self._kept = [array.copy() for array in world.kept()]
         self._actuation = None if world.actuation is None else world.actuation.kept()

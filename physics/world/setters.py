@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -16,10 +15,8 @@ from physics.scene.effects import RESISTANCES, Friction
 from physics.scene.force_field import Field, FieldSlot, write_columns
 from physics.summary import shown
 from physics.world import parameters
+from physics.world.batch import Batch
 from physics.world.wall_distance import geometric_centres, wall_gaps
-
-if TYPE_CHECKING:
-    from physics.world.world import World
 
 # A body may be put this deep into a wall, in bounding radii: what a rounded or hand-typed pose may be off by.
 START_DEPTH = 1e-2
@@ -34,7 +31,7 @@ SAME_PLACE = 1e-12
 SKEW = np.array([0.5257311121191336, 0.3090169943749474, 0.7925309171246312])
 
 
-def set_state(world: World, pos, quat, linvel, angvel, worlds) -> None:
+def set_state(world: Batch, pos, quat, linvel, angvel, worlds) -> None:
     """`World.set_state`, which documents it."""
     chosen = _chosen(world, worlds)
     rows = _rows(world, chosen)
@@ -53,7 +50,7 @@ def set_state(world: World, pos, quat, linvel, angvel, worlds) -> None:
         world.actuation.forget(chosen)
 
 
-def set_parameters(world: World, mass, size, inertia_body, friction, restitution, gravity, effects, worlds) -> None:
+def set_parameters(world: Batch, mass, size, inertia_body, friction, restitution, gravity, effects, worlds) -> None:
     """`World.set_parameters`, which documents it."""
     chosen = _chosen(world, worlds)
     rows = _rows(world, chosen)
@@ -92,7 +89,7 @@ def set_parameters(world: World, mass, size, inertia_body, friction, restitution
         world.gravity[chosen] = field
 
 
-def check_place(world: World, state: np.ndarray, params: np.ndarray, chosen: np.ndarray, what: str) -> None:
+def check_place(world: Batch, state: np.ndarray, params: np.ndarray, chosen: np.ndarray, what: str) -> None:
     """Refuse what no step could start from: bodies deep in a wall, or in the same place.
 
     Parameters and errors are those of `check_depth`.
@@ -102,7 +99,7 @@ def check_place(world: World, state: np.ndarray, params: np.ndarray, chosen: np.
         _check_centres(world, state, params, chosen, what)
 
 
-def _check_centres(world: World, state: np.ndarray, params: np.ndarray, chosen: np.ndarray, what: str) -> None:
+def _check_centres(world: Batch, state: np.ndarray, params: np.ndarray, chosen: np.ndarray, what: str) -> None:
     """Refuse two bodies that touch each other with their centres in the same place: no way apart is nearer than others.
 
     Bodies in the same place are neighbours in the order along any direction, and in that along one that no scene is
@@ -128,12 +125,12 @@ def _check_centres(world: World, state: np.ndarray, params: np.ndarray, chosen: 
         )
 
 
-def check_depth(world: World, state: np.ndarray, params: np.ndarray, chosen: np.ndarray, what: str) -> None:
+def check_depth(world: Batch, state: np.ndarray, params: np.ndarray, chosen: np.ndarray, what: str) -> None:
     """Refuse bodies that are deep inside a wall.
 
     Parameters
     ----------
-    world : World
+    world : Batch
     state, params : (k * bodies, STATE_SIZE | PARAM_SIZE) float64
         Rows to look at.
     chosen : (k,) int64
@@ -160,7 +157,7 @@ def check_depth(world: World, state: np.ndarray, params: np.ndarray, chosen: np.
         )
 
 
-def _adopt(world: World, chosen, rows, state, params, what, keep_memory=False) -> None:
+def _adopt(world: Batch, chosen, rows, state, params, what, keep_memory=False) -> None:
     """Check new rows of state and parameters, then write them."""
     check_place(world, state, params, chosen, what)
     angular_momenta(np.arange(len(rows)), state, params)
@@ -186,7 +183,7 @@ def _check_axis(friction: Friction, declared: Friction) -> None:
         )
 
 
-def _changed_slots(world: World, effects) -> list[FieldSlot]:
+def _changed_slots(world: Batch, effects) -> list[FieldSlot]:
     """The scene's kinds of field that `effects` are of, with these in place of the scene's."""
     kinds: dict[type, list[Field]] = {}
     for effect in effects:
@@ -213,7 +210,7 @@ def _changed_slots(world: World, effects) -> list[FieldSlot]:
     return [slots[kind] for kind in kinds]
 
 
-def _chosen(world: World, worlds) -> np.ndarray:
+def _chosen(world: Batch, worlds) -> np.ndarray:
     """Indices (k,) int64 of the worlds meant by what a user gives."""
     if worlds is None:
         return np.arange(world.worlds)
@@ -232,11 +229,11 @@ def _chosen(world: World, worlds) -> np.ndarray:
     return chosen.astype(np.int64)
 
 
-def _no_worlds(world: World, worlds) -> ValueError:
+def _no_worlds(world: Batch, worlds) -> ValueError:
     allowed = f"a list of indices from 0 to {world.worlds - 1}, or a mask of {world.worlds} bools"
     return ValueError(f"worlds is {shown(worlds)}; allowed is {allowed}")
 
 
-def _rows(world: World, chosen: np.ndarray) -> np.ndarray:
+def _rows(world: Batch, chosen: np.ndarray) -> np.ndarray:
     """Rows (k * bodies,) of these worlds in the arrays of bodies."""
     return (chosen[:, None] * world.body_count + np.arange(world.body_count)).ravel()

@@ -1,4 +1,4 @@
-"""What a world tells of its steps, and to whom: an interface, so that a world knows no recorder."""
+"""Interface of those whom a world tells of its steps, so that a world knows no recorder."""
 
 from __future__ import annotations
 

@@ -17,13 +17,13 @@ from physics.keywords import known_keywords
 from physics.parallel.bound_call import Work, compiled
 from physics.parallel.exclusive import in_use
 from physics.summary import shown
+from physics.world.batch import Batch
 
 # Which arguments of all step kernels the number of steps is, and the length of a substep.
 STEPS, SUBSTEP = 2, 4
 
 if TYPE_CHECKING:
     from physics.plan.plan import Plan
-    from physics.world.world import World
 
 
 @known_keywords
@@ -35,7 +35,7 @@ class Stepper:
 
     Parameters
     ----------
-    world : World
+    world : Batch
     steps : int
         Steps that one call takes.
     dt : float, optional
@@ -53,7 +53,7 @@ class Stepper:
 
     def __init__(
         self,
-        world: World,
+        world: Batch,
         steps: int = 1,
         dt: float | None = None,
         then: Callable[[np.ndarray], Work] | None = None,
@@ -135,12 +135,12 @@ class Stepper:
         return {**vars(self), **machine_code}
 
 
-def _takes_each_step(world: World) -> bool:
+def _takes_each_step(world: Batch) -> bool:
     """A call of several steps is made step by step, since the actuator is asked at each."""
     return world.actuation is not None and world.actuation.actuator.remembers
 
 
-def _is_all(world: World, calls: list[Work]) -> bool:
+def _is_all(world: Batch, calls: list[Work]) -> bool:
     """Test whether a step is this call: there is one thread, no actuator, and no field that is told the time.
 
     What `World.advance` does besides; a recorder, which comes and goes, is looked up in each call.
@@ -148,12 +148,12 @@ def _is_all(world: World, calls: list[Work]) -> bool:
     return len(calls) == 1 and world.actuation is None and not world.plan.fields
 
 
-def kernel_calls(world: World, wrench: np.ndarray, steps: int, dt: float) -> list[Work]:
+def kernel_calls(world: Batch, wrench: np.ndarray, steps: int, dt: float) -> list[Work]:
     """One call of the step kernel for each thread, all arguments bound.
 
     Parameters
     ----------
-    world : World
+    world : Batch
         Its arrays are bound, not the world itself: it may keep the calls, and is freed with its last user.
     wrench : (worlds, bodies, 6) float64, contiguous and writable
         What it holds when a call is made counts; of a scene with an actuator what that makes of it.
@@ -178,7 +178,7 @@ def kernel_calls(world: World, wrench: np.ndarray, steps: int, dt: float) -> lis
     return [Work([(entry, arguments)]) for arguments in argument_lists]
 
 
-def retime(world: World, calls: list[Work], steps: int, dt: float) -> None:
+def retime(world: Batch, calls: list[Work], steps: int, dt: float) -> None:
     """Let `kernel_calls` of a world take so many steps of another `dt` [s]: faster than to prepare others."""
     steps, _, h = _times(world, steps, dt)
     for call in calls:
@@ -186,13 +186,13 @@ def retime(world: World, calls: list[Work], steps: int, dt: float) -> None:
         call.put(SUBSTEP, h)
 
 
-def _times(world: World, steps: int, dt: float) -> tuple[int, int, float]:
+def _times(world: Batch, steps: int, dt: float) -> tuple[int, int, float]:
     """Steps, substeps and the length of one [s] that a kernel is called for."""
     substeps = world.accuracy.substeps
     return 1 if _takes_each_step(world) else steps, substeps, dt / substeps
 
 
-def _step_of(plan: Plan) -> tuple[Callable, Callable[[World, int], tuple]]:
+def _step_of(plan: Plan) -> tuple[Callable, Callable[[Batch, int], tuple]]:
     """The step kernel of a plan, and what gives the arguments that it alone has for one thread."""
     if plan.many:
         return step_many, _many_arguments
@@ -203,20 +203,20 @@ def _step_of(plan: Plan) -> tuple[Callable, Callable[[World, int], tuple]]:
     return step_worlds, _world_arguments
 
 
-def _many_arguments(world: World, k: int) -> tuple:
+def _many_arguments(world: Batch, k: int) -> tuple:
     plan = world.plan
     switches = (plan.friction, plan.restitution, plan.gyroscopic, plan.tilted, plan.ellipsoids, plan.hulls, plan.scheme)
     kept = (world.motions[k], world.sleep_of_kernel(), world.memory, world.report_table)
     return *switches, *kept, world.scratch[k], *_log(world)
 
 
-def _linked_arguments(world: World, k: int) -> tuple:
+def _linked_arguments(world: Batch, k: int) -> tuple:
     plan = world.plan
     held = None if plan.events else True
     return plan.gyroscopic, plan.tilted, plan.scheme, held, plan.events, world.report_table, world.scratch[k]
 
 
-def _log(world: World) -> tuple[np.ndarray, np.ndarray]:
+def _log(world: Batch) -> tuple[np.ndarray, np.ndarray]:
     return world.event_log, world.event_counts
 
 
@@ -224,13 +224,13 @@ def _wall_switches(plan: Plan) -> tuple:
     return plan.contact, plan.friction, plan.smooth, plan.restitution, plan.gyroscopic, plan.tilted, plan.pivots
 
 
-def _event_arguments(world: World, k: int) -> tuple:
+def _event_arguments(world: Batch, k: int) -> tuple:
     return (
         *_wall_switches(world.plan), world.memory, world.report_table, world.scratch[k], world.motions[k], *_log(world),
     )  # fmt: skip
 
 
-def _world_arguments(world: World, k: int) -> tuple:
+def _world_arguments(world: Batch, k: int) -> tuple:
     switches = (*_wall_switches(world.plan), world.plan.scheme)
     return *switches, world.sleep_of_kernel(), world.memory, world.report_table, world.scratch[k], *_log(world)
 

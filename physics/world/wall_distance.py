@@ -2,19 +2,15 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from physics.kernels.half_space.gap_queries import deepest_gaps
 from physics.kernels.state import layout as at
 from physics.rotations import rotation_matrices
-
-if TYPE_CHECKING:
-    from physics.world.world import World
+from physics.world.batch import Batch
 
 
-def geometric_centres(world: World, state: np.ndarray, params: np.ndarray) -> np.ndarray:
+def geometric_centres(world: Batch, state: np.ndarray, params: np.ndarray) -> np.ndarray:
     """Centres of the bodies' shapes, (k * bodies, 3) float64, world frame [m]; arguments as of `wall_gaps`."""
     centres = state[:, at.POS : at.POS + 3]
     if world.plan.tilted:
@@ -23,12 +19,12 @@ def geometric_centres(world: World, state: np.ndarray, params: np.ndarray) -> np
     return centres
 
 
-def wall_gaps(world: World, state: np.ndarray, params: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def wall_gaps(world: Batch, state: np.ndarray, params: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Smallest gap of every body over all walls.
 
     Parameters
     ----------
-    world : World
+    world : Batch
         Its scene says what the rows are of.
     state, params : (k * bodies, STATE_SIZE | PARAM_SIZE) float64
 

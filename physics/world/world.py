@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from threading import get_ident
 
 import numpy as np
@@ -12,46 +11,29 @@ from numpy.typing import ArrayLike
 from physics import validation
 from physics.kernels.forces.force_field_dispatch import declare
 from physics.kernels.state import layout as at
-from physics.kernels.state.sleeping import GROUP, SLEEP_SIZE, Sleep
+from physics.kernels.state.sleeping import GROUP, SLEEP_SIZE
 from physics.kernels.time_stepping.event_log import EVENT_SIZE
-from physics.kernels.time_stepping.workspace import body_records
 from physics.keywords import known_keywords
 from physics.parallel.bound_call import Work
 from physics.parallel.exclusive import exclusive, in_use, watch
 from physics.parallel.thread_team import Team
 from physics.plan.accuracy import Accuracy, resolve
 from physics.plan.plan import SHAPE_CODES, make_plan
-from physics.scene.effects import Actuator, Friction, RollingFriction, Sleeping, SpinFriction
+from physics.scene.effects import Actuator, Friction, RollingFriction, SpinFriction
 from physics.scene.force_field import Field
 from physics.scene.scene import Scene
-from physics.summary import lines_repr
 from physics.world import batch_arrays, parameters, setters
 from physics.world.actuator import Actuation
+from physics.world.batch import Batch
 from physics.world.contact_report import contact_ends, contact_forces
 from physics.world.report import StepReport
 from physics.world.rollback import Before
-from physics.world.step_listener import StepListener
+from physics.world.snapshot import Snapshot
 from physics.world.stepper import kernel_calls, retime
-
-# Arrays that decide how a `World` goes on, in the order of `Snapshot.arrays`; the last one where bodies may sleep.
-KEPT = ("state", "params", "gravity", "memory", "report_table", "sleep")
-
-
-@dataclass(frozen=True)
-class Snapshot:
-    """Everything that decides how a `World` goes on: states, warm starts, parameters, time, the actuator's memory."""
-
-    arrays: tuple[np.ndarray, ...]
-    time: float
-    actuation: tuple | None = None
-
-    def __repr__(self) -> str:
-        shapes = (f"{name} {array.shape}" for name, array in zip(KEPT, self.arrays))
-        return lines_repr("Snapshot", f"time={self.time:.6g} s", *shapes)
 
 
 @known_keywords
-class World:
+class World(Batch):
     """Many worlds of one scene, stepped together and independent of each other.
 
     The same world gives the same bits whatever the batch size, its place in the batch and the number of threads.
@@ -73,17 +55,10 @@ class World:
     ----------
     pos, quat, linvel, angvel : (worlds, bodies, 3|4|3|3) float64
         Read-only views in the world frame, refreshed in place by every step; copy them to keep them.
-    state : (worlds * bodies, STATE_SIZE) float64
-        The array behind them, for kernels that read it; columns in `physics.kernels.state.layout`.
-    report_table : (worlds, REPORT_SIZE) float64
-        The array behind `report`, likewise.
     time : float
         Time since the start [s].
-    recorder : StepListener or None
-        What is told of every step; see `physics.Recorder`.
-    is_free : bool
-        Whether no thread is in a method that changes or copies the world. Such a method raises RuntimeError while
-        another thread is in one: a world belongs to one thread at a time.
+
+    What else it holds stands in `physics.world.batch.Batch`.
 
     Raises
     ------
@@ -110,7 +85,7 @@ class World:
         self.plan = make_plan(scene, self.accuracy)
         self.body_count = len(scene.bodies)
         self.time = 0.0
-        self.recorder: StepListener | None = None
+        self.recorder = None
         batch_arrays.check_room(self.worlds, self.body_count, self.plan)
         self.is_free = True
         self._allocate()
@@ -140,7 +115,7 @@ class World:
 
     def _prepare_threads(self) -> None:
         self.is_free, self.is_torn = True, False
-        self.telling: int | None = None  # the thread that tells the recorder of its step
+        self.telling = None  # the thread that tells the recorder of its step
         watch(self)
         self.team = Team(self.threads, self.worlds)
         declare(self.plan.terms)
@@ -254,18 +229,6 @@ class World:
         finally:
             self.telling = None
 
-    def make(self, calls: list[Work], duration: float) -> None:
-        """Make kernel calls that take so long [s]."""
-        if self.plan.fields:
-            for scratch in self.scratch:
-                body_records(scratch)["call_start"] = self.time
-        self.team.run(calls)
-        self.time += duration
-
-    def no_wrench(self) -> np.ndarray:
-        """(worlds, bodies, 6) float64 zeros: an array for wrenches."""
-        return np.zeros((self.worlds, self.body_count, 6))
-
     @property
     def report(self) -> StepReport:
         """Report of the last step, whoever took it."""
@@ -349,10 +312,6 @@ class World:
 
     # --- keeping and looking -----------------------------------------------------------------------------------
 
-    def kept(self) -> tuple[np.ndarray, ...]:
-        """The arrays themselves that a snapshot copies, in the order of `KEPT`."""
-        return tuple(getattr(self, name) for name in (KEPT if self.plan.sleeping else KEPT[:-1]))
-
     @exclusive
     def snapshot(self) -> Snapshot:
         """All that decides the future, copied; `restore` continues bit-identically, warm starts and all."""
@@ -421,13 +380,6 @@ class World:
         if not self.plan.sleeping:
             return np.zeros((self.worlds, self.body_count), dtype=np.bool_)
         return self.sleep[:, GROUP].reshape(self.worlds, self.body_count) > 0.0
-
-    def sleep_of_kernel(self) -> Sleep | None:
-        """Sleep record for the step; None where no body may sleep."""
-        if not self.plan.sleeping:
-            return None
-        effect = self.scene.effect(Sleeping)
-        return Sleep(self.sleep, effect.slops * self.accuracy.slop, effect.time or 0.0)
 
     def _check_index(self, world: int) -> None:
         validation.index(world, self.worlds, "world")

@@ -1,0 +1,137 @@
+"""The arrays of a batch of worlds: what the parts of a `World` share, and nothing that they do with it."""
+
+from __future__ import annotations
+
+from typing import Any, Protocol
+
+import numpy as np
+
+from physics.kernels.state.sleeping import Sleep
+from physics.kernels.time_stepping.workspace import body_records
+from physics.parallel.bound_call import Work
+from physics.parallel.thread_team import Team
+from physics.plan.accuracy import Accuracy
+from physics.plan.plan import Plan
+from physics.scene.effects import Actuator, Sleeping
+from physics.scene.scene import Scene
+from physics.world.snapshot import KEPT
+from physics.world.step_listener import StepListener
+
+
+class ActuatorState(Protocol):
+    """The actuators of a batch between two steps; see `physics.world.actuator`."""
+
+    actuator: Actuator
+    applied: np.ndarray
+
+    def kept(self) -> Any:
+        """All that decides what acts from now on."""
+
+    def put_back(self, kept: Any) -> None:
+        """As it was when `kept` was taken."""
+
+    def forget(self, worlds: np.ndarray) -> None:
+        """Forget all commands that these worlds were given."""
+
+
+class Batch:
+    """Many worlds of one scene as arrays.
+
+    Attributes
+    ----------
+    scene, accuracy, plan : Scene, Accuracy, Plan
+        What is simulated, and how.
+    worlds, body_count, threads : int
+        Size of the batch, bodies of a world, threads that share a step.
+    dt, time : float
+        Step, and time since the start [s].
+    pos, quat, linvel, angvel : (worlds, bodies, 3|4|3|3) float64
+        Read-only views in the world frame, refreshed in place by every step; copy them to keep them.
+    state : (worlds * bodies, STATE_SIZE) float64
+        The array behind them, for kernels that read it; columns in `physics.kernels.state.layout`.
+    params : (worlds * bodies, PARAM_SIZE + columns of fields and laws) float64
+        Physical parameters; columns likewise.
+    gravity : (worlds, 3) float64
+        [m/s²].
+    walls : (walls, WALL_SIZE) float64
+        Normal, tangents and offset of each wall.
+    shapes : (bodies,) int64
+        Codes of the bodies' shapes.
+    memory : (worlds * bodies or worlds, columns) float64
+        Contacts and impulses of the last resting stage: the next one's warm start.
+    sleep : (worlds * bodies or 0, SLEEP_SIZE) float64
+        What is known of bodies that may sleep.
+    report_table : (worlds, REPORT_SIZE) float64
+        The array behind `World.report`.
+    event_log, event_counts : (worlds * bodies, room, EVENT_SIZE) float64, (worlds * bodies,) int64
+        Events of the last call; see `World.make_event_room`.
+    actuation : ActuatorState or None
+        State of the actuators.
+    team : Team
+        The threads.
+    scratch, motions : list
+        Working memory of each thread: of a step, and of the event-driven scheme or of error control.
+    recorder : StepListener or None
+        What is told of every step; see `physics.Recorder`.
+    telling : int or None
+        The thread that tells the recorder of its step.
+    is_free : bool
+        Whether no thread is in a method that changes or copies the world. Such a method raises RuntimeError while
+        another thread is in one: a world belongs to one thread at a time.
+    is_torn : bool
+        Whether another thread was in one when this process was forked.
+    """
+
+    scene: Scene
+    accuracy: Accuracy
+    plan: Plan
+    worlds: int
+    body_count: int
+    threads: int
+    dt: float
+    time: float
+    pos: np.ndarray
+    quat: np.ndarray
+    linvel: np.ndarray
+    angvel: np.ndarray
+    state: np.ndarray
+    params: np.ndarray
+    gravity: np.ndarray
+    walls: np.ndarray
+    shapes: np.ndarray
+    memory: np.ndarray
+    sleep: np.ndarray
+    report_table: np.ndarray
+    event_log: np.ndarray
+    event_counts: np.ndarray
+    actuation: ActuatorState | None
+    team: Team
+    scratch: list
+    motions: list
+    recorder: StepListener | None
+    telling: int | None
+    is_free: bool
+    is_torn: bool
+
+    def make(self, calls: list[Work], duration: float) -> None:
+        """Make kernel calls that take so long [s]."""
+        if self.plan.fields:
+            for scratch in self.scratch:
+                body_records(scratch)["call_start"] = self.time
+        self.team.run(calls)
+        self.time += duration
+
+    def no_wrench(self) -> np.ndarray:
+        """(worlds, bodies, 6) float64 zeros: an array for wrenches."""
+        return np.zeros((self.worlds, self.body_count, 6))
+
+    def kept(self) -> tuple[np.ndarray, ...]:
+        """The arrays themselves that a snapshot copies, in the order of `KEPT`."""
+        return tuple(getattr(self, name) for name in (KEPT if self.plan.sleeping else KEPT[:-1]))
+
+    def sleep_of_kernel(self) -> Sleep | None:
+        """Sleep record for the step; None where no body may sleep."""
+        if not self.plan.sleeping:
+            return None
+        effect = self.scene.effect(Sleeping)
+        return Sleep(self.sleep, effect.slops * self.accuracy.slop, effect.time or 0.0)
