@@ -27,7 +27,7 @@ def test_a_commit_has_the_bits_of_itself(tmp_path):
 
 def test_another_density_of_the_air_is_another_result(tmp_path):
     shutil.copytree(ROOT / "physics", tmp_path / "physics", ignore=shutil.ignore_patterns("__pycache__"))
-    fields = tmp_path / "physics" / "fields.py"
+    fields = tmp_path / "physics" / "scene" / "force_fields.py"
     text = fields.read_text()
     assert "AIR_DENSITY = 1.225" in text
     fields.write_text(text.replace("AIR_DENSITY = 1.225", "AIR_DENSITY = 1.2250001"))

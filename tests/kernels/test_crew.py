@@ -33,7 +33,7 @@ class Moment(NamedTuple):
     run: int = 0
     leader: str = "begin"
     is_interrupted: bool = False
-    thread_team: tuple[str, ...] = ()
+    threads: tuple[str, ...] = ()
 
 
 def of_leader(m: Moment) -> list[Moment]:
