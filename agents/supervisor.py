@@ -93,7 +93,7 @@ class Supervisor(BaseCallback):
         self._last_point = self.history.seconds
 
     def _is_confirmed(self) -> bool:
-        """Test whether the target is reached, by the last episodes and then by an evaluation."""
+        """True if the target is reached, by the last episodes and then by an evaluation."""
         history = self.history
         if len(history.window) < WINDOW or history.episodes < history.next_confirmation:
             return False

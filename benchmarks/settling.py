@@ -123,7 +123,7 @@ class Watch:
         self.steps += steps
 
     def lies(self, parts: int) -> bool:
-        """Test whether nothing was fast at the end of any of the last parts."""
+        """True if nothing was fast at the end of any of the last parts."""
         return len(self.speeds) >= parts and max(self.speeds[-parts:]) <= LIES
 
     def sample(self, bodies: int, seconds: float) -> Sample:

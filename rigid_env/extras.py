@@ -56,7 +56,7 @@ def require(extra: str, *modules: str, purpose: str = "this command") -> None:
 
 
 def is_installed(module: str) -> bool:
-    """Test whether a top-level module can be found; it is not imported."""
+    """True if a top-level module can be found; it is not imported."""
     try:
         return find_spec(module) is not None
     except ImportError:

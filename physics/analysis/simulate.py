@@ -129,7 +129,7 @@ class Trajectory:
 
     @property
     def ok(self) -> bool:
-        """Test whether every interval's report was."""
+        """True if every interval's report was."""
         return all(report.ok for report in self.reports)
 
     def to_npz(self, path: str | Path) -> None:

@@ -207,7 +207,7 @@ def _contact_effects(elements: list[ET.Element], planes: list[ET.Element]) -> li
 
 
 def _pair(a: ET.Element, b: ET.Element) -> tuple[bool, float]:
-    """Test whether two geoms touch, and with what friction."""
+    """(whether two geoms touch each other, their friction)."""
     (own, mine), (other, its) = ((_integer(g, "contype", 1), _integer(g, "conaffinity", 1)) for g in (a, b))
     if not (own & its or other & mine):
         return False, 0.0

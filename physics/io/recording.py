@@ -215,7 +215,7 @@ class Replay:
 
     @property
     def is_identical(self) -> bool:
-        """Test whether every state came out the same, bit for bit."""
+        """True if every state came out the same, bit for bit."""
         return self.first_difference is None
 
     @property

@@ -91,7 +91,7 @@ class Plan:
 
     @property
     def may_raise(self) -> bool:
-        """Test whether a step may end in an exception: that of a user's field."""
+        """True if a step may end in an exception: that of a user's field."""
         return any(slot.may_raise for slot in self.fields)
 
     @property
@@ -100,7 +100,7 @@ class Plan:
         return sum(term.count * term.size for term in self.terms)
 
     def allows(self, moments: np.ndarray, R: np.ndarray) -> np.ndarray:
-        """Test whether the kernel of this plan can turn bodies with these `physics.mass.inertia.principal_axes`.
+        """True if the kernel of this plan can turn bodies with these `physics.mass.inertia.principal_axes`.
 
         Parameters
         ----------
@@ -129,12 +129,12 @@ class Plan:
 
 
 def is_isotropic(moments: np.ndarray) -> np.ndarray:
-    """Test whether all `moments` (..., 3) are equal to rounding: then ω stays constant in free flight."""
+    """True if all `moments` (..., 3) are equal to rounding: then ω stays constant in free flight."""
     return np.ptp(moments, axis=-1) <= ISOTROPY_TOLERANCE * np.max(moments, axis=-1)
 
 
 def is_tilted(R: np.ndarray) -> np.ndarray:
-    """Test whether the principal axes `R` (..., 3, 3) are not the body axes."""
+    """True if the principal axes `R` (..., 3, 3) are not the body axes."""
     return (R - np.eye(3)).any(axis=(-2, -1))
 
 

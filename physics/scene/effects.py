@@ -226,7 +226,7 @@ class Actuator:
 
     @property
     def remembers(self) -> bool:
-        """Test whether what it gives depends on earlier commands."""
+        """True if what it gives depends on earlier commands."""
         return self.lag > 0.0 or self.delay > 0.0
 
 

@@ -176,7 +176,7 @@ def _also_called(own: set[str], assigned: list[ir.Assign]) -> set[str]:
 
 
 def _asks_for_size(value, own: set[str]) -> bool:
-    """Test whether this may be p's length: an index that is written down may stand behind a question."""
+    """True if this may be p's length: an index that is written down may stand behind a question."""
     if not isinstance(value, ir.Expr):
         return False
     if value.op == "getattr":

@@ -99,12 +99,12 @@ class Field:
 
     @property
     def takes_energy(self) -> bool | None:
-        """Test whether it only ever takes mechanical energy (True), keeps it, its own included (False), or neither."""
+        """True if it only ever takes mechanical energy (True), keeps it, its own included (False), or neither."""
         return None
 
     @property
     def is_steady(self) -> bool:
-        """Test whether what it does to a body that does not move stays the same; not known of fields of your own.
+        """True if what it does to a body that does not move stays the same; not known of fields of your own.
 
         `Sleeping` needs to know: under a load that may change on its own nothing sleeps.
         """

@@ -65,7 +65,7 @@ def mechanical_energy(scene: Scene, pos, quat, linvel, angvel) -> np.ndarray:
 
 
 def conserves_energy(scene: Scene) -> bool:
-    """Test whether nothing in the scene takes energy: no contact, or elastic contact without friction; no drag."""
+    """True if nothing in the scene takes energy: no contact, or elastic contact without friction; no drag."""
     if any(law is not False for law in _field_laws(scene)):
         return False
     contact, friction = scene.effect(Contact), scene.effect(Friction)

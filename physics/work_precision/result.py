@@ -99,7 +99,7 @@ class Frontier:
         return float(self.floors.get(self._measure(measure), 0.0))
 
     def is_at_floor(self, point: FrontierPoint, measure: str | None = None) -> bool:
-        """Test whether a point is as good as the truth itself is known; it may be better than it looks."""
+        """True if a point is as good as the truth itself is known; it may be better than it looks."""
         return self.error(point, measure) <= self.own_error(measure)
 
     def of(self, setting: object = None, engine: str | None = None) -> tuple[FrontierPoint, ...]:

@@ -141,7 +141,7 @@ def _takes_each_step(world: Batch) -> bool:
 
 
 def _is_all(world: Batch, calls: list[Work]) -> bool:
-    """Test whether a step is this call: there is one thread, no actuator, and no field that is told the time.
+    """True if a step is this call: there is one thread, no actuator, and no field that is told the time.
 
     What `World.advance` does besides; a recorder, which comes and goes, is looked up in each call.
     """

@@ -60,7 +60,7 @@ class Canvas:
                 self._strokes(pair[:1], pair[1:], width, colour)
 
     def is_in_sight(self, pixels, depths):
-        """Test whether projected points can be drawn as they are: in front of the camera and not far off."""
+        """True if projected points can be drawn as they are: in front of the camera and not far off."""
         if not np.all(depths > NEAR):
             return False
         return bool(np.all(np.abs(pixels - 0.5 * np.array(self.size)) < self.size))

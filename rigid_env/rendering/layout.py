@@ -99,12 +99,12 @@ class Room:
 
 
 def is_floor(wall):
-    """Test whether a `WallView` looks upwards."""
+    """True if a `WallView` looks upwards."""
     return wall.normal[1] > FLOOR_SLOPE
 
 
 def faces_point(wall, point):
-    """Test whether a point (3,) [m] is on the free side of a `WallView`."""
+    """True if a point (3,) [m] is on the free side of a `WallView`."""
     return wall.normal @ np.asarray(point) > wall.offset
 
 

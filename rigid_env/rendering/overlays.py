@@ -116,7 +116,7 @@ def draw_far_outlines(canvas, room):
 
 
 def hidden_points(points, bodies, eye):
-    """Test whether a body is between points and eye.
+    """True if a body is between points and eye.
 
     A point eye + s (point - eye) is inside a convex polyhedron if n·x ≤ n·vertex for all its faces; each face
     bounds s on one side. The point is hidden if the bounds leave room before s = 1.

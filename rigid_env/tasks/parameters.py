@@ -48,7 +48,7 @@ class Range:
 
     @property
     def is_fixed(self) -> bool:
-        """Test whether there is nothing to draw."""
+        """True if there is nothing to draw."""
         return bool((self.low == self.high).all())
 
     @property

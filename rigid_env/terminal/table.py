@@ -43,7 +43,7 @@ class Column:
 
     @property
     def may_break(self) -> bool:
-        """Test whether its text may go on in the next line."""
+        """True if its text may go on in the next line."""
         return not (self.is_number or self.is_whole)
 
 

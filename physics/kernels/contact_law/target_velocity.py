@@ -26,7 +26,7 @@ NOTHING, RESIDUE, HIT = range(3)
 
 @inlined
 def may_hit(bounce_speed, slop_speed, work):
-    """Test whether a contact of the set is fast enough for an impact: where none is, none is looked at."""
+    """True if a contact of the set is fast enough for an impact: where none is, none is looked at."""
     return work.approach > (min(bounce_speed, slop_speed) if work.restitution > 0.0 else slop_speed)
 
 
@@ -64,7 +64,7 @@ def aim_impact(n, bounce_speed, slop_speed, y, h, tilted, memory, work):
 
 @inlined
 def is_closing(i, n, work):
-    """Test whether a contact of the wall of contact i is still above it."""
+    """True if a contact of the wall of contact i is still above it."""
     if not work.widest > work.slop:
         return False
     wall = wall_of(work.slot[i], work)

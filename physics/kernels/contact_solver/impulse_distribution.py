@@ -49,7 +49,7 @@ def first_active(n, work):
 
 @inlined
 def is_in_cone(pn, pa, pb, work):
-    """Test whether an impulse (normal, tangents) is in the cone of friction."""
+    """True if an impulse (normal, tangents) is in the cone of friction."""
     limit, b = work.mu * pn, pb / friction_ratio(work)
     return pa * pa + b * b <= limit * limit
 

@@ -104,7 +104,7 @@ def inverse_root(square):
 
 @inlined
 def is_warm(push, needed):
-    """Test whether a warm start's push is so near to the push that the present loads need that its friction is, too."""
+    """True if a warm start's push is so near to the push that the present loads need that its friction is, too."""
     return abs(push - needed) <= WARM_SHARE * abs(needed)
 
 

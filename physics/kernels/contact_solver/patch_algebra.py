@@ -83,7 +83,7 @@ def _spread(n, a, b, on):
 
 @inlined
 def may_hold(n, axes, v, L, work):
-    """Test whether friction may stop a face, with the velocity v and angular momentum L that it has without it.
+    """True if friction may stop a face, with the velocity v and angular momentum L that it has without it.
 
     What holds stops at its wall: the pushes P take away the normal momentum, and friction, μP at most, the tangential
     one; its moment about the centroid is μ Σ p_i |d_i| <= μP max |d_i| at most. Of a face that can hold this is true;
@@ -287,7 +287,7 @@ def is_turned(on, d, size, change):
 
 @inlined
 def turns_little(patch, on, slip, mu, step):
-    """Test whether no direction turns by more than about 70 degrees, and none backwards, in a step of the motion."""
+    """True if no direction turns by more than about 70 degrees, and none backwards, in a step of the motion."""
     (_, a, b), _, _ = patch
     x, y, size = slip
     s = -1.0 / mu

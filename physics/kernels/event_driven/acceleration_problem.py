@@ -78,13 +78,13 @@ def pose_resting(count, y, R, w, has_sliding, tilted, work, motion):
 
 @inlined
 def is_way(way, i):
-    """Test whether a contact has a direction of sliding."""
+    """True if a contact has a direction of sliding."""
     return way[i, 0] != 0.0 or way[i, 1] != 0.0 or way[i, 2] != 0.0
 
 
 @inlined
 def is_idle(i, count, width, small, work):
-    """Test whether contact i without a force may be left to the others of its wall: at least three push."""
+    """True if contact i without a force may be left to the others of its wall: at least three push."""
     wall, pushing = wall_of(work.slot[i], work), 0
     for j in range(count):
         if wall_of(work.slot[j], work) == wall and work.impulse[width * j] > small * work.mass:
@@ -103,7 +103,7 @@ def take_forces(count, width, work, motion):
 
 @kernel
 def is_still(y, w, acceleration, work, motion):
-    """Test whether the body neither moves nor begins to: what is left is rounding."""
+    """True if the body neither moves nor begins to: what is left is rounding."""
     v = y[2]
     speed = math.sqrt(qt.dot(v, v)) + work.radius * math.sqrt(qt.dot(w, w))
     return speed <= 2.0 * motion.still and acceleration <= 4.0 * SMALL * work.acceleration

@@ -65,7 +65,7 @@ def act(count, work, motion):
 
 @inlined
 def has_open(motion):
-    """Test whether a candidate does not act."""
+    """True if a candidate does not act."""
     for i in range(motion.candidates):
         if motion.kind[i] == OPEN:
             return True
@@ -74,7 +74,7 @@ def has_open(motion):
 
 @inlined
 def has_speed(motion):
-    """Test whether an acting candidate moves along its normal, or another one approaches, by more than rounding."""
+    """True if an acting candidate moves along its normal, or another one approaches, by more than rounding."""
     for i in range(motion.candidates):
         rate = motion.gap_rate[START, motion.candidate[i]]
         if rate < -motion.noise or (rate > motion.noise and motion.kind[i] != OPEN):
@@ -119,7 +119,7 @@ def contact_acceleration(i, y, R, w, a, alpha, tilted, work, motion):
 
 @kernel
 def sliding_now(i, y, R, w, tilted, work, motion):
-    """Test whether candidate i slides; its direction into `candidate_way`."""
+    """True if candidate i slides; its direction into `candidate_way`."""
     wall = wall_of(motion.candidate[i], work)
     n = wall_normal(work.walls, wall)
     r, _ = arm_and_rate(work.shape, load(work.dims), R, w, n, feature_of(motion.candidate[i], work), tilted, work)
@@ -142,7 +142,7 @@ def acceleration_scale(w, work):
 
 @inlined
 def closes(count, motion):
-    """Test whether a contact that will leave is still, by a little, on its way in."""
+    """True if a contact that will leave is still, by a little, on its way in."""
     least = -motion.noise - UNSEEN_APPROACH * motion.still
     for i in range(count):
         if motion.kind[i] == OPEN and motion.gap_rate[START, motion.candidate[i]] < least:

@@ -92,7 +92,7 @@ def _change_one(count, y, R, w, a, alpha, scale, tilted, work, motion):
 
 @inlined
 def has_last(motion):
-    """Test whether any force is known from before."""
+    """True if any force is known from before."""
     for s in range(motion.last.shape[0]):
         if motion.last[s, 0] != 0.0:
             return True

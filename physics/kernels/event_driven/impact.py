@@ -61,7 +61,7 @@ def rebound(speed, normal, r, rate, w, alpha, work, motion):
 
 @inlined
 def touches(s, motion):
-    """Test whether feature s takes part in an impact: it touches, or would in no time."""
+    """True if feature s takes part in an impact: it touches, or would in no time."""
     return motion.gap[START, s] <= max(motion.touch, -motion.gap_rate[START, s] * motion.together)
 
 

@@ -36,7 +36,7 @@ def name_of_regime(motion):
 
 @inlined
 def is_heeded(motion):
-    """Test whether the guards of force say something of this regime."""
+    """True if the guards of force say something of this regime."""
     return motion.unheeded == NONE or name_of_regime(motion) != motion.unheeded
 
 
@@ -49,7 +49,7 @@ def distrust(nearest, motion):
 
 @kernel
 def has_jumped(what, y, tilted, work, motion):
-    """Test whether the step that led to y went too far: what the body does there does not go on from what it did."""
+    """True if the step that led to y went too far: what the body does there does not go on from what it did."""
     if what in (RESTS, ASKS, ASKS_SLIDING):
         return False
     if what != MOVES:

@@ -67,25 +67,25 @@ def stiffness_across(P, work, motion):
 
 @inlined
 def has_one_slide(work, motion):
-    """Test whether one contact acts, which slides with friction."""
+    """True if one contact acts, which slides with friction."""
     return motion.count == 1 and motion.holds[0] == 0 and work.mu > 0.0
 
 
 @inlined
 def _is_small(share, speed, work, motion):
-    """Test whether the speed of a slip is below `share` times SLOWLY."""
+    """True if the speed of a slip is below `share` times SLOWLY."""
     return speed * (motion.spin + math.sqrt(work.acceleration / work.radius)) < share * SLOWLY * motion.stiffness
 
 
 @inlined
 def creeps(growth, speed, work, motion):
-    """Test whether a slip that grows at the rate `growth` is so slow, and grows so little, that only loads turn it."""
+    """True if a slip that grows at the rate `growth` is so slow, and grows so little, that only loads turn it."""
     return growth < CREEPING * motion.stiffness and _is_small(1.0, speed, work, motion)
 
 
 @inlined
 def outruns(h, work, motion):
-    """Test whether the only contact begins to slide, and goes too far for that in the step of h to END, placed."""
+    """True if the only contact begins to slide, and goes too far for that in the step of h to END, placed."""
     if not has_one_slide(work, motion) or not motion.is_starting[0]:
         return False
     _, speed = sliding_velocity(0, work, motion)

@@ -115,7 +115,7 @@ def locate(h, margin, guard, which, heeds, tilted, work, motion):
 
 @inlined
 def has_stopped(guard, which, work, motion):
-    """Test whether the contact that ended a step nearly stands still there: then that is the end, not before."""
+    """True if the contact that ended a step nearly stands still there: then that is the end, not before."""
     if guard != SPEED:
         return False
     return sliding_velocity(which, work, motion)[1] <= motion.slow

@@ -140,7 +140,7 @@ def safe_flight(y, left, third, assured, tilted, work, motion):
 
 @inlined
 def has_torque(work):
-    """Test whether a torque acts."""
+    """True if a torque acts."""
     t = work.torque
     return t[0] != 0.0 or t[1] != 0.0 or t[2] != 0.0
 

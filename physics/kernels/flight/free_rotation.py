@@ -222,7 +222,7 @@ def momentum_period(m, J):
 
 @inlined
 def _is_steady(m, J):
-    """Test whether the momentum m in the principal frame stays as it is: no gyroscopic torque."""
+    """True if the momentum m in the principal frame stays as it is: no gyroscopic torque."""
     first, second, third = (J[2] - J[1]) * m[1] * m[2], (J[0] - J[2]) * m[2] * m[0], (J[1] - J[0]) * m[0] * m[1]
     return first == 0.0 and second == 0.0 and third == 0.0
 

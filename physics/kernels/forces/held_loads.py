@@ -169,7 +169,7 @@ def refresh_loads(y, later, tilted, work):
 
 @if_declared(False)
 def has_fields(work):
-    """Test whether the scene declares a field."""
+    """True if the scene declares a field."""
     return True
 
 
@@ -194,5 +194,5 @@ def set_now(t, work):
 
 @if_declared(True)
 def was_felt(work):
-    """Test whether a field, or a held torque, was not zero anywhere since `start_feeling`."""
+    """True if a field, or a held torque, was not zero anywhere since `start_feeling`."""
     return work.is_felt == 1

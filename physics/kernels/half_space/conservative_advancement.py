@@ -58,13 +58,13 @@ def largest_moment(work):
 
 @inlined
 def is_centred(tilted, work):
-    """Test whether the geometric centre is the centre of mass."""
+    """True if the geometric centre is the centre of mass."""
     return tilted is None or (work.center[0] == 0.0 and work.center[1] == 0.0 and work.center[2] == 0.0)
 
 
 @inlined
 def may_turn(L, h, least, tilted, work):
-    """Test whether a body of angular momentum L could turn by more than `least` [rad] in h: a cheap, safe bound.
+    """True if a body of angular momentum L could turn by more than `least` [rad] in h: a cheap, safe bound.
 
     A sphere does not where its centre is its centre of mass.
     """
@@ -195,7 +195,7 @@ def safe_time(y, wall, horizon, spin, tilted, work):
 
 @inlined
 def may_reach(wall, y, h, work):
-    """Test whether the bounding sphere may touch a wall in a free flight of h."""
+    """True if the bounding sphere may touch a wall in a free flight of h."""
     n, a = wall_normal(work.walls, wall), work.free_acceleration
     gap = qt.dot(n, y[0]) - work.walls[wall, OFFSET] - work.radius
     gap += min(0.0, h * qt.dot(n, y[2])) + min(0.0, 0.5 * h * h * (n[0] * a[0] + n[1] * a[1] + n[2] * a[2]))

@@ -21,7 +21,7 @@ stiffness = number_of(STIFFNESS)  # of contact that gives (`compliance`)
 
 @inlined
 def is_clear(x, v, h, work):
-    """Test whether the bounding sphere stays clear of every wall during a free flight of h from x with velocity v.
+    """True if the bounding sphere stays clear of every wall during a free flight of h from x with velocity v.
 
     The gap of the sphere is a parabola in time; it is bounded below by its start plus what the velocity and
     the acceleration can each take off. A contact could only matter when this is false.
@@ -39,7 +39,7 @@ def is_clear(x, v, h, work):
 
 @inlined
 def _admit(gap, speed, slop, reach, soft, slot, h, memory, work):
-    """Test whether a feature belongs to the contact set of this stage.
+    """True if a feature belongs to the contact set of this stage.
 
     It does when it touches (gap <= slop); when loads make it no faster at the wall than `soft`: than from rest in the
     step, and than what rests as it is (`target_velocity.aim_impact`); and when loads can bring it to the wall within

@@ -44,7 +44,7 @@ def free_acceleration(slot, y, tilted, work):
 
 @kernel
 def stays(gap, slot, y, h, tilted, memory, work):
-    """Test whether a round body that pushed in the last stage is still pressed, so that its gap closes."""
+    """True if a round body that pushed in the last stage is still pressed, so that its gap closes."""
     if not (work.shape == ELLIPSOID and last_push(slot, memory, work) > 0.0):
         return False
     return gap + 0.5 * h * h * min(free_acceleration(slot, y, tilted, work), 0.0) <= work.slop
@@ -65,7 +65,7 @@ def turning_acceleration(w, work):
 
 @kernel
 def goes_on(i, y, h, tilted, memory, work):
-    """Test whether the speed of contact i of the set is an error of the last stage: it pushed then, and is no faster.
+    """True if the speed of contact i of the set is an error of the last stage: it pushed then, and is no faster.
 
     A stage of length h can leave a contact that holds the speed that loads and turning make in it.
     """

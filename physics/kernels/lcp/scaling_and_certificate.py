@@ -30,7 +30,7 @@ def inverse_power_of_two(x):
 
 @kernel
 def are_finite(M, q):
-    """Test whether q (n,) and the leading n x n block of M hold neither NaN nor infinity."""
+    """True if q (n,) and the leading n x n block of M hold neither NaN nor infinity."""
     n = q.shape[0]
     for i in range(n):
         if not math.isfinite(q[i]):

@@ -74,7 +74,7 @@ def _rest(crew, look):
 
 @inlined
 def _is_busy(crew, member, patience):
-    """Test whether the member has not finished after so many looks."""
+    """True if the member has not finished after so many looks."""
     for look in range(1, patience + 1):
         if seen(crew, member, STATE) != BUSY:
             return False
@@ -99,7 +99,7 @@ def lead(crew, taken, members, jobs, count, patience):
 
 @inlined
 def _is_in_the_way(crew):
-    """Test whether a member has the leader's processor and would only delay it; the member has given way then."""
+    """True if a member has the leader's processor and would only delay it; the member has given way then."""
     processor = ask(crew[0, PROCESSOR])
     if processor < 0 or processor != crew[0, LED_ON]:
         return False
@@ -109,7 +109,7 @@ def _is_in_the_way(crew):
 
 @inlined
 def _begins(crew, member, patience):
-    """Test whether the member, waiting, is called within so many looks; else it is away."""
+    """True if the member, waiting, is called within so many looks; else it is away."""
     for look in range(1, patience + 1):
         state = seen(crew, member, STATE)
         if state == CALLED and not _is_in_the_way(crew) and exchange_if(crew, member, STATE, CALLED, BUSY):

@@ -69,7 +69,7 @@ def write_state(state, i, y):
 
 @inlined
 def is_finite(y):
-    """Test whether all numbers of the state are finite, and their squares far from overflow (`layout.LARGEST`)."""
+    """True if all numbers of the state are finite, and their squares far from overflow (`layout.LARGEST`)."""
     x, q, v, L = y
     turn = (q[0] * q[0] + q[1] * q[1]) + (q[2] * q[2] + q[3] * q[3])
     return (qt.dot(x, x) + qt.dot(v, v)) + (qt.dot(L, L) + turn) <= at.LARGEST * at.LARGEST
@@ -77,7 +77,7 @@ def is_finite(y):
 
 @inlined
 def all_finite(now):
-    """Test whether every number of every state in `now` (bodies, STATE_SIZE) is finite."""
+    """True if every number of every state in `now` (bodies, STATE_SIZE) is finite."""
     return first_lost(now) < 0
 
 
@@ -92,7 +92,7 @@ def first_lost(now):
 
 @inlined
 def can_bear(work):
-    """Test whether the loads that `bind_body` has found are finite, and far from overflowing (`layout.LARGEST`)."""
+    """True if the loads that `bind_body` has found are finite, and far from overflowing (`layout.LARGEST`)."""
     return work.acceleration <= at.LARGEST
 
 

@@ -46,7 +46,7 @@ class Sleep(NamedTuple):
 
 @inlined
 def sleeps(i, sleep):
-    """Test whether body i sleeps: never, where the scene does not declare it."""
+    """True if body i sleeps: never, where the scene does not declare it."""
     if sleep is None:
         return False
     return sleep.rows[i, GROUP] > 0.0
@@ -60,7 +60,7 @@ def stir(i, sleep):
 
 @inlined
 def is_pushed_anew(i, wrench, sleep):
-    """Test whether another wrench acts on body i than so far; it is the one that counts from now on."""
+    """True if another wrench acts on body i than so far; it is the one that counts from now on."""
     is_other = False
     for c in range(6):
         if wrench[i, c] != sleep.rows[i, WRENCH + c]:
@@ -104,7 +104,7 @@ def _begin(i, y, rows):
 
 @inlined
 def _is_over(clock, work, sleep):
-    """Test whether a window that has lasted so long is over: √(2 r/a) is how long it takes to fall r at a."""
+    """True if a window that has lasted so long is over: √(2 r/a) is how long it takes to fall r at a."""
     if sleep.time > 0.0:
         return clock >= sleep.time
     return clock * clock * work.acceleration >= 2.0 * work.radius
@@ -132,7 +132,7 @@ def watch(i, y, h, work, sleep):
 
 @inlined
 def is_growing(last, before):
-    """Test whether the way in the last window says that what moves will move further."""
+    """True if the way in the last window says that what moves will move further."""
     return not last <= GROWTH * before
 
 
@@ -144,7 +144,7 @@ def laid_down(y):
 
 @inlined
 def sleeps_on(i, wrench, sleep):
-    """Test whether body i, which meets walls only, sleeps and goes on to do so under this wrench."""
+    """True if body i, which meets walls only, sleeps and goes on to do so under this wrench."""
     if is_pushed_anew(i, wrench, sleep):
         stir(i, sleep)
     return sleep.rows[i, GROUP] > 0.0

@@ -55,7 +55,7 @@ def load_warm_start(n, width, memory, i, h, work):
 
 @inlined
 def _are_kept(n, memory, i, work):
-    """Test whether the contacts of the last resting stage are those of this one, in the same order."""
+    """True if the contacts of the last resting stage are those of this one, in the same order."""
     if memory[i, CONTACT_COUNT] != n:
         return False
     for k in range(n):
@@ -118,7 +118,7 @@ def note_solve(report, world, residual, sweeps, method, tolerance):
 
 @inlined
 def contacts_gain(before, w, v, L, solved, R, h, work):
-    """Test whether the impulses of a resting stage raise the energy by more than its solve and its step may be off.
+    """True if the impulses of a resting stage raise the energy by more than its solve and its step may be off.
 
     Impulses P at the centre of mass and moments Q about it change it by ½ P·(v + v') + ½ Q·(ω + ω'), v and ω before
     the stage (`before`, w), v' and ω' after it. `v`, `L` are those with loads and without impulses.

@@ -97,7 +97,7 @@ def oppose_end_slip(n, work):
 
 @inlined
 def has_turned_round(n, v, w, work):
-    """Test whether the slip of a contact that pushes is against the one before, -`work.target`, after impulses."""
+    """True if the slip of a contact that pushes is against the one before, -`work.target`, after impulses."""
     ratio = friction_ratio(work)
     for i in range(n):
         a, b = _tangential(i, v, w, work)

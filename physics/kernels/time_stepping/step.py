@@ -70,7 +70,7 @@ IMPACT_TRIALS = 16
 
 @inlined
 def has_touched(memory, i):
-    """Test whether a body had contacts in its last stage: its bounding sphere touches a wall, or has just left it."""
+    """True if a body had contacts in its last stage: its bounding sphere touches a wall, or has just left it."""
     return memory[i, CONTACT_COUNT] > 0.0
 
 
@@ -118,7 +118,7 @@ def contact_set(y, h, tilted, memory, work):
 
 @inlined
 def has_same_pose(y, z):
-    """Test whether two states have the same position and attitude, to the last bit."""
+    """True if two states have the same position and attitude, to the last bit."""
     return y[0] == z[0] and y[1] == z[1]
 
 

@@ -54,7 +54,7 @@ class Check:
 
     @property
     def passes(self) -> bool:
-        """Test whether the value obeys; NaN never does."""
+        """True if the value obeys; NaN never does."""
         if self.kind == AT_LEAST:
             return self.value >= self.limit
         return self.distance <= self.limit
@@ -133,17 +133,17 @@ class Setting:
 
     @property
     def is_event_driven(self) -> bool:
-        """Test whether events are located, so that outcomes do not depend on the step."""
+        """True if events are located, so that outcomes do not depend on the step."""
         return self.maker is None and resolve(self.accuracy).scheme == "events"
 
     @property
     def meets_an_error(self) -> bool:
-        """Test whether bodies that touch each other are stepped to an error: it is dear, so quick runs are smaller."""
+        """True if bodies that touch each other are stepped to an error: it is dear, so quick runs are smaller."""
         return self.is_event_driven
 
     @property
     def is_ours(self) -> bool:
-        """Test whether the engine is ours: only then there are reports, contact forces and parameters to look at."""
+        """True if the engine is ours: only then there are reports, contact forces and parameters to look at."""
         return self.maker is None
 
     @property

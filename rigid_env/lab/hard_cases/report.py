@@ -100,7 +100,7 @@ class Report:
 
     @property
     def has_failed(self) -> bool:
-        """Test whether a case of ours fails at that step; coarser and finer ones are there to show where it ends."""
+        """True if a case of ours fails at that step; coarser and finer ones are there to show where it ends."""
         return any(one.status is Status.FAILS for one in self.details)
 
     def to_dict(self) -> dict:

@@ -31,7 +31,7 @@ BLOCK = 1  # index of the block among the bodies; 0 is the world
 
 
 def is_installed() -> bool:
-    """Test whether MuJoCo can be imported."""
+    """True if MuJoCo can be imported."""
     return importlib.util.find_spec("mujoco") is not None
 
 
@@ -206,5 +206,5 @@ class Rollout:
 
 
 def has_batch() -> bool:
-    """Test whether this MuJoCo has `mujoco.batch` (since 4.0)."""
+    """True if this MuJoCo has `mujoco.batch` (since 4.0)."""
     return is_installed() and importlib.util.find_spec("mujoco.batch") is not None

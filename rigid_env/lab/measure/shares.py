@@ -42,7 +42,7 @@ class Share:
 
     @property
     def is_seen(self) -> bool:
-        """Test whether the time is above the noise: of one sign in every turn."""
+        """True if the time is above the noise: of one sign in every turn."""
         return self.time.lowest > 0 or self.time.highest < 0
 
     def to_dict(self) -> dict:

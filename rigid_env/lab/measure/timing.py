@@ -89,7 +89,7 @@ class Row:
 
     @property
     def is_passed(self) -> bool | None:
-        """Test whether the target is reached; None where there is none, or no peer to compare with."""
+        """True if the target is reached; None where there is none, or no peer to compare with."""
         if self.target is None or (self.is_ratio and self.peer is None):
             return None
         if not self.is_valid:

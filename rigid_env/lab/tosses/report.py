@@ -113,7 +113,7 @@ class Report:
 
     @property
     def is_complete(self) -> bool:
-        """Test whether no fit was interrupted."""
+        """True if no fit was interrupted."""
         return all(case.fit.is_complete for case in self.cases)
 
     def to_dict(self) -> dict:

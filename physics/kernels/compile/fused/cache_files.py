@@ -48,7 +48,7 @@ _SAID: set[str] = set()
 
 
 def is_own(status: os.stat_result) -> bool:
-    """Test whether only this user or root owns and can write a file or folder; always so without such users.
+    """True if only this user or root owns and can write a file or folder; always so without such users.
 
     Parameters
     ----------

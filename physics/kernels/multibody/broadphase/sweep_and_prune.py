@@ -45,14 +45,14 @@ def reach(b, h, many):
 
 @inlined
 def may_reach_wall(b, wall, h, many):
-    """Test whether body b's bounding sphere may touch a wall within h; one that turns fast far off may not."""
+    """True if body b's bounding sphere may touch a wall within h; one that turns fast far off may not."""
     d = qt.dot(vector(many.walls, wall, NORMAL), vector(many.now, b, POS)) - many.walls[wall, OFFSET]
     return not d > many.bodies[b].radius + travel(b, h, many) + many.bodies[b].slop
 
 
 @inlined
 def may_meet(a, b, h, many):
-    """Test whether the bounding spheres of two bodies may touch within h."""
+    """True if the bounding spheres of two bodies may touch within h."""
     far = many.bodies[a].radius + many.bodies[b].radius + travel(a, h, many) + travel(b, h, many)
     far += pair_slop(a, b, many)
     d = minus(vector(many.now, a, POS), vector(many.now, b, POS))

@@ -119,7 +119,7 @@ def arrival(a, b, many):
 
 @inlined
 def _turns_far(a, b, many):
-    """Test whether one of them may turn far in this stage (`conservative_advancement`)."""
+    """True if one of them may turn far in this stage (`conservative_advancement`)."""
     return many.spin[a] > 0.0 or (b >= 0 and many.spin[b] > 0.0)
 
 

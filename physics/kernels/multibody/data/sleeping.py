@@ -46,7 +46,7 @@ def wake_world(world, count, sleep):
 
 @inlined
 def all_sleep(world, count, sleep):
-    """Test whether every body of a world of `count` bodies sleeps."""
+    """True if every body of a world of `count` bodies sleeps."""
     for i in range(world * count, (world + 1) * count):
         if not sleeps(i, sleep):
             return False
@@ -55,7 +55,7 @@ def all_sleep(world, count, sleep):
 
 @inlined
 def sleep_on(world, count, wrench, sleep):
-    """Test whether every body of a world sleeps and goes on to do so under these wrenches; wakes those that do not."""
+    """True if every body of a world sleeps and goes on to do so under these wrenches; wakes those that do not."""
     for i in range(world * count, (world + 1) * count):
         if is_pushed_anew(i, wrench, sleep):
             if sleeps(i, sleep):

@@ -27,7 +27,7 @@ def _crossing(p, q, axis, bound):
 
 @inlined
 def is_within(source, count, axis, sign, bound, many):
-    """Test whether sign * coordinate <= bound for every vertex of the polygon in copy `source`: nothing to clip."""
+    """True if sign * coordinate <= bound for every vertex of the polygon in copy `source`: nothing to clip."""
     furthest = -math.inf
     for k in range(count):
         furthest = max(furthest, sign * many.polygon[source, k, axis])

@@ -94,7 +94,7 @@ def best_edges(a, b, margin, many):
 
 @inlined
 def lie_flat(face, many):
-    """Test whether a face of the other block is nearly parallel to this one: the two lie flat on each other."""
+    """True if a face of the other block is nearly parallel to this one: the two lie flat on each other."""
     S, most = many.mix[SIZES], 0.0
     for k in range(3):
         most = max(most, S[face, k] if face < 3 else S[k, face - 3])
@@ -103,7 +103,7 @@ def lie_flat(face, many):
 
 @inlined
 def is_along_face(edges, face, many):
-    """Test whether the product of two edges is nearly a face normal: the faces then lie flat on each other.
+    """True if the product of two edges is nearly a face normal: the faces then lie flat on each other.
 
     Both turned towards the other block's centre: of slender blocks that cross far from their centres, the face that
     looks there may be on the far side of the one that touches.

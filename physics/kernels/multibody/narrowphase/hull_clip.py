@@ -61,7 +61,7 @@ def _clip(source, count, m, bound, side, slop, hulls):
 
 @inlined
 def _has_corner(f, corner, hulls):
-    """Test whether face f of the tables has this corner."""
+    """True if face f of the tables has this corner."""
     for k in range(hulls.loops[f, 0], hulls.loops[f, 1]):
         if hulls.ring[k] == corner:
             return True

@@ -71,7 +71,7 @@ def edge_of(which, b, e, many):
 
 @inlined
 def _arcs_cross(d, left, right, e, other_left, other_right):
-    """Test whether the arc between the normals of an edge crosses that between the opposite normals of another edge.
+    """True if the arc between the normals of an edge crosses that between the opposite normals of another edge.
 
     The arc's great circle is perpendicular to the edge: its ends must be on both sides of the other's circle, and the
     other way round, on the same hemisphere.

@@ -52,7 +52,7 @@ def nearest_on_segment(x, p, q):
 
 @kernel
 def is_above_face(which, b, face, x, many):
-    """Test whether a face of body b, number `which` of the pair, has a normal through x, above or below."""
+    """True if a face of body b, number `which` of the pair, has a normal through x, above or below."""
     hulls = many.hulls
     out, k = vector(hulls.normal[which], face, 0), hulls.of[b, FIRST_FACE] + face
     first, last = hulls.loops[k, 0], hulls.loops[k, 1]

@@ -62,13 +62,13 @@ NO_MARK = -2
 
 @inlined
 def _is_answered(i, a, b, many):
-    """Test whether neither of two bodies (b < 0: a wall) has been pushed since the last visit i."""
+    """True if neither of two bodies (b < 0: a wall) has been pushed since the last visit i."""
     return many.visited[i] >= many.pushed[a] and (b < 0 or many.visited[i] >= many.pushed[b])
 
 
 @inlined
 def is_answered(k, many):
-    """Test whether no body of contact k has been pushed since its last visit."""
+    """True if no body of contact k has been pushed since its last visit."""
     return _is_answered(k, many.ends[k, 0], many.ends[k, 1], many)
 
 

@@ -54,7 +54,7 @@ def point_speed(v, w, b, many):
 
 @inlined
 def _keeps_velocity(b, most, many):
-    """Test whether the velocity of body b has changed by at most `most` in this resting stage [m/s].
+    """True if the velocity of body b has changed by at most `most` in this resting stage [m/s].
 
     Velocities before the stage are in `many.momenta`, those after it in `many.twist`.
     """
@@ -64,7 +64,7 @@ def _keeps_velocity(b, most, many):
 
 @kernel
 def is_in_balance(goal, least, many):
-    """Test whether nothing is left for `near_rest_refinement` to do in any island."""
+    """True if nothing is left for `near_rest_refinement` to do in any island."""
     if many.settings[0].rests == 1:
         for b in range(many.twist.shape[0]):
             if many.touched[b] == 1 and not _keeps_velocity(b, 2.0 * _fine(goal, least), many):
@@ -74,7 +74,7 @@ def is_in_balance(goal, least, many):
 
 @inlined
 def _may_calm(part, speed, change, many):
-    """Test whether all bodies of an island were slower than `speed`, and one changed by more than `change` [m/s]."""
+    """True if all bodies of an island were slower than `speed`, and one changed by more than `change` [m/s]."""
     is_balanced = True
     for i in range(part[2], part[3]):
         b = many.order[i]

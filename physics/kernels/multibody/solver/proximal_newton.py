@@ -200,7 +200,7 @@ def bring_back_best(part, many):
 
 @inlined
 def all_push(part, many):
-    """Test whether all contacts of an island push: else not all of them will hold."""
+    """True if all contacts of an island push: else not all of them will hold."""
     for i in range(part[0], part[1]):
         if not many.impulse[many.queue[i], 0] > 0.0:
             return False

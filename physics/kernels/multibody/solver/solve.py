@@ -164,7 +164,7 @@ def sweep_at_last(part, friction, residual, goal, limit, many):
 
 @inlined
 def none_pushes_or_parts(part, goal, many):
-    """Test whether no contact of an island pushes, and none opens faster than `goal` [m/s] without that."""
+    """True if no contact of an island pushes, and none opens faster than `goal` [m/s] without that."""
     for i in range(part[0], part[1]):
         k = many.queue[i]
         if many.impulse[k, 0] > 0.0 or velocity_missed(k, many)[0] > goal:
@@ -174,7 +174,7 @@ def none_pushes_or_parts(part, goal, many):
 
 @inlined
 def _is_swept_first(part, goal, scale, many):
-    """Test whether sweeps try an island first: it has one contact, or an impact at a coarse tolerance.
+    """True if sweeps try an island first: it has one contact, or an impact at a coarse tolerance.
 
     An impact begins from no impulses, and asks something of the few contacts near it.
     """

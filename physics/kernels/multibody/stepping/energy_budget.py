@@ -48,7 +48,7 @@ def keep_loaded(b, many):
 
 @kernel
 def stage_has_gained(n, h, many):
-    """Test whether the impulses of a resting stage of n contacts raised the energy by more than solve and step may.
+    """True if the impulses of a resting stage of n contacts raised the energy by more than solve and step may.
 
     Impulses P and moments Q of a body change its energy by ½ P·(v + v') + ½ Q·(ω + ω'). A contact that pushes may keep
     a residual r = tolerance · s, s the largest free speed, and so give ½ p r, which in a tower is far more than what

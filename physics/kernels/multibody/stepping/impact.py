@@ -27,7 +27,7 @@ FAR = 1.0e300
 
 @inlined
 def bounces(k, h, many):
-    """Test whether contact k would leave again for longer than `rest_share` of h after an impact at its speed now."""
+    """True if contact k would leave again for longer than `rest_share` of h after an impact at its speed now."""
     least = many.settings[0].rest_share * acceleration_of(k, many) * h
     return many.bounce[k] > 0.0 and -many.bounce[k] * many.speed[k] > least
 
@@ -61,7 +61,7 @@ def fast_speed(k, h, many):
 
 @inlined
 def _pair_touches(k, step, many):
-    """Test whether contact k, or one after it in the set by steps of `step`, touches and is of the same pair."""
+    """True if contact k, or one after it in the set by steps of `step`, touches and is of the same pair."""
     a, b = many.ends[k, 0], many.ends[k, 1]
     least = arrival(a, b, many)
     while 0 <= k < many.counts[CONTACTS] and many.ends[k, 0] == a and many.ends[k, 1] == b:
@@ -85,7 +85,7 @@ def is_seen_to(k, many):
 
 @inlined
 def is_meeting(k, h, many):
-    """Test whether contact k is still apart and to be met in time: it bounces, or is fast."""
+    """True if contact k is still apart and to be met in time: it bounces, or is fast."""
     a, b = many.ends[k, 0], many.ends[k, 1]
     if not (many.gap[k] > pair_slop(a, b, many) and many.speed[k] < 0.0):
         return False

@@ -83,7 +83,7 @@ def _aim_plastic(n, many):
 
 @inlined
 def _has_rebound(n, many):
-    """Test whether any contact that touches is to leave with a speed."""
+    """True if any contact that touches is to leave with a speed."""
     for k in range(n):
         if many.target[k, 0] != 0.0 and not many.gap[k] > pair_slop(many.ends[k, 0], many.ends[k, 1], many):
             return True

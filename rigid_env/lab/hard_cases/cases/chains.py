@@ -60,7 +60,7 @@ def _after(setting: Setting, scene: physics.Scene) -> np.ndarray:
 
 
 def _in_turn(setting: Setting, count: int) -> Check:
-    """Test whether balls that touch pass the impact on one by one with the option `sequential`."""
+    """True if balls that touch pass the impact on one by one with the option `sequential`."""
     chosen = replace(setting, accuracy=replace(resolve(setting.accuracy), collisions="sequential"))
     after = _after(chosen, cradle(count, 0.0))
     error = float(np.abs(after - SPEED * (np.arange(count) == count - 1)).max())

@@ -24,7 +24,7 @@ __all__ = ["ENGINES", "Engine", "PeerContender", "Unsupported", "is_installed", 
 
 
 def is_installed(name: str) -> bool:
-    """Test whether the engine of this name can be imported.
+    """True if the engine of this name can be imported.
 
     Raises
     ------
