@@ -26,7 +26,7 @@ from rigid_env.terminal import Column, Table, make_console, number_columns
 PROGRAM = """
 import json, sys, time
 from numba.core import event
-import physics, physics.scenes
+import physics
 name, accuracy, is_other = sys.argv[1:]
 scene = physics.scenes.by_name(name)
 if is_other == "True":

@@ -17,7 +17,7 @@ LIMIT = 1.5  # [s]
 PROGRAMS = {
     "start_world": (
         "new process to first World.step",
-        "import physics, physics.scenes; physics.World(physics.scenes.drop(), accuracy={accuracy!r}).step()",
+        "import physics; physics.World(physics.scenes.drop(), accuracy={accuracy!r}).step()",
     ),
     "start_env": (
         "new process to first Env.step",

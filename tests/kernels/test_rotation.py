@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 from physics.kernels.compile.decorators import kernel
 from physics.kernels.flight import free_rotation
 from physics.kernels.math import quaternion as qt
+from physics.kernels.state.layout import SERIES_SIZE
 from tests.reference import rigid_body as ref
 
 BLOCK = np.array([6.5, 14.5, 17.0])
@@ -29,7 +30,7 @@ def _repeat(q, L, J, series, h, steps):
 def turn(moments, quat, L, h, steps=1):
     """Attitude after `steps` flows of h each."""
     J = tuple(1.0 / np.asarray(moments, float))
-    series = np.zeros(free_rotation.SERIES_SIZE)
+    series = np.zeros(SERIES_SIZE)
     free_rotation.attitude_series(*J, series)
     return np.array(_repeat(tuple(map(float, quat)), tuple(map(float, L)), J, series, float(h), steps))
 
@@ -83,7 +84,7 @@ def test_modified_inertia_series_is_that_of_the_exact_flow(m):
     s, d, f = _exact_modification(J, m, 6)
     for n in range(7):
         assert f[2][n] == s[n] * J[2] + d[n]
-    series = np.zeros(free_rotation.SERIES_SIZE)
+    series = np.zeros(SERIES_SIZE)
     free_rotation.attitude_series(*map(float, J), series)
     mm = float(sum(x * x for x in m))
     ee = float(sum(j * x * x for j, x in zip(J, m)))
@@ -124,7 +125,7 @@ def storing(moments, angvel, h, steps):
 
     A component is off by ulp/√12 (rms), along no radius; the linearised flow, by differences, takes that to the end.
     """
-    J, series = tuple(1.0 / moments), np.zeros(free_rotation.SERIES_SIZE)
+    J, series = tuple(1.0 / moments), np.zeros(SERIES_SIZE)
     free_rotation.attitude_series(*J, series)
     held, offset = (tuple(map(float, moments * angvel)), J, series, h), 1e-5
     q, attitudes, flows = (1.0, 0.0, 0.0, 0.0), [], []
@@ -243,7 +244,7 @@ def test_terms_are_left_out_only_where_rounding_is_larger(limit):
         J = (1.0 / (spread.sum() - spread)).astype(wide)
         m = (rng.normal(size=3) * 10.0 ** rng.uniform(-4, 0, 3)).astype(wide)
         m *= np.sqrt(wide(limit) / (J.max() * (J * m) @ m))
-        series = np.zeros(free_rotation.SERIES_SIZE, dtype=wide)
+        series = np.zeros(SERIES_SIZE, dtype=wide)
         free_rotation.write_attitude_series(*J, series)
         start, sums = (wide(1), wide(0), wide(0), wide(0)), (m @ m, (J * m) @ m)
         without, fully = (

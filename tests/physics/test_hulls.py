@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 import physics
 from physics.analysis.resting_contact import resting_contact
 from physics.io.toml import from_toml, to_toml
+from physics.rotations import rotation_matrices
 from physics.work_precision.errors import deepest_penetration
 from physics.world.report import Status
 from tests.reference.polyhedra import prism
@@ -282,7 +283,7 @@ def test_gaps_to_walls_are_those_of_its_corners():
     rng = np.random.default_rng(4)
     body = physics.Hull(WEDGE, 2.0, pos=(0.3, 2.0, 0.1), quat=unit(rng))
     world = physics.World(scene([body], [FLOOR, physics.HalfSpace((-1, 0, 0), -1000)]), worlds=2, dt=0.01)
-    R = physics.work_precision.errors.rotation_matrices(np.array(body.quat))
+    R = rotation_matrices(np.array(body.quat))
     lowest = (body.polyhedron.vertices @ R.T)[:, 1].min() + 2.0
     assert physics.diagnose(world).gap[0, 0] == pytest.approx(lowest, abs=1e-14)
     deep = world.pos.copy()
