@@ -124,9 +124,7 @@ def contacts_gain(before, w, v, L, solved, R, h, work):
     the stage (`before`, w), v' and ω' after it. `v`, `L` are those with loads and without impulses.
     """
     v_new, L_new, _, _, _ = solved
-    if (
-        qt.dot(before, before) + qt.dot(v_new, v_new) + qt.dot(w, w) + qt.dot(L_new, L_new) == 0.0
-    ):  # at rest, as most are
+    if v_new == (0.0, 0.0, 0.0) and L_new == (0.0, 0.0, 0.0):  # at rest, as most are
         return False
     w_new, a = turning(R, L_new, work.J), work.free_acceleration
     push = work.mass * (

@@ -122,7 +122,7 @@ def has_same_pose(y, z):
     return y[0] == z[0] and y[1] == z[1]
 
 
-@inlined
+@kernel
 def kept_out(y, tilted, work):
     """y, pushed out of the walls where it is deeper in than the slop: what turns by radians in a step may be so."""
     return lifted_to(push_out(y[0], to_matrix(y[1]), tilted, work), y, tilted, work)
