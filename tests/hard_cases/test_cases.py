@@ -40,6 +40,14 @@ def test_the_case_comes_out_as_it_must(case, accuracy):
     assert not failed, "\n".join(map(str, failed))
 
 
+@pytest.mark.parametrize("dt", [0.02, 0.05])
+def test_a_moving_frame_changes_nothing_at_long_steps(dt):
+    """A stage that gains energy is solved again; speed along a frictionless wall must not decide whether it gains."""
+    (case,) = registry.find(["far-away"])
+    failed = [check for check in case.run(Setting("balanced", dt, is_thorough=False)) if not check.passes]
+    assert not failed, "\n".join(map(str, failed))
+
+
 def test_cases_are_numbered_and_named_once_and_say_where_their_outcome_comes_from():
     numbers = [case.number for case in registry.CASES]
     assert numbers == sorted(set(numbers))

@@ -121,24 +121,24 @@ def contacts_gain(before, w, v, L, solved, R, h, work):
     """True if the impulses of a resting stage raise the energy by more than its solve and its step may be off.
 
     Impulses P at the centre of mass and moments Q about it change it by ½ P·(v + v') + ½ Q·(ω + ω'), v and ω before
-    the stage (`before`, w), v' and ω' after it. `v`, `L` are those with loads and without impulses.
+    the stage (`before`, w), v' and ω' after it. `v`, `L` are those with loads and without impulses. Only the motion
+    along P counts for the error: a body that moves fast along a frictionless wall does what one does that stands.
     """
     v_new, L_new, _, _, _ = solved
     if v_new == (0.0, 0.0, 0.0) and L_new == (0.0, 0.0, 0.0):  # at rest, as most are
         return False
     w_new, a = turning(R, L_new, work.J), work.free_acceleration
-    push = work.mass * (
-        (v_new[0] - v[0]) * (before[0] + v_new[0])
-        + (v_new[1] - v[1]) * (before[1] + v_new[1])
-        + (v_new[2] - v[2]) * (before[2] + v_new[2])
-    )
+    d = (v_new[0] - v[0], v_new[1] - v[1], v_new[2] - v[2])
+    along, square = qt.dot(d, before), qt.dot(d, d)
+    push = work.mass * (along + qt.dot(d, v_new))
     turn = (
         (L_new[0] - L[0]) * (w[0] + w_new[0])
         + (L_new[1] - L[1]) * (w[1] + w_new[1])
         + (L_new[2] - L[2]) * (w[2] + w_new[2])
     )
-    square = h * h * (a[0] * a[0] + a[1] * a[1] + a[2] * a[2])
-    size = work.mass * (qt.dot(before, before) + square) + abs(qt.dot(L_new, w_new))
+    size = work.mass * h * h * (a[0] * a[0] + a[1] * a[1] + a[2] * a[2]) + abs(qt.dot(L_new, w_new))
+    if square > 0.0:
+        size += work.mass * along * (along / square)
     return push + turn > max(work.tolerance, GAIN_SHARE) * size
 
 
