@@ -125,7 +125,8 @@ def contacts_gain(before, w, v, L, solved, R, h, work):
     along P counts for the error: a body that moves fast along a frictionless wall does what one does that stands.
     """
     v_new, L_new, _, _, _ = solved
-    if v_new == (0.0, 0.0, 0.0) and L_new == (0.0, 0.0, 0.0):  # at rest, as most are
+    zero = (0.0, 0.0, 0.0)
+    if v_new == zero and before == zero and L_new == zero and w == zero:  # at rest, as most are
         return False
     w_new, a = turning(R, L_new, work.J), work.free_acceleration
     d = (v_new[0] - v[0], v_new[1] - v[1], v_new[2] - v[2])
