@@ -117,29 +117,42 @@ def note_solve(report, world, residual, sweeps, method, tolerance):
 
 
 @inlined
-def contacts_gain(before, w, v, L, solved, R, h, work):
+def motion_square(n, velocity, work):
+    """Square of the velocity that the contacts may act on: without friction, of one wall, only that along its normal.
+
+    A body that moves along a frictionless wall, however fast, does the same as one that does not.
+    """
+    wall = wall_of(work.slot[0], work)
+    if not work.mu > 0.0 and wall_of(work.slot[n - 1], work) == wall:
+        normal_speed = qt.dot(wall_normal(work.walls, wall), velocity)
+        return normal_speed * normal_speed
+    return qt.dot(velocity, velocity)
+
+
+@inlined
+def contacts_gain(n, before, w, v, L, solved, R, h, work):
     """True if the impulses of a resting stage raise the energy by more than its solve and its step may be off.
 
     Impulses P at the centre of mass and moments Q about it change it by ½ P·(v + v') + ½ Q·(ω + ω'), v and ω before
-    the stage (`before`, w), v' and ω' after it. `v`, `L` are those with loads and without impulses. Only the motion
-    along P counts for the error: a body that moves fast along a frictionless wall does what one does that stands.
+    the stage (`before`, w), v' and ω' after it. `v`, `L` are those with loads and without impulses.
     """
     v_new, L_new, _, _, _ = solved
     zero = (0.0, 0.0, 0.0)
     if v_new == zero and before == zero and L_new == zero and w == zero:  # at rest, as most are
         return False
     w_new, a = turning(R, L_new, work.J), work.free_acceleration
-    d = (v_new[0] - v[0], v_new[1] - v[1], v_new[2] - v[2])
-    along, square = qt.dot(d, before), qt.dot(d, d)
-    push = work.mass * (along + qt.dot(d, v_new))
+    push = work.mass * (
+        (v_new[0] - v[0]) * (before[0] + v_new[0])
+        + (v_new[1] - v[1]) * (before[1] + v_new[1])
+        + (v_new[2] - v[2]) * (before[2] + v_new[2])
+    )
     turn = (
         (L_new[0] - L[0]) * (w[0] + w_new[0])
         + (L_new[1] - L[1]) * (w[1] + w_new[1])
         + (L_new[2] - L[2]) * (w[2] + w_new[2])
     )
-    size = work.mass * h * h * (a[0] * a[0] + a[1] * a[1] + a[2] * a[2]) + abs(qt.dot(L_new, w_new))
-    if square > 0.0:
-        size += work.mass * along * (along / square)
+    square = h * h * (a[0] * a[0] + a[1] * a[1] + a[2] * a[2])
+    size = work.mass * (motion_square(n, before, work) + square) + abs(qt.dot(L_new, w_new))
     return push + turn > max(work.tolerance, GAIN_SHARE) * size
 
 
@@ -159,10 +172,10 @@ def calm_targets(n, before, w, work):
 
 
 def _calmed_if_it_gains(n, friction, smooth, pivots, before, w, solved, free, R, h, work):
-    if contacts_gain(before, w, free[0], free[1], solved, R, h, work):
+    if contacts_gain(n, before, w, free[0], free[1], solved, R, h, work):
         calm_targets(n, before, w, work)
         solved = solve_contacts(n, friction, smooth, pivots, free[0], free[1], R, work)
-        if not solved[2] <= work.tolerance and contacts_gain(before, w, free[0], free[1], solved, R, h, work):
+        if not solved[2] <= work.tolerance and contacts_gain(n, before, w, free[0], free[1], solved, R, h, work):
             return shortened(n, friction, before, w, solved, free, R, work)
     return solved
 
