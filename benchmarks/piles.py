@@ -23,7 +23,7 @@ from benchmarks import machine
 from benchmarks.settling import PARTS, Ours, Sample, Theirs, settle
 from physics import scenes
 from physics.kernels.multibody.broadphase.sweep_and_prune import find_pairs
-from physics.kernels.multibody.data.arrays import PAIRS
+from physics.kernels.multibody.data.arrays import NUM_PAIRS
 from rigid_env.lab.measure import mujoco_scene
 from rigid_env.lab.measure.plotting import require_matplotlib
 from rigid_env.lab.measure.workloads import STEP
@@ -54,7 +54,7 @@ def spread(count: int) -> Sample:
         for _ in range(CALLS):
             find_pairs(STEP, many)
         times.append((time.perf_counter() - start) / CALLS)
-    return Sample(count, float(many.counts[PAIRS]), float(np.median(times)))
+    return Sample(count, float(many.counts[NUM_PAIRS]), float(np.median(times)))
 
 
 def exponent(samples: list[Sample]) -> float:

@@ -9,7 +9,7 @@ import numpy as np
 
 import physics
 from physics import scenes
-from physics.kernels.multibody.data.arrays import CONTACTS, Many, make_many
+from physics.kernels.multibody.data.arrays import NUM_CONTACTS, BodiesWorkspace, make_bodies_workspace
 from physics.kernels.state import layout as at
 from rigid_env.lab.hard_cases.cases import arch, stacks
 
@@ -52,7 +52,7 @@ class Frictional:
     """
 
     name: str
-    many: Many
+    many: BodiesWorkspace
     count: int
     twists: np.ndarray
 
@@ -104,7 +104,7 @@ def pile(seed: int, bodies: int, contacts: int, mu: float, masses: float = 1.0) 
     Masses are powers of `masses` at random; the lowest lies on a wall.
     """
     rng = np.random.default_rng(seed)
-    many = make_many(bodies, np.zeros((1, at.WALL_SIZE)), **SETTINGS)
+    many = make_bodies_workspace(bodies, np.zeros((1, at.WALL_SIZE)), **SETTINGS)
     mass = masses ** rng.uniform(-1, 1, bodies)
     many.bodies["mass"], many.bodies["radius"], many.lightness[:] = mass, 1.0, 1 / mass
     for b in range(bodies):
@@ -132,7 +132,7 @@ def beginning(name: str, scene: physics.Scene) -> Frictional:
     world = physics.World(scene, dt=STEP)
     world.step()
     many = world.scratch[0]
-    count = int(many.counts[CONTACTS])
+    count = int(many.counts[NUM_CONTACTS])
     many.target[:count] = 0.0
     return Frictional(name, many, count, many.free.copy())
 

@@ -21,17 +21,22 @@ import typer
 
 from benchmarks import machine, problems
 from physics.kernels.compile.decorators import kernel
-from physics.kernels.contact_solver.friction_pyramid import pyramid_fallback
-from physics.kernels.contact_solver.gauss_seidel import cone_sweeps, factor_blocks, normal_sweeps
+from physics.kernels.contact_solver.friction_pyramid import solve_pyramid_lcp
+from physics.kernels.contact_solver.gauss_seidel import cone_sweeps, invert_contact_blocks, normal_sweeps
 from physics.kernels.lcp.dantzig import dantzig, dantzig_sizes
 from physics.kernels.lcp.lemke import lemke, lemke_sizes
-from physics.kernels.lcp.scaling_and_certificate import SOLVED
-from physics.kernels.multibody.solver.contact_operator import assemble, residual_of
+from physics.kernels.lcp.scaling_and_certificate import LCP_SOLVED
+from physics.kernels.multibody.solver.contact_operator import assemble_contact_blocks, max_contact_residual
 from physics.kernels.multibody.solver.gauss_seidel import sweep_contacts
-from physics.kernels.multibody.solver.interior_point import interior_point
+from physics.kernels.multibody.solver.interior_point import interior_point_contacts
 from physics.kernels.multibody.solver.islands import find_islands
-from physics.kernels.multibody.solver.proximal_newton import LEAST_STEPS, WORTH_LYING, newton_contacts, prepare_system
-from physics.kernels.multibody.solver.solve import POLISH, forget_all, solve_contacts
+from physics.kernels.multibody.solver.proximal_newton import (
+    MIN_NEWTON_STEPS,
+    RESTING_BUDGET,
+    newton_contacts,
+    prepare_system,
+)
+from physics.kernels.multibody.solver.solve import NEWTON_RHO, clear_all_impulses, solve_contacts
 from physics.kernels.state import layout as at
 from physics.kernels.time_stepping.workspace import make_workspace
 from rigid_env.lab.measure.machine import write_json
@@ -109,7 +114,7 @@ def _complementarity_solvers(
 
         def solve():
             status, count = method(M, q, z, floats, integers, PIVOTS)
-            return status == SOLVED, count, z
+            return status == LCP_SOLVED, count, z
 
         return solve
 
@@ -145,11 +150,11 @@ def _solve_island(method, part, residual, goal, limit, many):
     """Iterations of one method for one island; -1 where its linear system finds no room."""
     if method == SWEEPS:
         return sweep_contacts(part[0], part[1], True, residual, goal, limit, many)[0]
-    if prepare_system(part, limit, WORTH_LYING, LEAST_STEPS, many) < LEAST_STEPS:
+    if prepare_system(part, limit, RESTING_BUDGET, MIN_NEWTON_STEPS, many) < MIN_NEWTON_STEPS:
         return -1
     if method == INTERIOR:
-        return interior_point(part, residual, goal, limit, many)
-    return newton_contacts(part, True, residual, goal, limit, POLISH[0], many)[0]
+        return interior_point_contacts(part, residual, goal, limit, many)
+    return newton_contacts(part, True, residual, goal, limit, NEWTON_RHO[0], many)[0]
 
 
 @kernel
@@ -162,19 +167,19 @@ def solve_bodies(method, times, n, twists, limit, many):
                 many.twist[b, c] = many.free[b, c] = twists[b, c]
         for k in range(n):
             many.queue[k] = k
-        forget_all(n, many)
+        clear_all_impulses(n, many)
         if method == CHAIN:
             count, worst, _ = solve_contacts(n, True, many)
             continue
-        scale, count = assemble(n, many), 0
+        scale, count = assemble_contact_blocks(n, many), 0
         for i in range(find_islands(n, many)):
             part = (many.first_contact[i], many.first_contact[i + 1], many.first_body[i], many.first_body[i + 1])
-            residual = residual_of(part[0], part[1], True, many)
+            residual = max_contact_residual(part[0], part[1], True, many)
             more = _solve_island(method, part, residual, many.settings[0].tolerance * scale, limit, many)
             if more < 0:
                 return -1, 1.0
             count = max(count, more)
-        worst = residual_of(0, n, True, many) / scale
+        worst = max_contact_residual(0, n, True, many) / scale
     return count, worst
 
 
@@ -191,10 +196,10 @@ def _residual_of_impulses(problem: problems.Frictional, p: np.ndarray) -> float:
     """Relative residual of impulses (3 n,), by the same kernel for all."""
     many, n = problem.many, problem.count
     many.twist[:], many.impulse[:n] = problem.twists, 0.0
-    scale = assemble(n, many)
+    scale = assemble_contact_blocks(n, many)
     many.twist[:], many.impulse[:n] = problem.twists, p.reshape(n, 3)
-    assemble(n, many)
-    return residual_of(0, n, True, many) / scale
+    assemble_contact_blocks(n, many)
+    return max_contact_residual(0, n, True, many) / scale
 
 
 def with_friction(problem: problems.Frictional, samples: int) -> list[Outcome]:
@@ -214,13 +219,13 @@ def with_friction(problem: problems.Frictional, samples: int) -> list[Outcome]:
 
     def sweeps():
         work["impulse"][:] = work["change"][:] = 0.0
-        factor_blocks(n, work)
+        invert_contact_blocks(n, work)
         return cone_sweeps(n, work["friction"], goal, LIMIT, work)[0]
 
     def pyramid():
         work["impulse"][:] = 0.0
         W, b, mu, p = (work[name] for name in ("delassus", "bias", "friction", "impulse"))
-        return pyramid_fallback(W, b, mu, n, p, work["fallback_float"], work["fallback_int"], PIVOTS)[1]
+        return solve_pyramid_lcp(W, b, mu, n, p, work["fallback_float"], work["fallback_int"], PIVOTS)[1]
 
     for name, solve in (("sweeps, dense", sweeps), ("Lemke, pyramid", pyramid)):
         count = solve()

@@ -11,7 +11,7 @@ from functools import cache
 import numpy as np
 from numpy.typing import ArrayLike
 
-from physics.kernels.state.copy_if_finite import take_in
+from physics.kernels.state.copy_if_finite import copy_if_finite
 from physics.keywords import nearest_first
 from physics.parallel.bound_call import compiled
 from physics.summary import shown
@@ -131,7 +131,7 @@ def take_finite(value: ArrayLike, target: np.ndarray, field: str) -> None:
 
 @cache
 def _taking() -> Callable[[np.ndarray, np.ndarray], bool]:
-    return compiled(take_in, (np.zeros((1, 1)), np.zeros((1, 1))))
+    return compiled(copy_if_finite, (np.zeros((1, 1)), np.zeros((1, 1))))
 
 
 def _not_finite(array: np.ndarray, field: str) -> ValueError:

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from physics import validation
-from physics.kernels.forces.queries import look_at_fields
-from physics.kernels.half_space.gap_queries import spring_energies
+from physics.kernels.forces.queries import evaluate_fields
+from physics.kernels.half_space.gap_queries import contact_spring_energies
 from physics.kernels.state import layout as at
-from physics.kernels.state.contact_law_dispatch import STIFFNESS
+from physics.kernels.state.contact_law_dispatch import LAW_STIFFNESS
 from physics.kernels.time_stepping.workspace import body_records
 from physics.parallel.exclusive import exclusive
 from physics.scene.field_errors import raised
@@ -64,9 +64,9 @@ def _diagnose(world: World) -> Diagnostics:
     if world.plan.fields:
         potential += _look_at(world)[1].reshape(shape)
     laws = world.plan.laws
-    if STIFFNESS in laws:
-        energies, column = np.empty(len(world.state)), world.params.shape[1] - len(laws) + laws.index(STIFFNESS)
-        spring_energies(world.state, world.params, world.shapes, world.walls, column, energies)
+    if LAW_STIFFNESS in laws:
+        energies, column = np.empty(len(world.state)), world.params.shape[1] - len(laws) + laws.index(LAW_STIFFNESS)
+        contact_spring_energies(world.state, world.params, world.shapes, world.walls, column, energies)
         potential += energies.reshape(shape)
     return Diagnostics(
         kinetic_energy=0.5 * np.sum(momentum * world.linvel + angular * world.angvel, axis=-1),
@@ -97,7 +97,7 @@ def _look_at(world: World) -> tuple[np.ndarray, np.ndarray]:
     if world.plan.fields:
         arrays = world.state, world.params, world.shapes
         try:
-            look_at_fields(*arrays, world.plan.tilted, world.time, body_records(world.scratch[0]), wrenches, energies)
+            evaluate_fields(*arrays, world.plan.tilted, world.time, body_records(world.scratch[0]), wrenches, energies)
         except IndexError as error:
             raise raised(error, world.plan.fields) from error
     return wrenches, energies

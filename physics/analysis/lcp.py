@@ -19,11 +19,11 @@ PSD_TOLERANCE = 2.0**-46  # times n and the largest entry: what rounding may do 
 class LcpStatus(IntEnum):
     """End of a pivoting solver. `message` says what to do."""
 
-    SOLVED = scaling_and_certificate.SOLVED
-    RAY = scaling_and_certificate.RAY
-    PIVOT_LIMIT = scaling_and_certificate.PIVOT_LIMIT
-    BAD_DATA = scaling_and_certificate.BAD_DATA
-    INACCURATE = scaling_and_certificate.INACCURATE
+    SOLVED = scaling_and_certificate.LCP_SOLVED
+    RAY = scaling_and_certificate.LCP_RAY
+    PIVOT_LIMIT = scaling_and_certificate.LCP_PIVOT_LIMIT
+    BAD_DATA = scaling_and_certificate.LCP_BAD_DATA
+    INACCURATE = scaling_and_certificate.LCP_INACCURATE
 
     @property
     def message(self) -> str:

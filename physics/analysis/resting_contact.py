@@ -113,12 +113,12 @@ def _touching(world: World, i: int, gap: float, v: np.ndarray, w: np.ndarray) ->
     # What rounding of v and of ω x r may leave of a normal velocity that is zero.
     rounding = 1e-9 * (np.linalg.norm(v) + radius * np.linalg.norm(w))
     for k, wall in enumerate(world.walls):
-        n = wall[at.NORMAL : at.NORMAL + 3]
+        n = wall[at.WALL_NORMAL : at.WALL_NORMAL + 3]
         for feature in range(features):
             point = np.empty(3)
             contact_point(world.state, world.params, world.shapes, world.walls, i, k, feature, point)
             arm = point - position
-            if n @ point - wall[at.OFFSET] <= gap and n @ (v + np.cross(w, arm)) <= rounding:
+            if n @ point - wall[at.WALL_OFFSET] <= gap and n @ (v + np.cross(w, arm)) <= rounding:
                 arms.append(arm)
                 normals.append(n)
     return np.array(arms).reshape(-1, 3), np.array(normals).reshape(-1, 3)

@@ -298,10 +298,10 @@ def _logged(world: World, start: float, end: float, step: Callable[[], StepRepor
     for body, (count, rows) in enumerate(zip(world.event_counts.tolist(), world.event_log)):
         for row in rows[:count].tolist():
             impulse, point, normal = (
-                tuple(row[k : k + 3]) for k in (event_log.IMPULSE, event_log.POINT, event_log.NORMAL)
+                tuple(row[k : k + 3]) for k in (event_log.EVENT_IMPULSE, event_log.EVENT_POINT, event_log.EVENT_NORMAL)
             )
-            t, kind, wall, other = row[: event_log.IMPULSE]
+            t, kind, wall, other = row[: event_log.EVENT_IMPULSE]
             events.append(
-                Event(start + t, event_log.KINDS[int(kind)], body, int(wall), impulse, int(other), point, normal)
+                Event(start + t, event_log.KIND_NAMES[int(kind)], body, int(wall), impulse, int(other), point, normal)
             )
     return sorted(events, key=lambda event: event.t)

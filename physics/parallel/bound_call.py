@@ -17,14 +17,14 @@ import numpy as np
 from numba.core.compiler_lock import global_compiler_lock
 
 from physics.kernels.parallel.prepared_calls import (
-    ARGUMENTS,
-    CODE,
-    ENTRY_OF,
+    JOB_ARGUMENTS,
+    JOB_ENTRY,
+    JOB_EXCEPTION,
     JOB_SIZE,
-    RAISED,
-    perform,
-    perform_one,
-    raise_again,
+    JOB_STATUS,
+    reraise,
+    run_job,
+    run_jobs,
 )
 
 # Seconds after which the first step of a plan says that it is compiling.
@@ -45,15 +45,15 @@ class Work:
     jobs, count : int
         Address of the table of these calls, and their number: what `physics.kernels.parallel.prepared_calls` is told.
     perform : callable
-        Makes the calls; whether one raised something, which `raise_again` raises.
+        Makes the calls; whether one raised something, which `reraise` raises.
     """
 
     def __init__(self, calls: list[tuple[int, tuple]]):
         self._calls = calls  # they own what the table has addresses of
         self._words = [np.array(_words(arguments), dtype=np.int64) for _, arguments in calls]
         self._table = np.zeros((len(calls), JOB_SIZE), dtype=np.int64)
-        self._table[:, ENTRY_OF] = [entry for entry, _ in calls]
-        self._table[:, ARGUMENTS] = [words.ctypes.data for words in self._words]
+        self._table[:, JOB_ENTRY] = [entry for entry, _ in calls]
+        self._table[:, JOB_ARGUMENTS] = [words.ctypes.data for words in self._words]
         self.jobs, self.count = self._table.ctypes.data, len(calls)
         if self.count == 1:
             self.perform = partial(_performing_one(), self.jobs)
@@ -68,11 +68,11 @@ class Work:
     def raise_again(self) -> None:
         """Raise what one of the calls raised when they were made last, if one did."""
         for row in self._table:
-            raise_again(row[CODE], row[RAISED])
+            reraise(row[JOB_STATUS], row[JOB_EXCEPTION])
 
     def forget(self) -> None:
         """Let none of the calls have raised anything."""
-        self._table[:, CODE] = 0
+        self._table[:, JOB_STATUS] = 0
 
     def put(self, argument: int, number: float) -> None:
         """Give the first of the calls another number for an argument that is one."""
@@ -90,12 +90,12 @@ class Work:
 
 @cache
 def _performing() -> Callable[[int, int], bool]:
-    return compiled(perform, (0, 0))
+    return compiled(run_jobs, (0, 0))
 
 
 @cache
 def _performing_one() -> Callable[[int], bool]:
-    return compiled(perform_one, (0,))
+    return compiled(run_job, (0,))
 
 
 def _words(arguments: tuple) -> list[int]:

@@ -63,9 +63,9 @@ class Team:
     def __init__(self, threads: int, worlds: int):
         self.size = min(threads, worlds)
         chunk = min(WORLDS_AT_ONCE, worlds // (TURNS_PER_THREAD * self.size)) if self.size > 1 else worlds
-        self.turns = at.make_turns(self.size, worlds, max(1, chunk))
-        self.taken = at.make_taken(self.size, worlds)
-        self._crew = spin_wait_workers.make_crew(self.size - 1)
+        self.turns = at.make_ranges(self.size, worlds, max(1, chunk))
+        self.taken = at.make_taken_lists(self.size, worlds)
+        self._crew = spin_wait_workers.make_worker_table(self.size - 1)
         self._told: Sequence[Work] | None = None  # what the crew has been told to do
         self._futures: dict[int, Future] = {}
         self._is_interrupted = False  # members may still be busy with the last run
@@ -87,52 +87,60 @@ class Team:
             self._let_go()
         if calls is not self._told:
             self._tell(calls)
-        outcome, self._is_interrupted = spin_wait_workers.UNFINISHED, True
+        outcome, self._is_interrupted = spin_wait_workers.RUN_UNFINISHED, True
         try:
             if self._summon(self._members) > 0:
                 self._send_for_all()
             outcome = self._lead(self._members, calls[0].jobs, calls[0].count, self._patience)
         finally:
-            if outcome == spin_wait_workers.UNFINISHED:
+            if outcome == spin_wait_workers.RUN_UNFINISHED:
                 self._let_go()
         self._is_interrupted = False
-        if outcome != spin_wait_workers.DONE:
+        if outcome != spin_wait_workers.RUN_DONE:
             _raise(calls)
 
     def _start(self) -> None:
         self._pool = ThreadPoolExecutor(self.size - 1, thread_name_prefix="rigid-env")
         self._pid, self._told, self._futures, self._is_interrupted = os.getpid(), None, {}, False
-        self._crew[...] = self.taken[:, at.TAKEN] = 0
+        self._crew[...] = self.taken[:, at.TAKEN_COUNT] = 0
         is_fixed = os.environ.get(SWITCH) == "fixed"
         if not is_fixed:
-            self._crew[0, spin_wait_workers.GIVE_WAY], self._crew[0, spin_wait_workers.PROCESSOR] = (
+            (
+                self._crew[0, spin_wait_workers.CREW_YIELD_ADDRESS],
+                self._crew[0, spin_wait_workers.CREW_PROCESSOR_ADDRESS],
+            ) = (
                 processors.giving_way(),
                 processors.telling(),
             )
-        self._crew[0, spin_wait_workers.BETWEEN], self._crew[0, spin_wait_workers.BRIEF] = (
+        self._crew[0, spin_wait_workers.CREW_YIELD_INTERVAL], self._crew[0, spin_wait_workers.CREW_BRIEF_PAUSES] = (
             _pauses(BETWEEN),
             _pauses(BRIEF),
         )
         self._patience, self._stay = _pauses(PATIENCE), _pauses(STAY)
         self._members = (self.size if is_fixed else min(self.size, processors.usable())) - 1
-        self._summon = partial(compiled(spin_wait_workers.summon, (self._crew, self.turns, 0)), self._crew, self.turns)
-        self._dismiss = partial(compiled(spin_wait_workers.dismiss, (self._crew,)), self._crew)
-        self._lead = partial(
-            compiled(spin_wait_workers.lead, (self._crew, self.taken, 0, 0, 0, 0)), self._crew, self.taken
+        self._summon = partial(
+            compiled(spin_wait_workers.wake_workers, (self._crew, self.turns, 0)), self._crew, self.turns
         )
-        self._serve = partial(compiled(spin_wait_workers.serve, (self._crew, 0, 0)), self._crew)
+        self._dismiss = partial(compiled(spin_wait_workers.stop_workers, (self._crew,)), self._crew)
+        self._lead = partial(
+            compiled(spin_wait_workers.run_and_join, (self._crew, self.taken, 0, 0, 0, 0)), self._crew, self.taken
+        )
+        self._serve = partial(compiled(spin_wait_workers.worker_loop, (self._crew, 0, 0)), self._crew)
 
     def _tell(self, calls: Sequence[Work]) -> None:
         self._told = calls
         for member, call in enumerate(calls[1:], 1):
-            self._crew[member, spin_wait_workers.JOBS], self._crew[member, spin_wait_workers.COUNT] = (
+            (
+                self._crew[member, spin_wait_workers.WORKER_JOBS],
+                self._crew[member, spin_wait_workers.WORKER_JOB_COUNT],
+            ) = (
                 call.jobs,
                 call.count,
             )
 
     def _send_for_all(self) -> None:
         """Have the threads of the pool take the places of those who are away."""
-        for member in 1 + np.flatnonzero(self._crew[1:, spin_wait_workers.WAS_AWAY]):
+        for member in 1 + np.flatnonzero(self._crew[1:, spin_wait_workers.WORKER_WAS_IDLE]):
             self._futures[member] = self._pool.submit(self._be_member, member)
 
     def _be_member(self, member: int) -> None:
@@ -155,8 +163,8 @@ class Team:
 
 def listed(worlds: np.ndarray) -> np.ndarray:
     """Worlds (n,) as a list (FIRST + n,) int64 of those that a thread took."""
-    taken = np.zeros(at.FIRST + len(worlds), dtype=np.int64)
-    taken[at.TAKEN], taken[at.FIRST :] = len(worlds), worlds
+    taken = np.zeros(at.TAKEN_FIRST_WORLD + len(worlds), dtype=np.int64)
+    taken[at.TAKEN_COUNT], taken[at.TAKEN_FIRST_WORLD :] = len(worlds), worlds
     return taken
 
 
@@ -178,5 +186,5 @@ def _pauses(seconds: float) -> int:
 @cache
 def _pause() -> float:
     """Length of a pause [s], which differs from processor to processor: of the trial that was disturbed least."""
-    pause, count = compiled(spin_wait_workers.pause_often, (0,)), 1000
+    pause, count = compiled(spin_wait_workers.repeat_pause, (0,)), 1000
     return min(timeit.repeat(lambda: pause(count), number=1, repeat=7)) / count

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from physics.kernels.state.contact_law_dispatch import ROLLING, SPIN, STIFFNESS, TANGENTIAL
+from physics.kernels.state.contact_law_dispatch import LAW_ROLLING, LAW_SPIN, LAW_STIFFNESS, LAW_TANGENTIAL
 from physics.kernels.state.sleeping import SLEEP_SIZE
 from physics.scene.effects import Actuator, RollingFriction, Sleeping, SpinFriction
 from physics.scene.force_field import Field, FieldSlot
@@ -97,7 +97,7 @@ def _field_rows(fields: tuple[FieldSlot, ...]) -> list[Row]:
 def _tangential_row(scene, contact, laws) -> Row:
     if contact is None or contact.tangential is None:
         return Row("tangential restitution", False, "not declared", "")
-    if TANGENTIAL not in laws:
+    if LAW_TANGENTIAL not in laws:
         return Row("tangential restitution", False, "declared, but nothing can touch", "")
     return Row("tangential restitution", True, f"declared: e_t = {contact.tangential}", "a target along the wall")
 
@@ -105,7 +105,7 @@ def _tangential_row(scene, contact, laws) -> Row:
 def _compliance_row(contact, laws) -> Row:
     if contact is None or contact.stiffness is None:
         return Row("compliance", False, "not declared: contact is rigid", "")
-    if STIFFNESS not in laws:
+    if LAW_STIFFNESS not in laws:
         return Row("compliance", False, "declared, but nothing can touch", "")
     reason = f"declared: {contact.stiffness} N/m, {contact.damping} N s/m per contact point"
     return Row("compliance", True, reason, "a number on the diagonal, and a target")
@@ -156,8 +156,8 @@ def make_rows(scene, accuracy, seen, refined) -> tuple[Row, ...]:
         _restitution_row(contact, touching),
         _tangential_row(scene, contact, seen.laws),
         _compliance_row(contact, seen.laws),
-        _resistance_row(scene, RollingFriction, ROLLING, seen.laws),
-        _resistance_row(scene, SpinFriction, SPIN, seen.laws),
+        _resistance_row(scene, RollingFriction, LAW_ROLLING, seen.laws),
+        _resistance_row(scene, SpinFriction, LAW_SPIN, seen.laws),
         _gyroscopic_row(seen.isotropic, seen.turned),
         _center_row(seen.uneven),
         *_field_rows(seen.fields),

@@ -8,7 +8,15 @@ import numpy as np
 
 from physics import validation
 from physics.kernels.forces.force_field_dispatch import Term
-from physics.kernels.state.contact_law_dispatch import ANISOTROPY, DAMPING, LAWS, ROLLING, SPIN, STIFFNESS, TANGENTIAL
+from physics.kernels.state.contact_law_dispatch import (
+    LAW_ANISOTROPY,
+    LAW_DAMPING,
+    LAW_ROLLING,
+    LAW_SPIN,
+    LAW_STIFFNESS,
+    LAW_TANGENTIAL,
+    LAWS,
+)
 from physics.kernels.state.layout import BLOCK, ELLIPSOID, HULL, SPHERE, VERTEX_COUNT
 from physics.mass.inertia import principal_axes
 from physics.plan.accuracy import EVENTS, SCHEMES, Accuracy, resolve
@@ -180,12 +188,12 @@ def _laws(scene: Scene, contact: Contact, friction: Friction | None) -> tuple[st
     """The laws of `physics.kernels.state.contact_law_dispatch` that act where bodies touch walls."""
     has_round = any(body.kind in ("sphere", "ellipsoid") for body in scene.bodies)
     is_on = {
-        TANGENTIAL: contact.tangential is not None,
-        ROLLING: has_round and scene.effect(RollingFriction) is not None,
-        SPIN: has_round and scene.effect(SpinFriction) is not None,
-        ANISOTROPY: friction is not None and friction.axis is not None,
-        STIFFNESS: contact.stiffness is not None,
-        DAMPING: contact.stiffness is not None,
+        LAW_TANGENTIAL: contact.tangential is not None,
+        LAW_ROLLING: has_round and scene.effect(RollingFriction) is not None,
+        LAW_SPIN: has_round and scene.effect(SpinFriction) is not None,
+        LAW_ANISOTROPY: friction is not None and friction.axis is not None,
+        LAW_STIFFNESS: contact.stiffness is not None,
+        LAW_DAMPING: contact.stiffness is not None,
     }
     return tuple(law for law in LAWS if is_on[law])
 
@@ -246,11 +254,11 @@ def _check_collisions(accuracy: Accuracy) -> None:
 def _check_laws(scene: Scene, seen: _Seen, many: bool, scheme: int) -> None:
     """Refuse laws of contact where they are not known."""
     declared = {
-        TANGENTIAL: "Contact.tangential", ROLLING: "RollingFriction", SPIN: "SpinFriction",
-        ANISOTROPY: "Friction with two coefficients", STIFFNESS: "Contact.stiffness",
+        LAW_TANGENTIAL: "Contact.tangential", LAW_ROLLING: "RollingFriction", LAW_SPIN: "SpinFriction",
+        LAW_ANISOTROPY: "Friction with two coefficients", LAW_STIFFNESS: "Contact.stiffness",
     }  # fmt: skip
     names = ", ".join(declared[law] for law in seen.laws if law in declared)
-    unknown = ", ".join(declared[law] for law in seen.laws if law in (ROLLING, SPIN, STIFFNESS))
+    unknown = ", ".join(declared[law] for law in seen.laws if law in (LAW_ROLLING, LAW_SPIN, LAW_STIFFNESS))
     if unknown and scheme == EVENTS:
         raise ValueError(
             f"accuracy has the scheme 'events', which does not know {unknown}; allowed are 'fast', 'balanced' and "
@@ -261,7 +269,7 @@ def _check_laws(scene: Scene, seen: _Seen, many: bool, scheme: int) -> None:
             f"Scene.effects holds {names}, which act between a body and a wall; allowed are scenes of one body, or "
             "with Contact(between_bodies=False), without hulls and without Spring between bodies"
         )
-    for b, body in enumerate(scene.bodies if TANGENTIAL in seen.laws else ()):
+    for b, body in enumerate(scene.bodies if LAW_TANGENTIAL in seen.laws else ()):
         if body.kind != "sphere":
             raise ValueError(
                 f"Contact.tangential is {seen.contact.tangential}, but Scene.bodies[{b}] is a {body.kind}; allowed "

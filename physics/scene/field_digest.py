@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 from numba.core.dispatcher import Dispatcher
 
-from physics.kernels.compile.decorators import checked
+from physics.kernels.compile.decorators import user_kernel
 from physics.kernels.compile.fused.dispatcher import Kernel
 
 
@@ -93,7 +93,7 @@ def as_it_is(function: Kernel) -> Kernel:
             if _COMPILED_AS.setdefault(each, found) != found:
                 _COMPILED_AS[each] = found
                 each.renew() if isinstance(each, Kernel) else each.recompile()
-        _AS_IT_IS[key] = checked(function.py_func)
+        _AS_IT_IS[key] = user_kernel(function.py_func)
     return _AS_IT_IS[key]
 
 

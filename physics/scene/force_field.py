@@ -20,13 +20,13 @@ from typing import ClassVar
 
 import numpy as np
 
-from physics.kernels.compile.decorators import checked
+from physics.kernels.compile.decorators import user_kernel
 from physics.kernels.compile.fused.dispatcher import Kernel
 from physics.kernels.forces.force_field_dispatch import AIR, LOAD, Term
 from physics.scene import field_check
 from physics.scene.field_digest import as_it_is, digest
 
-field_function = checked
+field_function = user_kernel
 
 
 @dataclass(frozen=True)

@@ -157,7 +157,7 @@ class Wind(Checked):
         return self.gust == 0
 
     def columns(self, body, worlds):
-        phases = np.zeros((len(worlds), wind.SIZE - wind.PHASES))
+        phases = np.zeros((len(worlds), wind.WIND_SIZE - wind.WIND_PHASES))
         if self.gust > 0:
             for row, world in zip(phases, worlds):
                 row[:] = 2 * np.pi * np.random.default_rng([self.seed, int(world)]).random(len(row))

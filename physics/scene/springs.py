@@ -8,7 +8,7 @@ from typing import ClassVar
 import numpy as np
 
 from physics import validation
-from physics.kernels.forces import spring, two_body_spring
+from physics.kernels.forces import implicit_two_body_spring, spring, two_body_spring
 from physics.keywords import known_keywords
 from physics.scene.force_field import Checked
 
@@ -91,11 +91,11 @@ class Spring(Checked):
         """Columns of one end of a spring between bodies, or of a body at neither."""
         ends = {self.body: (self.point, self.other, self.anchor), self.other: (self.anchor, self.body, self.point)}
         here, other, there = ends.get(body, ((0.0, 0.0, 0.0), -1, (0.0, 0.0, 0.0)))
-        columns = np.zeros(two_body_spring.SIZE)
-        columns[spring.POINT : spring.POINT + 3] = here
-        columns[spring.LENGTH : spring.DAMPING + 1] = self.length, self.stiffness, self.damping
-        columns[two_body_spring.OTHER] = other
-        columns[two_body_spring.OTHER_POINT : two_body_spring.OTHER_POINT + 3] = there
+        columns = np.zeros(implicit_two_body_spring.LINK_SIZE)
+        columns[spring.SPRING_POINT : spring.SPRING_POINT + 3] = here
+        columns[spring.SPRING_LENGTH : spring.SPRING_DAMPING + 1] = self.length, self.stiffness, self.damping
+        columns[implicit_two_body_spring.LINK_OTHER] = other
+        columns[implicit_two_body_spring.LINK_OTHER_POINT : implicit_two_body_spring.LINK_OTHER_POINT + 3] = there
         return columns
 
 
@@ -132,7 +132,7 @@ class Push(Checked):
     frame: str = "world"
     body: int = 0
 
-    function: ClassVar = spring.push
+    function: ClassVar = spring.push_load
     _rates: ClassVar = spring.push_rates
     _soften: ClassVar = spring.soften_push
     has_many: ClassVar[bool] = True

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from physics.kernels.forces.actuator_lag import follow, shorten
+from physics.kernels.forces.actuator_lag import apply_actuator_lag, clamp_command
 from physics.scene.effects import Actuator
 from physics.world.batch import Batch
 from physics.world.report import add_report
@@ -74,7 +74,7 @@ class Actuation:
             self._command = self._nothing()
         self._command[...] = wrench.reshape(-1, 6)
         limits = (self.actuator.limit_force, self.actuator.limit_torque)
-        shorten(self._command, *(np.inf if limit is None else limit for limit in limits))
+        clamp_command(self._command, *(np.inf if limit is None else limit for limit in limits))
         applied = self.applied.reshape(-1, 6)
         for k, (share, tread) in enumerate(self._treads(start, dt)):
             gone, kept = 1.0, 0.0
@@ -82,7 +82,7 @@ class Actuation:
                 x = share * dt / self.actuator.lag
                 gone = -math.expm1(-x)
                 kept = gone / x
-            follow(tread, gone, kept, share, k == 0, self._output, applied)
+            apply_actuator_lag(tread, gone, kept, share, k == 0, self._output, applied)
 
     def _treads(self, start: float, dt: float) -> list[tuple[float, np.ndarray]]:
         """(share of the step, command) of the staircase from `start` over `dt`; zero before the first command."""

@@ -8,13 +8,13 @@ from dataclasses import replace
 import numpy as np
 
 from physics.kernels.event_driven import workspace
-from physics.kernels.half_space.gap_queries import angular_momenta
+from physics.kernels.half_space.gap_queries import write_angular_momenta
 from physics.kernels.multibody.data import arrays as many
-from physics.kernels.multibody.stepping.adaptive_substep import LEAST_SLOP, LEAST_TOLERANCE
+from physics.kernels.multibody.stepping.adaptive_substep import MIN_RELATIVE_SLOP, MIN_SOLVER_TOLERANCE
 from physics.kernels.state import layout as at
-from physics.kernels.time_stepping.contact_stages import memory_size
-from physics.kernels.time_stepping.midpoint_friction import FEW
-from physics.kernels.time_stepping.spring_coupled_step import make_linked
+from physics.kernels.time_stepping.contact_stages import wall_memory_size
+from physics.kernels.time_stepping.midpoint_friction import MEAN_SLIP_CONTACTS
+from physics.kernels.time_stepping.spring_coupled_step import make_linked_world
 from physics.kernels.time_stepping.workspace import make_workspace
 from physics.plan.accuracy import Accuracy
 from physics.plan.plan import Plan
@@ -29,22 +29,24 @@ def make_scratch(scene: Scene, plan: Plan, walls: np.ndarray, accuracy: Accuracy
     """Working memory of one thread, with the numerical settings in it; `walls` is the table of `parameters`."""
     if plan.refined:
         accuracy = replace(
-            accuracy, tolerance=max(accuracy.tolerance, LEAST_TOLERANCE), slop=max(accuracy.slop, LEAST_SLOP)
+            accuracy,
+            tolerance=max(accuracy.tolerance, MIN_SOLVER_TOLERANCE),
+            slop=max(accuracy.slop, MIN_RELATIVE_SLOP),
         )
     bodies = len(scene.bodies)
     numbers = {
         "tolerance": accuracy.tolerance, "sweeps": accuracy.iterations,
         "splits": accuracy.impacts * (bodies if plan.many else 1),
         "relative_slop": accuracy.slop, "rest_share": accuracy.rest_share,
-        "mean_slip": FEW if accuracy.slip == "mean" else 0,
+        "mean_slip": MEAN_SLIP_CONTACTS if accuracy.slip == "mean" else 0,
     }  # fmt: skip
     if plan.many:
-        return many.make_many(
+        return many.make_bodies_workspace(
             bodies, walls, plan.terms, parameters.polyhedra(scene.bodies), meet=plan.meeting,
             in_turn=accuracy.collisions == "sequential", in_time=bool(plan.refined), **numbers,
         )  # fmt: skip
     if plan.linked:
-        return make_linked(bodies, plan.terms, **numbers)
+        return make_linked_world(bodies, plan.terms, **numbers)
     return make_workspace(walls, plan.features, plan.terms, plan.laws, **numbers)
 
 
@@ -54,7 +56,7 @@ def make_motion(scene: Scene, plan: Plan, accuracy: Accuracy):
     if plan.events:
         return workspace.make_motion(walls, plan.features, accuracy.collisions == "sequential")
     if plan.refined:
-        return many.make_kept(bodies, many.memory_size(bodies, walls, parameters.polyhedra(scene.bodies)))
+        return many.make_snapshots(bodies, many.warm_start_size(bodies, walls, parameters.polyhedra(scene.bodies)))
     return None
 
 
@@ -63,8 +65,8 @@ def make_memory(scene: Scene, plan: Plan, worlds: int) -> np.ndarray:
     bodies, walls = len(scene.bodies), len(scene.walls)
     if plan.many:
         polyhedra = parameters.polyhedra(scene.bodies)
-        return np.zeros((worlds, many.memory_size(bodies, walls, polyhedra, bool(plan.refined))))
-    return np.zeros((worlds * bodies if plan.contact else 1, memory_size(max(walls * plan.features, 1))))
+        return np.zeros((worlds, many.warm_start_size(bodies, walls, polyhedra, bool(plan.refined))))
+    return np.zeros((worlds * bodies if plan.contact else 1, wall_memory_size(max(walls * plan.features, 1))))
 
 
 def check_room(worlds: int, bodies: int, plan: Plan) -> None:
@@ -103,4 +105,4 @@ def fill(world: Batch) -> None:
     parameters.write_laws(world.params, plan.laws, scene.effects)
     columns = world.params[:, at.PARAM_SIZE :]
     write_columns(plan.fields, columns, world.body_count, np.arange(world.worlds))
-    angular_momenta(np.arange(len(world.state)), world.state, world.params)
+    write_angular_momenta(np.arange(len(world.state)), world.state, world.params)

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from physics.kernels.half_space.gap_queries import contact_point
+from physics.kernels.half_space.persistent_contacts import WALL_MEMORY_HEAD
 from physics.kernels.multibody.data import arrays as many
 from physics.kernels.state import layout as at
-from physics.kernels.time_stepping.contact_stages import MEMORY_HEAD
 from physics.world.batch import Batch
 
 
@@ -16,7 +16,7 @@ def contact_ends(world: Batch, index: int) -> np.ndarray:
     if not world.plan.contact:
         return np.zeros((0, 2), dtype=np.int64)
     if world.plan.many:
-        return _many_rows(world, index)[:, many.FIRST : many.SECOND + 1].astype(np.int64)
+        return _many_rows(world, index)[:, many.WARM_BODY_A : many.WARM_BODY_B + 1].astype(np.int64)
     ends = [(b, -1 - slot // world.plan.features) for b in range(world.body_count) for slot in _slots(world, index, b)]
     return np.array(ends, dtype=np.int64).reshape(-1, 2)
 
@@ -27,8 +27,10 @@ def contact_forces(world: Batch, index: int) -> tuple[np.ndarray, np.ndarray]:
         return np.zeros((0, 3)), np.zeros((0, 3))
     if world.plan.many:
         rows = _many_rows(world, index)
-        length = world.memory[index, many.STAGE_LENGTH] or 1.0  # no row where nothing touched yet
-        return rows[:, many.POINT : many.POINT + 3].copy(), rows[:, many.IMPULSE : many.IMPULSE + 3] / length
+        length = world.memory[index, many.WARM_STAGE_LENGTH] or 1.0  # no row where nothing touched yet
+        return rows[:, many.WARM_POINT : many.WARM_POINT + 3].copy(), rows[
+            :, many.WARM_IMPULSE : many.WARM_IMPULSE + 3
+        ] / length
     found = [_wall_contact(world, index, b, slot) for b in range(world.body_count) for slot in _slots(world, index, b)]
     points, forces = zip(*found) if found else ((), ())
     return np.array(points).reshape(-1, 3), np.array(forces).reshape(-1, 3)
@@ -37,14 +39,16 @@ def contact_forces(world: Batch, index: int) -> tuple[np.ndarray, np.ndarray]:
 def _many_rows(world: Batch, index: int) -> np.ndarray:
     """Remembered contacts (n, `MEMORY_SIZE`) of one world in which bodies touch each other."""
     row = world.memory[index]
-    count = int(row[many.CONTACT_COUNT])
-    return row[many.MEMORY_HEAD : many.MEMORY_HEAD + many.MEMORY_SIZE * count].reshape(count, many.MEMORY_SIZE)
+    count = int(row[many.WARM_CONTACT_COUNT])
+    return row[many.WARM_HEADER_SIZE : many.WARM_HEADER_SIZE + many.WARM_CONTACT_SIZE * count].reshape(
+        count, many.WARM_CONTACT_SIZE
+    )
 
 
 def _slots(world: Batch, index: int, body: int) -> list[int]:
     """Slots (wall * features + feature) at which a body rests."""
     row = world.memory[index * world.body_count + body]
-    return row[MEMORY_HEAD : MEMORY_HEAD + int(row[1])].astype(int).tolist()
+    return row[WALL_MEMORY_HEAD : WALL_MEMORY_HEAD + int(row[1])].astype(int).tolist()
 
 
 def _wall_contact(world: Batch, index: int, body: int, slot: int) -> tuple[np.ndarray, np.ndarray]:
@@ -53,6 +57,6 @@ def _wall_contact(world: Batch, index: int, body: int, slot: int) -> tuple[np.nd
     row, (wall, feature) = world.memory[i], divmod(slot, world.plan.features)
     point = np.empty(3)
     contact_point(world.state, world.params, world.shapes, world.walls, i, wall, feature, point)
-    impulses_at = MEMORY_HEAD + (world.memory.shape[1] - MEMORY_HEAD) // 4
+    impulses_at = WALL_MEMORY_HEAD + (world.memory.shape[1] - WALL_MEMORY_HEAD) // 4
     impulse = row[impulses_at + 3 * slot : impulses_at + 3 * slot + 3]
-    return point, world.walls[wall, at.NORMAL : at.NORMAL + 9].reshape(3, 3).T @ impulse / row[0]
+    return point, world.walls[wall, at.WALL_NORMAL : at.WALL_NORMAL + 9].reshape(3, 3).T @ impulse / row[0]

@@ -11,7 +11,14 @@ from physics.kernels.compile.decorators import kernel
 from physics.kernels.flight.free_rotation import attitude_series, write_attitude_series
 from physics.kernels.multibody.data.hull_tables import CUBE
 from physics.kernels.state import layout as at
-from physics.kernels.state.contact_law_dispatch import ANISOTROPY, DAMPING, ROLLING, SPIN, STIFFNESS, TANGENTIAL
+from physics.kernels.state.contact_law_dispatch import (
+    LAW_ANISOTROPY,
+    LAW_DAMPING,
+    LAW_ROLLING,
+    LAW_SPIN,
+    LAW_STIFFNESS,
+    LAW_TANGENTIAL,
+)
 from physics.mass.inertia import check_inertia, check_range, principal_axes
 from physics.scene.bodies import Body
 from physics.scene.effects import Contact, Friction, RollingFriction, SpinFriction
@@ -66,12 +73,12 @@ def _write_body(rows, body, masses, moments, R, dimensions) -> None:
 
 # Which effect a law of contact is a number of.
 LAW_EFFECTS = {
-    TANGENTIAL: (Contact, "tangential"),
-    ROLLING: (RollingFriction, "radius"),
-    SPIN: (SpinFriction, "radius"),
-    ANISOTROPY: (Friction, "ratio"),
-    STIFFNESS: (Contact, "stiffness"),
-    DAMPING: (Contact, "damping"),
+    LAW_TANGENTIAL: (Contact, "tangential"),
+    LAW_ROLLING: (RollingFriction, "radius"),
+    LAW_SPIN: (SpinFriction, "radius"),
+    LAW_ANISOTROPY: (Friction, "ratio"),
+    LAW_STIFFNESS: (Contact, "stiffness"),
+    LAW_DAMPING: (Contact, "damping"),
 }
 
 
@@ -192,8 +199,8 @@ def wall_table(walls: tuple[HalfSpace, ...], along: np.ndarray | None = None) ->
             axis = along[k] / np.linalg.norm(along[k])
         t1 = axis - (axis @ n) * n
         t1 /= np.linalg.norm(t1)
-        row[at.NORMAL : at.NORMAL + 3] = n
-        row[at.TANGENT_1 : at.TANGENT_1 + 3] = t1
-        row[at.TANGENT_2 : at.TANGENT_2 + 3] = np.cross(n, t1)
-        row[at.OFFSET] = wall.offset
+        row[at.WALL_NORMAL : at.WALL_NORMAL + 3] = n
+        row[at.WALL_TANGENT_1 : at.WALL_TANGENT_1 + 3] = t1
+        row[at.WALL_TANGENT_2 : at.WALL_TANGENT_2 + 3] = np.cross(n, t1)
+        row[at.WALL_OFFSET] = wall.offset
     return table

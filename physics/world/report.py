@@ -13,11 +13,11 @@ from physics.kernels.state import layout as at
 class Solver(IntEnum):
     """The strongest contact method that a step needed."""
 
-    NONE = 0
-    DIRECT = 1
-    SWEEPS = 2
-    PIVOTING = 3
-    NEWTON = 4
+    NONE = at.METHOD_NONE
+    DIRECT = at.METHOD_DIRECT
+    SWEEPS = at.METHOD_SWEEPS
+    PIVOTING = at.METHOD_PIVOTING
+    NEWTON = at.METHOD_NEWTON
 
 
 class Status(IntEnum):
@@ -88,11 +88,11 @@ def gravest(table, status):
         status[world] = 0
         if table[world, at.FAULTS] > 0.0:
             status[world] = _FAULT
-        elif table[world, at.LEFT_OUT] > 0.0:
+        elif table[world, at.CONTACTS_LEFT_OUT] > 0.0:
             status[world] = _LEFT_OUT
         elif table[world, at.OVERLAP] > 0.0:
             status[world] = _OVERLAP
-        elif table[world, at.COARSE] > 0.0:
+        elif table[world, at.UNRESOLVED_MOTION] > 0.0:
             status[world] = _COARSE
         elif table[world, at.UNCONVERGED] > 0.0:
             status[world] = _UNCONVERGED
@@ -105,7 +105,7 @@ def add_report(total, table):
     """Add a report `table` (worlds, REPORT_SIZE) to that of steps before: counts add up, of the rest the largest."""
     for world in range(table.shape[0]):
         for c in range(at.REPORT_SIZE):
-            if c in (at.PENETRATION, at.RESIDUAL, at.SOLVER, at.OVERLAP, at.FAULTY):
+            if c in (at.PENETRATION, at.RESIDUAL, at.SOLVER, at.OVERLAP, at.FIRST_FAULTY):
                 total[world, c] = max(total[world, c], table[world, c])
             else:
                 total[world, c] += table[world, c]
@@ -150,10 +150,10 @@ class StepReport:
     impacts = property(lambda self: self._table[:, at.SPLITS].astype(np.int64))
     unresolved = property(lambda self: self._table[:, at.UNRESOLVED].astype(np.int64))
     faults = property(lambda self: self._table[:, at.FAULTS].astype(np.int64))
-    left_out = property(lambda self: self._table[:, at.LEFT_OUT].astype(np.int64))
-    coarse = property(lambda self: self._table[:, at.COARSE].astype(np.int64))
+    left_out = property(lambda self: self._table[:, at.CONTACTS_LEFT_OUT].astype(np.int64))
+    coarse = property(lambda self: self._table[:, at.UNRESOLVED_MOTION].astype(np.int64))
     overlap = property(lambda self: self._table[:, at.OVERLAP])
-    fault_body = property(lambda self: self._table[:, at.FAULTY].astype(np.int64) - 1)
+    fault_body = property(lambda self: self._table[:, at.FIRST_FAULTY].astype(np.int64) - 1)
 
     @property
     def solver(self) -> np.ndarray:
@@ -174,8 +174,8 @@ class StepReport:
         Contact problems met their tolerances and were whole, states stayed finite, fields were resolved, and no body
         was put deep into another.
         """
-        return not (self._table[:, at.UNCONVERGED : at.FAULTS + 1].any() or self._table[:, at.LEFT_OUT].any()
-                    or self._table[:, at.OVERLAP].any() or self._table[:, at.COARSE].any())  # fmt: skip
+        return not (self._table[:, at.UNCONVERGED : at.FAULTS + 1].any() or self._table[:, at.CONTACTS_LEFT_OUT].any()
+                    or self._table[:, at.OVERLAP].any() or self._table[:, at.UNRESOLVED_MOTION].any())  # fmt: skip
 
     def messages(self) -> dict[int, str]:
         """World index -> message, for the worlds whose status is not OK."""

@@ -8,9 +8,9 @@ from dataclasses import replace
 import numpy as np
 
 from physics import validation
-from physics.kernels.half_space.gap_queries import angular_momenta
+from physics.kernels.half_space.gap_queries import write_angular_momenta
 from physics.kernels.state import layout as at
-from physics.kernels.state.contact_law_dispatch import STIFFNESS
+from physics.kernels.state.contact_law_dispatch import LAW_STIFFNESS
 from physics.scene.effects import RESISTANCES, Friction
 from physics.scene.force_field import Field, FieldSlot, write_columns
 from physics.summary import shown
@@ -146,7 +146,7 @@ def check_depth(world: Batch, state: np.ndarray, params: np.ndarray, chosen: np.
     if not world.plan.contact:
         return
     gaps, which = wall_gaps(world, state, params)
-    allowed = (SOFT_DEPTH if STIFFNESS in world.plan.laws else START_DEPTH) * params[:, at.RADIUS]
+    allowed = (SOFT_DEPTH if LAW_STIFFNESS in world.plan.laws else START_DEPTH) * params[:, at.RADIUS]
     bad = np.flatnonzero(gaps < -allowed)
     if len(bad):
         k = int(bad[0])
@@ -160,7 +160,7 @@ def check_depth(world: Batch, state: np.ndarray, params: np.ndarray, chosen: np.
 def _adopt(world: Batch, chosen, rows, state, params, what, keep_memory=False) -> None:
     """Check new rows of state and parameters, then write them."""
     check_place(world, state, params, chosen, what)
-    angular_momenta(np.arange(len(rows)), state, params)
+    write_angular_momenta(np.arange(len(rows)), state, params)
     world.state[rows] = state
     world.params[rows] = params
     if world.plan.sleeping:

@@ -38,7 +38,7 @@ def wall_gaps(world: Batch, state: np.ndarray, params: np.ndarray) -> tuple[np.n
     gaps, which = np.empty(len(state)), np.empty(len(state), np.int64)
     deepest_gaps(np.arange(len(state)), state, params, world.shapes, world.walls, gaps, which)
     if len(world.walls):
-        normals, offsets = world.walls[:, at.NORMAL : at.NORMAL + 3], world.walls[:, at.OFFSET]
+        normals, offsets = world.walls[:, at.WALL_NORMAL : at.WALL_NORMAL + 3], world.walls[:, at.WALL_OFFSET]
         for b, body in enumerate(world.scene.bodies):
             if body.kind == "hull":
                 own = state[b :: world.body_count]

@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from physics import validation
-from physics.kernels.forces.force_field_dispatch import declare
+from physics.kernels.forces.force_field_dispatch import register_terms
 from physics.kernels.state import layout as at
-from physics.kernels.state.sleeping import GROUP, SLEEP_SIZE
+from physics.kernels.state.sleeping import SLEEP_GROUP, SLEEP_SIZE
 from physics.kernels.time_stepping.event_log import EVENT_SIZE
 from physics.keywords import known_keywords
 from physics.parallel.bound_call import Work
@@ -118,7 +118,7 @@ class World(Batch):
         self.telling = None  # the thread that tells the recorder of its step
         watch(self)
         self.team = Team(self.threads, self.worlds)
-        declare(self.plan.terms)
+        register_terms(self.plan.terms)
         self._may_raise = self.plan.may_raise
         self.scratch = [
             batch_arrays.make_scratch(self.scene, self.plan, self.walls, self.accuracy) for _ in range(self.team.size)
@@ -379,7 +379,7 @@ class World(Batch):
         """(worlds, bodies) bool: which bodies sleep; see `physics.Sleeping`. A new array."""
         if not self.plan.sleeping:
             return np.zeros((self.worlds, self.body_count), dtype=np.bool_)
-        return self.sleep[:, GROUP].reshape(self.worlds, self.body_count) > 0.0
+        return self.sleep[:, SLEEP_GROUP].reshape(self.worlds, self.body_count) > 0.0
 
     def _check_index(self, world: int) -> None:
         validation.index(world, self.worlds, "world")

@@ -14,7 +14,7 @@ import math
 
 from physics.kernels.compile.decorators import inlined, kernel
 from physics.kernels.math.quaternion import multiply, to_matrix
-from physics.kernels.parallel.work_stealing import FIRST, TAKEN
+from physics.kernels.parallel.work_stealing import TAKEN_COUNT, TAKEN_FIRST_WORLD
 from physics.kernels.state import layout as at
 from rigid_env.tasks import layout as col
 
@@ -149,9 +149,9 @@ def observe_motion(world, first, state, obs):
 def observe_gaps(world, first, state, R, record, walls, obs):
     """Smallest distances of the block's corners from the three walls into obs[world, first : first + 3]."""
     for k in range(3):
-        nx, ny, nz = walls[k, at.NORMAL], walls[k, at.NORMAL + 1], walls[k, at.NORMAL + 2]
+        nx, ny, nz = walls[k, at.WALL_NORMAL], walls[k, at.WALL_NORMAL + 1], walls[k, at.WALL_NORMAL + 2]
         gap = nx * state[world, at.POS] + ny * state[world, at.POS + 1] + nz * state[world, at.POS + 2]
-        gap -= walls[k, at.OFFSET]
+        gap -= walls[k, at.WALL_OFFSET]
         for j in range(3):
             gap -= record[world, col.HALF + j] * abs(R[j] * nx + R[3 + j] * ny + R[6 + j] * nz)
         obs[world, first + k] = clip(gap / GAP_SCALE, -1.0, LENGTH_BOUND)
@@ -213,8 +213,8 @@ def observe_reach(taken, state, record, walls, actions, obs, outcome):
     obs : (worlds, 24) float32, out
     outcome : (worlds, OUTCOME_SIZE) float64, out
     """
-    for i in range(taken[TAKEN]):
-        world = taken[FIRST + i]
+    for i in range(taken[TAKEN_COUNT]):
+        world = taken[TAKEN_FIRST_WORLD + i]
         dx = record[world, col.GOAL] - state[world, at.POS]
         dz = record[world, col.GOAL + 1] - state[world, at.POS + 2]
         obs[world, 0] = clip(dx / LENGTH_SCALE, -LENGTH_BOUND, LENGTH_BOUND)
@@ -241,8 +241,8 @@ def observe_reorient(taken, state, record, walls, actions, obs, outcome):
     two body axes in cyclic order, with the half edges in the same order; the policy need not know which face
     it is. obs is (worlds, 23) float32.
     """
-    for i in range(taken[TAKEN]):
-        world = taken[FIRST + i]
+    for i in range(taken[TAKEN_COUNT]):
+        world = taken[TAKEN_FIRST_WORLD + i]
         face = int(record[world, col.FACE])
         axis = face // 2
         sign = 1.0 if face % 2 == 1 else -1.0

@@ -37,8 +37,8 @@ def test_what_is_deep_in_a_wall_is_taken_out_under_any_load():
     wrench = np.zeros((1, 2, 6))
     wrench[0, 0, 1] = -1e6 * 9.81
     world.step(wrench)
-    # Out to a hundred slops (`position_correction.DEEP`) of a bounding radius of 0.87 m; halves of what is left are
-    # taken per step.
+    # Out to a hundred slops (`position_correction._DEEP_SLOPS`) of a bounding radius of 0.87 m; halves of what is left
+    # are taken per step.
     assert physics.diagnose(world).gap[0, 0] >= -100 * 1e-6 * 0.87
     assert np.abs(world.linvel[0, 0]).max() <= 1e-6 * 1e6 * 9.81 * 0.01  # the tolerance, of the speed its loads give
 

@@ -6,7 +6,7 @@ import numpy as np
 
 from physics.kernels.contact_solver.solve import solve_contacts
 from physics.kernels.math.quaternion import to_matrix
-from physics.kernels.state.contact_law_dispatch import ANISOTROPY, DAMPING, STIFFNESS
+from physics.kernels.state.contact_law_dispatch import LAW_ANISOTROPY, LAW_DAMPING, LAW_STIFFNESS
 from physics.kernels.time_stepping.workspace import make_workspace
 
 SIZE = np.array([2.5, 1.5, 1.0])
@@ -37,7 +37,7 @@ class Problem:
         ratio=None,
         give=None,
     ):
-        laws = (ANISOTROPY,) * (ratio is not None) + (STIFFNESS, DAMPING) * (give is not None)
+        laws = (LAW_ANISOTROPY,) * (ratio is not None) + (LAW_STIFFNESS, LAW_DAMPING) * (give is not None)
         self.work = make_workspace(np.array([FLOOR, SIDE]), 8, laws=laws, tolerance=tolerance, sweeps=2000)
         if ratio is not None:
             self.work["laws"][0, 0] = ratio

@@ -9,17 +9,17 @@ from hypothesis import strategies as st
 
 from physics.kernels.compile.decorators import kernel
 from physics.kernels.contact_law.target_velocity import (
-    CLOSING_SHARE,
-    HIT,
-    NOTHING,
-    RESIDUE,
-    UNSEEN,
-    aim_impact,
-    aim_rest,
-    may_hit,
+    GAP_CLOSING_SHARE,
+    NEGLIGIBLE_SLOP_SHARE,
+    NO_IMPACT,
+    RESIDUAL_APPROACH,
+    TRUE_IMPACT,
+    may_have_impact,
+    set_impact_targets,
+    set_resting_targets,
 )
-from physics.kernels.half_space.persistent_contacts import MEMORY_HEAD
-from physics.kernels.time_stepping.contact_stages import memory_size
+from physics.kernels.half_space.persistent_contacts import WALL_MEMORY_HEAD
+from physics.kernels.time_stepping.contact_stages import wall_memory_size
 from physics.kernels.time_stepping.workspace import make_workspace
 from tests.kernels.contact_problem import FLOOR, SIDE
 
@@ -31,7 +31,7 @@ EVEN = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
 
 @kernel
 def _aim(n, v, w, alpha, R, h, tilted, scratch):
-    aim_rest(n, v, w, alpha, R, h, tilted, scratch[0])
+    set_resting_targets(n, v, w, alpha, R, h, tilted, scratch[0])
 
 
 def posed(slots, gaps, seed, tolerance=1e-9):
@@ -45,7 +45,7 @@ def posed(slots, gaps, seed, tolerance=1e-9):
 
 
 def expected(work, n, v, w, alpha):
-    """Targets by the formulas of `aim_rest` and `gainless`, and the scale of their rounding."""
+    """Targets by the formulas of `set_resting_targets` and `gainless`, and the scale of their rounding."""
     one, targets = work[0], np.zeros((n, 3))
     for i in range(n):
         wall, r = one["slot"][i] // 8, one["arm"][i]
@@ -57,8 +57,8 @@ def expected(work, n, v, w, alpha):
         targets[i] = min(gained[0], max(-u[0], 0.0)), *along
         same_wall = one["slot"][:n] // 8 == wall
         if (one["gap"][:n][same_wall] > SLOP).any():
-            targets[i, 0] -= CLOSING_SHARE * one["gap"][i] / H
-        if np.abs(targets[i]).max() <= max(one["tolerance"] * 10.0 * H, UNSEEN * SLOP / H):
+            targets[i, 0] -= GAP_CLOSING_SHARE * one["gap"][i] / H
+        if np.abs(targets[i]).max() <= max(one["tolerance"] * 10.0 * H, NEGLIGIBLE_SLOP_SHARE * SLOP / H):
             targets[i] = 0.0
     return targets
 
@@ -92,9 +92,9 @@ def test_a_body_at_rest_is_asked_for_nothing():
 
 
 def test_what_is_next_to_nothing_is_not_asked_for():
-    """A turn that gains a contact less than `UNSEEN` slops in the step."""
+    """A turn that gains a contact less than `NEGLIGIBLE_SLOP_SHARE` slops in the step."""
     work = posed([0, 1, 4, 5], np.zeros(4), seed=1)
-    slow = (0.0, 1e-2 * UNSEEN * SLOP / H**2, 0.0)
+    slow = (0.0, 1e-2 * NEGLIGIBLE_SLOP_SHARE * SLOP / H**2, 0.0)
     _aim(4, (0.0, -1.0, 0.0), slow, (0.0, 0.0, 0.0), EVEN, H, None, work)
     assert not work[0]["target"].any()
 
@@ -104,10 +104,10 @@ def test_what_is_next_to_nothing_is_not_asked_for():
 
 @kernel
 def _aim_impact(n, bounce_speed, slop_speed, h, memory, scratch):
-    if not may_hit(bounce_speed, slop_speed, scratch[0]):
-        return NOTHING
+    if not may_have_impact(bounce_speed, slop_speed, scratch[0]):
+        return NO_IMPACT
     y = (NONE, (1.0, 0.0, 0.0, 0.0), NONE, NONE)
-    return aim_impact(n, bounce_speed, slop_speed, y, h, None, memory, scratch[0])
+    return set_impact_targets(n, bounce_speed, slop_speed, y, h, None, memory, scratch[0])
 
 
 speeds = st.sampled_from([-2.0, -0.5, -0.1, -0.011, -0.01, -0.009, 0.0, 0.3])
@@ -129,15 +129,15 @@ def test_an_impact_is_what_one_contact_of_it_is(contacts, restitution, bounce_sp
     work["restitution"], work["target"], work["acceleration"] = restitution, 7.0, residue / H
     work["speed"][0, :n] = [speed for speed, _, _ in contacts]
     work["approach"] = max(0.0, *(-speed for speed, _, _ in contacts))
-    memory = np.zeros((1, memory_size(work["slot"].shape[1])))
-    memory[0, MEMORY_HEAD + work["slot"].shape[1] :: 3][:n] = [pushed for _, _, pushed in contacts]
-    slop_speed, goals, found = SLOP / H, [], NOTHING
+    memory = np.zeros((1, wall_memory_size(work["slot"].shape[1])))
+    memory[0, WALL_MEMORY_HEAD + work["slot"].shape[1] :: 3][:n] = [pushed for _, _, pushed in contacts]
+    slop_speed, goals, found = SLOP / H, [], NO_IMPACT
     for speed, gap, pushed in contacts:
         is_left_over = pushed and -speed <= residue
         bounces = restitution > 0.0 and -speed > bounce_speed
         goals.append(-restitution * speed if bounces or speed > 0.0 else 0.0)
         if bounces or -speed > slop_speed + max(gap, 0.0) / H:
-            found = max(found, RESIDUE if is_left_over else HIT)
+            found = max(found, RESIDUAL_APPROACH if is_left_over else TRUE_IMPACT)
             goals[-1] *= not is_left_over
     assert _aim_impact(n, bounce_speed, slop_speed, H, memory, work) == found
     if found:

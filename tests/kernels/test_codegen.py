@@ -18,7 +18,7 @@ from numba.core.codegen import CPUCodeLibrary
 from numba.core.typeinfer import CallConstraint
 
 import physics
-from physics.kernels.compile.decorators import composed, kernel
+from physics.kernels.compile.decorators import kernel, runtime_kernel
 from physics.kernels.compile.fused.code_libraries import PartLibrary
 from physics.kernels.compile.fused.type_inference import _Network
 from physics.kernels.compile.simd import Lanes
@@ -107,7 +107,7 @@ def users_element(a, i, j):
     return a[i, j]
 
 
-of_user = composed(users_element)
+of_user = runtime_kernel(users_element)
 
 
 @kernel
@@ -126,7 +126,7 @@ import numpy as np
 import physics
 from physics import scenes
 from physics.kernels.compile.decorators import kernel
-from physics.kernels.compile.simd import put_row, row
+from physics.kernels.compile.simd import load_lanes, store_lanes
 
 @kernel
 def element(a, i, j):
@@ -134,7 +134,7 @@ def element(a, i, j):
 
 @kernel
 def moved(a, i, j, k, l):
-    put_row(a, k, l, row(a, i, j))
+    store_lanes(a, k, l, load_lanes(a, i, j))
 
 @kernel
 def asks(a, i, j):
@@ -473,7 +473,7 @@ def users_member(x, k):
     return (x, 2.0 * x, 3.0 * x)[k]
 
 
-member_of_user = composed(users_member)
+member_of_user = runtime_kernel(users_member)
 
 
 @kernel
@@ -502,8 +502,8 @@ def guard(x):
         return -1.0
 
 
-inner = composed(refuse)
-guarded = composed(guard)
+inner = runtime_kernel(refuse)
+guarded = runtime_kernel(guard)
 
 
 @kernel

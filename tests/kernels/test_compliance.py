@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from physics.kernels.contact_solver.solve import PIVOTING
+from physics.kernels.state.layout import METHOD_PIVOTING
 from tests.kernels.contact_problem import FACE, Problem
 from tests.kernels.test_direct import FALL, floor, law_defect
 
@@ -25,7 +25,7 @@ def test_impulses_obey_coulombs_law_with_springs(contacts, motion, mu, give):
     `test_direct.assert_solved`."""
     problem = Problem(contacts, np.add(motion[:3], (0, FALL, 0)), motion[3:], mu, tolerance=TOLERANCE, give=give)
     p, (_, _, residual, _, method) = problem.solve()
-    if method == PIVOTING or residual > TOLERANCE:
+    if method == METHOD_PIVOTING or residual > TOLERANCE:
         return  # reported, never taken for solved
     assert law_defect(problem, p) <= 1e-8
 

@@ -10,16 +10,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from physics.kernels.compile.decorators import kernel
-from physics.kernels.half_space.contact_set import TOGETHER, gather
+from physics.kernels.half_space.contact_set import SIMULTANEOUS_SLOPS, collect_wall_contacts
+from physics.kernels.half_space.persistent_contacts import WALL_MEMORY_COUNT, WALL_MEMORY_HEAD
 from physics.kernels.math.quaternion import to_matrix
 from physics.kernels.state.layout import BLOCK, ELLIPSOID
-from physics.kernels.time_stepping.contact_stages import (
-    CONTACT_COUNT,
-    MEMORY_HEAD,
-    load_warm_start,
-    memory_size,
-    store_warm_start,
-)
+from physics.kernels.time_stepping.contact_stages import load_warm_start, store_warm_start, wall_memory_size
 from physics.kernels.time_stepping.workspace import make_workspace
 from tests.kernels.contact_problem import FLOOR, SIDE, SIZE
 
@@ -32,7 +27,7 @@ CORNERS = SIZE * (2.0 * (np.arange(FEATURES)[:, None] >> np.arange(3) & 1) - 1.0
 
 @kernel
 def _gather(y, w, h, tilted, memory, scratch):
-    return gather(y, w, h, tilted, memory, scratch[0])
+    return collect_wall_contacts(y, w, h, tilted, memory, scratch[0])
 
 
 def block_at_walls():
@@ -62,13 +57,13 @@ def test_the_set_is_what_touches_or_arrives(turn, depth, v, w):
     least = arms.min(axis=0)
     x = np.array([-least[0] + SLOP * depth[0], -least[1] + SLOP * depth[1], 0.3])
     work = block_at_walls()
-    memory = np.zeros((1, memory_size(2 * FEATURES)))
+    memory = np.zeros((1, wall_memory_size(2 * FEATURES)))
     count, deepest = _gather((tuple(x), q, v, NONE), w, H, None, memory, work)
     gaps = np.concatenate([(x + arms)[:, 1], (x + arms)[:, 0]])
     speeds = np.concatenate([(v + np.cross(w, arms))[:, 1], (v + np.cross(w, arms))[:, 0]])
     clear = 1e-12  # of what is within rounding of a limit either is right
-    belongs = (gaps <= SLOP) | ((gaps <= TOGETHER * SLOP) & (speeds < 0.0))
-    unsure = (abs(gaps - SLOP) < clear) | (abs(gaps - TOGETHER * SLOP) < clear) | (abs(speeds) < clear)
+    belongs = (gaps <= SLOP) | ((gaps <= SIMULTANEOUS_SLOPS * SLOP) & (speeds < 0.0))
+    unsure = (abs(gaps - SLOP) < clear) | (abs(gaps - SIMULTANEOUS_SLOPS * SLOP) < clear) | (abs(speeds) < clear)
     slots = work[0]["slot"][:count]
     assert set(np.flatnonzero(belongs & ~unsure)) <= set(slots) <= set(np.flatnonzero(belongs | unsure))
     assert (np.diff(slots) > 0).all()
@@ -88,12 +83,12 @@ G = 10.0
 @pytest.mark.parametrize("speed", [0.0, 0.5])
 def test_what_pushed_and_may_be_back_within_the_step_belongs_to_the_set(pushed, gap, speed):
     """A vertex `gap` times G H²/2 above the slop that leaves at `speed` times G H/2; loads of G bring it back."""
-    work, memory = block_at_walls(), np.zeros((1, memory_size(2 * FEATURES)))
+    work, memory = block_at_walls(), np.zeros((1, wall_memory_size(2 * FEATURES)))
     one, q = work[0], (math.cos(0.3), math.sin(0.3), 0.0, 0.0)
     one["acceleration"] = G
     arms = CORNERS @ np.reshape(to_matrix(q), (3, 3)).T
     lowest = np.flatnonzero(arms[:, 1] < arms[:, 1].min() + 1e-9)
-    memory[0, MEMORY_HEAD + 2 * FEATURES + 3 * lowest] = float(pushed)
+    memory[0, WALL_MEMORY_HEAD + 2 * FEATURES + 3 * lowest] = float(pushed)
     x = (50.0, SLOP + gap * G * H**2 / 2 - arms[:, 1].min(), 0.0)
     count, _ = _gather((x, q, (0.0, speed * G * H / 2, 0.0), NONE), NONE, H, None, memory, work)
     assert list(one["slot"][:count]) == (list(lowest) if pushed and gap + speed < 1.0 else [])
@@ -104,11 +99,11 @@ def test_what_pushed_and_may_be_back_within_the_step_belongs_to_the_set(pushed, 
 @pytest.mark.parametrize("gap", [0.9, 1.1])
 def test_a_round_body_that_pushed_and_is_pressed_still_belongs_to_the_set(pushed, loads, gap):
     """It leaves however fast: loads towards the wall close `gap` times G H²/2 within H, and it has no other cause."""
-    work, memory = make_workspace(np.array([FLOOR, SIDE]), 1), np.zeros((1, memory_size(2)))
+    work, memory = make_workspace(np.array([FLOOR, SIDE]), 1), np.zeros((1, wall_memory_size(2)))
     one = work[0]
     one["shape"], one["dims"], one["radius"], one["slop"] = ELLIPSOID, SIZE, SIZE.max(), SLOP
     one["acceleration"], one["free_acceleration"] = G, (0.0, loads, 0.0)
-    memory[0, MEMORY_HEAD + 2] = float(pushed)
+    memory[0, WALL_MEMORY_HEAD + 2] = float(pushed)
     y = ((50.0, SIZE[1] + SLOP + gap * G * H**2 / 2, 0.0), (1.0, 0.0, 0.0, 0.0), (0.0, 10.0, 0.0), NONE)
     count, _ = _gather(y, NONE, H, None, memory, work)
     assert count == (pushed and loads < 0.0 and gap < 1.0)
@@ -118,7 +113,7 @@ def test_a_round_body_that_pushed_and_is_pressed_still_belongs_to_the_set(pushed
 @pytest.mark.parametrize("high", [0.0, 0.5, 0.99, 1.01])
 def test_what_arrives_belongs_where_loads_could_have_made_it_as_fast(share, high):
     """Falling under G from a gap g at speed s it hits at √(s² + 2 G g): up to G H it is no impact."""
-    work, memory = block_at_walls(), np.zeros((1, memory_size(2 * FEATURES)))
+    work, memory = block_at_walls(), np.zeros((1, wall_memory_size(2 * FEATURES)))
     one, soft = work[0], G * H
     one["acceleration"], one["slop"] = G, 1e-9
     x = (50.0, SIZE[1] + high * soft**2 / (2 * G) + 4e-9, 0.0)
@@ -147,7 +142,7 @@ stages = st.lists(st.sets(st.integers(0, 2 * FEATURES - 1), max_size=5).map(sort
 @given(stages=stages)
 def test_impulses_are_found_by_the_name_of_their_contact(width, stages):
     """Impulses of the stage before, times the ratio of the lengths; zero for new contacts; no others are kept."""
-    work, memory = block_at_walls(), np.zeros((1, memory_size(2 * FEATURES)))
+    work, memory = block_at_walls(), np.zeros((1, wall_memory_size(2 * FEATURES)))
     known, length = {}, 0.0
     for k, slots in enumerate(stages + stages[-1:]):
         n, h = len(slots), 0.01 * (k + 1)
@@ -161,7 +156,7 @@ def test_impulses_are_found_by_the_name_of_their_contact(width, stages):
         work["impulse"][0, : n * width] = impulses.ravel()
         _store(n, width, memory, h, work)
         known, length = dict(zip(slots, impulses, strict=True)), h
-        kept = memory[0, MEMORY_HEAD + 2 * FEATURES :].reshape(2 * FEATURES, 3)
-        assert memory[0, CONTACT_COUNT] == n
-        np.testing.assert_array_equal(memory[0, MEMORY_HEAD : MEMORY_HEAD + n], slots)
+        kept = memory[0, WALL_MEMORY_HEAD + 2 * FEATURES :].reshape(2 * FEATURES, 3)
+        assert memory[0, WALL_MEMORY_COUNT] == n
+        np.testing.assert_array_equal(memory[0, WALL_MEMORY_HEAD : WALL_MEMORY_HEAD + n], slots)
         np.testing.assert_array_equal(np.flatnonzero(kept.any(axis=1)), slots)

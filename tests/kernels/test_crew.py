@@ -14,9 +14,9 @@ import numpy as np
 import pytest
 
 from physics.kernels.compile.decorators import kernel
-from physics.kernels.parallel.atomics import ask, pause
-from physics.kernels.parallel.spin_wait_workers import AWAY, BUSY, CALLED, LEAVING, WAITING
-from physics.kernels.parallel.work_stealing import TAKEN, begin, next_world
+from physics.kernels.parallel.atomics import call_address, spin_pause
+from physics.kernels.parallel.spin_wait_workers import IDLE, RUNNING, SPINNING, STOPPING, WOKEN
+from physics.kernels.parallel.work_stealing import TAKEN_COUNT, begin_taking, next_world
 from physics.parallel import processors, thread_team
 from physics.parallel.bound_call import bound
 from physics.parallel.thread_team import Team
@@ -27,7 +27,7 @@ RUNS = 3
 class Moment(NamedTuple):
     """States of a leader and of one member; of the member there may be two threads, one that is going."""
 
-    state: int = AWAY
+    state: int = IDLE
     left: int = 0  # worlds that nobody has taken: a run has one
     done: int = 0  # worlds stepped, in all runs
     run: int = 0
@@ -42,23 +42,23 @@ def of_leader(m: Moment) -> list[Moment]:
         case "begin":
             return [m._replace(left=1, leader="summon")] if m.run < RUNS else []
         case "summon":
-            sent = (*m.threads, "look") if m.state == AWAY else m.threads
-            return [m._replace(state=CALLED, leader="perform", threads=sent)]
+            sent = (*m.threads, "look") if m.state == IDLE else m.threads
+            return [m._replace(state=WOKEN, leader="perform", threads=sent)]
         case "perform":
             performed = m._replace(left=0, done=m.done + m.left, leader="take back")
             return [performed, m._replace(leader="dismiss", is_interrupted=True)]
         case "take back":
-            return [m._replace(state=WAITING if m.state == CALLED else m.state, leader="wait")]
+            return [m._replace(state=SPINNING if m.state == WOKEN else m.state, leader="wait")]
         case "wait":
-            return [m._replace(leader="end")] if m.state != BUSY else [m, m._replace(leader="dismiss")]
+            return [m._replace(leader="end")] if m.state != RUNNING else [m, m._replace(leader="dismiss")]
         case "dismiss":
-            return [m._replace(leader="dismiss called" if m.state in (WAITING, CALLED, BUSY) else "join")]
+            return [m._replace(leader="dismiss called" if m.state in (SPINNING, WOKEN, RUNNING) else "join")]
         case "dismiss called":
-            return [m._replace(state=AWAY if m.state == CALLED else m.state, leader="dismiss waiting")]
+            return [m._replace(state=IDLE if m.state == WOKEN else m.state, leader="dismiss waiting")]
         case "dismiss waiting":
-            return [m._replace(state=AWAY if m.state == WAITING else m.state, leader="dismiss busy")]
+            return [m._replace(state=IDLE if m.state == SPINNING else m.state, leader="dismiss busy")]
         case "dismiss busy":
-            return [m._replace(state=LEAVING if m.state == BUSY else m.state, leader="dismiss")]
+            return [m._replace(state=STOPPING if m.state == RUNNING else m.state, leader="dismiss")]
         case "join":
             return [] if m.threads else [m._replace(leader="end")]
         case "end":
@@ -78,24 +78,24 @@ def of_thread(m: Moment, k: int) -> list[Moment]:
 
     match m.threads[k]:
         case "look":
-            seen = {CALLED: "take call", AWAY: None}.get(m.state, "look")
+            seen = {WOKEN: "take call", IDLE: None}.get(m.state, "look")
             return [then(seen), then("look"), then("go")]  # it may be on the leader's processor
         case "take call":
-            return [then("perform", state=BUSY) if m.state == CALLED else then("look")]
+            return [then("perform", state=RUNNING) if m.state == WOKEN else then("look")]
         case "perform":
             return [then("hold" if m.left else "made", left=0)]
         case "hold":
             return [then("made", done=m.done + 1)]
         case "made":
-            return [then("look", state=WAITING) if m.state == BUSY else then("leave")]
+            return [then("look", state=SPINNING) if m.state == RUNNING else then("leave")]
         case "leave":
-            return [then(None, state=AWAY)]
+            return [then(None, state=IDLE)]
         case "go":
-            return [then(None if m.state == AWAY else "go or begin")]
+            return [then(None if m.state == IDLE else "go or begin")]
         case "go or begin":
-            return [then("perform", state=BUSY) if m.state == CALLED else then("go away")]
+            return [then("perform", state=RUNNING) if m.state == WOKEN else then("go away")]
         case "go away":
-            return [then(None, state=AWAY) if m.state == WAITING else then("go")]
+            return [then(None, state=IDLE) if m.state == SPINNING else then("go")]
 
 
 def test_all_orders_of_looks_and_changes():
@@ -113,15 +113,15 @@ def test_all_orders_of_looks_and_changes():
             if each not in found:
                 found.add(each)
                 left.append(each)
-    assert Moment(state=AWAY, done=RUNS, run=RUNS) in found
-    assert Moment(state=WAITING, done=RUNS, run=RUNS, threads=("look",)) in found
+    assert Moment(state=IDLE, done=RUNS, run=RUNS) in found
+    assert Moment(state=SPINNING, done=RUNS, run=RUNS, threads=("look",)) in found
 
 
 @kernel
 def visit(visits, turns, taken, k, pauses):
     for _ in range(pauses[k]):
-        pause()
-    world = begin(turns, taken)
+        spin_pause()
+    world = begin_taking(turns, taken)
     while True:
         world = next_world(world, turns, taken)
         if world < 0:
@@ -148,13 +148,13 @@ def test_many_runs(size, patience, stay, gives_way, monkeypatch):
         pauses[:] = rng.integers(0, 300, size)
         team.run(calls)
         assert (visits == run).all()
-        assert team.taken[:, TAKEN].sum() == 100
+        assert team.taken[:, TAKEN_COUNT].sum() == 100
     team.close()
 
 
 @kernel
 def answer(address):
-    return ask(address)
+    return call_address(address)
 
 
 def test_asking_the_system():
@@ -177,7 +177,7 @@ def test_a_member_on_the_processor_of_the_leader_does_not_begin(monkeypatch):
         for run in range(1, 101):
             team.run(calls)
             assert (visits == run).all()
-            assert team.taken[1, TAKEN] == 0
+            assert team.taken[1, TAKEN_COUNT] == 0
         team.close()
     finally:
         os.sched_setaffinity(0, before)

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from physics.kernels.lcp.dantzig import dantzig, dantzig_sizes
-from physics.kernels.lcp.scaling_and_certificate import BAD_DATA, PIVOT_LIMIT, RAY, SOLVED
+from physics.kernels.lcp.scaling_and_certificate import LCP_BAD_DATA, LCP_PIVOT_LIMIT, LCP_RAY, LCP_SOLVED
 from tests.reference.lcp import enumerate_solutions
 
 EPS = np.finfo(float).eps
@@ -40,7 +40,7 @@ def test_baraff_1994_block_on_four_coplanar_contacts_carries_its_weight():
     J, A = block_contacts(CORNERS)
     weight = 6.0 * 9.81
     status, _, f = solve(A, J @ [0, -9.81, 0, 0, 0, 0])
-    assert status == SOLVED
+    assert status == LCP_SOLVED
     # contact forces of order 60, entries of A below 1.2: 1e-13 is ten roundings of A f
     assert np.abs(A @ f + J @ [0, -9.81, 0, 0, 0, 0]).max() < 1e-13
     np.testing.assert_allclose(J.T @ f, [0, weight, 0, 0, 0, 0], atol=1e-12)
@@ -51,7 +51,7 @@ def test_repeated_contacts_leave_velocities_unchanged(copies):
     J, A = block_contacts(CORNERS[:3] * copies)
     q = J @ [0.3, -1.0, 0.2, 0.4, 0.1, -0.3]
     status, pivots, z = solve(A, q)
-    assert status == SOLVED
+    assert status == LCP_SOLVED
     assert np.count_nonzero(z) <= 3
     assert pivots <= 2 * 3
     once = solve(A[:3, :3], q[:3])[2]
@@ -64,7 +64,7 @@ def test_contacts_in_general_position_have_rank_six():
         J = rng.normal(size=(count, 6))
         A, q = J @ J.T, J @ rng.normal(size=6)
         status, _, z = solve(A, q)
-        assert status == SOLVED
+        assert status == LCP_SOLVED
         assert np.count_nonzero(z) <= 6
         assert residual(A, q, z) <= 100 * EPS * np.abs(A).max() * max(1, np.abs(z).max())
 
@@ -72,13 +72,13 @@ def test_contacts_in_general_position_have_rank_six():
 def test_a_body_wedged_between_walls_that_close_has_no_solution():
     J = np.array([[1.0], [-1.0]])
     status, _, z = solve(J @ J.T, [-1, -1])
-    assert status == RAY
+    assert status == LCP_RAY
     assert not z.any()
 
 
 def test_a_massless_direction_that_must_move_has_no_solution():
-    assert solve([[0.0]], [-1.0])[0] == RAY
-    assert solve([[0.0]], [1.0])[0] == SOLVED
+    assert solve([[0.0]], [-1.0])[0] == LCP_RAY
+    assert solve([[0.0]], [1.0])[0] == LCP_SOLVED
 
 
 def test_driven_and_blocking_index_at_zero_together_was_reported_as_a_ray():
@@ -88,25 +88,25 @@ def test_driven_and_blocking_index_at_zero_together_was_reported_as_a_ray():
         G = rng.normal(size=(9, 2))
         M, q = G @ G.T, G @ rng.normal(size=2)
         status, _, z = solve(M, q)
-        assert status == SOLVED, seed
+        assert status == LCP_SOLVED, seed
         assert residual(M, q, z) <= 1e-9 * max(1, np.abs(z).max())
 
 
 @pytest.mark.parametrize("bad", [np.nan, -np.inf])
 def test_data_that_are_not_finite_are_refused(bad):
-    assert solve([[1, bad], [bad, 1]], [-1, -1])[0] == BAD_DATA
-    assert solve([[1, 0], [0, 1]], [1, bad])[0] == BAD_DATA
+    assert solve([[1, bad], [bad, 1]], [-1, -1])[0] == LCP_BAD_DATA
+    assert solve([[1, 0], [0, 1]], [1, bad])[0] == LCP_BAD_DATA
 
 
 def test_a_negative_diagonal_is_refused():
-    assert solve([[-1.0]], [-1.0])[0] == BAD_DATA
+    assert solve([[-1.0]], [-1.0])[0] == LCP_BAD_DATA
 
 
 def test_pivot_limit_is_reported_and_leaves_zeros():
     status, pivots, z = solve(np.eye(4), -np.ones(4), max_pivots=3)
-    assert (status, pivots) == (PIVOT_LIMIT, 3)
+    assert (status, pivots) == (LCP_PIVOT_LIMIT, 3)
     assert not z.any()
-    assert solve(np.eye(4), -np.ones(4), max_pivots=4)[:2] == (SOLVED, 4)
+    assert solve(np.eye(4), -np.ones(4), max_pivots=4)[:2] == (LCP_SOLVED, 4)
 
 
 @st.composite
@@ -123,7 +123,7 @@ def test_semidefinite_problems_equal_enumeration(problem):
     M, q = problem
     status, _, z = solve(M, q)
     expected = enumerate_solutions(M, q)
-    assert status == (SOLVED if expected else RAY)
+    assert status == (LCP_SOLVED if expected else LCP_RAY)
     if expected:
         # integer data below 40, nonsingular blocks have determinants >= 1: z loses at most four digits
         assert residual(M, q, z) <= 1e-11 * max(1, np.abs(z).max())
@@ -145,7 +145,7 @@ def test_scaling_by_powers_of_two_scales_z_bit_for_bit():
         G = rng.normal(size=(n, max(2, n // 2)))
         M, q = G @ G.T, G @ rng.normal(size=G.shape[1])
         status, pivots, z = solve(M, q)
-        assert status == SOLVED
+        assert status == LCP_SOLVED
         assert z.any()
         for m_power, q_power in ((40, 0), (-33, 0), (0, 51), (7, -90)):
             scaled = solve(np.ldexp(M, m_power), np.ldexp(q, q_power))
@@ -160,5 +160,5 @@ def test_a_feather_and_a_locomotive_in_one_problem():
     M = np.block([[A * 1e6, zero], [zero, A * 1e-6]])
     q = np.tile(J @ [0, -9.81, 0, 0, 0, 0], 2)
     status, _, f = solve(M, q)
-    assert status == SOLVED
+    assert status == LCP_SOLVED
     np.testing.assert_allclose([f[:4].sum(), f[4:].sum()], [6 * 9.81e-6, 6 * 9.81e6], rtol=1e-13)

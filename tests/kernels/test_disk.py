@@ -139,19 +139,19 @@ def test_a_file_that_others_may_write_is_not_unpickled(tmp_path):
             return os.mkdir, (str(tmp_path / "ran"),)
 
     path = tmp_path / "file.nbc"
-    cache_files.write(path, b"purpose", pickle.dumps([1]))
-    assert path.stat().st_mode & 0o777 & cache_files.OTHERS_WRITE == 0
-    assert cache_files.read(path, b"purpose") == [1]
-    cache_files.write(path, b"purpose", pickle.dumps(Evil()))
+    cache_files.write_cache_file(path, b"purpose", pickle.dumps([1]))
+    assert path.stat().st_mode & 0o777 & cache_files.WRITABLE_BY_OTHERS == 0
+    assert cache_files.read_cache_file(path, b"purpose") == [1]
+    cache_files.write_cache_file(path, b"purpose", pickle.dumps(Evil()))
     for mode in (0o664, 0o646):
         path.chmod(mode)
-        with pytest.raises(cache_files.Foreign):
-            cache_files.read(path, b"purpose")
+        with pytest.raises(cache_files.ForeignFileError):
+            cache_files.read_cache_file(path, b"purpose")
     path.chmod(0o644)
     if os.getuid() == 0:
         os.chown(path, 12345, -1)
-        with pytest.raises(cache_files.Foreign):
-            cache_files.read(path, b"purpose")
+        with pytest.raises(cache_files.ForeignFileError):
+            cache_files.read_cache_file(path, b"purpose")
     assert not (tmp_path / "ran").exists()
 
 
@@ -159,16 +159,16 @@ def test_a_file_that_others_may_write_is_not_unpickled(tmp_path):
 def test_files_are_nobody_elses_under_any_umask(umask, tmp_path):
     before = os.umask(umask)
     try:
-        cache_files.write(tmp_path / "folder" / "file.nbc", b"", pickle.dumps(3))
+        cache_files.write_cache_file(tmp_path / "folder" / "file.nbc", b"", pickle.dumps(3))
     finally:
         os.umask(before)
-    assert cache_files.read(tmp_path / "folder" / "file.nbc", b"") == 3
+    assert cache_files.read_cache_file(tmp_path / "folder" / "file.nbc", b"") == 3
 
 
 def test_a_file_for_another_purpose_is_damaged(tmp_path):
-    cache_files.write(tmp_path / "file", b"one", pickle.dumps(1))
-    with pytest.raises(cache_files.Damaged):
-        cache_files.read(tmp_path / "file", b"other")
+    cache_files.write_cache_file(tmp_path / "file", b"one", pickle.dumps(1))
+    with pytest.raises(cache_files.DamagedFileError):
+        cache_files.read_cache_file(tmp_path / "file", b"other")
 
 
 def test_what_others_may_write_costs_a_compilation_and_a_line(kept, tmp_path):

@@ -7,8 +7,8 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from physics.kernels.contact_solver.sliding_patch import HOLD, SLIDE
-from physics.kernels.contact_solver.solve import DIRECT, PIVOTING
+from physics.kernels.contact_solver.sliding_patch import TRY_SLIDING, TRY_STICKING
+from physics.kernels.state.layout import METHOD_DIRECT, METHOD_PIVOTING
 from tests.kernels.contact_problem import FACE, Problem
 from tests.kernels.test_direct import FALL, floor
 
@@ -38,9 +38,9 @@ CONTACTS = [[(0, 0)], floor((0, 1)), floor((0, 5)), floor(FACE), [(0, 0), (1, 0)
 @settings(max_examples=300, deadline=None)
 @given(
     st.sampled_from(CONTACTS), speeds, st.sampled_from([0.1, 0.5, 1.0]), st.sampled_from([0.2, 0.7, 3.0]),
-    st.sampled_from([HOLD, SLIDE]),
+    st.sampled_from([TRY_STICKING, TRY_SLIDING]),
 )  # fmt: skip
-@example([(0, 0), (0, 1), (0, 4), (0, 5)], (0.0, 0.0, 0.125, 0.0, 0.0, 0.125), 1.0, 0.7, HOLD)
+@example([(0, 0), (0, 1), (0, 4), (0, 5)], (0.0, 0.0, 0.125, 0.0, 0.0, 0.125), 1.0, 0.7, TRY_STICKING)
 def test_impulses_dissipate_most(contacts, motion, mu, ratio, mode):
     """Whichever method found them: directly, by sweeps and Newton's method, on one wall and on two.
 
@@ -50,7 +50,7 @@ def test_impulses_dissipate_most(contacts, motion, mu, ratio, mode):
     v = np.add(motion[:3], (0, FALL, 0))
     problem = Problem(contacts, v, motion[3:], mu, tolerance=TOLERANCE, ratio=ratio)
     p, (_, _, residual, _, method) = problem.solve(mode)
-    if method == PIVOTING or residual > TOLERANCE:
+    if method == METHOD_PIVOTING or residual > TOLERANCE:
         return  # reported, never taken for solved
     worst, scale = violation(problem, p, mu, ratio)
     assert worst <= 10 * TOLERANCE * max(ratio, 1 / ratio) * scale
@@ -64,16 +64,16 @@ def test_a_shoved_face_is_solved_directly(ratio):
     for _ in range(400):
         v = np.add(rng.normal(0, 0.03, 3), (0, FALL, 0))
         problem = Problem(floor(FACE), v, rng.normal(0, 0.01, 3), 0.5, tolerance=1e-6, ratio=ratio)
-        p, (_, _, residual, _, method) = problem.solve(SLIDE)
+        p, (_, _, residual, _, method) = problem.solve(TRY_SLIDING)
         worst, scale = violation(problem, p, 0.5, ratio)
         assert residual <= 1e-6
         assert worst <= 1e-5 * max(ratio, 1 / ratio) * scale
-        direct += method == DIRECT
+        direct += method == METHOD_DIRECT
     assert direct >= 0.9 * 400
 
 
 @settings(max_examples=100, deadline=None)
-@given(st.sampled_from(CONTACTS), speeds, st.sampled_from([HOLD, SLIDE]))
+@given(st.sampled_from(CONTACTS), speeds, st.sampled_from([TRY_STICKING, TRY_SLIDING]))
 def test_equal_coefficients_are_the_even_wall_to_the_last_bit(contacts, motion, mode):
     """Every stretching is a product or a quotient with 1."""
     v, w = np.add(motion[:3], (0, FALL, 0)), motion[3:]

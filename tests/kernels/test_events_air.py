@@ -6,14 +6,14 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 from numpy.polynomial import Chebyshev
 from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
 
 import physics
-from physics.kernels.event_driven.time_of_impact import parabola_root, safe_time, third_bound
+from physics.kernels.event_driven.time_of_impact import gap_jerk_bound, gap_safe_time, parabola_root
 
 EPS = np.finfo(float).eps
 
@@ -46,7 +46,7 @@ def test_parabola_root_is_the_first_zero(g, r, b):
 @given(GAP, RATE, BEND, st.floats(0, 50), st.floats(1e-3, 10), st.lists(st.floats(-1, 1), min_size=3))
 def test_safe_time_is_never_beyond_the_first_zero(g, r, b, third, horizon, shares):
     """Any gap whose third derivative stays within the bound, its worst case too, is not used up by then."""
-    t = safe_time(g, r, b, third, horizon)
+    t = gap_safe_time(g, r, b, third, horizon)
     assert 0 < t <= horizon
     scale = g + abs(r) * t + abs(b) * t * t + third * t**3
     # A constant third derivative -third is the worst; then piecewise constant ones, each sampled.
@@ -62,27 +62,31 @@ def test_safe_time_is_never_beyond_the_first_zero(g, r, b, third, horizon, share
 
 @pytest.mark.parametrize("b", [-9.81, 0.0, 4.0])
 def test_safe_time_without_a_third_derivative_is_the_zero_itself(b):
-    assert safe_time(1.0, -4.0, b, 0.0, 10.0) == parabola_root(1.0, -4.0, b)
+    assert gap_safe_time(1.0, -4.0, b, 0.0, 10.0) == parabola_root(1.0, -4.0, b)
 
 
 def test_safe_time_of_a_contact_that_is_about_to_leave():
     """From no gap and no speed at all: b t²/2 - C t³/6 is zero at 3 b / C."""
-    assert safe_time(0.0, 0.0, 4.0, 6.0, 10.0) == pytest.approx(2.0, rel=4 * EPS)
-    assert safe_time(0.0, 0.0, 4.0, 6.0, 1.0) == 1.0
+    assert gap_safe_time(0.0, 0.0, 4.0, 6.0, 10.0) == pytest.approx(2.0, rel=4 * EPS)
+    assert gap_safe_time(0.0, 0.0, 4.0, 6.0, 1.0) == 1.0
 
 
 @given(GAP, RATE, BEND, st.floats(0, 15), st.floats(1e-3, 10))
-def test_safe_time_is_half_the_best_at_least(g, r, b, digits, horizon):
-    """However loose the bound C of the third derivative is: g + r t + b t²/2 - C t³/6 has its first zero at t*.
+@example(1.0, -4.0, 10.0, 1.0, 1.0)
+def test_safe_time_is_safe_and_cannot_be_doubled(g, r, b, digits, horizon):
+    """However loose the bound C of the third derivative is: g + r t + b t²/2 - C t³/6 is positive before the safe time.
 
-    On τ <= h the parabola lies above that cubic, which is positive up to t*. So the time is doubled until it is more
-    than t*, and half of that is safe. A C of 10¹⁵ asks for 50 doublings from C's own first guess.
+    On τ <= h the parabola with b - C h/3 lies below that cubic by C τ² (h - τ)/6, so that its root is safe, and falls
+    with h. The time is doubled until the parabola over twice the time has its root within the time: a horizon twice as
+    long gains nothing. A C of 10¹⁵ takes 50 doublings from the first guess.
     """
     third = 10.0**digits
-    t = safe_time(g, r, b, third, horizon)
-    zeros = np.roots([-third / 6, b / 2, r, g])
-    best = min(z.real for z in zeros if abs(z.imag) <= 1e-6 * abs(z) and z.real > 0)
-    assert t >= 0.5 * min(best, horizon) * (1 - 1e-6)
+    t = gap_safe_time(g, r, b, third, horizon)
+    assert 0.0 <= t <= horizon
+    tau = np.linspace(0.0, t, 101)
+    sizes = g + abs(r) * tau + abs(b) * tau**2 / 2 + third * tau**3 / 6
+    assert (g + r * tau + b * tau**2 / 2 - third * tau**3 / 6 >= -16 * EPS * sizes).all()
+    assert t == horizon or parabola_root(g, r, b - third * min(2 * t, horizon) / 3) <= t * (1 + 16 * EPS)
 
 
 # --- the bound of the third derivative -------------------------------------------------------------------------------
@@ -131,7 +135,7 @@ def test_no_gap_has_a_larger_third_derivative_than_its_bound(kind, seed, strengt
     y = tuple(tuple(part.tolist()) for part in np.split(world.state[0, :13], [3, 7, 10]))
     world.step(np.array([[[0.0, 0.0, 0.0, *torque]]]))  # binds the body
     left = 1.0 / (1.0 + np.linalg.norm(body.angvel))
-    bound = third_bound(y, left, None, world.scratch[0][0])
+    bound = gap_jerk_bound(y, left, None, world.scratch[0][0])
     times = 0.5 * left * (1.0 - np.cos(np.pi * np.arange(49) / 48))
     for gap in gaps(body, turning(body, torque, times), normal):
         third = Chebyshev.fit(times, gap, 24).deriv(3)(times)

@@ -8,8 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.linalg import expm
 
-from physics.kernels.half_space.contact_point import arm_and_rate
-from physics.kernels.math.full_pivot_solve import PIVOT_SHARE, eliminate, solve_least
+from physics.kernels.half_space.contact_point import contact_arm_and_rate
+from physics.kernels.math.full_pivot_solve import PIVOT_SHARE, solve_full_pivot, solve_least_norm
 from physics.kernels.state.layout import BLOCK, ELLIPSOID, SPHERE
 
 EPS = np.finfo(float).eps
@@ -21,7 +21,7 @@ def solved(A, b):
     system = np.full((m + 2, m + 3), np.nan)
     system[:m, :m], system[:m, m] = A, b
     order, x = np.zeros(m + 2, np.int64), np.full(m + 2, np.nan)
-    return eliminate(m, system, order, x)[0], x[:m]
+    return solve_full_pivot(m, system, order, x)[0], x[:m]
 
 
 @given(st.integers(1, 12), st.integers(0, 2**32 - 1))
@@ -78,7 +78,7 @@ def test_least_solution_is_that_of_the_pseudoinverse(rank, free, implied, seed):
     rows = rank + len(extra)
     system, x = np.full((rows, m + 1), np.nan), np.full(m, np.nan)
     system[:, :m], system[:, m] = np.vstack([A, extra @ A]), np.concatenate([b, extra @ b])
-    solve_least(rows, m, system, x)
+    solve_least_norm(rows, m, system, x)
     assert np.abs(x - truth).max() <= 100 * m * EPS * condition**2 * np.linalg.norm(b)
 
 
@@ -93,7 +93,7 @@ def unit(rng, size):
 
 def arm(shape, dims, R, w, n, feature=0):
     """Arm and rate as arrays."""
-    r, rate = arm_and_rate(shape, tuple(dims), tuple(R.ravel()), tuple(w), tuple(n), feature, None, None)
+    r, rate = contact_arm_and_rate(shape, tuple(dims), tuple(R.ravel()), tuple(w), tuple(n), feature, None, None)
     return np.array(r), np.array(rate)
 
 

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from physics.kernels.event_driven.force_system import solve_unknowns
+from physics.kernels.event_driven.force_system import solve_contact_forces
 from physics.kernels.event_driven.workspace import make_motion
 from physics.kernels.state.layout import VERTEX_COUNT
 
@@ -27,7 +27,7 @@ def solved(rows, pushes, asked, is_skew):
     one["row"][:m], one["row_turn"][:m] = rows[:, :3], rows[:, 3:]
     one["push"][:m], one["turn"][:m] = pushes[:, :3], pushes[:, 3:]
     one["asked"][:m], one["is_skew"] = asked, is_skew
-    force, moment = solve_unknowns(m, AXES, work[0], one)
+    force, moment = solve_contact_forces(m, AXES, work[0], one)
     return np.array([*force, *moment]), one["unknown"][:m].copy()
 
 

@@ -8,10 +8,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from physics.kernels.compile.decorators import kernel
-from physics.kernels.contact_solver.patch_algebra import cold_motion, place_patch
-from physics.kernels.contact_solver.sliding_patch import HOLD, SLIDE
-from physics.kernels.contact_solver.solve import DIRECT
-from physics.kernels.math.simd_gather import present
+from physics.kernels.contact_solver.patch_algebra import cold_start_motion, gather_patch
+from physics.kernels.contact_solver.sliding_patch import TRY_SLIDING, TRY_STICKING
+from physics.kernels.math.simd_gather import valid_lanes_mask
+from physics.kernels.state.layout import METHOD_DIRECT
 from tests.kernels.contact_problem import FACE, MASS, Problem
 from tests.kernels.test_direct import FALL, assert_solved, floor, law_defect
 
@@ -41,13 +41,13 @@ centres = st.tuples(st.floats(-6, 6), st.floats(-6, 6)).filter(
 
 
 @settings(max_examples=200, deadline=None)
-@given(centres, st.sampled_from([-1, 1]), st.sampled_from([HOLD, SLIDE]))
+@given(centres, st.sampled_from([-1, 1]), st.sampled_from([TRY_STICKING, TRY_SLIDING]))
 def test_a_face_holds_up_to_the_verge_of_turning_about_any_point(centre, sense, mode):
     """Friction at 95 % of what it can give along a rigid motion: the body stops, to the last bit but rounding."""
     problem = loaded(np.full(4, -MASS * FALL / 4), 0.95 * motion_of(centre, sense))
     p, (v, L, _, _, method) = problem.solve(mode)
-    assert method == DIRECT
-    assert problem.one["mode"] == HOLD
+    assert method == METHOD_DIRECT
+    assert problem.one["mode"] == TRY_STICKING
     # Sums of four products of impulses of 0.07 N s with arms of 3 m.
     assert np.abs(v).max() <= 1e-15
     assert np.abs(L).max() <= 1e-14
@@ -55,12 +55,12 @@ def test_a_face_holds_up_to_the_verge_of_turning_about_any_point(centre, sense, 
 
 
 @settings(max_examples=200, deadline=None)
-@given(centres, st.sampled_from([-1, 1]), st.sampled_from([HOLD, SLIDE]))
+@given(centres, st.sampled_from([-1, 1]), st.sampled_from([TRY_STICKING, TRY_SLIDING]))
 def test_a_face_slips_beyond_the_verge(centre, sense, mode):
     """A target 5 % beyond friction does not hold, whatever is tried first."""
     problem = loaded(np.full(4, -MASS * FALL / 4), 1.05 * motion_of(centre, sense))
     p, result = problem.solve(mode)
-    assert problem.one["mode"] != HOLD
+    assert problem.one["mode"] != TRY_STICKING
     assert np.abs(result[0]).max() > 1e-4 or np.abs(result[1]).max() > 1e-4
     assert law_defect(problem, p) <= 1e-8
 
@@ -74,9 +74,9 @@ def test_tilting_loads_are_rarely_left_for_sweeps():
     for _ in range(600):
         w = rng.normal(0, 0.01, 3)
         problem = Problem(floor(FACE), np.add(rng.normal(0, 0.03, 3), (0, FALL, 0)), w, MU, tolerance=1e-6)
-        _, (_, _, residual, _, method) = problem.solve(SLIDE)
+        _, (_, _, residual, _, method) = problem.solve(TRY_SLIDING)
         assert residual <= 1e-6
-        direct += method == DIRECT
+        direct += method == METHOD_DIRECT
     assert direct >= 590
 
 
@@ -90,7 +90,7 @@ def test_targets_of_no_rigid_motion_are_met_by_three_contacts(targets, slip):
     target = np.zeros((4, 3))
     target[:, 0] = targets
     problem = Problem(floor(FACE), (slip[0], -0.5, slip[1]), (0, slip[2], 0), 0.2, target=target)
-    p, result = problem.solve(SLIDE)
+    p, result = problem.solve(TRY_SLIDING)
     assert_solved(problem, p, result)
     if abs(targets[0] + targets[3] - targets[1] - targets[2]) > 1e-6:  # 0 and 3 are a diagonal of the face
         assert np.count_nonzero(p[:, 0] == 0.0) >= 1
@@ -102,9 +102,9 @@ def test_one_contact_that_bounces_off_takes_another_along(bounces):
     target = np.zeros((4, 3))
     target[bounces, 0] = 0.1
     problem = Problem(floor(FACE), (0.3, -0.5, 0.2), (0, 0.1, 0), 0.2, target=target)
-    p, result = problem.solve(SLIDE)
+    p, result = problem.solve(TRY_SLIDING)
     assert_solved(problem, p, result)
-    assert result[4] == DIRECT
+    assert result[4] == METHOD_DIRECT
     assert np.count_nonzero(p[:, 0] == 0.0) >= 1
 
 
@@ -116,13 +116,13 @@ def test_contacts_hold_that_are_asked_to_move_apart_by_next_to_nothing(unseen):
     target[:, 1], target[:, 2] = 3e-9 * arms[:, 2], 3e-9 * arms[:, 0]  # at most 8e-9 m/s
     problem = Problem(floor(FACE), (0.001, FALL, 0), (0, 0, 0), MU, target=target, tolerance=1e-9)
     problem.one["unseen"] = unseen
-    _, (v, _, residual, _, _) = problem.solve(HOLD)
+    _, (v, _, residual, _, _) = problem.solve(TRY_STICKING)
     assert residual <= 1e-9
-    assert (problem.one["mode"] == HOLD) == (unseen > 0.0)
+    assert (problem.one["mode"] == TRY_STICKING) == (unseen > 0.0)
     assert np.abs(v).max() <= 1e-15 or not unseen
 
 
-@pytest.mark.parametrize("mode", [HOLD, SLIDE])
+@pytest.mark.parametrize("mode", [TRY_STICKING, TRY_SLIDING])
 def test_eight_contacts_of_one_wall_are_solved_by_sweeps(mode):
     """A plate thinner than the slop touches with both its faces: more than lanes take."""
     problem = Problem(floor(range(8)), (0.3, FALL, 0.1), (0, 0.1, 0), MU)
@@ -133,9 +133,9 @@ def test_eight_contacts_of_one_wall_are_solved_by_sweeps(mode):
 
 @kernel
 def begun(n, mu, u, w, inv_mass, K, work):
-    """Start of a face under new loads (`patch_algebra.cold_motion`), on the wall whose axes are x, y, z."""
+    """Start of a face under new loads (`patch_algebra.cold_start_motion`), on the wall whose axes are x, y, z."""
     axes = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
-    return cold_motion(n, place_patch(n, axes, inv_mass, K, work), present(n), mu, u, w, inv_mass, K)
+    return cold_start_motion(n, gather_patch(n, axes, inv_mass, K, work), valid_lanes_mask(n), mu, u, w, inv_mass, K)
 
 
 @pytest.mark.parametrize("n", [3, 4])

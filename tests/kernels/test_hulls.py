@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 import physics
-from physics.kernels.multibody.data.arrays import CONTACTS, make_many
+from physics.kernels.multibody.data.arrays import NUM_CONTACTS, make_bodies_workspace
 from physics.kernels.multibody.data.hull_tables import CUBE, make_hulls
 from physics.kernels.multibody.narrowphase.dispatch import find_contacts
 from physics.plan.plan import SHAPE_CODES
@@ -30,7 +30,7 @@ seeds = st.integers(0, 2**32 - 1)
 def found(bodies, places, rotations, walls=(), h=EVERYTHING):
     """(`Many`, number of contacts) of bodies at rest at `places` with these attitudes (n, 3, 3)."""
     walls = parameters.wall_table(walls)
-    many = make_many(len(bodies), walls, (), parameters.polyhedra(bodies), **SETTINGS)
+    many = make_bodies_workspace(len(bodies), walls, (), parameters.polyhedra(bodies), **SETTINGS)
     many.bodies["shape"] = [SHAPE_CODES[body.kind] for body in bodies]
     many.bodies["dims"] = [body.dimensions for body in bodies]
     many.bodies["radius"] = [body.bounding_radius(body.dimensions) for body in bodies]
@@ -39,7 +39,7 @@ def found(bodies, places, rotations, walls=(), h=EVERYTHING):
     many.place[:] = many.now[:, :3] = places
     many.rotation[:] = np.reshape(rotations, (-1, 9))
     find_contacts(h, True, True, 0, None, many)
-    return many, many.counts[CONTACTS]
+    return many, many.counts[NUM_CONTACTS]
 
 
 def rock(rng) -> physics.Hull:

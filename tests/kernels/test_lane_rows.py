@@ -6,18 +6,18 @@ import numpy as np
 import pytest
 
 from physics.kernels.compile.decorators import kernel
-from physics.kernels.compile.simd import put_row, root, row, total, totals
+from physics.kernels.compile.simd import lane_sqrt, lane_sum, lane_sums, load_lanes, store_lanes
 
 
 @kernel
 def rows(table, i, j, out):
     """Reads of four numbers from any place, sums of them, and writes."""
-    x, y = row(table, i, j), row(table, i, j + 1)
-    put_row(out, 0, 0, x * y)
-    put_row(out, 0, 5, totals(x, y, x * y, 2.0))
-    put_row(out, 1, 1, root(x))
-    put_row(out, 1, 7, 3.0)
-    out[0, 9], out[0, 10], out[1, 0] = root(table[i, j]), total(x), root(-1.0)
+    x, y = load_lanes(table, i, j), load_lanes(table, i, j + 1)
+    store_lanes(out, 0, 0, x * y)
+    store_lanes(out, 0, 5, lane_sums(x, y, x * y, 2.0))
+    store_lanes(out, 1, 1, lane_sqrt(x))
+    store_lanes(out, 1, 7, 3.0)
+    out[0, 9], out[0, 10], out[1, 0] = lane_sqrt(table[i, j]), lane_sum(x), lane_sqrt(-1.0)
 
 
 @pytest.mark.parametrize("place", [(0, 0), (1, 3), (2, 4)])

@@ -11,7 +11,17 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 
 from physics.kernels.compile.decorators import inlined, kernel
-from physics.kernels.compile.simd import Lanes, chosen, first_of, larger, largest, least, root, smaller, total
+from physics.kernels.compile.simd import (
+    Lanes,
+    first_true_lane,
+    lane_sqrt,
+    lane_sum,
+    larger,
+    max_of_lanes,
+    min_of_lanes,
+    select_lanes,
+    smaller,
+)
 from physics.kernels.math import simd_gather
 
 FOUR = st.tuples(*[st.floats(width=64, allow_subnormal=False)] * 4)
@@ -26,17 +36,28 @@ def _sums(x, y, s):
 
 @inlined
 def _choices(x, y, s):
-    return root(x), larger(x, y), smaller(x, s), chosen(x > y, x, s), chosen((x <= s) & ~(y == x), 1.0, y)
+    return (
+        lane_sqrt(x),
+        larger(x, y),
+        smaller(x, s),
+        select_lanes(x > y, x, s),
+        select_lanes((x <= s) & ~(y == x), 1.0, y),
+    )
 
 
 @inlined
 def _orders(x, y, s):
-    return first_of(x < y), first_of(x >= s), first_of((x > s) | (y > s)), first_of(~(x <= y))
+    return (
+        first_true_lane(x < y),
+        first_true_lane(x >= s),
+        first_true_lane((x > s) | (y > s)),
+        first_true_lane(~(x <= y)),
+    )
 
 
 @inlined
 def _of_all(x):
-    return total(x), largest(x), least(x)
+    return lane_sum(x), max_of_lanes(x), min_of_lanes(x)
 
 
 @kernel
@@ -96,7 +117,7 @@ def test_a_sum_is_taken_in_one_order():
 @kernel
 def compute_one(a, b, s, out):
     """Compute an expression that is valid for numbers as well."""
-    out[0], out[1], out[2] = larger(a, b), smaller(a, b), chosen(a <= b, s, a)
+    out[0], out[1], out[2] = larger(a, b), smaller(a, b), select_lanes(a <= b, s, a)
 
 
 @given(st.floats(), st.floats(), st.floats())
@@ -114,10 +135,10 @@ def test_of_numbers_they_are_what_they_are_of_lanes(a, b, s):
 @kernel
 def copy_columns(table, first, last, out):
     """Columns of some contacts, doubled, to another table."""
-    x = simd_gather.column_from(table, 0, first, last)
-    y = simd_gather.column_from(table, 1, first, last)
-    z = simd_gather.column_from(table, 2, first, last)
-    simd_gather.put_columns(out, first, last, 2.0 * x, 2.0 * y, 2.0 * z)
+    x = simd_gather.gather_column_from(table, 0, first, last)
+    y = simd_gather.gather_column_from(table, 1, first, last)
+    z = simd_gather.gather_column_from(table, 2, first, last)
+    simd_gather.scatter_columns(out, first, last, 2.0 * x, 2.0 * y, 2.0 * z)
 
 
 @pytest.mark.parametrize(("first", "last"), [(0, 0), (2, 2), (1, 2), (0, 2), (3, 5), (1, 4), (4, 7)])
@@ -134,11 +155,11 @@ def put(values, table, thirds, n, out):
     """Put n contacts into rows with `columns`: six rows of four."""
     for row, z in enumerate(
         (
-            simd_gather.numbers(values, n),
-            simd_gather.column(table, 1, n),
-            simd_gather.part(thirds, 2, n),
-            simd_gather.present(n),
-            chosen(simd_gather.lane(n - 1), 1.0, 0.0),
+            simd_gather.gather_numbers(values, n),
+            simd_gather.gather_column(table, 1, n),
+            simd_gather.gather_component(thirds, 2, n),
+            simd_gather.valid_lanes_mask(n),
+            select_lanes(simd_gather.select_lane(n - 1), 1.0, 0.0),
         )
     ):
         for k in range(4):

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from scipy.optimize import linprog
 
 from physics.kernels.lcp.lemke import lemke, lemke_sizes
-from physics.kernels.lcp.scaling_and_certificate import BAD_DATA, PIVOT_LIMIT, RAY, SOLVED
+from physics.kernels.lcp.scaling_and_certificate import LCP_BAD_DATA, LCP_PIVOT_LIMIT, LCP_RAY, LCP_SOLVED
 from tests.reference.lcp import enumerate_solutions
 
 
@@ -39,14 +39,14 @@ def assert_solves(M, q, z):
 def test_murty_example_2_8():
     M, q = np.array([[1.0, -1, -1, -1], [-1, 1, -1, -1], [1, 1, 2, 0], [1, 1, 0, 2]]), np.array([3.0, 5, -9, -5])
     status, _, z = solve(M, q)
-    assert status == SOLVED
+    assert status == LCP_SOLVED
     # Every z is positive, so M z = -q: z is as far from the solution as M⁻¹ takes what M z + q is rounded by.
     assert np.abs(z - [2, 1, 3, 1]).max() <= np.linalg.norm(np.linalg.inv(M), np.inf) * rounding(M, q, z)
 
 
 def test_murty_example_2_9_ends_in_a_ray():
     status, pivots, z = solve([[-1, 0, -3], [1, -2, -5], [-2, -1, -2]], [-3, -2, -1])
-    assert status == RAY
+    assert status == LCP_RAY
     assert pivots > 0
     assert not z.any()
 
@@ -54,13 +54,13 @@ def test_murty_example_2_9_ends_in_a_ray():
 def test_kostreva_1979_example_1_cycles_without_a_tie_rule():
     M = [[1, 2, 0], [0, 1, 2], [2, 0, 1]]
     status, pivots, z = solve(M, [-1, -1, -1])
-    assert status == SOLVED
+    assert status == LCP_SOLVED
     assert pivots <= 8  # 2^n complementary bases: no basis twice
     np.testing.assert_allclose(z, 1 / 3, rtol=4e-16)
 
 
 def test_kostreva_1979_example_2_is_infeasible_in_its_third_row():
-    assert solve([[1, -1, 3], [2, -1, 3], [-1, -2, 0]], [-1, -1, -1])[0] == RAY
+    assert solve([[1, -1, 3], [2, -1, 3], [-1, -2, 0]], [-1, -1, -1])[0] == LCP_RAY
 
 
 @pytest.mark.parametrize("n", [2, 3, 4, 5, 6])
@@ -75,9 +75,9 @@ def test_murty_1978_exponential_example_takes_all_2_to_the_n_pivots(n):
     M[n, :n] = 0.0
     q = [-sum(2.0 ** (n - k) for k in range(1, i + 1)) for i in range(1, n + 1)] + [1.0]
     status, pivots, z = solve(M, q)
-    assert (status, pivots) == (SOLVED, 2**n)
+    assert (status, pivots) == (LCP_SOLVED, 2**n)
     assert np.array_equal(z, [2.0 ** (n - 1)] + [0.0] * n)
-    assert solve(M, q, max_pivots=2**n - 1)[:2] == (PIVOT_LIMIT, 2**n - 1)
+    assert solve(M, q, max_pivots=2**n - 1)[:2] == (LCP_PIVOT_LIMIT, 2**n - 1)
 
 
 def test_a_ray_proves_nothing_for_a_bimatrix_game():
@@ -87,21 +87,21 @@ def test_a_ray_proves_nothing_for_a_bimatrix_game():
     """
     A, B = np.array([[2.0, 1.0], [1.0, 2.0]]), np.array([[1.0, 2.0], [2.0, 1.0]])
     M = np.block([[np.zeros((2, 2)), A], [B.T, np.zeros((2, 2))]])
-    assert solve(M, -np.ones(4))[0] == RAY
+    assert solve(M, -np.ones(4))[0] == LCP_RAY
     assert any(np.allclose(z, 1 / 3) for z in enumerate_solutions(M, -np.ones(4)))
 
 
 @pytest.mark.parametrize("q", [[0.0, 0.0], [1.0, 0.0]])
 def test_nonnegative_q_is_solved_by_zero_without_pivots(q):
     status, pivots, z = solve([[-1, 0], [0, -1]], q)
-    assert (status, pivots) == (SOLVED, 0)
+    assert (status, pivots) == (LCP_SOLVED, 0)
     assert not z.any()
 
 
 @pytest.mark.parametrize("bad", [np.nan, np.inf])
 def test_data_that_are_not_finite_are_refused(bad):
-    assert solve([[1, bad], [0, 1]], [-1, -1])[0] == BAD_DATA
-    assert solve([[1, 0], [0, 1]], [1, bad])[0] == BAD_DATA
+    assert solve([[1, bad], [0, 1]], [-1, -1])[0] == LCP_BAD_DATA
+    assert solve([[1, 0], [0, 1]], [1, bad])[0] == LCP_BAD_DATA
 
 
 integers = st.integers(-3, 3)
@@ -140,7 +140,7 @@ def copositive(draw):
 def test_definite_problems_have_the_one_solution_of_enumeration(problem):
     M, q = problem
     status, _, z = solve(M, q)
-    assert status == SOLVED
+    assert status == LCP_SOLVED
     assert_solves(M, q, z)
     # |z - z*| <= |M⁻¹| x residual; the smallest eigenvalue of the symmetric part is >= 1
     # and integers bound |M| by 5 x 9 + 6, so 1e-12 leaves three digits of room.
@@ -155,7 +155,7 @@ def test_semidefinite_problems_are_solved_or_have_no_solution(problem):
     M, q = problem
     status, _, z = solve(M, q)
     expected = enumerate_solutions(M, q)
-    assert status == (SOLVED if expected else RAY)
+    assert status == (LCP_SOLVED if expected else LCP_RAY)
     if expected:
         assert_solves(M, q, z)
         # w is the same for all solutions
@@ -167,7 +167,7 @@ def test_semidefinite_problems_are_solved_or_have_no_solution(problem):
 def test_a_ray_of_a_semidefinite_problem_means_infeasible(problem):
     M, q = problem
     is_feasible = linprog(np.zeros(len(q)), A_ub=-M, b_ub=q).status == 0
-    assert (solve(M, q)[0] == SOLVED) == is_feasible
+    assert (solve(M, q)[0] == LCP_SOLVED) == is_feasible
 
 
 @settings(max_examples=150, deadline=None)
@@ -175,7 +175,7 @@ def test_a_ray_of_a_semidefinite_problem_means_infeasible(problem):
 def test_strictly_copositive_problems_are_always_solved(problem):
     M, q = problem
     status, _, z = solve(M, q)
-    assert status == SOLVED
+    assert status == LCP_SOLVED
     assert_solves(M, q, z)
 
 
@@ -185,7 +185,7 @@ def test_random_definite_problems_of_contact_size(n):
     G = rng.normal(size=(n, n))
     M, q = G @ G.T + np.eye(n), rng.normal(size=n)
     status, pivots, z = solve(M, q)
-    assert status == SOLVED
+    assert status == LCP_SOLVED
     assert pivots < 5 * n
     assert_solves(M, q, z)
 
@@ -196,7 +196,7 @@ def test_scaling_by_powers_of_two_scales_z_bit_for_bit():
         G = rng.normal(size=(n, max(2, n // 2)))
         M, q = G @ G.T, G @ rng.normal(size=G.shape[1])
         status, pivots, z = solve(M, q)
-        assert status == SOLVED
+        assert status == LCP_SOLVED
         assert z.any()
         for m_power, q_power in ((40, 0), (-33, 0), (0, 51), (7, -90)):
             scaled = solve(np.ldexp(M, m_power), np.ldexp(q, q_power))
@@ -211,7 +211,7 @@ def test_units_of_any_size_stand_side_by_side():
     M, q = G @ G.T + np.eye(6), rng.normal(size=6)
     D = 10.0 ** np.arange(-12, 12, 4)
     status, _, z = solve(D[:, None] * M * D, D * q)
-    assert status == SOLVED
+    assert status == LCP_SOLVED
     # cond(M) < 1e2, so ten roundings of the data and the solution stay below 1e-12
     np.testing.assert_allclose(D * z, solve(M, q)[2], rtol=1e-12, atol=1e-14)
 

@@ -14,7 +14,7 @@ from pathlib import Path
 import pytest
 from numba.core.codegen import JITCodeLibrary
 
-from physics.kernels.compile.decorators import composed, inlined, kernel, standing
+from physics.kernels.compile.decorators import inlined, kernel, runtime_kernel, shared_kernel
 from tests.kernels.anew import anew
 
 
@@ -99,7 +99,7 @@ def test_what_an_inlined_function_calls_is_not_inlined_for_that():
     assert inlined_parts == {"halved": [False], "quartered": [True]}
 
 
-@composed
+@runtime_kernel
 def with_a_closure(x):
     twice = lambda y: 2.0 * y  # noqa: E731 (a closure is what this is about)
     return twice(x)
@@ -166,14 +166,23 @@ def test_a_contact_plan_is_optimised_once_and_compiled_once_for_all_processes(tm
     assert first["optimised"].pop("step_worlds") == 2  # one machine code for each plan, not for each kind of wrench
     # Of a step those that stand are optimised for themselves (the last resort of `balanced` is in one), and no others:
     # what is left are those that Python calls, before the first step.
-    names = ("_by_sweeps", "_directly", "find_contacts", "solve_contacts", "push_apart", "solve_smoothly")
+    names = (
+        "_solve_iteratively",
+        "_solve_directly",
+        "find_contacts",
+        "solve_contacts",
+        "correct_positions",
+        "solve_all_frictionless",
+    )
     assert [first["optimised"].pop(name) for name in names] == [2, 1, 1, 1, 1, 1]
-    assert not {"substep", "hold_all", "cone_sweeps", "interior_point", "touch_wall"} & set(first["optimised"])
+    assert not {"substep", "solve_all_sticking", "cone_sweeps", "interior_point_contacts", "collide_body_wall"} & set(
+        first["optimised"]
+    )
     # And none is typed twice: `balanced` adds its last resort to what `fast` had.
-    names = [key for key in first["lowered"] if "solve_contacts" in key or "hold_all" in key]
+    names = [key for key in first["lowered"] if "solve_contacts" in key or "solve_all_sticking" in key]
     assert len(names) == 3  # two of the solver, whose arguments tell the plans apart, one of the direct solve
     # (What stands for absent fields and laws is a line, chosen anew by Numba for each kind of caller's flags.)
-    lines = ("if_declared", "if_law", "_as_solved", "_as_assembled", "_no_aim", "number_of")
+    lines = ("if_declared", "if_law", "_as_solved", "_as_assembled", "_no_tangential_target", "law_parameter")
     again = {key: count for key, count in first["lowered"].items() if count > 1}
     assert not {key for key in again if not any(line in key for line in lines)}, again
 
@@ -189,7 +198,7 @@ def test_a_contact_plan_is_optimised_once_and_compiled_once_for_all_processes(tm
 STANDING = """
 import collections, sys
 from numba.core.codegen import JITCodeLibrary
-from physics.kernels.compile.decorators import kernel, standing
+from physics.kernels.compile.decorators import kernel, shared_kernel
 
 optimised, optimise = collections.Counter(), JITCodeLibrary._optimize_final_module
 
@@ -203,11 +212,11 @@ JITCodeLibrary._optimize_final_module = counted
 def squared(x):
     return x * x
 
-@standing
+@shared_kernel
 def cubed(x):
     return squared(x) * x
 
-@standing
+@shared_kernel
 def to_the_ninth(x):
     return cubed(cubed(x))
 
@@ -244,7 +253,7 @@ def test_what_stands_is_made_once_and_kept_for_all_that_call_it(tmp_path):
     assert optimised("other,one") == "to_the_ninth 1"  # made anew for wholes that were kept
 
 
-@standing
+@shared_kernel
 def stands(x):
     return x - 1.0
 

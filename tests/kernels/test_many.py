@@ -14,13 +14,19 @@ from scipy.sparse.csgraph import connected_components
 
 from physics.kernels.compile.decorators import kernel
 from physics.kernels.multibody.broadphase.sweep_and_prune import find_pairs
-from physics.kernels.multibody.data.arrays import BUNDLES, CONTACTS, LEFT_OUT, PAIRS, make_many
-from physics.kernels.multibody.narrowphase.box_sat import FLAT
+from physics.kernels.multibody.data.arrays import (
+    NUM_BATCHES,
+    NUM_CONTACTS,
+    NUM_DROPPED,
+    NUM_PAIRS,
+    make_bodies_workspace,
+)
+from physics.kernels.multibody.narrowphase.box_sat import FLAT_COSINE
 from physics.kernels.multibody.narrowphase.dispatch import find_contacts
 from physics.kernels.multibody.solver import block_lu as blocks_of
 from physics.kernels.multibody.solver import contact_batches, newton_system, second_order_cone
 from physics.kernels.multibody.solver.islands import find_islands
-from physics.kernels.multibody.solver.minimum_degree import order_bodies
+from physics.kernels.multibody.solver.minimum_degree import order_elimination
 from physics.kernels.state import layout as at
 
 SETTINGS = {"relative_slop": 1e-6, "tolerance": 1e-6, "sweeps": 100, "splits": 8, "rest_share": 0.5}
@@ -36,7 +42,7 @@ def rotation(rng) -> np.ndarray:
 
 def blocks(places, rotations, halves):
     """`Many` with blocks at rest, placed for the narrow phase."""
-    many = make_many(len(places), np.zeros((0, at.WALL_SIZE)), **SETTINGS)
+    many = make_bodies_workspace(len(places), np.zeros((0, at.WALL_SIZE)), **SETTINGS)
     many.bodies["shape"], many.bodies["mass"], many.bodies["dims"] = at.BLOCK, 1.0, halves
     many.bodies["radius"] = np.linalg.norm(halves, axis=-1)
     many.bodies["slop"] = 1e-6 * many.bodies["radius"]
@@ -75,10 +81,10 @@ def pairs_in_the_order_of_the_sweep(many):
 def test_pairs_are_those_whose_boxes_overlap_in_the_order_of_the_sweep(count, ratio, stretch):
     many = spread_out(count, count, ratio, stretch)
     find_pairs(0.0, many)
-    found = [tuple(pair) for pair in many.pairs[: many.counts[PAIRS]].tolist()]
+    found = [tuple(pair) for pair in many.pairs[: many.counts[NUM_PAIRS]].tolist()]
     expected = pairs_in_the_order_of_the_sweep(many)
     assert found == expected[: len(many.pairs)] or len(expected) > len(many.pairs)
-    assert many.counts[PAIRS] + many.counts[LEFT_OUT] == len(expected)  # none twice, and none missed
+    assert many.counts[NUM_PAIRS] + many.counts[NUM_DROPPED] == len(expected)  # none twice, and none missed
 
 
 @pytest.mark.parametrize("seed", range(5))
@@ -98,7 +104,7 @@ def test_a_box_that_is_not_finite_is_no_reason_to_read_beyond_the_columns(value)
     many = spread_out(0, 50, 1.0, (3, 3, 3))
     many.place[7, 1] = value
     find_pairs(0.0, many)
-    assert 0 <= many.counts[PAIRS] <= len(many.pairs)
+    assert 0 <= many.counts[NUM_PAIRS] <= len(many.pairs)
 
 
 # --- two blocks ------------------------------------------------------------------------------------------------
@@ -123,7 +129,7 @@ def test_the_normal_of_two_blocks_separates_them_most(seed, distance):
     h = 10.0  # the margin is the way that the loads could bring the blocks in h: gaps up to a m/s² h² = 100 m count
     many.bodies["acceleration"] = 1.0
     find_contacts(h, None, None, 0, None, many)
-    n = many.counts[CONTACTS]
+    n = many.counts[NUM_CONTACTS]
     assert n > 0
     normal = many.frame[0, :3]
     best = separation(-normal, many)
@@ -156,7 +162,9 @@ def test_the_normal_of_two_blocks_separates_them_most(seed, distance):
 @settings(max_examples=100, deadline=None)
 @given(
     seed=st.integers(0, 2**32 - 1),
-    turns=st.tuples(st.floats(-math.pi, math.pi), st.floats(math.acos(FLAT) + 1e-3, math.asin(FLAT) - 1e-3)),
+    turns=st.tuples(
+        st.floats(-math.pi, math.pi), st.floats(math.acos(FLAT_COSINE) + 1e-3, math.asin(FLAT_COSINE) - 1e-3)
+    ),
     shift=st.floats(-0.9, 0.9),
 )
 def test_parallel_edges_that_touch_push_along_the_middle_of_what_both_allow(seed, turns, shift):
@@ -177,7 +185,7 @@ def test_parallel_edges_that_touch_push_along_the_middle_of_what_both_allow(seed
         return  # beside each other along the edges
     many = blocks([world @ a, world @ b], [world @ R for R in planar], halves)
     find_contacts(0.01, None, None, 0, None, many)
-    n = many.counts[CONTACTS]
+    n = many.counts[NUM_CONTACTS]
     middle = 0.5 * (alpha + beta) + 0.25 * math.pi
     assert n == 2
     # The normal is out of the second block. A turned corner is rounded in the last bits; what is low is judged by slops
@@ -211,7 +219,7 @@ def test_no_contact_is_lost_where_a_face_is_tilted_by_some_slops(yaw, shift, til
         many = blocks([[0, 0, 0], [shift[0], 1.0, shift[1]]], [np.eye(3), tipped], np.full((2, 3), 0.5))
         many.bodies["acceleration"] = acceleration
         find_contacts(h, None, None, 0, None, many)
-        n = many.counts[CONTACTS]
+        n = many.counts[NUM_CONTACTS]
         return n, many.frame[:n, :3]
 
     flat, _ = touching_at(0.0)
@@ -226,7 +234,7 @@ def test_names_of_equal_stacked_blocks_do_not_change_with_rounding():
     for shift in (0.0, 1e-15, -1e-15):
         many = blocks([[0, 0, 0], [shift, 1, shift]], [np.eye(3), np.eye(3)], np.full((2, 3), 0.5))
         find_contacts(0.01, None, None, 0, None, many)
-        names.append(sorted(many.name[: many.counts[CONTACTS]].tolist()))
+        names.append(sorted(many.name[: many.counts[NUM_CONTACTS]].tolist()))
     assert len(names[0]) == 4
     assert names[0] == names[1] == names[2]
 
@@ -241,7 +249,7 @@ def test_faces_that_end_together_touch_all_over(yaw, shift):
     turned = np.array([[c, 0.0, s], [0.0, 1.0, 0.0], [-s, 0.0, c]])
     many = blocks([[0, 0, 0], [shift[0] * slop, 1, shift[1] * slop]], [np.eye(3), turned], np.full((2, 3), 0.5))
     find_contacts(0.01, None, None, 0, None, many)
-    points = many.arm[: many.counts[CONTACTS], :3]
+    points = many.arm[: many.counts[NUM_CONTACTS], :3]
     # A corner is off by the shift, its way by the turn, and what the clip leaves or takes: a slop.
     reach = (3 + 4 * 0.5 + 1 + 1e-6) * slop
     corners = np.array(list(itertools.product((-0.5, 0.5), (0.5,), (-0.5, 0.5))))
@@ -265,7 +273,7 @@ def block_of(numbers):
 
 def touching(count, pairs, walls=()):
     """`Many` with one contact for each pair of bodies, and for each body in `walls`; how many contacts."""
-    many = make_many(count, np.zeros((1, at.WALL_SIZE)), **SETTINGS)
+    many = make_bodies_workspace(count, np.zeros((1, at.WALL_SIZE)), **SETTINGS)
     ends = [*pairs, *((b, -1) for b in walls)]
     many.ends[: len(ends)] = np.reshape(ends, (-1, 2))
     return many, len(ends)
@@ -298,7 +306,7 @@ def island_of_all(count, pairs, most=ANY):
     """`Many` with one island of all bodies, which `pairs` must connect, ordered for elimination; products it takes."""
     many, n = touching(count, pairs, [0])
     assert find_islands(n, many) == 1
-    return many, order_bodies(0, n, 0, count, most, many)
+    return many, order_elimination(0, n, 0, count, most, many)
 
 
 def connected_pairs(rng, count, links):
@@ -315,7 +323,7 @@ def test_the_block_system_is_solved(count, links):
     pairs = connected_pairs(rng, count, links)
     many, products = island_of_all(count, pairs)
     assert products >= count
-    blocks_of.clear(0, count, many)
+    blocks_of.clear_system(0, count, many)
     A = np.zeros((6 * count, 6 * count))
     for a, b in [*pairs, *((b, b) for b in range(count))]:
         for i, j in {(a, b), (b, a)}:
@@ -323,14 +331,14 @@ def test_the_block_system_is_solved(count, links):
             if i == j:
                 many.diagonal[i] += numbers_of(block)
             elif many.rank[i] > many.rank[j]:
-                many.lower[blocks_of.place_of(j, i, many)] += numbers_of(block)
+                many.lower[blocks_of.find_block_index(j, i, many)] += numbers_of(block)
             else:
-                many.upper[blocks_of.place_of(i, j, many)] += numbers_of(block)
+                many.upper[blocks_of.find_block_index(i, j, many)] += numbers_of(block)
             A[6 * i : 6 * i + 6, 6 * j : 6 * j + 6] += block
     right = rng.normal(size=(count, 6))
     x = np.pad(right.reshape(count, 2, 3), ((0, 0), (0, 0), (0, 1))).reshape(count, 8)
-    blocks_of.factor(0, count, many)
-    blocks_of.substitute(0, count, x, many)
+    blocks_of.factor_system(0, count, many)
+    blocks_of.solve_factored(0, count, x, many)
     x = x.reshape(count, 2, 4)[:, :, :3]
     # Backward error of elimination: rounding times the condition of A times its order.
     bound = 6 * count * np.finfo(float).eps * np.linalg.cond(A) * np.abs(x).max()
@@ -357,9 +365,9 @@ def test_a_block_is_inverted(kind):
             A = (A + 20.0 * np.eye(6))[rng.permutation(6)]
         elif kind == "far apart":
             A = A @ A.T * 1.0e6 + np.eye(6)
-        many = make_many(1, np.zeros((1, at.WALL_SIZE)), **SETTINGS)
+        many = make_bodies_workspace(1, np.zeros((1, at.WALL_SIZE)), **SETTINGS)
         many.diagonal[0] = numbers_of(A)
-        blocks_of.invert(many.diagonal, 0, many.swaps)
+        blocks_of.invert_block(many.diagonal, 0, many.swaps)
         # Gauss and Jordan: rounding times condition, times what multipliers up to PIVOT_FACTOR add to it in practice.
         error = block_of(many.diagonal[0]) - np.linalg.inv(A)
         assert np.linalg.norm(error, 2) <= 1e-13 * np.linalg.cond(A) * np.linalg.norm(np.linalg.inv(A), 2)
@@ -368,13 +376,13 @@ def test_a_block_is_inverted(kind):
 @kernel
 def add_bundles(rho, D, E, F, many):
     """`add_bundle` of all bundles; D, E, F: three numbers of each contact, its matrix."""
-    for g in range(many.counts[BUNDLES]):
+    for g in range(many.counts[NUM_BATCHES]):
         x, y, z = (
-            contact_batches.gather(g, D, many),
-            contact_batches.gather(g, E, many),
-            contact_batches.gather(g, F, many),
+            contact_batches.gather_batch(g, D, many),
+            contact_batches.gather_batch(g, E, many),
+            contact_batches.gather_batch(g, F, many),
         )
-        newton_system.add_bundle(g, (x[0], x[1], x[2], y[0], y[1], y[2], z[0], z[1], z[2]), rho, many)
+        newton_system.add_batch_to_matrix(g, (x[0], x[1], x[2], y[0], y[1], y[2], z[0], z[1], z[2]), rho, many)
 
 
 @pytest.mark.parametrize("contacts", [1, 3, 4, 6])
@@ -385,7 +393,7 @@ def test_the_matrix_is_that_of_the_contacts(count, links, contacts):
     pairs = [pair for pair in connected_pairs(rng, count, links) for _ in range(contacts)]
     many, n = touching(count, pairs, list(range(0, count, 2)))
     find_islands(n, many)
-    order_bodies(0, n, 0, count, ANY, many)
+    order_elimination(0, n, 0, count, ANY, many)
     many.frame[:n] = [np.linalg.qr(rng.normal(size=(3, 3)))[0].ravel() for _ in range(n)]
     many.arm[:n], many.lightness[:] = rng.normal(size=(n, 6)), rng.uniform(0.5, 2, count)
     M, D, rho = np.zeros((6 * count, 6 * count)), rng.normal(size=(n, 9)), 0.7
@@ -395,8 +403,8 @@ def test_the_matrix_is_that_of_the_contacts(count, links, contacts):
         many.turning[b] = K[np.triu_indices(3)]
         M[6 * b : 6 * b + 3, 6 * b : 6 * b + 3] = many.lightness[b] * np.eye(3)
         M[6 * b + 3 : 6 * b + 6, 6 * b + 3 : 6 * b + 6] = K
-    assert contact_batches.bundle_contacts(0, n, many)
-    blocks_of.clear(0, count, many)
+    assert contact_batches.batch_contacts(0, n, many)
+    blocks_of.clear_system(0, count, many)
     A, found = np.eye(6 * count), np.zeros((6 * count, 6 * count))
     for k in range(n):
         J = np.zeros((3, 6 * count))
@@ -459,19 +467,21 @@ def inside(rng):
 def test_the_scaling_takes_p_and_u_to_the_same_point(seed):
     rng = np.random.default_rng(seed)
     p, u, x = inside(rng), inside(rng), tuple(rng.normal(size=3))
-    w, own, inverse = second_order_cone.scaling(p, u)
+    w, own, inverse = second_order_cone.nt_scaling(p, u)
     # Rounding of W and its inverse: they are within the condition of the scaling, (w₀ + |w'|)² (η cancels), of exact.
     bound = 1e-14 * (w[0] + np.hypot(w[1], w[2])) ** 2
-    size = np.abs(second_order_cone.scaled(w, p)).max()
-    np.testing.assert_allclose(own, second_order_cone.scaled(w, p), atol=10 * bound * size)
-    np.testing.assert_allclose(own, second_order_cone.unscaled(w, u), atol=10 * bound * size)
+    size = np.abs(second_order_cone.apply_scaling(w, p)).max()
+    np.testing.assert_allclose(own, second_order_cone.apply_scaling(w, p), atol=10 * bound * size)
+    np.testing.assert_allclose(own, second_order_cone.apply_inv_scaling(w, u), atol=10 * bound * size)
     np.testing.assert_allclose(
-        inverse**-4, second_order_cone.determinant(p) * second_order_cone.determinant(u)
+        inverse**-4, second_order_cone.cone_determinant(p) * second_order_cone.cone_determinant(u)
     )  # det W x = η² det x
-    np.testing.assert_allclose(second_order_cone.unscaled(w, second_order_cone.scaled(w, x)), x, atol=10 * bound)
-    twice = second_order_cone.unscaled(w, second_order_cone.unscaled(w, x))
     np.testing.assert_allclose(
-        second_order_cone.unscaled_twice(w, x), twice, atol=10 * bound * np.abs(twice).max() + 1e-14
+        second_order_cone.apply_inv_scaling(w, second_order_cone.apply_scaling(w, x)), x, atol=10 * bound
+    )
+    twice = second_order_cone.apply_inv_scaling(w, second_order_cone.apply_inv_scaling(w, x))
+    np.testing.assert_allclose(
+        second_order_cone.apply_inv_scaling_twice(w, x), twice, atol=10 * bound * np.abs(twice).max() + 1e-14
     )
 
 
@@ -482,10 +492,10 @@ def test_the_quotient_undoes_the_product_and_the_way_out_ends_at_the_boundary(se
     a, b = inside(rng), tuple(rng.normal(size=3))
     # The product's matrix has eigenvalues a₀ ± |a'|.
     condition = (a[0] + np.hypot(a[1], a[2])) / (a[0] - np.hypot(a[1], a[2]))
-    inverse = 1 / np.sqrt(second_order_cone.determinant(a))
-    quotient = second_order_cone.quotient(second_order_cone.product(a, b), a, inverse)
+    inverse = 1 / np.sqrt(second_order_cone.cone_determinant(a))
+    quotient = second_order_cone.jordan_quotient(second_order_cone.jordan_product(a, b), a, inverse)
     np.testing.assert_allclose(quotient, b, atol=1e-14 * condition * np.abs(b).max())
-    rate = second_order_cone.way_out(a, inverse, b)
+    rate = second_order_cone.inv_step_to_boundary(a, inverse, b)
     far = np.array(a) * 1e-3 + np.array(b) if rate <= 0 else np.array(a) + np.array(b) / rate
     slack = far[0] - np.hypot(far[1], far[2])
     bound = 1e-12 * condition * (np.abs(a).max() + np.abs(b).max() * max(1, 1 / abs(rate)))

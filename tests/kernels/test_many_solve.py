@@ -8,7 +8,7 @@ import pytest
 from benchmarks import problems
 from benchmarks.problems import SETTINGS
 from physics import scenes
-from physics.kernels.multibody.data.arrays import Many, make_many
+from physics.kernels.multibody.data.arrays import BodiesWorkspace, make_bodies_workspace
 from physics.kernels.multibody.solver import (
     contact_operator,
     gauss_seidel,
@@ -22,24 +22,29 @@ from physics.kernels.state import layout as at
 from tests.reference.lcp import coulomb_defect, solve_coulomb
 
 
-def pile(*arguments) -> tuple[Many, int]:
+def pile(*arguments) -> tuple[BodiesWorkspace, int]:
     """Scratch with a random pile (`problems.pile`), and the number of contacts."""
     problem = problems.pile(*arguments)
     return problem.many, problem.count
 
 
-def dense(many: Many, n: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def dense(many: BodiesWorkspace, n: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Jacobian (3 n, 6 bodies), inverse mass matrix and free velocities of the problem, without the kernels."""
     return problems.Frictional("", many, n, many.twist).dense()
 
 
-def one_island(many: Many, n: int, bodies: int) -> tuple[tuple[int, int, int, int], float]:
+def one_island(many: BodiesWorkspace, n: int, bodies: int) -> tuple[tuple[int, int, int, int], float]:
     """A problem made ready for the methods with a linear system: its only island, and its largest free velocity."""
     many.free[:] = many.twist
-    scale = contact_operator.assemble(n, many)
+    scale = contact_operator.assemble_contact_blocks(n, many)
     assert islands.find_islands(n, many) == 1
     part = (0, n, 0, bodies)
-    assert proximal_newton.prepare_system(part, 200, proximal_newton.WORTH_LYING, proximal_newton.LEAST_STEPS, many) > 0
+    assert (
+        proximal_newton.prepare_system(
+            part, 200, proximal_newton.RESTING_BUDGET, proximal_newton.MIN_NEWTON_STEPS, many
+        )
+        > 0
+    )
     return part, scale
 
 
@@ -114,7 +119,9 @@ def test_rounding_does_not_lead_out_of_the_cones(seed):
     """Masses of 1 : 1,000,000: an impulse may be as near to the boundary of its cone as its last place."""
     many, n = pile(seed, 12, 4, 0.2, 1000.0)
     part, scale = one_island(many, n, 12)
-    interior_point.interior_point(part, contact_operator.residual_of(0, n, True, many), 1e-6 * scale, 200, many)
+    interior_point.interior_point_contacts(
+        part, contact_operator.max_contact_residual(0, n, True, many), 1e-6 * scale, 200, many
+    )
     assert np.isfinite(many.impulse[:n]).all()
     assert np.isfinite(many.twist).all()
 
@@ -124,10 +131,10 @@ def test_rounding_does_not_lead_out_of_the_cones(seed):
 def test_the_interior_point_method_alone_comes_near_from_any_start(seed, mu):
     many, n = pile(seed, 8, 4, mu)
     part, scale = one_island(many, n, 8)
-    count = interior_point.interior_point(part, scale, 1e-4 * scale, 30, many)
+    count = interior_point.interior_point_contacts(part, scale, 1e-4 * scale, 30, many)
     assert count < 30
     # It stops at 1e-4 on twists of its own; those that belong to the impulses differ by what is left of its equations.
-    assert contact_operator.residual_of(0, n, True, many) <= 1e-3 * scale
+    assert contact_operator.max_contact_residual(0, n, True, many) <= 1e-3 * scale
 
 
 @pytest.mark.parametrize("seed", range(5))
@@ -135,7 +142,7 @@ def test_sweeps_without_friction_solve_the_complementarity_problem(seed):
     """u = W p + b, 0 <= p ⟂ u >= 0 along the normals: no contact is passed over that a push has changed."""
     many, n = pile(seed, 12, 4, 0.0)
     J, inverse, b = dense(many, n)
-    goal = 1e-6 * contact_operator.assemble(n, many)
+    goal = 1e-6 * contact_operator.assemble_contact_blocks(n, many)
     count, residual = gauss_seidel.sweep_normals(0, n, np.inf, goal, 2000, many)
     assert count < 2000
     assert residual <= goal
@@ -150,15 +157,15 @@ def test_sweeps_without_friction_solve_the_complementarity_problem(seed):
 def test_slow_sweeps_are_extrapolated():
     """Without that this pile takes 865 of them."""
     many, n = pile(0, 12, 4, 0.2)
-    goal = 1e-6 * contact_operator.assemble(n, many)
+    goal = 1e-6 * contact_operator.assemble_contact_blocks(n, many)
     count, residual = gauss_seidel.sweep_contacts(0, n, True, np.inf, goal, 1000, many)
     assert residual <= goal
     assert count <= 400
 
 
-def with_resting(one: Many, n: int, bodies: int, resting: int) -> Many:
+def with_resting(one: BodiesWorkspace, n: int, bodies: int, resting: int) -> BodiesWorkspace:
     """A problem of so many contacts and bodies, and beside it bodies that rest on the wall by one contact each."""
-    many = make_many(bodies + resting, np.zeros((1, at.WALL_SIZE)), **SETTINGS)
+    many = make_bodies_workspace(bodies + resting, np.zeros((1, at.WALL_SIZE)), **SETTINGS)
     for name in ("mass", "radius"):
         many.bodies[name] = 1.0
         many.bodies[name][:bodies] = one.bodies[name]
@@ -180,7 +187,7 @@ def test_sweeps_visit_only_what_has_something_to_do(seed):
     both, resting = with_resting(one, n, 4, 200), 200
     found = []
     for many, contacts in ((one, n), (both, n + resting)):
-        goal = 1e-6 * contact_operator.assemble(contacts, many)
+        goal = 1e-6 * contact_operator.assemble_contact_blocks(contacts, many)
         found.append(gauss_seidel.sweep_contacts(0, contacts, True, np.inf, goal, 2000, many))
         assert found[-1][1] <= goal
     (alone, _), (together, _) = found
@@ -188,13 +195,13 @@ def test_sweeps_visit_only_what_has_something_to_do(seed):
     # The contacts stand in another order then, and take other sweeps: up to twice as many are allowed for that.
     assert together <= 1 + 2 * alone * n / (n + resting)
     assert not both.impulse[n : n + resting].any()
-    assert contact_operator.residual_of(0, n + resting, True, both) == found[1][1]
+    assert contact_operator.max_contact_residual(0, n + resting, True, both) == found[1][1]
 
 
-def crowd(bodies: int) -> tuple[Many, int]:
+def crowd(bodies: int) -> tuple[BodiesWorkspace, int]:
     """Bodies that all touch each other, by one contact for each two, the first of them on a wall."""
     one, _ = pile(0, bodies, bodies, 0.3)
-    many = make_many(bodies, np.zeros((1, at.WALL_SIZE)), **SETTINGS)
+    many = make_bodies_workspace(bodies, np.zeros((1, at.WALL_SIZE)), **SETTINGS)
     for name in ("mass", "radius"):
         many.bodies[name] = one.bodies[name]
     pairs = [(0, -1), *((a, b) for a in range(bodies) for b in range(a))]
@@ -214,12 +221,14 @@ def test_what_is_too_dear_for_its_system_is_swept_while_it_moves(load):
     many.settings["tolerance"], many.settings["sweeps"], many.settings["rests"] = 1e-9, 20, 1
     many.settings["load"] = load
     iterations, residual, method = solve.solve_contacts(n, True, many)
-    assert method == (solve.SWEEPS if load == 0.0 else solve.NEWTON)
+    assert method == (at.METHOD_SWEEPS if load == 0.0 else at.METHOD_NEWTON)
     assert iterations <= (20 if load == 0.0 else 3 * 20)
-    assert residual == pytest.approx(contact_operator.residual_of(0, n, True, many) / scale_of(many, n), rel=1e-9)
+    assert residual == pytest.approx(
+        contact_operator.max_contact_residual(0, n, True, many) / scale_of(many, n), rel=1e-9
+    )
 
 
-def scale_of(many: Many, n: int) -> float:
+def scale_of(many: BodiesWorkspace, n: int) -> float:
     """Largest velocity of a contact without impulses, in its frame."""
     J, _, _ = dense(many, n)
     return np.abs(J @ many.free.ravel() - many.target[:n].ravel()).max()
@@ -231,7 +240,7 @@ def test_an_impact_that_is_not_solved_finely_is_swept_first():
     many.settings["tolerance"], many.settings["sweeps"] = 1e-3, 200
     _, residual, method = solve.solve_contacts(n, True, many)
     assert residual <= 1e-3
-    assert method == solve.SWEEPS
+    assert method == at.METHOD_SWEEPS
 
 
 @pytest.mark.parametrize("seed", range(20))
@@ -240,12 +249,12 @@ def test_calming_keeps_what_is_solved_solved(seed):
     many, n = pile(seed, 12, 4, 0.5, 10.0)
     many.settings["tolerance"] = 1e-2
     solve.solve_contacts(n, True, many)
-    goal = contact_operator.residual_of(0, n, True, many)
+    goal = contact_operator.max_contact_residual(0, n, True, many)
     many.settings["rests"] = 1  # and all bodies were at rest before the stage: `momenta` are zero
-    count, residual, _ = near_rest_refinement.calm((0, n, 0, 12), True, goal, goal, 1e-12, 1e-12, many)
+    count, residual, _ = near_rest_refinement.refine_near_rest((0, n, 0, 12), True, goal, goal, 1e-12, 1e-12, many)
     assert count > 0
     assert residual <= goal
-    assert contact_operator.residual_of(0, n, True, many) == pytest.approx(
+    assert contact_operator.max_contact_residual(0, n, True, many) == pytest.approx(
         residual, abs=1e-12 * np.abs(many.free).max()
     )
 
@@ -261,14 +270,14 @@ def test_what_stands_is_calmed_by_one_linear_system():
     many.momenta[:] = 0.0  # it stood still before
     many.settings["tolerance"], many.settings["rests"] = 1e-2, 1
     iterations, residual, method = solve.solve_contacts(n, True, many)
-    assert (iterations, method) == (1, solve.NEWTON)
-    assert residual <= solve.HOLD_SHARE * solve.FINE
+    assert (iterations, method) == (1, at.METHOD_NEWTON)
+    assert residual <= solve.STICKING_SHARE * solve.FINE_TOLERANCE
 
 
 def test_islands_are_solved_as_if_they_were_alone():
     one, n = pile(3, 4, 4, 0.5)
     two, _ = pile(4, 4, 4, 0.5)
-    both = make_many(8, np.zeros((1, at.WALL_SIZE)), **SETTINGS)
+    both = make_bodies_workspace(8, np.zeros((1, at.WALL_SIZE)), **SETTINGS)
     for name in ("mass", "radius"):
         both.bodies[name][:4], both.bodies[name][4:] = one.bodies[name], two.bodies[name]
     for name in ("lightness", "turning", "twist"):

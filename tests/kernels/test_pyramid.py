@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 
 from physics.kernels.contact_solver.friction_pyramid import (
-    normal_fallback,
-    normal_sizes,
-    pyramid_fallback,
+    normal_lcp_sizes,
     pyramid_sizes,
+    solve_normal_lcp,
+    solve_pyramid_lcp,
 )
-from physics.kernels.lcp.scaling_and_certificate import BAD_DATA, PIVOT_LIMIT, RAY, SOLVED
+from physics.kernels.lcp.scaling_and_certificate import LCP_BAD_DATA, LCP_PIVOT_LIMIT, LCP_RAY, LCP_SOLVED
 from tests.reference.lcp import coulomb_defect, solve_coulomb
 
 N_MAX = 8
@@ -25,7 +25,7 @@ def solve(W, b, mu, start=None, max_pivots=1000):
     if start is not None:
         p[: 3 * n] = start
     coefficients = np.broadcast_to(np.asarray(mu, float), (n,)).copy()
-    status, pivots = pyramid_fallback(
+    status, pivots = solve_pyramid_lcp(
         padded,
         np.array(b, float),
         coefficients,
@@ -64,14 +64,14 @@ def test_a_point_mass_that_slides_is_exact_whatever_its_direction():
     for angle in np.linspace(0, 6, 13):
         b = [-1.0, 4 * np.cos(angle), 4 * np.sin(angle)]
         status, _, p = solve(np.eye(3) / m, b, mu)
-        assert status == SOLVED
+        assert status == LCP_SOLVED
         expected = m * np.array([1.0, -mu * np.cos(angle), -mu * np.sin(angle)])
         assert np.abs(p - expected).max() <= 8 * np.finfo(float).eps * m
 
 
 def test_a_point_mass_sticks_inside_the_cone():
     status, _, p = solve(np.eye(3) / 2.0, [-1.0, 0.2, -0.1], 0.3)
-    assert status == SOLVED
+    assert status == LCP_SOLVED
     np.testing.assert_allclose(p, [2.0, -0.4, 0.2], rtol=1e-14)
 
 
@@ -81,7 +81,7 @@ def test_the_pyramid_is_inscribed_and_turned_by_the_start():
     a = np.pi / 8
     start = np.array([0.0, 4 * np.cos(a) - 4, 4 * np.sin(a)])  # makes u_t turn by pi/8
     status, _, p = solve(W, b, mu, start)
-    assert status == SOLVED
+    assert status == LCP_SOLVED
     assert p[1] == pytest.approx(-mu * np.cos(a), rel=1e-14)
     assert np.hypot(p[1], p[2]) <= mu * p[0]
     assert solve(W, b, mu, p)[2] == pytest.approx([1.0, -mu, 0.0], abs=0.03)
@@ -91,7 +91,7 @@ def test_without_friction_tangential_impulses_are_zero():
     J, W = block_contacts(CORNERS)
     b = J @ [1.0, -2.0, 0.5, 0.3, 0.2, 0.1]
     status, _, p = solve(W, b, 0.0)
-    assert status == SOLVED
+    assert status == LCP_SOLVED
     assert not p.reshape(-1, 3)[:, 1:].any()
     u = (W @ p + b).reshape(-1, 3)
     assert np.abs(np.minimum(u[:, 0], p[::3])).max() < 1e-13
@@ -105,7 +105,7 @@ def test_blocks_obey_the_pyramid_law(count):
         mu = rng.choice([0.1, 0.5, 1.0], size=count)
         b = J @ (rng.normal(size=6) * [1, 0.3, 1, 0.2, 0.5, 0.2] - [0, 1, 0, 0, 0, 0])
         status, pivots, p = solve(W, b, mu)
-        assert status == SOLVED
+        assert status == LCP_SOLVED
         assert pivots <= 20 * count
         assert_obeys_pyramid_law(W, b, mu, p)
 
@@ -147,14 +147,14 @@ def test_redundant_contacts_seen_from_near_a_solution_ended_in_a_ray(seed):
     p = np.zeros(12)
     for _ in range(15):
         status, _, p = solve(W, b, mu, p)
-        assert status == SOLVED
+        assert status == LCP_SOLVED
 
 
 def test_scaling_by_powers_of_two_scales_p_bit_for_bit():
     J, W = block_contacts(CORNERS)
     b = J @ [1.0, -2.0, 0.5, 0.3, 0.2, 0.1]
     status, pivots, p = solve(W, b, 0.4)
-    assert status == SOLVED
+    assert status == LCP_SOLVED
     for w_power, b_power in ((30, 0), (-21, 0), (0, 40), (5, -33)):
         scaled = solve(np.ldexp(W, w_power), np.ldexp(b, b_power), 0.4)
         assert scaled[:2] == (status, pivots)
@@ -164,10 +164,10 @@ def test_scaling_by_powers_of_two_scales_p_bit_for_bit():
 def test_failures_are_reported_and_leave_p_alone():
     W, b, start = np.eye(3), [-1.0, 1.0, 0.0], [7.0, 0.5, 0.25]
     for mu, velocity, limit, expected in (
-        (-0.1, b, 100, BAD_DATA),
-        (np.nan, b, 100, BAD_DATA),
-        (0.5, [np.nan, 0, 0], 100, BAD_DATA),
-        (0.5, b, 1, PIVOT_LIMIT),
+        (-0.1, b, 100, LCP_BAD_DATA),
+        (np.nan, b, 100, LCP_BAD_DATA),
+        (0.5, [np.nan, 0, 0], 100, LCP_BAD_DATA),
+        (0.5, b, 1, LCP_PIVOT_LIMIT),
     ):
         status, _, p = solve(W, velocity, mu, start, limit)
         assert status == expected
@@ -176,23 +176,23 @@ def test_failures_are_reported_and_leave_p_alone():
 
 def test_wedged_between_closing_walls_is_a_ray():
     J = np.array([[1, 0, 0], [0, 1, 0], [0, 0, 1], [-1, 0, 0], [0, 1, 0], [0, 0, 1]], float)
-    assert solve(J @ J.T, [-1, 0.5, 0, -1, 0.5, 0], 0.5)[0] == RAY
+    assert solve(J @ J.T, [-1, 0.5, 0, -1, 0.5, 0], 0.5)[0] == LCP_RAY
 
 
 def test_normal_fallback_is_the_frictionless_twin():
     J, W = block_contacts(CORNERS)
     b = J @ [1.0, -2.0, 0.5, 0.3, 0.2, 0.1]
-    floats, integers = normal_sizes(N_MAX)
+    floats, integers = normal_lcp_sizes(N_MAX)
     padded = np.full((N_MAX, N_MAX), np.nan)
     padded[:4, :4] = W[::3, ::3]
     p = np.full(N_MAX, 5.0)
     work = np.full(floats, np.nan), np.full(integers, -9)
     velocity = np.append(b[::3], np.full(N_MAX - 4, np.nan))
-    assert normal_fallback(padded, velocity, 4, p, *work, 100)[0] == SOLVED
+    assert solve_normal_lcp(padded, velocity, 4, p, *work, 100)[0] == LCP_SOLVED
     u = W[::3, ::3] @ p[:4] + b[::3]
     assert np.abs(np.minimum(u, p[:4])).max() < 1e-13
     assert (p[4:] == 5.0).all()
     assert np.abs(u - (W @ solve(W, b, 0.0)[2] + b)[::3]).max() < 1e-13
     before = p.copy()
-    assert normal_fallback(padded, velocity, 4, p, *work, 1)[0] == PIVOT_LIMIT
+    assert solve_normal_lcp(padded, velocity, 4, p, *work, 1)[0] == LCP_PIVOT_LIMIT
     assert np.array_equal(p, before)

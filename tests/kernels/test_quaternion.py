@@ -130,7 +130,7 @@ def test_vector_products_are_those_of_numpy(a, b):
 @settings(deadline=None)
 @given(rotation_vectors)
 def test_the_exponential_turns_by_the_rotation_vector(rotation):
-    q = kernels.exponential(rotation)
+    q = kernels.exp_map(rotation)
     assert abs(math.hypot(*q) - 1) <= 4 * EPS
     # The half angle ≤ 2.6 is rounded by 3 EPS of itself; then sine, cosine and two products.
     expected = Rotation.from_rotvec(rotation).as_quat()[[3, 0, 1, 2]]
@@ -141,7 +141,7 @@ def test_the_exponential_turns_by_the_rotation_vector(rotation):
 @settings(deadline=None)
 @given(rotation_vectors, st.floats(-1, 1), st.floats(-1, 1))
 def test_rotations_about_one_axis_add(rotation, s, t):
-    one, two, both = (kernels.exponential(tuple(float(a * f) for a in rotation)) for f in (s, t, s + t))
+    one, two, both = (kernels.exp_map(tuple(float(a * f) for a in rotation)) for f in (s, t, s + t))
     # Three half angles ≤ 5.2, each good to 4 EPS of itself, and a product of unit quaternions.
     assert distance(kernels.multiply(one, two), both) <= 80 * EPS
 
@@ -149,7 +149,7 @@ def test_rotations_about_one_axis_add(rotation, s, t):
 @pytest.mark.parametrize("half", [0.0, 5e-324, 1e-200, 1e-9, 9.999999e-5, 1e-4, 1.000001e-4, 1e-3])
 def test_the_exponential_has_no_seam_between_series_and_quotient(half):
     axis = np.array([2, -3, 6]) / 7
-    q = kernels.exponential(tuple(2 * half * axis))
+    q = kernels.exp_map(tuple(2 * half * axis))
     assert q[0] == pytest.approx(math.cos(half), rel=2 * EPS)
     # Squares of what is below 1e-154 vanish: the series is then sin(x)/x = 1 to rounding, which it is.
     assert np.allclose(q[1:], math.sin(half) * axis, rtol=8 * EPS, atol=5e-324)
@@ -158,7 +158,7 @@ def test_the_exponential_has_no_seam_between_series_and_quotient(half):
 @pytest.mark.parametrize("angle", [1e-300, 1e-12, 1e-8, 1e-3, 1.0, 3.0])
 def test_the_orientation_error_of_the_oracle_sees_small_angles(angle):
     start = np.array([0.5, -0.5, 0.5, 0.5])
-    turned = kernels.multiply(tuple(start), kernels.exponential((angle * 0.6, 0.0, angle * 0.8)))
+    turned = kernels.multiply(tuple(start), kernels.exp_map((angle * 0.6, 0.0, angle * 0.8)))
     # Products of the quaternions round parts of size 1/2, so that the angle is good to a few EPS absolute.
     assert abs(orientation_error(start, turned) - angle) <= 8 * EPS
     assert abs(orientation_error(start, np.negative(turned)) - angle) <= 8 * EPS

@@ -12,7 +12,7 @@ from numba.core.registry import cpu_target
 from numba.np.numpy_support import from_dtype
 
 from physics.kernels.compile.decorators import kernel
-from physics.kernels.compile.fused.memoised_contexts import RememberingTarget, remembering
+from physics.kernels.compile.fused.memoised_contexts import MemoisedTarget, memoised
 
 PAIRS = [
     (types.float64, types.float64),
@@ -36,14 +36,14 @@ def test_a_signature_is_the_one_that_numba_finds(function, pair):
     context = cpu_target.typing_context
     kind = context.resolve_value_type(function)
     if function is operator.add or pair[0] is not PAIRS[-1][0]:
-        ours = remembering(context).resolve_function_type(kind, pair, {})
-        again = remembering(context).resolve_function_type(kind, pair, {})
+        ours = memoised(context).resolve_function_type(kind, pair, {})
+        again = memoised(context).resolve_function_type(kind, pair, {})
         assert ours is again
         assert ours == context.resolve_function_type(kind, pair, {})
 
 
 def test_what_does_not_exist_is_refused_each_time():
-    context = remembering(cpu_target.typing_context)
+    context = memoised(cpu_target.typing_context)
     kind = context.resolve_value_type(operator.add)
     for _ in range(2):
         with pytest.raises(numba.TypingError):
@@ -51,7 +51,7 @@ def test_what_does_not_exist_is_refused_each_time():
 
 
 def test_members_of_a_record_are_told_apart_by_its_type():
-    context = remembering(cpu_target.typing_context)
+    context = memoised(cpu_target.typing_context)
     first = numba.from_dtype(np.dtype([("x", np.float64), ("y", np.int64)]))
     other = numba.from_dtype(np.dtype([("x", np.int64)]))
     for _ in range(2):
@@ -64,24 +64,24 @@ def test_a_size_is_the_one_that_llvm_gives():
     context = cpu_target.target_context
     for kind in (types.boolean, types.int32, types.float64, types.UniTuple(types.float64, 3)):
         layout = context.get_data_type(kind)
-        assert RememberingTarget(context).get_abi_sizeof(layout) == context.get_abi_sizeof(layout)
+        assert MemoisedTarget(context).get_abi_sizeof(layout) == context.get_abi_sizeof(layout)
 
 
 def test_functions_of_others_are_answered_by_numba():
     """Questions in Numba's own context leave no trace in the remembered answers."""
-    known = len(remembering(cpu_target.typing_context).signatures)
+    known = len(memoised(cpu_target.typing_context).signatures)
 
     @numba.njit
     def other(a, b):
         return a - b
 
     assert other(np.float32(3), np.complex64(1)) == 2
-    assert len(remembering(cpu_target.typing_context).signatures) == known
+    assert len(memoised(cpu_target.typing_context).signatures) == known
 
 
 def test_the_symbol_of_a_kernel_that_stands_does_not_count_the_types_of_the_process():
     """Two processes that compile at once keep one file for both: a whole of the other one has to find its symbol."""
-    target = RememberingTarget(cpu_target.target_context)
+    target = MemoisedTarget(cpu_target.target_context)
     first, later = (from_dtype(np.dtype([(name, np.float64)])) for name in ("symbol_first", "symbol_later"))
     tags = {"abi_tags": ["digest"], "uid": 0}
     assert target.mangler("solve", (first,), **tags) == target.mangler("solve", (later,), **tags)

@@ -189,13 +189,13 @@ def test_many_turns_at_once_follow_the_elliptic_functions_and_the_parts():
         h = angle / np.sqrt((m * m / moments).sum() / moments.min())
         at_once = turn(moments, (1, 0, 0, 0), m, h)
         top = ref.JacobiTop(moments, angvel)
-        parts = top.period * angle / h / free_rotation.ANGLE_LIMIT
+        parts = top.period * angle / h / free_rotation.PART_ANGLE_LIMIT
         found = ref.rotation_matrix(at_once).T @ m
         assert np.abs(found - moments * top.angvel_body(h)).max() < EPS * parts * angle * np.linalg.norm(m)
         if angle < 1000.0:
             pieces = int(angle / 40.0) + 1
             in_pieces = turn(moments, (1, 0, 0, 0), m, h / pieces, pieces)
-            assert ref.orientation_error(at_once, in_pieces) < EPS * angle / free_rotation.ANGLE_LIMIT * angle
+            assert ref.orientation_error(at_once, in_pieces) < EPS * angle / free_rotation.PART_ANGLE_LIMIT * angle
             assert ref.orientation_error(turn(moments, at_once, m, -h), (1, 0, 0, 0)) < 2 * EPS * parts * angle
 
 
@@ -260,7 +260,7 @@ def test_flow_keeps_unit_length_energy_and_reverses(angvel, h):
     """|q| = 1 and 2E = Σ L_k²/I_k to rounding, and the flow of -h undoes that of h."""
     L = BLOCK * np.array(angvel)
     q = turn(BLOCK, (1, 0, 0, 0), L, h)
-    parts = 1 + 17 * np.linalg.norm(angvel) / 6.5 * h / free_rotation.ANGLE_LIMIT
+    parts = 1 + 17 * np.linalg.norm(angvel) / 6.5 * h / free_rotation.PART_ANGLE_LIMIT
     assert abs(np.linalg.norm(q) - 1) < 8 * EPS
     m = ref.rotation_matrix(q).T @ L
     energy, start = np.sum(m * m / BLOCK), np.sum(L * L / BLOCK)

@@ -26,17 +26,19 @@ def pair(seed, a, b, is_block, gap):
     for _ in range(50):
         middle = 0.5 * (low + high)
         low, high = (middle, high) if (n @ (middle * way) - size).max() < gap else (low, middle)
-    A = ellipsoid_distance.squares_of(tuple(C.ravel()), tuple(a))
+    A = ellipsoid_distance.ellipsoid_matrix(tuple(C.ravel()), tuple(a))
     B = (b[0] ** 2, 0.0, 0.0, b[1] ** 2, 0.0, b[2] ** 2)
     return A, B, C, tuple((high * way).tolist())
 
 
 def solve(A, B, b, is_block, d):
-    start = ellipsoid_distance.nearest_in_block(d, tuple(b))[1] if is_block else ellipsoid_distance.start_from(d)
-    n, apart = ellipsoid_distance.direction_between(A, is_block, B, tuple(b), d, start)
-    on_a = np.array(d) - ellipsoid_distance.point_of(A, n)[1]
+    start = ellipsoid_distance.nearest_on_block(d, tuple(b))[1] if is_block else ellipsoid_distance.center_direction(d)
+    n, apart = ellipsoid_distance.max_separation_direction(A, is_block, B, tuple(b), d, start)
+    on_a = np.array(d) - ellipsoid_distance.ellipsoid_support_point(A, n)[1]
     on_b = (
-        ellipsoid_distance.block_point(tuple(b), n, tuple(on_a)) if is_block else ellipsoid_distance.point_of(B, n)[1]
+        ellipsoid_distance.block_support_point(tuple(b), n, tuple(on_a))
+        if is_block
+        else ellipsoid_distance.ellipsoid_support_point(B, n)[1]
     )
     return np.array(n), apart, on_a, np.array(on_b)
 
@@ -71,7 +73,7 @@ def test_the_two_points_lie_along_the_normal(seed, a, b, is_block, gap):
 
 def test_a_ball_as_an_ellipsoid_is_a_ball():
     A, B = (
-        ellipsoid_distance.squares_of((1.0, 0, 0, 0, 1.0, 0, 0, 0, 1.0), (0.5, 0.5, 0.5)),
+        ellipsoid_distance.ellipsoid_matrix((1.0, 0, 0, 0, 1.0, 0, 0, 0, 1.0), (0.5, 0.5, 0.5)),
         (4.0, 0.0, 0.0, 4.0, 0.0, 4.0),
     )
     d = (3.0, 1.0, -2.0)

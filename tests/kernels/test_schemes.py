@@ -172,7 +172,7 @@ def test_a_sphere_spun_up_about_a_fixed_axis_turns_by_the_phases_of_its_steps(co
     _, q_n, _, _ = integrators.integrate(code, ZERO, q, ZERO, L, ZERO, tau, ZERO, 1.0, (inverse,) * 3, h, n)
     y = h * inverse / 2 * (size + torque * h * np.arange(0, n + 0.5, 0.5))
     angle = sum(2 * np.angle(factor(code, *y[2 * k : 2 * k + 3])) for k in range(n))
-    turn = quaternion.exponential(tuple(float(a) for a in axis * angle))
+    turn = quaternion.exp_map(tuple(float(a) for a in axis * angle))
     # 50 steps of 20 roundings of EPS/2 in the parts of q, twice that in the angle; angle ≤ 150 by 4 EPS.
     assert orientation_error(quaternion.multiply(turn, q), q_n) <= 1600 * EPS
 

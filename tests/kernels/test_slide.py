@@ -12,19 +12,19 @@ from hypothesis import strategies as st
 from physics.kernels.compile.decorators import kernel
 from physics.kernels.compile.simd import Lanes
 from physics.kernels.contact_solver.one_contact import (
-    HELD,
-    LEAST_SQUARE,
-    LOST,
-    OPEN,
-    SLID,
-    answer,
-    block,
-    heading,
+    CONTACT_OPENS,
+    CONTACT_SLIDES,
+    CONTACT_STICKS,
+    CONTACT_UNSOLVED,
+    MIN_SQUARED_NORM,
+    delassus_block,
+    diagonal_delassus_block,
+    friction_direction,
     inverse_root,
-    own_block,
+    solve_contact_block,
 )
-from physics.kernels.contact_solver.sliding_patch import HOLD, MIXED, SLIDE
-from physics.kernels.contact_solver.solve import DIRECT
+from physics.kernels.contact_solver.sliding_patch import TRY_MIXED, TRY_SLIDING, TRY_STICKING
+from physics.kernels.state.layout import METHOD_DIRECT
 from tests.kernels.contact_problem import FACE, MASS, Problem
 from tests.kernels.test_direct import FALL, assert_solved, floor, law_defect
 
@@ -58,9 +58,9 @@ def test_a_face_turns_about_a_vertex(held, sense):
     """Friction holds one vertex, the other three slide about it: without sweeps."""
     problem, expected = pivoting(held, sense)
     p, (_, _, residual, _, method) = problem.solve()
-    assert method == DIRECT
+    assert method == METHOD_DIRECT
     assert residual <= TOLERANCE
-    assert problem.one["mode"] == MIXED
+    assert problem.one["mode"] == TRY_MIXED
     np.testing.assert_allclose(p, expected, atol=impulse_error(problem))
 
 
@@ -77,8 +77,8 @@ def test_the_impulses_of_the_last_step_are_the_start_where_some_contacts_held():
     """From them a solution is one: not a round is made, and nothing changes but by rounding."""
     problem, _ = pivoting(2, 1)
     p, _ = problem.solve()
-    again, (_, _, residual, _, method) = problem.solve(MIXED, warm=p)
-    assert method == DIRECT
+    again, (_, _, residual, _, method) = problem.solve(TRY_MIXED, warm=p)
+    assert method == METHOD_DIRECT
     assert residual <= TOLERANCE
     # Slopes and quotients of impulses come out of linear systems of 2 unknowns of condition < 100.
     np.testing.assert_allclose(again, p, atol=1e-13 * p.max())
@@ -97,11 +97,11 @@ def test_random_shoves_of_a_face_are_solved_directly(tolerance, speed, spin):
     for _ in range(400):
         v = np.add(rng.normal(0, speed, 3), (0, FALL, 0))
         problem = Problem(floor(FACE), v, rng.normal(0, spin, 3), 0.5, tolerance=tolerance)
-        p, (_, _, residual, _, method) = problem.solve(SLIDE)
+        p, (_, _, residual, _, method) = problem.solve(TRY_SLIDING)
         assert residual <= tolerance
         # What is reported bounds what is: both are sums of a dozen products, a few dozen roundings of their largest.
         assert problem.residual(p) <= residual + 64 * np.finfo(float).eps
-        direct += method == DIRECT
+        direct += method == METHOD_DIRECT
     assert direct >= 399
 
 
@@ -118,9 +118,9 @@ def test_a_face_that_tips_is_solved_directly_though_its_targets_differ():
         w, target = rng.normal(0, 0.1, 3), np.zeros((4, 3))
         target[:, 0] = -np.abs(rng.normal(0, 1e-6, 4))
         problem = Problem(floor(FACE), v, w, 0.5, tolerance=1e-6, target=target)
-        _, (_, _, residual, _, method) = problem.solve(SLIDE)
+        _, (_, _, residual, _, method) = problem.solve(TRY_SLIDING)
         assert residual <= 1e-6
-        direct += method == DIRECT
+        direct += method == METHOD_DIRECT
     assert direct >= 399
 
 
@@ -188,8 +188,8 @@ def test_what_was_left_for_sweeps_is_solved_directly(key):
     target = np.zeros((len(vertices), 3))
     target[:, 0] = normal_targets
     problem = Problem(floor(vertices), v, w, 0.5, quat=quat, target=target, tolerance=1e-6)
-    p, (_, _, residual, _, method) = problem.solve(SLIDE)
-    assert method == DIRECT
+    p, (_, _, residual, _, method) = problem.solve(TRY_SLIDING)
+    assert method == METHOD_DIRECT
     assert residual <= 1e-6
     assert law_defect(problem, p) <= 1e-4  # for why a hundred times that: `assert_solved`
 
@@ -197,10 +197,10 @@ def test_what_was_left_for_sweeps_is_solved_directly(key):
 def test_two_contacts_that_slid_are_not_asked_to_hold_first():
     """Two contacts that slide are tried as sliding first in the next step, whatever held before."""
     problem = Problem(floor((0, 1)), (0.3, FALL, 0.1), (0, 0, 0), 0.5)
-    p, (_, _, _, _, method) = problem.solve(HOLD)
-    assert method == DIRECT
+    p, (_, _, _, _, method) = problem.solve(TRY_STICKING)
+    assert method == METHOD_DIRECT
     np.testing.assert_allclose(np.hypot(p[:, 1], p[:, 2]), 0.5 * p[:, 0], rtol=1e-12)  # they slide
-    assert problem.one["mode"] == SLIDE
+    assert problem.one["mode"] == TRY_SLIDING
 
 
 @settings(max_examples=300, deadline=None)
@@ -212,7 +212,7 @@ def test_two_contacts_that_slid_are_not_asked_to_hold_first():
 def test_two_contacts_obey_the_law_in_every_mixture(vertices, motion, mu):
     problem = Problem(floor(vertices), np.add(motion[:3], (0, FALL, 0)), motion[3:], mu)
     if np.abs(problem.matrices()[1]).max() > 1e-3:
-        assert_solved(problem, *problem.solve(SLIDE))
+        assert_solved(problem, *problem.solve(TRY_SLIDING))
 
 
 def one_contact(v, w, mu):
@@ -223,15 +223,18 @@ def one_contact(v, w, mu):
 
 
 def test_one_contact_opens_holds_or_slides():
-    assert answer(*one_contact((0, 0.1, 0), (0, 0, 0), 0.5), 0.0, 0.0, True)[:2] == (OPEN, (0.0, 0.0, 0.0))
+    assert solve_contact_block(*one_contact((0, 0.1, 0), (0, 0, 0), 0.5), 0.0, 0.0, True)[:2] == (
+        CONTACT_OPENS,
+        (0.0, 0.0, 0.0),
+    )
     W, b, mu, trace, goal = one_contact((0, -1, 0), (0, 0, 0), 5.0)
-    what, p, _ = answer(W, b, mu, trace, goal, 0.0, 0.0, True)
-    assert what == HELD
+    what, p, _ = solve_contact_block(W, b, mu, trace, goal, 0.0, 0.0, True)
+    assert what == CONTACT_STICKS
     # A 3 x 3 solve of condition < 20: a few dozen roundings of the velocity.
     np.testing.assert_allclose(np.reshape(W, (3, 3)) @ p, -np.array(b), atol=1e-14)
     W, b, mu, trace, goal = one_contact((2, -1, 1), (0, 0, 0), 0.3)
-    what, p, miss = answer(W, b, mu, trace, goal, 0.0, 0.0, True)
-    assert what == SLID
+    what, p, miss = solve_contact_block(W, b, mu, trace, goal, 0.0, 0.0, True)
+    assert what == CONTACT_SLIDES
     assert miss <= goal
     u = np.reshape(W, (3, 3)) @ p + b
     assert u[0] == pytest.approx(0, abs=1e-14)
@@ -242,7 +245,7 @@ def test_one_contact_opens_holds_or_slides():
 def test_a_contact_that_may_not_hold_and_cannot_slide_is_lost():
     """No direction of sliding is consistent if holding, which is the answer, is ruled out."""
     W, b, _, trace, goal = one_contact((0.01, -1, 0), (0, 0, 0), 5.0)
-    assert answer(W, b, 5.0, trace, goal, 0.0, 0.0, False)[0] == LOST
+    assert solve_contact_block(W, b, 5.0, trace, goal, 0.0, 0.0, False)[0] == CONTACT_UNSOLVED
 
 
 def test_blocks_of_the_wall_frame_are_those_of_the_dense_matrix():
@@ -253,8 +256,10 @@ def test_blocks_of_the_wall_frame_are_those_of_the_dense_matrix():
     K = tuple(inverse[i, j] for i, j in ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2)))
     r, s = (tuple(axes @ problem.one["arm"][i]) for i in range(2))
     # Sums of products of size 1, a dozen roundings.
-    np.testing.assert_allclose(np.reshape(block(r, s, 1 / problem.mass, 1.0, K), (3, 3)), W[:3, 3:], atol=5e-15)
-    own = np.reshape(own_block(r, 1 / problem.mass, 1.0, K), (3, 3))
+    np.testing.assert_allclose(
+        np.reshape(delassus_block(r, s, 1 / problem.mass, 1.0, K), (3, 3)), W[:3, 3:], atol=5e-15
+    )
+    own = np.reshape(diagonal_delassus_block(r, 1 / problem.mass, 1.0, K), (3, 3))
     np.testing.assert_allclose(own, W[:3, :3], atol=5e-15)
     np.testing.assert_array_equal(own, own.T)
 
@@ -267,7 +272,7 @@ def _inverse_roots(x, out):
         out[1 + k] = lanes[k]
 
 
-@given(st.floats(LEAST_SQUARE, 1e300))
+@given(st.floats(MIN_SQUARED_NORM, 1e300))
 def test_the_inverse_root_is_off_by_two_roundings(x):
     """The product of the root, ½ ulp off and with it 1/x, is rounded once more: 1.5 EPS of it at most."""
     out = np.zeros(5)
@@ -278,6 +283,6 @@ def test_the_inverse_root_is_off_by_two_roundings(x):
 
 def test_a_direction_has_the_length_asked_for_or_there_is_none():
     for x, y in [(3.0, -4.0), (1e-140, 0.0), (-1e120, 1e119)]:
-        a, b = heading(x, y, 0.5)
+        a, b = friction_direction(x, y, 0.5)
         np.testing.assert_allclose((a, b), -0.5 * np.array([x, y]) / math.hypot(x, y), rtol=4e-16)
-    assert heading(1e-150, 1e-160, 0.5) == heading(0.0, 0.0, 0.5) == (0.0, 0.0)
+    assert friction_direction(1e-150, 1e-160, 0.5) == friction_direction(0.0, 0.0, 0.5) == (0.0, 0.0)

@@ -8,14 +8,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from physics.kernels.compile.decorators import kernel
-from physics.kernels.time_stepping.step import crossing
+from physics.kernels.math.parabolic_root import parabola_crossing_time
 
 EPS = 2.0**-52
 
 
 @kernel
 def _crossing(low_gap, high_gap, width, bend):
-    return crossing(low_gap, high_gap, width, bend)
+    return parabola_crossing_time(low_gap, high_gap, width, bend)
 
 
 magnitudes = st.floats(-12.0, 6.0).map(lambda e: 10.0**e)

@@ -7,7 +7,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from physics.kernels.contact_solver.gauss_seidel import assemble, cone_residual, cone_sweeps, factor_blocks, velocities
+from physics.kernels.contact_solver.gauss_seidel import (
+    assemble_delassus,
+    cone_residual,
+    cone_sweeps,
+    invert_contact_blocks,
+    update_contact_velocities,
+)
 from physics.kernels.contact_solver.proximal_newton import proximal_newton
 from physics.kernels.contact_solver.solve import solve_contacts
 from tests.kernels.contact_problem import FACE, Problem
@@ -20,8 +26,8 @@ def prepared(v, w, mu, vertices=FACE):
     """A problem with its matrices assembled by the kernel, and a zero start."""
     problem = Problem([(0, k) for k in vertices], v, w, mu)
     one = problem.one
-    assemble(problem.n, 3, problem.R, problem.v, tuple(np.linalg.inv(problem.inertia) @ problem.L), one)
-    factor_blocks(problem.n, one)
+    assemble_delassus(problem.n, 3, problem.R, problem.v, tuple(np.linalg.inv(problem.inertia) @ problem.L), one)
+    invert_contact_blocks(problem.n, one)
     one["friction"] = mu
     one["impulse"] = 0.0
     return problem, one
@@ -42,7 +48,7 @@ def test_the_residual_is_measured_on_the_result(v, w, mu):
     W, b = problem.matrices()
     sweeps, residual = cone_sweeps(4, one["friction"], 1e-9, 40, one)
     p, u = one["impulse"].copy(), np.zeros_like(one["velocity"])
-    velocities(12, one["delassus"], p, one["bias"], u)
+    update_contact_velocities(12, one["delassus"], p, one["bias"], u)
     # `velocity` is kept up to date sweep by sweep: rounding of 40 updates.
     assert cone_residual(4, p, u, one["friction"], one["local"]) == pytest.approx(residual, abs=1e-13)
     assert residual <= 1e-9 or sweeps == 40
@@ -57,7 +63,7 @@ def test_newton_never_makes_it_worse(v, w, mu):
     _, after = proximal_newton(4, before, 1e-10, False, one)
     assert after <= before
     p, u = one["impulse"], np.zeros_like(one["velocity"])
-    velocities(12, one["delassus"], p, one["bias"], u)
+    update_contact_velocities(12, one["delassus"], p, one["bias"], u)
     assert cone_residual(4, p, u, one["friction"], one["local"]) == pytest.approx(after, abs=1e-14)
 
 

@@ -7,8 +7,8 @@ import pytest
 
 import physics
 from physics.kernels.compile.decorators import kernel
-from physics.kernels.half_space.conservative_advancement import safe_time, spin_bound
-from physics.kernels.multibody.narrowphase.gjk import distance_between
+from physics.kernels.half_space.conservative_advancement import safe_advance, spin_bound
+from physics.kernels.multibody.narrowphase.gjk import gjk_distance
 from physics.kernels.state.layout import HULL, SPHERE
 from tests.reference import turning as truth
 from tests.reference.separation import largest_separation
@@ -26,7 +26,7 @@ SHAPES = {
 def safe_time_of(y, horizon, scratch):
     """(bound of |ω|, gap, safe time) of a body and the first wall."""
     spin = spin_bound(y[1], y[3], horizon, None, scratch[0])
-    gap, t = safe_time(y, 0, horizon, spin, None, scratch[0])
+    gap, t = safe_advance(y, 0, horizon, spin, None, scratch[0])
     return spin, gap, t
 
 
@@ -59,7 +59,7 @@ def test_the_distance_of_two_bodies_is_a_bound_that_falls_short_by_a_tenth_at_mo
         R, S = (truth.Rotation.random(random_state=rng.integers(1 << 30)).as_matrix() for _ in range(2))
         d = rng.standard_normal(3)
         d *= (0.5 + 1.5 * rng.random()) / np.linalg.norm(d)
-        n, gap = distance_between(
+        n, gap = gjk_distance(
             0, 1, tuple(d), tuple(R.ravel()), (0.0, 0.0, 0.0), tuple(S.ravel()), tuple(d), 1e-9, has_hulls, many
         )
         best = largest_separation(lambda n, R=R: support(a, R, -n), lambda n, S=S: support(b, S, n), d, seed=k)

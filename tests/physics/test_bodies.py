@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 import physics
 from physics import scenes
-from physics.kernels.multibody.data.arrays import PAIRS
+from physics.kernels.multibody.data.arrays import NUM_PAIRS
 from physics.world.report import Solver, Status
 
 G = 9.81
@@ -92,7 +92,7 @@ def test_a_ball_turns_the_block_that_it_hits_off_centre(restitution, ball_first,
 def test_a_plastic_landing_stops_in_front_of_what_it_meets():
     """At whatever moment of a step it comes: eight heights, spread over the way of one step."""
     speed, dt = np.sqrt(2 * G * 0.5), 0.01
-    assert speed * dt < 0.1 * np.sqrt(0.75)  # too slow to be met in time: `impact.FAST_SHARE`
+    assert speed * dt < 0.1 * np.sqrt(0.75)  # too slow to be met in time: `impact._FAST_RADIUS_SHARE`
     bodies = [physics.Block(CUBE, 1.0, pos=(0, 0.5, 0)), physics.Block(CUBE, 1.0, pos=(0, 2.0, 0))]
     effects = [physics.Gravity((0, -G, 0)), physics.Contact(), physics.Friction(0.5)]
     world = physics.World(physics.Scene(bodies, FLOOR, effects), worlds=8, dt=dt)
@@ -394,4 +394,4 @@ def test_many_that_spin_fast_but_far_apart_are_no_pairs():
     world = physics.World(physics.Scene(bodies, (), [physics.Contact()]), dt=0.01)
     report = world.step()
     assert not report.left_out.any()
-    assert world.scratch[0].counts[PAIRS] == 0
+    assert world.scratch[0].counts[NUM_PAIRS] == 0

@@ -153,8 +153,8 @@ def test_a_log_changes_nothing_and_tells_when_it_is_full(accuracy):
         np.testing.assert_array_equal(logged.event_counts, small.event_counts)
         most = max(most, int(small.event_counts.max()))
         for body, count in enumerate(logged.event_counts):
-            assert (np.diff(logged.event_log[body, :count, event_log.TIME]) >= 0).all()
-            assert (logged.event_log[body, :count, event_log.KIND] == event_log.IMPACT).all()
+            assert (np.diff(logged.event_log[body, :count, event_log.EVENT_TIME]) >= 0).all()
+            assert (logged.event_log[body, :count, event_log.EVENT_KIND] == event_log.KIND_IMPACT).all()
     assert most > 1
 
 
@@ -217,7 +217,10 @@ def test_random_impacts_with_friction_and_rebound_add_up(accuracy, count):
     for row, (number, events) in enumerate(zip(world.event_counts, world.event_log)):
         of, body = divmod(row, count)
         for event in events[:number]:
-            impulse, other = event[event_log.IMPULSE : event_log.IMPULSE + 3], int(event[event_log.OTHER])
+            impulse, other = (
+                event[event_log.EVENT_IMPULSE : event_log.EVENT_IMPULSE + 3],
+                int(event[event_log.EVENT_OTHER]),
+            )
             told[of, body] += impulse
             if other >= 0:
                 told[of, other] -= impulse

@@ -51,11 +51,11 @@ def test_explain_names_every_effect_and_its_reason():
 LINKED = """
 import json, sys, physics
 from numba.core.codegen import JITCodeLibrary
-from physics.kernels.compile.fused.code_libraries import StandingLibrary
+from physics.kernels.compile.fused.code_libraries import SharedLibrary
 linked, optimise = set(), JITCodeLibrary._optimize_final_module
 
 def noted(library):
-    if library.name == "step_worlds" or isinstance(library, StandingLibrary):
+    if library.name == "step_worlds" or isinstance(library, SharedLibrary):
         linked.update(f.name for f in library._final_module.functions if not f.is_declaration)
     optimise(library)
 
@@ -69,8 +69,9 @@ effects = eval(sys.argv[1])
 world = physics.World(physics.Scene([physics.Block((5, 3, 2), 6.0, pos=(0, 5, 0))],
                       [physics.HalfSpace((0, 1, 0))], effects), dt=0.01)
 world.step()
-names = ["gather", "solve_contacts", "cone_sweeps", "pyramid_fallback", "normal_sweeps", "free_rotation",
-         "resist_turning", "without_gain", "aim_tangential", "bind_laws", "hold_linked_loads", "unstretch"]
+names = ["collect_wall_contacts", "solve_contacts", "cone_sweeps", "solve_pyramid_lcp", "normal_sweeps",
+         "free_rotation", "apply_resistance_torques", "reject_energy_gain", "set_tangential_targets", "bind_laws",
+         "hold_linked_loads", "unstretch_tangents"]
 print(json.dumps([name for name in names if any(name in function for function in linked)]))
 """
 )
@@ -92,17 +93,24 @@ def compiled_names(effects: str, cache: Path) -> set[str]:
         (
             "[physics.Gravity()]",
             {"free_rotation"},
-            {"gather", "solve_contacts", "cone_sweeps", "normal_sweeps"},
+            {"collect_wall_contacts", "solve_contacts", "cone_sweeps", "normal_sweeps"},
         ),
         (
             "[physics.Contact()]",
-            {"gather", "normal_sweeps"},
-            {"cone_sweeps", "pyramid_fallback", "resist_turning", "without_gain", "aim_tangential", "bind_laws"},
+            {"collect_wall_contacts", "normal_sweeps"},
+            {
+                "cone_sweeps",
+                "solve_pyramid_lcp",
+                "apply_resistance_torques",
+                "reject_energy_gain",
+                "set_tangential_targets",
+                "bind_laws",
+            },
         ),
-        ("[physics.Contact(), physics.Friction()]", {"cone_sweeps"}, {"unstretch", "bind_laws"}),
+        ("[physics.Contact(), physics.Friction()]", {"cone_sweeps"}, {"unstretch_tangents", "bind_laws"}),
         (
             "[physics.Contact(), physics.Friction((0.1, 0.2), (0, 0, 1))]",
-            {"cone_sweeps", "unstretch", "bind_laws"},
+            {"cone_sweeps", "unstretch_tangents", "bind_laws"},
             set(),
         ),
     ],

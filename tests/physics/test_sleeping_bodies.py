@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import physics
-from physics.kernels.multibody.data.arrays import CONTACTS
+from physics.kernels.multibody.data.arrays import NUM_CONTACTS
 from physics.plan.accuracy import resolve
 
 DT, G, MU = 0.01, 9.81, 0.5
@@ -76,7 +76,7 @@ def test_pulling_the_lowest_wakes_the_tower_and_not_the_other_one():
         awake.step(load)
         assert world.asleep[0].tolist() == [False] * 4 + [True] * 4
         assert report.solves == 1
-    assert world.scratch[0].counts[CONTACTS] == 16  # those of the four alone were posed
+    assert world.scratch[0].counts[NUM_CONTACTS] == 16  # those of the four alone were posed
     assert len(world.contacts()[0]) == len(awake.contacts()[0]) == 32  # and those of the others are still told
     assert np.array_equal(world.state[4:], others)
     # What was asleep would have crept by less than a slop a window; the way of 0.3 s from there is solved to tolerance.

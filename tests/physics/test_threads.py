@@ -15,9 +15,9 @@ import physics
 from physics import scenes
 from physics.kernels.compile.decorators import kernel
 from physics.kernels.parallel import spin_wait_workers, work_stealing
-from physics.kernels.parallel.atomics import add, pause, seen
-from physics.kernels.parallel.work_stealing import FIRST, TAKEN, next_world
-from physics.kernels.parallel.work_stealing import begin as turns_begin
+from physics.kernels.parallel.atomics import atomic_add, atomic_load, spin_pause
+from physics.kernels.parallel.work_stealing import TAKEN_COUNT, TAKEN_FIRST_WORLD, next_world
+from physics.kernels.parallel.work_stealing import begin_taking as turns_begin
 from physics.parallel import processors, thread_team
 from physics.parallel.bound_call import bound
 from physics.parallel.thread_team import Team, listed
@@ -26,7 +26,7 @@ from physics.world.stepper import kernel_calls
 
 def taken_by(team: Team) -> list[list[int]]:
     """The worlds of each thread."""
-    return [each[FIRST : FIRST + each[TAKEN]].tolist() for each in team.taken]
+    return [each[TAKEN_FIRST_WORLD : TAKEN_FIRST_WORLD + each[TAKEN_COUNT]].tolist() for each in team.taken]
 
 
 def tied() -> physics.Scene:
@@ -62,24 +62,24 @@ def test_events_are_taken_in_turn_as_well():
 
 def test_worlds_listed_for_a_kernel():
     team = Team(1, 9)
-    team.taken[0][: FIRST + 3] = listed(np.array([2, 5, 7]))
+    team.taken[0][: TAKEN_FIRST_WORLD + 3] = listed(np.array([2, 5, 7]))
     assert taken_by(team) == [[2, 5, 7]]
 
 
 @given(st.integers(1, 5), st.integers(1, 60), st.integers(1, 9), st.randoms(use_true_random=False))
 def test_whoever_is_fast_each_world_is_taken_once(size, worlds, chunk, random):
     """And a thread takes those of its own range first."""
-    table, lists = work_stealing.make_turns(size, worlds, chunk), work_stealing.make_taken(size, worlds)
-    work_stealing.deal(table)
+    table, lists = work_stealing.make_ranges(size, worlds, chunk), work_stealing.make_taken_lists(size, worlds)
+    work_stealing.reset_ranges(table)
     for taken in lists:
-        work_stealing.begin(table, taken)
+        work_stealing.begin_taking(table, taken)
     last, busy = [-1] * size, list(range(size))
     while busy:
         k = random.choice(busy)
         last[k] = work_stealing.next_world(last[k], table, lists[k])
         if last[k] < 0:
             busy.remove(k)
-    each = [taken[FIRST : FIRST + taken[TAKEN]].tolist() for taken in lists]
+    each = [taken[TAKEN_FIRST_WORLD : TAKEN_FIRST_WORLD + taken[TAKEN_COUNT]].tolist() for taken in lists]
     assert sorted(np.concatenate(each)) == list(range(worlds))
     for k, mine in enumerate(each):
         is_own = [worlds * k // size <= world < worlds * (k + 1) // size for world in mine]
@@ -89,14 +89,14 @@ def test_whoever_is_fast_each_world_is_taken_once(size, worlds, chunk, random):
 @kernel
 def visit(visits, k, pauses, begun):
     """Wait, and note it; -1 instead of a number of pauses raises. The one that leads waits until all have begun."""
-    add(begun, 0, 0, 1)
-    while k == 0 and seen(begun, 0, 0) % visits.shape[1] != 0:
-        pause()
+    atomic_add(begun, 0, 0, 1)
+    while k == 0 and atomic_load(begun, 0, 0) % visits.shape[1] != 0:
+        spin_pause()
     if pauses[k] < 0:
         raise ZeroDivisionError("this thread")
     for _ in range(pauses[k]):
-        pause()
-    add(visits, 0, k, 1)
+        spin_pause()
+    atomic_add(visits, 0, k, 1)
 
 
 def visitors(size: int, pauses=0) -> tuple[list, np.ndarray, np.ndarray]:
@@ -163,7 +163,7 @@ def test_who_is_not_called_soon_goes(sent, monkeypatch):
         team.run(calls)
         for future in team._futures.values():
             future.result(timeout=60)
-        assert team._crew[1, spin_wait_workers.STATE] == spin_wait_workers.AWAY
+        assert team._crew[1, spin_wait_workers.WORKER_STATE] == spin_wait_workers.IDLE
         assert len(sent) == times
     assert visits.tolist() == [[3, 3]]
     team.close()
@@ -235,7 +235,7 @@ def test_nobody_waits_for_a_thread_that_has_not_begun(sent, monkeypatch):
     monkeypatch.setattr(Team, "_be_member", lambda team, member: (held.wait(60), be_member(team, member)))
     failing = np.zeros(1, dtype=np.int64)
     alone = [bound(take_all, team.turns, taken, visits, failing) for taken in team.taken]
-    team.taken[1, TAKEN] = 5
+    team.taken[1, TAKEN_COUNT] = 5
     for times in range(1, 4):
         team.run(alone)
         assert (visits == times).all()
@@ -275,16 +275,16 @@ def test_no_more_threads_than_processors(switch, others, sent, monkeypatch):
         world.step()
         assert sorted(np.concatenate(taken_by(world.team))) == list(range(40))
     assert len(sent) == others
-    assert (world.team._crew[0, spin_wait_workers.GIVE_WAY] == 0) == (switch == "fixed")
-    assert world.team._crew[0, spin_wait_workers.PROCESSOR] == 0
-    assert not world.team.taken[1 + others :, TAKEN].any()
+    assert (world.team._crew[0, spin_wait_workers.CREW_YIELD_ADDRESS] == 0) == (switch == "fixed")
+    assert world.team._crew[0, spin_wait_workers.CREW_PROCESSOR_ADDRESS] == 0
+    assert not world.team.taken[1 + others :, TAKEN_COUNT].any()
     world.team.close()
 
 
 @kernel
 def follow(taken, state, visits, heights):
-    for k in range(taken[TAKEN]):
-        world = taken[FIRST + k]
+    for k in range(taken[TAKEN_COUNT]):
+        world = taken[TAKEN_FIRST_WORLD + k]
         visits[world] += 1
         heights[world] = state[world, 1]
 

@@ -17,8 +17,8 @@ from pathlib import Path
 
 from numba.core import config
 
-from physics.kernels.compile.fused.cache_files import say
-from physics.kernels.compile.fused.dispatcher import FOREIGN, PART, STANDING, Kernel
+from physics.kernels.compile.fused.cache_files import warn
+from physics.kernels.compile.fused.dispatcher import FOREIGN_KIND, PART_KIND, SHARED_KIND, Kernel
 
 
 def _cache_root() -> Path | None:
@@ -37,7 +37,7 @@ def _cache_root() -> Path | None:
         try:
             root.mkdir(mode=0o700, parents=True, exist_ok=True)
             if hasattr(os, "getuid") and root.stat().st_uid not in (os.getuid(), 0):
-                say(f"{root} belongs to another user: kernels are not kept there")
+                warn(f"{root} belongs to another user: kernels are not kept there")
             elif os.access(root, os.W_OK):
                 return root
         except OSError:
@@ -78,10 +78,10 @@ def cache_dir() -> Path | None:
 OPTIONS = {"error_model": "numpy", "nogil": True, "_nrt": False}
 
 # For `numba.extending.overload`: what it chooses is a part of the kernel that calls it, with no call left.
-CHOSEN = {**OPTIONS, "forceinline": True, "pipeline_class": Kernel.part_pipeline}
+OVERLOAD_OPTIONS = {**OPTIONS, "forceinline": True, "pipeline_class": Kernel.part_pipeline}
 
 
-def _make(function, called_as=PART, **options):
+def _make(function, called_as=PART_KIND, **options):
     """A `Kernel` of `function`; without a compiler the function itself."""
     if config.DISABLE_JIT:
         return function
@@ -89,7 +89,7 @@ def _make(function, called_as=PART, **options):
     return Kernel(function, options=options, called_as=called_as)
 
 
-def _compile(function, called_as=PART, **options):
+def _compile(function, called_as=PART_KIND, **options):
     compiled = _make(function, called_as, **options)
     if not config.DISABLE_JIT:
         compiled.enable_caching(cache_dir())
@@ -122,9 +122,9 @@ def kernel(function):
     return _compile(function, forceinline=False)
 
 
-def standing(function):
+def shared_kernel(function):
     """`kernel` with machine code of its own, which all plans call: see `physics.kernels.compile.fused.dispatcher`."""
-    return _compile(function, STANDING, forceinline=False)
+    return _compile(function, SHARED_KIND, forceinline=False)
 
 
 def inlined(function):
@@ -132,11 +132,11 @@ def inlined(function):
     return _compile(function, forceinline=True)
 
 
-def composed(function):
+def runtime_kernel(function):
     """`inlined` without a place of its own on disk: made at run time, or by a user, and kept with what calls it."""
-    return _make(function, FOREIGN, forceinline=True)
+    return _make(function, FOREIGN_KIND, forceinline=True)
 
 
-def checked(function):
-    """`composed` for what a user wrote: an index may count from the end, and one outside its axis raises IndexError."""
-    return _make(function, FOREIGN, forceinline=True, boundscheck=True)
+def user_kernel(function):
+    """`runtime_kernel` for a user's function: indices may count from the end; one outside raises IndexError."""
+    return _make(function, FOREIGN_KIND, forceinline=True, boundscheck=True)

@@ -3,7 +3,7 @@
 A block rests on a wall with three or four vertices, and all of them are asked the same: how fast they slide, in what
 direction, what they push with. In kernels `Lanes` is a vector of LLVM's (`codegen.lanes`); what stands here is what it
 means, and what it is without a compiler. A number beside lanes is four of it. No result depends on the processor: each
-lane is what the number alone would be, and sums are taken in one order (`total`).
+lane is what the number alone would be, and sums are taken in one order (`lane_sum`).
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-WIDTH = 4
+LANE_COUNT = 4
 
 
 class Lanes:
@@ -40,7 +40,7 @@ class Lanes:
 
 def _each(of: Callable, *values) -> Lanes:
     """A function of each lane of some values; of a number, of that."""
-    spread = [one.each if isinstance(one, Lanes) else (one,) * WIDTH for one in values]
+    spread = [one.each if isinstance(one, Lanes) else (one,) * LANE_COUNT for one in values]
     return Lanes(*(of(*lane) for lane in zip(*spread, strict=True)))
 
 
@@ -66,12 +66,12 @@ for _name in ("lt", "le", "gt", "ge", "eq", "and", "or"):
     _define(_name, getattr(operator, f"__{_name}__"))
 
 
-def row(array, i, j):
+def load_lanes(array, i, j):
     """The four numbers `array[i, j]` to `array[i, j + 3]`, in one read."""
-    return Lanes(*(float(array[i, j + k]) for k in range(WIDTH)))
+    return Lanes(*(float(array[i, j + k]) for k in range(LANE_COUNT)))
 
 
-def put_row(array, i, j, x):
+def store_lanes(array, i, j, x):
     """Write four numbers, or one of them four times, to `array[i, j]` to `array[i, j + 3]`."""
     for k, one in enumerate(_each(float, x).each):
         array[i, j + k] = one
@@ -81,7 +81,7 @@ def _root(x) -> float:
     return math.sqrt(x) if x >= 0.0 else math.nan
 
 
-def root(x):
+def lane_sqrt(x):
     """Square roots; of a negative number, no number. Of a number that is not lanes, a number."""
     return _each(_root, x) if isinstance(x, Lanes) else _root(x)
 
@@ -96,31 +96,31 @@ def smaller(x, y):
     return _of_each_or_one(min, x, y)
 
 
-def chosen(where, x, y):
+def select_lanes(where, x, y):
     """x where something is true, else y; of a truth and two numbers, one of them."""
     return _of_each_or_one(lambda true, one, other: one if true else other, where, x, y)
 
 
-def total(x):
+def lane_sum(x):
     """Sum of all four: first those two apart, which is also the first half and the second half."""
     return (x[0] + x[2]) + (x[1] + x[3])
 
 
-def totals(a, b, c, d):
-    """`total` of each of four lanes."""
-    return Lanes(*(total(_each(float, one)) for one in (a, b, c, d)))
+def lane_sums(a, b, c, d):
+    """`lane_sum` of each of four lanes."""
+    return Lanes(*(lane_sum(_each(float, one)) for one in (a, b, c, d)))
 
 
-def largest(x):
+def max_of_lanes(x):
     """The largest of all four."""
     return max(max(x[0], x[2]), max(x[1], x[3]))
 
 
-def least(x):
+def min_of_lanes(x):
     """The least of all four."""
     return min(min(x[0], x[2]), min(x[1], x[3]))
 
 
-def first_of(where):
+def first_true_lane(where):
     """The first lane of which something is true, or -1."""
-    return next((k for k in range(WIDTH) if where[k]), -1)
+    return next((k for k in range(LANE_COUNT) if where[k]), -1)

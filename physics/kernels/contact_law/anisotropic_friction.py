@@ -29,10 +29,10 @@ import math
 
 from physics.kernels.compile.decorators import inlined
 from physics.kernels.math import quaternion as qt
-from physics.kernels.state.contact_law_dispatch import ANISOTROPY, if_law, number_of
+from physics.kernels.state.contact_law_dispatch import LAW_ANISOTROPY, if_law, law_parameter
 
 # k = μ2/μ1 of the body in the workspace; the literal 1 where it is not declared, which the compiler multiplies out.
-friction_ratio = number_of(ANISOTROPY, 1.0)
+friction_ratio = law_parameter(LAW_ANISOTROPY, 1.0)
 
 
 @inlined
@@ -50,8 +50,8 @@ def _as_assembled(n, work):
     return None
 
 
-@if_law((ANISOTROPY,), _as_assembled)
-def stretch(n, work):
+@if_law((LAW_ANISOTROPY,), _as_assembled)
+def stretch_tangents(n, work):
     """Stretch the rows of tangent 2 in the contact problem that is assembled in `work`, and its impulses with them."""
     k = friction_ratio(work)
     for i in range(n):
@@ -67,8 +67,8 @@ def stretch(n, work):
             work.delassus[s, r] *= k
 
 
-@if_law((ANISOTROPY,), _as_assembled)
-def unstretch(n, work):
+@if_law((LAW_ANISOTROPY,), _as_assembled)
+def unstretch_tangents(n, work):
     """The impulses along the unit tangents again."""
     k = friction_ratio(work)
     for i in range(n):
@@ -79,16 +79,16 @@ def _as_it_is(vector, axes, work):
     return vector
 
 
-@if_law((ANISOTROPY,), _as_it_is)
-def eased(f, axes, work):
+@if_law((LAW_ANISOTROPY,), _as_it_is)
+def unstretch_force(f, axes, work):
     """S⁻¹ f: a force whose size along the wall is to be held against μ1 times the push; `axes` are the wall's."""
     k = friction_ratio(work)
     s = (1.0 / k - 1.0) * qt.dot(axes[2], f)
     return f[0] + s * axes[2][0], f[1] + s * axes[2][1], f[2] + s * axes[2][2]
 
 
-@if_law((ANISOTROPY,), _as_it_is)
-def opposing(d, axes, work):
+@if_law((LAW_ANISOTROPY,), _as_it_is)
+def sliding_direction(d, axes, work):
     """S² d/|S d|: what friction of sliding along the unit vector d is -μ1 f_n times of; d itself on an even wall."""
     k = friction_ratio(work)
     a, b = qt.dot(axes[1], d), k * qt.dot(axes[2], d)

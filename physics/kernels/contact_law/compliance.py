@@ -8,15 +8,16 @@ the same way:
 
 (Of a point that is still above the wall, g⁰ > 0, 0 stands for g⁰ there: the spring then stores at most the energy
 that was paid for.) With g, the gap after the first drift, g¹ = g + θh u + (θh)² b/2 and g'¹ = u + θh b, u the new
-velocity of the point where it is then and b what it gains there per time by turning (`target_velocity.aim_rest`), that
-is linear in u. In a contact problem
+velocity of the point where it is then and b what it gains there per time by turning
+(`target_velocity.set_resting_targets`), that is linear in u. In a contact problem
 
     0 <= p ⟂ u + γ p - t >= 0,    γ = 1/(h D),    D = θ (θhk + c),
     t = -[k (θ (g + (θh)² b/2) + (1 - θ) g⁰) + c (θ²h b + (1 - θ) g'⁰)]/D,
 
 a number γ more on the diagonal of W, and a target. In equilibrium g = g⁰ = -p/(hk) at any h and θ: the sag is exact.
-A point that ends up deeper than g¹, since turning is no parabola, is lifted there (`lift_to_due`): by moving the body,
-as in `contact_set.push_out`. A depth that no force has worked for would be energy for a stiff spring.
+A point that ends up deeper than g¹, since turning is no parabola, is lifted there (`correct_spring_depth`): by moving
+the body, as in `contact_set.project_out_of_walls`. A depth that no force has worked for would be energy for a stiff
+spring.
 
 This is the θ-method. θ = ½ is the midpoint rule: of second order, and a spring keeps its energy, p (u⁰ + u¹)/2 =
 -k (g¹² - g⁰²)/2. θ = 1 is implicit Euler, which brings what a step cannot resolve to rest in one step. For ½ <= θ <= 1
@@ -38,27 +39,27 @@ from __future__ import annotations
 import math
 
 from physics.kernels.compile.decorators import inlined
-from physics.kernels.contact_law.restitution_energy import lifted_to
-from physics.kernels.contact_law.target_velocity import LARGEST_TURN, UNSEEN
+from physics.kernels.contact_law.restitution_energy import lift_conserving_energy
+from physics.kernels.contact_law.target_velocity import MAX_TARGET_TURN, NEGLIGIBLE_SLOP_SHARE
 from physics.kernels.half_space.contact_point import (
-    arm_and_rate,
     contact_arm,
+    contact_arm_and_rate,
     feature_of,
     place_arms,
     wall_normal,
     wall_of,
 )
-from physics.kernels.half_space.contact_set import gap_of, nearest_outside_set
+from physics.kernels.half_space.contact_set import feature_gap, nearest_outside_set
 from physics.kernels.math import quaternion as qt
 from physics.kernels.state import layout as at
-from physics.kernels.state.body import angular_velocity, kinetic_energy, principal_attitude, turning
-from physics.kernels.state.contact_law_dispatch import DAMPING, STIFFNESS, if_law, number_of
+from physics.kernels.state.body import angular_velocity, apply_inv_inertia, kinetic_energy, principal_attitude
+from physics.kernels.state.contact_law_dispatch import LAW_DAMPING, LAW_STIFFNESS, if_law, law_parameter
 
 # Share of its energy that a body may gain in a resting stage by what is of third order in the step.
-GAIN_SHARE = 2.0e-5
+ENERGY_GAIN_TOLERANCE = 2.0e-5
 
-stiffness = number_of(STIFFNESS)
-damping = number_of(DAMPING)
+contact_stiffness = law_parameter(LAW_STIFFNESS)
+contact_damping = law_parameter(LAW_DAMPING)
 
 
 @inlined
@@ -70,8 +71,8 @@ def _halves(n, y, h, tilted, work):
     return 0.5 * h, 0.5 * h
 
 
-@if_law((STIFFNESS,), _halves)
-def parts_of_stage(n, y, h, tilted, work):
+@if_law((LAW_STIFFNESS,), _halves)
+def split_stage_by_theta(n, y, h, tilted, work):
     """Lengths (1 - θ) h and θ h of the drifts before and after the impulses [s]."""
     q = y[1]
     place_arms(n, qt.to_matrix(q), tilted, work)
@@ -79,8 +80,8 @@ def parts_of_stage(n, y, h, tilted, work):
     w = n / work.mass
     for i in range(n):
         m = qt.cross(contact_arm(work, i), wall_normal(work.walls, wall_of(work.slot[i], work)))
-        w += qt.dot(m, turning(R, m, work.J))
-    rate = max(math.sqrt(stiffness(work) * w), damping(work) * w)
+        w += qt.dot(m, apply_inv_inertia(R, m, work.J))
+    rate = max(math.sqrt(contact_stiffness(work) * w), contact_damping(work) * w)
     theta = max(0.5, 1.0 - 1.0 / (rate * h))
     return (1.0 - theta) * h, theta * h
 
@@ -89,37 +90,37 @@ def _no_aim(*arguments):
     return None
 
 
-@if_law((STIFFNESS,), _no_aim)
-def aim_springs(n, x, R, v, w, alpha, before, after, tilted, work):
-    """Targets along the normals, and the γ of the stage, in place of what `target_velocity.aim_rest` asks for.
+@if_law((LAW_STIFFNESS,), _no_aim)
+def set_spring_targets(n, x, R, v, w, alpha, before, after, tilted, work):
+    """Targets along the normals, and the γ of the stage, instead of `target_velocity.set_resting_targets`.
 
     x, R, v, w, alpha are those of the body between the drifts of `before` and `after`, before the impulses;
     `work.gap` is that at the start.
     """
     h = before + after
-    k, c = stiffness(work), damping(work)
+    k, c = contact_stiffness(work), contact_damping(work)
     theta = after / h
     D = theta * (after * k + c)
     work.give = 1.0 / (h * D)
     dims = (work.dims[0], work.dims[1], work.dims[2])
-    is_turning = qt.dot(w, w) * h * h <= LARGEST_TURN * LARGEST_TURN
+    is_turning = qt.dot(w, w) * h * h <= MAX_TARGET_TURN * MAX_TARGET_TURN
     for i in range(n):
         wall = wall_of(work.slot[i], work)
         normal = wall_normal(work.walls, wall)
-        r, rate = arm_and_rate(work.shape, dims, R, w, normal, feature_of(work.slot[i], work), tilted, work)
+        r, rate = contact_arm_and_rate(work.shape, dims, R, w, normal, feature_of(work.slot[i], work), tilted, work)
         gain = 0.0
         if is_turning:
             gain = qt.dot(normal, qt.cross(w, rate)) + qt.dot(normal, qt.cross(alpha, r))
         speed = qt.dot(normal, v) + qt.dot(normal, qt.cross(w, r)) - before * gain
-        gap = gap_of(work.slot[i], x, R, tilted, work) + 0.5 * after * after * gain
+        gap = feature_gap(work.slot[i], x, R, tilted, work) + 0.5 * after * after * gain
         push = k * (theta * gap + (1.0 - theta) * min(work.gap[i], 0.0))
         push += c * (theta * after * gain + (1.0 - theta) * speed)
         work.target[i, 0] = -push / D
         work.due[i] = gap
 
 
-@if_law((STIFFNESS,), _no_aim)
-def foretell_gaps(n, v, w, after, work):
+@if_law((LAW_STIFFNESS,), _no_aim)
+def predict_end_gaps(n, v, w, after, work):
     """Gaps at the end of the stage into `work.due`, from the velocities after the impulses."""
     for i in range(n):
         normal = wall_normal(work.walls, wall_of(work.slot[i], work))
@@ -133,9 +134,9 @@ def _as_it_ends(n, y, end, h, tilted, report, work):
 @inlined
 def _lifted(n, x, R, share, tilted, work):
     """x moved out of the walls until no point is deeper than `share` of what its spring is due to be."""
-    least = UNSEEN * work.slop
+    least = NEGLIGIBLE_SLOP_SHARE * work.slop
     for i in range(n):
-        lift = share * min(work.due[i], 0.0) - gap_of(work.slot[i], x, R, tilted, work)
+        lift = share * min(work.due[i], 0.0) - feature_gap(work.slot[i], x, R, tilted, work)
         if lift > least:
             x = _along(x, lift, wall_normal(work.walls, wall_of(work.slot[i], work)))
     return x
@@ -159,8 +160,8 @@ def _stored(n, x, R, tilted, work):
     """Energy of the springs at x [J]."""
     stored = 0.0
     for i in range(n):
-        gap = min(gap_of(work.slot[i], x, R, tilted, work), 0.0)
-        stored += 0.5 * stiffness(work) * gap * gap
+        gap = min(feature_gap(work.slot[i], x, R, tilted, work), 0.0)
+        stored += 0.5 * contact_stiffness(work) * gap * gap
     return stored
 
 
@@ -173,18 +174,18 @@ def _without_excess(y, end, excess, h, tilted, report, work):
     x, q, v, L = end
     size = kinetic_energy(y[1], y[2], y[3], work, tilted)
     size += work.mass * h * h * qt.dot(work.free_acceleration, work.free_acceleration)
-    if not excess > max(work.tolerance, GAIN_SHARE) * size:
+    if not excess > max(work.tolerance, ENERGY_GAIN_TOLERANCE) * size:
         return end
     motion = kinetic_energy(q, v, L, work, tilted)
     if not excess < motion:
-        report[work.world, at.COARSE] += 1.0
+        report[work.world, at.UNRESOLVED_MOTION] += 1.0
         return y[0], y[1], (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
     s = math.sqrt(1.0 - excess / motion)
     return x, q, (s * v[0], s * v[1], s * v[2]), (s * L[0], s * L[1], s * L[2])
 
 
-@if_law((STIFFNESS,), _as_it_ends)
-def lift_to_due(n, y, end, h, tilted, report, work):
+@if_law((LAW_STIFFNESS,), _as_it_ends)
+def correct_spring_depth(n, y, end, h, tilted, report, work):
     """The end of a stage from y with no point deeper than its spring is due to be, and no other one in a wall.
 
     Nor is more stored in the springs than there was, and than the motion has lost and the loads have done on the way.
@@ -192,11 +193,11 @@ def lift_to_due(n, y, end, h, tilted, report, work):
     Friction far beyond 1 may push a point that turns more than its spring takes: that is taken from the motion.
     """
     x, q, v, L = end
-    R, least = qt.to_matrix(q), UNSEEN * work.slop
+    R, least = qt.to_matrix(q), NEGLIGIBLE_SLOP_SHARE * work.slop
     x = _lifted(n, x, R, 1.0, tilted, work)
     before = 0.0
     for i in range(n):
-        before += 0.5 * stiffness(work) * min(work.gap[i], 0.0) ** 2
+        before += 0.5 * contact_stiffness(work) * min(work.gap[i], 0.0) ** 2
     stored = _stored(n, x, R, tilted, work)
     if stored > before:
         budget = before + _work_of_loads(y, (x, q, v, L), h, tilted, work)
@@ -206,7 +207,7 @@ def lift_to_due(n, y, end, h, tilted, report, work):
     gap, slot = nearest_outside_set(x, R, tilted, work)
     if gap < -least:
         x = _along(x, -gap, wall_normal(work.walls, wall_of(slot, work)))
-    end = lifted_to(x, end, tilted, work)
+    end = lift_conserving_energy(x, end, tilted, work)
     excess = stored - before - _work_of_loads(y, end, h, tilted, work)
     return _without_excess(y, end, excess, h, tilted, report, work)
 
@@ -215,8 +216,8 @@ def _as_it_is(block, work):
     return block
 
 
-@if_law((STIFFNESS,), _as_it_is)
-def give_way(W, work):
+@if_law((LAW_STIFFNESS,), _as_it_is)
+def add_block_compliance(W, work):
     """The block of a contact with itself, and γ."""
     return W[0] + work.give, W[1], W[2], W[3], W[4], W[5], W[6], W[7], W[8]
 
@@ -225,8 +226,8 @@ def _as_assembled(n, width, work):
     return None
 
 
-@if_law((STIFFNESS,), _as_assembled)
-def soften(n, width, work):
+@if_law((LAW_STIFFNESS,), _as_assembled)
+def add_delassus_compliance(n, width, work):
     """Add γ to the assembled W."""
     for i in range(n):
         work.delassus[width * i, width * i] += work.give
@@ -236,7 +237,7 @@ def _unyielding(value, rho, work):
     return value
 
 
-@if_law((STIFFNESS,), _unyielding)
-def yielding(value, rho, work):
+@if_law((LAW_STIFFNESS,), _unyielding)
+def scale_by_compliance(value, rho, work):
     """Scale a value, a normal impulse q - ρ u or its slope, by the compliance γ: p = q - ρ (u + γ p)."""
     return value / (1.0 + rho * work.give)

@@ -20,23 +20,23 @@ import math
 
 from physics.kernels.compile.decorators import inlined, kernel
 from physics.kernels.math import quaternion as qt
-from physics.kernels.math.quaternion import between
-from physics.kernels.state.body import kinetic_energy, turning
+from physics.kernels.math.quaternion import lerp
+from physics.kernels.state.body import apply_inv_inertia, kinetic_energy
 
 # Share of the energy by which rounding of an impact may raise it: of the dozen products and sums behind a momentum.
-ROUNDING = 1.0e-14
+IMPACT_ENERGY_ROUNDING = 1.0e-14
 
 # Slops that a body is lifted out of a wall for nothing.
-FREE_LIFT = 10.0
+_FREE_LIFT_SLOPS = 10.0
 
 
 @inlined
-def lifted_to(z, y, tilted, work):
+def lift_conserving_energy(z, y, tilted, work):
     """y at the place z out of a wall. The work of the lift against the loads is paid with motion, if there is any."""
     x, q, v, L = y
     d, a = (z[0] - x[0], z[1] - x[1], z[2] - x[2]), work.free_acceleration
     lift = -work.mass * (a[0] * d[0] + a[1] * d[1] + a[2] * d[2])
-    if qt.dot(d, d) > (FREE_LIFT * work.slop) ** 2 and lift > 0.0:
+    if qt.dot(d, d) > (_FREE_LIFT_SLOPS * work.slop) ** 2 and lift > 0.0:
         kinetic = kinetic_energy(q, v, L, work, tilted)
         s = math.sqrt(1.0 - lift / kinetic) if lift < kinetic else 0.0
         v, L = (s * v[0], s * v[1], s * v[2]), (s * L[0], s * L[1], s * L[2])
@@ -60,20 +60,20 @@ def rebound_share(before, plastic, full, middle):
 
 
 @inlined
-def part_of_rebound(q, before, plastic, full, work, tilted):
+def limit_rebound_energy(q, before, plastic, full, work, tilted):
     """The (v, L) between those of a plastic impact and of a full rebound that there is energy for, and its share s.
 
     `before` is the energy before the impact [J], which the full rebound would raise.
     """
     (v0, L0), (v1, L1) = plastic, full
-    middle = kinetic_energy(q, between(v0, v1, 0.5), between(L0, L1, 0.5), work, tilted)
+    middle = kinetic_energy(q, lerp(v0, v1, 0.5), lerp(L0, L1, 0.5), work, tilted)
     ends = kinetic_energy(q, v0, L0, work, tilted), kinetic_energy(q, v1, L1, work, tilted)
     s = rebound_share(before, ends[0], ends[1], middle)
-    return between(v0, v1, s), between(L0, L1, s), s
+    return lerp(v0, v1, s), lerp(L0, L1, s), s
 
 
 @kernel
-def shortened(n, friction, before, w, solved, free, R, work):
+def scale_impulses_to_dissipate(n, friction, before, w, solved, free, R, work):
     """Result of `solve_contacts` for `free` (v, L), with impulses so short that they give no energy.
 
     For a problem that no method solved. Its impulses lie in their cones, and so does any share s of them, whose work is
@@ -83,7 +83,7 @@ def shortened(n, friction, before, w, solved, free, R, work):
     v, L = free
     v_new, L_new, residual, sweeps, method = solved
     u, M = (v_new[0] - v[0], v_new[1] - v[1], v_new[2] - v[2]), (L_new[0] - L[0], L_new[1] - L[1], L_new[2] - L[2])
-    w0, dw = turning(R, L, work.J), turning(R, M, work.J)
+    w0, dw = apply_inv_inertia(R, L, work.J), apply_inv_inertia(R, M, work.J)
     A = work.mass * (qt.dot(u, before) + qt.dot(u, v)) + qt.dot(M, w) + qt.dot(M, w0)
     B = work.mass * qt.dot(u, u) + qt.dot(M, dw)
     if not A + B > 0.0:
@@ -96,4 +96,4 @@ def shortened(n, friction, before, w, solved, free, R, work):
         width = 1
     for r in range(width * n):
         work.impulse[r] *= s
-    return between(v, v_new, s), between(L, L_new, s), residual, sweeps, method
+    return lerp(v, v_new, s), lerp(L, L_new, s), residual, sweeps, method

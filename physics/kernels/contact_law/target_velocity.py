@@ -3,35 +3,35 @@
 from __future__ import annotations
 
 from physics.kernels.compile.decorators import inlined, kernel
-from physics.kernels.compile.simd import WIDTH, chosen, larger, smaller
-from physics.kernels.half_space.contact_point import arm_and_rate, wall_normal, wall_of
-from physics.kernels.half_space.persistent_contacts import goes_on
+from physics.kernels.compile.simd import LANE_COUNT, larger, select_lanes, smaller
+from physics.kernels.half_space.contact_point import contact_arm_and_rate, wall_normal, wall_of
+from physics.kernels.half_space.persistent_contacts import is_persistent_contact
 from physics.kernels.math import quaternion as qt
-from physics.kernels.math.simd_gather import column_from, numbers_from, put_columns, spread
+from physics.kernels.math.simd_gather import broadcast, gather_column_from, gather_numbers_from, scatter_columns
 from physics.kernels.state.layout import BLOCK, SPHERE
 
 # Share of a resting contact's gap that a step closes. In the linear iteration of gap and velocity over steps,
 # λ² - (1 - β/2) λ + β/2 = 0, the root is double (fastest approach without overshoot) for β = 6 - 4√2.
-CLOSING_SHARE = 0.3431457505076198
+GAP_CLOSING_SHARE = 0.3431457505076198
 
 # Turn in a stage beyond which accelerations at its middle say nothing about its end any more [rad].
-LARGEST_TURN = 0.5
+MAX_TARGET_TURN = 0.5
 
 # Share of the slop below which the displacement of a contact in one step does not count.
-UNSEEN = 1.0e-3
+NEGLIGIBLE_SLOP_SHARE = 1.0e-3
 
 # Of the contacts of a set: none is fast enough for an impact, some are left so by the last stage, some hit their wall.
-NOTHING, RESIDUE, HIT = range(3)
+NO_IMPACT, RESIDUAL_APPROACH, TRUE_IMPACT = range(3)
 
 
 @inlined
-def may_hit(bounce_speed, slop_speed, work):
+def may_have_impact(bounce_speed, slop_speed, work):
     """True if a contact of the set is fast enough for an impact: where none is, none is looked at."""
     return work.approach > (min(bounce_speed, slop_speed) if work.restitution > 0.0 else slop_speed)
 
 
 @inlined
-def aim_impact(n, bounce_speed, slop_speed, y, h, tilted, memory, work):
+def set_impact_targets(n, bounce_speed, slop_speed, y, h, tilted, memory, work):
     """Targets of an impact, and what there is: nothing, contacts to bring back to rest, or an impact.
 
     A contact that approaches faster than `bounce_speed` leaves with e times that speed (Newton's law); one that
@@ -43,7 +43,7 @@ def aim_impact(n, bounce_speed, slop_speed, y, h, tilted, memory, work):
     A contact that goes on from the last stage has hit nothing (`persistent_contacts`): it is brought to rest, and its
     speed set to zero, but that is no impact.
     """
-    found, rate = NOTHING, 1.0 / h
+    found, rate = NO_IMPACT, 1.0 / h
     for i in range(n):
         s = -work.speed[i]
         goal = 0.0
@@ -51,11 +51,11 @@ def aim_impact(n, bounce_speed, slop_speed, y, h, tilted, memory, work):
         if is_bounce or s < 0.0:
             goal = work.restitution * s
         if is_bounce or s > slop_speed + max(work.gap[i], 0.0) * rate:
-            if goes_on(i, y, h, tilted, memory, work):
+            if is_persistent_contact(i, y, h, tilted, memory, work):
                 work.speed[i] = goal = 0.0
-                found = max(found, RESIDUE)
+                found = max(found, RESIDUAL_APPROACH)
             else:
-                found = HIT
+                found = TRUE_IMPACT
         work.target[i, 0] = goal
         work.target[i, 1] = 0.0
         work.target[i, 2] = 0.0
@@ -63,7 +63,7 @@ def aim_impact(n, bounce_speed, slop_speed, y, h, tilted, memory, work):
 
 
 @inlined
-def is_closing(i, n, work):
+def is_above_wall(i, n, work):
     """True if a contact of the wall of contact i is still above it."""
     if not work.widest > work.slop:
         return False
@@ -75,7 +75,7 @@ def is_closing(i, n, work):
 
 
 @inlined
-def gainless(target, u):
+def clamp_target_to_energy(target, u):
     """A target for the velocity of a contact (normal, tangents), at most what turns its velocity u round.
 
     Impulses p that change contact velocities from u to u' change the energy by p·(u + u')/2: a push with u' <= -u adds
@@ -85,7 +85,7 @@ def gainless(target, u):
     one division.
     """
     most, square = u[1] * u[1] + u[2] * u[2], target[1] * target[1] + target[2] * target[2]
-    share = chosen(square > most, most / square, 1.0)
+    share = select_lanes(square > most, most / square, 1.0)
     return smaller(target[0], larger(-u[0], 0.0)), share * target[1], share * target[2]
 
 
@@ -101,9 +101,9 @@ def _in_frame(k, a, walls):
 
 @kernel
 def _wandering(k, R, w, tilted, work):
-    """`arm_and_rate` of a body without vertices at wall k: apart, so that blocks do not carry it along."""
+    """`contact_arm_and_rate` of a body without vertices at wall k: apart, so that blocks do not carry it along."""
     dims = (work.dims[0], work.dims[1], work.dims[2])
-    return arm_and_rate(work.shape, dims, R, w, wall_normal(work.walls, k), 0, tilted, work)
+    return contact_arm_and_rate(work.shape, dims, R, w, wall_normal(work.walls, k), 0, tilted, work)
 
 
 @inlined
@@ -112,59 +112,63 @@ def _wandering_point(k, R, w, alpha, tilted, work):
     r, rate = _wandering(k, R, w, tilted, work)
     turn, a, b = qt.cross(w, r), qt.cross(w, rate), qt.cross(alpha, r)
     return (
-        (spread(turn[0]), spread(turn[1]), spread(turn[2])),
-        (spread(a[0]), spread(a[1]), spread(a[2])),
-        (spread(b[0]), spread(b[1]), spread(b[2])),
+        (broadcast(turn[0]), broadcast(turn[1]), broadcast(turn[2])),
+        (broadcast(a[0]), broadcast(a[1]), broadcast(a[2])),
+        (broadcast(b[0]), broadcast(b[1]), broadcast(b[2])),
     )
 
 
 @inlined
 def _aim_at_wall(first, n, v, w, alpha, half, is_turning, negligible, rate, R, tilted, work):
-    """`aim_rest` for contacts from `first` on, up to four of one wall: the next one after them."""
+    """`set_resting_targets` for contacts from `first` on, up to four of one wall: the next one after them."""
     walls, arm = work.walls, work.arm
     k, last = wall_of(work.slot[first], work), first
-    while last + 1 < min(n, first + WIDTH) and wall_of(work.slot[last + 1], work) == k:
+    while last + 1 < min(n, first + LANE_COUNT) and wall_of(work.slot[last + 1], work) == k:
         last += 1
-    t0 = t1 = t2 = spread(0.0)
+    t0 = t1 = t2 = broadcast(0.0)
     if is_turning:
-        r = column_from(arm, 0, first, last), column_from(arm, 1, first, last), column_from(arm, 2, first, last)
+        r = (
+            gather_column_from(arm, 0, first, last),
+            gather_column_from(arm, 1, first, last),
+            gather_column_from(arm, 2, first, last),
+        )
         turn = qt.cross(w, r)
         a, b = qt.cross(w, turn), qt.cross(alpha, r)
         if work.shape != BLOCK:
             turn, a, b = _wandering_point(k, R, w, alpha, tilted, work)
         u = (v[0] + turn[0], v[1] + turn[1], v[2] + turn[2])
         c = (-half * (a[0] + b[0]), -half * (a[1] + b[1]), -half * (a[2] + b[2]))
-        t0, t1, t2 = gainless(_in_frame(k, c, walls), _in_frame(k, u, walls))
-    if is_closing(first, n, work):
-        t0 = t0 - rate * numbers_from(work.gap, first, last)
+        t0, t1, t2 = clamp_target_to_energy(_in_frame(k, c, walls), _in_frame(k, u, walls))
+    if is_above_wall(first, n, work):
+        t0 = t0 - rate * gather_numbers_from(work.gap, first, last)
     is_little = larger(abs(t0), larger(abs(t1), abs(t2))) <= negligible
-    t0, t1, t2 = chosen(is_little, 0.0, t0), chosen(is_little, 0.0, t1), chosen(is_little, 0.0, t2)
-    put_columns(work.target, first, last, t0, t1, t2)
+    t0, t1, t2 = select_lanes(is_little, 0.0, t0), select_lanes(is_little, 0.0, t1), select_lanes(is_little, 0.0, t2)
+    scatter_columns(work.target, first, last, t0, t1, t2)
     return last + 1
 
 
 @kernel
 def _aim_at_others(first, n, v, w, alpha, half, is_turning, negligible, rate, R, tilted, work):
-    """`aim_rest` for contacts from `first` on: apart, since most bodies touch one wall."""
+    """`set_resting_targets` for contacts from `first` on: apart, since most bodies touch one wall."""
     while first < n:
         first = _aim_at_wall(first, n, v, w, alpha, half, is_turning, negligible, rate, R, tilted, work)
 
 
 @inlined
-def aim_rest(n, v, w, alpha, R, h, tilted, work):
+def set_resting_targets(n, v, w, alpha, R, h, tilted, work):
     """Targets of the resting stage over h; R is the attitude at its middle, v and w are the velocities there before it.
 
     The impulses act at the middle of the step, the target is the velocity at its end, half a step later: by then a
     point has gained h/2 (ω x ṙ + α x r), α the angular acceleration of free turning, and that is taken off. Of a vertex
     ṙ = ω x r; the lowest point of an ellipsoid wanders over it; of a sphere it is 0. A feature still above the wall
-    may close `CLOSING_SHARE` of its gap (all of it in a substep's last stage). What is smaller than the tolerance of
-    the solve, or would move a contact by less than `UNSEEN` slops in the step, is 0: a body comes to rest to the last
-    bit, and contacts that hold are not asked to move apart by next to nothing.
+    may close `GAP_CLOSING_SHARE` of its gap (all of it in a substep's last stage). What is smaller than the tolerance
+    of the solve, or would move a contact by less than `NEGLIGIBLE_SLOP_SHARE` slops in the step, is 0: a body comes to
+    rest to the last bit, and contacts that hold are not asked to move apart by next to nothing.
     """
     half = 0.5 * h
-    is_turning = 0.0 < qt.dot(w, w) * h * h <= LARGEST_TURN * LARGEST_TURN and work.shape != SPHERE
-    negligible = max(work.tolerance * work.acceleration * h, UNSEEN * work.slop / h)
-    rate = (1.0 if work.is_last else CLOSING_SHARE) / h
+    is_turning = 0.0 < qt.dot(w, w) * h * h <= MAX_TARGET_TURN * MAX_TARGET_TURN and work.shape != SPHERE
+    negligible = max(work.tolerance * work.acceleration * h, NEGLIGIBLE_SLOP_SHARE * work.slop / h)
+    rate = (1.0 if work.is_last else GAP_CLOSING_SHARE) / h
     first = _aim_at_wall(0, n, v, w, alpha, half, is_turning, negligible, rate, R, tilted, work)
     if first < n:
         _aim_at_others(first, n, v, w, alpha, half, is_turning, negligible, rate, R, tilted, work)

@@ -35,10 +35,16 @@ import math
 from physics.kernels.compile.decorators import kernel
 from physics.kernels.lcp.dantzig import dantzig, dantzig_sizes
 from physics.kernels.lcp.lemke import lemke, lemke_sizes
-from physics.kernels.lcp.scaling_and_certificate import BAD_DATA, INACCURATE, RAY, SOLVED, inverse_power_of_two
+from physics.kernels.lcp.scaling_and_certificate import (
+    LCP_BAD_DATA,
+    LCP_INACCURATE,
+    LCP_RAY,
+    LCP_SOLVED,
+    inverse_power_of_two,
+)
 
 DIRECTIONS = 8
-UNKNOWNS = DIRECTIONS + 2  # per contact: p_n, beta_0 .. beta_7, lambda
+UNKNOWNS_PER_CONTACT = DIRECTIONS + 2  # per contact: p_n, beta_0 .. beta_7, lambda
 SLIDING_TOLERANCE = 2.0**-30  # of the velocities that add up to u_t: slower than this is rounding
 RETRY_ANGLE = 1.0  # [rad], no fraction of a turn: no two pyramids come to stand alike
 
@@ -52,25 +58,25 @@ def pyramid_sizes(n_max: int) -> tuple[int, int]:
 
     About 1 MB for 24 contacts: one work space per thread, not one per world.
     """
-    size = UNKNOWNS * n_max
+    size = UNKNOWNS_PER_CONTACT * n_max
     (rows, columns), integers = lemke_sizes(size)
     return size * size + 2 * size + rows * columns + 2 * n_max, integers
 
 
-def normal_sizes(n_max: int) -> tuple[int, int]:
-    """Lengths of `work` (float64) and `index` (int64) of `normal_fallback` for up to n_max contacts."""
+def normal_lcp_sizes(n_max: int) -> tuple[int, int]:
+    """Lengths of `work` (float64) and `index` (int64) of `solve_normal_lcp` for up to n_max contacts."""
     (rows, columns), integers = dantzig_sizes(n_max)
     return rows * columns + n_max, integers
 
 
-def workspace_sizes(n_max: int) -> tuple[int, int]:
+def pivoting_workspace_sizes(n_max: int) -> tuple[int, int]:
     """Lengths of `work` (float64) and `index` (int64) that serve either fallback."""
-    pyramid, normal = pyramid_sizes(n_max), normal_sizes(n_max)
+    pyramid, normal = pyramid_sizes(n_max), normal_lcp_sizes(n_max)
     return max(pyramid[0], normal[0]), max(pyramid[1], normal[1])
 
 
 @kernel
-def orient(W, b, n, p, heading):
+def orient_pyramids(W, b, n, p, heading):
     """Direction d_0 of each contact into `heading` (n, 2): against u_t; if that vanishes, along p_t."""
     for i in range(n):
         ux, uy = b[3 * i + 1], b[3 * i + 2]
@@ -92,7 +98,7 @@ def orient(W, b, n, p, heading):
 
 
 @kernel
-def turn(n, heading):
+def rotate_pyramids(n, heading):
     """Turn each contact's pyramid by its own multiple of `RETRY_ANGLE`."""
     for i in range(n):
         c, s = math.cos((i + 1) * RETRY_ANGLE), math.sin((i + 1) * RETRY_ANGLE)
@@ -101,43 +107,43 @@ def turn(n, heading):
 
 
 @kernel
-def direction(heading, i, k):
+def pyramid_direction(heading, i, k):
     """d_k of contact i: d_0 turned by k pi / 4."""
     x, y = heading[i, 0], heading[i, 1]
     return COSINE[k] * x - SINE[k] * y, SINE[k] * x + COSINE[k] * y
 
 
 @kernel
-def fill_pair(W, w_scale, heading, i, j, M):
+def fill_pyramid_block(W, w_scale, heading, i, j, M):
     """Block of contacts i, j of the complementarity problem: W between normals and directions."""
-    row, column = UNKNOWNS * i, UNKNOWNS * j
+    row, column = UNKNOWNS_PER_CONTACT * i, UNKNOWNS_PER_CONTACT * j
     for c in range(DIRECTIONS + 1):
         if c == 0:
             gn, gx, gy = 1.0, 0.0, 0.0
         else:
             gn = 0.0
-            gx, gy = direction(heading, j, c - 1)
+            gx, gy = pyramid_direction(heading, j, c - 1)
         un = w_scale * (W[3 * i, 3 * j] * gn + W[3 * i, 3 * j + 1] * gx + W[3 * i, 3 * j + 2] * gy)
         ux = w_scale * (W[3 * i + 1, 3 * j] * gn + W[3 * i + 1, 3 * j + 1] * gx + W[3 * i + 1, 3 * j + 2] * gy)
         uy = w_scale * (W[3 * i + 2, 3 * j] * gn + W[3 * i + 2, 3 * j + 1] * gx + W[3 * i + 2, 3 * j + 2] * gy)
         M[row, column + c] = un
         for k in range(DIRECTIONS):
-            dx, dy = direction(heading, i, k)
+            dx, dy = pyramid_direction(heading, i, k)
             M[row + 1 + k, column + c] = dx * ux + dy * uy
 
 
 @kernel
-def fill_problem(W, b, mu, n, w_scale, heading, M, q):
+def fill_pyramid_lcp(W, b, mu, n, w_scale, heading, M, q):
     """The complementarity problem of all contacts, with W times `w_scale`."""
     M[:] = 0.0
     for i in range(n):
-        row = UNKNOWNS * i
-        last = row + UNKNOWNS - 1
+        row = UNKNOWNS_PER_CONTACT * i
+        last = row + UNKNOWNS_PER_CONTACT - 1
         for j in range(n):
-            fill_pair(W, w_scale, heading, i, j, M)
+            fill_pyramid_block(W, w_scale, heading, i, j, M)
         q[row] = b[3 * i]
         for k in range(DIRECTIONS):
-            dx, dy = direction(heading, i, k)
+            dx, dy = pyramid_direction(heading, i, k)
             q[row + 1 + k] = dx * b[3 * i + 1] + dy * b[3 * i + 2]
             M[row + 1 + k, last] = 1.0
             M[last, row + 1 + k] = -1.0
@@ -146,13 +152,13 @@ def fill_problem(W, b, mu, n, w_scale, heading, M, q):
 
 
 @kernel
-def write_impulses(z, mu, n, w_scale, heading, p):
+def store_pyramid_impulses(z, mu, n, w_scale, heading, p):
     """p from the multipliers, pulled back into the cone by what rounding put outside."""
     for i in range(n):
-        row = UNKNOWNS * i
+        row = UNKNOWNS_PER_CONTACT * i
         x, y = 0.0, 0.0
         for k in range(DIRECTIONS):
-            dx, dy = direction(heading, i, k)
+            dx, dy = pyramid_direction(heading, i, k)
             x += z[row + 1 + k] * dx
             y += z[row + 1 + k] * dy
         bound = mu[i] * z[row]
@@ -164,7 +170,7 @@ def write_impulses(z, mu, n, w_scale, heading, p):
 
 
 @kernel
-def pyramid_fallback(W, b, mu, n, p, work, index, max_pivots):
+def solve_pyramid_lcp(W, b, mu, n, p, work, index, max_pivots):
     """Solve the contact problem with a friction pyramid of eight directions by Lemke's method.
 
     Parameters
@@ -179,7 +185,7 @@ def pyramid_fallback(W, b, mu, n, p, work, index, max_pivots):
         How many contacts.
     p : (3 n or more,) float64, in and out
         [N s]. In: where to turn the pyramids from; zeros if nothing is known. Out:
-        the solution if the status is `SOLVED`, else unchanged.
+        the solution if the status is `LCP_SOLVED`, else unchanged.
     work, index : float64, int64, work
         Of the lengths that `pyramid_sizes` gives, or longer.
     max_pivots : int
@@ -198,7 +204,7 @@ def pyramid_fallback(W, b, mu, n, p, work, index, max_pivots):
     10⁵ problems, rounding loses one: a path without a result is followed once more with every
     pyramid turned. Multiplying W, or b, by a power of two gives exactly the scaled p.
     """
-    size = UNKNOWNS * n
+    size = UNKNOWNS_PER_CONTACT * n
     (rows, columns) = (size + 3, size + 2)
     end_M = size * size
     end_tableau = end_M + rows * columns
@@ -210,26 +216,26 @@ def pyramid_fallback(W, b, mu, n, p, work, index, max_pivots):
     largest = 0.0
     for i in range(3 * n):
         if not mu[i // 3] >= 0.0 or not math.isfinite(p[i]):
-            return BAD_DATA, 0
+            return LCP_BAD_DATA, 0
         largest = max(largest, W[i, i])
     if not math.isfinite(largest):
-        return BAD_DATA, 0
+        return LCP_BAD_DATA, 0
     w_scale = inverse_power_of_two(largest)
-    orient(W, b, n, p, heading)
-    fill_problem(W, b, mu, n, w_scale, heading, M, q)
+    orient_pyramids(W, b, n, p, heading)
+    fill_pyramid_lcp(W, b, mu, n, w_scale, heading, M, q)
     status, pivots = lemke(M, q, z, tableau, index, max_pivots)
-    if status in (RAY, INACCURATE):
-        turn(n, heading)
-        fill_problem(W, b, mu, n, w_scale, heading, M, q)
+    if status in (LCP_RAY, LCP_INACCURATE):
+        rotate_pyramids(n, heading)
+        fill_pyramid_lcp(W, b, mu, n, w_scale, heading, M, q)
         status, again = lemke(M, q, z, tableau, index, max_pivots - pivots)
         pivots += again
-    if status == SOLVED:
-        write_impulses(z, mu, n, w_scale, heading, p)
+    if status == LCP_SOLVED:
+        store_pyramid_impulses(z, mu, n, w_scale, heading, p)
     return status, pivots
 
 
 @kernel
-def normal_fallback(W, b, n, p, work, index, max_pivots):
+def solve_normal_lcp(W, b, n, p, work, index, max_pivots):
     """Solve the contact problem without friction: p >= 0, u = W p + b >= 0, p·u = 0.
 
     Parameters
@@ -241,9 +247,9 @@ def normal_fallback(W, b, n, p, work, index, max_pivots):
     n : int
         How many contacts.
     p : (n or more,) float64, out
-        [N s]. The solution if the status is `SOLVED`, else unchanged.
+        [N s]. The solution if the status is `LCP_SOLVED`, else unchanged.
     work, index : float64, int64, work
-        Of the lengths that `normal_sizes` gives, or longer.
+        Of the lengths that `normal_lcp_sizes` gives, or longer.
     max_pivots : int
         About 2 n are usual.
 
@@ -255,7 +261,7 @@ def normal_fallback(W, b, n, p, work, index, max_pivots):
     size = (2 * n + 6) * n
     z = work[size : size + n]
     status, pivots = dantzig(W, b[:n], z, work[:size].reshape((2 * n + 6, n)), index, max_pivots)
-    if status == SOLVED:
+    if status == LCP_SOLVED:
         for i in range(n):
             p[i] = z[i]
     return status, pivots

@@ -28,22 +28,22 @@ from physics.kernels.compile.decorators import inlined, kernel
 from physics.kernels.half_space.contact_point import wall_of
 
 # Columns of `work.local`: rows of the inverse of the contact's 3x3 block, then ρ_t and ρ.
-TANGENTIAL_STEP = 9
-NORMAL_STEP = 10
+LOCAL_TANGENT_RHO = 9
+LOCAL_NORMAL_RHO = 10
 
 # Newton steps of one contact's sliding direction per visit at most, and the last turn worth another [rad].
-TURN_LIMIT = 3
-TURN_ENOUGH = 1.0e-3
+_ANGLE_NEWTON_STEPS = 3
+_ANGLE_TOLERANCE = 1.0e-3
 
 # Sweeps between two extrapolations. A slow sweep contracts along one direction with a ratio q near 1, which
 # two changes of p tell; the rest of that geometric series, q/(1 - q) times the last change, is then added at
 # once.
 EXTRAPOLATION_PERIOD = 4
-RATIO_LIMIT = 0.998
+_MAX_CONTRACTION_RATIO = 0.998
 
 
 @kernel
-def assemble(n, width, R, v, w, work):
+def assemble_delassus(n, width, R, v, w, work):
     """Jacobian rows, W = J M⁻¹ Jᵀ and b = J (v, ω) - target for the n contacts in `work`.
 
     Parameters
@@ -91,7 +91,7 @@ def assemble(n, width, R, v, w, work):
 
 
 @kernel
-def factor_blocks(n, work):
+def invert_contact_blocks(n, work):
     """Inverse of each contact's 3x3 block, and the steps ρ, ρ_t of the residual."""
     W, local = work.delassus, work.local
     for i in range(n):
@@ -104,12 +104,12 @@ def factor_blocks(n, work):
         local[i, 3], local[i, 4], local[i, 5] = k12 * s, (a * f - c * c) * s, (b * c - a * e) * s
         local[i, 6], local[i, 7], local[i, 8] = k13 * s, (b * c - a * e) * s, (a * d - b * b) * s
         half = 0.5 * (d - f)
-        local[i, TANGENTIAL_STEP] = 1.0 / (0.5 * (d + f) + math.sqrt(half * half + e * e))
-        local[i, NORMAL_STEP] = 1.0 / a
+        local[i, LOCAL_TANGENT_RHO] = 1.0 / (0.5 * (d + f) + math.sqrt(half * half + e * e))
+        local[i, LOCAL_NORMAL_RHO] = 1.0 / a
 
 
 @kernel
-def velocities(rows, W, p, b, u):
+def update_contact_velocities(rows, W, p, b, u):
     """u = W p + b over the leading `rows`."""
     for r in range(rows):
         total = b[r]
@@ -124,7 +124,7 @@ def cone_residual(n, p, u, mu, local):
     worst = check = 0.0
     for i in range(n):
         r = 3 * i
-        rho, rho_t = local[i, NORMAL_STEP], local[i, TANGENTIAL_STEP]
+        rho, rho_t = local[i, LOCAL_NORMAL_RHO], local[i, LOCAL_TANGENT_RHO]
         worst = max(worst, abs(min(u[r], p[r] / rho)))
         x, y = p[r + 1] - rho_t * u[r + 1], p[r + 2] - rho_t * u[r + 2]
         size, limit = math.sqrt(x * x + y * y), mu[i] * max(p[r], 0.0)
@@ -150,7 +150,7 @@ def normal_residual(n, p, u, W):
 def normal_sweeps(n, tolerance, limit, work):
     """`cone_sweeps` for frictionless contacts: projected Gauss-Seidel on u = W p + b, 0 <= p ⟂ u >= 0."""
     p, u, W = work.impulse, work.velocity, work.delassus
-    velocities(n, W, p, work.bias, u)
+    update_contact_velocities(n, W, p, work.bias, u)
     residual = normal_residual(n, p, u, W)
     sweeps = 0
     while not residual <= tolerance and sweeps < limit:
@@ -166,7 +166,7 @@ def normal_sweeps(n, tolerance, limit, work):
 
 
 @inlined
-def _slide_one(r, bn, bx, by, p1, p2, mu, W):
+def _solve_sliding_contact(r, bn, bx, by, p1, p2, mu, W):
     """Impulse of one sliding contact that alone answers its free velocity b, and whether one was found.
 
     With p = p_n (1, -μ d), p_n = -b_n / (W_nn - μ W_nt·d): the contact neither approaches nor leaves. What is
@@ -184,7 +184,7 @@ def _slide_one(r, bn, bx, by, p1, p2, mu, W):
     if size > 0.0:
         x, y = x / size, y / size
     pn = 0.0
-    for _ in range(TURN_LIMIT):
+    for _ in range(_ANGLE_NEWTON_STEPS):
         along = a - mu * (b * x + c * y)
         pn = -bn / along
         gx, gy = b - mu * (d * x + e * y), c - mu * (e * x + f * y)
@@ -199,7 +199,7 @@ def _slide_one(r, bn, bx, by, p1, p2, mu, W):
         x, y = x - t * y, y + t * x
         size = 1.0 / math.sqrt(x * x + y * y)
         x, y = size * x, size * y
-        if abs(t) <= TURN_ENOUGH:
+        if abs(t) <= _ANGLE_TOLERANCE:
             break
     pn = -bn / (a - mu * (b * x + c * y))
     return pn >= 0.0, pn, -mu * pn * x, -mu * pn * y
@@ -224,12 +224,12 @@ def _local_impulse(i, impulse, u, mu, W, local):
     b0 = u[r] - (W[r, r] * p0 + W[r, r + 1] * p1 + W[r, r + 2] * p2)
     b1 = u[r + 1] - (W[r + 1, r] * p0 + W[r + 1, r + 1] * p1 + W[r + 1, r + 2] * p2)
     b2 = u[r + 2] - (W[r + 2, r] * p0 + W[r + 2, r + 1] * p1 + W[r + 2, r + 2] * p2)
-    found, q0, q1, q2 = _slide_one(r, b0, b1, b2, p1, p2, mu, W)
+    found, q0, q1, q2 = _solve_sliding_contact(r, b0, b1, b2, p1, p2, mu, W)
     if found:
         return q0, q1, q2
-    q0 = max(0.0, p0 - local[i, NORMAL_STEP] * u[r])
+    q0 = max(0.0, p0 - local[i, LOCAL_NORMAL_RHO] * u[r])
     dn = q0 - p0
-    step = local[i, TANGENTIAL_STEP]
+    step = local[i, LOCAL_TANGENT_RHO]
     q1 = p1 - step * (u[r + 1] + W[r + 1, r] * dn)
     q2 = p2 - step * (u[r + 2] + W[r + 2, r] * dn)
     size, limit = math.sqrt(q1 * q1 + q2 * q2), mu * q0
@@ -253,7 +253,7 @@ def _extrapolate(n, mu, ratio, work):
             q1 *= limit / size
             q2 *= limit / size
         p[r], p[r + 1], p[r + 2] = q0, q1, q2
-    velocities(3 * n, work.delassus, p, work.bias, work.velocity)
+    update_contact_velocities(3 * n, work.delassus, p, work.bias, work.velocity)
 
 
 @kernel
@@ -270,7 +270,7 @@ def cone_sweeps(n, mu, tolerance, limit, work):
     """
     p, u, W, local, change = work.impulse, work.velocity, work.delassus, work.local, work.change
     rows = 3 * n
-    velocities(rows, W, p, work.bias, u)
+    update_contact_velocities(rows, W, p, work.bias, u)
     residual = cone_residual(n, p, u, mu, local)
     sweeps = 0
     while not residual <= tolerance and sweeps < limit:
@@ -287,6 +287,6 @@ def cone_sweeps(n, mu, tolerance, limit, work):
                 u[s] += (W[r, s] * d0 + W[r + 1, s] * d1) + W[r + 2, s] * d2
         sweeps += 1
         if sweeps % EXTRAPOLATION_PERIOD == 0 and product > 0.0:
-            _extrapolate(n, mu, min(product / square, RATIO_LIMIT), work)
+            _extrapolate(n, mu, min(product / square, _MAX_CONTRACTION_RATIO), work)
         residual = cone_residual(n, p, u, mu, local)
     return sweeps, residual

@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 from physics.kernels.compile.decorators import inlined
-from physics.kernels.compile.simd import WIDTH, chosen, first_of, root, total
+from physics.kernels.compile.simd import LANE_COUNT, first_true_lane, lane_sqrt, lane_sum, select_lanes
 from physics.kernels.contact_law.anisotropic_friction import friction_ratio
 from physics.kernels.half_space.contact_point import contact_arm, wall_axis, wall_of
 from physics.kernels.math import quaternion as qt
-from physics.kernels.math.simd_gather import column, numbers, present
-from physics.kernels.state.layout import NORMAL, TANGENT_1, TANGENT_2
+from physics.kernels.math.simd_gather import gather_column, gather_numbers, valid_lanes_mask
+from physics.kernels.math.vector import minus
+from physics.kernels.state.layout import WALL_NORMAL, WALL_TANGENT_1, WALL_TANGENT_2
 
 # Weighted sharings of the tangential impulses at most: nine in ten of those that hold take ten.
-SHARE_LIMIT = 40
+_MAX_WEISZFELD_STEPS = 40
 
 
 @inlined
@@ -33,12 +34,6 @@ def solve_symmetric(k, b):
 
 
 @inlined
-def minus(a, b):
-    """a - b of vectors."""
-    return (a[0] - b[0], a[1] - b[1], a[2] - b[2])
-
-
-@inlined
 def first_active(n, work):
     """First contact that is not left out."""
     for i in range(n):
@@ -55,7 +50,7 @@ def is_in_cone(pn, pa, pb, work):
 
 
 @inlined
-def share_out(n, count, c, F, a, work):
+def distribute_by_bolt_group(n, count, c, F, a, work):
     """Bolt-group impulses: (the contact that pulls most or -1, whether all are in their cones)."""
     walls = work.walls
     lowest = 0.0
@@ -68,8 +63,8 @@ def share_out(n, count, c, F, a, work):
         wall = wall_of(work.slot[i], work)
         m = qt.cross(a, minus(contact_arm(work, i), c))
         p = (s * F[0] + m[0], s * F[1] + m[1], s * F[2] + m[2])
-        pn = qt.dot(wall_axis(walls, wall, NORMAL), p)
-        pa, pb = qt.dot(wall_axis(walls, wall, TANGENT_1), p), qt.dot(wall_axis(walls, wall, TANGENT_2), p)
+        pn = qt.dot(wall_axis(walls, wall, WALL_NORMAL), p)
+        pa, pb = qt.dot(wall_axis(walls, wall, WALL_TANGENT_1), p), qt.dot(wall_axis(walls, wall, WALL_TANGENT_2), p)
         work.normal[i] = pn
         work.across[i, 0], work.across[i, 1] = pa, pb
         if not pn >= lowest:
@@ -81,13 +76,17 @@ def share_out(n, count, c, F, a, work):
 
 
 @inlined
-def _along(axis, n, work):
+def _coordinates_along(axis, n, work):
     """Coordinates of the contacts along an axis."""
-    return axis[0] * column(work.arm, 0, n) + axis[1] * column(work.arm, 1, n) + axis[2] * column(work.arm, 2, n)
+    return (
+        axis[0] * gather_column(work.arm, 0, n)
+        + axis[1] * gather_column(work.arm, 1, n)
+        + axis[2] * gather_column(work.arm, 2, n)
+    )
 
 
 @inlined
-def share_by_load(n, work):
+def distribute_by_load(n, work):
     """Share the tangential impulses of one wall out in proportion to the normal ones; whether that holds.
 
     With weights g_i, at first the normal impulses, their centre r_g, ρ_i = r_i - r_g: p_t,i = g_i u_i, where
@@ -101,28 +100,35 @@ def share_by_load(n, work):
     walls, active, ratio = work.walls, work.active, friction_ratio(work)
     wall = wall_of(work.slot[first_active(n, work)], work)
     for i in range(n):
-        if n > WIDTH or (active[i] != 0 and wall_of(work.slot[i], work) != wall):
+        if n > LANE_COUNT or (active[i] != 0 and wall_of(work.slot[i], work) != wall):
             return False
-    on = numbers(active, n) * present(n)
-    a, b = _along(wall_axis(walls, wall, TANGENT_1), n, work), _along(wall_axis(walls, wall, TANGENT_2), n, work)
-    p, x, y = on * numbers(work.normal, n), on * column(work.across, 0, n), on * column(work.across, 1, n)
-    fa, fb, spin, limit, g = total(x), total(y), total(a * y - b * x), work.mu * p, p
-    for _ in range(SHARE_LIMIT):
-        s = 1.0 / total(g)
-        ca, cb = s * total(g * a), s * total(g * b)
+    on = gather_numbers(active, n) * valid_lanes_mask(n)
+    a, b = (
+        _coordinates_along(wall_axis(walls, wall, WALL_TANGENT_1), n, work),
+        _coordinates_along(wall_axis(walls, wall, WALL_TANGENT_2), n, work),
+    )
+    p, x, y = (
+        on * gather_numbers(work.normal, n),
+        on * gather_column(work.across, 0, n),
+        on * gather_column(work.across, 1, n),
+    )
+    fa, fb, spin, limit, g = lane_sum(x), lane_sum(y), lane_sum(a * y - b * x), work.mu * p, p
+    for _ in range(_MAX_WEISZFELD_STEPS):
+        s = 1.0 / lane_sum(g)
+        ca, cb = s * lane_sum(g * a), s * lane_sum(g * b)
         da, db = a - ca, b - cb
-        moment, second = spin - (ca * fb - cb * fa), total(g * (da * da + db * db))
+        moment, second = spin - (ca * fb - cb * fa), lane_sum(g * (da * da + db * db))
         alpha = moment / second if second > 0.0 else 0.0
         x, y = s * fa - alpha * db, s * fb + alpha * da
         stretched = y / ratio
-        size = g * root(x * x + stretched * stretched)
-        if first_of(~(size <= limit)) < 0:
+        size = g * lane_sqrt(x * x + stretched * stretched)
+        if first_true_lane(~(size <= limit)) < 0:
             for i in range(n):
                 if active[i] != 0:
                     work.across[i, 0], work.across[i, 1] = (g * x)[i], (g * y)[i]
             return True
         slip = ratio * y
-        if total(g * (x * x + y * y)) > total(limit * root(x * x + slip * slip)):
+        if lane_sum(g * (x * x + y * y)) > lane_sum(limit * lane_sqrt(x * x + slip * slip)):
             return False
-        g = chosen(size > 0.0, g * root(limit / size), g)
+        g = select_lanes(size > 0.0, g * lane_sqrt(limit / size), g)
     return False

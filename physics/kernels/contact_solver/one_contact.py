@@ -14,28 +14,28 @@ from __future__ import annotations
 import math
 
 from physics.kernels.compile.decorators import inlined
-from physics.kernels.compile.simd import root
+from physics.kernels.compile.simd import lane_sqrt
 from physics.kernels.contact_solver.impulse_distribution import solve_symmetric
 from physics.kernels.math import quaternion as qt
 
 # Newton steps on an angle at most: three are usual at a tolerance of 1e-6.
-TURN_LIMIT = 10
+_ANGLE_NEWTON_STEPS = 10
 
 # Largest turn of one Newton step [rad].
-TURN_AT_MOST = 1.0
+_MAX_ANGLE_STEP = 1.0
 
 # A warm start is of other loads if its pushes are off by more than this share of what is needed.
-WARM_SHARE = 0.1
+_WARM_START_TOLERANCE = 0.1
 
 # A vector whose square is no more has no direction: 1/square would overflow below 6e-309.
-LEAST_SQUARE = 1.0e-290
+MIN_SQUARED_NORM = 1.0e-290
 
 # What a contact was found to do.
-LOST, OPEN, HELD, SLID = range(4)
+CONTACT_UNSOLVED, CONTACT_OPENS, CONTACT_STICKS, CONTACT_SLIDES = range(4)
 
 
 @inlined
-def wall_frame(R, v, L, axes, J):
+def motion_in_wall_frame(R, v, L, axes, J):
     """Inverse inertia (00, 01, 02, 11, 12, 22), velocity and angular velocity in the frame of the wall."""
     e0, e1 = qt.transposed_matvec(R, axes[0]), qt.transposed_matvec(R, axes[1])
     e2 = qt.transposed_matvec(R, axes[2])
@@ -49,7 +49,7 @@ def wall_frame(R, v, L, axes, J):
 
 
 @inlined
-def to_world(axes, a, b, c, base):
+def wall_to_world(axes, a, b, c, base):
     """base + a axes[0] + b axes[1] + c axes[2]."""
     n, t1, t2 = axes
     return (
@@ -67,7 +67,7 @@ def point_velocity(r, u, w):
 
 
 @inlined
-def block(r, s, inv_mass, ratio, K):
+def delassus_block(r, s, inv_mass, ratio, K):
     """W between contacts r and s: velocity at r, row by row, per impulse at s; ratio: see `anisotropic_friction`."""
     c, a, b = s
     n0, n1, n2 = b * K[1] - a * K[2], b * K[3] - a * K[4], b * K[4] - a * K[5]
@@ -82,8 +82,8 @@ def block(r, s, inv_mass, ratio, K):
 
 
 @inlined
-def own_block(r, inv_mass, ratio, K):
-    """`block` of a contact with itself, which is symmetric."""
+def diagonal_delassus_block(r, inv_mass, ratio, K):
+    """`delassus_block` of a contact with itself, which is symmetric."""
     c, a, b = r
     n1, n2 = b * K[3] - a * K[4], b * K[4] - a * K[5]
     s0, s1, s2 = c * K[2] - b * K[0], c * K[4] - b * K[1], c * K[5] - b * K[2]
@@ -99,35 +99,35 @@ def own_block(r, inv_mass, ratio, K):
 @inlined
 def inverse_root(square):
     """1/√ of a number or of lanes, root and quotient side by side: what waits for it waits for the longer of them."""
-    return root(square) * (1.0 / square)
+    return lane_sqrt(square) * (1.0 / square)
 
 
 @inlined
-def is_warm(push, needed):
+def is_warm_start_valid(push, needed):
     """True if a warm start's push is so near to the push that the present loads need that its friction is, too."""
-    return abs(push - needed) <= WARM_SHARE * abs(needed)
+    return abs(push - needed) <= _WARM_START_TOLERANCE * abs(needed)
 
 
 @inlined
-def heading(x, y, mu):
+def friction_direction(x, y, mu):
     """-μ times the direction of (x, y); 0 when that has no direction."""
     square = x * x + y * y
-    if not square > LEAST_SQUARE:
+    if not square > MIN_SQUARED_NORM:
         return 0.0, 0.0
     s = -mu * inverse_root(square)
     return s * x, s * y
 
 
 @inlined
-def turned(x, y, angle):
+def rotate_direction(x, y, angle):
     """The vector (x, y) turned by about `angle`, its length kept."""
-    t = min(TURN_AT_MOST, max(-TURN_AT_MOST, angle))
+    t = min(_MAX_ANGLE_STEP, max(-_MAX_ANGLE_STEP, angle))
     s = inverse_root(1.0 + t * t)
     return s * (x - t * y), s * (y + t * x)
 
 
 @inlined
-def miss_across(across, along, weight):
+def sliding_residual(across, along, weight):
     """Residual of a sliding contact [m/s]: velocity across its direction, along it, μ p trace(W_tt)."""
     if not weight > 0.0:
         return 0.0
@@ -137,7 +137,7 @@ def miss_across(across, along, weight):
 
 
 @inlined
-def answer(W, b, mu, trace, goal, x, y, may_hold):
+def solve_contact_block(W, b, mu, trace, goal, x, y, may_hold):
     """Impulse of one contact that alone answers its free velocity b.
 
     Parameters
@@ -165,14 +165,14 @@ def answer(W, b, mu, trace, goal, x, y, may_hold):
         [m/s].
     """
     if b[0] >= 0.0:
-        return OPEN, (0.0, 0.0, 0.0), 0.0
+        return CONTACT_OPENS, (0.0, 0.0, 0.0), 0.0
     if mu > 0.0:
         p = solve_symmetric((W[0], W[1], W[2], W[4], W[5], W[8]), (-b[0], -b[1], -b[2]))
         if may_hold and p[0] >= 0.0 and p[1] * p[1] + p[2] * p[2] <= (mu * p[0]) * (mu * p[0]):
-            return HELD, p, 0.0
+            return CONTACT_STICKS, p, 0.0
         if x == 0.0 and y == 0.0:
-            x, y = heading(-p[1], -p[2], mu)
-    for _ in range(TURN_LIMIT):
+            x, y = friction_direction(-p[1], -p[2], mu)
+    for _ in range(_ANGLE_NEWTON_STEPS):
         along = W[0] + (W[1] * x + W[2] * y)
         pn = -b[0] / along
         gx, gy = W[3] + (W[4] * x + W[5] * y), W[6] + (W[7] * x + W[8] * y)
@@ -180,18 +180,18 @@ def answer(W, b, mu, trace, goal, x, y, may_hold):
         if not along > 0.0:
             break
         if not mu > 0.0:
-            return SLID, (pn, 0.0, 0.0), 0.0
+            return CONTACT_SLIDES, (pn, 0.0, 0.0), 0.0
         s = 1.0 / mu
         forward, across = -s * (x * ux + y * uy), s * (y * ux - x * uy)
-        miss = miss_across(across, forward, mu * pn * trace)
+        miss = sliding_residual(across, forward, mu * pn * trace)
         if miss <= goal:
-            return SLID, (pn, pn * x, pn * y), miss
+            return CONTACT_SLIDES, (pn, pn * x, pn * y), miss
         # Turning by dα changes (x, y) by (-y, x) dα, p_n by `change`.
         change = -pn * (W[2] * x - W[1] * y) / along
         ex, ey = W[5] * x - W[4] * y, W[8] * x - W[7] * y
         slope = -forward + s * (y * (change * gx + pn * ex) - x * (change * gy + pn * ey))
         turn = -across / slope
         if not slope < 0.0:
-            turn = math.copysign(TURN_AT_MOST, across)
-        x, y = turned(x, y, turn)
-    return LOST, (0.0, 0.0, 0.0), 0.0
+            turn = math.copysign(_MAX_ANGLE_STEP, across)
+        x, y = rotate_direction(x, y, turn)
+    return CONTACT_UNSOLVED, (0.0, 0.0, 0.0), 0.0

@@ -11,78 +11,103 @@ from __future__ import annotations
 import math
 
 from physics.kernels.compile.decorators import inlined
-from physics.kernels.compile.simd import chosen, first_of, larger, largest, least, root, total
+from physics.kernels.compile.simd import (
+    first_true_lane,
+    lane_sqrt,
+    lane_sum,
+    larger,
+    max_of_lanes,
+    min_of_lanes,
+    select_lanes,
+)
 from physics.kernels.contact_law.anisotropic_friction import friction_ratio
-from physics.kernels.contact_solver.one_contact import LEAST_SQUARE, inverse_root, is_warm, point_velocity
+from physics.kernels.contact_solver.one_contact import (
+    MIN_SQUARED_NORM,
+    inverse_root,
+    is_warm_start_valid,
+    point_velocity,
+)
 from physics.kernels.math import quaternion as qt
-from physics.kernels.math.simd_gather import column, part, present
+from physics.kernels.math.simd_gather import gather_column, gather_component, valid_lanes_mask
 
 # Second moments of a patch: below this share of det to trace² it counts as a line (edges 1 : 1000).
-LINE_LIMIT = 1.0e-6
+_COLLINEAR_LIMIT = 1.0e-6
 
 # Share of its free slip that a face which nearly holds starts with.
-LEAST_SLIP = 0.01
+_MIN_SLIP_SHARE = 0.01
 
 
 @inlined
-def _along(axis, n, work):
+def _coordinates_along(axis, n, work):
     """Coordinates of the contacts along an axis, from the centre of mass."""
-    return axis[0] * column(work.arm, 0, n) + axis[1] * column(work.arm, 1, n) + axis[2] * column(work.arm, 2, n)
+    return (
+        axis[0] * gather_column(work.arm, 0, n)
+        + axis[1] * gather_column(work.arm, 1, n)
+        + axis[2] * gather_column(work.arm, 2, n)
+    )
 
 
 @inlined
-def place_patch(n, axes, inv_mass, K, work):
+def gather_patch(n, axes, inv_mass, K, work):
     """The patch (place, target, mobility) of the n contacts in `work`, on the wall with these axes."""
     ratio = friction_ratio(work)
-    c, a, b = ratio * _along(axes[0], n, work), ratio * _along(axes[1], n, work), _along(axes[2], n, work)
-    target = (column(work.target, 0, n), column(work.target, 1, n), ratio * column(work.target, 2, n))
+    c, a, b = (
+        ratio * _coordinates_along(axes[0], n, work),
+        ratio * _coordinates_along(axes[1], n, work),
+        _coordinates_along(axes[2], n, work),
+    )
+    target = (
+        gather_column(work.target, 0, n),
+        gather_column(work.target, 1, n),
+        ratio * gather_column(work.target, 2, n),
+    )
     mass_b = ratio * ratio * inv_mass
     mobility = (inv_mass + mass_b) + K[0] * (a * a + b * b) - 2.0 * c * (K[1] * a + K[2] * b) + c * c * (K[3] + K[5])
     return (c, a, b), target, mobility
 
 
 @inlined
-def free_speed(friction, patch, u, w):
+def largest_free_speed(friction, patch, u, w):
     """Largest velocity of a contact without impulses, less its target [m/s]."""
     place, target, _ = patch
     speed = point_velocity(place, u, w)
     worst = abs(speed[0] - target[0])
     if friction is not None:
         worst = larger(worst, larger(abs(speed[1] - target[1]), abs(speed[2] - target[2])))
-    return largest(larger(0.0, worst))
+    return max_of_lanes(larger(0.0, worst))
 
 
 @inlined
-def warm_motion(n, patch, on, u, w, inv_mass, K, work):
+def warm_start_motion(n, patch, on, u, w, inv_mass, K, work):
     """Planar motion after the impulses in `work`, those of the warm start, and whether they are of these loads."""
     (c, a, b), _, _ = patch
     ratio = friction_ratio(work)
-    p, x = on * part(work.impulse, 0, n), on * part(work.impulse, 1, n)
-    y = on * part(work.impulse, 2, n) / ratio
+    p, x = on * gather_component(work.impulse, 0, n), on * gather_component(work.impulse, 1, n)
+    y = on * gather_component(work.impulse, 2, n) / ratio
     spin = K[0] * (a * y - b * x) + K[1] * (b * p - c * y) + K[2] * (c * x - a * p)
-    motion = u[1] + inv_mass * total(x), u[2] + ratio * ratio * inv_mass * total(y), w[0] + total(spin)
-    return motion, is_warm(inv_mass * total(p), -u[0])
+    motion = u[1] + inv_mass * lane_sum(x), u[2] + ratio * ratio * inv_mass * lane_sum(y), w[0] + lane_sum(spin)
+    return motion, is_warm_start_valid(inv_mass * lane_sum(p), -u[0])
 
 
 @inlined
-def warm_slip(n, patch, on, work):
+def warm_start_friction(n, patch, on, work):
     """Impulses per normal impulse along the tangents (two lanes) of those in `work`; 0 where nothing pushes."""
-    p = on * part(work.impulse, 0, n)
-    s = chosen(p > 0.0, 1.0 / p, 0.0)
-    return s * part(work.impulse, 1, n), s * part(work.impulse, 2, n) / friction_ratio(work)
+    p = on * gather_component(work.impulse, 0, n)
+    s = select_lanes(p > 0.0, 1.0 / p, 0.0)
+    return s * gather_component(work.impulse, 1, n), s * gather_component(work.impulse, 2, n) / friction_ratio(work)
 
 
 @inlined
-def _spread(n, a, b, on):
+def _centroid_and_variance(n, a, b, on):
     """Centroid of the contacts along the tangents, and mean square of their distance from it."""
     share = 1.0 / n
-    ca, cb = share * total(on * a), share * total(on * b)
+    ca, cb = share * lane_sum(on * a), share * lane_sum(on * b)
     a, b = on * (a - ca), on * (b - cb)
-    return ca, cb, share * (total(a * a) + total(b * b))
+    return ca, cb, share * (lane_sum(a * a) + lane_sum(b * b))
 
 
 @inlined
-def may_hold(n, axes, v, L, work):
+def may_stick(n, axes, v, L, work):
     """True if friction may stop a face, with the velocity v and angular momentum L that it has without it.
 
     What holds stops at its wall: the pushes P take away the normal momentum, and friction, μP at most, the tangential
@@ -94,15 +119,15 @@ def may_hold(n, axes, v, L, work):
     spin, slip = qt.dot(axes[0], L) / work.mass, va * va + vb * vb
     if slip > limit or (slip == 0.0 and spin == 0.0):
         return slip <= limit
-    a, b = ratio * _along(axes[1], n, work), _along(axes[2], n, work)
-    ca, cb, _ = _spread(n, a, b, present(n))
+    a, b = ratio * _coordinates_along(axes[1], n, work), _coordinates_along(axes[2], n, work)
+    ca, cb, _ = _centroid_and_variance(n, a, b, valid_lanes_mask(n))
     moment = ca * vb - cb * va - spin
     a, b = a - ca, b - cb
-    return moment * moment <= largest(a * a + b * b) * limit
+    return moment * moment <= max_of_lanes(a * a + b * b) * limit
 
 
 @inlined
-def cold_motion(n, patch, on, mu, u, w, inv_mass, K):
+def cold_start_motion(n, patch, on, mu, u, w, inv_mass, K):
     """Planar motion that friction leaves of one without impulses, if the planar friction is that of an ellipsoid.
 
     The forces and moments about the centroid that equal pushes, P in all, can exert while a face slides are nearly an
@@ -115,7 +140,7 @@ def cold_motion(n, patch, on, mu, u, w, inv_mass, K):
     φ(0) <= 1 says would hold is given a small part of its slip, since directions are wanted.
     """
     (_, a, b), _, _ = patch
-    ca, cb, second = _spread(n, a, b, on)
+    ca, cb, second = _centroid_and_variance(n, a, b, on)
     va, vb = u[1] - w[0] * cb, u[2] + w[0] * ca
     slip2, turn2, beta = va * va + vb * vb, second * w[0] * w[0], mu * max(-u[0], 0.0)
     free, gamma = math.sqrt(slip2 + turn2), beta * second * K[0] / inv_mass
@@ -123,60 +148,66 @@ def cold_motion(n, patch, on, mu, u, w, inv_mass, K):
     p, q = 1.0 / (s + beta), 1.0 / (s + gamma)
     square = slip2 * p * p + turn2 * q * q
     s += (math.sqrt(square) - 1.0) * square / (slip2 * p * p * p + turn2 * q * q * q)
-    s = max(s, LEAST_SLIP * free)
+    s = max(s, _MIN_SLIP_SHARE * free)
     p, q = s / (s + beta), s / (s + gamma)
     wn = q * w[0]
     return p * va + wn * cb, p * vb - wn * ca, wn
 
 
 @inlined
-def centroid(count, patch, on):
+def patch_centroid(count, patch, on):
     """Centroid of the active contacts."""
     (c, a, b), _, _ = patch
     s = 1.0 / count
-    return s * total(on * c), s * total(on * a), s * total(on * b)
+    return s * lane_sum(on * c), s * lane_sum(on * a), s * lane_sum(on * b)
 
 
 @inlined
-def fit_targets(count, patch, on):
+def fit_normal_motion(count, patch, on):
     """The normal motion that fits the targets of the active contacts best: (is one, centroid, (v_n, ω_a, ω_b)).
 
     Of contacts on a line it is not finite, or no longer accurate: then there is none.
     """
     (_, a, b), (target, _, _), _ = patch
-    center, t0 = centroid(count, patch, on), (1.0 / count) * total(on * target)
+    center, t0 = patch_centroid(count, patch, on), (1.0 / count) * lane_sum(on * target)
     a, b = on * (a - center[1]), on * (b - center[2])
-    saa, sab, sbb, ta, tb = total(a * a), total(a * b), total(b * b), total(a * target), total(b * target)
+    saa, sab, sbb, ta, tb = (
+        lane_sum(a * a),
+        lane_sum(a * b),
+        lane_sum(b * b),
+        lane_sum(a * target),
+        lane_sum(b * target),
+    )
     det, trace = saa * sbb - sab * sab, saa + sbb
     s = 1.0 / det
     ga, gb = s * (sbb * ta - sab * tb), s * (saa * tb - sab * ta)
-    return det > LINE_LIMIT * trace * trace, center, (t0 - (ga * center[1] + gb * center[2]), gb, -ga)
+    return det > _COLLINEAR_LIMIT * trace * trace, center, (t0 - (ga * center[1] + gb * center[2]), gb, -ga)
 
 
 @inlined
-def spare_speed(patch, vn, wa, wb):
+def normal_velocity_excess(patch, vn, wa, wb):
     """Normal velocities of the contacts less their targets [m/s] in a normal motion; of an open one it may be > 0."""
     (_, a, b), (target, _, _), _ = patch
     return (vn + wa * b - wb * a) - target
 
 
 @inlined
-def opposed(ua, ub, on, mu):
+def patch_friction_directions(ua, ub, on, mu):
     """Impulse per normal impulse that opposes a slip (ua, ub), -μ d, and its speed: none of what is open or still."""
     square = ua * ua + ub * ub
-    s = chosen(square > LEAST_SQUARE, -mu * on * inverse_root(square), 0.0)
-    return s * ua, s * ub, root(square)
+    s = select_lanes(square > MIN_SQUARED_NORM, -mu * on * inverse_root(square), 0.0)
+    return s * ua, s * ub, lane_sqrt(square)
 
 
 @inlined
-def slips(patch, motion, wa, wb):
+def patch_slip_velocities(patch, motion, wa, wb):
     """Tangential velocities of the contacts less their targets [m/s] in a planar motion."""
     (c, a, b), (_, target_a, target_b), _ = patch
     return motion[0] + wb * c - motion[2] * b - target_a, motion[1] + motion[2] * a - wa * c - target_b
 
 
 @inlined
-def respond(patch, on, center, y0, gain, slip, K):
+def solve_normal_slopes(patch, on, center, y0, gain, slip, K):
     """The y_1, y_2 that go with some directions, `slip`: impulses per normal impulse along the tangents (and speeds).
 
     Returns
@@ -189,9 +220,9 @@ def respond(patch, on, center, y0, gain, slip, K):
     x, y, _ = slip
     mn, ma, mb = a * y - b * x, on * b - c * y, c * x - on * a
     a, b = a - center[1], b - center[2]
-    n0, n1, n2 = total(mn), total(a * mn), total(b * mn)
-    a0, a1, a2 = total(ma), total(a * ma), total(b * ma)
-    b0, b1, b2 = total(mb), total(a * mb), total(b * mb)
+    n0, n1, n2 = lane_sum(mn), lane_sum(a * mn), lane_sum(b * mn)
+    a0, a1, a2 = lane_sum(ma), lane_sum(a * ma), lane_sum(b * ma)
+    b0, b1, b2 = lane_sum(mb), lane_sum(a * mb), lane_sum(b * mb)
     g0, h0 = K[1] * n0 + K[3] * a0 + K[4] * b0, K[2] * n0 + K[4] * a0 + K[5] * b0
     g1, g2 = K[1] * n1 + K[3] * a1 + K[4] * b1, K[1] * n2 + K[3] * a2 + K[4] * b2
     h1, h2 = K[2] * n1 + K[4] * a1 + K[5] * b1, K[2] * n2 + K[4] * a2 + K[5] * b2
@@ -202,10 +233,10 @@ def respond(patch, on, center, y0, gain, slip, K):
 
 
 @inlined
-def comply(patch, center, slip, turning, inv_mass, K, work):
+def planar_compliance(patch, center, slip, turning, inv_mass, K, work):
     """Planar motion per planar impulse at the centroid, row by row (9): with the normal motion held by y_1, y_2.
 
-    `slip` and `turning` are those of `respond`, which only a step of Newton's has a use for this after.
+    `slip` and `turning` are those of `solve_normal_slopes`, which only a step of Newton's has a use for this after.
     """
     (_, a, b), _, _ = patch
     x, y, _ = slip
@@ -218,7 +249,12 @@ def comply(patch, center, slip, turning, inv_mass, K, work):
     # Rows (ω_a, ω_b) of the response to the impulse (D_a, D_b, D_n), moments (D_n, -c D_b, c D_a).
     sa = (cc * K[4], -cc * K[3], K[1])
     sb = (cc * K[5], -cc * K[4], K[2])
-    x1, x2, y1, y2 = inv_mass * total(a * x), inv_mass * total(b * x), mass_b * total(a * y), mass_b * total(b * y)
+    x1, x2, y1, y2 = (
+        inv_mass * lane_sum(a * x),
+        inv_mass * lane_sum(b * x),
+        mass_b * lane_sum(a * y),
+        mass_b * lane_sum(b * y),
+    )
     # Motion per δω_a, δω_b made up for by y.
     pa, pb = s * (x1 * h2 - x2 * h1), s * (x2 * g1 - x1 * g2)
     qa, qb = s * (y1 * h2 - y2 * h1), s * (y2 * g1 - y1 * g2)
@@ -233,28 +269,28 @@ def comply(patch, center, slip, turning, inv_mass, K, work):
 
 
 @inlined
-def resultant(patch, on, center, y0, y, slip):
+def patch_normal_impulses(patch, on, center, y0, y, slip):
     """Normal impulses of the active contacts: which pull (1), which most (or -1), what pushes, what it exerts."""
     (c, a, b), _, _ = patch
-    p = chosen(on > 0.0, y0 + (y[0] * (a - center[1]) + y[1] * (b - center[2])), 0.0)
-    pulling, loser = chosen(p < 0.0, 1.0, 0.0), -1
-    if first_of(~(p >= 0.0)) >= 0:  # so that what is no number also pulls
-        loser = first_of((on > 0.0) & ~(p > least(p)))
+    p = select_lanes(on > 0.0, y0 + (y[0] * (a - center[1]) + y[1] * (b - center[2])), 0.0)
+    pulling, loser = select_lanes(p < 0.0, 1.0, 0.0), -1
+    if first_true_lane(~(p >= 0.0)) >= 0:  # so that what is no number also pulls
+        loser = first_true_lane((on > 0.0) & ~(p > min_of_lanes(p)))
     p = larger(p, 0.0)
     px, py = p * slip[0], p * slip[1]
-    exerted = total(px), total(py), total(a * py - b * px), total(b * p - c * py), total(c * px - a * p)
+    exerted = lane_sum(px), lane_sum(py), lane_sum(a * py - b * px), lane_sum(b * p - c * py), lane_sum(c * px - a * p)
     return pulling, loser, p, exerted
 
 
 @inlined
-def moved(exerted, u, w, inv_mass, mass_b, K):
+def planar_motion_after(exerted, u, w, inv_mass, mass_b, K):
     """Planar motion that impulses along the tangents, and moments, lead to."""
     fa, fb, tn, ta, tb = exerted
     return u[1] + inv_mass * fa, u[2] + mass_b * fb, w[0] + (K[0] * tn + K[1] * ta + K[2] * tb)
 
 
 @inlined
-def across_misses(patch, p, slip, mu, delta):
+def patch_sliding_residual(patch, p, slip, mu, delta):
     """Largest tangential residual [m/s] when the motion that the directions are of is left by delta: if all slide.
 
     Of the contacts with a push p > 0. Of one that moves backwards the whole velocity counts: its impulse is in the
@@ -271,25 +307,32 @@ def across_misses(patch, p, slip, mu, delta):
     load = mu * p
     weight = load * mobility  # μ p trace(W_tt), which is at least μ p / ρ_t
     along, across = size - (x * da + y * db), abs(x * db - y * da)
-    miss = chosen(along > 0.0, across * weight / (weight + along), across - along)
-    worst = largest(larger(0.0, chosen(weight > 0.0, miss, 0.0)))
-    s, h = chosen(size > 0.0, load / size, 0.0), -(a * x + b * y)
+    miss = select_lanes(along > 0.0, across * weight / (weight + along), across - along)
+    worst = max_of_lanes(larger(0.0, select_lanes(weight > 0.0, miss, 0.0)))
+    s, h = select_lanes(size > 0.0, load / size, 0.0), -(a * x + b * y)
     sx, sy = s * x, s * y
-    return worst, (total(sy * y), -total(sx * y), total(sy * h), total(sx * x), -total(sx * h), total(s * h * h))
+    return worst, (
+        lane_sum(sy * y),
+        -lane_sum(sx * y),
+        lane_sum(sy * h),
+        lane_sum(sx * x),
+        -lane_sum(sx * h),
+        lane_sum(s * h * h),
+    )
 
 
 @inlined
-def is_turned(on, d, size, change):
+def has_turned_far(on, d, size, change):
     """Mark the slips, of direction d and this size [m/s], that turn by more than about 70 degrees when they change."""
     along, across = size + (d[0] * change[0] + d[1] * change[1]), d[0] * change[1] - d[1] * change[0]
     return (on * size > 0.0) & ~((along > 0.1 * size) & (abs(across) <= 3.0 * along))
 
 
 @inlined
-def turns_little(patch, on, slip, mu, step):
+def has_small_turns(patch, on, slip, mu, step):
     """True if no direction turns by more than about 70 degrees, and none backwards, in a step of the motion."""
     (_, a, b), _, _ = patch
     x, y, size = slip
     s = -1.0 / mu
     change = step[0] - step[2] * b, step[1] + step[2] * a
-    return first_of(is_turned(on, (s * x, s * y), size, change)) < 0
+    return first_true_lane(has_turned_far(on, (s * x, s * y), size, change)) < 0

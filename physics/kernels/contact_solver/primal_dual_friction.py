@@ -7,12 +7,12 @@ Linearised about both, with d = u/|u|,
     z' = (u + A δu)/|u|,   A = 1 - z dᵀ,   δu_i = G_i Δ,
     (1 + C H) Δ = δ - C Σ μ p_i G_iᵀ (d_i - z_i),   H = Σ κ_i G_iᵀ A_i G_i,   κ = μ p/|u|,
 
-where δ is by how much the motion that the impulses lead to differs from τ, C is `patch_algebra.comply`, and G_i τ the
-velocity of contact i. With z = d this is the step of `sliding_patch`; with A = 1 it is one of Weiszfeld's, friction as
-a viscous drag, which slows what stops, and is taken where a direction would turn round. From there z of what stops is
-within the disc, and what is solved for is its impulse. Once its slip is lost in rounding, u/|u| says nothing: z' = z +
-(u + δu)/s with a small speed s, on which the solution does not depend. A motion about one contact that holds takes five
-rounds or six.
+where δ is by how much the motion that the impulses lead to differs from τ, C is `patch_algebra.planar_compliance`, and
+G_i τ the velocity of contact i. With z = d this is the step of `sliding_patch`; with A = 1 it is one of Weiszfeld's,
+friction as a viscous drag, which slows what stops, and is taken where a direction would turn round. From there z of
+what stops is within the disc, and what is solved for is its impulse. Once its slip is lost in rounding, u/|u| says
+nothing: z' = z + (u + δu)/s with a small speed s, on which the solution does not depend. A motion about one contact
+that holds takes five rounds or six.
 
 References
 ----------
@@ -28,31 +28,38 @@ from __future__ import annotations
 import math
 
 from physics.kernels.compile.decorators import inlined, kernel
-from physics.kernels.compile.simd import Lanes, chosen, first_of, larger, largest, root, total
+from physics.kernels.compile.simd import Lanes, first_true_lane, lane_sqrt, lane_sum, larger, max_of_lanes, select_lanes
 from physics.kernels.contact_law.anisotropic_friction import friction_ratio
 from physics.kernels.contact_solver.one_contact import inverse_root
-from physics.kernels.contact_solver.patch_algebra import comply, is_turned, moved, respond, resultant, slips
+from physics.kernels.contact_solver.patch_algebra import (
+    has_turned_far,
+    patch_normal_impulses,
+    patch_slip_velocities,
+    planar_compliance,
+    planar_motion_after,
+    solve_normal_slopes,
+)
 from physics.kernels.math import quaternion as qt
 
 # Rounds at most.
-DUAL_LIMIT = 24
+_MAX_DUAL_ROUNDS = 24
 
 # Share of the tolerance below which a slip has no direction.
-TINY = 1.0e-3
+_NO_DIRECTION_SHARE = 1.0e-3
 
 # Share of the largest free contact speed that s is, and below which a slip is too small for u/|u|: that would be off by
 # rounding over slip, and impulses with it.
-SLOW = 1.0e-7
+_REGULARISATION_SHARE = 1.0e-7
 
 # A contact slides whose friction is no less than this share of μ p.
-FULL = 0.999999
+_FULL_FRICTION_SHARE = 0.999999
 
 # What came out.
-NOT_FOUND, FOUND, PULLS = range(3)
+ROUND_FAILED, ROUND_SOLVED, ROUND_PULLS = range(3)
 
 
 @inlined
-def solve_compliant(compliance, h, r):
+def solve_planar_step(compliance, h, r):
     """Step Δ of (1 + C H) Δ = r, H row by row (9), by the columns of the matrix and Cramer's rule."""
     c0, c1, c2, c3, c4, c5, c6, c7, c8 = compliance
     h00, h01, h02, h10, h11, h12, h20, h21, h22 = h
@@ -77,7 +84,7 @@ def solve_compliant(compliance, h, r):
 
 
 @inlined
-def _misses(patch, p, slip, mu, after):
+def _friction_residual(patch, p, slip, mu, after):
     """Largest tangential residual [m/s] of pushes p and their friction along `slip`, when contacts slip as `after`.
 
     The natural map of Coulomb's disc, |f - P(f - u/W)| W of the impulse f with W = W_aa + W_bb, which is at least 1/ρ
@@ -91,19 +98,19 @@ def _misses(patch, p, slip, mu, after):
     fa, fb = mobility * (p * x), mobility * (p * y)
     ka, kb, load = fa - ua, fb - ub, mobility * load
     square = ka * ka + kb * kb
-    share = chosen(square > load * load, load * inverse_root(square), 1.0)
+    share = select_lanes(square > load * load, load * inverse_root(square), 1.0)
     da, db = fa - share * ka, fb - share * kb
-    square = chosen(p > 0.0, da * da + db * db, 0.0)
-    return math.sqrt(largest(larger(0.0, square)))
+    square = select_lanes(p > 0.0, da * da + db * db, 0.0)
+    return math.sqrt(max_of_lanes(larger(0.0, square)))
 
 
 @inlined
-def _step(patch, load, d, size, gain, taken, compliance, delta):
+def _newton_step(patch, load, d, size, gain, taken, compliance, delta):
     """Step Δ of the planar motion, and δu: z' = z + gain + A δu/size, A = 1 - `taken` dᵀ; `load` is μ p."""
     (_, a, b), _, _ = patch
     (da, db), (ta, tb) = d, taken
     fa, fb = load * gain[0], load * gain[1]
-    f0, f1, f2 = total(fa), total(fb), total(a * fb - b * fa)
+    f0, f1, f2 = lane_sum(fa), lane_sum(fb), lane_sum(a * fb - b * fa)
     c0, c1, c2, c3, c4, c5, c6, c7, c8 = compliance
     r = (
         delta[0] - (c0 * f0 + c1 * f1 + c2 * f2),
@@ -114,11 +121,11 @@ def _step(patch, load, d, size, gain, taken, compliance, delta):
     tn, dn = a * tb - b * ta, a * db - b * da  # Gᵀ taken and Gᵀ d, about the normal
     ka, kb, kn = k * ta, k * tb, k * tn
     h = (
-        total(k - ka * da), -total(ka * db), -total(k * b + ka * dn),
-        -total(kb * da), total(k - kb * db), total(k * a - kb * dn),
-        -total(k * b + kn * da), total(k * a - kn * db), total(k * (a * a + b * b) - kn * dn),
+        lane_sum(k - ka * da), -lane_sum(ka * db), -lane_sum(k * b + ka * dn),
+        -lane_sum(kb * da), lane_sum(k - kb * db), lane_sum(k * a - kb * dn),
+        -lane_sum(k * b + kn * da), lane_sum(k * a - kn * db), lane_sum(k * (a * a + b * b) - kn * dn),
     )  # fmt: skip
-    step = solve_compliant(compliance, h, r)
+    step = solve_planar_step(compliance, h, r)
     return step, (step[0] - step[2] * b, step[1] + step[2] * a)
 
 
@@ -129,46 +136,48 @@ def _next_friction(u, d, size, z, gain, taken, change, slides, tiny):
     za = z[0] + (gain[0] + (change[0] - taken[0] * s) / size)
     zb = z[1] + (gain[1] + (change[1] - taken[1] * s) / size)
     ua, ub = u[0] + change[0], u[1] + change[1]
-    long, fast = root(za * za + zb * zb), larger(root(ua * ua + ub * ub), tiny)
+    long, fast = lane_sqrt(za * za + zb * zb), larger(lane_sqrt(ua * ua + ub * ub), tiny)
     slides = slides | ((long >= 1.0) & (ua * za + ub * zb > 0.5 * fast * long))
     long = larger(long, 1.0)
-    return chosen(slides, ua / fast, za / long), chosen(slides, ub / fast, zb / long)
+    return select_lanes(slides, ua / fast, za / long), select_lanes(slides, ub / fast, zb / long)
 
 
 @kernel
-def slowed(patch, on, p, slip, mu, compliance, delta, goal):
+def take_viscous_step(patch, on, p, slip, mu, compliance, delta, goal):
     """First step, from where all slide, with A = 1: (step of the planar motion, impulses per normal impulse)."""
-    size, s = larger(slip[2], TINY * goal), -1.0 / mu
+    size, s = larger(slip[2], _NO_DIRECTION_SHARE * goal), -1.0 / mu
     d, none = (s * slip[0], s * slip[1]), Lanes(0.0, 0.0, 0.0, 0.0)
     zero = none, none
-    step, change = _step(patch, mu * p, d, size, zero, zero, compliance, delta)
-    u, slides = (size * d[0], size * d[1]), ~is_turned(on, d, size, change)
-    za, zb = _next_friction(u, d, size, d, zero, zero, change, slides, TINY * goal)
+    step, change = _newton_step(patch, mu * p, d, size, zero, zero, compliance, delta)
+    u, slides = (size * d[0], size * d[1]), ~has_turned_far(on, d, size, change)
+    za, zb = _next_friction(u, d, size, d, zero, zero, change, slides, _NO_DIRECTION_SHARE * goal)
     return step, -mu * on * za, -mu * on * zb
 
 
 @inlined
-def _turned(patch, on, p, slip, mu, u, compliance, delta, tiny, slow):
+def _primal_dual_step(patch, on, p, slip, mu, u, compliance, delta, tiny, slow):
     """Step of the planar motion, impulses per normal impulse after it, and whether no direction turned round."""
     z, load, none = (slip[0] / -mu, slip[1] / -mu), mu * p, Lanes(0.0, 0.0, 0.0, 0.0)
-    is_full = z[0] * z[0] + z[1] * z[1] >= FULL * FULL
-    size = larger(slip[2], chosen(is_full, tiny, slow))
+    is_full = z[0] * z[0] + z[1] * z[1] >= _FULL_FRICTION_SHARE * _FULL_FRICTION_SHARE
+    size = larger(slip[2], select_lanes(is_full, tiny, slow))
     d = u[0] / size, u[1] / size
     is_stuck = ~is_full & (slip[2] < slow)
-    gain = d[0] - chosen(is_stuck, 0.0, z[0]), d[1] - chosen(is_stuck, 0.0, z[1])
-    taken = chosen(is_stuck, 0.0, z[0]), chosen(is_stuck, 0.0, z[1])
-    step, change = _step(patch, load, d, size, gain, taken, compliance, delta)
-    has_turned = is_full & is_turned(on, d, size, change)
-    is_settled = first_of(has_turned) < 0
+    gain = d[0] - select_lanes(is_stuck, 0.0, z[0]), d[1] - select_lanes(is_stuck, 0.0, z[1])
+    taken = select_lanes(is_stuck, 0.0, z[0]), select_lanes(is_stuck, 0.0, z[1])
+    step, change = _newton_step(patch, load, d, size, gain, taken, compliance, delta)
+    has_turned = is_full & has_turned_far(on, d, size, change)
+    is_settled = first_true_lane(has_turned) < 0
     if not is_settled:
         taken = none, none
-        step, change = _step(patch, load, d, size, gain, taken, compliance, delta)
+        step, change = _newton_step(patch, load, d, size, gain, taken, compliance, delta)
     za, zb = _next_friction(u, d, size, z, gain, taken, change, is_full & ~has_turned, tiny)
     return step, -mu * on * za, -mu * on * zb, is_settled
 
 
 @kernel
-def hold_some(patient, patch, on, x, y, mu, goal, loose, center, y0, gain, motion, u, w, wa, wb, inv_mass, K, work):
+def solve_stick_slip_patch(
+    patient, patch, on, x, y, mu, goal, loose, center, y0, gain, motion, u, w, wa, wb, inv_mass, K, work
+):
     """Impulses with which some of the contacts hold, and the other active ones slide.
 
     Parameters
@@ -182,7 +191,7 @@ def hold_some(patient, patch, on, x, y, mu, goal, loose, center, y0, gain, motio
     loose : float
         Residual above which directions still turn [m/s].
     mu, goal, center, y0, gain, u, w, wa, wb, K
-        As in `sliding_patch.search`.
+        As in `sliding_patch.solve_sliding_patch`.
     motion : tuple of 3 floats
         First guess of the planar motion (v_a, v_b, ω_n).
 
@@ -202,21 +211,21 @@ def hold_some(patient, patch, on, x, y, mu, goal, loose, center, y0, gain, motio
     """
     ratio = friction_ratio(work)
     mass_b, may_open = ratio * ratio * inv_mass, not patient
-    tiny, slow = TINY * goal, SLOW * goal / work.tolerance
-    for _ in range(DUAL_LIMIT):
-        speed = slips(patch, motion, wa, wb)
-        slip = x, y, root(speed[0] * speed[0] + speed[1] * speed[1])
-        slopes, turning = respond(patch, on, center, y0, gain, slip, K)
-        _, loser, p, exerted = resultant(patch, on, center, y0, slopes, slip)
+    tiny, slow = _NO_DIRECTION_SHARE * goal, _REGULARISATION_SHARE * goal / work.tolerance
+    for _ in range(_MAX_DUAL_ROUNDS):
+        speed = patch_slip_velocities(patch, motion, wa, wb)
+        slip = x, y, lane_sqrt(speed[0] * speed[0] + speed[1] * speed[1])
+        slopes, turning = solve_normal_slopes(patch, on, center, y0, gain, slip, K)
+        _, loser, p, exerted = patch_normal_impulses(patch, on, center, y0, slopes, slip)
         if loser >= 0 and may_open:
-            return PULLS, loser, p, x, y, exerted, 0.0, motion
-        led_to = moved(exerted, u, w, inv_mass, mass_b, K)
-        miss = _misses(patch, p, slip, mu, slips(patch, led_to, wa, wb))
+            return ROUND_PULLS, loser, p, x, y, exerted, 0.0, motion
+        led_to = planar_motion_after(exerted, u, w, inv_mass, mass_b, K)
+        miss = _friction_residual(patch, p, slip, mu, patch_slip_velocities(patch, led_to, wa, wb))
         if loser < 0 and miss <= goal:
-            return FOUND, -1, p, x, y, exerted, miss, motion
+            return ROUND_SOLVED, -1, p, x, y, exerted, miss, motion
         delta = led_to[0] - motion[0], led_to[1] - motion[1], led_to[2] - motion[2]
-        compliance = comply(patch, center, slip, turning, inv_mass, K, work)
-        step, x, y, is_settled = _turned(patch, on, p, slip, mu, speed, compliance, delta, tiny, slow)
+        compliance = planar_compliance(patch, center, slip, turning, inv_mass, K, work)
+        step, x, y, is_settled = _primal_dual_step(patch, on, p, slip, mu, speed, compliance, delta, tiny, slow)
         may_open = not patient or (is_settled and miss <= loose)
         motion = motion[0] + step[0], motion[1] + step[1], motion[2] + step[2]
-    return NOT_FOUND, -1, x, x, y, (0.0, 0.0, 0.0, 0.0, 0.0), 0.0, motion
+    return ROUND_FAILED, -1, x, x, y, (0.0, 0.0, 0.0, 0.0, 0.0), 0.0, motion

@@ -26,33 +26,33 @@ from __future__ import annotations
 import math
 
 from physics.kernels.compile.decorators import inlined, kernel
-from physics.kernels.contact_law.compliance import yielding
-from physics.kernels.contact_solver.gauss_seidel import NORMAL_STEP, cone_residual, velocities
+from physics.kernels.contact_law.compliance import scale_by_compliance
+from physics.kernels.contact_solver.gauss_seidel import LOCAL_NORMAL_RHO, cone_residual, update_contact_velocities
 
 # ρ in units of a contact's normal mass 1/W_nn: of the first round, its growth from round to round, and the
 # largest, where rounding times ρ is still below the tolerance. Large: fewer rounds, Newton steps that
 # overshoot more often.
-PROXIMAL_FACTOR = 1.0e3
-FACTOR_GROWTH = 10.0
-FACTOR_LIMIT = 1.0e6
+_PROXIMAL_FACTOR = 1.0e3
+_FACTOR_GROWTH = 10.0
+_FACTOR_LIMIT = 1.0e6
 
 # Rounds; Newton steps of a round, halvings of a step, and steps that did not make the defect smaller, at most.
-ROUNDS = 12
-NEWTON_STEPS = 20
-HALVINGS = 6
-FAILURES = 5
+_MAX_ROUNDS = 12
+_MAX_NEWTON_STEPS = 20
+_MAX_HALVINGS = 6
+_MAX_FAILURES = 5
 
 # Rounds and Newton steps of a quick turn: what has not settled by then profits more from a few sweeps in between than
 # from more steps. A few problems in a thousand used to take two thirds of all steps.
-QUICK_ROUNDS = 6
-QUICK_STEPS = 8
+_QUICK_ROUNDS = 6
+_QUICK_NEWTON_STEPS = 8
 
 # A round is solved to this share of the tolerance.
-ROUND_SHARE = 0.01
+_ROUND_TOLERANCE_SHARE = 0.01
 
 
 @inlined
-def _defect(n, factor, inv_mass, work):
+def _fixed_point_residual(n, factor, inv_mass, work):
     """x - M⁻¹ Jᵀ p(x) into `work.defect`, p(x) into `work.trial`; its size as a velocity [m/s].
 
     `work.velocity` receives q - ρ u, which the derivative of the law is taken at.
@@ -63,14 +63,14 @@ def _defect(n, factor, inv_mass, work):
         g[c] = x[c]
     for i in range(n):
         r = 3 * i
-        rho = factor * work.local[i, NORMAL_STEP]
+        rho = factor * work.local[i, LOCAL_NORMAL_RHO]
         for s in range(r, r + 3):
             u = work.bias[s] + (
                 (frame[s, 0] * x[0] + frame[s, 1] * x[1] + frame[s, 2] * x[2])
                 + (angular[s, 0] * x[3] + angular[s, 1] * x[4] + angular[s, 2] * x[5])
             )
             y[s] = q[s] - rho * u
-        y[r] = yielding(y[r], rho, work)
+        y[r] = scale_by_compliance(y[r], rho, work)
         size, limit = math.sqrt(y[r + 1] * y[r + 1] + y[r + 2] * y[r + 2]), work.mu * max(y[r], 0.0)
         s = limit / size if size > limit else 1.0
         p[r], p[r + 1], p[r + 2] = max(y[r], 0.0), s * y[r + 1], s * y[r + 2]
@@ -83,14 +83,14 @@ def _defect(n, factor, inv_mass, work):
 
 
 @inlined
-def _row(s, c, work):
+def _jacobian_entry(s, c, work):
     """Entry c of row s of J."""
     return work.frame[s, c] if c < 3 else work.angular[s, c - 3]
 
 
 @inlined
-def _fill_matrix(n, factor, inv_mass, work):
-    """Newton matrix 1 - M⁻¹ Jᵀ p'(u) J at the point of the last `_defect`, and -defect beside it (6 x 7)."""
+def _fill_newton_matrix(n, factor, inv_mass, work):
+    """Newton matrix 1 - M⁻¹ Jᵀ p'(u) J after `_fixed_point_residual`, and -defect beside it (6 x 7)."""
     A, y, frame, response = work.newton, work.velocity, work.frame, work.response
     for a in range(6):
         for b in range(6):
@@ -101,7 +101,7 @@ def _fill_matrix(n, factor, inv_mass, work):
         r = 3 * i
         if not y[r] > 0.0:
             continue
-        rho = factor * work.local[i, NORMAL_STEP]
+        rho = factor * work.local[i, LOCAL_NORMAL_RHO]
         size, limit = math.sqrt(y[r + 1] * y[r + 1] + y[r + 2] * y[r + 2]), work.mu * y[r]
         da = db = 0.0
         k11 = k22 = 1.0
@@ -110,8 +110,8 @@ def _fill_matrix(n, factor, inv_mass, work):
             da, db, s = y[r + 1] / size, y[r + 2] / size, limit / size
             k11, k12, k22 = s * (1.0 - da * da), -s * da * db, s * (1.0 - db * db)
         for b in range(6):
-            jn = yielding(rho, rho, work) * _row(r, b, work)
-            ja, jb = rho * _row(r + 1, b, work), rho * _row(r + 2, b, work)
+            jn = scale_by_compliance(rho, rho, work) * _jacobian_entry(r, b, work)
+            ja, jb = rho * _jacobian_entry(r + 1, b, work), rho * _jacobian_entry(r + 2, b, work)
             pa = k11 * ja + k12 * jb
             pb = k12 * ja + k22 * jb
             if size > limit:
@@ -148,16 +148,16 @@ def _eliminate(A):
 def _newton_step(n, size, factor, inv_mass, work):
     """One damped Newton step on the twist; the new size of the defect."""
     x, start, step = work.twist, work.start, work.newton
-    _fill_matrix(n, factor, inv_mass, work)
+    _fill_newton_matrix(n, factor, inv_mass, work)
     _eliminate(work.newton)
     for c in range(6):
         start[c] = x[c]
     after = size
     t = 1.0
-    for _ in range(HALVINGS):
+    for _ in range(_MAX_HALVINGS):
         for c in range(6):
             x[c] = start[c] + t * step[c, 6]
-        after = _defect(n, factor, inv_mass, work)
+        after = _fixed_point_residual(n, factor, inv_mass, work)
         if after < size:
             break
         t *= 0.5
@@ -201,27 +201,27 @@ def proximal_newton(n, residual, goal, is_quick, work):
     rows = 3 * n
     inv_mass = 1.0 / work.mass
     steps = 0
-    factor = PROXIMAL_FACTOR
-    rounds, most = (QUICK_ROUNDS, QUICK_STEPS) if is_quick else (ROUNDS, NEWTON_STEPS)
+    factor = _PROXIMAL_FACTOR
+    rounds, most = (_QUICK_ROUNDS, _QUICK_NEWTON_STEPS) if is_quick else (_MAX_ROUNDS, _MAX_NEWTON_STEPS)
     for s in range(rows):
         work.saved[s] = p[s]
     for _ in range(rounds):
         _twist_of_impulses(n, inv_mass, work)
-        size = _defect(n, factor, inv_mass, work)
+        size = _fixed_point_residual(n, factor, inv_mass, work)
         failures = 0
         for _ in range(most):
-            if not size > ROUND_SHARE * goal:
+            if not size > _ROUND_TOLERANCE_SHARE * goal:
                 break
             after = _newton_step(n, size, factor, inv_mass, work)
             steps += 1
             if not after < size:
                 failures += 1
-                if failures > FAILURES:
+                if failures > _MAX_FAILURES:
                     break
             size = after
         for s in range(rows):
             p[s] = work.trial[s]
-        velocities(rows, W, p, work.bias, u)
+        update_contact_velocities(rows, W, p, work.bias, u)
         now = cone_residual(n, p, u, work.friction, work.local)
         if now < residual:
             residual = now
@@ -229,8 +229,8 @@ def proximal_newton(n, residual, goal, is_quick, work):
                 work.saved[s] = p[s]
         if residual <= goal:
             break
-        factor = min(FACTOR_GROWTH * factor, FACTOR_LIMIT)
+        factor = min(_FACTOR_GROWTH * factor, _FACTOR_LIMIT)
     for s in range(rows):
         p[s] = work.saved[s]
-    velocities(rows, W, p, work.bias, u)
+    update_contact_velocities(rows, W, p, work.bias, u)
     return steps, residual

@@ -4,37 +4,42 @@ from __future__ import annotations
 
 from physics.kernels.compile.decorators import inlined
 from physics.kernels.contact_law.anisotropic_friction import friction_ratio, stretched_frame
-from physics.kernels.contact_solver.one_contact import to_world, wall_frame
-from physics.kernels.contact_solver.patch_algebra import cold_motion, free_speed, place_patch, warm_motion
-from physics.kernels.contact_solver.sliding_patch import MIXED, SLIDE, search
-from physics.kernels.contact_solver.two_contacts import contact_at, solve_one, solve_pair
+from physics.kernels.contact_solver.one_contact import motion_in_wall_frame, wall_to_world
+from physics.kernels.contact_solver.patch_algebra import (
+    cold_start_motion,
+    gather_patch,
+    largest_free_speed,
+    warm_start_motion,
+)
+from physics.kernels.contact_solver.sliding_patch import TRY_MIXED, TRY_SLIDING, solve_sliding_patch
+from physics.kernels.contact_solver.two_contacts import contact_in_wall_frame, solve_one_contact, solve_two_contacts
 from physics.kernels.half_space.contact_point import wall_axes
-from physics.kernels.math.simd_gather import present
+from physics.kernels.math.simd_gather import valid_lanes_mask
 
 # Share of the free speed by which a contact that opened may close while it is sought which others push.
-LOOSE = 1.0e-2
+_CLOSING_TOLERANCE = 1.0e-2
 
 
 @inlined
-def _face(n, friction, axes, u, w, inv_mass, K, work):
+def _solve_face(n, friction, axes, u, w, inv_mass, K, work):
     """Three contacts or four: (found, tangents and moments, Σ p_n, residual, its scale), `work.impulse` when found."""
-    patch, on = place_patch(n, axes, inv_mass, K, work), present(n)
-    scale = free_speed(friction, patch, u, w)
+    patch, on = gather_patch(n, axes, inv_mass, K, work), valid_lanes_mask(n)
+    scale = largest_free_speed(friction, patch, u, w)
     start, is_mixed = (u[1], u[2], w[0]), False
     if friction is not None:
-        start, is_of_now = warm_motion(n, patch, on, u, w, inv_mass, K, work)
-        is_mixed = is_of_now and work.mode == MIXED
+        start, is_of_now = warm_start_motion(n, patch, on, u, w, inv_mass, K, work)
+        is_mixed = is_of_now and work.mode == TRY_MIXED
         if not is_of_now and work.mu > 0.0:
-            start = cold_motion(n, patch, on, work.mu, u, w, inv_mass, K)
+            start = cold_start_motion(n, patch, on, work.mu, u, w, inv_mass, K)
     goal = work.tolerance * scale
-    loose = max(goal, LOOSE * scale) if n > 3 else goal
+    loose = max(goal, _CLOSING_TOLERANCE * scale) if n > 3 else goal
     for patient in range(2):
-        found, impulses, exerted, push, miss, has_opened = search(
+        found, impulses, exerted, push, miss, has_opened = solve_sliding_patch(
             n, patient > 0, work.mu, goal, loose, patch, start, is_mixed, axes, u, w, inv_mass, K, work
         )
         if found:
             for i in range(n):
-                _store(i, (impulses[0][i], impulses[1][i], impulses[2][i]), friction, work)
+                _store_impulse(i, (impulses[0][i], impulses[1][i], impulses[2][i]), friction, work)
             return True, exerted, push, miss, scale
         if not has_opened:
             break
@@ -42,7 +47,7 @@ def _face(n, friction, axes, u, w, inv_mass, K, work):
 
 
 @inlined
-def _store(i, p, friction, work):
+def _store_impulse(i, p, friction, work):
     """Impulse of contact i to `work.impulse`, along the unit tangents."""
     if friction is None:
         work.impulse[i] = p[0]
@@ -52,7 +57,7 @@ def _store(i, p, friction, work):
 
 
 @inlined
-def _largest(friction, b):
+def _largest_component(friction, b):
     """Largest component of a contact velocity that impulses can change [m/s]."""
     if friction is None:
         return abs(b[0])
@@ -60,28 +65,28 @@ def _largest(friction, b):
 
 
 @inlined
-def _few(n, friction, axes, u, w, inv_mass, K, work):
-    """One contact or two, as `_face`."""
-    first = contact_at(0, axes, u, w, work)
-    scale = _largest(friction, first[1])
+def _solve_one_or_two(n, friction, axes, u, w, inv_mass, K, work):
+    """One contact or two, as `_solve_face`."""
+    first = contact_in_wall_frame(0, axes, u, w, work)
+    scale = _largest_component(friction, first[1])
     if n == 1:
-        found, p, m, miss = solve_one(first, work.mu, work.tolerance * scale, inv_mass, K, work)
+        found, p, m, miss = solve_one_contact(first, work.mu, work.tolerance * scale, inv_mass, K, work)
     else:
-        second = contact_at(1, axes, u, w, work)
-        scale = max(scale, _largest(friction, second[1]))
-        found, p, q, m, miss = solve_pair(first, second, work.mu, work.tolerance * scale, inv_mass, K, work)
+        second = contact_in_wall_frame(1, axes, u, w, work)
+        scale = max(scale, _largest_component(friction, second[1]))
+        found, p, q, m, miss = solve_two_contacts(first, second, work.mu, work.tolerance * scale, inv_mass, K, work)
         if found:
-            _store(1, q, friction, work)
-            work.mode = SLIDE
+            _store_impulse(1, q, friction, work)
+            work.mode = TRY_SLIDING
     if found:
-        _store(0, p, friction, work)
+        _store_impulse(0, p, friction, work)
     if n == 2:
         p = p[0] + q[0], p[1] + q[1], p[2] + q[2]
     return found, (p[1], p[2], m[0], m[1], m[2]), p[0], miss, scale
 
 
 @inlined
-def slide_on(n, friction, wall, R, v, L, work):
+def solve_single_wall(n, friction, wall, R, v, L, work):
     """Try the impulses with which the n contacts of one wall slide, open, or turn about one that holds.
 
     Parameters
@@ -107,16 +112,16 @@ def slide_on(n, friction, wall, R, v, L, work):
         Relative to the largest free contact speed.
     """
     axes, inv_mass, ratio = wall_axes(work.walls, wall), 1.0 / work.mass, friction_ratio(work)
-    K, u, w = wall_frame(R, v, L, axes, work.J)
+    K, u, w = motion_in_wall_frame(R, v, L, axes, work.J)
     K, u, w = stretched_frame(K, u, w, ratio)
     if n < 3:
-        found, exerted, push, miss, scale = _few(n, friction, axes, u, w, inv_mass, K, work)
+        found, exerted, push, miss, scale = _solve_one_or_two(n, friction, axes, u, w, inv_mass, K, work)
     else:
-        found, exerted, push, miss, scale = _face(n, friction, axes, u, w, inv_mass, K, work)
+        found, exerted, push, miss, scale = _solve_face(n, friction, axes, u, w, inv_mass, K, work)
     if not found:
         return False, v, L, 0.0
     if scale > 0.0:
         miss /= scale
     fa, fb, tn, ta, tb = exerted
-    v = to_world(axes, inv_mass * push, inv_mass * fa, ratio * (inv_mass * fb), v)
-    return True, v, to_world(axes, tn, ta, tb / ratio, L), miss
+    v = wall_to_world(axes, inv_mass * push, inv_mass * fa, ratio * (inv_mass * fb), v)
+    return True, v, wall_to_world(axes, tn, ta, tb / ratio, L), miss

@@ -33,7 +33,7 @@ pushes again, once; where three push and it hardly closes, not before these are 
 linear system is the solution.
 
 All begins with the motion that the impulses of the last step lead to, and with themselves where some contacts held; or,
-where they are of other loads, with `patch_algebra.cold_motion`.
+where they are of other loads, with `patch_algebra.cold_start_motion`.
 """
 
 from __future__ import annotations
@@ -41,46 +41,46 @@ from __future__ import annotations
 import math
 
 from physics.kernels.compile.decorators import inlined
-from physics.kernels.compile.simd import Lanes, chosen, first_of, larger, largest, total
+from physics.kernels.compile.simd import Lanes, first_true_lane, lane_sum, larger, max_of_lanes, select_lanes
 from physics.kernels.contact_law.anisotropic_friction import friction_ratio
 from physics.kernels.contact_solver.patch_algebra import (
-    across_misses,
-    centroid,
-    comply,
-    fit_targets,
-    moved,
-    opposed,
-    respond,
-    resultant,
-    slips,
-    spare_speed,
-    turns_little,
-    warm_slip,
+    fit_normal_motion,
+    has_small_turns,
+    normal_velocity_excess,
+    patch_centroid,
+    patch_friction_directions,
+    patch_normal_impulses,
+    patch_sliding_residual,
+    patch_slip_velocities,
+    planar_compliance,
+    planar_motion_after,
+    solve_normal_slopes,
+    warm_start_friction,
 )
 from physics.kernels.contact_solver.primal_dual_friction import (
-    FOUND,
-    NOT_FOUND,
-    PULLS,
-    hold_some,
-    slowed,
-    solve_compliant,
+    ROUND_FAILED,
+    ROUND_PULLS,
+    ROUND_SOLVED,
+    solve_planar_step,
+    solve_stick_slip_patch,
+    take_viscous_step,
 )
-from physics.kernels.contact_solver.two_contacts import contact_at, solve_pair
-from physics.kernels.math.simd_gather import lane, present
+from physics.kernels.contact_solver.two_contacts import contact_in_wall_frame, solve_two_contacts
+from physics.kernels.math.simd_gather import select_lane, valid_lanes_mask
 
 # Linear solves of one attempt at most. Two are usual at a tolerance of 1e-6, each contact that opens costs
 # one more.
-SLIDE_LIMIT = 16
+_MAX_PATCH_SOLVES = 16
 
 # What to try first (`work.mode`): all hold, all slide, or some of both.
-HOLD, SLIDE, MIXED = range(3)
+TRY_STICKING, TRY_SLIDING, TRY_MIXED = range(3)
 
-# What a round comes to, beside `primal_dual_friction.NOT_FOUND`, `FOUND` and `PULLS`.
-GOES_ON, TIPS, TURNS_ROUND = range(3, 6)
+# What a round comes to, beside `primal_dual_friction.ROUND_FAILED`, `ROUND_SOLVED` and `ROUND_PULLS`.
+ROUND_CONTINUES, ROUND_TIPS, ROUND_REVERSES = range(3, 6)
 
 
 @inlined
-def _normal_motion(count, goal, loose, patch, on, u, w):
+def _choose_normal_motion(count, goal, loose, patch, on, u, w):
     """Normal motion of the contacts that push, and which do.
 
     Targets of four contacts that are those of no rigid motion are met by three: one opens that is then faster than
@@ -102,22 +102,22 @@ def _normal_motion(count, goal, loose, patch, on, u, w):
         Whether it meets the targets of four contacts within the goal. Then it does whichever of them push; three that
         met theirs to the letter would have the fourth off by four times as much, and it would push again for nothing.
     """
-    is_patch, center, motion = fit_targets(count, patch, on)
-    spare = spare_speed(patch, motion[0], motion[1], motion[2])
-    if is_patch and count > 3 and not largest(abs(spare)) <= goal:
-        free = chosen(spare > 0.0, spare_speed(patch, u[0], w[1], w[2]), -math.inf)
-        count, on = count - 1, chosen(lane(first_of(free == largest(free))), 0.0, on)
-        is_patch, center, motion = fit_targets(count, patch, on)
-        spare = spare_speed(patch, motion[0], motion[1], motion[2])
-    speeds = chosen(on > 0.0, 0.0, -spare)
-    fastest = largest(speeds)
-    closing = first_of(speeds == fastest) if fastest > goal else -1
-    ok = is_patch and largest(on * abs(spare)) <= goal and fastest <= loose
+    is_patch, center, motion = fit_normal_motion(count, patch, on)
+    spare = normal_velocity_excess(patch, motion[0], motion[1], motion[2])
+    if is_patch and count > 3 and not max_of_lanes(abs(spare)) <= goal:
+        free = select_lanes(spare > 0.0, normal_velocity_excess(patch, u[0], w[1], w[2]), -math.inf)
+        count, on = count - 1, select_lanes(select_lane(first_true_lane(free == max_of_lanes(free))), 0.0, on)
+        is_patch, center, motion = fit_normal_motion(count, patch, on)
+        spare = normal_velocity_excess(patch, motion[0], motion[1], motion[2])
+    speeds = select_lanes(on > 0.0, 0.0, -spare)
+    fastest = max_of_lanes(speeds)
+    closing = first_true_lane(speeds == fastest) if fastest > goal else -1
+    ok = is_patch and max_of_lanes(on * abs(spare)) <= goal and fastest <= loose
     return ok, closing, count, on, center, motion, ok and count > 3
 
 
 @inlined
-def _two_left(patch, on, mu, goal, axes, u, w, inv_mass, K, work):
+def _solve_remaining_pair(patch, on, mu, goal, axes, u, w, inv_mass, K, work):
     """The two contacts that still push, the others open.
 
     Returns
@@ -128,28 +128,30 @@ def _two_left(patch, on, mu, goal, axes, u, w, inv_mass, K, work):
         The open contact that would close fastest, where that is why it is not found, else -1.
     """
     (_, a, b), (target, _, _), _ = patch
-    i = first_of(on > 0.0)
-    j = first_of(chosen(lane(i), 0.0, on) > 0.0)
-    first, second = contact_at(i, axes, u, w, work), contact_at(j, axes, u, w, work)
-    found, p, q, m, miss = solve_pair(first, second, mu, goal, inv_mass, K, work)
-    is_i, is_j = lane(i), lane(j)
+    i = first_true_lane(on > 0.0)
+    j = first_true_lane(select_lanes(select_lane(i), 0.0, on) > 0.0)
+    first, second = contact_in_wall_frame(i, axes, u, w, work), contact_in_wall_frame(j, axes, u, w, work)
+    found, p, q, m, miss = solve_two_contacts(first, second, mu, goal, inv_mass, K, work)
+    is_i, is_j = select_lane(i), select_lane(j)
     impulses = (
-        chosen(is_i, p[0], chosen(is_j, q[0], 0.0)),
-        chosen(is_i, p[1], chosen(is_j, q[1], 0.0)),
-        chosen(is_i, p[2], chosen(is_j, q[2], 0.0)),
+        select_lanes(is_i, p[0], select_lanes(is_j, q[0], 0.0)),
+        select_lanes(is_i, p[1], select_lanes(is_j, q[1], 0.0)),
+        select_lanes(is_i, p[2], select_lanes(is_j, q[2], 0.0)),
     )
     vn = u[0] + inv_mass * (p[0] + q[0])
     wa, wb = w[1] + (K[1] * m[0] + K[3] * m[1] + K[4] * m[2]), w[2] + (K[2] * m[0] + K[4] * m[1] + K[5] * m[2])
-    closing = chosen(on > 0.0, 0.0, target - (vn + (wa * b - wb * a)))
-    fastest, again = largest(larger(0.0, closing)), -1
+    closing = select_lanes(on > 0.0, 0.0, target - (vn + (wa * b - wb * a)))
+    fastest, again = max_of_lanes(larger(0.0, closing)), -1
     if found and not fastest <= goal:
-        found, again = False, first_of(closing == fastest)
+        found, again = False, first_true_lane(closing == fastest)
     exerted = (p[1] + q[1], p[2] + q[2], m[0], m[1], m[2])
     return found, impulses, exerted, p[0] + q[0], max(miss, fastest), again
 
 
 @inlined
-def _turn(patient, count, patch, on, mu, goal, center, y0, gain, motion, u, w, wa, wb, inv_mass, K, work):
+def _direction_newton_round(
+    patient, count, patch, on, mu, goal, center, y0, gain, motion, u, w, wa, wb, inv_mass, K, work
+):
     """One round of Newton's method on the directions, those of `motion`.
 
     Returns
@@ -158,7 +160,7 @@ def _turn(patient, count, patch, on, mu, goal, center, y0, gain, motion, u, w, w
         FOUND; GOES_ON; PULLS: the contact `loser` would have to pull; TIPS: two of four would; TURNS_ROUND: a direction
         would, and the motion is that of the first step of `primal_dual_friction`.
     loser, pulling
-        As of `resultant`.
+        As of `patch_normal_impulses`.
     p, x, y : lanes
         Normal impulses, and impulses along the tangents per normal impulse: for the next round when it TURNS_ROUND.
     exerted : tuple of 5 floats
@@ -167,33 +169,33 @@ def _turn(patient, count, patch, on, mu, goal, center, y0, gain, motion, u, w, w
     motion : tuple of 3 floats
         Of the next round.
     """
-    slip, miss = opposed(*slips(patch, motion, wa, wb), on, mu), 0.0
-    slopes, turning = respond(patch, on, center, y0, gain, slip, K)
-    pulling, loser, p, exerted = resultant(patch, on, center, y0, slopes, slip)
-    x, y, what = slip[0], slip[1], GOES_ON
+    slip, miss = patch_friction_directions(*patch_slip_velocities(patch, motion, wa, wb), on, mu), 0.0
+    slopes, turning = solve_normal_slopes(patch, on, center, y0, gain, slip, K)
+    pulling, loser, p, exerted = patch_normal_impulses(patch, on, center, y0, slopes, slip)
+    x, y, what = slip[0], slip[1], ROUND_CONTINUES
     if loser >= 0:
-        what = PULLS
-        if not patient and count > 3 and total(pulling) == 2.0:
-            what = TIPS
+        what = ROUND_PULLS
+        if not patient and count > 3 and lane_sum(pulling) == 2.0:
+            what = ROUND_TIPS
     if loser < 0 or patient:
         ratio = friction_ratio(work)
-        led_to = moved(exerted, u, w, inv_mass, ratio * ratio * inv_mass, K)
+        led_to = planar_motion_after(exerted, u, w, inv_mass, ratio * ratio * inv_mass, K)
         delta = led_to[0] - motion[0], led_to[1] - motion[1], led_to[2] - motion[2]
-        miss, k = across_misses(patch, p, slip, mu, delta)
+        miss, k = patch_sliding_residual(patch, p, slip, mu, delta)
         if loser < 0 and miss <= goal:
-            what = FOUND
+            what = ROUND_SOLVED
         else:
-            compliance = comply(patch, center, slip, turning, inv_mass, K, work)
-            step = solve_compliant(compliance, (k[0], k[1], k[2], k[1], k[3], k[4], k[2], k[4], k[5]), delta)
-            if not turns_little(patch, on, slip, mu, step):
-                what = TURNS_ROUND
-                step, x, y = slowed(patch, on, p, slip, mu, compliance, delta, goal)
+            compliance = planar_compliance(patch, center, slip, turning, inv_mass, K, work)
+            step = solve_planar_step(compliance, (k[0], k[1], k[2], k[1], k[3], k[4], k[2], k[4], k[5]), delta)
+            if not has_small_turns(patch, on, slip, mu, step):
+                what = ROUND_REVERSES
+                step, x, y = take_viscous_step(patch, on, p, slip, mu, compliance, delta, goal)
             motion = motion[0] + step[0], motion[1] + step[1], motion[2] + step[2]
     return what, loser, pulling, p, x, y, exerted, miss, motion
 
 
 @inlined
-def search(n, patient, mu, goal, loose, patch, start, is_mixed, axes, u, w, inv_mass, K, work):
+def solve_sliding_patch(n, patient, mu, goal, loose, patch, start, is_mixed, axes, u, w, inv_mass, K, work):
     """Directions and set of pushing contacts.
 
     Parameters
@@ -228,55 +230,63 @@ def search(n, patient, mu, goal, loose, patch, start, is_mixed, axes, u, w, inv_
     """
     ratio = friction_ratio(work)
     mass_b = ratio * ratio * inv_mass
-    on, has_opened = present(n), False
+    on, has_opened = valid_lanes_mask(n), False
     none = is_back = Lanes(0.0, 0.0, 0.0, 0.0)
     count, motion, is_set, is_even, again, closing = n, start, False, False, -1, -1
     center = normal_motion = start
-    for _ in range(SLIDE_LIMIT):
+    for _ in range(_MAX_PATCH_SOLVES):
         if again >= 0:
             if is_back[again] > 0.0:
                 break
-            count, on, is_back = count + 1, chosen(lane(again), 1.0, on), chosen(lane(again), 1.0, is_back)
+            count, on, is_back = (
+                count + 1,
+                select_lanes(select_lane(again), 1.0, on),
+                select_lanes(select_lane(again), 1.0, is_back),
+            )
             again, is_set = -1, False
         if count < 3:
-            found, impulses, exerted, push, miss, again = _two_left(patch, on, mu, goal, axes, u, w, inv_mass, K, work)
+            found, impulses, exerted, push, miss, again = _solve_remaining_pair(
+                patch, on, mu, goal, axes, u, w, inv_mass, K, work
+            )
             if again < 0:
                 return found, impulses, exerted, push, miss, has_opened
-            motion = moved(exerted, u, w, inv_mass, mass_b, K)
+            motion = planar_motion_after(exerted, u, w, inv_mass, mass_b, K)
             continue
         if not is_set and is_even:
-            center = centroid(count, patch, on)
+            center = patch_centroid(count, patch, on)
         elif not is_set:
-            ok, closing, count, on, center, normal_motion, is_even = _normal_motion(count, goal, loose, patch, on, u, w)
+            ok, closing, count, on, center, normal_motion, is_even = _choose_normal_motion(
+                count, goal, loose, patch, on, u, w
+            )
             if not ok:
                 break
         is_set = True
         vn, wa, wb = normal_motion
         push = (vn - u[0]) / inv_mass
         y0, gain = push / count, (wa - w[1], wb - w[2])
-        what, mode = TURNS_ROUND, SLIDE
+        what, mode = ROUND_REVERSES, TRY_SLIDING
         if is_mixed:
-            x, y = warm_slip(n, patch, on, work)
+            x, y = warm_start_friction(n, patch, on, work)
         else:
-            what, loser, pulling, p, x, y, exerted, miss, motion = _turn(
+            what, loser, pulling, p, x, y, exerted, miss, motion = _direction_newton_round(
                 patient, count, patch, on, mu, goal, center, y0, gain, motion, u, w, wa, wb, inv_mass, K, work
             )
-        if what == TURNS_ROUND:
-            what, loser, p, x, y, exerted, miss, motion = hold_some(
+        if what == ROUND_REVERSES:
+            what, loser, p, x, y, exerted, miss, motion = solve_stick_slip_patch(
                 patient, patch, on, x, y, mu, goal, loose, center, y0, gain, motion, u, w, wa, wb, inv_mass, K, work
             )
-            is_mixed, mode = False, MIXED
-        if what == NOT_FOUND:
+            is_mixed, mode = False, TRY_MIXED
+        if what == ROUND_FAILED:
             break
-        if what == FOUND and closing < 0:
+        if what == ROUND_SOLVED and closing < 0:
             work.mode = mode
             return True, (p, p * x, p * y), exerted, push, miss, has_opened
-        if what == FOUND:
+        if what == ROUND_SOLVED:
             again = closing
-        if what == TIPS:
+        if what == ROUND_TIPS:
             count, on, is_set, motion, has_opened = 2, on - pulling, False, start, True
-        if what == PULLS:
-            count, on, is_set, has_opened = count - 1, chosen(lane(loser), 0.0, on), False, True
+        if what == ROUND_PULLS:
+            count, on, is_set, has_opened = count - 1, select_lanes(select_lane(loser), 0.0, on), False, True
             if not patient:
                 motion = start
     return False, (none, none, none), (0.0, 0.0, 0.0, 0.0, 0.0), 0.0, 0.0, has_opened

@@ -2,54 +2,49 @@
 
 from __future__ import annotations
 
-from physics.kernels.compile.decorators import inlined, kernel, standing
-from physics.kernels.compile.simd import WIDTH
-from physics.kernels.contact_law.anisotropic_friction import stretch, unstretch
-from physics.kernels.contact_law.compliance import soften, stiffness
-from physics.kernels.contact_solver.friction_pyramid import normal_fallback, pyramid_fallback
+from physics.kernels.compile.decorators import inlined, kernel, shared_kernel
+from physics.kernels.compile.simd import LANE_COUNT
+from physics.kernels.contact_law.anisotropic_friction import stretch_tangents, unstretch_tangents
+from physics.kernels.contact_law.compliance import add_delassus_compliance, contact_stiffness
+from physics.kernels.contact_solver.friction_pyramid import solve_normal_lcp, solve_pyramid_lcp
 from physics.kernels.contact_solver.gauss_seidel import (
-    assemble,
+    assemble_delassus,
     cone_residual,
     cone_sweeps,
-    factor_blocks,
+    invert_contact_blocks,
     normal_residual,
     normal_sweeps,
-    velocities,
+    update_contact_velocities,
 )
-from physics.kernels.contact_solver.patch_algebra import may_hold
+from physics.kernels.contact_solver.patch_algebra import may_stick
 from physics.kernels.contact_solver.proximal_newton import proximal_newton
-from physics.kernels.contact_solver.single_wall import slide_on
-from physics.kernels.contact_solver.sliding_patch import HOLD
-from physics.kernels.contact_solver.sticking import hold_all
+from physics.kernels.contact_solver.single_wall import solve_single_wall
+from physics.kernels.contact_solver.sliding_patch import TRY_STICKING
+from physics.kernels.contact_solver.sticking import solve_all_sticking
 from physics.kernels.half_space.contact_point import wall_axes, wall_of
 from physics.kernels.math import quaternion as qt
-
-# Methods, weakest need first (column SOLVER of the report).
-NO_SOLVE = 0
-DIRECT = 1
-SWEEPS = 2
-PIVOTING = 3
+from physics.kernels.state.layout import METHOD_DIRECT, METHOD_PIVOTING, METHOD_SWEEPS
 
 # The pyramid's octagon is off by up to 1 - cos(π/8) = 8 % of the friction. Sweeps that stall nearer to a
 # solution than this share of the largest free contact speed know it better: their residual is reported as it
 # is.
-PIVOT_ABOVE = 0.01
+_PIVOTING_THRESHOLD = 0.01
 
 # Residual that rounding leaves, relative to the largest free contact speed: the smallest tolerance.
-ROUNDING = 1.0e-12
+_ROUNDING = 1.0e-12
 
 # Sweeps before Newton's method has a turn: most problems that are left for sweeps need fewer than ten.
-SWEEPS_AT_ONCE = 12
+_SWEEPS_PER_ROUND = 12
 
 # Turns of Newton's method that end early, unless there is no other; what they leave it is given its time for.
-QUICK_TURNS = 10
+_QUICK_NEWTON_ROUNDS = 10
 
 # Pivots of the fallback at most: several times the unknowns of a dozen contacts.
 MAX_PIVOTS = 500
 
 
 @inlined
-def _free_speed(rows, bias):
+def _largest_free_speed(rows, bias):
     """Largest free contact speed [m/s]: the scale of the relative residual."""
     largest = 0.0
     for r in range(rows):
@@ -58,7 +53,7 @@ def _free_speed(rows, bias):
 
 
 @kernel
-def _pivot(n, friction, smooth, residual, work):
+def _solve_by_pivoting(n, friction, smooth, residual, work):
     """Pivoting fallback; its result is kept where it beats that of the sweeps. Returns the residual [m/s]."""
     p, W, b, u = work.impulse, work.delassus, work.bias, work.velocity
     after, rows = residual, n
@@ -67,12 +62,12 @@ def _pivot(n, friction, smooth, residual, work):
     for r in range(rows):
         work.saved[r] = p[r]
     if smooth is not None:
-        normal_fallback(W, b, n, p, work.fallback_float, work.fallback_int, MAX_PIVOTS)
-        velocities(rows, W, p, b, u)
+        solve_normal_lcp(W, b, n, p, work.fallback_float, work.fallback_int, MAX_PIVOTS)
+        update_contact_velocities(rows, W, p, b, u)
         after = normal_residual(n, p, u, W)
     if friction is not None:
-        pyramid_fallback(W, b, work.friction, n, p, work.fallback_float, work.fallback_int, MAX_PIVOTS)
-        velocities(rows, W, p, b, u)
+        solve_pyramid_lcp(W, b, work.friction, n, p, work.fallback_float, work.fallback_int, MAX_PIVOTS)
+        update_contact_velocities(rows, W, p, b, u)
         after = cone_residual(n, p, u, work.friction, work.local)
     if not after < residual:
         for r in range(rows):
@@ -82,7 +77,7 @@ def _pivot(n, friction, smooth, residual, work):
 
 
 @inlined
-def _apply(n, width, v, L, work):
+def _apply_impulses(n, width, v, L, work):
     """Velocity and angular momentum after the impulses: v + Σ P/m, L + Σ r x P."""
     walls = work.walls
     inv_mass = 1.0 / work.mass
@@ -105,13 +100,13 @@ def _apply(n, width, v, L, work):
 
 
 @kernel
-def _hold(n, R, v, L, work):
-    """`hold_all`, apart: it comes before or after the other attempt, and is compiled once."""
-    return hold_all(n, R, v, L, work)
+def _solve_sticking(n, R, v, L, work):
+    """`solve_all_sticking`, apart: it comes before or after the other attempt, and is compiled once."""
+    return solve_all_sticking(n, R, v, L, work)
 
 
-@standing
-def _directly(n, friction, R, v, L, work):
+@shared_kernel
+def _solve_directly(n, friction, R, v, L, work):
     """Try that all contacts hold, and that they slide, the likelier one first: (found, v, L, residual).
 
     `sliding_patch` knows all about a single contact. Whether an edge, or contacts of several walls, held last is tried
@@ -119,63 +114,65 @@ def _directly(n, friction, R, v, L, work):
 
     Without a loop: LLVM would work out before it what only one of the attempts needs, whether that is made or not.
     """
-    wall, is_soft = wall_of(work.slot[0], work), stiffness(work) > 0.0
-    is_one_wall = n <= WIDTH and wall_of(work.slot[n - 1], work) == wall
+    wall, is_soft = wall_of(work.slot[0], work), contact_stiffness(work) > 0.0
+    is_one_wall = n <= LANE_COUNT and wall_of(work.slot[n - 1], work) == wall
     may_all_hold, holds_first = friction is not None and not is_soft, False
     if may_all_hold and n > 1:
-        holds_first = work.mode == HOLD
+        holds_first = work.mode == TRY_STICKING
         if is_one_wall and n > 2:
-            holds_first = may_hold(n, wall_axes(work.walls, wall), v, L, work)
+            holds_first = may_stick(n, wall_axes(work.walls, wall), v, L, work)
     found, v_new, L_new, residual = False, v, L, 0.0
     if holds_first:
-        found, v_new, L_new, residual = _hold(n, R, v, L, work)
+        found, v_new, L_new, residual = _solve_sticking(n, R, v, L, work)
         if found:
-            work.mode = HOLD
+            work.mode = TRY_STICKING
     if not found and is_one_wall and not (is_soft and n > 2):
-        found, v_new, L_new, residual = slide_on(n, friction, wall, R, v, L, work)
+        found, v_new, L_new, residual = solve_single_wall(n, friction, wall, R, v, L, work)
     if not found and may_all_hold and not holds_first:
-        found, v_new, L_new, residual = _hold(n, R, v, L, work)
+        found, v_new, L_new, residual = _solve_sticking(n, R, v, L, work)
         if found:
-            work.mode = HOLD
+            work.mode = TRY_STICKING
     return found, v_new, L_new, residual
 
 
 @inlined
-def _assemble(n, width, R, v, L, work):
+def _assemble_problem(n, width, R, v, L, work):
     """Assemble the contact problem; largest free contact speed."""
     J = work.J
     mb = qt.transposed_matvec(R, L)
-    assemble(n, width, R, v, qt.matvec(R, (J[0] * mb[0], J[1] * mb[1], J[2] * mb[2])), work)
-    stretch(n, work)
-    soften(n, width, work)
-    return _free_speed(width * n, work.bias)
+    assemble_delassus(n, width, R, v, qt.matvec(R, (J[0] * mb[0], J[1] * mb[1], J[2] * mb[2])), work)
+    stretch_tangents(n, work)
+    add_delassus_compliance(n, width, work)
+    return _largest_free_speed(width * n, work.bias)
 
 
 @kernel
-def _iterate(n, friction, smooth, goal, work):
+def _sweep_and_newton(n, friction, smooth, goal, work):
     """Sweeps, with friction in turn with Newton's method: (sweeps and steps, residual [m/s])."""
     steps, residual = 0, 0.0
     if smooth is not None:
-        if stiffness(work) > 0.0:  # W is positive definite, but sweeps crawl where γ is small: a few pivots first
-            normal_fallback(
+        if (
+            contact_stiffness(work) > 0.0
+        ):  # W is positive definite, but sweeps crawl where γ is small: a few pivots first
+            solve_normal_lcp(
                 work.delassus, work.bias, n, work.impulse, work.fallback_float, work.fallback_int, MAX_PIVOTS
             )
         steps, residual = normal_sweeps(n, goal, work.sweeps, work)
     if friction is not None:
-        factor_blocks(n, work)
+        invert_contact_blocks(n, work)
         for i in range(n):
             work.friction[i] = work.mu
-        left, at_once, turns = work.sweeps, SWEEPS_AT_ONCE, 0
-        if stiffness(work) > 0.0:  # the normals are determined, and Newton's method shares tangents out evenly
+        left, at_once, turns = work.sweeps, _SWEEPS_PER_ROUND, 0
+        if contact_stiffness(work) > 0.0:  # the normals are determined, and Newton's method shares tangents out evenly
             at_once = 0
         while True:
             sweeps, residual = cone_sweeps(n, work.friction, goal, min(left, at_once), work)
-            at_once = SWEEPS_AT_ONCE
+            at_once = _SWEEPS_PER_ROUND
             steps += sweeps
             left -= sweeps
             if residual <= goal or left <= 0:
                 break
-            is_quick = turns < QUICK_TURNS and left > SWEEPS_AT_ONCE
+            is_quick = turns < _QUICK_NEWTON_ROUNDS and left > _SWEEPS_PER_ROUND
             newtons, residual = proximal_newton(n, residual, goal, is_quick, work)
             turns += 1
             steps += newtons
@@ -184,19 +181,19 @@ def _iterate(n, friction, smooth, goal, work):
     return steps, residual
 
 
-@standing
-def _by_sweeps(n, friction, smooth, pivots, v, L, R, work):
+@shared_kernel
+def _solve_iteratively(n, friction, smooth, pivots, v, L, R, work):
     """Result of `solve_contacts` by sweeps and later solvers: out of line, since few problems come to it."""
     width = 1 if friction is None else 3
-    scale = _assemble(n, width, R, v, L, work)
-    goal = max(min(work.tolerance * scale, work.still), ROUNDING * scale)
-    sweeps, residual = _iterate(n, friction, smooth, goal, work)
-    method = SWEEPS
-    if pivots is not None and not residual <= max(goal, PIVOT_ABOVE * scale):
-        residual = _pivot(n, friction, smooth, residual, work)
-        method = PIVOTING
-    unstretch(n, work)
-    v, L = _apply(n, width, v, L, work)
+    scale = _assemble_problem(n, width, R, v, L, work)
+    goal = max(min(work.tolerance * scale, work.still), _ROUNDING * scale)
+    sweeps, residual = _sweep_and_newton(n, friction, smooth, goal, work)
+    method = METHOD_SWEEPS
+    if pivots is not None and not residual <= max(goal, _PIVOTING_THRESHOLD * scale):
+        residual = _solve_by_pivoting(n, friction, smooth, residual, work)
+        method = METHOD_PIVOTING
+    unstretch_tangents(n, work)
+    v, L = _apply_impulses(n, width, v, L, work)
     if scale > 0.0:
         residual /= scale
     return v, L, residual, sweeps, method
@@ -206,7 +203,7 @@ def _by_sweeps(n, friction, smooth, pivots, v, L, R, work):
 def solve_contacts(n, friction, smooth, pivots, v, L, R, work):
     """Contact impulses that bring the contacts of `work` to their target velocities as far as they can.
 
-    Tried in this order: `hold_all` and `slide_on`, directly, the likelier one first; sweeps in turn
+    Tried in this order: `solve_all_sticking` and `solve_single_wall`, directly, the likelier one first; sweeps in turn
     with Newton's method; pivoting. The first whose residual is within the tolerance gives the result.
 
     Parameters
@@ -234,7 +231,7 @@ def solve_contacts(n, friction, smooth, pivots, v, L, R, work):
     method : int
         DIRECT, SWEEPS or PIVOTING.
     """
-    found, v_new, L_new, residual = _directly(n, friction, R, v, L, work)
+    found, v_new, L_new, residual = _solve_directly(n, friction, R, v, L, work)
     if found:
-        return v_new, L_new, residual, 0, DIRECT
-    return _by_sweeps(n, friction, smooth, pivots, v, L, R, work)
+        return v_new, L_new, residual, 0, METHOD_DIRECT
+    return _solve_iteratively(n, friction, smooth, pivots, v, L, R, work)

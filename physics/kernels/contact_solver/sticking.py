@@ -20,10 +20,10 @@ contact that would have to pull is left out, the one that pulls most first. If e
 cone at the end, this solves the contact problem exactly; otherwise the contacts slide (`sliding_patch`,
 `gauss_seidel`).
 
-Targets of contacts that hold need not be those of a rigid motion: points of a body that turns are asked to move apart
-(`target_velocity.aim_rest`), by next to nothing when it is about to hold. Held to the letter they would all slide,
-nanometres a step, and friction would be spent on that. They are taken for those of the twist that fits them best where
-that changes them by less than `work.unseen`.
+Targets of contacts that hold need not be those of a rigid motion: `target_velocity.set_resting_targets` moves points of
+a turning body apart, by nanometres a step when it is about to hold. Met exactly, all of them would slide, and friction
+would be spent on that. They are replaced by those of the twist that fits them best where that changes them by less
+than `work.unseen`.
 """
 
 from __future__ import annotations
@@ -32,29 +32,29 @@ import math
 
 from physics.kernels.compile.decorators import inlined
 from physics.kernels.contact_solver.impulse_distribution import (
+    distribute_by_bolt_group,
+    distribute_by_load,
     first_active,
     is_in_cone,
-    minus,
-    share_by_load,
-    share_out,
     solve_symmetric,
 )
-from physics.kernels.contact_solver.one_contact import to_world
+from physics.kernels.contact_solver.one_contact import wall_to_world
 from physics.kernels.half_space.contact_point import contact_arm, wall_axes, wall_axis, wall_of
 from physics.kernels.math import quaternion as qt
-from physics.kernels.state.layout import NORMAL, TANGENT_1, TANGENT_2
+from physics.kernels.math.vector import minus
+from physics.kernels.state.layout import WALL_NORMAL, WALL_TANGENT_1, WALL_TANGENT_2
 
 # det K / tr(K)³ of a patch is (1 - s) s / 8 for a rectangle, s the smaller share of its second moment. Below
 # 1e-6 (edges 1 : 350) the patch counts as a line and is left to the sweeps.
-LINE_LIMIT = 1.0e-6
+_COLLINEAR_LIMIT = 1.0e-6
 
 # The target velocities must be those of one rigid twist, to this share of the largest of them
 # (rounding of a least-squares fit over a patch that is not a line).
-RIGID_LIMIT = 1.0e-11
+_RIGID_TWIST_TOLERANCE = 1.0e-11
 
 
 @inlined
-def _patch(n, count, work):
+def _centroid_and_second_moment(n, count, work):
     """Centroid of the active contact points and their second moment about it."""
     cx = cy = cz = 0.0
     for i in range(n):
@@ -79,9 +79,9 @@ def _patch(n, count, work):
 
 
 @inlined
-def _is_line(k):
+def _is_collinear(k):
     det = k[0] * (k[3] * k[5] - k[4] * k[4]) - k[1] * (k[1] * k[5] - k[4] * k[2]) + k[2] * (k[1] * k[4] - k[3] * k[2])
-    return not det > LINE_LIMIT * (k[0] + k[3] + k[5]) ** 3
+    return not det > _COLLINEAR_LIMIT * (k[0] + k[3] + k[5]) ** 3
 
 
 @inlined
@@ -90,14 +90,14 @@ def _world_target(i, work):
     n, a, b = work.target[i, 0], work.target[i, 1], work.target[i, 2]
     walls, wall = work.walls, wall_of(work.slot[i], work)
     return (
-        n * walls[wall, NORMAL] + a * walls[wall, TANGENT_1] + b * walls[wall, TANGENT_2],
-        n * walls[wall, NORMAL + 1] + a * walls[wall, TANGENT_1 + 1] + b * walls[wall, TANGENT_2 + 1],
-        n * walls[wall, NORMAL + 2] + a * walls[wall, TANGENT_1 + 2] + b * walls[wall, TANGENT_2 + 2],
+        n * walls[wall, WALL_NORMAL] + a * walls[wall, WALL_TANGENT_1] + b * walls[wall, WALL_TANGENT_2],
+        n * walls[wall, WALL_NORMAL + 1] + a * walls[wall, WALL_TANGENT_1 + 1] + b * walls[wall, WALL_TANGENT_2 + 1],
+        n * walls[wall, WALL_NORMAL + 2] + a * walls[wall, WALL_TANGENT_1 + 2] + b * walls[wall, WALL_TANGENT_2 + 2],
     )
 
 
 @inlined
-def _largest_target(n, work):
+def _largest_target_speed(n, work):
     largest = 0.0
     for i in range(n):
         for c in range(3):
@@ -121,7 +121,7 @@ def _target_moments(n, count, c, work):
 
 
 @inlined
-def _miss(n, v, w, work):
+def _target_residual(n, v, w, work):
     """Largest distance of contact velocities from their targets.
 
     A contact without impulse may separate faster than asked.
@@ -135,12 +135,12 @@ def _miss(n, v, w, work):
         if work.normal[i] > 0.0:
             worst = max(worst, math.sqrt(qt.dot(d, d)))
         else:
-            worst = max(worst, -qt.dot(wall_axis(walls, wall_of(work.slot[i], work), NORMAL), d))
+            worst = max(worst, -qt.dot(wall_axis(walls, wall_of(work.slot[i], work), WALL_NORMAL), d))
     return worst
 
 
 @inlined
-def _turned_about_line(n, c, k, vc, m, R, v, L, work):
+def _angular_velocity_about_line(n, c, k, vc, m, R, v, L, work):
     """Angular velocity of a body held at points on a line.
 
     Across the line it is the least-squares fit Σ d x t / Σ|d|². Along the unit vector e it is α with
@@ -181,7 +181,7 @@ def _point_impulse(r, t, R, v, L, work):
 
 
 @inlined
-def _twist(n, count, c, k, is_line, no_target, R, v, L, work):
+def _sticking_twist(n, count, c, k, is_line, no_target, R, v, L, work):
     """Velocity and angular velocity of the body when the active contacts take their targets."""
     zero = (0.0, 0.0, 0.0)
     if no_target and not is_line:
@@ -194,14 +194,14 @@ def _twist(n, count, c, k, is_line, no_target, R, v, L, work):
         b = qt.transposed_matvec(R, (L[0] + m[0], L[1] + m[1], L[2] + m[2]))
         w = qt.matvec(R, (J[0] * b[0], J[1] * b[1], J[2] * b[2]))
     elif is_line:
-        w = _turned_about_line(n, c, k, vc, m, R, v, L, work)
+        w = _angular_velocity_about_line(n, c, k, vc, m, R, v, L, work)
     else:
         w = solve_symmetric(k, m)
     return minus(vc, qt.cross(w, c)), w
 
 
 @inlined
-def _bolt(count, k, is_line, T):
+def _solve_bolt_group(count, k, is_line, T):
     """K⁻¹ T of the bolt group: 2 T / tr K on a line, 0 at a point."""
     if count == 1:
         return (0.0, 0.0, 0.0)
@@ -212,8 +212,8 @@ def _bolt(count, k, is_line, T):
 
 
 @inlined
-def _mend(n, count, c, k, is_line, T, work):
-    """Give the impulses of `share_by_load` the moment T about the centroid again: whether they stay in their cones.
+def _restore_moment(n, count, c, k, is_line, T, work):
+    """Restore the moment T of the impulses of `distribute_by_load`: True if they stay in their cones.
 
     It shares them out as if all contacts were equally deep in the wall, which is so to a few slops; the moment
     that is missing for it makes one more bolt group, (K⁻¹ ΔT) x d_i.
@@ -225,18 +225,18 @@ def _mend(n, count, c, k, is_line, T, work):
             continue
         wall, d = wall_of(work.slot[i], work), minus(contact_arm(work, i), c)
         pn, pa, pb = work.normal[i], work.across[i, 0], work.across[i, 1]
-        p = to_world(wall_axes(walls, wall), pn, pa, pb, (0.0, 0.0, 0.0))
+        p = wall_to_world(wall_axes(walls, wall), pn, pa, pb, (0.0, 0.0, 0.0))
         m = qt.cross(d, p)
         mx, my, mz = mx - m[0], my - m[1], mz - m[2]
-    a = _bolt(count, k, is_line, (mx, my, mz))
+    a = _solve_bolt_group(count, k, is_line, (mx, my, mz))
     for i in range(n):
         if work.active[i] == 0:
             continue
         wall = wall_of(work.slot[i], work)
         p = qt.cross(a, minus(contact_arm(work, i), c))
-        pn = work.normal[i] + qt.dot(wall_axis(walls, wall, NORMAL), p)
-        pa = work.across[i, 0] + qt.dot(wall_axis(walls, wall, TANGENT_1), p)
-        pb = work.across[i, 1] + qt.dot(wall_axis(walls, wall, TANGENT_2), p)
+        pn = work.normal[i] + qt.dot(wall_axis(walls, wall, WALL_NORMAL), p)
+        pa = work.across[i, 0] + qt.dot(wall_axis(walls, wall, WALL_TANGENT_1), p)
+        pb = work.across[i, 1] + qt.dot(wall_axis(walls, wall, WALL_TANGENT_2), p)
         work.normal[i], work.across[i, 0], work.across[i, 1] = pn, pa, pb
         if not (pn >= 0.0 and is_in_cone(pn, pa, pb, work)):
             return False
@@ -244,7 +244,7 @@ def _mend(n, count, c, k, is_line, T, work):
 
 
 @inlined
-def _free_speed(n, R, v, L, work):
+def _largest_free_speed(n, R, v, L, work):
     """Largest contact velocity without impulses, relative to the target [m/s]: the scale of a residual."""
     J = work.J
     b = qt.transposed_matvec(R, L)
@@ -258,7 +258,7 @@ def _free_speed(n, R, v, L, work):
 
 
 @inlined
-def hold_all(n, R, v, L, work):
+def solve_all_sticking(n, R, v, L, work):
     """Try the impulses with which all n contacts take their target velocity.
 
     Parameters
@@ -278,30 +278,30 @@ def hold_all(n, R, v, L, work):
         With the contact impulses, when found.
     """
     J, mass = work.J, work.mass
-    largest = _largest_target(n, work)
+    largest = _largest_target_speed(n, work)
     for i in range(n):
         work.active[i] = 1
     count = n
     while count > 0:
-        c, k = _patch(n, count, work)
-        is_line = count < 3 or _is_line(k)
-        v_new, w_new = _twist(n, count, c, k, is_line, largest == 0.0, R, v, L, work)
+        c, k = _centroid_and_second_moment(n, count, work)
+        is_line = count < 3 or _is_collinear(k)
+        v_new, w_new = _sticking_twist(n, count, c, k, is_line, largest == 0.0, R, v, L, work)
         wb = qt.transposed_matvec(R, w_new)
         L_new = qt.matvec(R, (wb[0] / J[0], wb[1] / J[1], wb[2] / J[2]))
         F = (mass * (v_new[0] - v[0]), mass * (v_new[1] - v[1]), mass * (v_new[2] - v[2]))
         m = qt.cross(c, F)
         T = (L_new[0] - L[0] - m[0], L_new[1] - L[1] - m[1], L_new[2] - L[2] - m[2])
-        a = _bolt(count, k, is_line, T)
-        loser, holds = share_out(n, count, c, F, a, work)
+        a = _solve_bolt_group(count, k, is_line, T)
+        loser, holds = distribute_by_bolt_group(n, count, c, F, a, work)
         if loser < 0:
-            if not holds and not (share_by_load(n, work) and _mend(n, count, c, k, is_line, T, work)):
+            if not holds and not (distribute_by_load(n, work) and _restore_moment(n, count, c, k, is_line, T, work)):
                 return False, v, L, 0.0
             residual = 0.0
             if largest > 0.0 or count < n:
-                miss = _miss(n, v_new, w_new, work)
-                if not miss <= RIGID_LIMIT * largest:
+                miss = _target_residual(n, v_new, w_new, work)
+                if not miss <= _RIGID_TWIST_TOLERANCE * largest:
                     if miss > work.unseen:
-                        residual = miss / _free_speed(n, R, v, L, work)
+                        residual = miss / _largest_free_speed(n, R, v, L, work)
                     if not residual <= work.tolerance:
                         return False, v, L, 0.0
             for i in range(n):

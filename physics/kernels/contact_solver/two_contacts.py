@@ -15,33 +15,33 @@ import math
 
 from physics.kernels.compile.decorators import inlined, kernel
 from physics.kernels.contact_law.anisotropic_friction import friction_ratio
-from physics.kernels.contact_law.compliance import give_way
+from physics.kernels.contact_law.compliance import add_block_compliance
 from physics.kernels.contact_solver.impulse_distribution import solve_symmetric
 from physics.kernels.contact_solver.one_contact import (
-    HELD,
-    LOST,
-    SLID,
-    answer,
-    block,
-    heading,
-    is_warm,
-    miss_across,
-    own_block,
+    CONTACT_SLIDES,
+    CONTACT_STICKS,
+    CONTACT_UNSOLVED,
+    delassus_block,
+    diagonal_delassus_block,
+    friction_direction,
+    is_warm_start_valid,
     point_velocity,
-    turned,
+    rotate_direction,
+    sliding_residual,
+    solve_contact_block,
 )
 from physics.kernels.math import quaternion as qt
 
 # Newton steps at most. Two are usual at a tolerance of 1e-6.
-PAIR_LIMIT = 12
+_MAX_NEWTON_STEPS = 12
 
 # How often a contact is tried as one that holds, and both once more after one that was open has closed.
-HELD_LIMIT = 2
-OPENED_LIMIT = 1
+_MAX_STICK_TRIALS = 2
+_MAX_RECLOSURES = 1
 
 # How often contacts that none of that is true of answer each other in turn, and how many times each.
-IN_TURN_LIMIT = 2
-ANSWERS = 8
+_MAX_ALTERNATIONS = 2
+_SWEEPS_PER_ALTERNATION = 8
 
 
 @inlined
@@ -55,21 +55,21 @@ def _transposed(W):
 
 
 @kernel
-def _opened(Wi, Wji, bi, bj, mu, goal, x, y):
+def _solve_with_open(Wi, Wji, bi, bj, mu, goal, x, y):
     """Contact i alone, contact j open: (found, p_i, p_j, residual, direction of i, and of j, to go on from)."""
     zero = (0.0, 0.0, 0.0)
-    what, p, miss = answer(Wi, bi, mu, Wi[4] + Wi[8], goal, x, y, True)
+    what, p, miss = solve_contact_block(Wi, bi, mu, Wi[4] + Wi[8], goal, x, y, True)
     uj = _plus(bj, qt.matvec(Wji, p))
-    if what == SLID:
+    if what == CONTACT_SLIDES:
         x, y = p[1] / p[0], p[2] / p[0]
-    elif what == HELD:
-        x, y = heading(-p[1], -p[2], mu)
-    xj, yj = heading(uj[1], uj[2], mu)
-    return what != LOST and uj[0] >= -goal, p, zero, max(miss, -uj[0]), x, y, xj, yj
+    elif what == CONTACT_STICKS:
+        x, y = friction_direction(-p[1], -p[2], mu)
+    xj, yj = friction_direction(uj[1], uj[2], mu)
+    return what != CONTACT_UNSOLVED and uj[0] >= -goal, p, zero, max(miss, -uj[0]), x, y, xj, yj
 
 
 @kernel
-def _held(Wi, Wij, Wj, bi, bj, mu, goal, x, y):
+def _solve_with_sticking(Wi, Wij, Wj, bi, bj, mu, goal, x, y):
     """Contact i holds, j slides or opens: (found, p_i, p_j, residual, direction of i, and of j, to go on from)."""
     Wji = _transposed(Wij)
     k = (Wi[0], Wi[1], Wi[2], Wi[4], Wi[5], Wi[8])
@@ -84,23 +84,23 @@ def _held(Wi, Wij, Wj, bi, bj, mu, goal, x, y):
         Wj[6] - c0[2], Wj[7] - c1[2], Wj[8] - c2[2],
     )  # fmt: skip
     b = (bj[0] - ch[0], bj[1] - ch[1], bj[2] - ch[2])
-    what, pj, miss = answer(W, b, mu, Wj[4] + Wj[8], goal, x, y, False)
+    what, pj, miss = solve_contact_block(W, b, mu, Wj[4] + Wj[8], goal, x, y, False)
     pi = (
         -h[0] - (s0[0] * pj[0] + s1[0] * pj[1] + s2[0] * pj[2]),
         -h[1] - (s0[1] * pj[0] + s1[1] * pj[1] + s2[1] * pj[2]),
         -h[2] - (s0[2] * pj[0] + s1[2] * pj[1] + s2[2] * pj[2]),
     )
     holds = pi[0] >= 0.0 and pi[1] * pi[1] + pi[2] * pi[2] <= (mu * pi[0]) * (mu * pi[0])
-    found = what != LOST and holds
-    xi, yi = heading(-pi[1], -pi[2], mu)
-    if what == SLID:
+    found = what != CONTACT_UNSOLVED and holds
+    xi, yi = friction_direction(-pi[1], -pi[2], mu)
+    if what == CONTACT_SLIDES:
         x, y = pj[1] / pj[0], pj[2] / pj[0]
     return found, pi, pj, miss, xi, yi, x, y
 
 
 @inlined
-def _both_slide(W11, W12, W22, b1, b2, mu, x1, y1, x2, y2):
-    """Two contacts that slide in given directions: (p_1, p_2, misses, what `_turns` goes on with)."""
+def _solve_both_sliding(W11, W12, W22, b1, b2, mu, x1, y1, x2, y2):
+    """Two contacts that slide in given directions: (p_1, p_2, misses, what `_direction_newton_step` goes on with)."""
     a11, a12 = W11[0] + (W11[1] * x1 + W11[2] * y1), W12[0] + (W12[1] * x2 + W12[2] * y2)
     a21, a22 = W12[0] + (W12[3] * x1 + W12[6] * y1), W22[0] + (W22[1] * x2 + W22[2] * y2)
     s = 1.0 / (a11 * a22 - a12 * a21)
@@ -116,14 +116,14 @@ def _both_slide(W11, W12, W22, b1, b2, mu, x1, y1, x2, y2):
     along1, along2 = -(x1 * u1x + y1 * u1y), -(x2 * u2x + y2 * u2y)
     across1, across2 = y1 * u1x - x1 * u1y, y2 * u2x - x2 * u2y
     t = 1.0 / mu
-    miss1 = miss_across(t * across1, t * along1, p1 * mu * (W11[4] + W11[8]))
-    miss2 = miss_across(t * across2, t * along2, p2 * mu * (W22[4] + W22[8]))
+    miss1 = sliding_residual(t * across1, t * along1, p1 * mu * (W11[4] + W11[8]))
+    miss2 = sliding_residual(t * across2, t * along2, p2 * mu * (W22[4] + W22[8]))
     inverse = (s * a11, s * a12, s * a21, s * a22)
     return p1, p2, miss1, miss2, (inverse, g11, g12, g21, g22, along1, along2, across1, across2)
 
 
 @inlined
-def _turns(W11, W12, W22, x1, y1, x2, y2, p1, p2, sliding):
+def _direction_newton_step(W11, W12, W22, x1, y1, x2, y2, p1, p2, sliding):
     """Newton's step of both directions [rad]: turning direction 1 by dα changes (x1, y1) by (-y1, x1) dα."""
     inverse, g11, g12, g21, g22, along1, along2, across1, across2 = sliding
     a11, a12, a21, a22 = inverse
@@ -149,68 +149,72 @@ def _turns(W11, W12, W22, x1, y1, x2, y2, p1, p2, sliding):
 
 
 @kernel
-def _in_turn(W11, W12, W22, b1, b2, mu, goal, p, q, x1, y1, x2, y2):
+def _solve_alternately(W11, W12, W22, b1, b2, mu, goal, p, q, x1, y1, x2, y2):
     """Each contact answers the impulse of the other in turn, from impulses p and q on; then what it came to is tried.
 
     (found, p, q, residual, direction of the first, and of the second, to go on from). One of them was to hold or to
     open and does not, or turns right round: Newton's method would go on to where friction pushes it along.
     """
     W21, miss = _transposed(W12), 0.0
-    first = second = SLID
-    for _ in range(ANSWERS):
-        first, p, miss = answer(W11, _plus(b1, qt.matvec(W12, q)), mu, W11[4] + W11[8], goal, x1, y1, True)
+    first = second = CONTACT_SLIDES
+    for _ in range(_SWEEPS_PER_ALTERNATION):
+        first, p, miss = solve_contact_block(W11, _plus(b1, qt.matvec(W12, q)), mu, W11[4] + W11[8], goal, x1, y1, True)
         if p[0] > 0.0:
-            x1, y1 = heading(-p[1], -p[2], mu)
-        second, q, miss = answer(W22, _plus(b2, qt.matvec(W21, p)), mu, W22[4] + W22[8], goal, x2, y2, True)
+            x1, y1 = friction_direction(-p[1], -p[2], mu)
+        second, q, miss = solve_contact_block(
+            W22, _plus(b2, qt.matvec(W21, p)), mu, W22[4] + W22[8], goal, x2, y2, True
+        )
         if q[0] > 0.0:
-            x2, y2 = heading(-q[1], -q[2], mu)
+            x2, y2 = friction_direction(-q[1], -q[2], mu)
     found = False
-    if first == HELD and second == SLID:
-        found, p, q, miss, x1, y1, x2, y2 = _held(W11, W12, W22, b1, b2, mu, goal, x2, y2)
-    elif first == SLID and second == HELD:
-        found, q, p, miss, x2, y2, x1, y1 = _held(W22, W21, W11, b2, b1, mu, goal, x1, y1)
+    if first == CONTACT_STICKS and second == CONTACT_SLIDES:
+        found, p, q, miss, x1, y1, x2, y2 = _solve_with_sticking(W11, W12, W22, b1, b2, mu, goal, x2, y2)
+    elif first == CONTACT_SLIDES and second == CONTACT_STICKS:
+        found, q, p, miss, x2, y2, x1, y1 = _solve_with_sticking(W22, W21, W11, b2, b1, mu, goal, x1, y1)
     return found, p, q, miss, x1, y1, x2, y2
 
 
 @inlined
-def solve_two(W11, W12, W22, b1, b2, mu, goal, x1, y1, x2, y2):
+def solve_block_pair(W11, W12, W22, b1, b2, mu, goal, x1, y1, x2, y2):
     """Impulses of two contacts: (found, p_1, p_2, residual [m/s])."""
     W21 = _transposed(W12)
     held1 = held2 = opened = turns = 0
-    for _ in range(PAIR_LIMIT):
+    for _ in range(_MAX_NEWTON_STEPS):
         is_stuck = False
-        p1, p2, miss1, miss2, sliding = _both_slide(W11, W12, W22, b1, b2, mu, x1, y1, x2, y2)
+        p1, p2, miss1, miss2, sliding = _solve_both_sliding(W11, W12, W22, b1, b2, mu, x1, y1, x2, y2)
         worst, q1, q2 = max(miss1, miss2), (p1, p1 * x1, p1 * y1), (p2, p2 * x2, p2 * y2)
         if not (p1 >= 0.0 and p2 >= 0.0):
             if p1 >= p2:
-                found, q1, q2, worst, x1, y1, x2, y2 = _opened(W11, W21, b1, b2, mu, goal, x1, y1)
+                found, q1, q2, worst, x1, y1, x2, y2 = _solve_with_open(W11, W21, b1, b2, mu, goal, x1, y1)
             else:
-                found, q2, q1, worst, x2, y2, x1, y1 = _opened(W22, W12, b2, b1, mu, goal, x2, y2)
+                found, q2, q1, worst, x2, y2, x1, y1 = _solve_with_open(W22, W12, b2, b1, mu, goal, x2, y2)
             if found:
                 return True, q1, q2, worst
-            is_stuck, opened = opened >= OPENED_LIMIT, opened + 1  # the open one closes: once more with both
+            is_stuck, opened = opened >= _MAX_RECLOSURES, opened + 1  # the open one closes: once more with both
         elif worst <= goal:
             return True, q1, q2, worst
-        elif miss1 == math.inf and held1 < HELD_LIMIT:
+        elif miss1 == math.inf and held1 < _MAX_STICK_TRIALS:
             held1 += 1
-            found, q1, q2, worst, x1, y1, x2, y2 = _held(W11, W12, W22, b1, b2, mu, goal, x2, y2)
+            found, q1, q2, worst, x1, y1, x2, y2 = _solve_with_sticking(W11, W12, W22, b1, b2, mu, goal, x2, y2)
             if found:
                 return True, q1, q2, worst
-        elif miss2 == math.inf and held2 < HELD_LIMIT:
+        elif miss2 == math.inf and held2 < _MAX_STICK_TRIALS:
             held2 += 1
-            found, q2, q1, worst, x2, y2, x1, y1 = _held(W22, W21, W11, b2, b1, mu, goal, x1, y1)
+            found, q2, q1, worst, x2, y2, x1, y1 = _solve_with_sticking(W22, W21, W11, b2, b1, mu, goal, x1, y1)
             if found:
                 return True, q1, q2, worst
         elif worst == math.inf:
             is_stuck = True
         else:
-            turn1, turn2 = _turns(W11, W12, W22, x1, y1, x2, y2, p1, p2, sliding)
-            x1, y1 = turned(x1, y1, turn1)
-            x2, y2 = turned(x2, y2, turn2)
+            turn1, turn2 = _direction_newton_step(W11, W12, W22, x1, y1, x2, y2, p1, p2, sliding)
+            x1, y1 = rotate_direction(x1, y1, turn1)
+            x2, y2 = rotate_direction(x2, y2, turn2)
         if is_stuck:
-            if turns == IN_TURN_LIMIT:
+            if turns == _MAX_ALTERNATIONS:
                 break
-            found, q1, q2, worst, x1, y1, x2, y2 = _in_turn(W11, W12, W22, b1, b2, mu, goal, q1, q2, x1, y1, x2, y2)
+            found, q1, q2, worst, x1, y1, x2, y2 = _solve_alternately(
+                W11, W12, W22, b1, b2, mu, goal, q1, q2, x1, y1, x2, y2
+            )
             if found:
                 return True, q1, q2, worst
             held1, held2, turns = 0, 0, turns + 1
@@ -218,7 +222,7 @@ def solve_two(W11, W12, W22, b1, b2, mu, goal, x1, y1, x2, y2):
 
 
 @inlined
-def contact_at(i, axes, u, w, work):
+def contact_in_wall_frame(i, axes, u, w, work):
     """Coordinates of contact i, its velocity without impulses less its target, and its impulse so far.
 
     All (normal, tangents) in the stretched frame of the wall with these axes; u, w are the body's motion there. Without
@@ -233,21 +237,21 @@ def contact_at(i, axes, u, w, work):
 
 
 @inlined
-def solve_one(first, mu, goal, inv_mass, K, work):
-    """Impulse of a contact (see `contact_at`) that alone touches: (found, impulse, moment, residual [m/s])."""
+def solve_one_contact(first, mu, goal, inv_mass, K, work):
+    """Impulse of a single contact, of `contact_in_wall_frame`: (found, impulse, moment, residual [m/s])."""
     r, b, impulse = first
-    W = give_way(own_block(r, inv_mass, friction_ratio(work), K), work)
+    W = add_block_compliance(diagonal_delassus_block(r, inv_mass, friction_ratio(work), K), work)
     x = y = 0.0
     if mu > 0.0:
         f = qt.matvec(W, impulse)
-        if is_warm(f[0], -b[0]):
-            x, y = heading(b[1] + f[1], b[2] + f[2], mu)
-    what, p, miss = answer(W, b, mu, W[4] + W[8], goal, x, y, True)
-    return what != LOST, p, qt.cross(r, p), miss
+        if is_warm_start_valid(f[0], -b[0]):
+            x, y = friction_direction(b[1] + f[1], b[2] + f[2], mu)
+    what, p, miss = solve_contact_block(W, b, mu, W[4] + W[8], goal, x, y, True)
+    return what != CONTACT_UNSOLVED, p, qt.cross(r, p), miss
 
 
 @inlined
-def _pushed_apart(W11, W12, W22, b1, b2):
+def _frictionless_response(W11, W12, W22, b1, b2):
     """Changes of velocity, by impulses without friction, of two contacts that approach with b1 and b2 (< 0) [m/s]."""
     s = 1.0 / (W11[0] * W22[0] - W12[0] * W12[0])
     p1, p2 = s * (W12[0] * b2 - W22[0] * b1), s * (W12[0] * b1 - W11[0] * b2)
@@ -262,8 +266,8 @@ def _pushed_apart(W11, W12, W22, b1, b2):
 
 
 @inlined
-def solve_pair(first, second, mu, goal, inv_mass, K, work):
-    """Impulses of two contacts (see `contact_at`).
+def solve_two_contacts(first, second, mu, goal, inv_mass, K, work):
+    """Impulses of two contacts (see `contact_in_wall_frame`).
 
     Returns
     -------
@@ -277,15 +281,18 @@ def solve_pair(first, second, mu, goal, inv_mass, K, work):
     """
     (r, b1, f), (s, b2, g) = first, second
     ratio = friction_ratio(work)
-    W11, W22 = give_way(own_block(r, inv_mass, ratio, K), work), give_way(own_block(s, inv_mass, ratio, K), work)
-    W12 = block(r, s, inv_mass, ratio, K)
+    W11, W22 = (
+        add_block_compliance(diagonal_delassus_block(r, inv_mass, ratio, K), work),
+        add_block_compliance(diagonal_delassus_block(s, inv_mass, ratio, K), work),
+    )
+    W12 = delassus_block(r, s, inv_mass, ratio, K)
     x1 = y1 = x2 = y2 = 0.0
     if mu > 0.0:
         u1 = _plus(qt.matvec(W11, f), qt.matvec(W12, g))
         u2 = _plus(qt.matvec(W22, g), qt.matvec(_transposed(W12), f))
-        if not (is_warm(u1[0], -b1[0]) and is_warm(u2[0], -b2[0])):
-            u1, u2 = _pushed_apart(W11, W12, W22, b1[0], b2[0])
-        x1, y1 = heading(b1[1] + u1[1], b1[2] + u1[2], mu)
-        x2, y2 = heading(b2[1] + u2[1], b2[2] + u2[2], mu)
-    found, p, q, miss = solve_two(W11, W12, W22, b1, b2, mu, goal, x1, y1, x2, y2)
+        if not (is_warm_start_valid(u1[0], -b1[0]) and is_warm_start_valid(u2[0], -b2[0])):
+            u1, u2 = _frictionless_response(W11, W12, W22, b1[0], b2[0])
+        x1, y1 = friction_direction(b1[1] + u1[1], b1[2] + u1[2], mu)
+        x2, y2 = friction_direction(b2[1] + u2[1], b2[2] + u2[2], mu)
+    found, p, q, miss = solve_block_pair(W11, W12, W22, b1, b2, mu, goal, x1, y1, x2, y2)
     return found, p, q, _plus(qt.cross(r, p), qt.cross(s, q)), miss

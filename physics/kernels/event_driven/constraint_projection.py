@@ -3,33 +3,39 @@
 from __future__ import annotations
 
 from physics.kernels.compile.decorators import inlined, kernel
-from physics.kernels.event_driven.contact_forces import free_turning, list_unknowns, place, plus, turned_by, vector
-from physics.kernels.event_driven.force_system import solve_unknowns
+from physics.kernels.event_driven.contact_forces import (
+    apply_inverse_inertia,
+    assemble_unknowns,
+    free_angular_motion,
+    set_contact_kinematics,
+)
+from physics.kernels.event_driven.force_system import solve_contact_forces
 from physics.kernels.half_space.contact_point import wall_normal, wall_of
 from physics.kernels.math import quaternion as qt
-from physics.kernels.state.layout import OFFSET
+from physics.kernels.math.vector import plus, row_vector
+from physics.kernels.state.layout import WALL_OFFSET
 
 # Gaps and velocities of contacts below these shares of `motion.touch` and `motion.noise` are left as they are.
-UNSEEN_GAP = 0.1
-UNSEEN_SPEED = 0.01
+_UNSEEN_GAP = 0.1
+_UNSEEN_SPEED = 0.01
 
 
 @inlined
-def _push_along(holding, P, work, motion):
+def _projection_step(holding, P, work, motion):
     """Velocity and turn, both per kinetic metric, that take off `goal` along the rows of the regime."""
-    k = list_unknowns(0.0, holding, work, motion)
-    F, T = solve_unknowns(k, P, work, motion)
+    k = assemble_unknowns(0.0, holding, work, motion)
+    F, T = solve_contact_forces(k, P, work, motion)
     s = 1.0 / work.mass
     return (s * F[0], s * F[1], s * F[2]), T
 
 
 @inlined
-def _speed_goals(motion, work):
+def _set_velocity_errors(motion, work):
     """`goal`: the velocities of the contacts that act; the largest that the regime does not allow [m/s]."""
     worst = 0.0
     for j in range(motion.count):
         n = wall_normal(work.walls, wall_of(motion.slot[j], work))
-        u = vector(motion.velocity, j)
+        u = row_vector(motion.velocity, j, 0)
         worst = max(worst, abs(qt.dot(n, u)))
         if motion.holds[j]:
             worst = max(worst, max(abs(u[0]), max(abs(u[1]), abs(u[2]))))
@@ -39,27 +45,27 @@ def _speed_goals(motion, work):
 
 
 @inlined
-def _cancel_speeds(holding, v, m, P, work, motion):
+def _project_velocities(holding, v, m, P, work, motion):
     """Velocity and angular momentum without the velocities of contacts that the regime does not allow (placed)."""
-    worst = _speed_goals(motion, work)
-    if not worst > UNSEEN_SPEED * motion.noise:
+    worst = _set_velocity_errors(motion, work)
+    if not worst > _UNSEEN_SPEED * motion.noise:
         return v, m
-    change, turn = _push_along(holding, P, work, motion)
+    change, turn = _projection_step(holding, P, work, motion)
     return plus(v, change), plus(m, turn)
 
 
 @kernel
-def cancel_normal_speeds(y, tilted, work, motion):
+def project_normal_speeds(y, tilted, work, motion):
     """State without the normal velocities of the contacts that act."""
     x, q, v, m = y
-    R, P, w, alpha = free_turning(y, tilted, work)
-    place(y, R, w, alpha, tilted, work, motion)
-    v, m = _cancel_speeds(False, v, m, P, work, motion)
+    R, P, w, alpha = free_angular_motion(y, tilted, work)
+    set_contact_kinematics(y, R, w, alpha, tilted, work, motion)
+    v, m = _project_velocities(False, v, m, P, work, motion)
     return x, q, v, m
 
 
 @kernel
-def cancel(y, tilted, work, motion):
+def project_state(y, tilted, work, motion):
     """State without the gaps and velocities of contacts that the regime does not allow, where above rounding.
 
     Least change in the kinetic metric: along M⁻¹ Jᵀ.
@@ -67,21 +73,21 @@ def cancel(y, tilted, work, motion):
     if motion.count == 0:
         return y
     x, q, v, m = y
-    R, P, w, alpha = free_turning(y, tilted, work)
-    place(y, R, w, alpha, tilted, work, motion)
+    R, P, w, alpha = free_angular_motion(y, tilted, work)
+    set_contact_kinematics(y, R, w, alpha, tilted, work, motion)
     worst = 0.0
     for j in range(motion.count):
         wall = wall_of(motion.slot[j], work)
         n = wall_normal(work.walls, wall)
-        gap = qt.dot(n, x) + qt.dot(n, vector(motion.arm, j)) - work.walls[wall, OFFSET]
+        gap = qt.dot(n, x) + qt.dot(n, row_vector(motion.arm, j, 0)) - work.walls[wall, WALL_OFFSET]
         worst = max(worst, abs(gap))
         for c in range(3):
             motion.goal[j, c] = gap * n[c]
-    if worst > UNSEEN_GAP * motion.touch:
-        move, turn = _push_along(False, P, work, motion)
+    if worst > _UNSEEN_GAP * motion.touch:
+        move, turn = _projection_step(False, P, work, motion)
         x = plus(x, move)
-        q = qt.normalise(qt.multiply(qt.exponential(turned_by(P, work.J, turn)), q))
-        R, P, w, alpha = free_turning((x, q, v, m), tilted, work)
-        place((x, q, v, m), R, w, alpha, tilted, work, motion)
-    v, m = _cancel_speeds(True, v, m, P, work, motion)
+        q = qt.normalise(qt.multiply(qt.exp_map(apply_inverse_inertia(P, work.J, turn)), q))
+        R, P, w, alpha = free_angular_motion((x, q, v, m), tilted, work)
+        set_contact_kinematics((x, q, v, m), R, w, alpha, tilted, work, motion)
+    v, m = _project_velocities(True, v, m, P, work, motion)
     return x, q, v, m

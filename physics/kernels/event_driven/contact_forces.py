@@ -28,51 +28,28 @@ from __future__ import annotations
 import math
 
 from physics.kernels.compile.decorators import inlined, kernel
-from physics.kernels.contact_law.anisotropic_friction import opposing
-from physics.kernels.half_space.contact_point import arm_and_rate, feature_of, wall_axes, wall_normal, wall_of
+from physics.kernels.contact_law.anisotropic_friction import sliding_direction
+from physics.kernels.half_space.contact_point import contact_arm_and_rate, feature_of, wall_axes, wall_normal, wall_of
 from physics.kernels.math import quaternion as qt
+from physics.kernels.math.vector import as_vector, plus, row_vector, times
 from physics.kernels.state.body import principal_attitude
 
 # Contacts of one wall from which on their normal forces are taken as affine.
-PATCH = 3
+MIN_PATCH_CONTACTS = 3
 
 # `motion.patch` of a contact whose normal force is an unknown of its own.
 NO_PATCH = -1
 
 
 @inlined
-def vector(a, k):
-    """Row k of an array (n, 3)."""
-    return (a[k, 0], a[k, 1], a[k, 2])
-
-
-@inlined
-def plus(a, b):
-    """a + b of vectors."""
-    return (a[0] + b[0], a[1] + b[1], a[2] + b[2])
-
-
-@inlined
-def times(s, a):
-    """s a of a vector."""
-    return (s * a[0], s * a[1], s * a[2])
-
-
-@inlined
-def load(work_field):
-    """A field (3,) of the workspace."""
-    return (work_field[0], work_field[1], work_field[2])
-
-
-@inlined
-def turned_by(P, J, h):
+def apply_inverse_inertia(P, J, h):
     """I⁻¹ h for the principal axes P and inverse moments J, world frame."""
     m = qt.transposed_matvec(P, h)
     return qt.matvec(P, (J[0] * m[0], J[1] * m[1], J[2] * m[2]))
 
 
 @kernel
-def free_turning(y, tilted, work):
+def free_angular_motion(y, tilted, work):
     """Body axes, principal axes, ω and the rate of change of ω without contact: (R, P, ω, I⁻¹(τ - ω x L))."""
     q, L = y[1], y[3]
     R = qt.to_matrix(q)
@@ -80,26 +57,26 @@ def free_turning(y, tilted, work):
     if tilted is not None:
         P = qt.to_matrix(principal_attitude(q, work, tilted))
     J = work.J
-    w = turned_by(P, J, L)
+    w = apply_inverse_inertia(P, J, L)
     g = qt.cross(w, L)
     t = work.torque
-    return R, P, w, turned_by(P, J, (t[0] - g[0], t[1] - g[1], t[2] - g[2]))
+    return R, P, w, apply_inverse_inertia(P, J, (t[0] - g[0], t[1] - g[1], t[2] - g[2]))
 
 
 @kernel
-def place(y, R, w, alpha, tilted, work, motion):
+def set_contact_kinematics(y, R, w, alpha, tilted, work, motion):
     """Arms, velocities, directions of sliding and free accelerations (`goal`) of the contacts that act."""
     shape, walls = work.shape, work.walls
-    dims, a, v = load(work.dims), load(work.free_acceleration), y[2]
+    dims, a, v = as_vector(work.dims), as_vector(work.free_acceleration), y[2]
     for j in range(motion.count):
         n = wall_normal(walls, wall_of(motion.slot[j], work))
-        r, rate = arm_and_rate(shape, dims, R, w, n, feature_of(motion.slot[j], work), tilted, work)
+        r, rate = contact_arm_and_rate(shape, dims, R, w, n, feature_of(motion.slot[j], work), tilted, work)
         u = plus(v, qt.cross(w, r))
         b = plus(plus(a, qt.cross(alpha, r)), qt.cross(w, rate))
         un = qt.dot(n, u)
         t = (u[0] - un * n[0], u[1] - un * n[1], u[2] - un * n[2])
         speed = math.sqrt(qt.dot(t, t))
-        d = vector(motion.reference, j)
+        d = row_vector(motion.reference, j, 0)
         if speed > motion.slow and qt.dot(t, d) > 0.0:
             d = times(1.0 / speed, t)
         for c in range(3):
@@ -108,7 +85,7 @@ def place(y, R, w, alpha, tilted, work, motion):
 
 
 @inlined
-def _add(m, r, push, row, share, motion):
+def _add_to_unknown(m, r, push, row, share, motion):
     """Add `share` of a contact at r to unknown m."""
     h, e = qt.cross(r, push), qt.cross(r, row)
     for c in range(3):
@@ -119,24 +96,24 @@ def _add(m, r, push, row, share, motion):
 
 
 @inlined
-def slide_push(mu, axes, j, work, motion):
+def sliding_force_direction(mu, axes, j, work, motion):
     """Force of contact j, which slides, for each newton along the normal."""
-    n, d = axes[0], opposing(vector(motion.way, j), axes, work)
+    n, d = axes[0], sliding_direction(row_vector(motion.way, j, 0), axes, work)
     return (n[0] - mu * d[0], n[1] - mu * d[1], n[2] - mu * d[2])
 
 
 @inlined
-def _push_of(mu, axes, j, work, motion):
+def _contact_force_direction(mu, axes, j, work, motion):
     """Force of contact j for each newton along the normal."""
     if motion.holds[j]:
         return axes[0]
-    return slide_push(mu, axes, j, work, motion)
+    return sliding_force_direction(mu, axes, j, work, motion)
 
 
 @inlined
 def _contact_force(normal, first, second, mu, axes, j, work, motion):
     """Force of contact j that presses with `normal` and, where it holds, has these along the other two axes."""
-    f = times(normal, _push_of(mu, axes, j, work, motion))
+    f = times(normal, _contact_force_direction(mu, axes, j, work, motion))
     if motion.holds[j]:
         f = plus(f, plus(times(first, axes[1]), times(second, axes[2])))
     return f
@@ -149,15 +126,15 @@ def _add_shares(mu, work, motion):
     if mu > 0.0:
         for j in range(motion.count):
             axes = wall_axes(work.walls, wall_of(motion.slot[j], work))
-            p = vector(motion.share, j)
+            p = row_vector(motion.share, j, 0)
             f = _contact_force(p[0], p[1], p[2], mu, axes, j, work, motion)
-            force, moment = plus(force, f), plus(moment, qt.cross(vector(motion.arm, j), f))
+            force, moment = plus(force, f), plus(moment, qt.cross(row_vector(motion.arm, j, 0), f))
     for c in range(3):
         motion.known[0, c], motion.known[1, c] = force[c], moment[c]
 
 
 @inlined
-def _clear(m, count, motion):
+def _clear_unknowns(m, count, motion):
     """Empty the unknowns m <= k < m + count."""
     for k in range(m, m + count):
         motion.asked[k] = 0.0
@@ -166,38 +143,38 @@ def _clear(m, count, motion):
 
 
 @kernel
-def _add_held(m, j, first_axis, axes, motion):
+def _add_sticking_unknowns(m, j, first_axis, axes, motion):
     """Unknowns of contact j from the axis `first_axis` on: the force along each."""
-    r, b = vector(motion.arm, j), vector(motion.goal, j)
+    r, b = row_vector(motion.arm, j, 0), row_vector(motion.goal, j, 0)
     motion.first[j] = m
-    _clear(m, 3 - first_axis, motion)
+    _clear_unknowns(m, 3 - first_axis, motion)
     for c in range(first_axis, 3):
-        _add(m, r, axes[c], axes[c], 1.0, motion)
+        _add_to_unknown(m, r, axes[c], axes[c], 1.0, motion)
         motion.asked[m] = -qt.dot(axes[c], b)
         m += 1
     return m
 
 
 @kernel
-def _add_patch(m, first, last, mu, axes, work, motion):
+def _add_patch_unknowns(m, first, last, mu, axes, work, motion):
     """Three unknowns of the normal forces of the contacts first <= j < last, those of one wall."""
-    _clear(m, 3, motion)
+    _clear_unknowns(m, 3, motion)
     radius = work.radius
     ca = cb = 0.0
     for j in range(first, last):
-        r = vector(motion.arm, j)
+        r = row_vector(motion.arm, j, 0)
         ca += qt.dot(axes[1], r) / (last - first)
         cb += qt.dot(axes[2], r) / (last - first)
     for j in range(first, last):
-        r, b = vector(motion.arm, j), -qt.dot(axes[0], vector(motion.goal, j))
-        push = _push_of(mu, axes, j, work, motion)
+        r, b = row_vector(motion.arm, j, 0), -qt.dot(axes[0], row_vector(motion.goal, j, 0))
+        push = _contact_force_direction(mu, axes, j, work, motion)
         s = (qt.dot(axes[1], r) - ca) / radius
         t = (qt.dot(axes[2], r) - cb) / radius
         motion.patch[j] = m
         motion.place[j, 0], motion.place[j, 1] = s, t
-        _add(m, r, push, axes[0], 1.0, motion)
-        _add(m + 1, r, push, axes[0], s, motion)
-        _add(m + 2, r, push, axes[0], t, motion)
+        _add_to_unknown(m, r, push, axes[0], 1.0, motion)
+        _add_to_unknown(m + 1, r, push, axes[0], s, motion)
+        _add_to_unknown(m + 2, r, push, axes[0], t, motion)
         motion.asked[m] += b
         motion.asked[m + 1] += s * b
         motion.asked[m + 2] += t * b
@@ -205,7 +182,7 @@ def _add_patch(m, first, last, mu, axes, work, motion):
 
 
 @kernel
-def list_unknowns(mu, holding, work, motion):
+def assemble_unknowns(mu, holding, work, motion):
     """Fill push, turn, row, row_turn, `known` and the right-hand sides (`asked`) from `goal`; their number.
 
     `holding`: contacts that hold do so along the wall, too.
@@ -223,16 +200,23 @@ def list_unknowns(mu, holding, work, motion):
             motion.patch[last] = NO_PATCH
             last += 1
         own = 0  # the first axis along which a contact that holds has a force of its own
-        if last - first >= PATCH:
-            m = _add_patch(m, first, last, mu, axes, work, motion)
+        if last - first >= MIN_PATCH_CONTACTS:
+            m = _add_patch_unknowns(m, first, last, mu, axes, work, motion)
             own = 1
         for j in range(first, last):
             if holding and motion.holds[j]:
-                m = _add_held(m, j, own, axes, motion)
+                m = _add_sticking_unknowns(m, j, own, axes, motion)
             elif own == 0:
-                _clear(m, 1, motion)
-                _add(m, vector(motion.arm, j), slide_push(mu, axes, j, work, motion), axes[0], 1.0, motion)
-                motion.asked[m] = -qt.dot(axes[0], vector(motion.goal, j))
+                _clear_unknowns(m, 1, motion)
+                _add_to_unknown(
+                    m,
+                    row_vector(motion.arm, j, 0),
+                    sliding_force_direction(mu, axes, j, work, motion),
+                    axes[0],
+                    1.0,
+                    motion,
+                )
+                motion.asked[m] = -qt.dot(axes[0], row_vector(motion.goal, j, 0))
                 motion.first[j] = m
                 m += 1
         first = last
@@ -240,11 +224,11 @@ def list_unknowns(mu, holding, work, motion):
 
 
 @kernel
-def spread(mu, work, motion):
+def recover_contact_forces(mu, work, motion):
     """Force of each contact that acts (`force`, `normal`) from the unknowns, and the shares where they are in it."""
     for j in range(motion.count):
         axes = wall_axes(work.walls, wall_of(motion.slot[j], work))
-        k, p, f = motion.first[j], motion.patch[j], vector(motion.share, j)
+        k, p, f = motion.first[j], motion.patch[j], row_vector(motion.share, j, 0)
         if not mu > 0.0:  # `_add_shares` leaves them out: the unknowns are all of the force
             f = (0.0, 0.0, 0.0)
         if p != NO_PATCH:
@@ -262,17 +246,17 @@ def spread(mu, work, motion):
 
 
 @inlined
-def forget_forces(motion):
+def clear_last_forces(motion):
     """No force is known from before."""
     for s in range(motion.last.shape[0]):
         motion.last[s, 0] = motion.last[s, 1] = motion.last[s, 2] = 0.0
 
 
 @kernel
-def keep_forces(work, motion):
+def store_last_forces(work, motion):
     """`last`: the forces of the contacts that act, none of all others."""
-    forget_forces(motion)
+    clear_last_forces(motion)
     for j in range(motion.count):
-        axes, f = wall_axes(work.walls, wall_of(motion.slot[j], work)), vector(motion.force, j)
+        axes, f = wall_axes(work.walls, wall_of(motion.slot[j], work)), row_vector(motion.force, j, 0)
         for c in range(3):
             motion.last[motion.slot[j], c] = qt.dot(axes[c], f)

@@ -14,30 +14,28 @@ of it.
 from __future__ import annotations
 
 from physics.kernels.compile.decorators import kernel
-from physics.kernels.event_driven.acceleration_problem import pose_resting
+from physics.kernels.event_driven.acceleration_problem import set_up_resting_problem
 from physics.kernels.event_driven.contact_candidates import (
-    ASKS,
-    ASKS_SLIDING,
-    COLLIDES,
-    FLIES,
-    MOVES,
-    closes,
+    MODE_CONTACT,
+    MODE_FLIGHT,
+    MODE_IMPACT,
+    MODE_UNDECIDED,
+    MODE_UNDECIDED_SLIDING,
     find_candidates,
-    sliding_now,
+    has_closing_contact,
+    is_candidate_sliding,
 )
-from physics.kernels.event_driven.contact_forces import (
-    free_turning,
-)
-from physics.kernels.event_driven.contact_mode_search import mixed_forces
+from physics.kernels.event_driven.contact_forces import free_angular_motion
+from physics.kernels.event_driven.contact_mode_search import search_contact_modes
 
 
 @kernel
-def find_regime(y, friction, tilted, work, motion):
+def find_contact_mode(y, friction, tilted, work, motion):
     """Find the regime at y and the contacts that act: (regime, number of candidates, acceleration, moment).
 
-    `ASKS`: none of the candidates slides, and the contact problem with this acceleration and moment, which is posed
-    in `work`, decides (`read_resting`). `ASKS_SLIDING`: some do, no mixture was found, and that problem decides for
-    them, too.
+    `MODE_UNDECIDED`: none of the candidates slides, and the contact problem with this acceleration and moment, which is
+    posed in `work`, decides (`read_resting`). `MODE_UNDECIDED_SLIDING`: some do, no mixture was found, and that problem
+    decides for them, too.
     """
     zero = (0.0, 0.0, 0.0)
     motion.count = 0
@@ -45,20 +43,20 @@ def find_regime(y, friction, tilted, work, motion):
     for s in range(motion.is_active.shape[0]):
         motion.is_active[s] = 0
     if approaches:
-        return COLLIDES, 0, zero, zero
+        return MODE_IMPACT, 0, zero, zero
     if count == 0:
-        return FLIES, 0, zero, zero
-    R, P, w, alpha = free_turning(y, tilted, work)
+        return MODE_FLIGHT, 0, zero, zero
+    R, P, w, alpha = free_angular_motion(y, tilted, work)
     slides = False
     if friction is not None:
         for i in range(count):
-            slides = sliding_now(i, y, R, w, tilted, work, motion) or slides
-    if not slides or not mixed_forces(count, y, R, P, w, alpha, tilted, work, motion):
+            slides = is_candidate_sliding(i, y, R, w, tilted, work, motion) or slides
+    if not slides or not search_contact_modes(count, y, R, P, w, alpha, tilted, work, motion):
         if slides:
             for i in range(count):
-                sliding_now(i, y, R, w, tilted, work, motion)
-        a, moment = pose_resting(count, y, R, w, slides, tilted, work, motion)
-        return (ASKS_SLIDING if slides else ASKS), count, a, moment
-    if closes(count, motion):
-        return COLLIDES, 0, zero, zero
-    return (MOVES if motion.count > 0 else FLIES), count, zero, zero
+                is_candidate_sliding(i, y, R, w, tilted, work, motion)
+        a, moment = set_up_resting_problem(count, y, R, w, slides, tilted, work, motion)
+        return (MODE_UNDECIDED_SLIDING if slides else MODE_UNDECIDED), count, a, moment
+    if has_closing_contact(count, motion):
+        return MODE_IMPACT, 0, zero, zero
+    return (MODE_CONTACT if motion.count > 0 else MODE_FLIGHT), count, zero, zero

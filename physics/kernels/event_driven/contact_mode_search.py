@@ -5,67 +5,65 @@ from __future__ import annotations
 import math
 
 from physics.kernels.compile.decorators import inlined, kernel
-from physics.kernels.contact_law.anisotropic_friction import eased
+from physics.kernels.contact_law.anisotropic_friction import unstretch_force
 from physics.kernels.event_driven.contact_candidates import (
-    HELD,
-    OPEN,
-    SLIDING,
-    act,
+    CANDIDATE_OPEN,
+    CANDIDATE_SLIDING,
+    CANDIDATE_STICKING,
+    activate_candidates,
     contact_acceleration,
-    sliding_now,
+    is_candidate_sliding,
 )
 from physics.kernels.event_driven.contact_forces import (
-    forget_forces,
-    list_unknowns,
-    load,
-    place,
-    plus,
-    spread,
-    turned_by,
-    vector,
+    apply_inverse_inertia,
+    assemble_unknowns,
+    clear_last_forces,
+    recover_contact_forces,
+    set_contact_kinematics,
 )
-from physics.kernels.event_driven.force_system import solve_unknowns
+from physics.kernels.event_driven.force_system import solve_contact_forces
 from physics.kernels.event_driven.guards import cone_excess
 from physics.kernels.half_space.contact_point import wall_axes, wall_of
 from physics.kernels.math import quaternion as qt
+from physics.kernels.math.vector import as_vector, plus, row_vector
 
 # Accelerations and forces of an exact trial below this share of the largest free ones are zero.
-SMALL_EXACT = 1.0e-11
+_EXACT_ZERO_SHARE = 1.0e-11
 
 # Trials of a mixture, and how often one contact may change in them.
-TRIALS = 60
-CHANGES = 6
+_MAX_MODE_TRIALS = 60
+_MAX_MODE_CHANGES = 6
 
 # Directions of sliding from rest are found when they no longer change by more than this.
-SAME_WAY = 1.0e-9
+_SAME_DIRECTION = 1.0e-9
 
 
 @kernel
-def _change_one(count, y, R, w, a, alpha, scale, tilted, work, motion):
+def _worst_violation(count, y, R, w, a, alpha, scale, tilted, work, motion):
     """The change that a trial asks for most: (candidate, its new kind), -1 when all conditions hold."""
-    weight = SMALL_EXACT * work.mass * scale
+    weight = _EXACT_ZERO_SHARE * work.mass * scale
     k = worst = 0
-    which, kind = -1, OPEN
+    which, kind = -1, CANDIDATE_OPEN
     deepest = -weight
     for i in range(count):
-        if motion.kind[i] != OPEN:
+        if motion.kind[i] != CANDIDATE_OPEN:
             if motion.normal[k] < deepest:
                 deepest, which = motion.normal[k], i
             k += 1
     if which >= 0:
-        return which, OPEN
+        return which, CANDIDATE_OPEN
     k = 0
     most = weight
     for i in range(count):
-        if motion.kind[i] != OPEN:
-            if motion.kind[i] == HELD:
+        if motion.kind[i] != CANDIDATE_OPEN:
+            if motion.kind[i] == CANDIDATE_STICKING:
                 excess = cone_excess(k, work, motion)
                 if excess > most:
-                    most, which, worst, kind = excess, i, k, SLIDING
+                    most, which, worst, kind = excess, i, k, CANDIDATE_SLIDING
             k += 1
     if which >= 0:
         axes = wall_axes(work.walls, wall_of(motion.candidate[which], work))
-        n, f = axes[0], eased(eased(vector(motion.force, worst), axes, work), axes, work)
+        n, f = axes[0], unstretch_force(unstretch_force(row_vector(motion.force, worst, 0), axes, work), axes, work)
         fn = qt.dot(n, f)
         t = (fn * n[0] - f[0], fn * n[1] - f[1], fn * n[2] - f[2])
         size = math.sqrt(qt.dot(t, t))
@@ -76,22 +74,22 @@ def _change_one(count, y, R, w, a, alpha, scale, tilted, work, motion):
         return which, kind
     for i in range(count):
         an, at = contact_acceleration(i, y, R, w, a, alpha, tilted, work, motion)
-        if motion.kind[i] == OPEN and an < -SMALL_EXACT * scale:
-            return i, SLIDING if motion.is_fresh[i] == 0 else HELD
-        if motion.kind[i] == SLIDING and motion.is_fresh[i]:
+        if motion.kind[i] == CANDIDATE_OPEN and an < -_EXACT_ZERO_SHARE * scale:
+            return i, CANDIDATE_SLIDING if motion.is_fresh[i] == 0 else CANDIDATE_STICKING
+        if motion.kind[i] == CANDIDATE_SLIDING and motion.is_fresh[i]:
             size = math.sqrt(qt.dot(at, at))
-            along = qt.dot(at, vector(motion.candidate_way, i))
+            along = qt.dot(at, row_vector(motion.candidate_way, i, 0))
             if along < 0.0:
-                return i, HELD
-            if size > SMALL_EXACT * scale and size - along > 0.5 * SAME_WAY * size:
+                return i, CANDIDATE_STICKING
+            if size > _EXACT_ZERO_SHARE * scale and size - along > 0.5 * _SAME_DIRECTION * size:
                 for c in range(3):
                     motion.candidate_way[i, c] = at[c] / size
-                return i, SLIDING
-    return -1, OPEN
+                return i, CANDIDATE_SLIDING
+    return -1, CANDIDATE_OPEN
 
 
 @inlined
-def has_last(motion):
+def has_last_forces(motion):
     """True if any force is known from before."""
     for s in range(motion.last.shape[0]):
         if motion.last[s, 0] != 0.0:
@@ -100,44 +98,44 @@ def has_last(motion):
 
 
 @kernel
-def try_mixtures(count, y, R, P, w, alpha_free, tilted, work, motion):
-    """`mixed_forces` with the last forces as they are."""
+def search_modes_once(count, y, R, P, w, alpha_free, tilted, work, motion):
+    """`search_contact_modes` with the last forces as they are."""
     scale = work.acceleration + work.radius * qt.dot(w, w)
     for i in range(count):
         motion.is_fresh[i] = motion.changes[i] = 0
-        motion.kind[i] = SLIDING
-        if not sliding_now(i, y, R, w, tilted, work, motion):
+        motion.kind[i] = CANDIDATE_SLIDING
+        if not is_candidate_sliding(i, y, R, w, tilted, work, motion):
             motion.is_fresh[i] = 1
             if work.mu > 0.0:
-                motion.kind[i] = HELD
-    f = load(work.free_acceleration)
-    for _ in range(TRIALS):
-        act(count, work, motion)
-        place(y, R, w, alpha_free, tilted, work, motion)
-        m = list_unknowns(work.mu, True, work, motion)
-        F, T = solve_unknowns(m, P, work, motion)
-        spread(work.mu, work, motion)
-        turn = turned_by(P, work.J, T)
+                motion.kind[i] = CANDIDATE_STICKING
+    f = as_vector(work.free_acceleration)
+    for _ in range(_MAX_MODE_TRIALS):
+        activate_candidates(count, work, motion)
+        set_contact_kinematics(y, R, w, alpha_free, tilted, work, motion)
+        m = assemble_unknowns(work.mu, True, work, motion)
+        F, T = solve_contact_forces(m, P, work, motion)
+        recover_contact_forces(work.mu, work, motion)
+        turn = apply_inverse_inertia(P, work.J, T)
         s = 1.0 / work.mass
         a = (f[0] + s * F[0], f[1] + s * F[1], f[2] + s * F[2])
         alpha = plus(alpha_free, turn)
-        which, kind = _change_one(count, y, R, w, a, alpha, scale, tilted, work, motion)
+        which, kind = _worst_violation(count, y, R, w, a, alpha, scale, tilted, work, motion)
         if which < 0:
             return True
         if kind != motion.kind[which]:
             motion.changes[which] += 1
-            if motion.changes[which] > CHANGES:
+            if motion.changes[which] > _MAX_MODE_CHANGES:
                 return False
         motion.kind[which] = kind
     return False
 
 
 @kernel
-def mixed_forces(count, y, R, P, w, alpha_free, tilted, work, motion):
+def search_contact_modes(count, y, R, P, w, alpha_free, tilted, work, motion):
     """Kinds of the candidates when some of them slide; whether they were found, with the last forces or without."""
-    if try_mixtures(count, y, R, P, w, alpha_free, tilted, work, motion):
+    if search_modes_once(count, y, R, P, w, alpha_free, tilted, work, motion):
         return True
-    if not has_last(motion):
+    if not has_last_forces(motion):
         return False
-    forget_forces(motion)
-    return try_mixtures(count, y, R, P, w, alpha_free, tilted, work, motion)
+    clear_last_forces(motion)
+    return search_modes_once(count, y, R, P, w, alpha_free, tilted, work, motion)

@@ -9,31 +9,31 @@ from __future__ import annotations
 import math
 
 from physics.kernels.compile.decorators import inlined, kernel
-from physics.kernels.event_driven.contact_forces import spread
-from physics.kernels.event_driven.extrapolated_midpoint import find_rate
-from physics.kernels.event_driven.guards import MARGIN, cone_excess
-from physics.kernels.event_driven.workspace import END, NOW, SIZE, START
+from physics.kernels.event_driven.contact_forces import recover_contact_forces
+from physics.kernels.event_driven.extrapolated_midpoint import compute_state_rate
+from physics.kernels.event_driven.guards import FORCE_MARGIN_TOLERANCE, cone_excess
+from physics.kernels.event_driven.workspace import ROW_CURRENT, ROW_END, ROW_START, Y_SIZE
 
 # Rows of `motion.margin`: margins at both ends of a step, and a moment inside of it.
-INSIDE = 2
+_INSIDE_ROW = 2
 
 # That moment, in steps.
-MOMENT = 1.0e-4
+_PROBE_SHARE = 1.0e-4
 
 # A cubic is believed but for this share of the larger margin at its ends, and these need be no better known than this.
 # Its lowest point is looked at where it is no nearer to an end of the step than BESIDE of it.
-DOUBT = 0.1
-UNSEEN = 100.0 * MARGIN
-BESIDE = 0.02
+_CUBIC_DOUBT = 0.1
+_UNSEEN_MARGIN = 100.0 * FORCE_MARGIN_TOLERANCE
+_END_ZONE = 0.02
 
 # Rules after which a step is known to be that of forces which do not change.
-CONSTANT = 2
+_CONSTANT_FORCE_RULES = 2
 
 
 @kernel
-def note_margins(row, work, motion):
+def store_force_margins(row, work, motion):
     """Margins of push and cone of the contacts that act, from the unknowns, into a row of `margin` [weights]."""
-    spread(work.mu, work, motion)
+    recover_contact_forces(work.mu, work, motion)
     for j in range(motion.count):
         motion.margin[row, 0, j] = motion.normal[j] / motion.weight
         motion.margin[row, 1, j] = math.inf
@@ -42,16 +42,16 @@ def note_margins(row, work, motion):
 
 
 @inlined
-def _look_inside(row, t, moment, tilted, work, motion):
+def _probe_margins(row, t, moment, tilted, work, motion):
     """Margins `moment` after a row of `y` at the time t, of the rate of change `rate`, into INSIDE."""
-    for c in range(SIZE):
-        motion.y[NOW, c] = motion.y[row, c] + moment * motion.rate[c]
-    find_rate(NOW, t + moment, tilted, work, motion)
-    note_margins(INSIDE, work, motion)
+    for c in range(Y_SIZE):
+        motion.y[ROW_CURRENT, c] = motion.y[row, c] + moment * motion.rate[c]
+    compute_state_rate(ROW_CURRENT, t + moment, tilted, work, motion)
+    store_force_margins(_INSIDE_ROW, work, motion)
 
 
 @inlined
-def _lowest(low, fall, high, rise, h):
+def _cubic_interior_minimum(low, fall, high, rise, h):
     """Lowest point within h of a cubic that begins at `low` and falls, and ends at `high` and rises: (time, value)."""
     c = (3.0 * (high - low) / h - 2.0 * fall - rise) / h
     k = (fall + rise - 2.0 * (high - low) / h) / (h * h)
@@ -60,39 +60,45 @@ def _lowest(low, fall, high, rise, h):
 
 
 @kernel
-def find_dip(h, used, tilted, work, motion):
+def find_force_minimum(h, used, tilted, work, motion):
     """The time within the step of h to END at which a margin of force may be used up, h where there is none.
 
     What is known of the start of the step is in START of `margin`; forces, rates and unknowns are those of END.
     """
-    if motion.count == 0 or used <= CONSTANT or not motion.weight > 0.0:
+    if motion.count == 0 or used <= _CONSTANT_FORCE_RULES or not motion.weight > 0.0:
         return h
-    moment = MOMENT * h
+    moment = _PROBE_SHARE * h
     falls = False
-    note_margins(END, work, motion)
-    for c in range(SIZE):
+    store_force_margins(ROW_END, work, motion)
+    for c in range(Y_SIZE):
         motion.last_rate[c], motion.rate[c] = motion.rate[c], motion.first_rate[c]
-    _look_inside(START, 0.0, moment, tilted, work, motion)
+    _probe_margins(ROW_START, 0.0, moment, tilted, work, motion)
     for sort in range(2):
         for j in range(motion.count):
-            motion.fall[sort, j] = (motion.margin[INSIDE, sort, j] - motion.margin[START, sort, j]) / moment
+            motion.fall[sort, j] = (motion.margin[_INSIDE_ROW, sort, j] - motion.margin[ROW_START, sort, j]) / moment
             falls = falls or motion.fall[sort, j] < 0.0
     first = h
     if falls:
-        for c in range(SIZE):
+        for c in range(Y_SIZE):
             motion.rate[c] = motion.last_rate[c]
-        _look_inside(END, h, -moment, tilted, work, motion)
+        _probe_margins(ROW_END, h, -moment, tilted, work, motion)
         for sort in range(2):
             for j in range(motion.count):
-                low, high, fall = motion.margin[START, sort, j], motion.margin[END, sort, j], motion.fall[sort, j]
-                rise = (high - motion.margin[INSIDE, sort, j]) / moment
-                if not (fall < 0.0 < rise and max(low, high) > UNSEEN and max(low, high) < math.inf):
+                low, high, fall = (
+                    motion.margin[ROW_START, sort, j],
+                    motion.margin[ROW_END, sort, j],
+                    motion.fall[sort, j],
+                )
+                rise = (high - motion.margin[_INSIDE_ROW, sort, j]) / moment
+                if not (fall < 0.0 < rise and max(low, high) > _UNSEEN_MARGIN and max(low, high) < math.inf):
                     continue
-                t, value = _lowest(low, fall, high, rise, h)
-                if value < DOUBT * max(low, high) and (value < -MARGIN or BESIDE * h < t < h - BESIDE * h):
+                t, value = _cubic_interior_minimum(low, fall, high, rise, h)
+                if value < _CUBIC_DOUBT * max(low, high) and (
+                    value < -FORCE_MARGIN_TOLERANCE or _END_ZONE * h < t < h - _END_ZONE * h
+                ):
                     first = min(first, t)
     if not 0.0 < first < h:
         first = h
-        find_rate(END, h, tilted, work, motion)
-        spread(work.mu, work, motion)
+        compute_state_rate(ROW_END, h, tilted, work, motion)
+        recover_contact_forces(work.mu, work, motion)
     return first

@@ -4,20 +4,18 @@ from __future__ import annotations
 
 from physics.kernels.compile.decorators import kernel
 from physics.kernels.event_driven.contact_forces import (
-    free_turning,
-    list_unknowns,
-    place,
-    plus,
-    times,
-    turned_by,
-    vector,
+    apply_inverse_inertia,
+    assemble_unknowns,
+    free_angular_motion,
+    set_contact_kinematics,
 )
-from physics.kernels.event_driven.slip_onset import turn_to_slip
+from physics.kernels.event_driven.slip_onset import set_slip_onset_direction
 from physics.kernels.math import quaternion as qt
-from physics.kernels.math.full_pivot_solve import eliminate, solve_least
+from physics.kernels.math.full_pivot_solve import solve_full_pivot, solve_least_norm
+from physics.kernels.math.vector import plus, row_vector, times
 
 # A pivot of less than this share of the largest may be that of a row which says what others say.
-DOUBTFUL = 1.0e-7
+_DOUBTFUL_PIVOT = 1.0e-7
 
 
 @kernel
@@ -25,9 +23,9 @@ def _set_metric(m, P, work, motion):
     """`matrix`: what the rows would have to do with each other if all pushed along themselves; right-hand side 0."""
     inv_mass, J, A = 1.0 / work.mass, work.J, motion.matrix
     for k in range(m):
-        F, g = vector(motion.row, k), turned_by(P, J, vector(motion.row_turn, k))
+        F, g = row_vector(motion.row, k, 0), apply_inverse_inertia(P, J, row_vector(motion.row_turn, k, 0))
         for l in range(m):
-            A[l, k] = inv_mass * qt.dot(vector(motion.row, l), F) + qt.dot(vector(motion.row_turn, l), g)
+            A[l, k] = inv_mass * qt.dot(row_vector(motion.row, l, 0), F) + qt.dot(row_vector(motion.row_turn, l, 0), g)
         A[k, m] = 0.0
 
 
@@ -38,7 +36,7 @@ def _choose_rows(m, P, work, motion):
     Of a symmetric matrix without negative directions the largest entry is on the diagonal: columns of pivots are rows.
     """
     _set_metric(m, P, work, motion)
-    rank, _ = eliminate(m, motion.matrix, motion.chosen, motion.unknown)
+    rank, _ = solve_full_pivot(m, motion.matrix, motion.chosen, motion.unknown)
     return rank
 
 
@@ -46,20 +44,20 @@ def _choose_rows(m, P, work, motion):
 def _set_rows(rows, m, P, work, motion):
     """`matrix`: the `rows` chosen equations of the m unknowns."""
     inv_mass, J, A = 1.0 / work.mass, work.J, motion.matrix
-    F, g = vector(motion.known, 0), turned_by(P, J, vector(motion.known, 1))
+    F, g = row_vector(motion.known, 0, 0), apply_inverse_inertia(P, J, row_vector(motion.known, 1, 0))
     for i in range(rows):
         l = motion.chosen[i]
         A[i, m] = motion.asked[l]
-        A[i, m] -= inv_mass * qt.dot(vector(motion.row, l), F) + qt.dot(vector(motion.row_turn, l), g)
+        A[i, m] -= inv_mass * qt.dot(row_vector(motion.row, l, 0), F) + qt.dot(row_vector(motion.row_turn, l, 0), g)
     for k in range(m):
-        F, g = vector(motion.push, k), turned_by(P, J, vector(motion.turn, k))
+        F, g = row_vector(motion.push, k, 0), apply_inverse_inertia(P, J, row_vector(motion.turn, k, 0))
         for i in range(rows):
             l = motion.chosen[i]
-            A[i, k] = inv_mass * qt.dot(vector(motion.row, l), F) + qt.dot(vector(motion.row_turn, l), g)
+            A[i, k] = inv_mass * qt.dot(row_vector(motion.row, l, 0), F) + qt.dot(row_vector(motion.row_turn, l, 0), g)
 
 
 @kernel
-def solve_unknowns(m, P, work, motion):
+def solve_contact_forces(m, P, work, motion):
     """Solve for the m unknowns, those that add least to the shares; total force and moment of the contacts.
 
     Contacts can say the same of the body's motion twice. Where each pushes along its row the matrix shows it: what a
@@ -70,31 +68,31 @@ def solve_unknowns(m, P, work, motion):
     for k in range(m):
         motion.chosen[k] = k
     _set_rows(m, m, P, work, motion)
-    rank, least = eliminate(m, motion.matrix, motion.order, motion.unknown)
-    if rank < m or (motion.is_skew and least < DOUBTFUL):
+    rank, least = solve_full_pivot(m, motion.matrix, motion.order, motion.unknown)
+    if rank < m or (motion.is_skew and least < _DOUBTFUL_PIVOT):
         rows = _choose_rows(m, P, work, motion)
         _set_rows(rows, m, P, work, motion)
         if rows < m:
-            solve_least(rows, m, motion.matrix, motion.unknown)
+            solve_least_norm(rows, m, motion.matrix, motion.unknown)
         else:
-            eliminate(m, motion.matrix, motion.order, motion.unknown)
-    force, moment = vector(motion.known, 0), vector(motion.known, 1)
+            solve_full_pivot(m, motion.matrix, motion.order, motion.unknown)
+    force, moment = row_vector(motion.known, 0, 0), row_vector(motion.known, 1, 0)
     for k in range(m):
         s = motion.unknown[k]
-        force = plus(force, times(s, vector(motion.push, k)))
-        moment = plus(moment, times(s, vector(motion.turn, k)))
+        force = plus(force, times(s, row_vector(motion.push, k, 0)))
+        moment = plus(moment, times(s, row_vector(motion.turn, k, 0)))
     return force, moment
 
 
 @kernel
-def regime_forces(y, tilted, work, motion):
+def solve_mode_forces(y, tilted, work, motion):
     """Forces of the regime at y: (total force, total moment, ω, dω/dt without contact, principal axes)."""
-    R, P, w, alpha = free_turning(y, tilted, work)
+    R, P, w, alpha = free_angular_motion(y, tilted, work)
     zero = (0.0, 0.0, 0.0)
     if motion.count == 0:
         return zero, zero, w, alpha, P
-    place(y, R, w, alpha, tilted, work, motion)
-    turn_to_slip(P, work, motion)
-    m = list_unknowns(work.mu, True, work, motion)
-    force, moment = solve_unknowns(m, P, work, motion)
+    set_contact_kinematics(y, R, w, alpha, tilted, work, motion)
+    set_slip_onset_direction(P, work, motion)
+    m = assemble_unknowns(work.mu, True, work, motion)
+    force, moment = solve_contact_forces(m, P, work, motion)
     return force, moment, w, alpha, P

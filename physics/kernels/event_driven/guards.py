@@ -18,10 +18,10 @@ from __future__ import annotations
 import math
 
 from physics.kernels.compile.decorators import inlined, kernel
-from physics.kernels.contact_law.anisotropic_friction import eased
-from physics.kernels.event_driven.contact_forces import NO_PATCH, free_turning, load, spread, vector
-from physics.kernels.event_driven.extrapolated_midpoint import find_rate, get_state, sliding_velocity
-from physics.kernels.event_driven.workspace import END, START, V
+from physics.kernels.contact_law.anisotropic_friction import unstretch_force
+from physics.kernels.event_driven.contact_forces import NO_PATCH, free_angular_motion, recover_contact_forces
+from physics.kernels.event_driven.extrapolated_midpoint import compute_state_rate, get_state_row, sliding_velocity
+from physics.kernels.event_driven.workspace import ROW_END, ROW_START, Y_VELOCITY
 from physics.kernels.half_space import support_function as geo
 from physics.kernels.half_space.contact_point import (
     center_arm,
@@ -32,27 +32,28 @@ from physics.kernels.half_space.contact_point import (
     wall_of,
 )
 from physics.kernels.math import quaternion as qt
-from physics.kernels.state.layout import BLOCK, OFFSET, VERTEX_COUNT
+from physics.kernels.math.vector import as_vector, row_vector
+from physics.kernels.state.layout import BLOCK, VERTEX_COUNT, WALL_OFFSET
 
-NO_GUARD, GAP, PUSH, CONE, SPEED, LOAD, NO_STEP, WATCH = range(8)
+GUARD_NONE, GUARD_GAP, GUARD_PUSH, GUARD_CONE, GUARD_SPEED, GUARD_LOAD, GUARD_STEP_FAILED, GUARD_WATCH = range(8)
 
 # Guards of force.
-FORCES = (PUSH, CONE, LOAD)
+FORCE_GUARDS = (GUARD_PUSH, GUARD_CONE, GUARD_LOAD)
 
 # Forces of this many weights are rounding: a push or a cone is given up only when it is missed by more.
-MARGIN = 1.0e-9
+FORCE_MARGIN_TOLERANCE = 1.0e-9
 
 
 @kernel
-def look_around(row, tilted, work, motion):
+def compute_feature_gaps(row, tilted, work, motion):
     """Gaps and their rates of all features into column `row` of `gap`; of a wall out of reach infinite."""
-    x, q, v, m = get_state(motion, row)
-    R, _, w, _ = free_turning((x, q, v, m), tilted, work)
-    dims, features, shape = load(work.dims), work.features, work.shape
+    x, q, v, m = get_state_row(motion, row)
+    R, _, w, _ = free_angular_motion((x, q, v, m), tilted, work)
+    dims, features, shape = as_vector(work.dims), work.features, work.shape
     center = geometric_center(x, R, work, tilted)
     for k in range(work.walls.shape[0]):
         n = wall_normal(work.walls, k)
-        d = qt.dot(n, center) - work.walls[k, OFFSET]
+        d = qt.dot(n, center) - work.walls[k, WALL_OFFSET]
         if d > 2.0 * work.radius:
             for feature in range(features):
                 motion.gap[row, k * features + feature] = math.inf
@@ -73,7 +74,7 @@ def look_around(row, tilted, work, motion):
 
 
 @inlined
-def lowest(g0, r0, g1, r1, h):
+def cubic_minimum(g0, r0, g1, r1, h):
     """Smallest value on (0, h] of the cubic with these values and slopes at 0 and h."""
     low = g1
     if r0 < 0.0 and r1 > 0.0 and g0 < math.inf:
@@ -89,7 +90,7 @@ def lowest(g0, r0, g1, r1, h):
 
 
 @inlined
-def gap_margin(h, work, motion):
+def least_gap_margin(h, work, motion):
     """Smallest gap of the features that do not act [m] over a step of h.
 
     Of one that leaves: what it is above where it left, so that a bounce does not end deeper, and gain by it. Of one
@@ -97,15 +98,15 @@ def gap_margin(h, work, motion):
     """
     least, which = math.inf, -1
     for s in range(motion.is_active.shape[0]):
-        if motion.is_active[s] or motion.gap[END, s] == math.inf:
+        if motion.is_active[s] or motion.gap[ROW_END, s] == math.inf:
             continue
-        g0, g1 = motion.gap[START, s], motion.gap[END, s]
-        if g0 <= motion.touch and motion.gap_rate[START, s] > motion.still:
+        g0, g1 = motion.gap[ROW_START, s], motion.gap[ROW_END, s]
+        if g0 <= motion.touch and motion.gap_rate[ROW_START, s] > motion.still:
             low = g1 - g0
         elif g0 <= motion.touch:
             low = g1 - min(g0, 0.0) + motion.touch
         else:
-            low = lowest(g0, motion.gap_rate[START, s], g1, motion.gap_rate[END, s], h)
+            low = cubic_minimum(g0, motion.gap_rate[ROW_START, s], g1, motion.gap_rate[ROW_END, s], h)
         if low < least:
             least, which = low, s
     return least, which
@@ -115,7 +116,7 @@ def gap_margin(h, work, motion):
 def _cone_excess(j, mu, work, motion):
     """Tangential force of contact j less μ times its push [N]."""
     axes = wall_axes(work.walls, wall_of(motion.slot[j], work))
-    n, f = axes[0], eased(vector(motion.force, j), axes, work)
+    n, f = axes[0], unstretch_force(row_vector(motion.force, j, 0), axes, work)
     p = motion.normal[j]
     return math.sqrt(max(0.0, qt.dot(f, f) - qt.dot(n, f) * qt.dot(n, f))) - mu * p
 
@@ -124,12 +125,15 @@ def _cone_excess(j, mu, work, motion):
 def _pair_excess(i, j, mu, work, motion):
     """The same of two contacts on one wall, whatever they share of the force along their line [N]."""
     axes = wall_axes(work.walls, wall_of(motion.slot[i], work))
-    a, b = vector(motion.arm, i), vector(motion.arm, j)
-    e = eased((b[0] - a[0], b[1] - a[1], b[2] - a[2]), axes, work)
+    a, b = row_vector(motion.arm, i, 0), row_vector(motion.arm, j, 0)
+    e = unstretch_force((b[0] - a[0], b[1] - a[1], b[2] - a[2]), axes, work)
     s = 1.0 / math.sqrt(qt.dot(e, e))
     e = (s * e[0], s * e[1], s * e[2])
     across = qt.cross(axes[0], e)
-    f, g = eased(vector(motion.force, i), axes, work), eased(vector(motion.force, j), axes, work)
+    f, g = (
+        unstretch_force(row_vector(motion.force, i, 0), axes, work),
+        unstretch_force(row_vector(motion.force, j, 0), axes, work),
+    )
     p, q = mu * motion.normal[i], mu * motion.normal[j]
     fa, ga = abs(qt.dot(across, f)), abs(qt.dot(across, g))
     worst = max(fa - p, ga - q)
@@ -153,7 +157,7 @@ def cone_excess(j, work, motion):
 
 
 @inlined
-def idle_pull(work, motion):
+def least_inactive_pull(work, motion):
     """Least pull [N] that the affine force of a sliding face has at a touching vertex which does not act."""
     least, which = math.inf, -1
     for j in range(motion.count):
@@ -163,17 +167,17 @@ def idle_pull(work, motion):
             continue
         wall, k = wall_of(motion.slot[j], work), motion.patch[j]
         axes = wall_axes(work.walls, wall)
-        r = vector(motion.arm, j)
+        r = row_vector(motion.arm, j, 0)
         for s in range(wall * work.features, (wall + 1) * work.features):
-            if motion.is_active[s] or not motion.gap[START, s] <= motion.touch:
+            if motion.is_active[s] or not motion.gap[ROW_START, s] <= motion.touch:
                 continue
             # The vertices of a face are its corners: the missing one is the sum of its neighbours less the opposite.
-            p = vector(motion.arm, opposite(s, wall, work, motion))
+            p = row_vector(motion.arm, opposite_face_contact(s, wall, work, motion), 0)
             a = b = 0.0
             for i in range(motion.count):
                 if wall_of(motion.slot[i], work) == wall:
-                    a += qt.dot(axes[1], vector(motion.arm, i))
-                    b += qt.dot(axes[2], vector(motion.arm, i))
+                    a += qt.dot(axes[1], row_vector(motion.arm, i, 0))
+                    b += qt.dot(axes[2], row_vector(motion.arm, i, 0))
             a -= 2.0 * qt.dot(axes[1], p) + qt.dot(axes[1], r)
             b -= 2.0 * qt.dot(axes[2], p) + qt.dot(axes[2], r)
             pull = -motion.unknown[k]
@@ -185,7 +189,7 @@ def idle_pull(work, motion):
 
 
 @inlined
-def opposite(slot, wall, work, motion):
+def opposite_face_contact(slot, wall, work, motion):
     """The contact of a face of three that is farthest from the vertex `slot`: all its bits but the face's differ."""
     best, most = -1, -1
     for i in range(motion.count):
@@ -198,53 +202,53 @@ def opposite(slot, wall, work, motion):
 
 
 @kernel
-def force_margin(slack, work, motion):
+def least_force_margin(slack, work, motion):
     """Smallest margin of the guards of force, of which `slack` counts as none: (margin, guard, contact or slot)."""
-    margin, guard, which = math.inf, NO_GUARD, -1
+    margin, guard, which = math.inf, GUARD_NONE, -1
     for j in range(motion.count):
         push = motion.normal[j] / motion.weight + slack
         if push < margin:
-            margin, guard, which = push, PUSH, j
+            margin, guard, which = push, GUARD_PUSH, j
         if motion.holds[j]:
             cone = slack - cone_excess(j, work, motion) / motion.weight
             if cone < margin:
-                margin, guard, which = cone, CONE, j
-    pull, slot = idle_pull(work, motion)
+                margin, guard, which = cone, GUARD_CONE, j
+    pull, slot = least_inactive_pull(work, motion)
     if pull / motion.weight + slack < margin:
-        margin, guard, which = pull / motion.weight + slack, LOAD, slot
+        margin, guard, which = pull / motion.weight + slack, GUARD_LOAD, slot
     return margin, guard, which
 
 
 @kernel
-def least_force_at_start(tilted, work, motion):
+def least_start_force_margin(tilted, work, motion):
     """Smallest margin of force at START, nothing of it rounding."""
-    find_rate(START, 0.0, tilted, work, motion)
-    spread(work.mu, work, motion)
-    return force_margin(0.0, work, motion)[0]
+    compute_state_rate(ROW_START, 0.0, tilted, work, motion)
+    recover_contact_forces(work.mu, work, motion)
+    return least_force_margin(0.0, work, motion)[0]
 
 
 @kernel
-def least_margin(h, heeds, slack, tilted, work, motion):
+def least_guard_margin(h, heeds, slack, tilted, work, motion):
     """Smallest margin at END, a step of h after START: (margin, guard, contact or slot).
 
     `heeds`: the guards of force count, where they are missed by more than `slack`.
     """
-    find_rate(END, h, tilted, work, motion)
-    spread(work.mu, work, motion)
-    look_around(END, tilted, work, motion)
-    gap, which = gap_margin(h, work, motion)
-    margin, guard = gap / work.radius, GAP
+    compute_state_rate(ROW_END, h, tilted, work, motion)
+    recover_contact_forces(work.mu, work, motion)
+    compute_feature_gaps(ROW_END, tilted, work, motion)
+    gap, which = least_gap_margin(h, work, motion)
+    margin, guard = gap / work.radius, GUARD_GAP
     if heeds and motion.weight > 0.0:
-        least, sort, j = force_margin(slack, work, motion)
+        least, sort, j = least_force_margin(slack, work, motion)
         if least < margin:
             margin, guard, which = least, sort, j
     if work.mu > 0.0 and margin >= 0.0:  # a contact may stop within the step, unless something ends it before
-        scale = motion.scale[V]
+        scale = motion.scale[Y_VELOCITY]
         for j in range(motion.count):
             if not motion.holds[j]:
                 t, _ = sliding_velocity(j, work, motion)
-                speed = qt.dot(t, vector(motion.reference, j))
+                speed = qt.dot(t, row_vector(motion.reference, j, 0))
                 speed = (speed + 0.5 * motion.slow if motion.is_starting[j] else speed - motion.slow) / scale
                 if speed < margin:
-                    margin, guard, which = speed, SPEED, j
+                    margin, guard, which = speed, GUARD_SPEED, j
     return margin, guard, which

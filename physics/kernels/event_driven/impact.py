@@ -3,40 +3,41 @@
 from __future__ import annotations
 
 from physics.kernels.compile.decorators import inlined, kernel
-from physics.kernels.contact_law.restitution_energy import ROUNDING, part_of_rebound
-from physics.kernels.contact_solver.sliding_patch import SLIDE
+from physics.kernels.contact_law.restitution_energy import IMPACT_ENERGY_ROUNDING, limit_rebound_energy
+from physics.kernels.contact_solver.sliding_patch import TRY_SLIDING
 from physics.kernels.contact_solver.solve import solve_contacts
-from physics.kernels.event_driven.acceleration_problem import pose_contact
-from physics.kernels.event_driven.contact_forces import free_turning, load
-from physics.kernels.event_driven.extrapolated_midpoint import put_state
-from physics.kernels.event_driven.guards import look_around
-from physics.kernels.event_driven.workspace import START
+from physics.kernels.event_driven.acceleration_problem import set_up_contact
+from physics.kernels.event_driven.contact_forces import free_angular_motion
+from physics.kernels.event_driven.extrapolated_midpoint import put_state_row
+from physics.kernels.event_driven.guards import compute_feature_gaps
+from physics.kernels.event_driven.workspace import ROW_START
 from physics.kernels.forces.held_loads import refresh_loads
-from physics.kernels.half_space.contact_point import arm_and_rate, feature_of, wall_normal, wall_of
+from physics.kernels.half_space.contact_point import contact_arm_and_rate, feature_of, wall_normal, wall_of
 from physics.kernels.math import quaternion as qt
+from physics.kernels.math.vector import as_vector
 from physics.kernels.state import layout as at
 from physics.kernels.state.body import angular_velocity, kinetic_energy, principal_attitude
-from physics.kernels.state.contact_law_dispatch import TANGENTIAL, if_law
+from physics.kernels.state.contact_law_dispatch import LAW_TANGENTIAL, if_law
 from physics.kernels.time_stepping import event_log as ev
-from physics.kernels.time_stepping.contact_resistance import aim_at, without_gain
-from physics.kernels.time_stepping.contact_stages import aim_plastic, note_solve
+from physics.kernels.time_stepping.contact_resistance import reject_energy_gain, set_tangential_target
+from physics.kernels.time_stepping.contact_stages import report_solve, set_plastic_targets
 
 # Impacts in turn at one moment at most. Speeds fall by a constant factor from round to round where they do not end:
 # cos²φ between two plastic walls whose normals are φ apart or π - φ.
-TURNS = 1000
+_MAX_SEQUENTIAL_IMPACTS = 1000
 
 # Residual of a contact problem that is as good as none: rounding of forces that differ by five orders.
-SOLVED = 1.0e-11
+_ROUNDING_RESIDUAL = 1.0e-11
 
 # Residual of what is no solution, relative to the largest free contact speed.
-UNSOLVED = 1.0e-3
+_FAILED_RESIDUAL = 1.0e-3
 
 # No contact alone.
-ALL = -1
+_ALL_AT_ONCE = -1
 
 
 @inlined
-def rebound(speed, normal, r, rate, w, alpha, work, motion):
+def rebound_target(speed, normal, r, rate, w, alpha, work, motion):
     """Velocity asked of a contact that approaches with `speed`; what a bounce too short leaves out is noted.
 
     One that leaves may be turned round, to come in at e times that speed and collide next: were it only stopped, its
@@ -52,7 +53,7 @@ def rebound(speed, normal, r, rate, w, alpha, work, motion):
     goal = work.restitution * speed
     if goal > motion.still:
         return goal
-    a, c, g = load(work.free_acceleration), qt.cross(alpha, r), qt.cross(w, rate)
+    a, c, g = as_vector(work.free_acceleration), qt.cross(alpha, r), qt.cross(w, rate)
     b = -(qt.dot(normal, a) + qt.dot(normal, c) + qt.dot(normal, g))
     if b > 0.0 and work.restitution < 1.0:
         motion.left_out = max(motion.left_out, 2.0 * goal / (b * (1.0 - work.restitution)))
@@ -60,88 +61,91 @@ def rebound(speed, normal, r, rate, w, alpha, work, motion):
 
 
 @inlined
-def touches(s, motion):
+def takes_part_in_impact(s, motion):
     """True if feature s takes part in an impact: it touches, or would in no time."""
-    return motion.gap[START, s] <= max(motion.touch, -motion.gap_rate[START, s] * motion.together)
+    return motion.gap[ROW_START, s] <= max(motion.touch, -motion.gap_rate[ROW_START, s] * motion.together)
 
 
 @inlined
-def whose_turn(work, motion, report):
+def next_sequential_impact(work, motion, report):
     """The feature that collides alone, that which approaches fastest; ALL where they do at once.
 
-    Which is so, too, after `TURNS` at one moment, which the report counts as a problem not solved to its tolerance.
+    Which is so, too, after `_MAX_SEQUENTIAL_IMPACTS` at one moment, which the report counts as a problem not solved to
+    its tolerance.
     """
     if not motion.is_sequential:
-        return ALL
+        return _ALL_AT_ONCE
     motion.turns += 1
-    if motion.turns > TURNS:
+    if motion.turns > _MAX_SEQUENTIAL_IMPACTS:
         report[work.world, at.UNCONVERGED] += 1.0
-        return ALL
-    fastest, found = 0.0, ALL
+        return _ALL_AT_ONCE
+    fastest, found = 0.0, _ALL_AT_ONCE
     for s in range(motion.is_active.shape[0]):
-        if touches(s, motion) and motion.gap_rate[START, s] < fastest:
-            fastest, found = motion.gap_rate[START, s], s
+        if takes_part_in_impact(s, motion) and motion.gap_rate[ROW_START, s] < fastest:
+            fastest, found = motion.gap_rate[ROW_START, s], s
     return found
 
 
 @kernel
-def pose_collision(y, tilted, work, motion, report):
+def set_up_impact_problem(y, tilted, work, motion, report):
     """Write the contact problem of all contacts that touch, or that of the one whose turn it is; their number."""
-    put_state(motion, START, y)
-    look_around(START, tilted, work, motion)
-    R, _, w, alpha = free_turning(y, tilted, work)
+    put_state_row(motion, ROW_START, y)
+    compute_feature_gaps(ROW_START, tilted, work, motion)
+    R, _, w, alpha = free_angular_motion(y, tilted, work)
     n = 0
     motion.left_out = 0.0
-    only = whose_turn(work, motion, report)
+    only = next_sequential_impact(work, motion, report)
     for s in range(motion.is_active.shape[0]):
-        rate = motion.gap_rate[START, s]
-        if not touches(s, motion) or n >= work.slot.shape[0] or (only != ALL and s != only):
+        rate = motion.gap_rate[ROW_START, s]
+        if not takes_part_in_impact(s, motion) or n >= work.slot.shape[0] or (only != _ALL_AT_ONCE and s != only):
             continue
         normal = wall_normal(work.walls, wall_of(s, work))
-        r, r_rate = arm_and_rate(work.shape, load(work.dims), R, w, normal, feature_of(s, work), tilted, work)
-        goal = rebound(-rate, normal, r, r_rate, w, alpha, work, motion)
-        pose_contact(n, s, r, (goal, 0.0, 0.0), work)
+        r, r_rate = contact_arm_and_rate(
+            work.shape, as_vector(work.dims), R, w, normal, feature_of(s, work), tilted, work
+        )
+        goal = rebound_target(-rate, normal, r, r_rate, w, alpha, work, motion)
+        set_up_contact(n, s, r, (goal, 0.0, 0.0), work)
         n += 1
-        report[work.world, at.PENETRATION] = max(report[work.world, at.PENETRATION], -motion.gap[START, s])
-    work.mode = SLIDE
+        report[work.world, at.PENETRATION] = max(report[work.world, at.PENETRATION], -motion.gap[ROW_START, s])
+    work.mode = TRY_SLIDING
     return n
 
 
-def _no_aim(*arguments):
+def _no_tangential_target(*arguments):
     return None
 
 
-@if_law((TANGENTIAL,), _no_aim)
-def aim_collision(n, y, tilted, motion, work):
-    """`contact_resistance.aim_tangential` for an impact: targets along the wall of the one contact that bounces.
+@if_law((LAW_TANGENTIAL,), _no_tangential_target)
+def set_tangential_rebound(n, y, tilted, motion, work):
+    """Set targets along the wall of the one contact that bounces, as `contact_resistance.set_tangential_targets`.
 
     What does not rebound though it has a restitution is a bounce left out, and is not one along the wall either.
     """
     bouncing, found = 0, 0
     for i in range(n):
-        speed = -motion.gap_rate[START, work.slot[i]]
+        speed = -motion.gap_rate[ROW_START, work.slot[i]]
         if speed > motion.still and (work.target[i, 0] > 0.0 or not work.restitution > 0.0):
             bouncing, found = bouncing + 1, i
     if bouncing == 1:
-        aim_at(found, y, tilted, work)
+        set_tangential_target(found, y, tilted, work)
 
 
 @inlined
-def note(solved, report, work):
+def report_impact_solve(solved, report, work):
     """Add a contact problem, which is solved to rounding, to the world's report."""
-    note_solve(report, work.world, *solved[2:], max(work.tolerance, SOLVED))
+    report_solve(report, work.world, *solved[2:], max(work.tolerance, _ROUNDING_RESIDUAL))
 
 
 @inlined
-def _without_rebound(n, friction, smooth, pivots, v, L, solved, P, work, report):
+def _solve_plastic_impact(n, friction, smooth, pivots, v, L, solved, P, work, report):
     """The same collision solved without any rebound; what `solved` has cost goes into the report."""
-    note(solved, report, work)
-    aim_plastic(n, work)
+    report_impact_solve(solved, report, work)
+    set_plastic_targets(n, work)
     return solve_contacts(n, friction, smooth, pivots, v, L, P, work)
 
 
 @kernel
-def or_plastic(n, friction, smooth, pivots, v, L, solved, P, work, report):
+def fall_back_to_plastic(n, friction, smooth, pivots, v, L, solved, P, work, report):
     """Result of `solve_contacts` for a collision, or an impact without rebound where that was no solution.
 
     With friction two contacts may hold any stress along the line between them, which no impulse lengthens: where one is
@@ -150,13 +154,13 @@ def or_plastic(n, friction, smooth, pivots, v, L, solved, P, work, report):
     is_asked = False
     for i in range(n):
         is_asked = is_asked or work.target[i, 0] > 0.0
-    if solved[2] <= UNSOLVED or not is_asked:
+    if solved[2] <= _FAILED_RESIDUAL or not is_asked:
         return solved
-    return _without_rebound(n, friction, smooth, pivots, v, L, solved, P, work, report)
+    return _solve_plastic_impact(n, friction, smooth, pivots, v, L, solved, P, work, report)
 
 
 @kernel
-def within_energy(n, y, friction, smooth, tilted, pivots, solved, P, work, motion, report):
+def cap_rebound_energy(n, y, friction, smooth, tilted, pivots, solved, P, work, motion, report):
     """Result of `solve_contacts` for a collision with friction, or as much of its rebound as there is energy for.
 
     Impulses are those of what is returned. See `physics.kernels.contact_law.restitution_energy`.
@@ -164,34 +168,34 @@ def within_energy(n, y, friction, smooth, tilted, pivots, solved, P, work, motio
     _, q, v, L = y
     v_full, L_full = solved[0], solved[1]
     before, full = kinetic_energy(q, v, L, work, tilted), kinetic_energy(q, v_full, L_full, work, tilted)
-    if not full > (1.0 + ROUNDING) * before:
+    if not full > (1.0 + IMPACT_ENERGY_ROUNDING) * before:
         return solved
     for k in range(3 * n):
         motion.rebound[k] = work.impulse[k]
-    plastic = _without_rebound(n, friction, smooth, pivots, v, L, solved, P, work, report)
+    plastic = _solve_plastic_impact(n, friction, smooth, pivots, v, L, solved, P, work, report)
     v_plastic, L_plastic, residual, sweeps, method = plastic
-    v, L, s = part_of_rebound(q, before, (v_plastic, L_plastic), (v_full, L_full), work, tilted)
+    v, L, s = limit_rebound_energy(q, before, (v_plastic, L_plastic), (v_full, L_full), work, tilted)
     for k in range(3 * n):
         work.impulse[k] += s * (motion.rebound[k] - work.impulse[k])
     return v, L, residual, sweeps, method
 
 
 @kernel
-def pose_jump(y, h, tilted, work, motion):
+def set_up_jump_problem(y, h, tilted, work, motion):
     """Write the contact problem of a first-order step over h into `work`: (contacts, velocity, angular momentum)."""
-    put_state(motion, START, y)
-    look_around(START, tilted, work, motion)
-    R, _, w, _ = free_turning(y, tilted, work)
+    put_state_row(motion, ROW_START, y)
+    compute_feature_gaps(ROW_START, tilted, work, motion)
+    R, _, w, _ = free_angular_motion(y, tilted, work)
     count = 0
     for s in range(motion.is_active.shape[0]):
-        gap = motion.gap[START, s]
-        if not gap <= motion.touch - min(0.0, motion.gap_rate[START, s]) * h or count >= work.slot.shape[0]:
+        gap = motion.gap[ROW_START, s]
+        if not gap <= motion.touch - min(0.0, motion.gap_rate[ROW_START, s]) * h or count >= work.slot.shape[0]:
             continue
         n = wall_normal(work.walls, wall_of(s, work))
-        r, _ = arm_and_rate(work.shape, load(work.dims), R, w, n, feature_of(s, work), tilted, work)
-        pose_contact(count, s, r, (-max(gap, 0.0) / h, 0.0, 0.0), work)
+        r, _ = contact_arm_and_rate(work.shape, as_vector(work.dims), R, w, n, feature_of(s, work), tilted, work)
+        set_up_contact(count, s, r, (-max(gap, 0.0) / h, 0.0, 0.0), work)
         count += 1
-    work.mode = SLIDE
+    work.mode = TRY_SLIDING
     a, torque, v, L = work.free_acceleration, work.torque, y[2], y[3]
     return (
         count,
@@ -201,54 +205,54 @@ def pose_jump(y, h, tilted, work, motion):
 
 
 @inlined
-def principal_axes(y, tilted, work):
+def principal_rotation(y, tilted, work):
     """Rotation matrix of the principal axes at y."""
     return qt.to_matrix(principal_attitude(y[1], work, tilted))
 
 
 @inlined
-def _width(friction):
+def _rows_per_contact(friction):
     return 1 if friction is None else 3
 
 
 @kernel
-def collide(y, t, friction, smooth, tilted, pivots, work, motion, report, log, counts):
+def resolve_impacts(y, t, friction, smooth, tilted, pivots, work, motion, report, log, counts):
     """State after the impulses of a collision at the time t, of all that touches or of the one whose turn it is."""
     refresh_loads(y, 0.0, tilted, work)
-    n = pose_collision(y, tilted, work, motion, report)
-    aim_collision(n, y, tilted, motion, work)
+    n = set_up_impact_problem(y, tilted, work, motion, report)
+    set_tangential_rebound(n, y, tilted, motion, work)
     x, q, v, L = y
     if n > 0:
-        P = principal_axes(y, tilted, work)
+        P = principal_rotation(y, tilted, work)
         solved = solve_contacts(n, friction, smooth, pivots, v, L, P, work)
-        solved = or_plastic(n, friction, smooth, pivots, v, L, solved, P, work, report)
-        solved = without_gain(n, friction, smooth, pivots, v, L, solved, P, work)
+        solved = fall_back_to_plastic(n, friction, smooth, pivots, v, L, solved, P, work, report)
+        solved = reject_energy_gain(n, friction, smooth, pivots, v, L, solved, P, work)
         if friction is not None and work.restitution > 0.0:
-            solved = within_energy(n, y, friction, smooth, tilted, pivots, solved, P, work, motion, report)
-        note(solved, report, work)
+            solved = cap_rebound_energy(n, y, friction, smooth, tilted, pivots, solved, P, work, motion, report)
+        report_impact_solve(solved, report, work)
         v, L = solved[0], solved[1]
-    ev.log_wall_impacts(n, _width(friction), x, work.mass * motion.noise, t, work, log, counts)
+    ev.log_wall_impacts(n, _rows_per_contact(friction), x, work.mass * motion.noise, t, work, log, counts)
     return x, q, v, L
 
 
 @kernel
-def jump(y, h, t, friction, smooth, tilted, pivots, work, motion, report, log, counts):
+def resolve_inconsistency(y, h, t, friction, smooth, tilted, pivots, work, motion, report, log, counts):
     """State with the velocities of a first-order step over h from the time t: a leap, before it is made."""
     refresh_loads(y, 0.0, tilted, work)
-    n, v, L = pose_jump(y, h, tilted, work, motion)
+    n, v, L = set_up_jump_problem(y, h, tilted, work, motion)
     if n > 0:  # there may be nothing in reach
-        P = principal_axes(y, tilted, work)
+        P = principal_rotation(y, tilted, work)
         solved = solve_contacts(n, friction, smooth, pivots, v, L, P, work)
-        note(solved, report, work)
+        report_impact_solve(solved, report, work)
         v, L = solved[0], solved[1]
-    ev.log_wall_impacts(n, _width(friction), y[0], work.mass * motion.noise, t, work, log, counts)
+    ev.log_wall_impacts(n, _rows_per_contact(friction), y[0], work.mass * motion.noise, t, work, log, counts)
     return y[0], y[1], v, L
 
 
 @kernel
-def carry_on(y, h, tilted, work):
+def drift_at_velocity(y, h, tilted, work):
     """State after a moment h at constant velocities."""
     x, q, v, L = y
     w = angular_velocity(q, L, work, tilted)
     x = (x[0] + h * v[0], x[1] + h * v[1], x[2] + h * v[2])
-    return x, qt.normalise(qt.multiply(qt.exponential((h * w[0], h * w[1], h * w[2])), q)), v, L
+    return x, qt.normalise(qt.multiply(qt.exp_map((h * w[0], h * w[1], h * w[2])), q)), v, L

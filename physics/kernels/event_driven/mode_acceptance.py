@@ -9,24 +9,30 @@ taken back and made shorter when the acceleration has jumped in it: then another
 from __future__ import annotations
 
 from physics.kernels.compile.decorators import inlined, kernel
-from physics.kernels.event_driven.contact_candidates import ASKS, ASKS_SLIDING, GOES_BACK, MOVES, RESTS
-from physics.kernels.event_driven.extrapolated_midpoint import put_state, start_step
-from physics.kernels.event_driven.workspace import SIZE, START, L, V
+from physics.kernels.event_driven.contact_candidates import (
+    MODE_CONTACT,
+    MODE_REST,
+    MODE_ROLLBACK,
+    MODE_UNDECIDED,
+    MODE_UNDECIDED_SLIDING,
+)
+from physics.kernels.event_driven.extrapolated_midpoint import prepare_extrapolated_step, put_state_row
+from physics.kernels.event_driven.workspace import ROW_START, Y_ANGULAR_MOMENTUM, Y_SIZE, Y_VELOCITY
 
 # The first such step in look-aheads, its growth after each that holds, and its share after each that does not: slips
 # begin with no acceleration, so that one found a look-ahead late, 1e-5 of the body's time, is off by the square of it.
-FIRST = 64.0
-GROWTH = 4.0
-SHORTER = 0.25
+_FIRST_TRUST_STEP = 64.0
+TRUST_GROWTH = 4.0
+TRUST_SHRINK = 0.25
 
 # Change of acceleration that is none, in weights.
-SAME = 1.0e-6
+_SAME_ACCELERATION = 1.0e-6
 
-NONE = 0
+NO_MODE = 0
 
 
 @inlined
-def name_of_regime(motion):
+def contact_mode_hash(motion):
     """A number for which contacts act and which of them hold."""
     name = 1
     for j in range(motion.count):
@@ -35,38 +41,38 @@ def name_of_regime(motion):
 
 
 @inlined
-def is_heeded(motion):
+def has_trusted_guards(motion):
     """True if the guards of force say something of this regime."""
-    return motion.unheeded == NONE or name_of_regime(motion) != motion.unheeded
+    return motion.unheeded == NO_MODE or contact_mode_hash(motion) != motion.unheeded
 
 
 @inlined
-def distrust(nearest, motion):
+def distrust_force_guards(nearest, motion):
     """The guards of force are not heeded for this regime any more."""
-    motion.unheeded = name_of_regime(motion)
-    motion.trust = FIRST * nearest
+    motion.unheeded = contact_mode_hash(motion)
+    motion.trust = _FIRST_TRUST_STEP * nearest
 
 
 @kernel
-def has_jumped(what, y, tilted, work, motion):
+def has_acceleration_jumped(what, y, tilted, work, motion):
     """True if the step that led to y went too far: what the body does there does not go on from what it did."""
-    if what in (RESTS, ASKS, ASKS_SLIDING):
+    if what in (MODE_REST, MODE_UNDECIDED, MODE_UNDECIDED_SLIDING):
         return False
-    if what != MOVES:
+    if what != MODE_CONTACT:
         return True
-    put_state(motion, START, y)
+    put_state_row(motion, ROW_START, y)
     motion.step = motion.ahead
-    start_step(motion.ahead, tilted, work, motion)
-    for c in range(V, SIZE):
-        unit = motion.weight / work.mass if c < L else motion.weight * work.radius
-        if abs(motion.first_rate[c] - motion.end_rate[c]) > SAME * unit:
+    prepare_extrapolated_step(motion.ahead, tilted, work, motion)
+    for c in range(Y_VELOCITY, Y_SIZE):
+        unit = motion.weight / work.mass if c < Y_ANGULAR_MOMENTUM else motion.weight * work.radius
+        if abs(motion.first_rate[c] - motion.end_rate[c]) > _SAME_ACCELERATION * unit:
             return True
     return False
 
 
 @kernel
-def judge(what, watched, y, tilted, work, motion):
+def accept_step(what, watched, y, tilted, work, motion):
     """Judge the regime at y; GOES_BACK where the watched step that led there was too long, and no mere look-ahead."""
-    if watched > motion.nearest and has_jumped(what, y, tilted, work, motion):
-        return GOES_BACK
+    if watched > motion.nearest and has_acceleration_jumped(what, y, tilted, work, motion):
+        return MODE_ROLLBACK
     return what

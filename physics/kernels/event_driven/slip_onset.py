@@ -16,57 +16,69 @@ from __future__ import annotations
 import math
 
 from physics.kernels.compile.decorators import inlined, kernel
-from physics.kernels.event_driven.contact_forces import plus, slide_push, times, turned_by, vector
-from physics.kernels.event_driven.workspace import L, V
+from physics.kernels.event_driven.contact_forces import apply_inverse_inertia, sliding_force_direction
+from physics.kernels.event_driven.workspace import Y_ANGULAR_MOMENTUM, Y_VELOCITY
 from physics.kernels.half_space.contact_point import wall_axes, wall_normal, wall_of
 from physics.kernels.math import quaternion as qt
+from physics.kernels.math.vector import plus, row_vector, times
 
 # Newton's steps for an angle that is known to some 1e-3, the difference for its derivative [rad], and the angle that is
 # none; steps of more than FAR are not of this direction.
-STEPS = 6
-NUDGE = 1.0e-5
-SAME = 1.0e-15
-FAR = 0.5
+_ANGLE_NEWTON_STEPS = 6
+_ANGLE_DIFFERENCE = 1.0e-5
+_ANGLE_TOLERANCE = 1.0e-15
+_MAX_ANGLE_STEP = 0.5
 
 # A contact creeps that is accelerated by less than CREEPING of K, and whose speed is less than SLOWLY of K in the time
 # in which the body turns. A step in which it begins to slide may go PAST times as far.
-CREEPING = 2.0e-3
-SLOWLY = 1.0e-5
-PAST = 2.0
+_CREEP_GROWTH = 2.0e-3
+_CREEP_SPEED = 1.0e-5
+_CREEP_OVERSHOOT = 2.0
 
 
 @inlined
 def sliding_velocity(j, work, motion):
     """Tangential velocity of contact j and its size."""
     n = wall_normal(work.walls, wall_of(motion.slot[j], work))
-    u = vector(motion.velocity, j)
+    u = row_vector(motion.velocity, j, 0)
     un = qt.dot(n, u)
     t = (u[0] - un * n[0], u[1] - un * n[1], u[2] - un * n[2])
     return t, math.sqrt(qt.dot(t, t))
 
 
 @inlined
-def contact_rate(j, P, work, motion):
+def contact_velocity_rate(j, P, work, motion):
     """Rate at which the velocity of contact j changes at START: `first_rate`, and `goal` as placed there."""
     rate, a, torque = motion.first_rate, work.free_acceleration, work.torque
-    T = (rate[L] - torque[0], rate[L + 1] - torque[1], rate[L + 2] - torque[2])
-    F = (rate[V] - a[0], rate[V + 1] - a[1], rate[V + 2] - a[2])
-    return plus(plus(vector(motion.goal, j), qt.cross(turned_by(P, work.J, T), vector(motion.arm, j))), F)
+    T = (
+        rate[Y_ANGULAR_MOMENTUM] - torque[0],
+        rate[Y_ANGULAR_MOMENTUM + 1] - torque[1],
+        rate[Y_ANGULAR_MOMENTUM + 2] - torque[2],
+    )
+    F = (rate[Y_VELOCITY] - a[0], rate[Y_VELOCITY + 1] - a[1], rate[Y_VELOCITY + 2] - a[2])
+    return plus(
+        plus(
+            row_vector(motion.goal, j, 0), qt.cross(apply_inverse_inertia(P, work.J, T), row_vector(motion.arm, j, 0))
+        ),
+        F,
+    )
 
 
 @inlined
-def stiffness_across(P, work, motion):
+def friction_turn_stiffness(P, work, motion):
     """K of the only contact, from `first_rate` [m/s²]."""
     n = wall_normal(work.walls, wall_of(motion.slot[0], work))
-    across = qt.cross(n, vector(motion.reference, 0))
-    moment = qt.cross(vector(motion.arm, 0), across)
+    across = qt.cross(n, row_vector(motion.reference, 0, 0))
+    moment = qt.cross(row_vector(motion.arm, 0, 0), across)
     a, rate = work.free_acceleration, motion.first_rate
-    push = work.mass * (n[0] * (rate[V] - a[0]) + n[1] * (rate[V + 1] - a[1]) + n[2] * (rate[V + 2] - a[2]))
-    return work.mu * push * (1.0 / work.mass + qt.dot(moment, turned_by(P, work.J, moment)))
+    push = work.mass * (
+        n[0] * (rate[Y_VELOCITY] - a[0]) + n[1] * (rate[Y_VELOCITY + 1] - a[1]) + n[2] * (rate[Y_VELOCITY + 2] - a[2])
+    )
+    return work.mu * push * (1.0 / work.mass + qt.dot(moment, apply_inverse_inertia(P, work.J, moment)))
 
 
 @inlined
-def has_one_slide(work, motion):
+def has_one_sliding_contact(work, motion):
     """True if one contact acts, which slides with friction."""
     return motion.count == 1 and motion.holds[0] == 0 and work.mu > 0.0
 
@@ -74,67 +86,67 @@ def has_one_slide(work, motion):
 @inlined
 def _is_small(share, speed, work, motion):
     """True if the speed of a slip is below `share` times SLOWLY."""
-    return speed * (motion.spin + math.sqrt(work.acceleration / work.radius)) < share * SLOWLY * motion.stiffness
+    return speed * (motion.spin + math.sqrt(work.acceleration / work.radius)) < share * _CREEP_SPEED * motion.stiffness
 
 
 @inlined
-def creeps(growth, speed, work, motion):
+def is_creeping(growth, speed, work, motion):
     """True if a slip that grows at the rate `growth` is so slow, and grows so little, that only loads turn it."""
-    return growth < CREEPING * motion.stiffness and _is_small(1.0, speed, work, motion)
+    return growth < _CREEP_GROWTH * motion.stiffness and _is_small(1.0, speed, work, motion)
 
 
 @inlined
-def outruns(h, work, motion):
+def has_outrun_creep(h, work, motion):
     """True if the only contact begins to slide, and goes too far for that in the step of h to END, placed."""
-    if not has_one_slide(work, motion) or not motion.is_starting[0]:
+    if not has_one_sliding_contact(work, motion) or not motion.is_starting[0]:
         return False
     _, speed = sliding_velocity(0, work, motion)
-    if not speed > PAST * motion.slow:
+    if not speed > _CREEP_OVERSHOOT * motion.slow:
         return False
-    if not _is_small(PAST * PAST, speed, work, motion):
+    if not _is_small(_CREEP_OVERSHOOT * _CREEP_OVERSHOOT, speed, work, motion):
         return True
-    limit = CREEPING * motion.stiffness
-    return motion.growth < limit and speed - motion.first_speed > PAST * limit * h
+    limit = _CREEP_GROWTH * motion.stiffness
+    return motion.growth < limit and speed - motion.first_speed > _CREEP_OVERSHOOT * limit * h
 
 
 @inlined
-def _rates(angle, first, second, axes, P, work, motion):
+def _slip_accelerations(angle, first, second, axes, P, work, motion):
     """Acceleration of contact 0 (across, along) the direction in which it slides: `angle` from `first` to `second`."""
     c, s = math.cos(angle), math.sin(angle)
     d = plus(times(c, first), times(s, second))
     for k in range(3):
         motion.way[0, k] = d[k]
-    n, r, b = axes[0], vector(motion.arm, 0), vector(motion.goal, 0)
-    f = slide_push(work.mu, axes, 0, work, motion)
-    a = plus(times(1.0 / work.mass, f), qt.cross(turned_by(P, work.J, qt.cross(r, f)), r))
+    n, r, b = axes[0], row_vector(motion.arm, 0, 0), row_vector(motion.goal, 0, 0)
+    f = sliding_force_direction(work.mu, axes, 0, work, motion)
+    a = plus(times(1.0 / work.mass, f), qt.cross(apply_inverse_inertia(P, work.J, qt.cross(r, f)), r))
     a = plus(b, times(-qt.dot(n, b) / qt.dot(n, a), a))
     return c * qt.dot(second, a) - s * qt.dot(first, a), qt.dot(d, a)
 
 
 @kernel
-def turn_to_slip(P, work, motion):
-    """Let the one contact that acts begin to slide in the direction above; `way`, placed (`contact_forces.place`).
+def set_slip_onset_direction(P, work, motion):
+    """Let the one contact that acts begin to slide in the direction above, and place `way`.
 
     More contacts than one begin in the directions that they were found with.
     """
-    if not has_one_slide(work, motion) or not motion.is_starting[0]:
+    if not has_one_sliding_contact(work, motion) or not motion.is_starting[0]:
         return
     axes = wall_axes(work.walls, wall_of(motion.slot[0], work))
-    n, u, first = axes[0], vector(motion.velocity, 0), vector(motion.reference, 0)
+    n, u, first = axes[0], row_vector(motion.velocity, 0, 0), row_vector(motion.reference, 0, 0)
     second, speed = qt.cross(n, first), math.sqrt(max(0.0, qt.dot(u, u) - qt.dot(n, u) * qt.dot(n, u)))
     angle = 0.0
-    for _ in range(STEPS):
-        across, along = _rates(angle, first, second, axes, P, work, motion)
-        nudged, _ = _rates(angle + NUDGE, first, second, axes, P, work, motion)
-        stiffness = (across - nudged) / NUDGE
+    for _ in range(_ANGLE_NEWTON_STEPS):
+        across, along = _slip_accelerations(angle, first, second, axes, P, work, motion)
+        nudged, _ = _slip_accelerations(angle + _ANGLE_DIFFERENCE, first, second, axes, P, work, motion)
+        stiffness = (across - nudged) / _ANGLE_DIFFERENCE
         if not stiffness > 0.0:
             angle = 0.0
             break
         step = (across - speed * motion.turning / (1.0 + along / stiffness)) / stiffness
-        if not abs(step) < FAR:
+        if not abs(step) < _MAX_ANGLE_STEP:
             angle = 0.0
             break
         angle += step
-        if abs(step) <= SAME:
+        if abs(step) <= _ANGLE_TOLERANCE:
             break
-    _rates(angle, first, second, axes, P, work, motion)
+    _slip_accelerations(angle, first, second, axes, P, work, motion)

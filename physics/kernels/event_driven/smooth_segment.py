@@ -5,63 +5,64 @@ from __future__ import annotations
 import math
 
 from physics.kernels.compile.decorators import inlined, kernel
-from physics.kernels.event_driven.constraint_projection import cancel
-from physics.kernels.event_driven.contact_candidates import set_down
-from physics.kernels.event_driven.contact_forces import free_turning, keep_forces, vector
+from physics.kernels.event_driven.constraint_projection import project_state
+from physics.kernels.event_driven.contact_candidates import project_candidate_speeds
+from physics.kernels.event_driven.contact_forces import free_angular_motion, store_last_forces
 from physics.kernels.event_driven.extrapolated_midpoint import (
-    CUT,
-    EASY,
-    GROWTH,
-    SHORTEST,
-    find_rate,
-    get_state,
-    put_state,
-    start_step,
-    try_step,
+    SEGMENT_EASY_RULES,
+    SEGMENT_SHORTEST_STEP,
+    SEGMENT_STEP_CUT,
+    SEGMENT_STEP_GROWTH,
+    compute_state_rate,
+    get_state_row,
+    prepare_extrapolated_step,
+    put_state_row,
+    try_extrapolated_step,
 )
-from physics.kernels.event_driven.force_minima import find_dip, note_margins
+from physics.kernels.event_driven.force_minima import find_force_minimum, store_force_margins
 from physics.kernels.event_driven.guards import (
-    FORCES,
-    GAP,
-    MARGIN,
-    NO_GUARD,
-    NO_STEP,
-    SPEED,
-    WATCH,
-    least_force_at_start,
-    least_margin,
-    look_around,
+    FORCE_GUARDS,
+    FORCE_MARGIN_TOLERANCE,
+    GUARD_GAP,
+    GUARD_NONE,
+    GUARD_SPEED,
+    GUARD_STEP_FAILED,
+    GUARD_WATCH,
+    compute_feature_gaps,
+    least_guard_margin,
+    least_start_force_margin,
 )
-from physics.kernels.event_driven.mode_acceptance import is_heeded
-from physics.kernels.event_driven.slip_onset import contact_rate, outruns, sliding_velocity
-from physics.kernels.event_driven.workspace import END, SIZE, START
-from physics.kernels.forces.held_loads import pass_time, refresh_loads
+from physics.kernels.event_driven.mode_acceptance import has_trusted_guards
+from physics.kernels.event_driven.slip_onset import contact_velocity_rate, has_outrun_creep, sliding_velocity
+from physics.kernels.event_driven.workspace import ROW_END, ROW_START, Y_SIZE
+from physics.kernels.forces.held_loads import advance_clock, refresh_loads
 from physics.kernels.math import quaternion as qt
+from physics.kernels.math.vector import row_vector
 from physics.kernels.state.body import angular_velocity
 
 # Smooth steps at most before the next regime is looked for.
-STEPS = 10_000
+_MAX_SEGMENT_STEPS = 10_000
 
 # Trials of the time at which a guard ends a step, those after which what is left must have been halved, and margins
 # that are none: of a gap and of all others.
-LOCATIONS = 110
-PATIENCE = 3
-MET = (1.0e-15, 1.0e-13)
+_MAX_LOCATION_TRIALS = 110
+_BISECT_AFTER = 3
+_ZERO_MARGINS = (1.0e-15, 1.0e-13)
 
 # A body whose contacts, when set right, take its speed down to this share of `motion.still` may be at rest.
-SETTLED = 1.0e-6
+_REST_SPEED_SHARE = 1.0e-6
 
 
 @inlined
-def towards_gap(t, margin, guard, which, work, motion):
+def newton_time_to_gap(t, margin, guard, which, work, motion):
     """Newton's step for the time at which the gap that was missed at END, t after START, is closed; -1 without one."""
-    if guard != GAP or not motion.gap_rate[END, which] < 0.0:
+    if guard != GUARD_GAP or not motion.gap_rate[ROW_END, which] < 0.0:
         return -1.0
-    return t - margin * work.radius / motion.gap_rate[END, which]
+    return t - margin * work.radius / motion.gap_rate[ROW_END, which]
 
 
 @kernel
-def locate(h, margin, guard, which, heeds, tilted, work, motion):
+def locate_event(h, margin, guard, which, heeds, tilted, work, motion):
     """End the step where its smallest margin is zero (END): (its length, guard, contact or slot).
 
     Newton's steps for a gap. Else false position with the Illinois rule, and a half where PATIENCE trials have not
@@ -71,33 +72,33 @@ def locate(h, margin, guard, which, heeds, tilted, work, motion):
     A force that was there at the start ends where it is zero, not where it is missed by more than rounding.
     """
     low, high, low_margin, high_margin = 0.0, h, -margin, margin
-    slack = MARGIN
-    if guard in FORCES:
-        least = least_force_at_start(tilted, work, motion)
-        if least > MARGIN:
-            slack, low_margin, high_margin = 0.0, least, margin - MARGIN
+    slack = FORCE_MARGIN_TOLERANCE
+    if guard in FORCE_GUARDS:
+        least = least_start_force_margin(tilted, work, motion)
+        if least > FORCE_MARGIN_TOLERANCE:
+            slack, low_margin, high_margin = 0.0, least, margin - FORCE_MARGIN_TOLERANCE
     side, width, stale = 0, h, 0
-    newton = towards_gap(h, margin, guard, which, work, motion)
-    for _ in range(LOCATIONS):
+    newton = newton_time_to_gap(h, margin, guard, which, work, motion)
+    for _ in range(_MAX_LOCATION_TRIALS):
         t = newton
         if not low < t < high:
             t = low + (high - low) * low_margin / (low_margin - high_margin)
-            if stale >= PATIENCE or not low < t < high:
+            if stale >= _BISECT_AFTER or not low < t < high:
                 t = 0.5 * (low + high)
-        error, _ = try_step(t, tilted, work, motion)
+        error, _ = try_extrapolated_step(t, tilted, work, motion)
         if not error <= work.tolerance:
-            return t, NO_STEP, which
-        margin, g, w = least_margin(t, heeds, slack, tilted, work, motion)
+            return t, GUARD_STEP_FAILED, which
+        margin, g, w = least_guard_margin(t, heeds, slack, tilted, work, motion)
         newton = -1.0
         if margin < 0.0:
             high, high_margin, guard, which = t, margin, g, w
-            newton = towards_gap(t, margin, g, w, work, motion)
+            newton = newton_time_to_gap(t, margin, g, w, work, motion)
             if side == 1:
                 low_margin *= 0.5
             side = 1
         else:
             low, low_margin = t, margin
-            if g == GAP and margin <= MET[0]:
+            if g == GUARD_GAP and margin <= _ZERO_MARGINS[0]:
                 return t, g, w
             if side == -1:
                 high_margin *= 0.5
@@ -105,24 +106,26 @@ def locate(h, margin, guard, which, heeds, tilted, work, motion):
         stale += 1
         if high - low <= 0.5 * width:
             width, stale = high - low, 0
-        if high - low <= 1.0e-15 * h or (margin < 0.0 and margin > -(MET[0] if g == GAP else MET[1])):
+        if high - low <= 1.0e-15 * h or (
+            margin < 0.0 and margin > -(_ZERO_MARGINS[0] if g == GUARD_GAP else _ZERO_MARGINS[1])
+        ):
             break
     if margin >= 0.0:
-        try_step(high, tilted, work, motion)
-        _, guard, which = least_margin(high, heeds, slack, tilted, work, motion)
+        try_extrapolated_step(high, tilted, work, motion)
+        _, guard, which = least_guard_margin(high, heeds, slack, tilted, work, motion)
     return high, guard, which
 
 
 @inlined
-def has_stopped(guard, which, work, motion):
+def has_slip_stopped(guard, which, work, motion):
     """True if the contact that ended a step nearly stands still there: then that is the end, not before."""
-    if guard != SPEED:
+    if guard != GUARD_SPEED:
         return False
     return sliding_velocity(which, work, motion)[1] <= motion.slow
 
 
 @kernel
-def finish_stop(which, left, heeds, tilted, work, motion):
+def slide_to_stop(which, left, heeds, tilted, work, motion):
     """Let contact `which`, which slides at END as slowly as counts as none, do so until it stands still: the time [s].
 
     Its direction stays what it is. Not where something else would end within that time, or it began to slide only now.
@@ -132,105 +135,113 @@ def finish_stop(which, left, heeds, tilted, work, motion):
     slip, speed = sliding_velocity(which, work, motion)
     if not motion.noise < speed <= 2.0 * motion.slow:
         return 0.0
-    before = get_state(motion, START)
-    end = get_state(motion, END)
+    before = get_state_row(motion, ROW_START)
+    end = get_state_row(motion, ROW_END)
     for c in range(3):
         motion.reference[which, c] = slip[c] / speed
-    put_state(motion, START, end)
-    find_rate(START, 0.0, tilted, work, motion)
-    for c in range(SIZE):
+    put_state_row(motion, ROW_START, end)
+    compute_state_rate(ROW_START, 0.0, tilted, work, motion)
+    for c in range(Y_SIZE):
         motion.first_rate[c] = motion.rate[c]
-    _, P, _, _ = free_turning(end, tilted, work)
-    along = qt.dot(contact_rate(which, P, work, motion), vector(motion.reference, which))
+    _, P, _, _ = free_angular_motion(end, tilted, work)
+    along = qt.dot(contact_velocity_rate(which, P, work, motion), row_vector(motion.reference, which, 0))
     if along < 0.0:
         h = min(left, -speed / along)
-        error, _ = try_step(h, tilted, work, motion)
-        margin, guard, _ = least_margin(h, heeds, MARGIN, tilted, work, motion)
-        if error <= work.tolerance and (margin >= 0.0 or guard == SPEED):
-            pass_time(h, work)
+        error, _ = try_extrapolated_step(h, tilted, work, motion)
+        margin, guard, _ = least_guard_margin(h, heeds, FORCE_MARGIN_TOLERANCE, tilted, work, motion)
+        if error <= work.tolerance and (margin >= 0.0 or guard == GUARD_SPEED):
+            advance_clock(h, work)
             return h
-    put_state(motion, START, before)
-    put_state(motion, END, end)
-    least_margin(0.0, heeds, MARGIN, tilted, work, motion)  # forces and gaps are those of END again
+    put_state_row(motion, ROW_START, before)
+    put_state_row(motion, ROW_END, end)
+    least_guard_margin(
+        0.0, heeds, FORCE_MARGIN_TOLERANCE, tilted, work, motion
+    )  # forces and gaps are those of END again
     return 0.0
 
 
 @inlined
-def body_speed(y, tilted, work):
+def body_speed_bound(y, tilted, work):
     """Speed that no point of the body exceeds [m/s]."""
     v, w = y[2], angular_velocity(y[1], y[3], work, tilted)
     return math.sqrt(qt.dot(v, v)) + work.radius * math.sqrt(qt.dot(w, w))
 
 
 @kernel
-def move(y, left, tilted, work, motion):
+def integrate_segment(y, left, tilted, work, motion):
     """Smooth motion of the regime for `left`, or until a guard ends it: (state, time, guard).
 
     Where the guards of force are not heeded one step, no longer than `motion.trust`: its guard is WATCH at least.
     """
-    heeds = is_heeded(motion)
-    had = body_speed(y, tilted, work)
-    y = cancel(set_down(y, tilted, work, motion), tilted, work, motion)
-    if had > motion.still and body_speed(y, tilted, work) <= SETTLED * motion.still:
-        return y, 0.0, SPEED  # the contacts have taken all of it: it may be at rest
-    put_state(motion, START, y)
-    look_around(START, tilted, work, motion)
+    heeds = has_trusted_guards(motion)
+    had = body_speed_bound(y, tilted, work)
+    y = project_state(project_candidate_speeds(y, tilted, work, motion), tilted, work, motion)
+    if had > motion.still and body_speed_bound(y, tilted, work) <= _REST_SPEED_SHARE * motion.still:
+        return y, 0.0, GUARD_SPEED  # the contacts have taken all of it: it may be at rest
+    put_state_row(motion, ROW_START, y)
+    compute_feature_gaps(ROW_START, tilted, work, motion)
     motion.step = left if heeds else motion.trust
-    t, h = 0.0, start_step(left, tilted, work, motion)
-    note_margins(START, work, motion)
-    for _ in range(STEPS):
-        error, used = try_step(h, tilted, work, motion)
-        is_over, guard = False, NO_STEP
+    t, h = 0.0, prepare_extrapolated_step(left, tilted, work, motion)
+    store_force_margins(ROW_START, work, motion)
+    for _ in range(_MAX_SEGMENT_STEPS):
+        error, used = try_extrapolated_step(h, tilted, work, motion)
+        is_over, guard = False, GUARD_STEP_FAILED
         if error <= work.tolerance:
-            margin, guard, which = least_margin(h, heeds, MARGIN, tilted, work, motion)
+            margin, guard, which = least_guard_margin(h, heeds, FORCE_MARGIN_TOLERANCE, tilted, work, motion)
             is_over = margin < 0.0
-            if outruns(h, work, motion):
-                guard = NO_STEP
-            elif is_over and not has_stopped(guard, which, work, motion):
-                h, guard, which = locate(h, margin, guard, which, heeds, tilted, work, motion)
-        if guard != NO_STEP and heeds:
-            dip = find_dip(h, used, tilted, work, motion)
+            if has_outrun_creep(h, work, motion):
+                guard = GUARD_STEP_FAILED
+            elif is_over and not has_slip_stopped(guard, which, work, motion):
+                h, guard, which = locate_event(h, margin, guard, which, heeds, tilted, work, motion)
+        if guard != GUARD_STEP_FAILED and heeds:
+            dip = find_force_minimum(h, used, tilted, work, motion)
             if dip < h:
                 h = dip
-                refresh_loads(get_state(motion, START), 0.0, tilted, work)
+                refresh_loads(get_state_row(motion, ROW_START), 0.0, tilted, work)
                 continue
-        if guard == NO_STEP:
-            if not h > SHORTEST * left:
-                return get_state(motion, START), t, NO_STEP
-            # Not `start_step` again: it would go by the directions of sliding (`way`) that the trial ended with.
-            h *= CUT
-            refresh_loads(get_state(motion, START), 0.0, tilted, work)  # the scale of the errors is that of the start
+        if guard == GUARD_STEP_FAILED:
+            if not h > SEGMENT_SHORTEST_STEP * left:
+                return get_state_row(motion, ROW_START), t, GUARD_STEP_FAILED
+            # Not `prepare_extrapolated_step` again: it would go by the directions of sliding (`way`) that the trial
+            # ended with.
+            h *= SEGMENT_STEP_CUT
+            refresh_loads(
+                get_state_row(motion, ROW_START), 0.0, tilted, work
+            )  # the scale of the errors is that of the start
             continue
         t += h
-        pass_time(h, work)
-        if is_over and guard == SPEED:
-            t += finish_stop(which, left - t, heeds, tilted, work, motion)
-        motion.step = GROWTH * h if used <= EASY else h
-        keep_forces(work, motion)
-        y = cancel(get_state(motion, END), tilted, work, motion)
+        advance_clock(h, work)
+        if is_over and guard == GUARD_SPEED:
+            t += slide_to_stop(which, left - t, heeds, tilted, work, motion)
+        motion.step = SEGMENT_STEP_GROWTH * h if used <= SEGMENT_EASY_RULES else h
+        store_last_forces(work, motion)
+        y = project_state(get_state_row(motion, ROW_END), tilted, work, motion)
         if is_over:
             return y, t, guard
         if not heeds:
-            for c in range(SIZE):
+            for c in range(Y_SIZE):
                 motion.end_rate[c] = motion.rate[c]
-            return y, t, WATCH
-        put_state(motion, START, y)
+            return y, t, GUARD_WATCH
+        put_state_row(motion, ROW_START, y)
         if not t < left:
             break
         for s in range(motion.is_active.shape[0]):
-            motion.gap[START, s], motion.gap_rate[START, s] = motion.gap[END, s], motion.gap_rate[END, s]
-        h = start_step(left - t, tilted, work, motion)
-        note_margins(START, work, motion)
+            motion.gap[ROW_START, s], motion.gap_rate[ROW_START, s] = (
+                motion.gap[ROW_END, s],
+                motion.gap_rate[ROW_END, s],
+            )
+        h = prepare_extrapolated_step(left - t, tilted, work, motion)
+        store_force_margins(ROW_START, work, motion)
     if t < left:
-        return get_state(motion, START), t, NO_STEP
-    return y, left, NO_GUARD
+        return get_state_row(motion, ROW_START), t, GUARD_STEP_FAILED
+    return y, left, GUARD_NONE
 
 
 @kernel
-def look_ahead(y, tilted, work, motion):
+def predict_state(y, tilted, work, motion):
     """State to which the regime would lead in a moment."""
-    put_state(motion, START, y)
+    put_state_row(motion, ROW_START, y)
     motion.step = motion.ahead
-    start_step(motion.ahead, tilted, work, motion)
-    try_step(motion.ahead, tilted, work, motion)
-    return cancel(get_state(motion, END), tilted, work, motion)
+    prepare_extrapolated_step(motion.ahead, tilted, work, motion)
+    try_extrapolated_step(motion.ahead, tilted, work, motion)
+    return project_state(get_state_row(motion, ROW_END), tilted, work, motion)

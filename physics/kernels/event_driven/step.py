@@ -26,58 +26,69 @@ import math
 
 from physics.kernels.compile.decorators import inlined, kernel
 from physics.kernels.contact_solver.solve import solve_contacts
-from physics.kernels.event_driven.acceleration_problem import read_resting
-from physics.kernels.event_driven.chatter_control import is_crowded, note_leap, note_step, set_pace
-from physics.kernels.event_driven.constraint_projection import cancel
-from physics.kernels.event_driven.contact_candidates import (
-    ASKS,
-    ASKS_SLIDING,
-    COLLIDES,
-    FLIES,
-    GOES_BACK,
-    IS_LOST,
-    RESTS,
+from physics.kernels.event_driven.acceleration_problem import read_resting_mode
+from physics.kernels.event_driven.chatter_control import (
+    adapt_look_ahead,
+    is_chattering,
+    lengthen_leap,
+    reset_chatter_control,
 )
-from physics.kernels.event_driven.contact_mode import find_regime
-from physics.kernels.event_driven.guards import FORCES, NO_GUARD, NO_STEP, WATCH
-from physics.kernels.event_driven.impact import carry_on, collide, jump, note, principal_axes
-from physics.kernels.event_driven.mode_acceptance import GROWTH, SHORTER, judge
-from physics.kernels.event_driven.mode_transitions import keep_contacts, log_changes, recall_contacts
-from physics.kernels.event_driven.smooth_segment import body_speed, look_ahead, move
-from physics.kernels.event_driven.time_of_impact import fly_freely, fly_to_wall, note_unresolved
+from physics.kernels.event_driven.constraint_projection import project_state
+from physics.kernels.event_driven.contact_candidates import (
+    MODE_FLIGHT,
+    MODE_IMPACT,
+    MODE_INCONSISTENT,
+    MODE_REST,
+    MODE_ROLLBACK,
+    MODE_UNDECIDED,
+    MODE_UNDECIDED_SLIDING,
+)
+from physics.kernels.event_driven.contact_mode import find_contact_mode
+from physics.kernels.event_driven.guards import FORCE_GUARDS, GUARD_NONE, GUARD_STEP_FAILED, GUARD_WATCH
+from physics.kernels.event_driven.impact import (
+    drift_at_velocity,
+    principal_rotation,
+    report_impact_solve,
+    resolve_impacts,
+    resolve_inconsistency,
+)
+from physics.kernels.event_driven.mode_acceptance import TRUST_GROWTH, TRUST_SHRINK, accept_step
+from physics.kernels.event_driven.mode_transitions import load_contact_modes, log_mode_changes, store_contact_modes
+from physics.kernels.event_driven.smooth_segment import body_speed_bound, integrate_segment, predict_state
+from physics.kernels.event_driven.time_of_impact import count_unresolved_flight, fly_freely, fly_to_wall
 from physics.kernels.forces.held_loads import bind_fields, refresh_loads, set_clock
 from physics.kernels.math import quaternion as qt
-from physics.kernels.parallel.work_stealing import begin, next_world
+from physics.kernels.parallel.work_stealing import begin_taking, next_world
 from physics.kernels.state import layout as at
 from physics.kernels.state.body import (
     angular_velocity,
     bind_body,
-    can_bear,
+    has_finite_loads,
     is_finite,
-    note_fault,
     read_state,
+    report_fault,
     write_state,
 )
 from physics.kernels.state.contact_law_dispatch import bind_laws
 from physics.kernels.time_stepping import event_log as ev
 
-# Gaps of this share of what they are the difference of are rounding; see `set_thresholds` for HOP.
-ROUNDING = 1.0e-15
-HOP = 4.0
+# Gaps of this share of what they are the difference of are rounding; see `set_event_thresholds` for HOP.
+_ROUNDING = 1.0e-15
+_UNSEEN_HOP_GAPS = 4.0
 
 # Contacts that touch within this share of the same time, and ten times the tolerance, do so at once: rounding would
 # else make two impacts of that of an edge, with another outcome.
-TOGETHER = 1.0e-10
-TINY = 1.0e-300
+_SIMULTANEOUS_SHARE = 1.0e-10
+_TINY = 1.0e-300
 
 # Sliding ends at this share of the speed at which a contact that leaves counts as still.
-SLOW = 1.0e-2
+_SLIP_STOP_SHARE = 1.0e-2
 
-NOTHING = -1
+_NO_FORCED_MODE = -1
 
 
 @kernel
-def set_thresholds(y, h, tilted, work, motion):
+def set_event_thresholds(y, h, tilted, work, motion):
     """Set the gap and speed that count as zero, and the time a regime is looked ahead; problems are solved to rounding.
 
     Gaps are differences of places, wherever the body may go within h.
@@ -85,49 +96,49 @@ def set_thresholds(y, h, tilted, work, motion):
     gain from being set down on the wall what it loses in the impact.
     """
     work.still = work.unseen = 0.0
-    x, speed = y[0], body_speed(y, tilted, work)
-    motion.touch = max(work.slop, ROUNDING * (work.radius + math.sqrt(qt.dot(x, x)) + h * speed))
+    x, speed = y[0], body_speed_bound(y, tilted, work)
+    motion.touch = max(work.slop, _ROUNDING * (work.radius + math.sqrt(qt.dot(x, x)) + h * speed))
     motion.noise = 1.0e-13 * speed
-    motion.still = math.sqrt(2.0 * HOP * work.acceleration * motion.touch) + motion.noise
-    motion.slow = SLOW * motion.still + motion.noise
-    unit = work.radius / (speed + math.sqrt(work.radius * work.acceleration) + TINY)
-    set_pace(unit, motion)
-    motion.together = (TOGETHER + 10.0 * work.tolerance) * unit
+    motion.still = math.sqrt(2.0 * _UNSEEN_HOP_GAPS * work.acceleration * motion.touch) + motion.noise
+    motion.slow = _SLIP_STOP_SHARE * motion.still + motion.noise
+    unit = work.radius / (speed + math.sqrt(work.radius * work.acceleration) + _TINY)
+    reset_chatter_control(unit, motion)
+    motion.together = (_SIMULTANEOUS_SHARE + 10.0 * work.tolerance) * unit
 
 
 @inlined
-def begin_part(y, start, h, tilted, memory, work, motion):
+def begin_event_substep(y, start, h, tilted, memory, work, motion):
     """Prepare a part of length h that begins at the time `start` of the step."""
     set_clock(start, work)
     refresh_loads(y, 0.0, tilted, work)
-    set_thresholds(y, h, tilted, work, motion)
+    set_event_thresholds(y, h, tilted, work, motion)
     motion.assured = 0.0
-    recall_contacts(memory, work.i, work, motion)
+    load_contact_modes(memory, work.i, work, motion)
     motion.left_out, motion.turns = 0.0, 0
 
 
 @kernel
-def find_what(y, is_foretold, watched, friction, smooth, tilted, pivots, work, motion, report):
+def classify_mode(y, is_foretold, watched, friction, smooth, tilted, pivots, work, motion, report):
     """Find the regime from y on, and whether a contact problem had to be solved, since the body may come to rest.
 
     It is looked for a moment ahead where a guard has foretold that the regime ends.
     """
     seen, later = y, 0.0
     if is_foretold:
-        seen, later = look_ahead(y, tilted, work, motion), motion.ahead
+        seen, later = predict_state(y, tilted, work, motion), motion.ahead
     motion.assured = later
     refresh_loads(seen, later, tilted, work)
-    what, n, v, L = find_regime(seen, friction, tilted, work, motion)
-    what = judge(what, watched, y, tilted, work, motion)
-    if what not in (ASKS, ASKS_SLIDING):
+    what, n, v, L = find_contact_mode(seen, friction, tilted, work, motion)
+    what = accept_step(what, watched, y, tilted, work, motion)
+    if what not in (MODE_UNDECIDED, MODE_UNDECIDED_SLIDING):
         return what, False
     if n > 0:
-        P = principal_axes(seen, tilted, work)
+        P = principal_rotation(seen, tilted, work)
         solved = solve_contacts(n, friction, smooth, pivots, v, L, P, work)
-        note(solved, report, work)
+        report_impact_solve(solved, report, work)
         v, L = solved[0], solved[1]
-    what = read_resting(n, seen, v, L, friction, what == ASKS_SLIDING, tilted, work, motion)
-    return judge(what, watched, y, tilted, work, motion), True
+    what = read_resting_mode(n, seen, v, L, friction, what == MODE_UNDECIDED_SLIDING, tilted, work, motion)
+    return accept_step(what, watched, y, tilted, work, motion), True
 
 
 @kernel
@@ -136,25 +147,25 @@ def come_to_rest(y, t, tilted, work, motion, log, counts):
     if motion.is_resting:
         return y
     motion.is_resting = 1
-    ev.note_change(log, counts, work.i, t + motion.left_out, ev.REST, -1)
-    x, q, _, _ = cancel(y, tilted, work, motion)
+    ev.note_mode_change(log, counts, work.i, t + motion.left_out, ev.KIND_REST, -1)
+    x, q, _, _ = project_state(y, tilted, work, motion)
     return x, q, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
 
 
 @kernel
-def go_on(what, y, t, h, gyroscopic, tilted, work, motion, report):
+def integrate_mode(what, y, t, h, gyroscopic, tilted, work, motion, report):
     """Move, fly or leap from y, at the time t of a part of length h: (state, time it took, the guard that ended it)."""
-    if what == IS_LOST:
+    if what == MODE_INCONSISTENT:
         report[work.world, at.FALLBACKS] += 1.0
         step = min(motion.leap, h - t)
-        note_leap(t + step, motion)
-        return carry_on(y, step, tilted, work), step, NO_GUARD
-    if what == FLIES:
+        lengthen_leap(t + step, motion)
+        return drift_at_velocity(y, step, tilted, work), step, GUARD_NONE
+    if what == MODE_FLIGHT:
         y, step, is_found = fly_to_wall(y, h - t, gyroscopic, tilted, work, motion, report)
         if not is_found:
-            note_unresolved(report, work)
-        return y, step, NO_GUARD
-    return move(y, h - t, tilted, work, motion)
+            count_unresolved_flight(report, work)
+        return y, step, GUARD_NONE
+    return integrate_segment(y, h - t, tilted, work, motion)
 
 
 @kernel
@@ -164,60 +175,62 @@ def advance(y, h, friction, smooth, gyroscopic, tilted, pivots, work, motion, me
     Each turn asks what the body does (`impact_events` says so beforehand where it is known) and does that. A step whose
     end has to be looked at (`mode_acceptance`) has begun at `kept` and has the length `watched`.
     """
-    begin_part(y, start, h, tilted, memory, work, motion)
-    t, told, is_foretold, kept, watched = 0.0, NOTHING, False, y, 0.0
+    begin_event_substep(y, start, h, tilted, memory, work, motion)
+    t, told, is_foretold, kept, watched = 0.0, _NO_FORCED_MODE, False, y, 0.0
     for k in range(work.splits + 1):
         if k == work.splits:
             report[work.world, at.UNRESOLVED] += 1.0
             break
-        if is_crowded(t, motion):
-            told = IS_LOST
+        if is_chattering(t, motion):
+            told = MODE_INCONSISTENT
         what, is_answer = told, False
-        if told == NOTHING:
-            what, is_answer = find_what(
+        if told == _NO_FORCED_MODE:
+            what, is_answer = classify_mode(
                 y, is_foretold, watched, friction, smooth, tilted, pivots, work, motion, report
             )  # fmt: skip
-        told = NOTHING
-        if is_answer and what in (COLLIDES, IS_LOST):
+        told = _NO_FORCED_MODE
+        if is_answer and what in (MODE_IMPACT, MODE_INCONSISTENT):
             told, is_foretold = what, False
             continue
-        if what == COLLIDES:
-            y = collide(y, start + t, friction, smooth, tilted, pivots, work, motion, report, log, counts)
-        elif what == IS_LOST:
+        if what == MODE_IMPACT:
+            y = resolve_impacts(y, start + t, friction, smooth, tilted, pivots, work, motion, report, log, counts)
+        elif what == MODE_INCONSISTENT:
             leap = min(motion.leap, h - t)
-            y = jump(y, leap, start + t, friction, smooth, tilted, pivots, work, motion, report, log, counts)
-        elif what == GOES_BACK:
-            motion.trust = SHORTER * watched
+            y = resolve_inconsistency(
+                y, leap, start + t, friction, smooth, tilted, pivots, work, motion, report, log, counts
+            )
+        elif what == MODE_ROLLBACK:
+            motion.trust = TRUST_SHRINK * watched
             y, t, watched, is_foretold = kept, t - watched, 0.0, False
             set_clock(start + t, work)
             continue
         if watched > 0.0:
-            motion.trust, watched = GROWTH * watched, 0.0
+            motion.trust, watched = TRUST_GROWTH * watched, 0.0
             if not t < h:
                 break
-        if what == COLLIDES:
+        if what == MODE_IMPACT:
             report[work.world, at.SPLITS] += 1.0
             motion.crowd -= motion.is_sequential  # those in turn have a bound of their own
             is_foretold = False
             continue
-        log_changes(work, motion, log, counts, start + t)
-        if what == RESTS:
+        log_mode_changes(work, motion, log, counts, start + t)
+        if what == MODE_REST:
             y = come_to_rest(y, start + t, tilted, work, motion, log, counts)
             break
         motion.is_resting, kept = 0, y
-        y, step, guard = go_on(what, y, t, h, gyroscopic, tilted, work, motion, report)
+        y, step, guard = integrate_mode(what, y, t, h, gyroscopic, tilted, work, motion, report)
         t += step
         set_clock(start + t, work)
-        note_step(step, guard, motion)
+        adapt_look_ahead(step, guard, motion)
         motion.left_out, motion.turns = 0.0, 0
-        if guard == WATCH:
+        if guard == GUARD_WATCH:
             watched = step
         elif not t < h:
             break
-        elif guard == NO_STEP:
-            told = IS_LOST
-        is_foretold = guard in FORCES
-    keep_contacts(memory, work.i, work, motion)
+        elif guard == GUARD_STEP_FAILED:
+            told = MODE_INCONSISTENT
+        is_foretold = guard in FORCE_GUARDS
+    store_contact_modes(memory, work.i, work, motion)
     return y
 
 
@@ -232,7 +245,7 @@ def step_events(
     """
     work, motion = scratch[0], motions[0]
     bodies = shapes.shape[0]
-    world = begin(turns, taken)
+    world = begin_taking(turns, taken)
     while True:
         world = next_world(world, turns, taken)
         if world < 0:
@@ -243,9 +256,9 @@ def step_events(
             i = world * bodies + b
             counts[i] = 0
             bind_body(world, i, shapes[b], params, gravity, wrench, friction, restitution, tilted, work)
-            if not can_bear(work):
-                note_fault(world, b, report)
-                ev.note_change(log, counts, i, 0.0, ev.FAULT, -1)
+            if not has_finite_loads(work):
+                report_fault(world, b, report)
+                ev.note_mode_change(log, counts, i, 0.0, ev.KIND_FAULT, -1)
                 continue
             bind_fields(params, i, None, work)
             bind_laws(params, i, work)
@@ -261,9 +274,9 @@ def step_events(
                     set_clock(k * h, work)
                     new = fly_freely(y, h, gyroscopic, tilted, work, motion, report)
                 if not is_finite(new):
-                    note_fault(world, b, report)
+                    report_fault(world, b, report)
                     ev.drop_events(i, 1, k * h, log, counts)
-                    ev.note_change(log, counts, i, k * h, ev.FAULT, -1)
+                    ev.note_mode_change(log, counts, i, k * h, ev.KIND_FAULT, -1)
                     break
                 y = new
             write_state(state, i, y)

@@ -17,7 +17,7 @@ s = |D Rᵀ n|, has derivatives that exceed those of a point at its largest semi
 largest to its smallest.
 
 In a field there is no such bound: the body moves as it does in contact, by smooth steps with gaps and their rates
-watched at both ends (`move`), unless it felt nothing of any field on its way.
+watched at both ends (`integrate_segment`), unless it felt nothing of any field on its way.
 """
 
 from __future__ import annotations
@@ -25,41 +25,49 @@ from __future__ import annotations
 import math
 
 from physics.kernels.compile.decorators import inlined, kernel
-from physics.kernels.event_driven.contact_forces import free_turning, load, plus
-from physics.kernels.event_driven.extrapolated_midpoint import CUT, SHORTEST, get_state, put_state, start_step, try_step
-from physics.kernels.event_driven.guards import NO_STEP
-from physics.kernels.event_driven.smooth_segment import move
-from physics.kernels.event_driven.workspace import END, SIZE, START
+from physics.kernels.event_driven.contact_forces import free_angular_motion
+from physics.kernels.event_driven.extrapolated_midpoint import (
+    SEGMENT_SHORTEST_STEP,
+    SEGMENT_STEP_CUT,
+    get_state_row,
+    prepare_extrapolated_step,
+    put_state_row,
+    try_extrapolated_step,
+)
+from physics.kernels.event_driven.guards import GUARD_STEP_FAILED
+from physics.kernels.event_driven.smooth_segment import integrate_segment
+from physics.kernels.event_driven.workspace import ROW_END, ROW_START, Y_SIZE
 from physics.kernels.flight.free_flight import fly
 from physics.kernels.forces.held_loads import (
+    advance_clock,
+    has_felt_field,
     has_fields,
     hold_loads,
-    pass_time,
     refresh_loads,
+    reset_felt_flag,
     set_now,
-    start_feeling,
-    was_felt,
 )
-from physics.kernels.forces.stiff_flight import graded_flight
-from physics.kernels.half_space.contact_point import arm_and_rate, wall_normal
-from physics.kernels.half_space.contact_set import is_clear
+from physics.kernels.forces.stiff_flight import subdivide_stiff_flight
+from physics.kernels.half_space.contact_point import contact_arm_and_rate, wall_normal
+from physics.kernels.half_space.contact_set import is_flight_clear
 from physics.kernels.math import quaternion as qt
+from physics.kernels.math.vector import as_vector, plus
 from physics.kernels.state import layout as at
 from physics.kernels.state.body import angular_velocity
-from physics.kernels.state.layout import ELLIPSOID, OFFSET, SPHERE
+from physics.kernels.state.layout import ELLIPSOID, SPHERE, WALL_OFFSET
 
 # Advances towards one impact at most; six are usual, more where a body grazes a wall.
-ADVANCES = 200
+_MAX_ADVANCES = 200
 
 # An advance by less than this share of the time left is the last one: what it leaves is of third order in it.
-FINEST = 1.0e-13
+_LAST_ADVANCE_SHARE = 1.0e-13
 
 # The time over which the parabola bounds the gap is doubled as long as it is not used up: from the first guess, which
 # is as short as the bound of the third derivative is loose, by as much as rounding tells apart at most.
-DOUBLINGS = 52
+_MAX_HORIZON_DOUBLINGS = 52
 
 # Extrapolated steps of one flight at most, those that are refused included.
-MOST_TRIES = 10_000
+_MAX_FLIGHT_STEPS = 10_000
 
 
 @inlined
@@ -78,10 +86,10 @@ def parabola_root(g, r, b):
 
 
 @inlined
-def safe_time(g, r, b, third, horizon):
+def gap_safe_time(g, r, b, third, horizon):
     """A time within which a gap g with rate r, second derivative b and third at most `third` is not used up."""
     t = min(horizon, parabola_root(g, r, b - third * horizon / 3.0))
-    for _ in range(DOUBLINGS):
+    for _ in range(_MAX_HORIZON_DOUBLINGS):
         over = min(horizon, 2.0 * t)
         t = max(t, min(over, parabola_root(g, r, b - third * over / 3.0)))
         if t < over or over == horizon:
@@ -92,7 +100,7 @@ def safe_time(g, r, b, third, horizon):
 
 
 @kernel
-def third_bound(y, left, tilted, work):
+def gap_jerk_bound(y, left, tilted, work):
     """Bound of the third derivative of any feature's gap over the time `left` [m/s³]."""
     if work.shape == SPHERE:
         return 0.0
@@ -110,31 +118,31 @@ def third_bound(y, left, tilted, work):
 
 
 @kernel
-def safe_flight(y, left, third, assured, tilted, work, motion):
+def safe_flight_time(y, left, third, assured, tilted, work, motion):
     """A time within which no feature at y reaches a wall, at most `left`.
 
     Those that touch and do not come stay away for the time `assured` at least: where a push has just ended, what lifts
     them is still zero.
     """
     x, v = y[0], y[2]
-    R, _, w, alpha = free_turning(y, tilted, work)
-    dims, a, shape = load(work.dims), load(work.free_acceleration), work.shape
+    R, _, w, alpha = free_angular_motion(y, tilted, work)
+    dims, a, shape = as_vector(work.dims), as_vector(work.free_acceleration), work.shape
     t = left
     for k in range(work.walls.shape[0]):
         n = wall_normal(work.walls, k)
-        d = qt.dot(n, x) - work.walls[k, OFFSET]
+        d = qt.dot(n, x) - work.walls[k, WALL_OFFSET]
         vn, an = qt.dot(n, v), qt.dot(n, a)
         if d - work.radius + min(0.0, t * vn) + min(0.0, 0.5 * t * t * an) > 0.0:
             continue
         for feature in range(work.features):
-            r, rate = arm_and_rate(shape, dims, R, w, n, feature, tilted, work)
+            r, rate = contact_arm_and_rate(shape, dims, R, w, n, feature, tilted, work)
             gap = d + qt.dot(n, r)
             speed = vn + qt.dot(n, qt.cross(w, r))
             bend = an + qt.dot(n, plus(qt.cross(alpha, r), qt.cross(w, rate)))
             least = 0.0
             if gap <= motion.touch and speed >= -motion.still:
                 gap, speed, least = max(gap, 0.0), max(speed, 0.0), assured
-            t = min(t, max(safe_time(max(gap, 0.0), speed, bend, third, t), least))
+            t = min(t, max(gap_safe_time(max(gap, 0.0), speed, bend, third, t), least))
     return t
 
 
@@ -146,32 +154,32 @@ def has_torque(work):
 
 
 @kernel
-def fly_smoothly(y, t, tilted, work, motion):
+def integrate_free_flight(y, t, tilted, work, motion):
     """Free motion under a torque or in fields over t by extrapolated steps: (state, what MOST_TRIES left of t)."""
-    put_state(motion, START, y)
+    put_state_row(motion, ROW_START, y)
     left, tries = t, 0
     motion.step = left
-    while left > 0.0 and tries < MOST_TRIES:
+    while left > 0.0 and tries < _MAX_FLIGHT_STEPS:
         tries += 1
-        h = start_step(left, tilted, work, motion)
-        error, _ = try_step(h, tilted, work, motion)
-        if not error <= work.tolerance and h > SHORTEST * t:
-            motion.step = CUT * h
+        h = prepare_extrapolated_step(left, tilted, work, motion)
+        error, _ = try_extrapolated_step(h, tilted, work, motion)
+        if not error <= work.tolerance and h > SEGMENT_SHORTEST_STEP * t:
+            motion.step = SEGMENT_STEP_CUT * h
             continue
-        for c in range(SIZE):
-            motion.y[START, c] = motion.y[END, c]
+        for c in range(Y_SIZE):
+            motion.y[ROW_START, c] = motion.y[ROW_END, c]
         left -= h
-        pass_time(h, work)
+        advance_clock(h, work)
         motion.step = 2.0 * h
-    return get_state(motion, START), left
+    return get_state_row(motion, ROW_START), left
 
 
 @inlined
-def note_unresolved(report, work):
+def count_unresolved_flight(report, work):
     """Count a flight that extrapolated steps cannot follow; if there are fields, it is they that are not resolved."""
     report[work.world, at.UNRESOLVED] += 1.0
     if has_fields(work):
-        report[work.world, at.COARSE] += 1.0
+        report[work.world, at.UNRESOLVED_MOTION] += 1.0
 
 
 @kernel
@@ -181,14 +189,14 @@ def fly_freely(y, t, gyroscopic, tilted, work, motion, report):
     Turned or swung by more than extrapolated steps can follow, the rest of t is time stepping's, which is reported.
     """
     if has_torque(work) or has_fields(work):
-        start_feeling(work)
-        end, left = fly_smoothly(y, t, tilted, work, motion)
+        reset_felt_flag(work)
+        end, left = integrate_free_flight(y, t, tilted, work, motion)
         if left > 0.0:
-            note_unresolved(report, work)
+            count_unresolved_flight(report, work)
             hold_loads(end, left, gyroscopic, tilted, work)
             rest = fly(end, work, left, gyroscopic, tilted)
-            end = graded_flight(rest, end, left, gyroscopic, tilted, None, work)
-        if was_felt(work):
+            end = subdivide_stiff_flight(rest, end, left, gyroscopic, tilted, None, work)
+        if has_felt_field(work):
             return end
     return fly(y, work, t, gyroscopic, tilted)
 
@@ -201,23 +209,23 @@ def fly_to_wall(y, left, gyroscopic, tilted, work, motion, report):
     """
     motion.count = 0
     if has_fields(work):
-        now = start_feeling(work)
-        end, t, guard = move(y, left, tilted, work, motion)
-        if was_felt(work):
-            return end, t, guard != NO_STEP
+        now = reset_felt_flag(work)
+        end, t, guard = integrate_segment(y, left, tilted, work, motion)
+        if has_felt_field(work):
+            return end, t, guard != GUARD_STEP_FAILED
         set_now(now, work)
         refresh_loads(y, 0.0, tilted, work)
-    if is_clear(y[0], y[2], left, work):
+    if is_flight_clear(y[0], y[2], left, work):
         return fly_freely(y, left, gyroscopic, tilted, work, motion, report), left, True
-    third = third_bound(y, left, tilted, work)
+    third = gap_jerk_bound(y, left, tilted, work)
     now, t = y, 0.0
-    for _ in range(ADVANCES):
+    for _ in range(_MAX_ADVANCES):
         assured = motion.assured if t == 0.0 else 0.0
-        step = safe_flight(now, left - t, third, assured, tilted, work, motion)
+        step = safe_flight_time(now, left - t, third, assured, tilted, work, motion)
         if t + step >= left:
             return fly_freely(y, left, gyroscopic, tilted, work, motion, report), left, True
         t += step
         now = fly_freely(y, t, gyroscopic, tilted, work, motion, report)
-        if step <= FINEST * left:
+        if step <= _LAST_ADVANCE_SHARE * left:
             break
     return now, t, True

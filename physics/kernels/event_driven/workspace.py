@@ -11,21 +11,21 @@ import numpy as np
 from physics.kernels.state.layout import VERTEX_COUNT
 
 # Vertices of a block that can lie in one plane.
-FACE = 4
+FACE_VERTICES = 4
 
 # Columns of a smooth state: position, quaternion, velocity, angular momentum.
-X, Q, V, L, SIZE = 0, 3, 7, 10, 13
+Y_POSITION, Y_QUATERNION, Y_VELOCITY, Y_ANGULAR_MOMENTUM, Y_SIZE = 0, 3, 7, 10, 13
 
 # Rows of `y`: where the step starts, where it ends, two of the midpoint rule.
-START, END, LAST, NOW, ROWS = 0, 1, 2, 3, 4
+ROW_START, ROW_END, ROW_PREVIOUS, ROW_CURRENT, ROW_COUNT = 0, 1, 2, 3, 4
 
 # Midpoint rules with 2, 4, 6, ... parts that are extrapolated at most: order 16.
-ORDERS = 8
+MAX_MIDPOINT_RULES = 8
 
 
 def motion_dtype(wall_count: int, features: int) -> np.dtype:
     """Record type for bodies with `features` contact features each against `wall_count` walls."""
-    n = max(wall_count, 1) * (FACE if features == VERTEX_COUNT else 1)
+    n = max(wall_count, 1) * (FACE_VERTICES if features == VERTEX_COUNT else 1)
     m = 3 * n
     n_slots = max(wall_count, 1) * features
     f, i = np.float64, np.int64
@@ -47,7 +47,7 @@ def motion_dtype(wall_count: int, features: int) -> np.dtype:
         ("step", f),  # length of the last smooth step [s]
         ("unheeded", i),  # the regime whose guards of force say nothing; see `mode_acceptance`
         ("trust", f),  # length of a step without them [s]
-        ("end_rate", f, (SIZE,)),  # rate of change at the end of such a step
+        ("end_rate", f, (Y_SIZE,)),  # rate of change at the end of such a step
         ("left_out", f),  # time that a sequence of bounces would have taken on [s]
         ("rebound", f, (3 * n_slots,)),  # impulses of a rebound that there is not enough energy for [N s]
         ("count", i),  # contacts that act
@@ -96,12 +96,12 @@ def motion_dtype(wall_count: int, features: int) -> np.dtype:
         ("is_active", i, (n_slots,)),
         ("weight", f),  # scale of the forces [N]
         ("spin", f),  # angular speed at the start of the step [rad/s]
-        ("y", f, (ROWS, SIZE)),
-        ("rate", f, (SIZE,)),
-        ("first_rate", f, (SIZE,)),
-        ("last_rate", f, (SIZE,)),
-        ("scale", f, (SIZE,)),
-        ("table", f, (ORDERS, SIZE)),
+        ("y", f, (ROW_COUNT, Y_SIZE)),
+        ("rate", f, (Y_SIZE,)),
+        ("first_rate", f, (Y_SIZE,)),
+        ("last_rate", f, (Y_SIZE,)),
+        ("scale", f, (Y_SIZE,)),
+        ("table", f, (MAX_MIDPOINT_RULES, Y_SIZE)),
     ])  # fmt: skip
 
 

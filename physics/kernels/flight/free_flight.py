@@ -5,23 +5,19 @@ from __future__ import annotations
 from physics.kernels.compile.decorators import inlined, kernel
 from physics.kernels.flight import integrators
 from physics.kernels.flight.free_rotation import free_rotation, isotropic_rotation
+from physics.kernels.math.vector import as_vector
 from physics.kernels.state.body import body_attitude, principal_attitude
 
 
 @inlined
-def _vector(a):
-    return (a[0], a[1], a[2])
-
-
-@inlined
-def drift(q, L, work, h, gyroscopic, tilted):
+def drift_attitude(q, L, work, h, gyroscopic, tilted):
     """Attitude after h with constant angular momentum L, exact to rounding."""
     if L[0] == 0.0 and L[1] == 0.0 and L[2] == 0.0:
         return q
     if gyroscopic is None:
         return isotropic_rotation(q, L, work.J[0], h)
     principal = principal_attitude(q, work, tilted)
-    return body_attitude(free_rotation(principal, L, _vector(work.J), work.series, h), work, tilted)
+    return body_attitude(free_rotation(principal, L, as_vector(work.J), work.series, h), work, tilted)
 
 
 @inlined
@@ -41,14 +37,14 @@ def fly(y, work, h, gyroscopic, tilted):
     )
     v = (v[0] + h * a[0], v[1] + h * a[1], v[2] + h * a[2])
     if torque[0] == 0.0 and torque[1] == 0.0 and torque[2] == 0.0:
-        return x, drift(q, L, work, h, gyroscopic, tilted), v, L
-    q = drift(q, L, work, 0.5 * h, gyroscopic, tilted)
+        return x, drift_attitude(q, L, work, h, gyroscopic, tilted), v, L
+    q = drift_attitude(q, L, work, 0.5 * h, gyroscopic, tilted)
     L = (L[0] + h * torque[0], L[1] + h * torque[1], L[2] + h * torque[2])
-    return x, drift(q, L, work, 0.5 * h, gyroscopic, tilted), v, L
+    return x, drift_attitude(q, L, work, 0.5 * h, gyroscopic, tilted), v, L
 
 
 @inlined
-def coast(y, h, gyroscopic, tilted, scheme, work):
+def integrate_flight(y, h, gyroscopic, tilted, scheme, work):
     """Free motion over h, by the exact flow or by the scheme that was chosen."""
     if scheme is None:
         return fly(y, work, h, gyroscopic, tilted)
@@ -68,10 +64,10 @@ def fly_by_scheme(scheme, y, work, h, tilted):
         v,
         L,
         zero,
-        _vector(work.torque),
-        _vector(work.free_acceleration),
+        as_vector(work.torque),
+        as_vector(work.free_acceleration),
         1.0,
-        _vector(work.J),
+        as_vector(work.J),
         h,
     )
     return x, body_attitude(q, work, tilted), v, L

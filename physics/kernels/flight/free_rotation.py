@@ -30,7 +30,7 @@ coefficients below were derived in exact rational arithmetic by matching the
 Taylor series of the flow; `tests/kernels/test_rotation.py` derives them anew.
 From e0 e follows e0² = (1 + √(1 - 4 |e0 e|²)) / 2.
 
-A step whose angle h |ω| exceeds `ANGLE_LIMIT` is cut into equal parts. One of many turns is taken by periods of m,
+A step whose angle h |ω| exceeds `PART_ANGLE_LIMIT` is cut into equal parts. One of many turns is taken by periods of m,
 which is made of elliptic functions: with the axes in the order of their moments, so that 2 is the middle one,
 
     T = 4 K(k) / √max(P, Q) = 2π / agm(√max(P, Q), √|P - Q|).
@@ -59,7 +59,7 @@ from physics.kernels.math import quaternion as qt
 # Largest rotation angle of one part [rad]. The first neglected terms are of relative size θ⁸ times at most
 # 1e-4 (s and d) and θ¹⁰ times 0.009 (σ): at 0.06, 1.7e-14 θ_part and 5e-15, that is 1e-15 rad per part at the
 # most, and a few 1e-17 for the block.
-ANGLE_LIMIT = 0.06
+PART_ANGLE_LIMIT = 0.06
 
 # Below this angle² θ² [rad²] the terms of third order of all series are left out. With |P| h² + |Q| h² <= 2 θ² they
 # change m(h) by less than 0.09 θ⁶ = 2.4e-14 of its size, and the attitude, where m(h) enters times θ/4, by 5e-17; those
@@ -127,7 +127,7 @@ def _half_angle(x, square):
     """(e0, 1/e0) from x = |e0 e|², that is e0² = (1 + √(1 - 4x)) / 2, by their series.
 
     The roots would stand one after the other in the longest chain of the step. 4x = sin² of an angle up to
-    `ANGLE_LIMIT`, so x < 9.0e-4, and the first neglected terms, 29 x⁶ of e0 and 51 x⁶ of 1/e0, are under 3e-17.
+    `PART_ANGLE_LIMIT`, so x < 9.0e-4, and the first neglected terms, 29 x⁶ of e0 and 51 x⁶ of 1/e0, are under 3e-17.
     """
     xx = x * x
     if square > TINY_SQUARE:
@@ -141,7 +141,7 @@ def _half_angle(x, square):
 
 @inlined
 def _part(q, m_body, J_body, c, mm, energy2, square, h):
-    """One part of the flow: (quaternion, body momentum) after h, for an angle below `ANGLE_LIMIT`, of that `square`."""
+    """Part of the flow: (quaternion, body momentum) after h, for an angle below the limit, of that `square`."""
     J1, J2, J3 = J_body
     m1, m2, m3 = m_body
     a1, a2, a3 = J3 - J2, J1 - J3, J2 - J1
@@ -231,23 +231,23 @@ def _is_steady(m, J):
 def _turn_steadily(q, L, mm, energy2, h):
     """Attitude after h of a body whose momentum in the principal frame stays as it is."""
     s = h * (energy2 / mm)
-    return qt.renormalise(qt.multiply(qt.exponential((s * L[0], s * L[1], s * L[2])), q))
+    return qt.renormalise(qt.multiply(qt.exp_map((s * L[0], s * L[1], s * L[2])), q))
 
 
 @inlined
 def _turn_by_parts(q, m, L, J, series, mm, energy2, h, angle):
-    """Attitude after h, in equal parts of at most `ANGLE_LIMIT`."""
-    if angle > ANGLE_LIMIT * PARTS_LIMIT:
+    """Attitude after h, in equal parts of at most `PART_ANGLE_LIMIT`."""
+    if angle > PART_ANGLE_LIMIT * PARTS_LIMIT:
         return _turn_steadily(q, L, mm, energy2, h)
-    parts = int(angle / ANGLE_LIMIT) + 1
+    parts = int(angle / PART_ANGLE_LIMIT) + 1
     for _ in range(parts):
-        q, m = _part(q, m, J, series, mm, energy2, ANGLE_LIMIT * ANGLE_LIMIT, h / parts)
+        q, m = _part(q, m, J, series, mm, energy2, PART_ANGLE_LIMIT * PART_ANGLE_LIMIT, h / parts)
     return q
 
 
 @kernel
 def _turn_far(q, m, L, J, series, mm, energy2, h):
-    """Attitude after a turn beyond `ANGLE_LIMIT`: by parts, and of many turns by periods of the momentum."""
+    """Attitude after a turn beyond `PART_ANGLE_LIMIT`: by parts, and of many turns by periods of the momentum."""
     angle = abs(h) * math.sqrt(max(J[0], J[1], J[2]) * energy2)
     if not angle < math.inf:
         return (math.nan, math.nan, math.nan, math.nan)  # its energy overflows: the caller's guard reports it
@@ -262,7 +262,7 @@ def _turn_far(q, m, L, J, series, mm, energy2, h):
         e = qt.multiply(turned, qt.conjugate(q))  # about L, since m is again what it was
         size = math.sqrt(mm)
         turn = 2.0 * math.atan2(qt.dot((e[1], e[2], e[3]), L) / size, e[0]) * math.copysign(count, h)
-        q = qt.multiply(qt.exponential((turn * L[0] / size, turn * L[1] / size, turn * L[2] / size)), q)
+        q = qt.multiply(qt.exp_map((turn * L[0] / size, turn * L[1] / size, turn * L[2] / size)), q)
         rest = max(abs(h) - count * period, 0.0)
         angle *= rest / abs(h)
         h = math.copysign(rest, h)
@@ -297,7 +297,7 @@ def free_rotation(q, L, J, series, h):
     energy2 = w1 * m[0] + w2 * m[1] + w3 * m[2]
     # max |ω|² over the whole orbit, not only now: Σ J² m² <= max(J) Σ J m².
     square = h * h * (max(J[0], J[1], J[2]) * energy2)
-    if square <= ANGLE_LIMIT * ANGLE_LIMIT:
+    if square <= PART_ANGLE_LIMIT * PART_ANGLE_LIMIT:
         q, m = _part(q, m, J, series, mm, energy2, square, h)
         return q
     return _turn_far(q, m, L, J, series, mm, energy2, h)
@@ -307,4 +307,4 @@ def free_rotation(q, L, J, series, h):
 def isotropic_rotation(q, L, J1, h):
     """Attitude after h when all moments are equal: ω = J1 L is constant, no gyroscopic torque."""
     s = J1 * h
-    return qt.renormalise(qt.multiply(qt.exponential((s * L[0], s * L[1], s * L[2])), q))
+    return qt.renormalise(qt.multiply(qt.exp_map((s * L[0], s * L[1], s * L[2])), q))

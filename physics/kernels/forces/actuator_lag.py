@@ -18,7 +18,7 @@ def _shorten(command, i, first, limit):
 
 
 @kernel
-def shorten(command, limit_force, limit_torque):
+def clamp_command(command, limit_force, limit_torque):
     """Shorten forces and torques of `command` (rows, 6) to limits [N, N m], inf where there is none."""
     for i in range(command.shape[0]):
         _shorten(command, i, 0, limit_force)
@@ -26,7 +26,7 @@ def shorten(command, limit_force, limit_torque):
 
 
 @kernel
-def follow(command, gone, kept, share, is_first, output, applied):
+def apply_actuator_lag(command, gone, kept, share, is_first, output, applied):
     """Let `output` follow a held `command`, both (rows, 6); its mean meanwhile, times `share`, goes to `applied`.
 
     Of the distance between them the share `gone` has gone at the end, and `kept` is left in the mean.

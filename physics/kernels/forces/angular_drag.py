@@ -10,27 +10,28 @@ from __future__ import annotations
 import math
 
 from physics.kernels.compile.decorators import inlined
-from physics.kernels.forces.force_field_state import ZERO, times
+from physics.kernels.forces.force_field_state import ZERO
 from physics.kernels.forces.implicit_loads import implicit_share
 from physics.kernels.math import quaternion as qt
+from physics.kernels.math.vector import times
 
 # Columns.
-LINEAR = 0  # c [N m s]
-QUADRATIC = 1  # d [N m s²]
-SIZE = 2
+ANGULAR_DRAG_LINEAR = 0  # c [N m s]
+ANGULAR_DRAG_QUADRATIC = 1  # d [N m s²]
+ANGULAR_DRAG_SIZE = 2
 
 
 @inlined
 def angular_drag(state, p, t):
     """(force, torque) of the drag on the spin."""
     w = state.w
-    return ZERO, times(-(p[LINEAR] + p[QUADRATIC] * math.sqrt(qt.dot(w, w))), w)
+    return ZERO, times(-(p[ANGULAR_DRAG_LINEAR] + p[ANGULAR_DRAG_QUADRATIC] * math.sqrt(qt.dot(w, w))), w)
 
 
 @inlined
 def _slope(state, p):
     """Slope of the torque with ω, along it [N m s]."""
-    return p[LINEAR] + 2.0 * p[QUADRATIC] * math.sqrt(qt.dot(state.w, state.w))
+    return p[ANGULAR_DRAG_LINEAR] + 2.0 * p[ANGULAR_DRAG_QUADRATIC] * math.sqrt(qt.dot(state.w, state.w))
 
 
 @inlined

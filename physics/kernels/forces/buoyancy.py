@@ -12,25 +12,26 @@ from __future__ import annotations
 import math
 
 from physics.kernels.compile.decorators import inlined
-from physics.kernels.forces.force_field_state import ZERO, acting_at, plus, times
+from physics.kernels.forces.force_field_state import ZERO, acting_at
 from physics.kernels.forces.implicit_loads import soften_at
-from physics.kernels.forces.submerged_volume import submerged
+from physics.kernels.forces.submerged_volume import submerged_part
 from physics.kernels.math import quaternion as qt
+from physics.kernels.math.vector import plus, times
 from physics.kernels.state.layout import BLOCK, SPHERE
 
 # Columns.
-NORMAL = 0  # of the surface, up
-OFFSET = 3  # the fluid is where normal·x <= offset [m]
-WEIGHT = 4  # ρ g [N/m³]
-SIZE = 5
+FLUID_NORMAL = 0  # of the surface, up
+FLUID_OFFSET = 3  # the fluid is where normal·x <= offset [m]
+FLUID_WEIGHT = 4  # ρ g [N/m³]
+BUOYANCY_SIZE = 5
 
 
 @inlined
 def _wet(state, p):
     """Volume of the submerged part, its centre relative to the centre of mass, and the height of that."""
-    n = (p[NORMAL], p[NORMAL + 1], p[NORMAL + 2])
-    height = qt.dot(n, plus(state.x, state.center)) - p[OFFSET]
-    volume, centre = submerged(state.shape, state.dims, qt.transposed_matvec(state.R, n), height)
+    n = (p[FLUID_NORMAL], p[FLUID_NORMAL + 1], p[FLUID_NORMAL + 2])
+    height = qt.dot(n, plus(state.x, state.center)) - p[FLUID_OFFSET]
+    volume, centre = submerged_part(state.shape, state.dims, qt.transposed_matvec(state.R, n), height)
     r = qt.matvec(state.R, centre)
     return volume, plus(state.center, r), height + qt.dot(n, r), n
 
@@ -39,7 +40,7 @@ def _wet(state, p):
 def buoyancy(state, p, t):
     """(force, torque) of the fluid."""
     volume, arm, _, n = _wet(state, p)
-    force = times(p[WEIGHT] * volume, n)
+    force = times(p[FLUID_WEIGHT] * volume, n)
     if state.shape == SPHERE and state.center == ZERO:
         return force, ZERO  # along the line through the centre, whatever rounding says
     return acting_at(arm, force)
@@ -49,7 +50,7 @@ def buoyancy(state, p, t):
 def buoyancy_energy(state, p, t):
     """ρ g V times the depth of the submerged part's centre [J]."""
     volume, _, height, _ = _wet(state, p)
-    return -p[WEIGHT] * volume * height
+    return -p[FLUID_WEIGHT] * volume * height
 
 
 @inlined
@@ -71,11 +72,11 @@ def _squares(state, p, J, h):
     the surface stays clear of the body in the half step on either side.
     """
     d, c = state.dims, state.center
-    height = qt.dot((p[NORMAL], p[NORMAL + 1], p[NORMAL + 2]), plus(state.x, c)) - p[OFFSET]
+    height = qt.dot((p[FLUID_NORMAL], p[FLUID_NORMAL + 1], p[FLUID_NORMAL + 2]), plus(state.x, c)) - p[FLUID_OFFSET]
     reach = math.sqrt(qt.dot(d, d)) + 0.5 * h * math.sqrt(qt.dot(state.v, state.v))
     if abs(height) > reach:
         return 0.0, 0.0
-    heave = p[WEIGHT] * _largest_section(state) / state.mass
+    heave = p[FLUID_WEIGHT] * _largest_section(state) / state.mass
     offset = 2.0 * math.sqrt(qt.dot(d, d) * qt.dot(c, c)) * state.mass * max(J[0], J[1], J[2])
     return heave, heave * (1.25 + offset)
 
@@ -93,7 +94,7 @@ def buoyancy_rates(state, p, J, h):
 def soften_buoyancy(loads, h, R, state, p, J):
     """Loads as `implicit_loads` has them, with the bounds of the stiffness."""
     heave, roll = _squares(state, p, J, h)
-    n = (p[NORMAL], p[NORMAL + 1], p[NORMAL + 2])
+    n = (p[FLUID_NORMAL], p[FLUID_NORMAL + 1], p[FLUID_NORMAL + 2])
     s = 0.25 * h * h
     a, T = soften_at(loads, ZERO, n, s * heave * state.mass, 0.0, R, state.mass, J)
     if state.shape == SPHERE and state.center == ZERO:

@@ -20,19 +20,26 @@ from __future__ import annotations
 import math
 
 from physics.kernels.compile.decorators import inlined
-from physics.kernels.forces.force_field_state import acting_at, minus, times, velocity_at
-from physics.kernels.forces.implicit_loads import arm_square, implicit_share, mobility_bound, soften_arm, soften_at
+from physics.kernels.forces.force_field_state import acting_at, velocity_at
+from physics.kernels.forces.implicit_loads import (
+    arm_frequency_squared,
+    implicit_share,
+    mobility_bound,
+    soften_arm,
+    soften_at,
+)
 from physics.kernels.math import quaternion as qt
+from physics.kernels.math.vector import minus, times
 from physics.kernels.state.layout import BLOCK, SPHERE
 
 # Columns.
-STRENGTH = 0  # ½ ρ C [kg/m³]
-LINEAR = 1  # c [N s/m]
-SIZE = 2
+DRAG_STRENGTH = 0  # ½ ρ C [kg/m³]
+DRAG_LINEAR = 1  # c [N s/m]
+DRAG_SIZE = 2
 
 
 @inlined
-def swept(shape, dims, R, u):
+def swept_volume_rate(shape, dims, R, u):
     """A(u) |u| [m³/s]: the volume of air that the body's shadow sweeps per second."""
     if shape == SPHERE:
         return math.pi * dims[0] * dims[0] * math.sqrt(qt.dot(u, u))
@@ -47,7 +54,7 @@ def swept(shape, dims, R, u):
 def drag(state, p, t):
     """(force, torque) of the drag."""
     u = minus(velocity_at(state, state.center), state.air)
-    k = p[STRENGTH] * swept(state.shape, state.dims, state.R, u) + p[LINEAR]
+    k = p[DRAG_STRENGTH] * swept_volume_rate(state.shape, state.dims, state.R, u) + p[DRAG_LINEAR]
     return acting_at(state.center, times(-k, u))
 
 
@@ -55,8 +62,8 @@ def drag(state, p, t):
 def _slopes(state, p):
     """Relative velocity u, and how fast the force grows along it and across [N s/m]: the quadratic part twice along."""
     u = minus(velocity_at(state, state.center), state.air)
-    quadratic = p[STRENGTH] * swept(state.shape, state.dims, state.R, u)
-    return u, 2.0 * quadratic + p[LINEAR], quadratic + p[LINEAR]
+    quadratic = p[DRAG_STRENGTH] * swept_volume_rate(state.shape, state.dims, state.R, u)
+    return u, 2.0 * quadratic + p[DRAG_LINEAR], quadratic + p[DRAG_LINEAR]
 
 
 @inlined
@@ -65,7 +72,7 @@ def drag_rates(state, p, J, h):
     u, along, across = _slopes(state, p)
     return (
         along * mobility_bound(state.center, state.mass, J),
-        arm_square(times(across, u), state.center, J),
+        arm_frequency_squared(times(across, u), state.center, J),
         0.0,
     )
 

@@ -13,17 +13,22 @@ import math
 
 from physics.kernels.compile.decorators import inlined, kernel
 from physics.kernels.forces.field_loads import field_state
-from physics.kernels.forces.force_field_dispatch import if_declared, total_energy, total_potential, total_supply
-from physics.kernels.forces.force_field_state import minus, plus, times
+from physics.kernels.forces.force_field_dispatch import (
+    if_declared,
+    total_conservative_load,
+    total_energy,
+    total_supplied_power,
+)
 from physics.kernels.math import quaternion as qt
+from physics.kernels.math.vector import minus, plus, times
 from physics.kernels.state.body import angular_velocity, kinetic_energy
 
 # Share of the energies at hand that rounding may add in a stage.
-ROUNDING = 1.0e-13
+ENERGY_ROUNDING = 1.0e-13
 
 # Share of the kinetic energy by which explicit loads of a stage in contact may miss the work of their fields, and
 # beyond which a stage that gains has not resolved them.
-EXPLICIT_SHARE = COARSE_SHARE = 0.01
+WORK_ERROR_SHARE = UNRESOLVED_GAIN_SHARE = 0.01
 
 
 @inlined
@@ -41,37 +46,37 @@ def _middle(y, end):
 
 
 @inlined
-def held_loads(work):
+def constant_loads(work):
     """Acceleration and torque that are held over the step."""
     a, T = work.held_acceleration, work.held_torque
     return (a[0], a[1], a[2]), (T[0], T[1], T[2])
 
 
 @kernel
-def gain_of(y, end, h, tilted, work):
+def energy_gain(y, end, h, tilted, work):
     """(energy that a stage from y to `end` has gained from nowhere, its kinetic energy, rounding of both) [J]."""
     x, q, v, L = _middle(y, end)
     before, after = kinetic_energy(y[1], y[2], y[3], work, tilted), kinetic_energy(end[1], end[2], end[3], work, tilted)
     low, high = potential_energy(y, 0.0, tilted, work), potential_energy(end, h, tilted, work)
-    a, T = held_loads(work)
+    a, T = constant_loads(work)
     done = work.mass * qt.dot(a, minus(end[0], y[0])) + h * qt.dot(T, angular_velocity(q, L, work, tilted))
     t = work.now + 0.5 * h
-    supply = h * total_supply(field_state(x, q, v, L, t, tilted, work), t, work)
-    rounding = ROUNDING * (before + after + abs(low) + abs(high) + abs(done) + supply)
+    supply = h * total_supplied_power(field_state(x, q, v, L, t, tilted, work), t, work)
+    rounding = ENERGY_ROUNDING * (before + after + abs(low) + abs(high) + abs(done) + supply)
     return (after + high) - (before + low) - done - supply, after, rounding
 
 
 @if_declared(False)
-def misses_work(y, end, h, tilted, work):
+def has_work_error(y, end, h, tilted, work):
     """True where the work from y to `end` of explicit loads misses the change of the fields' energy."""
     x, q, v, L = _middle(y, end)
     t = work.now + 0.5 * h
     state = field_state(plus(x, times(0.5 * h, y[2])), q, v, L, t, tilted, work)
-    F, T = total_potential(state, t, work)
+    F, T = total_conservative_load(state, t, work)
     low, high = potential_energy(y, 0.0, tilted, work), potential_energy(end, h, tilted, work)
     motion = kinetic_energy(y[1], y[2], y[3], work, tilted) + kinetic_energy(end[1], end[2], end[3], work, tilted)
     missed = high - low + h * (qt.dot(F, state.v) + qt.dot(T, state.w))
-    return abs(missed) > EXPLICIT_SHARE * motion + ROUNDING * (abs(low) + abs(high))
+    return abs(missed) > WORK_ERROR_SHARE * motion + ENERGY_ROUNDING * (abs(low) + abs(high))
 
 
 def _as_it_is(y, end, h, is_free, tilted, work):
@@ -79,7 +84,7 @@ def _as_it_is(y, end, h, is_free, tilted, work):
 
 
 @if_declared(_as_it_is)
-def paid(y, end, h, is_free, tilted, work):
+def limit_energy_gain(y, end, h, is_free, tilted, work):
     """`end` of a stage of length h from y without the energy that came from nowhere.
 
     Where there is too little motion to pay with the body is back at y: in free flight (`is_free`) turned round, in
@@ -87,10 +92,10 @@ def paid(y, end, h, is_free, tilted, work):
     """
     if work.is_stiff == 0:
         return end
-    gain, motion, rounding = gain_of(y, end, h, tilted, work)
+    gain, motion, rounding = energy_gain(y, end, h, tilted, work)
     if gain <= rounding:
         return end
-    if gain > COARSE_SHARE * motion:
+    if gain > UNRESOLVED_GAIN_SHARE * motion:
         work.is_coarse = 1
     x, q, v, L = end
     if gain < motion:

@@ -9,15 +9,10 @@ from physics.kernels.forces.force_field_dispatch import (
     total_air,
     total_load,
 )
-from physics.kernels.forces.force_field_state import ZERO, FieldState, minus, plus, times
+from physics.kernels.forces.force_field_state import ZERO, FieldState
 from physics.kernels.math import quaternion as qt
+from physics.kernels.math.vector import as_vector, minus, plus, times
 from physics.kernels.state.body import angular_velocity, principal_attitude
-
-
-@inlined
-def vector(a):
-    """Vector as a tuple."""
-    return (a[0], a[1], a[2])
 
 
 @inlined
@@ -27,16 +22,16 @@ def field_state(x, q, v, L, t, tilted, work):
     w = angular_velocity(q, L, work, tilted)
     center = ZERO
     if tilted is not None:
-        center = qt.matvec(R, vector(work.center))
-    still = FieldState(x, v, w, R, center, ZERO, work.mass, work.shape, vector(work.dims))
+        center = qt.matvec(R, as_vector(work.center))
+    still = FieldState(x, v, w, R, center, ZERO, work.mass, work.shape, as_vector(work.dims))
     air = total_air(still, t, work)
-    return FieldState(x, v, w, R, center, air, work.mass, work.shape, vector(work.dims))
+    return FieldState(x, v, w, R, center, air, work.mass, work.shape, as_vector(work.dims))
 
 
 @inlined
-def kicked(x, q, v, L, loads, kick, later, tilted, work):
+def kicked_state(x, q, v, L, loads, kick, later, tilted, work):
     """State that fields are told, `later` [s] than now, once loads (F, T) and those held have acted for `kick` [s]."""
-    a, torque = all_loads(loads[0], loads[1], work)
+    a, torque = add_held_loads(loads[0], loads[1], work)
     return field_state(x, q, plus(v, times(kick, a)), plus(L, times(kick, torque)), work.now + later, tilted, work)
 
 
@@ -47,7 +42,7 @@ def field_load(x, q, v, L, t, tilted, work):
 
 
 @inlined
-def put_loads(force, torque, work):
+def apply_loads(force, torque, work):
     """Let them act, besides what is held; `work.acceleration` bounds what they do to any point of the body."""
     inv_mass, J = 1.0 / work.mass, work.J
     for c in range(3):
@@ -60,45 +55,45 @@ def put_loads(force, torque, work):
 
 
 @inlined
-def principal_axes(q, tilted, work):
+def principal_axes_matrix(q, tilted, work):
     """Principal axes in the world."""
     return qt.to_matrix(principal_attitude(q, work, tilted))
 
 
 @inlined
-def all_loads(F, T, work):
+def add_held_loads(F, T, work):
     """Acceleration [m/s²] and torque [N m] of fields' loads and of what is held."""
-    return plus(vector(work.held_acceleration), times(1.0 / work.mass, F)), plus(vector(work.held_torque), T)
+    return plus(as_vector(work.held_acceleration), times(1.0 / work.mass, F)), plus(as_vector(work.held_torque), T)
 
 
 @inlined
-def put_all(loads, work):
+def apply_total_loads(loads, work):
     """Let them act."""
     a, T = loads
-    F = times(work.mass, minus(a, vector(work.held_acceleration)))
-    put_loads(F, minus(T, vector(work.held_torque)), work)
+    F = times(work.mass, minus(a, as_vector(work.held_acceleration)))
+    apply_loads(F, minus(T, as_vector(work.held_torque)), work)
 
 
 @inlined
-def less(b, a):
+def subtract_loads(b, a):
     """Difference of two pairs of acceleration and torque."""
     return minus(b[0], a[0]), minus(b[1], a[1])
 
 
 @inlined
-def more(a, b):
+def add_loads(a, b):
     """Sum of two pairs of acceleration and torque."""
     return plus(a[0], b[0]), plus(a[1], b[1])
 
 
 @inlined
-def loads_held(work):
+def acting_loads(work):
     """Acceleration and torque that act."""
-    return vector(work.free_acceleration), vector(work.torque)
+    return as_vector(work.free_acceleration), as_vector(work.torque)
 
 
 @inlined
-def size_of(loads, work):
+def load_bound(loads, work):
     """Bound of what an acceleration and a torque do to any point of the body [m/s²]."""
     a, T = loads
     J = max(work.J[0], work.J[1], work.J[2])

@@ -16,9 +16,10 @@ from typing import NamedTuple
 
 from numba.extending import overload
 
-from physics.kernels.compile.decorators import CHOSEN, composed, kernel
-from physics.kernels.forces.force_field_state import ZERO, plus
+from physics.kernels.compile.decorators import OVERLOAD_OPTIONS, kernel, runtime_kernel
+from physics.kernels.forces.force_field_state import ZERO
 from physics.kernels.math.quaternion import dot
+from physics.kernels.math.vector import plus
 
 # First word of a marker: what the field's function gives, a (force, torque) or the velocity of the air.
 LOAD, AIR = "load", "air"
@@ -65,12 +66,12 @@ class Term(NamedTuple):
 _KNOWN: dict[str, Term] = {}
 
 
-def declare(terms: tuple[Term, ...]) -> None:
+def register_terms(terms: tuple[Term, ...]) -> None:
     """Make terms known before a kernel is compiled for a workspace that holds their markers."""
     _KNOWN.update((term.marker, term) for term in terms)
 
 
-def members(terms: tuple[Term, ...]) -> list[tuple]:
+def term_members(terms: tuple[Term, ...]) -> list[tuple]:
     """Members of a workspace for these terms; none without terms."""
     if not terms:
         return []
@@ -122,7 +123,7 @@ def _chosen_by(is_chosen: Callable, otherwise):
         def stub(*arguments):
             return function(*arguments) if is_chosen(_names(arguments[-1])) else skip(*arguments)
 
-        @overload(stub, jit_options=CHOSEN, strict=False)
+        @overload(stub, jit_options=OVERLOAD_OPTIONS, strict=False)
         def choose(*types):
             return call if is_chosen(_names(types[-1])) else skip
 
@@ -140,7 +141,7 @@ def if_declared(otherwise=None):
     return _chosen_by(lambda names: bool(_markers(names)), otherwise)
 
 
-def if_unknown(otherwise=None):
+def if_user_field(otherwise=None):
     """As `if_declared`, where some field does not tell its rates: a user's own."""
     return _chosen_by(_has_unknown, otherwise)
 
@@ -149,7 +150,7 @@ def _has_unknown(names: list[str]) -> bool:
     return any(_KNOWN[name].rates is None for name in _markers(names) if name.startswith(LOAD))
 
 
-def instances(work, kind: str) -> Iterator[tuple[Term, int, int]]:
+def iterate_terms(work, kind: str) -> Iterator[tuple[Term, int, int]]:
     """Each field of this kind in a workspace: its term, first and last column."""
     first = 0
     for marker in _markers(_names(work)):
@@ -168,12 +169,12 @@ def _sum(kind: str, start: Callable, chosen: Callable, add: Callable):
 
     def total(work):
         result = start
-        for term, first, last in instances(work, kind):
+        for term, first, last in iterate_terms(work, kind):
             if chosen(term) is not None:
-                result = add(composed(result), chosen(term), first, last)
+                result = add(runtime_kernel(result), chosen(term), first, last)
         return result
 
-    @overload(stub, jit_options=CHOSEN, strict=False)
+    @overload(stub, jit_options=OVERLOAD_OPTIONS, strict=False)
     def choose(state, t, work):
         return total(work)
 
@@ -249,9 +250,11 @@ total_linked_load = _sum(LOAD, _no_load, lambda term: term.function if term.is_l
 total_air = _sum(AIR, _no_air, lambda term: term.function, _add_vector)
 total_energy = _sum(LOAD, _no_energy, lambda term: term.energy, _add_number)
 total_rates = _sum(LOAD, _no_rates, lambda term: term.rates, _add_rates)
-total_potential = _sum(LOAD, _no_load, lambda term: term.function if term.energy is not None else None, _add_load)
-total_supply = _sum(LOAD, _no_energy, lambda term: term.function if term.energy is None else None, _add_supply)
-total_unknown = _sum(LOAD, _no_load, lambda term: term.function if term.rates is None else None, _add_load)
+total_conservative_load = _sum(
+    LOAD, _no_load, lambda term: term.function if term.energy is not None else None, _add_load
+)
+total_supplied_power = _sum(LOAD, _no_energy, lambda term: term.function if term.energy is None else None, _add_supply)
+total_user_load = _sum(LOAD, _no_load, lambda term: term.function if term.rates is None else None, _add_load)
 
 
 def total_mean_load(states, t, work):
@@ -261,13 +264,13 @@ def total_mean_load(states, t, work):
 
 def _mean_load(work):
     result = _no_load
-    for term, first, last in instances(work, LOAD):
-        mean = composed(_of_middle(term.function)) if term.mean is None else term.mean
-        result = _add_load(composed(result), mean, first, last)
+    for term, first, last in iterate_terms(work, LOAD):
+        mean = runtime_kernel(_of_middle(term.function)) if term.mean is None else term.mean
+        result = _add_load(runtime_kernel(result), mean, first, last)
     return result
 
 
-@overload(total_mean_load, jit_options=CHOSEN, strict=False)
+@overload(total_mean_load, jit_options=OVERLOAD_OPTIONS, strict=False)
 def _choose_mean_load(states, t, work):
     return _mean_load(work)
 
@@ -283,19 +286,19 @@ def _then_soften(before, function, first, last):
     return soften
 
 
-def softened(loads, h, R, state, work):
+def soften_loads(loads, h, R, state, work):
     """Acceleration and torque as the implicit step over h of all fields has them, one field after the other."""
     return _softened(work)(loads, h, R, state, work)
 
 
 def _softened(work):
     result = _as_it_is
-    for term, first, last in instances(work, LOAD):
+    for term, first, last in iterate_terms(work, LOAD):
         if term.soften is not None:
-            result = _then_soften(composed(result), term.soften, first, last)
+            result = _then_soften(runtime_kernel(result), term.soften, first, last)
     return result
 
 
-@overload(softened, jit_options=CHOSEN, strict=False)
+@overload(soften_loads, jit_options=OVERLOAD_OPTIONS, strict=False)
 def _choose_softened(loads, h, R, state, work):
     return _softened(work)

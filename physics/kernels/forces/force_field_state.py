@@ -6,6 +6,7 @@ from typing import NamedTuple
 
 from physics.kernels.compile.decorators import inlined
 from physics.kernels.math import quaternion as qt
+from physics.kernels.math.vector import plus
 
 ZERO = (0.0, 0.0, 0.0)
 
@@ -40,24 +41,6 @@ class FieldState(NamedTuple):
     mass: float
     shape: int
     dims: tuple
-
-
-@inlined
-def plus(a, b):
-    """a + b."""
-    return (a[0] + b[0], a[1] + b[1], a[2] + b[2])
-
-
-@inlined
-def minus(a, b):
-    """a - b."""
-    return (a[0] - b[0], a[1] - b[1], a[2] - b[2])
-
-
-@inlined
-def times(s, a):
-    """The number s times the vector a."""
-    return (s * a[0], s * a[1], s * a[2])
 
 
 @inlined

@@ -16,26 +16,26 @@ None of this is in a kernel whose scene declares no field (`force_field_dispatch
 
 from __future__ import annotations
 
-from physics.kernels.flight.free_flight import drift
+from physics.kernels.flight.free_flight import drift_attitude
 from physics.kernels.forces.field_loads import (
-    all_loads,
+    add_held_loads,
+    add_loads,
+    apply_loads,
+    apply_total_loads,
     field_load,
     field_state,
-    kicked,
-    less,
-    more,
-    principal_axes,
-    put_all,
-    put_loads,
-    vector,
+    kicked_state,
+    principal_axes_matrix,
+    subtract_loads,
 )
 from physics.kernels.forces.force_field_dispatch import (
     if_declared,
-    softened,
+    soften_loads,
     total_load,
 )
-from physics.kernels.forces.force_field_state import ZERO, plus, times
-from physics.kernels.forces.resolution_limits import look_over_stage, note_rates
+from physics.kernels.forces.force_field_state import ZERO
+from physics.kernels.forces.resolution_limits import check_stage_resolution, note_field_rates
+from physics.kernels.math.vector import as_vector, plus, times
 from physics.kernels.state import layout as at
 
 # Evaluations of the midpoint rule beyond the first, and half a turn of the velocity [rad] up to which one will do: it
@@ -66,7 +66,7 @@ def set_clock(elapsed, work):
 
 
 @if_declared()
-def pass_time(h, work):
+def advance_clock(h, work):
     """Say that so much time has passed since it was last said [s]."""
     work.now += h
 
@@ -77,21 +77,23 @@ def hold_loads(y, h, gyroscopic, tilted, work):
     x, q, v, L = y
     half = 0.5 * h
     t = work.now + half
-    q = drift(q, L, work, half, gyroscopic, tilted)
+    q = drift_attitude(q, L, work, half, gyroscopic, tilted)
     x = plus(x, times(half, v))
     state = field_state(x, q, v, L, t, tilted, work)
     F, T = total_load(state, t, work)
-    look_over_stage(y, (F, T), x, q, h, tilted, work)
-    turn = note_rates(state, kicked(x, q, v, L, (F, T), h, h, tilted, work), h, work)
+    check_stage_resolution(y, (F, T), x, q, h, tilted, work)
+    turn = note_field_rates(state, kicked_state(x, q, v, L, (F, T), h, h, tilted, work), h, work)
     if work.is_stiff == 1:
-        put_all(softened(all_loads(F, T, work), h, principal_axes(q, tilted, work), state, work), work)
+        apply_total_loads(
+            soften_loads(add_held_loads(F, T, work), h, principal_axes_matrix(q, tilted, work), state, work), work
+        )
         return
     for _ in range(MIDPOINT_ROUNDS):
-        state = kicked(x, q, v, L, (F, T), half, half, tilted, work)
+        state = kicked_state(x, q, v, L, (F, T), half, half, tilted, work)
         before, (F, T) = (F, T), total_load(state, t, work)
         if work.is_textbook == 1 or not half * turn > EXPLICIT_TURN or (before[0] == F and before[1] == T):
             break
-    put_loads(F, T, work)
+    apply_loads(F, T, work)
 
 
 @if_declared()
@@ -103,18 +105,20 @@ def hold_contact_loads(y, h, gyroscopic, tilted, work):
     x, q, v, L = y
     half = 0.5 * h
     t = work.now + half
-    q = drift(q, L, work, half, gyroscopic, tilted)
+    q = drift_attitude(q, L, work, half, gyroscopic, tilted)
     x = plus(x, times(half, v))
     state = field_state(x, q, v, L, t, tilted, work)
     F, T = total_load(state, t, work)
-    look_over_stage(y, (F, T), x, q, h, tilted, work)
-    note_rates(state, kicked(x, q, v, L, (F, T), h, h, tilted, work), h, work)
+    check_stage_resolution(y, (F, T), x, q, h, tilted, work)
+    note_field_rates(state, kicked_state(x, q, v, L, (F, T), h, h, tilted, work), h, work)
     if work.is_stiff == 1:
-        still = all_loads(*field_load(x, q, state.air, ZERO, t, tilted, work), work)
-        slowed = softened(less(all_loads(F, T, work), still), h, principal_axes(q, tilted, work), state, work)
-        put_all(more(still, slowed), work)
+        still = add_held_loads(*field_load(x, q, state.air, ZERO, t, tilted, work), work)
+        slowed = soften_loads(
+            subtract_loads(add_held_loads(F, T, work), still), h, principal_axes_matrix(q, tilted, work), state, work
+        )
+        apply_total_loads(add_loads(still, slowed), work)
         return
-    put_loads(F, T, work)
+    apply_loads(F, T, work)
 
 
 @if_declared(False)
@@ -128,21 +132,27 @@ def hold_mean_loads(y, end, h, gyroscopic, tilted, work):
     x, q, v, L = y
     half = 0.5 * h
     t = work.now + half
-    q = drift(q, L, work, half, gyroscopic, tilted)
+    q = drift_attitude(q, L, work, half, gyroscopic, tilted)
     x, v, L = plus(x, times(half, v)), times(0.5, plus(v, end[2])), times(0.5, plus(L, end[3]))
     state = field_state(x, q, v, L, t, tilted, work)
     F, T = total_load(state, t, work)
-    a, torque = vector(work.free_acceleration), vector(work.torque)
+    a, torque = as_vector(work.free_acceleration), as_vector(work.torque)
     was_stiff = work.is_stiff
-    note_rates(state, field_state(x, q, end[2], end[3], t, tilted, work), h, work)
+    note_field_rates(state, field_state(x, q, end[2], end[3], t, tilted, work), h, work)
     if was_stiff == 1:
         work.is_stiff = 1
     if work.is_stiff == 1:
-        change = softened(less(all_loads(F, T, work), (a, torque)), h, principal_axes(q, tilted, work), state, work)
-        put_all(more((a, torque), change), work)
+        change = soften_loads(
+            subtract_loads(add_held_loads(F, T, work), (a, torque)),
+            h,
+            principal_axes_matrix(q, tilted, work),
+            state,
+            work,
+        )
+        apply_total_loads(add_loads((a, torque), change), work)
     else:
-        put_loads(F, T, work)
-    return a != vector(work.free_acceleration) or torque != vector(work.torque)
+        apply_loads(F, T, work)
+    return a != as_vector(work.free_acceleration) or torque != as_vector(work.torque)
 
 
 @if_declared()
@@ -151,10 +161,12 @@ def hold_softened_loads(y, h, gyroscopic, tilted, work):
     x, q, v, L = y
     half = 0.5 * h
     t = work.now + half
-    q = drift(q, L, work, half, gyroscopic, tilted)
+    q = drift_attitude(q, L, work, half, gyroscopic, tilted)
     state = field_state(plus(x, times(half, v)), q, v, L, t, tilted, work)
     F, T = total_load(state, t, work)
-    put_all(softened(all_loads(F, T, work), h, principal_axes(q, tilted, work), state, work), work)
+    apply_total_loads(
+        soften_loads(add_held_loads(F, T, work), h, principal_axes_matrix(q, tilted, work), state, work), work
+    )
 
 
 @if_declared()
@@ -162,8 +174,8 @@ def refresh_loads(y, later, tilted, work):
     """Let the loads at the state y act, `later` [s] than now."""
     x, q, v, L = y
     F, T = field_load(x, q, v, L, work.now + later, tilted, work)
-    put_loads(F, T, work)
-    if F != ZERO or T != ZERO or vector(work.held_torque) != ZERO:
+    apply_loads(F, T, work)
+    if F != ZERO or T != ZERO or as_vector(work.held_torque) != ZERO:
         work.is_felt = 1
 
 
@@ -180,7 +192,7 @@ def time_now(work):
 
 
 @if_declared(0.0)
-def start_feeling(work):
+def reset_felt_flag(work):
     """Forget what was felt; the time now [s]."""
     work.is_felt = 0
     return work.now
@@ -193,6 +205,6 @@ def set_now(t, work):
 
 
 @if_declared(True)
-def was_felt(work):
-    """True if a field, or a held torque, was not zero anywhere since `start_feeling`."""
+def has_felt_field(work):
+    """True if a field, or a held torque, was not zero anywhere since `reset_felt_flag`."""
     return work.is_felt == 1

@@ -27,15 +27,15 @@ from __future__ import annotations
 import math
 
 from physics.kernels.compile.decorators import inlined, kernel
-from physics.kernels.forces.force_field_state import minus, plus, times
 from physics.kernels.math import quaternion as qt
-from physics.kernels.state.body import turning
+from physics.kernels.math.vector import minus, plus, times
+from physics.kernels.state.body import apply_inv_inertia
 
 # A stage is taken implicitly where h λ is more, or where it does not resolve a field.
 DAMPING_LIMIT = 0.5
 
 # It does not resolve a field where h Ω or h γ, the angle that it swings or turns by [rad], is more.
-ANGLE_LIMIT = 1.0
+_RESOLVED_ANGLE = 1.0
 
 
 @inlined
@@ -49,11 +49,11 @@ def implicit_share(z):
 @inlined
 def is_unresolved(rates, h):
     """True where a step of h does not resolve how a field swings or turns; `stiff_flight` resolves damping."""
-    return h * h * rates[1] > ANGLE_LIMIT * ANGLE_LIMIT or h * rates[2] > ANGLE_LIMIT
+    return h * h * rates[1] > _RESOLVED_ANGLE * _RESOLVED_ANGLE or h * rates[2] > _RESOLVED_ANGLE
 
 
 @inlined
-def is_beyond(rates, h):
+def is_too_stiff(rates, h):
     """True where a step of h is too long for the explicit midpoint rule."""
     return h * rates[0] > DAMPING_LIMIT or is_unresolved(rates, h)
 
@@ -65,7 +65,7 @@ def mobility_bound(arm, mass, J):
 
 
 @inlined
-def arm_square(force, arm, J):
+def arm_frequency_squared(force, arm, J):
     """Squared frequency [1/s²] at which a force at an arm swings the body: like a pendulum, |F| |r| J at most."""
     return math.sqrt(qt.dot(force, force) * qt.dot(arm, arm)) * max(J[0], J[1], J[2])
 
@@ -85,7 +85,7 @@ def soften_arm(loads, h, force, arm, R, J):
 
 
 @inlined
-def axes_across(n):
+def tangent_basis(n):
     """Two unit vectors across the unit vector n."""
     if abs(n[0]) < 0.6:
         e = (1.0, 0.0, 0.0)
@@ -97,14 +97,14 @@ def axes_across(n):
 
 
 @inlined
-def answer_of(direction, arm, R, mass, J):
+def point_mobility(direction, arm, R, mass, J):
     """Acceleration of the point `arm` under a unit force along `direction` [1/kg]."""
-    alpha = turning(R, qt.cross(arm, direction), J)
+    alpha = apply_inv_inertia(R, qt.cross(arm, direction), J)
     return plus(times(1.0 / mass, direction), qt.cross(alpha, arm))
 
 
 @kernel
-def answer_to(w, n, s, t, wn, ws, wt, along, across):
+def implicit_point_force(w, n, s, t, wn, ws, wt, along, across):
     """Force f = (1 + Z W)⁻¹ Z w for the acceleration w of a point, or of two against each other.
 
     Z has `along` the unit vector n and `across` it, along s and t [kg]; wn, ws, wt are W n, W s and W t, with the
@@ -134,8 +134,12 @@ def soften_at(loads, arm, n, along, across, R, mass, J):
     With W the mobility of the point and w its acceleration, the force f = (1 + Z W)⁻¹ Z w acts on it, backwards.
     """
     a, T = loads
-    w = plus(a, qt.cross(turning(R, T, J), arm))
-    s, t = axes_across(n)
-    wn, ws, wt = answer_of(n, arm, R, mass, J), answer_of(s, arm, R, mass, J), answer_of(t, arm, R, mass, J)
-    f = answer_to(w, n, s, t, wn, ws, wt, along, across)
+    w = plus(a, qt.cross(apply_inv_inertia(R, T, J), arm))
+    s, t = tangent_basis(n)
+    wn, ws, wt = (
+        point_mobility(n, arm, R, mass, J),
+        point_mobility(s, arm, R, mass, J),
+        point_mobility(t, arm, R, mass, J),
+    )
+    f = implicit_point_force(w, n, s, t, wn, ws, wt, along, across)
     return minus(a, times(1.0 / mass, f)), minus(T, qt.cross(arm, f))

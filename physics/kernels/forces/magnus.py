@@ -16,12 +16,13 @@ from __future__ import annotations
 import math
 
 from physics.kernels.compile.decorators import inlined
-from physics.kernels.forces.force_field_state import ZERO, minus, plus, times
+from physics.kernels.forces.force_field_state import ZERO
 from physics.kernels.math import quaternion as qt
+from physics.kernels.math.vector import minus, plus, times
 
 # Columns.
-STRENGTH = 0  # ½ ρ C [kg/m³]
-SIZE = 1
+MAGNUS_STRENGTH = 0  # ½ ρ C [kg/m³]
+MAGNUS_SIZE = 1
 
 
 @inlined
@@ -29,14 +30,14 @@ def magnus(state, p, t):
     """(force, torque) of the lift."""
     d = state.dims
     u = minus(state.v, state.air)
-    return times(p[STRENGTH] * math.pi * d[0] * d[1] * d[2], qt.cross(state.w, u)), ZERO
+    return times(p[MAGNUS_STRENGTH] * math.pi * d[0] * d[1] * d[2], qt.cross(state.w, u)), ZERO
 
 
 @inlined
 def _turning(state, p):
     """Angular velocity at which the lift turns the velocity [rad/s]."""
     d = state.dims
-    return times(p[STRENGTH] * math.pi * d[0] * d[1] * d[2] / state.mass, state.w)
+    return times(p[MAGNUS_STRENGTH] * math.pi * d[0] * d[1] * d[2] / state.mass, state.w)
 
 
 @inlined

@@ -6,12 +6,12 @@ from physics.kernels.compile.decorators import kernel
 from physics.kernels.forces.field_loads import field_state
 from physics.kernels.forces.force_field_dispatch import total_energy, total_load
 from physics.kernels.forces.held_loads import bind_fields
-from physics.kernels.forces.two_body_spring import look_for_anchors
+from physics.kernels.forces.two_body_spring import place_anchors_of_body
 from physics.kernels.state.body import bind_body, read_state
 
 
 @kernel
-def look_at_fields(state, params, shapes, tilted, start, scratch, wrenches, energies):
+def evaluate_fields(state, params, shapes, tilted, start, scratch, wrenches, energies):
     """Write force and torque of all fields (rows, 6) [N, N m] and potential energies (rows,) [J] at `start` [s].
 
     `wrenches` is zero at first: it is the wrench that is bound, too.
@@ -22,7 +22,7 @@ def look_at_fields(state, params, shapes, tilted, start, scratch, wrenches, ener
             i // shapes.shape[0], i, shapes[i % shapes.shape[0]], params, None, wrenches, None, None, tilted, work
         )
         bind_fields(params, i, None, work)
-        look_for_anchors(i, state, shapes.shape[0], work)
+        place_anchors_of_body(i, state, shapes.shape[0], work)
         x, q, v, L = read_state(state, i)
         told = field_state(x, q, v, L, start, tilted, work)
         F, T = total_load(told, start, work)

@@ -5,42 +5,42 @@ from __future__ import annotations
 import math
 
 from physics.kernels.compile.decorators import inlined, kernel
-from physics.kernels.flight.free_flight import drift
+from physics.kernels.flight.free_flight import drift_attitude
 from physics.kernels.forces.field_loads import (
-    all_loads,
+    add_held_loads,
     field_state,
-    less,
-    principal_axes,
-    size_of,
+    load_bound,
+    principal_axes_matrix,
+    subtract_loads,
 )
 from physics.kernels.forces.force_field_dispatch import (
     if_declared,
-    if_unknown,
-    softened,
+    if_user_field,
+    soften_loads,
     total_mean_load,
     total_rates,
-    total_unknown,
+    total_user_load,
 )
-from physics.kernels.forces.force_field_state import minus, plus, times
-from physics.kernels.forces.implicit_loads import implicit_share, is_beyond, is_unresolved
+from physics.kernels.forces.implicit_loads import implicit_share, is_too_stiff, is_unresolved
 from physics.kernels.math import quaternion as qt
-from physics.kernels.math.quaternion import between
+from physics.kernels.math.quaternion import lerp
+from physics.kernels.math.vector import minus, plus, times
 from physics.kernels.state import layout as at
 from physics.kernels.state.body import angular_velocity
 
 # A user's field is not resolved where its loads change by more than this until the middle of a step, times speed/step.
-COARSE = 2.0
+_COARSE_CHANGE = 2.0
 
 # Share of a kick's cause by which the loads of a user's field may change in half of it without opposing it: a radian a
 # step.
-TURNING = 0.5
+_TURNING_SHARE = 0.5
 
 # Share of all loads up to which a change of them is rounding.
-ROUNDING = 1.0e-9
+_LOAD_ROUNDING = 1.0e-9
 
 
 @kernel
-def note_rates(state, late, h, work):
+def note_field_rates(state, late, h, work):
     """Note whether a stage of length h is too long for the explicit midpoint rule, and for the fields at all.
 
     `state` and `late` are at the same place, with the velocities of the stage's start and those that its loads lead to:
@@ -49,8 +49,8 @@ def note_rates(state, late, h, work):
     first, last = total_rates(state, h, work), total_rates(late, h, work)
     rates = max(first[0], last[0]), max(first[1], last[1]), max(first[2], last[2])
     work.rate, work.damping = max(rates[0], rates[2]), rates[0]
-    work.is_stiff = 1 if is_beyond(rates, h) and work.is_textbook == 0 else 0
-    if is_unresolved(rates, h) or (work.is_textbook == 1 and is_beyond(rates, h)):
+    work.is_stiff = 1 if is_too_stiff(rates, h) and work.is_textbook == 0 else 0
+    if is_unresolved(rates, h) or (work.is_textbook == 1 and is_too_stiff(rates, h)):
         work.is_coarse = 1
     return rates[2]
 
@@ -60,7 +60,7 @@ def _change_of(first, second, work):
     """Change between two loads (F, T): acceleration and torque, and the bound of what it does to any point [m/s²]."""
     F, T = minus(second[0], first[0]), minus(second[1], first[1])
     change = times(1.0 / work.mass, F), T
-    return change, size_of(change, work)
+    return change, load_bound(change, work)
 
 
 @inlined
@@ -68,7 +68,7 @@ def _change_by_kick(kick, moved, v, L, place, work):
     """Change of the loads of a user's fields from `moved`, by half a step of the loads `kick`, and its bound [m/s²]."""
     x, q, h, tilted = place
     v, L = plus(v, times(0.5 * h, kick[0])), plus(L, times(0.5 * h, kick[1]))
-    return _change_of(moved, total_unknown(field_state(x, q, v, L, work.now, tilted, work), work.now, work), work)
+    return _change_of(moved, total_user_load(field_state(x, q, v, L, work.now, tilted, work), work.now, work), work)
 
 
 @inlined
@@ -76,11 +76,11 @@ def _is_too_much(change, size, cause, cause_size, work):
     """True where a change of loads is more of its cause than the explicit rule bears; more where it opposes that."""
     arm = work.radius * max(work.J[0], work.J[1], work.J[2])
     product = qt.dot(cause[0], change[0]) + arm * arm * qt.dot(cause[1], change[1])
-    return size > (cause_size if product <= -0.5 * size * cause_size else TURNING * cause_size)
+    return size > (cause_size if product <= -0.5 * size * cause_size else _TURNING_SHARE * cause_size)
 
 
-@if_unknown()
-def look_over_stage(y, middle, x, q, h, tilted, work):
+@if_user_field()
+def check_stage_resolution(y, middle, x, q, h, tilted, work):
     """Note whether loads of a user's fields change too much over a stage from y; `middle` are all loads at (x, q).
 
     Under a stiffness of frequency Ω the loads change by Ω² h v/2 until the middle: h times that is more than 2 v where
@@ -91,36 +91,38 @@ def look_over_stage(y, middle, x, q, h, tilted, work):
     """
     t = work.now
     v, L = y[2], y[3]
-    start = total_unknown(field_state(y[0], y[1], v, L, t, tilted, work), t, work)
-    moved = total_unknown(field_state(x, q, v, L, t, tilted, work), t, work)
+    start = total_user_load(field_state(y[0], y[1], v, L, t, tilted, work), t, work)
+    moved = total_user_load(field_state(x, q, v, L, t, tilted, work), t, work)
     w = angular_velocity(q, L, work, tilted)
     speed = math.sqrt(qt.dot(v, v)) + work.radius * math.sqrt(qt.dot(w, w))
     _, change = _change_of(start, moved, work)
-    if change > COARSE * speed / h:
+    if change > _COARSE_CHANGE * speed / h:
         work.is_coarse = 1
     place = x, q, h, tilted
-    loads = all_loads(middle[0], middle[1], work)
-    size = size_of(loads, work)
+    loads = add_held_loads(middle[0], middle[1], work)
+    size = load_bound(loads, work)
     first, by_loads = _change_by_kick(loads, moved, v, L, place, work)
     second, by_change = _change_by_kick(first, moved, v, L, place, work)
     if _is_too_much(first, by_loads, loads, size, work):
         work.is_coarse = 1
-    if by_loads > ROUNDING * size and _is_too_much(second, by_change, first, by_loads, work):
+    if by_loads > _LOAD_ROUNDING * size and _is_too_much(second, by_change, first, by_loads, work):
         work.is_coarse = 1
 
 
 @inlined
-def change_to_agree(y, end, loads, h, gyroscopic, tilted, work):
+def newton_load_change(y, end, loads, h, gyroscopic, tilted, work):
     """Softened difference between the loads of a flight over h from y to `end` and `held_loads` (`implicit_loads`)."""
     t, half = work.now + 0.5 * h, 0.5 * h
     share = implicit_share(h * work.damping)
-    v, L = between(y[2], end[2], share), between(y[3], end[3], share)
-    x, q = times(0.5, plus(y[0], end[0])), drift(y[1], y[3], work, half, gyroscopic, tilted)
+    v, L = lerp(y[2], end[2], share), lerp(y[3], end[3], share)
+    x, q = times(0.5, plus(y[0], end[0])), drift_attitude(y[1], y[3], work, half, gyroscopic, tilted)
     middle = field_state(x, q, v, L, t, tilted, work)
     first = field_state(y[0], y[1], v, L, t, tilted, work)
     last = field_state(end[0], end[1], v, L, t, tilted, work)
     F, T = total_mean_load((middle, first, last), t, work)
-    return softened(less(all_loads(F, T, work), loads), h, principal_axes(q, tilted, work), middle, work)
+    return soften_loads(
+        subtract_loads(add_held_loads(F, T, work), loads), h, principal_axes_matrix(q, tilted, work), middle, work
+    )
 
 
 @if_declared(False)
@@ -130,7 +132,7 @@ def is_stiff(work):
 
 
 @if_declared()
-def note_report(is_moved, report, work):
+def report_unresolved_body(is_moved, report, work):
     """Count a body that has moved in fields which some stage of the call did not resolve, or was put back by one."""
     if work.is_put_back == 1 or (work.is_coarse == 1 and is_moved):
-        report[work.world, at.COARSE] += 1.0
+        report[work.world, at.UNRESOLVED_MOTION] += 1.0

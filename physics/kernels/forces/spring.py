@@ -16,55 +16,62 @@ from __future__ import annotations
 import math
 
 from physics.kernels.compile.decorators import inlined
-from physics.kernels.forces.force_field_state import ZERO, acting_at, minus, plus, times, velocity_at
-from physics.kernels.forces.implicit_loads import arm_square, implicit_share, mobility_bound, soften_arm, soften_at
+from physics.kernels.forces.force_field_state import ZERO, acting_at, velocity_at
+from physics.kernels.forces.implicit_loads import (
+    arm_frequency_squared,
+    implicit_share,
+    mobility_bound,
+    soften_arm,
+    soften_at,
+)
 from physics.kernels.math import quaternion as qt
+from physics.kernels.math.vector import minus, plus, times
 
 # Columns of a spring.
-POINT = 0  # body frame, from the centre of mass [m]
-ANCHOR = 3  # world frame [m]
-LENGTH = 6  # l0 [m]
-STIFFNESS = 7  # k [N/m]; 0 for other bodies than the spring's
-DAMPING = 8  # c [N s/m]
-SIZE = 9
+SPRING_POINT = 0  # body frame, from the centre of mass [m]
+SPRING_ANCHOR = 3  # world frame [m]
+SPRING_LENGTH = 6  # l0 [m]
+SPRING_STIFFNESS = 7  # k [N/m]; 0 for other bodies than the spring's
+SPRING_DAMPING = 8  # c [N s/m]
+SPRING_SIZE = 9
 
 # Columns of a push.
-FORCE = 3  # [N]; 0 for other bodies than the push's
-TURNS = 6  # 1: along the body axes, 0: along the world's
+PUSH_FORCE = 3  # [N]; 0 for other bodies than the push's
+PUSH_IS_BODY_FIXED = 6  # 1: along the body axes, 0: along the world's
 PUSH_SIZE = 7
 
 
 @inlined
-def stretch(state, p):
+def spring_vector(state, p):
     """Point of the body relative to its centre of mass, vector to it from the anchor, and its length."""
-    arm = qt.matvec(state.R, (p[POINT], p[POINT + 1], p[POINT + 2]))
-    e = minus(plus(state.x, arm), (p[ANCHOR], p[ANCHOR + 1], p[ANCHOR + 2]))
+    arm = qt.matvec(state.R, (p[SPRING_POINT], p[SPRING_POINT + 1], p[SPRING_POINT + 2]))
+    e = minus(plus(state.x, arm), (p[SPRING_ANCHOR], p[SPRING_ANCHOR + 1], p[SPRING_ANCHOR + 2]))
     return arm, e, math.sqrt(qt.dot(e, e))
 
 
 @inlined
-def line_load(arm, e, l, u, p):
+def spring_damper_load(arm, e, l, u, p):
     """(force, torque) at a point of velocity u, on a line along e whose length is l."""
     if l == 0.0:
-        return acting_at(arm, times(-p[DAMPING], u))
-    s = p[STIFFNESS] * (l - p[LENGTH]) + p[DAMPING] * qt.dot(u, e) / l
+        return acting_at(arm, times(-p[SPRING_DAMPING], u))
+    s = p[SPRING_STIFFNESS] * (l - p[SPRING_LENGTH]) + p[SPRING_DAMPING] * qt.dot(u, e) / l
     return acting_at(arm, times(-s / l, e))
 
 
 @inlined
 def spring(state, p, t):
     """(force, torque) of a spring."""
-    if p[STIFFNESS] == 0.0 and p[DAMPING] == 0.0:
+    if p[SPRING_STIFFNESS] == 0.0 and p[SPRING_DAMPING] == 0.0:
         return ZERO, ZERO
-    arm, e, l = stretch(state, p)
-    return line_load(arm, e, l, velocity_at(state, arm), p)
+    arm, e, l = spring_vector(state, p)
+    return spring_damper_load(arm, e, l, velocity_at(state, arm), p)
 
 
 @inlined
 def spring_energy(state, p, t):
     """½ k (l - l0)² [J]."""
-    _, _, l = stretch(state, p)
-    return 0.5 * p[STIFFNESS] * (l - p[LENGTH]) * (l - p[LENGTH])
+    _, _, l = spring_vector(state, p)
+    return 0.5 * p[SPRING_STIFFNESS] * (l - p[SPRING_LENGTH]) * (l - p[SPRING_LENGTH])
 
 
 @inlined
@@ -74,72 +81,86 @@ def mean_spring(states, p, t):
     With e the mean of the vectors at both ends and l the mean of their lengths, F = -k (1 - l0/l) e does just what the
     energy loses, F·(e1 - e0) = ½ k (l_0 - l0)² - ½ k (l_1 - l0)², since (e1 - e0)·(e1 + e0) = l_1² - l_0².
     """
-    if p[STIFFNESS] == 0.0 and p[DAMPING] == 0.0:
+    if p[SPRING_STIFFNESS] == 0.0 and p[SPRING_DAMPING] == 0.0:
         return ZERO, ZERO
     middle, first, last = states
-    before, after = stretch(first, p), stretch(last, p)
+    before, after = spring_vector(first, p), spring_vector(last, p)
     arm, e = times(0.5, plus(before[0], after[0])), times(0.5, plus(before[1], after[1]))
     l = 0.5 * (before[2] + after[2])
-    return line_load(arm, e, l, velocity_at(middle, arm), p)
+    return spring_damper_load(arm, e, l, velocity_at(middle, arm), p)
 
 
 @inlined
 def spring_rates(state, p, J, h):
     """Rates of `implicit_loads`."""
-    if p[STIFFNESS] == 0.0 and p[DAMPING] == 0.0:
+    if p[SPRING_STIFFNESS] == 0.0 and p[SPRING_DAMPING] == 0.0:
         return ZERO
     force, _ = spring(state, p, 0.0)
-    arm, _, _ = stretch(state, p)
+    arm, _, _ = spring_vector(state, p)
     w = mobility_bound(arm, state.mass, J)
-    return (p[DAMPING] * w, p[STIFFNESS] * w + arm_square(force, arm, J), 0.0)
+    return (p[SPRING_DAMPING] * w, p[SPRING_STIFFNESS] * w + arm_frequency_squared(force, arm, J), 0.0)
 
 
 @inlined
-def line_stiffness(h, w, e, l, p):
+def implicit_spring_stiffness(h, w, e, l, p):
     """Direction of a spring, and Z of `implicit_loads` along it and across [kg]; w the mobility of its points [1/kg].
 
     Across the line it is as stiff as it is tight, k (1 - l0/l); a spring that pushes would push over, which is left
     out.
     """
-    spring, damper = 0.25 * h * h * p[STIFFNESS], h * implicit_share(h * p[DAMPING] * w) * p[DAMPING]
+    spring, damper = (
+        0.25 * h * h * p[SPRING_STIFFNESS],
+        h * implicit_share(h * p[SPRING_DAMPING] * w) * p[SPRING_DAMPING],
+    )
     if l == 0.0:
         return (1.0, 0.0, 0.0), spring + damper, spring + damper
-    return times(1.0 / l, e), spring + damper, spring * max(1.0 - p[LENGTH] / l, 0.0)
+    return times(1.0 / l, e), spring + damper, spring * max(1.0 - p[SPRING_LENGTH] / l, 0.0)
 
 
 @inlined
 def soften_spring(loads, h, R, state, p, J):
     """Loads as `implicit_loads` has them."""
-    if p[STIFFNESS] == 0.0 and p[DAMPING] == 0.0:
+    if p[SPRING_STIFFNESS] == 0.0 and p[SPRING_DAMPING] == 0.0:
         return loads
-    arm, e, l = stretch(state, p)
-    n, along, across = line_stiffness(h, mobility_bound(arm, state.mass, J), e, l, p)
+    arm, e, l = spring_vector(state, p)
+    n, along, across = implicit_spring_stiffness(h, mobility_bound(arm, state.mass, J), e, l, p)
     force, _ = spring(state, p, 0.0)
     loads = soften_at(loads, arm, n, along, across, R, state.mass, J)
     return soften_arm(loads, h, force, arm, R, J)
 
 
 @inlined
-def push(state, p, t):
+def push_load(state, p, t):
     """(force, torque) of a constant force at a point of the body."""
-    force = (p[FORCE], p[FORCE + 1], p[FORCE + 2])
-    if p[TURNS] != 0.0:
+    force = (p[PUSH_FORCE], p[PUSH_FORCE + 1], p[PUSH_FORCE + 2])
+    if p[PUSH_IS_BODY_FIXED] != 0.0:
         force = qt.matvec(state.R, force)
-    return acting_at(qt.matvec(state.R, (p[POINT], p[POINT + 1], p[POINT + 2])), force)
+    return acting_at(qt.matvec(state.R, (p[SPRING_POINT], p[SPRING_POINT + 1], p[SPRING_POINT + 2])), force)
 
 
 @inlined
 def push_rates(state, p, J, h):
     """Rates of `implicit_loads`: a force along the world's axes swings the body."""
-    if p[TURNS] != 0.0:
+    if p[PUSH_IS_BODY_FIXED] != 0.0:
         return ZERO
-    return (0.0, arm_square((p[FORCE], p[FORCE + 1], p[FORCE + 2]), (p[POINT], p[POINT + 1], p[POINT + 2]), J), 0.0)
+    return (
+        0.0,
+        arm_frequency_squared(
+            (p[PUSH_FORCE], p[PUSH_FORCE + 1], p[PUSH_FORCE + 2]),
+            (p[SPRING_POINT], p[SPRING_POINT + 1], p[SPRING_POINT + 2]),
+            J,
+        ),
+        0.0,
+    )
 
 
 @inlined
 def soften_push(loads, h, R, state, p, J):
     """Loads as `implicit_loads` has them."""
-    if p[TURNS] != 0.0:
+    if p[PUSH_IS_BODY_FIXED] != 0.0:
         return loads
-    force, point = (p[FORCE], p[FORCE + 1], p[FORCE + 2]), (p[POINT], p[POINT + 1], p[POINT + 2])
+    force, point = (
+        (p[PUSH_FORCE], p[PUSH_FORCE + 1], p[PUSH_FORCE + 2]),
+        (p[SPRING_POINT], p[SPRING_POINT + 1], p[SPRING_POINT + 2]),
+    )
     return soften_arm(loads, h, force, point, R, J)

@@ -9,24 +9,24 @@ there may be takes all that is left, by an implicit step, when nothing is left t
 from __future__ import annotations
 
 from physics.kernels.compile.decorators import kernel
-from physics.kernels.flight.free_flight import coast
-from physics.kernels.forces.energy_budget import paid
-from physics.kernels.forces.field_loads import loads_held, put_all, size_of
+from physics.kernels.flight.free_flight import integrate_flight
+from physics.kernels.forces.energy_budget import limit_energy_gain
+from physics.kernels.forces.field_loads import acting_loads, apply_total_loads, load_bound
 from physics.kernels.forces.force_field_dispatch import if_declared
-from physics.kernels.forces.force_field_state import plus
-from physics.kernels.forces.held_loads import hold_loads, pass_time, set_now, time_now
-from physics.kernels.forces.resolution_limits import change_to_agree
+from physics.kernels.forces.held_loads import advance_clock, hold_loads, set_now, time_now
+from physics.kernels.forces.resolution_limits import newton_load_change
+from physics.kernels.math.vector import plus
 
 # First part of a step, in 1/λ; growth from part to part; parts.
-FIRST = 0.25
-GROWTH = 1.5
-PARTS = 72
+_FIRST_PART = 0.25
+_PART_GROWTH = 1.5
+_MAX_PARTS = 72
 
 # Rounds of Newton's method for loads that agree with the end of a part, the share of the loads at which they count as
 # settled, and the one up to which they are better than those of one round.
-ROUNDS = 12
-SETTLED = 1.0e-12
-NEARLY_SETTLED = 1.0e-3
+_NEWTON_ROUNDS = 12
+_CONVERGED = 1.0e-12
+_NEARLY_CONVERGED = 1.0e-3
 
 
 @kernel
@@ -35,18 +35,18 @@ def implicit_flight(y, h, gyroscopic, tilted, scheme, work):
 
     A' = A + (1 + M⁻¹ Z)⁻¹ (A(y, end) - A). Where that does not settle the loads of the first step are kept.
     """
-    start = loads_held(work)
-    size, loads = size_of(start, work), start
-    for _ in range(ROUNDS):
-        end = coast(y, h, gyroscopic, tilted, scheme, work)
-        change = change_to_agree(y, end, loads, h, gyroscopic, tilted, work)
+    start = acting_loads(work)
+    size, loads = load_bound(start, work), start
+    for _ in range(_NEWTON_ROUNDS):
+        end = integrate_flight(y, h, gyroscopic, tilted, scheme, work)
+        change = newton_load_change(y, end, loads, h, gyroscopic, tilted, work)
         loads = plus(loads[0], change[0]), plus(loads[1], change[1])
-        put_all(loads, work)
-        if size_of(change, work) <= SETTLED * size:
+        apply_total_loads(loads, work)
+        if load_bound(change, work) <= _CONVERGED * size:
             break
-    if not size_of(change, work) <= NEARLY_SETTLED * size:
-        put_all(start, work)
-    return coast(y, h, gyroscopic, tilted, scheme, work)
+    if not load_bound(change, work) <= _NEARLY_CONVERGED * size:
+        apply_total_loads(start, work)
+    return integrate_flight(y, h, gyroscopic, tilted, scheme, work)
 
 
 def _as_it_is(end, y, h, gyroscopic, tilted, scheme, work):
@@ -54,27 +54,27 @@ def _as_it_is(end, y, h, gyroscopic, tilted, scheme, work):
 
 
 @if_declared(_as_it_is)
-def graded_flight(end, y, h, gyroscopic, tilted, scheme, work):
+def subdivide_stiff_flight(end, y, h, gyroscopic, tilted, scheme, work):
     """`end` of a flight over h from y under the loads that are held; where these are stiff, made in parts."""
     if work.is_stiff == 0:
         return end
     start, left, part = time_now(work), h, 0.0
-    for k in range(PARTS):
+    for k in range(_MAX_PARTS):
         hold_loads(y, left, gyroscopic, tilted, work)
-        part = GROWTH * part
+        part = _PART_GROWTH * part
         if work.rate > 0.0:
-            part = max(part, FIRST / work.rate)
-        if not 0.0 < part < left or k == PARTS - 1:
+            part = max(part, _FIRST_PART / work.rate)
+        if not 0.0 < part < left or k == _MAX_PARTS - 1:
             part = left
         if part < left:
             hold_loads(y, part, gyroscopic, tilted, work)
         if work.is_stiff == 1:
             end = implicit_flight(y, part, gyroscopic, tilted, scheme, work)
         else:
-            end = coast(y, part, gyroscopic, tilted, scheme, work)
-        y = paid(y, end, part, True, tilted, work)
+            end = integrate_flight(y, part, gyroscopic, tilted, scheme, work)
+        y = limit_energy_gain(y, end, part, True, tilted, work)
         left -= part
-        pass_time(part, work)
+        advance_clock(part, work)
         if not left > 0.0:
             break
     set_now(start, work)

@@ -20,13 +20,14 @@ from __future__ import annotations
 import math
 
 from physics.kernels.compile.decorators import inlined, kernel
-from physics.kernels.forces.force_field_state import ZERO, minus, plus, times
+from physics.kernels.forces.force_field_state import ZERO
 from physics.kernels.math import quaternion as qt
+from physics.kernels.math.vector import minus, plus, times
 from physics.kernels.state.layout import BLOCK
 
 
 @inlined
-def cap(r, height):
+def spherical_cap(r, height):
     """(volume, depth of its centre below the sphere's) of a sphere's part below a plane, its centre at `height`."""
     h = min(max(r - height, 0.0), 2.0 * r)
     return math.pi * h * h * (3.0 * r - h) / 3.0, 3.0 * (2.0 * r - h) * (2.0 * r - h) / (4.0 * (3.0 * r - h))
@@ -100,7 +101,7 @@ def _wet_block(n, height, d):
 
 
 @kernel
-def submerged(shape, dims, n, height):
+def submerged_part(shape, dims, n, height):
     """Volume of the part of a body below a plane, and the centre of that part.
 
     Parameters
@@ -130,6 +131,6 @@ def submerged(shape, dims, n, height):
         return volume, times(1.0 / volume, moment) if volume > 0.0 else ZERO
     e = (dims[0] * n[0], dims[1] * n[1], dims[2] * n[2])
     reach = math.sqrt(qt.dot(e, e))
-    volume, depth = cap(1.0, height / reach)
+    volume, depth = spherical_cap(1.0, height / reach)
     s = -depth / reach
     return dims[0] * dims[1] * dims[2] * volume, (s * dims[0] * e[0], s * dims[1] * e[1], s * dims[2] * e[2])

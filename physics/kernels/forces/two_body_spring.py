@@ -10,27 +10,34 @@ from __future__ import annotations
 
 from numba.extending import overload
 
-from physics.kernels.compile.decorators import CHOSEN, inlined, kernel
-from physics.kernels.flight.free_flight import drift
-from physics.kernels.forces.field_loads import field_load, put_loads
-from physics.kernels.forces.force_field_dispatch import LOAD, instances
-from physics.kernels.forces.force_field_state import ZERO, minus, plus, times, velocity_at
-from physics.kernels.forces.implicit_loads import arm_square, mobility_bound, soften_arm
+from physics.kernels.compile.decorators import OVERLOAD_OPTIONS, inlined, kernel
+from physics.kernels.flight.free_flight import drift_attitude
+from physics.kernels.forces.field_loads import apply_loads, field_load
+from physics.kernels.forces.force_field_dispatch import LOAD, iterate_terms
+from physics.kernels.forces.force_field_state import ZERO, velocity_at
+from physics.kernels.forces.implicit_loads import arm_frequency_squared, mobility_bound, soften_arm
 from physics.kernels.forces.implicit_two_body_spring import (
-    ANCHOR,
-    OTHER,
-    OTHER_MOBILITY,
-    OTHER_POINT,
-    SIZE,
-    VELOCITY,
-    hold_implicit,
-    middle,
-    note_all_rates,
-    put_middle,
+    LINK_ANCHOR,
+    LINK_OTHER,
+    LINK_OTHER_MOBILITY,
+    LINK_OTHER_POINT,
+    LINK_SIZE,
+    LINK_VELOCITY,
+    hold_implicit_loads,
+    note_world_rates,
+    read_middle,
+    write_middle,
 )
-from physics.kernels.forces.spring import DAMPING, LENGTH, STIFFNESS, line_load, stretch
+from physics.kernels.forces.spring import (
+    SPRING_DAMPING,
+    SPRING_LENGTH,
+    SPRING_STIFFNESS,
+    spring_damper_load,
+    spring_vector,
+)
 from physics.kernels.math import quaternion as qt
-from physics.kernels.math.union_find import join
+from physics.kernels.math.union_find import unite_sets
+from physics.kernels.math.vector import minus, plus, times
 from physics.kernels.state import layout as at
 from physics.kernels.state.body import angular_velocity, read_state
 
@@ -38,46 +45,46 @@ from physics.kernels.state.body import angular_velocity, read_state
 @inlined
 def linked_spring(state, p, t):
     """(force, torque) of a spring to another body."""
-    if p[OTHER] < 0.0 or (p[STIFFNESS] == 0.0 and p[DAMPING] == 0.0):
+    if p[LINK_OTHER] < 0.0 or (p[SPRING_STIFFNESS] == 0.0 and p[SPRING_DAMPING] == 0.0):
         return ZERO, ZERO
-    arm, e, l = stretch(state, p)
-    u = minus(velocity_at(state, arm), (p[VELOCITY], p[VELOCITY + 1], p[VELOCITY + 2]))
-    return line_load(arm, e, l, u, p)
+    arm, e, l = spring_vector(state, p)
+    u = minus(velocity_at(state, arm), (p[LINK_VELOCITY], p[LINK_VELOCITY + 1], p[LINK_VELOCITY + 2]))
+    return spring_damper_load(arm, e, l, u, p)
 
 
 @inlined
 def linked_spring_rates(state, p, J, h):
     """Rates of `implicit_loads`, of the two ends against each other."""
-    if p[OTHER] < 0.0:
+    if p[LINK_OTHER] < 0.0:
         return ZERO
     force, _ = linked_spring(state, p, 0.0)
-    arm, _, _ = stretch(state, p)
-    w = mobility_bound(arm, state.mass, J) + p[OTHER_MOBILITY]
-    return (p[DAMPING] * w, p[STIFFNESS] * w + arm_square(force, arm, J), 0.0)
+    arm, _, _ = spring_vector(state, p)
+    w = mobility_bound(arm, state.mass, J) + p[LINK_OTHER_MOBILITY]
+    return (p[SPRING_DAMPING] * w, p[SPRING_STIFFNESS] * w + arm_frequency_squared(force, arm, J), 0.0)
 
 
 @inlined
 def soften_linked_arm(loads, h, R, state, p, J):
     """Torque as `implicit_loads` has it under the force at its arm; the rest is done for both ends at once."""
-    if p[OTHER] < 0.0:
+    if p[LINK_OTHER] < 0.0:
         return loads
     force, _ = linked_spring(state, p, 0.0)
-    arm, _, _ = stretch(state, p)
+    arm, _, _ = spring_vector(state, p)
     return soften_arm(loads, h, force, arm, R, J)
 
 
 @inlined
 def linked_spring_energy(state, p, t):
     """Half of ½ k (l - l0)² [J]: the other half is the other body's."""
-    if p[OTHER] < 0.0:
+    if p[LINK_OTHER] < 0.0:
         return 0.0
-    _, _, l = stretch(state, p)
-    return 0.25 * p[STIFFNESS] * (l - p[LENGTH]) * (l - p[LENGTH])
+    _, _, l = spring_vector(state, p)
+    return 0.25 * p[SPRING_STIFFNESS] * (l - p[SPRING_LENGTH]) * (l - p[SPRING_LENGTH])
 
 
 def _first_columns(record) -> list[int]:
     """First column of each spring between bodies in a record of a body, or in the type of one."""
-    return [first for term, first, _ in instances(record, LOAD) if term.function is linked_spring]
+    return [first for term, first, _ in iterate_terms(record, LOAD) if term.function is linked_spring]
 
 
 def _if_linked(where, otherwise):
@@ -99,7 +106,7 @@ def _if_linked(where, otherwise):
         def stub(*arguments):
             return chosen(arguments, function)(*arguments)
 
-        @overload(stub, jit_options=CHOSEN, strict=False)
+        @overload(stub, jit_options=OVERLOAD_OPTIONS, strict=False)
         def choose(*types):
             return chosen(types, compiled)
 
@@ -119,26 +126,26 @@ def _record(world):
 @inlined
 def _put_anchor(first, columns, x, R, v, w, mobility):
     """Write point, velocity and mobility of the other body, whose state this is, into the columns of a spring."""
-    o = first + OTHER_POINT
+    o = first + LINK_OTHER_POINT
     r = qt.matvec(R, (columns[o], columns[o + 1], columns[o + 2]))
     place, speed = plus(x, r), plus(v, qt.cross(w, r))
     for c in range(3):
-        columns[first + ANCHOR + c] = place[c]
-        columns[first + VELOCITY + c] = speed[c]
-    columns[first + OTHER_MOBILITY] = mobility
+        columns[first + LINK_ANCHOR + c] = place[c]
+        columns[first + LINK_VELOCITY + c] = speed[c]
+    columns[first + LINK_OTHER_MOBILITY] = mobility
 
 
 @inlined
 def _put_anchors(first, count, tilted, bodies):
-    """Put the anchors of all springs where the bodies' `middle` says."""
+    """Put the anchors of all springs where the bodies' `read_middle` says."""
     for b in range(bodies.shape[0]):
         columns = bodies[b].columns
-        for k in range(first, first + SIZE * count, SIZE):
-            if columns[k + OTHER] >= 0.0:
-                other = bodies[int(columns[k + OTHER])]
-                x, q, v, L = middle(other)
+        for k in range(first, first + LINK_SIZE * count, LINK_SIZE):
+            if columns[k + LINK_OTHER] >= 0.0:
+                other = bodies[int(columns[k + LINK_OTHER])]
+                x, q, v, L = read_middle(other)
                 w = angular_velocity(q, L, other, tilted)
-                o = k + OTHER_POINT
+                o = k + LINK_OTHER_POINT
                 mobility = mobility_bound((columns[o], columns[o + 1], columns[o + 2]), other.mass, other.J)
                 _put_anchor(k, columns, x, qt.to_matrix(q), v, w, mobility)
 
@@ -152,26 +159,26 @@ def hold_linked_loads(first, count, h, gyroscopic, tilted, world):
     bodies, half = world.bodies, 0.5 * h
     for b in range(bodies.shape[0]):
         x, q, v, L = read_state(world.now, b)
-        q = drift(q, L, bodies[b], half, gyroscopic, tilted)
-        put_middle(bodies[b], (plus(x, times(half, v)), q, v, L))
+        q = drift_attitude(q, L, bodies[b], half, gyroscopic, tilted)
+        write_middle(bodies[b], (plus(x, times(half, v)), q, v, L))
     _put_anchors(first, count, tilted, bodies)
-    if note_all_rates(h, tilted, bodies):
-        hold_implicit(first, count, h, tilted, bodies)
+    if note_world_rates(h, tilted, bodies):
+        hold_implicit_loads(first, count, h, tilted, bodies)
         return True
     for b in range(bodies.shape[0]):
         if world.touched[b] == 0:
             _kick(bodies[b], half, tilted)
     _put_anchors(first, count, tilted, bodies)
     for b in range(bodies.shape[0]):
-        x, q, v, L = middle(bodies[b])
+        x, q, v, L = read_middle(bodies[b])
         F, T = field_load(x, q, v, L, bodies[b].now + half, tilted, bodies[b])
-        put_loads(F, T, bodies[b])
+        apply_loads(F, T, bodies[b])
     return True
 
 
 @_if_linked(lambda arguments: _record(arguments[-1]), None)
 def place_anchors(first, count, tilted, world):
-    """Put the anchors of all springs where the bodies' `middle` says."""
+    """Put the anchors of all springs where the bodies' `read_middle` says."""
     _put_anchors(first, count, tilted, world.bodies)
 
 
@@ -179,37 +186,37 @@ def place_anchors(first, count, tilted, world):
 def place_anchors_now(first, count, tilted, world):
     """Put the anchors of all springs where the bodies are now."""
     for b in range(world.bodies.shape[0]):
-        put_middle(world.bodies[b], read_state(world.now, b))
+        write_middle(world.bodies[b], read_state(world.now, b))
     _put_anchors(first, count, tilted, world.bodies)
 
 
 @_if_linked(lambda arguments: _record(arguments[-1]), None)
-def join_linked(first, count, parent, world):
+def unite_linked_bodies(first, count, parent, world):
     """Make one island of any two bodies that a spring ties together, in what leads to the first body of each."""
     for b in range(world.bodies.shape[0]):
         columns = world.bodies[b].columns
-        for k in range(first, first + SIZE * count, SIZE):
-            if columns[k + OTHER] >= 0.0:
-                join(b, int(columns[k + OTHER]), parent)
+        for k in range(first, first + LINK_SIZE * count, LINK_SIZE):
+            if columns[k + LINK_OTHER] >= 0.0:
+                unite_sets(b, int(columns[k + LINK_OTHER]), parent)
 
 
 @inlined
 def _kick(body, half, tilted):
     """Give the middle of a body half a stage's kick of all loads."""
-    x, q, v, L = middle(body)
+    x, q, v, L = read_middle(body)
     F, T = field_load(x, q, v, L, body.now + half, tilted, body)
     a, held = body.held_acceleration, body.held_torque
     v = plus(v, times(half, plus((a[0], a[1], a[2]), times(1.0 / body.mass, F))))
     L = plus(L, times(half, plus((held[0], held[1], held[2]), T)))
-    put_middle(body, (x, q, v, L))
+    write_middle(body, (x, q, v, L))
 
 
 @_if_linked(lambda arguments: arguments[-1], None)
-def look_for_anchors(first, count, i, state, bodies, work):
+def place_anchors_of_body(first, count, i, state, bodies, work):
     """Put the anchors of body i's springs where the other bodies of its world are now."""
-    for k in range(first, first + SIZE * count, SIZE):
-        if work.columns[k + OTHER] >= 0.0:
-            j = i - i % bodies + int(work.columns[k + OTHER])
+    for k in range(first, first + LINK_SIZE * count, LINK_SIZE):
+        if work.columns[k + LINK_OTHER] >= 0.0:
+            j = i - i % bodies + int(work.columns[k + LINK_OTHER])
             x, q, v, _ = read_state(state, j)
             w = (state[j, at.ANGVEL], state[j, at.ANGVEL + 1], state[j, at.ANGVEL + 2])
             _put_anchor(k, work.columns, x, qt.to_matrix(q), v, w, 0.0)

@@ -21,33 +21,33 @@ import math
 
 from physics.kernels.compile.decorators import inlined, kernel
 
-WAVES = 8  # N
+WIND_WAVES = 8  # N
 
 # Columns.
-MEAN = 0  # U [m/s]
-GUST = 3  # σ [m/s]
-TIME_SCALE = 4  # τ [s]
-PHASES = 5  # φ of the N waves of x, then y, then z [rad]
-SIZE = PHASES + 3 * WAVES
+WIND_MEAN = 0  # U [m/s]
+WIND_GUST = 3  # σ [m/s]
+WIND_TIME_SCALE = 4  # τ [s]
+WIND_PHASES = 5  # φ of the N waves of x, then y, then z [rad]
+WIND_SIZE = WIND_PHASES + 3 * WIND_WAVES
 
 
 @inlined
-def frequency(k, time_scale):
+def gust_frequency(k, time_scale):
     """ω of wave k = 0 .. N - 1 [rad/s]."""
-    return math.tan(0.5 * math.pi * (k + 0.5) / WAVES) / time_scale
+    return math.tan(0.5 * math.pi * (k + 0.5) / WIND_WAVES) / time_scale
 
 
 @kernel
 def _gust(axis, p, t):
     total = 0.0
-    for k in range(WAVES):
-        total += math.cos(frequency(k, p[TIME_SCALE]) * t + p[PHASES + WAVES * axis + k])
-    return p[MEAN + axis] + p[GUST] * math.sqrt(2.0 / WAVES) * total
+    for k in range(WIND_WAVES):
+        total += math.cos(gust_frequency(k, p[WIND_TIME_SCALE]) * t + p[WIND_PHASES + WIND_WAVES * axis + k])
+    return p[WIND_MEAN + axis] + p[WIND_GUST] * math.sqrt(2.0 / WIND_WAVES) * total
 
 
 @inlined
 def wind(state, p, t):
     """Velocity of the air [m/s]."""
-    if p[GUST] == 0.0:
-        return (p[MEAN], p[MEAN + 1], p[MEAN + 2])
+    if p[WIND_GUST] == 0.0:
+        return (p[WIND_MEAN], p[WIND_MEAN + 1], p[WIND_MEAN + 2])
     return (_gust(0, p, t), _gust(1, p, t), _gust(2, p, t))

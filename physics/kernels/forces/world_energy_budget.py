@@ -9,13 +9,19 @@ from __future__ import annotations
 import math
 
 from physics.kernels.compile.decorators import inlined, kernel
-from physics.kernels.forces.energy_budget import COARSE_SHARE, ROUNDING, held_loads, potential_energy
+from physics.kernels.forces.energy_budget import (
+    ENERGY_ROUNDING,
+    UNRESOLVED_GAIN_SHARE,
+    constant_loads,
+    potential_energy,
+)
 from physics.kernels.forces.field_loads import field_state
-from physics.kernels.forces.force_field_dispatch import if_declared, total_supply
-from physics.kernels.forces.force_field_state import ZERO, minus, plus, times
-from physics.kernels.forces.resolution_limits import note_report
+from physics.kernels.forces.force_field_dispatch import if_declared, total_supplied_power
+from physics.kernels.forces.force_field_state import ZERO
+from physics.kernels.forces.resolution_limits import report_unresolved_body
 from physics.kernels.forces.two_body_spring import place_anchors_now
 from physics.kernels.math import quaternion as qt
+from physics.kernels.math.vector import minus, plus, times
 from physics.kernels.state.body import angular_velocity, kinetic_energy, read_state, write_state
 
 
@@ -45,7 +51,7 @@ def _potential(later, tilted, world):
 
 
 @if_declared()
-def note_start(tilted, world, first):
+def note_stage_energy(tilted, world, first):
     """Keep states and potential energy at the start of a stage, if it is stiff; `first` is the first body's record."""
     if not _any_is_stiff(world.bodies):
         return
@@ -64,10 +70,10 @@ def _gain_of(b, h, tilted, world):
     body, y, end = world.bodies[b], _start(world.bodies[b]), read_state(world.now, b)
     v, L = times(0.5, plus(y[2], end[2])), times(0.5, plus(y[3], end[3]))
     before, after = kinetic_energy(y[1], y[2], y[3], body, tilted), kinetic_energy(end[1], end[2], end[3], body, tilted)
-    a, T = held_loads(body)
+    a, T = constant_loads(body)
     done = body.mass * qt.dot(a, minus(end[0], y[0])) + h * qt.dot(T, angular_velocity(y[1], L, body, tilted))
     t = body.now + 0.5 * h
-    supply = h * total_supply(field_state(y[0], y[1], v, L, t, tilted, body), t, body)
+    supply = h * total_supplied_power(field_state(y[0], y[1], v, L, t, tilted, body), t, body)
     return after - before - done - supply, before + after + abs(done) + supply
 
 
@@ -95,7 +101,7 @@ def _take(gain, ties, tilted, world):
     for b in range(world.bodies.shape[0]):
         _, q, v, L = read_state(world.now, b)
         motion += kinetic_energy(q, minus(v, c), L, world.bodies[b], tilted)
-    if gain > COARSE_SHARE * motion:
+    if gain > UNRESOLVED_GAIN_SHARE * motion:
         for b in range(world.bodies.shape[0]):
             world.bodies[b].is_coarse = 1
     s = math.sqrt(1.0 - gain / motion) if gain < motion else 0.0
@@ -109,7 +115,7 @@ def _take(gain, ties, tilted, world):
 
 
 @if_declared()
-def pay_together(h, ties, tilted, world, first):
+def limit_world_energy_gain(h, ties, tilted, world, first):
     """Take from the bodies what energy a stiff stage of length h gave them from nowhere.
 
     `ties` is 1 where nothing but each other holds them; `first` the first body's record.
@@ -121,13 +127,13 @@ def pay_together(h, ties, tilted, world, first):
     for b in range(world.bodies.shape[0]):
         more, measure = _gain_of(b, h, tilted, world)
         gain, size = gain + more, size + measure
-    if gain > ROUNDING * size:
+    if gain > ENERGY_ROUNDING * size:
         _take(gain, ties, tilted, world)
 
 
 @if_declared()
-def note_reports(report, world, first):
+def report_unresolved_bodies(report, world, first):
     """Count the bodies that move in fields which some stage of the call did not resolve."""
     for b in range(world.bodies.shape[0]):
         _, _, v, L = read_state(world.now, b)
-        note_report(v != ZERO or L != ZERO, report, world.bodies[b])
+        report_unresolved_body(v != ZERO or L != ZERO, report, world.bodies[b])

@@ -32,26 +32,26 @@ from physics.kernels.half_space.contact_point import center_arm, wall_normal
 from physics.kernels.math import quaternion as qt
 from physics.kernels.math.quaternion import to_matrix
 from physics.kernels.state.body import angular_velocity
-from physics.kernels.state.layout import ELLIPSOID, HULL, OFFSET, SPHERE
+from physics.kernels.state.layout import ELLIPSOID, HULL, SPHERE, WALL_OFFSET
 
 # A body turns far where it turns by more than this within a step [rad]; less is looked for at the ends of stages.
 FAR_TURN = 0.25
 
 # Cuts of a substep for what turns, at most: those for impacts are counted apart.
-MOST_CUTS = 64
+MAX_TURNING_CUTS = 64
 
 # Advances of one flight at most; what is left of it is for the next stage.
-MOST_ADVANCES = 100
+MAX_ADVANCES = 100
 
 # Chords and halvings of one advance, and the share of the gap that may be left.
 CHORDS = 8
-LEFT_SHARE = 0.2
+GAP_LEFT_SHARE = 0.2
 
 ACCELERATION_SHARE = 1.0 + 1.0 / math.sqrt(3.0)
 
 
 @inlined
-def largest_moment(work):
+def max_inv_inertia(work):
     """Largest inverse moment of inertia [1/(kg m²)]."""
     return max(work.J[0], max(work.J[1], work.J[2]))
 
@@ -70,14 +70,14 @@ def may_turn(L, h, least, tilted, work):
     """
     if work.shape == SPHERE and is_centred(tilted, work):
         return False
-    s, t = h * largest_moment(work), (work.torque[0], work.torque[1], work.torque[2])
+    s, t = h * max_inv_inertia(work), (work.torque[0], work.torque[1], work.torque[2])
     return 2.0 * (qt.dot(L, L) + h * h * qt.dot(t, t)) * s * s > least * least
 
 
 @kernel
 def spin_bound(q, L, h, tilted, work):
     """Bound of |ω| within h [rad/s]."""
-    most, least = largest_moment(work), min(work.J[0], min(work.J[1], work.J[2]))
+    most, least = max_inv_inertia(work), min(work.J[0], min(work.J[1], work.J[2]))
     w = angular_velocity(q, L, work, tilted)
     push = h * math.sqrt(work.torque[0] ** 2 + work.torque[1] ** 2 + work.torque[2] ** 2)
     size = max(0.0, math.sqrt(qt.dot(L, L)) - push)
@@ -96,12 +96,12 @@ def _arm(i, tilted, work):
 
 
 @kernel
-def bend_bound(spin, q, L, h, tilted, work):
+def turning_acceleration_bound(spin, q, L, h, tilted, work):
     """Bound of what turning accelerates points by within h [m/s²], `spin` that of |ω|; 0 of a centred sphere."""
     if work.shape == SPHERE and is_centred(tilted, work):
         return 0.0
     torque = math.sqrt(work.torque[0] ** 2 + work.torque[1] ** 2 + work.torque[2] ** 2)
-    w, most, J = angular_velocity(q, L, work, tilted), largest_moment(work), work.J
+    w, most, J = angular_velocity(q, L, work, tilted), max_inv_inertia(work), work.J
     size = math.sqrt(qt.dot(L, L)) + h * torque
     energy = math.sqrt(max(0.0, qt.dot(w, L))) + math.sqrt(most) * h * torque
     u = min(math.sqrt(J[0]) * energy, J[0] * size)
@@ -114,13 +114,13 @@ def bend_bound(spin, q, L, h, tilted, work):
 
 
 @inlined
-def tilted_normal(n, m, t):
+def turned_normal(n, m, t):
     """n + t m."""
     return (n[0] + t * m[0], n[1] + t * m[1], n[2] + t * m[2])
 
 
 @inlined
-def lowest(shape, dims, R, k):
+def support_of_vector(shape, dims, R, k):
     """s(k) of a shape that is symmetric, for k of any length."""
     if shape == SPHERE:
         return dims[0] * math.sqrt(qt.dot(k, k))
@@ -128,7 +128,7 @@ def lowest(shape, dims, R, k):
 
 
 @inlined
-def first_bracket(gap, rate, turning, bend, horizon):
+def bracket_safe_time(gap, rate, turning, bend, horizon):
     """Times (before, after) between which a bound gap + rate t - (points turn) - bend t²/2 falls to zero.
 
     Points move along the normal by at most `turning` [m/s] at first, towards the wall or away from it.
@@ -140,13 +140,13 @@ def first_bracket(gap, rate, turning, bend, horizon):
 
 
 @inlined
-def chord(low, at_low, high, at_high):
+def secant_root(low, at_low, high, at_high):
     """Root of the chord from (low, at_low > 0) to (high, at_high < 0)."""
     return low + (high - low) * (at_low / (at_low - at_high))
 
 
 @inlined
-def middle(low, high):
+def mean_time(low, high):
     """Between low and high > low >= 0, so that few halvings find a time of any size."""
     return math.sqrt(low * high) if high > 4.0 * low else 0.5 * (low + high)
 
@@ -154,37 +154,39 @@ def middle(low, high):
 @inlined
 def _height(t, n, m, gap, rate, bend, c, R, work):
     """Bound of the gap to a wall after t, see the module; c is the geometric centre from the centre of mass."""
-    k = tilted_normal(n, m, t)
+    k = turned_normal(n, m, t)
     dims = (work.dims[0], work.dims[1], work.dims[2])
-    return gap + t * (rate - 0.5 * bend * t) + qt.dot(k, c) - lowest(work.shape, dims, R, k)
+    return gap + t * (rate - 0.5 * bend * t) + qt.dot(k, c) - support_of_vector(work.shape, dims, R, k)
 
 
 @kernel
-def safe_time(y, wall, horizon, spin, tilted, work):
+def safe_advance(y, wall, horizon, spin, tilted, work):
     """(gap to a wall, a time within which it is not used up in free flight from y, at most `horizon`)."""
     x, q, v, L = y
     n, R, w = wall_normal(work.walls, wall), to_matrix(q), angular_velocity(q, L, work, tilted)
-    m, d, c, a = qt.cross(n, w), qt.dot(n, x) - work.walls[wall, OFFSET], (0.0, 0.0, 0.0), work.free_acceleration
+    m, d, c, a = qt.cross(n, w), qt.dot(n, x) - work.walls[wall, WALL_OFFSET], (0.0, 0.0, 0.0), work.free_acceleration
     if tilted is not None:
         c = center_arm(R, work)
     rate = qt.dot(n, v)
-    bend = bend_bound(spin, q, L, horizon, tilted, work) - min(0.0, n[0] * a[0] + n[1] * a[1] + n[2] * a[2])
+    bend = turning_acceleration_bound(spin, q, L, horizon, tilted, work) - min(
+        0.0, n[0] * a[0] + n[1] * a[1] + n[2] * a[2]
+    )
     gap = _height(0.0, n, m, d, rate, bend, c, R, work)
     if not gap > 0.0 or not bend > 0.0:
         return gap, horizon
-    low, high = first_bracket(gap, rate, work.radius * math.sqrt(qt.dot(m, m)), bend, horizon)
+    low, high = bracket_safe_time(gap, rate, work.radius * math.sqrt(qt.dot(m, m)), bend, horizon)
     at_low = _height(low, n, m, d, rate, bend, c, R, work)
     at_high = _height(high, n, m, d, rate, bend, c, R, work)
     if at_high >= 0.0 or not at_low > 0.0:
         return gap, high if at_high >= 0.0 else low
     for _ in range(CHORDS):
-        t = chord(low, at_low, high, at_high)
+        t = secant_root(low, at_low, high, at_high)
         found = _height(t, n, m, d, rate, bend, c, R, work)
         if found > 0.0:
             low, at_low = t, found
-        if at_low <= LEFT_SHARE * gap:
+        if at_low <= GAP_LEFT_SHARE * gap:
             break
-        t = middle(low, high)
+        t = mean_time(low, high)
         found = _height(t, n, m, d, rate, bend, c, R, work)
         if found > 0.0:
             low, at_low = t, found
@@ -194,16 +196,16 @@ def safe_time(y, wall, horizon, spin, tilted, work):
 
 
 @inlined
-def may_reach(wall, y, h, work):
+def may_reach_wall_in_flight(wall, y, h, work):
     """True if the bounding sphere may touch a wall in a free flight of h."""
     n, a = wall_normal(work.walls, wall), work.free_acceleration
-    gap = qt.dot(n, y[0]) - work.walls[wall, OFFSET] - work.radius
+    gap = qt.dot(n, y[0]) - work.walls[wall, WALL_OFFSET] - work.radius
     gap += min(0.0, h * qt.dot(n, y[2])) + min(0.0, 0.5 * h * h * (n[0] * a[0] + n[1] * a[1] + n[2] * a[2]))
     return not gap > work.slop
 
 
 @inlined
-def sweeping(R, w, work):
+def remove_symmetric_spin(R, w, work):
     """Angular velocity without that about axes of symmetry of an ellipsoid, which sweeps nothing [rad/s]."""
     d = work.dims
     if work.shape != ELLIPSOID or not (d[0] == d[1] or d[1] == d[2] or d[0] == d[2]):
@@ -216,11 +218,11 @@ def sweeping(R, w, work):
 
 
 @inlined
-def tilting_time(n, y, tilted, work):
+def time_to_turn_far(n, y, tilted, work):
     """Time in which a body turns by `FAR_TURN` about what is across n [s]: about n itself nothing comes nearer."""
     w = angular_velocity(y[1], y[3], work, tilted)
     if is_centred(tilted, work):
-        w = sweeping(to_matrix(y[1]), w, work)
+        w = remove_symmetric_spin(to_matrix(y[1]), w, work)
     m = qt.cross(n, w)
     rate = math.sqrt(qt.dot(m, m))
     return FAR_TURN / rate if rate > 0.0 else math.inf
@@ -230,8 +232,8 @@ def tilting_time(n, y, tilted, work):
 def _fly_near(y, wall, h, spin, gyroscopic, tilted, work):
     """Time of free flight, at most h, after which a wall is at the slop or not reached [s]."""
     now, gone = y, 0.0
-    for _ in range(MOST_ADVANCES):
-        gap, step = safe_time(now, wall, h - gone, spin, tilted, work)
+    for _ in range(MAX_ADVANCES):
+        gap, step = safe_advance(now, wall, h - gone, spin, tilted, work)
         if not gap > work.slop:
             break
         gone += step
@@ -242,7 +244,7 @@ def _fly_near(y, wall, h, spin, gyroscopic, tilted, work):
 
 
 @kernel
-def stage_of_turning(n, y, h, left, gyroscopic, tilted, work):
+def limit_turning_stage(n, y, h, left, gyroscopic, tilted, work):
     """Time, at most `left`, that a stage from y may take; less where the body turns far in h: no wall is passed [s].
 
     In contact (n > 0) it does not fly as is foretold here: then it turns no further than a look at the end can tell. So
@@ -253,12 +255,12 @@ def stage_of_turning(n, y, h, left, gyroscopic, tilted, work):
         return left
     first = left
     for wall in range(work.walls.shape[0]):
-        if not may_reach(wall, y, first, work):
+        if not may_reach_wall_in_flight(wall, y, first, work):
             continue
         normal, met = wall_normal(work.walls, wall), 0.0
         if work.mask[wall] == 0:
             met = _fly_near(y, wall, first, spin, gyroscopic, tilted, work)
-        limit = tilting_time(normal, y, tilted, work)
+        limit = time_to_turn_far(normal, y, tilted, work)
         if not met > 0.0:
             met = limit
         if n > 0:

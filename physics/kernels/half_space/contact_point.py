@@ -7,7 +7,7 @@ import math
 from physics.kernels.compile.decorators import inlined
 from physics.kernels.half_space import support_function as geo
 from physics.kernels.math import quaternion as qt
-from physics.kernels.state.layout import BLOCK, NORMAL, SPHERE, TANGENT_1, TANGENT_2
+from physics.kernels.state.layout import BLOCK, SPHERE, WALL_NORMAL, WALL_TANGENT_1, WALL_TANGENT_2
 
 
 @inlined
@@ -25,7 +25,7 @@ def feature_of(slot, work):
 @inlined
 def wall_normal(walls, k):
     """Unit normal of wall k."""
-    return (walls[k, NORMAL], walls[k, NORMAL + 1], walls[k, NORMAL + 2])
+    return (walls[k, WALL_NORMAL], walls[k, WALL_NORMAL + 1], walls[k, WALL_NORMAL + 2])
 
 
 @inlined
@@ -49,7 +49,7 @@ def _plus(a, b):
 
 
 @inlined
-def wandering_point(dims, R, w, n):
+def ellipsoid_point_and_rate(dims, R, w, n):
     """Point of an ellipsoid with the normal -n from its centre, and its rate of change, world frame [m, m/s].
 
     r = R c with c = -D e/s, e = D Rᵀ n, s = |e| and de/dt = D (Rᵀn x Rᵀω).
@@ -71,7 +71,7 @@ def wandering_point(dims, R, w, n):
 
 
 @inlined
-def arm_and_rate(shape, dims, R, w, n, feature, tilted, work):
+def contact_arm_and_rate(shape, dims, R, w, n, feature, tilted, work):
     """Contact point relative to the centre of mass, and its rate of change, world frame [m, m/s]."""
     if shape == BLOCK:
         r = geo.vertex_arm(dims, R, feature)
@@ -80,7 +80,7 @@ def arm_and_rate(shape, dims, R, w, n, feature, tilted, work):
         return r, qt.cross(w, r)
     if shape == SPHERE:
         return (-dims[0] * n[0], -dims[0] * n[1], -dims[0] * n[2]), (0.0, 0.0, 0.0)
-    return wandering_point(dims, R, w, n)
+    return ellipsoid_point_and_rate(dims, R, w, n)
 
 
 @inlined
@@ -111,9 +111,9 @@ def wall_axis(walls, wall, first):
 def wall_axes(walls, wall):
     """Normal and the two tangents of a wall."""
     return (
-        wall_axis(walls, wall, NORMAL),
-        wall_axis(walls, wall, TANGENT_1),
-        wall_axis(walls, wall, TANGENT_2),
+        wall_axis(walls, wall, WALL_NORMAL),
+        wall_axis(walls, wall, WALL_TANGENT_1),
+        wall_axis(walls, wall, WALL_TANGENT_2),
     )
 
 

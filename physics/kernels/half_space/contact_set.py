@@ -3,24 +3,24 @@
 from __future__ import annotations
 
 from physics.kernels.compile.decorators import inlined, kernel
-from physics.kernels.compile.simd import WIDTH, put_row
+from physics.kernels.compile.simd import LANE_COUNT, store_lanes
 from physics.kernels.half_space import support_function as geo
 from physics.kernels.half_space.contact_point import center_arm, feature_of, geometric_center, wall_normal, wall_of
-from physics.kernels.half_space.persistent_contacts import last_push, stays, turning_acceleration
+from physics.kernels.half_space.persistent_contacts import is_still_pressed, last_normal_impulse, turning_acceleration
 from physics.kernels.math import quaternion as qt
 from physics.kernels.state.body import angular_velocity
-from physics.kernels.state.contact_law_dispatch import STIFFNESS, number_of
-from physics.kernels.state.layout import BLOCK, ELLIPSOID, OFFSET, VERTEX_COUNT
+from physics.kernels.state.contact_law_dispatch import LAW_STIFFNESS, law_parameter
+from physics.kernels.state.layout import BLOCK, ELLIPSOID, VERTEX_COUNT, WALL_OFFSET
 
 # Slops within which what approaches has arrived. Features that touched together may be two slops apart, and the place
 # of the first one's impact is half a slop off: an edge that comes down again does so with both its ends at once.
-TOGETHER = 3.0
+SIMULTANEOUS_SLOPS = 3.0
 
-stiffness = number_of(STIFFNESS)  # of contact that gives (`compliance`)
+_stiffness = law_parameter(LAW_STIFFNESS)  # of contact that gives (`compliance`)
 
 
 @inlined
-def is_clear(x, v, h, work):
+def is_flight_clear(x, v, h, work):
     """True if the bounding sphere stays clear of every wall during a free flight of h from x with velocity v.
 
     The gap of the sphere is a parabola in time; it is bounded below by its start plus what the velocity and
@@ -30,7 +30,7 @@ def is_clear(x, v, h, work):
     half = 0.5 * h * h
     for k in range(walls.shape[0]):
         n = wall_normal(walls, k)
-        gap = qt.dot(n, x) - walls[k, OFFSET] - work.radius
+        gap = qt.dot(n, x) - walls[k, WALL_OFFSET] - work.radius
         gap += min(0.0, h * qt.dot(n, v)) + min(0.0, half * (n[0] * a[0] + n[1] * a[1] + n[2] * a[2]))
         if not gap > 0.0:
             return False
@@ -42,19 +42,19 @@ def _admit(gap, speed, slop, reach, soft, slot, h, memory, work):
     """True if a feature belongs to the contact set of this stage.
 
     It does when it touches (gap <= slop); when loads make it no faster at the wall than `soft`: than from rest in the
-    step, and than what rests as it is (`target_velocity.aim_impact`); and when loads can bring it to the wall within
-    the step, if it pushed in the last stage (`persistent_contacts`), or if this is the last one that the substep may
-    have.
+    step, and than what rests as it is (`target_velocity.set_impact_targets`); and when loads can bring it to the wall
+    within the step, if it pushed in the last stage (`persistent_contacts`), or if this is the last one that the substep
+    may have.
     """
-    if gap <= slop or (gap <= TOGETHER * slop and speed < 0.0):
+    if gap <= slop or (gap <= SIMULTANEOUS_SLOPS * slop and speed < 0.0):
         return True
     if speed <= 0.0 and speed * speed + 2.0 * work.acceleration * gap <= soft * soft:
         return True
-    return gap + h * speed - reach <= slop and (work.is_last == 1 or last_push(slot, memory, work) > 0.0)
+    return gap + h * speed - reach <= slop and (work.is_last == 1 or last_normal_impulse(slot, memory, work) > 0.0)
 
 
 @inlined
-def gather(y, w, h, tilted, memory, work):
+def collect_wall_contacts(y, w, h, tilted, memory, work):
     """Fill `work` (slot, gap, speed, mask, and of all together widest and approach) with the contact set at this pose.
 
     Parameters
@@ -76,14 +76,14 @@ def gather(y, w, h, tilted, memory, work):
     walls, features, shape, radius = work.walls, work.features, work.shape, work.radius
     x, q, v, _ = y
     R, slop, acceleration = qt.to_matrix(q), work.slop, work.acceleration
-    if stiffness(work) > 0.0:  # springs push where there is no gap left
+    if _stiffness(work) > 0.0:  # springs push where there is no gap left
         acceleration = 0.0
     dims = (work.dims[0], work.dims[1], work.dims[2])
     center = geometric_center(x, R, work, tilted)
     reach, soft = 0.5 * acceleration * h * h, acceleration * h
     if work.restitution > work.rest_share:  # nor is what would rebound for longer than its share of the step
         soft *= work.rest_share / work.restitution
-    near = max(slop + reach, TOGETHER * slop)
+    near = max(slop + reach, SIMULTANEOUS_SLOPS * slop)
     if shape == ELLIPSOID:
         near += 0.5 * h * h * turning_acceleration(w, work)
     if work.is_last:
@@ -93,7 +93,7 @@ def gather(y, w, h, tilted, memory, work):
     for k in range(walls.shape[0]):
         work.mask[k] = 0
         n = wall_normal(walls, k)
-        d = qt.dot(n, center) - walls[k, OFFSET]
+        d = qt.dot(n, center) - walls[k, WALL_OFFSET]
         if d > radius + near:
             continue
         e = geo.scaled_normal(shape, dims, R, n)
@@ -107,10 +107,10 @@ def gather(y, w, h, tilted, memory, work):
                 vn += qt.dot(m, center_arm(R, work))
             lower, upper = geo.vertex_heights(e)
             slower, faster = geo.vertex_heights((dims[0] * mb[0], dims[1] * mb[1], dims[2] * mb[2]))
-            put_row(work.vertices, 0, 0, d + lower)
-            put_row(work.vertices, 0, WIDTH, d + upper)
-            put_row(work.vertices, 1, 0, vn + slower)
-            put_row(work.vertices, 1, WIDTH, vn + faster)
+            store_lanes(work.vertices, 0, 0, d + lower)
+            store_lanes(work.vertices, 0, LANE_COUNT, d + upper)
+            store_lanes(work.vertices, 1, 0, vn + slower)
+            store_lanes(work.vertices, 1, LANE_COUNT, vn + faster)
             for vertex in range(VERTEX_COUNT):
                 gap, speed = work.vertices[0, vertex], work.vertices[1, vertex]
                 if gap > near:
@@ -121,7 +121,9 @@ def gather(y, w, h, tilted, memory, work):
         else:
             gap = d - geo.support(shape, dims, e)
             speed = vn + qt.dot(m, geo.support_arm(shape, dims, R, n, e))
-            if _admit(gap, speed, slop, reach, soft, k, h, memory, work) or stays(gap, k, y, h, tilted, memory, work):
+            if _admit(gap, speed, slop, reach, soft, k, h, memory, work) or is_still_pressed(
+                gap, k, y, h, tilted, memory, work
+            ):
                 count = _record(count, k, 0, features, gap, speed, work)
                 depth, widest, approach = max(depth, -gap), max(widest, gap), max(approach, -speed)
     work.widest, work.approach = widest, approach
@@ -138,7 +140,7 @@ def _record(count, wall, feature, features, gap, speed, work):
 
 
 @inlined
-def what_is_behind(x, R, tilted, work):
+def check_penetration(x, R, tilted, work):
     """Test for features behind walls: (one outside the contact set, by more than half a slop; any, by a slop).
 
     Once a feature outside the set is, the other walls are not looked at: both are true then.
@@ -148,7 +150,7 @@ def what_is_behind(x, R, tilted, work):
     center, is_deep = geometric_center(x, R, work, tilted), False
     for k in range(walls.shape[0]):
         n = wall_normal(walls, k)
-        d = qt.dot(n, center) - walls[k, OFFSET]
+        d = qt.dot(n, center) - walls[k, WALL_OFFSET]
         if d > work.radius:
             continue
         e, mask = geo.scaled_normal(shape, dims, R, n), work.mask[k]
@@ -178,7 +180,7 @@ def nearest_outside_set(x, R, tilted, work):
     best, slot = 1.0e300, -1
     for k in range(walls.shape[0]):
         n = wall_normal(walls, k)
-        d = qt.dot(n, center) - walls[k, OFFSET]
+        d = qt.dot(n, center) - walls[k, WALL_OFFSET]
         if d > radius:
             if d - radius < best:
                 best, slot = d - radius, -1
@@ -198,12 +200,12 @@ def nearest_outside_set(x, R, tilted, work):
 
 
 @kernel
-def gap_of(slot, x, R, tilted, work):
+def feature_gap(slot, x, R, tilted, work):
     """Gap [m] of one feature to its wall."""
     walls, shape = work.walls, work.shape
     dims = (work.dims[0], work.dims[1], work.dims[2])
     n = wall_normal(walls, wall_of(slot, work))
-    d = qt.dot(n, geometric_center(x, R, work, tilted)) - walls[wall_of(slot, work), OFFSET]
+    d = qt.dot(n, geometric_center(x, R, work, tilted)) - walls[wall_of(slot, work), WALL_OFFSET]
     e = geo.scaled_normal(shape, dims, R, n)
     if shape == BLOCK:
         return d + geo.vertex_height(e, feature_of(slot, work))
@@ -211,7 +213,7 @@ def gap_of(slot, x, R, tilted, work):
 
 
 @kernel
-def gap_rate(slot, y, tilted, work):
+def feature_gap_rate(slot, y, tilted, work):
     """Rate of the gap of one feature [m/s]: its normal velocity. A point that wanders does so along the wall."""
     _, q, v, L = y
     walls, R, shape = work.walls, qt.to_matrix(q), work.shape
@@ -229,13 +231,13 @@ def gap_rate(slot, y, tilted, work):
 
 
 @inlined
-def push_out(x, R, tilted, work):
+def project_out_of_walls(x, R, tilted, work):
     """Position moved along the normals so that nothing is deeper than the slop in a wall. No velocity changes."""
     walls, shape, radius, slop = work.walls, work.shape, work.radius, work.slop
     dims = (work.dims[0], work.dims[1], work.dims[2])
     for k in range(walls.shape[0]):
         n = wall_normal(walls, k)
-        d = qt.dot(n, geometric_center(x, R, work, tilted)) - walls[k, OFFSET]
+        d = qt.dot(n, geometric_center(x, R, work, tilted)) - walls[k, WALL_OFFSET]
         if d >= radius:
             continue
         gap = d - geo.support(shape, dims, geo.scaled_normal(shape, dims, R, n))

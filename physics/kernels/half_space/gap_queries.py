@@ -17,7 +17,7 @@ def principal_matrix(state, params, i):
 
 
 @kernel
-def angular_momenta(rows, state, params):
+def write_angular_momenta(rows, state, params):
     """Write L = R I Rᵀ ω [kg m²/s] into the given rows of `state` from their ω."""
     for k in range(rows.shape[0]):
         i = rows[k]
@@ -45,28 +45,30 @@ def deepest_gaps(rows, state, params, shapes, walls, gaps, which):
         shape = shapes[i % shapes.shape[0]]
         gaps[k], which[k] = 1.0e300, -1
         for w in range(walls.shape[0]):
-            n = (walls[w, at.NORMAL], walls[w, at.NORMAL + 1], walls[w, at.NORMAL + 2])
-            gap = qt.dot(n, center) - walls[w, at.OFFSET] - geo.support(shape, d, geo.scaled_normal(shape, d, R, n))
+            n = (walls[w, at.WALL_NORMAL], walls[w, at.WALL_NORMAL + 1], walls[w, at.WALL_NORMAL + 2])
+            gap = (
+                qt.dot(n, center) - walls[w, at.WALL_OFFSET] - geo.support(shape, d, geo.scaled_normal(shape, d, R, n))
+            )
             if gap < gaps[k]:
                 gaps[k], which[k] = gap, w
 
 
 @kernel
-def spring_energies(state, params, shapes, walls, column, energies):
+def contact_spring_energies(state, params, shapes, walls, column, energies):
     """Energy [J] of the springs of contact, ½ k g² of each point with a gap g < 0, of every row; k in `column`."""
     for i in range(state.shape[0]):
         shape, energies[i] = shapes[i % shapes.shape[0]], 0.0
         point = (0.0, 0.0, 0.0)
         for w in range(walls.shape[0]):
-            n = (walls[w, at.NORMAL], walls[w, at.NORMAL + 1], walls[w, at.NORMAL + 2])
+            n = (walls[w, at.WALL_NORMAL], walls[w, at.WALL_NORMAL + 1], walls[w, at.WALL_NORMAL + 2])
             for feature in range(at.VERTEX_COUNT if shape == at.BLOCK else 1):
-                point = point_of(state, params, shape, n, i, feature)
-                gap = min(qt.dot(n, point) - walls[w, at.OFFSET], 0.0)
+                point = feature_point(state, params, shape, n, i, feature)
+                gap = min(qt.dot(n, point) - walls[w, at.WALL_OFFSET], 0.0)
                 energies[i] += 0.5 * params[i, column] * gap * gap
 
 
 @kernel
-def point_of(state, params, shape, n, i, feature):
+def feature_point(state, params, shape, n, i, feature):
     """World position [m] of a feature (see `layout.VERTEX_COUNT`) of row i towards the normal n of a wall."""
     R = qt.to_matrix((state[i, at.QUAT], state[i, at.QUAT + 1], state[i, at.QUAT + 2], state[i, at.QUAT + 3]))
     d = (params[i, at.DIMENSIONS], params[i, at.DIMENSIONS + 1], params[i, at.DIMENSIONS + 2])
@@ -81,6 +83,6 @@ def point_of(state, params, shape, n, i, feature):
 
 @kernel
 def contact_point(state, params, shapes, walls, i, wall, feature, out):
-    """`point_of` the feature of row i towards a wall, into out (3,)."""
-    n = (walls[wall, at.NORMAL], walls[wall, at.NORMAL + 1], walls[wall, at.NORMAL + 2])
-    out[0], out[1], out[2] = point_of(state, params, shapes[i % shapes.shape[0]], n, i, feature)
+    """`feature_point` the feature of row i towards a wall, into out (3,)."""
+    n = (walls[wall, at.WALL_NORMAL], walls[wall, at.WALL_NORMAL + 1], walls[wall, at.WALL_NORMAL + 2])
+    out[0], out[1], out[2] = feature_point(state, params, shapes[i % shapes.shape[0]], n, i, feature)

@@ -9,45 +9,45 @@ left it nor hit it.
 from __future__ import annotations
 
 from physics.kernels.compile.decorators import inlined, kernel
-from physics.kernels.half_space.contact_point import arm_and_rate, feature_of, place_arms, wall_normal, wall_of
+from physics.kernels.half_space.contact_point import contact_arm_and_rate, feature_of, place_arms, wall_normal, wall_of
 from physics.kernels.math import quaternion as qt
-from physics.kernels.state.body import angular_velocity, principal_attitude, turning
+from physics.kernels.state.body import angular_velocity, apply_inv_inertia, principal_attitude
 from physics.kernels.state.layout import ELLIPSOID
 
 # Row of `memory`: length of the last resting stage [s], its contact count, which direct solve worked last
-# (`sliding_patch.HOLD`, `SLIDE`, `MIXED`), the slots of its contacts, then the impulses of all slots, zero where
-# there is no contact.
-STAGE_LENGTH, CONTACT_COUNT, MODE = range(3)
-MEMORY_HEAD = 3
+# (`sliding_patch.TRY_STICKING`, `SLIDE`, `MIXED`), the slots of its contacts, then the impulses of all slots, zero
+# where there is no contact.
+WALL_MEMORY_STAGE, WALL_MEMORY_COUNT, WALL_MEMORY_MODE = range(3)
+WALL_MEMORY_HEAD = 3
 
 
 @inlined
-def last_push(slot, memory, work):
+def last_normal_impulse(slot, memory, work):
     """Normal impulse of a feature in the last stage of its body [N s]; 0 where that was in the air."""
-    return memory[work.i, MEMORY_HEAD + work.slot.shape[0] + 3 * slot]
+    return memory[work.i, WALL_MEMORY_HEAD + work.slot.shape[0] + 3 * slot]
 
 
 @kernel
-def free_acceleration(slot, y, tilted, work):
+def free_gap_acceleration(slot, y, tilted, work):
     """Acceleration of a feature's gap without contact, n·(v̇ + ω̇ x r + ω x ṙ) [m/s²]; < 0: it is pressed."""
     _, q, _, L = y
     n, a, torque = wall_normal(work.walls, wall_of(slot, work)), work.free_acceleration, work.torque
     dims = (work.dims[0], work.dims[1], work.dims[2])
     R = qt.to_matrix(principal_attitude(q, work, tilted))
-    w = turning(R, L, work.J)
+    w = apply_inv_inertia(R, L, work.J)
     g = qt.cross(L, w)
-    alpha = turning(R, (torque[0] + g[0], torque[1] + g[1], torque[2] + g[2]), work.J)
-    r, rate = arm_and_rate(work.shape, dims, qt.to_matrix(q), w, n, feature_of(slot, work), tilted, work)
+    alpha = apply_inv_inertia(R, (torque[0] + g[0], torque[1] + g[1], torque[2] + g[2]), work.J)
+    r, rate = contact_arm_and_rate(work.shape, dims, qt.to_matrix(q), w, n, feature_of(slot, work), tilted, work)
     b, c = qt.cross(alpha, r), qt.cross(w, rate)
     return n[0] * (a[0] + b[0] + c[0]) + n[1] * (a[1] + b[1] + c[1]) + n[2] * (a[2] + b[2] + c[2])
 
 
 @kernel
-def stays(gap, slot, y, h, tilted, memory, work):
+def is_still_pressed(gap, slot, y, h, tilted, memory, work):
     """True if a round body that pushed in the last stage is still pressed, so that its gap closes."""
-    if not (work.shape == ELLIPSOID and last_push(slot, memory, work) > 0.0):
+    if not (work.shape == ELLIPSOID and last_normal_impulse(slot, memory, work) > 0.0):
         return False
-    return gap + 0.5 * h * h * min(free_acceleration(slot, y, tilted, work), 0.0) <= work.slop
+    return gap + 0.5 * h * h * min(free_gap_acceleration(slot, y, tilted, work), 0.0) <= work.slop
 
 
 @inlined
@@ -64,19 +64,19 @@ def turning_acceleration(w, work):
 
 
 @kernel
-def goes_on(i, y, h, tilted, memory, work):
+def is_persistent_contact(i, y, h, tilted, memory, work):
     """True if the speed of contact i of the set is an error of the last stage: it pushed then, and is no faster.
 
     A stage of length h can leave a contact that holds the speed that loads and turning make in it.
     """
-    if not last_push(work.slot[i], memory, work) > 0.0:
+    if not last_normal_impulse(work.slot[i], memory, work) > 0.0:
         return False
     w = angular_velocity(y[1], y[3], work, tilted)
     return abs(work.speed[i]) <= h * (work.acceleration + turning_acceleration(w, work))
 
 
 @kernel
-def hold_back(y, h, tilted, memory, work):
+def cancel_separation(y, h, tilted, memory, work):
     """State with the one contact of the set at rest along its normal, if it holds on but h would not bring it back.
 
     What leaves at u after a push p, though it is pressed against its wall still, got u/(n·W n) more than it should
@@ -85,16 +85,16 @@ def hold_back(y, h, tilted, memory, work):
     """
     x, q, v, L = y
     gap, u, slot = work.gap[0], work.speed[0], work.slot[0]
-    if not goes_on(0, y, h, tilted, memory, work):
+    if not is_persistent_contact(0, y, h, tilted, memory, work):
         return y
-    a = free_acceleration(slot, y, tilted, work)
+    a = free_gap_acceleration(slot, y, tilted, work)
     if not (a < 0.0 and gap + h * (u + 0.5 * h * a) > 0.0):
         return y
     place_arms(1, qt.to_matrix(q), tilted, work)
     n, r = wall_normal(work.walls, wall_of(slot, work)), (work.arm[0, 0], work.arm[0, 1], work.arm[0, 2])
     m = qt.cross(r, n)
-    spin = turning(qt.to_matrix(principal_attitude(q, work, tilted)), m, work.J)
-    p = min(u / (1.0 / work.mass + qt.dot(m, spin)), last_push(slot, memory, work))
+    spin = apply_inv_inertia(qt.to_matrix(principal_attitude(q, work, tilted)), m, work.J)
+    p = min(u / (1.0 / work.mass + qt.dot(m, spin)), last_normal_impulse(slot, memory, work))
     s = p / work.mass
     v = (v[0] - s * n[0], v[1] - s * n[1], v[2] - s * n[2])
     return x, q, v, (L[0] - p * m[0], L[1] - p * m[1], L[2] - p * m[2])

@@ -7,17 +7,17 @@ import math
 from physics.kernels.compile.decorators import inlined
 from physics.kernels.forces.held_loads import has_fields
 from physics.kernels.half_space.contact_point import wall_normal
-from physics.kernels.half_space.contact_set import is_clear
+from physics.kernels.half_space.contact_set import is_flight_clear
 from physics.kernels.math import quaternion as qt
-from physics.kernels.state.layout import OFFSET
+from physics.kernels.state.layout import WALL_OFFSET
 
 # Substeps without a look at least: fewer are not worth finding out how many. And at most, with what rounding adds up to
 # in as many, relative to the coordinates: a handful of operations, 2⁻⁵³ each, in each of them.
-LEAST = 4
-MOST = 1 << 20
-ROUNDING = 2.0**-28
+_MIN_SUBSTEPS = 4
+_MAX_SUBSTEPS = 1 << 20
+_ROUNDING = 2.0**-28
 
-FAR = 1.0e300
+_FAR = 1.0e300
 
 
 @inlined
@@ -27,30 +27,30 @@ def _size(a):
 
 
 @inlined
-def clear_substeps(x, v, h, left, work):
+def count_clear_substeps(x, v, h, left, work):
     """Number of substeps of h, of `left`, in which free flight from x with velocity v meets no wall; 0: it could.
 
-    The first is `is_clear`'s. It would say the same of the next ones, as long as the acceleration stays what it is:
-    with s and c the parts of velocity and acceleration towards a wall, its gap, and the bound for that at any time
-    before, loses at most s t + c t²/2 in t. Half of each gap is spent on this, the other half is left for
-    rounding, and for textbook schemes, which go up to c t h/2 further: to leave out looks changes nothing.
+    The first is `is_flight_clear`'s. It would say the same of the next ones, as long as the acceleration stays what it
+    is: with s and c the parts of velocity and acceleration towards a wall, its gap, and the bound for that at any time
+    before, loses at most s t + c t²/2 in t. Half of each gap is spent on this, the other half is left for rounding, and
+    for textbook schemes, which go up to c t h/2 further: to leave out looks changes nothing.
     """
-    if not is_clear(x, v, h, work):
+    if not is_flight_clear(x, v, h, work):
         return 0
-    if left < LEAST or has_fields(work):
+    if left < _MIN_SUBSTEPS or has_fields(work):
         return 1
     walls, a = work.walls, (work.free_acceleration[0], work.free_acceleration[1], work.free_acceleration[2])
-    size, t, first = _size(x), h * min(left, MOST), LEAST * h
-    nearest = FAR
+    size, t, first = _size(x), h * min(left, _MAX_SUBSTEPS), _MIN_SUBSTEPS * h
+    nearest = _FAR
     for k in range(walls.shape[0]):
         n = wall_normal(walls, k)
-        gap = qt.dot(n, x) - walls[k, OFFSET] - work.radius
+        gap = qt.dot(n, x) - walls[k, WALL_OFFSET] - work.radius
         way, s, c = 0.5 * gap, max(0.0, -qt.dot(n, v)), max(0.0, -qt.dot(n, a))
         if first * (s + 0.5 * first * c) > way:
             return 1
         if s + c > 0.0:
             t = min(t, 2.0 * way / (s + math.sqrt(s * s + 2.0 * c * way)))
-        nearest, size = min(nearest, gap), max(size, abs(walls[k, OFFSET]))
-    if not 0.5 * nearest > ROUNDING * (size + t * (_size(v) + 0.5 * t * _size(a))):
+        nearest, size = min(nearest, gap), max(size, abs(walls[k, WALL_OFFSET]))
+    if not 0.5 * nearest > _ROUNDING * (size + t * (_size(v) + 0.5 * t * _size(a))):
         return 1
     return max(1, int(t / h))

@@ -17,7 +17,7 @@ DEPENDENT_TOLERANCE = 2.0**-40  # of its diagonal: an index with a smaller Schur
 
 
 @kernel
-def clamp(work, index, n, count, k):
+def clamp_index(work, index, n, count, k):
     """Append index k to the `count` clamped ones: one row of the Cholesky factor.
 
     Returns whether k is independent of them; if not, nothing but scratch space has changed.
@@ -40,7 +40,7 @@ def clamp(work, index, n, count, k):
 
 
 @kernel
-def release(work, index, n, count, k):
+def release_index(work, index, n, count, k):
     """Remove index k from the clamped ones and rebuild the factor behind it. Returns the new count."""
     clamped = index[:n]
     place = index[n + k]
@@ -49,7 +49,7 @@ def release(work, index, n, count, k):
     for r in range(place + 1, count):
         j = clamped[r]
         index[n + j] = -1
-        if clamp(work, index, n, kept, j):
+        if clamp_index(work, index, n, kept, j):
             kept += 1
     return kept
 

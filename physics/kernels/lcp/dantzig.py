@@ -36,20 +36,20 @@ from __future__ import annotations
 import math
 
 from physics.kernels.compile.decorators import kernel
-from physics.kernels.lcp.active_set_cholesky import DEPENDENT_TOLERANCE, clamp, release, solve_clamped
+from physics.kernels.lcp.active_set_cholesky import DEPENDENT_TOLERANCE, clamp_index, release_index, solve_clamped
 from physics.kernels.lcp.scaling_and_certificate import (
-    BAD_DATA,
-    PIVOT_LIMIT,
-    RAY,
-    SOLVED,
+    LCP_BAD_DATA,
+    LCP_PIVOT_LIMIT,
+    LCP_RAY,
+    LCP_SOLVED,
     are_finite,
-    certify,
+    certify_solution,
     inverse_power_of_two,
 )
 
 # Dimensionless: the scaled diagonal is in [1/4, 1), the scaled q at most 1. Rounding is 2^-53.
 DIRECTION_TOLERANCE = 2.0**-44  # of the largest rate: what moves slower stands still
-TIE_TOLERANCE = 2.0**-42  # of 1 + max z: a driven w above minus this has reached zero
+_TIE_TOLERANCE = 2.0**-42  # of 1 + max z: a driven w above minus this has reached zero
 SIGN_TOLERANCE = 2.0**-40  # of 1 + max z: a w above minus this counts as >= 0
 
 # Rows of `work` after the factor (n rows) and the scaled matrix (n rows).
@@ -139,20 +139,20 @@ def find_block(work, index, z, n, i, largest, is_independent):
         largest = step
         for k in range(n):
             largest = max(largest, z[k] + step * max(rate_z[k], 0.0))
-        if w[i] + step * rate_w[i] >= -TIE_TOLERANCE * (1.0 + largest):
+        if w[i] + step * rate_w[i] >= -_TIE_TOLERANCE * (1.0 + largest):
             blocking = i
     return blocking, step
 
 
 @kernel
-def drive(work, index, z, n, count, i, budget):
+def drive_to_zero(work, index, z, n, count, i, budget):
     """Increase z_i until w_i = 0. Returns (status, pivots, new clamped count)."""
     w, rate_z, rate_w = work[2 * n + W], work[2 * n + RATE_Z], work[2 * n + RATE_W]
     for pivots in range(budget):
         largest, is_independent = find_rates(work, index, n, count, i)
         blocking, step = find_block(work, index, z, n, i, largest, is_independent)
         if blocking < 0:
-            return RAY, pivots, count
+            return LCP_RAY, pivots, count
         z[i] += step
         for k in range(n):
             # what is in order stays so: rounding must not carry a tied index below zero
@@ -165,16 +165,16 @@ def drive(work, index, z, n, count, i, budget):
         if index[n + blocking] >= 0:
             z[blocking] = 0.0
             w[blocking] = 0.0
-            count = release(work, index, n, count, blocking)
+            count = release_index(work, index, n, count, blocking)
             continue
         w[blocking] = 0.0
-        if clamp(work, index, n, count, blocking):
+        if clamp_index(work, index, n, count, blocking):
             count += 1
         else:
             index[n + blocking] = -2
         if blocking == i:
-            return SOLVED, pivots + 1, count
-    return PIVOT_LIMIT, budget, count
+            return LCP_SOLVED, pivots + 1, count
+    return LCP_PIVOT_LIMIT, budget, count
 
 
 @kernel
@@ -218,10 +218,10 @@ def drive_all(work, index, z, n, max_pivots):
         while i < n and not work[2 * n + W, i] < 0.0:
             i += 1
         if i == n:
-            return SOLVED, pivots
-        status, done, count = drive(work, index, z, n, count, i, max_pivots - pivots)
+            return LCP_SOLVED, pivots
+        status, done, count = drive_to_zero(work, index, z, n, count, i, max_pivots - pivots)
         pivots += done
-        if status != SOLVED:
+        if status != LCP_SOLVED:
             return status, pivots
 
 
@@ -237,7 +237,7 @@ def dantzig(M, q, z, work, index, max_pivots):
     q : (n,) float64
         Its length is the size of the problem.
     z : (n,) float64, out
-        The solution if the status is `SOLVED`; the best found if it is
+        The solution if the status is `LCP_SOLVED`; the best found if it is
         `INACCURATE`; zeros otherwise. With dependent rows of M one of many
         solutions (w is the same for all): positive on independent rows only.
     work : (2 n + 6, n) float64, work
@@ -263,18 +263,18 @@ def dantzig(M, q, z, work, index, max_pivots):
     n = q.shape[0]
     z[:n] = 0.0
     if not are_finite(M, q):
-        return BAD_DATA, 0
+        return LCP_BAD_DATA, 0
     whole, q_scale = scale_problem(M, q, work)
     if whole == 0.0:
-        return BAD_DATA, 0
+        return LCP_BAD_DATA, 0
     index[n : 2 * n] = -1
     status, pivots = drive_all(work, index, z, n, max_pivots)
-    if status != SOLVED:
+    if status != LCP_SOLVED:
         z[:n] = 0.0
         return status, pivots
     ones = work[2 * n + SCRATCH]
     ones[:] = 1.0
-    status = certify(work[n : 2 * n], work[2 * n + RHS], z, ones, ones, 1.0)
+    status = certify_solution(work[n : 2 * n], work[2 * n + RHS], z, ones, ones, 1.0)
     for j in range(n):
         z[j] *= work[2 * n + SCALE, j] * (whole / q_scale)
     return status, pivots

@@ -20,7 +20,7 @@ Three things differ from the textbook:
   of each lies in [1/2, 1]. In the caller's units the covering column is then
   one over the row scales.
 * The answer is refined against M and q and its natural residual is checked, so
-  that `SOLVED` is a statement about the data and not about the tableau.
+  that `LCP_SOLVED` is a statement about the data and not about the tableau.
 
 References
 ----------
@@ -38,18 +38,18 @@ import math
 
 from physics.kernels.compile.decorators import kernel
 from physics.kernels.lcp.scaling_and_certificate import (
-    BAD_DATA,
-    PIVOT_LIMIT,
-    RAY,
-    SOLVED,
+    LCP_BAD_DATA,
+    LCP_PIVOT_LIMIT,
+    LCP_RAY,
+    LCP_SOLVED,
     are_finite,
-    certify,
+    certify_solution,
     inverse_power_of_two,
 )
 
 # Dimensionless: entries of the scaled data are at most 1. Rounding is 2^-53.
 PIVOT_TOLERANCE = 2.0**-36  # of its column's largest entry: a smaller pivot is taken for rounded-off zero
-TIE_TOLERANCE = 2.0**-36  # of its column's largest entry: closer rows of the ratio test count as tied
+_TIE_TOLERANCE = 2.0**-36  # of its column's largest entry: closer rows of the ratio test count as tied
 REFINEMENTS = 2  # each gains the digits the tableau's inverse still has
 
 
@@ -101,7 +101,7 @@ def fill_tableau(M, q, tableau, basis):
 
 
 @kernel
-def exchange(tableau, basis, n, r, c):
+def pivot_tableau(tableau, basis, n, r, c):
     """Swap the basic variable of row r and the nonbasic one of column c."""
     pivot = tableau[r, c]
     for j in range(n + 2):
@@ -131,7 +131,7 @@ def inverse_entry(tableau, basis, n, i, k):
 
 
 @kernel
-def keep_tied(tableau, basis, n, c, k, count):
+def filter_tied_rows(tableau, basis, n, c, k, count):
     """Keep those of the first `count` tied rows that have the least ratio in column k of [q | inverse].
 
     k = -1 stands for the right-hand side. Returns how many are left.
@@ -150,14 +150,14 @@ def keep_tied(tableau, basis, n, c, k, count):
     for t in range(count):
         i = tied[t]
         value = tableau[i, n + 1] if k < 0 else inverse_entry(tableau, basis, n, i, k)
-        if value <= least * tableau[i, c] + TIE_TOLERANCE * largest:
+        if value <= least * tableau[i, c] + _TIE_TOLERANCE * largest:
             tied[kept] = i
             kept += 1
     return kept
 
 
 @kernel
-def leaving_row(tableau, basis, n, c):
+def find_leaving_row(tableau, basis, n, c):
     """Lexicographic minimum ratio test in column c: the row that blocks first, -1 for a ray.
 
     Among rows that block together z0 goes first, because that ends the path.
@@ -173,19 +173,19 @@ def leaving_row(tableau, basis, n, c):
             count += 1
     if count == 0:
         return -1
-    count = keep_tied(tableau, basis, n, c, -1, count)
+    count = filter_tied_rows(tableau, basis, n, c, -1, count)
     for t in range(count):
         if basis[tied[t]] == 2 * n:
             return tied[t]
     for k in range(n):
         if count == 1:
             break
-        count = keep_tied(tableau, basis, n, c, k, count)
+        count = filter_tied_rows(tableau, basis, n, c, k, count)
     return tied[0]
 
 
 @kernel
-def first_row(tableau, n):
+def find_first_row(tableau, n):
     """The row in which z0 enters: least q; of tied ones the last, which is lexicographically least."""
     r = 0
     for i in range(1, n):
@@ -195,7 +195,7 @@ def first_row(tableau, n):
 
 
 @kernel
-def refine(M, q, z, tableau, basis, q_scale):
+def refine_solution(M, q, z, tableau, basis, q_scale):
     """Two steps of iterative refinement of the basic solution, then z in scaled units."""
     n = q.shape[0]
     row_scale, column_scale, defect = tableau[n], tableau[n + 1], tableau[n + 2]
@@ -217,26 +217,26 @@ def refine(M, q, z, tableau, basis, q_scale):
 
 
 @kernel
-def follow_path(tableau, basis, n, max_pivots):
+def follow_lemke_path(tableau, basis, n, max_pivots):
     """Pivot until z0 has left the basis. Returns (status, pivots)."""
-    r = first_row(tableau, n)
+    r = find_first_row(tableau, n)
     if max_pivots < 1:
-        return PIVOT_LIMIT, 0
+        return LCP_PIVOT_LIMIT, 0
     leaving = basis[r]
-    exchange(tableau, basis, n, r, n)
+    pivot_tableau(tableau, basis, n, r, n)
     pivots = 1
     while leaving != 2 * n:
         entering = leaving + n if leaving < n else leaving - n
         c = -1 - basis[2 * n + 1 + entering]
-        r = leaving_row(tableau, basis, n, c)
+        r = find_leaving_row(tableau, basis, n, c)
         if r < 0:
-            return RAY, pivots
+            return LCP_RAY, pivots
         if pivots >= max_pivots:
-            return PIVOT_LIMIT, pivots
+            return LCP_PIVOT_LIMIT, pivots
         leaving = basis[r]
-        exchange(tableau, basis, n, r, c)
+        pivot_tableau(tableau, basis, n, r, c)
         pivots += 1
-    return SOLVED, pivots
+    return LCP_SOLVED, pivots
 
 
 @kernel
@@ -250,7 +250,7 @@ def lemke(M, q, z, tableau, basis, max_pivots):
     q : (n,) float64
         Its length is the size of the problem.
     z : (n,) float64, out
-        The solution if the status is `SOLVED`; the best found if it is
+        The solution if the status is `LCP_SOLVED`; the best found if it is
         `INACCURATE`; zeros otherwise.
     tableau : (n + 3, n + 2) float64, work
         Tableau, then one row each of row scales, column scales and defects.
@@ -278,20 +278,20 @@ def lemke(M, q, z, tableau, basis, max_pivots):
     n = q.shape[0]
     z[:n] = 0.0
     if not are_finite(M, q):
-        return BAD_DATA, 0
+        return LCP_BAD_DATA, 0
     least = 0.0
     for i in range(n):
         least = min(least, q[i])
     if least >= 0.0:
-        return SOLVED, 0
+        return LCP_SOLVED, 0
     q_scale = fill_tableau(M, q, tableau, basis)
-    status, pivots = follow_path(tableau, basis, n, max_pivots)
-    if status != SOLVED:
+    status, pivots = follow_lemke_path(tableau, basis, n, max_pivots)
+    if status != LCP_SOLVED:
         return status, pivots
-    refine(M, q, z, tableau, basis, q_scale)
+    refine_solution(M, q, z, tableau, basis, q_scale)
     for j in range(n):
         z[j] = max(z[j], 0.0)
-    status = certify(M, q, z, tableau[n], tableau[n + 1], q_scale)
+    status = certify_solution(M, q, z, tableau[n], tableau[n + 1], q_scale)
     for j in range(n):
         z[j] *= tableau[n + 1, j] / q_scale
     return status, pivots

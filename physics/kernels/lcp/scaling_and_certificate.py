@@ -11,11 +11,11 @@ import math
 from physics.kernels.compile.decorators import kernel
 
 # Statuses, the same for every pivoting solver.
-SOLVED = 0
-RAY = 1  # the path ended without a solution
-PIVOT_LIMIT = 2
-BAD_DATA = 3  # not finite, or not of the class that the solver asks for
-INACCURATE = 4  # the path ended in a solution, but rounding left too large a residual
+LCP_SOLVED = 0
+LCP_RAY = 1  # the path ended without a solution
+LCP_PIVOT_LIMIT = 2
+LCP_BAD_DATA = 3  # not finite, or not of the class that the solver asks for
+LCP_INACCURATE = 4  # the path ended in a solution, but rounding left too large a residual
 
 RESIDUAL_TOLERANCE = 2.0**-30  # of the largest sum of magnitudes in a row of M z + q
 
@@ -42,8 +42,8 @@ def are_finite(M, q):
 
 
 @kernel
-def certify(M, q, z, row_scale, column_scale, q_scale):
-    """`SOLVED` if the natural residual max |min(z, w)| of the scaled problem is small, else `INACCURATE`."""
+def certify_solution(M, q, z, row_scale, column_scale, q_scale):
+    """`LCP_SOLVED` if the natural residual max |min(z, w)| of the scaled problem is small, else `LCP_INACCURATE`."""
     n = q.shape[0]
     worst = 0.0
     largest = 0.0
@@ -57,5 +57,5 @@ def certify(M, q, z, row_scale, column_scale, q_scale):
         worst = max(worst, abs(min(z[i], w)))
         largest = max(largest, magnitude)
     if worst <= RESIDUAL_TOLERANCE * largest:
-        return SOLVED
-    return INACCURATE
+        return LCP_SOLVED
+    return LCP_INACCURATE

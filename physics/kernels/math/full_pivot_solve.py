@@ -11,7 +11,7 @@ PIVOT_SHARE = 1.0e-10
 
 
 @kernel
-def eliminate(m, A, order, x):
+def solve_full_pivot(m, A, order, x):
     """Solve the m equations A[:, :m] x = A[:, m], A is overwritten; unknowns without a pivot are 0.
 
     Parameters
@@ -65,7 +65,7 @@ def eliminate(m, A, order, x):
 
 
 @kernel
-def solve_least(rows, m, A, x):
+def solve_least_norm(rows, m, A, x):
     """The x of least norm with A[:rows, :m] x = A[:rows, m]; A is overwritten, a row that others imply is left out.
 
     Rows are made orthonormal one after the other (modified Gram-Schmidt), so that x, a sum of them, is smooth in A as

@@ -16,7 +16,7 @@ def second_difference(a, fa, b, fb, c, fc):
 
 
 @inlined
-def crossing(low_gap, high_gap, width, bend):
+def parabola_crossing_time(low_gap, high_gap, width, bend):
     """Root in [0, width] of the parabola from low_gap >= 0 to high_gap < 0, `width` later.
 
     With the slope B at its start and `bend` c, c x² + B x + low_gap = 0: of the root's two forms the one that does not

@@ -113,7 +113,7 @@ def rotate(q, a):
 
 
 @inlined
-def exponential(rotation):
+def exp_map(rotation):
     """Quaternion of the rotation vector `free_rotation` [rad], exp(rotation / 2).
 
     sin(x)/x is taken from its series where the quotient would lose digits:
@@ -130,6 +130,6 @@ def exponential(rotation):
 
 
 @inlined
-def between(a, b, s):
+def lerp(a, b, s):
     """a + s (b - a) of vectors."""
     return (a[0] + s * (b[0] - a[0]), a[1] + s * (b[1] - a[1]), a[2] + s * (b[2] - a[2]))

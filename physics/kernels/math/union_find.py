@@ -9,7 +9,7 @@ from physics.kernels.compile.decorators import inlined
 
 
 @inlined
-def root_of(b, parent):
+def find_root(b, parent):
     """First body of the island of b."""
     while parent[b] != b:
         parent[b] = parent[parent[b]]
@@ -18,7 +18,7 @@ def root_of(b, parent):
 
 
 @inlined
-def join(a, b, parent):
+def unite_sets(a, b, parent):
     """Make one island of those of a and b."""
-    a, b = root_of(a, parent), root_of(b, parent)
+    a, b = find_root(a, parent), find_root(b, parent)
     parent[max(a, b)] = min(a, b)

@@ -8,8 +8,8 @@ from llvmlite import ir
 from numba.core import types
 from numba.extending import intrinsic
 
-from physics.kernels.compile.fused.array_elements import pointer
-from physics.kernels.compile.fused.folding_builder import WORD, word
+from physics.kernels.compile.fused.array_elements import element_pointer
+from physics.kernels.compile.fused.folding_builder import WORD, word_constant
 from physics.kernels.compile.fused.prepared_entry import WORD_SIZE
 
 # What a processor is told that waits for another one, where there is such an instruction.
@@ -21,7 +21,7 @@ _PAUSES = {
 
 def _pointer(context, builder, sig, args):
     """Pointer to table[row, column], from the first three arguments."""
-    return pointer(context, builder, sig.args[0], args[0], sig.args[1:3], args[1:3])
+    return element_pointer(context, builder, sig.args[0], args[0], sig.args[1:3], args[1:3])
 
 
 def _word(context, builder, sig, args, k):
@@ -39,19 +39,19 @@ def _changed_by(operation: str):
 
 
 @intrinsic
-def add(typing_context, table, row, column, number):
+def atomic_add(typing_context, table, row, column, number):
     """table[row, column] += number; returns what was there before."""
     return types.int64(table, row, column, number), _changed_by("add")
 
 
 @intrinsic
-def exchange(typing_context, table, row, column, number):
+def atomic_exchange(typing_context, table, row, column, number):
     """table[row, column] = number; returns what was there before."""
     return types.int64(table, row, column, number), _changed_by("xchg")
 
 
 @intrinsic
-def exchange_if(typing_context, table, row, column, expected, number):
+def compare_exchange(typing_context, table, row, column, expected, number):
     """table[row, column] = number, if there is what is expected; returns whether there was."""
 
     def lower(context, builder, sig, args):
@@ -63,7 +63,7 @@ def exchange_if(typing_context, table, row, column, expected, number):
 
 
 @intrinsic
-def seen(typing_context, table, row, column):
+def atomic_load(typing_context, table, row, column):
     """table[row, column] as it is now."""
 
     def lower(context, builder, sig, args):
@@ -73,7 +73,7 @@ def seen(typing_context, table, row, column):
 
 
 @intrinsic
-def pause(typing_context):
+def spin_pause(typing_context):
     """Wait for a moment."""
 
     def lower(context, builder, sig, args):
@@ -88,16 +88,16 @@ def pause(typing_context):
 
 
 @intrinsic
-def ask(typing_context, address):
+def call_address(typing_context, address):
     """Result of the system's function at the address, which takes no arguments; -1 if the address is 0."""
 
     def lower(context, builder, sig, args):
         function, before = ir.FunctionType(ir.IntType(32), []).as_pointer(), builder.basic_block
-        with builder.if_then(builder.icmp_signed("!=", args[0], word(0))):
+        with builder.if_then(builder.icmp_signed("!=", args[0], word_constant(0))):
             answer = builder.sext(builder.call(builder.inttoptr(args[0], function), []), WORD)
             asking = builder.basic_block
         result = builder.phi(WORD)
-        result.add_incoming(word(-1), before)
+        result.add_incoming(word_constant(-1), before)
         result.add_incoming(answer, asking)
         return result
 

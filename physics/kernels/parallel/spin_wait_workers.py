@@ -20,90 +20,107 @@ from __future__ import annotations
 import numpy as np
 
 from physics.kernels.compile.decorators import inlined, kernel
-from physics.kernels.parallel.atomics import add, ask, exchange, exchange_if, pause, seen
-from physics.kernels.parallel.prepared_calls import perform
-from physics.kernels.parallel.work_stealing import APART, TAKEN, deal
+from physics.kernels.parallel.atomics import (
+    atomic_add,
+    atomic_exchange,
+    atomic_load,
+    call_address,
+    compare_exchange,
+    spin_pause,
+)
+from physics.kernels.parallel.prepared_calls import run_jobs
+from physics.kernels.parallel.work_stealing import PADDING_WORDS, TAKEN_COUNT, reset_ranges
 
-AWAY, WAITING, CALLED, BUSY, LEAVING = range(5)
+IDLE, SPINNING, WOKEN, RUNNING, STOPPING = range(5)
 
 # Of a crew: how many members' calls raised an exception, the leader's processor, and whether it has done its
 # part; the addresses of the functions that give way and that tell the processor (0: none); and the number of pauses
 # between two calls of the first one, and before the first call of a member that waits while the leader is busy. Then, a
 # row for each member: its state, its jobs and their number, and whether it was away when it was called.
-FAILED, LED_ON, IS_OVER, GIVE_WAY, PROCESSOR, BETWEEN, BRIEF = range(7)
-STATE, JOBS, COUNT, WAS_AWAY = range(4)
+(
+    CREW_FAILED_COUNT,
+    CREW_LEADER_PROCESSOR,
+    CREW_LEADER_DONE,
+    CREW_YIELD_ADDRESS,
+    CREW_PROCESSOR_ADDRESS,
+    CREW_YIELD_INTERVAL,
+    CREW_BRIEF_PAUSES,
+) = range(7)
+WORKER_STATE, WORKER_JOBS, WORKER_JOB_COUNT, WORKER_WAS_IDLE = range(4)
 
 # What became of a run: all went well, someone has not finished, a call raised an exception.
-DONE, UNFINISHED, RAISED = range(3)
+RUN_DONE, RUN_UNFINISHED, RUN_FAILED = range(3)
 
 
-def make_crew(members: int) -> np.ndarray:
+def make_worker_table(members: int) -> np.ndarray:
     """(1 + members, APART) int64, all of them away."""
-    return np.zeros((1 + members, APART), dtype=np.int64)
+    return np.zeros((1 + members, PADDING_WORDS), dtype=np.int64)
 
 
 @kernel
-def summon(crew, turns, members):
+def wake_workers(crew, turns, members):
     """Call the first members to a batch of which nothing is taken; how many were away and have to be sent for."""
-    deal(turns)
-    crew[0, FAILED] = crew[0, IS_OVER] = away = 0
-    crew[0, LED_ON] = ask(crew[0, PROCESSOR])
+    reset_ranges(turns)
+    crew[0, CREW_FAILED_COUNT] = crew[0, CREW_LEADER_DONE] = away = 0
+    crew[0, CREW_LEADER_PROCESSOR] = call_address(crew[0, CREW_PROCESSOR_ADDRESS])
     for k in range(1, 1 + members):
-        crew[k, WAS_AWAY] = 1 if exchange(crew, k, STATE, CALLED) == AWAY else 0
-        away += crew[k, WAS_AWAY]
+        crew[k, WORKER_WAS_IDLE] = 1 if atomic_exchange(crew, k, WORKER_STATE, WOKEN) == IDLE else 0
+        away += crew[k, WORKER_WAS_IDLE]
     return away
 
 
 @kernel
-def dismiss(crew):
+def stop_workers(crew):
     """Let all members go: at once, or after the call that they are busy with."""
     for k in range(1, crew.shape[0]):
-        while WAITING <= seen(crew, k, STATE) <= BUSY:
-            exchange_if(crew, k, STATE, CALLED, AWAY)
-            exchange_if(crew, k, STATE, WAITING, AWAY)
-            exchange_if(crew, k, STATE, BUSY, LEAVING)
+        while SPINNING <= atomic_load(crew, k, WORKER_STATE) <= RUNNING:
+            compare_exchange(crew, k, WORKER_STATE, WOKEN, IDLE)
+            compare_exchange(crew, k, WORKER_STATE, SPINNING, IDLE)
+            compare_exchange(crew, k, WORKER_STATE, RUNNING, STOPPING)
 
 
 @inlined
 def _rest(crew, look):
     """Wait for a moment after so many looks; the leader may need this processor for its part of the run."""
-    pause()
-    if look % crew[0, BETWEEN] == 0 or (look == crew[0, BRIEF] and seen(crew, 0, IS_OVER) == 0):
-        ask(crew[0, GIVE_WAY])
+    spin_pause()
+    if look % crew[0, CREW_YIELD_INTERVAL] == 0 or (
+        look == crew[0, CREW_BRIEF_PAUSES] and atomic_load(crew, 0, CREW_LEADER_DONE) == 0
+    ):
+        call_address(crew[0, CREW_YIELD_ADDRESS])
 
 
 @inlined
 def _is_busy(crew, member, patience):
     """True if the member has not finished after so many looks."""
     for look in range(1, patience + 1):
-        if seen(crew, member, STATE) != BUSY:
+        if atomic_load(crew, member, WORKER_STATE) != RUNNING:
             return False
         _rest(crew, look)
-    return seen(crew, member, STATE) == BUSY
+    return atomic_load(crew, member, WORKER_STATE) == RUNNING
 
 
 @kernel
-def lead(crew, taken, members, jobs, count, patience):
+def run_and_join(crew, taken, members, jobs, count, patience):
     """Make calls, and wait until all members who have begun have finished or `patience` is over; what became of it."""
-    if perform(jobs, count):
-        add(crew, 0, FAILED, 1)
-    exchange(crew, 0, IS_OVER, 1)
+    if run_jobs(jobs, count):
+        atomic_add(crew, 0, CREW_FAILED_COUNT, 1)
+    atomic_exchange(crew, 0, CREW_LEADER_DONE, 1)
     for k in range(1, 1 + members):
-        if exchange_if(crew, k, STATE, CALLED, WAITING):
-            taken[k, TAKEN] = 0
+        if compare_exchange(crew, k, WORKER_STATE, WOKEN, SPINNING):
+            taken[k, TAKEN_COUNT] = 0
     for k in range(1, 1 + members):
         if _is_busy(crew, k, patience):
-            return UNFINISHED
-    return RAISED if seen(crew, 0, FAILED) > 0 else DONE
+            return RUN_UNFINISHED
+    return RUN_FAILED if atomic_load(crew, 0, CREW_FAILED_COUNT) > 0 else RUN_DONE
 
 
 @inlined
 def _is_in_the_way(crew):
     """True if a member has the leader's processor and would only delay it; the member has given way then."""
-    processor = ask(crew[0, PROCESSOR])
-    if processor < 0 or processor != crew[0, LED_ON]:
+    processor = call_address(crew[0, CREW_PROCESSOR_ADDRESS])
+    if processor < 0 or processor != crew[0, CREW_LEADER_PROCESSOR]:
         return False
-    ask(crew[0, GIVE_WAY])
+    call_address(crew[0, CREW_YIELD_ADDRESS])
     return True
 
 
@@ -111,33 +128,35 @@ def _is_in_the_way(crew):
 def _begins(crew, member, patience):
     """True if the member, waiting, is called within so many looks; else it is away."""
     for look in range(1, patience + 1):
-        state = seen(crew, member, STATE)
-        if state == CALLED and not _is_in_the_way(crew) and exchange_if(crew, member, STATE, CALLED, BUSY):
+        state = atomic_load(crew, member, WORKER_STATE)
+        if state == WOKEN and not _is_in_the_way(crew) and compare_exchange(crew, member, WORKER_STATE, WOKEN, RUNNING):
             return True
-        if state == AWAY:
+        if state == IDLE:
             return False
         _rest(crew, look)
-    while seen(crew, member, STATE) != AWAY:
-        if exchange_if(crew, member, STATE, CALLED, BUSY):
+    while atomic_load(crew, member, WORKER_STATE) != IDLE:
+        if compare_exchange(crew, member, WORKER_STATE, WOKEN, RUNNING):
             return True
-        if exchange_if(crew, member, STATE, WAITING, AWAY):  # another thread may be in its place from here on
+        if compare_exchange(
+            crew, member, WORKER_STATE, SPINNING, IDLE
+        ):  # another thread may be in its place from here on
             return False
     return False
 
 
 @kernel
-def serve(crew, member, patience):
+def worker_loop(crew, member, patience):
     """Be a member: make its calls each time that it is called, until it is not for so long."""
     while _begins(crew, member, patience):
-        if perform(crew[member, JOBS], crew[member, COUNT]):
-            add(crew, 0, FAILED, 1)
-        if not exchange_if(crew, member, STATE, BUSY, WAITING):
-            exchange(crew, member, STATE, AWAY)
+        if run_jobs(crew[member, WORKER_JOBS], crew[member, WORKER_JOB_COUNT]):
+            atomic_add(crew, 0, CREW_FAILED_COUNT, 1)
+        if not compare_exchange(crew, member, WORKER_STATE, RUNNING, SPINNING):
+            atomic_exchange(crew, member, WORKER_STATE, IDLE)
             return
 
 
 @kernel
-def pause_often(times):
+def repeat_pause(times):
     """Pause so many times: how long that takes is how long a patience lasts."""
     for _ in range(times):
-        pause()
+        spin_pause()

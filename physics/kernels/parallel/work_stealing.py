@@ -10,57 +10,57 @@ from __future__ import annotations
 import numpy as np
 
 from physics.kernels.compile.decorators import inlined, kernel
-from physics.kernels.parallel.atomics import add
+from physics.kernels.parallel.atomics import atomic_add
 
 # Words between what different threads change: two lines of a cache, since processors fetch them in pairs.
-APART = 16
+PADDING_WORDS = 16
 
 # Of all threads: how many worlds are taken at once. Then, a row for each range: the first of its worlds that nobody has
 # taken, and where it ends.
-CHUNK = 0
-NEXT, LAST = range(2)
+RANGE_CHUNK = 0
+RANGE_NEXT, RANGE_END = range(2)
 
 # Of one thread: how many worlds it has taken, the end of those it took last, the range that it takes from, its own one,
 # and from FIRST on which worlds.
-TAKEN, END, RANGE, OWN, FIRST = range(5)
+TAKEN_COUNT, TAKEN_CHUNK_END, TAKEN_RANGE, TAKEN_OWN_RANGE, TAKEN_FIRST_WORLD = range(5)
 
 
-def make_turns(threads: int, worlds: int, chunk: int) -> np.ndarray:
+def make_ranges(threads: int, worlds: int, chunk: int) -> np.ndarray:
     """(1 + threads, APART) int64: the worlds in as many ranges as there are threads."""
-    turns = np.zeros((1 + threads, APART), dtype=np.int64)
-    turns[0, CHUNK] = chunk
-    turns[1:, LAST] = worlds * np.arange(1, threads + 1) // threads
+    turns = np.zeros((1 + threads, PADDING_WORDS), dtype=np.int64)
+    turns[0, RANGE_CHUNK] = chunk
+    turns[1:, RANGE_END] = worlds * np.arange(1, threads + 1) // threads
     return turns
 
 
-def make_taken(threads: int, worlds: int) -> np.ndarray:
+def make_taken_lists(threads: int, worlds: int) -> np.ndarray:
     """(threads, FIRST + worlds + APART) int64, a row for each thread: nothing taken yet."""
-    lists = np.zeros((threads, FIRST + worlds + APART), dtype=np.int64)
-    lists[:, OWN] = 1 + np.arange(threads)
+    lists = np.zeros((threads, TAKEN_FIRST_WORLD + worlds + PADDING_WORDS), dtype=np.int64)
+    lists[:, TAKEN_OWN_RANGE] = 1 + np.arange(threads)
     return lists
 
 
 @inlined
-def begin(turns, taken):
+def begin_taking(turns, taken):
     """Nothing taken yet; returns what comes before the first world. A thread that is alone deals for itself."""
     if turns.shape[0] == 2:
-        turns[1, NEXT] = 0
-    taken[TAKEN] = taken[END] = 0
-    taken[RANGE] = taken[OWN]
+        turns[1, RANGE_NEXT] = 0
+    taken[TAKEN_COUNT] = taken[TAKEN_CHUNK_END] = 0
+    taken[TAKEN_RANGE] = taken[TAKEN_OWN_RANGE]
     return -1
 
 
 @kernel
-def take(turns, taken):
+def take_chunk(turns, taken):
     """First of the next worlds of the thread, of which `taken[END]` is the end, or -1."""
-    chunk = turns[0, CHUNK]
+    chunk = turns[0, RANGE_CHUNK]
     for _ in range(1, turns.shape[0]):
-        place = taken[RANGE]
-        world = add(turns, place, NEXT, chunk)
-        if world < turns[place, LAST]:
-            taken[END] = min(world + chunk, turns[place, LAST])
+        place = taken[TAKEN_RANGE]
+        world = atomic_add(turns, place, RANGE_NEXT, chunk)
+        if world < turns[place, RANGE_END]:
+            taken[TAKEN_CHUNK_END] = min(world + chunk, turns[place, RANGE_END])
             return world
-        taken[RANGE] = place + 1 if place + 1 < turns.shape[0] else 1
+        taken[TAKEN_RANGE] = place + 1 if place + 1 < turns.shape[0] else 1
     return -1
 
 
@@ -72,22 +72,22 @@ def next_world(world, turns, taken):
     ----------
     world : int
     turns : (1 + threads, APART) int64, in and out
-        Of all threads: `make_turns`.
+        Of all threads: `make_ranges`.
     taken : (FIRST + worlds,) int64, in and out
         Of this thread.
     """
     world += 1
-    if world == taken[END]:
-        world = take(turns, taken)
+    if world == taken[TAKEN_CHUNK_END]:
+        world = take_chunk(turns, taken)
         if world < 0:
             return -1
-    taken[FIRST + taken[TAKEN]] = world
-    taken[TAKEN] += 1
+    taken[TAKEN_FIRST_WORLD + taken[TAKEN_COUNT]] = world
+    taken[TAKEN_COUNT] += 1
     return world
 
 
 @inlined
-def deal(turns):
+def reset_ranges(turns):
     """Nobody has taken anything."""
     for k in range(1, turns.shape[0]):
-        turns[k, NEXT] = turns[k - 1, LAST] if k > 1 else 0
+        turns[k, RANGE_NEXT] = turns[k - 1, RANGE_END] if k > 1 else 0

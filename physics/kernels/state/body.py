@@ -69,20 +69,20 @@ def write_state(state, i, y):
 
 @inlined
 def is_finite(y):
-    """True if all numbers of the state are finite, and their squares far from overflow (`layout.LARGEST`)."""
+    """True if all numbers of the state are finite, and their squares far from overflow (`layout.OVERFLOW_LIMIT`)."""
     x, q, v, L = y
     turn = (q[0] * q[0] + q[1] * q[1]) + (q[2] * q[2] + q[3] * q[3])
-    return (qt.dot(x, x) + qt.dot(v, v)) + (qt.dot(L, L) + turn) <= at.LARGEST * at.LARGEST
+    return (qt.dot(x, x) + qt.dot(v, v)) + (qt.dot(L, L) + turn) <= at.OVERFLOW_LIMIT * at.OVERFLOW_LIMIT
 
 
 @inlined
-def all_finite(now):
+def are_all_finite(now):
     """True if every number of every state in `now` (bodies, STATE_SIZE) is finite."""
-    return first_lost(now) < 0
+    return find_nonfinite_body(now) < 0
 
 
 @inlined
-def first_lost(now):
+def find_nonfinite_body(now):
     """The first body in `now` (bodies, STATE_SIZE) whose state is not finite, -1: none."""
     for b in range(now.shape[0]):
         if not is_finite(read_state(now, b)):
@@ -91,26 +91,26 @@ def first_lost(now):
 
 
 @inlined
-def can_bear(work):
-    """True if the loads that `bind_body` has found are finite, and far from overflowing (`layout.LARGEST`)."""
-    return work.acceleration <= at.LARGEST
+def has_finite_loads(work):
+    """True if the loads that `bind_body` has found are finite, and far from overflowing (`layout.OVERFLOW_LIMIT`)."""
+    return work.acceleration <= at.OVERFLOW_LIMIT
 
 
 @inlined
-def first_overloaded(bodies):
+def find_overloaded_body(bodies):
     """The first of the records `bodies` with loads that it cannot bear, -1: none."""
     for b in range(bodies.shape[0]):
-        if not can_bear(bodies[b]):
+        if not has_finite_loads(bodies[b]):
             return b
     return -1
 
 
 @inlined
-def note_fault(world, b, report):
+def report_fault(world, b, report):
     """Body b of a world keeps its old state."""
     report[world, at.FAULTS] += 1.0
-    if report[world, at.FAULTY] == 0.0:
-        report[world, at.FAULTY] = 1.0 + b
+    if report[world, at.FIRST_FAULTY] == 0.0:
+        report[world, at.FIRST_FAULTY] = 1.0 + b
 
 
 @inlined
@@ -132,7 +132,7 @@ def body_attitude(q, work, tilted):
 
 
 @inlined
-def turning(R, L, J):
+def apply_inv_inertia(R, L, J):
     """ω = R I⁻¹ Rᵀ L, world frame [rad/s], R the principal frame in the world, J the inverse principal moments."""
     m = qt.transposed_matvec(R, L)
     return qt.matvec(R, (J[0] * m[0], J[1] * m[1], J[2] * m[2]))
@@ -140,10 +140,10 @@ def turning(R, L, J):
 
 @kernel
 def angular_velocity(q, L, work, tilted):
-    """`turning` of a body with attitude q."""
+    """`apply_inv_inertia` of a body with attitude q."""
     if L[0] == 0.0 and L[1] == 0.0 and L[2] == 0.0:
         return (0.0, 0.0, 0.0)
-    return turning(qt.to_matrix(principal_attitude(q, work, tilted)), L, work.J)
+    return apply_inv_inertia(qt.to_matrix(principal_attitude(q, work, tilted)), L, work.J)
 
 
 @inlined

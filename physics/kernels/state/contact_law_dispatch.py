@@ -9,21 +9,21 @@ from __future__ import annotations
 
 from numba.extending import overload
 
-from physics.kernels.compile.decorators import CHOSEN, kernel
+from physics.kernels.compile.decorators import OVERLOAD_OPTIONS, kernel
 
 # Names of the laws, in the order of their numbers in `work.laws` and of their columns, the last of `params`.
-TANGENTIAL, ROLLING, SPIN, ANISOTROPY = "tangential", "rolling", "spin", "anisotropy"
-STIFFNESS, DAMPING = "stiffness", "damping"
-LAWS = (TANGENTIAL, ROLLING, SPIN, ANISOTROPY, STIFFNESS, DAMPING)
+LAW_TANGENTIAL, LAW_ROLLING, LAW_SPIN, LAW_ANISOTROPY = "tangential", "rolling", "spin", "anisotropy"
+LAW_STIFFNESS, LAW_DAMPING = "stiffness", "damping"
+LAWS = (LAW_TANGENTIAL, LAW_ROLLING, LAW_SPIN, LAW_ANISOTROPY, LAW_STIFFNESS, LAW_DAMPING)
 _PREFIX = "law_"
 
 
-def members(laws: tuple[str, ...]) -> list[tuple]:
+def law_members(laws: tuple[str, ...]) -> list[tuple]:
     """Members of a workspace for these laws; none without laws."""
     if not laws:
         return []
     numbers = [("laws", float, (len(laws),)), *((_PREFIX + name, float) for name in laws)]
-    return numbers + [("give", float)] * (STIFFNESS in laws)  # γ of a stage [1/kg], see `compliance`
+    return numbers + [("give", float)] * (LAW_STIFFNESS in laws)  # γ of a stage [1/kg], see `compliance`
 
 
 def _declared(work) -> list[str]:
@@ -47,7 +47,7 @@ def if_law(laws: tuple[str, ...], instead):
         def stub(*arguments):
             return (function if set(laws) & set(_declared(arguments[-1])) else instead)(*arguments)
 
-        @overload(stub, jit_options=CHOSEN, strict=False)
+        @overload(stub, jit_options=OVERLOAD_OPTIONS, strict=False)
         def choose(*types):
             return call if set(laws) & set(_declared(types[-1])) else instead
 
@@ -57,7 +57,7 @@ def if_law(laws: tuple[str, ...], instead):
     return decorate
 
 
-def number_of(law: str, otherwise: float = 0.0):
+def law_parameter(law: str, otherwise: float = 0.0):
     """A kernel (work) that gives the number of a law for the body in the workspace; `otherwise` if undeclared."""
 
     def stub(work):
@@ -70,7 +70,7 @@ def number_of(law: str, otherwise: float = 0.0):
         place = declared.index(law)
         return lambda work: work.laws[place]
 
-    @overload(stub, jit_options=CHOSEN, strict=False)
+    @overload(stub, jit_options=OVERLOAD_OPTIONS, strict=False)
     def choose(work):
         return chosen(work)
 

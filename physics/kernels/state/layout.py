@@ -32,10 +32,10 @@ CENTER = SERIES + SERIES_SIZE  # geometric centre of a block from its centre of 
 PARAM_SIZE = CENTER + 3
 
 # --- walls (walls, WALL_SIZE) ----------------------------------------------------------------------------------
-NORMAL = 0  # unit normal, into the free side
-TANGENT_1 = 3
-TANGENT_2 = 6  # normal, tangent 1, tangent 2: right-handed
-OFFSET = 9  # free side: normal·x >= offset [m]
+WALL_NORMAL = 0  # unit normal, into the free side
+WALL_TANGENT_1 = 3
+WALL_TANGENT_2 = 6  # normal, tangent 1, tangent 2: right-handed
+WALL_OFFSET = 9  # free side: normal·x >= offset [m]
 WALL_SIZE = 10
 
 # --- shapes ----------------------------------------------------------------------------------------------------
@@ -48,7 +48,7 @@ HULL = 3  # its corners stand in tables: `many.hulls`
 VERTEX_COUNT = 8
 
 # Numbers of a state, and accelerations, beyond this are a fault [SI]: products of three of them are still finite.
-LARGEST = 1.0e100
+OVERFLOW_LIMIT = 1.0e100
 
 # --- report (worlds, REPORT_SIZE) ------------------------------------------------------------------------------
 PENETRATION = 0  # worst depth met [m]
@@ -57,12 +57,15 @@ ITERATIONS = 2  # sweeps, all solves together
 SOLVES = 3  # contact problems solved
 FALLBACKS = 4  # of these, by the pivoting fallback
 UNCONVERGED = 5  # of these, with a residual above the tolerance
-FAULTS = 6  # bodies whose new state was not finite or beyond `LARGEST` (their old state was kept)
+FAULTS = 6  # bodies whose new state was not finite or beyond `OVERFLOW_LIMIT` (their old state was kept)
 SPLITS = 7  # impacts that split a substep
 UNRESOLVED = 8  # substeps with more impacts than allowed: the rest was treated as plastic
-SOLVER = 9  # the strongest method needed: 0 none, 1 direct, 2 sweeps, 3 pivoting, 4 Newton's on all bodies
-LEFT_OUT = 10  # contacts and near pairs for which there was no room
+SOLVER = 9  # the strongest method needed: METHOD_NONE and so on
+CONTACTS_LEFT_OUT = 10  # contacts and near pairs for which there was no room
 OVERLAP = 11  # deepest overlap of two bodies that were put where they overlap [m], 0 where that is little
-FAULTY = 12  # 1 + the first body at fault, 0: none
-COARSE = 13  # bodies that moved in fields which the step does not resolve
+FIRST_FAULTY = 12  # 1 + the first body at fault, 0: none
+UNRESOLVED_MOTION = 13  # bodies that moved in fields which the step does not resolve
 REPORT_SIZE = 14
+
+# Methods that solve contact problems, weakest first.
+METHOD_NONE, METHOD_DIRECT, METHOD_SWEEPS, METHOD_PIVOTING, METHOD_NEWTON = range(5)

@@ -3,8 +3,8 @@
 A body is watched in windows of time, from a pose at the start of each. Its way in a window is the largest distance of
 any of its points from there, or what the speed at the end of a substep would move one in it: motion that comes back to
 the same place at the end of each substep is not rest. A window longer than `time` without way is quiet. A body sleeps
-after two quiet windows, in the later of which its way was not `GROWTH` times that in the one before: what falls from an
-unstable balance goes e^{λT} times as far from window to window, however little it has moved so far.
+after two quiet windows, in the later of which its way was not `_SLEEP_GROWTH` times that in the one before: what falls
+from an unstable balance goes e^{λT} times as far from window to window, however little it has moved so far.
 
 What sleeps is left out of a step with not so much as a look at it. It wakes when the wrench that acts on it becomes
 another; in worlds whose bodies touch each other, also with what it lies on or near (`many.sleep`).
@@ -19,21 +19,25 @@ import numpy as np
 from physics.kernels.compile.decorators import inlined, kernel
 
 # Columns of a body's row; all zero: awake, and nothing known of it yet.
-GROUP = 0  # 0: awake; else the first body of those that sleep and wake together, + 1
-CLOCK = 1  # time since the start of the window [s]; 0: the window is to begin
-QUIET = 2  # quiet windows in a row
-WAY, LAST, BEFORE = 3, 4, 5  # in this window [m], in the last one and the one before [bounding radii]
-POSE = 6  # position [m] and quaternion at its start
-WRENCH = 13  # that acts [N, N m]
+SLEEP_GROUP = 0  # 0: awake; else the first body of those that sleep and wake together, + 1
+SLEEP_CLOCK = 1  # time since the start of the window [s]; 0: the window is to begin
+QUIET_WINDOWS = 2  # quiet windows in a row
+WINDOW_DISPLACEMENT, LAST_DISPLACEMENT, EARLIER_DISPLACEMENT = (
+    3,
+    4,
+    5,
+)  # in this window [m], in the last one and the one before [bounding radii]
+WINDOW_POSE = 6  # position [m] and quaternion at its start
+SLEEP_WRENCH = 13  # that acts [N, N m]
 SLEEP_SIZE = 19
 
 # Quiet windows before sleep: two are compared.
-WINDOWS = 2
+WINDOWS_BEFORE_SLEEP = 2
 
 # Rigid bodies that fall from an unstable balance have λ² = 0.75 a/r (a rod on its end) to 0.92 a/r (a cube on an edge),
 # r the bounding radius, and go at least e^{λT} = 3.4 times as far in a window of T = √(2 r/a) as in the last. What
 # drifts evenly goes 1 times as far. In between, in the middle:
-GROWTH = 2.0
+_SLEEP_GROWTH = 2.0
 
 
 class Sleep(NamedTuple):
@@ -45,26 +49,26 @@ class Sleep(NamedTuple):
 
 
 @inlined
-def sleeps(i, sleep):
+def is_asleep(i, sleep):
     """True if body i sleeps: never, where the scene does not declare it."""
     if sleep is None:
         return False
-    return sleep.rows[i, GROUP] > 0.0
+    return sleep.rows[i, SLEEP_GROUP] > 0.0
 
 
 @inlined
-def stir(i, sleep):
+def wake_body(i, sleep):
     """Wake body i, or let its watch begin anew."""
-    sleep.rows[i, GROUP] = sleep.rows[i, CLOCK] = sleep.rows[i, QUIET] = 0.0
+    sleep.rows[i, SLEEP_GROUP] = sleep.rows[i, SLEEP_CLOCK] = sleep.rows[i, QUIET_WINDOWS] = 0.0
 
 
 @inlined
-def is_pushed_anew(i, wrench, sleep):
+def has_new_wrench(i, wrench, sleep):
     """True if another wrench acts on body i than so far; it is the one that counts from now on."""
     is_other = False
     for c in range(6):
-        if wrench[i, c] != sleep.rows[i, WRENCH + c]:
-            sleep.rows[i, WRENCH + c], is_other = wrench[i, c], True
+        if wrench[i, c] != sleep.rows[i, SLEEP_WRENCH + c]:
+            sleep.rows[i, SLEEP_WRENCH + c], is_other = wrench[i, c], True
     return is_other
 
 
@@ -76,9 +80,9 @@ def _way_from_start(i, y, radius, rows):
     absolute values are no less than norms.
     """
     x, q, _, _ = y
-    far = abs(x[0] - rows[i, POSE]) + abs(x[1] - rows[i, POSE + 1]) + abs(x[2] - rows[i, POSE + 2])
-    turn = (abs(q[0] - rows[i, POSE + 3]) + abs(q[1] - rows[i, POSE + 4])) + (
-        abs(q[2] - rows[i, POSE + 5]) + abs(q[3] - rows[i, POSE + 6])
+    far = abs(x[0] - rows[i, WINDOW_POSE]) + abs(x[1] - rows[i, WINDOW_POSE + 1]) + abs(x[2] - rows[i, WINDOW_POSE + 2])
+    turn = (abs(q[0] - rows[i, WINDOW_POSE + 3]) + abs(q[1] - rows[i, WINDOW_POSE + 4])) + (
+        abs(q[2] - rows[i, WINDOW_POSE + 5]) + abs(q[3] - rows[i, WINDOW_POSE + 6])
     )
     return far + 2.0 * radius * turn
 
@@ -96,10 +100,10 @@ def _begin(i, y, rows):
     """Begin a window at y."""
     x, q, _, _ = y
     for c in range(3):
-        rows[i, POSE + c] = x[c]
+        rows[i, WINDOW_POSE + c] = x[c]
     for c in range(4):
-        rows[i, POSE + 3 + c] = q[c]
-    rows[i, WAY] = 0.0
+        rows[i, WINDOW_POSE + 3 + c] = q[c]
+    rows[i, WINDOW_DISPLACEMENT] = 0.0
 
 
 @inlined
@@ -111,49 +115,54 @@ def _is_over(clock, work, sleep):
 
 
 @kernel
-def watch(i, y, h, work, sleep):
+def update_sleep_window(i, y, h, work, sleep):
     """Take note of where body i is after a substep of h: whether a quiet window has ended and there were enough."""
     rows = sleep.rows
-    if rows[i, CLOCK] == 0.0:
+    if rows[i, SLEEP_CLOCK] == 0.0:
         _begin(i, y, rows)
-    rows[i, CLOCK] += h
+    rows[i, SLEEP_CLOCK] += h
     way = max(_way_from_start(i, y, work.radius, rows), h * _fastest_point(y, work))
-    rows[i, WAY] = max(rows[i, WAY], way)
-    if not rows[i, WAY] <= sleep.way * work.radius:
-        rows[i, CLOCK] = rows[i, QUIET] = 0.0
+    rows[i, WINDOW_DISPLACEMENT] = max(rows[i, WINDOW_DISPLACEMENT], way)
+    if not rows[i, WINDOW_DISPLACEMENT] <= sleep.way * work.radius:
+        rows[i, SLEEP_CLOCK] = rows[i, QUIET_WINDOWS] = 0.0
         return False
-    if not _is_over(rows[i, CLOCK], work, sleep):
+    if not _is_over(rows[i, SLEEP_CLOCK], work, sleep):
         return False
-    rows[i, BEFORE], rows[i, LAST] = rows[i, LAST], rows[i, WAY] / work.radius
-    rows[i, QUIET] += 1.0
-    rows[i, CLOCK] = 0.0
-    return rows[i, QUIET] >= WINDOWS
+    rows[i, EARLIER_DISPLACEMENT], rows[i, LAST_DISPLACEMENT] = (
+        rows[i, LAST_DISPLACEMENT],
+        rows[i, WINDOW_DISPLACEMENT] / work.radius,
+    )
+    rows[i, QUIET_WINDOWS] += 1.0
+    rows[i, SLEEP_CLOCK] = 0.0
+    return rows[i, QUIET_WINDOWS] >= WINDOWS_BEFORE_SLEEP
 
 
 @inlined
-def is_growing(last, before):
+def is_motion_growing(last, before):
     """True if the way in the last window says that what moves will move further."""
-    return not last <= GROWTH * before
+    return not last <= _SLEEP_GROWTH * before
 
 
 @inlined
-def laid_down(y):
+def without_velocities(y):
     """The state y without motion."""
     return y[0], y[1], (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
 
 
 @inlined
-def sleeps_on(i, wrench, sleep):
+def remains_asleep(i, wrench, sleep):
     """True if body i, which meets walls only, sleeps and goes on to do so under this wrench."""
-    if is_pushed_anew(i, wrench, sleep):
-        stir(i, sleep)
-    return sleep.rows[i, GROUP] > 0.0
+    if has_new_wrench(i, wrench, sleep):
+        wake_body(i, sleep)
+    return sleep.rows[i, SLEEP_GROUP] > 0.0
 
 
 @inlined
 def falls_asleep(i, y, h, work, sleep):
-    """`watch` body i, which meets walls only: whether it falls asleep now."""
-    if watch(i, y, h, work, sleep) and not is_growing(sleep.rows[i, LAST], sleep.rows[i, BEFORE]):
-        sleep.rows[i, GROUP] = i + 1.0
+    """`update_sleep_window` body i, which meets walls only: whether it falls asleep now."""
+    if update_sleep_window(i, y, h, work, sleep) and not is_motion_growing(
+        sleep.rows[i, LAST_DISPLACEMENT], sleep.rows[i, EARLIER_DISPLACEMENT]
+    ):
+        sleep.rows[i, SLEEP_GROUP] = i + 1.0
         return True
     return False

@@ -31,22 +31,22 @@ from physics.kernels.compile.decorators import inlined, kernel
 from physics.kernels.contact_solver.solve import solve_contacts
 from physics.kernels.half_space.contact_point import wall_axis, wall_normal, wall_of
 from physics.kernels.math import quaternion as qt
-from physics.kernels.state.body import angular_velocity, turning
-from physics.kernels.state.contact_law_dispatch import ROLLING, SPIN, TANGENTIAL, if_law, number_of
-from physics.kernels.state.layout import BLOCK, TANGENT_1, TANGENT_2
+from physics.kernels.state.body import angular_velocity, apply_inv_inertia
+from physics.kernels.state.contact_law_dispatch import LAW_ROLLING, LAW_SPIN, LAW_TANGENTIAL, if_law, law_parameter
+from physics.kernels.state.layout import BLOCK, WALL_TANGENT_1, WALL_TANGENT_2
 
 # Solutions of the contact problem for one torque at most; two are usual, one where the body goes on turning.
-TRIALS = 5
+_MAX_TORQUE_TRIALS = 5
 
 # A body stands still when the torque's power is this share of what it was without it: some roundings.
-STILL = 1.0e-13
+_STOPPED_POWER_SHARE = 1.0e-13
 
 # Share by which rounding may let the energy of an impact grow.
-GAIN = 1.0e-12
+_IMPACT_GAIN_ROUNDING = 1.0e-12
 
-rolling_radius = number_of(ROLLING)
-spin_radius = number_of(SPIN)
-tangential_share = number_of(TANGENTIAL)
+rolling_radius = law_parameter(LAW_ROLLING)
+spin_radius = law_parameter(LAW_SPIN)
+tangential_restitution = law_parameter(LAW_TANGENTIAL)
 
 
 @inlined
@@ -74,16 +74,20 @@ def _against(n, width, across, along, w, work):
 def _resist(n, friction, smooth, pivots, across, along, v, L, solved, R, work):
     """One torque: what `solve_contacts` gives with it, and L with it but without the contacts."""
     width = 1 if friction is None else 3
-    w = turning(R, solved[1], work.J)
+    w = apply_inv_inertia(R, solved[1], work.J)
     T = _against(n, width, across, along, w, work)
     start = qt.dot(T, w)
     if not start < 0.0:
         return solved, L
     low, high, at_low, at_high, s = 0.0, 1.0, start, 0.0, 1.0
-    for trial in range(TRIALS):
+    for trial in range(_MAX_TORQUE_TRIALS):
         solved = solve_contacts(n, friction, smooth, pivots, v, _added(L, s, T), R, work)
-        power = qt.dot(T, turning(R, solved[1], work.J))
-        if (s == 1.0 and not power > 0.0) or abs(power) <= -STILL * start or trial == TRIALS - 1:
+        power = qt.dot(T, apply_inv_inertia(R, solved[1], work.J))
+        if (
+            (s == 1.0 and not power > 0.0)
+            or abs(power) <= -_STOPPED_POWER_SHARE * start
+            or trial == _MAX_TORQUE_TRIALS - 1
+        ):
             break
         if power > 0.0:
             high, at_high = s, power
@@ -97,8 +101,8 @@ def _as_solved(n, friction, smooth, pivots, v, L, solved, R, work):
     return solved
 
 
-@if_law((ROLLING, SPIN), _as_solved)
-def resist_turning(n, friction, smooth, pivots, v, L, solved, R, work):
+@if_law((LAW_ROLLING, LAW_SPIN), _as_solved)
+def apply_resistance_torques(n, friction, smooth, pivots, v, L, solved, R, work):
     """Result of `solve_contacts` for v and L, with the torques of rolling and spin friction on a round body."""
     if work.shape == BLOCK:
         return solved
@@ -115,42 +119,42 @@ def _no_aim(*arguments):
 
 
 @inlined
-def aim_at(k, y, tilted, work):
+def set_tangential_target(k, y, tilted, work):
     """Target along the wall of contact k, from the velocity of its point."""
     _, q, v, L = y
     w = angular_velocity(q, L, work, tilted)
     u = qt.cross(w, (work.arm[k, 0], work.arm[k, 1], work.arm[k, 2]))
     u = (u[0] + v[0], u[1] + v[1], u[2] + v[2])
-    share, wall = tangential_share(work), wall_of(work.slot[k], work)
-    work.target[k, 1] = -share * qt.dot(wall_axis(work.walls, wall, TANGENT_1), u)
-    work.target[k, 2] = -share * qt.dot(wall_axis(work.walls, wall, TANGENT_2), u)
+    share, wall = tangential_restitution(work), wall_of(work.slot[k], work)
+    work.target[k, 1] = -share * qt.dot(wall_axis(work.walls, wall, WALL_TANGENT_1), u)
+    work.target[k, 2] = -share * qt.dot(wall_axis(work.walls, wall, WALL_TANGENT_2), u)
 
 
-@if_law((TANGENTIAL,), _no_aim)
-def aim_tangential(n, bounce_speed, y, tilted, work):
+@if_law((LAW_TANGENTIAL,), _no_aim)
+def set_tangential_targets(n, bounce_speed, y, tilted, work):
     """Targets along the wall of the one contact that bounces; where several do, friction alone acts along them."""
     bouncing, found = 0, 0
     for i in range(n):
         if -work.speed[i] > bounce_speed:
             bouncing, found = bouncing + 1, i
     if bouncing == 1:
-        aim_at(found, y, tilted, work)
+        set_tangential_target(found, y, tilted, work)
 
 
 @inlined
 def _energy(v, L, R, work):
     """Kinetic energy [J]."""
-    return 0.5 * (work.mass * qt.dot(v, v) + qt.dot(L, turning(R, L, work.J)))
+    return 0.5 * (work.mass * qt.dot(v, v) + qt.dot(L, apply_inv_inertia(R, L, work.J)))
 
 
-@if_law((TANGENTIAL,), _as_solved)
-def without_gain(n, friction, smooth, pivots, v, L, solved, R, work):
-    """Result of `solve_contacts` for v and L; where that has gained energy, the one without `aim_tangential`.
+@if_law((LAW_TANGENTIAL,), _as_solved)
+def reject_energy_gain(n, friction, smooth, pivots, v, L, solved, R, work):
+    """Result of `solve_contacts` for v and L; where that has gained energy, the one without `set_tangential_targets`.
 
     A sphere's only contact cannot gain any: what it does along the wall and across does not mix. That of a sphere
     which at the same time rests on another wall can, its coefficients there being others.
     """
-    if n == 1 or not _energy(solved[0], solved[1], R, work) > (1.0 + GAIN) * _energy(v, L, R, work):
+    if n == 1 or not _energy(solved[0], solved[1], R, work) > (1.0 + _IMPACT_GAIN_ROUNDING) * _energy(v, L, R, work):
         return solved
     for i in range(n):
         work.target[i, 1] = work.target[i, 2] = 0.0

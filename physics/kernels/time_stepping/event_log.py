@@ -12,18 +12,18 @@ from physics.kernels.half_space.contact_point import wall_of
 from physics.kernels.math import quaternion as qt
 
 # Kinds of event.
-IMPACT, TOUCH, RELEASE, STICK, SLIP, REST, FAULT = range(7)
-KINDS = ("impact", "touch", "release", "stick", "slip", "rest", "fault")
+KIND_IMPACT, KIND_TOUCH, KIND_RELEASE, KIND_STICK, KIND_SLIP, KIND_REST, KIND_FAULT = range(7)
+KIND_NAMES = ("impact", "touch", "release", "stick", "slip", "rest", "fault")
 
 # Columns: time since the start of the step [s], kind, wall and other body (-1: none), and of an impact the impulse on
 # the body [N s], the point where it acts [m] and the unit normal towards the body, all three in the world frame.
-TIME, KIND, WALL, OTHER, IMPULSE, POINT, NORMAL = 0, 1, 2, 3, 4, 7, 10
+EVENT_TIME, EVENT_KIND, EVENT_WALL, EVENT_OTHER, EVENT_IMPULSE, EVENT_POINT, EVENT_NORMAL = 0, 1, 2, 3, 4, 7, 10
 EVENT_SIZE = 13
 
 NOBODY = -1
 
 # An impulse of this share of the largest of the same impact is rounding.
-ROUNDING = 1.0e-14
+EVENT_IMPULSE_ROUNDING = 1.0e-14
 
 
 @kernel
@@ -32,13 +32,22 @@ def note_event(log, counts, i, t, kind, wall, other, impulse, point, normal):
     k = counts[i]
     counts[i] = k + 1
     if k < log.shape[1]:
-        log[i, k, TIME], log[i, k, KIND], log[i, k, WALL], log[i, k, OTHER] = t, kind, wall, other
+        log[i, k, EVENT_TIME], log[i, k, EVENT_KIND], log[i, k, EVENT_WALL], log[i, k, EVENT_OTHER] = (
+            t,
+            kind,
+            wall,
+            other,
+        )
         for c in range(3):
-            log[i, k, IMPULSE + c], log[i, k, POINT + c], log[i, k, NORMAL + c] = impulse[c], point[c], normal[c]
+            log[i, k, EVENT_IMPULSE + c], log[i, k, EVENT_POINT + c], log[i, k, EVENT_NORMAL + c] = (
+                impulse[c],
+                point[c],
+                normal[c],
+            )
 
 
 @inlined
-def forget_events(world, bodies, log, counts):
+def clear_events(world, bodies, log, counts):
     """No event of a world yet; nothing to do where there is no room for any."""
     if log.shape[1] > 0:
         for i in range(world * bodies, (world + 1) * bodies):
@@ -49,19 +58,19 @@ def forget_events(world, bodies, log, counts):
 def drop_events(world, bodies, t, log, counts):
     """Take back what was logged of a world from the time t on: its state is not what came of it."""
     for i in range(world * bodies, (world + 1) * bodies):
-        while 0 < counts[i] <= log.shape[1] and log[i, counts[i] - 1, TIME] >= t:
+        while 0 < counts[i] <= log.shape[1] and log[i, counts[i] - 1, EVENT_TIME] >= t:
             counts[i] -= 1
 
 
 @inlined
-def note_change(log, counts, i, t, kind, wall):
+def note_mode_change(log, counts, i, t, kind, wall):
     """Add an event of body i that has no impulse."""
     zero = (0.0, 0.0, 0.0)
     note_event(log, counts, i, t, kind, wall, NOBODY, zero, zero, zero)
 
 
 @inlined
-def add_share(sums, normal, pushed, point):
+def add_weighted_contact(sums, normal, pushed, point):
     """Weighted sums of the contacts of a pair: of the normals, of the points, and of the weights.
 
     The weights are the normal impulses: where the normals are the same the mean point is that about which these have
@@ -78,13 +87,13 @@ def add_share(sums, normal, pushed, point):
 
 @inlined
 def note_impact(log, counts, i, t, wall, other, impulse, sums):
-    """Add the impact of body i with a wall or another body, from its impulse and what `add_share` has summed."""
+    """Add the impact of body i with a wall or a body, from its impulse and the sums of `add_weighted_contact`."""
     n, r, weight = sums
     size = math.sqrt(qt.dot(n, n))
     if not (weight > 0.0 and size > 0.0):
         return
     normal, point = (n[0] / size, n[1] / size, n[2] / size), (r[0] / weight, r[1] / weight, r[2] / weight)
-    note_event(log, counts, i, t, IMPACT, wall, other, impulse, point, normal)
+    note_event(log, counts, i, t, KIND_IMPACT, wall, other, impulse, point, normal)
 
 
 @kernel
@@ -106,6 +115,6 @@ def log_wall_impacts(n, width, x, least, t, work, log, counts):
                     pz += s * walls[wall, 3 * c + 2]
                 point = (x[0] + work.arm[i, 0], x[1] + work.arm[i, 1], x[2] + work.arm[i, 2])
                 normal = (walls[wall, 0], walls[wall, 1], walls[wall, 2])
-                sums = add_share(sums, normal, work.impulse[width * i], point)
+                sums = add_weighted_contact(sums, normal, work.impulse[width * i], point)
         if px * px + py * py + pz * pz > least * least:
             note_impact(log, counts, work.i, t, wall, NOBODY, (px, py, pz), sums)

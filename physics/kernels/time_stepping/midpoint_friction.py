@@ -19,16 +19,16 @@ from physics.kernels.contact_law.anisotropic_friction import friction_ratio
 from physics.kernels.contact_solver.solve import solve_contacts
 from physics.kernels.half_space.contact_point import contact_arm, wall_of
 from physics.kernels.math import quaternion as qt
-from physics.kernels.state.body import turning
-from physics.kernels.state.contact_law_dispatch import STIFFNESS, if_law
-from physics.kernels.state.layout import SPHERE, TANGENT_1
+from physics.kernels.state.body import apply_inv_inertia
+from physics.kernels.state.contact_law_dispatch import LAW_STIFFNESS, if_law
+from physics.kernels.state.layout import SPHERE, WALL_TANGENT_1
 
 # Contacts of a stage at most, `mean_slip` of the settings, for `physics.Accuracy.slip`. The slips of a face turn
 # slowly, as a whole, and a solve more is dear there.
-FEW = 2
+MEAN_SLIP_CONTACTS = 2
 
 # A contact that held slips by less than this many times the error of its target.
-MARGIN = 2.0
+_SLIP_MARGIN = 2.0
 
 
 @inlined
@@ -37,7 +37,7 @@ def _tangential(i, v, w, work):
     walls, k = work.walls, wall_of(work.slot[i], work)
     m = qt.cross(w, contact_arm(work, i))
     x, y, z = v[0] + m[0], v[1] + m[1], v[2] + m[2]
-    t = TANGENT_1
+    t = WALL_TANGENT_1
     return (
         walls[k, t] * x + walls[k, t + 1] * y + walls[k, t + 2] * z,
         walls[k, t + 3] * x + walls[k, t + 4] * y + walls[k, t + 5] * z,
@@ -48,14 +48,14 @@ def _tangential(i, v, w, work):
 def _least_slip(w, h, work):
     """Slip at the start of a stage up to which a contact holds [m/s].
 
-    What the target of a contact that held (`target_velocity.aim_rest`) left over in the stage before: the tolerance of
-    its solve, and h² (ω α + ω³ r) but of a sphere, whose arm does not turn with it.
+    What the target of a contact that held (`target_velocity.set_resting_targets`) left over in the stage before: the
+    tolerance of its solve, and h² (ω α + ω³ r) but of a sphere, whose arm does not turn with it.
     """
     least = work.tolerance * work.acceleration * h
     if work.shape == SPHERE:
         return least
     square = qt.dot(w, w)
-    return least + MARGIN * h * math.sqrt(square) * h * (work.acceleration + work.radius * square)
+    return least + _SLIP_MARGIN * h * math.sqrt(square) * h * (work.acceleration + work.radius * square)
 
 
 @inlined
@@ -71,9 +71,9 @@ def oppose_mean_slip(n, v, w, h, work):
 
     Notes
     -----
-    Changes the tangents of `work.target`, which `target_velocity.aim_rest` has set: what the turning of its arm takes
-    from a contact in half a stage (kept in `work.held`). Added to the velocity at the middle it gives the one at the
-    start.
+    Changes the tangents of `work.target`, which `target_velocity.set_resting_targets` has set: what the turning of its
+    arm takes from a contact in half a stage (kept in `work.held`). Added to the velocity at the middle it gives the one
+    at the start.
     """
     least = _least_slip(w, h, work)
     for i in range(n):
@@ -96,7 +96,7 @@ def oppose_end_slip(n, work):
 
 
 @inlined
-def has_turned_round(n, v, w, work):
+def has_slip_reversed(n, v, w, work):
     """True if the slip of a contact that pushes is against the one before, -`work.target`, after impulses."""
     ratio = friction_ratio(work)
     for i in range(n):
@@ -111,8 +111,8 @@ def _as_solved(n, friction, smooth, pivots, v, w, solved, free, R, h, work):
     return solved
 
 
-@if_law((STIFFNESS,), _as_solved)
-def without_gift(n, friction, smooth, pivots, v, w, solved, free, R, h, work):
+@if_law((LAW_STIFFNESS,), _as_solved)
+def cap_friction_work(n, friction, smooth, pivots, v, w, solved, free, R, h, work):
     """Result of `solve_contacts` for `free` (v, L); if friction gave energy, that with friction against the mean slip.
 
     An impulse p adds p·½(u⁰ + u¹). Friction that stops a contact adds ½ p_t·u⁰, which in a rigid impact the normal
@@ -125,7 +125,7 @@ def without_gift(n, friction, smooth, pivots, v, w, solved, free, R, h, work):
     """
     if friction is None:
         return solved
-    w_new = turning(R, solved[1], work.J)
+    w_new = apply_inv_inertia(R, solved[1], work.J)
     gift = push = 0.0
     for i in range(n):
         a, b = _tangential(i, v, w, work)

@@ -12,40 +12,41 @@ import math
 
 from physics.kernels.compile.decorators import inlined, kernel
 from physics.kernels.forces.field_loads import field_load
-from physics.kernels.forces.two_body_spring import middle, place_anchors, put_middle
+from physics.kernels.forces.implicit_two_body_spring import read_middle, write_middle
+from physics.kernels.forces.two_body_spring import place_anchors
 from physics.kernels.math import quaternion as qt
 from physics.kernels.state import layout as at
 from physics.kernels.state.body import angular_velocity, read_state, write_state
 
 # Rules of 2, 4, 6, ... parts: order 16 with eight.
-RULES = 8
-SIZE = 13  # numbers of a state: x, q, v, L
+_MAX_RULES = 8
+LINKED_STATE_SIZE = 13  # numbers of a state: x, q, v, L
 
 # Planes of `room`: the table, one per rule, then two states and a rate.
-BEFORE, HERE, RATE = RULES, RULES + 1, RULES + 2
-PLANES = RULES + 3
+PLANE_BEFORE, PLANE_HERE, PLANE_RATE = _MAX_RULES, _MAX_RULES + 1, _MAX_RULES + 2
+PLANE_COUNT = _MAX_RULES + 3
 
 # A step is cut to this share where the rules do not agree; the next one is this much longer where EASY of them did.
-CUT = 0.25
-GROWTH = 2.0
-EASY = 5
+_STEP_CUT = 0.25
+_STEP_GROWTH = 2.0
+_EASY_RULES = 5
 
 
 @kernel
 def _put_rate(t, tilted, linked):
-    """Rates of all bodies in the state `HERE` at time t [s] into `RATE`."""
+    """Rates of all bodies in the state `PLANE_HERE` at time t [s] into `PLANE_RATE`."""
     room, bodies = linked.room, linked.bodies
     for b in range(bodies.shape[0]):
-        s = room[HERE, b]
+        s = room[PLANE_HERE, b]
         size = math.sqrt(s[3] * s[3] + s[4] * s[4] + s[5] * s[5] + s[6] * s[6])
         q = (s[3] / size, s[4] / size, s[5] / size, s[6] / size)
-        put_middle(bodies[b], ((s[0], s[1], s[2]), q, (s[7], s[8], s[9]), (s[10], s[11], s[12])))
+        write_middle(bodies[b], ((s[0], s[1], s[2]), q, (s[7], s[8], s[9]), (s[10], s[11], s[12])))
     place_anchors(tilted, linked)
     for b in range(bodies.shape[0]):
-        x, q, v, L = middle(bodies[b])
+        x, q, v, L = read_middle(bodies[b])
         F, T = field_load(x, q, v, L, t, tilted, bodies[b])
         w = angular_velocity(q, L, bodies[b], tilted)
-        s, rate, a, held = room[HERE, b], room[RATE, b], bodies[b].held_acceleration, bodies[b].held_torque
+        s, rate, a, held = room[PLANE_HERE, b], room[PLANE_RATE, b], bodies[b].held_acceleration, bodies[b].held_torque
         turn = qt.multiply((0.0, 0.5 * w[0], 0.5 * w[1], 0.5 * w[2]), (s[3], s[4], s[5], s[6]))
         for c in range(4):
             rate[3 + c] = turn[c]
@@ -57,10 +58,10 @@ def _put_rate(t, tilted, linked):
 
 @inlined
 def _put_start(linked):
-    """The states of the bodies into `BEFORE` and `HERE`."""
+    """The states of the bodies into `PLANE_BEFORE` and `PLANE_HERE`."""
     for b in range(linked.now.shape[0]):
         x, q, v, L = read_state(linked.now, b)
-        for plane in (BEFORE, HERE):
+        for plane in (PLANE_BEFORE, PLANE_HERE):
             s = linked.room[plane, b]
             s[0], s[1], s[2] = x
             s[3], s[4], s[5], s[6] = q
@@ -76,17 +77,17 @@ def _midpoint(parts, h, t, row, tilted, linked):
     for k in range(parts):
         _put_rate(t + k * s, tilted, linked)
         for b in range(linked.now.shape[0]):
-            for c in range(SIZE):
-                here = room[HERE, b, c]
+            for c in range(LINKED_STATE_SIZE):
+                here = room[PLANE_HERE, b, c]
                 if k == 0:
-                    room[HERE, b, c] = here + s * room[RATE, b, c]
+                    room[PLANE_HERE, b, c] = here + s * room[PLANE_RATE, b, c]
                 else:
-                    room[HERE, b, c] = room[BEFORE, b, c] + 2.0 * s * room[RATE, b, c]
-                room[BEFORE, b, c] = here
+                    room[PLANE_HERE, b, c] = room[PLANE_BEFORE, b, c] + 2.0 * s * room[PLANE_RATE, b, c]
+                room[PLANE_BEFORE, b, c] = here
     _put_rate(t + h, tilted, linked)
     for b in range(linked.now.shape[0]):
-        for c in range(SIZE):
-            room[row, b, c] = 0.5 * (room[BEFORE, b, c] + room[HERE, b, c] + s * room[RATE, b, c])
+        for c in range(LINKED_STATE_SIZE):
+            room[row, b, c] = 0.5 * (room[PLANE_BEFORE, b, c] + room[PLANE_HERE, b, c] + s * room[PLANE_RATE, b, c])
 
 
 @kernel
@@ -98,10 +99,10 @@ def _extrapolate(row, h, linked):
     room, worst = linked.room, 0.0
     for b in range(linked.now.shape[0]):
         body = linked.bodies[b]
-        v = (room[HERE, b, 7], room[HERE, b, 8], room[HERE, b, 9])
+        v = (room[PLANE_HERE, b, 7], room[PLANE_HERE, b, 8], room[PLANE_HERE, b, 9])
         speed = math.sqrt(qt.dot(v, v)) + body.radius / h
         turning = speed * body.mass * body.radius
-        for c in range(SIZE):
+        for c in range(LINKED_STATE_SIZE):
             last = room[0, b, c]
             for j in range(row - 1, -1, -1):
                 ratio = (row + 1.0) / (j + 1.0)
@@ -118,19 +119,19 @@ def _extrapolate(row, h, linked):
 
 
 @kernel
-def move_linked(h, tilted, linked):
+def extrapolate_linked(h, tilted, linked):
     """All bodies after h, to the tolerance; whether it got there in the steps allowed."""
     start, t, step = linked.bodies[0].now, 0.0, h
     for _ in range(linked.most):
         step = min(step, h - t)
         rules, error = 0, math.inf
-        while rules < RULES and not error <= linked.tolerance:
+        while rules < _MAX_RULES and not error <= linked.tolerance:
             _midpoint(2 * (rules + 1), step, start + t, rules, tilted, linked)
             if rules > 0:
                 error = _extrapolate(rules, step, linked)
             rules += 1
         if not error <= linked.tolerance:
-            step *= CUT
+            step *= _STEP_CUT
             continue
         for b in range(linked.now.shape[0]):
             s = linked.room[0, b]
@@ -139,13 +140,13 @@ def move_linked(h, tilted, linked):
         t += step
         if not t < h:
             return True
-        if rules <= EASY:
-            step *= GROWTH
+        if rules <= _EASY_RULES:
+            step *= _STEP_GROWTH
     return False
 
 
 @kernel
-def step_smooth(world, h, tilted, report, linked):
-    """`move_linked`, with what it could not do in the report."""
-    if not move_linked(h, tilted, linked):
+def step_linked_segment(world, h, tilted, report, linked):
+    """`extrapolate_linked`, with what it could not do in the report."""
+    if not extrapolate_linked(h, tilted, linked):
         report[world, at.UNRESOLVED] += 1.0

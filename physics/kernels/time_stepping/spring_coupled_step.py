@@ -12,27 +12,35 @@ from typing import NamedTuple
 import numpy as np
 
 from physics.kernels.compile.decorators import kernel
-from physics.kernels.flight.free_flight import coast
+from physics.kernels.flight.free_flight import integrate_flight
 from physics.kernels.forces.force_field_dispatch import Term
 from physics.kernels.forces.held_loads import bind_fields, set_clock
 from physics.kernels.forces.two_body_spring import hold_linked_loads
-from physics.kernels.forces.world_energy_budget import note_reports, note_start, pay_together
-from physics.kernels.parallel.work_stealing import begin, next_world
+from physics.kernels.forces.world_energy_budget import (
+    limit_world_energy_gain,
+    note_stage_energy,
+    report_unresolved_bodies,
+)
+from physics.kernels.parallel.work_stealing import begin_taking, next_world
 from physics.kernels.state import layout as at
 from physics.kernels.state.body import (
     angular_velocity,
     bind_body,
-    first_lost,
-    first_overloaded,
-    note_fault,
+    find_nonfinite_body,
+    find_overloaded_body,
     read_state,
+    report_fault,
     write_state,
 )
-from physics.kernels.time_stepping.spring_coupled_extrapolation import PLANES, SIZE, step_smooth
+from physics.kernels.time_stepping.spring_coupled_extrapolation import (
+    LINKED_STATE_SIZE,
+    PLANE_COUNT,
+    step_linked_segment,
+)
 from physics.kernels.time_stepping.workspace import body_fields
 
 
-class Linked(NamedTuple):
+class LinkedWorld(NamedTuple):
     """Bodies of the world that a thread is at."""
 
     bodies: np.ndarray  # records: parameters and loads, see `workspace.body_fields`
@@ -43,25 +51,29 @@ class Linked(NamedTuple):
     most: int  # steps of `spring_coupled_extrapolation` in one of the caller's at most
 
 
-def make_linked(
+def make_linked_world(
     bodies: int, terms: tuple[Term, ...], *, relative_slop: float, tolerance: float, splits: int, **settings: float
-) -> Linked:
+) -> LinkedWorld:
     """Scratch for worlds of so many bodies in these fields, with numerical settings."""
     rows = np.zeros(bodies, np.dtype(body_fields(terms)))
     rows["relative_slop"] = relative_slop
-    now, touched, room = np.zeros((bodies, at.STATE_SIZE)), np.zeros(bodies, np.int64), np.zeros((PLANES, bodies, SIZE))
-    return Linked(rows, now, touched, room, float(tolerance), int(splits))
+    now, touched, room = (
+        np.zeros((bodies, at.STATE_SIZE)),
+        np.zeros(bodies, np.int64),
+        np.zeros((PLANE_COUNT, bodies, LINKED_STATE_SIZE)),
+    )
+    return LinkedWorld(rows, now, touched, room, float(tolerance), int(splits))
 
 
 @kernel
 def _substep(h, gyroscopic, tilted, scheme, linked):
     """All bodies after h by the loads of the middle."""
     hold_linked_loads(h, gyroscopic, tilted, linked)
-    note_start(tilted, linked, linked.bodies[0])
+    note_stage_energy(tilted, linked, linked.bodies[0])
     for b in range(linked.now.shape[0]):
-        y = coast(read_state(linked.now, b), h, gyroscopic, tilted, scheme, linked.bodies[b])
+        y = integrate_flight(read_state(linked.now, b), h, gyroscopic, tilted, scheme, linked.bodies[b])
         write_state(linked.now, b, y)
-    pay_together(h, 1, tilted, linked, linked.bodies[0])
+    limit_world_energy_gain(h, 1, tilted, linked, linked.bodies[0])
 
 
 @kernel
@@ -75,7 +87,7 @@ def step_linked(
     which a new state is not finite keeps the last good one, and its report counts the fault.
     """
     bodies = shapes.shape[0]
-    world = begin(turns, taken)
+    world = begin_taking(turns, taken)
     while True:
         world = next_world(world, turns, taken)
         if world < 0:
@@ -87,9 +99,9 @@ def step_linked(
             bind_body(world, i, shapes[b], params, gravity, wrench, None, None, tilted, linked.bodies[b])
             bind_fields(params, i, scheme, linked.bodies[b])
             write_state(linked.now, b, read_state(state, i))
-        lost = first_overloaded(linked.bodies)
+        lost = find_overloaded_body(linked.bodies)
         if lost >= 0:
-            note_fault(world, lost, report)
+            report_fault(world, lost, report)
             continue
         for k in range(steps * substeps):
             for b in range(bodies):
@@ -97,14 +109,14 @@ def step_linked(
             if held is not None:
                 _substep(h, gyroscopic, tilted, scheme, linked)
             if events is not None:
-                step_smooth(world, h, tilted, report, linked)
-            lost = first_lost(linked.now)
+                step_linked_segment(world, h, tilted, report, linked)
+            lost = find_nonfinite_body(linked.now)
             if lost >= 0:
-                note_fault(world, lost, report)
+                report_fault(world, lost, report)
                 break
             for b in range(bodies):
                 write_state(state, world * bodies + b, read_state(linked.now, b))
-        note_reports(report, linked, linked.bodies[0])
+        report_unresolved_bodies(report, linked, linked.bodies[0])
         for b in range(bodies):
             i = world * bodies + b
             _, q, _, L = read_state(state, i)

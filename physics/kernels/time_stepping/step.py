@@ -4,13 +4,14 @@ A body's substep is cut where a feature meets a wall (time of impact), so that i
 bodies meet, and between the cuts
 
 - in the air: exact flight (`free_flight.fly`);
-- touching:   Moreau's midpoint step (`contact_stages.touch`). Half a free drift, the contact problem at the middle,
+- touching:   Moreau's midpoint step (`contact_stages.midpoint_step`). Half a free drift, the contact problem at the
+middle,
   half a free drift.
 
 Moreau, *Unilateral contact and dry friction in finite freedom dynamics*, 1988, for the midpoint step; what
-differs are the cut at impacts, the target velocity at the step's end (`target_velocity.aim_rest`) and friction against
-the mean slip of few contacts (`midpoint_friction`), which together make the scheme second order between impacts and
-exact on parabolas.
+differs are the cut at impacts, the target velocity at the step's end (`target_velocity.set_resting_targets`) and
+friction against the mean slip of few contacts (`midpoint_friction`), which together make the scheme second order
+between impacts and exact on parabolas.
 
 What a scene does not have arrives here as None and is pruned by the compiler (see `decorators.kernel`).
 
@@ -21,48 +22,54 @@ call after call in the longest chain of the step, took a quarter of the time of 
 from __future__ import annotations
 
 from physics.kernels.compile.decorators import inlined, kernel
-from physics.kernels.contact_law.compliance import lift_to_due, stiffness
-from physics.kernels.contact_law.restitution_energy import lifted_to
-from physics.kernels.flight.free_flight import coast
-from physics.kernels.forces.energy_budget import misses_work, paid
+from physics.kernels.contact_law.compliance import contact_stiffness, correct_spring_depth
+from physics.kernels.contact_law.restitution_energy import lift_conserving_energy
+from physics.kernels.flight.free_flight import integrate_flight
+from physics.kernels.forces.energy_budget import has_work_error, limit_energy_gain
 from physics.kernels.forces.held_loads import (
+    advance_clock,
     bind_fields,
     hold_contact_loads,
     hold_loads,
     hold_mean_loads,
     hold_softened_loads,
-    pass_time,
     set_clock,
 )
-from physics.kernels.forces.resolution_limits import is_stiff, note_report
-from physics.kernels.forces.stiff_flight import graded_flight
-from physics.kernels.half_space.conservative_advancement import FAR_TURN, MOST_CUTS, may_turn, stage_of_turning
-from physics.kernels.half_space.contact_set import (
-    gap_of,
-    gap_rate,
-    gather,
-    nearest_outside_set,
-    push_out,
-    what_is_behind,
+from physics.kernels.forces.resolution_limits import is_stiff, report_unresolved_body
+from physics.kernels.forces.stiff_flight import subdivide_stiff_flight
+from physics.kernels.half_space.conservative_advancement import (
+    FAR_TURN,
+    MAX_TURNING_CUTS,
+    limit_turning_stage,
+    may_turn,
 )
-from physics.kernels.half_space.safe_substeps import clear_substeps
-from physics.kernels.math.parabolic_root import crossing, second_difference
+from physics.kernels.half_space.contact_set import (
+    check_penetration,
+    collect_wall_contacts,
+    feature_gap,
+    feature_gap_rate,
+    nearest_outside_set,
+    project_out_of_walls,
+)
+from physics.kernels.half_space.persistent_contacts import WALL_MEMORY_COUNT
+from physics.kernels.half_space.safe_substeps import count_clear_substeps
+from physics.kernels.math.parabolic_root import parabola_crossing_time, second_difference
 from physics.kernels.math.quaternion import to_matrix
-from physics.kernels.parallel.work_stealing import begin, next_world
+from physics.kernels.parallel.work_stealing import begin_taking, next_world
 from physics.kernels.state import layout as at
 from physics.kernels.state.body import (
     angular_velocity,
     bind_body,
-    can_bear,
+    has_finite_loads,
     is_finite,
-    note_fault,
     read_state,
+    report_fault,
     write_state,
 )
 from physics.kernels.state.contact_law_dispatch import bind_laws
-from physics.kernels.state.sleeping import falls_asleep, laid_down, sleeps_on
-from physics.kernels.time_stepping.contact_stages import CONTACT_COUNT, impact, store_warm_start, touch
-from physics.kernels.time_stepping.event_log import drop_events, forget_events
+from physics.kernels.state.sleeping import falls_asleep, remains_asleep, without_velocities
+from physics.kernels.time_stepping.contact_stages import midpoint_step, resolve_impacts, store_warm_start
+from physics.kernels.time_stepping.event_log import clear_events, drop_events
 
 # Trials of one time of impact: a secant, then parabolas through the last three. Three are usual.
 IMPACT_TRIALS = 16
@@ -71,7 +78,7 @@ IMPACT_TRIALS = 16
 @inlined
 def has_touched(memory, i):
     """True if a body had contacts in its last stage: its bounding sphere touches a wall, or has just left it."""
-    return memory[i, CONTACT_COUNT] > 0.0
+    return memory[i, WALL_MEMORY_COUNT] > 0.0
 
 
 @inlined
@@ -84,21 +91,23 @@ def forget_contacts(memory, i, work):
 @inlined
 def fly_stage(y, h, gyroscopic, tilted, scheme, work):
     """Free motion over h under the loads that are held; where these are stiff, cut into parts."""
-    return graded_flight(coast(y, h, gyroscopic, tilted, scheme, work), y, h, gyroscopic, tilted, scheme, work)
+    return subdivide_stiff_flight(
+        integrate_flight(y, h, gyroscopic, tilted, scheme, work), y, h, gyroscopic, tilted, scheme, work
+    )
 
 
 @inlined
-def advance(n, y, h, friction, smooth, gyroscopic, tilted, pivots, scheme, memory, report, work):
+def advance_stage(n, y, h, friction, smooth, gyroscopic, tilted, pivots, scheme, memory, report, work):
     """One stage of length h: flight when nothing touches, else Moreau's step."""
     if n > 0:
         hold_contact_loads(y, h, gyroscopic, tilted, work)
-        end = touch(n, y, h, friction, smooth, gyroscopic, tilted, pivots, memory, report, work)
+        end = midpoint_step(n, y, h, friction, smooth, gyroscopic, tilted, pivots, memory, report, work)
         if hold_mean_loads(y, end, h, gyroscopic, tilted, work):
-            end = touch(n, y, h, friction, smooth, gyroscopic, tilted, pivots, memory, report, work)
-        if is_stiff(work) and misses_work(y, end, h, tilted, work):
+            end = midpoint_step(n, y, h, friction, smooth, gyroscopic, tilted, pivots, memory, report, work)
+        if is_stiff(work) and has_work_error(y, end, h, tilted, work):
             hold_softened_loads(y, h, gyroscopic, tilted, work)
-            end = touch(n, y, h, friction, smooth, gyroscopic, tilted, pivots, memory, report, work)
-        return paid(y, end, h, False, tilted, work)
+            end = midpoint_step(n, y, h, friction, smooth, gyroscopic, tilted, pivots, memory, report, work)
+        return limit_energy_gain(y, end, h, False, tilted, work)
     hold_loads(y, h, gyroscopic, tilted, work)
     forget_contacts(memory, work.i, work)
     return fly_stage(y, h, gyroscopic, tilted, scheme, work)
@@ -111,9 +120,9 @@ def outside_gap(y, tilted, work):
 
 
 @inlined
-def contact_set(y, h, tilted, memory, work):
+def find_contact_set(y, h, tilted, memory, work):
     """Gather the contact set at y for a stage of length h: (count, depth)."""
-    return gather(y, angular_velocity(y[1], y[3], work, tilted), h, tilted, memory, work)
+    return collect_wall_contacts(y, angular_velocity(y[1], y[3], work, tilted), h, tilted, memory, work)
 
 
 @inlined
@@ -123,13 +132,13 @@ def has_same_pose(y, z):
 
 
 @kernel
-def kept_out(y, tilted, work):
+def keep_out_of_walls(y, tilted, work):
     """y, pushed out of the walls where it is deeper in than the slop: what turns by radians in a step may be so."""
-    return lifted_to(push_out(y[0], to_matrix(y[1]), tilted, work), y, tilted, work)
+    return lift_conserving_energy(project_out_of_walls(y[0], to_matrix(y[1]), tilted, work), y, tilted, work)
 
 
 @kernel
-def shortened_stage(n, y, end, h, friction, smooth, gyroscopic, tilted, pivots, scheme, memory, report, work):
+def shorten_to_impact(n, y, end, h, friction, smooth, gyroscopic, tilted, pivots, scheme, memory, report, work):
     """A stage over h that ends at `end`, where a feature has passed through a wall, up to that: (state, time advanced).
 
     It is shortened until that feature is within half a slop of the wall: `parabolic_root` of its gap. Another one that
@@ -143,12 +152,12 @@ def shortened_stage(n, y, end, h, friction, smooth, gyroscopic, tilted, pivots, 
         gap, nearest = outside_gap(end, tilted, work)
         if nearest != slot and gap < -0.5 * work.slop:
             slot, high, high_gap = nearest, t, gap
-            low_gap = max(gap_of(slot, low_end[0], to_matrix(low_end[1]), tilted, work), 0.0)
-            rate = gap_rate(slot, low_end, tilted, work)
+            low_gap = max(feature_gap(slot, low_end[0], to_matrix(low_end[1]), tilted, work), 0.0)
+            rate = feature_gap_rate(slot, low_end, tilted, work)
             bend = ((high_gap - low_gap) / (high - low) - rate) / (high - low)
         else:
             if nearest != slot:
-                gap = gap_of(slot, end[0], to_matrix(end[1]), tilted, work)
+                gap = feature_gap(slot, end[0], to_matrix(end[1]), tilted, work)
             if abs(gap) <= 0.5 * work.slop:
                 break
             bend = second_difference(low, low_gap, t, gap, high, high_gap)
@@ -156,30 +165,30 @@ def shortened_stage(n, y, end, h, friction, smooth, gyroscopic, tilted, pivots, 
                 low, low_gap, low_end = t, gap, end
             else:
                 high, high_gap = t, gap
-        t = low + crossing(low_gap, high_gap, high - low, bend)
+        t = low + parabola_crossing_time(low_gap, high_gap, high - low, bend)
         if not t < high:  # nor where low and high are one, and t is not a number
             end, t = low_end, low
             break
-        end = advance(n, y, t, friction, smooth, gyroscopic, tilted, pivots, scheme, memory, report, work)
+        end = advance_stage(n, y, t, friction, smooth, gyroscopic, tilted, pivots, scheme, memory, report, work)
         if has_same_pose(end, y):
             break
     return end, t
 
 
 @inlined
-def to_next_impact(n, y, h, friction, smooth, gyroscopic, tilted, pivots, scheme, memory, report, work):
+def advance_to_impact(n, y, h, friction, smooth, gyroscopic, tilted, pivots, scheme, memory, report, work):
     """Advance by h, or to the first impact within h: (state, time advanced, whether it may be deep in a wall).
 
     An end state in which a feature outside the contact set has passed through a wall is taken back, and the stage
-    shortened (`shortened_stage`: apart, so that what is hardly ever needed takes no part in what always is).
+    shortened (`shorten_to_impact`: apart, so that what is hardly ever needed takes no part in what always is).
     """
-    end = advance(n, y, h, friction, smooth, gyroscopic, tilted, pivots, scheme, memory, report, work)
+    end = advance_stage(n, y, h, friction, smooth, gyroscopic, tilted, pivots, scheme, memory, report, work)
     if has_same_pose(end, y):
         return end, h, False
-    has_passed, is_deep = what_is_behind(end[0], to_matrix(end[1]), tilted, work)
+    has_passed, is_deep = check_penetration(end[0], to_matrix(end[1]), tilted, work)
     if work.is_last or not has_passed:
         return end, h, is_deep
-    end, t = shortened_stage(n, y, end, h, friction, smooth, gyroscopic, tilted, pivots, scheme, memory, report, work)
+    end, t = shorten_to_impact(n, y, end, h, friction, smooth, gyroscopic, tilted, pivots, scheme, memory, report, work)
     return end, t, True
 
 
@@ -199,31 +208,31 @@ def substep(y, start, h, friction, smooth, gyroscopic, tilted, pivots, scheme, m
             report[world, at.UNRESOLVED] += 1.0
             work.is_last = 1
         hold_loads(y, left, gyroscopic, tilted, work)
-        n, depth = contact_set(y, left, tilted, memory, work)
+        n, depth = find_contact_set(y, left, tilted, memory, work)
         if n > 0:
             report[world, at.PENETRATION] = max(report[world, at.PENETRATION], depth)
-            if not work.is_last and not stiffness(work) > 0.0:
-                y = impact(
+            if not work.is_last and not contact_stiffness(work) > 0.0:
+                y = resolve_impacts(
                     n, y, start + (h - left), left, friction, smooth, tilted, pivots, memory, report, work, log, counts
                 )  # fmt: skip
         span = left
         if scheme is None:  # noqa: SIM102 (a branch of its own is what the compiler prunes)
-            if cuts < MOST_CUTS and may_turn(y[3], h, FAR_TURN, tilted, work) and not work.is_last:
-                span = stage_of_turning(n, y, h, left, gyroscopic, tilted, work)
-        end, t, is_deep = to_next_impact(
+            if cuts < MAX_TURNING_CUTS and may_turn(y[3], h, FAR_TURN, tilted, work) and not work.is_last:
+                span = limit_turning_stage(n, y, h, left, gyroscopic, tilted, work)
+        end, t, is_deep = advance_to_impact(
             n, y, span, friction, smooth, gyroscopic, tilted, pivots, scheme, memory, report, work
         )
         if t == span and span < left:
             cuts += 1
-            if cuts == MOST_CUTS:
+            if cuts == MAX_TURNING_CUTS:
                 report[world, at.UNRESOLVED] += 1.0
         else:
             splits += 1
         left -= t
-        pass_time(t, work)
-        if is_deep and n > 0 and not stiffness(work) > 0.0:
-            end = kept_out(end, tilted, work)
-        y = lift_to_due(n, y, end, t, tilted, report, work)
+        advance_clock(t, work)
+        if is_deep and n > 0 and not contact_stiffness(work) > 0.0:
+            end = keep_out_of_walls(end, tilted, work)
+        y = correct_spring_depth(n, y, end, t, tilted, report, work)
         if work.is_last or not left > 0.0:
             break
         report[world, at.SPLITS] += 1.0
@@ -244,21 +253,21 @@ def step_worlds(
     """
     work = scratch[0]
     bodies = shapes.shape[0]
-    world = begin(turns, taken)
+    world = begin_taking(turns, taken)
     while True:
         world = next_world(world, turns, taken)
         if world < 0:
             break
         for c in range(at.REPORT_SIZE):
             report[world, c] = 0.0
-        forget_events(world, bodies, log, counts)
+        clear_events(world, bodies, log, counts)
         for b in range(bodies):
             i = world * bodies + b
-            if sleep is not None and sleeps_on(i, wrench, sleep):
+            if sleep is not None and remains_asleep(i, wrench, sleep):
                 continue
             bind_body(world, i, shapes[b], params, gravity, wrench, friction, restitution, tilted, work)
-            if not can_bear(work):
-                note_fault(world, b, report)
+            if not has_finite_loads(work):
+                report_fault(world, b, report)
                 continue
             bind_fields(params, i, scheme, work)
             bind_laws(params, i, work)
@@ -267,7 +276,7 @@ def step_worlds(
                 set_clock(k * h, work)
                 hold_loads(y, h, gyroscopic, tilted, work)
                 if contact is not None and clear == 0 and not has_touched(memory, i):
-                    clear = clear_substeps(y[0], y[2], h, steps * substeps - k, work)
+                    clear = count_clear_substeps(y[0], y[2], h, steps * substeps - k, work)
                     if clear > 0:
                         forget_contacts(memory, i, work)
                 if contact is not None and clear == 0:
@@ -279,14 +288,14 @@ def step_worlds(
                     clear -= 1
                     new = fly_stage(y, h, gyroscopic, tilted, scheme, work)
                 if not is_finite(new):
-                    note_fault(world, b, report)
+                    report_fault(world, b, report)
                     drop_events(i, 1, k * h, log, counts)
                     break
                 y = new
                 if sleep is not None and falls_asleep(i, y, h, work, sleep):
-                    y = laid_down(y)
+                    y = without_velocities(y)
                     break
-            note_report(not has_same_pose(y, read_state(state, i)), report, work)
+            report_unresolved_body(not has_same_pose(y, read_state(state, i)), report, work)
             write_state(state, i, y)
             w = angular_velocity(y[1], y[3], work, tilted)
             state[i, at.ANGVEL], state[i, at.ANGVEL + 1], state[i, at.ANGVEL + 2] = w

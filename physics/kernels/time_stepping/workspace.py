@@ -11,11 +11,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from physics.kernels.contact_solver.friction_pyramid import normal_sizes, pyramid_sizes
-from physics.kernels.forces.force_field_dispatch import Term, members
+from physics.kernels.contact_solver.friction_pyramid import normal_lcp_sizes, pyramid_sizes
+from physics.kernels.forces.force_field_dispatch import Term, term_members
 from physics.kernels.state import contact_law_dispatch as contact_laws
 from physics.kernels.state.layout import SERIES_SIZE, VERTEX_COUNT, WALL_SIZE
-from physics.kernels.time_stepping.midpoint_friction import FEW
+from physics.kernels.time_stepping.midpoint_friction import MEAN_SLIP_CONTACTS
 
 
 def setting_fields() -> list[tuple]:
@@ -34,8 +34,8 @@ def body_fields(terms: tuple[Term, ...] = (), laws: tuple[str, ...] = ()) -> lis
     """Fields of what `body.bind_body` writes of one body, and of what the scene's fields and laws do to it."""
     f, i = np.float64, np.int64
     return [
-        *members(terms),  # first: a record may stand for one that it begins with, and Numba would say so
-        *contact_laws.members(laws),
+        *term_members(terms),  # first: a record may stand for one that it begins with, and Numba would say so
+        *contact_laws.law_members(laws),
         ("relative_slop", f),  # gap within which a feature touches, in bounding radii; the one field that is read
         ("i", i),
         ("world", i),
@@ -61,7 +61,7 @@ def workspace_dtype(
 ) -> np.dtype:
     """Record type for bodies with `features` contact features each on `wall_count` walls, in these fields and laws."""
     n = max(wall_count * features, 1)
-    float_size, int_size = np.maximum(pyramid_sizes(n), normal_sizes(n)).tolist()
+    float_size, int_size = np.maximum(pyramid_sizes(n), normal_lcp_sizes(n)).tolist()
     f, i = np.float64, np.int64
     scene = [
         ("features", i),
@@ -69,8 +69,11 @@ def workspace_dtype(
         ("walls", f, (max(wall_count, 1), WALL_SIZE)),  # columns of `layout`
     ]
     stage = [
-        ("mode", i),  # which direct solve to try first, then which one did it (`sliding_patch.HOLD`, `SLIDE`, `MIXED`)
-        ("still", f),  # residual allowed beside the tolerance [m/s]: see `contact_stages.still_speed`
+        (
+            "mode",
+            i,
+        ),  # which direct solve to try first, then which one did it (`sliding_patch.TRY_STICKING`, `SLIDE`, `MIXED`)
+        ("still", f),  # residual allowed beside the tolerance [m/s]: see `contact_stages.rest_residual`
         ("unseen", f),  # by what the targets of contacts that hold may be off [m/s]: see `sticking`
         ("is_last", i),  # 1 in the last stage a substep may have: take in all that would pass through a wall
     ]
@@ -79,13 +82,17 @@ def workspace_dtype(
         ("vertices", f, (2, VERTEX_COUNT)),  # gap [m] and normal velocity [m/s] of each vertex at one wall
         ("slot", i, (n,)),  # wall * features + feature, the stable name of a contact
         ("gap", f, (n,)),  # [m], negative when penetrating
-        *[("due", f, (n,))] * (contact_laws.STIFFNESS in laws),  # gap at the end of a stage [m] (`compliance`)
+        *[("due", f, (n,))] * (contact_laws.LAW_STIFFNESS in laws),  # gap at the end of a stage [m] (`compliance`)
         ("speed", f, (n,)),  # normal velocity before the stage [m/s], negative when approaching
         ("widest", f),  # largest gap of them all, 0 if there is none above a wall [m]
         ("approach", f),  # fastest approach of them all, 0 if none does [m/s]
         ("arm", f, (n, 3)),  # contact point relative to the centre of mass, world frame [m]
         ("target", f, (n, 3)),  # contact velocity aimed at (normal, tangents) [m/s]
-        ("held", f, (FEW, 2)),  # tangents for which contacts hold, where `target` has others (`midpoint_friction`)
+        (
+            "held",
+            f,
+            (MEAN_SLIP_CONTACTS, 2),
+        ),  # tangents for which contacts hold, where `target` has others (`midpoint_friction`)
         ("friction", f, (n,)),  # Coulomb coefficient
         ("frame", f, (3 * n, 3)),  # directions normal, tangent 1, tangent 2 of each contact
         ("angular", f, (3 * n, 3)),  # angular Jacobian rows arm x direction [m]
@@ -104,7 +111,7 @@ def workspace_dtype(
         ("defect", f, (6,)),
         ("newton", f, (6, 7)),
         ("trial", f, (3 * n,)),  # [N s]
-        ("local", f, (n, 12)),  # see `gauss_seidel.factor_blocks`
+        ("local", f, (n, 12)),  # see `gauss_seidel.invert_contact_blocks`
         ("fallback_float", f, (float_size,)),
         ("fallback_int", i, (int_size,)),
         ("rebound", f, (3 * n,)),  # p of an impact with all of its rebound, where there is less energy [N s]

@@ -32,8 +32,8 @@ BODIES = 3
 # Energy of the motion and its potential that leapfrog may show beyond what there is, at h Ω = 1.
 LEAPFROG_SHARE = 1.0 / 3.0
 
-# Per stage, by which contact may gain (`physics.kernels.contact_law.compliance.GAIN_SHARE`), and stages of a step:
-# impacts cut it.
+# Per stage, by which contact may gain (`physics.kernels.contact_law.compliance.ENERGY_GAIN_TOLERANCE`), and stages of a
+# step: impacts cut it.
 CONTACT_SHARE = 2.0e-5
 STAGES = 8.0
 

@@ -11,7 +11,7 @@ from llvmlite import ir
 from numba.core import types
 from numba.core.datamodel.packer import ArgPacker, _flatten, _Unflattener
 
-from physics.kernels.compile.fused.folding_builder import Elsewhere, FoldingBuilder, slot
+from physics.kernels.compile.fused.folding_builder import FoldingBuilder, StructInMemory, stack_slot
 
 FEW_WORDS = 64  # A tuple of more is handed on by its address.
 
@@ -59,11 +59,11 @@ class _ByAddress:
 
     def as_argument(self, builder, value):
         """Address of a value: where it stands already, if it was handed to the caller."""
-        if isinstance(value, Elsewhere):
+        if isinstance(value, StructInMemory):
             return value.address
-        address = slot(builder, self._type)
+        address = stack_slot(builder, self._type)
         builder.store(value, address)
         return address
 
     def from_argument(self, builder, address):
-        return Elsewhere(address) if isinstance(builder, FoldingBuilder) else builder.load(address)
+        return StructInMemory(address) if isinstance(builder, FoldingBuilder) else builder.load(address)

@@ -14,15 +14,21 @@ from collections.abc import Callable
 from llvmlite import ir
 from numba.core import cgutils, types, typing
 
-from physics.kernels.compile.fused.folding_builder import INSIDE, FoldingBuilder, constant_of, together, word
+from physics.kernels.compile.fused.folding_builder import (
+    NO_SIGNED_WRAP,
+    FoldingBuilder,
+    known_integer,
+    make_struct,
+    word_constant,
+)
 
-SIZE, DATA, SHAPE, STRIDES = 3, 4, 5, 6  # members of an array
+_ITEM_SIZE, _DATA, _SHAPE, _STRIDES = 3, 4, 5, 6  # members of an array
 
 
 def _lengths(builder, array_type, array, member, known) -> list:
     """Shape or strides [bytes] of an array, as constants where its type has them."""
     if isinstance(array_type, types.NestedArray):
-        return [word(length) for length in known(array_type)]
+        return [word_constant(length) for length in known(array_type)]
     return [builder.extract_value(array, (member, axis)) for axis in range(array_type.ndim)]
 
 
@@ -33,17 +39,17 @@ def _from_front(context, builder, index, type_, length):
     time. Functions of users, which are not written with our builder, may count as they like.
     """
     index = context.cast(builder, index, type_, types.intp if type_.signed else types.uintp)
-    known = constant_of(index)
+    known = known_integer(index)
     is_from_front = known >= 0 if known is not None else isinstance(builder, FoldingBuilder)
     if is_from_front or not type_.signed:
         return index
-    return builder.select(builder.icmp_signed("<", index, word(0)), builder.add(index, length), index)
+    return builder.select(builder.icmp_signed("<", index, word_constant(0)), builder.add(index, length), index)
 
 
-def pointer(context, builder, array_type, array, index_types, indices):
+def element_pointer(context, builder, array_type, array, index_types, indices):
     """Pointer to an element; under NUMBA_BOUNDSCHECK=1 an index outside its axis raises IndexError."""
-    shape = _lengths(builder, array_type, array, SHAPE, lambda known: known.shape)
-    data = builder.extract_value(array, DATA)
+    shape = _lengths(builder, array_type, array, _SHAPE, lambda known: known.shape)
+    data = builder.extract_value(array, _DATA)
     from_front = []
     for axis, (index, type_, length) in enumerate(zip(indices, index_types, shape, strict=True)):
         from_front.append(_from_front(context, builder, index, type_, length))
@@ -52,10 +58,10 @@ def pointer(context, builder, array_type, array, index_types, indices):
     if array_type.layout == "C":
         place = from_front[0]
         for index, length in zip(from_front[1:], shape[1:], strict=True):
-            place = builder.add(builder.mul(place, length, flags=INSIDE), index, flags=INSIDE)
+            place = builder.add(builder.mul(place, length, flags=NO_SIGNED_WRAP), index, flags=NO_SIGNED_WRAP)
         return builder.gep(data, [place], inbounds=True)
-    strides = _lengths(builder, array_type, array, STRIDES, lambda known: known.strides)
-    offset = word(0)
+    strides = _lengths(builder, array_type, array, _STRIDES, lambda known: known.strides)
+    offset = word_constant(0)
     for index, stride in zip(from_front, strides, strict=True):
         offset = builder.add(offset, builder.mul(index, stride))
     return cgutils.pointer_add(builder, data, offset)
@@ -78,7 +84,7 @@ def _is_element(array_type, index_type) -> bool:
 
 def _read(context, builder, sig, args):
     """`a[index]`."""
-    place = pointer(context, builder, sig.args[0], args[0], *_indices(builder, sig.args[1], args[1]))
+    place = element_pointer(context, builder, sig.args[0], args[0], *_indices(builder, sig.args[1], args[1]))
     return context.unpack_value(builder, sig.args[0].dtype, place, None if sig.args[0].aligned else 1)
 
 
@@ -86,7 +92,7 @@ def _write(context, builder, sig, args):
     """`a[index] = value`."""
     array_type, index_type, value_type = sig.args
     value = context.cast(builder, args[2], value_type, array_type.dtype)
-    place = pointer(context, builder, array_type, args[0], *_indices(builder, index_type, args[1]))
+    place = element_pointer(context, builder, array_type, args[0], *_indices(builder, index_type, args[1]))
     context.pack_value(builder, array_type.dtype, value, place, None if array_type.aligned else 1)
 
 
@@ -97,12 +103,12 @@ def _reshape(context, builder, sig, args):
     array, shape = args
     model = context.get_value_type(sig.return_type)
     lengths = [builder.extract_value(shape, k) for k in range(sig.return_type.ndim)]
-    strides = [builder.extract_value(array, SIZE)]
+    strides = [builder.extract_value(array, _ITEM_SIZE)]
     for length in reversed(lengths[1:]):
-        strides.insert(0, builder.mul(strides[0], length, flags=INSIDE))
-    kept = [builder.extract_value(array, k) for k in range(SHAPE)]
-    axes = [together(builder, model.elements[SHAPE], each) for each in (lengths, strides)]
-    return together(builder, model, [*kept, *axes])
+        strides.insert(0, builder.mul(strides[0], length, flags=NO_SIGNED_WRAP))
+    kept = [builder.extract_value(array, k) for k in range(_SHAPE)]
+    axes = [make_struct(builder, model.elements[_SHAPE], each) for each in (lengths, strides)]
+    return make_struct(builder, model, [*kept, *axes])
 
 
 def array_in_record(context, builder, record_type, record, name):
@@ -112,9 +118,13 @@ def array_in_record(context, builder, record_type, record, name):
         builder, record, record_type.offset(name), context.get_data_type(field.dtype)
     )  # fmt: skip
     model = context.get_value_type(field)
-    lengths = [ir.Constant.literal_array([word(each) for each in axes]) for axes in (field.shape, field.strides)]
+    lengths = [
+        ir.Constant.literal_array([word_constant(each) for each in axes]) for axes in (field.shape, field.strides)
+    ]
     owner = [ir.Constant(each, None) for each in model.elements[:2]]
-    return together(builder, model, [*owner, word(math.prod(field.shape)), word(field.size), data, *lengths])
+    return make_struct(
+        builder, model, [*owner, word_constant(math.prod(field.shape)), word_constant(field.size), data, *lengths]
+    )
 
 
 def signature(key, context, args) -> typing.Signature | None:

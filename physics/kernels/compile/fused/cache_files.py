@@ -21,33 +21,33 @@ from pathlib import Path
 
 MAGIC = b"rigid-env kernel 1\n"
 DIGEST_SIZE = 32  # [bytes]
-OTHERS_WRITE = stat.S_IWGRP | stat.S_IWOTH
+WRITABLE_BY_OTHERS = stat.S_IWGRP | stat.S_IWOTH
 
 
-class Damaged(Exception):
+class DamagedFileError(Exception):
     """A file is not what was written."""
 
 
-class Foreign(Exception):
+class ForeignFileError(Exception):
     """A file that somebody else wrote, or could have written."""
 
 
-def say(text: str) -> None:
+def warn(text: str) -> None:
     """One line on standard error."""
     print(f"rigid-env: {text}", file=sys.stderr, flush=True)
 
 
-def say_once(subject: str, text: str) -> None:
+def warn_once(subject: str, text: str) -> None:
     """The first line about a subject in this process."""
     if subject not in _SAID:
         _SAID.add(subject)
-        say(text)
+        warn(text)
 
 
 _SAID: set[str] = set()
 
 
-def is_own(status: os.stat_result) -> bool:
+def is_owned_by_user(status: os.stat_result) -> bool:
     """True if only this user or root owns and can write a file or folder; always so without such users.
 
     Parameters
@@ -56,14 +56,14 @@ def is_own(status: os.stat_result) -> bool:
     """
     if not hasattr(os, "getuid"):
         return True
-    return status.st_uid in (os.getuid(), 0) and not status.st_mode & OTHERS_WRITE
+    return status.st_uid in (os.getuid(), 0) and not status.st_mode & WRITABLE_BY_OTHERS
 
 
-def _sum_of(purpose: bytes, content: bytes) -> bytes:
+def _checksum(purpose: bytes, content: bytes) -> bytes:
     return hashlib.blake2b(content, digest_size=DIGEST_SIZE, key=hashlib.sha256(purpose).digest()).digest()
 
 
-def read(path: Path, purpose: bytes):
+def read_cache_file(path: Path, purpose: bytes):
     """Return the content of a file written for this purpose; None if there is no such file.
 
     Raises
@@ -78,16 +78,16 @@ def read(path: Path, purpose: bytes):
     except (FileNotFoundError, NotADirectoryError):
         return None
     with file:
-        if not is_own(os.fstat(file.fileno())):
-            raise Foreign("other users may write to it")
+        if not is_owned_by_user(os.fstat(file.fileno())):
+            raise ForeignFileError("other users may write to it")
         data = file.read()
     head = len(MAGIC) + DIGEST_SIZE
-    if data[: len(MAGIC)] != MAGIC or _sum_of(purpose, data[head:]) != data[len(MAGIC) : head]:
-        raise Damaged("it is empty" if not data else "it is not what was written")
+    if data[: len(MAGIC)] != MAGIC or _checksum(purpose, data[head:]) != data[len(MAGIC) : head]:
+        raise DamagedFileError("it is empty" if not data else "it is not what was written")
     return pickle.loads(data[head:])
 
 
-def write(path: Path, purpose: bytes, pickled: bytes) -> None:
+def write_cache_file(path: Path, purpose: bytes, pickled: bytes) -> None:
     """Write a file, which appears at once and whole; others may read it, whatever the umask allows them.
 
     Raises
@@ -102,7 +102,7 @@ def write(path: Path, purpose: bytes, pickled: bytes) -> None:
     try:
         descriptor = os.open(temporary, os.O_WRONLY | os.O_CREAT | os.O_EXCL | getattr(os, "O_BINARY", 0), 0o644)
         with open(descriptor, "wb") as file:
-            file.write(MAGIC + _sum_of(purpose, pickled) + pickled)
+            file.write(MAGIC + _checksum(purpose, pickled) + pickled)
         temporary.replace(path)
     except BaseException:
         with suppress(OSError):

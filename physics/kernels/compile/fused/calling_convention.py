@@ -13,26 +13,26 @@ from numba.core import cgutils
 from numba.core.callconv import RETCODE_OK, CPUCallConv, excinfo_ptr_t
 from numba.core.funcdesc import PythonFunctionDescriptor
 
-from physics.kernels.compile.fused.folding_builder import slot
+from physics.kernels.compile.fused.folding_builder import stack_slot
 
 
 class MayRaise(Exception):
     """A kernel that was to return its value may raise an exception, or return None for a number."""
 
 
-def gives_value(function) -> bool:
+def returns_value(function) -> bool:
     """A function, or one that is described, returns its value and not a status."""
-    return getattr(function, "gives_value", False)
+    return getattr(function, "returns_value", False)
 
 
 class ValueDescriptor(PythonFunctionDescriptor):
     """Descriptor of a function that returns its value."""
 
     __slots__ = ()
-    gives_value = True
+    returns_value = True
 
 
-def declare(context, module: ir.Module, about) -> ir.Function:
+def declare_value_function(context, module: ir.Module, about) -> ir.Function:
     """A function that returns its value, in a module that defines or calls it.
 
     Parameters
@@ -49,18 +49,18 @@ def declare(context, module: ir.Module, about) -> ir.Function:
     packer.assign_names(function.args, [f"arg.{name}" for name in about.args])
     if about.inline:
         function.attributes.add("alwaysinline")
-    function.gives_value = True
+    function.returns_value = True
     return function
 
 
-def call(context, builder, about, args):
+def call_value_function(context, builder, about, args):
     """Result of a call; an exception is handed on, since no kernel catches one."""
     words = context.get_arg_packer(about.argtypes).as_arguments(builder, args)
-    if gives_value(about):
-        result = builder.call(declare(context, builder.module, about), words)
+    if returns_value(about):
+        result = builder.call(declare_value_function(context, builder.module, about), words)
         return context.get_returned_value(builder, about.restype, result)
     convention, function = context.call_conv, context.declare_function(builder.module, about)
-    result = slot(builder, convention.get_return_type(about.restype).pointee)
+    result = stack_slot(builder, convention.get_return_type(about.restype).pointee)
     convention.must_give_status(builder)
     raised = convention._get_excinfo_argument(builder.function)
     status = builder.call(function, [result, raised, *words])
@@ -69,21 +69,21 @@ def call(context, builder, about, args):
     return context.get_returned_value(builder, about.restype, builder.load(result))
 
 
-class Convention(CPUCallConv):
+class ValueCallConv(CPUCallConv):
     """Numba's convention, and that of functions that return their value."""
 
     def must_give_status(self, builder: ir.IRBuilder) -> None:
         """Raise MayRaise if the function being written is one that returns its value."""
-        if gives_value(builder.function):
+        if returns_value(builder.function):
             raise MayRaise(builder.function.name)
 
     def get_arguments(self, func):
         """Return those of a function's arguments that are a kernel's."""
-        return func.args if gives_value(func) else super().get_arguments(func)
+        return func.args if returns_value(func) else super().get_arguments(func)
 
     def return_value(self, builder, retval):
         """Leave a function with a value."""
-        if gives_value(builder.function):
+        if returns_value(builder.function):
             builder.ret(retval)
         else:
             super().return_value(builder, retval)
@@ -112,7 +112,7 @@ class Convention(CPUCallConv):
 
     def call_function(self, builder, callee, resty, argtys, args, attrs=None):
         """Status and result of a call that Numba writes."""
-        if not gives_value(callee):
+        if not returns_value(callee):
             return super().call_function(builder, callee, resty, argtys, args, attrs)
         words = self.context.get_arg_packer(argtys).as_arguments(builder, args)
         result = self.context.get_returned_value(builder, resty, builder.call(callee, words))

@@ -13,7 +13,7 @@ from numba.core import cgutils
 from numba.core.codegen import CodeLibrary, JITCodeLibrary
 
 
-class Origin(NamedTuple):
+class KernelOrigin(NamedTuple):
     """Origin of shared machine code: a kernel, and the types of its arguments.
 
     Parameters
@@ -58,12 +58,12 @@ class WholeLibrary(JITCodeLibrary):
         The kernels that stand, of those below it.
     """
 
-    called: tuple[Origin, ...] = ()
+    called: tuple[KernelOrigin, ...] = ()
 
     def finalize(self):
         below = _callers_first(self)
-        self.called = tuple(each.origin for each in below if isinstance(each, StandingLibrary))
-        self._linking_libraries = [each for each in below if not isinstance(each, StandingLibrary)]
+        self.called = tuple(each.origin for each in below if isinstance(each, SharedLibrary))
+        self._linking_libraries = [each for each in below if not isinstance(each, SharedLibrary)]
         super().finalize()
 
     def _optimize_final_module(self):
@@ -73,7 +73,7 @@ class WholeLibrary(JITCodeLibrary):
         super()._optimize_final_module()
 
 
-class StandingLibrary(WholeLibrary):
+class SharedLibrary(WholeLibrary):
     """The same of a kernel that others call by its name.
 
     Attributes
@@ -82,7 +82,7 @@ class StandingLibrary(WholeLibrary):
         What it was made of.
     """
 
-    origin: Origin
+    origin: KernelOrigin
 
     def machine_code(self) -> bytes:
         """As it is kept."""

@@ -18,7 +18,7 @@ from numba.core.environment import Environment
 from numba.core.serialize import dumps
 
 from physics.kernels.compile.fused import cache_files
-from physics.kernels.compile.fused.code_libraries import StandingLibrary
+from physics.kernels.compile.fused.code_libraries import SharedLibrary
 
 
 class _Cache:
@@ -58,12 +58,12 @@ class _Cache:
         target_context.refresh()
         path, purpose = self._place(sig, target_context.codegen())
         try:
-            payload = cache_files.read(path, purpose)
+            payload = cache_files.read_cache_file(path, purpose)
             return None if payload is None else self.rebuild(target_context, payload)
-        except cache_files.Foreign as reason:
-            cache_files.say_once("foreign", f"{path} is not read, since {reason}: kernels are compiled in memory")
+        except cache_files.ForeignFileError as reason:
+            cache_files.warn_once("foreign", f"{path} is not read, since {reason}: kernels are compiled in memory")
         except Exception as error:  # whatever is wrong with it, the kernel can be compiled
-            cache_files.say(f"{path} is damaged ({type(error).__name__}: {str(error)[:200]}): compiled anew")
+            cache_files.warn(f"{path} is damaged ({type(error).__name__}: {str(error)[:200]}): compiled anew")
         return None
 
     def save_overload(self, sig, made):
@@ -71,15 +71,15 @@ class _Cache:
         if not self._is_enabled or made.library.has_dynamic_globals:
             return
         path, purpose = self._place(sig, made.codegen)
-        if path.is_file() and not cache_files.is_own(path.stat()):
+        if path.is_file() and not cache_files.is_owned_by_user(path.stat()):
             return  # somebody else's, who would find it changed
         try:
-            cache_files.write(path, purpose, dumps(self.reduce(made)))
+            cache_files.write_cache_file(path, purpose, dumps(self.reduce(made)))
         except OSError as error:
             about = (
                 f"kernels cannot be kept in {self.cache_path} ({error.strerror or error}): each process compiles them"
             )
-            cache_files.say_once("unwritable", about)
+            cache_files.warn_once("unwritable", about)
 
     @cached_property
     def _name(self) -> str:
@@ -122,7 +122,7 @@ class WholeCache(_Cache):
         return CompileResult._rebuild(target_context, *kept)
 
 
-class StandingCache(_Cache):
+class SharedCache(_Cache):
     """The machine codes of one kernel that stands: without their IR, since nothing is linked with it."""
 
     kind = "-standing"  # its file is not that of the whole of the same kernel
@@ -139,16 +139,16 @@ class StandingCache(_Cache):
         called, origin, code, about, signature = payload
         for each in called:
             each.load()
-        library = StandingLibrary(target_context.codegen(), about.qualname)
+        library = SharedLibrary(target_context.codegen(), about.qualname)
         library.called, library.origin = called, origin
         library.take(code)
         return compile_result(
             target_context=target_context, fndesc=about, library=library, signature=signature, objectmode=False,
-            entry_point=made_known(target_context, about, Environment.from_fndesc(about), library),
+            entry_point=register_library(target_context, about, Environment.from_fndesc(about), library),
         )  # fmt: skip
 
 
-def made_known(target_context, about, environment, library):
+def register_library(target_context, about, environment, library):
     """Have Numba, which knows functions by their entry points, know a kernel under one that must not be called."""
     entry = _dynfunc.make_function(about.lookup_module(), about.qualname, "", 0, environment, (library,))
     target_context.insert_user_function(entry, about, [library])

@@ -37,10 +37,10 @@ from numba.core.registry import CPUDispatcher
 from numba.core.sigutils import normalize_signature
 from numba.core.typed_passes import NativeLowering, NoPythonBackend
 
-from physics.kernels.compile.fused.code_libraries import Origin, PartLibrary, StandingLibrary, WholeLibrary
-from physics.kernels.compile.fused.disk_cache import StandingCache, WholeCache, made_known
-from physics.kernels.compile.fused.lowering import PartLowering, UsersLowering, WholeLowering
-from physics.kernels.compile.fused.memoised_contexts import RememberingTarget, remembering
+from physics.kernels.compile.fused.code_libraries import KernelOrigin, PartLibrary, SharedLibrary, WholeLibrary
+from physics.kernels.compile.fused.disk_cache import SharedCache, WholeCache, register_library
+from physics.kernels.compile.fused.lowering import PartLowering, UserLowering, WholeLowering
+from physics.kernels.compile.fused.memoised_contexts import MemoisedTarget, memoised
 from physics.kernels.compile.fused.passes import KernelPasses
 
 
@@ -74,7 +74,7 @@ class _WholeCompiler(CompilerBase):
     def __init__(self, typingctx, targetctx, library, args, return_type, flags, local_types):
         flags = _Flags(flags)
         flags.types = hashlib.sha256(str(args).encode()).hexdigest()[:16]
-        contexts = remembering(typingctx), RememberingTarget(targetctx)
+        contexts = memoised(typingctx), MemoisedTarget(targetctx)
         super().__init__(*contexts, library, args, return_type, flags, local_types)
         self.state.flags.no_cfunc_wrapper = not self.is_entered
 
@@ -101,7 +101,7 @@ class _KeepAsPart(LoweringPass):
     def run_pass(self, state):
         lowered = state["cr"]
         about = lowered.fndesc
-        entry = made_known(state.targetctx, about, lowered.env, state.library)
+        entry = register_library(state.targetctx, about, lowered.env, state.library)
         state["cr"] = lowered._replace(cfunc=entry)
         return True
 
@@ -121,16 +121,16 @@ class _PartCompiler(_WholeCompiler):
         return _passes(PartLowering, _KeepAsPart, NoPythonBackend)
 
 
-class _StandingCompiler(_PartCompiler):
+class _SharedCompiler(_PartCompiler):
     """Up to machine code, under a name that is the same in all processes: what calls it was made in any of them."""
 
-    library_class = StandingLibrary
+    library_class = SharedLibrary
 
     def define_pipelines(self):
         about = self.state.func_id
         about.unique_id = 0
         pipelines = super().define_pipelines()
-        self.state.library.origin = Origin(about.modname, about.func_qualname, self.state.args)
+        self.state.library.origin = KernelOrigin(about.modname, about.func_qualname, self.state.args)
         return pipelines
 
 
@@ -139,9 +139,9 @@ class _AnyPartCompiler(_PartCompiler):
 
     def passes(self):
         pipeline = DefaultPassBuilder.define_nopython_pipeline(self.state)
-        own = {NativeLowering: UsersLowering}
+        own = {NativeLowering: UserLowering}
         pipeline.passes = [(own.get(each, each), about) for each, about in pipeline.passes]
-        pipeline.add_pass_after(_KeepAsPart, UsersLowering)
+        pipeline.add_pass_after(_KeepAsPart, UserLowering)
         pipeline.finalize()
         return pipeline
 
@@ -162,19 +162,19 @@ class _Part(CPUDispatcher):
         return self.overloads[args].entry_point
 
 
-class _Standing(_Part):
+class _Shared(_Part):
     """A kernel that other kernels call, with machine code of its own."""
 
     def enable_caching(self, folder=None):
         """Keep it on disk, in a folder."""
-        self._cache = StandingCache(self.py_func, folder)
+        self._cache = SharedCache(self.py_func, folder)
 
     def compile(self, sig):
         """Have the machine code for the types of its arguments, from disk or new."""
         args, _ = normalize_signature(sig)
         if args not in self.overloads:
             with global_compiler_lock:
-                kept = self._cache.load_overload(args, RememberingTarget(self.targetctx))
+                kept = self._cache.load_overload(args, MemoisedTarget(self.targetctx))
                 if kept is None:
                     super().compile(sig)
                     self._cache.save_overload(args, self.overloads[args])
@@ -183,9 +183,9 @@ class _Standing(_Part):
         return self.overloads[args].entry_point
 
 
-PART = _Part, _PartCompiler
-STANDING = _Standing, _StandingCompiler
-FOREIGN = CPUDispatcher, _AnyPartCompiler  # may be more than a kernel is, and is only called from kernels
+PART_KIND = _Part, _PartCompiler
+SHARED_KIND = _Shared, _SharedCompiler
+FOREIGN_KIND = CPUDispatcher, _AnyPartCompiler  # may be more than a kernel is, and is only called from kernels
 
 
 class Kernel(CPUDispatcher):
@@ -199,12 +199,12 @@ class Kernel(CPUDispatcher):
     options : dict
         Numba's options, as of `numba.njit`.
     called_as : tuple
-        What it is for other kernels: `PART`, `FOREIGN` or `STANDING`.
+        What it is for other kernels: `PART_KIND`, `FOREIGN_KIND` or `SHARED_KIND`.
     """
 
     part_pipeline = _PartCompiler
 
-    def __init__(self, function, local_types=None, options=None, called_as=PART):
+    def __init__(self, function, local_types=None, options=None, called_as=PART_KIND):
         super().__init__(function, local_types, options, pipeline_class=_WholeCompiler)
         dispatcher, compiler = called_as
         self._make_part = lambda: dispatcher(function, local_types, options, pipeline_class=compiler)
@@ -213,12 +213,12 @@ class Kernel(CPUDispatcher):
     def renew(self) -> None:
         """Forget what is compiled for other kernels: what the function reads around it has changed."""
         self._part = self._make_part()
-        RememberingTarget.forget(types.Dispatcher(self))
+        MemoisedTarget.forget(types.Dispatcher(self))
 
     def enable_caching(self, folder=None):
         """Keep its machine code on disk, in a folder."""
         self._cache = WholeCache(self.py_func, folder)
-        if isinstance(self._part, _Standing):
+        if isinstance(self._part, _Shared):
             self._part.enable_caching(folder)
 
     def stand(self, args: tuple) -> None:

@@ -10,14 +10,14 @@ from llvmlite import ir
 from numba.core import cgutils
 
 WORD = ir.IntType(64)
-INSIDE = ("nsw",)  # no index and no number of a range is beyond what a word holds
+NO_SIGNED_WRAP = ("nsw",)  # no index and no number of a range is beyond what a word holds
 
 
 def _position(indices) -> tuple[int, ...]:
     return (indices,) if isinstance(indices, int) else tuple(indices)
 
 
-class Elsewhere:
+class StructInMemory:
     """A structure in memory that nobody changes while a function runs, of which nothing has been read yet.
 
     Parameters
@@ -29,7 +29,7 @@ class Elsewhere:
     def __init__(self, address):
         self.address = address
         self.type = address.type.pointee
-        self._members: dict[int, Elsewhere | ir.Value] = {}
+        self._members: dict[int, StructInMemory | ir.Value] = {}
 
     def member(self, builder: ir.IRBuilder, k: int):
         """A member: read at the entry of the function, once, unless it is a structure again."""
@@ -37,7 +37,7 @@ class Elsewhere:
             with builder.goto_entry_block():
                 address = builder.gep(self.address, [ir.Constant(ir.IntType(32), n) for n in (0, k)], inbounds=True)
                 is_word = not isinstance(address.type.pointee, ir.Aggregate)
-                self._members[k] = builder.load(address) if is_word else Elsewhere(address)
+                self._members[k] = builder.load(address) if is_word else StructInMemory(address)
         return self._members[k]
 
     def read(self, builder: ir.IRBuilder):
@@ -50,7 +50,7 @@ def member_type(type_: ir.Type, k: int) -> ir.Type:
     return type_.gep(ir.Constant(ir.IntType(32), k))
 
 
-class Together:
+class StructByMembers:
     """A structure of which only the members are known: written down as one value only where all of it is needed.
 
     Parameters
@@ -73,7 +73,7 @@ class Together:
         k, *within = position
         if within:
             value = builder.insert_value(self.member(builder, k), value, within)
-        return Together(self.type, (*self._members[:k], value, *self._members[k + 1 :]))
+        return StructByMembers(self.type, (*self._members[:k], value, *self._members[k + 1 :]))
 
     def read(self, builder: ir.IRBuilder):
         """All of it, as a value."""
@@ -85,9 +85,9 @@ class Together:
         return whole
 
 
-def together(builder: ir.IRBuilder, type_: ir.Type, members):
+def make_struct(builder: ir.IRBuilder, type_: ir.Type, members):
     """A structure of these members, for our builder or Numba's."""
-    structure = Together(type_, members)
+    structure = StructByMembers(type_, members)
     return structure if isinstance(builder, FoldingBuilder) else structure.read(builder)
 
 
@@ -95,31 +95,31 @@ def _is_constant(value) -> bool:
     return isinstance(value, ir.Constant)
 
 
-def _taken_apart(value):
+def _split_constant(value):
     """A constant structure by its members; anything else as it is."""
     if not _is_constant(value) or not isinstance(value.type, ir.Aggregate):
         return value
     known = value.constant if isinstance(value.constant, (list, tuple)) else None
     if known is None and value.constant is not ir.Undefined:
         return value
-    return Together(value.type, known or [None] * len(value.type))
+    return StructByMembers(value.type, known or [None] * len(value.type))
 
 
 class FoldingBuilder(ir.IRBuilder):
-    """LLVM's builder for structures known by their members, products and sums with nothing to compute, and `fused`."""
+    """LLVM's builder, with structures known by their members, constants folded, and `fused_multiply_add`."""
 
     def extract_value(self, agg, idx, name=""):
         """A member of a structure: the one that was put in, if that is known."""
         position = _position(idx)
-        agg = _taken_apart(agg)
-        while position and isinstance(agg, (Elsewhere, Together)):
-            agg, position = _taken_apart(agg.member(self, position[0])), position[1:]
+        agg = _split_constant(agg)
+        while position and isinstance(agg, (StructInMemory, StructByMembers)):
+            agg, position = _split_constant(agg.member(self, position[0])), position[1:]
         return super().extract_value(agg, position, name) if position else agg
 
     def insert_value(self, agg, value, idx, name=""):
         """A structure with one member changed."""
-        agg = _taken_apart(agg)
-        if isinstance(agg, Together):
+        agg = _split_constant(agg)
+        if isinstance(agg, StructByMembers):
             return agg.changed(self, value, _position(idx))
         return super().insert_value(_as_value(self, agg), _as_value(self, value), _position(idx), name)
 
@@ -140,18 +140,22 @@ class FoldingBuilder(ir.IRBuilder):
         return super().ret(_as_value(self, value))
 
     def fadd(self, lhs, rhs, name="", flags=()):
-        """Sum of numbers, or of lanes. A product in it is `fused`, of two the second."""
+        """Sum of numbers, or of lanes. A product in it is `fused_multiply_add`, of two the second."""
         left, right = _factors(lhs), _factors(rhs)
         if right:
-            return fused(self, *right, lhs)
-        return fused(self, *left, rhs) if left else super().fadd(lhs, rhs, name, flags)
+            return fused_multiply_add(self, *right, lhs)
+        return fused_multiply_add(self, *left, rhs) if left else super().fadd(lhs, rhs, name, flags)
 
     def fsub(self, lhs, rhs, name="", flags=()):
-        """Difference of numbers, or of lanes. A product in it is `fused`; of two none, so that equal ones leave 0."""
+        """Difference of numbers, or of lanes: a single product is fused; of two none, so that equal ones leave 0."""
         left, right = _factors(lhs), _factors(rhs)
         if bool(left) == bool(right):
             return super().fsub(lhs, rhs, name, flags)
-        return fused(self, self.fneg(right[0]), right[1], lhs) if right else fused(self, *left, self.fneg(rhs))
+        return (
+            fused_multiply_add(self, self.fneg(right[0]), right[1], lhs)
+            if right
+            else fused_multiply_add(self, *left, self.fneg(rhs))
+        )
 
     def mul(self, lhs, rhs, name="", flags=()):
         """Product of integers."""
@@ -180,7 +184,7 @@ def _factors(value) -> tuple:
     return tuple(value.operands) if is_product and value.type != ir.FloatType() else ()
 
 
-def fused(builder, a, b, c):
+def fused_multiply_add(builder, a, b, c):
     """a b + c, rounded once: one instruction, and the same to the last bit on every processor.
 
     That is said here and not left to LLVM (its flag `contract`), which would do so in one kernel and not in another,
@@ -192,7 +196,7 @@ def fused(builder, a, b, c):
 
 
 def _as_value(builder, value):
-    return value.read(builder) if isinstance(value, (Elsewhere, Together)) else value
+    return value.read(builder) if isinstance(value, (StructInMemory, StructByMembers)) else value
 
 
 def _is_number(value) -> bool:
@@ -203,17 +207,17 @@ def _is(value, number: int) -> bool:
     return _is_number(value) and value.constant == number
 
 
-def word(value: int) -> ir.Constant:
+def word_constant(value: int) -> ir.Constant:
     """A known word."""
     return ir.Constant(WORD, value)
 
 
-def constant_of(value):
+def known_integer(value):
     """The integer that a value is known to be, or None."""
     return value.constant if _is_number(value) else None
 
 
-def slot(builder: ir.IRBuilder, type_: ir.Type):
+def stack_slot(builder: ir.IRBuilder, type_: ir.Type):
     """Memory of a variable, for as long as its function runs; what is in it at first is not defined."""
     with builder.goto_entry_block():
         return builder.alloca(type_)

@@ -18,8 +18,8 @@ from numba.core.lowering import Lower
 from numba.core.typed_passes import NativeLowering
 
 from physics.kernels.compile.fused.calling_convention import MayRaise, ValueDescriptor
-from physics.kernels.compile.fused.folding_builder import FoldingBuilder, slot
-from physics.kernels.compile.fused.prepared_entry import write_ready_entry
+from physics.kernels.compile.fused.folding_builder import FoldingBuilder, stack_slot
+from physics.kernels.compile.fused.prepared_entry import write_prepared_entry
 
 
 class _KernelLower(Lower):
@@ -33,7 +33,7 @@ class _KernelLower(Lower):
 
     def create_cfunc_wrapper(self):
         """The entry for machine code, in place of Numba's for C; see `prepared_entry`."""
-        write_ready_entry(self.context, self.library, self.fndesc)
+        write_prepared_entry(self.context, self.library, self.fndesc)
 
     def _find_singly_assigned_variable(self):
         times = Counter(
@@ -75,7 +75,7 @@ class _KernelLower(Lower):
 
     def alloca_lltype(self, name, lltype, datamodel=None):
         """Memory of a variable that is assigned more than once."""
-        return slot(self.builder, lltype)
+        return stack_slot(self.builder, lltype)
 
     def storevar(self, value, name, argidx=None):
         """Give a variable a value."""
@@ -94,7 +94,7 @@ class _ValueLower(_KernelLower):
         super().setup_function(fndesc)
 
 
-class _UsersLower(Lower):
+class _UserLower(Lower):
     """Numba's lowering of a user's function, which remembers at which statement it is: for exceptions."""
 
     def lower_inst(self, inst):
@@ -104,11 +104,11 @@ class _UsersLower(Lower):
 
 
 @register_pass(mutates_CFG=True, analysis_only=False)
-class UsersLowering(NativeLowering):
+class UserLowering(NativeLowering):
     """The pass in which a user's function is lowered."""
 
     _name = "users_lowering"
-    lowering_class = _UsersLower
+    lowering_class = _UserLower
 
 
 @register_pass(mutates_CFG=True, analysis_only=False)

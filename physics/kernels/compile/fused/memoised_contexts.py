@@ -30,7 +30,7 @@ from physics.kernels.compile.fused.folding_builder import FoldingBuilder
 from physics.kernels.compile.fused.operation_table import lowering_of, signature_of
 
 
-class RememberingTyping(typing.Context):
+class MemoisedTyping(typing.Context):
     """Typing context of Numba that remembers its answers.
 
     Parameters
@@ -58,14 +58,14 @@ class RememberingTyping(typing.Context):
 
 
 @cache
-def remembering(context: typing.Context) -> RememberingTyping:
+def memoised(context: typing.Context) -> MemoisedTyping:
     """The one that remembers for a context: Numba keeps what it compiles of its own by the context it was asked in."""
-    return RememberingTyping(context)
+    return MemoisedTyping(context)
 
 
 def _get_call_type(function, context, args, kws, asked=types.Function.get_call_type):
     """Signature of a built-in function for arguments of these types: `types.Function.get_call_type`."""
-    if kws or not isinstance(context, RememberingTyping):
+    if kws or not isinstance(context, MemoisedTyping):
         return asked(function, context, args, kws)
     key = (function, tuple(args))
     found = context.signatures.get(key)
@@ -79,7 +79,7 @@ def _get_call_type(function, context, args, kws, asked=types.Function.get_call_t
 types.Function.get_call_type = _get_call_type
 
 
-class RememberingTarget(CPUContext):
+class MemoisedTarget(CPUContext):
     """Target context that lowers operations as Numba does, or as kernels do where that takes fewer instructions.
 
     Parameters
@@ -105,7 +105,7 @@ class RememberingTarget(CPUContext):
     @property
     def typing_context(self):
         """The context of types that remembers."""
-        return remembering(self.__dict__["typing_context"])
+        return memoised(self.__dict__["typing_context"])
 
     def mangler(self, name, types, *, abi_tags=(), uid=None):
         """Name of a symbol; that of a kernel that stands (`uid` 0) is the same in all processes.
@@ -122,7 +122,7 @@ class RememberingTarget(CPUContext):
         lowering = self.lowerings.get(key)
         if lowering is None:
             lower = lowering_of(fn, sig)
-            lowering = self.numba_function(fn, sig) if lower is None else _bound(lower, self, fn, sig)
+            lowering = self.numba_function(fn, sig) if lower is None else _bind_lowering(lower, self, fn, sig)
             self.lowerings[key] = lowering
         return lowering
 
@@ -141,12 +141,12 @@ class RememberingTarget(CPUContext):
     @property
     def call_conv(self):
         """Calling convention of functions."""
-        return calling_convention.Convention(self)
+        return calling_convention.ValueCallConv(self)
 
     def declare_function(self, module, fndesc):
         """A function in a module that defines or calls it."""
-        if calling_convention.gives_value(fndesc):
-            return calling_convention.declare(self, module, fndesc)
+        if calling_convention.returns_value(fndesc):
+            return calling_convention.declare_value_function(self, module, fndesc)
         return super().declare_function(module, fndesc)
 
     def get_arg_packer(self, fe_args):
@@ -172,8 +172,8 @@ class RememberingTarget(CPUContext):
 
         def call(context, builder, sig, args):
             is_kernel = isinstance(builder, FoldingBuilder) and not isinstance(fndesc.restype, types.Optional)
-            if is_kernel or calling_convention.gives_value(fndesc):
-                return calling_convention.call(context, builder, fndesc, args)
+            if is_kernel or calling_convention.returns_value(fndesc):
+                return calling_convention.call_value_function(context, builder, fndesc, args)
             return numbas_call(context, builder, sig, args)
 
         numbas_call = user_function(fndesc, libs)
@@ -188,7 +188,7 @@ class RememberingTarget(CPUContext):
         return size
 
 
-def _bound(lower: Callable, context: RememberingTarget, fn, sig) -> Callable:
+def _bind_lowering(lower: Callable, context: MemoisedTarget, fn, sig) -> Callable:
     """A lowering of ours, to be called as Numba calls its own."""
 
     def lowered(builder, args, loc=None):

@@ -96,7 +96,7 @@ class _NoPhis(PreLowerStripPhis):
         return True
 
 
-TO_TYPES = (
+_TYPING_PASSES = (
     _FromByteCode,
     FixupArgs,
     RewriteSemanticConstants,
@@ -121,7 +121,7 @@ class KernelPasses(PassManager):
 
     def __init__(self, *at_last: type):
         super().__init__("nopython")
-        for each in (*TO_TYPES, *at_last):
+        for each in (*_TYPING_PASSES, *at_last):
             self.add_pass(each, each.__name__)
         self.finalize()
 

@@ -13,30 +13,30 @@ from llvmlite import ir
 from numba.core import types
 from numba.core.callconv import excinfo_ptr_t
 
-from physics.kernels.compile.fused.folding_builder import WORD, Elsewhere, FoldingBuilder, word
+from physics.kernels.compile.fused.folding_builder import WORD, FoldingBuilder, StructInMemory, word_constant
 
 WORD_SIZE = 8  # [bytes]
-STATUS = ir.IntType(32)
-ENTRY = ir.FunctionType(STATUS, [WORD.as_pointer(), excinfo_ptr_t.as_pointer()])
+STATUS_TYPE = ir.IntType(32)
+ENTRY_TYPE = ir.FunctionType(STATUS_TYPE, [WORD.as_pointer(), excinfo_ptr_t.as_pointer()])
 
 
-def write_ready_entry(context, library, about) -> None:
+def write_prepared_entry(context, library, about) -> None:
     """Add the second entry of a kernel to its library."""
     if about.restype != types.none:
         return
     module = context.create_module("ready")
     kernel = context.declare_function(module, about)
-    entry = ir.Function(module, ENTRY, about.llvm_cfunc_wrapper_name)
+    entry = ir.Function(module, ENTRY_TYPE, about.llvm_cfunc_wrapper_name)
     builder = FoldingBuilder(entry.append_basic_block())
     values, place = [], 0
     for type_ in about.argtypes:
         form = context.get_value_type(type_)
-        address = builder.bitcast(builder.gep(entry.args[0], [word(place)]), form.as_pointer())
-        values.append(Elsewhere(address) if isinstance(form, ir.Aggregate) else builder.load(address))
+        address = builder.bitcast(builder.gep(entry.args[0], [word_constant(place)]), form.as_pointer())
+        values.append(StructInMemory(address) if isinstance(form, ir.Aggregate) else builder.load(address))
         place += -(-context.get_abi_sizeof(form) // WORD_SIZE)
     status, _ = context.call_conv.call_function(builder, kernel, about.restype, about.argtypes, values)
     with builder.if_then(status.is_error):
         builder.store(status.excinfoptr, entry.args[1])
         builder.ret(status.code)
-    builder.ret(STATUS(0))
+    builder.ret(STATUS_TYPE(0))
     library.add_ir_module(module)

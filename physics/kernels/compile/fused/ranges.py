@@ -6,38 +6,47 @@ from collections.abc import Callable
 
 from numba.core import types, typing
 
-from physics.kernels.compile.fused.folding_builder import INSIDE, WORD, constant_of, slot, together, word
+from physics.kernels.compile.fused.folding_builder import (
+    NO_SIGNED_WRAP,
+    WORD,
+    known_integer,
+    make_struct,
+    stack_slot,
+    word_constant,
+)
 
 
 def _count(context, builder, sig, args):
     """`range(stop)`, `range(start, stop)` or `range(start, stop, step)`."""
-    start, stop, step = (word(0), args[0], word(1)) if len(args) == 1 else (*args, word(1))[:3]
-    return together(builder, context.get_value_type(sig.return_type), [start, stop, step])
+    start, stop, step = (
+        (word_constant(0), args[0], word_constant(1)) if len(args) == 1 else (*args, word_constant(1))[:3]
+    )
+    return make_struct(builder, context.get_value_type(sig.return_type), [start, stop, step])
 
 
 def _iterate(context, builder, sig, args):
     """An iterator over a range: where its next number is, the end, the step, and where the count of those left is."""
     start, stop, step = (builder.extract_value(args[0], k) for k in range(3))
-    stride = constant_of(step)
+    stride = known_integer(step)
     if not stride:
         return NotImplemented
-    members = slot(builder, WORD), stop, step, slot(builder, WORD)
+    members = stack_slot(builder, WORD), stop, step, stack_slot(builder, WORD)
     builder.store(start, members[0])
     left = builder.sub(stop, start) if stride > 0 else builder.sub(start, stop)  # none is left if it is negative
     if abs(stride) > 1:
-        left = builder.sdiv(builder.add(left, word(abs(stride) - 1)), word(abs(stride)))
+        left = builder.sdiv(builder.add(left, word_constant(abs(stride) - 1)), word_constant(abs(stride)))
     builder.store(left, members[3])
-    return together(builder, context.get_value_type(sig.return_type), members)
+    return make_struct(builder, context.get_value_type(sig.return_type), members)
 
 
 def _advance(context, builder, sig, args):
     """The next number, and whether there is one."""
     following, step, left = (builder.extract_value(args[0], k) for k in (0, 2, 3))
     number, left_before = builder.load(following), builder.load(left)
-    builder.store(builder.add(number, step, flags=INSIDE), following)
-    builder.store(builder.sub(left_before, word(1), flags=INSIDE), left)
-    valid = builder.icmp_signed(">", left_before, word(0))
-    return together(builder, context.get_value_type(sig.return_type), [number, valid])
+    builder.store(builder.add(number, step, flags=NO_SIGNED_WRAP), following)
+    builder.store(builder.sub(left_before, word_constant(1), flags=NO_SIGNED_WRAP), left)
+    valid = builder.icmp_signed(">", left_before, word_constant(0))
+    return make_struct(builder, context.get_value_type(sig.return_type), [number, valid])
 
 
 def lowering(key, sig: typing.Signature) -> Callable | None:

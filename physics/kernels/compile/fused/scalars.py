@@ -8,7 +8,7 @@ from collections.abc import Callable
 from numba.core import types, typing
 from numba.cpython.builtins import do_minmax
 
-from physics.kernels.compile.fused.folding_builder import constant_of
+from physics.kernels.compile.fused.folding_builder import known_integer
 
 
 def _maximum(context, builder, sig, args):
@@ -27,7 +27,7 @@ def _to_integer(context, builder, sig, args):
 
 def _power(context, builder, sig, args):
     """`x ** n`: for an n that is written down the products that Numba takes in a loop."""
-    base, exponent = args[0], constant_of(args[1])
+    base, exponent = args[0], known_integer(args[1])
     if not exponent or exponent < 0:
         return NotImplemented
     result = None
@@ -39,7 +39,7 @@ def _power(context, builder, sig, args):
     return result
 
 
-OF_NUMBERS = {max: _maximum, min: _minimum, int: _to_integer}
+_SCALAR_FUNCTIONS = {max: _maximum, min: _minimum, int: _to_integer}
 
 
 def _are_numbers(args) -> bool:
@@ -48,7 +48,7 @@ def _are_numbers(args) -> bool:
 
 def signature(key, context, args) -> typing.Signature | None:
     """Signature of `max`, `min` or `int` of numbers, or None."""
-    if key not in OF_NUMBERS or (len(args) == 1) != (key is int):
+    if key not in _SCALAR_FUNCTIONS or (len(args) == 1) != (key is int):
         return None
     args = tuple(map(types.unliteral, args))
     if not _are_numbers(args):
@@ -60,8 +60,8 @@ def signature(key, context, args) -> typing.Signature | None:
 
 def lowering(key, sig: typing.Signature) -> Callable | None:
     """Return the function that lowers a function of numbers."""
-    if key in OF_NUMBERS and _are_numbers(sig.args):
-        return OF_NUMBERS[key]
+    if key in _SCALAR_FUNCTIONS and _are_numbers(sig.args):
+        return _SCALAR_FUNCTIONS[key]
     if key is operator.pow and isinstance(sig.args[0], types.Float) and isinstance(sig.args[1], types.Integer):
         return _power
     return None

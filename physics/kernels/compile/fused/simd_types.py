@@ -14,7 +14,7 @@ from numba.extending import register_model
 
 from physics.kernels.compile import simd
 from physics.kernels.compile.fused import array_elements
-from physics.kernels.compile.fused.folding_builder import WORD, word
+from physics.kernels.compile.fused.folding_builder import WORD, word_constant
 
 _DOUBLE, _INDEX = ir.DoubleType(), ir.IntType(32)
 
@@ -28,14 +28,14 @@ class LanesType(types.Type):
         super().__init__("lanes")
 
 
-class MarksType(types.Type):
+class MaskType(types.Type):
     """Type of four truth values."""
 
     def __init__(self):
         super().__init__("marks")
 
 
-LANES, MARKS = LanesType(), MarksType()
+LANES, MASK = LanesType(), MaskType()
 
 
 def _model_of(type_: type, one: ir.Type) -> None:
@@ -44,11 +44,11 @@ def _model_of(type_: type, one: ir.Type) -> None:
     @register_model(type_)
     class Model(data_models.PrimitiveModel):
         def __init__(self, manager, type_):
-            super().__init__(manager, type_, ir.VectorType(one, simd.WIDTH))
+            super().__init__(manager, type_, ir.VectorType(one, simd.LANE_COUNT))
 
 
 _model_of(LanesType, _DOUBLE)
-_model_of(MarksType, ir.IntType(1))
+_model_of(MaskType, ir.IntType(1))
 
 
 # --- of what type ------------------------------------------------------------------------------------------------
@@ -57,10 +57,19 @@ _SUMS = {operator.add: "fadd", operator.sub: "fsub", operator.mul: "fmul", opera
 _ORDERS = {operator.lt: "<", operator.le: "<=", operator.gt: ">", operator.ge: ">=", operator.eq: "=="}
 _BOTH = {operator.and_: "and_", operator.or_: "or_"}
 _OF_TWO = (simd.larger, simd.smaller)
-_OF_ALL = (simd.total, simd.largest, simd.least)
-_OF_EACH = (operator.neg, abs, simd.root)
-_ROWS = (simd.row, simd.put_row)
-_NAMED = (simd.Lanes, simd.root, simd.chosen, simd.first_of, simd.totals, *_OF_TWO, *_OF_ALL, *_ROWS)
+_OF_ALL = (simd.lane_sum, simd.max_of_lanes, simd.min_of_lanes)
+_OF_EACH = (operator.neg, abs, simd.lane_sqrt)
+_ROWS = (simd.load_lanes, simd.store_lanes)
+_NAMED = (
+    simd.Lanes,
+    simd.lane_sqrt,
+    simd.select_lanes,
+    simd.first_true_lane,
+    simd.lane_sums,
+    *_OF_TWO,
+    *_OF_ALL,
+    *_ROWS,
+)
 
 
 def _are_numbers(args) -> bool:
@@ -84,28 +93,28 @@ def _is_place_of_row(args) -> bool:
 def _result(key, args) -> types.Type | None:
     """Type of the result of an operation, or None where it is none of ours."""
     if key is simd.Lanes:
-        return LANES if len(args) == simd.WIDTH and _are_numbers(args) else None
-    if key is simd.chosen and args[0] is types.boolean:
+        return LANES if len(args) == simd.LANE_COUNT and _are_numbers(args) else None
+    if key is simd.select_lanes and args[0] is types.boolean:
         return types.float64 if _are_numbers(args[1:]) else None
-    if key is simd.chosen:
-        return LANES if args[0] is MARKS and (_are_lanes(args[1:]) or _are_numbers(args[1:])) else None
-    if key is simd.first_of or key is operator.invert:
-        return (types.intp if key is simd.first_of else MARKS) if args == (MARKS,) else None
+    if key is simd.select_lanes:
+        return LANES if args[0] is MASK and (_are_lanes(args[1:]) or _are_numbers(args[1:])) else None
+    if key is simd.first_true_lane or key is operator.invert:
+        return (types.intp if key is simd.first_true_lane else MASK) if args == (MASK,) else None
     if key in _BOTH:
-        return MARKS if args == (MARKS, MARKS) else None
+        return MASK if args == (MASK, MASK) else None
     if key in _ROWS:
-        result = LANES if key is simd.row else types.none
+        result = LANES if key is simd.load_lanes else types.none
         return result if _is_place_of_row(args[:3]) and _are_lanes((LANES, *args[3:])) else None
-    if (key is simd.root or key in _OF_TWO) and _are_numbers(args):
+    if (key is simd.lane_sqrt or key in _OF_TWO) and _are_numbers(args):
         return types.float64
-    if key is simd.totals:
-        return LANES if len(args) == simd.WIDTH and _are_lanes((LANES, *args)) else None
+    if key is simd.lane_sums:
+        return LANES if len(args) == simd.LANE_COUNT and _are_lanes((LANES, *args)) else None
     if not _are_lanes(args[:2]):
         return None
     if key is operator.getitem or key in _OF_ALL:
         return types.float64
     if key in _ORDERS:
-        return MARKS
+        return MASK
     return LANES if key in _SUMS or key in _OF_TWO or key in _OF_EACH else None
 
 
@@ -139,9 +148,11 @@ def _spread(builder, value):
     """A number four times; lanes as they are."""
     if isinstance(value.type, ir.VectorType):
         return value
-    nothing = ir.Constant(ir.VectorType(value.type, simd.WIDTH), ir.Undefined)
+    nothing = ir.Constant(ir.VectorType(value.type, simd.LANE_COUNT), ir.Undefined)
     first = builder.insert_element(nothing, value, _INDEX(0))
-    return builder.shuffle_vector(first, nothing, ir.Constant(ir.VectorType(_INDEX, simd.WIDTH), [0] * simd.WIDTH))
+    return builder.shuffle_vector(
+        first, nothing, ir.Constant(ir.VectorType(_INDEX, simd.LANE_COUNT), [0] * simd.LANE_COUNT)
+    )
 
 
 def _make(context, builder, sig, args):
@@ -177,13 +188,13 @@ def _negate(context, builder, sig, args):
 
 
 def _not(context, builder, sig, args):
-    return builder.xor(args[0], ir.Constant(args[0].type, [1] * simd.WIDTH))
+    return builder.xor(args[0], ir.Constant(args[0].type, [1] * simd.LANE_COUNT))
 
 
 def _call(name, context, builder, sig, args):
     """A function of LLVM's for vectors and numbers."""
     type_ = args[0].type
-    width = f"v{simd.WIDTH}" if isinstance(type_, ir.VectorType) else ""
+    width = f"v{simd.LANE_COUNT}" if isinstance(type_, ir.VectorType) else ""
     function = cgutils.get_or_insert_function(
         builder.module, ir.FunctionType(type_, [type_]), f"llvm.{name}.{width}f64"
     )
@@ -193,16 +204,16 @@ def _call(name, context, builder, sig, args):
 def _place_of_row(context, builder, sig, args):
     """Pointer to four numbers of a table."""
     if context.enable_boundscheck:
-        array_elements.pointer(
+        array_elements.element_pointer(
             context, builder, sig.args[0], args[0], sig.args[1:3], [args[1], _last(builder, args[2])]
         )
-    place = array_elements.pointer(context, builder, sig.args[0], args[0], sig.args[1:3], args[1:3])
+    place = array_elements.element_pointer(context, builder, sig.args[0], args[0], sig.args[1:3], args[1:3])
     return builder.bitcast(place, context.get_value_type(LANES).as_pointer())
 
 
 def _last(builder, first):
     """Column of the last number of a row."""
-    return builder.add(first, word(simd.WIDTH - 1))
+    return builder.add(first, word_constant(simd.LANE_COUNT - 1))
 
 
 def _read_row(context, builder, sig, args):
@@ -222,7 +233,7 @@ def _totals(context, builder, sig, args):
 
     def joined(x, y, first, second):
         parts = [
-            builder.shuffle_vector(x, y, ir.Constant(ir.VectorType(_INDEX, simd.WIDTH), which))
+            builder.shuffle_vector(x, y, ir.Constant(ir.VectorType(_INDEX, simd.LANE_COUNT), which))
             for which in (first, second)
         ]
         return builder.fadd(*parts)
@@ -256,9 +267,9 @@ def _extreme(order, context, builder, sig, args):
 
 def _first(context, builder, sig, args):
     """`first_of`: of four bits that are a number, how many are zero before the first one."""
-    bits = builder.bitcast(args[0], ir.IntType(simd.WIDTH))
+    bits = builder.bitcast(args[0], ir.IntType(simd.LANE_COUNT))
     place = builder.cttz(builder.zext(bits, WORD), ir.IntType(1)(0))
-    return builder.select(builder.icmp_unsigned("==", bits, bits.type(0)), word(-1), place)
+    return builder.select(builder.icmp_unsigned("==", bits, bits.type(0)), word_constant(-1), place)
 
 
 def _read(context, builder, sig, args):
@@ -268,17 +279,17 @@ def _read(context, builder, sig, args):
 
 _LOWERINGS = {
     simd.Lanes: _make,
-    simd.chosen: _choose,
-    simd.first_of: _first,
-    simd.root: partial(_call, "sqrt"),
-    simd.row: _read_row,
-    simd.put_row: _write_row,
-    simd.totals: _totals,
+    simd.select_lanes: _choose,
+    simd.first_true_lane: _first,
+    simd.lane_sqrt: partial(_call, "sqrt"),
+    simd.load_lanes: _read_row,
+    simd.store_lanes: _write_row,
+    simd.lane_sums: _totals,
     simd.larger: partial(_one_of_two, ">"),
     simd.smaller: partial(_one_of_two, "<"),
-    simd.total: _total,
-    simd.largest: partial(_extreme, ">"),
-    simd.least: partial(_extreme, "<"),
+    simd.lane_sum: _total,
+    simd.max_of_lanes: partial(_extreme, ">"),
+    simd.min_of_lanes: partial(_extreme, "<"),
     abs: partial(_call, "fabs"),
     operator.neg: _negate,
     operator.invert: _not,
@@ -290,5 +301,5 @@ _LOWERINGS = {
 
 def lowering(key, sig: typing.Signature) -> Callable | None:
     """Return the function that lowers an operation on lanes."""
-    is_ours = key in _NAMED or LANES in sig.args or MARKS in sig.args
+    is_ours = key in _NAMED or LANES in sig.args or MASK in sig.args
     return _LOWERINGS.get(key) if is_ours else None

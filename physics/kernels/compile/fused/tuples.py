@@ -8,7 +8,7 @@ from collections.abc import Callable
 from llvmlite import ir
 from numba.core import types, typing
 
-from physics.kernels.compile.fused.folding_builder import FoldingBuilder, member_type, together
+from physics.kernels.compile.fused.folding_builder import FoldingBuilder, make_struct, member_type
 
 
 def _is_numbers(type_: types.Type) -> bool:
@@ -66,7 +66,9 @@ def _put_together(builder, type_: ir.Type, words):
     """A tuple of tuples from its numbers."""
     if not isinstance(type_, ir.Aggregate):
         return next(words)
-    return together(builder, type_, [_put_together(builder, member_type(type_, k), words) for k in range(len(type_))])
+    return make_struct(
+        builder, type_, [_put_together(builder, member_type(type_, k), words) for k in range(len(type_))]
+    )
 
 
 def lowering(key, sig: typing.Signature) -> Callable | None:

@@ -33,19 +33,19 @@ def _cut(k, many):
 
 
 @inlined
-def strip(x, low, density, strips):
+def strip_index(x, low, density, strips):
     """The strip that coordinate x lies in."""
     return min(max(int((x - low) * density), 0), strips - 1)
 
 
 @inlined
-def columns_of(b, u, v, cuts, many):
+def body_strips(b, u, v, cuts, many):
     """First and last strips of body b along both axes: (u from, u to, v from, v to)."""
     box = many.box
     lu, du, nu, lv, dv, nv = cuts
     return (
-        strip(box[b, u], lu, du, nu), strip(box[b, u + 3], lu, du, nu),
-        strip(box[b, v], lv, dv, nv), strip(box[b, v + 3], lv, dv, nv),
+        strip_index(box[b, u], lu, du, nu), strip_index(box[b, u + 3], lu, du, nu),
+        strip_index(box[b, v], lv, dv, nv), strip_index(box[b, v + 3], lv, dv, nv),
     )  # fmt: skip
 
 
@@ -56,7 +56,7 @@ def _count_entries(u, v, cuts, many):
     for c in range(cuts[2] * cuts[5] + 1):
         first[c] = 0
     for b in range(many.box.shape[0]):
-        i_first, i_last, j_first, j_last = columns_of(b, u, v, cuts, many)
+        i_first, i_last, j_first, j_last = body_strips(b, u, v, cuts, many)
         for i in range(i_first, i_last + 1):
             for j in range(j_first, j_last + 1):
                 first[i * cuts[5] + j + 1] += 1
@@ -84,7 +84,7 @@ def fill_columns(u, v, many):
         cursor[c] = first[c]
     for r in range(many.order.shape[0]):
         b = many.order[r]
-        i_first, i_last, j_first, j_last = columns_of(b, u, v, cuts, many)
+        i_first, i_last, j_first, j_last = body_strips(b, u, v, cuts, many)
         for i in range(i_first, i_last + 1):
             for j in range(j_first, j_last + 1):
                 c = i * nv + j

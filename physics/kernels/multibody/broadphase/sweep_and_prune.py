@@ -13,24 +13,25 @@ from __future__ import annotations
 from physics.kernels.compile.decorators import inlined, kernel
 from physics.kernels.half_space import support_function as geo
 from physics.kernels.math import quaternion as qt
-from physics.kernels.multibody.broadphase.grid import columns_of, fill_columns
-from physics.kernels.multibody.data.arrays import LEFT_OUT, PAIRS
-from physics.kernels.multibody.data.contact_set import minus, pair_slop, vector
-from physics.kernels.state.layout import BLOCK, HULL, NORMAL, OFFSET, POS, SPHERE
+from physics.kernels.math.vector import row_vector
+from physics.kernels.multibody.broadphase.grid import body_strips, fill_columns
+from physics.kernels.multibody.data.arrays import NUM_DROPPED, NUM_PAIRS
+from physics.kernels.multibody.data.contact_set import pair_slop, subtract
+from physics.kernels.state.layout import BLOCK, HULL, POS, SPHERE, WALL_NORMAL, WALL_OFFSET
 
-# By how much more than at its first pace a body that turns far may do so; see `reach`.
-GROWTH = 1.5
+# By how much more than at its first pace a body that turns far may do so; see `surface_motion_bound`.
+_SPIN_GROWTH = 1.5
 
 
 @inlined
-def travel(b, h, many):
+def center_motion_bound(b, h, many):
     """Bound for how far body b's centre of mass moves in h without contact, and its bounding sphere with it [m]."""
     t = many.twist
     return h * (abs(t[b, 0]) + abs(t[b, 1]) + abs(t[b, 2])) + 0.5 * h * h * many.bodies[b].acceleration
 
 
 @inlined
-def reach(b, h, many):
+def surface_motion_bound(b, h, many):
     """Bound for how far any point of body b moves in h without contact [m]; by turning no further than across it.
 
     The angular velocity of what turns far may grow meanwhile: as |dω/dt| <= |ω|²/√3, a turn of θ at its first pace is
@@ -39,23 +40,28 @@ def reach(b, h, many):
     t = many.twist
     turn = h * (abs(t[b, 3]) + abs(t[b, 4]) + abs(t[b, 5]))
     if many.spin[b] > 0.0:
-        turn *= GROWTH
-    return travel(b, h, many) + many.bodies[b].radius * min(turn, 2.0)
+        turn *= _SPIN_GROWTH
+    return center_motion_bound(b, h, many) + many.bodies[b].radius * min(turn, 2.0)
 
 
 @inlined
 def may_reach_wall(b, wall, h, many):
     """True if body b's bounding sphere may touch a wall within h; one that turns fast far off may not."""
-    d = qt.dot(vector(many.walls, wall, NORMAL), vector(many.now, b, POS)) - many.walls[wall, OFFSET]
-    return not d > many.bodies[b].radius + travel(b, h, many) + many.bodies[b].slop
+    d = qt.dot(row_vector(many.walls, wall, WALL_NORMAL), row_vector(many.now, b, POS)) - many.walls[wall, WALL_OFFSET]
+    return not d > many.bodies[b].radius + center_motion_bound(b, h, many) + many.bodies[b].slop
 
 
 @inlined
 def may_meet(a, b, h, many):
     """True if the bounding spheres of two bodies may touch within h."""
-    far = many.bodies[a].radius + many.bodies[b].radius + travel(a, h, many) + travel(b, h, many)
+    far = (
+        many.bodies[a].radius
+        + many.bodies[b].radius
+        + center_motion_bound(a, h, many)
+        + center_motion_bound(b, h, many)
+    )
     far += pair_slop(a, b, many)
-    d = minus(vector(many.now, a, POS), vector(many.now, b, POS))
+    d = subtract(row_vector(many.now, a, POS), row_vector(many.now, b, POS))
     return not qt.dot(d, d) > far * far
 
 
@@ -72,10 +78,10 @@ def half_extent(b, axis, many):
 
 
 @kernel
-def bound_bodies(h, many):
+def write_swept_boxes(h, many):
     """Write `many.box`: every body with all it may sweep in h, and the slop."""
     for b in range(many.now.shape[0]):
-        margin = reach(b, h, many) + many.bodies[b].slop
+        margin = surface_motion_bound(b, h, many) + many.bodies[b].slop
         for axis in range(3):
             half = half_extent(b, axis, many) + margin
             many.box[b, axis] = many.place[b, axis] - half
@@ -163,12 +169,12 @@ def _pair_in_column(a, i, j, axes, cuts, count, many):
             break
         if not _overlap(a, b, many):
             continue
-        a_i, _, a_j, _ = columns_of(a, u, v, cuts, many)
-        b_i, _, b_j, _ = columns_of(b, u, v, cuts, many)
+        a_i, _, a_j, _ = body_strips(a, u, v, cuts, many)
+        b_i, _, b_j, _ = body_strips(b, u, v, cuts, many)
         if max(a_i, b_i) != i or max(a_j, b_j) != j:
             continue  # found in the column of the lower corner of what the boxes share
         if count == many.pairs.shape[0]:
-            many.counts[LEFT_OUT] += 1
+            many.counts[NUM_DROPPED] += 1
             continue
         many.pairs[count, 0], many.pairs[count, 1] = a, b
         count += 1
@@ -178,7 +184,7 @@ def _pair_in_column(a, i, j, axes, cuts, count, many):
 @kernel
 def find_pairs(h, many):
     """Write `many.pairs` and their number: all pairs (a < b) of bodies whose boxes overlap."""
-    bound_bodies(h, many)
+    write_swept_boxes(h, many)
     axis = widest_axis(many)
     sort_bodies(axis, many)
     u, v = (axis + 1) % 3, (axis + 2) % 3
@@ -187,7 +193,7 @@ def find_pairs(h, many):
         many.merged[many.order[r]] = r
     for r in range(many.order.shape[0]):
         a, first = many.order[r], count
-        i_first, i_last, j_first, j_last = columns_of(a, u, v, cuts, many)
+        i_first, i_last, j_first, j_last = body_strips(a, u, v, cuts, many)
         for i in range(i_first, i_last + 1):
             for j in range(j_first, j_last + 1):
                 count = _pair_in_column(a, i, j, (axis, u, v), cuts, count, many)
@@ -195,4 +201,4 @@ def find_pairs(h, many):
         for k in range(first, count):
             b = pairs[k, 1]
             pairs[k, 0], pairs[k, 1] = min(a, b), max(a, b)
-    many.counts[PAIRS] = count
+    many.counts[NUM_PAIRS] = count

@@ -12,12 +12,12 @@ from typing import NamedTuple
 import numpy as np
 
 from physics.kernels.forces.force_field_dispatch import Term
-from physics.kernels.multibody.data.hull_tables import Hulls, make_hulls, room_of_face
+from physics.kernels.multibody.data.hull_tables import Hulls, clipped_face_capacity, make_hulls
 from physics.kernels.state.layout import REPORT_SIZE, STATE_SIZE, VERTEX_COUNT
 from physics.kernels.time_stepping.workspace import body_fields, setting_fields
 
 # Columns of `many.momenta` in a resting stage: velocities before it, then momenta with its loads.
-VELOCITY, LOADED = 0, 6
+PRE_LOAD_VELOCITY, LOADED_MOMENTA = 0, 6
 
 # Contacts that two bodies may have at once: a rectangle clipped by another one has up to eight vertices.
 PAIR_CONTACTS = 8
@@ -33,10 +33,10 @@ BLOCKS_PER_BODY = 32
 
 # Bundles of contacts of one island (`contact_batches`) per body: where more are needed Newton's method is left out,
 # too.
-BUNDLES_PER_BODY = 32
+BATCHES_PER_BODY = 32
 
 # `counts`: contacts, pairs, contacts or pairs for which there was no room, and bundles of the island that is solved.
-CONTACTS, PAIRS, LEFT_OUT, BUNDLES = range(4)
+NUM_CONTACTS, NUM_PAIRS, NUM_DROPPED, NUM_BATCHES = range(4)
 
 # Of `block_lu`: numbers of a column, velocity and angular velocity with one unused after each, and of a block of six.
 COLUMN_SIZE = 8
@@ -44,24 +44,24 @@ BLOCK_SIZE = 6 * COLUMN_SIZE
 
 # Numbers of a row of `normal_rows`: five vectors, one unused number after each; and of one of `visit`, five lines of a
 # cache.
-ROWS_SIZE = 5 * 4
+NORMAL_ROW_SIZE = 5 * 4
 VISIT_SIZE = 5 * 8
 
 # Numbers of a row of `bundle`, and of `lanes`: four for each of the fields in `contact_batches`.
-BUNDLE_SIZE = 6
+BATCH_SIZE = 6
 LANES_SIZE = 4 * 52
 
-# Row of `memory`, one per world: length of the last resting stage [s], its contact count, then `MEMORY_SIZE` numbers
-# for each contact: its name, first and second body (-1 - k: wall k), impulse and point in the world frame. Where
-# substeps are refined the last column of all is the next part of one as a share of it (`adaptive_substep`; 0: all of
-# it).
-STAGE_LENGTH, CONTACT_COUNT = range(2)
-MEMORY_HEAD = 2
-NAME, FIRST, SECOND, IMPULSE, POINT = 0, 1, 2, 3, 6
-MEMORY_SIZE = 9
+# Row of `memory`, one per world: length of the last resting stage [s], its contact count, then `WARM_CONTACT_SIZE`
+# numbers for each contact: its name, first and second body (-1 - k: wall k), impulse and point in the world frame.
+# Where substeps are refined the last column of all is the next part of one as a share of it (`adaptive_substep`; 0: all
+# of it).
+WARM_STAGE_LENGTH, WARM_CONTACT_COUNT = range(2)
+WARM_HEADER_SIZE = 2
+WARM_CONTACT_ID, WARM_BODY_A, WARM_BODY_B, WARM_IMPULSE, WARM_POINT = 0, 1, 2, 3, 6
+WARM_CONTACT_SIZE = 9
 
 
-class Kept(NamedTuple):
+class WorldSnapshots(NamedTuple):
     """A world at moments to which `adaptive_substep` comes back, one row for each."""
 
     now: np.ndarray  # states of the bodies, (moments, bodies, STATE_SIZE)
@@ -70,8 +70,8 @@ class Kept(NamedTuple):
     counts: np.ndarray  # events of each body
 
 
-class Many(NamedTuple):
-    """Bodies, pairs and contacts of the world that a thread is at; shapes in `make_many`."""
+class BodiesWorkspace(NamedTuple):
+    """Bodies, pairs and contacts of the world that a thread is at; shapes in `make_bodies_workspace`."""
 
     bodies: np.ndarray  # records: parameters and loads, see `workspace.body_fields`
     now: np.ndarray  # states, columns of `layout`
@@ -157,23 +157,23 @@ class Many(NamedTuple):
     settings: np.ndarray  # one record: see `workspace.setting_fields`
 
 
-def contact_room(bodies: int, walls: int, polyhedra: Sequence = ()) -> int:
+def contact_capacity(bodies: int, walls: int, polyhedra: Sequence = ()) -> int:
     """Contacts that a world of so many bodies and walls has room for; `polyhedra` are those of `make_hulls`."""
     corners = max([VERTEX_COUNT, *(len(body.vertices) for body in polyhedra if body is not None)])
-    return bodies * walls * corners + pair_room(bodies) * max(PAIR_CONTACTS, room_of_face(polyhedra))
+    return bodies * walls * corners + pair_capacity(bodies) * max(PAIR_CONTACTS, clipped_face_capacity(polyhedra))
 
 
-def pair_room(bodies: int) -> int:
+def pair_capacity(bodies: int) -> int:
     """Pairs near each other that a world of so many bodies has room for."""
     return max(1, min(bodies * (bodies - 1) // 2, PAIRS_PER_BODY * bodies))
 
 
-def memory_size(bodies: int, walls: int, polyhedra: Sequence = (), refined: bool = False) -> int:
+def warm_start_size(bodies: int, walls: int, polyhedra: Sequence = (), refined: bool = False) -> int:
     """Columns of `memory` of one world; of one whose substeps are refined the last one is for the length of a part."""
-    return MEMORY_HEAD + MEMORY_SIZE * contact_room(bodies, walls, polyhedra) + int(refined)
+    return WARM_HEADER_SIZE + WARM_CONTACT_SIZE * contact_capacity(bodies, walls, polyhedra) + int(refined)
 
 
-def make_many(
+def make_bodies_workspace(
     bodies: int,
     walls: np.ndarray,
     terms: tuple[Term, ...] = (),
@@ -184,7 +184,7 @@ def make_many(
     in_time=False,
     relative_slop: float,
     **settings: float,
-) -> Many:
+) -> BodiesWorkspace:
     """Scratch for worlds of `bodies` bodies among `walls` ((walls, WALL_SIZE)), in fields, with numerical settings.
 
     `polyhedra` are those of `make_hulls`, empty where there is no hull. `meet` says whether bodies touch each other, or
@@ -192,7 +192,7 @@ def make_many(
     tolerance.
     """
     f, i, nb = np.float64, np.int64, bodies
-    pairs, n = pair_room(bodies), contact_room(bodies, len(walls), polyhedra)
+    pairs, n = pair_capacity(bodies), contact_capacity(bodies, len(walls), polyhedra)
     floats, ints = ("still", "half", "load"), ("rests", "meet", "in_turn", "in_time")
     fields = [*setting_fields(), *((name, f) for name in floats), *((name, i) for name in ints)]
     record = np.zeros(1, np.dtype(fields))
@@ -202,9 +202,9 @@ def make_many(
     rows = np.zeros(nb, np.dtype(body_fields(terms)))
     rows["relative_slop"] = relative_slop
     blocks = min(max(1, nb * (nb - 1) // 2), BLOCKS_PER_BODY * nb)
-    bundles = max(1, min(n, BUNDLES_PER_BODY * nb))
+    bundles = max(1, min(n, BATCHES_PER_BODY * nb))
     table = 1 << (2 * n - 1).bit_length()
-    return Many(
+    return BodiesWorkspace(
         bodies=rows, now=np.zeros((nb, STATE_SIZE)), rotation=np.zeros((nb, 9)), lightness=np.zeros(nb),
         turning=np.zeros((nb, 6)), twist=np.zeros((nb, 6)), place=np.zeros((nb, 3)), box=np.zeros((nb, 6)),
         touched=np.zeros(nb, i), spin=np.zeros(nb), simplex=np.zeros((4, 3)),
@@ -215,7 +215,7 @@ def make_many(
         owner=np.zeros(n, i), normal=np.zeros((n, 3), f), anchor=np.zeros((n, 6)), frame=np.zeros((n, 9)),
         arm=np.zeros((n, 6)), gap=np.zeros(n), speed=np.zeros(n), mu=np.zeros(n), bounce=np.zeros(n),
         target=np.zeros((n, 3)), impulse=np.zeros((n, 3)), step=np.zeros(n), block=np.zeros((n, 9)),
-        rows=np.zeros((n, ROWS_SIZE)), motion=np.zeros((nb, COLUMN_SIZE)), visit=np.zeros((n, VISIT_SIZE)),
+        rows=np.zeros((n, NORMAL_ROW_SIZE)), motion=np.zeros((nb, COLUMN_SIZE)), visit=np.zeros((n, VISIT_SIZE)),
         side=np.zeros((n, 2), i),
         settled=np.zeros((n, 3)), trend=np.zeros((n, 3)), visited=np.zeros(n, i), pushed=np.zeros(nb, i),
         table=np.full(table, -1, i), mix=np.zeros((4, 3, 3)), polygon=np.zeros((2, 16, 3)),
@@ -226,15 +226,15 @@ def make_many(
         rank=np.zeros(nb, i), start=np.zeros(nb, i), stop=np.zeros(nb, i), column=np.zeros(blocks, i),
         diagonal=np.zeros((nb, BLOCK_SIZE)), lower=np.zeros((blocks, BLOCK_SIZE)), upper=np.zeros((blocks, BLOCK_SIZE)),
         swaps=np.zeros(6, i), rebound=np.zeros((n, 3)), best=np.zeros((n, 3)), defect=np.zeros((nb, COLUMN_SIZE)),
-        before=np.zeros((nb, 6)), change=np.zeros((nb, COLUMN_SIZE)), bundle=np.zeros((bundles, BUNDLE_SIZE), i),
+        before=np.zeros((nb, 6)), change=np.zeros((nb, COLUMN_SIZE)), bundle=np.zeros((bundles, BATCH_SIZE), i),
         lanes=np.zeros((bundles, LANES_SIZE)), momenta=np.zeros((nb, 12)),
         hulls=make_hulls(polyhedra) if polyhedra else None, settings=record,
     )  # fmt: skip
 
 
-def make_kept(bodies: int, memory: int) -> Kept:
+def make_snapshots(bodies: int, memory: int) -> WorldSnapshots:
     """Room for a world of so many bodies and columns of `memory` at three moments."""
-    return Kept(
+    return WorldSnapshots(
         np.zeros((3, bodies, STATE_SIZE)),
         np.zeros((3, memory)),
         np.zeros((3, REPORT_SIZE)),

@@ -7,25 +7,20 @@ import math
 from physics.kernels.compile.decorators import inlined, kernel
 from physics.kernels.half_space import support_function as geo
 from physics.kernels.math import quaternion as qt
-from physics.kernels.multibody.data.arrays import CONTACTS, LEFT_OUT
+from physics.kernels.math.vector import row_vector
+from physics.kernels.multibody.data.arrays import NUM_CONTACTS, NUM_DROPPED
 from physics.kernels.state.layout import ELLIPSOID, SPHERE
 
 # Contact features that two bodies, or a body and a wall, have unless one is a hull: what a contact's name is made with.
-FEATURES = 512
+FEATURES_PER_PAIR = 512
 
 # Distance at which bodies that turn far have arrived, where the slop is less, in the smaller bounding radius: what is
 # left is small enough for contacts to be foretold by their speed, and large beside rounding.
-ARRIVED = 1.0e-7
+ARRIVAL_SHARE = 1.0e-7
 
 
 @inlined
-def vector(rows, i, first):
-    """Three numbers of row i from column `first`."""
-    return (rows[i, first], rows[i, first + 1], rows[i, first + 2])
-
-
-@inlined
-def matrix(rows, i):
+def row_matrix(rows, i):
     """The nine numbers of row i."""
     return (
         rows[i, 0], rows[i, 1], rows[i, 2], rows[i, 3], rows[i, 4], rows[i, 5], rows[i, 6], rows[i, 7], rows[i, 8],
@@ -33,25 +28,25 @@ def matrix(rows, i):
 
 
 @inlined
-def put(rows, i, first, a):
+def put_vector(rows, i, first, a):
     """Write three numbers into row i from column `first`."""
     rows[i, first], rows[i, first + 1], rows[i, first + 2] = a
 
 
 @inlined
-def minus(a, b):
+def subtract(a, b):
     """a - b."""
     return (a[0] - b[0], a[1] - b[1], a[2] - b[2])
 
 
 @inlined
-def plus(a, s, b):
+def add_scaled(a, s, b):
     """a + s b."""
     return (a[0] + s * b[0], a[1] + s * b[1], a[2] + s * b[2])
 
 
 @inlined
-def tangents(n):
+def tangent_basis(n):
     """Two unit vectors that complete the unit vector n to a right-handed frame.
 
     The first comes from the world axis that follows the one n is most along: for a normal along a world axis the
@@ -63,41 +58,41 @@ def tangents(n):
         e = (0.0, 0.0, 1.0)
     elif z > x and z > y:
         e = (1.0, 0.0, 0.0)
-    t = plus(e, -qt.dot(e, n), n)
+    t = add_scaled(e, -qt.dot(e, n), n)
     s = 1.0 / math.sqrt(qt.dot(t, t))
     t = (s * t[0], s * t[1], s * t[2])
     return t, qt.cross(n, t)
 
 
 @inlined
-def put_frame(k, n, many):
+def write_contact_frame(k, n, many):
     """Write the frame of contact k from its normal."""
-    t1, t2 = tangents(n)
-    put(many.frame, k, 0, n)
-    put(many.frame, k, 3, t1)
-    put(many.frame, k, 6, t2)
+    t1, t2 = tangent_basis(n)
+    put_vector(many.frame, k, 0, n)
+    put_vector(many.frame, k, 3, t1)
+    put_vector(many.frame, k, 6, t2)
 
 
 @inlined
 def relative_velocity(k, t, many):
     """Velocity of the first body's point of contact k relative to the second's, for twists t, world frame [m/s]."""
     a, b = many.ends[k, 0], many.ends[k, 1]
-    u = plus(vector(t, a, 0), 1.0, qt.cross(vector(t, a, 3), vector(many.arm, k, 0)))
+    u = add_scaled(row_vector(t, a, 0), 1.0, qt.cross(row_vector(t, a, 3), row_vector(many.arm, k, 0)))
     if b >= 0:
-        u = minus(u, plus(vector(t, b, 0), 1.0, qt.cross(vector(t, b, 3), vector(many.arm, k, 3))))
+        u = subtract(u, add_scaled(row_vector(t, b, 0), 1.0, qt.cross(row_vector(t, b, 3), row_vector(many.arm, k, 3))))
     return u
 
 
 @inlined
-def velocity_along(k, t, many):
+def velocity_in_contact_frame(k, t, many):
     """The same in the contact's frame: normal, tangents."""
-    return qt.matvec(matrix(many.frame, k), relative_velocity(k, t, many))
+    return qt.matvec(row_matrix(many.frame, k), relative_velocity(k, t, many))
 
 
 @inlined
-def local_velocity(k, many):
-    """`velocity_along` for the twists as they are."""
-    return velocity_along(k, many.twist, many)
+def contact_velocity(k, many):
+    """`velocity_in_contact_frame` for the twists as they are."""
+    return velocity_in_contact_frame(k, many.twist, many)
 
 
 @inlined
@@ -109,22 +104,22 @@ def pair_slop(a, b, many):
 
 
 @inlined
-def arrival(a, b, many):
+def arrival_gap(a, b, many):
     """Gap at which what turns far has arrived at a wall (b < 0) or another body [m]."""
     radius = many.bodies[a].radius
     if b >= 0:
         radius = min(radius, many.bodies[b].radius)
-    return max(pair_slop(a, b, many), ARRIVED * radius)
+    return max(pair_slop(a, b, many), ARRIVAL_SHARE * radius)
 
 
 @inlined
-def _turns_far(a, b, many):
+def _may_turn_far(a, b, many):
     """True if one of them may turn far in this stage (`conservative_advancement`)."""
     return many.spin[a] > 0.0 or (b >= 0 and many.spin[b] > 0.0)
 
 
 @inlined
-def acceleration_of(k, many):
+def relative_acceleration_bound(k, many):
     """Bound for the relative acceleration of a contact's points without contact [m/s²]."""
     a, b = many.ends[k, 0], many.ends[k, 1]
     if b < 0:
@@ -133,7 +128,7 @@ def acceleration_of(k, many):
 
 
 @inlined
-def _laws(k, a, b, many):
+def _combine_materials(k, a, b, many):
     """Coefficients of two bodies: the geometric mean of friction, the larger restitution. Of a wall: the body's."""
     mu, e = many.bodies[a].mu, many.bodies[a].restitution
     if b >= 0:
@@ -142,25 +137,25 @@ def _laws(k, a, b, many):
 
 
 @inlined
-def _anchor(k, b, first, point, many):
+def _write_anchor(k, b, first, point, many):
     """Arm and anchor of one end: from body b's centre of mass to `point` (world frame)."""
-    arm = minus(point, vector(many.now, b, 0))
-    put(many.arm, k, first, arm)
-    put(many.anchor, k, first, qt.transposed_matvec(matrix(many.rotation, b), arm))
+    arm = subtract(point, row_vector(many.now, b, 0))
+    put_vector(many.arm, k, first, arm)
+    put_vector(many.anchor, k, first, qt.transposed_matvec(row_matrix(many.rotation, b), arm))
 
 
 @kernel
-def record(a, b, feature, owner, normal, point_a, point_b, gap, h, many):
+def add_contact(a, b, feature, owner, normal, point_a, point_b, gap, h, many):
     """Add a contact to the set if it touches, or could within h: whether there was room for it.
 
-    What turns far touches from its `arrival` on.
+    What turns far touches from its `arrival_gap` on.
 
     Parameters
     ----------
     a, b : int
         Bodies; b = -1 - k is wall k.
     feature : int
-        Which of the features of this pair: below `FEATURES` unless one of them is a hull.
+        Which of the features of this pair: below `FEATURES_PER_PAIR` unless one of them is a hull.
     owner : int
         Body that the normal turns with; -1: it keeps its direction.
     normal, point_a, point_b : tuples of 3 floats
@@ -168,51 +163,53 @@ def record(a, b, feature, owner, normal, point_a, point_b, gap, h, many):
     gap, h : float
         [m], [s].
     """
-    k, count = many.counts[CONTACTS], many.now.shape[0]
+    k, count = many.counts[NUM_CONTACTS], many.now.shape[0]
     if k == many.gap.shape[0]:
-        many.counts[LEFT_OUT] += 1
+        many.counts[NUM_DROPPED] += 1
         return False
     many.ends[k, 0], many.ends[k, 1] = a, b
-    _anchor(k, a, 0, point_a, many)
+    _write_anchor(k, a, 0, point_a, many)
     acceleration = many.bodies[a].acceleration
     partner = count - 1 - b
     if b >= 0:
-        _anchor(k, b, 3, point_b, many)
+        _write_anchor(k, b, 3, point_b, many)
         acceleration += many.bodies[b].acceleration
         partner = b
-    put_frame(k, normal, many)
+    write_contact_frame(k, normal, many)
     speed = qt.dot(normal, relative_velocity(k, many.twist, many))
     slop = pair_slop(a, b, many)
     is_out_of_reach = gap > slop and gap + h * speed - 0.5 * h * h * acceleration > slop
-    if is_out_of_reach and not (_turns_far(a, b, many) and gap <= arrival(a, b, many)):
+    if is_out_of_reach and not (_may_turn_far(a, b, many) and gap <= arrival_gap(a, b, many)):
         return True
     many.gap[k], many.speed[k], many.owner[k] = gap, speed, owner
     local = normal
     if owner >= 0:
-        local = qt.transposed_matvec(matrix(many.rotation, owner), normal)
-    put(many.normal, k, 0, local)
+        local = qt.transposed_matvec(row_matrix(many.rotation, owner), normal)
+    put_vector(many.normal, k, 0, local)
     partners = count + many.walls.shape[0]
-    page = feature // FEATURES * count * partners  # of features beyond the first `FEATURES`: names after all of those
-    many.name[k] = (page + a * partners + partner) * FEATURES + feature % FEATURES
-    _laws(k, a, b, many)
+    page = (
+        feature // FEATURES_PER_PAIR * count * partners
+    )  # of features beyond the first `FEATURES_PER_PAIR`: names after all of those
+    many.name[k] = (page + a * partners + partner) * FEATURES_PER_PAIR + feature % FEATURES_PER_PAIR
+    _combine_materials(k, a, b, many)
     many.touched[a] = 1
     if b >= 0:
         many.touched[b] = 1
-    many.counts[CONTACTS] = k + 1
+    many.counts[NUM_CONTACTS] = k + 1
     return True
 
 
 @inlined
-def record_either(a, b, first, n, on_first, on_second, gap, h, many):
+def add_ordered_contact(a, b, first, n, on_first, on_second, gap, h, many):
     """Record the one contact of a and b, of which one is `first`; n is out of the other one."""
     if first == a:
-        record(a, b, 0, -1, n, on_first, on_second, gap, h, many)
+        add_contact(a, b, 0, -1, n, on_first, on_second, gap, h, many)
     else:
-        record(a, b, 0, -1, (-n[0], -n[1], -n[2]), on_second, on_first, gap, h, many)
+        add_contact(a, b, 0, -1, (-n[0], -n[1], -n[2]), on_second, on_first, gap, h, many)
 
 
 @inlined
-def _carried(b, k, first, side, n, many):
+def _carried_point(b, k, first, side, n, many):
     """Point of body b in contact k from its centre of mass, world frame [m]: carried along as the body turns.
 
     That of a round body is where its normal is that of the contact: turning brings another point there.
@@ -222,43 +219,45 @@ def _carried(b, k, first, side, n, many):
         r = side * d[0]
         return (r * n[0], r * n[1], r * n[2])
     if shape == ELLIPSOID:
-        dims, R, m = (d[0], d[1], d[2]), matrix(many.rotation, b), (-side * n[0], -side * n[1], -side * n[2])
+        dims, R, m = (d[0], d[1], d[2]), row_matrix(many.rotation, b), (-side * n[0], -side * n[1], -side * n[2])
         return geo.support_arm(shape, dims, R, m, geo.scaled_normal(shape, dims, R, m))
-    return qt.matvec(matrix(many.rotation, b), vector(many.anchor, k, first))
+    return qt.matvec(row_matrix(many.rotation, b), row_vector(many.anchor, k, first))
 
 
 @inlined
-def _meet_on_face(k, a, b, owner, n, many):
+def _slide_on_face(k, a, b, owner, n, many):
     """Let the point on the face that has the normal be where the other body's point is, which slides along it."""
     if owner < 0:
         return
     other, of_other, of_owner, side = a, 0, 3, -1.0
     if owner == a:
         other, of_other, of_owner, side = b, 3, 0, 1.0
-    point = plus(vector(many.now, other, 0), 1.0, vector(many.arm, k, of_other))
-    put(many.arm, k, of_owner, minus(plus(point, side * many.gap[k], n), vector(many.now, owner, 0)))
+    point = add_scaled(row_vector(many.now, other, 0), 1.0, row_vector(many.arm, k, of_other))
+    put_vector(
+        many.arm, k, of_owner, subtract(add_scaled(point, side * many.gap[k], n), row_vector(many.now, owner, 0))
+    )
 
 
 @kernel
-def refresh(many):
+def update_contacts(many):
     """Arms, frames and gaps of the contact set where the bodies are now, their points and normals carried along.
 
     The gap between the two points along the normal; the second one of a wall is the first one projected on it.
     """
-    for k in range(many.counts[CONTACTS]):
+    for k in range(many.counts[NUM_CONTACTS]):
         a, b, owner = many.ends[k, 0], many.ends[k, 1], many.owner[k]
-        n = vector(many.normal, k, 0)
+        n = row_vector(many.normal, k, 0)
         if owner >= 0:
-            n = qt.matvec(matrix(many.rotation, owner), n)
-            put_frame(k, n, many)
-        arm = _carried(a, k, 0, -1.0, n, many)
-        put(many.arm, k, 0, arm)
-        point = plus(arm, 1.0, vector(many.now, a, 0))
+            n = qt.matvec(row_matrix(many.rotation, owner), n)
+            write_contact_frame(k, n, many)
+        arm = _carried_point(a, k, 0, -1.0, n, many)
+        put_vector(many.arm, k, 0, arm)
+        point = add_scaled(arm, 1.0, row_vector(many.now, a, 0))
         if b < 0:
             many.gap[k] = qt.dot(n, point) - many.walls[-1 - b, 9]
         else:
-            arm = _carried(b, k, 3, 1.0, n, many)
-            put(many.arm, k, 3, arm)
-            many.gap[k] = qt.dot(n, minus(point, plus(arm, 1.0, vector(many.now, b, 0))))
+            arm = _carried_point(b, k, 3, 1.0, n, many)
+            put_vector(many.arm, k, 3, arm)
+            many.gap[k] = qt.dot(n, subtract(point, add_scaled(arm, 1.0, row_vector(many.now, b, 0))))
             if many.settings[0].in_time == 1:
-                _meet_on_face(k, a, b, owner, n, many)
+                _slide_on_face(k, a, b, owner, n, many)

@@ -16,7 +16,7 @@ import numpy as np
 FIRST_CORNER, LAST_CORNER, FIRST_FACE, LAST_FACE, FIRST_EDGE, LAST_EDGE = range(6)
 
 # Columns of `Hulls.edges`: its ends, and the faces on its left, seen from outside along it, and on its right.
-BEGIN, END, LEFT, RIGHT = range(4)
+EDGE_START, EDGE_END, EDGE_LEFT_FACE, EDGE_RIGHT_FACE = range(4)
 
 
 class Hulls(NamedTuple):
@@ -84,7 +84,7 @@ def make_hulls(bodies: Sequence[Solid | None]) -> Hulls:
             loops.append((len(ring), len(ring) + len(loop)))
             ring += loop
     most = [max([place[key][k + 1] - place[key][k] for key in kinds], default=0) for k in (0, 2)]
-    room = room_of_face(bodies)
+    room = clipped_face_capacity(bodies)
     f, i = np.float64, np.int64
     return Hulls(
         of=np.array([place.get(id(body), (0,) * 6) for body in bodies], i),
@@ -95,6 +95,6 @@ def make_hulls(bodies: Sequence[Solid | None]) -> Hulls:
     )  # fmt: skip
 
 
-def room_of_face(bodies: Sequence[Solid | None]) -> int:
+def clipped_face_capacity(bodies: Sequence[Solid | None]) -> int:
     """Corners that the largest face clipped by another one can have: each side cuts off one corner and makes two."""
     return 2 * max([len(loop) for body in bodies if body is not None for loop in body.loops], default=0)

@@ -5,20 +5,21 @@ from __future__ import annotations
 from physics.kernels.compile.decorators import inlined
 from physics.kernels.half_space.contact_point import geometric_center
 from physics.kernels.math import quaternion as qt
-from physics.kernels.multibody.data.contact_set import put, vector
+from physics.kernels.math.vector import row_vector
+from physics.kernels.multibody.data.contact_set import put_vector
 from physics.kernels.state import layout as at
 from physics.kernels.state.body import angular_velocity, principal_attitude, read_state
 
 
 @inlined
-def place_body(b, tilted, many):
+def update_body_pose(b, tilted, many):
     """Rotation, geometric centre and inverse inertia of body b where it is now, world frame."""
     x, q, _, _ = read_state(many.now, b)
     work = many.bodies[b]
     R = qt.to_matrix(q)
     for c in range(9):
         many.rotation[b, c] = R[c]
-    put(many.place, b, 0, geometric_center(x, R, work, tilted))
+    put_vector(many.place, b, 0, geometric_center(x, R, work, tilted))
     P = R
     if tilted is not None:
         P = qt.to_matrix(principal_attitude(q, work, tilted))
@@ -32,10 +33,10 @@ def place_body(b, tilted, many):
 
 
 @inlined
-def place_bodies(tilted, many):
-    """`place_body`, and the twist, of every body."""
+def update_poses_and_twists(tilted, many):
+    """`update_body_pose`, and the twist, of every body."""
     for b in range(many.now.shape[0]):
-        place_body(b, tilted, many)
-        put(many.twist, b, 0, vector(many.now, b, at.LINVEL))
-        q, L = read_state(many.now, b)[1], vector(many.now, b, at.ANGMOM)
-        put(many.twist, b, 3, angular_velocity(q, L, many.bodies[b], tilted))
+        update_body_pose(b, tilted, many)
+        put_vector(many.twist, b, 0, row_vector(many.now, b, at.LINVEL))
+        q, L = read_state(many.now, b)[1], row_vector(many.now, b, at.ANGMOM)
+        put_vector(many.twist, b, 3, angular_velocity(q, L, many.bodies[b], tilted))

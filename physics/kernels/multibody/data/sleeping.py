@@ -8,22 +8,22 @@ the broad phase first, and wakes it before a contact is looked for.
 from __future__ import annotations
 
 from physics.kernels.compile.decorators import inlined, kernel
-from physics.kernels.forces.two_body_spring import join_linked
-from physics.kernels.math.union_find import join, root_of
-from physics.kernels.multibody.data.arrays import PAIRS
+from physics.kernels.forces.two_body_spring import unite_linked_bodies
+from physics.kernels.math.union_find import find_root, unite_sets
+from physics.kernels.multibody.data.arrays import NUM_PAIRS
 from physics.kernels.state.body import read_state, write_state
 from physics.kernels.state.sleeping import (
-    BEFORE,
-    GROUP,
-    LAST,
-    QUIET,
-    WINDOWS,
-    is_growing,
-    is_pushed_anew,
-    laid_down,
-    sleeps,
-    stir,
-    watch,
+    EARLIER_DISPLACEMENT,
+    LAST_DISPLACEMENT,
+    QUIET_WINDOWS,
+    SLEEP_GROUP,
+    WINDOWS_BEFORE_SLEEP,
+    has_new_wrench,
+    is_asleep,
+    is_motion_growing,
+    update_sleep_window,
+    wake_body,
+    without_velocities,
 )
 
 
@@ -31,8 +31,8 @@ from physics.kernels.state.sleeping import (
 def wake_group(world, count, group, sleep):
     """Wake all bodies of a group of a world of `count` bodies."""
     for i in range(world * count, (world + 1) * count):
-        if sleep.rows[i, GROUP] == group:
-            stir(i, sleep)
+        if sleep.rows[i, SLEEP_GROUP] == group:
+            wake_body(i, sleep)
 
 
 @inlined
@@ -41,55 +41,55 @@ def wake_world(world, count, sleep):
     if sleep is None:
         return
     for i in range(world * count, (world + 1) * count):
-        stir(i, sleep)
+        wake_body(i, sleep)
 
 
 @inlined
-def all_sleep(world, count, sleep):
+def is_world_asleep(world, count, sleep):
     """True if every body of a world of `count` bodies sleeps."""
     for i in range(world * count, (world + 1) * count):
-        if not sleeps(i, sleep):
+        if not is_asleep(i, sleep):
             return False
     return True
 
 
 @inlined
-def sleep_on(world, count, wrench, sleep):
+def is_staying_asleep(world, count, wrench, sleep):
     """True if every body of a world sleeps and goes on to do so under these wrenches; wakes those that do not."""
     for i in range(world * count, (world + 1) * count):
-        if is_pushed_anew(i, wrench, sleep):
-            if sleeps(i, sleep):
-                wake_group(world, count, sleep.rows[i, GROUP], sleep)
-            stir(i, sleep)
-    return all_sleep(world, count, sleep)
+        if has_new_wrench(i, wrench, sleep):
+            if is_asleep(i, sleep):
+                wake_group(world, count, sleep.rows[i, SLEEP_GROUP], sleep)
+            wake_body(i, sleep)
+    return is_world_asleep(world, count, sleep)
 
 
 @kernel
-def wake_near(world, sleep, many):
+def wake_touched_groups(world, sleep, many):
     """Wake every group that something awake is near: a pair of the broad phase of which one body sleeps."""
     first, is_waking = world * many.now.shape[0], True
     while is_waking:
         is_waking = False
-        for k in range(many.counts[PAIRS]):
+        for k in range(many.counts[NUM_PAIRS]):
             a, b = first + many.pairs[k, 0], first + many.pairs[k, 1]
-            if sleeps(a, sleep) != sleeps(b, sleep):
-                group = max(sleep.rows[a, GROUP], sleep.rows[b, GROUP])
+            if is_asleep(a, sleep) != is_asleep(b, sleep):
+                group = max(sleep.rows[a, SLEEP_GROUP], sleep.rows[b, SLEEP_GROUP])
                 wake_group(world, many.now.shape[0], group, sleep)
                 is_waking = True
 
 
 @inlined
-def _join_near(many):
+def _union_near_pairs(many):
     """Let `many.parent` lead from every body to the first one of its group."""
     for b in range(many.parent.shape[0]):
         many.parent[b] = b
-    for k in range(many.counts[PAIRS]):
-        join(many.pairs[k, 0], many.pairs[k, 1], many.parent)
-    join_linked(many.parent, many)
+    for k in range(many.counts[NUM_PAIRS]):
+        unite_sets(many.pairs[k, 0], many.pairs[k, 1], many.parent)
+    unite_linked_bodies(many.parent, many)
 
 
 @kernel
-def lay_down(world, sleep, many):
+def put_quiet_groups_to_sleep(world, sleep, many):
     """Let every group fall asleep in which all bodies have been quiet for long enough, and no way grows.
 
     Largest ways of a group in its last two windows, and whether one of it is not quiet, are gathered at its root in
@@ -97,29 +97,31 @@ def lay_down(world, sleep, many):
     """
     count, found = many.now.shape[0], many.change
     first = world * count
-    _join_near(many)
+    _union_near_pairs(many)
     for b in range(count):
         found[b, 0] = found[b, 1] = found[b, 2] = 0.0
     for b in range(count):
-        root, i = root_of(b, many.parent), first + b
-        found[root, 0] = max(found[root, 0], sleep.rows[i, LAST])
-        found[root, 1] = max(found[root, 1], sleep.rows[i, BEFORE])
-        if sleep.rows[i, QUIET] < WINDOWS:
+        root, i = find_root(b, many.parent), first + b
+        found[root, 0] = max(found[root, 0], sleep.rows[i, LAST_DISPLACEMENT])
+        found[root, 1] = max(found[root, 1], sleep.rows[i, EARLIER_DISPLACEMENT])
+        if sleep.rows[i, QUIET_WINDOWS] < WINDOWS_BEFORE_SLEEP:
             found[root, 2] = 1.0
     for b in range(count):
-        root = root_of(b, many.parent)
-        if sleeps(first + b, sleep) or found[root, 2] == 1.0 or is_growing(found[root, 0], found[root, 1]):
+        root = find_root(b, many.parent)
+        if is_asleep(first + b, sleep) or found[root, 2] == 1.0 or is_motion_growing(found[root, 0], found[root, 1]):
             continue
-        sleep.rows[first + b, GROUP] = root + 1.0
-        write_state(many.now, b, laid_down(read_state(many.now, b)))
+        sleep.rows[first + b, SLEEP_GROUP] = root + 1.0
+        write_state(many.now, b, without_velocities(read_state(many.now, b)))
 
 
 @kernel
-def doze(world, h, sleep, many):
+def update_sleep(world, h, sleep, many):
     """Watch every body that is awake after a substep of h; what has been quiet for long enough falls asleep."""
     first, is_time = world * many.now.shape[0], False
     for b in range(many.now.shape[0]):
-        if not sleeps(first + b, sleep) and watch(first + b, read_state(many.now, b), h, many.bodies[b], sleep):
+        if not is_asleep(first + b, sleep) and update_sleep_window(
+            first + b, read_state(many.now, b), h, many.bodies[b], sleep
+        ):
             is_time = True
     if is_time:
-        lay_down(world, sleep, many)
+        put_quiet_groups_to_sleep(world, sleep, many)

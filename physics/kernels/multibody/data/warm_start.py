@@ -8,39 +8,40 @@ from __future__ import annotations
 
 from physics.kernels.compile.decorators import inlined, kernel
 from physics.kernels.math import quaternion as qt
+from physics.kernels.math.vector import row_vector
 from physics.kernels.multibody.data.arrays import (
-    CONTACT_COUNT,
-    FIRST,
-    IMPULSE,
-    MEMORY_HEAD,
-    MEMORY_SIZE,
-    NAME,
-    POINT,
-    SECOND,
-    STAGE_LENGTH,
+    WARM_BODY_A,
+    WARM_BODY_B,
+    WARM_CONTACT_COUNT,
+    WARM_CONTACT_ID,
+    WARM_CONTACT_SIZE,
+    WARM_HEADER_SIZE,
+    WARM_IMPULSE,
+    WARM_POINT,
+    WARM_STAGE_LENGTH,
 )
-from physics.kernels.multibody.data.contact_set import matrix, plus, put, vector
-from physics.kernels.state.sleeping import sleeps
+from physics.kernels.multibody.data.contact_set import add_scaled, put_vector, row_matrix
+from physics.kernels.state.sleeping import is_asleep
 
 
 @inlined
-def _row(k):
+def _contact_column(k):
     """First column of contact k."""
-    return MEMORY_HEAD + MEMORY_SIZE * k
+    return WARM_HEADER_SIZE + WARM_CONTACT_SIZE * k
 
 
 @inlined
-def _place(name, table):
+def _hash_slot(name, table):
     """Start of the search for a name: its low bits, well mixed (Knuth's multiplicative method)."""
     return ((name * 2654435761) >> 16) & (table.shape[0] - 1)
 
 
 @inlined
-def _find(name, world, memory, table):
+def _find_remembered(name, world, memory, table):
     """Index of the remembered contact of this name, or -1."""
-    at = _place(name, table)
+    at = _hash_slot(name, table)
     while table[at] >= 0:
-        if memory[world, _row(table[at]) + NAME] == name:
+        if memory[world, _contact_column(table[at]) + WARM_CONTACT_ID] == name:
             return table[at]
         at = (at + 1) & (table.shape[0] - 1)
     return -1
@@ -49,8 +50,8 @@ def _find(name, world, memory, table):
 @inlined
 def _index_names(world, memory, table):
     """Fill the table with the remembered contacts."""
-    for k in range(int(memory[world, CONTACT_COUNT])):
-        at = _place(int(memory[world, _row(k) + NAME]), table)
+    for k in range(int(memory[world, WARM_CONTACT_COUNT])):
+        at = _hash_slot(int(memory[world, _contact_column(k) + WARM_CONTACT_ID]), table)
         while table[at] >= 0:
             at = (at + 1) & (table.shape[0] - 1)
         table[at] = k
@@ -59,28 +60,30 @@ def _index_names(world, memory, table):
 @inlined
 def _clear_names(world, memory, table):
     """Empty the table again: its cost is that of the contacts, not of the room for them."""
-    for k in range(int(memory[world, CONTACT_COUNT])):
-        at = _place(int(memory[world, _row(k) + NAME]), table)
+    for k in range(int(memory[world, WARM_CONTACT_COUNT])):
+        at = _hash_slot(int(memory[world, _contact_column(k) + WARM_CONTACT_ID]), table)
         while table[at] >= 0:
             table[at] = -1
             at = (at + 1) & (table.shape[0] - 1)
 
 
 @kernel
-def load(n, world, h, friction, memory, many):
+def load_warm_impulses(n, world, h, friction, memory, many):
     """Impulses of the n contacts of the set from the last stage, scaled to a stage of length h; zero where new."""
-    length, table = memory[world, STAGE_LENGTH], many.table
+    length, table = memory[world, WARM_STAGE_LENGTH], many.table
     scale = h / length if length > 0.0 else 0.0
     _index_names(world, memory, table)
     for k in range(n):
         p = (0.0, 0.0, 0.0)
-        found = _find(many.name[k], world, memory, table)
+        found = _find_remembered(many.name[k], world, memory, table)
         if found >= 0:
-            x, y, z = qt.matvec(matrix(many.frame, k), vector(memory, world, _row(found) + IMPULSE))
+            x, y, z = qt.matvec(
+                row_matrix(many.frame, k), row_vector(memory, world, _contact_column(found) + WARM_IMPULSE)
+            )
             p = (scale * max(x, 0.0), 0.0, 0.0)
             if friction is not None:
                 p = (p[0], scale * y, scale * z)
-        put(many.impulse, k, 0, p)
+        put_vector(many.impulse, k, 0, p)
     _clear_names(world, memory, table)
 
 
@@ -89,46 +92,48 @@ def _keep_sleeping(world, h, sleep, memory, many):
     """Move the contacts of what sleeps to the front, their impulses as of a stage of length h: how many."""
     if sleep is None:
         return 0
-    first, count, length = world * many.now.shape[0], 0, memory[world, STAGE_LENGTH]
-    for k in range(int(memory[world, CONTACT_COUNT])):
-        row, to = _row(k), _row(count)
-        if sleeps(first + int(memory[world, row + FIRST]), sleep):
-            for c in range(MEMORY_SIZE):
+    first, count, length = world * many.now.shape[0], 0, memory[world, WARM_STAGE_LENGTH]
+    for k in range(int(memory[world, WARM_CONTACT_COUNT])):
+        row, to = _contact_column(k), _contact_column(count)
+        if is_asleep(first + int(memory[world, row + WARM_BODY_A]), sleep):
+            for c in range(WARM_CONTACT_SIZE):
                 memory[world, to + c] = memory[world, row + c]
             for c in range(3):
-                memory[world, to + IMPULSE + c] *= h / length
+                memory[world, to + WARM_IMPULSE + c] *= h / length
             count += 1
     return count
 
 
 @kernel
-def store(n, world, h, sleep, memory, many):
+def store_warm_impulses(n, world, h, sleep, memory, many):
     """Keep the n contacts of this stage, which took h, and those of what sleeps, as far as there is room."""
     before = _keep_sleeping(world, h, sleep, memory, many)
     n = min(n, many.gap.shape[0] - before)
-    memory[world, STAGE_LENGTH], memory[world, CONTACT_COUNT] = h, before + n
+    memory[world, WARM_STAGE_LENGTH], memory[world, WARM_CONTACT_COUNT] = h, before + n
     for k in range(n):
-        row, a = _row(before + k), many.ends[k, 0]
-        memory[world, row + NAME] = many.name[k]
-        memory[world, row + FIRST], memory[world, row + SECOND] = many.ends[k, 0], many.ends[k, 1]
-        p = qt.transposed_matvec(matrix(many.frame, k), vector(many.impulse, k, 0))
-        put(memory, world, row + IMPULSE, p)
-        put(memory, world, row + POINT, plus(vector(many.now, a, 0), 1.0, vector(many.arm, k, 0)))
+        row, a = _contact_column(before + k), many.ends[k, 0]
+        memory[world, row + WARM_CONTACT_ID] = many.name[k]
+        memory[world, row + WARM_BODY_A], memory[world, row + WARM_BODY_B] = many.ends[k, 0], many.ends[k, 1]
+        p = qt.transposed_matvec(row_matrix(many.frame, k), row_vector(many.impulse, k, 0))
+        put_vector(memory, world, row + WARM_IMPULSE, p)
+        put_vector(
+            memory, world, row + WARM_POINT, add_scaled(row_vector(many.now, a, 0), 1.0, row_vector(many.arm, k, 0))
+        )
 
 
 @inlined
-def forget(world, memory):
+def clear_warm_start(world, memory):
     """Nothing is remembered, as where the bodies were put."""
-    memory[world, STAGE_LENGTH] = memory[world, CONTACT_COUNT] = 0.0
+    memory[world, WARM_STAGE_LENGTH] = memory[world, WARM_CONTACT_COUNT] = 0.0
 
 
 @inlined
-def forget_awake(world, h, sleep, memory, many):
+def clear_awake_warm_start(world, h, sleep, memory, many):
     """Nothing touches any more but what sleeps, in a stage that took h."""
     if sleep is None:
-        memory[world, STAGE_LENGTH], memory[world, CONTACT_COUNT] = h, 0.0
+        memory[world, WARM_STAGE_LENGTH], memory[world, WARM_CONTACT_COUNT] = h, 0.0
     else:
-        store(0, world, h, sleep, memory, many)
+        store_warm_impulses(0, world, h, sleep, memory, many)
 
 
 @inlined

@@ -14,19 +14,20 @@ import math
 
 from physics.kernels.compile.decorators import inlined
 from physics.kernels.math import quaternion as qt
-from physics.kernels.multibody.data.contact_set import minus, plus, vector
-from physics.kernels.multibody.narrowphase.box_sat import column
+from physics.kernels.math.vector import row_vector
+from physics.kernels.multibody.data.contact_set import add_scaled, subtract
+from physics.kernels.multibody.narrowphase.box_sat import body_axis
 
 
 @inlined
 def _crossing(p, q, axis, bound):
     """Point of the edge from p to q at coordinate `bound`."""
     t = (bound - p[axis]) / (q[axis] - p[axis])
-    return plus(p, t, minus(q, p))
+    return add_scaled(p, t, subtract(q, p))
 
 
 @inlined
-def is_within(source, count, axis, sign, bound, many):
+def is_polygon_inside(source, count, axis, sign, bound, many):
     """True if sign * coordinate <= bound for every vertex of the polygon in copy `source`: nothing to clip."""
     furthest = -math.inf
     for k in range(count):
@@ -35,7 +36,7 @@ def is_within(source, count, axis, sign, bound, many):
 
 
 @inlined
-def clip(source, count, axis, sign, bound, side, slop, many):
+def clip_polygon(source, count, axis, sign, bound, side, slop, many):
     """Clip the polygon in copy `source` by sign * coordinate <= bound; its vertices, now in the other copy.
 
     A vertex no further than the slop outside stays: it would otherwise come and go with rounding where two faces end
@@ -52,7 +53,7 @@ def clip(source, count, axis, sign, bound, side, slop, many):
             edge[into, kept, 0], edge[into, kept, 1] = edge[source, k, 0], edge[source, k, 1]
             kept += 1
         if (here <= slop) != (there <= slop) and min(here, there) < 0.0:
-            cut = _crossing(vector(p[source], k, 0), vector(p[source], m, 0), axis, sign * bound)
+            cut = _crossing(row_vector(p[source], k, 0), row_vector(p[source], m, 0), axis, sign * bound)
             p[into, kept, 0], p[into, kept, 1], p[into, kept, 2] = cut
             leaving = here <= slop
             edge[into, kept, 0] = edge[source, k, 1] if leaving else side
@@ -68,32 +69,34 @@ def write_incident_face(r, o, axis, sign, many):
     Coordinates along the axes behind `axis` of r, and height along sign * axis above the centre of r.
     """
     R, d, p = many.rotation, many.bodies[o].dims, many.polygon
-    out = column(R, r, axis)
+    out = body_axis(R, r, axis)
     out = (sign * out[0], sign * out[1], sign * out[2])
-    x, y = column(R, r, (axis + 1) % 3), column(R, r, (axis + 2) % 3)
+    x, y = body_axis(R, r, (axis + 1) % 3), body_axis(R, r, (axis + 2) % 3)
     best, face, side = -1.0, 0, 1.0
     for j in range(3):
-        c = qt.dot(out, column(R, o, j))
+        c = qt.dot(out, body_axis(R, o, j))
         if abs(c) > best:
             best, face, side = abs(c), j, -math.copysign(1.0, c)
-    center = plus(minus(vector(many.place, o, 0), vector(many.place, r, 0)), side * d[face], column(R, o, face))
+    center = add_scaled(
+        subtract(row_vector(many.place, o, 0), row_vector(many.place, r, 0)), side * d[face], body_axis(R, o, face)
+    )
     j, k = (face + 1) % 3, (face + 2) % 3
     for vertex in range(4):
         s = d[j] if vertex == 1 or vertex == 2 else -d[j]
         t = d[k] if vertex >= 2 else -d[k]
-        q = plus(plus(center, s, column(R, o, j)), t, column(R, o, k))
+        q = add_scaled(add_scaled(center, s, body_axis(R, o, j)), t, body_axis(R, o, k))
         p[0, vertex, 0], p[0, vertex, 1], p[0, vertex, 2] = qt.dot(x, q), qt.dot(y, q), qt.dot(out, q)
         many.edge[0, vertex, 0], many.edge[0, vertex, 1] = (vertex + 3) % 4, vertex
 
 
 @inlined
-def within(s, bound):
+def clamp_to_half_width(s, bound):
     """s, no further than `bound` from 0."""
     return min(max(s, -bound), bound)
 
 
 @inlined
-def keep_lowest(x, y, many):
+def keep_deepest_vertex(x, y, many):
     """Leave the lowest vertex of copy 0, moved above the face of half edges x and y: the copy it is in.
 
     For blocks that are apart beside each other as well: the plane between them keeps them from each other all the same.
@@ -102,13 +105,17 @@ def keep_lowest(x, y, many):
     for k in range(4):
         if p[0, k, 2] < p[0, low, 2]:
             low = k
-    p[0, 0, 0], p[0, 0, 1], p[0, 0, 2] = within(p[0, low, 0], x), within(p[0, low, 1], y), p[0, low, 2]
+    p[0, 0, 0], p[0, 0, 1], p[0, 0, 2] = (
+        clamp_to_half_width(p[0, low, 0], x),
+        clamp_to_half_width(p[0, low, 1], y),
+        p[0, low, 2],
+    )
     edge[0, 0, 0], edge[0, 0, 1] = (low + 3) % 4, low
     return 0
 
 
 @inlined
-def lowest(source, count, polygon):
+def min_vertex_height(source, count, polygon):
     """Least height of a vertex of the polygon in copy `source`."""
     low = math.inf
     for k in range(count):
@@ -117,13 +124,13 @@ def lowest(source, count, polygon):
 
 
 @inlined
-def edge_at_rim(d, axis, source, count, slop, many):
+def find_rim_edge(d, axis, source, count, slop, many):
     """(its ends, axis of the rim, its sense) where all that is low of the polygon is an edge along the face's rim.
 
     What is within a slop of the lowest vertex is low; two slops from the rim are on it. Without such an edge the ends
     are -1.
     """
-    p, low = many.polygon, lowest(source, count, many.polygon)
+    p, low = many.polygon, min_vertex_height(source, count, many.polygon)
     for side in range(4):
         k, sense = side // 2, 1.0 - 2.0 * (side % 2)
         bound, first, last, is_rim = d[(axis + 1 + k) % 3], -1, -1, True

@@ -10,42 +10,43 @@ from __future__ import annotations
 import math
 
 from physics.kernels.compile.decorators import inlined
-from physics.kernels.multibody.data.contact_set import minus, pair_slop, vector
+from physics.kernels.math.vector import row_vector
+from physics.kernels.multibody.data.contact_set import pair_slop, subtract
 
 # Squared sine of the angle between two edges below which they are parallel: their product says nothing that a face
 # does not. Rounding of the nine products is 1e-16; its square root would still be noise.
-PARALLEL = 1.0e-12
+PARALLEL_SINE_SQUARED = 1.0e-12
 
 # Cosine of the angle between two face normals, or between the product of two edges and a face normal, above which the
 # faces count as lying flat on each other (11 degrees). One point or one edge would let them tip to and fro; the clipped
 # face holds them, at the distance that the edges say.
-FLAT = 0.98
+FLAT_COSINE = 0.98
 
 AXES, SIZES, FROM_A, FROM_B = 0, 1, 2, 3
 
 
 @inlined
-def column(R, b, k):
+def body_axis(R, b, k):
     """Axis k of body b, world frame."""
     return (R[b, k], R[b, 3 + k], R[b, 6 + k])
 
 
 @inlined
-def relate(a, b, many):
+def write_relative_axes(a, b, many):
     """Write `many.mix`: axes of b in a, absolute values, and the way from a to b in both frames."""
     R, mix, place = many.rotation, many.mix, many.place
     for i in range(3):
         for j in range(3):
             c = R[a, i] * R[b, j] + R[a, 3 + i] * R[b, 3 + j] + R[a, 6 + i] * R[b, 6 + j]
             mix[AXES, i, j], mix[SIZES, i, j] = c, abs(c)
-    d = minus(vector(place, b, 0), vector(place, a, 0))
+    d = subtract(row_vector(place, b, 0), row_vector(place, a, 0))
     for i in range(3):
         mix[FROM_A, 0, i] = R[a, i] * d[0] + R[a, 3 + i] * d[1] + R[a, 6 + i] * d[2]
         mix[FROM_B, 0, i] = R[b, i] * d[0] + R[b, 3 + i] * d[1] + R[b, 6 + i] * d[2]
 
 
 @inlined
-def best_face(a, b, margin, many):
+def max_box_face_separation(a, b, margin, many):
     """(separation, face) of the face normal that separates most; the first block's unless the other's is better.
 
     One that separates by more than `margin` [m] is enough.
@@ -70,8 +71,8 @@ def best_face(a, b, margin, many):
 
 
 @inlined
-def best_edges(a, b, margin, many):
-    """(separation, 3 i + j) of the product of edges i of a and j of b that separates most; as `best_face`."""
+def max_box_edge_separation(a, b, margin, many):
+    """(separation, 3 i + j) of edges i of a and j of b whose product separates most; as `max_box_face_separation`."""
     C, S, way = many.mix[AXES], many.mix[SIZES], many.mix[FROM_A, 0]
     da, db = many.bodies[a].dims, many.bodies[b].dims
     best, edges = -math.inf, 0
@@ -79,7 +80,7 @@ def best_edges(a, b, margin, many):
         ip, iq = (i + 1) % 3, (i + 2) % 3
         for j in range(3):
             square = 1.0 - C[i, j] * C[i, j]
-            if square < PARALLEL:
+            if square < PARALLEL_SINE_SQUARED:
                 continue
             jp, jq = (j + 1) % 3, (j + 2) % 3
             apart = abs(way[iq] * C[ip, j] - way[ip] * C[iq, j])
@@ -93,16 +94,16 @@ def best_edges(a, b, margin, many):
 
 
 @inlined
-def lie_flat(face, many):
+def is_face_flat_on_other(face, many):
     """True if a face of the other block is nearly parallel to this one: the two lie flat on each other."""
     S, most = many.mix[SIZES], 0.0
     for k in range(3):
         most = max(most, S[face, k] if face < 3 else S[k, face - 3])
-    return most >= FLAT
+    return most >= FLAT_COSINE
 
 
 @inlined
-def is_along_face(edges, face, many):
+def is_edge_axis_face_normal(edges, face, many):
     """True if the product of two edges is nearly a face normal: the faces then lie flat on each other.
 
     Both turned towards the other block's centre: of slender blocks that cross far from their centres, the face that
@@ -122,4 +123,4 @@ def is_along_face(edges, face, many):
         c = 0.0 if k == j else math.copysign(C[i, 3 - k - j], C[i, 3 - k - j] * towards)
         if k == (j + 2) % 3:
             c = -c
-    return c > 0.0 and c * c >= FLAT * FLAT * square
+    return c > 0.0 and c * c >= FLAT_COSINE * FLAT_COSINE * square

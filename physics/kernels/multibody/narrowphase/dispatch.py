@@ -4,37 +4,50 @@ from __future__ import annotations
 
 import math
 
-from physics.kernels.compile.decorators import inlined, kernel, standing
+from physics.kernels.compile.decorators import inlined, kernel, shared_kernel
 from physics.kernels.half_space import support_function as geo
 from physics.kernels.math import quaternion as qt
-from physics.kernels.multibody.broadphase.sweep_and_prune import find_pairs, may_meet, may_reach_wall, reach
-from physics.kernels.multibody.data.arrays import CONTACTS, PAIRS
-from physics.kernels.multibody.data.contact_set import matrix, minus, pair_slop, plus, record, record_either, vector
+from physics.kernels.math.vector import row_vector
+from physics.kernels.multibody.broadphase.sweep_and_prune import (
+    find_pairs,
+    may_meet,
+    may_reach_wall,
+    surface_motion_bound,
+)
+from physics.kernels.multibody.data.arrays import NUM_CONTACTS, NUM_PAIRS
+from physics.kernels.multibody.data.contact_set import (
+    add_contact,
+    add_ordered_contact,
+    add_scaled,
+    pair_slop,
+    row_matrix,
+    subtract,
+)
 from physics.kernels.multibody.data.hull_tables import FIRST_CORNER, LAST_CORNER
-from physics.kernels.multibody.data.sleeping import wake_near
-from physics.kernels.multibody.narrowphase.box_box import touch_blocks
+from physics.kernels.multibody.data.sleeping import wake_touched_groups
+from physics.kernels.multibody.narrowphase.box_box import collide_blocks
 from physics.kernels.multibody.narrowphase.ellipsoid_distance import (
-    block_point,
-    direction_between,
-    nearest_in_block,
-    point_of,
-    squares_of,
-    start_from,
-    turned_back,
+    block_support_point,
+    center_direction,
+    ellipsoid_matrix,
+    ellipsoid_support_point,
+    max_separation_direction,
+    nearest_on_block,
+    relative_rotation,
 )  # fmt: skip
-from physics.kernels.multibody.narrowphase.hull_ellipsoid import touch_ellipsoid_hull, touch_sphere_hull
-from physics.kernels.multibody.narrowphase.hull_hull import touch_hulls
+from physics.kernels.multibody.narrowphase.hull_ellipsoid import collide_ellipsoid_hull, collide_sphere_hull
+from physics.kernels.multibody.narrowphase.hull_hull import collide_hulls
 from physics.kernels.multibody.narrowphase.hull_pose import corner_arm
-from physics.kernels.state.layout import BLOCK, ELLIPSOID, HULL, NORMAL, OFFSET, SPHERE, VERTEX_COUNT
-from physics.kernels.state.sleeping import sleeps
+from physics.kernels.state.layout import BLOCK, ELLIPSOID, HULL, SPHERE, VERTEX_COUNT, WALL_NORMAL, WALL_OFFSET
+from physics.kernels.state.sleeping import is_asleep
 
 
 @kernel
-def touch_wall(b, wall, margin, h, many):
+def collide_body_wall(b, wall, margin, h, many):
     """Add the contacts of body b with a wall that are at most `margin` [m] from it."""
-    body, R = many.bodies[b], matrix(many.rotation, b)
-    n, x = vector(many.walls, wall, NORMAL), vector(many.place, b, 0)
-    d = qt.dot(n, x) - many.walls[wall, OFFSET]
+    body, R = many.bodies[b], row_matrix(many.rotation, b)
+    n, x = row_vector(many.walls, wall, WALL_NORMAL), row_vector(many.place, b, 0)
+    d = qt.dot(n, x) - many.walls[wall, WALL_OFFSET]
     if d > body.radius + margin:
         return
     dims = (body.dims[0], body.dims[1], body.dims[2])
@@ -45,136 +58,140 @@ def touch_wall(b, wall, margin, h, many):
         for vertex in range(VERTEX_COUNT):
             gap = d + geo.vertex_height(e, vertex)
             if gap <= margin:
-                point = plus(x, 1.0, geo.vertex_arm(dims, R, vertex))
-                record(b, -1 - wall, vertex, -1, n, point, point, gap, h, many)
+                point = add_scaled(x, 1.0, geo.vertex_arm(dims, R, vertex))
+                add_contact(b, -1 - wall, vertex, -1, n, point, point, gap, h, many)
     else:
         gap = d - geo.support(body.shape, dims, e)
-        point = plus(x, 1.0, geo.support_arm(body.shape, dims, R, n, e))
-        record(b, -1 - wall, 0, -1, n, point, point, gap, h, many)
+        point = add_scaled(x, 1.0, geo.support_arm(body.shape, dims, R, n, e))
+        add_contact(b, -1 - wall, 0, -1, n, point, point, gap, h, many)
 
 
 @kernel
-def touch_hull_wall(b, wall, margin, h, many):
+def collide_hull_wall(b, wall, margin, h, many):
     """Add the contacts of hull b with a wall: its corners that are at most `margin` [m] from it, by number."""
-    n, x, first = vector(many.walls, wall, NORMAL), vector(many.place, b, 0), many.hulls.of[b, FIRST_CORNER]
-    d = qt.dot(n, x) - many.walls[wall, OFFSET]
+    n, x, first = (
+        row_vector(many.walls, wall, WALL_NORMAL),
+        row_vector(many.place, b, 0),
+        many.hulls.of[b, FIRST_CORNER],
+    )
+    d = qt.dot(n, x) - many.walls[wall, WALL_OFFSET]
     if d > many.bodies[b].radius + margin:
         return
     for k in range(many.hulls.of[b, LAST_CORNER] - first):
         r = corner_arm(b, first + k, many)
         gap = d + qt.dot(n, r)
         if gap <= margin:
-            point = plus(x, 1.0, r)
-            record(b, -1 - wall, k, -1, n, point, point, gap, h, many)
+            point = add_scaled(x, 1.0, r)
+            add_contact(b, -1 - wall, k, -1, n, point, point, gap, h, many)
 
 
 @inlined
-def touch_spheres(a, b, margin, h, many):
+def collide_spheres(a, b, margin, h, many):
     """Add the contact of two spheres."""
-    x, y = vector(many.place, a, 0), vector(many.place, b, 0)
+    x, y = row_vector(many.place, a, 0), row_vector(many.place, b, 0)
     ra, rb = many.bodies[a].dims[0], many.bodies[b].dims[0]
-    n = minus(x, y)
+    n = subtract(x, y)
     size = math.sqrt(qt.dot(n, n))
     if size - ra - rb > margin:
         return
     n = (n[0] / size, n[1] / size, n[2] / size) if size > 0.0 else (0.0, 1.0, 0.0)
-    record(a, b, 0, -1, n, plus(x, -ra, n), plus(y, rb, n), size - ra - rb, h, many)
+    add_contact(a, b, 0, -1, n, add_scaled(x, -ra, n), add_scaled(y, rb, n), size - ra - rb, h, many)
 
 
 @inlined
-def touch_sphere_block(a, b, margin, h, many):
+def collide_sphere_block(a, b, margin, h, many):
     """Add the contact of a sphere and a block, whichever of the two is a."""
     ball, brick = a, b
     if many.bodies[a].shape == BLOCK:
         ball, brick = b, a
-    R, dims, r = matrix(many.rotation, brick), many.bodies[brick].dims, many.bodies[ball].dims[0]
-    x, y = vector(many.place, ball, 0), vector(many.place, brick, 0)
-    q, n, distance = nearest_in_block(qt.transposed_matvec(R, minus(x, y)), (dims[0], dims[1], dims[2]))
+    R, dims, r = row_matrix(many.rotation, brick), many.bodies[brick].dims, many.bodies[ball].dims[0]
+    x, y = row_vector(many.place, ball, 0), row_vector(many.place, brick, 0)
+    q, n, distance = nearest_on_block(qt.transposed_matvec(R, subtract(x, y)), (dims[0], dims[1], dims[2]))
     if distance - r > margin:
         return
     n = qt.matvec(R, n)
-    record_either(a, b, ball, n, plus(x, -r, n), plus(y, 1.0, qt.matvec(R, q)), distance - r, h, many)
+    add_ordered_contact(a, b, ball, n, add_scaled(x, -r, n), add_scaled(y, 1.0, qt.matvec(R, q)), distance - r, h, many)
 
 
 @kernel
-def touch_ellipsoid(a, b, margin, h, many):
+def collide_ellipsoid(a, b, margin, h, many):
     """Add the contact of an ellipsoid and any body, whichever of the two is a; in the frame of the other one."""
     first, second = a, b
     if many.bodies[a].shape != ELLIPSOID:
         first, second = b, a
-    R, size, d = matrix(many.rotation, second), many.bodies[second].dims, many.bodies[first].dims
-    x, dims = vector(many.place, second, 0), (size[0], size[1], size[2])
-    way = qt.transposed_matvec(R, minus(vector(many.place, first, 0), x))
-    A = squares_of(turned_back(R, matrix(many.rotation, first)), (d[0], d[1], d[2]))
+    R, size, d = row_matrix(many.rotation, second), many.bodies[second].dims, many.bodies[first].dims
+    x, dims = row_vector(many.place, second, 0), (size[0], size[1], size[2])
+    way = qt.transposed_matvec(R, subtract(row_vector(many.place, first, 0), x))
+    A = ellipsoid_matrix(relative_rotation(R, row_matrix(many.rotation, first)), (d[0], d[1], d[2]))
     B = (size[0] * size[0], 0.0, 0.0, size[1] * size[1], 0.0, size[2] * size[2])
     is_block = many.bodies[second].shape == BLOCK
-    start = nearest_in_block(way, dims)[1] if is_block else start_from(way)
-    n, gap = direction_between(A, is_block, B, dims, way, start)
+    start = nearest_on_block(way, dims)[1] if is_block else center_direction(way)
+    n, gap = max_separation_direction(A, is_block, B, dims, way, start)
     if gap > margin:
         return
-    on_first = minus(way, point_of(A, n)[1])
-    on_second = block_point(dims, n, on_first) if is_block else point_of(B, n)[1]
+    on_first = subtract(way, ellipsoid_support_point(A, n)[1])
+    on_second = block_support_point(dims, n, on_first) if is_block else ellipsoid_support_point(B, n)[1]
     n, on_first, on_second = (
         qt.matvec(R, n),
-        plus(x, 1.0, qt.matvec(R, on_first)),
-        plus(x, 1.0, qt.matvec(R, on_second)),
+        add_scaled(x, 1.0, qt.matvec(R, on_first)),
+        add_scaled(x, 1.0, qt.matvec(R, on_second)),
     )
-    record_either(a, b, first, n, on_first, on_second, gap, h, many)
+    add_ordered_contact(a, b, first, n, on_first, on_second, gap, h, many)
 
 
-@standing
+@shared_kernel
 def find_contacts(h, ellipsoids, hulls, world, sleep, many):
     """Write the contact set of the bodies where they are, for a stage of length h.
 
     `ellipsoids` and `hull_tables` are None where the scene has none, `sleep` where it does not declare it. What sleeps
     and comes near nothing is left out.
     """
-    many.counts[CONTACTS] = many.counts[PAIRS] = 0
+    many.counts[NUM_CONTACTS] = many.counts[NUM_PAIRS] = 0
     bodies = many.bodies
     first_row = world * bodies.shape[0]
     if many.settings[0].meet == 1:
         find_pairs(h, many)
     if sleep is not None:
-        wake_near(world, sleep, many)
+        wake_touched_groups(world, sleep, many)
     for b in range(bodies.shape[0]):
         many.touched[b] = 0
-        if sleeps(first_row + b, sleep):
+        if is_asleep(first_row + b, sleep):
             continue
-        margin = reach(b, h, many) + bodies[b].slop
+        margin = surface_motion_bound(b, h, many) + bodies[b].slop
         for wall in range(many.walls.shape[0]):
             if not may_reach_wall(b, wall, h, many):
                 continue
             if hulls is not None:  # noqa: SIM102 (a branch of its own is what the compiler prunes)
                 if bodies[b].shape == HULL:
-                    touch_hull_wall(b, wall, margin, h, many)
+                    collide_hull_wall(b, wall, margin, h, many)
                     continue
-            touch_wall(b, wall, margin, h, many)
-    for k in range(many.counts[PAIRS]):
+            collide_body_wall(b, wall, margin, h, many)
+    for k in range(many.counts[NUM_PAIRS]):
         a, b = many.pairs[k, 0], many.pairs[k, 1]
-        if sleeps(first_row + a, sleep):
-            continue  # and so does b: `wake_near`
+        if is_asleep(first_row + a, sleep):
+            continue  # and so does b: `wake_touched_groups`
         if not may_meet(a, b, h, many):
             continue
-        margin = reach(a, h, many) + reach(b, h, many) + pair_slop(a, b, many)
+        margin = surface_motion_bound(a, h, many) + surface_motion_bound(b, h, many) + pair_slop(a, b, many)
         first, second = bodies[a].shape, bodies[b].shape
         if hulls is not None:
             if ellipsoids is not None:  # noqa: SIM102 (as above)
                 if (first == HULL and second == ELLIPSOID) or (first == ELLIPSOID and second == HULL):
-                    touch_ellipsoid_hull(a, b, margin, h, many)
+                    collide_ellipsoid_hull(a, b, margin, h, many)
                     continue
             if first == HULL or second == HULL:
                 if first == SPHERE or second == SPHERE:
-                    touch_sphere_hull(a, b, margin, h, many)
+                    collide_sphere_hull(a, b, margin, h, many)
                 else:
-                    touch_hulls(a, b, margin, h, many)
+                    collide_hulls(a, b, margin, h, many)
                 continue
         if ellipsoids is not None:  # noqa: SIM102 (as above)
             if first == ELLIPSOID or second == ELLIPSOID:
-                touch_ellipsoid(a, b, margin, h, many)
+                collide_ellipsoid(a, b, margin, h, many)
                 continue
         if first == BLOCK and second == BLOCK:
-            touch_blocks(a, b, margin, h, many)
+            collide_blocks(a, b, margin, h, many)
         elif first == SPHERE and second == SPHERE:
-            touch_spheres(a, b, margin, h, many)
+            collide_spheres(a, b, margin, h, many)
         else:
-            touch_sphere_block(a, b, margin, h, many)
+            collide_sphere_block(a, b, margin, h, many)

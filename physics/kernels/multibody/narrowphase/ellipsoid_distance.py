@@ -22,20 +22,20 @@ import math
 
 from physics.kernels.compile.decorators import inlined, kernel
 from physics.kernels.math import quaternion as qt
-from physics.kernels.multibody.data.contact_set import minus
+from physics.kernels.multibody.data.contact_set import subtract
 
 # Newton steps at most; five are usual from a centre to centre start.
-STEPS = 40
+_NEWTON_STEPS = 40
 
 # Turn of the direction below which it is found [rad]: σ is off by its square.
-FOUND = 1.0e-10
+_DIRECTION_TOLERANCE = 1.0e-10
 
 # Halvings of a step that does not make σ larger.
-HALVINGS = 12
+_STEP_HALVINGS = 12
 
 
 @inlined
-def squares_of(C, dims):
+def ellipsoid_matrix(C, dims):
     """D = C diag(dims²) Cᵀ (00, 01, 02, 11, 12, 22), C from the ellipsoid's frame to the target frame."""
     a, b, c = dims[0] * dims[0], dims[1] * dims[1], dims[2] * dims[2]
     return (
@@ -49,7 +49,7 @@ def squares_of(C, dims):
 
 
 @inlined
-def point_of(D, n):
+def ellipsoid_support_point(D, n):
     """(support s, point of normal n) of an ellipsoid."""
     x = D[0] * n[0] + D[1] * n[1] + D[2] * n[2]
     y = D[1] * n[0] + D[3] * n[1] + D[4] * n[2]
@@ -59,7 +59,7 @@ def point_of(D, n):
 
 
 @inlined
-def _bend(D, s, p):
+def _support_hessian(D, s, p):
     """Second derivative of the support function (00, 01, 02, 11, 12, 22)."""
     return (
         (D[0] - p[0] * p[0]) / s, (D[1] - p[0] * p[1]) / s, (D[2] - p[0] * p[2]) / s,
@@ -73,29 +73,29 @@ def _signed(x):
 
 
 @inlined
-def separation(A, is_block, B, dims, d, n):
+def support_separation(A, is_block, B, dims, d, n):
     """σ(n); `B` is the ellipsoid b, `dims` the half edges of the block b."""
-    s, _ = point_of(A, n)
+    s, _ = ellipsoid_support_point(A, n)
     if is_block:
         return qt.dot(n, d) - s - (dims[0] * abs(n[0]) + dims[1] * abs(n[1]) + dims[2] * abs(n[2]))
-    r, _ = point_of(B, n)
+    r, _ = ellipsoid_support_point(B, n)
     return qt.dot(n, d) - s - r
 
 
 @inlined
-def _kept(free, size):
+def _reduced_gradient(free, size):
     """Reduce one component of the gradient where nᵢ = 0, for a half edge `size`: 0 keeps it there."""
     return free - math.copysign(size, free) if abs(free) > size else 0.0
 
 
 @inlined
-def _way_to_kink(x, dx, t):
+def _step_to_kink(x, dx, t):
     """The share t of a step dx that component x of the direction can take until it is 0."""
     return min(t, -x / dx) if x * (x + t * dx) < 0.0 else t
 
 
 @inlined
-def _moved(x, dx, t, at_kink):
+def _step_component(x, dx, t, at_kink):
     """Component x of the direction after t dx: exactly 0 where that is where its kink is."""
     return 0.0 if at_kink and x * dx < 0.0 and -x / dx <= t else x + t * dx
 
@@ -107,7 +107,7 @@ def _unit(x, y, z):
 
 
 @inlined
-def _step(H, g, n, k0, k1, k2):
+def _newton_direction(H, g, n, k0, k1, k2):
     """δ of (H + tr(H) n nᵀ) δ = g in the components with k = 1, the others 0; g ⟂ n."""
     t = H[0] + H[3] + H[5]
     a = k0 * (H[0] + t * n[0] * n[0]) + (1.0 - k0)
@@ -127,13 +127,13 @@ def _step(H, g, n, k0, k1, k2):
 
 
 @kernel
-def direction_between(A, is_block, B, dims, d, n):
+def max_separation_direction(A, is_block, B, dims, d, n):
     """(unit vector of the largest σ found from n on, σ there).
 
     Parameters
     ----------
     A, B : tuples of 6 floats
-        `squares_of` the ellipsoids a and b, in the frame of b; B of a block is not read.
+        `ellipsoid_matrix` the ellipsoids a and b, in the frame of b; B of a block is not read.
     is_block : bool
         Whether b is a block with half edges `dims`.
     d : tuple of 3 floats
@@ -141,45 +141,49 @@ def direction_between(A, is_block, B, dims, d, n):
     n : tuple of 3 floats
         Unit vector to start from, out of b.
     """
-    best = separation(A, is_block, B, dims, d, n)
-    for _ in range(STEPS):
-        s, p = point_of(A, n)
-        H = _bend(A, s, p)
+    best = support_separation(A, is_block, B, dims, d, n)
+    for _ in range(_NEWTON_STEPS):
+        s, p = ellipsoid_support_point(A, n)
+        H = _support_hessian(A, s, p)
         g = (d[0] - p[0], d[1] - p[1], d[2] - p[2])
         k0 = k1 = k2 = 1.0
         if is_block:
             g = (
-                g[0] - math.copysign(dims[0], n[0]) if n[0] != 0.0 else _kept(g[0], dims[0]),
-                g[1] - math.copysign(dims[1], n[1]) if n[1] != 0.0 else _kept(g[1], dims[1]),
-                g[2] - math.copysign(dims[2], n[2]) if n[2] != 0.0 else _kept(g[2], dims[2]),
+                g[0] - math.copysign(dims[0], n[0]) if n[0] != 0.0 else _reduced_gradient(g[0], dims[0]),
+                g[1] - math.copysign(dims[1], n[1]) if n[1] != 0.0 else _reduced_gradient(g[1], dims[1]),
+                g[2] - math.copysign(dims[2], n[2]) if n[2] != 0.0 else _reduced_gradient(g[2], dims[2]),
             )
             k0 = 0.0 if n[0] == 0.0 and g[0] == 0.0 else 1.0
             k1 = 0.0 if n[1] == 0.0 and g[1] == 0.0 else 1.0
             k2 = 0.0 if n[2] == 0.0 and g[2] == 0.0 else 1.0
         else:
-            r, q = point_of(B, n)
+            r, q = ellipsoid_support_point(B, n)
             g = (g[0] - q[0], g[1] - q[1], g[2] - q[2])
-            K = _bend(B, r, q)
+            K = _support_hessian(B, r, q)
             H = (H[0] + K[0], H[1] + K[1], H[2] + K[2], H[3] + K[3], H[4] + K[4], H[5] + K[5])
         apart, along = max(best, 0.0), qt.dot(g, n)
         H = (H[0] + apart, H[1], H[2], H[3] + apart, H[4], H[5] + apart)
         g = (k0 * (g[0] - along * n[0]), k1 * (g[1] - along * n[1]), k2 * (g[2] - along * n[2]))
-        e = _step(H, g, n, k0, k1, k2)
+        e = _newton_direction(H, g, n, k0, k1, k2)
         if is_block:  # at a kink only the side counts on which the gradient is known
             k0 = 0.0 if n[0] == 0.0 and e[0] * g[0] < 0.0 else k0
             k1 = 0.0 if n[1] == 0.0 and e[1] * g[1] < 0.0 else k1
             k2 = 0.0 if n[2] == 0.0 and e[2] * g[2] < 0.0 else k2
             g = (k0 * g[0], k1 * g[1], k2 * g[2])
-            e = _step(H, g, n, k0, k1, k2)
-        if not max(abs(e[0]), abs(e[1]), abs(e[2])) > FOUND:
+            e = _newton_direction(H, g, n, k0, k1, k2)
+        if not max(abs(e[0]), abs(e[1]), abs(e[2])) > _DIRECTION_TOLERANCE:
             break
         t, found = 1.0, False
         if is_block:
-            t = _way_to_kink(n[0], e[0], _way_to_kink(n[1], e[1], _way_to_kink(n[2], e[2], t)))
-        for trial in range(HALVINGS):
+            t = _step_to_kink(n[0], e[0], _step_to_kink(n[1], e[1], _step_to_kink(n[2], e[2], t)))
+        for trial in range(_STEP_HALVINGS):
             at_kink = is_block and trial == 0
-            m = _unit(_moved(n[0], e[0], t, at_kink), _moved(n[1], e[1], t, at_kink), _moved(n[2], e[2], t, at_kink))
-            value = separation(A, is_block, B, dims, d, m)
+            m = _unit(
+                _step_component(n[0], e[0], t, at_kink),
+                _step_component(n[1], e[1], t, at_kink),
+                _step_component(n[2], e[2], t, at_kink),
+            )
+            value = support_separation(A, is_block, B, dims, d, m)
             if value > best:
                 n, best, found = m, value, True
                 break
@@ -190,7 +194,7 @@ def direction_between(A, is_block, B, dims, d, n):
 
 
 @inlined
-def start_from(d):
+def center_direction(d):
     """Direction from the centre of b, the origin, to that of a; any where they are the same."""
     size = math.sqrt(qt.dot(d, d))
     if size > 0.0:
@@ -199,7 +203,7 @@ def start_from(d):
 
 
 @inlined
-def block_point(dims, n, near):
+def block_support_point(dims, n, near):
     """Point of a block with normal n that is nearest to `near`, a point in its frame."""
     return (
         math.copysign(dims[0], n[0]) if n[0] != 0.0 else min(max(near[0], -dims[0]), dims[0]),
@@ -209,10 +213,10 @@ def block_point(dims, n, near):
 
 
 @inlined
-def nearest_in_block(p, d):
+def nearest_on_block(p, d):
     """(nearest point on the surface of a block, outward normal, distance) for a point p, all in its frame."""
     q = (min(max(p[0], -d[0]), d[0]), min(max(p[1], -d[1]), d[1]), min(max(p[2], -d[2]), d[2]))
-    w = minus(p, q)
+    w = subtract(p, q)
     size = math.sqrt(qt.dot(w, w))
     if size > 0.0:
         return q, (w[0] / size, w[1] / size, w[2] / size), size
@@ -228,7 +232,7 @@ def nearest_in_block(p, d):
 
 
 @inlined
-def turned_back(R, S):
+def relative_rotation(R, S):
     """Rᵀ S: from the frame of S to that of R."""
     x = qt.transposed_matvec(R, (S[0], S[3], S[6]))
     y = qt.transposed_matvec(R, (S[1], S[4], S[7]))

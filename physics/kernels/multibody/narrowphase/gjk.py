@@ -14,31 +14,32 @@ import math
 
 from physics.kernels.compile.decorators import inlined, kernel
 from physics.kernels.math import quaternion as qt
-from physics.kernels.multibody.data.contact_set import minus, plus, put, vector
+from physics.kernels.math.vector import row_vector
+from physics.kernels.multibody.data.contact_set import add_scaled, put_vector, subtract
 from physics.kernels.multibody.data.hull_tables import FIRST_CORNER, LAST_CORNER
 from physics.kernels.state.layout import BLOCK, HULL, SPHERE
 
 # Rounds at most; polyhedra take some five, round bodies that nearly touch some twenty.
-ROUNDS = 64
+_MAX_ITERATIONS = 64
 
 # Share of the distance that the bound along n may fall short of it.
-SHORT = 0.1
+_GAP_TOLERANCE = 0.1
 
 
 @kernel
-def corner_of_hull(b, k, many):
+def hull_support_vertex(b, k, many):
     """Corner of hull b that reaches farthest along k, both in its frame [m]."""
     best, first = -math.inf, many.hulls.of[b, FIRST_CORNER]
     far = first
     for i in range(first, many.hulls.of[b, LAST_CORNER]):
-        reach = qt.dot(k, vector(many.hulls.corners, i, 0))
+        reach = qt.dot(k, row_vector(many.hulls.corners, i, 0))
         if reach > best:
             best, far = reach, i
-    return vector(many.hulls.corners, far, 0)
+    return row_vector(many.hulls.corners, far, 0)
 
 
 @inlined
-def _corner(b, x, R, k, hulls, many):
+def _support_point(b, x, R, k, hulls, many):
     """Point of body b (of a sphere its centre) that is farthest along k, for its geometric centre at x [m]."""
     d, shape = many.bodies[b].dims, many.bodies[b].shape
     if shape == SPHERE:
@@ -46,73 +47,73 @@ def _corner(b, x, R, k, hulls, many):
     e = qt.transposed_matvec(R, k)
     if hulls is not None:  # noqa: SIM102 (a branch of its own is what the compiler prunes)
         if shape == HULL:
-            return plus(x, 1.0, qt.matvec(R, corner_of_hull(b, e, many)))
+            return add_scaled(x, 1.0, qt.matvec(R, hull_support_vertex(b, e, many)))
     if shape == BLOCK:
         r = (math.copysign(d[0], e[0]), math.copysign(d[1], e[1]), math.copysign(d[2], e[2]))
-        return plus(x, 1.0, qt.matvec(R, r))
+        return add_scaled(x, 1.0, qt.matvec(R, r))
     f = (d[0] * e[0], d[1] * e[1], d[2] * e[2])
     s = math.sqrt(qt.dot(f, f))
-    return plus(x, 1.0 / s, qt.matvec(R, (d[0] * f[0], d[1] * f[1], d[2] * f[2])))
+    return add_scaled(x, 1.0 / s, qt.matvec(R, (d[0] * f[0], d[1] * f[1], d[2] * f[2])))
 
 
 @kernel
-def nearest_to_origin(count, many):
+def closest_on_simplex(count, many):
     """Point nearest to the origin of the simplex of the first `count` corners in `many.simplex` and the next one.
 
     Only those corners stay of which it is made: (point, how many). The new one is one of them, since the point comes
     nearer with it than without. (0, 0, 0) inside a tetrahedron.
     """
     S = many.simplex
-    w = vector(S, count, 0)
+    w = row_vector(S, count, 0)
     best, v, i_best, j_best = qt.dot(w, w), w, -1, -1
     is_inside = count == 3
     for i in range(count):
-        p = vector(S, i, 0)
-        d = minus(p, w)
+        p = row_vector(S, i, 0)
+        d = subtract(p, w)
         square, t = qt.dot(d, d), -qt.dot(w, d)
         if 0.0 < t < square:
-            u = plus(w, t / square, d)
+            u = add_scaled(w, t / square, d)
             if qt.dot(u, u) < best:
                 best, v, i_best, j_best = qt.dot(u, u), u, i, -1
         for j in range(i):
-            q = vector(S, j, 0)
-            n = qt.cross(d, minus(q, w))
+            q = row_vector(S, j, 0)
+            n = qt.cross(d, subtract(q, w))
             area = qt.dot(n, n)
             if not area > 0.0:
                 is_inside = False
                 continue
             height = qt.dot(n, w)
-            if count == 3 and height * qt.dot(n, minus(w, vector(S, 3 - i - j, 0))) < 0.0:
+            if count == 3 and height * qt.dot(n, subtract(w, row_vector(S, 3 - i - j, 0))) < 0.0:
                 is_inside = False
             u = (height / area * n[0], height / area * n[1], height / area * n[2])
-            a, b, c = minus(p, u), minus(q, u), minus(w, u)
+            a, b, c = subtract(p, u), subtract(q, u), subtract(w, u)
             is_above = qt.dot(n, qt.cross(a, b)) > 0.0 and qt.dot(n, qt.cross(b, c)) > 0.0
             if is_above and qt.dot(n, qt.cross(c, a)) > 0.0 and qt.dot(u, u) < best:
                 best, v, i_best, j_best = qt.dot(u, u), u, i, j
     if is_inside:
-        p, q, r = vector(S, 0, 0), vector(S, 1, 0), vector(S, 2, 0)
-        n = qt.cross(minus(q, p), minus(r, p))
-        if qt.dot(n, p) * qt.dot(n, minus(p, w)) >= 0.0:
+        p, q, r = row_vector(S, 0, 0), row_vector(S, 1, 0), row_vector(S, 2, 0)
+        n = qt.cross(subtract(q, p), subtract(r, p))
+        if qt.dot(n, p) * qt.dot(n, subtract(p, w)) >= 0.0:
             return (0.0, 0.0, 0.0), count
     count = 0
     if j_best >= 0:  # j < i: nothing is written over before it is read
-        put(S, 0, 0, vector(S, j_best, 0))
+        put_vector(S, 0, 0, row_vector(S, j_best, 0))
         count = 1
     if i_best >= 0:
-        put(S, count, 0, vector(S, i_best, 0))
+        put_vector(S, count, 0, row_vector(S, i_best, 0))
         count += 1
-    put(S, count, 0, w)
+    put_vector(S, count, 0, w)
     return v, count + 1
 
 
 @inlined
-def _core(b, many):
+def _core_radius(b, many):
     """Radius around the core of body b [m]: a sphere's own, 0 of other shapes."""
     return many.bodies[b].dims[0] if many.bodies[b].shape == SPHERE else 0.0
 
 
 @kernel
-def distance_between(a, b, x, R, y, S, way, touch, hulls, many):
+def gjk_distance(a, b, x, R, y, S, way, touch, hulls, many):
     """Distance of body a at (x, R) from body b at (y, S), or a bound that is nearly it: (direction out of b, distance).
 
     Parameters
@@ -126,19 +127,22 @@ def distance_between(a, b, x, R, y, S, way, touch, hulls, many):
     touch : float
         Distance below which no more is asked [m]: 0 is returned then.
     """
-    v, count, core = way, 0, _core(a, many) + _core(b, many)
+    v, count, core = way, 0, _core_radius(a, many) + _core_radius(b, many)
     best, n = -math.inf, way
-    for _ in range(ROUNDS):
+    for _ in range(_MAX_ITERATIONS):
         back = (-v[0], -v[1], -v[2])
-        w = minus(_corner(a, minus(x, y), R, back, hulls, many), _corner(b, (0.0, 0.0, 0.0), S, v, hulls, many))
+        w = subtract(
+            _support_point(a, subtract(x, y), R, back, hulls, many),
+            _support_point(b, (0.0, 0.0, 0.0), S, v, hulls, many),
+        )
         size = math.sqrt(qt.dot(v, v))
         bound = qt.dot(v, w) / size - core
         if bound > best:
             best, n = bound, (v[0] / size, v[1] / size, v[2] / size)
-        if count > 0 and best >= (1.0 - SHORT) * (size - core):
+        if count > 0 and best >= (1.0 - _GAP_TOLERANCE) * (size - core):
             break
-        put(many.simplex, count, 0, w)
-        v, count = nearest_to_origin(count, many)
+        put_vector(many.simplex, count, 0, w)
+        v, count = closest_on_simplex(count, many)
         far = math.sqrt(qt.dot(v, v)) - core
         if not far > touch:
             return n, 0.0

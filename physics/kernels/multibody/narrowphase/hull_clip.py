@@ -11,26 +11,27 @@ import math
 
 from physics.kernels.compile.decorators import inlined
 from physics.kernels.math import quaternion as qt
-from physics.kernels.multibody.data.contact_set import minus, plus, vector
+from physics.kernels.math.vector import row_vector
+from physics.kernels.multibody.data.contact_set import add_scaled, subtract
 from physics.kernels.multibody.data.hull_tables import FIRST_CORNER, FIRST_FACE, LAST_CORNER, LAST_FACE
 
 # An edge of the clipped polygon from this number on is a side of the face that clips it; below, an edge of its own.
-SIDES = 64
+CLIP_SIDE_OFFSET = 64
 
 
 @inlined
-def _side(which, ring, k, first, last, out, hulls):
+def _side_plane(which, ring, k, first, last, out, hulls):
     """(outward unit normal, bound) of the plane through side k of a face, along its normal `out`."""
-    p = vector(hulls.corner[which], ring[first + k], 0)
-    q = vector(hulls.corner[which], ring[first + k + 1 if first + k + 1 < last else first], 0)
-    m = qt.cross(minus(q, p), out)
+    p = row_vector(hulls.corner[which], ring[first + k], 0)
+    q = row_vector(hulls.corner[which], ring[first + k + 1 if first + k + 1 < last else first], 0)
+    m = qt.cross(subtract(q, p), out)
     s = 1.0 / math.sqrt(qt.dot(m, m))
     m = (s * m[0], s * m[1], s * m[2])
     return m, qt.dot(m, p)
 
 
 @inlined
-def _clip(source, count, m, bound, side, slop, hulls):
+def _clip_polygon(source, count, m, bound, side, slop, hulls):
     """Clip the polygon in copy `source` by m·x <= bound: (its copy, its vertices).
 
     A vertex no further than the slop outside stays: it would otherwise come and go with rounding where two faces end
@@ -39,19 +40,19 @@ def _clip(source, count, m, bound, side, slop, hulls):
     p, sides, into = hulls.polygon, hulls.sides, 1 - source
     furthest = -math.inf
     for k in range(count):
-        furthest = max(furthest, qt.dot(m, vector(p[source], k, 0)))
+        furthest = max(furthest, qt.dot(m, row_vector(p[source], k, 0)))
     if furthest - bound <= slop:
         return source, count
     kept = 0
     for k in range(count):
-        v, w = vector(p[source], k, 0), vector(p[source], (k + 1) % count, 0)
+        v, w = row_vector(p[source], k, 0), row_vector(p[source], (k + 1) % count, 0)
         here, there = qt.dot(m, v) - bound, qt.dot(m, w) - bound
         if here <= slop and kept < p.shape[1]:
             p[into, kept, 0], p[into, kept, 1], p[into, kept, 2] = v
             sides[into, kept, 0], sides[into, kept, 1] = sides[source, k, 0], sides[source, k, 1]
             kept += 1
         if (here <= slop) != (there <= slop) and min(here, there) < 0.0 and kept < p.shape[1]:
-            p[into, kept, 0], p[into, kept, 1], p[into, kept, 2] = plus(v, here / (here - there), minus(w, v))
+            p[into, kept, 0], p[into, kept, 1], p[into, kept, 2] = add_scaled(v, here / (here - there), subtract(w, v))
             leaving = here <= slop
             sides[into, kept, 0] = sides[source, k, 1] if leaving else side
             sides[into, kept, 1] = side if leaving else sides[source, k, 1]
@@ -69,7 +70,7 @@ def _has_corner(f, corner, hulls):
 
 
 @inlined
-def incident(which, o, out, many):
+def write_hull_incident_face(which, o, out, many):
     """Write a face of body o, number `which` of the pair, into copy 0: its vertices.
 
     Of the faces with the corner that reaches furthest against `out` the one that looks most against it: the face that
@@ -77,31 +78,31 @@ def incident(which, o, out, many):
     """
     hulls, low, deepest = many.hulls, math.inf, 0
     for k in range(hulls.of[o, LAST_CORNER] - hulls.of[o, FIRST_CORNER]):
-        height = qt.dot(out, vector(hulls.corner[which], k, 0))
+        height = qt.dot(out, row_vector(hulls.corner[which], k, 0))
         if height < low:
             low, deepest = height, k
     first, face, best = hulls.of[o, FIRST_FACE], 0, math.inf
     for f in range(hulls.of[o, LAST_FACE] - first):
-        c = qt.dot(out, vector(hulls.normal[which], f, 0))
+        c = qt.dot(out, row_vector(hulls.normal[which], f, 0))
         if c < best and _has_corner(first + f, deepest, hulls):
             best, face = c, f
     start, stop = hulls.loops[first + face, 0], hulls.loops[first + face, 1]
     for k in range(stop - start):
-        r = vector(hulls.corner[which], hulls.ring[start + k], 0)
+        r = row_vector(hulls.corner[which], hulls.ring[start + k], 0)
         hulls.polygon[0, k, 0], hulls.polygon[0, k, 1], hulls.polygon[0, k, 2] = r
         hulls.sides[0, k, 0], hulls.sides[0, k, 1] = k - 1 if k > 0 else stop - start - 1, k
     return stop - start
 
 
 @inlined
-def clip_face(which, r, o, face, slop, many):
+def clip_incident_face(which, r, o, face, slop, many):
     """Clip the face of body o that looks against this one of body r, number `which`, by its sides: (copy, vertices)."""
     hulls = many.hulls
-    out = vector(hulls.normal[which], face, 0)
-    source, count = 0, incident(1 - which, o, out, many)
+    out = row_vector(hulls.normal[which], face, 0)
+    source, count = 0, write_hull_incident_face(1 - which, o, out, many)
     k = hulls.of[r, FIRST_FACE] + face
     first, last = hulls.loops[k, 0], hulls.loops[k, 1]
     for side in range(last - first):
-        m, bound = _side(which, hulls.ring, side, first, last, out, hulls)
-        source, count = _clip(source, count, m, bound, SIDES + side, slop, hulls)
+        m, bound = _side_plane(which, hulls.ring, side, first, last, out, hulls)
+        source, count = _clip_polygon(source, count, m, bound, CLIP_SIDE_OFFSET + side, slop, hulls)
     return source, count

@@ -6,7 +6,14 @@ import math
 
 from physics.kernels.compile.decorators import inlined, kernel
 from physics.kernels.math import quaternion as qt
-from physics.kernels.multibody.data.contact_set import matrix, minus, plus, record_either, tangents, vector
+from physics.kernels.math.vector import row_vector
+from physics.kernels.multibody.data.contact_set import (
+    add_ordered_contact,
+    add_scaled,
+    row_matrix,
+    subtract,
+    tangent_basis,
+)
 from physics.kernels.multibody.data.hull_tables import (
     FIRST_CORNER,
     FIRST_EDGE,
@@ -16,17 +23,17 @@ from physics.kernels.multibody.data.hull_tables import (
     LAST_FACE,
 )
 from physics.kernels.multibody.narrowphase.ellipsoid_distance import (
-    direction_between,
-    nearest_in_block,
-    point_of,
-    squares_of,
-    turned_back,
+    ellipsoid_matrix,
+    ellipsoid_support_point,
+    max_separation_direction,
+    nearest_on_block,
+    relative_rotation,
 )
-from physics.kernels.multibody.narrowphase.hull_hull import edge_of
-from physics.kernels.multibody.narrowphase.hull_pose import is_above_face, nearest_on_face, put_in_place
+from physics.kernels.multibody.narrowphase.hull_hull import hull_edge
+from physics.kernels.multibody.narrowphase.hull_pose import is_above_face, nearest_on_face, pose_hull
 from physics.kernels.state.layout import ELLIPSOID, SPHERE
 
-NO_SQUARES = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+_NO_ELLIPSOID = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
 @inlined
@@ -38,17 +45,17 @@ def nearest_on_hull(b, x, many):
     """
     hulls, best, face = many.hulls, -math.inf, 0
     for f in range(hulls.of[b, LAST_FACE] - hulls.of[b, FIRST_FACE]):
-        height = qt.dot(vector(hulls.normal[0], f, 0), x) - hulls.offset[0, f]
+        height = qt.dot(row_vector(hulls.normal[0], f, 0), x) - hulls.offset[0, f]
         if height > best:
             best, face = height, f
-    n = vector(hulls.normal[0], face, 0)
-    y, distance = plus(x, -best, n), best
+    n = row_vector(hulls.normal[0], face, 0)
+    y, distance = add_scaled(x, -best, n), best
     if best > 0.0:
         square = math.inf
         for f in range(hulls.of[b, LAST_FACE] - hulls.of[b, FIRST_FACE]):
-            if qt.dot(vector(hulls.normal[0], f, 0), x) > hulls.offset[0, f]:
+            if qt.dot(row_vector(hulls.normal[0], f, 0), x) > hulls.offset[0, f]:
                 near = nearest_on_face(0, b, f, x, many)
-                w = minus(x, near)
+                w = subtract(x, near)
                 if 0.0 < qt.dot(w, w) < square:
                     square, y = qt.dot(w, w), near
                     distance = math.sqrt(square)
@@ -57,18 +64,18 @@ def nearest_on_hull(b, x, many):
 
 
 @kernel
-def touch_sphere_hull(a, b, margin, h, many):
+def collide_sphere_hull(a, b, margin, h, many):
     """Add the contact of a sphere and a hull, whichever of the two is a."""
     ball, hull = a, b
     if many.bodies[b].shape == SPHERE:
         ball, hull = b, a
-    origin, r = vector(many.place, hull, 0), many.bodies[ball].dims[0]
-    x = vector(many.place, ball, 0)
-    put_in_place(0, hull, origin, many)
-    y, n, distance = nearest_on_hull(hull, minus(x, origin), many)
+    origin, r = row_vector(many.place, hull, 0), many.bodies[ball].dims[0]
+    x = row_vector(many.place, ball, 0)
+    pose_hull(0, hull, origin, many)
+    y, n, distance = nearest_on_hull(hull, subtract(x, origin), many)
     if distance - r > margin:
         return
-    record_either(a, b, ball, n, plus(x, -r, n), plus(origin, 1.0, y), distance - r, h, many)
+    add_ordered_contact(a, b, ball, n, add_scaled(x, -r, n), add_scaled(origin, 1.0, y), distance - r, h, many)
 
 
 @inlined
@@ -76,30 +83,32 @@ def _separation(hull, A, way, n, many):
     """σ(n) of an ellipsoid from a hull, number 0 of the pair; see `ellipsoid_distance`."""
     hulls, reach = many.hulls, -math.inf
     for k in range(hulls.of[hull, LAST_CORNER] - hulls.of[hull, FIRST_CORNER]):
-        reach = max(reach, qt.dot(n, vector(hulls.corner[0], k, 0)))
-    return qt.dot(n, way) - point_of(A, n)[0] - reach
+        reach = max(reach, qt.dot(n, row_vector(hulls.corner[0], k, 0)))
+    return qt.dot(n, way) - ellipsoid_support_point(A, n)[0] - reach
 
 
 @inlined
 def _direction_from_edge(e, hull, S, dims, way, many):
     """Direction of the largest separation of an ellipsoid (attitude S, at `way`) from edge e of a hull alone.
 
-    That is a block without width and height: `direction_between` in the frame of the edge.
+    That is a block without width and height: `max_separation_direction` in the frame of the edge.
     """
-    p, d, _, _ = edge_of(0, hull, e, many)
+    p, d, _, _ = hull_edge(0, hull, e, many)
     half = 0.5 * math.sqrt(qt.dot(d, d))
     u = (0.5 * d[0] / half, 0.5 * d[1] / half, 0.5 * d[2] / half)
-    v, w = tangents(u)
+    v, w = tangent_basis(u)
     E = (u[0], v[0], w[0], u[1], v[1], w[1], u[2], v[2], w[2])
-    there = qt.transposed_matvec(E, minus(way, plus(p, 0.5, d)))
+    there = qt.transposed_matvec(E, subtract(way, add_scaled(p, 0.5, d)))
     segment = (half, 0.0, 0.0)
-    start = nearest_in_block(there, segment)[1]
-    n, _ = direction_between(squares_of(turned_back(E, S), dims), True, NO_SQUARES, segment, there, start)
+    start = nearest_on_block(there, segment)[1]
+    n, _ = max_separation_direction(
+        ellipsoid_matrix(relative_rotation(E, S), dims), True, _NO_ELLIPSOID, segment, there, start
+    )
     return qt.matvec(E, n)
 
 
 @kernel
-def touch_ellipsoid_hull(a, b, margin, h, many):
+def collide_ellipsoid_hull(a, b, margin, h, many):
     """Add the contact of an ellipsoid and a hull, whichever of the two is a.
 
     The direction is that of the largest separation, as in `ellipsoid_distance`. Where the ellipsoid's point over the
@@ -110,23 +119,23 @@ def touch_ellipsoid_hull(a, b, margin, h, many):
     round_, hull = a, b
     if many.bodies[b].shape == ELLIPSOID:
         round_, hull = b, a
-    hulls, origin, size = many.hulls, vector(many.place, hull, 0), many.bodies[round_].dims
-    put_in_place(0, hull, origin, many)
+    hulls, origin, size = many.hulls, row_vector(many.place, hull, 0), many.bodies[round_].dims
+    pose_hull(0, hull, origin, many)
     way, S, dims = (
-        minus(vector(many.place, round_, 0), origin),
-        matrix(many.rotation, round_),
+        subtract(row_vector(many.place, round_, 0), origin),
+        row_matrix(many.rotation, round_),
         (size[0], size[1], size[2]),
     )
-    A, best, face = squares_of(S, dims), -math.inf, 0
+    A, best, face = ellipsoid_matrix(S, dims), -math.inf, 0
     for f in range(hulls.of[hull, LAST_FACE] - hulls.of[hull, FIRST_FACE]):
-        m = vector(hulls.normal[0], f, 0)
-        gap = qt.dot(m, way) - point_of(A, m)[0] - hulls.offset[0, f]
+        m = row_vector(hulls.normal[0], f, 0)
+        gap = qt.dot(m, way) - ellipsoid_support_point(A, m)[0] - hulls.offset[0, f]
         if gap > best:
             best, face = gap, f
     if best > margin:
         return
-    n = vector(hulls.normal[0], face, 0)
-    if not is_above_face(0, hull, face, minus(way, point_of(A, n)[1]), many):
+    n = row_vector(hulls.normal[0], face, 0)
+    if not is_above_face(0, hull, face, subtract(way, ellipsoid_support_point(A, n)[1]), many):
         for e in range(hulls.of[hull, LAST_EDGE] - hulls.of[hull, FIRST_EDGE]):
             m = _direction_from_edge(e, hull, S, dims, way, many)
             gap = _separation(hull, A, way, m, many)
@@ -134,6 +143,6 @@ def touch_ellipsoid_hull(a, b, margin, h, many):
                 best, n = gap, m
     if best > margin:
         return
-    on_round = plus(origin, 1.0, minus(way, point_of(A, n)[1]))
-    on_hull = plus(on_round, -best, n)
-    record_either(a, b, round_, n, on_round, on_hull, best, h, many)
+    on_round = add_scaled(origin, 1.0, subtract(way, ellipsoid_support_point(A, n)[1]))
+    on_hull = add_scaled(on_round, -best, n)
+    add_ordered_contact(a, b, round_, n, on_round, on_hull, best, h, many)

@@ -15,31 +15,36 @@ import math
 
 from physics.kernels.compile.decorators import inlined, kernel
 from physics.kernels.math import quaternion as qt
-from physics.kernels.multibody.data.contact_set import minus, pair_slop, plus, record, vector
+from physics.kernels.math.vector import row_vector
+from physics.kernels.multibody.data.contact_set import add_contact, add_scaled, pair_slop, subtract
 from physics.kernels.multibody.data.hull_tables import (
-    BEGIN,
-    END,
+    EDGE_END,
+    EDGE_LEFT_FACE,
+    EDGE_RIGHT_FACE,
+    EDGE_START,
     FIRST_CORNER,
     FIRST_EDGE,
     FIRST_FACE,
     LAST_CORNER,
     LAST_EDGE,
     LAST_FACE,
-    LEFT,
-    RIGHT,
 )
-from physics.kernels.multibody.narrowphase.box_sat import FLAT, PARALLEL
-from physics.kernels.multibody.narrowphase.hull_clip import SIDES, clip_face, incident
-from physics.kernels.multibody.narrowphase.hull_pose import nearest_on_face, put_in_place
+from physics.kernels.multibody.narrowphase.box_sat import FLAT_COSINE, PARALLEL_SINE_SQUARED
+from physics.kernels.multibody.narrowphase.hull_clip import (
+    CLIP_SIDE_OFFSET,
+    clip_incident_face,
+    write_hull_incident_face,
+)
+from physics.kernels.multibody.narrowphase.hull_pose import nearest_on_face, pose_hull
 
-# Names: ((body of the pair, face) * 128 + edge in) * 128 + edge out (see `hull_clip.SIDES`); then pairs of edges. A
-# polyhedron of 64 corners has at most 124 faces and 186 edges (Euler's formula).
-MOST_FACES, MOST_EDGES = 128, 192
-FIRST_EDGE_NAME = 2 * MOST_FACES * 4 * SIDES * SIDES
+# Names: ((body of the pair, face) * 128 + edge in) * 128 + edge out (see `hull_clip.CLIP_SIDE_OFFSET`); then pairs of
+# edges. A polyhedron of 64 corners has at most 124 faces and 186 edges (Euler's formula).
+_MAX_FACES, _MAX_EDGES = 128, 192
+_FIRST_EDGE_FEATURE = 2 * _MAX_FACES * 4 * CLIP_SIDE_OFFSET * CLIP_SIDE_OFFSET
 
 
 @inlined
-def best_face(which, b, other, far, many):
+def max_hull_face_separation(which, b, other, far, many):
     """(separation, face) of the face of body b, number `which` of the pair, that is furthest from the body `other`.
 
     Beyond `far` nothing more is looked for: that is too far already.
@@ -47,9 +52,9 @@ def best_face(which, b, other, far, many):
     hulls, best, face = many.hulls, -math.inf, 0
     count = hulls.of[other, LAST_CORNER] - hulls.of[other, FIRST_CORNER]
     for f in range(hulls.of[b, LAST_FACE] - hulls.of[b, FIRST_FACE]):
-        n, low = vector(hulls.normal[which], f, 0), math.inf
+        n, low = row_vector(hulls.normal[which], f, 0), math.inf
         for k in range(count):
-            low = min(low, qt.dot(n, vector(hulls.corner[1 - which], k, 0)))
+            low = min(low, qt.dot(n, row_vector(hulls.corner[1 - which], k, 0)))
         if low - hulls.offset[which, f] > best:
             best, face = low - hulls.offset[which, f], f
             if best > far:
@@ -58,19 +63,19 @@ def best_face(which, b, other, far, many):
 
 
 @inlined
-def edge_of(which, b, e, many):
+def hull_edge(which, b, e, many):
     """(begin, direction, normal on the left, on the right) of edge e of body b, number `which` of the pair."""
     hulls, k = many.hulls, many.hulls.of[b, FIRST_EDGE] + e
-    p = vector(hulls.corner[which], hulls.edges[k, BEGIN], 0)
+    p = row_vector(hulls.corner[which], hulls.edges[k, EDGE_START], 0)
     left, right = (
-        vector(hulls.normal[which], hulls.edges[k, LEFT], 0),
-        vector(hulls.normal[which], hulls.edges[k, RIGHT], 0),
+        row_vector(hulls.normal[which], hulls.edges[k, EDGE_LEFT_FACE], 0),
+        row_vector(hulls.normal[which], hulls.edges[k, EDGE_RIGHT_FACE], 0),
     )
-    return p, minus(vector(hulls.corner[which], hulls.edges[k, END], 0), p), left, right
+    return p, subtract(row_vector(hulls.corner[which], hulls.edges[k, EDGE_END], 0), p), left, right
 
 
 @inlined
-def _arcs_cross(d, left, right, e, other_left, other_right):
+def _is_minkowski_face(d, left, right, e, other_left, other_right):
     """True if the arc between the normals of an edge crosses that between the opposite normals of another edge.
 
     The arc's great circle is perpendicular to the edge: its ends must be on both sides of the other's circle, and the
@@ -82,100 +87,100 @@ def _arcs_cross(d, left, right, e, other_left, other_right):
 
 
 @inlined
-def best_edges(a, b, many):
+def max_hull_edge_separation(a, b, many):
     """(separation, number of the edge of a, of b) of the two edges that separate most, -inf if there are none."""
     hulls, best, first, second = many.hulls, -math.inf, 0, 0
-    inside = vector(hulls.centre, 0, 0)
+    inside = row_vector(hulls.centre, 0, 0)
     for i in range(hulls.of[a, LAST_EDGE] - hulls.of[a, FIRST_EDGE]):
-        p, d, left, right = edge_of(0, a, i, many)
+        p, d, left, right = hull_edge(0, a, i, many)
         for j in range(hulls.of[b, LAST_EDGE] - hulls.of[b, FIRST_EDGE]):
-            q, e, other_left, other_right = edge_of(1, b, j, many)
-            if not _arcs_cross(d, left, right, e, other_left, other_right):
+            q, e, other_left, other_right = hull_edge(1, b, j, many)
+            if not _is_minkowski_face(d, left, right, e, other_left, other_right):
                 continue
             n = qt.cross(d, e)
             square = qt.dot(n, n)
-            if square < PARALLEL * qt.dot(d, d) * qt.dot(e, e):
+            if square < PARALLEL_SINE_SQUARED * qt.dot(d, d) * qt.dot(e, e):
                 continue
-            s = math.copysign(1.0 / math.sqrt(square), qt.dot(n, minus(p, inside)))
-            if s * qt.dot(n, minus(q, p)) > best:
-                best, first, second = s * qt.dot(n, minus(q, p)), i, j
+            s = math.copysign(1.0 / math.sqrt(square), qt.dot(n, subtract(p, inside)))
+            if s * qt.dot(n, subtract(q, p)) > best:
+                best, first, second = s * qt.dot(n, subtract(q, p)), i, j
     return best, first, second
 
 
 @inlined
 def _edge_normal(a, b, i, j, many):
     """Unit vector out of a, across edges i of a and j of b."""
-    p, d, _, _ = edge_of(0, a, i, many)
-    _, e, _, _ = edge_of(1, b, j, many)
+    p, d, _, _ = hull_edge(0, a, i, many)
+    _, e, _, _ = hull_edge(1, b, j, many)
     n = qt.cross(d, e)
-    s = math.copysign(1.0 / math.sqrt(qt.dot(n, n)), qt.dot(n, minus(p, vector(many.hulls.centre, 0, 0))))
+    s = math.copysign(1.0 / math.sqrt(qt.dot(n, n)), qt.dot(n, subtract(p, row_vector(many.hulls.centre, 0, 0))))
     return (s * n[0], s * n[1], s * n[2])
 
 
 @inlined
-def _lowest_vertex(which, r, o, face, many):
+def _keep_deepest_vertex(which, r, o, face, many):
     """Leave the vertex of the face against this one that is lowest in copy 0, moved above this one: (copy, vertices).
 
     For bodies that are apart beside each other as well: the plane between them keeps them from each other all the same.
     """
     hulls, low = many.hulls, 0
-    out = vector(hulls.normal[which], face, 0)
-    p, sides, count = hulls.polygon, hulls.sides, incident(1 - which, o, out, many)
+    out = row_vector(hulls.normal[which], face, 0)
+    p, sides, count = hulls.polygon, hulls.sides, write_hull_incident_face(1 - which, o, out, many)
     for k in range(count):
-        if qt.dot(out, vector(p[0], k, 0)) < qt.dot(out, vector(p[0], low, 0)):
+        if qt.dot(out, row_vector(p[0], k, 0)) < qt.dot(out, row_vector(p[0], low, 0)):
             low = k
-    x = vector(p[0], low, 0)
+    x = row_vector(p[0], low, 0)
     y = nearest_on_face(which, r, face, x, many)
-    p[0, 0, 0], p[0, 0, 1], p[0, 0, 2] = plus(y, qt.dot(out, minus(x, y)), out)
+    p[0, 0, 0], p[0, 0, 1], p[0, 0, 2] = add_scaled(y, qt.dot(out, subtract(x, y)), out)
     sides[0, 0, 0], sides[0, 0, 1] = sides[0, low, 0], sides[0, low, 1]
     return 0, 1
 
 
 @inlined
-def _height(which, face, source, count, many):
+def _clipped_height(which, face, source, count, many):
     """Height of the lowest vertex of the clipped polygon above a face; inf where there is none."""
-    out, low = vector(many.hulls.normal[which], face, 0), math.inf
+    out, low = row_vector(many.hulls.normal[which], face, 0), math.inf
     for k in range(count):
-        low = min(low, qt.dot(out, vector(many.hulls.polygon[source], k, 0)))
+        low = min(low, qt.dot(out, row_vector(many.hulls.polygon[source], k, 0)))
     return low - many.hulls.offset[which, face]
 
 
 @inlined
-def _touch_face(a, b, which, face, source, count, least, h, many):
+def _add_face_contacts(a, b, which, face, source, count, least, h, many):
     """Contacts between a face and the clipped face of the other body, lifted until none has a gap < least."""
-    hulls, origin = many.hulls, vector(many.place, a, 0)
-    out, offset = vector(hulls.normal[which], face, 0), hulls.offset[which, face]
-    lift = max(0.0, least - _height(which, face, source, count, many))
+    hulls, origin = many.hulls, row_vector(many.place, a, 0)
+    out, offset = row_vector(hulls.normal[which], face, 0), hulls.offset[which, face]
+    lift = max(0.0, least - _clipped_height(which, face, source, count, many))
     for k in range(count):
-        p = plus(origin, 1.0, vector(hulls.polygon[source], k, 0))
-        height = qt.dot(out, vector(hulls.polygon[source], k, 0)) - offset
-        on_face, on_other = plus(p, -height, out), plus(p, lift, out)
+        p = add_scaled(origin, 1.0, row_vector(hulls.polygon[source], k, 0))
+        height = qt.dot(out, row_vector(hulls.polygon[source], k, 0)) - offset
+        on_face, on_other = add_scaled(p, -height, out), add_scaled(p, lift, out)
         into, out_of = hulls.sides[source, k, 0], hulls.sides[source, k, 1]
-        name = ((which * MOST_FACES + face) * 2 * SIDES + into) * 2 * SIDES + out_of
+        name = ((which * _MAX_FACES + face) * 2 * CLIP_SIDE_OFFSET + into) * 2 * CLIP_SIDE_OFFSET + out_of
         if which == 0:
-            record(a, b, name, a, (-out[0], -out[1], -out[2]), on_face, on_other, height + lift, h, many)
+            add_contact(a, b, name, a, (-out[0], -out[1], -out[2]), on_face, on_other, height + lift, h, many)
         else:
-            record(a, b, name, b, out, on_other, on_face, height + lift, h, many)
+            add_contact(a, b, name, b, out, on_other, on_face, height + lift, h, many)
 
 
 @inlined
-def _touch_edges(a, b, i, j, n, gap, h, many):
+def _add_edge_contact(a, b, i, j, n, gap, h, many):
     """The contact of edges i of a and j of b, n out of a, at their nearest points."""
-    origin = vector(many.place, a, 0)
-    p, d, _, _ = edge_of(0, a, i, many)
-    q, e, _, _ = edge_of(1, b, j, many)
+    origin = row_vector(many.place, a, 0)
+    p, d, _, _ = hull_edge(0, a, i, many)
+    q, e, _, _ = hull_edge(1, b, j, many)
     # Points p + s d and q + t e whose difference is along n, both on their segments.
-    w, dd, de, ee = minus(q, p), qt.dot(d, d), qt.dot(d, e), qt.dot(e, e)
+    w, dd, de, ee = subtract(q, p), qt.dot(d, d), qt.dot(d, e), qt.dot(e, e)
     t = (de * qt.dot(d, w) - dd * qt.dot(e, w)) / (dd * ee - de * de)
     s = min(max((qt.dot(d, w) + t * de) / dd, 0.0), 1.0)
     t = min(max(t, 0.0), 1.0)
-    on_a, on_b = plus(plus(origin, 1.0, p), s, d), plus(plus(origin, 1.0, q), t, e)
-    name = FIRST_EDGE_NAME + i * MOST_EDGES + j
-    record(a, b, name, -1, (-n[0], -n[1], -n[2]), on_a, on_b, gap, h, many)
+    on_a, on_b = add_scaled(add_scaled(origin, 1.0, p), s, d), add_scaled(add_scaled(origin, 1.0, q), t, e)
+    name = _FIRST_EDGE_FEATURE + i * _MAX_EDGES + j
+    add_contact(a, b, name, -1, (-n[0], -n[1], -n[2]), on_a, on_b, gap, h, many)
 
 
 @kernel
-def touch_hulls(a, b, margin, h, many):
+def collide_hulls(a, b, margin, h, many):
     """Add the contacts of polyhedra a and b (hulls or blocks) that are at most `margin` [m] apart.
 
     Where a face separates them or nearly does, and something of the other body is above it, no pair of edges can say
@@ -185,11 +190,11 @@ def touch_hulls(a, b, margin, h, many):
     The first body's face is preferred unless the other's separates more by the slop, and a face to edges likewise: what
     is equal must not change with rounding.
     """
-    origin, slop = vector(many.place, a, 0), pair_slop(a, b, many)
-    put_in_place(0, a, origin, many)
-    put_in_place(1, b, origin, many)
-    apart, face = best_face(0, a, b, margin, many)
-    other, other_face = best_face(1, b, a, margin, many)
+    origin, slop = row_vector(many.place, a, 0), pair_slop(a, b, many)
+    pose_hull(0, a, origin, many)
+    pose_hull(1, b, origin, many)
+    apart, face = max_hull_face_separation(0, a, b, margin, many)
+    other, other_face = max_hull_face_separation(1, b, a, margin, many)
     which, r, o = 0, a, b
     if other > apart + slop:
         apart, face, which, r, o = other, other_face, 1, b, a
@@ -198,23 +203,23 @@ def touch_hulls(a, b, margin, h, many):
     source = count = 0
     is_clipped = apart >= -slop
     if is_clipped:
-        source, count = clip_face(which, r, o, face, slop, many)
+        source, count = clip_incident_face(which, r, o, face, slop, many)
     further, i, j = apart, 0, 0
     if count == 0:
-        further, i, j = best_edges(a, b, many)
+        further, i, j = max_hull_edge_separation(a, b, many)
     if further > margin:
         return
     is_face = further <= apart + slop
     n = (0.0, 0.0, 0.0)
     if not is_face:
         n = _edge_normal(a, b, i, j, many)
-    out = vector(many.hulls.normal[which], face, 0)
-    if is_face or (qt.dot(n, out) if which == 0 else -qt.dot(n, out)) >= FLAT:
+    out = row_vector(many.hulls.normal[which], face, 0)
+    if is_face or (qt.dot(n, out) if which == 0 else -qt.dot(n, out)) >= FLAT_COSINE:
         if not is_clipped:
-            source, count = clip_face(which, r, o, face, slop, many)
+            source, count = clip_incident_face(which, r, o, face, slop, many)
         if is_face and count == 0:
-            source, count = _lowest_vertex(which, r, o, face, many)
-        if is_face or _height(which, face, source, count, many) <= further:
-            _touch_face(a, b, which, face, source, count, max(apart, further), h, many)
+            source, count = _keep_deepest_vertex(which, r, o, face, many)
+        if is_face or _clipped_height(which, face, source, count, many) <= further:
+            _add_face_contacts(a, b, which, face, source, count, max(apart, further), h, many)
             return
-    _touch_edges(a, b, i, j, n, further, h, many)
+    _add_edge_contact(a, b, i, j, n, further, h, many)

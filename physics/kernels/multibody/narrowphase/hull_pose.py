@@ -6,13 +6,14 @@ import math
 
 from physics.kernels.compile.decorators import inlined, kernel
 from physics.kernels.math import quaternion as qt
-from physics.kernels.multibody.data.contact_set import matrix, minus, plus, put, vector
+from physics.kernels.math.vector import row_vector
+from physics.kernels.multibody.data.contact_set import add_scaled, put_vector, row_matrix, subtract
 from physics.kernels.multibody.data.hull_tables import FIRST_CORNER, FIRST_FACE, LAST_CORNER, LAST_FACE
 from physics.kernels.state.layout import BLOCK
 
 
 @inlined
-def scale_of(b, many):
+def hull_scale(b, many):
     """Scale of the corners of body b in the tables."""
     d = many.bodies[b].dims
     if many.bodies[b].shape == BLOCK:
@@ -23,43 +24,43 @@ def scale_of(b, many):
 @inlined
 def corner_arm(b, k, many):
     """Corner k of the tables, of body b, from its place, world frame [m]."""
-    r, s = vector(many.hulls.corners, k, 0), scale_of(b, many)
-    return qt.matvec(matrix(many.rotation, b), (s[0] * r[0], s[1] * r[1], s[2] * r[2]))
+    r, s = row_vector(many.hulls.corners, k, 0), hull_scale(b, many)
+    return qt.matvec(row_matrix(many.rotation, b), (s[0] * r[0], s[1] * r[1], s[2] * r[2]))
 
 
 @kernel
-def put_in_place(which, b, origin, many):
+def pose_hull(which, b, origin, many):
     """Write body b as number `which` of the pair, with `origin` (world frame) as origin."""
-    hulls, R = many.hulls, matrix(many.rotation, b)
-    x = minus(vector(many.place, b, 0), origin)
-    put(hulls.centre, which, 0, x)
+    hulls, R = many.hulls, row_matrix(many.rotation, b)
+    x = subtract(row_vector(many.place, b, 0), origin)
+    put_vector(hulls.centre, which, 0, x)
     first, face = hulls.of[b, FIRST_CORNER], hulls.of[b, FIRST_FACE]
     for k in range(hulls.of[b, LAST_CORNER] - first):
-        r = plus(x, 1.0, corner_arm(b, first + k, many))
+        r = add_scaled(x, 1.0, corner_arm(b, first + k, many))
         hulls.corner[which, k, 0], hulls.corner[which, k, 1], hulls.corner[which, k, 2] = r
     for f in range(hulls.of[b, LAST_FACE] - face):
-        n = qt.matvec(R, vector(hulls.normals, face + f, 0))
+        n = qt.matvec(R, row_vector(hulls.normals, face + f, 0))
         hulls.normal[which, f, 0], hulls.normal[which, f, 1], hulls.normal[which, f, 2] = n
-        hulls.offset[which, f] = qt.dot(n, vector(hulls.corner[which], hulls.ring[hulls.loops[face + f, 0]], 0))
+        hulls.offset[which, f] = qt.dot(n, row_vector(hulls.corner[which], hulls.ring[hulls.loops[face + f, 0]], 0))
 
 
 @inlined
 def nearest_on_segment(x, p, q):
     """Point of the segment from p to q that is nearest to x."""
-    d = minus(q, p)
-    return plus(p, min(max(qt.dot(d, minus(x, p)) / qt.dot(d, d), 0.0), 1.0), d)
+    d = subtract(q, p)
+    return add_scaled(p, min(max(qt.dot(d, subtract(x, p)) / qt.dot(d, d), 0.0), 1.0), d)
 
 
 @kernel
 def is_above_face(which, b, face, x, many):
     """True if a face of body b, number `which` of the pair, has a normal through x, above or below."""
     hulls = many.hulls
-    out, k = vector(hulls.normal[which], face, 0), hulls.of[b, FIRST_FACE] + face
+    out, k = row_vector(hulls.normal[which], face, 0), hulls.of[b, FIRST_FACE] + face
     first, last = hulls.loops[k, 0], hulls.loops[k, 1]
     for side in range(last - first):
-        p = vector(hulls.corner[which], hulls.ring[first + side], 0)
-        q = vector(hulls.corner[which], hulls.ring[first + side + 1 if first + side + 1 < last else first], 0)
-        if qt.dot(qt.cross(minus(q, p), out), minus(x, p)) > 0.0:
+        p = row_vector(hulls.corner[which], hulls.ring[first + side], 0)
+        q = row_vector(hulls.corner[which], hulls.ring[first + side + 1 if first + side + 1 < last else first], 0)
+        if qt.dot(qt.cross(subtract(q, p), out), subtract(x, p)) > 0.0:
             return False
     return True
 
@@ -68,16 +69,16 @@ def is_above_face(which, b, face, x, many):
 def nearest_on_face(which, b, face, x, many):
     """Point of a face of body b, number `which` of the pair, that is nearest to x."""
     hulls = many.hulls
-    out, k = vector(hulls.normal[which], face, 0), hulls.of[b, FIRST_FACE] + face
+    out, k = row_vector(hulls.normal[which], face, 0), hulls.of[b, FIRST_FACE] + face
     first, last = hulls.loops[k, 0], hulls.loops[k, 1]
     best, nearest = math.inf, x
     for side in range(last - first):
-        p = vector(hulls.corner[which], hulls.ring[first + side], 0)
-        q = vector(hulls.corner[which], hulls.ring[first + side + 1 if first + side + 1 < last else first], 0)
+        p = row_vector(hulls.corner[which], hulls.ring[first + side], 0)
+        q = row_vector(hulls.corner[which], hulls.ring[first + side + 1 if first + side + 1 < last else first], 0)
         y = nearest_on_segment(x, p, q)
-        w = minus(x, y)
+        w = subtract(x, y)
         if qt.dot(w, w) < best:
             best, nearest = qt.dot(w, w), y
     if is_above_face(which, b, face, x, many):
-        return plus(x, hulls.offset[which, face] - qt.dot(out, x), out)
+        return add_scaled(x, hulls.offset[which, face] - qt.dot(out, x), out)
     return nearest

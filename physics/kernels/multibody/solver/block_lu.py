@@ -17,13 +17,13 @@ Reference: A. George, J. W.-H. Liu, *Computer Solution of Large Sparse Positive 
 from __future__ import annotations
 
 from physics.kernels.compile.decorators import inlined, kernel
-from physics.kernels.compile.simd import Lanes, chosen, larger, largest, put_row, row
+from physics.kernels.compile.simd import Lanes, larger, load_lanes, max_of_lanes, select_lanes, store_lanes
 from physics.kernels.multibody.data.arrays import BLOCK_SIZE, COLUMN_SIZE
 
-SIZE = 6  # of a block: velocity and angular velocity of a body
+TWIST_DOFS = 6  # of a block: velocity and angular velocity of a body
 
 # Where the angular velocity begins in a column.
-SPIN = 4
+ANGULAR_OFFSET = 4
 
 # A pivot on the diagonal is taken if nothing below it is larger by more than this factor (threshold pivoting): looking
 # for the largest one and exchanging rows waits for each pivot before the next, to see that they are good does not. With
@@ -32,7 +32,7 @@ PIVOT_FACTOR = 2.0
 
 
 @kernel
-def clear(begin, end, many):
+def clear_system(begin, end, many):
     """Set the system of the bodies `many.order[begin:end]` to zero."""
     for i in range(begin, end):
         b = many.order[i]
@@ -44,7 +44,7 @@ def clear(begin, end, many):
 
 
 @inlined
-def place_of(b, c, many):
+def find_block_index(b, c, many):
     """Indices of the blocks of b and its later neighbour c in `lower` and `upper`."""
     k = many.start[b]
     while many.column[k] != c:
@@ -53,16 +53,17 @@ def place_of(b, c, many):
 
 
 @inlined
-def columns_of(A, k):
+def block_columns(A, k):
     """Columns of block A[k]: halves of the first, of the second ..."""
     return (
-        row(A, k, 0), row(A, k, 4), row(A, k, 8), row(A, k, 12), row(A, k, 16), row(A, k, 20),
-        row(A, k, 24), row(A, k, 28), row(A, k, 32), row(A, k, 36), row(A, k, 40), row(A, k, 44),
+        load_lanes(A, k, 0), load_lanes(A, k, 4), load_lanes(A, k, 8), load_lanes(A, k, 12),
+        load_lanes(A, k, 16), load_lanes(A, k, 20), load_lanes(A, k, 24), load_lanes(A, k, 28),
+        load_lanes(A, k, 32), load_lanes(A, k, 36), load_lanes(A, k, 40), load_lanes(A, k, 44),
     )  # fmt: skip
 
 
 @inlined
-def _image(X, B, j, c):
+def _multiply_column(X, B, j, c):
     """Halves of X b for columns X of a block and the six numbers b of row j of B from c on."""
     x, y, z, u, v, w = B[j, c], B[j, c + 1], B[j, c + 2], B[j, c + 4], B[j, c + 5], B[j, c + 6]
     return (
@@ -72,192 +73,200 @@ def _image(X, B, j, c):
 
 
 @inlined
-def _take_product(target, t, A, i, B, j):
+def _subtract_product(target, t, A, i, B, j):
     """target[t] -= A[i] B[j]."""
-    X = columns_of(A, i)
+    X = block_columns(A, i)
     for c in range(0, BLOCK_SIZE, COLUMN_SIZE):
-        y = _image(X, B, j, c)
-        put_row(target, t, c, row(target, t, c) - y[0])
-        put_row(target, t, c + SPIN, row(target, t, c + SPIN) - y[1])
+        y = _multiply_column(X, B, j, c)
+        store_lanes(target, t, c, load_lanes(target, t, c) - y[0])
+        store_lanes(target, t, c + ANGULAR_OFFSET, load_lanes(target, t, c + ANGULAR_OFFSET) - y[1])
 
 
 @inlined
-def _times(A, k, D, b):
+def _multiply_in_place(A, k, D, b):
     """A[k] = A[k] D[b]."""
-    X = columns_of(A, k)
+    X = block_columns(A, k)
     for c in range(0, BLOCK_SIZE, COLUMN_SIZE):
-        y = _image(X, D, b, c)
-        put_row(A, k, c, y[0])
-        put_row(A, k, c + SPIN, y[1])
+        y = _multiply_column(X, D, b, c)
+        store_lanes(A, k, c, y[0])
+        store_lanes(A, k, c + ANGULAR_OFFSET, y[1])
 
 
 @inlined
-def _is_at(k):
+def _lane_index(k):
     """Index of lane k."""
     return Lanes(0.0, 1.0, 2.0, 3.0) == k
 
 
 @inlined
-def _is_behind(k):
+def _lanes_after(k):
     """Marks of the lanes after lane k."""
     return Lanes(0.0, 1.0, 2.0, 3.0) > k
 
 
 @inlined
-def _at(x, p):
+def _component(x, p):
     """Number p of a column x."""
     return x[0][p] if p < 3 else x[1][p - 3]
 
 
 @inlined
-def _with(x, p, value):
+def _with_component(x, p, value):
     """Column x with another number p."""
     if p < 3:
-        return chosen(_is_at(p), value, x[0]), x[1]
-    return x[0], chosen(_is_at(p - 3), value, x[1])
+        return select_lanes(_lane_index(p), value, x[0]), x[1]
+    return x[0], select_lanes(_lane_index(p - 3), value, x[1])
 
 
 @inlined
-def _behind(x, p):
+def _max_below_pivot(x, p):
     """Largest of the numbers behind number p of a column x, without their signs."""
     if p < 3:
-        return largest(larger(chosen(_is_behind(p), abs(x[0]), 0.0), abs(x[1])))
-    return largest(chosen(_is_behind(p - 3), abs(x[1]), 0.0))
+        return max_of_lanes(larger(select_lanes(_lanes_after(p), abs(x[0]), 0.0), abs(x[1])))
+    return max_of_lanes(select_lanes(_lanes_after(p - 3), abs(x[1]), 0.0))
 
 
 @inlined
-def _less(y, p, s, x):
+def _eliminate_column(y, p, s, x):
     """Column y after row p of the block was made s times what it was, and taken off the others."""
-    t = s * _at(y, p)
-    return _with((y[0] - t * x[0], y[1] - t * x[1]), p, t)
+    t = s * _component(y, p)
+    return _with_component((y[0] - t * x[0], y[1] - t * x[1]), p, t)
 
 
 @inlined
-def _eliminate(p, least, x, a, b, c, d, e):
+def _gauss_jordan_step(p, least, x, a, b, c, d, e):
     """One step of Gauss and Jordan: column p, which is x, is the pivot's; the others follow it around.
 
     Returns what pivots are above what they have to be, at least; the others, and x last.
     """
-    value = _at(x, p)
+    value = _component(x, p)
     s = 1.0 / value
-    least = min(least, PIVOT_FACTOR * abs(value) - _behind(x, p))
-    y = _with((-s * x[0], -s * x[1]), p, s)
-    return least, _less(a, p, s, x), _less(b, p, s, x), _less(c, p, s, x), _less(d, p, s, x), _less(e, p, s, x), y
+    least = min(least, PIVOT_FACTOR * abs(value) - _max_below_pivot(x, p))
+    y = _with_component((-s * x[0], -s * x[1]), p, s)
+    return (
+        least,
+        _eliminate_column(a, p, s, x),
+        _eliminate_column(b, p, s, x),
+        _eliminate_column(c, p, s, x),
+        _eliminate_column(d, p, s, x),
+        _eliminate_column(e, p, s, x),
+        y,
+    )
 
 
 @inlined
-def _inverted_in_order(A, k):
+def _invert_unpivoted(A, k):
     """Invert block A[k] in place if its pivots may be those on the diagonal; whether they may."""
-    X = columns_of(A, k)
+    X = block_columns(A, k)
     a, b, c, d, e, f = (X[0], X[1]), (X[2], X[3]), (X[4], X[5]), (X[6], X[7]), (X[8], X[9]), (X[10], X[11])
-    least, b, c, d, e, f, a = _eliminate(0, 1.0e300, a, b, c, d, e, f)
-    least, c, d, e, f, a, b = _eliminate(1, least, b, c, d, e, f, a)
-    least, d, e, f, a, b, c = _eliminate(2, least, c, d, e, f, a, b)
-    least, e, f, a, b, c, d = _eliminate(3, least, d, e, f, a, b, c)
-    least, f, a, b, c, d, e = _eliminate(4, least, e, f, a, b, c, d)
-    least, a, b, c, d, e, f = _eliminate(5, least, f, a, b, c, d, e)
+    least, b, c, d, e, f, a = _gauss_jordan_step(0, 1.0e300, a, b, c, d, e, f)
+    least, c, d, e, f, a, b = _gauss_jordan_step(1, least, b, c, d, e, f, a)
+    least, d, e, f, a, b, c = _gauss_jordan_step(2, least, c, d, e, f, a, b)
+    least, e, f, a, b, c, d = _gauss_jordan_step(3, least, d, e, f, a, b, c)
+    least, f, a, b, c, d, e = _gauss_jordan_step(4, least, e, f, a, b, c, d)
+    least, a, b, c, d, e, f = _gauss_jordan_step(5, least, f, a, b, c, d, e)
     if not least >= 0.0:
         return False
-    put_row(A, k, 0, a[0])
-    put_row(A, k, 4, a[1])
-    put_row(A, k, 8, b[0])
-    put_row(A, k, 12, b[1])
-    put_row(A, k, 16, c[0])
-    put_row(A, k, 20, c[1])
-    put_row(A, k, 24, d[0])
-    put_row(A, k, 28, d[1])
-    put_row(A, k, 32, e[0])
-    put_row(A, k, 36, e[1])
-    put_row(A, k, 40, f[0])
-    put_row(A, k, 44, f[1])
+    store_lanes(A, k, 0, a[0])
+    store_lanes(A, k, 4, a[1])
+    store_lanes(A, k, 8, b[0])
+    store_lanes(A, k, 12, b[1])
+    store_lanes(A, k, 16, c[0])
+    store_lanes(A, k, 20, c[1])
+    store_lanes(A, k, 24, d[0])
+    store_lanes(A, k, 28, d[1])
+    store_lanes(A, k, 32, e[0])
+    store_lanes(A, k, 36, e[1])
+    store_lanes(A, k, 40, f[0])
+    store_lanes(A, k, 44, f[1])
     return True
 
 
 @inlined
-def _place(r, c):
+def _entry_index(r, c):
     """Index of row r of column c in a block."""
     return COLUMN_SIZE * c + r + r // 3
 
 
 @kernel
-def _invert_with_swaps(A, b, swaps):
+def _invert_pivoted(A, b, swaps):
     """Invert block A[b] in place (Gauss and Jordan, with row exchanges)."""
-    for p in range(SIZE):
+    for p in range(TWIST_DOFS):
         best = p
-        for r in range(p + 1, SIZE):
-            if abs(A[b, _place(r, p)]) > abs(A[b, _place(best, p)]):
+        for r in range(p + 1, TWIST_DOFS):
+            if abs(A[b, _entry_index(r, p)]) > abs(A[b, _entry_index(best, p)]):
                 best = r
         swaps[p] = best
-        for c in range(SIZE):
-            i, j = _place(p, c), _place(best, c)
+        for c in range(TWIST_DOFS):
+            i, j = _entry_index(p, c), _entry_index(best, c)
             A[b, i], A[b, j] = A[b, j], A[b, i]
-        s = 1.0 / A[b, _place(p, p)]
-        A[b, _place(p, p)] = 1.0
-        for c in range(SIZE):
-            A[b, _place(p, c)] *= s
-        for r in range(SIZE):
+        s = 1.0 / A[b, _entry_index(p, p)]
+        A[b, _entry_index(p, p)] = 1.0
+        for c in range(TWIST_DOFS):
+            A[b, _entry_index(p, c)] *= s
+        for r in range(TWIST_DOFS):
             if r != p:
-                f = A[b, _place(r, p)]
-                A[b, _place(r, p)] = 0.0
-                for c in range(SIZE):
-                    A[b, _place(r, c)] -= f * A[b, _place(p, c)]
-    for p in range(SIZE - 1, -1, -1):
-        for r in range(SIZE):
-            i, j = _place(r, p), _place(r, swaps[p])
+                f = A[b, _entry_index(r, p)]
+                A[b, _entry_index(r, p)] = 0.0
+                for c in range(TWIST_DOFS):
+                    A[b, _entry_index(r, c)] -= f * A[b, _entry_index(p, c)]
+    for p in range(TWIST_DOFS - 1, -1, -1):
+        for r in range(TWIST_DOFS):
+            i, j = _entry_index(r, p), _entry_index(r, swaps[p])
             A[b, i], A[b, j] = A[b, j], A[b, i]
 
 
 @kernel
-def invert(A, b, swaps):
+def invert_block(A, b, swaps):
     """Invert block A[b] in place."""
-    if not _inverted_in_order(A, b):
-        _invert_with_swaps(A, b, swaps)
+    if not _invert_unpivoted(A, b):
+        _invert_pivoted(A, b, swaps)
 
 
 @inlined
-def _take_from(c, d, i, j, many):
+def _update_schur_complement(c, d, i, j, many):
     """A_cd -= A_cb A_bb⁻¹ A_bd for neighbours c = column[i] and d = column[j] of b."""
     lower, upper = many.lower, many.upper
     if c == d:
-        _take_product(many.diagonal, c, lower, i, upper, j)
+        _subtract_product(many.diagonal, c, lower, i, upper, j)
     elif many.rank[c] > many.rank[d]:
-        _take_product(lower, place_of(d, c, many), lower, i, upper, j)
+        _subtract_product(lower, find_block_index(d, c, many), lower, i, upper, j)
     else:
-        _take_product(upper, place_of(c, d, many), lower, i, upper, j)
+        _subtract_product(upper, find_block_index(c, d, many), lower, i, upper, j)
 
 
 @kernel
-def factor(begin, end, many):
+def factor_system(begin, end, many):
     """Replace the system of the bodies `many.order[begin:end]` by its factors."""
     for place in range(begin, end):
         b = many.order[place]
-        invert(many.diagonal, b, many.swaps)
+        invert_block(many.diagonal, b, many.swaps)
         for i in range(many.start[b], many.stop[b]):
-            _times(many.lower, i, many.diagonal, b)
+            _multiply_in_place(many.lower, i, many.diagonal, b)
         for i in range(many.start[b], many.stop[b]):
             for j in range(many.start[b], many.stop[b]):
-                _take_from(many.column[i], many.column[j], i, j, many)
+                _update_schur_complement(many.column[i], many.column[j], i, j, many)
 
 
 @inlined
-def _take(x, i, A, k, j):
+def _subtract_block_product(x, i, A, k, j):
     """x[i] -= A[k] x[j]."""
-    y = _image(columns_of(A, k), x, j, 0)
-    put_row(x, i, 0, row(x, i, 0) - y[0])
-    put_row(x, i, SPIN, row(x, i, SPIN) - y[1])
+    y = _multiply_column(block_columns(A, k), x, j, 0)
+    store_lanes(x, i, 0, load_lanes(x, i, 0) - y[0])
+    store_lanes(x, i, ANGULAR_OFFSET, load_lanes(x, i, ANGULAR_OFFSET) - y[1])
 
 
 @kernel
-def substitute(begin, end, x, many):
+def solve_factored(begin, end, x, many):
     """Overwrite the right sides x (a column for each body) with the solution of the factored system."""
     for i in range(begin, end):
         b = many.order[i]
         for k in range(many.start[b], many.stop[b]):
-            _take(x, many.column[k], many.lower, k, b)
+            _subtract_block_product(x, many.column[k], many.lower, k, b)
     for i in range(end - 1, begin - 1, -1):
         b = many.order[i]
         for k in range(many.start[b], many.stop[b]):
-            _take(x, b, many.upper, k, many.column[k])
-        y = _image(columns_of(many.diagonal, b), x, b, 0)
-        put_row(x, b, 0, y[0])
-        put_row(x, b, SPIN, y[1])
+            _subtract_block_product(x, b, many.upper, k, many.column[k])
+        y = _multiply_column(block_columns(many.diagonal, b), x, b, 0)
+        store_lanes(x, b, 0, y[0])
+        store_lanes(x, b, ANGULAR_OFFSET, y[1])

@@ -11,88 +11,115 @@ bundle is `many.lanes[g, 4 f : 4 f + 4]`.
 from __future__ import annotations
 
 from physics.kernels.compile.decorators import inlined, kernel
-from physics.kernels.compile.simd import WIDTH, Lanes, chosen, larger, put_row, root, row, smaller, total
+from physics.kernels.compile.simd import (
+    LANE_COUNT,
+    Lanes,
+    lane_sqrt,
+    lane_sum,
+    larger,
+    load_lanes,
+    select_lanes,
+    smaller,
+    store_lanes,
+)
 from physics.kernels.math import quaternion as qt
-from physics.kernels.multibody.data.arrays import BUNDLES
-from physics.kernels.multibody.data.contact_set import put, vector
-from physics.kernels.multibody.solver.block_lu import place_of
-from physics.kernels.multibody.solver.contact_operator import turned
+from physics.kernels.math.vector import row_vector
+from physics.kernels.multibody.data.arrays import NUM_BATCHES
+from physics.kernels.multibody.data.contact_set import put_vector
+from physics.kernels.multibody.solver.block_lu import find_block_index
+from physics.kernels.multibody.solver.contact_operator import apply_body_inv_inertia
 
 # Columns of `many.bundle`: first and second body (b < 0: wall), place of their block, whether the first body is
 # eliminated before the second; first contact in `many.queue`, and how many.
-FIRST, SECOND, PLACE, IS_FIRST, BEGIN, COUNT = range(6)
+BATCH_BODY_A, BATCH_BODY_B, BATCH_BLOCK, BATCH_IS_A_FIRST, BATCH_START, BATCH_COUNT = range(6)
 
 # Fields of a contact: arms from both bodies, frame, target, μ, W_nn and step of its block, 1 or 0 for what it weighs.
-ARM, FRAME, TARGET, MU, NORMAL, STEP, WEIGHT = 0, 6, 15, 18, 19, 20, 21
+LANE_ARM, LANE_FRAME, LANE_TARGET, LANE_MU, LANE_W_NN, LANE_STEP, LANE_WEIGHT = 0, 6, 15, 18, 19, 20, 21
 
 # Of `interior_point`: diagonal of S (normal, tangents), p̂, û.
-UNIT, INSIDE, SLACK = 22, 24, 27
+IPM_UNIT, IPM_IMPULSE, IPM_VELOCITY = 22, 24, 27
 
 # What `interior_point` needs while it runs: scaling (w, η), λ, 1/√det λ, direction of slip, what û misses, what is
 # added to p̂, changes of both.
-SCALING, OWN, INVERSE, SLIP, MISS, EXTRA, CHANGE, SLACK_CHANGE = 30, 34, 37, 38, 40, 43, 46, 49
+(
+    IPM_SCALING,
+    IPM_LAMBDA,
+    IPM_INV_ROOT_DET,
+    IPM_SLIP_DIRECTION,
+    IPM_RESIDUAL,
+    IPM_CORRECTION,
+    IPM_IMPULSE_STEP,
+    IPM_VELOCITY_STEP,
+) = 30, 34, 37, 38, 40, 43, 46, 49
 
 # What `proximal_newton` needs, in the same place: impulses q, the best of them, q - ρ u, p(x).
-IMPULSE, SAVED, AIM, TRIAL = 30, 33, 36, 39
+PROX_IMPULSE, PROX_BEST, PROX_ARGUMENT, PROX_PROJECTED = 30, 33, 36, 39
 
 
 @inlined
-def one(g, field, many):
+def batch_field(g, field, many):
     """A field of bundle g."""
-    return row(many.lanes, g, WIDTH * field)
+    return load_lanes(many.lanes, g, LANE_COUNT * field)
 
 
 @inlined
-def put_one(g, field, x, many):
+def put_batch_field(g, field, x, many):
     """Write a field of bundle g."""
-    put_row(many.lanes, g, WIDTH * field, x)
+    store_lanes(many.lanes, g, LANE_COUNT * field, x)
 
 
 @inlined
-def three(g, field, many):
+def batch_vector(g, field, many):
     """Three fields of bundle g: of each contact a vector."""
-    return one(g, field, many), one(g, field + 1, many), one(g, field + 2, many)
+    return batch_field(g, field, many), batch_field(g, field + 1, many), batch_field(g, field + 2, many)
 
 
 @inlined
-def put_three(g, field, a, many):
+def put_batch_vector(g, field, a, many):
     """Write three fields of bundle g."""
-    put_one(g, field, a[0], many)
-    put_one(g, field + 1, a[1], many)
-    put_one(g, field + 2, a[2], many)
+    put_batch_field(g, field, a[0], many)
+    put_batch_field(g, field + 1, a[1], many)
+    put_batch_field(g, field + 2, a[2], many)
 
 
 @inlined
-def frame_of(g, many):
+def batch_frames(g, many):
     """Frames of the contacts of bundle g, row by row."""
-    n, s, t = three(g, FRAME, many), three(g, FRAME + 3, many), three(g, FRAME + 6, many)
+    n, s, t = (
+        batch_vector(g, LANE_FRAME, many),
+        batch_vector(g, LANE_FRAME + 3, many),
+        batch_vector(g, LANE_FRAME + 6, many),
+    )
     return (n[0], n[1], n[2], s[0], s[1], s[2], t[0], t[1], t[2])
 
 
 @inlined
-def _bind(g, i, n, many):
+def _fill_batch(g, i, n, many):
     """Copy what is known of the n contacts from place i of the queue on into bundle g."""
     L = many.lanes
-    for lane in range(WIDTH):
+    for lane in range(LANE_COUNT):
         k = many.queue[i + min(lane, n - 1)]
         for c in range(6):
-            L[g, WIDTH * (ARM + c) + lane] = many.arm[k, c]
+            L[g, LANE_COUNT * (LANE_ARM + c) + lane] = many.arm[k, c]
         for c in range(9):
-            L[g, WIDTH * (FRAME + c) + lane] = many.frame[k, c]
+            L[g, LANE_COUNT * (LANE_FRAME + c) + lane] = many.frame[k, c]
         for c in range(3):
-            L[g, WIDTH * (TARGET + c) + lane] = many.target[k, c]
-        L[g, WIDTH * MU + lane], L[g, WIDTH * NORMAL + lane] = many.mu[k], many.block[k, 0]
-        L[g, WIDTH * STEP + lane], L[g, WIDTH * WEIGHT + lane] = many.step[k], 1.0 if lane < n else 0.0
+            L[g, LANE_COUNT * (LANE_TARGET + c) + lane] = many.target[k, c]
+        L[g, LANE_COUNT * LANE_MU + lane], L[g, LANE_COUNT * LANE_W_NN + lane] = many.mu[k], many.block[k, 0]
+        L[g, LANE_COUNT * LANE_STEP + lane], L[g, LANE_COUNT * LANE_WEIGHT + lane] = (
+            many.step[k],
+            1.0 if lane < n else 0.0,
+        )
 
 
 @kernel
-def bundle_contacts(first, last, many):
+def batch_contacts(first, last, many):
     """Bundle the contacts `many.queue[first:last]` of an island whose bodies are ordered; whether there was room."""
     count, i = 0, first
     while i < last:
         a, b = many.ends[many.queue[i], 0], many.ends[many.queue[i], 1]
         n = 1
-        while n < WIDTH and i + n < last:
+        while n < LANE_COUNT and i + n < last:
             k = many.queue[i + n]
             if many.ends[k, 0] != a or many.ends[k, 1] != b:
                 break
@@ -100,22 +127,27 @@ def bundle_contacts(first, last, many):
         if count == many.bundle.shape[0]:
             return False
         bundle = many.bundle
-        bundle[count, FIRST], bundle[count, SECOND], bundle[count, BEGIN], bundle[count, COUNT] = a, b, i, n
+        (
+            bundle[count, BATCH_BODY_A],
+            bundle[count, BATCH_BODY_B],
+            bundle[count, BATCH_START],
+            bundle[count, BATCH_COUNT],
+        ) = a, b, i, n
         if b >= 0:
             is_first = many.rank[a] < many.rank[b]
-            bundle[count, IS_FIRST] = 1 if is_first else 0
-            bundle[count, PLACE] = place_of(a, b, many) if is_first else place_of(b, a, many)
-        _bind(count, i, n, many)
+            bundle[count, BATCH_IS_A_FIRST] = 1 if is_first else 0
+            bundle[count, BATCH_BLOCK] = find_block_index(a, b, many) if is_first else find_block_index(b, a, many)
+        _fill_batch(count, i, n, many)
         count += 1
         i += n
-    many.counts[BUNDLES] = count
+    many.counts[NUM_BATCHES] = count
     return True
 
 
 @inlined
-def gather(g, rows, many):
+def gather_batch(g, rows, many):
     """Vectors of the contacts of bundle g from an array with a row for each contact."""
-    i, n = many.bundle[g, BEGIN], many.bundle[g, COUNT]
+    i, n = many.bundle[g, BATCH_START], many.bundle[g, BATCH_COUNT]
     j, k = many.queue[i], many.queue[i + min(1, n - 1)]
     l, m = many.queue[i + min(2, n - 1)], many.queue[i + n - 1]
     return (
@@ -126,80 +158,80 @@ def gather(g, rows, many):
 
 
 @inlined
-def scatter(g, a, rows, many):
+def scatter_batch(g, a, rows, many):
     """Write vectors of the contacts of bundle g to an array with a row for each contact."""
-    i, n = many.bundle[g, BEGIN], many.bundle[g, COUNT]
+    i, n = many.bundle[g, BATCH_START], many.bundle[g, BATCH_COUNT]
     for lane in range(n):
-        put(rows, many.queue[i + lane], 0, (a[0][lane], a[1][lane], a[2][lane]))
+        put_vector(rows, many.queue[i + lane], 0, (a[0][lane], a[1][lane], a[2][lane]))
 
 
 @inlined
 def _point_velocity(b, r, t, spin):
     """v + ω x r of body b for points r."""
-    m = qt.cross(vector(t, b, spin), r)
+    m = qt.cross(row_vector(t, b, spin), r)
     return (t[b, 0] + m[0], t[b, 1] + m[1], t[b, 2] + m[2])
 
 
 @inlined
-def velocity_along(g, t, spin, many):
+def batch_velocity(g, t, spin, many):
     """Relative velocities of the contacts of bundle g in their frames for twists t, ω from column `spin` [m/s]."""
-    a, b = many.bundle[g, FIRST], many.bundle[g, SECOND]
-    u = _point_velocity(a, three(g, ARM, many), t, spin)
+    a, b = many.bundle[g, BATCH_BODY_A], many.bundle[g, BATCH_BODY_B]
+    u = _point_velocity(a, batch_vector(g, LANE_ARM, many), t, spin)
     if b >= 0:
-        v = _point_velocity(b, three(g, ARM + 3, many), t, spin)
+        v = _point_velocity(b, batch_vector(g, LANE_ARM + 3, many), t, spin)
         u = (u[0] - v[0], u[1] - v[1], u[2] - v[2])
-    return qt.matvec(frame_of(g, many), u)
+    return qt.matvec(batch_frames(g, many), u)
 
 
 @inlined
-def velocity_missed(g, many):
+def batch_velocity_error(g, many):
     """u of the contacts of bundle g less their targets."""
-    u, t = velocity_along(g, many.twist, 3, many), three(g, TARGET, many)
+    u, t = batch_velocity(g, many.twist, 3, many), batch_vector(g, LANE_TARGET, many)
     return (u[0] - t[0], u[1] - t[1], u[2] - t[2])
 
 
 @inlined
-def _push_one(b, f, m, sign, t, spin, many):
+def _apply_body_impulse(b, f, m, sign, t, spin, many):
     """Change the twist of body b in t by an impulse and a moment."""
-    w, s = turned(b, m, many), sign * many.lightness[b]
-    put(t, b, 0, (t[b, 0] + s * f[0], t[b, 1] + s * f[1], t[b, 2] + s * f[2]))
-    put(t, b, spin, (t[b, spin] + sign * w[0], t[b, spin + 1] + sign * w[1], t[b, spin + 2] + sign * w[2]))
+    w, s = apply_body_inv_inertia(b, m, many), sign * many.lightness[b]
+    put_vector(t, b, 0, (t[b, 0] + s * f[0], t[b, 1] + s * f[1], t[b, 2] + s * f[2]))
+    put_vector(t, b, spin, (t[b, spin] + sign * w[0], t[b, spin + 1] + sign * w[1], t[b, spin + 2] + sign * w[2]))
 
 
 @inlined
-def _sums(a):
-    return (total(a[0]), total(a[1]), total(a[2]))
+def _sum_lanes(a):
+    return (lane_sum(a[0]), lane_sum(a[1]), lane_sum(a[2]))
 
 
 @inlined
-def push(g, p, t, spin, many):
+def apply_batch_impulse(g, p, t, spin, many):
     """Change the twists t of both bodies by impulses of the contacts of bundle g, given in their frames [N s]."""
-    on, a, b = one(g, WEIGHT, many), many.bundle[g, FIRST], many.bundle[g, SECOND]
-    p = qt.transposed_matvec(frame_of(g, many), (on * p[0], on * p[1], on * p[2]))
-    f = _sums(p)
-    _push_one(a, f, _sums(qt.cross(three(g, ARM, many), p)), 1.0, t, spin, many)
+    on, a, b = batch_field(g, LANE_WEIGHT, many), many.bundle[g, BATCH_BODY_A], many.bundle[g, BATCH_BODY_B]
+    p = qt.transposed_matvec(batch_frames(g, many), (on * p[0], on * p[1], on * p[2]))
+    f = _sum_lanes(p)
+    _apply_body_impulse(a, f, _sum_lanes(qt.cross(batch_vector(g, LANE_ARM, many), p)), 1.0, t, spin, many)
     if b >= 0:
-        _push_one(b, f, _sums(qt.cross(three(g, ARM + 3, many), p)), -1.0, t, spin, many)
+        _apply_body_impulse(b, f, _sum_lanes(qt.cross(batch_vector(g, LANE_ARM + 3, many), p)), -1.0, t, spin, many)
 
 
 @inlined
-def length(x, y):
+def planar_length(x, y):
     """√(x² + y²)."""
-    return root(x * x + y * y)
+    return lane_sqrt(x * x + y * y)
 
 
 @inlined
-def on_disks(x, y, limit):
+def project_on_disks(x, y, limit):
     """(x, y), shortened to `limit` where it is longer."""
-    size = length(x, y)
-    s = chosen(size > limit, limit / size, 1.0)
+    size = planar_length(x, y)
+    s = select_lanes(size > limit, limit / size, 1.0)
     return s * x, s * y
 
 
 @inlined
-def misses(g, p, u, many):
+def batch_residuals(g, p, u, many):
     """Natural-map residuals of the contacts of bundle g for impulses p and velocities u; see `contact_operator`."""
-    step, mu = one(g, STEP, many), one(g, MU, many)
-    x, y = on_disks(p[1] - step * u[1], p[2] - step * u[2], mu * larger(p[0], 0.0))
-    tangential = length(p[1] - x, p[2] - y) / step
-    return larger(abs(smaller(u[0], p[0] * one(g, NORMAL, many))), tangential)
+    step, mu = batch_field(g, LANE_STEP, many), batch_field(g, LANE_MU, many)
+    x, y = project_on_disks(p[1] - step * u[1], p[2] - step * u[2], mu * larger(p[0], 0.0))
+    tangential = planar_length(p[1] - x, p[2] - y) / step
+    return larger(abs(smaller(u[0], p[0] * batch_field(g, LANE_W_NN, many))), tangential)

@@ -1,7 +1,7 @@
 """Sweeps over all contacts of a world with the circular Coulomb cone, on the twists of bodies (`contact_operator`).
 
-A visit of one contact answers it alone (`one_contact.answer`), and sweeps go up and down the list in turns, so that
-loads travel through a stack in both senses.
+A visit of one contact answers it alone (`one_contact.solve_contact_block`), and sweeps go up and down the list in
+turns, so that loads travel through a stack in both senses.
 
 Most contacts are soon answered and stay so: where something lands on a pile, few others have anything to do. A contact
 is visited only if one of its bodies has been pushed since, and it is left as it is where it is off by less than the
@@ -11,65 +11,70 @@ tolerance. The returned impulses are checked whole.
 from __future__ import annotations
 
 from physics.kernels.compile.decorators import inlined, kernel
-from physics.kernels.contact_solver.one_contact import LOST, answer, heading
+from physics.kernels.contact_solver.one_contact import CONTACT_UNSOLVED, friction_direction, solve_contact_block
 from physics.kernels.math import quaternion as qt
-from physics.kernels.multibody.data.contact_set import minus, put, vector
-from physics.kernels.multibody.solver.contact_operator import natural_map, on_disk, residual_of
+from physics.kernels.math.vector import row_vector
+from physics.kernels.multibody.data.contact_set import put_vector, subtract
+from physics.kernels.multibody.solver.contact_operator import (
+    max_contact_residual,
+    natural_map_residual,
+    project_on_disk,
+)
 from physics.kernels.multibody.solver.contact_rows import (
-    BLOCK,
-    IMPULSE,
-    INVERSE,
-    MU,
-    STIFF,
-    UNKNOWN,
-    line_up,
-    push,
-    put_inverse,
-    six,
-    take_back,
-    velocity,
+    NOT_INVERTED,
+    VISIT_BLOCK,
+    VISIT_IMPULSE,
+    VISIT_INVERSE,
+    VISIT_LAMBDA_MAX,
+    VISIT_MU,
+    apply_visit_impulse,
+    read_visit_impulses,
+    visit_block,
+    visit_velocity_error,
+    write_block_inverse,
+    write_visits,
 )
 from physics.kernels.multibody.solver.normal_rows import (
-    assemble_normal,
+    apply_normal_impulse,
+    assemble_normal_row,
+    motion_from_twists,
     normal_velocity,
-    push_normal,
-    set_motion,
-    set_twists,
+    twists_from_motion,
 )
 
 # Share of the tolerance to which one contact is answered, and within which it is left as it is, each that is
 # answered leaving those of two bodies to be visited again; and the same without friction.
-LEFT_SHARE = 0.9
-NORMAL_SHARE = 0.1
+_SKIP_SHARE = 0.9
+_NORMAL_SKIP_SHARE = 0.1
 
 # Of a contact that has been seen to miss too much: it is visited and answered whatever its bodies did.
-NEVER = -1
+_MUST_VISIT = -1
 
 # Goings through the list for each sweep allowed, at most: with little to visit they cost little, but not nothing.
-PASSES = 10
+_PASSES_PER_SWEEP = 10
 
 # Half of the sweeps between two extrapolations, an even number: those up and down belong together. Slow sweeps contract
 # along one direction with a ratio q near 1, which two changes tell; the rest of that series, q/(1 - q) times the last
 # change, is added at once. See `physics.kernels.contact_solver.gauss_seidel`. (Two more sweeps between them save a
 # tenth of the visits where the tolerance is loose, and leave arches at their limit unsolved five times as often at
 # `precise`.) There is no extrapolation if so few sweeps are allowed: the small rest is no series.
-HALF_PERIOD = 2
-RATIO_LIMIT = 0.998
+_HALF_PERIOD = 2
+_MAX_CONTRACTION_RATIO = 0.998
 
 # Of impulses that are not kept: no visit has a number as low.
-NO_MARK = -2
+_NO_HISTORY = -2
 
 
 @inlined
-def _is_answered(i, a, b, many):
+def _is_up_to_date(i, a, b, many):
     """True if neither of two bodies (b < 0: a wall) has been pushed since the last visit i."""
     return many.visited[i] >= many.pushed[a] and (b < 0 or many.visited[i] >= many.pushed[b])
 
 
 @inlined
-def is_answered(k, many):
+def is_contact_up_to_date(k, many):
     """True if no body of contact k has been pushed since its last visit."""
-    return _is_answered(k, many.ends[k, 0], many.ends[k, 1], many)
+    return _is_up_to_date(k, many.ends[k, 0], many.ends[k, 1], many)
 
 
 @inlined
@@ -81,7 +86,7 @@ def _mark_pushed(a, b, visit, many):
 
 
 @inlined
-def answer_normal(k, visit, small, many):
+def relax_normal_impulse(k, visit, small, many):
     """Answer contact k along its normal if it is off by more than `small`: its error before, as a velocity [m/s].
 
     `visit` is the number of this visit.
@@ -92,7 +97,7 @@ def answer_normal(k, visit, small, many):
     off = abs(d) * normal
     if off > small:
         many.impulse[k, 0] = p + d
-        push_normal(k, d, many)
+        apply_normal_impulse(k, d, many)
         _mark_pushed(many.ends[k, 0], many.ends[k, 1], visit, many)
     return off
 
@@ -107,101 +112,109 @@ def sweep_normals(first, last, residual, goal, limit, many):
     sweeps = visits = 0
     for i in range(first, last):
         k = many.queue[i]
-        assemble_normal(k, many)
-        many.visited[k] = NEVER
+        assemble_normal_row(k, many)
+        many.visited[k] = _MUST_VISIT
         _mark_pushed(many.ends[k, 0], many.ends[k, 1], 0, many)
-    set_motion(first, last, many)
+    motion_from_twists(first, last, many)
     while not residual <= goal and sweeps < limit:
         worst, before = 0.0, visits
         for i in range(first, last):
             k = many.queue[i if sweeps % 2 == 0 else first + last - 1 - i]
-            if is_answered(k, many):
+            if is_contact_up_to_date(k, many):
                 continue
             visits += 1
-            worst = max(worst, answer_normal(k, visits, NORMAL_SHARE * goal, many))
+            worst = max(worst, relax_normal_impulse(k, visits, _NORMAL_SKIP_SHARE * goal, many))
         sweeps += 1
         if worst <= goal or sweeps == limit:
-            set_twists(first, last, many)
-            residual = residual_of(first, last, None, many)
+            twists_from_motion(first, last, many)
+            residual = max_contact_residual(first, last, None, many)
         if visits == before:
             break  # all are answered, and stay so
     return sweeps, residual
 
 
 @inlined
-def _answer_one(W, V, mu, step, p, u, goal):
+def _solve_one_contact(W, V, mu, step, p, u, goal):
     """Impulse of a contact that answers its own velocity u, all others held; W and its inverse V are symmetric."""
     own = qt.symmetric_matvec(W, p)
-    b = minus(u, own)
+    b = subtract(u, own)
     if b[0] >= 0.0:
         return (0.0, 0.0, 0.0)
-    q = minus(p, qt.symmetric_matvec(V, u))
+    q = subtract(p, qt.symmetric_matvec(V, u))
     if q[0] >= 0.0 and q[1] * q[1] + q[2] * q[2] <= (mu * q[0]) * (mu * q[0]):
         return q
     x, y = (p[1], p[2]) if p[0] > 0.0 and p[1] * p[1] + p[2] * p[2] > 0.0 else (q[1], q[2])
-    x, y = heading(-x, -y, mu)
+    x, y = friction_direction(-x, -y, mu)
     full = (W[0], W[1], W[2], W[1], W[3], W[4], W[2], W[4], W[5])
-    what, q, _ = answer(full, b, mu, W[3] + W[5], goal, x, y, False)
-    if what != LOST:
+    what, q, _ = solve_contact_block(full, b, mu, W[3] + W[5], goal, x, y, False)
+    if what != CONTACT_UNSOLVED:
         return q
     # The normal impulse first, then the tangential step, back on the disk.
     normal = max(0.0, p[0] - u[0] / W[0])
     d = normal - p[0]
-    x, y = on_disk(p[1] - step * (u[1] + W[1] * d), p[2] - step * (u[2] + W[2] * d), mu * normal)
+    x, y = project_on_disk(p[1] - step * (u[1] + W[1] * d), p[2] - step * (u[2] + W[2] * d), mu * normal)
     return (normal, x, y)
 
 
 @inlined
-def _size(i, d, many):
+def _as_velocity(i, d, many):
     """A change d of an impulse, as a velocity [m/s]."""
-    return max(abs(d[0]) * many.visit[i, BLOCK], max(abs(d[1]), abs(d[2])) * many.visit[i, STIFF])
+    return max(abs(d[0]) * many.visit[i, VISIT_BLOCK], max(abs(d[1]), abs(d[2])) * many.visit[i, VISIT_LAMBDA_MAX])
 
 
 @inlined
-def _keep_before(i, p, marks, many):
+def _save_history(i, p, marks, many):
     """Keep the impulse of visit i as it was at two moments, if it has not been visited since then."""
     if many.visited[i] <= marks[0]:
-        put(many.settled, i, 0, p)
+        put_vector(many.settled, i, 0, p)
     if many.visited[i] <= marks[1]:
-        put(many.trend, i, 0, p)
+        put_vector(many.trend, i, 0, p)
 
 
 @inlined
-def _visit(i, number, marks, small, many):
+def _relax_contact(i, number, marks, small, many):
     """Answer visit i if it is off by more than `small`, or has been seen to be: its error before [m/s].
 
     The error is a velocity, the contact's residual or a little more. `number` is that of this visit.
     """
-    W, p = six(i, BLOCK, many), vector(many.visit, i, IMPULSE)
-    _keep_before(i, p, marks, many)
-    left = 0.0 if many.visited[i] == NEVER else small
+    W, p = visit_block(i, VISIT_BLOCK, many), row_vector(many.visit, i, VISIT_IMPULSE)
+    _save_history(i, p, marks, many)
+    left = 0.0 if many.visited[i] == _MUST_VISIT else small
     many.visited[i] = number
-    if many.visit[i, INVERSE] == UNKNOWN:
-        put_inverse(i, W, many)
-    u = velocity(i, many)
-    q = _answer_one(W, six(i, INVERSE, many), many.visit[i, MU], 1.0 / many.visit[i, STIFF], p, u, small)
-    d = minus(q, p)
-    off = _size(i, d, many)
+    if many.visit[i, VISIT_INVERSE] == NOT_INVERTED:
+        write_block_inverse(i, W, many)
+    u = visit_velocity_error(i, many)
+    q = _solve_one_contact(
+        W,
+        visit_block(i, VISIT_INVERSE, many),
+        many.visit[i, VISIT_MU],
+        1.0 / many.visit[i, VISIT_LAMBDA_MAX],
+        p,
+        u,
+        small,
+    )
+    d = subtract(q, p)
+    off = _as_velocity(i, d, many)
     if off > left:
-        put(many.visit, i, IMPULSE, q)
-        push(i, d, many)
+        put_vector(many.visit, i, VISIT_IMPULSE, q)
+        apply_visit_impulse(i, d, many)
         _mark_pushed(many.side[i, 0], many.side[i, 1], number, many)
     return off
 
 
 @inlined
-def _ratio(count, marks, many):
+def _contraction_ratio(count, marks, many):
     """Ratio of the last change of the impulses to the one before, in the metric of W_nn; 0: not along it."""
     product = square = 0.0
     for i in range(count):
         if many.visited[i] <= marks[0]:
             continue
-        p, weight = vector(many.visit, i, IMPULSE), many.visit[i, BLOCK]
-        middle = vector(many.trend, i, 0) if many.visited[i] > marks[1] else p
-        before = minus(middle, vector(many.settled, i, 0))
-        product += weight * qt.dot(minus(p, middle), before)
+        p, weight = row_vector(many.visit, i, VISIT_IMPULSE), many.visit[i, VISIT_BLOCK]
+        middle = row_vector(many.trend, i, 0) if many.visited[i] > marks[1] else p
+        before = subtract(middle, row_vector(many.settled, i, 0))
+        product += weight * qt.dot(subtract(p, middle), before)
         square += weight * qt.dot(before, before)
-    return min(product / square, RATIO_LIMIT) if product > 0.0 else 0.0
+    return min(product / square, _MAX_CONTRACTION_RATIO) if product > 0.0 else 0.0
 
 
 @inlined
@@ -214,25 +227,31 @@ def _extrapolate(count, ratio, number, marks, small, many):
     for i in range(count):
         if many.visited[i] <= marks[1]:
             continue
-        p = vector(many.visit, i, IMPULSE)
-        d = minus(p, vector(many.trend, i, 0))
+        p = row_vector(many.visit, i, VISIT_IMPULSE)
+        d = subtract(p, row_vector(many.trend, i, 0))
         normal = max(0.0, p[0] + s * d[0])
-        x, y = on_disk(p[1] + s * d[1], p[2] + s * d[2], many.visit[i, MU] * normal)
+        x, y = project_on_disk(p[1] + s * d[1], p[2] + s * d[2], many.visit[i, VISIT_MU] * normal)
         d = (normal - p[0], x - p[1], y - p[2])
-        put(many.visit, i, IMPULSE, (normal, x, y))
-        push(i, d, many)
-        if _size(i, d, many) > small:
+        put_vector(many.visit, i, VISIT_IMPULSE, (normal, x, y))
+        apply_visit_impulse(i, d, many)
+        if _as_velocity(i, d, many) > small:
             _mark_pushed(many.side[i, 0], many.side[i, 1], number, many)
 
 
 @inlined
-def _look(count, small, many):
+def _flag_unsolved(count, small, many):
     """The residual [m/s]. Who misses more than `small` is to be visited, others once a body of theirs moves."""
     worst = 0.0
     for i in range(count):
         R = many.visit
-        miss = natural_map(vector(R, i, IMPULSE), velocity(i, many), R[i, BLOCK], 1.0 / R[i, STIFF], R[i, MU])
-        many.visited[i] = 0 if miss <= small else NEVER
+        miss = natural_map_residual(
+            row_vector(R, i, VISIT_IMPULSE),
+            visit_velocity_error(i, many),
+            R[i, VISIT_BLOCK],
+            1.0 / R[i, VISIT_LAMBDA_MAX],
+            R[i, VISIT_MU],
+        )
+        many.visited[i] = 0 if miss <= small else _MUST_VISIT
         _mark_pushed(many.side[i, 0], many.side[i, 1], 0, many)
         if not miss <= worst:  # also what is not a number
             worst = miss
@@ -245,27 +264,27 @@ def _sweep(count, is_up, visits, marks, small, many):
     worst = 0.0
     for j in range(count):
         i = j if is_up else count - 1 - j
-        if not _is_answered(i, many.side[i, 0], many.side[i, 1], many):
+        if not _is_up_to_date(i, many.side[i, 0], many.side[i, 1], many):
             visits += 1
-            worst = max(worst, _visit(i, visits, marks, small, many))
+            worst = max(worst, _relax_contact(i, visits, marks, small, many))
     return worst, visits
 
 
 @kernel
-def _sweep_on(count, residual, goal, limit, many):
+def _sweep_until_solved(count, residual, goal, limit, many):
     """Sweep until the residual is at most `goal`, or for so many visits: (visits, residual [m/s])."""
-    small, most, passes, visits, since, marks = LEFT_SHARE * goal, limit * count, 0, 0, 0, (NO_MARK, NO_MARK)
-    while not residual <= goal and visits < most and passes < PASSES * limit:
+    small, most, passes, visits, since, marks = _SKIP_SHARE * goal, limit * count, 0, 0, 0, (_NO_HISTORY, _NO_HISTORY)
+    while not residual <= goal and visits < most and passes < _PASSES_PER_SWEEP * limit:
         if since == 0:
-            marks = (visits, NO_MARK)
-        elif since == HALF_PERIOD:
+            marks = (visits, _NO_HISTORY)
+        elif since == _HALF_PERIOD:
             marks = (marks[0], visits)
         worst, visits = _sweep(count, passes % 2 == 0, visits, marks, small, many)
         passes, since = passes + 1, since + 1
-        if worst <= goal or visits >= most or passes == PASSES * limit:
-            residual, since = _look(count, goal, many), 0
-        elif since == 2 * HALF_PERIOD:
-            ratio, since = _ratio(count, marks, many) if limit > since else 0.0, 0
+        if worst <= goal or visits >= most or passes == _PASSES_PER_SWEEP * limit:
+            residual, since = _flag_unsolved(count, goal, many), 0
+        elif since == 2 * _HALF_PERIOD:
+            ratio, since = _contraction_ratio(count, marks, many) if limit > since else 0.0, 0
             if ratio > 0.0:
                 _extrapolate(count, ratio, visits + 1, marks, small, many)
     return visits, residual
@@ -284,9 +303,9 @@ def sweep_contacts(first, last, friction, residual, goal, limit, many):
     if residual <= goal or limit <= 0:
         return 0, residual
     count = last - first
-    set_motion(first, last, many)
-    line_up(first, last, many)
-    visits, residual = _sweep_on(count, _look(count, LEFT_SHARE * goal, many), goal, limit, many)
-    take_back(first, last, many)
-    set_twists(first, last, many)
+    motion_from_twists(first, last, many)
+    write_visits(first, last, many)
+    visits, residual = _sweep_until_solved(count, _flag_unsolved(count, _SKIP_SHARE * goal, many), goal, limit, many)
+    read_visit_impulses(first, last, many)
+    twists_from_motion(first, last, many)
     return max(1, visits // count), residual

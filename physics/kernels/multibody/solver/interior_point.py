@@ -28,71 +28,77 @@ References
 from __future__ import annotations
 
 from physics.kernels.compile.decorators import inlined, kernel
-from physics.kernels.compile.simd import Lanes, chosen, larger, largest, total
+from physics.kernels.compile.simd import Lanes, lane_sum, larger, max_of_lanes, select_lanes
 from physics.kernels.math import quaternion as qt
-from physics.kernels.multibody.data.arrays import BUNDLES, COLUMN_SIZE
-from physics.kernels.multibody.data.contact_set import plus
+from physics.kernels.multibody.data.arrays import COLUMN_SIZE, NUM_BATCHES
+from physics.kernels.multibody.data.contact_set import add_scaled
 from physics.kernels.multibody.solver import contact_batches as of
 from physics.kernels.multibody.solver import second_order_cone
-from physics.kernels.multibody.solver.block_lu import SIZE, SPIN, clear, factor, substitute
-from physics.kernels.multibody.solver.newton_system import add_bundle, complete_matrix, set_less
+from physics.kernels.multibody.solver.block_lu import (
+    ANGULAR_OFFSET,
+    TWIST_DOFS,
+    clear_system,
+    factor_system,
+    solve_factored,
+)
+from physics.kernels.multibody.solver.newton_system import add_batch_to_matrix, complete_matrix, subtract_twists
 
 # How near to the boundary of the cones a step may lead; least ratio of p̂·û after and before that is aimed at.
-STEP_SHARE = 0.98
-LEAST_RATIO = 1.0e-4
+_FRACTION_TO_BOUNDARY = 0.98
+_MIN_CENTERING = 1.0e-4
 
 # Rounding may lead across the boundary, where masses are far apart: x₀ of what is inside is at least this times |x'|,
 # which is rounded by two units in its last place at most.
-BARELY = 1.0 + 4 * 2.0**-52
+_INTERIOR_MARGIN = 1.0 + 4 * 2.0**-52
 
 # Share of a whole step below which one is short; how much of d is taken along after such a step and after another one,
 # relative to before.
-SHORT = 0.1
-LESS, MORE = 0.2, 2.0
+_SHORT_STEP = 0.1
+_SLIP_SHRINK, _SLIP_GROWTH = 0.2, 2.0
 
 
 @inlined
 def _units(g, many):
     """Diagonal of S of the contacts of bundle g: (normal, tangents)."""
-    return of.one(g, of.UNIT, many), of.one(g, of.UNIT + 1, many)
+    return of.batch_field(g, of.IPM_UNIT, many), of.batch_field(g, of.IPM_UNIT + 1, many)
 
 
 @inlined
-def _into(s, a):
+def _apply_units(s, a):
     """S a."""
     return (s[0] * a[0], s[1] * a[1], s[1] * a[2])
 
 
 @inlined
-def _impulse(s, p):
+def _unscaled_impulse(s, p):
     """p of p̂."""
     return (s[0] * p[0], s[1] * p[1], s[1] * p[2])
 
 
 @inlined
-def _set_units(g, many):
+def _write_units(g, many):
     """Write the diagonal of S of the contacts of bundle g."""
-    mu = of.one(g, of.MU, many)
-    of.put_one(g, of.UNIT, chosen(mu > 0.0, 1.0 / mu, 1.0), many)
-    of.put_one(g, of.UNIT + 1, chosen(mu > 0.0, Lanes(1.0, 1.0, 1.0, 1.0), 0.0), many)
+    mu = of.batch_field(g, of.LANE_MU, many)
+    of.put_batch_field(g, of.IPM_UNIT, select_lanes(mu > 0.0, 1.0 / mu, 1.0), many)
+    of.put_batch_field(g, of.IPM_UNIT + 1, select_lanes(mu > 0.0, Lanes(1.0, 1.0, 1.0, 1.0), 0.0), many)
 
 
 @inlined
-def _begin(start, many):
+def _set_starting_point(start, many):
     """Start inside the cones by about `start` [m/s], near the impulses as they are."""
-    for g in range(many.counts[BUNDLES]):
-        _set_units(g, many)
-        s, p = _units(g, many), of.gather(g, many.impulse, many)
-        u = _into(s, of.velocity_missed(g, many))
+    for g in range(many.counts[NUM_BATCHES]):
+        _write_units(g, many)
+        s, p = _units(g, many), of.gather_batch(g, many.impulse, many)
+        u = _apply_units(s, of.batch_velocity_error(g, many))
         p = (p[0] / s[0], s[1] * p[1], s[1] * p[2])
-        side, slip = of.length(p[1], p[2]), of.length(u[1], u[2])
-        inside = larger(p[0], side) + start / (of.one(g, of.NORMAL, many) * s[0])
-        of.put_three(g, of.INSIDE, (inside, p[1], p[2]), many)
-        of.put_three(g, of.SLACK, (larger(u[0] + slip, slip) + start, u[1], u[2]), many)
+        side, slip = of.planar_length(p[1], p[2]), of.planar_length(u[1], u[2])
+        inside = larger(p[0], side) + start / (of.batch_field(g, of.LANE_W_NN, many) * s[0])
+        of.put_batch_vector(g, of.IPM_IMPULSE, (inside, p[1], p[2]), many)
+        of.put_batch_vector(g, of.IPM_VELOCITY, (larger(u[0] + slip, slip) + start, u[1], u[2]), many)
 
 
 @inlined
-def _pose(g, s, w, x, y, many):
+def _add_batch_matrix(g, s, w, x, y, many):
     """Add bundle g to the system: S W⁻² (S + e dᵀ) between its rows, d = (0, x, y) the direction of slip."""
     f = 1.0 / (w[3] * w[3])
     a, b, c = f * (2.0 * w[0] * w[0] - 1.0), -2.0 * f * w[0] * w[1], -2.0 * f * w[0] * w[2]
@@ -100,68 +106,68 @@ def _pose(g, s, w, x, y, many):
     n, t = s
     D = (n * n * a, n * t * (b + a * x), n * t * (c + a * y), n * t * b, t * t * (d + b * x), t * t * (e + b * y),
          n * t * c, t * t * (e + c * x), t * t * (g2 + c * y))  # fmt: skip
-    add_bundle(g, D, 1.0, many)
+    add_batch_to_matrix(g, D, 1.0, many)
 
 
 @inlined
-def _scale(g, share, many):
+def _scale_batch(g, share, many):
     """Scaling of bundle g, its matrix with a share of d, and right side: (p̂·û, residual [m/s])."""
-    s, p, u = _units(g, many), of.three(g, of.INSIDE, many), of.three(g, of.SLACK, many)
-    v = of.velocity_missed(g, many)
-    worst = of.misses(g, _impulse(s, p), v, many)
-    slip = of.length(u[1], u[2])
-    f = chosen(slip > 0.0, share / slip, 0.0)
+    s, p, u = _units(g, many), of.batch_vector(g, of.IPM_IMPULSE, many), of.batch_vector(g, of.IPM_VELOCITY, many)
+    v = of.batch_velocity_error(g, many)
+    worst = of.batch_residuals(g, _unscaled_impulse(s, p), v, many)
+    slip = of.planar_length(u[1], u[2])
+    f = select_lanes(slip > 0.0, share / slip, 0.0)
     x, y = f * u[1], f * u[2]
-    w, own, inverse = second_order_cone.scaling(p, u)
-    v = _into(s, v)
+    w, own, inverse = second_order_cone.nt_scaling(p, u)
+    v = _apply_units(s, v)
     miss = (v[0] + slip - u[0], v[1] - u[1], v[2] - u[2])
-    of.put_three(g, of.MISS, miss, many)
-    of.put_three(g, of.OWN, own, many)
-    of.put_one(g, of.INVERSE, inverse, many)
-    of.put_one(g, of.SLIP, x, many)
-    of.put_one(g, of.SLIP + 1, y, many)
-    of.put_three(g, of.SCALING, w, many)
-    of.put_one(g, of.SCALING + 3, w[3], many)
-    _pose(g, s, w, x, y, many)
-    f = _into(s, second_order_cone.unscaled_twice(w, miss))
-    of.push(g, (-f[0], -f[1], -f[2]), many.defect, SPIN, many)
+    of.put_batch_vector(g, of.IPM_RESIDUAL, miss, many)
+    of.put_batch_vector(g, of.IPM_LAMBDA, own, many)
+    of.put_batch_field(g, of.IPM_INV_ROOT_DET, inverse, many)
+    of.put_batch_field(g, of.IPM_SLIP_DIRECTION, x, many)
+    of.put_batch_field(g, of.IPM_SLIP_DIRECTION + 1, y, many)
+    of.put_batch_vector(g, of.IPM_SCALING, w, many)
+    of.put_batch_field(g, of.IPM_SCALING + 3, w[3], many)
+    _add_batch_matrix(g, s, w, x, y, many)
+    f = _apply_units(s, second_order_cone.apply_inv_scaling_twice(w, miss))
+    of.apply_batch_impulse(g, (-f[0], -f[1], -f[2]), many.defect, ANGULAR_OFFSET, many)
     return qt.dot(p, u), worst
 
 
 @kernel
-def _prepare(part, share, many):
+def _prepare_predictor(part, share, many):
     """Scalings, and the right side without what pushes off the boundary: (p̂·û of a contact, residual [m/s]).
 
     The matrix of the contacts, which `complete_matrix` completes.
     """
     first, last, begin, end = part
-    clear(begin, end, many)
+    clear_system(begin, end, many)
     for i in range(begin, end):
-        set_less(many.order[i], many.free, many.twist, many)
+        subtract_twists(many.order[i], many.free, many.twist, many)
     gap = worst = Lanes(0.0, 0.0, 0.0, 0.0)
-    for g in range(many.counts[BUNDLES]):
-        product, miss = _scale(g, share, many)
-        gap, worst = gap + of.one(g, of.WEIGHT, many) * product, larger(worst, miss)
-    return total(gap) / (last - first), largest(worst)
+    for g in range(many.counts[NUM_BATCHES]):
+        product, miss = _scale_batch(g, share, many)
+        gap, worst = gap + of.batch_field(g, of.LANE_WEIGHT, many) * product, larger(worst, miss)
+    return lane_sum(gap) / (last - first), max_of_lanes(worst)
 
 
 @inlined
 def _scaling_of(g, many):
     """(w₀, w₁, w₂, η) of the contacts of bundle g."""
-    w = of.three(g, of.SCALING, many)
-    return (w[0], w[1], w[2], of.one(g, of.SCALING + 3, many))
+    w = of.batch_vector(g, of.IPM_SCALING, many)
+    return (w[0], w[1], w[2], of.batch_field(g, of.IPM_SCALING + 3, many))
 
 
 @inlined
-def _change(g, s, many):
+def _batch_twist_step(g, s, many):
     """(S + e dᵀ) J dx for the change of twists in `many.change`, d = (0, x, y) the direction of slip."""
-    x, y = of.one(g, of.SLIP, many), of.one(g, of.SLIP + 1, many)
-    d = _into(s, of.velocity_along(g, many.change, SPIN, many))
+    x, y = of.batch_field(g, of.IPM_SLIP_DIRECTION, many), of.batch_field(g, of.IPM_SLIP_DIRECTION + 1, many)
+    d = _apply_units(s, of.batch_velocity(g, many.change, ANGULAR_OFFSET, many))
     return (d[0] + (x * d[1] + y * d[2]), d[1], d[2])
 
 
 @inlined
-def _explore(part, is_corrected, many):
+def _find_step_length(part, is_corrected, many):
     """Changes that belong to `many.change`, W dp̂ and dû; how far they lead, and p̂·û of a contact there.
 
     With f, what is in the bundles if `is_corrected`, else 0, they satisfy W dp̂ + W⁻¹ dû = f - λ. The second number is
@@ -169,27 +175,35 @@ def _explore(part, is_corrected, many):
     """
     most = Lanes(1.0, 1.0, 1.0, 1.0)  # of what 1/t must be at least
     square = product = Lanes(0.0, 0.0, 0.0, 0.0)
-    for g in range(many.counts[BUNDLES]):
-        own, inverse, on = of.three(g, of.OWN, many), of.one(g, of.INVERSE, many), of.one(g, of.WEIGHT, many)
-        du = plus(_change(g, _units(g, many), many), 1.0, of.three(g, of.MISS, many))
-        h = second_order_cone.unscaled(_scaling_of(g, many), du)
+    for g in range(many.counts[NUM_BATCHES]):
+        own, inverse, on = (
+            of.batch_vector(g, of.IPM_LAMBDA, many),
+            of.batch_field(g, of.IPM_INV_ROOT_DET, many),
+            of.batch_field(g, of.LANE_WEIGHT, many),
+        )
+        du = add_scaled(_batch_twist_step(g, _units(g, many), many), 1.0, of.batch_vector(g, of.IPM_RESIDUAL, many))
+        h = second_order_cone.apply_inv_scaling(_scaling_of(g, many), du)
         dp = (-own[0] - h[0], -own[1] - h[1], -own[2] - h[2])
         if is_corrected:
-            dp = plus(dp, 1.0, of.three(g, of.EXTRA, many))
-        of.put_three(g, of.CHANGE, dp, many)
-        of.put_three(g, of.SLACK_CHANGE, du, many)
+            dp = add_scaled(dp, 1.0, of.batch_vector(g, of.IPM_CORRECTION, many))
+        of.put_batch_vector(g, of.IPM_IMPULSE_STEP, dp, many)
+        of.put_batch_vector(g, of.IPM_VELOCITY_STEP, du, many)
         most = larger(
-            most, larger(second_order_cone.way_out(own, inverse, dp), second_order_cone.way_out(own, inverse, h))
+            most,
+            larger(
+                second_order_cone.inv_step_to_boundary(own, inverse, dp),
+                second_order_cone.inv_step_to_boundary(own, inverse, h),
+            ),
         )
         square = square + on * qt.dot(own, own)
         product = product + on * qt.dot(dp, h)
-    t = 1.0 / largest(most)
-    return t, ((1.0 - t) * total(square) + t * t * total(product)) / (part[1] - part[0])
+    t = 1.0 / max_of_lanes(most)
+    return t, ((1.0 - t) * lane_sum(square) + t * t * lane_sum(product)) / (part[1] - part[0])
 
 
 @inlined
 def _set_right_side(part, many):
-    """`many.change`: the right side that `_prepare` left."""
+    """`many.change`: the right side that `_prepare_predictor` left."""
     for i in range(part[2], part[3]):
         b = many.order[i]
         for c in range(COLUMN_SIZE):
@@ -197,52 +211,64 @@ def _set_right_side(part, many):
 
 
 @inlined
-def _correct(part, center, many):
+def _set_corrector(part, center, many):
     """Right side with σ ν = `center` and the second-order term of the changes found so far: λ ∘ f = σ ν e - … ."""
     _set_right_side(part, many)
-    for g in range(many.counts[BUNDLES]):
-        own, a = of.three(g, of.OWN, many), of.three(g, of.CHANGE, many)
-        m = second_order_cone.product(a, (-own[0] - a[0], -own[1] - a[1], -own[2] - a[2]))
-        f = second_order_cone.quotient((center - m[0], -m[1], -m[2]), own, of.one(g, of.INVERSE, many))
-        of.put_three(g, of.EXTRA, f, many)
-        of.push(g, _into(_units(g, many), second_order_cone.unscaled(_scaling_of(g, many), f)), many.change, SPIN, many)
+    for g in range(many.counts[NUM_BATCHES]):
+        own, a = of.batch_vector(g, of.IPM_LAMBDA, many), of.batch_vector(g, of.IPM_IMPULSE_STEP, many)
+        m = second_order_cone.jordan_product(a, (-own[0] - a[0], -own[1] - a[1], -own[2] - a[2]))
+        f = second_order_cone.jordan_quotient(
+            (center - m[0], -m[1], -m[2]), own, of.batch_field(g, of.IPM_INV_ROOT_DET, many)
+        )
+        of.put_batch_vector(g, of.IPM_CORRECTION, f, many)
+        of.apply_batch_impulse(
+            g,
+            _apply_units(_units(g, many), second_order_cone.apply_inv_scaling(_scaling_of(g, many), f)),
+            many.change,
+            ANGULAR_OFFSET,
+            many,
+        )
 
 
 @inlined
-def _within(a):
+def _move_inside_cone(a):
     """a, inside the cone."""
-    return (larger(a[0], BARELY * of.length(a[1], a[2])), a[1], a[2])
+    return (larger(a[0], _INTERIOR_MARGIN * of.planar_length(a[1], a[2])), a[1], a[2])
 
 
 @inlined
-def _step(part, t, many):
+def _take_step(part, t, many):
     """Go t of the way."""
-    for g in range(many.counts[BUNDLES]):
-        dp = second_order_cone.unscaled(_scaling_of(g, many), of.three(g, of.CHANGE, many))
-        of.put_three(g, of.INSIDE, _within(plus(of.three(g, of.INSIDE, many), t, dp)), many)
-        du = of.three(g, of.SLACK_CHANGE, many)
-        of.put_three(g, of.SLACK, _within(plus(of.three(g, of.SLACK, many), t, du)), many)
+    for g in range(many.counts[NUM_BATCHES]):
+        dp = second_order_cone.apply_inv_scaling(_scaling_of(g, many), of.batch_vector(g, of.IPM_IMPULSE_STEP, many))
+        of.put_batch_vector(
+            g, of.IPM_IMPULSE, _move_inside_cone(add_scaled(of.batch_vector(g, of.IPM_IMPULSE, many), t, dp)), many
+        )
+        du = of.batch_vector(g, of.IPM_VELOCITY_STEP, many)
+        of.put_batch_vector(
+            g, of.IPM_VELOCITY, _move_inside_cone(add_scaled(of.batch_vector(g, of.IPM_VELOCITY, many), t, du)), many
+        )
     for i in range(part[2], part[3]):
         b = many.order[i]
-        for c in range(SIZE):
+        for c in range(TWIST_DOFS):
             many.twist[b, c] += t * many.change[b, c + c // 3]
 
 
 @inlined
-def _take(part, many):
+def _write_solution(part, many):
     """The impulses, and the twists that belong to them."""
     for i in range(part[2], part[3]):
         b = many.order[i]
-        for c in range(SIZE):
+        for c in range(TWIST_DOFS):
             many.twist[b, c] = many.free[b, c]
-    for g in range(many.counts[BUNDLES]):
-        p = _impulse(_units(g, many), of.three(g, of.INSIDE, many))
-        of.scatter(g, p, many.impulse, many)
-        of.push(g, p, many.twist, 3, many)
+    for g in range(many.counts[NUM_BATCHES]):
+        p = _unscaled_impulse(_units(g, many), of.batch_vector(g, of.IPM_IMPULSE, many))
+        of.scatter_batch(g, p, many.impulse, many)
+        of.apply_batch_impulse(g, p, many.twist, 3, many)
 
 
 @kernel
-def interior_point(part, start, goal, limit, many):
+def interior_point_contacts(part, start, goal, limit, many):
     """Improve the impulses of an island by at most `limit` iterations; how many were made.
 
     Parameters
@@ -256,23 +282,23 @@ def interior_point(part, start, goal, limit, many):
     limit : int
     """
     _, _, begin, end = part
-    _begin(start, many)
+    _set_starting_point(start, many)
     count, share = 0, 1.0
     while count < limit:
-        gap, worst = _prepare(part, share, many)
+        gap, worst = _prepare_predictor(part, share, many)
         if not worst > goal:
             break
         complete_matrix(begin, end, many)
-        factor(begin, end, many)
+        factor_system(begin, end, many)
         _set_right_side(part, many)
-        substitute(begin, end, many.change, many)
-        _, after = _explore(part, False, many)
-        ratio = min(1.0, max(after / gap, LEAST_RATIO))
-        _correct(part, ratio * ratio * ratio * gap, many)
-        substitute(begin, end, many.change, many)
-        t, _ = _explore(part, True, many)
-        _step(part, min(1.0, STEP_SHARE * t), many)
-        share = LESS * share if t < SHORT else min(1.0, MORE * share)
+        solve_factored(begin, end, many.change, many)
+        _, after = _find_step_length(part, False, many)
+        ratio = min(1.0, max(after / gap, _MIN_CENTERING))
+        _set_corrector(part, ratio * ratio * ratio * gap, many)
+        solve_factored(begin, end, many.change, many)
+        t, _ = _find_step_length(part, True, many)
+        _take_step(part, min(1.0, _FRACTION_TO_BOUNDARY * t), many)
+        share = _SLIP_SHRINK * share if t < _SHORT_STEP else min(1.0, _SLIP_GROWTH * share)
         count += 1
-    _take(part, many)
+    _write_solution(part, many)
     return count

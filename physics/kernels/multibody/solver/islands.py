@@ -9,18 +9,18 @@ Reference: R. E. Tarjan, *Efficiency of a good but not linear set union algorith
 from __future__ import annotations
 
 from physics.kernels.compile.decorators import inlined, kernel
-from physics.kernels.math.union_find import join, root_of
+from physics.kernels.math.union_find import find_root, unite_sets
 
 
 @inlined
-def _join(n, many):
+def _union_contacts(n, many):
     """Let `many.parent` lead from every body to the first one that contacts connect it with."""
     parent = many.parent
     for b in range(parent.shape[0]):
         parent[b] = b
     for k in range(n):
         if many.ends[k, 1] >= 0:
-            join(many.ends[k, 0], many.ends[k, 1], parent)
+            unite_sets(many.ends[k, 0], many.ends[k, 1], parent)
 
 
 @inlined
@@ -30,7 +30,7 @@ def _list_contacts(n, many):
     for b in range(island.shape[0]):
         island[b] = -1
     for k in range(n):
-        root = root_of(many.ends[k, 0], parent)
+        root = find_root(many.ends[k, 0], parent)
         if island[root] < 0:
             island[root], begin[count] = count, 0
             count += 1
@@ -39,7 +39,7 @@ def _list_contacts(n, many):
     for i in range(count):
         total, begin[i] = total + begin[i], total
     for k in range(n):
-        i = island[root_of(many.ends[k, 0], parent)]
+        i = island[find_root(many.ends[k, 0], parent)]
         many.queue[begin[i]] = k
         begin[i] += 1
     for i in range(count, 0, -1):
@@ -55,7 +55,7 @@ def _list_bodies(count, many):
     for i in range(count + 1):
         begin[i] = 0
     for b in range(island.shape[0]):
-        island[b] = island[root_of(b, many.parent)]  # the root comes first
+        island[b] = island[find_root(b, many.parent)]  # the root comes first
         if island[b] >= 0:
             begin[island[b]] += 1
     for i in range(count):
@@ -76,7 +76,7 @@ def find_islands(n, many):
     Contacts of island i are `many.queue[first_contact[i] : first_contact[i + 1]]`, its bodies
     `many.order[first_body[i] : first_body[i + 1]]`.
     """
-    _join(n, many)
+    _union_contacts(n, many)
     count = _list_contacts(n, many)
     _list_bodies(count, many)
     return count

@@ -15,7 +15,7 @@ from __future__ import annotations
 
 from physics.kernels.compile.decorators import inlined, kernel
 
-NONE = -1
+_NO_ENTRY = -1
 
 
 @inlined
@@ -35,7 +35,7 @@ def _mark_neighbours(a, mark, many):
     """Write `mark` to all neighbours of a that are not eliminated, and to a itself."""
     many.mark[a] = mark
     k = many.head[a]
-    while k != NONE:
+    while k != _NO_ENTRY:
         many.mark[many.neighbour[k, 0]] = mark
         k = many.neighbour[k, 1]
 
@@ -44,8 +44,8 @@ def _mark_neighbours(a, mark, many):
 def _put_in_bucket(b, many):
     """Put b at the front of the list of bodies of its degree."""
     d = many.degree[b]
-    many.ahead[b], many.behind[b] = NONE, many.bucket[d]
-    if many.bucket[d] != NONE:
+    many.ahead[b], many.behind[b] = _NO_ENTRY, many.bucket[d]
+    if many.bucket[d] != _NO_ENTRY:
         many.ahead[many.bucket[d]] = b
     many.bucket[d] = b
 
@@ -53,22 +53,22 @@ def _put_in_bucket(b, many):
 @inlined
 def _take_from_bucket(b, many):
     """Take b out of the list of bodies of its degree."""
-    if many.ahead[b] == NONE:
+    if many.ahead[b] == _NO_ENTRY:
         many.bucket[many.degree[b]] = many.behind[b]
     else:
         many.behind[many.ahead[b]] = many.behind[b]
-    if many.behind[b] != NONE:
+    if many.behind[b] != _NO_ENTRY:
         many.ahead[many.behind[b]] = many.ahead[b]
 
 
 @inlined
-def _link(first, last, begin, end, many):
+def _build_graph(first, last, begin, end, many):
     """Neighbours of the bodies of one island, from its contacts; whether there was room."""
     many.links[0] = 0
     for i in range(begin, end):
         b = many.order[i]
-        many.head[b], many.degree[b], many.rank[b], many.mark[b] = NONE, 0, NONE, NONE
-    before_a = before_b = NONE
+        many.head[b], many.degree[b], many.rank[b], many.mark[b] = _NO_ENTRY, 0, _NO_ENTRY, _NO_ENTRY
+    before_a = before_b = _NO_ENTRY
     for i in range(first, last):
         a, b = many.ends[many.queue[i], 0], many.ends[many.queue[i], 1]
         if b < 0 or (a == before_a and b == before_b):
@@ -83,11 +83,11 @@ def _link(first, last, begin, end, many):
 def _write_column(b, at, many):
     """Write the neighbours of b that are left to `many.column` from `at` on; where they end, or -1: no room."""
     k = many.head[b]
-    while k != NONE:
+    while k != _NO_ENTRY:
         other = many.neighbour[k, 0]
-        if many.rank[other] == NONE:
+        if many.rank[other] == _NO_ENTRY:
             if at == many.column.shape[0]:
-                return NONE
+                return _NO_ENTRY
             many.column[at] = other
             at += 1
         k = many.neighbour[k, 1]
@@ -95,7 +95,7 @@ def _write_column(b, at, many):
 
 
 @inlined
-def _connect(start, end, b, many):
+def _eliminate_body(start, end, b, many):
     """Take b from its neighbours `many.column[start:end]` and make them neighbours of each other; whether room was."""
     for i in range(start, end):
         a = many.column[i]
@@ -113,27 +113,27 @@ def _connect(start, end, b, many):
 
 
 @kernel
-def order_bodies(first, last, begin, end, most, many):
+def order_elimination(first, last, begin, end, most, many):
     """Reorder the bodies `many.order[begin:end]` of an island with contacts `many.queue[first:last]` for elimination.
 
     `many.rank` receives the place of each, `many.column[start[b] : stop[b]]` those of its neighbours that come later.
     Returns the products of blocks that elimination takes; -1: there is no room for it, or they are more than `most`.
     """
-    if not _link(first, last, begin, end, many):
+    if not _build_graph(first, last, begin, end, many):
         return -1
     for d in range(end - begin):
-        many.bucket[d] = NONE
+        many.bucket[d] = _NO_ENTRY
     for i in range(end - 1, begin - 1, -1):
         _put_in_bucket(many.order[i], many)
     at = least = work = 0
     for i in range(begin, end):
-        while many.bucket[least] == NONE:
+        while many.bucket[least] == _NO_ENTRY:
             least += 1
         b = many.bucket[least]
         _take_from_bucket(b, many)
         many.order[i], many.rank[b], many.start[b] = b, i, at
         at = _write_column(b, at, many)
-        if at < 0 or not _connect(many.start[b], at, b, many):
+        if at < 0 or not _eliminate_body(many.start[b], at, b, many):
             return -1
         many.stop[b] = at
         d = at - many.start[b]

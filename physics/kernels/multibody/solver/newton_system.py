@@ -5,54 +5,58 @@ from __future__ import annotations
 import math
 
 from physics.kernels.compile.decorators import inlined, kernel
-from physics.kernels.compile.simd import Lanes, chosen, larger, put_row, row, totals
+from physics.kernels.compile.simd import Lanes, lane_sums, larger, load_lanes, select_lanes, store_lanes
 from physics.kernels.math import quaternion as qt
-from physics.kernels.multibody.data.arrays import BLOCK_SIZE, BUNDLES, COLUMN_SIZE
-from physics.kernels.multibody.data.contact_set import vector
+from physics.kernels.math.vector import row_vector
+from physics.kernels.multibody.data.arrays import BLOCK_SIZE, COLUMN_SIZE, NUM_BATCHES
 from physics.kernels.multibody.solver import contact_batches as of
-from physics.kernels.multibody.solver.block_lu import SIZE, SPIN, clear
-from physics.kernels.multibody.solver.contact_batches import FIRST, IS_FIRST, PLACE, SECOND
+from physics.kernels.multibody.solver.block_lu import ANGULAR_OFFSET, TWIST_DOFS, clear_system
+from physics.kernels.multibody.solver.contact_batches import BATCH_BLOCK, BATCH_BODY_A, BATCH_BODY_B, BATCH_IS_A_FIRST
 
 
 @inlined
-def law(y, mu):
+def project_impulse(y, mu):
     """The impulses that `y` stands for: no pull, and the tangential part inside its disk."""
     normal = larger(y[0], 0.0)
-    size, limit = of.length(y[1], y[2]), mu * normal
-    s = chosen(size > limit, limit / size, 1.0)
+    size, limit = of.planar_length(y[1], y[2]), mu * normal
+    s = select_lanes(size > limit, limit / size, 1.0)
     return normal, s * y[1], s * y[2]
 
 
 @inlined
-def set_less(b, a, c, many):
+def subtract_twists(b, a, c, many):
     """Column b of `many.defect`: row b of twists a less that of twists c."""
     D = many.defect
     D[b, 0], D[b, 1], D[b, 2] = a[b, 0] - c[b, 0], a[b, 1] - c[b, 1], a[b, 2] - c[b, 2]
-    D[b, SPIN], D[b, SPIN + 1], D[b, SPIN + 2] = a[b, 3] - c[b, 3], a[b, 4] - c[b, 4], a[b, 5] - c[b, 5]
+    D[b, ANGULAR_OFFSET], D[b, ANGULAR_OFFSET + 1], D[b, ANGULAR_OFFSET + 2] = (
+        a[b, 3] - c[b, 3],
+        a[b, 4] - c[b, 4],
+        a[b, 5] - c[b, 5],
+    )
 
 
 @kernel
-def defect(part, rho, all_hold, many):
+def compute_defect(part, rho, all_hold, many):
     """x - M⁻¹ Jᵀ p(x) of every body of an island into `many.defect`, p(x) into the bundles.
 
     Returns its norm by mass, and its largest velocity. With `all_hold` the law is left out: p = q - ρ u.
     """
     _, _, begin, end = part
     for i in range(begin, end):
-        set_less(many.order[i], many.twist, many.free, many)
-    for g in range(many.counts[BUNDLES]):
-        u, q = of.velocity_missed(g, many), of.three(g, of.IMPULSE, many)
+        subtract_twists(many.order[i], many.twist, many.free, many)
+    for g in range(many.counts[NUM_BATCHES]):
+        u, q = of.batch_velocity_error(g, many), of.batch_vector(g, of.PROX_IMPULSE, many)
         y = (q[0] - rho * u[0], q[1] - rho * u[1], q[2] - rho * u[2])
-        of.put_three(g, of.AIM, y, many)
+        of.put_batch_vector(g, of.PROX_ARGUMENT, y, many)
         p = y
         if not all_hold:
-            p = law(y, of.one(g, of.MU, many))
-        of.put_three(g, of.TRIAL, p, many)
-        of.push(g, (-p[0], -p[1], -p[2]), many.defect, SPIN, many)
+            p = project_impulse(y, of.batch_field(g, of.LANE_MU, many))
+        of.put_batch_vector(g, of.PROX_PROJECTED, p, many)
+        of.apply_batch_impulse(g, (-p[0], -p[1], -p[2]), many.defect, ANGULAR_OFFSET, many)
     total = worst = 0.0
     for i in range(begin, end):
         b = many.order[i]
-        v, w, r = vector(many.defect, b, 0), vector(many.defect, b, SPIN), many.bodies[b].radius
+        v, w, r = row_vector(many.defect, b, 0), row_vector(many.defect, b, ANGULAR_OFFSET), many.bodies[b].radius
         square = qt.dot(v, v) + r * r * qt.dot(w, w)
         total += many.bodies[b].mass * square
         worst = max(worst, square)
@@ -60,14 +64,14 @@ def defect(part, rho, all_hold, many):
 
 
 @inlined
-def _slopes(y, mu):
+def _projection_jacobian(y, mu):
     """Derivative of the law, row by row: 0 for y <= 0."""
-    size, limit, on = of.length(y[1], y[2]), mu * y[0], chosen(y[0] > 0.0, Lanes(1.0, 1.0, 1.0, 1.0), 0.0)
+    size, limit, on = of.planar_length(y[1], y[2]), mu * y[0], select_lanes(y[0] > 0.0, Lanes(1.0, 1.0, 1.0, 1.0), 0.0)
     slips = size > limit
-    a, b = chosen(slips, y[1] / size, 0.0), chosen(slips, y[2] / size, 0.0)
-    s = on * chosen(slips, limit / size, 1.0)
-    s = chosen(limit > 0.0, s, 0.0)
-    m = chosen(limit > 0.0, on * mu, 0.0)
+    a, b = select_lanes(slips, y[1] / size, 0.0), select_lanes(slips, y[2] / size, 0.0)
+    s = on * select_lanes(slips, limit / size, 1.0)
+    s = select_lanes(limit > 0.0, s, 0.0)
+    m = select_lanes(limit > 0.0, on * mu, 0.0)
     return (on, 0.0 * on, 0.0 * on, m * a, s * (1.0 - a * a), -s * a * b, m * b, -s * a * b, s * (1.0 - b * b))
 
 
@@ -83,7 +87,7 @@ def _world_rows(D, E, weight):
 @inlined
 def _sum(a):
     """Sum of vectors of a bundle, as half a column."""
-    return totals(a[0], a[1], a[2], Lanes(0.0, 0.0, 0.0, 0.0))
+    return lane_sums(a[0], a[1], a[2], Lanes(0.0, 0.0, 0.0, 0.0))
 
 
 @inlined
@@ -93,43 +97,43 @@ def _columns(x, y, z):
 
 
 @inlined
-def _upper(A):
+def _sum_columns(A):
     """Sums of three columns."""
     return _sum(A[0]), _sum(A[1]), _sum(A[2])
 
 
 @inlined
-def _below(r, A):
+def _moment_columns(r, A):
     """Sums of r x each of three columns: their moments."""
     return _sum(qt.cross(r, A[0])), _sum(qt.cross(r, A[1])), _sum(qt.cross(r, A[2]))
 
 
 @inlined
-def _add(B, place, c, upper, lower):
+def _add_columns(B, place, c, upper, lower):
     """Add halves of three columns to those of block B[place] from c on."""
     first, second, third = COLUMN_SIZE * c, COLUMN_SIZE * (c + 1), COLUMN_SIZE * (c + 2)
-    put_row(B, place, first, row(B, place, first) + upper[0])
-    put_row(B, place, first + SPIN, row(B, place, first + SPIN) + lower[0])
-    put_row(B, place, second, row(B, place, second) + upper[1])
-    put_row(B, place, second + SPIN, row(B, place, second + SPIN) + lower[1])
-    put_row(B, place, third, row(B, place, third) + upper[2])
-    put_row(B, place, third + SPIN, row(B, place, third + SPIN) + lower[2])
+    store_lanes(B, place, first, load_lanes(B, place, first) + upper[0])
+    store_lanes(B, place, first + ANGULAR_OFFSET, load_lanes(B, place, first + ANGULAR_OFFSET) + lower[0])
+    store_lanes(B, place, second, load_lanes(B, place, second) + upper[1])
+    store_lanes(B, place, second + ANGULAR_OFFSET, load_lanes(B, place, second + ANGULAR_OFFSET) + lower[1])
+    store_lanes(B, place, third, load_lanes(B, place, third) + upper[2])
+    store_lanes(B, place, third + ANGULAR_OFFSET, load_lanes(B, place, third + ANGULAR_OFFSET) + lower[2])
 
 
 @inlined
-def _take(B, place, c, upper, lower):
+def _subtract_columns(B, place, c, upper, lower):
     """Take halves of three columns off those of block B[place] from c on."""
     first, second, third = COLUMN_SIZE * c, COLUMN_SIZE * (c + 1), COLUMN_SIZE * (c + 2)
-    put_row(B, place, first, row(B, place, first) - upper[0])
-    put_row(B, place, first + SPIN, row(B, place, first + SPIN) - lower[0])
-    put_row(B, place, second, row(B, place, second) - upper[1])
-    put_row(B, place, second + SPIN, row(B, place, second + SPIN) - lower[1])
-    put_row(B, place, third, row(B, place, third) - upper[2])
-    put_row(B, place, third + SPIN, row(B, place, third + SPIN) - lower[2])
+    store_lanes(B, place, first, load_lanes(B, place, first) - upper[0])
+    store_lanes(B, place, first + ANGULAR_OFFSET, load_lanes(B, place, first + ANGULAR_OFFSET) - lower[0])
+    store_lanes(B, place, second, load_lanes(B, place, second) - upper[1])
+    store_lanes(B, place, second + ANGULAR_OFFSET, load_lanes(B, place, second + ANGULAR_OFFSET) - lower[1])
+    store_lanes(B, place, third, load_lanes(B, place, third) - upper[2])
+    store_lanes(B, place, third + ANGULAR_OFFSET, load_lanes(B, place, third + ANGULAR_OFFSET) - lower[2])
 
 
 @kernel
-def add_bundle(g, D, rho, many):
+def add_batch_to_matrix(g, D, rho, many):
     """Add Jᵀ ρ D J of the contacts of bundle g to the blocks of its bodies; D row by row in the contacts' frames.
 
     With A = ρ Eᵀ D E and J = (1, -[r]x) from the twist of a body to the velocity of its point, a block is
@@ -138,44 +142,44 @@ def add_bundle(g, D, rho, many):
 
     for the arms r of the body of its rows and s of that of its columns. Rows of -A [s]x are s x those of A.
     """
-    a, b = many.bundle[g, FIRST], many.bundle[g, SECOND]
-    x, y, z = _world_rows(D, of.frame_of(g, many), rho * of.one(g, of.WEIGHT, many))
-    r = of.three(g, of.ARM, many)
+    a, b = many.bundle[g, BATCH_BODY_A], many.bundle[g, BATCH_BODY_B]
+    x, y, z = _world_rows(D, of.batch_frames(g, many), rho * of.batch_field(g, of.LANE_WEIGHT, many))
+    r = of.batch_vector(g, of.LANE_ARM, many)
     A, P = _columns(x, y, z), _columns(qt.cross(r, x), qt.cross(r, y), qt.cross(r, z))
-    pull, of_a, turn_a = _upper(A), _below(r, A), _upper(P)
-    _add(many.diagonal, a, 0, pull, of_a)
-    _add(many.diagonal, a, 3, turn_a, _below(r, P))
+    pull, of_a, turn_a = _sum_columns(A), _moment_columns(r, A), _sum_columns(P)
+    _add_columns(many.diagonal, a, 0, pull, of_a)
+    _add_columns(many.diagonal, a, 3, turn_a, _moment_columns(r, P))
     if b < 0:
         return
-    s = of.three(g, of.ARM + 3, many)
+    s = of.batch_vector(g, of.LANE_ARM + 3, many)
     Q = _columns(qt.cross(s, x), qt.cross(s, y), qt.cross(s, z))
-    of_b, turn_b = _below(s, A), _upper(Q)
-    _add(many.diagonal, b, 0, pull, of_b)
-    _add(many.diagonal, b, 3, turn_b, _below(s, Q))
-    place = many.bundle[g, PLACE]
-    if many.bundle[g, IS_FIRST] == 1:
-        _take(many.upper, place, 0, pull, of_a)
-        _take(many.upper, place, 3, turn_b, _below(r, Q))
-        _take(many.lower, place, 0, pull, of_b)
-        _take(many.lower, place, 3, turn_a, _below(s, P))
+    of_b, turn_b = _moment_columns(s, A), _sum_columns(Q)
+    _add_columns(many.diagonal, b, 0, pull, of_b)
+    _add_columns(many.diagonal, b, 3, turn_b, _moment_columns(s, Q))
+    place = many.bundle[g, BATCH_BLOCK]
+    if many.bundle[g, BATCH_IS_A_FIRST] == 1:
+        _subtract_columns(many.upper, place, 0, pull, of_a)
+        _subtract_columns(many.upper, place, 3, turn_b, _moment_columns(r, Q))
+        _subtract_columns(many.lower, place, 0, pull, of_b)
+        _subtract_columns(many.lower, place, 3, turn_a, _moment_columns(s, P))
     else:
-        _take(many.lower, place, 0, pull, of_a)
-        _take(many.lower, place, 3, turn_b, _below(r, Q))
-        _take(many.upper, place, 0, pull, of_b)
-        _take(many.upper, place, 3, turn_a, _below(s, P))
+        _subtract_columns(many.lower, place, 0, pull, of_a)
+        _subtract_columns(many.lower, place, 3, turn_b, _moment_columns(r, Q))
+        _subtract_columns(many.upper, place, 0, pull, of_b)
+        _subtract_columns(many.upper, place, 3, turn_a, _moment_columns(s, P))
 
 
 @inlined
-def _respond(B, place, b, many):
+def _apply_inv_mass(B, place, b, many):
     """Multiply the rows of the block B[place] by M⁻¹ of body b."""
     m, K = many.lightness[b], many.turning
     x = Lanes(K[b, 0], K[b, 1], K[b, 2], 0.0)
     y = Lanes(K[b, 1], K[b, 3], K[b, 4], 0.0)
     z = Lanes(K[b, 2], K[b, 4], K[b, 5], 0.0)
     for c in range(0, BLOCK_SIZE, COLUMN_SIZE):
-        u, v, w = B[place, c + SPIN], B[place, c + SPIN + 1], B[place, c + SPIN + 2]
-        put_row(B, place, c, m * row(B, place, c))
-        put_row(B, place, c + SPIN, u * x + v * y + w * z)
+        u, v, w = B[place, c + ANGULAR_OFFSET], B[place, c + ANGULAR_OFFSET + 1], B[place, c + ANGULAR_OFFSET + 2]
+        store_lanes(B, place, c, m * load_lanes(B, place, c))
+        store_lanes(B, place, c + ANGULAR_OFFSET, u * x + v * y + w * z)
 
 
 @inlined
@@ -183,22 +187,22 @@ def complete_matrix(begin, end, many):
     """1 + M⁻¹ times what contacts have added."""
     for i in range(begin, end):
         b = many.order[i]
-        _respond(many.diagonal, b, b, many)
-        for c in range(SIZE):
+        _apply_inv_mass(many.diagonal, b, b, many)
+        for c in range(TWIST_DOFS):
             many.diagonal[b, COLUMN_SIZE * c + c + c // 3] += 1.0
         for k in range(many.start[b], many.stop[b]):
-            _respond(many.upper, k, b, many)
-            _respond(many.lower, k, many.column[k], many)
+            _apply_inv_mass(many.upper, k, b, many)
+            _apply_inv_mass(many.lower, k, many.column[k], many)
 
 
 @kernel
-def fill_matrix(part, rho, all_hold, many):
-    """Newton's matrix of an island at the point of the last `defect`."""
+def assemble_newton_matrix(part, rho, all_hold, many):
+    """Newton's matrix of an island at the point of the last `compute_defect`."""
     _, _, begin, end = part
-    clear(begin, end, many)
-    for g in range(many.counts[BUNDLES]):
-        y = of.three(g, of.AIM, many)
+    clear_system(begin, end, many)
+    for g in range(many.counts[NUM_BATCHES]):
+        y = of.batch_vector(g, of.PROX_ARGUMENT, many)
         if all_hold:
             y = (Lanes(1.0, 1.0, 1.0, 1.0), Lanes(0.0, 0.0, 0.0, 0.0), Lanes(0.0, 0.0, 0.0, 0.0))
-        add_bundle(g, _slopes(y, of.one(g, of.MU, many)), rho, many)
+        add_batch_to_matrix(g, _projection_jacobian(y, of.batch_field(g, of.LANE_MU, many)), rho, many)
     complete_matrix(begin, end, many)

@@ -18,53 +18,54 @@ thrown away and ρ shrinks.
 from __future__ import annotations
 
 from physics.kernels.compile.decorators import inlined, kernel
-from physics.kernels.multibody.data.arrays import BUNDLES, COLUMN_SIZE
-from physics.kernels.multibody.data.contact_set import put, vector
+from physics.kernels.math.vector import row_vector
+from physics.kernels.multibody.data.arrays import COLUMN_SIZE, NUM_BATCHES
+from physics.kernels.multibody.data.contact_set import put_vector
 from physics.kernels.multibody.solver import contact_batches as of
-from physics.kernels.multibody.solver.block_lu import SIZE, factor, substitute
-from physics.kernels.multibody.solver.contact_operator import push, residual_of
-from physics.kernels.multibody.solver.minimum_degree import order_bodies
-from physics.kernels.multibody.solver.newton_system import defect, fill_matrix, law
+from physics.kernels.multibody.solver.block_lu import TWIST_DOFS, factor_system, solve_factored
+from physics.kernels.multibody.solver.contact_operator import apply_contact_impulse, max_contact_residual
+from physics.kernels.multibody.solver.minimum_degree import order_elimination
+from physics.kernels.multibody.solver.newton_system import assemble_newton_matrix, compute_defect, project_impulse
 
 # ρ in units of the largest mass: of the guess that everything holds, with its rounds; its growth from round to round,
 # the largest, and what it shrinks by when a round fails.
-HOLD_FACTOR = 1.0e4
-HOLD_ROUNDS = 5
-FACTOR_GROWTH = 10.0
-FACTOR_LIMIT = 1.0e8
-FACTOR_LOSS = 30.0
+_STICK_RHO = 1.0e4
+_STICK_ROUNDS = 5
+_RHO_GROWTH = 10.0
+_RHO_LIMIT = 1.0e8
+_RHO_DECREASE = 30.0
 
 # Rounds that may fail; Newton steps of a round, halvings of a step, and steps without progress, at most.
 FAILED_ROUNDS = 4
-NEWTON_STEPS = 20
-HALVINGS = 10
+_NEWTON_STEPS = 20
+_STEP_HALVINGS = 10
 FAILED_STEPS = 2
 
 # A round is solved to this share of the residual met so far, or of a hundred times the tolerance.
-ROUND_SHARE = 0.01
-ENOUGH = 100.0
+_ROUND_SHARE = 0.01
+_ROUND_FLOOR = 100.0
 
 # Time of a contact in one sweep, of one in an iteration with the linear system, and of a product of two blocks [ns].
-SWEEP_WORK = 25.0
-CONTACT_WORK = 230.0
-BLOCK_WORK = 60.0
+_SWEEP_COST = 25.0
+_CONTACT_COST = 230.0
+_BLOCK_COST = 60.0
 
 # Work that iterations with the system may take, in that of the sweeps allowed: while a pile moves and all is new in the
 # next step; and once it nearly lies, where what is solved once holds for long, and what is not creeps for ever.
 # Fewer iterations than these lead nowhere.
-WORTH_MOVING = 10.0
-WORTH_LYING = 200.0
-LEAST_STEPS = 12
+MOVING_BUDGET = 10.0
+RESTING_BUDGET = 200.0
+MIN_NEWTON_STEPS = 12
 
 
 @inlined
-def _follow(part, many):
+def _apply_newton_direction(part, many):
     """Solve the factored system for the defect and take it off the twists."""
     _, _, begin, end = part
-    substitute(begin, end, many.defect, many)
+    solve_factored(begin, end, many.defect, many)
     for i in range(begin, end):
         b = many.order[i]
-        for c in range(SIZE):
+        for c in range(TWIST_DOFS):
             many.twist[b, c] -= many.defect[b, c + c // 3]
 
 
@@ -72,22 +73,22 @@ def _follow(part, many):
 def _newton_step(part, rho, norm, many):
     """One damped Newton step on the twists from a defect of the given norm: the new (norm, largest velocity)."""
     _, _, begin, end = part
-    fill_matrix(part, rho, False, many)
-    factor(begin, end, many)
+    assemble_newton_matrix(part, rho, False, many)
+    factor_system(begin, end, many)
     for i in range(begin, end):
         b = many.order[i]
-        for c in range(SIZE):
+        for c in range(TWIST_DOFS):
             many.before[b, c] = many.twist[b, c]
         for c in range(COLUMN_SIZE):
             many.change[b, c] = many.defect[b, c]
-    substitute(begin, end, many.change, many)
+    solve_factored(begin, end, many.change, many)
     after, worst, t = norm, 0.0, 1.0
-    for _ in range(HALVINGS):
+    for _ in range(_STEP_HALVINGS):
         for i in range(begin, end):
             b = many.order[i]
-            for c in range(SIZE):
+            for c in range(TWIST_DOFS):
                 many.twist[b, c] = many.before[b, c] - t * many.change[b, c + c // 3]
-        after, worst = defect(part, rho, False, many)
+        after, worst = compute_defect(part, rho, False, many)
         if after < norm:
             break
         t *= 0.5
@@ -95,55 +96,60 @@ def _newton_step(part, rho, norm, many):
 
 
 @inlined
-def _apply(part, many):
+def _apply_impulses(part, many):
     """Impulses of the bundles, also contact by contact, and twists from the free ones and them."""
     _, _, begin, end = part
     for i in range(begin, end):
         b = many.order[i]
-        for c in range(SIZE):
+        for c in range(TWIST_DOFS):
             many.twist[b, c] = many.free[b, c]
-    for g in range(many.counts[BUNDLES]):
-        p = of.three(g, of.IMPULSE, many)
-        of.scatter(g, p, many.impulse, many)
-        of.push(g, p, many.twist, 3, many)
+    for g in range(many.counts[NUM_BATCHES]):
+        p = of.batch_vector(g, of.PROX_IMPULSE, many)
+        of.scatter_batch(g, p, many.impulse, many)
+        of.apply_batch_impulse(g, p, many.twist, 3, many)
 
 
 @inlined
 def _gather_impulses(many):
     """Bundle the impulses, the best met so far."""
-    for g in range(many.counts[BUNDLES]):
-        p = of.gather(g, many.impulse, many)
-        of.put_three(g, of.IMPULSE, p, many)
-        of.put_three(g, of.SAVED, p, many)
+    for g in range(many.counts[NUM_BATCHES]):
+        p = of.gather_batch(g, many.impulse, many)
+        of.put_batch_vector(g, of.PROX_IMPULSE, p, many)
+        of.put_batch_vector(g, of.PROX_BEST, p, many)
 
 
 @inlined
-def _save(many):
+def _save_impulses(many):
     """Remember the impulses as the best met."""
-    for g in range(many.counts[BUNDLES]):
-        of.put_three(g, of.SAVED, of.three(g, of.IMPULSE, many), many)
+    for g in range(many.counts[NUM_BATCHES]):
+        of.put_batch_vector(g, of.PROX_BEST, of.batch_vector(g, of.PROX_IMPULSE, many), many)
 
 
 @inlined
-def _take_trial(part, many):
-    """Take the impulses of the last `defect`, as the law allows them, and the twists that belong to them."""
-    for g in range(many.counts[BUNDLES]):
-        of.put_three(g, of.IMPULSE, law(of.three(g, of.TRIAL, many), of.one(g, of.MU, many)), many)
-    _apply(part, many)
+def _accept_trial(part, many):
+    """Take the impulses of the last `compute_defect`, as the law allows them, and the twists that belong to them."""
+    for g in range(many.counts[NUM_BATCHES]):
+        of.put_batch_vector(
+            g,
+            of.PROX_IMPULSE,
+            project_impulse(of.batch_vector(g, of.PROX_PROJECTED, many), of.batch_field(g, of.LANE_MU, many)),
+            many,
+        )
+    _apply_impulses(part, many)
 
 
 @inlined
-def _restore(part, many):
+def _restore_impulses(part, many):
     """Back to the best impulses met."""
-    for g in range(many.counts[BUNDLES]):
-        of.put_three(g, of.IMPULSE, of.three(g, of.SAVED, many), many)
-    _apply(part, many)
+    for g in range(many.counts[NUM_BATCHES]):
+        of.put_batch_vector(g, of.PROX_IMPULSE, of.batch_vector(g, of.PROX_BEST, many), many)
+    _apply_impulses(part, many)
 
 
 @kernel
-def _round(part, rho, enough, limit, many):
+def _proximal_round(part, rho, enough, limit, many):
     """p(x) at the x that solves x = M⁻¹ Jᵀ p(x) to `enough` [m/s], into `many.impulse` and the twists: Newton steps."""
-    norm, worst = defect(part, rho, False, many)
+    norm, worst = compute_defect(part, rho, False, many)
     steps = failures = 0
     while worst > enough and steps < limit and failures <= FAILED_STEPS:
         after, worst = _newton_step(part, rho, norm, many)
@@ -151,7 +157,7 @@ def _round(part, rho, enough, limit, many):
         if not after < norm:
             failures += 1
         norm = after
-    _take_trial(part, many)
+    _accept_trial(part, many)
     return steps
 
 
@@ -172,34 +178,34 @@ def prepare_system(part, sweeps, worth, fewest, many):
     iterations: this is known before much work went into it.
     """
     first, last, begin, end = part
-    contacts, worth = (last - first) * CONTACT_WORK, worth * sweeps * (last - first) * SWEEP_WORK
-    products = order_bodies(first, last, begin, end, int((worth / fewest - contacts) / BLOCK_WORK), many)
-    if products < 0 or not of.bundle_contacts(first, last, many):
+    contacts, worth = (last - first) * _CONTACT_COST, worth * sweeps * (last - first) * _SWEEP_COST
+    products = order_elimination(first, last, begin, end, int((worth / fewest - contacts) / _BLOCK_COST), many)
+    if products < 0 or not of.batch_contacts(first, last, many):
         return 0
-    return min(int(worth / (contacts + products * BLOCK_WORK)), sweeps)
+    return min(int(worth / (contacts + products * _BLOCK_COST)), sweeps)
 
 
 @inlined
 def save_best(part, many):
     """Remember the impulses as they are as the best of all methods."""
     for i in range(part[0], part[1]):
-        put(many.best, many.queue[i], 0, vector(many.impulse, many.queue[i], 0))
+        put_vector(many.best, many.queue[i], 0, row_vector(many.impulse, many.queue[i], 0))
 
 
 @inlined
-def bring_back_best(part, many):
+def restore_best(part, many):
     """The best impulses of all methods, and the twists that belong to them."""
     for i in range(part[2], part[3]):
-        for c in range(SIZE):
+        for c in range(TWIST_DOFS):
             many.twist[many.order[i], c] = many.free[many.order[i], c]
     for i in range(part[0], part[1]):
         k = many.queue[i]
-        put(many.impulse, k, 0, vector(many.best, k, 0))
-        push(k, vector(many.best, k, 0), many.twist, many)
+        put_vector(many.impulse, k, 0, row_vector(many.best, k, 0))
+        apply_contact_impulse(k, row_vector(many.best, k, 0), many.twist, many)
 
 
 @inlined
-def all_push(part, many):
+def is_every_contact_pushing(part, many):
     """True if all contacts of an island push: else not all of them will hold."""
     for i in range(part[0], part[1]):
         if not many.impulse[many.queue[i], 0] > 0.0:
@@ -208,28 +214,28 @@ def all_push(part, many):
 
 
 @kernel
-def guess_all_hold(part, friction, residual, enough, many):
+def try_all_sticking(part, friction, residual, enough, many):
     """Impulses as if every contact held, if that makes the residual smaller, down to `enough`; the residual then [m/s].
 
     The law being linear, its matrix is factored once, and a few rounds of q = p(x) cost little more than one: what
     stands still is solved so far below the goal that the steps to come find nothing to do.
     """
     first, last, begin, end = part
-    rho = HOLD_FACTOR * _heaviest(part, many)
+    rho = _STICK_RHO * _heaviest(part, many)
     _gather_impulses(many)
-    fill_matrix(part, rho, True, many)
-    factor(begin, end, many)
-    for _ in range(HOLD_ROUNDS):
-        defect(part, rho, True, many)
-        _follow(part, many)
-        defect(part, rho, True, many)
-        _take_trial(part, many)
-        now = residual_of(first, last, friction, many)
+    assemble_newton_matrix(part, rho, True, many)
+    factor_system(begin, end, many)
+    for _ in range(_STICK_ROUNDS):
+        compute_defect(part, rho, True, many)
+        _apply_newton_direction(part, many)
+        compute_defect(part, rho, True, many)
+        _accept_trial(part, many)
+        now = max_contact_residual(first, last, friction, many)
         if not now < residual:
-            _restore(part, many)
+            _restore_impulses(part, many)
             break
         residual = now
-        _save(many)
+        _save_impulses(many)
         if residual <= enough:
             break
     return residual
@@ -261,15 +267,15 @@ def newton_contacts(part, friction, residual, goal, limit, scale, many):
     mass, failures, steps = _heaviest(part, many), 0, 0
     _gather_impulses(many)
     while residual > goal and failures <= FAILED_ROUNDS and steps < limit:
-        enough = ROUND_SHARE * min(ENOUGH * goal, residual)
-        steps += max(1, _round(part, scale * mass, enough, min(NEWTON_STEPS, limit - steps), many))
-        now = residual_of(part[0], part[1], friction, many)
+        enough = _ROUND_SHARE * min(_ROUND_FLOOR * goal, residual)
+        steps += max(1, _proximal_round(part, scale * mass, enough, min(_NEWTON_STEPS, limit - steps), many))
+        now = max_contact_residual(part[0], part[1], friction, many)
         if now < residual:
             residual = now
-            _save(many)
-            scale = min(FACTOR_GROWTH * scale, FACTOR_LIMIT)
+            _save_impulses(many)
+            scale = min(_RHO_GROWTH * scale, _RHO_LIMIT)
         else:
             failures += 1
-            scale /= FACTOR_LOSS
-            _restore(part, many)
+            scale /= _RHO_DECREASE
+            _restore_impulses(part, many)
     return steps, residual

@@ -15,30 +15,30 @@ References
 from __future__ import annotations
 
 from physics.kernels.compile.decorators import inlined
-from physics.kernels.compile.simd import root
+from physics.kernels.compile.simd import lane_sqrt
 from physics.kernels.math import quaternion as qt
 
 
 @inlined
-def determinant(a):
+def cone_determinant(a):
     """a₀² - |a'|², as a product that does not cancel for a' of one component."""
-    size = root(a[1] * a[1] + a[2] * a[2])
+    size = lane_sqrt(a[1] * a[1] + a[2] * a[2])
     return (a[0] - size) * (a[0] + size)
 
 
 @inlined
-def scaling(p, u):
+def nt_scaling(p, u):
     """((w₀, w₁, w₂, η), λ, 1/√det λ) for p and u inside the cone."""
-    dp, du = root(determinant(p)), root(determinant(u))
+    dp, du = lane_sqrt(cone_determinant(p)), lane_sqrt(cone_determinant(u))
     s, t = 1.0 / dp, 1.0 / du
-    half = 1.0 / root(2.0 + 2.0 * s * t * qt.dot(p, u))  # 1/(2γ)
-    eta = root(du * s)
+    half = 1.0 / lane_sqrt(2.0 + 2.0 * s * t * qt.dot(p, u))  # 1/(2γ)
+    eta = lane_sqrt(du * s)
     w = (half * (t * u[0] + s * p[0]), half * (t * u[1] - s * p[1]), half * (t * u[2] - s * p[2]), eta)
-    return w, scaled(w, p), 1.0 / (dp * eta)
+    return w, apply_scaling(w, p), 1.0 / (dp * eta)
 
 
 @inlined
-def scaled(w, x):
+def apply_scaling(w, x):
     """W x."""
     d = w[1] * x[1] + w[2] * x[2]
     f = x[0] + d / (1.0 + w[0])
@@ -46,13 +46,13 @@ def scaled(w, x):
 
 
 @inlined
-def unscaled(w, x):
+def apply_inv_scaling(w, x):
     """W⁻¹ x."""
-    return scaled((w[0], -w[1], -w[2], 1.0 / w[3]), x)
+    return apply_scaling((w[0], -w[1], -w[2], 1.0 / w[3]), x)
 
 
 @inlined
-def unscaled_twice(w, x):
+def apply_inv_scaling_twice(w, x):
     """W⁻² x."""
     s = 1.0 / (w[3] * w[3])
     d = 2.0 * (w[0] * x[0] - w[1] * x[1] - w[2] * x[2])
@@ -60,13 +60,13 @@ def unscaled_twice(w, x):
 
 
 @inlined
-def product(a, b):
+def jordan_product(a, b):
     """a ∘ b."""
     return (qt.dot(a, b), a[0] * b[1] + b[0] * a[1], a[0] * b[2] + b[0] * a[2])
 
 
 @inlined
-def quotient(b, a, inverse):
+def jordan_quotient(b, a, inverse):
     """x with a ∘ x = b, `inverse` being 1/√det a."""
     x = (a[0] * b[0] - a[1] * b[1] - a[2] * b[2]) * (inverse * inverse)
     s = 1.0 / a[0]
@@ -74,11 +74,11 @@ def quotient(b, a, inverse):
 
 
 @inlined
-def way_out(a, inverse, d):
+def inv_step_to_boundary(a, inverse, d):
     """1/t for the largest t for which a + t d is in the cone, a being inside; at most 0: any.
 
     The scaling with a/√det a takes a to √det a e and d to h √det a: 1 + t h₀ ≥ t |h'| is required.
     """
     s = inverse
-    h = unscaled((s * a[0], s * a[1], s * a[2], 1.0), (s * d[0], s * d[1], s * d[2]))
-    return root(h[1] * h[1] + h[2] * h[2]) - h[0]
+    h = apply_inv_scaling((s * a[0], s * a[1], s * a[2], 1.0), (s * d[0], s * d[1], s * d[2]))
+    return lane_sqrt(h[1] * h[1] + h[2] * h[2]) - h[0]

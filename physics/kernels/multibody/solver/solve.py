@@ -28,117 +28,129 @@ from __future__ import annotations
 
 import math
 
-from physics.kernels.compile.decorators import inlined, kernel, standing
-from physics.kernels.multibody.data.contact_set import put, vector
-from physics.kernels.multibody.solver.block_lu import SIZE
-from physics.kernels.multibody.solver.contact_operator import assemble, residual_of, velocity_missed
+from physics.kernels.compile.decorators import inlined, kernel, shared_kernel
+from physics.kernels.math.vector import row_vector
+from physics.kernels.multibody.data.contact_set import put_vector
+from physics.kernels.multibody.solver.block_lu import TWIST_DOFS
+from physics.kernels.multibody.solver.contact_operator import (
+    assemble_contact_blocks,
+    max_contact_residual,
+    velocity_error,
+)
 from physics.kernels.multibody.solver.gauss_seidel import sweep_contacts, sweep_normals
-from physics.kernels.multibody.solver.interior_point import interior_point
+from physics.kernels.multibody.solver.interior_point import interior_point_contacts
 from physics.kernels.multibody.solver.islands import find_islands
-from physics.kernels.multibody.solver.near_rest_refinement import NEWTON, SWEEPS, calm, is_in_balance, point_speed
+from physics.kernels.multibody.solver.near_rest_refinement import (
+    is_in_balance,
+    point_speed_bound,
+    refine_near_rest,
+)
 from physics.kernels.multibody.solver.proximal_newton import (
-    LEAST_STEPS,
-    WORTH_LYING,
-    WORTH_MOVING,
-    all_push,
-    bring_back_best,
-    guess_all_hold,
+    MIN_NEWTON_STEPS,
+    MOVING_BUDGET,
+    RESTING_BUDGET,
+    is_every_contact_pushing,
     newton_contacts,
     prepare_system,
+    restore_best,
     save_best,
+    try_all_sticking,
 )
+from physics.kernels.state.layout import METHOD_NEWTON, METHOD_SWEEPS
 
 # Share of the tolerance, or of this finer one, relative to the largest free velocity, that the guess that all
 # holds is solved to: what stands finds nothing to do in the steps to come.
-HOLD_SHARE = 1.0e-3
-FINE = 1.0e-6
+STICKING_SHARE = 1.0e-3
+FINE_TOLERANCE = 1.0e-6
 
 # Sweeps before the interior-point method.
 FIRST_SWEEPS = 5
 
 # A pile nearly lies where without impulses no contact would be faster than this many times what loads give in the
 # stage.
-LYING = 3.0
+_RESTING_FACTOR = 3.0
 
 # Tolerance from which on impacts are swept first.
-COARSE = 1.0e-4
+_COARSE_TOLERANCE = 1.0e-4
 
 # Residual that rounding leaves, relative to the largest free velocity: the smallest tolerance.
-ROUNDING = 1.0e-12
+_MIN_TOLERANCE = 1.0e-12
 
 # Where bodies of one velocity touch, all that is left to solve is the rounding of that velocity, and nothing can be
 # solved relative to it: u is the difference of two sums v + ω x r of three products and three terms each, every one of
 # them rounded, which makes 2 · 6 · ε of the largest, and the impulses round the velocities once more.
-VELOCITY_ROUNDING = 16 * 2.0**-52
+_VELOCITY_ROUNDING = 16 * 2.0**-52
 
 # An impulse is rounded, too, and with it the velocities, by up to this share of what it alone would give its bodies
 # (half an ulp in it, in its moment, and in each of the sums): a light cube under a heavy one can be at rest no better.
-IMPULSE_ROUNDING = 2 * 2.0**-52
+_IMPULSE_ROUNDING = 2 * 2.0**-52
 
 # Bodies that wedge by friction hold any stress. Impulses that alone would give this many times the free velocities are
 # one that a method ran into, not what holds a million times a body's weight: what they leave is rounding.
-STRAINED = 1.0e9
+_STRAIN_LIMIT = 1.0e9
 
 # Sweeps without friction, where all else failed.
-LAST_SWEEPS = 100
+_FALLBACK_SWEEPS = 100
 
 # Residual at which the interior-point method gives way to Newton's at the latest, relative to the largest velocity
 # without impulses: below it, rounding does.
-ROUGH = 1.0e-6
+_INTERIOR_TOLERANCE = 1.0e-6
 
 # Iterations of the first in a turn, steps of the second, and its ρ in units of the largest mass. Each turn goes on from
 # the impulses that the one before ended with, the last one from none.
-INTERIOR_STEPS = (30, 30, 40)
-POLISH_STEPS = (20, 40, 40)
-POLISH = (10.0, 1.0, 1.0)
+_INTERIOR_STEPS = (30, 30, 40)
+_NEWTON_STEPS = (20, 40, 40)
+NEWTON_RHO = (10.0, 1.0, 1.0)
 
 
 @inlined
-def keep_free(many):
+def save_free_twists(many):
     """`many.free`: the twists as they are, without any impulse."""
     for b in range(many.twist.shape[0]):
-        for c in range(SIZE):
+        for c in range(TWIST_DOFS):
             many.free[b, c] = many.twist[b, c]
 
 
 @inlined
-def free_body(b, many):
+def reset_body_to_free(b, many):
     """The twist of body b without any impulse."""
-    for c in range(SIZE):
+    for c in range(TWIST_DOFS):
         many.twist[b, c] = many.free[b, c]
 
 
 @inlined
-def forget_impulses(part, many):
+def clear_island_impulses(part, many):
     """No impulses in an island."""
     for i in range(part[0], part[1]):
-        put(many.impulse, many.queue[i], 0, (0.0, 0.0, 0.0))
+        put_vector(many.impulse, many.queue[i], 0, (0.0, 0.0, 0.0))
     for i in range(part[2], part[3]):
-        free_body(many.order[i], many)
+        reset_body_to_free(many.order[i], many)
 
 
 @inlined
-def forget_all(n, many):
+def clear_all_impulses(n, many):
     """No impulses at all."""
     for k in range(n):
-        put(many.impulse, k, 0, (0.0, 0.0, 0.0))
+        put_vector(many.impulse, k, 0, (0.0, 0.0, 0.0))
     for b in range(many.twist.shape[0]):
-        free_body(b, many)
+        reset_body_to_free(b, many)
 
 
 @kernel
-def solve_hard(part, friction, scale, residual, goal, limit, many):
+def alternate_second_order(part, friction, scale, residual, goal, limit, many):
     """Interior point and Newton's method in turns: (iterations, residual)."""
-    count, best, start, last = 0, residual, residual, len(POLISH) - 1
+    count, best, start, last = 0, residual, residual, len(NEWTON_RHO) - 1
     save_best(part, many)
     for turn in range(last + 1):
         if turn == last:
             start = scale
-            forget_impulses(part, many)
-        count += interior_point(part, start, max(goal, ROUGH * scale), min(INTERIOR_STEPS[turn], limit - count), many)
-        now = residual_of(part[0], part[1], friction, many)
+            clear_island_impulses(part, many)
+        count += interior_point_contacts(
+            part, start, max(goal, _INTERIOR_TOLERANCE * scale), min(_INTERIOR_STEPS[turn], limit - count), many
+        )
+        now = max_contact_residual(part[0], part[1], friction, many)
         if now > goal and count < limit:
-            more, now = newton_contacts(part, friction, now, goal, POLISH_STEPS[turn], POLISH[turn], many)
+            more, now = newton_contacts(part, friction, now, goal, _NEWTON_STEPS[turn], NEWTON_RHO[turn], many)
             count += more
         if now < best:
             best = now
@@ -147,27 +159,27 @@ def solve_hard(part, friction, scale, residual, goal, limit, many):
             break
         start = now
     if not now <= best:
-        bring_back_best(part, many)
+        restore_best(part, many)
     return count, best
 
 
 @kernel
-def sweep_at_last(part, friction, residual, goal, limit, many):
+def sweep_as_fallback(part, friction, residual, goal, limit, many):
     """Sweeps from the best impulses met, which stay where those do not lead to better ones: (sweeps, residual)."""
     save_best(part, many)
     count, now = sweep_contacts(part[0], part[1], friction, residual, goal, limit, many)
     if not now < residual:
-        bring_back_best(part, many)
+        restore_best(part, many)
         return count, residual
     return count, now
 
 
 @inlined
-def none_pushes_or_parts(part, goal, many):
+def is_island_inactive(part, goal, many):
     """True if no contact of an island pushes, and none opens faster than `goal` [m/s] without that."""
     for i in range(part[0], part[1]):
         k = many.queue[i]
-        if many.impulse[k, 0] > 0.0 or velocity_missed(k, many)[0] > goal:
+        if many.impulse[k, 0] > 0.0 or velocity_error(k, many)[0] > goal:
             return False
     return True
 
@@ -179,7 +191,7 @@ def _is_swept_first(part, goal, scale, many):
     An impact begins from no impulses, and asks something of the few contacts near it.
     """
     is_impact = many.settings[0].rests == 0
-    return part[1] - part[0] == 1 or (is_impact and goal >= COARSE * scale)
+    return part[1] - part[0] == 1 or (is_impact and goal >= _COARSE_TOLERANCE * scale)
 
 
 @kernel
@@ -194,75 +206,77 @@ def solve_island(part, friction, scale, residual, goal, deep, many):
         limit = limit if last - first > 1 else 1
         count, residual = sweep_contacts(first, last, friction, residual, goal, limit, many)
         if residual <= goal or last - first == 1:
-            return count, residual, SWEEPS
-    may_hold = all_push(part, many) or none_pushes_or_parts(part, goal, many)
-    worth = WORTH_LYING if scale <= LYING * many.settings[0].load else WORTH_MOVING
-    steps = prepare_system(part, limit, worth, 1 if may_hold else LEAST_STEPS, many)
+            return count, residual, METHOD_SWEEPS
+    may_hold = is_every_contact_pushing(part, many) or is_island_inactive(part, goal, many)
+    worth = RESTING_BUDGET if scale <= _RESTING_FACTOR * many.settings[0].load else MOVING_BUDGET
+    steps = prepare_system(part, limit, worth, 1 if may_hold else MIN_NEWTON_STEPS, many)
     if may_hold and steps > 0:
-        residual = guess_all_hold(part, friction, residual, deep, many)
+        residual = try_all_sticking(part, friction, residual, deep, many)
         if residual <= goal:
-            return 1 + count, residual, NEWTON
-    if steps < LEAST_STEPS:
+            return 1 + count, residual, METHOD_NEWTON
+    if steps < MIN_NEWTON_STEPS:
         more, residual = sweep_contacts(first, last, friction, residual, goal, limit - count, many)
-        return count + more, residual, SWEEPS
+        return count + more, residual, METHOD_SWEEPS
     if count == 0:
         count, residual = sweep_contacts(first, last, friction, residual, goal, FIRST_SWEEPS, many)
         if residual <= goal:
-            return 1 + count, residual, NEWTON
-    if not may_hold and all_push(part, many):
-        residual = guess_all_hold(part, friction, residual, deep, many)
+            return 1 + count, residual, METHOD_NEWTON
+    if not may_hold and is_every_contact_pushing(part, many):
+        residual = try_all_sticking(part, friction, residual, deep, many)
         if residual <= goal:
-            return 1 + count, residual, NEWTON
-    more, residual = solve_hard(part, friction, scale, residual, goal, max(1, steps - FIRST_SWEEPS - 1), many)
+            return 1 + count, residual, METHOD_NEWTON
+    more, residual = alternate_second_order(
+        part, friction, scale, residual, goal, max(1, steps - FIRST_SWEEPS - 1), many
+    )
     count += 1 + more
     if residual > goal:
-        more, residual = sweep_at_last(part, friction, residual, goal, limit, many)
+        more, residual = sweep_as_fallback(part, friction, residual, goal, limit, many)
         count += more
-    return count, residual, NEWTON
+    return count, residual, METHOD_NEWTON
 
 
 @inlined
-def strain(first, last, many):
+def max_impulse_speed(first, last, many):
     """Largest speed that a contact's impulse alone would give [m/s]."""
     most = 0.0
     for i in range(first, last):
         k = many.queue[i]
-        p = vector(many.impulse, k, 0)
+        p = row_vector(many.impulse, k, 0)
         most = max(most, many.block[k, 0] * max(abs(p[0]), max(abs(p[1]), abs(p[2]))))
     return most
 
 
 @inlined
-def fastest(many):
+def max_body_speed(many):
     """No point of a body is faster than this [m/s]."""
     most = 0.0
     for b in range(many.twist.shape[0]):
-        most = max(most, point_speed(vector(many.twist, b, 0), vector(many.twist, b, 3), b, many))
+        most = max(most, point_speed_bound(row_vector(many.twist, b, 0), row_vector(many.twist, b, 3), b, many))
     return most
 
 
 @kernel
-def solve_without_friction(part, friction, goal, many):
+def solve_island_frictionless(part, friction, goal, many):
     """Impulses along the normals only, from none: the residual, which is that of the problem with friction [m/s].
 
     The last resort, where the methods for friction went astray: these sweeps never raise the energy.
     """
     first, last, _, _ = part
-    forget_impulses(part, many)
-    sweep_normals(first, last, math.inf, goal, LAST_SWEEPS, many)
-    return residual_of(first, last, friction, many)
+    clear_island_impulses(part, many)
+    sweep_normals(first, last, math.inf, goal, _FALLBACK_SWEEPS, many)
+    return max_contact_residual(first, last, friction, many)
 
 
-@standing
-def solve_smoothly(n, many):
-    """`solve_without_friction` of all n contacts, for what a solve with friction came out wrong: the residual [m/s]."""
-    keep_free(many)
-    forget_all(n, many)
-    goal = many.settings[0].tolerance * assemble(n, many)
-    return sweep_normals(0, n, math.inf, goal, LAST_SWEEPS, many)[1]
+@shared_kernel
+def solve_all_frictionless(n, many):
+    """`solve_island_frictionless` of all n contacts, after a solve with friction failed: the residual [m/s]."""
+    save_free_twists(many)
+    clear_all_impulses(n, many)
+    goal = many.settings[0].tolerance * assemble_contact_blocks(n, many)
+    return sweep_normals(0, n, math.inf, goal, _FALLBACK_SWEEPS, many)[1]
 
 
-@standing
+@shared_kernel
 def solve_contacts(n, friction, many):
     """Solve for `many.impulse` from the warm start in it: (iterations, relative residual, method).
 
@@ -272,31 +286,31 @@ def solve_contacts(n, friction, many):
     tolerance's share; or, in a part of a substep, to what loads give in half of it (`adaptive_substep`).
     Iterations are those of the island that took most.
     """
-    keep_free(many)
+    save_free_twists(many)
     tolerance = many.settings[0].tolerance
-    least = VELOCITY_ROUNDING * fastest(many) / tolerance
-    scale = max(assemble(n, many), max(least, many.settings[0].half))
+    least = _VELOCITY_ROUNDING * max_body_speed(many) / tolerance
+    scale = max(assemble_contact_blocks(n, many), max(least, many.settings[0].half))
     if not scale > 0.0:
-        return 0, 0.0, SWEEPS
-    goal = max(min(tolerance * scale, many.settings[0].still), ROUNDING * scale)
-    if strain(0, n, many) > STRAINED * scale:
-        forget_all(n, many)
-    rounding = IMPULSE_ROUNDING * strain(0, n, many)
-    goal, least = max(goal, rounding), max(rounding, ROUNDING * scale)
-    residual = residual_of(0, n, friction, many)
+        return 0, 0.0, METHOD_SWEEPS
+    goal = max(min(tolerance * scale, many.settings[0].still), _MIN_TOLERANCE * scale)
+    if max_impulse_speed(0, n, many) > _STRAIN_LIMIT * scale:
+        clear_all_impulses(n, many)
+    rounding = _IMPULSE_ROUNDING * max_impulse_speed(0, n, many)
+    goal, least = max(goal, rounding), max(rounding, _MIN_TOLERANCE * scale)
+    residual = max_contact_residual(0, n, friction, many)
     if residual <= goal and is_in_balance(goal, least, many):
-        return 0, residual / max(scale, rounding / tolerance), SWEEPS
-    iterations, worst, method, deep = 0, 0.0, SWEEPS, HOLD_SHARE * min(goal, FINE * scale)
+        return 0, residual / max(scale, rounding / tolerance), METHOD_SWEEPS
+    iterations, worst, method, deep = 0, 0.0, METHOD_SWEEPS, STICKING_SHARE * min(goal, FINE_TOLERANCE * scale)
     for i in range(find_islands(n, many)):
         part = (many.first_contact[i], many.first_contact[i + 1], many.first_body[i], many.first_body[i + 1])
-        residual = residual_of(part[0], part[1], friction, many)
+        residual = max_contact_residual(part[0], part[1], friction, many)
         if not residual <= goal:
             count, residual, used = solve_island(part, friction, scale, residual, goal, deep, many)
-            if not residual <= scale or strain(part[0], part[1], many) > STRAINED * scale:
-                residual = solve_without_friction(part, friction, goal, many)
+            if not residual <= scale or max_impulse_speed(part[0], part[1], many) > _STRAIN_LIMIT * scale:
+                residual = solve_island_frictionless(part, friction, goal, many)
             iterations, method = max(iterations, count), max(method, used)
-        count, residual, used = calm(part, friction, residual, goal, deep, least, many)
+        count, residual, used = refine_near_rest(part, friction, residual, goal, deep, least, many)
         iterations, method = max(iterations, count), max(method, used)
         if not residual <= worst:
             worst = residual
-    return iterations, worst / max(scale, IMPULSE_ROUNDING * strain(0, n, many) / tolerance), method
+    return iterations, worst / max(scale, _IMPULSE_ROUNDING * max_impulse_speed(0, n, many) / tolerance), method

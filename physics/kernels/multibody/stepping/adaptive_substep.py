@@ -14,42 +14,42 @@ import math
 
 from physics.kernels.compile.decorators import inlined, kernel
 from physics.kernels.forces.held_loads import set_clock
-from physics.kernels.multibody.data.arrays import CONTACT_COUNT, MEMORY_HEAD, MEMORY_SIZE
-from physics.kernels.multibody.data.contact_set import minus
+from physics.kernels.multibody.data.arrays import WARM_CONTACT_COUNT, WARM_CONTACT_SIZE, WARM_HEADER_SIZE
+from physics.kernels.multibody.data.contact_set import subtract
 from physics.kernels.multibody.stepping.substep import substep_world
 from physics.kernels.state import layout as at
-from physics.kernels.state.body import all_finite, angular_velocity, read_state
+from physics.kernels.state.body import angular_velocity, are_all_finite, read_state
 
 # A substep in its shortest parts.
-WHOLE = 2**24
+_UNITS_PER_SUBSTEP = 2**24
 
 # Error that a part may have, in tolerances of the contact problem: what is left of that in one part, as a velocity, is
 # some of them, and no shorter part shows less.
-PART_ERROR = 100.0
+ERROR_PER_TOLERANCE = 100.0
 
 # Where the shortest part does not meet the error, or after so many parts tried, those of the rest of the substep are no
 # shorter than four times it: what has no limit, and what rattles without end, takes no end of parts. There are 12 such
 # lengths, so that this ends after some 600 trials; the longer a part, the later it is refused for this reason.
-GIVE_UP = 4
-PATIENCE = 50
+_COARSENING_FACTOR = 4
+_MAX_TRIALS = 50
 
 # Tolerance of the contact problems of many bodies, and slop in bounding radii, below which rounding would decide.
-LEAST_TOLERANCE = 1.0e-11
-LEAST_SLOP = 1.0e-12
+MIN_SOLVER_TOLERANCE = 1.0e-11
+MIN_RELATIVE_SLOP = 1.0e-12
 
 # Rounding of a position, in units of its last place.
-ROUNDING = 16.0 * 2.0**-52
+_POSITION_ROUNDING = 16.0 * 2.0**-52
 
-START, COARSE, MIDDLE = range(3)
+SNAPSHOT_START, SNAPSHOT_COARSE, SNAPSHOT_MIDDLE = range(3)
 
 
 @inlined
-def _keep(slot, world, kept, memory, report, many, counts):
+def _save_snapshot(slot, world, kept, memory, report, many, counts):
     """Keep the world as it is now."""
     for b in range(many.now.shape[0]):
         for c in range(many.now.shape[1]):
             kept.now[slot, b, c] = many.now[b, c]
-    for c in range(MEMORY_HEAD + MEMORY_SIZE * int(memory[world, CONTACT_COUNT])):
+    for c in range(WARM_HEADER_SIZE + WARM_CONTACT_SIZE * int(memory[world, WARM_CONTACT_COUNT])):
         kept.memory[slot, c] = memory[world, c]
     for c in range(at.REPORT_SIZE):
         kept.report[slot, c] = report[world, c]
@@ -58,7 +58,7 @@ def _keep(slot, world, kept, memory, report, many, counts):
 
 
 @inlined
-def _come_back(slot, world, kept, memory, report, many, counts):
+def _restore_snapshot(slot, world, kept, memory, report, many, counts):
     """Make the world what it was when it was kept, but for the work that the report counts.
 
     Events logged since are no more: their rows are written over.
@@ -66,7 +66,7 @@ def _come_back(slot, world, kept, memory, report, many, counts):
     for b in range(many.now.shape[0]):
         for c in range(many.now.shape[1]):
             many.now[b, c] = kept.now[slot, b, c]
-    for c in range(MEMORY_HEAD + MEMORY_SIZE * int(kept.memory[slot, CONTACT_COUNT])):
+    for c in range(WARM_HEADER_SIZE + WARM_CONTACT_SIZE * int(kept.memory[slot, WARM_CONTACT_COUNT])):
         memory[world, c] = kept.memory[slot, c]
     for c in range(at.REPORT_SIZE):
         if c != at.SOLVES and c != at.ITERATIONS:
@@ -81,40 +81,40 @@ def _length(a):
 
 
 @inlined
-def _apart(b, tilted, kept, many):
-    """Distance of body b from its state `COARSE`, in its radius; and the difference in velocity, in its speed.
+def _body_error(b, tilted, kept, many):
+    """Distance of body b from its state `SNAPSHOT_COARSE`, in its radius; and the difference in velocity, in its speed.
 
     Of its speed counts no less than what its loads give it over its radius.
     """
     body = many.bodies[b]
     x, q, v, L = read_state(many.now, b)
-    y, p, u, K = read_state(kept.now[COARSE], b)
-    way, r = minus(x, y), body.radius
+    y, p, u, K = read_state(kept.now[SNAPSHOT_COARSE], b)
+    way, r = subtract(x, y), body.radius
     same, other = 0.0, 0.0
     for c in range(4):
         same += (q[c] - p[c]) ** 2
         other += (q[c] + p[c]) ** 2
     pose = _length(way) + 2.0 * r * math.sqrt(min(same, other))
-    pose = max(0.0, pose - ROUNDING * _length(x)) / r
+    pose = max(0.0, pose - _POSITION_ROUNDING * _length(x)) / r
     w, z = angular_velocity(q, L, body, tilted), angular_velocity(p, K, body, tilted)
     speed = _length(v) + r * _length(w) + math.sqrt(r * body.acceleration)
-    change = _length(minus(v, u)) + r * _length(minus(w, z))
+    change = _length(subtract(v, u)) + r * _length(subtract(w, z))
     return max(pose, change / speed) if change > 0.0 else pose
 
 
 @inlined
-def _error(tilted, kept, many):
+def _max_body_error(tilted, kept, many):
     """Largest error of any body, 1: all that is allowed."""
-    worst, allowed = 0.0, PART_ERROR * many.settings[0].tolerance
+    worst, allowed = 0.0, ERROR_PER_TOLERANCE * many.settings[0].tolerance
     for b in range(many.now.shape[0]):
-        found = _apart(b, tilted, kept, many) / allowed
+        found = _body_error(b, tilted, kept, many) / allowed
         if not found <= worst:
             worst = found
     return worst
 
 
 @kernel
-def _advance(world, start, h, switches, memory, report, many, log, counts):
+def _step_part(world, start, h, switches, memory, report, many, log, counts):
     """One part of h [s], `start` [s] after the call."""
     friction, gyroscopic, tilted, ellipsoids, hulls, scheme = switches
     for b in range(many.now.shape[0]):
@@ -127,28 +127,30 @@ def _advance(world, start, h, switches, memory, report, many, log, counts):
 
 
 @kernel
-def _take_part(world, start, unit, part, shortest, switches, kept, memory, report, many, log, counts):
+def _step_with_halving(world, start, unit, part, shortest, switches, kept, memory, report, many, log, counts):
     """Advance by `part` units of time [s], or by half of it, or a quarter ...: (units taken, error, lengths tried)."""
     tilted, tried = switches[2], 1
-    _keep(START, world, kept, memory, report, many, counts)
-    _advance(world, start, part * unit, switches, memory, report, many, log, counts)
+    _save_snapshot(SNAPSHOT_START, world, kept, memory, report, many, counts)
+    _step_part(world, start, part * unit, switches, memory, report, many, log, counts)
     while True:
         half = 0.5 * part * unit
-        _keep(COARSE, world, kept, memory, report, many, counts)
-        _come_back(START, world, kept, memory, report, many, counts)
-        _advance(world, start, half, switches, memory, report, many, log, counts)
-        _keep(MIDDLE, world, kept, memory, report, many, counts)
-        _advance(world, start + half, half, switches, memory, report, many, log, counts)
-        error = _error(tilted, kept, many)
+        _save_snapshot(SNAPSHOT_COARSE, world, kept, memory, report, many, counts)
+        _restore_snapshot(SNAPSHOT_START, world, kept, memory, report, many, counts)
+        _step_part(world, start, half, switches, memory, report, many, log, counts)
+        _save_snapshot(SNAPSHOT_MIDDLE, world, kept, memory, report, many, counts)
+        _step_part(world, start + half, half, switches, memory, report, many, log, counts)
+        error = _max_body_error(tilted, kept, many)
         if error <= 1.0 or part <= shortest:
             return part, error, tried
-        _come_back(MIDDLE, world, kept, memory, report, many, counts)  # the coarse answer of the first half
+        _restore_snapshot(
+            SNAPSHOT_MIDDLE, world, kept, memory, report, many, counts
+        )  # the coarse answer of the first half
         part //= 2
         tried += 1
 
 
 @inlined
-def _loaded(h, many):
+def _min_load_speed(h, many):
     """Speed that its loads give the body that they give the least, in h [m/s].
 
     A part is solved no finer than the halves in which every substep is stepped at least. Its share of that would be
@@ -161,34 +163,36 @@ def _loaded(h, many):
 
 
 @kernel
-def refine(world, start, h, switches, kept, memory, report, many, log, counts):
+def step_with_error_control(world, start, h, switches, kept, memory, report, many, log, counts):
     """Advance the bodies of one world by h [s], `start` [s] after the call, in parts that meet the error.
 
     Where the shortest part does not meet it either, that is counted as a fallback, and the shortest part of this
     substep is longer from there on.
 
     `switches` are friction, gyroscopic, tilted, ellipsoids, hulls and scheme, as in `substep_world`; `kept` is what
-    `arrays.make_kept` makes.
+    `arrays.make_snapshots` makes.
     """
-    place, shortest, unit, patience = 0, 1, h / WHOLE, PATIENCE
+    place, shortest, unit, patience = 0, 1, h / _UNITS_PER_SUBSTEP, _MAX_TRIALS
     next_part = memory.shape[1] - 1
-    many.settings[0].half = _loaded(0.5 * h, many)  # the scale of contact problems, at least
-    part = int(memory[world, next_part] * WHOLE)
+    many.settings[0].half = _min_load_speed(0.5 * h, many)  # the scale of contact problems, at least
+    part = int(memory[world, next_part] * _UNITS_PER_SUBSTEP)
     if part == 0:
-        part = WHOLE
-    while place < WHOLE:
+        part = _UNITS_PER_SUBSTEP
+    while place < _UNITS_PER_SUBSTEP:
         now = start + place * unit
-        part, error, tried = _take_part(
+        part, error, tried = _step_with_halving(
             world, now, unit, part, shortest, switches, kept, memory, report, many, log, counts
         )  # fmt: skip
         place += part
         patience -= tried
-        if not all_finite(many.now):
+        if not are_all_finite(many.now):
             return
         if error > 1.0:
             report[world, at.FALLBACKS] += 1.0
         if error > 1.0 or patience <= 0:
-            shortest, patience = min(GIVE_UP * shortest, WHOLE), PATIENCE
-        part = min(2 * part, WHOLE)  # what rounding leaves is no reason to stay with short ones: it is always tried
-        memory[world, next_part] = part / WHOLE
+            shortest, patience = min(_COARSENING_FACTOR * shortest, _UNITS_PER_SUBSTEP), _MAX_TRIALS
+        part = min(
+            2 * part, _UNITS_PER_SUBSTEP
+        )  # what rounding leaves is no reason to stay with short ones: it is always tried
+        memory[world, next_part] = part / _UNITS_PER_SUBSTEP
         part = min(part, place & -place)

@@ -17,41 +17,42 @@ from physics.kernels.flight.free_flight import fly
 from physics.kernels.half_space.conservative_advancement import (
     CHORDS,
     FAR_TURN,
-    LEFT_SHARE,
-    MOST_ADVANCES,
-    bend_bound,
-    chord,
-    first_bracket,
+    GAP_LEFT_SHARE,
+    MAX_ADVANCES,
+    bracket_safe_time,
     is_centred,
-    lowest,
     may_turn,
-    middle,
+    mean_time,
+    secant_root,
     spin_bound,
-    tilted_normal,
-    tilting_time,
+    support_of_vector,
+    time_to_turn_far,
+    turned_normal,
+    turning_acceleration_bound,
 )
 from physics.kernels.half_space.contact_point import center_arm
 from physics.kernels.math import quaternion as qt
 from physics.kernels.math.quaternion import to_matrix
+from physics.kernels.math.vector import row_vector
 from physics.kernels.multibody.broadphase.sweep_and_prune import may_meet, may_reach_wall
-from physics.kernels.multibody.data.arrays import PAIRS
-from physics.kernels.multibody.data.contact_set import arrival, minus, plus, vector
-from physics.kernels.multibody.narrowphase.gjk import corner_of_hull, distance_between
+from physics.kernels.multibody.data.arrays import NUM_PAIRS
+from physics.kernels.multibody.data.contact_set import add_scaled, arrival_gap, subtract
+from physics.kernels.multibody.narrowphase.gjk import gjk_distance, hull_support_vertex
 from physics.kernels.state.body import angular_velocity, read_state
-from physics.kernels.state.layout import HULL, NORMAL, OFFSET, SPHERE
+from physics.kernels.state.layout import HULL, SPHERE, WALL_NORMAL, WALL_OFFSET
 
 # Turn from which bodies are looked at under error control [rad]: of a body that turns by less within a part the
 # points are off the line along which contacts are foretold by θ²/8 of its radius, 1.3e-3. A part of longer turns that
 # meets something differs from its halves if these do not, and is refused.
-LEAST_TURN = 0.1
+_MIN_TURN = 0.1
 
-# Share of `contact_set.arrival` to which they are flown: a contact's gap is along its own normal, which may be 11
+# Share of `contact_set.arrival_gap` to which they are flown: a contact's gap is along its own normal, which may be 11
 # degrees off, and none must be left to the other's care.
-NEAR = 0.5
+_ARRIVAL_FRACTION = 0.5
 
 
 @inlined
-def note_turning(h, tilted, many):
+def write_spin_bounds(h, tilted, many):
     """Write `many.spin`, bounds of |ω| of bodies that may turn far within h and 0 of all others: whether there are any.
 
     Most are told by a glance: loads turn a body by h times its acceleration over its radius at most, and while it turns
@@ -59,18 +60,18 @@ def note_turning(h, tilted, many):
     """
     least, found = FAR_TURN, False
     if many.settings[0].in_time == 1:
-        least = LEAST_TURN
+        least = _MIN_TURN
     limit = 0.5 * (least / h) ** 2
     for b in range(many.now.shape[0]):
         many.spin[b] = 0.0
-        w, r, push = vector(many.twist, b, 3), many.bodies[b].radius, h * many.bodies[b].acceleration
+        w, r, push = row_vector(many.twist, b, 3), many.bodies[b].radius, h * many.bodies[b].acceleration
         if r * r * (qt.dot(w, w) - limit) + push * push > 0.0:
-            found = _note_spin(b, h, least, tilted, many) or found
+            found = _write_spin_bound(b, h, least, tilted, many) or found
     return found
 
 
 @kernel
-def _note_spin(b, h, least, tilted, many):
+def _write_spin_bound(b, h, least, tilted, many):
     """Write `many.spin` of one body: whether it turns far."""
     _, q, _, L = read_state(many.now, b)
     if not may_turn(L, h, least, tilted, many.bodies[b]):
@@ -83,14 +84,14 @@ def _note_spin(b, h, least, tilted, many):
 
 
 @inlined
-def forget_turning(many):
+def clear_spin_bounds(many):
     """Let nothing turn far."""
     for b in range(many.now.shape[0]):
         many.spin[b] = 0.0
 
 
 @inlined
-def _side(b, y, n, tilted, many):
+def _contact_side(b, y, n, tilted, many):
     """(geometric centre, rotation, its arm, velocity along n, n x ω) of body b in state y; a sphere's ω is left out."""
     x, q, v, L = y
     R, c, m = to_matrix(q), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
@@ -98,64 +99,64 @@ def _side(b, y, n, tilted, many):
         c = center_arm(R, many.bodies[b])
     if not (many.bodies[b].shape == SPHERE and is_centred(tilted, many.bodies[b])):
         m = qt.cross(n, angular_velocity(q, L, many.bodies[b], tilted))
-    return plus(x, 1.0, c), R, c, qt.dot(n, v), m
+    return add_scaled(x, 1.0, c), R, c, qt.dot(n, v), m
 
 
 @inlined
-def _reach(b, R, k, hulls, many):
+def _support(b, R, k, hulls, many):
     """Reach of body b along k from its geometric centre, in |k|."""
     d, shape = many.bodies[b].dims, many.bodies[b].shape
     if hulls is not None:  # noqa: SIM102 (a branch of its own is what the compiler prunes)
         if shape == HULL:
             e = qt.transposed_matvec(R, k)
-            return qt.dot(e, corner_of_hull(b, e, many))
-    return lowest(shape, (d[0], d[1], d[2]), R, k)
+            return qt.dot(e, hull_support_vertex(b, e, many))
+    return support_of_vector(shape, (d[0], d[1], d[2]), R, k)
 
 
 @kernel
-def _apart(t, a, b, n, one, other, rate, bend, hulls, many):
+def _gap_bound(t, a, b, n, one, other, rate, bend, hulls, many):
     """Bound of the gap between body a and body b, or wall -1 - b, along n after t [m]; see the module."""
     x, R, c, _, m = one
-    k = tilted_normal(n, m, t)
-    gap = t * (rate - 0.5 * bend * t) + t * qt.dot(m, c) - _reach(a, R, (-k[0], -k[1], -k[2]), hulls, many)
+    k = turned_normal(n, m, t)
+    gap = t * (rate - 0.5 * bend * t) + t * qt.dot(m, c) - _support(a, R, (-k[0], -k[1], -k[2]), hulls, many)
     if b < 0:
-        return gap + qt.dot(n, x) - many.walls[-1 - b, OFFSET]
+        return gap + qt.dot(n, x) - many.walls[-1 - b, WALL_OFFSET]
     y, S, c, _, m = other
-    k = tilted_normal(n, m, t)
-    return gap + qt.dot(n, minus(x, y)) - t * qt.dot(m, c) - _reach(b, S, k, hulls, many)
+    k = turned_normal(n, m, t)
+    return gap + qt.dot(n, subtract(x, y)) - t * qt.dot(m, c) - _support(b, S, k, hulls, many)
 
 
 @inlined
-def _size(m):
+def _norm(m):
     return math.sqrt(qt.dot(m, m))
 
 
 @kernel
 def _safe_time(a, b, n, one, other, bend, horizon, hulls, many):
     """Time within which the gap along n is not used up, at most `horizon` [s]."""
-    rate, turning = one[3], many.bodies[a].radius * _size(one[4])
+    rate, turning = one[3], many.bodies[a].radius * _norm(one[4])
     if b >= 0:
         rate -= other[3]
-        turning += many.bodies[b].radius * _size(other[4])
-    gap = _apart(0.0, a, b, n, one, other, rate, bend, hulls, many)
+        turning += many.bodies[b].radius * _norm(other[4])
+    gap = _gap_bound(0.0, a, b, n, one, other, rate, bend, hulls, many)
     if not gap > 0.0:
         return 0.0
     if not bend > 0.0:
         return horizon
-    low, high = first_bracket(gap, rate, turning, bend, horizon)
-    at_low = _apart(low, a, b, n, one, other, rate, bend, hulls, many)
-    at_high = _apart(high, a, b, n, one, other, rate, bend, hulls, many)
+    low, high = bracket_safe_time(gap, rate, turning, bend, horizon)
+    at_low = _gap_bound(low, a, b, n, one, other, rate, bend, hulls, many)
+    at_high = _gap_bound(high, a, b, n, one, other, rate, bend, hulls, many)
     if at_high >= 0.0:
         return high
     for _ in range(CHORDS):
-        if not at_low > LEFT_SHARE * gap:
+        if not at_low > GAP_LEFT_SHARE * gap:
             break
-        t = chord(low, at_low, high, at_high)
-        found = _apart(t, a, b, n, one, other, rate, bend, hulls, many)
+        t = secant_root(low, at_low, high, at_high)
+        found = _gap_bound(t, a, b, n, one, other, rate, bend, hulls, many)
         if found > 0.0:
             low, at_low = t, found
-        t = middle(low, high)
-        found = _apart(t, a, b, n, one, other, rate, bend, hulls, many)
+        t = mean_time(low, high)
+        found = _gap_bound(t, a, b, n, one, other, rate, bend, hulls, many)
         if found > 0.0:
             low, at_low = t, found
         else:
@@ -164,59 +165,59 @@ def _safe_time(a, b, n, one, other, bend, horizon, hulls, many):
 
 
 @inlined
-def _bend(b, h, tilted, many):
+def _turning_acceleration(b, h, tilted, many):
     """Bound of what turning accelerates a point of body b by within h [m/s²]."""
     _, q, _, L = read_state(many.now, b)
     spin = many.spin[b]
     if not spin > 0.0:
         spin = spin_bound(q, L, h, tilted, many.bodies[b])
-    return bend_bound(spin, q, L, h, tilted, many.bodies[b])
+    return turning_acceleration_bound(spin, q, L, h, tilted, many.bodies[b])
 
 
 @inlined
-def _pull(b, n, many):
+def _load_acceleration(b, n, many):
     """Acceleration of body b along n [m/s²]."""
     g = many.bodies[b].free_acceleration
     return n[0] * g[0] + n[1] * g[1] + n[2] * g[2]
 
 
 @kernel
-def _meeting(a, b, h, gyroscopic, tilted, hulls, many):
+def _time_of_impact(a, b, h, gyroscopic, tilted, hulls, many):
     """Time of free flight, at most h, after which a and b (or wall -1 - b) have arrived or will not [s].
 
     Bodies in contact do not fly as is foretold here, nor do those that touch each other: they turn no further than a
     look at the end can tell.
     """
-    touch, gone, first = NEAR * arrival(a, b, many), 0.0, h
+    touch, gone, first = _ARRIVAL_FRACTION * arrival_gap(a, b, many), 0.0, h
     one = read_state(many.now, a)
     other, partner = one, a
     if b >= 0:
         other, partner = read_state(many.now, b), b
-    bend = _bend(a, h, tilted, many) + (_bend(b, h, tilted, many) if b >= 0 else 0.0)
+    bend = _turning_acceleration(a, h, tilted, many) + (_turning_acceleration(b, h, tilted, many) if b >= 0 else 0.0)
     is_held = many.touched[a] == 1 or many.touched[partner] == 1
     n = (1.0, 0.0, 0.0)
     if b < 0:
-        n = vector(many.walls, -1 - b, NORMAL)
-    elif _size(minus(one[0], other[0])) > 0.0:
-        n = minus(one[0], other[0])
-    for _ in range(MOST_ADVANCES):
-        left = _side(a, one, n, tilted, many)
-        right = _side(partner, other, n, tilted, many)
+        n = row_vector(many.walls, -1 - b, WALL_NORMAL)
+    elif _norm(subtract(one[0], other[0])) > 0.0:
+        n = subtract(one[0], other[0])
+    for _ in range(MAX_ADVANCES):
+        left = _contact_side(a, one, n, tilted, many)
+        right = _contact_side(partner, other, n, tilted, many)
         if b >= 0:
-            n, gap = distance_between(a, b, left[0], left[1], right[0], right[1], n, touch, hulls, many)
-            left, right = _side(a, one, n, tilted, many), _side(b, other, n, tilted, many)
+            n, gap = gjk_distance(a, b, left[0], left[1], right[0], right[1], n, touch, hulls, many)
+            left, right = _contact_side(a, one, n, tilted, many), _contact_side(b, other, n, tilted, many)
         else:
-            gap = _apart(0.0, a, b, n, left, right, 0.0, 0.0, hulls, many)
+            gap = _gap_bound(0.0, a, b, n, left, right, 0.0, 0.0, hulls, many)
         if gone == 0.0 and (is_held or not gap > touch):
             if many.spin[a] > 0.0:
-                first = min(first, tilting_time(n, one, tilted, many.bodies[a]))
+                first = min(first, time_to_turn_far(n, one, tilted, many.bodies[a]))
             if many.spin[partner] > 0.0:
-                first = min(first, tilting_time(n, other, tilted, many.bodies[partner]))
+                first = min(first, time_to_turn_far(n, other, tilted, many.bodies[partner]))
             if not gap > touch:
                 return first
         if not gap > touch:
             return gone
-        pull = _pull(a, n, many) - (_pull(b, n, many) if b >= 0 else 0.0)
+        pull = _load_acceleration(a, n, many) - (_load_acceleration(b, n, many) if b >= 0 else 0.0)
         step = _safe_time(a, b, n, left, right, bend - min(0.0, pull), first - gone, hulls, many)
         if not step > 0.0:
             break
@@ -230,16 +231,16 @@ def _meeting(a, b, h, gyroscopic, tilted, hulls, many):
 
 
 @kernel
-def time_until_turned(h, gyroscopic, tilted, hulls, many):
+def safe_stage_length(h, gyroscopic, tilted, hulls, many):
     """Time, at most h, that a stage may take: nothing that turns far passes through anything meanwhile [s]."""
     first = h
     for b in range(many.now.shape[0]):
         if many.spin[b] > 0.0:
             for wall in range(many.walls.shape[0]):
                 if may_reach_wall(b, wall, first, many):
-                    first = min(first, _meeting(b, -1 - wall, first, gyroscopic, tilted, hulls, many))
-    for k in range(many.counts[PAIRS]):
+                    first = min(first, _time_of_impact(b, -1 - wall, first, gyroscopic, tilted, hulls, many))
+    for k in range(many.counts[NUM_PAIRS]):
         a, b = many.pairs[k, 0], many.pairs[k, 1]
         if (many.spin[a] > 0.0 or many.spin[b] > 0.0) and may_meet(a, b, first, many):
-            first = min(first, _meeting(a, b, first, gyroscopic, tilted, hulls, many))
+            first = min(first, _time_of_impact(a, b, first, gyroscopic, tilted, hulls, many))
     return first

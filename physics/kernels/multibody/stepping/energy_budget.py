@@ -1,8 +1,8 @@
 """No more energy than there is, where bodies touch each other: resting stages, and places put right.
 
-A contact's target that knows how the bodies turn (`midpoint_step.aim_rest`) is gainless where bodies answer alike in
-all directions; others, and many contacts together, may gain. To push bodies apart may lift them against their loads,
-which is paid with their motion, and turns them, which changes ½ L·I⁻¹L at the same L. For impacts see
+A contact's target that knows how the bodies turn (`midpoint_step.set_resting_targets`) is gainless where bodies answer
+alike in all directions; others, and many contacts together, may gain. To push bodies apart may lift them against their
+loads, which is paid with their motion, and turns them, which changes ½ L·I⁻¹L at the same L. For impacts see
 `physics.kernels.contact_law.restitution_energy`.
 """
 
@@ -11,43 +11,38 @@ from __future__ import annotations
 import math
 
 from physics.kernels.compile.decorators import inlined, kernel
-from physics.kernels.contact_law.compliance import GAIN_SHARE
+from physics.kernels.contact_law.compliance import ENERGY_GAIN_TOLERANCE
 from physics.kernels.half_space import support_function as geo
 from physics.kernels.math import quaternion as qt
-from physics.kernels.multibody.data.arrays import LOADED, VELOCITY
-from physics.kernels.multibody.data.contact_set import matrix, minus, plus, put, vector
+from physics.kernels.math.vector import as_vector, row_vector
+from physics.kernels.multibody.data.arrays import LOADED_MOMENTA, PRE_LOAD_VELOCITY
+from physics.kernels.multibody.data.contact_set import add_scaled, put_vector, row_matrix, subtract
 from physics.kernels.state import layout as at
 from physics.kernels.state.body import angular_velocity, read_state
-from physics.kernels.state.layout import HULL, NORMAL, OFFSET
+from physics.kernels.state.layout import HULL, WALL_NORMAL, WALL_OFFSET
 
 # Share of its energy of turning that a body gains for nothing by being put right, and slops that it is lifted for
 # nothing. What is lifted pays where walls push: bodies push each other apart in pairs, and keep their momentum.
-FREE_SHARE = 1.0e-7
-FREE_LIFT = 10.0
+_FREE_ROTATION_SHARE = 1.0e-7
+_FREE_LIFT_SLOPS = 10.0
 
 
 @inlined
-def vector_of(a):
-    """The three numbers of an array."""
-    return (a[0], a[1], a[2])
-
-
-@inlined
-def note_loaded(b, velocity, many):
+def save_pre_load_velocity(b, velocity, many):
     """Keep the velocity of body b before its loads; `many.now` has its momenta and `many.twist` its ω before them."""
-    put(many.momenta, b, VELOCITY, velocity)
-    put(many.momenta, b, VELOCITY + 3, vector(many.twist, b, 3))
+    put_vector(many.momenta, b, PRE_LOAD_VELOCITY, velocity)
+    put_vector(many.momenta, b, PRE_LOAD_VELOCITY + 3, row_vector(many.twist, b, 3))
 
 
 @inlined
-def keep_loaded(b, many):
+def save_loaded_momenta(b, many):
     """Keep the momenta of body b with its loads."""
-    put(many.momenta, b, LOADED, vector(many.now, b, at.LINVEL))
-    put(many.momenta, b, LOADED + 3, vector(many.now, b, at.ANGMOM))
+    put_vector(many.momenta, b, LOADED_MOMENTA, row_vector(many.now, b, at.LINVEL))
+    put_vector(many.momenta, b, LOADED_MOMENTA + 3, row_vector(many.now, b, at.ANGMOM))
 
 
 @kernel
-def stage_has_gained(n, h, many):
+def has_gained_energy(n, h, many):
     """True if the impulses of a resting stage of n contacts raised the energy by more than solve and step may.
 
     Impulses P and moments Q of a body change its energy by ½ P·(v + v') + ½ Q·(ω + ω'). A contact that pushes may keep
@@ -58,11 +53,14 @@ def stage_has_gained(n, h, many):
     for b in range(many.now.shape[0]):
         if many.touched[b] == 0:
             continue
-        body, v_new, L_new = many.bodies[b], vector(many.now, b, at.LINVEL), vector(many.now, b, at.ANGMOM)
-        v, w = vector(many.momenta, b, VELOCITY), vector(many.momenta, b, VELOCITY + 3)
-        P, Q = minus(v_new, vector(many.momenta, b, LOADED)), minus(L_new, vector(many.momenta, b, LOADED + 3))
-        w_new, a = vector(many.twist, b, 3), body.free_acceleration
-        gain += body.mass * qt.dot(P, plus(v, 1.0, v_new)) + qt.dot(Q, plus(w, 1.0, w_new))
+        body, v_new, L_new = many.bodies[b], row_vector(many.now, b, at.LINVEL), row_vector(many.now, b, at.ANGMOM)
+        v, w = row_vector(many.momenta, b, PRE_LOAD_VELOCITY), row_vector(many.momenta, b, PRE_LOAD_VELOCITY + 3)
+        P, Q = (
+            subtract(v_new, row_vector(many.momenta, b, LOADED_MOMENTA)),
+            subtract(L_new, row_vector(many.momenta, b, LOADED_MOMENTA + 3)),
+        )
+        w_new, a = row_vector(many.twist, b, 3), body.free_acceleration
+        gain += body.mass * qt.dot(P, add_scaled(v, 1.0, v_new)) + qt.dot(Q, add_scaled(w, 1.0, w_new))
         square = h * h * (a[0] * a[0] + a[1] * a[1] + a[2] * a[2])
         size += body.mass * (qt.dot(v, v) + square) + abs(qt.dot(L_new, w_new))
         fastest = max(fastest, qt.dot(v, v) + square)
@@ -71,67 +69,67 @@ def stage_has_gained(n, h, many):
     for k in range(n):
         held += min(many.impulse[k, 0], F)
     tolerance = many.settings[0].tolerance
-    return gain > max(tolerance, GAIN_SHARE) * size + tolerance * math.sqrt(fastest) * held
+    return gain > max(tolerance, ENERGY_GAIN_TOLERANCE) * size + tolerance * math.sqrt(fastest) * held
 
 
 @inlined
-def turn_loaded(b, tilted, many):
+def update_twist(b, tilted, many):
     """Twist of body b from its momenta."""
-    put(many.twist, b, 0, vector(many.now, b, at.LINVEL))
-    q, L = read_state(many.now, b)[1], vector(many.now, b, at.ANGMOM)
-    put(many.twist, b, 3, angular_velocity(q, L, many.bodies[b], tilted))
+    put_vector(many.twist, b, 0, row_vector(many.now, b, at.LINVEL))
+    q, L = read_state(many.now, b)[1], row_vector(many.now, b, at.ANGMOM)
+    put_vector(many.twist, b, 3, angular_velocity(q, L, many.bodies[b], tilted))
 
 
 @kernel
-def take_stage_back(n, tilted, many):
+def revert_to_dissipative(n, tilted, many):
     """Momenta with loads and without impulses, and targets that cannot raise the energy (`contact_stages`)."""
     for b in range(many.now.shape[0]):
         if many.touched[b] == 0:
             continue
-        put(many.now, b, at.LINVEL, vector(many.momenta, b, LOADED))
-        put(many.now, b, at.ANGMOM, vector(many.momenta, b, LOADED + 3))
-        turn_loaded(b, tilted, many)
+        put_vector(many.now, b, at.LINVEL, row_vector(many.momenta, b, LOADED_MOMENTA))
+        put_vector(many.now, b, at.ANGMOM, row_vector(many.momenta, b, LOADED_MOMENTA + 3))
+        update_twist(b, tilted, many)
     for k in range(n):
-        put(many.target, k, 0, (min(many.target[k, 0], 0.0), 0.0, 0.0))
+        put_vector(many.target, k, 0, (min(many.target[k, 0], 0.0), 0.0, 0.0))
 
 
 @inlined
-def lift_of(b, x, many):
+def work_against_loads(b, x, many):
     """Work that moving body b from x to where it is takes against its loads [J]."""
-    body, y = many.bodies[b], vector(many.now, b, at.POS)
-    return -body.mass * qt.dot(vector_of(body.free_acceleration), minus(y, x))
+    body, y = many.bodies[b], row_vector(many.now, b, at.POS)
+    return -body.mass * qt.dot(as_vector(body.free_acceleration), subtract(y, x))
 
 
 @kernel
-def keep_turning(b, before, tilted, many):
+def cap_rotational_energy(b, before, tilted, many):
     """Shorten the angular momentum of a body that was turned, if ½L·I⁻¹L would be more than before."""
     _, q, _, L = read_state(many.now, b)
     after = 0.5 * qt.dot(L, angular_velocity(q, L, many.bodies[b], tilted))
-    if after > before + FREE_SHARE * before:
+    if after > before + _FREE_ROTATION_SHARE * before:
         s = math.sqrt(before / after)
-        put(many.now, b, at.ANGMOM, (s * L[0], s * L[1], s * L[2]))
+        put_vector(many.now, b, at.ANGMOM, (s * L[0], s * L[1], s * L[2]))
 
 
 @kernel
-def pay(b, price, tilted, many):
+def take_kinetic_energy(b, price, tilted, many):
     """Take a price [J] from the motion of body b, as far as there is any."""
     _, q, v, L = read_state(many.now, b)
     body = many.bodies[b]
     kinetic = 0.5 * (body.mass * qt.dot(v, v) + qt.dot(L, angular_velocity(q, L, body, tilted)))
     s = math.sqrt(1.0 - price / kinetic) if price < kinetic else 0.0
-    put(many.now, b, at.LINVEL, (s * v[0], s * v[1], s * v[2]))
-    put(many.now, b, at.ANGMOM, (s * L[0], s * L[1], s * L[2]))
+    put_vector(many.now, b, at.LINVEL, (s * v[0], s * v[1], s * v[2]))
+    put_vector(many.now, b, at.ANGMOM, (s * L[0], s * L[1], s * L[2]))
 
 
 @inlined
-def free_lift(b, many):
+def free_lift_work(b, many):
     """Lift of body b that costs nothing [J]."""
     body = many.bodies[b]
-    return body.mass * body.acceleration * FREE_LIFT * body.slop
+    return body.mass * body.acceleration * _FREE_LIFT_SLOPS * body.slop
 
 
 @kernel
-def bring_inside(b, tilted, many):
+def clamp_body_inside_walls(b, tilted, many):
     """Bring back a body whose centre is behind a wall, without the velocity that led there: whether it was.
 
     Contacts hold points. Loads of a million times the weight may turn a body by many radians in a step, and points that
@@ -140,16 +138,16 @@ def bring_inside(b, tilted, many):
     body, was_outside = many.bodies[b], False
     dims = (body.dims[0], body.dims[1], body.dims[2])
     for k in range(many.walls.shape[0]):
-        n, center = vector(many.walls, k, NORMAL), vector(many.place, b, 0)
-        d = qt.dot(n, center) - many.walls[k, OFFSET]
+        n, center = row_vector(many.walls, k, WALL_NORMAL), row_vector(many.place, b, 0)
+        d = qt.dot(n, center) - many.walls[k, WALL_OFFSET]
         if d >= 0.0:
             continue
         was_outside = True
         reach = body.radius
         if body.shape != HULL:
-            reach = geo.support(body.shape, dims, geo.scaled_normal(body.shape, dims, matrix(many.rotation, b), n))
-        put(many.place, b, 0, plus(center, reach - d, n))
-        put(many.now, b, at.POS, plus(vector(many.now, b, at.POS), reach - d, n))
-        v = vector(many.now, b, at.LINVEL)
-        put(many.now, b, at.LINVEL, plus(v, -min(qt.dot(n, v), 0.0), n))
+            reach = geo.support(body.shape, dims, geo.scaled_normal(body.shape, dims, row_matrix(many.rotation, b), n))
+        put_vector(many.place, b, 0, add_scaled(center, reach - d, n))
+        put_vector(many.now, b, at.POS, add_scaled(row_vector(many.now, b, at.POS), reach - d, n))
+        v = row_vector(many.now, b, at.LINVEL)
+        put_vector(many.now, b, at.LINVEL, add_scaled(v, -min(qt.dot(n, v), 0.0), n))
     return was_outside

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from physics.kernels.compile.decorators import kernel
 from physics.kernels.math import quaternion as qt
-from physics.kernels.multibody.data.contact_set import matrix, plus, vector
+from physics.kernels.math.vector import row_vector
+from physics.kernels.multibody.data.contact_set import add_scaled, row_matrix
 from physics.kernels.state.layout import POS
 from physics.kernels.time_stepping import event_log as ev
 
@@ -22,13 +23,13 @@ def log_impacts(n, world, t, many, log, counts):
     impulse, sums = (0.0, 0.0, 0.0), ((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), 0.0)
     for k in range(n):
         a, b = many.ends[k, 0], many.ends[k, 1]
-        p = qt.transposed_matvec(matrix(many.frame, k), vector(many.impulse, k, 0))
-        point = plus(vector(many.now, a, POS), 1.0, vector(many.arm, k, 0))
-        impulse = plus(impulse, 1.0, p)
-        sums = ev.add_share(sums, vector(many.frame, k, 0), many.impulse[k, 0], point)
+        p = qt.transposed_matvec(row_matrix(many.frame, k), row_vector(many.impulse, k, 0))
+        point = add_scaled(row_vector(many.now, a, POS), 1.0, row_vector(many.arm, k, 0))
+        impulse = add_scaled(impulse, 1.0, p)
+        sums = ev.add_weighted_contact(sums, row_vector(many.frame, k, 0), many.impulse[k, 0], point)
         if k + 1 < n and many.ends[k + 1, 0] == a and many.ends[k + 1, 1] == b:
             continue
-        if sums[2] > ev.ROUNDING * largest:
+        if sums[2] > ev.EVENT_IMPULSE_ROUNDING * largest:
             wall, other = (-1 - b, ev.NOBODY) if b < 0 else (-1, b)
             ev.note_impact(log, counts, first_row + a, t, wall, other, impulse, sums)
         impulse, sums = (0.0, 0.0, 0.0), ((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), 0.0)

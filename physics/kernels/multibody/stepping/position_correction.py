@@ -9,35 +9,42 @@ from __future__ import annotations
 
 import math
 
-from physics.kernels.compile.decorators import inlined, standing
+from physics.kernels.compile.decorators import inlined, shared_kernel
 from physics.kernels.math import quaternion as qt
-from physics.kernels.multibody.data.contact_set import pair_slop, plus, put, refresh, vector
-from physics.kernels.multibody.data.kinematics import place_body
-from physics.kernels.multibody.stepping.energy_budget import bring_inside, free_lift, keep_turning, lift_of, pay
-from physics.kernels.multibody.stepping.position_sweeps import part_contacts
+from physics.kernels.math.vector import row_vector
+from physics.kernels.multibody.data.contact_set import add_scaled, pair_slop, put_vector, update_contacts
+from physics.kernels.multibody.data.kinematics import update_body_pose
+from physics.kernels.multibody.stepping.energy_budget import (
+    cap_rotational_energy,
+    clamp_body_inside_walls,
+    free_lift_work,
+    take_kinetic_energy,
+    work_against_loads,
+)
+from physics.kernels.multibody.stepping.position_sweeps import sweep_positions
 from physics.kernels.state.body import angular_velocity, read_state, write_state
 
 # Share of the depth beyond half a slop that one stage takes back: turning makes the whole of it overshoot.
-APART_SHARE = 0.5
+_CORRECTION_SHARE = 0.5
 
 # Rounds, and the depth in slops from which on there is another, if the last one helped: what loads of a million times
 # the weight have turned deep into others is taken out at once.
-ROUNDS = 30
-DEEP = 100.0
+_MAX_ROUNDS = 30
+_DEEP_SLOPS = 100.0
 
 # Error of the displacements at most, relative to the largest target, or to so many slops where that is less,
 # and sweeps for it at most, if a contact problem may take as many: something light between a wall and something heavy
 # needs as many as their masses differ. A stage leaves half of the depth anyway, and half a slop less than the slop:
 # what is off by less is done with. Where solves are finer than that the error is the root of their tolerance, since
 # what it leaves grows with every landing.
-APART_ERROR = 1.0e-2
-LEAST_SLOPS = 10.0
-APART_SWEEPS = 50
-DEEP_SWEEPS = 1000
+_CORRECTION_ERROR = 1.0e-2
+_ERROR_SLOPS = 10.0
+_CORRECTION_SWEEPS = 50
+_DEEP_SWEEPS = 1000
 
 
 @inlined
-def _aim_apart(n, many):
+def _set_displacement_targets(n, many):
     """Set the target displacements along the normals: (deepest penetration, negligible error of a displacement [m]).
 
     The penetration is in slops of its pair: from 1 on there are some displacements.
@@ -47,18 +54,18 @@ def _aim_apart(n, many):
         slop, gap = pair_slop(many.ends[k, 0], many.ends[k, 1], many), many.gap[k]
         goal = -max(gap, 0.0)
         if gap < -slop:
-            goal = -APART_SHARE * (gap + 0.5 * slop)
+            goal = -_CORRECTION_SHARE * (gap + 0.5 * slop)
             largest, least = max(largest, goal), min(least, slop)
         deepest = max(deepest, -gap / slop)
-        put(many.target, k, 0, (goal, 0.0, 0.0))
-    return deepest, min(APART_ERROR, math.sqrt(many.settings[0].tolerance)) * max(largest, LEAST_SLOPS * least)
+        put_vector(many.target, k, 0, (goal, 0.0, 0.0))
+    return deepest, min(_CORRECTION_ERROR, math.sqrt(many.settings[0].tolerance)) * max(largest, _ERROR_SLOPS * least)
 
 
 @inlined
-def _place_inside(b, tilted, many):
+def _pose_inside_walls(b, tilted, many):
     """Place of body b with its centre inside all walls."""
-    place_body(b, tilted, many)
-    bring_inside(b, tilted, many)
+    update_body_pose(b, tilted, many)
+    clamp_body_inside_walls(b, tilted, many)
 
 
 @inlined
@@ -66,11 +73,11 @@ def _displace(b, tilted, many):
     """Move and turn body b by what `many.twist` says; the work that it takes against its loads [J]."""
     x, q, v, L = read_state(many.now, b)
     start, before = x, 0.5 * qt.dot(L, angular_velocity(q, L, many.bodies[b], tilted))
-    turn = qt.exponential(vector(many.twist, b, 3))
-    x = plus(x, 1.0, vector(many.twist, b, 0))
+    turn = qt.exp_map(row_vector(many.twist, b, 3))
+    x = add_scaled(x, 1.0, row_vector(many.twist, b, 0))
     write_state(many.now, b, (x, qt.normalise(qt.multiply(turn, q)), v, L))
-    keep_turning(b, before, tilted, many)
-    return lift_of(b, start, many)
+    cap_rotational_energy(b, before, tilted, many)
+    return work_against_loads(b, start, many)
 
 
 @inlined
@@ -81,39 +88,41 @@ def _displace_all(tilted, many):
         many.before[b, 0] = 0.0
         if many.touched[b] == 0:
             continue
-        free += free_lift(b, many)
+        free += free_lift_work(b, many)
         if many.pushed[b] > 0:
             lift = _displace(b, tilted, many)
-            _place_inside(b, tilted, many)
+            _pose_inside_walls(b, tilted, many)
             many.before[b, 0] = max(lift, 0.0)
             total, ups = total + lift, ups + max(lift, 0.0)
     if total > free:
         for b in range(many.now.shape[0]):
             if many.before[b, 0] > 0.0:
-                pay(b, many.before[b, 0] * (total / ups), tilted, many)
+                take_kinetic_energy(b, many.before[b, 0] * (total / ups), tilted, many)
 
 
 @inlined
-def _part_once(n, tilted, many):
+def _correct_once(n, tilted, many):
     """One round for the n contacts, posed where the bodies are: the deepest that anything was, in its slop."""
-    refresh(many)
-    deepest, error = _aim_apart(n, many)
+    update_contacts(many)
+    deepest, error = _set_displacement_targets(n, many)
     if not deepest > 1.0:
         return deepest
-    part_contacts(n, error, DEEP_SWEEPS if deepest > DEEP else min(APART_SWEEPS, many.settings[0].sweeps), many)
+    sweep_positions(
+        n, error, _DEEP_SWEEPS if deepest > _DEEP_SLOPS else min(_CORRECTION_SWEEPS, many.settings[0].sweeps), many
+    )
     _displace_all(tilted, many)
     return deepest
 
 
-@standing
-def push_apart(n, tilted, many):
+@shared_kernel
+def correct_positions(n, tilted, many):
     """Move the bodies of the n contacts apart where they overlap by more than the slop."""
     for b in range(many.now.shape[0]):
         if many.touched[b] == 1:
-            _place_inside(b, tilted, many)
+            _pose_inside_walls(b, tilted, many)
     before = math.inf
-    for _ in range(ROUNDS):
-        deepest = _part_once(n, tilted, many)
-        if not DEEP < deepest < before:
+    for _ in range(_MAX_ROUNDS):
+        deepest = _correct_once(n, tilted, many)
+        if not _DEEP_SLOPS < deepest < before:
             break
         before = deepest

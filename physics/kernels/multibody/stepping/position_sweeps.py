@@ -10,29 +10,29 @@ from __future__ import annotations
 import math
 
 from physics.kernels.compile.decorators import inlined, kernel
-from physics.kernels.multibody.solver.block_lu import SPIN
-from physics.kernels.multibody.solver.gauss_seidel import answer_normal, is_answered
-from physics.kernels.multibody.solver.normal_rows import assemble_normal, put_padded, set_moved
+from physics.kernels.multibody.solver.block_lu import ANGULAR_OFFSET
+from physics.kernels.multibody.solver.gauss_seidel import is_contact_up_to_date, relax_normal_impulse
+from physics.kernels.multibody.solver.normal_rows import assemble_normal_row, body_twist_from_motion, put_padded
 
 # Share of the error allowed within which a contact is left as it is: each that is answered leaves those of two bodies
 # to be visited again.
-LEFT_SHARE = 0.5
+_SKIP_SHARE = 0.5
 
 # W_nn of a contact that is not assembled yet: that of any other is positive.
-UNKNOWN = 0.0
+_NOT_ASSEMBLED = 0.0
 
 
 @inlined
-def _begin(n, many):
+def _clear_displacements(n, many):
     """No displacements, and no contacts to visit but those that are asked to open."""
     for b in range(many.now.shape[0]):
         many.pushed[b] = 0
         put_padded(many.motion, b, 0, (0.0, 0.0, 0.0))
-        put_padded(many.motion, b, SPIN, (0.0, 0.0, 0.0))
+        put_padded(many.motion, b, ANGULAR_OFFSET, (0.0, 0.0, 0.0))
     for k in range(n):
         many.queue[k] = k
         many.impulse[k, 0] = 0.0
-        many.block[k, 0] = UNKNOWN
+        many.block[k, 0] = _NOT_ASSEMBLED
         many.visited[k] = -1 if many.target[k, 0] > 0.0 else 0
 
 
@@ -45,14 +45,14 @@ def _sweep(count, is_up, visits, goal, many):
     worst, has_spread = 0.0, False
     for i in range(count):
         k = many.queue[i if is_up else count - 1 - i]
-        if is_answered(k, many):
+        if is_contact_up_to_date(k, many):
             continue
-        if many.block[k, 0] == UNKNOWN:
-            assemble_normal(k, many)
+        if many.block[k, 0] == _NOT_ASSEMBLED:
+            assemble_normal_row(k, many)
         visits += 1
         a, b = many.ends[k, 0], many.ends[k, 1]
         is_new = many.pushed[a] == 0 or (b >= 0 and many.pushed[b] == 0)
-        off = answer_normal(k, visits, LEFT_SHARE * goal, many)
+        off = relax_normal_impulse(k, visits, _SKIP_SHARE * goal, many)
         worst = max(worst, off)
         has_spread = has_spread or (is_new and many.pushed[a] == visits)
     return worst, visits, has_spread
@@ -78,12 +78,12 @@ def _list_pushed(n, many):
 
 
 @kernel
-def part_contacts(n, goal, limit, many):
+def sweep_positions(n, goal, limit, many):
     """Displacements `many.twist` that bring the n contacts to their targets within `goal` [m]: how many sweeps.
 
     `many.pushed` is 0 for bodies that stay where they are.
     """
-    _begin(n, many)
+    _clear_displacements(n, many)
     sweeps, visits, count, worst = 0, 0, n, math.inf
     while worst > goal and sweeps < limit:
         worst, visits, has_spread = _sweep(count, sweeps % 2 == 0, visits, goal, many)
@@ -93,5 +93,5 @@ def part_contacts(n, goal, limit, many):
         elif not has_spread and count == n:
             count = _list_pushed(n, many)
     for b in range(many.now.shape[0]):
-        set_moved(b, many)
+        body_twist_from_motion(b, many)
     return sweeps

@@ -4,26 +4,37 @@ from __future__ import annotations
 
 from physics.kernels.compile.decorators import inlined, kernel
 from physics.kernels.math import quaternion as qt
-from physics.kernels.multibody.data.contact_set import matrix, plus, put, vector
-from physics.kernels.multibody.solver.solve import solve_contacts, solve_smoothly
+from physics.kernels.math.vector import row_vector
+from physics.kernels.multibody.data.contact_set import add_scaled, put_vector, row_matrix
+from physics.kernels.multibody.solver.solve import solve_all_frictionless, solve_contacts
 from physics.kernels.state import layout as at
 
 
 @inlined
-def add_impulses(n, many):
+def apply_impulses(n, many):
     """Momenta of the bodies after the contact impulses; v from the solve, L + Σ r x p."""
     for k in range(n):
-        p = qt.transposed_matvec(matrix(many.frame, k), vector(many.impulse, k, 0))
+        p = qt.transposed_matvec(row_matrix(many.frame, k), row_vector(many.impulse, k, 0))
         a, b = many.ends[k, 0], many.ends[k, 1]
-        put(many.now, a, at.ANGMOM, plus(vector(many.now, a, at.ANGMOM), 1.0, qt.cross(vector(many.arm, k, 0), p)))
-        put(many.now, a, at.LINVEL, vector(many.twist, a, 0))
+        put_vector(
+            many.now,
+            a,
+            at.ANGMOM,
+            add_scaled(row_vector(many.now, a, at.ANGMOM), 1.0, qt.cross(row_vector(many.arm, k, 0), p)),
+        )
+        put_vector(many.now, a, at.LINVEL, row_vector(many.twist, a, 0))
         if b >= 0:
-            put(many.now, b, at.ANGMOM, plus(vector(many.now, b, at.ANGMOM), -1.0, qt.cross(vector(many.arm, k, 3), p)))
-            put(many.now, b, at.LINVEL, vector(many.twist, b, 0))
+            put_vector(
+                many.now,
+                b,
+                at.ANGMOM,
+                add_scaled(row_vector(many.now, b, at.ANGMOM), -1.0, qt.cross(row_vector(many.arm, k, 3), p)),
+            )
+            put_vector(many.now, b, at.LINVEL, row_vector(many.twist, b, 0))
 
 
 @inlined
-def note_solve(world, solved, tolerance, report):
+def report_solve(world, solved, tolerance, report):
     """Add one contact solve (iterations, residual, method) to the world's report."""
     sweeps, residual, method = solved
     report[world, at.SOLVES] += 1.0
@@ -35,15 +46,15 @@ def note_solve(world, solved, tolerance, report):
 
 
 @kernel
-def settle(n, world, friction, report, many):
+def solve_and_apply(n, world, friction, report, many):
     """Solve the contact problem of the stage, change the momenta of the bodies by it, and note it in the report."""
     solved = solve_contacts(n, friction, many)
-    add_impulses(n, many)
-    note_solve(world, solved, many.settings[0].tolerance, report)
+    apply_impulses(n, many)
+    report_solve(world, solved, many.settings[0].tolerance, report)
 
 
 @kernel
-def settle_smoothly(n, many):
+def solve_frictionless_and_apply(n, many):
     """`solve_and_apply` without friction, where a solve with it came out wrong; the report has that one already."""
-    solve_smoothly(n, many)
-    add_impulses(n, many)
+    solve_all_frictionless(n, many)
+    apply_impulses(n, many)

@@ -11,24 +11,24 @@ from __future__ import annotations
 
 from physics.kernels.compile.decorators import kernel
 from physics.kernels.forces.held_loads import bind_fields, set_clock
-from physics.kernels.forces.world_energy_budget import note_reports
-from physics.kernels.multibody.data.contact_set import put
-from physics.kernels.multibody.data.sleeping import all_sleep, doze, sleep_on, wake_world
-from physics.kernels.multibody.data.warm_start import forget
-from physics.kernels.multibody.stepping.adaptive_substep import refine
+from physics.kernels.forces.world_energy_budget import report_unresolved_bodies
+from physics.kernels.multibody.data.contact_set import put_vector
+from physics.kernels.multibody.data.sleeping import is_staying_asleep, is_world_asleep, update_sleep, wake_world
+from physics.kernels.multibody.data.warm_start import clear_warm_start
+from physics.kernels.multibody.stepping.adaptive_substep import step_with_error_control
 from physics.kernels.multibody.stepping.substep import substep_world
-from physics.kernels.parallel.work_stealing import begin, next_world
+from physics.kernels.parallel.work_stealing import begin_taking, next_world
 from physics.kernels.state import layout as at
 from physics.kernels.state.body import (
     angular_velocity,
     bind_body,
-    first_lost,
-    first_overloaded,
-    note_fault,
+    find_nonfinite_body,
+    find_overloaded_body,
     read_state,
+    report_fault,
     write_state,
 )
-from physics.kernels.time_stepping.event_log import drop_events, forget_events
+from physics.kernels.time_stepping.event_log import clear_events, drop_events
 
 
 @kernel
@@ -42,15 +42,15 @@ def step_many(
     Impacts go to `log` (rows, room, EVENT_SIZE), if that has any room, their number to `counts` (rows,).
     """
     bodies = shapes.shape[0]
-    world = begin(turns, taken)
+    world = begin_taking(turns, taken)
     while True:
         world = next_world(world, turns, taken)
         if world < 0:
             break
         for c in range(at.REPORT_SIZE):
             report[world, c] = 0.0
-        forget_events(world, bodies, log, counts)
-        if sleep is not None and sleep_on(world, bodies, wrench, sleep):
+        clear_events(world, bodies, log, counts)
+        if sleep is not None and is_staying_asleep(world, bodies, wrench, sleep):
             continue
         for b in range(bodies):
             i = world * bodies + b
@@ -59,16 +59,16 @@ def step_many(
             bind_fields(params, i, scheme, many.bodies[b])
             write_state(many.now, b, read_state(state, i))
             many.touched[b] = 0
-        lost = max(first_overloaded(many.bodies), first_lost(many.now))
+        lost = max(find_overloaded_body(many.bodies), find_nonfinite_body(many.now))
         if lost >= 0:
-            note_fault(world, lost, report)
-            forget(world, memory)
+            report_fault(world, lost, report)
+            clear_warm_start(world, memory)
             wake_world(world, bodies, sleep)
             continue
         for k in range(steps * substeps):
             if kept is not None:
                 switches = (friction, gyroscopic, tilted, ellipsoids, hulls, scheme)
-                refine(world, k * h, h, switches, kept, memory, report, many, log, counts)
+                step_with_error_control(world, k * h, h, switches, kept, memory, report, many, log, counts)
             else:
                 for b in range(bodies):
                     set_clock(k * h, many.bodies[b])
@@ -76,21 +76,21 @@ def step_many(
                     world, k * h, h, friction, gyroscopic, tilted, ellipsoids, hulls, scheme, sleep, memory, report,
                     many, log, counts,
                 )  # fmt: skip
-            lost = first_lost(many.now)
+            lost = find_nonfinite_body(many.now)
             if lost >= 0:
-                note_fault(world, lost, report)
-                forget(world, memory)
+                report_fault(world, lost, report)
+                clear_warm_start(world, memory)
                 drop_events(world, bodies, k * h, log, counts)
                 wake_world(world, bodies, sleep)
                 break
             if sleep is not None:
-                doze(world, h, sleep, many)
+                update_sleep(world, h, sleep, many)
             for b in range(bodies):
                 write_state(state, world * bodies + b, read_state(many.now, b))
-            if sleep is not None and all_sleep(world, bodies, sleep):
+            if sleep is not None and is_world_asleep(world, bodies, sleep):
                 break
-        note_reports(report, many, many.bodies[0])
+        report_unresolved_bodies(report, many, many.bodies[0])
         for b in range(bodies):
             i = world * bodies + b
             _, q, _, L = read_state(state, i)
-            put(state, i, at.ANGVEL, angular_velocity(q, L, many.bodies[b], tilted))
+            put_vector(state, i, at.ANGVEL, angular_velocity(q, L, many.bodies[b], tilted))

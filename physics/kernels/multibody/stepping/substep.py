@@ -17,19 +17,23 @@ The stages are those of `physics.kernels.time_stepping.step`, for a whole world 
 from __future__ import annotations
 
 from physics.kernels.compile.decorators import inlined, kernel
-from physics.kernels.forces.held_loads import pass_time
-from physics.kernels.half_space.conservative_advancement import MOST_CUTS
-from physics.kernels.multibody.data.arrays import CONTACTS, LEFT_OUT, STAGE_LENGTH
-from physics.kernels.multibody.data.kinematics import place_bodies
+from physics.kernels.forces.held_loads import advance_clock
+from physics.kernels.half_space.conservative_advancement import MAX_TURNING_CUTS
+from physics.kernels.multibody.data.arrays import NUM_CONTACTS, NUM_DROPPED, WARM_STAGE_LENGTH
+from physics.kernels.multibody.data.kinematics import update_poses_and_twists
 from physics.kernels.multibody.narrowphase.dispatch import find_contacts
-from physics.kernels.multibody.stepping.conservative_advancement import forget_turning, note_turning, time_until_turned
-from physics.kernels.multibody.stepping.impact import strike
-from physics.kernels.multibody.stepping.midpoint_step import glide, hold_all_loads
-from physics.kernels.multibody.stepping.position_correction import push_apart
+from physics.kernels.multibody.stepping.conservative_advancement import (
+    clear_spin_bounds,
+    safe_stage_length,
+    write_spin_bounds,
+)
+from physics.kernels.multibody.stepping.impact import resolve_impacts
+from physics.kernels.multibody.stepping.midpoint_step import hold_all_loads, midpoint_step
+from physics.kernels.multibody.stepping.position_correction import correct_positions
 from physics.kernels.state import layout as at
 
 # Cuts of a substep per impact allowed: a meeting is approached from before it, in two or three.
-CUTS_PER_IMPACT = 4
+SPLITS_PER_IMPACT = 4
 
 # Bodies put into each other deeper than this share of the smaller one's bounding radius overlap: as for walls
 # (`physics.world.setters.START_DEPTH`), which refuse it.
@@ -37,12 +41,12 @@ OVERLAP_SHARE = 1.0e-2
 
 
 @inlined
-def note_depth(n, world, memory, report, many):
+def record_penetration(n, world, memory, report, many):
     """Deepest penetration of the set into the world's report, and contacts for which there was no room.
 
     Nothing is remembered, not even the length of a stage, where the bodies were put: what overlaps there is told.
     """
-    is_start = memory[world, STAGE_LENGTH] == 0.0
+    is_start = memory[world, WARM_STAGE_LENGTH] == 0.0
     for k in range(n):
         depth = -many.gap[k]
         report[world, at.PENETRATION] = max(report[world, at.PENETRATION], depth)
@@ -50,8 +54,8 @@ def note_depth(n, world, memory, report, many):
             radius = min(many.bodies[many.ends[k, 0]].radius, many.bodies[many.ends[k, 1]].radius)
             if depth > OVERLAP_SHARE * radius:
                 report[world, at.OVERLAP] = max(report[world, at.OVERLAP], depth)
-    report[world, at.LEFT_OUT] += many.counts[LEFT_OUT]
-    many.counts[LEFT_OUT] = 0
+    report[world, at.CONTACTS_LEFT_OUT] += many.counts[NUM_DROPPED]
+    many.counts[NUM_DROPPED] = 0
 
 
 @inlined
@@ -72,20 +76,20 @@ def substep_world(
     """Advance the bodies of one world by h, `start` after the call [s]: the stages of the module's list."""
     left, impacts, cuts, turns = h, 0, 0, 0
     while True:
-        is_last = impacts >= many.settings[0].splits or cuts == CUTS_PER_IMPACT * many.settings[0].splits
+        is_last = impacts >= many.settings[0].splits or cuts == SPLITS_PER_IMPACT * many.settings[0].splits
         hold_all_loads(left, gyroscopic, tilted, many)
-        place_bodies(tilted, many)
-        is_turning = note_turning(h, tilted, many)
-        if is_turning and (is_last or turns >= MOST_CUTS):
-            forget_turning(many)
+        update_poses_and_twists(tilted, many)
+        is_turning = write_spin_bounds(h, tilted, many)
+        if is_turning and (is_last or turns >= MAX_TURNING_CUTS):
+            clear_spin_bounds(many)
             is_turning = False
         find_contacts(left, ellipsoids, hulls, world, sleep, many)
-        n = many.counts[CONTACTS]
-        note_depth(n, world, memory, report, many)
-        n, t, is_impact = strike(
+        n = many.counts[NUM_CONTACTS]
+        record_penetration(n, world, memory, report, many)
+        n, t, is_impact = resolve_impacts(
             n, world, start + (h - left), left, is_last, friction, tilted, report, many, log, counts
         )  # fmt: skip
-        many.counts[CONTACTS] = n
+        many.counts[NUM_CONTACTS] = n
         if is_impact and not is_last:
             impacts += 1
             cuts += 1
@@ -96,20 +100,20 @@ def substep_world(
         first = t
         if scheme is None:  # noqa: SIM102 (a branch of its own is what the compiler prunes)
             if is_turning:
-                t = time_until_turned(first, gyroscopic, tilted, hulls, many)
+                t = safe_stage_length(first, gyroscopic, tilted, hulls, many)
         if t < first:
             turns += 1
-            if turns == MOST_CUTS:
+            if turns == MAX_TURNING_CUTS:
                 report[world, at.UNRESOLVED] += 1.0
         else:
             cuts += 1
         if t < left:
             report[world, at.SPLITS] += 1.0
-        glide(n, world, t, friction, gyroscopic, tilted, scheme, sleep, memory, report, many)
+        midpoint_step(n, world, t, friction, gyroscopic, tilted, scheme, sleep, memory, report, many)
         left -= t
         for b in range(many.now.shape[0]):
-            pass_time(t, many.bodies[b])
+            advance_clock(t, many.bodies[b])
         if n > 0:
-            push_apart(n, tilted, many)
+            correct_positions(n, tilted, many)
         if is_last or not left > 0.0:
             break

@@ -160,11 +160,11 @@ def _impacts(on: Setting, scene: physics.Scene, seconds: float) -> list[tuple[fl
     for k in range(on.steps(seconds)):
         world.step()
         for event in world.event_log[0, : world.event_counts[0]]:
-            if event[event_log.KIND] == event_log.IMPACT:
+            if event[event_log.EVENT_KIND] == event_log.KIND_IMPACT:
                 found.append(
                     (
-                        k * on.dt + event[event_log.TIME],
-                        float(np.linalg.norm(event[event_log.IMPULSE : event_log.IMPULSE + 3])),
+                        k * on.dt + event[event_log.EVENT_TIME],
+                        float(np.linalg.norm(event[event_log.EVENT_IMPULSE : event_log.EVENT_IMPULSE + 3])),
                     )
                 )
     return found
