@@ -42,9 +42,9 @@ class Plan:
     `tilted` is on where the body frame of a body is not all there is to know of its mass: its principal axes are not
     its body axes, or its geometric centre is not its centre of mass. `many` is on where bodies touch each other, or
     touch walls and are tied together by springs, or a hull touches walls; `meeting` says whether they touch each other,
-    `ellipsoids` whether there are any among those, `hull_tables` whether any touch anything. `refined` is on where
+    `ellipsoids` whether there are any among those, `hulls` whether any hulls touch anything. `refined` is on where
     `many` is and steps have an error tolerance: by the scheme ``events``. `linked` is on where they are tied together
-    and touch nothing. `sleeping` is on where bodies may sleep. `contact_law_dispatch` are those of
+    and touch nothing. `sleeping` is on where bodies may sleep. `laws` are those of
     `physics.kernels.state.contact_law_dispatch`.
     """
 

@@ -24,7 +24,7 @@ from physics.kernels.compile.fused.dispatcher import FOREIGN_KIND, PART_KIND, SH
 def _cache_root() -> Path | None:
     """`NUMBA_CACHE_DIR` if the user set one, else the user's cache folder, else a temporary one; None if none is his.
 
-    Files in it are looked at one by one before they are read (`codegen.disk`), wherever they are.
+    Files in it are looked at one by one before they are read (`fused.disk_cache`), wherever they are.
     """
     if config.CACHE_DIR:
         return Path(config.CACHE_DIR)
@@ -102,7 +102,7 @@ def kernel(function):
     `error_model="numpy"` makes a division by zero an inf and not an exception
     (no exception path inside a kernel); there is no `fastmath`, so results do
     not depend on how the optimiser reorders a sum. A product in a sum is rounded
-    with it, which is said for each (`codegen.builder.fused`). Without Numba's run
+    with it, which is said for each (`folding_builder.fused_multiply_add`). Without Numba's run
     time (`_nrt`) there are no reference counts to keep, nor can a kernel allocate:
     arrays are lent to it, and views of the workspace need no owner.
 

@@ -2,7 +2,7 @@
 
 Two contacts that slide are two angles. For given directions "both normal velocities are on target" is a
 2 x 2 system for the normal impulses, and Newton's method turns both directions at once until no velocity is left
-across them (`point` has the same for a single contact).
+across them (`one_contact` has the same for a single contact).
 
 A direction that would have to turn right round belongs to a contact that holds. Its impulse answers the other's,
 p_i = -W_ii⁻¹ (b_i + W_ij p_j), so that the other one is a single contact with the block W_jj - W_ji W_ii⁻¹ W_ij.

@@ -2,7 +2,7 @@
 
 What damping does to a velocity is over after a few times 1/λ, and then λ may still be as large: of a linear drag it
 is. So the first part is a share of 1/λ, and each next one is longer than the one before by a constant factor: local
-errors are a share of what is left of the velocity, which falls faster. λ h = 10¹² takes 68 parts; the last one that
+errors are a share of what is left of the velocity, which falls faster. λ h = 10¹² takes 72 parts; the last one that
 there may be takes all that is left, by an implicit step, when nothing is left to err about.
 """
 

@@ -1,4 +1,4 @@
-"""Calls that stand ready in memory (`codegen.ready`), made one after another: a job is a row of a table of words."""
+"""Calls that stand ready in memory (`fused.prepared_entry`), made one after another: a job is a row of a table of words."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
 """Laws of contact beyond Coulomb's that only some scenes declare: which ones is read off the type of the workspace.
 
 As with force fields (`fields.terms`): the workspace has a member `law_rolling` where the scene declares rolling
-friction, its numbers stand in `contact_law_dispatch`, and a kernel that asks for them is compiled per type of the
+friction, its numbers stand in `work.laws`, and a kernel that asks for them is compiled per type of the
 workspace. Where none is declared nothing of it is compiled, stored or passed on.
 """
 
