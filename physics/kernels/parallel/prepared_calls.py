@@ -1,4 +1,4 @@
-"""Calls that stand ready in memory (`fused.prepared_entry`), made one after another: a job is a row of a table of words."""
+"""Make calls that are prepared in memory, one after another: a job is a row of a table (`fused.prepared_entry`)."""
 
 from __future__ import annotations
 
