@@ -74,14 +74,6 @@ class Plan:
         return lines_repr("Plan", *(f"{effect}: on" for effect in on[:MOST_ROWS]), f"{len(self.rows) - len(on)} off")
 
     @property
-    def smooth(self) -> bool | None:
-        """Contact without friction: the switch opposite to `friction`.
-
-        Numba prunes a branch only for the argument that is None, so that each of two alternatives needs one.
-        """
-        return True if self.contact and not self.friction else None
-
-    @property
     def key(self) -> tuple:
         """Key that distinguishes one compiled kernel from another."""
         return (

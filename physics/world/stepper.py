@@ -11,6 +11,7 @@ from numba.core.compiler_lock import global_compiler_lock
 from physics import validation
 from physics.kernels.event_driven.step import step_events
 from physics.kernels.multibody.stepping.step import step_many
+from physics.kernels.state.groups import BodyArrays, ContactSwitches, FlightSwitches, Records, WorkQueue
 from physics.kernels.time_stepping.spring_coupled_step import step_linked
 from physics.kernels.time_stepping.step import step_worlds
 from physics.keywords import known_keywords
@@ -20,7 +21,7 @@ from physics.summary import shown
 from physics.world.batch import Batch
 
 # Which arguments of all step kernels the number of steps is, and the length of a substep.
-STEPS, SUBSTEP = 2, 4
+STEPS, SUBSTEP = 1, 3
 
 if TYPE_CHECKING:
     from physics.plan.plan import Plan
@@ -167,13 +168,12 @@ def kernel_calls(world: Batch, wrench: np.ndarray, steps: int, dt: float) -> lis
         wrench = world.actuation.applied
     steps, substeps, h = _times(world, steps, dt)
     kernel, own_arguments = _step_of(plan)
+    gravity = world.gravity if plan.gravity else None
+    bodies = BodyArrays(world.state, world.params, world.shapes, gravity, wrench.reshape(-1, 6))
     argument_lists = [
-        (
-            world.team.turns, taken, steps, substeps, h, world.state, world.params, world.shapes,
-            world.gravity if plan.gravity else None, wrench.reshape(-1, 6), *own_arguments(world, k),
-        )
+        (WorkQueue(world.team.turns, taken), steps, substeps, h, bodies, *own_arguments(world, k))
         for k, taken in enumerate(world.team.taken)
-    ]  # fmt: skip
+    ]
     entry = _entry(kernel, (plan.key, len(world.walls)), argument_lists[0])
     return [Work([(entry, arguments)]) for arguments in argument_lists]
 
@@ -205,34 +205,37 @@ def _step_of(plan: Plan) -> tuple[Callable, Callable[[Batch, int], tuple]]:
 
 def _many_arguments(world: Batch, k: int) -> tuple:
     plan = world.plan
-    switches = (plan.friction, plan.restitution, plan.gyroscopic, plan.tilted, plan.ellipsoids, plan.hulls, plan.scheme)
-    kept = (world.motions[k], world.sleep_of_kernel(), world.memory, world.report_table)
-    return *switches, *kept, world.scratch[k], *_log(world)
+    switches = _contact(plan), plan.restitution, _flight(plan), plan.ellipsoids, plan.hulls
+    return *switches, world.motions[k], world.sleep_of_kernel(), _records(world), world.scratch[k]
 
 
 def _linked_arguments(world: Batch, k: int) -> tuple:
-    plan = world.plan
-    held = None if plan.events else True
-    return plan.gyroscopic, plan.tilted, plan.scheme, held, plan.events, world.report_table, world.scratch[k]
+    held = None if world.plan.events else True
+    return _flight(world.plan), held, world.plan.events, _records(world), world.scratch[k]
 
 
-def _log(world: Batch) -> tuple[np.ndarray, np.ndarray]:
-    return world.event_log, world.event_counts
+def _records(world: Batch) -> Records:
+    return Records(world.memory, world.report_table, world.event_log, world.event_counts)
 
 
-def _wall_switches(plan: Plan) -> tuple:
-    return plan.contact, plan.friction, plan.smooth, plan.restitution, plan.gyroscopic, plan.tilted, plan.pivots
+def _contact(plan: Plan) -> ContactSwitches:
+    return ContactSwitches(plan.contact, plan.friction, plan.pivots)
+
+
+def _flight(plan: Plan) -> FlightSwitches:
+    return FlightSwitches(plan.gyroscopic, plan.tilted, plan.scheme)
 
 
 def _event_arguments(world: Batch, k: int) -> tuple:
-    return (
-        *_wall_switches(world.plan), world.memory, world.report_table, world.scratch[k], world.motions[k], *_log(world),
-    )  # fmt: skip
+    plan = world.plan
+    switches = _contact(plan), plan.restitution, _flight(plan)
+    return *switches, _records(world), world.scratch[k], world.motions[k]
 
 
 def _world_arguments(world: Batch, k: int) -> tuple:
-    switches = (*_wall_switches(world.plan), world.plan.scheme)
-    return *switches, world.sleep_of_kernel(), world.memory, world.report_table, world.scratch[k], *_log(world)
+    plan = world.plan
+    switches = _contact(plan), plan.restitution, _flight(plan)
+    return *switches, world.sleep_of_kernel(), _records(world), world.scratch[k]
 
 
 def _entry(kernel, key: tuple, arguments: tuple) -> int:

@@ -7,6 +7,7 @@ import numpy as np
 from physics.kernels.contact_solver.solve import solve_contacts
 from physics.kernels.math.quaternion import to_matrix
 from physics.kernels.state.contact_law_dispatch import LAW_ANISOTROPY, LAW_DAMPING, LAW_STIFFNESS
+from physics.kernels.state.groups import ContactSwitches
 from physics.kernels.time_stepping.workspace import make_workspace
 
 SIZE = np.array([2.5, 1.5, 1.0])
@@ -98,7 +99,7 @@ class Problem:
         self.one["impulse"] = 0.0
         if warm is not None:
             self.one["impulse"][: 3 * self.n] = np.ravel(warm)
-        on, off = (True, None) if friction else (None, True)
-        result = solve_contacts(self.n, on, off, True, self.v, self.L, self.R, self.one)
+        contact = ContactSwitches(True, True if friction else None, True)
+        result = solve_contacts(self.n, contact, self.v, self.L, self.R, self.one)
         width = 3 if friction else 1
         return np.array(self.one["impulse"][: width * self.n]).reshape(self.n, width), result

@@ -16,6 +16,7 @@ from physics.kernels.contact_solver.gauss_seidel import (
 )
 from physics.kernels.contact_solver.proximal_newton import proximal_newton
 from physics.kernels.contact_solver.solve import solve_contacts
+from physics.kernels.state.groups import ContactSwitches
 from tests.kernels.contact_problem import FACE, Problem
 from tests.reference.lcp import coulomb_defect
 
@@ -106,6 +107,6 @@ def test_the_solver_is_deterministic():
     results = []
     for _ in range(2):
         problem = Problem([(0, k) for k in FACE], (0.011, -0.05, 0.004), (0.001, 0.01, 0.002), 0.5)
-        solve_contacts(4, True, None, True, problem.v, problem.L, problem.R, problem.one)
+        solve_contacts(4, ContactSwitches(True, True, True), problem.v, problem.L, problem.R, problem.one)
         results.append(problem.one["impulse"].copy())
     np.testing.assert_array_equal(*results)

@@ -53,19 +53,19 @@ def _largest_free_speed(rows, bias):
 
 
 @kernel
-def _solve_by_pivoting(n, friction, smooth, residual, work):
+def _solve_by_pivoting(n, contact, residual, work):
     """Pivoting fallback; its result is kept where it beats that of the sweeps. Returns the residual [m/s]."""
     p, W, b, u = work.impulse, work.delassus, work.bias, work.velocity
     after, rows = residual, n
-    if friction is not None:
+    if contact.friction is not None:
         rows = 3 * n
     for r in range(rows):
         work.saved[r] = p[r]
-    if smooth is not None:
+    if contact.friction is None:
         solve_normal_lcp(W, b, n, p, work.fallback_float, work.fallback_int, MAX_PIVOTS)
         update_contact_velocities(rows, W, p, b, u)
         after = normal_residual(n, p, u, W)
-    if friction is not None:
+    if contact.friction is not None:
         solve_pyramid_lcp(W, b, work.friction, n, p, work.fallback_float, work.fallback_int, MAX_PIVOTS)
         update_contact_velocities(rows, W, p, b, u)
         after = cone_residual(n, p, u, work.friction, work.local)
@@ -147,10 +147,10 @@ def _assemble_problem(n, width, R, v, L, work):
 
 
 @kernel
-def _sweep_and_newton(n, friction, smooth, goal, work):
+def _sweep_and_newton(n, contact, goal, work):
     """Sweeps, with friction in turn with Newton's method: (sweeps and steps, residual [m/s])."""
     steps, residual = 0, 0.0
-    if smooth is not None:
+    if contact.friction is None:
         if (
             contact_stiffness(work) > 0.0
         ):  # W is positive definite, but sweeps crawl where γ is small: a few pivots first
@@ -158,7 +158,7 @@ def _sweep_and_newton(n, friction, smooth, goal, work):
                 work.delassus, work.bias, n, work.impulse, work.fallback_float, work.fallback_int, MAX_PIVOTS
             )
         steps, residual = normal_sweeps(n, goal, work.sweeps, work)
-    if friction is not None:
+    if contact.friction is not None:
         invert_contact_blocks(n, work)
         for i in range(n):
             work.friction[i] = work.mu
@@ -182,15 +182,15 @@ def _sweep_and_newton(n, friction, smooth, goal, work):
 
 
 @shared_kernel
-def _solve_iteratively(n, friction, smooth, pivots, v, L, R, work):
+def _solve_iteratively(n, contact, v, L, R, work):
     """Result of `solve_contacts` by sweeps and later solvers: out of line, since few problems come to it."""
-    width = 1 if friction is None else 3
+    width = 1 if contact.friction is None else 3
     scale = _assemble_problem(n, width, R, v, L, work)
     goal = max(min(work.tolerance * scale, work.still), _ROUNDING * scale)
-    sweeps, residual = _sweep_and_newton(n, friction, smooth, goal, work)
+    sweeps, residual = _sweep_and_newton(n, contact, goal, work)
     method = METHOD_SWEEPS
-    if pivots is not None and not residual <= max(goal, _PIVOTING_THRESHOLD * scale):
-        residual = _solve_by_pivoting(n, friction, smooth, residual, work)
+    if contact.pivots is not None and not residual <= max(goal, _PIVOTING_THRESHOLD * scale):
+        residual = _solve_by_pivoting(n, contact, residual, work)
         method = METHOD_PIVOTING
     unstretch_tangents(n, work)
     v, L = _apply_impulses(n, width, v, L, work)
@@ -200,7 +200,7 @@ def _solve_iteratively(n, friction, smooth, pivots, v, L, R, work):
 
 
 @kernel
-def solve_contacts(n, friction, smooth, pivots, v, L, R, work):
+def solve_contacts(n, contact, v, L, R, work):
     """Contact impulses that bring the contacts of `work` to their target velocities as far as they can.
 
     Tried in this order: `solve_all_sticking` and `solve_single_wall`, directly, the likelier one first; sweeps in turn
@@ -210,12 +210,8 @@ def solve_contacts(n, friction, smooth, pivots, v, L, R, work):
     ----------
     n : int
         Contacts in `work`, one at least: slot, arm, target are read, impulse (width * n, the warm start) overwritten.
-    friction : True or None
-        None: frictionless, one row per contact.
-    smooth : True or None
-        The opposite switch: None with friction (see `physics.plan.plan.Plan.smooth`).
-    pivots : True or None
-        None: no pivoting fallback.
+    contact : ContactSwitches
+        Without friction one row per contact; without pivots no pivoting fallback.
     v, L : tuples of 3 floats
         Velocity [m/s] and angular momentum [kg m²/s] without contact impulses.
     R : tuple of 9 floats
@@ -231,7 +227,7 @@ def solve_contacts(n, friction, smooth, pivots, v, L, R, work):
     method : int
         DIRECT, SWEEPS or PIVOTING.
     """
-    found, v_new, L_new, residual = _solve_directly(n, friction, R, v, L, work)
+    found, v_new, L_new, residual = _solve_directly(n, contact.friction, R, v, L, work)
     if found:
         return v_new, L_new, residual, 0, METHOD_DIRECT
-    return _solve_iteratively(n, friction, smooth, pivots, v, L, R, work)
+    return _solve_iteratively(n, contact, v, L, R, work)

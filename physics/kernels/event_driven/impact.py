@@ -137,15 +137,15 @@ def report_impact_solve(solved, report, work):
 
 
 @inlined
-def _solve_plastic_impact(n, friction, smooth, pivots, v, L, solved, P, work, report):
+def _solve_plastic_impact(n, contact, v, L, solved, P, work, report):
     """The same collision solved without any rebound; what `solved` has cost goes into the report."""
     report_impact_solve(solved, report, work)
     set_plastic_targets(n, work)
-    return solve_contacts(n, friction, smooth, pivots, v, L, P, work)
+    return solve_contacts(n, contact, v, L, P, work)
 
 
 @kernel
-def fall_back_to_plastic(n, friction, smooth, pivots, v, L, solved, P, work, report):
+def fall_back_to_plastic(n, contact, v, L, solved, P, work, report):
     """Result of `solve_contacts` for a collision, or an impact without rebound where that was no solution.
 
     With friction two contacts may hold any stress along the line between them, which no impulse lengthens: where one is
@@ -156,11 +156,11 @@ def fall_back_to_plastic(n, friction, smooth, pivots, v, L, solved, P, work, rep
         is_asked = is_asked or work.target[i, 0] > 0.0
     if solved[2] <= _FAILED_RESIDUAL or not is_asked:
         return solved
-    return _solve_plastic_impact(n, friction, smooth, pivots, v, L, solved, P, work, report)
+    return _solve_plastic_impact(n, contact, v, L, solved, P, work, report)
 
 
 @kernel
-def cap_rebound_energy(n, y, friction, smooth, tilted, pivots, solved, P, work, motion, report):
+def cap_rebound_energy(n, y, contact, tilted, solved, P, work, motion, report):
     """Result of `solve_contacts` for a collision with friction, or as much of its rebound as there is energy for.
 
     Impulses are those of what is returned. See `physics.kernels.contact_law.restitution_energy`.
@@ -172,7 +172,7 @@ def cap_rebound_energy(n, y, friction, smooth, tilted, pivots, solved, P, work, 
         return solved
     for k in range(3 * n):
         motion.rebound[k] = work.impulse[k]
-    plastic = _solve_plastic_impact(n, friction, smooth, pivots, v, L, solved, P, work, report)
+    plastic = _solve_plastic_impact(n, contact, v, L, solved, P, work, report)
     v_plastic, L_plastic, residual, sweeps, method = plastic
     v, L, s = limit_rebound_energy(q, before, (v_plastic, L_plastic), (v_full, L_full), work, tilted)
     for k in range(3 * n):
@@ -216,36 +216,40 @@ def _rows_per_contact(friction):
 
 
 @kernel
-def resolve_impacts(y, t, friction, smooth, tilted, pivots, work, motion, report, log, counts):
+def resolve_impacts(y, t, contact, tilted, work, motion, records):
     """State after the impulses of a collision at the time t, of all that touches or of the one whose turn it is."""
     refresh_loads(y, 0.0, tilted, work)
-    n = set_up_impact_problem(y, tilted, work, motion, report)
+    n = set_up_impact_problem(y, tilted, work, motion, records.report)
     set_tangential_rebound(n, y, tilted, motion, work)
     x, q, v, L = y
     if n > 0:
         P = principal_rotation(y, tilted, work)
-        solved = solve_contacts(n, friction, smooth, pivots, v, L, P, work)
-        solved = fall_back_to_plastic(n, friction, smooth, pivots, v, L, solved, P, work, report)
-        solved = reject_energy_gain(n, friction, smooth, pivots, v, L, solved, P, work)
-        if friction is not None and work.restitution > 0.0:
-            solved = cap_rebound_energy(n, y, friction, smooth, tilted, pivots, solved, P, work, motion, report)
-        report_impact_solve(solved, report, work)
+        solved = solve_contacts(n, contact, v, L, P, work)
+        solved = fall_back_to_plastic(n, contact, v, L, solved, P, work, records.report)
+        solved = reject_energy_gain(n, contact, v, L, solved, P, work)
+        if contact.friction is not None and work.restitution > 0.0:
+            solved = cap_rebound_energy(n, y, contact, tilted, solved, P, work, motion, records.report)
+        report_impact_solve(solved, records.report, work)
         v, L = solved[0], solved[1]
-    ev.log_wall_impacts(n, _rows_per_contact(friction), x, work.mass * motion.noise, t, work, log, counts)
+    ev.log_wall_impacts(
+        n, _rows_per_contact(contact.friction), x, work.mass * motion.noise, t, work, records.log, records.counts
+    )
     return x, q, v, L
 
 
 @kernel
-def resolve_inconsistency(y, h, t, friction, smooth, tilted, pivots, work, motion, report, log, counts):
+def resolve_inconsistency(y, h, t, contact, tilted, work, motion, records):
     """State with the velocities of a first-order step over h from the time t: a leap, before it is made."""
     refresh_loads(y, 0.0, tilted, work)
     n, v, L = set_up_jump_problem(y, h, tilted, work, motion)
     if n > 0:  # there may be nothing in reach
         P = principal_rotation(y, tilted, work)
-        solved = solve_contacts(n, friction, smooth, pivots, v, L, P, work)
-        report_impact_solve(solved, report, work)
+        solved = solve_contacts(n, contact, v, L, P, work)
+        report_impact_solve(solved, records.report, work)
         v, L = solved[0], solved[1]
-    ev.log_wall_impacts(n, _rows_per_contact(friction), y[0], work.mass * motion.noise, t, work, log, counts)
+    ev.log_wall_impacts(
+        n, _rows_per_contact(contact.friction), y[0], work.mass * motion.noise, t, work, records.log, records.counts
+    )
     return y[0], y[1], v, L
 
 

@@ -118,7 +118,7 @@ def begin_event_substep(y, start, h, tilted, memory, work, motion):
 
 
 @kernel
-def classify_mode(y, is_foretold, watched, friction, smooth, tilted, pivots, work, motion, report):
+def classify_mode(y, is_foretold, watched, contact, tilted, work, motion, report):
     """Find the regime from y on, and whether a contact problem had to be solved, since the body may come to rest.
 
     It is looked for a moment ahead where a guard has foretold that the regime ends.
@@ -128,16 +128,16 @@ def classify_mode(y, is_foretold, watched, friction, smooth, tilted, pivots, wor
         seen, later = predict_state(y, tilted, work, motion), motion.ahead
     motion.assured = later
     refresh_loads(seen, later, tilted, work)
-    what, n, v, L = find_contact_mode(seen, friction, tilted, work, motion)
+    what, n, v, L = find_contact_mode(seen, contact.friction, tilted, work, motion)
     what = accept_step(what, watched, y, tilted, work, motion)
     if what not in (MODE_UNDECIDED, MODE_UNDECIDED_SLIDING):
         return what, False
     if n > 0:
         P = principal_rotation(seen, tilted, work)
-        solved = solve_contacts(n, friction, smooth, pivots, v, L, P, work)
+        solved = solve_contacts(n, contact, v, L, P, work)
         report_impact_solve(solved, report, work)
         v, L = solved[0], solved[1]
-    what = read_resting_mode(n, seen, v, L, friction, what == MODE_UNDECIDED_SLIDING, tilted, work, motion)
+    what = read_resting_mode(n, seen, v, L, contact.friction, what == MODE_UNDECIDED_SLIDING, tilted, work, motion)
     return accept_step(what, watched, y, tilted, work, motion), True
 
 
@@ -153,52 +153,50 @@ def come_to_rest(y, t, tilted, work, motion, log, counts):
 
 
 @kernel
-def integrate_mode(what, y, t, h, gyroscopic, tilted, work, motion, report):
+def integrate_mode(what, y, t, h, flight, work, motion, report):
     """Move, fly or leap from y, at the time t of a part of length h: (state, time it took, the guard that ended it)."""
     if what == MODE_INCONSISTENT:
         report[work.world, at.FALLBACKS] += 1.0
         step = min(motion.leap, h - t)
         lengthen_leap(t + step, motion)
-        return drift_at_velocity(y, step, tilted, work), step, GUARD_NONE
+        return drift_at_velocity(y, step, flight.tilted, work), step, GUARD_NONE
     if what == MODE_FLIGHT:
-        y, step, is_found = fly_to_wall(y, h - t, gyroscopic, tilted, work, motion, report)
+        y, step, is_found = fly_to_wall(y, h - t, flight.gyroscopic, flight.tilted, work, motion, report)
         if not is_found:
             count_unresolved_flight(report, work)
         return y, step, GUARD_NONE
-    return integrate_segment(y, h - t, tilted, work, motion)
+    return integrate_segment(y, h - t, flight.tilted, work, motion)
 
 
 @kernel
-def advance(y, h, friction, smooth, gyroscopic, tilted, pivots, work, motion, memory, report, log, counts, start):
+def advance(y, h, contact, flight, work, motion, records, start):
     """State after h: events where they happen, smooth motion between them.
 
     Each turn asks what the body does (`impact_events` says so beforehand where it is known) and does that. A step whose
     end has to be looked at (`mode_acceptance`) has begun at `kept` and has the length `watched`.
     """
-    begin_event_substep(y, start, h, tilted, memory, work, motion)
+    begin_event_substep(y, start, h, flight.tilted, records.memory, work, motion)
     t, told, is_foretold, kept, watched = 0.0, _NO_FORCED_MODE, False, y, 0.0
     for k in range(work.splits + 1):
         if k == work.splits:
-            report[work.world, at.UNRESOLVED] += 1.0
+            records.report[work.world, at.UNRESOLVED] += 1.0
             break
         if is_chattering(t, motion):
             told = MODE_INCONSISTENT
         what, is_answer = told, False
         if told == _NO_FORCED_MODE:
             what, is_answer = classify_mode(
-                y, is_foretold, watched, friction, smooth, tilted, pivots, work, motion, report
-            )  # fmt: skip
+                y, is_foretold, watched, contact, flight.tilted, work, motion, records.report
+            )
         told = _NO_FORCED_MODE
         if is_answer and what in (MODE_IMPACT, MODE_INCONSISTENT):
             told, is_foretold = what, False
             continue
         if what == MODE_IMPACT:
-            y = resolve_impacts(y, start + t, friction, smooth, tilted, pivots, work, motion, report, log, counts)
+            y = resolve_impacts(y, start + t, contact, flight.tilted, work, motion, records)
         elif what == MODE_INCONSISTENT:
             leap = min(motion.leap, h - t)
-            y = resolve_inconsistency(
-                y, leap, start + t, friction, smooth, tilted, pivots, work, motion, report, log, counts
-            )
+            y = resolve_inconsistency(y, leap, start + t, contact, flight.tilted, work, motion, records)
         elif what == MODE_ROLLBACK:
             motion.trust = TRUST_SHRINK * watched
             y, t, watched, is_foretold = kept, t - watched, 0.0, False
@@ -209,16 +207,16 @@ def advance(y, h, friction, smooth, gyroscopic, tilted, pivots, work, motion, me
             if not t < h:
                 break
         if what == MODE_IMPACT:
-            report[work.world, at.SPLITS] += 1.0
+            records.report[work.world, at.SPLITS] += 1.0
             motion.crowd -= motion.is_sequential  # those in turn have a bound of their own
             is_foretold = False
             continue
-        log_mode_changes(work, motion, log, counts, start + t)
+        log_mode_changes(work, motion, records.log, records.counts, start + t)
         if what == MODE_REST:
-            y = come_to_rest(y, start + t, tilted, work, motion, log, counts)
+            y = come_to_rest(y, start + t, flight.tilted, work, motion, records.log, records.counts)
             break
         motion.is_resting, kept = 0, y
-        y, step, guard = integrate_mode(what, y, t, h, gyroscopic, tilted, work, motion, report)
+        y, step, guard = integrate_mode(what, y, t, h, flight, work, motion, records.report)
         t += step
         set_clock(start + t, work)
         adapt_look_ahead(step, guard, motion)
@@ -230,55 +228,49 @@ def advance(y, h, friction, smooth, gyroscopic, tilted, pivots, work, motion, me
         elif guard == GUARD_STEP_FAILED:
             told = MODE_INCONSISTENT
         is_foretold = guard in FORCE_GUARDS
-    store_contact_modes(memory, work.i, work, motion)
+    store_contact_modes(records.memory, work.i, work, motion)
     return y
 
 
 @kernel
-def step_events(
-    turns, taken, steps, substeps, h, state, params, shapes, gravity, wrench, contact, friction, smooth, restitution,
-    gyroscopic, tilted, pivots, memory, report, scratch, motions, log, counts,
-):  # fmt: skip
+def step_events(queue, steps, substeps, h, bodies, contact, restitution, flight, records, scratch, motions):
     """Advance the worlds that no other thread has taken by `steps` steps of `substeps` parts of h seconds each.
 
     Events go to `log` (rows, room, EVENT_SIZE), their number to `counts` (rows,); otherwise as `step.step_worlds`.
     """
     work, motion = scratch[0], motions[0]
-    bodies = shapes.shape[0]
-    world = begin_taking(turns, taken)
+    count = bodies.shapes.shape[0]
+    world = begin_taking(queue.turns, queue.taken)
     while True:
-        world = next_world(world, turns, taken)
+        world = next_world(world, queue.turns, queue.taken)
         if world < 0:
             break
         for c in range(at.REPORT_SIZE):
-            report[world, c] = 0.0
-        for b in range(bodies):
-            i = world * bodies + b
-            counts[i] = 0
-            bind_body(world, i, shapes[b], params, gravity, wrench, friction, restitution, tilted, work)
+            records.report[world, c] = 0.0
+        for b in range(count):
+            i = world * count + b
+            records.counts[i] = 0
+            bind_body(world, i, bodies.shapes[b], bodies, contact.friction, restitution, flight.tilted, work)
             if not has_finite_loads(work):
-                report_fault(world, b, report)
-                ev.note_mode_change(log, counts, i, 0.0, ev.KIND_FAULT, -1)
+                report_fault(world, b, records.report)
+                ev.note_mode_change(records.log, records.counts, i, 0.0, ev.KIND_FAULT, -1)
                 continue
-            bind_fields(params, i, None, work)
-            bind_laws(params, i, work)
-            y = read_state(state, i)
+            bind_fields(bodies.params, i, None, work)
+            bind_laws(bodies.params, i, work)
+            y = read_state(bodies.state, i)
             for k in range(steps * substeps):
-                if contact is not None:
-                    new = advance(
-                        y, h, friction, smooth, gyroscopic, tilted, pivots, work, motion, memory, report, log, counts,
-                        k * h,
-                    )  # fmt: skip
+                if contact.acts is not None:
+                    new = advance(y, h, contact, flight, work, motion, records, k * h)
                 else:
                     motion.count = 0
                     set_clock(k * h, work)
-                    new = fly_freely(y, h, gyroscopic, tilted, work, motion, report)
+                    new = fly_freely(y, h, flight.gyroscopic, flight.tilted, work, motion, records.report)
                 if not is_finite(new):
-                    report_fault(world, b, report)
-                    ev.drop_events(i, 1, k * h, log, counts)
-                    ev.note_mode_change(log, counts, i, k * h, ev.KIND_FAULT, -1)
+                    report_fault(world, b, records.report)
+                    ev.drop_events(i, 1, k * h, records.log, records.counts)
+                    ev.note_mode_change(records.log, records.counts, i, k * h, ev.KIND_FAULT, -1)
                     break
                 y = new
-            write_state(state, i, y)
-            w = angular_velocity(y[1], y[3], work, tilted)
-            state[i, at.ANGVEL], state[i, at.ANGVEL + 1], state[i, at.ANGVEL + 2] = w
+            write_state(bodies.state, i, y)
+            w = angular_velocity(y[1], y[3], work, flight.tilted)
+            bodies.state[i, at.ANGVEL], bodies.state[i, at.ANGVEL + 1], bodies.state[i, at.ANGVEL + 2] = w

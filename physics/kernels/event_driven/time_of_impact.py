@@ -54,6 +54,7 @@ from physics.kernels.math import quaternion as qt
 from physics.kernels.math.vector import as_vector, plus
 from physics.kernels.state import layout as at
 from physics.kernels.state.body import angular_velocity
+from physics.kernels.state.groups import FlightSwitches
 from physics.kernels.state.layout import ELLIPSOID, SPHERE, WALL_OFFSET
 
 # Advances towards one impact at most; six are usual, more where a body grazes a wall.
@@ -195,7 +196,7 @@ def fly_freely(y, t, gyroscopic, tilted, work, motion, report):
             count_unresolved_flight(report, work)
             hold_loads(end, left, gyroscopic, tilted, work)
             rest = fly(end, work, left, gyroscopic, tilted)
-            end = subdivide_stiff_flight(rest, end, left, gyroscopic, tilted, None, work)
+            end = subdivide_stiff_flight(rest, end, left, FlightSwitches(gyroscopic, tilted, None), work)
         if has_felt_field(work):
             return end
     return fly(y, work, t, gyroscopic, tilted)

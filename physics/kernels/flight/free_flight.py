@@ -44,21 +44,21 @@ def fly(y, work, h, gyroscopic, tilted):
 
 
 @inlined
-def integrate_flight(y, h, gyroscopic, tilted, scheme, work):
+def integrate_flight(y, h, flight, work):
     """Free motion over h, by the exact flow or by the scheme that was chosen."""
-    if scheme is None:
-        return fly(y, work, h, gyroscopic, tilted)
-    return fly_by_scheme(scheme, y, work, h, tilted)
+    if flight.scheme is None:
+        return fly(y, work, h, flight.gyroscopic, flight.tilted)
+    return fly_by_scheme(flight, y, work, h)
 
 
 @kernel
-def fly_by_scheme(scheme, y, work, h, tilted):
+def fly_by_scheme(flight, y, work, h):
     """`fly` by a textbook scheme (codes of `physics.kernels.flight.integrators`) instead of the exact flow."""
     x, q, v, L = y
-    q = principal_attitude(q, work, tilted)
+    q = principal_attitude(q, work, flight.tilted)
     zero = (0.0, 0.0, 0.0)
     x, q, v, L = integrators.step(
-        scheme,
+        flight.scheme,
         x,
         q,
         v,
@@ -70,4 +70,4 @@ def fly_by_scheme(scheme, y, work, h, tilted):
         as_vector(work.J),
         h,
     )
-    return x, body_attitude(q, work, tilted), v, L
+    return x, body_attitude(q, work, flight.tilted), v, L

@@ -8,6 +8,7 @@ from physics.kernels.forces.force_field_dispatch import total_energy, total_load
 from physics.kernels.forces.held_loads import bind_fields
 from physics.kernels.forces.two_body_spring import place_anchors_of_body
 from physics.kernels.state.body import bind_body, read_state
+from physics.kernels.state.groups import BodyArrays
 
 
 @kernel
@@ -16,11 +17,9 @@ def evaluate_fields(state, params, shapes, tilted, start, scratch, wrenches, ene
 
     `wrenches` is zero at first: it is the wrench that is bound, too.
     """
-    work = scratch[0]
+    work, bodies = scratch[0], BodyArrays(state, params, shapes, None, wrenches)
     for i in range(state.shape[0]):
-        bind_body(
-            i // shapes.shape[0], i, shapes[i % shapes.shape[0]], params, None, wrenches, None, None, tilted, work
-        )
+        bind_body(i // shapes.shape[0], i, shapes[i % shapes.shape[0]], bodies, None, None, tilted, work)
         bind_fields(params, i, None, work)
         place_anchors_of_body(i, state, shapes.shape[0], work)
         x, q, v, L = read_state(state, i)

@@ -30,7 +30,7 @@ _NEARLY_CONVERGED = 1.0e-3
 
 
 @kernel
-def implicit_flight(y, h, gyroscopic, tilted, scheme, work):
+def implicit_flight(y, h, flight, work):
     """Flight over h from y under loads that agree with its end: discrete gradients, by Newton's method from those held.
 
     A' = A + (1 + M⁻¹ Z)⁻¹ (A(y, end) - A). Where that does not settle the loads of the first step are kept.
@@ -38,41 +38,41 @@ def implicit_flight(y, h, gyroscopic, tilted, scheme, work):
     start = acting_loads(work)
     size, loads = load_bound(start, work), start
     for _ in range(_NEWTON_ROUNDS):
-        end = integrate_flight(y, h, gyroscopic, tilted, scheme, work)
-        change = newton_load_change(y, end, loads, h, gyroscopic, tilted, work)
+        end = integrate_flight(y, h, flight, work)
+        change = newton_load_change(y, end, loads, h, flight.gyroscopic, flight.tilted, work)
         loads = plus(loads[0], change[0]), plus(loads[1], change[1])
         apply_total_loads(loads, work)
         if load_bound(change, work) <= _CONVERGED * size:
             break
     if not load_bound(change, work) <= _NEARLY_CONVERGED * size:
         apply_total_loads(start, work)
-    return integrate_flight(y, h, gyroscopic, tilted, scheme, work)
+    return integrate_flight(y, h, flight, work)
 
 
-def _as_it_is(end, y, h, gyroscopic, tilted, scheme, work):
+def _as_it_is(end, y, h, flight, work):
     return end
 
 
 @if_declared(_as_it_is)
-def subdivide_stiff_flight(end, y, h, gyroscopic, tilted, scheme, work):
+def subdivide_stiff_flight(end, y, h, flight, work):
     """`end` of a flight over h from y under the loads that are held; where these are stiff, made in parts."""
     if work.is_stiff == 0:
         return end
     start, left, part = time_now(work), h, 0.0
     for k in range(_MAX_PARTS):
-        hold_loads(y, left, gyroscopic, tilted, work)
+        hold_loads(y, left, flight.gyroscopic, flight.tilted, work)
         part = _PART_GROWTH * part
         if work.rate > 0.0:
             part = max(part, _FIRST_PART / work.rate)
         if not 0.0 < part < left or k == _MAX_PARTS - 1:
             part = left
         if part < left:
-            hold_loads(y, part, gyroscopic, tilted, work)
+            hold_loads(y, part, flight.gyroscopic, flight.tilted, work)
         if work.is_stiff == 1:
-            end = implicit_flight(y, part, gyroscopic, tilted, scheme, work)
+            end = implicit_flight(y, part, flight, work)
         else:
-            end = integrate_flight(y, part, gyroscopic, tilted, scheme, work)
-        y = limit_energy_gain(y, end, part, True, tilted, work)
+            end = integrate_flight(y, part, flight, work)
+        y = limit_energy_gain(y, end, part, True, flight.tilted, work)
         left -= part
         advance_clock(part, work)
         if not left > 0.0:

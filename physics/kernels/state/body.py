@@ -11,35 +11,35 @@ from physics.kernels.state.layout import SERIES_SIZE
 
 
 @inlined
-def bind_body(world, i, shape, params, gravity, wrench, friction, restitution, tilted, work):
+def bind_body(world, i, shape, bodies, friction, restitution, tilted, work):
     """Write what the step needs of body i into `work`: parameters, and the loads that are held over the step.
 
     gravity, friction, restitution and tilted are None where the scene does not have them: tilted, where the
     principal axes of every body are its body axes and its geometric centre is its centre of mass.
     """
-    inv_mass, radius = params[i, at.INV_MASS], params[i, at.RADIUS]
+    inv_mass, radius = bodies.params[i, at.INV_MASS], bodies.params[i, at.RADIUS]
     work.i, work.world, work.shape = i, world, shape
     work.mass, work.radius, work.slop = 1.0 / inv_mass, radius, work.relative_slop * radius
     for c in range(3):
-        work.J[c] = params[i, at.INV_INERTIA + c]
-        work.dims[c] = params[i, at.DIMENSIONS + c]
+        work.J[c] = bodies.params[i, at.INV_INERTIA + c]
+        work.dims[c] = bodies.params[i, at.DIMENSIONS + c]
         work.free_acceleration[c] = 0.0
-        if gravity is not None:
-            work.free_acceleration[c] = gravity[world, c]
-        work.free_acceleration[c] += inv_mass * wrench[i, c]
-        work.torque[c] = wrench[i, 3 + c]
+        if bodies.gravity is not None:
+            work.free_acceleration[c] = bodies.gravity[world, c]
+        work.free_acceleration[c] += inv_mass * bodies.wrench[i, c]
+        work.torque[c] = bodies.wrench[i, 3 + c]
     for c in range(SERIES_SIZE):
-        work.series[c] = params[i, at.SERIES + c]
+        work.series[c] = bodies.params[i, at.SERIES + c]
     work.mu = work.restitution = 0.0
     if friction is not None:
-        work.mu = params[i, at.FRICTION]
+        work.mu = bodies.params[i, at.FRICTION]
     if restitution is not None:
-        work.restitution = params[i, at.RESTITUTION]
+        work.restitution = bodies.params[i, at.RESTITUTION]
     if tilted is not None:
         for c in range(4):
-            work.principal[c] = params[i, at.PRINCIPAL + c]
+            work.principal[c] = bodies.params[i, at.PRINCIPAL + c]
         for c in range(3):
-            work.center[c] = params[i, at.CENTER + c]
+            work.center[c] = bodies.params[i, at.CENTER + c]
     a, t, J = work.free_acceleration, work.torque, work.J
     work.acceleration = math.sqrt(a[0] * a[0] + a[1] * a[1] + a[2] * a[2])
     turning = max(J[0], J[1], J[2]) * math.sqrt(t[0] * t[0] + t[1] * t[1] + t[2] * t[2])

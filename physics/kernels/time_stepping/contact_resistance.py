@@ -71,9 +71,9 @@ def _against(n, width, across, along, w, work):
 
 
 @kernel
-def _resist(n, friction, smooth, pivots, across, along, v, L, solved, R, work):
+def _resist(n, contact, across, along, v, L, solved, R, work):
     """One torque: what `solve_contacts` gives with it, and L with it but without the contacts."""
-    width = 1 if friction is None else 3
+    width = 1 if contact.friction is None else 3
     w = apply_inv_inertia(R, solved[1], work.J)
     T = _against(n, width, across, along, w, work)
     start = qt.dot(T, w)
@@ -81,7 +81,7 @@ def _resist(n, friction, smooth, pivots, across, along, v, L, solved, R, work):
         return solved, L
     low, high, at_low, at_high, s = 0.0, 1.0, start, 0.0, 1.0
     for trial in range(_MAX_TORQUE_TRIALS):
-        solved = solve_contacts(n, friction, smooth, pivots, v, _added(L, s, T), R, work)
+        solved = solve_contacts(n, contact, v, _added(L, s, T), R, work)
         power = qt.dot(T, apply_inv_inertia(R, solved[1], work.J))
         if (
             (s == 1.0 and not power > 0.0)
@@ -97,20 +97,20 @@ def _resist(n, friction, smooth, pivots, across, along, v, L, solved, R, work):
     return solved, _added(L, s, T)
 
 
-def _as_solved(n, friction, smooth, pivots, v, L, solved, R, work):
+def _as_solved(n, contact, v, L, solved, R, work):
     return solved
 
 
 @if_law((LAW_ROLLING, LAW_SPIN), _as_solved)
-def apply_resistance_torques(n, friction, smooth, pivots, v, L, solved, R, work):
+def apply_resistance_torques(n, contact, v, L, solved, R, work):
     """Result of `solve_contacts` for v and L, with the torques of rolling and spin friction on a round body."""
     if work.shape == BLOCK:
         return solved
     across, along = rolling_radius(work), spin_radius(work)
     if across > 0.0:
-        solved, L = _resist(n, friction, smooth, pivots, across, 0.0, v, L, solved, R, work)
+        solved, L = _resist(n, contact, across, 0.0, v, L, solved, R, work)
     if along > 0.0:
-        solved, L = _resist(n, friction, smooth, pivots, 0.0, along, v, L, solved, R, work)
+        solved, L = _resist(n, contact, 0.0, along, v, L, solved, R, work)
     return solved
 
 
@@ -148,7 +148,7 @@ def _energy(v, L, R, work):
 
 
 @if_law((LAW_TANGENTIAL,), _as_solved)
-def reject_energy_gain(n, friction, smooth, pivots, v, L, solved, R, work):
+def reject_energy_gain(n, contact, v, L, solved, R, work):
     """Result of `solve_contacts` for v and L; where that has gained energy, the one without `set_tangential_targets`.
 
     A sphere's only contact cannot gain any: what it does along the wall and across does not mix. That of a sphere
@@ -159,4 +159,4 @@ def reject_energy_gain(n, friction, smooth, pivots, v, L, solved, R, work):
     for i in range(n):
         work.target[i, 1] = work.target[i, 2] = 0.0
         work.impulse[3 * i] = work.impulse[3 * i + 1] = work.impulse[3 * i + 2] = 0.0
-    return solve_contacts(n, friction, smooth, pivots, v, L, R, work)
+    return solve_contacts(n, contact, v, L, R, work)

@@ -196,17 +196,17 @@ def set_dissipative_targets(n, before, w, work):
         work.target[i, 1] = work.target[i, 2] = 0.0
 
 
-def _calmed_if_it_gains(n, friction, smooth, pivots, before, w, solved, free, R, h, work):
+def _calmed_if_it_gains(n, contact, before, w, solved, free, R, h, work):
     if has_energy_gain(n, before, w, free[0], free[1], solved, R, h, work):
         set_dissipative_targets(n, before, w, work)
-        solved = solve_contacts(n, friction, smooth, pivots, free[0], free[1], R, work)
+        solved = solve_contacts(n, contact, free[0], free[1], R, work)
         if not solved[2] <= work.tolerance and has_energy_gain(n, before, w, free[0], free[1], solved, R, h, work):
-            return scale_impulses_to_dissipate(n, friction, before, w, solved, free, R, work)
+            return scale_impulses_to_dissipate(n, contact.friction, before, w, solved, free, R, work)
     return solved
 
 
 @if_law((LAW_STIFFNESS,), _calmed_if_it_gains)
-def limit_stage_energy(n, friction, smooth, pivots, before, w, solved, free, R, h, work):
+def limit_stage_energy(n, contact, before, w, solved, free, R, h, work):
     """Result of `solve_contacts` for `free` (v, L); if that raises the energy, the one for calm targets.
 
     If even that does, since no method solved it, as much of it as does not. Springs give back what they hold.
@@ -224,7 +224,7 @@ def set_plastic_targets(n, work):
 
 
 @inlined
-def resolve_impacts(n, y, t, h, friction, smooth, tilted, pivots, memory, report, work, log, counts):
+def resolve_impacts(n, y, t, h, contact, tilted, records, work):
     """State after the impulses of the contacts that approach; unchanged when none does.
 
     It happens t [s] after the start of the call, with h [s] left of the substep.
@@ -236,9 +236,9 @@ def resolve_impacts(n, y, t, h, friction, smooth, tilted, pivots, memory, report
     slop_speed = work.slop / h
     if not may_have_impact(bounce_speed, slop_speed, work):
         if n == 1 and work.shape == ELLIPSOID and work.speed[0] > slop_speed:
-            return cancel_separation(y, h, tilted, memory, work)
+            return cancel_separation(y, h, tilted, records.memory, work)
         return y
-    found = set_impact_targets(n, bounce_speed, slop_speed, y, h, tilted, memory, work)
+    found = set_impact_targets(n, bounce_speed, slop_speed, y, h, tilted, records.memory, work)
     if found == NO_IMPACT:
         return y
     place_arms(n, qt.to_matrix(q), tilted, work)
@@ -247,81 +247,79 @@ def resolve_impacts(n, y, t, h, friction, smooth, tilted, pivots, memory, report
         work.impulse[k] = 0.0
     R = qt.to_matrix(principal_attitude(q, work, tilted))
     work.mode, work.still, work.unseen = TRY_SLIDING, math.inf, 0.0
-    solved = solve_contacts(n, friction, smooth, pivots, v, L, R, work)
+    solved = solve_contacts(n, contact, v, L, R, work)
     if not solved[2] <= work.tolerance:
-        solved = scale_impulses_to_dissipate(n, friction, v, apply_inv_inertia(R, L, work.J), solved, (v, L), R, work)
-    solved = reject_energy_gain(n, friction, smooth, pivots, v, L, solved, R, work)
-    v_new, L_new, residual, sweeps, method = apply_resistance_torques(
-        n, friction, smooth, pivots, v, L, solved, R, work
-    )
-    report_solve(report, work.world, residual, sweeps, method, work.tolerance)
-    if friction is not None and work.restitution > 0.0:
+        solved = scale_impulses_to_dissipate(
+            n, contact.friction, v, apply_inv_inertia(R, L, work.J), solved, (v, L), R, work
+        )
+    solved = reject_energy_gain(n, contact, v, L, solved, R, work)
+    v_new, L_new, residual, sweeps, method = apply_resistance_torques(n, contact, v, L, solved, R, work)
+    report_solve(records.report, work.world, residual, sweeps, method, work.tolerance)
+    if contact.friction is not None and work.restitution > 0.0:
         before, full = kinetic_energy(q, v, L, work, tilted), kinetic_energy(q, v_new, L_new, work, tilted)
         if full > before + IMPACT_ENERGY_ROUNDING * before:
             for k in range(3 * n):
                 work.rebound[k] = work.impulse[k]
             set_plastic_targets(n, work)
-            solved = solve_contacts(n, friction, smooth, pivots, v, L, R, work)
+            solved = solve_contacts(n, contact, v, L, R, work)
             if not solved[2] <= work.tolerance:
                 solved = scale_impulses_to_dissipate(
-                    n, friction, v, apply_inv_inertia(R, L, work.J), solved, (v, L), R, work
+                    n, contact.friction, v, apply_inv_inertia(R, L, work.J), solved, (v, L), R, work
                 )
             v0, L0, residual, sweeps, method = solved
-            report_solve(report, work.world, residual, sweeps, method, work.tolerance)
+            report_solve(records.report, work.world, residual, sweeps, method, work.tolerance)
             v_new, L_new, s = limit_rebound_energy(q, before, (v0, L0), (v_new, L_new), work, tilted)
             for k in range(3 * n):
                 work.impulse[k] += s * (work.rebound[k] - work.impulse[k])
-    if log.shape[1] > 0 and found == TRUE_IMPACT:
-        log_wall_impacts(n, 1 if friction is None else 3, x, 0.0, t, work, log, counts)
+    if records.log.shape[1] > 0 and found == TRUE_IMPACT:
+        log_wall_impacts(n, 1 if contact.friction is None else 3, x, 0.0, t, work, records.log, records.counts)
     return x, q, v_new, L_new
 
 
 @inlined
-def midpoint_step(n, y, h, friction, smooth, gyroscopic, tilted, pivots, memory, report, work):
+def midpoint_step(n, y, h, contact, flight, records, work):
     """State after Moreau's midpoint step over h with the n contacts of the set."""
     x, q, v, L = y
     a, torque = work.free_acceleration, work.torque
-    before, after = split_stage_by_theta(n, y, h, tilted, work)
+    before, after = split_stage_by_theta(n, y, h, flight.tilted, work)
     x = (x[0] + before * v[0], x[1] + before * v[1], x[2] + before * v[2])
-    q = drift_attitude(q, L, work, before, gyroscopic, tilted)
+    q = drift_attitude(q, L, work, before, flight.gyroscopic, flight.tilted)
     middle = qt.to_matrix(q)
-    place_arms(n, middle, tilted, work)
+    place_arms(n, middle, flight.tilted, work)
     R = middle
-    if tilted is not None:
-        R = qt.to_matrix(principal_attitude(q, work, tilted))
+    if flight.tilted is not None:
+        R = qt.to_matrix(principal_attitude(q, work, flight.tilted))
     w, alpha = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
     if L[0] != 0.0 or L[1] != 0.0 or L[2] != 0.0:
         m, J = qt.transposed_matvec(R, L), work.J
         wb = (J[0] * m[0], J[1] * m[1], J[2] * m[2])
         w = qt.matvec(R, wb)
-        if gyroscopic is not None:
+        if flight.gyroscopic is not None:
             g = qt.cross(m, wb)
             alpha = qt.matvec(R, (J[0] * g[0], J[1] * g[1], J[2] * g[2]))
-    set_resting_targets(n, v, w, alpha, middle, h, tilted, work)
-    set_spring_targets(n, x, middle, v, w, alpha, before, after, tilted, work)
+    set_resting_targets(n, v, w, alpha, middle, h, flight.tilted, work)
+    set_spring_targets(n, x, middle, v, w, alpha, before, after, flight.tilted, work)
     v0, opposes_mean = v, False
-    if friction is not None and n <= work.mean_slip:
-        opposes_mean = oppose_mean_slip(n, v, w, max(h, memory[work.i, WALL_MEMORY_STAGE]), work)
+    if contact.friction is not None and n <= work.mean_slip:
+        opposes_mean = oppose_mean_slip(n, v, w, max(h, records.memory[work.i, WALL_MEMORY_STAGE]), work)
     width = 3
-    if friction is None:
+    if contact.friction is None:
         width = 1
-    load_warm_start(n, width, memory, work.i, h, work)
+    load_warm_start(n, width, records.memory, work.i, h, work)
     v = (v[0] + h * a[0], v[1] + h * a[1], v[2] + h * a[2])
     L = (L[0] + h * torque[0], L[1] + h * torque[1], L[2] + h * torque[2])
-    work.mode, work.still = int(memory[work.i, WALL_MEMORY_MODE]), rest_residual(h, work)
+    work.mode, work.still = int(records.memory[work.i, WALL_MEMORY_MODE]), rest_residual(h, work)
     work.unseen = TARGET_ERROR_SLOP_SHARE * work.slop / h
-    solved = solve_contacts(n, friction, smooth, pivots, v, L, R, work)
+    solved = solve_contacts(n, contact, v, L, R, work)
     if opposes_mean and has_slip_reversed(n, solved[0], apply_inv_inertia(R, solved[1], work.J), work):
         oppose_end_slip(n, work)
-        solved = solve_contacts(n, friction, smooth, pivots, v, L, R, work)
-    solved = cap_friction_work(n, friction, smooth, pivots, v0, w, solved, (v, L), R, h, work)
-    solved = limit_stage_energy(n, friction, smooth, pivots, v0, w, solved, (v, L), R, h, work)
-    v_new, L_new, residual, sweeps, method = apply_resistance_torques(
-        n, friction, smooth, pivots, v, L, solved, R, work
-    )
-    memory[work.i, WALL_MEMORY_MODE] = work.mode
-    report_solve(report, work.world, residual, sweeps, method, work.tolerance)
-    store_warm_start(n, width, memory, work.i, h, work)
+        solved = solve_contacts(n, contact, v, L, R, work)
+    solved = cap_friction_work(n, contact, v0, w, solved, (v, L), R, h, work)
+    solved = limit_stage_energy(n, contact, v0, w, solved, (v, L), R, h, work)
+    v_new, L_new, residual, sweeps, method = apply_resistance_torques(n, contact, v, L, solved, R, work)
+    records.memory[work.i, WALL_MEMORY_MODE] = work.mode
+    report_solve(records.report, work.world, residual, sweeps, method, work.tolerance)
+    store_warm_start(n, width, records.memory, work.i, h, work)
     predict_end_gaps(n, v_new, apply_inv_inertia(R, L_new, work.J), after, work)
     x = (x[0] + after * v_new[0], x[1] + after * v_new[1], x[2] + after * v_new[2])
-    return x, drift_attitude(q, L_new, work, after, gyroscopic, tilted), v_new, L_new
+    return x, drift_attitude(q, L_new, work, after, flight.gyroscopic, flight.tilted), v_new, L_new

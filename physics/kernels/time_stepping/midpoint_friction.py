@@ -107,12 +107,12 @@ def has_slip_reversed(n, v, w, work):
     return False
 
 
-def _as_solved(n, friction, smooth, pivots, v, w, solved, free, R, h, work):
+def _as_solved(n, contact, v, w, solved, free, R, h, work):
     return solved
 
 
 @if_law((LAW_STIFFNESS,), _as_solved)
-def cap_friction_work(n, friction, smooth, pivots, v, w, solved, free, R, h, work):
+def cap_friction_work(n, contact, v, w, solved, free, R, h, work):
     """Result of `solve_contacts` for `free` (v, L); if friction gave energy, that with friction against the mean slip.
 
     An impulse p adds p·½(u⁰ + u¹). Friction that stops a contact adds ½ p_t·u⁰, which in a rigid impact the normal
@@ -123,7 +123,7 @@ def cap_friction_work(n, friction, smooth, pivots, v, w, solved, free, R, h, wor
     v, w : tuples of 3 floats
         Velocity and angular velocity before the stage, at the attitude R of its middle.
     """
-    if friction is None:
+    if contact.friction is None:
         return solved
     w_new = apply_inv_inertia(R, solved[1], work.J)
     gift = push = 0.0
@@ -137,4 +137,4 @@ def cap_friction_work(n, friction, smooth, pivots, v, w, solved, free, R, h, wor
     for i in range(n):
         a, b = _tangential(i, v, w, work)
         work.target[i, 1], work.target[i, 2] = -a, -b
-    return solve_contacts(n, friction, smooth, pivots, free[0], free[1], R, work)
+    return solve_contacts(n, contact, free[0], free[1], R, work)

@@ -66,59 +66,56 @@ def make_linked_world(
 
 
 @kernel
-def _substep(h, gyroscopic, tilted, scheme, linked):
+def _substep(h, flight, linked):
     """All bodies after h by the loads of the middle."""
-    hold_linked_loads(h, gyroscopic, tilted, linked)
-    note_stage_energy(tilted, linked, linked.bodies[0])
+    hold_linked_loads(h, flight.gyroscopic, flight.tilted, linked)
+    note_stage_energy(flight.tilted, linked, linked.bodies[0])
     for b in range(linked.now.shape[0]):
-        y = integrate_flight(read_state(linked.now, b), h, gyroscopic, tilted, scheme, linked.bodies[b])
+        y = integrate_flight(read_state(linked.now, b), h, flight, linked.bodies[b])
         write_state(linked.now, b, y)
-    limit_world_energy_gain(h, 1, tilted, linked, linked.bodies[0])
+    limit_world_energy_gain(h, 1, flight.tilted, linked, linked.bodies[0])
 
 
 @kernel
-def step_linked(
-    turns, taken, steps, substeps, h, state, params, shapes, gravity, wrench, gyroscopic, tilted, scheme, held, events,
-    report, linked,
-):  # fmt: skip
+def step_linked(queue, steps, substeps, h, bodies, flight, held, events, records, linked):
     """Advance the worlds that no other thread has taken by `steps` steps of `substeps` substeps of h seconds each.
 
     Of the switches `held` and `events` one is on: loads held over the step, or motion to the tolerance. A world in
     which a new state is not finite keeps the last good one, and its report counts the fault.
     """
-    bodies = shapes.shape[0]
-    world = begin_taking(turns, taken)
+    count = bodies.shapes.shape[0]
+    world = begin_taking(queue.turns, queue.taken)
     while True:
-        world = next_world(world, turns, taken)
+        world = next_world(world, queue.turns, queue.taken)
         if world < 0:
             break
         for c in range(at.REPORT_SIZE):
-            report[world, c] = 0.0
-        for b in range(bodies):
-            i = world * bodies + b
-            bind_body(world, i, shapes[b], params, gravity, wrench, None, None, tilted, linked.bodies[b])
-            bind_fields(params, i, scheme, linked.bodies[b])
-            write_state(linked.now, b, read_state(state, i))
+            records.report[world, c] = 0.0
+        for b in range(count):
+            i = world * count + b
+            bind_body(world, i, bodies.shapes[b], bodies, None, None, flight.tilted, linked.bodies[b])
+            bind_fields(bodies.params, i, flight.scheme, linked.bodies[b])
+            write_state(linked.now, b, read_state(bodies.state, i))
         lost = find_overloaded_body(linked.bodies)
         if lost >= 0:
-            report_fault(world, lost, report)
+            report_fault(world, lost, records.report)
             continue
         for k in range(steps * substeps):
-            for b in range(bodies):
+            for b in range(count):
                 set_clock(k * h, linked.bodies[b])
             if held is not None:
-                _substep(h, gyroscopic, tilted, scheme, linked)
+                _substep(h, flight, linked)
             if events is not None:
-                step_linked_segment(world, h, tilted, report, linked)
+                step_linked_segment(world, h, flight.tilted, records.report, linked)
             lost = find_nonfinite_body(linked.now)
             if lost >= 0:
-                report_fault(world, lost, report)
+                report_fault(world, lost, records.report)
                 break
-            for b in range(bodies):
-                write_state(state, world * bodies + b, read_state(linked.now, b))
-        report_unresolved_bodies(report, linked, linked.bodies[0])
-        for b in range(bodies):
-            i = world * bodies + b
-            _, q, _, L = read_state(state, i)
-            w = angular_velocity(q, L, linked.bodies[b], tilted)
-            state[i, at.ANGVEL], state[i, at.ANGVEL + 1], state[i, at.ANGVEL + 2] = w
+            for b in range(count):
+                write_state(bodies.state, world * count + b, read_state(linked.now, b))
+        report_unresolved_bodies(records.report, linked, linked.bodies[0])
+        for b in range(count):
+            i = world * count + b
+            _, q, _, L = read_state(bodies.state, i)
+            w = angular_velocity(q, L, linked.bodies[b], flight.tilted)
+            bodies.state[i, at.ANGVEL], bodies.state[i, at.ANGVEL + 1], bodies.state[i, at.ANGVEL + 2] = w

@@ -89,28 +89,26 @@ def forget_contacts(memory, i, work):
 
 
 @inlined
-def fly_stage(y, h, gyroscopic, tilted, scheme, work):
+def fly_stage(y, h, flight, work):
     """Free motion over h under the loads that are held; where these are stiff, cut into parts."""
-    return subdivide_stiff_flight(
-        integrate_flight(y, h, gyroscopic, tilted, scheme, work), y, h, gyroscopic, tilted, scheme, work
-    )
+    return subdivide_stiff_flight(integrate_flight(y, h, flight, work), y, h, flight, work)
 
 
 @inlined
-def advance_stage(n, y, h, friction, smooth, gyroscopic, tilted, pivots, scheme, memory, report, work):
+def advance_stage(n, y, h, contact, flight, records, work):
     """One stage of length h: flight when nothing touches, else Moreau's step."""
     if n > 0:
-        hold_contact_loads(y, h, gyroscopic, tilted, work)
-        end = midpoint_step(n, y, h, friction, smooth, gyroscopic, tilted, pivots, memory, report, work)
-        if hold_mean_loads(y, end, h, gyroscopic, tilted, work):
-            end = midpoint_step(n, y, h, friction, smooth, gyroscopic, tilted, pivots, memory, report, work)
-        if is_stiff(work) and has_work_error(y, end, h, tilted, work):
-            hold_softened_loads(y, h, gyroscopic, tilted, work)
-            end = midpoint_step(n, y, h, friction, smooth, gyroscopic, tilted, pivots, memory, report, work)
-        return limit_energy_gain(y, end, h, False, tilted, work)
-    hold_loads(y, h, gyroscopic, tilted, work)
-    forget_contacts(memory, work.i, work)
-    return fly_stage(y, h, gyroscopic, tilted, scheme, work)
+        hold_contact_loads(y, h, flight.gyroscopic, flight.tilted, work)
+        end = midpoint_step(n, y, h, contact, flight, records, work)
+        if hold_mean_loads(y, end, h, flight.gyroscopic, flight.tilted, work):
+            end = midpoint_step(n, y, h, contact, flight, records, work)
+        if is_stiff(work) and has_work_error(y, end, h, flight.tilted, work):
+            hold_softened_loads(y, h, flight.gyroscopic, flight.tilted, work)
+            end = midpoint_step(n, y, h, contact, flight, records, work)
+        return limit_energy_gain(y, end, h, False, flight.tilted, work)
+    hold_loads(y, h, flight.gyroscopic, flight.tilted, work)
+    forget_contacts(records.memory, work.i, work)
+    return fly_stage(y, h, flight, work)
 
 
 @inlined
@@ -138,7 +136,7 @@ def keep_out_of_walls(y, tilted, work):
 
 
 @kernel
-def shorten_to_impact(n, y, end, h, friction, smooth, gyroscopic, tilted, pivots, scheme, memory, report, work):
+def shorten_to_impact(n, y, end, h, contact, flight, records, work):
     """A stage over h that ends at `end`, where a feature has passed through a wall, up to that: (state, time advanced).
 
     It is shortened until that feature is within half a slop of the wall: `parabolic_root` of its gap. Another one that
@@ -149,15 +147,15 @@ def shorten_to_impact(n, y, end, h, friction, smooth, gyroscopic, tilted, pivots
     t, low, low_gap, high, high_gap, bend, slot = h, 0.0, 0.0, h, 0.0, 0.0, -1
     low_end = y
     for _ in range(IMPACT_TRIALS):
-        gap, nearest = outside_gap(end, tilted, work)
+        gap, nearest = outside_gap(end, flight.tilted, work)
         if nearest != slot and gap < -0.5 * work.slop:
             slot, high, high_gap = nearest, t, gap
-            low_gap = max(feature_gap(slot, low_end[0], to_matrix(low_end[1]), tilted, work), 0.0)
-            rate = feature_gap_rate(slot, low_end, tilted, work)
+            low_gap = max(feature_gap(slot, low_end[0], to_matrix(low_end[1]), flight.tilted, work), 0.0)
+            rate = feature_gap_rate(slot, low_end, flight.tilted, work)
             bend = ((high_gap - low_gap) / (high - low) - rate) / (high - low)
         else:
             if nearest != slot:
-                gap = feature_gap(slot, end[0], to_matrix(end[1]), tilted, work)
+                gap = feature_gap(slot, end[0], to_matrix(end[1]), flight.tilted, work)
             if abs(gap) <= 0.5 * work.slop:
                 break
             bend = second_difference(low, low_gap, t, gap, high, high_gap)
@@ -169,31 +167,31 @@ def shorten_to_impact(n, y, end, h, friction, smooth, gyroscopic, tilted, pivots
         if not t < high:  # nor where low and high are one, and t is not a number
             end, t = low_end, low
             break
-        end = advance_stage(n, y, t, friction, smooth, gyroscopic, tilted, pivots, scheme, memory, report, work)
+        end = advance_stage(n, y, t, contact, flight, records, work)
         if has_same_pose(end, y):
             break
     return end, t
 
 
 @inlined
-def advance_to_impact(n, y, h, friction, smooth, gyroscopic, tilted, pivots, scheme, memory, report, work):
+def advance_to_impact(n, y, h, contact, flight, records, work):
     """Advance by h, or to the first impact within h: (state, time advanced, whether it may be deep in a wall).
 
     An end state in which a feature outside the contact set has passed through a wall is taken back, and the stage
     shortened (`shorten_to_impact`: apart, so that what is hardly ever needed takes no part in what always is).
     """
-    end = advance_stage(n, y, h, friction, smooth, gyroscopic, tilted, pivots, scheme, memory, report, work)
+    end = advance_stage(n, y, h, contact, flight, records, work)
     if has_same_pose(end, y):
         return end, h, False
-    has_passed, is_deep = check_penetration(end[0], to_matrix(end[1]), tilted, work)
+    has_passed, is_deep = check_penetration(end[0], to_matrix(end[1]), flight.tilted, work)
     if work.is_last or not has_passed:
         return end, h, is_deep
-    end, t = shorten_to_impact(n, y, end, h, friction, smooth, gyroscopic, tilted, pivots, scheme, memory, report, work)
+    end, t = shorten_to_impact(n, y, end, h, contact, flight, records, work)
     return end, t, True
 
 
 @inlined
-def substep(y, start, h, friction, smooth, gyroscopic, tilted, pivots, scheme, memory, report, work, log, counts):
+def substep(y, start, h, contact, flight, records, work):
     """State after h, `start` after the call [s]: impacts where they happen, flight or contact between them.
 
     When a substep has used up its cuts its rest is one plastic stage that takes in all it would pass through. Cuts for
@@ -205,45 +203,38 @@ def substep(y, start, h, friction, smooth, gyroscopic, tilted, pivots, scheme, m
     work.is_last = 0
     while True:
         if splits == work.splits:
-            report[world, at.UNRESOLVED] += 1.0
+            records.report[world, at.UNRESOLVED] += 1.0
             work.is_last = 1
-        hold_loads(y, left, gyroscopic, tilted, work)
-        n, depth = find_contact_set(y, left, tilted, memory, work)
+        hold_loads(y, left, flight.gyroscopic, flight.tilted, work)
+        n, depth = find_contact_set(y, left, flight.tilted, records.memory, work)
         if n > 0:
-            report[world, at.PENETRATION] = max(report[world, at.PENETRATION], depth)
+            records.report[world, at.PENETRATION] = max(records.report[world, at.PENETRATION], depth)
             if not work.is_last and not contact_stiffness(work) > 0.0:
-                y = resolve_impacts(
-                    n, y, start + (h - left), left, friction, smooth, tilted, pivots, memory, report, work, log, counts
-                )  # fmt: skip
+                y = resolve_impacts(n, y, start + (h - left), left, contact, flight.tilted, records, work)
         span = left
-        if scheme is None:  # noqa: SIM102 (a branch of its own is what the compiler prunes)
-            if cuts < MAX_TURNING_CUTS and may_turn(y[3], h, FAR_TURN, tilted, work) and not work.is_last:
-                span = limit_turning_stage(n, y, h, left, gyroscopic, tilted, work)
-        end, t, is_deep = advance_to_impact(
-            n, y, span, friction, smooth, gyroscopic, tilted, pivots, scheme, memory, report, work
-        )
+        if flight.scheme is None:  # noqa: SIM102 (a branch of its own is what the compiler prunes)
+            if cuts < MAX_TURNING_CUTS and may_turn(y[3], h, FAR_TURN, flight.tilted, work) and not work.is_last:
+                span = limit_turning_stage(n, y, h, left, flight.gyroscopic, flight.tilted, work)
+        end, t, is_deep = advance_to_impact(n, y, span, contact, flight, records, work)
         if t == span and span < left:
             cuts += 1
             if cuts == MAX_TURNING_CUTS:
-                report[world, at.UNRESOLVED] += 1.0
+                records.report[world, at.UNRESOLVED] += 1.0
         else:
             splits += 1
         left -= t
         advance_clock(t, work)
         if is_deep and n > 0 and not contact_stiffness(work) > 0.0:
-            end = keep_out_of_walls(end, tilted, work)
-        y = correct_spring_depth(n, y, end, t, tilted, report, work)
+            end = keep_out_of_walls(end, flight.tilted, work)
+        y = correct_spring_depth(n, y, end, t, flight.tilted, records.report, work)
         if work.is_last or not left > 0.0:
             break
-        report[world, at.SPLITS] += 1.0
+        records.report[world, at.SPLITS] += 1.0
     return y
 
 
 @kernel
-def step_worlds(
-    turns, taken, steps, substeps, h, state, params, shapes, gravity, wrench, contact, friction, smooth, restitution,
-    gyroscopic, tilted, pivots, scheme, sleep, memory, report, scratch, log, counts,
-):  # fmt: skip
+def step_worlds(queue, steps, substeps, h, bodies, contact, restitution, flight, sleep, records, scratch):
     """Advance the worlds that no other thread has taken by `steps` steps of `substeps` substeps of h seconds each.
 
     A body in flight looks for walls only when it could be near one (`safe_substeps`; what touched is), one that sleeps
@@ -252,50 +243,47 @@ def step_worlds(
     their number to `counts` (rows,).
     """
     work = scratch[0]
-    bodies = shapes.shape[0]
-    world = begin_taking(turns, taken)
+    count = bodies.shapes.shape[0]
+    world = begin_taking(queue.turns, queue.taken)
     while True:
-        world = next_world(world, turns, taken)
+        world = next_world(world, queue.turns, queue.taken)
         if world < 0:
             break
         for c in range(at.REPORT_SIZE):
-            report[world, c] = 0.0
-        clear_events(world, bodies, log, counts)
-        for b in range(bodies):
-            i = world * bodies + b
-            if sleep is not None and remains_asleep(i, wrench, sleep):
+            records.report[world, c] = 0.0
+        clear_events(world, count, records.log, records.counts)
+        for b in range(count):
+            i = world * count + b
+            if sleep is not None and remains_asleep(i, bodies.wrench, sleep):
                 continue
-            bind_body(world, i, shapes[b], params, gravity, wrench, friction, restitution, tilted, work)
+            bind_body(world, i, bodies.shapes[b], bodies, contact.friction, restitution, flight.tilted, work)
             if not has_finite_loads(work):
-                report_fault(world, b, report)
+                report_fault(world, b, records.report)
                 continue
-            bind_fields(params, i, scheme, work)
-            bind_laws(params, i, work)
-            y, clear = read_state(state, i), 0
+            bind_fields(bodies.params, i, flight.scheme, work)
+            bind_laws(bodies.params, i, work)
+            y, clear = read_state(bodies.state, i), 0
             for k in range(steps * substeps):
                 set_clock(k * h, work)
-                hold_loads(y, h, gyroscopic, tilted, work)
-                if contact is not None and clear == 0 and not has_touched(memory, i):
+                hold_loads(y, h, flight.gyroscopic, flight.tilted, work)
+                if contact.acts is not None and clear == 0 and not has_touched(records.memory, i):
                     clear = count_clear_substeps(y[0], y[2], h, steps * substeps - k, work)
                     if clear > 0:
-                        forget_contacts(memory, i, work)
-                if contact is not None and clear == 0:
-                    new = substep(
-                        y, k * h, h, friction, smooth, gyroscopic, tilted, pivots, scheme, memory, report, work, log,
-                        counts,
-                    )  # fmt: skip
+                        forget_contacts(records.memory, i, work)
+                if contact.acts is not None and clear == 0:
+                    new = substep(y, k * h, h, contact, flight, records, work)
                 else:
                     clear -= 1
-                    new = fly_stage(y, h, gyroscopic, tilted, scheme, work)
+                    new = fly_stage(y, h, flight, work)
                 if not is_finite(new):
-                    report_fault(world, b, report)
-                    drop_events(i, 1, k * h, log, counts)
+                    report_fault(world, b, records.report)
+                    drop_events(i, 1, k * h, records.log, records.counts)
                     break
                 y = new
                 if sleep is not None and falls_asleep(i, y, h, work, sleep):
                     y = without_velocities(y)
                     break
-            report_unresolved_body(not has_same_pose(y, read_state(state, i)), report, work)
-            write_state(state, i, y)
-            w = angular_velocity(y[1], y[3], work, tilted)
-            state[i, at.ANGVEL], state[i, at.ANGVEL + 1], state[i, at.ANGVEL + 2] = w
+            report_unresolved_body(not has_same_pose(y, read_state(bodies.state, i)), records.report, work)
+            write_state(bodies.state, i, y)
+            w = angular_velocity(y[1], y[3], work, flight.tilted)
+            bodies.state[i, at.ANGVEL], bodies.state[i, at.ANGVEL + 1], bodies.state[i, at.ANGVEL + 2] = w

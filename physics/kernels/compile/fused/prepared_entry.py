@@ -13,11 +13,31 @@ from llvmlite import ir
 from numba.core import types
 from numba.core.callconv import excinfo_ptr_t
 
-from physics.kernels.compile.fused.folding_builder import WORD, FoldingBuilder, StructInMemory, word_constant
+from physics.kernels.compile.fused.folding_builder import (
+    WORD,
+    FoldingBuilder,
+    StructInMemory,
+    make_struct,
+    word_constant,
+)
 
 WORD_SIZE = 8  # [bytes]
 STATUS_TYPE = ir.IntType(32)
 ENTRY_TYPE = ir.FunctionType(STATUS_TYPE, [WORD.as_pointer(), excinfo_ptr_t.as_pointer()])
+
+
+def _read(context, builder, words: ir.Value, type_: types.Type, place: int) -> tuple:
+    """Value of an argument whose words begin at `place`, and the place behind it. Each number has a word of its own."""
+    form = context.get_value_type(type_)
+    if isinstance(type_, types.BaseTuple):
+        members = []
+        for member in type_.types:
+            value, place = _read(context, builder, words, member, place)
+            members.append(value)
+        return make_struct(builder, form, members), place
+    address = builder.bitcast(builder.gep(words, [word_constant(place)]), form.as_pointer())
+    value = StructInMemory(address) if isinstance(form, ir.Aggregate) else builder.load(address)
+    return value, place - (-context.get_abi_sizeof(form) // WORD_SIZE)
 
 
 def write_prepared_entry(context, library, about) -> None:
@@ -30,10 +50,8 @@ def write_prepared_entry(context, library, about) -> None:
     builder = FoldingBuilder(entry.append_basic_block())
     values, place = [], 0
     for type_ in about.argtypes:
-        form = context.get_value_type(type_)
-        address = builder.bitcast(builder.gep(entry.args[0], [word_constant(place)]), form.as_pointer())
-        values.append(StructInMemory(address) if isinstance(form, ir.Aggregate) else builder.load(address))
-        place += -(-context.get_abi_sizeof(form) // WORD_SIZE)
+        value, place = _read(context, builder, entry.args[0], type_, place)
+        values.append(value)
     status, _ = context.call_conv.call_function(builder, kernel, about.restype, about.argtypes, values)
     with builder.if_then(status.is_error):
         builder.store(status.excinfoptr, entry.args[1])

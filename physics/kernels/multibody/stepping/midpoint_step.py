@@ -41,6 +41,7 @@ from physics.kernels.multibody.stepping.energy_budget import (
 from physics.kernels.multibody.stepping.solve_and_apply import solve_and_apply, solve_frictionless_and_apply
 from physics.kernels.state import layout as at
 from physics.kernels.state.body import angular_velocity, read_state, write_state
+from physics.kernels.state.groups import FlightSwitches
 from physics.kernels.state.layout import ELLIPSOID, SPHERE
 from physics.kernels.state.sleeping import is_asleep
 from physics.kernels.time_stepping.contact_stages import CREEP_SLOP_SHARE
@@ -157,9 +158,8 @@ def step_under_held_loads(n, world, h, friction, gyroscopic, tilted, scheme, sle
         if is_asleep(first + b, sleep):
             continue
         if many.touched[b] == 0:
-            write_state(
-                many.now, b, integrate_flight(read_state(many.now, b), h, gyroscopic, tilted, scheme, many.bodies[b])
-            )
+            flight = FlightSwitches(gyroscopic, tilted, scheme)
+            write_state(many.now, b, integrate_flight(read_state(many.now, b), h, flight, many.bodies[b]))
             continue
         drift_body(b, half, gyroscopic, tilted, many)
         update_body_pose(b, tilted, many)

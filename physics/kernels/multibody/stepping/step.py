@@ -33,18 +33,20 @@ from physics.kernels.time_stepping.event_log import clear_events, drop_events
 
 @kernel
 def step_many(
-    turns, taken, steps, substeps, h, state, params, shapes, gravity, wrench, friction, restitution, gyroscopic,
-    tilted, ellipsoids, hulls, scheme, kept, sleep, memory, report, many, log, counts,
-):  # fmt: skip
+    queue, steps, substeps, h, arrays, contact, restitution, flight, ellipsoids, hulls, kept, sleep, records, many
+):
     """Advance the worlds that no other thread has taken by `steps` steps of `substeps` substeps of h seconds each.
 
     A world in which a new state is not finite keeps the last good one, and its report counts the fault.
     Impacts go to `log` (rows, room, EVENT_SIZE), if that has any room, their number to `counts` (rows,).
     """
+    state, params, shapes, _, wrench = arrays
+    memory, report, log, counts = records
+    friction, (gyroscopic, tilted, scheme) = contact.friction, flight
     bodies = shapes.shape[0]
-    world = begin_taking(turns, taken)
+    world = begin_taking(queue.turns, queue.taken)
     while True:
-        world = next_world(world, turns, taken)
+        world = next_world(world, queue.turns, queue.taken)
         if world < 0:
             break
         for c in range(at.REPORT_SIZE):
@@ -54,7 +56,7 @@ def step_many(
             continue
         for b in range(bodies):
             i = world * bodies + b
-            bind_body(world, i, shapes[b], params, gravity, wrench, friction, restitution, tilted, many.bodies[b])
+            bind_body(world, i, shapes[b], arrays, friction, restitution, tilted, many.bodies[b])
             many.lightness[b] = params[i, at.INV_MASS]
             bind_fields(params, i, scheme, many.bodies[b])
             write_state(many.now, b, read_state(state, i))

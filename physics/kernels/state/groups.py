@@ -1,0 +1,52 @@
+"""Arguments of a step that travel together, as named tuples: switches, arrays of bodies, the books of a step.
+
+A switch is None (off) or not (on). What is off is not compiled (`physics.kernels.compile.decorators.kernel`).
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+
+class WorkQueue(NamedTuple):
+    """Worlds that a thread may take, of `physics.kernels.parallel.work_stealing`."""
+
+    turns: np.ndarray  # ranges of worlds of all threads
+    taken: np.ndarray  # worlds that this thread has taken
+
+
+class BodyArrays(NamedTuple):
+    """Bodies of all worlds; rows are those of world 0, then of world 1, and so on."""
+
+    state: np.ndarray  # (rows, STATE_SIZE) columns of `physics.kernels.state.layout`
+    params: np.ndarray  # (rows, ...) mass properties, coefficients, columns of fields and laws
+    shapes: np.ndarray  # (bodies,) codes of shapes
+    gravity: np.ndarray | None  # (worlds, 3) [m/s²]
+    wrench: np.ndarray  # (rows, 6) force [N] and torque about the centre of mass [N m], in the world frame
+
+
+class ContactSwitches(NamedTuple):
+    """Contact of a scene."""
+
+    acts: bool | None  # bodies touch walls
+    friction: bool | None  # with friction: three unknowns a contact instead of one
+    pivots: bool | None  # pivoting is the last resort of the contact solver
+
+
+class FlightSwitches(NamedTuple):
+    """Free motion of a scene's bodies."""
+
+    gyroscopic: bool | None  # moments of inertia differ
+    tilted: bool | None  # principal axes are not the body's axes, or its centre is not its centre of mass
+    scheme: int | None  # code of a textbook scheme (`physics.kernels.flight.integrators`) instead of the exact flow
+
+
+class Records(NamedTuple):
+    """Arrays that a step keeps and writes besides the state."""
+
+    memory: np.ndarray  # (rows, ...) contacts of the last stage, for warm starts
+    report: np.ndarray  # (worlds, REPORT_SIZE) columns of `physics.kernels.state.layout`
+    log: np.ndarray  # (rows, room, EVENT_SIZE) events
+    counts: np.ndarray  # (rows,) events of each body
