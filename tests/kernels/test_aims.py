@@ -14,6 +14,7 @@ from physics.kernels.contact_law.target_velocity import (
     NO_IMPACT,
     RESIDUAL_APPROACH,
     TRUE_IMPACT,
+    StageMotion,
     may_have_impact,
     set_impact_targets,
     set_resting_targets,
@@ -31,7 +32,7 @@ EVEN = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
 
 @kernel
 def _aim(n, v, w, alpha, R, h, tilted, scratch):
-    set_resting_targets(n, v, w, alpha, R, h, tilted, scratch[0])
+    set_resting_targets(n, StageMotion(R, v, w, alpha), h, tilted, scratch[0])
 
 
 def posed(slots, gaps, seed, tolerance=1e-9):

@@ -91,12 +91,13 @@ def _no_aim(*arguments):
 
 
 @if_law((LAW_STIFFNESS,), _no_aim)
-def set_spring_targets(n, x, R, v, w, alpha, before, after, tilted, work):
+def set_spring_targets(n, x, motion, before, after, tilted, work):
     """Targets along the normals, and the γ of the stage, instead of `target_velocity.set_resting_targets`.
 
-    x, R, v, w, alpha are those of the body between the drifts of `before` and `after`, before the impulses;
-    `work.gap` is that at the start.
+    x and `motion` (`StageMotion`) are those of the body between the drifts of `before` and `after`, before the
+    impulses; `work.gap` is that at the start.
     """
+    R, v, w, alpha = motion
     h = before + after
     k, c = contact_stiffness(work), contact_damping(work)
     theta = after / h

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 from physics.kernels.compile.decorators import inlined, kernel
 from physics.kernels.compile.simd import LANE_COUNT, larger, select_lanes, smaller
 from physics.kernels.half_space.contact_point import contact_arm_and_rate, wall_normal, wall_of
@@ -22,6 +24,24 @@ NEGLIGIBLE_SLOP_SHARE = 1.0e-3
 
 # Of the contacts of a set: none is fast enough for an impact, some are left so by the last stage, some hit their wall.
 NO_IMPACT, RESIDUAL_APPROACH, TRUE_IMPACT = range(3)
+
+
+class StageMotion(NamedTuple):
+    """Motion of a body at the middle of a stage, before the impulses; world frame."""
+
+    R: tuple  # 9 scalars, body to world
+    v: tuple  # 3 scalars [m/s]
+    w: tuple  # 3 scalars, angular velocity [rad/s]
+    alpha: tuple  # 3 scalars, angular acceleration of free turning [rad/s²]
+
+
+class TargetLimits(NamedTuple):
+    """Terms of the targets of a resting stage that all contacts share."""
+
+    half: float  # half the length of the stage [s]
+    is_turning: bool  # whether what turning adds counts
+    negligible: float  # smaller targets are 0 [m/s]
+    rate: float  # share of a gap that may be closed, per time [1/s]
 
 
 @inlined
@@ -119,9 +139,11 @@ def _wandering_point(k, R, w, alpha, tilted, work):
 
 
 @inlined
-def _aim_at_wall(first, n, v, w, alpha, half, is_turning, negligible, rate, R, tilted, work):
+def _aim_at_wall(first, n, motion, limits, tilted, work):
     """`set_resting_targets` for contacts from `first` on, up to four of one wall: the next one after them."""
     walls, arm = work.walls, work.arm
+    R, v, w, alpha = motion
+    half, is_turning, negligible, rate = limits
     k, last = wall_of(work.slot[first], work), first
     while last + 1 < min(n, first + LANE_COUNT) and wall_of(work.slot[last + 1], work) == k:
         last += 1
@@ -148,15 +170,15 @@ def _aim_at_wall(first, n, v, w, alpha, half, is_turning, negligible, rate, R, t
 
 
 @kernel
-def _aim_at_others(first, n, v, w, alpha, half, is_turning, negligible, rate, R, tilted, work):
+def _aim_at_others(first, n, motion, limits, tilted, work):
     """`set_resting_targets` for contacts from `first` on: apart, since most bodies touch one wall."""
     while first < n:
-        first = _aim_at_wall(first, n, v, w, alpha, half, is_turning, negligible, rate, R, tilted, work)
+        first = _aim_at_wall(first, n, motion, limits, tilted, work)
 
 
 @inlined
-def set_resting_targets(n, v, w, alpha, R, h, tilted, work):
-    """Targets of the resting stage over h; R is the attitude at its middle, v and w are the velocities there before it.
+def set_resting_targets(n, motion, h, tilted, work):
+    """Targets of the resting stage over h, from the motion at its middle before the impulses (`StageMotion`).
 
     The impulses act at the middle of the step, the target is the velocity at its end, half a step later: by then a
     point has gained h/2 (ω x ṙ + α x r), α the angular acceleration of free turning, and that is taken off. Of a vertex
@@ -165,10 +187,11 @@ def set_resting_targets(n, v, w, alpha, R, h, tilted, work):
     of the solve, or would move a contact by less than `NEGLIGIBLE_SLOP_SHARE` slops in the step, is 0: a body comes to
     rest to the last bit, and contacts that hold are not asked to move apart by next to nothing.
     """
-    half = 0.5 * h
+    w = motion.w
     is_turning = 0.0 < qt.dot(w, w) * h * h <= MAX_TARGET_TURN * MAX_TARGET_TURN and work.shape != SPHERE
     negligible = max(work.tolerance * work.acceleration * h, NEGLIGIBLE_SLOP_SHARE * work.slop / h)
     rate = (1.0 if work.is_last else GAP_CLOSING_SHARE) / h
-    first = _aim_at_wall(0, n, v, w, alpha, half, is_turning, negligible, rate, R, tilted, work)
+    limits = TargetLimits(0.5 * h, is_turning, negligible, rate)
+    first = _aim_at_wall(0, n, motion, limits, tilted, work)
     if first < n:
-        _aim_at_others(first, n, v, w, alpha, half, is_turning, negligible, rate, R, tilted, work)
+        _aim_at_others(first, n, motion, limits, tilted, work)

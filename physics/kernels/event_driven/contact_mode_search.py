@@ -39,8 +39,12 @@ _SAME_DIRECTION = 1.0e-9
 
 
 @kernel
-def _worst_violation(count, y, R, w, a, alpha, scale, tilted, work, motion):
-    """The change that a trial asks for most: (candidate, its new kind), -1 when all conditions hold."""
+def _worst_violation(count, y, rates, scale, tilted, work, motion):
+    """The change that a trial needs most: (candidate, its new kind), -1 when all conditions hold.
+
+    `rates` are the attitude, the angular velocity, and both accelerations of the trial.
+    """
+    R, w, a, alpha = rates
     weight = _EXACT_ZERO_SHARE * work.mass * scale
     k = worst = 0
     which, kind = -1, CANDIDATE_OPEN
@@ -119,7 +123,7 @@ def search_modes_once(count, y, R, P, w, alpha_free, tilted, work, motion):
         s = 1.0 / work.mass
         a = (f[0] + s * F[0], f[1] + s * F[1], f[2] + s * F[2])
         alpha = plus(alpha_free, turn)
-        which, kind = _worst_violation(count, y, R, w, a, alpha, scale, tilted, work, motion)
+        which, kind = _worst_violation(count, y, (R, w, a, alpha), scale, tilted, work, motion)
         if which < 0:
             return True
         if kind != motion.kind[which]:

@@ -167,6 +167,17 @@ def body_speed_bound(y, tilted, work):
     return math.sqrt(qt.dot(v, v)) + work.radius * math.sqrt(qt.dot(w, w))
 
 
+@inlined
+def _begin_next_step(left, tilted, work, motion):
+    """Length of the next step, which starts where the last one has ended."""
+    for s in range(motion.is_active.shape[0]):
+        gap, rate = motion.gap[ROW_END, s], motion.gap_rate[ROW_END, s]
+        motion.gap[ROW_START, s], motion.gap_rate[ROW_START, s] = gap, rate
+    h = prepare_extrapolated_step(left, tilted, work, motion)
+    store_force_margins(ROW_START, work, motion)
+    return h
+
+
 @kernel
 def integrate_segment(y, left, tilted, work, motion):
     """Smooth motion of the regime for `left`, or until a guard ends it: (state, time, guard).
@@ -203,11 +214,9 @@ def integrate_segment(y, left, tilted, work, motion):
             if not h > SEGMENT_SHORTEST_STEP * left:
                 return get_state_row(motion, ROW_START), t, GUARD_STEP_FAILED
             # Not `prepare_extrapolated_step` again: it would go by the directions of sliding (`way`) that the trial
-            # ended with.
+            # ended with. The scale of the errors is that of the start.
             h *= SEGMENT_STEP_CUT
-            refresh_loads(
-                get_state_row(motion, ROW_START), 0.0, tilted, work
-            )  # the scale of the errors is that of the start
+            refresh_loads(get_state_row(motion, ROW_START), 0.0, tilted, work)
             continue
         t += h
         advance_clock(h, work)
@@ -225,13 +234,7 @@ def integrate_segment(y, left, tilted, work, motion):
         put_state_row(motion, ROW_START, y)
         if not t < left:
             break
-        for s in range(motion.is_active.shape[0]):
-            motion.gap[ROW_START, s], motion.gap_rate[ROW_START, s] = (
-                motion.gap[ROW_END, s],
-                motion.gap_rate[ROW_END, s],
-            )
-        h = prepare_extrapolated_step(left - t, tilted, work, motion)
-        store_force_margins(ROW_START, work, motion)
+        h = _begin_next_step(left - t, tilted, work, motion)
     if t < left:
         return get_state_row(motion, ROW_START), t, GUARD_STEP_FAILED
     return y, left, GUARD_NONE

@@ -1,23 +1,26 @@
-"""The event-driven step of every world: smooth motion between events, each located to rounding.
+"""Event-driven scheme, one body at walls: smooth motion between events, each located to rounding.
 
-A body flies, collides, moves in contact or rests:
+Each part of a step goes through these stages until its time is used up. y = (x, q, v, L) is the state, M its mass and
+inertia, f the load, J the Jacobian of the contacts, u their velocities, p their impulses, λ their forces.
 
-- *flies*: exact flight to the next wall (`time_of_impact`);
-- *collides*: impulses at all touching contacts at once, or at one after the other, by the solver of the time-stepping
-  scheme. A rebound that
-  would be over within a threshold of time is not made: the rest of such a sequence of bounces, t/(1 - e) long for a
-  first bounce of length t, is left out and stated with the event that ends it;
-- *moves*: extrapolated smooth motion with the forces of the regime (`extrapolated_midpoint`, `contact_forces`) until a
-guard (`guards`) ends
-  it; then the next regime is looked for a moment ahead (`contact_mode`), where what the guard has foretold has
-  happened;
-- *rests*: nothing changes until the load does.
+1. Hold loads         f = f(y, t), anew at every stage of the integration                  `held_loads.refresh_loads`
+2. Find contacts      the contact mode: which touch, and of these which stick and slide    `classify_mode`
+3. Resolve impacts    M Δ(v, ω) = Jᵀ p, u_n⁺ >= -e u_n⁻ ⟂ p_n >= 0, |p_t| <= μ p_n         `resolve_impacts`
+4. Limit the stage    the first t at which a guard (gap, push, cone, speed) is zero        `guards`, `time_of_impact`
+5. Integrate          in the air the exact flow to the next wall                           `fly_to_wall`
+                      in contact M v̇ = f + Jᵀ λ with ü_n = 0, ü_t = 0 or λ_t = -μ λ_n d,   `integrate_segment`
+                      extrapolated to the tolerance
+6. Correct positions  y is projected onto g_n = 0, u_n = 0 of the contacts                 `project_state`
+7. Rest               nothing changes until the load does                                  `come_to_rest`
 
-Where no regime is consistent (Painlevé) the velocities jump: the impulse of an inelastic collision, looked for a
-moment ahead.
+A rebound that would be over within a threshold of time is not made. The rest of such a sequence of bounces, t/(1 - e)
+long for a first bounce of length t, is left out, and stated with the event that ends it. Where no mode is consistent
+(Painlevé) the velocities jump: the impulse of an inelastic collision, looked for a moment ahead.
 
-Baraff, *Coping with friction for non-penetrating rigid body simulation*, SIGGRAPH 1991, for impulses where forces
-have no solution.
+References
+----------
+.. [1] D. Baraff, *Coping with friction for non-penetrating rigid body simulation*, SIGGRAPH 1991, for impulses where
+   forces have no solution.
 """
 
 from __future__ import annotations
@@ -172,51 +175,51 @@ def integrate_mode(what, y, t, h, flight, work, motion, report):
 def advance(y, h, contact, flight, work, motion, records, start):
     """State after h: events where they happen, smooth motion between them.
 
-    Each turn asks what the body does (`impact_events` says so beforehand where it is known) and does that. A step whose
-    end has to be looked at (`mode_acceptance`) has begun at `kept` and has the length `watched`.
+    Each turn finds the mode of the body (`forced_mode` where it is known) and follows it. A step whose end has to be
+    accepted (`mode_acceptance`) has begun at `rollback_state` and has the length `watched`.
     """
     begin_event_substep(y, start, h, flight.tilted, records.memory, work, motion)
-    t, told, is_foretold, kept, watched = 0.0, _NO_FORCED_MODE, False, y, 0.0
+    t, forced_mode, is_foretold, rollback_state, watched = 0.0, _NO_FORCED_MODE, False, y, 0.0
     for k in range(work.splits + 1):
         if k == work.splits:
             records.report[work.world, at.UNRESOLVED] += 1.0
             break
         if is_chattering(t, motion):
-            told = MODE_INCONSISTENT
-        what, is_answer = told, False
-        if told == _NO_FORCED_MODE:
-            what, is_answer = classify_mode(
+            forced_mode = MODE_INCONSISTENT
+        mode, is_answer = forced_mode, False
+        if forced_mode == _NO_FORCED_MODE:
+            mode, is_answer = classify_mode(
                 y, is_foretold, watched, contact, flight.tilted, work, motion, records.report
             )
-        told = _NO_FORCED_MODE
-        if is_answer and what in (MODE_IMPACT, MODE_INCONSISTENT):
-            told, is_foretold = what, False
+        forced_mode = _NO_FORCED_MODE
+        if is_answer and mode in (MODE_IMPACT, MODE_INCONSISTENT):
+            forced_mode, is_foretold = mode, False
             continue
-        if what == MODE_IMPACT:
+        if mode == MODE_IMPACT:
             y = resolve_impacts(y, start + t, contact, flight.tilted, work, motion, records)
-        elif what == MODE_INCONSISTENT:
+        elif mode == MODE_INCONSISTENT:
             leap = min(motion.leap, h - t)
             y = resolve_inconsistency(y, leap, start + t, contact, flight.tilted, work, motion, records)
-        elif what == MODE_ROLLBACK:
+        elif mode == MODE_ROLLBACK:
             motion.trust = TRUST_SHRINK * watched
-            y, t, watched, is_foretold = kept, t - watched, 0.0, False
+            y, t, watched, is_foretold = rollback_state, t - watched, 0.0, False
             set_clock(start + t, work)
             continue
         if watched > 0.0:
             motion.trust, watched = TRUST_GROWTH * watched, 0.0
             if not t < h:
                 break
-        if what == MODE_IMPACT:
+        if mode == MODE_IMPACT:
             records.report[work.world, at.SPLITS] += 1.0
             motion.crowd -= motion.is_sequential  # those in turn have a bound of their own
             is_foretold = False
             continue
         log_mode_changes(work, motion, records.log, records.counts, start + t)
-        if what == MODE_REST:
+        if mode == MODE_REST:
             y = come_to_rest(y, start + t, flight.tilted, work, motion, records.log, records.counts)
             break
-        motion.is_resting, kept = 0, y
-        y, step, guard = integrate_mode(what, y, t, h, flight, work, motion, records.report)
+        motion.is_resting, rollback_state = 0, y
+        y, step, guard = integrate_mode(mode, y, t, h, flight, work, motion, records.report)
         t += step
         set_clock(start + t, work)
         adapt_look_ahead(step, guard, motion)
@@ -226,7 +229,7 @@ def advance(y, h, contact, flight, work, motion, records, start):
         elif not t < h:
             break
         elif guard == GUARD_STEP_FAILED:
-            told = MODE_INCONSISTENT
+            forced_mode = MODE_INCONSISTENT
         is_foretold = guard in FORCE_GUARDS
     store_contact_modes(records.memory, work.i, work, motion)
     return y

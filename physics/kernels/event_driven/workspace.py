@@ -23,13 +23,10 @@ ROW_START, ROW_END, ROW_PREVIOUS, ROW_CURRENT, ROW_COUNT = 0, 1, 2, 3, 4
 MAX_MIDPOINT_RULES = 8
 
 
-def motion_dtype(wall_count: int, features: int) -> np.dtype:
-    """Record type for bodies with `features` contact features each against `wall_count` walls."""
-    n = max(wall_count, 1) * (FACE_VERTICES if features == VERTEX_COUNT else 1)
-    m = 3 * n
-    n_slots = max(wall_count, 1) * features
+def _pace_fields(n_slots: int) -> list[tuple]:
+    """Thresholds, pace and trust of the scheme."""
     f, i = np.float64, np.int64
-    return np.dtype([
+    return [
         ("touch", f),  # gap within which a feature touches [m]
         ("still", f),  # speed of a contact that counts as none [m/s]
         ("slow", f),  # speed along the wall that counts as none [m/s]
@@ -50,6 +47,13 @@ def motion_dtype(wall_count: int, features: int) -> np.dtype:
         ("end_rate", f, (Y_SIZE,)),  # rate of change at the end of such a step
         ("left_out", f),  # time that a sequence of bounces would have taken on [s]
         ("rebound", f, (3 * n_slots,)),  # impulses of a rebound that there is not enough energy for [N s]
+    ]  # fmt: skip
+
+
+def _contact_fields(n: int, n_slots: int) -> list[tuple]:
+    """Contacts that act: kinematics, forces and their margins."""
+    f, i = np.float64, np.int64
+    return [
         ("count", i),  # contacts that act
         ("slot", i, (n,)),  # wall * features + feature
         ("holds", i, (n,)),  # 1: no velocity at all; 0: slides
@@ -72,6 +76,13 @@ def motion_dtype(wall_count: int, features: int) -> np.dtype:
         ("place", f, (n, 2)),  # coordinates in the patch, in radii
         ("share", f, (n, 3)),  # part of its force that is given, along the wall's axes [N]
         ("last", f, (n_slots, 3)),  # force of every feature when it was last known, along the wall's axes [N]
+    ]  # fmt: skip
+
+
+def _unknown_fields(m: int) -> list[tuple]:
+    """Unknowns of the contact forces and their equations."""
+    f, i = np.float64, np.int64
+    return [
         ("known", f, (2, 3)),  # force and moment of the shares, which the unknowns add to
         ("push", f, (m, 3)),  # force per unknown
         ("turn", f, (m, 3)),  # moment per unknown about the centre of mass
@@ -83,14 +94,28 @@ def motion_dtype(wall_count: int, features: int) -> np.dtype:
         ("order", i, (m,)),
         ("asked", f, (m,)),  # right-hand sides
         ("unknown", f, (m,)),
+    ]  # fmt: skip
+
+
+def _candidate_fields(n: int) -> list[tuple]:
+    """Contacts that a regime may have."""
+    f, i = np.float64, np.int64
+    return [
         ("candidates", i),  # of a regime: contacts that touch and do not leave
         ("kind", i, (n,)),  # of them: open, held, sliding
         ("is_fresh", i, (n,)),  # slides from rest
         ("changes", i, (n,)),
         ("candidate", i, (n,)),  # their slots
         ("candidate_way", f, (n, 3)),
+    ]  # fmt: skip
+
+
+def _step_fields(walls: int, n_slots: int) -> list[tuple]:
+    """Smooth step: gaps, stages, scales."""
+    f, i = np.float64, np.int64
+    return [
         ("is_resting", i),
-        ("state", i, (max(wall_count, 1),)),  # what the body did at each wall after the last event
+        ("state", i, (walls,)),  # what the body did at each wall after the last event
         ("gap", f, (2, n_slots)),  # of every feature, at the start and at the end of the step [m]
         ("gap_rate", f, (2, n_slots)),  # [m/s]
         ("is_active", i, (n_slots,)),
@@ -102,7 +127,20 @@ def motion_dtype(wall_count: int, features: int) -> np.dtype:
         ("last_rate", f, (Y_SIZE,)),
         ("scale", f, (Y_SIZE,)),
         ("table", f, (MAX_MIDPOINT_RULES, Y_SIZE)),
-    ])  # fmt: skip
+    ]  # fmt: skip
+
+
+def motion_dtype(wall_count: int, features: int) -> np.dtype:
+    """Record type for bodies with `features` contact features each against `wall_count` walls."""
+    walls = max(wall_count, 1)
+    n, n_slots = walls * (FACE_VERTICES if features == VERTEX_COUNT else 1), walls * features
+    return np.dtype(
+        _pace_fields(n_slots)
+        + _contact_fields(n, n_slots)
+        + _unknown_fields(3 * n)
+        + _candidate_fields(n)
+        + _step_fields(walls, n_slots)
+    )
 
 
 def make_motion(wall_count: int, features: int, is_sequential: bool) -> np.ndarray:

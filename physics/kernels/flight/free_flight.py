@@ -57,17 +57,7 @@ def fly_by_scheme(flight, y, work, h):
     x, q, v, L = y
     q = principal_attitude(q, work, flight.tilted)
     zero = (0.0, 0.0, 0.0)
-    x, q, v, L = integrators.step(
-        flight.scheme,
-        x,
-        q,
-        v,
-        L,
-        zero,
-        as_vector(work.torque),
-        as_vector(work.free_acceleration),
-        1.0,
-        as_vector(work.J),
-        h,
-    )
+    load = integrators.Load(zero, as_vector(work.torque), as_vector(work.free_acceleration))
+    inertia = integrators.Inertia(1.0, as_vector(work.J))
+    x, q, v, L = integrators.step(flight.scheme, (x, q, v, L), load, inertia, h)
     return x, body_attitude(q, work, flight.tilted), v, L

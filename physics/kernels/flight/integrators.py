@@ -18,7 +18,8 @@ in every stage, so the right-hand side is smooth off the unit sphere and the
 division costs no order. `matrix_explicit_euler` and `matrix_rk4` integrate
 R' = [ω]x R instead and correct nothing: nine numbers drift where four could.
 
-Arguments of every scheme (all tuples hold floats, all scalars are floats):
+Every scheme takes the state y = (x, q, v, L), or (x, R, v, L), a `Load` (force, torque, g), an `Inertia` (inv_mass, J)
+and the step h (all tuples hold floats, all scalars are floats):
 
 ==========  ==========  ======================================================
 x, v        3 scalars   centre of mass [m], its velocity [m/s], world frame
@@ -48,6 +49,7 @@ References
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 from physics.kernels.compile.decorators import kernel
 from physics.kernels.math.quaternion import cross, matvec, multiply, normalise, to_matrix, transposed_matvec
@@ -57,6 +59,21 @@ EXPLICIT_EULER = 1
 SEMI_IMPLICIT_EULER = 2
 MIDPOINT = 3
 RK4 = 4
+
+
+class Load(NamedTuple):
+    """Load of a body, held over a step."""
+
+    force: tuple  # 3 scalars [N], world frame
+    torque: tuple  # 3 scalars, about the centre of mass [N m], world frame
+    gravity: tuple  # 3 scalars, acceleration whatever the mass [m/s²], world frame
+
+
+class Inertia(NamedTuple):
+    """Mass properties of a body."""
+
+    inv_mass: float  # 1/M [1/kg]; 0: no force moves it
+    J: tuple  # 3 scalars, inverse principal moments [1/(kg m²)]; 0: does not turn
 
 
 @kernel
@@ -82,9 +99,9 @@ def _along9(a, h, rate):
 
 
 @kernel
-def acceleration(force, g, inv_mass):
+def acceleration(load, inertia):
     """Acceleration of the centre of mass, force / M + g [m/s²], world frame."""
-    return _along3(g, inv_mass, force)
+    return _along3(load.gravity, inertia.inv_mass, load.force)
 
 
 @kernel
@@ -146,81 +163,86 @@ def parabola(x, v, a, h):
 
 
 @kernel
-def explicit_euler(x, q, v, L, force, torque, g, inv_mass, J, h):
+def explicit_euler(y, load, inertia, h):
     """Explicit Euler: every rate from the start of the step. Order 1.
 
     Arguments and result: see the module. Under a held acceleration a,
     x_n = x_0 + n h v_0 + n (n - 1) h² a / 2.
     """
+    x, q, v, L = y
     return (
         _along3(x, h, v),
-        normalise(euler_attitude(q, L, J, h)),
-        _along3(v, h, acceleration(force, g, inv_mass)),
-        _along3(L, h, torque),
+        normalise(euler_attitude(q, L, inertia.J, h)),
+        _along3(v, h, acceleration(load, inertia)),
+        _along3(L, h, load.torque),
     )
 
 
 @kernel
-def semi_implicit_euler(x, q, v, L, force, torque, g, inv_mass, J, h):
+def semi_implicit_euler(y, load, inertia, h):
     """Semi-implicit (symplectic) Euler: momenta first, x and q with the new ones. Order 1.
 
     Arguments and result: see the module. Under a held acceleration a,
     x_n = x_0 + n h v_0 + n (n + 1) h² a / 2.
     """
-    v_new = _along3(v, h, acceleration(force, g, inv_mass))
-    L_new = _along3(L, h, torque)
-    return (_along3(x, h, v_new), normalise(euler_attitude(q, L_new, J, h)), v_new, L_new)
+    x, q, v, L = y
+    v_new = _along3(v, h, acceleration(load, inertia))
+    L_new = _along3(L, h, load.torque)
+    return (_along3(x, h, v_new), normalise(euler_attitude(q, L_new, inertia.J, h)), v_new, L_new)
 
 
 @kernel
-def midpoint(x, q, v, L, force, torque, g, inv_mass, J, h):
+def midpoint(y, load, inertia, h):
     """Explicit midpoint rule: the rates of an Euler half-step, over the whole step. Order 2.
 
     Arguments and result: see the module. Under a held acceleration a, x is exact.
     """
-    a = acceleration(force, g, inv_mass)
+    x, q, v, L = y
+    a = acceleration(load, inertia)
     return (
         parabola(x, v, a, h),
-        normalise(midpoint_attitude(q, L, torque, J, h)),
+        normalise(midpoint_attitude(q, L, load.torque, inertia.J, h)),
         _along3(v, h, a),
-        _along3(L, h, torque),
+        _along3(L, h, load.torque),
     )
 
 
 @kernel
-def rk4(x, q, v, L, force, torque, g, inv_mass, J, h):
+def rk4(y, load, inertia, h):
     """Classical Runge-Kutta method [2]_ of the module. Order 4.
 
     Arguments and result: see the module. Under a held acceleration a, x is
     exact: (v + 4 (v + h a/2) + (v + h a)) h / 6 = h v + h² a / 2.
     """
-    a = acceleration(force, g, inv_mass)
+    x, q, v, L = y
+    a = acceleration(load, inertia)
     return (
         parabola(x, v, a, h),
-        normalise(rk4_attitude(q, L, torque, J, h)),
+        normalise(rk4_attitude(q, L, load.torque, inertia.J, h)),
         _along3(v, h, a),
-        _along3(L, h, torque),
+        _along3(L, h, load.torque),
     )
 
 
 @kernel
-def matrix_explicit_euler(x, R, v, L, force, torque, g, inv_mass, J, h):
+def matrix_explicit_euler(y, load, inertia, h):
     """Explicit Euler on R' = [ω]x R, never re-orthonormalised. Order 1.
 
     Returns (x, R, v, L), R as nine scalars. About a fixed ω the two columns
     across it grow by sqrt(1 + (h|ω|)²) a step; a quaternion's length only by
     sqrt(1 + (h|ω|/2)²), and a division puts that right.
     """
+    x, R, v, L = y
     return (
         _along3(x, h, v),
-        _along9(R, h, matrix_rate(R, L, J)),
-        _along3(v, h, acceleration(force, g, inv_mass)),
-        _along3(L, h, torque),
+        _along9(R, h, matrix_rate(R, L, inertia.J)),
+        _along3(v, h, acceleration(load, inertia)),
+        _along3(L, h, load.torque),
     )
 
 
 @kernel
-def matrix_rk4(x, R, v, L, force, torque, g, inv_mass, J, h):
+def matrix_rk4(y, load, inertia, h):
     """Classical Runge-Kutta on R' = [ω]x R, never re-orthonormalised. Order 4.
 
     Returns (x, R, v, L), R as nine scalars. About a fixed ω, with y = h|ω|, the
@@ -228,43 +250,41 @@ def matrix_rk4(x, R, v, L, force, torque, g, inv_mass, J, h):
     of the stability polynomial at iy); a quaternion by the same with y/2: 64
     times less.
     """
+    x, R, v, L = y
     half = 0.5 * h
-    a = acceleration(force, g, inv_mass)
-    L_middle = _along3(L, half, torque)
-    L_new = _along3(L, h, torque)
-    k1 = matrix_rate(R, L, J)
-    k2 = matrix_rate(_along9(R, half, k1), L_middle, J)
-    k3 = matrix_rate(_along9(R, half, k2), L_middle, J)
-    k4 = matrix_rate(_along9(R, h, k3), L_new, J)
+    a = acceleration(load, inertia)
+    L_middle = _along3(L, half, load.torque)
+    L_new = _along3(L, h, load.torque)
+    k1 = matrix_rate(R, L, inertia.J)
+    k2 = matrix_rate(_along9(R, half, k1), L_middle, inertia.J)
+    k3 = matrix_rate(_along9(R, half, k2), L_middle, inertia.J)
+    k4 = matrix_rate(_along9(R, h, k3), L_new, inertia.J)
     mean = _along9(_along9(k1, 2.0, k2), 1.0, _along9(k4, 2.0, k3))
     return (parabola(x, v, a, h), _along9(R, h / 6.0, mean), _along3(v, h, a), L_new)
 
 
 @kernel
-def step(scheme, x, q, v, L, force, torque, g, inv_mass, J, h):
+def step(scheme, y, load, inertia, h):
     """One step of the scheme with code `scheme` (int); see the module for the rest.
 
     A code that is none of the four gives a state of NaN: the layer above
     checks the code, and this cannot be taken for a result.
     """
     if scheme == EXPLICIT_EULER:
-        return explicit_euler(x, q, v, L, force, torque, g, inv_mass, J, h)
+        return explicit_euler(y, load, inertia, h)
     if scheme == SEMI_IMPLICIT_EULER:
-        return semi_implicit_euler(x, q, v, L, force, torque, g, inv_mass, J, h)
+        return semi_implicit_euler(y, load, inertia, h)
     if scheme == MIDPOINT:
-        return midpoint(x, q, v, L, force, torque, g, inv_mass, J, h)
+        return midpoint(y, load, inertia, h)
     if scheme == RK4:
-        return rk4(x, q, v, L, force, torque, g, inv_mass, J, h)
+        return rk4(y, load, inertia, h)
     nan3 = (math.nan, math.nan, math.nan)
     return (nan3, (math.nan, math.nan, math.nan, math.nan), nan3, nan3)
 
 
 @kernel
-def integrate(scheme, x, q, v, L, force, torque, g, inv_mass, J, h, steps):
-    """`steps` (int) equal steps of `step`, the same wrench held over all of them.
-
-    Returns (x, q, v, L) after steps * h seconds; arguments as in the module.
-    """
+def integrate(scheme, y, load, inertia, h, steps):
+    """State (x, q, v, L) after `steps` (int) equal steps of `step`, the same load held over all of them."""
     for _ in range(steps):
-        x, q, v, L = step(scheme, x, q, v, L, force, torque, g, inv_mass, J, h)
-    return (x, q, v, L)
+        y = step(scheme, y, load, inertia, h)
+    return y

@@ -54,6 +54,37 @@ def _admit(gap, speed, slop, reach, soft, slot, h, memory, work):
 
 
 @inlined
+def _admission_bounds(v, w, h, work):
+    """Bounds of `_admit`: the way that loads can make a feature go, the speed they can give it, and the largest gap."""
+    slop, acceleration = work.slop, work.acceleration
+    if _stiffness(work) > 0.0:  # springs push where there is no gap left
+        acceleration = 0.0
+    reach, soft = 0.5 * acceleration * h * h, acceleration * h
+    if work.restitution > work.rest_share:  # nor is what would rebound for longer than its share of the step
+        soft *= work.rest_share / work.restitution
+    near = max(slop + reach, SIMULTANEOUS_SLOPS * slop)
+    if work.shape == ELLIPSOID:
+        near += 0.5 * h * h * turning_acceleration(w, work)
+    if work.is_last:
+        near += h * (abs(v[0]) + abs(v[1]) + abs(v[2]) + work.radius * (abs(w[0]) + abs(w[1]) + abs(w[2])))
+    return reach, soft, near
+
+
+@inlined
+def _write_vertices(d, vn, e, mb, work):
+    """Write gap [m] and normal velocity [m/s] of each vertex of a block at one wall, four at a time.
+
+    d and vn are those of the centre, e and mb the normal and n x ω in the body frame, e times the half edges.
+    """
+    lower, upper = geo.vertex_heights(e)
+    slower, faster = geo.vertex_heights((work.dims[0] * mb[0], work.dims[1] * mb[1], work.dims[2] * mb[2]))
+    store_lanes(work.vertices, 0, 0, d + lower)
+    store_lanes(work.vertices, 0, LANE_COUNT, d + upper)
+    store_lanes(work.vertices, 1, 0, vn + slower)
+    store_lanes(work.vertices, 1, LANE_COUNT, vn + faster)
+
+
+@inlined
 def collect_wall_contacts(y, w, h, tilted, memory, work):
     """Fill `work` (slot, gap, speed, mask, and of all together widest and approach) with the contact set at this pose.
 
@@ -75,19 +106,10 @@ def collect_wall_contacts(y, w, h, tilted, memory, work):
     """
     walls, features, shape, radius = work.walls, work.features, work.shape, work.radius
     x, q, v, _ = y
-    R, slop, acceleration = qt.to_matrix(q), work.slop, work.acceleration
-    if _stiffness(work) > 0.0:  # springs push where there is no gap left
-        acceleration = 0.0
+    R, slop = qt.to_matrix(q), work.slop
     dims = (work.dims[0], work.dims[1], work.dims[2])
     center = geometric_center(x, R, work, tilted)
-    reach, soft = 0.5 * acceleration * h * h, acceleration * h
-    if work.restitution > work.rest_share:  # nor is what would rebound for longer than its share of the step
-        soft *= work.rest_share / work.restitution
-    near = max(slop + reach, SIMULTANEOUS_SLOPS * slop)
-    if shape == ELLIPSOID:
-        near += 0.5 * h * h * turning_acceleration(w, work)
-    if work.is_last:
-        near += h * (abs(v[0]) + abs(v[1]) + abs(v[2]) + radius * (abs(w[0]) + abs(w[1]) + abs(w[2])))
+    reach, soft, near = _admission_bounds(v, w, h, work)
     count = 0
     depth = widest = approach = 0.0
     for k in range(walls.shape[0]):
@@ -102,15 +124,9 @@ def collect_wall_contacts(y, w, h, tilted, memory, work):
         vn = qt.dot(n, v)
         m = qt.cross(n, w)  # n·(ω x r) = (n x ω)·r
         if shape == BLOCK:
-            mb = qt.transposed_matvec(R, m)
             if tilted is not None:
                 vn += qt.dot(m, center_arm(R, work))
-            lower, upper = geo.vertex_heights(e)
-            slower, faster = geo.vertex_heights((dims[0] * mb[0], dims[1] * mb[1], dims[2] * mb[2]))
-            store_lanes(work.vertices, 0, 0, d + lower)
-            store_lanes(work.vertices, 0, LANE_COUNT, d + upper)
-            store_lanes(work.vertices, 1, 0, vn + slower)
-            store_lanes(work.vertices, 1, LANE_COUNT, vn + faster)
+            _write_vertices(d, vn, e, qt.transposed_matvec(R, m), work)
             for vertex in range(VERTEX_COUNT):
                 gap, speed = work.vertices[0, vertex], work.vertices[1, vertex]
                 if gap > near:

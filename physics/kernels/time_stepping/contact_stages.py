@@ -19,6 +19,7 @@ from physics.kernels.contact_law.restitution_energy import (
 from physics.kernels.contact_law.target_velocity import (
     NO_IMPACT,
     TRUE_IMPACT,
+    StageMotion,
     may_have_impact,
     set_impact_targets,
     set_resting_targets,
@@ -297,8 +298,9 @@ def midpoint_step(n, y, h, contact, flight, records, work):
         if flight.gyroscopic is not None:
             g = qt.cross(m, wb)
             alpha = qt.matvec(R, (J[0] * g[0], J[1] * g[1], J[2] * g[2]))
-    set_resting_targets(n, v, w, alpha, middle, h, flight.tilted, work)
-    set_spring_targets(n, x, middle, v, w, alpha, before, after, flight.tilted, work)
+    motion = StageMotion(middle, v, w, alpha)
+    set_resting_targets(n, motion, h, flight.tilted, work)
+    set_spring_targets(n, x, motion, before, after, flight.tilted, work)
     v0, opposes_mean = v, False
     if contact.friction is not None and n <= work.mean_slip:
         opposes_mean = oppose_mean_slip(n, v, w, max(h, records.memory[work.i, WALL_MEMORY_STAGE]), work)

@@ -6,6 +6,7 @@ A step that has no room for events (`World.make_event_room`) logs none, and asks
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 from physics.kernels.compile.decorators import inlined, kernel
 from physics.kernels.half_space.contact_point import wall_of
@@ -26,24 +27,29 @@ NOBODY = -1
 EVENT_IMPULSE_ROUNDING = 1.0e-14
 
 
+class Event(NamedTuple):
+    """Event of a body; all vectors in the world frame, zero where they mean nothing."""
+
+    kind: int  # KIND_IMPACT and so on
+    wall: int  # wall, or NOBODY
+    other: int  # body, or NOBODY
+    impulse: tuple  # 3 scalars, on the body [N s]
+    point: tuple  # 3 scalars [m]
+    normal: tuple  # 3 scalars, towards the body
+
+
 @kernel
-def note_event(log, counts, i, t, kind, wall, other, impulse, point, normal):
-    """Add an event of body i; what finds no room is counted."""
+def note_event(log, counts, i, t, event):
+    """Add an `Event` of body i at the time t [s]; one that finds no room is counted only."""
     k = counts[i]
     counts[i] = k + 1
     if k < log.shape[1]:
-        log[i, k, EVENT_TIME], log[i, k, EVENT_KIND], log[i, k, EVENT_WALL], log[i, k, EVENT_OTHER] = (
-            t,
-            kind,
-            wall,
-            other,
-        )
+        log[i, k, EVENT_TIME], log[i, k, EVENT_KIND] = t, event.kind
+        log[i, k, EVENT_WALL], log[i, k, EVENT_OTHER] = event.wall, event.other
         for c in range(3):
-            log[i, k, EVENT_IMPULSE + c], log[i, k, EVENT_POINT + c], log[i, k, EVENT_NORMAL + c] = (
-                impulse[c],
-                point[c],
-                normal[c],
-            )
+            log[i, k, EVENT_IMPULSE + c] = event.impulse[c]
+            log[i, k, EVENT_POINT + c] = event.point[c]
+            log[i, k, EVENT_NORMAL + c] = event.normal[c]
 
 
 @inlined
@@ -66,7 +72,7 @@ def drop_events(world, bodies, t, log, counts):
 def note_mode_change(log, counts, i, t, kind, wall):
     """Add an event of body i that has no impulse."""
     zero = (0.0, 0.0, 0.0)
-    note_event(log, counts, i, t, kind, wall, NOBODY, zero, zero, zero)
+    note_event(log, counts, i, t, Event(kind, wall, NOBODY, zero, zero, zero))
 
 
 @inlined
@@ -93,7 +99,7 @@ def note_impact(log, counts, i, t, wall, other, impulse, sums):
     if not (weight > 0.0 and size > 0.0):
         return
     normal, point = (n[0] / size, n[1] / size, n[2] / size), (r[0] / weight, r[1] / weight, r[2] / weight)
-    note_event(log, counts, i, t, KIND_IMPACT, wall, other, impulse, point, normal)
+    note_event(log, counts, i, t, Event(KIND_IMPACT, wall, other, impulse, point, normal))
 
 
 @kernel

@@ -1,22 +1,29 @@
-"""A step of every world: the visible list of stages.
+"""Time stepping, one body at walls: a step of every world as a list of stages.
 
-A body's substep is cut where a feature meets a wall (time of impact), so that impulses act where and when
-bodies meet, and between the cuts
+Each substep goes through these stages until its time is used up. y = (x, q, v, L) is the state, M its mass and inertia,
+f the load, J the Jacobian of the contacts, u = J (v, ω) their velocities, p their impulses.
 
-- in the air: exact flight (`free_flight.fly`);
-- touching:   Moreau's midpoint step (`contact_stages.midpoint_step`). Half a free drift, the contact problem at the
-middle,
-  half a free drift.
+1. Hold loads         f = f(y), held over the stage                                        `held_loads.hold_loads`
+2. Find contacts      {i : g_i(x, q) <= slop}, g_i the gap of a feature to a wall          `find_contact_set`
+3. Resolve impacts    M Δ(v, ω) = Jᵀ p, u_n⁺ >= -e u_n⁻ ⟂ p_n >= 0, |p_t| <= μ p_n         `resolve_impacts`
+4. Limit the stage    the first t at which a gap g(t) is used up                           `advance_to_impact`
+5. Integrate          in the air the exact flow of ẋ = v, q̇ = ½ ω q, M v̇ = f              `fly_stage`
+                      in contact Moreau's midpoint step: x, q drift by h/2;                `midpoint_step`
+                      M Δ(v, ω) = h f + Jᵀ p, u_n >= target ⟂ p_n >= 0, |p_t| <= μ p_n;
+                      x, q drift by h/2
+6. Correct positions  x moves along a normal where a feature is deeper than the slop       `keep_out_of_walls`
+7. Sleep              a body whose motion stays below a threshold is left out              `falls_asleep`
 
-Moreau, *Unilateral contact and dry friction in finite freedom dynamics*, 1988, for the midpoint step; what
-differs are the cut at impacts, the target velocity at the step's end (`target_velocity.set_resting_targets`) and
-friction against the mean slip of few contacts (`midpoint_friction`), which together make the scheme second order
-between impacts and exact on parabolas.
+Stage 4 cuts the substep where a feature meets a wall, so that impulses act where and when bodies meet. This cut, the
+target velocity of stage 5 at the end of the step (`target_velocity.set_resting_targets`) and friction against the mean
+slip of few contacts (`midpoint_friction`) make the scheme second order between impacts and exact on parabolas.
 
-What a scene does not have arrives here as None and is pruned by the compiler (see `decorators.kernel`).
+What a scene does not have arrives as None and is pruned by the compiler (`decorators.kernel`). Kernels that take a
+state and return one are inlined: to pass thirteen numbers through memory took a quarter of the time of a block at rest.
 
-What takes a state and gives one is inlined here and below: to hand thirteen numbers on through memory, both ways and
-call after call in the longest chain of the step, took a quarter of the time of a block at rest.
+References
+----------
+.. [1] J. J. Moreau, *Unilateral contact and dry friction in finite freedom dynamics*, 1988, for the midpoint step.
 """
 
 from __future__ import annotations

@@ -69,10 +69,7 @@ def workspace_dtype(
         ("walls", f, (max(wall_count, 1), WALL_SIZE)),  # columns of `layout`
     ]
     stage = [
-        (
-            "mode",
-            i,
-        ),  # which direct solve to try first, then which one did it (`sliding_patch.TRY_STICKING`, `SLIDE`, `MIXED`)
+        ("mode", i),  # the direct solve to try first, then the one that solved it (`sliding_patch.TRY_STICKING` ...)
         ("still", f),  # residual allowed beside the tolerance [m/s]: see `contact_stages.rest_residual`
         ("unseen", f),  # by what the targets of contacts that hold may be off [m/s]: see `sticking`
         ("is_last", i),  # 1 in the last stage a substep may have: take in all that would pass through a wall
@@ -88,11 +85,7 @@ def workspace_dtype(
         ("approach", f),  # fastest approach of them all, 0 if none does [m/s]
         ("arm", f, (n, 3)),  # contact point relative to the centre of mass, world frame [m]
         ("target", f, (n, 3)),  # contact velocity aimed at (normal, tangents) [m/s]
-        (
-            "held",
-            f,
-            (MEAN_SLIP_CONTACTS, 2),
-        ),  # tangents for which contacts hold, where `target` has others (`midpoint_friction`)
+        ("held", f, (MEAN_SLIP_CONTACTS, 2)),  # tangents of contacts that hold (`midpoint_friction`) [m/s]
         ("friction", f, (n,)),  # Coulomb coefficient
         ("frame", f, (3 * n, 3)),  # directions normal, tangent 1, tangent 2 of each contact
         ("angular", f, (3 * n, 3)),  # angular Jacobian rows arm x direction [m]
