@@ -12,9 +12,9 @@ from physics.kernels.half_space.gap_queries import write_angular_momenta
 from physics.kernels.multibody.data import arrays as many
 from physics.kernels.multibody.stepping.adaptive_substep import MIN_RELATIVE_SLOP, MIN_SOLVER_TOLERANCE
 from physics.kernels.state import layout as at
-from physics.kernels.time_stepping.contact_stages import wall_memory_size
 from physics.kernels.time_stepping.midpoint_friction import MEAN_SLIP_CONTACTS
 from physics.kernels.time_stepping.spring_coupled_step import make_linked_world
+from physics.kernels.time_stepping.warm_start import wall_memory_size
 from physics.kernels.time_stepping.workspace import make_workspace
 from physics.plan.accuracy import Accuracy
 from physics.plan.plan import Plan

@@ -20,7 +20,7 @@ from physics.kernels.contact_law.target_velocity import (
     set_resting_targets,
 )
 from physics.kernels.half_space.persistent_contacts import WALL_MEMORY_HEAD
-from physics.kernels.time_stepping.contact_stages import wall_memory_size
+from physics.kernels.time_stepping.warm_start import wall_memory_size
 from physics.kernels.time_stepping.workspace import make_workspace
 from tests.kernels.contact_problem import FLOOR, SIDE
 

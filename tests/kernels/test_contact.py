@@ -14,7 +14,7 @@ from physics.kernels.half_space.contact_set import SIMULTANEOUS_SLOPS, collect_w
 from physics.kernels.half_space.persistent_contacts import WALL_MEMORY_COUNT, WALL_MEMORY_HEAD
 from physics.kernels.math.quaternion import to_matrix
 from physics.kernels.state.layout import BLOCK, ELLIPSOID
-from physics.kernels.time_stepping.contact_stages import load_warm_start, store_warm_start, wall_memory_size
+from physics.kernels.time_stepping.warm_start import load_warm_start, store_warm_start, wall_memory_size
 from physics.kernels.time_stepping.workspace import make_workspace
 from tests.kernels.contact_problem import FLOOR, SIDE, SIZE
 

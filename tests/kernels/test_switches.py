@@ -56,7 +56,7 @@ def test_both_alternatives_of_a_switch_are_pruned():
 
 
 def test_a_name_that_is_assigned_in_branches_is_no_switch():
-    """What a variable holds is known while running alone: both branches stay."""
+    """The value of a variable is known only at run time: both branches stay."""
 
     @kernel
     def last(x, flag):

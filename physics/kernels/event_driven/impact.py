@@ -16,11 +16,11 @@ from physics.kernels.half_space.contact_point import contact_arm_and_rate, featu
 from physics.kernels.math import quaternion as qt
 from physics.kernels.math.vector import as_vector
 from physics.kernels.state import layout as at
-from physics.kernels.state.body import angular_velocity, kinetic_energy, principal_attitude
+from physics.kernels.state.body import angular_velocity, kinetic_energy, principal_attitude, report_solve
 from physics.kernels.state.contact_law_dispatch import LAW_TANGENTIAL, if_law
 from physics.kernels.time_stepping import event_log as ev
-from physics.kernels.time_stepping.contact_resistance import reject_energy_gain, set_tangential_target
-from physics.kernels.time_stepping.contact_stages import report_solve, set_plastic_targets
+from physics.kernels.time_stepping.impact import set_plastic_targets
+from physics.kernels.time_stepping.tangential_restitution import reject_energy_gain, set_tangential_target
 
 # Impacts in turn at one moment at most. Speeds fall by a constant factor from round to round where they do not end:
 # cos²φ between two plastic walls whose normals are φ apart or π - φ.
@@ -117,7 +117,7 @@ def _no_tangential_target(*arguments):
 
 @if_law((LAW_TANGENTIAL,), _no_tangential_target)
 def set_tangential_rebound(n, y, tilted, motion, work):
-    """Set targets along the wall of the one contact that bounces, as `contact_resistance.set_tangential_targets`.
+    """Set targets along the wall of the one contact that bounces, as `tangential_restitution.set_tangential_targets`.
 
     What does not rebound though it has a restitution is a bounce left out, and is not one along the wall either.
     """

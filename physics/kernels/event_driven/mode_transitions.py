@@ -36,7 +36,7 @@ def log_mode_changes(work, motion, log, counts, t):
 
 @kernel
 def store_contact_modes(memory, i, work, motion):
-    """Store the regime at the walls and the contact forces for later reads (`contact_stages.store_warm_start`)."""
+    """Store the regime at the walls and the contact forces for later reads (`warm_start.store_warm_start`)."""
     slots = work.slot.shape[0]
     row = WALL_MEMORY_HEAD + slots
     for k in range(int(memory[i, 1])):

@@ -7,7 +7,7 @@ import math
 from physics.kernels.compile.decorators import inlined, kernel
 from physics.kernels.math import quaternion as qt
 from physics.kernels.state import layout as at
-from physics.kernels.state.layout import SERIES_SIZE
+from physics.kernels.state.layout import METHOD_PIVOTING, SERIES_SIZE
 
 
 @inlined
@@ -150,3 +150,16 @@ def angular_velocity(q, L, work, tilted):
 def kinetic_energy(q, v, L, work, tilted):
     """Kinetic energy of one body [J]."""
     return 0.5 * (work.mass * qt.dot(v, v) + qt.dot(L, angular_velocity(q, L, work, tilted)))
+
+
+@inlined
+def report_solve(report, world, residual, sweeps, method, tolerance):
+    """Add one contact solve to the world's report."""
+    report[world, at.SOLVES] += 1.0
+    report[world, at.ITERATIONS] += sweeps
+    report[world, at.RESIDUAL] = max(report[world, at.RESIDUAL], residual)
+    report[world, at.SOLVER] = max(report[world, at.SOLVER], float(method))
+    if method == METHOD_PIVOTING:
+        report[world, at.FALLBACKS] += 1.0
+    if not residual <= tolerance:
+        report[world, at.UNCONVERGED] += 1.0

@@ -75,8 +75,10 @@ from physics.kernels.state.body import (
 )
 from physics.kernels.state.contact_law_dispatch import bind_laws
 from physics.kernels.state.sleeping import falls_asleep, remains_asleep, without_velocities
-from physics.kernels.time_stepping.contact_stages import midpoint_step, resolve_impacts, store_warm_start
 from physics.kernels.time_stepping.event_log import clear_events, drop_events
+from physics.kernels.time_stepping.impact import resolve_impacts
+from physics.kernels.time_stepping.midpoint_step import midpoint_step
+from physics.kernels.time_stepping.warm_start import store_warm_start
 
 # Trials of one time of impact: a secant, then parabolas through the last three. Three are usual.
 IMPACT_TRIALS = 16

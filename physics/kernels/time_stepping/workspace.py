@@ -70,7 +70,7 @@ def workspace_dtype(
     ]
     stage = [
         ("mode", i),  # the direct solve to try first, then the one that solved it (`sliding_patch.TRY_STICKING` ...)
-        ("still", f),  # residual allowed beside the tolerance [m/s]: see `contact_stages.rest_residual`
+        ("still", f),  # residual allowed beside the tolerance [m/s]: see `midpoint_step.rest_residual`
         ("unseen", f),  # by what the targets of contacts that hold may be off [m/s]: see `sticking`
         ("is_last", i),  # 1 in the last stage a substep may have: take in all that would pass through a wall
     ]

@@ -82,7 +82,7 @@ def update_twist(b, tilted, many):
 
 @kernel
 def revert_to_dissipative(n, tilted, many):
-    """Momenta with loads and without impulses, and targets that cannot raise the energy (`contact_stages`)."""
+    """Momenta with loads and without impulses, and targets that cannot raise the energy (`midpoint_step`)."""
     for b in range(many.now.shape[0]):
         if many.touched[b] == 0:
             continue

@@ -44,7 +44,7 @@ from physics.kernels.state.body import angular_velocity, read_state, write_state
 from physics.kernels.state.groups import FlightSwitches
 from physics.kernels.state.layout import ELLIPSOID, SPHERE
 from physics.kernels.state.sleeping import is_asleep
-from physics.kernels.time_stepping.contact_stages import CREEP_SLOP_SHARE
+from physics.kernels.time_stepping.midpoint_step import CREEP_SLOP_SHARE
 
 
 @inlined
@@ -131,7 +131,7 @@ def hold_all_loads(h, gyroscopic, tilted, many):
 
 @inlined
 def rest_residual(h, many):
-    """Residual that the stage is solved to whatever the tolerance allows; see `contact_stages.rest_residual`."""
+    """Residual that the stage is solved to whatever the tolerance allows; see `midpoint_step.rest_residual`."""
     least = math.inf
     for b in range(many.now.shape[0]):
         slop_speed = many.bodies[b].slop / h

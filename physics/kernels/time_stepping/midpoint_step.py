@@ -1,0 +1,103 @@
+"""Contact stage of a substep: Moreau's midpoint step, half a free drift, the contact problem, half a free drift."""
+
+from __future__ import annotations
+
+import math
+
+from physics.kernels.compile.decorators import inlined
+from physics.kernels.contact_law.compliance import (
+    predict_end_gaps,
+    set_spring_targets,
+    split_stage_by_theta,
+)
+from physics.kernels.contact_law.target_velocity import (
+    StageMotion,
+    set_resting_targets,
+)
+from physics.kernels.contact_solver.solve import solve_contacts
+from physics.kernels.flight.free_flight import drift_attitude
+from physics.kernels.half_space.contact_point import place_arms
+from physics.kernels.half_space.persistent_contacts import (
+    WALL_MEMORY_MODE,
+    WALL_MEMORY_STAGE,
+)
+from physics.kernels.math import quaternion as qt
+from physics.kernels.state.body import apply_inv_inertia, principal_attitude, report_solve
+from physics.kernels.time_stepping.midpoint_friction import (
+    cap_friction_work,
+    has_slip_reversed,
+    oppose_end_slip,
+    oppose_mean_slip,
+)
+from physics.kernels.time_stepping.rolling_friction import apply_resistance_torques
+from physics.kernels.time_stepping.stage_energy import limit_stage_energy
+from physics.kernels.time_stepping.warm_start import load_warm_start, store_warm_start
+
+# Slops that what is pressed by strong loads may move in a step.
+CREEP_SLOP_SHARE = 0.01
+
+# Slops that contacts which hold may miss their targets by in a step.
+TARGET_ERROR_SLOP_SHARE = 0.01
+
+
+@inlined
+def rest_residual(h, work):
+    """Residual that a resting stage of length h is solved to whatever the tolerance allows [m/s].
+
+    A share of the speed that loads give in h is a place error of that share of a h² in every step. Under loads so
+    strong that this is more than a slop what is pressed against walls would creep: it is held to a small part of one.
+    """
+    slop_speed = work.slop / h
+    if work.tolerance * work.acceleration * h > slop_speed:
+        return CREEP_SLOP_SHARE * slop_speed
+    return math.inf
+
+
+@inlined
+def midpoint_step(n, y, h, contact, flight, records, work):
+    """State after Moreau's midpoint step over h with the n contacts of the set."""
+    x, q, v, L = y
+    a, torque = work.free_acceleration, work.torque
+    before, after = split_stage_by_theta(n, y, h, flight.tilted, work)
+    x = (x[0] + before * v[0], x[1] + before * v[1], x[2] + before * v[2])
+    q = drift_attitude(q, L, work, before, flight.gyroscopic, flight.tilted)
+    middle = qt.to_matrix(q)
+    place_arms(n, middle, flight.tilted, work)
+    R = middle
+    if flight.tilted is not None:
+        R = qt.to_matrix(principal_attitude(q, work, flight.tilted))
+    w, alpha = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
+    if L[0] != 0.0 or L[1] != 0.0 or L[2] != 0.0:
+        m, J = qt.transposed_matvec(R, L), work.J
+        wb = (J[0] * m[0], J[1] * m[1], J[2] * m[2])
+        w = qt.matvec(R, wb)
+        if flight.gyroscopic is not None:
+            g = qt.cross(m, wb)
+            alpha = qt.matvec(R, (J[0] * g[0], J[1] * g[1], J[2] * g[2]))
+    motion = StageMotion(middle, v, w, alpha)
+    set_resting_targets(n, motion, h, flight.tilted, work)
+    set_spring_targets(n, x, motion, before, after, flight.tilted, work)
+    v0, opposes_mean = v, False
+    if contact.friction is not None and n <= work.mean_slip:
+        opposes_mean = oppose_mean_slip(n, v, w, max(h, records.memory[work.i, WALL_MEMORY_STAGE]), work)
+    width = 3
+    if contact.friction is None:
+        width = 1
+    load_warm_start(n, width, records.memory, work.i, h, work)
+    v = (v[0] + h * a[0], v[1] + h * a[1], v[2] + h * a[2])
+    L = (L[0] + h * torque[0], L[1] + h * torque[1], L[2] + h * torque[2])
+    work.mode, work.still = int(records.memory[work.i, WALL_MEMORY_MODE]), rest_residual(h, work)
+    work.unseen = TARGET_ERROR_SLOP_SHARE * work.slop / h
+    solved = solve_contacts(n, contact, v, L, R, work)
+    if opposes_mean and has_slip_reversed(n, solved[0], apply_inv_inertia(R, solved[1], work.J), work):
+        oppose_end_slip(n, work)
+        solved = solve_contacts(n, contact, v, L, R, work)
+    solved = cap_friction_work(n, contact, v0, w, solved, (v, L), R, h, work)
+    solved = limit_stage_energy(n, contact, v0, w, solved, (v, L), R, h, work)
+    v_new, L_new, residual, sweeps, method = apply_resistance_torques(n, contact, v, L, solved, R, work)
+    records.memory[work.i, WALL_MEMORY_MODE] = work.mode
+    report_solve(records.report, work.world, residual, sweeps, method, work.tolerance)
+    store_warm_start(n, width, records.memory, work.i, h, work)
+    predict_end_gaps(n, v_new, apply_inv_inertia(R, L_new, work.J), after, work)
+    x = (x[0] + after * v_new[0], x[1] + after * v_new[1], x[2] + after * v_new[2])
+    return x, drift_attitude(q, L_new, work, after, flight.gyroscopic, flight.tilted), v_new, L_new

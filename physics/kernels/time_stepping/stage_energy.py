@@ -1,0 +1,86 @@
+"""Energy of a resting stage: impulses that raise it are replaced by those for targets that cannot."""
+
+from __future__ import annotations
+
+from physics.kernels.compile.decorators import inlined
+from physics.kernels.contact_law.compliance import ENERGY_GAIN_TOLERANCE
+from physics.kernels.contact_law.restitution_energy import scale_impulses_to_dissipate
+from physics.kernels.contact_solver.one_contact import point_velocity
+from physics.kernels.contact_solver.solve import solve_contacts
+from physics.kernels.half_space.contact_point import contact_arm, wall_normal, wall_of
+from physics.kernels.math import quaternion as qt
+from physics.kernels.state.body import apply_inv_inertia
+from physics.kernels.state.contact_law_dispatch import LAW_STIFFNESS, if_law
+
+
+@inlined
+def motion_square(n, velocity, work):
+    """Square of the velocity that the contacts may act on: without friction, of one wall, only that along its normal.
+
+    A body that moves along a frictionless wall, however fast, does the same as one that does not.
+    """
+    wall = wall_of(work.slot[0], work)
+    if not work.mu > 0.0 and wall_of(work.slot[n - 1], work) == wall:
+        normal_speed = qt.dot(wall_normal(work.walls, wall), velocity)
+        return normal_speed * normal_speed
+    return qt.dot(velocity, velocity)
+
+
+@inlined
+def has_energy_gain(n, before, w, v, L, solved, R, h, work):
+    """True if the impulses of a resting stage raise the energy by more than its solve and its step may be off.
+
+    Impulses P at the centre of mass and moments Q about it change it by ½ P·(v + v') + ½ Q·(ω + ω'), v and ω before
+    the stage (`before`, w), v' and ω' after it. `v`, `L` are those with loads and without impulses.
+    """
+    v_new, L_new, _, _, _ = solved
+    zero = (0.0, 0.0, 0.0)
+    if v_new == zero and before == zero and L_new == zero and w == zero:  # at rest, as most are
+        return False
+    w_new, a = apply_inv_inertia(R, L_new, work.J), work.free_acceleration
+    push = work.mass * (
+        (v_new[0] - v[0]) * (before[0] + v_new[0])
+        + (v_new[1] - v[1]) * (before[1] + v_new[1])
+        + (v_new[2] - v[2]) * (before[2] + v_new[2])
+    )
+    turn = (
+        (L_new[0] - L[0]) * (w[0] + w_new[0])
+        + (L_new[1] - L[1]) * (w[1] + w_new[1])
+        + (L_new[2] - L[2]) * (w[2] + w_new[2])
+    )
+    square = h * h * (a[0] * a[0] + a[1] * a[1] + a[2] * a[2])
+    size = work.mass * (motion_square(n, before, work) + square) + abs(qt.dot(L_new, w_new))
+    return push + turn > max(work.tolerance, ENERGY_GAIN_TOLERANCE) * size
+
+
+@inlined
+def set_dissipative_targets(n, before, w, work):
+    """Targets that cannot raise the energy: no contact is pushed off or along, and what leaves is turned round.
+
+    A push p changes the energy by p·½(u + u'), with u and u' the normal velocities of its contact before and after. So
+    one that loads bring back within the stage, u > 0, comes back as fast as it left, instead of being stopped above
+    its wall.
+    """
+    for i in range(n):
+        normal = wall_normal(work.walls, wall_of(work.slot[i], work))
+        u = qt.dot(normal, point_velocity(contact_arm(work, i), before, w))
+        work.target[i, 0] = min(work.target[i, 0], -max(u, 0.0))
+        work.target[i, 1] = work.target[i, 2] = 0.0
+
+
+def _calmed_if_it_gains(n, contact, before, w, solved, free, R, h, work):
+    if has_energy_gain(n, before, w, free[0], free[1], solved, R, h, work):
+        set_dissipative_targets(n, before, w, work)
+        solved = solve_contacts(n, contact, free[0], free[1], R, work)
+        if not solved[2] <= work.tolerance and has_energy_gain(n, before, w, free[0], free[1], solved, R, h, work):
+            return scale_impulses_to_dissipate(n, contact.friction, before, w, solved, free, R, work)
+    return solved
+
+
+@if_law((LAW_STIFFNESS,), _calmed_if_it_gains)
+def limit_stage_energy(n, contact, before, w, solved, free, R, h, work):
+    """Result of `solve_contacts` for `free` (v, L); if that raises the energy, the one for calm targets.
+
+    If even that does, since no method solved it, as much of it as does not. Springs give back what they hold.
+    """
+    return solved

@@ -1,0 +1,61 @@
+"""Warm start of the contact problem: impulses of the last resting stage of a body, by slot."""
+
+from __future__ import annotations
+
+from physics.kernels.compile.decorators import inlined, kernel
+from physics.kernels.half_space.persistent_contacts import WALL_MEMORY_COUNT, WALL_MEMORY_HEAD, WALL_MEMORY_STAGE
+
+
+def wall_memory_size(slots: int) -> int:
+    """Columns of `memory` for bodies with `slots` possible contacts."""
+    return WALL_MEMORY_HEAD + 4 * slots
+
+
+@inlined
+def load_warm_start(n, width, memory, i, h, work):
+    """Impulses of the last resting stage, by slot, scaled to a stage of length h."""
+    first = WALL_MEMORY_HEAD + work.slot.shape[0]
+    scale = 0.0
+    if memory[i, WALL_MEMORY_STAGE] > 0.0:
+        scale = h / memory[i, WALL_MEMORY_STAGE]
+    for k in range(n):
+        base = first + 3 * work.slot[k]
+        for c in range(width):
+            work.impulse[width * k + c] = memory[i, base + c] * scale
+
+
+@inlined
+def _are_kept(n, memory, i, work):
+    """True if the contacts of the last resting stage are those of this one, in the same order."""
+    if memory[i, WALL_MEMORY_COUNT] != n:
+        return False
+    for k in range(n):
+        if memory[i, WALL_MEMORY_HEAD + k] != work.slot[k]:
+            return False
+    return True
+
+
+@kernel
+def _keep_slots(n, memory, i, work):
+    """Forget the contacts of the last resting stage for those of this one, whose impulses are zero as yet."""
+    first = WALL_MEMORY_HEAD + work.slot.shape[0]
+    for k in range(int(memory[i, WALL_MEMORY_COUNT])):
+        base = first + 3 * int(memory[i, WALL_MEMORY_HEAD + k])
+        for c in range(3):
+            memory[i, base + c] = 0.0
+    memory[i, WALL_MEMORY_COUNT] = n
+    for k in range(n):
+        memory[i, WALL_MEMORY_HEAD + k] = work.slot[k]
+
+
+@inlined
+def store_warm_start(n, width, memory, i, h, work):
+    """Keep the impulses of this resting stage by slot; what no longer touches is forgotten."""
+    first = WALL_MEMORY_HEAD + work.slot.shape[0]
+    memory[i, WALL_MEMORY_STAGE] = h
+    if not _are_kept(n, memory, i, work):
+        _keep_slots(n, memory, i, work)
+    for k in range(n):
+        base = first + 3 * work.slot[k]
+        for c in range(width):
+            memory[i, base + c] = work.impulse[width * k + c]
