@@ -8,6 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from physics.kernels.compile.decorators import kernel
+from physics.kernels.contact_solver.one_contact import FreeBody
 from physics.kernels.contact_solver.patch_algebra import cold_start_motion, gather_patch
 from physics.kernels.contact_solver.sliding_patch import TRY_SLIDING, TRY_STICKING
 from physics.kernels.math.simd_gather import valid_lanes_mask
@@ -135,7 +136,8 @@ def test_eight_contacts_of_one_wall_are_solved_by_sweeps(mode):
 def begun(n, mu, u, w, inv_mass, K, work):
     """Start of a face under new loads (`patch_algebra.cold_start_motion`), on the wall whose axes are x, y, z."""
     axes = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
-    return cold_start_motion(n, gather_patch(n, axes, inv_mass, K, work), valid_lanes_mask(n), mu, u, w, inv_mass, K)
+    body = FreeBody(axes, u, w, K, inv_mass)
+    return cold_start_motion(n, gather_patch(n, body, work), valid_lanes_mask(n), mu, body)
 
 
 @pytest.mark.parametrize("n", [3, 4])

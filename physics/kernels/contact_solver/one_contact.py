@@ -12,6 +12,7 @@ d for which the velocity across, g = e·u_t with e = n x d, vanishes: Newton's m
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 from physics.kernels.compile.decorators import inlined
 from physics.kernels.compile.simd import lane_sqrt
@@ -32,6 +33,30 @@ MIN_SQUARED_NORM = 1.0e-290
 
 # What a contact was found to do.
 CONTACT_UNSOLVED, CONTACT_OPENS, CONTACT_STICKS, CONTACT_SLIDES = range(4)
+
+
+class FreeBody(NamedTuple):
+    """A body without its contact impulses, in the stretched frame (n, a, b) of a wall (`anisotropic_friction`).
+
+    Attributes
+    ----------
+    axes : tuple of 3 tuples of 3 floats
+        Normal and tangents of the wall, world frame, not stretched.
+    u : tuple of 3 floats
+        Velocity of the centre of mass [m/s].
+    w : tuple of 3 floats
+        Angular velocity [rad/s].
+    K : tuple of 6 floats
+        Inverse inertia (00, 01, 02, 11, 12, 22) [1/(kg m²)].
+    inv_mass : float
+        Inverse mass [1/kg]; along tangent b it is this times the square of `friction_ratio`.
+    """
+
+    axes: tuple
+    u: tuple
+    w: tuple
+    K: tuple
+    inv_mass: float
 
 
 @inlined
@@ -158,7 +183,7 @@ def solve_contact_block(W, b, mu, trace, goal, x, y, may_hold):
     Returns
     -------
     what : int
-        OPEN, HELD, SLID, or LOST when Newton's method failed.
+        CONTACT_OPENS, CONTACT_STICKS, CONTACT_SLIDES, or CONTACT_UNSOLVED when Newton's method failed.
     p : tuple of 3 floats
         [N s].
     residual : float

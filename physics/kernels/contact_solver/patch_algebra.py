@@ -1,17 +1,27 @@
 """Sums over the contacts of a patch on one wall, with the formulas of `sliding_patch` and `primal_dual_friction`.
 
-A patch has three or four contacts, a lane each (`simd`); the fourth lane of three is the third contact once more, and
-never pushes. `on` is 1 for a contact that pushes and 0 for one that is open. All is in the stretched frame of
-`anisotropic_friction` (of an even wall: its frame): `place` are coordinates (normal, tangents) relative to the centre
-of mass, `target` is the targets along the same axes, and `mobility` W_aa + W_bb of each contact.
+A patch (`Patch`) has three or four contacts, a lane each (`simd`); the fourth lane of three is the third contact once
+more, and never pushes. All is in the stretched frame of `anisotropic_friction` (of an even wall: its frame). Names that
+recur without a group of their own:
+
+on : lanes
+    1 for a contact that pushes, 0 for one that is open.
+p : lanes
+    Normal impulses [N s].
+motion : tuple of 3 floats
+    Planar motion (v_a, v_b, ω_n) [m/s, m/s, rad/s].
+exerted : tuple of 5 floats
+    Sums over the contacts: impulses along the tangents (a, b) [N s], and moments about (n, a, b) [N m s].
 """
 
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 from physics.kernels.compile.decorators import inlined
 from physics.kernels.compile.simd import (
+    Lanes,
     first_true_lane,
     lane_sqrt,
     lane_sum,
@@ -23,6 +33,7 @@ from physics.kernels.compile.simd import (
 from physics.kernels.contact_law.anisotropic_friction import friction_ratio
 from physics.kernels.contact_solver.one_contact import (
     MIN_SQUARED_NORM,
+    FreeBody,
     inverse_root,
     is_warm_start_valid,
     point_velocity,
@@ -37,6 +48,90 @@ _COLLINEAR_LIMIT = 1.0e-6
 _MIN_SLIP_SHARE = 0.01
 
 
+class Patch(NamedTuple):
+    """Contacts of one wall, a lane each.
+
+    Attributes
+    ----------
+    points : tuple of 3 lanes
+        Coordinates (normal, tangents) from the centre of mass [m].
+    targets : tuple of 3 lanes
+        Velocities aimed at along the same axes [m/s].
+    mobility : lanes
+        W_aa + W_bb of each contact [1/kg].
+    """
+
+    points: tuple
+    targets: tuple
+    mobility: Lanes
+
+
+class PatchProblem(NamedTuple):
+    """Contact problem of a patch.
+
+    Attributes
+    ----------
+    patch : Patch
+        The contacts.
+    body : FreeBody
+        The body without their impulses.
+    mu : float
+        Coefficient of friction along tangent a; 0 without friction.
+    goal : float
+        Tolerance of the residual [m/s].
+    loose : float
+        Speed up to which an open contact may close while it is sought which others push [m/s].
+    """
+
+    patch: Patch
+    body: FreeBody
+    mu: float
+    goal: float
+    loose: float
+
+
+class NormalMotion(NamedTuple):
+    """Motion along the normal that the pushing contacts must have, known before their impulses.
+
+    Attributes
+    ----------
+    center : tuple of 3 floats
+        Centroid (normal, tangents) of the contacts that push [m].
+    wa, wb : float
+        Angular velocity about the tangents [rad/s].
+    push : float
+        Sum of the normal impulses that it takes [N s].
+    y0 : float
+        Their mean [N s].
+    gain : tuple of 2 floats
+        Change of the angular velocity about the tangents that it takes [rad/s].
+    """
+
+    center: tuple
+    wa: float
+    wb: float
+    push: float
+    y0: float
+    gain: tuple
+
+
+class PatchFriction(NamedTuple):
+    """Friction of the contacts, and their slip.
+
+    Attributes
+    ----------
+    x, y : lanes
+        Impulses along the tangents a and b per normal impulse: -μ d where a contact slides in the direction d, -μ z
+        with |z| <= 1 anywhere in the disc, 0 where it is open.
+    speed : lanes
+        Size of the tangential velocity less its target [m/s].
+    """
+
+    x: Lanes
+    y: Lanes
+    speed: Lanes
+
+
 @inlined
 def _coordinates_along(axis, n, work):
     """Coordinates of the contacts along an axis, from the centre of mass."""
@@ -48,9 +143,9 @@ def _coordinates_along(axis, n, work):
 
 
 @inlined
-def gather_patch(n, axes, inv_mass, K, work):
-    """The patch (place, target, mobility) of the n contacts in `work`, on the wall with these axes."""
-    ratio = friction_ratio(work)
+def gather_patch(n, body, work):
+    """The `Patch` of the n contacts in `work`, on the wall of `body`."""
+    axes, inv_mass, K, ratio = body.axes, body.inv_mass, body.K, friction_ratio(work)
     c, a, b = (
         ratio * _coordinates_along(axes[0], n, work),
         ratio * _coordinates_along(axes[1], n, work),
@@ -63,14 +158,13 @@ def gather_patch(n, axes, inv_mass, K, work):
     )
     mass_b = ratio * ratio * inv_mass
     mobility = (inv_mass + mass_b) + K[0] * (a * a + b * b) - 2.0 * c * (K[1] * a + K[2] * b) + c * c * (K[3] + K[5])
-    return (c, a, b), target, mobility
+    return Patch((c, a, b), target, mobility)
 
 
 @inlined
-def largest_free_speed(friction, patch, u, w):
+def largest_free_speed(friction, patch, body):
     """Largest velocity of a contact without impulses, less its target [m/s]."""
-    place, target, _ = patch
-    speed = point_velocity(place, u, w)
+    target, speed = patch.targets, point_velocity(patch.points, body.u, body.w)
     worst = abs(speed[0] - target[0])
     if friction is not None:
         worst = larger(worst, larger(abs(speed[1] - target[1]), abs(speed[2] - target[2])))
@@ -78,10 +172,10 @@ def largest_free_speed(friction, patch, u, w):
 
 
 @inlined
-def warm_start_motion(n, patch, on, u, w, inv_mass, K, work):
+def warm_start_motion(n, patch, on, body, work):
     """Planar motion after the impulses in `work`, those of the warm start, and whether they are of these loads."""
-    (c, a, b), _, _ = patch
-    ratio = friction_ratio(work)
+    c, a, b = patch.points
+    u, w, K, inv_mass, ratio = body.u, body.w, body.K, body.inv_mass, friction_ratio(work)
     p, x = on * gather_component(work.impulse, 0, n), on * gather_component(work.impulse, 1, n)
     y = on * gather_component(work.impulse, 2, n) / ratio
     spin = K[0] * (a * y - b * x) + K[1] * (b * p - c * y) + K[2] * (c * x - a * p)
@@ -127,7 +221,7 @@ def may_stick(n, axes, v, L, work):
 
 
 @inlined
-def cold_start_motion(n, patch, on, mu, u, w, inv_mass, K):
+def cold_start_motion(n, patch, on, mu, body):
     """Planar motion that friction leaves of one without impulses, if the planar friction is that of an ellipsoid.
 
     The forces and moments about the centroid that equal pushes, P in all, can exert while a face slides are nearly an
@@ -139,11 +233,12 @@ def cold_start_motion(n, patch, on, mu, u, w, inv_mass, K):
     1/φ is nearly a straight line and concave: one step of Newton's, from where it is not above 1, is near enough. What
     φ(0) <= 1 says would hold is given a small part of its slip, since directions are wanted.
     """
-    (_, a, b), _, _ = patch
+    _, a, b = patch.points
+    u, w, inv_mass = body.u, body.w, body.inv_mass
     ca, cb, second = _centroid_and_variance(n, a, b, on)
     va, vb = u[1] - w[0] * cb, u[2] + w[0] * ca
     slip2, turn2, beta = va * va + vb * vb, second * w[0] * w[0], mu * max(-u[0], 0.0)
-    free, gamma = math.sqrt(slip2 + turn2), beta * second * K[0] / inv_mass
+    free, gamma = math.sqrt(slip2 + turn2), beta * second * body.K[0] / inv_mass
     s = max(free - max(beta, gamma), 0.0)
     p, q = 1.0 / (s + beta), 1.0 / (s + gamma)
     square = slip2 * p * p + turn2 * q * q
@@ -157,7 +252,7 @@ def cold_start_motion(n, patch, on, mu, u, w, inv_mass, K):
 @inlined
 def patch_centroid(count, patch, on):
     """Centroid of the active contacts."""
-    (c, a, b), _, _ = patch
+    c, a, b = patch.points
     s = 1.0 / count
     return s * lane_sum(on * c), s * lane_sum(on * a), s * lane_sum(on * b)
 
@@ -168,7 +263,8 @@ def fit_normal_motion(count, patch, on):
 
     Of contacts on a line it is not finite, or no longer accurate: then there is none.
     """
-    (_, a, b), (target, _, _), _ = patch
+    _, a, b = patch.points
+    target = patch.targets[0]
     center, t0 = patch_centroid(count, patch, on), (1.0 / count) * lane_sum(on * target)
     a, b = on * (a - center[1]), on * (b - center[2])
     saa, sab, sbb, ta, tb = (
@@ -187,37 +283,48 @@ def fit_normal_motion(count, patch, on):
 @inlined
 def normal_velocity_excess(patch, vn, wa, wb):
     """Normal velocities of the contacts less their targets [m/s] in a normal motion; of an open one it may be > 0."""
-    (_, a, b), (target, _, _), _ = patch
-    return (vn + wa * b - wb * a) - target
+    _, a, b = patch.points
+    return (vn + wa * b - wb * a) - patch.targets[0]
+
+
+@inlined
+def normal_motion_about(count, center, motion, body):
+    """The `NormalMotion` (v_n, ω_a, ω_b) of `count` contacts about their centroid."""
+    vn, wa, wb = motion
+    push = (vn - body.u[0]) / body.inv_mass
+    return NormalMotion(center, wa, wb, push, push / count, (wa - body.w[1], wb - body.w[2]))
 
 
 @inlined
 def patch_friction_directions(ua, ub, on, mu):
-    """Impulse per normal impulse that opposes a slip (ua, ub), -μ d, and its speed: none of what is open or still."""
+    """The `PatchFriction` of contacts that slide, against a slip (ua, ub) [m/s]: none where one is open or still."""
     square = ua * ua + ub * ub
     s = select_lanes(square > MIN_SQUARED_NORM, -mu * on * inverse_root(square), 0.0)
-    return s * ua, s * ub, lane_sqrt(square)
+    return PatchFriction(s * ua, s * ub, lane_sqrt(square))
 
 
 @inlined
-def patch_slip_velocities(patch, motion, wa, wb):
-    """Tangential velocities of the contacts less their targets [m/s] in a planar motion."""
-    (c, a, b), (_, target_a, target_b), _ = patch
+def patch_slip_velocities(patch, motion, normal):
+    """Tangential velocities of the contacts less their targets [m/s] in a planar motion and a `NormalMotion`."""
+    c, a, b = patch.points
+    _, target_a, target_b = patch.targets
+    wa, wb = normal.wa, normal.wb
     return motion[0] + wb * c - motion[2] * b - target_a, motion[1] + motion[2] * a - wa * c - target_b
 
 
 @inlined
-def solve_normal_slopes(patch, on, center, y0, gain, slip, K):
-    """The y_1, y_2 that go with some directions, `slip`: impulses per normal impulse along the tangents (and speeds).
+def solve_normal_slopes(patch, on, normal, friction, K):
+    """Slopes y_1, y_2 of the normal impulses that hold the `NormalMotion` under some `PatchFriction`.
 
     Returns
     -------
     y : tuple of 2 floats
+        [N s/m].
     turning : tuple of 6 floats
         (ω_a per y_1, y_2; ω_b per y_1, y_2; ω_n per y_1, y_2), friction along with them.
     """
-    (c, a, b), _, _ = patch
-    x, y, _ = slip
+    c, a, b = patch.points
+    x, y, center, y0, gain = friction.x, friction.y, normal.center, normal.y0, normal.gain
     mn, ma, mb = a * y - b * x, on * b - c * y, c * x - on * a
     a, b = a - center[1], b - center[2]
     n0, n1, n2 = lane_sum(mn), lane_sum(a * mn), lane_sum(b * mn)
@@ -233,16 +340,15 @@ def solve_normal_slopes(patch, on, center, y0, gain, slip, K):
 
 
 @inlined
-def planar_compliance(patch, center, slip, turning, inv_mass, K, work):
+def planar_compliance(problem, normal, friction, turning, work):
     """Planar motion per planar impulse at the centroid, row by row (9): with the normal motion held by y_1, y_2.
 
-    `slip` and `turning` are those of `solve_normal_slopes`, which only a step of Newton's has a use for this after.
+    `friction` and `turning` are those of `solve_normal_slopes`. Only a step of Newton's method needs the compliance.
     """
-    (_, a, b), _, _ = patch
-    x, y, _ = slip
-    ratio = friction_ratio(work)
+    _, a, b = problem.patch.points
+    x, y, K, inv_mass, ratio = friction.x, friction.y, problem.body.K, problem.body.inv_mass, friction_ratio(work)
     mass_b = ratio * ratio * inv_mass
-    cc, ca, cb = center
+    cc, ca, cb = normal.center
     g1, g2, h1, h2, f1, f2 = turning
     s = 1.0 / (g1 * h2 - g2 * h1)
     a, b = a - ca, b - cb
@@ -269,28 +375,43 @@ def planar_compliance(patch, center, slip, turning, inv_mass, K, work):
 
 
 @inlined
-def patch_normal_impulses(patch, on, center, y0, y, slip):
-    """Normal impulses of the active contacts: which pull (1), which most (or -1), what pushes, what it exerts."""
-    (c, a, b), _, _ = patch
+def patch_normal_impulses(patch, on, normal, y, friction):
+    """Normal impulses with the slopes y of `solve_normal_slopes`.
+
+    Returns
+    -------
+    pulling : lanes
+        1 for a contact that would have to pull, else 0.
+    loser : int
+        The contact that would have to pull most, or -1.
+    p : lanes
+        Normal impulses [N s], 0 for contacts that would pull.
+    exerted : tuple of 5 floats
+        Of these and their friction.
+    """
+    c, a, b = patch.points
+    center, y0 = normal.center, normal.y0
     p = select_lanes(on > 0.0, y0 + (y[0] * (a - center[1]) + y[1] * (b - center[2])), 0.0)
     pulling, loser = select_lanes(p < 0.0, 1.0, 0.0), -1
     if first_true_lane(~(p >= 0.0)) >= 0:  # so that what is no number also pulls
         loser = first_true_lane((on > 0.0) & ~(p > min_of_lanes(p)))
     p = larger(p, 0.0)
-    px, py = p * slip[0], p * slip[1]
+    px, py = p * friction.x, p * friction.y
     exerted = lane_sum(px), lane_sum(py), lane_sum(a * py - b * px), lane_sum(b * p - c * py), lane_sum(c * px - a * p)
     return pulling, loser, p, exerted
 
 
 @inlined
-def planar_motion_after(exerted, u, w, inv_mass, mass_b, K):
+def planar_motion_after(exerted, body, work):
     """Planar motion that impulses along the tangents, and moments, lead to."""
     fa, fb, tn, ta, tb = exerted
+    u, w, K, inv_mass, ratio = body.u, body.w, body.K, body.inv_mass, friction_ratio(work)
+    mass_b = ratio * ratio * inv_mass
     return u[1] + inv_mass * fa, u[2] + mass_b * fb, w[0] + (K[0] * tn + K[1] * ta + K[2] * tb)
 
 
 @inlined
-def patch_sliding_residual(patch, p, slip, mu, delta):
+def patch_sliding_residual(patch, p, friction, mu, delta):
     """Largest tangential residual [m/s] when the motion that the directions are of is left by delta: if all slide.
 
     Of the contacts with a push p > 0. Of one that moves backwards the whole velocity counts: its impulse is in the
@@ -300,12 +421,12 @@ def patch_sliding_residual(patch, p, slip, mu, delta):
     """
     if not mu > 0.0:
         return 0.0, (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-    (_, a, b), _, mobility = patch
+    _, a, b = patch.points
     inv_mu = 1.0 / mu
-    x, y, size = slip[0] * inv_mu, slip[1] * inv_mu, slip[2]  # (x, y) = -d
+    x, y, size = friction.x * inv_mu, friction.y * inv_mu, friction.speed  # (x, y) = -d
     da, db = delta[0] - delta[2] * b, delta[1] + delta[2] * a
     load = mu * p
-    weight = load * mobility  # μ p trace(W_tt), which is at least μ p / ρ_t
+    weight = load * patch.mobility  # μ p trace(W_tt), which is at least μ p / ρ_t
     along, across = size - (x * da + y * db), abs(x * db - y * da)
     miss = select_lanes(along > 0.0, across * weight / (weight + along), across - along)
     worst = max_of_lanes(larger(0.0, select_lanes(weight > 0.0, miss, 0.0)))
@@ -329,10 +450,10 @@ def has_turned_far(on, d, size, change):
 
 
 @inlined
-def has_small_turns(patch, on, slip, mu, step):
+def has_small_turns(patch, on, friction, mu, step):
     """True if no direction turns by more than about 70 degrees, and none backwards, in a step of the motion."""
-    (_, a, b), _, _ = patch
-    x, y, size = slip
+    _, a, b = patch.points
+    x, y, size = friction
     s = -1.0 / mu
     change = step[0] - step[2] * b, step[1] + step[2] * a
     return first_true_lane(has_turned_far(on, (s * x, s * y), size, change)) < 0

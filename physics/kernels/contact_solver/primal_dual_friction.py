@@ -26,12 +26,13 @@ References
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 from physics.kernels.compile.decorators import inlined, kernel
 from physics.kernels.compile.simd import Lanes, first_true_lane, lane_sqrt, lane_sum, larger, max_of_lanes, select_lanes
-from physics.kernels.contact_law.anisotropic_friction import friction_ratio
 from physics.kernels.contact_solver.one_contact import inverse_root
 from physics.kernels.contact_solver.patch_algebra import (
+    PatchFriction,
     has_turned_far,
     patch_normal_impulses,
     patch_slip_velocities,
@@ -56,6 +57,53 @@ _FULL_FRICTION_SHARE = 0.999999
 
 # What came out.
 ROUND_FAILED, ROUND_SOLVED, ROUND_PULLS = range(3)
+
+
+class PatchRound(NamedTuple):
+    """Result of a round of `sliding_patch`, or of all rounds of this method.
+
+    Attributes
+    ----------
+    what : int
+        `ROUND_SOLVED`; `ROUND_PULLS`: the contact `loser` would have to pull; `ROUND_FAILED`; or one of those of
+        `sliding_patch`.
+    loser : int
+        The contact that would have to pull most, or -1.
+    p : lanes
+        Normal impulses [N s].
+    x, y : lanes
+        Impulses along the tangents per normal impulse.
+    exerted : tuple of 5 floats
+        Of these: impulses along the tangents [N s] and moments [N m s].
+    miss : float
+        Residual [m/s].
+    motion : tuple of 3 floats
+        Planar motion of the next round (v_a, v_b, ω_n) [m/s, rad/s].
+    """
+
+    what: int
+    loser: int
+    p: Lanes
+    x: Lanes
+    y: Lanes
+    exerted: tuple
+    miss: float
+    motion: tuple
+
+
+class SlipLimits(NamedTuple):
+    """Slips that are too small for a direction.
+
+    Attributes
+    ----------
+    tiny : float
+        Size that a slip counts as at least, where a contact slides [m/s].
+    slow : float
+        The speed s, instead of the size of a smaller slip, where a contact holds [m/s].
+    """
+
+    tiny: float
+    slow: float
 
 
 @inlined
@@ -84,16 +132,15 @@ def solve_planar_step(compliance, h, r):
 
 
 @inlined
-def _friction_residual(patch, p, slip, mu, after):
-    """Largest tangential residual [m/s] of pushes p and their friction along `slip`, when contacts slip as `after`.
+def _friction_residual(mobility, p, friction, mu, after):
+    """Largest tangential residual [m/s] of pushes p and their `PatchFriction`, when contacts slip as `after`.
 
     The natural map of Coulomb's disc, |f - P(f - u/W)| W of the impulse f with W = W_aa + W_bb, which is at least 1/ρ
     of its own (`gauss_seidel`); P projects onto the disc |f| <= μ p.
     """
     if not mu > 0.0:
         return 0.0
-    _, _, mobility = patch
-    x, y, _ = slip
+    x, y = friction.x, friction.y
     load, (ua, ub) = mu * p, after
     fa, fb = mobility * (p * x), mobility * (p * y)
     ka, kb, load = fa - ua, fb - ub, mobility * load
@@ -107,7 +154,7 @@ def _friction_residual(patch, p, slip, mu, after):
 @inlined
 def _newton_step(patch, load, d, size, gain, taken, compliance, delta):
     """Step Δ of the planar motion, and δu: z' = z + gain + A δu/size, A = 1 - `taken` dᵀ; `load` is μ p."""
-    (_, a, b), _, _ = patch
+    _, a, b = patch.points
     (da, db), (ta, tb) = d, taken
     fa, fb = load * gain[0], load * gain[1]
     f0, f1, f2 = lane_sum(fa), lane_sum(fb), lane_sum(a * fb - b * fa)
@@ -143,10 +190,11 @@ def _next_friction(u, d, size, z, gain, taken, change, slides, tiny):
 
 
 @kernel
-def take_viscous_step(patch, on, p, slip, mu, compliance, delta, goal):
+def take_viscous_step(problem, on, p, friction, compliance, delta):
     """First step, from where all slide, with A = 1: (step of the planar motion, impulses per normal impulse)."""
-    size, s = larger(slip[2], _NO_DIRECTION_SHARE * goal), -1.0 / mu
-    d, none = (s * slip[0], s * slip[1]), Lanes(0.0, 0.0, 0.0, 0.0)
+    patch, mu, goal = problem.patch, problem.mu, problem.goal
+    size, s = larger(friction.speed, _NO_DIRECTION_SHARE * goal), -1.0 / mu
+    d, none = (s * friction.x, s * friction.y), Lanes(0.0, 0.0, 0.0, 0.0)
     zero = none, none
     step, change = _newton_step(patch, mu * p, d, size, zero, zero, compliance, delta)
     u, slides = (size * d[0], size * d[1]), ~has_turned_far(on, d, size, change)
@@ -155,13 +203,24 @@ def take_viscous_step(patch, on, p, slip, mu, compliance, delta, goal):
 
 
 @inlined
-def _primal_dual_step(patch, on, p, slip, mu, u, compliance, delta, tiny, slow):
-    """Step of the planar motion, impulses per normal impulse after it, and whether no direction turned round."""
-    z, load, none = (slip[0] / -mu, slip[1] / -mu), mu * p, Lanes(0.0, 0.0, 0.0, 0.0)
+def _primal_dual_step(problem, on, p, friction, u, compliance, delta, limits):
+    """Take one step from `friction`, where the contacts slip by u [m/s].
+
+    Returns
+    -------
+    step : tuple of 3 floats
+        Of the planar motion.
+    x, y : lanes
+        Impulses along the tangents per normal impulse after it.
+    is_settled : bool
+        Whether no direction turned round.
+    """
+    patch, mu, speed, (tiny, slow) = problem.patch, problem.mu, friction.speed, limits
+    z, load, none = (friction.x / -mu, friction.y / -mu), mu * p, Lanes(0.0, 0.0, 0.0, 0.0)
     is_full = z[0] * z[0] + z[1] * z[1] >= _FULL_FRICTION_SHARE * _FULL_FRICTION_SHARE
-    size = larger(slip[2], select_lanes(is_full, tiny, slow))
+    size = larger(speed, select_lanes(is_full, tiny, slow))
     d = u[0] / size, u[1] / size
-    is_stuck = ~is_full & (slip[2] < slow)
+    is_stuck = ~is_full & (speed < slow)
     gain = d[0] - select_lanes(is_stuck, 0.0, z[0]), d[1] - select_lanes(is_stuck, 0.0, z[1])
     taken = select_lanes(is_stuck, 0.0, z[0]), select_lanes(is_stuck, 0.0, z[1])
     step, change = _newton_step(patch, load, d, size, gain, taken, compliance, delta)
@@ -175,57 +234,44 @@ def _primal_dual_step(patch, on, p, slip, mu, u, compliance, delta, tiny, slow):
 
 
 @kernel
-def solve_stick_slip_patch(
-    patient, patch, on, x, y, mu, goal, loose, center, y0, gain, motion, u, w, wa, wb, inv_mass, K, work
-):
+def solve_stick_slip_patch(patient, on, x, y, problem, normal, motion, work):
     """Impulses with which some of the contacts hold, and the other active ones slide.
 
     Parameters
     ----------
     patient : bool
-        Whether a contact that pulls may push again while directions still turn.
-    patch, on
-        Of the contacts (`patch_algebra`).
+        Whether a contact that pulls may push again while directions still turn, down to a residual of `problem.loose`.
+    on : lanes
+        Which contacts push.
     x, y : lanes
         First guess of the impulses per normal impulse along the tangents, -μ z.
-    loose : float
-        Residual above which directions still turn [m/s].
-    mu, goal, center, y0, gain, u, w, wa, wb, K
-        As in `sliding_patch.solve_sliding_patch`.
+    problem : PatchProblem
+    normal : NormalMotion
+        Of the contacts that push.
     motion : tuple of 3 floats
         First guess of the planar motion (v_a, v_b, ω_n).
 
     Returns
     -------
-    what : int
-        FOUND; PULLS: an active contact would have to pull; NOT_FOUND.
-    loser : int
-        The active contact that pulls most.
-    p, x, y : lanes
-        Normal impulses of the contacts [N s], and along the tangents per normal impulse.
-    exerted : tuple of 5 floats
-        Impulses along the tangents and moments of all contacts.
-    miss : float
-        Residual [m/s].
-    motion : tuple of 3 floats
+    PatchRound
+        `ROUND_SOLVED`, `ROUND_PULLS` or `ROUND_FAILED`.
     """
-    ratio = friction_ratio(work)
-    mass_b, may_open = ratio * ratio * inv_mass, not patient
-    tiny, slow = _NO_DIRECTION_SHARE * goal, _REGULARISATION_SHARE * goal / work.tolerance
+    patch, mu, goal, may_open = problem.patch, problem.mu, problem.goal, not patient
+    limits = SlipLimits(_NO_DIRECTION_SHARE * goal, _REGULARISATION_SHARE * goal / work.tolerance)
     for _ in range(_MAX_DUAL_ROUNDS):
-        speed = patch_slip_velocities(patch, motion, wa, wb)
-        slip = x, y, lane_sqrt(speed[0] * speed[0] + speed[1] * speed[1])
-        slopes, turning = solve_normal_slopes(patch, on, center, y0, gain, slip, K)
-        _, loser, p, exerted = patch_normal_impulses(patch, on, center, y0, slopes, slip)
+        slip = patch_slip_velocities(patch, motion, normal)
+        friction = PatchFriction(x, y, lane_sqrt(slip[0] * slip[0] + slip[1] * slip[1]))
+        slopes, turning = solve_normal_slopes(patch, on, normal, friction, problem.body.K)
+        _, loser, p, exerted = patch_normal_impulses(patch, on, normal, slopes, friction)
         if loser >= 0 and may_open:
-            return ROUND_PULLS, loser, p, x, y, exerted, 0.0, motion
-        led_to = planar_motion_after(exerted, u, w, inv_mass, mass_b, K)
-        miss = _friction_residual(patch, p, slip, mu, patch_slip_velocities(patch, led_to, wa, wb))
+            return PatchRound(ROUND_PULLS, loser, p, x, y, exerted, 0.0, motion)
+        led_to = planar_motion_after(exerted, problem.body, work)
+        miss = _friction_residual(patch.mobility, p, friction, mu, patch_slip_velocities(patch, led_to, normal))
         if loser < 0 and miss <= goal:
-            return ROUND_SOLVED, -1, p, x, y, exerted, miss, motion
+            return PatchRound(ROUND_SOLVED, -1, p, x, y, exerted, miss, motion)
         delta = led_to[0] - motion[0], led_to[1] - motion[1], led_to[2] - motion[2]
-        compliance = planar_compliance(patch, center, slip, turning, inv_mass, K, work)
-        step, x, y, is_settled = _primal_dual_step(patch, on, p, slip, mu, speed, compliance, delta, tiny, slow)
-        may_open = not patient or (is_settled and miss <= loose)
+        compliance = planar_compliance(problem, normal, friction, turning, work)
+        step, x, y, is_settled = _primal_dual_step(problem, on, p, friction, slip, compliance, delta, limits)
+        may_open = not patient or (is_settled and miss <= problem.loose)
         motion = motion[0] + step[0], motion[1] + step[1], motion[2] + step[2]
-    return ROUND_FAILED, -1, x, x, y, (0.0, 0.0, 0.0, 0.0, 0.0), 0.0, motion
+    return PatchRound(ROUND_FAILED, -1, x, x, y, (0.0, 0.0, 0.0, 0.0, 0.0), 0.0, motion)

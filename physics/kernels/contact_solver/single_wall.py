@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 from physics.kernels.compile.decorators import inlined
 from physics.kernels.contact_law.anisotropic_friction import friction_ratio, stretched_frame
-from physics.kernels.contact_solver.one_contact import motion_in_wall_frame, wall_to_world
+from physics.kernels.contact_solver.one_contact import FreeBody, motion_in_wall_frame, wall_to_world
 from physics.kernels.contact_solver.patch_algebra import (
+    PatchProblem,
     cold_start_motion,
     gather_patch,
     largest_free_speed,
@@ -20,30 +23,54 @@ from physics.kernels.math.simd_gather import valid_lanes_mask
 _CLOSING_TOLERANCE = 1.0e-2
 
 
+class WallSolution(NamedTuple):
+    """Impulses of all contacts of one wall, in its stretched frame; those of each contact are in `work.impulse`.
+
+    Attributes
+    ----------
+    found : bool
+        Whether they solve the problem.
+    exerted : tuple of 5 floats
+        Sums along the tangents [N s], and moments about normal and tangents [N m s].
+    push : float
+        Sum of the normal impulses [N s].
+    residual : float
+        [m/s].
+    scale : float
+        Largest free contact speed [m/s].
+    """
+
+    found: bool
+    exerted: tuple
+    push: float
+    residual: float
+    scale: float
+
+
 @inlined
-def _solve_face(n, friction, axes, u, w, inv_mass, K, work):
-    """Three contacts or four: (found, tangents and moments, Σ p_n, residual, its scale), `work.impulse` when found."""
-    patch, on = gather_patch(n, axes, inv_mass, K, work), valid_lanes_mask(n)
-    scale = largest_free_speed(friction, patch, u, w)
-    start, is_mixed = (u[1], u[2], w[0]), False
+def _solve_face(n, friction, body, work):
+    """Three contacts or four; `work.impulse` when found."""
+    patch, on = gather_patch(n, body, work), valid_lanes_mask(n)
+    scale = largest_free_speed(friction, patch, body)
+    start, is_mixed = (body.u[1], body.u[2], body.w[0]), False
     if friction is not None:
-        start, is_of_now = warm_start_motion(n, patch, on, u, w, inv_mass, K, work)
+        start, is_of_now = warm_start_motion(n, patch, on, body, work)
         is_mixed = is_of_now and work.mode == TRY_MIXED
         if not is_of_now and work.mu > 0.0:
-            start = cold_start_motion(n, patch, on, work.mu, u, w, inv_mass, K)
+            start = cold_start_motion(n, patch, on, work.mu, body)
     goal = work.tolerance * scale
     loose = max(goal, _CLOSING_TOLERANCE * scale) if n > 3 else goal
+    problem = PatchProblem(patch, body, work.mu, goal, loose)
     for patient in range(2):
-        found, impulses, exerted, push, miss, has_opened = solve_sliding_patch(
-            n, patient > 0, work.mu, goal, loose, patch, start, is_mixed, axes, u, w, inv_mass, K, work
-        )
-        if found:
+        face, has_opened = solve_sliding_patch(n, patient > 0, problem, start, is_mixed, work)
+        if face.found:
+            p, x, y = face.impulses
             for i in range(n):
-                _store_impulse(i, (impulses[0][i], impulses[1][i], impulses[2][i]), friction, work)
-            return True, exerted, push, miss, scale
+                _store_impulse(i, (p[i], x[i], y[i]), friction, work)
+            return WallSolution(True, face.exerted, face.push, face.residual, scale)
         if not has_opened:
             break
-    return False, (0.0, 0.0, 0.0, 0.0, 0.0), 0.0, 0.0, scale
+    return WallSolution(False, (0.0, 0.0, 0.0, 0.0, 0.0), 0.0, 0.0, scale)
 
 
 @inlined
@@ -65,16 +92,16 @@ def _largest_component(friction, b):
 
 
 @inlined
-def _solve_one_or_two(n, friction, axes, u, w, inv_mass, K, work):
+def _solve_one_or_two(n, friction, body, work):
     """One contact or two, as `_solve_face`."""
-    first = contact_in_wall_frame(0, axes, u, w, work)
-    scale = _largest_component(friction, first[1])
+    first = contact_in_wall_frame(0, body, work)
+    scale = _largest_component(friction, first.approach)
     if n == 1:
-        found, p, m, miss = solve_one_contact(first, work.mu, work.tolerance * scale, inv_mass, K, work)
+        found, p, m, miss = solve_one_contact(first, work.mu, work.tolerance * scale, body, work)
     else:
-        second = contact_in_wall_frame(1, axes, u, w, work)
-        scale = max(scale, _largest_component(friction, second[1]))
-        found, p, q, m, miss = solve_two_contacts(first, second, work.mu, work.tolerance * scale, inv_mass, K, work)
+        second = contact_in_wall_frame(1, body, work)
+        scale = max(scale, _largest_component(friction, second.approach))
+        found, p, q, m, miss = solve_two_contacts(first, second, work.mu, work.tolerance * scale, body, work)
         if found:
             _store_impulse(1, q, friction, work)
             work.mode = TRY_SLIDING
@@ -82,7 +109,7 @@ def _solve_one_or_two(n, friction, axes, u, w, inv_mass, K, work):
         _store_impulse(0, p, friction, work)
     if n == 2:
         p = p[0] + q[0], p[1] + q[1], p[2] + q[2]
-    return found, (p[1], p[2], m[0], m[1], m[2]), p[0], miss, scale
+    return WallSolution(found, (p[1], p[2], m[0], m[1], m[2]), p[0], miss, scale)
 
 
 @inlined
@@ -114,14 +141,16 @@ def solve_single_wall(n, friction, wall, R, v, L, work):
     axes, inv_mass, ratio = wall_axes(work.walls, wall), 1.0 / work.mass, friction_ratio(work)
     K, u, w = motion_in_wall_frame(R, v, L, axes, work.J)
     K, u, w = stretched_frame(K, u, w, ratio)
+    body = FreeBody(axes, u, w, K, inv_mass)
     if n < 3:
-        found, exerted, push, miss, scale = _solve_one_or_two(n, friction, axes, u, w, inv_mass, K, work)
+        solved = _solve_one_or_two(n, friction, body, work)
     else:
-        found, exerted, push, miss, scale = _solve_face(n, friction, axes, u, w, inv_mass, K, work)
-    if not found:
+        solved = _solve_face(n, friction, body, work)
+    if not solved.found:
         return False, v, L, 0.0
-    if scale > 0.0:
-        miss /= scale
-    fa, fb, tn, ta, tb = exerted
-    v = wall_to_world(axes, inv_mass * push, inv_mass * fa, ratio * (inv_mass * fb), v)
+    miss = solved.residual
+    if solved.scale > 0.0:
+        miss /= solved.scale
+    fa, fb, tn, ta, tb = solved.exerted
+    v = wall_to_world(axes, inv_mass * solved.push, inv_mass * fa, ratio * (inv_mass * fb), v)
     return True, v, wall_to_world(axes, tn, ta, tb / ratio, L), miss

@@ -39,13 +39,14 @@ where they are of other loads, with `patch_algebra.cold_start_motion`.
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 from physics.kernels.compile.decorators import inlined
 from physics.kernels.compile.simd import Lanes, first_true_lane, lane_sum, larger, max_of_lanes, select_lanes
-from physics.kernels.contact_law.anisotropic_friction import friction_ratio
 from physics.kernels.contact_solver.patch_algebra import (
     fit_normal_motion,
     has_small_turns,
+    normal_motion_about,
     normal_velocity_excess,
     patch_centroid,
     patch_friction_directions,
@@ -61,6 +62,7 @@ from physics.kernels.contact_solver.primal_dual_friction import (
     ROUND_FAILED,
     ROUND_PULLS,
     ROUND_SOLVED,
+    PatchRound,
     solve_planar_step,
     solve_stick_slip_patch,
     take_viscous_step,
@@ -79,29 +81,86 @@ TRY_STICKING, TRY_SLIDING, TRY_MIXED = range(3)
 ROUND_CONTINUES, ROUND_TIPS, ROUND_REVERSES = range(3, 6)
 
 
-@inlined
-def _choose_normal_motion(count, goal, loose, patch, on, u, w):
-    """Normal motion of the contacts that push, and which do.
+class PatchSolution(NamedTuple):
+    """Impulses of a patch.
 
-    Targets of four contacts that are those of no rigid motion are met by three: one opens that is then faster than
-    asked. Of the two of a rectangle it is the one that approaches less.
+    Attributes
+    ----------
+    found : bool
+        Whether they solve the problem.
+    impulses : tuple of 3 lanes
+        Of each contact (normal, tangents) [N s].
+    exerted : tuple of 5 floats
+        Their sums along the tangents [N s], and moments [N m s].
+    push : float
+        Sum of the normal impulses [N s].
+    residual : float
+        [m/s].
+    """
 
-    Returns
-    -------
+    found: bool
+    impulses: tuple
+    exerted: tuple
+    push: float
+    residual: float
+
+
+class PushingContacts(NamedTuple):
+    """Contacts of a patch that push.
+
+    Attributes
+    ----------
+    count : int
+        How many.
+    on : lanes
+        1 for each of them, 0 for an open contact.
+    is_back : lanes
+        1 for a contact that was open before and closed again, else 0.
+    """
+
+    count: int
+    on: Lanes
+    is_back: Lanes
+
+
+class NormalChoice(NamedTuple):
+    """Normal motion that was chosen for the contacts that push.
+
+    Attributes
+    ----------
     ok : bool
-        Whether the targets are met, and no open contact closes faster than `loose`.
+        Whether it meets their targets, and no open contact closes faster than `PatchProblem.loose`.
     closing : int
         The open contact that closes fastest, by more than the goal, or -1.
-    count, on
-        Contacts that push.
-    center : tuple of 3 floats
-        Their centroid.
-    motion : tuple of 3 floats
-        (v_n, ω_a, ω_b).
     is_even : bool
         Whether it meets the targets of four contacts within the goal. Then it does whichever of them push; three that
         met theirs to the letter would have the fourth off by four times as much, and it would push again for nothing.
+    motion : tuple of 3 floats
+        (v_n, ω_a, ω_b) [m/s, rad/s].
     """
+
+    ok: bool
+    closing: int
+    is_even: bool
+    motion: tuple
+
+
+@inlined
+def _fit_pushing_contacts(pushing, problem):
+    """Choose the normal motion of the contacts that push, and which do.
+
+    Targets of four contacts that are those of no rigid motion are met by three: one opens that is then faster than its
+    target. Of the two of a rectangle it is the one that approaches less.
+
+    Returns
+    -------
+    PushingContacts
+    center : tuple of 3 floats
+        Their centroid [m].
+    NormalChoice
+    """
+    patch, goal, u, w = problem.patch, problem.goal, problem.body.u, problem.body.w
+    count, on, is_back = pushing
     is_patch, center, motion = fit_normal_motion(count, patch, on)
     spare = normal_velocity_excess(patch, motion[0], motion[1], motion[2])
     if is_patch and count > 3 and not max_of_lanes(abs(spare)) <= goal:
@@ -112,26 +171,35 @@ def _choose_normal_motion(count, goal, loose, patch, on, u, w):
     speeds = select_lanes(on > 0.0, 0.0, -spare)
     fastest = max_of_lanes(speeds)
     closing = first_true_lane(speeds == fastest) if fastest > goal else -1
-    ok = is_patch and max_of_lanes(on * abs(spare)) <= goal and fastest <= loose
-    return ok, closing, count, on, center, motion, ok and count > 3
+    ok = is_patch and max_of_lanes(on * abs(spare)) <= goal and fastest <= problem.loose
+    return PushingContacts(count, on, is_back), center, NormalChoice(ok, closing, ok and count > 3, motion)
 
 
 @inlined
-def _solve_remaining_pair(patch, on, mu, goal, axes, u, w, inv_mass, K, work):
+def _choose_normal_motion(pushing, choice, problem):
+    """As `_fit_pushing_contacts`; a choice that is even stays, about the centroid of the contacts that now push."""
+    if choice.is_even:
+        return pushing, patch_centroid(pushing.count, problem.patch, pushing.on), choice
+    return _fit_pushing_contacts(pushing, problem)
+
+
+@inlined
+def _solve_remaining_pair(on, problem, work):
     """The two contacts that still push, the others open.
 
     Returns
     -------
-    found, impulses, exerted, push, residual
-        As `_search`.
+    PatchSolution
     closing : int
         The open contact that would close fastest, where that is why it is not found, else -1.
     """
-    (_, a, b), (target, _, _), _ = patch
+    patch, body, goal = problem.patch, problem.body, problem.goal
+    _, a, b = patch.points
+    u, w, K, inv_mass = body.u, body.w, body.K, body.inv_mass
     i = first_true_lane(on > 0.0)
     j = first_true_lane(select_lanes(select_lane(i), 0.0, on) > 0.0)
-    first, second = contact_in_wall_frame(i, axes, u, w, work), contact_in_wall_frame(j, axes, u, w, work)
-    found, p, q, m, miss = solve_two_contacts(first, second, mu, goal, inv_mass, K, work)
+    first, second = contact_in_wall_frame(i, body, work), contact_in_wall_frame(j, body, work)
+    found, p, q, m, miss = solve_two_contacts(first, second, problem.mu, goal, body, work)
     is_i, is_j = select_lane(i), select_lane(j)
     impulses = (
         select_lanes(is_i, p[0], select_lanes(is_j, q[0], 0.0)),
@@ -140,153 +208,152 @@ def _solve_remaining_pair(patch, on, mu, goal, axes, u, w, inv_mass, K, work):
     )
     vn = u[0] + inv_mass * (p[0] + q[0])
     wa, wb = w[1] + (K[1] * m[0] + K[3] * m[1] + K[4] * m[2]), w[2] + (K[2] * m[0] + K[4] * m[1] + K[5] * m[2])
-    closing = select_lanes(on > 0.0, 0.0, target - (vn + (wa * b - wb * a)))
+    closing = select_lanes(on > 0.0, 0.0, patch.targets[0] - (vn + (wa * b - wb * a)))
     fastest, again = max_of_lanes(larger(0.0, closing)), -1
     if found and not fastest <= goal:
         found, again = False, first_true_lane(closing == fastest)
     exerted = (p[1] + q[1], p[2] + q[2], m[0], m[1], m[2])
-    return found, impulses, exerted, p[0] + q[0], max(miss, fastest), again
+    return PatchSolution(found, impulses, exerted, p[0] + q[0], max(miss, fastest)), again
 
 
 @inlined
-def _direction_newton_round(
-    patient, count, patch, on, mu, goal, center, y0, gain, motion, u, w, wa, wb, inv_mass, K, work
-):
+def _direction_newton_round(patient, pushing, problem, normal, motion, work):
     """One round of Newton's method on the directions, those of `motion`.
 
     Returns
     -------
-    what : int
-        FOUND; GOES_ON; PULLS: the contact `loser` would have to pull; TIPS: two of four would; TURNS_ROUND: a direction
-        would, and the motion is that of the first step of `primal_dual_friction`.
-    loser, pulling
-        As of `patch_normal_impulses`.
-    p, x, y : lanes
-        Normal impulses, and impulses along the tangents per normal impulse: for the next round when it TURNS_ROUND.
-    exerted : tuple of 5 floats
-    miss : float
-        Residual [m/s].
-    motion : tuple of 3 floats
-        Of the next round.
+    PatchRound
+        `ROUND_SOLVED`; `ROUND_CONTINUES`; `ROUND_PULLS`; `ROUND_TIPS`: two of four contacts would pull; or
+        `ROUND_REVERSES`: a direction would turn right round. Its x, y and motion are then those after the first step
+        of `primal_dual_friction`.
+    pulling : lanes
+        1 for a contact that would have to pull, else 0.
     """
-    slip, miss = patch_friction_directions(*patch_slip_velocities(patch, motion, wa, wb), on, mu), 0.0
-    slopes, turning = solve_normal_slopes(patch, on, center, y0, gain, slip, K)
-    pulling, loser, p, exerted = patch_normal_impulses(patch, on, center, y0, slopes, slip)
-    x, y, what = slip[0], slip[1], ROUND_CONTINUES
+    patch, on, mu = problem.patch, pushing.on, problem.mu
+    slip = patch_slip_velocities(patch, motion, normal)
+    friction, miss = patch_friction_directions(slip[0], slip[1], on, mu), 0.0
+    slopes, turning = solve_normal_slopes(patch, on, normal, friction, problem.body.K)
+    pulling, loser, p, exerted = patch_normal_impulses(patch, on, normal, slopes, friction)
+    x, y, what = friction.x, friction.y, ROUND_CONTINUES
     if loser >= 0:
         what = ROUND_PULLS
-        if not patient and count > 3 and lane_sum(pulling) == 2.0:
+        if not patient and pushing.count > 3 and lane_sum(pulling) == 2.0:
             what = ROUND_TIPS
     if loser < 0 or patient:
-        ratio = friction_ratio(work)
-        led_to = planar_motion_after(exerted, u, w, inv_mass, ratio * ratio * inv_mass, K)
+        led_to = planar_motion_after(exerted, problem.body, work)
         delta = led_to[0] - motion[0], led_to[1] - motion[1], led_to[2] - motion[2]
-        miss, k = patch_sliding_residual(patch, p, slip, mu, delta)
-        if loser < 0 and miss <= goal:
+        miss, k = patch_sliding_residual(patch, p, friction, mu, delta)
+        if loser < 0 and miss <= problem.goal:
             what = ROUND_SOLVED
         else:
-            compliance = planar_compliance(patch, center, slip, turning, inv_mass, K, work)
+            compliance = planar_compliance(problem, normal, friction, turning, work)
             step = solve_planar_step(compliance, (k[0], k[1], k[2], k[1], k[3], k[4], k[2], k[4], k[5]), delta)
-            if not has_small_turns(patch, on, slip, mu, step):
+            if not has_small_turns(patch, on, friction, mu, step):
                 what = ROUND_REVERSES
-                step, x, y = take_viscous_step(patch, on, p, slip, mu, compliance, delta, goal)
+                step, x, y = take_viscous_step(problem, on, p, friction, compliance, delta)
             motion = motion[0] + step[0], motion[1] + step[1], motion[2] + step[2]
-    return what, loser, pulling, p, x, y, exerted, miss, motion
+    return PatchRound(what, loser, p, x, y, exerted, miss, motion), pulling
 
 
 @inlined
-def solve_sliding_patch(n, patient, mu, goal, loose, patch, start, is_mixed, axes, u, w, inv_mass, K, work):
+def _push_again(contact, pushing):
+    """Have an open contact push once more."""
+    is_it = select_lane(contact)
+    return PushingContacts(
+        pushing.count + 1, select_lanes(is_it, 1.0, pushing.on), select_lanes(is_it, 1.0, pushing.is_back)
+    )
+
+
+@inlined
+def _open_pulling(current, pulling, pushing):
+    """Open the contact that would pull most, or both where a face tips."""
+    count, on, is_back = pushing
+    if current.what == ROUND_TIPS:
+        return PushingContacts(2, on - pulling, is_back)
+    return PushingContacts(count - 1, select_lanes(select_lane(current.loser), 0.0, on), is_back)
+
+
+@inlined
+def _solve_round(n, patient, is_mixed, pushing, problem, normal, motion, work):
+    """One round on the directions, and where they do not settle all rounds of `primal_dual_friction`.
+
+    Returns
+    -------
+    PatchRound
+    pulling : lanes
+        As `_direction_newton_round`.
+    mode : int
+        `TRY_SLIDING` or `TRY_MIXED`: which of the two methods had the last word.
+    """
+    none = Lanes(0.0, 0.0, 0.0, 0.0)
+    if is_mixed:
+        x, y = warm_start_friction(n, problem.patch, pushing.on, work)
+        current, pulling = PatchRound(ROUND_REVERSES, -1, none, x, y, (0.0, 0.0, 0.0, 0.0, 0.0), 0.0, motion), none
+    else:
+        current, pulling = _direction_newton_round(patient, pushing, problem, normal, motion, work)
+    mode = TRY_SLIDING
+    if current.what == ROUND_REVERSES:
+        x, y, motion, mode = current.x, current.y, current.motion, TRY_MIXED
+        current = solve_stick_slip_patch(patient, pushing.on, x, y, problem, normal, motion, work)
+    return current, pulling, mode
+
+
+@inlined
+def solve_sliding_patch(n, patient, problem, start, is_mixed, work):
     """Directions and set of pushing contacts.
 
     Parameters
     ----------
+    n : int
+        Contacts, 3 or 4.
     patient : bool
         Whether a contact that pulls may push again while directions still turn. Otherwise it opens at once, which
         is quick and nearly always right.
-    goal : float
-        Tolerance of the residual [m/s].
-    loose : float
-        Speed up to which an open contact may close while it is sought which others push [m/s].
+    problem : PatchProblem
     start : tuple of 3 floats
         Planar motion to start from.
     is_mixed : bool
         Whether some contacts held in the stage before: then its impulses in `work` are the start.
-    u, w, K
-        Velocity and angular velocity without contact impulses, inverse inertia: in the stretched frame of the wall.
 
     Returns
     -------
-    found : bool
-    impulses : tuple of 3 lanes
-        Of each contact (normal, tangents) [N s].
-    exerted : tuple of 5 floats
-        Their sums along the tangents, and moments.
-    push : float
-        Sum of the normal impulses [N s].
-    residual : float
-        [m/s].
+    PatchSolution
+        When it is found by a round, `work.mode` says by which method.
     has_opened : bool
         Whether a contact was opened since it pulled: else patience changes nothing.
     """
-    ratio = friction_ratio(work)
-    mass_b = ratio * ratio * inv_mass
-    on, has_opened = valid_lanes_mask(n), False
-    none = is_back = Lanes(0.0, 0.0, 0.0, 0.0)
-    count, motion, is_set, is_even, again, closing = n, start, False, False, -1, -1
-    center = normal_motion = start
+    none, has_opened = Lanes(0.0, 0.0, 0.0, 0.0), False
+    pushing, choice = PushingContacts(n, valid_lanes_mask(n), none), NormalChoice(False, -1, False, start)
+    motion, is_set, again = start, False, -1
+    normal = normal_motion_about(n, start, start, problem.body)
     for _ in range(_MAX_PATCH_SOLVES):
         if again >= 0:
-            if is_back[again] > 0.0:
+            if pushing.is_back[again] > 0.0:
                 break
-            count, on, is_back = (
-                count + 1,
-                select_lanes(select_lane(again), 1.0, on),
-                select_lanes(select_lane(again), 1.0, is_back),
-            )
-            again, is_set = -1, False
-        if count < 3:
-            found, impulses, exerted, push, miss, again = _solve_remaining_pair(
-                patch, on, mu, goal, axes, u, w, inv_mass, K, work
-            )
+            pushing, is_set, again = _push_again(again, pushing), False, -1
+        if pushing.count < 3:
+            pair, again = _solve_remaining_pair(pushing.on, problem, work)
             if again < 0:
-                return found, impulses, exerted, push, miss, has_opened
-            motion = planar_motion_after(exerted, u, w, inv_mass, mass_b, K)
+                return pair, has_opened
+            motion = planar_motion_after(pair.exerted, problem.body, work)
             continue
-        if not is_set and is_even:
-            center = patch_centroid(count, patch, on)
-        elif not is_set:
-            ok, closing, count, on, center, normal_motion, is_even = _choose_normal_motion(
-                count, goal, loose, patch, on, u, w
-            )
-            if not ok:
+        if not is_set:
+            pushing, center, choice = _choose_normal_motion(pushing, choice, problem)
+            if not choice.ok:
                 break
-        is_set = True
-        vn, wa, wb = normal_motion
-        push = (vn - u[0]) / inv_mass
-        y0, gain = push / count, (wa - w[1], wb - w[2])
-        what, mode = ROUND_REVERSES, TRY_SLIDING
-        if is_mixed:
-            x, y = warm_start_friction(n, patch, on, work)
-        else:
-            what, loser, pulling, p, x, y, exerted, miss, motion = _direction_newton_round(
-                patient, count, patch, on, mu, goal, center, y0, gain, motion, u, w, wa, wb, inv_mass, K, work
-            )
-        if what == ROUND_REVERSES:
-            what, loser, p, x, y, exerted, miss, motion = solve_stick_slip_patch(
-                patient, patch, on, x, y, mu, goal, loose, center, y0, gain, motion, u, w, wa, wb, inv_mass, K, work
-            )
-            is_mixed, mode = False, TRY_MIXED
-        if what == ROUND_FAILED:
+            normal, is_set = normal_motion_about(pushing.count, center, choice.motion, problem.body), True
+        current, pulling, mode = _solve_round(n, patient, is_mixed, pushing, problem, normal, motion, work)
+        motion, is_mixed = current.motion, False
+        if current.what == ROUND_FAILED:
             break
-        if what == ROUND_SOLVED and closing < 0:
-            work.mode = mode
-            return True, (p, p * x, p * y), exerted, push, miss, has_opened
-        if what == ROUND_SOLVED:
-            again = closing
-        if what == ROUND_TIPS:
-            count, on, is_set, motion, has_opened = 2, on - pulling, False, start, True
-        if what == ROUND_PULLS:
-            count, on, is_set, has_opened = count - 1, select_lanes(select_lane(loser), 0.0, on), False, True
+        if current.what == ROUND_SOLVED and choice.closing < 0:
+            work.mode, p = mode, current.p
+            impulses = p, p * current.x, p * current.y
+            return PatchSolution(True, impulses, current.exerted, normal.push, current.miss), has_opened
+        if current.what == ROUND_SOLVED:
+            again = choice.closing
+        if current.what == ROUND_PULLS or current.what == ROUND_TIPS:
+            pushing, is_set, has_opened = _open_pulling(current, pulling, pushing), False, True
             if not patient:
                 motion = start
-    return False, (none, none, none), (0.0, 0.0, 0.0, 0.0, 0.0), 0.0, 0.0, has_opened
+    return PatchSolution(False, (none, none, none), (0.0, 0.0, 0.0, 0.0, 0.0), 0.0, 0.0), has_opened

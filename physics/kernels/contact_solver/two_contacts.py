@@ -12,6 +12,7 @@ Where the cone does not allow p_i, contact i slides against it, and that is the 
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 from physics.kernels.compile.decorators import inlined, kernel
 from physics.kernels.contact_law.anisotropic_friction import friction_ratio
@@ -54,24 +55,138 @@ def _transposed(W):
     return W[0], W[3], W[6], W[1], W[4], W[7], W[2], W[5], W[8]
 
 
+class WallContact(NamedTuple):
+    """A contact in the stretched frame (normal, tangents) of its wall.
+
+    Attributes
+    ----------
+    place : tuple of 3 floats
+        Coordinates from the centre of mass [m].
+    approach : tuple of 3 floats
+        Velocity without contact impulses, less the target [m/s].
+    impulse : tuple of 3 floats
+        Warm start [N s]; 0 without friction.
+    """
+
+    place: tuple
+    approach: tuple
+    impulse: tuple
+
+
+class PairProblem(NamedTuple):
+    """Contact problem of two contacts: u_1 = W_11 p_1 + W_12 p_2 + b_1, u_2 = W_12ᵀ p_1 + W_22 p_2 + b_2.
+
+    Attributes
+    ----------
+    W11, W12, W22 : tuple of 9 floats
+        Blocks of the Delassus matrix, row by row [1/kg].
+    b1, b2 : tuple of 3 floats
+        Velocities without contact impulses, less the targets [m/s].
+    mu : float
+        Coefficient of friction.
+    goal : float
+        Tolerance of the residual [m/s].
+    """
+
+    W11: tuple
+    W12: tuple
+    W22: tuple
+    b1: tuple
+    b2: tuple
+    mu: float
+    goal: float
+
+
+class PairTrial(NamedTuple):
+    """Impulses that were tried for two contacts, and where to go on from.
+
+    Attributes
+    ----------
+    found : bool
+        Whether they solve the problem.
+    p, q : tuple of 3 floats
+        Impulses of the first and of the second contact [N s].
+    miss : float
+        Residual [m/s].
+    first, second : tuple of 2 floats
+        Friction -μ d per normal impulse, d the direction of sliding, of each contact.
+    """
+
+    found: bool
+    p: tuple
+    q: tuple
+    miss: float
+    first: tuple
+    second: tuple
+
+
+class SlidingPair(NamedTuple):
+    """Two contacts that slide in given directions, their normal velocities on target.
+
+    Attributes
+    ----------
+    p1, p2 : float
+        Normal impulses [N s].
+    miss1, miss2 : float
+        Residuals [m/s]; infinite where a contact moves backwards.
+    inverse : tuple of 4 floats
+        Matrix (a_11, a_12, a_21, a_22) of the normal impulses over its determinant [kg].
+    g11, g12, g21, g22 : tuple of 2 floats
+        g_ij: tangential velocity of contact i per normal impulse of j, friction along with it [1/kg].
+    along1, along2 : float
+        μ times the velocities along the directions [m/s].
+    across1, across2 : float
+        μ times those across [m/s].
+    """
+
+    p1: float
+    p2: float
+    miss1: float
+    miss2: float
+    inverse: tuple
+    g11: tuple
+    g12: tuple
+    g21: tuple
+    g22: tuple
+    along1: float
+    along2: float
+    across1: float
+    across2: float
+
+
+@inlined
+def _swapped_problem(pair):
+    """The same problem with the contacts in the other order."""
+    return PairProblem(pair.W22, _transposed(pair.W12), pair.W11, pair.b2, pair.b1, pair.mu, pair.goal)
+
+
+@inlined
+def _swapped_trial(trial):
+    """A trial of the `_swapped_problem` as one of the problem."""
+    return PairTrial(trial.found, trial.q, trial.p, trial.miss, trial.second, trial.first)
+
+
 @kernel
-def _solve_with_open(Wi, Wji, bi, bj, mu, goal, x, y):
-    """Contact i alone, contact j open: (found, p_i, p_j, residual, direction of i, and of j, to go on from)."""
-    zero = (0.0, 0.0, 0.0)
+def _solve_with_open(pair, direction):
+    """Try the first contact alone, which slides in a `direction` at first, the second one open."""
+    Wi, bi, mu, goal = pair.W11, pair.b1, pair.mu, pair.goal
+    x, y = direction
     what, p, miss = solve_contact_block(Wi, bi, mu, Wi[4] + Wi[8], goal, x, y, True)
-    uj = _plus(bj, qt.matvec(Wji, p))
+    uj = _plus(pair.b2, qt.matvec(_transposed(pair.W12), p))
     if what == CONTACT_SLIDES:
         x, y = p[1] / p[0], p[2] / p[0]
     elif what == CONTACT_STICKS:
         x, y = friction_direction(-p[1], -p[2], mu)
-    xj, yj = friction_direction(uj[1], uj[2], mu)
-    return what != CONTACT_UNSOLVED and uj[0] >= -goal, p, zero, max(miss, -uj[0]), x, y, xj, yj
+    second, found = friction_direction(uj[1], uj[2], mu), what != CONTACT_UNSOLVED and uj[0] >= -goal
+    return PairTrial(found, p, (0.0, 0.0, 0.0), max(miss, -uj[0]), (x, y), second)
 
 
 @kernel
-def _solve_with_sticking(Wi, Wij, Wj, bi, bj, mu, goal, x, y):
-    """Contact i holds, j slides or opens: (found, p_i, p_j, residual, direction of i, and of j, to go on from)."""
+def _solve_with_sticking(pair, direction):
+    """Try that the first contact holds, and the second one slides, in a `direction` at first, or opens."""
+    Wi, Wij, Wj, bi, bj, mu, goal = pair
     Wji = _transposed(Wij)
+    x, y = direction
     k = (Wi[0], Wi[1], Wi[2], Wi[4], Wi[5], Wi[8])
     s0 = solve_symmetric(k, (Wij[0], Wij[3], Wij[6]))
     s1 = solve_symmetric(k, (Wij[1], Wij[4], Wij[7]))
@@ -92,20 +207,20 @@ def _solve_with_sticking(Wi, Wij, Wj, bi, bj, mu, goal, x, y):
     )
     holds = pi[0] >= 0.0 and pi[1] * pi[1] + pi[2] * pi[2] <= (mu * pi[0]) * (mu * pi[0])
     found = what != CONTACT_UNSOLVED and holds
-    xi, yi = friction_direction(-pi[1], -pi[2], mu)
     if what == CONTACT_SLIDES:
         x, y = pj[1] / pj[0], pj[2] / pj[0]
-    return found, pi, pj, miss, xi, yi, x, y
+    return PairTrial(found, pi, pj, miss, friction_direction(-pi[1], -pi[2], mu), (x, y))
 
 
 @inlined
-def _solve_both_sliding(W11, W12, W22, b1, b2, mu, x1, y1, x2, y2):
-    """Two contacts that slide in given directions: (p_1, p_2, misses, what `_direction_newton_step` goes on with)."""
+def _solve_both_sliding(pair, first, second):
+    """The `SlidingPair` of two directions."""
+    W11, W12, W22, b1, b2, mu, _ = pair
+    (x1, y1), (x2, y2) = first, second
     a11, a12 = W11[0] + (W11[1] * x1 + W11[2] * y1), W12[0] + (W12[1] * x2 + W12[2] * y2)
     a21, a22 = W12[0] + (W12[3] * x1 + W12[6] * y1), W22[0] + (W22[1] * x2 + W22[2] * y2)
     s = 1.0 / (a11 * a22 - a12 * a21)
     p1, p2 = s * (a12 * b2[0] - a22 * b1[0]), s * (a21 * b1[0] - a11 * b2[0])
-    # Tangential velocity of i per normal impulse of j, friction along with it.
     g11 = W11[3] + (W11[4] * x1 + W11[5] * y1), W11[6] + (W11[7] * x1 + W11[8] * y1)
     g12 = W12[3] + (W12[4] * x2 + W12[5] * y2), W12[6] + (W12[7] * x2 + W12[8] * y2)
     g21 = W12[1] + (W12[4] * x1 + W12[7] * y1), W12[2] + (W12[5] * x1 + W12[8] * y1)
@@ -119,13 +234,15 @@ def _solve_both_sliding(W11, W12, W22, b1, b2, mu, x1, y1, x2, y2):
     miss1 = sliding_residual(t * across1, t * along1, p1 * mu * (W11[4] + W11[8]))
     miss2 = sliding_residual(t * across2, t * along2, p2 * mu * (W22[4] + W22[8]))
     inverse = (s * a11, s * a12, s * a21, s * a22)
-    return p1, p2, miss1, miss2, (inverse, g11, g12, g21, g22, along1, along2, across1, across2)
+    return SlidingPair(p1, p2, miss1, miss2, inverse, g11, g12, g21, g22, along1, along2, across1, across2)
 
 
 @inlined
-def _direction_newton_step(W11, W12, W22, x1, y1, x2, y2, p1, p2, sliding):
+def _direction_newton_step(pair, first, second, sliding):
     """Newton's step of both directions [rad]: turning direction 1 by dα changes (x1, y1) by (-y1, x1) dα."""
-    inverse, g11, g12, g21, g22, along1, along2, across1, across2 = sliding
+    W11, W12, W22, _, _, _, _ = pair
+    p1, p2, _, _, inverse, g11, g12, g21, g22, along1, along2, across1, across2 = sliding
+    (x1, y1), (x2, y2) = first, second
     a11, a12, a21, a22 = inverse
     # What a turn of direction 1 does to p, then to u; then the same of direction 2.
     f1, f2 = p1 * (W11[2] * x1 - W11[1] * y1), p1 * (W12[6] * x1 - W12[3] * y1)
@@ -149,13 +266,15 @@ def _direction_newton_step(W11, W12, W22, x1, y1, x2, y2, p1, p2, sliding):
 
 
 @kernel
-def _solve_alternately(W11, W12, W22, b1, b2, mu, goal, p, q, x1, y1, x2, y2):
-    """Each contact answers the impulse of the other in turn, from impulses p and q on; then what it came to is tried.
+def _solve_alternately(pair, trial):
+    """Each contact answers the impulse of the other in turn, from a trial on; then what it came to is tried.
 
-    (found, p, q, residual, direction of the first, and of the second, to go on from). One of them was to hold or to
-    open and does not, or turns right round: Newton's method would go on to where friction pushes it along.
+    One of them was to hold or to open and does not, or turns right round: Newton's method would go on to where friction
+    pushes it along.
     """
-    W21, miss = _transposed(W12), 0.0
+    W11, W12, W22, b1, b2, mu, goal = pair
+    _, p, q, miss, (x1, y1), (x2, y2) = trial
+    W21 = _transposed(W12)
     first = second = CONTACT_SLIDES
     for _ in range(_SWEEPS_PER_ALTERNATION):
         first, p, miss = solve_contact_block(W11, _plus(b1, qt.matvec(W12, q)), mu, W11[4] + W11[8], goal, x1, y1, True)
@@ -166,81 +285,87 @@ def _solve_alternately(W11, W12, W22, b1, b2, mu, goal, p, q, x1, y1, x2, y2):
         )
         if q[0] > 0.0:
             x2, y2 = friction_direction(-q[1], -q[2], mu)
-    found = False
     if first == CONTACT_STICKS and second == CONTACT_SLIDES:
-        found, p, q, miss, x1, y1, x2, y2 = _solve_with_sticking(W11, W12, W22, b1, b2, mu, goal, x2, y2)
-    elif first == CONTACT_SLIDES and second == CONTACT_STICKS:
-        found, q, p, miss, x2, y2, x1, y1 = _solve_with_sticking(W22, W21, W11, b2, b1, mu, goal, x1, y1)
-    return found, p, q, miss, x1, y1, x2, y2
+        return _solve_with_sticking(pair, (x2, y2))
+    if first == CONTACT_SLIDES and second == CONTACT_STICKS:
+        return _swapped_trial(_solve_with_sticking(_swapped_problem(pair), (x1, y1)))
+    return PairTrial(False, p, q, miss, (x1, y1), (x2, y2))
 
 
 @inlined
-def solve_block_pair(W11, W12, W22, b1, b2, mu, goal, x1, y1, x2, y2):
-    """Impulses of two contacts: (found, p_1, p_2, residual [m/s])."""
-    W21 = _transposed(W12)
+def _turn_directions(pair, trial, sliding):
+    """The trial with both directions turned by Newton's step."""
+    (x1, y1), (x2, y2) = trial.first, trial.second
+    turn1, turn2 = _direction_newton_step(pair, trial.first, trial.second, sliding)
+    first, second = rotate_direction(x1, y1, turn1), rotate_direction(x2, y2, turn2)
+    return PairTrial(False, trial.p, trial.q, trial.miss, first, second)
+
+
+@inlined
+def _try_sliding(sliding, first, second, goal):
+    """The trial of two contacts that slide."""
+    p1, p2, (x1, y1), (x2, y2) = sliding.p1, sliding.p2, first, second
+    worst = max(sliding.miss1, sliding.miss2)
+    found = p1 >= 0.0 and p2 >= 0.0 and worst <= goal
+    return PairTrial(found, (p1, p1 * x1, p1 * y1), (p2, p2 * x2, p2 * y2), worst, first, second)
+
+
+@inlined
+def solve_block_pair(pair, first, second):
+    """The `PairTrial` that solves a `PairProblem`, from these directions (-μ d) on."""
+    swapped = _swapped_problem(pair)
     held1 = held2 = opened = turns = 0
     for _ in range(_MAX_NEWTON_STEPS):
         is_stuck = False
-        p1, p2, miss1, miss2, sliding = _solve_both_sliding(W11, W12, W22, b1, b2, mu, x1, y1, x2, y2)
-        worst, q1, q2 = max(miss1, miss2), (p1, p1 * x1, p1 * y1), (p2, p2 * x2, p2 * y2)
-        if not (p1 >= 0.0 and p2 >= 0.0):
-            if p1 >= p2:
-                found, q1, q2, worst, x1, y1, x2, y2 = _solve_with_open(W11, W21, b1, b2, mu, goal, x1, y1)
+        sliding = _solve_both_sliding(pair, first, second)
+        trial = _try_sliding(sliding, first, second, pair.goal)
+        if trial.found:
+            return trial
+        if not (sliding.p1 >= 0.0 and sliding.p2 >= 0.0):
+            if sliding.p1 >= sliding.p2:
+                trial = _solve_with_open(pair, first)
             else:
-                found, q2, q1, worst, x2, y2, x1, y1 = _solve_with_open(W22, W12, b2, b1, mu, goal, x2, y2)
-            if found:
-                return True, q1, q2, worst
+                trial = _swapped_trial(_solve_with_open(swapped, second))
             is_stuck, opened = opened >= _MAX_RECLOSURES, opened + 1  # the open one closes: once more with both
-        elif worst <= goal:
-            return True, q1, q2, worst
-        elif miss1 == math.inf and held1 < _MAX_STICK_TRIALS:
+        elif sliding.miss1 == math.inf and held1 < _MAX_STICK_TRIALS:
             held1 += 1
-            found, q1, q2, worst, x1, y1, x2, y2 = _solve_with_sticking(W11, W12, W22, b1, b2, mu, goal, x2, y2)
-            if found:
-                return True, q1, q2, worst
-        elif miss2 == math.inf and held2 < _MAX_STICK_TRIALS:
+            trial = _solve_with_sticking(pair, second)
+        elif sliding.miss2 == math.inf and held2 < _MAX_STICK_TRIALS:
             held2 += 1
-            found, q2, q1, worst, x2, y2, x1, y1 = _solve_with_sticking(W22, W21, W11, b2, b1, mu, goal, x1, y1)
-            if found:
-                return True, q1, q2, worst
-        elif worst == math.inf:
+            trial = _swapped_trial(_solve_with_sticking(swapped, first))
+        elif trial.miss == math.inf:
             is_stuck = True
         else:
-            turn1, turn2 = _direction_newton_step(W11, W12, W22, x1, y1, x2, y2, p1, p2, sliding)
-            x1, y1 = rotate_direction(x1, y1, turn1)
-            x2, y2 = rotate_direction(x2, y2, turn2)
-        if is_stuck:
+            trial = _turn_directions(pair, trial, sliding)
+        if is_stuck and not trial.found:
             if turns == _MAX_ALTERNATIONS:
                 break
-            found, q1, q2, worst, x1, y1, x2, y2 = _solve_alternately(
-                W11, W12, W22, b1, b2, mu, goal, q1, q2, x1, y1, x2, y2
-            )
-            if found:
-                return True, q1, q2, worst
+            trial = _solve_alternately(pair, trial)
             held1, held2, turns = 0, 0, turns + 1
-    return False, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), 0.0
+        if trial.found:
+            return trial
+        first, second = trial.first, trial.second
+    return PairTrial(False, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), 0.0, first, second)
 
 
 @inlined
-def contact_in_wall_frame(i, axes, u, w, work):
-    """Coordinates of contact i, its velocity without impulses less its target, and its impulse so far.
-
-    All (normal, tangents) in the stretched frame of the wall with these axes; u, w are the body's motion there. Without
-    friction there are no impulses so far.
-    """
+def contact_in_wall_frame(i, body, work):
+    """The `WallContact` of contact i of a `FreeBody`, with its impulse so far. Without friction there is none."""
+    axes, u, w = body.axes, body.u, body.w
     arm, ratio = (work.arm[i, 0], work.arm[i, 1], work.arm[i, 2]), friction_ratio(work)
     place = (ratio * qt.dot(axes[0], arm), ratio * qt.dot(axes[1], arm), qt.dot(axes[2], arm))
     f, impulse = point_velocity(place, u, w), (0.0, 0.0, 0.0)
     if work.mu > 0.0:
         impulse = (work.impulse[3 * i], work.impulse[3 * i + 1], work.impulse[3 * i + 2] / ratio)
-    return place, (f[0] - work.target[i, 0], f[1] - work.target[i, 1], f[2] - ratio * work.target[i, 2]), impulse
+    approach = f[0] - work.target[i, 0], f[1] - work.target[i, 1], f[2] - ratio * work.target[i, 2]
+    return WallContact(place, approach, impulse)
 
 
 @inlined
-def solve_one_contact(first, mu, goal, inv_mass, K, work):
-    """Impulse of a single contact, of `contact_in_wall_frame`: (found, impulse, moment, residual [m/s])."""
-    r, b, impulse = first
-    W = add_block_compliance(diagonal_delassus_block(r, inv_mass, friction_ratio(work), K), work)
+def solve_one_contact(contact, mu, goal, body, work):
+    """Impulse of a single `WallContact`: (found, impulse [N s], moment [N m s], residual [m/s])."""
+    r, b, impulse = contact
+    W = add_block_compliance(diagonal_delassus_block(r, body.inv_mass, friction_ratio(work), body.K), work)
     x = y = 0.0
     if mu > 0.0:
         f = qt.matvec(W, impulse)
@@ -251,8 +376,10 @@ def solve_one_contact(first, mu, goal, inv_mass, K, work):
 
 
 @inlined
-def _frictionless_response(W11, W12, W22, b1, b2):
-    """Changes of velocity, by impulses without friction, of two contacts that approach with b1 and b2 (< 0) [m/s]."""
+def _frictionless_response(pair):
+    """Changes of velocity [m/s], by impulses without friction, of two contacts that approach."""
+    W11, W12, W22 = pair.W11, pair.W12, pair.W22
+    b1, b2 = pair.b1[0], pair.b2[0]
     s = 1.0 / (W11[0] * W22[0] - W12[0] * W12[0])
     p1, p2 = s * (W12[0] * b2 - W22[0] * b1), s * (W12[0] * b1 - W11[0] * b2)
     if p1 < 0.0:
@@ -266,8 +393,17 @@ def _frictionless_response(W11, W12, W22, b1, b2):
 
 
 @inlined
-def solve_two_contacts(first, second, mu, goal, inv_mass, K, work):
-    """Impulses of two contacts (see `contact_in_wall_frame`).
+def solve_two_contacts(first, second, mu, goal, body, work):
+    """Impulses of two contacts.
+
+    Parameters
+    ----------
+    first, second : WallContact
+    mu : float
+        Coefficient of friction.
+    goal : float
+        Tolerance of the residual [m/s].
+    body : FreeBody
 
     Returns
     -------
@@ -275,24 +411,26 @@ def solve_two_contacts(first, second, mu, goal, inv_mass, K, work):
     p, q : tuples of 3 floats
         Of the first and of the second [N s].
     moment : tuple of 3 floats
-        Of both.
+        Of both [N m s].
     residual : float
         [m/s].
     """
     (r, b1, f), (s, b2, g) = first, second
-    ratio = friction_ratio(work)
+    inv_mass, K, ratio = body.inv_mass, body.K, friction_ratio(work)
     W11, W22 = (
         add_block_compliance(diagonal_delassus_block(r, inv_mass, ratio, K), work),
         add_block_compliance(diagonal_delassus_block(s, inv_mass, ratio, K), work),
     )
     W12 = delassus_block(r, s, inv_mass, ratio, K)
-    x1 = y1 = x2 = y2 = 0.0
+    pair, directions = PairProblem(W11, W12, W22, b1, b2, mu, goal), ((0.0, 0.0), (0.0, 0.0))
     if mu > 0.0:
         u1 = _plus(qt.matvec(W11, f), qt.matvec(W12, g))
         u2 = _plus(qt.matvec(W22, g), qt.matvec(_transposed(W12), f))
         if not (is_warm_start_valid(u1[0], -b1[0]) and is_warm_start_valid(u2[0], -b2[0])):
-            u1, u2 = _frictionless_response(W11, W12, W22, b1[0], b2[0])
-        x1, y1 = friction_direction(b1[1] + u1[1], b1[2] + u1[2], mu)
-        x2, y2 = friction_direction(b2[1] + u2[1], b2[2] + u2[2], mu)
-    found, p, q, miss = solve_block_pair(W11, W12, W22, b1, b2, mu, goal, x1, y1, x2, y2)
-    return found, p, q, _plus(qt.cross(r, p), qt.cross(s, q)), miss
+            u1, u2 = _frictionless_response(pair)
+        directions = (
+            friction_direction(b1[1] + u1[1], b1[2] + u1[2], mu),
+            friction_direction(b2[1] + u2[1], b2[2] + u2[2], mu),
+        )
+    trial = solve_block_pair(pair, directions[0], directions[1])
+    return trial.found, trial.p, trial.q, _plus(qt.cross(r, trial.p), qt.cross(s, trial.q)), trial.miss
