@@ -31,8 +31,11 @@ References
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
-from physics.kernels.compile.decorators import kernel
+import numpy as np
+
+from physics.kernels.compile.decorators import inlined, kernel
 from physics.kernels.lcp.dantzig import dantzig, dantzig_sizes
 from physics.kernels.lcp.lemke import lemke, lemke_sizes
 from physics.kernels.lcp.scaling_and_certificate import (
@@ -51,6 +54,30 @@ RETRY_ANGLE = 1.0  # [rad], no fraction of a turn: no two pyramids come to stand
 _R = math.sqrt(0.5)
 COSINE = (1.0, _R, 0.0, -_R, -1.0, -_R, 0.0, _R)
 SINE = (0.0, _R, 1.0, _R, 0.0, -_R, -1.0, -_R)
+
+
+class PyramidProblem(NamedTuple):
+    """The complementarity problem of n contacts and room to solve it: views of one array, m = 10 n unknowns.
+
+    Attributes
+    ----------
+    M : (m, m) float64
+        Matrix: w_scale W between normals and directions, and the rows of the cones.
+    q : (m,) float64
+        Right side [m/s].
+    z : (m,) float64
+        Unknowns p_n, beta_0 .. beta_7, lambda of each contact; w_scale times p_n and beta are impulses [N s].
+    tableau : (m + 3, m + 2) float64
+        Of Lemke's method.
+    heading : (n, 2) float64
+        Direction d_0 of each contact.
+    """
+
+    M: np.ndarray
+    q: np.ndarray
+    z: np.ndarray
+    tableau: np.ndarray
+    heading: np.ndarray
 
 
 def pyramid_sizes(n_max: int) -> tuple[int, int]:
@@ -169,6 +196,23 @@ def store_pyramid_impulses(z, mu, n, w_scale, heading, p):
         p[3 * i + 2] = y * shrink * w_scale
 
 
+@inlined
+def _pyramid_problem(n, work):
+    """The `PyramidProblem` in `work`, whose contents are not set."""
+    size = UNKNOWNS_PER_CONTACT * n
+    rows, columns = size + 3, size + 2
+    end_M = size * size
+    end_tableau = end_M + rows * columns
+    end_z = end_tableau + 2 * size
+    return PyramidProblem(
+        work[:end_M].reshape((size, size)),
+        work[end_tableau : end_tableau + size],
+        work[end_tableau + size : end_z],
+        work[end_M:end_tableau].reshape((rows, columns)),
+        work[end_z : end_z + 2 * n].reshape((n, 2)),
+    )
+
+
 @kernel
 def solve_pyramid_lcp(W, b, mu, n, p, work, index, max_pivots):
     """Solve the contact problem with a friction pyramid of eight directions by Lemke's method.
@@ -204,15 +248,7 @@ def solve_pyramid_lcp(W, b, mu, n, p, work, index, max_pivots):
     10⁵ problems, rounding loses one: a path without a result is followed once more with every
     pyramid turned. Multiplying W, or b, by a power of two gives exactly the scaled p.
     """
-    size = UNKNOWNS_PER_CONTACT * n
-    (rows, columns) = (size + 3, size + 2)
-    end_M = size * size
-    end_tableau = end_M + rows * columns
-    M = work[:end_M].reshape((size, size))
-    tableau = work[end_M:end_tableau].reshape((rows, columns))
-    q = work[end_tableau : end_tableau + size]
-    z = work[end_tableau + size : end_tableau + 2 * size]
-    heading = work[end_tableau + 2 * size : end_tableau + 2 * size + 2 * n].reshape((n, 2))
+    M, q, z, tableau, heading = _pyramid_problem(n, work)
     largest = 0.0
     for i in range(3 * n):
         if not mu[i // 3] >= 0.0 or not math.isfinite(p[i]):

@@ -29,6 +29,7 @@ than `work.unseen`.
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 from physics.kernels.compile.decorators import inlined
 from physics.kernels.contact_solver.impulse_distribution import (
@@ -53,9 +54,48 @@ _COLLINEAR_LIMIT = 1.0e-6
 _RIGID_TWIST_TOLERANCE = 1.0e-11
 
 
+class FreeMotion(NamedTuple):
+    """Motion of the body without contact impulses, world frame.
+
+    Attributes
+    ----------
+    R : tuple of 9 floats
+        Principal frame to world.
+    v : tuple of 3 floats
+        Velocity of the centre of mass [m/s].
+    L : tuple of 3 floats
+        Angular momentum about it [kg m²/s].
+    """
+
+    R: tuple
+    v: tuple
+    L: tuple
+
+
+class BoltGroup(NamedTuple):
+    """Contacts that hold, flagged in `work.active`, world frame.
+
+    Attributes
+    ----------
+    count : int
+        How many.
+    center : tuple of 3 floats
+        Their centroid r̄, from the centre of mass [m].
+    second : tuple of 6 floats
+        Their second moment K (00, 01, 02, 11, 12, 22) about the centroid [m²].
+    is_line : bool
+        Whether they are on a line, or at a point.
+    """
+
+    count: int
+    center: tuple
+    second: tuple
+    is_line: bool
+
+
 @inlined
-def _centroid_and_second_moment(n, count, work):
-    """Centroid of the active contact points and their second moment about it."""
+def _bolt_group(n, count, work):
+    """The `BoltGroup` of the active contacts."""
     cx = cy = cz = 0.0
     for i in range(n):
         if work.active[i] == 0:
@@ -75,7 +115,8 @@ def _centroid_and_second_moment(n, count, work):
         yy += y * y
         yz += y * z
         zz += z * z
-    return c, (yy + zz, -xy, -xz, xx + zz, -yz, xx + yy)
+    k = (yy + zz, -xy, -xz, xx + zz, -yz, xx + yy)
+    return BoltGroup(count, c, k, count < 3 or _is_collinear(k))
 
 
 @inlined
@@ -106,8 +147,9 @@ def _largest_target_speed(n, work):
 
 
 @inlined
-def _target_moments(n, count, c, work):
+def _target_moments(n, group, work):
     """Mean of the target velocities, and Σ d_i x t_i."""
+    count, c = group.count, group.center
     s = (0.0, 0.0, 0.0)
     m = (0.0, 0.0, 0.0)
     for i in range(n):
@@ -140,13 +182,13 @@ def _target_residual(n, v, w, work):
 
 
 @inlined
-def _angular_velocity_about_line(n, c, k, vc, m, R, v, L, work):
+def _angular_velocity_about_line(n, group, vc, m, free, work):
     """Angular velocity of a body held at points on a line.
 
     Across the line it is the least-squares fit Σ d x t / Σ|d|². Along the unit vector e it is α with
     e·(I ω - L - c x m (v₁ - v)) = 0, v₁ = v_c - ω x c: the contacts exert no moment about the line.
     """
-    J = work.J
+    J, c, k, (R, v, L) = work.J, group.center, group.second, free
     first = minus(contact_arm(work, first_active(n, work)), c)
     size2 = 0.5 * (k[0] + k[3] + k[5])
     s = 1.0 / math.sqrt(first[0] * first[0] + first[1] * first[1] + first[2] * first[2])
@@ -164,9 +206,9 @@ def _angular_velocity_about_line(n, c, k, vc, m, R, v, L, work):
 
 
 @inlined
-def _point_impulse(r, t, R, v, L, work):
+def _point_impulse(r, t, free, work):
     """Impulse at r that gives the point the velocity t, by its inverse mass in the principal frame."""
-    J, q = work.J, 1.0 / work.mass
+    J, q, (R, v, L) = work.J, 1.0 / work.mass, free
     x, y, z = qt.transposed_matvec(R, r)
     Lb = qt.transposed_matvec(R, L)
     wb = (J[0] * Lb[0], J[1] * Lb[1], J[2] * Lb[2])
@@ -181,44 +223,46 @@ def _point_impulse(r, t, R, v, L, work):
 
 
 @inlined
-def _sticking_twist(n, count, c, k, is_line, no_target, R, v, L, work):
+def _sticking_twist(n, group, no_target, free, work):
     """Velocity and angular velocity of the body when the active contacts take their targets."""
     zero = (0.0, 0.0, 0.0)
-    if no_target and not is_line:
+    if no_target and not group.is_line:
         return zero, zero
-    vc, m = _target_moments(n, count, c, work)
-    if count == 1:
-        J = work.J
-        P = _point_impulse(c, vc, R, v, L, work)
+    c = group.center
+    vc, m = _target_moments(n, group, work)
+    if group.count == 1:
+        J, R, L = work.J, free.R, free.L
+        P = _point_impulse(c, vc, free, work)
         m = qt.cross(c, P)
         b = qt.transposed_matvec(R, (L[0] + m[0], L[1] + m[1], L[2] + m[2]))
         w = qt.matvec(R, (J[0] * b[0], J[1] * b[1], J[2] * b[2]))
-    elif is_line:
-        w = _angular_velocity_about_line(n, c, k, vc, m, R, v, L, work)
+    elif group.is_line:
+        w = _angular_velocity_about_line(n, group, vc, m, free, work)
     else:
-        w = solve_symmetric(k, m)
+        w = solve_symmetric(group.second, m)
     return minus(vc, qt.cross(w, c)), w
 
 
 @inlined
-def _solve_bolt_group(count, k, is_line, T):
+def _solve_bolt_group(group, T):
     """K⁻¹ T of the bolt group: 2 T / tr K on a line, 0 at a point."""
-    if count == 1:
+    k = group.second
+    if group.count == 1:
         return (0.0, 0.0, 0.0)
-    if is_line:
+    if group.is_line:
         s = 2.0 / (k[0] + k[3] + k[5])
         return (s * T[0], s * T[1], s * T[2])
     return solve_symmetric(k, T)
 
 
 @inlined
-def _restore_moment(n, count, c, k, is_line, T, work):
+def _restore_moment(n, group, T, work):
     """Restore the moment T of the impulses of `distribute_by_load`: True if they stay in their cones.
 
     It shares them out as if all contacts were equally deep in the wall, which is so to a few slops; the moment
     that is missing for it makes one more bolt group, (K⁻¹ ΔT) x d_i.
     """
-    walls = work.walls
+    walls, c = work.walls, group.center
     mx, my, mz = T
     for i in range(n):
         if work.active[i] == 0:
@@ -228,7 +272,7 @@ def _restore_moment(n, count, c, k, is_line, T, work):
         p = wall_to_world(wall_axes(walls, wall), pn, pa, pb, (0.0, 0.0, 0.0))
         m = qt.cross(d, p)
         mx, my, mz = mx - m[0], my - m[1], mz - m[2]
-    a = _solve_bolt_group(count, k, is_line, (mx, my, mz))
+    a = _solve_bolt_group(group, (mx, my, mz))
     for i in range(n):
         if work.active[i] == 0:
             continue
@@ -244,9 +288,9 @@ def _restore_moment(n, count, c, k, is_line, T, work):
 
 
 @inlined
-def _largest_free_speed(n, R, v, L, work):
+def _largest_free_speed(n, free, work):
     """Largest contact velocity without impulses, relative to the target [m/s]: the scale of a residual."""
-    J = work.J
+    J, (R, v, L) = work.J, free
     b = qt.transposed_matvec(R, L)
     w = qt.matvec(R, (J[0] * b[0], J[1] * b[1], J[2] * b[2]))
     largest = 0.0
@@ -277,31 +321,30 @@ def solve_all_sticking(n, R, v, L, work):
     v, L : tuple of 3 floats
         With the contact impulses, when found.
     """
-    J, mass = work.J, work.mass
+    J, mass, free = work.J, work.mass, FreeMotion(R, v, L)
     largest = _largest_target_speed(n, work)
     for i in range(n):
         work.active[i] = 1
     count = n
     while count > 0:
-        c, k = _centroid_and_second_moment(n, count, work)
-        is_line = count < 3 or _is_collinear(k)
-        v_new, w_new = _sticking_twist(n, count, c, k, is_line, largest == 0.0, R, v, L, work)
+        group = _bolt_group(n, count, work)
+        v_new, w_new = _sticking_twist(n, group, largest == 0.0, free, work)
         wb = qt.transposed_matvec(R, w_new)
         L_new = qt.matvec(R, (wb[0] / J[0], wb[1] / J[1], wb[2] / J[2]))
         F = (mass * (v_new[0] - v[0]), mass * (v_new[1] - v[1]), mass * (v_new[2] - v[2]))
-        m = qt.cross(c, F)
+        m = qt.cross(group.center, F)
         T = (L_new[0] - L[0] - m[0], L_new[1] - L[1] - m[1], L_new[2] - L[2] - m[2])
-        a = _solve_bolt_group(count, k, is_line, T)
-        loser, holds = distribute_by_bolt_group(n, count, c, F, a, work)
+        a = _solve_bolt_group(group, T)
+        loser, holds = distribute_by_bolt_group(n, count, group.center, F, a, work)
         if loser < 0:
-            if not holds and not (distribute_by_load(n, work) and _restore_moment(n, count, c, k, is_line, T, work)):
+            if not holds and not (distribute_by_load(n, work) and _restore_moment(n, group, T, work)):
                 return False, v, L, 0.0
             residual = 0.0
             if largest > 0.0 or count < n:
                 miss = _target_residual(n, v_new, w_new, work)
                 if not miss <= _RIGID_TWIST_TOLERANCE * largest:
                     if miss > work.unseen:
-                        residual = miss / _largest_free_speed(n, R, v, L, work)
+                        residual = miss / _largest_free_speed(n, free, work)
                     if not residual <= work.tolerance:
                         return False, v, L, 0.0
             for i in range(n):
