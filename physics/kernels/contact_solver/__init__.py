@@ -1,1 +1,106 @@
-"""Solvers of the contact problem of one body, from closed forms to Newton's method."""
+"""Solvers of the contact problem of one body, from closed forms to Newton's method, and the contract they share.
+
+The problem
+-----------
+A body has n contacts. Contact i has the impulse p_i = (normal, tangent 1, tangent 2) [N s] and the velocity u_i [m/s]
+along the same axes, less its target. With the Delassus matrix W = J M⁻¹ Jᵀ [1/kg] and the velocities b without
+impulses, less the targets,
+
+    u = W p + b,    0 <= p_n ⟂ u_n >= 0,    |p_t| <= μ p_n,    u_t = 0 or p_t = -μ p_n u_t/|u_t|.
+
+Walls with two coefficients of friction come as a stretched problem of this form (`contact_law.anisotropic_friction`),
+walls that give as a larger diagonal of W (`contact_law.compliance`). Without friction only the normal rows remain.
+
+Given
+-----
+n : int
+    Contacts, one at least.
+R : tuple of 9 floats
+    Principal frame to world.
+v, L : tuples of 3 floats
+    Velocity [m/s] and angular momentum [kg m²/s] without contact impulses, world frame.
+work : record
+    Work space of the body (`time_stepping.workspace`). Solvers read its members
+
+    - `slot`, `arm`, `target` of each contact, `walls`, `mass`, `J`, `radius`, `mu` and the members of its laws;
+    - `impulse`, the warm start: 3 n numbers with friction, n without; zeros where nothing is known;
+    - `mode`, the direct solve to try first, which did it last (`sliding_patch.TRY_STICKING`, `TRY_SLIDING`,
+      `TRY_MIXED`);
+    - `tolerance` of the relative residual, `still`, a tolerance of iterative solves [m/s], and `unseen`, the misfit of
+      targets that contacts that hold may have [m/s];
+    - `sweeps`, how many sweeps are made at most.
+
+Left behind
+-----------
+work.impulse
+    The solution, along the unit tangents of each wall.
+work.mode
+    The direct solve that did it. `single_wall` leaves it as it was for one contact, and for two that are left of a
+    face; so do iterative solves and pivoting.
+v, L, residual, sweeps, method
+    Returned by `solve.solve_contacts`: motion with the impulses, relative residual, sweeps and Newton steps made, and
+    `METHOD_DIRECT`, `METHOD_SWEEPS` or `METHOD_PIVOTING` (`state.layout`), the last method tried.
+
+All other members of `work` that a solver writes are scratch.
+
+Residual
+--------
+The natural map of the problem, in units of velocity. It is 0 at solutions and nowhere else:
+
+    max over i of   |p_n - max(0, p_n - ρ u_n)|/ρ   and   |p_t - disk(p_t - ρ_t u_t, μ p_n)|/ρ_t,
+
+with ρ = 1/W_nn, ρ_t = 1/λ_max(W_tt) of the contact's own block, and disk the projection onto a disk about 0 of the
+radius μ p_n. It is divided by the largest free contact speed, max |b|, unless that is 0. How it is measured depends on
+the solver:
+
+- Sweeps, Newton's method and pivoting measure it on the impulses that they leave (`gauss_seidel.cone_residual`,
+  `gauss_seidel.normal_residual`).
+- `single_wall` reports a bound of its tangential part, with W_aa + W_bb instead of λ_max(W_tt). Contacts that push have
+  their normal target, and open ones do not close, to within the tolerance; of a face that is not in the residual.
+- `sticking` reports the largest distance of a velocity from its target, or the fastest approach of an open contact,
+  over the largest free speed along the axes of the world. It reports 0 where that is rounding, or at most `unseen`.
+
+Failure
+-------
+No solver raises. Each says so in its own way, and `solve_contacts` goes on to the next one:
+
+- A direct solver returns `found` False, and has changed neither `work.impulse` nor `work.mode`.
+- Sweeps and Newton's method return a residual above their tolerance, and leave the impulses they came to. Newton's
+  method leaves the best it met, so its residual is at most that of its start.
+- The LCP solvers return a status other than `LCP_SOLVED`, and leave the impulses as they were.
+- `solve_contacts` returns a residual above `work.tolerance`. Callers count that as unconverged
+  (`time_stepping.contact_stages.report_solve`). Velocities that are not finite have an infinite residual with friction.
+
+Comparisons are written `not residual <= tolerance`, so that a residual that is no number counts as failure.
+
+Solvers
+-------
+In the order in which `solve_contacts` tries them; the first result within its tolerance is taken.
+
+1. Direct, without W, to the tolerance `work.tolerance` max |b|. They return (found, v, L, relative residual).
+
+   a. `sticking.solve_all_sticking`: all contacts take their targets, or open. Any number of contacts and walls, with
+      friction, walls that do not give. It comes before b where it is likelier: for three or four contacts of one wall
+      if friction may stop them (`patch_algebra.may_stick`), for two, or several walls, if `work.mode` is
+      `TRY_STICKING`. Otherwise it comes after b, for a single contact always.
+   b. `single_wall.solve_single_wall`: contacts hold, slide or open. One to four contacts of one wall; at most two where
+      walls give. It tries `two_contacts.solve_one_contact` for one, `two_contacts.solve_two_contacts` for two, and
+      `sliding_patch.solve_sliding_patch` for three or four; the latter once more, patiently, if a contact opened and
+      nothing was found. That one in turn calls
+
+      - `primal_dual_friction.solve_stick_slip_patch`, where a direction of sliding would turn right round, and first
+        if `work.mode` is `TRY_MIXED` and the warm start is of the present loads;
+      - `two_contacts.solve_two_contacts`, once two contacts are left.
+
+2. Iterative, on the assembled `work.delassus` and `work.bias`, from `work.impulse` on. The tolerance is the smaller of
+   `work.tolerance` max |b| and `work.still`, but not below rounding. They return (sweeps or steps, residual [m/s]), and
+   leave u in `work.velocity`.
+
+   a. Without friction `gauss_seidel.normal_sweeps`; where walls give, after a few pivots of Dantzig's method.
+   b. With friction `gauss_seidel.cone_sweeps`, a dozen, in turn with `proximal_newton.proximal_newton`; where walls
+      give, Newton's method comes first. This goes on until `work.sweeps` sweeps are made.
+
+3. Pivoting, if the plan has it and the residual is above both the tolerance and 1 % of max |b|. With friction that is
+   `friction_pyramid.solve_pyramid_lcp` (Lemke's method), without it `friction_pyramid.solve_normal_lcp` (Dantzig's).
+   They return (status, pivots). Their result is kept if it has the smaller residual.
+"""
