@@ -1,0 +1,61 @@
+"""The recipes of `docs/architecture.md` do what they say, carried out from their text."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+
+import pytest
+
+from tests.docs import recipes
+
+TITLES = recipes.titles()
+
+
+@pytest.fixture(scope="module")
+def changed_packages(tmp_path_factory):
+    """A copy of the packages with all recipes carried out, so that their kernels are compiled under one digest."""
+    folder = tmp_path_factory.mktemp("recipes")
+    recipes.copy_packages(folder)
+    for title in TITLES:
+        recipes.apply(title, folder)
+    return folder
+
+
+def run(program: str, folder, cache) -> subprocess.CompletedProcess:
+    """Run a program on the packages in a folder."""
+    environment = {
+        **os.environ, "PYTHONPATH": str(folder), "NUMBA_CACHE_DIR": str(cache), "SDL_VIDEODRIVER": "dummy"
+    }  # fmt: skip
+    return subprocess.run(
+        [sys.executable, "-c", program], capture_output=True, text=True, cwd=folder, env=environment, timeout=600
+    )  # fmt: skip
+
+
+def test_there_are_four_in_order():
+    kinds = ["an effect", "a shape", "a contact solver", "a task"]
+    assert [f"Recipe {k}: add {kind}" for k, kind in enumerate(kinds, 1)] == TITLES
+
+
+@pytest.mark.parametrize("title", TITLES)
+def test_each_applies_alone_to_the_files_it_names(title, tmp_path):
+    recipes.copy_packages(tmp_path)
+    text = recipes.text_of(title)
+    for path in recipes.apply(title, tmp_path):
+        compile((tmp_path / path).read_text(encoding="utf-8"), path, "exec")
+        assert f"{path}\n" in text
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("title", TITLES)
+def test_the_proof_holds(title, changed_packages):
+    done = run(recipes.proof(title), changed_packages, changed_packages / "cache")
+    assert done.returncode == 0, done.stderr[-3000:]
+
+
+def test_a_hunk_that_does_not_fit_is_seen():
+    assert recipes.changed("a = 1\nb = 2\n", " a = 1\n+c = 3\n", "file") == "a = 1\nc = 3\nb = 2\n"
+    for text in ("b = 2\n", "a = 1\na = 1\n", "aa = 1\n"):
+        with pytest.raises(AssertionError, match=r"file has [02] places of"):
+            recipes.changed(text, "-a = 1\n", "file")
