@@ -44,7 +44,7 @@ def test_each_applies_alone_to_the_files_it_names(title, tmp_path):
     text = recipes.text_of(title)
     for path in recipes.apply(title, tmp_path):
         compile((tmp_path / path).read_text(encoding="utf-8"), path, "exec")
-        assert f"{path}\n" in text
+        assert f"`{path}`" in text
 
 
 @pytest.mark.slow
