@@ -69,7 +69,7 @@ No solver raises. Each says so in its own way, and `solve_contacts` goes on to t
   method leaves the best it met, so its residual is at most that of its start.
 - The LCP solvers return a status other than `LCP_SOLVED`, and leave the impulses as they were.
 - `solve_contacts` returns a residual above `work.tolerance`. Callers count that as unconverged
-  (`time_stepping.contact_stages.report_solve`). Velocities that are not finite have an infinite residual with friction.
+  (`state.body.report_solve`). Velocities that are not finite have an infinite residual with friction.
 
 Comparisons are written `not residual <= tolerance`, so that a residual that is no number counts as failure.
 
