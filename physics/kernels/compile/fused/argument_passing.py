@@ -26,8 +26,9 @@ class Arguments(ArgPacker):
     """
 
     def __init__(self, models, fe_args):
-        super().__init__(models, fe_args)
-        self._dm_args = [_ByAddress(model) if _is_large(model) else model for model in self._dm_args]
+        # Numba's own constructor would take large tuples apart, too.
+        self._fe_args, self._nargs = fe_args, len(fe_args)
+        self._dm_args = [_argument_model(models.lookup(each)) for each in fe_args]
         self._addresses = [model.get_argument_type() for model in self._dm_args if isinstance(model, _ByAddress)]
         words = [model.get_argument_type() for model in self._dm_args]
         self._unflattener = _Unflattener(words)
@@ -40,6 +41,18 @@ class Arguments(ArgPacker):
             if isinstance(word.type, ir.PointerType) and word.type in self._addresses:
                 for attribute in ("noalias", "nonnull"):
                     word.add_attribute(attribute)
+
+
+# By the identity of a model of Numba's: the model itself, which so lives as long, and the one of an argument.
+_ARGUMENT_MODELS: dict[int, tuple] = {}
+
+
+def _argument_model(model):
+    """`_ByAddress` for the model of a large tuple, any other model as it is; each is looked at once."""
+    known = _ARGUMENT_MODELS.get(id(model))
+    if known is None:
+        known = _ARGUMENT_MODELS[id(model)] = model, _ByAddress(model) if _is_large(model) else model
+    return known[1]
 
 
 def _is_large(model) -> bool:
