@@ -62,16 +62,16 @@ class Frictional:
         J, inverse = np.zeros((3 * self.count, 6 * bodies)), np.zeros((6 * bodies, 6 * bodies))
         for b in range(bodies):
             K = np.zeros((3, 3))
-            K[np.triu_indices(3)] = many.turning[b]
-            inverse[6 * b : 6 * b + 3, 6 * b : 6 * b + 3] = many.lightness[b] * np.eye(3)
+            K[np.triu_indices(3)] = many.bodies.inv_inertia[b]
+            inverse[6 * b : 6 * b + 3, 6 * b : 6 * b + 3] = many.bodies.inv_mass[b] * np.eye(3)
             inverse[6 * b + 3 : 6 * b + 6, 6 * b + 3 : 6 * b + 6] = K + np.triu(K, 1).T
         for k in range(self.count):
-            E = many.frame[k].reshape(3, 3)
-            for b, r, sign in zip(many.ends[k], many.arm[k].reshape(2, 3), (1, -1)):
+            E = many.contacts.frame[k].reshape(3, 3)
+            for b, r, sign in zip(many.contacts.bodies[k], many.contacts.arm[k].reshape(2, 3), (1, -1)):
                 if b >= 0:
                     J[3 * k : 3 * k + 3, 6 * b : 6 * b + 3] += sign * E
                     J[3 * k : 3 * k + 3, 6 * b + 3 : 6 * b + 6] += sign * np.cross(r, E)
-        return J, inverse, J @ self.twists.ravel() - many.target[: self.count].ravel()
+        return J, inverse, J @ self.twists.ravel() - many.contacts.target[: self.count].ravel()
 
 
 def textbook() -> Iterator[Complementarity]:
@@ -106,25 +106,25 @@ def pile(seed: int, bodies: int, contacts: int, mu: float, masses: float = 1.0) 
     rng = np.random.default_rng(seed)
     many = make_bodies_workspace(bodies, np.zeros((1, at.WALL_SIZE)), **SETTINGS)
     mass = masses ** rng.uniform(-1, 1, bodies)
-    many.bodies["mass"], many.bodies["radius"], many.lightness[:] = mass, 1.0, 1 / mass
+    many.bodies.work["mass"], many.bodies.work["radius"], many.bodies.inv_mass[:] = mass, 1.0, 1 / mass
     for b in range(bodies):
         A = rng.normal(size=(3, 3))
         K = (A @ A.T + np.eye(3)) / mass[b]
-        many.turning[b] = K[np.triu_indices(3)]
-    many.twist[:] = rng.normal(size=(bodies, 6))
-    many.twist[:, 1] -= 3.0
+        many.bodies.inv_inertia[b] = K[np.triu_indices(3)]
+    many.bodies.twist[:] = rng.normal(size=(bodies, 6))
+    many.bodies.twist[:, 1] -= 3.0
     n = bodies * contacts
     for k in range(n):
         b = k // contacts
         normal = np.array([0, 1, 0]) + 0.3 * rng.normal(size=3)
         frame = np.linalg.qr(np.column_stack([normal, rng.normal(size=(3, 2))]))[0].T
-        many.ends[k] = (b, b - 1) if b > 0 else (0, -1)
-        many.frame[k] = (frame * np.sign(frame[0] @ normal)).ravel()
-        many.arm[k] = rng.normal(size=6)
-    many.mu[:] = mu
-    many.touched[:] = 1
+        many.contacts.bodies[k] = (b, b - 1) if b > 0 else (0, -1)
+        many.contacts.frame[k] = (frame * np.sign(frame[0] @ normal)).ravel()
+        many.contacts.arm[k] = rng.normal(size=6)
+    many.contacts.mu[:] = mu
+    many.bodies.touched[:] = 1
     ratio = f", masses 1 : {masses**2:g}" if masses > 1.0 else ""
-    return Frictional(f"pile of {bodies}, {contacts} contacts each, μ = {mu}{ratio}", many, n, many.twist.copy())
+    return Frictional(f"pile of {bodies}, {contacts} contacts each, μ = {mu}{ratio}", many, n, many.bodies.twist.copy())
 
 
 def beginning(name: str, scene: physics.Scene) -> Frictional:
@@ -133,8 +133,8 @@ def beginning(name: str, scene: physics.Scene) -> Frictional:
     world.step()
     many = world.scratch[0]
     count = int(many.counts[NUM_CONTACTS])
-    many.target[:count] = 0.0
-    return Frictional(name, many, count, many.free.copy())
+    many.contacts.target[:count] = 0.0
+    return Frictional(name, many, count, many.bodies.free_twist.copy())
 
 
 def hard() -> Iterator[Frictional]:

@@ -164,16 +164,21 @@ def solve_bodies(method, times, n, twists, limit, many):
     for _ in range(times):
         for b in range(twists.shape[0]):
             for c in range(6):
-                many.twist[b, c] = many.free[b, c] = twists[b, c]
+                many.bodies.twist[b, c] = many.bodies.free_twist[b, c] = twists[b, c]
         for k in range(n):
-            many.queue[k] = k
+            many.islands.contacts[k] = k
         clear_all_impulses(n, many)
         if method == CHAIN:
             count, worst, _ = solve_contacts(n, True, many)
             continue
         scale, count = assemble_contact_blocks(n, many), 0
         for i in range(find_islands(n, many)):
-            part = (many.first_contact[i], many.first_contact[i + 1], many.first_body[i], many.first_body[i + 1])
+            part = (
+                many.islands.first_contact[i],
+                many.islands.first_contact[i + 1],
+                many.islands.first_body[i],
+                many.islands.first_body[i + 1],
+            )
             residual = max_contact_residual(part[0], part[1], True, many)
             more = _solve_island(method, part, residual, many.settings[0].tolerance * scale, limit, many)
             if more < 0:
@@ -188,16 +193,16 @@ def _dense_work(problem: problems.Frictional):
     n, (J, inverse, b) = problem.count, problem.dense()
     work = make_workspace(np.zeros((-(-n // FEATURES), at.WALL_SIZE)), FEATURES)[0]
     work["delassus"][: 3 * n, : 3 * n], work["bias"][: 3 * n] = J @ inverse @ J.T, b
-    work["friction"][:n] = problem.many.mu[:n]
+    work["friction"][:n] = problem.many.contacts.mu[:n]
     return work
 
 
 def _residual_of_impulses(problem: problems.Frictional, p: np.ndarray) -> float:
     """Relative residual of impulses (3 n,), by the same kernel for all."""
     many, n = problem.many, problem.count
-    many.twist[:], many.impulse[:n] = problem.twists, 0.0
+    many.bodies.twist[:], many.contacts.impulse[:n] = problem.twists, 0.0
     scale = assemble_contact_blocks(n, many)
-    many.twist[:], many.impulse[:n] = problem.twists, p.reshape(n, 3)
+    many.bodies.twist[:], many.contacts.impulse[:n] = problem.twists, p.reshape(n, 3)
     assemble_contact_blocks(n, many)
     return max_contact_residual(0, n, True, many) / scale
 
@@ -205,7 +210,7 @@ def _residual_of_impulses(problem: problems.Frictional, p: np.ndarray) -> float:
 def with_friction(problem: problems.Frictional, samples: int) -> list[Outcome]:
     """Every solver of contacts with friction on one problem."""
     n, many, outcomes = problem.count, problem.many, []
-    many.settings["tolerance"], many.settings["sweeps"], many.settings["still"] = TOLERANCE, LIMIT, np.inf
+    many.settings["tolerance"], many.settings["sweeps"], many.settings["residual_limit"] = TOLERANCE, LIMIT, np.inf
     for name, method in (("in turn", CHAIN), ("sweeps", SWEEPS), ("Newton", NEWTON), ("interior point", INTERIOR)):
         count, residual = solve_bodies(method, 1, n, problem.twists, LIMIT, many)
         if count < 0:

@@ -43,7 +43,7 @@ def make_scratch(scene: Scene, plan: Plan, walls: np.ndarray, accuracy: Accuracy
     if plan.many:
         return many.make_bodies_workspace(
             bodies, walls, plan.terms, parameters.polyhedra(scene.bodies), meet=plan.meeting,
-            in_turn=accuracy.collisions == "sequential", in_time=bool(plan.refined), **numbers,
+            is_sequential=accuracy.collisions == "sequential", is_error_controlled=bool(plan.refined), **numbers,
         )  # fmt: skip
     if plan.linked:
         return make_linked_world(bodies, plan.terms, **numbers)

@@ -28,16 +28,16 @@ seeds = st.integers(0, 2**32 - 1)
 
 
 def found(bodies, places, rotations, walls=(), h=EVERYTHING):
-    """(`Many`, number of contacts) of bodies at rest at `places` with these attitudes (n, 3, 3)."""
+    """(workspace, number of contacts) of bodies at rest at `places` with these attitudes (n, 3, 3)."""
     walls = parameters.wall_table(walls)
     many = make_bodies_workspace(len(bodies), walls, (), parameters.polyhedra(bodies), **SETTINGS)
-    many.bodies["shape"] = [SHAPE_CODES[body.kind] for body in bodies]
-    many.bodies["dims"] = [body.dimensions for body in bodies]
-    many.bodies["radius"] = [body.bounding_radius(body.dimensions) for body in bodies]
-    many.bodies["mass"] = many.bodies["acceleration"] = 1.0
-    many.bodies["slop"] = 1e-6 * many.bodies["radius"]
-    many.place[:] = many.now[:, :3] = places
-    many.rotation[:] = np.reshape(rotations, (-1, 9))
+    many.bodies.work["shape"] = [SHAPE_CODES[body.kind] for body in bodies]
+    many.bodies.work["dims"] = [body.dimensions for body in bodies]
+    many.bodies.work["radius"] = [body.bounding_radius(body.dimensions) for body in bodies]
+    many.bodies.work["mass"] = many.bodies.work["acceleration"] = 1.0
+    many.bodies.work["slop"] = 1e-6 * many.bodies.work["radius"]
+    many.bodies.center[:] = many.bodies.state[:, :3] = places
+    many.bodies.rotation[:] = np.reshape(rotations, (-1, 9))
     find_contacts(h, True, True, 0, None, many)
     return many, many.counts[NUM_CONTACTS]
 
@@ -79,20 +79,20 @@ def test_the_normal_of_two_polyhedra_separates_them_most(seed, kinds):
     many, n = found(bodies, places, R)
     assert n > 0
     a, b = (corners(*each) for each in zip(bodies, places, R))
-    slop, size = many.bodies["slop"].max(), np.abs(np.concatenate([a, b])).max()
-    true, normal, least = polyhedra.largest_separation(a, b), many.frame[0, :3], many.gap[:n].min()
+    slop, size = many.bodies.work["slop"].max(), np.abs(np.concatenate([a, b])).max()
+    true, normal, least = polyhedra.largest_separation(a, b), many.contacts.frame[0, :3], many.contacts.gap[:n].min()
     along = polyhedra.separation_along(-normal, a, b)
-    np.testing.assert_allclose(many.frame[:n, :3], np.tile(normal, (n, 1)), atol=1e-15)
-    points = places + many.arm[:n].reshape(n, 2, 3)
+    np.testing.assert_allclose(many.contacts.frame[:n, :3], np.tile(normal, (n, 1)), atol=1e-15)
+    points = places + many.contacts.arm[:n].reshape(n, 2, 3)
     rounding, reach = 1e-9 * size, 4 * slop + 1e-9 * size
-    np.testing.assert_allclose((points[:, 0] - points[:, 1]) @ normal, many.gap[:n], atol=rounding)
+    np.testing.assert_allclose((points[:, 0] - points[:, 1]) @ normal, many.contacts.gap[:n], atol=rounding)
     if true >= 0:  # apart: the distance of two corners is along no face and no two edges; but a plane is between them
         assert least > 0
         return
     # Where they overlap a face or two edges separate them most: no contact is deeper than that, but for the preference
     # for faces (a slop each).
     assert least >= true - reach
-    across = points[:, 0] - points[:, 1] - many.gap[:n, None] * normal
+    across = points[:, 0] - points[:, 1] - many.contacts.gap[:n, None] * normal
     if n == 1:  # two edges, at points inside them, along that direction
         assert along == pytest.approx(true, abs=reach)
         assert least == pytest.approx(true, abs=reach)
@@ -120,9 +120,9 @@ def test_contacts_of_disjoint_polyhedra_have_positive_gaps_only(seed, distance):
     a, b = (corners(*each) for each in zip(bodies, places, R))
     many, n = found(bodies, places, R)
     if polyhedra.are_disjoint(a, b):
-        assert (many.gap[:n] > 0).all()
+        assert (many.contacts.gap[:n] > 0).all()
     else:  # the last of what they touch with is 1e-9 of their size at most
-        assert many.gap[:n].min() <= 2 * many.bodies["slop"].max()
+        assert many.contacts.gap[:n].min() <= 2 * many.bodies.work["slop"].max()
 
 
 def test_stones_of_an_arch_touch_with_the_corners_of_their_joint():
@@ -134,10 +134,12 @@ def test_stones_of_an_arch_touch_with_the_corners_of_their_joint():
     places = [np.array(stone.centroid), turn @ stone.centroid]
     many, n = found([stone, stone], places, [np.eye(3), turn], h=1e-3)
     assert n == 4
-    np.testing.assert_allclose(many.frame[:4, :3], np.tile((np.sin(angle), -np.cos(angle), 0), (4, 1)), atol=1e-14)
-    np.testing.assert_allclose(many.gap[:4], 0.0, atol=1e-14)
+    np.testing.assert_allclose(
+        many.contacts.frame[:4, :3], np.tile((np.sin(angle), -np.cos(angle), 0), (4, 1)), atol=1e-14
+    )
+    np.testing.assert_allclose(many.contacts.gap[:4], 0.0, atol=1e-14)
     expected = [(r * np.cos(angle), r * np.sin(angle), z) for r in (0.95, 1.05) for z in (-0.125, 0.125)]
-    points = sorted(map(tuple, np.round(places[0] + many.arm[:4, :3], 12)))
+    points = sorted(map(tuple, np.round(places[0] + many.contacts.arm[:4, :3], 12)))
     np.testing.assert_allclose(points, sorted(expected), atol=1e-11)
 
 
@@ -146,7 +148,7 @@ def test_names_do_not_change_with_rounding_and_are_all_different():
     names = []
     for shift in (0.0, 1e-15, -1e-15):
         many, n = found([stone, stone], [[0, 0, 0], [shift, shift, 1 + shift]], [np.eye(3)] * 2, h=1e-3)
-        names.append(sorted(many.name[:n].tolist()))
+        names.append(sorted(many.contacts.id[:n].tolist()))
     assert len(set(names[0])) == 4
     assert names[0] == names[1] == names[2]
 
@@ -162,8 +164,8 @@ def test_prisms_of_many_sides_have_room_for_all_their_contacts(seed, count):
     shift = rng.uniform(-0.3, 0.3, 2)
     many, n = found([prism, prism], [[0, 0, 0], [*shift, 1.0]], [np.eye(3), R], h=1e-3)
     assert 3 <= n <= 2 * count
-    np.testing.assert_allclose(many.gap[:n], 0.0, atol=1e-12)
-    assert len(set(many.name[:n].tolist())) == n
+    np.testing.assert_allclose(many.contacts.gap[:n], 0.0, atol=1e-12)
+    assert len(set(many.contacts.id[:n].tolist())) == n
 
 
 @settings(max_examples=100, deadline=None)
@@ -177,11 +179,11 @@ def test_a_sphere_touches_the_nearest_point_of_a_hull(seed, hull_first):
     assert n == 1
     point, distance = polyhedra.nearest_point(corners(hull, places[0], R[0]), places[1])
     # Non-negative least squares is good to about the root of rounding of the condition of its normal equations.
-    assert many.gap[0] == pytest.approx(distance - radius, abs=1e-8)
-    on_hull = places[0] + many.arm[0, :3] if hull_first else places[0] + many.arm[0, 3:]
+    assert many.contacts.gap[0] == pytest.approx(distance - radius, abs=1e-8)
+    on_hull = places[0] + many.contacts.arm[0, :3] if hull_first else places[0] + many.contacts.arm[0, 3:]
     if distance > 1e-3:
         np.testing.assert_allclose(on_hull, point, atol=1e-6)
-        outward = -many.frame[0, :3] if hull_first else many.frame[0, :3]
+        outward = -many.contacts.frame[0, :3] if hull_first else many.contacts.frame[0, :3]
         np.testing.assert_allclose(outward, (places[1] - point) / distance, atol=1e-6 / distance)
 
 
@@ -206,15 +208,15 @@ def test_an_ellipsoid_is_as_far_from_a_hull_as_any_direction_says(seed, gap, hul
         size = separation.ellipsoid_support(axes, R[1], directions) + (directions @ V.T).max(axis=1)
         return directions @ places[1] - size
 
-    outward = -many.frame[0, :3] if hull_first else many.frame[0, :3]
-    assert many.gap[0] == pytest.approx(along(outward[None])[0], abs=1e-13)  # it is a separation,
+    outward = -many.contacts.frame[0, :3] if hull_first else many.contacts.frame[0, :3]
+    assert many.contacts.gap[0] == pytest.approx(along(outward[None])[0], abs=1e-13)  # it is a separation,
     best = separation.largest_separation(
         lambda n: separation.ellipsoid_support(axes, R[1], n), lambda n: (n @ V.T).max(axis=1), places[1], seed
     )
     # and the largest: the oracle never finds more than there is, and may miss some of it.
-    assert many.gap[0] >= best - 1e-12
-    points = places[order] + many.arm[0].reshape(2, 3)
-    np.testing.assert_allclose(points[0] - points[1], many.gap[0] * many.frame[0, :3], atol=1e-12)
+    assert many.contacts.gap[0] >= best - 1e-12
+    points = places[order] + many.contacts.arm[0].reshape(2, 3)
+    np.testing.assert_allclose(points[0] - points[1], many.contacts.gap[0] * many.contacts.frame[0, :3], atol=1e-12)
 
 
 @settings(max_examples=50, deadline=None)
@@ -229,9 +231,9 @@ def test_a_hull_touches_a_wall_with_the_corners_that_are_near(seed):
     h = 0.5  # margin and reach are a h²/2 = 0.125 m and the slop
     many, n = found([hull], [place], [R], [wall], h)
     near = np.flatnonzero(heights <= 0.125 + 1e-6 * hull.polyhedron.radius)
-    assert (many.name[:n] % 512).tolist() == near.tolist()
-    np.testing.assert_allclose(many.gap[:n], heights[near], atol=1e-13)
-    np.testing.assert_allclose(many.arm[:n, :3], hull.polyhedron.vertices[near] @ R.T, atol=1e-13)
+    assert (many.contacts.id[:n] % 512).tolist() == near.tolist()
+    np.testing.assert_allclose(many.contacts.gap[:n], heights[near], atol=1e-13)
+    np.testing.assert_allclose(many.contacts.arm[:n, :3], hull.polyhedron.vertices[near] @ R.T, atol=1e-13)
 
 
 @pytest.mark.parametrize("scale", [2.0**-30, 2.0**30])
@@ -246,7 +248,9 @@ def test_contacts_of_a_scene_scaled_by_a_power_of_two_are_scaled_to_the_last_bit
         bodies += [physics.Block(size * np.array([1.0, 0.5, 0.7]), 1.0), physics.Sphere(0.3 * size, 1.0)]
         walls = [physics.HalfSpace((1, 2, 3), -0.5 * size)]
         many, n = found(bodies, size * places, R, walls, EVERYTHING * np.sqrt(size))
-        sets.append((many.name[:n], many.gap[:n] / size, many.arm[:n] / size, many.frame[:n]))
+        sets.append(
+            (many.contacts.id[:n], many.contacts.gap[:n] / size, many.contacts.arm[:n] / size, many.contacts.frame[:n])
+        )
     assert len(sets[0][0]) > 10
     for small, large in zip(*sets):
         np.testing.assert_array_equal(small, large)

@@ -41,13 +41,13 @@ def rotation(rng) -> np.ndarray:
 
 
 def blocks(places, rotations, halves):
-    """`Many` with blocks at rest, placed for the narrow phase."""
+    """Workspace with blocks at rest, placed for the narrow phase."""
     many = make_bodies_workspace(len(places), np.zeros((0, at.WALL_SIZE)), **SETTINGS)
-    many.bodies["shape"], many.bodies["mass"], many.bodies["dims"] = at.BLOCK, 1.0, halves
-    many.bodies["radius"] = np.linalg.norm(halves, axis=-1)
-    many.bodies["slop"] = 1e-6 * many.bodies["radius"]
-    many.place[:] = many.now[:, :3] = places
-    many.rotation[:] = np.reshape(rotations, (-1, 9))
+    many.bodies.work["shape"], many.bodies.work["mass"], many.bodies.work["dims"] = at.BLOCK, 1.0, halves
+    many.bodies.work["radius"] = np.linalg.norm(halves, axis=-1)
+    many.bodies.work["slop"] = 1e-6 * many.bodies.work["radius"]
+    many.bodies.center[:] = many.bodies.state[:, :3] = places
+    many.bodies.rotation[:] = np.reshape(rotations, (-1, 9))
     return many
 
 
@@ -55,7 +55,7 @@ def blocks(places, rotations, halves):
 
 
 def spread_out(seed, count, ratio, stretch):
-    """`Many` with `count` turned blocks in a box stretched along its axes, half edges spread over `ratio`."""
+    """Workspace with `count` turned blocks in a box stretched along its axes, half edges spread over `ratio`."""
     rng = np.random.default_rng(seed)
     halves = 0.2 * ratio ** rng.uniform(0, 1, (count, 3))
     places = rng.uniform(-1, 1, (count, 3)) * np.array(stretch)
@@ -64,14 +64,14 @@ def spread_out(seed, count, ratio, stretch):
 
 def pairs_in_the_order_of_the_sweep(many):
     """All pairs of bodies whose boxes overlap, compared one by one: a reference for `find_pairs`."""
-    R, count = np.abs(many.rotation.reshape(-1, 3, 3)), len(many.place)
-    extent = np.einsum("bij,bj->bi", R, many.bodies["dims"]) + many.bodies["slop"][:, None]
-    axis = np.argmax(np.var(many.place, axis=0))
-    order = sorted(range(count), key=lambda b: (many.place[b, axis] - extent[b, axis], b))
+    R, count = np.abs(many.bodies.rotation.reshape(-1, 3, 3)), len(many.bodies.center)
+    extent = np.einsum("bij,bj->bi", R, many.bodies.work["dims"]) + many.bodies.work["slop"][:, None]
+    axis = np.argmax(np.var(many.bodies.center, axis=0))
+    order = sorted(range(count), key=lambda b: (many.bodies.center[b, axis] - extent[b, axis], b))
     return [
         (min(a, b), max(a, b))
         for a, b in itertools.combinations(order, 2)
-        if (np.abs(many.place[a] - many.place[b]) <= extent[a] + extent[b]).all()
+        if (np.abs(many.bodies.center[a] - many.bodies.center[b]) <= extent[a] + extent[b]).all()
     ]
 
 
@@ -81,9 +81,9 @@ def pairs_in_the_order_of_the_sweep(many):
 def test_pairs_are_those_whose_boxes_overlap_in_the_order_of_the_sweep(count, ratio, stretch):
     many = spread_out(count, count, ratio, stretch)
     find_pairs(0.0, many)
-    found = [tuple(pair) for pair in many.pairs[: many.counts[NUM_PAIRS]].tolist()]
+    found = [tuple(pair) for pair in many.broadphase.pairs[: many.counts[NUM_PAIRS]].tolist()]
     expected = pairs_in_the_order_of_the_sweep(many)
-    assert found == expected[: len(many.pairs)] or len(expected) > len(many.pairs)
+    assert found == expected[: len(many.broadphase.pairs)] or len(expected) > len(many.broadphase.pairs)
     assert many.counts[NUM_PAIRS] + many.counts[NUM_DROPPED] == len(expected)  # none twice, and none missed
 
 
@@ -93,7 +93,7 @@ def test_pairs_are_found_within_columns_not_by_comparing_all(seed):
     count = 400
     many = spread_out(seed, count, 1.0, (6, 6, 6))
     find_pairs(0.0, many)
-    lengths = np.diff(many.first_entry)[many.cursor != many.first_entry[:-1]]
+    lengths = np.diff(many.broadphase.first_entry)[many.broadphase.cursor != many.broadphase.first_entry[:-1]]
     # Boxes are 0.4 to 0.7 wide (a cube's 2 x 0.2, turned): strips of at most 1.4 + cuts on 12 are 8 or more a side.
     # 400 bodies that enter at most 4 columns each: 25 or less in each of 64 on average; twice that is never reached.
     assert 0 < lengths.max() <= 50
@@ -102,9 +102,9 @@ def test_pairs_are_found_within_columns_not_by_comparing_all(seed):
 @pytest.mark.parametrize("value", [np.nan, np.inf, 1e300])
 def test_a_box_that_is_not_finite_is_no_reason_to_read_beyond_the_columns(value):
     many = spread_out(0, 50, 1.0, (3, 3, 3))
-    many.place[7, 1] = value
+    many.bodies.center[7, 1] = value
     find_pairs(0.0, many)
-    assert 0 <= many.counts[NUM_PAIRS] <= len(many.pairs)
+    assert 0 <= many.counts[NUM_PAIRS] <= len(many.broadphase.pairs)
 
 
 # --- two blocks ------------------------------------------------------------------------------------------------
@@ -112,9 +112,9 @@ def test_a_box_that_is_not_finite_is_no_reason_to_read_beyond_the_columns(value)
 
 def separation(direction, many) -> float:
     """Signed distance of the two blocks along a unit direction from the first to the second [m]."""
-    R = many.rotation.reshape(2, 3, 3)
-    reach = np.abs(np.einsum("bij,i->bj", R, direction)) * many.bodies["dims"]
-    return direction @ (many.place[1] - many.place[0]) - reach.sum()
+    R = many.bodies.rotation.reshape(2, 3, 3)
+    reach = np.abs(np.einsum("bij,i->bj", R, direction)) * many.bodies.work["dims"]
+    return direction @ (many.bodies.center[1] - many.bodies.center[0]) - reach.sum()
 
 
 @settings(max_examples=200, deadline=None)
@@ -127,17 +127,17 @@ def test_the_normal_of_two_blocks_separates_them_most(seed, distance):
     halves = rng.uniform(0.2, 1.0, (2, 3))
     many = blocks([np.zeros(3), distance * direction], [rotation(rng), rotation(rng)], halves)
     h = 10.0  # the margin is the way that the loads could bring the blocks in h: gaps up to a m/s² h² = 100 m count
-    many.bodies["acceleration"] = 1.0
+    many.bodies.work["acceleration"] = 1.0
     find_contacts(h, None, None, 0, None, many)
     n = many.counts[NUM_CONTACTS]
     assert n > 0
-    normal = many.frame[0, :3]
+    normal = many.contacts.frame[0, :3]
     best = separation(-normal, many)
-    least = many.gap[:n].min()
+    least = many.contacts.gap[:n].min()
     # All normals of one pair agree, and no direction separates the blocks by more than the contacts say: all that can
     # are the fifteen axes, so that none of many others may beat them but by the preference for faces, the slop, and
     # rounding. (Where edges separate more than the face whose clip is taken, its contacts are lifted to their gap.)
-    np.testing.assert_allclose(many.frame[:n, :3], np.tile(normal, (n, 1)), atol=1e-15)
+    np.testing.assert_allclose(many.contacts.frame[:n, :3], np.tile(normal, (n, 1)), atol=1e-15)
     others = rng.normal(size=(500, 3)) + 3 * rng.uniform(size=(500, 1)) * -normal
     others /= np.linalg.norm(others, axis=1)[:, None]
     if best < 0:  # of separated blocks the greatest distance may be along none of the axes: that of two vertices
@@ -151,12 +151,12 @@ def test_the_normal_of_two_blocks_separates_them_most(seed, distance):
     # Points lie on the blocks they are points of (up to the slop by which the clipping is generous), and their
     # distance along the normal is the gap.
     for k in range(n):
-        points = many.place + many.arm[k].reshape(2, 3)
+        points = many.bodies.center + many.contacts.arm[k].reshape(2, 3)
         for b in range(2):
-            local = many.rotation[b].reshape(3, 3).T @ (points[b] - many.place[b])
+            local = many.bodies.rotation[b].reshape(3, 3).T @ (points[b] - many.bodies.center[b])
             if n > 1 or best < 0:  # apart, a lone point may stand for a face that is beside the other one
                 assert (np.abs(local) <= halves[b] + lift + 1e-5).all()
-        assert normal @ (points[0] - points[1]) == pytest.approx(many.gap[k], abs=1e-12)
+        assert normal @ (points[0] - points[1]) == pytest.approx(many.contacts.gap[k], abs=1e-12)
 
 
 @settings(max_examples=100, deadline=None)
@@ -191,8 +191,8 @@ def test_parallel_edges_that_touch_push_along_the_middle_of_what_both_allow(seed
     # The normal is out of the second block. A turned corner is rounded in the last bits; what is low is judged by slops
     # of 1e-6, which a normal does not see.
     expected = -world @ [math.cos(middle), math.sin(middle), 0.0]
-    np.testing.assert_allclose(many.frame[:n, :3], np.tile(expected, (n, 1)), atol=1e-12)
-    np.testing.assert_allclose(many.gap[:n], 0.0, atol=1e-14)
+    np.testing.assert_allclose(many.contacts.frame[:n, :3], np.tile(expected, (n, 1)), atol=1e-12)
+    np.testing.assert_allclose(many.contacts.gap[:n], 0.0, atol=1e-14)
 
 
 @settings(max_examples=200, deadline=None)
@@ -217,10 +217,10 @@ def test_no_contact_is_lost_where_a_face_is_tilted_by_some_slops(yaw, shift, til
         cross = np.array([[0, -z, 0], [z, 0, -x], [0, x, 0]])  # of the axis (x, 0, z)
         tipped = (np.eye(3) + math.sin(angle) * cross + (1 - math.cos(angle)) * cross @ cross) @ turned
         many = blocks([[0, 0, 0], [shift[0], 1.0, shift[1]]], [np.eye(3), tipped], np.full((2, 3), 0.5))
-        many.bodies["acceleration"] = acceleration
+        many.bodies.work["acceleration"] = acceleration
         find_contacts(h, None, None, 0, None, many)
         n = many.counts[NUM_CONTACTS]
-        return n, many.frame[:n, :3]
+        return n, many.contacts.frame[:n, :3]
 
     flat, _ = touching_at(0.0)
     count, normals = touching_at(tilt)
@@ -234,7 +234,7 @@ def test_names_of_equal_stacked_blocks_do_not_change_with_rounding():
     for shift in (0.0, 1e-15, -1e-15):
         many = blocks([[0, 0, 0], [shift, 1, shift]], [np.eye(3), np.eye(3)], np.full((2, 3), 0.5))
         find_contacts(0.01, None, None, 0, None, many)
-        names.append(sorted(many.name[: many.counts[NUM_CONTACTS]].tolist()))
+        names.append(sorted(many.contacts.id[: many.counts[NUM_CONTACTS]].tolist()))
     assert len(names[0]) == 4
     assert names[0] == names[1] == names[2]
 
@@ -249,7 +249,7 @@ def test_faces_that_end_together_touch_all_over(yaw, shift):
     turned = np.array([[c, 0.0, s], [0.0, 1.0, 0.0], [-s, 0.0, c]])
     many = blocks([[0, 0, 0], [shift[0] * slop, 1, shift[1] * slop]], [np.eye(3), turned], np.full((2, 3), 0.5))
     find_contacts(0.01, None, None, 0, None, many)
-    points = many.arm[: many.counts[NUM_CONTACTS], :3]
+    points = many.contacts.arm[: many.counts[NUM_CONTACTS], :3]
     # A corner is off by the shift, its way by the turn, and what the clip leaves or takes: a slop.
     reach = (3 + 4 * 0.5 + 1 + 1e-6) * slop
     corners = np.array(list(itertools.product((-0.5, 0.5), (0.5,), (-0.5, 0.5))))
@@ -272,10 +272,10 @@ def block_of(numbers):
 
 
 def touching(count, pairs, walls=()):
-    """`Many` with one contact for each pair of bodies, and for each body in `walls`; how many contacts."""
+    """Workspace with one contact for each pair of bodies, and for each body in `walls`; how many contacts."""
     many = make_bodies_workspace(count, np.zeros((1, at.WALL_SIZE)), **SETTINGS)
     ends = [*pairs, *((b, -1) for b in walls)]
-    many.ends[: len(ends)] = np.reshape(ends, (-1, 2))
+    many.contacts.bodies[: len(ends)] = np.reshape(ends, (-1, 2))
     return many, len(ends)
 
 
@@ -292,18 +292,18 @@ def test_islands_are_the_connected_components(seed, count, links):
     labels = connected_components(graph, directed=False)[1]
     seen = []
     for i in range(found):
-        contacts = many.queue[many.first_contact[i] : many.first_contact[i + 1]]
-        bodies = many.order[many.first_body[i] : many.first_body[i + 1]]
+        contacts = many.islands.contacts[many.islands.first_contact[i] : many.islands.first_contact[i + 1]]
+        bodies = many.islands.bodies[many.islands.first_body[i] : many.islands.first_body[i + 1]]
         assert (np.diff(contacts) > 0).all()  # in their order
-        label = labels[many.ends[contacts[0], 0]]
-        assert set(labels[many.ends[contacts, 0]]) == {label}
+        label = labels[many.contacts.bodies[contacts[0], 0]]
+        assert set(labels[many.contacts.bodies[contacts, 0]]) == {label}
         assert sorted(bodies) == np.flatnonzero(labels == label).tolist()
         seen += contacts.tolist()
     assert sorted(seen) == list(range(n))
 
 
 def island_of_all(count, pairs, most=ANY):
-    """`Many` with one island of all bodies, which `pairs` must connect, ordered for elimination; products it takes."""
+    """Workspace with one island, which `pairs` must connect, ordered for elimination; products that it takes."""
     many, n = touching(count, pairs, [0])
     assert find_islands(n, many) == 1
     return many, order_elimination(0, n, 0, count, most, many)
@@ -329,11 +329,11 @@ def test_the_block_system_is_solved(count, links):
         for i, j in {(a, b), (b, a)}:
             block = rng.normal(size=(6, 6)) + 6 * np.sqrt(1 + links) * np.eye(6) * (i == j)
             if i == j:
-                many.diagonal[i] += numbers_of(block)
-            elif many.rank[i] > many.rank[j]:
-                many.lower[blocks_of.find_block_index(j, i, many)] += numbers_of(block)
+                many.system.diagonal[i] += numbers_of(block)
+            elif many.system.rank[i] > many.system.rank[j]:
+                many.system.lower[blocks_of.find_block_index(j, i, many)] += numbers_of(block)
             else:
-                many.upper[blocks_of.find_block_index(i, j, many)] += numbers_of(block)
+                many.system.upper[blocks_of.find_block_index(i, j, many)] += numbers_of(block)
             A[6 * i : 6 * i + 6, 6 * j : 6 * j + 6] += block
     right = rng.normal(size=(count, 6))
     x = np.pad(right.reshape(count, 2, 3), ((0, 0), (0, 0), (0, 1))).reshape(count, 8)
@@ -366,16 +366,16 @@ def test_a_block_is_inverted(kind):
         elif kind == "far apart":
             A = A @ A.T * 1.0e6 + np.eye(6)
         many = make_bodies_workspace(1, np.zeros((1, at.WALL_SIZE)), **SETTINGS)
-        many.diagonal[0] = numbers_of(A)
-        blocks_of.invert_block(many.diagonal, 0, many.swaps)
+        many.system.diagonal[0] = numbers_of(A)
+        blocks_of.invert_block(many.system.diagonal, 0, many.system.swaps)
         # Gauss and Jordan: rounding times condition, times what multipliers up to PIVOT_FACTOR add to it in practice.
-        error = block_of(many.diagonal[0]) - np.linalg.inv(A)
+        error = block_of(many.system.diagonal[0]) - np.linalg.inv(A)
         assert np.linalg.norm(error, 2) <= 1e-13 * np.linalg.cond(A) * np.linalg.norm(np.linalg.inv(A), 2)
 
 
 @kernel
-def add_bundles(rho, D, E, F, many):
-    """`add_bundle` of all bundles; D, E, F: three numbers of each contact, its matrix."""
+def add_batches(rho, D, E, F, many):
+    """`newton_system.add_batch_to_matrix` of all batches; D, E, F: three numbers of each contact, its matrix."""
     for g in range(many.counts[NUM_BATCHES]):
         x, y, z = (
             contact_batches.gather_batch(g, D, many),
@@ -394,34 +394,34 @@ def test_the_matrix_is_that_of_the_contacts(count, links, contacts):
     many, n = touching(count, pairs, list(range(0, count, 2)))
     find_islands(n, many)
     order_elimination(0, n, 0, count, ANY, many)
-    many.frame[:n] = [np.linalg.qr(rng.normal(size=(3, 3)))[0].ravel() for _ in range(n)]
-    many.arm[:n], many.lightness[:] = rng.normal(size=(n, 6)), rng.uniform(0.5, 2, count)
+    many.contacts.frame[:n] = [np.linalg.qr(rng.normal(size=(3, 3)))[0].ravel() for _ in range(n)]
+    many.contacts.arm[:n], many.bodies.inv_mass[:] = rng.normal(size=(n, 6)), rng.uniform(0.5, 2, count)
     M, D, rho = np.zeros((6 * count, 6 * count)), rng.normal(size=(n, 9)), 0.7
     for b in range(count):
         K = rng.normal(size=(3, 3))
         K = K @ K.T
-        many.turning[b] = K[np.triu_indices(3)]
-        M[6 * b : 6 * b + 3, 6 * b : 6 * b + 3] = many.lightness[b] * np.eye(3)
+        many.bodies.inv_inertia[b] = K[np.triu_indices(3)]
+        M[6 * b : 6 * b + 3, 6 * b : 6 * b + 3] = many.bodies.inv_mass[b] * np.eye(3)
         M[6 * b + 3 : 6 * b + 6, 6 * b + 3 : 6 * b + 6] = K
     assert contact_batches.batch_contacts(0, n, many)
     blocks_of.clear_system(0, count, many)
     A, found = np.eye(6 * count), np.zeros((6 * count, 6 * count))
     for k in range(n):
         J = np.zeros((3, 6 * count))
-        for end, (b, sign) in enumerate(zip(many.ends[k], (1, -1))):
+        for end, (b, sign) in enumerate(zip(many.contacts.bodies[k], (1, -1))):
             if b >= 0:
-                r = many.arm[k, 3 * end : 3 * end + 3]
+                r = many.contacts.arm[k, 3 * end : 3 * end + 3]
                 J[:, 6 * b : 6 * b + 6] = sign * np.hstack([np.eye(3), np.cross(np.eye(3), r).T])  # v + ω x r
-        J = many.frame[k].reshape(3, 3) @ J
+        J = many.contacts.frame[k].reshape(3, 3) @ J
         A += M @ J.T @ (rho * D[k].reshape(3, 3)) @ J
-    add_bundles(rho, *(np.ascontiguousarray(D[:, k : k + 3]) for k in (0, 3, 6)), many)
+    add_batches(rho, *(np.ascontiguousarray(D[:, k : k + 3]) for k in (0, 3, 6)), many)
     newton_system.complete_matrix(0, count, many)
     for b in range(count):
-        found[6 * b : 6 * b + 6, 6 * b : 6 * b + 6] = block_of(many.diagonal[b])
-        for k in range(many.start[b], many.stop[b]):
-            c = many.column[k]
-            found[6 * c : 6 * c + 6, 6 * b : 6 * b + 6] = block_of(many.lower[k])
-            found[6 * b : 6 * b + 6, 6 * c : 6 * c + 6] = block_of(many.upper[k])
+        found[6 * b : 6 * b + 6, 6 * b : 6 * b + 6] = block_of(many.system.diagonal[b])
+        for k in range(many.system.start[b], many.system.stop[b]):
+            c = many.system.column[k]
+            found[6 * c : 6 * c + 6, 6 * b : 6 * b + 6] = block_of(many.system.lower[k])
+            found[6 * b : 6 * b + 6, 6 * c : 6 * c + 6] = block_of(many.system.upper[k])
     np.testing.assert_allclose(found, A, atol=1e-14 * n * np.abs(A).max())  # rounding of n sums of products
 
 

@@ -30,12 +30,12 @@ def pile(*arguments) -> tuple[BodiesWorkspace, int]:
 
 def dense(many: BodiesWorkspace, n: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Jacobian (3 n, 6 bodies), inverse mass matrix and free velocities of the problem, without the kernels."""
-    return problems.Frictional("", many, n, many.twist).dense()
+    return problems.Frictional("", many, n, many.bodies.twist).dense()
 
 
 def one_island(many: BodiesWorkspace, n: int, bodies: int) -> tuple[tuple[int, int, int, int], float]:
     """A problem made ready for the methods with a linear system: its only island, and its largest free velocity."""
-    many.free[:] = many.twist
+    many.bodies.free_twist[:] = many.bodies.twist
     scale = contact_operator.assemble_contact_blocks(n, many)
     assert islands.find_islands(n, many) == 1
     part = (0, n, 0, bodies)
@@ -58,7 +58,7 @@ def test_where_the_impulses_are_determined_they_are_those_of_the_oracle(seed, mu
     _, residual, _ = solve.solve_contacts(n, True, many)
     assert residual <= 1e-6
     # An error u of the velocities is one of W⁻¹ u of the impulses, and the residual says u relative to the largest.
-    error = np.abs(many.impulse[:n].ravel() - expected).max()
+    error = np.abs(many.contacts.impulse[:n].ravel() - expected).max()
     assert error <= 100 * 1e-6 * np.abs(b).max() / np.linalg.eigvalsh(W).min()
 
 
@@ -68,11 +68,11 @@ def test_where_the_impulses_are_determined_they_are_those_of_the_oracle(seed, mu
 def test_piles_with_more_contacts_than_are_determined_obey_the_law(seed, bodies, masses):
     many, n = pile(seed, bodies, 4, 0.2, masses)
     J, inverse, b = dense(many, n)
-    free = many.twist.ravel().copy()
+    free = many.bodies.twist.ravel().copy()
     _, residual, _ = solve.solve_contacts(n, True, many)
-    p = many.impulse[:n].ravel()
+    p = many.contacts.impulse[:n].ravel()
     # Twists and impulses belong to each other, to rounding of some hundred additions.
-    np.testing.assert_allclose(many.twist.ravel(), free + inverse @ J.T @ p, atol=1e-12 * np.abs(b).max())
+    np.testing.assert_allclose(many.bodies.twist.ravel(), free + inverse @ J.T @ p, atol=1e-12 * np.abs(b).max())
     assert residual <= 1e-6
     # The oracle's defect is p - proj(p - s ũ) with one s for all: at most s times the velocity that is missing.
     W = J @ inverse @ J.T
@@ -122,8 +122,8 @@ def test_rounding_does_not_lead_out_of_the_cones(seed):
     interior_point.interior_point_contacts(
         part, contact_operator.max_contact_residual(0, n, True, many), 1e-6 * scale, 200, many
     )
-    assert np.isfinite(many.impulse[:n]).all()
-    assert np.isfinite(many.twist).all()
+    assert np.isfinite(many.contacts.impulse[:n]).all()
+    assert np.isfinite(many.bodies.twist).all()
 
 
 @pytest.mark.parametrize("mu", [0.0, 0.2])
@@ -146,12 +146,12 @@ def test_sweeps_without_friction_solve_the_complementarity_problem(seed):
     count, residual = gauss_seidel.sweep_normals(0, n, np.inf, goal, 2000, many)
     assert count < 2000
     assert residual <= goal
-    p, normals = many.impulse[:n, 0], J[::3]
+    p, normals = many.contacts.impulse[:n, 0], J[::3]
     W = normals @ inverse @ normals.T
     # The twists have taken up some thousand pushes, each rounded.
     missed = np.abs(np.minimum(W @ p + b[::3], p * np.diag(W))).max()
     assert missed <= goal + 1e-11 * np.abs(b).max()
-    assert not many.impulse[:n, 1:].any()
+    assert not many.contacts.impulse[:n, 1:].any()
 
 
 def test_slow_sweeps_are_extrapolated():
@@ -167,16 +167,16 @@ def with_resting(one: BodiesWorkspace, n: int, bodies: int, resting: int) -> Bod
     """A problem of so many contacts and bodies, and beside it bodies that rest on the wall by one contact each."""
     many = make_bodies_workspace(bodies + resting, np.zeros((1, at.WALL_SIZE)), **SETTINGS)
     for name in ("mass", "radius"):
-        many.bodies[name] = 1.0
-        many.bodies[name][:bodies] = one.bodies[name]
-    many.lightness[:], many.turning[:] = 1.0, (1, 0, 0, 1, 0, 1)
-    for name in ("lightness", "turning", "twist"):
-        getattr(many, name)[:bodies] = getattr(one, name)
-    for name in ("frame", "arm", "mu", "ends"):
-        getattr(many, name)[:n] = getattr(one, name)[:n]
+        many.bodies.work[name] = 1.0
+        many.bodies.work[name][:bodies] = one.bodies.work[name]
+    many.bodies.inv_mass[:], many.bodies.inv_inertia[:] = 1.0, (1, 0, 0, 1, 0, 1)
+    for name in ("inv_mass", "inv_inertia", "twist"):
+        getattr(many.bodies, name)[:bodies] = getattr(one.bodies, name)
+    for name in ("frame", "arm", "mu", "bodies"):
+        getattr(many.contacts, name)[:n] = getattr(one.contacts, name)[:n]
     for k in range(resting):
-        many.ends[n + k], many.frame[n + k] = (bodies + k, -1), np.eye(3).ravel()
-        many.arm[n + k], many.mu[n + k] = (0, -1, 0, 0, 0, 0), 0.5
+        many.contacts.bodies[n + k], many.contacts.frame[n + k] = (bodies + k, -1), np.eye(3).ravel()
+        many.contacts.arm[n + k], many.contacts.mu[n + k] = (0, -1, 0, 0, 0, 0), 0.5
     return many
 
 
@@ -194,7 +194,7 @@ def test_sweeps_visit_only_what_has_something_to_do(seed):
     assert alone >= 10
     # The contacts stand in another order then, and take other sweeps: up to twice as many are allowed for that.
     assert together <= 1 + 2 * alone * n / (n + resting)
-    assert not both.impulse[n : n + resting].any()
+    assert not both.contacts.impulse[n : n + resting].any()
     assert contact_operator.max_contact_residual(0, n + resting, True, both) == found[1][1]
 
 
@@ -203,14 +203,14 @@ def crowd(bodies: int) -> tuple[BodiesWorkspace, int]:
     one, _ = pile(0, bodies, bodies, 0.3)
     many = make_bodies_workspace(bodies, np.zeros((1, at.WALL_SIZE)), **SETTINGS)
     for name in ("mass", "radius"):
-        many.bodies[name] = one.bodies[name]
+        many.bodies.work[name] = one.bodies.work[name]
     pairs = [(0, -1), *((a, b) for a in range(bodies) for b in range(a))]
     n = len(pairs)
-    for name in ("lightness", "turning", "twist"):
-        getattr(many, name)[:] = getattr(one, name)
+    for name in ("inv_mass", "inv_inertia", "twist"):
+        getattr(many.bodies, name)[:] = getattr(one.bodies, name)
     for name in ("frame", "arm", "mu"):
-        getattr(many, name)[:n] = getattr(one, name)[:n]
-    many.ends[:n] = pairs
+        getattr(many.contacts, name)[:n] = getattr(one.contacts, name)[:n]
+    many.contacts.bodies[:n] = pairs
     return many, n
 
 
@@ -218,8 +218,8 @@ def crowd(bodies: int) -> tuple[BodiesWorkspace, int]:
 def test_what_is_too_dear_for_its_system_is_swept_while_it_moves(load):
     """All is new in the next step then; once it lies what is solved holds, and its system is worth more."""
     many, n = crowd(30)
-    many.settings["tolerance"], many.settings["sweeps"], many.settings["rests"] = 1e-9, 20, 1
-    many.settings["load"] = load
+    many.settings["tolerance"], many.settings["sweeps"], many.settings["is_resting_stage"] = 1e-9, 20, 1
+    many.settings["load_speed"] = load
     iterations, residual, method = solve.solve_contacts(n, True, many)
     assert method == (at.METHOD_SWEEPS if load == 0.0 else at.METHOD_NEWTON)
     assert iterations <= (20 if load == 0.0 else 3 * 20)
@@ -231,7 +231,7 @@ def test_what_is_too_dear_for_its_system_is_swept_while_it_moves(load):
 def scale_of(many: BodiesWorkspace, n: int) -> float:
     """Largest velocity of a contact without impulses, in its frame."""
     J, _, _ = dense(many, n)
-    return np.abs(J @ many.free.ravel() - many.target[:n].ravel()).max()
+    return np.abs(J @ many.bodies.free_twist.ravel() - many.contacts.target[:n].ravel()).max()
 
 
 def test_an_impact_that_is_not_solved_finely_is_swept_first():
@@ -250,12 +250,12 @@ def test_calming_keeps_what_is_solved_solved(seed):
     many.settings["tolerance"] = 1e-2
     solve.solve_contacts(n, True, many)
     goal = contact_operator.max_contact_residual(0, n, True, many)
-    many.settings["rests"] = 1  # and all bodies were at rest before the stage: `momenta` are zero
+    many.settings["is_resting_stage"] = 1  # and all bodies were at rest before the stage: `momenta` are zero
     count, residual, _ = near_rest_refinement.refine_near_rest((0, n, 0, 12), True, goal, goal, 1e-12, 1e-12, many)
     assert count > 0
     assert residual <= goal
     assert contact_operator.max_contact_residual(0, n, True, many) == pytest.approx(
-        residual, abs=1e-12 * np.abs(many.free).max()
+        residual, abs=1e-12 * np.abs(many.bodies.free_twist).max()
     )
 
 
@@ -263,12 +263,12 @@ def test_what_stands_is_calmed_by_one_linear_system():
     """A tower whose warm start is off by a part in 10,000: within the goal, and solved as far as what holds is."""
     problem = problems.beginning("tower", scenes.tower(10))
     many, n = problem.many, problem.count
-    many.twist[:] = problem.twists
+    many.bodies.twist[:] = problem.twists
     solve.solve_contacts(n, True, many)
-    many.impulse[:n] *= 1 + 1e-4
-    many.twist[:] = problem.twists
-    many.momenta[:] = 0.0  # it stood still before
-    many.settings["tolerance"], many.settings["rests"] = 1e-2, 1
+    many.contacts.impulse[:n] *= 1 + 1e-4
+    many.bodies.twist[:] = problem.twists
+    many.bodies.momenta[:] = 0.0  # it stood still before
+    many.settings["tolerance"], many.settings["is_resting_stage"] = 1e-2, 1
     iterations, residual, method = solve.solve_contacts(n, True, many)
     assert (iterations, method) == (1, at.METHOD_NEWTON)
     assert residual <= solve.STICKING_SHARE * solve.FINE_TOLERANCE
@@ -279,16 +279,26 @@ def test_islands_are_solved_as_if_they_were_alone():
     two, _ = pile(4, 4, 4, 0.5)
     both = make_bodies_workspace(8, np.zeros((1, at.WALL_SIZE)), **SETTINGS)
     for name in ("mass", "radius"):
-        both.bodies[name][:4], both.bodies[name][4:] = one.bodies[name], two.bodies[name]
-    for name in ("lightness", "turning", "twist"):
-        getattr(both, name)[:4], getattr(both, name)[4:] = getattr(one, name), getattr(two, name)
+        both.bodies.work[name][:4], both.bodies.work[name][4:] = (
+            one.bodies.work[name],
+            two.bodies.work[name],
+        )
+    for name in ("inv_mass", "inv_inertia", "twist"):
+        column = getattr(both.bodies, name)
+        column[:4], column[4:] = getattr(one.bodies, name), getattr(two.bodies, name)
     for name in ("frame", "arm", "mu"):
-        getattr(both, name)[:n], getattr(both, name)[n : 2 * n] = getattr(one, name)[:n], getattr(two, name)[:n]
-    both.ends[:n], both.ends[n : 2 * n] = one.ends[:n], two.ends[:n] + 4 * (two.ends[:n] >= 0)
+        column = getattr(both.contacts, name)
+        column[:n], column[n : 2 * n] = getattr(one.contacts, name)[:n], getattr(two.contacts, name)[:n]
+    both.contacts.bodies[:n], both.contacts.bodies[n : 2 * n] = (
+        one.contacts.bodies[:n],
+        two.contacts.bodies[:n] + 4 * (two.contacts.bodies[:n] >= 0),
+    )
     # The residual is relative to the largest velocity of all: give both the same one.
     largest = [np.abs(dense(many, n)[2]).max() for many in (one, two)]
     one.settings["tolerance"] *= max(largest) / largest[0]
     two.settings["tolerance"] *= max(largest) / largest[1]
     for many, contacts in ((one, n), (two, n), (both, 2 * n)):
         solve.solve_contacts(contacts, True, many)
-    np.testing.assert_allclose(both.twist, np.vstack([one.twist, two.twist]), atol=1e-5 * max(largest))
+    np.testing.assert_allclose(
+        both.bodies.twist, np.vstack([one.bodies.twist, two.bodies.twist]), atol=1e-5 * max(largest)
+    )

@@ -116,11 +116,11 @@ def _if_linked(where, otherwise):
     return decorate
 
 
-def _record(world):
-    """Record of a body in a `Many` or `Linked`, or its type in the type of one."""
-    if hasattr(world, "bodies"):
-        return world.bodies[0]
-    return world.types[world.fields.index("bodies")].dtype
+def _record(bodies):
+    """Record of a body in a group with `work` (`multibody.data.arrays.Bodies`), or its type in the group's type."""
+    if hasattr(bodies, "work"):
+        return bodies.work[0]
+    return bodies.types[bodies.fields.index("work")].dtype
 
 
 @inlined
@@ -136,13 +136,13 @@ def _put_anchor(first, columns, x, R, v, w, mobility):
 
 
 @inlined
-def _put_anchors(first, count, tilted, bodies):
+def _put_anchors(first, count, tilted, records):
     """Put the anchors of all springs where the bodies' `read_middle` says."""
-    for b in range(bodies.shape[0]):
-        columns = bodies[b].columns
+    for b in range(records.shape[0]):
+        columns = records[b].columns
         for k in range(first, first + LINK_SIZE * count, LINK_SIZE):
             if columns[k + LINK_OTHER] >= 0.0:
-                other = bodies[int(columns[k + LINK_OTHER])]
+                other = records[int(columns[k + LINK_OTHER])]
                 x, q, v, L = read_middle(other)
                 w = angular_velocity(q, L, other, tilted)
                 o = k + LINK_OTHER_POINT
@@ -151,50 +151,50 @@ def _put_anchors(first, count, tilted, bodies):
 
 
 @_if_linked(lambda arguments: _record(arguments[-1]), False)
-def hold_linked_loads(first, count, h, gyroscopic, tilted, world):
+def hold_linked_loads(first, count, h, gyroscopic, tilted, bodies):
     """`held_loads.hold_loads` for bodies tied by springs: all at once. False, and nothing done, without those.
 
     A body in contact keeps the velocities of the start of the stage, as in `held_loads.hold_contact_loads`.
     """
-    bodies, half = world.bodies, 0.5 * h
-    for b in range(bodies.shape[0]):
-        x, q, v, L = read_state(world.now, b)
-        q = drift_attitude(q, L, bodies[b], half, gyroscopic, tilted)
-        write_middle(bodies[b], (plus(x, times(half, v)), q, v, L))
-    _put_anchors(first, count, tilted, bodies)
-    if note_world_rates(h, tilted, bodies):
-        hold_implicit_loads(first, count, h, tilted, bodies)
+    records, half = bodies.work, 0.5 * h
+    for b in range(records.shape[0]):
+        x, q, v, L = read_state(bodies.state, b)
+        q = drift_attitude(q, L, records[b], half, gyroscopic, tilted)
+        write_middle(records[b], (plus(x, times(half, v)), q, v, L))
+    _put_anchors(first, count, tilted, records)
+    if note_world_rates(h, tilted, records):
+        hold_implicit_loads(first, count, h, tilted, records)
         return True
-    for b in range(bodies.shape[0]):
-        if world.touched[b] == 0:
-            _kick(bodies[b], half, tilted)
-    _put_anchors(first, count, tilted, bodies)
-    for b in range(bodies.shape[0]):
-        x, q, v, L = read_middle(bodies[b])
-        F, T = field_load(x, q, v, L, bodies[b].now + half, tilted, bodies[b])
-        apply_loads(F, T, bodies[b])
+    for b in range(records.shape[0]):
+        if bodies.touched[b] == 0:
+            _kick(records[b], half, tilted)
+    _put_anchors(first, count, tilted, records)
+    for b in range(records.shape[0]):
+        x, q, v, L = read_middle(records[b])
+        F, T = field_load(x, q, v, L, records[b].now + half, tilted, records[b])
+        apply_loads(F, T, records[b])
     return True
 
 
 @_if_linked(lambda arguments: _record(arguments[-1]), None)
-def place_anchors(first, count, tilted, world):
+def place_anchors(first, count, tilted, bodies):
     """Put the anchors of all springs where the bodies' `read_middle` says."""
-    _put_anchors(first, count, tilted, world.bodies)
+    _put_anchors(first, count, tilted, bodies.work)
 
 
 @_if_linked(lambda arguments: _record(arguments[-1]), None)
-def place_anchors_now(first, count, tilted, world):
+def place_anchors_now(first, count, tilted, bodies):
     """Put the anchors of all springs where the bodies are now."""
-    for b in range(world.bodies.shape[0]):
-        write_middle(world.bodies[b], read_state(world.now, b))
-    _put_anchors(first, count, tilted, world.bodies)
+    for b in range(bodies.work.shape[0]):
+        write_middle(bodies.work[b], read_state(bodies.state, b))
+    _put_anchors(first, count, tilted, bodies.work)
 
 
 @_if_linked(lambda arguments: _record(arguments[-1]), None)
-def unite_linked_bodies(first, count, parent, world):
+def unite_linked_bodies(first, count, parent, bodies):
     """Make one island of any two bodies that a spring ties together, in what leads to the first body of each."""
-    for b in range(world.bodies.shape[0]):
-        columns = world.bodies[b].columns
+    for b in range(bodies.work.shape[0]):
+        columns = bodies.work[b].columns
         for k in range(first, first + LINK_SIZE * count, LINK_SIZE):
             if columns[k + LINK_OTHER] >= 0.0:
                 unite_sets(b, int(columns[k + LINK_OTHER]), parent)

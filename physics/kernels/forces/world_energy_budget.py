@@ -33,31 +33,31 @@ def _start(body):
 
 
 @inlined
-def _any_is_stiff(bodies):
-    for b in range(bodies.shape[0]):
-        if bodies[b].is_stiff == 1:
+def _any_is_stiff(records):
+    for b in range(records.shape[0]):
+        if records[b].is_stiff == 1:
             return True
     return False
 
 
 @kernel
-def _potential(later, tilted, world):
+def _potential(later, tilted, bodies):
     """Energy of all fields at the places of now, `later` [s] than the start of the stage [J]."""
-    place_anchors_now(tilted, world)
+    place_anchors_now(tilted, bodies)
     total = 0.0
-    for b in range(world.bodies.shape[0]):
-        total += potential_energy(read_state(world.now, b), later, tilted, world.bodies[b])
+    for b in range(bodies.work.shape[0]):
+        total += potential_energy(read_state(bodies.state, b), later, tilted, bodies.work[b])
     return total
 
 
 @if_declared()
-def note_stage_energy(tilted, world, first):
+def note_stage_energy(tilted, bodies, first):
     """Keep states and potential energy at the start of a stage, if it is stiff; `first` is the first body's record."""
-    if not _any_is_stiff(world.bodies):
+    if not _any_is_stiff(bodies.work):
         return
-    first.stage_energy = _potential(0.0, tilted, world)
-    for b in range(world.bodies.shape[0]):
-        (x, q, v, L), m = read_state(world.now, b), world.bodies[b].stage_start
+    first.stage_energy = _potential(0.0, tilted, bodies)
+    for b in range(bodies.work.shape[0]):
+        (x, q, v, L), m = read_state(bodies.state, b), bodies.work[b].stage_start
         m[0], m[1], m[2] = x
         m[3], m[4], m[5], m[6] = q
         m[7], m[8], m[9] = v
@@ -65,9 +65,9 @@ def note_stage_energy(tilted, world, first):
 
 
 @kernel
-def _gain_of(b, h, tilted, world):
+def _gain_of(b, h, tilted, bodies):
     """(kinetic energy gained by body b beyond the work of held loads and of fields without an energy, sizes) [J]."""
-    body, y, end = world.bodies[b], _start(world.bodies[b]), read_state(world.now, b)
+    body, y, end = bodies.work[b], _start(bodies.work[b]), read_state(bodies.state, b)
     v, L = times(0.5, plus(y[2], end[2])), times(0.5, plus(y[3], end[3]))
     before, after = kinetic_energy(y[1], y[2], y[3], body, tilted), kinetic_energy(end[1], end[2], end[3], body, tilted)
     a, T = constant_loads(body)
@@ -78,62 +78,62 @@ def _gain_of(b, h, tilted, world):
 
 
 @inlined
-def _common_velocities(ties, world):
+def _common_velocities(ties, bodies):
     """Velocity of the common centre of mass now and at the start of the stage; zero where walls hold the bodies."""
     mass, p, start = 0.0, ZERO, ZERO
-    for b in range(world.bodies.shape[0]):
-        m = world.bodies[b].mass
-        mass, p = mass + m, plus(p, times(m, read_state(world.now, b)[2]))
-        start = plus(start, times(m, _start(world.bodies[b])[2]))
+    for b in range(bodies.work.shape[0]):
+        m = bodies.work[b].mass
+        mass, p = mass + m, plus(p, times(m, read_state(bodies.state, b)[2]))
+        start = plus(start, times(m, _start(bodies.work[b])[2]))
     if ties == 0:
         return ZERO, ZERO
     return times(1.0 / mass, p), times(1.0 / mass, start)
 
 
 @kernel
-def _take(gain, ties, tilted, world):
+def _take(gain, ties, tilted, bodies):
     """Take an energy from the motion of all bodies; where there is too little, they are back where they were.
 
     Their common velocity then is that of the start, too: what the stage made of it is as wrong as the rest.
     """
-    c, start = _common_velocities(ties, world)
+    c, start = _common_velocities(ties, bodies)
     motion = 0.0
-    for b in range(world.bodies.shape[0]):
-        _, q, v, L = read_state(world.now, b)
-        motion += kinetic_energy(q, minus(v, c), L, world.bodies[b], tilted)
+    for b in range(bodies.work.shape[0]):
+        _, q, v, L = read_state(bodies.state, b)
+        motion += kinetic_energy(q, minus(v, c), L, bodies.work[b], tilted)
     if gain > UNRESOLVED_GAIN_SHARE * motion:
-        for b in range(world.bodies.shape[0]):
-            world.bodies[b].is_coarse = 1
+        for b in range(bodies.work.shape[0]):
+            bodies.work[b].is_coarse = 1
     s = math.sqrt(1.0 - gain / motion) if gain < motion else 0.0
     new = c if gain < motion else start
-    for b in range(world.bodies.shape[0]):
-        x, q, v, L = read_state(world.now, b)
+    for b in range(bodies.work.shape[0]):
+        x, q, v, L = read_state(bodies.state, b)
         if not gain < motion:
-            world.bodies[b].is_put_back = 1
-            x, q, _, _ = _start(world.bodies[b])
-        write_state(world.now, b, (x, q, plus(new, times(s, minus(v, c))), times(s, L)))
+            bodies.work[b].is_put_back = 1
+            x, q, _, _ = _start(bodies.work[b])
+        write_state(bodies.state, b, (x, q, plus(new, times(s, minus(v, c))), times(s, L)))
 
 
 @if_declared()
-def limit_world_energy_gain(h, ties, tilted, world, first):
+def limit_world_energy_gain(h, ties, tilted, bodies, first):
     """Take from the bodies what energy a stiff stage of length h gave them from nowhere.
 
     `ties` is 1 where nothing but each other holds them; `first` the first body's record.
     """
-    if not _any_is_stiff(world.bodies):
+    if not _any_is_stiff(bodies.work):
         return
-    high = _potential(h, tilted, world)
+    high = _potential(h, tilted, bodies)
     gain, size = high - first.stage_energy, abs(high) + abs(first.stage_energy)
-    for b in range(world.bodies.shape[0]):
-        more, measure = _gain_of(b, h, tilted, world)
+    for b in range(bodies.work.shape[0]):
+        more, measure = _gain_of(b, h, tilted, bodies)
         gain, size = gain + more, size + measure
     if gain > ENERGY_ROUNDING * size:
-        _take(gain, ties, tilted, world)
+        _take(gain, ties, tilted, bodies)
 
 
 @if_declared()
-def report_unresolved_bodies(report, world, first):
+def report_unresolved_bodies(report, bodies, first):
     """Count the bodies that move in fields which some stage of the call did not resolve."""
-    for b in range(world.bodies.shape[0]):
-        _, _, v, L = read_state(world.now, b)
-        report_unresolved_body(v != ZERO or L != ZERO, report, world.bodies[b])
+    for b in range(bodies.work.shape[0]):
+        _, _, v, L = read_state(bodies.state, b)
+        report_unresolved_body(v != ZERO or L != ZERO, report, bodies.work[b])

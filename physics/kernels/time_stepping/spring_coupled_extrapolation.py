@@ -35,7 +35,7 @@ _EASY_RULES = 5
 @kernel
 def _put_rate(t, tilted, linked):
     """Rates of all bodies in the state `PLANE_HERE` at time t [s] into `PLANE_RATE`."""
-    room, bodies = linked.room, linked.bodies
+    room, bodies = linked.room, linked.work
     for b in range(bodies.shape[0]):
         s = room[PLANE_HERE, b]
         size = math.sqrt(s[3] * s[3] + s[4] * s[4] + s[5] * s[5] + s[6] * s[6])
@@ -59,8 +59,8 @@ def _put_rate(t, tilted, linked):
 @inlined
 def _put_start(linked):
     """The states of the bodies into `PLANE_BEFORE` and `PLANE_HERE`."""
-    for b in range(linked.now.shape[0]):
-        x, q, v, L = read_state(linked.now, b)
+    for b in range(linked.state.shape[0]):
+        x, q, v, L = read_state(linked.state, b)
         for plane in (PLANE_BEFORE, PLANE_HERE):
             s = linked.room[plane, b]
             s[0], s[1], s[2] = x
@@ -76,7 +76,7 @@ def _midpoint(parts, h, t, row, tilted, linked):
     _put_start(linked)
     for k in range(parts):
         _put_rate(t + k * s, tilted, linked)
-        for b in range(linked.now.shape[0]):
+        for b in range(linked.state.shape[0]):
             for c in range(LINKED_STATE_SIZE):
                 here = room[PLANE_HERE, b, c]
                 if k == 0:
@@ -85,7 +85,7 @@ def _midpoint(parts, h, t, row, tilted, linked):
                     room[PLANE_HERE, b, c] = room[PLANE_BEFORE, b, c] + 2.0 * s * room[PLANE_RATE, b, c]
                 room[PLANE_BEFORE, b, c] = here
     _put_rate(t + h, tilted, linked)
-    for b in range(linked.now.shape[0]):
+    for b in range(linked.state.shape[0]):
         for c in range(LINKED_STATE_SIZE):
             room[row, b, c] = 0.5 * (room[PLANE_BEFORE, b, c] + room[PLANE_HERE, b, c] + s * room[PLANE_RATE, b, c])
 
@@ -97,8 +97,8 @@ def _extrapolate(row, h, linked):
     Row j holds T of rule j and column row - j. The error is relative to size, or speed and what the step makes of it.
     """
     room, worst = linked.room, 0.0
-    for b in range(linked.now.shape[0]):
-        body = linked.bodies[b]
+    for b in range(linked.state.shape[0]):
+        body = linked.work[b]
         v = (room[PLANE_HERE, b, 7], room[PLANE_HERE, b, 8], room[PLANE_HERE, b, 9])
         speed = math.sqrt(qt.dot(v, v)) + body.radius / h
         turning = speed * body.mass * body.radius
@@ -121,7 +121,7 @@ def _extrapolate(row, h, linked):
 @kernel
 def extrapolate_linked(h, tilted, linked):
     """All bodies after h, to the tolerance; whether it got there in the steps allowed."""
-    start, t, step = linked.bodies[0].now, 0.0, h
+    start, t, step = linked.work[0].now, 0.0, h
     for _ in range(linked.most):
         step = min(step, h - t)
         rules, error = 0, math.inf
@@ -133,10 +133,10 @@ def extrapolate_linked(h, tilted, linked):
         if not error <= linked.tolerance:
             step *= _STEP_CUT
             continue
-        for b in range(linked.now.shape[0]):
+        for b in range(linked.state.shape[0]):
             s = linked.room[0, b]
             q = qt.normalise((s[3], s[4], s[5], s[6]))
-            write_state(linked.now, b, ((s[0], s[1], s[2]), q, (s[7], s[8], s[9]), (s[10], s[11], s[12])))
+            write_state(linked.state, b, ((s[0], s[1], s[2]), q, (s[7], s[8], s[9]), (s[10], s[11], s[12])))
         t += step
         if not t < h:
             return True

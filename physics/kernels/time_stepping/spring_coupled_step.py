@@ -43,8 +43,8 @@ from physics.kernels.time_stepping.workspace import body_fields
 class LinkedWorld(NamedTuple):
     """Bodies of the world that a thread is at."""
 
-    bodies: np.ndarray  # records: parameters and loads, see `workspace.body_fields`
-    now: np.ndarray  # states, columns of `layout`
+    work: np.ndarray  # records: parameters and loads, see `workspace.body_fields`
+    state: np.ndarray  # columns of `layout`
     touched: np.ndarray  # 0: no body is in contact
     room: np.ndarray  # states and rates of `spring_coupled_extrapolation`
     tolerance: float
@@ -69,11 +69,11 @@ def make_linked_world(
 def _substep(h, flight, linked):
     """All bodies after h by the loads of the middle."""
     hold_linked_loads(h, flight.gyroscopic, flight.tilted, linked)
-    note_stage_energy(flight.tilted, linked, linked.bodies[0])
-    for b in range(linked.now.shape[0]):
-        y = integrate_flight(read_state(linked.now, b), h, flight, linked.bodies[b])
-        write_state(linked.now, b, y)
-    limit_world_energy_gain(h, 1, flight.tilted, linked, linked.bodies[0])
+    note_stage_energy(flight.tilted, linked, linked.work[0])
+    for b in range(linked.state.shape[0]):
+        y = integrate_flight(read_state(linked.state, b), h, flight, linked.work[b])
+        write_state(linked.state, b, y)
+    limit_world_energy_gain(h, 1, flight.tilted, linked, linked.work[0])
 
 
 @kernel
@@ -93,29 +93,29 @@ def step_linked(queue, steps, substeps, h, bodies, flight, held, events, records
             records.report[world, c] = 0.0
         for b in range(count):
             i = world * count + b
-            bind_body(world, i, bodies.shapes[b], bodies, None, None, flight.tilted, linked.bodies[b])
-            bind_fields(bodies.params, i, flight.scheme, linked.bodies[b])
-            write_state(linked.now, b, read_state(bodies.state, i))
-        lost = find_overloaded_body(linked.bodies)
+            bind_body(world, i, bodies.shapes[b], bodies, None, None, flight.tilted, linked.work[b])
+            bind_fields(bodies.params, i, flight.scheme, linked.work[b])
+            write_state(linked.state, b, read_state(bodies.state, i))
+        lost = find_overloaded_body(linked.work)
         if lost >= 0:
             report_fault(world, lost, records.report)
             continue
         for k in range(steps * substeps):
             for b in range(count):
-                set_clock(k * h, linked.bodies[b])
+                set_clock(k * h, linked.work[b])
             if held is not None:
                 _substep(h, flight, linked)
             if events is not None:
                 step_linked_segment(world, h, flight.tilted, records.report, linked)
-            lost = find_nonfinite_body(linked.now)
+            lost = find_nonfinite_body(linked.state)
             if lost >= 0:
                 report_fault(world, lost, records.report)
                 break
             for b in range(count):
-                write_state(bodies.state, world * count + b, read_state(linked.now, b))
-        report_unresolved_bodies(records.report, linked, linked.bodies[0])
+                write_state(bodies.state, world * count + b, read_state(linked.state, b))
+        report_unresolved_bodies(records.report, linked, linked.work[0])
         for b in range(count):
             i = world * count + b
             _, q, _, L = read_state(bodies.state, i)
-            w = angular_velocity(q, L, linked.bodies[b], flight.tilted)
+            w = angular_velocity(q, L, linked.work[b], flight.tilted)
             bodies.state[i, at.ANGVEL], bodies.state[i, at.ANGVEL + 1], bodies.state[i, at.ANGVEL + 2] = w

@@ -4,7 +4,7 @@ It is one NumPy record, so that a kernel hands on a single pointer, and the comp
 filled anew for each body (`body.bind_body`); nothing in it outlives a step.
 
 Contacts here are with walls: arm and Jacobian rows belong to the body. The wall has inverse mass and inertia zero as
-in the course notes, and adds nothing. Bodies that touch each other have a memory of their own (`many.arrays`).
+in the course notes, and adds nothing. Bodies that touch each other have their own memory (`multibody.data.arrays`).
 """
 
 from __future__ import annotations
@@ -126,5 +126,5 @@ def make_workspace(
 
 
 def body_records(scratch) -> np.ndarray:
-    """The records of `body_fields` in a workspace, or in the `many.arrays.Many` of worlds whose bodies touch."""
-    return getattr(scratch, "bodies", scratch)
+    """The records of `body_fields` in a workspace, in a `LinkedWorld`, or in a `BodiesWorkspace`."""
+    return getattr(getattr(scratch, "bodies", scratch), "work", scratch)

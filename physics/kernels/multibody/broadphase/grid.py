@@ -19,7 +19,7 @@ BOXES_PER_STRIP = 2.0
 @inlined
 def _cut(k, many):
     """Cut axis k into strips: (lowest coordinate, strips per metre, strips)."""
-    box, count = many.box, many.box.shape[0]
+    box, count = many.bodies.box, many.bodies.box.shape[0]
     low, high, total = box[0, k], box[0, k + 3], 0.0
     for b in range(count):
         low, high = min(low, box[b, k]), max(high, box[b, k + 3])
@@ -41,7 +41,7 @@ def strip_index(x, low, density, strips):
 @inlined
 def body_strips(b, u, v, cuts, many):
     """First and last strips of body b along both axes: (u from, u to, v from, v to)."""
-    box = many.box
+    box = many.bodies.box
     lu, du, nu, lv, dv, nv = cuts
     return (
         strip_index(box[b, u], lu, du, nu), strip_index(box[b, u + 3], lu, du, nu),
@@ -51,11 +51,11 @@ def body_strips(b, u, v, cuts, many):
 
 @inlined
 def _count_entries(u, v, cuts, many):
-    """Write into `many.first_entry[c + 1]` how many bodies enter column c; how many entries that makes."""
-    first, total = many.first_entry, 0
+    """Write into `many.broadphase.first_entry[c + 1]` how many bodies enter column c; how many entries that makes."""
+    first, total = many.broadphase.first_entry, 0
     for c in range(cuts[2] * cuts[5] + 1):
         first[c] = 0
-    for b in range(many.box.shape[0]):
+    for b in range(many.bodies.box.shape[0]):
         i_first, i_last, j_first, j_last = body_strips(b, u, v, cuts, many)
         for i in range(i_first, i_last + 1):
             for j in range(j_first, j_last + 1):
@@ -66,29 +66,29 @@ def _count_entries(u, v, cuts, many):
 
 @kernel
 def fill_columns(u, v, many):
-    """List the bodies, in the order of `many.order`, in the columns along axes u and v; how those were cut.
+    """List the bodies, in the order of `many.broadphase.order`, in the columns along axes u and v; how those were cut.
 
-    Column c = strip of u * strips of v + strip of v has `many.entry[first_entry[c] : first_entry[c + 1]]`;
-    `many.cursor[c]` is where it begins.
+    Column c = strip of u * strips of v + strip of v has `many.broadphase.entry[first_entry[c] : first_entry[c + 1]]`;
+    `many.broadphase.cursor[c]` is where it begins.
     """
     lu, du, nu = _cut(u, many)
     lv, dv, nv = _cut(v, many)
     cuts = (lu, du, nu, lv, dv, nv)
-    while _count_entries(u, v, cuts, many) > ENTRIES_PER_BODY * many.box.shape[0]:
+    while _count_entries(u, v, cuts, many) > ENTRIES_PER_BODY * many.bodies.box.shape[0]:
         du, nu = (0.5 * du, nu // 2) if nu > 1 else (0.0, 1)
         dv, nv = (0.5 * dv, nv // 2) if nv > 1 else (0.0, 1)
         cuts = (lu, du, nu, lv, dv, nv)
-    first, cursor = many.first_entry, many.cursor
+    first, cursor = many.broadphase.first_entry, many.broadphase.cursor
     for c in range(nu * nv):
         first[c + 1] += first[c]
         cursor[c] = first[c]
-    for r in range(many.order.shape[0]):
-        b = many.order[r]
+    for r in range(many.broadphase.order.shape[0]):
+        b = many.broadphase.order[r]
         i_first, i_last, j_first, j_last = body_strips(b, u, v, cuts, many)
         for i in range(i_first, i_last + 1):
             for j in range(j_first, j_last + 1):
                 c = i * nv + j
-                many.entry[cursor[c]] = b
+                many.broadphase.entry[cursor[c]] = b
                 cursor[c] += 1
     for c in range(nu * nv):
         cursor[c] = first[c]

@@ -26,8 +26,8 @@ _SPIN_GROWTH = 1.5
 @inlined
 def center_motion_bound(b, h, many):
     """Bound for how far body b's centre of mass moves in h without contact, and its bounding sphere with it [m]."""
-    t = many.twist
-    return h * (abs(t[b, 0]) + abs(t[b, 1]) + abs(t[b, 2])) + 0.5 * h * h * many.bodies[b].acceleration
+    t = many.bodies.twist
+    return h * (abs(t[b, 0]) + abs(t[b, 1]) + abs(t[b, 2])) + 0.5 * h * h * many.bodies.work[b].acceleration
 
 
 @inlined
@@ -37,38 +37,41 @@ def surface_motion_bound(b, h, many):
     The angular velocity of what turns far may grow meanwhile: as |dω/dt| <= |ω|²/√3, a turn of θ at its first pace is
     one of -√3 log(1 - θ/√3) at most, and the chord of that is no longer than 1.5 θ or 2 radii.
     """
-    t = many.twist
+    t = many.bodies.twist
     turn = h * (abs(t[b, 3]) + abs(t[b, 4]) + abs(t[b, 5]))
-    if many.spin[b] > 0.0:
+    if many.bodies.spin_bound[b] > 0.0:
         turn *= _SPIN_GROWTH
-    return center_motion_bound(b, h, many) + many.bodies[b].radius * min(turn, 2.0)
+    return center_motion_bound(b, h, many) + many.bodies.work[b].radius * min(turn, 2.0)
 
 
 @inlined
 def may_reach_wall(b, wall, h, many):
     """True if body b's bounding sphere may touch a wall within h; one that turns fast far off may not."""
-    d = qt.dot(row_vector(many.walls, wall, WALL_NORMAL), row_vector(many.now, b, POS)) - many.walls[wall, WALL_OFFSET]
-    return not d > many.bodies[b].radius + center_motion_bound(b, h, many) + many.bodies[b].slop
+    d = (
+        qt.dot(row_vector(many.walls, wall, WALL_NORMAL), row_vector(many.bodies.state, b, POS))
+        - many.walls[wall, WALL_OFFSET]
+    )
+    return not d > many.bodies.work[b].radius + center_motion_bound(b, h, many) + many.bodies.work[b].slop
 
 
 @inlined
 def may_meet(a, b, h, many):
     """True if the bounding spheres of two bodies may touch within h."""
     far = (
-        many.bodies[a].radius
-        + many.bodies[b].radius
+        many.bodies.work[a].radius
+        + many.bodies.work[b].radius
         + center_motion_bound(a, h, many)
         + center_motion_bound(b, h, many)
     )
     far += pair_slop(a, b, many)
-    d = subtract(row_vector(many.now, a, POS), row_vector(many.now, b, POS))
+    d = subtract(row_vector(many.bodies.state, a, POS), row_vector(many.bodies.state, b, POS))
     return not qt.dot(d, d) > far * far
 
 
 @inlined
 def half_extent(b, axis, many):
     """Half the width of body b along a world axis [m]; of a hull that of the block that reaches as far as it does."""
-    R, d, shape = many.rotation, many.bodies[b].dims, many.bodies[b].shape
+    R, d, shape = many.bodies.rotation, many.bodies.work[b].dims, many.bodies.work[b].shape
     if shape == SPHERE:
         return d[0]
     if shape == HULL:
@@ -80,24 +83,24 @@ def half_extent(b, axis, many):
 @kernel
 def write_swept_boxes(h, many):
     """Write `many.box`: every body with all it may sweep in h, and the slop."""
-    for b in range(many.now.shape[0]):
-        margin = surface_motion_bound(b, h, many) + many.bodies[b].slop
+    for b in range(many.bodies.state.shape[0]):
+        margin = surface_motion_bound(b, h, many) + many.bodies.work[b].slop
         for axis in range(3):
             half = half_extent(b, axis, many) + margin
-            many.box[b, axis] = many.place[b, axis] - half
-            many.box[b, axis + 3] = many.place[b, axis] + half
+            many.bodies.box[b, axis] = many.bodies.center[b, axis] - half
+            many.bodies.box[b, axis + 3] = many.bodies.center[b, axis] + half
 
 
 @inlined
 def widest_axis(many):
     """World axis with the largest variance of the bodies' centres."""
-    best, axis, count = -1.0, 0, many.place.shape[0]
+    best, axis, count = -1.0, 0, many.bodies.center.shape[0]
     for k in range(3):
         total = square = 0.0
         for b in range(count):
-            total += many.place[b, k]
+            total += many.bodies.center[b, k]
         for b in range(count):
-            d = many.place[b, k] - total / count
+            d = many.bodies.center[b, k] - total / count
             square += d * d
         if square > best:
             best, axis = square, k
@@ -106,8 +109,8 @@ def widest_axis(many):
 
 @inlined
 def _merge(first, middle, last, axis, many):
-    """Merge two sorted runs of `many.order` that follow each other."""
-    order, merged, box = many.order, many.merged, many.box
+    """Merge two sorted runs of `many.broadphase.order` that follow each other."""
+    order, merged, box = many.broadphase.order, many.broadphase.merged, many.bodies.box
     i, j = first, middle
     for k in range(first, last):
         if j >= last or (i < middle and box[order[i], axis] <= box[order[j], axis]):
@@ -122,10 +125,10 @@ def _merge(first, middle, last, axis, many):
 
 @inlined
 def sort_bodies(axis, many):
-    """Write `many.order`: the bodies by the lower end of their boxes, ties by index (merge sort)."""
-    count = many.order.shape[0]
+    """Write `many.broadphase.order`: the bodies by the lower end of their boxes, ties by index (merge sort)."""
+    count = many.broadphase.order.shape[0]
     for b in range(count):
-        many.order[b] = b
+        many.broadphase.order[b] = b
     width = 1
     while width < count:
         first = 0
@@ -137,7 +140,7 @@ def sort_bodies(axis, many):
 
 @inlined
 def _overlap(a, b, many):
-    box = many.box
+    box = many.bodies.box
     for k in range(3):
         if box[a, k] > box[b, k + 3] or box[b, k] > box[a, k + 3]:
             return False
@@ -146,8 +149,8 @@ def _overlap(a, b, many):
 
 @inlined
 def _sort_behind(first, last, many):
-    """Sort the new pairs `many.pairs[first:last]`, whose first body is the same, by the place of the second one."""
-    pairs, rank = many.pairs, many.merged
+    """Sort the new pairs `many.broadphase.pairs[first:last]` of one first body by the rank of the second body."""
+    pairs, rank = many.broadphase.pairs, many.broadphase.merged
     for i in range(first + 1, last):
         b, j = pairs[i, 1], i
         while j > first and rank[pairs[j - 1, 1]] > rank[b]:
@@ -160,11 +163,11 @@ def _sort_behind(first, last, many):
 def _pair_in_column(a, i, j, axes, cuts, count, many):
     """Add the pairs of a with those behind it in a column, if their boxes overlap there first: how many pairs now."""
     axis, u, v = axes
-    box, nv = many.box, cuts[5]
+    box, nv = many.bodies.box, cuts[5]
     column = i * nv + j
-    many.cursor[column] += 1  # past a
-    for k in range(many.cursor[column], many.first_entry[column + 1]):
-        b = many.entry[k]
+    many.broadphase.cursor[column] += 1  # past a
+    for k in range(many.broadphase.cursor[column], many.broadphase.first_entry[column + 1]):
+        b = many.broadphase.entry[k]
         if box[b, axis] > box[a, axis + 3]:
             break
         if not _overlap(a, b, many):
@@ -173,26 +176,26 @@ def _pair_in_column(a, i, j, axes, cuts, count, many):
         b_i, _, b_j, _ = body_strips(b, u, v, cuts, many)
         if max(a_i, b_i) != i or max(a_j, b_j) != j:
             continue  # found in the column of the lower corner of what the boxes share
-        if count == many.pairs.shape[0]:
+        if count == many.broadphase.pairs.shape[0]:
             many.counts[NUM_DROPPED] += 1
             continue
-        many.pairs[count, 0], many.pairs[count, 1] = a, b
+        many.broadphase.pairs[count, 0], many.broadphase.pairs[count, 1] = a, b
         count += 1
     return count
 
 
 @kernel
 def find_pairs(h, many):
-    """Write `many.pairs` and their number: all pairs (a < b) of bodies whose boxes overlap."""
+    """Write `many.broadphase.pairs` and their number: all pairs (a < b) of bodies whose boxes overlap."""
     write_swept_boxes(h, many)
     axis = widest_axis(many)
     sort_bodies(axis, many)
     u, v = (axis + 1) % 3, (axis + 2) % 3
-    cuts, pairs, count = fill_columns(u, v, many), many.pairs, 0
-    for r in range(many.order.shape[0]):
-        many.merged[many.order[r]] = r
-    for r in range(many.order.shape[0]):
-        a, first = many.order[r], count
+    cuts, pairs, count = fill_columns(u, v, many), many.broadphase.pairs, 0
+    for r in range(many.broadphase.order.shape[0]):
+        many.broadphase.merged[many.broadphase.order[r]] = r
+    for r in range(many.broadphase.order.shape[0]):
+        a, first = many.broadphase.order[r], count
         i_first, i_last, j_first, j_last = body_strips(a, u, v, cuts, many)
         for i in range(i_first, i_last + 1):
             for j in range(j_first, j_last + 1):

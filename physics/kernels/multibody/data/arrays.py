@@ -1,7 +1,23 @@
 """Scratch memory of one thread for worlds whose bodies touch each other.
 
-A named tuple of arrays: its type does not depend on how many bodies, walls or contacts there are, so that one
-compiled kernel serves them all. It is filled anew for every world and every stage; nothing in it outlives a step.
+`BodiesWorkspace` is a named tuple of groups of arrays, one for each part of a step. Its type does not depend on the
+number of bodies, walls or contacts: one compiled kernel serves them all. It is filled anew for every world and every
+stage; nothing in it outlives a step.
+
+Shapes are given in these numbers:
+
+========  ==============================================================
+bodies    bodies of the world
+walls     walls of the world
+pairs     `pair_capacity`: pairs of bodies that there is room for
+contacts  `contact_capacity`: contacts that there is room for
+blocks    `block_capacity`: off-diagonal blocks that there is room for
+batches   `batch_capacity`: batches of contacts that there is room for
+slots     a power of two, at least twice the contacts
+========  ==============================================================
+
+Arrays are of float64; `int` in a shape says int64. Contacts and bodies are referred to by their indices, a wall k among
+bodies by -1 - k.
 """
 
 from __future__ import annotations
@@ -16,7 +32,7 @@ from physics.kernels.multibody.data.hull_tables import Hulls, clipped_face_capac
 from physics.kernels.state.layout import REPORT_SIZE, STATE_SIZE, VERTEX_COUNT
 from physics.kernels.time_stepping.workspace import body_fields, setting_fields
 
-# Columns of `many.momenta` in a resting stage: velocities before it, then momenta with its loads.
+# Columns of `many.bodies.momenta` in a resting stage: velocities before it, then momenta with its loads.
 PRE_LOAD_VELOCITY, LOADED_MOMENTA = 0, 6
 
 # Contacts that two bodies may have at once: a rectangle clipped by another one has up to eight vertices.
@@ -31,28 +47,28 @@ ENTRIES_PER_BODY = 4
 # Blocks of the linear system of `block_lu` per body: where more are needed Newton's method is left out.
 BLOCKS_PER_BODY = 32
 
-# Bundles of contacts of one island (`contact_batches`) per body: where more are needed Newton's method is left out,
+# Batches of contacts of one island (`contact_batches`) per body: where more are needed Newton's method is left out,
 # too.
 BATCHES_PER_BODY = 32
 
-# `counts`: contacts, pairs, contacts or pairs for which there was no room, and bundles of the island that is solved.
+# Entries of `counts`: contacts, pairs, contacts or pairs without room, and batches of the island that is solved.
 NUM_CONTACTS, NUM_PAIRS, NUM_DROPPED, NUM_BATCHES = range(4)
 
 # Of `block_lu`: numbers of a column, velocity and angular velocity with one unused after each, and of a block of six.
 COLUMN_SIZE = 8
 BLOCK_SIZE = 6 * COLUMN_SIZE
 
-# Numbers of a row of `normal_rows`: five vectors, one unused number after each; and of one of `visit`, five lines of a
-# cache.
+# Numbers of a row of `normal_rows`: five vectors, one unused number after each; and of a row of `visit_rows`, five
+# cache lines.
 NORMAL_ROW_SIZE = 5 * 4
 VISIT_SIZE = 5 * 8
 
-# Numbers of a row of `bundle`, and of `lanes`: four for each of the fields in `contact_batches`.
+# Numbers of a row of `batch`, and of `lanes`: four for each of the fields in `contact_batches`.
 BATCH_SIZE = 6
 LANES_SIZE = 4 * 52
 
 # Row of `memory`, one per world: length of the last resting stage [s], its contact count, then `WARM_CONTACT_SIZE`
-# numbers for each contact: its name, first and second body (-1 - k: wall k), impulse and point in the world frame.
+# numbers for each contact: its id, first and second body (-1 - k: wall k), impulse and point in the world frame.
 # Where substeps are refined the last column of all is the next part of one as a share of it (`adaptive_substep`; 0: all
 # of it).
 WARM_STAGE_LENGTH, WARM_CONTACT_COUNT = range(2)
@@ -62,99 +78,163 @@ WARM_CONTACT_SIZE = 9
 
 
 class WorldSnapshots(NamedTuple):
-    """A world at moments to which `adaptive_substep` comes back, one row for each."""
+    """A world at the moments to which `adaptive_substep` comes back, one row for each."""
 
-    now: np.ndarray  # states of the bodies, (moments, bodies, STATE_SIZE)
-    memory: np.ndarray  # row of `memory`
-    report: np.ndarray  # row of the report
-    counts: np.ndarray  # events of each body
+    state: np.ndarray  # (moments, bodies, STATE_SIZE) states of the bodies
+    memory: np.ndarray  # (moments, columns) row of `memory`
+    report: np.ndarray  # (moments, REPORT_SIZE) row of the report
+    counts: np.ndarray  # (moments, bodies) int, events of each body
+
+
+class Bodies(NamedTuple):
+    """Bodies of the world: parameters, poses and motion."""
+
+    work: np.ndarray  # (bodies,) records: parameters and loads, see `workspace.body_fields`
+    state: np.ndarray  # (bodies, STATE_SIZE) columns of `layout`
+    rotation: np.ndarray  # (bodies, 9) body frame to world, row by row
+    inv_mass: np.ndarray  # (bodies,) 1/mass [1/kg]
+    inv_inertia: np.ndarray  # (bodies, 6) inverse inertia, world frame: 00, 01, 02, 11, 12, 22 [1/(kg m²)]
+    twist: np.ndarray  # (bodies, 6) velocity and angular velocity, world frame [m/s, rad/s]
+    free_twist: np.ndarray  # (bodies, 6) twist without contact impulses [m/s, rad/s]
+    momenta: np.ndarray  # (bodies, 12) in a resting stage: `PRE_LOAD_VELOCITY`, `LOADED_MOMENTA`; in
+    # `restitution_energy`: velocity and angular momentum before an impact, then with all of its rebound
+    center: np.ndarray  # (bodies, 3) geometric centre, world frame [m]
+    box: np.ndarray  # (bodies, 6) lower, then upper corner of the bounding box, motion of the stage included [m]
+    touched: np.ndarray  # (bodies,) int, 1: the body is in a contact of this stage
+    spin_bound: np.ndarray  # (bodies,) bound of |ω| of a body that may turn far in this stage, else 0 [rad/s]
+    lift_work: np.ndarray  # (bodies,) work that `position_correction` does against the loads [J]
+
+
+class BroadPhase(NamedTuple):
+    """Sweep and prune along one axis, and the columns that cut the other two."""
+
+    pairs: np.ndarray  # (pairs, 2) int, bodies whose boxes overlap
+    order: np.ndarray  # (bodies,) int, bodies by the lower end of their boxes
+    merged: np.ndarray  # (bodies,) int, scratch of the merge sort; then the position of each body in `order`
+    first_entry: np.ndarray  # (bodies + 1,) int, first position of a column in `entry`
+    cursor: np.ndarray  # (bodies,) int, position in `entry` at which a column continues
+    entry: np.ndarray  # (ENTRIES_PER_BODY * bodies,) int, bodies, column by column
+
+
+class NarrowPhase(NamedTuple):
+    """Scratch for one pair of bodies."""
+
+    simplex: np.ndarray  # (4, 3) of `gjk`: differences of points of the two bodies [m]
+    relative_axes: np.ndarray  # (4, 3, 3) of two blocks: rows of `box_sat`, axes of one block in the other
+    polygon: np.ndarray  # (2, 16, 3) of two blocks: clipped face in two copies, vertices (x, y, height) [m]
+    edge: np.ndarray  # (2, 16, 2) int, edges into and out of each vertex of `polygon`
+    hulls: Hulls | None  # tables of convex polyhedra, and scratch for a pair; None in a world without hulls
+
+
+class Contacts(NamedTuple):
+    """Contact set of a stage, a row for each contact."""
+
+    bodies: np.ndarray  # (contacts, 2) int, first and second body; -1 - k: wall k
+    id: np.ndarray  # (contacts,) int, the same while the same features touch
+    owner: np.ndarray  # (contacts,) int, body that the normal turns with, -1: none
+    normal: np.ndarray  # (contacts, 3) unit vector out of the second body, in the frame of the owner
+    anchor: np.ndarray  # (contacts, 6) points of both bodies from their centres of mass, in their frames [m]
+    frame: np.ndarray  # (contacts, 9) rows normal, tangent 1, tangent 2, world frame
+    arm: np.ndarray  # (contacts, 6) points of both bodies from their centres of mass, world frame [m]
+    gap: np.ndarray  # (contacts,) distance along the normal [m], negative when penetrating
+    speed: np.ndarray  # (contacts,) normal velocity before the stage [m/s], negative when approaching
+    mu: np.ndarray  # (contacts,) Coulomb coefficient of friction
+    restitution: np.ndarray  # (contacts,) coefficient of restitution
+    target: np.ndarray  # (contacts, 3) relative velocity that the solver aims at: normal, tangents [m/s]
+    impulse: np.ndarray  # (contacts, 3) normal, tangents [N s]
+    block: np.ndarray  # (contacts, 9) the contact's own 3 x 3 block of W = J M⁻¹ Jᵀ [1/kg]
+    step: np.ndarray  # (contacts,) 1/λ_max of the tangential part of `block` [kg]
+    best_impulse: np.ndarray  # (contacts, 3) best impulses of all methods for an island [N s]
+    rebound_impulse: np.ndarray  # (contacts, 3) of `restitution_energy`: impulses with all of the rebound [N s]
+    id_table: np.ndarray  # (slots,) int, of `warm_start`: contacts of the last stage by id, open addressing; -1: free
+
+
+class Sweeps(NamedTuple):
+    """Gauss-Seidel sweeps over the contacts of an island."""
+
+    motion: np.ndarray  # (bodies, COLUMN_SIZE) twists during the sweeps, columns of `block_lu` [m/s, rad/s]
+    normal_rows: np.ndarray  # (contacts, NORMAL_ROW_SIZE) of `normal_rows`: row of the Jacobian, and M⁻¹ times it
+    visit_rows: np.ndarray  # (contacts, VISIT_SIZE) of `contact_rows`: data of the contacts, in visiting order
+    visit_bodies: np.ndarray  # (contacts, 2) int, `Contacts.bodies` in visiting order
+    impulse_4_sweeps_ago: np.ndarray  # (contacts, 3) impulses of the visits, for the extrapolation [N s]
+    impulse_2_sweeps_ago: np.ndarray  # (contacts, 3) the same, two sweeps later [N s]
+    visited: np.ndarray  # (contacts,) int, number of the last visit of a contact
+    pushed: np.ndarray  # (bodies,) int, number of the last visit that changed a body's motion
+
+
+class Islands(NamedTuple):
+    """Groups of bodies connected by contacts."""
+
+    parent: np.ndarray  # (bodies,) int, union-find forest: a body of the same island
+    of_body: np.ndarray  # (bodies,) int, island of a body, -1: none
+    contacts: np.ndarray  # (contacts,) int, contacts, island by island
+    first_contact: np.ndarray  # (contacts + 1,) int, first position of an island in `contacts`
+    bodies: np.ndarray  # (bodies,) int, bodies, island by island; then in the order of elimination
+    first_body: np.ndarray  # (contacts + 1,) int, first position of an island in `bodies`
+    group_motion: np.ndarray  # (bodies, 3) of `sleeping`, at the root of a group: largest displacements in the last two
+    # windows, in the threshold; 1: a body of the group is not quiet
+
+
+class LinearSystem(NamedTuple):
+    """Sparse system of an island: a 6 x 6 block for each body and for each two that touch."""
+
+    diagonal: np.ndarray  # (bodies, BLOCK_SIZE) of `block_lu`: block of a body, then its inverse
+    lower: np.ndarray  # (blocks, BLOCK_SIZE) blocks below the diagonal, column by column
+    upper: np.ndarray  # (blocks, BLOCK_SIZE) blocks right of the diagonal, row by row
+    swaps: np.ndarray  # (6,) int, row exchanges of the block that is inverted
+    rank: np.ndarray  # (bodies,) int, position of a body in the elimination
+    start: np.ndarray  # (bodies,) int, later neighbours of body b: `column[start[b] : stop[b]]`
+    stop: np.ndarray  # (bodies,) int
+    column: np.ndarray  # (blocks,) int
+    neighbour: np.ndarray  # (2 * blocks, 2) int, of `minimum_degree`: linked lists (body, next entry)
+    links: np.ndarray  # (1,) int, number of entries in `neighbour`
+    head: np.ndarray  # (bodies,) int, first entry of a body's list of neighbours
+    degree: np.ndarray  # (bodies,) int, number of neighbours of a body
+    mark: np.ndarray  # (bodies,) int, stamp of the bodies that are neighbours
+    bucket: np.ndarray  # (bodies,) int, first body of each degree; doubly linked by the next two
+    ahead: np.ndarray  # (bodies,) int
+    behind: np.ndarray  # (bodies,) int
+
+
+class Newton(NamedTuple):
+    """Iterates of `proximal_newton` and `interior_point`."""
+
+    defect: np.ndarray  # (bodies, COLUMN_SIZE) x - M⁻¹ Jᵀ p(x), columns of `block_lu` [m/s, rad/s]
+    before: np.ndarray  # (bodies, 6) twists before a step [m/s, rad/s]
+    change: np.ndarray  # (bodies, COLUMN_SIZE) the step, columns of `block_lu` [m/s, rad/s]
+    batch: np.ndarray  # (batches, BATCH_SIZE) int, of `contact_batches`: bodies, index of their block, contacts
+    lanes: np.ndarray  # (batches, LANES_SIZE) data of the contacts, four of them side by side
 
 
 class BodiesWorkspace(NamedTuple):
-    """Bodies, pairs and contacts of the world that a thread is at; shapes in `make_bodies_workspace`."""
+    """Bodies, pairs and contacts of the world that a thread works on."""
 
-    bodies: np.ndarray  # records: parameters and loads, see `workspace.body_fields`
-    now: np.ndarray  # states, columns of `layout`
-    rotation: np.ndarray  # body frame to world, row by row
-    lightness: np.ndarray  # 1/mass [1/kg]
-    turning: np.ndarray  # inverse inertia in the world frame: 00, 01, 02, 11, 12, 22 [1/(kg m²)]
-    twist: np.ndarray  # velocity and angular velocity, world frame [m/s, rad/s]
-    place: np.ndarray  # geometric centre, world frame [m]
-    box: np.ndarray  # lower, then upper corner of the box along the world axes, motion of the stage included [m]
-    touched: np.ndarray  # 1: the body is in a contact of this stage
-    spin: (
-        np.ndarray
-    )  # of `conservative_advancement`: bound of |ω| of a body that may turn far in this stage, else 0 [rad/s]
-    simplex: np.ndarray  # of `gjk`: differences of points of two bodies [m]
-    order: np.ndarray  # bodies by the lower end of their boxes
-    merged: np.ndarray  # scratch of sorting; then places of the bodies in `order`
-    first_entry: np.ndarray  # of `columns`: where the bodies of a column begin in `entry`, and where to go on
-    cursor: np.ndarray
-    entry: np.ndarray
-    walls: np.ndarray  # columns of `layout`
-    pairs: np.ndarray  # bodies whose boxes overlap
-    counts: np.ndarray
-    ends: np.ndarray  # first and second body of a contact; -1 - k: wall k
-    name: np.ndarray  # of a contact, the same while the same features touch
-    owner: np.ndarray  # body that the normal turns with, -1: none
-    normal: np.ndarray  # out of the second body, in the frame of its owner
-    anchor: np.ndarray  # points of first and second body, in their frames, from their centres of mass [m]
-    frame: np.ndarray  # normal, tangent 1, tangent 2, world frame
-    arm: np.ndarray  # points of first and second body from their centres of mass, world frame [m]
-    gap: np.ndarray  # [m], negative when penetrating
-    speed: np.ndarray  # normal velocity before the stage [m/s], negative when approaching
-    mu: np.ndarray  # Coulomb coefficient
-    bounce: np.ndarray  # coefficient of restitution
-    target: np.ndarray  # velocity aimed at: normal, tangents [m/s]
-    impulse: np.ndarray  # normal, tangents [N s]
-    step: np.ndarray  # 1/λ_max of the tangential part of its block [kg]
-    block: np.ndarray  # the contact's own 3 x 3 of W = J M⁻¹ Jᵀ [1/kg]
-    rows: np.ndarray  # of `normal_rows`: the normal's row of the Jacobian of a contact, and M⁻¹ times it
-    visit: np.ndarray  # of `contact_rows`: what visits of contacts read, in the order of the visits
-    side: np.ndarray  # their bodies, as `ends`
-    motion: np.ndarray  # twists while contacts are swept, columns of `block_lu`
-    settled: np.ndarray  # of `gauss_seidel`: impulses of visits as they were four sweeps ago, and two sweeps ago [N s]
-    trend: np.ndarray
-    visited: np.ndarray  # of sweeps: number of the last visit of a contact, of the last push of a body
-    pushed: np.ndarray
-    table: np.ndarray  # places of names in the last stage's contacts: open addressing
-    mix: np.ndarray  # of a pair of blocks: axes of one in the other, and absolute values
-    polygon: np.ndarray  # of a pair of blocks: clipped face, two copies of (x, y, height)
-    edge: np.ndarray  # of a pair of blocks: edges into and out of each vertex of it
-    free: np.ndarray  # twists without contact impulses [m/s, rad/s]
-    parent: np.ndarray  # of `islands`: a body of the same island, and the number of a body's island
-    island: np.ndarray
-    first_contact: np.ndarray  # where the contacts and bodies of an island begin in `queue` and `order`
-    first_body: np.ndarray
-    queue: np.ndarray  # contacts, island by island
-    neighbour: np.ndarray  # of `minimum_degree`: linked lists of bodies that touch a body, (body, next entry)
-    links: np.ndarray  # how many entries those have
-    head: np.ndarray  # first entry of a body
-    degree: np.ndarray  # its length
-    mark: np.ndarray
-    bucket: np.ndarray  # linked lists of bodies of one degree
-    ahead: np.ndarray
-    behind: np.ndarray
-    rank: np.ndarray  # place of a body in the elimination
-    start: np.ndarray  # later neighbours of a body: `column[start : stop]`
-    stop: np.ndarray
-    column: np.ndarray
-    diagonal: np.ndarray  # of `block_lu`: the linear system
-    lower: np.ndarray
-    upper: np.ndarray
-    swaps: np.ndarray
-    rebound: np.ndarray  # of `restitution_energy`: impulses with all of the rebound [N s]
-    best: np.ndarray  # best impulses met by all methods for an island [N s]
-    defect: np.ndarray  # of `proximal_newton`: x - M⁻¹ Jᵀ p(x), columns of `block_lu` [m/s, rad/s]
-    before: np.ndarray  # twists before a Newton step
-    change: np.ndarray  # the step, columns of `block_lu`
-    bundle: np.ndarray  # of `contact_batches`: bodies, place of their block, contacts
-    lanes: np.ndarray  # what `proximal_newton` and `interior_point` know of contacts
-    momenta: (
-        np.ndarray
-    )  # of `restitution_energy`: velocity and angular momentum before an impact, then with all of its rebound
-    hulls: Hulls | None  # tables of convex polyhedra, and a pair of them in place; None where there is no hull
-    settings: np.ndarray  # one record: see `workspace.setting_fields`
+    bodies: Bodies
+    broadphase: BroadPhase
+    narrowphase: NarrowPhase
+    contacts: Contacts
+    sweeps: Sweeps
+    islands: Islands
+    system: LinearSystem
+    newton: Newton
+    walls: np.ndarray  # (walls, WALL_SIZE) columns of `layout`
+    counts: np.ndarray  # (4,) int: `NUM_CONTACTS`, `NUM_PAIRS`, `NUM_DROPPED`, `NUM_BATCHES`
+    settings: np.ndarray  # (1,) record: `bodies_setting_fields`
+
+
+def bodies_setting_fields() -> list[tuple]:
+    """Fields of the numerical settings, and what a stage tells the solver."""
+    f, i = np.float64, np.int64
+    return [
+        *setting_fields(),
+        ("residual_limit", f),  # residual allowed beside the tolerance [m/s]: see `midpoint_step.rest_residual`
+        ("half_load_speed", f),  # with error control: least speed that half a substep's loads give a body [m/s], else 0
+        ("load_speed", f),  # largest speed that the loads of a resting stage give a body [m/s], else 0
+        ("is_resting_stage", i),  # 1: contacts are held through a stage, 0: impacts
+        ("meet", i),  # 1: bodies touch each other, 0: walls only
+        ("is_sequential", i),  # 1: contacts that collide do so one after the other
+        ("is_error_controlled", i),  # 1: steps have an error tolerance
+    ]
 
 
 def contact_capacity(bodies: int, walls: int, polyhedra: Sequence = ()) -> int:
@@ -166,6 +246,16 @@ def contact_capacity(bodies: int, walls: int, polyhedra: Sequence = ()) -> int:
 def pair_capacity(bodies: int) -> int:
     """Pairs near each other that a world of so many bodies has room for."""
     return max(1, min(bodies * (bodies - 1) // 2, PAIRS_PER_BODY * bodies))
+
+
+def block_capacity(bodies: int) -> int:
+    """Off-diagonal blocks of the linear system that a world of so many bodies has room for."""
+    return min(max(1, bodies * (bodies - 1) // 2), BLOCKS_PER_BODY * bodies)
+
+
+def batch_capacity(bodies: int, contacts: int) -> int:
+    """Batches of contacts that a world with room for so many bodies and contacts has room for."""
+    return max(1, min(contacts, BATCHES_PER_BODY * bodies))
 
 
 def warm_start_size(bodies: int, walls: int, polyhedra: Sequence = (), refined: bool = False) -> int:
@@ -180,56 +270,165 @@ def make_bodies_workspace(
     polyhedra: Sequence = (),
     *,
     meet=True,
-    in_turn=False,
-    in_time=False,
+    is_sequential=False,
+    is_error_controlled=False,
     relative_slop: float,
     **settings: float,
 ) -> BodiesWorkspace:
     """Scratch for worlds of `bodies` bodies among `walls` ((walls, WALL_SIZE)), in fields, with numerical settings.
 
     `polyhedra` are those of `make_hulls`, empty where there is no hull. `meet` says whether bodies touch each other, or
-    walls only; `in_turn` whether contacts that collide do so one after the other; `in_time` whether steps have an error
-    tolerance.
+    walls only; `is_sequential` whether contacts that collide do so one after the other; `is_error_controlled` whether
+    steps have an error tolerance.
     """
-    f, i, nb = np.float64, np.int64, bodies
-    pairs, n = pair_capacity(bodies), contact_capacity(bodies, len(walls), polyhedra)
-    floats, ints = ("still", "half", "load"), ("rests", "meet", "in_turn", "in_time")
-    fields = [*setting_fields(), *((name, f) for name in floats), *((name, i) for name in ints)]
-    record = np.zeros(1, np.dtype(fields))
-    record["still"], record["meet"], record["in_turn"], record["in_time"] = np.inf, meet, in_turn, in_time
+    contacts = contact_capacity(bodies, len(walls), polyhedra)
+    switches = {"meet": meet, "is_sequential": is_sequential, "is_error_controlled": is_error_controlled}
+    return BodiesWorkspace(
+        bodies=_make_bodies(bodies, terms, relative_slop),
+        broadphase=_make_broad_phase(bodies),
+        narrowphase=_make_narrow_phase(polyhedra),
+        contacts=_make_contacts(contacts),
+        sweeps=_make_sweeps(bodies, contacts),
+        islands=_make_islands(bodies, contacts),
+        system=_make_linear_system(bodies, block_capacity(bodies)),
+        newton=_make_newton(bodies, batch_capacity(bodies, contacts)),
+        walls=walls.copy(),
+        counts=np.zeros(4, np.int64),
+        settings=_make_settings({**settings, **switches}),
+    )
+
+
+def _make_bodies(bodies: int, terms: tuple[Term, ...], relative_slop: float) -> Bodies:
+    records = np.zeros(bodies, np.dtype(body_fields(terms)))
+    records["relative_slop"] = relative_slop
+    return Bodies(
+        work=records,
+        state=np.zeros((bodies, STATE_SIZE)),
+        rotation=np.zeros((bodies, 9)),
+        inv_mass=np.zeros(bodies),
+        inv_inertia=np.zeros((bodies, 6)),
+        twist=np.zeros((bodies, 6)),
+        free_twist=np.zeros((bodies, 6)),
+        momenta=np.zeros((bodies, 12)),
+        center=np.zeros((bodies, 3)),
+        box=np.zeros((bodies, 6)),
+        touched=np.zeros(bodies, np.int64),
+        spin_bound=np.zeros(bodies),
+        lift_work=np.zeros(bodies),
+    )
+
+
+def _make_broad_phase(bodies: int) -> BroadPhase:
+    i = np.int64
+    return BroadPhase(
+        pairs=np.zeros((pair_capacity(bodies), 2), i),
+        order=np.arange(bodies, dtype=i),
+        merged=np.zeros(bodies, i),
+        first_entry=np.zeros(bodies + 1, i),
+        cursor=np.zeros(bodies, i),
+        entry=np.zeros(ENTRIES_PER_BODY * bodies, i),
+    )
+
+
+def _make_narrow_phase(polyhedra: Sequence) -> NarrowPhase:
+    return NarrowPhase(
+        simplex=np.zeros((4, 3)),
+        relative_axes=np.zeros((4, 3, 3)),
+        polygon=np.zeros((2, 16, 3)),
+        edge=np.zeros((2, 16, 2), np.int64),
+        hulls=make_hulls(polyhedra) if polyhedra else None,
+    )
+
+
+def _make_contacts(contacts: int) -> Contacts:
+    i = np.int64
+    return Contacts(
+        bodies=np.zeros((contacts, 2), i),
+        id=np.zeros(contacts, i),
+        owner=np.zeros(contacts, i),
+        normal=np.zeros((contacts, 3)),
+        anchor=np.zeros((contacts, 6)),
+        frame=np.zeros((contacts, 9)),
+        arm=np.zeros((contacts, 6)),
+        gap=np.zeros(contacts),
+        speed=np.zeros(contacts),
+        mu=np.zeros(contacts),
+        restitution=np.zeros(contacts),
+        target=np.zeros((contacts, 3)),
+        impulse=np.zeros((contacts, 3)),
+        block=np.zeros((contacts, 9)),
+        step=np.zeros(contacts),
+        best_impulse=np.zeros((contacts, 3)),
+        rebound_impulse=np.zeros((contacts, 3)),
+        id_table=np.full(1 << (2 * contacts - 1).bit_length(), -1, i),
+    )
+
+
+def _make_sweeps(bodies: int, contacts: int) -> Sweeps:
+    i = np.int64
+    return Sweeps(
+        motion=np.zeros((bodies, COLUMN_SIZE)),
+        normal_rows=np.zeros((contacts, NORMAL_ROW_SIZE)),
+        visit_rows=np.zeros((contacts, VISIT_SIZE)),
+        visit_bodies=np.zeros((contacts, 2), i),
+        impulse_4_sweeps_ago=np.zeros((contacts, 3)),
+        impulse_2_sweeps_ago=np.zeros((contacts, 3)),
+        visited=np.zeros(contacts, i),
+        pushed=np.zeros(bodies, i),
+    )
+
+
+def _make_islands(bodies: int, contacts: int) -> Islands:
+    i = np.int64
+    return Islands(
+        parent=np.zeros(bodies, i),
+        of_body=np.zeros(bodies, i),
+        contacts=np.zeros(contacts, i),
+        first_contact=np.zeros(contacts + 1, i),
+        bodies=np.zeros(bodies, i),
+        first_body=np.zeros(contacts + 1, i),
+        group_motion=np.zeros((bodies, 3)),
+    )
+
+
+def _make_linear_system(bodies: int, blocks: int) -> LinearSystem:
+    i = np.int64
+    return LinearSystem(
+        diagonal=np.zeros((bodies, BLOCK_SIZE)),
+        lower=np.zeros((blocks, BLOCK_SIZE)),
+        upper=np.zeros((blocks, BLOCK_SIZE)),
+        swaps=np.zeros(6, i),
+        rank=np.zeros(bodies, i),
+        start=np.zeros(bodies, i),
+        stop=np.zeros(bodies, i),
+        column=np.zeros(blocks, i),
+        neighbour=np.zeros((2 * blocks, 2), i),
+        links=np.zeros(1, i),
+        head=np.zeros(bodies, i),
+        degree=np.zeros(bodies, i),
+        mark=np.zeros(bodies, i),
+        bucket=np.zeros(bodies, i),
+        ahead=np.zeros(bodies, i),
+        behind=np.zeros(bodies, i),
+    )
+
+
+def _make_newton(bodies: int, batches: int) -> Newton:
+    return Newton(
+        defect=np.zeros((bodies, COLUMN_SIZE)),
+        before=np.zeros((bodies, 6)),
+        change=np.zeros((bodies, COLUMN_SIZE)),
+        batch=np.zeros((batches, BATCH_SIZE), np.int64),
+        lanes=np.zeros((batches, LANES_SIZE)),
+    )
+
+
+def _make_settings(settings: dict[str, float]) -> np.ndarray:
+    record = np.zeros(1, np.dtype(bodies_setting_fields()))
+    record["residual_limit"] = np.inf
     for name, value in settings.items():
         record[name] = value
-    rows = np.zeros(nb, np.dtype(body_fields(terms)))
-    rows["relative_slop"] = relative_slop
-    blocks = min(max(1, nb * (nb - 1) // 2), BLOCKS_PER_BODY * nb)
-    bundles = max(1, min(n, BATCHES_PER_BODY * nb))
-    table = 1 << (2 * n - 1).bit_length()
-    return BodiesWorkspace(
-        bodies=rows, now=np.zeros((nb, STATE_SIZE)), rotation=np.zeros((nb, 9)), lightness=np.zeros(nb),
-        turning=np.zeros((nb, 6)), twist=np.zeros((nb, 6)), place=np.zeros((nb, 3)), box=np.zeros((nb, 6)),
-        touched=np.zeros(nb, i), spin=np.zeros(nb), simplex=np.zeros((4, 3)),
-        order=np.arange(nb, dtype=i), merged=np.zeros(nb, i),
-        first_entry=np.zeros(nb + 1, i), cursor=np.zeros(nb, i), entry=np.zeros(ENTRIES_PER_BODY * nb, i),
-        walls=walls.copy(),
-        pairs=np.zeros((pairs, 2), i), counts=np.zeros(4, i), ends=np.zeros((n, 2), i), name=np.zeros(n, i),
-        owner=np.zeros(n, i), normal=np.zeros((n, 3), f), anchor=np.zeros((n, 6)), frame=np.zeros((n, 9)),
-        arm=np.zeros((n, 6)), gap=np.zeros(n), speed=np.zeros(n), mu=np.zeros(n), bounce=np.zeros(n),
-        target=np.zeros((n, 3)), impulse=np.zeros((n, 3)), step=np.zeros(n), block=np.zeros((n, 9)),
-        rows=np.zeros((n, NORMAL_ROW_SIZE)), motion=np.zeros((nb, COLUMN_SIZE)), visit=np.zeros((n, VISIT_SIZE)),
-        side=np.zeros((n, 2), i),
-        settled=np.zeros((n, 3)), trend=np.zeros((n, 3)), visited=np.zeros(n, i), pushed=np.zeros(nb, i),
-        table=np.full(table, -1, i), mix=np.zeros((4, 3, 3)), polygon=np.zeros((2, 16, 3)),
-        edge=np.zeros((2, 16, 2), i), free=np.zeros((nb, 6)), parent=np.zeros(nb, i), island=np.zeros(nb, i),
-        first_contact=np.zeros(n + 1, i), first_body=np.zeros(n + 1, i), queue=np.zeros(n, i),
-        neighbour=np.zeros((2 * blocks, 2), i), links=np.zeros(1, i), head=np.zeros(nb, i), degree=np.zeros(nb, i),
-        mark=np.zeros(nb, i), bucket=np.zeros(nb, i), ahead=np.zeros(nb, i), behind=np.zeros(nb, i),
-        rank=np.zeros(nb, i), start=np.zeros(nb, i), stop=np.zeros(nb, i), column=np.zeros(blocks, i),
-        diagonal=np.zeros((nb, BLOCK_SIZE)), lower=np.zeros((blocks, BLOCK_SIZE)), upper=np.zeros((blocks, BLOCK_SIZE)),
-        swaps=np.zeros(6, i), rebound=np.zeros((n, 3)), best=np.zeros((n, 3)), defect=np.zeros((nb, COLUMN_SIZE)),
-        before=np.zeros((nb, 6)), change=np.zeros((nb, COLUMN_SIZE)), bundle=np.zeros((bundles, BATCH_SIZE), i),
-        lanes=np.zeros((bundles, LANES_SIZE)), momenta=np.zeros((nb, 12)),
-        hulls=make_hulls(polyhedra) if polyhedra else None, settings=record,
-    )  # fmt: skip
+    return record
 
 
 def make_snapshots(bodies: int, memory: int) -> WorldSnapshots:

@@ -11,7 +11,7 @@ from physics.kernels.math.vector import row_vector
 from physics.kernels.multibody.data.arrays import NUM_CONTACTS, NUM_DROPPED
 from physics.kernels.state.layout import ELLIPSOID, SPHERE
 
-# Contact features that two bodies, or a body and a wall, have unless one is a hull: what a contact's name is made with.
+# Contact features that two bodies, or a body and a wall, have unless one is a hull: the parts of a contact's id.
 FEATURES_PER_PAIR = 512
 
 # Distance at which bodies that turn far have arrived, where the slop is less, in the smaller bounding radius: what is
@@ -68,80 +68,82 @@ def tangent_basis(n):
 def write_contact_frame(k, n, many):
     """Write the frame of contact k from its normal."""
     t1, t2 = tangent_basis(n)
-    put_vector(many.frame, k, 0, n)
-    put_vector(many.frame, k, 3, t1)
-    put_vector(many.frame, k, 6, t2)
+    put_vector(many.contacts.frame, k, 0, n)
+    put_vector(many.contacts.frame, k, 3, t1)
+    put_vector(many.contacts.frame, k, 6, t2)
 
 
 @inlined
 def relative_velocity(k, t, many):
     """Velocity of the first body's point of contact k relative to the second's, for twists t, world frame [m/s]."""
-    a, b = many.ends[k, 0], many.ends[k, 1]
-    u = add_scaled(row_vector(t, a, 0), 1.0, qt.cross(row_vector(t, a, 3), row_vector(many.arm, k, 0)))
+    a, b = many.contacts.bodies[k, 0], many.contacts.bodies[k, 1]
+    u = add_scaled(row_vector(t, a, 0), 1.0, qt.cross(row_vector(t, a, 3), row_vector(many.contacts.arm, k, 0)))
     if b >= 0:
-        u = subtract(u, add_scaled(row_vector(t, b, 0), 1.0, qt.cross(row_vector(t, b, 3), row_vector(many.arm, k, 3))))
+        u = subtract(
+            u, add_scaled(row_vector(t, b, 0), 1.0, qt.cross(row_vector(t, b, 3), row_vector(many.contacts.arm, k, 3)))
+        )
     return u
 
 
 @inlined
 def velocity_in_contact_frame(k, t, many):
     """The same in the contact's frame: normal, tangents."""
-    return qt.matvec(row_matrix(many.frame, k), relative_velocity(k, t, many))
+    return qt.matvec(row_matrix(many.contacts.frame, k), relative_velocity(k, t, many))
 
 
 @inlined
 def contact_velocity(k, many):
     """`velocity_in_contact_frame` for the twists as they are."""
-    return velocity_in_contact_frame(k, many.twist, many)
+    return velocity_in_contact_frame(k, many.bodies.twist, many)
 
 
 @inlined
 def pair_slop(a, b, many):
     """Gap within which two bodies, or body a and a wall (b < 0), touch [m]."""
     if b < 0:
-        return many.bodies[a].slop
-    return min(many.bodies[a].slop, many.bodies[b].slop)
+        return many.bodies.work[a].slop
+    return min(many.bodies.work[a].slop, many.bodies.work[b].slop)
 
 
 @inlined
 def arrival_gap(a, b, many):
     """Gap at which what turns far has arrived at a wall (b < 0) or another body [m]."""
-    radius = many.bodies[a].radius
+    radius = many.bodies.work[a].radius
     if b >= 0:
-        radius = min(radius, many.bodies[b].radius)
+        radius = min(radius, many.bodies.work[b].radius)
     return max(pair_slop(a, b, many), ARRIVAL_SHARE * radius)
 
 
 @inlined
 def _may_turn_far(a, b, many):
     """True if one of them may turn far in this stage (`conservative_advancement`)."""
-    return many.spin[a] > 0.0 or (b >= 0 and many.spin[b] > 0.0)
+    return many.bodies.spin_bound[a] > 0.0 or (b >= 0 and many.bodies.spin_bound[b] > 0.0)
 
 
 @inlined
 def relative_acceleration_bound(k, many):
     """Bound for the relative acceleration of a contact's points without contact [m/s²]."""
-    a, b = many.ends[k, 0], many.ends[k, 1]
+    a, b = many.contacts.bodies[k, 0], many.contacts.bodies[k, 1]
     if b < 0:
-        return many.bodies[a].acceleration
-    return many.bodies[a].acceleration + many.bodies[b].acceleration
+        return many.bodies.work[a].acceleration
+    return many.bodies.work[a].acceleration + many.bodies.work[b].acceleration
 
 
 @inlined
 def _combine_materials(k, a, b, many):
     """Coefficients of two bodies: the geometric mean of friction, the larger restitution. Of a wall: the body's."""
-    mu, e = many.bodies[a].mu, many.bodies[a].restitution
+    mu, e = many.bodies.work[a].mu, many.bodies.work[a].restitution
     if b >= 0:
-        mu, e = math.sqrt(mu * many.bodies[b].mu), max(e, many.bodies[b].restitution)
-    many.mu[k], many.bounce[k] = mu, e
+        mu, e = math.sqrt(mu * many.bodies.work[b].mu), max(e, many.bodies.work[b].restitution)
+    many.contacts.mu[k], many.contacts.restitution[k] = mu, e
 
 
 @inlined
 def _write_anchor(k, b, first, point, many):
     """Arm and anchor of one end: from body b's centre of mass to `point` (world frame)."""
-    arm = subtract(point, row_vector(many.now, b, 0))
-    put_vector(many.arm, k, first, arm)
-    put_vector(many.anchor, k, first, qt.transposed_matvec(row_matrix(many.rotation, b), arm))
+    arm = subtract(point, row_vector(many.bodies.state, b, 0))
+    put_vector(many.contacts.arm, k, first, arm)
+    put_vector(many.contacts.anchor, k, first, qt.transposed_matvec(row_matrix(many.bodies.rotation, b), arm))
 
 
 @kernel
@@ -163,38 +165,38 @@ def add_contact(a, b, feature, owner, normal, point_a, point_b, gap, h, many):
     gap, h : float
         [m], [s].
     """
-    k, count = many.counts[NUM_CONTACTS], many.now.shape[0]
-    if k == many.gap.shape[0]:
+    k, count = many.counts[NUM_CONTACTS], many.bodies.state.shape[0]
+    if k == many.contacts.gap.shape[0]:
         many.counts[NUM_DROPPED] += 1
         return False
-    many.ends[k, 0], many.ends[k, 1] = a, b
+    many.contacts.bodies[k, 0], many.contacts.bodies[k, 1] = a, b
     _write_anchor(k, a, 0, point_a, many)
-    acceleration = many.bodies[a].acceleration
+    acceleration = many.bodies.work[a].acceleration
     partner = count - 1 - b
     if b >= 0:
         _write_anchor(k, b, 3, point_b, many)
-        acceleration += many.bodies[b].acceleration
+        acceleration += many.bodies.work[b].acceleration
         partner = b
     write_contact_frame(k, normal, many)
-    speed = qt.dot(normal, relative_velocity(k, many.twist, many))
+    speed = qt.dot(normal, relative_velocity(k, many.bodies.twist, many))
     slop = pair_slop(a, b, many)
     is_out_of_reach = gap > slop and gap + h * speed - 0.5 * h * h * acceleration > slop
     if is_out_of_reach and not (_may_turn_far(a, b, many) and gap <= arrival_gap(a, b, many)):
         return True
-    many.gap[k], many.speed[k], many.owner[k] = gap, speed, owner
+    many.contacts.gap[k], many.contacts.speed[k], many.contacts.owner[k] = gap, speed, owner
     local = normal
     if owner >= 0:
-        local = qt.transposed_matvec(row_matrix(many.rotation, owner), normal)
-    put_vector(many.normal, k, 0, local)
+        local = qt.transposed_matvec(row_matrix(many.bodies.rotation, owner), normal)
+    put_vector(many.contacts.normal, k, 0, local)
     partners = count + many.walls.shape[0]
     page = (
         feature // FEATURES_PER_PAIR * count * partners
-    )  # of features beyond the first `FEATURES_PER_PAIR`: names after all of those
-    many.name[k] = (page + a * partners + partner) * FEATURES_PER_PAIR + feature % FEATURES_PER_PAIR
+    )  # of features beyond the first `FEATURES_PER_PAIR`: ids after all of those
+    many.contacts.id[k] = (page + a * partners + partner) * FEATURES_PER_PAIR + feature % FEATURES_PER_PAIR
     _combine_materials(k, a, b, many)
-    many.touched[a] = 1
+    many.bodies.touched[a] = 1
     if b >= 0:
-        many.touched[b] = 1
+        many.bodies.touched[b] = 1
     many.counts[NUM_CONTACTS] = k + 1
     return True
 
@@ -214,14 +216,14 @@ def _carried_point(b, k, first, side, n, many):
 
     That of a round body is where its normal is that of the contact: turning brings another point there.
     """
-    shape, d = many.bodies[b].shape, many.bodies[b].dims
+    shape, d = many.bodies.work[b].shape, many.bodies.work[b].dims
     if shape == SPHERE:
         r = side * d[0]
         return (r * n[0], r * n[1], r * n[2])
     if shape == ELLIPSOID:
-        dims, R, m = (d[0], d[1], d[2]), row_matrix(many.rotation, b), (-side * n[0], -side * n[1], -side * n[2])
+        dims, R, m = (d[0], d[1], d[2]), row_matrix(many.bodies.rotation, b), (-side * n[0], -side * n[1], -side * n[2])
         return geo.support_arm(shape, dims, R, m, geo.scaled_normal(shape, dims, R, m))
-    return qt.matvec(row_matrix(many.rotation, b), row_vector(many.anchor, k, first))
+    return qt.matvec(row_matrix(many.bodies.rotation, b), row_vector(many.contacts.anchor, k, first))
 
 
 @inlined
@@ -232,9 +234,12 @@ def _slide_on_face(k, a, b, owner, n, many):
     other, of_other, of_owner, side = a, 0, 3, -1.0
     if owner == a:
         other, of_other, of_owner, side = b, 3, 0, 1.0
-    point = add_scaled(row_vector(many.now, other, 0), 1.0, row_vector(many.arm, k, of_other))
+    point = add_scaled(row_vector(many.bodies.state, other, 0), 1.0, row_vector(many.contacts.arm, k, of_other))
     put_vector(
-        many.arm, k, of_owner, subtract(add_scaled(point, side * many.gap[k], n), row_vector(many.now, owner, 0))
+        many.contacts.arm,
+        k,
+        of_owner,
+        subtract(add_scaled(point, side * many.contacts.gap[k], n), row_vector(many.bodies.state, owner, 0)),
     )
 
 
@@ -245,19 +250,19 @@ def update_contacts(many):
     The gap between the two points along the normal; the second one of a wall is the first one projected on it.
     """
     for k in range(many.counts[NUM_CONTACTS]):
-        a, b, owner = many.ends[k, 0], many.ends[k, 1], many.owner[k]
-        n = row_vector(many.normal, k, 0)
+        a, b, owner = many.contacts.bodies[k, 0], many.contacts.bodies[k, 1], many.contacts.owner[k]
+        n = row_vector(many.contacts.normal, k, 0)
         if owner >= 0:
-            n = qt.matvec(row_matrix(many.rotation, owner), n)
+            n = qt.matvec(row_matrix(many.bodies.rotation, owner), n)
             write_contact_frame(k, n, many)
         arm = _carried_point(a, k, 0, -1.0, n, many)
-        put_vector(many.arm, k, 0, arm)
-        point = add_scaled(arm, 1.0, row_vector(many.now, a, 0))
+        put_vector(many.contacts.arm, k, 0, arm)
+        point = add_scaled(arm, 1.0, row_vector(many.bodies.state, a, 0))
         if b < 0:
-            many.gap[k] = qt.dot(n, point) - many.walls[-1 - b, 9]
+            many.contacts.gap[k] = qt.dot(n, point) - many.walls[-1 - b, 9]
         else:
             arm = _carried_point(b, k, 3, 1.0, n, many)
-            put_vector(many.arm, k, 3, arm)
-            many.gap[k] = qt.dot(n, subtract(point, add_scaled(arm, 1.0, row_vector(many.now, b, 0))))
-            if many.settings[0].in_time == 1:
+            put_vector(many.contacts.arm, k, 3, arm)
+            many.contacts.gap[k] = qt.dot(n, subtract(point, add_scaled(arm, 1.0, row_vector(many.bodies.state, b, 0))))
+            if many.settings[0].is_error_controlled == 1:
                 _slide_on_face(k, a, b, owner, n, many)

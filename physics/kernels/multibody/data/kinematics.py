@@ -14,16 +14,16 @@ from physics.kernels.state.body import angular_velocity, principal_attitude, rea
 @inlined
 def update_body_pose(b, tilted, many):
     """Rotation, geometric centre and inverse inertia of body b where it is now, world frame."""
-    x, q, _, _ = read_state(many.now, b)
-    work = many.bodies[b]
+    x, q, _, _ = read_state(many.bodies.state, b)
+    work = many.bodies.work[b]
     R = qt.to_matrix(q)
     for c in range(9):
-        many.rotation[b, c] = R[c]
-    put_vector(many.place, b, 0, geometric_center(x, R, work, tilted))
+        many.bodies.rotation[b, c] = R[c]
+    put_vector(many.bodies.center, b, 0, geometric_center(x, R, work, tilted))
     P = R
     if tilted is not None:
         P = qt.to_matrix(principal_attitude(q, work, tilted))
-    J, K = work.J, many.turning
+    J, K = work.J, many.bodies.inv_inertia
     K[b, 0] = J[0] * P[0] * P[0] + J[1] * P[1] * P[1] + J[2] * P[2] * P[2]
     K[b, 1] = J[0] * P[0] * P[3] + J[1] * P[1] * P[4] + J[2] * P[2] * P[5]
     K[b, 2] = J[0] * P[0] * P[6] + J[1] * P[1] * P[7] + J[2] * P[2] * P[8]
@@ -35,8 +35,8 @@ def update_body_pose(b, tilted, many):
 @inlined
 def update_poses_and_twists(tilted, many):
     """`update_body_pose`, and the twist, of every body."""
-    for b in range(many.now.shape[0]):
+    for b in range(many.bodies.state.shape[0]):
         update_body_pose(b, tilted, many)
-        put_vector(many.twist, b, 0, row_vector(many.now, b, at.LINVEL))
-        q, L = read_state(many.now, b)[1], row_vector(many.now, b, at.ANGMOM)
-        put_vector(many.twist, b, 3, angular_velocity(q, L, many.bodies[b], tilted))
+        put_vector(many.bodies.twist, b, 0, row_vector(many.bodies.state, b, at.LINVEL))
+        q, L = read_state(many.bodies.state, b)[1], row_vector(many.bodies.state, b, at.ANGMOM)
+        put_vector(many.bodies.twist, b, 3, angular_velocity(q, L, many.bodies.work[b], tilted))

@@ -67,25 +67,25 @@ def is_staying_asleep(world, count, wrench, sleep):
 @kernel
 def wake_touched_groups(world, sleep, many):
     """Wake every group that something awake is near: a pair of the broad phase of which one body sleeps."""
-    first, is_waking = world * many.now.shape[0], True
+    first, is_waking = world * many.bodies.state.shape[0], True
     while is_waking:
         is_waking = False
         for k in range(many.counts[NUM_PAIRS]):
-            a, b = first + many.pairs[k, 0], first + many.pairs[k, 1]
+            a, b = first + many.broadphase.pairs[k, 0], first + many.broadphase.pairs[k, 1]
             if is_asleep(a, sleep) != is_asleep(b, sleep):
                 group = max(sleep.rows[a, SLEEP_GROUP], sleep.rows[b, SLEEP_GROUP])
-                wake_group(world, many.now.shape[0], group, sleep)
+                wake_group(world, many.bodies.state.shape[0], group, sleep)
                 is_waking = True
 
 
 @inlined
 def _union_near_pairs(many):
-    """Let `many.parent` lead from every body to the first one of its group."""
-    for b in range(many.parent.shape[0]):
-        many.parent[b] = b
+    """Let `many.islands.parent` lead from every body to the first one of its group."""
+    for b in range(many.islands.parent.shape[0]):
+        many.islands.parent[b] = b
     for k in range(many.counts[NUM_PAIRS]):
-        unite_sets(many.pairs[k, 0], many.pairs[k, 1], many.parent)
-    unite_linked_bodies(many.parent, many)
+        unite_sets(many.broadphase.pairs[k, 0], many.broadphase.pairs[k, 1], many.islands.parent)
+    unite_linked_bodies(many.islands.parent, many.bodies)
 
 
 @kernel
@@ -93,34 +93,34 @@ def put_quiet_groups_to_sleep(world, sleep, many):
     """Let every group fall asleep in which all bodies have been quiet for long enough, and no way grows.
 
     Largest ways of a group in its last two windows, and whether one of it is not quiet, are gathered at its root in
-    `many.change`, which is free between solves.
+    `many.islands.group_motion`.
     """
-    count, found = many.now.shape[0], many.change
+    count, found = many.bodies.state.shape[0], many.islands.group_motion
     first = world * count
     _union_near_pairs(many)
     for b in range(count):
         found[b, 0] = found[b, 1] = found[b, 2] = 0.0
     for b in range(count):
-        root, i = find_root(b, many.parent), first + b
+        root, i = find_root(b, many.islands.parent), first + b
         found[root, 0] = max(found[root, 0], sleep.rows[i, LAST_DISPLACEMENT])
         found[root, 1] = max(found[root, 1], sleep.rows[i, EARLIER_DISPLACEMENT])
         if sleep.rows[i, QUIET_WINDOWS] < WINDOWS_BEFORE_SLEEP:
             found[root, 2] = 1.0
     for b in range(count):
-        root = find_root(b, many.parent)
+        root = find_root(b, many.islands.parent)
         if is_asleep(first + b, sleep) or found[root, 2] == 1.0 or is_motion_growing(found[root, 0], found[root, 1]):
             continue
         sleep.rows[first + b, SLEEP_GROUP] = root + 1.0
-        write_state(many.now, b, without_velocities(read_state(many.now, b)))
+        write_state(many.bodies.state, b, without_velocities(read_state(many.bodies.state, b)))
 
 
 @kernel
 def update_sleep(world, h, sleep, many):
     """Watch every body that is awake after a substep of h; what has been quiet for long enough falls asleep."""
-    first, is_time = world * many.now.shape[0], False
-    for b in range(many.now.shape[0]):
+    first, is_time = world * many.bodies.state.shape[0], False
+    for b in range(many.bodies.state.shape[0]):
         if not is_asleep(first + b, sleep) and update_sleep_window(
-            first + b, read_state(many.now, b), h, many.bodies[b], sleep
+            first + b, read_state(many.bodies.state, b), h, many.bodies.work[b], sleep
         ):
             is_time = True
     if is_time:

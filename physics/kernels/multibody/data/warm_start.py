@@ -1,6 +1,6 @@
 """Warm start of a world's contacts: impulses of the last stage, to start the next solve with.
 
-Contacts are known again by their names. Impulses are kept in the world frame, so that a contact whose frame has turned
+Contacts are recognised by their ids. Impulses are kept in the world frame, so that a contact whose frame has turned
 starts with the same force.
 """
 
@@ -31,24 +31,24 @@ def _contact_column(k):
 
 
 @inlined
-def _hash_slot(name, table):
-    """Start of the search for a name: its low bits, well mixed (Knuth's multiplicative method)."""
-    return ((name * 2654435761) >> 16) & (table.shape[0] - 1)
+def _hash_slot(contact_id, table):
+    """Start of the search for an id: its low bits, well mixed (Knuth's multiplicative method)."""
+    return ((contact_id * 2654435761) >> 16) & (table.shape[0] - 1)
 
 
 @inlined
-def _find_remembered(name, world, memory, table):
-    """Index of the remembered contact of this name, or -1."""
-    at = _hash_slot(name, table)
+def _find_remembered(contact_id, world, memory, table):
+    """Index of the remembered contact of this id, or -1."""
+    at = _hash_slot(contact_id, table)
     while table[at] >= 0:
-        if memory[world, _contact_column(table[at]) + WARM_CONTACT_ID] == name:
+        if memory[world, _contact_column(table[at]) + WARM_CONTACT_ID] == contact_id:
             return table[at]
         at = (at + 1) & (table.shape[0] - 1)
     return -1
 
 
 @inlined
-def _index_names(world, memory, table):
+def _index_ids(world, memory, table):
     """Fill the table with the remembered contacts."""
     for k in range(int(memory[world, WARM_CONTACT_COUNT])):
         at = _hash_slot(int(memory[world, _contact_column(k) + WARM_CONTACT_ID]), table)
@@ -58,7 +58,7 @@ def _index_names(world, memory, table):
 
 
 @inlined
-def _clear_names(world, memory, table):
+def _clear_ids(world, memory, table):
     """Empty the table again: its cost is that of the contacts, not of the room for them."""
     for k in range(int(memory[world, WARM_CONTACT_COUNT])):
         at = _hash_slot(int(memory[world, _contact_column(k) + WARM_CONTACT_ID]), table)
@@ -70,21 +70,21 @@ def _clear_names(world, memory, table):
 @kernel
 def load_warm_impulses(n, world, h, friction, memory, many):
     """Impulses of the n contacts of the set from the last stage, scaled to a stage of length h; zero where new."""
-    length, table = memory[world, WARM_STAGE_LENGTH], many.table
+    length, table = memory[world, WARM_STAGE_LENGTH], many.contacts.id_table
     scale = h / length if length > 0.0 else 0.0
-    _index_names(world, memory, table)
+    _index_ids(world, memory, table)
     for k in range(n):
         p = (0.0, 0.0, 0.0)
-        found = _find_remembered(many.name[k], world, memory, table)
+        found = _find_remembered(many.contacts.id[k], world, memory, table)
         if found >= 0:
             x, y, z = qt.matvec(
-                row_matrix(many.frame, k), row_vector(memory, world, _contact_column(found) + WARM_IMPULSE)
+                row_matrix(many.contacts.frame, k), row_vector(memory, world, _contact_column(found) + WARM_IMPULSE)
             )
             p = (scale * max(x, 0.0), 0.0, 0.0)
             if friction is not None:
                 p = (p[0], scale * y, scale * z)
-        put_vector(many.impulse, k, 0, p)
-    _clear_names(world, memory, table)
+        put_vector(many.contacts.impulse, k, 0, p)
+    _clear_ids(world, memory, table)
 
 
 @inlined
@@ -92,7 +92,7 @@ def _keep_sleeping(world, h, sleep, memory, many):
     """Move the contacts of what sleeps to the front, their impulses as of a stage of length h: how many."""
     if sleep is None:
         return 0
-    first, count, length = world * many.now.shape[0], 0, memory[world, WARM_STAGE_LENGTH]
+    first, count, length = world * many.bodies.state.shape[0], 0, memory[world, WARM_STAGE_LENGTH]
     for k in range(int(memory[world, WARM_CONTACT_COUNT])):
         row, to = _contact_column(k), _contact_column(count)
         if is_asleep(first + int(memory[world, row + WARM_BODY_A]), sleep):
@@ -108,16 +108,22 @@ def _keep_sleeping(world, h, sleep, memory, many):
 def store_warm_impulses(n, world, h, sleep, memory, many):
     """Keep the n contacts of this stage, which took h, and those of what sleeps, as far as there is room."""
     before = _keep_sleeping(world, h, sleep, memory, many)
-    n = min(n, many.gap.shape[0] - before)
+    n = min(n, many.contacts.gap.shape[0] - before)
     memory[world, WARM_STAGE_LENGTH], memory[world, WARM_CONTACT_COUNT] = h, before + n
     for k in range(n):
-        row, a = _contact_column(before + k), many.ends[k, 0]
-        memory[world, row + WARM_CONTACT_ID] = many.name[k]
-        memory[world, row + WARM_BODY_A], memory[world, row + WARM_BODY_B] = many.ends[k, 0], many.ends[k, 1]
-        p = qt.transposed_matvec(row_matrix(many.frame, k), row_vector(many.impulse, k, 0))
+        row, a = _contact_column(before + k), many.contacts.bodies[k, 0]
+        memory[world, row + WARM_CONTACT_ID] = many.contacts.id[k]
+        memory[world, row + WARM_BODY_A], memory[world, row + WARM_BODY_B] = (
+            many.contacts.bodies[k, 0],
+            many.contacts.bodies[k, 1],
+        )
+        p = qt.transposed_matvec(row_matrix(many.contacts.frame, k), row_vector(many.contacts.impulse, k, 0))
         put_vector(memory, world, row + WARM_IMPULSE, p)
         put_vector(
-            memory, world, row + WARM_POINT, add_scaled(row_vector(many.now, a, 0), 1.0, row_vector(many.arm, k, 0))
+            memory,
+            world,
+            row + WARM_POINT,
+            add_scaled(row_vector(many.bodies.state, a, 0), 1.0, row_vector(many.contacts.arm, k, 0)),
         )
 
 
@@ -139,20 +145,20 @@ def clear_awake_warm_start(world, h, sleep, memory, many):
 @inlined
 def copy_contact(k, to, many):
     """Move contact k of the set to another place in it; what a stage has not filled yet is left."""
-    many.name[to], many.owner[to], many.gap[to], many.speed[to] = (
-        many.name[k],
-        many.owner[k],
-        many.gap[k],
-        many.speed[k],
+    many.contacts.id[to], many.contacts.owner[to], many.contacts.gap[to], many.contacts.speed[to] = (
+        many.contacts.id[k],
+        many.contacts.owner[k],
+        many.contacts.gap[k],
+        many.contacts.speed[k],
     )
-    many.mu[to], many.bounce[to] = many.mu[k], many.bounce[k]
+    many.contacts.mu[to], many.contacts.restitution[to] = many.contacts.mu[k], many.contacts.restitution[k]
     for c in range(2):
-        many.ends[to, c] = many.ends[k, c]
+        many.contacts.bodies[to, c] = many.contacts.bodies[k, c]
     for c in range(3):
-        many.normal[to, c], many.target[to, c], many.impulse[to, c] = (
-            many.normal[k, c], many.target[k, c], many.impulse[k, c],
+        many.contacts.normal[to, c], many.contacts.target[to, c], many.contacts.impulse[to, c] = (
+            many.contacts.normal[k, c], many.contacts.target[k, c], many.contacts.impulse[k, c],
         )  # fmt: skip
     for c in range(6):
-        many.anchor[to, c], many.arm[to, c] = many.anchor[k, c], many.arm[k, c]
+        many.contacts.anchor[to, c], many.contacts.arm[to, c] = many.contacts.anchor[k, c], many.contacts.arm[k, c]
     for c in range(9):
-        many.frame[to, c] = many.frame[k, c]
+        many.contacts.frame[to, c] = many.contacts.frame[k, c]

@@ -2,7 +2,7 @@
 
 Of the fifteen axes that can separate two blocks (three face normals of each, nine products of edges) the one with the
 largest separation is the contact normal. On a face normal the opposite face of the other block is clipped by the sides
-of this one, so that up to eight points touch, each with a name that stays while the same edges cross.
+of this one, so that up to eight points touch, each with an id that stays while the same edges cross.
 """
 
 from __future__ import annotations
@@ -42,8 +42,8 @@ _FIRST_EDGE_FEATURE = 6 * _FEATURES_PER_FACE
 def _reference_face(a, b, face, many):
     """(block with the face, other block, axis, its sense towards the other)."""
     if face < 3:
-        return a, b, face, math.copysign(1.0, many.mix[FROM_A, 0, face])
-    return b, a, face - 3, -math.copysign(1.0, many.mix[FROM_B, 0, face - 3])
+        return a, b, face, math.copysign(1.0, many.narrowphase.relative_axes[FROM_A, 0, face])
+    return b, a, face - 3, -math.copysign(1.0, many.narrowphase.relative_axes[FROM_B, 0, face - 3])
 
 
 @inlined
@@ -51,7 +51,7 @@ def _clip_face(a, b, face, many):
     """Clip the face that looks against this one by its sides: (copy of the polygon, vertices)."""
     r, o, axis, sign = _reference_face(a, b, face, many)
     write_incident_face(r, o, axis, sign, many)
-    d, slop = many.bodies[r].dims, pair_slop(a, b, many)
+    d, slop = many.bodies.work[r].dims, pair_slop(a, b, many)
     source, count = 0, 4
     for side in range(4):
         k, s = side // 2, 1.0 - 2.0 * (side % 2)
@@ -71,9 +71,9 @@ def _parallel_edge_normal(o, out, rim, point, many):
     o's ends before `rim`, a quarter turn from its other end: what both allow lies between `out` and that end.
     """
     end, most, along = out, 0.0, qt.cross(out, rim)
-    w = subtract(point, row_vector(many.place, o, 0))
+    w = subtract(point, row_vector(many.bodies.center, o, 0))
     for j in range(3):
-        axis = body_axis(many.rotation, o, j)
+        axis = body_axis(many.bodies.rotation, o, j)
         s = -math.copysign(1.0, qt.dot(axis, w))
         normal = (s * axis[0], s * axis[1], s * axis[2])
         towards = qt.dot(normal, rim)
@@ -87,18 +87,18 @@ def _parallel_edge_normal(o, out, rim, point, many):
 @inlined
 def _point_above_face(r, x, y, s, t, many):
     """Point s along x and t along y from the centre of block r [m]."""
-    return add_scaled(add_scaled(row_vector(many.place, r, 0), s, x), t, y)
+    return add_scaled(add_scaled(row_vector(many.bodies.center, r, 0), s, x), t, y)
 
 
 @inlined
 def _add_face_contacts(a, b, face, source, count, least, h, many):
     """Contacts between a face and the clipped face of the other block, lifted until none has a gap < least."""
     r, o, axis, sign = _reference_face(a, b, face, many)
-    d = many.bodies[r].dims
+    d = many.bodies.work[r].dims
     if count == 0:
         write_incident_face(r, o, axis, sign, many)
         source, count = keep_deepest_vertex(d[(axis + 1) % 3], d[(axis + 2) % 3], many), 1
-    R, p = many.rotation, many.polygon
+    R, p = many.bodies.rotation, many.narrowphase.polygon
     x, y, out = body_axis(R, r, (axis + 1) % 3), body_axis(R, r, (axis + 2) % 3), body_axis(R, r, axis)
     out = (sign * out[0], sign * out[1], sign * out[2])
     slop = pair_slop(a, b, many)
@@ -118,18 +118,20 @@ def _add_face_contacts(a, b, face, source, count, least, h, many):
         point = _point_above_face(r, x, y, p[source, k, 0], p[source, k, 1], many)
         on_face, on_other = add_scaled(point, d[axis], out), add_scaled(point, d[axis] + gap, out)
         gap *= qt.dot(n, out)
-        name = face * _FEATURES_PER_FACE + 8 * many.edge[source, k, 0] + many.edge[source, k, 1]
+        feature = (
+            face * _FEATURES_PER_FACE + 8 * many.narrowphase.edge[source, k, 0] + many.narrowphase.edge[source, k, 1]
+        )
         if face < 3:
-            add_contact(a, b, name, owner, (-n[0], -n[1], -n[2]), on_face, on_other, gap, h, many)
+            add_contact(a, b, feature, owner, (-n[0], -n[1], -n[2]), on_face, on_other, gap, h, many)
         else:
-            add_contact(a, b, name, owner, n, on_other, on_face, gap, h, many)
+            add_contact(a, b, feature, owner, n, on_other, on_face, gap, h, many)
 
 
 @inlined
 def _middle_of_edge(b, k, n, many):
     """Middle of the edge of block b along its axis k that reaches furthest along n, world frame [m]."""
-    R, d = many.rotation, many.bodies[b].dims
-    point = row_vector(many.place, b, 0)
+    R, d = many.bodies.rotation, many.bodies.work[b].dims
+    point = row_vector(many.bodies.center, b, 0)
     for j in range(3):
         axis = body_axis(R, b, j)
         if j != k:
@@ -141,18 +143,18 @@ def _middle_of_edge(b, k, n, many):
 def _add_edge_contact(a, b, edges, gap, h, many):
     """The contact of two edges, at their nearest points."""
     i, j = edges // 3, edges % 3
-    x, y = body_axis(many.rotation, a, i), body_axis(many.rotation, b, j)
+    x, y = body_axis(many.bodies.rotation, a, i), body_axis(many.bodies.rotation, b, j)
     n = qt.cross(x, y)
     s = 1.0 / math.sqrt(qt.dot(n, n))
-    if qt.dot(n, subtract(row_vector(many.place, a, 0), row_vector(many.place, b, 0))) < 0.0:
+    if qt.dot(n, subtract(row_vector(many.bodies.center, a, 0), row_vector(many.bodies.center, b, 0))) < 0.0:
         s = -s
     n = (s * n[0], s * n[1], s * n[2])
     p, q = _middle_of_edge(a, i, (-n[0], -n[1], -n[2]), many), _middle_of_edge(b, j, n, many)
     # Points p + s x and q + t y whose difference is along n.
     w, c = subtract(q, p), qt.dot(x, y)
     t = (c * qt.dot(x, w) - qt.dot(y, w)) / (1.0 - c * c)
-    s = clamp_to_half_width(qt.dot(x, w) + t * c, many.bodies[a].dims[i])
-    t = clamp_to_half_width(t, many.bodies[b].dims[j])
+    s = clamp_to_half_width(qt.dot(x, w) + t * c, many.bodies.work[a].dims[i])
+    t = clamp_to_half_width(t, many.bodies.work[b].dims[j])
     add_contact(a, b, _FIRST_EDGE_FEATURE + edges, -1, n, add_scaled(p, s, x), add_scaled(q, t, y), gap, h, many)
 
 

@@ -31,7 +31,7 @@ def is_polygon_inside(source, count, axis, sign, bound, many):
     """True if sign * coordinate <= bound for every vertex of the polygon in copy `source`: nothing to clip."""
     furthest = -math.inf
     for k in range(count):
-        furthest = max(furthest, sign * many.polygon[source, k, axis])
+        furthest = max(furthest, sign * many.narrowphase.polygon[source, k, axis])
     return furthest <= bound
 
 
@@ -42,7 +42,7 @@ def clip_polygon(source, count, axis, sign, bound, side, slop, many):
     A vertex no further than the slop outside stays: it would otherwise come and go with rounding where two faces end
     together. It stands for the crossing of its edge then, which may be far off along an edge that the side hardly cuts.
     """
-    p, edge, into = many.polygon, many.edge, 1 - source
+    p, edge, into = many.narrowphase.polygon, many.narrowphase.edge, 1 - source
     kept = 0
     for k in range(count):
         m = (k + 1) % count
@@ -68,7 +68,7 @@ def write_incident_face(r, o, axis, sign, many):
 
     Coordinates along the axes behind `axis` of r, and height along sign * axis above the centre of r.
     """
-    R, d, p = many.rotation, many.bodies[o].dims, many.polygon
+    R, d, p = many.bodies.rotation, many.bodies.work[o].dims, many.narrowphase.polygon
     out = body_axis(R, r, axis)
     out = (sign * out[0], sign * out[1], sign * out[2])
     x, y = body_axis(R, r, (axis + 1) % 3), body_axis(R, r, (axis + 2) % 3)
@@ -78,7 +78,9 @@ def write_incident_face(r, o, axis, sign, many):
         if abs(c) > best:
             best, face, side = abs(c), j, -math.copysign(1.0, c)
     center = add_scaled(
-        subtract(row_vector(many.place, o, 0), row_vector(many.place, r, 0)), side * d[face], body_axis(R, o, face)
+        subtract(row_vector(many.bodies.center, o, 0), row_vector(many.bodies.center, r, 0)),
+        side * d[face],
+        body_axis(R, o, face),
     )
     j, k = (face + 1) % 3, (face + 2) % 3
     for vertex in range(4):
@@ -86,7 +88,7 @@ def write_incident_face(r, o, axis, sign, many):
         t = d[k] if vertex >= 2 else -d[k]
         q = add_scaled(add_scaled(center, s, body_axis(R, o, j)), t, body_axis(R, o, k))
         p[0, vertex, 0], p[0, vertex, 1], p[0, vertex, 2] = qt.dot(x, q), qt.dot(y, q), qt.dot(out, q)
-        many.edge[0, vertex, 0], many.edge[0, vertex, 1] = (vertex + 3) % 4, vertex
+        many.narrowphase.edge[0, vertex, 0], many.narrowphase.edge[0, vertex, 1] = (vertex + 3) % 4, vertex
 
 
 @inlined
@@ -101,7 +103,7 @@ def keep_deepest_vertex(x, y, many):
 
     For blocks that are apart beside each other as well: the plane between them keeps them from each other all the same.
     """
-    p, edge, low = many.polygon, many.edge, 0
+    p, edge, low = many.narrowphase.polygon, many.narrowphase.edge, 0
     for k in range(4):
         if p[0, k, 2] < p[0, low, 2]:
             low = k
@@ -130,7 +132,7 @@ def find_rim_edge(d, axis, source, count, slop, many):
     What is within a slop of the lowest vertex is low; two slops from the rim are on it. Without such an edge the ends
     are -1.
     """
-    p, low = many.polygon, min_vertex_height(source, count, many.polygon)
+    p, low = many.narrowphase.polygon, min_vertex_height(source, count, many.narrowphase.polygon)
     for side in range(4):
         k, sense = side // 2, 1.0 - 2.0 * (side % 2)
         bound, first, last, is_rim = d[(axis + 1 + k) % 3], -1, -1, True

@@ -33,8 +33,8 @@ def body_axis(R, b, k):
 
 @inlined
 def write_relative_axes(a, b, many):
-    """Write `many.mix`: axes of b in a, absolute values, and the way from a to b in both frames."""
-    R, mix, place = many.rotation, many.mix, many.place
+    """Write `many.narrowphase.relative_axes`: axes of b in a, their absolute values, the way from a to b in both."""
+    R, mix, place = many.bodies.rotation, many.narrowphase.relative_axes, many.bodies.center
     for i in range(3):
         for j in range(3):
             c = R[a, i] * R[b, j] + R[a, 3 + i] * R[b, 3 + j] + R[a, 6 + i] * R[b, 6 + j]
@@ -51,8 +51,8 @@ def max_box_face_separation(a, b, margin, many):
 
     One that separates by more than `margin` [m] is enough.
     """
-    S, da, db = many.mix[SIZES], many.bodies[a].dims, many.bodies[b].dims
-    way_a, way_b = many.mix[FROM_A, 0], many.mix[FROM_B, 0]
+    S, da, db = many.narrowphase.relative_axes[SIZES], many.bodies.work[a].dims, many.bodies.work[b].dims
+    way_a, way_b = many.narrowphase.relative_axes[FROM_A, 0], many.narrowphase.relative_axes[FROM_B, 0]
     best, face = -math.inf, 0
     slop = pair_slop(a, b, many)
     for i in range(3):
@@ -73,8 +73,12 @@ def max_box_face_separation(a, b, margin, many):
 @inlined
 def max_box_edge_separation(a, b, margin, many):
     """(separation, 3 i + j) of edges i of a and j of b whose product separates most; as `max_box_face_separation`."""
-    C, S, way = many.mix[AXES], many.mix[SIZES], many.mix[FROM_A, 0]
-    da, db = many.bodies[a].dims, many.bodies[b].dims
+    C, S, way = (
+        many.narrowphase.relative_axes[AXES],
+        many.narrowphase.relative_axes[SIZES],
+        many.narrowphase.relative_axes[FROM_A, 0],
+    )
+    da, db = many.bodies.work[a].dims, many.bodies.work[b].dims
     best, edges = -math.inf, 0
     for i in range(3):
         ip, iq = (i + 1) % 3, (i + 2) % 3
@@ -96,7 +100,7 @@ def max_box_edge_separation(a, b, margin, many):
 @inlined
 def is_face_flat_on_other(face, many):
     """True if a face of the other block is nearly parallel to this one: the two lie flat on each other."""
-    S, most = many.mix[SIZES], 0.0
+    S, most = many.narrowphase.relative_axes[SIZES], 0.0
     for k in range(3):
         most = max(most, S[face, k] if face < 3 else S[k, face - 3])
     return most >= FLAT_COSINE
@@ -109,7 +113,12 @@ def is_edge_axis_face_normal(edges, face, many):
     Both turned towards the other block's centre: of slender blocks that cross far from their centres, the face that
     looks there may be on the far side of the one that touches.
     """
-    C, i, j, way = many.mix[AXES], edges // 3, edges % 3, many.mix[FROM_A, 0]
+    C, i, j, way = (
+        many.narrowphase.relative_axes[AXES],
+        edges // 3,
+        edges % 3,
+        many.narrowphase.relative_axes[FROM_A, 0],
+    )
     square, ip, iq = 1.0 - C[i, j] * C[i, j], (i + 1) % 3, (i + 2) % 3
     towards = way[iq] * C[ip, j] - way[ip] * C[iq, j]
     # Component of (edge i of a) x (edge j of b) along the face normal: on axis k of a it is the determinant
@@ -119,7 +128,7 @@ def is_edge_axis_face_normal(edges, face, many):
         if face == ip:
             c = -c
     else:
-        k, towards = face - 3, towards * many.mix[FROM_B, 0, face - 3]
+        k, towards = face - 3, towards * many.narrowphase.relative_axes[FROM_B, 0, face - 3]
         c = 0.0 if k == j else math.copysign(C[i, 3 - k - j], C[i, 3 - k - j] * towards)
         if k == (j + 2) % 3:
             c = -c

@@ -45,8 +45,8 @@ from physics.kernels.state.sleeping import is_asleep
 @kernel
 def collide_body_wall(b, wall, margin, h, many):
     """Add the contacts of body b with a wall that are at most `margin` [m] from it."""
-    body, R = many.bodies[b], row_matrix(many.rotation, b)
-    n, x = row_vector(many.walls, wall, WALL_NORMAL), row_vector(many.place, b, 0)
+    body, R = many.bodies.work[b], row_matrix(many.bodies.rotation, b)
+    n, x = row_vector(many.walls, wall, WALL_NORMAL), row_vector(many.bodies.center, b, 0)
     d = qt.dot(n, x) - many.walls[wall, WALL_OFFSET]
     if d > body.radius + margin:
         return
@@ -71,13 +71,13 @@ def collide_hull_wall(b, wall, margin, h, many):
     """Add the contacts of hull b with a wall: its corners that are at most `margin` [m] from it, by number."""
     n, x, first = (
         row_vector(many.walls, wall, WALL_NORMAL),
-        row_vector(many.place, b, 0),
-        many.hulls.of[b, FIRST_CORNER],
+        row_vector(many.bodies.center, b, 0),
+        many.narrowphase.hulls.of[b, FIRST_CORNER],
     )
     d = qt.dot(n, x) - many.walls[wall, WALL_OFFSET]
-    if d > many.bodies[b].radius + margin:
+    if d > many.bodies.work[b].radius + margin:
         return
-    for k in range(many.hulls.of[b, LAST_CORNER] - first):
+    for k in range(many.narrowphase.hulls.of[b, LAST_CORNER] - first):
         r = corner_arm(b, first + k, many)
         gap = d + qt.dot(n, r)
         if gap <= margin:
@@ -88,8 +88,8 @@ def collide_hull_wall(b, wall, margin, h, many):
 @inlined
 def collide_spheres(a, b, margin, h, many):
     """Add the contact of two spheres."""
-    x, y = row_vector(many.place, a, 0), row_vector(many.place, b, 0)
-    ra, rb = many.bodies[a].dims[0], many.bodies[b].dims[0]
+    x, y = row_vector(many.bodies.center, a, 0), row_vector(many.bodies.center, b, 0)
+    ra, rb = many.bodies.work[a].dims[0], many.bodies.work[b].dims[0]
     n = subtract(x, y)
     size = math.sqrt(qt.dot(n, n))
     if size - ra - rb > margin:
@@ -102,10 +102,14 @@ def collide_spheres(a, b, margin, h, many):
 def collide_sphere_block(a, b, margin, h, many):
     """Add the contact of a sphere and a block, whichever of the two is a."""
     ball, brick = a, b
-    if many.bodies[a].shape == BLOCK:
+    if many.bodies.work[a].shape == BLOCK:
         ball, brick = b, a
-    R, dims, r = row_matrix(many.rotation, brick), many.bodies[brick].dims, many.bodies[ball].dims[0]
-    x, y = row_vector(many.place, ball, 0), row_vector(many.place, brick, 0)
+    R, dims, r = (
+        row_matrix(many.bodies.rotation, brick),
+        many.bodies.work[brick].dims,
+        many.bodies.work[ball].dims[0],
+    )
+    x, y = row_vector(many.bodies.center, ball, 0), row_vector(many.bodies.center, brick, 0)
     q, n, distance = nearest_on_block(qt.transposed_matvec(R, subtract(x, y)), (dims[0], dims[1], dims[2]))
     if distance - r > margin:
         return
@@ -117,14 +121,18 @@ def collide_sphere_block(a, b, margin, h, many):
 def collide_ellipsoid(a, b, margin, h, many):
     """Add the contact of an ellipsoid and any body, whichever of the two is a; in the frame of the other one."""
     first, second = a, b
-    if many.bodies[a].shape != ELLIPSOID:
+    if many.bodies.work[a].shape != ELLIPSOID:
         first, second = b, a
-    R, size, d = row_matrix(many.rotation, second), many.bodies[second].dims, many.bodies[first].dims
-    x, dims = row_vector(many.place, second, 0), (size[0], size[1], size[2])
-    way = qt.transposed_matvec(R, subtract(row_vector(many.place, first, 0), x))
-    A = ellipsoid_matrix(relative_rotation(R, row_matrix(many.rotation, first)), (d[0], d[1], d[2]))
+    R, size, d = (
+        row_matrix(many.bodies.rotation, second),
+        many.bodies.work[second].dims,
+        many.bodies.work[first].dims,
+    )
+    x, dims = row_vector(many.bodies.center, second, 0), (size[0], size[1], size[2])
+    way = qt.transposed_matvec(R, subtract(row_vector(many.bodies.center, first, 0), x))
+    A = ellipsoid_matrix(relative_rotation(R, row_matrix(many.bodies.rotation, first)), (d[0], d[1], d[2]))
     B = (size[0] * size[0], 0.0, 0.0, size[1] * size[1], 0.0, size[2] * size[2])
-    is_block = many.bodies[second].shape == BLOCK
+    is_block = many.bodies.work[second].shape == BLOCK
     start = nearest_on_block(way, dims)[1] if is_block else center_direction(way)
     n, gap = max_separation_direction(A, is_block, B, dims, way, start)
     if gap > margin:
@@ -147,14 +155,14 @@ def find_contacts(h, ellipsoids, hulls, world, sleep, many):
     and comes near nothing is left out.
     """
     many.counts[NUM_CONTACTS] = many.counts[NUM_PAIRS] = 0
-    bodies = many.bodies
+    bodies = many.bodies.work
     first_row = world * bodies.shape[0]
     if many.settings[0].meet == 1:
         find_pairs(h, many)
     if sleep is not None:
         wake_touched_groups(world, sleep, many)
     for b in range(bodies.shape[0]):
-        many.touched[b] = 0
+        many.bodies.touched[b] = 0
         if is_asleep(first_row + b, sleep):
             continue
         margin = surface_motion_bound(b, h, many) + bodies[b].slop
@@ -167,7 +175,7 @@ def find_contacts(h, ellipsoids, hulls, world, sleep, many):
                     continue
             collide_body_wall(b, wall, margin, h, many)
     for k in range(many.counts[NUM_PAIRS]):
-        a, b = many.pairs[k, 0], many.pairs[k, 1]
+        a, b = many.broadphase.pairs[k, 0], many.broadphase.pairs[k, 1]
         if is_asleep(first_row + a, sleep):
             continue  # and so does b: `wake_touched_groups`
         if not may_meet(a, b, h, many):

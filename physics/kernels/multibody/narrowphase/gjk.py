@@ -29,19 +29,19 @@ _GAP_TOLERANCE = 0.1
 @kernel
 def hull_support_vertex(b, k, many):
     """Corner of hull b that reaches farthest along k, both in its frame [m]."""
-    best, first = -math.inf, many.hulls.of[b, FIRST_CORNER]
+    best, first = -math.inf, many.narrowphase.hulls.of[b, FIRST_CORNER]
     far = first
-    for i in range(first, many.hulls.of[b, LAST_CORNER]):
-        reach = qt.dot(k, row_vector(many.hulls.corners, i, 0))
+    for i in range(first, many.narrowphase.hulls.of[b, LAST_CORNER]):
+        reach = qt.dot(k, row_vector(many.narrowphase.hulls.corners, i, 0))
         if reach > best:
             best, far = reach, i
-    return row_vector(many.hulls.corners, far, 0)
+    return row_vector(many.narrowphase.hulls.corners, far, 0)
 
 
 @inlined
 def _support_point(b, x, R, k, hulls, many):
     """Point of body b (of a sphere its centre) that is farthest along k, for its geometric centre at x [m]."""
-    d, shape = many.bodies[b].dims, many.bodies[b].shape
+    d, shape = many.bodies.work[b].dims, many.bodies.work[b].shape
     if shape == SPHERE:
         return x
     e = qt.transposed_matvec(R, k)
@@ -58,12 +58,12 @@ def _support_point(b, x, R, k, hulls, many):
 
 @kernel
 def closest_on_simplex(count, many):
-    """Point nearest to the origin of the simplex of the first `count` corners in `many.simplex` and the next one.
+    """Point nearest the origin of the simplex of the first `count` corners in `narrowphase.simplex` and the next one.
 
     Only those corners stay of which it is made: (point, how many). The new one is one of them, since the point comes
     nearer with it than without. (0, 0, 0) inside a tetrahedron.
     """
-    S = many.simplex
+    S = many.narrowphase.simplex
     w = row_vector(S, count, 0)
     best, v, i_best, j_best = qt.dot(w, w), w, -1, -1
     is_inside = count == 3
@@ -109,7 +109,7 @@ def closest_on_simplex(count, many):
 @inlined
 def _core_radius(b, many):
     """Radius around the core of body b [m]: a sphere's own, 0 of other shapes."""
-    return many.bodies[b].dims[0] if many.bodies[b].shape == SPHERE else 0.0
+    return many.bodies.work[b].dims[0] if many.bodies.work[b].shape == SPHERE else 0.0
 
 
 @kernel
@@ -141,7 +141,7 @@ def gjk_distance(a, b, x, R, y, S, way, touch, hulls, many):
             best, n = bound, (v[0] / size, v[1] / size, v[2] / size)
         if count > 0 and best >= (1.0 - _GAP_TOLERANCE) * (size - core):
             break
-        put_vector(many.simplex, count, 0, w)
+        put_vector(many.narrowphase.simplex, count, 0, w)
         v, count = closest_on_simplex(count, many)
         far = math.sqrt(qt.dot(v, v)) - core
         if not far > touch:

@@ -76,7 +76,7 @@ def write_hull_incident_face(which, o, out, many):
     Of the faces with the corner that reaches furthest against `out` the one that looks most against it: the face that
     does so of all need not have that corner.
     """
-    hulls, low, deepest = many.hulls, math.inf, 0
+    hulls, low, deepest = many.narrowphase.hulls, math.inf, 0
     for k in range(hulls.of[o, LAST_CORNER] - hulls.of[o, FIRST_CORNER]):
         height = qt.dot(out, row_vector(hulls.corner[which], k, 0))
         if height < low:
@@ -97,7 +97,7 @@ def write_hull_incident_face(which, o, out, many):
 @inlined
 def clip_incident_face(which, r, o, face, slop, many):
     """Clip the face of body o that looks against this one of body r, number `which`, by its sides: (copy, vertices)."""
-    hulls = many.hulls
+    hulls = many.narrowphase.hulls
     out = row_vector(hulls.normal[which], face, 0)
     source, count = 0, write_hull_incident_face(1 - which, o, out, many)
     k = hulls.of[r, FIRST_FACE] + face

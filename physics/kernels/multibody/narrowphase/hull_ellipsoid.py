@@ -43,7 +43,7 @@ def nearest_on_hull(b, x, many):
     Inside the way out is by the nearest face, and the distance negative. Outside the nearest point is on a face that
     looks towards x: of the normals that meet there, which x - y is made of, at least one does.
     """
-    hulls, best, face = many.hulls, -math.inf, 0
+    hulls, best, face = many.narrowphase.hulls, -math.inf, 0
     for f in range(hulls.of[b, LAST_FACE] - hulls.of[b, FIRST_FACE]):
         height = qt.dot(row_vector(hulls.normal[0], f, 0), x) - hulls.offset[0, f]
         if height > best:
@@ -67,10 +67,10 @@ def nearest_on_hull(b, x, many):
 def collide_sphere_hull(a, b, margin, h, many):
     """Add the contact of a sphere and a hull, whichever of the two is a."""
     ball, hull = a, b
-    if many.bodies[b].shape == SPHERE:
+    if many.bodies.work[b].shape == SPHERE:
         ball, hull = b, a
-    origin, r = row_vector(many.place, hull, 0), many.bodies[ball].dims[0]
-    x = row_vector(many.place, ball, 0)
+    origin, r = row_vector(many.bodies.center, hull, 0), many.bodies.work[ball].dims[0]
+    x = row_vector(many.bodies.center, ball, 0)
     pose_hull(0, hull, origin, many)
     y, n, distance = nearest_on_hull(hull, subtract(x, origin), many)
     if distance - r > margin:
@@ -81,7 +81,7 @@ def collide_sphere_hull(a, b, margin, h, many):
 @inlined
 def _separation(hull, A, way, n, many):
     """σ(n) of an ellipsoid from a hull, number 0 of the pair; see `ellipsoid_distance`."""
-    hulls, reach = many.hulls, -math.inf
+    hulls, reach = many.narrowphase.hulls, -math.inf
     for k in range(hulls.of[hull, LAST_CORNER] - hulls.of[hull, FIRST_CORNER]):
         reach = max(reach, qt.dot(n, row_vector(hulls.corner[0], k, 0)))
     return qt.dot(n, way) - ellipsoid_support_point(A, n)[0] - reach
@@ -117,13 +117,17 @@ def collide_ellipsoid_hull(a, b, margin, h, many):
     it is the one there is; where they overlap none of the edges may be, and a face is the way out.
     """
     round_, hull = a, b
-    if many.bodies[b].shape == ELLIPSOID:
+    if many.bodies.work[b].shape == ELLIPSOID:
         round_, hull = b, a
-    hulls, origin, size = many.hulls, row_vector(many.place, hull, 0), many.bodies[round_].dims
+    hulls, origin, size = (
+        many.narrowphase.hulls,
+        row_vector(many.bodies.center, hull, 0),
+        many.bodies.work[round_].dims,
+    )
     pose_hull(0, hull, origin, many)
     way, S, dims = (
-        subtract(row_vector(many.place, round_, 0), origin),
-        row_matrix(many.rotation, round_),
+        subtract(row_vector(many.bodies.center, round_, 0), origin),
+        row_matrix(many.bodies.rotation, round_),
         (size[0], size[1], size[2]),
     )
     A, best, face = ellipsoid_matrix(S, dims), -math.inf, 0

@@ -49,7 +49,7 @@ def max_hull_face_separation(which, b, other, far, many):
 
     Beyond `far` nothing more is looked for: that is too far already.
     """
-    hulls, best, face = many.hulls, -math.inf, 0
+    hulls, best, face = many.narrowphase.hulls, -math.inf, 0
     count = hulls.of[other, LAST_CORNER] - hulls.of[other, FIRST_CORNER]
     for f in range(hulls.of[b, LAST_FACE] - hulls.of[b, FIRST_FACE]):
         n, low = row_vector(hulls.normal[which], f, 0), math.inf
@@ -65,7 +65,7 @@ def max_hull_face_separation(which, b, other, far, many):
 @inlined
 def hull_edge(which, b, e, many):
     """(begin, direction, normal on the left, on the right) of edge e of body b, number `which` of the pair."""
-    hulls, k = many.hulls, many.hulls.of[b, FIRST_EDGE] + e
+    hulls, k = many.narrowphase.hulls, many.narrowphase.hulls.of[b, FIRST_EDGE] + e
     p = row_vector(hulls.corner[which], hulls.edges[k, EDGE_START], 0)
     left, right = (
         row_vector(hulls.normal[which], hulls.edges[k, EDGE_LEFT_FACE], 0),
@@ -89,7 +89,7 @@ def _is_minkowski_face(d, left, right, e, other_left, other_right):
 @inlined
 def max_hull_edge_separation(a, b, many):
     """(separation, number of the edge of a, of b) of the two edges that separate most, -inf if there are none."""
-    hulls, best, first, second = many.hulls, -math.inf, 0, 0
+    hulls, best, first, second = many.narrowphase.hulls, -math.inf, 0, 0
     inside = row_vector(hulls.centre, 0, 0)
     for i in range(hulls.of[a, LAST_EDGE] - hulls.of[a, FIRST_EDGE]):
         p, d, left, right = hull_edge(0, a, i, many)
@@ -113,7 +113,9 @@ def _edge_normal(a, b, i, j, many):
     p, d, _, _ = hull_edge(0, a, i, many)
     _, e, _, _ = hull_edge(1, b, j, many)
     n = qt.cross(d, e)
-    s = math.copysign(1.0 / math.sqrt(qt.dot(n, n)), qt.dot(n, subtract(p, row_vector(many.hulls.centre, 0, 0))))
+    s = math.copysign(
+        1.0 / math.sqrt(qt.dot(n, n)), qt.dot(n, subtract(p, row_vector(many.narrowphase.hulls.centre, 0, 0)))
+    )
     return (s * n[0], s * n[1], s * n[2])
 
 
@@ -123,7 +125,7 @@ def _keep_deepest_vertex(which, r, o, face, many):
 
     For bodies that are apart beside each other as well: the plane between them keeps them from each other all the same.
     """
-    hulls, low = many.hulls, 0
+    hulls, low = many.narrowphase.hulls, 0
     out = row_vector(hulls.normal[which], face, 0)
     p, sides, count = hulls.polygon, hulls.sides, write_hull_incident_face(1 - which, o, out, many)
     for k in range(count):
@@ -139,16 +141,16 @@ def _keep_deepest_vertex(which, r, o, face, many):
 @inlined
 def _clipped_height(which, face, source, count, many):
     """Height of the lowest vertex of the clipped polygon above a face; inf where there is none."""
-    out, low = row_vector(many.hulls.normal[which], face, 0), math.inf
+    out, low = row_vector(many.narrowphase.hulls.normal[which], face, 0), math.inf
     for k in range(count):
-        low = min(low, qt.dot(out, row_vector(many.hulls.polygon[source], k, 0)))
-    return low - many.hulls.offset[which, face]
+        low = min(low, qt.dot(out, row_vector(many.narrowphase.hulls.polygon[source], k, 0)))
+    return low - many.narrowphase.hulls.offset[which, face]
 
 
 @inlined
 def _add_face_contacts(a, b, which, face, source, count, least, h, many):
     """Contacts between a face and the clipped face of the other body, lifted until none has a gap < least."""
-    hulls, origin = many.hulls, row_vector(many.place, a, 0)
+    hulls, origin = many.narrowphase.hulls, row_vector(many.bodies.center, a, 0)
     out, offset = row_vector(hulls.normal[which], face, 0), hulls.offset[which, face]
     lift = max(0.0, least - _clipped_height(which, face, source, count, many))
     for k in range(count):
@@ -156,17 +158,17 @@ def _add_face_contacts(a, b, which, face, source, count, least, h, many):
         height = qt.dot(out, row_vector(hulls.polygon[source], k, 0)) - offset
         on_face, on_other = add_scaled(p, -height, out), add_scaled(p, lift, out)
         into, out_of = hulls.sides[source, k, 0], hulls.sides[source, k, 1]
-        name = ((which * _MAX_FACES + face) * 2 * CLIP_SIDE_OFFSET + into) * 2 * CLIP_SIDE_OFFSET + out_of
+        feature = ((which * _MAX_FACES + face) * 2 * CLIP_SIDE_OFFSET + into) * 2 * CLIP_SIDE_OFFSET + out_of
         if which == 0:
-            add_contact(a, b, name, a, (-out[0], -out[1], -out[2]), on_face, on_other, height + lift, h, many)
+            add_contact(a, b, feature, a, (-out[0], -out[1], -out[2]), on_face, on_other, height + lift, h, many)
         else:
-            add_contact(a, b, name, b, out, on_other, on_face, height + lift, h, many)
+            add_contact(a, b, feature, b, out, on_other, on_face, height + lift, h, many)
 
 
 @inlined
 def _add_edge_contact(a, b, i, j, n, gap, h, many):
     """The contact of edges i of a and j of b, n out of a, at their nearest points."""
-    origin = row_vector(many.place, a, 0)
+    origin = row_vector(many.bodies.center, a, 0)
     p, d, _, _ = hull_edge(0, a, i, many)
     q, e, _, _ = hull_edge(1, b, j, many)
     # Points p + s d and q + t e whose difference is along n, both on their segments.
@@ -175,8 +177,8 @@ def _add_edge_contact(a, b, i, j, n, gap, h, many):
     s = min(max((qt.dot(d, w) + t * de) / dd, 0.0), 1.0)
     t = min(max(t, 0.0), 1.0)
     on_a, on_b = add_scaled(add_scaled(origin, 1.0, p), s, d), add_scaled(add_scaled(origin, 1.0, q), t, e)
-    name = _FIRST_EDGE_FEATURE + i * _MAX_EDGES + j
-    add_contact(a, b, name, -1, (-n[0], -n[1], -n[2]), on_a, on_b, gap, h, many)
+    feature = _FIRST_EDGE_FEATURE + i * _MAX_EDGES + j
+    add_contact(a, b, feature, -1, (-n[0], -n[1], -n[2]), on_a, on_b, gap, h, many)
 
 
 @kernel
@@ -190,7 +192,7 @@ def collide_hulls(a, b, margin, h, many):
     The first body's face is preferred unless the other's separates more by the slop, and a face to edges likewise: what
     is equal must not change with rounding.
     """
-    origin, slop = row_vector(many.place, a, 0), pair_slop(a, b, many)
+    origin, slop = row_vector(many.bodies.center, a, 0), pair_slop(a, b, many)
     pose_hull(0, a, origin, many)
     pose_hull(1, b, origin, many)
     apart, face = max_hull_face_separation(0, a, b, margin, many)
@@ -213,7 +215,7 @@ def collide_hulls(a, b, margin, h, many):
     n = (0.0, 0.0, 0.0)
     if not is_face:
         n = _edge_normal(a, b, i, j, many)
-    out = row_vector(many.hulls.normal[which], face, 0)
+    out = row_vector(many.narrowphase.hulls.normal[which], face, 0)
     if is_face or (qt.dot(n, out) if which == 0 else -qt.dot(n, out)) >= FLAT_COSINE:
         if not is_clipped:
             source, count = clip_incident_face(which, r, o, face, slop, many)

@@ -15,8 +15,8 @@ from physics.kernels.state.layout import BLOCK
 @inlined
 def hull_scale(b, many):
     """Scale of the corners of body b in the tables."""
-    d = many.bodies[b].dims
-    if many.bodies[b].shape == BLOCK:
+    d = many.bodies.work[b].dims
+    if many.bodies.work[b].shape == BLOCK:
         return (d[0], d[1], d[2])
     return (1.0, 1.0, 1.0)
 
@@ -24,15 +24,15 @@ def hull_scale(b, many):
 @inlined
 def corner_arm(b, k, many):
     """Corner k of the tables, of body b, from its place, world frame [m]."""
-    r, s = row_vector(many.hulls.corners, k, 0), hull_scale(b, many)
-    return qt.matvec(row_matrix(many.rotation, b), (s[0] * r[0], s[1] * r[1], s[2] * r[2]))
+    r, s = row_vector(many.narrowphase.hulls.corners, k, 0), hull_scale(b, many)
+    return qt.matvec(row_matrix(many.bodies.rotation, b), (s[0] * r[0], s[1] * r[1], s[2] * r[2]))
 
 
 @kernel
 def pose_hull(which, b, origin, many):
     """Write body b as number `which` of the pair, with `origin` (world frame) as origin."""
-    hulls, R = many.hulls, row_matrix(many.rotation, b)
-    x = subtract(row_vector(many.place, b, 0), origin)
+    hulls, R = many.narrowphase.hulls, row_matrix(many.bodies.rotation, b)
+    x = subtract(row_vector(many.bodies.center, b, 0), origin)
     put_vector(hulls.centre, which, 0, x)
     first, face = hulls.of[b, FIRST_CORNER], hulls.of[b, FIRST_FACE]
     for k in range(hulls.of[b, LAST_CORNER] - first):
@@ -54,7 +54,7 @@ def nearest_on_segment(x, p, q):
 @kernel
 def is_above_face(which, b, face, x, many):
     """True if a face of body b, number `which` of the pair, has a normal through x, above or below."""
-    hulls = many.hulls
+    hulls = many.narrowphase.hulls
     out, k = row_vector(hulls.normal[which], face, 0), hulls.of[b, FIRST_FACE] + face
     first, last = hulls.loops[k, 0], hulls.loops[k, 1]
     for side in range(last - first):
@@ -68,7 +68,7 @@ def is_above_face(which, b, face, x, many):
 @kernel
 def nearest_on_face(which, b, face, x, many):
     """Point of a face of body b, number `which` of the pair, that is nearest to x."""
-    hulls = many.hulls
+    hulls = many.narrowphase.hulls
     out, k = row_vector(hulls.normal[which], face, 0), hulls.of[b, FIRST_FACE] + face
     first, last = hulls.loops[k, 0], hulls.loops[k, 1]
     best, nearest = math.inf, x

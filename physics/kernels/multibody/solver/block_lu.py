@@ -33,21 +33,21 @@ PIVOT_FACTOR = 2.0
 
 @kernel
 def clear_system(begin, end, many):
-    """Set the system of the bodies `many.order[begin:end]` to zero."""
+    """Set the system of the bodies `many.islands.bodies[begin:end]` to zero."""
     for i in range(begin, end):
-        b = many.order[i]
+        b = many.islands.bodies[i]
         for c in range(BLOCK_SIZE):
-            many.diagonal[b, c] = 0.0
-        for k in range(many.start[b], many.stop[b]):
+            many.system.diagonal[b, c] = 0.0
+        for k in range(many.system.start[b], many.system.stop[b]):
             for c in range(BLOCK_SIZE):
-                many.lower[k, c] = many.upper[k, c] = 0.0
+                many.system.lower[k, c] = many.system.upper[k, c] = 0.0
 
 
 @inlined
 def find_block_index(b, c, many):
     """Indices of the blocks of b and its later neighbour c in `lower` and `upper`."""
-    k = many.start[b]
-    while many.column[k] != c:
+    k = many.system.start[b]
+    while many.system.column[k] != c:
         k += 1
     return k
 
@@ -226,10 +226,10 @@ def invert_block(A, b, swaps):
 @inlined
 def _update_schur_complement(c, d, i, j, many):
     """A_cd -= A_cb A_bb⁻¹ A_bd for neighbours c = column[i] and d = column[j] of b."""
-    lower, upper = many.lower, many.upper
+    lower, upper = many.system.lower, many.system.upper
     if c == d:
-        _subtract_product(many.diagonal, c, lower, i, upper, j)
-    elif many.rank[c] > many.rank[d]:
+        _subtract_product(many.system.diagonal, c, lower, i, upper, j)
+    elif many.system.rank[c] > many.system.rank[d]:
         _subtract_product(lower, find_block_index(d, c, many), lower, i, upper, j)
     else:
         _subtract_product(upper, find_block_index(c, d, many), lower, i, upper, j)
@@ -237,15 +237,15 @@ def _update_schur_complement(c, d, i, j, many):
 
 @kernel
 def factor_system(begin, end, many):
-    """Replace the system of the bodies `many.order[begin:end]` by its factors."""
+    """Replace the system of the bodies `many.islands.bodies[begin:end]` by its factors."""
     for place in range(begin, end):
-        b = many.order[place]
-        invert_block(many.diagonal, b, many.swaps)
-        for i in range(many.start[b], many.stop[b]):
-            _multiply_in_place(many.lower, i, many.diagonal, b)
-        for i in range(many.start[b], many.stop[b]):
-            for j in range(many.start[b], many.stop[b]):
-                _update_schur_complement(many.column[i], many.column[j], i, j, many)
+        b = many.islands.bodies[place]
+        invert_block(many.system.diagonal, b, many.system.swaps)
+        for i in range(many.system.start[b], many.system.stop[b]):
+            _multiply_in_place(many.system.lower, i, many.system.diagonal, b)
+        for i in range(many.system.start[b], many.system.stop[b]):
+            for j in range(many.system.start[b], many.system.stop[b]):
+                _update_schur_complement(many.system.column[i], many.system.column[j], i, j, many)
 
 
 @inlined
@@ -260,13 +260,13 @@ def _subtract_block_product(x, i, A, k, j):
 def solve_factored(begin, end, x, many):
     """Overwrite the right sides x (a column for each body) with the solution of the factored system."""
     for i in range(begin, end):
-        b = many.order[i]
-        for k in range(many.start[b], many.stop[b]):
-            _subtract_block_product(x, many.column[k], many.lower, k, b)
+        b = many.islands.bodies[i]
+        for k in range(many.system.start[b], many.system.stop[b]):
+            _subtract_block_product(x, many.system.column[k], many.system.lower, k, b)
     for i in range(end - 1, begin - 1, -1):
-        b = many.order[i]
-        for k in range(many.start[b], many.stop[b]):
-            _subtract_block_product(x, b, many.upper, k, many.column[k])
-        y = _multiply_column(block_columns(many.diagonal, b), x, b, 0)
+        b = many.islands.bodies[i]
+        for k in range(many.system.start[b], many.system.stop[b]):
+            _subtract_block_product(x, b, many.system.upper, k, many.system.column[k])
+        y = _multiply_column(block_columns(many.system.diagonal, b), x, b, 0)
         store_lanes(x, b, 0, y[0])
         store_lanes(x, b, ANGULAR_OFFSET, y[1])

@@ -1,11 +1,11 @@
-"""Bundles: up to four contacts of the same two bodies, a lane each, for the methods with a linear system.
+"""Batches: up to four contacts of the same two bodies, a lane each, for the methods with a linear system.
 
 Two blocks touch with a face, and what is asked of its contacts is the same for each of them; what they do to their
 bodies is a sum. So twists are read once for four contacts, and forces, moments and blocks of the system are summed
 before anything is written. A lane that is left over repeats the last contact, and weighs nothing.
 
 What is known of contacts is copied here, with the bodies' block of the system, when an island is prepared: field f of a
-bundle is `many.lanes[g, 4 f : 4 f + 4]`.
+batch is `many.newton.lanes[g, 4 f : 4 f + 4]`.
 """
 
 from __future__ import annotations
@@ -29,8 +29,8 @@ from physics.kernels.multibody.data.contact_set import put_vector
 from physics.kernels.multibody.solver.block_lu import find_block_index
 from physics.kernels.multibody.solver.contact_operator import apply_body_inv_inertia
 
-# Columns of `many.bundle`: first and second body (b < 0: wall), place of their block, whether the first body is
-# eliminated before the second; first contact in `many.queue`, and how many.
+# Columns of `many.newton.batch`: first and second body (b < 0: wall), place of their block, whether the first body is
+# eliminated before the second; first contact in `many.islands.contacts`, and how many.
 BATCH_BODY_A, BATCH_BODY_B, BATCH_BLOCK, BATCH_IS_A_FIRST, BATCH_START, BATCH_COUNT = range(6)
 
 # Fields of a contact: arms from both bodies, frame, target, μ, W_nn and step of its block, 1 or 0 for what it weighs.
@@ -58,25 +58,25 @@ PROX_IMPULSE, PROX_BEST, PROX_ARGUMENT, PROX_PROJECTED = 30, 33, 36, 39
 
 @inlined
 def batch_field(g, field, many):
-    """A field of bundle g."""
-    return load_lanes(many.lanes, g, LANE_COUNT * field)
+    """A field of batch g."""
+    return load_lanes(many.newton.lanes, g, LANE_COUNT * field)
 
 
 @inlined
 def put_batch_field(g, field, x, many):
-    """Write a field of bundle g."""
-    store_lanes(many.lanes, g, LANE_COUNT * field, x)
+    """Write a field of batch g."""
+    store_lanes(many.newton.lanes, g, LANE_COUNT * field, x)
 
 
 @inlined
 def batch_vector(g, field, many):
-    """Three fields of bundle g: of each contact a vector."""
+    """Three fields of batch g: of each contact a vector."""
     return batch_field(g, field, many), batch_field(g, field + 1, many), batch_field(g, field + 2, many)
 
 
 @inlined
 def put_batch_vector(g, field, a, many):
-    """Write three fields of bundle g."""
+    """Write three fields of batch g."""
     put_batch_field(g, field, a[0], many)
     put_batch_field(g, field + 1, a[1], many)
     put_batch_field(g, field + 2, a[2], many)
@@ -84,7 +84,7 @@ def put_batch_vector(g, field, a, many):
 
 @inlined
 def batch_frames(g, many):
-    """Frames of the contacts of bundle g, row by row."""
+    """Frames of the contacts of batch g, row by row."""
     n, s, t = (
         batch_vector(g, LANE_FRAME, many),
         batch_vector(g, LANE_FRAME + 3, many),
@@ -95,48 +95,51 @@ def batch_frames(g, many):
 
 @inlined
 def _fill_batch(g, i, n, many):
-    """Copy what is known of the n contacts from place i of the queue on into bundle g."""
-    L = many.lanes
+    """Copy what is known of the n contacts from place i of the queue on into batch g."""
+    L = many.newton.lanes
     for lane in range(LANE_COUNT):
-        k = many.queue[i + min(lane, n - 1)]
+        k = many.islands.contacts[i + min(lane, n - 1)]
         for c in range(6):
-            L[g, LANE_COUNT * (LANE_ARM + c) + lane] = many.arm[k, c]
+            L[g, LANE_COUNT * (LANE_ARM + c) + lane] = many.contacts.arm[k, c]
         for c in range(9):
-            L[g, LANE_COUNT * (LANE_FRAME + c) + lane] = many.frame[k, c]
+            L[g, LANE_COUNT * (LANE_FRAME + c) + lane] = many.contacts.frame[k, c]
         for c in range(3):
-            L[g, LANE_COUNT * (LANE_TARGET + c) + lane] = many.target[k, c]
-        L[g, LANE_COUNT * LANE_MU + lane], L[g, LANE_COUNT * LANE_W_NN + lane] = many.mu[k], many.block[k, 0]
+            L[g, LANE_COUNT * (LANE_TARGET + c) + lane] = many.contacts.target[k, c]
+        L[g, LANE_COUNT * LANE_MU + lane], L[g, LANE_COUNT * LANE_W_NN + lane] = (
+            many.contacts.mu[k],
+            many.contacts.block[k, 0],
+        )
         L[g, LANE_COUNT * LANE_STEP + lane], L[g, LANE_COUNT * LANE_WEIGHT + lane] = (
-            many.step[k],
+            many.contacts.step[k],
             1.0 if lane < n else 0.0,
         )
 
 
 @kernel
 def batch_contacts(first, last, many):
-    """Bundle the contacts `many.queue[first:last]` of an island whose bodies are ordered; whether there was room."""
+    """Batch the contacts `many.islands.contacts[first:last]` of an island of ordered bodies; whether they fit."""
     count, i = 0, first
     while i < last:
-        a, b = many.ends[many.queue[i], 0], many.ends[many.queue[i], 1]
+        a, b = many.contacts.bodies[many.islands.contacts[i], 0], many.contacts.bodies[many.islands.contacts[i], 1]
         n = 1
         while n < LANE_COUNT and i + n < last:
-            k = many.queue[i + n]
-            if many.ends[k, 0] != a or many.ends[k, 1] != b:
+            k = many.islands.contacts[i + n]
+            if many.contacts.bodies[k, 0] != a or many.contacts.bodies[k, 1] != b:
                 break
             n += 1
-        if count == many.bundle.shape[0]:
+        if count == many.newton.batch.shape[0]:
             return False
-        bundle = many.bundle
+        batch = many.newton.batch
         (
-            bundle[count, BATCH_BODY_A],
-            bundle[count, BATCH_BODY_B],
-            bundle[count, BATCH_START],
-            bundle[count, BATCH_COUNT],
+            batch[count, BATCH_BODY_A],
+            batch[count, BATCH_BODY_B],
+            batch[count, BATCH_START],
+            batch[count, BATCH_COUNT],
         ) = a, b, i, n
         if b >= 0:
-            is_first = many.rank[a] < many.rank[b]
-            bundle[count, BATCH_IS_A_FIRST] = 1 if is_first else 0
-            bundle[count, BATCH_BLOCK] = find_block_index(a, b, many) if is_first else find_block_index(b, a, many)
+            is_first = many.system.rank[a] < many.system.rank[b]
+            batch[count, BATCH_IS_A_FIRST] = 1 if is_first else 0
+            batch[count, BATCH_BLOCK] = find_block_index(a, b, many) if is_first else find_block_index(b, a, many)
         _fill_batch(count, i, n, many)
         count += 1
         i += n
@@ -146,10 +149,10 @@ def batch_contacts(first, last, many):
 
 @inlined
 def gather_batch(g, rows, many):
-    """Vectors of the contacts of bundle g from an array with a row for each contact."""
-    i, n = many.bundle[g, BATCH_START], many.bundle[g, BATCH_COUNT]
-    j, k = many.queue[i], many.queue[i + min(1, n - 1)]
-    l, m = many.queue[i + min(2, n - 1)], many.queue[i + n - 1]
+    """Vectors of the contacts of batch g from an array with a row for each contact."""
+    i, n = many.newton.batch[g, BATCH_START], many.newton.batch[g, BATCH_COUNT]
+    j, k = many.islands.contacts[i], many.islands.contacts[i + min(1, n - 1)]
+    l, m = many.islands.contacts[i + min(2, n - 1)], many.islands.contacts[i + n - 1]
     return (
         Lanes(rows[j, 0], rows[k, 0], rows[l, 0], rows[m, 0]),
         Lanes(rows[j, 1], rows[k, 1], rows[l, 1], rows[m, 1]),
@@ -159,10 +162,10 @@ def gather_batch(g, rows, many):
 
 @inlined
 def scatter_batch(g, a, rows, many):
-    """Write vectors of the contacts of bundle g to an array with a row for each contact."""
-    i, n = many.bundle[g, BATCH_START], many.bundle[g, BATCH_COUNT]
+    """Write vectors of the contacts of batch g to an array with a row for each contact."""
+    i, n = many.newton.batch[g, BATCH_START], many.newton.batch[g, BATCH_COUNT]
     for lane in range(n):
-        put_vector(rows, many.queue[i + lane], 0, (a[0][lane], a[1][lane], a[2][lane]))
+        put_vector(rows, many.islands.contacts[i + lane], 0, (a[0][lane], a[1][lane], a[2][lane]))
 
 
 @inlined
@@ -174,8 +177,8 @@ def _point_velocity(b, r, t, spin):
 
 @inlined
 def batch_velocity(g, t, spin, many):
-    """Relative velocities of the contacts of bundle g in their frames for twists t, ω from column `spin` [m/s]."""
-    a, b = many.bundle[g, BATCH_BODY_A], many.bundle[g, BATCH_BODY_B]
+    """Relative velocities of the contacts of batch g in their frames for twists t, ω from column `spin` [m/s]."""
+    a, b = many.newton.batch[g, BATCH_BODY_A], many.newton.batch[g, BATCH_BODY_B]
     u = _point_velocity(a, batch_vector(g, LANE_ARM, many), t, spin)
     if b >= 0:
         v = _point_velocity(b, batch_vector(g, LANE_ARM + 3, many), t, spin)
@@ -185,15 +188,15 @@ def batch_velocity(g, t, spin, many):
 
 @inlined
 def batch_velocity_error(g, many):
-    """u of the contacts of bundle g less their targets."""
-    u, t = batch_velocity(g, many.twist, 3, many), batch_vector(g, LANE_TARGET, many)
+    """u of the contacts of batch g less their targets."""
+    u, t = batch_velocity(g, many.bodies.twist, 3, many), batch_vector(g, LANE_TARGET, many)
     return (u[0] - t[0], u[1] - t[1], u[2] - t[2])
 
 
 @inlined
 def _apply_body_impulse(b, f, m, sign, t, spin, many):
     """Change the twist of body b in t by an impulse and a moment."""
-    w, s = apply_body_inv_inertia(b, m, many), sign * many.lightness[b]
+    w, s = apply_body_inv_inertia(b, m, many), sign * many.bodies.inv_mass[b]
     put_vector(t, b, 0, (t[b, 0] + s * f[0], t[b, 1] + s * f[1], t[b, 2] + s * f[2]))
     put_vector(t, b, spin, (t[b, spin] + sign * w[0], t[b, spin + 1] + sign * w[1], t[b, spin + 2] + sign * w[2]))
 
@@ -205,8 +208,8 @@ def _sum_lanes(a):
 
 @inlined
 def apply_batch_impulse(g, p, t, spin, many):
-    """Change the twists t of both bodies by impulses of the contacts of bundle g, given in their frames [N s]."""
-    on, a, b = batch_field(g, LANE_WEIGHT, many), many.bundle[g, BATCH_BODY_A], many.bundle[g, BATCH_BODY_B]
+    """Change the twists t of both bodies by impulses of the contacts of batch g, given in their frames [N s]."""
+    on, a, b = batch_field(g, LANE_WEIGHT, many), many.newton.batch[g, BATCH_BODY_A], many.newton.batch[g, BATCH_BODY_B]
     p = qt.transposed_matvec(batch_frames(g, many), (on * p[0], on * p[1], on * p[2]))
     f = _sum_lanes(p)
     _apply_body_impulse(a, f, _sum_lanes(qt.cross(batch_vector(g, LANE_ARM, many), p)), 1.0, t, spin, many)
@@ -230,7 +233,7 @@ def project_on_disks(x, y, limit):
 
 @inlined
 def batch_residuals(g, p, u, many):
-    """Natural-map residuals of the contacts of bundle g for impulses p and velocities u; see `contact_operator`."""
+    """Natural-map residuals of the contacts of batch g for impulses p and velocities u; see `contact_operator`."""
     step, mu = batch_field(g, LANE_STEP, many), batch_field(g, LANE_MU, many)
     x, y = project_on_disks(p[1] - step * u[1], p[2] - step * u[2], mu * larger(p[0], 0.0))
     tangential = planar_length(p[1] - x, p[2] - y) / step

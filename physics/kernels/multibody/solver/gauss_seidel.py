@@ -68,21 +68,23 @@ _NO_HISTORY = -2
 @inlined
 def _is_up_to_date(i, a, b, many):
     """True if neither of two bodies (b < 0: a wall) has been pushed since the last visit i."""
-    return many.visited[i] >= many.pushed[a] and (b < 0 or many.visited[i] >= many.pushed[b])
+    return many.sweeps.visited[i] >= many.sweeps.pushed[a] and (
+        b < 0 or many.sweeps.visited[i] >= many.sweeps.pushed[b]
+    )
 
 
 @inlined
 def is_contact_up_to_date(k, many):
     """True if no body of contact k has been pushed since its last visit."""
-    return _is_up_to_date(k, many.ends[k, 0], many.ends[k, 1], many)
+    return _is_up_to_date(k, many.contacts.bodies[k, 0], many.contacts.bodies[k, 1], many)
 
 
 @inlined
 def _mark_pushed(a, b, visit, many):
     """Note that two bodies (b < 0: a wall) have been pushed in this visit."""
-    many.pushed[a] = visit
+    many.sweeps.pushed[a] = visit
     if b >= 0:
-        many.pushed[b] = visit
+        many.sweeps.pushed[b] = visit
 
 
 @inlined
@@ -91,14 +93,14 @@ def relax_normal_impulse(k, visit, small, many):
 
     `visit` is the number of this visit.
     """
-    many.visited[k] = visit
-    p, normal = many.impulse[k, 0], many.block[k, 0]
-    d = max(0.0, p - (normal_velocity(k, many) - many.target[k, 0]) / normal) - p
+    many.sweeps.visited[k] = visit
+    p, normal = many.contacts.impulse[k, 0], many.contacts.block[k, 0]
+    d = max(0.0, p - (normal_velocity(k, many) - many.contacts.target[k, 0]) / normal) - p
     off = abs(d) * normal
     if off > small:
-        many.impulse[k, 0] = p + d
+        many.contacts.impulse[k, 0] = p + d
         apply_normal_impulse(k, d, many)
-        _mark_pushed(many.ends[k, 0], many.ends[k, 1], visit, many)
+        _mark_pushed(many.contacts.bodies[k, 0], many.contacts.bodies[k, 1], visit, many)
     return off
 
 
@@ -111,15 +113,15 @@ def sweep_normals(first, last, residual, goal, limit, many):
     """
     sweeps = visits = 0
     for i in range(first, last):
-        k = many.queue[i]
+        k = many.islands.contacts[i]
         assemble_normal_row(k, many)
-        many.visited[k] = _MUST_VISIT
-        _mark_pushed(many.ends[k, 0], many.ends[k, 1], 0, many)
+        many.sweeps.visited[k] = _MUST_VISIT
+        _mark_pushed(many.contacts.bodies[k, 0], many.contacts.bodies[k, 1], 0, many)
     motion_from_twists(first, last, many)
     while not residual <= goal and sweeps < limit:
         worst, before = 0.0, visits
         for i in range(first, last):
-            k = many.queue[i if sweeps % 2 == 0 else first + last - 1 - i]
+            k = many.islands.contacts[i if sweeps % 2 == 0 else first + last - 1 - i]
             if is_contact_up_to_date(k, many):
                 continue
             visits += 1
@@ -159,16 +161,19 @@ def _solve_one_contact(W, V, mu, step, p, u, goal):
 @inlined
 def _as_velocity(i, d, many):
     """A change d of an impulse, as a velocity [m/s]."""
-    return max(abs(d[0]) * many.visit[i, VISIT_BLOCK], max(abs(d[1]), abs(d[2])) * many.visit[i, VISIT_LAMBDA_MAX])
+    return max(
+        abs(d[0]) * many.sweeps.visit_rows[i, VISIT_BLOCK],
+        max(abs(d[1]), abs(d[2])) * many.sweeps.visit_rows[i, VISIT_LAMBDA_MAX],
+    )
 
 
 @inlined
 def _save_history(i, p, marks, many):
     """Keep the impulse of visit i as it was at two moments, if it has not been visited since then."""
-    if many.visited[i] <= marks[0]:
-        put_vector(many.settled, i, 0, p)
-    if many.visited[i] <= marks[1]:
-        put_vector(many.trend, i, 0, p)
+    if many.sweeps.visited[i] <= marks[0]:
+        put_vector(many.sweeps.impulse_4_sweeps_ago, i, 0, p)
+    if many.sweeps.visited[i] <= marks[1]:
+        put_vector(many.sweeps.impulse_2_sweeps_ago, i, 0, p)
 
 
 @inlined
@@ -177,18 +182,18 @@ def _relax_contact(i, number, marks, small, many):
 
     The error is a velocity, the contact's residual or a little more. `number` is that of this visit.
     """
-    W, p = visit_block(i, VISIT_BLOCK, many), row_vector(many.visit, i, VISIT_IMPULSE)
+    W, p = visit_block(i, VISIT_BLOCK, many), row_vector(many.sweeps.visit_rows, i, VISIT_IMPULSE)
     _save_history(i, p, marks, many)
-    left = 0.0 if many.visited[i] == _MUST_VISIT else small
-    many.visited[i] = number
-    if many.visit[i, VISIT_INVERSE] == NOT_INVERTED:
+    left = 0.0 if many.sweeps.visited[i] == _MUST_VISIT else small
+    many.sweeps.visited[i] = number
+    if many.sweeps.visit_rows[i, VISIT_INVERSE] == NOT_INVERTED:
         write_block_inverse(i, W, many)
     u = visit_velocity_error(i, many)
     q = _solve_one_contact(
         W,
         visit_block(i, VISIT_INVERSE, many),
-        many.visit[i, VISIT_MU],
-        1.0 / many.visit[i, VISIT_LAMBDA_MAX],
+        many.sweeps.visit_rows[i, VISIT_MU],
+        1.0 / many.sweeps.visit_rows[i, VISIT_LAMBDA_MAX],
         p,
         u,
         small,
@@ -196,9 +201,9 @@ def _relax_contact(i, number, marks, small, many):
     d = subtract(q, p)
     off = _as_velocity(i, d, many)
     if off > left:
-        put_vector(many.visit, i, VISIT_IMPULSE, q)
+        put_vector(many.sweeps.visit_rows, i, VISIT_IMPULSE, q)
         apply_visit_impulse(i, d, many)
-        _mark_pushed(many.side[i, 0], many.side[i, 1], number, many)
+        _mark_pushed(many.sweeps.visit_bodies[i, 0], many.sweeps.visit_bodies[i, 1], number, many)
     return off
 
 
@@ -207,11 +212,11 @@ def _contraction_ratio(count, marks, many):
     """Ratio of the last change of the impulses to the one before, in the metric of W_nn; 0: not along it."""
     product = square = 0.0
     for i in range(count):
-        if many.visited[i] <= marks[0]:
+        if many.sweeps.visited[i] <= marks[0]:
             continue
-        p, weight = row_vector(many.visit, i, VISIT_IMPULSE), many.visit[i, VISIT_BLOCK]
-        middle = row_vector(many.trend, i, 0) if many.visited[i] > marks[1] else p
-        before = subtract(middle, row_vector(many.settled, i, 0))
+        p, weight = row_vector(many.sweeps.visit_rows, i, VISIT_IMPULSE), many.sweeps.visit_rows[i, VISIT_BLOCK]
+        middle = row_vector(many.sweeps.impulse_2_sweeps_ago, i, 0) if many.sweeps.visited[i] > marks[1] else p
+        before = subtract(middle, row_vector(many.sweeps.impulse_4_sweeps_ago, i, 0))
         product += weight * qt.dot(subtract(p, middle), before)
         square += weight * qt.dot(before, before)
     return min(product / square, _MAX_CONTRACTION_RATIO) if product > 0.0 else 0.0
@@ -225,17 +230,17 @@ def _extrapolate(count, ratio, number, marks, small, many):
     """
     s = ratio / (1.0 - ratio)
     for i in range(count):
-        if many.visited[i] <= marks[1]:
+        if many.sweeps.visited[i] <= marks[1]:
             continue
-        p = row_vector(many.visit, i, VISIT_IMPULSE)
-        d = subtract(p, row_vector(many.trend, i, 0))
+        p = row_vector(many.sweeps.visit_rows, i, VISIT_IMPULSE)
+        d = subtract(p, row_vector(many.sweeps.impulse_2_sweeps_ago, i, 0))
         normal = max(0.0, p[0] + s * d[0])
-        x, y = project_on_disk(p[1] + s * d[1], p[2] + s * d[2], many.visit[i, VISIT_MU] * normal)
+        x, y = project_on_disk(p[1] + s * d[1], p[2] + s * d[2], many.sweeps.visit_rows[i, VISIT_MU] * normal)
         d = (normal - p[0], x - p[1], y - p[2])
-        put_vector(many.visit, i, VISIT_IMPULSE, (normal, x, y))
+        put_vector(many.sweeps.visit_rows, i, VISIT_IMPULSE, (normal, x, y))
         apply_visit_impulse(i, d, many)
         if _as_velocity(i, d, many) > small:
-            _mark_pushed(many.side[i, 0], many.side[i, 1], number, many)
+            _mark_pushed(many.sweeps.visit_bodies[i, 0], many.sweeps.visit_bodies[i, 1], number, many)
 
 
 @inlined
@@ -243,7 +248,7 @@ def _flag_unsolved(count, small, many):
     """The residual [m/s]. Who misses more than `small` is to be visited, others once a body of theirs moves."""
     worst = 0.0
     for i in range(count):
-        R = many.visit
+        R = many.sweeps.visit_rows
         miss = natural_map_residual(
             row_vector(R, i, VISIT_IMPULSE),
             visit_velocity_error(i, many),
@@ -251,8 +256,8 @@ def _flag_unsolved(count, small, many):
             1.0 / R[i, VISIT_LAMBDA_MAX],
             R[i, VISIT_MU],
         )
-        many.visited[i] = 0 if miss <= small else _MUST_VISIT
-        _mark_pushed(many.side[i, 0], many.side[i, 1], 0, many)
+        many.sweeps.visited[i] = 0 if miss <= small else _MUST_VISIT
+        _mark_pushed(many.sweeps.visit_bodies[i, 0], many.sweeps.visit_bodies[i, 1], 0, many)
         if not miss <= worst:  # also what is not a number
             worst = miss
     return worst
@@ -264,7 +269,7 @@ def _sweep(count, is_up, visits, marks, small, many):
     worst = 0.0
     for j in range(count):
         i = j if is_up else count - 1 - j
-        if not _is_up_to_date(i, many.side[i, 0], many.side[i, 1], many):
+        if not _is_up_to_date(i, many.sweeps.visit_bodies[i, 0], many.sweeps.visit_bodies[i, 1], many):
             visits += 1
             worst = max(worst, _relax_contact(i, visits, marks, small, many))
     return worst, visits
@@ -292,11 +297,11 @@ def _sweep_until_solved(count, residual, goal, limit, many):
 
 @kernel
 def sweep_contacts(first, last, friction, residual, goal, limit, many):
-    """Improve the impulses of `many.queue[first:last]` by sweeps until the residual is at most `goal` [m/s].
+    """Improve the impulses of `many.islands.contacts[first:last]` by sweeps until the residual is at most `goal` [m/s].
 
-    `many.impulse` and `many.twist`, which belong to each other, hold the start, whose residual is given, and receive
-    the result. Returns the number of sweeps, `limit` at most, and the residual, measured on what is returned. As many
-    visits as there are contacts count as a sweep, fewer than that as one; the last begun is finished.
+    `contacts.impulse` and `bodies.twist` belong to each other. They hold the start, whose residual is given, and
+    receive the result. Returns the number of sweeps, `limit` at most, and the residual of the result. As many visits as
+    there are contacts count as a sweep, fewer than that as one; the last begun is finished.
     """
     if friction is None:
         return sweep_normals(first, last, residual, goal, limit, many)

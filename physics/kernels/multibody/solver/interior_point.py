@@ -59,7 +59,7 @@ _SLIP_SHRINK, _SLIP_GROWTH = 0.2, 2.0
 
 @inlined
 def _units(g, many):
-    """Diagonal of S of the contacts of bundle g: (normal, tangents)."""
+    """Diagonal of S of the contacts of batch g: (normal, tangents)."""
     return of.batch_field(g, of.IPM_UNIT, many), of.batch_field(g, of.IPM_UNIT + 1, many)
 
 
@@ -77,7 +77,7 @@ def _unscaled_impulse(s, p):
 
 @inlined
 def _write_units(g, many):
-    """Write the diagonal of S of the contacts of bundle g."""
+    """Write the diagonal of S of the contacts of batch g."""
     mu = of.batch_field(g, of.LANE_MU, many)
     of.put_batch_field(g, of.IPM_UNIT, select_lanes(mu > 0.0, 1.0 / mu, 1.0), many)
     of.put_batch_field(g, of.IPM_UNIT + 1, select_lanes(mu > 0.0, Lanes(1.0, 1.0, 1.0, 1.0), 0.0), many)
@@ -88,7 +88,7 @@ def _set_starting_point(start, many):
     """Start inside the cones by about `start` [m/s], near the impulses as they are."""
     for g in range(many.counts[NUM_BATCHES]):
         _write_units(g, many)
-        s, p = _units(g, many), of.gather_batch(g, many.impulse, many)
+        s, p = _units(g, many), of.gather_batch(g, many.contacts.impulse, many)
         u = _apply_units(s, of.batch_velocity_error(g, many))
         p = (p[0] / s[0], s[1] * p[1], s[1] * p[2])
         side, slip = of.planar_length(p[1], p[2]), of.planar_length(u[1], u[2])
@@ -99,7 +99,7 @@ def _set_starting_point(start, many):
 
 @inlined
 def _add_batch_matrix(g, s, w, x, y, many):
-    """Add bundle g to the system: S W⁻² (S + e dᵀ) between its rows, d = (0, x, y) the direction of slip."""
+    """Add batch g to the system: S W⁻² (S + e dᵀ) between its rows, d = (0, x, y) the direction of slip."""
     f = 1.0 / (w[3] * w[3])
     a, b, c = f * (2.0 * w[0] * w[0] - 1.0), -2.0 * f * w[0] * w[1], -2.0 * f * w[0] * w[2]
     d, e, g2 = f * (1.0 + 2.0 * w[1] * w[1]), 2.0 * f * w[1] * w[2], f * (1.0 + 2.0 * w[2] * w[2])
@@ -111,7 +111,7 @@ def _add_batch_matrix(g, s, w, x, y, many):
 
 @inlined
 def _scale_batch(g, share, many):
-    """Scaling of bundle g, its matrix with a share of d, and right side: (p̂·û, residual [m/s])."""
+    """Scaling of batch g, its matrix with a share of d, and right side: (p̂·û, residual [m/s])."""
     s, p, u = _units(g, many), of.batch_vector(g, of.IPM_IMPULSE, many), of.batch_vector(g, of.IPM_VELOCITY, many)
     v = of.batch_velocity_error(g, many)
     worst = of.batch_residuals(g, _unscaled_impulse(s, p), v, many)
@@ -130,7 +130,7 @@ def _scale_batch(g, share, many):
     of.put_batch_field(g, of.IPM_SCALING + 3, w[3], many)
     _add_batch_matrix(g, s, w, x, y, many)
     f = _apply_units(s, second_order_cone.apply_inv_scaling_twice(w, miss))
-    of.apply_batch_impulse(g, (-f[0], -f[1], -f[2]), many.defect, ANGULAR_OFFSET, many)
+    of.apply_batch_impulse(g, (-f[0], -f[1], -f[2]), many.newton.defect, ANGULAR_OFFSET, many)
     return qt.dot(p, u), worst
 
 
@@ -143,7 +143,7 @@ def _prepare_predictor(part, share, many):
     first, last, begin, end = part
     clear_system(begin, end, many)
     for i in range(begin, end):
-        subtract_twists(many.order[i], many.free, many.twist, many)
+        subtract_twists(many.islands.bodies[i], many.bodies.free_twist, many.bodies.twist, many)
     gap = worst = Lanes(0.0, 0.0, 0.0, 0.0)
     for g in range(many.counts[NUM_BATCHES]):
         product, miss = _scale_batch(g, share, many)
@@ -153,24 +153,24 @@ def _prepare_predictor(part, share, many):
 
 @inlined
 def _scaling_of(g, many):
-    """(w₀, w₁, w₂, η) of the contacts of bundle g."""
+    """(w₀, w₁, w₂, η) of the contacts of batch g."""
     w = of.batch_vector(g, of.IPM_SCALING, many)
     return (w[0], w[1], w[2], of.batch_field(g, of.IPM_SCALING + 3, many))
 
 
 @inlined
 def _batch_twist_step(g, s, many):
-    """(S + e dᵀ) J dx for the change of twists in `many.change`, d = (0, x, y) the direction of slip."""
+    """(S + e dᵀ) J dx for the change of twists in `many.newton.change`, d = (0, x, y) the direction of slip."""
     x, y = of.batch_field(g, of.IPM_SLIP_DIRECTION, many), of.batch_field(g, of.IPM_SLIP_DIRECTION + 1, many)
-    d = _apply_units(s, of.batch_velocity(g, many.change, ANGULAR_OFFSET, many))
+    d = _apply_units(s, of.batch_velocity(g, many.newton.change, ANGULAR_OFFSET, many))
     return (d[0] + (x * d[1] + y * d[2]), d[1], d[2])
 
 
 @inlined
 def _find_step_length(part, is_corrected, many):
-    """Changes that belong to `many.change`, W dp̂ and dû; how far they lead, and p̂·û of a contact there.
+    """Changes that belong to `many.newton.change`, W dp̂ and dû; how far they lead, and p̂·û of a contact there.
 
-    With f, what is in the bundles if `is_corrected`, else 0, they satisfy W dp̂ + W⁻¹ dû = f - λ. The second number is
+    With f, what is in the batches if `is_corrected`, else 0, they satisfy W dp̂ + W⁻¹ dû = f - λ. The second number is
     right where f is 0.
     """
     most = Lanes(1.0, 1.0, 1.0, 1.0)  # of what 1/t must be at least
@@ -205,9 +205,9 @@ def _find_step_length(part, is_corrected, many):
 def _set_right_side(part, many):
     """`many.change`: the right side that `_prepare_predictor` left."""
     for i in range(part[2], part[3]):
-        b = many.order[i]
+        b = many.islands.bodies[i]
         for c in range(COLUMN_SIZE):
-            many.change[b, c] = many.defect[b, c]
+            many.newton.change[b, c] = many.newton.defect[b, c]
 
 
 @inlined
@@ -224,7 +224,7 @@ def _set_corrector(part, center, many):
         of.apply_batch_impulse(
             g,
             _apply_units(_units(g, many), second_order_cone.apply_inv_scaling(_scaling_of(g, many), f)),
-            many.change,
+            many.newton.change,
             ANGULAR_OFFSET,
             many,
         )
@@ -249,22 +249,22 @@ def _take_step(part, t, many):
             g, of.IPM_VELOCITY, _move_inside_cone(add_scaled(of.batch_vector(g, of.IPM_VELOCITY, many), t, du)), many
         )
     for i in range(part[2], part[3]):
-        b = many.order[i]
+        b = many.islands.bodies[i]
         for c in range(TWIST_DOFS):
-            many.twist[b, c] += t * many.change[b, c + c // 3]
+            many.bodies.twist[b, c] += t * many.newton.change[b, c + c // 3]
 
 
 @inlined
 def _write_solution(part, many):
     """The impulses, and the twists that belong to them."""
     for i in range(part[2], part[3]):
-        b = many.order[i]
+        b = many.islands.bodies[i]
         for c in range(TWIST_DOFS):
-            many.twist[b, c] = many.free[b, c]
+            many.bodies.twist[b, c] = many.bodies.free_twist[b, c]
     for g in range(many.counts[NUM_BATCHES]):
         p = _unscaled_impulse(_units(g, many), of.batch_vector(g, of.IPM_IMPULSE, many))
-        of.scatter_batch(g, p, many.impulse, many)
-        of.apply_batch_impulse(g, p, many.twist, 3, many)
+        of.scatter_batch(g, p, many.contacts.impulse, many)
+        of.apply_batch_impulse(g, p, many.bodies.twist, 3, many)
 
 
 @kernel
@@ -291,11 +291,11 @@ def interior_point_contacts(part, start, goal, limit, many):
         complete_matrix(begin, end, many)
         factor_system(begin, end, many)
         _set_right_side(part, many)
-        solve_factored(begin, end, many.change, many)
+        solve_factored(begin, end, many.newton.change, many)
         _, after = _find_step_length(part, False, many)
         ratio = min(1.0, max(after / gap, _MIN_CENTERING))
         _set_corrector(part, ratio * ratio * ratio * gap, many)
-        solve_factored(begin, end, many.change, many)
+        solve_factored(begin, end, many.newton.change, many)
         t, _ = _find_step_length(part, True, many)
         _take_step(part, min(1.0, _FRACTION_TO_BOUNDARY * t), many)
         share = _SLIP_SHRINK * share if t < _SHORT_STEP else min(1.0, _SLIP_GROWTH * share)

@@ -14,23 +14,23 @@ from physics.kernels.math.union_find import find_root, unite_sets
 
 @inlined
 def _union_contacts(n, many):
-    """Let `many.parent` lead from every body to the first one that contacts connect it with."""
-    parent = many.parent
+    """Let `many.islands.parent` lead from every body to the first one that contacts connect it with."""
+    parent = many.islands.parent
     for b in range(parent.shape[0]):
         parent[b] = b
     for k in range(n):
-        if many.ends[k, 1] >= 0:
-            unite_sets(many.ends[k, 0], many.ends[k, 1], parent)
+        if many.contacts.bodies[k, 1] >= 0:
+            unite_sets(many.contacts.bodies[k, 0], many.contacts.bodies[k, 1], parent)
 
 
 @inlined
 def _list_contacts(n, many):
     """Number the islands by their first contacts and list the contacts; how many islands there are."""
-    island, begin, parent, count = many.island, many.first_contact, many.parent, 0
+    island, begin, parent, count = many.islands.of_body, many.islands.first_contact, many.islands.parent, 0
     for b in range(island.shape[0]):
         island[b] = -1
     for k in range(n):
-        root = find_root(many.ends[k, 0], parent)
+        root = find_root(many.contacts.bodies[k, 0], parent)
         if island[root] < 0:
             island[root], begin[count] = count, 0
             count += 1
@@ -39,8 +39,8 @@ def _list_contacts(n, many):
     for i in range(count):
         total, begin[i] = total + begin[i], total
     for k in range(n):
-        i = island[find_root(many.ends[k, 0], parent)]
-        many.queue[begin[i]] = k
+        i = island[find_root(many.contacts.bodies[k, 0], parent)]
+        many.islands.contacts[begin[i]] = k
         begin[i] += 1
     for i in range(count, 0, -1):
         begin[i] = begin[i - 1]
@@ -50,19 +50,19 @@ def _list_contacts(n, many):
 
 @inlined
 def _list_bodies(count, many):
-    """List the bodies of the islands in `many.order`."""
-    island, begin, total = many.island, many.first_body, 0
+    """List the bodies of the islands in `many.islands.bodies`."""
+    island, begin, total = many.islands.of_body, many.islands.first_body, 0
     for i in range(count + 1):
         begin[i] = 0
     for b in range(island.shape[0]):
-        island[b] = island[find_root(b, many.parent)]  # the root comes first
+        island[b] = island[find_root(b, many.islands.parent)]  # the root comes first
         if island[b] >= 0:
             begin[island[b]] += 1
     for i in range(count):
         total, begin[i] = total + begin[i], total
     for b in range(island.shape[0]):
         if island[b] >= 0:
-            many.order[begin[island[b]]] = b
+            many.islands.bodies[begin[island[b]]] = b
             begin[island[b]] += 1
     for i in range(count, 0, -1):
         begin[i] = begin[i - 1]
@@ -73,8 +73,8 @@ def _list_bodies(count, many):
 def find_islands(n, many):
     """Sort the n contacts into islands: how many there are.
 
-    Contacts of island i are `many.queue[first_contact[i] : first_contact[i + 1]]`, its bodies
-    `many.order[first_body[i] : first_body[i + 1]]`.
+    Contacts of island i are `many.islands.contacts[first_contact[i] : first_contact[i + 1]]`, its bodies
+    `many.islands.bodies[first_body[i] : first_body[i + 1]]`.
     """
     _union_contacts(n, many)
     count = _list_contacts(n, many)

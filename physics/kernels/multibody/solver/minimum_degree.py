@@ -21,56 +21,61 @@ _NO_ENTRY = -1
 @inlined
 def _add_neighbour(a, b, many):
     """Add b to the list of neighbours of a, at its front; whether there was room."""
-    k = many.links[0]
-    if k == many.neighbour.shape[0]:
+    k = many.system.links[0]
+    if k == many.system.neighbour.shape[0]:
         return False
-    many.neighbour[k, 0], many.neighbour[k, 1] = b, many.head[a]
-    many.head[a], many.links[0] = k, k + 1
-    many.degree[a] += 1
+    many.system.neighbour[k, 0], many.system.neighbour[k, 1] = b, many.system.head[a]
+    many.system.head[a], many.system.links[0] = k, k + 1
+    many.system.degree[a] += 1
     return True
 
 
 @inlined
 def _mark_neighbours(a, mark, many):
     """Write `mark` to all neighbours of a that are not eliminated, and to a itself."""
-    many.mark[a] = mark
-    k = many.head[a]
+    many.system.mark[a] = mark
+    k = many.system.head[a]
     while k != _NO_ENTRY:
-        many.mark[many.neighbour[k, 0]] = mark
-        k = many.neighbour[k, 1]
+        many.system.mark[many.system.neighbour[k, 0]] = mark
+        k = many.system.neighbour[k, 1]
 
 
 @inlined
 def _put_in_bucket(b, many):
     """Put b at the front of the list of bodies of its degree."""
-    d = many.degree[b]
-    many.ahead[b], many.behind[b] = _NO_ENTRY, many.bucket[d]
-    if many.bucket[d] != _NO_ENTRY:
-        many.ahead[many.bucket[d]] = b
-    many.bucket[d] = b
+    d = many.system.degree[b]
+    many.system.ahead[b], many.system.behind[b] = _NO_ENTRY, many.system.bucket[d]
+    if many.system.bucket[d] != _NO_ENTRY:
+        many.system.ahead[many.system.bucket[d]] = b
+    many.system.bucket[d] = b
 
 
 @inlined
 def _take_from_bucket(b, many):
     """Take b out of the list of bodies of its degree."""
-    if many.ahead[b] == _NO_ENTRY:
-        many.bucket[many.degree[b]] = many.behind[b]
+    if many.system.ahead[b] == _NO_ENTRY:
+        many.system.bucket[many.system.degree[b]] = many.system.behind[b]
     else:
-        many.behind[many.ahead[b]] = many.behind[b]
-    if many.behind[b] != _NO_ENTRY:
-        many.ahead[many.behind[b]] = many.ahead[b]
+        many.system.behind[many.system.ahead[b]] = many.system.behind[b]
+    if many.system.behind[b] != _NO_ENTRY:
+        many.system.ahead[many.system.behind[b]] = many.system.ahead[b]
 
 
 @inlined
 def _build_graph(first, last, begin, end, many):
     """Neighbours of the bodies of one island, from its contacts; whether there was room."""
-    many.links[0] = 0
+    many.system.links[0] = 0
     for i in range(begin, end):
-        b = many.order[i]
-        many.head[b], many.degree[b], many.rank[b], many.mark[b] = _NO_ENTRY, 0, _NO_ENTRY, _NO_ENTRY
+        b = many.islands.bodies[i]
+        many.system.head[b], many.system.degree[b], many.system.rank[b], many.system.mark[b] = (
+            _NO_ENTRY,
+            0,
+            _NO_ENTRY,
+            _NO_ENTRY,
+        )
     before_a = before_b = _NO_ENTRY
     for i in range(first, last):
-        a, b = many.ends[many.queue[i], 0], many.ends[many.queue[i], 1]
+        a, b = many.contacts.bodies[many.islands.contacts[i], 0], many.contacts.bodies[many.islands.contacts[i], 1]
         if b < 0 or (a == before_a and b == before_b):
             continue
         before_a, before_b = a, b
@@ -81,31 +86,31 @@ def _build_graph(first, last, begin, end, many):
 
 @inlined
 def _write_column(b, at, many):
-    """Write the neighbours of b that are left to `many.column` from `at` on; where they end, or -1: no room."""
-    k = many.head[b]
+    """Write the neighbours of b that are left to `many.system.column` from `at` on; where they end, or -1: no room."""
+    k = many.system.head[b]
     while k != _NO_ENTRY:
-        other = many.neighbour[k, 0]
-        if many.rank[other] == _NO_ENTRY:
-            if at == many.column.shape[0]:
+        other = many.system.neighbour[k, 0]
+        if many.system.rank[other] == _NO_ENTRY:
+            if at == many.system.column.shape[0]:
                 return _NO_ENTRY
-            many.column[at] = other
+            many.system.column[at] = other
             at += 1
-        k = many.neighbour[k, 1]
+        k = many.system.neighbour[k, 1]
     return at
 
 
 @inlined
 def _eliminate_body(start, end, b, many):
-    """Take b from its neighbours `many.column[start:end]` and make them neighbours of each other; whether room was."""
+    """Take b from its neighbours `system.column[start:end]` and make them neighbours mutually; whether they fit."""
     for i in range(start, end):
-        a = many.column[i]
+        a = many.system.column[i]
         _take_from_bucket(a, many)
-        many.degree[a] -= 1
+        many.system.degree[a] -= 1
         if end - start > 1:
-            _mark_neighbours(a, b * many.mark.shape[0] + a, many)
+            _mark_neighbours(a, b * many.system.mark.shape[0] + a, many)
         for j in range(start, end):
-            other = many.column[j]
-            is_new = end - start > 1 and many.mark[other] != b * many.mark.shape[0] + a
+            other = many.system.column[j]
+            is_new = end - start > 1 and many.system.mark[other] != b * many.system.mark.shape[0] + a
             if is_new and not _add_neighbour(a, other, many):
                 return False
         _put_in_bucket(a, many)
@@ -114,29 +119,29 @@ def _eliminate_body(start, end, b, many):
 
 @kernel
 def order_elimination(first, last, begin, end, most, many):
-    """Reorder the bodies `many.order[begin:end]` of an island with contacts `many.queue[first:last]` for elimination.
+    """Order the bodies `islands.bodies[begin:end]` with contacts `islands.contacts[first:last]` for elimination.
 
-    `many.rank` receives the place of each, `many.column[start[b] : stop[b]]` those of its neighbours that come later.
+    `system.rank` receives the position of each, `system.column[start[b] : stop[b]]` its neighbours that come later.
     Returns the products of blocks that elimination takes; -1: there is no room for it, or they are more than `most`.
     """
     if not _build_graph(first, last, begin, end, many):
         return -1
     for d in range(end - begin):
-        many.bucket[d] = _NO_ENTRY
+        many.system.bucket[d] = _NO_ENTRY
     for i in range(end - 1, begin - 1, -1):
-        _put_in_bucket(many.order[i], many)
+        _put_in_bucket(many.islands.bodies[i], many)
     at = least = work = 0
     for i in range(begin, end):
-        while many.bucket[least] == _NO_ENTRY:
+        while many.system.bucket[least] == _NO_ENTRY:
             least += 1
-        b = many.bucket[least]
+        b = many.system.bucket[least]
         _take_from_bucket(b, many)
-        many.order[i], many.rank[b], many.start[b] = b, i, at
+        many.islands.bodies[i], many.system.rank[b], many.system.start[b] = b, i, at
         at = _write_column(b, at, many)
-        if at < 0 or not _eliminate_body(many.start[b], at, b, many):
+        if at < 0 or not _eliminate_body(many.system.start[b], at, b, many):
             return -1
-        many.stop[b] = at
-        d = at - many.start[b]
+        many.system.stop[b] = at
+        d = at - many.system.start[b]
         work += 1 + d + d * d
         if work > most:
             return -1

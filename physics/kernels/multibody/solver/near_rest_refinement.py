@@ -48,18 +48,23 @@ def _refined_tolerance(goal, least):
 def point_speed_bound(v, w, b, many):
     """No point of body b is faster than this if it moves with v and turns with w [m/s]."""
     linear = max(abs(v[0]), max(abs(v[1]), abs(v[2])))
-    return linear + many.bodies[b].radius * (abs(w[0]) + abs(w[1]) + abs(w[2]))
+    return linear + many.bodies.work[b].radius * (abs(w[0]) + abs(w[1]) + abs(w[2]))
 
 
 @inlined
 def _keeps_velocity(b, most, many):
     """True if the velocity of body b has changed by at most `most` in this resting stage [m/s].
 
-    Velocities before the stage are in `many.momenta`, those after it in `many.twist`.
+    Velocities before the stage are in `many.bodies.momenta`, those after it in `many.bodies.twist`.
     """
-    v, w = row_vector(many.momenta, b, PRE_LOAD_VELOCITY), row_vector(many.momenta, b, PRE_LOAD_VELOCITY + 3)
+    v, w = (
+        row_vector(many.bodies.momenta, b, PRE_LOAD_VELOCITY),
+        row_vector(many.bodies.momenta, b, PRE_LOAD_VELOCITY + 3),
+    )
     return (
-        point_speed_bound(subtract(row_vector(many.twist, b, 0), v), subtract(row_vector(many.twist, b, 3), w), b, many)
+        point_speed_bound(
+            subtract(row_vector(many.bodies.twist, b, 0), v), subtract(row_vector(many.bodies.twist, b, 3), w), b, many
+        )
         <= most
     )
 
@@ -67,9 +72,9 @@ def _keeps_velocity(b, most, many):
 @kernel
 def is_in_balance(goal, least, many):
     """True if nothing is left for `near_rest_refinement` to do in any island."""
-    if many.settings[0].rests == 1:
-        for b in range(many.twist.shape[0]):
-            if many.touched[b] == 1 and not _keeps_velocity(b, 2.0 * _refined_tolerance(goal, least), many):
+    if many.settings[0].is_resting_stage == 1:
+        for b in range(many.bodies.twist.shape[0]):
+            if many.bodies.touched[b] == 1 and not _keeps_velocity(b, 2.0 * _refined_tolerance(goal, least), many):
                 return False
     return True
 
@@ -79,11 +84,11 @@ def _needs_refinement(part, speed, change, many):
     """True if all bodies of an island were slower than `speed`, and one changed by more than `change` [m/s]."""
     is_balanced = True
     for i in range(part[2], part[3]):
-        b = many.order[i]
+        b = many.islands.bodies[i]
         if (
             point_speed_bound(
-                row_vector(many.momenta, b, PRE_LOAD_VELOCITY),
-                row_vector(many.momenta, b, PRE_LOAD_VELOCITY + 3),
+                row_vector(many.bodies.momenta, b, PRE_LOAD_VELOCITY),
+                row_vector(many.bodies.momenta, b, PRE_LOAD_VELOCITY + 3),
                 b,
                 many,
             )
@@ -102,7 +107,7 @@ def refine_near_rest(part, friction, residual, goal, deep, least, many):
     where that would make more of the residual than the goal.
     """
     fine = _refined_tolerance(goal, least)
-    if many.settings[0].rests == 0 or not fine < residual <= goal:
+    if many.settings[0].is_resting_stage == 0 or not fine < residual <= goal:
         return 0, residual, METHOD_SWEEPS
     if not _needs_refinement(part, _NEAR_REST_SPEED * goal, 2.0 * fine, many):
         return 0, residual, METHOD_SWEEPS

@@ -26,7 +26,7 @@ def project_impulse(y, mu):
 @inlined
 def subtract_twists(b, a, c, many):
     """Column b of `many.defect`: row b of twists a less that of twists c."""
-    D = many.defect
+    D = many.newton.defect
     D[b, 0], D[b, 1], D[b, 2] = a[b, 0] - c[b, 0], a[b, 1] - c[b, 1], a[b, 2] - c[b, 2]
     D[b, ANGULAR_OFFSET], D[b, ANGULAR_OFFSET + 1], D[b, ANGULAR_OFFSET + 2] = (
         a[b, 3] - c[b, 3],
@@ -37,13 +37,13 @@ def subtract_twists(b, a, c, many):
 
 @kernel
 def compute_defect(part, rho, all_hold, many):
-    """x - M⁻¹ Jᵀ p(x) of every body of an island into `many.defect`, p(x) into the bundles.
+    """x - M⁻¹ Jᵀ p(x) of every body of an island into `many.newton.defect`, p(x) into the batches.
 
     Returns its norm by mass, and its largest velocity. With `all_hold` the law is left out: p = q - ρ u.
     """
     _, _, begin, end = part
     for i in range(begin, end):
-        subtract_twists(many.order[i], many.twist, many.free, many)
+        subtract_twists(many.islands.bodies[i], many.bodies.twist, many.bodies.free_twist, many)
     for g in range(many.counts[NUM_BATCHES]):
         u, q = of.batch_velocity_error(g, many), of.batch_vector(g, of.PROX_IMPULSE, many)
         y = (q[0] - rho * u[0], q[1] - rho * u[1], q[2] - rho * u[2])
@@ -52,13 +52,17 @@ def compute_defect(part, rho, all_hold, many):
         if not all_hold:
             p = project_impulse(y, of.batch_field(g, of.LANE_MU, many))
         of.put_batch_vector(g, of.PROX_PROJECTED, p, many)
-        of.apply_batch_impulse(g, (-p[0], -p[1], -p[2]), many.defect, ANGULAR_OFFSET, many)
+        of.apply_batch_impulse(g, (-p[0], -p[1], -p[2]), many.newton.defect, ANGULAR_OFFSET, many)
     total = worst = 0.0
     for i in range(begin, end):
-        b = many.order[i]
-        v, w, r = row_vector(many.defect, b, 0), row_vector(many.defect, b, ANGULAR_OFFSET), many.bodies[b].radius
+        b = many.islands.bodies[i]
+        v, w, r = (
+            row_vector(many.newton.defect, b, 0),
+            row_vector(many.newton.defect, b, ANGULAR_OFFSET),
+            many.bodies.work[b].radius,
+        )
         square = qt.dot(v, v) + r * r * qt.dot(w, w)
-        total += many.bodies[b].mass * square
+        total += many.bodies.work[b].mass * square
         worst = max(worst, square)
     return math.sqrt(total), math.sqrt(worst)
 
@@ -86,7 +90,7 @@ def _world_rows(D, E, weight):
 
 @inlined
 def _sum(a):
-    """Sum of vectors of a bundle, as half a column."""
+    """Sum of vectors of a batch, as half a column."""
     return lane_sums(a[0], a[1], a[2], Lanes(0.0, 0.0, 0.0, 0.0))
 
 
@@ -134,7 +138,7 @@ def _subtract_columns(B, place, c, upper, lower):
 
 @kernel
 def add_batch_to_matrix(g, D, rho, many):
-    """Add Jᵀ ρ D J of the contacts of bundle g to the blocks of its bodies; D row by row in the contacts' frames.
+    """Add Jᵀ ρ D J of the contacts of batch g to the blocks of its bodies; D row by row in the contacts' frames.
 
     With A = ρ Eᵀ D E and J = (1, -[r]x) from the twist of a body to the velocity of its point, a block is
 
@@ -142,37 +146,37 @@ def add_batch_to_matrix(g, D, rho, many):
 
     for the arms r of the body of its rows and s of that of its columns. Rows of -A [s]x are s x those of A.
     """
-    a, b = many.bundle[g, BATCH_BODY_A], many.bundle[g, BATCH_BODY_B]
+    a, b = many.newton.batch[g, BATCH_BODY_A], many.newton.batch[g, BATCH_BODY_B]
     x, y, z = _world_rows(D, of.batch_frames(g, many), rho * of.batch_field(g, of.LANE_WEIGHT, many))
     r = of.batch_vector(g, of.LANE_ARM, many)
     A, P = _columns(x, y, z), _columns(qt.cross(r, x), qt.cross(r, y), qt.cross(r, z))
     pull, of_a, turn_a = _sum_columns(A), _moment_columns(r, A), _sum_columns(P)
-    _add_columns(many.diagonal, a, 0, pull, of_a)
-    _add_columns(many.diagonal, a, 3, turn_a, _moment_columns(r, P))
+    _add_columns(many.system.diagonal, a, 0, pull, of_a)
+    _add_columns(many.system.diagonal, a, 3, turn_a, _moment_columns(r, P))
     if b < 0:
         return
     s = of.batch_vector(g, of.LANE_ARM + 3, many)
     Q = _columns(qt.cross(s, x), qt.cross(s, y), qt.cross(s, z))
     of_b, turn_b = _moment_columns(s, A), _sum_columns(Q)
-    _add_columns(many.diagonal, b, 0, pull, of_b)
-    _add_columns(many.diagonal, b, 3, turn_b, _moment_columns(s, Q))
-    place = many.bundle[g, BATCH_BLOCK]
-    if many.bundle[g, BATCH_IS_A_FIRST] == 1:
-        _subtract_columns(many.upper, place, 0, pull, of_a)
-        _subtract_columns(many.upper, place, 3, turn_b, _moment_columns(r, Q))
-        _subtract_columns(many.lower, place, 0, pull, of_b)
-        _subtract_columns(many.lower, place, 3, turn_a, _moment_columns(s, P))
+    _add_columns(many.system.diagonal, b, 0, pull, of_b)
+    _add_columns(many.system.diagonal, b, 3, turn_b, _moment_columns(s, Q))
+    place = many.newton.batch[g, BATCH_BLOCK]
+    if many.newton.batch[g, BATCH_IS_A_FIRST] == 1:
+        _subtract_columns(many.system.upper, place, 0, pull, of_a)
+        _subtract_columns(many.system.upper, place, 3, turn_b, _moment_columns(r, Q))
+        _subtract_columns(many.system.lower, place, 0, pull, of_b)
+        _subtract_columns(many.system.lower, place, 3, turn_a, _moment_columns(s, P))
     else:
-        _subtract_columns(many.lower, place, 0, pull, of_a)
-        _subtract_columns(many.lower, place, 3, turn_b, _moment_columns(r, Q))
-        _subtract_columns(many.upper, place, 0, pull, of_b)
-        _subtract_columns(many.upper, place, 3, turn_a, _moment_columns(s, P))
+        _subtract_columns(many.system.lower, place, 0, pull, of_a)
+        _subtract_columns(many.system.lower, place, 3, turn_b, _moment_columns(r, Q))
+        _subtract_columns(many.system.upper, place, 0, pull, of_b)
+        _subtract_columns(many.system.upper, place, 3, turn_a, _moment_columns(s, P))
 
 
 @inlined
 def _apply_inv_mass(B, place, b, many):
     """Multiply the rows of the block B[place] by M⁻¹ of body b."""
-    m, K = many.lightness[b], many.turning
+    m, K = many.bodies.inv_mass[b], many.bodies.inv_inertia
     x = Lanes(K[b, 0], K[b, 1], K[b, 2], 0.0)
     y = Lanes(K[b, 1], K[b, 3], K[b, 4], 0.0)
     z = Lanes(K[b, 2], K[b, 4], K[b, 5], 0.0)
@@ -186,13 +190,13 @@ def _apply_inv_mass(B, place, b, many):
 def complete_matrix(begin, end, many):
     """1 + M⁻¹ times what contacts have added."""
     for i in range(begin, end):
-        b = many.order[i]
-        _apply_inv_mass(many.diagonal, b, b, many)
+        b = many.islands.bodies[i]
+        _apply_inv_mass(many.system.diagonal, b, b, many)
         for c in range(TWIST_DOFS):
-            many.diagonal[b, COLUMN_SIZE * c + c + c // 3] += 1.0
-        for k in range(many.start[b], many.stop[b]):
-            _apply_inv_mass(many.upper, k, b, many)
-            _apply_inv_mass(many.lower, k, many.column[k], many)
+            many.system.diagonal[b, COLUMN_SIZE * c + c + c // 3] += 1.0
+        for k in range(many.system.start[b], many.system.stop[b]):
+            _apply_inv_mass(many.system.upper, k, b, many)
+            _apply_inv_mass(many.system.lower, k, many.system.column[k], many)
 
 
 @kernel

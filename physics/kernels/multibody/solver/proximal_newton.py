@@ -62,11 +62,11 @@ MIN_NEWTON_STEPS = 12
 def _apply_newton_direction(part, many):
     """Solve the factored system for the defect and take it off the twists."""
     _, _, begin, end = part
-    solve_factored(begin, end, many.defect, many)
+    solve_factored(begin, end, many.newton.defect, many)
     for i in range(begin, end):
-        b = many.order[i]
+        b = many.islands.bodies[i]
         for c in range(TWIST_DOFS):
-            many.twist[b, c] -= many.defect[b, c + c // 3]
+            many.bodies.twist[b, c] -= many.newton.defect[b, c + c // 3]
 
 
 @kernel
@@ -76,18 +76,18 @@ def _newton_step(part, rho, norm, many):
     assemble_newton_matrix(part, rho, False, many)
     factor_system(begin, end, many)
     for i in range(begin, end):
-        b = many.order[i]
+        b = many.islands.bodies[i]
         for c in range(TWIST_DOFS):
-            many.before[b, c] = many.twist[b, c]
+            many.newton.before[b, c] = many.bodies.twist[b, c]
         for c in range(COLUMN_SIZE):
-            many.change[b, c] = many.defect[b, c]
-    solve_factored(begin, end, many.change, many)
+            many.newton.change[b, c] = many.newton.defect[b, c]
+    solve_factored(begin, end, many.newton.change, many)
     after, worst, t = norm, 0.0, 1.0
     for _ in range(_STEP_HALVINGS):
         for i in range(begin, end):
-            b = many.order[i]
+            b = many.islands.bodies[i]
             for c in range(TWIST_DOFS):
-                many.twist[b, c] = many.before[b, c] - t * many.change[b, c + c // 3]
+                many.bodies.twist[b, c] = many.newton.before[b, c] - t * many.newton.change[b, c + c // 3]
         after, worst = compute_defect(part, rho, False, many)
         if after < norm:
             break
@@ -97,23 +97,23 @@ def _newton_step(part, rho, norm, many):
 
 @inlined
 def _apply_impulses(part, many):
-    """Impulses of the bundles, also contact by contact, and twists from the free ones and them."""
+    """Impulses of the batches, also contact by contact, and twists from the free ones and them."""
     _, _, begin, end = part
     for i in range(begin, end):
-        b = many.order[i]
+        b = many.islands.bodies[i]
         for c in range(TWIST_DOFS):
-            many.twist[b, c] = many.free[b, c]
+            many.bodies.twist[b, c] = many.bodies.free_twist[b, c]
     for g in range(many.counts[NUM_BATCHES]):
         p = of.batch_vector(g, of.PROX_IMPULSE, many)
-        of.scatter_batch(g, p, many.impulse, many)
-        of.apply_batch_impulse(g, p, many.twist, 3, many)
+        of.scatter_batch(g, p, many.contacts.impulse, many)
+        of.apply_batch_impulse(g, p, many.bodies.twist, 3, many)
 
 
 @inlined
 def _gather_impulses(many):
-    """Bundle the impulses, the best met so far."""
+    """Copy the best impulses so far into the batches."""
     for g in range(many.counts[NUM_BATCHES]):
-        p = of.gather_batch(g, many.impulse, many)
+        p = of.gather_batch(g, many.contacts.impulse, many)
         of.put_batch_vector(g, of.PROX_IMPULSE, p, many)
         of.put_batch_vector(g, of.PROX_BEST, p, many)
 
@@ -148,7 +148,7 @@ def _restore_impulses(part, many):
 
 @kernel
 def _proximal_round(part, rho, enough, limit, many):
-    """p(x) at the x that solves x = M⁻¹ Jᵀ p(x) to `enough` [m/s], into `many.impulse` and the twists: Newton steps."""
+    """Solve x = M⁻¹ Jᵀ p(x) to `enough` [m/s] by Newton steps; p(x) goes into `contacts.impulse` and the twists."""
     norm, worst = compute_defect(part, rho, False, many)
     steps = failures = 0
     while worst > enough and steps < limit and failures <= FAILED_STEPS:
@@ -166,7 +166,7 @@ def _heaviest(part, many):
     """Largest mass among the bodies of the problem [kg]."""
     mass = 0.0
     for i in range(part[2], part[3]):
-        mass = max(mass, many.bodies[many.order[i]].mass)
+        mass = max(mass, many.bodies.work[many.islands.bodies[i]].mass)
     return mass
 
 
@@ -189,7 +189,12 @@ def prepare_system(part, sweeps, worth, fewest, many):
 def save_best(part, many):
     """Remember the impulses as they are as the best of all methods."""
     for i in range(part[0], part[1]):
-        put_vector(many.best, many.queue[i], 0, row_vector(many.impulse, many.queue[i], 0))
+        put_vector(
+            many.contacts.best_impulse,
+            many.islands.contacts[i],
+            0,
+            row_vector(many.contacts.impulse, many.islands.contacts[i], 0),
+        )
 
 
 @inlined
@@ -197,18 +202,18 @@ def restore_best(part, many):
     """The best impulses of all methods, and the twists that belong to them."""
     for i in range(part[2], part[3]):
         for c in range(TWIST_DOFS):
-            many.twist[many.order[i], c] = many.free[many.order[i], c]
+            many.bodies.twist[many.islands.bodies[i], c] = many.bodies.free_twist[many.islands.bodies[i], c]
     for i in range(part[0], part[1]):
-        k = many.queue[i]
-        put_vector(many.impulse, k, 0, row_vector(many.best, k, 0))
-        apply_contact_impulse(k, row_vector(many.best, k, 0), many.twist, many)
+        k = many.islands.contacts[i]
+        put_vector(many.contacts.impulse, k, 0, row_vector(many.contacts.best_impulse, k, 0))
+        apply_contact_impulse(k, row_vector(many.contacts.best_impulse, k, 0), many.bodies.twist, many)
 
 
 @inlined
 def is_every_contact_pushing(part, many):
     """True if all contacts of an island push: else not all of them will hold."""
     for i in range(part[0], part[1]):
-        if not many.impulse[many.queue[i], 0] > 0.0:
+        if not many.contacts.impulse[many.islands.contacts[i], 0] > 0.0:
             return False
     return True
 
@@ -248,9 +253,9 @@ def newton_contacts(part, friction, residual, goal, limit, scale, many):
     Parameters
     ----------
     part : tuple of 4 ints
-        Its contacts `many.queue[part[0]:part[1]]` and bodies `many.order[part[2]:part[3]]`. `many.impulse` is the
-        start, `many.free` the twists without any impulse; `many.impulse` and `many.twist` receive the best that was
-        met.
+        Its contacts `islands.contacts[part[0]:part[1]]` and bodies `islands.bodies[part[2]:part[3]]`.
+        `contacts.impulse` is the start, `bodies.free_twist` the twists without any impulse; `contacts.impulse` and
+        `bodies.twist` receive the best result.
     residual, goal : float
         Residual of the start, and tolerance [m/s].
     limit : int

@@ -106,33 +106,33 @@ NEWTON_RHO = (10.0, 1.0, 1.0)
 @inlined
 def save_free_twists(many):
     """`many.free`: the twists as they are, without any impulse."""
-    for b in range(many.twist.shape[0]):
+    for b in range(many.bodies.twist.shape[0]):
         for c in range(TWIST_DOFS):
-            many.free[b, c] = many.twist[b, c]
+            many.bodies.free_twist[b, c] = many.bodies.twist[b, c]
 
 
 @inlined
 def reset_body_to_free(b, many):
     """The twist of body b without any impulse."""
     for c in range(TWIST_DOFS):
-        many.twist[b, c] = many.free[b, c]
+        many.bodies.twist[b, c] = many.bodies.free_twist[b, c]
 
 
 @inlined
 def clear_island_impulses(part, many):
     """No impulses in an island."""
     for i in range(part[0], part[1]):
-        put_vector(many.impulse, many.queue[i], 0, (0.0, 0.0, 0.0))
+        put_vector(many.contacts.impulse, many.islands.contacts[i], 0, (0.0, 0.0, 0.0))
     for i in range(part[2], part[3]):
-        reset_body_to_free(many.order[i], many)
+        reset_body_to_free(many.islands.bodies[i], many)
 
 
 @inlined
 def clear_all_impulses(n, many):
     """No impulses at all."""
     for k in range(n):
-        put_vector(many.impulse, k, 0, (0.0, 0.0, 0.0))
-    for b in range(many.twist.shape[0]):
+        put_vector(many.contacts.impulse, k, 0, (0.0, 0.0, 0.0))
+    for b in range(many.bodies.twist.shape[0]):
         reset_body_to_free(b, many)
 
 
@@ -178,8 +178,8 @@ def sweep_as_fallback(part, friction, residual, goal, limit, many):
 def is_island_inactive(part, goal, many):
     """True if no contact of an island pushes, and none opens faster than `goal` [m/s] without that."""
     for i in range(part[0], part[1]):
-        k = many.queue[i]
-        if many.impulse[k, 0] > 0.0 or velocity_error(k, many)[0] > goal:
+        k = many.islands.contacts[i]
+        if many.contacts.impulse[k, 0] > 0.0 or velocity_error(k, many)[0] > goal:
             return False
     return True
 
@@ -190,7 +190,7 @@ def _is_swept_first(part, goal, scale, many):
 
     An impact begins from no impulses, and asks something of the few contacts near it.
     """
-    is_impact = many.settings[0].rests == 0
+    is_impact = many.settings[0].is_resting_stage == 0
     return part[1] - part[0] == 1 or (is_impact and goal >= _COARSE_TOLERANCE * scale)
 
 
@@ -208,7 +208,7 @@ def solve_island(part, friction, scale, residual, goal, deep, many):
         if residual <= goal or last - first == 1:
             return count, residual, METHOD_SWEEPS
     may_hold = is_every_contact_pushing(part, many) or is_island_inactive(part, goal, many)
-    worth = RESTING_BUDGET if scale <= _RESTING_FACTOR * many.settings[0].load else MOVING_BUDGET
+    worth = RESTING_BUDGET if scale <= _RESTING_FACTOR * many.settings[0].load_speed else MOVING_BUDGET
     steps = prepare_system(part, limit, worth, 1 if may_hold else MIN_NEWTON_STEPS, many)
     if may_hold and steps > 0:
         residual = try_all_sticking(part, friction, residual, deep, many)
@@ -240,9 +240,9 @@ def max_impulse_speed(first, last, many):
     """Largest speed that a contact's impulse alone would give [m/s]."""
     most = 0.0
     for i in range(first, last):
-        k = many.queue[i]
-        p = row_vector(many.impulse, k, 0)
-        most = max(most, many.block[k, 0] * max(abs(p[0]), max(abs(p[1]), abs(p[2]))))
+        k = many.islands.contacts[i]
+        p = row_vector(many.contacts.impulse, k, 0)
+        most = max(most, many.contacts.block[k, 0] * max(abs(p[0]), max(abs(p[1]), abs(p[2]))))
     return most
 
 
@@ -250,8 +250,10 @@ def max_impulse_speed(first, last, many):
 def max_body_speed(many):
     """No point of a body is faster than this [m/s]."""
     most = 0.0
-    for b in range(many.twist.shape[0]):
-        most = max(most, point_speed_bound(row_vector(many.twist, b, 0), row_vector(many.twist, b, 3), b, many))
+    for b in range(many.bodies.twist.shape[0]):
+        most = max(
+            most, point_speed_bound(row_vector(many.bodies.twist, b, 0), row_vector(many.bodies.twist, b, 3), b, many)
+        )
     return most
 
 
@@ -278,9 +280,9 @@ def solve_all_frictionless(n, many):
 
 @shared_kernel
 def solve_contacts(n, friction, many):
-    """Solve for `many.impulse` from the warm start in it: (iterations, relative residual, method).
+    """Solve for `many.contacts.impulse` from the warm start in it: (iterations, relative residual, method).
 
-    `many.twist` holds the velocities without any contact impulse and receives those with them. The residual is
+    `many.bodies.twist` holds the velocities without any contact impulse and receives those with them. The residual is
     measured on what is returned, relative to the largest velocity that a contact would have without any impulse; or,
     where all of those are next to rounding, to that speed of which the rounding of velocities or of impulses is the
     tolerance's share; or, in a part of a substep, to what loads give in half of it (`adaptive_substep`).
@@ -289,10 +291,10 @@ def solve_contacts(n, friction, many):
     save_free_twists(many)
     tolerance = many.settings[0].tolerance
     least = _VELOCITY_ROUNDING * max_body_speed(many) / tolerance
-    scale = max(assemble_contact_blocks(n, many), max(least, many.settings[0].half))
+    scale = max(assemble_contact_blocks(n, many), max(least, many.settings[0].half_load_speed))
     if not scale > 0.0:
         return 0, 0.0, METHOD_SWEEPS
-    goal = max(min(tolerance * scale, many.settings[0].still), _MIN_TOLERANCE * scale)
+    goal = max(min(tolerance * scale, many.settings[0].residual_limit), _MIN_TOLERANCE * scale)
     if max_impulse_speed(0, n, many) > _STRAIN_LIMIT * scale:
         clear_all_impulses(n, many)
     rounding = _IMPULSE_ROUNDING * max_impulse_speed(0, n, many)
@@ -302,7 +304,12 @@ def solve_contacts(n, friction, many):
         return 0, residual / max(scale, rounding / tolerance), METHOD_SWEEPS
     iterations, worst, method, deep = 0, 0.0, METHOD_SWEEPS, STICKING_SHARE * min(goal, FINE_TOLERANCE * scale)
     for i in range(find_islands(n, many)):
-        part = (many.first_contact[i], many.first_contact[i + 1], many.first_body[i], many.first_body[i + 1])
+        part = (
+            many.islands.first_contact[i],
+            many.islands.first_contact[i + 1],
+            many.islands.first_body[i],
+            many.islands.first_body[i + 1],
+        )
         residual = max_contact_residual(part[0], part[1], friction, many)
         if not residual <= goal:
             count, residual, used = solve_island(part, friction, scale, residual, goal, deep, many)

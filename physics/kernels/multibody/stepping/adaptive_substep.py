@@ -46,15 +46,15 @@ SNAPSHOT_START, SNAPSHOT_COARSE, SNAPSHOT_MIDDLE = range(3)
 @inlined
 def _save_snapshot(slot, world, kept, memory, report, many, counts):
     """Keep the world as it is now."""
-    for b in range(many.now.shape[0]):
-        for c in range(many.now.shape[1]):
-            kept.now[slot, b, c] = many.now[b, c]
+    for b in range(many.bodies.state.shape[0]):
+        for c in range(many.bodies.state.shape[1]):
+            kept.state[slot, b, c] = many.bodies.state[b, c]
     for c in range(WARM_HEADER_SIZE + WARM_CONTACT_SIZE * int(memory[world, WARM_CONTACT_COUNT])):
         kept.memory[slot, c] = memory[world, c]
     for c in range(at.REPORT_SIZE):
         kept.report[slot, c] = report[world, c]
-    for b in range(many.now.shape[0]):
-        kept.counts[slot, b] = counts[world * many.now.shape[0] + b]
+    for b in range(many.bodies.state.shape[0]):
+        kept.counts[slot, b] = counts[world * many.bodies.state.shape[0] + b]
 
 
 @inlined
@@ -63,16 +63,16 @@ def _restore_snapshot(slot, world, kept, memory, report, many, counts):
 
     Events logged since are no more: their rows are written over.
     """
-    for b in range(many.now.shape[0]):
-        for c in range(many.now.shape[1]):
-            many.now[b, c] = kept.now[slot, b, c]
+    for b in range(many.bodies.state.shape[0]):
+        for c in range(many.bodies.state.shape[1]):
+            many.bodies.state[b, c] = kept.state[slot, b, c]
     for c in range(WARM_HEADER_SIZE + WARM_CONTACT_SIZE * int(kept.memory[slot, WARM_CONTACT_COUNT])):
         memory[world, c] = kept.memory[slot, c]
     for c in range(at.REPORT_SIZE):
         if c != at.SOLVES and c != at.ITERATIONS:
             report[world, c] = kept.report[slot, c]
-    for b in range(many.now.shape[0]):
-        counts[world * many.now.shape[0] + b] = kept.counts[slot, b]
+    for b in range(many.bodies.state.shape[0]):
+        counts[world * many.bodies.state.shape[0] + b] = kept.counts[slot, b]
 
 
 @inlined
@@ -86,9 +86,9 @@ def _body_error(b, tilted, kept, many):
 
     Of its speed counts no less than what its loads give it over its radius.
     """
-    body = many.bodies[b]
-    x, q, v, L = read_state(many.now, b)
-    y, p, u, K = read_state(kept.now[SNAPSHOT_COARSE], b)
+    body = many.bodies.work[b]
+    x, q, v, L = read_state(many.bodies.state, b)
+    y, p, u, K = read_state(kept.state[SNAPSHOT_COARSE], b)
     way, r = subtract(x, y), body.radius
     same, other = 0.0, 0.0
     for c in range(4):
@@ -106,7 +106,7 @@ def _body_error(b, tilted, kept, many):
 def _max_body_error(tilted, kept, many):
     """Largest error of any body, 1: all that is allowed."""
     worst, allowed = 0.0, ERROR_PER_TOLERANCE * many.settings[0].tolerance
-    for b in range(many.now.shape[0]):
+    for b in range(many.bodies.state.shape[0]):
         found = _body_error(b, tilted, kept, many) / allowed
         if not found <= worst:
             worst = found
@@ -117,9 +117,9 @@ def _max_body_error(tilted, kept, many):
 def _step_part(world, start, h, switches, memory, report, many, log, counts):
     """One part of h [s], `start` [s] after the call."""
     friction, gyroscopic, tilted, ellipsoids, hulls, scheme = switches
-    for b in range(many.now.shape[0]):
-        set_clock(start, many.bodies[b])
-        many.touched[b] = 0
+    for b in range(many.bodies.state.shape[0]):
+        set_clock(start, many.bodies.work[b])
+        many.bodies.touched[b] = 0
     substep_world(
         world, start, h, friction, gyroscopic, tilted, ellipsoids, hulls, scheme, None, memory, report, many,
         log, counts,
@@ -157,8 +157,8 @@ def _min_load_speed(h, many):
     less than rounding leaves where bodies turn on edges, and no error is as small.
     """
     least = math.inf
-    for b in range(many.now.shape[0]):
-        least = min(least, many.bodies[b].acceleration * h)
+    for b in range(many.bodies.state.shape[0]):
+        least = min(least, many.bodies.work[b].acceleration * h)
     return least
 
 
@@ -174,7 +174,7 @@ def step_with_error_control(world, start, h, switches, kept, memory, report, man
     """
     place, shortest, unit, patience = 0, 1, h / _UNITS_PER_SUBSTEP, _MAX_TRIALS
     next_part = memory.shape[1] - 1
-    many.settings[0].half = _min_load_speed(0.5 * h, many)  # the scale of contact problems, at least
+    many.settings[0].half_load_speed = _min_load_speed(0.5 * h, many)  # the scale of contact problems, at least
     part = int(memory[world, next_part] * _UNITS_PER_SUBSTEP)
     if part == 0:
         part = _UNITS_PER_SUBSTEP
@@ -185,7 +185,7 @@ def step_with_error_control(world, start, h, switches, kept, memory, report, man
         )  # fmt: skip
         place += part
         patience -= tried
-        if not are_all_finite(many.now):
+        if not are_all_finite(many.bodies.state):
             return
         if error > 1.0:
             report[world, at.FALLBACKS] += 1.0

@@ -53,18 +53,22 @@ _ARRIVAL_FRACTION = 0.5
 
 @inlined
 def write_spin_bounds(h, tilted, many):
-    """Write `many.spin`, bounds of |ω| of bodies that may turn far within h and 0 of all others: whether there are any.
+    """Write `many.bodies.spin_bound`: bounds of |ω| of bodies that may turn far in h, else 0; whether any may.
 
     Most are told by a glance: loads turn a body by h times its acceleration over its radius at most, and while it turns
     by less than `FAR_TURN` it gets no faster by a factor of √2 (see `conservative_advancement.spin_bound`).
     """
     least, found = FAR_TURN, False
-    if many.settings[0].in_time == 1:
+    if many.settings[0].is_error_controlled == 1:
         least = _MIN_TURN
     limit = 0.5 * (least / h) ** 2
-    for b in range(many.now.shape[0]):
-        many.spin[b] = 0.0
-        w, r, push = row_vector(many.twist, b, 3), many.bodies[b].radius, h * many.bodies[b].acceleration
+    for b in range(many.bodies.state.shape[0]):
+        many.bodies.spin_bound[b] = 0.0
+        w, r, push = (
+            row_vector(many.bodies.twist, b, 3),
+            many.bodies.work[b].radius,
+            h * many.bodies.work[b].acceleration,
+        )
         if r * r * (qt.dot(w, w) - limit) + push * push > 0.0:
             found = _write_spin_bound(b, h, least, tilted, many) or found
     return found
@@ -72,22 +76,22 @@ def write_spin_bounds(h, tilted, many):
 
 @kernel
 def _write_spin_bound(b, h, least, tilted, many):
-    """Write `many.spin` of one body: whether it turns far."""
-    _, q, _, L = read_state(many.now, b)
-    if not may_turn(L, h, least, tilted, many.bodies[b]):
+    """Write `many.bodies.spin_bound` of one body: whether it turns far."""
+    _, q, _, L = read_state(many.bodies.state, b)
+    if not may_turn(L, h, least, tilted, many.bodies.work[b]):
         return False
-    spin = spin_bound(q, L, h, tilted, many.bodies[b])
+    spin = spin_bound(q, L, h, tilted, many.bodies.work[b])
     if not spin * h > least:
         return False
-    many.spin[b] = spin
+    many.bodies.spin_bound[b] = spin
     return True
 
 
 @inlined
 def clear_spin_bounds(many):
     """Let nothing turn far."""
-    for b in range(many.now.shape[0]):
-        many.spin[b] = 0.0
+    for b in range(many.bodies.state.shape[0]):
+        many.bodies.spin_bound[b] = 0.0
 
 
 @inlined
@@ -96,16 +100,16 @@ def _contact_side(b, y, n, tilted, many):
     x, q, v, L = y
     R, c, m = to_matrix(q), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
     if tilted is not None:
-        c = center_arm(R, many.bodies[b])
-    if not (many.bodies[b].shape == SPHERE and is_centred(tilted, many.bodies[b])):
-        m = qt.cross(n, angular_velocity(q, L, many.bodies[b], tilted))
+        c = center_arm(R, many.bodies.work[b])
+    if not (many.bodies.work[b].shape == SPHERE and is_centred(tilted, many.bodies.work[b])):
+        m = qt.cross(n, angular_velocity(q, L, many.bodies.work[b], tilted))
     return add_scaled(x, 1.0, c), R, c, qt.dot(n, v), m
 
 
 @inlined
 def _support(b, R, k, hulls, many):
     """Reach of body b along k from its geometric centre, in |k|."""
-    d, shape = many.bodies[b].dims, many.bodies[b].shape
+    d, shape = many.bodies.work[b].dims, many.bodies.work[b].shape
     if hulls is not None:  # noqa: SIM102 (a branch of its own is what the compiler prunes)
         if shape == HULL:
             e = qt.transposed_matvec(R, k)
@@ -134,10 +138,10 @@ def _norm(m):
 @kernel
 def _safe_time(a, b, n, one, other, bend, horizon, hulls, many):
     """Time within which the gap along n is not used up, at most `horizon` [s]."""
-    rate, turning = one[3], many.bodies[a].radius * _norm(one[4])
+    rate, turning = one[3], many.bodies.work[a].radius * _norm(one[4])
     if b >= 0:
         rate -= other[3]
-        turning += many.bodies[b].radius * _norm(other[4])
+        turning += many.bodies.work[b].radius * _norm(other[4])
     gap = _gap_bound(0.0, a, b, n, one, other, rate, bend, hulls, many)
     if not gap > 0.0:
         return 0.0
@@ -167,17 +171,17 @@ def _safe_time(a, b, n, one, other, bend, horizon, hulls, many):
 @inlined
 def _turning_acceleration(b, h, tilted, many):
     """Bound of what turning accelerates a point of body b by within h [m/s²]."""
-    _, q, _, L = read_state(many.now, b)
-    spin = many.spin[b]
+    _, q, _, L = read_state(many.bodies.state, b)
+    spin = many.bodies.spin_bound[b]
     if not spin > 0.0:
-        spin = spin_bound(q, L, h, tilted, many.bodies[b])
-    return turning_acceleration_bound(spin, q, L, h, tilted, many.bodies[b])
+        spin = spin_bound(q, L, h, tilted, many.bodies.work[b])
+    return turning_acceleration_bound(spin, q, L, h, tilted, many.bodies.work[b])
 
 
 @inlined
 def _load_acceleration(b, n, many):
     """Acceleration of body b along n [m/s²]."""
-    g = many.bodies[b].free_acceleration
+    g = many.bodies.work[b].free_acceleration
     return n[0] * g[0] + n[1] * g[1] + n[2] * g[2]
 
 
@@ -189,12 +193,12 @@ def _time_of_impact(a, b, h, gyroscopic, tilted, hulls, many):
     look at the end can tell.
     """
     touch, gone, first = _ARRIVAL_FRACTION * arrival_gap(a, b, many), 0.0, h
-    one = read_state(many.now, a)
+    one = read_state(many.bodies.state, a)
     other, partner = one, a
     if b >= 0:
-        other, partner = read_state(many.now, b), b
+        other, partner = read_state(many.bodies.state, b), b
     bend = _turning_acceleration(a, h, tilted, many) + (_turning_acceleration(b, h, tilted, many) if b >= 0 else 0.0)
-    is_held = many.touched[a] == 1 or many.touched[partner] == 1
+    is_held = many.bodies.touched[a] == 1 or many.bodies.touched[partner] == 1
     n = (1.0, 0.0, 0.0)
     if b < 0:
         n = row_vector(many.walls, -1 - b, WALL_NORMAL)
@@ -209,10 +213,10 @@ def _time_of_impact(a, b, h, gyroscopic, tilted, hulls, many):
         else:
             gap = _gap_bound(0.0, a, b, n, left, right, 0.0, 0.0, hulls, many)
         if gone == 0.0 and (is_held or not gap > touch):
-            if many.spin[a] > 0.0:
-                first = min(first, time_to_turn_far(n, one, tilted, many.bodies[a]))
-            if many.spin[partner] > 0.0:
-                first = min(first, time_to_turn_far(n, other, tilted, many.bodies[partner]))
+            if many.bodies.spin_bound[a] > 0.0:
+                first = min(first, time_to_turn_far(n, one, tilted, many.bodies.work[a]))
+            if many.bodies.spin_bound[partner] > 0.0:
+                first = min(first, time_to_turn_far(n, other, tilted, many.bodies.work[partner]))
             if not gap > touch:
                 return first
         if not gap > touch:
@@ -224,9 +228,9 @@ def _time_of_impact(a, b, h, gyroscopic, tilted, hulls, many):
         gone += step
         if not gone < first:
             return first
-        one = fly(one, many.bodies[a], step, gyroscopic, tilted)
+        one = fly(one, many.bodies.work[a], step, gyroscopic, tilted)
         if b >= 0:
-            other = fly(other, many.bodies[b], step, gyroscopic, tilted)
+            other = fly(other, many.bodies.work[b], step, gyroscopic, tilted)
     return gone
 
 
@@ -234,13 +238,13 @@ def _time_of_impact(a, b, h, gyroscopic, tilted, hulls, many):
 def safe_stage_length(h, gyroscopic, tilted, hulls, many):
     """Time, at most h, that a stage may take: nothing that turns far passes through anything meanwhile [s]."""
     first = h
-    for b in range(many.now.shape[0]):
-        if many.spin[b] > 0.0:
+    for b in range(many.bodies.state.shape[0]):
+        if many.bodies.spin_bound[b] > 0.0:
             for wall in range(many.walls.shape[0]):
                 if may_reach_wall(b, wall, first, many):
                     first = min(first, _time_of_impact(b, -1 - wall, first, gyroscopic, tilted, hulls, many))
     for k in range(many.counts[NUM_PAIRS]):
-        a, b = many.pairs[k, 0], many.pairs[k, 1]
-        if (many.spin[a] > 0.0 or many.spin[b] > 0.0) and may_meet(a, b, first, many):
+        a, b = many.broadphase.pairs[k, 0], many.broadphase.pairs[k, 1]
+        if (many.bodies.spin_bound[a] > 0.0 or many.bodies.spin_bound[b] > 0.0) and may_meet(a, b, first, many):
             first = min(first, _time_of_impact(a, b, first, gyroscopic, tilted, hulls, many))
     return first

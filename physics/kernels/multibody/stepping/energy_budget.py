@@ -29,16 +29,16 @@ _FREE_LIFT_SLOPS = 10.0
 
 @inlined
 def save_pre_load_velocity(b, velocity, many):
-    """Keep the velocity of body b before its loads; `many.now` has its momenta and `many.twist` its ω before them."""
-    put_vector(many.momenta, b, PRE_LOAD_VELOCITY, velocity)
-    put_vector(many.momenta, b, PRE_LOAD_VELOCITY + 3, row_vector(many.twist, b, 3))
+    """Keep the velocity of body b before its loads; `bodies.state` has its momenta, `bodies.twist` its ω."""
+    put_vector(many.bodies.momenta, b, PRE_LOAD_VELOCITY, velocity)
+    put_vector(many.bodies.momenta, b, PRE_LOAD_VELOCITY + 3, row_vector(many.bodies.twist, b, 3))
 
 
 @inlined
 def save_loaded_momenta(b, many):
     """Keep the momenta of body b with its loads."""
-    put_vector(many.momenta, b, LOADED_MOMENTA, row_vector(many.now, b, at.LINVEL))
-    put_vector(many.momenta, b, LOADED_MOMENTA + 3, row_vector(many.now, b, at.ANGMOM))
+    put_vector(many.bodies.momenta, b, LOADED_MOMENTA, row_vector(many.bodies.state, b, at.LINVEL))
+    put_vector(many.bodies.momenta, b, LOADED_MOMENTA + 3, row_vector(many.bodies.state, b, at.ANGMOM))
 
 
 @kernel
@@ -50,16 +50,23 @@ def has_gained_energy(n, h, many):
     its bodies move with. To hold loads, none needs a p above all of them together, F: what is beyond is strain.
     """
     gain = size = fastest = F = 0.0
-    for b in range(many.now.shape[0]):
-        if many.touched[b] == 0:
+    for b in range(many.bodies.state.shape[0]):
+        if many.bodies.touched[b] == 0:
             continue
-        body, v_new, L_new = many.bodies[b], row_vector(many.now, b, at.LINVEL), row_vector(many.now, b, at.ANGMOM)
-        v, w = row_vector(many.momenta, b, PRE_LOAD_VELOCITY), row_vector(many.momenta, b, PRE_LOAD_VELOCITY + 3)
-        P, Q = (
-            subtract(v_new, row_vector(many.momenta, b, LOADED_MOMENTA)),
-            subtract(L_new, row_vector(many.momenta, b, LOADED_MOMENTA + 3)),
+        body, v_new, L_new = (
+            many.bodies.work[b],
+            row_vector(many.bodies.state, b, at.LINVEL),
+            row_vector(many.bodies.state, b, at.ANGMOM),
         )
-        w_new, a = row_vector(many.twist, b, 3), body.free_acceleration
+        v, w = (
+            row_vector(many.bodies.momenta, b, PRE_LOAD_VELOCITY),
+            row_vector(many.bodies.momenta, b, PRE_LOAD_VELOCITY + 3),
+        )
+        P, Q = (
+            subtract(v_new, row_vector(many.bodies.momenta, b, LOADED_MOMENTA)),
+            subtract(L_new, row_vector(many.bodies.momenta, b, LOADED_MOMENTA + 3)),
+        )
+        w_new, a = row_vector(many.bodies.twist, b, 3), body.free_acceleration
         gain += body.mass * qt.dot(P, add_scaled(v, 1.0, v_new)) + qt.dot(Q, add_scaled(w, 1.0, w_new))
         square = h * h * (a[0] * a[0] + a[1] * a[1] + a[2] * a[2])
         size += body.mass * (qt.dot(v, v) + square) + abs(qt.dot(L_new, w_new))
@@ -67,7 +74,7 @@ def has_gained_energy(n, h, many):
         F += body.mass * math.sqrt(square)
     held = 0.0
     for k in range(n):
-        held += min(many.impulse[k, 0], F)
+        held += min(many.contacts.impulse[k, 0], F)
     tolerance = many.settings[0].tolerance
     return gain > max(tolerance, ENERGY_GAIN_TOLERANCE) * size + tolerance * math.sqrt(fastest) * held
 
@@ -75,56 +82,56 @@ def has_gained_energy(n, h, many):
 @inlined
 def update_twist(b, tilted, many):
     """Twist of body b from its momenta."""
-    put_vector(many.twist, b, 0, row_vector(many.now, b, at.LINVEL))
-    q, L = read_state(many.now, b)[1], row_vector(many.now, b, at.ANGMOM)
-    put_vector(many.twist, b, 3, angular_velocity(q, L, many.bodies[b], tilted))
+    put_vector(many.bodies.twist, b, 0, row_vector(many.bodies.state, b, at.LINVEL))
+    q, L = read_state(many.bodies.state, b)[1], row_vector(many.bodies.state, b, at.ANGMOM)
+    put_vector(many.bodies.twist, b, 3, angular_velocity(q, L, many.bodies.work[b], tilted))
 
 
 @kernel
 def revert_to_dissipative(n, tilted, many):
     """Momenta with loads and without impulses, and targets that cannot raise the energy (`midpoint_step`)."""
-    for b in range(many.now.shape[0]):
-        if many.touched[b] == 0:
+    for b in range(many.bodies.state.shape[0]):
+        if many.bodies.touched[b] == 0:
             continue
-        put_vector(many.now, b, at.LINVEL, row_vector(many.momenta, b, LOADED_MOMENTA))
-        put_vector(many.now, b, at.ANGMOM, row_vector(many.momenta, b, LOADED_MOMENTA + 3))
+        put_vector(many.bodies.state, b, at.LINVEL, row_vector(many.bodies.momenta, b, LOADED_MOMENTA))
+        put_vector(many.bodies.state, b, at.ANGMOM, row_vector(many.bodies.momenta, b, LOADED_MOMENTA + 3))
         update_twist(b, tilted, many)
     for k in range(n):
-        put_vector(many.target, k, 0, (min(many.target[k, 0], 0.0), 0.0, 0.0))
+        put_vector(many.contacts.target, k, 0, (min(many.contacts.target[k, 0], 0.0), 0.0, 0.0))
 
 
 @inlined
 def work_against_loads(b, x, many):
     """Work that moving body b from x to where it is takes against its loads [J]."""
-    body, y = many.bodies[b], row_vector(many.now, b, at.POS)
+    body, y = many.bodies.work[b], row_vector(many.bodies.state, b, at.POS)
     return -body.mass * qt.dot(as_vector(body.free_acceleration), subtract(y, x))
 
 
 @kernel
 def cap_rotational_energy(b, before, tilted, many):
     """Shorten the angular momentum of a body that was turned, if ½L·I⁻¹L would be more than before."""
-    _, q, _, L = read_state(many.now, b)
-    after = 0.5 * qt.dot(L, angular_velocity(q, L, many.bodies[b], tilted))
+    _, q, _, L = read_state(many.bodies.state, b)
+    after = 0.5 * qt.dot(L, angular_velocity(q, L, many.bodies.work[b], tilted))
     if after > before + _FREE_ROTATION_SHARE * before:
         s = math.sqrt(before / after)
-        put_vector(many.now, b, at.ANGMOM, (s * L[0], s * L[1], s * L[2]))
+        put_vector(many.bodies.state, b, at.ANGMOM, (s * L[0], s * L[1], s * L[2]))
 
 
 @kernel
 def take_kinetic_energy(b, price, tilted, many):
     """Take a price [J] from the motion of body b, as far as there is any."""
-    _, q, v, L = read_state(many.now, b)
-    body = many.bodies[b]
+    _, q, v, L = read_state(many.bodies.state, b)
+    body = many.bodies.work[b]
     kinetic = 0.5 * (body.mass * qt.dot(v, v) + qt.dot(L, angular_velocity(q, L, body, tilted)))
     s = math.sqrt(1.0 - price / kinetic) if price < kinetic else 0.0
-    put_vector(many.now, b, at.LINVEL, (s * v[0], s * v[1], s * v[2]))
-    put_vector(many.now, b, at.ANGMOM, (s * L[0], s * L[1], s * L[2]))
+    put_vector(many.bodies.state, b, at.LINVEL, (s * v[0], s * v[1], s * v[2]))
+    put_vector(many.bodies.state, b, at.ANGMOM, (s * L[0], s * L[1], s * L[2]))
 
 
 @inlined
 def free_lift_work(b, many):
     """Lift of body b that costs nothing [J]."""
-    body = many.bodies[b]
+    body = many.bodies.work[b]
     return body.mass * body.acceleration * _FREE_LIFT_SLOPS * body.slop
 
 
@@ -135,19 +142,21 @@ def clamp_body_inside_walls(b, tilted, many):
     Contacts hold points. Loads of a million times the weight may turn a body by many radians in a step, and points that
     move with that say nothing about where the centre goes.
     """
-    body, was_outside = many.bodies[b], False
+    body, was_outside = many.bodies.work[b], False
     dims = (body.dims[0], body.dims[1], body.dims[2])
     for k in range(many.walls.shape[0]):
-        n, center = row_vector(many.walls, k, WALL_NORMAL), row_vector(many.place, b, 0)
+        n, center = row_vector(many.walls, k, WALL_NORMAL), row_vector(many.bodies.center, b, 0)
         d = qt.dot(n, center) - many.walls[k, WALL_OFFSET]
         if d >= 0.0:
             continue
         was_outside = True
         reach = body.radius
         if body.shape != HULL:
-            reach = geo.support(body.shape, dims, geo.scaled_normal(body.shape, dims, row_matrix(many.rotation, b), n))
-        put_vector(many.place, b, 0, add_scaled(center, reach - d, n))
-        put_vector(many.now, b, at.POS, add_scaled(row_vector(many.now, b, at.POS), reach - d, n))
-        v = row_vector(many.now, b, at.LINVEL)
-        put_vector(many.now, b, at.LINVEL, add_scaled(v, -min(qt.dot(n, v), 0.0), n))
+            reach = geo.support(
+                body.shape, dims, geo.scaled_normal(body.shape, dims, row_matrix(many.bodies.rotation, b), n)
+            )
+        put_vector(many.bodies.center, b, 0, add_scaled(center, reach - d, n))
+        put_vector(many.bodies.state, b, at.POS, add_scaled(row_vector(many.bodies.state, b, at.POS), reach - d, n))
+        v = row_vector(many.bodies.state, b, at.LINVEL)
+        put_vector(many.bodies.state, b, at.LINVEL, add_scaled(v, -min(qt.dot(n, v), 0.0), n))
     return was_outside

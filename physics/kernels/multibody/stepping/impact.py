@@ -30,7 +30,7 @@ _UNCONSTRAINED = 1.0e300
 def is_bouncing(k, h, many):
     """True if contact k would leave again for longer than `rest_share` of h after an impact at its speed now."""
     least = many.settings[0].rest_share * relative_acceleration_bound(k, many) * h
-    return many.bounce[k] > 0.0 and -many.bounce[k] * many.speed[k] > least
+    return many.contacts.restitution[k] > 0.0 and -many.contacts.restitution[k] * many.contacts.speed[k] > least
 
 
 @inlined
@@ -39,7 +39,7 @@ def rest_speed_limit(k, h, many):
 
     What loads give within `rest_share` of h, or what goes in by a few slops only until the middle of it.
     """
-    slop = pair_slop(many.ends[k, 0], many.ends[k, 1], many)
+    slop = pair_slop(many.contacts.bodies[k, 0], many.contacts.bodies[k, 1], many)
     return max(
         2.0 * _SOFT_LANDING_SLOPS * slop / h, many.settings[0].rest_share * relative_acceleration_bound(k, many) * h
     )
@@ -52,12 +52,12 @@ def impact_speed_limit(k, h, many):
     Under error control (`adaptive_substep`) all that is not slow, so that no part has to be as short as the error of
     where bodies meet.
     """
-    one, other = many.ends[k, 0], many.ends[k, 1]
-    radius = many.bodies[one].radius
+    one, other = many.contacts.bodies[k, 0], many.contacts.bodies[k, 1]
+    radius = many.bodies.work[one].radius
     if other >= 0:
-        radius = min(radius, many.bodies[other].radius)
+        radius = min(radius, many.bodies.work[other].radius)
     fast = _FAST_RADIUS_SHARE * radius / h
-    if many.settings[0].in_time == 1:
+    if many.settings[0].is_error_controlled == 1:
         fast = min(fast, rest_speed_limit(k, h, many))
     return fast
 
@@ -65,10 +65,10 @@ def impact_speed_limit(k, h, many):
 @inlined
 def _pair_touches(k, step, many):
     """True if contact k, or one after it in the set by steps of `step`, touches and is of the same pair."""
-    a, b = many.ends[k, 0], many.ends[k, 1]
+    a, b = many.contacts.bodies[k, 0], many.contacts.bodies[k, 1]
     least = arrival_gap(a, b, many)
-    while 0 <= k < many.counts[NUM_CONTACTS] and many.ends[k, 0] == a and many.ends[k, 1] == b:
-        if not many.gap[k] > least:
+    while 0 <= k < many.counts[NUM_CONTACTS] and many.contacts.bodies[k, 0] == a and many.contacts.bodies[k, 1] == b:
+        if not many.contacts.gap[k] > least:
             return True
         k += step
     return False
@@ -80,8 +80,8 @@ def is_left_to_advancement(k, many):
 
     It looks at what is apart: where the pair touches elsewhere the contact is foretold as any other.
     """
-    a, b = many.ends[k, 0], many.ends[k, 1]
-    if not (many.spin[a] > 0.0 or (b >= 0 and many.spin[b] > 0.0)):
+    a, b = many.contacts.bodies[k, 0], many.contacts.bodies[k, 1]
+    if not (many.bodies.spin_bound[a] > 0.0 or (b >= 0 and many.bodies.spin_bound[b] > 0.0)):
         return False
     return not _pair_touches(k, 1, many) and not _pair_touches(k, -1, many)
 
@@ -89,10 +89,10 @@ def is_left_to_advancement(k, many):
 @inlined
 def is_impact_ahead(k, h, many):
     """True if contact k is still apart and to be met in time: it bounces, or is fast."""
-    a, b = many.ends[k, 0], many.ends[k, 1]
-    if not (many.gap[k] > pair_slop(a, b, many) and many.speed[k] < 0.0):
+    a, b = many.contacts.bodies[k, 0], many.contacts.bodies[k, 1]
+    if not (many.contacts.gap[k] > pair_slop(a, b, many) and many.contacts.speed[k] < 0.0):
         return False
-    return is_bouncing(k, h, many) or -many.speed[k] > impact_speed_limit(k, h, many)
+    return is_bouncing(k, h, many) or -many.contacts.speed[k] > impact_speed_limit(k, h, many)
 
 
 @inlined
@@ -106,8 +106,8 @@ def set_impact_targets(n, h, is_last, many):
     """
     fastest = -1
     for k in range(n):
-        slop = pair_slop(many.ends[k, 0], many.ends[k, 1], many)
-        gap, speed, goal, is_hit = many.gap[k], many.speed[k], 0.0, False
+        slop = pair_slop(many.contacts.bodies[k, 0], many.contacts.bodies[k, 1], many)
+        gap, speed, goal, is_hit = many.contacts.gap[k], many.contacts.speed[k], 0.0, False
         slow = min(rest_speed_limit(k, h, many), impact_speed_limit(k, h, many))
         if gap > slop:
             goal = -gap / h
@@ -116,15 +116,17 @@ def set_impact_targets(n, h, is_last, many):
             elif goal - speed > slow:
                 is_hit = True
         elif speed > 0.0:
-            goal = -many.bounce[k] * speed  # Moreau's law for what leaves: without it a struck chain could gain energy
+            goal = (
+                -many.contacts.restitution[k] * speed
+            )  # Moreau's law for what leaves: without it a struck chain could gain energy
         elif is_bouncing(k, h, many):
-            goal, is_hit = -many.bounce[k] * speed, True
+            goal, is_hit = -many.contacts.restitution[k] * speed, True
         elif -speed > slow:
             is_hit = True
-        if is_hit and (fastest < 0 or speed < many.speed[fastest]):
+        if is_hit and (fastest < 0 or speed < many.contacts.speed[fastest]):
             fastest = k
-        put_vector(many.target, k, 0, (goal, 0.0, 0.0))
-        put_vector(many.impulse, k, 0, (0.0, 0.0, 0.0))
+        put_vector(many.contacts.target, k, 0, (goal, 0.0, 0.0))
+        put_vector(many.contacts.impulse, k, 0, (0.0, 0.0, 0.0))
     return fastest
 
 
@@ -133,7 +135,7 @@ def drop_unconstrained(n, many):
     """Drop the contacts that have no target from the set: they are not met in this stage. Returns what is left."""
     left = 0
     for k in range(n):
-        if many.target[k, 0] > -_UNCONSTRAINED:
+        if many.contacts.target[k, 0] > -_UNCONSTRAINED:
             if left < k:
                 kept.copy_contact(k, left, many)
             left += 1
@@ -142,9 +144,9 @@ def drop_unconstrained(n, many):
 
 @inlined
 def _mark_bodies(k, many):
-    many.touched[many.ends[k, 0]] = 1
-    if many.ends[k, 1] >= 0:
-        many.touched[many.ends[k, 1]] = 1
+    many.bodies.touched[many.contacts.bodies[k, 0]] = 1
+    if many.contacts.bodies[k, 1] >= 0:
+        many.bodies.touched[many.contacts.bodies[k, 1]] = 1
 
 
 @inlined
@@ -153,18 +155,20 @@ def constrain_coupled_contacts(n, many):
 
     Loads alone do not bring them together in this stage, but what pushes these bodies may.
     """
-    for b in range(many.touched.shape[0]):
-        many.touched[b] = 0
+    for b in range(many.bodies.touched.shape[0]):
+        many.bodies.touched[b] = 0
     for k in range(n):
-        if many.target[k, 0] > -_UNCONSTRAINED:
+        if many.contacts.target[k, 0] > -_UNCONSTRAINED:
             _mark_bodies(k, many)
     is_growing = True
     while is_growing:
         is_growing = False
         for k in range(n):
-            a, b = many.ends[k, 0], many.ends[k, 1]
-            if not many.target[k, 0] > -_UNCONSTRAINED and (many.touched[a] == 1 or (b >= 0 and many.touched[b] == 1)):
-                many.target[k, 0], is_growing = 0.0, True
+            a, b = many.contacts.bodies[k, 0], many.contacts.bodies[k, 1]
+            if not many.contacts.target[k, 0] > -_UNCONSTRAINED and (
+                many.bodies.touched[a] == 1 or (b >= 0 and many.bodies.touched[b] == 1)
+            ):
+                many.contacts.target[k, 0], is_growing = 0.0, True
                 _mark_bodies(k, many)
 
 
@@ -181,10 +185,10 @@ def resolve_impacts(n, world, t, h, is_last, friction, tilted, report, many, log
     if fastest < 0:
         constrain_coupled_contacts(n, many)
         return drop_unconstrained(n, many), meeting, False
-    if many.settings[0].in_turn == 1 and not is_last:
+    if many.settings[0].is_sequential == 1 and not is_last:
         for k in range(n):
             if k != fastest:
-                many.target[k, 0] = -_UNCONSTRAINED  # its turn comes when this one is over
+                many.contacts.target[k, 0] = -_UNCONSTRAINED  # its turn comes when this one is over
     n = drop_unconstrained(n, many)
     apply_impact_within_energy(n, world, friction, tilted, report, many)
     if log.shape[1] > 0:
@@ -206,11 +210,11 @@ def time_to_first_impact(n, h, is_last, many):
     for k in range(n):
         if is_left_to_advancement(k, many) or not is_impact_ahead(k, h, many):
             continue
-        a, b, s = many.ends[k, 0], many.ends[k, 1], -many.speed[k]
-        w = row_vector(many.twist, a, 3)
-        bound = relative_acceleration_bound(k, many) + TURNING_MARGIN * qt.dot(w, w) * many.bodies[a].radius
+        a, b, s = many.contacts.bodies[k, 0], many.contacts.bodies[k, 1], -many.contacts.speed[k]
+        w = row_vector(many.bodies.twist, a, 3)
+        bound = relative_acceleration_bound(k, many) + TURNING_MARGIN * qt.dot(w, w) * many.bodies.work[a].radius
         if b >= 0:
-            w = row_vector(many.twist, b, 3)
-            bound += TURNING_MARGIN * qt.dot(w, w) * many.bodies[b].radius
-        first = min(first, 2.0 * many.gap[k] / (s + math.sqrt(s * s + 2.0 * bound * many.gap[k])))
+            w = row_vector(many.bodies.twist, b, 3)
+            bound += TURNING_MARGIN * qt.dot(w, w) * many.bodies.work[b].radius
+        first = min(first, 2.0 * many.contacts.gap[k] / (s + math.sqrt(s * s + 2.0 * bound * many.contacts.gap[k])))
     return first

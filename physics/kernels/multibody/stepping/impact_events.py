@@ -17,17 +17,17 @@ def log_impacts(n, world, t, many, log, counts):
     Contacts of one pair follow each other in the set (`dispatch.find_contacts`). The impulse is that on the first body
     of the pair, whose events these are, and acts at points of it.
     """
-    first_row, largest = world * many.now.shape[0], 0.0
+    first_row, largest = world * many.bodies.state.shape[0], 0.0
     for k in range(n):
-        largest = max(largest, many.impulse[k, 0])
+        largest = max(largest, many.contacts.impulse[k, 0])
     impulse, sums = (0.0, 0.0, 0.0), ((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), 0.0)
     for k in range(n):
-        a, b = many.ends[k, 0], many.ends[k, 1]
-        p = qt.transposed_matvec(row_matrix(many.frame, k), row_vector(many.impulse, k, 0))
-        point = add_scaled(row_vector(many.now, a, POS), 1.0, row_vector(many.arm, k, 0))
+        a, b = many.contacts.bodies[k, 0], many.contacts.bodies[k, 1]
+        p = qt.transposed_matvec(row_matrix(many.contacts.frame, k), row_vector(many.contacts.impulse, k, 0))
+        point = add_scaled(row_vector(many.bodies.state, a, POS), 1.0, row_vector(many.contacts.arm, k, 0))
         impulse = add_scaled(impulse, 1.0, p)
-        sums = ev.add_weighted_contact(sums, row_vector(many.frame, k, 0), many.impulse[k, 0], point)
-        if k + 1 < n and many.ends[k + 1, 0] == a and many.ends[k + 1, 1] == b:
+        sums = ev.add_weighted_contact(sums, row_vector(many.contacts.frame, k, 0), many.contacts.impulse[k, 0], point)
+        if k + 1 < n and many.contacts.bodies[k + 1, 0] == a and many.contacts.bodies[k + 1, 1] == b:
             continue
         if sums[2] > ev.EVENT_IMPULSE_ROUNDING * largest:
             wall, other = (-1 - b, ev.NOBODY) if b < 0 else (-1, b)

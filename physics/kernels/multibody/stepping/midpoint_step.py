@@ -50,8 +50,12 @@ from physics.kernels.time_stepping.midpoint_step import CREEP_SLOP_SHARE
 @inlined
 def drift_body(b, h, gyroscopic, tilted, many):
     """Body b after half a free drift: position and attitude at constant momenta."""
-    x, q, v, L = read_state(many.now, b)
-    write_state(many.now, b, (add_scaled(x, h, v), drift_attitude(q, L, many.bodies[b], h, gyroscopic, tilted), v, L))
+    x, q, v, L = read_state(many.bodies.state, b)
+    write_state(
+        many.bodies.state,
+        b,
+        (add_scaled(x, h, v), drift_attitude(q, L, many.bodies.work[b], h, gyroscopic, tilted), v, L),
+    )
 
 
 @inlined
@@ -60,15 +64,15 @@ def _centripetal(b, k, first, side, h, many):
 
     0 of a sphere, whose point of contact does not turn, and where it says nothing about the end of a stage of length h.
     """
-    shape, w = many.bodies[b].shape, row_vector(many.twist, b, 3)
+    shape, w = many.bodies.work[b].shape, row_vector(many.bodies.twist, b, 3)
     if shape == SPHERE or qt.dot(w, w) * h * h > MAX_TARGET_TURN * MAX_TARGET_TURN:
         return (0.0, 0.0, 0.0)
     if shape == ELLIPSOID:
-        d, n = many.bodies[b].dims, row_vector(many.frame, k, 0)
+        d, n = many.bodies.work[b].dims, row_vector(many.contacts.frame, k, 0)
         n = (-side * n[0], -side * n[1], -side * n[2])
-        _, rate = ellipsoid_point_and_rate((d[0], d[1], d[2]), row_matrix(many.rotation, b), w, n)
+        _, rate = ellipsoid_point_and_rate((d[0], d[1], d[2]), row_matrix(many.bodies.rotation, b), w, n)
         return qt.cross(w, rate)
-    return qt.cross(w, qt.cross(w, row_vector(many.arm, k, first)))
+    return qt.cross(w, qt.cross(w, row_vector(many.contacts.arm, k, first)))
 
 
 @inlined
@@ -78,10 +82,10 @@ def _coriolis(k, many):
     A point that slides at u on a face that turns at ω meets it where another normal was: the gap's second derivative
     has 2 n·(u x ω) beside the accelerations of the points.
     """
-    owner, n = many.owner[k], row_vector(many.frame, k, 0)
+    owner, n = many.contacts.owner[k], row_vector(many.contacts.frame, k, 0)
     if owner < 0:
         return 0.0
-    return qt.dot(n, qt.cross(row_vector(many.twist, owner, 3), relative_velocity(k, many.twist, many)))
+    return qt.dot(n, qt.cross(row_vector(many.bodies.twist, owner, 3), relative_velocity(k, many.bodies.twist, many)))
 
 
 @inlined
@@ -94,14 +98,14 @@ def set_resting_targets(n, h, many):
     """
     half = 0.5 * h
     for k in range(n):
-        a, b = many.ends[k, 0], many.ends[k, 1]
+        a, b = many.contacts.bodies[k, 0], many.contacts.bodies[k, 1]
         slop = pair_slop(a, b, many)
         c = _centripetal(a, k, 0, -1.0, h, many)
         if b >= 0:
             c = subtract(c, _centripetal(b, k, 3, 1.0, h, many))
-        t = qt.matvec(row_matrix(many.frame, k), (-half * c[0], -half * c[1], -half * c[2]))
-        gap = many.gap[k]
-        if many.settings[0].in_time == 1:
+        t = qt.matvec(row_matrix(many.contacts.frame, k), (-half * c[0], -half * c[1], -half * c[2]))
+        gap = many.contacts.gap[k]
+        if many.settings[0].is_error_controlled == 1:
             t = (t[0] + h * _coriolis(k, many), t[1], t[2])
             gap += 0.5 * half * t[0]
         t = clamp_target_to_energy(t, contact_velocity(k, many))
@@ -114,28 +118,31 @@ def set_resting_targets(n, h, many):
         )
         if max(abs(t[0]), max(abs(t[1]), abs(t[2]))) <= negligible:
             t = (0.0, 0.0, 0.0)
-        put_vector(many.target, k, 0, t)
+        put_vector(many.contacts.target, k, 0, t)
 
 
 @inlined
 def hold_all_loads(h, gyroscopic, tilted, many):
     """Hold the loads of the middle of a stage of length h for every body; nothing where there are no fields."""
-    if hold_linked_loads(h, gyroscopic, tilted, many):
+    if hold_linked_loads(h, gyroscopic, tilted, many.bodies):
         return
-    for b in range(many.now.shape[0]):
-        if many.touched[b] == 1:
-            hold_contact_loads(read_state(many.now, b), h, gyroscopic, tilted, many.bodies[b])
+    for b in range(many.bodies.state.shape[0]):
+        if many.bodies.touched[b] == 1:
+            hold_contact_loads(read_state(many.bodies.state, b), h, gyroscopic, tilted, many.bodies.work[b])
         else:
-            hold_loads(read_state(many.now, b), h, gyroscopic, tilted, many.bodies[b])
+            hold_loads(read_state(many.bodies.state, b), h, gyroscopic, tilted, many.bodies.work[b])
 
 
 @inlined
 def rest_residual(h, many):
     """Residual that the stage is solved to whatever the tolerance allows; see `midpoint_step.rest_residual`."""
     least = math.inf
-    for b in range(many.now.shape[0]):
-        slop_speed = many.bodies[b].slop / h
-        if many.touched[b] == 1 and many.settings[0].tolerance * many.bodies[b].acceleration * h > slop_speed:
+    for b in range(many.bodies.state.shape[0]):
+        slop_speed = many.bodies.work[b].slop / h
+        if (
+            many.bodies.touched[b] == 1
+            and many.settings[0].tolerance * many.bodies.work[b].acceleration * h > slop_speed
+        ):
             least = min(least, CREEP_SLOP_SHARE * slop_speed)
     return least
 
@@ -144,44 +151,53 @@ def rest_residual(h, many):
 def max_load_speed(h, many):
     """Speed that the loads of the stage alone give to what touches, at most [m/s]."""
     most = 0.0
-    for b in range(many.now.shape[0]):
-        if many.touched[b] == 1:
-            most = max(most, many.bodies[b].acceleration * h)
+    for b in range(many.bodies.state.shape[0]):
+        if many.bodies.touched[b] == 1:
+            most = max(most, many.bodies.work[b].acceleration * h)
     return most
 
 
 @inlined
 def step_under_held_loads(n, world, h, friction, gyroscopic, tilted, scheme, sleep, memory, report, many):
     """`midpoint_step` under the loads that are held."""
-    half, first = 0.5 * h, world * many.now.shape[0]
-    for b in range(many.now.shape[0]):
+    half, first = 0.5 * h, world * many.bodies.state.shape[0]
+    for b in range(many.bodies.state.shape[0]):
         if is_asleep(first + b, sleep):
             continue
-        if many.touched[b] == 0:
+        if many.bodies.touched[b] == 0:
             flight = FlightSwitches(gyroscopic, tilted, scheme)
-            write_state(many.now, b, integrate_flight(read_state(many.now, b), h, flight, many.bodies[b]))
+            write_state(
+                many.bodies.state,
+                b,
+                integrate_flight(read_state(many.bodies.state, b), h, flight, many.bodies.work[b]),
+            )
             continue
         drift_body(b, half, gyroscopic, tilted, many)
         update_body_pose(b, tilted, many)
-        _, q, _, L = read_state(many.now, b)
-        put_vector(many.twist, b, 3, angular_velocity(q, L, many.bodies[b], tilted))
+        _, q, _, L = read_state(many.bodies.state, b)
+        put_vector(many.bodies.twist, b, 3, angular_velocity(q, L, many.bodies.work[b], tilted))
     if n == 0:
         kept.clear_awake_warm_start(world, h, sleep, memory, many)
         return
     update_contacts(many)
     set_resting_targets(n, h, many)
-    for b in range(many.now.shape[0]):
-        if many.touched[b] == 1:
-            body = many.bodies[b]
+    for b in range(many.bodies.state.shape[0]):
+        if many.bodies.touched[b] == 1:
+            body = many.bodies.work[b]
             a, torque = as_vector(body.free_acceleration), as_vector(body.torque)
-            save_pre_load_velocity(b, row_vector(many.now, b, at.LINVEL), many)
-            put_vector(many.now, b, at.LINVEL, add_scaled(row_vector(many.now, b, at.LINVEL), h, a))
-            put_vector(many.now, b, at.ANGMOM, add_scaled(row_vector(many.now, b, at.ANGMOM), h, torque))
+            save_pre_load_velocity(b, row_vector(many.bodies.state, b, at.LINVEL), many)
+            put_vector(many.bodies.state, b, at.LINVEL, add_scaled(row_vector(many.bodies.state, b, at.LINVEL), h, a))
+            put_vector(
+                many.bodies.state, b, at.ANGMOM, add_scaled(row_vector(many.bodies.state, b, at.ANGMOM), h, torque)
+            )
             save_loaded_momenta(b, many)
             update_twist(b, tilted, many)
     kept.load_warm_impulses(n, world, h, friction, memory, many)
-    many.settings[0].still, many.settings[0].rests = rest_residual(h, many), 1 - many.settings[0].in_time
-    many.settings[0].load = max_load_speed(h, many)
+    many.settings[0].residual_limit, many.settings[0].is_resting_stage = (
+        rest_residual(h, many),
+        1 - many.settings[0].is_error_controlled,
+    )
+    many.settings[0].load_speed = max_load_speed(h, many)
     solve_and_apply(n, world, friction, report, many)
     if has_gained_energy(n, h, many):
         revert_to_dissipative(n, tilted, many)
@@ -189,10 +205,10 @@ def step_under_held_loads(n, world, h, friction, gyroscopic, tilted, scheme, sle
         if friction is not None and has_gained_energy(n, h, many):
             revert_to_dissipative(n, tilted, many)
             solve_frictionless_and_apply(n, many)
-    many.settings[0].still, many.settings[0].rests, many.settings[0].load = math.inf, 0, 0.0
+    many.settings[0].residual_limit, many.settings[0].is_resting_stage, many.settings[0].load_speed = math.inf, 0, 0.0
     kept.store_warm_impulses(n, world, h, sleep, memory, many)
-    for b in range(many.now.shape[0]):
-        if many.touched[b] == 1:
+    for b in range(many.bodies.state.shape[0]):
+        if many.bodies.touched[b] == 1:
             drift_body(b, half, gyroscopic, tilted, many)
 
 
@@ -200,6 +216,6 @@ def step_under_held_loads(n, world, h, friction, gyroscopic, tilted, scheme, sle
 def midpoint_step(n, world, h, friction, gyroscopic, tilted, scheme, sleep, memory, report, many):
     """Every body after h: exact flight, or Moreau's midpoint step with the n contacts of the set."""
     hold_all_loads(h, gyroscopic, tilted, many)
-    note_stage_energy(tilted, many, many.bodies[0])
+    note_stage_energy(tilted, many.bodies, many.bodies.work[0])
     step_under_held_loads(n, world, h, friction, gyroscopic, tilted, scheme, sleep, memory, report, many)
-    limit_world_energy_gain(h, 0, tilted, many, many.bodies[0])
+    limit_world_energy_gain(h, 0, tilted, many.bodies, many.bodies.work[0])

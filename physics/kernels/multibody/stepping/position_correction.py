@@ -51,13 +51,13 @@ def _set_displacement_targets(n, many):
     """
     deepest, largest, least = 0.0, 0.0, math.inf
     for k in range(n):
-        slop, gap = pair_slop(many.ends[k, 0], many.ends[k, 1], many), many.gap[k]
+        slop, gap = pair_slop(many.contacts.bodies[k, 0], many.contacts.bodies[k, 1], many), many.contacts.gap[k]
         goal = -max(gap, 0.0)
         if gap < -slop:
             goal = -_CORRECTION_SHARE * (gap + 0.5 * slop)
             largest, least = max(largest, goal), min(least, slop)
         deepest = max(deepest, -gap / slop)
-        put_vector(many.target, k, 0, (goal, 0.0, 0.0))
+        put_vector(many.contacts.target, k, 0, (goal, 0.0, 0.0))
     return deepest, min(_CORRECTION_ERROR, math.sqrt(many.settings[0].tolerance)) * max(largest, _ERROR_SLOPS * least)
 
 
@@ -70,12 +70,12 @@ def _pose_inside_walls(b, tilted, many):
 
 @inlined
 def _displace(b, tilted, many):
-    """Move and turn body b by what `many.twist` says; the work that it takes against its loads [J]."""
-    x, q, v, L = read_state(many.now, b)
-    start, before = x, 0.5 * qt.dot(L, angular_velocity(q, L, many.bodies[b], tilted))
-    turn = qt.exp_map(row_vector(many.twist, b, 3))
-    x = add_scaled(x, 1.0, row_vector(many.twist, b, 0))
-    write_state(many.now, b, (x, qt.normalise(qt.multiply(turn, q)), v, L))
+    """Move and turn body b by what `many.bodies.twist` says; the work that it takes against its loads [J]."""
+    x, q, v, L = read_state(many.bodies.state, b)
+    start, before = x, 0.5 * qt.dot(L, angular_velocity(q, L, many.bodies.work[b], tilted))
+    turn = qt.exp_map(row_vector(many.bodies.twist, b, 3))
+    x = add_scaled(x, 1.0, row_vector(many.bodies.twist, b, 0))
+    write_state(many.bodies.state, b, (x, qt.normalise(qt.multiply(turn, q)), v, L))
     cap_rotational_energy(b, before, tilted, many)
     return work_against_loads(b, start, many)
 
@@ -84,20 +84,20 @@ def _displace(b, tilted, many):
 def _displace_all(tilted, many):
     """Move and turn the bodies, and let those that were lifted pay for what all of them were (`energy_budget`)."""
     total = ups = free = 0.0
-    for b in range(many.now.shape[0]):
-        many.before[b, 0] = 0.0
-        if many.touched[b] == 0:
+    for b in range(many.bodies.state.shape[0]):
+        many.bodies.lift_work[b] = 0.0
+        if many.bodies.touched[b] == 0:
             continue
         free += free_lift_work(b, many)
-        if many.pushed[b] > 0:
+        if many.sweeps.pushed[b] > 0:
             lift = _displace(b, tilted, many)
             _pose_inside_walls(b, tilted, many)
-            many.before[b, 0] = max(lift, 0.0)
+            many.bodies.lift_work[b] = max(lift, 0.0)
             total, ups = total + lift, ups + max(lift, 0.0)
     if total > free:
-        for b in range(many.now.shape[0]):
-            if many.before[b, 0] > 0.0:
-                take_kinetic_energy(b, many.before[b, 0] * (total / ups), tilted, many)
+        for b in range(many.bodies.state.shape[0]):
+            if many.bodies.lift_work[b] > 0.0:
+                take_kinetic_energy(b, many.bodies.lift_work[b] * (total / ups), tilted, many)
 
 
 @inlined
@@ -117,8 +117,8 @@ def _correct_once(n, tilted, many):
 @shared_kernel
 def correct_positions(n, tilted, many):
     """Move the bodies of the n contacts apart where they overlap by more than the slop."""
-    for b in range(many.now.shape[0]):
-        if many.touched[b] == 1:
+    for b in range(many.bodies.state.shape[0]):
+        if many.bodies.touched[b] == 1:
             _pose_inside_walls(b, tilted, many)
     before = math.inf
     for _ in range(_MAX_ROUNDS):

@@ -25,43 +25,43 @@ _NOT_ASSEMBLED = 0.0
 @inlined
 def _clear_displacements(n, many):
     """No displacements, and no contacts to visit but those that are asked to open."""
-    for b in range(many.now.shape[0]):
-        many.pushed[b] = 0
-        put_padded(many.motion, b, 0, (0.0, 0.0, 0.0))
-        put_padded(many.motion, b, ANGULAR_OFFSET, (0.0, 0.0, 0.0))
+    for b in range(many.bodies.state.shape[0]):
+        many.sweeps.pushed[b] = 0
+        put_padded(many.sweeps.motion, b, 0, (0.0, 0.0, 0.0))
+        put_padded(many.sweeps.motion, b, ANGULAR_OFFSET, (0.0, 0.0, 0.0))
     for k in range(n):
-        many.queue[k] = k
-        many.impulse[k, 0] = 0.0
-        many.block[k, 0] = _NOT_ASSEMBLED
-        many.visited[k] = -1 if many.target[k, 0] > 0.0 else 0
+        many.islands.contacts[k] = k
+        many.contacts.impulse[k, 0] = 0.0
+        many.contacts.block[k, 0] = _NOT_ASSEMBLED
+        many.sweeps.visited[k] = -1 if many.contacts.target[k, 0] > 0.0 else 0
 
 
 @inlined
 def _sweep(count, is_up, visits, goal, many):
-    """Sweep once over `many.queue[:count]`: (largest error of an impulse, visits so far, whether it spread).
+    """Sweep once over `many.islands.contacts[:count]`: (largest error of an impulse, visits so far, whether it spread).
 
     It has spread if it pushed a body that had not been pushed before.
     """
     worst, has_spread = 0.0, False
     for i in range(count):
-        k = many.queue[i if is_up else count - 1 - i]
+        k = many.islands.contacts[i if is_up else count - 1 - i]
         if is_contact_up_to_date(k, many):
             continue
-        if many.block[k, 0] == _NOT_ASSEMBLED:
+        if many.contacts.block[k, 0] == _NOT_ASSEMBLED:
             assemble_normal_row(k, many)
         visits += 1
-        a, b = many.ends[k, 0], many.ends[k, 1]
-        is_new = many.pushed[a] == 0 or (b >= 0 and many.pushed[b] == 0)
+        a, b = many.contacts.bodies[k, 0], many.contacts.bodies[k, 1]
+        is_new = many.sweeps.pushed[a] == 0 or (b >= 0 and many.sweeps.pushed[b] == 0)
         off = relax_normal_impulse(k, visits, _SKIP_SHARE * goal, many)
         worst = max(worst, off)
-        has_spread = has_spread or (is_new and many.pushed[a] == visits)
+        has_spread = has_spread or (is_new and many.sweeps.pushed[a] == visits)
     return worst, visits, has_spread
 
 
 @inlined
 def _list_all(n, many):
     for k in range(n):
-        many.queue[k] = k
+        many.islands.contacts[k] = k
     return n
 
 
@@ -70,18 +70,18 @@ def _list_pushed(n, many):
     """List the contacts of bodies that were pushed: how many."""
     count = 0
     for k in range(n):
-        b = many.ends[k, 1]
-        if many.pushed[many.ends[k, 0]] > 0 or (b >= 0 and many.pushed[b] > 0):
-            many.queue[count] = k
+        b = many.contacts.bodies[k, 1]
+        if many.sweeps.pushed[many.contacts.bodies[k, 0]] > 0 or (b >= 0 and many.sweeps.pushed[b] > 0):
+            many.islands.contacts[count] = k
             count += 1
     return count
 
 
 @kernel
 def sweep_positions(n, goal, limit, many):
-    """Displacements `many.twist` that bring the n contacts to their targets within `goal` [m]: how many sweeps.
+    """Displacements `many.bodies.twist` that bring the n contacts to their targets within `goal` [m]: how many sweeps.
 
-    `many.pushed` is 0 for bodies that stay where they are.
+    `many.sweeps.pushed` is 0 for bodies that stay where they are.
     """
     _clear_displacements(n, many)
     sweeps, visits, count, worst = 0, 0, n, math.inf
@@ -92,6 +92,6 @@ def sweep_positions(n, goal, limit, many):
             count = _list_all(n, many)
         elif not has_spread and count == n:
             count = _list_pushed(n, many)
-    for b in range(many.now.shape[0]):
+    for b in range(many.bodies.state.shape[0]):
         body_twist_from_motion(b, many)
     return sweeps

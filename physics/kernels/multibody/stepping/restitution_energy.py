@@ -19,19 +19,19 @@ _ENERGY_TOLERANCES = 4.0
 
 @inlined
 def _save_momenta(first, many):
-    """Copy the momenta of all bodies to `many.momenta`."""
-    for b in range(many.now.shape[0]):
-        put_vector(many.momenta, b, first, row_vector(many.now, b, at.LINVEL))
-        put_vector(many.momenta, b, first + 3, row_vector(many.now, b, at.ANGMOM))
+    """Copy the momenta of all bodies to `many.bodies.momenta`."""
+    for b in range(many.bodies.state.shape[0]):
+        put_vector(many.bodies.momenta, b, first, row_vector(many.bodies.state, b, at.LINVEL))
+        put_vector(many.bodies.momenta, b, first + 3, row_vector(many.bodies.state, b, at.ANGMOM))
 
 
 @inlined
 def _update_twists(tilted, many):
     """Twists of all bodies from their momenta."""
-    for b in range(many.now.shape[0]):
-        _, q, v, L = read_state(many.now, b)
-        put_vector(many.twist, b, 0, v)
-        put_vector(many.twist, b, 3, angular_velocity(q, L, many.bodies[b], tilted))
+    for b in range(many.bodies.state.shape[0]):
+        _, q, v, L = read_state(many.bodies.state, b)
+        put_vector(many.bodies.twist, b, 0, v)
+        put_vector(many.bodies.twist, b, 3, angular_velocity(q, L, many.bodies.work[b], tilted))
 
 
 @kernel
@@ -39,54 +39,64 @@ def world_kinetic_energy(tilted, many):
     """Kinetic energy of all bodies of the world [J]; their twists are computed anew."""
     _update_twists(tilted, many)
     total = 0.0
-    for b in range(many.now.shape[0]):
-        v, L = row_vector(many.now, b, at.LINVEL), row_vector(many.now, b, at.ANGMOM)
-        total += 0.5 * (qt.dot(v, v) / many.lightness[b] + qt.dot(L, row_vector(many.twist, b, 3)))
+    for b in range(many.bodies.state.shape[0]):
+        v, L = row_vector(many.bodies.state, b, at.LINVEL), row_vector(many.bodies.state, b, at.ANGMOM)
+        total += 0.5 * (qt.dot(v, v) / many.bodies.inv_mass[b] + qt.dot(L, row_vector(many.bodies.twist, b, 3)))
     return total
 
 
 @inlined
 def _blend_momenta(s, many):
     """Move the momenta of all bodies by the share s towards those with all of the rebound."""
-    for b in range(many.now.shape[0]):
-        v, L = row_vector(many.now, b, at.LINVEL), row_vector(many.now, b, at.ANGMOM)
-        v_full, L_full = row_vector(many.momenta, b, _FULL_REBOUND), row_vector(many.momenta, b, _FULL_REBOUND + 3)
-        put_vector(many.now, b, at.LINVEL, add_scaled(add_scaled(v, -s, v), s, v_full))
-        put_vector(many.now, b, at.ANGMOM, add_scaled(add_scaled(L, -s, L), s, L_full))
+    for b in range(many.bodies.state.shape[0]):
+        v, L = row_vector(many.bodies.state, b, at.LINVEL), row_vector(many.bodies.state, b, at.ANGMOM)
+        v_full, L_full = (
+            row_vector(many.bodies.momenta, b, _FULL_REBOUND),
+            row_vector(many.bodies.momenta, b, _FULL_REBOUND + 3),
+        )
+        put_vector(many.bodies.state, b, at.LINVEL, add_scaled(add_scaled(v, -s, v), s, v_full))
+        put_vector(many.bodies.state, b, at.ANGMOM, add_scaled(add_scaled(L, -s, L), s, L_full))
 
 
 @inlined
 def _save_impulses(n, many):
-    """Copy the impulses of the n contacts to `many.rebound`."""
+    """Copy the impulses of the n contacts to `many.contacts.rebound_impulse`."""
     for k in range(n):
-        put_vector(many.rebound, k, 0, row_vector(many.impulse, k, 0))
+        put_vector(many.contacts.rebound_impulse, k, 0, row_vector(many.contacts.impulse, k, 0))
 
 
 @inlined
 def _blend_impulses(n, s, many):
     """Move the impulses of the n contacts by the share s towards those with all of the rebound."""
     for k in range(n):
-        p = row_vector(many.impulse, k, 0)
-        put_vector(many.impulse, k, 0, add_scaled(add_scaled(p, -s, p), s, row_vector(many.rebound, k, 0)))
+        p = row_vector(many.contacts.impulse, k, 0)
+        put_vector(
+            many.contacts.impulse,
+            k,
+            0,
+            add_scaled(add_scaled(p, -s, p), s, row_vector(many.contacts.rebound_impulse, k, 0)),
+        )
 
 
 @inlined
 def _set_plastic_targets(n, many):
     """Targets of what touches without rebound, and momenta as before the impact."""
     for k in range(n):
-        put_vector(many.impulse, k, 0, (0.0, 0.0, 0.0))
-        if not many.gap[k] > pair_slop(many.ends[k, 0], many.ends[k, 1], many):
-            many.target[k, 0] = 0.0
-    for b in range(many.now.shape[0]):
-        put_vector(many.now, b, at.LINVEL, row_vector(many.momenta, b, _PRE_IMPACT))
-        put_vector(many.now, b, at.ANGMOM, row_vector(many.momenta, b, _PRE_IMPACT + 3))
+        put_vector(many.contacts.impulse, k, 0, (0.0, 0.0, 0.0))
+        if not many.contacts.gap[k] > pair_slop(many.contacts.bodies[k, 0], many.contacts.bodies[k, 1], many):
+            many.contacts.target[k, 0] = 0.0
+    for b in range(many.bodies.state.shape[0]):
+        put_vector(many.bodies.state, b, at.LINVEL, row_vector(many.bodies.momenta, b, _PRE_IMPACT))
+        put_vector(many.bodies.state, b, at.ANGMOM, row_vector(many.bodies.momenta, b, _PRE_IMPACT + 3))
 
 
 @inlined
 def _has_rebound(n, many):
     """True if any contact that touches is to leave with a speed."""
     for k in range(n):
-        if many.target[k, 0] != 0.0 and not many.gap[k] > pair_slop(many.ends[k, 0], many.ends[k, 1], many):
+        if many.contacts.target[k, 0] != 0.0 and not many.contacts.gap[k] > pair_slop(
+            many.contacts.bodies[k, 0], many.contacts.bodies[k, 1], many
+        ):
             return True
     return False
 

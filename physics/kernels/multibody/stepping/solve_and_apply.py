@@ -14,23 +14,27 @@ from physics.kernels.state import layout as at
 def apply_impulses(n, many):
     """Momenta of the bodies after the contact impulses; v from the solve, L + Σ r x p."""
     for k in range(n):
-        p = qt.transposed_matvec(row_matrix(many.frame, k), row_vector(many.impulse, k, 0))
-        a, b = many.ends[k, 0], many.ends[k, 1]
+        p = qt.transposed_matvec(row_matrix(many.contacts.frame, k), row_vector(many.contacts.impulse, k, 0))
+        a, b = many.contacts.bodies[k, 0], many.contacts.bodies[k, 1]
         put_vector(
-            many.now,
+            many.bodies.state,
             a,
             at.ANGMOM,
-            add_scaled(row_vector(many.now, a, at.ANGMOM), 1.0, qt.cross(row_vector(many.arm, k, 0), p)),
+            add_scaled(
+                row_vector(many.bodies.state, a, at.ANGMOM), 1.0, qt.cross(row_vector(many.contacts.arm, k, 0), p)
+            ),
         )
-        put_vector(many.now, a, at.LINVEL, row_vector(many.twist, a, 0))
+        put_vector(many.bodies.state, a, at.LINVEL, row_vector(many.bodies.twist, a, 0))
         if b >= 0:
             put_vector(
-                many.now,
+                many.bodies.state,
                 b,
                 at.ANGMOM,
-                add_scaled(row_vector(many.now, b, at.ANGMOM), -1.0, qt.cross(row_vector(many.arm, k, 3), p)),
+                add_scaled(
+                    row_vector(many.bodies.state, b, at.ANGMOM), -1.0, qt.cross(row_vector(many.contacts.arm, k, 3), p)
+                ),
             )
-            put_vector(many.now, b, at.LINVEL, row_vector(many.twist, b, 0))
+            put_vector(many.bodies.state, b, at.LINVEL, row_vector(many.bodies.twist, b, 0))
 
 
 @inlined

@@ -56,12 +56,12 @@ def step_many(
             continue
         for b in range(bodies):
             i = world * bodies + b
-            bind_body(world, i, shapes[b], arrays, friction, restitution, tilted, many.bodies[b])
-            many.lightness[b] = params[i, at.INV_MASS]
-            bind_fields(params, i, scheme, many.bodies[b])
-            write_state(many.now, b, read_state(state, i))
-            many.touched[b] = 0
-        lost = max(find_overloaded_body(many.bodies), find_nonfinite_body(many.now))
+            bind_body(world, i, shapes[b], arrays, friction, restitution, tilted, many.bodies.work[b])
+            many.bodies.inv_mass[b] = params[i, at.INV_MASS]
+            bind_fields(params, i, scheme, many.bodies.work[b])
+            write_state(many.bodies.state, b, read_state(state, i))
+            many.bodies.touched[b] = 0
+        lost = max(find_overloaded_body(many.bodies.work), find_nonfinite_body(many.bodies.state))
         if lost >= 0:
             report_fault(world, lost, report)
             clear_warm_start(world, memory)
@@ -73,12 +73,12 @@ def step_many(
                 step_with_error_control(world, k * h, h, switches, kept, memory, report, many, log, counts)
             else:
                 for b in range(bodies):
-                    set_clock(k * h, many.bodies[b])
+                    set_clock(k * h, many.bodies.work[b])
                 substep_world(
                     world, k * h, h, friction, gyroscopic, tilted, ellipsoids, hulls, scheme, sleep, memory, report,
                     many, log, counts,
                 )  # fmt: skip
-            lost = find_nonfinite_body(many.now)
+            lost = find_nonfinite_body(many.bodies.state)
             if lost >= 0:
                 report_fault(world, lost, report)
                 clear_warm_start(world, memory)
@@ -88,11 +88,11 @@ def step_many(
             if sleep is not None:
                 update_sleep(world, h, sleep, many)
             for b in range(bodies):
-                write_state(state, world * bodies + b, read_state(many.now, b))
+                write_state(state, world * bodies + b, read_state(many.bodies.state, b))
             if sleep is not None and is_world_asleep(world, bodies, sleep):
                 break
-        report_unresolved_bodies(report, many, many.bodies[0])
+        report_unresolved_bodies(report, many.bodies, many.bodies.work[0])
         for b in range(bodies):
             i = world * bodies + b
             _, q, _, L = read_state(state, i)
-            put_vector(state, i, at.ANGVEL, angular_velocity(q, L, many.bodies[b], tilted))
+            put_vector(state, i, at.ANGVEL, angular_velocity(q, L, many.bodies.work[b], tilted))

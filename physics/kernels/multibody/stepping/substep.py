@@ -48,10 +48,13 @@ def record_penetration(n, world, memory, report, many):
     """
     is_start = memory[world, WARM_STAGE_LENGTH] == 0.0
     for k in range(n):
-        depth = -many.gap[k]
+        depth = -many.contacts.gap[k]
         report[world, at.PENETRATION] = max(report[world, at.PENETRATION], depth)
-        if is_start and many.ends[k, 1] >= 0:
-            radius = min(many.bodies[many.ends[k, 0]].radius, many.bodies[many.ends[k, 1]].radius)
+        if is_start and many.contacts.bodies[k, 1] >= 0:
+            radius = min(
+                many.bodies.work[many.contacts.bodies[k, 0]].radius,
+                many.bodies.work[many.contacts.bodies[k, 1]].radius,
+            )
             if depth > OVERLAP_SHARE * radius:
                 report[world, at.OVERLAP] = max(report[world, at.OVERLAP], depth)
     report[world, at.CONTACTS_LEFT_OUT] += many.counts[NUM_DROPPED]
@@ -60,13 +63,13 @@ def record_penetration(n, world, memory, report, many):
 
 @inlined
 def mark_touched(n, many):
-    """`many.touched`: bodies in a contact of the set."""
-    for b in range(many.touched.shape[0]):
-        many.touched[b] = 0
+    """`many.bodies.touched`: bodies in a contact of the set."""
+    for b in range(many.bodies.touched.shape[0]):
+        many.bodies.touched[b] = 0
     for k in range(n):
-        many.touched[many.ends[k, 0]] = 1
-        if many.ends[k, 1] >= 0:
-            many.touched[many.ends[k, 1]] = 1
+        many.bodies.touched[many.contacts.bodies[k, 0]] = 1
+        if many.contacts.bodies[k, 1] >= 0:
+            many.bodies.touched[many.contacts.bodies[k, 1]] = 1
 
 
 @kernel
@@ -111,8 +114,8 @@ def substep_world(
             report[world, at.SPLITS] += 1.0
         midpoint_step(n, world, t, friction, gyroscopic, tilted, scheme, sleep, memory, report, many)
         left -= t
-        for b in range(many.now.shape[0]):
-            advance_clock(t, many.bodies[b])
+        for b in range(many.bodies.state.shape[0]):
+            advance_clock(t, many.bodies.work[b])
         if n > 0:
             correct_positions(n, tilted, many)
         if is_last or not left > 0.0:
