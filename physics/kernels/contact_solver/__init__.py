@@ -69,9 +69,10 @@ No solver raises. Each says so in its own way, and `solve_contacts` goes on to t
   method leaves the best it met, so its residual is at most that of its start.
 - The LCP solvers return a status other than `LCP_SOLVED`, and leave the impulses as they were.
 - `solve_contacts` returns a residual above `work.tolerance`. Callers count that as unconverged
-  (`state.body.report_solve`). Velocities that are not finite have an infinite residual with friction.
+  (`state.body.report_solve`).
 
-Comparisons are written `not residual <= tolerance`, so that a residual that is no number counts as failure.
+Comparisons are written `not residual <= tolerance`, so that a residual that is no number counts as failure. Velocities
+that are not finite have an infinite residual with friction; `gauss_seidel.normal_residual` does not notice them.
 
 Solvers
 -------
