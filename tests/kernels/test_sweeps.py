@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -12,6 +14,7 @@ from physics.kernels.contact_solver.gauss_seidel import (
     cone_residual,
     cone_sweeps,
     invert_contact_blocks,
+    normal_residual,
     update_contact_velocities,
 )
 from physics.kernels.contact_solver.proximal_newton import proximal_newton
@@ -110,3 +113,12 @@ def test_the_solver_is_deterministic():
         solve_contacts(4, ContactSwitches(True, True, True), problem.v, problem.L, problem.R, problem.one)
         results.append(problem.one["impulse"].copy())
     np.testing.assert_array_equal(*results)
+
+
+@pytest.mark.parametrize("bad", [math.nan, math.inf])
+def test_velocities_that_are_not_finite_have_an_infinite_residual(bad):
+    """max and min let a NaN pass: without a look at the sum of velocities such a problem would count as solved."""
+    p, u, W = np.zeros(3), np.array([0.0, bad, 0.0]), np.eye(3)
+    assert normal_residual(3, p, u, W) == math.inf
+    local = np.ones((1, 12))
+    assert cone_residual(1, p, u, np.ones(1), local) == math.inf

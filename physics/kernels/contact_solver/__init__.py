@@ -72,7 +72,7 @@ No solver raises. Each says so in its own way, and `solve_contacts` goes on to t
   (`state.body.report_solve`).
 
 Comparisons are written `not residual <= tolerance`, so that a residual that is no number counts as failure. Velocities
-that are not finite have an infinite residual with friction; `gauss_seidel.normal_residual` does not notice them.
+that are not finite have an infinite residual.
 
 Solvers
 -------

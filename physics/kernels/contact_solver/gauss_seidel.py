@@ -139,11 +139,12 @@ def cone_residual(n, p, u, mu, local):
 
 @kernel
 def normal_residual(n, p, u, W):
-    """The same for frictionless contacts, one row each [m/s]."""
-    worst = 0.0
+    """`cone_residual` of frictionless contacts, one row each [m/s]."""
+    worst = check = 0.0
     for i in range(n):
         worst = max(worst, abs(min(u[i], p[i] * W[i, i])))
-    return worst
+        check += u[i]
+    return worst if math.isfinite(check) else math.inf
 
 
 @kernel

@@ -15,8 +15,8 @@ from physics.kernels.state.body import angular_velocity, apply_inv_inertia, prin
 from physics.kernels.state.layout import ELLIPSOID
 
 # Row of `memory`: length of the last resting stage [s], its contact count, which direct solve worked last
-# (`sliding_patch.TRY_STICKING`, `TRY_SLIDING`, `TRY_MIXED`), the slots of its contacts, then the impulses of all slots, zero
-# where there is no contact.
+# (`sliding_patch.TRY_STICKING`, `TRY_SLIDING`, `TRY_MIXED`), the slots of its contacts, then the impulses of all slots,
+# zero where there is no contact.
 WALL_MEMORY_STAGE, WALL_MEMORY_COUNT, WALL_MEMORY_MODE = range(3)
 WALL_MEMORY_HEAD = 3
 
