@@ -133,7 +133,7 @@ def cone_residual(n, p, u, mu, local):
             y *= limit / size
         dx, dy = p[r + 1] - x, p[r + 2] - y
         worst = max(worst, math.sqrt(dx * dx + dy * dy) / rho_t)
-        check += u[r]
+        check += u[r] + u[r + 1] + u[r + 2]
     return worst if math.isfinite(check) else math.inf
 
 
