@@ -11,7 +11,14 @@ from numba.core.compiler_lock import global_compiler_lock
 from physics import validation
 from physics.kernels.event_driven.step import step_events
 from physics.kernels.multibody.stepping.step import step_many
-from physics.kernels.state.groups import BodyArrays, ContactSwitches, FlightSwitches, Records, WorkQueue
+from physics.kernels.state.groups import (
+    BodyArrays,
+    ContactSwitches,
+    FlightSwitches,
+    MultibodySwitches,
+    Records,
+    WorkQueue,
+)
 from physics.kernels.time_stepping.spring_coupled_step import step_linked
 from physics.kernels.time_stepping.step import step_worlds
 from physics.keywords import known_keywords
@@ -205,7 +212,7 @@ def _step_of(plan: Plan) -> tuple[Callable, Callable[[Batch, int], tuple]]:
 
 def _many_arguments(world: Batch, k: int) -> tuple:
     plan = world.plan
-    switches = _contact(plan), plan.restitution, _flight(plan), plan.ellipsoids, plan.hulls
+    switches = MultibodySwitches(plan.friction, _flight(plan), plan.ellipsoids, plan.hulls), plan.restitution
     return *switches, world.motions[k], world.sleep_of_kernel(), _records(world), world.scratch[k]
 
 

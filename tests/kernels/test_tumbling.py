@@ -60,7 +60,7 @@ def test_the_distance_of_two_bodies_is_a_bound_that_falls_short_by_a_tenth_at_mo
         d = rng.standard_normal(3)
         d *= (0.5 + 1.5 * rng.random()) / np.linalg.norm(d)
         n, gap = gjk_distance(
-            0, 1, tuple(d), tuple(R.ravel()), (0.0, 0.0, 0.0), tuple(S.ravel()), tuple(d), 1e-9, has_hulls, many
+            0, 1, (tuple(d), tuple(R.ravel())), ((0.0, 0.0, 0.0), tuple(S.ravel())), tuple(d), 1e-9, has_hulls, many
         )
         best = largest_separation(lambda n, R=R: support(a, R, -n), lambda n, S=S: support(b, S, n), d, seed=k)
         n = np.array(n)

@@ -85,7 +85,7 @@ def soften_arm(loads, h, force, arm, R, J):
 
 
 @inlined
-def tangent_basis(n):
+def axes_across(n):
     """Two unit vectors across the unit vector n."""
     if abs(n[0]) < 0.6:
         e = (1.0, 0.0, 0.0)
@@ -135,7 +135,7 @@ def soften_at(loads, arm, n, along, across, R, mass, J):
     """
     a, T = loads
     w = plus(a, qt.cross(apply_inv_inertia(R, T, J), arm))
-    s, t = tangent_basis(n)
+    s, t = axes_across(n)
     wn, ws, wt = (
         point_mobility(n, arm, R, mass, J),
         point_mobility(s, arm, R, mass, J),

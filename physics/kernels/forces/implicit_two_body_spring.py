@@ -16,7 +16,7 @@ from physics.kernels.forces.field_loads import (
     subtract_loads,
 )
 from physics.kernels.forces.force_field_dispatch import soften_loads, total_linked_load, total_load, total_own_load
-from physics.kernels.forces.implicit_loads import implicit_point_force, mobility_bound, point_mobility, tangent_basis
+from physics.kernels.forces.implicit_loads import implicit_point_force, mobility_bound, point_mobility, axes_across
 from physics.kernels.forces.resolution_limits import note_field_rates
 from physics.kernels.forces.spring import implicit_spring_stiffness, spring_vector
 from physics.kernels.math import quaternion as qt
@@ -100,7 +100,7 @@ def _soften_pair(k, one, other, h, tilted):
     K, S = (other.J[0], other.J[1], other.J[2]), _principal(other, tilted)
     w = mobility_bound(arm, one.mass, J) + mobility_bound(lever, other.mass, K)
     n, along, across = implicit_spring_stiffness(h, w, e, l, p)
-    s, t = tangent_basis(n)
+    s, t = axes_across(n)
     first, second = acting_loads(one), acting_loads(other)
     u = minus(
         plus(first[0], qt.cross(apply_inv_inertia(R, first[1], J), arm)),

@@ -43,6 +43,15 @@ class FlightSwitches(NamedTuple):
     scheme: int | None  # code of a textbook scheme (`physics.kernels.flight.integrators`) instead of the exact flow
 
 
+class MultibodySwitches(NamedTuple):
+    """Bodies that touch each other."""
+
+    friction: bool | None
+    flight: FlightSwitches
+    ellipsoids: bool | None  # some of them are ellipsoids
+    hulls: bool | None  # some of them are hulls
+
+
 class Records(NamedTuple):
     """Arrays that a step keeps and writes besides the state."""
 

@@ -113,20 +113,19 @@ def _core_radius(b, many):
 
 
 @kernel
-def gjk_distance(a, b, x, R, y, S, way, touch, hulls, many):
-    """Distance of body a at (x, R) from body b at (y, S), or a bound that is nearly it: (direction out of b, distance).
+def gjk_distance(a, b, pose_a, pose_b, way, touch, hulls, many):
+    """Distance of body a from body b in their poses, or a bound that is nearly it: (direction out of b, distance).
 
     Parameters
     ----------
-    x, y : tuples of 3 floats
-        Geometric centres [m].
-    R, S : tuples of 9 floats
-        Body frames to world.
+    pose_a, pose_b : tuples
+        Geometric centre (3 floats) [m], body frame to world (9 floats).
     way : tuple of 3 floats
         Where to look first, not 0.
     touch : float
         Distance below which no more is asked [m]: 0 is returned then.
     """
+    x, R, y, S = pose_a[0], pose_a[1], pose_b[0], pose_b[1]
     v, count, core = way, 0, _core_radius(a, many) + _core_radius(b, many)
     best, n = -math.inf, way
     for _ in range(_MAX_ITERATIONS):

@@ -114,36 +114,32 @@ def _max_body_error(tilted, kept, many):
 
 
 @kernel
-def _step_part(world, start, h, switches, memory, report, many, log, counts):
+def _step_part(world, start, h, switches, records, many):
     """One part of h [s], `start` [s] after the call."""
-    friction, gyroscopic, tilted, ellipsoids, hulls, scheme = switches
     for b in range(many.bodies.state.shape[0]):
         set_clock(start, many.bodies.work[b])
         many.bodies.touched[b] = 0
-    substep_world(
-        world, start, h, friction, gyroscopic, tilted, ellipsoids, hulls, scheme, None, memory, report, many,
-        log, counts,
-    )  # fmt: skip
+    substep_world(world, start, h, switches, None, records, many)
 
 
 @kernel
-def _step_with_halving(world, start, unit, part, shortest, switches, kept, memory, report, many, log, counts):
+def _step_with_halving(world, start, unit, part, shortest, switches, kept, records, many):
     """Advance by `part` units of time [s], or by half of it, or a quarter ...: (units taken, error, lengths tried)."""
-    tilted, tried = switches[2], 1
-    _save_snapshot(SNAPSHOT_START, world, kept, memory, report, many, counts)
-    _step_part(world, start, part * unit, switches, memory, report, many, log, counts)
+    tilted, tried = switches.flight.tilted, 1
+    _save_snapshot(SNAPSHOT_START, world, kept, records.memory, records.report, many, records.counts)
+    _step_part(world, start, part * unit, switches, records, many)
     while True:
         half = 0.5 * part * unit
-        _save_snapshot(SNAPSHOT_COARSE, world, kept, memory, report, many, counts)
-        _restore_snapshot(SNAPSHOT_START, world, kept, memory, report, many, counts)
-        _step_part(world, start, half, switches, memory, report, many, log, counts)
-        _save_snapshot(SNAPSHOT_MIDDLE, world, kept, memory, report, many, counts)
-        _step_part(world, start + half, half, switches, memory, report, many, log, counts)
+        _save_snapshot(SNAPSHOT_COARSE, world, kept, records.memory, records.report, many, records.counts)
+        _restore_snapshot(SNAPSHOT_START, world, kept, records.memory, records.report, many, records.counts)
+        _step_part(world, start, half, switches, records, many)
+        _save_snapshot(SNAPSHOT_MIDDLE, world, kept, records.memory, records.report, many, records.counts)
+        _step_part(world, start + half, half, switches, records, many)
         error = _max_body_error(tilted, kept, many)
         if error <= 1.0 or part <= shortest:
             return part, error, tried
         _restore_snapshot(
-            SNAPSHOT_MIDDLE, world, kept, memory, report, many, counts
+            SNAPSHOT_MIDDLE, world, kept, records.memory, records.report, many, records.counts
         )  # the coarse answer of the first half
         part //= 2
         tried += 1
@@ -163,36 +159,33 @@ def _min_load_speed(h, many):
 
 
 @kernel
-def step_with_error_control(world, start, h, switches, kept, memory, report, many, log, counts):
+def step_with_error_control(world, start, h, switches, kept, records, many):
     """Advance the bodies of one world by h [s], `start` [s] after the call, in parts that meet the error.
 
     Where the shortest part does not meet it either, that is counted as a fallback, and the shortest part of this
     substep is longer from there on.
 
-    `switches` are friction, gyroscopic, tilted, ellipsoids, hulls and scheme, as in `substep_world`; `kept` is what
-    `arrays.make_snapshots` makes.
+    `switches` are `MultibodySwitches`; `kept` is what `arrays.make_snapshots` makes.
     """
     place, shortest, unit, patience = 0, 1, h / _UNITS_PER_SUBSTEP, _MAX_TRIALS
-    next_part = memory.shape[1] - 1
+    next_part = records.memory.shape[1] - 1
     many.settings[0].half_load_speed = _min_load_speed(0.5 * h, many)  # the scale of contact problems, at least
-    part = int(memory[world, next_part] * _UNITS_PER_SUBSTEP)
+    part = int(records.memory[world, next_part] * _UNITS_PER_SUBSTEP)
     if part == 0:
         part = _UNITS_PER_SUBSTEP
     while place < _UNITS_PER_SUBSTEP:
         now = start + place * unit
-        part, error, tried = _step_with_halving(
-            world, now, unit, part, shortest, switches, kept, memory, report, many, log, counts
-        )  # fmt: skip
+        part, error, tried = _step_with_halving(world, now, unit, part, shortest, switches, kept, records, many)
         place += part
         patience -= tried
         if not are_all_finite(many.bodies.state):
             return
         if error > 1.0:
-            report[world, at.FALLBACKS] += 1.0
+            records.report[world, at.FALLBACKS] += 1.0
         if error > 1.0 or patience <= 0:
             shortest, patience = min(_COARSENING_FACTOR * shortest, _UNITS_PER_SUBSTEP), _MAX_TRIALS
         part = min(
             2 * part, _UNITS_PER_SUBSTEP
         )  # what rounding leaves is no reason to stay with short ones: it is always tried
-        memory[world, next_part] = part / _UNITS_PER_SUBSTEP
+        records.memory[world, next_part] = part / _UNITS_PER_SUBSTEP
         part = min(part, place & -place)

@@ -118,8 +118,9 @@ def _support(b, R, k, hulls, many):
 
 
 @kernel
-def _gap_bound(t, a, b, n, one, other, rate, bend, hulls, many):
+def _gap_bound(t, a, b, n, sides, rate, bend, hulls, many):
     """Bound of the gap between body a and body b, or wall -1 - b, along n after t [m]; see the module."""
+    one, other = sides
     x, R, c, _, m = one
     k = turned_normal(n, m, t)
     gap = t * (rate - 0.5 * bend * t) + t * qt.dot(m, c) - _support(a, R, (-k[0], -k[1], -k[2]), hulls, many)
@@ -156,11 +157,11 @@ def _safe_time(a, b, n, one, other, bend, horizon, hulls, many):
         if not at_low > GAP_LEFT_SHARE * gap:
             break
         t = secant_root(low, at_low, high, at_high)
-        found = _gap_bound(t, a, b, n, one, other, rate, bend, hulls, many)
+        found = _gap_bound(t, a, b, n, (one, other), rate, bend, hulls, many)
         if found > 0.0:
             low, at_low = t, found
         t = mean_time(low, high)
-        found = _gap_bound(t, a, b, n, one, other, rate, bend, hulls, many)
+        found = _gap_bound(t, a, b, n, (one, other), rate, bend, hulls, many)
         if found > 0.0:
             low, at_low = t, found
         else:
@@ -208,10 +209,10 @@ def _time_of_impact(a, b, h, gyroscopic, tilted, hulls, many):
         left = _contact_side(a, one, n, tilted, many)
         right = _contact_side(partner, other, n, tilted, many)
         if b >= 0:
-            n, gap = gjk_distance(a, b, left[0], left[1], right[0], right[1], n, touch, hulls, many)
+            n, gap = gjk_distance(a, b, left, right, n, touch, hulls, many)
             left, right = _contact_side(a, one, n, tilted, many), _contact_side(b, other, n, tilted, many)
         else:
-            gap = _gap_bound(0.0, a, b, n, left, right, 0.0, 0.0, hulls, many)
+            gap = _gap_bound(0.0, a, b, n, (left, right), 0.0, 0.0, hulls, many)
         if gone == 0.0 and (is_held or not gap > touch):
             if many.bodies.spin_bound[a] > 0.0:
                 first = min(first, time_to_turn_far(n, one, tilted, many.bodies.work[a]))

@@ -173,7 +173,7 @@ def constrain_coupled_contacts(n, many):
 
 
 @kernel
-def resolve_impacts(n, world, t, h, is_last, friction, tilted, report, many, log, counts):
+def resolve_impacts(n, world, t, h, is_last, switches, records, many):
     """Velocities after the impulses of the contacts that approach; nothing where none does. Contacts in the set.
 
     It happens t [s] after the start of the call, with h [s] left of the substep.
@@ -190,9 +190,9 @@ def resolve_impacts(n, world, t, h, is_last, friction, tilted, report, many, log
             if k != fastest:
                 many.contacts.target[k, 0] = -_UNCONSTRAINED  # its turn comes when this one is over
     n = drop_unconstrained(n, many)
-    apply_impact_within_energy(n, world, friction, tilted, report, many)
-    if log.shape[1] > 0:
-        log_impacts(n, world, t, many, log, counts)
+    apply_impact_within_energy(n, world, switches.friction, switches.flight.tilted, records.report, many)
+    if records.log.shape[1] > 0:
+        log_impacts(n, world, t, many, records.log, records.counts)
     return n, meeting, True
 
 

@@ -158,26 +158,26 @@ def max_load_speed(h, many):
 
 
 @inlined
-def step_under_held_loads(n, world, h, friction, gyroscopic, tilted, scheme, sleep, memory, report, many):
+def step_under_held_loads(n, world, h, switches, sleep, records, many):
     """`midpoint_step` under the loads that are held."""
     half, first = 0.5 * h, world * many.bodies.state.shape[0]
     for b in range(many.bodies.state.shape[0]):
         if is_asleep(first + b, sleep):
             continue
         if many.bodies.touched[b] == 0:
-            flight = FlightSwitches(gyroscopic, tilted, scheme)
+            flight = FlightSwitches(switches.flight.gyroscopic, switches.flight.tilted, switches.flight.scheme)
             write_state(
                 many.bodies.state,
                 b,
                 integrate_flight(read_state(many.bodies.state, b), h, flight, many.bodies.work[b]),
             )
             continue
-        drift_body(b, half, gyroscopic, tilted, many)
-        update_body_pose(b, tilted, many)
+        drift_body(b, half, switches.flight.gyroscopic, switches.flight.tilted, many)
+        update_body_pose(b, switches.flight.tilted, many)
         _, q, _, L = read_state(many.bodies.state, b)
-        put_vector(many.bodies.twist, b, 3, angular_velocity(q, L, many.bodies.work[b], tilted))
+        put_vector(many.bodies.twist, b, 3, angular_velocity(q, L, many.bodies.work[b], switches.flight.tilted))
     if n == 0:
-        kept.clear_awake_warm_start(world, h, sleep, memory, many)
+        kept.clear_awake_warm_start(world, h, sleep, records.memory, many)
         return
     update_contacts(many)
     set_resting_targets(n, h, many)
@@ -191,31 +191,31 @@ def step_under_held_loads(n, world, h, friction, gyroscopic, tilted, scheme, sle
                 many.bodies.state, b, at.ANGMOM, add_scaled(row_vector(many.bodies.state, b, at.ANGMOM), h, torque)
             )
             save_loaded_momenta(b, many)
-            update_twist(b, tilted, many)
-    kept.load_warm_impulses(n, world, h, friction, memory, many)
+            update_twist(b, switches.flight.tilted, many)
+    kept.load_warm_impulses(n, world, h, switches.friction, records.memory, many)
     many.settings[0].residual_limit, many.settings[0].is_resting_stage = (
         rest_residual(h, many),
         1 - many.settings[0].is_error_controlled,
     )
     many.settings[0].load_speed = max_load_speed(h, many)
-    solve_and_apply(n, world, friction, report, many)
+    solve_and_apply(n, world, switches.friction, records.report, many)
     if has_gained_energy(n, h, many):
-        revert_to_dissipative(n, tilted, many)
-        solve_and_apply(n, world, friction, report, many)
-        if friction is not None and has_gained_energy(n, h, many):
-            revert_to_dissipative(n, tilted, many)
+        revert_to_dissipative(n, switches.flight.tilted, many)
+        solve_and_apply(n, world, switches.friction, records.report, many)
+        if switches.friction is not None and has_gained_energy(n, h, many):
+            revert_to_dissipative(n, switches.flight.tilted, many)
             solve_frictionless_and_apply(n, many)
     many.settings[0].residual_limit, many.settings[0].is_resting_stage, many.settings[0].load_speed = math.inf, 0, 0.0
-    kept.store_warm_impulses(n, world, h, sleep, memory, many)
+    kept.store_warm_impulses(n, world, h, sleep, records.memory, many)
     for b in range(many.bodies.state.shape[0]):
         if many.bodies.touched[b] == 1:
-            drift_body(b, half, gyroscopic, tilted, many)
+            drift_body(b, half, switches.flight.gyroscopic, switches.flight.tilted, many)
 
 
 @kernel
-def midpoint_step(n, world, h, friction, gyroscopic, tilted, scheme, sleep, memory, report, many):
+def midpoint_step(n, world, h, switches, sleep, records, many):
     """Every body after h: exact flight, or Moreau's midpoint step with the n contacts of the set."""
-    hold_all_loads(h, gyroscopic, tilted, many)
-    note_stage_energy(tilted, many.bodies, many.bodies.work[0])
-    step_under_held_loads(n, world, h, friction, gyroscopic, tilted, scheme, sleep, memory, report, many)
-    limit_world_energy_gain(h, 0, tilted, many.bodies, many.bodies.work[0])
+    hold_all_loads(h, switches.flight.gyroscopic, switches.flight.tilted, many)
+    note_stage_energy(switches.flight.tilted, many.bodies, many.bodies.work[0])
+    step_under_held_loads(n, world, h, switches, sleep, records, many)
+    limit_world_energy_gain(h, 0, switches.flight.tilted, many.bodies, many.bodies.work[0])

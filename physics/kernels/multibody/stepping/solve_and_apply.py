@@ -8,6 +8,7 @@ from physics.kernels.math.vector import row_vector
 from physics.kernels.multibody.data.contact_set import add_scaled, put_vector, row_matrix
 from physics.kernels.multibody.solver.solve import solve_all_frictionless, solve_contacts
 from physics.kernels.state import layout as at
+from physics.kernels.state.body import report_solve
 
 
 @inlined
@@ -37,24 +38,12 @@ def apply_impulses(n, many):
             put_vector(many.bodies.state, b, at.LINVEL, row_vector(many.bodies.twist, b, 0))
 
 
-@inlined
-def report_solve(world, solved, tolerance, report):
-    """Add one contact solve (iterations, residual, method) to the world's report."""
-    sweeps, residual, method = solved
-    report[world, at.SOLVES] += 1.0
-    report[world, at.ITERATIONS] += sweeps
-    report[world, at.RESIDUAL] = max(report[world, at.RESIDUAL], residual)
-    report[world, at.SOLVER] = max(report[world, at.SOLVER], float(method))
-    if not residual <= tolerance:
-        report[world, at.UNCONVERGED] += 1.0
-
-
 @kernel
 def solve_and_apply(n, world, friction, report, many):
     """Solve the contact problem of the stage, change the momenta of the bodies by it, and note it in the report."""
-    solved = solve_contacts(n, friction, many)
+    iterations, residual, method = solve_contacts(n, friction, many)
     apply_impulses(n, many)
-    report_solve(world, solved, many.settings[0].tolerance, report)
+    report_solve(report, world, residual, iterations, method, many.settings[0].tolerance)
 
 
 @kernel

@@ -32,9 +32,7 @@ from physics.kernels.time_stepping.event_log import clear_events, drop_events
 
 
 @kernel
-def step_many(
-    queue, steps, substeps, h, arrays, contact, restitution, flight, ellipsoids, hulls, kept, sleep, records, many
-):
+def step_many(queue, steps, substeps, h, arrays, switches, restitution, kept, sleep, records, many):
     """Advance the worlds that no other thread has taken by `steps` steps of `substeps` substeps of h seconds each.
 
     A world in which a new state is not finite keeps the last good one, and its report counts the fault.
@@ -42,7 +40,7 @@ def step_many(
     """
     state, params, shapes, _, wrench = arrays
     memory, report, log, counts = records
-    friction, (gyroscopic, tilted, scheme) = contact.friction, flight
+    tilted = switches.flight.tilted
     bodies = shapes.shape[0]
     world = begin_taking(queue.turns, queue.taken)
     while True:
@@ -56,9 +54,9 @@ def step_many(
             continue
         for b in range(bodies):
             i = world * bodies + b
-            bind_body(world, i, shapes[b], arrays, friction, restitution, tilted, many.bodies.work[b])
+            bind_body(world, i, shapes[b], arrays, switches.friction, restitution, tilted, many.bodies.work[b])
             many.bodies.inv_mass[b] = params[i, at.INV_MASS]
-            bind_fields(params, i, scheme, many.bodies.work[b])
+            bind_fields(params, i, switches.flight.scheme, many.bodies.work[b])
             write_state(many.bodies.state, b, read_state(state, i))
             many.bodies.touched[b] = 0
         lost = max(find_overloaded_body(many.bodies.work), find_nonfinite_body(many.bodies.state))
@@ -69,15 +67,11 @@ def step_many(
             continue
         for k in range(steps * substeps):
             if kept is not None:
-                switches = (friction, gyroscopic, tilted, ellipsoids, hulls, scheme)
-                step_with_error_control(world, k * h, h, switches, kept, memory, report, many, log, counts)
+                step_with_error_control(world, k * h, h, switches, kept, records, many)
             else:
                 for b in range(bodies):
                     set_clock(k * h, many.bodies.work[b])
-                substep_world(
-                    world, k * h, h, friction, gyroscopic, tilted, ellipsoids, hulls, scheme, sleep, memory, report,
-                    many, log, counts,
-                )  # fmt: skip
+                substep_world(world, k * h, h, switches, sleep, records, many)
             lost = find_nonfinite_body(many.bodies.state)
             if lost >= 0:
                 report_fault(world, lost, report)

@@ -1,17 +1,23 @@
-"""A substep of a world whose bodies touch each other: the visible list of stages.
+"""Time stepping, bodies that touch each other: a substep of a world as a list of stages.
 
-The world goes, until the time of the substep is used up, through
+The stages are those of `physics.kernels.time_stepping.step`, for all bodies of a world at once. y = (x, q, v, L) are
+their states, M their masses and inertias, f the loads, J the Jacobian of the contacts, u their velocities, p their
+impulses.
 
-1. find      the contact set where the bodies are (`touch`): what touches or could within the time left;
-2. strike    velocities jump where bodies meet (`impact`); what could meet later may approach no faster than its gap
-             allows (a speculative contact: nothing passes through anything, however fast);
-3. until     the time that can pass before a meeting that matters: one that bounces, or is fast (`impact`);
-4. glide     bodies in no contact fly exactly; the others take Moreau's midpoint step (`midpoint_step`): half a free
-drift,
-             the contact problem of all of them at the middle, half a free drift;
-5. apart     what still overlaps is pushed apart, positions only (`position_correction`).
+1. Hold loads         f = f(y), held over the stage                                        `hold_all_loads`
+2. Find contacts      {i : g_i <= what the time left can close}: sweep and prune, then the `find_contacts`
+                      narrow phase of each pair
+3. Resolve impacts    M Δ(v, ω) = Jᵀ p, u_n⁺ >= -e u_n⁻ ⟂ p_n >= 0, |p_t| <= μ p_n;        `resolve_impacts`
+                      later meetings are speculative: u_n⁺ >= -g/t
+4. Limit the stage    the first t at which bodies meet that bounce, are fast, or turn far  `safe_stage_length`
+5. Integrate          in the air the exact flow of ẋ = v, q̇ = ½ ω q, M v̇ = f              `midpoint_step`
+                      in contact Moreau's midpoint step: x, q drift by h/2;
+                      M Δ(v, ω) = h f + Jᵀ p, u_n >= target ⟂ p_n >= 0, |p_t| <= μ p_n;
+                      x, q drift by h/2
+6. Correct positions  overlaps are pushed apart, positions only                            `correct_positions`
+7. Sleep              groups whose motion stays below a threshold are left out (`step`)    `update_sleep`
 
-The stages are those of `physics.kernels.time_stepping.step`, for a whole world where that has one body.
+No body passes through another one, however fast: a speculative contact bounds the speed at which the gap may close.
 """
 
 from __future__ import annotations
@@ -74,24 +80,21 @@ def mark_touched(n, many):
 
 @kernel
 def substep_world(
-    world, start, h, friction, gyroscopic, tilted, ellipsoids, hulls, scheme, sleep, memory, report, many, log, counts
-):  # fmt: skip
+    world, start, h, switches, sleep, records, many):  # fmt: skip
     """Advance the bodies of one world by h, `start` after the call [s]: the stages of the module's list."""
     left, impacts, cuts, turns = h, 0, 0, 0
     while True:
         is_last = impacts >= many.settings[0].splits or cuts == SPLITS_PER_IMPACT * many.settings[0].splits
-        hold_all_loads(left, gyroscopic, tilted, many)
-        update_poses_and_twists(tilted, many)
-        is_turning = write_spin_bounds(h, tilted, many)
+        hold_all_loads(left, switches.flight.gyroscopic, switches.flight.tilted, many)
+        update_poses_and_twists(switches.flight.tilted, many)
+        is_turning = write_spin_bounds(h, switches.flight.tilted, many)
         if is_turning and (is_last or turns >= MAX_TURNING_CUTS):
             clear_spin_bounds(many)
             is_turning = False
-        find_contacts(left, ellipsoids, hulls, world, sleep, many)
+        find_contacts(left, switches.ellipsoids, switches.hulls, world, sleep, many)
         n = many.counts[NUM_CONTACTS]
-        record_penetration(n, world, memory, report, many)
-        n, t, is_impact = resolve_impacts(
-            n, world, start + (h - left), left, is_last, friction, tilted, report, many, log, counts
-        )  # fmt: skip
+        record_penetration(n, world, records.memory, records.report, many)
+        n, t, is_impact = resolve_impacts(n, world, start + (h - left), left, is_last, switches, records, many)
         many.counts[NUM_CONTACTS] = n
         if is_impact and not is_last:
             impacts += 1
@@ -99,24 +102,24 @@ def substep_world(
             continue  # what may be met in the time left is another set now
         mark_touched(n, many)
         if is_last:
-            report[world, at.UNRESOLVED] += 1.0
+            records.report[world, at.UNRESOLVED] += 1.0
         first = t
-        if scheme is None:  # noqa: SIM102 (a branch of its own is what the compiler prunes)
+        if switches.flight.scheme is None:  # noqa: SIM102 (a branch of its own is what the compiler prunes)
             if is_turning:
-                t = safe_stage_length(first, gyroscopic, tilted, hulls, many)
+                t = safe_stage_length(first, switches.flight.gyroscopic, switches.flight.tilted, switches.hulls, many)
         if t < first:
             turns += 1
             if turns == MAX_TURNING_CUTS:
-                report[world, at.UNRESOLVED] += 1.0
+                records.report[world, at.UNRESOLVED] += 1.0
         else:
             cuts += 1
         if t < left:
-            report[world, at.SPLITS] += 1.0
-        midpoint_step(n, world, t, friction, gyroscopic, tilted, scheme, sleep, memory, report, many)
+            records.report[world, at.SPLITS] += 1.0
+        midpoint_step(n, world, t, switches, sleep, records, many)
         left -= t
         for b in range(many.bodies.state.shape[0]):
             advance_clock(t, many.bodies.work[b])
         if n > 0:
-            correct_positions(n, tilted, many)
+            correct_positions(n, switches.flight.tilted, many)
         if is_last or not left > 0.0:
             break
