@@ -97,7 +97,9 @@ def _look_at(world: World) -> tuple[np.ndarray, np.ndarray]:
     if world.plan.fields:
         arrays = world.state, world.params, world.shapes
         try:
-            evaluate_fields(*arrays, world.plan.tilted, world.time, body_records(world.scratch[0]), wrenches, energies)
+            evaluate_fields(
+                *arrays, world.plan.offset_frame, world.time, body_records(world.scratch[0]), wrenches, energies
+            )
         except IndexError as error:
             raise raised(error, world.plan.fields) from error
     return wrenches, energies

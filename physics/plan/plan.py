@@ -39,8 +39,8 @@ MOST_ROWS = 20
 class Plan:
     """The switches that the kernel is compiled for, and the reasons. None is off, True is on.
 
-    `tilted` is on where the body frame of a body is not all there is to know of its mass: its principal axes are not
-    its body axes, or its geometric centre is not its centre of mass. `many` is on where bodies touch each other, or
+    `offset_frame` is on where the body frame of a body is not all there is to know of its mass: its principal axes are
+    not its body axes, or its geometric centre is not its centre of mass. `many` is on where bodies touch each other, or
     touch walls and are tied together by springs, or a hull touches walls; `meeting` says whether they touch each other,
     `ellipsoids` whether there are any among those, `hulls` whether any hulls touch anything. `refined` is on where
     `many` is and steps have an error tolerance: by the scheme ``events``. `linked` is on where they are tied together
@@ -53,7 +53,7 @@ class Plan:
     restitution: bool | None
     gravity: bool | None
     gyroscopic: bool | None
-    tilted: bool | None
+    offset_frame: bool | None
     pivots: bool | None
     scheme: int | None
     events: bool | None
@@ -77,7 +77,7 @@ class Plan:
     def key(self) -> tuple:
         """Key that distinguishes one compiled kernel from another."""
         return (
-            self.contact, self.friction, self.restitution, self.gravity, self.gyroscopic, self.tilted,
+            self.contact, self.friction, self.restitution, self.gravity, self.gyroscopic, self.offset_frame,
             self.pivots, self.scheme is None, self.events, self.many, self.refined, self.ellipsoids, self.hulls,
             self.linked, self.sleeping, self.features,
             *self.laws,
@@ -115,7 +115,7 @@ class Plan:
         """
         if not self.gyroscopic:
             return is_isotropic(moments)
-        return ~is_tilted(R) | bool(self.tilted)
+        return ~is_tilted(R) | bool(self.offset_frame)
 
     def explain(self) -> str:
         """The plan as text: every effect, on or off, why, and what is compiled for it."""
@@ -212,7 +212,7 @@ def make_plan(scene: Scene, accuracy: str | Accuracy) -> Plan:
         restitution=(seen.touching and seen.contact.restitution is not None) or None,
         gravity=(seen.gravity is not None) or None,
         gyroscopic=(not seen.isotropic) or None,
-        tilted=(seen.turned or bool(seen.uneven)) or None,
+        offset_frame=(seen.turned or bool(seen.uneven)) or None,
         pivots=(seen.touching and accuracy.solver == "sweeps+pivoting") or None,
         scheme=scheme if scheme > 0 else None,
         events=(scheme == EVENTS and not many) or None,

@@ -230,7 +230,7 @@ def _contact(plan: Plan) -> ContactSwitches:
 
 
 def _flight(plan: Plan) -> FlightSwitches:
-    return FlightSwitches(plan.gyroscopic, plan.tilted, plan.scheme)
+    return FlightSwitches(plan.gyroscopic, plan.offset_frame, plan.scheme)
 
 
 def _event_arguments(world: Batch, k: int) -> tuple:

@@ -13,7 +13,7 @@ from physics.world.batch import Batch
 def geometric_centres(world: Batch, state: np.ndarray, params: np.ndarray) -> np.ndarray:
     """Centres of the bodies' shapes, (k * bodies, 3) float64, world frame [m]; arguments as of `wall_gaps`."""
     centres = state[:, at.POS : at.POS + 3]
-    if world.plan.tilted:
+    if world.plan.offset_frame:
         R = rotation_matrices(state[:, at.QUAT : at.QUAT + 4])
         centres = centres + np.einsum("kij,kj->ki", R, params[:, at.CENTER : at.CENTER + 3])
     return centres

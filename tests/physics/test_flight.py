@@ -107,7 +107,7 @@ def test_gyroscopic_torque_is_left_out_when_isotropic_and_tilted_axes_are_seen()
     P = np.array([[c, 0, s], [0, 1, 0], [-s, 0, c]])
     body = physics.Block((5, 3, 2), 6.0, angvel=(0.4, 1.5, -0.7), inertia_body=P @ np.diag(INERTIA) @ P.T)
     tilted = physics.World(physics.Scene([body]), dt=0.01)
-    assert tilted.plan.tilted
+    assert tilted.plan.offset_frame
     tilted.step(steps=100)
     start = ref.RigidState(
         np.zeros(3), np.array([1.0, 0, 0, 0]), np.zeros(3), P @ np.diag(INERTIA) @ P.T @ [0.4, 1.5, -0.7]

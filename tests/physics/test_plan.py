@@ -142,14 +142,14 @@ def test_an_offset_center_is_compiled_only_where_a_body_has_it():
     without = physics.Scene([CUBE, physics.Block((2, 2, 2), 6.0, inertia_body=(3.0, 4.0, 5.0), pos=(0, 5, 0))],
                             FLOOR, effects)  # fmt: skip
     even, uneven = plan((0, 0, 0)), plan((0, 0.1, 0))
-    assert even.tilted is None
+    assert even.offset_frame is None
     assert even.key == physics.make_plan(without, resolve("balanced")).key
-    assert uneven.tilted
+    assert uneven.offset_frame
     assert [a for a, b in zip(even.key, uneven.key) if a != b] == [None]
     assert "center of body 1 is not 0" in uneven.explain()
     assert "is not 0" not in even.explain()
     isotropic = plan((0.1, 0, 0), (4.0, 4.0, 4.0))
-    assert isotropic.tilted
+    assert isotropic.offset_frame
     assert isotropic.gyroscopic is None
 
 

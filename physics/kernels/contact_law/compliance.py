@@ -67,16 +67,16 @@ def _along(x, s, n):
     return x[0] + s * n[0], x[1] + s * n[1], x[2] + s * n[2]
 
 
-def _halves(n, y, h, tilted, work):
+def _halves(n, y, h, offset_frame, work):
     return 0.5 * h, 0.5 * h
 
 
 @if_law((LAW_STIFFNESS,), _halves)
-def split_stage_by_theta(n, y, h, tilted, work):
+def split_stage_by_theta(n, y, h, offset_frame, work):
     """Lengths (1 - θ) h and θ h of the drifts before and after the impulses [s]."""
     q = y[1]
-    place_arms(n, qt.to_matrix(q), tilted, work)
-    R = qt.to_matrix(principal_attitude(q, work, tilted))
+    place_arms(n, qt.to_matrix(q), offset_frame, work)
+    R = qt.to_matrix(principal_attitude(q, work, offset_frame))
     w = n / work.mass
     for i in range(n):
         m = qt.cross(contact_arm(work, i), wall_normal(work.walls, wall_of(work.slot[i], work)))
@@ -91,7 +91,7 @@ def _no_aim(*arguments):
 
 
 @if_law((LAW_STIFFNESS,), _no_aim)
-def set_spring_targets(n, x, motion, before, after, tilted, work):
+def set_spring_targets(n, x, motion, before, after, offset_frame, work):
     """Targets along the normals, and the γ of the stage, instead of `target_velocity.set_resting_targets`.
 
     x and `motion` (`StageMotion`) are those of the body between the drifts of `before` and `after`, before the
@@ -108,12 +108,14 @@ def set_spring_targets(n, x, motion, before, after, tilted, work):
     for i in range(n):
         wall = wall_of(work.slot[i], work)
         normal = wall_normal(work.walls, wall)
-        r, rate = contact_arm_and_rate(work.shape, dims, R, w, normal, feature_of(work.slot[i], work), tilted, work)
+        r, rate = contact_arm_and_rate(
+            work.shape, dims, R, w, normal, feature_of(work.slot[i], work), offset_frame, work
+        )
         gain = 0.0
         if is_turning:
             gain = qt.dot(normal, qt.cross(w, rate)) + qt.dot(normal, qt.cross(alpha, r))
         speed = qt.dot(normal, v) + qt.dot(normal, qt.cross(w, r)) - before * gain
-        gap = feature_gap(work.slot[i], x, R, tilted, work) + 0.5 * after * after * gain
+        gap = feature_gap(work.slot[i], x, R, offset_frame, work) + 0.5 * after * after * gain
         push = k * (theta * gap + (1.0 - theta) * min(work.gap[i], 0.0))
         push += c * (theta * after * gain + (1.0 - theta) * speed)
         work.target[i, 0] = -push / D
@@ -128,56 +130,56 @@ def predict_end_gaps(n, v, w, after, work):
         work.due[i] += after * (qt.dot(normal, v) + qt.dot(normal, qt.cross(w, contact_arm(work, i))))
 
 
-def _as_it_ends(n, y, end, h, tilted, report, work):
+def _as_it_ends(n, y, end, h, offset_frame, report, work):
     return end
 
 
 @inlined
-def _lifted(n, x, R, share, tilted, work):
+def _lifted(n, x, R, share, offset_frame, work):
     """x moved out of the walls until no point is deeper than `share` of what its spring is due to be."""
     least = NEGLIGIBLE_SLOP_SHARE * work.slop
     for i in range(n):
-        lift = share * min(work.due[i], 0.0) - feature_gap(work.slot[i], x, R, tilted, work)
+        lift = share * min(work.due[i], 0.0) - feature_gap(work.slot[i], x, R, offset_frame, work)
         if lift > least:
             x = _along(x, lift, wall_normal(work.walls, wall_of(work.slot[i], work)))
     return x
 
 
 @inlined
-def _work_of_loads(y, end, h, tilted, work):
+def _work_of_loads(y, end, h, offset_frame, work):
     """Work that the loads which are held have done from y to `end`, and what the motion has lost [J]."""
     a, T, v, L = work.free_acceleration, work.torque, end[2], end[3]
     d = end[0][0] - y[0][0], end[0][1] - y[0][1], end[0][2] - y[0][2]
-    lost = kinetic_energy(y[1], y[2], y[3], work, tilted) - kinetic_energy(end[1], v, L, work, tilted)
+    lost = kinetic_energy(y[1], y[2], y[3], work, offset_frame) - kinetic_energy(end[1], v, L, work, offset_frame)
     if T[0] != 0.0 or T[1] != 0.0 or T[2] != 0.0:
-        first, last = angular_velocity(y[1], y[3], work, tilted), angular_velocity(end[1], L, work, tilted)
+        first, last = angular_velocity(y[1], y[3], work, offset_frame), angular_velocity(end[1], L, work, offset_frame)
         turn = 0.5 * (first[0] + last[0]), 0.5 * (first[1] + last[1]), 0.5 * (first[2] + last[2])
         lost += h * (T[0] * turn[0] + T[1] * turn[1] + T[2] * turn[2])
     return lost + work.mass * (a[0] * d[0] + a[1] * d[1] + a[2] * d[2])
 
 
 @inlined
-def _stored(n, x, R, tilted, work):
+def _stored(n, x, R, offset_frame, work):
     """Energy of the springs at x [J]."""
     stored = 0.0
     for i in range(n):
-        gap = min(feature_gap(work.slot[i], x, R, tilted, work), 0.0)
+        gap = min(feature_gap(work.slot[i], x, R, offset_frame, work), 0.0)
         stored += 0.5 * contact_stiffness(work) * gap * gap
     return stored
 
 
 @inlined
-def _without_excess(y, end, excess, h, tilted, report, work):
+def _without_excess(y, end, excess, h, offset_frame, report, work):
     """`end` without the energy `excess` [J] that came from nowhere, if that is more than the stage and its solve miss.
 
     Where there is too little motion to pay with the body stays at y without velocity, and is reported as coarse.
     """
     x, q, v, L = end
-    size = kinetic_energy(y[1], y[2], y[3], work, tilted)
+    size = kinetic_energy(y[1], y[2], y[3], work, offset_frame)
     size += work.mass * h * h * qt.dot(work.free_acceleration, work.free_acceleration)
     if not excess > max(work.tolerance, ENERGY_GAIN_TOLERANCE) * size:
         return end
-    motion = kinetic_energy(q, v, L, work, tilted)
+    motion = kinetic_energy(q, v, L, work, offset_frame)
     if not excess < motion:
         report[work.world, at.UNRESOLVED_MOTION] += 1.0
         return y[0], y[1], (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
@@ -186,7 +188,7 @@ def _without_excess(y, end, excess, h, tilted, report, work):
 
 
 @if_law((LAW_STIFFNESS,), _as_it_ends)
-def correct_spring_depth(n, y, end, h, tilted, report, work):
+def correct_spring_depth(n, y, end, h, offset_frame, report, work):
     """The end of a stage from y with no point deeper than its spring is due to be, and no other one in a wall.
 
     Nor is more stored in the springs than there was, and than the motion has lost and the loads have done on the way.
@@ -195,22 +197,22 @@ def correct_spring_depth(n, y, end, h, tilted, report, work):
     """
     x, q, v, L = end
     R, least = qt.to_matrix(q), NEGLIGIBLE_SLOP_SHARE * work.slop
-    x = _lifted(n, x, R, 1.0, tilted, work)
+    x = _lifted(n, x, R, 1.0, offset_frame, work)
     before = 0.0
     for i in range(n):
         before += 0.5 * contact_stiffness(work) * min(work.gap[i], 0.0) ** 2
-    stored = _stored(n, x, R, tilted, work)
+    stored = _stored(n, x, R, offset_frame, work)
     if stored > before:
-        budget = before + _work_of_loads(y, (x, q, v, L), h, tilted, work)
+        budget = before + _work_of_loads(y, (x, q, v, L), h, offset_frame, work)
         if stored > budget:
-            x = _lifted(n, x, R, math.sqrt(max(budget, 0.0) / stored), tilted, work)
-            stored = _stored(n, x, R, tilted, work)
-    gap, slot = nearest_outside_set(x, R, tilted, work)
+            x = _lifted(n, x, R, math.sqrt(max(budget, 0.0) / stored), offset_frame, work)
+            stored = _stored(n, x, R, offset_frame, work)
+    gap, slot = nearest_outside_set(x, R, offset_frame, work)
     if gap < -least:
         x = _along(x, -gap, wall_normal(work.walls, wall_of(slot, work)))
-    end = lift_conserving_energy(x, end, tilted, work)
-    excess = stored - before - _work_of_loads(y, end, h, tilted, work)
-    return _without_excess(y, end, excess, h, tilted, report, work)
+    end = lift_conserving_energy(x, end, offset_frame, work)
+    excess = stored - before - _work_of_loads(y, end, h, offset_frame, work)
+    return _without_excess(y, end, excess, h, offset_frame, report, work)
 
 
 def _as_it_is(block, work):

@@ -31,13 +31,13 @@ _FREE_LIFT_SLOPS = 10.0
 
 
 @inlined
-def lift_conserving_energy(z, y, tilted, work):
+def lift_conserving_energy(z, y, offset_frame, work):
     """y at the place z out of a wall. The work of the lift against the loads is paid with motion, if there is any."""
     x, q, v, L = y
     d, a = (z[0] - x[0], z[1] - x[1], z[2] - x[2]), work.free_acceleration
     lift = -work.mass * (a[0] * d[0] + a[1] * d[1] + a[2] * d[2])
     if qt.dot(d, d) > (_FREE_LIFT_SLOPS * work.slop) ** 2 and lift > 0.0:
-        kinetic = kinetic_energy(q, v, L, work, tilted)
+        kinetic = kinetic_energy(q, v, L, work, offset_frame)
         s = math.sqrt(1.0 - lift / kinetic) if lift < kinetic else 0.0
         v, L = (s * v[0], s * v[1], s * v[2]), (s * L[0], s * L[1], s * L[2])
     return z, q, v, L
@@ -60,14 +60,14 @@ def rebound_share(before, plastic, full, middle):
 
 
 @inlined
-def limit_rebound_energy(q, before, plastic, full, work, tilted):
+def limit_rebound_energy(q, before, plastic, full, work, offset_frame):
     """The (v, L) between those of a plastic impact and of a full rebound that there is energy for, and its share s.
 
     `before` is the energy before the impact [J], which the full rebound would raise.
     """
     (v0, L0), (v1, L1) = plastic, full
-    middle = kinetic_energy(q, lerp(v0, v1, 0.5), lerp(L0, L1, 0.5), work, tilted)
-    ends = kinetic_energy(q, v0, L0, work, tilted), kinetic_energy(q, v1, L1, work, tilted)
+    middle = kinetic_energy(q, lerp(v0, v1, 0.5), lerp(L0, L1, 0.5), work, offset_frame)
+    ends = kinetic_energy(q, v0, L0, work, offset_frame), kinetic_energy(q, v1, L1, work, offset_frame)
     s = rebound_share(before, ends[0], ends[1], middle)
     return lerp(v0, v1, s), lerp(L0, L1, s), s
 

@@ -51,7 +51,7 @@ def may_have_impact(bounce_speed, slop_speed, work):
 
 
 @inlined
-def set_impact_targets(n, bounce_speed, slop_speed, y, h, tilted, memory, work):
+def set_impact_targets(n, bounce_speed, slop_speed, y, h, offset_frame, memory, work):
     """Targets of an impact, and what there is: nothing, contacts to bring back to rest, or an impact.
 
     A contact that approaches faster than `bounce_speed` leaves with e times that speed (Newton's law); one that
@@ -71,7 +71,7 @@ def set_impact_targets(n, bounce_speed, slop_speed, y, h, tilted, memory, work):
         if is_bounce or s < 0.0:
             goal = work.restitution * s
         if is_bounce or s > slop_speed + max(work.gap[i], 0.0) * rate:
-            if is_persistent_contact(i, y, h, tilted, memory, work):
+            if is_persistent_contact(i, y, h, offset_frame, memory, work):
                 work.speed[i] = goal = 0.0
                 found = max(found, RESIDUAL_APPROACH)
             else:
@@ -120,16 +120,16 @@ def _in_frame(k, a, walls):
 
 
 @kernel
-def _wandering(k, R, w, tilted, work):
+def _wandering(k, R, w, offset_frame, work):
     """`contact_arm_and_rate` of a body without vertices at wall k: apart, so that blocks do not carry it along."""
     dims = (work.dims[0], work.dims[1], work.dims[2])
-    return contact_arm_and_rate(work.shape, dims, R, w, wall_normal(work.walls, k), 0, tilted, work)
+    return contact_arm_and_rate(work.shape, dims, R, w, wall_normal(work.walls, k), 0, offset_frame, work)
 
 
 @inlined
-def _wandering_point(k, R, w, alpha, tilted, work):
+def _wandering_point(k, R, w, alpha, offset_frame, work):
     """Return ω x r, ω x ṙ and α x r of a body without vertices at wall k, four times each."""
-    r, rate = _wandering(k, R, w, tilted, work)
+    r, rate = _wandering(k, R, w, offset_frame, work)
     turn, a, b = qt.cross(w, r), qt.cross(w, rate), qt.cross(alpha, r)
     return (
         (broadcast(turn[0]), broadcast(turn[1]), broadcast(turn[2])),
@@ -139,7 +139,7 @@ def _wandering_point(k, R, w, alpha, tilted, work):
 
 
 @inlined
-def _aim_at_wall(first, n, motion, limits, tilted, work):
+def _aim_at_wall(first, n, motion, limits, offset_frame, work):
     """`set_resting_targets` for contacts from `first` on, up to four of one wall: the next one after them."""
     walls, arm = work.walls, work.arm
     R, v, w, alpha = motion
@@ -157,7 +157,7 @@ def _aim_at_wall(first, n, motion, limits, tilted, work):
         turn = qt.cross(w, r)
         a, b = qt.cross(w, turn), qt.cross(alpha, r)
         if work.shape != BLOCK:
-            turn, a, b = _wandering_point(k, R, w, alpha, tilted, work)
+            turn, a, b = _wandering_point(k, R, w, alpha, offset_frame, work)
         u = (v[0] + turn[0], v[1] + turn[1], v[2] + turn[2])
         c = (-half * (a[0] + b[0]), -half * (a[1] + b[1]), -half * (a[2] + b[2]))
         t0, t1, t2 = clamp_target_to_energy(_in_frame(k, c, walls), _in_frame(k, u, walls))
@@ -170,14 +170,14 @@ def _aim_at_wall(first, n, motion, limits, tilted, work):
 
 
 @kernel
-def _aim_at_others(first, n, motion, limits, tilted, work):
+def _aim_at_others(first, n, motion, limits, offset_frame, work):
     """`set_resting_targets` for contacts from `first` on: apart, since most bodies touch one wall."""
     while first < n:
-        first = _aim_at_wall(first, n, motion, limits, tilted, work)
+        first = _aim_at_wall(first, n, motion, limits, offset_frame, work)
 
 
 @inlined
-def set_resting_targets(n, motion, h, tilted, work):
+def set_resting_targets(n, motion, h, offset_frame, work):
     """Targets of the resting stage over h, from the motion at its middle before the impulses (`StageMotion`).
 
     The impulses act at the middle of the step, the target is the velocity at its end, half a step later: by then a
@@ -192,6 +192,6 @@ def set_resting_targets(n, motion, h, tilted, work):
     negligible = max(work.tolerance * work.acceleration * h, NEGLIGIBLE_SLOP_SHARE * work.slop / h)
     rate = (1.0 if work.is_last else GAP_CLOSING_SHARE) / h
     limits = TargetLimits(0.5 * h, is_turning, negligible, rate)
-    first = _aim_at_wall(0, n, motion, limits, tilted, work)
+    first = _aim_at_wall(0, n, motion, limits, offset_frame, work)
     if first < n:
-        _aim_at_others(first, n, motion, limits, tilted, work)
+        _aim_at_others(first, n, motion, limits, offset_frame, work)

@@ -50,7 +50,7 @@ def set_up_contact(i, slot, r, target, work):
 
 
 @kernel
-def set_up_resting_problem(count, y, R, w, has_sliding, tilted, work, motion):
+def set_up_resting_problem(count, y, R, w, has_sliding, offset_frame, work, motion):
     """Write the contact problem of candidates that do not slide into `work`: (acceleration, moment) without forces.
 
     It is that of an impact with the free acceleration for velocity, the moment τ - ω x L for angular momentum and
@@ -63,7 +63,7 @@ def set_up_resting_problem(count, y, R, w, has_sliding, tilted, work, motion):
         slot = motion.candidate[i]
         axes = wall_axes(walls, wall_of(slot, work))
         r, rate = contact_arm_and_rate(
-            work.shape, as_vector(work.dims), R, w, axes[0], feature_of(slot, work), tilted, work
+            work.shape, as_vector(work.dims), R, w, axes[0], feature_of(slot, work), offset_frame, work
         )
         c = qt.cross(w, rate)
         if has_sliding:  # as if it had accelerated along its sliding for long: no force then turns it
@@ -108,9 +108,9 @@ def is_body_at_rest(y, w, acceleration, work, motion):
 
 
 @kernel
-def read_resting_mode(count, y, a, moment, friction, has_sliding, tilted, work, motion):
+def read_resting_mode(count, y, a, moment, friction, has_sliding, offset_frame, work, motion):
     """Read the regime from the solution of `set_up_resting_problem`'s problem, and set the contacts that act."""
-    R, P, w, _ = free_angular_motion(y, tilted, work)
+    R, P, w, _ = free_angular_motion(y, offset_frame, work)
     alpha = apply_inverse_inertia(P, work.J, moment)
     width = 3
     if friction is None:
@@ -120,7 +120,7 @@ def read_resting_mode(count, y, a, moment, friction, has_sliding, tilted, work, 
     if has_sliding:
         small *= _SLIDING_ACCELERATION
     for i in range(count):
-        an, at = contact_acceleration(i, y, R, w, a, alpha, tilted, work, motion)
+        an, at = contact_acceleration(i, y, R, w, a, alpha, offset_frame, work, motion)
         size = math.sqrt(qt.dot(at, at))
         push = work.impulse[width * i]
         if has_sliding and push > _PAINLEVE_PUSH * _SLIDING_ACCELERATION * work.mass * scale:

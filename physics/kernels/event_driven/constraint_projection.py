@@ -55,17 +55,17 @@ def _project_velocities(holding, v, m, P, work, motion):
 
 
 @kernel
-def project_normal_speeds(y, tilted, work, motion):
+def project_normal_speeds(y, offset_frame, work, motion):
     """State without the normal velocities of the contacts that act."""
     x, q, v, m = y
-    R, P, w, alpha = free_angular_motion(y, tilted, work)
-    set_contact_kinematics(y, R, w, alpha, tilted, work, motion)
+    R, P, w, alpha = free_angular_motion(y, offset_frame, work)
+    set_contact_kinematics(y, R, w, alpha, offset_frame, work, motion)
     v, m = _project_velocities(False, v, m, P, work, motion)
     return x, q, v, m
 
 
 @kernel
-def project_state(y, tilted, work, motion):
+def project_state(y, offset_frame, work, motion):
     """State without the gaps and velocities of contacts that the regime does not allow, where above rounding.
 
     Least change in the kinetic metric: along M⁻¹ Jᵀ.
@@ -73,8 +73,8 @@ def project_state(y, tilted, work, motion):
     if motion.count == 0:
         return y
     x, q, v, m = y
-    R, P, w, alpha = free_angular_motion(y, tilted, work)
-    set_contact_kinematics(y, R, w, alpha, tilted, work, motion)
+    R, P, w, alpha = free_angular_motion(y, offset_frame, work)
+    set_contact_kinematics(y, R, w, alpha, offset_frame, work, motion)
     worst = 0.0
     for j in range(motion.count):
         wall = wall_of(motion.slot[j], work)
@@ -87,7 +87,7 @@ def project_state(y, tilted, work, motion):
         move, turn = _projection_step(False, P, work, motion)
         x = plus(x, move)
         q = qt.normalise(qt.multiply(qt.exp_map(apply_inverse_inertia(P, work.J, turn)), q))
-        R, P, w, alpha = free_angular_motion((x, q, v, m), tilted, work)
-        set_contact_kinematics((x, q, v, m), R, w, alpha, tilted, work, motion)
+        R, P, w, alpha = free_angular_motion((x, q, v, m), offset_frame, work)
+        set_contact_kinematics((x, q, v, m), R, w, alpha, offset_frame, work, motion)
     v, m = _project_velocities(True, v, m, P, work, motion)
     return x, q, v, m

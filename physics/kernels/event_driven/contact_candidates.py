@@ -33,10 +33,10 @@ _UNSEEN_APPROACH = 1.0e-2
 
 
 @kernel
-def find_candidates(y, tilted, work, motion):
+def find_candidates(y, offset_frame, work, motion):
     """Features that touch and do not leave, into `candidate`: (count, whether one approaches)."""
     put_state_row(motion, ROW_START, y)
-    compute_feature_gaps(ROW_START, tilted, work, motion)
+    compute_feature_gaps(ROW_START, offset_frame, work, motion)
     count = motion.candidates = 0
     for s in range(motion.is_active.shape[0]):
         if motion.gap[ROW_START, s] <= motion.touch and count < motion.slot.shape[0]:
@@ -88,7 +88,7 @@ def has_normal_speed(motion):
 
 
 @kernel
-def project_candidate_speeds(y, tilted, work, motion):
+def project_candidate_speeds(y, offset_frame, work, motion):
     """State without the normal velocities of all candidates that neither come nor go, whether they act or not.
 
     A body that lies on two contacts and rocks lower than counts would else come down on the one whenever it is set
@@ -97,7 +97,7 @@ def project_candidate_speeds(y, tilted, work, motion):
     if not has_open_candidate(motion):
         return y
     put_state_row(motion, ROW_START, y)
-    compute_feature_gaps(ROW_START, tilted, work, motion)
+    compute_feature_gaps(ROW_START, offset_frame, work, motion)
     if not has_normal_speed(motion):
         return y
     motion.count = 0
@@ -106,18 +106,18 @@ def project_candidate_speeds(y, tilted, work, motion):
         if motion.gap[ROW_START, s] <= motion.touch and abs(motion.gap_rate[ROW_START, s]) <= motion.still:
             motion.slot[motion.count], motion.holds[motion.count] = s, 0
             motion.count += 1
-    y = project_normal_speeds(y, tilted, work, motion)
+    y = project_normal_speeds(y, offset_frame, work, motion)
     activate_candidates(motion.candidates, work, motion)
     return y
 
 
 @inlined
-def contact_acceleration(i, y, R, w, a, alpha, tilted, work, motion):
+def contact_acceleration(i, y, R, w, a, alpha, offset_frame, work, motion):
     """Acceleration of candidate i: (normal part, tangential part)."""
     wall = wall_of(motion.candidate[i], work)
     n = wall_normal(work.walls, wall)
     r, rate = contact_arm_and_rate(
-        work.shape, as_vector(work.dims), R, w, n, feature_of(motion.candidate[i], work), tilted, work
+        work.shape, as_vector(work.dims), R, w, n, feature_of(motion.candidate[i], work), offset_frame, work
     )
     b = plus(plus(a, qt.cross(alpha, r)), qt.cross(w, rate))
     bn = qt.dot(n, b)
@@ -125,12 +125,12 @@ def contact_acceleration(i, y, R, w, a, alpha, tilted, work, motion):
 
 
 @kernel
-def is_candidate_sliding(i, y, R, w, tilted, work, motion):
+def is_candidate_sliding(i, y, R, w, offset_frame, work, motion):
     """True if candidate i slides; its direction into `candidate_way`."""
     wall = wall_of(motion.candidate[i], work)
     n = wall_normal(work.walls, wall)
     r, _ = contact_arm_and_rate(
-        work.shape, as_vector(work.dims), R, w, n, feature_of(motion.candidate[i], work), tilted, work
+        work.shape, as_vector(work.dims), R, w, n, feature_of(motion.candidate[i], work), offset_frame, work
     )
     u = plus(y[2], qt.cross(w, r))
     un = qt.dot(n, u)

@@ -49,13 +49,13 @@ def apply_inverse_inertia(P, J, h):
 
 
 @kernel
-def free_angular_motion(y, tilted, work):
+def free_angular_motion(y, offset_frame, work):
     """Body axes, principal axes, ω and the rate of change of ω without contact: (R, P, ω, I⁻¹(τ - ω x L))."""
     q, L = y[1], y[3]
     R = qt.to_matrix(q)
     P = R
-    if tilted is not None:
-        P = qt.to_matrix(principal_attitude(q, work, tilted))
+    if offset_frame is not None:
+        P = qt.to_matrix(principal_attitude(q, work, offset_frame))
     J = work.J
     w = apply_inverse_inertia(P, J, L)
     g = qt.cross(w, L)
@@ -64,13 +64,13 @@ def free_angular_motion(y, tilted, work):
 
 
 @kernel
-def set_contact_kinematics(y, R, w, alpha, tilted, work, motion):
+def set_contact_kinematics(y, R, w, alpha, offset_frame, work, motion):
     """Arms, velocities, directions of sliding and free accelerations (`goal`) of the contacts that act."""
     shape, walls = work.shape, work.walls
     dims, a, v = as_vector(work.dims), as_vector(work.free_acceleration), y[2]
     for j in range(motion.count):
         n = wall_normal(walls, wall_of(motion.slot[j], work))
-        r, rate = contact_arm_and_rate(shape, dims, R, w, n, feature_of(motion.slot[j], work), tilted, work)
+        r, rate = contact_arm_and_rate(shape, dims, R, w, n, feature_of(motion.slot[j], work), offset_frame, work)
         u = plus(v, qt.cross(w, r))
         b = plus(plus(a, qt.cross(alpha, r)), qt.cross(w, rate))
         un = qt.dot(n, u)

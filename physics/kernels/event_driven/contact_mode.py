@@ -30,7 +30,7 @@ from physics.kernels.event_driven.contact_mode_search import search_contact_mode
 
 
 @kernel
-def find_contact_mode(y, friction, tilted, work, motion):
+def find_contact_mode(y, friction, offset_frame, work, motion):
     """Find the regime at y and the contacts that act: (regime, number of candidates, acceleration, moment).
 
     `MODE_UNDECIDED`: none of the candidates slides, and the contact problem with this acceleration and moment, which is
@@ -39,23 +39,23 @@ def find_contact_mode(y, friction, tilted, work, motion):
     """
     zero = (0.0, 0.0, 0.0)
     motion.count = 0
-    count, approaches = find_candidates(y, tilted, work, motion)
+    count, approaches = find_candidates(y, offset_frame, work, motion)
     for s in range(motion.is_active.shape[0]):
         motion.is_active[s] = 0
     if approaches:
         return MODE_IMPACT, 0, zero, zero
     if count == 0:
         return MODE_FLIGHT, 0, zero, zero
-    R, P, w, alpha = free_angular_motion(y, tilted, work)
+    R, P, w, alpha = free_angular_motion(y, offset_frame, work)
     slides = False
     if friction is not None:
         for i in range(count):
-            slides = is_candidate_sliding(i, y, R, w, tilted, work, motion) or slides
-    if not slides or not search_contact_modes(count, y, R, P, w, alpha, tilted, work, motion):
+            slides = is_candidate_sliding(i, y, R, w, offset_frame, work, motion) or slides
+    if not slides or not search_contact_modes(count, y, R, P, w, alpha, offset_frame, work, motion):
         if slides:
             for i in range(count):
-                is_candidate_sliding(i, y, R, w, tilted, work, motion)
-        a, moment = set_up_resting_problem(count, y, R, w, slides, tilted, work, motion)
+                is_candidate_sliding(i, y, R, w, offset_frame, work, motion)
+        a, moment = set_up_resting_problem(count, y, R, w, slides, offset_frame, work, motion)
         return (MODE_UNDECIDED_SLIDING if slides else MODE_UNDECIDED), count, a, moment
     if has_closing_contact(count, motion):
         return MODE_IMPACT, 0, zero, zero

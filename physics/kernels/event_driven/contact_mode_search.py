@@ -39,7 +39,7 @@ _SAME_DIRECTION = 1.0e-9
 
 
 @kernel
-def _worst_violation(count, y, rates, scale, tilted, work, motion):
+def _worst_violation(count, y, rates, scale, offset_frame, work, motion):
     """The change that a trial needs most: (candidate, its new kind), -1 when all conditions hold.
 
     `rates` are the attitude, the angular velocity, and both accelerations of the trial.
@@ -77,7 +77,7 @@ def _worst_violation(count, y, rates, scale, tilted, work, motion):
         motion.is_fresh[which] = 1
         return which, kind
     for i in range(count):
-        an, at = contact_acceleration(i, y, R, w, a, alpha, tilted, work, motion)
+        an, at = contact_acceleration(i, y, R, w, a, alpha, offset_frame, work, motion)
         if motion.kind[i] == CANDIDATE_OPEN and an < -_EXACT_ZERO_SHARE * scale:
             return i, CANDIDATE_SLIDING if motion.is_fresh[i] == 0 else CANDIDATE_STICKING
         if motion.kind[i] == CANDIDATE_SLIDING and motion.is_fresh[i]:
@@ -102,20 +102,20 @@ def has_last_forces(motion):
 
 
 @kernel
-def search_modes_once(count, y, R, P, w, alpha_free, tilted, work, motion):
+def search_modes_once(count, y, R, P, w, alpha_free, offset_frame, work, motion):
     """`search_contact_modes` with the last forces as they are."""
     scale = work.acceleration + work.radius * qt.dot(w, w)
     for i in range(count):
         motion.is_fresh[i] = motion.changes[i] = 0
         motion.kind[i] = CANDIDATE_SLIDING
-        if not is_candidate_sliding(i, y, R, w, tilted, work, motion):
+        if not is_candidate_sliding(i, y, R, w, offset_frame, work, motion):
             motion.is_fresh[i] = 1
             if work.mu > 0.0:
                 motion.kind[i] = CANDIDATE_STICKING
     f = as_vector(work.free_acceleration)
     for _ in range(_MAX_MODE_TRIALS):
         activate_candidates(count, work, motion)
-        set_contact_kinematics(y, R, w, alpha_free, tilted, work, motion)
+        set_contact_kinematics(y, R, w, alpha_free, offset_frame, work, motion)
         m = assemble_unknowns(work.mu, True, work, motion)
         F, T = solve_contact_forces(m, P, work, motion)
         recover_contact_forces(work.mu, work, motion)
@@ -123,7 +123,7 @@ def search_modes_once(count, y, R, P, w, alpha_free, tilted, work, motion):
         s = 1.0 / work.mass
         a = (f[0] + s * F[0], f[1] + s * F[1], f[2] + s * F[2])
         alpha = plus(alpha_free, turn)
-        which, kind = _worst_violation(count, y, (R, w, a, alpha), scale, tilted, work, motion)
+        which, kind = _worst_violation(count, y, (R, w, a, alpha), scale, offset_frame, work, motion)
         if which < 0:
             return True
         if kind != motion.kind[which]:
@@ -135,11 +135,11 @@ def search_modes_once(count, y, R, P, w, alpha_free, tilted, work, motion):
 
 
 @kernel
-def search_contact_modes(count, y, R, P, w, alpha_free, tilted, work, motion):
+def search_contact_modes(count, y, R, P, w, alpha_free, offset_frame, work, motion):
     """Kinds of the candidates when some of them slide; whether they were found, with the last forces or without."""
-    if search_modes_once(count, y, R, P, w, alpha_free, tilted, work, motion):
+    if search_modes_once(count, y, R, P, w, alpha_free, offset_frame, work, motion):
         return True
     if not has_last_forces(motion):
         return False
     clear_last_forces(motion)
-    return search_modes_once(count, y, R, P, w, alpha_free, tilted, work, motion)
+    return search_modes_once(count, y, R, P, w, alpha_free, offset_frame, work, motion)

@@ -98,12 +98,12 @@ def put_state_row(motion, row, state):
 
 
 @kernel
-def compute_state_rate(row, later, tilted, work, motion):
+def compute_state_rate(row, later, offset_frame, work, motion):
     """Rate of change of a row of `y`, `later` [s] than START, into `rate`, its contacts' forces into the unknowns."""
     state = get_state_row(motion, row)
-    refresh_loads(state, later, tilted, work)
+    refresh_loads(state, later, offset_frame, work)
     q, v = state[1], state[2]
-    F, T, w, _, _ = solve_mode_forces(state, tilted, work, motion)
+    F, T, w, _, _ = solve_mode_forces(state, offset_frame, work, motion)
     inv_mass = 1.0 / work.mass
     turn = qt.multiply((0.0, w[0], w[1], w[2]), q)
     rate = motion.rate
@@ -134,7 +134,7 @@ def set_error_scale(h, work, motion):
 
 
 @kernel
-def _midpoint_rule(parts, h, tilted, work, motion):
+def _midpoint_rule(parts, h, offset_frame, work, motion):
     """One rule with `parts` parts from START, smoothed, into row END."""
     y, rate = motion.y, motion.rate
     s = h / parts
@@ -142,18 +142,18 @@ def _midpoint_rule(parts, h, tilted, work, motion):
         y[ROW_PREVIOUS, c] = y[ROW_START, c]
         y[ROW_CURRENT, c] = y[ROW_START, c] + s * motion.first_rate[c]
     for k in range(1, parts):
-        compute_state_rate(ROW_CURRENT, k * s, tilted, work, motion)
+        compute_state_rate(ROW_CURRENT, k * s, offset_frame, work, motion)
         for c in range(Y_SIZE):
             old = y[ROW_PREVIOUS, c]
             y[ROW_PREVIOUS, c] = y[ROW_CURRENT, c]
             y[ROW_CURRENT, c] = old + 2.0 * s * rate[c]
-    compute_state_rate(ROW_CURRENT, h, tilted, work, motion)
+    compute_state_rate(ROW_CURRENT, h, offset_frame, work, motion)
     for c in range(Y_SIZE):
         y[ROW_END, c] = 0.5 * (y[ROW_CURRENT, c] + y[ROW_PREVIOUS, c] + s * rate[c])
 
 
 @kernel
-def try_extrapolated_step(h, tilted, work, motion):
+def try_extrapolated_step(h, offset_frame, work, motion):
     """Row END from row START, h later (`first_rate` known): (relative error, rules used)."""
     table, y = motion.table, motion.y
     goal = work.tolerance
@@ -162,7 +162,7 @@ def try_extrapolated_step(h, tilted, work, motion):
     error = math.inf
     used = MAX_MIDPOINT_RULES
     for k in range(MAX_MIDPOINT_RULES):
-        _midpoint_rule(2 * (k + 1), h, tilted, work, motion)
+        _midpoint_rule(2 * (k + 1), h, offset_frame, work, motion)
         before = error
         error = total = 0.0
         for c in range(Y_SIZE):
@@ -193,7 +193,7 @@ def try_extrapolated_step(h, tilted, work, motion):
 
 
 @kernel
-def prepare_extrapolated_step(left, tilted, work, motion):
+def prepare_extrapolated_step(left, offset_frame, work, motion):
     """Make row START ready for `try_extrapolated_step`; how long the step should be at most.
 
     No longer than the time `left`, what the last step's ease suggests, a turn of TURN_AT_MOST, the time at which a
@@ -201,11 +201,11 @@ def prepare_extrapolated_step(left, tilted, work, motion):
     its radius, so that no wall is reached and left again unseen.
     """
     state = get_state_row(motion, ROW_START)
-    R, P, w, alpha = free_angular_motion(state, tilted, work)
+    R, P, w, alpha = free_angular_motion(state, offset_frame, work)
     for j in range(motion.count):
         for c in range(3):
             motion.reference[j, c] = motion.way[j, c]
-    set_contact_kinematics(state, R, w, alpha, tilted, work, motion)
+    set_contact_kinematics(state, R, w, alpha, offset_frame, work, motion)
     for j in range(motion.count):
         t, speed = sliding_velocity(j, work, motion)
         motion.is_starting[j] = 1 if speed <= motion.slow else 0
@@ -213,10 +213,10 @@ def prepare_extrapolated_step(left, tilted, work, motion):
             for c in range(3):
                 motion.reference[j, c] = t[c] / speed
     motion.turning = motion.stiffness = 0.0
-    _set_first_rate(tilted, work, motion)
+    _set_first_rate(offset_frame, work, motion)
     turn = motion.spin = math.sqrt(qt.dot(w, w))
     if has_one_sliding_contact(work, motion):
-        _begin_slide(P, tilted, work, motion)
+        _begin_slide(P, offset_frame, work, motion)
     motion.weight = work.mass * (work.acceleration + work.radius * turn * turn)
     h = min(left, motion.step)
     if work.shape != SPHERE and h * turn > _MAX_STEP_ROTATION:
@@ -227,34 +227,34 @@ def prepare_extrapolated_step(left, tilted, work, motion):
 
 
 @inlined
-def _set_first_rate(tilted, work, motion):
+def _set_first_rate(offset_frame, work, motion):
     """`first_rate`: that of START."""
-    compute_state_rate(ROW_START, 0.0, tilted, work, motion)
+    compute_state_rate(ROW_START, 0.0, offset_frame, work, motion)
     for c in range(Y_SIZE):
         motion.first_rate[c] = motion.rate[c]
 
 
 @kernel
-def _begin_slide(P, tilted, work, motion):
+def _begin_slide(P, offset_frame, work, motion):
     """Prepare the only contact, which slides, at START; one that creeps has the direction of `slip_onset`."""
     motion.stiffness = friction_turn_stiffness(P, work, motion)
     _, motion.first_speed = sliding_velocity(0, work, motion)
     motion.growth = qt.dot(contact_velocity_rate(0, P, work, motion), row_vector(motion.reference, 0, 0))
     if motion.growth >= 0.0 and is_creeping(motion.growth, motion.first_speed, work, motion):
         motion.is_starting[0] = 1
-        _set_first_rate(tilted, work, motion)
+        _set_first_rate(offset_frame, work, motion)
     if motion.is_starting[0]:
-        _set_slip_turn_rate(tilted, work, motion)
-        _set_first_rate(tilted, work, motion)
+        _set_slip_turn_rate(offset_frame, work, motion)
+        _set_first_rate(offset_frame, work, motion)
 
 
 @inlined
-def _set_slip_turn_rate(tilted, work, motion):
+def _set_slip_turn_rate(offset_frame, work, motion):
     """`turning` of the only contact, by a look a moment ahead."""
     d = row_vector(motion.way, 0, 0)
     for c in range(Y_SIZE):
         motion.y[ROW_CURRENT, c] = motion.y[ROW_START, c] + motion.nearest * motion.first_rate[c]
-    compute_state_rate(ROW_CURRENT, motion.nearest, tilted, work, motion)
+    compute_state_rate(ROW_CURRENT, motion.nearest, offset_frame, work, motion)
     n = wall_normal(work.walls, wall_of(motion.slot[0], work))
     motion.turning = qt.dot(qt.cross(n, d), row_vector(motion.way, 0, 0)) / motion.nearest
 

@@ -42,11 +42,11 @@ def store_force_margins(row, work, motion):
 
 
 @inlined
-def _probe_margins(row, t, moment, tilted, work, motion):
+def _probe_margins(row, t, moment, offset_frame, work, motion):
     """Margins `moment` after a row of `y` at the time t, of the rate of change `rate`, into INSIDE."""
     for c in range(Y_SIZE):
         motion.y[ROW_CURRENT, c] = motion.y[row, c] + moment * motion.rate[c]
-    compute_state_rate(ROW_CURRENT, t + moment, tilted, work, motion)
+    compute_state_rate(ROW_CURRENT, t + moment, offset_frame, work, motion)
     store_force_margins(_INSIDE_ROW, work, motion)
 
 
@@ -60,7 +60,7 @@ def _cubic_interior_minimum(low, fall, high, rise, h):
 
 
 @kernel
-def find_force_minimum(h, used, tilted, work, motion):
+def find_force_minimum(h, used, offset_frame, work, motion):
     """The time within the step of h to END at which a margin of force may be used up, h where there is none.
 
     What is known of the start of the step is in START of `margin`; forces, rates and unknowns are those of END.
@@ -72,7 +72,7 @@ def find_force_minimum(h, used, tilted, work, motion):
     store_force_margins(ROW_END, work, motion)
     for c in range(Y_SIZE):
         motion.last_rate[c], motion.rate[c] = motion.rate[c], motion.first_rate[c]
-    _probe_margins(ROW_START, 0.0, moment, tilted, work, motion)
+    _probe_margins(ROW_START, 0.0, moment, offset_frame, work, motion)
     for sort in range(2):
         for j in range(motion.count):
             motion.fall[sort, j] = (motion.margin[_INSIDE_ROW, sort, j] - motion.margin[ROW_START, sort, j]) / moment
@@ -81,7 +81,7 @@ def find_force_minimum(h, used, tilted, work, motion):
     if falls:
         for c in range(Y_SIZE):
             motion.rate[c] = motion.last_rate[c]
-        _probe_margins(ROW_END, h, -moment, tilted, work, motion)
+        _probe_margins(ROW_END, h, -moment, offset_frame, work, motion)
         for sort in range(2):
             for j in range(motion.count):
                 low, high, fall = (
@@ -99,6 +99,6 @@ def find_force_minimum(h, used, tilted, work, motion):
                     first = min(first, t)
     if not 0.0 < first < h:
         first = h
-        compute_state_rate(ROW_END, h, tilted, work, motion)
+        compute_state_rate(ROW_END, h, offset_frame, work, motion)
         recover_contact_forces(work.mu, work, motion)
     return first

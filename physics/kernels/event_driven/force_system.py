@@ -85,13 +85,13 @@ def solve_contact_forces(m, P, work, motion):
 
 
 @kernel
-def solve_mode_forces(y, tilted, work, motion):
+def solve_mode_forces(y, offset_frame, work, motion):
     """Forces of the regime at y: (total force, total moment, ω, dω/dt without contact, principal axes)."""
-    R, P, w, alpha = free_angular_motion(y, tilted, work)
+    R, P, w, alpha = free_angular_motion(y, offset_frame, work)
     zero = (0.0, 0.0, 0.0)
     if motion.count == 0:
         return zero, zero, w, alpha, P
-    set_contact_kinematics(y, R, w, alpha, tilted, work, motion)
+    set_contact_kinematics(y, R, w, alpha, offset_frame, work, motion)
     set_slip_onset_direction(P, work, motion)
     m = assemble_unknowns(work.mu, True, work, motion)
     force, moment = solve_contact_forces(m, P, work, motion)

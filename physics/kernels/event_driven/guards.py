@@ -45,12 +45,12 @@ FORCE_MARGIN_TOLERANCE = 1.0e-9
 
 
 @kernel
-def compute_feature_gaps(row, tilted, work, motion):
+def compute_feature_gaps(row, offset_frame, work, motion):
     """Gaps and their rates of all features into column `row` of `gap`; of a wall out of reach infinite."""
     x, q, v, m = get_state_row(motion, row)
-    R, _, w, _ = free_angular_motion((x, q, v, m), tilted, work)
+    R, _, w, _ = free_angular_motion((x, q, v, m), offset_frame, work)
     dims, features, shape = as_vector(work.dims), work.features, work.shape
-    center = geometric_center(x, R, work, tilted)
+    center = geometric_center(x, R, work, offset_frame)
     for k in range(work.walls.shape[0]):
         n = wall_normal(work.walls, k)
         d = qt.dot(n, center) - work.walls[k, WALL_OFFSET]
@@ -61,7 +61,7 @@ def compute_feature_gaps(row, tilted, work, motion):
         e = geo.scaled_normal(shape, dims, R, n)
         vn, turn = qt.dot(n, v), qt.cross(n, w)
         if shape == BLOCK:
-            if tilted is not None:
+            if offset_frame is not None:
                 vn += qt.dot(turn, center_arm(R, work))
             b = qt.transposed_matvec(R, turn)
             f = (dims[0] * b[0], dims[1] * b[1], dims[2] * b[2])
@@ -220,22 +220,22 @@ def least_force_margin(slack, work, motion):
 
 
 @kernel
-def least_start_force_margin(tilted, work, motion):
+def least_start_force_margin(offset_frame, work, motion):
     """Smallest margin of force at START, nothing of it rounding."""
-    compute_state_rate(ROW_START, 0.0, tilted, work, motion)
+    compute_state_rate(ROW_START, 0.0, offset_frame, work, motion)
     recover_contact_forces(work.mu, work, motion)
     return least_force_margin(0.0, work, motion)[0]
 
 
 @kernel
-def least_guard_margin(h, heeds, slack, tilted, work, motion):
+def least_guard_margin(h, heeds, slack, offset_frame, work, motion):
     """Smallest margin at END, a step of h after START: (margin, guard, contact or slot).
 
     `heeds`: the guards of force count, where they are missed by more than `slack`.
     """
-    compute_state_rate(ROW_END, h, tilted, work, motion)
+    compute_state_rate(ROW_END, h, offset_frame, work, motion)
     recover_contact_forces(work.mu, work, motion)
-    compute_feature_gaps(ROW_END, tilted, work, motion)
+    compute_feature_gaps(ROW_END, offset_frame, work, motion)
     gap, which = least_gap_margin(h, work, motion)
     margin, guard = gap / work.radius, GUARD_GAP
     if heeds and motion.weight > 0.0:

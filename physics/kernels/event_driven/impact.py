@@ -87,11 +87,11 @@ def next_sequential_impact(work, motion, report):
 
 
 @kernel
-def set_up_impact_problem(y, tilted, work, motion, report):
+def set_up_impact_problem(y, offset_frame, work, motion, report):
     """Write the contact problem of all contacts that touch, or that of the one whose turn it is; their number."""
     put_state_row(motion, ROW_START, y)
-    compute_feature_gaps(ROW_START, tilted, work, motion)
-    R, _, w, alpha = free_angular_motion(y, tilted, work)
+    compute_feature_gaps(ROW_START, offset_frame, work, motion)
+    R, _, w, alpha = free_angular_motion(y, offset_frame, work)
     n = 0
     motion.left_out = 0.0
     only = next_sequential_impact(work, motion, report)
@@ -101,7 +101,7 @@ def set_up_impact_problem(y, tilted, work, motion, report):
             continue
         normal = wall_normal(work.walls, wall_of(s, work))
         r, r_rate = contact_arm_and_rate(
-            work.shape, as_vector(work.dims), R, w, normal, feature_of(s, work), tilted, work
+            work.shape, as_vector(work.dims), R, w, normal, feature_of(s, work), offset_frame, work
         )
         goal = rebound_target(-rate, normal, r, r_rate, w, alpha, work, motion)
         set_up_contact(n, s, r, (goal, 0.0, 0.0), work)
@@ -116,7 +116,7 @@ def _no_tangential_target(*arguments):
 
 
 @if_law((LAW_TANGENTIAL,), _no_tangential_target)
-def set_tangential_rebound(n, y, tilted, motion, work):
+def set_tangential_rebound(n, y, offset_frame, motion, work):
     """Set targets along the wall of the one contact that bounces, as `tangential_restitution.set_tangential_targets`.
 
     What does not rebound though it has a restitution is a bounce left out, and is not one along the wall either.
@@ -127,7 +127,7 @@ def set_tangential_rebound(n, y, tilted, motion, work):
         if speed > motion.still and (work.target[i, 0] > 0.0 or not work.restitution > 0.0):
             bouncing, found = bouncing + 1, i
     if bouncing == 1:
-        set_tangential_target(found, y, tilted, work)
+        set_tangential_target(found, y, offset_frame, work)
 
 
 @inlined
@@ -160,39 +160,39 @@ def fall_back_to_plastic(n, contact, v, L, solved, P, work, report):
 
 
 @kernel
-def cap_rebound_energy(n, y, contact, tilted, solved, P, work, motion, report):
+def cap_rebound_energy(n, y, contact, offset_frame, solved, P, work, motion, report):
     """Result of `solve_contacts` for a collision with friction, or as much of its rebound as there is energy for.
 
     Impulses are those of what is returned. See `physics.kernels.contact_law.restitution_energy`.
     """
     _, q, v, L = y
     v_full, L_full = solved[0], solved[1]
-    before, full = kinetic_energy(q, v, L, work, tilted), kinetic_energy(q, v_full, L_full, work, tilted)
+    before, full = kinetic_energy(q, v, L, work, offset_frame), kinetic_energy(q, v_full, L_full, work, offset_frame)
     if not full > (1.0 + IMPACT_ENERGY_ROUNDING) * before:
         return solved
     for k in range(3 * n):
         motion.rebound[k] = work.impulse[k]
     plastic = _solve_plastic_impact(n, contact, v, L, solved, P, work, report)
     v_plastic, L_plastic, residual, sweeps, method = plastic
-    v, L, s = limit_rebound_energy(q, before, (v_plastic, L_plastic), (v_full, L_full), work, tilted)
+    v, L, s = limit_rebound_energy(q, before, (v_plastic, L_plastic), (v_full, L_full), work, offset_frame)
     for k in range(3 * n):
         work.impulse[k] += s * (motion.rebound[k] - work.impulse[k])
     return v, L, residual, sweeps, method
 
 
 @kernel
-def set_up_jump_problem(y, h, tilted, work, motion):
+def set_up_jump_problem(y, h, offset_frame, work, motion):
     """Write the contact problem of a first-order step over h into `work`: (contacts, velocity, angular momentum)."""
     put_state_row(motion, ROW_START, y)
-    compute_feature_gaps(ROW_START, tilted, work, motion)
-    R, _, w, _ = free_angular_motion(y, tilted, work)
+    compute_feature_gaps(ROW_START, offset_frame, work, motion)
+    R, _, w, _ = free_angular_motion(y, offset_frame, work)
     count = 0
     for s in range(motion.is_active.shape[0]):
         gap = motion.gap[ROW_START, s]
         if not gap <= motion.touch - min(0.0, motion.gap_rate[ROW_START, s]) * h or count >= work.slot.shape[0]:
             continue
         n = wall_normal(work.walls, wall_of(s, work))
-        r, _ = contact_arm_and_rate(work.shape, as_vector(work.dims), R, w, n, feature_of(s, work), tilted, work)
+        r, _ = contact_arm_and_rate(work.shape, as_vector(work.dims), R, w, n, feature_of(s, work), offset_frame, work)
         set_up_contact(count, s, r, (-max(gap, 0.0) / h, 0.0, 0.0), work)
         count += 1
     work.mode = TRY_SLIDING
@@ -205,9 +205,9 @@ def set_up_jump_problem(y, h, tilted, work, motion):
 
 
 @inlined
-def principal_rotation(y, tilted, work):
+def principal_rotation(y, offset_frame, work):
     """Rotation matrix of the principal axes at y."""
-    return qt.to_matrix(principal_attitude(y[1], work, tilted))
+    return qt.to_matrix(principal_attitude(y[1], work, offset_frame))
 
 
 @inlined
@@ -216,19 +216,19 @@ def _rows_per_contact(friction):
 
 
 @kernel
-def resolve_impacts(y, t, contact, tilted, work, motion, records):
+def resolve_impacts(y, t, contact, offset_frame, work, motion, records):
     """State after the impulses of a collision at the time t, of all that touches or of the one whose turn it is."""
-    refresh_loads(y, 0.0, tilted, work)
-    n = set_up_impact_problem(y, tilted, work, motion, records.report)
-    set_tangential_rebound(n, y, tilted, motion, work)
+    refresh_loads(y, 0.0, offset_frame, work)
+    n = set_up_impact_problem(y, offset_frame, work, motion, records.report)
+    set_tangential_rebound(n, y, offset_frame, motion, work)
     x, q, v, L = y
     if n > 0:
-        P = principal_rotation(y, tilted, work)
+        P = principal_rotation(y, offset_frame, work)
         solved = solve_contacts(n, contact, v, L, P, work)
         solved = fall_back_to_plastic(n, contact, v, L, solved, P, work, records.report)
         solved = reject_energy_gain(n, contact, v, L, solved, P, work)
         if contact.friction is not None and work.restitution > 0.0:
-            solved = cap_rebound_energy(n, y, contact, tilted, solved, P, work, motion, records.report)
+            solved = cap_rebound_energy(n, y, contact, offset_frame, solved, P, work, motion, records.report)
         report_impact_solve(solved, records.report, work)
         v, L = solved[0], solved[1]
     ev.log_wall_impacts(
@@ -238,12 +238,12 @@ def resolve_impacts(y, t, contact, tilted, work, motion, records):
 
 
 @kernel
-def resolve_inconsistency(y, h, t, contact, tilted, work, motion, records):
+def resolve_inconsistency(y, h, t, contact, offset_frame, work, motion, records):
     """State with the velocities of a first-order step over h from the time t: a leap, before it is made."""
-    refresh_loads(y, 0.0, tilted, work)
-    n, v, L = set_up_jump_problem(y, h, tilted, work, motion)
+    refresh_loads(y, 0.0, offset_frame, work)
+    n, v, L = set_up_jump_problem(y, h, offset_frame, work, motion)
     if n > 0:  # there may be nothing in reach
-        P = principal_rotation(y, tilted, work)
+        P = principal_rotation(y, offset_frame, work)
         solved = solve_contacts(n, contact, v, L, P, work)
         report_impact_solve(solved, records.report, work)
         v, L = solved[0], solved[1]
@@ -254,9 +254,9 @@ def resolve_inconsistency(y, h, t, contact, tilted, work, motion, records):
 
 
 @kernel
-def drift_at_velocity(y, h, tilted, work):
+def drift_at_velocity(y, h, offset_frame, work):
     """State after a moment h at constant velocities."""
     x, q, v, L = y
-    w = angular_velocity(q, L, work, tilted)
+    w = angular_velocity(q, L, work, offset_frame)
     x = (x[0] + h * v[0], x[1] + h * v[1], x[2] + h * v[2])
     return x, qt.normalise(qt.multiply(qt.exp_map((h * w[0], h * w[1], h * w[2])), q)), v, L

@@ -54,7 +54,7 @@ def distrust_force_guards(nearest, motion):
 
 
 @kernel
-def has_acceleration_jumped(what, y, tilted, work, motion):
+def has_acceleration_jumped(what, y, offset_frame, work, motion):
     """True if the step that led to y went too far: what the body does there does not go on from what it did."""
     if what in (MODE_REST, MODE_UNDECIDED, MODE_UNDECIDED_SLIDING):
         return False
@@ -62,7 +62,7 @@ def has_acceleration_jumped(what, y, tilted, work, motion):
         return True
     put_state_row(motion, ROW_START, y)
     motion.step = motion.ahead
-    prepare_extrapolated_step(motion.ahead, tilted, work, motion)
+    prepare_extrapolated_step(motion.ahead, offset_frame, work, motion)
     for c in range(Y_VELOCITY, Y_SIZE):
         unit = motion.weight / work.mass if c < Y_ANGULAR_MOMENTUM else motion.weight * work.radius
         if abs(motion.first_rate[c] - motion.end_rate[c]) > _SAME_ACCELERATION * unit:
@@ -71,8 +71,8 @@ def has_acceleration_jumped(what, y, tilted, work, motion):
 
 
 @kernel
-def accept_step(what, watched, y, tilted, work, motion):
+def accept_step(what, watched, y, offset_frame, work, motion):
     """Judge the regime at y; GOES_BACK where the watched step that led there was too long, and no mere look-ahead."""
-    if watched > motion.nearest and has_acceleration_jumped(what, y, tilted, work, motion):
+    if watched > motion.nearest and has_acceleration_jumped(what, y, offset_frame, work, motion):
         return MODE_ROLLBACK
     return what

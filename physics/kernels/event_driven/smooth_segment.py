@@ -62,7 +62,7 @@ def newton_time_to_gap(t, margin, guard, which, work, motion):
 
 
 @kernel
-def locate_event(h, margin, guard, which, heeds, tilted, work, motion):
+def locate_event(h, margin, guard, which, heeds, offset_frame, work, motion):
     """End the step where its smallest margin is zero (END): (its length, guard, contact or slot).
 
     Newton's steps for a gap. Else false position with the Illinois rule, and a half where PATIENCE trials have not
@@ -74,7 +74,7 @@ def locate_event(h, margin, guard, which, heeds, tilted, work, motion):
     low, high, low_margin, high_margin = 0.0, h, -margin, margin
     slack = FORCE_MARGIN_TOLERANCE
     if guard in FORCE_GUARDS:
-        least = least_start_force_margin(tilted, work, motion)
+        least = least_start_force_margin(offset_frame, work, motion)
         if least > FORCE_MARGIN_TOLERANCE:
             slack, low_margin, high_margin = 0.0, least, margin - FORCE_MARGIN_TOLERANCE
     side, width, stale = 0, h, 0
@@ -85,10 +85,10 @@ def locate_event(h, margin, guard, which, heeds, tilted, work, motion):
             t = low + (high - low) * low_margin / (low_margin - high_margin)
             if stale >= _BISECT_AFTER or not low < t < high:
                 t = 0.5 * (low + high)
-        error, _ = try_extrapolated_step(t, tilted, work, motion)
+        error, _ = try_extrapolated_step(t, offset_frame, work, motion)
         if not error <= work.tolerance:
             return t, GUARD_STEP_FAILED, which
-        margin, g, w = least_guard_margin(t, heeds, slack, tilted, work, motion)
+        margin, g, w = least_guard_margin(t, heeds, slack, offset_frame, work, motion)
         newton = -1.0
         if margin < 0.0:
             high, high_margin, guard, which = t, margin, g, w
@@ -111,8 +111,8 @@ def locate_event(h, margin, guard, which, heeds, tilted, work, motion):
         ):
             break
     if margin >= 0.0:
-        try_extrapolated_step(high, tilted, work, motion)
-        _, guard, which = least_guard_margin(high, heeds, slack, tilted, work, motion)
+        try_extrapolated_step(high, offset_frame, work, motion)
+        _, guard, which = least_guard_margin(high, heeds, slack, offset_frame, work, motion)
     return high, guard, which
 
 
@@ -125,7 +125,7 @@ def has_slip_stopped(guard, which, work, motion):
 
 
 @kernel
-def slide_to_stop(which, left, heeds, tilted, work, motion):
+def slide_to_stop(which, left, heeds, offset_frame, work, motion):
     """Let contact `which`, which slides at END as slowly as counts as none, do so until it stands still: the time [s].
 
     Its direction stays what it is. Not where something else would end within that time, or it began to slide only now.
@@ -140,75 +140,75 @@ def slide_to_stop(which, left, heeds, tilted, work, motion):
     for c in range(3):
         motion.reference[which, c] = slip[c] / speed
     put_state_row(motion, ROW_START, end)
-    compute_state_rate(ROW_START, 0.0, tilted, work, motion)
+    compute_state_rate(ROW_START, 0.0, offset_frame, work, motion)
     for c in range(Y_SIZE):
         motion.first_rate[c] = motion.rate[c]
-    _, P, _, _ = free_angular_motion(end, tilted, work)
+    _, P, _, _ = free_angular_motion(end, offset_frame, work)
     along = qt.dot(contact_velocity_rate(which, P, work, motion), row_vector(motion.reference, which, 0))
     if along < 0.0:
         h = min(left, -speed / along)
-        error, _ = try_extrapolated_step(h, tilted, work, motion)
-        margin, guard, _ = least_guard_margin(h, heeds, FORCE_MARGIN_TOLERANCE, tilted, work, motion)
+        error, _ = try_extrapolated_step(h, offset_frame, work, motion)
+        margin, guard, _ = least_guard_margin(h, heeds, FORCE_MARGIN_TOLERANCE, offset_frame, work, motion)
         if error <= work.tolerance and (margin >= 0.0 or guard == GUARD_SPEED):
             advance_clock(h, work)
             return h
     put_state_row(motion, ROW_START, before)
     put_state_row(motion, ROW_END, end)
     least_guard_margin(
-        0.0, heeds, FORCE_MARGIN_TOLERANCE, tilted, work, motion
+        0.0, heeds, FORCE_MARGIN_TOLERANCE, offset_frame, work, motion
     )  # forces and gaps are those of END again
     return 0.0
 
 
 @inlined
-def body_speed_bound(y, tilted, work):
+def body_speed_bound(y, offset_frame, work):
     """Speed that no point of the body exceeds [m/s]."""
-    v, w = y[2], angular_velocity(y[1], y[3], work, tilted)
+    v, w = y[2], angular_velocity(y[1], y[3], work, offset_frame)
     return math.sqrt(qt.dot(v, v)) + work.radius * math.sqrt(qt.dot(w, w))
 
 
 @inlined
-def _begin_next_step(left, tilted, work, motion):
+def _begin_next_step(left, offset_frame, work, motion):
     """Length of the next step, which starts where the last one has ended."""
     for s in range(motion.is_active.shape[0]):
         gap, rate = motion.gap[ROW_END, s], motion.gap_rate[ROW_END, s]
         motion.gap[ROW_START, s], motion.gap_rate[ROW_START, s] = gap, rate
-    h = prepare_extrapolated_step(left, tilted, work, motion)
+    h = prepare_extrapolated_step(left, offset_frame, work, motion)
     store_force_margins(ROW_START, work, motion)
     return h
 
 
 @kernel
-def integrate_segment(y, left, tilted, work, motion):
+def integrate_segment(y, left, offset_frame, work, motion):
     """Smooth motion of the regime for `left`, or until a guard ends it: (state, time, guard).
 
     Where the guards of force are not heeded one step, no longer than `motion.trust`: its guard is WATCH at least.
     """
     heeds = has_trusted_guards(motion)
-    had = body_speed_bound(y, tilted, work)
-    y = project_state(project_candidate_speeds(y, tilted, work, motion), tilted, work, motion)
-    if had > motion.still and body_speed_bound(y, tilted, work) <= _REST_SPEED_SHARE * motion.still:
+    had = body_speed_bound(y, offset_frame, work)
+    y = project_state(project_candidate_speeds(y, offset_frame, work, motion), offset_frame, work, motion)
+    if had > motion.still and body_speed_bound(y, offset_frame, work) <= _REST_SPEED_SHARE * motion.still:
         return y, 0.0, GUARD_SPEED  # the contacts have taken all of it: it may be at rest
     put_state_row(motion, ROW_START, y)
-    compute_feature_gaps(ROW_START, tilted, work, motion)
+    compute_feature_gaps(ROW_START, offset_frame, work, motion)
     motion.step = left if heeds else motion.trust
-    t, h = 0.0, prepare_extrapolated_step(left, tilted, work, motion)
+    t, h = 0.0, prepare_extrapolated_step(left, offset_frame, work, motion)
     store_force_margins(ROW_START, work, motion)
     for _ in range(_MAX_SEGMENT_STEPS):
-        error, used = try_extrapolated_step(h, tilted, work, motion)
+        error, used = try_extrapolated_step(h, offset_frame, work, motion)
         is_over, guard = False, GUARD_STEP_FAILED
         if error <= work.tolerance:
-            margin, guard, which = least_guard_margin(h, heeds, FORCE_MARGIN_TOLERANCE, tilted, work, motion)
+            margin, guard, which = least_guard_margin(h, heeds, FORCE_MARGIN_TOLERANCE, offset_frame, work, motion)
             is_over = margin < 0.0
             if has_outrun_creep(h, work, motion):
                 guard = GUARD_STEP_FAILED
             elif is_over and not has_slip_stopped(guard, which, work, motion):
-                h, guard, which = locate_event(h, margin, guard, which, heeds, tilted, work, motion)
+                h, guard, which = locate_event(h, margin, guard, which, heeds, offset_frame, work, motion)
         if guard != GUARD_STEP_FAILED and heeds:
-            dip = find_force_minimum(h, used, tilted, work, motion)
+            dip = find_force_minimum(h, used, offset_frame, work, motion)
             if dip < h:
                 h = dip
-                refresh_loads(get_state_row(motion, ROW_START), 0.0, tilted, work)
+                refresh_loads(get_state_row(motion, ROW_START), 0.0, offset_frame, work)
                 continue
         if guard == GUARD_STEP_FAILED:
             if not h > SEGMENT_SHORTEST_STEP * left:
@@ -216,15 +216,15 @@ def integrate_segment(y, left, tilted, work, motion):
             # Not `prepare_extrapolated_step` again: it would go by the directions of sliding (`way`) that the trial
             # ended with. The scale of the errors is that of the start.
             h *= SEGMENT_STEP_CUT
-            refresh_loads(get_state_row(motion, ROW_START), 0.0, tilted, work)
+            refresh_loads(get_state_row(motion, ROW_START), 0.0, offset_frame, work)
             continue
         t += h
         advance_clock(h, work)
         if is_over and guard == GUARD_SPEED:
-            t += slide_to_stop(which, left - t, heeds, tilted, work, motion)
+            t += slide_to_stop(which, left - t, heeds, offset_frame, work, motion)
         motion.step = SEGMENT_STEP_GROWTH * h if used <= SEGMENT_EASY_RULES else h
         store_last_forces(work, motion)
-        y = project_state(get_state_row(motion, ROW_END), tilted, work, motion)
+        y = project_state(get_state_row(motion, ROW_END), offset_frame, work, motion)
         if is_over:
             return y, t, guard
         if not heeds:
@@ -234,17 +234,17 @@ def integrate_segment(y, left, tilted, work, motion):
         put_state_row(motion, ROW_START, y)
         if not t < left:
             break
-        h = _begin_next_step(left - t, tilted, work, motion)
+        h = _begin_next_step(left - t, offset_frame, work, motion)
     if t < left:
         return get_state_row(motion, ROW_START), t, GUARD_STEP_FAILED
     return y, left, GUARD_NONE
 
 
 @kernel
-def predict_state(y, tilted, work, motion):
+def predict_state(y, offset_frame, work, motion):
     """State to which the regime would lead in a moment."""
     put_state_row(motion, ROW_START, y)
     motion.step = motion.ahead
-    prepare_extrapolated_step(motion.ahead, tilted, work, motion)
-    try_extrapolated_step(motion.ahead, tilted, work, motion)
-    return project_state(get_state_row(motion, ROW_END), tilted, work, motion)
+    prepare_extrapolated_step(motion.ahead, offset_frame, work, motion)
+    try_extrapolated_step(motion.ahead, offset_frame, work, motion)
+    return project_state(get_state_row(motion, ROW_END), offset_frame, work, motion)

@@ -91,7 +91,7 @@ _NO_FORCED_MODE = -1
 
 
 @kernel
-def set_event_thresholds(y, h, tilted, work, motion):
+def set_event_thresholds(y, h, offset_frame, work, motion):
     """Set the gap and speed that count as zero, and the time a regime is looked ahead; problems are solved to rounding.
 
     Gaps are differences of places, wherever the body may go within h.
@@ -99,7 +99,7 @@ def set_event_thresholds(y, h, tilted, work, motion):
     gain from being set down on the wall what it loses in the impact.
     """
     work.still = work.unseen = 0.0
-    x, speed = y[0], body_speed_bound(y, tilted, work)
+    x, speed = y[0], body_speed_bound(y, offset_frame, work)
     motion.touch = max(work.slop, _ROUNDING * (work.radius + math.sqrt(qt.dot(x, x)) + h * speed))
     motion.noise = 1.0e-13 * speed
     motion.still = math.sqrt(2.0 * _UNSEEN_HOP_GAPS * work.acceleration * motion.touch) + motion.noise
@@ -110,48 +110,50 @@ def set_event_thresholds(y, h, tilted, work, motion):
 
 
 @inlined
-def begin_event_substep(y, start, h, tilted, memory, work, motion):
+def begin_event_substep(y, start, h, offset_frame, memory, work, motion):
     """Prepare a part of length h that begins at the time `start` of the step."""
     set_clock(start, work)
-    refresh_loads(y, 0.0, tilted, work)
-    set_event_thresholds(y, h, tilted, work, motion)
+    refresh_loads(y, 0.0, offset_frame, work)
+    set_event_thresholds(y, h, offset_frame, work, motion)
     motion.assured = 0.0
     load_contact_modes(memory, work.i, work, motion)
     motion.left_out, motion.turns = 0.0, 0
 
 
 @kernel
-def classify_mode(y, is_foretold, watched, contact, tilted, work, motion, report):
+def classify_mode(y, is_foretold, watched, contact, offset_frame, work, motion, report):
     """Find the regime from y on, and whether a contact problem had to be solved, since the body may come to rest.
 
     It is looked for a moment ahead where a guard has foretold that the regime ends.
     """
     seen, later = y, 0.0
     if is_foretold:
-        seen, later = predict_state(y, tilted, work, motion), motion.ahead
+        seen, later = predict_state(y, offset_frame, work, motion), motion.ahead
     motion.assured = later
-    refresh_loads(seen, later, tilted, work)
-    what, n, v, L = find_contact_mode(seen, contact.friction, tilted, work, motion)
-    what = accept_step(what, watched, y, tilted, work, motion)
+    refresh_loads(seen, later, offset_frame, work)
+    what, n, v, L = find_contact_mode(seen, contact.friction, offset_frame, work, motion)
+    what = accept_step(what, watched, y, offset_frame, work, motion)
     if what not in (MODE_UNDECIDED, MODE_UNDECIDED_SLIDING):
         return what, False
     if n > 0:
-        P = principal_rotation(seen, tilted, work)
+        P = principal_rotation(seen, offset_frame, work)
         solved = solve_contacts(n, contact, v, L, P, work)
         report_impact_solve(solved, report, work)
         v, L = solved[0], solved[1]
-    what = read_resting_mode(n, seen, v, L, contact.friction, what == MODE_UNDECIDED_SLIDING, tilted, work, motion)
-    return accept_step(what, watched, y, tilted, work, motion), True
+    what = read_resting_mode(
+        n, seen, v, L, contact.friction, what == MODE_UNDECIDED_SLIDING, offset_frame, work, motion
+    )
+    return accept_step(what, watched, y, offset_frame, work, motion), True
 
 
 @kernel
-def come_to_rest(y, t, tilted, work, motion, log, counts):
+def come_to_rest(y, t, offset_frame, work, motion, log, counts):
     """State of what rests from the time t on."""
     if motion.is_resting:
         return y
     motion.is_resting = 1
     ev.note_mode_change(log, counts, work.i, t + motion.left_out, ev.KIND_REST, -1)
-    x, q, _, _ = project_state(y, tilted, work, motion)
+    x, q, _, _ = project_state(y, offset_frame, work, motion)
     return x, q, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
 
 
@@ -162,13 +164,13 @@ def integrate_mode(what, y, t, h, flight, work, motion, report):
         report[work.world, at.FALLBACKS] += 1.0
         step = min(motion.leap, h - t)
         lengthen_leap(t + step, motion)
-        return drift_at_velocity(y, step, flight.tilted, work), step, GUARD_NONE
+        return drift_at_velocity(y, step, flight.offset_frame, work), step, GUARD_NONE
     if what == MODE_FLIGHT:
-        y, step, is_found = fly_to_wall(y, h - t, flight.gyroscopic, flight.tilted, work, motion, report)
+        y, step, is_found = fly_to_wall(y, h - t, flight.gyroscopic, flight.offset_frame, work, motion, report)
         if not is_found:
             count_unresolved_flight(report, work)
         return y, step, GUARD_NONE
-    return integrate_segment(y, h - t, flight.tilted, work, motion)
+    return integrate_segment(y, h - t, flight.offset_frame, work, motion)
 
 
 @kernel
@@ -178,7 +180,7 @@ def advance(y, h, contact, flight, work, motion, records, start):
     Each turn finds the mode of the body (`forced_mode` where it is known) and follows it. A step whose end has to be
     accepted (`mode_acceptance`) has begun at `rollback_state` and has the length `watched`.
     """
-    begin_event_substep(y, start, h, flight.tilted, records.memory, work, motion)
+    begin_event_substep(y, start, h, flight.offset_frame, records.memory, work, motion)
     t, forced_mode, is_foretold, rollback_state, watched = 0.0, _NO_FORCED_MODE, False, y, 0.0
     for k in range(work.splits + 1):
         if k == work.splits:
@@ -189,17 +191,17 @@ def advance(y, h, contact, flight, work, motion, records, start):
         mode, is_answer = forced_mode, False
         if forced_mode == _NO_FORCED_MODE:
             mode, is_answer = classify_mode(
-                y, is_foretold, watched, contact, flight.tilted, work, motion, records.report
+                y, is_foretold, watched, contact, flight.offset_frame, work, motion, records.report
             )
         forced_mode = _NO_FORCED_MODE
         if is_answer and mode in (MODE_IMPACT, MODE_INCONSISTENT):
             forced_mode, is_foretold = mode, False
             continue
         if mode == MODE_IMPACT:
-            y = resolve_impacts(y, start + t, contact, flight.tilted, work, motion, records)
+            y = resolve_impacts(y, start + t, contact, flight.offset_frame, work, motion, records)
         elif mode == MODE_INCONSISTENT:
             leap = min(motion.leap, h - t)
-            y = resolve_inconsistency(y, leap, start + t, contact, flight.tilted, work, motion, records)
+            y = resolve_inconsistency(y, leap, start + t, contact, flight.offset_frame, work, motion, records)
         elif mode == MODE_ROLLBACK:
             motion.trust = TRUST_SHRINK * watched
             y, t, watched, is_foretold = rollback_state, t - watched, 0.0, False
@@ -216,7 +218,7 @@ def advance(y, h, contact, flight, work, motion, records, start):
             continue
         log_mode_changes(work, motion, records.log, records.counts, start + t)
         if mode == MODE_REST:
-            y = come_to_rest(y, start + t, flight.tilted, work, motion, records.log, records.counts)
+            y = come_to_rest(y, start + t, flight.offset_frame, work, motion, records.log, records.counts)
             break
         motion.is_resting, rollback_state = 0, y
         y, step, guard = integrate_mode(mode, y, t, h, flight, work, motion, records.report)
@@ -253,7 +255,7 @@ def step_events(queue, steps, substeps, h, bodies, contact, restitution, flight,
         for b in range(count):
             i = world * count + b
             records.counts[i] = 0
-            bind_body(world, i, bodies.shapes[b], bodies, contact.friction, restitution, flight.tilted, work)
+            bind_body(world, i, bodies.shapes[b], bodies, contact.friction, restitution, flight.offset_frame, work)
             if not has_finite_loads(work):
                 report_fault(world, b, records.report)
                 ev.note_mode_change(records.log, records.counts, i, 0.0, ev.KIND_FAULT, -1)
@@ -267,7 +269,7 @@ def step_events(queue, steps, substeps, h, bodies, contact, restitution, flight,
                 else:
                     motion.count = 0
                     set_clock(k * h, work)
-                    new = fly_freely(y, h, flight.gyroscopic, flight.tilted, work, motion, records.report)
+                    new = fly_freely(y, h, flight.gyroscopic, flight.offset_frame, work, motion, records.report)
                 if not is_finite(new):
                     report_fault(world, b, records.report)
                     ev.drop_events(i, 1, k * h, records.log, records.counts)
@@ -275,5 +277,5 @@ def step_events(queue, steps, substeps, h, bodies, contact, restitution, flight,
                     break
                 y = new
             write_state(bodies.state, i, y)
-            w = angular_velocity(y[1], y[3], work, flight.tilted)
+            w = angular_velocity(y[1], y[3], work, flight.offset_frame)
             bodies.state[i, at.ANGVEL], bodies.state[i, at.ANGVEL + 1], bodies.state[i, at.ANGVEL + 2] = w

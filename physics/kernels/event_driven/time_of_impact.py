@@ -101,13 +101,13 @@ def gap_safe_time(g, r, b, third, horizon):
 
 
 @kernel
-def gap_jerk_bound(y, left, tilted, work):
+def gap_jerk_bound(y, left, offset_frame, work):
     """Bound of the third derivative of any feature's gap over the time `left` [m/s³]."""
     if work.shape == SPHERE:
         return 0.0
     t = math.sqrt(work.torque[0] ** 2 + work.torque[1] ** 2 + work.torque[2] ** 2)
     j = max(work.J[0], work.J[1], work.J[2])
-    w = math.sqrt(j * max(0.0, qt.dot(angular_velocity(y[1], y[3], work, tilted), y[3]))) + j * left * t
+    w = math.sqrt(j * max(0.0, qt.dot(angular_velocity(y[1], y[3], work, offset_frame), y[3]))) + j * left * t
     a = j * t + w * w
     b = (1.0 + math.sqrt(2.0)) * w * a + j * w * t
     bound = work.radius * (b + 3.0 * w * a + w * w * w)
@@ -119,14 +119,14 @@ def gap_jerk_bound(y, left, tilted, work):
 
 
 @kernel
-def safe_flight_time(y, left, third, assured, tilted, work, motion):
+def safe_flight_time(y, left, third, assured, offset_frame, work, motion):
     """A time within which no feature at y reaches a wall, at most `left`.
 
     Those that touch and do not come stay away for the time `assured` at least: where a push has just ended, what lifts
     them is still zero.
     """
     x, v = y[0], y[2]
-    R, _, w, alpha = free_angular_motion(y, tilted, work)
+    R, _, w, alpha = free_angular_motion(y, offset_frame, work)
     dims, a, shape = as_vector(work.dims), as_vector(work.free_acceleration), work.shape
     t = left
     for k in range(work.walls.shape[0]):
@@ -136,7 +136,7 @@ def safe_flight_time(y, left, third, assured, tilted, work, motion):
         if d - work.radius + min(0.0, t * vn) + min(0.0, 0.5 * t * t * an) > 0.0:
             continue
         for feature in range(work.features):
-            r, rate = contact_arm_and_rate(shape, dims, R, w, n, feature, tilted, work)
+            r, rate = contact_arm_and_rate(shape, dims, R, w, n, feature, offset_frame, work)
             gap = d + qt.dot(n, r)
             speed = vn + qt.dot(n, qt.cross(w, r))
             bend = an + qt.dot(n, plus(qt.cross(alpha, r), qt.cross(w, rate)))
@@ -155,15 +155,15 @@ def has_torque(work):
 
 
 @kernel
-def integrate_free_flight(y, t, tilted, work, motion):
+def integrate_free_flight(y, t, offset_frame, work, motion):
     """Free motion under a torque or in fields over t by extrapolated steps: (state, what MOST_TRIES left of t)."""
     put_state_row(motion, ROW_START, y)
     left, tries = t, 0
     motion.step = left
     while left > 0.0 and tries < _MAX_FLIGHT_STEPS:
         tries += 1
-        h = prepare_extrapolated_step(left, tilted, work, motion)
-        error, _ = try_extrapolated_step(h, tilted, work, motion)
+        h = prepare_extrapolated_step(left, offset_frame, work, motion)
+        error, _ = try_extrapolated_step(h, offset_frame, work, motion)
         if not error <= work.tolerance and h > SEGMENT_SHORTEST_STEP * t:
             motion.step = SEGMENT_STEP_CUT * h
             continue
@@ -184,26 +184,26 @@ def count_unresolved_flight(report, work):
 
 
 @kernel
-def fly_freely(y, t, gyroscopic, tilted, work, motion, report):
+def fly_freely(y, t, gyroscopic, offset_frame, work, motion, report):
     """State after the time t without contact.
 
     Turned or swung by more than extrapolated steps can follow, the rest of t is time stepping's, which is reported.
     """
     if has_torque(work) or has_fields(work):
         reset_felt_flag(work)
-        end, left = integrate_free_flight(y, t, tilted, work, motion)
+        end, left = integrate_free_flight(y, t, offset_frame, work, motion)
         if left > 0.0:
             count_unresolved_flight(report, work)
-            hold_loads(end, left, gyroscopic, tilted, work)
-            rest = fly(end, work, left, gyroscopic, tilted)
-            end = subdivide_stiff_flight(rest, end, left, FlightSwitches(gyroscopic, tilted, None), work)
+            hold_loads(end, left, gyroscopic, offset_frame, work)
+            rest = fly(end, work, left, gyroscopic, offset_frame)
+            end = subdivide_stiff_flight(rest, end, left, FlightSwitches(gyroscopic, offset_frame, None), work)
         if has_felt_field(work):
             return end
-    return fly(y, work, t, gyroscopic, tilted)
+    return fly(y, work, t, gyroscopic, offset_frame)
 
 
 @kernel
-def fly_to_wall(y, left, gyroscopic, tilted, work, motion, report):
+def fly_to_wall(y, left, gyroscopic, offset_frame, work, motion, report):
     """Fly for `left` or until a feature reaches a wall: (state, time, whether the flight was found).
 
     It may end earlier, where a feature flies so close along a wall that ADVANCES steps did not tell: no wall is missed.
@@ -211,22 +211,22 @@ def fly_to_wall(y, left, gyroscopic, tilted, work, motion, report):
     motion.count = 0
     if has_fields(work):
         now = reset_felt_flag(work)
-        end, t, guard = integrate_segment(y, left, tilted, work, motion)
+        end, t, guard = integrate_segment(y, left, offset_frame, work, motion)
         if has_felt_field(work):
             return end, t, guard != GUARD_STEP_FAILED
         set_now(now, work)
-        refresh_loads(y, 0.0, tilted, work)
+        refresh_loads(y, 0.0, offset_frame, work)
     if is_flight_clear(y[0], y[2], left, work):
-        return fly_freely(y, left, gyroscopic, tilted, work, motion, report), left, True
-    third = gap_jerk_bound(y, left, tilted, work)
+        return fly_freely(y, left, gyroscopic, offset_frame, work, motion, report), left, True
+    third = gap_jerk_bound(y, left, offset_frame, work)
     now, t = y, 0.0
     for _ in range(_MAX_ADVANCES):
         assured = motion.assured if t == 0.0 else 0.0
-        step = safe_flight_time(now, left - t, third, assured, tilted, work, motion)
+        step = safe_flight_time(now, left - t, third, assured, offset_frame, work, motion)
         if t + step >= left:
-            return fly_freely(y, left, gyroscopic, tilted, work, motion, report), left, True
+            return fly_freely(y, left, gyroscopic, offset_frame, work, motion, report), left, True
         t += step
-        now = fly_freely(y, t, gyroscopic, tilted, work, motion, report)
+        now = fly_freely(y, t, gyroscopic, offset_frame, work, motion, report)
         if step <= _LAST_ADVANCE_SHARE * left:
             break
     return now, t, True

@@ -10,18 +10,18 @@ from physics.kernels.state.body import body_attitude, principal_attitude
 
 
 @inlined
-def drift_attitude(q, L, work, h, gyroscopic, tilted):
+def drift_attitude(q, L, work, h, gyroscopic, offset_frame):
     """Attitude after h with constant angular momentum L, exact to rounding."""
     if L[0] == 0.0 and L[1] == 0.0 and L[2] == 0.0:
         return q
     if gyroscopic is None:
         return isotropic_rotation(q, L, work.J[0], h)
-    principal = principal_attitude(q, work, tilted)
-    return body_attitude(free_rotation(principal, L, as_vector(work.J), work.series, h), work, tilted)
+    principal = principal_attitude(q, work, offset_frame)
+    return body_attitude(free_rotation(principal, L, as_vector(work.J), work.series, h), work, offset_frame)
 
 
 @inlined
-def fly(y, work, h, gyroscopic, tilted):
+def fly(y, work, h, gyroscopic, offset_frame):
     """State (x, q, v, L) after h under the constant acceleration and torque of the step.
 
     The parabola is exact. Without torque so is the rotation; with torque it is the Strang splitting of second
@@ -37,17 +37,17 @@ def fly(y, work, h, gyroscopic, tilted):
     )
     v = (v[0] + h * a[0], v[1] + h * a[1], v[2] + h * a[2])
     if torque[0] == 0.0 and torque[1] == 0.0 and torque[2] == 0.0:
-        return x, drift_attitude(q, L, work, h, gyroscopic, tilted), v, L
-    q = drift_attitude(q, L, work, 0.5 * h, gyroscopic, tilted)
+        return x, drift_attitude(q, L, work, h, gyroscopic, offset_frame), v, L
+    q = drift_attitude(q, L, work, 0.5 * h, gyroscopic, offset_frame)
     L = (L[0] + h * torque[0], L[1] + h * torque[1], L[2] + h * torque[2])
-    return x, drift_attitude(q, L, work, 0.5 * h, gyroscopic, tilted), v, L
+    return x, drift_attitude(q, L, work, 0.5 * h, gyroscopic, offset_frame), v, L
 
 
 @inlined
 def integrate_flight(y, h, flight, work):
     """Free motion over h, by the exact flow or by the scheme that was chosen."""
     if flight.scheme is None:
-        return fly(y, work, h, flight.gyroscopic, flight.tilted)
+        return fly(y, work, h, flight.gyroscopic, flight.offset_frame)
     return fly_by_scheme(flight, y, work, h)
 
 
@@ -55,9 +55,9 @@ def integrate_flight(y, h, flight, work):
 def fly_by_scheme(flight, y, work, h):
     """`fly` by a textbook scheme (codes of `physics.kernels.flight.integrators`) instead of the exact flow."""
     x, q, v, L = y
-    q = principal_attitude(q, work, flight.tilted)
+    q = principal_attitude(q, work, flight.offset_frame)
     zero = (0.0, 0.0, 0.0)
     load = integrators.Load(zero, as_vector(work.torque), as_vector(work.free_acceleration))
     inertia = integrators.Inertia(1.0, as_vector(work.J))
     x, q, v, L = integrators.step(flight.scheme, (x, q, v, L), load, inertia, h)
-    return x, body_attitude(q, work, flight.tilted), v, L
+    return x, body_attitude(q, work, flight.offset_frame), v, L

@@ -32,11 +32,11 @@ WORK_ERROR_SHARE = UNRESOLVED_GAIN_SHARE = 0.01
 
 
 @inlined
-def potential_energy(y, later, tilted, work):
+def potential_energy(y, later, offset_frame, work):
     """Potential energy of all fields at y, `later` [s] than now [J]."""
     x, q, v, L = y
     t = work.now + later
-    return total_energy(field_state(x, q, v, L, t, tilted, work), t, work)
+    return total_energy(field_state(x, q, v, L, t, offset_frame, work), t, work)
 
 
 @inlined
@@ -53,38 +53,43 @@ def constant_loads(work):
 
 
 @kernel
-def energy_gain(y, end, h, tilted, work):
+def energy_gain(y, end, h, offset_frame, work):
     """(energy that a stage from y to `end` has gained from nowhere, its kinetic energy, rounding of both) [J]."""
     x, q, v, L = _middle(y, end)
-    before, after = kinetic_energy(y[1], y[2], y[3], work, tilted), kinetic_energy(end[1], end[2], end[3], work, tilted)
-    low, high = potential_energy(y, 0.0, tilted, work), potential_energy(end, h, tilted, work)
+    before, after = (
+        kinetic_energy(y[1], y[2], y[3], work, offset_frame),
+        kinetic_energy(end[1], end[2], end[3], work, offset_frame),
+    )
+    low, high = potential_energy(y, 0.0, offset_frame, work), potential_energy(end, h, offset_frame, work)
     a, T = constant_loads(work)
-    done = work.mass * qt.dot(a, minus(end[0], y[0])) + h * qt.dot(T, angular_velocity(q, L, work, tilted))
+    done = work.mass * qt.dot(a, minus(end[0], y[0])) + h * qt.dot(T, angular_velocity(q, L, work, offset_frame))
     t = work.now + 0.5 * h
-    supply = h * total_supplied_power(field_state(x, q, v, L, t, tilted, work), t, work)
+    supply = h * total_supplied_power(field_state(x, q, v, L, t, offset_frame, work), t, work)
     rounding = ENERGY_ROUNDING * (before + after + abs(low) + abs(high) + abs(done) + supply)
     return (after + high) - (before + low) - done - supply, after, rounding
 
 
 @if_declared(False)
-def has_work_error(y, end, h, tilted, work):
+def has_work_error(y, end, h, offset_frame, work):
     """True where the work from y to `end` of explicit loads misses the change of the fields' energy."""
     x, q, v, L = _middle(y, end)
     t = work.now + 0.5 * h
-    state = field_state(plus(x, times(0.5 * h, y[2])), q, v, L, t, tilted, work)
+    state = field_state(plus(x, times(0.5 * h, y[2])), q, v, L, t, offset_frame, work)
     F, T = total_conservative_load(state, t, work)
-    low, high = potential_energy(y, 0.0, tilted, work), potential_energy(end, h, tilted, work)
-    motion = kinetic_energy(y[1], y[2], y[3], work, tilted) + kinetic_energy(end[1], end[2], end[3], work, tilted)
+    low, high = potential_energy(y, 0.0, offset_frame, work), potential_energy(end, h, offset_frame, work)
+    motion = kinetic_energy(y[1], y[2], y[3], work, offset_frame) + kinetic_energy(
+        end[1], end[2], end[3], work, offset_frame
+    )
     missed = high - low + h * (qt.dot(F, state.v) + qt.dot(T, state.w))
     return abs(missed) > WORK_ERROR_SHARE * motion + ENERGY_ROUNDING * (abs(low) + abs(high))
 
 
-def _as_it_is(y, end, h, is_free, tilted, work):
+def _as_it_is(y, end, h, is_free, offset_frame, work):
     return end
 
 
 @if_declared(_as_it_is)
-def limit_energy_gain(y, end, h, is_free, tilted, work):
+def limit_energy_gain(y, end, h, is_free, offset_frame, work):
     """`end` of a stage of length h from y without the energy that came from nowhere.
 
     Where there is too little motion to pay with the body is back at y: in free flight (`is_free`) turned round, in
@@ -92,7 +97,7 @@ def limit_energy_gain(y, end, h, is_free, tilted, work):
     """
     if work.is_stiff == 0:
         return end
-    gain, motion, rounding = energy_gain(y, end, h, tilted, work)
+    gain, motion, rounding = energy_gain(y, end, h, offset_frame, work)
     if gain <= rounding:
         return end
     if gain > UNRESOLVED_GAIN_SHARE * motion:

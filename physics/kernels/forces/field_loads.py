@@ -16,12 +16,12 @@ from physics.kernels.state.body import angular_velocity, principal_attitude
 
 
 @inlined
-def field_state(x, q, v, L, t, tilted, work):
+def field_state(x, q, v, L, t, offset_frame, work):
     """State of a body as its fields read it."""
     R = qt.to_matrix(q)
-    w = angular_velocity(q, L, work, tilted)
+    w = angular_velocity(q, L, work, offset_frame)
     center = ZERO
-    if tilted is not None:
+    if offset_frame is not None:
         center = qt.matvec(R, as_vector(work.center))
     still = FieldState(x, v, w, R, center, ZERO, work.mass, work.shape, as_vector(work.dims))
     air = total_air(still, t, work)
@@ -29,16 +29,18 @@ def field_state(x, q, v, L, t, tilted, work):
 
 
 @inlined
-def kicked_state(x, q, v, L, loads, kick, later, tilted, work):
+def kicked_state(x, q, v, L, loads, kick, later, offset_frame, work):
     """State that fields are told, `later` [s] than now, once loads (F, T) and those held have acted for `kick` [s]."""
     a, torque = add_held_loads(loads[0], loads[1], work)
-    return field_state(x, q, plus(v, times(kick, a)), plus(L, times(kick, torque)), work.now + later, tilted, work)
+    return field_state(
+        x, q, plus(v, times(kick, a)), plus(L, times(kick, torque)), work.now + later, offset_frame, work
+    )
 
 
 @inlined
-def field_load(x, q, v, L, t, tilted, work):
+def field_load(x, q, v, L, t, offset_frame, work):
     """(force, torque about the centre of mass) of all fields at a state and a time."""
-    return total_load(field_state(x, q, v, L, t, tilted, work), t, work)
+    return total_load(field_state(x, q, v, L, t, offset_frame, work), t, work)
 
 
 @inlined
@@ -55,9 +57,9 @@ def apply_loads(force, torque, work):
 
 
 @inlined
-def principal_axes_matrix(q, tilted, work):
+def principal_axes_matrix(q, offset_frame, work):
     """Principal axes in the world."""
-    return qt.to_matrix(principal_attitude(q, work, tilted))
+    return qt.to_matrix(principal_attitude(q, work, offset_frame))
 
 
 @inlined

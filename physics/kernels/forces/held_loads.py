@@ -72,24 +72,24 @@ def advance_clock(h, work):
 
 
 @if_declared()
-def hold_loads(y, h, gyroscopic, tilted, work):
+def hold_loads(y, h, gyroscopic, offset_frame, work):
     """Hold the loads of the middle of a flight of length h that starts at y, now."""
     x, q, v, L = y
     half = 0.5 * h
     t = work.now + half
-    q = drift_attitude(q, L, work, half, gyroscopic, tilted)
+    q = drift_attitude(q, L, work, half, gyroscopic, offset_frame)
     x = plus(x, times(half, v))
-    state = field_state(x, q, v, L, t, tilted, work)
+    state = field_state(x, q, v, L, t, offset_frame, work)
     F, T = total_load(state, t, work)
-    check_stage_resolution(y, (F, T), x, q, h, tilted, work)
-    turn = note_field_rates(state, kicked_state(x, q, v, L, (F, T), h, h, tilted, work), h, work)
+    check_stage_resolution(y, (F, T), x, q, h, offset_frame, work)
+    turn = note_field_rates(state, kicked_state(x, q, v, L, (F, T), h, h, offset_frame, work), h, work)
     if work.is_stiff == 1:
         apply_total_loads(
-            soften_loads(add_held_loads(F, T, work), h, principal_axes_matrix(q, tilted, work), state, work), work
+            soften_loads(add_held_loads(F, T, work), h, principal_axes_matrix(q, offset_frame, work), state, work), work
         )
         return
     for _ in range(MIDPOINT_ROUNDS):
-        state = kicked_state(x, q, v, L, (F, T), half, half, tilted, work)
+        state = kicked_state(x, q, v, L, (F, T), half, half, offset_frame, work)
         before, (F, T) = (F, T), total_load(state, t, work)
         if work.is_textbook == 1 or not half * turn > EXPLICIT_TURN or (before[0] == F and before[1] == T):
             break
@@ -97,7 +97,7 @@ def hold_loads(y, h, gyroscopic, tilted, work):
 
 
 @if_declared()
-def hold_contact_loads(y, h, gyroscopic, tilted, work):
+def hold_contact_loads(y, h, gyroscopic, offset_frame, work):
     """Hold the loads of the middle of a stage in contact, with the velocities of its start.
 
     Where the stage is stiff, those that depend on velocities are softened as if there were no contact.
@@ -105,16 +105,20 @@ def hold_contact_loads(y, h, gyroscopic, tilted, work):
     x, q, v, L = y
     half = 0.5 * h
     t = work.now + half
-    q = drift_attitude(q, L, work, half, gyroscopic, tilted)
+    q = drift_attitude(q, L, work, half, gyroscopic, offset_frame)
     x = plus(x, times(half, v))
-    state = field_state(x, q, v, L, t, tilted, work)
+    state = field_state(x, q, v, L, t, offset_frame, work)
     F, T = total_load(state, t, work)
-    check_stage_resolution(y, (F, T), x, q, h, tilted, work)
-    note_field_rates(state, kicked_state(x, q, v, L, (F, T), h, h, tilted, work), h, work)
+    check_stage_resolution(y, (F, T), x, q, h, offset_frame, work)
+    note_field_rates(state, kicked_state(x, q, v, L, (F, T), h, h, offset_frame, work), h, work)
     if work.is_stiff == 1:
-        still = add_held_loads(*field_load(x, q, state.air, ZERO, t, tilted, work), work)
+        still = add_held_loads(*field_load(x, q, state.air, ZERO, t, offset_frame, work), work)
         slowed = soften_loads(
-            subtract_loads(add_held_loads(F, T, work), still), h, principal_axes_matrix(q, tilted, work), state, work
+            subtract_loads(add_held_loads(F, T, work), still),
+            h,
+            principal_axes_matrix(q, offset_frame, work),
+            state,
+            work,
         )
         apply_total_loads(add_loads(still, slowed), work)
         return
@@ -122,7 +126,7 @@ def hold_contact_loads(y, h, gyroscopic, tilted, work):
 
 
 @if_declared(False)
-def hold_mean_loads(y, end, h, gyroscopic, tilted, work):
+def hold_mean_loads(y, end, h, gyroscopic, offset_frame, work):
     """Hold the loads of the middle of a stage in contact from y to `end`: whether they are others than before.
 
     Contacts may have made motion that the start of the stage did not have, so it is looked at anew whether it is stiff.
@@ -132,20 +136,20 @@ def hold_mean_loads(y, end, h, gyroscopic, tilted, work):
     x, q, v, L = y
     half = 0.5 * h
     t = work.now + half
-    q = drift_attitude(q, L, work, half, gyroscopic, tilted)
+    q = drift_attitude(q, L, work, half, gyroscopic, offset_frame)
     x, v, L = plus(x, times(half, v)), times(0.5, plus(v, end[2])), times(0.5, plus(L, end[3]))
-    state = field_state(x, q, v, L, t, tilted, work)
+    state = field_state(x, q, v, L, t, offset_frame, work)
     F, T = total_load(state, t, work)
     a, torque = as_vector(work.free_acceleration), as_vector(work.torque)
     was_stiff = work.is_stiff
-    note_field_rates(state, field_state(x, q, end[2], end[3], t, tilted, work), h, work)
+    note_field_rates(state, field_state(x, q, end[2], end[3], t, offset_frame, work), h, work)
     if was_stiff == 1:
         work.is_stiff = 1
     if work.is_stiff == 1:
         change = soften_loads(
             subtract_loads(add_held_loads(F, T, work), (a, torque)),
             h,
-            principal_axes_matrix(q, tilted, work),
+            principal_axes_matrix(q, offset_frame, work),
             state,
             work,
         )
@@ -156,24 +160,24 @@ def hold_mean_loads(y, end, h, gyroscopic, tilted, work):
 
 
 @if_declared()
-def hold_softened_loads(y, h, gyroscopic, tilted, work):
+def hold_softened_loads(y, h, gyroscopic, offset_frame, work):
     """Hold the loads of an implicit step over h from y, whatever touches."""
     x, q, v, L = y
     half = 0.5 * h
     t = work.now + half
-    q = drift_attitude(q, L, work, half, gyroscopic, tilted)
-    state = field_state(plus(x, times(half, v)), q, v, L, t, tilted, work)
+    q = drift_attitude(q, L, work, half, gyroscopic, offset_frame)
+    state = field_state(plus(x, times(half, v)), q, v, L, t, offset_frame, work)
     F, T = total_load(state, t, work)
     apply_total_loads(
-        soften_loads(add_held_loads(F, T, work), h, principal_axes_matrix(q, tilted, work), state, work), work
+        soften_loads(add_held_loads(F, T, work), h, principal_axes_matrix(q, offset_frame, work), state, work), work
     )
 
 
 @if_declared()
-def refresh_loads(y, later, tilted, work):
+def refresh_loads(y, later, offset_frame, work):
     """Let the loads at the state y act, `later` [s] than now."""
     x, q, v, L = y
-    F, T = field_load(x, q, v, L, work.now + later, tilted, work)
+    F, T = field_load(x, q, v, L, work.now + later, offset_frame, work)
     apply_loads(F, T, work)
     if F != ZERO or T != ZERO or as_vector(work.held_torque) != ZERO:
         work.is_felt = 1

@@ -16,7 +16,7 @@ from physics.kernels.forces.field_loads import (
     subtract_loads,
 )
 from physics.kernels.forces.force_field_dispatch import soften_loads, total_linked_load, total_load, total_own_load
-from physics.kernels.forces.implicit_loads import implicit_point_force, mobility_bound, point_mobility, axes_across
+from physics.kernels.forces.implicit_loads import axes_across, implicit_point_force, mobility_bound, point_mobility
 from physics.kernels.forces.resolution_limits import note_field_rates
 from physics.kernels.forces.spring import implicit_spring_stiffness, spring_vector
 from physics.kernels.math import quaternion as qt
@@ -51,53 +51,53 @@ def write_middle(body, y):
 
 
 @inlined
-def middle_field_state(body, later, tilted):
+def middle_field_state(body, later, offset_frame):
     """State that the fields of a body are told in its middle."""
     x, q, v, L = read_middle(body)
-    return field_state(x, q, v, L, body.now + later, tilted, body)
+    return field_state(x, q, v, L, body.now + later, offset_frame, body)
 
 
 @inlined
-def _principal(body, tilted):
+def _principal(body, offset_frame):
     """Principal axes of a body in its middle."""
-    return qt.to_matrix(principal_attitude(read_middle(body)[1], body, tilted))
+    return qt.to_matrix(principal_attitude(read_middle(body)[1], body, offset_frame))
 
 
 @inlined
-def _own_loads(body, h, tilted):
+def _own_loads(body, h, offset_frame):
     """Loads of a body that the implicit step over h of its own fields has, as if no spring tied it to others."""
-    state = middle_field_state(body, 0.5 * h, tilted)
+    state = middle_field_state(body, 0.5 * h, offset_frame)
     F, T = total_own_load(state, body.now + 0.5 * h, body)
-    return soften_loads(add_held_loads(F, T, body), h, _principal(body, tilted), state, body)
+    return soften_loads(add_held_loads(F, T, body), h, _principal(body, offset_frame), state, body)
 
 
 @inlined
-def _hold_unsoftened_springs(body, h, tilted):
+def _hold_unsoftened_springs(body, h, offset_frame):
     """Let the springs to others act besides the body's own softened loads."""
-    F, T = total_linked_load(middle_field_state(body, 0.5 * h, tilted), body.now + 0.5 * h, body)
-    a, torque = _own_loads(body, h, tilted)
+    F, T = total_linked_load(middle_field_state(body, 0.5 * h, offset_frame), body.now + 0.5 * h, body)
+    a, torque = _own_loads(body, h, offset_frame)
     apply_total_loads((plus(a, times(1.0 / body.mass, F)), plus(torque, T)), body)
 
 
 @inlined
-def _soften_springs(body, h, tilted):
+def _soften_springs(body, h, offset_frame):
     """Soften by the body's own fields what springs to others, themselves softened by now, add to its own loads."""
-    own = _own_loads(body, h, tilted)
-    added, state = subtract_loads(acting_loads(body), own), middle_field_state(body, 0.5 * h, tilted)
-    apply_total_loads(add_loads(own, soften_loads(added, h, _principal(body, tilted), state, body)), body)
+    own = _own_loads(body, h, offset_frame)
+    added, state = subtract_loads(acting_loads(body), own), middle_field_state(body, 0.5 * h, offset_frame)
+    apply_total_loads(add_loads(own, soften_loads(added, h, _principal(body, offset_frame), state, body)), body)
 
 
 @kernel
-def _soften_pair(k, one, other, h, tilted):
+def _soften_pair(k, one, other, h, offset_frame):
     """Soften the loads of two bodies by the spring in columns k over h: equal and opposite changes."""
     columns = one.columns
-    state, p = middle_field_state(one, 0.5 * h, tilted), columns[k : k + LINK_SIZE]
+    state, p = middle_field_state(one, 0.5 * h, offset_frame), columns[k : k + LINK_SIZE]
     arm, e, l = spring_vector(state, p)
     _, q, _, _ = read_middle(other)
     o = k + LINK_OTHER_POINT
     lever = qt.matvec(qt.to_matrix(q), (columns[o], columns[o + 1], columns[o + 2]))
-    J, R = (one.J[0], one.J[1], one.J[2]), _principal(one, tilted)
-    K, S = (other.J[0], other.J[1], other.J[2]), _principal(other, tilted)
+    J, R = (one.J[0], one.J[1], one.J[2]), _principal(one, offset_frame)
+    K, S = (other.J[0], other.J[1], other.J[2]), _principal(other, offset_frame)
     w = mobility_bound(arm, one.mass, J) + mobility_bound(lever, other.mass, K)
     n, along, across = implicit_spring_stiffness(h, w, e, l, p)
     s, t = axes_across(n)
@@ -115,32 +115,32 @@ def _soften_pair(k, one, other, h, tilted):
 
 
 @inlined
-def hold_implicit_loads(first, count, h, tilted, bodies):
+def hold_implicit_loads(first, count, h, offset_frame, bodies):
     """Let loads act as the implicit step over h has them: own fields, then springs between bodies, one after another.
 
     A field softens the loads of a spring after the spring has: of loads that a damper makes small, even a small share
     that is left to one of the two bodies would be large.
     """
     for b in range(bodies.shape[0]):
-        _hold_unsoftened_springs(bodies[b], h, tilted)
+        _hold_unsoftened_springs(bodies[b], h, offset_frame)
     for b in range(bodies.shape[0]):
         for k in range(first, first + LINK_SIZE * count, LINK_SIZE):
             j = int(bodies[b].columns[k + LINK_OTHER])
             if j > b:  # each spring once
-                _soften_pair(k, bodies[b], bodies[j], h, tilted)
+                _soften_pair(k, bodies[b], bodies[j], h, offset_frame)
     for b in range(bodies.shape[0]):
-        _soften_springs(bodies[b], h, tilted)
+        _soften_springs(bodies[b], h, offset_frame)
 
 
 @kernel
-def note_world_rates(h, tilted, bodies):
+def note_world_rates(h, offset_frame, bodies):
     """Note for all bodies whether a stage of length h is too long for the explicit midpoint rule for one of them."""
     stiff = 0
     for b in range(bodies.shape[0]):
-        body, state = bodies[b], middle_field_state(bodies[b], 0.5 * h, tilted)
+        body, state = bodies[b], middle_field_state(bodies[b], 0.5 * h, offset_frame)
         x, q, v, L = read_middle(body)
         loads = total_load(state, body.now + 0.5 * h, body)
-        note_field_rates(state, kicked_state(x, q, v, L, loads, h, h, tilted, body), h, body)
+        note_field_rates(state, kicked_state(x, q, v, L, loads, h, h, offset_frame, body), h, body)
         stiff = max(stiff, bodies[b].is_stiff)
     for b in range(bodies.shape[0]):
         bodies[b].is_stiff = stiff

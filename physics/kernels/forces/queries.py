@@ -12,18 +12,18 @@ from physics.kernels.state.groups import BodyArrays
 
 
 @kernel
-def evaluate_fields(state, params, shapes, tilted, start, scratch, wrenches, energies):
+def evaluate_fields(state, params, shapes, offset_frame, start, scratch, wrenches, energies):
     """Write force and torque of all fields (rows, 6) [N, N m] and potential energies (rows,) [J] at `start` [s].
 
     `wrenches` is zero at first: it is the wrench that is bound, too.
     """
     work, bodies = scratch[0], BodyArrays(state, params, shapes, None, wrenches)
     for i in range(state.shape[0]):
-        bind_body(i // shapes.shape[0], i, shapes[i % shapes.shape[0]], bodies, None, None, tilted, work)
+        bind_body(i // shapes.shape[0], i, shapes[i % shapes.shape[0]], bodies, None, None, offset_frame, work)
         bind_fields(params, i, None, work)
         place_anchors_of_body(i, state, shapes.shape[0], work)
         x, q, v, L = read_state(state, i)
-        told = field_state(x, q, v, L, start, tilted, work)
+        told = field_state(x, q, v, L, start, offset_frame, work)
         F, T = total_load(told, start, work)
         for c in range(3):
             wrenches[i, c], wrenches[i, 3 + c] = F[c], T[c]

@@ -66,9 +66,11 @@ def _change_of(first, second, work):
 @inlined
 def _change_by_kick(kick, moved, v, L, place, work):
     """Change of the loads of a user's fields from `moved`, by half a step of the loads `kick`, and its bound [m/s²]."""
-    x, q, h, tilted = place
+    x, q, h, offset_frame = place
     v, L = plus(v, times(0.5 * h, kick[0])), plus(L, times(0.5 * h, kick[1]))
-    return _change_of(moved, total_user_load(field_state(x, q, v, L, work.now, tilted, work), work.now, work), work)
+    return _change_of(
+        moved, total_user_load(field_state(x, q, v, L, work.now, offset_frame, work), work.now, work), work
+    )
 
 
 @inlined
@@ -80,7 +82,7 @@ def _is_too_much(change, size, cause, cause_size, work):
 
 
 @if_user_field()
-def check_stage_resolution(y, middle, x, q, h, tilted, work):
+def check_stage_resolution(y, middle, x, q, h, offset_frame, work):
     """Note whether loads of a user's fields change too much over a stage from y; `middle` are all loads at (x, q).
 
     Under a stiffness of frequency Ω the loads change by Ω² h v/2 until the middle: h times that is more than 2 v where
@@ -91,14 +93,14 @@ def check_stage_resolution(y, middle, x, q, h, tilted, work):
     """
     t = work.now
     v, L = y[2], y[3]
-    start = total_user_load(field_state(y[0], y[1], v, L, t, tilted, work), t, work)
-    moved = total_user_load(field_state(x, q, v, L, t, tilted, work), t, work)
-    w = angular_velocity(q, L, work, tilted)
+    start = total_user_load(field_state(y[0], y[1], v, L, t, offset_frame, work), t, work)
+    moved = total_user_load(field_state(x, q, v, L, t, offset_frame, work), t, work)
+    w = angular_velocity(q, L, work, offset_frame)
     speed = math.sqrt(qt.dot(v, v)) + work.radius * math.sqrt(qt.dot(w, w))
     _, change = _change_of(start, moved, work)
     if change > _COARSE_CHANGE * speed / h:
         work.is_coarse = 1
-    place = x, q, h, tilted
+    place = x, q, h, offset_frame
     loads = add_held_loads(middle[0], middle[1], work)
     size = load_bound(loads, work)
     first, by_loads = _change_by_kick(loads, moved, v, L, place, work)
@@ -110,18 +112,18 @@ def check_stage_resolution(y, middle, x, q, h, tilted, work):
 
 
 @inlined
-def newton_load_change(y, end, loads, h, gyroscopic, tilted, work):
+def newton_load_change(y, end, loads, h, gyroscopic, offset_frame, work):
     """Softened difference between the loads of a flight over h from y to `end` and `held_loads` (`implicit_loads`)."""
     t, half = work.now + 0.5 * h, 0.5 * h
     share = implicit_share(h * work.damping)
     v, L = lerp(y[2], end[2], share), lerp(y[3], end[3], share)
-    x, q = times(0.5, plus(y[0], end[0])), drift_attitude(y[1], y[3], work, half, gyroscopic, tilted)
-    middle = field_state(x, q, v, L, t, tilted, work)
-    first = field_state(y[0], y[1], v, L, t, tilted, work)
-    last = field_state(end[0], end[1], v, L, t, tilted, work)
+    x, q = times(0.5, plus(y[0], end[0])), drift_attitude(y[1], y[3], work, half, gyroscopic, offset_frame)
+    middle = field_state(x, q, v, L, t, offset_frame, work)
+    first = field_state(y[0], y[1], v, L, t, offset_frame, work)
+    last = field_state(end[0], end[1], v, L, t, offset_frame, work)
     F, T = total_mean_load((middle, first, last), t, work)
     return soften_loads(
-        subtract_loads(add_held_loads(F, T, work), loads), h, principal_axes_matrix(q, tilted, work), middle, work
+        subtract_loads(add_held_loads(F, T, work), loads), h, principal_axes_matrix(q, offset_frame, work), middle, work
     )
 
 

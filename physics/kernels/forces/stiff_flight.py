@@ -39,7 +39,7 @@ def implicit_flight(y, h, flight, work):
     size, loads = load_bound(start, work), start
     for _ in range(_NEWTON_ROUNDS):
         end = integrate_flight(y, h, flight, work)
-        change = newton_load_change(y, end, loads, h, flight.gyroscopic, flight.tilted, work)
+        change = newton_load_change(y, end, loads, h, flight.gyroscopic, flight.offset_frame, work)
         loads = plus(loads[0], change[0]), plus(loads[1], change[1])
         apply_total_loads(loads, work)
         if load_bound(change, work) <= _CONVERGED * size:
@@ -60,19 +60,19 @@ def subdivide_stiff_flight(end, y, h, flight, work):
         return end
     start, left, part = time_now(work), h, 0.0
     for k in range(_MAX_PARTS):
-        hold_loads(y, left, flight.gyroscopic, flight.tilted, work)
+        hold_loads(y, left, flight.gyroscopic, flight.offset_frame, work)
         part = _PART_GROWTH * part
         if work.rate > 0.0:
             part = max(part, _FIRST_PART / work.rate)
         if not 0.0 < part < left or k == _MAX_PARTS - 1:
             part = left
         if part < left:
-            hold_loads(y, part, flight.gyroscopic, flight.tilted, work)
+            hold_loads(y, part, flight.gyroscopic, flight.offset_frame, work)
         if work.is_stiff == 1:
             end = implicit_flight(y, part, flight, work)
         else:
             end = integrate_flight(y, part, flight, work)
-        y = limit_energy_gain(y, end, part, True, flight.tilted, work)
+        y = limit_energy_gain(y, end, part, True, flight.offset_frame, work)
         left -= part
         advance_clock(part, work)
         if not left > 0.0:

@@ -136,7 +136,7 @@ def _put_anchor(first, columns, x, R, v, w, mobility):
 
 
 @inlined
-def _put_anchors(first, count, tilted, records):
+def _put_anchors(first, count, offset_frame, records):
     """Put the anchors of all springs where the bodies' `read_middle` says."""
     for b in range(records.shape[0]):
         columns = records[b].columns
@@ -144,14 +144,14 @@ def _put_anchors(first, count, tilted, records):
             if columns[k + LINK_OTHER] >= 0.0:
                 other = records[int(columns[k + LINK_OTHER])]
                 x, q, v, L = read_middle(other)
-                w = angular_velocity(q, L, other, tilted)
+                w = angular_velocity(q, L, other, offset_frame)
                 o = k + LINK_OTHER_POINT
                 mobility = mobility_bound((columns[o], columns[o + 1], columns[o + 2]), other.mass, other.J)
                 _put_anchor(k, columns, x, qt.to_matrix(q), v, w, mobility)
 
 
 @_if_linked(lambda arguments: _record(arguments[-1]), False)
-def hold_linked_loads(first, count, h, gyroscopic, tilted, bodies):
+def hold_linked_loads(first, count, h, gyroscopic, offset_frame, bodies):
     """`held_loads.hold_loads` for bodies tied by springs: all at once. False, and nothing done, without those.
 
     A body in contact keeps the velocities of the start of the stage, as in `held_loads.hold_contact_loads`.
@@ -159,35 +159,35 @@ def hold_linked_loads(first, count, h, gyroscopic, tilted, bodies):
     records, half = bodies.work, 0.5 * h
     for b in range(records.shape[0]):
         x, q, v, L = read_state(bodies.state, b)
-        q = drift_attitude(q, L, records[b], half, gyroscopic, tilted)
+        q = drift_attitude(q, L, records[b], half, gyroscopic, offset_frame)
         write_middle(records[b], (plus(x, times(half, v)), q, v, L))
-    _put_anchors(first, count, tilted, records)
-    if note_world_rates(h, tilted, records):
-        hold_implicit_loads(first, count, h, tilted, records)
+    _put_anchors(first, count, offset_frame, records)
+    if note_world_rates(h, offset_frame, records):
+        hold_implicit_loads(first, count, h, offset_frame, records)
         return True
     for b in range(records.shape[0]):
         if bodies.touched[b] == 0:
-            _kick(records[b], half, tilted)
-    _put_anchors(first, count, tilted, records)
+            _kick(records[b], half, offset_frame)
+    _put_anchors(first, count, offset_frame, records)
     for b in range(records.shape[0]):
         x, q, v, L = read_middle(records[b])
-        F, T = field_load(x, q, v, L, records[b].now + half, tilted, records[b])
+        F, T = field_load(x, q, v, L, records[b].now + half, offset_frame, records[b])
         apply_loads(F, T, records[b])
     return True
 
 
 @_if_linked(lambda arguments: _record(arguments[-1]), None)
-def place_anchors(first, count, tilted, bodies):
+def place_anchors(first, count, offset_frame, bodies):
     """Put the anchors of all springs where the bodies' `read_middle` says."""
-    _put_anchors(first, count, tilted, bodies.work)
+    _put_anchors(first, count, offset_frame, bodies.work)
 
 
 @_if_linked(lambda arguments: _record(arguments[-1]), None)
-def place_anchors_now(first, count, tilted, bodies):
+def place_anchors_now(first, count, offset_frame, bodies):
     """Put the anchors of all springs where the bodies are now."""
     for b in range(bodies.work.shape[0]):
         write_middle(bodies.work[b], read_state(bodies.state, b))
-    _put_anchors(first, count, tilted, bodies.work)
+    _put_anchors(first, count, offset_frame, bodies.work)
 
 
 @_if_linked(lambda arguments: _record(arguments[-1]), None)
@@ -201,10 +201,10 @@ def unite_linked_bodies(first, count, parent, bodies):
 
 
 @inlined
-def _kick(body, half, tilted):
+def _kick(body, half, offset_frame):
     """Give the middle of a body half a stage's kick of all loads."""
     x, q, v, L = read_middle(body)
-    F, T = field_load(x, q, v, L, body.now + half, tilted, body)
+    F, T = field_load(x, q, v, L, body.now + half, offset_frame, body)
     a, held = body.held_acceleration, body.held_torque
     v = plus(v, times(half, plus((a[0], a[1], a[2]), times(1.0 / body.mass, F))))
     L = plus(L, times(half, plus((held[0], held[1], held[2]), T)))

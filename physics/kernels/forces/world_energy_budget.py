@@ -41,21 +41,21 @@ def _any_is_stiff(records):
 
 
 @kernel
-def _potential(later, tilted, bodies):
+def _potential(later, offset_frame, bodies):
     """Energy of all fields at the places of now, `later` [s] than the start of the stage [J]."""
-    place_anchors_now(tilted, bodies)
+    place_anchors_now(offset_frame, bodies)
     total = 0.0
     for b in range(bodies.work.shape[0]):
-        total += potential_energy(read_state(bodies.state, b), later, tilted, bodies.work[b])
+        total += potential_energy(read_state(bodies.state, b), later, offset_frame, bodies.work[b])
     return total
 
 
 @if_declared()
-def note_stage_energy(tilted, bodies, first):
+def note_stage_energy(offset_frame, bodies, first):
     """Keep states and potential energy at the start of a stage, if it is stiff; `first` is the first body's record."""
     if not _any_is_stiff(bodies.work):
         return
-    first.stage_energy = _potential(0.0, tilted, bodies)
+    first.stage_energy = _potential(0.0, offset_frame, bodies)
     for b in range(bodies.work.shape[0]):
         (x, q, v, L), m = read_state(bodies.state, b), bodies.work[b].stage_start
         m[0], m[1], m[2] = x
@@ -65,15 +65,18 @@ def note_stage_energy(tilted, bodies, first):
 
 
 @kernel
-def _gain_of(b, h, tilted, bodies):
+def _gain_of(b, h, offset_frame, bodies):
     """(kinetic energy gained by body b beyond the work of held loads and of fields without an energy, sizes) [J]."""
     body, y, end = bodies.work[b], _start(bodies.work[b]), read_state(bodies.state, b)
     v, L = times(0.5, plus(y[2], end[2])), times(0.5, plus(y[3], end[3]))
-    before, after = kinetic_energy(y[1], y[2], y[3], body, tilted), kinetic_energy(end[1], end[2], end[3], body, tilted)
+    before, after = (
+        kinetic_energy(y[1], y[2], y[3], body, offset_frame),
+        kinetic_energy(end[1], end[2], end[3], body, offset_frame),
+    )
     a, T = constant_loads(body)
-    done = body.mass * qt.dot(a, minus(end[0], y[0])) + h * qt.dot(T, angular_velocity(y[1], L, body, tilted))
+    done = body.mass * qt.dot(a, minus(end[0], y[0])) + h * qt.dot(T, angular_velocity(y[1], L, body, offset_frame))
     t = body.now + 0.5 * h
-    supply = h * total_supplied_power(field_state(y[0], y[1], v, L, t, tilted, body), t, body)
+    supply = h * total_supplied_power(field_state(y[0], y[1], v, L, t, offset_frame, body), t, body)
     return after - before - done - supply, before + after + abs(done) + supply
 
 
@@ -91,7 +94,7 @@ def _common_velocities(ties, bodies):
 
 
 @kernel
-def _take(gain, ties, tilted, bodies):
+def _take(gain, ties, offset_frame, bodies):
     """Take an energy from the motion of all bodies; where there is too little, they are back where they were.
 
     Their common velocity then is that of the start, too: what the stage made of it is as wrong as the rest.
@@ -100,7 +103,7 @@ def _take(gain, ties, tilted, bodies):
     motion = 0.0
     for b in range(bodies.work.shape[0]):
         _, q, v, L = read_state(bodies.state, b)
-        motion += kinetic_energy(q, minus(v, c), L, bodies.work[b], tilted)
+        motion += kinetic_energy(q, minus(v, c), L, bodies.work[b], offset_frame)
     if gain > UNRESOLVED_GAIN_SHARE * motion:
         for b in range(bodies.work.shape[0]):
             bodies.work[b].is_coarse = 1
@@ -115,20 +118,20 @@ def _take(gain, ties, tilted, bodies):
 
 
 @if_declared()
-def limit_world_energy_gain(h, ties, tilted, bodies, first):
+def limit_world_energy_gain(h, ties, offset_frame, bodies, first):
     """Take from the bodies what energy a stiff stage of length h gave them from nowhere.
 
     `ties` is 1 where nothing but each other holds them; `first` the first body's record.
     """
     if not _any_is_stiff(bodies.work):
         return
-    high = _potential(h, tilted, bodies)
+    high = _potential(h, offset_frame, bodies)
     gain, size = high - first.stage_energy, abs(high) + abs(first.stage_energy)
     for b in range(bodies.work.shape[0]):
-        more, measure = _gain_of(b, h, tilted, bodies)
+        more, measure = _gain_of(b, h, offset_frame, bodies)
         gain, size = gain + more, size + measure
     if gain > ENERGY_ROUNDING * size:
-        _take(gain, ties, tilted, bodies)
+        _take(gain, ties, offset_frame, bodies)
 
 
 @if_declared()

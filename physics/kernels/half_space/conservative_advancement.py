@@ -57,28 +57,28 @@ def max_inv_inertia(work):
 
 
 @inlined
-def is_centred(tilted, work):
+def is_centred(offset_frame, work):
     """True if the geometric centre is the centre of mass."""
-    return tilted is None or (work.center[0] == 0.0 and work.center[1] == 0.0 and work.center[2] == 0.0)
+    return offset_frame is None or (work.center[0] == 0.0 and work.center[1] == 0.0 and work.center[2] == 0.0)
 
 
 @inlined
-def may_turn(L, h, least, tilted, work):
+def may_turn(L, h, least, offset_frame, work):
     """True if a body of angular momentum L could turn by more than `least` [rad] in h: a cheap, safe bound.
 
     A sphere does not where its centre is its centre of mass.
     """
-    if work.shape == SPHERE and is_centred(tilted, work):
+    if work.shape == SPHERE and is_centred(offset_frame, work):
         return False
     s, t = h * max_inv_inertia(work), (work.torque[0], work.torque[1], work.torque[2])
     return 2.0 * (qt.dot(L, L) + h * h * qt.dot(t, t)) * s * s > least * least
 
 
 @kernel
-def spin_bound(q, L, h, tilted, work):
+def spin_bound(q, L, h, offset_frame, work):
     """Bound of |ω| within h [rad/s]."""
     most, least = max_inv_inertia(work), min(work.J[0], min(work.J[1], work.J[2]))
-    w = angular_velocity(q, L, work, tilted)
+    w = angular_velocity(q, L, work, offset_frame)
     push = h * math.sqrt(work.torque[0] ** 2 + work.torque[1] ** 2 + work.torque[2] ** 2)
     size = max(0.0, math.sqrt(qt.dot(L, L)) - push)
     energy = math.sqrt(max(0.0, qt.dot(w, L))) + math.sqrt(most) * push
@@ -87,27 +87,27 @@ def spin_bound(q, L, h, tilted, work):
 
 
 @inlined
-def _arm(i, tilted, work):
+def _arm(i, offset_frame, work):
     """Largest distance of a body's points from its principal axis i [m]."""
-    if tilted is not None or work.shape == HULL:
+    if offset_frame is not None or work.shape == HULL:
         return work.radius
     b, c = work.dims[(i + 1) % 3], work.dims[(i + 2) % 3]
     return math.sqrt(b * b + c * c)
 
 
 @kernel
-def turning_acceleration_bound(spin, q, L, h, tilted, work):
+def turning_acceleration_bound(spin, q, L, h, offset_frame, work):
     """Bound of what turning accelerates points by within h [m/s²], `spin` that of |ω|; 0 of a centred sphere."""
-    if work.shape == SPHERE and is_centred(tilted, work):
+    if work.shape == SPHERE and is_centred(offset_frame, work):
         return 0.0
     torque = math.sqrt(work.torque[0] ** 2 + work.torque[1] ** 2 + work.torque[2] ** 2)
-    w, most, J = angular_velocity(q, L, work, tilted), max_inv_inertia(work), work.J
+    w, most, J = angular_velocity(q, L, work, offset_frame), max_inv_inertia(work), work.J
     size = math.sqrt(qt.dot(L, L)) + h * torque
     energy = math.sqrt(max(0.0, qt.dot(w, L))) + math.sqrt(most) * h * torque
     u = min(math.sqrt(J[0]) * energy, J[0] * size)
     v = min(math.sqrt(J[1]) * energy, J[1] * size)
     t = min(math.sqrt(J[2]) * energy, J[2] * size)
-    a, b, c = _arm(0, tilted, work), _arm(1, tilted, work), _arm(2, tilted, work)
+    a, b, c = _arm(0, offset_frame, work), _arm(1, offset_frame, work), _arm(2, offset_frame, work)
     bend = spin * (u * a + v * b + t * c)
     bend += (v * t + J[0] * torque) * a + (t * u + J[1] * torque) * b + (u * v + J[2] * torque) * c
     return min(bend, work.radius * (ACCELERATION_SHARE * spin * spin + most * torque))
@@ -160,15 +160,15 @@ def _height(t, n, m, gap, rate, bend, c, R, work):
 
 
 @kernel
-def safe_advance(y, wall, horizon, spin, tilted, work):
+def safe_advance(y, wall, horizon, spin, offset_frame, work):
     """(gap to a wall, a time within which it is not used up in free flight from y, at most `horizon`)."""
     x, q, v, L = y
-    n, R, w = wall_normal(work.walls, wall), to_matrix(q), angular_velocity(q, L, work, tilted)
+    n, R, w = wall_normal(work.walls, wall), to_matrix(q), angular_velocity(q, L, work, offset_frame)
     m, d, c, a = qt.cross(n, w), qt.dot(n, x) - work.walls[wall, WALL_OFFSET], (0.0, 0.0, 0.0), work.free_acceleration
-    if tilted is not None:
+    if offset_frame is not None:
         c = center_arm(R, work)
     rate = qt.dot(n, v)
-    bend = turning_acceleration_bound(spin, q, L, horizon, tilted, work) - min(
+    bend = turning_acceleration_bound(spin, q, L, horizon, offset_frame, work) - min(
         0.0, n[0] * a[0] + n[1] * a[1] + n[2] * a[2]
     )
     gap = _height(0.0, n, m, d, rate, bend, c, R, work)
@@ -218,10 +218,10 @@ def remove_symmetric_spin(R, w, work):
 
 
 @inlined
-def time_to_turn_far(n, y, tilted, work):
+def time_to_turn_far(n, y, offset_frame, work):
     """Time in which a body turns by `FAR_TURN` about what is across n [s]: about n itself nothing comes nearer."""
-    w = angular_velocity(y[1], y[3], work, tilted)
-    if is_centred(tilted, work):
+    w = angular_velocity(y[1], y[3], work, offset_frame)
+    if is_centred(offset_frame, work):
         w = remove_symmetric_spin(to_matrix(y[1]), w, work)
     m = qt.cross(n, w)
     rate = math.sqrt(qt.dot(m, m))
@@ -229,28 +229,28 @@ def time_to_turn_far(n, y, tilted, work):
 
 
 @inlined
-def _fly_near(y, wall, h, spin, gyroscopic, tilted, work):
+def _fly_near(y, wall, h, spin, gyroscopic, offset_frame, work):
     """Time of free flight, at most h, after which a wall is at the slop or not reached [s]."""
     now, gone = y, 0.0
     for _ in range(MAX_ADVANCES):
-        gap, step = safe_advance(now, wall, h - gone, spin, tilted, work)
+        gap, step = safe_advance(now, wall, h - gone, spin, offset_frame, work)
         if not gap > work.slop:
             break
         gone += step
         if not gone < h:
             return h
-        now = fly(now, work, step, gyroscopic, tilted)
+        now = fly(now, work, step, gyroscopic, offset_frame)
     return gone
 
 
 @kernel
-def limit_turning_stage(n, y, h, left, gyroscopic, tilted, work):
+def limit_turning_stage(n, y, h, left, gyroscopic, offset_frame, work):
     """Time, at most `left`, that a stage from y may take; less where the body turns far in h: no wall is passed [s].
 
     In contact (n > 0) it does not fly as is foretold here: then it turns no further than a look at the end can tell. So
     do features on a wall that others touch.
     """
-    spin = spin_bound(y[1], y[3], h, tilted, work)
+    spin = spin_bound(y[1], y[3], h, offset_frame, work)
     if not spin * h > FAR_TURN:
         return left
     first = left
@@ -259,8 +259,8 @@ def limit_turning_stage(n, y, h, left, gyroscopic, tilted, work):
             continue
         normal, met = wall_normal(work.walls, wall), 0.0
         if work.mask[wall] == 0:
-            met = _fly_near(y, wall, first, spin, gyroscopic, tilted, work)
-        limit = time_to_turn_far(normal, y, tilted, work)
+            met = _fly_near(y, wall, first, spin, gyroscopic, offset_frame, work)
+        limit = time_to_turn_far(normal, y, offset_frame, work)
         if not met > 0.0:
             met = limit
         if n > 0:

@@ -30,14 +30,14 @@ def wall_normal(walls, k):
 
 @inlined
 def center_arm(R, work):
-    """Geometric centre of a body relative to its centre of mass, world frame [m]; only of a scene that is `tilted`."""
+    """Geometric centre of a body relative to its centre of mass, world frame [m]; with `offset_frame` only."""
     return qt.matvec(R, (work.center[0], work.center[1], work.center[2]))
 
 
 @inlined
-def geometric_center(x, R, work, tilted):
-    """Geometric centre of a body whose centre of mass is at x [m] (the same unless `tilted`)."""
-    if tilted is None:
+def geometric_center(x, R, work, offset_frame):
+    """Geometric centre of a body whose centre of mass is at x [m] (the same unless `offset_frame`)."""
+    if offset_frame is None:
         return x
     r = center_arm(R, work)
     return (x[0] + r[0], x[1] + r[1], x[2] + r[2])
@@ -71,11 +71,11 @@ def ellipsoid_point_and_rate(dims, R, w, n):
 
 
 @inlined
-def contact_arm_and_rate(shape, dims, R, w, n, feature, tilted, work):
+def contact_arm_and_rate(shape, dims, R, w, n, feature, offset_frame, work):
     """Contact point relative to the centre of mass, and its rate of change, world frame [m, m/s]."""
     if shape == BLOCK:
         r = geo.vertex_arm(dims, R, feature)
-        if tilted is not None:
+        if offset_frame is not None:
             r = _plus(r, center_arm(R, work))
         return r, qt.cross(w, r)
     if shape == SPHERE:
@@ -84,7 +84,7 @@ def contact_arm_and_rate(shape, dims, R, w, n, feature, tilted, work):
 
 
 @inlined
-def place_arms(n, R, tilted, work):
+def place_arms(n, R, offset_frame, work):
     """Contact points of the set at this pose: `work.arm`, relative to the centre of mass, world frame [m]."""
     walls, shape = work.walls, work.shape
     dims = (work.dims[0], work.dims[1], work.dims[2])
@@ -92,7 +92,7 @@ def place_arms(n, R, tilted, work):
         wall = wall_of(work.slot[i], work)
         if shape == BLOCK:
             r = geo.vertex_arm(dims, R, feature_of(work.slot[i], work))
-            if tilted is not None:
+            if offset_frame is not None:
                 c = center_arm(R, work)
                 r = (r[0] + c[0], r[1] + c[1], r[2] + c[2])
         else:

@@ -85,7 +85,7 @@ def _write_vertices(d, vn, e, mb, work):
 
 
 @inlined
-def collect_wall_contacts(y, w, h, tilted, memory, work):
+def collect_wall_contacts(y, w, h, offset_frame, memory, work):
     """Fill `work` (slot, gap, speed, mask, and of all together widest and approach) with the contact set at this pose.
 
     Parameters
@@ -108,7 +108,7 @@ def collect_wall_contacts(y, w, h, tilted, memory, work):
     x, q, v, _ = y
     R, slop = qt.to_matrix(q), work.slop
     dims = (work.dims[0], work.dims[1], work.dims[2])
-    center = geometric_center(x, R, work, tilted)
+    center = geometric_center(x, R, work, offset_frame)
     reach, soft, near = _admission_bounds(v, w, h, work)
     count = 0
     depth = widest = approach = 0.0
@@ -124,7 +124,7 @@ def collect_wall_contacts(y, w, h, tilted, memory, work):
         vn = qt.dot(n, v)
         m = qt.cross(n, w)  # n·(ω x r) = (n x ω)·r
         if shape == BLOCK:
-            if tilted is not None:
+            if offset_frame is not None:
                 vn += qt.dot(m, center_arm(R, work))
             _write_vertices(d, vn, e, qt.transposed_matvec(R, m), work)
             for vertex in range(VERTEX_COUNT):
@@ -138,7 +138,7 @@ def collect_wall_contacts(y, w, h, tilted, memory, work):
             gap = d - geo.support(shape, dims, e)
             speed = vn + qt.dot(m, geo.support_arm(shape, dims, R, n, e))
             if _admit(gap, speed, slop, reach, soft, k, h, memory, work) or is_still_pressed(
-                gap, k, y, h, tilted, memory, work
+                gap, k, y, h, offset_frame, memory, work
             ):
                 count = _record(count, k, 0, features, gap, speed, work)
                 depth, widest, approach = max(depth, -gap), max(widest, gap), max(approach, -speed)
@@ -156,14 +156,14 @@ def _record(count, wall, feature, features, gap, speed, work):
 
 
 @inlined
-def check_penetration(x, R, tilted, work):
+def check_penetration(x, R, offset_frame, work):
     """Test for features behind walls: (one outside the contact set, by more than half a slop; any, by a slop).
 
     Once a feature outside the set is, the other walls are not looked at: both are true then.
     """
     walls, shape, least = work.walls, work.shape, -0.5 * work.slop
     dims = (work.dims[0], work.dims[1], work.dims[2])
-    center, is_deep = geometric_center(x, R, work, tilted), False
+    center, is_deep = geometric_center(x, R, work, offset_frame), False
     for k in range(walls.shape[0]):
         n = wall_normal(walls, k)
         d = qt.dot(n, center) - walls[k, WALL_OFFSET]
@@ -185,14 +185,14 @@ def check_penetration(x, R, tilted, work):
 
 
 @kernel
-def nearest_outside_set(x, R, tilted, work):
+def nearest_outside_set(x, R, offset_frame, work):
     """Smallest gap [m] over all features that are not in the contact set, and the slot of its feature.
 
     Of a wall that the bounding sphere does not reach the sphere's gap is taken: a lower bound, and positive (slot -1).
     """
     walls, features, shape, radius = work.walls, work.features, work.shape, work.radius
     dims = (work.dims[0], work.dims[1], work.dims[2])
-    center = geometric_center(x, R, work, tilted)
+    center = geometric_center(x, R, work, offset_frame)
     best, slot = 1.0e300, -1
     for k in range(walls.shape[0]):
         n = wall_normal(walls, k)
@@ -216,12 +216,12 @@ def nearest_outside_set(x, R, tilted, work):
 
 
 @kernel
-def feature_gap(slot, x, R, tilted, work):
+def feature_gap(slot, x, R, offset_frame, work):
     """Gap [m] of one feature to its wall."""
     walls, shape = work.walls, work.shape
     dims = (work.dims[0], work.dims[1], work.dims[2])
     n = wall_normal(walls, wall_of(slot, work))
-    d = qt.dot(n, geometric_center(x, R, work, tilted)) - walls[wall_of(slot, work), WALL_OFFSET]
+    d = qt.dot(n, geometric_center(x, R, work, offset_frame)) - walls[wall_of(slot, work), WALL_OFFSET]
     e = geo.scaled_normal(shape, dims, R, n)
     if shape == BLOCK:
         return d + geo.vertex_height(e, feature_of(slot, work))
@@ -229,7 +229,7 @@ def feature_gap(slot, x, R, tilted, work):
 
 
 @kernel
-def feature_gap_rate(slot, y, tilted, work):
+def feature_gap_rate(slot, y, offset_frame, work):
     """Rate of the gap of one feature [m/s]: its normal velocity. A point that wanders does so along the wall."""
     _, q, v, L = y
     walls, R, shape = work.walls, qt.to_matrix(q), work.shape
@@ -237,23 +237,23 @@ def feature_gap_rate(slot, y, tilted, work):
     n = wall_normal(walls, wall_of(slot, work))
     if shape == BLOCK:
         r = geo.vertex_arm(dims, R, feature_of(slot, work))
-        if tilted is not None:
+        if offset_frame is not None:
             c = center_arm(R, work)
             r = (r[0] + c[0], r[1] + c[1], r[2] + c[2])
     else:
         r = geo.support_arm(shape, dims, R, n, geo.scaled_normal(shape, dims, R, n))
-    u = qt.cross(angular_velocity(q, L, work, tilted), r)
+    u = qt.cross(angular_velocity(q, L, work, offset_frame), r)
     return qt.dot(n, (v[0] + u[0], v[1] + u[1], v[2] + u[2]))
 
 
 @inlined
-def project_out_of_walls(x, R, tilted, work):
+def project_out_of_walls(x, R, offset_frame, work):
     """Position moved along the normals so that nothing is deeper than the slop in a wall. No velocity changes."""
     walls, shape, radius, slop = work.walls, work.shape, work.radius, work.slop
     dims = (work.dims[0], work.dims[1], work.dims[2])
     for k in range(walls.shape[0]):
         n = wall_normal(walls, k)
-        d = qt.dot(n, geometric_center(x, R, work, tilted)) - walls[k, WALL_OFFSET]
+        d = qt.dot(n, geometric_center(x, R, work, offset_frame)) - walls[k, WALL_OFFSET]
         if d >= radius:
             continue
         gap = d - geo.support(shape, dims, geo.scaled_normal(shape, dims, R, n))

@@ -28,26 +28,26 @@ def last_normal_impulse(slot, memory, work):
 
 
 @kernel
-def free_gap_acceleration(slot, y, tilted, work):
+def free_gap_acceleration(slot, y, offset_frame, work):
     """Acceleration of a feature's gap without contact, n·(v̇ + ω̇ x r + ω x ṙ) [m/s²]; < 0: it is pressed."""
     _, q, _, L = y
     n, a, torque = wall_normal(work.walls, wall_of(slot, work)), work.free_acceleration, work.torque
     dims = (work.dims[0], work.dims[1], work.dims[2])
-    R = qt.to_matrix(principal_attitude(q, work, tilted))
+    R = qt.to_matrix(principal_attitude(q, work, offset_frame))
     w = apply_inv_inertia(R, L, work.J)
     g = qt.cross(L, w)
     alpha = apply_inv_inertia(R, (torque[0] + g[0], torque[1] + g[1], torque[2] + g[2]), work.J)
-    r, rate = contact_arm_and_rate(work.shape, dims, qt.to_matrix(q), w, n, feature_of(slot, work), tilted, work)
+    r, rate = contact_arm_and_rate(work.shape, dims, qt.to_matrix(q), w, n, feature_of(slot, work), offset_frame, work)
     b, c = qt.cross(alpha, r), qt.cross(w, rate)
     return n[0] * (a[0] + b[0] + c[0]) + n[1] * (a[1] + b[1] + c[1]) + n[2] * (a[2] + b[2] + c[2])
 
 
 @kernel
-def is_still_pressed(gap, slot, y, h, tilted, memory, work):
+def is_still_pressed(gap, slot, y, h, offset_frame, memory, work):
     """True if a round body that pushed in the last stage is still pressed, so that its gap closes."""
     if not (work.shape == ELLIPSOID and last_normal_impulse(slot, memory, work) > 0.0):
         return False
-    return gap + 0.5 * h * h * min(free_gap_acceleration(slot, y, tilted, work), 0.0) <= work.slop
+    return gap + 0.5 * h * h * min(free_gap_acceleration(slot, y, offset_frame, work), 0.0) <= work.slop
 
 
 @inlined
@@ -64,19 +64,19 @@ def turning_acceleration(w, work):
 
 
 @kernel
-def is_persistent_contact(i, y, h, tilted, memory, work):
+def is_persistent_contact(i, y, h, offset_frame, memory, work):
     """True if the speed of contact i of the set is an error of the last stage: it pushed then, and is no faster.
 
     A stage of length h can leave a contact that holds the speed that loads and turning make in it.
     """
     if not last_normal_impulse(work.slot[i], memory, work) > 0.0:
         return False
-    w = angular_velocity(y[1], y[3], work, tilted)
+    w = angular_velocity(y[1], y[3], work, offset_frame)
     return abs(work.speed[i]) <= h * (work.acceleration + turning_acceleration(w, work))
 
 
 @kernel
-def cancel_separation(y, h, tilted, memory, work):
+def cancel_separation(y, h, offset_frame, memory, work):
     """State with the one contact of the set at rest along its normal, if it holds on but h would not bring it back.
 
     What leaves at u after a push p, though it is pressed against its wall still, got u/(n·W n) more than it should
@@ -85,15 +85,15 @@ def cancel_separation(y, h, tilted, memory, work):
     """
     x, q, v, L = y
     gap, u, slot = work.gap[0], work.speed[0], work.slot[0]
-    if not is_persistent_contact(0, y, h, tilted, memory, work):
+    if not is_persistent_contact(0, y, h, offset_frame, memory, work):
         return y
-    a = free_gap_acceleration(slot, y, tilted, work)
+    a = free_gap_acceleration(slot, y, offset_frame, work)
     if not (a < 0.0 and gap + h * (u + 0.5 * h * a) > 0.0):
         return y
-    place_arms(1, qt.to_matrix(q), tilted, work)
+    place_arms(1, qt.to_matrix(q), offset_frame, work)
     n, r = wall_normal(work.walls, wall_of(slot, work)), (work.arm[0, 0], work.arm[0, 1], work.arm[0, 2])
     m = qt.cross(r, n)
-    spin = apply_inv_inertia(qt.to_matrix(principal_attitude(q, work, tilted)), m, work.J)
+    spin = apply_inv_inertia(qt.to_matrix(principal_attitude(q, work, offset_frame)), m, work.J)
     p = min(u / (1.0 / work.mass + qt.dot(m, spin)), last_normal_impulse(slot, memory, work))
     s = p / work.mass
     v = (v[0] - s * n[0], v[1] - s * n[1], v[2] - s * n[2])

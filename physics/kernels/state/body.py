@@ -11,10 +11,10 @@ from physics.kernels.state.layout import METHOD_PIVOTING, SERIES_SIZE
 
 
 @inlined
-def bind_body(world, i, shape, bodies, friction, restitution, tilted, work):
+def bind_body(world, i, shape, bodies, friction, restitution, offset_frame, work):
     """Write what the step needs of body i into `work`: parameters, and the loads that are held over the step.
 
-    gravity, friction, restitution and tilted are None where the scene does not have them: tilted, where the
+    gravity, friction, restitution and offset_frame are None where the scene does not have them: offset_frame, where the
     principal axes of every body are its body axes and its geometric centre is its centre of mass.
     """
     inv_mass, radius = bodies.params[i, at.INV_MASS], bodies.params[i, at.RADIUS]
@@ -35,7 +35,7 @@ def bind_body(world, i, shape, bodies, friction, restitution, tilted, work):
         work.mu = bodies.params[i, at.FRICTION]
     if restitution is not None:
         work.restitution = bodies.params[i, at.RESTITUTION]
-    if tilted is not None:
+    if offset_frame is not None:
         for c in range(4):
             work.principal[c] = bodies.params[i, at.PRINCIPAL + c]
         for c in range(3):
@@ -114,18 +114,18 @@ def report_fault(world, b, report):
 
 
 @inlined
-def principal_attitude(q, work, tilted):
-    """Quaternion of the principal frame from that of the body frame (the same unless `tilted`)."""
-    if tilted is None:
+def principal_attitude(q, work, offset_frame):
+    """Quaternion of the principal frame from that of the body frame (the same unless `offset_frame`)."""
+    if offset_frame is None:
         return q
     p = work.principal
     return qt.multiply(q, (p[0], p[1], p[2], p[3]))
 
 
 @inlined
-def body_attitude(q, work, tilted):
+def body_attitude(q, work, offset_frame):
     """The inverse of `principal_attitude`."""
-    if tilted is None:
+    if offset_frame is None:
         return q
     p = work.principal
     return qt.multiply(q, (p[0], -p[1], -p[2], -p[3]))
@@ -139,17 +139,17 @@ def apply_inv_inertia(R, L, J):
 
 
 @kernel
-def angular_velocity(q, L, work, tilted):
+def angular_velocity(q, L, work, offset_frame):
     """`apply_inv_inertia` of a body with attitude q."""
     if L[0] == 0.0 and L[1] == 0.0 and L[2] == 0.0:
         return (0.0, 0.0, 0.0)
-    return apply_inv_inertia(qt.to_matrix(principal_attitude(q, work, tilted)), L, work.J)
+    return apply_inv_inertia(qt.to_matrix(principal_attitude(q, work, offset_frame)), L, work.J)
 
 
 @inlined
-def kinetic_energy(q, v, L, work, tilted):
+def kinetic_energy(q, v, L, work, offset_frame):
     """Kinetic energy of one body [J]."""
-    return 0.5 * (work.mass * qt.dot(v, v) + qt.dot(L, angular_velocity(q, L, work, tilted)))
+    return 0.5 * (work.mass * qt.dot(v, v) + qt.dot(L, angular_velocity(q, L, work, offset_frame)))
 
 
 @inlined

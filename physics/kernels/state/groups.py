@@ -39,7 +39,7 @@ class FlightSwitches(NamedTuple):
     """Free motion of a scene's bodies."""
 
     gyroscopic: bool | None  # moments of inertia differ
-    tilted: bool | None  # principal axes are not the body's axes, or its centre is not its centre of mass
+    offset_frame: bool | None  # principal axes are not the body's axes, or its centre is not its centre of mass
     scheme: int | None  # code of a textbook scheme (`physics.kernels.flight.integrators`) instead of the exact flow
 
 

@@ -33,7 +33,7 @@ def set_plastic_targets(n, work):
 
 
 @inlined
-def resolve_impacts(n, y, t, h, contact, tilted, records, work):
+def resolve_impacts(n, y, t, h, contact, offset_frame, records, work):
     """State after the impulses of the contacts that approach; unchanged when none does.
 
     It happens t [s] after the start of the call, with h [s] left of the substep.
@@ -45,16 +45,16 @@ def resolve_impacts(n, y, t, h, contact, tilted, records, work):
     slop_speed = work.slop / h
     if not may_have_impact(bounce_speed, slop_speed, work):
         if n == 1 and work.shape == ELLIPSOID and work.speed[0] > slop_speed:
-            return cancel_separation(y, h, tilted, records.memory, work)
+            return cancel_separation(y, h, offset_frame, records.memory, work)
         return y
-    found = set_impact_targets(n, bounce_speed, slop_speed, y, h, tilted, records.memory, work)
+    found = set_impact_targets(n, bounce_speed, slop_speed, y, h, offset_frame, records.memory, work)
     if found == NO_IMPACT:
         return y
-    place_arms(n, qt.to_matrix(q), tilted, work)
-    set_tangential_targets(n, bounce_speed, y, tilted, work)
+    place_arms(n, qt.to_matrix(q), offset_frame, work)
+    set_tangential_targets(n, bounce_speed, y, offset_frame, work)
     for k in range(3 * n):
         work.impulse[k] = 0.0
-    R = qt.to_matrix(principal_attitude(q, work, tilted))
+    R = qt.to_matrix(principal_attitude(q, work, offset_frame))
     work.mode, work.still, work.unseen = TRY_SLIDING, math.inf, 0.0
     solved = solve_contacts(n, contact, v, L, R, work)
     if not solved[2] <= work.tolerance:
@@ -65,7 +65,7 @@ def resolve_impacts(n, y, t, h, contact, tilted, records, work):
     v_new, L_new, residual, sweeps, method = apply_resistance_torques(n, contact, v, L, solved, R, work)
     report_solve(records.report, work.world, residual, sweeps, method, work.tolerance)
     if contact.friction is not None and work.restitution > 0.0:
-        before, full = kinetic_energy(q, v, L, work, tilted), kinetic_energy(q, v_new, L_new, work, tilted)
+        before, full = kinetic_energy(q, v, L, work, offset_frame), kinetic_energy(q, v_new, L_new, work, offset_frame)
         if full > before + IMPACT_ENERGY_ROUNDING * before:
             for k in range(3 * n):
                 work.rebound[k] = work.impulse[k]
@@ -77,7 +77,7 @@ def resolve_impacts(n, y, t, h, contact, tilted, records, work):
                 )
             v0, L0, residual, sweeps, method = solved
             report_solve(records.report, work.world, residual, sweeps, method, work.tolerance)
-            v_new, L_new, s = limit_rebound_energy(q, before, (v0, L0), (v_new, L_new), work, tilted)
+            v_new, L_new, s = limit_rebound_energy(q, before, (v0, L0), (v_new, L_new), work, offset_frame)
             for k in range(3 * n):
                 work.impulse[k] += s * (work.rebound[k] - work.impulse[k])
     if records.log.shape[1] > 0 and found == TRUE_IMPACT:

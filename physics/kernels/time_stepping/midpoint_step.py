@@ -58,14 +58,14 @@ def midpoint_step(n, y, h, contact, flight, records, work):
     """State after Moreau's midpoint step over h with the n contacts of the set."""
     x, q, v, L = y
     a, torque = work.free_acceleration, work.torque
-    before, after = split_stage_by_theta(n, y, h, flight.tilted, work)
+    before, after = split_stage_by_theta(n, y, h, flight.offset_frame, work)
     x = (x[0] + before * v[0], x[1] + before * v[1], x[2] + before * v[2])
-    q = drift_attitude(q, L, work, before, flight.gyroscopic, flight.tilted)
+    q = drift_attitude(q, L, work, before, flight.gyroscopic, flight.offset_frame)
     middle = qt.to_matrix(q)
-    place_arms(n, middle, flight.tilted, work)
+    place_arms(n, middle, flight.offset_frame, work)
     R = middle
-    if flight.tilted is not None:
-        R = qt.to_matrix(principal_attitude(q, work, flight.tilted))
+    if flight.offset_frame is not None:
+        R = qt.to_matrix(principal_attitude(q, work, flight.offset_frame))
     w, alpha = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
     if L[0] != 0.0 or L[1] != 0.0 or L[2] != 0.0:
         m, J = qt.transposed_matvec(R, L), work.J
@@ -75,8 +75,8 @@ def midpoint_step(n, y, h, contact, flight, records, work):
             g = qt.cross(m, wb)
             alpha = qt.matvec(R, (J[0] * g[0], J[1] * g[1], J[2] * g[2]))
     motion = StageMotion(middle, v, w, alpha)
-    set_resting_targets(n, motion, h, flight.tilted, work)
-    set_spring_targets(n, x, motion, before, after, flight.tilted, work)
+    set_resting_targets(n, motion, h, flight.offset_frame, work)
+    set_spring_targets(n, x, motion, before, after, flight.offset_frame, work)
     v0, opposes_mean = v, False
     if contact.friction is not None and n <= work.mean_slip:
         opposes_mean = oppose_mean_slip(n, v, w, max(h, records.memory[work.i, WALL_MEMORY_STAGE]), work)
@@ -100,4 +100,4 @@ def midpoint_step(n, y, h, contact, flight, records, work):
     store_warm_start(n, width, records.memory, work.i, h, work)
     predict_end_gaps(n, v_new, apply_inv_inertia(R, L_new, work.J), after, work)
     x = (x[0] + after * v_new[0], x[1] + after * v_new[1], x[2] + after * v_new[2])
-    return x, drift_attitude(q, L_new, work, after, flight.gyroscopic, flight.tilted), v_new, L_new
+    return x, drift_attitude(q, L_new, work, after, flight.gyroscopic, flight.offset_frame), v_new, L_new

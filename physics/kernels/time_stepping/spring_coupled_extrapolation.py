@@ -33,7 +33,7 @@ _EASY_RULES = 5
 
 
 @kernel
-def _put_rate(t, tilted, linked):
+def _put_rate(t, offset_frame, linked):
     """Rates of all bodies in the state `PLANE_HERE` at time t [s] into `PLANE_RATE`."""
     room, bodies = linked.room, linked.work
     for b in range(bodies.shape[0]):
@@ -41,11 +41,11 @@ def _put_rate(t, tilted, linked):
         size = math.sqrt(s[3] * s[3] + s[4] * s[4] + s[5] * s[5] + s[6] * s[6])
         q = (s[3] / size, s[4] / size, s[5] / size, s[6] / size)
         write_middle(bodies[b], ((s[0], s[1], s[2]), q, (s[7], s[8], s[9]), (s[10], s[11], s[12])))
-    place_anchors(tilted, linked)
+    place_anchors(offset_frame, linked)
     for b in range(bodies.shape[0]):
         x, q, v, L = read_middle(bodies[b])
-        F, T = field_load(x, q, v, L, t, tilted, bodies[b])
-        w = angular_velocity(q, L, bodies[b], tilted)
+        F, T = field_load(x, q, v, L, t, offset_frame, bodies[b])
+        w = angular_velocity(q, L, bodies[b], offset_frame)
         s, rate, a, held = room[PLANE_HERE, b], room[PLANE_RATE, b], bodies[b].held_acceleration, bodies[b].held_torque
         turn = qt.multiply((0.0, 0.5 * w[0], 0.5 * w[1], 0.5 * w[2]), (s[3], s[4], s[5], s[6]))
         for c in range(4):
@@ -70,12 +70,12 @@ def _put_start(linked):
 
 
 @kernel
-def _midpoint(parts, h, t, row, tilted, linked):
+def _midpoint(parts, h, t, row, offset_frame, linked):
     """Gragg's rule of so many parts, an even number, over h from time t into row `row` of the table."""
     room, s = linked.room, h / parts
     _put_start(linked)
     for k in range(parts):
-        _put_rate(t + k * s, tilted, linked)
+        _put_rate(t + k * s, offset_frame, linked)
         for b in range(linked.state.shape[0]):
             for c in range(LINKED_STATE_SIZE):
                 here = room[PLANE_HERE, b, c]
@@ -84,7 +84,7 @@ def _midpoint(parts, h, t, row, tilted, linked):
                 else:
                     room[PLANE_HERE, b, c] = room[PLANE_BEFORE, b, c] + 2.0 * s * room[PLANE_RATE, b, c]
                 room[PLANE_BEFORE, b, c] = here
-    _put_rate(t + h, tilted, linked)
+    _put_rate(t + h, offset_frame, linked)
     for b in range(linked.state.shape[0]):
         for c in range(LINKED_STATE_SIZE):
             room[row, b, c] = 0.5 * (room[PLANE_BEFORE, b, c] + room[PLANE_HERE, b, c] + s * room[PLANE_RATE, b, c])
@@ -119,14 +119,14 @@ def _extrapolate(row, h, linked):
 
 
 @kernel
-def extrapolate_linked(h, tilted, linked):
+def extrapolate_linked(h, offset_frame, linked):
     """All bodies after h, to the tolerance; whether it got there in the steps allowed."""
     start, t, step = linked.work[0].now, 0.0, h
     for _ in range(linked.most):
         step = min(step, h - t)
         rules, error = 0, math.inf
         while rules < _MAX_RULES and not error <= linked.tolerance:
-            _midpoint(2 * (rules + 1), step, start + t, rules, tilted, linked)
+            _midpoint(2 * (rules + 1), step, start + t, rules, offset_frame, linked)
             if rules > 0:
                 error = _extrapolate(rules, step, linked)
             rules += 1
@@ -146,7 +146,7 @@ def extrapolate_linked(h, tilted, linked):
 
 
 @kernel
-def step_linked_segment(world, h, tilted, report, linked):
+def step_linked_segment(world, h, offset_frame, report, linked):
     """`extrapolate_linked`, with what it could not do in the report."""
-    if not extrapolate_linked(h, tilted, linked):
+    if not extrapolate_linked(h, offset_frame, linked):
         report[world, at.UNRESOLVED] += 1.0

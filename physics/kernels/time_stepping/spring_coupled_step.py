@@ -68,12 +68,12 @@ def make_linked_world(
 @kernel
 def _substep(h, flight, linked):
     """All bodies after h by the loads of the middle."""
-    hold_linked_loads(h, flight.gyroscopic, flight.tilted, linked)
-    note_stage_energy(flight.tilted, linked, linked.work[0])
+    hold_linked_loads(h, flight.gyroscopic, flight.offset_frame, linked)
+    note_stage_energy(flight.offset_frame, linked, linked.work[0])
     for b in range(linked.state.shape[0]):
         y = integrate_flight(read_state(linked.state, b), h, flight, linked.work[b])
         write_state(linked.state, b, y)
-    limit_world_energy_gain(h, 1, flight.tilted, linked, linked.work[0])
+    limit_world_energy_gain(h, 1, flight.offset_frame, linked, linked.work[0])
 
 
 @kernel
@@ -93,7 +93,7 @@ def step_linked(queue, steps, substeps, h, bodies, flight, held, events, records
             records.report[world, c] = 0.0
         for b in range(count):
             i = world * count + b
-            bind_body(world, i, bodies.shapes[b], bodies, None, None, flight.tilted, linked.work[b])
+            bind_body(world, i, bodies.shapes[b], bodies, None, None, flight.offset_frame, linked.work[b])
             bind_fields(bodies.params, i, flight.scheme, linked.work[b])
             write_state(linked.state, b, read_state(bodies.state, i))
         lost = find_overloaded_body(linked.work)
@@ -106,7 +106,7 @@ def step_linked(queue, steps, substeps, h, bodies, flight, held, events, records
             if held is not None:
                 _substep(h, flight, linked)
             if events is not None:
-                step_linked_segment(world, h, flight.tilted, records.report, linked)
+                step_linked_segment(world, h, flight.offset_frame, records.report, linked)
             lost = find_nonfinite_body(linked.state)
             if lost >= 0:
                 report_fault(world, lost, records.report)
@@ -117,5 +117,5 @@ def step_linked(queue, steps, substeps, h, bodies, flight, held, events, records
         for b in range(count):
             i = world * count + b
             _, q, _, L = read_state(bodies.state, i)
-            w = angular_velocity(q, L, linked.work[b], flight.tilted)
+            w = angular_velocity(q, L, linked.work[b], flight.offset_frame)
             bodies.state[i, at.ANGVEL], bodies.state[i, at.ANGVEL + 1], bodies.state[i, at.ANGVEL + 2] = w

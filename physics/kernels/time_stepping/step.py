@@ -107,29 +107,29 @@ def fly_stage(y, h, flight, work):
 def advance_stage(n, y, h, contact, flight, records, work):
     """One stage of length h: flight when nothing touches, else Moreau's step."""
     if n > 0:
-        hold_contact_loads(y, h, flight.gyroscopic, flight.tilted, work)
+        hold_contact_loads(y, h, flight.gyroscopic, flight.offset_frame, work)
         end = midpoint_step(n, y, h, contact, flight, records, work)
-        if hold_mean_loads(y, end, h, flight.gyroscopic, flight.tilted, work):
+        if hold_mean_loads(y, end, h, flight.gyroscopic, flight.offset_frame, work):
             end = midpoint_step(n, y, h, contact, flight, records, work)
-        if is_stiff(work) and has_work_error(y, end, h, flight.tilted, work):
-            hold_softened_loads(y, h, flight.gyroscopic, flight.tilted, work)
+        if is_stiff(work) and has_work_error(y, end, h, flight.offset_frame, work):
+            hold_softened_loads(y, h, flight.gyroscopic, flight.offset_frame, work)
             end = midpoint_step(n, y, h, contact, flight, records, work)
-        return limit_energy_gain(y, end, h, False, flight.tilted, work)
-    hold_loads(y, h, flight.gyroscopic, flight.tilted, work)
+        return limit_energy_gain(y, end, h, False, flight.offset_frame, work)
+    hold_loads(y, h, flight.gyroscopic, flight.offset_frame, work)
     forget_contacts(records.memory, work.i, work)
     return fly_stage(y, h, flight, work)
 
 
 @inlined
-def outside_gap(y, tilted, work):
+def outside_gap(y, offset_frame, work):
     """Smallest gap of what is not in the contact set [m], and the slot of its feature."""
-    return nearest_outside_set(y[0], to_matrix(y[1]), tilted, work)
+    return nearest_outside_set(y[0], to_matrix(y[1]), offset_frame, work)
 
 
 @inlined
-def find_contact_set(y, h, tilted, memory, work):
+def find_contact_set(y, h, offset_frame, memory, work):
     """Gather the contact set at y for a stage of length h: (count, depth)."""
-    return collect_wall_contacts(y, angular_velocity(y[1], y[3], work, tilted), h, tilted, memory, work)
+    return collect_wall_contacts(y, angular_velocity(y[1], y[3], work, offset_frame), h, offset_frame, memory, work)
 
 
 @inlined
@@ -139,9 +139,11 @@ def has_same_pose(y, z):
 
 
 @kernel
-def keep_out_of_walls(y, tilted, work):
+def keep_out_of_walls(y, offset_frame, work):
     """y, pushed out of the walls where it is deeper in than the slop: what turns by radians in a step may be so."""
-    return lift_conserving_energy(project_out_of_walls(y[0], to_matrix(y[1]), tilted, work), y, tilted, work)
+    return lift_conserving_energy(
+        project_out_of_walls(y[0], to_matrix(y[1]), offset_frame, work), y, offset_frame, work
+    )
 
 
 @kernel
@@ -156,15 +158,15 @@ def shorten_to_impact(n, y, end, h, contact, flight, records, work):
     t, low, low_gap, high, high_gap, bend, slot = h, 0.0, 0.0, h, 0.0, 0.0, -1
     low_end = y
     for _ in range(IMPACT_TRIALS):
-        gap, nearest = outside_gap(end, flight.tilted, work)
+        gap, nearest = outside_gap(end, flight.offset_frame, work)
         if nearest != slot and gap < -0.5 * work.slop:
             slot, high, high_gap = nearest, t, gap
-            low_gap = max(feature_gap(slot, low_end[0], to_matrix(low_end[1]), flight.tilted, work), 0.0)
-            rate = feature_gap_rate(slot, low_end, flight.tilted, work)
+            low_gap = max(feature_gap(slot, low_end[0], to_matrix(low_end[1]), flight.offset_frame, work), 0.0)
+            rate = feature_gap_rate(slot, low_end, flight.offset_frame, work)
             bend = ((high_gap - low_gap) / (high - low) - rate) / (high - low)
         else:
             if nearest != slot:
-                gap = feature_gap(slot, end[0], to_matrix(end[1]), flight.tilted, work)
+                gap = feature_gap(slot, end[0], to_matrix(end[1]), flight.offset_frame, work)
             if abs(gap) <= 0.5 * work.slop:
                 break
             bend = second_difference(low, low_gap, t, gap, high, high_gap)
@@ -192,7 +194,7 @@ def advance_to_impact(n, y, h, contact, flight, records, work):
     end = advance_stage(n, y, h, contact, flight, records, work)
     if has_same_pose(end, y):
         return end, h, False
-    has_passed, is_deep = check_penetration(end[0], to_matrix(end[1]), flight.tilted, work)
+    has_passed, is_deep = check_penetration(end[0], to_matrix(end[1]), flight.offset_frame, work)
     if work.is_last or not has_passed:
         return end, h, is_deep
     end, t = shorten_to_impact(n, y, end, h, contact, flight, records, work)
@@ -214,16 +216,16 @@ def substep(y, start, h, contact, flight, records, work):
         if splits == work.splits:
             records.report[world, at.UNRESOLVED] += 1.0
             work.is_last = 1
-        hold_loads(y, left, flight.gyroscopic, flight.tilted, work)
-        n, depth = find_contact_set(y, left, flight.tilted, records.memory, work)
+        hold_loads(y, left, flight.gyroscopic, flight.offset_frame, work)
+        n, depth = find_contact_set(y, left, flight.offset_frame, records.memory, work)
         if n > 0:
             records.report[world, at.PENETRATION] = max(records.report[world, at.PENETRATION], depth)
             if not work.is_last and not contact_stiffness(work) > 0.0:
-                y = resolve_impacts(n, y, start + (h - left), left, contact, flight.tilted, records, work)
+                y = resolve_impacts(n, y, start + (h - left), left, contact, flight.offset_frame, records, work)
         span = left
         if flight.scheme is None:  # noqa: SIM102 (a branch of its own is what the compiler prunes)
-            if cuts < MAX_TURNING_CUTS and may_turn(y[3], h, FAR_TURN, flight.tilted, work) and not work.is_last:
-                span = limit_turning_stage(n, y, h, left, flight.gyroscopic, flight.tilted, work)
+            if cuts < MAX_TURNING_CUTS and may_turn(y[3], h, FAR_TURN, flight.offset_frame, work) and not work.is_last:
+                span = limit_turning_stage(n, y, h, left, flight.gyroscopic, flight.offset_frame, work)
         end, t, is_deep = advance_to_impact(n, y, span, contact, flight, records, work)
         if t == span and span < left:
             cuts += 1
@@ -234,8 +236,8 @@ def substep(y, start, h, contact, flight, records, work):
         left -= t
         advance_clock(t, work)
         if is_deep and n > 0 and not contact_stiffness(work) > 0.0:
-            end = keep_out_of_walls(end, flight.tilted, work)
-        y = correct_spring_depth(n, y, end, t, flight.tilted, records.report, work)
+            end = keep_out_of_walls(end, flight.offset_frame, work)
+        y = correct_spring_depth(n, y, end, t, flight.offset_frame, records.report, work)
         if work.is_last or not left > 0.0:
             break
         records.report[world, at.SPLITS] += 1.0
@@ -265,7 +267,7 @@ def step_worlds(queue, steps, substeps, h, bodies, contact, restitution, flight,
             i = world * count + b
             if sleep is not None and remains_asleep(i, bodies.wrench, sleep):
                 continue
-            bind_body(world, i, bodies.shapes[b], bodies, contact.friction, restitution, flight.tilted, work)
+            bind_body(world, i, bodies.shapes[b], bodies, contact.friction, restitution, flight.offset_frame, work)
             if not has_finite_loads(work):
                 report_fault(world, b, records.report)
                 continue
@@ -274,7 +276,7 @@ def step_worlds(queue, steps, substeps, h, bodies, contact, restitution, flight,
             y, clear = read_state(bodies.state, i), 0
             for k in range(steps * substeps):
                 set_clock(k * h, work)
-                hold_loads(y, h, flight.gyroscopic, flight.tilted, work)
+                hold_loads(y, h, flight.gyroscopic, flight.offset_frame, work)
                 if contact.acts is not None and clear == 0 and not has_touched(records.memory, i):
                     clear = count_clear_substeps(y[0], y[2], h, steps * substeps - k, work)
                     if clear > 0:
@@ -294,5 +296,5 @@ def step_worlds(queue, steps, substeps, h, bodies, contact, restitution, flight,
                     break
             report_unresolved_body(not has_same_pose(y, read_state(bodies.state, i)), records.report, work)
             write_state(bodies.state, i, y)
-            w = angular_velocity(y[1], y[3], work, flight.tilted)
+            w = angular_velocity(y[1], y[3], work, flight.offset_frame)
             bodies.state[i, at.ANGVEL], bodies.state[i, at.ANGVEL + 1], bodies.state[i, at.ANGVEL + 2] = w

@@ -32,10 +32,10 @@ def _no_aim(*arguments):
 
 
 @inlined
-def set_tangential_target(k, y, tilted, work):
+def set_tangential_target(k, y, offset_frame, work):
     """Target along the wall of contact k, from the velocity of its point."""
     _, q, v, L = y
-    w = angular_velocity(q, L, work, tilted)
+    w = angular_velocity(q, L, work, offset_frame)
     u = qt.cross(w, (work.arm[k, 0], work.arm[k, 1], work.arm[k, 2]))
     u = (u[0] + v[0], u[1] + v[1], u[2] + v[2])
     share, wall = tangential_restitution(work), wall_of(work.slot[k], work)
@@ -44,14 +44,14 @@ def set_tangential_target(k, y, tilted, work):
 
 
 @if_law((LAW_TANGENTIAL,), _no_aim)
-def set_tangential_targets(n, bounce_speed, y, tilted, work):
+def set_tangential_targets(n, bounce_speed, y, offset_frame, work):
     """Targets along the wall of the one contact that bounces; where several do, friction alone acts along them."""
     bouncing, found = 0, 0
     for i in range(n):
         if -work.speed[i] > bounce_speed:
             bouncing, found = bouncing + 1, i
     if bouncing == 1:
-        set_tangential_target(found, y, tilted, work)
+        set_tangential_target(found, y, offset_frame, work)
 
 
 @inlined

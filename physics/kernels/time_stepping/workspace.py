@@ -44,7 +44,7 @@ def body_fields(terms: tuple[Term, ...] = (), laws: tuple[str, ...] = ()) -> lis
         ("J", f, (3,)),  # inverse principal moments [1/(kg m²)]
         ("series", f, (SERIES_SIZE,)),  # of the free rotation
         ("principal", f, (4,)),  # quaternion, principal frame to body frame
-        ("center", f, (3,)),  # of the block, from the centre of mass, body frame [m]; not set unless `tilted`
+        ("center", f, (3,)),  # of the block, from the centre of mass, body frame [m]; not set unless `offset_frame`
         ("dims", f, (3,)),  # half edges, semi-axes, or the radius three times [m]
         ("radius", f),  # of the bounding sphere [m]
         ("slop", f),  # [m]

@@ -12,17 +12,17 @@ from physics.kernels.state.body import angular_velocity, principal_attitude, rea
 
 
 @inlined
-def update_body_pose(b, tilted, many):
+def update_body_pose(b, offset_frame, many):
     """Rotation, geometric centre and inverse inertia of body b where it is now, world frame."""
     x, q, _, _ = read_state(many.bodies.state, b)
     work = many.bodies.work[b]
     R = qt.to_matrix(q)
     for c in range(9):
         many.bodies.rotation[b, c] = R[c]
-    put_vector(many.bodies.center, b, 0, geometric_center(x, R, work, tilted))
+    put_vector(many.bodies.center, b, 0, geometric_center(x, R, work, offset_frame))
     P = R
-    if tilted is not None:
-        P = qt.to_matrix(principal_attitude(q, work, tilted))
+    if offset_frame is not None:
+        P = qt.to_matrix(principal_attitude(q, work, offset_frame))
     J, K = work.J, many.bodies.inv_inertia
     K[b, 0] = J[0] * P[0] * P[0] + J[1] * P[1] * P[1] + J[2] * P[2] * P[2]
     K[b, 1] = J[0] * P[0] * P[3] + J[1] * P[1] * P[4] + J[2] * P[2] * P[5]
@@ -33,10 +33,10 @@ def update_body_pose(b, tilted, many):
 
 
 @inlined
-def update_poses_and_twists(tilted, many):
+def update_poses_and_twists(offset_frame, many):
     """`update_body_pose`, and the twist, of every body."""
     for b in range(many.bodies.state.shape[0]):
-        update_body_pose(b, tilted, many)
+        update_body_pose(b, offset_frame, many)
         put_vector(many.bodies.twist, b, 0, row_vector(many.bodies.state, b, at.LINVEL))
         q, L = read_state(many.bodies.state, b)[1], row_vector(many.bodies.state, b, at.ANGMOM)
-        put_vector(many.bodies.twist, b, 3, angular_velocity(q, L, many.bodies.work[b], tilted))
+        put_vector(many.bodies.twist, b, 3, angular_velocity(q, L, many.bodies.work[b], offset_frame))

@@ -81,7 +81,7 @@ def _length(a):
 
 
 @inlined
-def _body_error(b, tilted, kept, many):
+def _body_error(b, offset_frame, kept, many):
     """Distance of body b from its state `SNAPSHOT_COARSE`, in its radius; and the difference in velocity, in its speed.
 
     Of its speed counts no less than what its loads give it over its radius.
@@ -96,18 +96,18 @@ def _body_error(b, tilted, kept, many):
         other += (q[c] + p[c]) ** 2
     pose = _length(way) + 2.0 * r * math.sqrt(min(same, other))
     pose = max(0.0, pose - _POSITION_ROUNDING * _length(x)) / r
-    w, z = angular_velocity(q, L, body, tilted), angular_velocity(p, K, body, tilted)
+    w, z = angular_velocity(q, L, body, offset_frame), angular_velocity(p, K, body, offset_frame)
     speed = _length(v) + r * _length(w) + math.sqrt(r * body.acceleration)
     change = _length(subtract(v, u)) + r * _length(subtract(w, z))
     return max(pose, change / speed) if change > 0.0 else pose
 
 
 @inlined
-def _max_body_error(tilted, kept, many):
+def _max_body_error(offset_frame, kept, many):
     """Largest error of any body, 1: all that is allowed."""
     worst, allowed = 0.0, ERROR_PER_TOLERANCE * many.settings[0].tolerance
     for b in range(many.bodies.state.shape[0]):
-        found = _body_error(b, tilted, kept, many) / allowed
+        found = _body_error(b, offset_frame, kept, many) / allowed
         if not found <= worst:
             worst = found
     return worst
@@ -125,7 +125,7 @@ def _step_part(world, start, h, switches, records, many):
 @kernel
 def _step_with_halving(world, start, unit, part, shortest, switches, kept, records, many):
     """Advance by `part` units of time [s], or by half of it, or a quarter ...: (units taken, error, lengths tried)."""
-    tilted, tried = switches.flight.tilted, 1
+    offset_frame, tried = switches.flight.offset_frame, 1
     _save_snapshot(SNAPSHOT_START, world, kept, records.memory, records.report, many, records.counts)
     _step_part(world, start, part * unit, switches, records, many)
     while True:
@@ -135,7 +135,7 @@ def _step_with_halving(world, start, unit, part, shortest, switches, kept, recor
         _step_part(world, start, half, switches, records, many)
         _save_snapshot(SNAPSHOT_MIDDLE, world, kept, records.memory, records.report, many, records.counts)
         _step_part(world, start + half, half, switches, records, many)
-        error = _max_body_error(tilted, kept, many)
+        error = _max_body_error(offset_frame, kept, many)
         if error <= 1.0 or part <= shortest:
             return part, error, tried
         _restore_snapshot(

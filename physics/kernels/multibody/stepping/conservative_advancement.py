@@ -52,7 +52,7 @@ _ARRIVAL_FRACTION = 0.5
 
 
 @inlined
-def write_spin_bounds(h, tilted, many):
+def write_spin_bounds(h, offset_frame, many):
     """Write `many.bodies.spin_bound`: bounds of |ω| of bodies that may turn far in h, else 0; whether any may.
 
     Most are told by a glance: loads turn a body by h times its acceleration over its radius at most, and while it turns
@@ -70,17 +70,17 @@ def write_spin_bounds(h, tilted, many):
             h * many.bodies.work[b].acceleration,
         )
         if r * r * (qt.dot(w, w) - limit) + push * push > 0.0:
-            found = _write_spin_bound(b, h, least, tilted, many) or found
+            found = _write_spin_bound(b, h, least, offset_frame, many) or found
     return found
 
 
 @kernel
-def _write_spin_bound(b, h, least, tilted, many):
+def _write_spin_bound(b, h, least, offset_frame, many):
     """Write `many.bodies.spin_bound` of one body: whether it turns far."""
     _, q, _, L = read_state(many.bodies.state, b)
-    if not may_turn(L, h, least, tilted, many.bodies.work[b]):
+    if not may_turn(L, h, least, offset_frame, many.bodies.work[b]):
         return False
-    spin = spin_bound(q, L, h, tilted, many.bodies.work[b])
+    spin = spin_bound(q, L, h, offset_frame, many.bodies.work[b])
     if not spin * h > least:
         return False
     many.bodies.spin_bound[b] = spin
@@ -95,14 +95,14 @@ def clear_spin_bounds(many):
 
 
 @inlined
-def _contact_side(b, y, n, tilted, many):
+def _contact_side(b, y, n, offset_frame, many):
     """(geometric centre, rotation, its arm, velocity along n, n x ω) of body b in state y; a sphere's ω is left out."""
     x, q, v, L = y
     R, c, m = to_matrix(q), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
-    if tilted is not None:
+    if offset_frame is not None:
         c = center_arm(R, many.bodies.work[b])
-    if not (many.bodies.work[b].shape == SPHERE and is_centred(tilted, many.bodies.work[b])):
-        m = qt.cross(n, angular_velocity(q, L, many.bodies.work[b], tilted))
+    if not (many.bodies.work[b].shape == SPHERE and is_centred(offset_frame, many.bodies.work[b])):
+        m = qt.cross(n, angular_velocity(q, L, many.bodies.work[b], offset_frame))
     return add_scaled(x, 1.0, c), R, c, qt.dot(n, v), m
 
 
@@ -170,13 +170,13 @@ def _safe_time(a, b, n, one, other, bend, horizon, hulls, many):
 
 
 @inlined
-def _turning_acceleration(b, h, tilted, many):
+def _turning_acceleration(b, h, offset_frame, many):
     """Bound of what turning accelerates a point of body b by within h [m/s²]."""
     _, q, _, L = read_state(many.bodies.state, b)
     spin = many.bodies.spin_bound[b]
     if not spin > 0.0:
-        spin = spin_bound(q, L, h, tilted, many.bodies.work[b])
-    return turning_acceleration_bound(spin, q, L, h, tilted, many.bodies.work[b])
+        spin = spin_bound(q, L, h, offset_frame, many.bodies.work[b])
+    return turning_acceleration_bound(spin, q, L, h, offset_frame, many.bodies.work[b])
 
 
 @inlined
@@ -187,7 +187,7 @@ def _load_acceleration(b, n, many):
 
 
 @kernel
-def _time_of_impact(a, b, h, gyroscopic, tilted, hulls, many):
+def _time_of_impact(a, b, h, gyroscopic, offset_frame, hulls, many):
     """Time of free flight, at most h, after which a and b (or wall -1 - b) have arrived or will not [s].
 
     Bodies in contact do not fly as is foretold here, nor do those that touch each other: they turn no further than a
@@ -198,7 +198,9 @@ def _time_of_impact(a, b, h, gyroscopic, tilted, hulls, many):
     other, partner = one, a
     if b >= 0:
         other, partner = read_state(many.bodies.state, b), b
-    bend = _turning_acceleration(a, h, tilted, many) + (_turning_acceleration(b, h, tilted, many) if b >= 0 else 0.0)
+    bend = _turning_acceleration(a, h, offset_frame, many) + (
+        _turning_acceleration(b, h, offset_frame, many) if b >= 0 else 0.0
+    )
     is_held = many.bodies.touched[a] == 1 or many.bodies.touched[partner] == 1
     n = (1.0, 0.0, 0.0)
     if b < 0:
@@ -206,18 +208,18 @@ def _time_of_impact(a, b, h, gyroscopic, tilted, hulls, many):
     elif _norm(subtract(one[0], other[0])) > 0.0:
         n = subtract(one[0], other[0])
     for _ in range(MAX_ADVANCES):
-        left = _contact_side(a, one, n, tilted, many)
-        right = _contact_side(partner, other, n, tilted, many)
+        left = _contact_side(a, one, n, offset_frame, many)
+        right = _contact_side(partner, other, n, offset_frame, many)
         if b >= 0:
             n, gap = gjk_distance(a, b, left, right, n, touch, hulls, many)
-            left, right = _contact_side(a, one, n, tilted, many), _contact_side(b, other, n, tilted, many)
+            left, right = _contact_side(a, one, n, offset_frame, many), _contact_side(b, other, n, offset_frame, many)
         else:
             gap = _gap_bound(0.0, a, b, n, (left, right), 0.0, 0.0, hulls, many)
         if gone == 0.0 and (is_held or not gap > touch):
             if many.bodies.spin_bound[a] > 0.0:
-                first = min(first, time_to_turn_far(n, one, tilted, many.bodies.work[a]))
+                first = min(first, time_to_turn_far(n, one, offset_frame, many.bodies.work[a]))
             if many.bodies.spin_bound[partner] > 0.0:
-                first = min(first, time_to_turn_far(n, other, tilted, many.bodies.work[partner]))
+                first = min(first, time_to_turn_far(n, other, offset_frame, many.bodies.work[partner]))
             if not gap > touch:
                 return first
         if not gap > touch:
@@ -229,23 +231,23 @@ def _time_of_impact(a, b, h, gyroscopic, tilted, hulls, many):
         gone += step
         if not gone < first:
             return first
-        one = fly(one, many.bodies.work[a], step, gyroscopic, tilted)
+        one = fly(one, many.bodies.work[a], step, gyroscopic, offset_frame)
         if b >= 0:
-            other = fly(other, many.bodies.work[b], step, gyroscopic, tilted)
+            other = fly(other, many.bodies.work[b], step, gyroscopic, offset_frame)
     return gone
 
 
 @kernel
-def safe_stage_length(h, gyroscopic, tilted, hulls, many):
+def safe_stage_length(h, gyroscopic, offset_frame, hulls, many):
     """Time, at most h, that a stage may take: nothing that turns far passes through anything meanwhile [s]."""
     first = h
     for b in range(many.bodies.state.shape[0]):
         if many.bodies.spin_bound[b] > 0.0:
             for wall in range(many.walls.shape[0]):
                 if may_reach_wall(b, wall, first, many):
-                    first = min(first, _time_of_impact(b, -1 - wall, first, gyroscopic, tilted, hulls, many))
+                    first = min(first, _time_of_impact(b, -1 - wall, first, gyroscopic, offset_frame, hulls, many))
     for k in range(many.counts[NUM_PAIRS]):
         a, b = many.broadphase.pairs[k, 0], many.broadphase.pairs[k, 1]
         if (many.bodies.spin_bound[a] > 0.0 or many.bodies.spin_bound[b] > 0.0) and may_meet(a, b, first, many):
-            first = min(first, _time_of_impact(a, b, first, gyroscopic, tilted, hulls, many))
+            first = min(first, _time_of_impact(a, b, first, gyroscopic, offset_frame, hulls, many))
     return first

@@ -80,22 +80,22 @@ def has_gained_energy(n, h, many):
 
 
 @inlined
-def update_twist(b, tilted, many):
+def update_twist(b, offset_frame, many):
     """Twist of body b from its momenta."""
     put_vector(many.bodies.twist, b, 0, row_vector(many.bodies.state, b, at.LINVEL))
     q, L = read_state(many.bodies.state, b)[1], row_vector(many.bodies.state, b, at.ANGMOM)
-    put_vector(many.bodies.twist, b, 3, angular_velocity(q, L, many.bodies.work[b], tilted))
+    put_vector(many.bodies.twist, b, 3, angular_velocity(q, L, many.bodies.work[b], offset_frame))
 
 
 @kernel
-def revert_to_dissipative(n, tilted, many):
+def revert_to_dissipative(n, offset_frame, many):
     """Momenta with loads and without impulses, and targets that cannot raise the energy (`midpoint_step`)."""
     for b in range(many.bodies.state.shape[0]):
         if many.bodies.touched[b] == 0:
             continue
         put_vector(many.bodies.state, b, at.LINVEL, row_vector(many.bodies.momenta, b, LOADED_MOMENTA))
         put_vector(many.bodies.state, b, at.ANGMOM, row_vector(many.bodies.momenta, b, LOADED_MOMENTA + 3))
-        update_twist(b, tilted, many)
+        update_twist(b, offset_frame, many)
     for k in range(n):
         put_vector(many.contacts.target, k, 0, (min(many.contacts.target[k, 0], 0.0), 0.0, 0.0))
 
@@ -108,21 +108,21 @@ def work_against_loads(b, x, many):
 
 
 @kernel
-def cap_rotational_energy(b, before, tilted, many):
+def cap_rotational_energy(b, before, offset_frame, many):
     """Shorten the angular momentum of a body that was turned, if ½L·I⁻¹L would be more than before."""
     _, q, _, L = read_state(many.bodies.state, b)
-    after = 0.5 * qt.dot(L, angular_velocity(q, L, many.bodies.work[b], tilted))
+    after = 0.5 * qt.dot(L, angular_velocity(q, L, many.bodies.work[b], offset_frame))
     if after > before + _FREE_ROTATION_SHARE * before:
         s = math.sqrt(before / after)
         put_vector(many.bodies.state, b, at.ANGMOM, (s * L[0], s * L[1], s * L[2]))
 
 
 @kernel
-def take_kinetic_energy(b, price, tilted, many):
+def take_kinetic_energy(b, price, offset_frame, many):
     """Take a price [J] from the motion of body b, as far as there is any."""
     _, q, v, L = read_state(many.bodies.state, b)
     body = many.bodies.work[b]
-    kinetic = 0.5 * (body.mass * qt.dot(v, v) + qt.dot(L, angular_velocity(q, L, body, tilted)))
+    kinetic = 0.5 * (body.mass * qt.dot(v, v) + qt.dot(L, angular_velocity(q, L, body, offset_frame)))
     s = math.sqrt(1.0 - price / kinetic) if price < kinetic else 0.0
     put_vector(many.bodies.state, b, at.LINVEL, (s * v[0], s * v[1], s * v[2]))
     put_vector(many.bodies.state, b, at.ANGMOM, (s * L[0], s * L[1], s * L[2]))
@@ -136,7 +136,7 @@ def free_lift_work(b, many):
 
 
 @kernel
-def clamp_body_inside_walls(b, tilted, many):
+def clamp_body_inside_walls(b, offset_frame, many):
     """Bring back a body whose centre is behind a wall, without the velocity that led there: whether it was.
 
     Contacts hold points. Loads of a million times the weight may turn a body by many radians in a step, and points that

@@ -190,7 +190,7 @@ def resolve_impacts(n, world, t, h, is_last, switches, records, many):
             if k != fastest:
                 many.contacts.target[k, 0] = -_UNCONSTRAINED  # its turn comes when this one is over
     n = drop_unconstrained(n, many)
-    apply_impact_within_energy(n, world, switches.friction, switches.flight.tilted, records.report, many)
+    apply_impact_within_energy(n, world, switches.friction, switches.flight.offset_frame, records.report, many)
     if records.log.shape[1] > 0:
         log_impacts(n, world, t, many, records.log, records.counts)
     return n, meeting, True

@@ -48,13 +48,13 @@ from physics.kernels.time_stepping.midpoint_step import CREEP_SLOP_SHARE
 
 
 @inlined
-def drift_body(b, h, gyroscopic, tilted, many):
+def drift_body(b, h, gyroscopic, offset_frame, many):
     """Body b after half a free drift: position and attitude at constant momenta."""
     x, q, v, L = read_state(many.bodies.state, b)
     write_state(
         many.bodies.state,
         b,
-        (add_scaled(x, h, v), drift_attitude(q, L, many.bodies.work[b], h, gyroscopic, tilted), v, L),
+        (add_scaled(x, h, v), drift_attitude(q, L, many.bodies.work[b], h, gyroscopic, offset_frame), v, L),
     )
 
 
@@ -122,15 +122,15 @@ def set_resting_targets(n, h, many):
 
 
 @inlined
-def hold_all_loads(h, gyroscopic, tilted, many):
+def hold_all_loads(h, gyroscopic, offset_frame, many):
     """Hold the loads of the middle of a stage of length h for every body; nothing where there are no fields."""
-    if hold_linked_loads(h, gyroscopic, tilted, many.bodies):
+    if hold_linked_loads(h, gyroscopic, offset_frame, many.bodies):
         return
     for b in range(many.bodies.state.shape[0]):
         if many.bodies.touched[b] == 1:
-            hold_contact_loads(read_state(many.bodies.state, b), h, gyroscopic, tilted, many.bodies.work[b])
+            hold_contact_loads(read_state(many.bodies.state, b), h, gyroscopic, offset_frame, many.bodies.work[b])
         else:
-            hold_loads(read_state(many.bodies.state, b), h, gyroscopic, tilted, many.bodies.work[b])
+            hold_loads(read_state(many.bodies.state, b), h, gyroscopic, offset_frame, many.bodies.work[b])
 
 
 @inlined
@@ -165,17 +165,17 @@ def step_under_held_loads(n, world, h, switches, sleep, records, many):
         if is_asleep(first + b, sleep):
             continue
         if many.bodies.touched[b] == 0:
-            flight = FlightSwitches(switches.flight.gyroscopic, switches.flight.tilted, switches.flight.scheme)
+            flight = FlightSwitches(switches.flight.gyroscopic, switches.flight.offset_frame, switches.flight.scheme)
             write_state(
                 many.bodies.state,
                 b,
                 integrate_flight(read_state(many.bodies.state, b), h, flight, many.bodies.work[b]),
             )
             continue
-        drift_body(b, half, switches.flight.gyroscopic, switches.flight.tilted, many)
-        update_body_pose(b, switches.flight.tilted, many)
+        drift_body(b, half, switches.flight.gyroscopic, switches.flight.offset_frame, many)
+        update_body_pose(b, switches.flight.offset_frame, many)
         _, q, _, L = read_state(many.bodies.state, b)
-        put_vector(many.bodies.twist, b, 3, angular_velocity(q, L, many.bodies.work[b], switches.flight.tilted))
+        put_vector(many.bodies.twist, b, 3, angular_velocity(q, L, many.bodies.work[b], switches.flight.offset_frame))
     if n == 0:
         kept.clear_awake_warm_start(world, h, sleep, records.memory, many)
         return
@@ -191,7 +191,7 @@ def step_under_held_loads(n, world, h, switches, sleep, records, many):
                 many.bodies.state, b, at.ANGMOM, add_scaled(row_vector(many.bodies.state, b, at.ANGMOM), h, torque)
             )
             save_loaded_momenta(b, many)
-            update_twist(b, switches.flight.tilted, many)
+            update_twist(b, switches.flight.offset_frame, many)
     kept.load_warm_impulses(n, world, h, switches.friction, records.memory, many)
     many.settings[0].residual_limit, many.settings[0].is_resting_stage = (
         rest_residual(h, many),
@@ -200,22 +200,22 @@ def step_under_held_loads(n, world, h, switches, sleep, records, many):
     many.settings[0].load_speed = max_load_speed(h, many)
     solve_and_apply(n, world, switches.friction, records.report, many)
     if has_gained_energy(n, h, many):
-        revert_to_dissipative(n, switches.flight.tilted, many)
+        revert_to_dissipative(n, switches.flight.offset_frame, many)
         solve_and_apply(n, world, switches.friction, records.report, many)
         if switches.friction is not None and has_gained_energy(n, h, many):
-            revert_to_dissipative(n, switches.flight.tilted, many)
+            revert_to_dissipative(n, switches.flight.offset_frame, many)
             solve_frictionless_and_apply(n, many)
     many.settings[0].residual_limit, many.settings[0].is_resting_stage, many.settings[0].load_speed = math.inf, 0, 0.0
     kept.store_warm_impulses(n, world, h, sleep, records.memory, many)
     for b in range(many.bodies.state.shape[0]):
         if many.bodies.touched[b] == 1:
-            drift_body(b, half, switches.flight.gyroscopic, switches.flight.tilted, many)
+            drift_body(b, half, switches.flight.gyroscopic, switches.flight.offset_frame, many)
 
 
 @kernel
 def midpoint_step(n, world, h, switches, sleep, records, many):
     """Every body after h: exact flight, or Moreau's midpoint step with the n contacts of the set."""
-    hold_all_loads(h, switches.flight.gyroscopic, switches.flight.tilted, many)
-    note_stage_energy(switches.flight.tilted, many.bodies, many.bodies.work[0])
+    hold_all_loads(h, switches.flight.gyroscopic, switches.flight.offset_frame, many)
+    note_stage_energy(switches.flight.offset_frame, many.bodies, many.bodies.work[0])
     step_under_held_loads(n, world, h, switches, sleep, records, many)
-    limit_world_energy_gain(h, 0, switches.flight.tilted, many.bodies, many.bodies.work[0])
+    limit_world_energy_gain(h, 0, switches.flight.offset_frame, many.bodies, many.bodies.work[0])

@@ -62,26 +62,26 @@ def _set_displacement_targets(n, many):
 
 
 @inlined
-def _pose_inside_walls(b, tilted, many):
+def _pose_inside_walls(b, offset_frame, many):
     """Place of body b with its centre inside all walls."""
-    update_body_pose(b, tilted, many)
-    clamp_body_inside_walls(b, tilted, many)
+    update_body_pose(b, offset_frame, many)
+    clamp_body_inside_walls(b, offset_frame, many)
 
 
 @inlined
-def _displace(b, tilted, many):
+def _displace(b, offset_frame, many):
     """Move and turn body b by what `many.bodies.twist` says; the work that it takes against its loads [J]."""
     x, q, v, L = read_state(many.bodies.state, b)
-    start, before = x, 0.5 * qt.dot(L, angular_velocity(q, L, many.bodies.work[b], tilted))
+    start, before = x, 0.5 * qt.dot(L, angular_velocity(q, L, many.bodies.work[b], offset_frame))
     turn = qt.exp_map(row_vector(many.bodies.twist, b, 3))
     x = add_scaled(x, 1.0, row_vector(many.bodies.twist, b, 0))
     write_state(many.bodies.state, b, (x, qt.normalise(qt.multiply(turn, q)), v, L))
-    cap_rotational_energy(b, before, tilted, many)
+    cap_rotational_energy(b, before, offset_frame, many)
     return work_against_loads(b, start, many)
 
 
 @inlined
-def _displace_all(tilted, many):
+def _displace_all(offset_frame, many):
     """Move and turn the bodies, and let those that were lifted pay for what all of them were (`energy_budget`)."""
     total = ups = free = 0.0
     for b in range(many.bodies.state.shape[0]):
@@ -90,18 +90,18 @@ def _displace_all(tilted, many):
             continue
         free += free_lift_work(b, many)
         if many.sweeps.pushed[b] > 0:
-            lift = _displace(b, tilted, many)
-            _pose_inside_walls(b, tilted, many)
+            lift = _displace(b, offset_frame, many)
+            _pose_inside_walls(b, offset_frame, many)
             many.bodies.lift_work[b] = max(lift, 0.0)
             total, ups = total + lift, ups + max(lift, 0.0)
     if total > free:
         for b in range(many.bodies.state.shape[0]):
             if many.bodies.lift_work[b] > 0.0:
-                take_kinetic_energy(b, many.bodies.lift_work[b] * (total / ups), tilted, many)
+                take_kinetic_energy(b, many.bodies.lift_work[b] * (total / ups), offset_frame, many)
 
 
 @inlined
-def _correct_once(n, tilted, many):
+def _correct_once(n, offset_frame, many):
     """One round for the n contacts, posed where the bodies are: the deepest that anything was, in its slop."""
     update_contacts(many)
     deepest, error = _set_displacement_targets(n, many)
@@ -110,19 +110,19 @@ def _correct_once(n, tilted, many):
     sweep_positions(
         n, error, _DEEP_SWEEPS if deepest > _DEEP_SLOPS else min(_CORRECTION_SWEEPS, many.settings[0].sweeps), many
     )
-    _displace_all(tilted, many)
+    _displace_all(offset_frame, many)
     return deepest
 
 
 @shared_kernel
-def correct_positions(n, tilted, many):
+def correct_positions(n, offset_frame, many):
     """Move the bodies of the n contacts apart where they overlap by more than the slop."""
     for b in range(many.bodies.state.shape[0]):
         if many.bodies.touched[b] == 1:
-            _pose_inside_walls(b, tilted, many)
+            _pose_inside_walls(b, offset_frame, many)
     before = math.inf
     for _ in range(_MAX_ROUNDS):
-        deepest = _correct_once(n, tilted, many)
+        deepest = _correct_once(n, offset_frame, many)
         if not _DEEP_SLOPS < deepest < before:
             break
         before = deepest

@@ -26,18 +26,18 @@ def _save_momenta(first, many):
 
 
 @inlined
-def _update_twists(tilted, many):
+def _update_twists(offset_frame, many):
     """Twists of all bodies from their momenta."""
     for b in range(many.bodies.state.shape[0]):
         _, q, v, L = read_state(many.bodies.state, b)
         put_vector(many.bodies.twist, b, 0, v)
-        put_vector(many.bodies.twist, b, 3, angular_velocity(q, L, many.bodies.work[b], tilted))
+        put_vector(many.bodies.twist, b, 3, angular_velocity(q, L, many.bodies.work[b], offset_frame))
 
 
 @kernel
-def world_kinetic_energy(tilted, many):
+def world_kinetic_energy(offset_frame, many):
     """Kinetic energy of all bodies of the world [J]; their twists are computed anew."""
-    _update_twists(tilted, many)
+    _update_twists(offset_frame, many)
     total = 0.0
     for b in range(many.bodies.state.shape[0]):
         v, L = row_vector(many.bodies.state, b, at.LINVEL), row_vector(many.bodies.state, b, at.ANGMOM)
@@ -102,25 +102,25 @@ def _has_rebound(n, many):
 
 
 @kernel
-def _apply_frictionless(n, tilted, many):
+def _apply_frictionless(n, offset_frame, many):
     """The plastic impact without friction from the momenta before: no solve with friction came out right."""
     _set_plastic_targets(n, many)
-    _update_twists(tilted, many)
+    _update_twists(offset_frame, many)
     solve_frictionless_and_apply(n, many)
 
 
 @kernel
-def apply_impact_within_energy(n, world, friction, tilted, report, many):
+def apply_impact_within_energy(n, world, friction, offset_frame, report, many):
     """Solve and apply the n contacts of an impact; with friction, with as much rebound as there is energy for."""
     if friction is None:
         solve_and_apply(n, world, friction, report, many)
         return
     _save_momenta(_PRE_IMPACT, many)
-    before = world_kinetic_energy(tilted, many)
+    before = world_kinetic_energy(offset_frame, many)
     most = before + _ENERGY_TOLERANCES * many.settings[0].tolerance * before
     has_rebound = _has_rebound(n, many)
     solve_and_apply(n, world, friction, report, many)
-    full = world_kinetic_energy(tilted, many)
+    full = world_kinetic_energy(offset_frame, many)
     if not full > (before + IMPACT_ENERGY_ROUNDING * before if has_rebound else most):
         return
     plastic = full
@@ -128,15 +128,15 @@ def apply_impact_within_energy(n, world, friction, tilted, report, many):
         _save_momenta(_FULL_REBOUND, many)
         _save_impulses(n, many)
         _set_plastic_targets(n, many)
-        _update_twists(tilted, many)
+        _update_twists(offset_frame, many)
         solve_and_apply(n, world, friction, report, many)
-        plastic = world_kinetic_energy(tilted, many)
+        plastic = world_kinetic_energy(offset_frame, many)
     if plastic > most:
-        _apply_frictionless(n, tilted, many)
+        _apply_frictionless(n, offset_frame, many)
         return
     _blend_momenta(0.5, many)
-    middle = world_kinetic_energy(tilted, many)
+    middle = world_kinetic_energy(offset_frame, many)
     s = rebound_share(before, plastic, full, middle)
     _blend_momenta(2.0 * s - 1.0, many)  # from the middle
     _blend_impulses(n, s, many)
-    _update_twists(tilted, many)
+    _update_twists(offset_frame, many)

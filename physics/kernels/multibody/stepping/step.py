@@ -40,7 +40,7 @@ def step_many(queue, steps, substeps, h, arrays, switches, restitution, kept, sl
     """
     state, params, shapes, _, wrench = arrays
     memory, report, log, counts = records
-    tilted = switches.flight.tilted
+    offset_frame = switches.flight.offset_frame
     bodies = shapes.shape[0]
     world = begin_taking(queue.turns, queue.taken)
     while True:
@@ -54,7 +54,7 @@ def step_many(queue, steps, substeps, h, arrays, switches, restitution, kept, sl
             continue
         for b in range(bodies):
             i = world * bodies + b
-            bind_body(world, i, shapes[b], arrays, switches.friction, restitution, tilted, many.bodies.work[b])
+            bind_body(world, i, shapes[b], arrays, switches.friction, restitution, offset_frame, many.bodies.work[b])
             many.bodies.inv_mass[b] = params[i, at.INV_MASS]
             bind_fields(params, i, switches.flight.scheme, many.bodies.work[b])
             write_state(many.bodies.state, b, read_state(state, i))
@@ -89,4 +89,4 @@ def step_many(queue, steps, substeps, h, arrays, switches, restitution, kept, sl
         for b in range(bodies):
             i = world * bodies + b
             _, q, _, L = read_state(state, i)
-            put_vector(state, i, at.ANGVEL, angular_velocity(q, L, many.bodies.work[b], tilted))
+            put_vector(state, i, at.ANGVEL, angular_velocity(q, L, many.bodies.work[b], offset_frame))

@@ -85,9 +85,9 @@ def substep_world(
     left, impacts, cuts, turns = h, 0, 0, 0
     while True:
         is_last = impacts >= many.settings[0].splits or cuts == SPLITS_PER_IMPACT * many.settings[0].splits
-        hold_all_loads(left, switches.flight.gyroscopic, switches.flight.tilted, many)
-        update_poses_and_twists(switches.flight.tilted, many)
-        is_turning = write_spin_bounds(h, switches.flight.tilted, many)
+        hold_all_loads(left, switches.flight.gyroscopic, switches.flight.offset_frame, many)
+        update_poses_and_twists(switches.flight.offset_frame, many)
+        is_turning = write_spin_bounds(h, switches.flight.offset_frame, many)
         if is_turning and (is_last or turns >= MAX_TURNING_CUTS):
             clear_spin_bounds(many)
             is_turning = False
@@ -106,7 +106,9 @@ def substep_world(
         first = t
         if switches.flight.scheme is None:  # noqa: SIM102 (a branch of its own is what the compiler prunes)
             if is_turning:
-                t = safe_stage_length(first, switches.flight.gyroscopic, switches.flight.tilted, switches.hulls, many)
+                t = safe_stage_length(
+                    first, switches.flight.gyroscopic, switches.flight.offset_frame, switches.hulls, many
+                )
         if t < first:
             turns += 1
             if turns == MAX_TURNING_CUTS:
@@ -120,6 +122,6 @@ def substep_world(
         for b in range(many.bodies.state.shape[0]):
             advance_clock(t, many.bodies.work[b])
         if n > 0:
-            correct_positions(n, switches.flight.tilted, many)
+            correct_positions(n, switches.flight.offset_frame, many)
         if is_last or not left > 0.0:
             break
