@@ -143,14 +143,14 @@ def _safe_time(a, b, n, one, other, bend, horizon, hulls, many):
     if b >= 0:
         rate -= other[3]
         turning += many.bodies.work[b].radius * _norm(other[4])
-    gap = _gap_bound(0.0, a, b, n, one, other, rate, bend, hulls, many)
+    gap = _gap_bound(0.0, a, b, n, (one, other), rate, bend, hulls, many)
     if not gap > 0.0:
         return 0.0
     if not bend > 0.0:
         return horizon
     low, high = bracket_safe_time(gap, rate, turning, bend, horizon)
-    at_low = _gap_bound(low, a, b, n, one, other, rate, bend, hulls, many)
-    at_high = _gap_bound(high, a, b, n, one, other, rate, bend, hulls, many)
+    at_low = _gap_bound(low, a, b, n, (one, other), rate, bend, hulls, many)
+    at_high = _gap_bound(high, a, b, n, (one, other), rate, bend, hulls, many)
     if at_high >= 0.0:
         return high
     for _ in range(CHORDS):
