@@ -175,10 +175,9 @@ def integrate_mode(what, y, t, h, flight, work, motion, report):
 
 @kernel
 def advance(y, h, contact, flight, work, motion, records, start):
-    """State after h: events where they happen, smooth motion between them.
+    """State after h: each turn finds the mode of the body (`forced_mode` where it is known) and follows it.
 
-    Each turn finds the mode of the body (`forced_mode` where it is known) and follows it. A step whose end has to be
-    accepted (`mode_acceptance`) has begun at `rollback_state` and has the length `watched`.
+    A step whose end has to be accepted (`mode_acceptance`) began at `rollback_state` and has the length `watched`.
     """
     begin_event_substep(y, start, h, flight.offset_frame, records.memory, work, motion)
     t, forced_mode, is_foretold, rollback_state, watched = 0.0, _NO_FORCED_MODE, False, y, 0.0

@@ -126,6 +126,26 @@ def _newton_direction(H, g, n, k0, k1, k2):
     )
 
 
+@inlined
+def _search_along(A, is_block, B, dims, d, n, e, best):
+    """Line search from n along e for a σ above `best`, halving the step: (found, direction, σ there)."""
+    t = 1.0
+    if is_block:
+        t = _step_to_kink(n[0], e[0], _step_to_kink(n[1], e[1], _step_to_kink(n[2], e[2], t)))
+    for trial in range(_STEP_HALVINGS):
+        at_kink = is_block and trial == 0
+        m = _unit(
+            _step_component(n[0], e[0], t, at_kink),
+            _step_component(n[1], e[1], t, at_kink),
+            _step_component(n[2], e[2], t, at_kink),
+        )
+        value = support_separation(A, is_block, B, dims, d, m)
+        if value > best:
+            return True, m, value
+        t *= 0.5
+    return False, n, best
+
+
 @kernel
 def max_separation_direction(A, is_block, B, dims, d, n):
     """(unit vector of the largest σ found from n on, σ there).
@@ -173,21 +193,7 @@ def max_separation_direction(A, is_block, B, dims, d, n):
             e = _newton_direction(H, g, n, k0, k1, k2)
         if not max(abs(e[0]), abs(e[1]), abs(e[2])) > _DIRECTION_TOLERANCE:
             break
-        t, found = 1.0, False
-        if is_block:
-            t = _step_to_kink(n[0], e[0], _step_to_kink(n[1], e[1], _step_to_kink(n[2], e[2], t)))
-        for trial in range(_STEP_HALVINGS):
-            at_kink = is_block and trial == 0
-            m = _unit(
-                _step_component(n[0], e[0], t, at_kink),
-                _step_component(n[1], e[1], t, at_kink),
-                _step_component(n[2], e[2], t, at_kink),
-            )
-            value = support_separation(A, is_block, B, dims, d, m)
-            if value > best:
-                n, best, found = m, value, True
-                break
-            t *= 0.5
+        found, n, best = _search_along(A, is_block, B, dims, d, n, e, best)
         if not found:
             break
     return n, best
