@@ -75,7 +75,7 @@ from physics.kernels.state.body import (
 from physics.kernels.state.contact_law_dispatch import bind_laws
 from physics.kernels.time_stepping import event_log as ev
 
-# Gaps of this share of what they are the difference of are rounding; see `set_event_thresholds` for HOP.
+# Gaps of this share of what they are the difference of are rounding; see `set_event_thresholds` for _UNSEEN_HOP_GAPS.
 _ROUNDING = 1.0e-15
 _UNSEEN_HOP_GAPS = 4.0
 
