@@ -9,7 +9,8 @@ import numpy as np
 
 import physics
 from physics import scenes
-from physics.kernels.multibody.data.arrays import NUM_CONTACTS, BodiesWorkspace, make_bodies_workspace
+from physics.kernels.multibody.data.allocation import make_bodies_workspace
+from physics.kernels.multibody.data.arrays import NUM_CONTACTS, BodiesWorkspace
 from physics.kernels.state import layout as at
 from rigid_env.lab.hard_cases.cases import arch, stacks
 

@@ -54,9 +54,9 @@ class Team:
     ----------
     size : int
         Number of threads.
-    turns : (1 + size, APART) int64
+    turns : (1 + size, PADDING_WORDS) int64
         Whose turn it is, of `physics.kernels.parallel.work_stealing`.
-    taken : (size, FIRST + worlds + APART) int64
+    taken : (size, TAKEN_FIRST_WORLD + worlds + PADDING_WORDS) int64
         For each thread the worlds that it took in the last run.
     """
 
@@ -162,7 +162,7 @@ class Team:
 
 
 def listed(worlds: np.ndarray) -> np.ndarray:
-    """Worlds (n,) as a list (FIRST + n,) int64 of those that a thread took."""
+    """Worlds (n,) as a list (TAKEN_FIRST_WORLD + n,) int64 of those that a thread took."""
     taken = np.zeros(at.TAKEN_FIRST_WORLD + len(worlds), dtype=np.int64)
     taken[at.TAKEN_COUNT], taken[at.TAKEN_FIRST_WORLD :] = len(worlds), worlds
     return taken

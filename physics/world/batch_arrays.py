@@ -9,7 +9,7 @@ import numpy as np
 
 from physics.kernels.event_driven import workspace
 from physics.kernels.half_space.gap_queries import write_angular_momenta
-from physics.kernels.multibody.data import arrays as many
+from physics.kernels.multibody.data import allocation as many
 from physics.kernels.multibody.stepping.adaptive_substep import MIN_RELATIVE_SLOP, MIN_SOLVER_TOLERANCE
 from physics.kernels.state import layout as at
 from physics.kernels.time_stepping.midpoint_friction import MEAN_SLIP_CONTACTS

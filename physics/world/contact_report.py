@@ -37,7 +37,7 @@ def contact_forces(world: Batch, index: int) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _many_rows(world: Batch, index: int) -> np.ndarray:
-    """Remembered contacts (n, `MEMORY_SIZE`) of one world in which bodies touch each other."""
+    """Remembered contacts (n, `WARM_CONTACT_SIZE`) of one world in which bodies touch each other."""
     row = world.memory[index]
     count = int(row[many.WARM_CONTACT_COUNT])
     return row[many.WARM_HEADER_SIZE : many.WARM_HEADER_SIZE + many.WARM_CONTACT_SIZE * count].reshape(

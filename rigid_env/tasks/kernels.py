@@ -202,7 +202,7 @@ def observe_reach(taken, state, record, walls, actions, obs, outcome):
 
     Parameters
     ----------
-    taken : (FIRST + n or more,) int64
+    taken : (TAKEN_FIRST_WORLD + n or more,) int64
         Worlds to look at, listed as in `physics.kernels.parallel.work_stealing`; the rest of the outputs is left alone.
     state : (worlds, STATE_SIZE) float64
     record : (worlds, RECORD_SIZE) float64, in and out

@@ -9,7 +9,8 @@ from hypothesis import strategies as st
 
 from physics.kernels.compile.decorators import kernel
 from physics.kernels.contact_solver.one_contact import FreeBody
-from physics.kernels.contact_solver.patch_algebra import cold_start_motion, gather_patch
+from physics.kernels.contact_solver.patch import gather_patch
+from physics.kernels.contact_solver.patch_start import cold_start_motion
 from physics.kernels.contact_solver.sliding_patch import TRY_SLIDING, TRY_STICKING
 from physics.kernels.math.simd_gather import valid_lanes_mask
 from physics.kernels.state.layout import METHOD_DIRECT
@@ -134,7 +135,7 @@ def test_eight_contacts_of_one_wall_are_solved_by_sweeps(mode):
 
 @kernel
 def begun(n, mu, u, w, inv_mass, K, work):
-    """Start of a face under new loads (`patch_algebra.cold_start_motion`), on the wall whose axes are x, y, z."""
+    """Start of a face under new loads (`patch_start.cold_start_motion`), on the wall whose axes are x, y, z."""
     axes = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
     body = FreeBody(axes, u, w, K, inv_mass)
     return cold_start_motion(n, gather_patch(n, body, work), valid_lanes_mask(n), mu, body)

@@ -11,7 +11,8 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 import physics
-from physics.kernels.multibody.data.arrays import NUM_CONTACTS, make_bodies_workspace
+from physics.kernels.multibody.data.allocation import make_bodies_workspace
+from physics.kernels.multibody.data.arrays import NUM_CONTACTS
 from physics.kernels.multibody.data.hull_tables import CUBE, make_hulls
 from physics.kernels.multibody.narrowphase.dispatch import find_contacts
 from physics.plan.plan import SHAPE_CODES

@@ -14,13 +14,8 @@ from scipy.sparse.csgraph import connected_components
 
 from physics.kernels.compile.decorators import kernel
 from physics.kernels.multibody.broadphase.sweep_and_prune import find_pairs
-from physics.kernels.multibody.data.arrays import (
-    NUM_BATCHES,
-    NUM_CONTACTS,
-    NUM_DROPPED,
-    NUM_PAIRS,
-    make_bodies_workspace,
-)
+from physics.kernels.multibody.data.allocation import make_bodies_workspace
+from physics.kernels.multibody.data.arrays import NUM_BATCHES, NUM_CONTACTS, NUM_DROPPED, NUM_PAIRS
 from physics.kernels.multibody.narrowphase.box_sat import FLAT_COSINE
 from physics.kernels.multibody.narrowphase.dispatch import find_contacts
 from physics.kernels.multibody.solver import block_lu as blocks_of

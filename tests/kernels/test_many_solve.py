@@ -8,7 +8,8 @@ import pytest
 from benchmarks import problems
 from benchmarks.problems import SETTINGS
 from physics import scenes
-from physics.kernels.multibody.data.arrays import BodiesWorkspace, make_bodies_workspace
+from physics.kernels.multibody.data.allocation import make_bodies_workspace
+from physics.kernels.multibody.data.arrays import BodiesWorkspace
 from physics.kernels.multibody.solver import (
     contact_operator,
     gauss_seidel,

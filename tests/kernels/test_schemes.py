@@ -57,11 +57,6 @@ def grouped(x, q, v, L, force, torque, g, inv_mass, J):
     return (x, q, v, L), integrators.Load(force, torque, g), integrators.Inertia(inv_mass, J)
 
 
-def integrate(code, x, q, v, L, force, torque, g, inv_mass, J, h, steps):
-    """State after some steps of a scheme."""
-    return integrators.integrate(code, *grouped(x, q, v, L, force, torque, g, inv_mass, J), h, steps)
-
-
 def spinning(scheme, attitude, L, inverse, h, steps):
     """`steps` steps of a torque-free `scheme`; the attitude after them."""
     x, v = ZERO, ZERO
@@ -98,13 +93,13 @@ ORDERS = [
 
 @pytest.mark.parametrize(("code", "order", "fewest"), ORDERS)
 def test_order_of_the_attitude_of_a_tumbling_block(code, order, fewest):
-    ends = [integrate(code, **TUMBLE, h=1 / n, steps=n) for n in (fewest, 2 * fewest, 4 * fewest)]
+    ends = [integrators.integrate(code, *grouped(**TUMBLE), 1 / n, n) for n in (fewest, 2 * fewest, 4 * fewest)]
     assert_order([orientation_error(q, truth().quat) for _, q, _, _ in ends], order)
 
 
 @pytest.mark.parametrize(("code", "order", "fewest"), ORDERS[:2])
 def test_order_of_the_position_by_the_two_euler_methods(code, order, fewest):
-    ends = [integrate(code, **TUMBLE, h=1 / n, steps=n) for n in (fewest, 2 * fewest)]
+    ends = [integrators.integrate(code, *grouped(**TUMBLE), 1 / n, n) for n in (fewest, 2 * fewest)]
     assert_order([np.linalg.norm(x - truth().pos) for x, _, _, _ in ends], order)
 
 
@@ -126,7 +121,7 @@ def test_order_of_the_matrix_formulation(scheme, order, fewest):
 @every_scheme
 def test_momenta_of_the_tumbling_block_are_exact(code):
     n = 256
-    x, q, v, L = integrate(code, **TUMBLE, h=1 / n, steps=n)
+    x, q, v, L = integrators.integrate(code, *grouped(**TUMBLE), 1 / n, n)
     # n additions to numbers ≤ 32.
     assert np.abs(np.array(L) - truth().angular_momentum).max() <= n * EPS * 32
     assert np.abs(np.array(v) - truth().momentum / MASS).max() <= n * EPS * 32
@@ -146,7 +141,7 @@ def test_free_flight_is_the_discrete_parabola(code, x, v, force, g, h, n):
     c = {integrators.EXPLICIT_EULER: n * (n - 1) / 2, integrators.SEMI_IMPLICIT_EULER: n * (n + 1) / 2}.get(
         code, n * n / 2
     )
-    x_n, _, v_n, _ = integrate(code, x, START, v, ZERO, force, ZERO, g, 0.5, J, h, n)
+    x_n, _, v_n, _ = integrators.integrate(code, *grouped(x, START, v, ZERO, force, ZERO, g, 0.5, J), h, n)
     a = np.array(g) + 0.5 * np.array(force)
     # |a| ≤ 15, so |v| ≤ 10 + 15 n h ≤ 310 and |x| ≤ 10 + 310 n h; each of n steps rounds v and x by EPS,
     # and what v has lost is moved on for n h ≤ 20 s.
@@ -179,7 +174,7 @@ def test_a_sphere_spun_up_about_a_fixed_axis_turns_by_the_phases_of_its_steps(co
     n, inverse = 50, 0.5
     axis = np.array(axis) / math.hypot(*axis) if math.hypot(*axis) > 1e-3 else np.array([0.6, 0.0, 0.8])
     L, tau = (tuple(float(a) for a in axis * f) for f in (size, torque))
-    _, q_n, _, _ = integrate(code, ZERO, q, ZERO, L, ZERO, tau, ZERO, 1.0, (inverse,) * 3, h, n)
+    _, q_n, _, _ = integrators.integrate(code, *grouped(ZERO, q, ZERO, L, ZERO, tau, ZERO, 1.0, (inverse,) * 3), h, n)
     y = h * inverse / 2 * (size + torque * h * np.arange(0, n + 0.5, 0.5))
     angle = sum(2 * np.angle(factor(code, *y[2 * k : 2 * k + 3])) for k in range(n))
     turn = quaternion.exp_map(tuple(float(a) for a in axis * angle))
@@ -191,7 +186,7 @@ def test_a_sphere_spun_up_about_a_fixed_axis_turns_by_the_phases_of_its_steps(co
 @settings(deadline=None, max_examples=20)
 @given(q=unit_quaternions, L=vectors, h=steps_sizes)
 def test_angular_momentum_without_torque_is_constant_bit_for_bit(code, q, L, h):
-    assert integrate(code, ZERO, q, ZERO, L, ZERO, ZERO, ZERO, 1.0, J, h, 50)[3] == L
+    assert integrators.integrate(code, *grouped(ZERO, q, ZERO, L, ZERO, ZERO, ZERO, 1.0, J), h, 50)[3] == L
 
 
 @pytest.mark.parametrize(
@@ -251,10 +246,14 @@ def test_the_matrix_drifts_64_times_as_fast_as_the_quaternion_by_rk4():
 @settings(deadline=None, max_examples=60)
 @given(codes, unit_quaternions, unit_quaternions, vectors, vectors, vectors, steps_sizes)
 def test_a_turned_world_gives_the_turned_result(code, turn, q, v, L, torque, h):
-    args = (1 / MASS, J, h, 5)
-    x, q_n, v_n, L_n = integrate(code, ZERO, q, v, L, ZERO, torque, (0.0, -9.81, 0.0), *args)
+    body = (1 / MASS, J)
+    x, q_n, v_n, L_n = integrators.integrate(
+        code, *grouped(ZERO, q, v, L, ZERO, torque, (0.0, -9.81, 0.0), *body), h, 5
+    )
     v, L, torque, g = (quaternion.rotate(turn, a) for a in (v, L, torque, (0.0, -9.81, 0.0)))
-    turned = integrate(code, ZERO, quaternion.multiply(turn, q), v, L, ZERO, torque, g, *args)
+    turned = integrators.integrate(
+        code, *grouped(ZERO, quaternion.multiply(turn, q), v, L, ZERO, torque, g, *body), h, 5
+    )
     # `rotate` loses 30 EPS of a vector ≤ 22; five steps of about 20 roundings.
     for before, after in ((x, turned[0]), (v_n, turned[2]), (L_n, turned[3])):
         assert np.abs(np.subtract(quaternion.rotate(turn, before), after)).max() <= 150 * EPS * 22
@@ -264,16 +263,18 @@ def test_a_turned_world_gives_the_turned_result(code, turn, q, v, L, torque, h):
 @settings(deadline=None, max_examples=60)
 @given(codes, unit_quaternions, vectors, vectors, steps_sizes)
 def test_opposite_quaternions_are_the_same_body(code, q, L, torque, h):
-    args = (ZERO, L, ZERO, torque, ZERO, 1.0, J, h, 5)
-    one = integrate(code, ZERO, q, *args)
-    other = integrate(code, ZERO, tuple(-a for a in q), *args)
+    rest = (ZERO, L, ZERO, torque, ZERO, 1.0, J)
+    one = integrators.integrate(code, *grouped(ZERO, q, *rest), h, 5)
+    other = integrators.integrate(code, *grouped(ZERO, tuple(-a for a in q), *rest), h, 5)
     assert np.array_equal(one[1], np.negative(other[1]))
 
 
 @settings(deadline=None, max_examples=60)
 @given(codes, unit_quaternions, vectors, vectors, steps_sizes)
 def test_what_has_no_inverse_mass_and_inertia_stays(code, q, force, torque, h):
-    x, q_n, v, _ = integrate(code, (1.0, 2.0, 3.0), q, ZERO, ZERO, force, torque, ZERO, 0.0, ZERO, h, 5)
+    x, q_n, v, _ = integrators.integrate(
+        code, *grouped((1.0, 2.0, 3.0), q, ZERO, ZERO, force, torque, ZERO, 0.0, ZERO), h, 5
+    )
     assert x == (1, 2, 3)
     assert v == ZERO
     # Normalisation rounds each part by 2.5 EPS a step at most.
@@ -288,7 +289,7 @@ def test_the_loop_is_its_steps_bit_for_bit(code):
         by_code = integrators.step(code, *grouped(*state, **held), 0.01)
         state = SCHEMES[code](*grouped(*state, **held), 0.01)
         assert by_code == state
-    assert integrate(code, **TUMBLE, h=0.01, steps=7) == state
+    assert integrators.integrate(code, *grouped(**TUMBLE), 0.01, 7) == state
 
 
 @pytest.mark.parametrize("code", [-1, 0, 5])

@@ -82,7 +82,7 @@ In the order in which `solve_contacts` tries them; the first result within its t
 
    a. `sticking.solve_all_sticking`: all contacts take their targets, or open. Any number of contacts and walls, with
       friction, walls that do not give. It comes before b where it is likelier: for three or four contacts of one wall
-      if friction may stop them (`patch_algebra.may_stick`), for two, or several walls, if `work.mode` is
+      if friction may stop them (`patch_start.may_stick`), for two, or several walls, if `work.mode` is
       `TRY_STICKING`. Otherwise it comes after b, for a single contact always.
    b. `single_wall.solve_single_wall`: contacts hold, slide or open. One to four contacts of one wall; at most two where
       walls give. It tries `two_contacts.solve_one_contact` for one, `two_contacts.solve_two_contacts` for two, and

@@ -16,12 +16,8 @@ exerted : tuple of 5 floats
 
 from __future__ import annotations
 
-import math
-from typing import NamedTuple
-
 from physics.kernels.compile.decorators import inlined
 from physics.kernels.compile.simd import (
-    Lanes,
     first_true_lane,
     lane_sqrt,
     lane_sum,
@@ -33,132 +29,13 @@ from physics.kernels.compile.simd import (
 from physics.kernels.contact_law.anisotropic_friction import friction_ratio
 from physics.kernels.contact_solver.one_contact import (
     MIN_SQUARED_NORM,
-    FreeBody,
     inverse_root,
-    is_warm_start_valid,
     point_velocity,
 )
-from physics.kernels.math import quaternion as qt
-from physics.kernels.math.simd_gather import gather_column, gather_component, valid_lanes_mask
+from physics.kernels.contact_solver.patch import NormalMotion, PatchFriction
 
 # Second moments of a patch: below this share of det to trace² it counts as a line (edges 1 : 1000).
 _COLLINEAR_LIMIT = 1.0e-6
-
-# Share of its free slip that a face which nearly holds starts with.
-_MIN_SLIP_SHARE = 0.01
-
-
-class Patch(NamedTuple):
-    """Contacts of one wall, a lane each.
-
-    Attributes
-    ----------
-    points : tuple of 3 lanes
-        Coordinates (normal, tangents) from the centre of mass [m].
-    targets : tuple of 3 lanes
-        Velocities aimed at along the same axes [m/s].
-    mobility : lanes
-        W_aa + W_bb of each contact [1/kg].
-    """
-
-    points: tuple
-    targets: tuple
-    mobility: Lanes
-
-
-class PatchProblem(NamedTuple):
-    """Contact problem of a patch.
-
-    Attributes
-    ----------
-    patch : Patch
-        The contacts.
-    body : FreeBody
-        The body without their impulses.
-    mu : float
-        Coefficient of friction along tangent a; 0 without friction.
-    goal : float
-        Tolerance of the residual [m/s].
-    loose : float
-        Speed up to which an open contact may close while it is sought which others push [m/s].
-    """
-
-    patch: Patch
-    body: FreeBody
-    mu: float
-    goal: float
-    loose: float
-
-
-class NormalMotion(NamedTuple):
-    """Motion along the normal that the pushing contacts must have, known before their impulses.
-
-    Attributes
-    ----------
-    center : tuple of 3 floats
-        Centroid (normal, tangents) of the contacts that push [m].
-    wa, wb : float
-        Angular velocity about the tangents [rad/s].
-    push : float
-        Sum of the normal impulses that it takes [N s].
-    y0 : float
-        Their mean [N s].
-    gain : tuple of 2 floats
-        Change of the angular velocity about the tangents that it takes [rad/s].
-    """
-
-    center: tuple
-    wa: float
-    wb: float
-    push: float
-    y0: float
-    gain: tuple
-
-
-class PatchFriction(NamedTuple):
-    """Friction of the contacts, and their slip.
-
-    Attributes
-    ----------
-    x, y : lanes
-        Impulses along the tangents a and b per normal impulse: -μ d where a contact slides in the direction d, -μ z
-        with |z| <= 1 anywhere in the disc, 0 where it is open.
-    speed : lanes
-        Size of the tangential velocity less its target [m/s].
-    """
-
-    x: Lanes
-    y: Lanes
-    speed: Lanes
-
-
-@inlined
-def _coordinates_along(axis, n, work):
-    """Coordinates of the contacts along an axis, from the centre of mass."""
-    return (
-        axis[0] * gather_column(work.arm, 0, n)
-        + axis[1] * gather_column(work.arm, 1, n)
-        + axis[2] * gather_column(work.arm, 2, n)
-    )
-
-
-@inlined
-def gather_patch(n, body, work):
-    """The `Patch` of the n contacts in `work`, on the wall of `body`."""
-    axes, inv_mass, K, ratio = body.axes, body.inv_mass, body.K, friction_ratio(work)
-    c, a, b = (
-        ratio * _coordinates_along(axes[0], n, work),
-        ratio * _coordinates_along(axes[1], n, work),
-        _coordinates_along(axes[2], n, work),
-    )
-    target = (
-        gather_column(work.target, 0, n),
-        gather_column(work.target, 1, n),
-        ratio * gather_column(work.target, 2, n),
-    )
-    mass_b = ratio * ratio * inv_mass
-    mobility = (inv_mass + mass_b) + K[0] * (a * a + b * b) - 2.0 * c * (K[1] * a + K[2] * b) + c * c * (K[3] + K[5])
-    return Patch((c, a, b), target, mobility)
 
 
 @inlined
@@ -169,84 +46,6 @@ def largest_free_speed(friction, patch, body):
     if friction is not None:
         worst = larger(worst, larger(abs(speed[1] - target[1]), abs(speed[2] - target[2])))
     return max_of_lanes(larger(0.0, worst))
-
-
-@inlined
-def warm_start_motion(n, patch, on, body, work):
-    """Planar motion after the impulses in `work`, those of the warm start, and whether they are of these loads."""
-    c, a, b = patch.points
-    u, w, K, inv_mass, ratio = body.u, body.w, body.K, body.inv_mass, friction_ratio(work)
-    p, x = on * gather_component(work.impulse, 0, n), on * gather_component(work.impulse, 1, n)
-    y = on * gather_component(work.impulse, 2, n) / ratio
-    spin = K[0] * (a * y - b * x) + K[1] * (b * p - c * y) + K[2] * (c * x - a * p)
-    motion = u[1] + inv_mass * lane_sum(x), u[2] + ratio * ratio * inv_mass * lane_sum(y), w[0] + lane_sum(spin)
-    return motion, is_warm_start_valid(inv_mass * lane_sum(p), -u[0])
-
-
-@inlined
-def warm_start_friction(n, patch, on, work):
-    """Impulses per normal impulse along the tangents (two lanes) of those in `work`; 0 where nothing pushes."""
-    p = on * gather_component(work.impulse, 0, n)
-    s = select_lanes(p > 0.0, 1.0 / p, 0.0)
-    return s * gather_component(work.impulse, 1, n), s * gather_component(work.impulse, 2, n) / friction_ratio(work)
-
-
-@inlined
-def _centroid_and_variance(n, a, b, on):
-    """Centroid of the contacts along the tangents, and mean square of their distance from it."""
-    share = 1.0 / n
-    ca, cb = share * lane_sum(on * a), share * lane_sum(on * b)
-    a, b = on * (a - ca), on * (b - cb)
-    return ca, cb, share * (lane_sum(a * a) + lane_sum(b * b))
-
-
-@inlined
-def may_stick(n, axes, v, L, work):
-    """True if friction may stop a face, with the velocity v and angular momentum L that it has without it.
-
-    What holds stops at its wall: the pushes P take away the normal momentum, and friction, μP at most, the tangential
-    one; its moment about the centroid is μ Σ p_i |d_i| <= μP max |d_i| at most. Of a face that can hold this is true;
-    one that slips within the tolerance of a solve would be taken for it, and creep.
-    """
-    ratio, friction = friction_ratio(work), work.mu * qt.dot(axes[0], v)
-    va, vb, limit = qt.dot(axes[1], v), qt.dot(axes[2], v) / ratio, friction * friction
-    spin, slip = qt.dot(axes[0], L) / work.mass, va * va + vb * vb
-    if slip > limit or (slip == 0.0 and spin == 0.0):
-        return slip <= limit
-    a, b = ratio * _coordinates_along(axes[1], n, work), _coordinates_along(axes[2], n, work)
-    ca, cb, _ = _centroid_and_variance(n, a, b, valid_lanes_mask(n))
-    moment = ca * vb - cb * va - spin
-    a, b = a - ca, b - cb
-    return moment * moment <= max_of_lanes(a * a + b * b) * limit
-
-
-@inlined
-def cold_start_motion(n, patch, on, mu, body):
-    """Planar motion that friction leaves of one without impulses, if the planar friction is that of an ellipsoid.
-
-    The forces and moments about the centroid that equal pushes, P in all, can exert while a face slides are nearly an
-    ellipsoid, (|f|/μP)² + (T/μPρ)² <= 1, and the slip is along its normal, (v, ρ² ω) (Goyal et al. 1991; Howe and
-    Cutkosky 1996). With ρ² = Σ|d_i|²/n, β = μP/m, γ = μPρ²/I and the slip's size s, s² = v² + ρ²ω²,
-
-        v = v₀ s/(s + β),   ω = ω₀ s/(s + γ),   φ(s)² = v₀²/(s + β)² + ρ²ω₀²/(s + γ)² = 1.
-
-    1/φ is nearly a straight line and concave: one step of Newton's, from where it is not above 1, is near enough. What
-    φ(0) <= 1 says would hold is given a small part of its slip, since directions are wanted.
-    """
-    _, a, b = patch.points
-    u, w, inv_mass = body.u, body.w, body.inv_mass
-    ca, cb, second = _centroid_and_variance(n, a, b, on)
-    va, vb = u[1] - w[0] * cb, u[2] + w[0] * ca
-    slip2, turn2, beta = va * va + vb * vb, second * w[0] * w[0], mu * max(-u[0], 0.0)
-    free, gamma = math.sqrt(slip2 + turn2), beta * second * body.K[0] / inv_mass
-    s = max(free - max(beta, gamma), 0.0)
-    p, q = 1.0 / (s + beta), 1.0 / (s + gamma)
-    square = slip2 * p * p + turn2 * q * q
-    s += (math.sqrt(square) - 1.0) * square / (slip2 * p * p * p + turn2 * q * q * q)
-    s = max(s, _MIN_SLIP_SHARE * free)
-    p, q = s / (s + beta), s / (s + gamma)
-    wn = q * w[0]
-    return p * va + wn * cb, p * vb - wn * ca, wn
 
 
 @inlined

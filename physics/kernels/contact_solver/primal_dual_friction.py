@@ -31,8 +31,8 @@ from typing import NamedTuple
 from physics.kernels.compile.decorators import inlined, kernel
 from physics.kernels.compile.simd import Lanes, first_true_lane, lane_sqrt, lane_sum, larger, max_of_lanes, select_lanes
 from physics.kernels.contact_solver.one_contact import inverse_root
+from physics.kernels.contact_solver.patch import PatchFriction
 from physics.kernels.contact_solver.patch_algebra import (
-    PatchFriction,
     has_turned_far,
     patch_normal_impulses,
     patch_slip_velocities,

@@ -183,7 +183,7 @@ def proximal_newton(n, residual, goal, is_quick, work):
     Parameters
     ----------
     n : int
-        Contacts in `work`: what `assemble` and `factor_blocks` fill is read; `work.impulse` is the start and
+        Contacts in `work`: what `assemble` and `invert_contact_blocks` fill is read; `work.impulse` is the start and
         receives the result, `work.velocity` the contact velocities.
     residual, goal : float
         Residual of the start, and tolerance [m/s].

@@ -6,16 +6,13 @@ from typing import NamedTuple
 
 from physics.kernels.compile.decorators import inlined
 from physics.kernels.contact_law.anisotropic_friction import friction_ratio, stretched_frame
+from physics.kernels.contact_solver.contact_pair import contact_in_wall_frame
 from physics.kernels.contact_solver.one_contact import FreeBody, motion_in_wall_frame, wall_to_world
-from physics.kernels.contact_solver.patch_algebra import (
-    PatchProblem,
-    cold_start_motion,
-    gather_patch,
-    largest_free_speed,
-    warm_start_motion,
-)
+from physics.kernels.contact_solver.patch import PatchProblem, gather_patch
+from physics.kernels.contact_solver.patch_algebra import largest_free_speed
+from physics.kernels.contact_solver.patch_start import cold_start_motion, warm_start_motion
 from physics.kernels.contact_solver.sliding_patch import TRY_MIXED, TRY_SLIDING, solve_sliding_patch
-from physics.kernels.contact_solver.two_contacts import contact_in_wall_frame, solve_one_contact, solve_two_contacts
+from physics.kernels.contact_solver.two_contacts import solve_one_contact, solve_two_contacts
 from physics.kernels.half_space.contact_point import wall_axes
 from physics.kernels.math.simd_gather import valid_lanes_mask
 

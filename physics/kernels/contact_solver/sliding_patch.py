@@ -33,7 +33,7 @@ pushes again, once; where three push and it hardly closes, not before these are 
 linear system is the solution.
 
 All begins with the motion that the impulses of the last step lead to, and with themselves where some contacts held; or,
-where they are of other loads, with `patch_algebra.cold_start_motion`.
+where they are of other loads, with `patch_start.cold_start_motion`.
 """
 
 from __future__ import annotations
@@ -43,6 +43,7 @@ from typing import NamedTuple
 
 from physics.kernels.compile.decorators import inlined
 from physics.kernels.compile.simd import Lanes, first_true_lane, lane_sum, larger, max_of_lanes, select_lanes
+from physics.kernels.contact_solver.contact_pair import contact_in_wall_frame
 from physics.kernels.contact_solver.patch_algebra import (
     fit_normal_motion,
     has_small_turns,
@@ -56,8 +57,8 @@ from physics.kernels.contact_solver.patch_algebra import (
     planar_compliance,
     planar_motion_after,
     solve_normal_slopes,
-    warm_start_friction,
 )
+from physics.kernels.contact_solver.patch_start import warm_start_friction
 from physics.kernels.contact_solver.primal_dual_friction import (
     ROUND_FAILED,
     ROUND_PULLS,
@@ -67,7 +68,7 @@ from physics.kernels.contact_solver.primal_dual_friction import (
     solve_stick_slip_patch,
     take_viscous_step,
 )
-from physics.kernels.contact_solver.two_contacts import contact_in_wall_frame, solve_two_contacts
+from physics.kernels.contact_solver.two_contacts import solve_two_contacts
 from physics.kernels.math.simd_gather import select_lane, valid_lanes_mask
 
 # Linear solves of one attempt at most. Two are usual at a tolerance of 1e-6, each contact that opens costs

@@ -16,7 +16,7 @@ from physics.kernels.contact_solver.gauss_seidel import (
     normal_sweeps,
     update_contact_velocities,
 )
-from physics.kernels.contact_solver.patch_algebra import may_stick
+from physics.kernels.contact_solver.patch_start import may_stick
 from physics.kernels.contact_solver.proximal_newton import proximal_newton
 from physics.kernels.contact_solver.single_wall import solve_single_wall
 from physics.kernels.contact_solver.sliding_patch import TRY_STICKING
@@ -225,7 +225,7 @@ def solve_contacts(n, contact, v, L, R, work):
         Relative to the largest free contact speed.
     sweeps : int
     method : int
-        DIRECT, SWEEPS or PIVOTING.
+        METHOD_DIRECT, METHOD_SWEEPS or METHOD_PIVOTING.
     """
     found, v_new, L_new, residual = _solve_directly(n, contact.friction, R, v, L, work)
     if found:

@@ -12,11 +12,18 @@ Where the cone does not allow p_i, contact i slides against it, and that is the 
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
 
 from physics.kernels.compile.decorators import inlined, kernel
 from physics.kernels.contact_law.anisotropic_friction import friction_ratio
 from physics.kernels.contact_law.compliance import add_block_compliance
+from physics.kernels.contact_solver.contact_pair import (
+    PairProblem,
+    PairTrial,
+    SlidingPair,
+    swap_pair_problem,
+    swap_pair_trial,
+    transpose_block,
+)
 from physics.kernels.contact_solver.impulse_distribution import solve_symmetric
 from physics.kernels.contact_solver.one_contact import (
     CONTACT_SLIDES,
@@ -26,7 +33,6 @@ from physics.kernels.contact_solver.one_contact import (
     diagonal_delassus_block,
     friction_direction,
     is_warm_start_valid,
-    point_velocity,
     rotate_direction,
     sliding_residual,
     solve_contact_block,
@@ -50,129 +56,13 @@ def _plus(p, q):
     return p[0] + q[0], p[1] + q[1], p[2] + q[2]
 
 
-@inlined
-def _transposed(W):
-    return W[0], W[3], W[6], W[1], W[4], W[7], W[2], W[5], W[8]
-
-
-class WallContact(NamedTuple):
-    """A contact in the stretched frame (normal, tangents) of its wall.
-
-    Attributes
-    ----------
-    place : tuple of 3 floats
-        Coordinates from the centre of mass [m].
-    approach : tuple of 3 floats
-        Velocity without contact impulses, less the target [m/s].
-    impulse : tuple of 3 floats
-        Warm start [N s]; 0 without friction.
-    """
-
-    place: tuple
-    approach: tuple
-    impulse: tuple
-
-
-class PairProblem(NamedTuple):
-    """Contact problem of two contacts: u_1 = W_11 p_1 + W_12 p_2 + b_1, u_2 = W_12ᵀ p_1 + W_22 p_2 + b_2.
-
-    Attributes
-    ----------
-    W11, W12, W22 : tuple of 9 floats
-        Blocks of the Delassus matrix, row by row [1/kg].
-    b1, b2 : tuple of 3 floats
-        Velocities without contact impulses, less the targets [m/s].
-    mu : float
-        Coefficient of friction.
-    goal : float
-        Tolerance of the residual [m/s].
-    """
-
-    W11: tuple
-    W12: tuple
-    W22: tuple
-    b1: tuple
-    b2: tuple
-    mu: float
-    goal: float
-
-
-class PairTrial(NamedTuple):
-    """Impulses that were tried for two contacts, and where to go on from.
-
-    Attributes
-    ----------
-    found : bool
-        Whether they solve the problem.
-    p, q : tuple of 3 floats
-        Impulses of the first and of the second contact [N s].
-    miss : float
-        Residual [m/s].
-    first, second : tuple of 2 floats
-        Friction -μ d per normal impulse, d the direction of sliding, of each contact.
-    """
-
-    found: bool
-    p: tuple
-    q: tuple
-    miss: float
-    first: tuple
-    second: tuple
-
-
-class SlidingPair(NamedTuple):
-    """Two contacts that slide in given directions, their normal velocities on target.
-
-    Attributes
-    ----------
-    p1, p2 : float
-        Normal impulses [N s].
-    miss1, miss2 : float
-        Residuals [m/s]; infinite where a contact moves backwards.
-    inverse : tuple of 4 floats
-        Matrix (a_11, a_12, a_21, a_22) of the normal impulses over its determinant [kg].
-    g11, g12, g21, g22 : tuple of 2 floats
-        g_ij: tangential velocity of contact i per normal impulse of j, friction along with it [1/kg].
-    along1, along2 : float
-        μ times the velocities along the directions [m/s].
-    across1, across2 : float
-        μ times those across [m/s].
-    """
-
-    p1: float
-    p2: float
-    miss1: float
-    miss2: float
-    inverse: tuple
-    g11: tuple
-    g12: tuple
-    g21: tuple
-    g22: tuple
-    along1: float
-    along2: float
-    across1: float
-    across2: float
-
-
-@inlined
-def _swapped_problem(pair):
-    """The same problem with the contacts in the other order."""
-    return PairProblem(pair.W22, _transposed(pair.W12), pair.W11, pair.b2, pair.b1, pair.mu, pair.goal)
-
-
-@inlined
-def _swapped_trial(trial):
-    """A trial of the `_swapped_problem` as one of the problem."""
-    return PairTrial(trial.found, trial.q, trial.p, trial.miss, trial.second, trial.first)
-
-
 @kernel
 def _solve_with_open(pair, direction):
     """Try the first contact alone, which slides in a `direction` at first, the second one open."""
     Wi, bi, mu, goal = pair.W11, pair.b1, pair.mu, pair.goal
     x, y = direction
     what, p, miss = solve_contact_block(Wi, bi, mu, Wi[4] + Wi[8], goal, x, y, True)
-    uj = _plus(pair.b2, qt.matvec(_transposed(pair.W12), p))
+    uj = _plus(pair.b2, qt.matvec(transpose_block(pair.W12), p))
     if what == CONTACT_SLIDES:
         x, y = p[1] / p[0], p[2] / p[0]
     elif what == CONTACT_STICKS:
@@ -185,7 +75,7 @@ def _solve_with_open(pair, direction):
 def _solve_with_sticking(pair, direction):
     """Try that the first contact holds, and the second one slides, in a `direction` at first, or opens."""
     Wi, Wij, Wj, bi, bj, mu, goal = pair
-    Wji = _transposed(Wij)
+    Wji = transpose_block(Wij)
     x, y = direction
     k = (Wi[0], Wi[1], Wi[2], Wi[4], Wi[5], Wi[8])
     s0 = solve_symmetric(k, (Wij[0], Wij[3], Wij[6]))
@@ -274,7 +164,7 @@ def _solve_alternately(pair, trial):
     """
     W11, W12, W22, b1, b2, mu, goal = pair
     _, p, q, miss, (x1, y1), (x2, y2) = trial
-    W21 = _transposed(W12)
+    W21 = transpose_block(W12)
     first = second = CONTACT_SLIDES
     for _ in range(_SWEEPS_PER_ALTERNATION):
         first, p, miss = solve_contact_block(W11, _plus(b1, qt.matvec(W12, q)), mu, W11[4] + W11[8], goal, x1, y1, True)
@@ -288,7 +178,7 @@ def _solve_alternately(pair, trial):
     if first == CONTACT_STICKS and second == CONTACT_SLIDES:
         return _solve_with_sticking(pair, (x2, y2))
     if first == CONTACT_SLIDES and second == CONTACT_STICKS:
-        return _swapped_trial(_solve_with_sticking(_swapped_problem(pair), (x1, y1)))
+        return swap_pair_trial(_solve_with_sticking(swap_pair_problem(pair), (x1, y1)))
     return PairTrial(False, p, q, miss, (x1, y1), (x2, y2))
 
 
@@ -313,7 +203,7 @@ def _try_sliding(sliding, first, second, goal):
 @inlined
 def solve_block_pair(pair, first, second):
     """The `PairTrial` that solves a `PairProblem`, from these directions (-μ d) on."""
-    swapped = _swapped_problem(pair)
+    swapped = swap_pair_problem(pair)
     held1 = held2 = opened = turns = 0
     for _ in range(_MAX_NEWTON_STEPS):
         is_stuck = False
@@ -325,14 +215,14 @@ def solve_block_pair(pair, first, second):
             if sliding.p1 >= sliding.p2:
                 trial = _solve_with_open(pair, first)
             else:
-                trial = _swapped_trial(_solve_with_open(swapped, second))
+                trial = swap_pair_trial(_solve_with_open(swapped, second))
             is_stuck, opened = opened >= _MAX_RECLOSURES, opened + 1  # the open one closes: once more with both
         elif sliding.miss1 == math.inf and held1 < _MAX_STICK_TRIALS:
             held1 += 1
             trial = _solve_with_sticking(pair, second)
         elif sliding.miss2 == math.inf and held2 < _MAX_STICK_TRIALS:
             held2 += 1
-            trial = _swapped_trial(_solve_with_sticking(swapped, first))
+            trial = swap_pair_trial(_solve_with_sticking(swapped, first))
         elif trial.miss == math.inf:
             is_stuck = True
         else:
@@ -346,19 +236,6 @@ def solve_block_pair(pair, first, second):
             return trial
         first, second = trial.first, trial.second
     return PairTrial(False, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), 0.0, first, second)
-
-
-@inlined
-def contact_in_wall_frame(i, body, work):
-    """The `WallContact` of contact i of a `FreeBody`, with its impulse so far. Without friction there is none."""
-    axes, u, w = body.axes, body.u, body.w
-    arm, ratio = (work.arm[i, 0], work.arm[i, 1], work.arm[i, 2]), friction_ratio(work)
-    place = (ratio * qt.dot(axes[0], arm), ratio * qt.dot(axes[1], arm), qt.dot(axes[2], arm))
-    f, impulse = point_velocity(place, u, w), (0.0, 0.0, 0.0)
-    if work.mu > 0.0:
-        impulse = (work.impulse[3 * i], work.impulse[3 * i + 1], work.impulse[3 * i + 2] / ratio)
-    approach = f[0] - work.target[i, 0], f[1] - work.target[i, 1], f[2] - ratio * work.target[i, 2]
-    return WallContact(place, approach, impulse)
 
 
 @inlined
@@ -425,7 +302,7 @@ def solve_two_contacts(first, second, mu, goal, body, work):
     pair, directions = PairProblem(W11, W12, W22, b1, b2, mu, goal), ((0.0, 0.0), (0.0, 0.0))
     if mu > 0.0:
         u1 = _plus(qt.matvec(W11, f), qt.matvec(W12, g))
-        u2 = _plus(qt.matvec(W22, g), qt.matvec(_transposed(W12), f))
+        u2 = _plus(qt.matvec(W22, g), qt.matvec(transpose_block(W12), f))
         if not (is_warm_start_valid(u1[0], -b1[0]) and is_warm_start_valid(u2[0], -b2[0])):
             u1, u2 = _frictionless_response(pair)
         directions = (

@@ -34,8 +34,8 @@ from physics.kernels.math.vector import as_vector, plus, row_vector, times
 _ZERO_SHARE = 1.0e-8
 
 # Tangential acceleration that stands for sliding where no mixture was found, in largest free ones; the direction of a
-# contact that slides is then off by the inverse of it. A push of PARADOX times that would stop the sliding: there is no
-# force, only an impulse.
+# contact that slides is then off by the inverse of it. A push of `_PAINLEVE_PUSH` times that would stop the sliding:
+# there is no force, only an impulse.
 _SLIDING_ACCELERATION = 1.0e3
 _PAINLEVE_PUSH = 0.03
 

@@ -34,8 +34,8 @@ def find_contact_mode(y, friction, offset_frame, work, motion):
     """Find the regime at y and the contacts that act: (regime, number of candidates, acceleration, moment).
 
     `MODE_UNDECIDED`: none of the candidates slides, and the contact problem with this acceleration and moment, which is
-    posed in `work`, decides (`read_resting`). `MODE_UNDECIDED_SLIDING`: some do, no mixture was found, and that problem
-    decides for them, too.
+    posed in `work`, decides (`read_resting_mode`). `MODE_UNDECIDED_SLIDING`: some do, no mixture was found, and that
+    problem decides for them, too.
     """
     zero = (0.0, 0.0, 0.0)
     motion.count = 0

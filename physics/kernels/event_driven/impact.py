@@ -68,7 +68,7 @@ def takes_part_in_impact(s, motion):
 
 @inlined
 def next_sequential_impact(work, motion, report):
-    """The feature that collides alone, that which approaches fastest; ALL where they do at once.
+    """The feature that collides alone, that which approaches fastest; _ALL_AT_ONCE where they do at once.
 
     Which is so, too, after `_MAX_SEQUENTIAL_IMPACTS` at one moment, which the report counts as a problem not solved to
     its tolerance.

@@ -95,8 +95,8 @@ def set_event_thresholds(y, h, offset_frame, work, motion):
     """Set the gap and speed that count as zero, and the time a regime is looked ahead; problems are solved to rounding.
 
     Gaps are differences of places, wherever the body may go within h.
-    A contact is still when the speed would not lift it by HOP gaps that count as none: a bounce as low as that would
-    gain from being set down on the wall what it loses in the impact.
+    A contact is still when the speed would not lift it by `_UNSEEN_HOP_GAPS` gaps that count as none: a bounce as low
+    as that would gain from being set down on the wall what it loses in the impact.
     """
     work.still = work.unseen = 0.0
     x, speed = y[0], body_speed_bound(y, offset_frame, work)

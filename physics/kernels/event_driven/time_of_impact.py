@@ -156,7 +156,7 @@ def has_torque(work):
 
 @kernel
 def integrate_free_flight(y, t, offset_frame, work, motion):
-    """Free motion under a torque or in fields over t by extrapolated steps: (state, what MOST_TRIES left of t)."""
+    """Free motion under a torque or in fields over t by extrapolated steps: (state, time left)."""
     put_state_row(motion, ROW_START, y)
     left, tries = t, 0
     motion.step = left
@@ -206,7 +206,8 @@ def fly_freely(y, t, gyroscopic, offset_frame, work, motion, report):
 def fly_to_wall(y, left, gyroscopic, offset_frame, work, motion, report):
     """Fly for `left` or until a feature reaches a wall: (state, time, whether the flight was found).
 
-    It may end earlier, where a feature flies so close along a wall that ADVANCES steps did not tell: no wall is missed.
+    It may end earlier, where a feature flies so close along a wall that `_MAX_ADVANCES` steps did not tell: no wall is
+    missed.
     """
     motion.count = 0
     if has_fields(work):

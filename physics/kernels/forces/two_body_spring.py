@@ -1,6 +1,6 @@
 """Spring and damper between two bodies: to each of them a spring to an anchor that moves with the other.
 
-The point of the other body and its velocity are numbers among the spring's columns, written (`put_anchors`) before
+The point of the other body and its velocity are numbers among the spring's columns, written (`place_anchors`) before
 the loads of either body are evaluated. Both ends see the same two points and velocities, so that their forces are
 equal and opposite to the last bit; and since the loads of a stage are those of its middle, where they act along the
 line of the two points, momentum and angular momentum of the two together are kept to rounding.

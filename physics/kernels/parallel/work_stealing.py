@@ -21,12 +21,12 @@ RANGE_CHUNK = 0
 RANGE_NEXT, RANGE_END = range(2)
 
 # Of one thread: how many worlds it has taken, the end of those it took last, the range that it takes from, its own one,
-# and from FIRST on which worlds.
+# and from TAKEN_FIRST_WORLD on which worlds.
 TAKEN_COUNT, TAKEN_CHUNK_END, TAKEN_RANGE, TAKEN_OWN_RANGE, TAKEN_FIRST_WORLD = range(5)
 
 
 def make_ranges(threads: int, worlds: int, chunk: int) -> np.ndarray:
-    """(1 + threads, APART) int64: the worlds in as many ranges as there are threads."""
+    """(1 + threads, PADDING_WORDS) int64: the worlds in as many ranges as there are threads."""
     turns = np.zeros((1 + threads, PADDING_WORDS), dtype=np.int64)
     turns[0, RANGE_CHUNK] = chunk
     turns[1:, RANGE_END] = worlds * np.arange(1, threads + 1) // threads
@@ -34,7 +34,7 @@ def make_ranges(threads: int, worlds: int, chunk: int) -> np.ndarray:
 
 
 def make_taken_lists(threads: int, worlds: int) -> np.ndarray:
-    """(threads, FIRST + worlds + APART) int64, a row for each thread: nothing taken yet."""
+    """(threads, TAKEN_FIRST_WORLD + worlds + PADDING_WORDS) int64, a row for each thread: nothing taken yet."""
     lists = np.zeros((threads, TAKEN_FIRST_WORLD + worlds + PADDING_WORDS), dtype=np.int64)
     lists[:, TAKEN_OWN_RANGE] = 1 + np.arange(threads)
     return lists
@@ -52,7 +52,7 @@ def begin_taking(turns, taken):
 
 @kernel
 def take_chunk(turns, taken):
-    """First of the next worlds of the thread, of which `taken[END]` is the end, or -1."""
+    """First of the next worlds of the thread, of which `taken[TAKEN_CHUNK_END]` is the end, or -1."""
     chunk = turns[0, RANGE_CHUNK]
     for _ in range(1, turns.shape[0]):
         place = taken[TAKEN_RANGE]
@@ -71,9 +71,9 @@ def next_world(world, turns, taken):
     Parameters
     ----------
     world : int
-    turns : (1 + threads, APART) int64, in and out
+    turns : (1 + threads, PADDING_WORDS) int64, in and out
         Of all threads: `make_ranges`.
-    taken : (FIRST + worlds,) int64, in and out
+    taken : (TAKEN_FIRST_WORLD + worlds,) int64, in and out
         Of this thread.
     """
     world += 1

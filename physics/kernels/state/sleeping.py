@@ -7,7 +7,7 @@ after two quiet windows, in the later of which its way was not `_SLEEP_GROWTH` t
 from an unstable balance goes e^{λT} times as far from window to window, however little it has moved so far.
 
 What sleeps is left out of a step with not so much as a look at it. It wakes when the wrench that acts on it becomes
-another; in worlds whose bodies touch each other, also with what it lies on or near (`many.sleep`).
+another; in worlds whose bodies touch each other, also with what it lies on or near (`multibody.data.sleeping`).
 """
 
 from __future__ import annotations

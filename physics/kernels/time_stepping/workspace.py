@@ -99,7 +99,7 @@ def workspace_dtype(
         ("active", i, (n,)),  # of a direct solve: contacts that push, flags (`sticking`) or a list (`sliding_patch`)
         ("normal", f, (n,)),  # of a direct solve: normal impulse, negative where the contact is open [N s]
         ("across", f, (n, 2)),  # of `sticking`: tangential impulse [N s]
-        ("twist", f, (6,)),  # of `proximal`: change of (v, ω) [m/s, rad/s]
+        ("twist", f, (6,)),  # of `proximal_newton`: change of (v, ω) [m/s, rad/s]
         ("start", f, (6,)),
         ("defect", f, (6,)),
         ("newton", f, (6, 7)),

@@ -14,7 +14,7 @@ up to 2 |e|. Lift F = s ω x u has the power s (ω x u)·e <= s |ω| |u| |e|.
 
 *Share.* A spring or a fluid with h Ω <= 1 is stepped by leapfrog, which keeps ½ k x² + ½ m v² (1 - (h Ω)²/4): E_n <=
 E_0/(1 - 1/4), a share of 1/3 of the energy of the motion and its potential. Contact is solved to the tolerance of the
-preset and may gain `GAIN_SHARE` of the kinetic energy in a stage.
+preset and may gain `ENERGY_GAIN_TOLERANCE` of the kinetic energy in a stage.
 """
 
 from __future__ import annotations

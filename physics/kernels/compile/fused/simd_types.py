@@ -266,7 +266,7 @@ def _extreme(order, context, builder, sig, args):
 
 
 def _first(context, builder, sig, args):
-    """`first_of`: of four bits that are a number, how many are zero before the first one."""
+    """`first_true_lane`: of four bits that are a number, how many are zero before the first one."""
     bits = builder.bitcast(args[0], ir.IntType(simd.LANE_COUNT))
     place = builder.cttz(builder.zext(bits, WORD), ir.IntType(1)(0))
     return builder.select(builder.icmp_unsigned("==", bits, bits.type(0)), word_constant(-1), place)

@@ -2,7 +2,7 @@
 
 Sweep and prune: the boxes around the bodies, the motion of the stage included, are sorted along the world axis on
 which the bodies are spread most; a body is then compared with those behind it until one begins beyond its end. Many
-bodies are compared within columns along that axis only (`columns`). The pairs come in the order of the sweep, however
+bodies are compared within columns along that axis only (`grid`). The pairs come in the order of the sweep, however
 the columns are cut.
 
 Reference: D. Baraff, *Dynamic simulation of non-penetrating rigid bodies*, PhD thesis, Cornell, 1992, section 2.3.

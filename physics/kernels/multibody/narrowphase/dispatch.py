@@ -151,7 +151,7 @@ def collide_ellipsoid(a, b, margin, h, many):
 def find_contacts(h, ellipsoids, hulls, world, sleep, many):
     """Write the contact set of the bodies where they are, for a stage of length h.
 
-    `ellipsoids` and `hull_tables` are None where the scene has none, `sleep` where it does not declare it. What sleeps
+    `ellipsoids` and `hulls` are None where the scene has none, `sleep` where it does not declare it. What sleeps
     and comes near nothing is left out.
     """
     many.counts[NUM_CONTACTS] = many.counts[NUM_PAIRS] = 0

@@ -17,8 +17,8 @@ from physics.kernels.multibody.data.contact_set import add_scaled, put_vector, r
 from physics.kernels.multibody.solver.block_lu import ANGULAR_OFFSET
 from physics.kernels.multibody.solver.contact_operator import apply_body_inv_inertia
 
-# Columns of `many.visit`: frame, arms of both bodies, block and its inverse (00, 01, 02, 11, 12, 22), target, μ,
-# λ_max of its tangential part, impulse.
+# Columns of `many.sweeps.visit_rows`: frame, arms of both bodies, block and its inverse (00, 01, 02, 11, 12, 22),
+# target, μ, λ_max of its tangential part, impulse.
 VISIT_ARM_A, VISIT_ARM_B, VISIT_BLOCK, VISIT_INVERSE, VISIT_TARGET, VISIT_MU, VISIT_LAMBDA_MAX, VISIT_IMPULSE = (
     9,
     12,

@@ -25,7 +25,7 @@ def project_impulse(y, mu):
 
 @inlined
 def subtract_twists(b, a, c, many):
-    """Column b of `many.defect`: row b of twists a less that of twists c."""
+    """Column b of `many.newton.defect`: row b of twists a less that of twists c."""
     D = many.newton.defect
     D[b, 0], D[b, 1], D[b, 2] = a[b, 0] - c[b, 0], a[b, 1] - c[b, 1], a[b, 2] - c[b, 2]
     D[b, ANGULAR_OFFSET], D[b, ANGULAR_OFFSET + 1], D[b, ANGULAR_OFFSET + 2] = (

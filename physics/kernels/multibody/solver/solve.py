@@ -105,7 +105,7 @@ NEWTON_RHO = (10.0, 1.0, 1.0)
 
 @inlined
 def save_free_twists(many):
-    """`many.free`: the twists as they are, without any impulse."""
+    """Save the twists as they are, without any impulse (`many.bodies.free_twist`)."""
     for b in range(many.bodies.twist.shape[0]):
         for c in range(TWIST_DOFS):
             many.bodies.free_twist[b, c] = many.bodies.twist[b, c]

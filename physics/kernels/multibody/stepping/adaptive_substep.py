@@ -165,7 +165,7 @@ def step_with_error_control(world, start, h, switches, kept, records, many):
     Where the shortest part does not meet it either, that is counted as a fallback, and the shortest part of this
     substep is longer from there on.
 
-    `switches` are `MultibodySwitches`; `kept` is what `arrays.make_snapshots` makes.
+    `switches` are `MultibodySwitches`; `kept` is what `allocation.make_snapshots` makes.
     """
     place, shortest, unit, patience = 0, 1, h / _UNITS_PER_SUBSTEP, _MAX_TRIALS
     next_part = records.memory.shape[1] - 1

@@ -1,0 +1,259 @@
+"""Room for the workspace of a world whose bodies touch each other: capacities, and one function for each group.
+
+Capacities grow with the numbers of bodies, walls and contacts; what finds no room is counted in the report.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from physics.kernels.forces.force_field_dispatch import Term
+from physics.kernels.multibody.data.arrays import (
+    BATCH_SIZE,
+    BATCHES_PER_BODY,
+    BLOCK_SIZE,
+    BLOCKS_PER_BODY,
+    COLUMN_SIZE,
+    ENTRIES_PER_BODY,
+    LANES_SIZE,
+    NORMAL_ROW_SIZE,
+    PAIR_CONTACTS,
+    PAIRS_PER_BODY,
+    VISIT_SIZE,
+    WARM_CONTACT_SIZE,
+    WARM_HEADER_SIZE,
+    Bodies,
+    BodiesWorkspace,
+    BroadPhase,
+    Contacts,
+    Islands,
+    LinearSystem,
+    NarrowPhase,
+    Newton,
+    Sweeps,
+    WorldSnapshots,
+)
+from physics.kernels.multibody.data.hull_tables import clipped_face_capacity, make_hulls
+from physics.kernels.state.layout import REPORT_SIZE, STATE_SIZE, VERTEX_COUNT
+from physics.kernels.time_stepping.workspace import body_fields, setting_fields
+
+
+def bodies_setting_fields() -> list[tuple]:
+    """Fields of the numerical settings, and what a stage tells the solver."""
+    f, i = np.float64, np.int64
+    return [
+        *setting_fields(),
+        ("residual_limit", f),  # residual allowed beside the tolerance [m/s]: see `midpoint_step.rest_residual`
+        ("half_load_speed", f),  # with error control: least speed that half a substep's loads give a body [m/s], else 0
+        ("load_speed", f),  # largest speed that the loads of a resting stage give a body [m/s], else 0
+        ("is_resting_stage", i),  # 1: contacts are held through a stage, 0: impacts
+        ("meet", i),  # 1: bodies touch each other, 0: walls only
+        ("is_sequential", i),  # 1: contacts that collide do so one after the other
+        ("is_error_controlled", i),  # 1: steps have an error tolerance
+    ]
+
+
+def contact_capacity(bodies: int, walls: int, polyhedra: Sequence = ()) -> int:
+    """Contacts that a world of so many bodies and walls has room for; `polyhedra` are those of `make_hulls`."""
+    corners = max([VERTEX_COUNT, *(len(body.vertices) for body in polyhedra if body is not None)])
+    return bodies * walls * corners + pair_capacity(bodies) * max(PAIR_CONTACTS, clipped_face_capacity(polyhedra))
+
+
+def pair_capacity(bodies: int) -> int:
+    """Pairs near each other that a world of so many bodies has room for."""
+    return max(1, min(bodies * (bodies - 1) // 2, PAIRS_PER_BODY * bodies))
+
+
+def block_capacity(bodies: int) -> int:
+    """Off-diagonal blocks of the linear system that a world of so many bodies has room for."""
+    return min(max(1, bodies * (bodies - 1) // 2), BLOCKS_PER_BODY * bodies)
+
+
+def batch_capacity(bodies: int, contacts: int) -> int:
+    """Batches of contacts that a world with room for so many bodies and contacts has room for."""
+    return max(1, min(contacts, BATCHES_PER_BODY * bodies))
+
+
+def warm_start_size(bodies: int, walls: int, polyhedra: Sequence = (), refined: bool = False) -> int:
+    """Columns of `memory` of one world; of one whose substeps are refined the last one is for the length of a part."""
+    return WARM_HEADER_SIZE + WARM_CONTACT_SIZE * contact_capacity(bodies, walls, polyhedra) + int(refined)
+
+
+def make_bodies_workspace(
+    bodies: int,
+    walls: np.ndarray,
+    terms: tuple[Term, ...] = (),
+    polyhedra: Sequence = (),
+    *,
+    meet=True,
+    is_sequential=False,
+    is_error_controlled=False,
+    relative_slop: float,
+    **settings: float,
+) -> BodiesWorkspace:
+    """Scratch for worlds of `bodies` bodies among `walls` ((walls, WALL_SIZE)), in fields, with numerical settings.
+
+    `polyhedra` are those of `make_hulls`, empty where there is no hull. `meet` says whether bodies touch each other, or
+    walls only; `is_sequential` whether contacts that collide do so one after the other; `is_error_controlled` whether
+    steps have an error tolerance.
+    """
+    contacts = contact_capacity(bodies, len(walls), polyhedra)
+    switches = {"meet": meet, "is_sequential": is_sequential, "is_error_controlled": is_error_controlled}
+    return BodiesWorkspace(
+        bodies=_make_bodies(bodies, terms, relative_slop),
+        broadphase=_make_broad_phase(bodies),
+        narrowphase=_make_narrow_phase(polyhedra),
+        contacts=_make_contacts(contacts),
+        sweeps=_make_sweeps(bodies, contacts),
+        islands=_make_islands(bodies, contacts),
+        system=_make_linear_system(bodies, block_capacity(bodies)),
+        newton=_make_newton(bodies, batch_capacity(bodies, contacts)),
+        walls=walls.copy(),
+        counts=np.zeros(4, np.int64),
+        settings=_make_settings({**settings, **switches}),
+    )
+
+
+def _make_bodies(bodies: int, terms: tuple[Term, ...], relative_slop: float) -> Bodies:
+    records = np.zeros(bodies, np.dtype(body_fields(terms)))
+    records["relative_slop"] = relative_slop
+    return Bodies(
+        work=records,
+        state=np.zeros((bodies, STATE_SIZE)),
+        rotation=np.zeros((bodies, 9)),
+        inv_mass=np.zeros(bodies),
+        inv_inertia=np.zeros((bodies, 6)),
+        twist=np.zeros((bodies, 6)),
+        free_twist=np.zeros((bodies, 6)),
+        momenta=np.zeros((bodies, 12)),
+        center=np.zeros((bodies, 3)),
+        box=np.zeros((bodies, 6)),
+        touched=np.zeros(bodies, np.int64),
+        spin_bound=np.zeros(bodies),
+        lift_work=np.zeros(bodies),
+    )
+
+
+def _make_broad_phase(bodies: int) -> BroadPhase:
+    i = np.int64
+    return BroadPhase(
+        pairs=np.zeros((pair_capacity(bodies), 2), i),
+        order=np.arange(bodies, dtype=i),
+        merged=np.zeros(bodies, i),
+        first_entry=np.zeros(bodies + 1, i),
+        cursor=np.zeros(bodies, i),
+        entry=np.zeros(ENTRIES_PER_BODY * bodies, i),
+    )
+
+
+def _make_narrow_phase(polyhedra: Sequence) -> NarrowPhase:
+    return NarrowPhase(
+        simplex=np.zeros((4, 3)),
+        relative_axes=np.zeros((4, 3, 3)),
+        polygon=np.zeros((2, 16, 3)),
+        edge=np.zeros((2, 16, 2), np.int64),
+        hulls=make_hulls(polyhedra) if polyhedra else None,
+    )
+
+
+def _make_contacts(contacts: int) -> Contacts:
+    i = np.int64
+    return Contacts(
+        bodies=np.zeros((contacts, 2), i),
+        id=np.zeros(contacts, i),
+        owner=np.zeros(contacts, i),
+        normal=np.zeros((contacts, 3)),
+        anchor=np.zeros((contacts, 6)),
+        frame=np.zeros((contacts, 9)),
+        arm=np.zeros((contacts, 6)),
+        gap=np.zeros(contacts),
+        speed=np.zeros(contacts),
+        mu=np.zeros(contacts),
+        restitution=np.zeros(contacts),
+        target=np.zeros((contacts, 3)),
+        impulse=np.zeros((contacts, 3)),
+        block=np.zeros((contacts, 9)),
+        step=np.zeros(contacts),
+        best_impulse=np.zeros((contacts, 3)),
+        rebound_impulse=np.zeros((contacts, 3)),
+        id_table=np.full(1 << (2 * contacts - 1).bit_length(), -1, i),
+    )
+
+
+def _make_sweeps(bodies: int, contacts: int) -> Sweeps:
+    i = np.int64
+    return Sweeps(
+        motion=np.zeros((bodies, COLUMN_SIZE)),
+        normal_rows=np.zeros((contacts, NORMAL_ROW_SIZE)),
+        visit_rows=np.zeros((contacts, VISIT_SIZE)),
+        visit_bodies=np.zeros((contacts, 2), i),
+        impulse_4_sweeps_ago=np.zeros((contacts, 3)),
+        impulse_2_sweeps_ago=np.zeros((contacts, 3)),
+        visited=np.zeros(contacts, i),
+        pushed=np.zeros(bodies, i),
+    )
+
+
+def _make_islands(bodies: int, contacts: int) -> Islands:
+    i = np.int64
+    return Islands(
+        parent=np.zeros(bodies, i),
+        of_body=np.zeros(bodies, i),
+        contacts=np.zeros(contacts, i),
+        first_contact=np.zeros(contacts + 1, i),
+        bodies=np.zeros(bodies, i),
+        first_body=np.zeros(contacts + 1, i),
+        group_motion=np.zeros((bodies, 3)),
+    )
+
+
+def _make_linear_system(bodies: int, blocks: int) -> LinearSystem:
+    i = np.int64
+    return LinearSystem(
+        diagonal=np.zeros((bodies, BLOCK_SIZE)),
+        lower=np.zeros((blocks, BLOCK_SIZE)),
+        upper=np.zeros((blocks, BLOCK_SIZE)),
+        swaps=np.zeros(6, i),
+        rank=np.zeros(bodies, i),
+        start=np.zeros(bodies, i),
+        stop=np.zeros(bodies, i),
+        column=np.zeros(blocks, i),
+        neighbour=np.zeros((2 * blocks, 2), i),
+        links=np.zeros(1, i),
+        head=np.zeros(bodies, i),
+        degree=np.zeros(bodies, i),
+        mark=np.zeros(bodies, i),
+        bucket=np.zeros(bodies, i),
+        ahead=np.zeros(bodies, i),
+        behind=np.zeros(bodies, i),
+    )
+
+
+def _make_newton(bodies: int, batches: int) -> Newton:
+    return Newton(
+        defect=np.zeros((bodies, COLUMN_SIZE)),
+        before=np.zeros((bodies, 6)),
+        change=np.zeros((bodies, COLUMN_SIZE)),
+        batch=np.zeros((batches, BATCH_SIZE), np.int64),
+        lanes=np.zeros((batches, LANES_SIZE)),
+    )
+
+
+def _make_settings(settings: dict[str, float]) -> np.ndarray:
+    record = np.zeros(1, np.dtype(bodies_setting_fields()))
+    record["residual_limit"] = np.inf
+    for name, value in settings.items():
+        record[name] = value
+    return record
+
+
+def make_snapshots(bodies: int, memory: int) -> WorldSnapshots:
+    """Room for a world of so many bodies and columns of `memory` at three moments."""
+    return WorldSnapshots(
+        np.zeros((3, bodies, STATE_SIZE)),
+        np.zeros((3, memory)),
+        np.zeros((3, REPORT_SIZE)),
+        np.zeros((3, bodies), np.int64),
+    )
