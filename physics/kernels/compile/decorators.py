@@ -122,6 +122,16 @@ def kernel(function):
     return _compile(function, forceinline=False)
 
 
+def cold_kernel(function):
+    """`kernel` for what a step hardly ever needs: a call is left of it.
+
+    LLVM copies a function that is called from one place into its caller, however long it is. What always runs there
+    then has fewer registers for its numbers, and moves them to the stack and back.
+    """
+    function.is_cold = True
+    return kernel(function)
+
+
 def shared_kernel(function):
     """`kernel` with machine code of its own, which all plans call: see `physics.kernels.compile.fused.dispatcher`."""
     return _compile(function, SHARED_KIND, forceinline=False)

@@ -10,10 +10,15 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+
 from physics.kernels.compile.decorators import inlined
 from physics.kernels.compile.simd import Lanes
 from physics.kernels.math import quaternion as qt
-from physics.kernels.state.layout import BLOCK, SPHERE
+from physics.kernels.state.layout import BLOCK, SPHERE, VERTEX_COUNT
+
+# Bit j of the number of a vertex is set where the vertex is on the + side of body axis j.
+VERTEX_SIGNS = np.array([[1.0 if vertex >> j & 1 else -1.0 for j in range(3)] for vertex in range(VERTEX_COUNT)])
 
 
 @inlined
@@ -37,7 +42,7 @@ def support(shape, dims, e):
 
 @inlined
 def vertex_height(e, k):
-    """n·r of vertex k of a block relative to its centre [m]; bit j of k set: the + side of body axis j."""
+    """n·r of vertex k of a block relative to its centre [m] (`VERTEX_SIGNS`)."""
     h = e[0] if k & 1 else -e[0]
     h += e[1] if k & 2 else -e[1]
     h += e[2] if k & 4 else -e[2]
@@ -57,9 +62,9 @@ def vertex_arm(dims, R, k):
     return qt.matvec(
         R,
         (
-            dims[0] if k & 1 else -dims[0],
-            dims[1] if k & 2 else -dims[1],
-            dims[2] if k & 4 else -dims[2],
+            VERTEX_SIGNS[k, 0] * dims[0],
+            VERTEX_SIGNS[k, 1] * dims[1],
+            VERTEX_SIGNS[k, 2] * dims[2],
         ),
     )
 

@@ -34,8 +34,7 @@ def has_energy_gain(n, before, w, v, L, solved, R, h, work):
     the stage (`before`, w), v' and ω' after it. `v`, `L` are those with loads and without impulses.
     """
     v_new, L_new, _, _, _ = solved
-    zero = (0.0, 0.0, 0.0)
-    if v_new == zero and before == zero and L_new == zero and w == zero:  # at rest, as most are
+    if (qt.dot(v_new, v_new) + qt.dot(before, before)) + (qt.dot(L_new, L_new) + qt.dot(w, w)) == 0.0:  # at rest
         return False
     w_new, a = apply_inv_inertia(R, L_new, work.J), work.free_acceleration
     push = work.mass * (

@@ -28,7 +28,7 @@ References
 
 from __future__ import annotations
 
-from physics.kernels.compile.decorators import inlined, kernel
+from physics.kernels.compile.decorators import cold_kernel, inlined, kernel
 from physics.kernels.contact_law.compliance import contact_stiffness, correct_spring_depth
 from physics.kernels.contact_law.restitution_energy import lift_conserving_energy
 from physics.kernels.flight.free_flight import integrate_flight
@@ -138,7 +138,7 @@ def has_same_pose(y, z):
     return y[0] == z[0] and y[1] == z[1]
 
 
-@kernel
+@cold_kernel
 def keep_out_of_walls(y, offset_frame, work):
     """y, pushed out of the walls where it is deeper in than the slop: what turns by radians in a step may be so."""
     return lift_conserving_energy(
@@ -146,7 +146,7 @@ def keep_out_of_walls(y, offset_frame, work):
     )
 
 
-@kernel
+@cold_kernel
 def shorten_to_impact(n, y, end, h, contact, flight, records, work):
     """A stage over h that ends at `end`, where a feature has passed through a wall, up to that: (state, time advanced).
 

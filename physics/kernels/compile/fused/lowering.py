@@ -92,6 +92,8 @@ class _ValueLower(_KernelLower):
         """Declare the function."""
         fndesc.__class__ = ValueDescriptor
         super().setup_function(fndesc)
+        if getattr(self.func_ir.func_id.func, "is_cold", False):  # `decorators.cold_kernel`
+            self.function.attributes.add("noinline")
 
 
 class _UserLower(Lower):
