@@ -47,6 +47,8 @@ def has_energy_gain(n, before, w, v, L, solved, R, h, work):
         + (L_new[1] - L[1]) * (w[1] + w_new[1])
         + (L_new[2] - L[2]) * (w[2] + w_new[2])
     )
+    if not push + turn > 0.0:
+        return False
     square = h * h * (a[0] * a[0] + a[1] * a[1] + a[2] * a[2])
     size = work.mass * (motion_square(n, before, work) + square) + abs(qt.dot(L_new, w_new))
     return push + turn > max(work.tolerance, ENERGY_GAIN_TOLERANCE) * size
