@@ -1,4 +1,4 @@
-"""Forces of a regime whose contacts say the same of the body's motion twice."""
+"""Forces of a contact mode whose contacts say the same of the body's motion twice."""
 
 from __future__ import annotations
 

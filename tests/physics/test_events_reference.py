@@ -76,7 +76,7 @@ def test_a_bounce_ends_no_deeper_than_it_began():
 
 
 def test_events_that_come_round_again_and_again_are_left_by_an_impulse():
-    """Regimes that follow each other for ever, a tenth of a look-ahead in all: the body is at rest in the end."""
+    """Contact modes that follow each other for ever, a tenth of a look-ahead in all: the body is at rest in the end."""
     world, _, solves = play("a face that nearly holds")
     assert solves <= 500
     assert not world.linvel.any()

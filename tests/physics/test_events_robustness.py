@@ -16,7 +16,7 @@ RADIUS = float(np.linalg.norm(scenes.SIZE)) / 2
 # A step of 20 ms has some ten events, a whole sequence of bounces a hundred; 500 are a scheme that gets nowhere. The
 # preset's own limit would take a second to be reached.
 PRECISE = dataclasses.replace(accuracy.PRESETS["precise"], impacts=500)
-# A gap counts as none within a slop; contacts that leave each other's regime add theirs.
+# A gap counts as none within a slop; contacts that leave each other's contact mode add theirs.
 DEEPEST = 10 * PRECISE.slop * RADIUS
 
 

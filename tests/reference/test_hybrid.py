@@ -100,7 +100,7 @@ def test_impacts_obey_the_contact_laws(rng, mu, edge):
     for _ in range(3):
         y[7:13] = rng.normal(size=6)
         restitution = np.full(len(edge), 0.3)
-        A, _, u, _, _ = hybrid.regime.assemble(problem, y, edge)
+        A, _, u, _, _ = hybrid.contact_mode.assemble(problem, y, edge)
         u[:, 0] += restitution * np.minimum(u[:, 0], 0.0)
         _, p = motion.collide(problem, y, edge, restitution)
         # The laws once more as a projection on the cone: zero up to the tolerance of the directions, 1e-11.

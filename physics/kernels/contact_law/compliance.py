@@ -119,15 +119,15 @@ def set_spring_targets(n, x, motion, before, after, offset_frame, work):
         push = k * (theta * gap + (1.0 - theta) * min(work.gap[i], 0.0))
         push += c * (theta * after * gain + (1.0 - theta) * speed)
         work.target[i, 0] = -push / D
-        work.due[i] = gap
+        work.end_gap[i] = gap
 
 
 @if_law((LAW_STIFFNESS,), _no_aim)
 def predict_end_gaps(n, v, w, after, work):
-    """Gaps at the end of the stage into `work.due`, from the velocities after the impulses."""
+    """Gaps at the end of the stage into `work.end_gap`, from the velocities after the impulses."""
     for i in range(n):
         normal = wall_normal(work.walls, wall_of(work.slot[i], work))
-        work.due[i] += after * (qt.dot(normal, v) + qt.dot(normal, qt.cross(w, contact_arm(work, i))))
+        work.end_gap[i] += after * (qt.dot(normal, v) + qt.dot(normal, qt.cross(w, contact_arm(work, i))))
 
 
 def _as_it_ends(n, y, end, h, offset_frame, report, work):
@@ -139,7 +139,7 @@ def _lifted(n, x, R, share, offset_frame, work):
     """x moved out of the walls until no point is deeper than `share` of what its spring is due to be."""
     least = NEGLIGIBLE_SLOP_SHARE * work.slop
     for i in range(n):
-        lift = share * min(work.due[i], 0.0) - feature_gap(work.slot[i], x, R, offset_frame, work)
+        lift = share * min(work.end_gap[i], 0.0) - feature_gap(work.slot[i], x, R, offset_frame, work)
         if lift > least:
             x = _along(x, lift, wall_normal(work.walls, wall_of(work.slot[i], work)))
     return x

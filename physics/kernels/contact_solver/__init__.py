@@ -26,8 +26,8 @@ work : record
     - `impulse`, the warm start: 3 n numbers with friction, n without; zeros where nothing is known;
     - `mode`, the direct solve to try first, which did it last (`sliding_patch.TRY_STICKING`, `TRY_SLIDING`,
       `TRY_MIXED`);
-    - `tolerance` of the relative residual, `still`, a tolerance of iterative solves [m/s], and `unseen`, the misfit of
-      targets that contacts that hold may have [m/s];
+    - `tolerance` of the relative residual; `residual_limit`, a tolerance of iterative solves [m/s];
+      `target_error_limit`, the misfit of targets that contacts that hold may have [m/s];
     - `sweeps`, how many sweeps are made at most.
 
 Left behind
@@ -58,7 +58,8 @@ the solver:
 - `single_wall` reports a bound of its tangential part, with W_aa + W_bb instead of λ_max(W_tt). Contacts that push have
   their normal target, and open ones do not close, to within the tolerance; of a face that is not in the residual.
 - `sticking` reports the largest distance of a velocity from its target, or the fastest approach of an open contact,
-  over the largest free speed along the axes of the world. It reports 0 where that is rounding, or at most `unseen`.
+  over the largest free speed along the axes of the world. It reports 0 where that is rounding, or at most
+  `target_error_limit`.
 
 Failure
 -------
@@ -94,7 +95,8 @@ In the order in which `solve_contacts` tries them; the first result within its t
       - `two_contacts.solve_two_contacts`, once two contacts are left.
 
 2. Iterative, on the assembled `work.delassus` and `work.bias`, from `work.impulse` on. The tolerance is the smaller of
-   `work.tolerance` max |b| and `work.still`, but not below rounding. They return (sweeps or steps, residual [m/s]), and
+   `work.tolerance` max |b| and `work.residual_limit`, but not below rounding. They return (sweeps or steps,
+   residual [m/s]), and
    leave u in `work.velocity`.
 
    a. Without friction `gauss_seidel.normal_sweeps`; where walls give, after a few pivots of Dantzig's method.

@@ -186,7 +186,7 @@ def _solve_iteratively(n, contact, v, L, R, work):
     """Result of `solve_contacts` by sweeps and later solvers: out of line, since few problems come to it."""
     width = 1 if contact.friction is None else 3
     scale = _assemble_problem(n, width, R, v, L, work)
-    goal = max(min(work.tolerance * scale, work.still), _ROUNDING * scale)
+    goal = max(min(work.tolerance * scale, work.residual_limit), _ROUNDING * scale)
     sweeps, residual = _sweep_and_newton(n, contact, goal, work)
     method = METHOD_SWEEPS
     if contact.pivots is not None and not residual <= max(goal, _PIVOTING_THRESHOLD * scale):

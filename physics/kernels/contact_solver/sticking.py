@@ -23,7 +23,7 @@ cone at the end, this solves the contact problem exactly; otherwise the contacts
 Targets of contacts that hold need not be those of a rigid motion: `target_velocity.set_resting_targets` moves points of
 a turning body apart, by nanometres a step when it is about to hold. Met exactly, all of them would slide, and friction
 would be spent on that. They are replaced by those of the twist that fits them best where that changes them by less
-than `work.unseen`.
+than `work.target_error_limit`.
 """
 
 from __future__ import annotations
@@ -343,7 +343,7 @@ def solve_all_sticking(n, R, v, L, work):
             if largest > 0.0 or count < n:
                 miss = _target_residual(n, v_new, w_new, work)
                 if not miss <= _RIGID_TWIST_TOLERANCE * largest:
-                    if miss > work.unseen:
+                    if miss > work.target_error_limit:
                         residual = miss / _largest_free_speed(n, free, work)
                     if not residual <= work.tolerance:
                         return False, v, L, 0.0

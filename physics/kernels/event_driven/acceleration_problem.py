@@ -55,7 +55,7 @@ def set_up_resting_problem(count, y, R, w, has_sliding, offset_frame, work, moti
 
     It is that of an impact with the free acceleration for velocity, the moment τ - ω x L for angular momentum and
     forces for impulses; what an arm's own motion adds to a contact's acceleration is asked of it as a target.
-    `has_sliding`: some of the candidates slide (`candidate_way`).
+    `has_sliding`: some of the candidates slide (`candidate_direction`).
     """
     walls = work.walls
     scale = acceleration_scale(w, work)
@@ -67,7 +67,7 @@ def set_up_resting_problem(count, y, R, w, has_sliding, offset_frame, work, moti
         )
         c = qt.cross(w, rate)
         if has_sliding:  # as if it had accelerated along its sliding for long: no force then turns it
-            c = plus(c, times(_SLIDING_ACCELERATION * scale, row_vector(motion.candidate_way, i, 0)))
+            c = plus(c, times(_SLIDING_ACCELERATION * scale, row_vector(motion.candidate_direction, i, 0)))
         set_up_contact(i, slot, r, (-qt.dot(axes[0], c), -qt.dot(axes[1], c), -qt.dot(axes[2], c)), work)
     work.mode = TRY_STICKING
     g, t = qt.cross(w, y[3]), work.torque
@@ -92,11 +92,11 @@ def is_redundant_contact(i, count, width, small, work):
 
 @inlined
 def store_solver_forces(count, width, work, motion):
-    """`last`: the solver's forces."""
+    """`last_force`: the solver's forces."""
     clear_last_forces(motion)
     for i in range(count):
         for c in range(width):
-            motion.last[work.slot[i], c] = work.impulse[width * i + c]
+            motion.last_force[work.slot[i], c] = work.impulse[width * i + c]
 
 
 @kernel
@@ -104,12 +104,12 @@ def is_body_at_rest(y, w, acceleration, work, motion):
     """True if the body neither moves nor begins to: what is left is rounding."""
     v = y[2]
     speed = math.sqrt(qt.dot(v, v)) + work.radius * math.sqrt(qt.dot(w, w))
-    return speed <= 2.0 * motion.still and acceleration <= 4.0 * _ZERO_SHARE * work.acceleration
+    return speed <= 2.0 * motion.rest_speed and acceleration <= 4.0 * _ZERO_SHARE * work.acceleration
 
 
 @kernel
 def read_resting_mode(count, y, a, moment, friction, has_sliding, offset_frame, work, motion):
-    """Read the regime from the solution of `set_up_resting_problem`'s problem, and set the contacts that act."""
+    """Read the contact mode from the solution of `set_up_resting_problem`'s problem, and set the contacts that act."""
     R, P, w, _ = free_angular_motion(y, offset_frame, work)
     alpha = apply_inverse_inertia(P, work.J, moment)
     width = 3
@@ -125,17 +125,17 @@ def read_resting_mode(count, y, a, moment, friction, has_sliding, offset_frame, 
         push = work.impulse[width * i]
         if has_sliding and push > _PAINLEVE_PUSH * _SLIDING_ACCELERATION * work.mass * scale:
             return MODE_INCONSISTENT
-        slides = has_sliding and has_sliding_direction(motion.candidate_way, i)
+        slides = has_sliding and has_sliding_direction(motion.candidate_direction, i)
         kind = CANDIDATE_SLIDING
         if not push > small * work.mass and (an > small or is_redundant_contact(i, count, width, small, work)):
             kind = CANDIDATE_OPEN
         elif friction is not None and not slides and size <= small:
             kind = CANDIDATE_STICKING
-        motion.kind[i] = kind
+        motion.candidate_state[i] = kind
         if slides:
             continue
         for c in range(3):
-            motion.candidate_way[i, c] = at[c] / size if size > small else 0.0
+            motion.candidate_direction[i, c] = at[c] / size if size > small else 0.0
     store_solver_forces(count, width, work, motion)
     activate_candidates(count, work, motion)
     if has_closing_contact(count, motion):

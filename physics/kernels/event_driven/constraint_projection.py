@@ -1,4 +1,4 @@
-"""Take off what rounding and the tolerance leave in the contacts of a regime: a projection in the kinetic metric."""
+"""Take off what rounding and the tolerance leave in the contacts of a mode: a projection in the kinetic metric."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ from physics.kernels.math import quaternion as qt
 from physics.kernels.math.vector import plus, row_vector
 from physics.kernels.state.layout import WALL_OFFSET
 
-# Gaps and velocities of contacts below these shares of `motion.touch` and `motion.noise` are left as they are.
+# Gaps and velocities of contacts below these shares of `motion.touch_gap`, `motion.rounding_speed` are left alone.
 _UNSEEN_GAP = 0.1
 _UNSEEN_SPEED = 0.01
 
 
 @inlined
 def _projection_step(holding, P, work, motion):
-    """Velocity and turn, both per kinetic metric, that take off `goal` along the rows of the regime."""
+    """Velocity and turn, both per kinetic metric, that take off `constraint_error` along the rows of the mode."""
     k = assemble_unknowns(0.0, holding, work, motion)
     F, T = solve_contact_forces(k, P, work, motion)
     s = 1.0 / work.mass
@@ -31,24 +31,24 @@ def _projection_step(holding, P, work, motion):
 
 @inlined
 def _set_velocity_errors(motion, work):
-    """`goal`: the velocities of the contacts that act; the largest that the regime does not allow [m/s]."""
+    """`constraint_error`: the velocities of the contacts that act; the largest that the mode does not allow [m/s]."""
     worst = 0.0
     for j in range(motion.count):
         n = wall_normal(work.walls, wall_of(motion.slot[j], work))
         u = row_vector(motion.velocity, j, 0)
         worst = max(worst, abs(qt.dot(n, u)))
-        if motion.holds[j]:
+        if motion.sticks[j]:
             worst = max(worst, max(abs(u[0]), max(abs(u[1]), abs(u[2]))))
         for c in range(3):
-            motion.goal[j, c] = u[c]
+            motion.constraint_error[j, c] = u[c]
     return worst
 
 
 @inlined
 def _project_velocities(holding, v, m, P, work, motion):
-    """Velocity and angular momentum without the velocities of contacts that the regime does not allow (placed)."""
+    """Velocity and angular momentum without the velocities of contacts that the mode does not allow (placed)."""
     worst = _set_velocity_errors(motion, work)
-    if not worst > _UNSEEN_SPEED * motion.noise:
+    if not worst > _UNSEEN_SPEED * motion.rounding_speed:
         return v, m
     change, turn = _projection_step(holding, P, work, motion)
     return plus(v, change), plus(m, turn)
@@ -66,7 +66,7 @@ def project_normal_speeds(y, offset_frame, work, motion):
 
 @kernel
 def project_state(y, offset_frame, work, motion):
-    """State without the gaps and velocities of contacts that the regime does not allow, where above rounding.
+    """State without the gaps and velocities of contacts that the contact mode does not allow, where above rounding.
 
     Least change in the kinetic metric: along M⁻¹ Jᵀ.
     """
@@ -82,8 +82,8 @@ def project_state(y, offset_frame, work, motion):
         gap = qt.dot(n, x) + qt.dot(n, row_vector(motion.arm, j, 0)) - work.walls[wall, WALL_OFFSET]
         worst = max(worst, abs(gap))
         for c in range(3):
-            motion.goal[j, c] = gap * n[c]
-    if worst > _UNSEEN_GAP * motion.touch:
+            motion.constraint_error[j, c] = gap * n[c]
+    if worst > _UNSEEN_GAP * motion.touch_gap:
         move, turn = _projection_step(False, P, work, motion)
         x = plus(x, move)
         q = qt.normalise(qt.multiply(qt.exp_map(apply_inverse_inertia(P, work.J, turn)), q))

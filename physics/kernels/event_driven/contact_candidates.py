@@ -28,7 +28,7 @@ from physics.kernels.math.vector import as_vector, plus
 # What a candidate does.
 CANDIDATE_OPEN, CANDIDATE_STICKING, CANDIDATE_SLIDING = range(3)
 
-# Approach of a contact that will leave that is none, in `motion.still`.
+# Approach of a contact that will leave that is none, in `motion.rest_speed`.
 _UNSEEN_APPROACH = 1.0e-2
 
 
@@ -39,11 +39,11 @@ def find_candidates(y, offset_frame, work, motion):
     compute_feature_gaps(ROW_START, offset_frame, work, motion)
     count = motion.candidates = 0
     for s in range(motion.is_active.shape[0]):
-        if motion.gap[ROW_START, s] <= motion.touch and count < motion.slot.shape[0]:
+        if motion.gap[ROW_START, s] <= motion.touch_gap and count < motion.slot.shape[0]:
             rate = motion.gap_rate[ROW_START, s]
-            if rate < -motion.still:
+            if rate < -motion.rest_speed:
                 return 0, True
-            if rate <= motion.still:
+            if rate <= motion.rest_speed:
                 motion.candidate[count] = s
                 count += 1
     motion.candidates = count
@@ -57,13 +57,13 @@ def activate_candidates(count, work, motion):
     for s in range(motion.is_active.shape[0]):
         motion.is_active[s] = 0
     for i in range(count):
-        if motion.kind[i] != CANDIDATE_OPEN and k < motion.slot.shape[0]:
+        if motion.candidate_state[i] != CANDIDATE_OPEN and k < motion.slot.shape[0]:
             motion.slot[k] = motion.candidate[i]
             motion.is_active[motion.candidate[i]] = 1
-            motion.holds[k] = 1 if motion.kind[i] == CANDIDATE_STICKING else 0
+            motion.sticks[k] = 1 if motion.candidate_state[i] == CANDIDATE_STICKING else 0
             for c in range(3):
-                motion.share[k, c] = motion.last[motion.candidate[i], c]
-                motion.way[k, c] = motion.reference[k, c] = motion.candidate_way[i, c]
+                motion.given_force[k, c] = motion.last_force[motion.candidate[i], c]
+                motion.slip_direction[k, c] = motion.start_slip_direction[k, c] = motion.candidate_direction[i, c]
             k += 1
     motion.count = k
 
@@ -72,7 +72,7 @@ def activate_candidates(count, work, motion):
 def has_open_candidate(motion):
     """True if a candidate does not act."""
     for i in range(motion.candidates):
-        if motion.kind[i] == CANDIDATE_OPEN:
+        if motion.candidate_state[i] == CANDIDATE_OPEN:
             return True
     return False
 
@@ -82,7 +82,9 @@ def has_normal_speed(motion):
     """True if an acting candidate moves along its normal, or another one approaches, by more than rounding."""
     for i in range(motion.candidates):
         rate = motion.gap_rate[ROW_START, motion.candidate[i]]
-        if rate < -motion.noise or (rate > motion.noise and motion.kind[i] != CANDIDATE_OPEN):
+        if rate < -motion.rounding_speed or (
+            rate > motion.rounding_speed and motion.candidate_state[i] != CANDIDATE_OPEN
+        ):
             return True
     return False
 
@@ -103,8 +105,8 @@ def project_candidate_speeds(y, offset_frame, work, motion):
     motion.count = 0
     for i in range(motion.candidates):
         s = motion.candidate[i]
-        if motion.gap[ROW_START, s] <= motion.touch and abs(motion.gap_rate[ROW_START, s]) <= motion.still:
-            motion.slot[motion.count], motion.holds[motion.count] = s, 0
+        if motion.gap[ROW_START, s] <= motion.touch_gap and abs(motion.gap_rate[ROW_START, s]) <= motion.rest_speed:
+            motion.slot[motion.count], motion.sticks[motion.count] = s, 0
             motion.count += 1
     y = project_normal_speeds(y, offset_frame, work, motion)
     activate_candidates(motion.candidates, work, motion)
@@ -126,7 +128,7 @@ def contact_acceleration(i, y, R, w, a, alpha, offset_frame, work, motion):
 
 @kernel
 def is_candidate_sliding(i, y, R, w, offset_frame, work, motion):
-    """True if candidate i slides; its direction into `candidate_way`."""
+    """True if candidate i slides; its direction into `candidate_direction`."""
     wall = wall_of(motion.candidate[i], work)
     n = wall_normal(work.walls, wall)
     r, _ = contact_arm_and_rate(
@@ -137,10 +139,10 @@ def is_candidate_sliding(i, y, R, w, offset_frame, work, motion):
     t = (u[0] - un * n[0], u[1] - un * n[1], u[2] - un * n[2])
     speed = math.sqrt(qt.dot(t, t))
     for c in range(3):
-        motion.candidate_way[i, c] = 0.0
-        if speed > motion.slow:
-            motion.candidate_way[i, c] = t[c] / speed
-    return speed > motion.slow
+        motion.candidate_direction[i, c] = 0.0
+        if speed > motion.slip_stop_speed:
+            motion.candidate_direction[i, c] = t[c] / speed
+    return speed > motion.slip_stop_speed
 
 
 @inlined
@@ -152,8 +154,8 @@ def acceleration_scale(w, work):
 @inlined
 def has_closing_contact(count, motion):
     """True if a contact that will leave is still, by a little, on its way in."""
-    least = -motion.noise - _UNSEEN_APPROACH * motion.still
+    least = -motion.rounding_speed - _UNSEEN_APPROACH * motion.rest_speed
     for i in range(count):
-        if motion.kind[i] == CANDIDATE_OPEN and motion.gap_rate[ROW_START, motion.candidate[i]] < least:
+        if motion.candidate_state[i] == CANDIDATE_OPEN and motion.gap_rate[ROW_START, motion.candidate[i]] < least:
             return True
     return False

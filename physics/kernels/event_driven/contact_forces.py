@@ -1,6 +1,6 @@
-"""Forces of the contacts that act: the acceleration-level problem a = A f + b of a regime, and its velocities.
+"""Forces of the contacts that act: the acceleration-level problem a = A f + b of a contact mode, and its velocities.
 
-A regime says of each contact whether it *holds* (its point has no acceleration) or *slides* (no normal
+A contact mode says of each contact whether it *holds* (its point has no acceleration) or *slides* (no normal
 acceleration; the force is f_n (n - μ d) along the direction d of its sliding). With the acceleration of a contact
 
     a_i = dv/dt + dω/dt x r_i + ω x dr_i/dt
@@ -12,15 +12,15 @@ f_i = y_0 + y_1 a_i + y_2 b_i, have the least norm of all with their resultant, 
 rows with the same coefficients stand for the equations. So it stays when one of them holds, which then adds its two
 tangential forces: what a face presses with does not jump where a corner of it stops.
 
-The forces that were last known (`share`) are a part of the answer, and the unknowns only what is still to be added to
+The forces that were last known (`given_force`) are a part of the answer, the unknowns only what is still to be added to
 them: a rigid body does not tell which of its corners presses on the floor, or on the wall beside it, and what the
 contact problem of a moment has found to hold (`resting`) does so from then on.
 
 The same rows, with velocities or gaps in place of accelerations and pushes along the rows, bring a state back to
-what the regime says (`cancel`): the least change in the kinetic metric.
+what the contact mode says (`cancel`): the least change in the kinetic metric.
 
 Witkin and Baraff, *Physically Based Modeling*, SIGGRAPH course notes, 1997, part II, section 8, for a = A f + b;
-what differs is friction in it, and that the regime is known.
+what differs is friction in it, and that the contact mode is known.
 """
 
 from __future__ import annotations
@@ -65,7 +65,7 @@ def free_angular_motion(y, offset_frame, work):
 
 @kernel
 def set_contact_kinematics(y, R, w, alpha, offset_frame, work, motion):
-    """Arms, velocities, directions of sliding and free accelerations (`goal`) of the contacts that act."""
+    """Arms, velocities, directions of sliding and free accelerations (`constraint_error`) of the contacts that act."""
     shape, walls = work.shape, work.walls
     dims, a, v = as_vector(work.dims), as_vector(work.free_acceleration), y[2]
     for j in range(motion.count):
@@ -76,36 +76,36 @@ def set_contact_kinematics(y, R, w, alpha, offset_frame, work, motion):
         un = qt.dot(n, u)
         t = (u[0] - un * n[0], u[1] - un * n[1], u[2] - un * n[2])
         speed = math.sqrt(qt.dot(t, t))
-        d = row_vector(motion.reference, j, 0)
-        if speed > motion.slow and qt.dot(t, d) > 0.0:
+        d = row_vector(motion.start_slip_direction, j, 0)
+        if speed > motion.slip_stop_speed and qt.dot(t, d) > 0.0:
             d = times(1.0 / speed, t)
         for c in range(3):
-            motion.arm[j, c], motion.velocity[j, c], motion.goal[j, c] = r[c], u[c], b[c]
-            motion.way[j, c] = d[c]
+            motion.arm[j, c], motion.velocity[j, c], motion.constraint_error[j, c] = r[c], u[c], b[c]
+            motion.slip_direction[j, c] = d[c]
 
 
 @inlined
 def _add_to_unknown(m, r, push, row, share, motion):
-    """Add `share` of a contact at r to unknown m."""
+    """Add `given_force` of a contact at r to unknown m."""
     h, e = qt.cross(r, push), qt.cross(r, row)
     for c in range(3):
-        motion.push[m, c] += share * push[c]
-        motion.turn[m, c] += share * h[c]
+        motion.column_force[m, c] += share * push[c]
+        motion.column_moment[m, c] += share * h[c]
         motion.row[m, c] += share * row[c]
-        motion.row_turn[m, c] += share * e[c]
+        motion.row_moment[m, c] += share * e[c]
 
 
 @inlined
 def sliding_force_direction(mu, axes, j, work, motion):
     """Force of contact j, which slides, for each newton along the normal."""
-    n, d = axes[0], sliding_direction(row_vector(motion.way, j, 0), axes, work)
+    n, d = axes[0], sliding_direction(row_vector(motion.slip_direction, j, 0), axes, work)
     return (n[0] - mu * d[0], n[1] - mu * d[1], n[2] - mu * d[2])
 
 
 @inlined
 def _contact_force_direction(mu, axes, j, work, motion):
     """Force of contact j for each newton along the normal."""
-    if motion.holds[j]:
+    if motion.sticks[j]:
         return axes[0]
     return sliding_force_direction(mu, axes, j, work, motion)
 
@@ -114,43 +114,43 @@ def _contact_force_direction(mu, axes, j, work, motion):
 def _contact_force(normal, first, second, mu, axes, j, work, motion):
     """Force of contact j that presses with `normal` and, where it holds, has these along the other two axes."""
     f = times(normal, _contact_force_direction(mu, axes, j, work, motion))
-    if motion.holds[j]:
+    if motion.sticks[j]:
         f = plus(f, plus(times(first, axes[1]), times(second, axes[2])))
     return f
 
 
 @kernel
 def _add_shares(mu, work, motion):
-    """`known`: force and moment of all shares. Without friction they make no difference, and are left out."""
+    """`given_wrench`: force and moment of all shares. Without friction they make no difference, and are left out."""
     force = moment = (0.0, 0.0, 0.0)
     if mu > 0.0:
         for j in range(motion.count):
             axes = wall_axes(work.walls, wall_of(motion.slot[j], work))
-            p = row_vector(motion.share, j, 0)
+            p = row_vector(motion.given_force, j, 0)
             f = _contact_force(p[0], p[1], p[2], mu, axes, j, work, motion)
             force, moment = plus(force, f), plus(moment, qt.cross(row_vector(motion.arm, j, 0), f))
     for c in range(3):
-        motion.known[0, c], motion.known[1, c] = force[c], moment[c]
+        motion.given_wrench[0, c], motion.given_wrench[1, c] = force[c], moment[c]
 
 
 @inlined
 def _clear_unknowns(m, count, motion):
     """Empty the unknowns m <= k < m + count."""
     for k in range(m, m + count):
-        motion.asked[k] = 0.0
+        motion.rhs[k] = 0.0
         for c in range(3):
-            motion.push[k, c] = motion.turn[k, c] = motion.row[k, c] = motion.row_turn[k, c] = 0.0
+            motion.column_force[k, c] = motion.column_moment[k, c] = motion.row[k, c] = motion.row_moment[k, c] = 0.0
 
 
 @kernel
 def _add_sticking_unknowns(m, j, first_axis, axes, motion):
     """Unknowns of contact j from the axis `first_axis` on: the force along each."""
-    r, b = row_vector(motion.arm, j, 0), row_vector(motion.goal, j, 0)
-    motion.first[j] = m
+    r, b = row_vector(motion.arm, j, 0), row_vector(motion.constraint_error, j, 0)
+    motion.first_unknown[j] = m
     _clear_unknowns(m, 3 - first_axis, motion)
     for c in range(first_axis, 3):
         _add_to_unknown(m, r, axes[c], axes[c], 1.0, motion)
-        motion.asked[m] = -qt.dot(axes[c], b)
+        motion.rhs[m] = -qt.dot(axes[c], b)
         m += 1
     return m
 
@@ -166,31 +166,31 @@ def _add_patch_unknowns(m, first, last, mu, axes, work, motion):
         ca += qt.dot(axes[1], r) / (last - first)
         cb += qt.dot(axes[2], r) / (last - first)
     for j in range(first, last):
-        r, b = row_vector(motion.arm, j, 0), -qt.dot(axes[0], row_vector(motion.goal, j, 0))
+        r, b = row_vector(motion.arm, j, 0), -qt.dot(axes[0], row_vector(motion.constraint_error, j, 0))
         push = _contact_force_direction(mu, axes, j, work, motion)
         s = (qt.dot(axes[1], r) - ca) / radius
         t = (qt.dot(axes[2], r) - cb) / radius
         motion.patch[j] = m
-        motion.place[j, 0], motion.place[j, 1] = s, t
+        motion.patch_coordinate[j, 0], motion.patch_coordinate[j, 1] = s, t
         _add_to_unknown(m, r, push, axes[0], 1.0, motion)
         _add_to_unknown(m + 1, r, push, axes[0], s, motion)
         _add_to_unknown(m + 2, r, push, axes[0], t, motion)
-        motion.asked[m] += b
-        motion.asked[m + 1] += s * b
-        motion.asked[m + 2] += t * b
+        motion.rhs[m] += b
+        motion.rhs[m + 1] += s * b
+        motion.rhs[m + 2] += t * b
     return m + 3
 
 
 @kernel
 def assemble_unknowns(mu, holding, work, motion):
-    """Fill push, turn, row, row_turn, `known` and the right-hand sides (`asked`) from `goal`; their number.
+    """Fill the columns, the rows, `given_wrench` and the right-hand sides from `constraint_error`; their number.
 
     `holding`: contacts that hold do so along the wall, too.
     """
     m = first = motion.is_skew = 0
     _add_shares(mu, work, motion)
     for j in range(motion.count):
-        if mu > 0.0 and not motion.holds[j]:
+        if mu > 0.0 and not motion.sticks[j]:
             motion.is_skew = 1
     while first < motion.count:
         wall = wall_of(motion.slot[first], work)
@@ -204,7 +204,7 @@ def assemble_unknowns(mu, holding, work, motion):
             m = _add_patch_unknowns(m, first, last, mu, axes, work, motion)
             own = 1
         for j in range(first, last):
-            if holding and motion.holds[j]:
+            if holding and motion.sticks[j]:
                 m = _add_sticking_unknowns(m, j, own, axes, motion)
             elif own == 0:
                 _clear_unknowns(m, 1, motion)
@@ -216,8 +216,8 @@ def assemble_unknowns(mu, holding, work, motion):
                     1.0,
                     motion,
                 )
-                motion.asked[m] = -qt.dot(axes[0], row_vector(motion.goal, j, 0))
-                motion.first[j] = m
+                motion.rhs[m] = -qt.dot(axes[0], row_vector(motion.constraint_error, j, 0))
+                motion.first_unknown[j] = m
                 m += 1
         first = last
     return m
@@ -228,18 +228,21 @@ def recover_contact_forces(mu, work, motion):
     """Force of each contact that acts (`force`, `normal`) from the unknowns, and the shares where they are in it."""
     for j in range(motion.count):
         axes = wall_axes(work.walls, wall_of(motion.slot[j], work))
-        k, p, f = motion.first[j], motion.patch[j], row_vector(motion.share, j, 0)
+        k, p, f = motion.first_unknown[j], motion.patch[j], row_vector(motion.given_force, j, 0)
         if not mu > 0.0:  # `_add_shares` leaves them out: the unknowns are all of the force
             f = (0.0, 0.0, 0.0)
         if p != NO_PATCH:
             s = motion.unknown[p]
-            s += motion.place[j, 0] * motion.unknown[p + 1] + motion.place[j, 1] * motion.unknown[p + 2]
+            s += (
+                motion.patch_coordinate[j, 0] * motion.unknown[p + 1]
+                + motion.patch_coordinate[j, 1] * motion.unknown[p + 2]
+            )
         else:
             s = motion.unknown[k]
             k += 1
         motion.normal[j] = f[0] + s
         first = second = 0.0
-        if motion.holds[j]:
+        if motion.sticks[j]:
             first, second = f[1] + motion.unknown[k], f[2] + motion.unknown[k + 1]
         f = _contact_force(motion.normal[j], first, second, mu, axes, j, work, motion)
         motion.force[j, 0], motion.force[j, 1], motion.force[j, 2] = f
@@ -248,15 +251,15 @@ def recover_contact_forces(mu, work, motion):
 @inlined
 def clear_last_forces(motion):
     """No force is known from before."""
-    for s in range(motion.last.shape[0]):
-        motion.last[s, 0] = motion.last[s, 1] = motion.last[s, 2] = 0.0
+    for s in range(motion.last_force.shape[0]):
+        motion.last_force[s, 0] = motion.last_force[s, 1] = motion.last_force[s, 2] = 0.0
 
 
 @kernel
 def store_last_forces(work, motion):
-    """`last`: the forces of the contacts that act, none of all others."""
+    """`last_force`: the forces of the contacts that act, none of all others."""
     clear_last_forces(motion)
     for j in range(motion.count):
         axes, f = wall_axes(work.walls, wall_of(motion.slot[j], work)), row_vector(motion.force, j, 0)
         for c in range(3):
-            motion.last[motion.slot[j], c] = qt.dot(axes[c], f)
+            motion.last_force[motion.slot[j], c] = qt.dot(axes[c], f)

@@ -31,7 +31,7 @@ from physics.kernels.event_driven.contact_mode_search import search_contact_mode
 
 @kernel
 def find_contact_mode(y, friction, offset_frame, work, motion):
-    """Find the regime at y and the contacts that act: (regime, number of candidates, acceleration, moment).
+    """Find the contact mode at y and the contacts that act: (contact mode, number of candidates, acceleration, moment).
 
     `MODE_UNDECIDED`: none of the candidates slides, and the contact problem with this acceleration and moment, which is
     posed in `work`, decides (`read_resting_mode`). `MODE_UNDECIDED_SLIDING`: some do, no mixture was found, and that

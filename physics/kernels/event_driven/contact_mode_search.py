@@ -50,7 +50,7 @@ def _worst_violation(count, y, rates, scale, offset_frame, work, motion):
     which, kind = -1, CANDIDATE_OPEN
     deepest = -weight
     for i in range(count):
-        if motion.kind[i] != CANDIDATE_OPEN:
+        if motion.candidate_state[i] != CANDIDATE_OPEN:
             if motion.normal[k] < deepest:
                 deepest, which = motion.normal[k], i
             k += 1
@@ -59,8 +59,8 @@ def _worst_violation(count, y, rates, scale, offset_frame, work, motion):
     k = 0
     most = weight
     for i in range(count):
-        if motion.kind[i] != CANDIDATE_OPEN:
-            if motion.kind[i] == CANDIDATE_STICKING:
+        if motion.candidate_state[i] != CANDIDATE_OPEN:
+            if motion.candidate_state[i] == CANDIDATE_STICKING:
                 excess = cone_excess(k, work, motion)
                 if excess > most:
                     most, which, worst, kind = excess, i, k, CANDIDATE_SLIDING
@@ -73,21 +73,21 @@ def _worst_violation(count, y, rates, scale, offset_frame, work, motion):
         size = math.sqrt(qt.dot(t, t))
         if size > 0.0:
             for c in range(3):
-                motion.candidate_way[which, c] = t[c] / size
+                motion.candidate_direction[which, c] = t[c] / size
         motion.is_fresh[which] = 1
         return which, kind
     for i in range(count):
         an, at = contact_acceleration(i, y, R, w, a, alpha, offset_frame, work, motion)
-        if motion.kind[i] == CANDIDATE_OPEN and an < -_EXACT_ZERO_SHARE * scale:
+        if motion.candidate_state[i] == CANDIDATE_OPEN and an < -_EXACT_ZERO_SHARE * scale:
             return i, CANDIDATE_SLIDING if motion.is_fresh[i] == 0 else CANDIDATE_STICKING
-        if motion.kind[i] == CANDIDATE_SLIDING and motion.is_fresh[i]:
+        if motion.candidate_state[i] == CANDIDATE_SLIDING and motion.is_fresh[i]:
             size = math.sqrt(qt.dot(at, at))
-            along = qt.dot(at, row_vector(motion.candidate_way, i, 0))
+            along = qt.dot(at, row_vector(motion.candidate_direction, i, 0))
             if along < 0.0:
                 return i, CANDIDATE_STICKING
             if size > _EXACT_ZERO_SHARE * scale and size - along > 0.5 * _SAME_DIRECTION * size:
                 for c in range(3):
-                    motion.candidate_way[i, c] = at[c] / size
+                    motion.candidate_direction[i, c] = at[c] / size
                 return i, CANDIDATE_SLIDING
     return -1, CANDIDATE_OPEN
 
@@ -95,8 +95,8 @@ def _worst_violation(count, y, rates, scale, offset_frame, work, motion):
 @inlined
 def has_last_forces(motion):
     """True if any force is known from before."""
-    for s in range(motion.last.shape[0]):
-        if motion.last[s, 0] != 0.0:
+    for s in range(motion.last_force.shape[0]):
+        if motion.last_force[s, 0] != 0.0:
             return True
     return False
 
@@ -106,12 +106,12 @@ def search_modes_once(count, y, R, P, w, alpha_free, offset_frame, work, motion)
     """`search_contact_modes` with the last forces as they are."""
     scale = work.acceleration + work.radius * qt.dot(w, w)
     for i in range(count):
-        motion.is_fresh[i] = motion.changes[i] = 0
-        motion.kind[i] = CANDIDATE_SLIDING
+        motion.is_fresh[i] = motion.candidate_changes[i] = 0
+        motion.candidate_state[i] = CANDIDATE_SLIDING
         if not is_candidate_sliding(i, y, R, w, offset_frame, work, motion):
             motion.is_fresh[i] = 1
             if work.mu > 0.0:
-                motion.kind[i] = CANDIDATE_STICKING
+                motion.candidate_state[i] = CANDIDATE_STICKING
     f = as_vector(work.free_acceleration)
     for _ in range(_MAX_MODE_TRIALS):
         activate_candidates(count, work, motion)
@@ -126,11 +126,11 @@ def search_modes_once(count, y, R, P, w, alpha_free, offset_frame, work, motion)
         which, kind = _worst_violation(count, y, (R, w, a, alpha), scale, offset_frame, work, motion)
         if which < 0:
             return True
-        if kind != motion.kind[which]:
-            motion.changes[which] += 1
-            if motion.changes[which] > _MAX_MODE_CHANGES:
+        if kind != motion.candidate_state[which]:
+            motion.candidate_changes[which] += 1
+            if motion.candidate_changes[which] > _MAX_MODE_CHANGES:
                 return False
-        motion.kind[which] = kind
+        motion.candidate_state[which] = kind
     return False
 
 

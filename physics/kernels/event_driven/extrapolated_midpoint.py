@@ -1,4 +1,4 @@
-"""Smooth motion in one regime: the midpoint rule, extrapolated to any order.
+"""Smooth motion in one contact mode: the midpoint rule, extrapolated to any order.
 
 One step of length h is made by Gragg's midpoint rule with 2, 4, 6, ... parts; its error is a series in the square
 of the parts' length, so that each further number of parts raises the order by two (Bulirsch and Stoer). Two
@@ -123,7 +123,7 @@ def compute_state_rate(row, later, offset_frame, work, motion):
 def set_error_scale(h, work, motion):
     """Sizes against which the errors of a step are held, its start made ready by `prepare_extrapolated_step`."""
     x, _, v, _ = get_state_row(motion, ROW_START)
-    speed = math.sqrt(qt.dot(v, v)) + work.radius * motion.spin + work.acceleration * h
+    speed = math.sqrt(qt.dot(v, v)) + work.radius * motion.start_angular_speed + work.acceleration * h
     place_size = work.radius + max(abs(x[0]), max(abs(x[1]), abs(x[2])))
     for c in range(3):
         motion.scale[Y_POSITION + c] = place_size
@@ -155,7 +155,7 @@ def _midpoint_rule(parts, h, offset_frame, work, motion):
 @kernel
 def try_extrapolated_step(h, offset_frame, work, motion):
     """Row END from row START, h later (`first_rate` known): (relative error, rules used)."""
-    table, y = motion.table, motion.y
+    table, y = motion.extrapolation_table, motion.y
     goal = work.tolerance
     aim = max(_CONTACT_TOLERANCE_SHARE * goal, min(goal, _FINEST_TOLERANCE)) if motion.count > 0 else goal
     set_error_scale(h, work, motion)
@@ -204,21 +204,21 @@ def prepare_extrapolated_step(left, offset_frame, work, motion):
     R, P, w, alpha = free_angular_motion(state, offset_frame, work)
     for j in range(motion.count):
         for c in range(3):
-            motion.reference[j, c] = motion.way[j, c]
+            motion.start_slip_direction[j, c] = motion.slip_direction[j, c]
     set_contact_kinematics(state, R, w, alpha, offset_frame, work, motion)
     for j in range(motion.count):
         t, speed = sliding_velocity(j, work, motion)
-        motion.is_starting[j] = 1 if speed <= motion.slow else 0
-        if speed > motion.slow:
+        motion.is_starting[j] = 1 if speed <= motion.slip_stop_speed else 0
+        if speed > motion.slip_stop_speed:
             for c in range(3):
-                motion.reference[j, c] = t[c] / speed
-    motion.turning = motion.stiffness = 0.0
+                motion.start_slip_direction[j, c] = t[c] / speed
+    motion.slip_turn_rate = motion.friction_turn_stiffness = 0.0
     _set_first_rate(offset_frame, work, motion)
-    turn = motion.spin = math.sqrt(qt.dot(w, w))
+    turn = motion.start_angular_speed = math.sqrt(qt.dot(w, w))
     if has_one_sliding_contact(work, motion):
         _begin_slide(P, offset_frame, work, motion)
     motion.weight = work.mass * (work.acceleration + work.radius * turn * turn)
-    h = min(left, motion.step)
+    h = min(left, motion.step_length)
     if work.shape != SPHERE and h * turn > _MAX_STEP_ROTATION:
         h = _MAX_STEP_ROTATION / turn
     if motion.count == 0 and has_fields(work):
@@ -237,10 +237,12 @@ def _set_first_rate(offset_frame, work, motion):
 @kernel
 def _begin_slide(P, offset_frame, work, motion):
     """Prepare the only contact, which slides, at START; one that creeps has the direction of `slip_onset`."""
-    motion.stiffness = friction_turn_stiffness(P, work, motion)
-    _, motion.first_speed = sliding_velocity(0, work, motion)
-    motion.growth = qt.dot(contact_velocity_rate(0, P, work, motion), row_vector(motion.reference, 0, 0))
-    if motion.growth >= 0.0 and is_creeping(motion.growth, motion.first_speed, work, motion):
+    motion.friction_turn_stiffness = friction_turn_stiffness(P, work, motion)
+    _, motion.start_slip_speed = sliding_velocity(0, work, motion)
+    motion.slip_growth = qt.dot(
+        contact_velocity_rate(0, P, work, motion), row_vector(motion.start_slip_direction, 0, 0)
+    )
+    if motion.slip_growth >= 0.0 and is_creeping(motion.slip_growth, motion.start_slip_speed, work, motion):
         motion.is_starting[0] = 1
         _set_first_rate(offset_frame, work, motion)
     if motion.is_starting[0]:
@@ -250,13 +252,13 @@ def _begin_slide(P, offset_frame, work, motion):
 
 @inlined
 def _set_slip_turn_rate(offset_frame, work, motion):
-    """`turning` of the only contact, by a look a moment ahead."""
-    d = row_vector(motion.way, 0, 0)
+    """`slip_turn_rate` of the only contact, by a look a moment ahead."""
+    d = row_vector(motion.slip_direction, 0, 0)
     for c in range(Y_SIZE):
-        motion.y[ROW_CURRENT, c] = motion.y[ROW_START, c] + motion.nearest * motion.first_rate[c]
-    compute_state_rate(ROW_CURRENT, motion.nearest, offset_frame, work, motion)
+        motion.y[ROW_CURRENT, c] = motion.y[ROW_START, c] + motion.min_look_ahead * motion.first_rate[c]
+    compute_state_rate(ROW_CURRENT, motion.min_look_ahead, offset_frame, work, motion)
     n = wall_normal(work.walls, wall_of(motion.slot[0], work))
-    motion.turning = qt.dot(qt.cross(n, d), row_vector(motion.way, 0, 0)) / motion.nearest
+    motion.slip_turn_rate = qt.dot(qt.cross(n, d), row_vector(motion.slip_direction, 0, 0)) / motion.min_look_ahead
 
 
 @inlined
@@ -267,9 +269,9 @@ def _limit_to_slip_stop(h, P, w, work, motion):
     step much longer than that is of any high order.
     """
     for j in range(motion.count):
-        if motion.holds[j] or motion.is_starting[j] or not work.mu > 0.0:
+        if motion.sticks[j] or motion.is_starting[j] or not work.mu > 0.0:
             continue
-        d = row_vector(motion.reference, j, 0)
+        d = row_vector(motion.start_slip_direction, j, 0)
         _, speed = sliding_velocity(j, work, motion)
         change = contact_velocity_rate(j, P, work, motion)
         along, size = qt.dot(d, change), math.sqrt(qt.dot(change, change))
@@ -280,6 +282,6 @@ def _limit_to_slip_stop(h, P, w, work, motion):
                 h *= _SHORT_OF_STOP
         if bend > _BENT_SHARE * size:
             h = min(h, _BENT_STEP * speed / size)
-        if bend > _STRAIGHT_SHARE * size and motion.stiffness > 0.0:  # 0 of more contacts than one
-            h = min(h, _STIFF_STEP * speed / motion.stiffness)
+        if bend > _STRAIGHT_SHARE * size and motion.friction_turn_stiffness > 0.0:  # 0 of more contacts than one
+            h = min(h, _STIFF_STEP * speed / motion.friction_turn_stiffness)
     return h

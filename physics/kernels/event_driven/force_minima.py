@@ -37,7 +37,7 @@ def store_force_margins(row, work, motion):
     for j in range(motion.count):
         motion.margin[row, 0, j] = motion.normal[j] / motion.weight
         motion.margin[row, 1, j] = math.inf
-        if motion.holds[j]:
+        if motion.sticks[j]:
             motion.margin[row, 1, j] = -cone_excess(j, work, motion) / motion.weight
 
 
@@ -75,8 +75,10 @@ def find_force_minimum(h, used, offset_frame, work, motion):
     _probe_margins(ROW_START, 0.0, moment, offset_frame, work, motion)
     for sort in range(2):
         for j in range(motion.count):
-            motion.fall[sort, j] = (motion.margin[_INSIDE_ROW, sort, j] - motion.margin[ROW_START, sort, j]) / moment
-            falls = falls or motion.fall[sort, j] < 0.0
+            motion.margin_rate[sort, j] = (
+                motion.margin[_INSIDE_ROW, sort, j] - motion.margin[ROW_START, sort, j]
+            ) / moment
+            falls = falls or motion.margin_rate[sort, j] < 0.0
     first = h
     if falls:
         for c in range(Y_SIZE):
@@ -87,7 +89,7 @@ def find_force_minimum(h, used, offset_frame, work, motion):
                 low, high, fall = (
                     motion.margin[ROW_START, sort, j],
                     motion.margin[ROW_END, sort, j],
-                    motion.fall[sort, j],
+                    motion.margin_rate[sort, j],
                 )
                 rise = (high - motion.margin[_INSIDE_ROW, sort, j]) / moment
                 if not (fall < 0.0 < rise and max(low, high) > _UNSEEN_MARGIN and max(low, high) < math.inf):

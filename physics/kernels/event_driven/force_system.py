@@ -1,4 +1,4 @@
-"""The unknown forces of a regime: the linear system of `contact_forces`, which rows of it count, and its solution."""
+"""Unknown forces of a contact mode: the linear system of `contact_forces`, which rows count, and its solution."""
 
 from __future__ import annotations
 
@@ -23,20 +23,22 @@ def _set_metric(m, P, work, motion):
     """`matrix`: what the rows would have to do with each other if all pushed along themselves; right-hand side 0."""
     inv_mass, J, A = 1.0 / work.mass, work.J, motion.matrix
     for k in range(m):
-        F, g = row_vector(motion.row, k, 0), apply_inverse_inertia(P, J, row_vector(motion.row_turn, k, 0))
+        F, g = row_vector(motion.row, k, 0), apply_inverse_inertia(P, J, row_vector(motion.row_moment, k, 0))
         for l in range(m):
-            A[l, k] = inv_mass * qt.dot(row_vector(motion.row, l, 0), F) + qt.dot(row_vector(motion.row_turn, l, 0), g)
+            A[l, k] = inv_mass * qt.dot(row_vector(motion.row, l, 0), F) + qt.dot(
+                row_vector(motion.row_moment, l, 0), g
+            )
         A[k, m] = 0.0
 
 
 @kernel
 def _choose_rows(m, P, work, motion):
-    """`chosen`: the rows that are no sums of others, by their own metric; their number.
+    """`independent_row`: the rows that are no sums of others, by their own metric; their number.
 
     Of a symmetric matrix without negative directions the largest entry is on the diagonal: columns of pivots are rows.
     """
     _set_metric(m, P, work, motion)
-    rank, _ = solve_full_pivot(m, motion.matrix, motion.chosen, motion.unknown)
+    rank, _ = solve_full_pivot(m, motion.matrix, motion.independent_row, motion.unknown)
     return rank
 
 
@@ -44,16 +46,21 @@ def _choose_rows(m, P, work, motion):
 def _set_rows(rows, m, P, work, motion):
     """`matrix`: the `rows` chosen equations of the m unknowns."""
     inv_mass, J, A = 1.0 / work.mass, work.J, motion.matrix
-    F, g = row_vector(motion.known, 0, 0), apply_inverse_inertia(P, J, row_vector(motion.known, 1, 0))
+    F, g = row_vector(motion.given_wrench, 0, 0), apply_inverse_inertia(P, J, row_vector(motion.given_wrench, 1, 0))
     for i in range(rows):
-        l = motion.chosen[i]
-        A[i, m] = motion.asked[l]
-        A[i, m] -= inv_mass * qt.dot(row_vector(motion.row, l, 0), F) + qt.dot(row_vector(motion.row_turn, l, 0), g)
+        l = motion.independent_row[i]
+        A[i, m] = motion.rhs[l]
+        A[i, m] -= inv_mass * qt.dot(row_vector(motion.row, l, 0), F) + qt.dot(row_vector(motion.row_moment, l, 0), g)
     for k in range(m):
-        F, g = row_vector(motion.push, k, 0), apply_inverse_inertia(P, J, row_vector(motion.turn, k, 0))
+        F, g = (
+            row_vector(motion.column_force, k, 0),
+            apply_inverse_inertia(P, J, row_vector(motion.column_moment, k, 0)),
+        )
         for i in range(rows):
-            l = motion.chosen[i]
-            A[i, k] = inv_mass * qt.dot(row_vector(motion.row, l, 0), F) + qt.dot(row_vector(motion.row_turn, l, 0), g)
+            l = motion.independent_row[i]
+            A[i, k] = inv_mass * qt.dot(row_vector(motion.row, l, 0), F) + qt.dot(
+                row_vector(motion.row_moment, l, 0), g
+            )
 
 
 @kernel
@@ -66,7 +73,7 @@ def solve_contact_forces(m, P, work, motion):
     that stop a body which no contact holds. So where a pivot is small the rows are chosen by their own metric.
     """
     for k in range(m):
-        motion.chosen[k] = k
+        motion.independent_row[k] = k
     _set_rows(m, m, P, work, motion)
     rank, least = solve_full_pivot(m, motion.matrix, motion.order, motion.unknown)
     if rank < m or (motion.is_skew and least < _DOUBTFUL_PIVOT):
@@ -76,17 +83,17 @@ def solve_contact_forces(m, P, work, motion):
             solve_least_norm(rows, m, motion.matrix, motion.unknown)
         else:
             solve_full_pivot(m, motion.matrix, motion.order, motion.unknown)
-    force, moment = row_vector(motion.known, 0, 0), row_vector(motion.known, 1, 0)
+    force, moment = row_vector(motion.given_wrench, 0, 0), row_vector(motion.given_wrench, 1, 0)
     for k in range(m):
         s = motion.unknown[k]
-        force = plus(force, times(s, row_vector(motion.push, k, 0)))
-        moment = plus(moment, times(s, row_vector(motion.turn, k, 0)))
+        force = plus(force, times(s, row_vector(motion.column_force, k, 0)))
+        moment = plus(moment, times(s, row_vector(motion.column_moment, k, 0)))
     return force, moment
 
 
 @kernel
 def solve_mode_forces(y, offset_frame, work, motion):
-    """Forces of the regime at y: (total force, total moment, ω, dω/dt without contact, principal axes)."""
+    """Forces of the contact mode at y: (total force, total moment, ω, dω/dt without contact, principal axes)."""
     R, P, w, alpha = free_angular_motion(y, offset_frame, work)
     zero = (0.0, 0.0, 0.0)
     if motion.count == 0:

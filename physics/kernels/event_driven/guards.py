@@ -1,4 +1,4 @@
-"""Guards that end a regime: the smallest of the quantities that have to stay positive during a smooth step.
+"""Guards that end a contact mode: the smallest of the quantities that have to stay positive during a smooth step.
 
 - *Gap* of every feature that does not act, in radii. A dip between the ends of a step shows in the cubic through the
   gaps and their rates at both ends.
@@ -101,10 +101,10 @@ def least_gap_margin(h, work, motion):
         if motion.is_active[s] or motion.gap[ROW_END, s] == math.inf:
             continue
         g0, g1 = motion.gap[ROW_START, s], motion.gap[ROW_END, s]
-        if g0 <= motion.touch and motion.gap_rate[ROW_START, s] > motion.still:
+        if g0 <= motion.touch_gap and motion.gap_rate[ROW_START, s] > motion.rest_speed:
             low = g1 - g0
-        elif g0 <= motion.touch:
-            low = g1 - min(g0, 0.0) + motion.touch
+        elif g0 <= motion.touch_gap:
+            low = g1 - min(g0, 0.0) + motion.touch_gap
         else:
             low = cubic_minimum(g0, motion.gap_rate[ROW_START, s], g1, motion.gap_rate[ROW_END, s], h)
         if low < least:
@@ -148,7 +148,7 @@ def cone_excess(j, work, motion):
     """Excess of contact j, which holds with the others of its wall that hold, over its friction cone [N]."""
     wall, other, holding = wall_of(motion.slot[j], work), j, 1
     for k in range(motion.count):
-        if k != j and motion.holds[k] and wall_of(motion.slot[k], work) == wall:
+        if k != j and motion.sticks[k] and wall_of(motion.slot[k], work) == wall:
             other = k
             holding += 1
     if holding == 2 and motion.normal[j] >= 0.0 and motion.normal[other] >= 0.0:
@@ -169,7 +169,7 @@ def least_inactive_pull(work, motion):
         axes = wall_axes(work.walls, wall)
         r = row_vector(motion.arm, j, 0)
         for s in range(wall * work.features, (wall + 1) * work.features):
-            if motion.is_active[s] or not motion.gap[ROW_START, s] <= motion.touch:
+            if motion.is_active[s] or not motion.gap[ROW_START, s] <= motion.touch_gap:
                 continue
             # The vertices of a face are its corners: the missing one is the sum of its neighbours less the opposite.
             p = row_vector(motion.arm, opposite_face_contact(s, wall, work, motion), 0)
@@ -181,8 +181,8 @@ def least_inactive_pull(work, motion):
             a -= 2.0 * qt.dot(axes[1], p) + qt.dot(axes[1], r)
             b -= 2.0 * qt.dot(axes[2], p) + qt.dot(axes[2], r)
             pull = -motion.unknown[k]
-            pull -= (motion.place[j, 0] + a / work.radius) * motion.unknown[k + 1]
-            pull -= (motion.place[j, 1] + b / work.radius) * motion.unknown[k + 2]
+            pull -= (motion.patch_coordinate[j, 0] + a / work.radius) * motion.unknown[k + 1]
+            pull -= (motion.patch_coordinate[j, 1] + b / work.radius) * motion.unknown[k + 2]
             if pull < least:
                 least, which = pull, s
     return least, which
@@ -209,7 +209,7 @@ def least_force_margin(slack, work, motion):
         push = motion.normal[j] / motion.weight + slack
         if push < margin:
             margin, guard, which = push, GUARD_PUSH, j
-        if motion.holds[j]:
+        if motion.sticks[j]:
             cone = slack - cone_excess(j, work, motion) / motion.weight
             if cone < margin:
                 margin, guard, which = cone, GUARD_CONE, j
@@ -245,10 +245,12 @@ def least_guard_margin(h, heeds, slack, offset_frame, work, motion):
     if work.mu > 0.0 and margin >= 0.0:  # a contact may stop within the step, unless something ends it before
         scale = motion.scale[Y_VELOCITY]
         for j in range(motion.count):
-            if not motion.holds[j]:
+            if not motion.sticks[j]:
                 t, _ = sliding_velocity(j, work, motion)
-                speed = qt.dot(t, row_vector(motion.reference, j, 0))
-                speed = (speed + 0.5 * motion.slow if motion.is_starting[j] else speed - motion.slow) / scale
+                speed = qt.dot(t, row_vector(motion.start_slip_direction, j, 0))
+                speed = (
+                    speed + 0.5 * motion.slip_stop_speed if motion.is_starting[j] else speed - motion.slip_stop_speed
+                ) / scale
                 if speed < margin:
                     margin, guard, which = speed, GUARD_SPEED, j
     return margin, guard, which

@@ -46,24 +46,24 @@ def rebound_target(speed, normal, r, rate, w, alpha, work, motion):
     With the free acceleration b towards the wall a bounce at e times the speed takes t = 2 e speed / b, and all that
     follow it t e/(1 - e).
     """
-    if speed < -motion.still:
+    if speed < -motion.rest_speed:
         return work.restitution * speed
-    if not speed > motion.still:
+    if not speed > motion.rest_speed:
         return 0.0
     goal = work.restitution * speed
-    if goal > motion.still:
+    if goal > motion.rest_speed:
         return goal
     a, c, g = as_vector(work.free_acceleration), qt.cross(alpha, r), qt.cross(w, rate)
     b = -(qt.dot(normal, a) + qt.dot(normal, c) + qt.dot(normal, g))
     if b > 0.0 and work.restitution < 1.0:
-        motion.left_out = max(motion.left_out, 2.0 * goal / (b * (1.0 - work.restitution)))
+        motion.skipped_bounce_time = max(motion.skipped_bounce_time, 2.0 * goal / (b * (1.0 - work.restitution)))
     return 0.0
 
 
 @inlined
 def takes_part_in_impact(s, motion):
     """True if feature s takes part in an impact: it touches, or would in no time."""
-    return motion.gap[ROW_START, s] <= max(motion.touch, -motion.gap_rate[ROW_START, s] * motion.together)
+    return motion.gap[ROW_START, s] <= max(motion.touch_gap, -motion.gap_rate[ROW_START, s] * motion.simultaneity_time)
 
 
 @inlined
@@ -75,8 +75,8 @@ def next_sequential_impact(work, motion, report):
     """
     if not motion.is_sequential:
         return _ALL_AT_ONCE
-    motion.turns += 1
-    if motion.turns > _MAX_SEQUENTIAL_IMPACTS:
+    motion.sequential_impacts += 1
+    if motion.sequential_impacts > _MAX_SEQUENTIAL_IMPACTS:
         report[work.world, at.UNCONVERGED] += 1.0
         return _ALL_AT_ONCE
     fastest, found = 0.0, _ALL_AT_ONCE
@@ -93,7 +93,7 @@ def set_up_impact_problem(y, offset_frame, work, motion, report):
     compute_feature_gaps(ROW_START, offset_frame, work, motion)
     R, _, w, alpha = free_angular_motion(y, offset_frame, work)
     n = 0
-    motion.left_out = 0.0
+    motion.skipped_bounce_time = 0.0
     only = next_sequential_impact(work, motion, report)
     for s in range(motion.is_active.shape[0]):
         rate = motion.gap_rate[ROW_START, s]
@@ -124,7 +124,7 @@ def set_tangential_rebound(n, y, offset_frame, motion, work):
     bouncing, found = 0, 0
     for i in range(n):
         speed = -motion.gap_rate[ROW_START, work.slot[i]]
-        if speed > motion.still and (work.target[i, 0] > 0.0 or not work.restitution > 0.0):
+        if speed > motion.rest_speed and (work.target[i, 0] > 0.0 or not work.restitution > 0.0):
             bouncing, found = bouncing + 1, i
     if bouncing == 1:
         set_tangential_target(found, y, offset_frame, work)
@@ -189,7 +189,7 @@ def set_up_jump_problem(y, h, offset_frame, work, motion):
     count = 0
     for s in range(motion.is_active.shape[0]):
         gap = motion.gap[ROW_START, s]
-        if not gap <= motion.touch - min(0.0, motion.gap_rate[ROW_START, s]) * h or count >= work.slot.shape[0]:
+        if not gap <= motion.touch_gap - min(0.0, motion.gap_rate[ROW_START, s]) * h or count >= work.slot.shape[0]:
             continue
         n = wall_normal(work.walls, wall_of(s, work))
         r, _ = contact_arm_and_rate(work.shape, as_vector(work.dims), R, w, n, feature_of(s, work), offset_frame, work)
@@ -232,7 +232,14 @@ def resolve_impacts(y, t, contact, offset_frame, work, motion, records):
         report_impact_solve(solved, records.report, work)
         v, L = solved[0], solved[1]
     ev.log_wall_impacts(
-        n, _rows_per_contact(contact.friction), x, work.mass * motion.noise, t, work, records.log, records.counts
+        n,
+        _rows_per_contact(contact.friction),
+        x,
+        work.mass * motion.rounding_speed,
+        t,
+        work,
+        records.log,
+        records.counts,
     )
     return x, q, v, L
 
@@ -248,7 +255,14 @@ def resolve_inconsistency(y, h, t, contact, offset_frame, work, motion, records)
         report_impact_solve(solved, records.report, work)
         v, L = solved[0], solved[1]
     ev.log_wall_impacts(
-        n, _rows_per_contact(contact.friction), y[0], work.mass * motion.noise, t, work, records.log, records.counts
+        n,
+        _rows_per_contact(contact.friction),
+        y[0],
+        work.mass * motion.rounding_speed,
+        t,
+        work,
+        records.log,
+        records.counts,
     )
     return y[0], y[1], v, L
 

@@ -1,9 +1,9 @@
-"""Steps of a regime whose guards of force say nothing: the search for the regime judges them, after each.
+"""Steps of a contact mode whose guards of force say nothing: the search for the contact mode judges them, after each.
 
 Where contacts are more than the body's motion needs, their forces can be shared out in many ways, of which the linear
-system takes one. That one may leave a cone, or pull, where others hold: the guard ends the regime and the search finds
-the same one again. Then these guards are not heeded for it. After every step the regime is looked for, and the step is
-taken back and made shorter when the acceleration has jumped in it: then another regime had begun before its end.
+system takes one. That one may leave a cone, or pull, where others hold: the guard ends the mode and the search finds
+the same one again. Then these guards are not heeded for it. After every step the mode is looked for, and the step is
+taken back and made shorter when the acceleration has jumped in it: then another contact mode had begun before its end.
 """
 
 from __future__ import annotations
@@ -36,21 +36,21 @@ def contact_mode_hash(motion):
     """A number for which contacts act and which of them hold."""
     name = 1
     for j in range(motion.count):
-        name = 131 * name + 2 * motion.slot[j] + motion.holds[j]
+        name = 131 * name + 2 * motion.slot[j] + motion.sticks[j]
     return name
 
 
 @inlined
 def has_trusted_guards(motion):
-    """True if the guards of force say something of this regime."""
-    return motion.unheeded == NO_MODE or contact_mode_hash(motion) != motion.unheeded
+    """True if the guards of force say something of this contact mode."""
+    return motion.distrusted_mode == NO_MODE or contact_mode_hash(motion) != motion.distrusted_mode
 
 
 @inlined
 def distrust_force_guards(nearest, motion):
-    """The guards of force are not heeded for this regime any more."""
-    motion.unheeded = contact_mode_hash(motion)
-    motion.trust = _FIRST_TRUST_STEP * nearest
+    """The guards of force are not heeded for this contact mode any more."""
+    motion.distrusted_mode = contact_mode_hash(motion)
+    motion.watched_length = _FIRST_TRUST_STEP * nearest
 
 
 @kernel
@@ -61,8 +61,8 @@ def has_acceleration_jumped(what, y, offset_frame, work, motion):
     if what != MODE_CONTACT:
         return True
     put_state_row(motion, ROW_START, y)
-    motion.step = motion.ahead
-    prepare_extrapolated_step(motion.ahead, offset_frame, work, motion)
+    motion.step_length = motion.look_ahead
+    prepare_extrapolated_step(motion.look_ahead, offset_frame, work, motion)
     for c in range(Y_VELOCITY, Y_SIZE):
         unit = motion.weight / work.mass if c < Y_ANGULAR_MOMENTUM else motion.weight * work.radius
         if abs(motion.first_rate[c] - motion.end_rate[c]) > _SAME_ACCELERATION * unit:
@@ -72,7 +72,7 @@ def has_acceleration_jumped(what, y, offset_frame, work, motion):
 
 @kernel
 def accept_step(what, watched, y, offset_frame, work, motion):
-    """Judge the regime at y; GOES_BACK where the watched step that led there was too long, and no mere look-ahead."""
-    if watched > motion.nearest and has_acceleration_jumped(what, y, offset_frame, work, motion):
+    """Judge the mode at y; GOES_BACK where the watched step that led there was too long, and no mere look-ahead."""
+    if watched > motion.min_look_ahead and has_acceleration_jumped(what, y, offset_frame, work, motion):
         return MODE_ROLLBACK
     return what

@@ -1,4 +1,4 @@
-"""Regime of a body at the walls: logged as events when it changes, and remembered from step to step."""
+"""Contact mode of a body at the walls: logged as events when it changes, and remembered from step to step."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from physics.kernels.half_space.contact_point import wall_of
 from physics.kernels.half_space.persistent_contacts import WALL_MEMORY_HEAD
 from physics.kernels.time_stepping import event_log as ev
 
-# State of a body at a wall (`motion.state`).
+# State of a body at a wall (`motion.wall_state`).
 WALL_SEPARATED, WALL_SLIPPING, WALL_STICKING = range(3)
 
 
@@ -18,16 +18,16 @@ def log_mode_changes(work, motion, log, counts, t):
         state = WALL_SEPARATED
         for j in range(motion.count):
             if wall_of(motion.slot[j], work) == wall:
-                if motion.holds[j]:
+                if motion.sticks[j]:
                     state = WALL_STICKING
                 elif state == WALL_SEPARATED:
                     state = WALL_SLIPPING
-        old = motion.state[wall]
+        old = motion.wall_state[wall]
         if state == old:
             continue
-        motion.state[wall] = state
+        motion.wall_state[wall] = state
         if old == WALL_SEPARATED:
-            ev.note_mode_change(log, counts, work.i, t + motion.left_out, ev.KIND_TOUCH, wall)
+            ev.note_mode_change(log, counts, work.i, t + motion.skipped_bounce_time, ev.KIND_TOUCH, wall)
         elif state == WALL_SEPARATED:
             ev.note_mode_change(log, counts, work.i, t, ev.KIND_RELEASE, wall)
         else:
@@ -36,7 +36,7 @@ def log_mode_changes(work, motion, log, counts, t):
 
 @kernel
 def store_contact_modes(memory, i, work, motion):
-    """Store the regime at the walls and the contact forces for later reads (`warm_start.store_warm_start`)."""
+    """Store the contact mode at the walls and the contact forces for later reads (`warm_start.store_warm_start`)."""
     slots = work.slot.shape[0]
     row = WALL_MEMORY_HEAD + slots
     for k in range(int(memory[i, 1])):
@@ -47,23 +47,23 @@ def store_contact_modes(memory, i, work, motion):
         slot = motion.slot[j]
         memory[i, WALL_MEMORY_HEAD + j] = slot
         for c in range(3):
-            memory[i, row + 3 * slot + c] = motion.last[slot, c]
+            memory[i, row + 3 * slot + c] = motion.last_force[slot, c]
     total = 0.0
     for wall in range(work.walls.shape[0] - 1, -1, -1):
-        total = 3.0 * total + motion.state[wall]
+        total = 3.0 * total + motion.wall_state[wall]
     memory[i, 2] = 2.0 * total + motion.is_resting
 
 
 @inlined
 def load_contact_modes(memory, i, work, motion):
-    """Read the regime at the end of the last step, and its forces: the opposite of `store_contact_modes`."""
+    """Read the contact mode at the end of the last step, and its forces: the opposite of `store_contact_modes`."""
     row = WALL_MEMORY_HEAD + work.slot.shape[0]
-    for s in range(motion.last.shape[0]):
+    for s in range(motion.last_force.shape[0]):
         for c in range(3):
-            motion.last[s, c] = memory[i, row + 3 * s + c]
+            motion.last_force[s, c] = memory[i, row + 3 * s + c]
     total = int(memory[i, 2])  # whether it rested, and base 3 a digit per wall
     motion.is_resting = total % 2
     total //= 2
     for wall in range(work.walls.shape[0]):
-        motion.state[wall] = total % 3
+        motion.wall_state[wall] = total % 3
         total //= 3

@@ -48,7 +48,7 @@ def sliding_velocity(j, work, motion):
 
 @inlined
 def contact_velocity_rate(j, P, work, motion):
-    """Rate at which the velocity of contact j changes at START: `first_rate`, and `goal` as placed there."""
+    """Rate at which the velocity of contact j changes at START, from `first_rate` and `constraint_error` there."""
     rate, a, torque = motion.first_rate, work.free_acceleration, work.torque
     T = (
         rate[Y_ANGULAR_MOMENTUM] - torque[0],
@@ -58,7 +58,8 @@ def contact_velocity_rate(j, P, work, motion):
     F = (rate[Y_VELOCITY] - a[0], rate[Y_VELOCITY + 1] - a[1], rate[Y_VELOCITY + 2] - a[2])
     return plus(
         plus(
-            row_vector(motion.goal, j, 0), qt.cross(apply_inverse_inertia(P, work.J, T), row_vector(motion.arm, j, 0))
+            row_vector(motion.constraint_error, j, 0),
+            qt.cross(apply_inverse_inertia(P, work.J, T), row_vector(motion.arm, j, 0)),
         ),
         F,
     )
@@ -68,7 +69,7 @@ def contact_velocity_rate(j, P, work, motion):
 def friction_turn_stiffness(P, work, motion):
     """K of the only contact, from `first_rate` [m/s²]."""
     n = wall_normal(work.walls, wall_of(motion.slot[0], work))
-    across = qt.cross(n, row_vector(motion.reference, 0, 0))
+    across = qt.cross(n, row_vector(motion.start_slip_direction, 0, 0))
     moment = qt.cross(row_vector(motion.arm, 0, 0), across)
     a, rate = work.free_acceleration, motion.first_rate
     push = work.mass * (
@@ -80,19 +81,22 @@ def friction_turn_stiffness(P, work, motion):
 @inlined
 def has_one_sliding_contact(work, motion):
     """True if one contact acts, which slides with friction."""
-    return motion.count == 1 and motion.holds[0] == 0 and work.mu > 0.0
+    return motion.count == 1 and motion.sticks[0] == 0 and work.mu > 0.0
 
 
 @inlined
 def _is_small(share, speed, work, motion):
     """True if the speed of a slip is below `share` times SLOWLY."""
-    return speed * (motion.spin + math.sqrt(work.acceleration / work.radius)) < share * _CREEP_SPEED * motion.stiffness
+    return (
+        speed * (motion.start_angular_speed + math.sqrt(work.acceleration / work.radius))
+        < share * _CREEP_SPEED * motion.friction_turn_stiffness
+    )
 
 
 @inlined
 def is_creeping(growth, speed, work, motion):
     """True if a slip that grows at the rate `growth` is so slow, and grows so little, that only loads turn it."""
-    return growth < _CREEP_GROWTH * motion.stiffness and _is_small(1.0, speed, work, motion)
+    return growth < _CREEP_GROWTH * motion.friction_turn_stiffness and _is_small(1.0, speed, work, motion)
 
 
 @inlined
@@ -101,12 +105,12 @@ def has_outrun_creep(h, work, motion):
     if not has_one_sliding_contact(work, motion) or not motion.is_starting[0]:
         return False
     _, speed = sliding_velocity(0, work, motion)
-    if not speed > _CREEP_OVERSHOOT * motion.slow:
+    if not speed > _CREEP_OVERSHOOT * motion.slip_stop_speed:
         return False
     if not _is_small(_CREEP_OVERSHOOT * _CREEP_OVERSHOOT, speed, work, motion):
         return True
-    limit = _CREEP_GROWTH * motion.stiffness
-    return motion.growth < limit and speed - motion.first_speed > _CREEP_OVERSHOOT * limit * h
+    limit = _CREEP_GROWTH * motion.friction_turn_stiffness
+    return motion.slip_growth < limit and speed - motion.start_slip_speed > _CREEP_OVERSHOOT * limit * h
 
 
 @inlined
@@ -115,8 +119,8 @@ def _slip_accelerations(angle, first, second, axes, P, work, motion):
     c, s = math.cos(angle), math.sin(angle)
     d = plus(times(c, first), times(s, second))
     for k in range(3):
-        motion.way[0, k] = d[k]
-    n, r, b = axes[0], row_vector(motion.arm, 0, 0), row_vector(motion.goal, 0, 0)
+        motion.slip_direction[0, k] = d[k]
+    n, r, b = axes[0], row_vector(motion.arm, 0, 0), row_vector(motion.constraint_error, 0, 0)
     f = sliding_force_direction(work.mu, axes, 0, work, motion)
     a = plus(times(1.0 / work.mass, f), qt.cross(apply_inverse_inertia(P, work.J, qt.cross(r, f)), r))
     a = plus(b, times(-qt.dot(n, b) / qt.dot(n, a), a))
@@ -125,14 +129,14 @@ def _slip_accelerations(angle, first, second, axes, P, work, motion):
 
 @kernel
 def set_slip_onset_direction(P, work, motion):
-    """Let the one contact that acts begin to slide in the direction above, and place `way`.
+    """Let the one contact that acts begin to slide in the direction above, and place `slip_direction`.
 
     More contacts than one begin in the directions that they were found with.
     """
     if not has_one_sliding_contact(work, motion) or not motion.is_starting[0]:
         return
     axes = wall_axes(work.walls, wall_of(motion.slot[0], work))
-    n, u, first = axes[0], row_vector(motion.velocity, 0, 0), row_vector(motion.reference, 0, 0)
+    n, u, first = axes[0], row_vector(motion.velocity, 0, 0), row_vector(motion.start_slip_direction, 0, 0)
     second, speed = qt.cross(n, first), math.sqrt(max(0.0, qt.dot(u, u) - qt.dot(n, u) * qt.dot(n, u)))
     angle = 0.0
     for _ in range(_ANGLE_NEWTON_STEPS):
@@ -142,7 +146,7 @@ def set_slip_onset_direction(P, work, motion):
         if not stiffness > 0.0:
             angle = 0.0
             break
-        step = (across - speed * motion.turning / (1.0 + along / stiffness)) / stiffness
+        step = (across - speed * motion.slip_turn_rate / (1.0 + along / stiffness)) / stiffness
         if not abs(step) < _MAX_ANGLE_STEP:
             angle = 0.0
             break

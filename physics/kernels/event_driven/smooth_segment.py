@@ -1,4 +1,4 @@
-"""Smooth motion of a regime up to the guard that ends it, and a look at what comes next."""
+"""Smooth motion of a contact mode up to the guard that ends it, and a look at what comes next."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ from physics.kernels.math import quaternion as qt
 from physics.kernels.math.vector import row_vector
 from physics.kernels.state.body import angular_velocity
 
-# Smooth steps at most before the next regime is looked for.
+# Smooth steps at most before the next contact mode is looked for.
 _MAX_SEGMENT_STEPS = 10_000
 
 # Trials of the time at which a guard ends a step, those after which what is left must have been halved, and margins
@@ -49,7 +49,7 @@ _MAX_LOCATION_TRIALS = 110
 _BISECT_AFTER = 3
 _ZERO_MARGINS = (1.0e-15, 1.0e-13)
 
-# A body whose contacts, when set right, take its speed down to this share of `motion.still` may be at rest.
+# A body whose contacts, when set right, take its speed down to this share of `motion.rest_speed` may be at rest.
 _REST_SPEED_SHARE = 1.0e-6
 
 
@@ -121,7 +121,7 @@ def has_slip_stopped(guard, which, work, motion):
     """True if the contact that ended a step nearly stands still there: then that is the end, not before."""
     if guard != GUARD_SPEED:
         return False
-    return sliding_velocity(which, work, motion)[1] <= motion.slow
+    return sliding_velocity(which, work, motion)[1] <= motion.slip_stop_speed
 
 
 @kernel
@@ -133,18 +133,18 @@ def slide_to_stop(which, left, heeds, offset_frame, work, motion):
     if motion.is_starting[which]:
         return 0.0
     slip, speed = sliding_velocity(which, work, motion)
-    if not motion.noise < speed <= 2.0 * motion.slow:
+    if not motion.rounding_speed < speed <= 2.0 * motion.slip_stop_speed:
         return 0.0
     before = get_state_row(motion, ROW_START)
     end = get_state_row(motion, ROW_END)
     for c in range(3):
-        motion.reference[which, c] = slip[c] / speed
+        motion.start_slip_direction[which, c] = slip[c] / speed
     put_state_row(motion, ROW_START, end)
     compute_state_rate(ROW_START, 0.0, offset_frame, work, motion)
     for c in range(Y_SIZE):
         motion.first_rate[c] = motion.rate[c]
     _, P, _, _ = free_angular_motion(end, offset_frame, work)
-    along = qt.dot(contact_velocity_rate(which, P, work, motion), row_vector(motion.reference, which, 0))
+    along = qt.dot(contact_velocity_rate(which, P, work, motion), row_vector(motion.start_slip_direction, which, 0))
     if along < 0.0:
         h = min(left, -speed / along)
         error, _ = try_extrapolated_step(h, offset_frame, work, motion)
@@ -180,18 +180,18 @@ def _begin_next_step(left, offset_frame, work, motion):
 
 @kernel
 def integrate_segment(y, left, offset_frame, work, motion):
-    """Smooth motion of the regime for `left`, or until a guard ends it: (state, time, guard).
+    """Smooth motion of the contact mode for `left`, or until a guard ends it: (state, time, guard).
 
-    Where the guards of force are not heeded one step, no longer than `motion.trust`: its guard is WATCH at least.
+    Where guards of force are not heeded one step, no longer than `motion.watched_length`: its guard is WATCH at least.
     """
     heeds = has_trusted_guards(motion)
     had = body_speed_bound(y, offset_frame, work)
     y = project_state(project_candidate_speeds(y, offset_frame, work, motion), offset_frame, work, motion)
-    if had > motion.still and body_speed_bound(y, offset_frame, work) <= _REST_SPEED_SHARE * motion.still:
+    if had > motion.rest_speed and body_speed_bound(y, offset_frame, work) <= _REST_SPEED_SHARE * motion.rest_speed:
         return y, 0.0, GUARD_SPEED  # the contacts have taken all of it: it may be at rest
     put_state_row(motion, ROW_START, y)
     compute_feature_gaps(ROW_START, offset_frame, work, motion)
-    motion.step = left if heeds else motion.trust
+    motion.step_length = left if heeds else motion.watched_length
     t, h = 0.0, prepare_extrapolated_step(left, offset_frame, work, motion)
     store_force_margins(ROW_START, work, motion)
     for _ in range(_MAX_SEGMENT_STEPS):
@@ -213,7 +213,7 @@ def integrate_segment(y, left, offset_frame, work, motion):
         if guard == GUARD_STEP_FAILED:
             if not h > SEGMENT_SHORTEST_STEP * left:
                 return get_state_row(motion, ROW_START), t, GUARD_STEP_FAILED
-            # Not `prepare_extrapolated_step` again: it would go by the directions of sliding (`way`) that the trial
+            # Not `prepare_extrapolated_step` again: it would go by the directions (`slip_direction`) that the trial
             # ended with. The scale of the errors is that of the start.
             h *= SEGMENT_STEP_CUT
             refresh_loads(get_state_row(motion, ROW_START), 0.0, offset_frame, work)
@@ -222,7 +222,7 @@ def integrate_segment(y, left, offset_frame, work, motion):
         advance_clock(h, work)
         if is_over and guard == GUARD_SPEED:
             t += slide_to_stop(which, left - t, heeds, offset_frame, work, motion)
-        motion.step = SEGMENT_STEP_GROWTH * h if used <= SEGMENT_EASY_RULES else h
+        motion.step_length = SEGMENT_STEP_GROWTH * h if used <= SEGMENT_EASY_RULES else h
         store_last_forces(work, motion)
         y = project_state(get_state_row(motion, ROW_END), offset_frame, work, motion)
         if is_over:
@@ -242,9 +242,9 @@ def integrate_segment(y, left, offset_frame, work, motion):
 
 @kernel
 def predict_state(y, offset_frame, work, motion):
-    """State to which the regime would lead in a moment."""
+    """State to which the contact mode would lead in a moment."""
     put_state_row(motion, ROW_START, y)
-    motion.step = motion.ahead
-    prepare_extrapolated_step(motion.ahead, offset_frame, work, motion)
-    try_extrapolated_step(motion.ahead, offset_frame, work, motion)
+    motion.step_length = motion.look_ahead
+    prepare_extrapolated_step(motion.look_ahead, offset_frame, work, motion)
+    try_extrapolated_step(motion.look_ahead, offset_frame, work, motion)
     return project_state(get_state_row(motion, ROW_END), offset_frame, work, motion)

@@ -92,21 +92,21 @@ _NO_FORCED_MODE = -1
 
 @kernel
 def set_event_thresholds(y, h, offset_frame, work, motion):
-    """Set the gap and speed that count as zero, and the time a regime is looked ahead; problems are solved to rounding.
+    """Set the gap and speed that count as zero, and the look-ahead of a mode; problems are solved to rounding.
 
     Gaps are differences of places, wherever the body may go within h.
     A contact is still when the speed would not lift it by `_UNSEEN_HOP_GAPS` gaps that count as none: a bounce as low
     as that would gain from being set down on the wall what it loses in the impact.
     """
-    work.still = work.unseen = 0.0
+    work.residual_limit = work.target_error_limit = 0.0
     x, speed = y[0], body_speed_bound(y, offset_frame, work)
-    motion.touch = max(work.slop, _ROUNDING * (work.radius + math.sqrt(qt.dot(x, x)) + h * speed))
-    motion.noise = 1.0e-13 * speed
-    motion.still = math.sqrt(2.0 * _UNSEEN_HOP_GAPS * work.acceleration * motion.touch) + motion.noise
-    motion.slow = _SLIP_STOP_SHARE * motion.still + motion.noise
+    motion.touch_gap = max(work.slop, _ROUNDING * (work.radius + math.sqrt(qt.dot(x, x)) + h * speed))
+    motion.rounding_speed = 1.0e-13 * speed
+    motion.rest_speed = math.sqrt(2.0 * _UNSEEN_HOP_GAPS * work.acceleration * motion.touch_gap) + motion.rounding_speed
+    motion.slip_stop_speed = _SLIP_STOP_SHARE * motion.rest_speed + motion.rounding_speed
     unit = work.radius / (speed + math.sqrt(work.radius * work.acceleration) + _TINY)
     reset_chatter_control(unit, motion)
-    motion.together = (_SIMULTANEOUS_SHARE + 10.0 * work.tolerance) * unit
+    motion.simultaneity_time = (_SIMULTANEOUS_SHARE + 10.0 * work.tolerance) * unit
 
 
 @inlined
@@ -115,21 +115,21 @@ def begin_event_substep(y, start, h, offset_frame, memory, work, motion):
     set_clock(start, work)
     refresh_loads(y, 0.0, offset_frame, work)
     set_event_thresholds(y, h, offset_frame, work, motion)
-    motion.assured = 0.0
+    motion.assured_time = 0.0
     load_contact_modes(memory, work.i, work, motion)
-    motion.left_out, motion.turns = 0.0, 0
+    motion.skipped_bounce_time, motion.sequential_impacts = 0.0, 0
 
 
 @kernel
 def classify_mode(y, is_foretold, watched, contact, offset_frame, work, motion, report):
-    """Find the regime from y on, and whether a contact problem had to be solved, since the body may come to rest.
+    """Find the contact mode from y on, and whether a contact problem had to be solved, since the body may come to rest.
 
-    It is looked for a moment ahead where a guard has foretold that the regime ends.
+    It is looked for a moment ahead where a guard has foretold that the contact mode ends.
     """
     seen, later = y, 0.0
     if is_foretold:
-        seen, later = predict_state(y, offset_frame, work, motion), motion.ahead
-    motion.assured = later
+        seen, later = predict_state(y, offset_frame, work, motion), motion.look_ahead
+    motion.assured_time = later
     refresh_loads(seen, later, offset_frame, work)
     what, n, v, L = find_contact_mode(seen, contact.friction, offset_frame, work, motion)
     what = accept_step(what, watched, y, offset_frame, work, motion)
@@ -152,7 +152,7 @@ def come_to_rest(y, t, offset_frame, work, motion, log, counts):
     if motion.is_resting:
         return y
     motion.is_resting = 1
-    ev.note_mode_change(log, counts, work.i, t + motion.left_out, ev.KIND_REST, -1)
+    ev.note_mode_change(log, counts, work.i, t + motion.skipped_bounce_time, ev.KIND_REST, -1)
     x, q, _, _ = project_state(y, offset_frame, work, motion)
     return x, q, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
 
@@ -162,7 +162,7 @@ def integrate_mode(what, y, t, h, flight, work, motion, report):
     """Move, fly or leap from y, at the time t of a part of length h: (state, time it took, the guard that ended it)."""
     if what == MODE_INCONSISTENT:
         report[work.world, at.FALLBACKS] += 1.0
-        step = min(motion.leap, h - t)
+        step = min(motion.next_leap, h - t)
         lengthen_leap(t + step, motion)
         return drift_at_velocity(y, step, flight.offset_frame, work), step, GUARD_NONE
     if what == MODE_FLIGHT:
@@ -199,20 +199,20 @@ def advance(y, h, contact, flight, work, motion, records, start):
         if mode == MODE_IMPACT:
             y = resolve_impacts(y, start + t, contact, flight.offset_frame, work, motion, records)
         elif mode == MODE_INCONSISTENT:
-            leap = min(motion.leap, h - t)
+            leap = min(motion.next_leap, h - t)
             y = resolve_inconsistency(y, leap, start + t, contact, flight.offset_frame, work, motion, records)
         elif mode == MODE_ROLLBACK:
-            motion.trust = TRUST_SHRINK * watched
+            motion.watched_length = TRUST_SHRINK * watched
             y, t, watched, is_foretold = rollback_state, t - watched, 0.0, False
             set_clock(start + t, work)
             continue
         if watched > 0.0:
-            motion.trust, watched = TRUST_GROWTH * watched, 0.0
+            motion.watched_length, watched = TRUST_GROWTH * watched, 0.0
             if not t < h:
                 break
         if mode == MODE_IMPACT:
             records.report[work.world, at.SPLITS] += 1.0
-            motion.crowd -= motion.is_sequential  # those in turn have a bound of their own
+            motion.chatter_count -= motion.is_sequential  # those in turn have a bound of their own
             is_foretold = False
             continue
         log_mode_changes(work, motion, records.log, records.counts, start + t)
@@ -224,7 +224,7 @@ def advance(y, h, contact, flight, work, motion, records, start):
         t += step
         set_clock(start + t, work)
         adapt_look_ahead(step, guard, motion)
-        motion.left_out, motion.turns = 0.0, 0
+        motion.skipped_bounce_time, motion.sequential_impacts = 0.0, 0
         if guard == GUARD_WATCH:
             watched = step
         elif not t < h:

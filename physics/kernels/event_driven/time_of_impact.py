@@ -122,7 +122,7 @@ def gap_jerk_bound(y, left, offset_frame, work):
 def safe_flight_time(y, left, third, assured, offset_frame, work, motion):
     """A time within which no feature at y reaches a wall, at most `left`.
 
-    Those that touch and do not come stay away for the time `assured` at least: where a push has just ended, what lifts
+    Those that touch and do not come stay away for `assured_time` at least: where a push has just ended, what lifts
     them is still zero.
     """
     x, v = y[0], y[2]
@@ -141,7 +141,7 @@ def safe_flight_time(y, left, third, assured, offset_frame, work, motion):
             speed = vn + qt.dot(n, qt.cross(w, r))
             bend = an + qt.dot(n, plus(qt.cross(alpha, r), qt.cross(w, rate)))
             least = 0.0
-            if gap <= motion.touch and speed >= -motion.still:
+            if gap <= motion.touch_gap and speed >= -motion.rest_speed:
                 gap, speed, least = max(gap, 0.0), max(speed, 0.0), assured
             t = min(t, max(gap_safe_time(max(gap, 0.0), speed, bend, third, t), least))
     return t
@@ -159,19 +159,19 @@ def integrate_free_flight(y, t, offset_frame, work, motion):
     """Free motion under a torque or in fields over t by extrapolated steps: (state, time left)."""
     put_state_row(motion, ROW_START, y)
     left, tries = t, 0
-    motion.step = left
+    motion.step_length = left
     while left > 0.0 and tries < _MAX_FLIGHT_STEPS:
         tries += 1
         h = prepare_extrapolated_step(left, offset_frame, work, motion)
         error, _ = try_extrapolated_step(h, offset_frame, work, motion)
         if not error <= work.tolerance and h > SEGMENT_SHORTEST_STEP * t:
-            motion.step = SEGMENT_STEP_CUT * h
+            motion.step_length = SEGMENT_STEP_CUT * h
             continue
         for c in range(Y_SIZE):
             motion.y[ROW_START, c] = motion.y[ROW_END, c]
         left -= h
         advance_clock(h, work)
-        motion.step = 2.0 * h
+        motion.step_length = 2.0 * h
     return get_state_row(motion, ROW_START), left
 
 
@@ -222,7 +222,7 @@ def fly_to_wall(y, left, gyroscopic, offset_frame, work, motion, report):
     third = gap_jerk_bound(y, left, offset_frame, work)
     now, t = y, 0.0
     for _ in range(_MAX_ADVANCES):
-        assured = motion.assured if t == 0.0 else 0.0
+        assured = motion.assured_time if t == 0.0 else 0.0
         step = safe_flight_time(now, left - t, third, assured, offset_frame, work, motion)
         if t + step >= left:
             return fly_freely(y, left, gyroscopic, offset_frame, work, motion, report), left, True

@@ -27,25 +27,25 @@ def _pace_fields(n_slots: int) -> list[tuple]:
     """Thresholds, pace and trust of the scheme."""
     f, i = np.float64, np.int64
     return [
-        ("touch", f),  # gap within which a feature touches [m]
-        ("still", f),  # speed of a contact that counts as none [m/s]
-        ("slow", f),  # speed along the wall that counts as none [m/s]
-        ("noise", f),  # speed that is rounding [m/s]
-        ("together", f),  # impacts within this time are one [s]
+        ("touch_gap", f),  # gap within which a feature touches [m]
+        ("rest_speed", f),  # speed of a contact that counts as none [m/s]
+        ("slip_stop_speed", f),  # speed along the wall that counts as none [m/s]
+        ("rounding_speed", f),  # speed that is rounding [m/s]
+        ("simultaneity_time", f),  # impacts within this time are one [s]
         ("is_sequential", i),  # 1: contacts collide in turn, 0: at once
-        ("turns", i),  # impacts in turn so far at this moment
-        ("ahead", f),  # time by which the next regime is looked for [s]
-        ("nearest", f),  # the least of these [s]
-        ("assured", f),  # time for which contacts that a guard has let go are known to stay open [s]
-        ("leap", f),  # next leap, since when events crowd, and their number (`chatter_control`)
-        ("since", f),
-        ("crowd", i),
-        ("ended", i),  # the regime that a guard of force has ended
-        ("step", f),  # length of the last smooth step [s]
-        ("unheeded", i),  # the regime whose guards of force say nothing; see `mode_acceptance`
-        ("trust", f),  # length of a step without them [s]
+        ("sequential_impacts", i),  # impacts in turn so far at this moment
+        ("look_ahead", f),  # time by which the next contact mode is looked for [s]
+        ("min_look_ahead", f),  # the least of these [s]
+        ("assured_time", f),  # time for which contacts that a guard has let go are known to stay open [s]
+        ("next_leap", f),  # next leap, since when events crowd, and their number (`chatter_control`)
+        ("chatter_start", f),
+        ("chatter_count", i),
+        ("ended_mode", i),  # the contact mode that a guard of force has ended
+        ("step_length", f),  # length of the last smooth step [s]
+        ("distrusted_mode", i),  # the contact mode whose guards of force say nothing; see `mode_acceptance`
+        ("watched_length", f),  # length of a step without them [s]
         ("end_rate", f, (Y_SIZE,)),  # rate of change at the end of such a step
-        ("left_out", f),  # time that a sequence of bounces would have taken on [s]
+        ("skipped_bounce_time", f),  # time that a sequence of bounces would have taken on [s]
         ("rebound", f, (3 * n_slots,)),  # impulses of a rebound that there is not enough energy for [N s]
     ]  # fmt: skip
 
@@ -56,26 +56,26 @@ def _contact_fields(n: int, n_slots: int) -> list[tuple]:
     return [
         ("count", i),  # contacts that act
         ("slot", i, (n,)),  # wall * features + feature
-        ("holds", i, (n,)),  # 1: no velocity at all; 0: slides
-        ("way", f, (n, 3)),  # direction of sliding
-        ("reference", f, (n, 3)),  # the one at the start of the step
+        ("sticks", i, (n,)),  # 1: no velocity at all; 0: slides
+        ("slip_direction", f, (n, 3)),  # direction of sliding
+        ("start_slip_direction", f, (n, 3)),  # the one at the start of the step
         ("is_starting", i, (n,)),  # 1: the contact was at rest at the start of the step, or nearly
-        ("turning", f),  # rate at which the direction turns in which the only contact begins to slide [rad/s]
-        ("stiffness", f),  # what friction changes of its acceleration across that, for each radian [m/s²]
-        ("first_speed", f),  # of it, at the start of the step [m/s]
-        ("growth", f),  # of that [m/s²]
+        ("slip_turn_rate", f),  # rate at which the direction turns in which the only contact begins to slide [rad/s]
+        ("friction_turn_stiffness", f),  # what friction changes of its acceleration across that, for each radian [m/s²]
+        ("start_slip_speed", f),  # of it, at the start of the step [m/s]
+        ("slip_growth", f),  # of that [m/s²]
         ("arm", f, (n, 3)),  # contact point relative to the centre of mass [m]
         ("velocity", f, (n, 3)),  # of the body there [m/s]
-        ("goal", f, (n, 3)),  # what the unknowns are to cancel: acceleration, velocity or gap
+        ("constraint_error", f, (n, 3)),  # what the unknowns are to cancel: acceleration, velocity or gap
         ("force", f, (n, 3)),  # [N]
         ("normal", f, (n,)),  # of it, along the normal [N]
         ("margin", f, (3, 2, n)),  # of push and cone at the ends of a step and inside; see `force_minima` [weights]
-        ("fall", f, (2, n)),  # their rates of change at its start
-        ("first", i, (n,)),  # first unknown of the contact alone
+        ("margin_rate", f, (2, n)),  # their rates of change at its start
+        ("first_unknown", i, (n,)),  # first unknown of the contact alone
         ("patch", i, (n,)),  # first of the three of its wall's normal forces, NO_PATCH: its normal force is its own
-        ("place", f, (n, 2)),  # coordinates in the patch, in radii
-        ("share", f, (n, 3)),  # part of its force that is given, along the wall's axes [N]
-        ("last", f, (n_slots, 3)),  # force of every feature when it was last known, along the wall's axes [N]
+        ("patch_coordinate", f, (n, 2)),  # coordinates in the patch, in radii
+        ("given_force", f, (n, 3)),  # part of its force that is given, along the wall's axes [N]
+        ("last_force", f, (n_slots, 3)),  # force of every feature when it was last known, along the wall's axes [N]
     ]  # fmt: skip
 
 
@@ -83,30 +83,30 @@ def _unknown_fields(m: int) -> list[tuple]:
     """Unknowns of the contact forces and their equations."""
     f, i = np.float64, np.int64
     return [
-        ("known", f, (2, 3)),  # force and moment of the shares, which the unknowns add to
-        ("push", f, (m, 3)),  # force per unknown
-        ("turn", f, (m, 3)),  # moment per unknown about the centre of mass
+        ("given_wrench", f, (2, 3)),  # force and moment of the shares, which the unknowns add to
+        ("column_force", f, (m, 3)),  # force per unknown
+        ("column_moment", f, (m, 3)),  # moment per unknown about the centre of mass
         ("row", f, (m, 3)),  # direction of the constraint
-        ("row_turn", f, (m, 3)),  # its moment
+        ("row_moment", f, (m, 3)),  # its moment
         ("is_skew", i),  # 1: some contact pushes along another line than its row
-        ("chosen", i, (m,)),  # rows that are equations
+        ("independent_row", i, (m,)),  # rows that are equations
         ("matrix", f, (m, m + 1)),
         ("order", i, (m,)),
-        ("asked", f, (m,)),  # right-hand sides
+        ("rhs", f, (m,)),  # right-hand sides
         ("unknown", f, (m,)),
     ]  # fmt: skip
 
 
 def _candidate_fields(n: int) -> list[tuple]:
-    """Contacts that a regime may have."""
+    """Contacts that a contact mode may have."""
     f, i = np.float64, np.int64
     return [
-        ("candidates", i),  # of a regime: contacts that touch and do not leave
-        ("kind", i, (n,)),  # of them: open, held, sliding
+        ("candidates", i),  # of a contact mode: contacts that touch and do not leave
+        ("candidate_state", i, (n,)),  # of them: open, held, sliding
         ("is_fresh", i, (n,)),  # slides from rest
-        ("changes", i, (n,)),
+        ("candidate_changes", i, (n,)),
         ("candidate", i, (n,)),  # their slots
-        ("candidate_way", f, (n, 3)),
+        ("candidate_direction", f, (n, 3)),
     ]  # fmt: skip
 
 
@@ -115,18 +115,18 @@ def _step_fields(walls: int, n_slots: int) -> list[tuple]:
     f, i = np.float64, np.int64
     return [
         ("is_resting", i),
-        ("state", i, (walls,)),  # what the body did at each wall after the last event
+        ("wall_state", i, (walls,)),  # what the body did at each wall after the last event
         ("gap", f, (2, n_slots)),  # of every feature, at the start and at the end of the step [m]
         ("gap_rate", f, (2, n_slots)),  # [m/s]
         ("is_active", i, (n_slots,)),
         ("weight", f),  # scale of the forces [N]
-        ("spin", f),  # angular speed at the start of the step [rad/s]
+        ("start_angular_speed", f),  # angular speed at the start of the step [rad/s]
         ("y", f, (ROW_COUNT, Y_SIZE)),
         ("rate", f, (Y_SIZE,)),
         ("first_rate", f, (Y_SIZE,)),
         ("last_rate", f, (Y_SIZE,)),
         ("scale", f, (Y_SIZE,)),
-        ("table", f, (MAX_MIDPOINT_RULES, Y_SIZE)),
+        ("extrapolation_table", f, (MAX_MIDPOINT_RULES, Y_SIZE)),
     ]  # fmt: skip
 
 

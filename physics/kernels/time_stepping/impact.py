@@ -55,7 +55,7 @@ def resolve_impacts(n, y, t, h, contact, offset_frame, records, work):
     for k in range(3 * n):
         work.impulse[k] = 0.0
     R = qt.to_matrix(principal_attitude(q, work, offset_frame))
-    work.mode, work.still, work.unseen = TRY_SLIDING, math.inf, 0.0
+    work.mode, work.residual_limit, work.target_error_limit = TRY_SLIDING, math.inf, 0.0
     solved = solve_contacts(n, contact, v, L, R, work)
     if not solved[2] <= work.tolerance:
         solved = scale_impulses_to_dissipate(

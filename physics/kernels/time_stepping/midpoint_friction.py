@@ -72,8 +72,8 @@ def oppose_mean_slip(n, v, w, h, work):
     Notes
     -----
     Changes the tangents of `work.target`, which `target_velocity.set_resting_targets` has set: what the turning of its
-    arm takes from a contact in half a stage (kept in `work.held`). Added to the velocity at the middle it gives the one
-    at the start.
+    arm takes from a contact in half a stage (kept in `work.held_target`). Added to the velocity at the middle it gives
+    the one at the start.
     """
     least = _least_slip(w, h, work)
     for i in range(n):
@@ -83,7 +83,7 @@ def oppose_mean_slip(n, v, w, h, work):
             return False
     for i in range(n):
         a, b = _tangential(i, v, w, work)
-        work.held[i, 0], work.held[i, 1] = work.target[i, 1], work.target[i, 2]
+        work.held_target[i, 0], work.held_target[i, 1] = work.target[i, 1], work.target[i, 2]
         work.target[i, 1], work.target[i, 2] = -a, -b
     return True
 
@@ -92,7 +92,7 @@ def oppose_mean_slip(n, v, w, h, work):
 def oppose_end_slip(n, work):
     """Take `oppose_mean_slip` back."""
     for i in range(n):
-        work.target[i, 1], work.target[i, 2] = work.held[i, 0], work.held[i, 1]
+        work.target[i, 1], work.target[i, 2] = work.held_target[i, 0], work.held_target[i, 1]
 
 
 @inlined

@@ -86,8 +86,8 @@ def midpoint_step(n, y, h, contact, flight, records, work):
     load_warm_start(n, width, records.memory, work.i, h, work)
     v = (v[0] + h * a[0], v[1] + h * a[1], v[2] + h * a[2])
     L = (L[0] + h * torque[0], L[1] + h * torque[1], L[2] + h * torque[2])
-    work.mode, work.still = int(records.memory[work.i, WALL_MEMORY_MODE]), rest_residual(h, work)
-    work.unseen = TARGET_ERROR_SLOP_SHARE * work.slop / h
+    work.mode, work.residual_limit = int(records.memory[work.i, WALL_MEMORY_MODE]), rest_residual(h, work)
+    work.target_error_limit = TARGET_ERROR_SLOP_SHARE * work.slop / h
     solved = solve_contacts(n, contact, v, L, R, work)
     if opposes_mean and has_slip_reversed(n, solved[0], apply_inv_inertia(R, solved[1], work.J), work):
         oppose_end_slip(n, work)

@@ -70,8 +70,8 @@ def workspace_dtype(
     ]
     stage = [
         ("mode", i),  # the direct solve to try first, then the one that solved it (`sliding_patch.TRY_STICKING` ...)
-        ("still", f),  # residual allowed beside the tolerance [m/s]: see `midpoint_step.rest_residual`
-        ("unseen", f),  # by what the targets of contacts that hold may be off [m/s]: see `sticking`
+        ("residual_limit", f),  # residual allowed beside the tolerance [m/s]: see `midpoint_step.rest_residual`
+        ("target_error_limit", f),  # by what the targets of contacts that hold may be off [m/s]: see `sticking`
         ("is_last", i),  # 1 in the last stage a substep may have: take in all that would pass through a wall
     ]
     contacts = [
@@ -79,13 +79,13 @@ def workspace_dtype(
         ("vertices", f, (2, VERTEX_COUNT)),  # gap [m] and normal velocity [m/s] of each vertex at one wall
         ("slot", i, (n,)),  # wall * features + feature, the stable name of a contact
         ("gap", f, (n,)),  # [m], negative when penetrating
-        *[("due", f, (n,))] * (contact_laws.LAW_STIFFNESS in laws),  # gap at the end of a stage [m] (`compliance`)
+        *[("end_gap", f, (n,))] * (contact_laws.LAW_STIFFNESS in laws),  # gap at the end of a stage [m] (`compliance`)
         ("speed", f, (n,)),  # normal velocity before the stage [m/s], negative when approaching
         ("widest", f),  # largest gap of them all, 0 if there is none above a wall [m]
         ("approach", f),  # fastest approach of them all, 0 if none does [m/s]
         ("arm", f, (n, 3)),  # contact point relative to the centre of mass, world frame [m]
         ("target", f, (n, 3)),  # contact velocity aimed at (normal, tangents) [m/s]
-        ("held", f, (MEAN_SLIP_CONTACTS, 2)),  # tangents of contacts that hold (`midpoint_friction`) [m/s]
+        ("held_target", f, (MEAN_SLIP_CONTACTS, 2)),  # tangents of contacts that hold (`midpoint_friction`) [m/s]
         ("friction", f, (n,)),  # Coulomb coefficient
         ("frame", f, (3 * n, 3)),  # directions normal, tangent 1, tangent 2 of each contact
         ("angular", f, (3 * n, 3)),  # angular Jacobian rows arm x direction [m]
@@ -117,7 +117,7 @@ def make_workspace(
 ) -> np.ndarray:
     """One workspace record, shape (1,), for `walls` ((walls, WALL_SIZE)), fields, laws, and numerical settings."""
     work = np.zeros(1, workspace_dtype(len(walls), features, terms, laws))
-    work["features"], work["feature_bits"], work["still"] = features, features.bit_length() - 1, np.inf
+    work["features"], work["feature_bits"], work["residual_limit"] = features, features.bit_length() - 1, np.inf
     if len(walls):
         work["walls"][0] = walls
     for name, value in settings.items():

@@ -13,7 +13,7 @@ from tests.reference.rigid_body import rotation_matrix
 
 POS, QUAT, VEL, ANGVEL, GAPS = slice(0, 3), slice(3, 7), slice(7, 10), slice(10, 13), slice(13, -1)
 TWIST = slice(7, 13)
-CLOCK = -1  # time since the regime began [s]
+CLOCK = -1  # time since the contact mode began [s]
 
 
 def skew(a):

@@ -77,7 +77,7 @@ def constrained_rows(modes):
     return [3 * i + k for i, mode in enumerate(modes) for k in range(3 if mode == HOLD else 1)]
 
 
-def regime_forces(A, b, walls, places, modes, directions, mu):
+def mode_forces(A, b, walls, places, modes, directions, mu):
     """(n, 3) forces of active contacts whose modes and directions of sliding are known."""
     G = force_basis(walls, places, modes, directions, mu)
     rows = constrained_rows(modes)
@@ -164,7 +164,7 @@ def _forces(problem, modes, directions):
     f = np.zeros((len(modes), 3))
     if active:
         rows = [3 * i + k for i in active for k in range(3)]
-        f[active] = regime_forces(
+        f[active] = mode_forces(
             problem.A[np.ix_(rows, rows)], problem.b[rows], [problem.walls[i] for i in active],
             problem.places[active], [modes[i] for i in active], [directions[i] for i in active], problem.mu,
         )  # fmt: skip

@@ -1,4 +1,4 @@
-"""The motion: smooth regimes, and the events between them."""
+"""The motion: smooth contact modes, and the events between them."""
 
 from __future__ import annotations
 
@@ -8,10 +8,10 @@ from typing import NamedTuple
 import numpy as np
 from scipy.optimize import brentq
 
-from tests.reference.hybrid import body, contact, hits, regime
+from tests.reference.hybrid import body, contact, contact_mode, hits
 from tests.reference.hybrid.body import ANGVEL, GAPS, TWIST, VEL, Problem
 from tests.reference.hybrid.contact import HOLD, SLIDE
-from tests.reference.hybrid.regime import advance, choose, dynamics, margins, project
+from tests.reference.hybrid.contact_mode import advance, choose, dynamics, margins, project
 
 
 class Options(NamedTuple):
@@ -114,7 +114,7 @@ class _Run:
     # Smooth motion
 
     def settle(self, touching, at_rest=(), ahead=None):
-        """The regime from here: impacts first, then forces; `ahead` is an old regime that is just ending."""
+        """The contact mode from here: impacts first, then forces; `ahead` is an old one that is just ending."""
         self.impacts(touching)
         speeds = body.normal_speeds(self.problem, self.y)
         candidates = [c for c in touching if abs(speeds[c]) <= self.options.tiny]
@@ -123,7 +123,7 @@ class _Run:
             y = advance(self.problem, y, ahead, self.options.ahead)
         now = choose(self.problem, y, candidates, self.options.snap, at_rest)
         self.y = project(self.problem, self.y, now)
-        return regime.with_directions(self.problem, self.y, now, self.options)
+        return contact_mode.with_directions(self.problem, self.y, now, self.options)
 
     def slip_rates(self, y, now):
         """(contacts, speeds, d speed/dt) of the contacts that slide and do not only begin to."""
@@ -146,7 +146,7 @@ class _Run:
 
     def smooth(self, now, duration, sample):
         """Integrate until an event or until `duration`; returns what ended it: (kind, contacts)."""
-        solver = regime.integrator(self.problem, self.y, now, self.options)
+        solver = contact_mode.integrator(self.problem, self.y, now, self.options)
         begin, longest = self.t, solver.max_step
         while True:
             t0, y0 = solver.t, solver.y.copy()
@@ -217,12 +217,12 @@ QUARTERS = np.linspace(0.0, 1.0, 5)
 
 def collide(problem: Problem, y, touching, restitution):
     """(y⁺, impulses (n, 3)) of one impact with a coefficient of restitution per contact."""
-    A, _, u, carried, _ = regime.assemble(problem, y, touching)
+    A, _, u, carried, _ = contact_mode.assemble(problem, y, touching)
     b = u.copy()
     b[:, 0] += restitution * np.minimum(u[:, 0], 0.0)  # u_n⁺ - goal, goal = -e u_n⁻
     given = tuple(np.zeros(2) if problem.friction == 0.0 else None for _ in touching)
     walls = tuple(problem.wall(c) for c in touching)
-    question = contact.Contacts(A, b.ravel(), problem.friction, walls, regime.places(problem, y, touching), given)
+    question = contact.Contacts(A, b.ravel(), problem.friction, walls, contact_mode.places(problem, y, touching), given)
     p = contact.solve(question).f
     after = y.copy()
     after[TWIST] += carried @ p.ravel()
@@ -266,7 +266,7 @@ def simulate(problem: Problem, y, duration, sample_times=(), options=None) -> Re
 
 
 def follow(run, now, kind, contacts):
-    """The regime after an event."""
+    """The contact mode after an event."""
     held = [c for c, mode in zip(now.active, now.modes) if mode == HOLD]
     if kind == "impact":
         run.y[GAPS][contacts] = 0.0

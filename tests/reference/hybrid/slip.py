@@ -22,7 +22,7 @@ ACCEPTED = 1e-12  # velocity across the assumed direction [m/s]
 class Turning(NamedTuple):
     """Directions of the contacts that start to slide while the clock runs from 0 to `span`."""
 
-    which: tuple  # indices into the active contacts of the regime
+    which: tuple  # indices into the active contacts of the contact mode
     span: float  # [s]
     angles: np.ndarray  # (len(which), degree + 1) polynomial in clock/span, lowest power first [rad]
 

@@ -13,7 +13,7 @@ from tests.reference.hybrid.contact import HOLD, OPEN, SLIDE
 from tests.reference.hybrid.slip import Turning
 
 
-class Regime(NamedTuple):
+class ContactMode(NamedTuple):
     """Contacts that carry, their modes; those that only touch; directions of those whose sliding only begins."""
 
     active: tuple = ()
@@ -52,45 +52,45 @@ def directions(velocities, turning, clock):
     return found
 
 
-def dynamics(problem: Problem, y, regime: Regime):
-    """(dy/dt, forces (n, 3), A) of a regime."""
+def dynamics(problem: Problem, y, mode: ContactMode):
+    """(dy/dt, forces (n, 3), A) of a contact mode."""
     rate = np.zeros_like(y)
     rate[POS], rate[QUAT] = y[VEL], body.quaternion_rate(y)
     rate[GAPS] = body.normal_speeds(problem, y)
-    rate[GAPS][regime.fixed] = 0.0
+    rate[GAPS][mode.fixed] = 0.0
     rate[CLOCK] = 1.0
-    if not regime.active:
+    if not mode.active:
         rate[TWIST] = body.free_acceleration(problem, y)
         return rate, np.zeros((0, 3)), np.zeros((0, 0))
-    A, b, u, carried, free = assemble(problem, y, regime.active)
-    walls = [problem.wall(c) for c in regime.active]
-    d = directions(u, regime.turning, y[CLOCK])
-    f = contact.regime_forces(A, b, walls, places(problem, y, regime.active), regime.modes, d, problem.friction)
+    A, b, u, carried, free = assemble(problem, y, mode.active)
+    walls = [problem.wall(c) for c in mode.active]
+    d = directions(u, mode.turning, y[CLOCK])
+    f = contact.mode_forces(A, b, walls, places(problem, y, mode.active), mode.modes, d, problem.friction)
     rate[TWIST] = free + carried @ f.ravel()
     return rate, f, A
 
 
-def margins(problem: Problem, y, regime: Regime) -> dict:
-    """{what ends the regime: a number that is positive while it lasts}.
+def margins(problem: Problem, y, mode: ContactMode) -> dict:
+    """{what ends the contact mode: a number that is positive while it lasts}.
 
     Keys are ("release", contact), ("slip", None) and ("carry", contact) for an idle contact whose share of the
     normal force, max(0, ℓ), becomes positive.
     """
-    if not regime.active:
+    if not mode.active:
         return {}
-    _, f, A = dynamics(problem, y, regime)
-    ends = {("release", c): f[i, 0] for i, c in enumerate(regime.active)}
-    if HOLD in regime.modes:
-        ends["slip", None] = contact.hold_margin(A, regime.modes, f, problem.friction)
-    for c in regime.idle:
-        mine = [i for i, other in enumerate(regime.active) if problem.wall(other) == problem.wall(c)]
-        place = places(problem, y, [*(regime.active[i] for i in mine), c])
+    _, f, A = dynamics(problem, y, mode)
+    ends = {("release", c): f[i, 0] for i, c in enumerate(mode.active)}
+    if HOLD in mode.modes:
+        ends["slip", None] = contact.hold_margin(A, mode.modes, f, problem.friction)
+    for c in mode.idle:
+        mine = [i for i, other in enumerate(mode.active) if problem.wall(other) == problem.wall(c)]
+        place = places(problem, y, [*(mode.active[i] for i in mine), c])
         ends["carry", c] = -contact.extrapolated(place[:-1], f[mine, 0], place[-1])
     return ends
 
 
-def choose(problem: Problem, y, touching, still, at_rest) -> Regime:
-    """The regime of touching contacts with u_n = 0 at this instant.
+def choose(problem: Problem, y, touching, still, at_rest) -> ContactMode:
+    """The contact mode of touching contacts with u_n = 0 at this instant.
 
     Parameters
     ----------
@@ -101,7 +101,7 @@ def choose(problem: Problem, y, touching, still, at_rest) -> Regime:
         Contacts that do not slide whatever rounding, or a look ahead, says of their speed.
     """
     if not touching:
-        return Regime()
+        return ContactMode()
     A, b, u, _, _ = assemble(problem, y, touching)
     slides = [c not in at_rest and np.linalg.norm(row[1:]) > still for c, row in zip(touching, u)]
     given = tuple(row[1:] / np.linalg.norm(row[1:]) if s else None for s, row in zip(slides, u))
@@ -114,7 +114,7 @@ def choose(problem: Problem, y, touching, still, at_rest) -> Regime:
     carry = [i for i, mode in enumerate(answer.modes) if mode != OPEN]
     starts = [k for k, i in enumerate(carry) if answer.modes[i] == SLIDE and given[i] is None]
     begin = [answer.a[carry[k], 1:] for k in starts]
-    return Regime(
+    return ContactMode(
         active=tuple(touching[i] for i in carry),
         modes=tuple(answer.modes[i] for i in carry),
         idle=tuple(touching[i] for i in idle),
@@ -122,45 +122,45 @@ def choose(problem: Problem, y, touching, still, at_rest) -> Regime:
     )
 
 
-def with_directions(problem: Problem, y, regime: Regime, options) -> Regime:
-    """The regime from the state y on, with the directions in which its contacts start to slide."""
-    if regime.turning is None:
-        return regime
+def with_directions(problem: Problem, y, mode: ContactMode, options) -> ContactMode:
+    """The contact mode from the state y on, with the directions in which its contacts start to slide."""
+    if mode.turning is None:
+        return mode
     y = y.copy()
     y[CLOCK] = 0.0
-    starting = [regime.active[k] for k in regime.turning.which]
+    starting = [mode.active[k] for k in mode.turning.which]
 
     def velocities(turning, times):
-        trial, now, found = regime._replace(turning=turning), y, []
+        trial, now, found = mode._replace(turning=turning), y, []
         for h in np.diff(times, prepend=0.0):
             now = advance(problem, now, trial, h)
             found.append((body.jacobian(problem, now, starting) @ now[TWIST])[:, 1:])
         return np.array(found).transpose(1, 0, 2)
 
     span = 0.5 * options.max_step(problem, y)
-    return regime._replace(turning=slip.collocate(regime.turning, span, velocities))
+    return mode._replace(turning=slip.collocate(mode.turning, span, velocities))
 
 
-def integrator(problem: Problem, y, regime: Regime, options):
-    """SciPy's one-step integrator of the regime from local time 0; it ends where sliding has begun."""
+def integrator(problem: Problem, y, mode: ContactMode, options):
+    """SciPy's one-step integrator of the contact mode from local time 0; it ends where sliding has begun."""
     return DOP853(
-        lambda t, y: dynamics(problem, y, regime)[0], 0.0, y, regime.turning.span if regime.turning else np.inf,
+        lambda t, y: dynamics(problem, y, mode)[0], 0.0, y, mode.turning.span if mode.turning else np.inf,
         rtol=options.rtol, atol=1e-2 * options.rtol, max_step=options.max_step(problem, y),
     )  # fmt: skip
 
 
-def advance(problem: Problem, y, regime: Regime, h):
+def advance(problem: Problem, y, mode: ContactMode, h):
     """y after h: one step of DOP853, h within a step that its error control has accepted."""
     if h <= 0.0:
         return y.copy()
     stages = []
     for row in DOP853.A[: DOP853.n_stages]:
         moved = y + h * sum((a * k for a, k in zip(row, stages) if a != 0.0), np.zeros_like(y))
-        stages.append(dynamics(problem, moved, regime)[0])
+        stages.append(dynamics(problem, moved, mode)[0])
     return y + h * sum(c * k for c, k in zip(DOP853.B, stages))
 
 
-def project(problem: Problem, y, regime: Regime, restart_above=1e-6):
+def project(problem: Problem, y, mode: ContactMode, restart_above=1e-6):
     """Remove drift: gaps and velocities that are zero, by the least change in the mass metric; |q| = 1.
 
     The gaps carried along are exact for contacts that have just left the wall; beyond `restart_above` [m]
@@ -169,14 +169,14 @@ def project(problem: Problem, y, regime: Regime, restart_above=1e-6):
     y = y.copy()
     y[QUAT] /= np.linalg.norm(y[QUAT])
     inverse = body.inverse_mass(problem, y)
-    fixed = regime.fixed
+    fixed = mode.fixed
     if fixed:
         J = body.jacobian(problem, y, fixed)
         move = _least(inverse, J[:, 0], -body.gaps(problem, y)[fixed])
         y[POS] += move[:3]
         y[QUAT] += body.quaternion_rate(np.concatenate([y[:10], move[3:]]))
         y[QUAT] /= np.linalg.norm(y[QUAT])
-        modes = [*regime.modes, *(SLIDE for _ in regime.idle)]
+        modes = [*mode.modes, *(SLIDE for _ in mode.idle)]
         J = body.jacobian(problem, y, fixed).reshape(-1, 6)[contact.constrained_rows(modes)]
         y[TWIST] += _least(inverse, J, -J @ y[TWIST])
     fresh = body.gaps(problem, y)
