@@ -74,9 +74,10 @@ class Work:
         """Let none of the calls have raised anything."""
         self._table[:, JOB_STATUS] = 0
 
-    def put(self, argument: int, number: float) -> None:
-        """Give the first of the calls another number for an argument that is one."""
-        self._words[0][self._places[argument]] = _words((number,))[0]
+    def put(self, argument: int, value: float | tuple) -> None:
+        """Give the first of the calls another value for an argument: a number, or as many of them as it had."""
+        words, place = _words((value,)), self._places[argument]
+        self._words[0][place : place + len(words)] = words
 
     @cached_property
     def _places(self) -> list[int]:

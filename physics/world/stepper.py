@@ -17,6 +17,7 @@ from physics.kernels.state.groups import (
     FlightSwitches,
     MultibodySwitches,
     Records,
+    TimeGrid,
     WorkQueue,
 )
 from physics.kernels.time_stepping.spring_coupled_step import step_linked
@@ -27,8 +28,8 @@ from physics.parallel.exclusive import in_use
 from physics.summary import shown
 from physics.world.batch import Batch
 
-# Which arguments of all step kernels the number of steps is, and the length of a substep.
-STEPS, SUBSTEP = 1, 3
+# Which argument of all step kernels the `TimeGrid` is.
+GRID = 1
 
 if TYPE_CHECKING:
     from physics.plan.plan import Plan
@@ -173,12 +174,12 @@ def kernel_calls(world: Batch, wrench: np.ndarray, steps: int, dt: float) -> lis
     plan = world.plan
     if world.actuation is not None:
         wrench = world.actuation.applied
-    steps, substeps, h = _times(world, steps, dt)
+    grid = _time_grid(world, steps, dt)
     kernel, own_arguments = _step_of(plan)
     gravity = world.gravity if plan.gravity else None
     bodies = BodyArrays(world.state, world.params, world.shapes, gravity, wrench.reshape(-1, 6))
     argument_lists = [
-        (WorkQueue(world.team.turns, taken), steps, substeps, h, bodies, *own_arguments(world, k))
+        (WorkQueue(world.team.turns, taken), grid, bodies, *own_arguments(world, k))
         for k, taken in enumerate(world.team.taken)
     ]
     entry = _entry(kernel, (plan.key, len(world.walls)), argument_lists[0])
@@ -187,16 +188,14 @@ def kernel_calls(world: Batch, wrench: np.ndarray, steps: int, dt: float) -> lis
 
 def retime(world: Batch, calls: list[Work], steps: int, dt: float) -> None:
     """Let `kernel_calls` of a world take so many steps of another `dt` [s]: faster than to prepare others."""
-    steps, _, h = _times(world, steps, dt)
     for call in calls:
-        call.put(STEPS, steps)
-        call.put(SUBSTEP, h)
+        call.put(GRID, _time_grid(world, steps, dt))
 
 
-def _times(world: Batch, steps: int, dt: float) -> tuple[int, int, float]:
-    """Steps, substeps and the length of one [s] that a kernel is called for."""
+def _time_grid(world: Batch, steps: int, dt: float) -> TimeGrid:
+    """Time that a kernel is called for."""
     substeps = world.accuracy.substeps
-    return 1 if _takes_each_step(world) else steps, substeps, dt / substeps
+    return TimeGrid(1 if _takes_each_step(world) else steps, substeps, dt / substeps)
 
 
 def _step_of(plan: Plan) -> tuple[Callable, Callable[[Batch, int], tuple]]:

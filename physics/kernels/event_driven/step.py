@@ -61,11 +61,12 @@ from physics.kernels.event_driven.smooth_segment import body_speed_bound, integr
 from physics.kernels.event_driven.time_of_impact import count_unresolved_flight, fly_freely, fly_to_wall
 from physics.kernels.forces.held_loads import bind_fields, refresh_loads, set_clock
 from physics.kernels.math import quaternion as qt
-from physics.kernels.parallel.work_stealing import begin_taking, next_world
+from physics.kernels.parallel.work_stealing import for_each_world
 from physics.kernels.state import layout as at
 from physics.kernels.state.body import (
     angular_velocity,
     bind_body,
+    clear_report,
     has_finite_loads,
     is_finite,
     read_state,
@@ -236,45 +237,44 @@ def advance(y, h, contact, flight, work, motion, records, start):
     return y
 
 
-@kernel
-def step_events(queue, steps, substeps, h, bodies, contact, restitution, flight, records, scratch, motions):
-    """Advance the worlds that no other thread has taken by `steps` steps of `substeps` parts of h seconds each.
+@inlined
+def advance_world(world, grid, bodies, contact, restitution, flight, records, work, motion):
+    """Advance each body of a world by `grid.steps` steps, from event to event.
 
-    Events go to `log` (rows, room, EVENT_SIZE), their number to `counts` (rows,); otherwise as `step.step_worlds`.
+    Events go to `log` (rows, room, EVENT_SIZE), their number to `counts` (rows,); otherwise as that of time stepping.
     """
-    work, motion = scratch[0], motions[0]
-    count = bodies.shapes.shape[0]
-    world = begin_taking(queue.turns, queue.taken)
-    while True:
-        world = next_world(world, queue.turns, queue.taken)
-        if world < 0:
-            break
-        for c in range(at.REPORT_SIZE):
-            records.report[world, c] = 0.0
-        for b in range(count):
-            i = world * count + b
-            records.counts[i] = 0
-            bind_body(world, i, bodies.shapes[b], bodies, contact.friction, restitution, flight.offset_frame, work)
-            if not has_finite_loads(work):
+    h, count = grid.h, bodies.shapes.shape[0]
+    clear_report(world, records.report)
+    for b in range(count):
+        i = world * count + b
+        records.counts[i] = 0
+        bind_body(world, i, bodies.shapes[b], bodies, contact.friction, restitution, flight.offset_frame, work)
+        if not has_finite_loads(work):
+            report_fault(world, b, records.report)
+            ev.note_mode_change(records.log, records.counts, i, 0.0, ev.KIND_FAULT, -1)
+            continue
+        bind_fields(bodies.params, i, None, work)
+        bind_laws(bodies.params, i, work)
+        y = read_state(bodies.state, i)
+        for k in range(grid.steps * grid.substeps):
+            if contact.acts is not None:
+                new = advance(y, h, contact, flight, work, motion, records, k * h)
+            else:
+                motion.count = 0
+                set_clock(k * h, work)
+                new = fly_freely(y, h, flight.gyroscopic, flight.offset_frame, work, motion, records.report)
+            if not is_finite(new):
                 report_fault(world, b, records.report)
-                ev.note_mode_change(records.log, records.counts, i, 0.0, ev.KIND_FAULT, -1)
-                continue
-            bind_fields(bodies.params, i, None, work)
-            bind_laws(bodies.params, i, work)
-            y = read_state(bodies.state, i)
-            for k in range(steps * substeps):
-                if contact.acts is not None:
-                    new = advance(y, h, contact, flight, work, motion, records, k * h)
-                else:
-                    motion.count = 0
-                    set_clock(k * h, work)
-                    new = fly_freely(y, h, flight.gyroscopic, flight.offset_frame, work, motion, records.report)
-                if not is_finite(new):
-                    report_fault(world, b, records.report)
-                    ev.drop_events(i, 1, k * h, records.log, records.counts)
-                    ev.note_mode_change(records.log, records.counts, i, k * h, ev.KIND_FAULT, -1)
-                    break
-                y = new
-            write_state(bodies.state, i, y)
-            w = angular_velocity(y[1], y[3], work, flight.offset_frame)
-            bodies.state[i, at.ANGVEL], bodies.state[i, at.ANGVEL + 1], bodies.state[i, at.ANGVEL + 2] = w
+                ev.drop_events(i, 1, k * h, records.log, records.counts)
+                ev.note_mode_change(records.log, records.counts, i, k * h, ev.KIND_FAULT, -1)
+                break
+            y = new
+        write_state(bodies.state, i, y)
+        w = angular_velocity(y[1], y[3], work, flight.offset_frame)
+        bodies.state[i, at.ANGVEL], bodies.state[i, at.ANGVEL + 1], bodies.state[i, at.ANGVEL + 2] = w
+
+
+@kernel
+def step_events(queue, grid, bodies, contact, restitution, flight, records, scratch, motions):
+    """Advance the worlds that no other thread has taken, from event to event: `advance_world`."""
+    for_each_world(queue, advance_world, (grid, bodies, contact, restitution, flight, records, scratch[0], motions[0]))

@@ -91,3 +91,24 @@ def reset_ranges(turns):
     """Nobody has taken anything."""
     for k in range(1, turns.shape[0]):
         turns[k, RANGE_NEXT] = turns[k - 1, RANGE_END] if k > 1 else 0
+
+
+@inlined
+def for_each_world(queue, advance, about):
+    """Call ``advance(world, *about)`` for the worlds that no other thread has taken: the one loop over worlds.
+
+    Parameters
+    ----------
+    queue : WorkQueue
+        `physics.kernels.state.groups`.
+    advance : kernel
+        Advances one world.
+    about : tuple
+        Its other arguments. What is None there is pruned in the kernel.
+    """
+    world = begin_taking(queue.turns, queue.taken)
+    while True:
+        world = next_world(world, queue.turns, queue.taken)
+        if world < 0:
+            break
+        advance(world, *about)

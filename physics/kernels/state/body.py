@@ -106,6 +106,13 @@ def find_overloaded_body(bodies):
 
 
 @inlined
+def clear_report(world, report):
+    """Begin the report of a world's steps."""
+    for c in range(at.REPORT_SIZE):
+        report[world, c] = 0.0
+
+
+@inlined
 def report_fault(world, b, report):
     """Body b of a world keeps its old state."""
     report[world, at.FAULTS] += 1.0

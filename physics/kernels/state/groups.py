@@ -17,6 +17,14 @@ class WorkQueue(NamedTuple):
     taken: np.ndarray  # worlds that this thread has taken
 
 
+class TimeGrid(NamedTuple):
+    """Time that a call covers."""
+
+    steps: int
+    substeps: int  # of each step
+    h: float  # length of a substep [s]
+
+
 class BodyArrays(NamedTuple):
     """Bodies of all worlds; rows are those of world 0, then of world 1, and so on."""
 

@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from physics.kernels.compile.decorators import kernel
+from physics.kernels.compile.decorators import inlined, kernel
 from physics.kernels.flight.free_flight import integrate_flight
 from physics.kernels.forces.force_field_dispatch import Term
 from physics.kernels.forces.held_loads import bind_fields, set_clock
@@ -21,11 +21,12 @@ from physics.kernels.forces.world_energy_budget import (
     note_stage_energy,
     report_unresolved_bodies,
 )
-from physics.kernels.parallel.work_stealing import begin_taking, next_world
+from physics.kernels.parallel.work_stealing import for_each_world
 from physics.kernels.state import layout as at
 from physics.kernels.state.body import (
     angular_velocity,
     bind_body,
+    clear_report,
     find_nonfinite_body,
     find_overloaded_body,
     read_state,
@@ -76,46 +77,46 @@ def _substep(h, flight, linked):
     limit_world_energy_gain(h, 1, flight.offset_frame, linked, linked.work[0])
 
 
-@kernel
-def step_linked(queue, steps, substeps, h, bodies, flight, held, events, records, linked):
-    """Advance the worlds that no other thread has taken by `steps` steps of `substeps` substeps of h seconds each.
+@inlined
+def advance_world(world, grid, bodies, flight, held, events, records, linked):
+    """Advance a world by `grid.steps` steps.
 
     Of the switches `held` and `events` one is on: loads held over the step, or motion to the tolerance. A world in
     which a new state is not finite keeps the last good one, and its report counts the fault.
     """
-    count = bodies.shapes.shape[0]
-    world = begin_taking(queue.turns, queue.taken)
-    while True:
-        world = next_world(world, queue.turns, queue.taken)
-        if world < 0:
-            break
-        for c in range(at.REPORT_SIZE):
-            records.report[world, c] = 0.0
+    h, count = grid.h, bodies.shapes.shape[0]
+    clear_report(world, records.report)
+    for b in range(count):
+        i = world * count + b
+        bind_body(world, i, bodies.shapes[b], bodies, None, None, flight.offset_frame, linked.work[b])
+        bind_fields(bodies.params, i, flight.scheme, linked.work[b])
+        write_state(linked.state, b, read_state(bodies.state, i))
+    lost = find_overloaded_body(linked.work)
+    if lost >= 0:
+        report_fault(world, lost, records.report)
+        return
+    for k in range(grid.steps * grid.substeps):
         for b in range(count):
-            i = world * count + b
-            bind_body(world, i, bodies.shapes[b], bodies, None, None, flight.offset_frame, linked.work[b])
-            bind_fields(bodies.params, i, flight.scheme, linked.work[b])
-            write_state(linked.state, b, read_state(bodies.state, i))
-        lost = find_overloaded_body(linked.work)
+            set_clock(k * h, linked.work[b])
+        if held is not None:
+            _substep(h, flight, linked)
+        if events is not None:
+            step_linked_segment(world, h, flight.offset_frame, records.report, linked)
+        lost = find_nonfinite_body(linked.state)
         if lost >= 0:
             report_fault(world, lost, records.report)
-            continue
-        for k in range(steps * substeps):
-            for b in range(count):
-                set_clock(k * h, linked.work[b])
-            if held is not None:
-                _substep(h, flight, linked)
-            if events is not None:
-                step_linked_segment(world, h, flight.offset_frame, records.report, linked)
-            lost = find_nonfinite_body(linked.state)
-            if lost >= 0:
-                report_fault(world, lost, records.report)
-                break
-            for b in range(count):
-                write_state(bodies.state, world * count + b, read_state(linked.state, b))
-        report_unresolved_bodies(records.report, linked, linked.work[0])
+            break
         for b in range(count):
-            i = world * count + b
-            _, q, _, L = read_state(bodies.state, i)
-            w = angular_velocity(q, L, linked.work[b], flight.offset_frame)
-            bodies.state[i, at.ANGVEL], bodies.state[i, at.ANGVEL + 1], bodies.state[i, at.ANGVEL + 2] = w
+            write_state(bodies.state, world * count + b, read_state(linked.state, b))
+    report_unresolved_bodies(records.report, linked, linked.work[0])
+    for b in range(count):
+        i = world * count + b
+        _, q, _, L = read_state(bodies.state, i)
+        w = angular_velocity(q, L, linked.work[b], flight.offset_frame)
+        bodies.state[i, at.ANGVEL], bodies.state[i, at.ANGVEL + 1], bodies.state[i, at.ANGVEL + 2] = w
+
+
+@kernel
+def step_linked(queue, grid, bodies, flight, held, events, records, linked):
+    """Advance the worlds that no other thread has taken, of bodies that springs tie together: `advance_world`."""
+    for_each_world(queue, advance_world, (grid, bodies, flight, held, events, records, linked))

@@ -62,11 +62,12 @@ from physics.kernels.half_space.persistent_contacts import WALL_MEMORY_COUNT
 from physics.kernels.half_space.safe_substeps import count_clear_substeps
 from physics.kernels.math.parabolic_root import parabola_crossing_time, second_difference
 from physics.kernels.math.quaternion import to_matrix
-from physics.kernels.parallel.work_stealing import begin_taking, next_world
+from physics.kernels.parallel.work_stealing import for_each_world
 from physics.kernels.state import layout as at
 from physics.kernels.state.body import (
     angular_velocity,
     bind_body,
+    clear_report,
     has_finite_loads,
     is_finite,
     read_state,
@@ -244,57 +245,56 @@ def substep(y, start, h, contact, flight, records, work):
     return y
 
 
-@kernel
-def step_worlds(queue, steps, substeps, h, bodies, contact, restitution, flight, sleep, records, scratch):
-    """Advance the worlds that no other thread has taken by `steps` steps of `substeps` substeps of h seconds each.
+@inlined
+def advance_world(world, grid, bodies, contact, restitution, flight, sleep, records, work):
+    """Advance each body of a world by `grid.steps` steps.
 
     A body in flight looks for walls only when it could be near one (`safe_substeps`; what touched is), one that sleeps
     for nothing (`sleep`, None where the scene does not declare it). A body whose new state is not finite keeps the old
     one, and its world's report counts the fault. Impacts go to `log` (rows, room, EVENT_SIZE), if that has any room,
     their number to `counts` (rows,).
     """
-    work = scratch[0]
-    count = bodies.shapes.shape[0]
-    world = begin_taking(queue.turns, queue.taken)
-    while True:
-        world = next_world(world, queue.turns, queue.taken)
-        if world < 0:
-            break
-        for c in range(at.REPORT_SIZE):
-            records.report[world, c] = 0.0
-        clear_events(world, count, records.log, records.counts)
-        for b in range(count):
-            i = world * count + b
-            if sleep is not None and remains_asleep(i, bodies.wrench, sleep):
-                continue
-            bind_body(world, i, bodies.shapes[b], bodies, contact.friction, restitution, flight.offset_frame, work)
-            if not has_finite_loads(work):
+    h, count, end = grid.h, bodies.shapes.shape[0], grid.steps * grid.substeps
+    clear_report(world, records.report)
+    clear_events(world, count, records.log, records.counts)
+    for b in range(count):
+        i = world * count + b
+        if sleep is not None and remains_asleep(i, bodies.wrench, sleep):
+            continue
+        bind_body(world, i, bodies.shapes[b], bodies, contact.friction, restitution, flight.offset_frame, work)
+        if not has_finite_loads(work):
+            report_fault(world, b, records.report)
+            continue
+        bind_fields(bodies.params, i, flight.scheme, work)
+        bind_laws(bodies.params, i, work)
+        y, clear = read_state(bodies.state, i), 0
+        for k in range(end):
+            set_clock(k * h, work)
+            hold_loads(y, h, flight.gyroscopic, flight.offset_frame, work)
+            if contact.acts is not None and clear == 0 and not has_touched(records.memory, i):
+                clear = count_clear_substeps(y[0], y[2], h, end - k, work)
+                if clear > 0:
+                    forget_contacts(records.memory, i, work)
+            if contact.acts is not None and clear == 0:
+                new = substep(y, k * h, h, contact, flight, records, work)
+            else:
+                clear -= 1
+                new = fly_stage(y, h, flight, work)
+            if not is_finite(new):
                 report_fault(world, b, records.report)
-                continue
-            bind_fields(bodies.params, i, flight.scheme, work)
-            bind_laws(bodies.params, i, work)
-            y, clear = read_state(bodies.state, i), 0
-            for k in range(steps * substeps):
-                set_clock(k * h, work)
-                hold_loads(y, h, flight.gyroscopic, flight.offset_frame, work)
-                if contact.acts is not None and clear == 0 and not has_touched(records.memory, i):
-                    clear = count_clear_substeps(y[0], y[2], h, steps * substeps - k, work)
-                    if clear > 0:
-                        forget_contacts(records.memory, i, work)
-                if contact.acts is not None and clear == 0:
-                    new = substep(y, k * h, h, contact, flight, records, work)
-                else:
-                    clear -= 1
-                    new = fly_stage(y, h, flight, work)
-                if not is_finite(new):
-                    report_fault(world, b, records.report)
-                    drop_events(i, 1, k * h, records.log, records.counts)
-                    break
-                y = new
-                if sleep is not None and falls_asleep(i, y, h, work, sleep):
-                    y = without_velocities(y)
-                    break
-            report_unresolved_body(not has_same_pose(y, read_state(bodies.state, i)), records.report, work)
-            write_state(bodies.state, i, y)
-            w = angular_velocity(y[1], y[3], work, flight.offset_frame)
-            bodies.state[i, at.ANGVEL], bodies.state[i, at.ANGVEL + 1], bodies.state[i, at.ANGVEL + 2] = w
+                drop_events(i, 1, k * h, records.log, records.counts)
+                break
+            y = new
+            if sleep is not None and falls_asleep(i, y, h, work, sleep):
+                y = without_velocities(y)
+                break
+        report_unresolved_body(not has_same_pose(y, read_state(bodies.state, i)), records.report, work)
+        write_state(bodies.state, i, y)
+        w = angular_velocity(y[1], y[3], work, flight.offset_frame)
+        bodies.state[i, at.ANGVEL], bodies.state[i, at.ANGVEL + 1], bodies.state[i, at.ANGVEL + 2] = w
+
+
+@kernel
+def step_worlds(queue, grid, bodies, contact, restitution, flight, sleep, records, scratch):
+    """Advance the worlds that no other thread has taken, of bodies that meet walls only: `advance_world`."""
+    for_each_world(queue, advance_world, (grid, bodies, contact, restitution, flight, sleep, records, scratch[0]))

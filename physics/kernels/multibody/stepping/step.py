@@ -9,7 +9,7 @@ for the broad phase, until something wakes it (`sleep`).
 
 from __future__ import annotations
 
-from physics.kernels.compile.decorators import kernel
+from physics.kernels.compile.decorators import inlined, kernel
 from physics.kernels.forces.held_loads import bind_fields, set_clock
 from physics.kernels.forces.world_energy_budget import report_unresolved_bodies
 from physics.kernels.multibody.data.contact_set import put_vector
@@ -17,11 +17,12 @@ from physics.kernels.multibody.data.sleeping import is_staying_asleep, is_world_
 from physics.kernels.multibody.data.warm_start import clear_warm_start
 from physics.kernels.multibody.stepping.adaptive_substep import step_with_error_control
 from physics.kernels.multibody.stepping.substep import substep_world
-from physics.kernels.parallel.work_stealing import begin_taking, next_world
+from physics.kernels.parallel.work_stealing import for_each_world
 from physics.kernels.state import layout as at
 from physics.kernels.state.body import (
     angular_velocity,
     bind_body,
+    clear_report,
     find_nonfinite_body,
     find_overloaded_body,
     read_state,
@@ -31,62 +32,62 @@ from physics.kernels.state.body import (
 from physics.kernels.time_stepping.event_log import clear_events, drop_events
 
 
-@kernel
-def step_many(queue, steps, substeps, h, arrays, switches, restitution, kept, sleep, records, many):
-    """Advance the worlds that no other thread has taken by `steps` steps of `substeps` substeps of h seconds each.
+@inlined
+def advance_world(world, grid, arrays, switches, restitution, kept, sleep, records, many):
+    """Advance a world by `grid.steps` steps.
 
     A world in which a new state is not finite keeps the last good one, and its report counts the fault.
     Impacts go to `log` (rows, room, EVENT_SIZE), if that has any room, their number to `counts` (rows,).
     """
     state, params, shapes, _, wrench = arrays
     memory, report, log, counts = records
-    offset_frame = switches.flight.offset_frame
+    h, offset_frame = grid.h, switches.flight.offset_frame
     bodies = shapes.shape[0]
-    world = begin_taking(queue.turns, queue.taken)
-    while True:
-        world = next_world(world, queue.turns, queue.taken)
-        if world < 0:
-            break
-        for c in range(at.REPORT_SIZE):
-            report[world, c] = 0.0
-        clear_events(world, bodies, log, counts)
-        if sleep is not None and is_staying_asleep(world, bodies, wrench, sleep):
-            continue
-        for b in range(bodies):
-            i = world * bodies + b
-            bind_body(world, i, shapes[b], arrays, switches.friction, restitution, offset_frame, many.bodies.work[b])
-            many.bodies.inv_mass[b] = params[i, at.INV_MASS]
-            bind_fields(params, i, switches.flight.scheme, many.bodies.work[b])
-            write_state(many.bodies.state, b, read_state(state, i))
-            many.bodies.touched[b] = 0
-        lost = max(find_overloaded_body(many.bodies.work), find_nonfinite_body(many.bodies.state))
+    clear_report(world, report)
+    clear_events(world, bodies, log, counts)
+    if sleep is not None and is_staying_asleep(world, bodies, wrench, sleep):
+        return
+    for b in range(bodies):
+        i = world * bodies + b
+        bind_body(world, i, shapes[b], arrays, switches.friction, restitution, offset_frame, many.bodies.work[b])
+        many.bodies.inv_mass[b] = params[i, at.INV_MASS]
+        bind_fields(params, i, switches.flight.scheme, many.bodies.work[b])
+        write_state(many.bodies.state, b, read_state(state, i))
+        many.bodies.touched[b] = 0
+    lost = max(find_overloaded_body(many.bodies.work), find_nonfinite_body(many.bodies.state))
+    if lost >= 0:
+        report_fault(world, lost, report)
+        clear_warm_start(world, memory)
+        wake_world(world, bodies, sleep)
+        return
+    for k in range(grid.steps * grid.substeps):
+        if kept is not None:
+            step_with_error_control(world, k * h, h, switches, kept, records, many)
+        else:
+            for b in range(bodies):
+                set_clock(k * h, many.bodies.work[b])
+            substep_world(world, k * h, h, switches, sleep, records, many)
+        lost = find_nonfinite_body(many.bodies.state)
         if lost >= 0:
             report_fault(world, lost, report)
             clear_warm_start(world, memory)
+            drop_events(world, bodies, k * h, log, counts)
             wake_world(world, bodies, sleep)
-            continue
-        for k in range(steps * substeps):
-            if kept is not None:
-                step_with_error_control(world, k * h, h, switches, kept, records, many)
-            else:
-                for b in range(bodies):
-                    set_clock(k * h, many.bodies.work[b])
-                substep_world(world, k * h, h, switches, sleep, records, many)
-            lost = find_nonfinite_body(many.bodies.state)
-            if lost >= 0:
-                report_fault(world, lost, report)
-                clear_warm_start(world, memory)
-                drop_events(world, bodies, k * h, log, counts)
-                wake_world(world, bodies, sleep)
-                break
-            if sleep is not None:
-                update_sleep(world, h, sleep, many)
-            for b in range(bodies):
-                write_state(state, world * bodies + b, read_state(many.bodies.state, b))
-            if sleep is not None and is_world_asleep(world, bodies, sleep):
-                break
-        report_unresolved_bodies(report, many.bodies, many.bodies.work[0])
+            break
+        if sleep is not None:
+            update_sleep(world, h, sleep, many)
         for b in range(bodies):
-            i = world * bodies + b
-            _, q, _, L = read_state(state, i)
-            put_vector(state, i, at.ANGVEL, angular_velocity(q, L, many.bodies.work[b], offset_frame))
+            write_state(state, world * bodies + b, read_state(many.bodies.state, b))
+        if sleep is not None and is_world_asleep(world, bodies, sleep):
+            break
+    report_unresolved_bodies(report, many.bodies, many.bodies.work[0])
+    for b in range(bodies):
+        i = world * bodies + b
+        _, q, _, L = read_state(state, i)
+        put_vector(state, i, at.ANGVEL, angular_velocity(q, L, many.bodies.work[b], offset_frame))
+
+
+@kernel
+def step_many(queue, grid, arrays, switches, restitution, kept, sleep, records, many):
+    """Advance the worlds that no other thread has taken, of bodies that touch each other: `advance_world`."""
+    for_each_world(queue, advance_world, (grid, arrays, switches, restitution, kept, sleep, records, many))
