@@ -22,7 +22,9 @@ import math
 
 from physics.kernels.compile.decorators import inlined, kernel
 from physics.kernels.math import quaternion as qt
-from physics.kernels.multibody.data.contact_set import subtract
+from physics.kernels.math.vector import row_vector
+from physics.kernels.multibody.data.contact_set import add_ordered_contact, add_scaled, row_matrix, subtract
+from physics.kernels.state.layout import BLOCK, ELLIPSOID
 
 # Newton steps at most; five are usual from a centre to centre start.
 _NEWTON_STEPS = 40
@@ -244,3 +246,33 @@ def relative_rotation(R, S):
     y = qt.transposed_matvec(R, (S[1], S[4], S[7]))
     z = qt.transposed_matvec(R, (S[2], S[5], S[8]))
     return (x[0], y[0], z[0], x[1], y[1], z[1], x[2], y[2], z[2])
+
+
+@kernel
+def collide_ellipsoid(a, b, margin, h, many):
+    """Add the contact of an ellipsoid and any body, whichever of the two is a; in the frame of the other one."""
+    first, second = a, b
+    if many.bodies.work[a].shape != ELLIPSOID:
+        first, second = b, a
+    R, size, d = (
+        row_matrix(many.bodies.rotation, second),
+        many.bodies.work[second].dims,
+        many.bodies.work[first].dims,
+    )
+    x, dims = row_vector(many.bodies.center, second, 0), (size[0], size[1], size[2])
+    way = qt.transposed_matvec(R, subtract(row_vector(many.bodies.center, first, 0), x))
+    A = ellipsoid_matrix(relative_rotation(R, row_matrix(many.bodies.rotation, first)), (d[0], d[1], d[2]))
+    B = (size[0] * size[0], 0.0, 0.0, size[1] * size[1], 0.0, size[2] * size[2])
+    is_block = many.bodies.work[second].shape == BLOCK
+    start = nearest_on_block(way, dims)[1] if is_block else center_direction(way)
+    n, gap = max_separation_direction(A, is_block, B, dims, way, start)
+    if gap > margin:
+        return
+    on_first = subtract(way, ellipsoid_support_point(A, n)[1])
+    on_second = block_support_point(dims, n, on_first) if is_block else ellipsoid_support_point(B, n)[1]
+    n, on_first, on_second = (
+        qt.matvec(R, n),
+        add_scaled(x, 1.0, qt.matvec(R, on_first)),
+        add_scaled(x, 1.0, qt.matvec(R, on_second)),
+    )
+    add_ordered_contact(a, b, first, n, on_first, on_second, gap, h, many)

@@ -1,0 +1,50 @@
+"""Contacts of a sphere with a sphere and with a block, from the distance of its centre."""
+
+from __future__ import annotations
+
+import math
+
+from physics.kernels.compile.decorators import inlined
+from physics.kernels.math import quaternion as qt
+from physics.kernels.math.vector import row_vector
+from physics.kernels.multibody.data.contact_set import (
+    add_contact,
+    add_ordered_contact,
+    add_scaled,
+    row_matrix,
+    subtract,
+)
+from physics.kernels.multibody.narrowphase.ellipsoid_distance import nearest_on_block
+from physics.kernels.state.layout import BLOCK
+
+
+@inlined
+def collide_spheres(a, b, margin, h, many):
+    """Add the contact of two spheres."""
+    x, y = row_vector(many.bodies.center, a, 0), row_vector(many.bodies.center, b, 0)
+    ra, rb = many.bodies.work[a].dims[0], many.bodies.work[b].dims[0]
+    n = subtract(x, y)
+    size = math.sqrt(qt.dot(n, n))
+    if size - ra - rb > margin:
+        return
+    n = (n[0] / size, n[1] / size, n[2] / size) if size > 0.0 else (0.0, 1.0, 0.0)
+    add_contact(a, b, 0, -1, n, add_scaled(x, -ra, n), add_scaled(y, rb, n), size - ra - rb, h, many)
+
+
+@inlined
+def collide_sphere_block(a, b, margin, h, many):
+    """Add the contact of a sphere and a block, whichever of the two is a."""
+    ball, brick = a, b
+    if many.bodies.work[a].shape == BLOCK:
+        ball, brick = b, a
+    R, dims, r = (
+        row_matrix(many.bodies.rotation, brick),
+        many.bodies.work[brick].dims,
+        many.bodies.work[ball].dims[0],
+    )
+    x, y = row_vector(many.bodies.center, ball, 0), row_vector(many.bodies.center, brick, 0)
+    q, n, distance = nearest_on_block(qt.transposed_matvec(R, subtract(x, y)), (dims[0], dims[1], dims[2]))
+    if distance - r > margin:
+        return
+    n = qt.matvec(R, n)
+    add_ordered_contact(a, b, ball, n, add_scaled(x, -r, n), add_scaled(y, 1.0, qt.matvec(R, q)), distance - r, h, many)
