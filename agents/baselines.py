@@ -1,7 +1,7 @@
 """Policies to compare trained agents with: uniformly random, and controllers written by hand.
 
 A policy is a function from observations (n, entries) to actions (n, 6). The controllers see what an agent
-sees, and know the block's observation table (see `rigid_env.envs.documentation`), nothing else.
+sees, and know the block's observation table (see `rigid_env.envs.block_reach`), nothing else.
 """
 
 from __future__ import annotations

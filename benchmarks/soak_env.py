@@ -100,7 +100,7 @@ class Judge:
         self.potential[rows] = self._potential(self.hold)[0][rows]
 
     def _potential(self, hold) -> tuple[np.ndarray, np.ndarray]:
-        """(potential, whether goal and rest are met) by the formulas in `rigid_env.envs.documentation`."""
+        """(potential, whether goal and rest are met) by the formulas in the documentation of `rigid_env.envs`."""
         world, record = self.task.world, self.task.record
         speed, spin = np.linalg.norm(world.linvel[:, 0], axis=1), np.linalg.norm(world.angvel[:, 0], axis=1)
         is_still = (speed <= 0.1) & (spin <= 0.1)

@@ -11,7 +11,8 @@ from rigid_env.envs.registration import register_envs
 from rigid_env.shadowing import check_engine_is_found
 
 if TYPE_CHECKING:
-    from rigid_env.envs.documentation import BlockReachEnv, BlockReorientEnv
+    from rigid_env.envs.block_reach import BlockReachEnv
+    from rigid_env.envs.block_reorient import BlockReorientEnv
     from rigid_env.envs.vector_env import BlockReachVectorEnv, BlockReorientVectorEnv
 
     __version__: str
@@ -20,9 +21,9 @@ check_engine_is_found()
 register_envs()
 
 _LAZY = {
-    "BlockReachEnv": "rigid_env.envs.documentation",
+    "BlockReachEnv": "rigid_env.envs.block_reach",
     "BlockReachVectorEnv": "rigid_env.envs.vector_env",
-    "BlockReorientEnv": "rigid_env.envs.documentation",
+    "BlockReorientEnv": "rigid_env.envs.block_reorient",
     "BlockReorientVectorEnv": "rigid_env.envs.vector_env",
     "RigidVecEnv": "rigid_env.envs.sb3",  # needs the extra `agents`, so it is not in `__all__`
 }

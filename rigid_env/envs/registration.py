@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 from gymnasium.envs.registration import register, registry
 
 NAMESPACE = "rigid_env"
@@ -24,9 +26,10 @@ def register_envs() -> None:
         env_id = f"{NAMESPACE}/{name}-v0"
         if env_id in registry:
             continue
+        module = re.sub("(?<=[a-z])(?=[A-Z])", "_", name).lower()  # BlockReach is in block_reach
         register(
             id=env_id,
-            entry_point=f"rigid_env.envs.documentation:{name}Env",
+            entry_point=f"rigid_env.envs.{module}:{name}Env",
             vector_entry_point=f"rigid_env.envs.vector_env:{name}VectorEnv",
             max_episode_steps=steps,
         )

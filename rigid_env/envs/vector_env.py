@@ -268,13 +268,13 @@ class RigidVectorEnv(BatchAttributes):
 
 @known_keywords
 class BlockReachVectorEnv(RigidVectorEnv):
-    """Many worlds of `rigid_env.envs.documentation.BlockReachEnv`, which documents the task."""
+    """Many worlds of `rigid_env.envs.block_reach.BlockReachEnv`, which documents the task."""
 
     task_class = BlockReach
 
 
 @known_keywords
 class BlockReorientVectorEnv(RigidVectorEnv):
-    """Many worlds of `rigid_env.envs.documentation.BlockReorientEnv`, which documents the task."""
+    """Many worlds of `rigid_env.envs.block_reorient.BlockReorientEnv`, which documents the task."""
 
     task_class = BlockReorient

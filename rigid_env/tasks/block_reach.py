@@ -10,7 +10,7 @@ from rigid_env.tasks.base import Task
 
 
 class BlockReach(Task):
-    """The batch behind `rigid_env.envs.documentation.BlockReachEnv`, which documents it."""
+    """The batch behind `rigid_env.envs.block_reach.BlockReachEnv`, which documents it."""
 
     observation = (
         *entries.GOAL_OFFSET,

@@ -13,7 +13,7 @@ from rigid_env.tasks.options import FACE_COUNT
 
 
 class BlockReorient(Task):
-    """The batch behind `rigid_env.envs.documentation.BlockReorientEnv`, which documents it."""
+    """The batch behind `rigid_env.envs.block_reorient.BlockReorientEnv`, which documents it."""
 
     observation = (
         *entries.GOAL_AXES,

@@ -9,7 +9,7 @@ import gymnasium as gym
 import numpy as np
 import pytest
 
-from rigid_env.envs.documentation import BlockReachEnv
+from rigid_env.envs.block_reach import BlockReachEnv
 from rigid_env.envs.registration import MAX_EPISODE_STEPS
 from rigid_env.tasks import Task, base, kernels
 

@@ -82,7 +82,7 @@ def test_baselines_do_without_the_extra(tmp_path):
         ),
         (
             ("pygame",),
-            "import rigid_env.envs.documentation as e; e.BlockReachEnv(render_mode='rgb_array')",
+            "import rigid_env.envs.block_reach as e; e.BlockReachEnv(render_mode='rgb_array')",
             "rendering needs pygame, which is not",
         ),
         (

@@ -65,7 +65,7 @@ def test_importing_the_package_leaves_the_engine_alone(tmp_path):
 
 
 def test_lazy_names():
-    from rigid_env.envs.documentation import BlockReachEnv
+    from rigid_env.envs.block_reach import BlockReachEnv
     from rigid_env.envs.vector_env import BlockReorientVectorEnv
 
     assert rigid_env.BlockReachEnv is BlockReachEnv

@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 
 import physics
-from rigid_env.envs.documentation import BlockReachEnv, BlockReorientEnv
+from rigid_env.envs.block_reach import BlockReachEnv
+from rigid_env.envs.block_reorient import BlockReorientEnv
 from rigid_env.envs.vector_env import BlockReachVectorEnv, BlockReorientVectorEnv
 from rigid_env.tasks import base, kernels
 from rigid_env.tasks import layout as col

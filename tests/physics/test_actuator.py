@@ -152,7 +152,7 @@ def test_an_actuator_without_effect_leaves_every_bit_and_costs_no_parameters():
 
 
 def test_environments_take_an_actuator():
-    from rigid_env.envs.documentation import BlockReachEnv
+    from rigid_env.envs.block_reach import BlockReachEnv
 
     env = BlockReachEnv(effects=[physics.Actuator(lag=0.1, delay=0.02)])
     plain = BlockReachEnv()
