@@ -16,8 +16,8 @@ velocity of the point where it is then and b what it gains there per time by tur
 
 a number γ more on the diagonal of W, and a target. In equilibrium g = g⁰ = -p/(hk) at any h and θ: the sag is exact.
 A point that ends up deeper than g¹, since turning is no parabola, is lifted there (`correct_spring_depth`): by moving
-the body, as in `contact_set.project_out_of_walls`. A depth that no force has worked for would be energy for a stiff
-spring.
+the body, as in `half_space.contact_set.project_out_of_walls`. A depth that no force has worked for would be energy for
+a stiff spring.
 
 This is the θ-method. θ = ½ is the midpoint rule: of second order, and a spring keeps its energy, p (u⁰ + u¹)/2 =
 -k (g¹² - g⁰²)/2. θ = 1 is implicit Euler, which brings what a step cannot resolve to rest in one step. For ½ <= θ <= 1

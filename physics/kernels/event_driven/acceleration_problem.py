@@ -42,7 +42,7 @@ _PAINLEVE_PUSH = 0.03
 
 @inlined
 def set_up_contact(i, slot, r, target, work):
-    """Contact i of a problem for `solve.solve_contacts`, without a warm start."""
+    """Contact i of a problem for `contact_solver.solve.solve_contacts`, without a warm start."""
     work.slot[i] = slot
     work.arm[i, 0], work.arm[i, 1], work.arm[i, 2] = r
     work.target[i, 0], work.target[i, 1], work.target[i, 2] = target

@@ -36,7 +36,7 @@ def log_mode_changes(work, motion, log, counts, t):
 
 @kernel
 def store_contact_modes(memory, i, work, motion):
-    """Store the contact mode at the walls and the contact forces for later reads (`warm_start.store_warm_start`)."""
+    """Store the contact mode and the contact forces for later (`time_stepping.warm_start.store_warm_start`)."""
     slots = work.slot.shape[0]
     row = WALL_MEMORY_HEAD + slots
     for k in range(int(memory[i, 1])):

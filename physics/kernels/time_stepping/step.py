@@ -207,8 +207,8 @@ def substep(y, start, h, contact, flight, records, work):
     """State after h, `start` after the call [s]: impacts where they happen, flight or contact between them.
 
     When a substep has used up its cuts its rest is one plastic stage that takes in all it would pass through. Cuts for
-    what turns far (`conservative_advancement`) are counted apart; when they are used up it is looked at as what turns
-    little is.
+    what turns far (`half_space.conservative_advancement`) are counted apart; when they are used up it is looked at as
+    what turns little is.
     """
     left, splits, cuts = h, 0, 0
     world = work.world

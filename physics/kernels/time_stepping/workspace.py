@@ -99,12 +99,12 @@ def workspace_dtype(
         ("active", i, (n,)),  # of a direct solve: contacts that push, flags (`sticking`) or a list (`sliding_patch`)
         ("normal", f, (n,)),  # of a direct solve: normal impulse, negative where the contact is open [N s]
         ("across", f, (n, 2)),  # of `sticking`: tangential impulse [N s]
-        ("twist", f, (6,)),  # of `proximal_newton`: change of (v, ω) [m/s, rad/s]
+        ("twist", f, (6,)),  # of `contact_solver.proximal_newton`: change of (v, ω) [m/s, rad/s]
         ("start", f, (6,)),
         ("defect", f, (6,)),
         ("newton", f, (6, 7)),
         ("trial", f, (3 * n,)),  # [N s]
-        ("local", f, (n, 12)),  # see `gauss_seidel.invert_contact_blocks`
+        ("local", f, (n, 12)),  # see `contact_solver.gauss_seidel.invert_contact_blocks`
         ("fallback_float", f, (float_size,)),
         ("fallback_int", i, (int_size,)),
         ("rebound", f, (3 * n,)),  # p of an impact with all of its rebound, where there is less energy [N s]

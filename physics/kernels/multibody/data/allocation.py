@@ -45,7 +45,7 @@ def bodies_setting_fields() -> list[tuple]:
     f, i = np.float64, np.int64
     return [
         *setting_fields(),
-        ("residual_limit", f),  # residual allowed beside the tolerance [m/s]: see `midpoint_step.rest_residual`
+        ("residual_limit", f),  # allowed beside the tolerance [m/s]: see `time_stepping.midpoint_step.rest_residual`
         ("half_load_speed", f),  # with error control: least speed that half a substep's loads give a body [m/s], else 0
         ("load_speed", f),  # largest speed that the loads of a resting stage give a body [m/s], else 0
         ("is_resting_stage", i),  # 1: contacts are held through a stage, 0: impacts

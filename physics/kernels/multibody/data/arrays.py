@@ -85,7 +85,7 @@ class WorldSnapshots(NamedTuple):
 class Bodies(NamedTuple):
     """Bodies of the world: parameters, poses and motion."""
 
-    work: np.ndarray  # (bodies,) records: parameters and loads, see `workspace.body_fields`
+    work: np.ndarray  # (bodies,) records: parameters and loads, see `time_stepping.workspace.body_fields`
     state: np.ndarray  # (bodies, STATE_SIZE) columns of `layout`
     rotation: np.ndarray  # (bodies, 9) body frame to world, row by row
     inv_mass: np.ndarray  # (bodies,) 1/mass [1/kg]
@@ -93,7 +93,7 @@ class Bodies(NamedTuple):
     twist: np.ndarray  # (bodies, 6) velocity and angular velocity, world frame [m/s, rad/s]
     free_twist: np.ndarray  # (bodies, 6) twist without contact impulses [m/s, rad/s]
     momenta: np.ndarray  # (bodies, 12) in a resting stage: `PRE_LOAD_VELOCITY`, `LOADED_MOMENTA`; in
-    # `restitution_energy`: velocity and angular momentum before an impact, then with all of its rebound
+    # `stepping.restitution_energy`: velocity and angular momentum before an impact, then with all of its rebound
     center: np.ndarray  # (bodies, 3) geometric centre, world frame [m]
     box: np.ndarray  # (bodies, 6) lower, then upper corner of the bounding box, motion of the stage included [m]
     touched: np.ndarray  # (bodies,) int, 1: the body is in a contact of this stage
@@ -141,7 +141,7 @@ class Contacts(NamedTuple):
     block: np.ndarray  # (contacts, 9) the contact's own 3 x 3 block of W = J M⁻¹ Jᵀ [1/kg]
     step: np.ndarray  # (contacts,) 1/λ_max of the tangential part of `block` [kg]
     best_impulse: np.ndarray  # (contacts, 3) best impulses of all methods for an island [N s]
-    rebound_impulse: np.ndarray  # (contacts, 3) of `restitution_energy`: impulses with all of the rebound [N s]
+    rebound_impulse: np.ndarray  # (contacts, 3) of `stepping.restitution_energy`: with all of the rebound [N s]
     id_table: np.ndarray  # (slots,) int, of `warm_start`: contacts of the last stage by id, open addressing; -1: free
 
 
@@ -193,7 +193,7 @@ class LinearSystem(NamedTuple):
 
 
 class Newton(NamedTuple):
-    """Iterates of `proximal_newton` and `interior_point`."""
+    """Iterates of `solver.proximal_newton` and `solver.interior_point`."""
 
     defect: np.ndarray  # (bodies, COLUMN_SIZE) x - M⁻¹ Jᵀ p(x), columns of `block_lu` [m/s, rad/s]
     before: np.ndarray  # (bodies, 6) twists before a step [m/s, rad/s]

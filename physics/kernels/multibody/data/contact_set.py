@@ -116,7 +116,7 @@ def arrival_gap(a, b, many):
 
 @inlined
 def _may_turn_far(a, b, many):
-    """True if one of them may turn far in this stage (`conservative_advancement`)."""
+    """True if one of them may turn far in this stage (`stepping.conservative_advancement`)."""
     return many.bodies.spin_bound[a] > 0.0 or (b >= 0 and many.bodies.spin_bound[b] > 0.0)
 
 

@@ -46,8 +46,8 @@ from physics.kernels.state.layout import HULL, SPHERE, WALL_NORMAL, WALL_OFFSET
 # meets something differs from its halves if these do not, and is refused.
 _MIN_TURN = 0.1
 
-# Share of `contact_set.arrival_gap` to which they are flown: a contact's gap is along its own normal, which may be 11
-# degrees off, and none must be left to the other's care.
+# Share of `data.contact_set.arrival_gap` to which they are flown: a contact's gap is along its own normal, which may be
+# 11 degrees off, and none must be left to the other's care.
 _ARRIVAL_FRACTION = 0.5
 
 
