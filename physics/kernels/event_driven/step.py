@@ -241,7 +241,7 @@ def advance(y, h, contact, flight, work, motion, records, start):
 def advance_world(world, grid, bodies, contact, restitution, flight, records, work, motion):
     """Advance each body of a world by `grid.steps` steps, from event to event.
 
-    Events go to `log` (rows, room, EVENT_SIZE), their number to `counts` (rows,); otherwise as that of time stepping.
+    Events go to `records.log`, their number to `records.counts`; otherwise as in time stepping.
     """
     h, count = grid.h, bodies.shapes.shape[0]
     clear_report(world, records.report)

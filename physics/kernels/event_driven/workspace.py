@@ -19,7 +19,7 @@ Y_POSITION, Y_QUATERNION, Y_VELOCITY, Y_ANGULAR_MOMENTUM, Y_SIZE = 0, 3, 7, 10, 
 # Rows of `y`: where the step starts, where it ends, two of the midpoint rule.
 ROW_START, ROW_END, ROW_PREVIOUS, ROW_CURRENT, ROW_COUNT = 0, 1, 2, 3, 4
 
-# Midpoint rules with 2, 4, 6, ... parts that are extrapolated at most: order 16.
+# At most so many midpoint rules are extrapolated, with 2, 4, 6, ... parts: order 16.
 MAX_MIDPOINT_RULES = 8
 
 
@@ -37,13 +37,13 @@ def _pace_fields(n_slots: int) -> list[tuple]:
         ("look_ahead", f),  # time by which the next contact mode is looked for [s]
         ("min_look_ahead", f),  # the least of these [s]
         ("assured_time", f),  # time for which contacts that a guard has let go are known to stay open [s]
-        ("next_leap", f),  # next leap, since when events crowd, and their number (`chatter_control`)
-        ("chatter_start", f),
-        ("chatter_count", i),
+        ("next_leap", f),  # length of the next leap over events that crowd [s] (`chatter_control`)
+        ("chatter_start", f),  # since when events crowd [s]
+        ("chatter_count", i),  # events since then
         ("ended_mode", i),  # the contact mode that a guard of force has ended
         ("step_length", f),  # length of the last smooth step [s]
         ("distrusted_mode", i),  # the contact mode whose guards of force say nothing; see `mode_acceptance`
-        ("watched_length", f),  # length of a step without them [s]
+        ("watched_length", f),  # length of a step without such guards [s]
         ("end_rate", f, (Y_SIZE,)),  # rate of change at the end of such a step
         ("skipped_bounce_time", f),  # time that a sequence of bounces would have taken on [s]
         ("rebound", f, (3 * n_slots,)),  # impulses of a rebound that there is not enough energy for [N s]
@@ -61,9 +61,9 @@ def _contact_fields(n: int, n_slots: int) -> list[tuple]:
         ("start_slip_direction", f, (n, 3)),  # the one at the start of the step
         ("is_starting", i, (n,)),  # 1: the contact was at rest at the start of the step, or nearly
         ("slip_turn_rate", f),  # rate at which the direction turns in which the only contact begins to slide [rad/s]
-        ("friction_turn_stiffness", f),  # what friction changes of its acceleration across that, for each radian [m/s²]
-        ("start_slip_speed", f),  # of it, at the start of the step [m/s]
-        ("slip_growth", f),  # of that [m/s²]
+        ("friction_turn_stiffness", f),  # change by friction of its acceleration across, for each radian [m/s²]
+        ("start_slip_speed", f),  # slip speed of the only contact at the start of the step [m/s]
+        ("slip_growth", f),  # rate at which that speed grows [m/s²]
         ("arm", f, (n, 3)),  # contact point relative to the centre of mass [m]
         ("velocity", f, (n, 3)),  # of the body there [m/s]
         ("constraint_error", f, (n, 3)),  # what the unknowns are to cancel: acceleration, velocity or gap
@@ -72,7 +72,7 @@ def _contact_fields(n: int, n_slots: int) -> list[tuple]:
         ("margin", f, (3, 2, n)),  # of push and cone at the ends of a step and inside; see `force_minima` [weights]
         ("margin_rate", f, (2, n)),  # their rates of change at its start
         ("first_unknown", i, (n,)),  # first unknown of the contact alone
-        ("patch", i, (n,)),  # first of the three of its wall's normal forces, NO_PATCH: its normal force is its own
+        ("patch", i, (n,)),  # first of its wall's three normal forces; NO_PATCH (`contact_forces`): one of its own
         ("patch_coordinate", f, (n, 2)),  # coordinates in the patch, in radii
         ("given_force", f, (n, 3)),  # part of its force that is given, along the wall's axes [N]
         ("last_force", f, (n_slots, 3)),  # force of every feature when it was last known, along the wall's axes [N]
@@ -101,11 +101,11 @@ def _candidate_fields(n: int) -> list[tuple]:
     """Contacts that a contact mode may have."""
     f, i = np.float64, np.int64
     return [
-        ("candidates", i),  # of a contact mode: contacts that touch and do not leave
-        ("candidate_state", i, (n,)),  # of them: open, held, sliding
+        ("candidates", i),  # number of candidates: contacts that touch and do not leave
+        ("candidate_state", i, (n,)),  # open, held, sliding
         ("is_fresh", i, (n,)),  # slides from rest
         ("candidate_changes", i, (n,)),
-        ("candidate", i, (n,)),  # their slots
+        ("candidate", i, (n,)),  # slots of the candidates
         ("candidate_direction", f, (n, 3)),
     ]  # fmt: skip
 

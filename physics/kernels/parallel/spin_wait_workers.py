@@ -53,7 +53,7 @@ RUN_DONE, RUN_UNFINISHED, RUN_FAILED = range(3)
 
 
 def make_worker_table(members: int) -> np.ndarray:
-    """(1 + members, APART) int64, all of them away."""
+    """(1 + members, PADDING_WORDS) int64, all of them away."""
     return np.zeros((1 + members, PADDING_WORDS), dtype=np.int64)
 
 

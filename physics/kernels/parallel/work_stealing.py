@@ -1,8 +1,8 @@
 """Work stealing of threads over a batch: each takes the next few worlds of its own range, then of the others' ranges.
 
 They do so in machine code, without the interpreter in between: its lock changes hands only when a thread begins and
-ends. A thread finds the worlds of its own range where it left them, in the cache of its processor: where it took what
-came next, half of them had been stepped by another one the last time, and had to come from there.
+ends. A thread finds the worlds of its own range in the cache of its processor, where it left them after the last step.
+With one queue for all, half of the worlds of a thread had been stepped by the other one, and came from its cache.
 """
 
 from __future__ import annotations
@@ -15,13 +15,13 @@ from physics.kernels.parallel.atomics import atomic_add
 # Words between what different threads change: two lines of a cache, since processors fetch them in pairs.
 PADDING_WORDS = 16
 
-# Of all threads: how many worlds are taken at once. Then, a row for each range: the first of its worlds that nobody has
-# taken, and where it ends.
+# `turns`, of all threads. Row 0: how many worlds are taken at once. Then a row for each range: the first of its worlds
+# that nobody has taken, and the end of the range.
 RANGE_CHUNK = 0
 RANGE_NEXT, RANGE_END = range(2)
 
-# Of one thread: how many worlds it has taken, the end of those it took last, the range that it takes from, its own one,
-# and from TAKEN_FIRST_WORLD on which worlds.
+# `taken`, of one thread: how many worlds it has taken, the end of those it took last, the range that it takes from, its
+# own range, and from TAKEN_FIRST_WORLD on the worlds.
 TAKEN_COUNT, TAKEN_CHUNK_END, TAKEN_RANGE, TAKEN_OWN_RANGE, TAKEN_FIRST_WORLD = range(5)
 
 
@@ -42,7 +42,7 @@ def make_taken_lists(threads: int, worlds: int) -> np.ndarray:
 
 @inlined
 def begin_taking(turns, taken):
-    """Nothing taken yet; returns what comes before the first world. A thread that is alone deals for itself."""
+    """Nothing taken yet; returns what comes before the first world. A thread that is alone resets its range itself."""
     if turns.shape[0] == 2:
         turns[1, RANGE_NEXT] = 0
     taken[TAKEN_COUNT] = taken[TAKEN_CHUNK_END] = 0
@@ -73,7 +73,7 @@ def next_world(world, turns, taken):
     world : int
     turns : (1 + threads, PADDING_WORDS) int64, in and out
         Of all threads: `make_ranges`.
-    taken : (TAKEN_FIRST_WORLD + worlds,) int64, in and out
+    taken : (TAKEN_FIRST_WORLD + worlds + PADDING_WORDS,) int64, in and out
         Of this thread.
     """
     world += 1

@@ -6,7 +6,8 @@ f the load, J the Jacobian of the contacts, u = J (v, ω) their velocities, p th
 1. Hold loads         f = f(y), held over the stage                                        `held_loads.hold_loads`
 2. Find contacts      {i : g_i(x, q) <= slop}, g_i the gap of a feature to a wall          `find_contact_set`
 3. Resolve impacts    M Δ(v, ω) = Jᵀ p, u_n⁺ >= -e u_n⁻ ⟂ p_n >= 0, |p_t| <= μ p_n         `resolve_impacts`
-4. Limit the stage    the first t at which a gap g(t) is used up                           `advance_to_impact`
+4. Limit the stage    to the first t at which a gap g(t) is used up: stage 5 is tried,     `advance_to_impact`
+                      and tried again for a shorter time if something has passed a wall
 5. Integrate          in the air the exact flow of ẋ = v, q̇ = ½ ω q, M v̇ = f              `fly_stage`
                       in contact Moreau's midpoint step: x, q drift by h/2;                `midpoint_step`
                       M Δ(v, ω) = h f + Jᵀ p, u_n >= target ⟂ p_n >= 0, |p_t| <= μ p_n;
@@ -19,7 +20,8 @@ target velocity of stage 5 at the end of the step (`target_velocity.set_resting_
 slip of few contacts (`midpoint_friction`) make the scheme second order between impacts and exact on parabolas.
 
 What a scene does not have arrives as None and is pruned by the compiler (`decorators.kernel`). Kernels that take a
-state and return one are inlined: to pass thirteen numbers through memory took a quarter of the time of a block at rest.
+state and return one are inlined, but for those that a step hardly ever needs (`cold_kernel`): to pass thirteen numbers
+through memory took a quarter of the time of a block at rest.
 
 References
 ----------
@@ -153,8 +155,8 @@ def shorten_to_impact(n, y, end, h, contact, flight, records, work):
 
     It is shortened until that feature is within half a slop of the wall: `parabolic_root` of its gap. Another one that
     is through the wall by then is sought instead. The gap of one feature is smooth; the smallest of all has kinks,
-    before which a parabola would creep along a wall that nothing hits. Where impulses leap from one time to the next
-    one, as those that no method solves may, nothing is between: the last state that was outside is taken.
+    before which a parabola would creep along a wall that nothing hits. Impulses that no method solves may leap from
+    one time to the next. Then nothing is between, and the last state that was outside is taken.
     """
     t, low, low_gap, high, high_gap, bend, slot = h, 0.0, 0.0, h, 0.0, 0.0, -1
     low_end = y
@@ -206,9 +208,9 @@ def advance_to_impact(n, y, h, contact, flight, records, work):
 def substep(y, start, h, contact, flight, records, work):
     """State after h, `start` after the call [s]: impacts where they happen, flight or contact between them.
 
-    When a substep has used up its cuts its rest is one plastic stage that takes in all it would pass through. Cuts for
-    what turns far (`half_space.conservative_advancement`) are counted apart; when they are used up it is looked at as
-    what turns little is.
+    When a substep has used up its cuts, its rest is one plastic stage with contacts wherever it would pass a wall. Cuts
+    for what turns far (`half_space.conservative_advancement`) are counted apart. When those are used up, a body that
+    turns far is treated as one that turns little.
     """
     left, splits, cuts = h, 0, 0
     world = work.world
@@ -249,10 +251,10 @@ def substep(y, start, h, contact, flight, records, work):
 def advance_world(world, grid, bodies, contact, restitution, flight, sleep, records, work):
     """Advance each body of a world by `grid.steps` steps.
 
-    A body in flight looks for walls only when it could be near one (`safe_substeps`; what touched is), one that sleeps
-    for nothing (`sleep`, None where the scene does not declare it). A body whose new state is not finite keeps the old
-    one, and its world's report counts the fault. Impacts go to `log` (rows, room, EVENT_SIZE), if that has any room,
-    their number to `counts` (rows,).
+    A body in flight looks for walls only when it could be near one (`count_clear_substeps`); one that touched a wall is
+    near it. A body that sleeps is left out (`sleep`, None where the scene does not declare it). A body whose new state
+    is not finite keeps the old one, and its world's report counts the fault. Impacts go to `records.log`, if that has
+    any room, their number to `records.counts`.
     """
     h, count, end = grid.h, bodies.shapes.shape[0], grid.steps * grid.substeps
     clear_report(world, records.report)

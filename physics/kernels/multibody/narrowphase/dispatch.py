@@ -52,7 +52,7 @@ def find_contacts(h, ellipsoids, hulls, world, sleep, many):
     for k in range(many.counts[NUM_PAIRS]):
         a, b = many.broadphase.pairs[k, 0], many.broadphase.pairs[k, 1]
         if is_asleep(first_row + a, sleep):
-            continue  # and so does b: `wake_touched_groups`
+            continue  # b sleeps, too: `wake_touched_groups` has woken all that a waking body may touch
         if not may_meet(a, b, h, many):
             continue
         margin = surface_motion_bound(a, h, many) + surface_motion_bound(b, h, many) + pair_slop(a, b, many)

@@ -37,7 +37,7 @@ def advance_world(world, grid, arrays, switches, restitution, kept, sleep, recor
     """Advance a world by `grid.steps` steps.
 
     A world in which a new state is not finite keeps the last good one, and its report counts the fault.
-    Impacts go to `log` (rows, room, EVENT_SIZE), if that has any room, their number to `counts` (rows,).
+    Impacts go to `records.log`, if that has any room, their number to `records.counts`.
     """
     state, params, shapes, _, wrench = arrays
     memory, report, log, counts = records
