@@ -30,6 +30,8 @@ class _KernelLower(Lower):
         super().setup_function(fndesc)
         self.builder = FoldingBuilder(self.entry_block)
         self.call_helper = self.call_conv.init_call_helper(self.builder)
+        if getattr(self.func_ir.func_id.func, "is_cold", False):  # `decorators.cold_kernel`
+            self.function.attributes.add("noinline")
 
     def create_cfunc_wrapper(self):
         """The entry for machine code, in place of Numba's for C; see `prepared_entry`."""
@@ -92,8 +94,6 @@ class _ValueLower(_KernelLower):
         """Declare the function."""
         fndesc.__class__ = ValueDescriptor
         super().setup_function(fndesc)
-        if getattr(self.func_ir.func_id.func, "is_cold", False):  # `decorators.cold_kernel`
-            self.function.attributes.add("noinline")
 
 
 class _UserLower(Lower):
