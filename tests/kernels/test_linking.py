@@ -115,7 +115,7 @@ def calls_each_once(x):
 
 
 def test_of_a_cold_kernel_a_call_is_left(monkeypatch):
-    """Of one that is called from one place LLVM leaves none otherwise, however long it is."""
+    """Names the calls that LLVM leaves: of a kernel called from one place none, but of a cold one, however short."""
     left, optimise = [], JITCodeLibrary._optimize_final_module
 
     def noted(library):
