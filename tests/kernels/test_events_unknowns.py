@@ -23,12 +23,12 @@ def solved(rows, pushes, asked, is_skew):
     """
     work, motion = np.ones(1, WORK), make_motion(3, VERTEX_COUNT, False)
     m = len(asked)
-    one = motion[0]
+    one = motion.unknowns[0]
     one["row"][:m], one["row_moment"][:m] = rows[:, :3], rows[:, 3:]
     one["column_force"][:m], one["column_moment"][:m] = pushes[:, :3], pushes[:, 3:]
     one["rhs"][:m], one["is_skew"] = asked, is_skew
     force, moment = solve_contact_forces(m, AXES, work[0], one)
-    return np.array([*force, *moment]), one["unknown"][:m].copy()
+    return np.array([*force, *moment]), one["value"][:m].copy()
 
 
 def problem(seed, count, tilt, skew):

@@ -102,4 +102,4 @@ def test_angular_momentum_is_held_against_the_real_spin():
     world.step()
     # Loads could add, in the step: the drag's 5e-6 N m about the axis, with 0.008 kg m² there, 6.25e-6 m/s in 10 ms.
     expected = mass * reach * (reach * spin + 6.25e-6)
-    assert world.motions[0]["scale"][0][10:] == pytest.approx([expected] * 3, rel=1e-9)
+    assert world.motions[0].smooth["scale"][0][10:] == pytest.approx([expected] * 3, rel=1e-9)

@@ -50,7 +50,7 @@ def set_up_contact(i, slot, r, target, work):
 
 
 @kernel
-def set_up_resting_problem(count, y, R, w, has_sliding, offset_frame, work, motion):
+def set_up_resting_problem(count, y, R, w, has_sliding, offset_frame, work, candidates):
     """Write the contact problem of candidates that do not slide into `work`: (acceleration, moment) without forces.
 
     It is that of an impact with the free acceleration for velocity, the moment τ - ω x L for angular momentum and
@@ -60,14 +60,14 @@ def set_up_resting_problem(count, y, R, w, has_sliding, offset_frame, work, moti
     walls = work.walls
     scale = acceleration_scale(w, work)
     for i in range(count):
-        slot = motion.candidate[i]
+        slot = candidates.slot[i]
         axes = wall_axes(walls, wall_of(slot, work))
         r, rate = contact_arm_and_rate(
             work.shape, as_vector(work.dims), R, w, axes[0], feature_of(slot, work), offset_frame, work
         )
         c = qt.cross(w, rate)
         if has_sliding:  # as if it had accelerated along its sliding for long: no force then turns it
-            c = plus(c, times(_SLIDING_ACCELERATION * scale, row_vector(motion.candidate_direction, i, 0)))
+            c = plus(c, times(_SLIDING_ACCELERATION * scale, row_vector(candidates.direction, i, 0)))
         set_up_contact(i, slot, r, (-qt.dot(axes[0], c), -qt.dot(axes[1], c), -qt.dot(axes[2], c)), work)
     work.mode = TRY_STICKING
     g, t = qt.cross(w, y[3]), work.torque
@@ -91,25 +91,26 @@ def is_redundant_contact(i, count, width, small, work):
 
 
 @inlined
-def store_solver_forces(count, width, work, motion):
+def store_solver_forces(count, width, work, contacts):
     """`last_force`: the solver's forces."""
-    clear_last_forces(motion)
+    clear_last_forces(contacts)
     for i in range(count):
         for c in range(width):
-            motion.last_force[work.slot[i], c] = work.impulse[width * i + c]
+            contacts.last_force[work.slot[i], c] = work.impulse[width * i + c]
 
 
 @kernel
-def is_body_at_rest(y, w, acceleration, work, motion):
+def is_body_at_rest(y, w, acceleration, work, thresholds):
     """True if the body neither moves nor begins to: what is left is rounding."""
     v = y[2]
     speed = math.sqrt(qt.dot(v, v)) + work.radius * math.sqrt(qt.dot(w, w))
-    return speed <= 2.0 * motion.rest_speed and acceleration <= 4.0 * _ZERO_SHARE * work.acceleration
+    return speed <= 2.0 * thresholds.rest_speed and acceleration <= 4.0 * _ZERO_SHARE * work.acceleration
 
 
 @kernel
 def read_resting_mode(count, y, a, moment, friction, has_sliding, offset_frame, work, motion):
     """Read the contact mode from the solution of `set_up_resting_problem`'s problem, and set the contacts that act."""
+    candidates = motion.candidates
     R, P, w, _ = free_angular_motion(y, offset_frame, work)
     alpha = apply_inverse_inertia(P, work.J, moment)
     width = 3
@@ -120,29 +121,29 @@ def read_resting_mode(count, y, a, moment, friction, has_sliding, offset_frame, 
     if has_sliding:
         small *= _SLIDING_ACCELERATION
     for i in range(count):
-        an, at = contact_acceleration(i, y, R, w, a, alpha, offset_frame, work, motion)
+        an, at = contact_acceleration(i, y, R, w, a, alpha, offset_frame, work, candidates)
         size = math.sqrt(qt.dot(at, at))
         push = work.impulse[width * i]
         if has_sliding and push > _PAINLEVE_PUSH * _SLIDING_ACCELERATION * work.mass * scale:
             return MODE_INCONSISTENT
-        slides = has_sliding and has_sliding_direction(motion.candidate_direction, i)
+        slides = has_sliding and has_sliding_direction(candidates.direction, i)
         kind = CANDIDATE_SLIDING
         if not push > small * work.mass and (an > small or is_redundant_contact(i, count, width, small, work)):
             kind = CANDIDATE_OPEN
         elif friction is not None and not slides and size <= small:
             kind = CANDIDATE_STICKING
-        motion.candidate_state[i] = kind
+        candidates.state[i] = kind
         if slides:
             continue
         for c in range(3):
-            motion.candidate_direction[i, c] = at[c] / size if size > small else 0.0
-    store_solver_forces(count, width, work, motion)
+            candidates.direction[i, c] = at[c] / size if size > small else 0.0
+    store_solver_forces(count, width, work, motion.contacts)
     activate_candidates(count, work, motion)
     if has_closing_contact(count, motion):
         return MODE_IMPACT
-    if motion.count == 0:
+    if motion.contacts.count == 0:
         return MODE_FLIGHT
     acceleration = math.sqrt(qt.dot(a, a)) + work.radius * math.sqrt(qt.dot(alpha, alpha))
-    if is_body_at_rest(y, w, acceleration, work, motion):
+    if is_body_at_rest(y, w, acceleration, work, motion.thresholds):
         return MODE_REST
     return MODE_CONTACT

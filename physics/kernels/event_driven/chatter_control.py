@@ -23,40 +23,41 @@ _EVENTS_BETWEEN_LEAPS = 6
 
 
 @inlined
-def reset_chatter_control(unit, motion):
+def reset_chatter_control(unit, pace):
     """Look-ahead and leaps at the start of a part, for a body whose own time is `unit` [s]; no event so far."""
-    motion.look_ahead = motion.min_look_ahead = _LOOK_AHEAD * unit
-    motion.next_leap = _FIRST_LEAP * motion.min_look_ahead
-    motion.chatter_start, motion.chatter_count = 0.0, 0
-    motion.distrusted_mode, motion.ended_mode = NO_MODE, NO_MODE
+    pace.look_ahead = pace.min_look_ahead = _LOOK_AHEAD * unit
+    pace.next_leap = _FIRST_LEAP * pace.min_look_ahead
+    pace.chatter_start, pace.chatter_count = 0.0, 0
+    pace.distrusted_mode, pace.ended_mode = NO_MODE, NO_MODE
 
 
 @inlined
-def is_chattering(t, motion):
+def is_chattering(t, pace):
     """Count an event at the time t of the part; whether there have been too many within one look-ahead."""
-    motion.chatter_count += 1
-    if t > motion.chatter_start + motion.min_look_ahead:
-        motion.chatter_start, motion.chatter_count = t, 0
-    return motion.chatter_count > _CHATTER_EVENTS
+    pace.chatter_count += 1
+    if t > pace.chatter_start + pace.min_look_ahead:
+        pace.chatter_start, pace.chatter_count = t, 0
+    return pace.chatter_count > _CHATTER_EVENTS
 
 
 @inlined
-def lengthen_leap(t, motion):
+def lengthen_leap(t, pace):
     """A leap ends at the time t of the part: the next one is longer, and PAUSE events later if the crowd lasts."""
-    motion.next_leap = min(_LEAP_GROWTH * motion.next_leap, _MAX_LEAP * motion.min_look_ahead)
-    motion.chatter_start, motion.chatter_count = t, _CHATTER_EVENTS - _EVENTS_BETWEEN_LEAPS
+    pace.next_leap = min(_LEAP_GROWTH * pace.next_leap, _MAX_LEAP * pace.min_look_ahead)
+    pace.chatter_start, pace.chatter_count = t, _CHATTER_EVENTS - _EVENTS_BETWEEN_LEAPS
 
 
 @inlined
 def adapt_look_ahead(step, guard, motion):
     """A step was ended by `guard`: look further ahead if it was short, or its mode is the one that ended before."""
-    if guard in FORCE_GUARDS and (step < motion.look_ahead or contact_mode_hash(motion) == motion.ended_mode):
-        if not motion.look_ahead < _MAX_LOOK_AHEAD * motion.min_look_ahead:
-            distrust_force_guards(motion.min_look_ahead, motion)
-        motion.look_ahead = min(
-            motion.look_ahead * _LOOK_AHEAD_GROWTH, _MAX_LOOK_AHEAD * motion.min_look_ahead
+    pace, contacts = motion.pace, motion.contacts
+    if guard in FORCE_GUARDS and (step < pace.look_ahead or contact_mode_hash(contacts) == pace.ended_mode):
+        if not pace.look_ahead < _MAX_LOOK_AHEAD * pace.min_look_ahead:
+            distrust_force_guards(pace.min_look_ahead, motion)
+        pace.look_ahead = min(
+            pace.look_ahead * _LOOK_AHEAD_GROWTH, _MAX_LOOK_AHEAD * pace.min_look_ahead
         )  # what was foretold has not been found
-    elif step > motion.look_ahead:
-        motion.look_ahead = motion.min_look_ahead
-        motion.next_leap = max(_FIRST_LEAP * motion.min_look_ahead, motion.next_leap / _LEAP_GROWTH)
-    motion.ended_mode = contact_mode_hash(motion) if guard in FORCE_GUARDS else NO_MODE
+    elif step > pace.look_ahead:
+        pace.look_ahead = pace.min_look_ahead
+        pace.next_leap = max(_FIRST_LEAP * pace.min_look_ahead, pace.next_leap / _LEAP_GROWTH)
+    pace.ended_mode = contact_mode_hash(contacts) if guard in FORCE_GUARDS else NO_MODE

@@ -15,7 +15,7 @@ from physics.kernels.math import quaternion as qt
 from physics.kernels.math.vector import plus, row_vector
 from physics.kernels.state.layout import WALL_OFFSET
 
-# Gaps and velocities of contacts below these shares of `motion.touch_gap`, `motion.rounding_speed` are left alone.
+# Gaps and velocities of contacts below these shares of `touch_gap` and `rounding_speed` are left alone.
 _UNSEEN_GAP = 0.1
 _UNSEEN_SPEED = 0.01
 
@@ -24,31 +24,31 @@ _UNSEEN_SPEED = 0.01
 def _projection_step(holding, P, work, motion):
     """Velocity and turn, both per kinetic metric, that take off `constraint_error` along the rows of the mode."""
     k = assemble_unknowns(0.0, holding, work, motion)
-    F, T = solve_contact_forces(k, P, work, motion)
+    F, T = solve_contact_forces(k, P, work, motion.unknowns)
     s = 1.0 / work.mass
     return (s * F[0], s * F[1], s * F[2]), T
 
 
 @inlined
-def _set_velocity_errors(motion, work):
+def _set_velocity_errors(contacts, work):
     """`constraint_error`: the velocities of the contacts that act; the largest that the mode does not allow [m/s]."""
     worst = 0.0
-    for j in range(motion.count):
-        n = wall_normal(work.walls, wall_of(motion.slot[j], work))
-        u = row_vector(motion.velocity, j, 0)
+    for j in range(contacts.count):
+        n = wall_normal(work.walls, wall_of(contacts.slot[j], work))
+        u = row_vector(contacts.velocity, j, 0)
         worst = max(worst, abs(qt.dot(n, u)))
-        if motion.sticks[j]:
+        if contacts.sticks[j]:
             worst = max(worst, max(abs(u[0]), max(abs(u[1]), abs(u[2]))))
         for c in range(3):
-            motion.constraint_error[j, c] = u[c]
+            contacts.constraint_error[j, c] = u[c]
     return worst
 
 
 @inlined
 def _project_velocities(holding, v, m, P, work, motion):
     """Velocity and angular momentum without the velocities of contacts that the mode does not allow (placed)."""
-    worst = _set_velocity_errors(motion, work)
-    if not worst > _UNSEEN_SPEED * motion.rounding_speed:
+    worst = _set_velocity_errors(motion.contacts, work)
+    if not worst > _UNSEEN_SPEED * motion.thresholds.rounding_speed:
         return v, m
     change, turn = _projection_step(holding, P, work, motion)
     return plus(v, change), plus(m, turn)
@@ -70,20 +70,21 @@ def project_state(y, offset_frame, work, motion):
 
     Least change in the kinetic metric: along M⁻¹ Jᵀ.
     """
-    if motion.count == 0:
+    contacts = motion.contacts
+    if contacts.count == 0:
         return y
     x, q, v, m = y
     R, P, w, alpha = free_angular_motion(y, offset_frame, work)
     set_contact_kinematics(y, R, w, alpha, offset_frame, work, motion)
     worst = 0.0
-    for j in range(motion.count):
-        wall = wall_of(motion.slot[j], work)
+    for j in range(contacts.count):
+        wall = wall_of(contacts.slot[j], work)
         n = wall_normal(work.walls, wall)
-        gap = qt.dot(n, x) + qt.dot(n, row_vector(motion.arm, j, 0)) - work.walls[wall, WALL_OFFSET]
+        gap = qt.dot(n, x) + qt.dot(n, row_vector(contacts.arm, j, 0)) - work.walls[wall, WALL_OFFSET]
         worst = max(worst, abs(gap))
         for c in range(3):
-            motion.constraint_error[j, c] = gap * n[c]
-    if worst > _UNSEEN_GAP * motion.touch_gap:
+            contacts.constraint_error[j, c] = gap * n[c]
+    if worst > _UNSEEN_GAP * motion.thresholds.touch_gap:
         move, turn = _projection_step(False, P, work, motion)
         x = plus(x, move)
         q = qt.normalise(qt.multiply(qt.exp_map(apply_inverse_inertia(P, work.J, turn)), q))

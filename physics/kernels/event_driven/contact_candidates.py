@@ -28,51 +28,53 @@ from physics.kernels.math.vector import as_vector, plus
 # What a candidate does.
 CANDIDATE_OPEN, CANDIDATE_STICKING, CANDIDATE_SLIDING = range(3)
 
-# Approach of a contact that will leave that is none, in `motion.rest_speed`.
+# Approach of a contact that will leave that is none, in `motion.thresholds.rest_speed`.
 _UNSEEN_APPROACH = 1.0e-2
 
 
 @kernel
 def find_candidates(y, offset_frame, work, motion):
     """Features that touch and do not leave, into `candidate`: (count, whether one approaches)."""
-    put_state_row(motion, ROW_START, y)
-    compute_feature_gaps(ROW_START, offset_frame, work, motion)
-    count = motion.candidates = 0
-    for s in range(motion.is_active.shape[0]):
-        if motion.gap[ROW_START, s] <= motion.touch_gap and count < motion.slot.shape[0]:
-            rate = motion.gap_rate[ROW_START, s]
-            if rate < -motion.rest_speed:
+    smooth = motion.smooth
+    put_state_row(smooth, ROW_START, y)
+    compute_feature_gaps(ROW_START, offset_frame, work, smooth)
+    count = motion.candidates.count = 0
+    for s in range(smooth.is_active.shape[0]):
+        if smooth.gap[ROW_START, s] <= motion.thresholds.touch_gap and count < motion.contacts.slot.shape[0]:
+            rate = smooth.gap_rate[ROW_START, s]
+            if rate < -motion.thresholds.rest_speed:
                 return 0, True
-            if rate <= motion.rest_speed:
-                motion.candidate[count] = s
+            if rate <= motion.thresholds.rest_speed:
+                motion.candidates.slot[count] = s
                 count += 1
-    motion.candidates = count
+    motion.candidates.count = count
     return count, False
 
 
 @kernel
 def activate_candidates(count, work, motion):
     """Let the candidates act that are not open, with the last forces for shares; mark their slots."""
+    contacts, smooth, candidates = motion.contacts, motion.smooth, motion.candidates
     k = 0
-    for s in range(motion.is_active.shape[0]):
-        motion.is_active[s] = 0
+    for s in range(smooth.is_active.shape[0]):
+        smooth.is_active[s] = 0
     for i in range(count):
-        if motion.candidate_state[i] != CANDIDATE_OPEN and k < motion.slot.shape[0]:
-            motion.slot[k] = motion.candidate[i]
-            motion.is_active[motion.candidate[i]] = 1
-            motion.sticks[k] = 1 if motion.candidate_state[i] == CANDIDATE_STICKING else 0
+        if candidates.state[i] != CANDIDATE_OPEN and k < contacts.slot.shape[0]:
+            contacts.slot[k] = candidates.slot[i]
+            smooth.is_active[candidates.slot[i]] = 1
+            contacts.sticks[k] = 1 if candidates.state[i] == CANDIDATE_STICKING else 0
             for c in range(3):
-                motion.given_force[k, c] = motion.last_force[motion.candidate[i], c]
-                motion.slip_direction[k, c] = motion.start_slip_direction[k, c] = motion.candidate_direction[i, c]
+                contacts.given_force[k, c] = contacts.last_force[candidates.slot[i], c]
+                contacts.slip_direction[k, c] = contacts.start_slip_direction[k, c] = candidates.direction[i, c]
             k += 1
-    motion.count = k
+    contacts.count = k
 
 
 @inlined
-def has_open_candidate(motion):
+def has_open_candidate(candidates):
     """True if a candidate does not act."""
-    for i in range(motion.candidates):
-        if motion.candidate_state[i] == CANDIDATE_OPEN:
+    for i in range(candidates.count):
+        if candidates.state[i] == CANDIDATE_OPEN:
             return True
     return False
 
@@ -80,10 +82,10 @@ def has_open_candidate(motion):
 @inlined
 def has_normal_speed(motion):
     """True if an acting candidate moves along its normal, or another one approaches, by more than rounding."""
-    for i in range(motion.candidates):
-        rate = motion.gap_rate[ROW_START, motion.candidate[i]]
-        if rate < -motion.rounding_speed or (
-            rate > motion.rounding_speed and motion.candidate_state[i] != CANDIDATE_OPEN
+    for i in range(motion.candidates.count):
+        rate = motion.smooth.gap_rate[ROW_START, motion.candidates.slot[i]]
+        if rate < -motion.thresholds.rounding_speed or (
+            rate > motion.thresholds.rounding_speed and motion.candidates.state[i] != CANDIDATE_OPEN
         ):
             return True
     return False
@@ -96,30 +98,32 @@ def project_candidate_speeds(y, offset_frame, work, motion):
     A body that lies on two contacts and rocks lower than counts would else come down on the one whenever it is set
     down on the other. Where those that act have no such velocity one that has just been let go keeps its own.
     """
-    if not has_open_candidate(motion):
+    smooth, contacts, candidates, thresholds = motion.smooth, motion.contacts, motion.candidates, motion.thresholds
+    if not has_open_candidate(candidates):
         return y
-    put_state_row(motion, ROW_START, y)
-    compute_feature_gaps(ROW_START, offset_frame, work, motion)
+    put_state_row(smooth, ROW_START, y)
+    compute_feature_gaps(ROW_START, offset_frame, work, smooth)
     if not has_normal_speed(motion):
         return y
-    motion.count = 0
-    for i in range(motion.candidates):
-        s = motion.candidate[i]
-        if motion.gap[ROW_START, s] <= motion.touch_gap and abs(motion.gap_rate[ROW_START, s]) <= motion.rest_speed:
-            motion.slot[motion.count], motion.sticks[motion.count] = s, 0
-            motion.count += 1
+    contacts.count = 0
+    for i in range(candidates.count):
+        s = candidates.slot[i]
+        gap, rate = smooth.gap[ROW_START, s], smooth.gap_rate[ROW_START, s]
+        if gap <= thresholds.touch_gap and abs(rate) <= thresholds.rest_speed:
+            contacts.slot[contacts.count], contacts.sticks[contacts.count] = s, 0
+            contacts.count += 1
     y = project_normal_speeds(y, offset_frame, work, motion)
-    activate_candidates(motion.candidates, work, motion)
+    activate_candidates(candidates.count, work, motion)
     return y
 
 
 @inlined
-def contact_acceleration(i, y, R, w, a, alpha, offset_frame, work, motion):
+def contact_acceleration(i, y, R, w, a, alpha, offset_frame, work, candidates):
     """Acceleration of candidate i: (normal part, tangential part)."""
-    wall = wall_of(motion.candidate[i], work)
+    wall = wall_of(candidates.slot[i], work)
     n = wall_normal(work.walls, wall)
     r, rate = contact_arm_and_rate(
-        work.shape, as_vector(work.dims), R, w, n, feature_of(motion.candidate[i], work), offset_frame, work
+        work.shape, as_vector(work.dims), R, w, n, feature_of(candidates.slot[i], work), offset_frame, work
     )
     b = plus(plus(a, qt.cross(alpha, r)), qt.cross(w, rate))
     bn = qt.dot(n, b)
@@ -129,20 +133,21 @@ def contact_acceleration(i, y, R, w, a, alpha, offset_frame, work, motion):
 @kernel
 def is_candidate_sliding(i, y, R, w, offset_frame, work, motion):
     """True if candidate i slides; its direction into `candidate_direction`."""
-    wall = wall_of(motion.candidate[i], work)
+    candidates = motion.candidates
+    wall = wall_of(candidates.slot[i], work)
     n = wall_normal(work.walls, wall)
     r, _ = contact_arm_and_rate(
-        work.shape, as_vector(work.dims), R, w, n, feature_of(motion.candidate[i], work), offset_frame, work
+        work.shape, as_vector(work.dims), R, w, n, feature_of(candidates.slot[i], work), offset_frame, work
     )
     u = plus(y[2], qt.cross(w, r))
     un = qt.dot(n, u)
     t = (u[0] - un * n[0], u[1] - un * n[1], u[2] - un * n[2])
     speed = math.sqrt(qt.dot(t, t))
     for c in range(3):
-        motion.candidate_direction[i, c] = 0.0
-        if speed > motion.slip_stop_speed:
-            motion.candidate_direction[i, c] = t[c] / speed
-    return speed > motion.slip_stop_speed
+        candidates.direction[i, c] = 0.0
+        if speed > motion.thresholds.slip_stop_speed:
+            candidates.direction[i, c] = t[c] / speed
+    return speed > motion.thresholds.slip_stop_speed
 
 
 @inlined
@@ -154,8 +159,9 @@ def acceleration_scale(w, work):
 @inlined
 def has_closing_contact(count, motion):
     """True if a contact that will leave is still, by a little, on its way in."""
-    least = -motion.rounding_speed - _UNSEEN_APPROACH * motion.rest_speed
+    thresholds, candidates = motion.thresholds, motion.candidates
+    least = -thresholds.rounding_speed - _UNSEEN_APPROACH * thresholds.rest_speed
     for i in range(count):
-        if motion.candidate_state[i] == CANDIDATE_OPEN and motion.gap_rate[ROW_START, motion.candidate[i]] < least:
+        if candidates.state[i] == CANDIDATE_OPEN and motion.smooth.gap_rate[ROW_START, candidates.slot[i]] < least:
             return True
     return False

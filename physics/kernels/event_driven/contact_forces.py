@@ -37,7 +37,7 @@ from physics.kernels.state.body import principal_attitude
 # Contacts of one wall from which on their normal forces are taken as affine.
 MIN_PATCH_CONTACTS = 3
 
-# `motion.patch` of a contact whose normal force is an unknown of its own.
+# `motion.contacts.patch` of a contact whose normal force is an unknown of its own.
 NO_PATCH = -1
 
 
@@ -66,55 +66,56 @@ def free_angular_motion(y, offset_frame, work):
 @kernel
 def set_contact_kinematics(y, R, w, alpha, offset_frame, work, motion):
     """Arms, velocities, directions of sliding and free accelerations (`constraint_error`) of the contacts that act."""
+    contacts = motion.contacts
     shape, walls = work.shape, work.walls
     dims, a, v = as_vector(work.dims), as_vector(work.free_acceleration), y[2]
-    for j in range(motion.count):
-        n = wall_normal(walls, wall_of(motion.slot[j], work))
-        r, rate = contact_arm_and_rate(shape, dims, R, w, n, feature_of(motion.slot[j], work), offset_frame, work)
+    for j in range(contacts.count):
+        n = wall_normal(walls, wall_of(contacts.slot[j], work))
+        r, rate = contact_arm_and_rate(shape, dims, R, w, n, feature_of(contacts.slot[j], work), offset_frame, work)
         u = plus(v, qt.cross(w, r))
         b = plus(plus(a, qt.cross(alpha, r)), qt.cross(w, rate))
         un = qt.dot(n, u)
         t = (u[0] - un * n[0], u[1] - un * n[1], u[2] - un * n[2])
         speed = math.sqrt(qt.dot(t, t))
-        d = row_vector(motion.start_slip_direction, j, 0)
-        if speed > motion.slip_stop_speed and qt.dot(t, d) > 0.0:
+        d = row_vector(contacts.start_slip_direction, j, 0)
+        if speed > motion.thresholds.slip_stop_speed and qt.dot(t, d) > 0.0:
             d = times(1.0 / speed, t)
         for c in range(3):
-            motion.arm[j, c], motion.velocity[j, c], motion.constraint_error[j, c] = r[c], u[c], b[c]
-            motion.slip_direction[j, c] = d[c]
+            contacts.arm[j, c], contacts.velocity[j, c], contacts.constraint_error[j, c] = r[c], u[c], b[c]
+            contacts.slip_direction[j, c] = d[c]
 
 
 @inlined
-def _add_to_unknown(m, r, push, row, share, motion):
+def _add_to_unknown(m, r, push, row, share, unknowns):
     """Add `given_force` of a contact at r to unknown m."""
     h, e = qt.cross(r, push), qt.cross(r, row)
     for c in range(3):
-        motion.column_force[m, c] += share * push[c]
-        motion.column_moment[m, c] += share * h[c]
-        motion.row[m, c] += share * row[c]
-        motion.row_moment[m, c] += share * e[c]
+        unknowns.column_force[m, c] += share * push[c]
+        unknowns.column_moment[m, c] += share * h[c]
+        unknowns.row[m, c] += share * row[c]
+        unknowns.row_moment[m, c] += share * e[c]
 
 
 @inlined
-def sliding_force_direction(mu, axes, j, work, motion):
+def sliding_force_direction(mu, axes, j, work, contacts):
     """Force of contact j, which slides, for each newton along the normal."""
-    n, d = axes[0], sliding_direction(row_vector(motion.slip_direction, j, 0), axes, work)
+    n, d = axes[0], sliding_direction(row_vector(contacts.slip_direction, j, 0), axes, work)
     return (n[0] - mu * d[0], n[1] - mu * d[1], n[2] - mu * d[2])
 
 
 @inlined
-def _contact_force_direction(mu, axes, j, work, motion):
+def _contact_force_direction(mu, axes, j, work, contacts):
     """Force of contact j for each newton along the normal."""
-    if motion.sticks[j]:
+    if contacts.sticks[j]:
         return axes[0]
-    return sliding_force_direction(mu, axes, j, work, motion)
+    return sliding_force_direction(mu, axes, j, work, contacts)
 
 
 @inlined
-def _contact_force(normal, first, second, mu, axes, j, work, motion):
+def _contact_force(normal, first, second, mu, axes, j, work, contacts):
     """Force of contact j that presses with `normal` and, where it holds, has these along the other two axes."""
-    f = times(normal, _contact_force_direction(mu, axes, j, work, motion))
-    if motion.sticks[j]:
+    f = times(normal, _contact_force_direction(mu, axes, j, work, contacts))
+    if contacts.sticks[j]:
         f = plus(f, plus(times(first, axes[1]), times(second, axes[2])))
     return f
 
@@ -122,35 +123,37 @@ def _contact_force(normal, first, second, mu, axes, j, work, motion):
 @kernel
 def _add_shares(mu, work, motion):
     """`given_wrench`: force and moment of all shares. Without friction they make no difference, and are left out."""
+    contacts = motion.contacts
     force = moment = (0.0, 0.0, 0.0)
     if mu > 0.0:
-        for j in range(motion.count):
-            axes = wall_axes(work.walls, wall_of(motion.slot[j], work))
-            p = row_vector(motion.given_force, j, 0)
-            f = _contact_force(p[0], p[1], p[2], mu, axes, j, work, motion)
-            force, moment = plus(force, f), plus(moment, qt.cross(row_vector(motion.arm, j, 0), f))
+        for j in range(contacts.count):
+            axes = wall_axes(work.walls, wall_of(contacts.slot[j], work))
+            p = row_vector(contacts.given_force, j, 0)
+            f = _contact_force(p[0], p[1], p[2], mu, axes, j, work, contacts)
+            force, moment = plus(force, f), plus(moment, qt.cross(row_vector(contacts.arm, j, 0), f))
     for c in range(3):
-        motion.given_wrench[0, c], motion.given_wrench[1, c] = force[c], moment[c]
+        motion.unknowns.given_wrench[0, c], motion.unknowns.given_wrench[1, c] = force[c], moment[c]
 
 
 @inlined
-def _clear_unknowns(m, count, motion):
+def _clear_unknowns(m, count, unknowns):
     """Empty the unknowns m <= k < m + count."""
     for k in range(m, m + count):
-        motion.rhs[k] = 0.0
+        unknowns.rhs[k] = 0.0
         for c in range(3):
-            motion.column_force[k, c] = motion.column_moment[k, c] = motion.row[k, c] = motion.row_moment[k, c] = 0.0
+            unknowns.column_force[k, c] = unknowns.column_moment[k, c] = 0.0
+            unknowns.row[k, c] = unknowns.row_moment[k, c] = 0.0
 
 
 @kernel
 def _add_sticking_unknowns(m, j, first_axis, axes, motion):
     """Unknowns of contact j from the axis `first_axis` on: the force along each."""
-    r, b = row_vector(motion.arm, j, 0), row_vector(motion.constraint_error, j, 0)
-    motion.first_unknown[j] = m
-    _clear_unknowns(m, 3 - first_axis, motion)
+    r, b = row_vector(motion.contacts.arm, j, 0), row_vector(motion.contacts.constraint_error, j, 0)
+    motion.contacts.first_unknown[j] = m
+    _clear_unknowns(m, 3 - first_axis, motion.unknowns)
     for c in range(first_axis, 3):
-        _add_to_unknown(m, r, axes[c], axes[c], 1.0, motion)
-        motion.rhs[m] = -qt.dot(axes[c], b)
+        _add_to_unknown(m, r, axes[c], axes[c], 1.0, motion.unknowns)
+        motion.unknowns.rhs[m] = -qt.dot(axes[c], b)
         m += 1
     return m
 
@@ -158,26 +161,27 @@ def _add_sticking_unknowns(m, j, first_axis, axes, motion):
 @kernel
 def _add_patch_unknowns(m, first, last, mu, axes, work, motion):
     """Three unknowns of the normal forces of the contacts first <= j < last, those of one wall."""
-    _clear_unknowns(m, 3, motion)
+    unknowns, contacts = motion.unknowns, motion.contacts
+    _clear_unknowns(m, 3, unknowns)
     radius = work.radius
     ca = cb = 0.0
     for j in range(first, last):
-        r = row_vector(motion.arm, j, 0)
+        r = row_vector(contacts.arm, j, 0)
         ca += qt.dot(axes[1], r) / (last - first)
         cb += qt.dot(axes[2], r) / (last - first)
     for j in range(first, last):
-        r, b = row_vector(motion.arm, j, 0), -qt.dot(axes[0], row_vector(motion.constraint_error, j, 0))
-        push = _contact_force_direction(mu, axes, j, work, motion)
+        r, b = row_vector(contacts.arm, j, 0), -qt.dot(axes[0], row_vector(contacts.constraint_error, j, 0))
+        push = _contact_force_direction(mu, axes, j, work, contacts)
         s = (qt.dot(axes[1], r) - ca) / radius
         t = (qt.dot(axes[2], r) - cb) / radius
-        motion.patch[j] = m
-        motion.patch_coordinate[j, 0], motion.patch_coordinate[j, 1] = s, t
-        _add_to_unknown(m, r, push, axes[0], 1.0, motion)
-        _add_to_unknown(m + 1, r, push, axes[0], s, motion)
-        _add_to_unknown(m + 2, r, push, axes[0], t, motion)
-        motion.rhs[m] += b
-        motion.rhs[m + 1] += s * b
-        motion.rhs[m + 2] += t * b
+        contacts.patch[j] = m
+        contacts.patch_coordinate[j, 0], contacts.patch_coordinate[j, 1] = s, t
+        _add_to_unknown(m, r, push, axes[0], 1.0, unknowns)
+        _add_to_unknown(m + 1, r, push, axes[0], s, unknowns)
+        _add_to_unknown(m + 2, r, push, axes[0], t, unknowns)
+        unknowns.rhs[m] += b
+        unknowns.rhs[m + 1] += s * b
+        unknowns.rhs[m + 2] += t * b
     return m + 3
 
 
@@ -187,37 +191,38 @@ def assemble_unknowns(mu, holding, work, motion):
 
     `holding`: contacts that hold do so along the wall, too.
     """
-    m = first = motion.is_skew = 0
+    unknowns, contacts = motion.unknowns, motion.contacts
+    m = first = unknowns.is_skew = 0
     _add_shares(mu, work, motion)
-    for j in range(motion.count):
-        if mu > 0.0 and not motion.sticks[j]:
-            motion.is_skew = 1
-    while first < motion.count:
-        wall = wall_of(motion.slot[first], work)
+    for j in range(contacts.count):
+        if mu > 0.0 and not contacts.sticks[j]:
+            unknowns.is_skew = 1
+    while first < contacts.count:
+        wall = wall_of(contacts.slot[first], work)
         axes = wall_axes(work.walls, wall)
         last = first
-        while last < motion.count and wall_of(motion.slot[last], work) == wall:
-            motion.patch[last] = NO_PATCH
+        while last < contacts.count and wall_of(contacts.slot[last], work) == wall:
+            contacts.patch[last] = NO_PATCH
             last += 1
         own = 0  # the first axis along which a contact that holds has a force of its own
         if last - first >= MIN_PATCH_CONTACTS:
             m = _add_patch_unknowns(m, first, last, mu, axes, work, motion)
             own = 1
         for j in range(first, last):
-            if holding and motion.sticks[j]:
+            if holding and contacts.sticks[j]:
                 m = _add_sticking_unknowns(m, j, own, axes, motion)
             elif own == 0:
-                _clear_unknowns(m, 1, motion)
+                _clear_unknowns(m, 1, unknowns)
                 _add_to_unknown(
                     m,
-                    row_vector(motion.arm, j, 0),
-                    sliding_force_direction(mu, axes, j, work, motion),
+                    row_vector(contacts.arm, j, 0),
+                    sliding_force_direction(mu, axes, j, work, contacts),
                     axes[0],
                     1.0,
-                    motion,
+                    unknowns,
                 )
-                motion.rhs[m] = -qt.dot(axes[0], row_vector(motion.constraint_error, j, 0))
-                motion.first_unknown[j] = m
+                unknowns.rhs[m] = -qt.dot(axes[0], row_vector(contacts.constraint_error, j, 0))
+                contacts.first_unknown[j] = m
                 m += 1
         first = last
     return m
@@ -226,40 +231,41 @@ def assemble_unknowns(mu, holding, work, motion):
 @kernel
 def recover_contact_forces(mu, work, motion):
     """Force of each contact that acts (`force`, `normal`) from the unknowns, and the shares where they are in it."""
-    for j in range(motion.count):
-        axes = wall_axes(work.walls, wall_of(motion.slot[j], work))
-        k, p, f = motion.first_unknown[j], motion.patch[j], row_vector(motion.given_force, j, 0)
+    contacts, unknowns = motion.contacts, motion.unknowns
+    for j in range(contacts.count):
+        axes = wall_axes(work.walls, wall_of(contacts.slot[j], work))
+        k, p, f = contacts.first_unknown[j], contacts.patch[j], row_vector(contacts.given_force, j, 0)
         if not mu > 0.0:  # `_add_shares` leaves them out: the unknowns are all of the force
             f = (0.0, 0.0, 0.0)
         if p != NO_PATCH:
-            s = motion.unknown[p]
+            s = unknowns.value[p]
             s += (
-                motion.patch_coordinate[j, 0] * motion.unknown[p + 1]
-                + motion.patch_coordinate[j, 1] * motion.unknown[p + 2]
+                contacts.patch_coordinate[j, 0] * unknowns.value[p + 1]
+                + contacts.patch_coordinate[j, 1] * unknowns.value[p + 2]
             )
         else:
-            s = motion.unknown[k]
+            s = unknowns.value[k]
             k += 1
-        motion.normal[j] = f[0] + s
+        contacts.normal[j] = f[0] + s
         first = second = 0.0
-        if motion.sticks[j]:
-            first, second = f[1] + motion.unknown[k], f[2] + motion.unknown[k + 1]
-        f = _contact_force(motion.normal[j], first, second, mu, axes, j, work, motion)
-        motion.force[j, 0], motion.force[j, 1], motion.force[j, 2] = f
+        if contacts.sticks[j]:
+            first, second = f[1] + unknowns.value[k], f[2] + unknowns.value[k + 1]
+        f = _contact_force(contacts.normal[j], first, second, mu, axes, j, work, contacts)
+        contacts.force[j, 0], contacts.force[j, 1], contacts.force[j, 2] = f
 
 
 @inlined
-def clear_last_forces(motion):
+def clear_last_forces(contacts):
     """No force is known from before."""
-    for s in range(motion.last_force.shape[0]):
-        motion.last_force[s, 0] = motion.last_force[s, 1] = motion.last_force[s, 2] = 0.0
+    for s in range(contacts.last_force.shape[0]):
+        contacts.last_force[s, 0] = contacts.last_force[s, 1] = contacts.last_force[s, 2] = 0.0
 
 
 @kernel
-def store_last_forces(work, motion):
+def store_last_forces(work, contacts):
     """`last_force`: the forces of the contacts that act, none of all others."""
-    clear_last_forces(motion)
-    for j in range(motion.count):
-        axes, f = wall_axes(work.walls, wall_of(motion.slot[j], work)), row_vector(motion.force, j, 0)
+    clear_last_forces(contacts)
+    for j in range(contacts.count):
+        axes, f = wall_axes(work.walls, wall_of(contacts.slot[j], work)), row_vector(contacts.force, j, 0)
         for c in range(3):
-            motion.last_force[motion.slot[j], c] = qt.dot(axes[c], f)
+            contacts.last_force[contacts.slot[j], c] = qt.dot(axes[c], f)

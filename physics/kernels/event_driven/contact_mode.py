@@ -38,10 +38,10 @@ def find_contact_mode(y, friction, offset_frame, work, motion):
     problem decides for them, too.
     """
     zero = (0.0, 0.0, 0.0)
-    motion.count = 0
+    motion.contacts.count = 0
     count, approaches = find_candidates(y, offset_frame, work, motion)
-    for s in range(motion.is_active.shape[0]):
-        motion.is_active[s] = 0
+    for s in range(motion.smooth.is_active.shape[0]):
+        motion.smooth.is_active[s] = 0
     if approaches:
         return MODE_IMPACT, 0, zero, zero
     if count == 0:
@@ -55,8 +55,8 @@ def find_contact_mode(y, friction, offset_frame, work, motion):
         if slides:
             for i in range(count):
                 is_candidate_sliding(i, y, R, w, offset_frame, work, motion)
-        a, moment = set_up_resting_problem(count, y, R, w, slides, offset_frame, work, motion)
+        a, moment = set_up_resting_problem(count, y, R, w, slides, offset_frame, work, motion.candidates)
         return (MODE_UNDECIDED_SLIDING if slides else MODE_UNDECIDED), count, a, moment
     if has_closing_contact(count, motion):
         return MODE_IMPACT, 0, zero, zero
-    return (MODE_CONTACT if motion.count > 0 else MODE_FLIGHT), count, zero, zero
+    return (MODE_CONTACT if motion.contacts.count > 0 else MODE_FLIGHT), count, zero, zero

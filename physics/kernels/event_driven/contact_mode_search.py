@@ -44,59 +44,60 @@ def _worst_violation(count, y, rates, scale, offset_frame, work, motion):
 
     `rates` are the attitude, the angular velocity, and both accelerations of the trial.
     """
+    candidates, contacts = motion.candidates, motion.contacts
     R, w, a, alpha = rates
     weight = _EXACT_ZERO_SHARE * work.mass * scale
     k = worst = 0
     which, kind = -1, CANDIDATE_OPEN
     deepest = -weight
     for i in range(count):
-        if motion.candidate_state[i] != CANDIDATE_OPEN:
-            if motion.normal[k] < deepest:
-                deepest, which = motion.normal[k], i
+        if candidates.state[i] != CANDIDATE_OPEN:
+            if contacts.normal[k] < deepest:
+                deepest, which = contacts.normal[k], i
             k += 1
     if which >= 0:
         return which, CANDIDATE_OPEN
     k = 0
     most = weight
     for i in range(count):
-        if motion.candidate_state[i] != CANDIDATE_OPEN:
-            if motion.candidate_state[i] == CANDIDATE_STICKING:
-                excess = cone_excess(k, work, motion)
+        if candidates.state[i] != CANDIDATE_OPEN:
+            if candidates.state[i] == CANDIDATE_STICKING:
+                excess = cone_excess(k, work, contacts)
                 if excess > most:
                     most, which, worst, kind = excess, i, k, CANDIDATE_SLIDING
             k += 1
     if which >= 0:
-        axes = wall_axes(work.walls, wall_of(motion.candidate[which], work))
-        n, f = axes[0], unstretch_force(unstretch_force(row_vector(motion.force, worst, 0), axes, work), axes, work)
+        axes = wall_axes(work.walls, wall_of(candidates.slot[which], work))
+        n, f = axes[0], unstretch_force(unstretch_force(row_vector(contacts.force, worst, 0), axes, work), axes, work)
         fn = qt.dot(n, f)
         t = (fn * n[0] - f[0], fn * n[1] - f[1], fn * n[2] - f[2])
         size = math.sqrt(qt.dot(t, t))
         if size > 0.0:
             for c in range(3):
-                motion.candidate_direction[which, c] = t[c] / size
-        motion.is_fresh[which] = 1
+                candidates.direction[which, c] = t[c] / size
+        candidates.is_fresh[which] = 1
         return which, kind
     for i in range(count):
-        an, at = contact_acceleration(i, y, R, w, a, alpha, offset_frame, work, motion)
-        if motion.candidate_state[i] == CANDIDATE_OPEN and an < -_EXACT_ZERO_SHARE * scale:
-            return i, CANDIDATE_SLIDING if motion.is_fresh[i] == 0 else CANDIDATE_STICKING
-        if motion.candidate_state[i] == CANDIDATE_SLIDING and motion.is_fresh[i]:
+        an, at = contact_acceleration(i, y, R, w, a, alpha, offset_frame, work, candidates)
+        if candidates.state[i] == CANDIDATE_OPEN and an < -_EXACT_ZERO_SHARE * scale:
+            return i, CANDIDATE_SLIDING if candidates.is_fresh[i] == 0 else CANDIDATE_STICKING
+        if candidates.state[i] == CANDIDATE_SLIDING and candidates.is_fresh[i]:
             size = math.sqrt(qt.dot(at, at))
-            along = qt.dot(at, row_vector(motion.candidate_direction, i, 0))
+            along = qt.dot(at, row_vector(candidates.direction, i, 0))
             if along < 0.0:
                 return i, CANDIDATE_STICKING
             if size > _EXACT_ZERO_SHARE * scale and size - along > 0.5 * _SAME_DIRECTION * size:
                 for c in range(3):
-                    motion.candidate_direction[i, c] = at[c] / size
+                    candidates.direction[i, c] = at[c] / size
                 return i, CANDIDATE_SLIDING
     return -1, CANDIDATE_OPEN
 
 
 @inlined
-def has_last_forces(motion):
+def has_last_forces(contacts):
     """True if any force is known from before."""
-    for s in range(motion.last_force.shape[0]):
-        if motion.last_force[s, 0] != 0.0:
+    for s in range(contacts.last_force.shape[0]):
+        if contacts.last_force[s, 0] != 0.0:
             return True
     return False
 
@@ -104,20 +105,21 @@ def has_last_forces(motion):
 @kernel
 def search_modes_once(count, y, R, P, w, alpha_free, offset_frame, work, motion):
     """`search_contact_modes` with the last forces as they are."""
+    candidates = motion.candidates
     scale = work.acceleration + work.radius * qt.dot(w, w)
     for i in range(count):
-        motion.is_fresh[i] = motion.candidate_changes[i] = 0
-        motion.candidate_state[i] = CANDIDATE_SLIDING
+        candidates.is_fresh[i] = candidates.changes[i] = 0
+        candidates.state[i] = CANDIDATE_SLIDING
         if not is_candidate_sliding(i, y, R, w, offset_frame, work, motion):
-            motion.is_fresh[i] = 1
+            candidates.is_fresh[i] = 1
             if work.mu > 0.0:
-                motion.candidate_state[i] = CANDIDATE_STICKING
+                candidates.state[i] = CANDIDATE_STICKING
     f = as_vector(work.free_acceleration)
     for _ in range(_MAX_MODE_TRIALS):
         activate_candidates(count, work, motion)
         set_contact_kinematics(y, R, w, alpha_free, offset_frame, work, motion)
         m = assemble_unknowns(work.mu, True, work, motion)
-        F, T = solve_contact_forces(m, P, work, motion)
+        F, T = solve_contact_forces(m, P, work, motion.unknowns)
         recover_contact_forces(work.mu, work, motion)
         turn = apply_inverse_inertia(P, work.J, T)
         s = 1.0 / work.mass
@@ -126,11 +128,11 @@ def search_modes_once(count, y, R, P, w, alpha_free, offset_frame, work, motion)
         which, kind = _worst_violation(count, y, (R, w, a, alpha), scale, offset_frame, work, motion)
         if which < 0:
             return True
-        if kind != motion.candidate_state[which]:
-            motion.candidate_changes[which] += 1
-            if motion.candidate_changes[which] > _MAX_MODE_CHANGES:
+        if kind != candidates.state[which]:
+            candidates.changes[which] += 1
+            if candidates.changes[which] > _MAX_MODE_CHANGES:
                 return False
-        motion.candidate_state[which] = kind
+        candidates.state[which] = kind
     return False
 
 
@@ -139,7 +141,7 @@ def search_contact_modes(count, y, R, P, w, alpha_free, offset_frame, work, moti
     """Kinds of the candidates when some of them slide; whether they were found, with the last forces or without."""
     if search_modes_once(count, y, R, P, w, alpha_free, offset_frame, work, motion):
         return True
-    if not has_last_forces(motion):
+    if not has_last_forces(motion.contacts):
         return False
-    clear_last_forces(motion)
+    clear_last_forces(motion.contacts)
     return search_modes_once(count, y, R, P, w, alpha_free, offset_frame, work, motion)

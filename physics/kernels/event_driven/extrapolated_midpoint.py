@@ -75,9 +75,9 @@ _MAX_STEP_ROTATION = 0.25
 
 
 @inlined
-def get_state_row(motion, row):
+def get_state_row(smooth, row):
     """(x, q, v, L) of a row of `y`."""
-    y = motion.y
+    y = smooth.y
     return (
         (y[row, Y_POSITION], y[row, Y_POSITION + 1], y[row, Y_POSITION + 2]),
         (y[row, Y_QUATERNION], y[row, Y_QUATERNION + 1], y[row, Y_QUATERNION + 2], y[row, Y_QUATERNION + 3]),
@@ -87,10 +87,10 @@ def get_state_row(motion, row):
 
 
 @inlined
-def put_state_row(motion, row, state):
+def put_state_row(smooth, row, state):
     """Write (x, q, v, L) to a row of `y`."""
     x, q, v, m = state
-    y = motion.y
+    y = smooth.y
     y[row, Y_POSITION], y[row, Y_POSITION + 1], y[row, Y_POSITION + 2] = x
     y[row, Y_QUATERNION], y[row, Y_QUATERNION + 1], y[row, Y_QUATERNION + 2], y[row, Y_QUATERNION + 3] = q
     y[row, Y_VELOCITY], y[row, Y_VELOCITY + 1], y[row, Y_VELOCITY + 2] = v
@@ -100,13 +100,13 @@ def put_state_row(motion, row, state):
 @kernel
 def compute_state_rate(row, later, offset_frame, work, motion):
     """Rate of change of a row of `y`, `later` [s] than START, into `rate`, its contacts' forces into the unknowns."""
-    state = get_state_row(motion, row)
+    state = get_state_row(motion.smooth, row)
     refresh_loads(state, later, offset_frame, work)
     q, v = state[1], state[2]
     F, T, w, _, _ = solve_mode_forces(state, offset_frame, work, motion)
     inv_mass = 1.0 / work.mass
     turn = qt.multiply((0.0, w[0], w[1], w[2]), q)
-    rate = motion.rate
+    rate = motion.smooth.rate
     for c in range(3):
         rate[Y_POSITION + c] = v[c]
         rate[Y_VELOCITY + c] = work.free_acceleration[c] + inv_mass * F[c]
@@ -120,27 +120,27 @@ def compute_state_rate(row, later, offset_frame, work, motion):
 
 
 @kernel
-def set_error_scale(h, work, motion):
+def set_error_scale(h, work, smooth):
     """Sizes against which the errors of a step are held, its start made ready by `prepare_extrapolated_step`."""
-    x, _, v, _ = get_state_row(motion, ROW_START)
-    speed = math.sqrt(qt.dot(v, v)) + work.radius * motion.start_angular_speed + work.acceleration * h
+    x, _, v, _ = get_state_row(smooth, ROW_START)
+    speed = math.sqrt(qt.dot(v, v)) + work.radius * smooth.start_angular_speed + work.acceleration * h
     place_size = work.radius + max(abs(x[0]), max(abs(x[1]), abs(x[2])))
     for c in range(3):
-        motion.scale[Y_POSITION + c] = place_size
-        motion.scale[Y_VELOCITY + c] = speed
-        motion.scale[Y_ANGULAR_MOMENTUM + c] = speed * work.mass * work.radius
+        smooth.scale[Y_POSITION + c] = place_size
+        smooth.scale[Y_VELOCITY + c] = speed
+        smooth.scale[Y_ANGULAR_MOMENTUM + c] = speed * work.mass * work.radius
     for c in range(4):
-        motion.scale[Y_QUATERNION + c] = 1.0
+        smooth.scale[Y_QUATERNION + c] = 1.0
 
 
 @kernel
 def _midpoint_rule(parts, h, offset_frame, work, motion):
     """One rule with `parts` parts from START, smoothed, into row END."""
-    y, rate = motion.y, motion.rate
+    y, rate = motion.smooth.y, motion.smooth.rate
     s = h / parts
     for c in range(Y_SIZE):
         y[ROW_PREVIOUS, c] = y[ROW_START, c]
-        y[ROW_CURRENT, c] = y[ROW_START, c] + s * motion.first_rate[c]
+        y[ROW_CURRENT, c] = y[ROW_START, c] + s * motion.smooth.first_rate[c]
     for k in range(1, parts):
         compute_state_rate(ROW_CURRENT, k * s, offset_frame, work, motion)
         for c in range(Y_SIZE):
@@ -155,10 +155,11 @@ def _midpoint_rule(parts, h, offset_frame, work, motion):
 @kernel
 def try_extrapolated_step(h, offset_frame, work, motion):
     """Row END from row START, h later (`first_rate` known): (relative error, rules used)."""
-    table, y = motion.extrapolation_table, motion.y
+    smooth = motion.smooth
+    table, y = smooth.extrapolation_table, smooth.y
     goal = work.tolerance
-    aim = max(_CONTACT_TOLERANCE_SHARE * goal, min(goal, _FINEST_TOLERANCE)) if motion.count > 0 else goal
-    set_error_scale(h, work, motion)
+    aim = max(_CONTACT_TOLERANCE_SHARE * goal, min(goal, _FINEST_TOLERANCE)) if motion.contacts.count > 0 else goal
+    set_error_scale(h, work, smooth)
     error = math.inf
     used = MAX_MIDPOINT_RULES
     for k in range(MAX_MIDPOINT_RULES):
@@ -176,8 +177,8 @@ def try_extrapolated_step(h, offset_frame, work, motion):
             table[k, c] = new
             y[ROW_END, c] = new
             total += new
-            if motion.scale[c] > 0.0:
-                error = max(error, abs(change) / motion.scale[c])
+            if smooth.scale[c] > 0.0:
+                error = max(error, abs(change) / smooth.scale[c])
         if not math.isfinite(total):
             return math.inf, MAX_MIDPOINT_RULES
         if error <= aim:
@@ -187,8 +188,8 @@ def try_extrapolated_step(h, offset_frame, work, motion):
             aim if error <= goal else goal
         ):
             break
-    x, q, v, m = get_state_row(motion, ROW_END)
-    put_state_row(motion, ROW_END, (x, qt.normalise(q), v, m))
+    x, q, v, m = get_state_row(smooth, ROW_END)
+    put_state_row(smooth, ROW_END, (x, qt.normalise(q), v, m))
     return error, used
 
 
@@ -200,28 +201,29 @@ def prepare_extrapolated_step(left, offset_frame, work, motion):
     contact that is slowed as it is now stops sliding, and, flying through a field, the time in which the body crosses
     its radius, so that no wall is reached and left again unseen.
     """
-    state = get_state_row(motion, ROW_START)
+    contacts = motion.contacts
+    state = get_state_row(motion.smooth, ROW_START)
     R, P, w, alpha = free_angular_motion(state, offset_frame, work)
-    for j in range(motion.count):
+    for j in range(contacts.count):
         for c in range(3):
-            motion.start_slip_direction[j, c] = motion.slip_direction[j, c]
+            contacts.start_slip_direction[j, c] = contacts.slip_direction[j, c]
     set_contact_kinematics(state, R, w, alpha, offset_frame, work, motion)
-    for j in range(motion.count):
-        t, speed = sliding_velocity(j, work, motion)
-        motion.is_starting[j] = 1 if speed <= motion.slip_stop_speed else 0
-        if speed > motion.slip_stop_speed:
+    for j in range(contacts.count):
+        t, speed = sliding_velocity(j, work, contacts)
+        contacts.is_starting[j] = 1 if speed <= motion.thresholds.slip_stop_speed else 0
+        if speed > motion.thresholds.slip_stop_speed:
             for c in range(3):
-                motion.start_slip_direction[j, c] = t[c] / speed
-    motion.slip_turn_rate = motion.friction_turn_stiffness = 0.0
+                contacts.start_slip_direction[j, c] = t[c] / speed
+    contacts.slip_turn_rate = contacts.friction_turn_stiffness = 0.0
     _set_first_rate(offset_frame, work, motion)
-    turn = motion.start_angular_speed = math.sqrt(qt.dot(w, w))
-    if has_one_sliding_contact(work, motion):
+    turn = motion.smooth.start_angular_speed = math.sqrt(qt.dot(w, w))
+    if has_one_sliding_contact(work, contacts):
         _begin_slide(P, offset_frame, work, motion)
-    motion.weight = work.mass * (work.acceleration + work.radius * turn * turn)
-    h = min(left, motion.step_length)
+    motion.smooth.weight = work.mass * (work.acceleration + work.radius * turn * turn)
+    h = min(left, motion.pace.step_length)
     if work.shape != SPHERE and h * turn > _MAX_STEP_ROTATION:
         h = _MAX_STEP_ROTATION / turn
-    if motion.count == 0 and has_fields(work):
+    if contacts.count == 0 and has_fields(work):
         h = min(h, work.radius / (math.sqrt(qt.dot(state[2], state[2])) + math.sqrt(work.radius * work.acceleration)))
     return _limit_to_slip_stop(h, P, w, work, motion)
 
@@ -231,21 +233,22 @@ def _set_first_rate(offset_frame, work, motion):
     """`first_rate`: that of START."""
     compute_state_rate(ROW_START, 0.0, offset_frame, work, motion)
     for c in range(Y_SIZE):
-        motion.first_rate[c] = motion.rate[c]
+        motion.smooth.first_rate[c] = motion.smooth.rate[c]
 
 
 @kernel
 def _begin_slide(P, offset_frame, work, motion):
     """Prepare the only contact, which slides, at START; one that creeps has the direction of `slip_onset`."""
-    motion.friction_turn_stiffness = friction_turn_stiffness(P, work, motion)
-    _, motion.start_slip_speed = sliding_velocity(0, work, motion)
-    motion.slip_growth = qt.dot(
-        contact_velocity_rate(0, P, work, motion), row_vector(motion.start_slip_direction, 0, 0)
+    contacts = motion.contacts
+    contacts.friction_turn_stiffness = friction_turn_stiffness(P, work, motion)
+    _, contacts.start_slip_speed = sliding_velocity(0, work, contacts)
+    contacts.slip_growth = qt.dot(
+        contact_velocity_rate(0, P, work, motion), row_vector(contacts.start_slip_direction, 0, 0)
     )
-    if motion.slip_growth >= 0.0 and is_creeping(motion.slip_growth, motion.start_slip_speed, work, motion):
-        motion.is_starting[0] = 1
+    if contacts.slip_growth >= 0.0 and is_creeping(contacts.slip_growth, contacts.start_slip_speed, work, motion):
+        contacts.is_starting[0] = 1
         _set_first_rate(offset_frame, work, motion)
-    if motion.is_starting[0]:
+    if contacts.is_starting[0]:
         _set_slip_turn_rate(offset_frame, work, motion)
         _set_first_rate(offset_frame, work, motion)
 
@@ -253,12 +256,13 @@ def _begin_slide(P, offset_frame, work, motion):
 @inlined
 def _set_slip_turn_rate(offset_frame, work, motion):
     """`slip_turn_rate` of the only contact, by a look a moment ahead."""
-    d = row_vector(motion.slip_direction, 0, 0)
+    contacts, pace, smooth = motion.contacts, motion.pace, motion.smooth
+    d = row_vector(contacts.slip_direction, 0, 0)
     for c in range(Y_SIZE):
-        motion.y[ROW_CURRENT, c] = motion.y[ROW_START, c] + motion.min_look_ahead * motion.first_rate[c]
-    compute_state_rate(ROW_CURRENT, motion.min_look_ahead, offset_frame, work, motion)
-    n = wall_normal(work.walls, wall_of(motion.slot[0], work))
-    motion.slip_turn_rate = qt.dot(qt.cross(n, d), row_vector(motion.slip_direction, 0, 0)) / motion.min_look_ahead
+        smooth.y[ROW_CURRENT, c] = smooth.y[ROW_START, c] + pace.min_look_ahead * smooth.first_rate[c]
+    compute_state_rate(ROW_CURRENT, pace.min_look_ahead, offset_frame, work, motion)
+    n = wall_normal(work.walls, wall_of(contacts.slot[0], work))
+    contacts.slip_turn_rate = qt.dot(qt.cross(n, d), row_vector(contacts.slip_direction, 0, 0)) / pace.min_look_ahead
 
 
 @inlined
@@ -268,11 +272,12 @@ def _limit_to_slip_stop(h, P, w, work, motion):
     The direction of a velocity u + a t is analytic up to the time |u|/|a| (where a complex t makes it vanish), and no
     step much longer than that is of any high order.
     """
-    for j in range(motion.count):
-        if motion.sticks[j] or motion.is_starting[j] or not work.mu > 0.0:
+    contacts = motion.contacts
+    for j in range(contacts.count):
+        if contacts.sticks[j] or contacts.is_starting[j] or not work.mu > 0.0:
             continue
-        d = row_vector(motion.start_slip_direction, j, 0)
-        _, speed = sliding_velocity(j, work, motion)
+        d = row_vector(contacts.start_slip_direction, j, 0)
+        _, speed = sliding_velocity(j, work, contacts)
         change = contact_velocity_rate(j, P, work, motion)
         along, size = qt.dot(d, change), math.sqrt(qt.dot(change, change))
         bend = size - abs(along)
@@ -282,6 +287,6 @@ def _limit_to_slip_stop(h, P, w, work, motion):
                 h *= _SHORT_OF_STOP
         if bend > _BENT_SHARE * size:
             h = min(h, _BENT_STEP * speed / size)
-        if bend > _STRAIGHT_SHARE * size and motion.friction_turn_stiffness > 0.0:  # 0 of more contacts than one
-            h = min(h, _STIFF_STEP * speed / motion.friction_turn_stiffness)
+        if bend > _STRAIGHT_SHARE * size and contacts.friction_turn_stiffness > 0.0:  # 0 of more contacts than one
+            h = min(h, _STIFF_STEP * speed / contacts.friction_turn_stiffness)
     return h

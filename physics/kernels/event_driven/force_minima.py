@@ -14,7 +14,7 @@ from physics.kernels.event_driven.extrapolated_midpoint import compute_state_rat
 from physics.kernels.event_driven.guards import FORCE_MARGIN_TOLERANCE, cone_excess
 from physics.kernels.event_driven.workspace import ROW_CURRENT, ROW_END, ROW_START, Y_SIZE
 
-# Rows of `motion.margin`: margins at both ends of a step, and a moment inside of it.
+# Rows of `motion.contacts.margin`: margins at both ends of a step, and a moment inside of it.
 _INSIDE_ROW = 2
 
 # That moment, in steps.
@@ -33,19 +33,20 @@ _CONSTANT_FORCE_RULES = 2
 @kernel
 def store_force_margins(row, work, motion):
     """Margins of push and cone of the contacts that act, from the unknowns, into a row of `margin` [weights]."""
+    contacts = motion.contacts
     recover_contact_forces(work.mu, work, motion)
-    for j in range(motion.count):
-        motion.margin[row, 0, j] = motion.normal[j] / motion.weight
-        motion.margin[row, 1, j] = math.inf
-        if motion.sticks[j]:
-            motion.margin[row, 1, j] = -cone_excess(j, work, motion) / motion.weight
+    for j in range(contacts.count):
+        contacts.margin[row, 0, j] = contacts.normal[j] / motion.smooth.weight
+        contacts.margin[row, 1, j] = math.inf
+        if contacts.sticks[j]:
+            contacts.margin[row, 1, j] = -cone_excess(j, work, contacts) / motion.smooth.weight
 
 
 @inlined
 def _probe_margins(row, t, moment, offset_frame, work, motion):
     """Margins `moment` after a row of `y` at the time t, of the rate of change `rate`, into INSIDE."""
     for c in range(Y_SIZE):
-        motion.y[ROW_CURRENT, c] = motion.y[row, c] + moment * motion.rate[c]
+        motion.smooth.y[ROW_CURRENT, c] = motion.smooth.y[row, c] + moment * motion.smooth.rate[c]
     compute_state_rate(ROW_CURRENT, t + moment, offset_frame, work, motion)
     store_force_margins(_INSIDE_ROW, work, motion)
 
@@ -65,33 +66,34 @@ def find_force_minimum(h, used, offset_frame, work, motion):
 
     What is known of the start of the step is in START of `margin`; forces, rates and unknowns are those of END.
     """
-    if motion.count == 0 or used <= _CONSTANT_FORCE_RULES or not motion.weight > 0.0:
+    contacts, smooth = motion.contacts, motion.smooth
+    if contacts.count == 0 or used <= _CONSTANT_FORCE_RULES or not smooth.weight > 0.0:
         return h
     moment = _PROBE_SHARE * h
     falls = False
     store_force_margins(ROW_END, work, motion)
     for c in range(Y_SIZE):
-        motion.last_rate[c], motion.rate[c] = motion.rate[c], motion.first_rate[c]
+        smooth.last_rate[c], smooth.rate[c] = smooth.rate[c], smooth.first_rate[c]
     _probe_margins(ROW_START, 0.0, moment, offset_frame, work, motion)
     for sort in range(2):
-        for j in range(motion.count):
-            motion.margin_rate[sort, j] = (
-                motion.margin[_INSIDE_ROW, sort, j] - motion.margin[ROW_START, sort, j]
+        for j in range(contacts.count):
+            contacts.margin_rate[sort, j] = (
+                contacts.margin[_INSIDE_ROW, sort, j] - contacts.margin[ROW_START, sort, j]
             ) / moment
-            falls = falls or motion.margin_rate[sort, j] < 0.0
+            falls = falls or contacts.margin_rate[sort, j] < 0.0
     first = h
     if falls:
         for c in range(Y_SIZE):
-            motion.rate[c] = motion.last_rate[c]
+            smooth.rate[c] = smooth.last_rate[c]
         _probe_margins(ROW_END, h, -moment, offset_frame, work, motion)
         for sort in range(2):
-            for j in range(motion.count):
+            for j in range(contacts.count):
                 low, high, fall = (
-                    motion.margin[ROW_START, sort, j],
-                    motion.margin[ROW_END, sort, j],
-                    motion.margin_rate[sort, j],
+                    contacts.margin[ROW_START, sort, j],
+                    contacts.margin[ROW_END, sort, j],
+                    contacts.margin_rate[sort, j],
                 )
-                rise = (high - motion.margin[_INSIDE_ROW, sort, j]) / moment
+                rise = (high - contacts.margin[_INSIDE_ROW, sort, j]) / moment
                 if not (fall < 0.0 < rise and max(low, high) > _UNSEEN_MARGIN and max(low, high) < math.inf):
                     continue
                 t, value = _cubic_interior_minimum(low, fall, high, rise, h)

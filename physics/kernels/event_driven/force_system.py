@@ -19,52 +19,53 @@ _DOUBTFUL_PIVOT = 1.0e-7
 
 
 @kernel
-def _set_metric(m, P, work, motion):
+def _set_metric(m, P, work, unknowns):
     """`matrix`: what the rows would have to do with each other if all pushed along themselves; right-hand side 0."""
-    inv_mass, J, A = 1.0 / work.mass, work.J, motion.matrix
+    inv_mass, J, A = 1.0 / work.mass, work.J, unknowns.matrix
     for k in range(m):
-        F, g = row_vector(motion.row, k, 0), apply_inverse_inertia(P, J, row_vector(motion.row_moment, k, 0))
+        F, g = row_vector(unknowns.row, k, 0), apply_inverse_inertia(P, J, row_vector(unknowns.row_moment, k, 0))
         for l in range(m):
-            A[l, k] = inv_mass * qt.dot(row_vector(motion.row, l, 0), F) + qt.dot(
-                row_vector(motion.row_moment, l, 0), g
+            A[l, k] = inv_mass * qt.dot(row_vector(unknowns.row, l, 0), F) + qt.dot(
+                row_vector(unknowns.row_moment, l, 0), g
             )
         A[k, m] = 0.0
 
 
 @kernel
-def _choose_rows(m, P, work, motion):
+def _choose_rows(m, P, work, unknowns):
     """`independent_row`: the rows that are no sums of others, by their own metric; their number.
 
     Of a symmetric matrix without negative directions the largest entry is on the diagonal: columns of pivots are rows.
     """
-    _set_metric(m, P, work, motion)
-    rank, _ = solve_full_pivot(m, motion.matrix, motion.independent_row, motion.unknown)
+    _set_metric(m, P, work, unknowns)
+    rank, _ = solve_full_pivot(m, unknowns.matrix, unknowns.independent_row, unknowns.value)
     return rank
 
 
 @kernel
-def _set_rows(rows, m, P, work, motion):
+def _set_rows(rows, m, P, work, unknowns):
     """`matrix`: the `rows` chosen equations of the m unknowns."""
-    inv_mass, J, A = 1.0 / work.mass, work.J, motion.matrix
-    F, g = row_vector(motion.given_wrench, 0, 0), apply_inverse_inertia(P, J, row_vector(motion.given_wrench, 1, 0))
+    inv_mass, J, A = 1.0 / work.mass, work.J, unknowns.matrix
+    F, g = row_vector(unknowns.given_wrench, 0, 0), apply_inverse_inertia(P, J, row_vector(unknowns.given_wrench, 1, 0))
     for i in range(rows):
-        l = motion.independent_row[i]
-        A[i, m] = motion.rhs[l]
-        A[i, m] -= inv_mass * qt.dot(row_vector(motion.row, l, 0), F) + qt.dot(row_vector(motion.row_moment, l, 0), g)
+        l = unknowns.independent_row[i]
+        A[i, m] = unknowns.rhs[l]
+        row, moment = row_vector(unknowns.row, l, 0), row_vector(unknowns.row_moment, l, 0)
+        A[i, m] -= inv_mass * qt.dot(row, F) + qt.dot(moment, g)
     for k in range(m):
         F, g = (
-            row_vector(motion.column_force, k, 0),
-            apply_inverse_inertia(P, J, row_vector(motion.column_moment, k, 0)),
+            row_vector(unknowns.column_force, k, 0),
+            apply_inverse_inertia(P, J, row_vector(unknowns.column_moment, k, 0)),
         )
         for i in range(rows):
-            l = motion.independent_row[i]
-            A[i, k] = inv_mass * qt.dot(row_vector(motion.row, l, 0), F) + qt.dot(
-                row_vector(motion.row_moment, l, 0), g
+            l = unknowns.independent_row[i]
+            A[i, k] = inv_mass * qt.dot(row_vector(unknowns.row, l, 0), F) + qt.dot(
+                row_vector(unknowns.row_moment, l, 0), g
             )
 
 
 @kernel
-def solve_contact_forces(m, P, work, motion):
+def solve_contact_forces(m, P, work, unknowns):
     """Solve for the m unknowns, those that add least to the shares; total force and moment of the contacts.
 
     Contacts can say the same of the body's motion twice. Where each pushes along its row the matrix shows it: what a
@@ -73,21 +74,21 @@ def solve_contact_forces(m, P, work, motion):
     that stop a body which no contact holds. So where a pivot is small the rows are chosen by their own metric.
     """
     for k in range(m):
-        motion.independent_row[k] = k
-    _set_rows(m, m, P, work, motion)
-    rank, least = solve_full_pivot(m, motion.matrix, motion.order, motion.unknown)
-    if rank < m or (motion.is_skew and least < _DOUBTFUL_PIVOT):
-        rows = _choose_rows(m, P, work, motion)
-        _set_rows(rows, m, P, work, motion)
+        unknowns.independent_row[k] = k
+    _set_rows(m, m, P, work, unknowns)
+    rank, least = solve_full_pivot(m, unknowns.matrix, unknowns.order, unknowns.value)
+    if rank < m or (unknowns.is_skew and least < _DOUBTFUL_PIVOT):
+        rows = _choose_rows(m, P, work, unknowns)
+        _set_rows(rows, m, P, work, unknowns)
         if rows < m:
-            solve_least_norm(rows, m, motion.matrix, motion.unknown)
+            solve_least_norm(rows, m, unknowns.matrix, unknowns.value)
         else:
-            solve_full_pivot(m, motion.matrix, motion.order, motion.unknown)
-    force, moment = row_vector(motion.given_wrench, 0, 0), row_vector(motion.given_wrench, 1, 0)
+            solve_full_pivot(m, unknowns.matrix, unknowns.order, unknowns.value)
+    force, moment = row_vector(unknowns.given_wrench, 0, 0), row_vector(unknowns.given_wrench, 1, 0)
     for k in range(m):
-        s = motion.unknown[k]
-        force = plus(force, times(s, row_vector(motion.column_force, k, 0)))
-        moment = plus(moment, times(s, row_vector(motion.column_moment, k, 0)))
+        s = unknowns.value[k]
+        force = plus(force, times(s, row_vector(unknowns.column_force, k, 0)))
+        moment = plus(moment, times(s, row_vector(unknowns.column_moment, k, 0)))
     return force, moment
 
 
@@ -96,10 +97,10 @@ def solve_mode_forces(y, offset_frame, work, motion):
     """Forces of the contact mode at y: (total force, total moment, ω, dω/dt without contact, principal axes)."""
     R, P, w, alpha = free_angular_motion(y, offset_frame, work)
     zero = (0.0, 0.0, 0.0)
-    if motion.count == 0:
+    if motion.contacts.count == 0:
         return zero, zero, w, alpha, P
     set_contact_kinematics(y, R, w, alpha, offset_frame, work, motion)
-    set_slip_onset_direction(P, work, motion)
+    set_slip_onset_direction(P, work, motion.contacts)
     m = assemble_unknowns(work.mu, True, work, motion)
-    force, moment = solve_contact_forces(m, P, work, motion)
+    force, moment = solve_contact_forces(m, P, work, motion.unknowns)
     return force, moment, w, alpha, P

@@ -45,9 +45,9 @@ FORCE_MARGIN_TOLERANCE = 1.0e-9
 
 
 @kernel
-def compute_feature_gaps(row, offset_frame, work, motion):
+def compute_feature_gaps(row, offset_frame, work, smooth):
     """Gaps and their rates of all features into column `row` of `gap`; of a wall out of reach infinite."""
-    x, q, v, m = get_state_row(motion, row)
+    x, q, v, m = get_state_row(smooth, row)
     R, _, w, _ = free_angular_motion((x, q, v, m), offset_frame, work)
     dims, features, shape = as_vector(work.dims), work.features, work.shape
     center = geometric_center(x, R, work, offset_frame)
@@ -56,7 +56,7 @@ def compute_feature_gaps(row, offset_frame, work, motion):
         d = qt.dot(n, center) - work.walls[k, WALL_OFFSET]
         if d > 2.0 * work.radius:
             for feature in range(features):
-                motion.gap[row, k * features + feature] = math.inf
+                smooth.gap[row, k * features + feature] = math.inf
             continue
         e = geo.scaled_normal(shape, dims, R, n)
         vn, turn = qt.dot(n, v), qt.cross(n, w)
@@ -66,11 +66,11 @@ def compute_feature_gaps(row, offset_frame, work, motion):
             b = qt.transposed_matvec(R, turn)
             f = (dims[0] * b[0], dims[1] * b[1], dims[2] * b[2])
             for vertex in range(VERTEX_COUNT):
-                motion.gap[row, k * features + vertex] = d + geo.vertex_height(e, vertex)
-                motion.gap_rate[row, k * features + vertex] = vn + geo.vertex_height(f, vertex)
+                smooth.gap[row, k * features + vertex] = d + geo.vertex_height(e, vertex)
+                smooth.gap_rate[row, k * features + vertex] = vn + geo.vertex_height(f, vertex)
         else:
-            motion.gap[row, k * features] = d - geo.support(shape, dims, e)
-            motion.gap_rate[row, k * features] = vn + qt.dot(turn, geo.support_arm(shape, dims, R, n, e))
+            smooth.gap[row, k * features] = d - geo.support(shape, dims, e)
+            smooth.gap_rate[row, k * features] = vn + qt.dot(turn, geo.support_arm(shape, dims, R, n, e))
 
 
 @inlined
@@ -96,45 +96,46 @@ def least_gap_margin(h, work, motion):
     Of one that leaves: what it is above where it left, so that a bounce does not end deeper, and gain by it. Of one
     that touches and neither comes nor goes: what it is above there, and the slop.
     """
+    smooth, thresholds = motion.smooth, motion.thresholds
     least, which = math.inf, -1
-    for s in range(motion.is_active.shape[0]):
-        if motion.is_active[s] or motion.gap[ROW_END, s] == math.inf:
+    for s in range(smooth.is_active.shape[0]):
+        if smooth.is_active[s] or smooth.gap[ROW_END, s] == math.inf:
             continue
-        g0, g1 = motion.gap[ROW_START, s], motion.gap[ROW_END, s]
-        if g0 <= motion.touch_gap and motion.gap_rate[ROW_START, s] > motion.rest_speed:
+        g0, g1 = smooth.gap[ROW_START, s], smooth.gap[ROW_END, s]
+        if g0 <= thresholds.touch_gap and smooth.gap_rate[ROW_START, s] > thresholds.rest_speed:
             low = g1 - g0
-        elif g0 <= motion.touch_gap:
-            low = g1 - min(g0, 0.0) + motion.touch_gap
+        elif g0 <= thresholds.touch_gap:
+            low = g1 - min(g0, 0.0) + thresholds.touch_gap
         else:
-            low = cubic_minimum(g0, motion.gap_rate[ROW_START, s], g1, motion.gap_rate[ROW_END, s], h)
+            low = cubic_minimum(g0, smooth.gap_rate[ROW_START, s], g1, smooth.gap_rate[ROW_END, s], h)
         if low < least:
             least, which = low, s
     return least, which
 
 
 @inlined
-def _cone_excess(j, mu, work, motion):
+def _cone_excess(j, mu, work, contacts):
     """Tangential force of contact j less μ times its push [N]."""
-    axes = wall_axes(work.walls, wall_of(motion.slot[j], work))
-    n, f = axes[0], unstretch_force(row_vector(motion.force, j, 0), axes, work)
-    p = motion.normal[j]
+    axes = wall_axes(work.walls, wall_of(contacts.slot[j], work))
+    n, f = axes[0], unstretch_force(row_vector(contacts.force, j, 0), axes, work)
+    p = contacts.normal[j]
     return math.sqrt(max(0.0, qt.dot(f, f) - qt.dot(n, f) * qt.dot(n, f))) - mu * p
 
 
 @inlined
-def _pair_excess(i, j, mu, work, motion):
+def _pair_excess(i, j, mu, work, contacts):
     """The same of two contacts on one wall, whatever they share of the force along their line [N]."""
-    axes = wall_axes(work.walls, wall_of(motion.slot[i], work))
-    a, b = row_vector(motion.arm, i, 0), row_vector(motion.arm, j, 0)
+    axes = wall_axes(work.walls, wall_of(contacts.slot[i], work))
+    a, b = row_vector(contacts.arm, i, 0), row_vector(contacts.arm, j, 0)
     e = unstretch_force((b[0] - a[0], b[1] - a[1], b[2] - a[2]), axes, work)
     s = 1.0 / math.sqrt(qt.dot(e, e))
     e = (s * e[0], s * e[1], s * e[2])
     across = qt.cross(axes[0], e)
     f, g = (
-        unstretch_force(row_vector(motion.force, i, 0), axes, work),
-        unstretch_force(row_vector(motion.force, j, 0), axes, work),
+        unstretch_force(row_vector(contacts.force, i, 0), axes, work),
+        unstretch_force(row_vector(contacts.force, j, 0), axes, work),
     )
-    p, q = mu * motion.normal[i], mu * motion.normal[j]
+    p, q = mu * contacts.normal[i], mu * contacts.normal[j]
     fa, ga = abs(qt.dot(across, f)), abs(qt.dot(across, g))
     worst = max(fa - p, ga - q)
     if worst > 0.0:
@@ -144,57 +145,58 @@ def _pair_excess(i, j, mu, work, motion):
 
 
 @kernel
-def cone_excess(j, work, motion):
+def cone_excess(j, work, contacts):
     """Excess of contact j, which holds with the others of its wall that hold, over its friction cone [N]."""
-    wall, other, holding = wall_of(motion.slot[j], work), j, 1
-    for k in range(motion.count):
-        if k != j and motion.sticks[k] and wall_of(motion.slot[k], work) == wall:
+    wall, other, holding = wall_of(contacts.slot[j], work), j, 1
+    for k in range(contacts.count):
+        if k != j and contacts.sticks[k] and wall_of(contacts.slot[k], work) == wall:
             other = k
             holding += 1
-    if holding == 2 and motion.normal[j] >= 0.0 and motion.normal[other] >= 0.0:
-        return _pair_excess(j, other, work.mu, work, motion)
-    return _cone_excess(j, work.mu, work, motion)
+    if holding == 2 and contacts.normal[j] >= 0.0 and contacts.normal[other] >= 0.0:
+        return _pair_excess(j, other, work.mu, work, contacts)
+    return _cone_excess(j, work.mu, work, contacts)
 
 
 @inlined
 def least_inactive_pull(work, motion):
     """Least pull [N] that the affine force of a sliding face has at a touching vertex which does not act."""
+    contacts = motion.contacts
     least, which = math.inf, -1
-    for j in range(motion.count):
-        if motion.patch[j] == NO_PATCH or (
-            j > 0 and wall_of(motion.slot[j], work) == wall_of(motion.slot[j - 1], work)
+    for j in range(contacts.count):
+        if contacts.patch[j] == NO_PATCH or (
+            j > 0 and wall_of(contacts.slot[j], work) == wall_of(contacts.slot[j - 1], work)
         ):
             continue
-        wall, k = wall_of(motion.slot[j], work), motion.patch[j]
+        wall, k = wall_of(contacts.slot[j], work), contacts.patch[j]
         axes = wall_axes(work.walls, wall)
-        r = row_vector(motion.arm, j, 0)
+        r = row_vector(contacts.arm, j, 0)
         for s in range(wall * work.features, (wall + 1) * work.features):
-            if motion.is_active[s] or not motion.gap[ROW_START, s] <= motion.touch_gap:
+            if motion.smooth.is_active[s] or not motion.smooth.gap[ROW_START, s] <= motion.thresholds.touch_gap:
                 continue
             # The vertices of a face are its corners: the missing one is the sum of its neighbours less the opposite.
-            p = row_vector(motion.arm, opposite_face_contact(s, wall, work, motion), 0)
+            p = row_vector(contacts.arm, opposite_face_contact(s, wall, work, contacts), 0)
             a = b = 0.0
-            for i in range(motion.count):
-                if wall_of(motion.slot[i], work) == wall:
-                    a += qt.dot(axes[1], row_vector(motion.arm, i, 0))
-                    b += qt.dot(axes[2], row_vector(motion.arm, i, 0))
+            for i in range(contacts.count):
+                if wall_of(contacts.slot[i], work) == wall:
+                    a += qt.dot(axes[1], row_vector(contacts.arm, i, 0))
+                    b += qt.dot(axes[2], row_vector(contacts.arm, i, 0))
             a -= 2.0 * qt.dot(axes[1], p) + qt.dot(axes[1], r)
             b -= 2.0 * qt.dot(axes[2], p) + qt.dot(axes[2], r)
-            pull = -motion.unknown[k]
-            pull -= (motion.patch_coordinate[j, 0] + a / work.radius) * motion.unknown[k + 1]
-            pull -= (motion.patch_coordinate[j, 1] + b / work.radius) * motion.unknown[k + 2]
+            pull = -motion.unknowns.value[k]
+            pull -= (contacts.patch_coordinate[j, 0] + a / work.radius) * motion.unknowns.value[k + 1]
+            pull -= (contacts.patch_coordinate[j, 1] + b / work.radius) * motion.unknowns.value[k + 2]
             if pull < least:
                 least, which = pull, s
     return least, which
 
 
 @inlined
-def opposite_face_contact(slot, wall, work, motion):
+def opposite_face_contact(slot, wall, work, contacts):
     """The contact of a face of three that is farthest from the vertex `slot`: all its bits but the face's differ."""
     best, most = -1, -1
-    for i in range(motion.count):
-        if wall_of(motion.slot[i], work) == wall:
-            bits = feature_of(motion.slot[i], work) ^ feature_of(slot, work)
+    for i in range(contacts.count):
+        if wall_of(contacts.slot[i], work) == wall:
+            bits = feature_of(contacts.slot[i], work) ^ feature_of(slot, work)
             differing = (bits & 1) + ((bits >> 1) & 1) + ((bits >> 2) & 1)
             if differing > most:
                 best, most = i, differing
@@ -204,18 +206,19 @@ def opposite_face_contact(slot, wall, work, motion):
 @kernel
 def least_force_margin(slack, work, motion):
     """Smallest margin of the guards of force, of which `slack` counts as none: (margin, guard, contact or slot)."""
+    contacts, smooth = motion.contacts, motion.smooth
     margin, guard, which = math.inf, GUARD_NONE, -1
-    for j in range(motion.count):
-        push = motion.normal[j] / motion.weight + slack
+    for j in range(contacts.count):
+        push = contacts.normal[j] / smooth.weight + slack
         if push < margin:
             margin, guard, which = push, GUARD_PUSH, j
-        if motion.sticks[j]:
-            cone = slack - cone_excess(j, work, motion) / motion.weight
+        if contacts.sticks[j]:
+            cone = slack - cone_excess(j, work, contacts) / smooth.weight
             if cone < margin:
                 margin, guard, which = cone, GUARD_CONE, j
     pull, slot = least_inactive_pull(work, motion)
-    if pull / motion.weight + slack < margin:
-        margin, guard, which = pull / motion.weight + slack, GUARD_LOAD, slot
+    if pull / smooth.weight + slack < margin:
+        margin, guard, which = pull / smooth.weight + slack, GUARD_LOAD, slot
     return margin, guard, which
 
 
@@ -233,24 +236,24 @@ def least_guard_margin(h, heeds, slack, offset_frame, work, motion):
 
     `heeds`: the guards of force count, where they are missed by more than `slack`.
     """
+    smooth, contacts, thresholds = motion.smooth, motion.contacts, motion.thresholds
     compute_state_rate(ROW_END, h, offset_frame, work, motion)
     recover_contact_forces(work.mu, work, motion)
-    compute_feature_gaps(ROW_END, offset_frame, work, motion)
+    compute_feature_gaps(ROW_END, offset_frame, work, smooth)
     gap, which = least_gap_margin(h, work, motion)
     margin, guard = gap / work.radius, GUARD_GAP
-    if heeds and motion.weight > 0.0:
+    if heeds and smooth.weight > 0.0:
         least, sort, j = least_force_margin(slack, work, motion)
         if least < margin:
             margin, guard, which = least, sort, j
     if work.mu > 0.0 and margin >= 0.0:  # a contact may stop within the step, unless something ends it before
-        scale = motion.scale[Y_VELOCITY]
-        for j in range(motion.count):
-            if not motion.sticks[j]:
-                t, _ = sliding_velocity(j, work, motion)
-                speed = qt.dot(t, row_vector(motion.start_slip_direction, j, 0))
-                speed = (
-                    speed + 0.5 * motion.slip_stop_speed if motion.is_starting[j] else speed - motion.slip_stop_speed
-                ) / scale
+        scale = smooth.scale[Y_VELOCITY]
+        for j in range(contacts.count):
+            if not contacts.sticks[j]:
+                t, _ = sliding_velocity(j, work, contacts)
+                speed = qt.dot(t, row_vector(contacts.start_slip_direction, j, 0))
+                still = thresholds.slip_stop_speed
+                speed = (speed + 0.5 * still if contacts.is_starting[j] else speed - still) / scale
                 if speed < margin:
                     margin, guard, which = speed, GUARD_SPEED, j
     return margin, guard, which

@@ -46,24 +46,27 @@ def rebound_target(speed, normal, r, rate, w, alpha, work, motion):
     With the free acceleration b towards the wall a bounce at e times the speed takes t = 2 e speed / b, and all that
     follow it t e/(1 - e).
     """
-    if speed < -motion.rest_speed:
+    thresholds, pace = motion.thresholds, motion.pace
+    if speed < -thresholds.rest_speed:
         return work.restitution * speed
-    if not speed > motion.rest_speed:
+    if not speed > thresholds.rest_speed:
         return 0.0
     goal = work.restitution * speed
-    if goal > motion.rest_speed:
+    if goal > thresholds.rest_speed:
         return goal
     a, c, g = as_vector(work.free_acceleration), qt.cross(alpha, r), qt.cross(w, rate)
     b = -(qt.dot(normal, a) + qt.dot(normal, c) + qt.dot(normal, g))
     if b > 0.0 and work.restitution < 1.0:
-        motion.skipped_bounce_time = max(motion.skipped_bounce_time, 2.0 * goal / (b * (1.0 - work.restitution)))
+        pace.skipped_bounce_time = max(pace.skipped_bounce_time, 2.0 * goal / (b * (1.0 - work.restitution)))
     return 0.0
 
 
 @inlined
 def takes_part_in_impact(s, motion):
     """True if feature s takes part in an impact: it touches, or would in no time."""
-    return motion.gap[ROW_START, s] <= max(motion.touch_gap, -motion.gap_rate[ROW_START, s] * motion.simultaneity_time)
+    smooth, thresholds = motion.smooth, motion.thresholds
+    way = -smooth.gap_rate[ROW_START, s] * thresholds.simultaneity_time
+    return smooth.gap[ROW_START, s] <= max(thresholds.touch_gap, way)
 
 
 @inlined
@@ -73,30 +76,31 @@ def next_sequential_impact(work, motion, report):
     Which is so, too, after `_MAX_SEQUENTIAL_IMPACTS` at one moment, which the report counts as a problem not solved to
     its tolerance.
     """
-    if not motion.is_sequential:
+    if not motion.thresholds.is_sequential:
         return _ALL_AT_ONCE
-    motion.sequential_impacts += 1
-    if motion.sequential_impacts > _MAX_SEQUENTIAL_IMPACTS:
+    motion.pace.sequential_impacts += 1
+    if motion.pace.sequential_impacts > _MAX_SEQUENTIAL_IMPACTS:
         report[work.world, at.UNCONVERGED] += 1.0
         return _ALL_AT_ONCE
     fastest, found = 0.0, _ALL_AT_ONCE
-    for s in range(motion.is_active.shape[0]):
-        if takes_part_in_impact(s, motion) and motion.gap_rate[ROW_START, s] < fastest:
-            fastest, found = motion.gap_rate[ROW_START, s], s
+    for s in range(motion.smooth.is_active.shape[0]):
+        if takes_part_in_impact(s, motion) and motion.smooth.gap_rate[ROW_START, s] < fastest:
+            fastest, found = motion.smooth.gap_rate[ROW_START, s], s
     return found
 
 
 @kernel
 def set_up_impact_problem(y, offset_frame, work, motion, report):
     """Write the contact problem of all contacts that touch, or that of the one whose turn it is; their number."""
-    put_state_row(motion, ROW_START, y)
-    compute_feature_gaps(ROW_START, offset_frame, work, motion)
+    smooth = motion.smooth
+    put_state_row(smooth, ROW_START, y)
+    compute_feature_gaps(ROW_START, offset_frame, work, smooth)
     R, _, w, alpha = free_angular_motion(y, offset_frame, work)
     n = 0
-    motion.skipped_bounce_time = 0.0
+    motion.pace.skipped_bounce_time = 0.0
     only = next_sequential_impact(work, motion, report)
-    for s in range(motion.is_active.shape[0]):
-        rate = motion.gap_rate[ROW_START, s]
+    for s in range(smooth.is_active.shape[0]):
+        rate = smooth.gap_rate[ROW_START, s]
         if not takes_part_in_impact(s, motion) or n >= work.slot.shape[0] or (only != _ALL_AT_ONCE and s != only):
             continue
         normal = wall_normal(work.walls, wall_of(s, work))
@@ -106,7 +110,7 @@ def set_up_impact_problem(y, offset_frame, work, motion, report):
         goal = rebound_target(-rate, normal, r, r_rate, w, alpha, work, motion)
         set_up_contact(n, s, r, (goal, 0.0, 0.0), work)
         n += 1
-        report[work.world, at.PENETRATION] = max(report[work.world, at.PENETRATION], -motion.gap[ROW_START, s])
+        report[work.world, at.PENETRATION] = max(report[work.world, at.PENETRATION], -smooth.gap[ROW_START, s])
     work.mode = TRY_SLIDING
     return n
 
@@ -123,8 +127,8 @@ def set_tangential_rebound(n, y, offset_frame, motion, work):
     """
     bouncing, found = 0, 0
     for i in range(n):
-        speed = -motion.gap_rate[ROW_START, work.slot[i]]
-        if speed > motion.rest_speed and (work.target[i, 0] > 0.0 or not work.restitution > 0.0):
+        speed = -motion.smooth.gap_rate[ROW_START, work.slot[i]]
+        if speed > motion.thresholds.rest_speed and (work.target[i, 0] > 0.0 or not work.restitution > 0.0):
             bouncing, found = bouncing + 1, i
     if bouncing == 1:
         set_tangential_target(found, y, offset_frame, work)
@@ -160,7 +164,7 @@ def fall_back_to_plastic(n, contact, v, L, solved, P, work, report):
 
 
 @kernel
-def cap_rebound_energy(n, y, contact, offset_frame, solved, P, work, motion, report):
+def cap_rebound_energy(n, y, contact, offset_frame, solved, P, work, contacts, report):
     """Result of `solve_contacts` for a collision with friction, or as much of its rebound as there is energy for.
 
     Impulses are those of what is returned. See `physics.kernels.contact_law.restitution_energy`.
@@ -171,25 +175,26 @@ def cap_rebound_energy(n, y, contact, offset_frame, solved, P, work, motion, rep
     if not full > (1.0 + IMPACT_ENERGY_ROUNDING) * before:
         return solved
     for k in range(3 * n):
-        motion.rebound[k] = work.impulse[k]
+        contacts.rebound[k] = work.impulse[k]
     plastic = _solve_plastic_impact(n, contact, v, L, solved, P, work, report)
     v_plastic, L_plastic, residual, sweeps, method = plastic
     v, L, s = limit_rebound_energy(q, before, (v_plastic, L_plastic), (v_full, L_full), work, offset_frame)
     for k in range(3 * n):
-        work.impulse[k] += s * (motion.rebound[k] - work.impulse[k])
+        work.impulse[k] += s * (contacts.rebound[k] - work.impulse[k])
     return v, L, residual, sweeps, method
 
 
 @kernel
 def set_up_jump_problem(y, h, offset_frame, work, motion):
     """Write the contact problem of a first-order step over h into `work`: (contacts, velocity, angular momentum)."""
-    put_state_row(motion, ROW_START, y)
-    compute_feature_gaps(ROW_START, offset_frame, work, motion)
+    smooth = motion.smooth
+    put_state_row(smooth, ROW_START, y)
+    compute_feature_gaps(ROW_START, offset_frame, work, smooth)
     R, _, w, _ = free_angular_motion(y, offset_frame, work)
     count = 0
-    for s in range(motion.is_active.shape[0]):
-        gap = motion.gap[ROW_START, s]
-        if not gap <= motion.touch_gap - min(0.0, motion.gap_rate[ROW_START, s]) * h or count >= work.slot.shape[0]:
+    for s in range(smooth.is_active.shape[0]):
+        gap, rate = smooth.gap[ROW_START, s], smooth.gap_rate[ROW_START, s]
+        if not gap <= motion.thresholds.touch_gap - min(0.0, rate) * h or count >= work.slot.shape[0]:
             continue
         n = wall_normal(work.walls, wall_of(s, work))
         r, _ = contact_arm_and_rate(work.shape, as_vector(work.dims), R, w, n, feature_of(s, work), offset_frame, work)
@@ -228,14 +233,14 @@ def resolve_impacts(y, t, contact, offset_frame, work, motion, records):
         solved = fall_back_to_plastic(n, contact, v, L, solved, P, work, records.report)
         solved = reject_energy_gain(n, contact, v, L, solved, P, work)
         if contact.friction is not None and work.restitution > 0.0:
-            solved = cap_rebound_energy(n, y, contact, offset_frame, solved, P, work, motion, records.report)
+            solved = cap_rebound_energy(n, y, contact, offset_frame, solved, P, work, motion.contacts, records.report)
         report_impact_solve(solved, records.report, work)
         v, L = solved[0], solved[1]
     ev.log_wall_impacts(
         n,
         _rows_per_contact(contact.friction),
         x,
-        work.mass * motion.rounding_speed,
+        work.mass * motion.thresholds.rounding_speed,
         t,
         work,
         records.log,
@@ -258,7 +263,7 @@ def resolve_inconsistency(y, h, t, contact, offset_frame, work, motion, records)
         n,
         _rows_per_contact(contact.friction),
         y[0],
-        work.mass * motion.rounding_speed,
+        work.mass * motion.thresholds.rounding_speed,
         t,
         work,
         records.log,

@@ -32,40 +32,41 @@ NO_MODE = 0
 
 
 @inlined
-def contact_mode_hash(motion):
+def contact_mode_hash(contacts):
     """A number for which contacts act and which of them hold."""
     name = 1
-    for j in range(motion.count):
-        name = 131 * name + 2 * motion.slot[j] + motion.sticks[j]
+    for j in range(contacts.count):
+        name = 131 * name + 2 * contacts.slot[j] + contacts.sticks[j]
     return name
 
 
 @inlined
 def has_trusted_guards(motion):
     """True if the guards of force say something of this contact mode."""
-    return motion.distrusted_mode == NO_MODE or contact_mode_hash(motion) != motion.distrusted_mode
+    return motion.pace.distrusted_mode == NO_MODE or contact_mode_hash(motion.contacts) != motion.pace.distrusted_mode
 
 
 @inlined
 def distrust_force_guards(nearest, motion):
     """The guards of force are not heeded for this contact mode any more."""
-    motion.distrusted_mode = contact_mode_hash(motion)
-    motion.watched_length = _FIRST_TRUST_STEP * nearest
+    motion.pace.distrusted_mode = contact_mode_hash(motion.contacts)
+    motion.pace.watched_length = _FIRST_TRUST_STEP * nearest
 
 
 @kernel
 def has_acceleration_jumped(what, y, offset_frame, work, motion):
     """True if the step that led to y went too far: what the body does there does not go on from what it did."""
+    smooth, pace = motion.smooth, motion.pace
     if what in (MODE_REST, MODE_UNDECIDED, MODE_UNDECIDED_SLIDING):
         return False
     if what != MODE_CONTACT:
         return True
-    put_state_row(motion, ROW_START, y)
-    motion.step_length = motion.look_ahead
-    prepare_extrapolated_step(motion.look_ahead, offset_frame, work, motion)
+    put_state_row(smooth, ROW_START, y)
+    pace.step_length = pace.look_ahead
+    prepare_extrapolated_step(pace.look_ahead, offset_frame, work, motion)
     for c in range(Y_VELOCITY, Y_SIZE):
-        unit = motion.weight / work.mass if c < Y_ANGULAR_MOMENTUM else motion.weight * work.radius
-        if abs(motion.first_rate[c] - motion.end_rate[c]) > _SAME_ACCELERATION * unit:
+        unit = smooth.weight / work.mass if c < Y_ANGULAR_MOMENTUM else smooth.weight * work.radius
+        if abs(smooth.first_rate[c] - pace.end_rate[c]) > _SAME_ACCELERATION * unit:
             return True
     return False
 
@@ -73,6 +74,6 @@ def has_acceleration_jumped(what, y, offset_frame, work, motion):
 @kernel
 def accept_step(what, watched, y, offset_frame, work, motion):
     """Judge the mode at y; GOES_BACK where the watched step that led there was too long, and no mere look-ahead."""
-    if watched > motion.min_look_ahead and has_acceleration_jumped(what, y, offset_frame, work, motion):
+    if watched > motion.pace.min_look_ahead and has_acceleration_jumped(what, y, offset_frame, work, motion):
         return MODE_ROLLBACK
     return what

@@ -7,7 +7,7 @@ from physics.kernels.half_space.contact_point import wall_of
 from physics.kernels.half_space.persistent_contacts import WALL_MEMORY_HEAD
 from physics.kernels.time_stepping import event_log as ev
 
-# State of a body at a wall (`motion.wall_state`).
+# State of a body at a wall (`motion.smooth.wall_state`).
 WALL_SEPARATED, WALL_SLIPPING, WALL_STICKING = range(3)
 
 
@@ -16,18 +16,18 @@ def log_mode_changes(work, motion, log, counts, t):
     """Events of the walls at which the body now does something else."""
     for wall in range(work.walls.shape[0]):
         state = WALL_SEPARATED
-        for j in range(motion.count):
-            if wall_of(motion.slot[j], work) == wall:
-                if motion.sticks[j]:
+        for j in range(motion.contacts.count):
+            if wall_of(motion.contacts.slot[j], work) == wall:
+                if motion.contacts.sticks[j]:
                     state = WALL_STICKING
                 elif state == WALL_SEPARATED:
                     state = WALL_SLIPPING
-        old = motion.wall_state[wall]
+        old = motion.smooth.wall_state[wall]
         if state == old:
             continue
-        motion.wall_state[wall] = state
+        motion.smooth.wall_state[wall] = state
         if old == WALL_SEPARATED:
-            ev.note_mode_change(log, counts, work.i, t + motion.skipped_bounce_time, ev.KIND_TOUCH, wall)
+            ev.note_mode_change(log, counts, work.i, t + motion.pace.skipped_bounce_time, ev.KIND_TOUCH, wall)
         elif state == WALL_SEPARATED:
             ev.note_mode_change(log, counts, work.i, t, ev.KIND_RELEASE, wall)
         else:
@@ -37,33 +37,34 @@ def log_mode_changes(work, motion, log, counts, t):
 @kernel
 def store_contact_modes(memory, i, work, motion):
     """Store the contact mode and the contact forces for later (`time_stepping.warm_start.store_warm_start`)."""
+    contacts = motion.contacts
     slots = work.slot.shape[0]
     row = WALL_MEMORY_HEAD + slots
     for k in range(int(memory[i, 1])):
         for c in range(3):
             memory[i, row + 3 * int(memory[i, WALL_MEMORY_HEAD + k]) + c] = 0.0
-    memory[i, 0], memory[i, 1] = 1.0, motion.count
-    for j in range(motion.count):
-        slot = motion.slot[j]
+    memory[i, 0], memory[i, 1] = 1.0, contacts.count
+    for j in range(contacts.count):
+        slot = contacts.slot[j]
         memory[i, WALL_MEMORY_HEAD + j] = slot
         for c in range(3):
-            memory[i, row + 3 * slot + c] = motion.last_force[slot, c]
+            memory[i, row + 3 * slot + c] = contacts.last_force[slot, c]
     total = 0.0
     for wall in range(work.walls.shape[0] - 1, -1, -1):
-        total = 3.0 * total + motion.wall_state[wall]
-    memory[i, 2] = 2.0 * total + motion.is_resting
+        total = 3.0 * total + motion.smooth.wall_state[wall]
+    memory[i, 2] = 2.0 * total + motion.smooth.is_resting
 
 
 @inlined
 def load_contact_modes(memory, i, work, motion):
     """Read the contact mode at the end of the last step, and its forces: the opposite of `store_contact_modes`."""
     row = WALL_MEMORY_HEAD + work.slot.shape[0]
-    for s in range(motion.last_force.shape[0]):
+    for s in range(motion.contacts.last_force.shape[0]):
         for c in range(3):
-            motion.last_force[s, c] = memory[i, row + 3 * s + c]
+            motion.contacts.last_force[s, c] = memory[i, row + 3 * s + c]
     total = int(memory[i, 2])  # whether it rested, and base 3 a digit per wall
-    motion.is_resting = total % 2
+    motion.smooth.is_resting = total % 2
     total //= 2
     for wall in range(work.walls.shape[0]):
-        motion.wall_state[wall] = total % 3
+        motion.smooth.wall_state[wall] = total % 3
         total //= 3

@@ -37,10 +37,10 @@ _CREEP_OVERSHOOT = 2.0
 
 
 @inlined
-def sliding_velocity(j, work, motion):
+def sliding_velocity(j, work, contacts):
     """Tangential velocity of contact j and its size."""
-    n = wall_normal(work.walls, wall_of(motion.slot[j], work))
-    u = row_vector(motion.velocity, j, 0)
+    n = wall_normal(work.walls, wall_of(contacts.slot[j], work))
+    u = row_vector(contacts.velocity, j, 0)
     un = qt.dot(n, u)
     t = (u[0] - un * n[0], u[1] - un * n[1], u[2] - un * n[2])
     return t, math.sqrt(qt.dot(t, t))
@@ -49,7 +49,7 @@ def sliding_velocity(j, work, motion):
 @inlined
 def contact_velocity_rate(j, P, work, motion):
     """Rate at which the velocity of contact j changes at START, from `first_rate` and `constraint_error` there."""
-    rate, a, torque = motion.first_rate, work.free_acceleration, work.torque
+    rate, a, torque = motion.smooth.first_rate, work.free_acceleration, work.torque
     T = (
         rate[Y_ANGULAR_MOMENTUM] - torque[0],
         rate[Y_ANGULAR_MOMENTUM + 1] - torque[1],
@@ -58,8 +58,8 @@ def contact_velocity_rate(j, P, work, motion):
     F = (rate[Y_VELOCITY] - a[0], rate[Y_VELOCITY + 1] - a[1], rate[Y_VELOCITY + 2] - a[2])
     return plus(
         plus(
-            row_vector(motion.constraint_error, j, 0),
-            qt.cross(apply_inverse_inertia(P, work.J, T), row_vector(motion.arm, j, 0)),
+            row_vector(motion.contacts.constraint_error, j, 0),
+            qt.cross(apply_inverse_inertia(P, work.J, T), row_vector(motion.contacts.arm, j, 0)),
         ),
         F,
     )
@@ -68,10 +68,10 @@ def contact_velocity_rate(j, P, work, motion):
 @inlined
 def friction_turn_stiffness(P, work, motion):
     """K of the only contact, from `first_rate` [m/s²]."""
-    n = wall_normal(work.walls, wall_of(motion.slot[0], work))
-    across = qt.cross(n, row_vector(motion.start_slip_direction, 0, 0))
-    moment = qt.cross(row_vector(motion.arm, 0, 0), across)
-    a, rate = work.free_acceleration, motion.first_rate
+    n = wall_normal(work.walls, wall_of(motion.contacts.slot[0], work))
+    across = qt.cross(n, row_vector(motion.contacts.start_slip_direction, 0, 0))
+    moment = qt.cross(row_vector(motion.contacts.arm, 0, 0), across)
+    a, rate = work.free_acceleration, motion.smooth.first_rate
     push = work.mass * (
         n[0] * (rate[Y_VELOCITY] - a[0]) + n[1] * (rate[Y_VELOCITY + 1] - a[1]) + n[2] * (rate[Y_VELOCITY + 2] - a[2])
     )
@@ -79,78 +79,79 @@ def friction_turn_stiffness(P, work, motion):
 
 
 @inlined
-def has_one_sliding_contact(work, motion):
+def has_one_sliding_contact(work, contacts):
     """True if one contact acts, which slides with friction."""
-    return motion.count == 1 and motion.sticks[0] == 0 and work.mu > 0.0
+    return contacts.count == 1 and contacts.sticks[0] == 0 and work.mu > 0.0
 
 
 @inlined
 def _is_small(share, speed, work, motion):
     """True if the speed of a slip is below `share` times SLOWLY."""
     return (
-        speed * (motion.start_angular_speed + math.sqrt(work.acceleration / work.radius))
-        < share * _CREEP_SPEED * motion.friction_turn_stiffness
+        speed * (motion.smooth.start_angular_speed + math.sqrt(work.acceleration / work.radius))
+        < share * _CREEP_SPEED * motion.contacts.friction_turn_stiffness
     )
 
 
 @inlined
 def is_creeping(growth, speed, work, motion):
     """True if a slip that grows at the rate `growth` is so slow, and grows so little, that only loads turn it."""
-    return growth < _CREEP_GROWTH * motion.friction_turn_stiffness and _is_small(1.0, speed, work, motion)
+    return growth < _CREEP_GROWTH * motion.contacts.friction_turn_stiffness and _is_small(1.0, speed, work, motion)
 
 
 @inlined
 def has_outrun_creep(h, work, motion):
     """True if the only contact begins to slide, and goes too far for that in the step of h to END, placed."""
-    if not has_one_sliding_contact(work, motion) or not motion.is_starting[0]:
+    contacts = motion.contacts
+    if not has_one_sliding_contact(work, contacts) or not contacts.is_starting[0]:
         return False
-    _, speed = sliding_velocity(0, work, motion)
-    if not speed > _CREEP_OVERSHOOT * motion.slip_stop_speed:
+    _, speed = sliding_velocity(0, work, contacts)
+    if not speed > _CREEP_OVERSHOOT * motion.thresholds.slip_stop_speed:
         return False
     if not _is_small(_CREEP_OVERSHOOT * _CREEP_OVERSHOOT, speed, work, motion):
         return True
-    limit = _CREEP_GROWTH * motion.friction_turn_stiffness
-    return motion.slip_growth < limit and speed - motion.start_slip_speed > _CREEP_OVERSHOOT * limit * h
+    limit = _CREEP_GROWTH * contacts.friction_turn_stiffness
+    return contacts.slip_growth < limit and speed - contacts.start_slip_speed > _CREEP_OVERSHOOT * limit * h
 
 
 @inlined
-def _slip_accelerations(angle, first, second, axes, P, work, motion):
+def _slip_accelerations(angle, first, second, axes, P, work, contacts):
     """Acceleration of contact 0 (across, along) the direction in which it slides: `angle` from `first` to `second`."""
     c, s = math.cos(angle), math.sin(angle)
     d = plus(times(c, first), times(s, second))
     for k in range(3):
-        motion.slip_direction[0, k] = d[k]
-    n, r, b = axes[0], row_vector(motion.arm, 0, 0), row_vector(motion.constraint_error, 0, 0)
-    f = sliding_force_direction(work.mu, axes, 0, work, motion)
+        contacts.slip_direction[0, k] = d[k]
+    n, r, b = axes[0], row_vector(contacts.arm, 0, 0), row_vector(contacts.constraint_error, 0, 0)
+    f = sliding_force_direction(work.mu, axes, 0, work, contacts)
     a = plus(times(1.0 / work.mass, f), qt.cross(apply_inverse_inertia(P, work.J, qt.cross(r, f)), r))
     a = plus(b, times(-qt.dot(n, b) / qt.dot(n, a), a))
     return c * qt.dot(second, a) - s * qt.dot(first, a), qt.dot(d, a)
 
 
 @kernel
-def set_slip_onset_direction(P, work, motion):
+def set_slip_onset_direction(P, work, contacts):
     """Let the one contact that acts begin to slide in the direction above, and place `slip_direction`.
 
     More contacts than one begin in the directions that they were found with.
     """
-    if not has_one_sliding_contact(work, motion) or not motion.is_starting[0]:
+    if not has_one_sliding_contact(work, contacts) or not contacts.is_starting[0]:
         return
-    axes = wall_axes(work.walls, wall_of(motion.slot[0], work))
-    n, u, first = axes[0], row_vector(motion.velocity, 0, 0), row_vector(motion.start_slip_direction, 0, 0)
+    axes = wall_axes(work.walls, wall_of(contacts.slot[0], work))
+    n, u, first = axes[0], row_vector(contacts.velocity, 0, 0), row_vector(contacts.start_slip_direction, 0, 0)
     second, speed = qt.cross(n, first), math.sqrt(max(0.0, qt.dot(u, u) - qt.dot(n, u) * qt.dot(n, u)))
     angle = 0.0
     for _ in range(_ANGLE_NEWTON_STEPS):
-        across, along = _slip_accelerations(angle, first, second, axes, P, work, motion)
-        nudged, _ = _slip_accelerations(angle + _ANGLE_DIFFERENCE, first, second, axes, P, work, motion)
+        across, along = _slip_accelerations(angle, first, second, axes, P, work, contacts)
+        nudged, _ = _slip_accelerations(angle + _ANGLE_DIFFERENCE, first, second, axes, P, work, contacts)
         stiffness = (across - nudged) / _ANGLE_DIFFERENCE
         if not stiffness > 0.0:
             angle = 0.0
             break
-        step = (across - speed * motion.slip_turn_rate / (1.0 + along / stiffness)) / stiffness
+        step = (across - speed * contacts.slip_turn_rate / (1.0 + along / stiffness)) / stiffness
         if not abs(step) < _MAX_ANGLE_STEP:
             angle = 0.0
             break
         angle += step
         if abs(step) <= _ANGLE_TOLERANCE:
             break
-    _slip_accelerations(angle, first, second, axes, P, work, motion)
+    _slip_accelerations(angle, first, second, axes, P, work, contacts)

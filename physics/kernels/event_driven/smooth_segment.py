@@ -49,16 +49,16 @@ _MAX_LOCATION_TRIALS = 110
 _BISECT_AFTER = 3
 _ZERO_MARGINS = (1.0e-15, 1.0e-13)
 
-# A body whose contacts, when set right, take its speed down to this share of `motion.rest_speed` may be at rest.
+# A body whose contacts, when set right, take its speed down to this share of `rest_speed` may be at rest.
 _REST_SPEED_SHARE = 1.0e-6
 
 
 @inlined
-def newton_time_to_gap(t, margin, guard, which, work, motion):
+def newton_time_to_gap(t, margin, guard, which, work, smooth):
     """Newton's step for the time at which the gap that was missed at END, t after START, is closed; -1 without one."""
-    if guard != GUARD_GAP or not motion.gap_rate[ROW_END, which] < 0.0:
+    if guard != GUARD_GAP or not smooth.gap_rate[ROW_END, which] < 0.0:
         return -1.0
-    return t - margin * work.radius / motion.gap_rate[ROW_END, which]
+    return t - margin * work.radius / smooth.gap_rate[ROW_END, which]
 
 
 @kernel
@@ -78,7 +78,7 @@ def locate_event(h, margin, guard, which, heeds, offset_frame, work, motion):
         if least > FORCE_MARGIN_TOLERANCE:
             slack, low_margin, high_margin = 0.0, least, margin - FORCE_MARGIN_TOLERANCE
     side, width, stale = 0, h, 0
-    newton = newton_time_to_gap(h, margin, guard, which, work, motion)
+    newton = newton_time_to_gap(h, margin, guard, which, work, motion.smooth)
     for _ in range(_MAX_LOCATION_TRIALS):
         t = newton
         if not low < t < high:
@@ -92,7 +92,7 @@ def locate_event(h, margin, guard, which, heeds, offset_frame, work, motion):
         newton = -1.0
         if margin < 0.0:
             high, high_margin, guard, which = t, margin, g, w
-            newton = newton_time_to_gap(t, margin, g, w, work, motion)
+            newton = newton_time_to_gap(t, margin, g, w, work, motion.smooth)
             if side == 1:
                 low_margin *= 0.5
             side = 1
@@ -121,7 +121,7 @@ def has_slip_stopped(guard, which, work, motion):
     """True if the contact that ended a step nearly stands still there: then that is the end, not before."""
     if guard != GUARD_SPEED:
         return False
-    return sliding_velocity(which, work, motion)[1] <= motion.slip_stop_speed
+    return sliding_velocity(which, work, motion.contacts)[1] <= motion.thresholds.slip_stop_speed
 
 
 @kernel
@@ -130,21 +130,22 @@ def slide_to_stop(which, left, heeds, offset_frame, work, motion):
 
     Its direction stays what it is. Not where something else would end within that time, or it began to slide only now.
     """
-    if motion.is_starting[which]:
+    contacts, smooth, thresholds = motion.contacts, motion.smooth, motion.thresholds
+    if contacts.is_starting[which]:
         return 0.0
-    slip, speed = sliding_velocity(which, work, motion)
-    if not motion.rounding_speed < speed <= 2.0 * motion.slip_stop_speed:
+    slip, speed = sliding_velocity(which, work, contacts)
+    if not thresholds.rounding_speed < speed <= 2.0 * thresholds.slip_stop_speed:
         return 0.0
-    before = get_state_row(motion, ROW_START)
-    end = get_state_row(motion, ROW_END)
+    before = get_state_row(smooth, ROW_START)
+    end = get_state_row(smooth, ROW_END)
     for c in range(3):
-        motion.start_slip_direction[which, c] = slip[c] / speed
-    put_state_row(motion, ROW_START, end)
+        contacts.start_slip_direction[which, c] = slip[c] / speed
+    put_state_row(smooth, ROW_START, end)
     compute_state_rate(ROW_START, 0.0, offset_frame, work, motion)
     for c in range(Y_SIZE):
-        motion.first_rate[c] = motion.rate[c]
+        smooth.first_rate[c] = smooth.rate[c]
     _, P, _, _ = free_angular_motion(end, offset_frame, work)
-    along = qt.dot(contact_velocity_rate(which, P, work, motion), row_vector(motion.start_slip_direction, which, 0))
+    along = qt.dot(contact_velocity_rate(which, P, work, motion), row_vector(contacts.start_slip_direction, which, 0))
     if along < 0.0:
         h = min(left, -speed / along)
         error, _ = try_extrapolated_step(h, offset_frame, work, motion)
@@ -152,8 +153,8 @@ def slide_to_stop(which, left, heeds, offset_frame, work, motion):
         if error <= work.tolerance and (margin >= 0.0 or guard == GUARD_SPEED):
             advance_clock(h, work)
             return h
-    put_state_row(motion, ROW_START, before)
-    put_state_row(motion, ROW_END, end)
+    put_state_row(smooth, ROW_START, before)
+    put_state_row(smooth, ROW_END, end)
     least_guard_margin(
         0.0, heeds, FORCE_MARGIN_TOLERANCE, offset_frame, work, motion
     )  # forces and gaps are those of END again
@@ -170,9 +171,10 @@ def body_speed_bound(y, offset_frame, work):
 @inlined
 def _begin_next_step(left, offset_frame, work, motion):
     """Length of the next step, which starts where the last one has ended."""
-    for s in range(motion.is_active.shape[0]):
-        gap, rate = motion.gap[ROW_END, s], motion.gap_rate[ROW_END, s]
-        motion.gap[ROW_START, s], motion.gap_rate[ROW_START, s] = gap, rate
+    smooth = motion.smooth
+    for s in range(smooth.is_active.shape[0]):
+        gap, rate = smooth.gap[ROW_END, s], smooth.gap_rate[ROW_END, s]
+        smooth.gap[ROW_START, s], smooth.gap_rate[ROW_START, s] = gap, rate
     h = prepare_extrapolated_step(left, offset_frame, work, motion)
     store_force_margins(ROW_START, work, motion)
     return h
@@ -182,16 +184,17 @@ def _begin_next_step(left, offset_frame, work, motion):
 def integrate_segment(y, left, offset_frame, work, motion):
     """Smooth motion of the contact mode for `left`, or until a guard ends it: (state, time, guard).
 
-    Where guards of force are not heeded one step, no longer than `motion.watched_length`: its guard is WATCH at least.
+    Where guards of force are not heeded one step, no longer than `watched_length`: its guard is WATCH at least.
     """
+    smooth, pace, thresholds = motion.smooth, motion.pace, motion.thresholds
     heeds = has_trusted_guards(motion)
-    had = body_speed_bound(y, offset_frame, work)
+    had, still = body_speed_bound(y, offset_frame, work), thresholds.rest_speed
     y = project_state(project_candidate_speeds(y, offset_frame, work, motion), offset_frame, work, motion)
-    if had > motion.rest_speed and body_speed_bound(y, offset_frame, work) <= _REST_SPEED_SHARE * motion.rest_speed:
+    if had > still and body_speed_bound(y, offset_frame, work) <= _REST_SPEED_SHARE * still:
         return y, 0.0, GUARD_SPEED  # the contacts have taken all of it: it may be at rest
-    put_state_row(motion, ROW_START, y)
-    compute_feature_gaps(ROW_START, offset_frame, work, motion)
-    motion.step_length = left if heeds else motion.watched_length
+    put_state_row(smooth, ROW_START, y)
+    compute_feature_gaps(ROW_START, offset_frame, work, smooth)
+    pace.step_length = left if heeds else pace.watched_length
     t, h = 0.0, prepare_extrapolated_step(left, offset_frame, work, motion)
     store_force_margins(ROW_START, work, motion)
     for _ in range(_MAX_SEGMENT_STEPS):
@@ -208,43 +211,44 @@ def integrate_segment(y, left, offset_frame, work, motion):
             dip = find_force_minimum(h, used, offset_frame, work, motion)
             if dip < h:
                 h = dip
-                refresh_loads(get_state_row(motion, ROW_START), 0.0, offset_frame, work)
+                refresh_loads(get_state_row(smooth, ROW_START), 0.0, offset_frame, work)
                 continue
         if guard == GUARD_STEP_FAILED:
             if not h > SEGMENT_SHORTEST_STEP * left:
-                return get_state_row(motion, ROW_START), t, GUARD_STEP_FAILED
+                return get_state_row(smooth, ROW_START), t, GUARD_STEP_FAILED
             # Not `prepare_extrapolated_step` again: it would go by the directions (`slip_direction`) that the trial
             # ended with. The scale of the errors is that of the start.
             h *= SEGMENT_STEP_CUT
-            refresh_loads(get_state_row(motion, ROW_START), 0.0, offset_frame, work)
+            refresh_loads(get_state_row(smooth, ROW_START), 0.0, offset_frame, work)
             continue
         t += h
         advance_clock(h, work)
         if is_over and guard == GUARD_SPEED:
             t += slide_to_stop(which, left - t, heeds, offset_frame, work, motion)
-        motion.step_length = SEGMENT_STEP_GROWTH * h if used <= SEGMENT_EASY_RULES else h
-        store_last_forces(work, motion)
-        y = project_state(get_state_row(motion, ROW_END), offset_frame, work, motion)
+        pace.step_length = SEGMENT_STEP_GROWTH * h if used <= SEGMENT_EASY_RULES else h
+        store_last_forces(work, motion.contacts)
+        y = project_state(get_state_row(smooth, ROW_END), offset_frame, work, motion)
         if is_over:
             return y, t, guard
         if not heeds:
             for c in range(Y_SIZE):
-                motion.end_rate[c] = motion.rate[c]
+                pace.end_rate[c] = smooth.rate[c]
             return y, t, GUARD_WATCH
-        put_state_row(motion, ROW_START, y)
+        put_state_row(smooth, ROW_START, y)
         if not t < left:
             break
         h = _begin_next_step(left - t, offset_frame, work, motion)
     if t < left:
-        return get_state_row(motion, ROW_START), t, GUARD_STEP_FAILED
+        return get_state_row(smooth, ROW_START), t, GUARD_STEP_FAILED
     return y, left, GUARD_NONE
 
 
 @kernel
 def predict_state(y, offset_frame, work, motion):
     """State to which the contact mode would lead in a moment."""
-    put_state_row(motion, ROW_START, y)
-    motion.step_length = motion.look_ahead
-    prepare_extrapolated_step(motion.look_ahead, offset_frame, work, motion)
-    try_extrapolated_step(motion.look_ahead, offset_frame, work, motion)
-    return project_state(get_state_row(motion, ROW_END), offset_frame, work, motion)
+    pace = motion.pace
+    put_state_row(motion.smooth, ROW_START, y)
+    pace.step_length = pace.look_ahead
+    prepare_extrapolated_step(pace.look_ahead, offset_frame, work, motion)
+    try_extrapolated_step(pace.look_ahead, offset_frame, work, motion)
+    return project_state(get_state_row(motion.smooth, ROW_END), offset_frame, work, motion)

@@ -59,6 +59,7 @@ from physics.kernels.event_driven.mode_acceptance import TRUST_GROWTH, TRUST_SHR
 from physics.kernels.event_driven.mode_transitions import load_contact_modes, log_mode_changes, store_contact_modes
 from physics.kernels.event_driven.smooth_segment import body_speed_bound, integrate_segment, predict_state
 from physics.kernels.event_driven.time_of_impact import count_unresolved_flight, fly_freely, fly_to_wall
+from physics.kernels.event_driven.workspace import Motion
 from physics.kernels.forces.held_loads import bind_fields, refresh_loads, set_clock
 from physics.kernels.math import quaternion as qt
 from physics.kernels.parallel.work_stealing import for_each_world
@@ -99,15 +100,17 @@ def set_event_thresholds(y, h, offset_frame, work, motion):
     A contact is still when the speed would not lift it by `_UNSEEN_HOP_GAPS` gaps that count as none: a bounce as low
     as that would gain from being set down on the wall what it loses in the impact.
     """
+    thresholds = motion.thresholds
     work.residual_limit = work.target_error_limit = 0.0
     x, speed = y[0], body_speed_bound(y, offset_frame, work)
-    motion.touch_gap = max(work.slop, _ROUNDING * (work.radius + math.sqrt(qt.dot(x, x)) + h * speed))
-    motion.rounding_speed = 1.0e-13 * speed
-    motion.rest_speed = math.sqrt(2.0 * _UNSEEN_HOP_GAPS * work.acceleration * motion.touch_gap) + motion.rounding_speed
-    motion.slip_stop_speed = _SLIP_STOP_SHARE * motion.rest_speed + motion.rounding_speed
+    thresholds.touch_gap = max(work.slop, _ROUNDING * (work.radius + math.sqrt(qt.dot(x, x)) + h * speed))
+    thresholds.rounding_speed = 1.0e-13 * speed
+    hop = 2.0 * _UNSEEN_HOP_GAPS * work.acceleration * thresholds.touch_gap
+    thresholds.rest_speed = math.sqrt(hop) + thresholds.rounding_speed
+    thresholds.slip_stop_speed = _SLIP_STOP_SHARE * thresholds.rest_speed + thresholds.rounding_speed
     unit = work.radius / (speed + math.sqrt(work.radius * work.acceleration) + _TINY)
-    reset_chatter_control(unit, motion)
-    motion.simultaneity_time = (_SIMULTANEOUS_SHARE + 10.0 * work.tolerance) * unit
+    reset_chatter_control(unit, motion.pace)
+    thresholds.simultaneity_time = (_SIMULTANEOUS_SHARE + 10.0 * work.tolerance) * unit
 
 
 @inlined
@@ -116,9 +119,9 @@ def begin_event_substep(y, start, h, offset_frame, memory, work, motion):
     set_clock(start, work)
     refresh_loads(y, 0.0, offset_frame, work)
     set_event_thresholds(y, h, offset_frame, work, motion)
-    motion.assured_time = 0.0
+    motion.pace.assured_time = 0.0
     load_contact_modes(memory, work.i, work, motion)
-    motion.skipped_bounce_time, motion.sequential_impacts = 0.0, 0
+    motion.pace.skipped_bounce_time, motion.pace.sequential_impacts = 0.0, 0
 
 
 @kernel
@@ -129,8 +132,8 @@ def classify_mode(y, is_foretold, watched, contact, offset_frame, work, motion, 
     """
     seen, later = y, 0.0
     if is_foretold:
-        seen, later = predict_state(y, offset_frame, work, motion), motion.look_ahead
-    motion.assured_time = later
+        seen, later = predict_state(y, offset_frame, work, motion), motion.pace.look_ahead
+    motion.pace.assured_time = later
     refresh_loads(seen, later, offset_frame, work)
     what, n, v, L = find_contact_mode(seen, contact.friction, offset_frame, work, motion)
     what = accept_step(what, watched, y, offset_frame, work, motion)
@@ -150,10 +153,10 @@ def classify_mode(y, is_foretold, watched, contact, offset_frame, work, motion, 
 @kernel
 def come_to_rest(y, t, offset_frame, work, motion, log, counts):
     """State of what rests from the time t on."""
-    if motion.is_resting:
+    if motion.smooth.is_resting:
         return y
-    motion.is_resting = 1
-    ev.note_mode_change(log, counts, work.i, t + motion.skipped_bounce_time, ev.KIND_REST, -1)
+    motion.smooth.is_resting = 1
+    ev.note_mode_change(log, counts, work.i, t + motion.pace.skipped_bounce_time, ev.KIND_REST, -1)
     x, q, _, _ = project_state(y, offset_frame, work, motion)
     return x, q, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
 
@@ -163,8 +166,8 @@ def integrate_mode(what, y, t, h, flight, work, motion, report):
     """Move, fly or leap from y, at the time t of a part of length h: (state, time it took, the guard that ended it)."""
     if what == MODE_INCONSISTENT:
         report[work.world, at.FALLBACKS] += 1.0
-        step = min(motion.next_leap, h - t)
-        lengthen_leap(t + step, motion)
+        step = min(motion.pace.next_leap, h - t)
+        lengthen_leap(t + step, motion.pace)
         return drift_at_velocity(y, step, flight.offset_frame, work), step, GUARD_NONE
     if what == MODE_FLIGHT:
         y, step, is_found = fly_to_wall(y, h - t, flight.gyroscopic, flight.offset_frame, work, motion, report)
@@ -180,13 +183,14 @@ def advance(y, h, contact, flight, work, motion, records, start):
 
     A step whose end has to be accepted (`mode_acceptance`) began at `rollback_state` and has the length `watched`.
     """
+    pace = motion.pace
     begin_event_substep(y, start, h, flight.offset_frame, records.memory, work, motion)
     t, forced_mode, is_foretold, rollback_state, watched = 0.0, _NO_FORCED_MODE, False, y, 0.0
     for k in range(work.splits + 1):
         if k == work.splits:
             records.report[work.world, at.UNRESOLVED] += 1.0
             break
-        if is_chattering(t, motion):
+        if is_chattering(t, pace):
             forced_mode = MODE_INCONSISTENT
         mode, is_answer = forced_mode, False
         if forced_mode == _NO_FORCED_MODE:
@@ -200,32 +204,32 @@ def advance(y, h, contact, flight, work, motion, records, start):
         if mode == MODE_IMPACT:
             y = resolve_impacts(y, start + t, contact, flight.offset_frame, work, motion, records)
         elif mode == MODE_INCONSISTENT:
-            leap = min(motion.next_leap, h - t)
+            leap = min(pace.next_leap, h - t)
             y = resolve_inconsistency(y, leap, start + t, contact, flight.offset_frame, work, motion, records)
         elif mode == MODE_ROLLBACK:
-            motion.watched_length = TRUST_SHRINK * watched
+            pace.watched_length = TRUST_SHRINK * watched
             y, t, watched, is_foretold = rollback_state, t - watched, 0.0, False
             set_clock(start + t, work)
             continue
         if watched > 0.0:
-            motion.watched_length, watched = TRUST_GROWTH * watched, 0.0
+            pace.watched_length, watched = TRUST_GROWTH * watched, 0.0
             if not t < h:
                 break
         if mode == MODE_IMPACT:
             records.report[work.world, at.SPLITS] += 1.0
-            motion.chatter_count -= motion.is_sequential  # those in turn have a bound of their own
+            pace.chatter_count -= motion.thresholds.is_sequential  # those in turn have a bound of their own
             is_foretold = False
             continue
         log_mode_changes(work, motion, records.log, records.counts, start + t)
         if mode == MODE_REST:
             y = come_to_rest(y, start + t, flight.offset_frame, work, motion, records.log, records.counts)
             break
-        motion.is_resting, rollback_state = 0, y
+        motion.smooth.is_resting, rollback_state = 0, y
         y, step, guard = integrate_mode(mode, y, t, h, flight, work, motion, records.report)
         t += step
         set_clock(start + t, work)
         adapt_look_ahead(step, guard, motion)
-        motion.skipped_bounce_time, motion.sequential_impacts = 0.0, 0
+        pace.skipped_bounce_time, pace.sequential_impacts = 0.0, 0
         if guard == GUARD_WATCH:
             watched = step
         elif not t < h:
@@ -260,7 +264,7 @@ def advance_world(world, grid, bodies, contact, restitution, flight, records, wo
             if contact.acts is not None:
                 new = advance(y, h, contact, flight, work, motion, records, k * h)
             else:
-                motion.count = 0
+                motion.contacts.count = 0
                 set_clock(k * h, work)
                 new = fly_freely(y, h, flight.gyroscopic, flight.offset_frame, work, motion, records.report)
             if not is_finite(new):
@@ -277,4 +281,12 @@ def advance_world(world, grid, bodies, contact, restitution, flight, records, wo
 @kernel
 def step_events(queue, grid, bodies, contact, restitution, flight, records, scratch, motions):
     """Advance the worlds that no other thread has taken, from event to event: `advance_world`."""
-    for_each_world(queue, advance_world, (grid, bodies, contact, restitution, flight, records, scratch[0], motions[0]))
+    motion = Motion(
+        motions.thresholds[0],
+        motions.pace[0],
+        motions.contacts[0],
+        motions.unknowns[0],
+        motions.candidates[0],
+        motions.smooth[0],
+    )
+    for_each_world(queue, advance_world, (grid, bodies, contact, restitution, flight, records, scratch[0], motion))

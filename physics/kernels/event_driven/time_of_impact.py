@@ -119,7 +119,7 @@ def gap_jerk_bound(y, left, offset_frame, work):
 
 
 @kernel
-def safe_flight_time(y, left, third, assured, offset_frame, work, motion):
+def safe_flight_time(y, left, third, assured, offset_frame, work, thresholds):
     """A time within which no feature at y reaches a wall, at most `left`.
 
     Those that touch and do not come stay away for `assured_time` at least: where a push has just ended, what lifts
@@ -141,7 +141,7 @@ def safe_flight_time(y, left, third, assured, offset_frame, work, motion):
             speed = vn + qt.dot(n, qt.cross(w, r))
             bend = an + qt.dot(n, plus(qt.cross(alpha, r), qt.cross(w, rate)))
             least = 0.0
-            if gap <= motion.touch_gap and speed >= -motion.rest_speed:
+            if gap <= thresholds.touch_gap and speed >= -thresholds.rest_speed:
                 gap, speed, least = max(gap, 0.0), max(speed, 0.0), assured
             t = min(t, max(gap_safe_time(max(gap, 0.0), speed, bend, third, t), least))
     return t
@@ -157,22 +157,23 @@ def has_torque(work):
 @kernel
 def integrate_free_flight(y, t, offset_frame, work, motion):
     """Free motion under a torque or in fields over t by extrapolated steps: (state, time left)."""
-    put_state_row(motion, ROW_START, y)
+    smooth = motion.smooth
+    put_state_row(smooth, ROW_START, y)
     left, tries = t, 0
-    motion.step_length = left
+    motion.pace.step_length = left
     while left > 0.0 and tries < _MAX_FLIGHT_STEPS:
         tries += 1
         h = prepare_extrapolated_step(left, offset_frame, work, motion)
         error, _ = try_extrapolated_step(h, offset_frame, work, motion)
         if not error <= work.tolerance and h > SEGMENT_SHORTEST_STEP * t:
-            motion.step_length = SEGMENT_STEP_CUT * h
+            motion.pace.step_length = SEGMENT_STEP_CUT * h
             continue
         for c in range(Y_SIZE):
-            motion.y[ROW_START, c] = motion.y[ROW_END, c]
+            smooth.y[ROW_START, c] = smooth.y[ROW_END, c]
         left -= h
         advance_clock(h, work)
-        motion.step_length = 2.0 * h
-    return get_state_row(motion, ROW_START), left
+        motion.pace.step_length = 2.0 * h
+    return get_state_row(smooth, ROW_START), left
 
 
 @inlined
@@ -209,7 +210,7 @@ def fly_to_wall(y, left, gyroscopic, offset_frame, work, motion, report):
     It may end earlier, where a feature flies so close along a wall that `_MAX_ADVANCES` steps did not tell: no wall is
     missed.
     """
-    motion.count = 0
+    motion.contacts.count = 0
     if has_fields(work):
         now = reset_felt_flag(work)
         end, t, guard = integrate_segment(y, left, offset_frame, work, motion)
@@ -222,8 +223,8 @@ def fly_to_wall(y, left, gyroscopic, offset_frame, work, motion, report):
     third = gap_jerk_bound(y, left, offset_frame, work)
     now, t = y, 0.0
     for _ in range(_MAX_ADVANCES):
-        assured = motion.assured_time if t == 0.0 else 0.0
-        step = safe_flight_time(now, left - t, third, assured, offset_frame, work, motion)
+        assured = motion.pace.assured_time if t == 0.0 else 0.0
+        step = safe_flight_time(now, left - t, third, assured, offset_frame, work, motion.thresholds)
         if t + step >= left:
             return fly_freely(y, left, gyroscopic, offset_frame, work, motion, report), left, True
         t += step

@@ -1,10 +1,16 @@
-"""Scratch memory of the event-driven scheme: the contacts that act now, their forces, the smooth motion's stages.
+"""Scratch memory of one thread for the event-driven scheme: contacts that act, their forces, stages of smooth motion.
+
+`Motion` is a named tuple of groups, one for each part of a step. Each is a record whose fields are named in a function
+below, since their sizes depend on the walls and on the features of a body: `contacts` at most act at once, `slots` are
+all features at all walls, and there are `unknowns` = 3 contacts.
 
 Besides the workspace of `physics.kernels.time_stepping.workspace`, which the impact solver shares with the
 time-stepping scheme.
 """
 
 from __future__ import annotations
+
+from typing import NamedTuple
 
 import numpy as np
 
@@ -23,8 +29,18 @@ ROW_START, ROW_END, ROW_PREVIOUS, ROW_CURRENT, ROW_COUNT = 0, 1, 2, 3, 4
 MAX_MIDPOINT_RULES = 8
 
 
-def _pace_fields(n_slots: int) -> list[tuple]:
-    """Thresholds, pace and trust of the scheme."""
+class Motion(NamedTuple):
+    """Groups of the scratch memory: arrays of one record each in Python, the records themselves within a kernel."""
+
+    thresholds: np.ndarray  # what counts as zero and as one
+    pace: np.ndarray  # when the next contact mode is looked for, and how far a step is trusted
+    contacts: np.ndarray  # contacts that act: kinematics, forces and their margins
+    unknowns: np.ndarray  # unknowns of the contact forces, and their equations
+    candidates: np.ndarray  # contacts that a contact mode may have
+    smooth: np.ndarray  # smooth step: gaps, stages, scales
+
+
+def _threshold_fields() -> list[tuple]:
     f, i = np.float64, np.int64
     return [
         ("touch_gap", f),  # gap within which a feature touches [m]
@@ -33,26 +49,30 @@ def _pace_fields(n_slots: int) -> list[tuple]:
         ("rounding_speed", f),  # speed that is rounding [m/s]
         ("simultaneity_time", f),  # impacts within this time are one [s]
         ("is_sequential", i),  # 1: contacts collide in turn, 0: at once
-        ("sequential_impacts", i),  # impacts in turn so far at this moment
+    ]  # fmt: skip
+
+
+def _pace_fields() -> list[tuple]:
+    f, i = np.float64, np.int64
+    return [
         ("look_ahead", f),  # time by which the next contact mode is looked for [s]
         ("min_look_ahead", f),  # the least of these [s]
         ("assured_time", f),  # time for which contacts that a guard has let go are known to stay open [s]
         ("next_leap", f),  # length of the next leap over events that crowd [s] (`chatter_control`)
         ("chatter_start", f),  # since when events crowd [s]
         ("chatter_count", i),  # events since then
-        ("ended_mode", i),  # the contact mode that a guard of force has ended
+        ("sequential_impacts", i),  # impacts in turn so far at this moment
+        ("skipped_bounce_time", f),  # time that a sequence of bounces would have taken on [s]
         ("step_length", f),  # length of the last smooth step [s]
+        ("ended_mode", i),  # the contact mode that a guard of force has ended
         ("distrusted_mode", i),  # the contact mode whose guards of force say nothing; see `mode_acceptance`
         ("watched_length", f),  # length of a step without such guards [s]
         ("end_rate", f, (Y_SIZE,)),  # rate of change at the end of such a step
-        ("skipped_bounce_time", f),  # time that a sequence of bounces would have taken on [s]
-        ("rebound", f, (3 * n_slots,)),  # impulses of a rebound that there is not enough energy for [N s]
     ]  # fmt: skip
 
 
-def _contact_fields(n: int, n_slots: int) -> list[tuple]:
-    """Contacts that act: kinematics, forces and their margins."""
-    f, i = np.float64, np.int64
+def _contact_fields(contacts: int, slots: int) -> list[tuple]:
+    f, i, n = np.float64, np.int64, contacts
     return [
         ("count", i),  # contacts that act
         ("slot", i, (n,)),  # wall * features + feature
@@ -75,13 +95,13 @@ def _contact_fields(n: int, n_slots: int) -> list[tuple]:
         ("patch", i, (n,)),  # first of its wall's three normal forces; NO_PATCH (`contact_forces`): one of its own
         ("patch_coordinate", f, (n, 2)),  # coordinates in the patch, in radii
         ("given_force", f, (n, 3)),  # part of its force that is given, along the wall's axes [N]
-        ("last_force", f, (n_slots, 3)),  # force of every feature when it was last known, along the wall's axes [N]
+        ("last_force", f, (slots, 3)),  # force of every feature when it was last known, along the wall's axes [N]
+        ("rebound", f, (3 * slots,)),  # impulses of a rebound that there is not enough energy for [N s]
     ]  # fmt: skip
 
 
-def _unknown_fields(m: int) -> list[tuple]:
-    """Unknowns of the contact forces and their equations."""
-    f, i = np.float64, np.int64
+def _unknown_fields(unknowns: int) -> list[tuple]:
+    f, i, m = np.float64, np.int64, unknowns
     return [
         ("given_wrench", f, (2, 3)),  # force and moment of the shares, which the unknowns add to
         ("column_force", f, (m, 3)),  # force per unknown
@@ -93,32 +113,30 @@ def _unknown_fields(m: int) -> list[tuple]:
         ("matrix", f, (m, m + 1)),
         ("order", i, (m,)),
         ("rhs", f, (m,)),  # right-hand sides
-        ("unknown", f, (m,)),
+        ("value", f, (m,)),
     ]  # fmt: skip
 
 
-def _candidate_fields(n: int) -> list[tuple]:
-    """Contacts that a contact mode may have."""
-    f, i = np.float64, np.int64
+def _candidate_fields(contacts: int) -> list[tuple]:
+    f, i, n = np.float64, np.int64, contacts
     return [
-        ("candidates", i),  # number of candidates: contacts that touch and do not leave
-        ("candidate_state", i, (n,)),  # open, held, sliding
+        ("count", i),  # contacts that touch and do not leave
+        ("slot", i, (n,)),  # wall * features + feature
+        ("state", i, (n,)),  # open, held, sliding
+        ("direction", f, (n, 3)),  # direction of sliding
         ("is_fresh", i, (n,)),  # slides from rest
-        ("candidate_changes", i, (n,)),
-        ("candidate", i, (n,)),  # slots of the candidates
-        ("candidate_direction", f, (n, 3)),
+        ("changes", i, (n,)),  # changes of its state in this search
     ]  # fmt: skip
 
 
-def _step_fields(walls: int, n_slots: int) -> list[tuple]:
-    """Smooth step: gaps, stages, scales."""
+def _smooth_fields(walls: int, slots: int) -> list[tuple]:
     f, i = np.float64, np.int64
     return [
         ("is_resting", i),
         ("wall_state", i, (walls,)),  # what the body did at each wall after the last event
-        ("gap", f, (2, n_slots)),  # of every feature, at the start and at the end of the step [m]
-        ("gap_rate", f, (2, n_slots)),  # [m/s]
-        ("is_active", i, (n_slots,)),
+        ("gap", f, (2, slots)),  # of every feature, at the start and at the end of the step [m]
+        ("gap_rate", f, (2, slots)),  # [m/s]
+        ("is_active", i, (slots,)),
         ("weight", f),  # scale of the forces [N]
         ("start_angular_speed", f),  # angular speed at the start of the step [rad/s]
         ("y", f, (ROW_COUNT, Y_SIZE)),
@@ -130,21 +148,18 @@ def _step_fields(walls: int, n_slots: int) -> list[tuple]:
     ]  # fmt: skip
 
 
-def motion_dtype(wall_count: int, features: int) -> np.dtype:
-    """Record type for bodies with `features` contact features each against `wall_count` walls."""
+def make_motion(wall_count: int, features: int, is_sequential: bool) -> Motion:
+    """Make the scratch for bodies with `features` contact features each against `wall_count` walls."""
     walls = max(wall_count, 1)
-    n, n_slots = walls * (FACE_VERTICES if features == VERTEX_COUNT else 1), walls * features
-    return np.dtype(
-        _pace_fields(n_slots)
-        + _contact_fields(n, n_slots)
-        + _unknown_fields(3 * n)
-        + _candidate_fields(n)
-        + _step_fields(walls, n_slots)
+    contacts, slots = walls * (FACE_VERTICES if features == VERTEX_COUNT else 1), walls * features
+    groups = (
+        _threshold_fields(),
+        _pace_fields(),
+        _contact_fields(contacts, slots),
+        _unknown_fields(3 * contacts),
+        _candidate_fields(contacts),
+        _smooth_fields(walls, slots),
     )
-
-
-def make_motion(wall_count: int, features: int, is_sequential: bool) -> np.ndarray:
-    """One such record, shape (1,)."""
-    motion = np.zeros(1, motion_dtype(wall_count, features))
-    motion["is_sequential"] = is_sequential
+    motion = Motion(*(np.zeros(1, np.dtype(fields)) for fields in groups))
+    motion.thresholds["is_sequential"] = is_sequential
     return motion
