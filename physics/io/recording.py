@@ -19,7 +19,7 @@ import numpy as np
 from physics import validation
 from physics.analysis.diagnostics import diagnose
 from physics.io.toml import from_toml, to_toml
-from physics.kernels.compile.decorators import folder_name
+from physics.kernels.compile.cache_folder import folder_name
 from physics.kernels.state import layout as at
 from physics.plan.accuracy import Accuracy
 from physics.scene.force_field import Field

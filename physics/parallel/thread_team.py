@@ -22,6 +22,7 @@ import numpy as np
 
 from physics.kernels.parallel import spin_wait_workers
 from physics.kernels.parallel import work_stealing as at
+from physics.kernels.state.groups import WorkQueue
 from physics.parallel import processors
 from physics.parallel.bound_call import Work, compiled
 
@@ -58,6 +59,8 @@ class Team:
         Whose turn it is, of `physics.kernels.parallel.work_stealing`.
     taken : (size, TAKEN_FIRST_WORLD + worlds + PADDING_WORDS) int64
         For each thread the worlds that it took in the last run.
+    queues : list of WorkQueue
+        Of each thread.
     """
 
     def __init__(self, threads: int, worlds: int):
@@ -65,6 +68,7 @@ class Team:
         chunk = min(WORLDS_AT_ONCE, worlds // (TURNS_PER_THREAD * self.size)) if self.size > 1 else worlds
         self.turns = at.make_ranges(self.size, worlds, max(1, chunk))
         self.taken = at.make_taken_lists(self.size, worlds)
+        self.queues = [WorkQueue(self.turns, taken) for taken in self.taken]
         self._crew = spin_wait_workers.make_worker_table(self.size - 1)
         self._told: Sequence[Work] | None = None  # what the crew has been told to do
         self._futures: dict[int, Future] = {}
@@ -159,13 +163,6 @@ class Team:
             self._dismiss()
             self._pool.shutdown()
         self._pool = None
-
-
-def listed(worlds: np.ndarray) -> np.ndarray:
-    """Worlds (n,) as a list (TAKEN_FIRST_WORLD + n,) int64 of those that a thread took."""
-    taken = np.zeros(at.TAKEN_FIRST_WORLD + len(worlds), dtype=np.int64)
-    taken[at.TAKEN_COUNT], taken[at.TAKEN_FIRST_WORLD :] = len(worlds), worlds
-    return taken
 
 
 def _raise(calls: Sequence[Work]) -> None:

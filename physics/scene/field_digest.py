@@ -5,17 +5,15 @@ from __future__ import annotations
 import hashlib
 import inspect
 import types
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import numpy as np
-from numba.core.dispatcher import Dispatcher
 
-from physics.kernels.compile.decorators import user_kernel
-from physics.kernels.compile.fused.dispatcher import Kernel
+from physics.kernels.compile.decorators import backend, is_compiled, plain_function, user_kernel
 
 
-def digest(*functions: Dispatcher | None) -> str:
+def digest(*functions: Callable | None) -> str:
     """Hexadecimal digest of everything that decides what these functions compile to.
 
     Their code, the numbers and functions that they read from around them, and so on down; of other modules that they
@@ -30,8 +28,7 @@ def digest(*functions: Dispatcher | None) -> str:
 
 def _feed(found, value, seen: set[int]) -> None:
     """Add a value that a function reads to a digest."""
-    if isinstance(value, Dispatcher):
-        value = value.py_func
+    value = plain_function(value)
     if isinstance(value, types.FunctionType):
         if id(value) not in seen:
             seen.add(id(value))
@@ -68,34 +65,34 @@ def _feed_function(found, function: types.FunctionType, seen: set[int]) -> None:
             _feed(found, names[name], seen)
 
 
-def called(function: Dispatcher, seen: set | None = None) -> Iterator[Dispatcher]:
+def called(function: Callable, seen: set | None = None) -> Iterator[Callable]:
     """A compiled function and all those that it names, and so on down; not what it takes from modules."""
     seen = set() if seen is None else seen
     if function in seen:
         return
     seen.add(function)
     yield function
-    around = inspect.getclosurevars(function.py_func)
+    around = inspect.getclosurevars(plain_function(function))
     for value in (*around.nonlocals.values(), *around.globals.values()):
-        if isinstance(value, Dispatcher):
+        if is_compiled(value):
             yield from called(value, seen)
 
 
-def as_it_is(function: Kernel) -> Kernel:
+def as_it_is(function: Callable) -> Callable:
     """The same function for which nothing is compiled of before an edit of what it reads; the same one until the next.
 
     Numba takes the numbers and functions that a function reads when it compiles it, and never again.
     """
-    key = function.py_func, digest(function)
+    key = plain_function(function), digest(function)
     if key not in _AS_IT_IS:
         for each in called(function):
             found = digest(each)
             if _COMPILED_AS.setdefault(each, found) != found:
                 _COMPILED_AS[each] = found
-                each.renew() if isinstance(each, Kernel) else each.recompile()
-        _AS_IT_IS[key] = user_kernel(function.py_func)
+                backend.renew(each)
+        _AS_IT_IS[key] = user_kernel(plain_function(function))
     return _AS_IT_IS[key]
 
 
-_AS_IT_IS: dict[tuple[types.FunctionType, str], Kernel] = {}
-_COMPILED_AS: dict[Dispatcher, str] = {}
+_AS_IT_IS: dict[tuple[types.FunctionType, str], Callable] = {}
+_COMPILED_AS: dict[Callable, str] = {}

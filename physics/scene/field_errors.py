@@ -5,17 +5,16 @@ from __future__ import annotations
 import linecache
 import re
 import traceback
+from collections.abc import Callable
+from importlib.util import find_spec
 from pathlib import Path
 from typing import NamedTuple
 
-import numba
-from numba.core.dispatcher import Dispatcher
-from numba.core.ir import Loc
-
+from physics.kernels.compile.decorators import plain_function
 from physics.kernels.forces.force_field_state import FieldState
 from physics.scene.field_digest import called
 
-NUMBA = str(Path(numba.__file__).parent)
+NUMBA = str(Path(find_spec("numba").origin).parent)
 
 ALLOWED = (
     "allowed are numbers, tuples of them, their functions of `math`, and functions under @physics.field_function; "
@@ -58,12 +57,10 @@ class Place(NamedTuple):
         return f'  File "{self.file}", line {self.line}, in {self.function}{shown}'
 
 
-def at(function: Dispatcher, loc: Loc | None = None) -> Place:
-    """The place of a statement of a function; without one that of its first line."""
-    plain = function.py_func
-    if loc is None:
-        return Place(plain.__code__.co_filename, plain.__code__.co_firstlineno, plain.__name__)
-    return Place(loc.filename, loc.line, plain.__name__)
+def at(function: Callable, line: tuple[str, int] | None = None) -> Place:
+    """The place of a statement of a function, of its file and line; without them that of its first line."""
+    plain = plain_function(function)
+    return Place(*(line or (plain.__code__.co_filename, plain.__code__.co_firstlineno)), plain.__name__)
 
 
 def placed(what: str, place: Place) -> str:
@@ -71,14 +68,14 @@ def placed(what: str, place: Place) -> str:
     return f"{what}\n{place}"
 
 
-def not_compiled(name: str, function: Dispatcher, error: Exception) -> ValueError:
+def not_compiled(name: str, function: Callable, error: Exception) -> ValueError:
     """Return the error of a function that Numba cannot compile.
 
     Parameters
     ----------
     name : str
         ``Class.function``.
-    function : dispatcher
+    function : kernel
     error : Exception
         Numba's.
     """
@@ -95,22 +92,22 @@ def _reason(text: str) -> str:
     return lines[0].split(". Raised from ")[0] if lines else text
 
 
-def _place(function: Dispatcher, error: Exception) -> Place:
+def _place(function: Callable, error: Exception) -> Place:
     loc = getattr(error, "loc", None)
-    outermost = [(loc.filename, loc.line)] if isinstance(loc, Loc) else []
+    outermost = [] if loc is None else [(loc.filename, loc.line)]
     for file, line in (*_PLACE.findall(str(error)), *outermost):
         if not file.startswith(NUMBA):
             return Place(file, int(line), _name_at(function, file, int(line)))
     return at(function)
 
 
-def _name_at(function: Dispatcher, file: str, line: int) -> str:
-    around = [each.py_func.__name__ for each in called(function) if _holds(each, file, line)]
-    return around[0] if around else function.py_func.__name__
+def _name_at(function: Callable, file: str, line: int) -> str:
+    around = [plain_function(each).__name__ for each in called(function) if _holds(each, file, line)]
+    return around[0] if around else plain_function(function).__name__
 
 
-def _holds(function: Dispatcher, file: str, line: int) -> bool:
-    code = function.py_func.__code__
+def _holds(function: Callable, file: str, line: int) -> bool:
+    code = plain_function(function).__code__
     lines = [each for _, _, each in code.co_lines() if each is not None]
     return code.co_filename == file and code.co_firstlineno <= line <= max(lines, default=-1)
 

@@ -15,13 +15,13 @@ parameters and the time. The built-in ones stand in `physics.scene.force_fields`
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, fields
 from typing import ClassVar
 
 import numpy as np
 
-from physics.kernels.compile.decorators import user_kernel
-from physics.kernels.compile.fused.dispatcher import Kernel
+from physics.kernels.compile.decorators import is_kernel, plain_function, user_kernel
 from physics.kernels.forces.force_field_dispatch import AIR, LOAD, Term
 from physics.scene import field_check
 from physics.scene.field_digest import as_it_is, digest
@@ -199,13 +199,13 @@ def _check_functions(kind: type, term: Term) -> bool:
     return field_check.check_function(f"{kind.__name__}.function", term.function, form, term.size, numbers)
 
 
-def _is_built_in(function: Kernel) -> bool:
-    return (function.py_func.__module__ or "").startswith("physics.kernels.")
+def _is_built_in(function: Callable) -> bool:
+    return (plain_function(function).__module__ or "").startswith("physics.kernels.")
 
 
-def _compiled(kind: type, name: str) -> Kernel | None:
+def _compiled(kind: type, name: str) -> Callable | None:
     function = vars(kind).get(name, getattr(kind, name))
-    if isinstance(function, Kernel) or (function is None and name == "energy"):
+    if is_kernel(function) or (function is None and name == "energy"):
         return function
     raise ValueError(f"{kind.__name__}.{name} is {function!r}; allowed is a function under @physics.field_function")
 
@@ -213,7 +213,7 @@ def _compiled(kind: type, name: str) -> Kernel | None:
 def _name(kind: type) -> str:
     """Return the name that tells this kind of field from all others: its function's, for a user's own with a digest."""
     function = _compiled(kind, "function")
-    name = function.py_func.__name__.replace("_", "")
+    name = plain_function(function).__name__.replace("_", "")
     if _is_built_in(function):
         return name
     return f"{name}{digest(function, _compiled(kind, 'energy'))}"

@@ -9,7 +9,7 @@ import numpy as np
 from physics.kernels.state.sleeping import Sleep
 from physics.kernels.time_stepping.workspace import body_records
 from physics.parallel.bound_call import Work
-from physics.parallel.thread_team import Team
+from physics.parallel.team import Team
 from physics.plan.accuracy import Accuracy
 from physics.plan.plan import Plan
 from physics.scene.effects import Actuator, Sleeping

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from physics import validation
-from physics.kernels.compile.decorators import kernel
+from physics.kernels.compile.decorators import entry_kernel
 from physics.kernels.flight.free_rotation import attitude_series, write_attitude_series
 from physics.kernels.multibody.data.hull_tables import CUBE
 from physics.kernels.state import layout as at
@@ -97,7 +97,7 @@ def _write_series(params: np.ndarray) -> None:
     write_attitude_series(*params[:, first : first + 3].T, series.T)
 
 
-@kernel
+@entry_kernel
 def _change_series(params):
     """The same, compiled: worlds with bodies of their own change them at every reset."""
     first = at.INV_INERTIA

@@ -6,7 +6,7 @@ from enum import IntEnum
 
 import numpy as np
 
-from physics.kernels.compile.decorators import kernel
+from physics.kernels.compile.decorators import entry_kernel
 from physics.kernels.state import layout as at
 
 
@@ -81,7 +81,7 @@ _UNRESOLVED, _UNCONVERGED, _FAULT = int(Status.UNRESOLVED), int(Status.UNCONVERG
 _LEFT_OUT, _OVERLAP, _COARSE = int(Status.LEFT_OUT), int(Status.OVERLAP), int(Status.COARSE)
 
 
-@kernel
+@entry_kernel
 def gravest(table, status):
     """Write the `Status` of each row of a report `table` (worlds, REPORT_SIZE) into `status` (worlds,) int64."""
     for world in range(table.shape[0]):
@@ -100,7 +100,7 @@ def gravest(table, status):
             status[world] = _UNRESOLVED
 
 
-@kernel
+@entry_kernel
 def add_report(total, table):
     """Add a report `table` (worlds, REPORT_SIZE) to that of steps before: counts add up, of the rest the largest."""
     for world in range(table.shape[0]):

@@ -6,7 +6,6 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numba.core.compiler_lock import global_compiler_lock
 
 from physics import validation
 from physics.kernels.event_driven.step import step_events
@@ -18,12 +17,11 @@ from physics.kernels.state.groups import (
     MultibodySwitches,
     Records,
     TimeGrid,
-    WorkQueue,
 )
 from physics.kernels.time_stepping.spring_coupled_step import step_linked
 from physics.kernels.time_stepping.step import step_worlds
 from physics.keywords import known_keywords
-from physics.parallel.bound_call import Work, compiled
+from physics.parallel.bound_call import Work, compiled_entry
 from physics.parallel.exclusive import in_use
 from physics.summary import shown
 from physics.world.batch import Batch
@@ -178,10 +176,7 @@ def kernel_calls(world: Batch, wrench: np.ndarray, steps: int, dt: float) -> lis
     kernel, own_arguments = _step_of(plan)
     gravity = world.gravity if plan.gravity else None
     bodies = BodyArrays(world.state, world.params, world.shapes, gravity, wrench.reshape(-1, 6))
-    argument_lists = [
-        (WorkQueue(world.team.turns, taken), grid, bodies, *own_arguments(world, k))
-        for k, taken in enumerate(world.team.taken)
-    ]
+    argument_lists = [(queue, grid, bodies, *own_arguments(world, k)) for k, queue in enumerate(world.team.queues)]
     entry = _entry(kernel, (plan.key, len(world.walls)), argument_lists[0])
     return [Work([(entry, arguments)]) for arguments in argument_lists]
 
@@ -244,12 +239,11 @@ def _world_arguments(world: Batch, k: int) -> tuple:
     return *switches, world.sleep_of_kernel(), _records(world), world.scratch[k]
 
 
-def _entry(kernel, key: tuple, arguments: tuple) -> int:
+def _entry(kernel, key: tuple, arguments: tuple):
     """Entry of the step kernel for arguments of these types, which `key` determines: to look at each takes a while."""
     if key not in _ENTRIES:
-        with global_compiler_lock:  # nobody else adds to what is linked meanwhile
-            _ENTRIES[key] = kernel.ready_entry(compiled(kernel, arguments))
+        _ENTRIES[key] = compiled_entry(kernel, arguments)
     return _ENTRIES[key]
 
 
-_ENTRIES: dict[tuple, int] = {}
+_ENTRIES: dict[tuple, object] = {}

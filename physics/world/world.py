@@ -16,7 +16,7 @@ from physics.kernels.time_stepping.event_log import EVENT_SIZE
 from physics.keywords import known_keywords
 from physics.parallel.bound_call import Work
 from physics.parallel.exclusive import exclusive, in_use, watch
-from physics.parallel.thread_team import Team
+from physics.parallel.team import Team
 from physics.plan.accuracy import Accuracy, resolve
 from physics.plan.plan import SHAPE_CODES, make_plan
 from physics.scene.effects import Actuator, Friction, RollingFriction, SpinFriction

@@ -8,10 +8,10 @@ from dataclasses import asdict, dataclass
 
 import gymnasium
 import numpy as np
-from numba.core import event
 
 import physics
 from physics import scenes
+from physics.kernels.compile.decorators import backend
 from rigid_env.lab.measure.environments import environment_ids
 
 ACCURACIES = ("balanced", "fast")
@@ -68,12 +68,11 @@ def jobs() -> list[Job]:
 def warm(todo: list[Job]) -> Iterator[Warmed]:
     """Run jobs one after the other; yields what each took."""
     for job in todo:
-        with event.install_recorder("numba:compile") as recorder:
+        with backend.count_compilations() as count:
             start = time.perf_counter()
             job.run()
             seconds = time.perf_counter() - start
-        compiled = sum(1 for _, what in recorder.buffer if what.is_start)
-        yield Warmed(job.name, job.accuracy, seconds, compiled)
+        yield Warmed(job.name, job.accuracy, seconds, count())
 
 
 def _scene_job(name: str, accuracy: str) -> Job:

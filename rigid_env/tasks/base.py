@@ -13,7 +13,7 @@ from gymnasium.utils import seeding
 import physics
 from physics import validation
 from physics.parallel.bound_call import bound
-from physics.parallel.thread_team import listed
+from physics.parallel.team import listed
 from physics.world.report import gravest
 from rigid_env.tasks import layout as col
 from rigid_env.tasks import start

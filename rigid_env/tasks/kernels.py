@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import math
 
-from physics.kernels.compile.decorators import inlined, kernel
+from physics.kernels.compile.decorators import entry_kernel, inlined, kernel
 from physics.kernels.math.quaternion import multiply, to_matrix
 from physics.kernels.parallel.work_stealing import TAKEN_COUNT, TAKEN_FIRST_WORLD
 from physics.kernels.state import layout as at
@@ -62,7 +62,7 @@ def norm3(a, b, c):
     return math.sqrt(a * a + b * b + c * c)
 
 
-@kernel
+@entry_kernel
 def wrenches(actions, record, wrench):
     """Forces and torques [N, N m] from actions: clipped to ±1 each, then each vector to its ball of radius 1.
 
@@ -94,7 +94,7 @@ def wrenches(actions, record, wrench):
     return -1
 
 
-@kernel
+@entry_kernel
 def start_poses(starts, half, pos, quat):
     """Poses of blocks that lie on the floor y = 0.
 

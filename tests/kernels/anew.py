@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from physics.kernels.compile.decorators import _make
+from physics.kernels.compile.fused.backend import make
 
 
 def anew(kernel):
     """The same kernel, to be compiled at its first call: neither found on disk nor kept there."""
-    return _make(kernel.py_func)
+    return make(kernel.py_func)

@@ -13,26 +13,26 @@ from pathlib import Path
 import pytest
 
 import physics
-from physics.kernels.compile import decorators
+from physics.kernels.compile import cache_folder
 
 
 def test_digest_changes_with_any_edit_and_any_rename(tmp_path: Path):
     (tmp_path / "a.py").write_text("x = 1\n")
     (tmp_path / "sub").mkdir()
     (tmp_path / "sub" / "b.py").write_text("y = 2\n")
-    first = decorators.source_digest(tmp_path)
-    assert decorators.source_digest(tmp_path) == first
+    first = cache_folder.source_digest(tmp_path)
+    assert cache_folder.source_digest(tmp_path) == first
     (tmp_path / "sub" / "b.py").write_text("y = 3\n")
-    second = decorators.source_digest(tmp_path)
+    second = cache_folder.source_digest(tmp_path)
     (tmp_path / "sub" / "b.py").rename(tmp_path / "sub" / "c.py")
-    third = decorators.source_digest(tmp_path)
+    third = cache_folder.source_digest(tmp_path)
     assert len({first, second, third}) == 3
 
 
 def test_an_edit_of_any_kernel_makes_other_machine_code(tmp_path: Path):
-    """Kernels stand in many folders, and none of them holds the decorators."""
+    """Kernels stand in many folders, and none of them holds the cache_folder."""
     shutil.copytree(Path(physics.__file__).parent, tmp_path / "physics", ignore=shutil.ignore_patterns("__pycache__"))
-    program = "from physics.kernels.compile.decorators import folder_name; print(folder_name())"
+    program = "from physics.kernels.compile.cache_folder import folder_name; print(folder_name())"
 
     def name() -> str:
         environment = {**os.environ, "PYTHONPATH": str(tmp_path)}
@@ -78,4 +78,4 @@ def test_a_second_process_compiles_nothing_and_gets_the_same_bits(tmp_path: Path
     assert (second["hits"], second["misses"]) == (1, 0)
     assert first["q"] == second["q"]
     folders = {path.relative_to(tmp_path).parts[0] for path in tmp_path.rglob("*.nbc")}
-    assert folders == {decorators.cache_dir().name}
+    assert folders == {cache_folder.cache_dir().name}

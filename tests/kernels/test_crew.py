@@ -14,12 +14,12 @@ import numpy as np
 import pytest
 
 from physics.kernels.compile.decorators import kernel
-from physics.kernels.parallel.atomics import call_address, spin_pause
+from physics.kernels.compile.fused.atomics import call_address, spin_pause
 from physics.kernels.parallel.spin_wait_workers import IDLE, RUNNING, SPINNING, STOPPING, WOKEN
 from physics.kernels.parallel.work_stealing import TAKEN_COUNT, begin_taking, next_world
 from physics.parallel import processors, thread_team
 from physics.parallel.bound_call import bound
-from physics.parallel.thread_team import Team
+from physics.parallel.team import Team
 
 RUNS = 3
 

@@ -14,13 +14,13 @@ from hypothesis import strategies as st
 import physics
 from physics import scenes
 from physics.kernels.compile.decorators import kernel
+from physics.kernels.compile.fused.atomics import atomic_add, atomic_load, spin_pause
 from physics.kernels.parallel import spin_wait_workers, work_stealing
-from physics.kernels.parallel.atomics import atomic_add, atomic_load, spin_pause
 from physics.kernels.parallel.work_stealing import TAKEN_COUNT, TAKEN_FIRST_WORLD, next_world
 from physics.kernels.parallel.work_stealing import begin_taking as turns_begin
 from physics.parallel import processors, thread_team
 from physics.parallel.bound_call import bound
-from physics.parallel.thread_team import Team, listed
+from physics.parallel.team import Team, listed
 from physics.world.stepper import kernel_calls
 
 

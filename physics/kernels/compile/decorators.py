@@ -1,125 +1,56 @@
-"""The one decorator for all kernels, and where their compiled code is kept.
-
-Numba's disk cache compares only the file in which a function stands. A kernel
-that calls a kernel of *another* file would therefore go on using the old
-machine code after that other file was edited. Here the cache lives in a folder
-named after the content of all kernel sources together, so that an edit
-anywhere among them starts a fresh cache.
-"""
+"""Decorate kernels: one source for each compiler (`compiler_choice`)."""
 
 from __future__ import annotations
 
-import hashlib
-import os
-import tempfile
-from functools import cache
-from pathlib import Path
+import inspect
+from collections.abc import Callable
 
-from numba.core import config
+from physics.kernels.compile.compiler_choice import COMPILER, FUSED, NUMBA
 
-from physics.kernels.compile.fused.cache_files import warn
-from physics.kernels.compile.fused.dispatcher import FOREIGN_KIND, PART_KIND, SHARED_KIND, Kernel
+if COMPILER == FUSED:
+    from physics.kernels.compile.fused import backend
+elif COMPILER == NUMBA:
+    from physics.kernels.compile.public import backend
+else:
+    from physics.kernels.compile.interpreted import backend
 
-
-def _cache_root() -> Path | None:
-    """`NUMBA_CACHE_DIR` if the user set one, else the user's cache folder, else a temporary one; None if none is his.
-
-    Files in it are looked at one by one before they are read (`fused.disk_cache`), wherever they are.
-    """
-    if config.CACHE_DIR:
-        return Path(config.CACHE_DIR)
-    if os.name == "nt":
-        base = Path(os.environ.get("LOCALAPPDATA", Path.home()))
-    else:
-        base = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
-    user = os.getuid() if hasattr(os, "getuid") else "user"
-    for root in (base / "rigid-env", Path(tempfile.gettempdir()) / f"rigid-env-{user}"):
-        try:
-            root.mkdir(mode=0o700, parents=True, exist_ok=True)
-            if hasattr(os, "getuid") and root.stat().st_uid not in (os.getuid(), 0):
-                warn(f"{root} belongs to another user: kernels are not kept there")
-            elif os.access(root, os.W_OK):
-                return root
-        except OSError:
-            continue
-    return None
+is_kernel = backend.is_kernel
 
 
-def source_digest(folder: Path) -> str:
-    """Hexadecimal digest of every Python source under `folder`, names included."""
-    digest = hashlib.sha256()
-    for path in sorted(folder.rglob("*.py")):
-        digest.update(path.relative_to(folder).as_posix().encode())
-        digest.update(path.read_bytes())
-    return digest.hexdigest()[:16]
+def is_compiled(value) -> bool:
+    """True for a kernel, and for a function that somebody else has had compiled by Numba."""
+    return hasattr(value, "py_func")
 
 
-# All that machine code may depend on: every folder of kernels, not only the one of this file.
-SOURCES = Path(__file__).parents[1]
-
-
-@cache
-def folder_name() -> str:
-    """Name of the folder: what tells these kernels from all others."""
-    return source_digest(SOURCES) + ("-checked" if config.BOUNDSCHECK else "")
-
-
-@cache
-def cache_dir() -> Path | None:
-    """Folder of the compiled kernels that belong to exactly these kernel sources, and check their indices or do not.
-
-    None where there is no folder of this user's: then nothing is kept.
-    """
-    root = _cache_root()
-    return None if root is None else root / folder_name()
-
-
-# What all kernels have in common; see `kernel`.
-OPTIONS = {"error_model": "numpy", "nogil": True, "_nrt": False}
-
-# For `numba.extending.overload`: what it chooses is a part of the kernel that calls it, with no call left.
-OVERLOAD_OPTIONS = {**OPTIONS, "forceinline": True, "pipeline_class": Kernel.part_pipeline}
-
-
-def _make(function, called_as=PART_KIND, **options):
-    """A `Kernel` of `function`; without a compiler the function itself."""
-    if config.DISABLE_JIT:
-        return function
-    options = {"nopython": True, "boundscheck": None, **OPTIONS, **options}
-    return Kernel(function, options=options, called_as=called_as)
-
-
-def _compile(function, called_as=PART_KIND, **options):
-    compiled = _make(function, called_as, **options)
-    if not config.DISABLE_JIT:
-        compiled.enable_caching(cache_dir())
-    return compiled
+def plain_function(value):
+    """The Python function that something compiled was made of; any other value as it is."""
+    return getattr(value, "py_func", value)
 
 
 def kernel(function):
-    """Compile `function` in nopython mode; cached on disk, IEEE semantics, the GIL released.
+    """Compile `function`; cached on disk, IEEE semantics, the GIL released.
 
-    `error_model="numpy"` makes a division by zero an inf and not an exception
-    (no exception path inside a kernel); there is no `fastmath`, so results do
-    not depend on how the optimiser reorders a sum. A product in a sum is rounded
-    with it, which is said for each (`folding_builder.fused_multiply_add`). Without Numba's run
-    time (`_nrt`) there are no reference counts to keep, nor can a kernel allocate:
-    arrays are lent to it, and views of the workspace need no owner.
+    A division by zero gives inf and not an exception. There is no `fastmath`, so results do not depend on how an
+    optimiser reorders a sum. `fused` rounds a product in a sum with it, which is said for each
+    (`fused.folding_builder.fused_multiply_add`). A kernel allocates nothing: arrays are lent to it.
 
     An index counts from the front of its axis, unless it is a literal: nothing asks whether it is negative. Under
     `NUMBA_BOUNDSCHECK=1` one that is outside its axis raises IndexError.
 
-    Switches among the arguments are passed as ``None`` (off) or ``True`` (on):
-    Numba prunes a branch on ``x is None`` while compiling, in every callee, so
-    that what is off is not in the machine code at all.
+    Switches among the arguments are passed as ``None`` (off) or not (on), also as members of named tuples. A kernel is
+    compiled for the types of its arguments, so that a branch on ``x is None`` is decided while compiling, and what is
+    off is not in the machine code. A branch that cannot be compiled where x is None stands in a function of its own
+    under `if_given`.
 
     A variable of a kernel with branches is not named after another one with digits behind, as x1 and x12 are: Numba may
     take one for the other, and then cannot compile it (`tests/kernels/test_variable_names.py`).
-
-    That it is not inlined is said, because Numba would have it inlined where the first caller that it is compiled for
-    is, and with it all that it calls, a copy for each call.
     """
-    return _compile(function, forceinline=False)
+    return backend.part(function)
+
+
+def entry_kernel(function):
+    """`kernel` that Python calls itself, not by way of `physics.parallel.bound_call`."""
+    return backend.entry(function)
 
 
 def cold_kernel(function):
@@ -129,24 +60,108 @@ def cold_kernel(function):
     then has fewer registers for its numbers, and moves them to the stack and back.
     """
     function.is_cold = True
-    return kernel(function)
+    return backend.part(function)
 
 
 def shared_kernel(function):
     """`kernel` with machine code of its own, which all plans call: see `physics.kernels.compile.fused.dispatcher`."""
-    return _compile(function, SHARED_KIND, forceinline=False)
+    return backend.shared_part(function)
 
 
 def inlined(function):
     """`kernel` for what is a few instructions long, or is called from one place: no call is left of it."""
-    return _compile(function, forceinline=True)
+    return backend.inlined_part(function)
 
 
 def runtime_kernel(function):
     """`inlined` without a place of its own on disk: made at run time, or by a user, and kept with what calls it."""
-    return _make(function, FOREIGN_KIND, forceinline=True)
+    return backend.runtime_part(function)
 
 
 def user_kernel(function):
     """`runtime_kernel` for a user's function: indices may count from the end; one outside raises IndexError."""
-    return _make(function, FOREIGN_KIND, forceinline=True, boundscheck=True)
+    return backend.user_part(function)
+
+
+def by_type(choose: Callable, about: Callable | None = None):
+    """Make a kernel that is another one for each type of its arguments.
+
+    Parameters
+    ----------
+    choose : callable
+        From the types of the arguments, or from the arguments themselves where nothing is compiled, to a function of
+        the same arguments.
+    about : callable, optional
+        The function whose name and docstring it has.
+    """
+
+    def stub(*arguments):
+        return choose(*arguments)(*arguments)
+
+    for name in ("__name__", "__qualname__", "__doc__", "__module__"):
+        if about is not None:
+            setattr(stub, name, getattr(about, name))
+    return backend.chosen(stub, choose)
+
+
+def when(is_chosen: Callable, otherwise=None):
+    """Make a function a kernel by type: called where `is_chosen` says so of the types of its arguments.
+
+    Parameters
+    ----------
+    is_chosen : callable
+        From the types of the arguments, or from the arguments, to a truth.
+    otherwise : callable or number or None
+        What is called instead, with the same arguments, or returned.
+    """
+
+    def constant(*arguments):
+        return otherwise
+
+    skip = otherwise if callable(otherwise) else constant
+
+    def decorate(function):
+        compiled = kernel(function)
+
+        def call(*arguments):
+            return compiled(*arguments)
+
+        return by_type(lambda *types: call if is_chosen(*types) else skip, function)
+
+    return decorate
+
+
+def if_given(switch: str, otherwise=None):
+    """Make a function a kernel that stands in place of its call where a switch is on, and `otherwise` does elsewhere.
+
+    Parameters
+    ----------
+    switch : str
+        Name of an argument, or of a member of one, as in `contact.friction`: None where it is off.
+    otherwise : callable or number or None
+        Function of the same arguments, or a value.
+    """
+
+    def constant(*arguments):
+        return otherwise
+
+    skip = otherwise if callable(otherwise) else constant
+
+    def decorate(function):
+        name, *path = switch.split(".")
+        place = list(inspect.signature(function).parameters).index(name)
+
+        def choose(*types):
+            found = types[place]
+            for member in path:
+                found = backend.member(found, member)
+            return skip if backend.is_none(found) else plain_function(function)
+
+        return by_type(choose, function)
+
+    return decorate
+
+
+def members(group) -> list[str]:
+    """Names of the members of a record, or of its type."""
+    return list(backend.record_members(group))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from physics.kernels.compile.decorators import inlined, kernel, shared_kernel
+from physics.kernels.compile.decorators import if_given, inlined, kernel, shared_kernel
 from physics.kernels.compile.simd import LANE_COUNT
 from physics.kernels.contact_law.anisotropic_friction import stretch_tangents, unstretch_tangents
 from physics.kernels.contact_law.compliance import add_delassus_compliance, contact_stiffness
@@ -43,6 +43,12 @@ _QUICK_NEWTON_ROUNDS = 10
 MAX_PIVOTS = 500
 
 
+@if_given("contact.friction", 1)
+def rows_per_contact(contact):
+    """Unknowns of a contact: the normal impulse, with friction three."""
+    return 3
+
+
 @inlined
 def _largest_free_speed(rows, bias):
     """Largest free contact speed [m/s]: the scale of the relative residual."""
@@ -52,28 +58,47 @@ def _largest_free_speed(rows, bias):
     return largest
 
 
+def _pivot_normals(n, contact, work):
+    """Pivoting without friction; the residual [m/s]."""
+    p, W, b, u = work.impulse, work.delassus, work.bias, work.velocity
+    solve_normal_lcp(W, b, n, p, work.fallback_float, work.fallback_int, MAX_PIVOTS)
+    update_contact_velocities(n, W, p, b, u)
+    return normal_residual(n, p, u, W)
+
+
+@if_given("contact.friction", _pivot_normals)
+def _pivot(n, contact, work):
+    """Pivoting with the friction pyramid; the residual against the cone [m/s]."""
+    p, W, b, u = work.impulse, work.delassus, work.bias, work.velocity
+    solve_pyramid_lcp(W, b, work.friction, n, p, work.fallback_float, work.fallback_int, MAX_PIVOTS)
+    update_contact_velocities(3 * n, W, p, b, u)
+    return cone_residual(n, p, u, work.friction, work.local)
+
+
 @kernel
 def _solve_by_pivoting(n, contact, residual, work):
     """Pivoting fallback; its result is kept where it beats that of the sweeps. Returns the residual [m/s]."""
-    p, W, b, u = work.impulse, work.delassus, work.bias, work.velocity
-    after, rows = residual, n
-    if contact.friction is not None:
-        rows = 3 * n
+    rows = n * rows_per_contact(contact)
     for r in range(rows):
-        work.saved[r] = p[r]
-    if contact.friction is None:
-        solve_normal_lcp(W, b, n, p, work.fallback_float, work.fallback_int, MAX_PIVOTS)
-        update_contact_velocities(rows, W, p, b, u)
-        after = normal_residual(n, p, u, W)
-    if contact.friction is not None:
-        solve_pyramid_lcp(W, b, work.friction, n, p, work.fallback_float, work.fallback_int, MAX_PIVOTS)
-        update_contact_velocities(rows, W, p, b, u)
-        after = cone_residual(n, p, u, work.friction, work.local)
+        work.saved[r] = work.impulse[r]
+    after = _pivot(n, contact, work)
     if not after < residual:
         for r in range(rows):
-            p[r] = work.saved[r]
+            work.impulse[r] = work.saved[r]
         after = residual
     return after
+
+
+def _keep_sweeps(n, contact, limit, residual, work):
+    return residual, METHOD_SWEEPS
+
+
+@if_given("contact.pivots", _keep_sweeps)
+def _pivot_above(n, contact, limit, residual, work):
+    """Pivoting where sweeps left more than `limit` [m/s]: (residual, method)."""
+    if residual <= limit:
+        return residual, METHOD_SWEEPS
+    return _solve_by_pivoting(n, contact, residual, work), METHOD_PIVOTING
 
 
 @inlined
@@ -146,52 +171,47 @@ def _assemble_problem(n, width, R, v, L, work):
     return _largest_free_speed(width * n, work.bias)
 
 
-@kernel
+def _sweep_normals(n, contact, goal, work):
+    """Sweeps without friction: (sweeps, residual [m/s])."""
+    if contact_stiffness(work) > 0.0:  # W is positive definite, but sweeps crawl where γ is small: a few pivots first
+        solve_normal_lcp(work.delassus, work.bias, n, work.impulse, work.fallback_float, work.fallback_int, MAX_PIVOTS)
+    return normal_sweeps(n, goal, work.sweeps, work)
+
+
+@if_given("contact.friction", _sweep_normals)
 def _sweep_and_newton(n, contact, goal, work):
-    """Sweeps, with friction in turn with Newton's method: (sweeps and steps, residual [m/s])."""
+    """Sweeps in turn with Newton's method: (sweeps and steps, residual [m/s])."""
     steps, residual = 0, 0.0
-    if contact.friction is None:
-        if (
-            contact_stiffness(work) > 0.0
-        ):  # W is positive definite, but sweeps crawl where γ is small: a few pivots first
-            solve_normal_lcp(
-                work.delassus, work.bias, n, work.impulse, work.fallback_float, work.fallback_int, MAX_PIVOTS
-            )
-        steps, residual = normal_sweeps(n, goal, work.sweeps, work)
-    if contact.friction is not None:
-        invert_contact_blocks(n, work)
-        for i in range(n):
-            work.friction[i] = work.mu
-        left, at_once, turns = work.sweeps, _SWEEPS_PER_ROUND, 0
-        if contact_stiffness(work) > 0.0:  # the normals are determined, and Newton's method shares tangents out evenly
-            at_once = 0
-        while True:
-            sweeps, residual = cone_sweeps(n, work.friction, goal, min(left, at_once), work)
-            at_once = _SWEEPS_PER_ROUND
-            steps += sweeps
-            left -= sweeps
-            if residual <= goal or left <= 0:
-                break
-            is_quick = turns < _QUICK_NEWTON_ROUNDS and left > _SWEEPS_PER_ROUND
-            newtons, residual = proximal_newton(n, residual, goal, is_quick, work)
-            turns += 1
-            steps += newtons
-            if residual <= goal:
-                break
+    invert_contact_blocks(n, work)
+    for i in range(n):
+        work.friction[i] = work.mu
+    left, at_once, turns = work.sweeps, _SWEEPS_PER_ROUND, 0
+    if contact_stiffness(work) > 0.0:  # the normals are determined, and Newton's method shares tangents out evenly
+        at_once = 0
+    while True:
+        sweeps, residual = cone_sweeps(n, work.friction, goal, min(left, at_once), work)
+        at_once = _SWEEPS_PER_ROUND
+        steps += sweeps
+        left -= sweeps
+        if residual <= goal or left <= 0:
+            break
+        is_quick = turns < _QUICK_NEWTON_ROUNDS and left > _SWEEPS_PER_ROUND
+        newtons, residual = proximal_newton(n, residual, goal, is_quick, work)
+        turns += 1
+        steps += newtons
+        if residual <= goal:
+            break
     return steps, residual
 
 
 @shared_kernel
 def _solve_iteratively(n, contact, v, L, R, work):
     """Result of `solve_contacts` by sweeps and later solvers: out of line, since few problems come to it."""
-    width = 1 if contact.friction is None else 3
+    width = rows_per_contact(contact)
     scale = _assemble_problem(n, width, R, v, L, work)
     goal = max(min(work.tolerance * scale, work.residual_limit), _ROUNDING * scale)
     sweeps, residual = _sweep_and_newton(n, contact, goal, work)
-    method = METHOD_SWEEPS
-    if contact.pivots is not None and not residual <= max(goal, _PIVOTING_THRESHOLD * scale):
-        residual = _solve_by_pivoting(n, contact, residual, work)
-        method = METHOD_PIVOTING
+    residual, method = _pivot_above(n, contact, max(goal, _PIVOTING_THRESHOLD * scale), residual, work)
     unstretch_tangents(n, work)
     v, L = _apply_impulses(n, width, v, L, work)
     if scale > 0.0:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from physics.kernels.compile.decorators import inlined, kernel
 from physics.kernels.contact_law.restitution_energy import IMPACT_ENERGY_ROUNDING, limit_rebound_energy
 from physics.kernels.contact_solver.sliding_patch import TRY_SLIDING
-from physics.kernels.contact_solver.solve import solve_contacts
+from physics.kernels.contact_solver.solve import rows_per_contact, solve_contacts
 from physics.kernels.event_driven.acceleration_problem import set_up_contact
 from physics.kernels.event_driven.contact_forces import free_angular_motion
 from physics.kernels.event_driven.extrapolated_midpoint import put_state_row
@@ -215,11 +215,6 @@ def principal_rotation(y, offset_frame, work):
     return qt.to_matrix(principal_attitude(y[1], work, offset_frame))
 
 
-@inlined
-def _rows_per_contact(friction):
-    return 1 if friction is None else 3
-
-
 @kernel
 def resolve_impacts(y, t, contact, offset_frame, work, motion, records):
     """State after the impulses of a collision at the time t, of all that touches or of the one whose turn it is."""
@@ -238,7 +233,7 @@ def resolve_impacts(y, t, contact, offset_frame, work, motion, records):
         v, L = solved[0], solved[1]
     ev.log_wall_impacts(
         n,
-        _rows_per_contact(contact.friction),
+        rows_per_contact(contact),
         x,
         work.mass * motion.thresholds.rounding_speed,
         t,
@@ -261,7 +256,7 @@ def resolve_inconsistency(y, h, t, contact, offset_frame, work, motion, records)
         v, L = solved[0], solved[1]
     ev.log_wall_impacts(
         n,
-        _rows_per_contact(contact.friction),
+        rows_per_contact(contact),
         y[0],
         work.mass * motion.thresholds.rounding_speed,
         t,

@@ -27,7 +27,7 @@ from __future__ import annotations
 
 import math
 
-from physics.kernels.compile.decorators import inlined, kernel
+from physics.kernels.compile.decorators import if_given, inlined, kernel
 from physics.kernels.contact_solver.solve import solve_contacts
 from physics.kernels.event_driven.acceleration_problem import read_resting_mode
 from physics.kernels.event_driven.chatter_control import (
@@ -241,6 +241,18 @@ def advance(y, h, contact, flight, work, motion, records, start):
     return y
 
 
+def _fly_substep(y, h, contact, flight, work, motion, records, start):
+    motion.contacts.count = 0
+    set_clock(start, work)
+    return fly_freely(y, h, flight.gyroscopic, flight.offset_frame, work, motion, records.report)
+
+
+@if_given("contact.acts", _fly_substep)
+def _take_substep(y, h, contact, flight, work, motion, records, start):
+    """State after a substep that begins at the time `start` of the step."""
+    return advance(y, h, contact, flight, work, motion, records, start)
+
+
 @inlined
 def advance_world(world, grid, bodies, contact, restitution, flight, records, work, motion):
     """Advance each body of a world by `grid.steps` steps, from event to event.
@@ -261,12 +273,7 @@ def advance_world(world, grid, bodies, contact, restitution, flight, records, wo
         bind_laws(bodies.params, i, work)
         y = read_state(bodies.state, i)
         for k in range(grid.steps * grid.substeps):
-            if contact.acts is not None:
-                new = advance(y, h, contact, flight, work, motion, records, k * h)
-            else:
-                motion.contacts.count = 0
-                set_clock(k * h, work)
-                new = fly_freely(y, h, flight.gyroscopic, flight.offset_frame, work, motion, records.report)
+            new = _take_substep(y, h, contact, flight, work, motion, records, k * h)
             if not is_finite(new):
                 report_fault(world, b, records.report)
                 ev.drop_events(i, 1, k * h, records.log, records.counts)
@@ -276,6 +283,9 @@ def advance_world(world, grid, bodies, contact, restitution, flight, records, wo
         write_state(bodies.state, i, y)
         w = angular_velocity(y[1], y[3], work, flight.offset_frame)
         bodies.state[i, at.ANGVEL], bodies.state[i, at.ANGVEL + 1], bodies.state[i, at.ANGVEL + 2] = w
+
+
+_advance_worlds = for_each_world(advance_world)
 
 
 @kernel
@@ -289,4 +299,4 @@ def step_events(queue, grid, bodies, contact, restitution, flight, records, scra
         motions.candidates[0],
         motions.smooth[0],
     )
-    for_each_world(queue, advance_world, (grid, bodies, contact, restitution, flight, records, scratch[0], motion))
+    _advance_worlds(queue, (grid, bodies, contact, restitution, flight, records, scratch[0], motion))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from physics.kernels.compile.decorators import inlined, kernel
+from physics.kernels.compile.decorators import if_given, inlined
 from physics.kernels.flight import integrators
 from physics.kernels.flight.free_rotation import free_rotation, isotropic_rotation
 from physics.kernels.math.vector import as_vector
@@ -43,17 +43,13 @@ def fly(y, work, h, gyroscopic, offset_frame):
     return x, drift_attitude(q, L, work, 0.5 * h, gyroscopic, offset_frame), v, L
 
 
-@inlined
+def _fly_exactly(y, h, flight, work):
+    return fly(y, work, h, flight.gyroscopic, flight.offset_frame)
+
+
+@if_given("flight.scheme", _fly_exactly)
 def integrate_flight(y, h, flight, work):
-    """Free motion over h, by the exact flow or by the scheme that was chosen."""
-    if flight.scheme is None:
-        return fly(y, work, h, flight.gyroscopic, flight.offset_frame)
-    return fly_by_scheme(flight, y, work, h)
-
-
-@kernel
-def fly_by_scheme(flight, y, work, h):
-    """`fly` by a textbook scheme (codes of `physics.kernels.flight.integrators`) instead of the exact flow."""
+    """Free motion over h: the exact flow, or a textbook scheme (codes of `physics.kernels.flight.integrators`)."""
     x, q, v, L = y
     q = principal_attitude(q, work, flight.offset_frame)
     zero = (0.0, 0.0, 0.0)

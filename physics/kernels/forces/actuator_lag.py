@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from physics.kernels.compile.decorators import inlined, kernel
+from physics.kernels.compile.decorators import entry_kernel, inlined
 
 
 @inlined
@@ -17,7 +17,7 @@ def _shorten(command, i, first, limit):
         command[i, first], command[i, first + 1], command[i, first + 2] = share * x, share * y, share * z
 
 
-@kernel
+@entry_kernel
 def clamp_command(command, limit_force, limit_torque):
     """Shorten forces and torques of `command` (rows, 6) to limits [N, N m], inf where there is none."""
     for i in range(command.shape[0]):
@@ -25,7 +25,7 @@ def clamp_command(command, limit_force, limit_torque):
         _shorten(command, i, 3, limit_torque)
 
 
-@kernel
+@entry_kernel
 def apply_actuator_lag(command, gone, kept, share, is_first, output, applied):
     """Let `output` follow a held `command`, both (rows, 6); its mean meanwhile, times `share`, goes to `applied`.
 

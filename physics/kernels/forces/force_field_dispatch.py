@@ -5,8 +5,7 @@ three columns. Numba compiles a kernel per type of its arguments, so that a reco
 fields, and one with them is found in the disk cache by its markers, from any process. A user's own field is marked
 with a digest of its source: an edit is another type.
 
-What is compiled for a type is chosen while Numba finds out types (`numba.extending.overload`): functions here are
-chosen by the record, and nothing is passed for it.
+What is compiled is chosen by the type of the record (`compile.decorators.by_type`), and nothing is passed for it.
 """
 
 from __future__ import annotations
@@ -14,9 +13,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from typing import NamedTuple
 
-from numba.extending import overload
-
-from physics.kernels.compile.decorators import OVERLOAD_OPTIONS, kernel, runtime_kernel
+from physics.kernels.compile.decorators import by_type, members, runtime_kernel, when
 from physics.kernels.forces.force_field_state import ZERO
 from physics.kernels.math.quaternion import dot
 from physics.kernels.math.vector import plus
@@ -101,49 +98,17 @@ def _markers(names) -> list[str]:
     return [name for name in names if name.split("_")[0] in (LOAD, AIR)]
 
 
-def _names(work) -> list[str]:
-    """Members of a workspace, or of the type of one."""
-    return list(work.fields) if hasattr(work, "fields") else list(work.dtype.names)
-
-
-def _chosen_by(is_chosen: Callable, otherwise):
-    """`if_declared`, where `is_chosen` decides by the members of the workspace."""
-
-    def constant(*arguments):
-        return otherwise
-
-    skip = otherwise if callable(otherwise) else constant
-
-    def decorate(function):
-        compiled = kernel(function)
-
-        def call(*arguments):
-            return compiled(*arguments)
-
-        def stub(*arguments):
-            return function(*arguments) if is_chosen(_names(arguments[-1])) else skip(*arguments)
-
-        @overload(stub, jit_options=OVERLOAD_OPTIONS, strict=False)
-        def choose(*types):
-            return call if is_chosen(_names(types[-1])) else skip
-
-        stub.__doc__ = function.__doc__
-        return stub
-
-    return decorate
-
-
 def if_declared(otherwise=None):
     """Make a function, whose last argument is the workspace, a kernel that only returns `otherwise` without fields.
 
     A function for `otherwise` is called instead. That is inlined: nothing is left of it.
     """
-    return _chosen_by(lambda names: bool(_markers(names)), otherwise)
+    return when(lambda *types: bool(_markers(members(types[-1]))), otherwise)
 
 
 def if_user_field(otherwise=None):
     """As `if_declared`, where some field does not tell its rates: a user's own."""
-    return _chosen_by(_has_unknown, otherwise)
+    return when(lambda *types: _has_unknown(members(types[-1])), otherwise)
 
 
 def _has_unknown(names: list[str]) -> bool:
@@ -153,7 +118,7 @@ def _has_unknown(names: list[str]) -> bool:
 def iterate_terms(work, kind: str) -> Iterator[tuple[Term, int, int]]:
     """Each field of this kind in a workspace: its term, first and last column."""
     first = 0
-    for marker in _markers(_names(work)):
+    for marker in _markers(members(work)):
         term = _KNOWN[marker]
         for _ in range(term.count):
             if marker.startswith(kind):
@@ -164,21 +129,14 @@ def iterate_terms(work, kind: str) -> Iterator[tuple[Term, int, int]]:
 def _sum(kind: str, start: Callable, chosen: Callable, add: Callable):
     """A kernel (state, t, work) that adds up what the chosen functions of a workspace's fields give."""
 
-    def stub(state, t, work):
-        return total(work)(state, t, work)
-
-    def total(work):
+    def total(state, t, work):
         result = start
         for term, first, last in iterate_terms(work, kind):
             if chosen(term) is not None:
                 result = add(runtime_kernel(result), chosen(term), first, last)
         return result
 
-    @overload(stub, jit_options=OVERLOAD_OPTIONS, strict=False)
-    def choose(state, t, work):
-        return total(work)
-
-    return stub
+    return by_type(total)
 
 
 def _no_load(state, t, work):
@@ -257,12 +215,8 @@ total_supplied_power = _sum(LOAD, _no_energy, lambda term: term.function if term
 total_user_load = _sum(LOAD, _no_load, lambda term: term.function if term.rates is None else None, _add_load)
 
 
-def total_mean_load(states, t, work):
+def _mean_load(states, t, work):
     """Load of all fields over a stage, `states` in its middle, at its start and at its end: of discrete gradients."""
-    return _mean_load(work)(states, t, work)
-
-
-def _mean_load(work):
     result = _no_load
     for term, first, last in iterate_terms(work, LOAD):
         mean = runtime_kernel(_of_middle(term.function)) if term.mean is None else term.mean
@@ -270,9 +224,7 @@ def _mean_load(work):
     return result
 
 
-@overload(total_mean_load, jit_options=OVERLOAD_OPTIONS, strict=False)
-def _choose_mean_load(states, t, work):
-    return _mean_load(work)
+total_mean_load = by_type(_mean_load, _mean_load)
 
 
 def _as_it_is(loads, h, R, state, work):
@@ -286,12 +238,8 @@ def _then_soften(before, function, first, last):
     return soften
 
 
-def soften_loads(loads, h, R, state, work):
+def _softened(loads, h, R, state, work):
     """Acceleration and torque as the implicit step over h of all fields has them, one field after the other."""
-    return _softened(work)(loads, h, R, state, work)
-
-
-def _softened(work):
     result = _as_it_is
     for term, first, last in iterate_terms(work, LOAD):
         if term.soften is not None:
@@ -299,6 +247,4 @@ def _softened(work):
     return result
 
 
-@overload(soften_loads, jit_options=OVERLOAD_OPTIONS, strict=False)
-def _choose_softened(loads, h, R, state, work):
-    return _softened(work)
+soften_loads = by_type(_softened, _softened)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from physics.kernels.compile.decorators import kernel
+from physics.kernels.compile.decorators import entry_kernel
 from physics.kernels.forces.field_loads import field_state
 from physics.kernels.forces.force_field_dispatch import total_energy, total_load
 from physics.kernels.forces.held_loads import bind_fields
@@ -11,7 +11,7 @@ from physics.kernels.state.body import bind_body, read_state
 from physics.kernels.state.groups import BodyArrays
 
 
-@kernel
+@entry_kernel
 def evaluate_fields(state, params, shapes, offset_frame, start, scratch, wrenches, energies):
     """Write force and torque of all fields (rows, 6) [N, N m] and potential energies (rows,) [J] at `start` [s].
 

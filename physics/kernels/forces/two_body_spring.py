@@ -8,9 +8,7 @@ line of the two points, momentum and angular momentum of the two together are ke
 
 from __future__ import annotations
 
-from numba.extending import overload
-
-from physics.kernels.compile.decorators import OVERLOAD_OPTIONS, inlined, kernel
+from physics.kernels.compile.decorators import by_type, inlined, kernel
 from physics.kernels.flight.free_flight import drift_attitude
 from physics.kernels.forces.field_loads import apply_loads, field_load
 from physics.kernels.forces.force_field_dispatch import LOAD, iterate_terms
@@ -96,22 +94,14 @@ def _if_linked(where, otherwise):
     def decorate(function):
         compiled = kernel(function)
 
-        def chosen(arguments, callee):
+        def chosen(*arguments):
             columns = _first_columns(where(arguments))
             if not columns:
                 return lambda *arguments: otherwise
             first, count = columns[0], len(columns)
-            return lambda *arguments: callee(first, count, *arguments)
+            return lambda *arguments: compiled(first, count, *arguments)
 
-        def stub(*arguments):
-            return chosen(arguments, function)(*arguments)
-
-        @overload(stub, jit_options=OVERLOAD_OPTIONS, strict=False)
-        def choose(*types):
-            return chosen(types, compiled)
-
-        stub.__doc__ = function.__doc__
-        return stub
+        return by_type(chosen, function)
 
     return decorate
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from physics.kernels.compile.decorators import kernel
+from physics.kernels.compile.decorators import entry_kernel, kernel
 from physics.kernels.half_space import support_function as geo
 from physics.kernels.math import quaternion as qt
 from physics.kernels.state import layout as at
@@ -16,7 +16,7 @@ def principal_matrix(state, params, i):
     return qt.to_matrix(qt.multiply(q, (params[i, p], params[i, p + 1], params[i, p + 2], params[i, p + 3])))
 
 
-@kernel
+@entry_kernel
 def write_angular_momenta(rows, state, params):
     """Write L = R I Rᵀ ω [kg m²/s] into the given rows of `state` from their ω."""
     for k in range(rows.shape[0]):
@@ -31,7 +31,7 @@ def write_angular_momenta(rows, state, params):
         state[i, at.ANGMOM], state[i, at.ANGMOM + 1], state[i, at.ANGMOM + 2] = L
 
 
-@kernel
+@entry_kernel
 def deepest_gaps(rows, state, params, shapes, walls, gaps, which):
     """Smallest gap [m] of each given row over all walls, and the wall it is at (-1 without walls); not of hulls."""
     for k in range(rows.shape[0]):
@@ -53,7 +53,7 @@ def deepest_gaps(rows, state, params, shapes, walls, gaps, which):
                 gaps[k], which[k] = gap, w
 
 
-@kernel
+@entry_kernel
 def contact_spring_energies(state, params, shapes, walls, column, energies):
     """Energy [J] of the springs of contact, ½ k g² of each point with a gap g < 0, of every row; k in `column`."""
     for i in range(state.shape[0]):
@@ -81,7 +81,7 @@ def feature_point(state, params, shape, n, i, feature):
     return (state[i, at.POS] + r[0], state[i, at.POS + 1] + r[1], state[i, at.POS + 2] + r[2])
 
 
-@kernel
+@entry_kernel
 def contact_point(state, params, shapes, walls, i, wall, feature, out):
     """`feature_point` the feature of row i towards a wall, into out (3,)."""
     n = (walls[wall, at.WALL_NORMAL], walls[wall, at.WALL_NORMAL + 1], walls[wall, at.WALL_NORMAL + 2])

@@ -2,41 +2,15 @@
 
 from __future__ import annotations
 
-from numba.core import types
-from numba.core.callconv import excinfo_ptr_t
-from numba.extending import intrinsic
-
 from physics.kernels.compile.decorators import kernel
-from physics.kernels.compile.fused.folding_builder import WORD, word_constant
-from physics.kernels.compile.fused.prepared_entry import ENTRY_TYPE, STATUS_TYPE, WORD_SIZE
-
-# A kernel's entry, the address of its arguments, and what became of the last call: its status and its exception.
-JOB_ENTRY, JOB_ARGUMENTS, JOB_STATUS, JOB_EXCEPTION, JOB_SIZE = range(5)
-
-
-@intrinsic
-def _enter(typing_context, job):
-    """Make the call at an address; its status."""
-
-    def lower(context, builder, sig, args):
-        row = builder.inttoptr(args[0], WORD.as_pointer())
-        entry, arguments = (builder.load(builder.gep(row, [word_constant(k)])) for k in (JOB_ENTRY, JOB_ARGUMENTS))
-        raised = builder.bitcast(builder.gep(row, [word_constant(JOB_EXCEPTION)]), ENTRY_TYPE.args[1])
-        code = builder.call(
-            builder.inttoptr(entry, ENTRY_TYPE.as_pointer()), [builder.inttoptr(arguments, ENTRY_TYPE.args[0]), raised]
-        )
-        code = builder.sext(code, WORD)
-        builder.store(code, builder.gep(row, [word_constant(JOB_STATUS)]))
-        return code
-
-    return types.int64(types.int64), lower
+from physics.kernels.compile.fused.prepared_calls import JOB_BYTES, enter_prepared, raise_prepared
 
 
 @kernel
 def run_jobs(jobs, count):
     """Make the `count` calls of the table at the address `jobs`; whether one raised an exception, which is the last."""
     for k in range(count):
-        if _enter(jobs + k * (JOB_SIZE * WORD_SIZE)) != 0:
+        if enter_prepared(jobs + k * JOB_BYTES) != 0:
             return True
     return False
 
@@ -44,24 +18,10 @@ def run_jobs(jobs, count):
 @kernel
 def run_job(job):
     """Make one call, of the row at the address `job`; whether it raised an exception. One number less to hand over."""
-    return _enter(job) != 0
-
-
-@intrinsic
-def _raise(typing_context, code, raised):
-    """Leave the kernel with an exception, if the code is that of one."""
-
-    def lower(context, builder, sig, args):
-        code, place = builder.trunc(args[0], STATUS_TYPE), context.call_conv._get_excinfo_argument(builder.function)
-        with builder.if_then(builder.icmp_unsigned("!=", code, STATUS_TYPE(0))):
-            builder.store(builder.inttoptr(args[1], excinfo_ptr_t), place)
-            builder.ret(code)
-        return context.get_dummy_value()
-
-    return types.none(types.int64, types.int64), lower
+    return enter_prepared(job) != 0
 
 
 @kernel
 def reraise(code, raised):
     """Raise what a call raised."""
-    _raise(code, raised)
+    raise_prepared(code, raised)

@@ -20,7 +20,7 @@ from __future__ import annotations
 import numpy as np
 
 from physics.kernels.compile.decorators import inlined, kernel
-from physics.kernels.parallel.atomics import (
+from physics.kernels.compile.fused.atomics import (
     atomic_add,
     atomic_exchange,
     atomic_load,

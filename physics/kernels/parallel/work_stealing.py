@@ -15,8 +15,8 @@ from physics.kernels.parallel.atomics import atomic_add
 # Words between what different threads change: two lines of a cache, since processors fetch them in pairs.
 PADDING_WORDS = 16
 
-# `turns`, of all threads. Row 0: how many worlds are taken at once. Then a row for each range: the first of its worlds
-# that nobody has taken, and the end of the range.
+# `turns`, of all threads. Row 0: how many worlds are taken at once, and the first world. Then a row for each range: the
+# first of its worlds that nobody has taken, and the end of the range.
 RANGE_CHUNK = 0
 RANGE_NEXT, RANGE_END = range(2)
 
@@ -44,7 +44,7 @@ def make_taken_lists(threads: int, worlds: int) -> np.ndarray:
 def begin_taking(turns, taken):
     """Nothing taken yet; returns what comes before the first world. A thread that is alone resets its range itself."""
     if turns.shape[0] == 2:
-        turns[1, RANGE_NEXT] = 0
+        turns[1, RANGE_NEXT] = turns[0, RANGE_END]
     taken[TAKEN_COUNT] = taken[TAKEN_CHUNK_END] = 0
     taken[TAKEN_RANGE] = taken[TAKEN_OWN_RANGE]
     return -1
@@ -93,22 +93,24 @@ def reset_ranges(turns):
         turns[k, RANGE_NEXT] = turns[k - 1, RANGE_END] if k > 1 else 0
 
 
-@inlined
-def for_each_world(queue, advance, about):
-    """Call ``advance(world, *about)`` for the worlds that no other thread has taken: the one loop over worlds.
+def for_each_world(advance):
+    """Make a kernel (queue, about) of the one loop over worlds: call ``advance(world, *about)`` for each.
+
+    A thread takes worlds that no other thread has taken (`WorkQueue` of `physics.kernels.state.groups`).
 
     Parameters
     ----------
-    queue : WorkQueue
-        `physics.kernels.state.groups`.
     advance : kernel
-        Advances one world.
-    about : tuple
-        Its other arguments. What is None there is pruned in the kernel.
+        Advances one world; `about` is the tuple of its other arguments.
     """
-    world = begin_taking(queue.turns, queue.taken)
-    while True:
-        world = next_world(world, queue.turns, queue.taken)
-        if world < 0:
-            break
-        advance(world, *about)
+
+    @inlined
+    def loop(queue, about):
+        world = begin_taking(queue.turns, queue.taken)
+        while True:
+            world = next_world(world, queue.turns, queue.taken)
+            if world < 0:
+                break
+            advance(world, *about)
+
+    return loop

@@ -4,10 +4,21 @@ from __future__ import annotations
 
 import math
 
-from physics.kernels.compile.decorators import inlined, kernel
+from physics.kernels.compile.decorators import if_given, inlined, kernel
 from physics.kernels.math import quaternion as qt
+from physics.kernels.math.vector import row_vector
 from physics.kernels.state import layout as at
 from physics.kernels.state.layout import METHOD_PIVOTING, SERIES_SIZE
+
+
+def _no_gravity(world, bodies):
+    return (0.0, 0.0, 0.0)
+
+
+@if_given("bodies.gravity", _no_gravity)
+def _gravity_of(world, bodies):
+    """Gravity of a world [m/s²]."""
+    return row_vector(bodies.gravity, world, 0)
 
 
 @inlined
@@ -18,15 +29,13 @@ def bind_body(world, i, shape, bodies, friction, restitution, offset_frame, work
     principal axes of every body are its body axes and its geometric centre is its centre of mass.
     """
     inv_mass, radius = bodies.params[i, at.INV_MASS], bodies.params[i, at.RADIUS]
+    gravity = _gravity_of(world, bodies)
     work.i, work.world, work.shape = i, world, shape
     work.mass, work.radius, work.slop = 1.0 / inv_mass, radius, work.relative_slop * radius
     for c in range(3):
         work.J[c] = bodies.params[i, at.INV_INERTIA + c]
         work.dims[c] = bodies.params[i, at.DIMENSIONS + c]
-        work.free_acceleration[c] = 0.0
-        if bodies.gravity is not None:
-            work.free_acceleration[c] = bodies.gravity[world, c]
-        work.free_acceleration[c] += inv_mass * bodies.wrench[i, c]
+        work.free_acceleration[c] = gravity[c] + inv_mass * bodies.wrench[i, c]
         work.torque[c] = bodies.wrench[i, 3 + c]
     for c in range(SERIES_SIZE):
         work.series[c] = bodies.params[i, at.SERIES + c]
@@ -127,6 +136,14 @@ def principal_attitude(q, work, offset_frame):
         return q
     p = work.principal
     return qt.multiply(q, (p[0], p[1], p[2], p[3]))
+
+
+@inlined
+def principal_matrix(q, R, work, offset_frame):
+    """Matrix of `principal_attitude`, R of the body frame's (the same unless `offset_frame`)."""
+    if offset_frame is None:
+        return R
+    return qt.to_matrix(principal_attitude(q, work, offset_frame))
 
 
 @inlined

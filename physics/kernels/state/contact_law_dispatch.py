@@ -7,9 +7,7 @@ workspace. Where none is declared nothing of it is compiled, stored or passed on
 
 from __future__ import annotations
 
-from numba.extending import overload
-
-from physics.kernels.compile.decorators import OVERLOAD_OPTIONS, kernel
+from physics.kernels.compile.decorators import by_type, members, when
 
 # Names of the laws, in the order of their numbers in `work.laws` and of their columns, the last of `params`.
 LAW_TANGENTIAL, LAW_ROLLING, LAW_SPIN, LAW_ANISOTROPY = "tangential", "rolling", "spin", "anisotropy"
@@ -28,8 +26,7 @@ def law_members(laws: tuple[str, ...]) -> list[tuple]:
 
 def _declared(work) -> list[str]:
     """Laws of a workspace, or of the type of one."""
-    names = work.fields if hasattr(work, "fields") else work.dtype.names
-    return [name[len(_PREFIX) :] for name in names if name.startswith(_PREFIX)]
+    return [name[len(_PREFIX) :] for name in members(work) if name.startswith(_PREFIX)]
 
 
 def if_law(laws: tuple[str, ...], instead):
@@ -37,31 +34,11 @@ def if_law(laws: tuple[str, ...], instead):
 
     `instead` takes the same arguments and is inlined.
     """
-
-    def decorate(function):
-        compiled = kernel(function)
-
-        def call(*arguments):
-            return compiled(*arguments)
-
-        def stub(*arguments):
-            return (function if set(laws) & set(_declared(arguments[-1])) else instead)(*arguments)
-
-        @overload(stub, jit_options=OVERLOAD_OPTIONS, strict=False)
-        def choose(*types):
-            return call if set(laws) & set(_declared(types[-1])) else instead
-
-        stub.__doc__ = function.__doc__
-        return stub
-
-    return decorate
+    return when(lambda *types: bool(set(laws) & set(_declared(types[-1]))), instead)
 
 
 def law_parameter(law: str, otherwise: float = 0.0):
     """A kernel (work) that gives the number of a law for the body in the workspace; `otherwise` if undeclared."""
-
-    def stub(work):
-        return chosen(work)(work)
 
     def chosen(work):
         declared = _declared(work)
@@ -70,11 +47,7 @@ def law_parameter(law: str, otherwise: float = 0.0):
         place = declared.index(law)
         return lambda work: work.laws[place]
 
-    @overload(stub, jit_options=OVERLOAD_OPTIONS, strict=False)
-    def choose(work):
-        return chosen(work)
-
-    return stub
+    return by_type(chosen)
 
 
 def _nothing(params, i, work):

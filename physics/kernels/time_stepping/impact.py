@@ -12,7 +12,7 @@ from physics.kernels.contact_law.restitution_energy import (
 )
 from physics.kernels.contact_law.target_velocity import NO_IMPACT, TRUE_IMPACT, may_have_impact, set_impact_targets
 from physics.kernels.contact_solver.sliding_patch import TRY_SLIDING
-from physics.kernels.contact_solver.solve import solve_contacts
+from physics.kernels.contact_solver.solve import rows_per_contact, solve_contacts
 from physics.kernels.half_space.contact_point import place_arms
 from physics.kernels.half_space.persistent_contacts import cancel_separation
 from physics.kernels.math import quaternion as qt
@@ -81,5 +81,5 @@ def resolve_impacts(n, y, t, h, contact, offset_frame, records, work):
             for k in range(3 * n):
                 work.impulse[k] += s * (work.rebound[k] - work.impulse[k])
     if records.log.shape[1] > 0 and found == TRUE_IMPACT:
-        log_wall_impacts(n, 1 if contact.friction is None else 3, x, 0.0, t, work, records.log, records.counts)
+        log_wall_impacts(n, rows_per_contact(contact), x, 0.0, t, work, records.log, records.counts)
     return x, q, v_new, L_new

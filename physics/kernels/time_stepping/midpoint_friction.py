@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import math
 
-from physics.kernels.compile.decorators import inlined
+from physics.kernels.compile.decorators import if_given, inlined
 from physics.kernels.contact_law.anisotropic_friction import friction_ratio
 from physics.kernels.contact_solver.solve import solve_contacts
 from physics.kernels.half_space.contact_point import contact_arm, wall_of
@@ -58,8 +58,8 @@ def _least_slip(w, h, work):
     return least + _SLIP_MARGIN * h * math.sqrt(square) * h * (work.acceleration + work.radius * square)
 
 
-@inlined
-def oppose_mean_slip(n, v, w, h, work):
+@if_given("contact.friction", False)
+def oppose_mean_slip(n, contact, v, w, h, work):
     """Let friction oppose the mean slip of the stage: whether all contacts slip.
 
     Parameters

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from physics.kernels.compile.decorators import inlined
+from physics.kernels.compile.decorators import if_given, inlined
 from physics.kernels.contact_law.compliance import (
     predict_end_gaps,
     set_spring_targets,
@@ -14,7 +14,7 @@ from physics.kernels.contact_law.target_velocity import (
     StageMotion,
     set_resting_targets,
 )
-from physics.kernels.contact_solver.solve import solve_contacts
+from physics.kernels.contact_solver.solve import rows_per_contact, solve_contacts
 from physics.kernels.flight.free_flight import drift_attitude
 from physics.kernels.half_space.contact_point import place_arms
 from physics.kernels.half_space.persistent_contacts import (
@@ -22,7 +22,7 @@ from physics.kernels.half_space.persistent_contacts import (
     WALL_MEMORY_STAGE,
 )
 from physics.kernels.math import quaternion as qt
-from physics.kernels.state.body import apply_inv_inertia, principal_attitude, report_solve
+from physics.kernels.state.body import apply_inv_inertia, principal_matrix, report_solve
 from physics.kernels.time_stepping.midpoint_friction import (
     cap_friction_work,
     has_slip_reversed,
@@ -53,6 +53,17 @@ def rest_residual(h, work):
     return math.inf
 
 
+def _no_acceleration(flight, R, m, wb, J):
+    return (0.0, 0.0, 0.0)
+
+
+@if_given("flight.gyroscopic", _no_acceleration)
+def _gyroscopic_acceleration(flight, R, m, wb, J):
+    """Angular acceleration J (m x wb) of a body with unequal moments, turned to the world [rad/s²]."""
+    g = qt.cross(m, wb)
+    return qt.matvec(R, (J[0] * g[0], J[1] * g[1], J[2] * g[2]))
+
+
 @inlined
 def midpoint_step(n, y, h, contact, flight, records, work):
     """State after Moreau's midpoint step over h with the n contacts of the set."""
@@ -63,26 +74,21 @@ def midpoint_step(n, y, h, contact, flight, records, work):
     q = drift_attitude(q, L, work, before, flight.gyroscopic, flight.offset_frame)
     middle = qt.to_matrix(q)
     place_arms(n, middle, flight.offset_frame, work)
-    R = middle
-    if flight.offset_frame is not None:
-        R = qt.to_matrix(principal_attitude(q, work, flight.offset_frame))
+    R = principal_matrix(q, middle, work, flight.offset_frame)
     w, alpha = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
     if L[0] != 0.0 or L[1] != 0.0 or L[2] != 0.0:
         m, J = qt.transposed_matvec(R, L), work.J
         wb = (J[0] * m[0], J[1] * m[1], J[2] * m[2])
         w = qt.matvec(R, wb)
-        if flight.gyroscopic is not None:
-            g = qt.cross(m, wb)
-            alpha = qt.matvec(R, (J[0] * g[0], J[1] * g[1], J[2] * g[2]))
+        alpha = _gyroscopic_acceleration(flight, R, m, wb, J)
     motion = StageMotion(middle, v, w, alpha)
     set_resting_targets(n, motion, h, flight.offset_frame, work)
     set_spring_targets(n, x, motion, before, after, flight.offset_frame, work)
     v0, opposes_mean = v, False
-    if contact.friction is not None and n <= work.mean_slip:
-        opposes_mean = oppose_mean_slip(n, v, w, max(h, records.memory[work.i, WALL_MEMORY_STAGE]), work)
-    width = 3
-    if contact.friction is None:
-        width = 1
+    if n <= work.mean_slip:
+        last = max(h, records.memory[work.i, WALL_MEMORY_STAGE])
+        opposes_mean = oppose_mean_slip(n, contact, v, w, last, work)
+    width = rows_per_contact(contact)
     load_warm_start(n, width, records.memory, work.i, h, work)
     v = (v[0] + h * a[0], v[1] + h * a[1], v[2] + h * a[2])
     L = (L[0] + h * torque[0], L[1] + h * torque[1], L[2] + h * torque[2])

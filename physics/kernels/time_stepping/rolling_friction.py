@@ -23,7 +23,7 @@ from __future__ import annotations
 import math
 
 from physics.kernels.compile.decorators import inlined, kernel
-from physics.kernels.contact_solver.solve import solve_contacts
+from physics.kernels.contact_solver.solve import rows_per_contact, solve_contacts
 from physics.kernels.half_space.contact_point import wall_normal, wall_of
 from physics.kernels.math import quaternion as qt
 from physics.kernels.state.body import apply_inv_inertia
@@ -64,7 +64,7 @@ def _against(n, width, across, along, w, work):
 @kernel
 def _resist(n, contact, across, along, v, L, solved, R, work):
     """One torque: what `solve_contacts` gives with it, and L with it but without the contacts."""
-    width = 1 if contact.friction is None else 3
+    width = rows_per_contact(contact)
     w = apply_inv_inertia(R, solved[1], work.J)
     T = _against(n, width, across, along, w, work)
     start = qt.dot(T, w)

@@ -116,7 +116,10 @@ def advance_world(world, grid, bodies, flight, held, events, records, linked):
         bodies.state[i, at.ANGVEL], bodies.state[i, at.ANGVEL + 1], bodies.state[i, at.ANGVEL + 2] = w
 
 
+_advance_worlds = for_each_world(advance_world)
+
+
 @kernel
 def step_linked(queue, grid, bodies, flight, held, events, records, linked):
     """Advance the worlds that no other thread has taken, of bodies that springs tie together: `advance_world`."""
-    for_each_world(queue, advance_world, (grid, bodies, flight, held, events, records, linked))
+    _advance_worlds(queue, (grid, bodies, flight, held, events, records, linked))

@@ -30,7 +30,7 @@ References
 
 from __future__ import annotations
 
-from physics.kernels.compile.decorators import cold_kernel, inlined, kernel
+from physics.kernels.compile.decorators import cold_kernel, if_given, inlined, kernel
 from physics.kernels.contact_law.compliance import contact_stiffness, correct_spring_depth
 from physics.kernels.contact_law.restitution_energy import lift_conserving_energy
 from physics.kernels.flight.free_flight import integrate_flight
@@ -247,6 +247,29 @@ def substep(y, start, h, contact, flight, records, work):
     return y
 
 
+@if_given("contact.acts", 0)
+def _clear_substeps(y, clear, h, left, contact, memory, work):
+    """Substeps, of those that are `left`, for which the body cannot reach a wall; `clear` where that is known."""
+    if clear > 0 or has_touched(memory, work.i):
+        return clear
+    clear = count_clear_substeps(y[0], y[2], h, left, work)
+    if clear > 0:
+        forget_contacts(memory, work.i, work)
+    return clear
+
+
+def _fly_substep(y, start, h, clear, contact, flight, records, work):
+    return fly_stage(y, h, flight, work)
+
+
+@if_given("contact.acts", _fly_substep)
+def _take_substep(y, start, h, clear, contact, flight, records, work):
+    """State after a substep that begins at the time `start` of the step."""
+    if clear == 0:
+        return substep(y, start, h, contact, flight, records, work)
+    return fly_stage(y, h, flight, work)
+
+
 @inlined
 def advance_world(world, grid, bodies, contact, restitution, flight, sleep, records, work):
     """Advance each body of a world by `grid.steps` steps.
@@ -273,15 +296,9 @@ def advance_world(world, grid, bodies, contact, restitution, flight, sleep, reco
         for k in range(end):
             set_clock(k * h, work)
             hold_loads(y, h, flight.gyroscopic, flight.offset_frame, work)
-            if contact.acts is not None and clear == 0 and not has_touched(records.memory, i):
-                clear = count_clear_substeps(y[0], y[2], h, end - k, work)
-                if clear > 0:
-                    forget_contacts(records.memory, i, work)
-            if contact.acts is not None and clear == 0:
-                new = substep(y, k * h, h, contact, flight, records, work)
-            else:
-                clear -= 1
-                new = fly_stage(y, h, flight, work)
+            clear = _clear_substeps(y, clear, h, end - k, contact, records.memory, work)
+            new = _take_substep(y, k * h, h, clear, contact, flight, records, work)
+            clear = max(clear - 1, 0)
             if not is_finite(new):
                 report_fault(world, b, records.report)
                 drop_events(i, 1, k * h, records.log, records.counts)
@@ -296,7 +313,10 @@ def advance_world(world, grid, bodies, contact, restitution, flight, sleep, reco
         bodies.state[i, at.ANGVEL], bodies.state[i, at.ANGVEL + 1], bodies.state[i, at.ANGVEL + 2] = w
 
 
+_advance_worlds = for_each_world(advance_world)
+
+
 @kernel
 def step_worlds(queue, grid, bodies, contact, restitution, flight, sleep, records, scratch):
     """Advance the worlds that no other thread has taken, of bodies that meet walls only: `advance_world`."""
-    for_each_world(queue, advance_world, (grid, bodies, contact, restitution, flight, sleep, records, scratch[0]))
+    _advance_worlds(queue, (grid, bodies, contact, restitution, flight, sleep, records, scratch[0]))

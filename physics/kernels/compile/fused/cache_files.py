@@ -14,7 +14,6 @@ import hashlib
 import os
 import pickle
 import stat
-import sys
 import uuid
 from contextlib import suppress
 from pathlib import Path
@@ -30,21 +29,6 @@ class DamagedFileError(Exception):
 
 class ForeignFileError(Exception):
     """A file that somebody else wrote, or could have written."""
-
-
-def warn(text: str) -> None:
-    """One line on standard error."""
-    print(f"rigid-env: {text}", file=sys.stderr, flush=True)
-
-
-def warn_once(subject: str, text: str) -> None:
-    """The first line about a subject in this process."""
-    if subject not in _SAID:
-        _SAID.add(subject)
-        warn(text)
-
-
-_SAID: set[str] = set()
 
 
 def is_owned_by_user(status: os.stat_result) -> bool:

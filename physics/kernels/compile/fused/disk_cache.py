@@ -19,6 +19,7 @@ from numba.core.serialize import dumps
 
 from physics.kernels.compile.fused import cache_files
 from physics.kernels.compile.fused.code_libraries import SharedLibrary
+from physics.kernels.compile.notices import warn, warn_once
 
 
 class _Cache:
@@ -61,9 +62,9 @@ class _Cache:
             payload = cache_files.read_cache_file(path, purpose)
             return None if payload is None else self.rebuild(target_context, payload)
         except cache_files.ForeignFileError as reason:
-            cache_files.warn_once("foreign", f"{path} is not read, since {reason}: kernels are compiled in memory")
+            warn_once("foreign", f"{path} is not read, since {reason}: kernels are compiled in memory")
         except Exception as error:  # whatever is wrong with it, the kernel can be compiled
-            cache_files.warn(f"{path} is damaged ({type(error).__name__}: {str(error)[:200]}): compiled anew")
+            warn(f"{path} is damaged ({type(error).__name__}: {str(error)[:200]}): compiled anew")
         return None
 
     def save_overload(self, sig, made):
@@ -79,7 +80,7 @@ class _Cache:
             about = (
                 f"kernels cannot be kept in {self.cache_path} ({error.strerror or error}): each process compiles them"
             )
-            cache_files.warn_once("unwritable", about)
+            warn_once("unwritable", about)
 
     @cached_property
     def _name(self) -> str:

@@ -87,7 +87,10 @@ def advance_world(world, grid, arrays, switches, restitution, kept, sleep, recor
         put_vector(state, i, at.ANGVEL, angular_velocity(q, L, many.bodies.work[b], offset_frame))
 
 
+_advance_worlds = for_each_world(advance_world)
+
+
 @kernel
 def step_many(queue, grid, arrays, switches, restitution, kept, sleep, records, many):
     """Advance the worlds that no other thread has taken, of bodies that touch each other: `advance_world`."""
-    for_each_world(queue, advance_world, (grid, arrays, switches, restitution, kept, sleep, records, many))
+    _advance_worlds(queue, (grid, arrays, switches, restitution, kept, sleep, records, many))

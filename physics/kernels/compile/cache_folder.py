@@ -1,0 +1,76 @@
+"""Name the folder of compiled kernels after all of their sources.
+
+Numba's disk cache compares only the file in which a function stands. A kernel that calls a kernel of another file would
+go on using the old machine code after that other file was edited. Here an edit anywhere among the kernels starts a
+fresh folder.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import tempfile
+from functools import cache
+from pathlib import Path
+
+from physics.kernels.compile.compiler_choice import COMPILER, FUSED
+from physics.kernels.compile.notices import warn
+
+
+def is_checked() -> bool:
+    """Answer whether indices are checked: `NUMBA_BOUNDSCHECK=1`."""
+    return os.environ.get("NUMBA_BOUNDSCHECK", "0") not in ("", "0")
+
+
+def _cache_root() -> Path | None:
+    """`NUMBA_CACHE_DIR` if the user set one, else the user's cache folder, else a temporary one; None if none is his.
+
+    Files in it are looked at one by one before they are read (`fused.disk_cache`), wherever they are.
+    """
+    if os.environ.get("NUMBA_CACHE_DIR"):
+        return Path(os.environ["NUMBA_CACHE_DIR"])
+    if os.name == "nt":
+        base = Path(os.environ.get("LOCALAPPDATA", Path.home()))
+    else:
+        base = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
+    user = os.getuid() if hasattr(os, "getuid") else "user"
+    for root in (base / "rigid-env", Path(tempfile.gettempdir()) / f"rigid-env-{user}"):
+        try:
+            root.mkdir(mode=0o700, parents=True, exist_ok=True)
+            if hasattr(os, "getuid") and root.stat().st_uid not in (os.getuid(), 0):
+                warn(f"{root} belongs to another user: kernels are not kept there")
+            elif os.access(root, os.W_OK):
+                return root
+        except OSError:
+            continue
+    return None
+
+
+def source_digest(folder: Path) -> str:
+    """Hexadecimal digest of every Python source under `folder`, names included."""
+    digest = hashlib.sha256()
+    for path in sorted(folder.rglob("*.py")):
+        digest.update(path.relative_to(folder).as_posix().encode())
+        digest.update(path.read_bytes())
+    return digest.hexdigest()[:16]
+
+
+# All that machine code may depend on: every folder of kernels, not only the one of this file.
+SOURCES = Path(__file__).parents[1]
+
+
+@cache
+def folder_name() -> str:
+    """Name of the folder, which tells these kernels and their compiler from all others."""
+    compiler = "" if COMPILER == FUSED else f"-{COMPILER}"
+    return source_digest(SOURCES) + compiler + ("-checked" if is_checked() else "")
+
+
+@cache
+def cache_dir() -> Path | None:
+    """Folder of the compiled kernels that belong to exactly these kernel sources, and check their indices or do not.
+
+    None where there is no folder of this user's: then nothing is kept.
+    """
+    root = _cache_root()
+    return None if root is None else root / folder_name()

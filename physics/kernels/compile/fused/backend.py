@@ -1,0 +1,113 @@
+"""Compile kernels together: the interface of `compile.decorators`."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+
+import numba
+from numba.core import event, types
+from numba.core.compiler_lock import global_compiler_lock
+from numba.core.dispatcher import Dispatcher
+from numba.extending import overload
+
+from physics.kernels.compile.cache_folder import cache_dir
+from physics.kernels.compile.fused.dispatcher import FOREIGN_KIND, PART_KIND, SHARED_KIND, Kernel
+from physics.kernels.compile.fused.user_functions import examine  # noqa: F401 (a part of the interface)
+
+# Without Numba's run time (`_nrt`) there are no reference counts to keep, nor can a kernel allocate.
+OPTIONS = {"error_model": "numpy", "nogil": True, "_nrt": False}
+
+# Held while something is compiled or loaded.
+LOCK = global_compiler_lock
+
+
+def make(function, called_as=PART_KIND, **options) -> Kernel:
+    """A `Kernel` of `function` that is not kept on disk."""
+    options = {"nopython": True, "boundscheck": None, **OPTIONS, **options}
+    return Kernel(function, options=options, called_as=called_as)
+
+
+def _kept(function, called_as=PART_KIND, **options) -> Kernel:
+    made = make(function, called_as, **options)
+    made.enable_caching(cache_dir())
+    return made
+
+
+def part(function) -> Kernel:
+    """Compile a function that other kernels call.
+
+    That it is not inlined is said, because Numba would have it inlined where the first caller that it is compiled for
+    is, and with it all that it calls, a copy for each call.
+    """
+    return _kept(function, forceinline=False)
+
+
+entry = part
+
+
+def shared_part(function) -> Kernel:
+    """Compile it with machine code of its own."""
+    return _kept(function, SHARED_KIND, forceinline=False)
+
+
+def inlined_part(function) -> Kernel:
+    """Compile it into its callers."""
+    return _kept(function, forceinline=True)
+
+
+def runtime_part(function) -> Kernel:
+    """Compile it into its callers, without a place on disk."""
+    return make(function, FOREIGN_KIND, forceinline=True)
+
+
+def user_part(function) -> Kernel:
+    """Compile it likewise, with checks of its indices."""
+    return make(function, FOREIGN_KIND, forceinline=True, boundscheck=True)
+
+
+def chosen(stub: Callable, choose: Callable) -> Callable:
+    """Have `choose` asked for a call of `stub`; it becomes a part of the kernel that calls it, with no call left."""
+    options = {**OPTIONS, "forceinline": True, "pipeline_class": Kernel.part_pipeline}
+    overload(stub, jit_options=options, strict=False)(choose)
+    return stub
+
+
+def is_kernel(value) -> bool:
+    """True for what the decorators of kernels make."""
+    return isinstance(value, Kernel)
+
+
+def is_none(value) -> bool:
+    """True for None, and for the type of it."""
+    return value is None or isinstance(value, types.NoneType)
+
+
+def member(group, name: str):
+    """A member of a named tuple, or the type of one in the type of a named tuple."""
+    return group.types[group.fields.index(name)] if isinstance(group, types.BaseNamedTuple) else getattr(group, name)
+
+
+def record_members(record):
+    """Names of the members of a record, or of the type of one."""
+    return record.fields if isinstance(record, types.Record) else record.dtype.names
+
+
+def machine_code(kernel: Kernel, arguments: tuple) -> Callable:
+    """Machine code of a kernel for arguments of these types, to be called with such arguments."""
+    return kernel.compile(tuple(map(numba.typeof, arguments)))
+
+
+def renew(function: Dispatcher) -> None:
+    """Forget what is compiled of a function: something that it reads around it has changed."""
+    if isinstance(function, Kernel):
+        function.renew()
+    else:
+        function.recompile()
+
+
+@contextmanager
+def count_compilations() -> Iterator[Callable[[], int]]:
+    """Count the kernels that are compiled in the meantime: yields a function that tells how many."""
+    with event.install_recorder("numba:compile") as recorder:
+        yield lambda: sum(1 for _, what in recorder.buffer if what.is_start)

@@ -1,0 +1,1 @@
+"""Kernels run by Python itself, with the results of machine code."""

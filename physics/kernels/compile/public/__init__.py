@@ -1,0 +1,1 @@
+"""Kernels compiled one by one, through public interfaces of Numba alone."""

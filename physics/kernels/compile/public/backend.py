@@ -1,0 +1,116 @@
+"""Compile each kernel with `numba.njit`: the interface of `compile.decorators`, without private interfaces of Numba.
+
+A kernel that Python calls is compiled with all kernels below it, and Numba keeps it on disk in a folder of ours. LLVM
+decides alone what it inlines.
+"""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from functools import cache
+
+import numba
+from numba import types
+from numba.extending import is_jitted, overload
+
+from physics.kernels.compile.cache_folder import cache_dir
+from physics.kernels.compile.public import simd_types  # noqa: F401 (registers operations on lanes)
+from physics.kernels.compile.user_function import Examined, probe
+
+OPTIONS = {"error_model": "numpy", "nogil": True}
+
+# Held while something is compiled or loaded.
+LOCK = threading.RLock()
+
+_compilations = 0
+
+
+def part(function):
+    """Compile a function that other kernels call."""
+    return numba.njit(**OPTIONS)(function)
+
+
+cold_part = shared_part = inlined_part = runtime_part = part
+
+
+def entry(function):
+    """Compile a function that Python calls: kept on disk, with the machine code of all below it."""
+    folder = cache_dir()
+    if folder is None:
+        return part(function)
+    before, numba.config.CACHE_DIR = numba.config.CACHE_DIR, str(folder)
+    try:
+        return numba.njit(cache=True, **OPTIONS)(function)
+    finally:
+        numba.config.CACHE_DIR = before
+
+
+def user_part(function):
+    """Compile a user's function, with checks of its indices."""
+    return numba.njit(boundscheck=True, **OPTIONS)(function)
+
+
+def chosen(stub: Callable, choose: Callable) -> Callable:
+    """Have `choose` asked for a call of `stub`."""
+    overload(stub, jit_options=OPTIONS, strict=False)(choose)
+    return stub
+
+
+def is_kernel(value) -> bool:
+    """True for what the decorators of kernels make."""
+    return is_jitted(value)
+
+
+def is_none(value) -> bool:
+    """True for None, and for the type of it."""
+    return value is None or isinstance(value, types.NoneType)
+
+
+def member(group, name: str):
+    """A member of a named tuple, or the type of one in the type of a named tuple."""
+    return group.types[group.fields.index(name)] if isinstance(group, types.BaseTuple) else getattr(group, name)
+
+
+def record_members(record):
+    """Names of the members of a record, or of the type of one."""
+    return record.fields if isinstance(record, types.Record) else record.dtype.names
+
+
+@cache
+def _entry(kernel):
+    return entry(kernel.py_func)
+
+
+def machine_code(kernel, arguments: tuple) -> Callable:
+    """Machine code of a kernel for arguments of these types, to be called with such arguments."""
+    global _compilations
+    with LOCK:
+        whole = _entry(kernel)
+        loaded = sum(whole.stats.cache_hits.values())
+        code = whole.compile(tuple(map(numba.typeof, arguments)))
+        if sum(whole.stats.cache_hits.values()) == loaded:
+            _compilations += 1
+    return code
+
+
+def renew(function) -> None:
+    """Forget what is compiled of a function: something that it reads around it has changed."""
+    function.recompile()
+
+
+@contextmanager
+def count_compilations() -> Iterator[Callable[[], int]]:
+    """Count the kernels that are compiled in the meantime: yields a function that tells how many."""
+    before = _compilations
+    yield lambda: _compilations - before
+
+
+def examine(function, arguments: tuple, numbers: str) -> Examined:
+    """Compile a user's function for read-only numbers p, and call it once; see `fused.user_functions.examine`."""
+    state, p, t = arguments
+    p.flags.writeable = False
+    arguments = state, p, t
+    called = function.compile(tuple(map(numba.typeof, arguments)))
+    return Examined(probe(function, called, arguments, numbers), None, may_raise=True)

@@ -1,0 +1,22 @@
+"""Threads that share a batch, as the compiler of kernels allows."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from physics.kernels.compile.compiler_choice import COMPILER, FUSED
+from physics.kernels.parallel import work_stealing as at
+
+if COMPILER == FUSED:
+    from physics.parallel.thread_team import Team
+else:
+    from physics.parallel.thread_pool import Pool as Team
+
+__all__ = ["Team", "listed"]
+
+
+def listed(worlds: np.ndarray) -> np.ndarray:
+    """Worlds (n,) as a list (TAKEN_FIRST_WORLD + n,) int64 of those that a thread took."""
+    taken = np.zeros(at.TAKEN_FIRST_WORLD + len(worlds), dtype=np.int64)
+    taken[at.TAKEN_COUNT], taken[at.TAKEN_FIRST_WORLD :] = len(worlds), worlds
+    return taken

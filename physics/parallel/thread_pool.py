@@ -1,0 +1,64 @@
+"""A batch of worlds on a pool of threads, each with a range of worlds of its own."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor, wait
+from itertools import pairwise
+
+from physics.kernels.parallel import work_stealing as at
+from physics.kernels.state.groups import WorkQueue
+from physics.parallel.bound_call import Work
+
+
+class Pool:
+    """Threads that share a batch evenly: what `thread_team.Team` is without atomics.
+
+    Parameters
+    ----------
+    threads : int
+    worlds : int
+        Size of the batch.
+
+    Attributes
+    ----------
+    size : int
+        Number of threads.
+    taken : (size, TAKEN_FIRST_WORLD + worlds + PADDING_WORDS) int64
+        For each thread the worlds that it took in the last run.
+    queues : list of WorkQueue
+        Of each thread: its range alone.
+    """
+
+    def __init__(self, threads: int, worlds: int):
+        self.size = min(threads, worlds)
+        self.taken = at.make_taken_lists(1, worlds).repeat(self.size, axis=0)
+        ends = [worlds * k // self.size for k in range(self.size + 1)]
+        ranges = [at.make_ranges(1, end, max(1, end - first)) for first, end in pairwise(ends)]
+        for first, turns in zip(ends, ranges):
+            turns[0, at.RANGE_END] = first
+        self.queues = [WorkQueue(turns, taken) for turns, taken in zip(ranges, self.taken)]
+        self._pool: ThreadPoolExecutor | None = None
+        self._pid = -1
+
+    def run(self, calls: Sequence[Work]) -> None:
+        """Make the calls, one per thread, of which the calling one is the first; raises what one of them raised."""
+        if self.size == 1:
+            calls[0].perform()
+            return
+        if self._pool is None or self._pid != os.getpid():
+            self._pool, self._pid = ThreadPoolExecutor(self.size - 1, thread_name_prefix="rigid-env"), os.getpid()
+        others = [self._pool.submit(call.perform) for call in calls[1:]]
+        try:
+            calls[0].perform()
+        finally:
+            wait(others)
+        for other in others:
+            other.result()
+
+    def close(self) -> None:
+        """End the threads; the pool can be used again."""
+        if self._pool is not None and self._pid == os.getpid():
+            self._pool.shutdown()
+        self._pool = None
