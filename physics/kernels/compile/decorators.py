@@ -14,7 +14,7 @@ elif COMPILER == NUMBA:
 else:
     from physics.kernels.compile.interpreted import backend
 
-is_kernel = backend.is_kernel
+is_kernel, lend = backend.is_kernel, backend.lend
 
 
 def is_compiled(value) -> bool:

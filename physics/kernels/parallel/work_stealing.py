@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from physics.kernels.compile.decorators import inlined, kernel
+from physics.kernels.compile.decorators import inlined, kernel, lend
 from physics.kernels.parallel.atomics import atomic_add
 
 # Words between what different threads change: two lines of a cache, since processors fetch them in pairs.
@@ -106,11 +106,11 @@ def for_each_world(advance):
 
     @inlined
     def loop(queue, about):
-        world = begin_taking(queue.turns, queue.taken)
+        world, lent = begin_taking(queue.turns, queue.taken), lend(about)
         while True:
             world = next_world(world, queue.turns, queue.taken)
             if world < 0:
                 break
-            advance(world, *about)
+            advance(world, *lent)
 
     return loop

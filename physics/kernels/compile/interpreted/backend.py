@@ -10,7 +10,7 @@ from functools import wraps
 import numpy as np
 
 from physics.kernels.compile.interpreted.ieee_source import as_ieee
-from physics.kernels.compile.interpreted.records import lend, type_of
+from physics.kernels.compile.interpreted.records import records_of, type_of
 from physics.kernels.compile.user_function import Examined, probe
 
 # Held while something is compiled elsewhere; here nothing is.
@@ -72,9 +72,15 @@ def machine_code(kernel: Callable, arguments: tuple) -> Callable:
 
     def call(*arguments):
         with np.errstate(all="ignore"):
-            return kernel(*lend(arguments))
+            return kernel(*records_of(arguments))
 
     return call
+
+
+@part
+def lend(value):
+    """The same arrays."""
+    return value
 
 
 def renew(function) -> None:

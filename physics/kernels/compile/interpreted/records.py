@@ -68,14 +68,14 @@ class RecordArray:
         return self.shape[0]
 
 
-def lend(value):
+def records_of(value):
     """Arguments of a kernel, with `RecordArray` and `Record` for arrays of records, also within tuples."""
     if isinstance(value, np.ndarray):
         return RecordArray(value) if value.dtype.names else value
     if isinstance(value, np.void) and value.dtype.names:
         return _class_of(value.dtype)(value)
     if isinstance(value, tuple):
-        members = map(lend, value)
+        members = map(records_of, value)
         return type(value)(*members) if hasattr(value, "_fields") else tuple(members)
     return value
 

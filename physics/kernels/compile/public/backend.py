@@ -13,7 +13,7 @@ from functools import cache
 
 import numba
 from numba import types
-from numba.extending import is_jitted, overload
+from numba.extending import intrinsic, is_jitted, overload
 
 from physics.kernels.compile.cache_folder import cache_dir
 from physics.kernels.compile.public import simd_types  # noqa: F401 (registers operations on lanes)
@@ -105,6 +105,27 @@ def count_compilations() -> Iterator[Callable[[], int]]:
     """Count the kernels that are compiled in the meantime: yields a function that tells how many."""
     before = _compilations
     yield lambda: _compilations - before
+
+
+@intrinsic
+def lend(typing_context, value):
+    """The same arrays, also within tuples, without an owner: nothing counts who refers to them."""
+
+    def without_owner(context, builder, type_, value):
+        if isinstance(type_, types.Array):
+            array = context.make_array(type_)(context, builder, value)
+            array.meminfo, array.parent = array.meminfo.type(None), array.parent.type(None)
+            return array._getvalue()
+        if isinstance(type_, types.BaseTuple):
+            for k, member in enumerate(type_):
+                lent = without_owner(context, builder, member, builder.extract_value(value, k))
+                value = builder.insert_value(value, lent, k)
+        return value
+
+    def lower(context, builder, sig, args):
+        return without_owner(context, builder, sig.args[0], args[0])
+
+    return value(value), lower
 
 
 def examine(function, arguments: tuple, numbers: str) -> Examined:
