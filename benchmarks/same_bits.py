@@ -1,4 +1,7 @@
-"""Compare the results of two commits to the last bit: ``python -m benchmarks.same_bits OTHER_CHECKOUT``.
+"""Compare the results of two commits, or of two compilers of kernels, to the last bit.
+
+``python -m benchmarks.same_bits OTHER_CHECKOUT``, or
+``python -m benchmarks.same_bits . --compiler numba --other-compiler python``.
 
 Each of the 24 scenes of `benchmarks.bit_scenes` takes 500 steps at each preset, over this checkout and over the other
 one, on this machine. A checkout of an older commit is made with ``git worktree add FOLDER COMMIT``.
@@ -19,16 +22,19 @@ from rich.progress import track
 
 from benchmarks import machine
 from benchmarks.bit_scenes import PRESETS, SCENES, STEPS
+from physics.kernels.compile.compiler_choice import COMPILERS, VARIABLE
 from rigid_env.lab.measure.machine import write_json
 
 WORKER = Path(__file__).with_name("bit_scenes.py")
 
 
 class Checkout:
-    """A process that runs scenes over one checkout."""
+    """A process that runs scenes over one checkout, with a compiler of kernels (None: the default)."""
 
-    def __init__(self, folder: Path):
+    def __init__(self, folder: Path, compiler: str | None = None):
         environment = {**os.environ, "PYTHONPATH": str(folder)}
+        if compiler is not None:
+            environment[VARIABLE] = compiler
         self._process = subprocess.Popen(
             [sys.executable, str(WORKER)],
             stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, env=environment, cwd=folder,
@@ -66,11 +72,16 @@ def main(
     scene: Annotated[list[str] | None, typer.Option(help=f"Some of {', '.join(SCENES)}.")] = None,
     preset: Annotated[list[str] | None, typer.Option(help=f"Some of {', '.join(PRESETS)}.")] = None,
     steps: Annotated[int, typer.Option(min=1, help="Of each run, in parts of 25.")] = STEPS,
+    compiler: Annotated[str | None, typer.Option(help=f"Of {', '.join(COMPILERS)}.")] = None,
+    other_compiler: Annotated[str | None, typer.Option(help="Likewise, over the other checkout.")] = None,
     json: Annotated[Path | None, typer.Option(help="Where to write the result.")] = None,
 ) -> None:
     """Compare the states of 24 scenes at four presets with those of another commit; exit with 1 where one differs."""
+    for each in (compiler, other_compiler):
+        if each not in (None, *COMPILERS):
+            raise typer.BadParameter(f"{each} is no compiler; allowed are {', '.join(COMPILERS)}")
     pairs = [(name, level) for name in scene or SCENES for level in preset or PRESETS]
-    here, there = Checkout(Path(__file__).parents[1]), Checkout(other.resolve())
+    here, there = Checkout(Path(__file__).parents[1], compiler), Checkout(other.resolve(), other_compiler)
     found = {}
     for name, level in track(pairs, description="scenes"):
         here.ask(name, level, steps)
@@ -83,7 +94,10 @@ def main(
         typer.echo(f"{run}: {how}")
     typer.echo(f"{len(found) - len(different)} of {len(found)} runs of {steps} steps have the same bits")
     if json is not None:
-        write_json(json, {"name": "same_bits", "machine": machine.headline(), "steps": steps, "runs": found})
+        write_json(json, {
+            "name": "same_bits", "machine": machine.headline(), "steps": steps,
+            "compilers": [compiler, other_compiler], "runs": found,
+        })  # fmt: skip
     raise typer.Exit(1 if different else 0)
 
 

@@ -10,16 +10,17 @@ import json
 import platform
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
+from importlib import metadata
 from pathlib import Path
 from zipfile import BadZipFile, is_zipfile
 
-import numba
 import numpy as np
 
 from physics import validation
 from physics.analysis.diagnostics import diagnose
 from physics.io.toml import from_toml, to_toml
 from physics.kernels.compile.cache_folder import folder_name
+from physics.kernels.compile.compiler_choice import COMPILER, FUSED
 from physics.kernels.state import layout as at
 from physics.plan.accuracy import Accuracy
 from physics.scene.force_field import Field
@@ -33,6 +34,10 @@ from physics.world.world import World
 
 # Number of the format; a reader refuses what is newer than itself.
 FORMAT = 1
+
+# Difference allowed in a replay by a compiler that rounds differently. Before the first contact changes it is rounding;
+# from then on a solver's tolerance decides, 2e-7 for a block dropped at `balanced`. Chaotic motion exceeds any number.
+OTHER_COMPILER = 1.0e-6
 
 
 @dataclass(frozen=True)
@@ -72,7 +77,7 @@ class Recording:
     reason : str
         Why it was kept.
     origin : dict of str to str
-        What it was made with: version, kernels, numba, numpy, python, machine.
+        What it was made with: version, kernels, compiler, numba, numpy, python, machine.
     """
 
     scene: Scene
@@ -167,11 +172,12 @@ class Recording:
             raise ValueError(f"{path} is no recording ({error}); allowed is what physics.Recorder writes") from None
         if head["format"] > FORMAT:
             raise ValueError(f"{path} has format {head['format']}; allowed are formats up to {FORMAT}")
+        compiler = head["origin"].setdefault("compiler", FUSED)  # there was no other
         starts = zip(content["start_steps"].tolist(), content["start_times"].tolist(), zip(*columns))
         return cls(
             scene=from_toml(head["scene"], str(path), kinds),
             accuracy=Accuracy(**head["accuracy"]),
-            starts=tuple(Start(step, Snapshot(arrays, time)) for step, time, arrays in starts),
+            starts=tuple(Start(step, Snapshot(arrays, time, compiler=compiler)) for step, time, arrays in starts),
             **{name: content[name] for name in ("wrenches", "steps", "dt", "states")},
             reason=head["reason"],
             origin=head["origin"],
@@ -203,20 +209,33 @@ class Replay:
 
     def __repr__(self) -> str:
         first = self.first_difference
-        told = "identical" if first is None else f"the first difference is after call {first}"
+        told = "identical" if self.is_identical else f"equal within {self.tolerance:g}"
+        told = told if first is None else f"the first difference is after call {first}"
         return lines_repr("Replay", f"{len(self.states)} calls of step", told)
 
     @property
+    def tolerance(self) -> float:
+        """Tolerance of the comparison: 0, for bits; `OTHER_COMPILER` where the recording's compiler rounds differently.
+
+        A state may differ by so much of itself, and of 1 of its unit.
+        """
+        makers = {self.recording.origin["compiler"], COMPILER}
+        return OTHER_COMPILER if FUSED in makers and len(makers) > 1 else 0.0
+
+    @property
     def first_difference(self) -> int | None:
-        """The first step after which a state differs in a bit from what was recorded; None: none does."""
-        ours, theirs = self.states.view(np.int64), self.recording.states.view(np.int64)
-        different = np.flatnonzero((ours != theirs).any(axis=(1, 2)))
+        """The first step after which a state differs from the recorded one, in a bit or beyond `tolerance`; or None."""
+        ours, theirs = self.states, self.recording.states
+        is_other = ours.view(np.int64) != theirs.view(np.int64)
+        if self.tolerance > 0.0:
+            is_other &= ~(np.abs(ours - theirs) <= self.tolerance * (1.0 + np.abs(theirs)))
+        different = np.flatnonzero(is_other.any(axis=(1, 2)))
         return int(different[0]) if len(different) else None
 
     @property
     def is_identical(self) -> bool:
         """True if every state came out the same, bit for bit."""
-        return self.first_difference is None
+        return np.array_equal(self.states.view(np.int64), self.recording.states.view(np.int64))
 
     @property
     def distances(self) -> np.ndarray:
@@ -240,7 +259,8 @@ def origin() -> dict[str, str]:
     return {
         "version": version(),
         "kernels": folder_name(),  # digest of their sources
-        "numba": numba.__version__,
+        "compiler": COMPILER,
+        "numba": metadata.version("numba"),
         "numpy": np.__version__,
         "python": platform.python_version(),
         "machine": platform.platform(),

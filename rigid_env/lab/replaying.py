@@ -22,6 +22,7 @@ def summary(replay: Replay) -> dict:
         "steps": len(recording),
         "is_identical": replay.is_identical,
         "first_difference": first,
+        "tolerance": replay.tolerance,
         "largest_distance": float(replay.distances.max(initial=0.0)),
         "recorded_with": recording.origin,
         "replayed_with": origin(),
@@ -74,9 +75,13 @@ def _shown(rows: list[dict]) -> list[int]:
 
 
 def _verdict(content: dict) -> str:
+    """Outcome in words."""
     if content["is_identical"]:
         return "bit for bit as recorded"
     ours, theirs = content["replayed_with"], content["recorded_with"]
+    compilers = f"recorded by compiler {theirs['compiler']}, replayed by {ours['compiler']}"
+    if content["first_difference"] is None:
+        return f"as recorded, within {content['tolerance']:g} ({compilers}, which rounds differently)"
     other = ", ".join(f"{key} {theirs.get(key)} then, {ours[key]} now" for key in ours if ours[key] != theirs.get(key))
     cause = other or "all versions are the same: please report this"
     return f"differs from step {content['first_difference']} on, by up to {content['largest_distance']:.3g} m ({cause})"

@@ -67,7 +67,7 @@ def user_part(function) -> Kernel:
 
 
 def chosen(stub: Callable, choose: Callable) -> Callable:
-    """Have `choose` asked for a call of `stub`; it becomes a part of the kernel that calls it, with no call left."""
+    """Let `choose` pick the function that a call of `stub` is; it becomes a part of its caller, with no call left."""
     options = {**OPTIONS, "forceinline": True, "pipeline_class": Kernel.part_pipeline}
     overload(stub, jit_options=options, strict=False)(choose)
     return stub
@@ -105,7 +105,7 @@ def lend(typing_context, value):
 
 
 def renew(function: Dispatcher) -> None:
-    """Forget what is compiled of a function: something that it reads around it has changed."""
+    """Forget what is compiled of a function, since something that it reads around it has changed."""
     if isinstance(function, Kernel):
         function.renew()
     else:

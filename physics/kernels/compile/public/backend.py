@@ -53,7 +53,7 @@ def user_part(function):
 
 
 def chosen(stub: Callable, choose: Callable) -> Callable:
-    """Have `choose` asked for a call of `stub`."""
+    """Let `choose` pick the function that a call of `stub` is."""
     overload(stub, jit_options=OPTIONS, strict=False)(choose)
     return stub
 
@@ -96,7 +96,7 @@ def machine_code(kernel, arguments: tuple) -> Callable:
 
 
 def renew(function) -> None:
-    """Forget what is compiled of a function: something that it reads around it has changed."""
+    """Forget what is compiled of a function, since something that it reads around it has changed."""
     function.recompile()
 
 

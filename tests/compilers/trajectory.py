@@ -1,0 +1,69 @@
+"""Trajectory of a scene, step by step, by the compiler of this process: the worker of the tests beside it."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+
+import physics
+from benchmarks.bit_scenes import DT, SCENES
+from physics.kernels.compile.compiler_choice import VARIABLE
+
+
+def trajectory(scene: str, preset: str, steps: int, threads: int = 1) -> dict:
+    """States (steps, numbers) of a scene, and after each step its contacts, impacts, energy and deepest penetration."""
+    world = physics.World(SCENES[scene](), worlds=2, dt=DT, accuracy=preset, threads=threads)
+    found: dict[str, list] = {name: [] for name in ("state", "solves", "impacts", "energy", "momentum", "depth")}
+    for _ in range(steps):
+        report = world.step()
+        numbers = np.concatenate([world.pos, world.quat, world.linvel, world.angvel], axis=-1)
+        measured = physics.diagnose(world)
+        found["state"].append(numbers.ravel().tolist())
+        found["solves"].append((report.solves > 0).tolist())
+        found["impacts"].append(report.impacts.tolist())
+        found["energy"].append(measured.energy.ravel().tolist())
+        found["momentum"].append(measured.momentum.ravel().tolist())
+        found["depth"].append(report.penetration.tolist())
+    return found
+
+
+# A program that runs this module where nobody may import the private part of the compilers.
+WITHOUT_FUSED = """
+import runpy, sys
+
+class Refuse:
+    def find_spec(self, name, path=None, target=None):
+        if name.startswith("physics.kernels.compile.fused"):
+            raise ImportError(name)
+
+sys.meta_path.insert(0, Refuse())
+runpy.run_module("tests.compilers.trajectory", run_name="__main__")
+"""
+
+
+def by_compiler(compiler: str, jobs: list[tuple]) -> list[dict]:
+    """Trajectories by another compiler than `fused`, in a process that may not import that.
+
+    Parameters
+    ----------
+    compiler : str
+    jobs : list of tuple
+        Arguments of `trajectory`.
+    """
+    root = str(Path(__file__).parents[2])
+    environment = {**os.environ, VARIABLE: compiler, "PYTHONPATH": root}
+    command = [sys.executable, "-c", WITHOUT_FUSED]
+    done = subprocess.run(
+        command, input=json.dumps(jobs), capture_output=True, text=True, env=environment, cwd=root, timeout=1500
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr[-3000:]
+    return json.loads(done.stdout)
+
+
+if __name__ == "__main__":
+    json.dump([trajectory(*job) for job in json.load(sys.stdin)], sys.stdout)
