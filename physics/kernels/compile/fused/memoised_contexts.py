@@ -22,12 +22,45 @@ from typing import ClassVar
 from numba.core import types, typing
 from numba.core.cpu import CPUContext
 from numba.core.imputils import user_function
+from numba.extending import models, register_model
 
 from physics.kernels.compile.fused import calling_convention
 from physics.kernels.compile.fused.argument_passing import Arguments
 from physics.kernels.compile.fused.array_elements import array_in_record
 from physics.kernels.compile.fused.folding_builder import FoldingBuilder
 from physics.kernels.compile.fused.operation_table import lowering_of, signature_of
+
+
+class MemoisedFunction(types.Function):
+    """Built-in function of Numba that remembers its signatures: typing asks it, and lowering once more.
+
+    Parameters
+    ----------
+    templates : tuple
+        Of the function that it stands for in contexts of ours.
+    """
+
+    def __init__(self, templates: tuple):
+        super().__init__(templates)
+        self._signatures: dict[tuple, typing.Signature] = {}
+
+    def augment(self, other):
+        """Numba's function with more templates: it is kept for all contexts."""
+        return types.Function(self.templates).augment(other)
+
+    def get_call_type(self, context, args, kws):
+        """Signature for arguments of these types."""
+        if kws:
+            return super().get_call_type(context, args, kws)
+        key = tuple(args)
+        found = self._signatures.get(key)
+        if found is None:
+            found = signature_of(self, context, args) or super().get_call_type(context, args, kws)
+            self._signatures[key] = found
+        return found
+
+
+register_model(MemoisedFunction)(models.OpaqueModel)
 
 
 class MemoisedTyping(typing.Context):
@@ -39,11 +72,23 @@ class MemoisedTyping(typing.Context):
         Whose knowledge is shared.
     """
 
-    signatures: ClassVar[dict[tuple, typing.Signature]] = {}  # by function and types of its arguments
+    functions: ClassVar[dict[types.Function, MemoisedFunction]] = {}  # by the one of Numba
     members: ClassVar[dict[tuple, types.Type]] = {}  # by type and name
 
     def __init__(self, context):
         self.__dict__ = context.__dict__
+
+    def _lookup_global(self, gv):
+        return self._with_memory(super()._lookup_global(gv))
+
+    def _with_memory(self, type_):
+        """`MemoisedFunction` for a built-in function of Numba, any other type as it is."""
+        if type(type_) is not types.Function:
+            return type_
+        ours = self.functions.get(type_)
+        if ours is None:
+            ours = self.functions[type_] = MemoisedFunction(type_.templates)
+        return ours
 
     def resolve_getattr(self, typ, attr):
         """Type of a member; None if there is none."""
@@ -51,7 +96,7 @@ class MemoisedTyping(typing.Context):
             return super().resolve_getattr(typ, attr)
         found = self.members.get((typ, attr))
         if found is None:
-            found = super().resolve_getattr(typ, attr)
+            found = self._with_memory(super().resolve_getattr(typ, attr))
             if found is not None:
                 self.members[typ, attr] = found
         return found
@@ -61,22 +106,6 @@ class MemoisedTyping(typing.Context):
 def memoised(context: typing.Context) -> MemoisedTyping:
     """The one that remembers for a context: Numba keeps what it compiles of its own by the context it was asked in."""
     return MemoisedTyping(context)
-
-
-def _get_call_type(function, context, args, kws, asked=types.Function.get_call_type):
-    """Signature of a built-in function for arguments of these types: `types.Function.get_call_type`."""
-    if kws or not isinstance(context, MemoisedTyping):
-        return asked(function, context, args, kws)
-    key = (function, tuple(args))
-    found = context.signatures.get(key)
-    if found is None:
-        found = signature_of(function, context, args) or asked(function, context, args, kws)
-        context.signatures[key] = found
-    return found
-
-
-# Where Numba lowers an operation it asks the function itself, past every context that it could be given.
-types.Function.get_call_type = _get_call_type
 
 
 class MemoisedTarget(CPUContext):
