@@ -16,6 +16,7 @@ import numba
 import numpy as np
 from numba.core.compiler_lock import global_compiler_lock
 
+from physics.kernels.compile.fused.ablation import is_on
 from physics.kernels.parallel.prepared_calls import (
     JOB_ARGUMENTS,
     JOB_ENTRY,
@@ -149,7 +150,8 @@ def compiling():
     timer.daemon = True
     was_collecting = gc.isenabled()
     timer.start()
-    gc.disable()
+    if is_on("paused_gc"):
+        gc.disable()
     try:
         yield
     finally:

@@ -17,6 +17,7 @@ from pathlib import Path
 
 from numba.core import config
 
+from physics.kernels.compile.fused.ablation import folder_suffix
 from physics.kernels.compile.fused.cache_files import warn
 from physics.kernels.compile.fused.dispatcher import FOREIGN_KIND, PART_KIND, SHARED_KIND, Kernel
 
@@ -61,7 +62,7 @@ SOURCES = Path(__file__).parents[1]
 @cache
 def folder_name() -> str:
     """Name of the folder: what tells these kernels from all others."""
-    return source_digest(SOURCES) + ("-checked" if config.BOUNDSCHECK else "")
+    return source_digest(SOURCES) + ("-checked" if config.BOUNDSCHECK else "") + folder_suffix()
 
 
 @cache

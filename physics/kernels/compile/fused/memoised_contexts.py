@@ -25,10 +25,22 @@ from numba.core.imputils import user_function
 from numba.extending import models, register_model
 
 from physics.kernels.compile.fused import calling_convention
+from physics.kernels.compile.fused.ablation import is_on
 from physics.kernels.compile.fused.argument_passing import Arguments
 from physics.kernels.compile.fused.array_elements import array_in_record
-from physics.kernels.compile.fused.folding_builder import FoldingBuilder
+from physics.kernels.compile.fused.folding_builder import KernelBuilder
 from physics.kernels.compile.fused.operation_table import lowering_of, signature_of
+
+
+class _Forgotten(dict):
+    """Table that keeps nothing."""
+
+    def __setitem__(self, key, value):
+        """Keep nothing."""
+
+
+def _make_table() -> dict:
+    return {} if is_on("memoised_contexts") else _Forgotten()
 
 
 class MemoisedFunction(types.Function):
@@ -42,7 +54,7 @@ class MemoisedFunction(types.Function):
 
     def __init__(self, templates: tuple):
         super().__init__(templates)
-        self._signatures: dict[tuple, typing.Signature] = {}
+        self._signatures = _make_table()
 
     def augment(self, other):
         """Numba's function with more templates: it is kept for all contexts."""
@@ -73,7 +85,7 @@ class MemoisedTyping(typing.Context):
     """
 
     functions: ClassVar[dict[types.Function, MemoisedFunction]] = {}  # by the one of Numba
-    members: ClassVar[dict[tuple, types.Type]] = {}  # by type and name
+    members: ClassVar[dict[tuple, types.Type]] = _make_table()  # by type and name
 
     def __init__(self, context):
         self.__dict__ = context.__dict__
@@ -117,10 +129,10 @@ class MemoisedTarget(CPUContext):
         Whose knowledge is shared.
     """
 
-    lowerings: ClassVar[dict[tuple, Callable]] = {}  # by operation, signature, and what is an error
-    absent: ClassVar[set[tuple]] = set()  # operations without a lowering of their own, and their signatures
-    asked: ClassVar[set] = set()  # operations for which Numba has looked through its registries
-    sizes: ClassVar[dict] = {}  # of LLVM types [bytes]
+    lowerings: ClassVar[dict[tuple, Callable]] = _make_table()  # by operation, signature, and what is an error
+    absent: ClassVar[dict[tuple, bool]] = _make_table()  # operations without a lowering, and their signatures
+    asked: ClassVar[dict] = _make_table()  # operations for which Numba has looked through its registries
+    sizes: ClassVar[dict] = _make_table()  # of LLVM types [bytes]
 
     def __init__(self, context):
         self.__dict__ = context.__dict__
@@ -151,20 +163,23 @@ class MemoisedTarget(CPUContext):
         lowering = self.lowerings.get(key)
         if lowering is None:
             lower = lowering_of(fn, sig)
-            lowering = self.numba_function(fn, sig) if lower is None else _bind_lowering(lower, self, fn, sig)
+            if lower is None:
+                lowering = self.numba_function(fn, sig, _firstcall)
+            else:
+                lowering = _bind_lowering(lower, self, fn, sig)
             self.lowerings[key] = lowering
         return lowering
 
-    def numba_function(self, fn, sig):
+    def numba_function(self, fn, sig, is_first=True):
         """Return Numba's way to lower `fn`; its registries are searched once for each `fn`, not for each signature."""
         if (fn, sig) in self.absent:
             raise NotImplementedError(f"No definition for lowering {fn}{sig}")
-        is_new = fn not in self.asked
-        self.asked.add(fn)
+        is_new = is_first and fn not in self.asked
+        self.asked[fn] = True
         try:
             return super().get_function(fn, sig, is_new)
         except NotImplementedError:
-            self.absent.add((fn, sig))
+            self.absent[fn, sig] = True
             raise
 
     @property
@@ -182,11 +197,13 @@ class MemoisedTarget(CPUContext):
         """The words of a call's arguments."""
         return Arguments(self.data_model_manager, fe_args)
 
-    def get_getattr(self, typ, attr):
-        """Return the function that reads a member of a value."""
-        if isinstance(typ, types.Record) and isinstance(typ.typeof(attr), types.NestedArray):
-            return array_in_record
-        return super().get_getattr(typ, attr)
+    if is_on("array_elements"):
+
+        def get_getattr(self, typ, attr):
+            """Return the function that reads a member of a value."""
+            if isinstance(typ, types.Record) and isinstance(typ.typeof(attr), types.NestedArray):
+                return array_in_record
+            return super().get_getattr(typ, attr)
 
     def pair_first(self, builder, val, ty):
         """Lower the value that an iterator gave."""
@@ -200,7 +217,7 @@ class MemoisedTarget(CPUContext):
         """Have a kernel known by its entry point, and how it is called."""
 
         def call(context, builder, sig, args):
-            is_kernel = isinstance(builder, FoldingBuilder) and not isinstance(fndesc.restype, types.Optional)
+            is_kernel = isinstance(builder, KernelBuilder) and not isinstance(fndesc.restype, types.Optional)
             if is_kernel or calling_convention.returns_value(fndesc):
                 return calling_convention.call_value_function(context, builder, fndesc, args)
             return numbas_call(context, builder, sig, args)
