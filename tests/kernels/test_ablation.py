@@ -9,8 +9,10 @@ import sys
 from pathlib import Path
 
 import pytest
+import typer
 
 import physics
+from benchmarks import ablation as benchmark
 from physics.kernels.compile import decorators
 from physics.kernels.compile.fused import ablation
 
@@ -104,3 +106,22 @@ def test_a_process_with_an_unknown_name_ends_with_it():
     done = subprocess.run([sys.executable, "-c", "import physics"], env=environment, capture_output=True, text=True)
     assert done.returncode == 1
     assert "ValueError: RIGID_ENV_WITHOUT='rangs' names rangs; allowed are " in done.stderr
+
+
+def test_the_benchmark_takes_ratios_turn_by_turn_and_measures_no_row_again(tmp_path, capsys, monkeypatch):
+    """Rows that the file holds are shown; a name that is unknown is refused."""
+    samples = {"with": [dict.fromkeys(benchmark.COLUMNS, 2.0)] * 3}
+    samples["without"] = [dict.fromkeys(benchmark.COLUMNS, each) for each in (2.0, 3.0, 8.0)]
+    path = tmp_path / "rows.json"
+    path.write_text(json.dumps({"rows": {"ranges": {"machine": "some machine", "samples": samples}}}))
+    monkeypatch.setattr(benchmark, "sample", lambda *_: pytest.fail("measured again"))
+    monkeypatch.setenv(ablation.VARIABLE, "tuples")
+    benchmark.main(repeats=1, only=["ranges"], json=path)
+    out = capsys.readouterr().out
+    assert "1.50" in out
+    assert "prepared_entry has no switch" in out
+    with benchmark.left_out("scalars"):
+        assert os.environ[ablation.VARIABLE] == "scalars"
+    assert os.environ[ablation.VARIABLE] == "tuples"
+    with pytest.raises(typer.BadParameter, match="rangs; allowed are "):
+        benchmark.main(only=["rangs"])
