@@ -12,6 +12,7 @@ from physics.kernels.compile.compiler_choice import COMPILER, FUSED
 from physics.kernels.compile.decorators import backend
 
 if COMPILER == FUSED:
+    from physics.kernels.compile.fused.ablation import is_on
     from physics.parallel.prepared_work import PreparedWork as Work
     from physics.parallel.prepared_work import entry
 else:
@@ -20,7 +21,9 @@ else:
 
 # Allocations between two runs of the garbage collector while something is compiled; 0: none. What `numba` leaves behind
 # would take half a gigabyte, what `fused` does hardly anything.
-COLLECT_AT = (0, 0, 0) if COMPILER == FUSED else (100_000, 50, 50)
+COLLECT_AT = (100_000, 50, 50)
+if COMPILER == FUSED:
+    COLLECT_AT = (0, 0, 0) if is_on("paused_gc") else gc.get_threshold()
 
 # Seconds after which the first step of a plan says that it is compiling.
 COMPILE_NOTICE = 1.0

@@ -62,8 +62,12 @@ SOURCES = Path(__file__).parents[1]
 @cache
 def folder_name() -> str:
     """Name of the folder, which tells these kernels and their compiler from all others."""
-    compiler = "" if COMPILER == FUSED else f"-{COMPILER}"
-    return source_digest(SOURCES) + compiler + ("-checked" if is_checked() else "")
+    checked = "-checked" if is_checked() else ""
+    if COMPILER != FUSED:
+        return f"{source_digest(SOURCES)}-{COMPILER}{checked}"
+    from physics.kernels.compile.fused.ablation import folder_suffix
+
+    return source_digest(SOURCES) + checked + folder_suffix()
 
 
 @cache

@@ -7,13 +7,17 @@ call hands on one address, and a kernel reads from there what it reads of the tu
 
 from __future__ import annotations
 
+import sys
+
 from llvmlite import ir
 from numba.core import types
 from numba.core.datamodel.packer import ArgPacker, _flatten, _Unflattener
 
+from physics.kernels.compile.fused.ablation import is_on
 from physics.kernels.compile.fused.folding_builder import FoldingBuilder, StructInMemory, stack_slot
 
-FEW_WORDS = 64  # A tuple of more is handed on by its address.
+# A tuple of more is handed on by its address.
+FEW_WORDS = 64 if is_on("argument_passing") else sys.maxsize
 
 
 class Arguments(ArgPacker):

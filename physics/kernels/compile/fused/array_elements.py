@@ -14,15 +14,18 @@ from collections.abc import Callable
 from llvmlite import ir
 from numba.core import cgutils, types, typing
 
+from physics.kernels.compile.fused.ablation import is_on
 from physics.kernels.compile.fused.folding_builder import (
     NO_SIGNED_WRAP,
-    FoldingBuilder,
+    KernelBuilder,
     known_integer,
     make_struct,
     word_constant,
 )
 
 _ITEM_SIZE, _DATA, _SHAPE, _STRIDES = 3, 4, 5, 6  # members of an array
+
+_COUNTS_FROM_FRONT = is_on("indices_from_front")
 
 
 def _lengths(builder, array_type, array, member, known) -> list:
@@ -40,7 +43,7 @@ def _from_front(context, builder, index, type_, length):
     """
     index = context.cast(builder, index, type_, types.intp if type_.signed else types.uintp)
     known = known_integer(index)
-    is_from_front = known >= 0 if known is not None else isinstance(builder, FoldingBuilder)
+    is_from_front = known >= 0 if known is not None else _COUNTS_FROM_FRONT and isinstance(builder, KernelBuilder)
     if is_from_front or not type_.signed:
         return index
     return builder.select(builder.icmp_signed("<", index, word_constant(0)), builder.add(index, length), index)
@@ -98,7 +101,7 @@ def _write(context, builder, sig, args):
 
 def _reshape(context, builder, sig, args):
     """`a.reshape(shape)` of an array without gaps, of as many elements; whether it is, is asked as for an index."""
-    if context.enable_boundscheck or not isinstance(builder, FoldingBuilder):
+    if context.enable_boundscheck or not isinstance(builder, KernelBuilder):
         return NotImplemented
     array, shape = args
     model = context.get_value_type(sig.return_type)

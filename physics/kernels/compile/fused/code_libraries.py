@@ -12,6 +12,8 @@ from llvmlite import binding as llvm
 from numba.core import cgutils
 from numba.core.codegen import CodeLibrary, JITCodeLibrary
 
+from physics.kernels.compile.fused.ablation import is_on
+
 
 class KernelOrigin(NamedTuple):
     """Origin of shared machine code: a kernel, and the types of its arguments.
@@ -62,15 +64,22 @@ class WholeLibrary(JITCodeLibrary):
 
     def finalize(self):
         below = _callers_first(self)
-        self.called = tuple(each.origin for each in below if isinstance(each, SharedLibrary))
+        self.called = tuple(dict.fromkeys(origin for each in below for origin in _standing(each)))
         self._linking_libraries = [each for each in below if not isinstance(each, SharedLibrary)]
         super().finalize()
 
     def _optimize_final_module(self):
-        for function in self._final_module.functions:
+        for function in self._final_module.functions if is_on("internal_parts") else ():
             if function.linkage.name == "linkonce_odr" and not function.is_declaration:  # a part
                 function.linkage = "internal"
         super()._optimize_final_module()
+
+
+class OptimisedPart(WholeLibrary):
+    """Machine code of one part, with all below it, as Numba makes it: what calls it optimises it once more."""
+
+    def _optimize_final_module(self):
+        JITCodeLibrary._optimize_final_module(self)
 
 
 class SharedLibrary(WholeLibrary):
@@ -94,6 +103,13 @@ class SharedLibrary(WholeLibrary):
         self.enable_object_caching()
         self._set_compiled_object(machine_code)
         self._finalize_final_module()
+
+
+def _standing(library: CodeLibrary) -> tuple[KernelOrigin, ...]:
+    """Shared kernels that a library adds to those a caller needs."""
+    if isinstance(library, SharedLibrary):
+        return (library.origin,)
+    return library.called if isinstance(library, OptimisedPart) else ()
 
 
 def _callers_first(whole: WholeLibrary) -> list[CodeLibrary]:

@@ -26,22 +26,28 @@ types is part of each name.
 from __future__ import annotations
 
 import hashlib
-from functools import cache
 
 from numba.core import event, types
 from numba.core.codegen import JITCodeLibrary
-from numba.core.compiler import CompilerBase, DefaultPassBuilder, Flags
+from numba.core.compiler import CompilerBase, Flags
 from numba.core.compiler_lock import global_compiler_lock
 from numba.core.compiler_machinery import LoweringPass, PassManager, register_pass
 from numba.core.registry import CPUDispatcher
 from numba.core.sigutils import normalize_signature
-from numba.core.typed_passes import NativeLowering, NoPythonBackend
+from numba.core.typed_passes import NativeLowering
 
-from physics.kernels.compile.fused.code_libraries import KernelOrigin, PartLibrary, SharedLibrary, WholeLibrary
+from physics.kernels.compile.fused.ablation import is_on
+from physics.kernels.compile.fused.code_libraries import (
+    KernelOrigin,
+    OptimisedPart,
+    PartLibrary,
+    SharedLibrary,
+    WholeLibrary,
+)
 from physics.kernels.compile.fused.disk_cache import SharedCache, WholeCache, register_library
 from physics.kernels.compile.fused.lowering import PartLowering, UserLowering, WholeLowering
 from physics.kernels.compile.fused.memoised_contexts import MemoisedTarget, memoised
-from physics.kernels.compile.fused.passes import KernelPasses
+from physics.kernels.compile.fused.passes import kernel_passes, numbas_passes
 
 
 class _Flags(Flags):
@@ -53,16 +59,13 @@ class _Flags(Flags):
 
     types = ""
 
-    def values(self):
-        return self._values
+    if is_on("comparable_flags"):
+
+        def values(self):
+            return self._values
 
     def get_mangle_string(self):
         return super().get_mangle_string() + self.types
-
-
-@cache
-def _passes(*at_last: type) -> KernelPasses:
-    return KernelPasses(*at_last)
 
 
 class _WholeCompiler(CompilerBase):
@@ -80,7 +83,7 @@ class _WholeCompiler(CompilerBase):
 
     def passes(self) -> PassManager:
         """To be run one after another."""
-        return _passes(WholeLowering, NoPythonBackend)
+        return kernel_passes(self.state, WholeLowering)
 
     def define_pipelines(self):
         state = self.state
@@ -109,16 +112,18 @@ class _KeepAsPart(LoweringPass):
 class _PartCompiler(_WholeCompiler):
     """Up to the IR."""
 
-    library_class = PartLibrary
+    library_class = PartLibrary if is_on("code_libraries") else OptimisedPart
     is_entered = False
 
     def __init__(self, *arguments):
         super().__init__(*arguments)
         self.state.flags.no_cpython_wrapper = True
         self.state.flags.no_compile = True
+        if not is_on("inlined_kernels"):
+            self.state.flags.forceinline = False
 
     def passes(self):
-        return _passes(PartLowering, _KeepAsPart, NoPythonBackend)
+        return kernel_passes(self.state, PartLowering, _KeepAsPart)
 
 
 class _SharedCompiler(_PartCompiler):
@@ -138,12 +143,7 @@ class _AnyPartCompiler(_PartCompiler):
     """For a function of which nothing is known: all that Numba's own pipeline does."""
 
     def passes(self):
-        pipeline = DefaultPassBuilder.define_nopython_pipeline(self.state)
-        own = {NativeLowering: UserLowering}
-        pipeline.passes = [(own.get(each, each), about) for each, about in pipeline.passes]
-        pipeline.add_pass_after(_KeepAsPart, UserLowering)
-        pipeline.finalize()
-        return pipeline
+        return numbas_passes(self.state, {NativeLowering: UserLowering}, _KeepAsPart)
 
 
 class _Part(CPUDispatcher):
@@ -154,6 +154,8 @@ class _Part(CPUDispatcher):
 
         They tell each other of every call of LLVM, as many of them as calls are nested.
         """
+        if not is_on("untimed_parts"):
+            return super().compile(sig)
         args, return_type = normalize_signature(sig)
         if args not in self.overloads:
             about = {"dispatcher": self, "args": args, "return_type": return_type}
@@ -184,7 +186,7 @@ class _Shared(_Part):
 
 
 PART_KIND = _Part, _PartCompiler
-SHARED_KIND = _Shared, _SharedCompiler
+SHARED_KIND = (_Shared, _SharedCompiler) if is_on("shared_kernels") else PART_KIND
 FOREIGN_KIND = CPUDispatcher, _AnyPartCompiler  # may be more than a kernel is, and is only called from kernels
 
 

@@ -9,6 +9,8 @@ from __future__ import annotations
 from llvmlite import ir
 from numba.core import cgutils
 
+from physics.kernels.compile.fused.ablation import is_on
+
 WORD = ir.IntType(64)
 NO_SIGNED_WRAP = ("nsw",)  # no index and no number of a range is beyond what a word holds
 
@@ -105,8 +107,32 @@ def _split_constant(value):
     return StructByMembers(value.type, known or [None] * len(value.type))
 
 
-class FoldingBuilder(ir.IRBuilder):
-    """LLVM's builder, with structures known by their members, constants folded, and `fused_multiply_add`."""
+class KernelBuilder(ir.IRBuilder):
+    """LLVM's builder, with `fused_multiply_add`."""
+
+    if is_on("fused_products"):
+
+        def fadd(self, lhs, rhs, name="", flags=()):
+            """Sum of numbers, or of lanes. A product in it is `fused_multiply_add`, of two the second."""
+            left, right = _factors(lhs), _factors(rhs)
+            if right:
+                return fused_multiply_add(self, *right, lhs)
+            return fused_multiply_add(self, *left, rhs) if left else super().fadd(lhs, rhs, name, flags)
+
+        def fsub(self, lhs, rhs, name="", flags=()):
+            """Difference of numbers, or of lanes: one product is fused; of two none, so that equal ones leave 0."""
+            left, right = _factors(lhs), _factors(rhs)
+            if bool(left) == bool(right):
+                return super().fsub(lhs, rhs, name, flags)
+            return (
+                fused_multiply_add(self, self.fneg(right[0]), right[1], lhs)
+                if right
+                else fused_multiply_add(self, *left, self.fneg(rhs))
+            )
+
+
+class FoldingBuilder(KernelBuilder):
+    """The same with structures known by their members, and constants folded."""
 
     def extract_value(self, agg, idx, name=""):
         """A member of a structure: the one that was put in, if that is known."""
@@ -139,24 +165,6 @@ class FoldingBuilder(ir.IRBuilder):
         """Leave the function with a value."""
         return super().ret(_as_value(self, value))
 
-    def fadd(self, lhs, rhs, name="", flags=()):
-        """Sum of numbers, or of lanes. A product in it is `fused_multiply_add`, of two the second."""
-        left, right = _factors(lhs), _factors(rhs)
-        if right:
-            return fused_multiply_add(self, *right, lhs)
-        return fused_multiply_add(self, *left, rhs) if left else super().fadd(lhs, rhs, name, flags)
-
-    def fsub(self, lhs, rhs, name="", flags=()):
-        """Difference of numbers, or of lanes: a single product is fused; of two none, so that equal ones leave 0."""
-        left, right = _factors(lhs), _factors(rhs)
-        if bool(left) == bool(right):
-            return super().fsub(lhs, rhs, name, flags)
-        return (
-            fused_multiply_add(self, self.fneg(right[0]), right[1], lhs)
-            if right
-            else fused_multiply_add(self, *left, self.fneg(rhs))
-        )
-
     def mul(self, lhs, rhs, name="", flags=()):
         """Product of integers."""
         if _is(lhs, 1):
@@ -176,6 +184,11 @@ class FoldingBuilder(ir.IRBuilder):
         if _is_number(lhs) and _is_number(rhs):
             return ir.Constant(lhs.type, lhs.constant + rhs.constant)
         return super().add(lhs, rhs, name, flags)
+
+
+def kernel_builder(block: ir.Block) -> KernelBuilder:
+    """Builder of a kernel's instructions, at the end of a block."""
+    return FoldingBuilder(block) if is_on("folding_builder") else KernelBuilder(block)
 
 
 def _factors(value) -> tuple:

@@ -17,25 +17,14 @@ from numba.core.compiler_machinery import register_pass
 from numba.core.lowering import Lower
 from numba.core.typed_passes import NativeLowering
 
+from physics.kernels.compile.fused.ablation import is_on
 from physics.kernels.compile.fused.calling_convention import MayRaise, ValueDescriptor
-from physics.kernels.compile.fused.folding_builder import FoldingBuilder, stack_slot
+from physics.kernels.compile.fused.folding_builder import kernel_builder, stack_slot
 from physics.kernels.compile.fused.prepared_entry import write_prepared_entry
 
 
-class _KernelLower(Lower):
-    """Numba's lowering of one function: a variable is a value, if it is assigned once."""
-
-    def setup_function(self, fndesc):
-        """Declare the function, with our builder for its body."""
-        super().setup_function(fndesc)
-        self.builder = FoldingBuilder(self.entry_block)
-        self.call_helper = self.call_conv.init_call_helper(self.builder)
-        if getattr(self.func_ir.func_id.func, "is_cold", False):  # `decorators.cold_kernel`
-            self.function.attributes.add("noinline")
-
-    def create_cfunc_wrapper(self):
-        """The entry for machine code, in place of Numba's for C; see `prepared_entry`."""
-        write_prepared_entry(self.context, self.library, self.fndesc)
+class _Values(Lower):
+    """Numba's lowering of one function: a variable is a value, if it is assigned once, and none is released."""
 
     def _find_singly_assigned_variable(self):
         times = Counter(
@@ -43,29 +32,6 @@ class _KernelLower(Lower):
         )
         self._singly_assigned_vars = {name for name, count in times.items() if count == 1}
         self._blk_local_varmap = {}
-
-    def lower_block(self, block):
-        """Lower the statements of a block; what cannot be lowered says so in its own words."""
-        self._cur_ir_block = block
-        for each in block.body:
-            self.loc = each.loc
-            if isinstance(each, ir.Assign):
-                name = each.target.name
-                self.storevar(self.lower_assign(self.typeof(name), each), name)
-            else:
-                self.lower_inst(each)
-
-    def lower_binop(self, resty, expr, op):
-        """An operation on two values; those with a number that is written down are no others (`scalars` sees one)."""
-        context, builder = self.context, self.builder
-        function = context.typing_context.resolve_value_type(op)
-        sig = function.get_call_type(context.typing_context, self.fndesc.calltypes[expr].args, {})
-        operands = [
-            context.cast(builder, self.loadvar(each.name), self.typeof(each.name), type_)
-            for each, type_ in zip((expr.lhs, expr.rhs), sig.args, strict=True)
-        ]
-        value = context.get_function(function, sig)(builder, operands)
-        return context.cast(builder, value, sig.return_type, resty)
 
     def loadvar(self, name):
         """Value of a variable."""
@@ -85,6 +51,50 @@ class _KernelLower(Lower):
             self._blk_local_varmap[name] = value
         else:
             self.builder.store(value, self.getvar(name))
+
+    def delvar(self, name):
+        """Leave a variable as it is at the end of its life, which Numba's passes tell and those of kernels do not."""
+
+
+class _KernelLower(_Values if is_on("lowering") else Lower):
+    """Lowering of a kernel: with a builder of ours, and an entry for machine code."""
+
+    def setup_function(self, fndesc):
+        """Declare the function, with our builder for its body."""
+        super().setup_function(fndesc)
+        self.builder = kernel_builder(self.entry_block)
+        self.call_helper = self.call_conv.init_call_helper(self.builder)
+        if is_on("cold_kernels") and getattr(self.func_ir.func_id.func, "is_cold", False):  # `decorators.cold_kernel`
+            self.function.attributes.add("noinline")
+
+    def create_cfunc_wrapper(self):
+        """The entry for machine code, in place of Numba's for C; see `prepared_entry`."""
+        write_prepared_entry(self.context, self.library, self.fndesc)
+
+    def lower_block(self, block):
+        """Lower the statements of a block; what cannot be lowered says so in its own words."""
+        self._cur_ir_block = block
+        for each in block.body:
+            self.loc = each.loc
+            if isinstance(each, ir.Assign):
+                name = each.target.name
+                self.storevar(self.lower_assign(self.typeof(name), each), name)
+            else:
+                self.lower_inst(each)
+
+    if is_on("scalars"):
+
+        def lower_binop(self, resty, expr, op):
+            """An operation on two values; those with a number written down are no others (`scalars` sees one)."""
+            context, builder = self.context, self.builder
+            function = context.typing_context.resolve_value_type(op)
+            sig = function.get_call_type(context.typing_context, self.fndesc.calltypes[expr].args, {})
+            operands = [
+                context.cast(builder, self.loadvar(each.name), self.typeof(each.name), type_)
+                for each, type_ in zip((expr.lhs, expr.rhs), sig.args, strict=True)
+            ]
+            value = context.get_function(function, sig)(builder, operands)
+            return context.cast(builder, value, sig.return_type, resty)
 
 
 class _ValueLower(_KernelLower):
@@ -130,7 +140,7 @@ class PartLowering(WholeLowering):
 
     def run_pass(self, state):
         """Lower a kernel; one that may raise an exception gives a status, as all do whose indices are checked."""
-        if not state.targetctx.enable_boundscheck:
+        if is_on("calling_convention") and not state.targetctx.enable_boundscheck:
             try:
                 return super().run_pass(state)
             except MayRaise:

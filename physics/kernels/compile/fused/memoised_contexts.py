@@ -22,12 +22,57 @@ from typing import ClassVar
 from numba.core import types, typing
 from numba.core.cpu import CPUContext
 from numba.core.imputils import user_function
+from numba.extending import models, register_model
 
 from physics.kernels.compile.fused import calling_convention
+from physics.kernels.compile.fused.ablation import is_on
 from physics.kernels.compile.fused.argument_passing import Arguments
 from physics.kernels.compile.fused.array_elements import array_in_record
-from physics.kernels.compile.fused.folding_builder import FoldingBuilder
+from physics.kernels.compile.fused.folding_builder import KernelBuilder
 from physics.kernels.compile.fused.operation_table import lowering_of, signature_of
+
+
+class _Forgotten(dict):
+    """Table that keeps nothing."""
+
+    def __setitem__(self, key, value):
+        """Keep nothing."""
+
+
+def _make_table() -> dict:
+    return {} if is_on("memoised_contexts") else _Forgotten()
+
+
+class MemoisedFunction(types.Function):
+    """Built-in function of Numba that remembers its signatures: typing asks it, and lowering once more.
+
+    Parameters
+    ----------
+    templates : tuple
+        Of the function that it stands for in contexts of ours.
+    """
+
+    def __init__(self, templates: tuple):
+        super().__init__(templates)
+        self._signatures = _make_table()
+
+    def augment(self, other):
+        """Numba's function with more templates: it is kept for all contexts."""
+        return types.Function(self.templates).augment(other)
+
+    def get_call_type(self, context, args, kws):
+        """Signature for arguments of these types."""
+        if kws:
+            return super().get_call_type(context, args, kws)
+        key = tuple(args)
+        found = self._signatures.get(key)
+        if found is None:
+            found = signature_of(self, context, args) or super().get_call_type(context, args, kws)
+            self._signatures[key] = found
+        return found
+
+
+register_model(MemoisedFunction)(models.OpaqueModel)
 
 
 class MemoisedTyping(typing.Context):
@@ -39,11 +84,23 @@ class MemoisedTyping(typing.Context):
         Whose knowledge is shared.
     """
 
-    signatures: ClassVar[dict[tuple, typing.Signature]] = {}  # by function and types of its arguments
-    members: ClassVar[dict[tuple, types.Type]] = {}  # by type and name
+    functions: ClassVar[dict[types.Function, MemoisedFunction]] = {}  # by the one of Numba
+    members: ClassVar[dict[tuple, types.Type]] = _make_table()  # by type and name
 
     def __init__(self, context):
         self.__dict__ = context.__dict__
+
+    def _lookup_global(self, gv):
+        return self._with_memory(super()._lookup_global(gv))
+
+    def _with_memory(self, type_):
+        """`MemoisedFunction` for a built-in function of Numba, any other type as it is."""
+        if type(type_) is not types.Function:
+            return type_
+        ours = self.functions.get(type_)
+        if ours is None:
+            ours = self.functions[type_] = MemoisedFunction(type_.templates)
+        return ours
 
     def resolve_getattr(self, typ, attr):
         """Type of a member; None if there is none."""
@@ -51,7 +108,7 @@ class MemoisedTyping(typing.Context):
             return super().resolve_getattr(typ, attr)
         found = self.members.get((typ, attr))
         if found is None:
-            found = super().resolve_getattr(typ, attr)
+            found = self._with_memory(super().resolve_getattr(typ, attr))
             if found is not None:
                 self.members[typ, attr] = found
         return found
@@ -63,22 +120,6 @@ def memoised(context: typing.Context) -> MemoisedTyping:
     return MemoisedTyping(context)
 
 
-def _get_call_type(function, context, args, kws, asked=types.Function.get_call_type):
-    """Signature of a built-in function for arguments of these types: `types.Function.get_call_type`."""
-    if kws or not isinstance(context, MemoisedTyping):
-        return asked(function, context, args, kws)
-    key = (function, tuple(args))
-    found = context.signatures.get(key)
-    if found is None:
-        found = signature_of(function, context, args) or asked(function, context, args, kws)
-        context.signatures[key] = found
-    return found
-
-
-# Where Numba lowers an operation it asks the function itself, past every context that it could be given.
-types.Function.get_call_type = _get_call_type
-
-
 class MemoisedTarget(CPUContext):
     """Target context that lowers operations as Numba does, or as kernels do where that takes fewer instructions.
 
@@ -88,10 +129,10 @@ class MemoisedTarget(CPUContext):
         Whose knowledge is shared.
     """
 
-    lowerings: ClassVar[dict[tuple, Callable]] = {}  # by operation, signature, and what is an error
-    absent: ClassVar[set[tuple]] = set()  # operations without a lowering of their own, and their signatures
-    asked: ClassVar[set] = set()  # operations for which Numba has looked through its registries
-    sizes: ClassVar[dict] = {}  # of LLVM types [bytes]
+    lowerings: ClassVar[dict[tuple, Callable]] = _make_table()  # by operation, signature, and what is an error
+    absent: ClassVar[dict[tuple, bool]] = _make_table()  # operations without a lowering, and their signatures
+    asked: ClassVar[dict] = _make_table()  # operations for which Numba has looked through its registries
+    sizes: ClassVar[dict] = _make_table()  # of LLVM types [bytes]
 
     def __init__(self, context):
         self.__dict__ = context.__dict__
@@ -122,20 +163,23 @@ class MemoisedTarget(CPUContext):
         lowering = self.lowerings.get(key)
         if lowering is None:
             lower = lowering_of(fn, sig)
-            lowering = self.numba_function(fn, sig) if lower is None else _bind_lowering(lower, self, fn, sig)
+            if lower is None:
+                lowering = self.numba_function(fn, sig, _firstcall)
+            else:
+                lowering = _bind_lowering(lower, self, fn, sig)
             self.lowerings[key] = lowering
         return lowering
 
-    def numba_function(self, fn, sig):
+    def numba_function(self, fn, sig, is_first=True):
         """Return Numba's way to lower `fn`; its registries are searched once for each `fn`, not for each signature."""
         if (fn, sig) in self.absent:
             raise NotImplementedError(f"No definition for lowering {fn}{sig}")
-        is_new = fn not in self.asked
-        self.asked.add(fn)
+        is_new = is_first and fn not in self.asked
+        self.asked[fn] = True
         try:
             return super().get_function(fn, sig, is_new)
         except NotImplementedError:
-            self.absent.add((fn, sig))
+            self.absent[fn, sig] = True
             raise
 
     @property
@@ -153,11 +197,13 @@ class MemoisedTarget(CPUContext):
         """The words of a call's arguments."""
         return Arguments(self.data_model_manager, fe_args)
 
-    def get_getattr(self, typ, attr):
-        """Return the function that reads a member of a value."""
-        if isinstance(typ, types.Record) and isinstance(typ.typeof(attr), types.NestedArray):
-            return array_in_record
-        return super().get_getattr(typ, attr)
+    if is_on("array_elements"):
+
+        def get_getattr(self, typ, attr):
+            """Return the function that reads a member of a value."""
+            if isinstance(typ, types.Record) and isinstance(typ.typeof(attr), types.NestedArray):
+                return array_in_record
+            return super().get_getattr(typ, attr)
 
     def pair_first(self, builder, val, ty):
         """Lower the value that an iterator gave."""
@@ -171,7 +217,7 @@ class MemoisedTarget(CPUContext):
         """Have a kernel known by its entry point, and how it is called."""
 
         def call(context, builder, sig, args):
-            is_kernel = isinstance(builder, FoldingBuilder) and not isinstance(fndesc.restype, types.Optional)
+            is_kernel = isinstance(builder, KernelBuilder) and not isinstance(fndesc.restype, types.Optional)
             if is_kernel or calling_convention.returns_value(fndesc):
                 return calling_convention.call_value_function(context, builder, fndesc, args)
             return numbas_call(context, builder, sig, args)

@@ -11,6 +11,16 @@ from collections.abc import Callable
 from numba.core import types, typing
 
 from physics.kernels.compile.fused import array_elements, ranges, scalars, simd_types, tuples
+from physics.kernels.compile.fused.ablation import is_on
+
+_LOWERING = (
+    *((array_elements,) if is_on("array_elements") else ()),
+    *((ranges,) if is_on("ranges") else ()),
+    *((tuples,) if is_on("tuples") else ()),
+    *((scalars,) if is_on("scalars") else ()),
+    simd_types,
+)
+_TYPING = tuple(module for module in _LOWERING if hasattr(module, "signature"))
 
 
 def signature_of(function: types.Function, context: typing.Context, args: tuple) -> typing.Signature | None:
@@ -23,7 +33,7 @@ def signature_of(function: types.Function, context: typing.Context, args: tuple)
     args : tuple of types.Type
     """
     key = function.typing_key
-    for module in (array_elements, scalars, simd_types):
+    for module in _TYPING:
         found = module.signature(key, context, args)
         if found is not None:
             return found
@@ -45,7 +55,7 @@ def lowering_of(function, sig: typing.Signature) -> Callable | None:
         Numba's way is taken after all.
     """
     key = function if isinstance(function, str) else getattr(function, "typing_key", None)
-    for module in (array_elements, ranges, tuples, scalars, simd_types):
+    for module in _LOWERING:
         found = module.lowering(key, sig)
         if found is not None:
             return found

@@ -9,16 +9,25 @@ fails to compile. What users write goes through Numba's own pipeline.
 from __future__ import annotations
 
 import operator
+from functools import cache
 
 from numba.core import ir, types
+from numba.core.compiler import DefaultPassBuilder
 from numba.core.compiler_machinery import FunctionPass, PassManager, _pass_registry, register_pass
 from numba.core.interpreter import Interpreter, peep_hole_list_to_tuple
 from numba.core.ir_utils import build_definitions, get_definition, guard
 from numba.core.rewrites import rewrite_registry
 from numba.core.ssa import reconstruct_ssa
-from numba.core.typed_passes import AnnotateTypes, PreLowerStripPhis
+from numba.core.typed_passes import (
+    AnnotateTypes,
+    NativeLowering,
+    NoPythonBackend,
+    NopythonTypeInference,
+    PreLowerStripPhis,
+)
 from numba.core.untyped_passes import DeadBranchPrune, FixupArgs, RewriteSemanticConstants
 
+from physics.kernels.compile.fused.ablation import is_on
 from physics.kernels.compile.fused.type_inference import infer_types
 
 
@@ -143,7 +152,7 @@ _TYPING_PASSES = (
     _FromByteCode,
     FixupArgs,
     RewriteSemanticConstants,
-    _Switches,
+    *((_Switches,) if is_on("switches") else ()),
     DeadBranchPrune,
     _Rewrites,
     _SingleAssignment,
@@ -175,3 +184,47 @@ class KernelPasses(PassManager):
             one = _pass_registry.get(each).pass_inst
             one.analysis = self._analysis
             one.run_pass(state)
+
+
+def numbas_passes(state, own: dict[type, type], *after_lowering: type) -> PassManager:
+    """Numba's own pipeline, with passes of ours in place of some of its.
+
+    Parameters
+    ----------
+    state : numba.core.compiler.StateDict
+    own : dict
+        Passes of ours by those of Numba; one for `NativeLowering` is among them.
+    *after_lowering : type
+        Passes that follow the lowering.
+    """
+    pipeline = DefaultPassBuilder.define_nopython_pipeline(state)
+    pipeline.passes = [(own.get(each, each), about) for each, about in pipeline.passes]
+    for each in after_lowering:
+        pipeline.add_pass_after(each, own[NativeLowering])
+    pipeline.finalize()
+    return pipeline
+
+
+@cache
+def _own_passes(*at_last: type) -> KernelPasses:
+    return KernelPasses(*at_last)
+
+
+def kernel_passes(state, lowering: type, *after_lowering: type) -> PassManager:
+    """Passes of a kernel.
+
+    Parameters
+    ----------
+    state : numba.core.compiler.StateDict
+    lowering : type
+        The lowering to LLVM.
+    *after_lowering : type
+        Passes that follow it.
+    """
+    if is_on("passes"):
+        return _own_passes(lowering, *after_lowering, NoPythonBackend)
+    pipeline = numbas_passes(state, {NativeLowering: lowering, NopythonTypeInference: _Types}, *after_lowering)
+    if is_on("switches"):
+        pipeline.add_pass_after(_Switches, RewriteSemanticConstants)
+        pipeline.finalize()
+    return pipeline

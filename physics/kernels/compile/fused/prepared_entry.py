@@ -17,6 +17,7 @@ from physics.kernels.compile.fused.folding_builder import (
     WORD,
     FoldingBuilder,
     StructInMemory,
+    kernel_builder,
     make_struct,
     word_constant,
 )
@@ -36,7 +37,8 @@ def _read(context, builder, words: ir.Value, type_: types.Type, place: int) -> t
             members.append(value)
         return make_struct(builder, form, members), place
     address = builder.bitcast(builder.gep(words, [word_constant(place)]), form.as_pointer())
-    value = StructInMemory(address) if isinstance(form, ir.Aggregate) else builder.load(address)
+    is_read_later = isinstance(form, ir.Aggregate) and isinstance(builder, FoldingBuilder)
+    value = StructInMemory(address) if is_read_later else builder.load(address)
     return value, place - (-context.get_abi_sizeof(form) // WORD_SIZE)
 
 
@@ -47,7 +49,7 @@ def write_prepared_entry(context, library, about) -> None:
     module = context.create_module("ready")
     kernel = context.declare_function(module, about)
     entry = ir.Function(module, ENTRY_TYPE, about.llvm_cfunc_wrapper_name)
-    builder = FoldingBuilder(entry.append_basic_block())
+    builder = kernel_builder(entry.append_basic_block())
     values, place = [], 0
     for type_ in about.argtypes:
         value, place = _read(context, builder, entry.args[0], type_, place)

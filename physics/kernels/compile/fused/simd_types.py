@@ -7,6 +7,7 @@ from collections.abc import Callable
 from functools import partial
 
 from llvmlite import ir
+from llvmlite.ir.instructions import InsertElement
 from numba.core import cgutils, types, typing
 from numba.core.typing.templates import AbstractTemplate, infer_global
 from numba.extending import models as data_models
@@ -14,6 +15,7 @@ from numba.extending import register_model
 
 from physics.kernels.compile import simd
 from physics.kernels.compile.fused import array_elements
+from physics.kernels.compile.fused.ablation import is_on
 from physics.kernels.compile.fused.folding_builder import WORD, word_constant
 
 _DOUBLE, _INDEX = ir.DoubleType(), ir.IntType(32)
@@ -155,6 +157,12 @@ def _spread(builder, value):
     )
 
 
+def _alike(builder, values) -> list:
+    """All values as lanes if one of them is, else as they are."""
+    has_lanes = any(isinstance(each.type, ir.VectorType) for each in values)
+    return [_spread(builder, each) for each in values] if has_lanes else list(values)
+
+
 def _make(context, builder, sig, args):
     """`Lanes(a, b, c, d)`."""
     made = ir.Constant(context.get_value_type(LANES), ir.Undefined)
@@ -164,22 +172,22 @@ def _make(context, builder, sig, args):
 
 
 def _compute(name, context, builder, sig, args):
-    return getattr(builder, name)(*(_spread(builder, each) for each in args))
+    return getattr(builder, name)(*_alike(builder, args))
 
 
 def _compare(order, context, builder, sig, args):
-    return builder.fcmp_ordered(order, *(_spread(builder, each) for each in args))
+    return builder.fcmp_ordered(order, *_alike(builder, args))
 
 
 def _choose(context, builder, sig, args):
     if sig.args[0] is types.boolean:
         return builder.select(context.cast(builder, args[0], types.boolean, types.boolean), *args[1:])
-    return builder.select(args[0], _spread(builder, args[1]), _spread(builder, args[2]))
+    return builder.select(*_alike(builder, args))
 
 
 def _one_of_two(order, context, builder, sig, args):
     """`larger` and `smaller`."""
-    x, y = (_spread(builder, each) for each in args) if LANES in sig.args else args
+    x, y = _alike(builder, args)
     return builder.select(builder.fcmp_ordered(order, y, x), y, x)
 
 
@@ -188,7 +196,7 @@ def _negate(context, builder, sig, args):
 
 
 def _not(context, builder, sig, args):
-    return builder.xor(args[0], ir.Constant(args[0].type, [1] * simd.LANE_COUNT))
+    return builder.not_(args[0])
 
 
 def _call(name, context, builder, sig, args):
@@ -277,25 +285,49 @@ def _read(context, builder, sig, args):
     return builder.extract_element(args[0], args[1])
 
 
-_LOWERINGS = {
-    simd.Lanes: _make,
+def _lane(builder, value, k: int):
+    """One lane: the number that it was made of, if that is known."""
+    made = value
+    while isinstance(made, InsertElement):
+        made, number, place = made.operands
+        if place.constant == k:
+            return number
+    return builder.extract_element(value, _INDEX(k))
+
+
+def _each_lane(lower: Callable, context, builder, sig, args):
+    """An operation that is done to each lane, written for one after another."""
+    if sig.return_type not in (LANES, MASK):
+        return lower(context, builder, sig, args)
+    made = ir.Constant(context.get_value_type(sig.return_type), ir.Undefined)
+    for k in range(simd.LANE_COUNT):
+        numbers = [_lane(builder, each, k) if isinstance(each.type, ir.VectorType) else each for each in args]
+        made = builder.insert_element(made, lower(context, builder, sig, numbers), _INDEX(k))
+    return made
+
+
+_OF_EACH_LANE = {
     simd.select_lanes: _choose,
-    simd.first_true_lane: _first,
     simd.lane_sqrt: partial(_call, "sqrt"),
-    simd.load_lanes: _read_row,
-    simd.store_lanes: _write_row,
-    simd.lane_sums: _totals,
     simd.larger: partial(_one_of_two, ">"),
     simd.smaller: partial(_one_of_two, "<"),
-    simd.lane_sum: _total,
-    simd.max_of_lanes: partial(_extreme, ">"),
-    simd.min_of_lanes: partial(_extreme, "<"),
     abs: partial(_call, "fabs"),
     operator.neg: _negate,
     operator.invert: _not,
-    operator.getitem: _read,
     **{key: partial(_compute, name) for key, name in (_SUMS | _BOTH).items()},
     **{key: partial(_compare, order) for key, order in _ORDERS.items()},
+}
+_LOWERINGS = {
+    simd.Lanes: _make,
+    simd.first_true_lane: _first,
+    simd.load_lanes: _read_row,
+    simd.store_lanes: _write_row,
+    simd.lane_sums: _totals,
+    simd.lane_sum: _total,
+    simd.max_of_lanes: partial(_extreme, ">"),
+    simd.min_of_lanes: partial(_extreme, "<"),
+    operator.getitem: _read,
+    **{key: lower if is_on("simd_types") else partial(_each_lane, lower) for key, lower in _OF_EACH_LANE.items()},
 }
 
 

@@ -8,7 +8,7 @@ from collections.abc import Callable
 from llvmlite import ir
 from numba.core import types, typing
 
-from physics.kernels.compile.fused.folding_builder import FoldingBuilder, make_struct, member_type
+from physics.kernels.compile.fused.folding_builder import KernelBuilder, make_struct, member_type
 
 
 def _is_numbers(type_: types.Type) -> bool:
@@ -20,7 +20,7 @@ def _is_numbers(type_: types.Type) -> bool:
 
 def _choose(context, builder, sig, args):
     """`t[k]`, counted from the front; what a k is that no member has is asked under NUMBA_BOUNDSCHECK=1 alone."""
-    if not isinstance(builder, FoldingBuilder):
+    if not isinstance(builder, KernelBuilder):
         return NotImplemented
     chosen = context.get_value_type(sig.return_type)
     offered = [_words(builder, builder.extract_value(args[0], k)) for k in range(len(sig.args[0]))]

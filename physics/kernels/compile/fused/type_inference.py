@@ -6,6 +6,8 @@ from numba.core import ir
 from numba.core.errors import NumbaWarning, TypingError, WarningsFixer
 from numba.core.typeinfer import ConstraintNetwork, TypeInferer
 
+from physics.kernels.compile.fused.ablation import is_on
+
 
 def infer_types(state) -> None:
     """Write types of variables, of the result and of calls into the state of a compilation.
@@ -22,7 +24,8 @@ def infer_types(state) -> None:
     code, context = state.func_ir, state.typingctx
     warnings = WarningsFixer(NumbaWarning)
     inference = TypeInferer(context, code, warnings)
-    inference.constraints = _Network()
+    if is_on("type_inference"):
+        inference.constraints = _Network()
     with context.callstack.register(state.targetctx.target, inference, state.func_id, state.args), warnings:
         for k, (name, type_) in enumerate(zip(code.arg_names, state.args, strict=True)):
             inference.seed_argument(name, k, type_)
