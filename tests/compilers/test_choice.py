@@ -67,7 +67,7 @@ def test_python_needs_no_numba_and_numba_no_private_part():
 
 
 def names_of_numba(path: Path) -> list[str]:
-    """What a source imports of Numba and LLVM."""
+    """Names that a source imports of Numba and LLVM."""
     found = []
     for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
         if isinstance(node, ast.Import):

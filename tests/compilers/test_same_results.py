@@ -19,8 +19,8 @@ JOBS = [
     ("drop", "fast", 80), ("drop", "balanced", 80), ("drop", "precise", 80), ("tower", "balanced", 20),
     ("frictionless", "balanced", 80), ("superball", "balanced", 70), ("compliant", "balanced", 80),
     ("grain", "balanced", 40), ("sphere-rolls", "balanced", 40), ("ellipsoid", "balanced", 70),
-    ("hull", "balanced", 70), ("kick", "balanced", 40), ("floats", "balanced", 40), ("spring", "balanced", 40), ("push", "balanced", 40),
-    ("actuated", "balanced", 40), ("pendulum", "balanced", 40), ("mixed", "balanced", 60),
+    ("hull", "balanced", 70), ("kick", "balanced", 40), ("floats", "balanced", 40), ("spring", "balanced", 40),
+    ("push", "balanced", 40), ("actuated", "balanced", 40), ("pendulum", "balanced", 40), ("mixed", "balanced", 60),
     ("sleeping-tower", "balanced", 30),
 ]  # fmt: skip
 

@@ -14,6 +14,7 @@ from pathlib import Path
 
 import pytest
 
+from physics.kernels.compile import cache_folder
 from physics.kernels.compile.fused import cache_files
 
 ROOT = str(Path(__file__).parents[2])
@@ -140,7 +141,7 @@ def test_a_file_that_others_may_write_is_not_unpickled(tmp_path):
 
     path = tmp_path / "file.nbc"
     cache_files.write_cache_file(path, b"purpose", pickle.dumps([1]))
-    assert path.stat().st_mode & 0o777 & cache_files.WRITABLE_BY_OTHERS == 0
+    assert path.stat().st_mode & 0o777 & cache_folder.WRITABLE_BY_OTHERS == 0
     assert cache_files.read_cache_file(path, b"purpose") == [1]
     cache_files.write_cache_file(path, b"purpose", pickle.dumps(Evil()))
     for mode in (0o664, 0o646):

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import hashlib
 import os
+import stat
 import tempfile
 from functools import cache
 from pathlib import Path
@@ -20,6 +21,21 @@ from physics.kernels.compile.notices import warn
 def is_checked() -> bool:
     """Answer whether indices are checked: `NUMBA_BOUNDSCHECK=1`."""
     return os.environ.get("NUMBA_BOUNDSCHECK", "0") not in ("", "0")
+
+
+WRITABLE_BY_OTHERS = stat.S_IWGRP | stat.S_IWOTH
+
+
+def is_owned_by_user(status: os.stat_result) -> bool:
+    """True if only this user or root owns and can write a file or folder; always so without such users.
+
+    Parameters
+    ----------
+    status : os.stat_result
+    """
+    if not hasattr(os, "getuid"):
+        return True
+    return status.st_uid in (os.getuid(), 0) and not status.st_mode & WRITABLE_BY_OTHERS
 
 
 def _cache_root() -> Path | None:

@@ -41,11 +41,15 @@ OPTIMISATIONS = {
 
 # Modules without a switch, and the reason.
 BASES = {
+    "atomics": "instructions by which threads share worlds",
+    "backend": "the interface of the decorators",
     "cache_files": "files of machine code: no optimisation, and all that is kept on disk rests on it",
     "disk_cache": "what is kept on disk and loaded: shared kernels rest on it; `benchmarks.start` shows its worth",
     "dispatcher": "has kernels compiled: all others hook in there",
     "operation_table": "asks `array_elements`, `ranges`, `scalars`, `simd_types` and `tuples`, which have switches",
+    "prepared_calls": "makes the calls that `prepared_entry` is the other end of",
     "prepared_entry": "threads take their calls from a table of prepared ones, and chained calls stand in it",
+    "user_functions": "looks through users' functions before anything moves",
 }
 
 

@@ -13,14 +13,14 @@ from __future__ import annotations
 import hashlib
 import os
 import pickle
-import stat
 import uuid
 from contextlib import suppress
 from pathlib import Path
 
+from physics.kernels.compile.cache_folder import is_owned_by_user
+
 MAGIC = b"rigid-env kernel 1\n"
 DIGEST_SIZE = 32  # [bytes]
-WRITABLE_BY_OTHERS = stat.S_IWGRP | stat.S_IWOTH
 
 
 class DamagedFileError(Exception):
@@ -29,18 +29,6 @@ class DamagedFileError(Exception):
 
 class ForeignFileError(Exception):
     """A file that somebody else wrote, or could have written."""
-
-
-def is_owned_by_user(status: os.stat_result) -> bool:
-    """True if only this user or root owns and can write a file or folder; always so without such users.
-
-    Parameters
-    ----------
-    status : os.stat_result
-    """
-    if not hasattr(os, "getuid"):
-        return True
-    return status.st_uid in (os.getuid(), 0) and not status.st_mode & WRITABLE_BY_OTHERS
 
 
 def _checksum(purpose: bytes, content: bytes) -> bytes:

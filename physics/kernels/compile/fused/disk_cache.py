@@ -17,6 +17,7 @@ from numba.core.compiler import CompileResult, compile_result
 from numba.core.environment import Environment
 from numba.core.serialize import dumps
 
+from physics.kernels.compile.cache_folder import is_owned_by_user
 from physics.kernels.compile.fused import cache_files
 from physics.kernels.compile.fused.code_libraries import SharedLibrary
 from physics.kernels.compile.notices import warn, warn_once
@@ -72,7 +73,7 @@ class _Cache:
         if not self._is_enabled or made.library.has_dynamic_globals:
             return
         path, purpose = self._place(sig, made.codegen)
-        if path.is_file() and not cache_files.is_owned_by_user(path.stat()):
+        if path.is_file() and not is_owned_by_user(path.stat()):
             return  # somebody else's, who would find it changed
         try:
             cache_files.write_cache_file(path, purpose, dumps(self.reduce(made)))

@@ -10,12 +10,14 @@ import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from functools import cache
+from pathlib import Path
 
 import numba
 from numba import types
 from numba.extending import intrinsic, is_jitted, overload
 
-from physics.kernels.compile.cache_folder import cache_dir
+from physics.kernels.compile.cache_folder import cache_dir, is_owned_by_user
+from physics.kernels.compile.notices import warn
 from physics.kernels.compile.public import simd_types  # noqa: F401 (registers operations on lanes)
 from physics.kernels.compile.user_function import Examined, probe
 
@@ -35,9 +37,26 @@ def part(function):
 cold_part = shared_part = inlined_part = runtime_part = part
 
 
+@cache
+def _own_folder() -> Path | None:
+    """Folder of machine code, if nobody else may write to it: Numba runs whatever it finds there."""
+    folder = cache_dir()
+    if folder is None:
+        return None
+    try:
+        folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+    except OSError as error:
+        warn(f"kernels cannot be kept in {folder} ({error.strerror or error}): each process compiles them")
+        return None
+    if is_owned_by_user(folder.stat()):
+        return folder
+    warn(f"{folder} is not used, since other users may write to it: each process compiles its kernels")
+    return None
+
+
 def entry(function):
     """Compile a function that Python calls: kept on disk, with the machine code of all below it."""
-    folder = cache_dir()
+    folder = _own_folder()
     if folder is None:
         return part(function)
     before, numba.config.CACHE_DIR = numba.config.CACHE_DIR, str(folder)
