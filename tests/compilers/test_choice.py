@@ -25,7 +25,8 @@ TESTED = "{}.{}.1".format(*TESTED_RELEASES[-1])
         ({VARIABLE: "numba"}, TESTED, NUMBA),
         ({VARIABLE: "python"}, "0.61.2", PYTHON),
         ({"NUMBA_DISABLE_JIT": "1"}, TESTED, PYTHON),
-        ({"NUMBA_DISABLE_JIT": "1", VARIABLE: "numba"}, TESTED, PYTHON),
+        ({"NUMBA_DISABLE_JIT": "1", VARIABLE: "python"}, TESTED, PYTHON),
+        ({VARIABLE: "python"}, "", PYTHON),
         ({"NUMBA_DISABLE_JIT": "0"}, TESTED, FUSED),
         ({VARIABLE: "numba"}, "0.99.0rc1", NUMBA),
     ],
@@ -43,6 +44,15 @@ def test_another_release_of_numba_is_named_once(installed):
     compiler, warning = choose_compiler({VARIABLE: FUSED}, installed)
     assert compiler == FUSED
     assert installed in warning
+
+
+def test_without_a_compiler_python_runs_kernels():
+    compiler, warning = choose_compiler({}, "")
+    assert compiler == PYTHON
+    assert "not installed" in warning
+    compiler, warning = choose_compiler({"NUMBA_DISABLE_JIT": "1", VARIABLE: "numba"}, TESTED)
+    assert compiler == PYTHON
+    assert "RIGID_ENV_COMPILER=numba is not followed" in warning
 
 
 def test_an_unknown_compiler_is_refused():

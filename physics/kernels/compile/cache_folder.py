@@ -39,9 +39,9 @@ def is_owned_by_user(status: os.stat_result) -> bool:
 
 
 def _cache_root() -> Path | None:
-    """`NUMBA_CACHE_DIR` if the user set one, else the user's cache folder, else a temporary one; None if none is his.
+    """`NUMBA_CACHE_DIR` if it is set, else the user's cache folder, else a temporary one; None if none is usable.
 
-    Files in it are looked at one by one before they are read (`fused.disk_cache`), wherever they are.
+    `fused` looks at each file before it reads it (`fused.disk_cache`), `numba` at the folder.
     """
     if os.environ.get("NUMBA_CACHE_DIR"):
         return Path(os.environ["NUMBA_CACHE_DIR"])

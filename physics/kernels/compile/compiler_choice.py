@@ -16,7 +16,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping
-from importlib.metadata import version
+from importlib.metadata import PackageNotFoundError, version
 
 from physics.kernels.compile.notices import warn
 
@@ -35,7 +35,7 @@ def choose_compiler(environment: Mapping[str, str], numba_version: str) -> tuple
     environment : mapping
         Environment variables.
     numba_version : str
-        Version of the Numba that is installed.
+        Version of the Numba that is installed; empty if there is none.
 
     Returns
     -------
@@ -53,13 +53,16 @@ def choose_compiler(environment: Mapping[str, str], numba_version: str) -> tuple
     if asked and asked not in COMPILERS:
         raise ValueError(f"{VARIABLE} is {asked!r}; allowed are {', '.join(COMPILERS)}")
     if environment.get("NUMBA_DISABLE_JIT", "0") not in ("", "0"):
-        return PYTHON, None
+        is_overruled = asked not in ("", PYTHON)
+        return PYTHON, f"NUMBA_DISABLE_JIT is set, and {VARIABLE}={asked} is not followed" if is_overruled else None
+    if asked in (NUMBA, PYTHON):
+        return asked, None
     is_tested = _release(numba_version) in TESTED_RELEASES
+    if not numba_version:
+        return PYTHON, "Numba is not installed: kernels are run by Python, a thousand times slower"
     tested = " and ".join(f"{major}.{minor}" for major, minor in TESTED_RELEASES)
     if asked == FUSED and not is_tested:
         return FUSED, f"{VARIABLE} is 'fused', which is tested with Numba {tested}; installed is {numba_version}"
-    if asked:
-        return asked, None
     if is_tested:
         return FUSED, None
     return NUMBA, (
@@ -74,7 +77,11 @@ def _release(numba_version: str) -> tuple[int, ...]:
 
 
 def _choose() -> str:
-    compiler, warning = choose_compiler(os.environ, version("numba"))
+    try:
+        installed = version("numba")
+    except PackageNotFoundError:
+        installed = ""
+    compiler, warning = choose_compiler(os.environ, installed)
     if warning is not None:
         warn(warning)
     return compiler

@@ -28,7 +28,7 @@ def plain_function(value):
 
 
 def kernel(function):
-    """Compile `function`; cached on disk, IEEE semantics, the GIL released.
+    """Compile `function`: IEEE semantics, the GIL released.
 
     A division by zero gives inf and not an exception. There is no `fastmath`, so results do not depend on how an
     optimiser reorders a sum. `fused` rounds a product in a sum with it, which is said for each
@@ -37,10 +37,9 @@ def kernel(function):
     An index counts from the front of its axis, unless it is a literal: nothing asks whether it is negative. Under
     `NUMBA_BOUNDSCHECK=1` one that is outside its axis raises IndexError.
 
-    Switches among the arguments are passed as ``None`` (off) or not (on), also as members of named tuples. A kernel is
-    compiled for the types of its arguments, so that a branch on ``x is None`` is decided while compiling, and what is
-    off is not in the machine code. A branch that cannot be compiled where x is None stands in a function of its own
-    under `if_given`.
+    Switches among the arguments are passed as ``None`` (off) or not (on). A kernel is compiled for the types of its
+    arguments: a branch on ``x is None`` of an argument x is pruned before types are inferred. A switch that is a member
+    of a group chooses a function by its type (`if_given`).
 
     A variable of a kernel with branches is not named after another one with digits behind, as x1 and x12 are: Numba may
     take one for the other, and then cannot compile it (`tests/kernels/test_variable_names.py`).
@@ -54,7 +53,7 @@ def entry_kernel(function):
 
 
 def cold_kernel(function):
-    """`kernel` for what a step hardly ever needs: a call is left of it.
+    """`kernel` that a step hardly ever needs: `fused` leaves a call of it.
 
     LLVM copies a function that is called from one place into its caller, however long it is. What always runs there
     then has fewer registers for its numbers, and moves them to the stack and back.
@@ -64,12 +63,12 @@ def cold_kernel(function):
 
 
 def shared_kernel(function):
-    """`kernel` with machine code of its own, which all plans call: see `physics.kernels.compile.fused.dispatcher`."""
+    """`kernel` that all plans share: `fused` gives it machine code of its own (`fused.dispatcher`)."""
     return backend.shared_part(function)
 
 
 def inlined(function):
-    """`kernel` for what is a few instructions long, or is called from one place: no call is left of it."""
+    """`kernel` of a few instructions, or with one caller: `fused` leaves no call of it."""
     return backend.inlined_part(function)
 
 

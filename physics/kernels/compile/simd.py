@@ -1,9 +1,10 @@
 """Four numbers at once: what is done to one is done to each, in one instruction where the processor has one for it.
 
 A block rests on a wall with three or four vertices, and all of them are asked the same: how fast they slide, in what
-direction, what they push with. In kernels `Lanes` is a vector of LLVM's (`fused.simd_types`); what stands here is what
-it means, and what it is without a compiler. A number beside lanes is four of it. No result depends on the processor:
-each lane is what the number alone would be, and sums are taken in one order (`lane_sum`).
+direction, what they push with. In kernels `Lanes` is a vector of LLVM's (`fused.simd_types`) or four numbers
+(`public.simd_types`). This module says what it means, and is what it is without a compiler. A number beside lanes is
+four of it. No result depends on the processor: each lane is what the number alone would be, and sums are taken in one
+order (`lane_sum`).
 """
 
 from __future__ import annotations

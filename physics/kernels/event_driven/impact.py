@@ -18,6 +18,7 @@ from physics.kernels.math.vector import as_vector
 from physics.kernels.state import layout as at
 from physics.kernels.state.body import angular_velocity, kinetic_energy, principal_attitude, report_solve
 from physics.kernels.state.contact_law_dispatch import LAW_TANGENTIAL, if_law
+from physics.kernels.state.groups import has_friction
 from physics.kernels.time_stepping import event_log as ev
 from physics.kernels.time_stepping.impact import set_plastic_targets
 from physics.kernels.time_stepping.tangential_restitution import reject_energy_gain, set_tangential_target
@@ -227,7 +228,7 @@ def resolve_impacts(y, t, contact, offset_frame, work, motion, records):
         solved = solve_contacts(n, contact, v, L, P, work)
         solved = fall_back_to_plastic(n, contact, v, L, solved, P, work, records.report)
         solved = reject_energy_gain(n, contact, v, L, solved, P, work)
-        if contact.friction is not None and work.restitution > 0.0:
+        if has_friction(contact) and work.restitution > 0.0:
             solved = cap_rebound_energy(n, y, contact, offset_frame, solved, P, work, motion.contacts, records.report)
         report_impact_solve(solved, records.report, work)
         v, L = solved[0], solved[1]

@@ -1,7 +1,6 @@
 """Atomic changes and reads of an array that threads share without a lock.
 
-Only `fused` has them. Elsewhere each thread has a queue of its own (`physics.parallel.thread_pool`), and a change is
-one of an array that no other thread looks at.
+Only `fused` has them. Elsewhere each thread has a table of its own (`physics.parallel.thread_pool`).
 """
 
 from __future__ import annotations

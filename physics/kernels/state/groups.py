@@ -1,6 +1,7 @@
 """Arguments of a step that travel together, as named tuples: switches, arrays of bodies, the books of a step.
 
-A switch is None (off) or not (on). What is off is not compiled (`physics.kernels.compile.decorators.kernel`).
+A switch is None (off) or not (on). Which of two functions is called, or which of two answers given, is chosen by its
+type (`physics.kernels.compile.decorators.if_given`).
 """
 
 from __future__ import annotations
@@ -8,6 +9,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
+
+from physics.kernels.compile.decorators import if_given
 
 
 class WorkQueue(NamedTuple):
@@ -67,3 +70,15 @@ class Records(NamedTuple):
     report: np.ndarray  # (worlds, REPORT_SIZE) columns of `physics.kernels.state.layout`
     log: np.ndarray  # (rows, room, EVENT_SIZE) events
     counts: np.ndarray  # (rows,) events of each body
+
+
+@if_given("switches.friction", False)
+def has_friction(switches):
+    """True where a group of switches has friction on."""
+    return True
+
+
+@if_given("flight.scheme", True)
+def flies_exactly(flight):
+    """True unless a textbook scheme moves the bodies."""
+    return False

@@ -17,6 +17,7 @@ from physics.kernels.half_space.contact_point import place_arms
 from physics.kernels.half_space.persistent_contacts import cancel_separation
 from physics.kernels.math import quaternion as qt
 from physics.kernels.state.body import apply_inv_inertia, kinetic_energy, principal_attitude, report_solve
+from physics.kernels.state.groups import has_friction
 from physics.kernels.state.layout import ELLIPSOID
 from physics.kernels.time_stepping.event_log import log_wall_impacts
 from physics.kernels.time_stepping.rolling_friction import apply_resistance_torques
@@ -64,7 +65,7 @@ def resolve_impacts(n, y, t, h, contact, offset_frame, records, work):
     solved = reject_energy_gain(n, contact, v, L, solved, R, work)
     v_new, L_new, residual, sweeps, method = apply_resistance_torques(n, contact, v, L, solved, R, work)
     report_solve(records.report, work.world, residual, sweeps, method, work.tolerance)
-    if contact.friction is not None and work.restitution > 0.0:
+    if has_friction(contact) and work.restitution > 0.0:
         before, full = kinetic_energy(q, v, L, work, offset_frame), kinetic_energy(q, v_new, L_new, work, offset_frame)
         if full > before + IMPACT_ENERGY_ROUNDING * before:
             for k in range(3 * n):

@@ -21,6 +21,7 @@ from physics.kernels.half_space.contact_point import contact_arm, wall_of
 from physics.kernels.math import quaternion as qt
 from physics.kernels.state.body import apply_inv_inertia
 from physics.kernels.state.contact_law_dispatch import LAW_STIFFNESS, if_law
+from physics.kernels.state.groups import has_friction
 from physics.kernels.state.layout import SPHERE, WALL_TANGENT_1
 
 # Contacts of a stage at most, `mean_slip` of the settings, for `physics.Accuracy.slip`. The slips of a face turn
@@ -123,7 +124,7 @@ def cap_friction_work(n, contact, v, w, solved, free, R, h, work):
     v, w : tuples of 3 floats
         Velocity and angular velocity before the stage, at the attitude R of its middle.
     """
-    if contact.friction is None:
+    if not has_friction(contact):
         return solved
     w_new = apply_inv_inertia(R, solved[1], work.J)
     gift = push = 0.0

@@ -77,6 +77,7 @@ from physics.kernels.state.body import (
     write_state,
 )
 from physics.kernels.state.contact_law_dispatch import bind_laws
+from physics.kernels.state.groups import flies_exactly
 from physics.kernels.state.sleeping import falls_asleep, remains_asleep, without_velocities
 from physics.kernels.time_stepping.event_log import clear_events, drop_events
 from physics.kernels.time_stepping.impact import resolve_impacts
@@ -226,9 +227,9 @@ def substep(y, start, h, contact, flight, records, work):
             if not work.is_last and not contact_stiffness(work) > 0.0:
                 y = resolve_impacts(n, y, start + (h - left), left, contact, flight.offset_frame, records, work)
         span = left
-        if flight.scheme is None:  # noqa: SIM102 (a branch of its own is what the compiler prunes)
-            if cuts < MAX_TURNING_CUTS and may_turn(y[3], h, FAR_TURN, flight.offset_frame, work) and not work.is_last:
-                span = limit_turning_stage(n, y, h, left, flight.gyroscopic, flight.offset_frame, work)
+        is_cut = flies_exactly(flight) and cuts < MAX_TURNING_CUTS and not work.is_last
+        if is_cut and may_turn(y[3], h, FAR_TURN, flight.offset_frame, work):
+            span = limit_turning_stage(n, y, h, left, flight.gyroscopic, flight.offset_frame, work)
         end, t, is_deep = advance_to_impact(n, y, span, contact, flight, records, work)
         if t == span and span < left:
             cuts += 1

@@ -40,7 +40,7 @@ def read_cache_file(path: Path, purpose: bytes):
 
     Raises
     ------
-    Damaged, Foreign
+    DamagedFileError, ForeignFileError
         With the reason.
     OSError
         The file cannot be read.

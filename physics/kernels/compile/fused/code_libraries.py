@@ -56,7 +56,7 @@ class WholeLibrary(JITCodeLibrary):
 
     Attributes
     ----------
-    called : tuple of Origin
+    called : tuple of KernelOrigin
         The kernels that stand, of those below it.
     """
 
@@ -87,7 +87,7 @@ class SharedLibrary(WholeLibrary):
 
     Attributes
     ----------
-    origin : Origin
+    origin : KernelOrigin
         What it was made of.
     """
 

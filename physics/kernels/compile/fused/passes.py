@@ -8,14 +8,12 @@ fails to compile. What users write goes through Numba's own pipeline.
 
 from __future__ import annotations
 
-import operator
 from functools import cache
 
-from numba.core import ir, types
 from numba.core.compiler import DefaultPassBuilder
 from numba.core.compiler_machinery import FunctionPass, PassManager, _pass_registry, register_pass
 from numba.core.interpreter import Interpreter, peep_hole_list_to_tuple
-from numba.core.ir_utils import build_definitions, get_definition, guard
+from numba.core.ir_utils import build_definitions
 from numba.core.rewrites import rewrite_registry
 from numba.core.ssa import reconstruct_ssa
 from numba.core.typed_passes import (
@@ -58,46 +56,6 @@ class _FromByteCode(_Plain):
 
     def change(self, state):
         state.func_ir = _Interpreter(state.func_id).interpret(state.bc)
-
-
-def _known_type(state, variable: ir.Var) -> types.Type | None:
-    """Type of an argument, or of a member of one that is a named tuple; None for all others."""
-    found = guard(get_definition, state.func_ir, variable)
-    if isinstance(found, ir.Arg):
-        return state.args[found.index]
-    if isinstance(found, ir.Expr) and found.op == "getattr":
-        group = _known_type(state, found.value)
-        if isinstance(group, types.BaseNamedTuple):
-            return group.types[group.fields.index(found.attr)]
-    return None
-
-
-def _is_on(state, question: ir.Expr) -> bool | None:
-    """Answer `x is None` and `x is not None` for a switch x; None where that is not known while compiling."""
-    other = guard(get_definition, state.func_ir, question.rhs)
-    if not (isinstance(other, ir.Const) and other.value is None):
-        return None
-    type_ = _known_type(state, question.lhs)
-    if type_ is None or isinstance(type_, types.Optional | types.Omitted):
-        return None
-    return question.fn(None if isinstance(type_, types.NoneType) else type_, None)
-
-
-@register_pass(mutates_CFG=True, analysis_only=False)
-class _Switches(_Plain):
-    """Answer questions about switches: whether an argument, or a member of one, is None. Numba knows bare ones only."""
-
-    _name = "kernel_switches"
-
-    def change(self, state):
-        for block in state.func_ir.blocks.values():
-            for each in block.body:
-                value = getattr(each, "value", None)
-                if isinstance(value, ir.Expr) and value.op == "binop" and value.fn in (operator.is_, operator.is_not):
-                    answer = _is_on(state, value)
-                    if answer is not None:
-                        each.value = ir.Const(answer, value.loc)
-                        state.func_ir._definitions[each.target.name] = [each.value]
 
 
 @register_pass(mutates_CFG=True, analysis_only=False)
@@ -152,7 +110,6 @@ _TYPING_PASSES = (
     _FromByteCode,
     FixupArgs,
     RewriteSemanticConstants,
-    *((_Switches,) if is_on("switches") else ()),
     DeadBranchPrune,
     _Rewrites,
     _SingleAssignment,
@@ -224,7 +181,4 @@ def kernel_passes(state, lowering: type, *after_lowering: type) -> PassManager:
     if is_on("passes"):
         return _own_passes(lowering, *after_lowering, NoPythonBackend)
     pipeline = numbas_passes(state, {NativeLowering: lowering, NopythonTypeInference: _Types}, *after_lowering)
-    if is_on("switches"):
-        pipeline.add_pass_after(_Switches, RewriteSemanticConstants)
-        pipeline.finalize()
     return pipeline

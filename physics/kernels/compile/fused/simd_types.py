@@ -225,18 +225,18 @@ def _last(builder, first):
 
 
 def _read_row(context, builder, sig, args):
-    """`row`: a table begins anywhere, so that nothing is known of the place but that it is one of a number."""
+    """`load_lanes`: a table begins anywhere, so that nothing is known of the place but that it is one of a number."""
     return builder.load(_place_of_row(context, builder, sig, args), align=NUMBER_SIZE)
 
 
 def _write_row(context, builder, sig, args):
-    """`put_row`."""
+    """`store_lanes`."""
     builder.store(_spread(builder, args[3]), _place_of_row(context, builder, sig, args), align=NUMBER_SIZE)
     return context.get_dummy_value()
 
 
 def _totals(context, builder, sig, args):
-    """`totals`: halves of two and two beside each other, and halves of those."""
+    """`lane_sums`: halves of two and two beside each other, and halves of those."""
     a, b, c, d = (_spread(builder, each) for each in args)
 
     def joined(x, y, first, second):
@@ -269,7 +269,7 @@ def _total(context, builder, sig, args):
 
 
 def _extreme(order, context, builder, sig, args):
-    """`largest` and `least`."""
+    """`max_of_lanes` and `min_of_lanes`."""
     return _halves(builder, args[0], lambda x, y: builder.select(builder.fcmp_ordered(order, y, x), y, x))
 
 

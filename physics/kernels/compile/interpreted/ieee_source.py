@@ -25,7 +25,8 @@ def divide(x, y):
     try:
         return x / y
     except ZeroDivisionError:
-        return float(np.float64(x) / np.float64(y))
+        with np.errstate(all="ignore"):
+            return float(np.float64(x) / np.float64(y))
 
 
 def power(x, n):
@@ -151,10 +152,10 @@ def as_ieee(function: FunctionType) -> FunctionType:
 def _compiled(definition: ast.FunctionDef, function: FunctionType) -> CodeType:
     """Code of a function; what it takes from functions around it stays so."""
     free = function.__code__.co_freevars
-    names = ast.arguments([], [ast.arg(name) for name in free], None, [], [], None, [])
-    body = [definition, ast.Return(ast.Name(definition.name, ast.Load()))]
-    around = ast.copy_location(ast.FunctionDef("__around__", names, body, [], None), definition)
-    module = ast.fix_missing_locations(ast.Module([around], []))
+    module = ast.parse(f"def around({', '.join(free)}):\n    pass")
+    around = module.body[0]
+    around.body = [definition, ast.Return(ast.Name(definition.name, ast.Load()))]
+    ast.fix_missing_locations(ast.copy_location(around, definition))
     for each in ast.walk(around):  # what was added stands where the function does
         if hasattr(each, "end_lineno") and each.end_lineno < each.lineno:
             ast.copy_location(each, definition)

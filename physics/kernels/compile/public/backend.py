@@ -6,6 +6,7 @@ decides alone what it inlines.
 
 from __future__ import annotations
 
+import tempfile
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -43,8 +44,10 @@ def _own_folder() -> Path | None:
     folder = cache_dir()
     if folder is None:
         return None
-    try:
+    try:  # where Numba cannot write it takes `__pycache__`, and machine code of kernels that were edited since
         folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+        with tempfile.TemporaryFile(dir=folder):
+            pass
     except OSError as error:
         warn(f"kernels cannot be kept in {folder} ({error.strerror or error}): each process compiles them")
         return None

@@ -41,7 +41,7 @@ from physics.kernels.multibody.stepping.energy_budget import (
 from physics.kernels.multibody.stepping.solve_and_apply import solve_and_apply, solve_frictionless_and_apply
 from physics.kernels.state import layout as at
 from physics.kernels.state.body import angular_velocity, read_state, write_state
-from physics.kernels.state.groups import FlightSwitches
+from physics.kernels.state.groups import FlightSwitches, has_friction
 from physics.kernels.state.layout import ELLIPSOID, SPHERE
 from physics.kernels.state.sleeping import is_asleep
 from physics.kernels.time_stepping.midpoint_step import CREEP_SLOP_SHARE
@@ -202,7 +202,7 @@ def step_under_held_loads(n, world, h, switches, sleep, records, many):
     if has_gained_energy(n, h, many):
         revert_to_dissipative(n, switches.flight.offset_frame, many)
         solve_and_apply(n, world, switches.friction, records.report, many)
-        if switches.friction is not None and has_gained_energy(n, h, many):
+        if has_friction(switches) and has_gained_energy(n, h, many):
             revert_to_dissipative(n, switches.flight.offset_frame, many)
             solve_frictionless_and_apply(n, many)
     many.settings[0].residual_limit, many.settings[0].is_resting_stage, many.settings[0].load_speed = math.inf, 0, 0.0

@@ -37,6 +37,7 @@ from physics.kernels.multibody.stepping.impact import resolve_impacts
 from physics.kernels.multibody.stepping.midpoint_step import hold_all_loads, midpoint_step
 from physics.kernels.multibody.stepping.position_correction import correct_positions
 from physics.kernels.state import layout as at
+from physics.kernels.state.groups import flies_exactly
 
 # Cuts of a substep per impact allowed: a meeting is approached from before it, in two or three.
 SPLITS_PER_IMPACT = 4
@@ -104,11 +105,8 @@ def substep_world(
         if is_last:
             records.report[world, at.UNRESOLVED] += 1.0
         first = t
-        if switches.flight.scheme is None:  # noqa: SIM102 (a branch of its own is what the compiler prunes)
-            if is_turning:
-                t = safe_stage_length(
-                    first, switches.flight.gyroscopic, switches.flight.offset_frame, switches.hulls, many
-                )
+        if is_turning and flies_exactly(switches.flight):
+            t = safe_stage_length(first, switches.flight.gyroscopic, switches.flight.offset_frame, switches.hulls, many)
         if t < first:
             turns += 1
             if turns == MAX_TURNING_CUTS:
