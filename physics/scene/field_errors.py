@@ -27,6 +27,7 @@ _PLACE = re.compile(r"\b(?:at|from) (\S.*?) \((\d+)\)")
 # What Numba says of the statement, and what its user has to know. `%` takes the groups found.
 _KNOWN = (
     (r"Unknown attribute '(\w+)' of type FieldState", "state has no %r; allowed are " + ", ".join(FieldState._fields)),
+    (r"'FieldState' object has no attribute '(\w+)'", "state has no %r; allowed are " + ", ".join(FieldState._fields)),
     (
         r"Untyped \D*? name '(\w+)': Cannot determine Numba type of <class 'function'>",
         "%s is not compiled; allowed are functions under @physics.field_function",

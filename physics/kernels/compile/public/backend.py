@@ -14,13 +14,13 @@ from functools import cache
 from pathlib import Path
 
 import numba
-from numba import types
+from numba import TypingError, types
 from numba.extending import intrinsic, is_jitted, overload
 
 from physics.kernels.compile.cache_folder import cache_dir, is_owned_by_user
 from physics.kernels.compile.notices import warn
 from physics.kernels.compile.public import simd_types  # noqa: F401 (registers operations on lanes)
-from physics.kernels.compile.user_function import Examined, probe
+from physics.kernels.compile.user_function import Examined, FaultyFunctionError, probe
 
 OPTIONS = {"error_model": "numpy", "nogil": True}
 
@@ -155,5 +155,10 @@ def examine(function, arguments: tuple, numbers: str) -> Examined:
     state, p, t = arguments
     p.flags.writeable = False
     arguments = state, p, t
-    called = function.compile(tuple(map(numba.typeof, arguments)))
+    try:
+        called = function.compile(tuple(map(numba.typeof, arguments)))
+    except TypingError as error:
+        if "setitem(readonly array" in str(error):
+            raise FaultyFunctionError("writes to p; allowed is to read it", function, None) from None
+        raise
     return Examined(probe(function, called, arguments, numbers), None, may_raise=True)
