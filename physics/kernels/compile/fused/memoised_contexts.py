@@ -54,7 +54,7 @@ class MemoisedFunction(types.Function):
 
     def __init__(self, templates: tuple):
         super().__init__(templates)
-        self._signatures = _make_table()
+        self.signatures = _make_table()
 
     def augment(self, other):
         """Numba's function with more templates: it is kept for all contexts."""
@@ -65,10 +65,10 @@ class MemoisedFunction(types.Function):
         if kws:
             return super().get_call_type(context, args, kws)
         key = tuple(args)
-        found = self._signatures.get(key)
+        found = self.signatures.get(key)
         if found is None:
             found = signature_of(self, context, args) or super().get_call_type(context, args, kws)
-            self._signatures[key] = found
+            self.signatures[key] = found
         return found
 
 
