@@ -8,7 +8,7 @@ line of the two points, momentum and angular momentum of the two together are ke
 
 from __future__ import annotations
 
-from physics.kernels.compile.decorators import by_type, inlined, kernel
+from physics.kernels.compile.decorators import backend, by_type, inlined, kernel
 from physics.kernels.flight.free_flight import drift_attitude
 from physics.kernels.forces.field_loads import apply_loads, field_load
 from physics.kernels.forces.force_field_dispatch import LOAD, iterate_terms
@@ -108,9 +108,8 @@ def _if_linked(where, otherwise):
 
 def _record(bodies):
     """Record of a body in a group with `work` (`multibody.data.arrays.Bodies`), or its type in the group's type."""
-    if hasattr(bodies, "work"):
-        return bodies.work[0]
-    return bodies.types[bodies.fields.index("work")].dtype
+    work = backend.member(bodies, "work")
+    return work[0] if len(getattr(work, "shape", ())) else work.dtype
 
 
 @inlined

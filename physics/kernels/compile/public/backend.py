@@ -15,11 +15,12 @@ from pathlib import Path
 
 import numba
 from numba import TypingError, types
-from numba.extending import intrinsic, is_jitted, overload
+from numba.extending import is_jitted, overload
 
 from physics.kernels.compile.cache_folder import cache_dir, is_owned_by_user
 from physics.kernels.compile.notices import warn
 from physics.kernels.compile.public import simd_types  # noqa: F401 (registers operations on lanes)
+from physics.kernels.compile.public.lent import declare_members, lend, member_type  # noqa: F401 (`lend`: for `compile.decorators`)
 from physics.kernels.compile.user_function import Examined, FaultyFunctionError, probe
 
 OPTIONS = {"error_model": "numpy", "nogil": True}
@@ -92,7 +93,7 @@ def is_none(value) -> bool:
 
 def member(group, name: str):
     """A member of a named tuple, or the type of one in the type of a named tuple."""
-    return group.types[group.fields.index(name)] if isinstance(group, types.BaseTuple) else getattr(group, name)
+    return member_type(group, name) if isinstance(group, types.Type) else getattr(group, name)
 
 
 def record_members(record):
@@ -109,6 +110,7 @@ def machine_code(kernel, arguments: tuple) -> Callable:
     """Machine code of a kernel for arguments of these types, to be called with such arguments."""
     global _compilations
     with LOCK:
+        declare_members(arguments)
         whole = _entry(kernel)
         loaded = sum(whole.stats.cache_hits.values())
         code = whole.compile(tuple(map(numba.typeof, arguments)))
@@ -127,27 +129,6 @@ def count_compilations() -> Iterator[Callable[[], int]]:
     """Count the kernels that are compiled in the meantime: yields a function that tells how many."""
     before = _compilations
     yield lambda: _compilations - before
-
-
-@intrinsic
-def lend(typing_context, value):
-    """The same arrays, also within tuples, without an owner: nothing counts who refers to them."""
-
-    def without_owner(context, builder, type_, value):
-        if isinstance(type_, types.Array):
-            array = context.make_array(type_)(context, builder, value)
-            array.meminfo, array.parent = array.meminfo.type(None), array.parent.type(None)
-            return array._getvalue()
-        if isinstance(type_, types.BaseTuple):
-            for k, member in enumerate(type_):
-                lent = without_owner(context, builder, member, builder.extract_value(value, k))
-                value = builder.insert_value(value, lent, k)
-        return value
-
-    def lower(context, builder, sig, args):
-        return without_owner(context, builder, sig.args[0], args[0])
-
-    return value(value), lower
 
 
 def examine(function, arguments: tuple, numbers: str) -> Examined:
