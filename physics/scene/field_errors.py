@@ -34,7 +34,10 @@ _KNOWN = (
     ),
     (r"Untyped \D*? name '(\w+)': Cannot determine Numba type of <class '([\w.]+)'>", f"%s is a %s; {ALLOWED}"),
     (r"type, assigned to variable '(\w+)' in globals, is not supported", f"%s is of another kind; {ALLOWED}"),
-    (r"No implementation of function Function\(<.*?>\) found for signature:\s*>>> (.*)", f"there is no %s; {ALLOWED}"),
+    (
+        r"No implementation of function (?:Memoised)?Function\(<.*?>\) found for signature:\s*>>> (.*)",
+        f"there is no %s; {ALLOWED}",
+    ),
     (
         r"use of yield in a closure()",
         "comprehensions and generators%s are not compiled; write each number out",

@@ -1,4 +1,4 @@
-"""Switches: a branch on `x is None` is pruned for an argument and for a member of one, at any depth."""
+"""Switches: a function is chosen by the type of an argument, or of a member of one at any depth."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
-from physics.kernels.compile.decorators import kernel
+from physics.kernels.compile.decorators import by_type, if_given, kernel, when
 
 
 class Inner(NamedTuple):
@@ -19,22 +19,25 @@ class Outer(NamedTuple):
     inner: Inner
 
 
+def _as_it_is(x, group):
+    return x
+
+
+@if_given("group.factor", _as_it_is)
+def multiplied(x, group):
+    """Of None there is no product: this cannot be compiled where the factor is None."""
+    return x * group.factor
+
+
+@if_given("group.inner.offset", 0.0)
+def offset_of(group):
+    """Of None there is no number, either."""
+    return 1.0 * group.inner.offset
+
+
 @kernel
 def scaled(x, group):
-    """Neither branch could be typed with the other's argument: None has no product and no sum."""
-    if group.factor is not None:
-        x = x * group.factor
-    if group.inner.offset is None:
-        return x
-    return x + group.inner.offset
-
-
-@kernel
-def chosen(x, switch):
-    """An alternative, by one switch."""
-    if switch is None:
-        return x[0]  # x is an array here
-    return x  # and a number here
+    return multiplied(x, group) + offset_of(group)
 
 
 @kernel
@@ -50,9 +53,59 @@ def test_members_of_named_tuples_are_switches(call, factor, offset):
     assert call(2.0, Outer(factor, Inner(offset))) == expected
 
 
-def test_both_alternatives_of_a_switch_are_pruned():
-    assert chosen(np.array([4.0]), None) == 4.0
-    assert chosen(5.0, True) == 5.0
+@if_given("switch")
+def doubled(x, switch):
+    """Nothing is returned where it is off."""
+    x[0] *= 2.0
+
+
+@kernel
+def double(x, switch):
+    doubled(x, switch)
+
+
+@pytest.mark.parametrize(("switch", "expected"), [(None, 4.0), (True, 8.0)])
+def test_a_bare_argument_is_a_switch(switch, expected):
+    x = np.array([4.0])
+    double(x, switch)
+    assert x[0] == expected
+
+
+@kernel
+def without(x, switch):
+    if switch is not None:
+        x = x * switch
+    return x
+
+
+def test_numba_prunes_what_asks_whether_none_is_given():
+    assert without(2.0, None) == 2.0
+    assert without(2.0, 3.0) == 6.0
+
+
+@when(lambda x: "Array" in type(x).__name__ or isinstance(x, np.ndarray), otherwise=-1.0)
+def first_of(x):
+    return x[0]
+
+
+def _kind(x):
+    if isinstance(x, np.ndarray) or "Array" in type(x).__name__:
+        return lambda x: 1.0
+    return lambda x: 0.0
+
+
+is_array = by_type(_kind, _kind)
+
+
+@kernel
+def chosen(x):
+    return first_of(x) + 10.0 * is_array(x)
+
+
+def test_any_question_about_types_chooses():
+    assert chosen(np.array([4.0])) == 14.0
+    assert chosen(5.0) == -1.0
+    assert is_array.__name__ == "_kind"
 
 
 def test_a_name_that_is_assigned_in_branches_is_no_switch():
