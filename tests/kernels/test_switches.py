@@ -25,13 +25,13 @@ def _as_it_is(x, group):
 
 @if_given("group.factor", _as_it_is)
 def multiplied(x, group):
-    """Of None there is no product: this cannot be compiled where the factor is None."""
+    """Product that cannot be compiled where the factor is None."""
     return x * group.factor
 
 
 @if_given("group.inner.offset", 0.0)
 def offset_of(group):
-    """Of None there is no number, either."""
+    """Number that cannot be compiled where it is None."""
     return 1.0 * group.inner.offset
 
 
