@@ -39,8 +39,8 @@ def advance_world(world, grid, arrays, switches, restitution, kept, sleep, recor
     A world in which a new state is not finite keeps the last good one, and its report counts the fault.
     Impacts go to `records.log`, if that has any room, their number to `records.counts`.
     """
-    state, params, shapes, _, wrench = arrays
-    memory, report, log, counts = records
+    state, params, shapes, wrench = arrays.state, arrays.params, arrays.shapes, arrays.wrench
+    memory, report, log, counts = records.memory, records.report, records.log, records.counts
     h, offset_frame = grid.h, switches.flight.offset_frame
     bodies = shapes.shape[0]
     clear_report(world, report)
