@@ -12,8 +12,8 @@ from functools import cache
 from numba import types
 from numba.extending import intrinsic, models, overload_attribute, register_model
 
-# Words of a group above which it is handed on by its address: three arrays. With 64 the block takes longer to compile, and
-# a step longer; the scratch of many bodies, word by word, took 528 CPU seconds to compile.
+# Words of a group above which it is handed on by its address: three arrays. With 64 the block takes longer to compile,
+# and a step longer; the scratch of many bodies, word by word, took 528 CPU seconds to compile.
 MANY_WORDS = 16
 
 
