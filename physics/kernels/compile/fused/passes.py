@@ -180,5 +180,4 @@ def kernel_passes(state, lowering: type, *after_lowering: type) -> PassManager:
     """
     if is_on("passes"):
         return _own_passes(lowering, *after_lowering, NoPythonBackend)
-    pipeline = numbas_passes(state, {NativeLowering: lowering, NopythonTypeInference: _Types}, *after_lowering)
-    return pipeline
+    return numbas_passes(state, {NativeLowering: lowering, NopythonTypeInference: _Types}, *after_lowering)

@@ -24,7 +24,7 @@ def part(function):
     return made
 
 
-cold_part = shared_part = inlined_part = runtime_part = user_part = part
+shared_part = inlined_part = runtime_part = user_part = part
 
 
 def entry(function):

@@ -19,11 +19,9 @@ from numba.extending import is_jitted, overload
 
 from physics.kernels.compile.cache_folder import cache_dir, is_owned_by_user
 from physics.kernels.compile.notices import warn
-from physics.kernels.compile.public import simd_types  # noqa: F401 (registers operations on lanes)
 from physics.kernels.compile.public.lent import declare_members, lend, member_type  # noqa: F401 (`lend`: for `compile.decorators`)
+from physics.kernels.compile.public.simd_types import OPTIONS  # which also registers operations on lanes
 from physics.kernels.compile.user_function import Examined, FaultyFunctionError, probe
-
-OPTIONS = {"error_model": "numpy", "nogil": True}
 
 # Held while something is compiled or loaded.
 LOCK = threading.RLock()
@@ -36,7 +34,7 @@ def part(function):
     return numba.njit(**OPTIONS)(function)
 
 
-cold_part = shared_part = inlined_part = runtime_part = part
+shared_part = inlined_part = runtime_part = part
 
 
 @cache

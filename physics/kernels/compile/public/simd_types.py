@@ -15,6 +15,7 @@ from numba.extending import intrinsic, make_attribute_wrapper, models, overload,
 
 from physics.kernels.compile import simd
 
+# Options of all kernels.
 OPTIONS = {"error_model": "numpy", "nogil": True}
 
 
@@ -79,40 +80,21 @@ def _lanes(a, b, c, d):
 # --- one of four -------------------------------------------------------------------------------------------------
 
 
-def _first(x):
-    raise NotImplementedError("in kernels only")
+def _one_of_four(read: Callable) -> Callable:
+    """Make the kernel (x) that reads one of four numbers; of a number beside lanes it gives that number."""
+
+    def one(x):
+        return read(x)
+
+    @_overloaded(one)
+    def choose(x):
+        return read if _is_lanes(x) else lambda x: x
+
+    return one
 
 
-def _second(x):
-    raise NotImplementedError("in kernels only")
-
-
-def _third(x):
-    raise NotImplementedError("in kernels only")
-
-
-def _fourth(x):
-    raise NotImplementedError("in kernels only")
-
-
-@_overloaded(_first)
-def _first_of(x):
-    return (lambda x: x.a) if _is_lanes(x) else (lambda x: x)
-
-
-@_overloaded(_second)
-def _second_of(x):
-    return (lambda x: x.b) if _is_lanes(x) else (lambda x: x)
-
-
-@_overloaded(_third)
-def _third_of(x):
-    return (lambda x: x.c) if _is_lanes(x) else (lambda x: x)
-
-
-@_overloaded(_fourth)
-def _fourth_of(x):
-    return (lambda x: x.d) if _is_lanes(x) else (lambda x: x)
+_first, _second = _one_of_four(lambda x: x.a), _one_of_four(lambda x: x.b)
+_third, _fourth = _one_of_four(lambda x: x.c), _one_of_four(lambda x: x.d)
 
 
 @_overloaded(operator.getitem)
