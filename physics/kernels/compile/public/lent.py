@@ -1,8 +1,7 @@
-"""Lend the arguments of a step to the kernels below it: arrays without an owner, large groups by their address.
+"""Lend the arguments of a step to the kernels below it: large groups by their address.
 
-Numba counts who refers to an array, in each function that it is handed to; what a step is lent needs no count. And it
-hands a tuple on word by word: the scratch of many bodies is a hundred arrays of seven words each. Here such a group is
-put in memory once, and kernels are handed its address. A member that is a group is again an address.
+Numba hands a tuple on word by word: the scratch of many bodies is a hundred arrays of seven words each. Here such a
+group is put in memory once, and kernels are handed its address. A member that is a group is again an address.
 """
 
 from __future__ import annotations
@@ -11,6 +10,8 @@ from functools import cache
 
 from numba import types
 from numba.extending import intrinsic, models, overload_attribute, register_model
+
+from physics.kernels.compile.public.reference_counts import WITH_COUNTS
 
 # Words of a group above which it is handed on by its address: three arrays. With 64 the block takes longer to compile,
 # and a step longer; the scratch of many bodies, word by word, took 528 CPU seconds to compile.
@@ -65,7 +66,8 @@ def _reader(k: int):
 def _declare_member(name: str) -> None:
     """Let kernels read the member `name` of groups that have one."""
 
-    @overload_attribute(LentGroup, name, strict=False)
+    # Without counts a function may not return an array, unless it was handed it.
+    @overload_attribute(LentGroup, name, strict=False, jit_options=WITH_COUNTS)
     def read_member(group):
         if name not in group.group.fields:
             return None
@@ -97,18 +99,6 @@ def _is_large(type_) -> bool:
     return isinstance(type_, types.BaseTuple) and hasattr(type_, "fields") and _words(type_) > MANY_WORDS
 
 
-def _without_owner(context, builder, type_, value):
-    if isinstance(type_, types.Array):
-        array = context.make_array(type_)(context, builder, value)
-        array.meminfo, array.parent = array.meminfo.type(None), array.parent.type(None)
-        return array._getvalue()
-    if isinstance(type_, types.BaseTuple):
-        for k, member in enumerate(type_):
-            lent = _without_owner(context, builder, member, builder.extract_value(value, k))
-            value = builder.insert_value(value, lent, k)
-    return value
-
-
 @intrinsic
 def lend(typing_context, arguments):
     """A tuple of arguments, lent: it is valid as long as the kernel runs that lends it."""
@@ -117,7 +107,7 @@ def lend(typing_context, arguments):
     def lower(context, builder, sig, args):
         members = []
         for k, type_ in enumerate(sig.args[0]):
-            value = _without_owner(context, builder, type_, builder.extract_value(args[0], k))
+            value = builder.extract_value(args[0], k)
             if _is_large(type_):
                 with builder.goto_entry_block():
                     place = builder.alloca(value.type)

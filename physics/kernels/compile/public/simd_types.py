@@ -14,9 +14,10 @@ from numba import njit, types
 from numba.extending import intrinsic, make_attribute_wrapper, models, overload, register_model
 
 from physics.kernels.compile import simd
+from physics.kernels.compile.public.reference_counts import WITHOUT_COUNTS
 
 # Options of all kernels.
-OPTIONS = {"error_model": "numpy", "nogil": True}
+OPTIONS = {"error_model": "numpy", "nogil": True, **WITHOUT_COUNTS}
 
 
 class LanesType(types.Type):
