@@ -27,7 +27,7 @@ def test_a_name_that_is_unknown_is_refused_with_those_allowed():
     for name in ablation.OPTIMISATIONS:
         assert name in str(told.value)
     assert ablation.read_names("") == frozenset()
-    assert ablation.read_names(" ranges,,tuples ") == {"ranges", "tuples"}
+    assert ablation.read_names(" ranges,,scalars ") == {"ranges", "scalars"}
     with pytest.raises(KeyError):
         ablation.is_on("rangs")
 
@@ -92,7 +92,7 @@ def test_switches_leave_the_result_as_it_is_and_kernels_in_folders_of_their_own(
     expected = run_without("", tmp_path)
     folders = {expected["folder"]}
     assert folders == {cache_folder.folder_name()}
-    for names in ("ranges", "scalars,tuples", everything):
+    for names in ("ranges", "scalars,lowering", everything):
         found = run_without(names, tmp_path)
         assert found["result"] == pytest.approx(expected["result"], rel=1e-14)
         assert found["code"] != expected["code"]
@@ -115,13 +115,13 @@ def test_the_benchmark_takes_ratios_turn_by_turn_and_measures_no_row_again(tmp_p
     path = tmp_path / "rows.json"
     path.write_text(json.dumps({"rows": {"ranges": {"machine": "some machine", "samples": samples}}}))
     monkeypatch.setattr(benchmark, "sample", lambda *_: pytest.fail("measured again"))
-    monkeypatch.setenv(ablation.VARIABLE, "tuples")
+    monkeypatch.setenv(ablation.VARIABLE, "lowering")
     benchmark.main(repeats=1, only=["ranges"], json=path)
     out = capsys.readouterr().out
     assert "1.50" in out
     assert "prepared_entry has no switch" in out
     with benchmark.left_out("scalars"):
         assert os.environ[ablation.VARIABLE] == "scalars"
-    assert os.environ[ablation.VARIABLE] == "tuples"
+    assert os.environ[ablation.VARIABLE] == "lowering"
     with pytest.raises(typer.BadParameter, match="rangs; allowed are "):
         benchmark.main(only=["rangs"])

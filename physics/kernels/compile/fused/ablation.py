@@ -19,7 +19,6 @@ OPTIMISATIONS = {
     "calling_convention": "a kernel returns its value, not a status with the value in memory",
     "code_libraries": "parts are linked as they are and optimised once, in the whole that calls them",
     "cold_kernels": "a call is left of what a step hardly ever needs",
-    "comparable_flags": "flags of two compilations are compared by those that are set, not by all of them",
     "folding_builder": "members of structures and constants are folded while instructions are written",
     "fused_products": "a product in a sum is rounded with it; the last bits of results depend on it",
     "indices_from_front": "no index is asked whether it is negative",
@@ -33,7 +32,6 @@ OPTIMISATIONS = {
     "scalars": "max, min, int and powers of numbers are written in place, not compiled as functions",
     "shared_kernels": "large kernels that know no plan are made machine code once for all plans",
     "simd_types": "an operation on lanes is one of vectors, not one for each lane",
-    "tuples": "a member that an index chooses and the search for a number are written in place",
     "type_inference": "a constraint is looked at again only if a type in it has changed",
     "untimed_parts": "no clocks run while a part is compiled",
 }
@@ -45,9 +43,10 @@ BASES = {
     "cache_files": "files of machine code: no optimisation, and all that is kept on disk rests on it",
     "disk_cache": "what is kept on disk and loaded: shared kernels rest on it; `benchmarks.start` shows its worth",
     "dispatcher": "has kernels compiled: all others hook in there",
-    "operation_table": "asks `array_elements`, `ranges`, `scalars`, `simd_types` and `tuples`, which have switches",
+    "operation_table": "asks `array_elements`, `ranges`, `scalars` and `simd_types`, which have switches",
     "prepared_calls": "makes the calls that `prepared_entry` is the other end of",
     "prepared_entry": "threads take their calls from a table of prepared ones, and chained calls stand in it",
+    "tuples": "without it `t[k]` may raise: 55 kernels of a plan would return a status, and be lowered twice",
     "user_functions": "looks through users' functions before anything moves",
 }
 

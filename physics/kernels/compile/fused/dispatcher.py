@@ -51,18 +51,9 @@ from physics.kernels.compile.fused.passes import kernel_passes, numbas_passes
 
 
 class _Flags(Flags):
-    """Flags of a compilation that are equal when the same ones are set alike.
-
-    Numba looks them up for each subscript it types; comparing the two dozen that are not set took a fifth of all time.
-    What it puts into the names of symbols for them also tells the types of the arguments.
-    """
+    """Flags of a compilation. What Numba puts into the names of symbols for them also tells the types of arguments."""
 
     types = ""
-
-    if is_on("comparable_flags"):
-
-        def values(self):
-            return self._values
 
     def get_mangle_string(self):
         return super().get_mangle_string() + self.types
