@@ -28,6 +28,7 @@ from physics.work_precision.result import Frontier, FrontierPoint
 from physics.work_precision.run import frontier, ladder
 from physics.work_precision.truth import Truth
 from physics.world.report import Solver, Status, StepReport
+from physics.world.rollout import Rollout, rollout
 from physics.world.snapshot import Snapshot
 from physics.world.stepper import Stepper
 from physics.world.world import World
@@ -61,6 +62,7 @@ __all__ = [
     "Recording",
     "Replay",
     "RollingFriction",
+    "Rollout",
     "Scene",
     "SceneWarning",
     "Sleeping",
@@ -86,6 +88,7 @@ __all__ = [
     "load_scene",
     "look_at",
     "make_plan",
+    "rollout",
     "save_mjcf",
     "save_scene",
     "scenes",

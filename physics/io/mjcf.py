@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from physics import validation
-from physics.io.mjcf_reader import read_scene
+from physics.io.mjcf_reader import read_scene, unnamed
 from physics.rotations import rotation_matrices
 from physics.scene.effects import Contact, Friction, Gravity
 from physics.scene.force_fields import Spring
@@ -98,6 +98,7 @@ def to_mjcf(scene: Scene, drop: bool = False) -> str:
         place = {"pos": _text(wall.offset * np.array(wall.normal)), "zaxis": _text(wall.normal), "size": "0 0 1"}
         ET.SubElement(world, "geom", type="plane", **place, **touch, **surface)
     springs = [effect for effect in scene.effects if isinstance(effect, Spring)]
+    _check_names(scene)
     for b, body in enumerate(scene.bodies):
         _add_body(world, b, body, scene.effect(Contact), surface, springs)
     if springs:
@@ -105,6 +106,17 @@ def to_mjcf(scene: Scene, drop: bool = False) -> str:
     _add_keyframe(root, scene)
     ET.indent(root)
     return ET.tostring(root, encoding="unicode") + "\n"
+
+
+def _check_names(scene: Scene) -> None:
+    """Refuse a body's name that the file gives to a body without one."""
+    taken = {unnamed(b): b for b, body in enumerate(scene.bodies) if body.name is None}
+    for b, body in enumerate(scene.bodies):
+        if body.name in taken:
+            raise ValueError(
+                f"Scene.bodies[{b}] has the name {body.name!r}, which MJCF gives to Scene.bodies[{taken[body.name]}]; "
+                "allowed are other names"
+            )
 
 
 def _add_meshes(root: ET.Element, scene: Scene) -> None:
@@ -138,7 +150,7 @@ def _surface(scene: Scene) -> dict[str, str]:
 
 def _add_body(world: ET.Element, b: int, body, contact: Contact | None, surface: dict, springs: list[Spring]) -> None:
     """One free body; its frame is that of the scene's body."""
-    element = ET.SubElement(world, "body", name=f"body{b}", pos=_text(body.pos), quat=_text(body.quat))
+    element = ET.SubElement(world, "body", name=body.name or unnamed(b), pos=_text(body.pos), quat=_text(body.quat))
     ET.SubElement(element, "freejoint")
     I = body.inertia
     full = _text((I[0, 0], I[1, 1], I[2, 2], I[0, 1], I[0, 2], I[1, 2]))

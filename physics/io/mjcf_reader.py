@@ -29,6 +29,11 @@ KNOWN = {
 }
 
 
+def unnamed(b: int) -> str:
+    """Name in MJCF of body `b` of a scene if it has none there."""
+    return f"body{b}"
+
+
 def read_scene(root: ET.Element) -> Scene:
     """The scene of a model's root element."""
     _check_children(root, "mujoco")
@@ -42,7 +47,7 @@ def read_scene(root: ET.Element) -> Scene:
             raise ValueError(f"{_name(plane)} of the world is a {_type(plane)}; allowed are planes")
     elements = world.findall("body")
     velocities = _velocities(root, len(elements))
-    bodies = [_body(element, velocity) for element, velocity in zip(elements, velocities)]
+    bodies = [_body(b, element, velocity) for b, (element, velocity) in enumerate(zip(elements, velocities))]
     option = root.find("option")
     gravity = _numbers(root if option is None else option, "gravity", GRAVITY, 3)
     effects = [Gravity(gravity)] if gravity.any() else []
@@ -111,7 +116,7 @@ def _unit(element: ET.Element) -> np.ndarray:
     return validation.unit(q, norm)
 
 
-def _body(element: ET.Element, velocity: np.ndarray) -> Body:
+def _body(b: int, element: ET.Element, velocity: np.ndarray) -> Body:
     """A free body; the scene's frame has its axes, and its origin at the centre of mass."""
     _check_children(element, "body")
     _refuse(element, "euler", "axisangle", "xyaxes", "zaxis")
@@ -133,6 +138,7 @@ def _body(element: ET.Element, velocity: np.ndarray) -> Body:
         "pos": _numbers(element, "pos", "0 0 0", 3) + R @ centre, "quat": quat,
         # MuJoCo's velocity is that of the frame's origin.
         "linvel": velocity[:3] + R @ np.cross(velocity[3:], centre), "angvel": R @ velocity[3:],
+        "name": None if element.get("name") in (None, "", unnamed(b)) else element.get("name"),
     }  # fmt: skip
     return _shape(geoms[0], mass, inertia, arm, start)
 

@@ -8,6 +8,9 @@ from __future__ import annotations
 
 import re
 
+# Header of a table, and not a row of numbers in an array that goes over several lines.
+HEADER = re.compile(r"\s*\[\[?\s*[A-Za-z_\"'][^,]*\]\s*(#.*)?$")
+
 
 class Places:
     """Lines of one file's text.
@@ -32,6 +35,21 @@ class Places:
             line = self._key_line(start, key) or start or 1
         place = "" if name is None else f"{name}[{index}]: "
         return ValueError(f"{self._source}, line {line}: {place}{message}")
+
+    def error_in_table(self, name: str, key: str | None, message: str) -> ValueError:
+        """An error about a key of the table [name], such as ``environment.goal``, or about the table itself."""
+        return ValueError(f"{self._source}, line {self._line_in_table(name, key)}: {name}: {message}")
+
+    def _line_in_table(self, name: str, key: str | None) -> int:
+        """Line of a key of a table, or of what is nearest to it: tables in tables may be written inline."""
+        parts = [*name.split("."), key]
+        for depth in range(len(parts) - 1, 0, -1):
+            dotted = r"\s*\.\s*".join(rf"[\"']?{re.escape(part)}[\"']?" for part in parts[:depth])
+            header = re.compile(rf"\s*\[\s*{dotted}\s*\]")
+            found = [k for k, line in enumerate(self._lines, 1) if header.match(line)]
+            if found:
+                return self._key_line(found[0], parts[depth]) or found[0]
+        return self._key_line(0, parts[0]) or 1
 
     def error_of_scene(self, lists: dict[str, list], message: str) -> ValueError:
         """An error of the whole scene, at the table that its message names, by number or, of an effect, by class."""
@@ -65,6 +83,6 @@ class Places:
         for k, line in enumerate(self._lines[start:], start + 1):
             if wanted.match(line):
                 return k
-            if start and re.match(r"\s*\[\[", line):
+            if start and HEADER.match(line):
                 return None
         return None

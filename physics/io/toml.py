@@ -2,6 +2,8 @@
 
 One table per body, wall and effect; `kind` is the class, the other keys are its parameters under their names, in SI
 units. What is left out keeps its default. Files are read with the standard library's reader and written with tomlkit.
+
+A file may hold tables for programs that use scenes, such as [environment]: they are handed back as they stand.
 """
 
 from __future__ import annotations
@@ -9,8 +11,9 @@ from __future__ import annotations
 import re
 import sys
 from collections.abc import Iterable, Sequence
-from dataclasses import MISSING, fields
+from dataclasses import MISSING, dataclass, fields
 from pathlib import Path
+from typing import Any
 
 import tomlkit
 
@@ -35,6 +38,27 @@ FORMAT = 1
 BODIES = (Block, Sphere, Ellipsoid, Hull)
 EFFECTS = (Gravity, Contact, Friction, RollingFriction, SpinFriction, Actuator, Sleeping, *FIELDS)
 LISTS = ("bodies", "walls", "effects")
+
+# Tables that are no part of a scene: read, but left to the programs that know them.
+OTHERS = ("environment",)
+
+
+@dataclass(frozen=True)
+class SceneFile:
+    """Content of a scene file.
+
+    Attributes
+    ----------
+    scene : Scene
+    others : dict of str to dict
+        Tables of `OTHERS` that the file has, with what stands in them, unchecked.
+    places : Places
+        Lines of the file, for errors about these tables.
+    """
+
+    scene: Scene
+    others: dict[str, dict[str, Any]]
+    places: Places
 
 
 def save_scene(scene: Scene, path: str | Path) -> None:
@@ -87,7 +111,7 @@ def _plain(value):
 
 @known_keywords
 def load_scene(path: str | Path, kinds: Sequence[type[Field]] = ()) -> Scene:
-    """Read a scene from a TOML file.
+    """Read a scene from a TOML file. A table [environment] is left to `rigid_env`.
 
     Parameters
     ----------
@@ -102,35 +126,55 @@ def load_scene(path: str | Path, kinds: Sequence[type[Field]] = ()) -> Scene:
     OSError
         The file cannot be read.
     """
+    return load_file(path, kinds).scene
+
+
+def load_file(path: str | Path, kinds: Sequence[type[Field]] = ()) -> SceneFile:
+    """Read all of a scene file; arguments and errors as of `load_scene`."""
     validation.path(path)
     try:
         text = Path(path).read_text(encoding="utf-8")
     except UnicodeDecodeError as error:
         raise ValueError(f"{path}: byte {error.start} is no UTF-8; allowed is a text file in TOML") from None
-    return from_toml(text, str(path), kinds)
+    return file_from_toml(text, str(path), kinds)
 
 
 def from_toml(text: str, source: str = "scene", kinds: Sequence[type[Field]] = ()) -> Scene:
     """The scene that a text describes; `source` is what messages call it."""
+    return file_from_toml(text, source, kinds).scene
+
+
+def file_from_toml(text: str, source: str = "scene", kinds: Sequence[type[Field]] = ()) -> SceneFile:
+    """All that a text of a scene file holds; `source` is what messages call it."""
     kinds = _own_kinds(kinds)
     try:
         content = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
         raise ValueError(_syntax_error(text, source, str(error))) from None
     places = Places(text, source)
+    _check_head(places, content)
+    known = {"bodies": BODIES, "walls": (HalfSpace,), "effects": (*EFFECTS, *kinds)}
+    lists = {name: _build_all(places, name, content.get(name, []), known[name]) for name in LISTS}
+    try:
+        scene = Scene(**lists)
+    except ValueError as error:
+        raise places.error_of_scene(lists, str(error)) from None
+    return SceneFile(scene, {name: content[name] for name in OTHERS if name in content}, places)
+
+
+def _check_head(places: Places, content: dict) -> None:
+    """Refuse unknown keys and tables of a file's head, and formats that are newer than this reader."""
+    known = ("format", *LISTS, *OTHERS)
     for key in content:
-        if key not in ("format", *LISTS):
-            allowed = ", ".join(nearest_first(key, ("format", *LISTS)))
+        if key not in known:
+            allowed = ", ".join(nearest_first(key, known))
             raise places.error(None, 0, key, f"{key} is not known; allowed are {allowed}")
     number = content.get("format", FORMAT)
     if type(number) is not int or number not in range(1, FORMAT + 1):
         raise places.error(None, 0, "format", f"format is {shown(number)}; allowed is {FORMAT}")
-    known = {"bodies": BODIES, "walls": (HalfSpace,), "effects": (*EFFECTS, *kinds)}
-    lists = {name: _build_all(places, name, content.get(name, []), known[name]) for name in LISTS}
-    try:
-        return Scene(**lists)
-    except ValueError as error:
-        raise places.error_of_scene(lists, str(error)) from None
+    for name in OTHERS:
+        if not isinstance(content.get(name, {}), dict):
+            raise places.error(None, 0, name, f"{name} is {shown(content[name])}; allowed is a table [{name}]")
 
 
 def _own_kinds(kinds) -> tuple:

@@ -19,6 +19,12 @@ def _tuple(array: np.ndarray) -> tuple:
     return tuple(float(v) for v in np.ravel(array))
 
 
+def check_name(name: str) -> None:
+    """Refuse a body's name that is no text, is empty, or holds characters that do not print or blanks around it."""
+    if not isinstance(name, str) or not name or name != name.strip() or not name.isprintable():
+        raise ValueError(f"name is {shown(name)}; allowed are printable characters, no blank at the ends")
+
+
 @dataclass(frozen=True, kw_only=True)
 class Body:
     """Base of all bodies; use `Block`, `Sphere`, `Ellipsoid` or `Hull`.
@@ -32,11 +38,13 @@ class Body:
         Moments, or tensor, about the centre of mass in the body frame [kg m²]. None: uniform density.
     density : float, optional
         Instead of `mass` [kg/m³]: the body has this times its `volume` as its mass, and None here.
+    name : str, optional
+        Name of the body in files and environments, of its own in a scene. It changes no motion.
 
     Raises
     ------
     ValueError
-        A parameter out of range, or not exactly one of mass and density.
+        A parameter out of range, not exactly one of mass and density, or a name without printable characters.
     """
 
     pos: tuple = (0.0, 0.0, 0.0)
@@ -45,6 +53,7 @@ class Body:
     angvel: tuple = (0.0, 0.0, 0.0)
     inertia_body: tuple | None = None
     density: float | None = field(default=None, repr=False, compare=False)
+    name: str | None = None
     center: ClassVar[tuple] = (0.0, 0.0, 0.0)  # of the shape, from the centre of mass; a block may have another
 
     def __post_init__(self):
@@ -57,6 +66,8 @@ class Body:
         if self.inertia_body is not None:
             tensor = inertia.check_inertia(self.inertia_body, "inertia_body")
             self._set("inertia_body", tuple(map(_tuple, tensor)))
+        if self.name is not None:
+            check_name(self.name)
         self._check_range()
 
     def _set_mass(self) -> None:

@@ -78,7 +78,7 @@ class Scene:
     Parameters
     ----------
     bodies : sequence of Body
-        At least one.
+        At least one; those with names have different ones.
     walls : sequence of HalfSpace
     effects : sequence of effects
         At most one of each kind, but any number of `Spring` and `Push`. `Friction`, `RollingFriction`,
@@ -105,6 +105,7 @@ class Scene:
             object.__setattr__(self, name, _items(getattr(self, name), name, allowed))
         if not self.bodies:
             raise ValueError("Scene.bodies is empty; allowed is at least one body")
+        self._check_names()
         kinds = [type(effect) for effect in self.effects]
         for kind in set(kinds):
             if kinds.count(kind) > 1 and not getattr(kind, "has_many", False):
@@ -133,6 +134,15 @@ class Scene:
             "Scene", f"{len(self.bodies)} bodies: {counted(kinds['bodies'])}", f"{len(self.walls)} walls",
             f"effects: {counted(kinds['effects'])}",
         )  # fmt: skip
+
+    def _check_names(self) -> None:
+        first: dict[str, int] = {}
+        for b, body in enumerate(self.bodies):
+            if body.name is not None and first.setdefault(body.name, b) != b:
+                raise ValueError(
+                    f"Scene.bodies[{b}] has the name {shown(body.name)}, as Scene.bodies[{first[body.name]}]; allowed "
+                    "are different names"
+                )
 
     def _check_axes(self) -> None:
         friction = self.effect(Friction)

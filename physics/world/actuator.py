@@ -42,13 +42,15 @@ class Actuation:
     ----------
     applied : (worlds, bodies, 6) float64
         What acts in the next step: force [N], torque [N m], world frame; renewed in place.
+    output : (worlds * bodies, 6) float64
+        Wrench that the lag has reached.
     """
 
     def __init__(self, actuator: Actuator, shape: tuple[int, int, int]):
         self.actuator = actuator
         self.applied = np.zeros(shape)
         self._shape = shape
-        self._output = self._nothing()  # w
+        self.output = self._nothing()
         self._command = self._nothing()  # of this step, clipped
         self._late: list[tuple[float, np.ndarray]] = []  # commands with a delay that still count: when given [s]
 
@@ -82,7 +84,7 @@ class Actuation:
                 x = share * dt / self.actuator.lag
                 gone = -math.expm1(-x)
                 kept = gone / x
-            apply_actuator_lag(tread, gone, kept, share, k == 0, self._output, applied)
+            apply_actuator_lag(tread, gone, kept, share, k == 0, self.output, applied)
 
     def _treads(self, start: float, dt: float) -> list[tuple[float, np.ndarray]]:
         """(share of the step, command) of the staircase from `start` over `dt`; zero before the first command."""
@@ -98,18 +100,57 @@ class Actuation:
 
     def forget(self, worlds: np.ndarray) -> None:
         """Let these worlds begin at rest: no output, no commands on their way."""
-        for rows in (self._output, *(command for _, command in self._late)):
+        for rows in (self.output, *(command for _, command in self._late)):
             rows.reshape(self._shape)[worlds] = 0.0
 
-    def kept(self) -> tuple:
-        """State of the actuator, for `put_back`."""
-        return self._output.copy(), [(given, command.copy()) for given, command in self._late]
+    def kept(self, worlds: np.ndarray | None = None) -> tuple:
+        """State of the actuators of some worlds, or of all, for `put_back` and `put_worlds`."""
+        if worlds is None:
+            return self.output.copy(), [(given, command.copy()) for given, command in self._late]
+        output, late = self.output, self._late
+        return self._rows(output, worlds).reshape(-1, 6), [
+            (given, self._rows(command, worlds).reshape(-1, 6)) for given, command in late
+        ]
 
     def put_back(self, kept: tuple) -> None:
-        """Go on from what `kept` gave."""
+        """Go on from what `kept` gave of all worlds."""
         output, late = kept
-        self._output[...] = output
+        self.output[...] = output
         self._late = [(given, command.copy()) for given, command in late]
+
+    def put_worlds(self, kept: tuple, source: np.ndarray, worlds: np.ndarray, shift: float | None) -> None:
+        """Let `worlds` (k,) go on as the worlds `source` (k,) of what `kept` gave.
+
+        Parameters
+        ----------
+        kept : tuple
+        source, worlds : (k,) int64
+        shift : float or None
+            Added to the times at which commands were given [s]. None: `worlds` are all there are, and nothing of the
+            batch's own commands is left.
+        """
+        output, late = kept
+        self.output.reshape(self._shape)[worlds] = self._rows(output, source)
+        own = [] if shift is None else self._late
+        theirs = [(given + (shift or 0.0), command) for given, command in late]
+        near = NO_TIME * self.actuator.delay
+        moments = [given for given, _ in own]
+        moments += [given for given, _ in theirs if all(abs(given - known) > near for known in moments)]
+        self._late = []
+        for given in sorted(moments):
+            held, taken = _held(own, given), _held(theirs, given + near)
+            command = self._nothing() if held is None else held.copy()
+            command.reshape(self._shape)[worlds] = 0.0 if taken is None else self._rows(taken, source)
+            self._late.append((given, command))
+
+    def _rows(self, table: np.ndarray, worlds: np.ndarray) -> np.ndarray:
+        """Rows (k, bodies, 6) of some worlds in a table (worlds * bodies, 6), copied."""
+        return table.reshape(-1, *self._shape[1:])[worlds]
+
+
+def _held(staircase: list[tuple[float, np.ndarray]], moment: float) -> np.ndarray | None:
+    """The last command of a staircase that was given by this moment [s]; None: there is none."""
+    return next((command for given, command in reversed(staircase) if given <= moment), None)
 
 
 def _snapped(share: float) -> float:

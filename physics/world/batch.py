@@ -23,12 +23,16 @@ class ActuatorState(Protocol):
 
     actuator: Actuator
     applied: np.ndarray
+    output: np.ndarray
 
-    def kept(self) -> Any:
-        """All that decides what acts from now on."""
+    def kept(self, worlds: np.ndarray | None = None) -> Any:
+        """All that decides what acts from now on, of some worlds or all."""
 
     def put_back(self, kept: Any) -> None:
         """As it was when `kept` was taken."""
+
+    def put_worlds(self, kept: Any, source: np.ndarray, worlds: np.ndarray, shift: float | None) -> None:
+        """Let worlds go on as those of `source` in `kept`, whose times are `shift` [s] early; None: of all worlds."""
 
     def forget(self, worlds: np.ndarray) -> None:
         """Forget all commands that these worlds were given."""
@@ -128,6 +132,12 @@ class Batch:
     def kept(self) -> tuple[np.ndarray, ...]:
         """The arrays themselves that a snapshot copies, in the order of `KEPT`."""
         return tuple(getattr(self, name) for name in (KEPT if self.plan.sleeping else KEPT[:-1]))
+
+    def kept_rows(self) -> tuple[int, ...]:
+        """Rows that one world has in each of the `kept` arrays; 0: it has one row for all worlds, which is not used."""
+        bodies = self.body_count
+        memory = 1 if self.plan.many else bodies if self.plan.contact else 0
+        return (bodies, bodies, 1, memory, 1, bodies) if self.plan.sleeping else (bodies, bodies, 1, memory, 1)
 
     def sleep_of_kernel(self) -> Sleep | None:
         """Sleep record for the step; None where no body may sleep."""

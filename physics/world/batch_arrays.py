@@ -72,7 +72,7 @@ def make_memory(scene: Scene, plan: Plan, worlds: int) -> np.ndarray:
 def check_room(worlds: int, bodies: int, plan: Plan) -> None:
     """Refuse more worlds than this machine's memory holds: a few would otherwise end the process."""
     row = 8 * (at.STATE_SIZE + at.PARAM_SIZE + plan.field_columns)  # the least that a body takes [bytes]
-    memory = _memory()
+    memory = machine_memory()
     if worlds * bodies * row > memory:
         raise ValueError(
             f"worlds is {worlds} of {bodies} bodies; allowed are at most {memory // (bodies * row)}, which fill the "
@@ -80,7 +80,7 @@ def check_room(worlds: int, bodies: int, plan: Plan) -> None:
         )
 
 
-def _memory() -> int:
+def machine_memory() -> int:
     """Physical memory [bytes]; where the system does not say, an amount that no machine has."""
     try:
         return os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")

@@ -6,7 +6,7 @@ from enum import IntEnum
 
 import numpy as np
 
-from physics.kernels.compile.decorators import entry_kernel
+from physics.kernels.compile.decorators import entry_kernel, kernel
 from physics.kernels.state import layout as at
 
 
@@ -100,15 +100,21 @@ def gravest(table, status):
             status[world] = _UNRESOLVED
 
 
-@entry_kernel
-def add_report(total, table):
-    """Add a report `table` (worlds, REPORT_SIZE) to that of steps before: counts add up, of the rest the largest."""
-    for world in range(table.shape[0]):
+@kernel
+def add_rows(first, end, total, table):
+    """Add the reports of some worlds to those of steps before: counts add up, of the rest the largest."""
+    for world in range(first, end):
         for c in range(at.REPORT_SIZE):
             if c in (at.PENETRATION, at.RESIDUAL, at.SOLVER, at.OVERLAP, at.FIRST_FAULTY):
                 total[world, c] = max(total[world, c], table[world, c])
             else:
                 total[world, c] += table[world, c]
+
+
+@entry_kernel
+def add_report(total, table):
+    """Add a report `table` (worlds, REPORT_SIZE) to that of steps before (`add_rows`)."""
+    add_rows(0, table.shape[0], total, table)
 
 
 class StepReport:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -14,7 +14,7 @@ from physics.kernels.state.contact_law_dispatch import LAW_STIFFNESS
 from physics.scene.effects import RESISTANCES, Friction
 from physics.scene.force_field import Field, FieldSlot, write_columns
 from physics.summary import shown
-from physics.world import parameters
+from physics.world import choice, parameters
 from physics.world.batch import Batch
 from physics.world.wall_distance import geometric_centres, wall_gaps
 
@@ -35,6 +35,58 @@ def set_state(world: Batch, pos, quat, linvel, angvel, worlds) -> None:
     """`World.set_state`, which documents it."""
     chosen = _chosen(world, worlds)
     rows = _rows(world, chosen)
+    state = _new_state(world, chosen, rows, pos, quat, linvel, angvel)
+    _adopt(world, chosen, rows, state, world.params[rows], "set_state")
+    if world.actuation is not None:
+        world.actuation.forget(chosen)
+
+
+def set_parameters(world: Batch, mass, size, inertia_body, friction, restitution, gravity, effects, worlds) -> None:
+    """`World.set_parameters`, which documents it."""
+    chosen = _chosen(world, worlds)
+    rows = _rows(world, chosen)
+    params = _new_parameters(world, chosen, rows, mass, size, inertia_body, friction, restitution, effects)
+    field = None if gravity is None else _new_gravity(world, chosen, gravity)
+    _adopt(world, chosen, rows, world.state[rows], params, "set_parameters", keep_memory=size is None)
+    if field is not None:
+        world.gravity[chosen] = field
+
+
+def start_anew(world: Batch, worlds, state: Mapping, given: Mapping, what: str = "start") -> None:
+    """Give worlds new states and new parameters at once; after an error nothing has changed.
+
+    Both are checked together: neither the old state with the new sizes nor the reverse needs to be possible.
+
+    Parameters
+    ----------
+    world : Batch
+    worlds : (k,) int array_like
+    state : mapping
+        Arguments of `World.set_state`.
+    given : mapping
+        Arguments of `World.set_parameters`.
+    what : str
+        What an error about the place of a body begins with.
+    """
+    chosen = _chosen(world, worlds)
+    rows = _rows(world, chosen)
+    given = dict(given)
+    gravity = given.pop("gravity", None)
+    new = _new_state(world, chosen, rows, **{**dict.fromkeys(("pos", "quat", "linvel", "angvel")), **state})
+    params = world.params[rows]
+    if given:
+        names = ("mass", "size", "inertia_body", "friction", "restitution", "effects")
+        params = _new_parameters(world, chosen, rows, **{**dict.fromkeys(names), **given})
+    field = None if gravity is None else _new_gravity(world, chosen, gravity)
+    _adopt(world, chosen, rows, new, params, what)
+    if field is not None:
+        world.gravity[chosen] = field
+    if world.actuation is not None:
+        world.actuation.forget(chosen)
+
+
+def _new_state(world: Batch, chosen, rows, pos, quat, linvel, angvel) -> np.ndarray:
+    """Rows of the state with what is not None in place of what was."""
     state = world.state[rows]
     given = (("pos", pos, at.POS, 3), ("quat", quat, at.QUAT, 4), ("linvel", linvel, at.LINVEL, 3),
              ("angvel", angvel, at.ANGVEL, 3))  # fmt: skip
@@ -45,15 +97,11 @@ def set_state(world: Batch, pos, quat, linvel, angvel, worlds) -> None:
         check = validation.unit_quaternion if name == "quat" else validation.finite
         value = check(validation.batch(value, shape, name), shape, name)
         state[:, first : first + size] = value.reshape(-1, size)
-    _adopt(world, chosen, rows, state, world.params[rows], "set_state")
-    if world.actuation is not None:
-        world.actuation.forget(chosen)
+    return state
 
 
-def set_parameters(world: Batch, mass, size, inertia_body, friction, restitution, gravity, effects, worlds) -> None:
-    """`World.set_parameters`, which documents it."""
-    chosen = _chosen(world, worlds)
-    rows = _rows(world, chosen)
+def _new_parameters(world: Batch, chosen, rows, mass, size, inertia_body, friction, restitution, effects) -> np.ndarray:
+    """Rows of the parameters with what is not None in place of what was."""
     params = world.params[rows]
     plan, shape = world.plan, (len(chosen), world.body_count)
     if mass is not None or size is not None or inertia_body is not None:
@@ -65,28 +113,33 @@ def set_parameters(world: Batch, mass, size, inertia_body, friction, restitution
         _needs("restitution", plan.restitution, "physics.Contact(restitution=...)")
         params[:, at.RESTITUTION] = validation.share(*parameters.spread(restitution, shape, "restitution")).ravel()
     if effects is not None:
-        if isinstance(effects, (str, bytes)):
-            raise ValueError(f"effects is {shown(effects)}; allowed is a list of effects")
-        effects = tuple(effects) if isinstance(effects, Iterable) else (effects,)
-        laws = [effect for effect in effects if isinstance(effect, (*RESISTANCES, Friction))]
-        for effect in laws:
-            if sum(type(effect) is type(other) for other in laws) > 1:
-                raise ValueError(f"effects holds several {type(effect).__name__}; allowed is one")
-            _needs(type(effect).__name__, world.scene.effect(type(effect)), f"physics.{type(effect).__name__}(...)")
-            if isinstance(effect, Friction):
-                _check_axis(effect, world.scene.effect(Friction))
-                params[:, at.FRICTION] = effect.along
-        parameters.write_laws(params, plan.laws, laws)
-        fields = [effect for effect in effects if effect not in laws]
-        write_columns(_changed_slots(world, fields), params[:, at.PARAM_SIZE :], world.body_count, chosen)
-    field = None
-    if gravity is not None:
-        _needs("gravity", plan.gravity, "physics.Gravity(...)")
-        field = validation.batch(gravity, (len(chosen), 1, 3), "gravity")[:, 0]
-        field = validation.finite(field, field.shape, "gravity")
-    _adopt(world, chosen, rows, world.state[rows], params, "set_parameters", keep_memory=size is None)
-    if field is not None:
-        world.gravity[chosen] = field
+        _write_effects(world, chosen, params, effects)
+    return params
+
+
+def _write_effects(world: Batch, chosen, params, effects) -> None:
+    """Laws of contact and force fields into rows of the parameters."""
+    if isinstance(effects, (str, bytes)):
+        raise ValueError(f"effects is {shown(effects)}; allowed is a list of effects")
+    effects = tuple(effects) if isinstance(effects, Iterable) else (effects,)
+    laws = [effect for effect in effects if isinstance(effect, (*RESISTANCES, Friction))]
+    for effect in laws:
+        if sum(type(effect) is type(other) for other in laws) > 1:
+            raise ValueError(f"effects holds several {type(effect).__name__}; allowed is one")
+        _needs(type(effect).__name__, world.scene.effect(type(effect)), f"physics.{type(effect).__name__}(...)")
+        if isinstance(effect, Friction):
+            _check_axis(effect, world.scene.effect(Friction))
+            params[:, at.FRICTION] = effect.along
+    parameters.write_laws(params, world.plan.laws, laws)
+    fields = [effect for effect in effects if effect not in laws]
+    write_columns(_changed_slots(world, fields), params[:, at.PARAM_SIZE :], world.body_count, chosen)
+
+
+def _new_gravity(world: Batch, chosen, gravity) -> np.ndarray:
+    """(k, 3) gravity of the chosen worlds [m/s²]."""
+    _needs("gravity", world.plan.gravity, "physics.Gravity(...)")
+    field = validation.batch(gravity, (len(chosen), 1, 3), "gravity")[:, 0]
+    return validation.finite(field, field.shape, "gravity")
 
 
 def check_place(world: Batch, state: np.ndarray, params: np.ndarray, chosen: np.ndarray, what: str) -> None:
@@ -212,26 +265,7 @@ def _changed_slots(world: Batch, effects) -> list[FieldSlot]:
 
 def _chosen(world: Batch, worlds) -> np.ndarray:
     """Indices (k,) int64 of the worlds meant by what a user gives."""
-    if worlds is None:
-        return np.arange(world.worlds)
-    try:
-        chosen = np.asarray(worlds)
-    except ValueError:  # ragged
-        raise _no_worlds(world, worlds) from None
-    if chosen.dtype == bool and chosen.shape == (world.worlds,):
-        chosen = np.flatnonzero(chosen)
-    if chosen.ndim != 1 or (chosen.size and not np.issubdtype(chosen.dtype, np.integer)):
-        raise _no_worlds(world, worlds)
-    if chosen.size and not (chosen.min() >= 0 and chosen.max() < world.worlds):
-        raise ValueError(f"worlds is {shown(worlds)}; allowed are indices from 0 to {world.worlds - 1}")
-    if not (chosen[1:] > chosen[:-1]).all() and len(np.unique(chosen)) < len(chosen):
-        raise ValueError(f"worlds is {shown(worlds)}; allowed is each world once")
-    return chosen.astype(np.int64)
-
-
-def _no_worlds(world: Batch, worlds) -> ValueError:
-    allowed = f"a list of indices from 0 to {world.worlds - 1}, or a mask of {world.worlds} bools"
-    return ValueError(f"worlds is {shown(worlds)}; allowed is {allowed}")
+    return np.arange(world.worlds) if worlds is None else choice.chosen(worlds, world.worlds)
 
 
 def _rows(world: Batch, chosen: np.ndarray) -> np.ndarray:

@@ -2,12 +2,25 @@
 
 from __future__ import annotations
 
+import io
+import json
+import os
 from dataclasses import dataclass
+from pathlib import Path
+from typing import BinaryIO
+from zipfile import is_zipfile
 
 import numpy as np
 
+from physics import validation
 from physics.kernels.compile.compiler_choice import COMPILER
+from physics.kernels.state import layout as at
 from physics.summary import lines_repr
+from physics.version import version
+
+# Number of the format of files; a reader refuses what is newer than itself.
+FORMAT = 1
+KIND = "snapshot"
 
 # Arrays that decide how a `World` goes on, in the order of `Snapshot.arrays`; the last one where bodies may sleep.
 KEPT = ("state", "params", "gravity", "memory", "report_table", "sleep")
@@ -17,15 +30,120 @@ KEPT = ("state", "params", "gravity", "memory", "report_table", "sleep")
 class Snapshot:
     """Everything that decides how a `World` goes on: states, warm starts, parameters, time, the actuator's memory.
 
-    `compiler` is the one that made it (`physics.kernels.compile.compiler_choice`): with another one a world goes on
-    with other last bits.
+    Parameters
+    ----------
+    arrays : tuple of float64 arrays
+        Of `KEPT`; rows are those of its first world, then of its second, and so on.
+    time : float
+        Of the batch that it was taken of [s].
+    actuation : tuple or None
+        Wrench that the actuator's lag has reached, (worlds * bodies, 6), and its delayed commands: a list of the time
+        at which each was given [s] and the command (worlds * bodies, 6). None without an actuator.
+    compiler : str
+        The one that made it (`physics.kernels.compile.compiler_choice`): with another one a world goes on with other
+        last bits.
+    is_read : bool
+        It is of a file: whoever restores it looks at its numbers first.
     """
 
     arrays: tuple[np.ndarray, ...]
     time: float
     actuation: tuple | None = None
     compiler: str = COMPILER
+    is_read: bool = False
+
+    @property
+    def worlds(self) -> int:
+        """Number of worlds that it is of."""
+        return len(self.arrays[KEPT.index("gravity")])
+
+    def renew(self, time: float, actuation: tuple | None) -> None:
+        """Be of another moment: whoever has overwritten `arrays` calls this (`World.snapshot` with `out`)."""
+        for name, value in (("time", time), ("actuation", actuation), ("compiler", COMPILER), ("is_read", False)):
+            object.__setattr__(self, name, value)
+
+    def save(self, path: str | os.PathLike) -> Path:
+        """Write it as ``.npz`` (`load` reads it); returns the path.
+
+        Parameters
+        ----------
+        path : str or Path
+        """
+        with open(validation.path(path), "wb") as file:
+            self.write(file)
+        return Path(path)
+
+    def write(self, file: BinaryIO) -> None:
+        """Write it into an open file, as `save` does."""
+        head = {"kind": KIND, "format": FORMAT, "compiler": self.compiler, "version": version()}
+        parts = dict(zip(KEPT, self.arrays))
+        if self.actuation is not None:
+            output, late = self.actuation
+            parts["actuator_output"] = output
+            parts["actuator_times"] = np.array([given for given, _ in late], dtype=np.float64)
+            parts["actuator_commands"] = np.array([command for _, command in late]).reshape(-1, *output.shape)
+        np.savez_compressed(file, head=json.dumps(head), time=np.float64(self.time), **parts)
+
+    @classmethod
+    def load(cls, path: str | os.PathLike) -> Snapshot:
+        """Read a snapshot that `save` has written, bit for bit; nothing in a file is run.
+
+        Parameters
+        ----------
+        path : str or Path
+
+        Raises
+        ------
+        ValueError
+            It is no snapshot, a damaged one, or one of a newer format.
+        OSError
+            The file cannot be read.
+        """
+        return cls.read(io.BytesIO(Path(validation.path(path)).read_bytes()), path)
+
+    @classmethod
+    def read(cls, content: BinaryIO, path: str | os.PathLike) -> Snapshot:
+        """Read the content of a file as `load` does; `path` is its name in an error."""
+        allowed = "allowed is what Snapshot.save writes (.npz)"
+        if not is_zipfile(content):
+            raise ValueError(f"{path} is no snapshot; {allowed}")
+        try:
+            with np.load(content, allow_pickle=False) as file:
+                parts = dict(file)
+            head = json.loads(str(parts["head"]))
+            if head["kind"] != KIND:
+                raise ValueError(f"it is a {head['kind']}")
+            number = validation.count(head["format"], "its format")
+            found = _from_parts(parts, str(head["compiler"])) if number <= FORMAT else None
+        except Exception as error:  # whatever is wrong with it, it is none
+            told = f"there is no {error}" if isinstance(error, KeyError) else error
+            raise ValueError(f"{path} is no snapshot ({told}); {allowed}") from None
+        if found is None:
+            raise ValueError(f"{path} has format {number}; allowed are formats up to {FORMAT}")
+        return found
 
     def __repr__(self) -> str:
         shapes = (f"{name} {array.shape}" for name, array in zip(KEPT, self.arrays))
         return lines_repr("Snapshot", f"time={self.time:.6g} s", *shapes, f"compiler={self.compiler}")
+
+
+def _from_parts(parts: dict[str, np.ndarray], compiler: str) -> Snapshot:
+    """Snapshot of the arrays of a file; whether they fit a scene is found out by who restores it."""
+    arrays = tuple(parts[name] for name in KEPT if name != "sleep" or name in parts)
+    rows, worlds = len(parts["state"]), len(parts["gravity"])
+    rows_of = {"state": rows, "params": rows, "gravity": worlds, "report_table": worlds, "sleep": rows}
+    for name, array in zip(KEPT, arrays):
+        if array.ndim != 2 or len(array) != rows_of.get(name, len(array)) or (worlds and rows % worlds):
+            raise ValueError(f"{name} has shape {array.shape}")
+    for name, width in (("state", at.STATE_SIZE), ("gravity", 3), ("report_table", at.REPORT_SIZE)):
+        if parts[name].shape[1] != width:
+            raise ValueError(f"{name} has {parts[name].shape[1]} columns instead of {width}")
+    actuation = None
+    if "actuator_output" in parts:
+        output, times, commands = (parts[f"actuator_{name}"] for name in ("output", "times", "commands"))
+        if output.shape != (rows, 6) or times.ndim != 1 or commands.shape != (len(times), rows, 6):
+            raise ValueError(f"actuator_output has shape {output.shape}, actuator_commands {commands.shape}")
+        actuation = output, list(zip(times.tolist(), commands))
+    if any(array.dtype != np.float64 for name, array in parts.items() if name != "head"):
+        raise ValueError("it holds other numbers than 64-bit floats")
+    return Snapshot(arrays, validation.number(parts["time"], "its time"), actuation, compiler, is_read=True)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -17,6 +17,7 @@ from physics.kernels.state.groups import (
     MultibodySwitches,
     Records,
     TimeGrid,
+    WorkQueue,
 )
 from physics.kernels.time_stepping.spring_coupled_step import step_linked
 from physics.kernels.time_stepping.step import step_worlds
@@ -129,7 +130,7 @@ class Stepper:
         calls = kernel_calls(self.world, self._wrench, self.steps, self.dt)
         if self._then is not None:
             following = [self._then(taken) for taken in self.world.team.taken]
-            if _takes_each_step(self.world) and self.steps > 1:  # with calls of their own
+            if takes_each_step(self.world) and self.steps > 1:  # with calls of their own
                 self._afterwards = following
             else:
                 calls = [first.then(second) for first, second in zip(calls, following, strict=True)]
@@ -142,7 +143,7 @@ class Stepper:
         return {**vars(self), **machine_code}
 
 
-def _takes_each_step(world: Batch) -> bool:
+def takes_each_step(world: Batch) -> bool:
     """A call of several steps is made step by step, since the actuator is asked at each."""
     return world.actuation is not None and world.actuation.actuator.remembers
 
@@ -155,7 +156,9 @@ def _is_all(world: Batch, calls: list[Work]) -> bool:
     return len(calls) == 1 and world.actuation is None and not world.plan.fields
 
 
-def kernel_calls(world: Batch, wrench: np.ndarray, steps: int, dt: float) -> list[Work]:
+def kernel_calls(
+    world: Batch, wrench: np.ndarray, steps: int, dt: float, queues: Sequence[WorkQueue] | None = None
+) -> list[Work]:
     """One call of the step kernel for each thread, all arguments bound.
 
     Parameters
@@ -168,15 +171,18 @@ def kernel_calls(world: Batch, wrench: np.ndarray, steps: int, dt: float) -> lis
         Where an actuator remembers, a call takes one of them.
     dt : float
         [s].
+    queues : sequence of WorkQueue, optional
+        Worlds that each thread may take, instead of those of its team.
     """
     plan = world.plan
+    queues = world.team.queues if queues is None else queues
     if world.actuation is not None:
         wrench = world.actuation.applied
     grid = _time_grid(world, steps, dt)
     kernel, own_arguments = _step_of(plan)
     gravity = world.gravity if plan.gravity else None
     bodies = BodyArrays(world.state, world.params, world.shapes, gravity, wrench.reshape(-1, 6))
-    argument_lists = [(queue, grid, bodies, *own_arguments(world, k)) for k, queue in enumerate(world.team.queues)]
+    argument_lists = [(queue, grid, bodies, *own_arguments(world, k)) for k, queue in enumerate(queues)]
     entry = _entry(kernel, (plan.key, len(world.walls)), argument_lists[0])
     return [Work([(entry, arguments)]) for arguments in argument_lists]
 
@@ -190,7 +196,7 @@ def retime(world: Batch, calls: list[Work], steps: int, dt: float) -> None:
 def _time_grid(world: Batch, steps: int, dt: float) -> TimeGrid:
     """Time that a kernel is called for."""
     substeps = world.accuracy.substeps
-    return TimeGrid(1 if _takes_each_step(world) else steps, substeps, dt / substeps)
+    return TimeGrid(1 if takes_each_step(world) else steps, substeps, dt / substeps)
 
 
 def _step_of(plan: Plan) -> tuple[Callable, Callable[[Batch, int], tuple]]:

@@ -22,7 +22,7 @@ from physics.plan.plan import SHAPE_CODES, make_plan
 from physics.scene.effects import Actuator, Friction, RollingFriction, SpinFriction
 from physics.scene.force_field import Field
 from physics.scene.scene import Scene
-from physics.world import batch_arrays, parameters, setters
+from physics.world import batch_arrays, parameters, restoring, setters
 from physics.world.actuator import Actuation
 from physics.world.batch import Batch
 from physics.world.contact_report import contact_ends, contact_forces
@@ -312,45 +312,61 @@ class World(Batch):
 
     # --- keeping and looking -----------------------------------------------------------------------------------
 
+    @known_keywords
     @exclusive
-    def snapshot(self) -> Snapshot:
-        """All that decides the future, copied; `restore` continues bit-identically, warm starts and all."""
-        actuation = None if self.actuation is None else self.actuation.kept()
-        return Snapshot(tuple(array.copy() for array in self.kept()), self.time, actuation)
+    def snapshot(self, worlds: ArrayLike | None = None, out: Snapshot | None = None) -> Snapshot:
+        """All that decides the future, copied; `restore` continues bit-identically, warm starts and all.
 
-    def restore(self, snapshot: Snapshot) -> None:
-        """Go back to a snapshot of this world, or of one of the same scene and batch size.
+        Parameters
+        ----------
+        worlds : (k,) int array_like, optional
+            Indices of the worlds meant, or a mask; None: all.
+        out : Snapshot, optional
+            One of as many worlds, to be overwritten and returned: faster where a snapshot is taken often.
 
         Raises
         ------
         ValueError
-            It is no `Snapshot`, or one of other sizes. Nothing has changed then.
+            A world named twice or not there, or `out` of another size. Nothing has changed then.
         """
-        validation.instance(snapshot, Snapshot, "snapshot", "a physics.Snapshot, as `World.snapshot` gives it")
-        if self.is_torn:
+        return restoring.take(self, worlds, out)
+
+    @known_keywords
+    def restore(
+        self, snapshot: Snapshot, worlds: ArrayLike | None = None, source: ArrayLike | int | None = None
+    ) -> None:
+        """Let worlds go on from a snapshot of this scene, bit for bit as those that it was taken of.
+
+        Parameters
+        ----------
+        snapshot : Snapshot
+            Of any batch of this scene, `World.snapshot`.
+        worlds : (k,) int array_like, optional
+            Indices of the worlds of this batch that change, each once, or a mask; None: all.
+        source : (k,) int array_like or int, optional
+            Worlds of the snapshot from which these go on; one may be named several times, and an int is for all. None:
+            the snapshot has one world, for all of them, or k worlds, in this order.
+
+        Raises
+        ------
+        ValueError
+            It is no `Snapshot`, or one of another scene; indices out of range or of another number; or some worlds
+            would go on at another time than the batch's, in a scene with a field that may change with time. Nothing
+            has changed then.
+
+        Notes
+        -----
+        A batch has one `time`. It becomes the snapshot's where all worlds are restored, and stays otherwise.
+        Commands that a delayed actuator still holds keep their age.
+        """
+        at_places = restoring.places(self, snapshot, worlds, source)
+        if self.is_torn and at_places.is_all:
             self.is_free, self.is_torn = True, False  # the thread of the parent process is not there to finish its step
-        self._restore(snapshot)
+        self._restore(snapshot, at_places)
 
     @exclusive
-    def _restore(self, snapshot: Snapshot) -> None:
-        kept = self.kept()
-        if [array.shape for array in kept] != [np.shape(array) for array in snapshot.arrays]:
-            raise ValueError(
-                f"snapshot is {snapshot!r}, of another scene or batch size; allowed is one of this scene, of "
-                f"{self.worlds} worlds"
-            )
-        if any(array.dtype != value.dtype for array, value in zip(kept, snapshot.arrays)):
-            raise ValueError(f"snapshot is {snapshot!r}; allowed are arrays of 64-bit numbers, as they were taken")
-        for array, value in zip(kept, snapshot.arrays):
-            array[...] = value
-        self.time = snapshot.time
-        if self.actuation is not None:
-            if snapshot.actuation is None:  # of a world without an actuator: there is nothing to go on with
-                self.actuation.forget(np.arange(self.worlds))
-            else:
-                self.actuation.put_back(snapshot.actuation)
-        if self.recorder is not None:
-            self.recorder.changed(slice(None))
+    def _restore(self, snapshot: Snapshot, at_places: restoring.Places) -> None:
+        restoring.put(self, snapshot, at_places)
 
     def contacts(self, world: int = 0) -> tuple[np.ndarray, np.ndarray]:
         """Contact points and forces of one world's last step.

@@ -58,6 +58,8 @@ def in_python() -> dict[tuple, dict]:
 @pytest.mark.parametrize("job", JOBS, ids=lambda job: f"{job[0]}-{job[1]}")
 def test_python_gives_the_numbers_of_machine_code(job, in_python):
     compiled, interpreted = trajectory(*job), in_python[job]
+    assert compiled["is_rolled_out"]
+    assert interpreted["is_rolled_out"]
     change = first_change(compiled)
     assert first_change(interpreted) == change
     states = differences(compiled, interpreted, "state")
@@ -71,6 +73,7 @@ def test_plain_numba_gives_the_bits_of_python():
     """With one thread and with two, in a process that may not import `fused`."""
     alone, shared = ("drop", "fast", 80), ("drop", "fast", 80, 2)
     (one, two), (meant, of_threads) = (by_compiler(compiler, [alone, shared]) for compiler in (NUMBA, PYTHON))
+    assert one["is_rolled_out"]
     assert one == meant
     assert two == meant
     assert of_threads == meant

@@ -16,9 +16,15 @@ from physics.kernels.compile.compiler_choice import VARIABLE
 
 
 def trajectory(scene: str, preset: str, steps: int, threads: int = 1) -> dict:
-    """States (steps, numbers) of a scene, and after each step its contacts, impacts, energy and deepest penetration."""
+    """States (steps, numbers) of a scene, and after each step its contacts, impacts, energy and deepest penetration.
+
+    And whether a rollout (`physics.rollout`) has the same bits.
+    """
     world = physics.World(SCENES[scene](), worlds=2, dt=DT, accuracy=preset, threads=threads)
     found: dict[str, list] = {name: [] for name in ("state", "solves", "impacts", "energy", "momentum", "depth")}
+    start = world.snapshot()
+    rolled = physics.rollout(world, np.zeros((2, steps, world.body_count, 6)))
+    world.restore(start)
     for _ in range(steps):
         report = world.step()
         numbers = np.concatenate([world.pos, world.quat, world.linvel, world.angvel], axis=-1)
@@ -29,6 +35,8 @@ def trajectory(scene: str, preset: str, steps: int, threads: int = 1) -> dict:
         found["energy"].append(measured.energy.ravel().tolist())
         found["momentum"].append(measured.momentum.ravel().tolist())
         found["depth"].append(report.penetration.tolist())
+    states = np.concatenate([rolled.pos, rolled.quat, rolled.linvel, rolled.angvel], axis=-1)
+    found["is_rolled_out"] = np.array_equal(states.swapaxes(0, 1).reshape(steps, -1), found["state"])
     return found
 
 

@@ -50,6 +50,7 @@ def test_a_scene_comes_back(name):
     assert back.effects == scene.effects
     for body, again in zip(scene.bodies, back.bodies, strict=True):
         assert type(again) is type(body)
+        assert again.name == body.name
         assert (again.mass, again.pos, again.quat, again.linvel) == (body.mass, body.pos, body.quat, body.linvel)
         assert np.array_equal(again.dimensions, body.dimensions)
         assert again.center == body.center
@@ -192,6 +193,15 @@ REFUSED = [
 def test_what_a_scene_cannot_hold_is_named(text, message):
     with pytest.raises(ValueError, match=f"^here: .*({message})"):
         from_mjcf(text, "here")
+
+
+def test_names_come_back_and_none_is_given_twice():
+    ball, cart = physics.Sphere(1, 1), physics.Sphere(1, 1, name="cart")
+    assert [body.name for body in from_mjcf(to_mjcf(physics.Scene([ball, cart]))).bodies] == [None, "cart"]
+    assert from_mjcf(to_mjcf(physics.Scene([cart])).replace('"cart"', '""')).bodies[0].name is None
+    other = physics.Sphere(1, 1, name="body0")
+    with pytest.raises(ValueError, match=r"Scene.bodies\[1\] has the name 'body0', which MJCF gives to .*bodies\[0\]"):
+        to_mjcf(physics.Scene([ball, other]))
 
 
 def test_what_mjcf_cannot_express_is_refused_or_named(tmp_path):

@@ -11,13 +11,13 @@ import pytest
 
 import physics
 from physics import scenes
-from physics.io.toml import from_toml, to_toml
+from physics.io.toml import file_from_toml, from_toml, to_toml
 
 EVERYTHING = physics.Scene(
     [
         physics.Block((5, 3, 2), 6.0, pos=(0.1, 0.2, 0.3), quat=(0.5, 0.5, -0.5, 0.5), center=(0.1, 0, 0),
                       inertia_body=((3, 0.1, 0), (0.1, 4, 0), (0, 0, 5))),
-        physics.Sphere(0.1, 1 / 3, linvel=(1e-300, -2.5e17, 0)),
+        physics.Sphere(0.1, 1 / 3, linvel=(1e-300, -2.5e17, 0), name="ball"),
         physics.Ellipsoid((1, 2, 3), 4.0, angvel=(1, 2, 3)),
     ],
     [physics.HalfSpace((1, 2, 3), -0.7)],
@@ -90,6 +90,13 @@ MISTAKES = [
         BALL + "[[effects]]\nkind = 'Gravity'\n[[effects]]\nkind = 'Push'\nbody = 4\n",
         "line 7: Push.body is 4; allow",
     ),
+    (BALL + "name = ' '\n", r"line 5: bodies\[0\]: name is ' '; allowed are printable characters"),
+    (
+        BALL + "name = 'a'\n" + BALL + "name = 'a'\n",
+        r"line 6: Scene.bodies\[1\] has the name 'a', as Scene.bodies\[0\]; allowed are different names",
+    ),
+    (BALL + "[enviroment]\n", "line 5: enviroment is not known; allowed are environment, format, bodies"),
+    (BALL + "[[environment]]\n", r"line 5: environment is \[\{\}\]; allowed is a table \[environment\]"),
     ("bodies = [{kind = 'Sphere', radius = 1, mass = 0}]", r"line 1: bodies\[0\]: mass is 0.0; allowed are"),
 ]
 
@@ -105,6 +112,27 @@ def test_a_density_may_stand_in_the_file(tmp_path):
     assert scene.bodies[0].mass == 3 * scene.bodies[0].volume
     assert "density" not in to_toml(scene)
     assert from_toml(to_toml(scene)) == scene
+
+
+def test_a_table_of_another_program_is_handed_back_with_its_lines():
+    text = BALL + "[environment]\ndriven = [0]\ngoal = {body = 0}\n[environment . start]\n\npos = 1 # [m]\n"
+    file = file_from_toml(text, "here")
+    assert file.scene == from_toml(BALL)
+    assert file.others == {"environment": {"driven": [0], "goal": {"body": 0}, "start": {"pos": 1}}}
+    lines = {
+        ("environment", "driven"): 6, ("environment", "dt"): 5, ("environment", None): 5,
+        ("environment.goal", "body"): 7, ("environment.start", "pos"): 10, ("environment.start", None): 8,
+    }  # fmt: skip
+    for (table, key), line in lines.items():
+        assert str(file.places.error_in_table(table, key, "no")) == f"here, line {line}: {table}: no"
+
+
+def test_a_key_that_is_missing_is_not_looked_for_in_the_table_behind():
+    text = BALL.replace("mass = 2\n", "points = [\n[1, 2],\n]\n") + "[environment]\nmass = 1\n"
+    with pytest.raises(ValueError, match=r"here, line 4: .*points is not known"):
+        from_toml(text, "here")
+    with pytest.raises(ValueError, match=r"here, line 1: .*mass is None"):
+        from_toml(text.replace("points = [\n[1, 2],\n]\n", ""), "here")
 
 
 def test_a_file_that_cannot_be_read_is_named(tmp_path):

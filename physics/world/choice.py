@@ -1,0 +1,45 @@
+"""Worlds that a user names by their indices."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from physics.summary import shown
+
+
+def chosen(worlds, count: int, field: str = "worlds", once: bool = True) -> np.ndarray:
+    """Indices (k,) int64 of the worlds meant, of `count`; a mask of so many bools names them, too.
+
+    Parameters
+    ----------
+    worlds : (k,) array_like of int, or (count,) of bool
+    count : int
+        Worlds that there are.
+    field : str
+        Name in messages.
+    once : bool
+        Refuse a world that is named twice.
+
+    Raises
+    ------
+    ValueError
+        They are no such indices.
+    """
+    try:
+        found = np.asarray(worlds)
+    except ValueError:  # ragged
+        raise _no_worlds(worlds, count, field) from None
+    if found.dtype == bool and found.shape == (count,):
+        found = np.flatnonzero(found)
+    if found.ndim != 1 or (found.size and not np.issubdtype(found.dtype, np.integer)):
+        raise _no_worlds(worlds, count, field)
+    if found.size and not (found.min() >= 0 and found.max() < count):
+        raise ValueError(f"{field} is {shown(worlds)}; allowed are indices from 0 to {count - 1}")
+    if once and not (found[1:] > found[:-1]).all() and len(np.unique(found)) < len(found):
+        raise ValueError(f"{field} is {shown(worlds)}; allowed is each world once")
+    return found.astype(np.int64)
+
+
+def _no_worlds(worlds, count: int, field: str) -> ValueError:
+    allowed = f"a list of indices from 0 to {count - 1}, or a mask of {count} bools"
+    return ValueError(f"{field} is {shown(worlds)}; allowed is {allowed}")

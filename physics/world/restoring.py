@@ -1,0 +1,183 @@
+"""Snapshots of a batch, and worlds that go on from one: from other places, and in batches of other sizes, too."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from physics import validation
+from physics.kernels.forces.wind import WIND_GUST
+from physics.kernels.state import layout as at
+from physics.plan.plan import Plan
+from physics.scene.force_fields import Wind
+from physics.summary import shown
+from physics.world import choice
+from physics.world.batch import Batch
+from physics.world.snapshot import KEPT, Snapshot
+from physics.world.warm_starts import check_numbers, copy_memory
+
+
+class Places(NamedTuple):
+    """Worlds that go on from worlds of a snapshot."""
+
+    worlds: np.ndarray | None  # (k,) indices into the batch; None: all
+    source: np.ndarray | None  # (k,) indices into the snapshot; None: its one world, or its worlds in their order
+    is_all: bool  # every world of the batch is among them
+
+
+def take(world: Batch, worlds, out: Snapshot | None) -> Snapshot:
+    """`World.snapshot`, which documents it."""
+    chosen = None if worlds is None else choice.chosen(worlds, world.worlds)
+    kept, rows = world.kept(), world.kept_rows()
+    actuation = None if world.actuation is None else world.actuation.kept(chosen)
+    if chosen is None:
+        parts = kept
+    else:
+        parts = tuple(_by_world(array, n, world.worlds)[chosen] if n else array for array, n in zip(kept, rows))
+    if out is None:
+        arrays = (part.copy() if part is array else part.reshape(-1, array.shape[-1])
+                  for part, array in zip(parts, kept))  # fmt: skip
+        return Snapshot(tuple(arrays), world.time, actuation)
+    count = world.worlds if chosen is None else len(chosen)
+    validation.instance(out, Snapshot, "out", "None or a physics.Snapshot")
+    if not (_fits(world, out, count) and all(array.flags.writeable for array in out.arrays)):
+        raise ValueError(f"out is {out!r}; allowed is a snapshot of this scene, of {count} worlds, that can be written")
+    for target, part, array in zip(out.arrays, parts, kept):
+        _copy(world, part.reshape(target.shape), target, array is world.memory)
+    out.renew(world.time, actuation)
+    return out
+
+
+def places(world: Batch, snapshot: Snapshot, worlds, source) -> Places:
+    """Check arguments of `World.restore`, which documents them: the worlds meant."""
+    validation.instance(snapshot, Snapshot, "snapshot", "a physics.Snapshot, as `World.snapshot` gives it")
+    if worlds is None and source is None and not snapshot.is_read and _is_alike(world, snapshot):  # the most frequent
+        return Places(None, None, True)
+    chosen = None if worlds is None else choice.chosen(worlds, world.worlds)
+    count = world.worlds if chosen is None else len(chosen)
+    held = _world_count(world, snapshot, count)
+    if snapshot.is_read:
+        check_numbers(world, snapshot)
+    if source is None:
+        if held not in (1, count):
+            raise _other_snapshot(snapshot, count)
+        if chosen is not None and held == 1:
+            source = np.zeros(count, dtype=np.int64)
+    elif np.ndim(source) == 0:
+        source = np.full(count, validation.index(source, held, "source"))
+    else:
+        given, source = source, choice.chosen(source, held, "source", once=False)
+        if len(source) != count:
+            raise ValueError(f"source is {shown(given)}; allowed is one index, or {count}, for each world restored")
+    return Places(chosen, source, count == world.worlds)
+
+
+def put(world: Batch, snapshot: Snapshot, at_places: Places) -> None:
+    """Let worlds go on from a snapshot; arguments as checked by `places`."""
+    chosen, source, is_all = at_places
+    if not is_all and snapshot.time != world.time:
+        _check_clock(world, snapshot)
+    where = slice(None) if chosen is None else chosen
+    for array, value, n in zip(world.kept(), snapshot.arrays, world.kept_rows()):
+        if value.shape == array.shape and chosen is None and source is None:
+            _copy(world, value, array, array is world.memory)
+        elif n:
+            rows = _by_world(value, n, snapshot.worlds)
+            _by_world(array, n, world.worlds)[where] = rows if source is None else rows[source]
+    if world.actuation is not None:
+        _put_actuation(world, snapshot, at_places)
+    if is_all:
+        world.time = snapshot.time
+    if world.recorder is not None:
+        world.recorder.changed(where)
+
+
+def _put_actuation(world: Batch, snapshot: Snapshot, at_places: Places) -> None:
+    chosen = np.arange(world.worlds) if at_places.worlds is None else at_places.worlds
+    if snapshot.actuation is None:  # of a world without an actuator: there is nothing to go on with
+        world.actuation.forget(chosen)
+        return
+    source = np.arange(snapshot.worlds) if at_places.source is None else at_places.source
+    source = np.broadcast_to(source, len(chosen))
+    world.actuation.put_worlds(
+        snapshot.actuation, source, chosen, None if at_places.is_all else world.time - snapshot.time
+    )
+
+
+def _copy(world: Batch, source: np.ndarray, target: np.ndarray, is_memory: bool) -> None:
+    """Copy one of the kept arrays, of all its worlds."""
+    if is_memory:
+        copy_memory(world, source, target)
+    else:
+        target[...] = source
+
+
+def _by_world(array: np.ndarray, rows: int, worlds: int) -> np.ndarray:
+    """(worlds, numbers of one) view of an array in which a world has so many rows."""
+    return array.reshape(worlds, rows * array.shape[-1])
+
+
+def _is_alike(world: Batch, snapshot: Snapshot) -> bool:
+    """True for a snapshot of so many worlds of such a scene."""
+    return _fits(world, snapshot, world.worlds)
+
+
+def _fits(world: Batch, snapshot: Snapshot, count: int) -> bool:
+    """True if the arrays of a snapshot are those of so many worlds of this scene."""
+    kept, arrays = world.kept(), snapshot.arrays
+    if len(arrays) != len(kept):
+        return False
+    for array, value, rows in zip(kept, arrays, world.kept_rows()):
+        if not isinstance(value, np.ndarray) or value.dtype != array.dtype:
+            return False
+        if value.shape != (rows * count if rows else len(array), array.shape[1]):
+            return False
+    return world.actuation is None or _fits_actuation(snapshot.actuation, count * world.body_count)
+
+
+def _fits_actuation(actuation: tuple | None, rows: int) -> bool:
+    if actuation is None:
+        return True
+    output, late = actuation
+    return all(np.shape(table) == (rows, 6) for table in (output, *(command for _, command in late)))
+
+
+def _world_count(world: Batch, snapshot: Snapshot, count: int) -> int:
+    """Worlds of a snapshot of this scene, to be restored to `count` worlds."""
+    if any(getattr(value, "dtype", None) != np.float64 for value in snapshot.arrays):
+        raise ValueError(f"snapshot is {snapshot!r}; allowed are arrays of 64-bit numbers, as they were taken")
+    held = snapshot.worlds if len(snapshot.arrays) == len(world.kept()) else 0
+    if not _fits(world, snapshot, held):
+        raise _other_snapshot(snapshot, count)
+    return held
+
+
+def _other_snapshot(snapshot: Snapshot, count: int) -> ValueError:
+    sizes = "1 world" if count == 1 else f"1 world or of {count} worlds"
+    return ValueError(
+        f"snapshot is {snapshot!r}, of another scene or batch size; allowed is one of this scene, of {sizes}, or of "
+        "any number with `source`, which names those to take"
+    )
+
+
+def _check_clock(world: Batch, snapshot: Snapshot) -> None:
+    """Refuse to restore some worlds to another time of fields that change with it: a batch has one time."""
+    if _reads_time(world.plan, world.params) or _reads_time(world.plan, snapshot.arrays[KEPT.index("params")]):
+        raise ValueError(
+            f"snapshot is of time {snapshot.time!r} s, and the batch of time {world.time!r} s, in a scene with a field "
+            "that may change with time; allowed is to restore all worlds, or a snapshot of the same time "
+            "(dataclasses.replace(snapshot, time=world.time), if the time does not matter)"
+        )
+
+
+def _reads_time(plan: Plan, params: np.ndarray) -> bool:
+    """True if a field may change with time: wind with gusts, or a user's that does not say that it is steady."""
+    for slot in plan.fields:
+        if slot.is_users and not all(effect.is_steady for effect in slot.effects):
+            return True
+        if slot.kind is Wind:
+            gusts = at.PARAM_SIZE + slot.first + WIND_GUST + slot.term.size * np.arange(slot.term.count)
+            if params[:, gusts].any():
+                return True
+    return False

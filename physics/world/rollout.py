@@ -1,0 +1,216 @@
+"""Rollouts: many steps of every world of a batch, with a wrench for each, and the states along the way."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from physics import validation
+from physics.kernels.state import layout as at
+from physics.keywords import known_keywords
+from physics.parallel.exclusive import exclusive
+from physics.summary import lines_repr, shown
+from physics.world import batch_arrays, restoring
+from physics.world.report import StepReport
+from physics.world.rollout_course import advance
+from physics.world.snapshot import Snapshot
+from physics.world.world import World
+
+# Columns of a state that can be kept, and how many numbers each has.
+SIZES = {"pos": 3, "quat": 4, "linvel": 3, "angvel": 3}
+COLUMNS = tuple(SIZES)
+
+MEBIBYTE = 2**20
+
+
+@dataclass(frozen=True, eq=False)
+class Rollout:
+    """States of a batch along a rollout; `samples` of them are kept.
+
+    Attributes
+    ----------
+    pos, quat, linvel, angvel : (worlds, samples, bodies, 3|4|3|3) float64 or None
+        World frame [m, 1, m/s, rad/s]; None: the column was not among those chosen.
+    times : (samples,) float64
+        Time of each state [s].
+    report_table : (worlds, REPORT_SIZE) float64
+        The array behind `report`.
+    """
+
+    pos: np.ndarray | None
+    quat: np.ndarray | None
+    linvel: np.ndarray | None
+    angvel: np.ndarray | None
+    times: np.ndarray
+    report_table: np.ndarray
+
+    @property
+    def columns(self) -> tuple[str, ...]:
+        """Names of the columns that are kept."""
+        return tuple(name for name in COLUMNS if getattr(self, name) is not None)
+
+    @property
+    def report(self) -> StepReport:
+        """Report of all its steps together."""
+        return StepReport(self.report_table)
+
+    @property
+    def status(self) -> np.ndarray:
+        """(worlds,) int64, values of `Status`: the gravest thing that happened in any step."""
+        return self.report.status
+
+    @property
+    def nbytes(self) -> int:
+        """Memory of its arrays [bytes]."""
+        arrays = (*(getattr(self, name) for name in self.columns), self.times, self.report_table)
+        return sum(array.nbytes for array in arrays)
+
+    def __repr__(self) -> str:
+        first = getattr(self, self.columns[0])
+        return lines_repr(
+            "Rollout", f"{len(first)} worlds of {first.shape[2]} bodies", f"{first.shape[1]} states",
+            f"t = {self.times[0]:.6g} to {self.times[-1]:.6g} s", *self.columns, f"ok={self.report.ok}",
+            f"{self.nbytes / MEBIBYTE:.3g} MiB",
+        )  # fmt: skip
+
+
+@known_keywords
+def rollout(
+    world: World,
+    wrenches: ArrayLike,
+    initial: Snapshot | None = None,
+    steps: int = 1,
+    dt: float | None = None,
+    columns: Sequence[str] = COLUMNS,
+    every: int = 1,
+    out: Rollout | None = None,
+) -> Rollout:
+    """Step every world with its own sequence of wrenches, and keep the states.
+
+    The same bits as `World.step` with one wrench after another. The loop over time runs in each thread, over a few
+    worlds at a time. Afterwards the world is where the last step left it, report and time included.
+
+    Parameters
+    ----------
+    world : World
+    wrenches : (worlds, length, bodies, 6) array_like
+        Force [N] and torque about the centre of mass [N m], world frame; each is held over its steps. With an actuator:
+        commands. Of a scene of one body also (worlds, length, 6).
+    initial : Snapshot, optional
+        Where all worlds begin: a snapshot of one world for all of them, or of as many. None: where they are.
+    steps : int
+        Steps with each wrench.
+    dt : float, optional
+        Time of a step, instead of the world's [s].
+    columns : sequence of str
+        Columns to keep, of ``pos``, ``quat``, ``linvel``, ``angvel``.
+    every : int
+        Wrenches from one state that is kept to the next; a divisor of their number, which itself keeps the last state
+        only.
+    out : Rollout, optional
+        One of the same sizes and columns, to be overwritten and returned.
+
+    Returns
+    -------
+    Rollout
+        Its arrays take 8 bytes a number: worlds * length / every * bodies * 13 numbers where all columns are kept.
+        Wrenches that are not contiguous float64 are copied. Everything else is small.
+
+    Raises
+    ------
+    ValueError
+        An argument of the wrong shape or out of range, or more states than this machine's memory holds. Nothing has
+        moved then.
+    RuntimeError
+        Another thread is stepping or changing this world.
+
+    Notes
+    -----
+    With a recorder, an actuator with a delay, or one with a lag and `steps` above 1, each step is made from Python.
+    Where a field of your own raises an exception, the world is put back to where it was before the call.
+
+    Examples
+    --------
+    >>> world = physics.World(physics.scenes.drop(), worlds=64)
+    >>> physics.rollout(world, np.zeros((64, 100, 6)), columns=["pos"], every=100).pos.shape
+    (64, 1, 1, 3)
+    """
+    validation.instance(world, World, "world", "a physics.World")
+    return _rollout(world, wrenches, initial, steps, dt, columns, every, out)
+
+
+@exclusive
+def _rollout(world: World, wrenches, initial, steps, dt, columns, every, out) -> Rollout:
+    wrenches = _wrenches(world, wrenches)
+    length = wrenches.shape[1]
+    steps = validation.count(steps, "steps")
+    dt = world.dt if dt is None else float(validation.positive(dt, (), "dt"))
+    every = validation.count(every, "every")
+    if length % every:
+        raise ValueError(f"every is {every}; allowed are divisors of {length}, the number of wrenches of a world")
+    shapes = {name: (world.worlds, length // every, world.body_count, SIZES[name]) for name in _columns(columns)}
+    places = None if initial is None else restoring.places(world, initial, None, None)
+    found = _room(world, shapes) if out is None else _checked(out, shapes)
+    before = restoring.take(world, None, None) if world.plan.may_raise else None
+    try:
+        if places is not None:
+            restoring.put(world, initial, places)
+        advance(world, wrenches, found, steps, dt, every)
+    except Exception:
+        if before is not None:
+            restoring.put(world, before, restoring.Places(None, None, True))
+        raise
+    return found
+
+
+def _wrenches(world: World, wrenches: ArrayLike) -> np.ndarray:
+    """`wrenches` as contiguous float64 (worlds, length, bodies, 6), all finite."""
+    worlds, bodies = world.worlds, world.body_count
+    allowed = f"({worlds}, length, {bodies}, 6)" + (f" or ({worlds}, length, 6)" if bodies == 1 else "")
+    array = validation.floats(wrenches, "wrenches", f"are numbers in shape {allowed}")
+    if array.ndim == 3 and bodies == 1:
+        array = array[:, :, None]
+    if array.ndim != 4 or array.shape[1] == 0 or (len(array), *array.shape[2:]) != (worlds, bodies, 6):
+        raise ValueError(f"wrenches has shape {np.shape(wrenches)}; allowed is {allowed}, with a length of at least 1")
+    return np.ascontiguousarray(validation.finite(array, array.shape, "wrenches"))
+
+
+def _columns(columns: Sequence[str]) -> list[str]:
+    """Names of the columns to keep, each once."""
+    names = list(columns) if isinstance(columns, Iterable) and not isinstance(columns, str) else [columns]
+    for name in names:
+        validation.one_of(name, COLUMNS, "columns", " and lists of these")
+    if not names or len(set(names)) < len(names):
+        raise ValueError(f"columns is {shown(columns)}; allowed are some of {', '.join(COLUMNS)}, each once")
+    return names
+
+
+def _room(world: World, shapes: dict[str, tuple[int, ...]]) -> Rollout:
+    """Arrays for the states; refused where this machine's memory does not hold them."""
+    samples = next(iter(shapes.values()))[1]
+    needed = 8 * (sum(int(np.prod(shape, dtype=object)) for shape in shapes.values()) + samples)
+    memory = batch_arrays.machine_memory()
+    message = (
+        f"the states of {samples} moments in {world.worlds} worlds need {needed / 2**30:.3g} GiB, and this machine has "
+        f"{memory / 2**30:.3g} GiB of memory; allowed are fewer: raise `every`, or keep fewer `columns`"
+    )
+    if needed > memory:
+        raise ValueError(message)
+    try:
+        arrays = {name: np.empty(shapes[name]) if name in shapes else None for name in COLUMNS}
+        return Rollout(**arrays, times=np.empty(samples), report_table=np.zeros((world.worlds, at.REPORT_SIZE)))
+    except MemoryError:
+        raise ValueError(message) from None
+
+
+def _checked(out: Rollout, shapes: dict[str, tuple[int, ...]]) -> Rollout:
+    """`out`, which must have exactly these arrays."""
+    validation.instance(out, Rollout, "out", "None or a physics.Rollout")
+    arrays = {name: getattr(out, name) for name in out.columns}
+    is_ours = all(array.flags.c_contiguous and array.flags.writeable for array in arrays.values())
+    if {name: array.shape for name, array in arrays.items()} != shapes or not is_ours:
+        raise ValueError(f"out is {out!r}; allowed is one that `rollout` has made, with {shapes}")
+    return out
