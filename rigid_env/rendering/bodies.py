@@ -1,19 +1,18 @@
-"""Convex bodies: culled, flat-shaded faces and outlines, farthest body first."""
+"""Convex bodies: flat-shaded faces and outlines, farthest body first."""
 
 from __future__ import annotations
+
+from itertools import compress
 
 import numpy as np
 
 from rigid_env.rendering import palette
-from rigid_env.rendering.geometry import rotation_matrix
-from rigid_env.rendering.meshes import body_mesh
+from rigid_env.rendering.solids import pose
 
 SILHOUETTE_WIDTH, EDGE_WIDTH = 1.4, 1.0
 """[units] of the canvas."""
 
 SILHOUETTE_DARKENING, EDGE_LIGHTENING = 0.55, 0.38
-OCTANT_LIGHTENING = 0.42
-"""Every second octant of a round body is lighter, so that its rotation can be seen."""
 
 GOAL_FACE_TINT = 0.78
 GOAL_FACE_INSET = 0.86
@@ -30,66 +29,57 @@ def goal_colour(goal):
     return palette.GOAL_REACHED if goal.reached else palette.GOAL
 
 
-def draw_bodies(canvas, bodies, goal):
-    """Draw all bodies on a `Canvas`; `goal` (GoalView or None) may highlight a face of body 0."""
-    _, depths = canvas.project(np.array([b.pos for b in bodies]).reshape(-1, 3))
-    for index in np.argsort(-depths, kind="stable"):
-        face_goal = goal if index == 0 and goal is not None and goal.goal_face is not None else None
-        _draw_body(canvas, bodies[index], body_colour(bodies[index], index), face_goal)
+def draw_bodies(canvas, frame, room):
+    """Draw all bodies of a `Frame` on a `Canvas`; its goal may highlight a face of body 0."""
+    bodies, goal = frame.bodies, frame.goal
+    if not bodies:
+        return
+    colours = [body_colour(body, index) for index, body in enumerate(bodies)]
+    has_goal_face = goal is not None and goal.goal_face is not None and bodies[0].kind == "block"
+    tint = (goal.goal_face, palette.mix(colours[0], goal_colour(goal), GOAL_FACE_TINT)) if has_goal_face else None
+    solids, depths = pose(canvas, frame, np.array(colours, dtype=np.float64), SILHOUETTE_WIDTH, tint)
+    for index in np.argsort(-depths, kind="stable").tolist():
+        _draw_solid(canvas, solids[index], colours[index])
+        if index == 0 and has_goal_face:
+            _draw_goal_face(canvas, solids[0], goal)
 
 
-def _draw_body(canvas, body, colour, goal):
-    mesh = body_mesh(body)
-    R = rotation_matrix(body.quat)
-    vertices, normals = body.pos + mesh.vertices @ R.T, mesh.normals @ R.T
-    towards_eye = canvas.camera.eye - vertices[mesh.faces].mean(axis=1)
-    towards_eye /= np.linalg.norm(towards_eye, axis=1, keepdims=True)
-    is_visible = np.sum(normals * towards_eye, axis=1) > 0.0
-    has_goal_face = goal is not None and body.kind == "block"
-    surface = _surface_colours(mesh, colour)
-    if has_goal_face:
-        surface[goal.goal_face] = palette.mix(colour, goal_colour(goal), GOAL_FACE_TINT)
-    shown = np.flatnonzero(is_visible)
-    lit = palette.shade(surface[shown], normals[shown], towards_eye[shown])
-    pixels, depths = canvas.project(vertices)
-    is_whole = canvas.is_in_sight(pixels, depths)
-    if is_whole:
-        canvas.fill_all(pixels[mesh.faces[shown]], lit)
-    else:
-        for face, face_colour in zip(mesh.faces[shown], lit.tolist()):
-            canvas.polygon(vertices[face], face_colour)
-    _draw_edges(canvas, mesh, vertices, is_visible, colour)
-    if has_goal_face:
-        corners = vertices[mesh.faces[goal.goal_face]]
-        _draw_goal_face(canvas, corners, is_visible[goal.goal_face], goal_colour(goal))
-
-
-def _surface_colours(mesh, colour):
-    """(m, 3) float64 sRGB of the faces, before light: one colour, or two in alternating octants."""
-    colours = np.tile(np.array(colour, dtype=np.float64), (len(mesh.faces), 1))
-    if mesh.is_smooth:
-        is_light = np.prod(mesh.vertices[mesh.faces].mean(axis=1), axis=1) < 0.0
-        colours[is_light] = palette.mix(colour, (255, 255, 255), OCTANT_LIGHTENING)
-    return colours
-
-
-def _draw_edges(canvas, mesh, vertices, is_visible, colour):
-    """Dark silhouette; light edges between two visible faces of a block."""
-    seen = is_visible[mesh.edges[:, 2:]].sum(axis=1)
-    if not mesh.is_smooth:
-        light = palette.mix(colour, (255, 255, 255), EDGE_LIGHTENING)
-        starts, ends = mesh.edges[seen == 2, :2].T
-        canvas.segments(vertices[starts], vertices[ends], EDGE_WIDTH, light)
+def _draw_solid(canvas, solid, colour):
     dark = palette.mix(colour, (10, 16, 32), SILHOUETTE_DARKENING)
-    starts, ends = mesh.edges[seen == 1, :2].T
-    canvas.segments(vertices[starts], vertices[ends], SILHOUETTE_WIDTH, dark)
+    if solid.rim is not None:
+        canvas.fill(solid.rim, dark)
+    mesh, colours = solid.mesh, solid.colours[solid.is_visible].tolist()
+    if solid.is_whole:
+        canvas.fill_faces(solid.pixels, compress(mesh.corner_getters, solid.is_visible.tolist()), colours)
+    else:
+        for face, face_colour in zip(mesh.faces[solid.is_visible], colours):
+            canvas.polygon(solid.vertices[face], face_colour)
+    if solid.rim is None:
+        _draw_edges(canvas, solid, colour, dark)
 
 
-def _draw_goal_face(canvas, corners, is_visible, colour):
+def _draw_edges(canvas, solid, colour, dark):
+    """Dark silhouette on light edges between two visible faces, which a round body does not have."""
+    edges, is_smooth = solid.mesh.edges, solid.mesh.is_smooth
+    seen = solid.is_visible[edges[:, 2:]].sum(axis=1)
+    between, outer = edges[seen == 2, :2][: 0 if is_smooth else None], edges[seen == 1, :2]
+    starts, ends = np.concatenate([between, outer]).T
+    light = palette.mix(colour, (255, 255, 255), EDGE_LIGHTENING)
+    widths = np.repeat((EDGE_WIDTH, SILHOUETTE_WIDTH), (len(between), len(outer)))
+    colours = [light] * len(between) + [dark] * len(outer)
+    if solid.is_whole:
+        canvas.strokes(solid.pixels[starts], solid.pixels[ends], widths, colours)
+    else:
+        for line in zip(solid.vertices[starts, None], solid.vertices[ends, None], widths, colours):
+            canvas.segments(*line)
+
+
+def _draw_goal_face(canvas, solid, goal):
     """An inset frame on the face; on a face turned away, its thin outline seen through the body."""
+    corners = solid.vertices[solid.mesh.faces[goal.goal_face]]
     centre = corners.mean(axis=0)
     inset = centre + GOAL_FACE_INSET * (corners - centre)
-    if is_visible:
+    if solid.is_visible[goal.goal_face]:
         canvas.loop(inset, GOAL_OUTLINE_WIDTH, palette.HALO)
     else:
-        canvas.loop(inset, 0.5 * GOAL_OUTLINE_WIDTH, palette.mix(colour, (255, 255, 255), 0.35))
+        canvas.loop(inset, 0.5 * GOAL_OUTLINE_WIDTH, palette.mix(goal_colour(goal), (255, 255, 255), 0.35))

@@ -3,13 +3,20 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
+
+from rigid_env.rendering.geometry import rotation_matrices
 
 BODY_KINDS = ("block", "sphere", "ellipsoid", "hull")
 
 FACE_COUNT = 6
 """Faces of a block, in the order -x, +x, -y, +y, -z, +z of its body axes."""
+
+
+NO_POINTS = np.zeros((0, 3))
+NO_POINTS.setflags(write=False)
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,7 +51,7 @@ class BodyView:
     pos: np.ndarray
     quat: np.ndarray = (1.0, 0.0, 0.0, 0.0)
     colour: tuple[int, int, int] | None = None
-    corners: np.ndarray = field(default_factory=lambda: np.zeros((0, 3)))
+    corners: np.ndarray = field(default_factory=lambda: NO_POINTS)
     faces: tuple[tuple[int, ...], ...] = ()
 
     def __post_init__(self):
@@ -56,8 +63,30 @@ class BodyView:
         _set_array(self, "corners", (-1, 3))
         if (self.kind == "hull") != bool(self.faces):
             raise ValueError(f"faces must be those of a hull, and of nothing else, not {self.faces!r} of a {self.kind}")
-        if not np.all(self.dimensions > 0.0):
+        if not (self.dimensions > 0.0).all():
             raise ValueError(f"dimensions must be positive, not {self.dimensions}")
+
+
+@dataclass(frozen=True, eq=False)
+class Poses:
+    """All bodies of a frame in one array each.
+
+    Parameters
+    ----------
+    pos : (n, 3) float64
+        [m]. World frame.
+    rotation : (n, 3, 3) float64
+        Columns are the body's axes in the world frame.
+    size : (n, 3) float64
+        [m]. `BodyView.dimensions`.
+    radius : (n,) float64
+        [m]. Of a sphere round `pos` that holds the body.
+    """
+
+    pos: np.ndarray
+    rotation: np.ndarray
+    size: np.ndarray
+    radius: np.ndarray
 
 
 @dataclass(frozen=True, eq=False)
@@ -153,8 +182,8 @@ class Frame:
     bodies: tuple[BodyView, ...] = ()
     walls: tuple[WallView, ...] = ()
     goal: GoalView | None = None
-    contact_points: np.ndarray = field(default_factory=lambda: np.zeros((0, 3)))
-    contact_forces: np.ndarray = field(default_factory=lambda: np.zeros((0, 3)))
+    contact_points: np.ndarray = field(default_factory=lambda: NO_POINTS)
+    contact_forces: np.ndarray = field(default_factory=lambda: NO_POINTS)
     applied_force: np.ndarray = (0.0, 0.0, 0.0)
     applied_torque: np.ndarray = (0.0, 0.0, 0.0)
     text: tuple[str, ...] = ()
@@ -168,13 +197,43 @@ class Frame:
         _set_array(self, "applied_force", (3,))
         _set_array(self, "applied_torque", (3,))
 
+    @property
+    def has_arrows(self):
+        """bool. Whether there is a contact, or a force or torque is applied."""
+        return len(self.contact_points) > 0 or bool(np.any(self.applied_force)) or bool(np.any(self.applied_torque))
+
+    @cached_property
+    def poses(self):
+        """`Poses` of the bodies."""
+        count = len(self.bodies)
+        pos, size = (
+            np.array([getattr(b, name) for b in self.bodies]).reshape(count, 3) for name in ("pos", "dimensions")
+        )
+        rotation = rotation_matrices(np.array([body.quat for body in self.bodies]).reshape(count, 4))
+        is_block = np.array([body.kind == "block" for body in self.bodies], dtype=bool)
+        # the corner of a block, the longest semi-axis, and of a hull the corner of the box that it reaches to
+        is_round = np.array([body.kind in ("sphere", "ellipsoid") for body in self.bodies], dtype=bool)
+        radius = np.where(
+            is_round, size.max(axis=1), np.where(is_block, 0.5, 1.0) * np.sqrt(np.sum(size * size, axis=1))
+        )
+        return Poses(pos, rotation, size, radius)
+
 
 def _set_array(view, name, shape):
     """Replace the attribute by its read-only float64 copy; -1 in `shape` stands for any length."""
-    array = np.array(getattr(view, name), dtype=np.float64)
+    given = getattr(view, name)
+    if _is_kept(given):
+        array = given  # of another view, as `dataclasses.replace` hands it on
+    else:
+        array = np.array(given, dtype=np.float64)
+        array.setflags(write=False)
     if array.size == 0 and shape[0] in (-1, 0):
         array = array.reshape(0, *shape[1:])
     if array.ndim != len(shape) or any(want not in (-1, have) for want, have in zip(shape, array.shape)):
         raise ValueError(f"{name} must have shape {shape}, not {array.shape}")
-    array.setflags(write=False)
     object.__setattr__(view, name, array)
+
+
+def _is_kept(array):
+    """True if nobody can change an array any more: it is read-only, and no view of another."""
+    return type(array) is np.ndarray and array.dtype == np.float64 and not array.flags.writeable and array.base is None

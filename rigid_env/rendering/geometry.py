@@ -28,6 +28,64 @@ def rotation_matrix(quat):
     )
 
 
+def rotation_matrices(quats):
+    """Rotation matrices of many quaternions at once.
+
+    Parameters
+    ----------
+    quats : (n, 4) float
+        As of `rotation_matrix`, in which the formula can be read.
+
+    Returns
+    -------
+    (n, 3, 3) float64
+    """
+    q = np.asarray(quats, dtype=np.float64)
+    products = q[:, _FIRST] * q[:, _SECOND] / np.sum(q * q, axis=1)[:, None]
+    return (products @ _ROTATION).reshape(-1, 3, 3)
+
+
+_FIRST, _SECOND = np.triu_indices(4)
+"""Pairs of a quaternion's entries, each once: ww, wx, wy, wz, xx, xy, xz, yy, yz, zz."""
+
+_ROTATION = np.array(
+    [
+        [1, 0, 0, 0, 1, 0, 0, 0, 1],  # ww
+        [0, 0, 0, 0, 0, -2, 0, 2, 0],  # wx
+        [0, 0, 2, 0, 0, 0, -2, 0, 0],  # wy
+        [0, -2, 0, 2, 0, 0, 0, 0, 0],  # wz
+        [1, 0, 0, 0, -1, 0, 0, 0, -1],  # xx
+        [0, 2, 0, 2, 0, 0, 0, 0, 0],  # xy
+        [0, 0, 2, 0, 0, 0, 2, 0, 0],  # xz
+        [-1, 0, 0, 0, 1, 0, 0, 0, -1],  # yy
+        [0, 0, 0, 0, 0, 2, 0, 2, 0],  # yz
+        [-1, 0, 0, 0, -1, 0, 0, 0, 1],  # zz
+    ],
+    dtype=np.float64,
+)
+"""(10, 9). Entries of the rotation matrix, row by row, in these products."""
+
+
+def unit_vectors(vectors):
+    """Vectors (..., 3) divided by their lengths."""
+    return vectors / np.sqrt(np.sum(vectors * vectors, axis=-1, keepdims=True))
+
+
+def cross(a, b):
+    """Cross products of vectors (n, 3); of few vectors in a third of the time of `numpy.cross`."""
+    return a[:, _NEXT] * b[:, _PREVIOUS] - a[:, _PREVIOUS] * b[:, _NEXT]
+
+
+def perpendiculars(axes):
+    """Two unit vectors u, v perpendicular to each of many axes (n, 3), with u × v along it; (n, 3) each."""
+    axes = unit_vectors(axes)
+    u = unit_vectors(cross(np.eye(3)[np.argmin(np.abs(axes), axis=1)], axes))
+    return u, cross(axes, u)
+
+
+_NEXT, _PREVIOUS = [1, 2, 0], [2, 0, 1]
+
+
 def plane_axes(normal):
     """Two unit vectors u, v that span the plane of a unit normal, with u × v = normal.
 
@@ -77,6 +135,27 @@ def clip_polygon(polygon, normal, offset):
             s = heights[i] / (heights[i] - heights[j])
             kept.append(polygon[i] + s * (polygon[j] - polygon[i]))
     return np.array(kept).reshape(-1, polygon.shape[1])
+
+
+def point_lists(polygons):
+    """Polygons as lists of points, one at a time.
+
+    Lists of all points at once would be so many that Python's garbage collector starts, which takes longer than a
+    picture.
+
+    Parameters
+    ----------
+    polygons : (n, k, 2) int or float
+
+    Yields
+    ------
+    list of k (x, y)
+    """
+    count = polygons.shape[1]
+    x, y = polygons[..., 0].ravel().tolist(), polygons[..., 1].ravel().tolist()
+    for first in range(0, len(x), count):
+        last = first + count
+        yield list(zip(x[first:last], y[first:last]))
 
 
 def convex_hull(points):

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from itertools import pairwise
+from operator import itemgetter
 
 import numpy as np
 
@@ -41,6 +42,21 @@ class Mesh:
     edges: np.ndarray
     is_smooth: bool
 
+    @cached_property
+    def centres(self):
+        """(m, 3) float64 [m]. Means of the faces' vertices, body frame."""
+        return self.vertices[self.faces].mean(axis=1)
+
+    @cached_property
+    def corner_getters(self):
+        """List of a function for each face, that takes the corners out of a list of the vertices."""
+        return [itemgetter(*face) for face in self.faces.tolist()]
+
+    @cached_property
+    def is_odd_octant(self):
+        """(m,) bool. Faces in every second octant of the body frame."""
+        return np.prod(self.centres, axis=1) < 0.0
+
 
 def body_mesh(body):
     """Mesh of a `BodyView`; made once for each shape.
@@ -57,6 +73,18 @@ def body_mesh(body):
 @lru_cache(maxsize=64)
 def _body_mesh(kind, dimensions):
     return block_mesh(dimensions) if kind == "block" else ellipsoid_mesh(dimensions)
+
+
+@lru_cache(maxsize=16)
+def unit_mesh(kind, subdivisions=SPHERE_SUBDIVISIONS):
+    """Block with edges 1, or (`kind` is another) `patched_sphere`: a `Mesh` to be stretched by a body's dimensions.
+
+    Returns
+    -------
+    Mesh
+        The same object each time.
+    """
+    return block_mesh((1.0, 1.0, 1.0)) if kind == "block" else patched_sphere(subdivisions)
 
 
 def block_mesh(size):
@@ -87,13 +115,31 @@ def ellipsoid_mesh(semi_axes, subdivisions=SPHERE_SUBDIVISIONS):
 
     Every triangle lies in one octant, so that octants can be told apart by colour.
     """
-    vertices, faces = _subdivided_octahedron(subdivisions)
+    vertices, faces = _subdivided_octahedron(subdivisions, _triangles)
     vertices = vertices / np.linalg.norm(vertices, axis=1, keepdims=True)
     return _mesh(vertices * np.asarray(semi_axes, dtype=np.float64), faces, is_smooth=True)
 
 
-def _subdivided_octahedron(n):
-    """Integer vertices with |x| + |y| + |z| = n, and the triangles between them."""
+def patched_sphere(subdivisions):
+    """Sphere of radius 1: the triangles of `ellipsoid_mesh`, two by two as quadrangles, which are half as many to draw.
+
+    Their corners are nearly in a plane; the normal is that of the two diagonals. A triangle that is left alone has its
+    last corner twice.
+
+    Returns
+    -------
+    Mesh
+    """
+    vertices, faces = _subdivided_octahedron(subdivisions, _squares)
+    vertices = vertices / np.linalg.norm(vertices, axis=1, keepdims=True)
+    diagonals = vertices[faces[:, 2:]] - vertices[faces[:, :2]]
+    normals = np.cross(diagonals[:, 0], diagonals[:, 1])
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    return Mesh(vertices, faces, normals, _edges(faces), is_smooth=True)
+
+
+def _subdivided_octahedron(n, cells):
+    """Integer vertices with |x| + |y| + |z| = n, and the faces between them: `_triangles` or `_squares`."""
     index, faces = {}, []
 
     def vertex(p):
@@ -103,8 +149,8 @@ def _subdivided_octahedron(n):
         for sy in (-1, 1):
             for sz in (-1, 1):
                 is_mirrored = sx * sy * sz < 0
-                for triangle in _triangles(n):
-                    corners = [vertex((sx * i, sy * j, sz * (n - i - j))) for i, j in triangle]
+                for cell in cells(n):
+                    corners = [vertex((sx * i, sy * j, sz * (n - i - j))) for i, j in cell]
                     faces.append(corners[::-1] if is_mirrored else corners)
     return np.array(list(index), dtype=np.float64), np.array(faces)
 
@@ -118,6 +164,14 @@ def _triangles(n):
                 yield (i + 1, j), (i + 1, j + 1), (i, j + 1)
 
 
+def _squares(n):
+    """The same grid in squares; along i + j = n are triangles, with the last corner twice."""
+    for i in range(n):
+        for j in range(n - i):
+            far = (i + 1, j + 1) if i + j + 2 <= n else (i, j + 1)
+            yield (i, j), (i + 1, j), far, (i, j + 1)
+
+
 def _mesh(vertices, faces, is_smooth):
     corners = vertices[faces]
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
@@ -129,5 +183,7 @@ def _edges(faces):
     sides = {}
     for face, corners in enumerate(faces.tolist()):
         for a, b in zip(corners, corners[1:] + corners[:1]):
+            if a == b:
+                continue
             sides.setdefault((min(a, b), max(a, b)), []).append(face)
     return np.array([[a, b, *pair] for (a, b), pair in sides.items()])

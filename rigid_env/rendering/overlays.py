@@ -36,7 +36,7 @@ NEAR_WALL_ALPHA = 12
 
 
 def draw_goal(canvas, goal, room):
-    """Disc, ring and centre mark on the floor, at the foot of the target."""
+    """Disc, ring and centre mark on the floor of a `Room`, at the foot of the target of a `GoalView` or None."""
     if goal is None or goal.pos is None:
         return
     floors = [w for w in room.walls if is_floor(w)]
@@ -54,14 +54,15 @@ def draw_goal(canvas, goal, room):
     canvas.segments(foot - arms, foot + arms, 1.4, colour)
 
 
-def draw_contacts(canvas, frame):
+def draw_contacts(canvas, frame, room):
     """Discs at the contact points and red arrows of their forces; paler where the body hides them."""
     if len(frame.contact_points) == 0:
         return
     is_hidden = hidden_points(frame.contact_points, frame.bodies, canvas.camera.eye)
     pixels, depths = canvas.project(frame.contact_points)
+    is_in_sight = canvas.are_in_sight(pixels[:, None], depths[:, None])
     for i in np.lexsort((-depths, ~is_hidden)):
-        if not canvas.is_in_sight(pixels[i], depths[i]):
+        if not is_in_sight[i]:
             continue
         fade = HIDDEN_FADE if is_hidden[i] else 0.0
         colour = palette.mix(palette.CONTACT, palette.HALO, fade)
@@ -70,7 +71,7 @@ def draw_contacts(canvas, frame):
         canvas.disc(pixels[i], CONTACT_RADIUS, colour)
 
 
-def draw_wrench(canvas, frame):
+def draw_wrench(canvas, frame, room):
     """Orange arrow of the applied force and purple arc of the applied torque, at body 0's centre."""
     if not frame.bodies:
         return
@@ -98,12 +99,17 @@ def draw_arrow(canvas, start, vector, colour):
         _arrow_line(canvas, pixels, colour)
 
 
+def has_near_walls(camera, room):
+    """True if a wall of a `Room` is between its inside and a `Camera`."""
+    return any(len(p) >= 3 and not faces_point(w, camera.eye) for w, p in zip(room.walls, room.wall_polygons))
+
+
 def draw_near_walls(canvas, room):
     """Walls between camera and scene: an outline and a breath of colour, in front of everything."""
     for index, wall in enumerate(room.walls):
         polygon = room.wall_polygons[index]
         if len(polygon) >= 3 and not faces_point(wall, canvas.camera.eye):
-            canvas.polygon(polygon, palette.WALL_OUTLINE, NEAR_WALL_ALPHA)
+            canvas.polygon(polygon, (*palette.WALL_OUTLINE, NEAR_WALL_ALPHA))
             canvas.loop(polygon, 1.0, palette.mix(palette.WALL_OUTLINE, palette.HALO, 0.3))
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
 
 BACKGROUND_TOP = (243, 246, 250)
@@ -49,13 +51,19 @@ def to_srgb(intensity):
     return np.rint(255.0 * c).astype(np.int64)
 
 
+_LINEAR = to_linear(np.arange(256))
+_SRGB_STEPS = 65535
+_SRGB = to_srgb(np.arange(_SRGB_STEPS + 1) / _SRGB_STEPS)
+"""Tables of both, as powers take long; 255 · 12.92 / 65535 = 0.05 of a level between two entries, at most."""
+
+
 def shade(colours, normals, towards_eye):
     """Colours of flat faces in the light: Lambert, an ambient that grows towards the sky, and a highlight.
 
     Parameters
     ----------
     colours : (n, 3) or (3,) float
-        sRGB, 0..255, of the surface.
+        sRGB, 0..255, of the surface; rounded here.
     normals : (n, 3) float
         Outward unit normals, world frame.
     towards_eye : (n, 3) float
@@ -69,12 +77,14 @@ def shade(colours, normals, towards_eye):
     lambert = np.maximum(normals @ LIGHT, 0.0)
     ambient = GROUND + (SKY - GROUND) * 0.5 * (1.0 + normals[:, 1])
     half = LIGHT + towards_eye
-    half /= np.maximum(np.linalg.norm(half, axis=1, keepdims=True), 1e-12)
+    half /= np.maximum(np.sqrt(np.sum(half * half, axis=1, keepdims=True)), 1e-12)
     highlight = GLOSS * np.maximum(np.sum(normals * half, axis=1), 0.0) ** SHININESS
-    lit = to_linear(colours) * (ambient + SUN * lambert)[:, None] + (highlight * (lambert > 0.0))[:, None]
-    return to_srgb(lit)
+    albedo = _LINEAR[np.rint(colours).astype(np.intp)]
+    lit = albedo * (ambient + SUN * lambert)[:, None] + (highlight * (lambert > 0.0))[:, None]
+    return _SRGB[np.rint(_SRGB_STEPS * np.minimum(lit, 1.0)).astype(np.intp)]
 
 
+@lru_cache(maxsize=256)
 def mix(colour, other, part):
     """sRGB colour `part` (0..1) of the way from `colour` to `other`, a tuple of int."""
     return tuple(round((1.0 - part) * a + part * b) for a, b in zip(colour, other))

@@ -4,17 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
 
-from physics import World
+from physics import HalfSpace, World, validation
 from physics.kernels.state import layout as at
 from rigid_env.extras import require
 from rigid_env.rendering import BodyView, Camera, Frame, GoalView, WallView
 from rigid_env.rendering.geometry import rotation_matrix
-from rigid_env.rendering.view import WEIGHT_ARROW
 
+WEIGHT_ARROW = 2.5  # length of the arrow of a force as large as the weight of body 0 [m]
 FULL_CHANGE = 40.0  # of a pixel from which on it shows a body, not the rim of a shadow [of 255]
 FAINTEST = 0.25  # opacity of the first of the stroboscopic pictures; the last one has 1
 GIF_COLOURS = 128
@@ -28,6 +29,7 @@ def world_frame(
     text: Sequence[str] = (),
     goal: GoalView | None = None,
     applied: np.ndarray | None = None,
+    arrows: bool = True,
 ) -> Frame:
     """Make the frame to draw of one world now.
 
@@ -41,20 +43,31 @@ def world_frame(
     goal : GoalView, optional
     applied : (6,) float, optional
         Force [N] and torque [N m] on body 0, world frame; drawn at its geometric centre.
+    arrows : bool
+        False leaves out contacts and the applied wrench, and saves the time to find them.
 
     Returns
     -------
     Frame
         Bodies, walls (if they act), contact points and forces.
+
+    Raises
+    ------
+    ValueError
+        On an index that is not of a world.
     """
+    index = validation.index(index, world.worlds, "index")
+    bodies = tuple(_body_view(world, index, body) for body in range(world.body_count))
+    walls = _wall_views(world.scene.walls) if world.plan.contact else ()
+    if not arrows:
+        return Frame(bodies, walls, goal, text=tuple(text))
     wrench = np.zeros(6) if applied is None else np.asarray(applied, dtype=float)
     points, forces = world.contacts(index)
-    walls = world.scene.walls if world.plan.contact else ()
     first = index * world.body_count
     strength = float(np.linalg.norm(world.gravity[index])) or UNIT_WEIGHT
     return Frame(
-        bodies=tuple(_body_view(world, index, body) for body in range(world.body_count)),
-        walls=tuple(WallView(wall.normal, wall.offset) for wall in walls),
+        bodies=bodies,
+        walls=walls,
         goal=goal,
         contact_points=points,
         contact_forces=forces,
@@ -65,6 +78,11 @@ def world_frame(
     )
 
 
+@lru_cache(maxsize=16)
+def _wall_views(walls: tuple[HalfSpace, ...]) -> tuple[WallView, ...]:
+    return tuple(WallView(wall.normal, wall.offset) for wall in walls)
+
+
 def _body_view(world: World, index: int, body: int) -> BodyView:
     kind = world.scene.bodies[body].kind
     params, quat = world.params[index * world.body_count + body], world.quat[index, body]
@@ -72,7 +90,8 @@ def _body_view(world: World, index: int, body: int) -> BodyView:
     dimensions = 2.0 * stored if kind == "block" else stored
     solid = world.scene.bodies[body].polyhedron if kind == "hull" else None
     outline = {} if solid is None else {"corners": solid.vertices, "faces": solid.loops}
-    return BodyView(kind, dimensions, world.pos[index, body] + rotation_matrix(quat) @ center, quat, **outline)
+    pos = world.pos[index, body] + rotation_matrix(quat) @ center if center.any() else world.pos[index, body]
+    return BodyView(kind, dimensions, pos, quat, **outline)
 
 
 def without_bodies(frame: Frame, camera: Camera) -> Frame:

@@ -4,20 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from rigid_env.extras import require
 from rigid_env.rendering import palette
-from rigid_env.rendering.backdrop import draw_backdrop
-from rigid_env.rendering.bodies import draw_bodies
-from rigid_env.rendering.canvas import SUPERSAMPLING, Canvas
-from rigid_env.rendering.layout import default_camera, make_room
-from rigid_env.rendering.overlays import (
-    draw_contacts,
-    draw_far_outlines,
-    draw_goal,
-    draw_near_walls,
-    draw_wrench,
-)
-from rigid_env.rendering.shadows import draw_shadows
+from rigid_env.rendering.painter import Painter, import_pygame
 
 MODES = ("rgb_array", "human")
 
@@ -44,6 +32,10 @@ class Renderer:
         walls and the bodies' sizes, without walls also on the positions in the first frame drawn.
     bounds : pair of (3,) float, optional
         [m]. Lower and upper corner of a box that is in sight, too, where no wall bounds the room.
+    arrows : bool
+        False leaves out contact points and the arrows of forces and torques.
+    text : bool
+        False leaves out the text.
 
     Raises
     ------
@@ -53,20 +45,18 @@ class Renderer:
         On an unknown mode or a size that is not positive.
     """
 
-    def __init__(self, width=960, height=600, mode="rgb_array", fps=40, title="rigid-env", camera=None, bounds=None):
+    def __init__(
+        self, width=960, height=600, mode="rgb_array", fps=40, title="rigid-env", camera=None, bounds=None, *,
+        arrows=True, text=True,
+    ):  # fmt: skip
         if mode not in MODES:
             raise ValueError(f"mode must be one of {MODES}, not {mode!r}")
         if width < 1 or height < 1:
             raise ValueError(f"width and height must be positive, not {width} x {height}")
-        self._pygame = _import_pygame()
+        self._pygame = import_pygame()
         self.width, self.height, self.mode, self.fps, self.title = int(width), int(height), mode, fps, title
-        self._camera, self._bounds = camera, bounds
-        self._canvas_size = (SUPERSAMPLING * self.width, SUPERSAMPLING * self.height)
-        surface = self._pygame.Surface
-        self._large = surface(self._canvas_size, 0, 32)
-        self._backdrop = surface(self._canvas_size, 0, 32)
-        self._picture = surface((self.width, self.height), 0, 32)
-        self._scene_key = self._room = self._scene_camera = None
+        self._painter = Painter((self.width, self.height), camera, bounds=bounds, arrows=arrows)
+        self._has_text = text
         self._font = self._window = self._clock = None
         self._is_closed = False
 
@@ -94,47 +84,23 @@ class Renderer:
         """
         if self._is_closed:
             raise RuntimeError("this Renderer is closed; make a new one")
-        self._prepare_scene(frame)
-        self._large.blit(self._backdrop, (0, 0))
-        canvas = Canvas(self._large, self._scene_camera, self._pygame)
-        draw_goal(canvas, frame.goal, self._room)
-        draw_shadows(canvas, self._room, frame.bodies)
-        draw_bodies(canvas, frame.bodies, frame.goal)
-        draw_contacts(canvas, frame)
-        draw_wrench(canvas, frame)
-        draw_near_walls(canvas, self._room)
-        self._pygame.transform.smoothscale(self._large, (self.width, self.height), self._picture)
-        self._draw_text(frame.text)
+        self._painter.paint(frame)
+        if self._has_text:
+            self._draw_text(frame.text)
         if self.mode == "human":
             self._show()
-        pixels = self._pygame.image.tobytes(self._picture, "RGB")
-        return np.frombuffer(pixels, dtype=np.uint8).reshape(self.height, self.width, 3).copy()
+        pixels = np.empty((self.height, self.width, 3), dtype=np.uint8)
+        self._painter.copy_to(pixels)
+        return pixels
 
     def camera(self, frame):
         """`Camera` that `draw(frame)` looks through; its `project(points, (width, height))` gives pixels."""
-        self._prepare_scene(frame)
-        return self._scene_camera
+        return self._painter.setting(frame).camera
 
     def close(self):
         """Close the window, if any. May be called again."""
         self._is_closed = True
         self._close_window()
-
-    def _prepare_scene(self, frame):
-        """Room, camera and backdrop: only when walls or shapes are not those of the last frame."""
-        key = (
-            tuple((*w.normal.tolist(), w.offset) for w in frame.walls),
-            tuple((b.kind, *b.dimensions.tolist()) for b in frame.bodies),
-        )
-        if key == self._scene_key:
-            return
-        self._scene_key = key
-        self._room = make_room(frame.walls, frame.bodies, self._bounds)
-        self._scene_camera = self._camera or default_camera(self._room, (self.width, self.height))
-        pixels = draw_backdrop(self._scene_camera, (self.width, self.height), self._room)
-        small = self._pygame.image.frombuffer(pixels.tobytes(), (self.width, self.height), "RGB")
-        self._backdrop.blit(self._pygame.transform.scale(small, self._canvas_size), (0, 0))
-        draw_far_outlines(Canvas(self._backdrop, self._scene_camera, self._pygame), self._room)
 
     def _draw_text(self, lines):
         if not lines:
@@ -152,7 +118,7 @@ class Renderer:
         self._pygame.draw.rect(panel, (*palette.WALL_OUTLINE, 90), box, width=1, border_radius=pad)
         for i, row in enumerate(rows):
             panel.blit(row, (pad, pad + i * pitch))
-        self._picture.blit(panel, (pad, pad))
+        self._painter.picture.blit(panel, (pad, pad))
 
     def _show(self):
         pygame = self._pygame
@@ -163,7 +129,7 @@ class Renderer:
             self._clock = pygame.time.Clock()
         if self._window is None:
             return
-        self._window.blit(self._picture, (0, 0))
+        self._window.blit(self._painter.picture, (0, 0))
         pygame.display.flip()
         if any(event.type == pygame.QUIT for event in pygame.event.get()):
             self._close_window()
@@ -174,14 +140,6 @@ class Renderer:
         if self._window is not None:
             self._window = None
             self._pygame.display.quit()
-
-
-def _import_pygame():
-    require("render", "pygame", purpose="rendering")
-    import pygame
-    import pygame.gfxdraw
-
-    return pygame
 
 
 def _load_font(pygame, size):

@@ -1,25 +1,22 @@
-"""Soft shadows of convex bodies on walls: a sun with a disc, sampled; sharp where they touch, soft above."""
+"""Soft shadows of convex bodies on walls: a sun with a disc, sampled; sharp where they touch, soft above.
+
+Every sample of the sun is a light of its own: the `outlines` of the bodies along it `fall` onto a wall as convex
+polygons. `shadow_layer` draws them.
+"""
 
 from __future__ import annotations
 
 import numpy as np
 
 from rigid_env.rendering import palette
-from rigid_env.rendering.geometry import clip_polygon, convex_hull, plane_axes, rotation_matrix
-from rigid_env.rendering.layout import faces_point
-from rigid_env.rendering.meshes import body_mesh
+from rigid_env.rendering.geometry import convex_hull, perpendiculars, plane_axes
+from rigid_env.rendering.meshes import body_mesh, unit_mesh
 
-SAMPLES = 22
+SAMPLES = 16
 SUN_RADIUS = 0.085
 """Tangent of half the sun's angular diameter; the real one's is 0.0047, but a softer shadow looks better."""
 
-SAMPLE_ALPHA = 5
-"""0..255. One sample's; all of them darken by 1 - (1 - 5/255)^22 = 35 percent."""
-
-OUTLINE_POINTS = 32
-GRAZING = 0.05
-"""Least sine of the angle between light and wall for which a shadow is drawn."""
-
+OUTLINE_POINTS = 16
 GOLDEN_ANGLE = np.pi * (3.0 - np.sqrt(5.0))
 
 
@@ -34,28 +31,67 @@ def _sun_samples():
 
 SUN_SAMPLES = _sun_samples()
 
+HEXAGONS = np.array([[c ^ 4, c ^ 6, c ^ 2, c ^ 3, c ^ 1, c ^ 5] for c in range(8)])
+"""(8, 6). Corners of a block round its outline, in order, as seen from above corner c; see `meshes.BLOCK_FACES`."""
 
-def outline(body):
-    """Points whose hull along the light is the body's shadow.
+_ANGLES = 2.0 * np.pi * np.arange(OUTLINE_POINTS)[:, None] / OUTLINE_POINTS
+_COSINES, _SINES = np.cos(_ANGLES), np.sin(_ANGLES)
+
+
+def outlines(frame):
+    """Outlines of the bodies of a frame along the lights of the sun, those of like bodies together.
 
     Parameters
     ----------
-    body : BodyView
+    frame : Frame
 
     Returns
     -------
-    (n, 3) float64
-        [m], world frame. A block's or hull's corners. On an ellipsoid x = R A u, |u| = 1, light grazes where its normal
-        R A⁻¹ u is perpendicular to the light: the great circle of u perpendicular to A⁻¹ Rᵀ light.
+    list of (members, points)
+        Indices of n bodies, and points (n, SAMPLES or 1, k, 3) float64 [m], world frame: a loop for each light, or one
+        for all.
     """
-    R = rotation_matrix(body.quat)
-    if body.kind in ("block", "hull"):
-        return body.pos + body_mesh(body).vertices @ R.T
-    pole = (R.T @ palette.LIGHT) / body.dimensions
-    u, v = plane_axes(pole / np.linalg.norm(pole))
-    angle = 2.0 * np.pi * np.arange(OUTLINE_POINTS) / OUTLINE_POINTS
-    circle = np.cos(angle)[:, None] * u + np.sin(angle)[:, None] * v
-    return body.pos + (circle * body.dimensions) @ R.T
+    members = {"block": [], "round": [], "hull": []}
+    for index, body in enumerate(frame.bodies):
+        members[body.kind if body.kind in members else "round"].append(index)
+    found = []
+    for kind, outlined in (("block", _block_outlines), ("round", _round_outlines)):
+        if members[kind]:
+            poses = frame.poses
+            found.append(
+                (members[kind], outlined(*(a[members[kind]] for a in (poses.pos, poses.rotation, poses.size))))
+            )
+    return found + [([i], _hull_outlines(frame.bodies[i], frame.poses.rotation[i])) for i in members["hull"]]
+
+
+def _block_outlines(pos, R, size):
+    """A block's corners except the one nearest to the light and its opposite."""
+    corners = pos[:, None] + (unit_mesh("block").vertices * size[:, None]) @ np.swapaxes(R, 1, 2)
+    top = (SUN_SAMPLES @ R > 0.0) @ (4, 2, 1)
+    return corners[np.arange(len(pos))[:, None, None], HEXAGONS[top]]
+
+
+def _round_outlines(pos, R, size):
+    """One loop for all lights.
+
+    On an ellipsoid x = R A u, |u| = 1, light grazes where its normal R A⁻¹ u is perpendicular to the light: the great
+    circle of u perpendicular to A⁻¹ Rᵀ light.
+    """
+    u, v = perpendiculars((palette.LIGHT @ R) / size)
+    circles = _COSINES * u[:, None] + _SINES * v[:, None]
+    return (pos[:, None] + (circles * size[:, None]) @ np.swapaxes(R, 1, 2))[:, None]
+
+
+def _hull_outlines(body, R):
+    """Hulls of the corners in the planes perpendicular to the lights: moved along the light they fall alike."""
+    corners = body.pos + body_mesh(body).vertices @ R.T
+    loops = []
+    for light in SUN_SAMPLES:
+        u, v = plane_axes(light)
+        hull = convex_hull(np.stack([corners @ u, corners @ v], axis=1))
+        loops.append((body.pos @ light) * light + hull[:, :1] * u + hull[:, 1:] * v)
+    most = max(map(len, loops))
+    return np.array([[*loop, *loop[-1:].repeat(most - len(loop), axis=0)] for loop in loops])[None]
 
 
 def fall(points, wall, lights):
@@ -63,75 +99,16 @@ def fall(points, wall, lights):
 
     Parameters
     ----------
-    points : (n, 3) float
-        [m], world frame.
+    points : (n, 3) or (..., s, n, 3) float
+        [m], world frame. The same for all lights, or of each its own.
     wall : WallView
     lights : (s, 3) float
         Unit vectors towards the light, with normal·light > 0.
 
     Returns
     -------
-    (s, n, 3) float64
+    (..., s, n, 3) float64
         [m], world frame, on the wall.
     """
     heights = points @ wall.normal - wall.offset
-    return points - heights[:, None] * (lights / (lights @ wall.normal)[:, None])[:, None, :]
-
-
-def draw_shadows(canvas, room, bodies):
-    """Darken the walls under the bodies, on a `Canvas`.
-
-    Parameters
-    ----------
-    canvas : Canvas
-    room : Room
-    bodies : tuple of BodyView
-    """
-    outlines = [outline(body) for body in bodies]
-    for wall, shown in zip(room.walls, room.wall_polygons):
-        is_lit = np.min(SUN_SAMPLES @ wall.normal) > GRAZING
-        if len(shown) < 3 or not is_lit or not faces_point(wall, canvas.camera.eye):
-            continue
-        sides, offsets = _side_planes(shown, wall.normal)
-        for points in outlines:
-            fallen = fall(points, wall, SUN_SAMPLES)
-            gaps = fallen @ sides.T - offsets
-            if np.any(np.all(gaps < 0.0, axis=(0, 1))):
-                continue
-            is_crossed = np.any(gaps < 0.0, axis=(0, 1))
-            if not np.any(is_crossed):
-                _fill_whole(canvas, fallen, wall.normal)
-            else:
-                _fill_clipped(canvas, fallen, wall.normal, zip(sides[is_crossed], offsets[is_crossed]))
-
-
-def _fill_whole(canvas, fallen, normal):
-    """Hulls of the projected points: a convex polygon in front of the camera stays convex in the picture."""
-    pixels, depths = canvas.project(fallen.reshape(-1, 3))
-    if not canvas.is_in_sight(pixels, depths):
-        _fill_clipped(canvas, fallen, normal, ())
-        return
-    for sample in pixels.reshape(*fallen.shape[:2], 2):
-        canvas.fill(convex_hull(sample), palette.SHADOW, SAMPLE_ALPHA)
-
-
-def _fill_clipped(canvas, fallen, normal, bounds):
-    bounds = tuple(bounds)
-    u, v = plane_axes(normal)
-    for sample in fallen:
-        hull = convex_hull(np.stack([sample @ u, sample @ v], axis=1))
-        polygon = (sample[0] @ normal) * normal + hull[:, :1] * u + hull[:, 1:] * v
-        for side, offset in bounds:
-            polygon = clip_polygon(polygon, side, offset)
-            if len(polygon) < 3:
-                break
-        else:
-            canvas.polygon(polygon, palette.SHADOW, SAMPLE_ALPHA)
-
-
-def _side_planes(polygon, normal):
-    """Half-spaces normals (k, 3), offsets (k,) that cut a convex polygon (k, 3) out of its plane."""
-    sides = np.cross(normal, np.roll(polygon, -1, axis=0) - polygon)
-    offsets = np.sum(sides * polygon, axis=1)
-    signs = np.sign(sides @ polygon.mean(axis=0) - offsets)
-    return signs[:, None] * sides, signs * offsets
+    return points - heights[..., None] * (lights / (lights @ wall.normal)[:, None])[:, None, :]

@@ -32,11 +32,12 @@ class Stage:
     """
 
     def __init__(self, scene: Scene, frame: Frame, pos: np.ndarray):
-        self._turn = _upright(scene)
+        turn = _upright(scene)
+        self._turn, self._matrix = turn, rotation_matrix(turn)
         size = max((_extent(body) for body in frame.bodies), default=1.0)
         self._scale = max(1.0, DRAWN_SIZE / size)
         size *= self._scale
-        turned = self._scale * np.asarray(pos) @ rotation_matrix(self._turn).T
+        turned = self._scale * np.asarray(pos) @ self._matrix.T
         lower, upper = turned.min(axis=(0, 1)) - 0.5 * size, turned.max(axis=(0, 1)) + 0.5 * size
         span = float((upper - lower).max())
         self._travels = span > FAR_SPAN * size or bool(np.abs(turned[0]).max() > SIGHT * self._scale)
@@ -48,7 +49,7 @@ class Stage:
 
         Where the bodies go too far to be shown whole, the picture is without walls and travels with body 0.
         """
-        matrix, scale = rotation_matrix(self._turn), self._scale
+        matrix, scale = self._matrix, self._scale
         bodies = [self._placed(body, matrix) for body in frame.bodies]
         walls = [WallView(matrix @ wall.normal, scale * wall.offset) for wall in frame.walls]
         points, forces = scale * frame.contact_points @ matrix.T, frame.contact_forces @ matrix.T
@@ -89,5 +90,5 @@ def _upright(scene: Scene) -> np.ndarray:
 
 def _product(p: np.ndarray, q: np.ndarray) -> np.ndarray:
     """Quaternion (4,) of the turn q, then p; scalar first."""
-    vector = p[0] * q[1:] + q[0] * p[1:] + np.cross(p[1:], q[1:])
-    return np.concatenate(([p[0] * q[0] - p[1:] @ q[1:]], vector))
+    a, b, c, d = p.tolist()
+    return np.array(((a, -b, -c, -d), (b, a, -d, c), (c, d, a, -b), (d, -c, b, a))) @ q

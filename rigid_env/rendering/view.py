@@ -2,70 +2,43 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from rigid_env.extras import require
-from rigid_env.rendering import BodyView, Frame, GoalView, Renderer, WallView
+from rigid_env.rendering import Frame, GoalView, Renderer, Room, make_room
+from rigid_env.rendering.picture import WEIGHT_ARROW, world_frame
 from rigid_env.tasks import Task
-from rigid_env.tasks import layout as col
-from rigid_env.tasks.base import FORCE_SHARE
 
 RENDER_MODES = ("rgb_array", "human")
 
-WEIGHT_ARROW = 2.5
-"""[m] Length of the arrow of a force as large as the block's weight."""
 
-
-GOAL_RADIUS = 1.0
-"""[m] Of the goal's disc, to be seen beside a block that covers its tolerance."""
-
-
-def frame_of(task: Task, world: int = 0) -> Frame:
+def frame_of(task: Task, world: int = 0, arrows: bool = True) -> Frame:
     """Picture of one world of a task.
 
     Parameters
     ----------
     task : Task
     world : int
+    arrows : bool
+        Whether contacts, forces and torques are drawn.
 
     Returns
     -------
     Frame
-        Walls, block, goal, contact points with their forces, the applied wrench, and a line of text.
+        Walls, bodies, goal, contact points with their forces, the wrench on body 0, and lines of text.
     """
-    record, outcome, wrench = task.record[world], task.outcome[world], task.wrench[world, 0]
-    points, forces = task.world.contacts(world)
-    weight = record[col.FORCE_LIMIT] / FORCE_SHARE
-    unit = "m" if task.error_name == "distance" else "rad"
-    return Frame(
-        bodies=(
-            BodyView(
-                kind="block",
-                dimensions=2.0 * record[col.HALF : col.HALF + 3],
-                pos=task.world.pos[world, 0],
-                quat=task.world.quat[world, 0],
-            ),
-        ),
-        walls=tuple(WallView(wall.normal, wall.offset) for wall in task.world.scene.walls),
-        goal=_goal(task, record),
-        contact_points=points,
-        contact_forces=forces,
-        applied_force=wrench[:3],
-        applied_torque=wrench[3:],
-        text=(
-            f"{task.error_name} {outcome[col.ERROR]:.2f} {unit}",
-            f"speed {outcome[col.SPEED]:.2f} m/s   spin {outcome[col.SPIN]:.2f} rad/s",
-        ),
-        force_scale=WEIGHT_ARROW / weight,
-    )
+    mark = task.goal_mark(world)
+    goal = None if mark is None else GoalView(**mark)
+    frame = world_frame(task.world, world, task.lines(world), goal, task.wrench[world, 0], arrows=arrows)
+    return replace(frame, force_scale=WEIGHT_ARROW / task.weights[world, 0])
 
 
-def _goal(task: Task, record: np.ndarray) -> GoalView:
-    is_held = bool(record[col.HOLD] > 0)
-    if task.error_name == "angle":
-        return GoalView(reached=is_held, goal_face=int(record[col.FACE]))
-    x, z = record[col.GOAL : col.GOAL + 2]
-    return GoalView(pos=(x, 0.0, z), radius=GOAL_RADIUS, reached=is_held)
+def room_of(task: Task) -> Room:
+    """Part of space that pictures of a task show: the same for all its worlds and episodes."""
+    frame = world_frame(task.world, arrows=False)
+    return make_room(frame.walls, frame.bodies)
 
 
 class View:

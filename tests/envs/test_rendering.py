@@ -9,16 +9,30 @@ from math import radians, tan
 import gymnasium
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
 
 import physics
 from rigid_env.rendering import BodyView, Camera, Frame, GoalView, Renderer, WallView, palette
 from rigid_env.rendering.camera import NEAR, fit_camera
-from rigid_env.rendering.geometry import clip_polygon, convex_hull, plane_axes, rotation_matrix
+from rigid_env.rendering.canvas import Canvas
+from rigid_env.rendering.geometry import (
+    clip_polygon,
+    convex_hull,
+    perpendiculars,
+    plane_axes,
+    point_lists,
+    rotation_matrices,
+    rotation_matrix,
+)
 from rigid_env.rendering.layout import faces_point, make_room
-from rigid_env.rendering.meshes import block_mesh, body_mesh, ellipsoid_mesh
+from rigid_env.rendering.meshes import block_mesh, body_mesh, ellipsoid_mesh, unit_mesh
 from rigid_env.rendering.overlays import hidden_points
+from rigid_env.rendering.painter import Painter, import_pygame
 from rigid_env.rendering.picture import without_bodies, world_frame
-from rigid_env.rendering.shadows import fall, outline
+from rigid_env.rendering.shadows import SUN_SAMPLES, fall, outlines
+from rigid_env.rendering.solids import pose
 
 pytest.importorskip("pygame")
 
@@ -155,6 +169,24 @@ def test_rotation_matrix_turns_x_to_y_about_z():
     np.testing.assert_allclose(R @ R.T, np.eye(3), atol=ROUNDING)
 
 
+def test_rotation_matrices_are_those_of_the_single_quaternions():
+    quats = np.random.default_rng(5).normal(size=(7, 4))
+    np.testing.assert_allclose(rotation_matrices(quats), [rotation_matrix(q) for q in quats], atol=ROUNDING)
+
+
+def test_perpendiculars_are_right_handed():
+    axes = np.array([(0.0, 0.0, -2.0), (3.0, 0.1, 0.0), (1.0, -1.0, 1.0)])
+    u, v = perpendiculars(axes)
+    np.testing.assert_allclose(np.cross(u, v), axes / np.linalg.norm(axes, axis=1)[:, None], atol=ROUNDING)
+    for a, b, value in ((u, u, 1.0), (v, v, 1.0), (u, v, 0.0), (u, axes, 0.0)):
+        np.testing.assert_allclose(np.sum(a * b, axis=1), value, atol=ROUNDING)
+
+
+def test_point_lists_are_the_rows():
+    polygons = np.arange(24).reshape(3, 4, 2)
+    assert [list(map(list, polygon)) for polygon in point_lists(polygons)] == polygons.tolist()
+
+
 @pytest.mark.parametrize("normal", [(0, 1, 0), (1, 0, 0), (0.6, 0.0, -0.8)])
 def test_plane_axes_are_right_handed(normal):
     u, v = plane_axes(normal)
@@ -178,6 +210,20 @@ def test_mesh_is_closed_and_convex_with_outward_normals(mesh):
     on_face = np.take_along_axis(heights, mesh.faces, axis=1)
     assert np.all(on_face > 0.0)  # the centre is inside
     assert np.all(heights <= on_face[:, :1] + 1e-12)  # no vertex beyond a face
+
+
+@pytest.mark.parametrize("subdivisions", [1, 2, 5])
+def test_patched_sphere_is_closed_and_covers_the_triangles(subdivisions):
+    mesh, fine = unit_mesh("sphere", subdivisions), ellipsoid_mesh((1, 1, 1), subdivisions)
+    assert len(mesh.vertices) - len(mesh.edges) + len(mesh.faces) == 2  # Euler: V - E + F
+    assert np.all(np.sum(mesh.normals * mesh.centres, axis=1) > 0.0)  # outwards
+    faces, triangles = ([frozenset(map(tuple, m.vertices[face].tolist())) for face in m.faces] for m in (mesh, fine))
+    left = set(triangles)
+    for face in faces:
+        held = {triangle for triangle in left if triangle <= face}
+        assert len(held) == len(face) - 2
+        left -= held
+    assert not left
 
 
 def test_a_hull_is_drawn_with_its_corners_and_without_the_diagonals_of_its_faces():
@@ -226,6 +272,26 @@ def test_ellipsoid_vertices_lie_on_the_ellipsoid():
     np.testing.assert_allclose(np.linalg.norm(scaled, axis=1), 1.0, rtol=ROUNDING)
 
 
+@given(
+    quat=arrays(float, 4, elements=st.floats(-1.0, 1.0)).filter(lambda q: q @ q > 0.1),
+    axes=st.tuples(*[st.floats(0.3, 3.0)] * 3),
+)
+def test_outline_of_an_ellipsoid_is_where_lines_of_sight_graze_it(quat, axes):
+    camera = Camera(eye=(3.0, 8.0, 20.0), target=(0.0, 2.0, 0.0), fov_y=40.0)
+    pygame = import_pygame()
+    canvas = Canvas(pygame.Surface((640, 400), 0, 32), camera, pygame)
+    body = BodyView("ellipsoid", axes, (1.0, 2.0, 3.0), quat)
+    ((solid,), _) = pose(canvas, Frame((body,)), np.array([[200.0, 60.0, 40.0]]), rim_width=0.0)
+    across = (solid.rim - 0.5 * np.array(canvas.size)) * (1.0, -1.0) / camera.focal(400)
+    rays = np.column_stack([across, np.ones(len(across))]) @ camera.basis
+    R = rotation_matrix(quat)
+    eye, rays = (np.array(camera.eye) - body.pos) @ R / axes, rays @ R / axes
+    # |eye + s ray| = 1 has one root s: the discriminant is zero
+    product, square = np.sum(eye * rays, axis=1), np.sum(rays * rays, axis=1)
+    # rounding of a pixel's place, 1e-13 of 640 px, times the slope of the discriminant, of the size of product²
+    np.testing.assert_allclose((product**2 - square * (eye @ eye - 1.0)) / product**2, 0.0, atol=1e-10)
+
+
 # shadows and hidden points
 
 
@@ -236,10 +302,45 @@ def test_shadow_of_a_point_falls_along_the_light():
 
 def test_shadow_outline_of_an_ellipsoid_is_where_light_grazes():
     body = BodyView("ellipsoid", (2.5, 1.5, 1.0), (1, 2, 3), TILTED)
-    local = (outline(body) - body.pos) @ rotation_matrix(body.quat)
+    ((members, points),) = outlines(Frame((body,)))
+    assert members == [0]
+    local = (points[0, 0] - body.pos) @ rotation_matrix(body.quat)
     gradient = local / body.dimensions**2
     np.testing.assert_allclose(np.sum((local / body.dimensions) ** 2, axis=1), 1.0, rtol=ROUNDING)
     np.testing.assert_allclose(gradient @ rotation_matrix(TILTED).T @ palette.LIGHT, 0.0, atol=ROUNDING)
+
+
+@pytest.mark.parametrize("kind", ["block", "hull"])
+@given(quat=arrays(float, 4, elements=st.floats(-1.0, 1.0)).filter(lambda q: q @ q > 0.1))
+def test_shadow_outline_is_the_hull_of_the_corners_along_every_light(kind, quat):
+    solid = WEDGE.polyhedron
+    shape = {"corners": solid.vertices, "faces": solid.loops} if kind == "hull" else {}
+    body = BodyView(kind, (3.0, 2.0, 1.0), (1.0, 5.0, 2.0), quat, **shape)
+    ((_, loops),) = outlines(Frame((body,)))
+    corners = body.pos + body_mesh(body).vertices @ rotation_matrix(quat).T
+    for light, loop in zip(SUN_SAMPLES, loops[0]):
+        flat = np.stack(plane_axes(light), axis=1)
+        expected, found = area(convex_hull(corners @ flat)), area(loop @ flat)
+        # the loop goes round once, without a detour: so it is the hull where it is as large
+        assert abs(found) == pytest.approx(expected, rel=1e-9)
+        assert area(convex_hull(loop @ flat)) == pytest.approx(expected, rel=1e-9)
+
+
+def area(loop):
+    (x, y), (u, v) = loop.T, np.roll(loop, -1, axis=0).T
+    return 0.5 * np.sum(x * v - u * y)
+
+
+def test_shadows_that_cover_each_other_are_no_darker_than_one(renderer):
+    low, high = np.array([0.0, 2.0, 0.0]), np.array([0.0, 2.0, 0.0]) + 3.0 * palette.LIGHT
+    near, far = BodyView("sphere", (1, 1, 1), low), BodyView("sphere", (0.9, 0.9, 0.9), high)
+    away = replace(far, pos=(0.0, 500.0, 0.0))
+    one, both = (renderer.draw(Frame((near, body), THREE_WALLS)).astype(int) for body in (away, far))
+    foot = fall(low[None], THREE_WALLS[0], palette.LIGHT[None])[0]
+    (pixel,), _ = renderer.camera(Frame((near, far), THREE_WALLS)).project(foot, SIZE)
+    column, row = np.floor(pixel).astype(int)
+    np.testing.assert_array_equal(one[row, column], both[row, column])
+    assert one[row, column].max() < 200  # it is in the shadow
 
 
 def test_points_behind_a_block_are_hidden():
@@ -380,6 +481,40 @@ def test_same_frame_gives_same_bytes_whatever_was_drawn_before(renderer):
     assert corner.tobytes() == other.draw(block_frame((4, 3, 4), walls=CORNER)).tobytes()
     assert first.tobytes() == again.tobytes() == other.draw(frame).tobytes()
     other.close()
+
+
+@given(pos=st.tuples(*[st.floats(-9.0, 9.0)] * 3), kind=st.sampled_from(["block", "sphere", "ellipsoid"]))
+def test_only_the_part_with_the_bodies_is_redrawn_and_nothing_is_missing(pos, kind):
+    camera = Camera(eye=(0.0, 6.0, 14.0), target=(0.0, 3.0, 0.0), fov_y=50.0)
+    body = BodyView(kind, (3.0, 3.0, 3.0) if kind == "sphere" else (4.0, 1.0, 0.5), pos, TILTED)
+    frame = Frame((body, replace(body, pos=(2.0, 3.0, -1.0))), THREE_WALLS, GoalView(goal_face=2))
+    painter = Painter(SIZE, camera)
+    pictures = np.zeros((2, SIZE[1], SIZE[0], 3), dtype=np.uint8)
+    painter.paint(frame)
+    painter.copy_to(pictures[0])
+    painter._box = lambda frame, camera: painter.picture.get_rect()
+    painter.paint(frame)
+    painter.copy_to(pictures[1])
+    np.testing.assert_array_equal(*pictures)
+
+
+@pytest.mark.parametrize(("switch", "left"), [("arrows", {"text"}), ("text", {"arrows"})])
+def test_arrows_and_text_can_be_left_out(switch, left):
+    arrows = {"contact_points": [(1, 0, 1)], "contact_forces": [(0, 20, 0)], "applied_force": (30, 0, 0)}
+    marks = {"arrows": arrows, "text": {"text": ("t",)}}
+    whole, bare = block_frame(**arrows, text=("t",)), block_frame(**{k: v for m in left for k, v in marks[m].items()})
+    plain, without = Renderer(*SIZE), Renderer(*SIZE, **{switch: False})
+    np.testing.assert_array_equal(without.draw(whole), plain.draw(bare))
+    assert np.any(plain.draw(whole) != without.draw(whole))
+
+
+def test_backdrops_are_kept_within_bounds(monkeypatch):
+    monkeypatch.setattr("rigid_env.rendering.painter.KEPT_PIXELS", 3 * SIZE[0] * SIZE[1])
+    painter = Painter(SIZE)
+    frames = [block_frame(goal=GoalView((x, 0.0, 0.0))) for x in range(5)]
+    kept = [painter.setting(frame) for frame in frames]
+    assert [painter.setting(frame) is setting for frame, setting in zip(frames[2:], kept[2:])] == [True] * 3
+    assert painter.setting(frames[0]) is not kept[0]
 
 
 def test_picture_is_a_writable_array_of_its_own(renderer):

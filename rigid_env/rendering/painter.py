@@ -1,0 +1,212 @@
+"""Frames onto a picture in memory: the stages of drawing, in order, and what is kept from one frame to the next."""
+
+from __future__ import annotations
+
+from collections import OrderedDict
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from rigid_env.extras import require
+from rigid_env.rendering import palette
+from rigid_env.rendering.backdrop import draw_backdrop
+from rigid_env.rendering.bodies import draw_bodies
+from rigid_env.rendering.camera import NEAR, Camera
+from rigid_env.rendering.canvas import REFERENCE_HEIGHT, SUPERSAMPLING, Canvas
+from rigid_env.rendering.layout import Room, default_camera, make_room
+from rigid_env.rendering.overlays import (
+    draw_contacts,
+    draw_far_outlines,
+    draw_goal,
+    draw_near_walls,
+    draw_wrench,
+    has_near_walls,
+)
+from rigid_env.rendering.shadow_layer import LitWall, ShadowLayer, lit_walls
+
+BODY_STAGES = (draw_bodies,)
+ARROW_STAGES = (draw_contacts, draw_wrench)
+"""Drawn in this order on the canvas, each a function of canvas, frame and room."""
+
+LINE_REACH = 3.0
+"""[px] at 600 px of height, and in smaller pictures. No line of a body reaches further beyond it."""
+
+SMALL = 20_000
+"""Pixels of a picture that is always drawn whole: that takes less time than to find the part with the bodies."""
+
+KEPT_PIXELS = 5_000_000
+"""Pixels of kept backdrops in all: of eight pictures of 960 x 600 px, or 700 of 84 x 84 px."""
+
+
+@dataclass(frozen=True, eq=False)
+class Setting:
+    """Everything in a picture that does not move.
+
+    Parameters
+    ----------
+    room : Room
+    camera : Camera
+    backdrop : (height, width, 4) uint8
+        Background, floor, walls and goal.
+    lit_walls : list of LitWall
+    pane : pygame.Surface or None
+        Of the picture's size, with alpha: walls between camera and scene.
+    """
+
+    room: Room
+    camera: Camera
+    backdrop: np.ndarray
+    lit_walls: list[LitWall]
+    pane: object
+
+
+class Painter:
+    """Draws frames into an array.
+
+    Parameters
+    ----------
+    size : (width, height)
+        [px]. Of the picture.
+    camera : Camera or None
+        None takes `layout.default_camera`.
+    room : Room or None
+        None makes one of each frame, by `layout.make_room`. The walls are those of the frame.
+    bounds : pair of (3,) float or None
+        Of `layout.make_room`.
+    arrows : bool
+        Whether contacts, forces and torques are drawn.
+
+    Attributes
+    ----------
+    picture : pygame.Surface
+        Overwritten by the next `paint`.
+
+    Raises
+    ------
+    gymnasium.error.DependencyNotInstalled
+        If pygame is missing.
+    """
+
+    def __init__(self, size, camera=None, room=None, bounds=None, arrows=True):
+        self._pygame = import_pygame()
+        self.size = size
+        self._camera, self._room, self._bounds = camera, room, bounds
+        self._has_arrows, self._stages = arrows, BODY_STAGES + (ARROW_STAGES if arrows else ())
+        self._line_reach = LINE_REACH * max(1.0, size[1] / REFERENCE_HEIGHT)
+        self._memory, self.picture = self._surface(size, "RGBX")
+        _, self._canvas = self._surface((SUPERSAMPLING * size[0], SUPERSAMPLING * size[1]), "RGBX")
+        self._shadows = ShadowLayer(size, self._pygame)
+        self._settings = OrderedDict()
+
+    def _surface(self, size, layout):
+        """Array (height, width, 4) uint8 and the surface of the same memory.
+
+        Surfaces whose colours are stored in the same order are blended ten times as fast.
+        """
+        memory = np.zeros((size[1], size[0], 4), dtype=np.uint8)
+        return memory, self._pygame.image.frombuffer(memory, size, layout)
+
+    def paint(self, frame):
+        """Draw a `Frame` on `picture`."""
+        setting = self.setting(frame)
+        np.copyto(self._memory, setting.backdrop)
+        if frame.bodies:
+            self._shadows.draw(self.picture, setting.camera, setting.lit_walls, frame)
+        box = self._box(frame, setting.camera)
+        if box:
+            canvas = self._enlarged(setting.camera, box)
+            for stage in self._stages:
+                stage(canvas, frame, setting.room)
+            self._reduce(box)
+        if setting.pane is not None:
+            self.picture.blit(setting.pane, (0, 0))
+
+    def copy_to(self, out):
+        """Copy the picture into a contiguous (height, width, 3) uint8 array."""
+        self._pygame.image.frombuffer(out, self.size, "RGB").blit(self.picture, (0, 0))
+
+    def setting(self, frame):
+        """`Setting` of a frame, kept for later ones with the same walls, shapes and goal."""
+        key = self._key(frame)
+        setting = self._settings.get(key)
+        if setting is None:
+            setting = self._settings[key] = self._make_setting(frame)
+            while len(self._settings) > max(1, KEPT_PIXELS // (self.size[0] * self.size[1])):
+                self._settings.popitem(last=False)
+        self._settings.move_to_end(key)
+        return setting
+
+    def _key(self, frame):
+        walls = tuple((*wall.normal.tolist(), wall.offset) for wall in frame.walls)
+        shapes = () if self._room else tuple((body.kind, *body.dimensions.tolist()) for body in frame.bodies)
+        goal = frame.goal
+        return walls, shapes, goal and (goal.pos is not None and (*goal.pos.tolist(), goal.radius, goal.reached))
+
+    def _make_setting(self, frame):
+        if self._room:
+            room = replace(self._room, walls=frame.walls)
+        else:
+            room = make_room(frame.walls, frame.bodies, self._bounds)
+        camera = self._camera or default_camera(room, self.size)
+        self._memory[..., :3] = draw_backdrop(camera, self.size, room)
+        canvas = self._enlarged(camera)
+        draw_far_outlines(canvas, room)
+        draw_goal(canvas, frame.goal, room)
+        self._reduce()
+        lit = lit_walls(camera, self._shadows.size, room, self._pygame)
+        return Setting(room, camera, self._memory.copy(), lit, self._make_pane(camera, room))
+
+    def _make_pane(self, camera, room):
+        if not has_near_walls(camera, room):
+            return None
+        _, large = self._surface(self._canvas.get_size(), "RGBA")
+        large.fill((*palette.HALO, 0))
+        draw_near_walls(Canvas(large, camera, self._pygame), room)
+        _, pane = self._surface(self.size, "RGBA")
+        return self._pygame.transform.smoothscale(large, self.size, pane)
+
+    def _box(self, frame, camera):
+        """Part of the picture [px], a `pygame.Rect`, outside of which the stages draw nothing.
+
+        A point at most r away from one at depth z and lateral offset x, both along the camera's axes, is at most
+        f r √(1 + (x/z)²) / (z - r) away from it in the picture, f the focal length.
+        """
+        whole = self._pygame.Rect((0, 0), self.size)
+        if self.size[0] * self.size[1] < SMALL or (self._has_arrows and frame.has_arrows):
+            return whole
+        if not frame.bodies:
+            return self._pygame.Rect(0, 0, 0, 0)
+        poses, focal = frame.poses, camera.focal(self.size[1])
+        pixels, depths = camera.project(poses.pos, self.size)
+        nearest = (depths - poses.radius)[:, None]
+        if nearest.min() < NEAR:
+            return whole
+        slopes = (pixels - 0.5 * np.array(self.size)) / focal
+        reach = focal * poses.radius[:, None] * np.sqrt(1.0 + slopes**2) / nearest + self._line_reach
+        low, high = np.floor((pixels - reach).min(axis=0)), np.ceil((pixels + reach).max(axis=0))
+        return whole.clip((*low.tolist(), *(high - low).tolist()))
+
+    def _enlarged(self, camera, box=None):
+        """Canvas with a part of the picture on it, or all."""
+        small, large = self._parts(box)
+        self._pygame.transform.scale(small, large.get_size(), large)
+        return Canvas(self._canvas, camera, self._pygame)
+
+    def _reduce(self, box=None):
+        """Canvas back to the picture, each pixel the mean of its parts."""
+        small, large = self._parts(box)
+        self._pygame.transform.smoothscale(large, small.get_size(), small)
+
+    def _parts(self, box):
+        if box is None:
+            return self.picture, self._canvas
+        return self.picture.subsurface(box), self._canvas.subsurface([SUPERSAMPLING * length for length in box])
+
+
+def import_pygame():
+    """pygame, with `gfxdraw`; an error that names the extra where it is missing."""
+    require("render", "pygame", purpose="rendering")
+    import pygame
+    import pygame.gfxdraw
+
+    return pygame

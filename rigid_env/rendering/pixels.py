@@ -1,0 +1,123 @@
+"""Pixel observations: pictures of worlds, one after the other, written into arrays that the caller keeps."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from physics import World
+from rigid_env.extras import require
+from rigid_env.rendering.camera import Camera
+from rigid_env.rendering.frame import Frame
+from rigid_env.rendering.layout import Room
+from rigid_env.rendering.painter import Painter
+from rigid_env.rendering.picture import world_frame
+
+
+class PixelObserver:
+    """Writes pictures without text, and without arrows unless they are wanted, into arrays.
+
+    One observer draws any number of worlds. The picture depends on nothing but the frame: equal states give equal
+    pixels, whatever was drawn before. No window or display is needed. A pickled observer draws the same pictures: it
+    takes its settings along, and leaves pygame's surfaces and the kept backdrops behind.
+
+    Parameters
+    ----------
+    width, height : int
+        [px].
+    camera : Camera, optional
+        None looks into the room, see `Renderer`.
+    room : Room, optional
+        Part of space that is shown, see `make_room`. None takes one that fits the walls and the bodies' sizes of each
+        frame: worlds with bodies of other sizes are then seen from elsewhere, and each costs a new backdrop at first.
+    arrows : bool
+        Whether contact points and the arrows of forces and torques are drawn.
+
+    Raises
+    ------
+    ValueError
+        On a size that is not positive.
+    gymnasium.error.DependencyNotInstalled
+        If pygame is missing.
+
+    Examples
+    --------
+    >>> import numpy as np, physics
+    >>> from rigid_env.rendering.pixels import PixelObserver
+    >>> world = physics.World(physics.scenes.drop(), worlds=4)
+    >>> pictures = np.zeros((4, 84, 84, 3), np.uint8)
+    >>> observer = PixelObserver(84, 84)
+    >>> for index in range(4):
+    ...     _ = observer.observe_world(world, index, pictures[index])
+    """
+
+    def __init__(
+        self, width: int, height: int, camera: Camera | None = None, *, room: Room | None = None, arrows: bool = False
+    ):
+        for name, value in (("width", width), ("height", height)):
+            if isinstance(value, bool) or not isinstance(value, (int, np.integer)) or value < 1:
+                raise ValueError(f"{name} is {value!r}; allowed are integers of at least 1")
+        require("render", "pygame", purpose="pixel observations")
+        self.width, self.height = int(width), int(height)
+        self._camera, self._room, self._arrows = camera, room, arrows
+        self._painter: Painter | None = None
+
+    @property
+    def shape(self) -> tuple[int, int, int]:
+        """Shape of a picture: (height, width, 3)."""
+        return self.height, self.width, 3
+
+    def observe(self, frame: Frame, out: np.ndarray | None = None) -> np.ndarray:
+        """Draw a frame.
+
+        Parameters
+        ----------
+        frame : Frame
+        out : (height, width, 3) uint8, optional
+            Array to write into, contiguous in memory, as one of a batch is. None makes a new one.
+
+        Returns
+        -------
+        (height, width, 3) uint8
+            `out`. sRGB, row 0 on top.
+
+        Raises
+        ------
+        ValueError
+            If `out` is another kind of array, or the frame has no walls and neither camera nor room was given: nothing
+            would say from where to look. Nothing has been written then.
+        """
+        out = np.empty(self.shape, dtype=np.uint8) if out is None else self._checked(out)
+        if not frame.walls and self._camera is None and self._room is None:
+            raise ValueError("frame has no walls; allowed is one with walls, or an observer with a camera or a room")
+        if self._painter is None:
+            self._painter = Painter((self.width, self.height), self._camera, self._room, arrows=self._arrows)
+        self._painter.paint(frame)
+        self._painter.copy_to(out)
+        return out
+
+    def observe_world(self, world: World, index: int = 0, out: np.ndarray | None = None) -> np.ndarray:
+        """Draw one world of a batch, with `world_frame`; `observe` says more.
+
+        Parameters
+        ----------
+        world : World
+        index : int
+            Of the world in its batch.
+        out : (height, width, 3) uint8, optional
+
+        Returns
+        -------
+        (height, width, 3) uint8
+        """
+        return self.observe(world_frame(world, index, arrows=self._arrows), out)
+
+    def _checked(self, out: np.ndarray) -> np.ndarray:
+        if not isinstance(out, np.ndarray) or out.shape != self.shape or out.dtype != np.uint8:
+            found = f"{out.dtype} {out.shape}" if isinstance(out, np.ndarray) else type(out).__name__
+            raise ValueError(f"out is {found}; allowed is a uint8 array {self.shape}")
+        if not (out.flags.c_contiguous and out.flags.writeable):
+            raise ValueError("out is not contiguous or not writeable; allowed is an array that is both")
+        return out
+
+    def __getstate__(self):
+        return {**vars(self), "_painter": None}

@@ -1,0 +1,170 @@
+"""Bodies before the camera: the meshes of all bodies posed, lit and projected, those of one shape at once."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from rigid_env.rendering import palette
+from rigid_env.rendering.camera import NEAR
+from rigid_env.rendering.geometry import perpendiculars, unit_vectors
+from rigid_env.rendering.meshes import Mesh, body_mesh, unit_mesh
+
+OCTANT_LIGHTENING = 0.42
+"""Every second octant of a round body is lighter, so that its rotation can be seen."""
+
+FACET, FEW = 8.0, 16
+"""[px] of the picture. A round body gets so many facets that none is longer, within `SUBDIVISIONS`. With more than
+`FEW` round bodies the length grows, so that there are as many facets in all."""
+
+SUBDIVISIONS = (4, 6, 8, 10, 12)
+"""Of a round body's mesh, see `meshes.SPHERE_SUBDIVISIONS`: coarse where the body is small in the picture."""
+
+RIM_POINTS = 32
+"""Of the outline of a round body."""
+
+_ANGLES = 2.0 * np.pi * np.arange(RIM_POINTS)[:, None] / RIM_POINTS
+_COSINES, _SINES = np.cos(_ANGLES), np.sin(_ANGLES)
+
+
+@dataclass(frozen=True, eq=False)
+class Solid:
+    """One body as the camera sees it.
+
+    Parameters
+    ----------
+    mesh : Mesh
+        Its faces and edges; its vertices are those of the unit shape.
+    vertices : (v, 3) float64
+        [m]. World frame.
+    pixels : (v, 2) float64
+        [px]. On the canvas.
+    is_visible : (f,) bool
+        Faces that look to the camera.
+    colours : (f,) int
+        Of the visible faces in the light, as the canvas stores them.
+    rim : (k, 2) float64 or None
+        [px]. Of a round body: its outline on the canvas, in order.
+    is_whole : bool
+        Whether all of it can be drawn as it is projected.
+    """
+
+    mesh: Mesh
+    vertices: np.ndarray
+    pixels: np.ndarray
+    is_visible: np.ndarray
+    colours: np.ndarray
+    rim: np.ndarray | None
+    is_whole: bool
+
+
+def pose(canvas, frame, colours, rim_width, face_tint=None):
+    """Pose the bodies of a frame before a canvas's camera.
+
+    Parameters
+    ----------
+    canvas : Canvas
+    frame : Frame
+    colours : (n, 3) float
+        sRGB of the bodies before light, 0..255.
+    rim_width : float
+        [units] of the canvas. Of the line round a round body, which lies half outside and half on it.
+    face_tint : (face, colour) or None
+        Another colour of one face of body 0.
+
+    Returns
+    -------
+    solids : list of Solid
+    depths : (n,) float64
+        [m]. Of the bodies along the line of sight.
+    """
+    _, depths = canvas.project(frame.poses.pos)
+    groups = {}
+    for index, mesh in enumerate(_meshes(canvas, frame.bodies, depths)):
+        groups.setdefault(id(mesh), (mesh, []))[1].append(index)
+    solids = [None] * len(frame.bodies)
+    for mesh, members in groups.values():
+        tint = face_tint if members[0] == 0 else None
+        for index, solid in zip(members, _pose_alike(canvas, mesh, frame, members, colours[members], rim_width, tint)):
+            solids[index] = solid
+    return solids, depths
+
+
+def _meshes(canvas, bodies, depths):
+    """Unit mesh of each body; of a hull, its own."""
+    focal = canvas.camera.focal(canvas.size[1]) / canvas.scale
+    count = sum(body.kind in ("sphere", "ellipsoid") for body in bodies)
+    facet = FACET * max(1.0, count / FEW) ** 0.5
+    for body, depth in zip(bodies, depths.tolist()):
+        if body.kind == "block":
+            yield unit_mesh("block")
+        elif body.kind == "hull":
+            yield body_mesh(body)
+        else:
+            radius = focal * max(body.dimensions.tolist()) / max(depth, NEAR)
+            fine = (n for n in SUBDIVISIONS if 0.5 * np.pi * radius <= n * facet)
+            yield unit_mesh("sphere", next(fine, SUBDIVISIONS[-1]))
+
+
+def _pose_alike(canvas, mesh, frame, members, colours, rim_width, face_tint):
+    """Solids of the bodies that share a mesh."""
+    eye = np.array(canvas.camera.eye)
+    pos, R, size = (array[members] for array in (frame.poses.pos, frame.poses.rotation, frame.poses.size))
+    turned = np.swapaxes(R, 1, 2)
+    if frame.bodies[members[0]].kind == "hull":
+        size = np.ones_like(size)
+    rims = None
+    if mesh.is_smooth:
+        rims = _rims(canvas, pos, R, size, eye, rim_width)
+        # the mesh ends where the line round it begins
+        half = 0.5 * rim_width * canvas.unit / canvas.camera.focal(canvas.size[1])
+        size = size - np.minimum(half * np.linalg.norm(eye - pos, axis=1)[:, None], 0.4 * size)
+    vertices = pos[:, None] + (mesh.vertices * size[:, None]) @ turned
+    centres = pos[:, None] + (mesh.centres * size[:, None]) @ turned
+    normals = (mesh.normals / size[:, None]) @ turned
+    towards_eye = eye - centres
+    is_visible = np.einsum("nfi,nfi->nf", normals, towards_eye) > 0.0
+    lit = _light(canvas, mesh, normals, towards_eye, is_visible, colours, face_tint)
+    pixels, depths = canvas.project(vertices.reshape(-1, 3))
+    pixels, depths = pixels.reshape(*vertices.shape[:2], 2), depths.reshape(vertices.shape[:2])
+    is_whole = canvas.are_in_sight(pixels, depths)
+    for i in range(len(members)):
+        rim = rims[i] if rims is not None and is_whole[i] else None
+        yield Solid(mesh, vertices[i], pixels[i], is_visible[i], lit[i], rim, bool(is_whole[i]))
+
+
+def _light(canvas, mesh, normals, towards_eye, is_visible, colours, face_tint):
+    """(n, f) int colours of the visible faces in the light, as the canvas stores them."""
+    body, face = np.nonzero(is_visible)
+    surface = colours[body]
+    if mesh.is_smooth:
+        odd = mesh.is_odd_octant[face]
+        surface[odd] += OCTANT_LIGHTENING * (255.0 - surface[odd])
+    if face_tint is not None:
+        surface[(body == 0) & (face == face_tint[0])] = face_tint[1]
+    lit = np.zeros(is_visible.shape, dtype=np.int64)
+    lit[body, face] = canvas.stored(
+        palette.shade(surface, unit_vectors(normals[body, face]), unit_vectors(towards_eye[body, face]))
+    )
+    return lit
+
+
+def _rims(canvas, pos, R, size, eye, width):
+    """Outlines (n, k, 2) [px] of ellipsoids, moved outwards by half a line's width.
+
+    In the frame in which the ellipsoid x = pos + R A u is the unit sphere |u| = 1 the eye is at w = A⁻¹ Rᵀ (eye - pos),
+    and lines of sight graze where u·w = 1: on a circle round w / |w|², of radius √(1 - 1/|w|²).
+    """
+    w = np.einsum("nij,ni->nj", R, eye - pos) / size
+    square = np.maximum(np.sum(w * w, axis=1), 1.0)[:, None]
+    radius = np.sqrt(1.0 - 1.0 / square)
+    a, b = perpendiculars(w)
+    grazed = (w / square)[:, None] + radius[:, None] * (_COSINES * a[:, None] + _SINES * b[:, None])
+    points = pos[:, None] + (grazed * size[:, None]) @ np.swapaxes(R, 1, 2)
+    pixels, _ = canvas.project(points.reshape(-1, 3))
+    pixels = pixels.reshape(len(pos), -1, 2)
+    along = np.roll(pixels, -1, axis=1) - np.roll(pixels, 1, axis=1)
+    outwards = unit_vectors(np.stack([along[..., 1], -along[..., 0]], axis=-1))
+    outwards *= np.sign(np.sum(outwards * (pixels - pixels.mean(axis=1, keepdims=True)), axis=-1, keepdims=True))
+    return pixels + 0.5 * width * canvas.unit * outwards
