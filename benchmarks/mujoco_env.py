@@ -16,7 +16,7 @@ from physics import scenes
 from rigid_env.lab.measure.environments import ENV_ID, SUBSTEPS, EnvPeer
 from rigid_env.lab.measure.mujoco_scene import BLOCK, model_xml
 from rigid_env.lab.measure.workloads import STEP
-from rigid_env.tasks.base import FORCE_SHARE, TORQUE_SHARE
+from rigid_env.tasks.block import FORCE_SHARE, TORQUE_SHARE
 
 PEER_ID = "MujocoBlockReach-v0"
 GOAL_WIDTH = 6.0  # |x| and |z| of the goal and of the start are below this [m]

@@ -1,30 +1,60 @@
 """Gymnasium environments on the `physics` engine: a block to be pushed, tipped and turned among three walls.
 
-Importing the package registers `rigid_env/BlockReach-v0` and `rigid_env/BlockReorient-v0`; the engine is imported with
-the first environment.
+Importing the package registers `rigid_env/BlockReach-v0`, `rigid_env/BlockReorient-v0` and `rigid_env/Scene-v0`, the
+environment of a scene file; the engine is imported with the first environment.
 """
 
 from importlib import import_module
 from typing import TYPE_CHECKING
 
-from rigid_env.envs.registration import register_envs
+from rigid_env.envs.registration import register_envs, register_task
 from rigid_env.shadowing import check_engine_is_found
 
 if TYPE_CHECKING:
     from rigid_env.envs.block_reach import BlockReachEnv
     from rigid_env.envs.block_reorient import BlockReorientEnv
-    from rigid_env.envs.vector_env import BlockReachVectorEnv, BlockReorientVectorEnv
+    from rigid_env.envs.checks import check_task
+    from rigid_env.envs.env import TaskEnv
+    from rigid_env.envs.scene import SceneEnv, SceneVectorEnv
+    from rigid_env.envs.vector_env import BlockReachVectorEnv, BlockReorientVectorEnv, TaskVectorEnv
+    from rigid_env.tasks import (
+        Choice,
+        Entry,
+        Force,
+        Gust,
+        Impulse,
+        LogUniform,
+        Normal,
+        Push,
+        Task,
+        Uniform,
+        Wrench,
+        observe,
+    )
+    from rigid_env.tasks.state import TaskState
 
     __version__: str
 
 check_engine_is_found()
 register_envs()
 
+_OF_TASKS = (
+    "Choice", "Entry", "Force", "Gust", "Impulse", "LogUniform", "Normal", "Push", "Task", "Uniform", "Wrench",
+    "observe",
+)  # fmt: skip
+
 _LAZY = {
     "BlockReachEnv": "rigid_env.envs.block_reach",
     "BlockReachVectorEnv": "rigid_env.envs.vector_env",
     "BlockReorientEnv": "rigid_env.envs.block_reorient",
     "BlockReorientVectorEnv": "rigid_env.envs.vector_env",
+    **dict.fromkeys(_OF_TASKS, "rigid_env.tasks"),
+    "SceneEnv": "rigid_env.envs.scene",
+    "SceneVectorEnv": "rigid_env.envs.scene",
+    "TaskEnv": "rigid_env.envs.env",
+    "TaskState": "rigid_env.tasks.state",
+    "check_task": "rigid_env.envs.checks",
+    "TaskVectorEnv": "rigid_env.envs.vector_env",
     "RigidVecEnv": "rigid_env.envs.sb3",  # needs the extra `agents`, so it is not in `__all__`
 }
 
@@ -33,8 +63,27 @@ __all__ = [
     "BlockReachVectorEnv",
     "BlockReorientEnv",
     "BlockReorientVectorEnv",
+    "Choice",
+    "Entry",
+    "Force",
+    "Gust",
+    "Impulse",
+    "LogUniform",
+    "Normal",
+    "Push",
+    "SceneEnv",
+    "SceneVectorEnv",
+    "Task",
+    "TaskEnv",
+    "TaskState",
+    "TaskVectorEnv",
+    "Uniform",
+    "Wrench",
     "__version__",
+    "check_task",
+    "observe",
     "register_envs",
+    "register_task",
 ]
 
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from physics import Scene
 
-SCENE_FILE = ".toml"
+SCENE_FILE = ".toml"  # as of `rigid_env.tasks.scene_source`, which takes long to import
 
 
 def load_scene(name: str) -> tuple[str, Scene]:
@@ -20,20 +20,10 @@ def load_scene(name: str) -> tuple[str, Scene]:
     ValueError
         No such scene or file, or a mistake in the file: it is named with file, line and key.
     """
-    import physics
-    from physics import scenes
-    from physics.keywords import nearest_first
+    from rigid_env.tasks.scene_source import find_scene
 
-    path = Path(name)
-    if path.suffix.lower() == SCENE_FILE or path.is_file():
-        if not path.is_file():
-            what = "is a folder" if path.is_dir() else "does not exist"
-            raise ValueError(f"scene is {name!r}, which {what}; allowed is a scene file, or a canonical scene")
-        return path.stem, physics.load_scene(path)
-    if name in scenes.SCENES:
-        return name, scenes.by_name(name)
-    known = ", ".join(nearest_first(name, scenes.SCENES))
-    raise ValueError(f"scene is {name!r}; allowed are {known}, or a scene file ({SCENE_FILE})")
+    found = find_scene(name)
+    return found.name, found.scene
 
 
 # --- completion in a shell -------------------------------------------------------------------------------------------

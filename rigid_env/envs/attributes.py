@@ -9,12 +9,11 @@ import numpy as np
 
 from physics.keywords import nearest_first
 from rigid_env.envs.vector_arguments import episode_limit
-from rigid_env.tasks.parameters import LENGTHS
 
 
 def _parameter(field: str, what: str) -> property:
     def read(env) -> float | np.ndarray:
-        return value_of(env.task.values.now[field][0])
+        return value_of(env.task.drawn[field][0])
 
     def write(env, value) -> None:
         env.task.hold(field, value)
@@ -43,10 +42,13 @@ class EpisodeParameters:
 
 
 SHARED = (
-    "accuracy", "autoreset_mode", "control_dt", "dt", "effects", "frame_skip", "half_width", "max_episode_steps",
-    "metadata", "render_mode", "spec", "walls",
+    "accuracy", "autoreset_mode", "control_dt", "dt", "effects", "frame_skip", "max_episode_steps", "metadata",
+    "render_mode", "spec",
 )  # fmt: skip
 """Attributes that are the same in all worlds of a batch."""
+
+OF_BLOCKS = ("half_width", "walls")
+"""More of them, of the block's tasks."""
 
 SINGLE = ("action_space", "observation_space", "np_random", "np_random_seed")
 """Attributes of one world under other names, or in tuples, in the batch."""
@@ -65,9 +67,9 @@ class BatchAttributes(gym.vector.VectorEnv):
         Parameters
         ----------
         name : str
-            ``mass``, ``size``, ``friction``, ``restitution``, ``gravity`` of the running episodes; ``np_random``,
-            ``np_random_seed``; ``action_space`` and ``observation_space`` of one world; ``elapsed_steps``; and the
-            settings of the batch (`SHARED`), the same in all worlds.
+            A drawn value of the running episodes, such as ``mass``; ``np_random``, ``np_random_seed``; ``action_space``
+            and ``observation_space`` of one world; ``elapsed_steps``; and the settings of the batch (`SHARED`), the
+            same in all worlds.
 
         Returns
         -------
@@ -78,17 +80,19 @@ class BatchAttributes(gym.vector.VectorEnv):
         AttributeError
             Listing the names there are, the nearest first.
         """
-        if name in LENGTHS:
-            return tuple(value_of(value) for value in self.task.values.now[name])
+        if name in self.task.drawn:
+            return tuple(value_of(value) for value in self.task.drawn[name])
         if name in ("np_random", "np_random_seed"):
             return tuple(getattr(self, name))
         if name == "elapsed_steps":
-            return tuple(self._elapsed.tolist())
+            return tuple(self.task.steps.tolist())
         if name in ("action_space", "observation_space"):
             return (getattr(self, f"single_{name}"),) * self.num_envs
-        if name in SHARED:
+        if name in self._shared_names:
             return (self._shared(name),) * self.num_envs
-        raise AttributeError(self._unknown("get_attr", name, (*LENGTHS, "elapsed_steps", *SINGLE, *SHARED)))
+        raise AttributeError(
+            self._unknown("get_attr", name, (*self.task.drawn, "elapsed_steps", *SINGLE, *self._shared_names))
+        )
 
     def set_attr(self, name: str, values: Any) -> None:
         """Set an attribute of every world.
@@ -96,8 +100,9 @@ class BatchAttributes(gym.vector.VectorEnv):
         Parameters
         ----------
         name : str
-            ``mass``, ``size``, ``friction``, ``restitution`` or ``gravity``: from now on, in the running and all later
-            episodes; None draws it again from the next episode on. ``max_episode_steps``, the same for all worlds.
+            A drawn value: ``mass`` and the other physical parameters from now on, in the running and all later
+            episodes, other names in all later ones; None draws it again from the next episode on.
+            ``max_episode_steps``, the same for all worlds.
         values : list, tuple or anything else
             A list or a tuple has one entry for each world; anything else, a (3,) array of a size included, is for all.
 
@@ -108,7 +113,7 @@ class BatchAttributes(gym.vector.VectorEnv):
         ValueError
             Naming the field, the value and what is allowed. Nothing has changed then.
         """
-        settable = (*LENGTHS, "max_episode_steps")
+        settable = (*self.task.drawn, "max_episode_steps")
         if name not in settable:
             raise AttributeError(self._unknown("set_attr", name, settable))
         if isinstance(values, (list, tuple)) and len(values) != self.num_envs:
@@ -151,8 +156,12 @@ class BatchAttributes(gym.vector.VectorEnv):
             return self.render() or (None,) * self.num_envs
         return self.get_attr(name)
 
+    @property
+    def _shared_names(self) -> tuple[str, ...]:
+        return SHARED + (OF_BLOCKS if hasattr(self.task, "area") else ())
+
     def _shared(self, name: str) -> Any:
-        if name in ("walls", "half_width"):
+        if name in OF_BLOCKS:
             return getattr(self.task.area, name)
         if name in ("accuracy", "dt"):
             return getattr(self.task.world, name)

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from physics.keywords import known_keywords
-from rigid_env.envs.env import RigidEnv
+from rigid_env.envs.env import BlockEnv
 from rigid_env.tasks import BlockReach
 
 
 @known_keywords
-class BlockReachEnv(RigidEnv):
+class BlockReachEnv(BlockEnv):
     """Bring a block to a place on the floor, and leave it at rest there.
 
     ## Description
@@ -92,9 +92,11 @@ class BlockReachEnv(RigidEnv):
     `gymnasium.make`.
 
     `info` holds `is_success`, `distance` [m], `speed` [m/s], `spin` [rad/s], and `physics_status`, a
-    `physics.Status`: 0 when nothing went wrong in the step, contact problems above their tolerance included.
-    That of `reset` also holds the parameters of the episode, `mass` [kg], `size` [m], `friction`, `restitution` and
-    `gravity` [m/s²], without those that `effects` take the place of.
+    `physics.Status`: 0 when nothing went wrong in the step, contact problems above their tolerance included. The terms
+    of the reward are in it, too: `reward_progress` is the gain of the potential, `reward_effort` the costs,
+    `reward_success` the bonus. That of `reset` also holds what was drawn for the episode: `place` [m], `yaw` [rad],
+    `face`, `goal` [m], and the parameters `mass` [kg], `size` [m], `friction`, `restitution` and `gravity` [m/s²],
+    without those that `effects` take the place of.
 
     ## Arguments
 
@@ -115,6 +117,9 @@ class BlockReachEnv(RigidEnv):
     | `render_mode` | None | `"rgb_array"`, `"human"` or None |
     | `width` | 960 | of pictures [px] |
     | `height` | 600 | of pictures [px] |
+    | `obs` | `"state"` | observations: `"state"`, the table above, or `"pixels"`, pictures (uint8) |
+    | `obs_size` | (84, 84) | height and width of these [px] |
+    | `obs_stack` | 1 | of the last so many control steps, along the last axis, the newest last |
 
     `mass`, `size`, `friction`, `restitution` and `gravity` take a pair (low, high) as well: each episode
     then draws its own value. What is drawn is not observed, the edges in the gaps to the walls apart. They are

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from physics.keywords import known_keywords
-from rigid_env.envs.env import RigidEnv
+from rigid_env.envs.env import BlockEnv
 from rigid_env.tasks import BlockReorient
 
 
 @known_keywords
-class BlockReorientEnv(RigidEnv):
+class BlockReorientEnv(BlockEnv):
     """Turn a block so that a given face is down, and leave it at rest.
 
     ## Description
@@ -84,9 +84,11 @@ class BlockReorientEnv(RigidEnv):
     `gymnasium.make`.
 
     `info` holds `is_success`, `angle` [rad], `speed` [m/s], `spin` [rad/s], and `physics_status`, a
-    `physics.Status`: 0 when nothing went wrong in the step, contact problems above their tolerance included.
-    That of `reset` also holds the parameters of the episode, `mass` [kg], `size` [m], `friction`, `restitution` and
-    `gravity` [m/s²], without those that `effects` take the place of.
+    `physics.Status`: 0 when nothing went wrong in the step, contact problems above their tolerance included. The terms
+    of the reward are in it, too: `reward_progress` is the gain of the potential, `reward_effort` the costs,
+    `reward_success` the bonus. That of `reset` also holds what was drawn for the episode: `place` [m], `yaw` [rad],
+    `face`, `target_face`, and the parameters `mass` [kg], `size` [m], `friction`, `restitution` and `gravity` [m/s²],
+    without those that `effects` take the place of.
 
     ## Arguments
 

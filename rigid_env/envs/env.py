@@ -1,7 +1,8 @@
-"""A task as a single Gymnasium environment: a batch of one world."""
+"""Tasks as single Gymnasium environments: batches of one world."""
 
 from __future__ import annotations
 
+import inspect
 import reprlib
 from collections.abc import Sequence
 from pathlib import Path
@@ -13,68 +14,68 @@ import numpy as np
 import physics
 from physics.parallel.exclusive import exclusive, in_use
 from rigid_env.envs.attributes import EpisodeParameters, value_of
-from rigid_env.envs.spaces import action_space, observation_space
+from rigid_env.envs.infos import InfoMaker
+from rigid_env.envs.making import make_task
+from rigid_env.envs.sources import make_source
+from rigid_env.envs.spaces import action_space
 from rigid_env.rendering.view import RENDER_MODES, View
 from rigid_env.tasks import Task
-from rigid_env.tasks.kernels import AXES
+from rigid_env.tasks.block import BlockTask
+from rigid_env.tasks.describe import Section, markdown, sections
+from rigid_env.tasks.layout import FAILURE, REWARD
 from rigid_env.tasks.parameters import Edges, Number
+from rigid_env.tasks.state import TaskState, put, take
 
 RENDER_FPS = 40  # of the default control period, 5 steps of 5 ms
 
 
-class RigidEnv(EpisodeParameters, gym.Env):
-    """A `Task` as a Gymnasium environment; subclasses name the task.
+class RigidEnv(gym.Env):
+    """A `Task` of one world as a Gymnasium environment.
 
     Parameters
     ----------
+    task : Task
+        Of one world.
     render_mode : {"rgb_array", "human"} or None
     width, height : int
         Of pictures [px].
-    accuracy, walls, half_width, mass, size, friction, restitution, gravity, effects, frame_skip, dt, dump_faults
-        Of the task, see `Task`.
+    obs : {"state", "pixels"}
+        Observations: the numbers of the task's entries, or pictures of `obs_size`, of the last `obs_stack` steps; see
+        `rigid_env.envs.sources`.
+    obs_size : (2,) int
+        Height and width [px].
+    obs_stack : int
 
     Raises
     ------
-    TypeError
-        An unknown argument, with the known ones, the nearest first.
     ValueError
         Naming the field, the value and what is allowed.
     """
 
     metadata: ClassVar[dict[str, Any]] = {"render_modes": list(RENDER_MODES), "render_fps": RENDER_FPS}
-    task_class: ClassVar[type[Task]]
     is_free = True  # no thread is in a call: of `physics.parallel.exclusive`
 
     def __init__(
         self,
+        task: Task,
         render_mode: str | None = None,
         width: int = 960,
         height: int = 600,
-        *,
-        accuracy: str | physics.Accuracy = "balanced",
-        walls: str = "three",
-        half_width: float = 10.0,
-        mass: Number = 6.0,
-        size: Edges = (5.0, 3.0, 2.0),
-        friction: Number = 0.5,
-        restitution: Number = 0.2,
-        gravity: Number = 9.81,
-        effects: Sequence = (),
-        frame_skip: int = 5,
-        dt: float = 0.005,
-        dump_faults: str | Path | None = None,
+        obs: str = "state",
+        obs_size: Sequence[int] = (84, 84),
+        obs_stack: int = 1,
     ):
-        self.task = self.task_class(
-            1, accuracy=accuracy, walls=walls, half_width=half_width, mass=mass, size=size, friction=friction,
-            restitution=restitution, gravity=gravity, effects=effects, frame_skip=frame_skip, dt=dt,
-            dump_faults=dump_faults,
-        )  # fmt: skip
+        self.task = task
+        self._source = make_source(task, obs, obs_size, obs_stack)
         self.metadata = {**self.metadata, "render_fps": max(1, round(1.0 / self.task.control_dt))}
         self.render_mode = render_mode
-        self.observation_space = observation_space(self.task)
-        self.action_space = action_space()
-        self._view = View(render_mode, width, height, self.metadata["render_fps"], self.task_class.__name__)
+        self.observation_space = self._source.space
+        self.action_space = action_space(task)
+        self._view = View(render_mode, width, height, self.metadata["render_fps"], type(task).__name__)
         self._world = np.zeros(1, dtype=np.int64)
+        self._is_drawn = obs == "pixels"
+        self._action_shape = self.action_space.shape
+        self._info = InfoMaker(task.info_names)
         self._has_reset = self._is_closed = False
 
     @exclusive
@@ -92,8 +93,7 @@ class RigidEnv(EpisodeParameters, gym.Env):
         -------
         observation : (entries,) float32
         info : dict
-            As of `step`, and the parameters of the episode: ``mass``, ``size``, ``friction``, ``restitution``,
-            ``gravity``, all except those that `effects` take the place of.
+            As of `step`, and what was drawn for the episode, by name, except what `effects` take the place of.
 
         Raises
         ------
@@ -104,31 +104,33 @@ class RigidEnv(EpisodeParameters, gym.Env):
         try:
             super().reset(seed=seed)
             self.task.generators[0] = self.np_random
-            self.task.begin(self._world, options)
+            self.task.start(self._world, options)
+            self._source.start(self._world)
         except (TypeError, ValueError):
             self._np_random, self._np_random_seed, self.task.generators[0] = kept
             raise
         self._has_reset, self._is_closed = True, False
         if self.render_mode == "human":
             self.render()
-        values = self.task.values.now
-        drawn = {field: value_of(values[field][0]) for field in self.task.own_parameters}
-        return self.task.obs[0].copy(), {**self._info(self.task.outcome[0].tolist()), **drawn}
+        values = self.task.drawn
+        drawn = {name: value_of(values[name][0]) for name in self.task.own_draws}
+        info = self._info(self.task.outcome[0].tolist(), self.task.status.item())
+        return self._source.one(0), {**info, **drawn}
 
     def step(self, action):
         """Hold an action for one control step; see `gymnasium.Env.step`.
 
         Parameters
         ----------
-        action : (6,) array_like
-            Force and torque as shares of their limits, clipped to ±1.
+        action : (entries,) array_like
+            Forces, torques and impulses as shares of their limits, clipped to ±1.
 
         Returns
         -------
         observation : (entries,) float32
         reward : float
         terminated : bool
-            True on success.
+            True on success and on failure.
         truncated : bool
             Always False: the time limit is `gymnasium.make`'s.
         info : dict
@@ -150,27 +152,61 @@ class RigidEnv(EpisodeParameters, gym.Env):
             try:
                 action = np.asarray(action)
             except ValueError:  # parts of different lengths
-                raise ValueError(f"action is {reprlib.repr(action)}; allowed are {AXES} numbers") from None
-            if action.shape != (AXES,):
-                raise ValueError(f"action has shape {action.shape}; allowed is shape ({AXES},)")
-            self.task.step(action[None])
-            (outcome,) = self.task.outcome.tolist()  # one world: cheaper than the row of an array
-            info = self._info(outcome)
+                allowed = f"{self.task.action_size} numbers"
+                raise ValueError(f"action is {reprlib.repr(action)}; allowed are {allowed}") from None
+            if action.shape != self._action_shape:
+                raise ValueError(f"action has shape {action.shape}; allowed is shape {self._action_shape}")
+            task = self.task
+            task.take(action)
+            (outcome,) = task.outcome.tolist()  # one world: cheaper than the row of an array
+            info = self._info(outcome, task.status.item())
             if self.render_mode == "human":
                 self.render()
-            return self.task.obs[0].copy(), outcome[0], info["is_success"], False, info
+            if self._is_drawn:
+                self._source.step()
+                obs = self._source.one(0)
+            else:
+                obs = task.obs[0].copy()
+            return obs, outcome[REWARD], info["is_success"] or outcome[FAILURE] > 0.0, False, info
         finally:
             self.is_free = True
 
-    def _info(self, outcome: list[float]) -> dict[str, Any]:
-        _, success, error, speed, spin = outcome
-        return {
-            "is_success": success > 0.0,
-            self.task.error_name: error,
-            "speed": speed,
-            "spin": spin,
-            "physics_status": self.task.status.item(),
-        }
+    @exclusive
+    def get_state(self) -> TaskState:
+        """Copy all that decides how the episode goes on: `set_state` continues bit-identically, generator and all.
+
+        Returns
+        -------
+        TaskState
+            ``save(path)`` writes it, `rigid_env.TaskState.load` reads it.
+        """
+        return take(self.task, self._arrays(), [self._np_random_seed])
+
+    @exclusive
+    def set_state(self, state: TaskState, source: int = 0) -> None:
+        """Go on from a state of this task, of an environment or of one world of a batch.
+
+        Parameters
+        ----------
+        state : TaskState
+            Of `get_state`.
+        source : int
+            World of the state.
+
+        Raises
+        ------
+        ValueError
+            It is no state, one of another task or of other settings, or has no such world. Nothing has changed then.
+        """
+        arrays = self._arrays()
+        put(self.task, arrays, state, source=None if source == 0 and getattr(state, "worlds", 0) == 1 else source)
+        self._np_random, self._np_random_seed = self.task.generators[0], state.seeds[source]
+        self._has_reset, self._is_closed = not arrays["waiting"][0], False
+
+    def _arrays(self) -> dict[str, np.ndarray]:
+        """Memory of the environment, with one row: the names are those of a batch."""
+        flags = {"waiting": np.array([not self._has_reset]), "ended": np.zeros(1, dtype=np.bool_)}
+        return {**flags, **self._source.arrays}
 
     def render(self):
         """(height, width, 3) uint8 picture in mode "rgb_array"; in mode "human" shows it and returns None."""
@@ -182,6 +218,18 @@ class RigidEnv(EpisodeParameters, gym.Env):
         picture = self._view.draw(self.task)
         return picture if self.render_mode == "rgb_array" else None
 
+    def describe(self) -> str:
+        """Documentation of the task as Markdown: spaces, rewards, draws, episode end and arguments, in tables."""
+        return markdown(self.documentation())
+
+    def documentation(self) -> tuple[Section, ...]:
+        """The same, section by section; with the defaults of the id that this environment was made by, if any."""
+        registered = None if self.spec is None else gym.registry.get(self.spec.id)
+        documented = type(self) if isinstance(self, BlockEnv) else type(self.task)
+        own = list(inspect.signature(RigidEnv.__init__).parameters.values())[2:]  # without self and task
+        added = {parameter.name: parameter.default for parameter in own}
+        return sections(self.task, documented, added, None if registered is None else registered.kwargs)
+
     def close(self):
         """Close the window, if any; `reset` begins anew."""
         self._view.close()
@@ -191,3 +239,88 @@ class RigidEnv(EpisodeParameters, gym.Env):
         if self._is_closed:
             return gym.error.ClosedEnvironmentError(f"{call}() after close(): allowed is reset() or a new environment")
         return gym.error.ResetNeeded(f"call reset() before {call}()")
+
+
+class TaskEnv(RigidEnv):
+    """Any task as a Gymnasium environment; see `rigid_env.register_task`.
+
+    Parameters
+    ----------
+    task : class of Task, or str
+        The class, or where it stands: ``module:Class``.
+    render_mode, width, height, obs, obs_size, obs_stack
+        As of `RigidEnv`.
+    settings
+        Arguments of the task.
+
+    Raises
+    ------
+    TypeError
+        An unknown argument, with the known ones, the nearest first.
+    ValueError
+        Naming the field, the value and what is allowed.
+    """
+
+    def __init__(
+        self,
+        task: type[Task] | str,
+        render_mode: str | None = None,
+        width: int = 960,
+        height: int = 600,
+        *,
+        obs: str = "state",
+        obs_size: Sequence[int] = (84, 84),
+        obs_stack: int = 1,
+        **settings,
+    ):
+        super().__init__(make_task(task, 1, settings), render_mode, width, height, obs, obs_size, obs_stack)
+
+
+class BlockEnv(EpisodeParameters, RigidEnv):
+    """A task of the block as a Gymnasium environment; subclasses name the task.
+
+    Parameters
+    ----------
+    render_mode, width, height, obs, obs_size, obs_stack
+        As of `RigidEnv`.
+    accuracy, walls, half_width, mass, size, friction, restitution, gravity, effects, frame_skip, dt, dump_faults
+        Of the task, see `rigid_env.tasks.block.BlockTask`.
+
+    Raises
+    ------
+    TypeError
+        An unknown argument, with the known ones, the nearest first.
+    ValueError
+        Naming the field, the value and what is allowed.
+    """
+
+    task_class: ClassVar[type[BlockTask]]
+
+    def __init__(
+        self,
+        render_mode: str | None = None,
+        width: int = 960,
+        height: int = 600,
+        *,
+        obs: str = "state",
+        obs_size: Sequence[int] = (84, 84),
+        obs_stack: int = 1,
+        accuracy: str | physics.Accuracy = "balanced",
+        walls: str = "three",
+        half_width: float = 10.0,
+        mass: Number = 6.0,
+        size: Edges = (5.0, 3.0, 2.0),
+        friction: Number = 0.5,
+        restitution: Number = 0.2,
+        gravity: Number = 9.81,
+        effects: Sequence = (),
+        frame_skip: int = 5,
+        dt: float = 0.005,
+        dump_faults: str | Path | None = None,
+    ):
+        task = self.task_class(
+            1, accuracy=accuracy, walls=walls, half_width=half_width, mass=mass, size=size, friction=friction,
+            restitution=restitution, gravity=gravity, effects=effects, frame_skip=frame_skip, dt=dt,
+            dump_faults=dump_faults,
+        )  # fmt: skip
+        super().__init__(task, render_mode, width, height, obs, obs_size, obs_stack)

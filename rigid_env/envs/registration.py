@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from typing import Any
 
 from gymnasium.envs.registration import register, registry
 
@@ -10,6 +11,9 @@ NAMESPACE = "rigid_env"
 
 MAX_EPISODE_STEPS = {"BlockReach": 300, "BlockReorient": 300}
 """Control steps after which an episode is truncated: 7.5 s at the default 25 ms."""
+
+SCENE_ID = f"{NAMESPACE}/Scene-v0"
+"""Environment of any scene: it needs the argument `scene`, whose file may limit the episodes."""
 
 
 def register_envs() -> None:
@@ -33,3 +37,41 @@ def register_envs() -> None:
             vector_entry_point=f"rigid_env.envs.vector_env:{name}VectorEnv",
             max_episode_steps=steps,
         )
+    if SCENE_ID not in registry:
+        module = "rigid_env.envs.scene"
+        register(SCENE_ID, entry_point=f"{module}:SceneEnv", vector_entry_point=f"{module}:SceneVectorEnv")
+
+
+def register_task(id: str, task: type | str, **settings: Any) -> None:
+    """Register a task with Gymnasium: `gymnasium.make` and `make_vec` then find it under its id.
+
+    Parameters
+    ----------
+    id : str
+        Such as ``mine/EdgeBalance-v0``.
+    task : class of Task, or str
+        The class, or where it stands, ``module:Class``: workers that start afresh import it from there.
+    settings
+        Arguments of the task, such as ``accuracy``, and of its environment, in place of their defaults.
+
+    Raises
+    ------
+    TypeError
+        An unknown setting, with the known ones, the nearest first.
+    ValueError
+        It is no task.
+    """
+    from physics import validation
+    from rigid_env.envs.making import check_settings, task_class
+
+    kind = task_class(task)
+    check_settings(kind, settings, of_environment=True)
+    if kind.max_episode_steps is not None:
+        validation.count(kind.max_episode_steps, f"max_episode_steps of {kind.__name__}")
+    register(
+        id=id,
+        entry_point="rigid_env.envs.env:TaskEnv",
+        vector_entry_point="rigid_env.envs.vector_env:TaskVectorEnv",
+        max_episode_steps=kind.max_episode_steps,
+        kwargs={"task": task, **settings},
+    )

@@ -25,8 +25,8 @@ class RigidVecEnv(VecEnv):
     """A `RigidVectorEnv` behind the interface that Stable-Baselines3 trains on.
 
     Worlds start anew in the step in which their episode ends; the info of that step holds
-    ``terminal_observation``, ``TimeLimit.truncated``, ``is_success``, the error that the task names, and,
-    with `monitor`, ``episode`` (return ``r``, length ``l``, seconds since the start of training ``t``).
+    ``terminal_observation``, ``TimeLimit.truncated``, the numbers of the task's infos, and, with `monitor`,
+    ``episode`` (return ``r``, length ``l``, seconds since the start of training ``t``).
     The other infos are empty. `reset_infos` holds the infos of the starts of the running episodes, with the parameters
     of each (``mass``, ``size``, ``friction``, ``restitution``, ``gravity``).
 
@@ -103,13 +103,11 @@ class RigidVecEnv(VecEnv):
         return obs, rewards.astype(np.float32), dones, infos
 
     def _final_info(self, i: int, is_truncated: bool, vector_infos: dict[str, Any]) -> dict[str, Any]:
-        final, error = vector_infos["final_info"], self.vector_env.task.error_name
+        final = vector_infos["final_info"]
         info = {
             "terminal_observation": vector_infos["final_obs"][i],
             "TimeLimit.truncated": is_truncated,
-            "is_success": bool(final["is_success"][i]),
-            error: float(final[error][i]),
-            "physics_status": int(final["physics_status"][i]),
+            **{key: final[key][i].item() for key in infos_of_batches.keys(self.vector_env.task)},
         }
         if self.monitor:
             info["episode"] = {
@@ -121,7 +119,7 @@ class RigidVecEnv(VecEnv):
 
     def _row_of(self, infos: dict[str, Any], world: int) -> dict[str, Any]:
         """One world's info at the start of its episode."""
-        keys = (*infos_of_batches.keys(self.vector_env.task), *self.vector_env.task.own_parameters)
+        keys = (*infos_of_batches.keys(self.vector_env.task), *self.vector_env.task.own_draws)
         return {key: infos[key][world].tolist() for key in keys}
 
     def close(self) -> None:

@@ -10,6 +10,7 @@ import gymnasium as gym
 import numpy as np
 from gymnasium.vector import AutoresetMode
 from gymnasium.vector.utils import batch_space
+from numpy.typing import ArrayLike
 
 import physics
 from physics import validation
@@ -18,81 +19,65 @@ from physics.parallel.exclusive import exclusive
 from rigid_env.envs import vector_arguments as arguments
 from rigid_env.envs import vector_infos
 from rigid_env.envs.attributes import BatchAttributes
-from rigid_env.envs.registration import MAX_EPISODE_STEPS
-from rigid_env.envs.spaces import action_space, observation_space
+from rigid_env.envs.making import make_task
+from rigid_env.envs.sources import make_source
+from rigid_env.envs.spaces import action_space
 from rigid_env.rendering.view import RENDER_MODES, View
 from rigid_env.tasks import BlockReach, BlockReorient, Task
 from rigid_env.tasks import layout as col
+from rigid_env.tasks.block import BlockTask
 from rigid_env.tasks.options import require_known
 from rigid_env.tasks.parameters import Edges, Number
+from rigid_env.tasks.state import TaskState, put, take
 
 
 class RigidVectorEnv(BatchAttributes):
-    """A `Task` as a Gymnasium vector environment; subclasses name the task.
+    """A `Task` as a Gymnasium vector environment.
 
     World i goes through the same bits as the single environment with the same seed, whatever `num_envs`.
 
     Parameters
     ----------
-    num_envs : int
+    task : Task
+        Of `num_envs` worlds.
     autoreset_mode : AutoresetMode or str
         ``NextStep`` (default), ``SameStep`` or ``Disabled``.
     max_episode_steps : int or None
-        Control steps after which an episode is truncated; None: never. The default is the registered number.
+        Control steps after which an episode is truncated; None: never. The default is the task's number.
     render_mode : {"rgb_array", "human"} or None
         ``human`` shows world 0.
     width, height : int
         Of one world's picture [px].
-    threads : int
-        Threads that share a step.
-    accuracy, walls, half_width, mass, size, friction, restitution, gravity, effects, frame_skip, dt, dump_faults
-        Of the task, see `Task`.
+    obs, obs_size, obs_stack
+        As of `rigid_env.envs.env.RigidEnv`.
 
     Raises
     ------
-    TypeError
-        An unknown argument, with the known ones, the nearest first.
     ValueError
         Naming the field, the value and what is allowed.
     """
 
-    task_class: ClassVar[type[Task]]
     is_free = True  # no thread is in a call: of `physics.parallel.exclusive`
     _view: View | None = None  # Gymnasium closes batches, too, whose construction ended with an error
 
     def __init__(
         self,
-        num_envs: int = 1,
+        task: Task,
         autoreset_mode: AutoresetMode | str = AutoresetMode.NEXT_STEP,
         max_episode_steps: int | str | None = "registered",
         render_mode: str | None = None,
         width: int = 960,
         height: int = 600,
-        *,
-        threads: int = 1,
-        accuracy: str | physics.Accuracy = "balanced",
-        walls: str = "three",
-        half_width: float = 10.0,
-        mass: Number = 6.0,
-        size: Edges = (5.0, 3.0, 2.0),
-        friction: Number = 0.5,
-        restitution: Number = 0.2,
-        gravity: Number = 9.81,
-        effects: Sequence = (),
-        frame_skip: int = 5,
-        dt: float = 0.005,
-        dump_faults: str | Path | None = None,
+        obs: str = "state",
+        obs_size: Sequence[int] = (84, 84),
+        obs_stack: int = 1,
     ):
-        self.num_envs = num_envs = validation.count(num_envs, "num_envs")
+        self.task = task
+        self._source = make_source(task, obs, obs_size, obs_stack)
+        self.num_envs = num_envs = task.worlds
         self.autoreset_mode = arguments.autoreset_mode(autoreset_mode)
         is_registered = isinstance(max_episode_steps, str) and max_episode_steps == "registered"
-        limit = MAX_EPISODE_STEPS[self.task_class.__name__] if is_registered else max_episode_steps
-        self.max_episode_steps = arguments.episode_limit(limit)
-        self.task = self.task_class(
-            num_envs, threads=threads, accuracy=accuracy, walls=walls, half_width=half_width, mass=mass, size=size,
-            friction=friction, restitution=restitution, gravity=gravity, effects=effects, frame_skip=frame_skip,
-            dt=dt, dump_faults=dump_faults,
-        )  # fmt: skip
+        self.max_episode_steps = arguments.episode_limit(task.max_episode_steps if is_registered else max_episode_steps)
         fps = max(1, round(1.0 / self.task.control_dt))
         self.metadata = {
             "render_modes": list(RENDER_MODES),
@@ -100,13 +85,12 @@ class RigidVectorEnv(BatchAttributes):
             "autoreset_mode": self.autoreset_mode,
         }
         self.render_mode = render_mode
-        self.single_observation_space = observation_space(self.task)
-        self.single_action_space = action_space()
+        self.single_observation_space = self._source.space
+        self.single_action_space = action_space(task)
         self.observation_space = batch_space(self.single_observation_space, num_envs)
         self.action_space = batch_space(self.single_action_space, num_envs)
-        self._view = View(render_mode, width, height, fps, self.task_class.__name__)
+        self._view = View(render_mode, width, height, fps, type(task).__name__)
         self._seeds = [-1] * num_envs
-        self._elapsed = np.zeros(num_envs, dtype=np.int64)
         self._ended = np.zeros(num_envs, dtype=np.bool_)
         self._waiting = np.ones(num_envs, dtype=np.bool_)  # for their first reset
 
@@ -140,8 +124,7 @@ class RigidVectorEnv(BatchAttributes):
         -------
         observations : (num_envs, entries) float32
         infos : dict of arrays
-            With the parameters of the new episodes: ``mass``, ``size``, ``friction``, ``restitution``, ``gravity``,
-            all except those that `effects` take the place of.
+            With what was drawn for the new episodes, by name, except what `effects` take the place of.
 
         Raises
         ------
@@ -151,7 +134,7 @@ class RigidVectorEnv(BatchAttributes):
             After `close`.
         """
         self._check_open("reset")
-        options = dict(require_known(options, (*self.task.option_kinds, "reset_mask")))
+        options = dict(require_known(options, (*self.task.option_names, "reset_mask")))
         mask = arguments.reset_mask(options, self.num_envs)
         seeds = arguments.seed_list(seed, self.num_envs)
         rows = np.flatnonzero(mask)
@@ -167,8 +150,8 @@ class RigidVectorEnv(BatchAttributes):
         self._waiting[rows] = False
         self._show()
         infos = vector_infos.of_outcomes(self.task, mask)
-        vector_infos.add_parameters(infos, self.task, rows)
-        return self.task.obs.copy(), infos
+        vector_infos.add_drawn(infos, self.task, rows)
+        return self._source.all(), infos
 
     @exclusive
     def step(self, actions) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, dict[str, Any]]:
@@ -176,7 +159,7 @@ class RigidVectorEnv(BatchAttributes):
 
         Parameters
         ----------
-        actions : (num_envs, 6) array_like
+        actions : (num_envs, numbers) array_like
 
         Returns
         -------
@@ -199,12 +182,12 @@ class RigidVectorEnv(BatchAttributes):
         self._check_ready()
         task = self.task
         task.step(actions)
-        self._elapsed += 1
+        self._source.step()
         rewards = task.outcome[:, col.REWARD].copy()
-        terminations = task.outcome[:, col.SUCCESS] > 0.0
+        terminations = task.outcome[:, col.SUCCESS] + task.outcome[:, col.FAILURE] > 0.0
         truncations = np.zeros(self.num_envs, dtype=np.bool_)
         if self.max_episode_steps is not None:
-            truncations = self._elapsed >= self.max_episode_steps
+            truncations = task.steps >= self.max_episode_steps
         finals: dict[str, Any] = {}
         if self.autoreset_mode is AutoresetMode.NEXT_STEP:
             rows = np.flatnonzero(self._ended)
@@ -213,14 +196,64 @@ class RigidVectorEnv(BatchAttributes):
         if self.autoreset_mode is AutoresetMode.SAME_STEP:
             rows = np.flatnonzero(self._ended)
             if len(rows):
-                finals = vector_infos.of_ended(task, rows, self._ended)
+                finals = vector_infos.of_ended(task, self._source, rows, self._ended)
         if self.autoreset_mode is not AutoresetMode.DISABLED and len(rows):
             ended = self._ended
             self._begin(rows, {})
             self._ended = ended & (self.autoreset_mode is AutoresetMode.NEXT_STEP)
-            vector_infos.add_parameters(finals, task, rows)
+            vector_infos.add_drawn(finals, task, rows)
         self._show()
-        return task.obs.copy(), rewards, terminations, truncations, {**vector_infos.of_outcomes(task), **finals}
+        return self._source.all(), rewards, terminations, truncations, {**vector_infos.of_outcomes(task), **finals}
+
+    # --- state --------------------------------------------------------------------------------------------
+
+    @exclusive
+    def get_state(self, worlds: ArrayLike | None = None) -> TaskState:
+        """Copy all that decides how episodes go on: `set_state` continues bit-identically, generators and all.
+
+        Parameters
+        ----------
+        worlds : (k,) array_like of int, or mask, optional
+            Worlds meant; None: all.
+
+        Returns
+        -------
+        TaskState
+            ``save(path)`` writes it, `rigid_env.TaskState.load` reads it.
+
+        Raises
+        ------
+        ValueError
+            A world that is not there, or named twice.
+        """
+        return take(self.task, self._arrays(), self._seeds, worlds)
+
+    @exclusive
+    def set_state(
+        self, state: TaskState, worlds: ArrayLike | None = None, source: ArrayLike | int | None = None
+    ) -> None:
+        """Let worlds go on from a state of this task, of an environment or of any batch.
+
+        Parameters
+        ----------
+        state : TaskState
+        worlds : (k,) array_like of int, or mask, optional
+            Worlds that change; None: all.
+        source : (k,) array_like of int, or int, optional
+            Worlds of the state from which these go on; an int is for all. None: the state has one world, for all of
+            them, or k worlds, in this order.
+
+        Raises
+        ------
+        ValueError
+            It is no state, one of another task or of other settings, or indices out of range. Nothing has changed then.
+        """
+        chosen, sources = put(self.task, self._arrays(), state, worlds, source)
+        for world, of in zip(chosen.tolist(), sources.tolist()):
+            self._seeds[world] = state.seeds[of]
+
+    def _arrays(self) -> dict[str, np.ndarray]:
+        return {"waiting": self._waiting, "ended": self._ended, **self._source.arrays}
 
     # --- parts of these -----------------------------------------------------------------------------------
 
@@ -239,8 +272,8 @@ class RigidVectorEnv(BatchAttributes):
             )
 
     def _begin(self, rows: np.ndarray, options: dict[str, Any]) -> None:
-        self.task.begin(rows, options)
-        self._elapsed[rows] = 0
+        self.task.start(rows, options)
+        self._source.start(rows)
         self._ended[rows] = False
 
     # --- pictures -----------------------------------------------------------------------------------------
@@ -266,15 +299,114 @@ class RigidVectorEnv(BatchAttributes):
             self._view.close()
 
 
+class TaskVectorEnv(RigidVectorEnv):
+    """Many worlds of any task as a Gymnasium vector environment; see `rigid_env.register_task`.
+
+    Parameters
+    ----------
+    num_envs : int
+    task : class of Task, or str
+        The class, or where it stands: ``module:Class``.
+    autoreset_mode, max_episode_steps, render_mode, width, height, obs, obs_size, obs_stack
+        As of `RigidVectorEnv`.
+    settings
+        Arguments of the task, ``threads`` among them.
+
+    Raises
+    ------
+    TypeError
+        An unknown argument, with the known ones, the nearest first.
+    ValueError
+        Naming the field, the value and what is allowed.
+    """
+
+    def __init__(
+        self,
+        num_envs: int = 1,
+        *,
+        task: type[Task] | str,
+        autoreset_mode: AutoresetMode | str = AutoresetMode.NEXT_STEP,
+        max_episode_steps: int | str | None = "registered",
+        render_mode: str | None = None,
+        width: int = 960,
+        height: int = 600,
+        obs: str = "state",
+        obs_size: Sequence[int] = (84, 84),
+        obs_stack: int = 1,
+        **settings,
+    ):
+        batch = make_task(task, validation.count(num_envs, "num_envs"), settings)
+        picture = render_mode, width, height, obs, obs_size, obs_stack
+        super().__init__(batch, autoreset_mode, max_episode_steps, *picture)
+
+
+class BlockVectorEnv(RigidVectorEnv):
+    """Many worlds of a task of the block; subclasses name the task.
+
+    Parameters
+    ----------
+    num_envs : int
+    autoreset_mode, max_episode_steps, render_mode, width, height, obs, obs_size, obs_stack
+        As of `RigidVectorEnv`.
+    threads : int
+        Threads that share a step.
+    accuracy, walls, half_width, mass, size, friction, restitution, gravity, effects, frame_skip, dt, dump_faults
+        Of the task, see `rigid_env.tasks.block.BlockTask`.
+
+    Raises
+    ------
+    TypeError
+        An unknown argument, with the known ones, the nearest first.
+    ValueError
+        Naming the field, the value and what is allowed.
+    """
+
+    task_class: ClassVar[type[BlockTask]]
+
+    def __init__(
+        self,
+        num_envs: int = 1,
+        autoreset_mode: AutoresetMode | str = AutoresetMode.NEXT_STEP,
+        max_episode_steps: int | str | None = "registered",
+        render_mode: str | None = None,
+        width: int = 960,
+        height: int = 600,
+        *,
+        obs: str = "state",
+        obs_size: Sequence[int] = (84, 84),
+        obs_stack: int = 1,
+        threads: int = 1,
+        accuracy: str | physics.Accuracy = "balanced",
+        walls: str = "three",
+        half_width: float = 10.0,
+        mass: Number = 6.0,
+        size: Edges = (5.0, 3.0, 2.0),
+        friction: Number = 0.5,
+        restitution: Number = 0.2,
+        gravity: Number = 9.81,
+        effects: Sequence = (),
+        frame_skip: int = 5,
+        dt: float = 0.005,
+        dump_faults: str | Path | None = None,
+    ):
+        task = self.task_class(
+            validation.count(num_envs, "num_envs"), threads=threads, accuracy=accuracy, walls=walls,
+            half_width=half_width, mass=mass, size=size, friction=friction, restitution=restitution, gravity=gravity,
+            effects=effects, frame_skip=frame_skip, dt=dt, dump_faults=dump_faults,
+        )  # fmt: skip
+        picture = render_mode, width, height, obs, obs_size, obs_stack
+        super().__init__(task, autoreset_mode, max_episode_steps, *picture)
+
+
 @known_keywords
-class BlockReachVectorEnv(RigidVectorEnv):
+class BlockReachVectorEnv(BlockVectorEnv):
     """Many worlds of `rigid_env.envs.block_reach.BlockReachEnv`, which documents the task."""
 
     task_class = BlockReach
 
 
 @known_keywords
-class BlockReorientVectorEnv(RigidVectorEnv):
+class BlockReorientVectorEnv(BlockVectorEnv):
     """Many worlds of `rigid_env.envs.block_reorient.BlockReorientEnv`, which documents the task."""
 
     task_class = BlockReorient

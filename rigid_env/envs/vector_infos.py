@@ -12,19 +12,16 @@ from rigid_env.tasks import layout as col
 
 def keys(task: Task) -> tuple[str, ...]:
     """Keys of every info, of a step and of a start."""
-    return ("is_success", task.error_name, "speed", "spin", "physics_status")
+    return ("is_success", *task.info_names, "physics_status")
 
 
 def of_outcomes(task: Task, mask: np.ndarray | None = None) -> dict[str, Any]:
     """Infos that the last step or start left, of the worlds of `mask` (worlds,) bool; zero in the others."""
     outcome = task.outcome
-    infos = {
-        "is_success": outcome[:, col.SUCCESS] > 0.0,
-        task.error_name: outcome[:, col.ERROR].copy(),
-        "speed": outcome[:, col.SPEED].copy(),
-        "spin": outcome[:, col.SPIN].copy(),
-        "physics_status": task.status.copy(),
-    }
+    infos = {"is_success": outcome[:, col.SUCCESS] > 0.0}
+    for column, name in enumerate(task.info_names, col.INFO):
+        infos[name] = outcome[:, column].copy()
+    infos["physics_status"] = task.status.copy()
     if mask is None:
         mask = np.ones(task.worlds, dtype=np.bool_)
     else:
@@ -34,22 +31,22 @@ def of_outcomes(task: Task, mask: np.ndarray | None = None) -> dict[str, Any]:
     return infos
 
 
-def add_parameters(infos: dict[str, Any], task: Task, rows: np.ndarray) -> None:
-    """Add the parameters of the episodes that begin in the worlds `rows` (n,); zero in the others."""
+def add_drawn(infos: dict[str, Any], task: Task, rows: np.ndarray) -> None:
+    """Add what was drawn for the episodes that begin in the worlds `rows` (n,); zero in the others."""
     mask = np.zeros(task.worlds, dtype=np.bool_)
     mask[rows] = True
-    for field in task.own_parameters:
-        now = task.values.now[field]
+    for name in task.own_draws:
+        now = task.drawn[name]
         told = np.zeros_like(now)
         told[rows] = now[rows]
-        infos[field], infos[f"_{field}"] = told, mask.copy()
+        infos[name], infos[f"_{name}"] = told, mask.copy()
 
 
-def of_ended(task: Task, rows: np.ndarray, mask: np.ndarray) -> dict[str, Any]:
+def of_ended(task: Task, source, rows: np.ndarray, mask: np.ndarray) -> dict[str, Any]:
     """`final_obs` and `final_info` of the episodes that end in `rows`, where `mask` is True, before they start anew."""
     final_obs = np.full(task.worlds, None, dtype=object)
     for i in rows:
-        final_obs[i] = task.obs[i].copy()
+        final_obs[i] = source.one(i)
     return {
         "final_obs": final_obs,
         "_final_obs": mask.copy(),

@@ -12,6 +12,7 @@ import numpy as np
 import physics
 from physics import scenes
 from physics.kernels.compile.decorators import backend
+from rigid_env.envs.registration import SCENE_ID
 from rigid_env.lab.measure.environments import environment_ids
 
 ACCURACIES = ("balanced", "fast")
@@ -90,12 +91,14 @@ def _environment_jobs(accuracy: str) -> list[Job]:
 
 
 def _stepper(env_id: str, accuracy: str) -> Callable[[], None]:
+    settings = {"scene": FIRST_SCENE} if env_id == SCENE_ID else {}
+
     def step() -> None:
-        env = gymnasium.make(env_id, accuracy=accuracy)
+        env = gymnasium.make(env_id, accuracy=accuracy, **settings)
         env.reset(seed=0)
         env.step(np.zeros(env.action_space.shape, env.action_space.dtype))
         env.close()
-        envs = gymnasium.make_vec(env_id, num_envs=2, accuracy=accuracy)
+        envs = gymnasium.make_vec(env_id, num_envs=2, accuracy=accuracy, **settings)
         envs.reset(seed=0)
         envs.step(np.zeros(envs.action_space.shape, envs.action_space.dtype))
         envs.close()

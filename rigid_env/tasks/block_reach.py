@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
-from typing import ClassVar
-
-from rigid_env.tasks import entries, kernels
+from rigid_env.tasks import block_entries as entries
+from rigid_env.tasks import kernels
 from rigid_env.tasks import layout as col
-from rigid_env.tasks.base import Task
+from rigid_env.tasks.block import BlockTask
+from rigid_env.tasks.block_draws import OnFloor
+
+MARK_RADIUS = 1.0
+"""[m] Of the goal's disc, to be seen beside a block that covers its tolerance."""
 
 
-class BlockReach(Task):
+class BlockReach(BlockTask):
     """The batch behind `rigid_env.envs.block_reach.BlockReachEnv`, which documents it."""
 
     observation = (
@@ -19,10 +22,18 @@ class BlockReach(Task):
         *entries.GAPS,
         *entries.HOLD,
     )
-    goal_options: ClassVar = {"goal": "place"}
+    measures = ("distance", "speed", "spin")
+    goal_draw = "goal"
     error_name = "distance"
+    compiled = staticmethod(kernels.observe_reach)
 
-    def _set_goals(self, record, shares, starts, size, options):
-        record[:, col.GOAL : col.GOAL + 2] = options["goal"] if "goal" in options else self.area.spread(shares, size)
+    def goal(self):
+        """Places on the floor."""
+        return OnFloor(self.area)
 
-    _kernel = staticmethod(kernels.observe_reach)
+    def _note_episodes(self, rows, values):
+        self.record[rows, col.GOAL : col.GOAL + 2] = values["goal"]
+
+    def goal_mark(self, world):
+        x, z = self.record[world, col.GOAL : col.GOAL + 2]
+        return {"pos": (x, 0.0, z), "radius": MARK_RADIUS, "reached": self.record[world, col.HOLD] > 0}

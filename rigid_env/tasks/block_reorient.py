@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
-from typing import ClassVar
-
-import numpy as np
-
-from rigid_env.tasks import entries, kernels
+from rigid_env.tasks import block_entries as entries
+from rigid_env.tasks import kernels
 from rigid_env.tasks import layout as col
-from rigid_env.tasks.base import Task
-from rigid_env.tasks.options import FACE_COUNT
+from rigid_env.tasks.block import BlockTask
+from rigid_env.tasks.block_draws import OtherFace
 
 
-class BlockReorient(Task):
+class BlockReorient(BlockTask):
     """The batch behind `rigid_env.envs.block_reorient.BlockReorientEnv`, which documents it."""
 
     observation = (
@@ -21,12 +18,17 @@ class BlockReorient(Task):
         *entries.GAPS,
         *entries.HOLD,
     )
-    goal_options: ClassVar = {"target_face": "face"}
+    measures = ("angle", "speed", "spin")
+    goal_draw = "target_face"
     error_name = "angle"
+    compiled = staticmethod(kernels.observe_reorient)
 
-    def _set_goals(self, record, shares, starts, size, options):
-        other = 1.0 + np.floor((FACE_COUNT - 1) * shares[:, 0])
-        faces = (starts[:, col.START_FACE] + other) % FACE_COUNT
-        record[:, col.FACE] = options.get("target_face", faces)
+    def goal(self):
+        """Any face but the one that is down."""
+        return OtherFace()
 
-    _kernel = staticmethod(kernels.observe_reorient)
+    def _note_episodes(self, rows, values):
+        self.record[rows, col.FACE] = values["target_face"]
+
+    def goal_mark(self, world):
+        return {"goal_face": int(self.record[world, col.FACE]), "reached": self.record[world, col.HOLD] > 0}

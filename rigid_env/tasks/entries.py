@@ -1,43 +1,150 @@
-"""Names, units and bounds of the numbers in an observation, as the environments' docstrings have them."""
+"""Entries of an observation: their names, units, bounds, and the function that reads them."""
 
 from __future__ import annotations
 
-from typing import NamedTuple
+import numbers
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
 
-from rigid_env.tasks.kernels import LENGTH_BOUND, RATE_BOUND
+import numpy as np
 
 
-class Entry(NamedTuple):
-    """One number of an observation: what it is, the unit it is told in, and its bounds (clipped to them)."""
+@dataclass(frozen=True)
+class Entry:
+    """One number of an observation, or several that one function reads.
 
-    name: str
+    Parameters
+    ----------
+    name : str or sequence of str
+        Of each number.
+    unit : str
+        In which it is told, such as ``m/s``.
+    low, high : float
+        Bounds, in this unit; what is read is clipped to them.
+    read : callable, optional
+        From `Worlds` to the numbers, (n,) or (n, numbers). None where a compiled function writes the observation.
+    scale : float
+        Value of one unit: with 5 and ``m`` an observation is told in units of 5 m.
+
+    Raises
+    ------
+    ValueError
+        No name, two of one name, bounds the wrong way round or a scale that is not positive.
+    """
+
+    name: str | tuple[str, ...]
     unit: str
     low: float
     high: float
+    read: Callable | None = None
+    scale: float = 1.0
+
+    def __post_init__(self):
+        if not isinstance(self.name, str):
+            object.__setattr__(self, "name", tuple(self.name) if isinstance(self.name, Iterable) else ())
+        names = self.names
+        if not names or not all(isinstance(name, str) and name for name in names):
+            raise ValueError(f"name of an Entry is {self.name!r}; allowed are a text and several of them")
+        refuse_twice(names)
+        for field in ("low", "high", "scale"):
+            value = getattr(self, field)
+            if isinstance(value, bool) or not isinstance(value, numbers.Real) or value != value:
+                raise ValueError(f"{field} of entry {names[0]!r} is {value!r}; allowed is a number")
+        if not self.low < self.high:
+            raise ValueError(
+                f"entry {names[0]!r} has low {self.low:g} and high {self.high:g}; allowed is low below high"
+            )
+        if not 0.0 < self.scale < np.inf:
+            raise ValueError(f"scale of entry {names[0]!r} is {self.scale:g}; allowed are finite numbers above 0")
+        if self.read is not None and not callable(self.read):
+            raise ValueError(f"read of entry {names[0]!r} is {self.read!r}; allowed is a function of Worlds")
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Name of each number."""
+        return (self.name,) if isinstance(self.name, str) else self.name
+
+    @property
+    def told_unit(self) -> str:
+        """Unit with its scale, for tables."""
+        return self.unit if self.scale == 1.0 else f"{self.scale:g} {self.unit}".removesuffix(" 1")
 
 
-GOAL_OFFSET = (
-    Entry("goal x minus centre x", "5 m", -LENGTH_BOUND, LENGTH_BOUND),
-    Entry("goal z minus centre z", "5 m", -LENGTH_BOUND, LENGTH_BOUND),
-    Entry("tanh of (goal x minus centre x) / 1 m", "1", -1.0, 1.0),
-    Entry("tanh of (goal z minus centre z) / 1 m", "1", -1.0, 1.0),
-)
+def refuse_twice(names: Sequence[str]) -> None:
+    """Raise a ValueError if a name occurs twice."""
+    twice = sorted({name for name in names if list(names).count(name) > 1})
+    if twice:
+        raise ValueError(f"observation has two entries of the name {twice[0]!r}; allowed are different names")
 
-MOTION = (
-    Entry("height of the centre over the floor", "2.5 m", 0.0, LENGTH_BOUND),
-    *(Entry(f"linear velocity {axis}", "5 m/s", -RATE_BOUND, RATE_BOUND) for axis in "xyz"),
-    *(Entry(f"angular velocity {axis}", "5 rad/s", -RATE_BOUND, RATE_BOUND) for axis in "xyz"),
-)
 
-ROTATION = tuple(Entry(f"R[{i}, {j}]", "1", -1.0, 1.0) for i in range(3) for j in range(3))
+class Observation:
+    """All entries of a task, and how they are read.
 
-GOAL_AXES = (
-    *(Entry(f"outward normal of the target face, {axis}", "1", -1.0, 1.0) for axis in "xyz"),
-    *(Entry(f"next body axis, {axis}", "1", -1.0, 1.0) for axis in "xyz"),
-    *(Entry(f"body axis after that, {axis}", "1", -1.0, 1.0) for axis in "xyz"),
-    *(Entry(f"half edge along {which}", "2.5 m", 0.0, LENGTH_BOUND) for which in ("normal", "next", "last")),
-)
+    Parameters
+    ----------
+    entries : sequence of Entry
 
-GAPS = tuple(Entry(f"gap between block and wall {k}", "5 m", -1.0, LENGTH_BOUND) for k in range(3))
+    Attributes
+    ----------
+    size : int
+    low, high : (size,) float32
 
-HOLD = (Entry("share of the hold completed", "1", 0.0, 1.0),)
+    Raises
+    ------
+    ValueError
+        Something that is no entry, or two entries of one name.
+    """
+
+    def __init__(self, entries: Sequence[Entry]):
+        if isinstance(entries, Entry):
+            entries = (entries,)
+        if not isinstance(entries, (list, tuple)):
+            raise ValueError(f"observation is {entries!r}; allowed is a list of Entry")
+        self.entries = tuple(entries)
+        for entry in self.entries:
+            if not isinstance(entry, Entry):
+                raise ValueError(
+                    f"observation holds {entry!r}; allowed are Entry and the functions of rigid_env.observe"
+                )
+        refuse_twice([name for entry in self.entries for name in entry.names])
+        self.size = sum(len(entry.names) for entry in self.entries)
+        spread = [len(entry.names) for entry in self.entries]
+        self.low, self.high = (
+            np.repeat(np.array([getattr(entry, end) for entry in self.entries], dtype=np.float32), spread)
+            for end in ("low", "high")
+        )
+        ends = np.cumsum([0, *spread]).tolist()
+        self._places = [slice(first, end) for first, end in pairwise(ends)]
+        self._factors = np.repeat([1.0 / entry.scale for entry in self.entries], spread)
+        self._targets: tuple[np.ndarray, list] = np.empty((0, self.size)), []
+
+    def read(self, worlds, out: np.ndarray) -> None:
+        """Read all entries into `out` (n, size) float32, scaled and clipped."""
+        table, targets = self._targets
+        if len(table) != len(out):
+            table, targets = self._make_targets(len(out))
+            if len(out) > len(self._targets[0]):  # of all worlds, in every step; of a few at the start of episodes
+                self._targets = table, targets
+        for entry, columns, column in targets:
+            values = entry.read(worlds)
+            if type(values) is not np.ndarray or values.shape not in (columns.shape, column.shape):
+                raise self._misfit(entry, values, columns.shape)
+            (columns if values.ndim == 2 else column)[...] = values
+        np.multiply(table, self._factors, out=out, casting="same_kind")
+        np.maximum(out, self.low, out=out)
+        np.minimum(out, self.high, out=out)
+
+    def _make_targets(self, count: int) -> tuple[np.ndarray, list]:
+        """Table (count, size) for what entries give, and the part of it that each one writes."""
+        table = np.empty((count, self.size))
+        return table, [
+            (entry, table[:, place], table[:, place.start] if len(entry.names) == 1 else table[:, place])
+            for entry, place in zip(self.entries, self._places)
+        ]
+
+    @staticmethod
+    def _misfit(entry: Entry, values, shape: tuple[int, int]) -> ValueError:
+        given = f"shape {np.shape(values)}" if isinstance(values, np.ndarray) else repr(values)
+        allowed = f"shape {shape}" if shape[1] > 1 else f"shape ({shape[0]},), one number for each world"
+        return ValueError(f"read of entry {entry.names[0]!r} gave {given}; allowed is {allowed}")

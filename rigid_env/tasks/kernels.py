@@ -1,4 +1,4 @@
-"""Compiled parts of a task's control step: wrenches, observations, rewards, success.
+"""Compiled parts of the block's tasks: starts, observations, rewards, success.
 
 Everything is in this one file because Numba's disk cache notices a change only in the file of the function it
 calls (callees in `physics.kernels` are covered by the name of the cache folder).
@@ -63,52 +63,25 @@ def norm3(a, b, c):
 
 
 @entry_kernel
-def wrenches(actions, record, wrench):
-    """Forces and torques [N, N m] from actions: clipped to ±1 each, then each vector to its ball of radius 1.
-
-    Parameters
-    ----------
-    actions : (worlds, 6) float64
-    record : (worlds, RECORD_SIZE) float64
-    wrench : (worlds, 1, 6) float64, out
-        World frame.
-
-    Returns
-    -------
-    int
-        Index of the first world whose action is not finite, else -1; `wrench` is written in the second case only.
-    """
-    for i in range(actions.shape[0]):
-        for k in range(AXES):
-            if not math.isfinite(actions[i, k]):
-                return i
-    for i in range(actions.shape[0]):
-        for first, limit in ((0, record[i, col.FORCE_LIMIT]), (3, record[i, col.TORQUE_LIMIT])):
-            x = clip(actions[i, first], -1.0, 1.0)
-            y = clip(actions[i, first + 1], -1.0, 1.0)
-            z = clip(actions[i, first + 2], -1.0, 1.0)
-            scale = limit / max(1.0, norm3(x, y, z))
-            wrench[i, 0, first] = scale * x
-            wrench[i, 0, first + 1] = scale * y
-            wrench[i, 0, first + 2] = scale * z
-    return -1
-
-
-@entry_kernel
-def start_poses(starts, half, pos, quat):
+def start_poses(place, yaw, faces, half, pos, quat):
     """Poses of blocks that lie on the floor y = 0.
 
     Parameters
     ----------
-    starts : (n, START_SIZE) float64
+    place : (n, 2) float64
+        x and z of the centre [m].
+    yaw : (n,) float64
+        About the vertical [rad].
+    faces : (n,) float64
+        Face that is down, 0 to 5.
     half : (n, 3) float64
         Half edges [m].
     pos : (n, 1, 3) float64, out
     quat : (n, 1, 4) float64, out
     """
     s = math.sqrt(0.5)
-    for i in range(starts.shape[0]):
-        face = int(starts[i, col.START_FACE])
+    for i in range(place.shape[0]):
+        face = int(faces[i])
         if face == 0:  # -x down
             q = (s, 0.0, 0.0, s)
         elif face == 1:  # +x
@@ -121,13 +94,13 @@ def start_poses(starts, half, pos, quat):
             q = (s, -s, 0.0, 0.0)
         else:  # +z
             q = (s, s, 0.0, 0.0)
-        turn = 0.5 * starts[i, col.YAW]
+        turn = 0.5 * yaw[i]
         q = multiply((math.cos(turn), 0.0, math.sin(turn), 0.0), q)
         for k in range(4):
             quat[i, 0, k] = q[k]
-        pos[i, 0, 0] = starts[i, col.PLACE]
+        pos[i, 0, 0] = place[i, 0]
         pos[i, 0, 1] = half[i, face // 2]
-        pos[i, 0, 2] = starts[i, col.PLACE + 1]
+        pos[i, 0, 2] = place[i, 1]
 
 
 @inlined
@@ -173,19 +146,21 @@ def attitude(world, state):
 @inlined
 def conclude(world, is_met, potential, error, speed, spin, actions, record, outcome):
     """Count the hold, then reward and success of one world; `actions` is None at the start of an episode."""
-    hold = 0.0
+    hold = effort = 0.0
     if actions is not None and is_met and speed <= REST_SPEED and spin <= REST_SPIN:
         hold = record[world, col.HOLD] + 1.0
     potential += HOLD_VALUE * hold / HOLD_STEPS
     success = 1.0 if hold >= HOLD_STEPS else 0.0
     reward = 0.0
     if actions is not None:
-        effort = 0.0
         for k in range(AXES):
             a = clip(actions[world, k], -1.0, 1.0)
             effort += a * a
         reward = potential - record[world, col.POTENTIAL] - STEP_COST - ACTION_COST * effort
         reward += SUCCESS_BONUS * success
+        outcome[world, col.REWARD_PROGRESS] = potential - record[world, col.POTENTIAL]
+        outcome[world, col.REWARD_EFFORT] = -(STEP_COST + ACTION_COST * effort)
+        outcome[world, col.REWARD_SUCCESS] = SUCCESS_BONUS * success
     record[world, col.HOLD] = hold
     record[world, col.POTENTIAL] = potential
     outcome[world, col.REWARD] = reward

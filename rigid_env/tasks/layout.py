@@ -1,4 +1,4 @@
-"""Columns of the arrays that the task kernels share: the place of each number of a task.
+"""Columns of the arrays that the block's kernels share: the place of each number of a task.
 
 Row `world` of each array belongs to one world; the block is the only body, so that row `world` of
 `physics.World.state` is its state.
@@ -6,26 +6,22 @@ Row `world` of each array belongs to one world; the block is the only body, so t
 
 from __future__ import annotations
 
-# --- record (worlds, RECORD_SIZE): what an episode fixes or carries along ---------------------------------
-FORCE_LIMIT = 0  # longest force vector [N]
-TORQUE_LIMIT = 1  # longest torque vector [N m]
-HALF = 2  # half edges along the body axes [m]
-POTENTIAL = 5  # of the last observed state
-HOLD = 6  # consecutive control steps on which goal and rest were met
-GOAL = 7  # x and z of the goal on the floor [m]
-FACE = 9  # face to be turned down: 0..5 = -x, +x, -y, +y, -z, +z
-RECORD_SIZE = 10
+# --- record (worlds, RECORD_SIZE): what an episode of the block's tasks fixes or carries along -------------
+HALF = 0  # half edges along the body axes [m]
+POTENTIAL = 3  # of the last observed state
+HOLD = 4  # consecutive control steps on which goal and rest were met
+GOAL = 5  # x and z of the goal on the floor [m]
+FACE = 7  # face to be turned down: 0..5 = -x, +x, -y, +y, -z, +z
+RECORD_SIZE = 8
 
-# --- outcome (worlds, OUTCOME_SIZE): what a control step leaves behind ------------------------------------
+# --- outcome (worlds, 3 + infos): what a control step of any task leaves behind ----------------------------
 REWARD = 0
 SUCCESS = 1  # 0 or 1
-ERROR = 2  # distance to the goal [m] or angle to it [rad]
-SPEED = 3  # of the centre [m/s]
-SPIN = 4  # |angular velocity| [rad/s]
-OUTCOME_SIZE = 5
-
-# --- start (rows, START_SIZE): what is sampled of a start pose --------------------------------------------
-PLACE = 0  # x and z of the centre [m]
-YAW = 2  # about the vertical [rad]
-START_FACE = 3  # face that is down
-START_SIZE = 4
+FAILURE = 2  # 0 or 1
+INFO = 3  # from here on: the numbers of `Task.info_names`; of the block's tasks these
+ERROR = 3  # distance to the goal [m] or angle to it [rad]
+SPEED = 4  # of the centre [m/s]
+SPIN = 5  # |angular velocity| [rad/s]
+REWARD_PROGRESS = 6  # terms of the reward
+REWARD_EFFORT = 7
+REWARD_SUCCESS = 8

@@ -8,6 +8,7 @@ import signal
 import subprocess
 import sys
 import time
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -18,6 +19,7 @@ import physics
 from physics import scenes
 from rigid_env.cli import app, files
 from rigid_env.cli.common import INTERRUPTED
+from rigid_env.lab import warmup
 from rigid_env.lab.demo import LARGEST_GIF, Demo
 from rigid_env.lab.measure import effects as costs
 from rigid_env.terminal.console import UNBROKEN
@@ -25,9 +27,10 @@ from rigid_env.terminal.console import UNBROKEN
 runner = CliRunner()
 COMMANDS = {
     "demo": (), "run": ("rest",), "replay": ("none.npz",), "explain": ("rest",), "warmup": (), "bench": (),
-    "effects": (), "accuracy": (), "tosses": ("none.npz",), "hard-cases": (),
+    "effects": (), "accuracy": (), "tosses": ("none.npz",), "hard-cases": (), "describe": ("rigid_env/BlockReach-v0",),
 }  # fmt: skip
 
+CART = Path(__file__).parents[2] / "examples" / "cart.toml"
 BALL = physics.Scene([physics.Sphere(0.5, 2.0, linvel=(1.0, 0.0, 0.0))], effects=[physics.Gravity()])
 
 
@@ -164,6 +167,15 @@ def test_run_and_demo_take_scenes_and_files_alike(ball, tmp_path):
     out = tmp_path / "pictures"
     assert "ball, accuracy balanced" in run("demo", ball, "--duration", 0.05, "--out", out)
     assert sorted(path.name for path in out.iterdir()) == ["ball.gif", "ball.png"]
+
+
+def test_run_takes_the_scene_of_an_environment():
+    assert "cart, accuracy balanced" in run("run", CART, "--duration", 0.05)
+
+
+def test_warmup_knows_the_environment_of_any_scene():
+    names = {job.name: job for job in warmup.jobs() if job.accuracy == "balanced"}
+    names["environment rigid_env/Scene-v0"].run()
 
 
 def test_gif_keeps_the_time_of_the_motion():

@@ -84,7 +84,8 @@ def test_scene_files_are_scenes(tmp_path):
         for block in snippets.blocks(page, "toml"):
             path = tmp_path / "scene.toml"
             path.write_text(block.code, encoding="utf-8")
-            assert physics.load_scene(path).bodies
+            if "[[bodies]]" in block.code:  # the others are parts of files
+                assert physics.load_scene(path).bodies
 
 
 def test_the_readme_is_short_and_its_two_commands_stand():

@@ -11,7 +11,9 @@ import pytest
 
 from rigid_env.envs.block_reach import BlockReachEnv
 from rigid_env.envs.registration import MAX_EPISODE_STEPS
-from rigid_env.tasks import Task, base, kernels
+from rigid_env.tasks import block as base
+from rigid_env.tasks import kernels
+from rigid_env.tasks.block import BlockTask
 
 SECTIONS = [
     "Description", "Action Space", "Observation Space", "Rewards", "Starting State", "Episode End",
@@ -71,7 +73,8 @@ def test_numbers_in_rewards_and_episode_end(env_class):
     assert f"Success earns {kernels.SUCCESS_BONUS:g}" in rewards
     assert f"speed of at most {kernels.REST_SPEED:g} m/s and a spin of at most {kernels.REST_SPIN:g} rad/s" in end
     assert f"on {kernels.HOLD_STEPS} control steps in a row" in end
-    steps = MAX_EPISODE_STEPS[env_class.task_class.__name__]
+    steps = env_class.task_class.max_episode_steps
+    assert MAX_EPISODE_STEPS[env_class.task_class.__name__] == steps
     assert f"after {steps} control steps ({steps * env_class().task.control_dt:g} s)" in end
     assert kernels.HOLD_VALUE == 1.0  # the "+ h" above
 
@@ -88,7 +91,7 @@ def test_argument_table_holds_the_defaults():
     rows = {row[0].strip("`"): row[1].strip("`") for row in table(section(BlockReachEnv.__doc__, "Arguments"))}
     defaults = {
         name: parameter.default
-        for owner in (Task.__init__, BlockReachEnv.__init__)
+        for owner in (BlockTask.__init__, BlockReachEnv.__init__)
         for name, parameter in inspect.signature(owner).parameters.items()
         if parameter.default is not inspect.Parameter.empty and name not in ("worlds", "threads")
     }

@@ -43,8 +43,8 @@ def test_snippets_of_the_page_run_as_they_stand(snippet, tmp_path):
 
 def test_the_page_lists_the_options():
     rows = set(re.findall(r"^\| `(\w+)` \|", PAGE, re.M))
-    kinds = {**rigid_env.BlockReachEnv().task.option_kinds, **rigid_env.BlockReorientEnv().task.option_kinds}
-    assert rows == kinds.keys() | {"reset_mask"}
+    tasks = rigid_env.BlockReachEnv().task, rigid_env.BlockReorientEnv().task
+    assert rows == {name for task in tasks for name in task.option_names} | {"reset_mask"}
 
 
 def test_the_bare_id_needs_the_import(tmp_path):
@@ -87,16 +87,16 @@ def test_the_version_of_sources_that_are_not_installed(monkeypatch):
 
 
 def test_signatures_are_explicit_and_hold_the_tasks_defaults():
-    from rigid_env.tasks import Task
+    from rigid_env.tasks.block import BlockTask
 
     def defaults(target, *but):
         found = inspect.signature(target).parameters
         assert all(p.kind not in (p.VAR_KEYWORD, p.VAR_POSITIONAL) for p in found.values())
         return {name: p.default for name, p in found.items() if name not in but and p.default is not p.empty}
 
-    task = defaults(Task.__init__, "worlds", "self")
+    task = defaults(BlockTask.__init__, "worlds", "self")
     of_one = {name: default for name, default in task.items() if name != "threads"}
-    picture = {"render_mode": None, "width": 960, "height": 600}
+    picture = {"render_mode": None, "width": 960, "height": 600, "obs": "state", "obs_size": (84, 84), "obs_stack": 1}
     for single in (rigid_env.BlockReachEnv, rigid_env.BlockReorientEnv):
         assert defaults(single) == {**of_one, **picture}
     batch = {"num_envs": 1, "max_episode_steps": "registered", **picture}

@@ -78,8 +78,9 @@ def test_seeds_are_used_once():
     venv.seed(3)
     np.testing.assert_array_equal(first, venv.reset())
     assert len(venv.reset_infos) == 3
-    parameters = {"mass", "size", "friction", "restitution", "gravity"}
-    assert venv.reset_infos[0].keys() == {"is_success", "distance", "speed", "spin", "physics_status"} | parameters
+    drawn = {"mass", "size", "friction", "restitution", "gravity", "place", "yaw", "face", "goal"}
+    terms = {"reward_progress", "reward_effort", "reward_success"}
+    assert venv.reset_infos[0].keys() == {"is_success", "distance", "speed", "spin", "physics_status"} | terms | drawn
 
 
 def test_attributes_and_methods():

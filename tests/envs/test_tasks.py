@@ -13,7 +13,8 @@ import physics
 from rigid_env.envs.block_reach import BlockReachEnv
 from rigid_env.envs.block_reorient import BlockReorientEnv
 from rigid_env.envs.vector_env import BlockReachVectorEnv, BlockReorientVectorEnv
-from rigid_env.tasks import base, kernels
+from rigid_env.tasks import block as base
+from rigid_env.tasks import kernels
 from rigid_env.tasks import layout as col
 from tests.envs.conftest import push, random_actions
 
@@ -314,8 +315,8 @@ def test_effects_are_added_or_take_the_place_of_the_tasks():
     task = env.unwrapped.task
     kinds = [type(effect) for effect in task.world.scene.effects]
     assert kinds == [physics.Contact, physics.Friction, physics.Drag, physics.Gravity]
-    assert task.record[0, col.FORCE_LIMIT] == pytest.approx(0.9 * 6.0 * 4.0)
-    assert plain.task.record[0, col.FORCE_LIMIT] == pytest.approx(0.9 * 6.0 * 9.81)
+    assert task.limits[0, 0] == pytest.approx(0.9 * 6.0 * 4.0)
+    assert plain.task.limits[0, 0] == pytest.approx(0.9 * 6.0 * 9.81)
     speeds = []
     for effects in ((), (physics.Drag(0.0, linear=5.0),)):
         single = BlockReachEnv(effects=effects, friction=0.0)

@@ -64,10 +64,10 @@ SUBJECTS = {
 def state_of(env) -> tuple:
     """Everything that decides how an environment goes on."""
     task = env.task
-    own = ("_elapsed", "_ended", "_waiting", "_seeds", "_has_reset", "_np_random_seed", "max_episode_steps", "closed")
+    own = ("_ended", "_waiting", "_seeds", "_has_reset", "_np_random_seed", "max_episode_steps", "closed")
     return (
         task.world.kept(), task.world.params, task.world.gravity, task.world.time, task.wrench, task.record, task.obs,
-        task.outcome, task.status, task.values.now, task.values._held, sorted(task.values.varying),
+        task.outcome, task.status, task.drawn, task.episodes.held, sorted(task.episodes.varying), task.steps,
         [generator and generator.bit_generator.state for generator in task.generators],
         [list(value) if isinstance(value, list) else value for value in (vars(env).get(name) for name in own)],
     )  # fmt: skip

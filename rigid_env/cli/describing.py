@@ -1,0 +1,94 @@
+"""The command that documents a task."""
+
+from __future__ import annotations
+
+import os
+import re
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from rigid_env.cli.common import Json, app, tell_file, told_errors, write
+from rigid_env.cli.files import make_parents, output_option
+from rigid_env.terminal import Column, Table, make_console
+
+if TYPE_CHECKING:
+    from rigid_env.envs.env import RigidEnv
+    from rigid_env.tasks.describe import Section
+
+CLASS = re.compile(r"[\w.]+:[A-Za-z_]\w*")
+NUMBERS = ("Num", "Min", "Max", "Numbers")  # columns
+
+
+@app.command(short_help="Document a task: spaces, rewards, draws, episode end, arguments.")
+def describe(
+    task: Annotated[
+        str,
+        typer.Argument(metavar="TASK", help="Id of an environment, MODULE:ID, or MODULE:CLASS of a task."),
+    ],
+    markdown: Annotated[Path | None, output_option("--markdown", ".md", help="Write it as Markdown, too.")] = None,
+    json: Json = None,
+) -> None:
+    """Document a task by the tables of an environment's docstring.
+
+    Modules of the working folder are found, after those that are installed.
+    """
+    with told_errors():
+        make_parents(markdown, json)
+        console = make_console()
+        env = _make(task)
+        sections = env.documentation()
+        for section in sections:
+            console.print(_shown(section.title), style="bold")
+            for paragraph in section.before:
+                console.print(_shown(paragraph))
+            if section.rows:
+                console.print(_table(section))
+            for paragraph in section.after:
+                console.print(_shown(paragraph))
+            console.print()
+        if markdown is not None:
+            markdown.write_text(env.describe(), encoding="utf-8")
+            tell_file(markdown, console)
+        write(json, {"task": task, "sections": [section.to_dict() for section in sections]}, console)
+
+
+def _make(task: str) -> RigidEnv:
+    """Environment of an id, or of a task's class.
+
+    Raises
+    ------
+    ValueError
+        There is none, or it is not of this package.
+    """
+    import gymnasium as gym
+
+    from rigid_env.envs.env import RigidEnv, TaskEnv
+
+    if os.getcwd() not in sys.path:
+        sys.path.append(os.getcwd())
+    if CLASS.fullmatch(task):
+        return TaskEnv(task)
+    try:
+        made = gym.make(task).unwrapped
+    except (gym.error.Error, ImportError) as error:
+        allowed = "allowed are ids such as 'rigid_env/BlockReach-v0', 'module:id', and 'module:Class' of a task"
+        raise ValueError(f"task is {task!r}, which is not there ({error}); {allowed}") from error
+    if not isinstance(made, RigidEnv):
+        raise ValueError(f"task is {task!r}, a {type(made).__name__}; allowed are environments of rigid_env")
+    return made
+
+
+def _table(section: Section) -> Table:
+    """The table of a section; numbers are never broken."""
+    table = Table([Column(name, is_number=name in NUMBERS) for name in map(_shown, section.columns)])
+    for row in section.rows:
+        table.add_row(*map(_shown, row))
+    return table
+
+
+def _shown(text: str) -> str:
+    """Text without Markdown's marks of code."""
+    return text.replace("`", "")

@@ -1,0 +1,175 @@
+"""Checks of a task of one's own: what Gymnasium asks of environments, and what this package promises of its own."""
+
+from __future__ import annotations
+
+import pickle
+import warnings
+from collections.abc import Callable
+from typing import Any
+
+import gymnasium as gym
+import numpy as np
+from gymnasium.utils.env_checker import check_env
+from gymnasium.vector import AutoresetMode
+
+from rigid_env.envs.env import TaskEnv
+from rigid_env.envs.making import task_class
+from rigid_env.envs.vector_env import TaskVectorEnv
+from rigid_env.tasks import Task
+
+SEED = 7
+ENVS = 3
+
+
+class CheckError(AssertionError):
+    """A task does not do what environments promise."""
+
+
+def check_task(
+    task: type[Task] | str, steps: int = 60, contexts: tuple[str, ...] = ("fork", "spawn"), **settings: Any
+) -> None:
+    """Check a task as an environment.
+
+    Gymnasium's `check_env`; the same numbers in a batch as alone, for the same seeds; all modes of starting anew;
+    seeds; copies by `pickle`; workers.
+
+    Parameters
+    ----------
+    task : class of Task, or str
+        The class, or where it stands, ``module:Class``.
+    steps : int
+        Control steps of each comparison, in episodes of a third of them.
+    contexts : tuple of str
+        Ways to start workers that are tried; a class that stands in `__main__` without a file cannot be spawned.
+    settings
+        Arguments of the task.
+
+    Raises
+    ------
+    CheckError
+        Saying what differs, where, and by how much.
+    ValueError
+        The task itself refuses; see `Task`.
+    """
+    kind = task_class(task)
+    check = _Checks(kind, steps, settings)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        check_env(TaskEnv(kind, **settings), skip_render_check=True)
+    check.alone_as_in_a_batch()
+    for mode in AutoresetMode:
+        check.starts_anew(mode)
+    check.seeds()
+    check.copies()
+    for context in contexts:
+        check.workers(task, context)
+
+
+class _Checks:
+    """The comparisons of `check_task`."""
+
+    def __init__(self, kind: type[Task], steps: int, settings: dict[str, Any]):
+        self.kind, self.steps, self.settings = kind, steps, settings
+        self.limit = max(1, steps // 3)
+        size = TaskEnv(kind, **settings).action_space.shape
+        self.actions = np.random.default_rng(SEED).uniform(-1.0, 1.0, (steps, ENVS, *size)).astype(np.float32)
+
+    def batch(self, mode: AutoresetMode | str = AutoresetMode.DISABLED, limit: int | None = None) -> TaskVectorEnv:
+        """A batch of `ENVS` worlds."""
+        return TaskVectorEnv(ENVS, task=self.kind, autoreset_mode=mode, max_episode_steps=limit, **self.settings)
+
+    def alone_as_in_a_batch(self) -> None:
+        """World i of a batch goes through the same bits as an environment with its seed."""
+        envs = self.batch()
+        together, _ = envs.reset(seed=SEED)
+        singles = [TaskEnv(self.kind, **self.settings) for _ in range(ENVS)]
+        for i, env in enumerate(singles):
+            _same("observation of reset", together[i], env.reset(seed=SEED + i)[0], f"world {i}")
+        for k in range(self.steps):
+            obs, rewards, ends, _, infos = envs.step(self.actions[k])
+            for i, env in enumerate(singles):
+                alone = env.step(self.actions[k, i])
+                where = f"world {i}, step {k}"
+                _same("observation", obs[i], alone[0], where)
+                _same("reward", rewards[i], alone[1], where)
+                _same("end of the episode", ends[i], alone[2], where)
+                for name in envs.task.info_names:
+                    _same(f"info {name}", infos[name][i], alone[4][name], where)
+            if ends.any():
+                return
+
+    def starts_anew(self, mode: AutoresetMode) -> None:
+        """Episodes end at the limit and start anew as the mode says, inside the observation space."""
+        envs = self.batch(mode, self.limit)
+        envs.reset(seed=SEED)
+        for k in range(self.steps):
+            obs, rewards, ends, cuts, _ = envs.step(self.actions[k])
+            _require(envs.observation_space.contains(obs), f"observation of step {k} is outside its space")
+            _require(bool(np.isfinite(rewards).all()), f"reward of step {k} is {rewards}")
+            over = ends | cuts
+            if mode is AutoresetMode.DISABLED and over.any():
+                envs.reset(options={"reset_mask": over})
+            elif mode is AutoresetMode.SAME_STEP:
+                _require(bool((envs.task.steps[over] == 0).all()), f"worlds did not start anew in step {k}")
+        envs.close()
+
+    def seeds(self) -> None:
+        """The same seed gives the same episode, another seed another one where anything is drawn."""
+        env = TaskEnv(self.kind, **self.settings)
+        first, second = self._trajectory(env, SEED), self._trajectory(env, SEED)
+        _same("trajectory", first, second, f"seed {SEED} twice")
+        if any(not each.is_fixed for each in env.task.distributions.values()):
+            drawn = [env.reset(seed=seed) and {k: np.copy(v) for k, v in env.task.drawn.items()} for seed in (1, 2)]
+            is_same = all(np.array_equal(drawn[0][name], drawn[1][name]) for name in drawn[0])
+            _require(not is_same, "the seeds 1 and 2 draw the same values")
+
+    def copies(self) -> None:
+        """A pickled copy goes on with the same bits."""
+        env = TaskEnv(self.kind, **self.settings)
+        env.reset(seed=SEED)
+        for k in range(self.steps // 4):
+            if env.step(self.actions[k, 0])[2]:
+                break
+        twin = pickle.loads(pickle.dumps(env))
+        for k in range(self.steps // 4, self.steps):
+            ours, theirs = env.step(self.actions[k, 0]), twin.step(self.actions[k, 0])
+            _same("observation of a pickled copy", ours[0], theirs[0], f"step {k}")
+            _same("reward of a pickled copy", ours[1], theirs[1], f"step {k}")
+            if ours[2]:
+                _same("episode of a pickled copy", env.reset()[0], twin.reset()[0], f"step {k}")
+
+    def workers(self, task: type[Task] | str, context: str) -> None:
+        """Workers give the numbers of the batch."""
+        settings = self.settings
+        make: Callable[[], gym.Env] = lambda: TaskEnv(task, **settings)  # noqa: E731 (a closure, which workers are sent)
+        workers = gym.vector.AsyncVectorEnv([make] * 2, context=context)
+        try:
+            theirs, _ = workers.reset(seed=SEED)
+            ours, _ = self.batch().reset(seed=SEED)
+            _same(f"observation of a worker by {context}", ours[:2], theirs, "reset")
+            workers.step(self.actions[0, :2])
+        finally:
+            workers.close()
+
+    def _trajectory(self, env: TaskEnv, seed: int) -> np.ndarray:
+        rows = [env.reset(seed=seed)[0]]
+        for k in range(self.steps):
+            obs, reward, is_ended, _, _ = env.step(self.actions[k, 0])
+            rows.append(np.append(obs, reward))
+            if is_ended:
+                break
+        return np.concatenate(rows)
+
+
+def _same(what: str, ours, theirs, where: str) -> None:
+    ours, theirs = np.asarray(ours), np.asarray(theirs)
+    if ours.shape != theirs.shape:
+        raise CheckError(f"{what} has shapes {ours.shape} and {theirs.shape}; allowed is one shape ({where})")
+    if not np.array_equal(ours, theirs):
+        apart = np.abs(np.subtract(ours, theirs, dtype=np.float64)).max()
+        raise CheckError(f"{what} differs by {apart:.3g}; allowed are the same bits ({where})")
+
+
+def _require(is_met: bool, message: str) -> None:
+    if not is_met:
+        raise CheckError(message)

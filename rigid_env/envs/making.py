@@ -1,0 +1,61 @@
+"""From a task class, or where it stands, to a batch of worlds."""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Mapping
+from importlib import import_module
+from typing import Any
+
+from physics.keywords import nearest_first
+from rigid_env.tasks import Task
+
+OF_ENVIRONMENT = ["render_mode", "width", "height", "obs", "obs_size", "obs_stack"]
+"""Settings of an environment that are none of its task."""
+
+
+def task_class(task: type[Task] | str) -> type[Task]:
+    """Task class from itself, or from ``module:Class``.
+
+    Raises
+    ------
+    ValueError
+        It is neither, or is not there.
+    """
+    if isinstance(task, str):
+        module, _, name = task.partition(":")
+        try:
+            found = getattr(import_module(module), name)
+        except (ImportError, AttributeError, ValueError) as error:
+            raise ValueError(f"task is {task!r}, which is not there ({error}); allowed is 'module:Class'") from error
+    else:
+        found = task
+    if not (inspect.isclass(found) and issubclass(found, Task)):
+        raise ValueError(f"task is {task!r}; allowed are a subclass of rigid_env.Task and 'module:Class' of one")
+    return found
+
+
+def make_task(task: type[Task] | str, worlds: int, settings: Mapping[str, Any]) -> Task:
+    """Make a task with these settings, its constructor's arguments.
+
+    Raises
+    ------
+    TypeError
+        An unknown setting, with the known ones, the nearest first.
+    ValueError
+        As of `task_class`, and a setting out of range.
+    """
+    kind = task_class(task)
+    check_settings(kind, settings)
+    return kind(worlds, **settings)
+
+
+def check_settings(kind: type[Task], settings: Mapping[str, Any], of_environment: bool = False) -> None:
+    """Raise a TypeError at a setting that the task, or the environment with it, does not know."""
+    known = [name for name in inspect.signature(kind.__init__).parameters if name not in ("self", "worlds")]
+    if of_environment:
+        known += OF_ENVIRONMENT
+    for name in settings:
+        if name not in known:
+            allowed = ", ".join(nearest_first(name, known))
+            raise TypeError(f"{kind.__name__} got the argument {name!r}; allowed are {allowed}")

@@ -1,0 +1,235 @@
+"""The environment `rigid_env/Scene-v0` and its documentation; `rigid_env.tasks.scene_task` is its task."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from gymnasium.vector import AutoresetMode
+
+import physics
+from physics import validation
+from physics.keywords import known_keywords
+from rigid_env.envs.env import RigidEnv
+from rigid_env.envs.vector_env import RigidVectorEnv
+from rigid_env.tasks.scene_task import SceneTask
+
+SceneSource = physics.Scene | str | os.PathLike
+Driven = str | int | Sequence[str | int]
+
+
+@known_keywords
+class SceneEnv(RigidEnv):
+    """Drive bodies of any scene, and bring one of them to a place.
+
+    ## Description
+
+    The scene comes from a file, by the name of a canonical scene, or as a `physics.Scene`. A force at the
+    centre of mass and a torque act on each driven body. The table `[environment]` of the file has the
+    settings; docs/scene-files.md lists its keys. World axes: x right, y up, z towards the viewer.
+
+    ## Action Space
+
+    `Box(-1, 1, (6 driven,), float32)`, held for one control step. Six numbers for each driven body, in
+    their order in `driven`:
+
+    | Num | Action | Min | Max | Unit |
+    | --- | --- | --- | --- | --- |
+    | 0 | force along x | -1 | 1 | 0.9 m g |
+    | 1 | force along y | -1 | 1 | 0.9 m g |
+    | 2 | force along z | -1 | 1 | 0.9 m g |
+    | 3 | torque about x | -1 | 1 | 0.5 m g a |
+    | 4 | torque about y | -1 | 1 | 0.5 m g a |
+    | 5 | torque about z | -1 | 1 | 0.5 m g a |
+
+    m is the mass of the body, g gravity (9.81 m/s² where there is none), a its longest half extent. `force`
+    and `torque` stand in place of 0.9 and 0.5; a limit of 0 takes its three numbers away. World frame, or
+    the body's with `frame = "body"`. Each number is clipped to ±1, then force and torque vector are
+    shortened to length 1 where they are longer.
+
+    ## Observation Space
+
+    `Box` of 18 float32 for each body of the scene, in their order, and 3 of the goal if there is one. World
+    frame. Each number is told in its unit and clipped to its bounds. R is the rotation matrix from body to
+    world, by rows. With one body and a goal:
+
+    | Num | Observation | Min | Max | Unit |
+    | --- | --- | --- | --- | --- |
+    | 0 | position x | -10 | 10 | 5 m |
+    | 1 | position y | -10 | 10 | 5 m |
+    | 2 | position z | -10 | 10 | 5 m |
+    | 3 | linear velocity x | -10 | 10 | 5 m/s |
+    | 4 | linear velocity y | -10 | 10 | 5 m/s |
+    | 5 | linear velocity z | -10 | 10 | 5 m/s |
+    | 6 | R[0, 0] | -1 | 1 | 1 |
+    | 7 | R[0, 1] | -1 | 1 | 1 |
+    | 8 | R[0, 2] | -1 | 1 | 1 |
+    | 9 | R[1, 0] | -1 | 1 | 1 |
+    | 10 | R[1, 1] | -1 | 1 | 1 |
+    | 11 | R[1, 2] | -1 | 1 | 1 |
+    | 12 | R[2, 0] | -1 | 1 | 1 |
+    | 13 | R[2, 1] | -1 | 1 | 1 |
+    | 14 | R[2, 2] | -1 | 1 | 1 |
+    | 15 | angular velocity x | -10 | 10 | 5 rad/s |
+    | 16 | angular velocity y | -10 | 10 | 5 rad/s |
+    | 17 | angular velocity z | -10 | 10 | 5 rad/s |
+    | 18 | goal 0 | -10 | 10 | 5 m |
+    | 19 | goal 1 | -10 | 10 | 5 m |
+    | 20 | goal 2 | -10 | 10 | 5 m |
+
+    Positions are those of centres of mass. `length` [m] stands in place of 5 in `5 m` and `5 m/s`: choose it
+    so that the scene is a few lengths wide.
+
+    ## Rewards
+
+    0 without a goal. With one, the gain of closeness in the step, plus a bonus. With d the distance of the
+    goal's body from the goal [m] and t the tolerance [m], closeness is `-log(1 + d / t)`, so that a scene
+    rewards the same at every scale. Success earns 5.
+
+    ## Starting State
+
+    Poses and velocities of the scene. `[environment.start]` has half widths, three numbers each, of what is
+    added to `pos` [m], `linvel` [m/s] and `angvel` [rad/s] of every body, drawn uniformly for each of them. A
+    goal with `low` and `high` is drawn uniformly between them. `reset(options=...)` fixes what it names for
+    this episode: `goal` (three numbers), `start_pos`, `start_linvel`, `start_angvel` (three for each body). The
+    other draws of a seed stay the same.
+
+    ## Episode End
+
+    Termination: success, which is a distance of at most `tolerance` and a speed of at most `speed`. Without a
+    goal no episode terminates. Truncation: after `max_episode_steps` of the file, or of `gymnasium.make` if
+    that is sooner; `gymnasium.make_vec` takes its own in place of the file's.
+
+    `info` holds `is_success` and `physics_status`, a `physics.Status`: 0 when nothing went wrong in the step,
+    contact problems above their tolerance included. With a goal also `distance` [m], `speed` [m/s], and the
+    terms of the reward, `reward_progress` and `reward_success`. That of `reset` also holds what was drawn:
+    `goal`, `start_pos`, `start_linvel`, `start_angvel`.
+
+    ## Arguments
+
+    | Argument | Default | Meaning |
+    | --- | --- | --- |
+    | `scene` | None | scene file (.toml), name of a canonical scene, or a `physics.Scene`; must be given |
+    | `driven` | None | names or indices of driven bodies; with one body in the scene that one |
+    | `force` | None | longest force over the body's weight (0.9) |
+    | `torque` | None | longest torque over weight times longest half extent (0.5) |
+    | `frame` | None | `"world"` (default) or `"body"`: frame of force and torque |
+    | `length` | None | unit of lengths in observations (5) [m] |
+    | `goal` | None | dict of `body`, `pos` (or `low` and `high`), `tolerance`, `speed` |
+    | `start` | None | dict of `pos`, `linvel`, `angvel` |
+    | `frame_skip` | None | physics steps per control step (5) |
+    | `dt` | None | physics step (0.005) [s] |
+    | `accuracy` | `"balanced"` | preset of the engine, or a `physics.Accuracy` |
+    | `effects` | () | `physics` effects besides, or instead of the scene's of that class |
+    | `dump_faults` | None | folder for what led to a state that was not finite (`rigid-env replay`) |
+    | `render_mode` | None | `"rgb_array"`, `"human"` or None |
+    | `width` | 960 | of pictures [px] |
+    | `height` | 600 | of pictures [px] |
+    | `obs` | `"state"` | observations: `"state"`, the table above, or `"pixels"`, pictures (uint8) |
+    | `obs_size` | (84, 84) | height and width of these [px] |
+    | `obs_stack` | 1 | of the last so many control steps, along the last axis, the newest last |
+
+    From `driven` to `dt` an argument takes the place of that key in the file; None leaves the file's, or the
+    default in brackets.
+
+    ## Version History
+
+    - v0: first version.
+    """
+
+    def __init__(
+        self,
+        scene: SceneSource | None = None,
+        render_mode: str | None = None,
+        width: int = 960,
+        height: int = 600,
+        *,
+        obs: str = "state",
+        obs_size: Sequence[int] = (84, 84),
+        obs_stack: int = 1,
+        driven: Driven | None = None,
+        force: float | None = None,
+        torque: float | None = None,
+        frame: str | None = None,
+        length: float | None = None,
+        goal: Mapping[str, Any] | None = None,
+        start: Mapping[str, Any] | None = None,
+        frame_skip: int | None = None,
+        dt: float | None = None,
+        accuracy: str | physics.Accuracy = "balanced",
+        effects: Sequence = (),
+        dump_faults: str | Path | None = None,
+    ):
+        task = SceneTask(
+            1, scene, driven=driven, force=force, torque=torque, frame=frame, length=length, goal=goal, start=start,
+            frame_skip=frame_skip, dt=dt, accuracy=accuracy, effects=effects, dump_faults=dump_faults,
+        )  # fmt: skip
+        super().__init__(task, render_mode, width, height, obs, obs_size, obs_stack)
+
+    def step(self, action):
+        """Hold an action for one control step; as `RigidEnv.step`, but truncated at the limit of the scene's file."""
+        obs, reward, is_terminated, is_truncated, info = super().step(action)
+        limit = self.task.max_episode_steps
+        if limit is not None and self.task.steps[0] >= limit:
+            is_truncated = True
+        return obs, reward, is_terminated, is_truncated, info
+
+
+@known_keywords
+class SceneVectorEnv(RigidVectorEnv):
+    """Many worlds of `SceneEnv`, which documents the task.
+
+    Parameters
+    ----------
+    num_envs : int
+    scene : physics.Scene, str or Path
+    autoreset_mode, max_episode_steps, render_mode, width, height, obs, obs_size, obs_stack
+        As of `RigidVectorEnv`; `max_episode_steps` is the file's by default.
+    driven, force, torque, frame, length, goal, start, frame_skip, dt, accuracy, effects, dump_faults
+        As of `SceneEnv`.
+    threads : int
+        Threads that share a step.
+
+    Raises
+    ------
+    TypeError
+        An unknown argument, with the known ones, the nearest first.
+    ValueError
+        Naming file, line and key or the argument, the value, and what is allowed.
+    """
+
+    def __init__(
+        self,
+        num_envs: int = 1,
+        scene: SceneSource | None = None,
+        autoreset_mode: AutoresetMode | str = AutoresetMode.NEXT_STEP,
+        max_episode_steps: int | str | None = "registered",
+        render_mode: str | None = None,
+        width: int = 960,
+        height: int = 600,
+        *,
+        obs: str = "state",
+        obs_size: Sequence[int] = (84, 84),
+        obs_stack: int = 1,
+        driven: Driven | None = None,
+        force: float | None = None,
+        torque: float | None = None,
+        frame: str | None = None,
+        length: float | None = None,
+        goal: Mapping[str, Any] | None = None,
+        start: Mapping[str, Any] | None = None,
+        frame_skip: int | None = None,
+        dt: float | None = None,
+        accuracy: str | physics.Accuracy = "balanced",
+        effects: Sequence = (),
+        dump_faults: str | Path | None = None,
+        threads: int = 1,
+    ):
+        task = SceneTask(
+            validation.count(num_envs, "num_envs"), scene, driven=driven, force=force, torque=torque, frame=frame,
+            length=length, goal=goal, start=start, frame_skip=frame_skip, dt=dt, accuracy=accuracy, effects=effects,
+            dump_faults=dump_faults, threads=threads,
+        )  # fmt: skip
+        super().__init__(task, autoreset_mode, max_episode_steps, render_mode, width, height, obs, obs_size, obs_stack)

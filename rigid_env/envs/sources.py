@@ -1,0 +1,130 @@
+"""Sources of observations: the numbers of a task, or pictures of its worlds."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from gymnasium import spaces
+
+from physics import validation
+from rigid_env.rendering.pixels import PixelObserver
+from rigid_env.rendering.view import frame_of, room_of
+from rigid_env.tasks import Task
+
+KINDS = ("state", "pixels")
+
+
+class StateSource:
+    """Observations as a task's entries give them.
+
+    Parameters
+    ----------
+    task : Task
+
+    Attributes
+    ----------
+    space : gymnasium.spaces.Box
+        Of one world.
+    """
+
+    def __init__(self, task: Task):
+        self._task = task
+        self.space = spaces.Box(task.observed.low, task.observed.high, dtype=np.float32)
+
+    def start(self, rows: np.ndarray) -> None:
+        """Look at worlds whose episodes begin."""
+
+    def step(self) -> None:
+        """Look at all worlds after a step."""
+
+    @property
+    def arrays(self) -> dict[str, np.ndarray]:
+        """Memory of the source, by name, with the worlds first: none."""
+        return {}
+
+    def one(self, world: int) -> np.ndarray:
+        """Observation of one world, a copy."""
+        return self._task.obs[world].copy()
+
+    def all(self) -> np.ndarray:
+        """Observations of all worlds, a copy."""
+        return self._task.obs.copy()
+
+
+class PixelSource:
+    """Pictures of the worlds as observations, without text and arrows.
+
+    Parameters
+    ----------
+    task : Task
+    size : (2,) int
+        Height and width [px].
+    stack : int
+        Pictures in one observation, one for each of the last control steps, the newest last; at the start of an episode
+        all show the start.
+
+    Attributes
+    ----------
+    space : gymnasium.spaces.Box
+        (height, width, 3 * stack) uint8.
+
+    Raises
+    ------
+    ValueError
+        A size or a number of pictures that is not positive.
+    gymnasium.error.DependencyNotInstalled
+        If pygame is missing.
+    """
+
+    def __init__(self, task: Task, size: Sequence[int], stack: int):
+        try:
+            height, width = size
+        except (TypeError, ValueError):
+            raise ValueError(f"obs_size is {size!r}; allowed are two integers, height and width") from None
+        height, width = validation.count(height, "height of obs_size"), validation.count(width, "width of obs_size")
+        self.stack = validation.count(stack, "obs_stack")
+        self._task = task
+        self._observer = PixelObserver(width, height, room=room_of(task))
+        self.space = spaces.Box(0, 255, (height, width, 3 * self.stack), dtype=np.uint8)
+        self._pictures = np.zeros((task.worlds, self.stack, height, width, 3), dtype=np.uint8)
+
+    def start(self, rows: np.ndarray) -> None:
+        """Draw worlds whose episodes begin."""
+        for world in rows:
+            self._draw(world)
+            self._pictures[world, :-1] = self._pictures[world, -1]
+
+    def step(self) -> None:
+        """Draw all worlds after a step."""
+        self._pictures[:, :-1] = self._pictures[:, 1:]
+        for world in range(self._task.worlds):
+            self._draw(world)
+
+    @property
+    def arrays(self) -> dict[str, np.ndarray]:
+        """Memory of the source, by name, with the worlds first: the last pictures."""
+        return {"pictures": self._pictures}
+
+    def _draw(self, world: int) -> None:
+        self._observer.observe(frame_of(self._task, world, arrows=False), self._pictures[world, -1])
+
+    def one(self, world: int) -> np.ndarray:
+        """Observation of one world, a copy."""
+        return np.concatenate(tuple(self._pictures[world]), axis=-1)
+
+    def all(self) -> np.ndarray:
+        """Observations of all worlds, a copy."""
+        return np.concatenate(tuple(self._pictures.swapaxes(0, 1)), axis=-1)
+
+
+def make_source(task: Task, obs: str, size: Sequence[int], stack: int) -> StateSource | PixelSource:
+    """Make the source of observations that an environment's arguments ask for.
+
+    Raises
+    ------
+    ValueError
+        Naming the argument, its value and what is allowed.
+    """
+    validation.one_of(obs, KINDS, "obs")
+    return StateSource(task) if obs == "state" else PixelSource(task, size, stack)

@@ -1,0 +1,46 @@
+"""A task before a control step, to go back to where a function of the user's ends with an error."""
+
+from __future__ import annotations
+
+import numpy as np
+
+
+class Before:
+    """All that a control step changes, kept in arrays that are there for it.
+
+    Parameters
+    ----------
+    task : Task
+    """
+
+    def __init__(self, task):
+        self._task, world = task, task.world
+        disturbed = () if task.disturbed is None else task.disturbed.arrays.values()
+        changing = [world.state, world.memory, world.report_table, world.sleep, task.action, task.previous_action,
+                    task.status, task.wrench, *task.memory_arrays.values(), *disturbed]  # fmt: skip
+        self._kept = [(array, np.empty_like(array)) for array in changing if array.size]
+        self._time, self._clock, self._actuation = 0.0, 0, None
+        self._generators: dict[int, dict] = {}
+
+    def keep(self) -> None:
+        """Copy what the coming step changes."""
+        task = self._task
+        for array, kept in self._kept:
+            kept[...] = array
+        self._time, self._clock = task.world.time, task.clock
+        if task.world.actuation is not None:
+            self._actuation = task.world.actuation.kept()
+        if task.disturbed is not None:
+            due = task.disturbed.due().tolist()
+            self._generators = {world: task.generators[world].bit_generator.state for world in due}
+
+    def put_back(self) -> None:
+        """Be as it was when `keep` was called."""
+        task = self._task
+        for array, kept in self._kept:
+            array[...] = kept
+        task.world.time, task.clock = self._time, self._clock
+        if self._actuation is not None:
+            task.world.actuation.put_back(self._actuation)
+        for world, state in self._generators.items():
+            task.generators[world].bit_generator.state = state

@@ -1,0 +1,148 @@
+"""Base of the block's tasks: one block among three walls, starting at rest on a random face."""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+import numpy as np
+
+import physics
+from rigid_env.tasks import layout as col
+from rigid_env.tasks.actions import Wrench
+from rigid_env.tasks.area import Area
+from rigid_env.tasks.block_draws import YAW, EdgesInside, Face, OnFloor
+from rigid_env.tasks.distributions import LAST, Distribution, Uniform
+from rigid_env.tasks.kernels import start_poses
+from rigid_env.tasks.parameters import LENGTHS, middle, parse_range, scene_size
+from rigid_env.tasks.task import Task
+
+FORCE_SHARE = 0.9
+"""Longest force over the block's weight m g: less than 1, so that the agent cannot fly."""
+
+TORQUE_SHARE = 0.5
+"""Longest torque over m g times the longest half edge. To tip the block a torque alone must exceed m g times
+the half edge that the centre has to pass over: this one tips the 5 x 3 x 2 m block when that is its shortest,
+and is too weak for the others without the force's help, momentum, or a wall."""
+
+
+class BlockTask(Task):
+    """A batch of worlds with one block each among three walls.
+
+    Subclasses say what a goal is, and observe with one compiled function.
+
+    Parameters
+    ----------
+    worlds, accuracy, effects, frame_skip, dt, dump_faults, threads
+        As of `Task`.
+    walls : {"three", "corner"}
+        Layout, see `Area`.
+    half_width : float
+        Half the width of the floor that starts and goals are drawn from, and of the three-wall box [m].
+    mass, size, friction, restitution, gravity : number, pair or Distribution
+        Block's mass [kg] and edges (three numbers) [m], coefficients against the walls, strength of gravity along -y
+        [m/s²]. A pair (low, high) is drawn from uniformly in each episode of each world.
+
+    Attributes
+    ----------
+    area : Area
+    record : (worlds, RECORD_SIZE) float64
+        See `rigid_env.tasks.layout`.
+    goal_draw : str or None
+        Name of the goal among the draws; None: there is none to draw.
+
+    Raises
+    ------
+    ValueError
+        Naming the field, the value and what is allowed.
+    """
+
+    actions = Wrench(0, FORCE_SHARE, TORQUE_SHARE)
+    max_episode_steps = 300
+    record_size = col.RECORD_SIZE
+    terms = ("progress", "effort", "success")
+    goal_draw: ClassVar[str | None] = None
+    error_name: ClassVar[str]
+
+    def __init__(
+        self,
+        worlds: int = 1,
+        *,
+        accuracy="balanced",
+        walls="three",
+        half_width=10.0,
+        mass=6.0,
+        size=(5.0, 3.0, 2.0),
+        friction=0.5,
+        restitution=0.2,
+        gravity=9.81,
+        effects=(),
+        frame_skip=5,
+        dt=0.005,
+        dump_faults=None,
+        threads=1,
+    ):
+        self.area = Area(walls, half_width)
+        given = {"mass": mass, "size": size, "friction": friction, "restitution": restitution, "gravity": gravity}
+        self._parameters = {field: parse_range(field, given[field]) for field in LENGTHS}
+        edges = self._parameters["size"]
+        self._largest = (
+            edges.high if isinstance(edges, Uniform) else edges.at(np.full((1, edges.uniforms), LAST), {})[0]
+        )
+        self.area.check_room(self._largest)
+        self._parameters["size"] = EdgesInside(edges, self.area)
+        super().__init__(
+            worlds, accuracy=accuracy, effects=effects, frame_skip=frame_skip, dt=dt, dump_faults=dump_faults,
+            threads=threads,
+        )  # fmt: skip
+
+    def declared_draws(self):
+        """Place, yaw and face of the start, the goal, and the five parameters."""
+        start = {"place": OnFloor(self.area), "yaw": YAW, "face": Face()}
+        goal = {} if self.goal_draw is None else {self.goal_draw: self.goal()}
+        return {**start, **goal, **self._parameters}
+
+    def goal(self) -> Distribution:
+        """Distribution of goals."""
+        raise NotImplementedError
+
+    def make_scene(self, distributions):
+        """The block at the middle of the area, lifted clear of the floor, with the middles of all ranges."""
+        size, centre = scene_size(self._parameters["size"]), self.area.centre
+        values = {field: float(middle(each)) for field, each in self._parameters.items() if field != "size"}
+        clear = float(np.linalg.norm(self._largest))
+        return physics.Scene(
+            bodies=[physics.Block(size=tuple(size), mass=values["mass"], pos=(centre, clear, centre))],
+            walls=self.area.half_spaces,
+            effects=[
+                physics.Gravity((0.0, -values["gravity"], 0.0)),
+                physics.Contact(restitution=values["restitution"]),
+                physics.Friction(values["friction"]),
+            ],
+        )
+
+    def place(self, drawn):
+        """Poses at rest on the floor."""
+        count = len(drawn["yaw"])
+        pos, quat = np.empty((count, 1, 3)), np.empty((count, 1, 4))
+        start_poses(drawn["place"], drawn["yaw"], drawn["face"], 0.5 * drawn["size"], pos, quat)
+        return {"pos": pos, "quat": quat}
+
+    @property
+    def place_options(self):
+        return ("place", "yaw", "face", "size")
+
+    def _weights(self, rows):
+        given = next((effect for effect in self.effects if isinstance(effect, physics.Gravity)), None)
+        gravity = self.drawn["gravity"][rows] if given is None else float(np.linalg.norm(given.acceleration))
+        return (self.drawn["mass"][rows] * gravity)[:, None]
+
+    def _note_parameters(self, rows):
+        super()._note_parameters(rows)
+        self.record[rows, col.HALF : col.HALF + 3] = 0.5 * self.drawn["size"][rows]
+
+    def lines(self, world):
+        if self.compiled is None:
+            return super().lines(world)
+        error, speed, spin = self.outcome[world, [col.ERROR, col.SPEED, col.SPIN]].tolist()
+        unit = "m" if self.error_name == "distance" else "rad"
+        return f"{self.error_name} {error:.2f} {unit}", f"speed {speed:.2f} m/s   spin {spin:.2f} rad/s"

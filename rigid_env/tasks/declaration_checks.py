@@ -1,0 +1,55 @@
+"""Checks of the class of a task: attributes that would be ignored, or that would hide the task's own."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from difflib import get_close_matches
+
+NEAR = 0.68  # likeness from which on a name is taken for a misspelt one
+FUNCTIONS = ("place", "begin", "update", "success", "failure", "rewards", "measure")
+OVERRIDABLE = {"lines", "place_options", "error_name", "area", "goal_draw", "name", "settings", "goal"}
+OF_INSTANCES = {
+    "action", "clock", "disturbed", "effects", "episodes", "frame_skip", "generators", "info_names", "limits",
+    "memory_arrays", "obs", "observed", "outcome", "previous_action", "record", "status", "weights", "world",
+}  # fmt: skip
+OF_INFO = ("is_success", "physics_status", "reset_mask", "elapsed_steps")
+
+
+def check_class(task: type, base: type, declaration: type) -> None:
+    """Look at what the body of a subclass of `Task` defines.
+
+    Parameters
+    ----------
+    task : type
+    base, declaration : type
+        `Task` and `Declaration`.
+
+    Raises
+    ------
+    TypeError
+        Naming the attribute, and what is allowed: one that is the task's own, one that would be ignored since its name
+        is nearly that of a declared one, or a function that is none.
+    """
+    declared = {name for name in vars(declaration) if not name.startswith("_")} | {"scene"}
+    own = ({name for name in vars(base) if not name.startswith("_")} | OF_INSTANCES) - declared - OVERRIDABLE
+    defined = [name for name in vars(task) if not name.startswith("_")]
+    for name in defined:
+        if name in own:
+            raise TypeError(f"{task.__name__} defines {name!r}, which is the task's own; allowed is another name")
+        if name in declared or name in OVERRIDABLE:
+            continue
+        near = get_close_matches(name, declared, 1, NEAR)
+        if near and near[0] not in vars(task):
+            what = f"{task.__name__} defines {name!r}, which nothing reads"
+            raise TypeError(f"{what}; allowed is {near[0]!r}, or a name that is less like it")
+    for name in FUNCTIONS:
+        if name in defined and not callable(vars(task)[name]):
+            raise TypeError(f"{name} of {task.__name__} is {vars(task)[name]!r}; allowed is a function")
+
+
+def refuse_same_keys(task: str, names: Iterable[str], drawn: Mapping) -> None:
+    """Raise a ValueError if two numbers of an info would have the same key."""
+    keys = [*OF_INFO, *names, *drawn]
+    twice = sorted({key for key in keys if keys.count(key) > 1})
+    if twice:
+        raise ValueError(f"info of {task} has {twice[0]!r} twice; allowed are measures, terms and draws of other names")

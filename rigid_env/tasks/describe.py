@@ -1,0 +1,287 @@
+"""Documentation of any task as Markdown: the tables of an environment's docstring, from what the task declares.
+
+`rigid_env.envs.block_reach` is the form: Gymnasium's sections in Gymnasium's order.
+"""
+
+from __future__ import annotations
+
+import inspect
+import re
+import textwrap
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from physics.summary import counted
+from rigid_env.tasks.actions import IMPULSE, TORQUE
+from rigid_env.tasks.declaration import Declaration
+from rigid_env.tasks.draws import parameter_of
+from rigid_env.tasks.task import Task
+
+WIDTH = 79  # of lines of text [characters]
+
+ARGUMENTS = {
+    "accuracy": "preset of the engine, or a `physics.Accuracy`",
+    "effects": "`physics` effects besides (`physics.Drag()`, ...), or instead of the task's of that class",
+    "draws": "distributions instead of the task's, by name",
+    "frame_skip": "physics steps per control step",
+    "dt": "physics step [s]",
+    "dump_faults": "folder for what led to a state that was not finite (`rigid-env replay`)",
+    "threads": "threads that share a step of a batch",
+}
+"""Meanings of the arguments that all tasks have."""
+
+OF_ENVIRONMENTS = {
+    "render_mode": '`"rgb_array"`, `"human"` or None',
+    "width": "of pictures [px]",
+    "height": "of pictures [px]",
+    "obs": 'observations: `"state"`, the table above, or `"pixels"`, pictures (uint8)',
+    "obs_size": "height and width of these [px]",
+    "obs_stack": "of the last so many control steps, along the last axis, the newest last",
+}
+"""Meanings of the arguments that environments add."""
+
+PARAMETERS = {
+    "mass": "mass [kg]",
+    "size": "edges or diameters [m]",
+    "friction": "Coulomb coefficient",
+    "restitution": "restitution",
+    "gravity": "strength of gravity [m/s²]",
+}
+"""Meanings of draws that are physical parameters."""
+
+
+@dataclass(frozen=True)
+class Section:
+    """A section of the documentation.
+
+    Attributes
+    ----------
+    title : str
+    before, after : tuple of str
+        Paragraphs around the table.
+    columns : tuple of str
+        Of the table; empty without one.
+    rows : tuple of tuple of str
+    """
+
+    title: str
+    before: tuple[str, ...] = ()
+    columns: tuple[str, ...] = ()
+    rows: tuple[tuple[str, ...], ...] = ()
+    after: tuple[str, ...] = ()
+
+    @property
+    def markdown(self) -> str:
+        """Heading, text and table."""
+        parts = [f"## {self.title}", *map(_wrapped, self.before)]
+        if self.rows:
+            lines = (self.columns, ("---",) * len(self.columns), *self.rows)
+            parts.append(
+                "\n".join(f"| {' | '.join(cell.replace('|', chr(92) + '|') for cell in row)} |" for row in lines)
+            )
+        return "\n\n".join([*parts, *map(_wrapped, self.after)])
+
+    def to_dict(self) -> dict[str, Any]:
+        """The same for JSON."""
+        return {"title": self.title, "text": [*self.before, *self.after], "columns": self.columns, "rows": self.rows}
+
+
+def describe(task: Task) -> str:
+    """Documentation of a task as Markdown; `RigidEnv.describe` gives that of an environment."""
+    return markdown(sections(task))
+
+
+def markdown(found: Iterable[Section]) -> str:
+    """Sections as one text."""
+    return "\n\n".join(section.markdown for section in found) + "\n"
+
+
+def sections(
+    task: Task,
+    documented: type | None = None,
+    added: Mapping[str, Any] | None = None,
+    registered: Mapping[str, Any] | None = None,
+) -> tuple[Section, ...]:
+    """Documentation of a task, section by section.
+
+    Parameters
+    ----------
+    task : Task
+    documented : type, optional
+        Class whose docstring describes the task; None: that of the task.
+    added : mapping, optional
+        Arguments that the environment adds to the task's, with their defaults.
+    registered : mapping, optional
+        Defaults of the id that the environment is registered under, instead of its class's.
+    """
+    return (
+        _description(task, documented or type(task)),
+        _actions(task),
+        _observation(task),
+        _rewards(task),
+        _starts(task),
+        *_disturbances(task),
+        _end(task),
+        _arguments(task, added or {}, registered or {}),
+    )
+
+
+# --- sections ---------------------------------------------------------------------------------------------------------
+
+
+def _description(task: Task, documented: type) -> Section:
+    scene, doc = task.world.scene, inspect.cleandoc(documented.__doc__ or "")
+    bodies = "; ".join(f"{i} {type(body).__name__} of {body.mass:g} kg" for i, body in enumerate(scene.bodies))
+    effects = counted(type(effect).__name__ for effect in scene.effects)
+    text = [*_paragraphs(doc), f"Bodies: {bodies}. Walls: {len(scene.walls)}. Effects: {effects}."]
+    if "## Rewards" in doc:
+        text.append(f"`help({documented.__module__}.{documented.__qualname__})` says more.")
+    return Section("Description", tuple(text))
+
+
+def _actions(task: Task) -> Section:
+    agents = {place: agent for agent, places in task.agents.items() for place in places.tolist()}
+    has_agents, has_bodies = len(task.agents) > 1, task.world.body_count > 1
+    rows: list[tuple[str, ...]] = []
+    for vector in task.action_vectors:
+        where = f" of body {vector.body}" if has_bodies else ""
+        if vector.point is not None:
+            where += f" at ({', '.join(f'{x:g}' for x in vector.point)}) m"
+        for name in vector.names:
+            agent = (agents[len(rows)],) if has_agents else ()
+            rows.append((str(len(rows)), name + where, "-1", "1", vector.unit, *agent))
+    kinds = {vector.kind for vector in task.action_vectors}
+    notes = ["m is the mass of the body, g gravity (9.81 m/s² where there is none)"]
+    notes += ["a the longest half extent of the body"] if TORQUE in kinds else []
+    text = (
+        f"{', '.join(notes)}. Each number is clipped to ±1, then a vector is shortened to length 1 where it is longer."
+    )
+    text += " An impulse acts in the first physics step." if IMPULSE in kinds else ""
+    before = f"`Box(-1, 1, ({task.action_size},), float32)`, held for one control step ({1e3 * task.control_dt:g} ms)."
+    columns = ("Num", "Action", "Min", "Max", "Unit", *(("Agent",) if has_agents else ()))
+    return Section("Action Space", (before,), columns, tuple(rows), (text,))
+
+
+def _observation(task: Task) -> Section:
+    named = [(name, entry) for entry in task.observed.entries for name in entry.names]
+    rows = tuple(
+        (str(k), name, f"{entry.low:.12g}", f"{entry.high:.12g}", entry.told_unit)
+        for k, (name, entry) in enumerate(named)
+    )
+    text = f"`Box` of {len(rows)} float32. Each number is told in its unit and clipped to its bounds."
+    return Section("Observation Space", (text,), ("Num", "Observation", "Min", "Max", "Unit"), rows)
+
+
+def _rewards(task: Task) -> Section:
+    text = "The sum of the terms." if task.terms else "Always 0: the task has no terms."
+    rows = tuple((term, f"`reward_{term}`") for term in task.terms)
+    return Section("Rewards", (*_own_text(task, "rewards"), text), ("Term", "In `info`"), rows)
+
+
+def _starts(task: Task) -> Section:
+    rows = tuple(
+        (f"`{name}`", each.describe(), str(each.length), _meaning(name))
+        for name, each in task.distributions.items()
+        if name in task.own_draws
+    )
+    text = "The same in every episode."
+    if rows:
+        text = (
+            "Each episode draws the values of the table. `reset(options=...)` fixes what it names, for this episode; "
+            "the other draws of a seed stay the same. The `info` of `reset` tells all of them."
+        )
+    return Section("Starting State", (*_own_text(task, "place"), text), ("Option", "Drawn", "Numbers", "Meaning"), rows)
+
+
+def _disturbances(task: Task) -> tuple[Section, ...]:
+    rows = []
+    for kind in task.disturbances:
+        if hasattr(kind, "speed"):
+            size = f"speed {kind.speed.describe()} m/s"
+        else:
+            size = f"force {kind.force.describe()} m g, lasts {kind.lasts.describe()} s"
+        rows.append((type(kind).__name__, str(kind.body), size, kind.axes, f"{kind.every:g} s"))
+    text = "Pushes and gusts come at random times, exponentially distributed."
+    columns = ("Kind", "Body", "Size", "Axes", "Mean wait")
+    return (Section("Disturbances", (text,), columns, tuple(rows)),) if rows else ()
+
+
+def _end(task: Task) -> Section:
+    ends = [name for name in ("success", "failure") if getattr(type(task), name) is not getattr(Declaration, name)]
+    text = f"Termination: {' and '.join(f'on {name}' for name in ends) or 'never'}."
+    if task.compiled is not None:
+        text = "Termination: on success and on failure, as the compiled function decides."
+    own = (paragraph for name in ends for paragraph in _own_text(task, name))
+    steps = task.max_episode_steps
+    limit = (
+        "none" if steps is None else f"after {steps} control steps ({steps * task.control_dt:g} s), by `gymnasium.make`"
+    )
+    keys = [("is_success", "whether the task is solved"), *((name, "measured by the task") for name in task.measures)]
+    keys += [(f"reward_{term}", "term of the reward") for term in task.terms]
+    keys += [("physics_status", "a `physics.Status`: 0 when nothing went wrong")]
+    rows = tuple((f"`{key}`", meaning) for key, meaning in keys)
+    return Section("Episode End", (" ".join([text, *own]), f"Truncation: {limit}."), ("In `info`", "Meaning"), rows)
+
+
+def _arguments(task: Task, added: Mapping[str, Any], registered: Mapping[str, Any]) -> Section:
+    kind = type(task)
+    known = {
+        name: parameter.default
+        for name, parameter in inspect.signature(kind.__init__).parameters.items()
+        if name not in ("self", "worlds")
+    }
+    meanings = {**{name: _argument_text(kind, name) for name in known}, **ARGUMENTS, **OF_ENVIRONMENTS}
+    defaults = {**known, **added}
+    rows = tuple((f"`{name}`", _default(registered.get(name, defaults[name])), meanings[name]) for name in defaults)
+    return Section("Arguments", (), ("Argument", "Default", "Meaning"), rows)
+
+
+# --- parts of these ---------------------------------------------------------------------------------------------------
+
+
+def _meaning(name: str) -> str:
+    """Meaning of a draw, with its unit where it is a physical parameter."""
+    found = parameter_of(name)
+    if found is None:
+        return "the task's own"
+    parameter, body = found
+    return PARAMETERS[parameter] + ("" if body is None else f" of body {body}")
+
+
+def _argument_text(kind: type, name: str) -> str:
+    """Meaning of an argument: of a draw of its name, or of the docstrings' ``Parameters``."""
+    if parameter_of(name):
+        return _meaning(name)
+    for owner in kind.__mro__:
+        doc = inspect.cleandoc(owner.__doc__ or "")
+        parts = re.search(r"^Parameters\n-+\n(.*?)(?=\n\w+\n-+\n|\n## |\Z)", doc, re.DOTALL | re.MULTILINE)
+        for names, text in re.findall(
+            r"^(\S[^:\n]*?)(?: :.*)?\n((?: {4}.*\n?)+)", parts[1] if parts else "", re.MULTILINE
+        ):
+            if name in names.split(", "):
+                return " ".join(text.split())
+    return ""
+
+
+def _default(value: Any) -> str:
+    if value is inspect.Parameter.empty:
+        return "required"
+    return f'`"{value}"`' if isinstance(value, str) else repr(value)
+
+
+def _own_text(task: Task, name: str) -> tuple[str, ...]:
+    """First paragraph of the docstring of a function that the task defines itself."""
+    function = getattr(type(task), name)
+    doc = function.__doc__ if function is not getattr(Declaration, name) else None
+    return tuple(_paragraphs(inspect.cleandoc(doc))[:1]) if doc else ()
+
+
+def _paragraphs(doc: str) -> list[str]:
+    """Paragraphs of a docstring before its first heading."""
+    head = re.split(r"^(?:## .*|\w+\n-+)$", doc, maxsplit=1, flags=re.MULTILINE)[0]
+    return [" ".join(part.split()) for part in head.split("\n\n") if part.strip()]
+
+
+def _wrapped(text: str) -> str:
+    return textwrap.fill(text, WIDTH, break_long_words=False, break_on_hyphens=False)

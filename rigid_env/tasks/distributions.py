@@ -1,0 +1,339 @@
+"""Distributions that the start of an episode draws from: each turns uniform numbers into values.
+
+A distribution takes a fixed number of uniform numbers, whatever the values are. An episode draws them all at once from
+the generator of its world, so that fixing one value, or replacing one distribution, leaves the others of a seed alone.
+"""
+
+from __future__ import annotations
+
+import reprlib
+from abc import ABC, abstractmethod
+from collections.abc import Mapping
+
+import numpy as np
+from scipy.special import ndtr, ndtri
+
+LAST = float(np.nextafter(1.0, 0.0))
+"""Largest uniform number."""
+
+DEVIATIONS = 5.0
+"""Standard deviations from the mean at which a normal distribution is cut off."""
+
+Drawn = Mapping[str, np.ndarray]
+"""Values drawn before, by name: (n,) or (n, k) float64."""
+
+
+class Distribution(ABC):
+    """Values of one name in every new episode.
+
+    Attributes
+    ----------
+    length : int
+        Numbers in one value: 1 for (n,) arrays, else (n, length).
+    uniforms : int
+        Uniform numbers that one value takes.
+    """
+
+    length: int
+    uniforms: int
+
+    @abstractmethod
+    def at(self, shares: np.ndarray, drawn: Drawn) -> np.ndarray:
+        """Turn uniform numbers into values.
+
+        Parameters
+        ----------
+        shares : (n, uniforms) float64
+            In [0, 1).
+        drawn : mapping of str to array
+            Values that stand before this one in the task's `draws`; physical parameters stand before all others.
+
+        Returns
+        -------
+        (n,) or (n, length) float64
+        """
+
+    @abstractmethod
+    def describe(self) -> str:
+        """Text for a table, such as ``uniform from 0 to 1``."""
+
+    @property
+    def is_fixed(self) -> bool:
+        """True if there is nothing to draw."""
+        return False
+
+    def ends(self) -> np.ndarray:
+        """(2,) or (2, length) values of the least and the largest uniform numbers."""
+        return np.stack([self.at(np.full((1, self.uniforms), share), {})[0] for share in (0.0, LAST)])
+
+    def read(self, field: str, value, worlds: int) -> np.ndarray:
+        """Check what a user gives in place of a draw.
+
+        Parameters
+        ----------
+        field : str
+            Name in an error.
+        value : array_like
+            One value for all worlds, or one for each.
+        worlds : int
+
+        Returns
+        -------
+        (worlds,) or (worlds, length) float64
+
+        Raises
+        ------
+        ValueError
+            Naming the field, the value and what is allowed.
+        """
+        return read_numbers(field, value, worlds, self.length)
+
+
+def read_numbers(field: str, value, worlds: int, length: int) -> np.ndarray:
+    """(worlds,) for a length of 1, else (worlds, length): finite numbers, from one for all worlds or one for each."""
+    shape = (worlds,) if length == 1 else (worlds, length)
+    try:
+        array = np.asarray(value)
+    except ValueError:  # rows of different lengths
+        array = np.asarray(None)
+    if array.dtype.kind not in "fiu" or array.shape not in (shape, shape[1:]):
+        one = "a number" if length == 1 else f"{length} numbers"
+        each = f", or as much for each of {worlds} worlds" if worlds > 1 else ""
+        raise ValueError(f"{field} is {reprlib.repr(value)}; allowed is {one}{each}")
+    array = array.astype(np.float64)
+    if not np.isfinite(array).all():
+        raise ValueError(f"{field} is {reprlib.repr(value)}; allowed are finite numbers")
+    return np.broadcast_to(array, shape)
+
+
+class _Elementwise(Distribution):
+    """A distribution with one uniform number for each number of a value."""
+
+    def _set(self, name: str, **ends) -> None:
+        """Keep parameters as arrays of one shape: () or (k,)."""
+        arrays = {}
+        for field, value in ends.items():
+            try:
+                array = np.asarray(value, dtype=np.float64)
+            except (TypeError, ValueError):
+                array = np.array(np.nan)
+            if array.ndim > 1 or not np.isfinite(array).all():
+                raise ValueError(f"{field} of {name} is {value!r}; allowed are a finite number and a row of such")
+            arrays[field] = array
+        try:
+            spread = np.broadcast_arrays(*arrays.values())
+        except ValueError:
+            raise ValueError(f"{name} has {ends}; allowed are ends of one length") from None
+        for field, array in zip(arrays, spread):
+            setattr(self, field, np.array(array))
+        self.length = self.uniforms = 1 if spread[0].ndim == 0 else len(spread[0])
+
+    def _row(self, shares: np.ndarray) -> np.ndarray:
+        return shares[:, 0] if self.length == 1 and self.is_scalar else shares
+
+    @property
+    def is_scalar(self) -> bool:
+        """True if a value is a number, not a row of one."""
+        return self._first.ndim == 0
+
+    @property
+    def _first(self) -> np.ndarray:
+        return next(value for value in vars(self).values() if isinstance(value, np.ndarray))
+
+
+class Uniform(_Elementwise):
+    """Numbers between two ends, each as likely as the other.
+
+    Parameters
+    ----------
+    low, high : number or (k,) numbers
+        k numbers make a value a row of k, drawn independently.
+
+    Raises
+    ------
+    ValueError
+        Ends that are not finite, of different lengths, or the wrong way round.
+    """
+
+    def __init__(self, low, high):
+        self._set("Uniform", low=low, high=high)
+        if not (self.low <= self.high).all():
+            raise ValueError(f"Uniform has low {low!r} and high {high!r}; allowed is low at most high")
+
+    @property
+    def is_fixed(self) -> bool:
+        return bool((self.low == self.high).all())
+
+    def at(self, shares, drawn):
+        return self.low + (self.high - self.low) * self._row(shares)
+
+    def describe(self) -> str:
+        return f"{_text(self.low)}" if self.is_fixed else f"uniform from {_text(self.low)} to {_text(self.high)}"
+
+    def __repr__(self) -> str:
+        return f"Uniform({_text(self.low)}, {_text(self.high)})"
+
+
+class LogUniform(_Elementwise):
+    """Numbers between two positive ends whose logarithm is uniform.
+
+    Parameters
+    ----------
+    low, high : number or (k,) numbers
+        Above 0.
+
+    Raises
+    ------
+    ValueError
+        Ends that are not finite and positive, of different lengths, or the wrong way round.
+    """
+
+    def __init__(self, low, high):
+        self._set("LogUniform", low=low, high=high)
+        if not ((self.low > 0.0) & (self.low <= self.high)).all():
+            raise ValueError(f"LogUniform has low {low!r} and high {high!r}; allowed is 0 < low <= high")
+
+    @property
+    def is_fixed(self) -> bool:
+        return bool((self.low == self.high).all())
+
+    def at(self, shares, drawn):
+        return self.low * (self.high / self.low) ** self._row(shares)
+
+    def describe(self) -> str:
+        return f"log-uniform from {_text(self.low)} to {_text(self.high)}"
+
+    def __repr__(self) -> str:
+        return f"LogUniform({_text(self.low)}, {_text(self.high)})"
+
+
+class Normal(_Elementwise):
+    """Normal numbers, cut off at two ends: drawn by the inverse of the distribution between them.
+
+    Parameters
+    ----------
+    mean : number or (k,) numbers
+    deviation : number or (k,) numbers
+        Standard deviation before the cut, above 0.
+    low, high : number or (k,) numbers, optional
+        Ends; by default five deviations from the mean, since a uniform number of 0 has no finite value otherwise.
+
+    Raises
+    ------
+    ValueError
+        Numbers that are not finite, a deviation that is not positive, or ends the wrong way round.
+    """
+
+    def __init__(self, mean, deviation, low=None, high=None):
+        ends = {"low": 0.0 if low is None else low, "high": 0.0 if high is None else high}
+        self._set("Normal", mean=mean, deviation=deviation, **ends)
+        if low is None:
+            self.low = self.mean - DEVIATIONS * self.deviation
+        if high is None:
+            self.high = self.mean + DEVIATIONS * self.deviation
+        if not (self.deviation > 0.0).all():
+            raise ValueError(f"deviation of Normal is {deviation!r}; allowed are numbers above 0")
+        if not (self.low < self.high).all():
+            raise ValueError(f"Normal has low {low!r} and high {high!r}; allowed is low below high")
+        self._ends = tuple(ndtr((end - self.mean) / self.deviation) for end in (self.low, self.high))
+
+    def at(self, shares, drawn):
+        low, high = self._ends
+        values = self.mean + self.deviation * ndtri(low + (high - low) * self._row(shares))
+        return np.clip(values, self.low, self.high)
+
+    def describe(self) -> str:
+        return (
+            f"normal, mean {_text(self.mean)}, deviation {_text(self.deviation)}, "
+            f"from {_text(self.low)} to {_text(self.high)}"
+        )
+
+    def __repr__(self) -> str:
+        return f"Normal({', '.join(map(_text, (self.mean, self.deviation, self.low, self.high)))})"
+
+
+class Choice(Distribution):
+    """One of several values, each as likely as the other.
+
+    Parameters
+    ----------
+    values : sequence of numbers, or of rows of k numbers
+
+    Raises
+    ------
+    ValueError
+        No values, or values that are not finite numbers of one length.
+    """
+
+    uniforms = 1
+
+    def __init__(self, values):
+        try:
+            array = np.asarray(list(values), dtype=np.float64)
+        except (TypeError, ValueError):
+            array = np.empty(0)
+        if array.ndim not in (1, 2) or len(array) == 0 or not np.isfinite(array).all():
+            raise ValueError(f"values of Choice is {values!r}; allowed are numbers, or rows of one length")
+        self.values = array
+        self.length = 1 if array.ndim == 1 else array.shape[1]
+
+    @property
+    def is_fixed(self) -> bool:
+        return len(self.values) == 1
+
+    def at(self, shares, drawn):
+        return self.values[(len(self.values) * shares[:, 0]).astype(np.int64)]
+
+    def read(self, field, value, worlds):
+        array = super().read(field, value, worlds)
+        rows = array.reshape(worlds, -1)
+        if not (rows[:, None] == self.values.reshape(len(self.values), -1)).all(axis=2).any(axis=1).all():
+            raise ValueError(f"{field} is {reprlib.repr(value)}; allowed are {self.values.tolist()}")
+        return array
+
+    def describe(self) -> str:
+        return f"one of {self.values.tolist()}"
+
+    def __repr__(self) -> str:
+        return f"Choice({self.values.tolist()})"
+
+
+def as_distribution(field: str, value, length: int | None = None) -> Distribution:
+    """Turn what a user gives for a name into a distribution.
+
+    Parameters
+    ----------
+    field : str
+        Name in an error.
+    value : Distribution, number, row of numbers, or a pair (low, high) of either
+        A pair is a uniform range. A row of two numbers means a pair, unless `length` is 2.
+    length : int, optional
+        Numbers in one value, where it is known.
+
+    Raises
+    ------
+    ValueError
+        Naming the field, the value and what is allowed.
+    """
+    if isinstance(value, Distribution):
+        if length is not None and value.length != length:
+            raise ValueError(f"{field} is {value!r}, of {value.length} numbers; allowed are {length}")
+        return value
+    try:
+        array = np.asarray(value, dtype=np.float64)
+    except (TypeError, ValueError):
+        array = np.empty((0, 0, 0))
+    row = () if length in (1, None) else (length,)
+    if array.shape == (2, *row) or (length is None and array.ndim == 2 and len(array) == 2):
+        if not (array[0] <= array[1]).all():
+            raise ValueError(f"{field} is {value!r}; allowed is a pair (low, high) with low at most high")
+        return Uniform(array[0], array[1])
+    if array.shape == row or (length is None and array.ndim == 1):
+        return Uniform(array, array)
+    one = "a number" if row == () else f"{length} numbers"
+    raise ValueError(f"{field} is {value!r}; allowed is {one}, a pair (low, high) of such, or a distribution")
+
+
+def _text(value) -> str:
+    array = np.asarray(value)
+    return f"{float(array):g}" if array.ndim == 0 else "(" + ", ".join(f"{x:g}" for x in array) + ")"

@@ -1,0 +1,196 @@
+"""Disturbances: pushes and gusts at random times, which the agent does not choose.
+
+Waiting times are exponential, so that the time since the last disturbance tells nothing about the next one. All random
+numbers come from the generator of the world that is disturbed.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from physics import validation
+from rigid_env.tasks.actions import check_axes, check_body
+from rigid_env.tasks.distributions import Distribution, as_distribution
+
+UNIFORMS = 5  # of one disturbance: direction (2), size (1), duration (1), wait (1)
+
+
+@dataclass(frozen=True)
+class Push:
+    """An impulse at the centre of mass, at random times.
+
+    Parameters
+    ----------
+    body : int
+    speed : number, pair or Distribution
+        Change of the body's speed [m/s].
+    every : float
+        Mean time between two [s].
+    axes : str
+        Axes that span the directions, each as likely as the other: ``xz`` is horizontal.
+
+    Raises
+    ------
+    ValueError
+        Naming the field, the value and what is allowed.
+    """
+
+    body: int = 0
+    speed: Distribution | float | tuple[float, float] = (0.0, 1.0)
+    every: float = 2.0
+    axes: str = "xz"
+
+    def __post_init__(self):
+        check_body(self.body)
+        validation.positive(self.every, (), "every")
+        check_axes("axes", self.axes)
+        _take_size(self, "speed")
+
+
+@dataclass(frozen=True)
+class Gust:
+    """A force at the centre of mass that lasts for a while, at random times.
+
+    Parameters
+    ----------
+    body : int
+    force : number, pair or Distribution
+        Force over the body's weight.
+    lasts : number, pair or Distribution
+        Duration [s].
+    every : float
+        Mean time from the end of one to the start of the next [s].
+    axes : str
+        As of `Push`.
+
+    Raises
+    ------
+    ValueError
+        Naming the field, the value and what is allowed.
+    """
+
+    body: int = 0
+    force: Distribution | float | tuple[float, float] = (0.0, 0.3)
+    lasts: Distribution | float | tuple[float, float] = (0.2, 1.0)
+    every: float = 3.0
+    axes: str = "xz"
+
+    def __post_init__(self):
+        check_body(self.body)
+        validation.positive(self.every, (), "every")
+        check_axes("axes", self.axes)
+        _take_size(self, "force")
+        _take_size(self, "lasts")
+
+
+def _take_size(kind: Push | Gust, field: str) -> None:
+    """Make a field a distribution of numbers that are not negative."""
+    value = getattr(kind, field)
+    sizes = as_distribution(field, value, 1)
+    if (sizes.ends() < 0.0).any():
+        raise ValueError(f"{field} is {value!r}; allowed are numbers of at least 0")
+    object.__setattr__(kind, field, sizes)
+
+
+def direction(shares: np.ndarray, axes: str) -> np.ndarray:
+    """(3,) unit vector from two uniform numbers, each direction along the `axes` as likely as the other."""
+    vector = np.zeros(3)
+    places = ["xyz".index(axis) for axis in axes]
+    if len(places) == 1:
+        vector[places] = 1.0 if shares[0] < 0.5 else -1.0
+    elif len(places) == 2:
+        turn = 2.0 * math.pi * shares[0]
+        vector[places] = math.cos(turn), math.sin(turn)
+    else:  # Archimedes: the height of a uniform point of a sphere is uniform
+        height, turn = 2.0 * shares[1] - 1.0, 2.0 * math.pi * shares[0]
+        radius = math.sqrt(max(0.0, 1.0 - height * height))
+        vector[:] = radius * math.cos(turn), radius * math.sin(turn), height
+    return vector
+
+
+class Disturbances:
+    """All disturbances of a batch, and when the next ones come.
+
+    Parameters
+    ----------
+    kinds : sequence of Push and Gust
+    task : Task
+
+    Attributes
+    ----------
+    next : (kinds, worlds) float64
+        Time in the episode at which the next one starts [s].
+    end : (kinds, worlds) float64
+        Time at which the present one ends [s].
+    force : (kinds, worlds, 3) float64
+        Of the present one [N].
+
+    Raises
+    ------
+    ValueError
+        Something that is no disturbance, or a body that is not there.
+    """
+
+    def __init__(self, kinds, task):
+        self.kinds, self._task = tuple(kinds) if isinstance(kinds, (list, tuple)) else (kinds,), task
+        for kind in self.kinds:
+            if not isinstance(kind, (Push, Gust)):
+                raise ValueError(f"disturbances holds {kind!r}; allowed are Push and Gust")
+            if kind.body >= task.world.body_count:
+                raise ValueError(f"body of {kind!r} is {kind.body}; allowed are 0 to {task.world.body_count - 1}")
+        shape = (len(self.kinds), task.worlds)
+        self.next, self.end, self.force = np.full(shape, np.inf), np.zeros(shape), np.zeros((*shape, 3))
+
+    @property
+    def arrays(self) -> dict[str, np.ndarray]:
+        """All that decides what comes, the generators apart: views with the worlds first."""
+        return {
+            "disturbance start": self.next.swapaxes(0, 1), "disturbance end": self.end.swapaxes(0, 1),
+            "disturbance force": self.force.swapaxes(0, 1),
+        }  # fmt: skip
+
+    def begin(self, rows: np.ndarray) -> None:
+        """Draw the first disturbances of episodes that begin in worlds `rows`."""
+        for k, kind in enumerate(self.kinds):
+            self.force[k, rows] = self.end[k, rows] = 0.0
+            self.next[k, rows] = [self._wait(kind, self._task.generators[world].random()) for world in rows]
+
+    def due(self) -> np.ndarray:
+        """(n,) int64. Worlds in which a disturbance starts in the coming control step."""
+        time = self._task.steps * self._task.control_dt
+        return np.flatnonzero((self.next <= time).any(axis=0))
+
+    def act(self, wrench: np.ndarray, kick: np.ndarray) -> None:
+        """Add what acts in the coming control step to wrenches and to those of its first physics step."""
+        task = self._task
+        time = task.steps * task.control_dt
+        for k, kind in enumerate(self.kinds):
+            due = np.flatnonzero(self.next[k] <= time)
+            for world in due:
+                self._draw(k, kind, world, time[world])
+            if isinstance(kind, Push):
+                kick[due, kind.body, :3] += self.force[k, due]
+            else:
+                acting = self.end[k] > time
+                wrench[:, kind.body, :3] += np.where(acting[:, None], self.force[k], 0.0)
+
+    def _draw(self, k: int, kind: Push | Gust, world: int, time: float) -> None:
+        task = self._task
+        shares = task.generators[world].random(UNIFORMS)
+        along = direction(shares[:2], kind.axes)
+        one = shares[2:3, None]
+        if isinstance(kind, Push):
+            inv_mass = task.inv_mass(world, kind.body)
+            self.force[k, world] = kind.speed.at(one, {})[0] / inv_mass / task.world.dt * along
+            start = time
+        else:
+            self.force[k, world] = kind.force.at(one, {})[0] * task.weights[world, kind.body] * along
+            start = self.end[k, world] = time + kind.lasts.at(shares[3:4, None], {})[0]
+        self.next[k, world] = start + self._wait(kind, shares[4])
+
+    @staticmethod
+    def _wait(kind: Push | Gust, share: float) -> float:
+        return -kind.every * math.log1p(-share)

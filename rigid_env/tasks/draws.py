@@ -1,0 +1,183 @@
+"""Values of the episodes: drawn at their start, fixed by an option, or held at a value from outside."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from difflib import get_close_matches
+
+import numpy as np
+
+from physics.world.world import World
+from rigid_env.tasks.distributions import Distribution
+from rigid_env.tasks.parameters import CHECKS, LENGTHS
+
+NEAR = 0.8
+"""Likeness from which on a name is taken for a misspelt one."""
+
+DOWN = (0.0, -1.0, 0.0)
+"""Direction of gravity in a world that has had none."""
+
+_PARAMETER = re.compile(rf"({'|'.join(LENGTHS)})(?:\[(\d+)\])?$")
+
+
+def parameter_of(name: str) -> tuple[str, int | None] | None:
+    """Physical parameter that a name means, and its body (None: all); None if it is a name of the task's own."""
+    found = _PARAMETER.match(name)
+    return None if found is None else (found[1], None if found[2] is None else int(found[2]))
+
+
+class Draws:
+    """Values in every world of a batch, by name.
+
+    Parameters
+    ----------
+    distributions : mapping of str to Distribution
+        The names ``mass``, ``size``, ``friction``, ``restitution`` and ``gravity`` mean physical parameters of all
+        bodies, ``mass[1]`` that of body 1 alone.
+    worlds : int
+
+    Attributes
+    ----------
+    now : dict of str to (worlds,) or (worlds, k) float64
+        Of the running episodes; values at the middle of each distribution before the first.
+    uniforms : int
+        Uniform numbers that an episode takes.
+    held : dict of str to (worlds,) or (worlds, k) float64
+        Values that are held, in place of draws.
+    varying : set of str
+        Physical parameters that the world is told of at the start of an episode; the others never differ from its
+        scene.
+    """
+
+    def __init__(self, distributions: Mapping[str, Distribution], worlds: int):
+        self.distributions = dict(distributions)
+        ends = np.cumsum([0, *(each.uniforms for each in self.distributions.values())]).tolist()
+        self._places = {name: slice(*pair) for name, *pair in zip(self.distributions, ends, ends[1:])}
+        self.uniforms = ends[-1]
+        self.parameters = [name for name in self.distributions if parameter_of(name)]
+        self._order = [*self.parameters, *(name for name in self.distributions if name not in self.parameters)]
+        self.held: dict[str, np.ndarray] = {}
+        self.varying = {name for name in self.parameters if not self.distributions[name].is_fixed}
+        middle = self.draw(np.arange(worlds), np.full((worlds, self.uniforms), 0.5), {})
+        self.now = {name: np.array(values, dtype=np.float64) for name, values in middle.items()}
+
+    def draw(self, rows: np.ndarray, shares: np.ndarray, options: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
+        """Values of new episodes; nothing is changed.
+
+        Parameters
+        ----------
+        rows : (n,) int64
+            Worlds.
+        shares : (n, uniforms) float64
+            In [0, 1).
+        options : mapping
+            Of `read_options`: takes the place of what is drawn or held.
+
+        Returns
+        -------
+        dict of str to (n,) or (n, k) float64
+        """
+        values: dict[str, np.ndarray] = {}
+        for name in self._order:
+            if name in options:
+                values[name] = options[name].copy()
+            elif name in self.held:
+                values[name] = self.held[name][rows]
+            else:
+                values[name] = self.distributions[name].at(shares[:, self._places[name]], values)
+        return values
+
+    def begin(self, rows: np.ndarray, values: Mapping[str, np.ndarray], options: Mapping[str, np.ndarray]) -> None:
+        """Note the values of new episodes."""
+        for name, value in values.items():
+            self.now[name][rows] = value
+        self.varying.update(name for name in self.parameters if name in options)
+
+    def hold(self, name: str, values: np.ndarray | None) -> None:
+        """Hold a value, (worlds,) or (worlds, k), in later episodes, a parameter from now on; None: draw it again."""
+        if values is None:
+            self.held.pop(name, None)
+            return
+        self.held[name] = np.array(values)
+        if name in self.parameters:
+            self.now[name][...] = values
+            self.varying.add(name)
+
+    def read(self, name: str, field: str, value, worlds: int) -> np.ndarray:
+        """Check a value given from outside; see `Distribution.read`. `field` is its name in an error."""
+        values = self.distributions[name].read(field, value, worlds)
+        parameter = parameter_of(name)
+        if parameter is not None:
+            CHECKS[parameter[0]](values, values.shape, field)
+        return values
+
+
+def world_arguments(values: Mapping[str, np.ndarray], before: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
+    """Arguments of `World.set_parameters` from values of physical parameters.
+
+    Parameters
+    ----------
+    values : mapping of str to (n,) or (n, k) array
+        By names such as ``mass`` and ``mass[1]``.
+    before : mapping of str to (n, bodies) or (n, bodies, 3) array
+        What the bodies have now, by parameter; gravity (n, 3), as a vector [m/s²].
+    """
+    arguments: dict[str, np.ndarray] = {}
+    for name, value in values.items():
+        parameter, body = parameter_of(name)
+        if parameter == "gravity":
+            strength = np.linalg.norm(before["gravity"], axis=1, keepdims=True)
+            is_on = strength > 0.0
+            down = np.where(is_on, before["gravity"] / np.where(is_on, strength, 1.0), DOWN)
+            arguments[parameter] = value[:, None] * down
+            continue
+        table = arguments.setdefault(parameter, before[parameter].copy())
+        if body is None:
+            table[...] = value[:, None]
+        else:
+            table[:, body] = value
+    return arguments
+
+
+def check_draws(task: str, distributions: Mapping[str, Distribution], world: World) -> None:
+    """Refuse physical parameters that the scene has no use for, or that are out of range.
+
+    Parameters
+    ----------
+    task : str
+        Its name.
+    distributions : mapping
+    world : physics.World
+
+    Raises
+    ------
+    ValueError
+        Naming the draw, the value and what is allowed.
+    """
+    needs = {
+        "friction": (world.plan.friction, "physics.Friction(...)"),
+        "restitution": (world.plan.restitution, "physics.Contact(restitution=...)"),
+        "gravity": (world.plan.gravity, "physics.Gravity(...)"),
+    }
+    for name, distribution in distributions.items():
+        parameter = parameter_of(name)
+        if parameter is None:
+            near = get_close_matches(name.lower(), LENGTHS, 1, NEAR)
+            if near:
+                raise ValueError(f"draws of {task} has {name!r}, which is no {near[0]!r}; allowed is another name")
+            continue
+        kind, body = parameter
+        is_on, effect = needs.get(kind, (True, ""))
+        if not is_on:
+            raise ValueError(
+                f"draws of {task} has {name!r}, but its scene does not declare it; add {effect} to its effects"
+            )
+        if body is not None:
+            if kind == "gravity" or body >= world.body_count:
+                bodies = f"bodies 0 to {world.body_count - 1}, and gravity is of all"
+                raise ValueError(f"draws of {task} has {name!r}; allowed are {bodies}")
+            if kind in distributions:
+                raise ValueError(f"draws of {task} has {kind!r} and {name!r}; allowed is one of the two")
+        ends = distribution.ends()
+        CHECKS[kind](ends, ends.shape, f"draws {name} of {task}")

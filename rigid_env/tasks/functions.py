@@ -1,0 +1,171 @@
+"""NumPy functions of a task: called once in a control step, looked at, and written into the batch."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+
+import numpy as np
+
+from rigid_env.tasks import layout as col
+from rigid_env.tasks.before import Before
+from rigid_env.tasks.named import Named
+from rigid_env.tasks.worlds import Worlds
+
+
+class Functions:
+    """Calls of the functions of a task that has no compiled one.
+
+    Each function is called once when this is made, in a world at its start, so that a mistake shows at once.
+
+    Parameters
+    ----------
+    task : Task
+        Gets the names of its `measures` and `terms` by the first calls.
+    is_first : bool
+        False: the names are there, as in a copy.
+
+    Raises
+    ------
+    ValueError
+        A function gives what it may not: names the function, the value and what is allowed.
+    """
+
+    def __init__(self, task, is_first: bool = True):
+        self.task, self._name = task, type(task).__name__
+        self._entries = task.observed.entries
+        unread = [entry.names[0] for entry in self._entries if entry.read is None]
+        if unread:
+            raise ValueError(
+                f"read of entry {unread[0]!r} is None; allowed is a function of Worlds, or a compiled task"
+            )
+        self._all = Worlds(task)
+        if is_first:
+            self._rehearse()
+        self._outcome = np.zeros((task.worlds, col.INFO + len(task.measures) + len(task.terms)))
+        if is_first:
+            task.set_outcome(np.zeros_like(self._outcome))
+        self._obs = np.zeros_like(task.obs)
+        self._before = Before(task)
+
+    def _rehearse(self) -> None:
+        """Call each function once, for two rows of world 0, so that no shape fits by chance."""
+        task, before = self.task, self.task.world.snapshot()
+        task.move(np.zeros(1, dtype=np.int64), {name: values[:1] for name, values in task.drawn.items()}, {})
+        worlds = Worlds(task, np.zeros(2, dtype=np.int64))
+        self._measure(worlds)
+        task.begin(worlds)
+        terms = self._look(worlds)
+        task.measures, task.terms = tuple(map(str, worlds.measured)), tuple(map(str, terms))
+        out = np.zeros((2, col.INFO + len(terms) + len(worlds.measured)))
+        self._fill("measure", worlds.measured, task.measures, out, col.INFO)
+        self._fill("rewards", terms, task.terms, out, col.INFO)
+        try:
+            task.observed.read(worlds, np.empty((2, task.obs.shape[1]), dtype=np.float32))
+        except (IndexError, KeyError) as error:
+            parts = f"{task.world.body_count} bodies and {len(task.world.walls)} walls"
+            told = f"observation of {self._name} ends with {type(error).__name__}: {error}"
+            raise ValueError(f"{told}; allowed are parts of its scene, {parts}") from error
+        finally:
+            task.world.restore(before)
+
+    def begin(self, rows: np.ndarray) -> None:
+        """Observe worlds `rows` (n,) in which episodes begin."""
+        task = self.task
+        worlds = Worlds(task, rows)
+        self._measure(worlds)
+        task.begin(worlds)
+        outcome = np.zeros((len(rows), self._outcome.shape[1]))
+        self._fill("measure", worlds.measured, task.measures, outcome, col.INFO)
+        obs = np.empty((len(rows), task.obs.shape[1]), dtype=np.float32)
+        task.observed.read(worlds, obs)
+        self._check_finite(outcome, obs, rows)
+        for name, values in worlds.memory.items():
+            task.memory_arrays[name][rows] = values
+        task.outcome[rows], task.obs[rows] = outcome, obs
+
+    def step(self, actions: np.ndarray) -> None:
+        """Move all worlds and look at them; after an error nothing has changed."""
+        task = self.task
+        self._before.keep()
+        try:
+            task.previous_action[...] = task.action
+            np.maximum(actions, -1.0, out=task.action)
+            np.minimum(task.action, 1.0, out=task.action)
+            task.act()
+            self._conclude()
+        except BaseException:  # of an interrupt, too
+            self._before.put_back()
+            raise
+
+    def _conclude(self) -> None:
+        task, worlds, outcome = self.task, self._all, self._outcome
+        worlds.renew()
+        terms = self._look(worlds)
+        first = col.INFO + len(task.measures)
+        self._fill("measure", worlds.measured, task.measures, outcome, col.INFO)
+        self._fill("rewards", terms, task.terms, outcome, first)
+        outcome[:, first:].sum(axis=1, out=outcome[:, col.REWARD])
+        outcome[:, col.SUCCESS], outcome[:, col.FAILURE] = worlds.success, worlds.failure
+        task.observed.read(worlds, self._obs)
+        self._check_finite(outcome, self._obs, worlds.indices)
+        task.outcome[...], task.obs[...] = outcome, self._obs
+
+    def _look(self, worlds: Worlds) -> Mapping:
+        """Call the functions that look at a state, in their order; gives the terms of the reward."""
+        task = self.task
+        self._measure(worlds)
+        task.update(worlds)
+        worlds.success = self._flags("success", task.success(worlds), len(worlds))
+        worlds.failure = self._flags("failure", task.failure(worlds), len(worlds))
+        terms = task.rewards(worlds)
+        self._check_names("rewards", terms)
+        return terms
+
+    def _measure(self, worlds: Worlds) -> None:
+        found = self.task.measure(worlds)
+        self._check_names("measure", found)
+        worlds.measured = Named(found, "measured")
+
+    def _check_names(self, function: str, values) -> None:
+        if type(values) is not dict:
+            raise ValueError(f"{function} of {self._name} gave {values!r}; allowed is a dict of arrays by name")
+
+    def _flags(self, function: str, values, count: int) -> np.ndarray:
+        values = np.asarray(values)
+        if values.shape != (count,) or values.dtype.kind != "b":
+            raise ValueError(
+                f"{function} of {self._name} gave {values.dtype} of shape {values.shape}; allowed are bools of shape "
+                f"({count},), one for each world"
+            )
+        return values
+
+    def _fill(self, function: str, values: Mapping, names: tuple[str, ...], out: np.ndarray, first: int) -> None:
+        """Write numbers by name into columns of `out` from `first` on."""
+        if tuple(values) != names:
+            raise ValueError(
+                f"{function} of {self._name} gave the names {', '.join(map(repr, values))}; allowed are those of its "
+                f"first call, {', '.join(map(repr, names))}, in this order"
+            )
+        shape = (len(out),)
+        for k, (name, value) in enumerate(values.items(), first):
+            if type(value) in (float, int) or (getattr(value, "shape", None) == shape and value.dtype.kind in "fiub"):
+                out[:, k] = value
+                continue
+            given = f"of {value.dtype} in shape {value.shape}" if isinstance(value, np.ndarray) else repr(value)
+            what = f"{name!r} of {function} of {self._name} is {given}"
+            raise ValueError(f"{what}; allowed are numbers of shape {shape}, or one for all")
+
+    def _check_finite(self, outcome: np.ndarray, obs: np.ndarray, indices: np.ndarray) -> None:
+        with np.errstate(invalid="ignore", over="ignore"):
+            total = outcome.sum() + obs.sum()  # not finite if one of the numbers is not
+        if math.isfinite(total) or (np.isfinite(outcome).all() and np.isfinite(obs).all()):
+            return
+        task = self.task
+        names = ["reward", "success", "failure", *task.measures, *(f"reward term {term!r}" for term in task.terms)]
+        names += [f"observation {name!r}" for entry in self._entries for name in entry.names]
+        table = np.concatenate((outcome, obs), axis=1)
+        bad = np.argwhere(~np.isfinite(table))
+        row, column = min(bad.tolist(), key=lambda place: (place[1] == col.REWARD, place))  # the term before the sum
+        what = f"{names[column]} of {self._name} is {table[row, column]} in world {indices[row]}"
+        raise ValueError(f"{what}; allowed are finite numbers")

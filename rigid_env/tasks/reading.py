@@ -1,0 +1,105 @@
+"""Quantities of many worlds that are worked out from their state: rotations, gaps to walls, contact forces.
+
+Compiled, each in one call for all worlds. An array of results has a row for each world of `indices`.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from physics.kernels.compile.decorators import entry_kernel
+from physics.kernels.half_space import support_function as geo
+from physics.kernels.half_space.persistent_contacts import WALL_MEMORY_HEAD
+from physics.kernels.math import quaternion as qt
+from physics.kernels.multibody.data import arrays as many
+from physics.kernels.state import layout as at
+from physics.rotations import rotation_matrices
+from physics.world.world import World
+
+
+@entry_kernel
+def _rotations(indices, state, out):
+    bodies = out.shape[1]
+    for k in range(indices.shape[0]):
+        for b in range(bodies):
+            i = indices[k] * bodies + b
+            R = qt.to_matrix((state[i, at.QUAT], state[i, at.QUAT + 1], state[i, at.QUAT + 2], state[i, at.QUAT + 3]))
+            for j in range(9):
+                out[k, b, j // 3, j % 3] = R[j]
+
+
+@entry_kernel
+def _wall_gaps(indices, state, params, shapes, walls, out):
+    bodies = out.shape[1]
+    for k in range(indices.shape[0]):
+        for b in range(bodies):
+            i = indices[k] * bodies + b
+            R = qt.to_matrix((state[i, at.QUAT], state[i, at.QUAT + 1], state[i, at.QUAT + 2], state[i, at.QUAT + 3]))
+            d = (params[i, at.DIMENSIONS], params[i, at.DIMENSIONS + 1], params[i, at.DIMENSIONS + 2])
+            r = qt.matvec(R, (params[i, at.CENTER], params[i, at.CENTER + 1], params[i, at.CENTER + 2]))
+            x = (state[i, at.POS] + r[0], state[i, at.POS + 1] + r[1], state[i, at.POS + 2] + r[2])
+            for w in range(walls.shape[0]):
+                n = (walls[w, at.WALL_NORMAL], walls[w, at.WALL_NORMAL + 1], walls[w, at.WALL_NORMAL + 2])
+                reach = geo.support(shapes[b], d, geo.scaled_normal(shapes[b], d, R, n))
+                out[k, b, w] = qt.dot(n, x) - walls[w, at.WALL_OFFSET] - reach
+
+
+@entry_kernel
+def _wall_forces(indices, memory, walls, features, out):
+    bodies = out.shape[1]
+    impulses = WALL_MEMORY_HEAD + (memory.shape[1] - WALL_MEMORY_HEAD) // 4
+    for k in range(indices.shape[0]):
+        for b in range(bodies):
+            i = indices[k] * bodies + b
+            for slot in range(int(memory[i, 1])):
+                s = int(memory[i, WALL_MEMORY_HEAD + slot])
+                wall = s // features
+                for j in range(3):
+                    axis = at.WALL_NORMAL + 3 * j
+                    impulse = memory[i, impulses + 3 * s + j] / memory[i, 0]
+                    for c in range(3):
+                        out[k, b, c] += impulse * walls[wall, axis + c]
+
+
+@entry_kernel
+def _all_forces(indices, memory, out):
+    for k in range(indices.shape[0]):
+        i = indices[k]
+        length = memory[i, many.WARM_STAGE_LENGTH]
+        if length == 0.0:  # nothing touched yet
+            continue
+        for c in range(int(memory[i, many.WARM_CONTACT_COUNT])):
+            row = many.WARM_HEADER_SIZE + many.WARM_CONTACT_SIZE * c
+            a, b = int(memory[i, row + many.WARM_BODY_A]), int(memory[i, row + many.WARM_BODY_B])
+            for j in range(3):
+                force = memory[i, row + many.WARM_IMPULSE + j] / length
+                out[k, a, j] += force
+                if b >= 0:
+                    out[k, b, j] -= force
+
+
+def write_rotations(world: World, indices: np.ndarray, out: np.ndarray) -> None:
+    """Rotation matrices, body to world, into `out` (n, bodies, 3, 3)."""
+    _rotations(indices, world.state, out)
+
+
+def write_wall_gaps(world: World, indices: np.ndarray, out: np.ndarray) -> None:
+    """Distances between bodies and walls [m] into `out` (n, bodies, walls); negative inside."""
+    _wall_gaps(indices, world.state, world.params, world.shapes, world.walls, out)
+    for b, body in enumerate(world.scene.bodies):
+        if body.kind == "hull":
+            normals, offsets = world.walls[:, at.WALL_NORMAL : at.WALL_NORMAL + 3], world.walls[:, at.WALL_OFFSET]
+            R = rotation_matrices(world.quat[indices, b])
+            reach = np.einsum("wi,kij,vj->kwv", normals, R, body.polyhedron.vertices).min(axis=-1)
+            out[:, b] = world.pos[indices, b] @ normals.T - offsets + reach
+
+
+def write_contact_forces(world: World, indices: np.ndarray, out: np.ndarray) -> None:
+    """Sums of the contact forces on bodies in the last step [N], world frame, into `out` (n, bodies, 3)."""
+    out[...] = 0.0
+    if not world.plan.contact:
+        return
+    if world.plan.many:
+        _all_forces(indices, world.memory, out)
+    else:
+        _wall_forces(indices, world.memory, world.walls, world.plan.features, out)

@@ -1,0 +1,111 @@
+"""Keys of a table [environment] of a scene file, or arguments of the same names, and errors that tell their place."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+from typing import Any, TypeVar
+
+import numpy as np
+
+import physics
+from physics.io.scene_places import Places
+from physics.keywords import nearest_first
+from physics.summary import shown
+
+T = TypeVar("T")
+
+
+class Section:
+    """Keys and values, each to be checked when it is read.
+
+    Parameters
+    ----------
+    values : mapping
+    name : str
+        In errors, such as ``environment.goal`` of a file or ``goal`` of arguments; "": nothing stands in front.
+    places : Places, optional
+        Lines of the file. None: arguments.
+    """
+
+    def __init__(self, values: Mapping[str, Any], name: str = "", places: Places | None = None):
+        self.values, self.name, self._places = values, name, places
+
+    def __contains__(self, key: str) -> bool:
+        return key in self.values
+
+    def error(self, key: str | None, message: str) -> ValueError:
+        """An error about a key, or about the section itself."""
+        if self._places is not None:
+            return self._places.error_in_table(self.name, key, message)
+        return ValueError(f"{self.name}: {message}" if self.name else message)
+
+    def require_known(self, allowed: Iterable[str]) -> None:
+        """Raise an error about a key that is not `allowed`, if there is one; the nearest allowed stand first."""
+        for key in self.values:
+            if key not in allowed:
+                raise self.error(key, f"{key} is not known; allowed are {', '.join(nearest_first(key, allowed))}")
+
+    def read(self, key: str, check: Callable[[Any, str], T]) -> T:
+        """Value of a key that is there, after `check` (value, key), whose error gets its place."""
+        try:
+            return check(self.values[key], key)
+        except ValueError as error:
+            raise self.error(key, str(error)) from None
+
+    def require(self, key: str, check: Callable[[Any, str], T], needed: str) -> T:
+        """Value of a key that must be there; `needed` says what it is in the error."""
+        if key not in self.values:
+            raise self.error(None, f"{key} is missing; allowed is {needed}")
+        return self.read(key, check)
+
+    def part(self, key: str, allowed: Iterable[str]) -> Section:
+        """Table in this table; its keys are among `allowed`."""
+        name = f"{self.name}.{key}" if self.name else key
+        values = self.values[key]
+        if not isinstance(values, Mapping):
+            what = f"a table [{name}]" if self._places is not None else "a dict"
+            raise self.error(key, f"{key} is {shown(values)}; allowed is {what} with keys of {', '.join(allowed)}")
+        part = Section(values, name, self._places)
+        part.require_known(allowed)
+        return part
+
+
+def body_index(value, field: str, scene: physics.Scene, verb: str = "is") -> int:
+    """Index of a body of a scene, from its name or itself.
+
+    Raises
+    ------
+    ValueError
+        No such body: names the field, the value and the bodies there are, the nearest name first.
+    """
+    names = {body.name: b for b, body in enumerate(scene.bodies) if body.name is not None}
+    if isinstance(value, str) and value in names:
+        return names[value]
+    count = len(scene.bodies)
+    if isinstance(value, (int, np.integer)) and not isinstance(value, bool) and 0 <= value < count:
+        return int(value)
+    raise ValueError(f"{field} {verb} {shown(value)}; allowed are {_bodies(names, count, value)}")
+
+
+def body_indices(value, field: str, scene: physics.Scene) -> tuple[int, ...]:
+    """Indices of bodies, from a list of names and indices, or from one of them; each once, at least one."""
+    given = list(value) if isinstance(value, (list, tuple)) else [value]
+    if not given:
+        raise ValueError(f"{field} is {shown(value)}; allowed is at least one body")
+    found = [body_index(body, field, scene, "holds") for body in given]
+    for k, body in enumerate(found):
+        if body in found[:k]:
+            raise ValueError(f"{field} holds body {body} twice; allowed is each body once")
+    return tuple(found)
+
+
+def told_bodies(scene: physics.Scene) -> str:
+    """Names and indices of a scene's bodies, for errors."""
+    names = [body.name for body in scene.bodies if body.name is not None]
+    return _bodies(names, len(scene.bodies), "")
+
+
+def _bodies(names: Iterable[str], count: int, near: object) -> str:
+    indices = f"indices from 0 to {count - 1}" if count > 1 else "the index 0"
+    ordered = nearest_first(near, names) if isinstance(near, str) else list(names)
+    return f"{', '.join(ordered)}, or {indices}" if ordered else indices

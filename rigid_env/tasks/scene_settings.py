@@ -1,0 +1,215 @@
+"""Settings of the environment of a scene: the table [environment] of its file, or arguments in place of its keys."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+import physics
+from physics import validation
+from physics.io.toml import SceneFile
+from physics.summary import shown
+from rigid_env.tasks.actions import FRAMES
+from rigid_env.tasks.distributions import Uniform, read_numbers
+from rigid_env.tasks.observe import LENGTH, REACH
+from rigid_env.tasks.scene_section import Section, body_index, body_indices, told_bodies
+
+FORCE, TORQUE = 0.9, 0.5
+"""Longest force over a driven body's weight, and longest torque over weight times longest half extent."""
+
+LIMITS = {"force": FORCE, "torque": TORQUE}
+"""Keys of the limits, with their defaults."""
+
+FRAME_SKIP, DT = 5, 0.005
+"""Physics steps per control step, and their length [s]."""
+
+GOAL_SPEED = 0.1
+"""[m/s] At most, where a goal counts as reached."""
+
+KEYS = ("driven", "force", "torque", "frame", "length", "goal", "start", "frame_skip", "dt", "max_episode_steps")
+GOAL_KEYS = ("body", "pos", "low", "high", "tolerance", "speed")
+START_KEYS = ("pos", "linvel", "angvel")
+
+
+class Place(Uniform):
+    """Places that an observation in units of `length` can tell.
+
+    Parameters
+    ----------
+    low, high : (3,) array_like
+        Ends [m].
+    length : float
+        [m].
+    """
+
+    def __init__(self, low, high, length: float):
+        super().__init__(low, high)
+        self.farthest = REACH * length
+
+    def read(self, field, value, worlds):
+        places = read_numbers(field, value, worlds, self.length)
+        _check_near(places, field, self.farthest)
+        return places
+
+
+@dataclass(frozen=True)
+class Goal:
+    """Goal of a scene's environment.
+
+    Attributes
+    ----------
+    body : int
+        Whose centre of mass is to be there.
+    place : Place
+    tolerance : float
+        Farthest from the goal [m].
+    speed : float
+        Largest speed there [m/s].
+    """
+
+    body: int
+    place: Place
+    tolerance: float
+    speed: float
+
+
+@dataclass(frozen=True)
+class Settings:
+    """Settings that `SceneTask` documents; `start` has half widths (3,) of what each body's start may differ by."""
+
+    driven: tuple[int, ...]
+    force: float
+    torque: float
+    frame: str
+    length: float
+    goal: Goal | None
+    start: dict[str, np.ndarray]
+    frame_skip: int
+    dt: float
+    max_episode_steps: int | None
+
+
+class SettingsReader:
+    """Reader of the settings of one scene: each from the arguments where it is given there, else from the file.
+
+    Parameters
+    ----------
+    scene : physics.Scene
+    file : SceneFile or None
+    given : mapping
+        Arguments by the names of `KEYS`; None: not given.
+    """
+
+    def __init__(self, scene: physics.Scene, file: SceneFile | None, given: Mapping[str, Any]):
+        self._scene = scene
+        table = file.others.get("environment", {}) if file is not None else {}
+        self._file = Section(table, "environment", file.places) if file is not None else Section({})
+        self._given = Section({key: value for key, value in given.items() if value is not None})
+
+    def section(self, key: str) -> Section:
+        """Section that a key is taken from."""
+        return self._given if key in self._given else self._file
+
+    def start_error(self, key: str, message: str) -> ValueError:
+        """An error about a key of the starts."""
+        return self.section("start").part("start", START_KEYS).error(key, f"{key}: {message}")
+
+    def settings(self) -> Settings:
+        """All settings.
+
+        Raises
+        ------
+        ValueError
+            Naming file, line and key, the value, and what is allowed.
+        """
+        self._file.require_known(KEYS)
+        driven, length = self._driven(), self._value("length", _positive, LENGTH)
+        force, torque = (self._value(key, _non_negative, default) for key, default in LIMITS.items())
+        if force == torque == 0.0:
+            raise self.section("force").error("force", "force and torque are 0; allowed is at least one above 0")
+        return Settings(
+            driven, force, torque, self._value("frame", _frame, FRAMES[0]), length,
+            goal=self._goal(driven[0], length), start=self._start(),
+            frame_skip=self._value("frame_skip", validation.count, FRAME_SKIP), dt=self._value("dt", _positive, DT),
+            max_episode_steps=self._value("max_episode_steps", validation.count, None),
+        )  # fmt: skip
+
+    def _value(self, key: str, check, default):
+        section = self.section(key)
+        return section.read(key, check) if key in section else default
+
+    def _driven(self) -> tuple[int, ...]:
+        section, scene = self.section("driven"), self._scene
+        if "driven" in section:
+            return section.read("driven", lambda value, key: body_indices(value, key, scene))
+        if len(scene.bodies) == 1:
+            return (0,)
+        raise section.error(None, f"driven is missing; allowed is a list of bodies: {told_bodies(scene)}")
+
+    def _goal(self, driven: int, length: float) -> Goal | None:
+        if "goal" not in self.section("goal"):
+            return None
+        part = self.section("goal").part("goal", GOAL_KEYS)
+        scene, body = self._scene, driven
+        if "body" in part:
+            body = part.read("body", lambda value, key: body_index(value, key, scene))
+        tolerance = part.require("tolerance", _positive, "the farthest from the goal [m] at which it counts as reached")
+        speed = part.read("speed", _positive) if "speed" in part else GOAL_SPEED
+        return Goal(body, _place(part, length), tolerance, speed)
+
+    def _start(self) -> dict[str, np.ndarray]:
+        if "start" not in self.section("start"):
+            return {}
+        part = self.section("start").part("start", START_KEYS)
+        return {key: part.read(key, _half_widths) for key in START_KEYS if key in part}
+
+
+def _place(part: Section, length: float) -> Place:
+    """Distribution of a goal: fixed at `pos`, or uniform from `low` to `high`."""
+    if "pos" in part:
+        for key in ("low", "high"):
+            if key in part:
+                raise part.error("pos", f"pos and {key} are given; allowed is pos, or low and high")
+        low = high = part.read("pos", _point(length))
+    else:
+        low, high = (part.require(key, _point(length), "pos [x, y, z], or low and high") for key in ("low", "high"))
+    if not (low <= high).all():
+        raise part.error("high", f"low is {low.tolist()} and high is {high.tolist()}; allowed is low at most high")
+    return Place(low, high, length)
+
+
+def _point(length: float):
+    def check(value, field: str) -> np.ndarray:
+        point = validation.finite(value, (3,), field)
+        _check_near(point, field, REACH * length)
+        return point
+
+    return check
+
+
+def _check_near(points: np.ndarray, field: str, farthest: float) -> None:
+    """Refuse goals that an observation would clip."""
+    if np.abs(points).max(initial=0.0) > farthest:
+        raise ValueError(
+            f"{field} is {shown(points.tolist())}; allowed are coordinates from {-farthest:g} to {farthest:g} m, "
+            f"{REACH:g} times length: what is farther is not observed"
+        )
+
+
+def _half_widths(value, field: str) -> np.ndarray:
+    return validation.non_negative(value, (3,), field)
+
+
+def _positive(value, field: str) -> float:
+    return float(validation.positive(value, (), field))
+
+
+def _non_negative(value, field: str) -> float:
+    return float(validation.non_negative(value, (), field))
+
+
+def _frame(value, field: str) -> str:
+    return validation.one_of(value, FRAMES, field)

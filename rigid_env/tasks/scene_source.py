@@ -1,0 +1,59 @@
+"""From the name of a canonical scene, or a scene file, to the scene and what stands beside it."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import NamedTuple
+
+import physics
+from physics import scenes
+from physics.io.toml import SceneFile, load_file
+from physics.keywords import nearest_first
+from physics.summary import shown
+
+SCENE_FILE = ".toml"
+"""Ending of scene files."""
+
+
+class Found(NamedTuple):
+    """A scene that a user names.
+
+    Attributes
+    ----------
+    name : str
+        Short, for titles.
+    scene : physics.Scene
+    file : SceneFile or None
+        None: the scene is no file's.
+    """
+
+    name: str
+    scene: physics.Scene
+    file: SceneFile | None
+
+
+def find_scene(scene: physics.Scene | str | os.PathLike) -> Found:
+    """Scene that is given as an object, by the name of a canonical scene, or as a file.
+
+    Raises
+    ------
+    ValueError
+        No such scene or file, or a mistake in the file: it is named with file, line and key.
+    """
+    if isinstance(scene, physics.Scene):
+        return Found("Scene", scene, None)
+    allowed = f"a scene file ({SCENE_FILE})"
+    if not isinstance(scene, (str, os.PathLike)) or not os.fspath(scene):
+        raise ValueError(f"scene is {shown(scene)}; allowed are {allowed}, a canonical scene, or a physics.Scene")
+    name = os.fspath(scene)
+    path = Path(name)
+    if path.suffix.lower() == SCENE_FILE or path.is_file():
+        if not path.is_file():
+            what = "is a folder" if path.is_dir() else "does not exist"
+            raise ValueError(f"scene is {name!r}, which {what}; allowed is a scene file, or a canonical scene")
+        file = load_file(path)
+        return Found(path.stem, file.scene, file)
+    if name in scenes.SCENES:
+        return Found(name, scenes.by_name(name), None)
+    raise ValueError(f"scene is {name!r}; allowed are {', '.join(nearest_first(name, scenes.SCENES))}, or {allowed}")

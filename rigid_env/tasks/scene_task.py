@@ -1,0 +1,165 @@
+"""SceneTask: the bodies of any scene, some of them driven, and a place to bring one of them to."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from physics.kernels.state import layout as at
+from physics.world.setters import check_depth
+from rigid_env.tasks import layout as col
+from rigid_env.tasks import observe
+from rigid_env.tasks.actions import Wrench
+from rigid_env.tasks.distributions import Uniform
+from rigid_env.tasks.scene_settings import SettingsReader
+from rigid_env.tasks.scene_source import find_scene
+from rigid_env.tasks.task import Task
+
+BONUS = 5.0
+"""Reward of success."""
+
+START = "a start as far off as it may be"
+"""Subject of errors about starts inside a wall."""
+
+
+class SceneTask(Task):
+    """The batch behind `rigid_env.envs.scene.SceneEnv`, which documents it.
+
+    Parameters
+    ----------
+    worlds : int
+    scene : physics.Scene, str or Path
+        A scene, the name of a canonical one, or a scene file, whose table [environment] has the settings below.
+    driven, force, torque, frame, length, goal, start, frame_skip, dt
+        In place of the keys of that table; None: the file's, or the default. `goal` and `start` are dicts.
+    accuracy, effects, draws, dump_faults, threads
+        As of `Task`.
+
+    Attributes
+    ----------
+    settings : Settings
+    name : str
+        Of the scene, for titles.
+
+    Raises
+    ------
+    ValueError
+        Naming file, line and key or the argument, the value, and what is allowed.
+    """
+
+    def __init__(
+        self,
+        worlds=1,
+        scene=None,
+        *,
+        driven=None,
+        force=None,
+        torque=None,
+        frame=None,
+        length=None,
+        goal=None,
+        start=None,
+        frame_skip=None,
+        dt=None,
+        accuracy="balanced",
+        effects=(),
+        draws=None,
+        dump_faults=None,
+        threads=1,
+    ):
+        self.name, self.scene, file = find_scene(scene)
+        given = {
+            "driven": driven, "force": force, "torque": torque, "frame": frame, "length": length, "goal": goal,
+            "start": start, "frame_skip": frame_skip, "dt": dt,
+        }  # fmt: skip
+        reader = SettingsReader(self.scene, file, given)
+        self.settings = settings = reader.settings()
+        self.max_episode_steps = settings.max_episode_steps
+        limits = {"force": settings.force, "torque": settings.torque, "frame": settings.frame}
+        self.actions = [Wrench(body, **limits) for body in settings.driven]
+        self.draws = self._declared()
+        self.memory = {} if settings.goal is None else {"closeness": 1, "gain": 1}
+        super().__init__(
+            worlds, accuracy=accuracy, effects=effects, draws=draws, frame_skip=settings.frame_skip, dt=settings.dt,
+            dump_faults=dump_faults, threads=threads,
+        )  # fmt: skip
+        self._check_starts(reader)
+
+    def _declared(self) -> dict[str, Uniform]:
+        bodies, goal = len(self.scene.bodies), self.settings.goal
+        draws = {f"start_{key}": np.tile(width, bodies) for key, width in self.settings.start.items()}
+        draws = {name: Uniform(-width, width) for name, width in draws.items()}
+        return draws if goal is None else {**draws, "goal": goal.place}
+
+    def _check_starts(self, reader: SettingsReader) -> None:
+        """Refuse starts that may lie deep inside a wall: those nearest to each wall are looked at."""
+        if "pos" not in self.settings.start:
+            return
+        bodies, chosen = self.world.body_count, np.zeros(1, dtype=np.int64)
+        for wall in self.scene.walls:
+            state = self.world.state[:bodies].copy()
+            state[:, at.POS : at.POS + 3] -= np.sign(wall.normal) * self.settings.start["pos"]
+            try:
+                check_depth(self.world, state, self.world.params[:bodies], chosen, START)
+            except ValueError as error:
+                raise reader.start_error("pos", str(error)) from None
+
+    @property
+    def observation(self):
+        """Pose and velocities of every body, then the goal."""
+        length, entries = self.settings.length, []
+        for body in range(len(self.scene.bodies)):
+            entries += [observe.pos(body, length), observe.linvel(body, length)]
+            entries += [observe.rotation(body), observe.angvel(body)]
+        return entries if self.settings.goal is None else [*entries, observe.drawn("goal", 3, "m", length)]
+
+    def place(self, drawn):
+        """Poses and velocities of the scene, with what the episode adds."""
+        shape = (-1, self.world.body_count, 3)
+        return {key: self._own_starts[key] + drawn[f"start_{key}"].reshape(shape) for key in self.settings.start}
+
+    def measure(self, worlds):
+        """Distance from the goal [m] and speed [m/s] of the body that is to be there."""
+        goal = self.settings.goal
+        if goal is None:
+            return {}
+        apart, velocity = worlds.pos[:, goal.body] - worlds.drawn["goal"], worlds.linvel[:, goal.body]
+        return {"distance": np.linalg.norm(apart, axis=1), "speed": np.linalg.norm(velocity, axis=1)}
+
+    def begin(self, worlds):
+        """Note how close the body starts."""
+        if self.settings.goal is not None:
+            worlds.memory["closeness"][...] = self._closeness(worlds)
+
+    def update(self, worlds):
+        """Note how much closer the body has come."""
+        if self.settings.goal is not None:
+            closeness = self._closeness(worlds)
+            worlds.memory["gain"][...] = closeness - worlds.memory["closeness"]
+            worlds.memory["closeness"][...] = closeness
+
+    def success(self, worlds):
+        """(n,) bool: the body is at the goal, and slow."""
+        goal, measured = self.settings.goal, worlds.measured
+        if goal is None:
+            return super().success(worlds)
+        return (measured["distance"] <= goal.tolerance) & (measured["speed"] <= goal.speed)
+
+    def rewards(self, worlds):
+        """Gain of closeness, and a bonus for success."""
+        if self.settings.goal is None:
+            return {}
+        return {"progress": worlds.memory["gain"], "success": BONUS * worlds.success}
+
+    def goal_mark(self, world):
+        """Disc of the size of the body and the tolerance around it."""
+        goal = self.settings.goal
+        if goal is None:
+            return None
+        row = world * self.world.body_count + goal.body
+        radius = goal.tolerance + float(self.world.params[row, at.RADIUS])
+        reached = bool(self.outcome[world, col.SUCCESS])
+        return {"pos": self.drawn["goal"][world], "radius": radius, "reached": reached}
+
+    def _closeness(self, worlds) -> np.ndarray:
+        """(n,) 0 at the goal, and -log(1 + distance / tolerance) elsewhere: the same at every scale."""
+        return -np.log1p(worlds.measured["distance"] / self.settings.goal.tolerance)

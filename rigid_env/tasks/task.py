@@ -1,0 +1,513 @@
+"""A task: what is declared of it, and the batch of worlds it runs in."""
+
+from __future__ import annotations
+
+import reprlib
+from collections.abc import Callable, Mapping
+from dataclasses import replace as replace_fields
+from typing import Any
+
+import numpy as np
+from gymnasium.utils import seeding
+
+import physics
+from physics import validation
+from physics.kernels.state import layout as at
+from physics.parallel.bound_call import bound, compiled
+from physics.parallel.team import listed
+from physics.world.report import gravest
+from physics.world.setters import start_anew
+from rigid_env.tasks import layout as col
+from rigid_env.tasks.actions import ActionTable
+from rigid_env.tasks.declaration import Declaration
+from rigid_env.tasks.declaration_checks import check_class, refuse_same_keys
+from rigid_env.tasks.distributions import Distribution, as_distribution
+from rigid_env.tasks.disturbances import Disturbances, Push
+from rigid_env.tasks.draws import Draws, check_draws, parameter_of, world_arguments
+from rigid_env.tasks.entries import Observation
+from rigid_env.tasks.functions import Functions
+from rigid_env.tasks.options import require_known
+from rigid_env.tasks.parameters import LENGTHS
+from rigid_env.tasks.replacing import checked_effects, refuse_replaced, replaced
+from rigid_env.tasks.state import put, take
+from rigid_env.tasks.steps import Steps
+from rigid_env.tasks.wrenches import write_wrenches
+
+PARAMETER_ROUNDING = 1e-12
+"""Share by which a parameter differs from itself after it was stored: an inverse, twice a half."""
+
+UNIT_GRAVITY = 9.81
+"""[m/s²] In the unit of forces where a scene has no gravity."""
+
+
+class Task(Declaration):
+    """A batch of worlds of one scene, and the task set in them. Subclass it to set one of your own.
+
+    A subclass declares the attributes below, and defines the functions that it needs of `place`, `begin`, `update`,
+    `success`, `failure`, `rewards` and `measure`. They are NumPy functions of `Worlds`, arrays with one row for each
+    world, and are called once in a control step. docs/tasks.md builds one from nothing.
+
+    Parameters
+    ----------
+    worlds : int
+        Size of the batch.
+    accuracy : str or physics.Accuracy
+    effects : sequence of physics effects
+        Added to the scene's; one of the same class replaces the scene's. What is drawn cannot be replaced.
+    draws : mapping, optional
+        Distributions in place of the task's own of the same names; a number is fixed, a pair (low, high) uniform.
+    frame_skip : int
+        Physics steps per control step, with the action held.
+    dt : float
+        Physics step [s].
+    dump_faults : str or Path, optional
+        Folder for the last control steps of a world whose state did not stay finite; ``rigid-env replay`` takes them
+        again. See `physics.Recorder`, which then keeps a copy of them all.
+    threads : int
+        Threads that share a step.
+
+    Attributes
+    ----------
+    scene : physics.Scene
+        Declared by the subclass.
+    actions : sequence of Wrench, Force and Impulse
+        Declared: who is acted upon and how.
+    observation : sequence of Entry
+        Declared: `rigid_env.observe` has the usual ones.
+    draws : mapping of str to Distribution, number or pair
+        Declared: what each episode draws. ``mass``, ``size``, ``friction``, ``restitution`` and ``gravity`` are given
+        to the world (``mass[1]``: to body 1 alone), the rest is for the task's functions.
+    memory : mapping of str to int
+        Declared: numbers per world that functions keep from step to step, and how many each; zeros at the start.
+    disturbances : sequence of Push and Gust
+        Declared: what happens to bodies at random times.
+    max_episode_steps : int or None
+        Declared: control steps after which Gymnasium truncates an episode.
+    world : physics.World
+    generators : list of numpy.random.Generator or None
+        One per world: an episode does not depend on the batch it runs in.
+    drawn : dict of str to (worlds,) or (worlds, k) float64
+        Values of the running episodes.
+    obs : (worlds, entries) float32
+    outcome : (worlds, 3 + infos) float64
+        Reward, success, failure and the numbers of `info_names`, of the last step.
+    status : (worlds,) int64
+        Values of `physics.Status`, of the last step; OK at the start of an episode.
+
+    Raises
+    ------
+    ValueError
+        Naming the field, the value and what is allowed.
+    """
+
+    def __init__(
+        self,
+        worlds: int = 1,
+        *,
+        accuracy="balanced",
+        effects=(),
+        draws=None,
+        frame_skip=5,
+        dt=0.005,
+        dump_faults=None,
+        threads=1,
+    ):
+        self.frame_skip = validation.count(frame_skip, "frame_skip")
+        if self.max_episode_steps is not None:
+            validation.count(self.max_episode_steps, f"max_episode_steps of {type(self).__name__}")
+        distributions = _distributions(self.declared_draws(), draws)
+        varied = [name for name, each in distributions.items() if not each.is_fixed]
+        self.effects = checked_effects(effects, varied)
+        self.world = physics.World(self._scene(distributions), worlds, dt, accuracy, threads)
+        check_draws(type(self).__name__, distributions, self.world)
+        bodies = self.world.scene.bodies
+        self._own_starts = {
+            name: np.array([getattr(body, name) for body in bodies]) for name in ("pos", "quat", "linvel", "angvel")
+        }
+        self.generators: list[np.random.Generator | None] = [None] * self.worlds
+        self.episodes = Draws(distributions, self.worlds)
+        self.episodes.varying |= self._unlike_scene()
+        self._table = ActionTable(self.actions, self.world.body_count)
+        self.observed = Observation(self.observation)
+        self.clock, self._began = 0, np.zeros(self.worlds, dtype=np.int64)
+        self._allocate()
+        disturbances = self.disturbances if isinstance(self.disturbances, (list, tuple)) else (self.disturbances,)
+        kicks = self._table.has_impulses or any(isinstance(each, Push) for each in disturbances)
+        self._advance = Steps(self.world, self.frame_skip, kicks, self._observer if self.compiled else None)
+        if dump_faults is not None:
+            physics.Recorder(self.world, folder=dump_faults)
+        self.disturbed = Disturbances(disturbances, self) if disturbances else None
+        self._note_parameters(np.arange(self.worlds))
+        self.outcome = np.zeros((self.worlds, col.INFO + len(self.measures) + len(self.terms)))
+        self._prepare()
+        self._functions = None if self.compiled else Functions(self)
+        self.info_names = (*self.measures, *(f"reward_{term}" for term in self.terms))
+        refuse_same_keys(type(self).__name__, self.info_names, self.drawn)
+
+    def __init_subclass__(cls, **keywords):
+        super().__init_subclass__(**keywords)
+        check_class(cls, Task, Declaration)
+
+    def _allocate(self) -> None:
+        worlds, bodies = self.worlds, self.world.body_count
+        self.action, self.previous_action = (np.zeros((worlds, self._table.size)) for _ in range(2))
+        require_known(self.memory, self.memory, "memory")
+        self.memory_arrays = {
+            name: np.zeros(worlds if validation.count(size, f"memory {name}") == 1 else (worlds, size))
+            for name, size in self.memory.items()
+        }
+        self.record = np.zeros((worlds, self.record_size))
+        self.obs = np.zeros((worlds, self.observed.size), dtype=np.float32)
+        self.status = np.zeros(worlds, dtype=np.int64)
+        self.weights = np.zeros((worlds, bodies))
+        self.limits = np.zeros((worlds, len(self._table.vectors)))
+
+    def _unlike_scene(self) -> set[str]:
+        """Parameters that are fixed at another value than the scene's."""
+        one = np.zeros(1, dtype=np.int64)
+        fixed = {name: self.drawn[name][:1] for name in self.episodes.parameters}
+        found = set()
+        for name, value in fixed.items():
+            parameter, _ = parameter_of(name)
+            (now,) = self._arguments(one, {name: value}).values()
+            if not np.allclose(now, self._parameters_of(one)[parameter], rtol=PARAMETER_ROUNDING, atol=0.0):
+                found.add(name)
+        return found
+
+    # --- the batch ----------------------------------------------------------------------------------------
+
+    @property
+    def worlds(self) -> int:
+        """Size of the batch."""
+        return self.world.worlds
+
+    @property
+    def drawn(self) -> dict[str, np.ndarray]:
+        """Values of the running episodes, by name."""
+        return self.episodes.now
+
+    @property
+    def distributions(self) -> dict[str, Distribution]:
+        """Distributions that episodes draw from, by name."""
+        return self.episodes.distributions
+
+    @property
+    def wrench(self) -> np.ndarray:
+        """(worlds, bodies, 6) float64, applied in the last step: force [N], torque [N m], world frame."""
+        return self._advance.wrench
+
+    @property
+    def control_dt(self) -> float:
+        """Time between two actions [s]."""
+        return self.frame_skip * self.world.dt
+
+    @property
+    def steps(self) -> np.ndarray:
+        """(worlds,) int64. Control steps since each episode began."""
+        return self.clock - self._began
+
+    @property
+    def action_size(self) -> int:
+        """Numbers of an action."""
+        return self._table.size
+
+    @property
+    def action_vectors(self) -> list:
+        """Forces, torques and impulses that an action's numbers make, in their order."""
+        return self._table.vectors
+
+    def lines(self, world: int) -> tuple[str, ...]:
+        """Text for pictures of one world: the numbers that the task measures."""
+        values = self.outcome[world, col.INFO :].tolist()
+        return tuple(f"{name} {value:.2f}" for name, value in zip(self.measures, values))
+
+    def inv_mass(self, world: int, body: int) -> float:
+        """Inverse mass of one body [1/kg]."""
+        return float(self.world.params[world * self.world.body_count + body, at.INV_MASS])
+
+    @property
+    def agents(self) -> dict[str, np.ndarray]:
+        """Numbers of an action that belong to each agent."""
+        return self._table.agents
+
+    @property
+    def own_draws(self) -> tuple[str, ...]:
+        """Names that `reset` tells in its info: all that `effects` leave to the task."""
+        taken = replaced(self.effects)
+        return tuple(name for name in self.drawn if name not in taken)
+
+    @property
+    def option_names(self) -> tuple[str, ...]:
+        """Options of `start`."""
+        return tuple(self.drawn)
+
+    def _scene(self, distributions: Mapping[str, Distribution]) -> physics.Scene:
+        scene = self.make_scene(distributions)
+        validation.instance(scene, physics.Scene, f"scene of {type(self).__name__}", "a physics.Scene")
+        given = {type(effect) for effect in self.effects}
+        kept = [effect for effect in scene.effects if type(effect) not in given]
+        return replace_fields(scene, effects=(*kept, *self.effects)) if given else scene
+
+    # --- episodes -----------------------------------------------------------------------------------------
+
+    def seed(self, world: int, seed: int | None) -> int:
+        """Give one world a new generator, as `gymnasium.Env.reset` does; returns the seed."""
+        self.generators[world], used = seeding.np_random(seed)
+        return used
+
+    def start(self, rows: np.ndarray, options: Mapping[str, Any] | None = None) -> None:
+        """Start a new episode in the worlds `rows`.
+
+        Parameters
+        ----------
+        rows : (n,) int64
+            Worlds.
+        options : dict, optional
+            Fix what is otherwise drawn, each for all `rows` or one per row, by the names of the task's `draws`.
+
+        Raises
+        ------
+        TypeError, ValueError
+            An option that is unknown or out of range. Nothing has changed then, the generators included.
+        """
+        options = require_known(options, self.option_names)
+        chosen = {name: self.episodes.read(name, f"options {name}", options[name], len(rows)) for name in options}
+        refuse_replaced(self.effects, chosen, "options ")
+        if self._functions is None and not chosen:  # nothing can go wrong
+            self._start(rows, chosen)
+            return
+        before = take(self, {}, [None] * self.worlds, rows)
+        try:
+            self._start(rows, chosen)
+        except BaseException:
+            put(self, {}, before, rows)
+            raise
+
+    def _start(self, rows: np.ndarray, chosen: Mapping[str, np.ndarray]) -> None:
+        shares = np.array([self.generators[world].random(self.episodes.uniforms) for world in rows])
+        values = self.episodes.draw(rows, shares, chosen)
+        self.move(rows, values, chosen)
+        self.episodes.begin(rows, values, chosen)
+        self._note_parameters(rows)
+        for array in (self.action, self.previous_action, self.wrench, self.outcome, *self.memory_arrays.values()):
+            array[rows] = 0.0
+        self._began[rows] = self.clock
+        self.status[rows] = physics.Status.OK
+        if self.disturbed is not None:
+            self.disturbed.begin(rows)
+        self._note_episodes(rows, values)
+        if self.compiled is None:
+            self._functions.begin(rows)
+        else:
+            world = self.world
+            self.compiled(listed(rows), world.state, self.record, world.walls, None, self.obs, self.outcome)
+
+    def move(self, rows: np.ndarray, values: Mapping[str, np.ndarray], chosen: Mapping[str, np.ndarray]) -> None:
+        """Write poses and parameters of episodes with these values into the world; after an error nothing has changed.
+
+        Parameters
+        ----------
+        rows : (n,) int64
+        values : mapping of str to (n,) or (n, k) array
+        chosen : mapping
+            Those of them that options fix.
+        """
+        told = self.episodes.varying | chosen.keys()
+        changed = {name: values[name] for name in self.episodes.parameters if name in told}
+        what = f"options {', '.join(self.place_options)}" if chosen else f"place of {type(self).__name__}"
+        try:
+            start_anew(self.world, rows, self._starts(values), self._arguments(rows, changed), what)
+        except ValueError as error:
+            if str(error).startswith(what):
+                raise
+            raise ValueError(f"{what}: {error}") from None
+
+    def _arguments(self, rows: np.ndarray, values: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
+        """Arguments of `World.set_parameters` for physical parameters by name."""
+        return world_arguments(values, self._parameters_of(rows)) if values else {}
+
+    def _parameters_of(self, rows: np.ndarray) -> dict[str, np.ndarray]:
+        """Physical parameters of worlds `rows`: (n, bodies) or (n, bodies, 3), gravity (n, 3)."""
+        world = self.world
+        params = world.params.reshape(self.worlds, world.body_count, -1)[rows]
+        return {
+            "mass": 1.0 / params[..., at.INV_MASS],
+            "size": 2.0 * params[..., at.DIMENSIONS : at.DIMENSIONS + 3],
+            "friction": params[..., at.FRICTION],
+            "restitution": params[..., at.RESTITUTION],
+            "gravity": world.gravity[rows],
+        }
+
+    def _starts(self, values: Mapping[str, np.ndarray]) -> dict[str, Any]:
+        """Arguments of `World.set_state`: the scene's poses, with those of `place` instead."""
+        given = self.place(values)
+        if not isinstance(given, Mapping) or not set(given) <= set(self._own_starts):
+            raise ValueError(
+                f"place of {type(self).__name__} gave {reprlib.repr(given)}; allowed is a dict with keys of "
+                f"{', '.join(self._own_starts)}"
+            )
+        return {**self._own_starts, **given}
+
+    @property
+    def place_options(self) -> tuple[str, ...]:
+        """Options that decide where bodies start, for errors."""
+        return self.option_names
+
+    def _note_parameters(self, rows: np.ndarray) -> None:
+        """Renew what follows from masses, sizes and gravity: weights and the limits of actions."""
+        self.weights[rows] = weights = self._weights(rows)
+        params = self.world.params.reshape(self.worlds, self.world.body_count, -1)[rows]
+        reach = params[..., at.DIMENSIONS : at.DIMENSIONS + 3].max(axis=2)
+        self.limits[rows] = self._table.limits(weights, reach, self.world.dt)
+
+    def _weights(self, rows: np.ndarray) -> np.ndarray:
+        """(n, bodies) m g [N]."""
+        gravity = np.linalg.norm(self.world.gravity[rows], axis=1)
+        gravity[gravity == 0.0] = UNIT_GRAVITY
+        masses = 1.0 / self.world.params.reshape(self.worlds, self.world.body_count, -1)[rows, :, at.INV_MASS]
+        return masses * gravity[:, None]
+
+    def _note_episodes(self, rows: np.ndarray, values: Mapping[str, np.ndarray]) -> None:
+        """Write what a compiled function reads into `record`."""
+
+    def hold(self, name: str, value) -> None:
+        """Give a drawn value of every world from now on: a physical parameter at once, any other from the next start.
+
+        Parameters
+        ----------
+        name : str
+            Of `drawn`.
+        value : array_like
+            One for all worlds or one for each; None: draw it again from the next episode on.
+
+        Raises
+        ------
+        ValueError
+            Out of range, or a size that reaches deep into a wall where the body is. Nothing has changed then.
+        """
+        refuse_replaced(self.effects, (name,))
+        if value is not None:
+            value = self.episodes.read(name, name, value, self.worlds)
+            if name in self.episodes.parameters:
+                self._change(name, value)
+        self.episodes.hold(name, value)
+        self._note_parameters(np.arange(self.worlds))
+
+    def _change(self, name: str, value: np.ndarray) -> None:
+        """Give a parameter of all worlds the values (worlds,) or (worlds, k); after an error nothing has changed."""
+        try:
+            self.world.set_parameters(**self._arguments(np.arange(self.worlds), {name: value}))
+        except ValueError as error:
+            raise ValueError(f"{name} is {reprlib.repr(value.tolist())}: {error}") from None
+
+    # --- control steps ------------------------------------------------------------------------------------
+
+    def step(self, actions) -> None:
+        """Hold actions for `frame_skip` physics steps, then observe.
+
+        Parameters
+        ----------
+        actions : (worlds, action_size) array_like
+            Clipped to ±1; see `rigid_env.tasks.actions`.
+
+        Raises
+        ------
+        ValueError
+            Actions of the wrong shape or not finite, or a function of the task that gives what it may not. Nothing has
+            changed then.
+        """
+        shape = self.action.shape
+        try:
+            actions = np.asarray(actions)
+        except ValueError:  # rows of different lengths
+            raise ValueError(f"actions is {reprlib.repr(actions)}; allowed is shape {shape}") from None
+        if actions.shape != shape:
+            raise ValueError(f"actions has shape {actions.shape}; allowed is shape {shape}")
+        self.take(actions)
+
+    def take(self, actions: np.ndarray) -> None:
+        """`step` with an array of the right shape; of one world its axis may be missing."""
+        if actions.dtype.kind not in "fiub":
+            raise ValueError(f"actions is {reprlib.repr(actions.tolist())}; allowed are numbers")
+        if self._functions is not None:
+            self._functions.step(actions)
+            return
+        self.action[...] = actions
+        self.act()
+
+    def act(self) -> None:
+        """Move the worlds by one control step."""
+        bad = self._write_wrenches(*self._wrench_arguments)
+        if bad >= 0:
+            raise ValueError(f"action of world {bad} is {self.action[bad].tolist()}; allowed are finite numbers")
+        advance = self._advance
+        if self.disturbed is not None:
+            self.disturbed.act(advance.wrench, advance.kick)
+        advance.take()
+        gravest(self.world.report_table, self.status)
+        if advance.has_first:
+            advance.note_first(self.status)
+        self.clock += 1
+
+    def _prepare(self) -> None:
+        """Bind what belongs to this process: machine code, and views of arrays."""
+        table, advance = self._table, self._advance
+        self._wrench_arguments = (
+            self.action, table.table, table.points, self.limits, self.world.state, advance.wrench, advance.kick
+        )  # fmt: skip
+        self._write_wrenches = compiled(write_wrenches, self._wrench_arguments)
+        self._kept_arrays = {
+            "action": self.action, "previous action": self.previous_action, "record": self.record, "obs": self.obs,
+            "outcome": self.outcome, "status": self.status, "wrench": self.wrench, "weights": self.weights,
+            "limits": self.limits, **({} if self.disturbed is None else self.disturbed.arrays),
+            **{f"drawn {name}": array for name, array in self.drawn.items()},
+            **{f"memory {name}": array for name, array in self.memory_arrays.items()},
+        }  # fmt: skip
+
+    def state_arrays(self) -> dict[str, np.ndarray]:
+        """Arrays that decide how episodes go on, the worlds apart, by name; each has a row for each world."""
+        return {**self._kept_arrays, "steps": self.steps}
+
+    def set_outcome(self, outcome: np.ndarray) -> None:
+        """Take an array for outcomes, once it is known how many numbers they have."""
+        self.outcome = self._kept_arrays["outcome"] = outcome
+
+    def adopt(self, rows: np.ndarray, steps: np.ndarray) -> None:
+        """Take over how many control steps (n,) the episodes in worlds `rows` have had."""
+        self._began[rows] = self.clock - steps
+
+    def __getstate__(self):
+        kept = dict(vars(self))
+        for name in (
+            "_functions",
+            "observed",
+            "_write_wrenches",
+            "_kept_arrays",
+        ):  # machine code, and functions of the class
+            del kept[name]
+        return kept
+
+    def __setstate__(self, kept):
+        vars(self).update(kept)
+        self.observed = Observation(self.observation)
+        self._prepare()
+        self._functions = None if self.compiled else Functions(self, is_first=False)
+
+    def _observer(self, taken: np.ndarray) -> Callable[[], object]:
+        """Return the kernel that observes the worlds that a thread has stepped."""
+        world = self.world
+        return bound(
+            self.compiled, taken, world.state, self.record, world.walls, self.action, self.obs, self.outcome
+        )  # fmt: skip
+
+
+def _distributions(declared: Mapping[str, Any], given: Mapping[str, Any] | None) -> dict[str, Distribution]:
+    """Distributions of a task, with those that a user gives in place of its own, of the same lengths."""
+    declared = require_known(declared, declared, "draws")
+    given = require_known(given, tuple(declared), "draws")
+    found = {}
+    for name, value in declared.items():
+        field, parameter = f"draws {name}", parameter_of(name)
+        own = as_distribution(field, value, LENGTHS[parameter[0]] if parameter else None)
+        found[name] = as_distribution(field, given[name], own.length) if name in given else own
+    return found

@@ -1,0 +1,108 @@
+"""The worlds that a task's functions are asked about, as arrays with one row for each."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from rigid_env.tasks.named import Named
+from rigid_env.tasks.reading import write_contact_forces, write_rotations, write_wall_gaps
+
+
+def read_only(array: np.ndarray) -> np.ndarray:
+    """View of an array that cannot be written."""
+    view = array.view()
+    view.flags.writeable = False
+    return view
+
+
+class Worlds:
+    """Worlds of a task: all of them in a step, or those whose episodes begin.
+
+    Arrays are views of the running simulation where all worlds are meant: copy what is to be kept. What takes time to
+    work out is worked out when it is first read, once in a step.
+
+    Attributes
+    ----------
+    indices : (n,) int64
+        Of the worlds in their batch.
+    pos, quat, linvel, angvel : (n, bodies, 3|4|3|3) float64
+        World frame; [m], unit quaternions, [m/s], [rad/s].
+    drawn : dict of str to (n,) or (n, k) float64
+        Values of the episodes, by their names in the task's `draws`.
+    memory : dict of str to (n,) or (n, k) float64
+        Numbers that the task keeps from step to step, by their names in its `memory`: to be written in place.
+    action, previous_action : (n, entries) float64
+        The last two actions, clipped to ±1; zeros at the start of an episode.
+    measured : dict of str to (n,) array
+        Numbers that the task's `measure` gave, before its other functions are called.
+    success, failure : (n,) bool
+        Flags that the task's functions of these names gave; False before they did.
+    """
+
+    def __init__(self, task, indices: np.ndarray | None = None):
+        self._task, world = task, task.world
+        self.is_all = indices is None
+        self.indices = np.arange(task.worlds) if self.is_all else indices
+        take = (lambda array: array) if self.is_all else (lambda array: array[indices])
+        moving = world.pos, world.quat, world.linvel, world.angvel
+        self.pos, self.quat, self.linvel, self.angvel = (read_only(take(array)) for array in moving)
+        self.drawn = Named({name: read_only(take(values)) for name, values in task.drawn.items()}, "drawn")
+        memory = {name: take(values) for name, values in task.memory_arrays.items()}
+        self.memory = Named(memory, "memory", is_written=True)
+        self.action, self.previous_action = read_only(take(task.action)), read_only(take(task.previous_action))
+        self._take = take
+        self.renew()
+
+    def renew(self) -> None:
+        """Forget what was worked out: the worlds have moved."""
+        self.success = self.failure = np.zeros(len(self.indices), dtype=np.bool_)
+        self.measured: Mapping[str, np.ndarray] = {}
+        self._found: dict[str, np.ndarray] = {}
+
+    def __len__(self) -> int:
+        return len(self.indices)
+
+    @property
+    def steps(self) -> np.ndarray:
+        """(n,) int64. Control steps since the episode began."""
+        return self._take(self._task.steps)
+
+    @property
+    def time(self) -> np.ndarray:
+        """(n,) float64. Time since the episode began [s]."""
+        return self.steps * self._task.control_dt
+
+    @property
+    def rotation(self) -> np.ndarray:
+        """(n, bodies, 3, 3) float64. Rotation matrices, body to world."""
+        return self._worked_out("rotation", write_rotations, (self._task.world.body_count, 3, 3))
+
+    @property
+    def wall_gaps(self) -> np.ndarray:
+        """(n, bodies, walls) float64. Distance between each body and each wall, negative inside [m]."""
+        world = self._task.world
+        return self._worked_out("wall_gaps", write_wall_gaps, (world.body_count, len(world.walls)))
+
+    @property
+    def contact_force(self) -> np.ndarray:
+        """(n, bodies, 3) float64. Sum of the contact forces on each body in the last physics step, world frame [N]."""
+        return self._worked_out("contact_force", write_contact_forces, (self._task.world.body_count, 3))
+
+    @property
+    def wrench(self) -> np.ndarray:
+        """(n, bodies, 6) float64. Wrench of the last action: force [N] and torque [N m], world frame."""
+        return self._take(self._task.wrench)
+
+    @property
+    def weight(self) -> np.ndarray:
+        """(n, bodies) float64. Mass times gravity (9.81 m/s² where there is none) [N]."""
+        return self._take(self._task.weights)
+
+    def _worked_out(self, name: str, write, shape: tuple[int, ...]) -> np.ndarray:
+        if name not in self._found:
+            out = np.empty((len(self.indices), *shape))
+            write(self._task.world, self.indices, out)
+            self._found[name] = out
+        return self._found[name]

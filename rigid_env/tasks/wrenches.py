@@ -1,0 +1,79 @@
+"""Compiled part of acting: from the numbers of an action to the wrenches on bodies."""
+
+from __future__ import annotations
+
+import math
+
+from physics.kernels.compile.decorators import entry_kernel, inlined
+from physics.kernels.math import quaternion as qt
+from physics.kernels.state import layout as at
+
+KIND, BODY, FIRST_NUMBER, IN_BODY_FRAME = 0, 1, 2, 5  # columns of `actions.ActionTable.table`
+TORQUE, IMPULSE = 1, 2  # kinds, as in `rigid_env.tasks.actions`
+
+
+@inlined
+def clip(x, low, high):
+    """x limited to [low, high]."""
+    return min(max(x, low), high)
+
+
+@inlined
+def _number(actions, i, k):
+    """Number k of an action, clipped to ±1; 0 for an axis without one."""
+    return clip(actions[i, k], -1.0, 1.0) if k >= 0 else 0.0
+
+
+@entry_kernel
+def write_wrenches(actions, table, points, limits, state, wrench, kick):
+    """Wrenches from actions: numbers clipped to ±1 each, then each vector to its ball of radius 1.
+
+    Parameters
+    ----------
+    actions : (worlds, numbers) float64
+    table, points : (vectors, 6) int64, (vectors, 3) float64
+        As of `actions.ActionTable`.
+    limits : (worlds, vectors) float64
+        Longest vectors [N, N m].
+    state : (worlds * bodies, STATE_SIZE) float64
+    wrench, kick : (worlds, bodies, 6) float64, out
+        World frame; of forces and torques, and of impulses as forces. The same array where there are no impulses.
+
+    Returns
+    -------
+    int
+        Index of the first world whose action is not finite, else -1; the outputs are written in the second case only.
+    """
+    for i in range(actions.shape[0]):
+        for k in range(actions.shape[1]):
+            if not math.isfinite(actions[i, k]):
+                return i
+    bodies = wrench.shape[1]
+    for i in range(actions.shape[0]):
+        for b in range(bodies):
+            for k in range(6):
+                wrench[i, b, k] = 0.0
+                kick[i, b, k] = 0.0
+        for v in range(table.shape[0]):
+            x = _number(actions, i, table[v, FIRST_NUMBER])
+            y = _number(actions, i, table[v, FIRST_NUMBER + 1])
+            z = _number(actions, i, table[v, FIRST_NUMBER + 2])
+            scale = limits[i, v] / max(1.0, math.sqrt(x * x + y * y + z * z))
+            vector = (scale * x, scale * y, scale * z)
+            kind, body = table[v, KIND], table[v, BODY]
+            row = i * bodies + body
+            q = (state[row, at.QUAT], state[row, at.QUAT + 1], state[row, at.QUAT + 2], state[row, at.QUAT + 3])
+            R = qt.to_matrix(q)
+            if table[v, IN_BODY_FRAME] == 1:
+                vector = qt.matvec(R, vector)
+            out = kick if kind == IMPULSE else wrench
+            first = 3 if kind == TORQUE else 0
+            out[i, body, first] += vector[0]
+            out[i, body, first + 1] += vector[1]
+            out[i, body, first + 2] += vector[2]
+            if points[v, 0] != 0.0 or points[v, 1] != 0.0 or points[v, 2] != 0.0:
+                torque = qt.cross(qt.matvec(R, (points[v, 0], points[v, 1], points[v, 2])), vector)
+                out[i, body, 3] += torque[0]
+                out[i, body, 4] += torque[1]
+                out[i, body, 5] += torque[2]
+    return -1

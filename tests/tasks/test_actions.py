@@ -1,0 +1,111 @@
+"""Wrenches and impulses from actions, against `physics.wrench_at` and the laws of momentum."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation
+
+import physics
+from physics.kernels.state import layout as at
+from rigid_env.tasks import Force, Impulse, Task, Wrench, observe
+from tests.tasks.conftest import Free, started
+
+TILT = (0.5, 0.5, -0.5, 0.5)
+
+
+def floating(*ways, bodies: int = 1, worlds: int = 1, frame_skip: int = 1) -> Task:
+    """A task of blocks that float, tilted, acted upon in some ways."""
+
+    class Floating(Free):
+        scene = physics.Scene(
+            [physics.Block((5, 3, 2), 6.0, pos=(9.0 * b, 0, 0), quat=TILT) for b in range(bodies)], effects=[]
+        )
+        actions = ways
+        observation = (observe.pos(),)
+
+    return started(Floating(worlds, frame_skip=frame_skip))
+
+
+@settings(max_examples=40, deadline=None)
+@given(st.lists(st.floats(-2.0, 2.0), min_size=6, max_size=6))
+def test_a_wrench_is_clipped_and_shortened_to_its_limits(action):
+    task = floating(Wrench(0, force=0.5, torque=0.25))
+    task.step(np.array([action]))
+    force, torque = (np.clip(part, -1.0, 1.0) for part in (action[:3], action[3:]))
+    weight = 6.0 * 9.81  # without gravity the unit is 9.81 m/s²
+    for vector, limit, ours in ((force, 0.5 * weight, slice(0, 3)), (torque, 0.25 * weight * 2.5, slice(3, 6))):
+        expected = limit * vector / max(1.0, np.linalg.norm(vector))
+        # A norm, a quotient and a product: a few roundings of the limit.
+        np.testing.assert_allclose(task.wrench[0, 0, ours], expected, rtol=1e-14, atol=1e-14 * limit)
+
+
+@pytest.mark.parametrize("frame", ["world", "body"])
+@pytest.mark.parametrize("point", [(0.0, 0.0, 0.0), (2.5, -1.5, 0.5)])
+def test_a_force_at_a_point_is_wrench_at(frame, point):
+    task = floating(Force(0, 0.7, point, frame=frame))
+    task.step(np.array([[0.3, -0.4, 0.5]]))
+    task.start(np.arange(1))  # the same pose again, in which `wrench_at` is asked
+    expected = physics.wrench_at(task.world, 0.7 * 6.0 * 9.81 * np.array([0.3, -0.4, 0.5]), point, frame)
+    task.step(np.array([[0.3, -0.4, 0.5]]))
+    np.testing.assert_allclose(task.wrench, expected, rtol=1e-13, atol=1e-12)
+
+
+def test_ways_take_the_numbers_in_turn_and_agents_know_theirs():
+    task = floating(
+        Wrench(0, 0.5, 0.5, force_axes="xz", torque_axes="y", agent="left"), Force(1, 0.4, axes="y", agent="right"),
+        bodies=2,
+    )  # fmt: skip
+    assert task.action_size == 4
+    assert {agent: places.tolist() for agent, places in task.agents.items()} == {"left": [0, 1, 2], "right": [3]}
+    task.step(np.array([[1.0, 0.0, 0.0, -1.0]]))
+    weight = 6.0 * 9.81
+    np.testing.assert_allclose(task.wrench[0, 0], [0.5 * weight, 0, 0, 0, 0, 0], rtol=1e-14)
+    np.testing.assert_allclose(task.wrench[0, 1], [0, -0.4 * weight, 0, 0, 0, 0], rtol=1e-14)
+
+
+@pytest.mark.parametrize("frame_skip", [1, 4])
+def test_an_impulse_changes_the_momentum_by_itself_however_long_the_step(frame_skip):
+    task = floating(Impulse(0, 0.2, point=(2.5, 0.0, 0.0)), frame_skip=frame_skip)
+    task.step(np.array([[0.0, 1.0, 0.0]]))
+    impulse = 0.2 * 6.0 * 9.81
+    # Without other forces the velocity of the centre is impulse / m exactly, up to the rounding of a few products.
+    np.testing.assert_allclose(task.world.linvel[0, 0], [0.0, impulse / 6.0, 0.0], rtol=1e-12, atol=1e-12)
+    arm = Rotation.from_quat(TILT, scalar_first=True).apply([2.5, 0.0, 0.0])
+    momentum = task.world.state[0, at.ANGMOM : at.ANGMOM + 3]
+    np.testing.assert_allclose(momentum, np.cross(arm, [0.0, impulse, 0.0]), rtol=1e-12, atol=1e-12)
+    before = task.world.linvel.copy()
+    task.step(np.zeros((1, 3)))
+    np.testing.assert_allclose(task.world.linvel, before, rtol=1e-12, atol=1e-12)
+
+
+def test_an_action_that_is_not_finite_moves_nothing():
+    task = floating(Wrench(0), worlds=2)
+    state, before = task.world.state.copy(), task.action.copy()
+    with pytest.raises(ValueError, match=r"action of world 1 is .*nan.*allowed are finite"):
+        task.step(np.array([[0.0] * 6, [0.0] * 5 + [np.nan]]))
+    np.testing.assert_array_equal(task.world.state, state)
+    np.testing.assert_array_equal(task.action, before)
+
+
+REFUSED = {
+    "none": (lambda: floating(), ("actions", "at least one")),
+    "word": (lambda: floating("push"), ("actions", "'push'")),
+    "body": (lambda: floating(Wrench(1)), ("body", "1", "0 to 0")),
+    "negative": (lambda: Wrench(-1), ("body", "-1", "from 0 on")),
+    "axes": (lambda: Force(axes="zx"), ("axes", "'zx'", "'xyz'")),
+    "zero": (lambda: Wrench(force=0.0, torque=0.0), ("force and torque", "above 0")),
+    "strength": (lambda: Force(strength=0.0), ("strength", "0")),
+    "frame": (lambda: Force(frame="wall"), ("frame", "'wall'", "body")),
+    "point": (lambda: Impulse(point=(0, 0)), ("point", "(2,)", "(3,)")),
+}
+
+
+@pytest.mark.parametrize("name", REFUSED)
+def test_refusals_name_field_value_and_what_is_allowed(name):
+    make, words = REFUSED[name]
+    with pytest.raises(ValueError, match="allowed") as error:
+        make()
+    assert all(word in str(error.value) for word in words), str(error.value)
