@@ -165,7 +165,9 @@ class Task(Declaration):
     def _unlike_scene(self) -> set[str]:
         """Parameters that are fixed at another value than the scene's."""
         one = np.zeros(1, dtype=np.int64)
-        fixed = {name: self.drawn[name][:1] for name in self.episodes.parameters}
+        taken = replaced(self.effects)
+        names = [name for name in self.episodes.parameters if parameter_of(name)[0] not in taken]
+        fixed = {name: self.drawn[name][:1] for name in names}
         found = set()
         for name, value in fixed.items():
             parameter, _ = parameter_of(name)

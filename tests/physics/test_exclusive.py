@@ -211,14 +211,14 @@ def test_two_threads_in_an_environment(make, monkeypatch):
     env.reset(seed=0)
     action = np.ones(env.action_space.shape, dtype=np.float32)
     begun, go_on, found = threading.Event(), threading.Event(), []
-    step = env.task.step
+    act = env.task.act
 
-    def held(actions):
+    def held():
         begun.set()
         assert go_on.wait(60)
-        step(actions)
+        act()
 
-    monkeypatch.setattr(env.task, "step", held)
+    monkeypatch.setattr(env.task, "act", held)
     thread = threading.Thread(target=lambda: found.append(env.step(action)))
     thread.start()
     assert begun.wait(60)

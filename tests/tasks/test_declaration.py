@@ -102,6 +102,16 @@ def test_a_fixed_draw_reaches_the_world(name, value):
     assert task.weights[0, 0] == pytest.approx(gravity * mass, rel=1e-14)
 
 
+def test_an_effect_in_place_of_a_fixed_draw_stands():
+    task = subclass(scene=ROUGH, draws={"friction": 0.4, "gravity": 9.81})
+    env = TaskEnv(task, effects=[physics.Friction(0.1), physics.Gravity((0, -2.0, 0))])
+    _, info = env.reset(seed=0)
+    seen = env.task._parameters_of(np.zeros(1, dtype=np.int64))
+    assert seen["friction"][0, 0] == 0.1
+    assert seen["gravity"].tolist() == [[0.0, -2.0, 0.0]]
+    assert not {"friction", "gravity"} & set(info)
+
+
 def test_an_argument_replaces_a_draw_by_one_of_its_length():
     task = subclass(draws={"goal": Uniform((0, 0), (1, 1)), "mass": (2.0, 4.0)})
     assert TaskEnv(task, draws={"mass": 5.0}).reset(seed=1)[1]["mass"] == 5.0
