@@ -31,6 +31,8 @@ if TYPE_CHECKING:
         Wrench,
         observe,
     )
+    from rigid_env.tasks.block_goals import BlockReachGoal, BlockReorientGoal
+    from rigid_env.tasks.goal import GoalTask
     from rigid_env.tasks.state import TaskState
 
     __version__: str
@@ -51,6 +53,9 @@ _LAZY = {
     **dict.fromkeys(_OF_TASKS, "rigid_env.tasks"),
     "SceneEnv": "rigid_env.envs.scene",
     "SceneVectorEnv": "rigid_env.envs.scene",
+    "BlockReachGoal": "rigid_env.tasks.block_goals",
+    "BlockReorientGoal": "rigid_env.tasks.block_goals",
+    "GoalTask": "rigid_env.tasks.goal",
     "TaskEnv": "rigid_env.envs.env",
     "TaskState": "rigid_env.tasks.state",
     "check_task": "rigid_env.envs.checks",
@@ -60,12 +65,15 @@ _LAZY = {
 
 __all__ = [
     "BlockReachEnv",
+    "BlockReachGoal",
     "BlockReachVectorEnv",
     "BlockReorientEnv",
+    "BlockReorientGoal",
     "BlockReorientVectorEnv",
     "Choice",
     "Entry",
     "Force",
+    "GoalTask",
     "Gust",
     "Impulse",
     "LogUniform",

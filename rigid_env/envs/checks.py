@@ -84,13 +84,13 @@ class _Checks:
         together, _ = envs.reset(seed=SEED)
         singles = [TaskEnv(self.kind, **self.settings) for _ in range(ENVS)]
         for i, env in enumerate(singles):
-            _same("observation of reset", together[i], env.reset(seed=SEED + i)[0], f"world {i}")
+            _same("observation of reset", _of_world(together, i), env.reset(seed=SEED + i)[0], f"world {i}")
         for k in range(self.steps):
             obs, rewards, ends, _, infos = envs.step(self.actions[k])
             for i, env in enumerate(singles):
                 alone = env.step(self.actions[k, i])
                 where = f"world {i}, step {k}"
-                _same("observation", obs[i], alone[0], where)
+                _same("observation", _of_world(obs, i), alone[0], where)
                 _same("reward", rewards[i], alone[1], where)
                 _same("end of the episode", ends[i], alone[2], where)
                 for name in envs.task.info_names:
@@ -146,22 +146,36 @@ class _Checks:
         try:
             theirs, _ = workers.reset(seed=SEED)
             ours, _ = self.batch().reset(seed=SEED)
-            _same(f"observation of a worker by {context}", ours[:2], theirs, "reset")
+            for i in range(2):
+                _same(f"observation of a worker by {context}", _of_world(ours, i), _of_world(theirs, i), "reset")
             workers.step(self.actions[0, :2])
         finally:
             workers.close()
 
     def _trajectory(self, env: TaskEnv, seed: int) -> np.ndarray:
-        rows = [env.reset(seed=seed)[0]]
+        rows = [_flat(env.reset(seed=seed)[0])]
         for k in range(self.steps):
             obs, reward, is_ended, _, _ = env.step(self.actions[k, 0])
-            rows.append(np.append(obs, reward))
+            rows.append(np.append(_flat(obs), reward))
             if is_ended:
                 break
         return np.concatenate(rows)
 
 
+def _of_world(obs, world: int):
+    """Observation of one world of a batch."""
+    return {key: part[world] for key, part in obs.items()} if isinstance(obs, dict) else obs[world]
+
+
+def _flat(obs) -> np.ndarray:
+    """All numbers of an observation in a row."""
+    parts = obs.values() if isinstance(obs, dict) else (obs,)
+    return np.concatenate([np.ravel(part) for part in parts])
+
+
 def _same(what: str, ours, theirs, where: str) -> None:
+    if isinstance(ours, dict):
+        ours, theirs = _flat(ours), _flat(theirs)
     ours, theirs = np.asarray(ours), np.asarray(theirs)
     if ours.shape != theirs.shape:
         raise CheckError(f"{what} has shapes {ours.shape} and {theirs.shape}; allowed is one shape ({where})")

@@ -14,9 +14,10 @@ import numpy as np
 import physics
 from physics.parallel.exclusive import exclusive, in_use
 from rigid_env.envs.attributes import EpisodeParameters, value_of
+from rigid_env.envs.goals import lend_goals
 from rigid_env.envs.infos import InfoMaker
 from rigid_env.envs.making import make_task
-from rigid_env.envs.sources import make_source
+from rigid_env.envs.sources import StateSource, make_source
 from rigid_env.envs.spaces import action_space
 from rigid_env.rendering.view import RENDER_MODES, View
 from rigid_env.tasks import Task
@@ -67,15 +68,17 @@ class RigidEnv(gym.Env):
     ):
         self.task = task
         self._source = make_source(task, obs, obs_size, obs_stack)
+        lend_goals(task, self)
         self.metadata = {**self.metadata, "render_fps": max(1, round(1.0 / self.task.control_dt))}
         self.render_mode = render_mode
         self.observation_space = self._source.space
         self.action_space = action_space(task)
         self._view = View(render_mode, width, height, self.metadata["render_fps"], type(task).__name__)
         self._world = np.zeros(1, dtype=np.int64)
-        self._is_drawn = obs == "pixels"
+        self._is_plain = type(self._source) is StateSource
         self._action_shape = self.action_space.shape
         self._info = InfoMaker(task.info_names)
+        self._ends_on_success = task.ends_on_success
         self._has_reset = self._is_closed = False
 
     @exclusive
@@ -162,12 +165,18 @@ class RigidEnv(gym.Env):
             info = self._info(outcome, task.status.item())
             if self.render_mode == "human":
                 self.render()
-            if self._is_drawn:
+            if self._is_plain:
+                obs = task.obs[0].copy()
+            else:
                 self._source.step()
                 obs = self._source.one(0)
-            else:
-                obs = task.obs[0].copy()
-            return obs, outcome[REWARD], info["is_success"] or outcome[FAILURE] > 0.0, False, info
+            return (
+                obs,
+                outcome[REWARD],
+                (info["is_success"] and self._ends_on_success) or outcome[FAILURE] > 0.0,
+                False,
+                info,
+            )
         finally:
             self.is_free = True
 

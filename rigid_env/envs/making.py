@@ -52,10 +52,23 @@ def make_task(task: type[Task] | str, worlds: int, settings: Mapping[str, Any]) 
 
 def check_settings(kind: type[Task], settings: Mapping[str, Any], of_environment: bool = False) -> None:
     """Raise a TypeError at a setting that the task, or the environment with it, does not know."""
-    known = [name for name in inspect.signature(kind.__init__).parameters if name not in ("self", "worlds")]
+    known = _settings_of(kind)
     if of_environment:
         known += OF_ENVIRONMENT
     for name in settings:
         if name not in known:
             allowed = ", ".join(nearest_first(name, known))
             raise TypeError(f"{kind.__name__} got the argument {name!r}; allowed are {allowed}")
+
+
+def _settings_of(kind: type[Task]) -> list[str]:
+    """Arguments of a task's constructor, and of those that it hands others on to."""
+    names: list[str] = []
+    for each in kind.__mro__:
+        if "__init__" not in vars(each):
+            continue
+        parameters = inspect.signature(vars(each)["__init__"]).parameters
+        names += [name for name, about in parameters.items() if about.kind is not inspect.Parameter.VAR_KEYWORD]
+        if all(about.kind is not inspect.Parameter.VAR_KEYWORD for about in parameters.values()):
+            break
+    return [name for name in dict.fromkeys(names) if name not in ("self", "worlds")]

@@ -12,6 +12,9 @@ NAMESPACE = "rigid_env"
 MAX_EPISODE_STEPS = {"BlockReach": 300, "BlockReorient": 300}
 """Control steps after which an episode is truncated: 7.5 s at the default 25 ms."""
 
+GOALS = {"BlockReachGoal": 150, "BlockReorientGoal": 150}
+"""Tasks with goals, and control steps of their episodes: 7.5 s at the default 50 ms."""
+
 SCENE_ID = f"{NAMESPACE}/Scene-v0"
 """Environment of any scene: it needs the argument `scene`, whose file may limit the episodes."""
 
@@ -37,6 +40,16 @@ def register_envs() -> None:
             vector_entry_point=f"rigid_env.envs.vector_env:{name}VectorEnv",
             max_episode_steps=steps,
         )
+    for name, steps in GOALS.items():
+        env_id = f"{NAMESPACE}/{name}-v0"
+        if env_id not in registry:
+            register(
+                id=env_id,
+                entry_point="rigid_env.envs.env:TaskEnv",
+                vector_entry_point="rigid_env.envs.vector_env:TaskVectorEnv",
+                max_episode_steps=steps,
+                kwargs={"task": f"rigid_env.tasks.block_goals:{name}"},
+            )
     if SCENE_ID not in registry:
         module = "rigid_env.envs.scene"
         register(SCENE_ID, entry_point=f"{module}:SceneEnv", vector_entry_point=f"{module}:SceneVectorEnv")

@@ -20,6 +20,9 @@ except ImportError:
     require("agents", "torch", "stable_baselines3", purpose="rigid_env.envs.sb3")
     raise
 
+OF_NO_ENVIRONMENT = ("compute_reward",)
+"""Methods whose results are the same for all environments, and change none."""
+
 
 class RigidVecEnv(VecEnv):
     """A `RigidVectorEnv` behind the interface that Stable-Baselines3 trains on.
@@ -151,10 +154,14 @@ class RigidVecEnv(VecEnv):
         self.vector_env.set_attr(attr_name, [value] * self.num_envs)
 
     def env_method(self, method_name: str, *method_args, indices=None, **method_kwargs) -> list[Any]:
-        """Call a method of the vector environment once, for all environments; its result, once per index."""
-        self._require_all("env_method", indices)
+        """Call a method of the vector environment once, for all environments; its result, once per index.
+
+        A method that looks at no environment, `compute_reward`, may be called for some of them.
+        """
+        if method_name not in OF_NO_ENVIRONMENT:
+            self._require_all("env_method", indices)
         result = getattr(self.vector_env, method_name)(*method_args, **method_kwargs)
-        return [result] * self.num_envs
+        return [result for _ in self._get_indices(indices)]
 
     def _require_all(self, what: str, indices) -> None:
         chosen = sorted(set(self._get_indices(indices)))

@@ -8,9 +8,11 @@ import numpy as np
 from gymnasium import spaces
 
 from physics import validation
+from rigid_env.envs.goals import GoalSource
 from rigid_env.rendering.pixels import PixelObserver
 from rigid_env.rendering.view import frame_of, room_of
 from rigid_env.tasks import Task
+from rigid_env.tasks.goal import GoalTask
 
 KINDS = ("state", "pixels")
 
@@ -118,7 +120,7 @@ class PixelSource:
         return np.concatenate(tuple(self._pictures.swapaxes(0, 1)), axis=-1)
 
 
-def make_source(task: Task, obs: str, size: Sequence[int], stack: int) -> StateSource | PixelSource:
+def make_source(task: Task, obs: str, size: Sequence[int], stack: int) -> StateSource | PixelSource | GoalSource:
     """Make the source of observations that an environment's arguments ask for.
 
     Raises
@@ -127,4 +129,5 @@ def make_source(task: Task, obs: str, size: Sequence[int], stack: int) -> StateS
         Naming the argument, its value and what is allowed.
     """
     validation.one_of(obs, KINDS, "obs")
-    return StateSource(task) if obs == "state" else PixelSource(task, size, stack)
+    source = StateSource(task) if obs == "state" else PixelSource(task, size, stack)
+    return GoalSource(task, source) if isinstance(task, GoalTask) else source

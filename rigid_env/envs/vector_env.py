@@ -19,6 +19,7 @@ from physics.parallel.exclusive import exclusive
 from rigid_env.envs import vector_arguments as arguments
 from rigid_env.envs import vector_infos
 from rigid_env.envs.attributes import BatchAttributes
+from rigid_env.envs.goals import lend_goals
 from rigid_env.envs.making import make_task
 from rigid_env.envs.sources import make_source
 from rigid_env.envs.spaces import action_space
@@ -74,6 +75,7 @@ class RigidVectorEnv(BatchAttributes):
     ):
         self.task = task
         self._source = make_source(task, obs, obs_size, obs_stack)
+        lend_goals(task, self)
         self.num_envs = num_envs = task.worlds
         self.autoreset_mode = arguments.autoreset_mode(autoreset_mode)
         is_registered = isinstance(max_episode_steps, str) and max_episode_steps == "registered"
@@ -184,7 +186,9 @@ class RigidVectorEnv(BatchAttributes):
         task.step(actions)
         self._source.step()
         rewards = task.outcome[:, col.REWARD].copy()
-        terminations = task.outcome[:, col.SUCCESS] + task.outcome[:, col.FAILURE] > 0.0
+        terminations = task.outcome[:, col.FAILURE] > 0.0
+        if task.ends_on_success:
+            terminations |= task.outcome[:, col.SUCCESS] > 0.0
         truncations = np.zeros(self.num_envs, dtype=np.bool_)
         if self.max_episode_steps is not None:
             truncations = task.steps >= self.max_episode_steps
@@ -204,8 +208,6 @@ class RigidVectorEnv(BatchAttributes):
             vector_infos.add_drawn(finals, task, rows)
         self._show()
         return self._source.all(), rewards, terminations, truncations, {**vector_infos.of_outcomes(task), **finals}
-
-    # --- state --------------------------------------------------------------------------------------------
 
     @exclusive
     def get_state(self, worlds: ArrayLike | None = None) -> TaskState:

@@ -40,6 +40,7 @@ class Declaration:
     memory: ClassVar[Mapping[str, int]] = {}
     disturbances: ClassVar[Sequence] = ()
     max_episode_steps: ClassVar[int | None] = None
+    ends_on_success: ClassVar[bool] = True
 
     compiled: ClassVar[Callable | None] = None
     measures: ClassVar[tuple[str, ...]] = ()
@@ -77,7 +78,7 @@ class Declaration:
         """Look at the worlds first in a control step, to change `memory`."""
 
     def success(self, worlds: Worlds) -> np.ndarray:
-        """(n,) bool: the task is solved, which ends the episode."""
+        """(n,) bool: the task is solved, which ends the episode unless `ends_on_success` is False."""
         return np.zeros(len(worlds), dtype=np.bool_)
 
     def failure(self, worlds: Worlds) -> np.ndarray:

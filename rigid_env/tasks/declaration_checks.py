@@ -7,7 +7,7 @@ from difflib import get_close_matches
 
 NEAR = 0.68  # likeness from which on a name is taken for a misspelt one
 FUNCTIONS = ("place", "begin", "update", "success", "failure", "rewards", "measure")
-OVERRIDABLE = {"lines", "place_options", "error_name", "area", "goal_draw", "name", "settings", "goal"}
+OVERRIDABLE = {"lines", "place_options", "error_name", "area", "goal_draw", "name", "settings", "goal", "own_arrays"}
 OF_INSTANCES = {
     "action", "clock", "disturbed", "effects", "episodes", "frame_skip", "generators", "info_names", "limits",
     "memory_arrays", "obs", "observed", "outcome", "previous_action", "record", "status", "weights", "world",

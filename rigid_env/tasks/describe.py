@@ -16,6 +16,7 @@ from physics.summary import counted
 from rigid_env.tasks.actions import IMPULSE, TORQUE
 from rigid_env.tasks.declaration import Declaration
 from rigid_env.tasks.draws import parameter_of
+from rigid_env.tasks.goal import GoalTask
 from rigid_env.tasks.task import Task
 
 WIDTH = 79  # of lines of text [characters]
@@ -164,12 +165,21 @@ def _actions(task: Task) -> Section:
 
 
 def _observation(task: Task) -> Section:
-    named = [(name, entry) for entry in task.observed.entries for name in entry.names]
+    parts = {"": task.observed}
+    if isinstance(task, GoalTask):
+        parts = {"observation": task.observed, "goal": task.goals}
     rows = tuple(
-        (str(k), name, f"{entry.low:.12g}", f"{entry.high:.12g}", entry.told_unit)
-        for k, (name, entry) in enumerate(named)
+        (str(k), f"{part}: {name}" if part else name, f"{entry.low:.12g}", f"{entry.high:.12g}", entry.told_unit)
+        for part, entries in parts.items()
+        for k, (name, entry) in enumerate((name, entry) for entry in entries.entries for name in entry.names)
     )
-    text = f"`Box` of {len(rows)} float32. Each number is told in its unit and clipped to its bounds."
+    text = f"`Box` of {task.observed.size} float32."
+    if isinstance(task, GoalTask):
+        text = (
+            f"`Dict` of `observation`, {task.observed.size} float32, and `achieved_goal` and `desired_goal`, "
+            f"{task.goals.size} float32 each."
+        )
+    text += " Each number is told in its unit and clipped to its bounds."
     return Section("Observation Space", (text,), ("Num", "Observation", "Min", "Max", "Unit"), rows)
 
 

@@ -89,6 +89,8 @@ class Observation:
     ----------
     size : int
     low, high : (size,) float32
+    scales : (size,) float64
+        Value of one unit of each number.
 
     Raises
     ------
@@ -116,6 +118,7 @@ class Observation:
         )
         ends = np.cumsum([0, *spread]).tolist()
         self._places = [slice(first, end) for first, end in pairwise(ends)]
+        self.scales = np.repeat([entry.scale for entry in self.entries], spread)
         self._factors = np.repeat([1.0 / entry.scale for entry in self.entries], spread)
         self._targets: tuple[np.ndarray, list] = np.empty((0, self.size)), []
 

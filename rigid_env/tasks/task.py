@@ -83,6 +83,8 @@ class Task(Declaration):
         Declared: what happens to bodies at random times.
     max_episode_steps : int or None
         Declared: control steps after which Gymnasium truncates an episode.
+    ends_on_success : bool
+        Declared: False lets an episode go on.
     world : physics.World
     generators : list of numpy.random.Generator or None
         One per world: an episode does not depend on the batch it runs in.
@@ -462,6 +464,7 @@ class Task(Declaration):
             "action": self.action, "previous action": self.previous_action, "record": self.record, "obs": self.obs,
             "outcome": self.outcome, "status": self.status, "wrench": self.wrench, "weights": self.weights,
             "limits": self.limits, **({} if self.disturbed is None else self.disturbed.arrays),
+            **self.own_arrays(),
             **{f"drawn {name}": array for name, array in self.drawn.items()},
             **{f"memory {name}": array for name, array in self.memory_arrays.items()},
         }  # fmt: skip
@@ -469,6 +472,10 @@ class Task(Declaration):
     def state_arrays(self) -> dict[str, np.ndarray]:
         """Arrays that decide how episodes go on, the worlds apart, by name; each has a row for each world."""
         return {**self._kept_arrays, "steps": self.steps}
+
+    def own_arrays(self) -> dict[str, np.ndarray]:
+        """More arrays of a kind of tasks that a step renews, by name, with a row for each world."""
+        return {}
 
     def set_outcome(self, outcome: np.ndarray) -> None:
         """Take an array for outcomes, once it is known how many numbers they have."""

@@ -1,0 +1,55 @@
+"""Observations and rewards of tasks with goals."""
+
+from __future__ import annotations
+
+import numpy as np
+from gymnasium import spaces
+
+from rigid_env.tasks import Task
+from rigid_env.tasks.goal import GoalTask
+
+
+def lend_goals(task: Task, env) -> None:
+    """Give an environment the method `compute_reward` of a task with goals; others must not have one."""
+    if isinstance(task, GoalTask):
+        env.compute_reward = task.compute_reward
+
+
+class GoalSource:
+    """Observations with both goals beside them, as dicts.
+
+    Parameters
+    ----------
+    task : GoalTask
+    inner : StateSource or PixelSource
+        Of the part ``observation``.
+
+    Attributes
+    ----------
+    space : gymnasium.spaces.Dict
+        Of one world: ``observation``, ``achieved_goal`` and ``desired_goal``.
+    """
+
+    def __init__(self, task: GoalTask, inner):
+        self._task, self._inner = task, inner
+        goal = spaces.Box(task.goals.low, task.goals.high, dtype=np.float32)
+        self.space = spaces.Dict({"observation": inner.space, "achieved_goal": goal, "desired_goal": goal})
+        self.start, self.step = inner.start, inner.step
+
+    @property
+    def arrays(self) -> dict[str, np.ndarray]:
+        """Memory of the source, by name, with the worlds first."""
+        return self._inner.arrays
+
+    def one(self, world: int) -> dict[str, np.ndarray]:
+        """Observation of one world, a copy."""
+        achieved, desired = self._task.achieved_goal[world], self._task.desired_goal[world]
+        return self._dict(self._inner.one(world), achieved.copy(), desired.copy())
+
+    def all(self) -> dict[str, np.ndarray]:
+        """Observations of all worlds, a copy."""
+        return self._dict(self._inner.all(), self._task.achieved_goal.copy(), self._task.desired_goal.copy())
+
+    @staticmethod
+    def _dict(observation, achieved, desired) -> dict[str, np.ndarray]:
+        return {"achieved_goal": achieved, "desired_goal": desired, "observation": observation}

@@ -1,0 +1,123 @@
+"""The block's tasks with goals: reach a place, turn a face down."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from rigid_env.tasks import observe
+from rigid_env.tasks.block import BlockTask
+from rigid_env.tasks.block_draws import OnFloor, OtherFace
+from rigid_env.tasks.block_reach import MARK_RADIUS
+from rigid_env.tasks.entries import Entry
+from rigid_env.tasks.goal import GoalTask
+from rigid_env.tasks.kernels import REACH_TOLERANCE, REORIENT_TOLERANCE, REST_SPEED, REST_SPIN
+
+LENGTH = 5.0  # unit of places [m]
+BOUND = 10.0  # of numbers in observations
+
+
+def _length(vectors: np.ndarray) -> np.ndarray:
+    """(n,) lengths of (n, 3) vectors."""
+    return np.sqrt(np.einsum("ij,ij->i", vectors, vectors))
+
+
+REST = (
+    Entry("speed", "m/s", 0.0, BOUND, lambda worlds: _length(worlds.linvel[:, 0])),
+    Entry("spin", "rad/s", 0.0, BOUND, lambda worlds: _length(worlds.angvel[:, 0])),
+)
+"""How fast the block moves: the last two numbers of a goal, 0 in the one that is wanted."""
+
+MOTION = (
+    observe.height(scale=2.5),
+    observe.linvel(),
+    observe.angvel(),
+    observe.rotation(),
+    observe.wall_gaps(),
+)
+
+
+class BlockGoal(GoalTask, BlockTask):
+    """Base of the block's tasks with goals."""
+
+    def __init__(self, worlds: int = 1, *, reward="sparse", frame_skip=10, **settings):
+        super().__init__(worlds, reward=reward, frame_skip=frame_skip, **settings)
+
+    def shortfall(self, achieved, desired):
+        """Largest of three: miss of the goal, difference of speed and of spin, each over its tolerance."""
+        speed, spin = (np.abs(achieved[..., k] - desired[..., k]) for k in (-2, -1))
+        miss = self.miss(achieved[..., :-2], desired[..., :-2])
+        return np.maximum(miss, np.maximum(speed / REST_SPEED, spin / REST_SPIN))
+
+    def miss(self, achieved, desired) -> np.ndarray:
+        """(...,) distance or angle between goals over its tolerance."""
+        raise NotImplementedError
+
+
+class BlockReachGoal(BlockGoal):
+    """Bring a block to a place on the floor, and keep it at rest there: a task with goals.
+
+    The block, the box and the actions are those of `rigid_env.BlockReachEnv`, at 50 ms for a control step. An
+    observation is a dict. A goal is x and z of the block's centre [5 m], its speed [m/s] and its spin [rad/s]; the one
+    that is wanted has speed and spin 0. It is reached within 0.3 m, 0.1 m/s and 0.1 rad/s.
+    """
+
+    max_episode_steps = 150
+    observation = (Entry(("position x", "position z"), "m", -BOUND, BOUND, lambda w: w.pos[:, 0, ::2], LENGTH), *MOTION)
+    goal_entries = (Entry(("place x", "place z"), "m", -BOUND, BOUND, lambda w: w.pos[:, 0, ::2], LENGTH), *REST)
+    goal_draw = "goal"
+
+    def goal(self):
+        """Places on the floor."""
+        return OnFloor(self.area)
+
+    def desired(self, worlds):
+        """The place that was drawn, at rest."""
+        return np.pad(worlds.drawn["goal"], ((0, 0), (0, 2)))
+
+    def miss(self, achieved, desired):
+        """Distance over its tolerance."""
+        return LENGTH * np.linalg.norm(achieved - desired, axis=-1) / REACH_TOLERANCE
+
+    def goal_mark(self, world):
+        x, z = self.drawn["goal"][world]
+        is_reached = self.is_reached(self.achieved_goal[world], self.desired_goal[world])
+        return {"pos": (x, 0.0, z), "radius": MARK_RADIUS, "reached": bool(is_reached)}
+
+
+class BlockReorientGoal(BlockGoal):
+    """Turn a block so that a face is down, and keep it at rest: a task with goals.
+
+    The block, the box and the actions are those of `rigid_env.BlockReorientEnv`, at 50 ms for a control step. An
+    observation is a dict. A goal is the direction straight down, as the block sees it (three numbers), speed [m/s] and
+    spin [rad/s]; of the one that is wanted the direction is the outward normal of a face, and speed and spin are 0. It
+    is reached within 0.1 rad, 0.1 m/s and 0.1 rad/s.
+    """
+
+    max_episode_steps = 150
+    observation = (*MOTION, Entry(("edge x", "edge y", "edge z"), "m", 0.0, BOUND, lambda w: w.drawn["size"], LENGTH))
+    goal_entries = (
+        Entry(("down x", "down y", "down z"), "1", -1.0, 1.0, lambda worlds: -worlds.rotation[:, 0, 1]),
+        *REST,
+    )
+    goal_draw = "target_face"
+
+    def goal(self):
+        """Any face but the one that is down."""
+        return OtherFace()
+
+    def desired(self, worlds):
+        """Outward normal of the face that was drawn, body frame, at rest."""
+        faces = worlds.drawn["target_face"].astype(np.int64)
+        wanted = np.zeros((len(worlds), 5))
+        wanted[np.arange(len(worlds)), faces // 2] = np.where(faces % 2 == 1, 1.0, -1.0)
+        return wanted
+
+    def miss(self, achieved, desired):
+        """Angle over its tolerance."""
+        # Of unit vectors up to float32: the angle from the chord keeps its digits where it is small.
+        chord = np.linalg.norm(achieved - desired, axis=-1)
+        return 2.0 * np.arcsin(np.minimum(0.5 * chord, 1.0)) / REORIENT_TOLERANCE
+
+    def goal_mark(self, world):
+        is_reached = self.is_reached(self.achieved_goal[world], self.desired_goal[world])
+        return {"goal_face": int(self.drawn["target_face"][world]), "reached": bool(is_reached)}

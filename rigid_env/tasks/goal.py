@@ -1,0 +1,146 @@
+"""Tasks with goals: observations that tell the goal that is wanted and the one that is achieved."""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from collections.abc import Sequence
+from typing import Any, ClassVar
+
+import numpy as np
+
+from physics import validation
+from rigid_env.tasks.entries import Entry, Observation
+from rigid_env.tasks.task import Task
+
+REWARDS = ("sparse", "dense")
+
+
+class GoalTask(Task):
+    """A task whose reward and success follow from two rows of numbers: the goal that is wanted, and the one achieved.
+
+    An algorithm may then ask for the reward of another goal than the one that was wanted, as hindsight experience
+    replay does. Success does not end an episode: a goal is to be kept.
+
+    A subclass declares `goal_entries`, and defines `desired` and `shortfall`.
+
+    Parameters
+    ----------
+    reward : {"sparse", "dense"}
+        Sparse: 0 where the goal is reached, else -1. Dense: minus the shortfall, at most 1 where it is reached.
+    settings
+        As of `Task`.
+
+    Attributes
+    ----------
+    goal_entries : sequence of Entry
+        Declared: names, units and bounds of a goal's numbers, which `read` gives as they are achieved.
+    achieved_goal, desired_goal : (worlds, numbers) float32
+        Of the running episodes, renewed in place.
+
+    References
+    ----------
+    Andrychowicz et al., *Hindsight experience replay*, NeurIPS 2017. Plappert et al., *Multi-goal reinforcement
+    learning*, 2018, which has the form of the observation.
+    """
+
+    goal_entries: ClassVar[Sequence[Entry]]
+    ends_on_success = False
+
+    def __init__(self, worlds: int = 1, *, reward: str = "sparse", **settings):
+        self.reward = validation.one_of(reward, REWARDS, "reward")
+        self._goals = Observation(self.goal_entries)
+        worlds = validation.count(worlds, "worlds")
+        self.achieved_goal = np.zeros((worlds, self._goals.size), dtype=np.float32)
+        self.desired_goal = np.zeros_like(self.achieved_goal)
+        super().__init__(worlds, **settings)
+
+    @property
+    def goals(self) -> Observation:
+        """Entries of a goal."""
+        return self._goals
+
+    @abstractmethod
+    def desired(self, worlds) -> np.ndarray:
+        """(n, numbers) goals that are wanted, in the units of `goal_entries`."""
+
+    @abstractmethod
+    def shortfall(self, achieved: np.ndarray, desired: np.ndarray) -> np.ndarray:
+        """Say how far an achieved goal is from a wanted one.
+
+        Parameters
+        ----------
+        achieved, desired : (..., numbers) float
+            As observed.
+
+        Returns
+        -------
+        (...,) float64
+            0 where they are the same, at most 1 where the goal counts as reached.
+        """
+
+    def compute_reward(self, achieved_goal, desired_goal, info: Any = None) -> np.ndarray:
+        """Reward of achieving one goal where another is wanted.
+
+        Parameters
+        ----------
+        achieved_goal, desired_goal : (..., numbers) array_like
+        info : anything
+            Not looked at: Gymnasium's interface hands it over.
+
+        Returns
+        -------
+        (...,) float64
+
+        Raises
+        ------
+        ValueError
+            Goals of other sizes.
+        """
+        achieved, desired = (np.asarray(goal, dtype=np.float64) for goal in (achieved_goal, desired_goal))
+        size = self._goals.size
+        for name, goal in (("achieved_goal", achieved), ("desired_goal", desired)):
+            if goal.shape[-1:] != (size,):
+                raise ValueError(f"{name} has shape {goal.shape}; allowed are {size} numbers along the last axis")
+        shortfall = self.shortfall(achieved, desired)
+        return np.where(shortfall <= 1.0, 0.0, -1.0) if self.reward == "sparse" else -shortfall
+
+    def is_reached(self, achieved_goal, desired_goal) -> np.ndarray:
+        """(...,) bool: a goal counts as reached."""
+        achieved, desired = (np.asarray(goal, dtype=np.float64) for goal in (achieved_goal, desired_goal))
+        return self.shortfall(achieved, desired) <= 1.0
+
+    # --- functions of the task ----------------------------------------------------------------------------
+
+    def measure(self, worlds):
+        """Note both goals, and tell the shortfall."""
+        rows = worlds.indices
+        achieved = np.empty((len(worlds), self._goals.size), dtype=np.float32)
+        self._goals.read(worlds, achieved)
+        self.achieved_goal[rows] = achieved
+        self.desired_goal[rows] = self.desired(worlds) / self._goals.scales
+        return {"shortfall": self.shortfall(*self._both(rows))}
+
+    def success(self, worlds):
+        """The goal is reached."""
+        return worlds.measured["shortfall"] <= 1.0
+
+    def rewards(self, worlds):
+        """`compute_reward` of what is observed."""
+        rows = worlds.indices
+        return {"goal": self.compute_reward(self.achieved_goal[rows], self.desired_goal[rows])}
+
+    def _both(self, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        return self.achieved_goal[rows].astype(np.float64), self.desired_goal[rows].astype(np.float64)
+
+    def own_arrays(self):
+        """Both goals."""
+        return {"achieved goal": self.achieved_goal, "desired goal": self.desired_goal}
+
+    def __getstate__(self):
+        kept = super().__getstate__()
+        del kept["_goals"]
+        return kept
+
+    def __setstate__(self, kept):
+        self._goals = Observation(self.goal_entries)
+        super().__setstate__(kept)

@@ -1,0 +1,171 @@
+"""Tasks with goals: both goals in the observation, rewards of any pair, hindsight experience replay."""
+
+from __future__ import annotations
+
+import pickle
+
+import gymnasium as gym
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from rigid_env import BlockReachEnv, RigidVecEnv, TaskEnv, TaskVectorEnv, check_task
+from rigid_env.tasks.block_goals import BlockReachGoal, BlockReorientGoal
+
+TASKS = (BlockReachGoal, BlockReorientGoal)
+IDS = ("rigid_env/BlockReachGoal-v0", "rigid_env/BlockReorientGoal-v0")
+
+
+@pytest.mark.parametrize("task", TASKS)
+@pytest.mark.parametrize("reward", ["sparse", "dense"])
+def test_tasks_pass_their_checks(task, reward):
+    check_task(task, contexts=("fork",), reward=reward)
+
+
+@pytest.mark.parametrize("env_id", IDS)
+def test_sb3_check_env_without_a_warning(env_id):
+    import warnings
+
+    from stable_baselines3.common.env_checker import check_env
+
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        check_env(gym.make(env_id).unwrapped, warn=True, skip_render_check=True)
+
+
+@pytest.mark.parametrize("env_id", IDS)
+@pytest.mark.parametrize("reward", ["sparse", "dense"])
+def test_the_reward_is_that_of_the_observed_goals(env_id, reward):
+    envs = gym.make_vec(env_id, num_envs=4, reward=reward)
+    envs.reset(seed=0)
+    rng = np.random.default_rng(1)
+    for _ in range(20):
+        obs, rewards, *_ = envs.step(rng.uniform(-1, 1, (4, 6)))
+        np.testing.assert_array_equal(
+            rewards, envs.unwrapped.compute_reward(obs["achieved_goal"], obs["desired_goal"], {})
+        )
+    other = np.roll(obs["desired_goal"], 1, axis=0)  # of any pair, and of a stack of pairs
+    each = [envs.unwrapped.compute_reward(a, b) for a, b in zip(obs["achieved_goal"], other)]
+    np.testing.assert_array_equal(envs.unwrapped.compute_reward(obs["achieved_goal"], other), each)
+    stack = np.stack([obs["achieved_goal"]] * 2), np.stack([other] * 2)
+    np.testing.assert_array_equal(envs.unwrapped.compute_reward(*stack), [each, each])
+
+
+@pytest.mark.parametrize("task", TASKS)
+def test_a_goal_that_is_achieved_is_reached_and_success_does_not_end_the_episode(task):
+    env = TaskEnv(task)
+    option = {"place": (1.0, 2.0), "face": 2}
+    option |= {"goal": (1.0, 2.0)} if task is BlockReachGoal else {"target_face": 2}
+    obs, info = env.reset(seed=0, options=option)
+    assert info["is_success"] is False  # nothing has been done yet
+    for _ in range(5):
+        obs, reward, is_ended, _, info = env.step(np.zeros(6))
+        assert (reward, is_ended, info["is_success"]) == (0.0, False, True)
+    np.testing.assert_allclose(obs["achieved_goal"], obs["desired_goal"], atol=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("change", "is_reached"),
+    [
+        ({}, True),
+        ({"pos": (0.29, 3.0, 0.0)}, True),
+        ({"pos": (0.31, 3.0, 0.0)}, False),
+        ({"pos": (0.0, 5.0, 0.0)}, True),  # the height does not count
+        ({"linvel": (0.0, 0.09, 0.0)}, True),
+        ({"linvel": (0.0, 0.11, 0.0)}, False),
+        ({"angvel": (0.0, 0.0, 0.09)}, True),
+        ({"angvel": (0.0, 0.0, 0.11)}, False),
+    ],
+)
+def test_place_speed_and_spin_decide(change, is_reached):
+    task = BlockReachGoal(1)
+    task.seed(0, 0)
+    task.start(np.zeros(1, dtype=np.int64), {"goal": (0.0, 0.0)})
+    state = {"pos": (0.0, 3.0, 0.0), "linvel": (0.0, 0.0, 0.0), "angvel": (0.0, 0.0, 0.0), **change}
+    task.world.set_state(**state)
+    worlds = task._functions._all
+    worlds.renew()
+    worlds.measured = task.measure(worlds)
+    assert task.success(worlds)[0] == is_reached
+
+
+@settings(max_examples=50, deadline=None)
+@given(st.floats(-np.pi, np.pi), st.integers(0, 5))
+def test_the_angle_decides_which_face_is_down(turn, face):
+    """A turn about z takes the way down from -y by so much: the shortfall is the angle over 0.1 rad."""
+    task = BlockReorientGoal(1)
+    task.seed(0, 0)
+    task.start(np.zeros(1, dtype=np.int64), {"face": 2, "target_face": face})
+    quat = (np.cos(turn / 2), 0.0, 0.0, np.sin(turn / 2))
+    task.world.set_state(pos=(0, 6, 0), quat=quat, linvel=(0, 0, 0), angvel=(0, 0, 0))
+    worlds = task._functions._all
+    worlds.renew()
+    down = np.array([-np.sin(turn), -np.cos(turn), 0.0])  # Rᵀ (0, -1, 0)
+    axis = np.zeros(3)
+    axis[face // 2] = 1.0 if face % 2 else -1.0
+    expected = np.arctan2(np.linalg.norm(np.cross(down, axis)), down @ axis) / 0.1
+    # Goals are float32: an angle from their chord is off by some 1e-7, near 180° by its root; ten of that over 0.1.
+    assert task.measure(worlds)["shortfall"][0] == pytest.approx(expected, abs=1e-5 if expected < 31 else 2e-2)
+
+
+def test_autoreset_gives_dicts_and_the_last_one_of_each_episode():
+    envs = TaskVectorEnv(2, task=BlockReachGoal, autoreset_mode="SameStep", max_episode_steps=2)
+    first, _ = envs.reset(seed=0)
+    assert set(first) == {"observation", "achieved_goal", "desired_goal"}
+    envs.step(np.zeros((2, 6)))
+    obs, _, _, cuts, infos = envs.step(np.zeros((2, 6)))
+    assert cuts.all()
+    for i in range(2):
+        np.testing.assert_array_equal(infos["final_obs"][i]["desired_goal"], first["desired_goal"][i])
+        assert (obs["desired_goal"][i] != first["desired_goal"][i]).any()
+
+
+def test_goals_go_along_with_states_and_pickles_and_pictures():
+    env = TaskEnv(BlockReachGoal, obs="pixels", obs_size=(12, 16))
+    env.reset(seed=1)
+    state, twin = env.get_state(), pickle.loads(pickle.dumps(env))
+    other = TaskEnv(BlockReachGoal, obs="pixels", obs_size=(12, 16))
+    other.set_state(state)
+    action = np.full(6, 0.3)
+    ours = env.step(action)[0]
+    assert ours["observation"].shape == (12, 16, 3)
+    for copy in (twin, other):
+        theirs = copy.step(action)[0]
+        for key, part in ours.items():
+            np.testing.assert_array_equal(theirs[key], part)
+
+
+def test_hindsight_replay_of_stable_baselines3_takes_the_native_batch():
+    from stable_baselines3 import SAC, HerReplayBuffer
+
+    envs = RigidVecEnv(TaskVectorEnv(2, task=BlockReachGoal, autoreset_mode="SameStep", max_episode_steps=10))
+    model = SAC(
+        "MultiInputPolicy", envs, replay_buffer_class=HerReplayBuffer, learning_starts=40, batch_size=16, seed=0,
+        device="cpu", policy_kwargs={"net_arch": [16]},
+    )  # fmt: skip
+    model.learn(100)
+    samples = model.replay_buffer.sample(200)
+    relabelled = samples.rewards.numpy().ravel()
+    again = envs.env_method("compute_reward", samples.next_observations["achieved_goal"].numpy(),
+                            samples.observations["desired_goal"].numpy(), [{}] * 200, indices=[0])  # fmt: skip
+    assert len(again) == 1
+    np.testing.assert_array_equal(relabelled, again[0])
+    assert (relabelled == 0.0).any()  # some transitions reach the goal that hindsight puts in place
+
+
+def test_what_a_batch_cannot_do_for_some_of_its_worlds_is_refused_still():
+    envs = RigidVecEnv(TaskVectorEnv(2, task=BlockReachGoal, autoreset_mode="SameStep"))
+    with pytest.raises(ValueError, match="indices"):
+        envs.env_method("render", indices=[0])
+
+
+def test_refusals():
+    with pytest.raises(ValueError, match=r"reward is 'shaped'.*sparse, dense"):
+        TaskEnv(BlockReachGoal, reward="shaped")
+    env = TaskEnv(BlockReachGoal)
+    with pytest.raises(ValueError, match=r"desired_goal has shape \(3,\); allowed are 4 numbers"):
+        env.compute_reward(np.zeros(4), np.zeros(3))
+    assert not hasattr(BlockReachEnv(), "compute_reward")
+    with pytest.raises(TypeError, match=r"'acuracy'.*allowed are accuracy"):
+        TaskEnv(BlockReachGoal, acuracy="fast")
