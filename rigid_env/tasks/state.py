@@ -19,6 +19,7 @@ from physics.world import choice, restoring
 
 FORMAT = 1
 HELD = "held "
+OF_ENVIRONMENTS = frozenset(("waiting", "ended", "pictures"))  # parts that a task without an environment leaves out
 KIND = "task state"
 
 
@@ -187,7 +188,7 @@ def put(task, arrays: Mapping[str, np.ndarray], state: TaskState, worlds=None, s
     """
     validation.instance(state, TaskState, "state", "what get_state gives")
     own = {**task.state_arrays(), **arrays}
-    _check(task, own, state)
+    _check(task, own, state, OF_ENVIRONMENTS if not arrays else frozenset())
     places = restoring.places(task.world, state.world, worlds, source)
     chosen = np.arange(task.worlds) if places.worlds is None else places.worlds
     sources = places.source
@@ -225,13 +226,14 @@ def _put_generator(task, world: int, state: dict[str, Any] | None) -> None:
     task.generators[world].bit_generator.state = state
 
 
-def _check(task, own: Mapping[str, np.ndarray], state: TaskState) -> None:
-    """Refuse a state of another task, or of the same with other settings."""
+def _check(task, own: Mapping[str, np.ndarray], state: TaskState, more: frozenset[str]) -> None:
+    """Refuse a state of another task, or of the same with other settings; it may have `more` parts."""
     name = type(task).__name__
     if state.task != name:
         raise ValueError(f"state is {state!r}; allowed are states of {name}")
-    if own.keys() != state.arrays.keys():
-        odd = ", ".join(sorted(own.keys() ^ state.arrays.keys()))
+    odd = own.keys() ^ state.arrays.keys()
+    if odd - more:
+        odd = ", ".join(sorted(odd))
         raise ValueError(f"state is {state!r}, with other parts ({odd}); allowed are states of the same settings")
     count, is_alike = state.worlds, state.worlds == task.worlds
     for part, array in own.items():

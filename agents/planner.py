@@ -1,0 +1,260 @@
+"""Plan without training: sample sequences of actions, roll them out on copies of the environment, keep what is good.
+
+``python -m agents.planner --env rigid_env/BlockReach-v0 --episodes 20`` solves episodes and tells how many, and how
+long one takes. Two ways to improve a plan: MPPI, which averages sequences by the exponential of their return, and the
+cross-entropy method, which fits a normal distribution to the best of them.
+
+References
+----------
+Williams, Aldrich and Theodorou, *Model predictive path integral control*, JGCD 40, 2017. Rubinstein and Kroese, *The
+cross-entropy method*, 2004. Pinneri et al., *Sample-efficient cross-entropy method*, CoRL 2020, for coloured noise and
+kept elites.
+"""
+
+from __future__ import annotations
+
+import statistics
+import time
+from dataclasses import dataclass
+from json import dumps
+from typing import Annotated
+
+import gymnasium as gym
+import numpy as np
+import typer
+from rich.progress import Progress
+
+from agents.evaluate import JsonOption
+from agents.interval import wilson
+from physics import validation
+from rigid_env.envs.making import make_task
+from rigid_env.tasks.layout import FAILURE, REWARD, SUCCESS
+from rigid_env.tasks.state import TaskState, put
+from rigid_env.terminal import Column, Table, make_console, number_columns, run_program
+
+ENV_ID = "rigid_env:rigid_env/BlockReach-v0"
+METHODS = ("mppi", "cem")
+
+
+@dataclass(frozen=True)
+class PlannerSettings:
+    """Settings of a planner.
+
+    Parameters
+    ----------
+    method : {"mppi", "cem"}
+    samples : int
+        Sequences in one iteration.
+    horizon : int
+        Control steps of a sequence.
+    knots : int
+        Actions of a sequence that are drawn; those between are interpolated.
+    iterations : int
+        Improvements of a plan in one control step.
+    noise : float
+        Standard deviation of what is added to knots.
+    temperature : float
+        MPPI: difference of returns over which a weight falls by e, in standard deviations of the returns.
+    elites : int
+        Cross-entropy method: sequences that the distribution is fitted to.
+    replan : int
+        Control steps that are taken of a plan before the next one.
+
+    Raises
+    ------
+    ValueError
+        Naming the field, the value and what is allowed.
+    """
+
+    method: str = "mppi"
+    samples: int = 128
+    horizon: int = 24
+    knots: int = 4
+    iterations: int = 1
+    noise: float = 0.5
+    temperature: float = 0.3
+    elites: int = 4
+    replan: int = 4
+
+    def __post_init__(self):
+        validation.one_of(self.method, METHODS, "method")
+        for field in ("samples", "horizon", "knots", "iterations", "elites", "replan"):
+            validation.count(getattr(self, field), field)
+        for field in ("noise", "temperature"):
+            validation.positive(getattr(self, field), (), field)
+        if not 2 <= self.knots <= self.horizon:
+            raise ValueError(f"knots is {self.knots}; allowed are 2 to the horizon, {self.horizon}")
+        if self.elites > self.samples:
+            raise ValueError(f"elites is {self.elites}; allowed are at most the samples, {self.samples}")
+        if self.replan > self.horizon:
+            raise ValueError(f"replan is {self.replan}; allowed is at most the horizon, {self.horizon}")
+
+
+class Planner:
+    """Plan actions of a task by rolling out samples.
+
+    Parameters
+    ----------
+    task : class of Task, or str
+    settings : PlannerSettings
+    seed : int
+    **of_task
+        Arguments of the task, such as ``accuracy`` and ``threads``: those of the model, which may be coarser than the
+        environment.
+    """
+
+    def __init__(self, task, settings: PlannerSettings | None = None, seed: int = 0, **of_task):
+        self.settings = PlannerSettings() if settings is None else settings
+        self.model = make_task(task, self.settings.samples, of_task)
+        self._rng = np.random.default_rng(seed)
+        self._weights = _interpolation(self.settings.knots, self.settings.horizon)
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget the last plan: another episode begins."""
+        self._mean = np.zeros((self.settings.knots, self.model.action_size))
+        self._spread = np.full_like(self._mean, self.settings.noise)
+
+    def plan(self, state: TaskState) -> np.ndarray:
+        """Improve the plan from a state, and give its next actions.
+
+        Parameters
+        ----------
+        state : TaskState
+            Of one world; `get_state` of an environment.
+
+        Returns
+        -------
+        (replan, numbers) float64
+        """
+        s = self.settings
+        for _ in range(s.iterations):
+            noise = self._rng.standard_normal((s.samples, s.knots, self.model.action_size))
+            noise[0] = 0.0  # the plan itself is among them
+            knots = np.clip(self._mean + self._spread * noise, -1.0, 1.0)
+            returns = self.returns(state, np.einsum("tk,nka->tna", self._weights, knots))
+            self._improve(knots, returns)
+        actions = self._weights @ self._mean
+        self._shift()
+        return actions[: s.replan]
+
+    def returns(self, state: TaskState, actions: np.ndarray) -> np.ndarray:
+        """Returns of sequences of actions (T, samples, numbers), each up to the end of its episode."""
+        model = self.model
+        put(model, {}, state)
+        total, is_running = np.zeros(model.worlds), np.ones(model.worlds, dtype=np.bool_)
+        for row in actions:
+            model.step(row)
+            total += model.outcome[:, REWARD] * is_running
+            ended = model.outcome[:, FAILURE] > 0.0
+            is_running &= ~(ended | (model.outcome[:, SUCCESS] > 0.0) if model.ends_on_success else ended)
+        return total
+
+    def _improve(self, knots: np.ndarray, returns: np.ndarray) -> None:
+        s = self.settings
+        if s.method == "cem":
+            best = knots[np.argsort(-returns)[: s.elites]]
+            self._mean, self._spread = best.mean(axis=0), np.maximum(best.std(axis=0), 0.1 * s.noise)
+            return
+        scale = max(returns.std(), 1e-9) * s.temperature
+        weights = np.exp((returns - returns.max()) / scale)
+        self._mean = np.einsum("n,nka->ka", weights / weights.sum(), knots)
+
+    def _shift(self) -> None:
+        """Move the plan on by the control steps that are taken of it."""
+        s = self.settings
+        times = np.linspace(0, s.horizon - 1, s.knots) + s.replan
+        plan = self._weights @ self._mean
+        last = np.minimum(times, s.horizon - 1)
+        for k in range(self._mean.shape[1]):
+            self._mean[:, k] = np.interp(last, np.arange(s.horizon), plan[:, k])
+        self._spread = np.full_like(self._mean, s.noise)
+
+
+def _interpolation(knots: int, horizon: int) -> np.ndarray:
+    """(horizon, knots) weights of linear interpolation."""
+    times = np.linspace(0.0, knots - 1.0, horizon)
+    return np.maximum(0.0, 1.0 - np.abs(times[:, None] - np.arange(knots)))
+
+
+@dataclass(frozen=True)
+class Solved:
+    """Outcome of planned episodes.
+
+    Attributes
+    ----------
+    is_success : list of bool
+    steps : list of int
+        Control steps of each episode.
+    seconds : list of float
+        CPU time of each, planning and environment together [s].
+    """
+
+    is_success: list[bool]
+    steps: list[int]
+    seconds: list[float]
+
+
+def solve(env: gym.Env, planner: Planner, episodes: int, seed: int = 0, tick=lambda: None) -> Solved:
+    """Plan whole episodes.
+
+    Parameters
+    ----------
+    env : gymnasium.Env
+        Of this package; the planner's model is of its task.
+    planner : Planner
+    episodes : int
+    seed : int
+        Of the first episode; the others follow it.
+    tick : callable
+        Called after each episode.
+    """
+    found = Solved([], [], [])
+    for episode in range(episodes):
+        start = time.process_time()
+        _, info = env.reset(seed=seed + episode)
+        planner.reset()
+        steps, is_over = 0, False
+        while not is_over:
+            for action in planner.plan(env.unwrapped.get_state()):
+                _, _, terminated, truncated, info = env.step(action)
+                steps, is_over = steps + 1, terminated or truncated
+                if is_over:
+                    break
+        found.is_success.append(bool(info["is_success"]))
+        found.steps.append(steps)
+        found.seconds.append(time.process_time() - start)
+        tick()
+    return found
+
+
+def main(
+    env: Annotated[str, typer.Option(help="Gymnasium id of an environment of this package.")] = ENV_ID,
+    episodes: Annotated[int, typer.Option(min=1, help="Episodes to plan.")] = 100,
+    method: Annotated[str, typer.Option(help=f"One of {', '.join(METHODS)}.")] = METHODS[0],
+    samples: Annotated[int, typer.Option(min=1, help="Sequences in one iteration.")] = PlannerSettings.samples,
+    accuracy: Annotated[str, typer.Option(help="Preset of the model; the environment has its default.")] = "fast",
+    seed: Annotated[int, typer.Option(min=0, help="Of the first episode, and of the noise.")] = 1000,
+    json: JsonOption = None,
+) -> None:
+    """Solve episodes by planning, without training."""
+    world = gym.make(env)
+    settings = PlannerSettings(method=method, samples=samples)
+    planner = Planner(type(world.unwrapped.task), settings, seed, accuracy=accuracy)
+    with Progress(console=make_console(), transient=True) as progress:
+        task = progress.add_task("episodes", total=episodes)
+        found = solve(world, planner, episodes, seed, lambda: progress.advance(task))
+    low, high = wilson(sum(found.is_success), episodes)
+    row = {
+        "env": env, "method": method, "success": sum(found.is_success) / episodes, "interval": [low, high],
+        "steps": statistics.fmean(found.steps), "seconds": statistics.median(found.seconds),
+    }  # fmt: skip
+    table = Table([Column("environment"), Column("method"), *number_columns("success", "steps", "CPU s an episode")])
+    table.add_row(env, method, f"{row['success']:.2f}", f"{row['steps']:.0f}", f"{row['seconds']:.2f}")
+    make_console().print(table)
+    if json is not None:
+        json.write_text(dumps(row, indent=2) + "\n", encoding="utf-8")
+
+
+if __name__ == "__main__":
+    run_program(main)
