@@ -28,8 +28,8 @@ from agents.evaluate import JsonOption
 from agents.interval import wilson
 from physics import validation
 from rigid_env.envs.making import make_task
-from rigid_env.tasks.layout import FAILURE, REWARD, SUCCESS
-from rigid_env.tasks.state import TaskState, put
+from rigid_env.tasks.rollout import rollout
+from rigid_env.tasks.state import TaskState
 from rigid_env.terminal import Column, Table, make_console, number_columns, run_program
 
 ENV_ID = "rigid_env:rigid_env/BlockReach-v0"
@@ -132,23 +132,15 @@ class Planner:
             noise = self._rng.standard_normal((s.samples, s.knots, self.model.action_size))
             noise[0] = 0.0  # the plan itself is among them
             knots = np.clip(self._mean + self._spread * noise, -1.0, 1.0)
-            returns = self.returns(state, np.einsum("tk,nka->tna", self._weights, knots))
+            returns = self.returns(state, np.einsum("tk,nka->nta", self._weights, knots))
             self._improve(knots, returns)
         actions = self._weights @ self._mean
         self._shift()
         return actions[: s.replan]
 
     def returns(self, state: TaskState, actions: np.ndarray) -> np.ndarray:
-        """Returns of sequences of actions (T, samples, numbers), each up to the end of its episode."""
-        model = self.model
-        put(model, {}, state)
-        total, is_running = np.zeros(model.worlds), np.ones(model.worlds, dtype=np.bool_)
-        for row in actions:
-            model.step(row)
-            total += model.outcome[:, REWARD] * is_running
-            ended = model.outcome[:, FAILURE] > 0.0
-            is_running &= ~(ended | (model.outcome[:, SUCCESS] > 0.0) if model.ends_on_success else ended)
-        return total
+        """Returns of sequences of actions (samples, horizon, numbers), each up to the end of its episode."""
+        return rollout(self.model, actions, initial=state).returns
 
     def _improve(self, knots: np.ndarray, returns: np.ndarray) -> None:
         s = self.settings

@@ -32,7 +32,10 @@ if TYPE_CHECKING:
         observe,
     )
     from rigid_env.tasks.block_goals import BlockReachGoal, BlockReorientGoal
+    from rigid_env.tasks.block_reach import BlockReach
+    from rigid_env.tasks.block_reorient import BlockReorient
     from rigid_env.tasks.goal import GoalTask
+    from rigid_env.tasks.rollout import TaskRollout, rollout
     from rigid_env.tasks.state import TaskState
 
     __version__: str
@@ -53,20 +56,26 @@ _LAZY = {
     **dict.fromkeys(_OF_TASKS, "rigid_env.tasks"),
     "SceneEnv": "rigid_env.envs.scene",
     "SceneVectorEnv": "rigid_env.envs.scene",
+    "BlockReach": "rigid_env.tasks.block_reach",
     "BlockReachGoal": "rigid_env.tasks.block_goals",
+    "BlockReorient": "rigid_env.tasks.block_reorient",
     "BlockReorientGoal": "rigid_env.tasks.block_goals",
     "GoalTask": "rigid_env.tasks.goal",
     "TaskEnv": "rigid_env.envs.env",
+    "TaskRollout": "rigid_env.tasks.rollout",
     "TaskState": "rigid_env.tasks.state",
     "check_task": "rigid_env.envs.checks",
+    "rollout": "rigid_env.tasks.rollout",
     "TaskVectorEnv": "rigid_env.envs.vector_env",
     "RigidVecEnv": "rigid_env.envs.sb3",  # needs the extra `agents`, so it is not in `__all__`
 }
 
 __all__ = [
+    "BlockReach",
     "BlockReachEnv",
     "BlockReachGoal",
     "BlockReachVectorEnv",
+    "BlockReorient",
     "BlockReorientEnv",
     "BlockReorientGoal",
     "BlockReorientVectorEnv",
@@ -83,6 +92,7 @@ __all__ = [
     "SceneVectorEnv",
     "Task",
     "TaskEnv",
+    "TaskRollout",
     "TaskState",
     "TaskVectorEnv",
     "Uniform",
@@ -92,6 +102,7 @@ __all__ = [
     "observe",
     "register_envs",
     "register_task",
+    "rollout",
 ]
 
 

@@ -57,6 +57,16 @@ def bound(kernel: Callable, *arguments) -> Work:
     return Work([(compiled_entry(kernel, arguments), arguments)])
 
 
+def bound_alike(key, kernel: Callable, *arguments) -> Work:
+    """`bound`, where the kernel and a `key` determine the types of all arguments: to look at each takes a while."""
+    if (kernel, key) not in _ENTRIES:
+        _ENTRIES[kernel, key] = compiled_entry(kernel, arguments)
+    return Work([(_ENTRIES[kernel, key], arguments)])
+
+
+_ENTRIES: dict[tuple, object] = {}
+
+
 @contextmanager
 def compiling():
     """Say on standard error that a kernel is being compiled, if it takes long enough to notice.

@@ -29,6 +29,8 @@ class PreparedWork:
     calls : list of (int, tuple)
         A kernel's entry (`entry`) and its arguments. Arrays are bound, not copied: what they hold when a
         call is made counts.
+    words : list of array, optional
+        Their arguments as a kernel finds them, where others have them already; they are shared.
 
     Attributes
     ----------
@@ -38,9 +40,11 @@ class PreparedWork:
         Makes the calls; whether one raised something, which `reraise` raises.
     """
 
-    def __init__(self, calls: list[tuple[int, tuple]]):
+    def __init__(self, calls: list[tuple[int, tuple]], words: list[np.ndarray] | None = None):
         self._calls = calls  # they own what the table has addresses of
-        self._words = [np.array(_words(arguments), dtype=np.int64) for _, arguments in calls]
+        if words is None:
+            words = [np.array(_words(arguments), dtype=np.int64) for _, arguments in calls]
+        self._words = words
         self._table = np.zeros((len(calls), JOB_SIZE), dtype=np.int64)
         self._table[:, JOB_ENTRY] = [entry for entry, _ in calls]
         self._table[:, JOB_ARGUMENTS] = [words.ctypes.data for words in self._words]
@@ -75,8 +79,8 @@ class PreparedWork:
         return list(accumulate((len(_words((value,))) for value in self._calls[0][1]), initial=0))
 
     def then(self, other: PreparedWork) -> PreparedWork:
-        """These calls, and the other ones after them."""
-        return PreparedWork([*self._calls, *other._calls])
+        """These calls, and the other ones after them; `put` changes the arguments of both."""
+        return PreparedWork([*self._calls, *other._calls], [*self._words, *other._words])
 
 
 @cache

@@ -1,9 +1,4 @@
-"""The loop over time of a rollout, in each thread: all steps of a few worlds, before those of the next ones.
-
-Worlds are independent, so that no thread waits for another one between two steps, and a block of worlds stays in the
-cache of its processor. `fused` has the whole loop in machine code, which calls the step kernel by its address. The
-other compilers call it from Python, once for each step and block.
-"""
+"""Parts of a rollout before each step of a block of worlds, and after it."""
 
 from __future__ import annotations
 
@@ -11,21 +6,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from physics.kernels.compile.compiler_choice import COMPILER, FUSED
-from physics.kernels.compile.decorators import entry_kernel, kernel
+from physics.kernels.compile.decorators import kernel
 from physics.kernels.forces.actuator_lag import apply_actuator_lag, clamp_command
-from physics.kernels.parallel.work_stealing import RANGE_CHUNK, RANGE_END, TAKEN_CHUNK_END, begin_taking, take_chunk
 from physics.kernels.state import layout as at
 from physics.world.report import add_rows
-
-if COMPILER == FUSED:
-    from physics.kernels.compile.fused.prepared_calls import enter_prepared as enter
-else:
-
-    def enter(work):
-        """Make a prepared call; 0, or the exception that it raised."""
-        work.perform()
-        return 0
+from physics.world.rollout_loop import END, FIRST, STEP
 
 
 class Follow(NamedTuple):
@@ -44,8 +29,6 @@ class Course(NamedTuple):
 
     wrenches: np.ndarray  # (worlds, length, bodies, 6) force [N], torque [N m]
     held: np.ndarray  # (rows, 6) wrench of the next step
-    starts: np.ndarray  # (length,) time at which each step begins [s]
-    clock: np.ndarray  # (records,) time that the fields of this thread read [s]; (0,) without fields
     follow: Follow | None
 
 
@@ -79,45 +62,26 @@ def _follow(rows, follow, held):
         apply_actuator_lag(command, follow.gone, follow.kept, 1.0, True, output, applied)
 
 
-@entry_kernel
-def begin_moment(first, end, k, course):
-    """Hold the wrenches of step k of the worlds from `first` to `end`, and set the clock."""
+@kernel
+def begin_moment(moment, course):
+    """Hold the wrenches of a step."""
+    first, end, k = moment[FIRST], moment[END], moment[STEP]
     count = course.wrenches.shape[2]
     for world in range(first, end):
         for b in range(count):
             for c in range(6):
                 course.held[world * count + b, c] = course.wrenches[world, k, b, c]
     _follow(slice(first * count, end * count), course.follow, course.held)
-    for record in range(course.clock.shape[0]):
-        course.clock[record] = course.starts[k]
 
 
-@entry_kernel
-def end_moment(first, end, k, every, state, report, total, samples):
-    """Add up reports of step k of the worlds from `first` to `end`, and keep their states after each `every` steps."""
-    add_rows(first, end, total, report)
-    if (k + 1) % every == 0:
-        place = (k + 1) // every - 1
-        _keep(first, end, place, at.POS, state, samples.pos)
-        _keep(first, end, place, at.QUAT, state, samples.quat)
-        _keep(first, end, place, at.LINVEL, state, samples.linvel)
-        _keep(first, end, place, at.ANGVEL, state, samples.angvel)
-
-
-def roll_out(outer, inner, block, step, course, every, state, report, total, samples):
-    """Take all steps of the worlds that no other thread has taken, a block of them at a time.
-
-    A step that raises an exception ends it.
+@kernel
+def end_moment(moment, every, state, report, total, samples):
+    """Add up reports of a step, and keep states after each `every` steps.
 
     Parameters
     ----------
-    outer, inner : WorkQueue
-        Of this thread among the others, and of the step kernel, which is given one block.
-    block : int
-        Worlds of a block.
-    step : int
-        Prepared call of the step kernel with `inner`: address of a job, or without `fused` its `Work`.
-    course : Course
+    moment : (MOMENT_SIZE,) int64
+        Of `physics.world.rollout_loop`.
     every : int
         Steps from one state that is kept to the next.
     state, report : arrays of the world
@@ -125,23 +89,11 @@ def roll_out(outer, inner, block, step, course, every, state, report, total, sam
         Report of all steps, zero at first.
     samples : Samples
     """
-    begin_taking(outer.turns, outer.taken)
-    while True:
-        start = take_chunk(outer.turns, outer.taken)
-        if start < 0:
-            break
-        stop = outer.taken[TAKEN_CHUNK_END]
-        for first in range(start, stop, block):
-            end = min(first + block, stop)
-            inner.turns[0, RANGE_CHUNK] = end - first
-            inner.turns[0, RANGE_END] = first
-            inner.turns[1, RANGE_END] = end
-            for k in range(course.wrenches.shape[1]):
-                begin_moment(first, end, k, course)
-                if enter(step) != 0:
-                    return
-                end_moment(first, end, k, every, state, report, total, samples)
-
-
-if COMPILER == FUSED:
-    roll_out = kernel(roll_out)
+    first, end, k = moment[FIRST], moment[END], moment[STEP]
+    add_rows(first, end, total, report)
+    if (k + 1) % every == 0:
+        place = (k + 1) // every - 1
+        _keep(first, end, place, at.POS, state, samples.pos)
+        _keep(first, end, place, at.QUAT, state, samples.quat)
+        _keep(first, end, place, at.LINVEL, state, samples.linvel)
+        _keep(first, end, place, at.ANGVEL, state, samples.angvel)

@@ -22,7 +22,7 @@ from physics.kernels.state.groups import (
 from physics.kernels.time_stepping.spring_coupled_step import step_linked
 from physics.kernels.time_stepping.step import step_worlds
 from physics.keywords import known_keywords
-from physics.parallel.bound_call import Work, compiled_entry
+from physics.parallel.bound_call import Work, bound_alike
 from physics.parallel.exclusive import in_use
 from physics.summary import shown
 from physics.world.batch import Batch
@@ -183,8 +183,8 @@ def kernel_calls(
     gravity = world.gravity if plan.gravity else None
     bodies = BodyArrays(world.state, world.params, world.shapes, gravity, wrench.reshape(-1, 6))
     argument_lists = [(queue, grid, bodies, *own_arguments(world, k)) for k, queue in enumerate(queues)]
-    entry = _entry(kernel, (plan.key, len(world.walls)), argument_lists[0])
-    return [Work([(entry, arguments)]) for arguments in argument_lists]
+    key = (plan.key, len(world.walls))
+    return [bound_alike(key, kernel, *arguments) for arguments in argument_lists]
 
 
 def retime(world: Batch, calls: list[Work], steps: int, dt: float) -> None:
@@ -243,13 +243,3 @@ def _world_arguments(world: Batch, k: int) -> tuple:
     plan = world.plan
     switches = _contact(plan), plan.restitution, _flight(plan)
     return *switches, world.sleep_of_kernel(), _records(world), world.scratch[k]
-
-
-def _entry(kernel, key: tuple, arguments: tuple):
-    """Entry of the step kernel for arguments of these types, which `key` determines: to look at each takes a while."""
-    if key not in _ENTRIES:
-        _ENTRIES[key] = compiled_entry(kernel, arguments)
-    return _ENTRIES[key]
-
-
-_ENTRIES: dict[tuple, object] = {}

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import reprlib
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import replace as replace_fields
 from typing import Any
 
@@ -13,7 +13,7 @@ from gymnasium.utils import seeding
 import physics
 from physics import validation
 from physics.kernels.state import layout as at
-from physics.parallel.bound_call import bound, compiled
+from physics.parallel.bound_call import Work, bound_alike, compiled
 from physics.parallel.team import listed
 from physics.world.report import gravest
 from physics.world.setters import start_anew
@@ -135,7 +135,7 @@ class Task(Declaration):
         self._allocate()
         disturbances = self.disturbances if isinstance(self.disturbances, (list, tuple)) else (self.disturbances,)
         kicks = self._table.has_impulses or any(isinstance(each, Push) for each in disturbances)
-        self._advance = Steps(self.world, self.frame_skip, kicks, self._observer if self.compiled else None)
+        self._advance = Steps(self.world, self.frame_skip, kicks, self.observer if self.compiled else None)
         if dump_faults is not None:
             physics.Recorder(self.world, folder=dump_faults)
         self.disturbed = Disturbances(disturbances, self) if disturbances else None
@@ -214,6 +214,11 @@ class Task(Declaration):
     def action_size(self) -> int:
         """Numbers of an action."""
         return self._table.size
+
+    @property
+    def has_impulses(self) -> bool:
+        """An action, or a disturbance, may be an impulse."""
+        return self._advance.kick is not self._advance.wrench
 
     @property
     def action_vectors(self) -> list:
@@ -441,7 +446,7 @@ class Task(Declaration):
 
     def act(self) -> None:
         """Move the worlds by one control step."""
-        bad = self._write_wrenches(*self._wrench_arguments)
+        bad = self._write_wrenches(*self.wrench_arguments)
         if bad >= 0:
             raise ValueError(f"action of world {bad} is {self.action[bad].tolist()}; allowed are finite numbers")
         advance = self._advance
@@ -456,10 +461,10 @@ class Task(Declaration):
     def _prepare(self) -> None:
         """Bind what belongs to this process: machine code, and views of arrays."""
         table, advance = self._table, self._advance
-        self._wrench_arguments = (
+        self.wrench_arguments = (
             self.action, table.table, table.points, self.limits, self.world.state, advance.wrench, advance.kick
         )  # fmt: skip
-        self._write_wrenches = compiled(write_wrenches, self._wrench_arguments)
+        self._write_wrenches = compiled(write_wrenches, self.wrench_arguments)
         self._kept_arrays = {
             "action": self.action, "previous action": self.previous_action, "record": self.record, "obs": self.obs,
             "outcome": self.outcome, "status": self.status, "wrench": self.wrench, "weights": self.weights,
@@ -502,12 +507,10 @@ class Task(Declaration):
         self._prepare()
         self._functions = None if self.compiled else Functions(self, is_first=False)
 
-    def _observer(self, taken: np.ndarray) -> Callable[[], object]:
-        """Return the kernel that observes the worlds that a thread has stepped."""
-        world = self.world
-        return bound(
-            self.compiled, taken, world.state, self.record, world.walls, self.action, self.obs, self.outcome
-        )  # fmt: skip
+    def observer(self, taken: np.ndarray) -> Work:
+        """Return the kernel that observes the worlds of a list, such as a thread has stepped."""
+        arguments = (taken, self.world.state, self.record, self.world.walls, self.action, self.obs, self.outcome)
+        return bound_alike(None, self.compiled, *arguments)
 
 
 def _distributions(declared: Mapping[str, Any], given: Mapping[str, Any] | None) -> dict[str, Distribution]:

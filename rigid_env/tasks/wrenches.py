@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import math
 
-from physics.kernels.compile.decorators import entry_kernel, inlined
+from physics.kernels.compile.decorators import entry_kernel, inlined, kernel
 from physics.kernels.math import quaternion as qt
 from physics.kernels.state import layout as at
+from physics.world.rollout_loop import END, FIRST, STEP
 
 KIND, BODY, FIRST_NUMBER, IN_BODY_FRAME = 0, 1, 2, 5  # columns of `actions.ActionTable.table`
 TORQUE, IMPULSE = 1, 2  # kinds, as in `rigid_env.tasks.actions`
@@ -22,6 +23,38 @@ def clip(x, low, high):
 def _number(actions, i, k):
     """Number k of an action, clipped to ±1; 0 for an axis without one."""
     return clip(actions[i, k], -1.0, 1.0) if k >= 0 else 0.0
+
+
+@kernel
+def write_wrench(i, actions, table, points, limits, state, wrench, kick):
+    """Wrenches of world i from row i of `actions`; arguments as of `write_wrenches`."""
+    bodies = wrench.shape[1]
+    for b in range(bodies):
+        for k in range(6):
+            wrench[i, b, k] = 0.0
+            kick[i, b, k] = 0.0
+    for v in range(table.shape[0]):
+        x = _number(actions, i, table[v, FIRST_NUMBER])
+        y = _number(actions, i, table[v, FIRST_NUMBER + 1])
+        z = _number(actions, i, table[v, FIRST_NUMBER + 2])
+        scale = limits[i, v] / max(1.0, math.sqrt(x * x + y * y + z * z))
+        vector = (scale * x, scale * y, scale * z)
+        kind, body = table[v, KIND], table[v, BODY]
+        row = i * bodies + body
+        q = (state[row, at.QUAT], state[row, at.QUAT + 1], state[row, at.QUAT + 2], state[row, at.QUAT + 3])
+        R = qt.to_matrix(q)
+        if table[v, IN_BODY_FRAME] == 1:
+            vector = qt.matvec(R, vector)
+        out = kick if kind == IMPULSE else wrench
+        first = 3 if kind == TORQUE else 0
+        out[i, body, first] += vector[0]
+        out[i, body, first + 1] += vector[1]
+        out[i, body, first + 2] += vector[2]
+        if points[v, 0] != 0.0 or points[v, 1] != 0.0 or points[v, 2] != 0.0:
+            torque = qt.cross(qt.matvec(R, (points[v, 0], points[v, 1], points[v, 2])), vector)
+            out[i, body, 3] += torque[0]
+            out[i, body, 4] += torque[1]
+            out[i, body, 5] += torque[2]
 
 
 @entry_kernel
@@ -48,32 +81,25 @@ def write_wrenches(actions, table, points, limits, state, wrench, kick):
         for k in range(actions.shape[1]):
             if not math.isfinite(actions[i, k]):
                 return i
-    bodies = wrench.shape[1]
     for i in range(actions.shape[0]):
-        for b in range(bodies):
-            for k in range(6):
-                wrench[i, b, k] = 0.0
-                kick[i, b, k] = 0.0
-        for v in range(table.shape[0]):
-            x = _number(actions, i, table[v, FIRST_NUMBER])
-            y = _number(actions, i, table[v, FIRST_NUMBER + 1])
-            z = _number(actions, i, table[v, FIRST_NUMBER + 2])
-            scale = limits[i, v] / max(1.0, math.sqrt(x * x + y * y + z * z))
-            vector = (scale * x, scale * y, scale * z)
-            kind, body = table[v, KIND], table[v, BODY]
-            row = i * bodies + body
-            q = (state[row, at.QUAT], state[row, at.QUAT + 1], state[row, at.QUAT + 2], state[row, at.QUAT + 3])
-            R = qt.to_matrix(q)
-            if table[v, IN_BODY_FRAME] == 1:
-                vector = qt.matvec(R, vector)
-            out = kick if kind == IMPULSE else wrench
-            first = 3 if kind == TORQUE else 0
-            out[i, body, first] += vector[0]
-            out[i, body, first + 1] += vector[1]
-            out[i, body, first + 2] += vector[2]
-            if points[v, 0] != 0.0 or points[v, 1] != 0.0 or points[v, 2] != 0.0:
-                torque = qt.cross(qt.matvec(R, (points[v, 0], points[v, 1], points[v, 2])), vector)
-                out[i, body, 3] += torque[0]
-                out[i, body, 4] += torque[1]
-                out[i, body, 5] += torque[2]
+        write_wrench(i, actions, table, points, limits, state, wrench, kick)
     return -1
+
+
+@kernel
+def begin_control(moment, actions, action, table, points, limits, state, wrench, kick):
+    """Take the actions of a step of a rollout, and hold their wrenches.
+
+    Parameters
+    ----------
+    moment : (MOMENT_SIZE,) int64
+        Of `physics.world.rollout_loop`.
+    actions : (worlds, length, numbers) float64
+    action : (worlds, numbers) float64, out
+    table, points, limits, state, wrench, kick
+        As of `write_wrenches`.
+    """
+    for i in range(moment[FIRST], moment[END]):
+        for k in range(action.shape[1]):
+            action[i, k] = actions[i, moment[STEP], k]
+        write_wrench(i, action, table, points, limits, state, wrench, kick)

@@ -1,0 +1,166 @@
+"""The loop over time of a rollout, in each thread: all steps of a few worlds, before those of the next ones.
+
+Worlds are independent, so that no thread waits for another one between two steps, and a block of worlds stays in the
+cache of its processor. `fused` has the whole loop in machine code, which makes prepared calls by their address. The
+other compilers make them from Python, once for each step and block.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import NoReturn
+
+import numpy as np
+
+from physics.kernels.compile.compiler_choice import COMPILER, FUSED
+from physics.kernels.compile.decorators import kernel
+from physics.kernels.parallel import work_stealing
+from physics.kernels.parallel.work_stealing import RANGE_CHUNK, RANGE_END, TAKEN_CHUNK_END, begin_taking, take_chunk
+from physics.kernels.state.groups import WorkQueue
+from physics.kernels.time_stepping.workspace import body_records
+from physics.parallel.bound_call import Work, bound_alike
+from physics.scene.field_errors import raised
+from physics.world.batch import Batch
+from physics.world.stepper import kernel_calls
+
+if COMPILER == FUSED:
+    from physics.kernels.parallel.prepared_calls import run_jobs as perform_all
+else:
+
+    def perform_all(work, _count):
+        """Make prepared calls; False, or the exception that one raised."""
+        return work.perform()
+
+
+# Worlds that a thread steps through all of time before the next ones: few enough for the cache of a processor, and
+# enough that the calls are a small part of the step.
+BLOCK = 8
+
+# `moment`, of one thread: the first of the worlds that are stepped, their end, and which step it is.
+FIRST, END, STEP, MOMENT_SIZE = range(4)
+
+
+def roll_out(outer, inner, block, starts, clock, moment, calls, count):
+    """Take all steps of the worlds that no other thread has taken, a block of them at a time.
+
+    A call that raises an exception ends it.
+
+    Parameters
+    ----------
+    outer, inner : WorkQueue
+        Of this thread among the others, and of the step kernel, which is given one block.
+    block : int
+        Worlds of a block.
+    starts : (length,) float64
+        Time at which each step begins [s].
+    clock : (records,) float64, out
+        Time that the fields of this thread read [s]; (0,) without fields.
+    moment : (MOMENT_SIZE,) int64, out
+        Where it is: what the calls besides that of the step kernel read.
+    calls, count : int
+        Address of the table of prepared calls of one step, and their number; without `fused` their `Work`.
+    """
+    begin_taking(outer.turns, outer.taken)
+    while True:
+        start = take_chunk(outer.turns, outer.taken)
+        if start < 0:
+            break
+        stop = outer.taken[TAKEN_CHUNK_END]
+        for first in range(start, stop, block):
+            end = min(first + block, stop)
+            inner.turns[0, RANGE_CHUNK] = end - first
+            inner.turns[0, RANGE_END] = first
+            inner.turns[1, RANGE_END] = end
+            moment[FIRST], moment[END] = first, end
+            for k in range(starts.shape[0]):
+                moment[STEP] = k
+                for record in range(clock.shape[0]):
+                    clock[record] = starts[k]
+                if perform_all(calls, count):
+                    return
+
+
+if COMPILER == FUSED:
+    roll_out = kernel(roll_out)
+
+
+def run(
+    world: Batch,
+    wrench: np.ndarray,
+    steps: int,
+    dt: float,
+    length: int,
+    around: Callable[[np.ndarray, np.ndarray], tuple[Work, Work]],
+) -> np.ndarray:
+    """Step every world `length` times, `steps` steps of `dt` [s] each.
+
+    Parameters
+    ----------
+    world : Batch
+        Without a recorder, and without an actuator that has to be asked between two steps.
+    wrench : (worlds, bodies, 6) float64
+        Of the step to come; the actuator's own output where there is one. Written by the calls of `around`.
+    steps, dt, length : int, float, int
+    around : callable
+        From the `moment` of a thread, and the list of worlds that its last step took, to what it does before a step and
+        after it.
+
+    Returns
+    -------
+    (length,) float64
+        Time after each step [s].
+
+    Raises
+    ------
+    Exception
+        What a field of the user's raises; worlds are then somewhere on their way.
+    """
+    moments = np.full(1 + length, steps * dt)
+    moments[0] = world.time
+    np.add.accumulate(moments, out=moments)  # as times add up step by step
+    inner = [WorkQueue(work_stealing.make_ranges(1, world.worlds, BLOCK),
+                       work_stealing.make_taken_lists(1, world.worlds)[0]) for _ in world.team.queues]  # fmt: skip
+    stepping = kernel_calls(world, wrench, steps, dt, inner)
+    chains, loops = [], []
+    for k, outer in enumerate(world.team.queues):
+        moment = np.zeros(MOMENT_SIZE, dtype=np.int64)
+        before, after = around(moment, inner[k].taken)
+        chain = before.then(stepping[k]).then(after)
+        chains.append(chain)
+        loops.append(_prepared((outer, inner[k], BLOCK, moments[:-1], _clock(world, k), moment), chain))
+    try:
+        world.team.run(loops)
+        for chain in chains:
+            chain.raise_again()
+    except Exception as error:
+        _raise_again(error, world)
+    world.time = float(moments[-1])
+    return moments[1:]
+
+
+def _raise_again(error: Exception, world: Batch) -> NoReturn:
+    raise raised(error, world.plan.fields)
+
+
+def _clock(world: Batch, k: int) -> np.ndarray:
+    """Time that the fields of a thread read, (records,) [s]."""
+    return np.atleast_1d(body_records(world.scratch[k])["call_start"]) if world.plan.fields else np.zeros(0)
+
+
+class _Loop:
+    """`roll_out` run by Python, in a thread of a pool."""
+
+    def __init__(self, arguments: tuple):
+        self._arguments = arguments
+
+    def perform(self) -> bool:
+        """Run it; raises what a step raises."""
+        roll_out(*self._arguments)
+        return False
+
+
+def _prepared(arguments: tuple, chain: Work):
+    if COMPILER != FUSED:
+        return _Loop((*arguments, chain, 0))
+    arguments = (*arguments, chain.jobs, chain.count)
+    return bound_alike(arguments[4].flags.c_contiguous, roll_out, *arguments)

@@ -1,0 +1,228 @@
+"""Rollouts of a task: a sequence of actions for each world, and the rewards that they earn."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from physics import validation
+from physics.keywords import known_keywords
+from physics.parallel.bound_call import Work, bound_alike
+from physics.parallel.exclusive import exclusive
+from physics.summary import lines_repr
+from physics.world import rollout_loop
+from physics.world.batch_arrays import machine_memory
+from physics.world.report import Status, gravest
+from rigid_env.tasks import layout as col
+from rigid_env.tasks.rollout_steps import Kept, end_control
+from rigid_env.tasks.state import TaskState, put, take
+from rigid_env.tasks.task import Task
+from rigid_env.tasks.wrenches import begin_control
+
+MEBIBYTE = 2**20
+
+
+@dataclass(frozen=True, eq=False)
+class TaskRollout:
+    """What a batch of worlds earned along a rollout.
+
+    Attributes
+    ----------
+    rewards : (worlds, length) float64
+    success, failure : (worlds, length) bool
+    observations : (worlds, samples, entries) float32 or None
+        None where they were not asked for.
+    status : (worlds,) int64
+        Values of `physics.Status`: the gravest thing that happened in any step.
+    ends_on_success : bool
+        Whether an episode ends with its success.
+    """
+
+    rewards: np.ndarray
+    success: np.ndarray
+    failure: np.ndarray
+    observations: np.ndarray | None
+    status: np.ndarray
+    ends_on_success: bool
+
+    @property
+    def lengths(self) -> np.ndarray:
+        """(worlds,) int64. Control steps up to the first that ends an episode, itself included; else all."""
+        ends = self.failure | self.success if self.ends_on_success else self.failure
+        return np.where(ends.any(axis=1), ends.argmax(axis=1) + 1, ends.shape[1])
+
+    @property
+    def returns(self) -> np.ndarray:
+        """(worlds,) float64. Sums of the rewards up to the end of each episode."""
+        counts = np.arange(self.rewards.shape[1]) < self.lengths[:, None]
+        return np.where(counts, self.rewards, 0.0).sum(axis=1)
+
+    @property
+    def _worst(self) -> Status:
+        return Status(max(self.status.tolist(), key=Status.severity))
+
+    @property
+    def nbytes(self) -> int:
+        """Memory of its arrays [bytes]."""
+        arrays = (self.rewards, self.success, self.failure, self.observations, self.status)
+        return sum(array.nbytes for array in arrays if array is not None)
+
+    def __repr__(self) -> str:
+        worlds, length = self.rewards.shape
+        observed = "no observations" if self.observations is None else f"{self.observations.shape[1]} observations"
+        return lines_repr(
+            "TaskRollout", f"{worlds} worlds", f"{length} control steps", observed,
+            f"returns {self.returns.min():.4g} to {self.returns.max():.4g}", f"status {self._worst.name}",
+            f"{self.nbytes / MEBIBYTE:.3g} MiB",
+        )  # fmt: skip
+
+
+@known_keywords
+def rollout(
+    task: Task,
+    actions: ArrayLike,
+    initial: TaskState | None = None,
+    observations: bool = False,
+    every: int = 1,
+    out: TaskRollout | None = None,
+) -> TaskRollout:
+    """Step every world of a task with its own sequence of actions, and keep what they earn.
+
+    The same bits as `Task.step` with one action after another. No episode starts anew: what a world does after the
+    end of its own is in the arrays too, and is left out of `TaskRollout.returns`. Afterwards the task is where the last
+    step left it.
+
+    Parameters
+    ----------
+    task : Task
+        A batch of worlds: ``MyTask(128)``, or an environment's ``unwrapped.task``.
+    actions : (worlds, length, action_size) array_like
+        Clipped to ±1.
+    initial : TaskState, optional
+        Where all worlds begin: a state of one world for all of them, or of as many (``env.unwrapped.get_state()``).
+        None: where they are.
+    observations : bool
+        Keep observations, too.
+    every : int
+        Control steps from one observation that is kept to the next; a divisor of their number.
+    out : TaskRollout, optional
+        One of the same sizes, to be overwritten and returned.
+
+    Returns
+    -------
+    TaskRollout
+        Its arrays take 10 bytes a control step, and 4 bytes a number of an observation that is kept.
+
+    Raises
+    ------
+    ValueError
+        An argument of the wrong shape or out of range, or more observations than this machine's memory holds; a
+        function of the task that gives what it may not. Nothing has changed then.
+    RuntimeError
+        Another thread is stepping or changing this world.
+
+    Notes
+    -----
+    Of a compiled task the loop runs in machine code, in each thread. One whose functions are NumPy is stepped from
+    Python, one call a control step for the whole batch, and so is one with impulses, disturbances, an actuator or
+    `dump_faults`.
+    """
+    validation.instance(task, Task, "task", "a Task, such as env.unwrapped.task")
+    actions = _actions(task, actions)
+    length = actions.shape[1]
+    every = validation.count(every, "every")
+    if length % every:
+        raise ValueError(f"every is {every}; allowed are divisors of {length}, the number of actions of a world")
+    validation.instance(observations, bool, "observations", "True or False")
+    kept = _room(task, length, length // every if observations else 0, out)
+    before = take(task, {}, [None] * task.worlds) if task.compiled is None or task.world.plan.may_raise else None
+    if initial is not None:
+        put(task, {}, initial)
+    try:
+        if _needs_python(task):
+            status = _one_by_one(task, actions, every, kept)
+        else:
+            status = _all_at_once(task.world, task, actions, every, kept)
+    except BaseException:
+        if before is not None:
+            put(task, {}, before)
+        raise
+    return TaskRollout(*kept[:3], kept.observations if observations else None, status, task.ends_on_success)
+
+
+def _actions(task: Task, actions: ArrayLike) -> np.ndarray:
+    """`actions` as contiguous float64 (worlds, length, action_size), all finite."""
+    allowed = f"({task.worlds}, length, {task.action_size})"
+    array = validation.floats(actions, "actions", f"are numbers in shape {allowed}")
+    if array.ndim != 3 or array.shape[1] == 0 or array.shape[::2] != (task.worlds, task.action_size):
+        raise ValueError(f"actions has shape {array.shape}; allowed is {allowed}, with a length of at least 1")
+    return np.ascontiguousarray(validation.finite(array, array.shape, "actions"))
+
+
+def _room(task: Task, length: int, samples: int, out: TaskRollout | None) -> Kept:
+    """Arrays to keep things in: those of `out`, or new ones; refused where this machine's memory does not hold them."""
+    worlds, entries = task.obs.shape
+    if out is not None:
+        return _checked(out, worlds, length, (worlds, samples, entries))
+    needed, memory = worlds * (10 * length + 4 * samples * entries), machine_memory()
+    if needed > memory:
+        raise ValueError(
+            f"{length} control steps of {worlds} worlds need {needed / 2**30:.3g} GiB, and this machine has "
+            f"{memory / 2**30:.3g} GiB of memory; allowed are fewer: raise `every`, or leave out `observations`"
+        )
+    flags = (np.empty((worlds, length), dtype=np.bool_) for _ in range(2))
+    observed = np.empty((worlds, samples, entries), dtype=np.float32)
+    return Kept(np.empty((worlds, length)), *flags, observed)
+
+
+def _checked(out: TaskRollout, worlds: int, length: int, shape: tuple[int, int, int]) -> Kept:
+    validation.instance(out, TaskRollout, "out", "None or a TaskRollout")
+    observed = np.empty((worlds, 0, shape[2]), dtype=np.float32) if out.observations is None else out.observations
+    if out.rewards.shape != (worlds, length) or observed.shape != shape:
+        raise ValueError(
+            f"out is {out!r}; allowed is one of {worlds} worlds, {length} control steps and {shape[1]} observations"
+        )
+    return Kept(out.rewards, out.success, out.failure, observed)
+
+
+def _needs_python(task: Task) -> bool:
+    """True if something is to be done in Python between two control steps."""
+    world = task.world
+    if task.compiled is None or task.disturbed is not None or task.has_impulses:
+        return True
+    return world.actuation is not None or world.recorder is not None
+
+
+def _one_by_one(task: Task, actions: np.ndarray, every: int, kept: Kept) -> np.ndarray:
+    """Take control steps from Python; the gravest `status` of each world."""
+    gravity = np.array([Status.severity(status) for status in Status])
+    status = np.full(task.worlds, Status.OK, dtype=np.int64)
+    for k in range(actions.shape[1]):
+        task.step(actions[:, k])
+        outcome = task.outcome
+        kept.rewards[:, k] = outcome[:, col.REWARD]
+        kept.success[:, k], kept.failure[:, k] = outcome[:, col.SUCCESS] > 0.0, outcome[:, col.FAILURE] > 0.0
+        np.copyto(status, task.status, where=gravity[task.status] > gravity[status])
+        if kept.observations.shape[1] and (k + 1) % every == 0:
+            kept.observations[:, (k + 1) // every - 1] = task.obs
+    return status
+
+
+@exclusive
+def _all_at_once(world, task: Task, actions: np.ndarray, every: int, kept: Kept) -> np.ndarray:
+    """Take control steps in machine code; the gravest `status` of each world."""
+    total, length = np.zeros_like(world.report_table), actions.shape[1]
+
+    def around(moment, taken) -> tuple[Work, Work]:
+        before = bound_alike(None, begin_control, moment, actions, *task.wrench_arguments)
+        keep = bound_alike(None, end_control, moment, every, task.outcome, task.obs, world.report_table, total, kept)
+        return before, task.observer(taken).then(keep)
+
+    rollout_loop.run(world, task.wrench, task.frame_skip, world.dt, length, around)
+    task.clock += length
+    gravest(world.report_table, task.status)
+    status = np.empty_like(task.status)
+    gravest(total, status)
+    return status

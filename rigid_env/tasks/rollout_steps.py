@@ -1,0 +1,48 @@
+"""Part of a task's rollout after each control step of a block of worlds: what it keeps."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from physics.kernels.compile.decorators import kernel
+from physics.world.report import add_rows
+from physics.world.rollout_loop import END, FIRST, STEP
+from rigid_env.tasks import layout as col
+
+
+class Kept(NamedTuple):
+    """Arrays of a rollout, with the worlds first."""
+
+    rewards: np.ndarray  # (worlds, length) float64
+    success: np.ndarray  # (worlds, length) bool
+    failure: np.ndarray  # (worlds, length) bool
+    observations: np.ndarray  # (worlds, samples, entries) float32; (worlds, 0, entries): none are kept
+
+
+@kernel
+def end_control(moment, every, outcome, obs, report, total, kept):
+    """Keep rewards, flags and observations of a step, and add up reports.
+
+    Parameters
+    ----------
+    moment : (MOMENT_SIZE,) int64
+        Of `physics.world.rollout_loop`.
+    every : int
+        Steps from one observation that is kept to the next.
+    outcome, obs : arrays of the task
+    report, total : (worlds, REPORT_SIZE) float64
+        Of the step, and of all steps before, zero at first.
+    kept : Kept
+    """
+    first, end, k = moment[FIRST], moment[END], moment[STEP]
+    add_rows(first, end, total, report)
+    is_kept = kept.observations.shape[1] > 0 and (k + 1) % every == 0
+    for world in range(first, end):
+        kept.rewards[world, k] = outcome[world, col.REWARD]
+        kept.success[world, k] = outcome[world, col.SUCCESS] > 0.0
+        kept.failure[world, k] = outcome[world, col.FAILURE] > 0.0
+        if is_kept:
+            for c in range(obs.shape[1]):
+                kept.observations[world, (k + 1) // every - 1, c] = obs[world, c]
