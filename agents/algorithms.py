@@ -6,10 +6,12 @@ from collections.abc import Callable
 from typing import Any
 
 import gymnasium as gym
+import numpy as np
 import torch
 from gymnasium.vector import AutoresetMode
-from stable_baselines3 import PPO, SAC
+from stable_baselines3 import PPO, SAC, HerReplayBuffer
 from stable_baselines3.common.base_class import BaseAlgorithm
+from stable_baselines3.common.noise import OrnsteinUhlenbeckActionNoise
 
 import physics
 from agents.config import RunConfig
@@ -68,13 +70,19 @@ def make_training_env(config: RunConfig) -> RigidVecEnv:
     return env
 
 
-def algorithm_arguments(config: RunConfig) -> dict[str, Any]:
-    """Keyword arguments of the algorithm's class, with names of torch classes looked up.
+def algorithm_arguments(config: RunConfig, action_size: int = 6) -> dict[str, Any]:
+    """Keyword arguments of the algorithm's class, with what YAML cannot hold made from names and numbers.
+
+    Parameters
+    ----------
+    config : RunConfig
+    action_size : int
+        Numbers of an action.
 
     Raises
     ------
     ValueError
-        If `torch.nn` has no such activation.
+        If `torch.nn` has no such activation, or an entry has keys that nothing reads.
     """
     arguments = dict(config.algorithm)
     policy = dict(arguments.pop("policy_kwargs", {}))
@@ -83,9 +91,23 @@ def algorithm_arguments(config: RunConfig) -> dict[str, Any]:
         if not hasattr(torch.nn, name):
             raise ValueError(f"policy_kwargs.activation_fn is {name!r}; allowed are class names of torch.nn")
         policy["activation_fn"] = getattr(torch.nn, name)
+    if "hindsight" in arguments:
+        arguments["replay_buffer_class"] = HerReplayBuffer
+        arguments["replay_buffer_kwargs"] = arguments.pop("hindsight")
+    if "action_noise" in arguments:
+        arguments["action_noise"] = _slow_noise(arguments["action_noise"], action_size)
     return {**arguments, "policy_kwargs": policy}
+
+
+def _slow_noise(given: dict[str, float], size: int) -> OrnsteinUhlenbeckActionNoise:
+    """Noise that lasts for some steps: white noise cancels out before a block has moved."""
+    if given.keys() != {"sigma", "theta"}:
+        raise ValueError(f"action_noise has the keys {', '.join(given)}; allowed are sigma, theta")
+    return OrnsteinUhlenbeckActionNoise(np.zeros(size), np.full(size, given["sigma"]), given["theta"], dt=1.0)
 
 
 def make_model(config: RunConfig, env: RigidVecEnv) -> BaseAlgorithm:
     """A new model on the CPU, where small networks are fastest."""
-    return CLASSES[config.algo]("MlpPolicy", env, seed=config.seed, device="cpu", **algorithm_arguments(config))
+    policy = "MultiInputPolicy" if isinstance(env.observation_space, gym.spaces.Dict) else "MlpPolicy"
+    arguments = algorithm_arguments(config, env.action_space.shape[0])
+    return CLASSES[config.algo](policy, env, seed=config.seed, device="cpu", **arguments)

@@ -24,6 +24,9 @@ from agents.config import RunConfig, RunFolder
 
 KEPT = 3  # newest checkpoints of a run; older ones are deleted
 
+# Of a model that only acts: no memory for a replay buffer, and no environment that one would ask for rewards.
+WITHOUT_REPLAY = {"replay_buffer_class": None, "replay_buffer_kwargs": {}, "buffer_size": 1}
+
 MODEL, REPLAY, STATE = "model.zip", "replay_buffer.pkl", "state.pkl"
 
 
@@ -95,12 +98,11 @@ def load_checkpoint(run: RunFolder, config: RunConfig) -> tuple[BaseAlgorithm, A
     found = list_checkpoints(run.checkpoints)
     if not found:
         raise ValueError(f"run is {str(run.path)!r}; allowed is one with a checkpoint")
-    model = CLASSES[config.algo].load(found[-1] / MODEL, device="cpu")
-    if isinstance(model, OffPolicyAlgorithm):
-        model.load_replay_buffer(found[-1] / REPLAY)
     with (found[-1] / STATE).open("rb") as file:
         state = pickle.load(file)
-    model.set_env(state["env"], force_reset=False)
+    model = CLASSES[config.algo].load(found[-1] / MODEL, env=state["env"], device="cpu", force_reset=False)
+    if isinstance(model, OffPolicyAlgorithm):
+        model.load_replay_buffer(found[-1] / REPLAY, truncate_last_traj=False)
     torch.set_rng_state(state["torch"])
     np.random.get_bit_generator().state = state["numpy"]
     random.setstate(state["python"])
@@ -124,7 +126,7 @@ def load_policy(run: RunFolder) -> tuple[RunConfig, Policy]:
     if not found:
         raise ValueError(f"run is {str(run.path)!r}; allowed is one with a model.zip or a checkpoint")
     torch.set_num_threads(config.torch_threads)
-    return config, greedy(CLASSES[config.algo].load(found[-1], device="cpu"))
+    return config, greedy(CLASSES[config.algo].load(found[-1], device="cpu", custom_objects=WITHOUT_REPLAY))
 
 
 def greedy(model: BaseAlgorithm) -> Policy:

@@ -39,7 +39,8 @@ class RunConfig:
     torch_threads : int
     algorithm : dict
         Keyword arguments of the class in Stable-Baselines3; ``policy_kwargs.activation_fn`` by its name in
-        `torch.nn`.
+        `torch.nn`. ``hindsight`` holds the arguments of its `HerReplayBuffer`, for environments with goals;
+        ``action_noise`` the ``sigma`` and ``theta`` of an Ornstein-Uhlenbeck process, per control step.
     env_kwargs : dict
         Further arguments of the environment.
 

@@ -7,6 +7,7 @@ import os
 from collections import deque
 from dataclasses import asdict, dataclass, field, fields
 from pathlib import Path
+from typing import Any
 
 WINDOW = 500  # finished episodes whose mean is shown, and held against the target
 
@@ -53,6 +54,8 @@ class History:
         Made so far.
     points : list of CurvePoint
     window : deque of (success, return, length)
+    noise : ActionNoise, optional
+        Of the exploration, at the checkpoint: Stable-Baselines3 resets it where learning goes on.
     """
 
     seconds: float = 0.0
@@ -62,6 +65,7 @@ class History:
     confirmations: int = 0
     points: list[CurvePoint] = field(default_factory=list)
     window: deque[tuple[bool, float, int]] = field(default_factory=lambda: deque(maxlen=WINDOW))
+    noise: Any = None
 
     def add(self, success: bool, episode_return: float, length: int) -> None:
         """Count a finished episode."""

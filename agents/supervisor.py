@@ -53,6 +53,8 @@ class Supervisor(BaseCallback):
     def _on_training_start(self) -> None:
         self._open_monitor()
         self._start = time.perf_counter() - self.history.seconds
+        if self.history.noise is not None:
+            self.model.action_noise = self.history.noise
 
     def _on_rollout_start(self) -> None:
         """Between two updates: the only moment at which all of the run is in a state to be kept."""
@@ -121,6 +123,7 @@ class Supervisor(BaseCallback):
     def _checkpoint(self) -> None:
         self._monitor.flush()
         self.history.monitor_size = self._monitor.tell()
+        self.history.noise = getattr(self.model, "action_noise", None)
         save_checkpoint(self.run_folder.checkpoints, self.model, self.history)
         write_curve(self.history.points, self.run_folder.curve)
         self._last_checkpoint = self.history.seconds

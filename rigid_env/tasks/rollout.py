@@ -26,14 +26,14 @@ MEBIBYTE = 2**20
 
 @dataclass(frozen=True, eq=False)
 class TaskRollout:
-    """What a batch of worlds earned along a rollout.
+    """Rewards of a batch of worlds along a rollout.
 
     Attributes
     ----------
     rewards : (worlds, length) float64
     success, failure : (worlds, length) bool
     observations : (worlds, samples, entries) float32 or None
-        None where they were not asked for.
+        None where they were not kept.
     status : (worlds,) int64
         Values of `physics.Status`: the gravest thing that happened in any step.
     ends_on_success : bool

@@ -21,12 +21,20 @@ TINY_ALGORITHMS = {
 }
 
 
+HINDSIGHT = "sac with hindsight"
+TINY_ALGORITHMS[HINDSIGHT] = {
+    **TINY_ALGORITHMS["sac"], "learning_starts": NUM_ENVS * 8, "hindsight": {"n_sampled_goal": 4},
+    "action_noise": {"sigma": 0.3, "theta": 0.15},
+}  # fmt: skip
+
+
 @pytest.fixture(params=TINY_ALGORITHMS)
 def tiny(request) -> RunConfig:
-    """Two rollouts of 8 worlds (PPO), or as many steps (SAC)."""
+    """Two rollouts of 8 worlds (PPO), or as many steps (SAC); with hindsight in episodes of five steps."""
+    is_goal = request.param == HINDSIGHT
     return RunConfig(
-        env="rigid_env/BlockReach-v0",
-        algo=request.param,
+        env="rigid_env/BlockReachGoal-v0" if is_goal else "rigid_env/BlockReach-v0",
+        algo="sac" if is_goal else request.param,
         seed=3,
         num_envs=NUM_ENVS,
         max_steps=2 * NUM_ENVS * ROLLOUT,
@@ -34,4 +42,5 @@ def tiny(request) -> RunConfig:
         threads=1,
         accuracy={"tolerance": 1e-3},
         algorithm=TINY_ALGORITHMS[request.param],
+        env_kwargs={"max_episode_steps": 5} if is_goal else {},
     )

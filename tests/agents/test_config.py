@@ -10,6 +10,7 @@ import yaml
 
 pytest.importorskip("stable_baselines3")
 
+from stable_baselines3 import HerReplayBuffer
 from stable_baselines3.common.policies import ActorCriticPolicy
 from stable_baselines3.sac.policies import SACPolicy
 
@@ -24,9 +25,8 @@ OURS = {"policy", "env", "seed", "device"}  # set by make_model
 
 
 def test_every_environment_has_every_algorithm():
-    assert set(ENTRIES) == {
-        (f"rigid_env/{name}-v0", algo) for name in ("BlockReach", "BlockReorient") for algo in ALGORITHMS
-    }
+    with_rewards = {(f"rigid_env/{name}-v0", algo) for name in ("BlockReach", "BlockReorient") for algo in ALGORITHMS}
+    assert set(ENTRIES) == with_rewards | {("rigid_env/BlockReachGoal-v0", "sac")}  # hindsight needs a replay buffer
 
 
 @pytest.mark.parametrize(("env", "algo"), ENTRIES)
@@ -34,15 +34,20 @@ def test_every_key_is_accepted(env, algo):
     config = make_config(env, algo, seed=0)
     assert env in gym.registry
     physics.Accuracy(**config.accuracy)
+    arguments = algorithm_arguments(config)
     allowed = set(inspect.signature(CLASSES[algo].__init__).parameters) - {"self"} - OURS
-    assert set(config.algorithm) <= allowed
-    policy_arguments = algorithm_arguments(config)["policy_kwargs"]
+    assert set(arguments) <= allowed
+    of_replay = set(inspect.signature(HerReplayBuffer.__init__).parameters)
+    assert set(arguments.get("replay_buffer_kwargs", {})) <= of_replay
+    policy_arguments = arguments["policy_kwargs"]
     assert set(policy_arguments) <= set(inspect.signature(POLICIES[algo].__init__).parameters)
     assert inspect.isclass(policy_arguments["activation_fn"])
 
 
 def test_minibatches_divide_the_rollout():
     for env, entry in TABLE.items():
+        if "ppo" not in entry:
+            continue
         config = make_config(env, "ppo", seed=0)
         assert config.num_envs * entry["ppo"]["algorithm"]["n_steps"] % config.algorithm["batch_size"] == 0
 
@@ -85,4 +90,11 @@ def test_unknown_activation_is_named():
     config = make_config("rigid_env/BlockReach-v0", "ppo", seed=0)
     config = change(config, algorithm={"policy_kwargs": {"activation_fn": "Rellu"}})
     with pytest.raises(ValueError, match="activation_fn is 'Rellu'"):
+        algorithm_arguments(config)
+
+
+def test_noise_of_other_keys_is_named():
+    config = make_config("rigid_env/BlockReachGoal-v0", "sac", seed=0)
+    config = change(config, algorithm={"action_noise": {"sigma": 0.3}})
+    with pytest.raises(ValueError, match="action_noise has the keys sigma; allowed are sigma, theta"):
         algorithm_arguments(config)

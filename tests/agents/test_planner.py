@@ -25,14 +25,14 @@ def test_a_return_is_the_sum_of_the_rewards_of_the_environment():
     planner = Planner(
         type(env.task), PlannerSettings(samples=3, horizon=6, knots=2, elites=1, replan=1), accuracy="fast"
     )
-    actions = np.random.default_rng(0).uniform(-1.0, 1.0, (6, 3, 6))
+    actions = np.random.default_rng(0).uniform(-1.0, 1.0, (3, 6, 6))
     state = env.get_state()
     ours = planner.returns(state, actions)
     for k in range(3):
         env.set_state(state)
         total = 0.0
-        for row in actions:
-            total += env.step(row[k])[1]
+        for action in actions[k]:
+            total += env.step(action)[1]
         assert ours[k] == total  # the same bits in the same order
 
 
