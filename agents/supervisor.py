@@ -16,7 +16,8 @@ from agents.evaluate import SEED_STRIDE, evaluation_seeds, run_episodes
 from agents.progress import ProgressDisplay
 
 POINT_EVERY = 0.5  # between two points of the curve [s]
-CHECKPOINT_EVERY = 10.0  # of training; what an interruption costs at most [s]
+CHECKPOINT_EVERY = 10.0  # of training; what an interruption costs at most [s] ...
+CHECKPOINT_SHARE = 0.05  # ... or longer, so that writing them, with a large replay buffer, takes this share at most
 
 CONFIRMATION_EPISODES = 500  # of the deterministic policy on fresh seeds, before training may end
 CONFIRMATION_PAUSE = 2000  # episodes of training after a confirmation that failed
@@ -47,6 +48,7 @@ class Supervisor(BaseCallback):
         self.config, self.run_folder, self.history, self.display = config, run, history, display
         self.is_target_reached = False
         self._last_point = self._last_checkpoint = float("-inf")
+        self._checkpoint_every = CHECKPOINT_EVERY
 
     # --- calls of Stable-Baselines3 -----------------------------------------------------------------------
 
@@ -62,7 +64,7 @@ class Supervisor(BaseCallback):
         self.is_target_reached = self._is_confirmed()
         if self.is_target_reached or self.history.seconds - self._last_point >= POINT_EVERY:
             self._add_point()
-        if self.is_target_reached or self.history.seconds - self._last_checkpoint >= CHECKPOINT_EVERY:
+        if self.is_target_reached or self.history.seconds - self._last_checkpoint >= self._checkpoint_every:
             self._checkpoint()
 
     def _on_step(self) -> bool:
@@ -121,12 +123,14 @@ class Supervisor(BaseCallback):
         return bool(rate >= self.config.target)
 
     def _checkpoint(self) -> None:
+        start = time.perf_counter()
         self._monitor.flush()
         self.history.monitor_size = self._monitor.tell()
         self.history.noise = getattr(self.model, "action_noise", None)
         save_checkpoint(self.run_folder.checkpoints, self.model, self.history)
         write_curve(self.history.points, self.run_folder.curve)
         self._last_checkpoint = self.history.seconds
+        self._checkpoint_every = max(CHECKPOINT_EVERY, (time.perf_counter() - start) / CHECKPOINT_SHARE)
 
     def _open_monitor(self) -> None:
         """Open the monitor file, in the format of SB3's `Monitor`; resuming cuts it at the checkpoint."""

@@ -85,6 +85,7 @@ def test_interrupted_run_keeps_its_checkpoint_and_goes_on(tiny, tmp_path, monkey
     run = RunFolder(tmp_path / "run")
     with monkeypatch.context() as patch:
         patch.setattr("agents.supervisor.CHECKPOINT_EVERY", 0.0)
+        patch.setattr("agents.supervisor.CHECKPOINT_SHARE", float("inf"))
         interrupt_at(patch, tiny.max_steps - 3 * tiny.num_envs)
         with pytest.raises(Interrupted, match=f"--resume {run.path}"):
             train(tiny, run, console=QUIET)
