@@ -15,7 +15,7 @@ from __future__ import annotations
 
 import statistics
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from json import dumps
 from typing import Annotated
 
@@ -140,6 +140,8 @@ class Planner:
 
     def returns(self, state: TaskState, actions: np.ndarray) -> np.ndarray:
         """Returns of sequences of actions (samples, horizon, numbers), each up to the end of its episode."""
+        if self.model.disturbed is None:  # nothing is drawn, and generators take a while to copy
+            state = replace(state, generators=(None,) * state.worlds)
         return rollout(self.model, actions, initial=state).returns
 
     def _improve(self, knots: np.ndarray, returns: np.ndarray) -> None:

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from physics.parallel.bound_call import bound_alike
-from physics.world import rollout_loop
 from physics.world.batch import Batch
 from physics.world.report import add_report
+from physics.world.rollout_loop import RolloutLoop
 from physics.world.rollout_steps import Course, Follow, Samples, begin_moment, end_moment
 from physics.world.stepper import kernel_calls, takes_each_step
 
@@ -60,12 +60,11 @@ def _all_at_once(world: Batch, wrenches, into: Rollout, steps: int, dt: float, e
     samples = Samples(*(NOTHING if array is None else array
                         for array in (into.pos, into.quat, into.linvel, into.angvel)))  # fmt: skip
 
-    def around(moment, _taken):
-        before = bound_alike(course.follow is None, begin_moment, moment, course)
-        ending = (moment, every, world.state, world.report_table, into.report_table, samples)
-        return before, bound_alike(None, end_moment, *ending)
-
-    into.times[...] = rollout_loop.run(world, held, steps, dt, wrenches.shape[1], around)[every - 1 :: every]
+    loop = RolloutLoop(world, held, steps, dt)
+    arrays = (world.state, world.report_table, into.report_table, samples)
+    before = [bound_alike(course.follow is None, begin_moment, moment, course) for moment in loop.moments]
+    after = [bound_alike(None, end_moment, moment, every, *arrays) for moment in loop.moments]
+    into.times[...] = loop.run(wrenches.shape[1], before, after)[every - 1 :: every]
 
 
 def _follow(world: Batch, dt: float) -> Follow | None:

@@ -7,7 +7,6 @@ other compilers make them from Python, once for each step and block.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import NoReturn
 
 import numpy as np
@@ -84,58 +83,73 @@ if COMPILER == FUSED:
     roll_out = kernel(roll_out)
 
 
-def run(
-    world: Batch,
-    wrench: np.ndarray,
-    steps: int,
-    dt: float,
-    length: int,
-    around: Callable[[np.ndarray, np.ndarray], tuple[Work, Work]],
-) -> np.ndarray:
-    """Step every world `length` times, `steps` steps of `dt` [s] each.
+class RolloutLoop:
+    """The loop over time of a world, prepared once and run often.
 
     Parameters
     ----------
     world : Batch
-        Without a recorder, and without an actuator that has to be asked between two steps.
+        Without an actuator that has to be asked between two steps; while the loop runs, without a recorder.
     wrench : (worlds, bodies, 6) float64
-        Of the step to come; the actuator's own output where there is one. Written by the calls of `around`.
-    steps, dt, length : int, float, int
-    around : callable
-        From the `moment` of a thread, and the list of worlds that its last step took, to what it does before a step and
-        after it.
+        Of the step to come; the actuator's own output where there is one. Written by what comes before a step.
+    steps : int
+        Steps that are taken at once.
+    dt : float
+        Of each [s].
 
-    Returns
-    -------
-    (length,) float64
-        Time after each step [s].
-
-    Raises
-    ------
-    Exception
-        What a field of the user's raises; worlds are then somewhere on their way.
+    Attributes
+    ----------
+    moments : list of (MOMENT_SIZE,) int64
+        Of each thread: where it is.
+    taken : list of array
+        Of each thread: the worlds that its last step took.
     """
-    moments = np.full(1 + length, steps * dt)
-    moments[0] = world.time
-    np.add.accumulate(moments, out=moments)  # as times add up step by step
-    inner = [WorkQueue(work_stealing.make_ranges(1, world.worlds, BLOCK),
-                       work_stealing.make_taken_lists(1, world.worlds)[0]) for _ in world.team.queues]  # fmt: skip
-    stepping = kernel_calls(world, wrench, steps, dt, inner)
-    chains, loops = [], []
-    for k, outer in enumerate(world.team.queues):
-        moment = np.zeros(MOMENT_SIZE, dtype=np.int64)
-        before, after = around(moment, inner[k].taken)
-        chain = before.then(stepping[k]).then(after)
-        chains.append(chain)
-        loops.append(_prepared((outer, inner[k], BLOCK, moments[:-1], _clock(world, k), moment), chain))
-    try:
-        world.team.run(loops)
-        for chain in chains:
-            chain.raise_again()
-    except Exception as error:
-        _raise_again(error, world)
-    world.time = float(moments[-1])
-    return moments[1:]
+
+    def __init__(self, world: Batch, wrench: np.ndarray, steps: int, dt: float):
+        self._world, self._duration = world, steps * dt
+        self._inner = [WorkQueue(work_stealing.make_ranges(1, world.worlds, BLOCK),
+                                 work_stealing.make_taken_lists(1, world.worlds)[0])
+                       for _ in world.team.queues]  # fmt: skip
+        self._stepping = kernel_calls(world, wrench, steps, dt, self._inner)
+        self.moments = [np.zeros(MOMENT_SIZE, dtype=np.int64) for _ in self._inner]
+        self.taken = [queue.taken for queue in self._inner]
+
+    def run(self, length: int, before: list[Work], after: list[Work]) -> np.ndarray:
+        """Step every world `length` times.
+
+        Parameters
+        ----------
+        length : int
+        before, after : list of Work
+            What each thread does before a step, and after it.
+
+        Returns
+        -------
+        (length,) float64
+            Time after each step [s].
+
+        Raises
+        ------
+        Exception
+            What a field of the user's raises; worlds are then somewhere on their way.
+        """
+        world = self._world
+        times = np.full(1 + length, self._duration)
+        times[0] = world.time
+        np.add.accumulate(times, out=times)  # as times add up step by step
+        chains = [first.then(step).then(last) for first, step, last in zip(before, self._stepping, after, strict=True)]
+        loops = [
+            _prepared((outer, inner, BLOCK, times[:-1], _clock(world, k), self.moments[k]), chains[k])
+            for k, (outer, inner) in enumerate(zip(world.team.queues, self._inner, strict=True))
+        ]
+        try:
+            world.team.run(loops)
+            for chain in chains:
+                chain.raise_again()
+        except Exception as error:
+            _raise_again(error, world)
+        world.time = float(times[-1])
+        return times[1:]
 
 
 def _raise_again(error: Exception, world: Batch) -> NoReturn:

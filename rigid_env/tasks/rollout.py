@@ -9,10 +9,9 @@ from numpy.typing import ArrayLike
 
 from physics import validation
 from physics.keywords import known_keywords
-from physics.parallel.bound_call import Work, bound_alike
+from physics.parallel.bound_call import bound_alike
 from physics.parallel.exclusive import exclusive
 from physics.summary import lines_repr
-from physics.world import rollout_loop
 from physics.world.batch_arrays import machine_memory
 from physics.world.report import Status, gravest
 from rigid_env.tasks import layout as col
@@ -213,14 +212,14 @@ def _one_by_one(task: Task, actions: np.ndarray, every: int, kept: Kept) -> np.n
 @exclusive
 def _all_at_once(world, task: Task, actions: np.ndarray, every: int, kept: Kept) -> np.ndarray:
     """Take control steps in machine code; the gravest `status` of each world."""
-    total, length = np.zeros_like(world.report_table), actions.shape[1]
-
-    def around(moment, taken) -> tuple[Work, Work]:
-        before = bound_alike(None, begin_control, moment, actions, *task.wrench_arguments)
-        keep = bound_alike(None, end_control, moment, every, task.outcome, task.obs, world.report_table, total, kept)
-        return before, task.observer(taken).then(keep)
-
-    rollout_loop.run(world, task.wrench, task.frame_skip, world.dt, length, around)
+    total, length, loop = np.zeros_like(world.report_table), actions.shape[1], task.rollout_loop
+    arrays = (task.outcome, task.obs, world.report_table, total, kept)
+    before = [bound_alike(None, begin_control, moment, actions, *task.wrench_arguments) for moment in loop.moments]
+    after = [
+        observe.then(bound_alike(None, end_control, moment, every, *arrays))
+        for observe, moment in zip(task.rollout_observers, loop.moments, strict=True)
+    ]
+    loop.run(length, before, after)
     task.clock += length
     gravest(world.report_table, task.status)
     status = np.empty_like(task.status)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import reprlib
 from collections.abc import Mapping
 from dataclasses import replace as replace_fields
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -16,6 +17,7 @@ from physics.kernels.state import layout as at
 from physics.parallel.bound_call import Work, bound_alike, compiled
 from physics.parallel.team import listed
 from physics.world.report import gravest
+from physics.world.rollout_loop import RolloutLoop
 from physics.world.setters import start_anew
 from rigid_env.tasks import layout as col
 from rigid_env.tasks.actions import ActionTable
@@ -35,6 +37,9 @@ from rigid_env.tasks.wrenches import write_wrenches
 
 PARAMETER_ROUNDING = 1e-12
 """Share by which a parameter differs from itself after it was stored: an inverse, twice a half."""
+
+OF_PROCESS = ("_functions", "observed", "_write_wrenches", "_kept_arrays", "rollout_loop", "rollout_observers")
+"""Attributes that are left out of copies: machine code, and functions of the class."""
 
 UNIT_GRAVITY = 9.81
 """[m/s²] In the unit of forces where a scene has no gravity."""
@@ -219,6 +224,16 @@ class Task(Declaration):
     def has_impulses(self) -> bool:
         """An action, or a disturbance, may be an impulse."""
         return self._advance.kick is not self._advance.wrench
+
+    @cached_property
+    def rollout_loop(self) -> RolloutLoop:
+        """The loop of a compiled task's rollouts, made with the first."""
+        return RolloutLoop(self.world, self.wrench, self.frame_skip, self.world.dt)
+
+    @cached_property
+    def rollout_observers(self) -> list[Work]:
+        """Calls that observe the worlds that each thread of that loop has stepped."""
+        return [self.observer(taken) for taken in self.rollout_loop.taken]
 
     @property
     def action_vectors(self) -> list:
@@ -492,13 +507,8 @@ class Task(Declaration):
 
     def __getstate__(self):
         kept = dict(vars(self))
-        for name in (
-            "_functions",
-            "observed",
-            "_write_wrenches",
-            "_kept_arrays",
-        ):  # machine code, and functions of the class
-            del kept[name]
+        for name in OF_PROCESS:
+            kept.pop(name, None)
         return kept
 
     def __setstate__(self, kept):
