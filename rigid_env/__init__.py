@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from rigid_env.envs.vector_env import BlockReachVectorEnv, BlockReorientVectorEnv, TaskVectorEnv
     from rigid_env.tasks import (
         Choice,
+        Distribution,
         Entry,
         Force,
         Gust,
@@ -29,6 +30,7 @@ if TYPE_CHECKING:
         Task,
         Uniform,
         Wrench,
+        compiled,
         observe,
     )
     from rigid_env.tasks.block_goals import BlockReachGoal, BlockReorientGoal
@@ -44,8 +46,8 @@ check_engine_is_found()
 register_envs()
 
 _OF_TASKS = (
-    "Choice", "Entry", "Force", "Gust", "Impulse", "LogUniform", "Normal", "Push", "Task", "Uniform", "Wrench",
-    "observe",
+    "Choice", "Distribution", "Entry", "Force", "Gust", "Impulse", "LogUniform", "Normal", "Push", "Task", "Uniform",
+    "Wrench", "compiled", "observe",
 )  # fmt: skip
 
 _LAZY = {
@@ -80,6 +82,7 @@ __all__ = [
     "BlockReorientGoal",
     "BlockReorientVectorEnv",
     "Choice",
+    "Distribution",
     "Entry",
     "Force",
     "GoalTask",
@@ -99,6 +102,7 @@ __all__ = [
     "Wrench",
     "__version__",
     "check_task",
+    "compiled",
     "observe",
     "register_envs",
     "register_task",

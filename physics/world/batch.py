@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from operator import attrgetter
 from typing import Any, Protocol
 
 import numpy as np
@@ -16,6 +17,8 @@ from physics.scene.effects import Actuator, Sleeping
 from physics.scene.scene import Scene
 from physics.world.snapshot import KEPT
 from physics.world.step_listener import StepListener
+
+_KEPT, _KEPT_AWAKE = attrgetter(*KEPT), attrgetter(*KEPT[:-1])
 
 
 class ActuatorState(Protocol):
@@ -131,7 +134,7 @@ class Batch:
 
     def kept(self) -> tuple[np.ndarray, ...]:
         """The arrays themselves that a snapshot copies, in the order of `KEPT`."""
-        return tuple(getattr(self, name) for name in (KEPT if self.plan.sleeping else KEPT[:-1]))
+        return _KEPT(self) if self.plan.sleeping else _KEPT_AWAKE(self)
 
     def kept_rows(self) -> tuple[int, ...]:
         """Rows that one world has in each of the `kept` arrays; 0: it has one row for all worlds, which is not used."""

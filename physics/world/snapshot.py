@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import io
-import json
 import os
 from dataclasses import dataclass
 from pathlib import Path
 from typing import BinaryIO
-from zipfile import is_zipfile
 
 import numpy as np
 
@@ -17,10 +15,9 @@ from physics.kernels.compile.compiler_choice import COMPILER
 from physics.kernels.state import layout as at
 from physics.summary import lines_repr
 from physics.version import version
+from physics.world.headed_file import FileKind
 
-# Number of the format of files; a reader refuses what is newer than itself.
-FORMAT = 1
-KIND = "snapshot"
+FILE = FileKind("snapshot", "snapshot", "Snapshot.save")
 
 # Arrays that decide how a `World` goes on, in the order of `Snapshot.arrays`; the last one where bodies may sleep.
 KEPT = ("state", "params", "gravity", "memory", "report_table", "sleep")
@@ -75,14 +72,13 @@ class Snapshot:
 
     def write(self, file: BinaryIO) -> None:
         """Write it into an open file, as `save` does."""
-        head = {"kind": KIND, "format": FORMAT, "compiler": self.compiler, "version": version()}
-        parts = dict(zip(KEPT, self.arrays))
+        parts = {"time": np.float64(self.time), **dict(zip(KEPT, self.arrays))}
         if self.actuation is not None:
             output, late = self.actuation
             parts["actuator_output"] = output
             parts["actuator_times"] = np.array([given for given, _ in late], dtype=np.float64)
             parts["actuator_commands"] = np.array([command for _, command in late]).reshape(-1, *output.shape)
-        np.savez_compressed(file, head=json.dumps(head), time=np.float64(self.time), **parts)
+        FILE.write(file, {"compiler": self.compiler, "version": version()}, parts)
 
     @classmethod
     def load(cls, path: str | os.PathLike) -> Snapshot:
@@ -104,23 +100,7 @@ class Snapshot:
     @classmethod
     def read(cls, content: BinaryIO, path: str | os.PathLike) -> Snapshot:
         """Read the content of a file as `load` does; `path` is its name in an error."""
-        allowed = "allowed is what Snapshot.save writes (.npz)"
-        if not is_zipfile(content):
-            raise ValueError(f"{path} is no snapshot; {allowed}")
-        try:
-            with np.load(content, allow_pickle=False) as file:
-                parts = dict(file)
-            head = json.loads(str(parts["head"]))
-            if head["kind"] != KIND:
-                raise ValueError(f"it is a {head['kind']}")
-            number = validation.count(head["format"], "its format")
-            found = _from_parts(parts, str(head["compiler"])) if number <= FORMAT else None
-        except Exception as error:  # whatever is wrong with it, it is none
-            told = f"there is no {error}" if isinstance(error, KeyError) else error
-            raise ValueError(f"{path} is no snapshot ({told}); {allowed}") from None
-        if found is None:
-            raise ValueError(f"{path} has format {number}; allowed are formats up to {FORMAT}")
-        return found
+        return FILE.read(content, path, lambda head, parts: _from_parts(parts, str(head["compiler"])))
 
     def __repr__(self) -> str:
         shapes = (f"{name} {array.shape}" for name, array in zip(KEPT, self.arrays))
@@ -144,6 +124,6 @@ def _from_parts(parts: dict[str, np.ndarray], compiler: str) -> Snapshot:
         if output.shape != (rows, 6) or times.ndim != 1 or commands.shape != (len(times), rows, 6):
             raise ValueError(f"actuator_output has shape {output.shape}, actuator_commands {commands.shape}")
         actuation = output, list(zip(times.tolist(), commands))
-    if any(array.dtype != np.float64 for name, array in parts.items() if name != "head"):
+    if any(array.dtype != np.float64 for array in parts.values()):
         raise ValueError("it holds other numbers than 64-bit floats")
     return Snapshot(arrays, validation.number(parts["time"], "its time"), actuation, compiler, is_read=True)

@@ -359,7 +359,10 @@ class World(Batch):
         A batch has one `time`. It becomes the snapshot's where all worlds are restored, and stays otherwise.
         Commands that a delayed actuator still holds keep their age.
         """
-        at_places = restoring.places(self, snapshot, worlds, source)
+        self.restore_at(snapshot, restoring.places(self, snapshot, worlds, source))
+
+    def restore_at(self, snapshot: Snapshot, at_places: restoring.Places) -> None:
+        """`restore` after its checks: for who has made them with `restoring.places`."""
         if self.is_torn and at_places.is_all:
             self.is_free, self.is_torn = True, False  # the thread of the parent process is not there to finish its step
         self._restore(snapshot, at_places)

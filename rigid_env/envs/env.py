@@ -109,7 +109,7 @@ class RigidEnv(gym.Env):
             self.task.generators[0] = self.np_random
             self.task.start(self._world, options)
             self._source.start(self._world)
-        except (TypeError, ValueError):
+        except BaseException:
             self._np_random, self._np_random_seed, self.task.generators[0] = kept
             raise
         self._has_reset, self._is_closed = True, False
@@ -205,7 +205,8 @@ class RigidEnv(gym.Env):
         Raises
         ------
         ValueError
-            It is no state, one of another task or of other settings, or has no such world. Nothing has changed then.
+            It is no state, one of another task or of other settings (`TaskState.settings`; both values are told), or it
+            has no such world. Nothing has changed then.
         """
         arrays = self._arrays()
         put(self.task, arrays, state, source=None if source == 0 and getattr(state, "worlds", 0) == 1 else source)

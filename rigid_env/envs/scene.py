@@ -99,8 +99,8 @@ class SceneEnv(RigidEnv):
     ## Episode End
 
     Termination: success, which is a distance of at most `tolerance` and a speed of at most `speed`. Without a
-    goal no episode terminates. Truncation: after `max_episode_steps` of the file, or of `gymnasium.make` if
-    that is sooner; `gymnasium.make_vec` takes its own in place of the file's.
+    goal no episode terminates. Truncation: after `episode_steps`, by default `max_episode_steps` of the file.
+    The argument `max_episode_steps` of `gymnasium.make` and `make_vec` can only make episodes shorter.
 
     `info` holds `is_success` and `physics_status`, a `physics.Status`: 0 when nothing went wrong in the step,
     contact problems above their tolerance included. With a goal also `distance` [m], `speed` [m/s], and the
@@ -121,6 +121,7 @@ class SceneEnv(RigidEnv):
     | `start` | None | dict of `pos`, `linvel`, `angvel` |
     | `frame_skip` | None | physics steps per control step (5) |
     | `dt` | None | physics step (0.005) [s] |
+    | `episode_steps` | None | control steps after which an episode is truncated, for the file's `max_episode_steps` |
     | `accuracy` | `"balanced"` | preset of the engine, or a `physics.Accuracy` |
     | `effects` | () | `physics` effects besides, or instead of the scene's of that class |
     | `dump_faults` | None | folder for what led to a state that was not finite (`rigid-env replay`) |
@@ -131,7 +132,7 @@ class SceneEnv(RigidEnv):
     | `obs_size` | (84, 84) | height and width of these [px] |
     | `obs_stack` | 1 | of the last so many control steps, along the last axis, the newest last |
 
-    From `driven` to `dt` an argument takes the place of that key in the file; None leaves the file's, or the
+    From `driven` to `episode_steps` an argument takes the place of that key in the file; None leaves the file's, or the
     default in brackets.
 
     ## Version History
@@ -158,18 +159,20 @@ class SceneEnv(RigidEnv):
         start: Mapping[str, Any] | None = None,
         frame_skip: int | None = None,
         dt: float | None = None,
+        episode_steps: int | None = None,
         accuracy: str | physics.Accuracy = "balanced",
         effects: Sequence = (),
         dump_faults: str | Path | None = None,
     ):
         task = SceneTask(
             1, scene, driven=driven, force=force, torque=torque, frame=frame, length=length, goal=goal, start=start,
-            frame_skip=frame_skip, dt=dt, accuracy=accuracy, effects=effects, dump_faults=dump_faults,
+            frame_skip=frame_skip, dt=dt, episode_steps=episode_steps, accuracy=accuracy, effects=effects,
+            dump_faults=dump_faults,
         )  # fmt: skip
         super().__init__(task, render_mode, width, height, obs, obs_size, obs_stack)
 
     def step(self, action):
-        """Hold an action for one control step; as `RigidEnv.step`, but truncated at the limit of the scene's file."""
+        """Hold an action for one control step; as `RigidEnv.step`, but truncated at the limit of the task."""
         obs, reward, is_terminated, is_truncated, info = super().step(action)
         limit = self.task.max_episode_steps
         if limit is not None and self.task.steps[0] >= limit:
@@ -186,8 +189,8 @@ class SceneVectorEnv(RigidVectorEnv):
     num_envs : int
     scene : physics.Scene, str or Path
     autoreset_mode, max_episode_steps, render_mode, width, height, obs, obs_size, obs_stack
-        As of `RigidVectorEnv`; `max_episode_steps` is the file's by default.
-    driven, force, torque, frame, length, goal, start, frame_skip, dt, accuracy, effects, dump_faults
+        As of `RigidVectorEnv`; `max_episode_steps` is `episode_steps` by default, and at most that.
+    driven, force, torque, frame, length, goal, start, frame_skip, dt, episode_steps, accuracy, effects, dump_faults
         As of `SceneEnv`.
     threads : int
         Threads that share a step.
@@ -222,6 +225,7 @@ class SceneVectorEnv(RigidVectorEnv):
         start: Mapping[str, Any] | None = None,
         frame_skip: int | None = None,
         dt: float | None = None,
+        episode_steps: int | None = None,
         accuracy: str | physics.Accuracy = "balanced",
         effects: Sequence = (),
         dump_faults: str | Path | None = None,
@@ -229,7 +233,19 @@ class SceneVectorEnv(RigidVectorEnv):
     ):
         task = SceneTask(
             validation.count(num_envs, "num_envs"), scene, driven=driven, force=force, torque=torque, frame=frame,
-            length=length, goal=goal, start=start, frame_skip=frame_skip, dt=dt, accuracy=accuracy, effects=effects,
-            dump_faults=dump_faults, threads=threads,
+            length=length, goal=goal, start=start, frame_skip=frame_skip, dt=dt, episode_steps=episode_steps,
+            accuracy=accuracy, effects=effects, dump_faults=dump_faults, threads=threads,
         )  # fmt: skip
+        check_limit(max_episode_steps, task.max_episode_steps)
         super().__init__(task, autoreset_mode, max_episode_steps, render_mode, width, height, obs, obs_size, obs_stack)
+
+
+def check_limit(value: int | str | None, limit: int | None) -> None:
+    """Refuse a limit of a batch beyond that of its task: Gymnasium cannot lengthen a single environment's, either."""
+    if limit is None or isinstance(value, str):
+        return
+    if value is None or validation.count(value, "max_episode_steps") > limit:
+        raise ValueError(
+            f"max_episode_steps is {value}, and the scene's {limit}; allowed are at most {limit}, or another "
+            "episode_steps, which takes the place of the file's"
+        )

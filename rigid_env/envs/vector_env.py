@@ -146,7 +146,7 @@ class RigidVectorEnv(BatchAttributes):
                 if seeds[i] is not None or self.task.generators[i] is None:
                     self._seeds[i] = self.task.seed(i, seeds[i])
             self._begin(rows, options)
-        except (TypeError, ValueError, gym.error.Error):
+        except BaseException:
             self.task.generators[:], self._seeds[:] = kept
             raise
         self._waiting[rows] = False
@@ -182,8 +182,20 @@ class RigidVectorEnv(BatchAttributes):
             Actions of another shape, or that are not finite numbers. Nothing has changed then.
         """
         self._check_ready()
+        before = self._ended, self._kept_pictures()
+        self.task.step(actions)
+        try:
+            return self._conclude()
+        except BaseException:  # of a start, or of a picture: this step has not been
+            if self.task.may_fail:
+                self.task.take_back()
+                self._ended = before[0]
+                self._put_pictures(before[1])
+            raise
+
+    def _conclude(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, dict[str, Any]]:
+        """Observe a step that was taken, and start episodes after those that ended."""
         task = self.task
-        task.step(actions)
         self._source.step()
         rewards = task.outcome[:, col.REWARD].copy()
         terminations = task.outcome[:, col.FAILURE] > 0.0
@@ -248,7 +260,8 @@ class RigidVectorEnv(BatchAttributes):
         Raises
         ------
         ValueError
-            It is no state, one of another task or of other settings, or indices out of range. Nothing has changed then.
+            It is no state, one of another task or of other settings (`TaskState.settings`; both values are told), or
+            indices are out of range. Nothing has changed then.
         """
         chosen, sources = put(self.task, self._arrays(), state, worlds, source)
         for world, of in zip(chosen.tolist(), sources.tolist()):
@@ -273,9 +286,26 @@ class RigidVectorEnv(BatchAttributes):
                 "is disabled: reset(options={'reset_mask': terminations | truncations}) first"
             )
 
+    def _kept_pictures(self) -> dict[str, np.ndarray]:
+        """Copies of the source's memory, where code of a user may end with an error."""
+        return {name: array.copy() for name, array in self._source.arrays.items()} if self.task.may_fail else {}
+
+    def _put_pictures(self, kept: dict[str, np.ndarray]) -> None:
+        for name, array in kept.items():
+            self._source.arrays[name][...] = array
+
     def _begin(self, rows: np.ndarray, options: dict[str, Any]) -> None:
+        """Start episodes; after an error nothing has changed."""
+        pictures = self._kept_pictures()
+        before = take(self.task, {}, self._seeds, rows) if pictures else None
         self.task.start(rows, options)
-        self._source.start(rows)
+        try:
+            self._source.start(rows)
+        except BaseException:
+            if before is not None:
+                put(self.task, {}, before, rows)
+                self._put_pictures(pictures)
+            raise
         self._ended[rows] = False
 
     # --- pictures -----------------------------------------------------------------------------------------

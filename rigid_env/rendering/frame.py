@@ -164,10 +164,10 @@ class Frame:
         [m]. World frame.
     contact_forces : (n, 3) float
         [N]. On the body, world frame, one for each contact point.
-    applied_force : (3,) float
-        [N]. At body 0's centre, world frame.
-    applied_torque : (3,) float
-        [N m]. On body 0, world frame.
+    applied_force : (3,) or (n, 3) float
+        [N]. At the centre of body 0, or of the first n bodies, world frame; kept as (n, 3).
+    applied_torque : (3,) or (n, 3) float
+        [N m]. On the same bodies, world frame; kept as (n, 3).
     text : tuple of str
         Lines in the upper left corner.
     force_scale : float
@@ -184,8 +184,8 @@ class Frame:
     goal: GoalView | None = None
     contact_points: np.ndarray = field(default_factory=lambda: NO_POINTS)
     contact_forces: np.ndarray = field(default_factory=lambda: NO_POINTS)
-    applied_force: np.ndarray = (0.0, 0.0, 0.0)
-    applied_torque: np.ndarray = (0.0, 0.0, 0.0)
+    applied_force: np.ndarray = field(default_factory=lambda: NO_POINTS)
+    applied_torque: np.ndarray = field(default_factory=lambda: NO_POINTS)
     text: tuple[str, ...] = ()
     force_scale: float = 0.1
 
@@ -194,8 +194,12 @@ class Frame:
             object.__setattr__(self, name, tuple(getattr(self, name)))
         _set_array(self, "contact_points", (-1, 3))
         _set_array(self, "contact_forces", (len(self.contact_points), 3))
-        _set_array(self, "applied_force", (3,))
-        _set_array(self, "applied_torque", (3,))
+        for name in ("applied_force", "applied_torque"):
+            if np.ndim(getattr(self, name)) == 1:
+                object.__setattr__(self, name, np.array([getattr(self, name)], dtype=np.float64))
+            _set_array(self, name, (-1, 3))
+            if len(getattr(self, name)) > max(1, len(self.bodies)):
+                raise ValueError(f"{name} has {len(getattr(self, name))} rows; allowed are at most {len(self.bodies)}")
 
     @property
     def has_arrows(self):

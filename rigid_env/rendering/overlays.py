@@ -72,12 +72,11 @@ def draw_contacts(canvas, frame, room):
 
 
 def draw_wrench(canvas, frame, room):
-    """Orange arrow of the applied force and purple arc of the applied torque, at body 0's centre."""
-    if not frame.bodies:
-        return
-    body = frame.bodies[0]
-    _draw_torque(canvas, body, frame.force_scale * frame.applied_torque)
-    draw_arrow(canvas, body.pos, frame.force_scale * frame.applied_force, palette.APPLIED_FORCE)
+    """Orange arrows of applied forces and purple arcs of applied torques, at the centres of their bodies."""
+    for body, torque in zip(frame.bodies, frame.applied_torque):
+        _draw_torque(canvas, body, frame.force_scale * torque)
+    for body, force in zip(frame.bodies, frame.applied_force):
+        draw_arrow(canvas, body.pos, frame.force_scale * force, palette.APPLIED_FORCE)
 
 
 def draw_arrow(canvas, start, vector, colour):

@@ -41,10 +41,10 @@ def world_frame(
     text : sequence of str
         Lines in the upper left corner.
     goal : GoalView, optional
-    applied : (6,) float, optional
-        Force [N] and torque [N m] on body 0, world frame; drawn at its geometric centre.
+    applied : (6,) or (bodies, 6) float, optional
+        Force [N] and torque [N m] on body 0, or on each body, world frame; drawn at the geometric centre.
     arrows : bool
-        False leaves out contacts and the applied wrench, and saves the time to find them.
+        False leaves out contacts and applied wrenches, and saves the time to find them.
 
     Returns
     -------
@@ -61,7 +61,7 @@ def world_frame(
     walls = _wall_views(world.scene.walls) if world.plan.contact else ()
     if not arrows:
         return Frame(bodies, walls, goal, text=tuple(text))
-    wrench = np.zeros(6) if applied is None else np.asarray(applied, dtype=float)
+    wrench = np.zeros((0, 6)) if applied is None else np.asarray(applied, dtype=float).reshape(-1, 6)
     points, forces = world.contacts(index)
     first = index * world.body_count
     strength = float(np.linalg.norm(world.gravity[index])) or UNIT_WEIGHT
@@ -71,8 +71,8 @@ def world_frame(
         goal=goal,
         contact_points=points,
         contact_forces=forces,
-        applied_force=wrench[:3],
-        applied_torque=wrench[3:],
+        applied_force=wrench[:, :3],
+        applied_torque=wrench[:, 3:],
         text=tuple(text),
         force_scale=WEIGHT_ARROW * float(world.params[first, at.INV_MASS]) / strength,
     )

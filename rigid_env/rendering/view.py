@@ -27,11 +27,11 @@ def frame_of(task: Task, world: int = 0, arrows: bool = True) -> Frame:
     Returns
     -------
     Frame
-        Walls, bodies, goal, contact points with their forces, the wrench on body 0, and lines of text.
+        Walls, bodies, goal, contact points with their forces, the wrench on each body, and lines of text.
     """
     mark = task.goal_mark(world)
     goal = None if mark is None else GoalView(**mark)
-    frame = world_frame(task.world, world, task.lines(world), goal, task.wrench[world, 0], arrows=arrows)
+    frame = world_frame(task.world, world, task.lines(world), goal, task.wrench[world], arrows=arrows)
     return replace(frame, force_scale=WEIGHT_ARROW / task.weights[world, 0])
 
 

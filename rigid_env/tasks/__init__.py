@@ -4,7 +4,7 @@ The single environment is a batch of one; the vector environment and the Stable-
 batch itself. Subclass `Task` to set one of your own.
 """
 
-from rigid_env.tasks import observe
+from rigid_env.tasks import compiled, observe
 from rigid_env.tasks.actions import Force, Impulse, Wrench
 from rigid_env.tasks.block_reach import BlockReach
 from rigid_env.tasks.block_reorient import BlockReorient
@@ -30,5 +30,6 @@ __all__ = [
     "Uniform",
     "Worlds",
     "Wrench",
+    "compiled",
     "observe",
 ]

@@ -56,6 +56,13 @@ class Vector(NamedTuple):
         """Unit of its numbers, for tables: m mass of the body, g gravity, a its longest half extent."""
         return f"{self.share:g} m g" + {FORCE: "", TORQUE: " a", IMPULSE: " s"}[self.kind]
 
+    @property
+    def text(self) -> str:
+        """All of it in words, with every digit of its numbers."""
+        what = {FORCE: "force", TORQUE: "torque", IMPULSE: "impulse"}[self.kind]
+        at = "" if self.point is None else f" at {self.point}"
+        return f"{what} {self.share!r} on body {self.body} along {self.axes} of the {self.frame} frame{at}"
+
 
 @dataclass(frozen=True)
 class Wrench:

@@ -17,7 +17,8 @@ class Before:
         self._task, world = task, task.world
         disturbed = () if task.disturbed is None else task.disturbed.arrays.values()
         changing = [world.state, world.memory, world.report_table, world.sleep, task.action, task.previous_action,
-                    task.status, task.wrench, *task.memory_arrays.values(), *task.own_arrays().values(),
+                    task.status, task.wrench, task.record, task.outcome, task.obs,
+                    *task.memory_arrays.values(), *task.own_arrays().values(),
                     *disturbed]  # fmt: skip
         self._kept = [(array, np.empty_like(array)) for array in changing if array.size]
         self._time, self._clock, self._actuation = 0.0, 0, None

@@ -31,7 +31,7 @@ class BlockReach(BlockTask):
         """Places on the floor."""
         return OnFloor(self.area)
 
-    def _note_episodes(self, rows, values):
+    def note_episodes(self, rows, values):
         self.record[rows, col.GOAL : col.GOAL + 2] = values["goal"]
 
     def goal_mark(self, world):

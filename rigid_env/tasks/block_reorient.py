@@ -27,7 +27,7 @@ class BlockReorient(BlockTask):
         """Any face but the one that is down."""
         return OtherFace()
 
-    def _note_episodes(self, rows, values):
+    def note_episodes(self, rows, values):
         self.record[rows, col.FACE] = values["target_face"]
 
     def goal_mark(self, world):

@@ -25,12 +25,12 @@ class Declaration:
     ----------
     compiled : callable or None
         A kernel in place of the functions `update` to `measure` and of the entries' `read`, for speed:
-        ``(taken, state, record, walls, actions, obs, outcome)``, as `rigid_env.tasks.kernels.observe_reach`. It runs in
-        the threads that step the worlds.
+        ``(taken, state, record, walls, actions, obs, outcome)``, decorated with `rigid_env.compiled.kernel`. It
+        runs in the threads that step the worlds.
     measures, terms : tuple of str
         Of a compiled task: the names of what it writes into `outcome` behind reward, success and failure.
     record_size : int
-        Of a compiled task: numbers per world in `record`, which is its memory.
+        Of a compiled task: numbers per world in `record`, which is its memory; `note_episodes` writes draws into it.
     """
 
     scene: ClassVar[physics.Scene]
@@ -73,6 +73,17 @@ class Declaration:
 
     def begin(self, worlds: Worlds) -> None:
         """Prepare `memory` for episodes that begin; it is zero before."""
+
+    def note_episodes(self, rows: np.ndarray, values: Mapping[str, np.ndarray]) -> None:
+        """Write draws into `record`, where a compiled function finds them; NumPy functions need none of it.
+
+        Parameters
+        ----------
+        rows : (n,) int64
+            Worlds in which episodes begin: rows of `record`, which are as the last episode left them.
+        values : mapping of str to (n,) or (n, k) float64
+            Values of these episodes, by the names of `draws`.
+        """
 
     def update(self, worlds: Worlds) -> None:
         """Look at the worlds first in a control step, to change `memory`."""

@@ -6,11 +6,13 @@ from collections.abc import Iterable, Mapping
 from difflib import get_close_matches
 
 NEAR = 0.68  # likeness from which on a name is taken for a misspelt one
-FUNCTIONS = ("place", "begin", "update", "success", "failure", "rewards", "measure")
-OVERRIDABLE = {"lines", "place_options", "error_name", "area", "goal_draw", "name", "settings", "goal", "own_arrays"}
+FUNCTIONS = ("place", "note_episodes", "begin", "update", "success", "failure", "rewards", "measure")
+OVERRIDABLE = {"lines", "place_options", "error_name", "area", "goal_draw", "name", "settings", "goal"}
+OVERRIDABLE |= {"own_arrays", "own_settings"}
 OF_INSTANCES = {
-    "action", "clock", "disturbed", "effects", "episodes", "frame_skip", "generators", "info_names", "limits",
-    "memory_arrays", "obs", "observed", "outcome", "previous_action", "record", "status", "weights", "world",
+    "action", "clock", "disturbed", "effects", "episodes", "frame_skip", "generators", "info_names",
+    "kept_arrays", "limits", "memory_arrays", "obs", "observed", "outcome", "previous_action", "record", "status",
+    "weights", "world",
 }  # fmt: skip
 OF_INFO = ("is_success", "physics_status", "reset_mask", "elapsed_steps")
 
@@ -31,7 +33,8 @@ def check_class(task: type, base: type, declaration: type) -> None:
         is nearly that of a declared one, or a function that is none.
     """
     declared = {name for name in vars(declaration) if not name.startswith("_")} | {"scene"}
-    own = ({name for name in vars(base) if not name.startswith("_")} | OF_INSTANCES) - declared - OVERRIDABLE
+    of_base = {name for each in base.__mro__ for name in vars(each) if not name.startswith("_")}
+    own = (of_base | OF_INSTANCES) - declared - OVERRIDABLE
     defined = [name for name in vars(task) if not name.startswith("_")]
     for name in defined:
         if name in own:

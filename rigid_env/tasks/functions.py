@@ -46,7 +46,7 @@ class Functions:
         if is_first:
             task.set_outcome(np.zeros_like(self._outcome))
         self._obs = np.zeros_like(task.obs)
-        self._before = Before(task)
+        self.before = Before(task)
 
     def _rehearse(self) -> None:
         """Call each function once, for two rows of world 0, so that no shape fits by chance."""
@@ -87,7 +87,7 @@ class Functions:
     def step(self, actions: np.ndarray) -> None:
         """Move all worlds and look at them; after an error nothing has changed."""
         task = self.task
-        self._before.keep()
+        self.before.keep()
         try:
             task.previous_action[...] = task.action
             np.maximum(actions, -1.0, out=task.action)
@@ -95,7 +95,7 @@ class Functions:
             task.act()
             self._conclude()
         except BaseException:  # of an interrupt, too
-            self._before.put_back()
+            self.before.put_back()
             raise
 
     def _conclude(self) -> None:

@@ -132,6 +132,10 @@ class GoalTask(Task):
     def _both(self, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         return self.achieved_goal[rows].astype(np.float64), self.desired_goal[rows].astype(np.float64)
 
+    def own_settings(self):
+        """Kind of reward."""
+        return {"reward": self.reward}
+
     def own_arrays(self):
         """Both goals."""
         return {"achieved goal": self.achieved_goal, "desired goal": self.desired_goal}

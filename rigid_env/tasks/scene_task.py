@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from physics import validation
 from physics.kernels.state import layout as at
 from physics.world.setters import check_depth
 from rigid_env.tasks import layout as col
@@ -31,6 +32,8 @@ class SceneTask(Task):
         A scene, the name of a canonical one, or a scene file, whose table [environment] has the settings below.
     driven, force, torque, frame, length, goal, start, frame_skip, dt
         In place of the keys of that table; None: the file's, or the default. `goal` and `start` are dicts.
+    episode_steps : int, optional
+        In place of the key `max_episode_steps`, which `gymnasium.make` takes for itself.
     accuracy, effects, draws, dump_faults, threads
         As of `Task`.
 
@@ -60,6 +63,7 @@ class SceneTask(Task):
         start=None,
         frame_skip=None,
         dt=None,
+        episode_steps=None,
         accuracy="balanced",
         effects=(),
         draws=None,
@@ -74,6 +78,8 @@ class SceneTask(Task):
         reader = SettingsReader(self.scene, file, given)
         self.settings = settings = reader.settings()
         self.max_episode_steps = settings.max_episode_steps
+        if episode_steps is not None:
+            self.max_episode_steps = validation.count(episode_steps, "episode_steps")
         limits = {"force": settings.force, "torque": settings.torque, "frame": settings.frame}
         self.actions = [Wrench(body, **limits) for body in settings.driven]
         self.draws = self._declared()
@@ -149,6 +155,13 @@ class SceneTask(Task):
         if self.settings.goal is None:
             return {}
         return {"progress": worlds.memory["gain"], "success": BONUS * worlds.success}
+
+    def own_settings(self):
+        """Unit of lengths, and what counts as reaching the goal."""
+        goal, length = self.settings.goal, {"length": self.settings.length}
+        if goal is None:
+            return length
+        return {**length, "goal": f"body {goal.body} within {goal.tolerance!r} m at {goal.speed!r} m/s"}
 
     def goal_mark(self, world):
         """Disc of the size of the body and the tolerance around it."""

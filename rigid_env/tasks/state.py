@@ -3,34 +3,39 @@
 from __future__ import annotations
 
 import io
-import json
 import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
-from zipfile import is_zipfile
 
 import numpy as np
 
 import physics
 from physics import validation
 from physics.world import choice, restoring
+from physics.world.headed_file import FileKind
+from rigid_env.tasks.state_settings import check_settings
 
-FORMAT = 1
 HELD = "held "
 OF_ENVIRONMENTS = frozenset(("waiting", "ended", "pictures"))  # parts that a task without an environment leaves out
-KIND = "task state"
+FILE = FileKind("task state", "state of a task", "TaskState.save", format=2, oldest=2, missing="settings of the task")
 
 
 @dataclass(frozen=True)
 class TaskState:
-    """Everything that decides how the worlds of a task go on.
+    """Everything that decides how the worlds of a task go on, and the settings that must be the same where they do.
+
+    Accuracy, `max_episode_steps` and distributions of draws may be others: the same worlds go on with those.
 
     Parameters
     ----------
     task : str
         Name of the task's class.
+    settings : dict of str to str, int or float
+        Settings that must be the same where it goes on: ``frame_skip``, ``dt`` and others, see
+        `rigid_env.tasks.state_settings`.
     world : physics.Snapshot
         The worlds: poses, velocities, parameters, warm starts, actuators, time.
     arrays : dict of str to array
@@ -45,6 +50,7 @@ class TaskState:
     """
 
     task: str
+    settings: dict[str, str | int | float]
     world: physics.Snapshot
     arrays: dict[str, np.ndarray]
     held: dict[str, np.ndarray]
@@ -70,13 +76,13 @@ class TaskState:
         world = io.BytesIO()
         self.world.write(world)
         head = {
-            "kind": KIND, "format": FORMAT, "task": self.task, "told": self.told, "seeds": self.seeds,
+            "task": self.task, "settings": self.settings, "told": self.told, "seeds": self.seeds,
             "generators": list(map(_as_json, self.generators)),
         }  # fmt: skip
         parts = {f"{HELD}{name}": values for name, values in self.held.items()} | self.arrays
+        parts["world"] = np.frombuffer(world.getvalue(), dtype=np.uint8)
         with open(validation.path(path), "wb") as file:
-            binary = np.frombuffer(world.getvalue(), dtype=np.uint8)
-            np.savez_compressed(file, head=json.dumps(head), world=binary, **parts)
+            FILE.write(file, head, parts)
         return Path(path)
 
     @classmethod
@@ -90,27 +96,20 @@ class TaskState:
         Raises
         ------
         ValueError
-            It is no state of a task, a damaged one, or one of a newer format.
+            It is no state of a task, a damaged one, or one of another format than 2.
         OSError
             The file cannot be read.
         """
-        content = io.BytesIO(Path(validation.path(path)).read_bytes())
-        allowed = "allowed is what TaskState.save writes (.npz)"
-        if not is_zipfile(content):
-            raise ValueError(f"{path} is no state of a task; {allowed}")
-        try:
-            with np.load(content, allow_pickle=False) as file:
-                parts = dict(file)
-            head = json.loads(str(parts.pop("head")))
-            if head["kind"] != KIND or validation.count(head["format"], "its format") > FORMAT:
-                raise ValueError(f"it is a {head['kind']} of format {head['format']}")
-            world = physics.Snapshot.read(io.BytesIO(parts.pop("world").tobytes()), path)
-            held = {name.removeprefix(HELD): parts.pop(name) for name in list(parts) if name.startswith(HELD)}
-            generators = tuple(map(_of_json, head["generators"]))
-            return cls(str(head["task"]), world, parts, held, tuple(head["told"]), generators, tuple(head["seeds"]))
-        except Exception as error:  # whatever is wrong with it, it is none
-            told = f"there is no {error}" if isinstance(error, KeyError) else error
-            raise ValueError(f"{path} is no state of a task ({told}); {allowed}") from None
+        return FILE.read(io.BytesIO(Path(validation.path(path)).read_bytes()), path, partial(_from_parts, path))
+
+
+def _from_parts(path: str | os.PathLike, head: Mapping[str, Any], parts: dict[str, np.ndarray]) -> TaskState:
+    """State of the head and the arrays of a file; whether it fits a task is found out by `put`."""
+    world = physics.Snapshot.read(io.BytesIO(parts.pop("world").tobytes()), path)
+    held = {name.removeprefix(HELD): parts.pop(name) for name in list(parts) if name.startswith(HELD)}
+    told, seeds = tuple(head["told"]), tuple(head["seeds"])
+    generators = tuple(map(_of_json, head["generators"]))
+    return TaskState(str(head["task"]), dict(head["settings"]), world, parts, held, told, generators, seeds)
 
 
 def _as_json(state: Mapping[str, Any] | None) -> Any:
@@ -155,6 +154,7 @@ def take(task, arrays: Mapping[str, np.ndarray], seeds: Sequence[int | None], wo
     states = [task.generators[world] for world in indices]
     return TaskState(
         type(task).__name__,
+        task.settings_of_state,
         task.world.snapshot(worlds),
         {name: array[chosen].copy() for name, array in {**task.state_arrays(), **arrays}.items()},
         {name: array[chosen].copy() for name, array in task.episodes.held.items()},
@@ -187,61 +187,95 @@ def put(task, arrays: Mapping[str, np.ndarray], state: TaskState, worlds=None, s
         It is no state, one of another task or of other settings, or indices out of range.
     """
     validation.instance(state, TaskState, "state", "what get_state gives")
-    own = {**task.state_arrays(), **arrays}
-    _check(task, own, state, OF_ENVIRONMENTS if not arrays else frozenset())
+    _check(task, arrays, state)
     places = restoring.places(task.world, state.world, worlds, source)
-    chosen = np.arange(task.worlds) if places.worlds is None else places.worlds
-    sources = places.source
-    if sources is None:
-        sources = np.arange(len(chosen)) if state.worlds == len(chosen) else np.zeros(len(chosen), dtype=np.int64)
     if not places.is_all and state.held.keys() != task.episodes.held.keys():
         ours, theirs = (", ".join(held) or "nothing" for held in (task.episodes.held, state.held))
         raise ValueError(f"state holds {theirs}, the task {ours}; allowed is the same, or a state for all worlds")
-    task.world.restore(state.world, worlds, source)
+    task.world.restore_at(state.world, places)
+    chosen, sources = _indices(task.worlds, state.worlds, places)
     if places.worlds is None and places.source is None and state.worlds == task.worlds:
-        for name, array in own.items():
-            array[...] = state.arrays[name]
-        task.adopt(slice(None), state.arrays["steps"])
+        _write(task, arrays, state, slice(None), slice(None))
     else:
-        for name, array in own.items():
-            array[chosen] = state.arrays[name][sources]
-        task.adopt(chosen, state.arrays["steps"][sources])
-    for name, values in state.held.items():
-        task.episodes.held.setdefault(name, np.zeros((task.worlds, *values.shape[1:])))[chosen] = values[sources]
-    if places.is_all:
-        for name in task.episodes.held.keys() - state.held.keys():
-            del task.episodes.held[name]
+        _write(task, arrays, state, chosen, sources)
+    if state.held or task.episodes.held:
+        _hold(task, state, chosen, sources, places.is_all)
     task.episodes.varying.update(state.told)
-    for world, of in zip(chosen.tolist(), sources.tolist()):
-        _put_generator(task, world, state.generators[of])
+    _put_generators(task.generators, state.generators, chosen.tolist(), sources.tolist())
     return chosen, sources
 
 
-def _put_generator(task, world: int, state: dict[str, Any] | None) -> None:
-    if state is None:
-        task.generators[world] = None
-        return
-    if task.generators[world] is None:
-        task.generators[world] = np.random.Generator(np.random.PCG64())
-    task.generators[world].bit_generator.state = state
+def _indices(worlds: int, held: int, places: restoring.Places) -> tuple[np.ndarray, np.ndarray]:
+    """Worlds that change, and those of the state that they go on from."""
+    chosen = np.arange(worlds) if places.worlds is None else places.worlds
+    if places.source is not None:
+        return chosen, places.source
+    return chosen, np.arange(held) if held == len(chosen) else np.zeros(len(chosen), dtype=np.int64)
 
 
-def _check(task, own: Mapping[str, np.ndarray], state: TaskState, more: frozenset[str]) -> None:
-    """Refuse a state of another task, or of the same with other settings; it may have `more` parts."""
+def _write(task, arrays: Mapping[str, np.ndarray], state: TaskState, chosen, sources) -> None:
+    """Copy rows `sources` of a state into rows `chosen` of a task and its environment."""
+    given = state.arrays
+    if type(sources) is slice:  # all, in their order
+        for own in (task.kept_arrays, arrays):
+            for name, array in own.items():
+                array[...] = given[name]
+    else:
+        for own in (task.kept_arrays, arrays):
+            for name, array in own.items():
+                array[chosen] = given[name][sources]
+    task.adopt(chosen, given["steps"][sources])
+
+
+def _hold(task, state: TaskState, chosen: np.ndarray, sources: np.ndarray, is_all: bool) -> None:
+    """Hold the values that the state holds."""
+    held = task.episodes.held
+    for name, values in state.held.items():
+        held.setdefault(name, np.zeros((task.worlds, *values.shape[1:])))[chosen] = values[sources]
+    if is_all:
+        for name in held.keys() - state.held.keys():
+            del held[name]
+
+
+def _put_generators(generators: list, states: Sequence[dict[str, Any] | None], chosen: list, sources: list) -> None:
+    for world, of in zip(chosen, sources):
+        state = states[of]
+        if state is None:
+            generators[world] = None
+            continue
+        if generators[world] is None:
+            generators[world] = np.random.Generator(np.random.PCG64())
+        generators[world].bit_generator.state = state
+
+
+def _check(task, arrays: Mapping[str, np.ndarray], state: TaskState) -> None:
+    """Refuse a state of another task, or of the same with other settings or parts."""
     name = type(task).__name__
     if state.task != name:
         raise ValueError(f"state is {state!r}; allowed are states of {name}")
-    odd = own.keys() ^ state.arrays.keys()
-    if odd - more:
-        odd = ", ".join(sorted(odd))
-        raise ValueError(f"state is {state!r}, with other parts ({odd}); allowed are states of the same settings")
+    if state.settings != task.settings_of_state:
+        check_settings(name, task.settings_of_state, state.settings)
+    given, kept = state.arrays, task.kept_arrays
+    has_all = given.keys() >= kept.keys() and given.keys() >= arrays.keys()
+    if not has_all or len(given) != len(kept) + len(arrays) + 1:
+        odd = given.keys() ^ {*kept, *arrays, "steps"}
+        if arrays or odd - OF_ENVIRONMENTS:
+            odd = ", ".join(sorted(odd))
+            raise ValueError(f"state is {state!r}, with other parts ({odd}); allowed are states of the same settings")
     count, is_alike = state.worlds, state.worlds == task.worlds
-    for part, array in own.items():
-        given = state.arrays[part]
-        if given.dtype is array.dtype and is_alike and given.shape == array.shape:  # the most frequent
-            continue
-        if given.shape[1:] != array.shape[1:] or given.dtype != array.dtype or len(given) != count:
-            raise ValueError(
-                f"{part} of state has shape {given.shape} of {given.dtype}; allowed is "
-                f"{(state.worlds, *array.shape[1:])} of {array.dtype}"
-            )
+    for own in (kept, arrays):
+        for part, array in own.items():
+            value = given[part]
+            if not is_alike or value.shape != array.shape or value.dtype is not array.dtype:  # rarely
+                _check_part(part, value, array, count)
+    _check_part("steps", given["steps"], task.status, count)
+    for part, value in state.held.items():
+        if part not in task.drawn:
+            raise ValueError(f"state holds {part}, which {name} does not draw; allowed are {', '.join(task.drawn)}")
+        _check_part(f"held {part}", value, task.drawn[part], count)
+
+
+def _check_part(part: str, value: np.ndarray, array: np.ndarray, count: int) -> None:
+    if value.shape[1:] != array.shape[1:] or value.dtype != array.dtype or len(value) != count:
+        allowed = f"{(count, *array.shape[1:])} of {array.dtype}"
+        raise ValueError(f"{part} of state has shape {value.shape} of {value.dtype}; allowed is {allowed}")

@@ -3,49 +3,41 @@
 from __future__ import annotations
 
 import reprlib
-from collections.abc import Mapping
-from dataclasses import replace as replace_fields
 from functools import cached_property
 from typing import Any
 
 import numpy as np
-from gymnasium.utils import seeding
 
 import physics
 from physics import validation
 from physics.kernels.state import layout as at
 from physics.parallel.bound_call import Work, bound_alike, compiled
-from physics.parallel.team import listed
 from physics.world.report import gravest
 from physics.world.rollout_loop import RolloutLoop
-from physics.world.setters import start_anew
 from rigid_env.tasks import layout as col
 from rigid_env.tasks.actions import ActionTable
+from rigid_env.tasks.before import Before
 from rigid_env.tasks.declaration import Declaration
 from rigid_env.tasks.declaration_checks import check_class, refuse_same_keys
-from rigid_env.tasks.distributions import Distribution, as_distribution
+from rigid_env.tasks.distributions import Distribution
 from rigid_env.tasks.disturbances import Disturbances, Push
-from rigid_env.tasks.draws import Draws, check_draws, parameter_of, world_arguments
+from rigid_env.tasks.draws import Draws, check_draws
 from rigid_env.tasks.entries import Observation
 from rigid_env.tasks.functions import Functions
 from rigid_env.tasks.options import require_known
-from rigid_env.tasks.parameters import LENGTHS
-from rigid_env.tasks.replacing import checked_effects, refuse_replaced, replaced
-from rigid_env.tasks.state import put, take
+from rigid_env.tasks.replacing import checked_effects
+from rigid_env.tasks.starts import Starts, distributions_of
+from rigid_env.tasks.state_settings import state_settings
 from rigid_env.tasks.steps import Steps
 from rigid_env.tasks.wrenches import write_wrenches
 
-PARAMETER_ROUNDING = 1e-12
-"""Share by which a parameter differs from itself after it was stored: an inverse, twice a half."""
-
-OF_PROCESS = ("_functions", "observed", "_write_wrenches", "_kept_arrays", "rollout_loop", "rollout_observers")
+OF_PROCESS = (
+    "_before", "_functions", "_write_wrenches", "kept_arrays", "observed", "rollout_loop", "rollout_observers",
+)  # fmt: skip
 """Attributes that are left out of copies: machine code, and functions of the class."""
 
-UNIT_GRAVITY = 9.81
-"""[m/s²] In the unit of forces where a scene has no gravity."""
 
-
-class Task(Declaration):
+class Task(Starts):
     """A batch of worlds of one scene, and the task set in them. Subclass it to set one of your own.
 
     A subclass declares the attributes below, and defines the functions that it needs of `place`, `begin`, `update`,
@@ -122,7 +114,7 @@ class Task(Declaration):
         self.frame_skip = validation.count(frame_skip, "frame_skip")
         if self.max_episode_steps is not None:
             validation.count(self.max_episode_steps, f"max_episode_steps of {type(self).__name__}")
-        distributions = _distributions(self.declared_draws(), draws)
+        distributions = distributions_of(self.declared_draws(), draws)
         varied = [name for name, each in distributions.items() if not each.is_fixed]
         self.effects = checked_effects(effects, varied)
         self.world = physics.World(self._scene(distributions), worlds, dt, accuracy, threads)
@@ -148,6 +140,7 @@ class Task(Declaration):
         self.outcome = np.zeros((self.worlds, col.INFO + len(self.measures) + len(self.terms)))
         self._prepare()
         self._functions = None if self.compiled else Functions(self)
+        self._before = self._keeper()
         self.info_names = (*self.measures, *(f"reward_{term}" for term in self.terms))
         refuse_same_keys(type(self).__name__, self.info_names, self.drawn)
 
@@ -168,20 +161,6 @@ class Task(Declaration):
         self.status = np.zeros(worlds, dtype=np.int64)
         self.weights = np.zeros((worlds, bodies))
         self.limits = np.zeros((worlds, len(self._table.vectors)))
-
-    def _unlike_scene(self) -> set[str]:
-        """Parameters that are fixed at another value than the scene's."""
-        one = np.zeros(1, dtype=np.int64)
-        taken = replaced(self.effects)
-        names = [name for name in self.episodes.parameters if parameter_of(name)[0] not in taken]
-        fixed = {name: self.drawn[name][:1] for name in names}
-        found = set()
-        for name, value in fixed.items():
-            parameter, _ = parameter_of(name)
-            (now,) = self._arguments(one, {name: value}).values()
-            if not np.allclose(now, self._parameters_of(one)[parameter], rtol=PARAMETER_ROUNDING, atol=0.0):
-                found.add(name)
-        return found
 
     # --- the batch ----------------------------------------------------------------------------------------
 
@@ -250,179 +229,14 @@ class Task(Declaration):
         return float(self.world.params[world * self.world.body_count + body, at.INV_MASS])
 
     @property
+    def action_text(self) -> str:
+        """Vectors that an action makes, in words."""
+        return ", ".join(vector.text for vector in self._table.vectors)
+
+    @property
     def agents(self) -> dict[str, np.ndarray]:
         """Numbers of an action that belong to each agent."""
         return self._table.agents
-
-    @property
-    def own_draws(self) -> tuple[str, ...]:
-        """Names that `reset` tells in its info: all that `effects` leave to the task."""
-        taken = replaced(self.effects)
-        return tuple(name for name in self.drawn if name not in taken)
-
-    @property
-    def option_names(self) -> tuple[str, ...]:
-        """Options of `start`."""
-        return tuple(self.drawn)
-
-    def _scene(self, distributions: Mapping[str, Distribution]) -> physics.Scene:
-        scene = self.make_scene(distributions)
-        validation.instance(scene, physics.Scene, f"scene of {type(self).__name__}", "a physics.Scene")
-        given = {type(effect) for effect in self.effects}
-        kept = [effect for effect in scene.effects if type(effect) not in given]
-        return replace_fields(scene, effects=(*kept, *self.effects)) if given else scene
-
-    # --- episodes -----------------------------------------------------------------------------------------
-
-    def seed(self, world: int, seed: int | None) -> int:
-        """Give one world a new generator, as `gymnasium.Env.reset` does; returns the seed."""
-        self.generators[world], used = seeding.np_random(seed)
-        return used
-
-    def start(self, rows: np.ndarray, options: Mapping[str, Any] | None = None) -> None:
-        """Start a new episode in the worlds `rows`.
-
-        Parameters
-        ----------
-        rows : (n,) int64
-            Worlds.
-        options : dict, optional
-            Fix what is otherwise drawn, each for all `rows` or one per row, by the names of the task's `draws`.
-
-        Raises
-        ------
-        TypeError, ValueError
-            An option that is unknown or out of range. Nothing has changed then, the generators included.
-        """
-        options = require_known(options, self.option_names)
-        chosen = {name: self.episodes.read(name, f"options {name}", options[name], len(rows)) for name in options}
-        refuse_replaced(self.effects, chosen, "options ")
-        if self._functions is None and not chosen:  # nothing can go wrong
-            self._start(rows, chosen)
-            return
-        before = take(self, {}, [None] * self.worlds, rows)
-        try:
-            self._start(rows, chosen)
-        except BaseException:
-            put(self, {}, before, rows)
-            raise
-
-    def _start(self, rows: np.ndarray, chosen: Mapping[str, np.ndarray]) -> None:
-        shares = np.array([self.generators[world].random(self.episodes.uniforms) for world in rows])
-        values = self.episodes.draw(rows, shares, chosen)
-        self.move(rows, values, chosen)
-        self.episodes.begin(rows, values, chosen)
-        self._note_parameters(rows)
-        for array in (self.action, self.previous_action, self.wrench, self.outcome, *self.memory_arrays.values()):
-            array[rows] = 0.0
-        self._began[rows] = self.clock
-        self.status[rows] = physics.Status.OK
-        if self.disturbed is not None:
-            self.disturbed.begin(rows)
-        self._note_episodes(rows, values)
-        if self.compiled is None:
-            self._functions.begin(rows)
-        else:
-            world = self.world
-            self.compiled(listed(rows), world.state, self.record, world.walls, None, self.obs, self.outcome)
-
-    def move(self, rows: np.ndarray, values: Mapping[str, np.ndarray], chosen: Mapping[str, np.ndarray]) -> None:
-        """Write poses and parameters of episodes with these values into the world; after an error nothing has changed.
-
-        Parameters
-        ----------
-        rows : (n,) int64
-        values : mapping of str to (n,) or (n, k) array
-        chosen : mapping
-            Those of them that options fix.
-        """
-        told = self.episodes.varying | chosen.keys()
-        changed = {name: values[name] for name in self.episodes.parameters if name in told}
-        what = f"options {', '.join(self.place_options)}" if chosen else f"place of {type(self).__name__}"
-        try:
-            start_anew(self.world, rows, self._starts(values), self._arguments(rows, changed), what)
-        except ValueError as error:
-            if str(error).startswith(what):
-                raise
-            raise ValueError(f"{what}: {error}") from None
-
-    def _arguments(self, rows: np.ndarray, values: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
-        """Arguments of `World.set_parameters` for physical parameters by name."""
-        return world_arguments(values, self._parameters_of(rows)) if values else {}
-
-    def _parameters_of(self, rows: np.ndarray) -> dict[str, np.ndarray]:
-        """Physical parameters of worlds `rows`: (n, bodies) or (n, bodies, 3), gravity (n, 3)."""
-        world = self.world
-        params = world.params.reshape(self.worlds, world.body_count, -1)[rows]
-        return {
-            "mass": 1.0 / params[..., at.INV_MASS],
-            "size": 2.0 * params[..., at.DIMENSIONS : at.DIMENSIONS + 3],
-            "friction": params[..., at.FRICTION],
-            "restitution": params[..., at.RESTITUTION],
-            "gravity": world.gravity[rows],
-        }
-
-    def _starts(self, values: Mapping[str, np.ndarray]) -> dict[str, Any]:
-        """Arguments of `World.set_state`: the scene's poses, with those of `place` instead."""
-        given = self.place(values)
-        if not isinstance(given, Mapping) or not set(given) <= set(self._own_starts):
-            raise ValueError(
-                f"place of {type(self).__name__} gave {reprlib.repr(given)}; allowed is a dict with keys of "
-                f"{', '.join(self._own_starts)}"
-            )
-        return {**self._own_starts, **given}
-
-    @property
-    def place_options(self) -> tuple[str, ...]:
-        """Options that decide where bodies start, for errors."""
-        return self.option_names
-
-    def _note_parameters(self, rows: np.ndarray) -> None:
-        """Renew what follows from masses, sizes and gravity: weights and the limits of actions."""
-        self.weights[rows] = weights = self._weights(rows)
-        params = self.world.params.reshape(self.worlds, self.world.body_count, -1)[rows]
-        reach = params[..., at.DIMENSIONS : at.DIMENSIONS + 3].max(axis=2)
-        self.limits[rows] = self._table.limits(weights, reach, self.world.dt)
-
-    def _weights(self, rows: np.ndarray) -> np.ndarray:
-        """(n, bodies) m g [N]."""
-        gravity = np.linalg.norm(self.world.gravity[rows], axis=1)
-        gravity[gravity == 0.0] = UNIT_GRAVITY
-        masses = 1.0 / self.world.params.reshape(self.worlds, self.world.body_count, -1)[rows, :, at.INV_MASS]
-        return masses * gravity[:, None]
-
-    def _note_episodes(self, rows: np.ndarray, values: Mapping[str, np.ndarray]) -> None:
-        """Write what a compiled function reads into `record`."""
-
-    def hold(self, name: str, value) -> None:
-        """Give a drawn value of every world from now on: a physical parameter at once, any other from the next start.
-
-        Parameters
-        ----------
-        name : str
-            Of `drawn`.
-        value : array_like
-            One for all worlds or one for each; None: draw it again from the next episode on.
-
-        Raises
-        ------
-        ValueError
-            Out of range, or a size that reaches deep into a wall where the body is. Nothing has changed then.
-        """
-        refuse_replaced(self.effects, (name,))
-        if value is not None:
-            value = self.episodes.read(name, name, value, self.worlds)
-            if name in self.episodes.parameters:
-                self._change(name, value)
-        self.episodes.hold(name, value)
-        self._note_parameters(np.arange(self.worlds))
-
-    def _change(self, name: str, value: np.ndarray) -> None:
-        """Give a parameter of all worlds the values (worlds,) or (worlds, k); after an error nothing has changed."""
-        try:
-            self.world.set_parameters(**self._arguments(np.arange(self.worlds), {name: value}))
-        except ValueError as error:
-            raise ValueError(f"{name} is {reprlib.repr(value.tolist())}: {error}") from None
 
     # --- control steps ------------------------------------------------------------------------------------
 
@@ -456,8 +270,20 @@ class Task(Declaration):
         if self._functions is not None:
             self._functions.step(actions)
             return
+        if self._before is not None:
+            self._before.keep()
         self.action[...] = actions
         self.act()
+
+    def _keeper(self) -> Before | None:
+        if self._functions is not None:
+            return self._functions.before
+        return Before(self) if self.may_fail else None
+
+    def take_back(self) -> None:
+        """Be as before the last control step: for one that is followed by a start that ends with an error."""
+        if self._before is not None:
+            self._before.put_back()
 
     def act(self) -> None:
         """Move the worlds by one control step."""
@@ -480,7 +306,7 @@ class Task(Declaration):
             self.action, table.table, table.points, self.limits, self.world.state, advance.wrench, advance.kick
         )  # fmt: skip
         self._write_wrenches = compiled(write_wrenches, self.wrench_arguments)
-        self._kept_arrays = {
+        self.kept_arrays = {
             "action": self.action, "previous action": self.previous_action, "record": self.record, "obs": self.obs,
             "outcome": self.outcome, "status": self.status, "wrench": self.wrench, "weights": self.weights,
             "limits": self.limits, **({} if self.disturbed is None else self.disturbed.arrays),
@@ -491,7 +317,19 @@ class Task(Declaration):
 
     def state_arrays(self) -> dict[str, np.ndarray]:
         """Arrays that decide how episodes go on, the worlds apart, by name; each has a row for each world."""
-        return {**self._kept_arrays, "steps": self.steps}
+        return {**self.kept_arrays, "steps": self.steps}
+
+    @cached_property
+    def settings_of_state(self) -> dict[str, Any]:
+        """Settings that must be the same where a state goes on, by name."""
+        return state_settings(self)
+
+    def own_settings(self) -> dict[str, Any]:
+        """Settings of a kind of tasks that decide how episodes go on, by name: a state goes on where they are the same.
+
+        Scene, actions and time need not be among them.
+        """
+        return {}
 
     def own_arrays(self) -> dict[str, np.ndarray]:
         """More arrays of a kind of tasks that a step renews, by name, with a row for each world."""
@@ -499,7 +337,7 @@ class Task(Declaration):
 
     def set_outcome(self, outcome: np.ndarray) -> None:
         """Take an array for outcomes, once it is known how many numbers they have."""
-        self.outcome = self._kept_arrays["outcome"] = outcome
+        self.outcome = self.kept_arrays["outcome"] = outcome
 
     def adopt(self, rows: np.ndarray, steps: np.ndarray) -> None:
         """Take over how many control steps (n,) the episodes in worlds `rows` have had."""
@@ -516,20 +354,9 @@ class Task(Declaration):
         self.observed = Observation(self.observation)
         self._prepare()
         self._functions = None if self.compiled else Functions(self, is_first=False)
+        self._before = self._keeper()
 
     def observer(self, taken: np.ndarray) -> Work:
         """Return the kernel that observes the worlds of a list, such as a thread has stepped."""
         arguments = (taken, self.world.state, self.record, self.world.walls, self.action, self.obs, self.outcome)
         return bound_alike(None, self.compiled, *arguments)
-
-
-def _distributions(declared: Mapping[str, Any], given: Mapping[str, Any] | None) -> dict[str, Distribution]:
-    """Distributions of a task, with those that a user gives in place of its own, of the same lengths."""
-    declared = require_known(declared, declared, "draws")
-    given = require_known(given, tuple(declared), "draws")
-    found = {}
-    for name, value in declared.items():
-        field, parameter = f"draws {name}", parameter_of(name)
-        own = as_distribution(field, value, LENGTHS[parameter[0]] if parameter else None)
-        found[name] = as_distribution(field, given[name], own.length) if name in given else own
-    return found

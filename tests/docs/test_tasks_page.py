@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import importlib
 import importlib.util
 import inspect
 import io
@@ -14,7 +15,7 @@ from types import ModuleType
 import numpy as np
 import pytest
 
-from rigid_env import TaskEnv, tasks
+from rigid_env import TaskEnv, check_task, tasks
 from rigid_env.tasks import (
     Choice,
     Force,
@@ -116,6 +117,7 @@ def test_the_tables_have_all_there_is():
         "Entry",
         "Task",
         "Worlds",
+        "compiled",
         "observe",
     }
 
@@ -153,3 +155,39 @@ def test_the_pieces_make_the_whole():
         ours, theirs = (env.step(action) for env in envs)
         np.testing.assert_array_equal(ours[0], theirs[0])
         assert ours[1:] == theirs[1:]
+
+
+@pytest.fixture
+def puck(tmp_path, monkeypatch):
+    """The module of the compiled example, as a user has it: a file of its own."""
+    (code,) = (block.code for block in BLOCKS if block.code.startswith("# puck.py"))
+    (tmp_path / "puck.py").write_text(code, encoding="utf-8")
+    monkeypatch.syspath_prepend(tmp_path)
+    yield importlib.import_module("puck")
+    sys.modules.pop("puck")
+
+
+def test_the_compiled_example_is_a_whole_task(puck):
+    check_task(puck.Puck, contexts=())
+
+
+def test_the_compiled_example_needs_public_names_only():
+    (code,) = (block.code for block in BLOCKS if block.code.startswith("# puck.py"))
+    imported = re.findall(r"^(?:from|import) (\S+)", code, re.MULTILINE)
+    assert set(imported) == {"math", "physics", "rigid_env"}
+
+
+def test_the_compiled_example_gives_what_its_functions_would(puck):
+    """The closed form: a force of 0.3 m g for t on ice is a speed of 0.3 g t."""
+    env = TaskEnv(puck.Puck)
+    obs, info = env.reset(seed=3, options={"goal": 2.0})
+    assert (obs[0], info["distance"]) == (np.float32(-0.4), 2.0)
+    before = 2.0
+    for k in range(1, 6):
+        obs, reward, terminated, _, info = env.step([1.0])
+        assert obs[1] * 5.0 == pytest.approx(0.3 * 9.81 * 0.025 * k, rel=1e-6)
+        assert reward == info["reward_nearer"] == pytest.approx(before - info["distance"], abs=1e-12)
+        assert not terminated
+        before = info["distance"]
+    env.reset(options={"goal": 0.05})
+    assert env.step([0.0])[2]

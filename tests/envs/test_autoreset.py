@@ -7,6 +7,10 @@ import numpy as np
 import pytest
 from gymnasium.vector import AutoresetMode
 
+from rigid_env import BlockReachVectorEnv, TaskVectorEnv, Uniform
+from rigid_env.tasks import BlockReach, Distribution, Push
+from tests.tasks.conftest import Slide
+
 STILL = np.zeros((2, 6), dtype=np.float32)
 
 
@@ -107,3 +111,139 @@ def test_reset_mask_errors(vector_class, mask, text):
     envs.reset(seed=0)
     with pytest.raises(ValueError, match=f"reset_mask.*{text}"):
         envs.reset(options={"reset_mask": mask})
+
+
+# --- starts that end with an error ------------------------------------------------------------------------------------
+
+
+class Fragile(Slide):
+    """A task whose start, or whose goal in pictures, may end with an error."""
+
+    draws = {"x": Uniform(-1.0, 1.0), "mass": (2.0, 4.0)}  # noqa: RUF012
+    memory = {"count": 1}  # noqa: RUF012
+    disturbances = (Push(0, 0.5, 0.05),)
+    max_episode_steps = 4
+    breaks_at = None
+
+    def place(self, drawn):
+        if self.breaks_at == "place":
+            raise ZeroDivisionError("no place")
+        return {"pos": np.stack([drawn["x"], np.full_like(drawn["x"], 0.5), 0 * drawn["x"]], axis=1)}
+
+    def begin(self, worlds):
+        if self.breaks_at == "begin":
+            raise ZeroDivisionError("no beginning")
+
+    def update(self, worlds):
+        worlds.memory["count"] += 1.0
+
+    def goal_mark(self, world):
+        if self.breaks_at == "goal_mark":
+            raise ZeroDivisionError("no goal")
+        return {"pos": (0.0, 0.0, 0.0)}
+
+
+class OwnDraw(Distribution):
+    """A distribution that ends with an error while `breaks` is True."""
+
+    length = uniforms = 1
+    breaks = False
+
+    def at(self, shares, drawn):
+        if self.breaks:
+            raise ZeroDivisionError("no draw")
+        return 4.0 + shares[:, 0]
+
+    def describe(self):
+        return "from 4 to 5"
+
+
+class FragileReach(BlockReach):
+    """A compiled task whose start may end with an error."""
+
+    breaks_at = None
+
+    def place(self, drawn):
+        if self.breaks_at == "place":
+            raise ZeroDivisionError("no place")
+        return super().place(drawn)
+
+
+def everything(envs) -> str:
+    state = envs.get_state()
+    parts = state.world.arrays, state.world.time, state.arrays, state.held, state.generators, state.seeds
+    with np.printoptions(threshold=1_000_000, floatmode="unique"):
+        return str((parts, envs.task.clock, [generator is None for generator in envs.task.generators]))
+
+
+def broken(envs, place):
+    """Break the task at a place."""
+    envs.task.breaks_at = place
+    for each in envs.task.distributions.values():
+        for part in (each, getattr(each, "edges", None)):
+            if isinstance(part, OwnDraw):
+                part.breaks = place == "draw"
+
+
+FRAGILE = {
+    "place": (Fragile, {}, "place"),
+    "begin": (Fragile, {}, "begin"),
+    "pictures": (Fragile, {"obs": "pixels", "obs_size": (8, 12), "obs_stack": 2}, "goal_mark"),
+    "start of pictures": (Fragile, {"obs": "pixels", "obs_size": (8, 12), "obs_stack": 2}, "begin"),
+    "compiled": (FragileReach, {}, "place"),
+    "drawn": (BlockReach, {"mass": OwnDraw()}, "draw"),
+}
+
+
+@pytest.mark.parametrize("mode", ["NextStep", "SameStep"])
+@pytest.mark.parametrize("name", FRAGILE)
+def test_a_step_whose_start_fails_changes_nothing_and_can_be_taken_again(name, mode):
+    task, more, place = FRAGILE[name]
+    envs, twin = (TaskVectorEnv(3, task=task, autoreset_mode=mode, max_episode_steps=4, **more) for _ in range(2))
+    rng = np.random.default_rng(1)
+    for each in (envs, twin):
+        broken(each, None)
+        each.reset(seed=0)
+        each.step(np.zeros(each.action_space.shape))
+        each.reset(options={"reset_mask": np.array([True, False, True])})
+    failed = 0
+    for _ in range(14):
+        action = rng.uniform(-1, 1, envs.action_space.shape)
+        before = everything(envs)
+        broken(envs, place)
+        try:
+            obs, *rest = envs.step(action)
+        except ZeroDivisionError:
+            failed += 1
+            assert everything(envs) == before
+            broken(envs, None)
+            obs, *rest = envs.step(action)
+        broken(envs, None)
+        theirs = twin.step(action)
+        np.testing.assert_array_equal(obs, theirs[0])
+        for ours, other in zip(rest[:3], theirs[1:4], strict=True):
+            np.testing.assert_array_equal(ours, other)
+    assert failed >= 3
+    assert everything(envs) == everything(twin)
+
+
+@pytest.mark.parametrize("name", FRAGILE)
+def test_a_reset_that_fails_changes_nothing(name):
+    task, more, place = FRAGILE[name]
+    envs = TaskVectorEnv(2, task=task, **more)
+    broken(envs, None)
+    envs.reset(seed=0)
+    envs.step(np.zeros(envs.action_space.shape))
+    before, seeds = everything(envs), envs.np_random_seed
+    broken(envs, place)
+    for keywords in ({}, {"seed": 5}, {"options": {"reset_mask": np.array([False, True])}}):
+        with pytest.raises(ZeroDivisionError):
+            envs.reset(**keywords)
+        assert everything(envs) == before
+        assert envs.np_random_seed == seeds
+    broken(envs, None)
+
+
+def test_built_in_tasks_need_no_copies_for_starts():
+    assert not BlockReachVectorEnv(1).task.may_fail
+    assert TaskVectorEnv(1, task=FragileReach).task.may_fail

@@ -253,7 +253,7 @@ def test_frame_shows_the_world_as_it_is():
     np.testing.assert_allclose(frame.bodies[0].pos, world.pos[1, 0])
     assert len(frame.walls) == 3
     assert len(frame.contact_points) == 4
-    assert frame.applied_torque.tolist() == [3.0, 4.0, 5.0]
+    assert frame.applied_torque.tolist() == [[3.0, 4.0, 5.0]]
     assert frame.text == ("text",)
 
 

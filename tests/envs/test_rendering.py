@@ -33,6 +33,9 @@ from rigid_env.rendering.painter import Painter, import_pygame
 from rigid_env.rendering.picture import without_bodies, world_frame
 from rigid_env.rendering.shadows import SUN_SAMPLES, fall, outlines
 from rigid_env.rendering.solids import pose
+from rigid_env.rendering.view import frame_of
+from rigid_env.tasks import Wrench
+from tests.tasks.conftest import started
 
 pytest.importorskip("pygame")
 
@@ -451,6 +454,48 @@ def test_forces_torque_contacts_goal_and_text_each_leave_their_mark(renderer):
         assert np.abs(changed - colour).max(axis=1).min() < 30, more
     with_text = renderer.draw(block_frame(text=("t = 1.0 s",)))
     assert np.any(with_text[:40, :120] != plain[:40, :120])
+
+
+def test_the_wrench_on_each_body_is_drawn_at_its_centre(renderer):
+    """The arrows of two bodies together change the pixels that those of each body alone change."""
+    bodies = tuple(BodyView("block", (2, 1, 1), (x, 4, 0)) for x in (-5.0, 5.0))
+    wrenches = np.array([[(30.0, 0.0, 0.0), (0.0, 0.0, 20.0)], [(0.0, 40.0, 0.0), (0.0, 15.0, 0.0)]])
+    plain = Frame(bodies, THREE_WALLS)
+    still = renderer.draw(plain)
+
+    def changed(on):
+        force, torque = (wrenches[:, k] * np.array(on)[:, None] for k in (0, 1))
+        return np.any(renderer.draw(replace(plain, applied_force=force, applied_torque=torque)) != still, axis=2)
+
+    first, second, both = changed((1, 0)), changed((0, 1)), changed((1, 1))
+    assert first.any()
+    assert second.any()
+    np.testing.assert_array_equal(both, first | second)
+    pixels, _ = renderer.camera(plain).project([body.pos for body in bodies], SIZE)
+    for mark, here, there in ((first, 0, 1), (second, 1, 0)):
+        middle = np.argwhere(mark)[:, ::-1].mean(axis=0)
+        assert np.hypot(*(middle - pixels[here])) < np.hypot(*(middle - pixels[there]))
+
+
+def test_wrenches_of_more_bodies_than_there_are_are_refused():
+    with pytest.raises(ValueError, match="applied_force has 2 rows; allowed are at most 1"):
+        block_frame(applied_force=np.ones((2, 3)))
+    with pytest.raises(ValueError, match=r"applied_torque must have shape \(-1, 3\)"):
+        block_frame(applied_torque=(1.0, 2.0))
+
+
+def test_the_frame_of_a_task_has_the_wrench_on_each_body():
+    from examples.two_blocks import TwoBlocks
+
+    class BothDriven(TwoBlocks):
+        actions = (Wrench(0), Wrench(1, frame="body"))
+
+    task = started(BothDriven(1))
+    task.step(np.linspace(0.2, 1.0, task.action_size)[None])
+    frame = frame_of(task)
+    np.testing.assert_array_equal(frame.applied_force, task.wrench[0, :, :3])
+    np.testing.assert_array_equal(frame.applied_torque, task.wrench[0, :, 3:])
+    assert np.any(frame.applied_force[1])
 
 
 def test_force_arrow_has_the_length_of_the_scaled_force(renderer):

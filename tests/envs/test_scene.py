@@ -211,12 +211,35 @@ def test_the_file_limits_episodes(tmp_path):
     assert length(gym.make(ID, scene=path)) == 7
     assert length(gym.make(ID, scene=path, max_episode_steps=4)) == 4
     assert gym.make_vec(ID, num_envs=2, scene=path).max_episode_steps == 7
-    assert gym.make_vec(ID, num_envs=2, scene=path, max_episode_steps=9).max_episode_steps == 9
     assert SceneVectorEnv(2, BALL).max_episode_steps is None
     envs = SceneVectorEnv(2, path)
     envs.reset(seed=0)
     cuts = [envs.step(np.zeros((2, 6)))[3].tolist() for _ in range(7)]
     assert cuts == [[False] * 2] * 6 + [[True] * 2]
+
+
+@pytest.mark.parametrize("steps", [3, 7, 12])
+def test_an_explicit_limit_takes_the_place_of_the_files_in_single_and_batch(steps, tmp_path):
+    path = limited(tmp_path, 7)
+    assert length(SceneEnv(path, episode_steps=steps)) == steps
+    assert length(gym.make(ID, scene=path, episode_steps=steps)) == steps
+    assert length(gym.make(ID, scene=path, episode_steps=steps, max_episode_steps=2)) == 2
+    for mode in ("vector_entry_point", "sync"):
+        envs = gym.make_vec(ID, num_envs=2, scene=path, episode_steps=steps, vectorization_mode=mode)
+        envs.reset(seed=0)
+        cuts = [envs.step(np.zeros((2, 6), dtype=np.float32))[3].tolist() for _ in range(steps)]
+        assert cuts == [[False] * 2] * (steps - 1) + [[True] * 2]
+    assert gym.make_vec(ID, num_envs=2, scene=path, episode_steps=steps, max_episode_steps=2).max_episode_steps == 2
+
+
+@pytest.mark.parametrize("value", [8, None])
+def test_a_batch_refuses_a_limit_that_a_single_environment_would_not_reach(value, tmp_path):
+    path = limited(tmp_path, 7)
+    with pytest.raises(ValueError, match=f"max_episode_steps is {value}, and the scene's 7; allowed are at most 7, or"):
+        gym.make_vec(ID, num_envs=2, scene=path, max_episode_steps=value)
+    assert gym.make_vec(ID, num_envs=2, scene=BALL, max_episode_steps=value).max_episode_steps == value
+    with pytest.raises(ValueError, match="episode_steps is 0; allowed"):
+        SceneEnv(path, episode_steps=0)
 
 
 # --- starts ----------------------------------------------------------------------------------------------------------

@@ -8,8 +8,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import stats
 
+import physics
+from rigid_env import Distribution, TaskEnv
 from rigid_env.tasks import Choice, LogUniform, Normal, Uniform
 from rigid_env.tasks.distributions import LAST, as_distribution
+from tests.tasks.conftest import Slide, started
 
 DRAWS = 20_000
 
@@ -99,3 +102,56 @@ def test_refusals_name_field_value_and_what_is_allowed(name):
     with pytest.raises(ValueError, match="allowed") as error:
         make()
     assert all(word in str(error.value) for word in words), str(error.value)
+
+
+# --- a distribution of one's own --------------------------------------------------------------------------------------
+
+
+class Triangle(Distribution):
+    """Numbers from 0 to 2, as likely as a triangle over them is high: the sum of two uniform numbers."""
+
+    length, uniforms = 1, 2
+
+    def at(self, shares, drawn):
+        return shares[:, 0] + shares[:, 1]
+
+    def describe(self):
+        return "a triangle from 0 to 2"
+
+    def read(self, field, value, worlds):
+        values = super().read(field, value, worlds)
+        if not ((values >= 0.0) & (values <= 2.0)).all():
+            raise ValueError(f"{field} is {value!r}; allowed are numbers from 0 to 2")
+        return values
+
+
+class Drawing(Slide):
+    """A task that draws with it."""
+
+    draws = {"before": (0.0, 1.0), "height": Triangle(), "after": (0.0, 1.0), "friction": (0.1, 0.5)}  # noqa: RUF012
+    scene = physics.Scene(Slide.scene.bodies, Slide.scene.walls, (*Slide.scene.effects, physics.Friction(0.3)))
+
+
+def test_a_distribution_of_ones_own_draws_in_its_task():
+    task = started(Drawing(2000))
+    assert stats.kstest(task.drawn["height"], stats.triang(0.5, 0.0, 2.0).cdf).pvalue > 1e-3
+    assert "a triangle from 0 to 2" in TaskEnv(Drawing).describe()
+
+
+@given(seed=st.integers(0, 1000), value=st.floats(0.0, 2.0))
+@settings(max_examples=20)
+def test_its_options_fix_it_and_leave_the_other_draws_of_the_seed_alone(seed, value):
+    env = TaskEnv(Drawing)
+    drawn = env.reset(seed=seed)[1]
+    fixed = env.reset(seed=seed, options={"height": value})[1]
+    assert fixed["height"] == value
+    for name in ("before", "after", "friction"):
+        assert fixed[name] == drawn[name]
+
+
+def test_its_own_refusals_are_told():
+    env = TaskEnv(Drawing)
+    with pytest.raises(ValueError, match=r"options height is 2.5; allowed are numbers from 0 to 2"):
+        env.reset(seed=0, options={"height": 2.5})
+    with pytest.raises(ValueError, match=r"draws height is Uniform.*, of 2 numbers; allowed are 1"):
+        TaskEnv(Drawing, draws={"height": Uniform((0, 0), (1, 1))})

@@ -2,13 +2,27 @@
 
 from __future__ import annotations
 
+import dataclasses
+import json
+
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 import physics
 from benchmarks.numpy_reach import NumpyReach
-from rigid_env import BlockReachEnv, BlockReachVectorEnv, BlockReorientEnv, TaskEnv, TaskState, TaskVectorEnv
-from rigid_env.tasks import Gust, Push
+from rigid_env import (
+    BlockReachEnv,
+    BlockReachGoal,
+    BlockReachVectorEnv,
+    BlockReorientEnv,
+    SceneEnv,
+    TaskEnv,
+    TaskState,
+    TaskVectorEnv,
+)
+from rigid_env.tasks import Gust, Push, Wrench
 from tests.tasks.conftest import Slide
 
 VARIED = {"mass": (4.0, 8.0), "size": ((4.0, 2.5, 1.5), (6.0, 3.5, 2.5)), "friction": (0.3, 0.7)}
@@ -179,7 +193,7 @@ def everything(envs) -> tuple:
         (lambda envs, s: envs.set_state(None), ("state", "None", "get_state")),
         (lambda envs, s: envs.set_state(s["reorient"]), ("BlockReorient", "states of BlockReach")),
         (lambda envs, s: envs.set_state(s["pixels"]), ("pictures", "same settings")),
-        (lambda envs, s: envs.set_state(s["actuated"]), ("snapshot", "of another scene")),
+        (lambda envs, s: envs.set_state(s["actuated"]), ("effects", "lag=0.1", "Contact, Friction, Gravity")),
         (lambda envs, s: envs.set_state(s["three"]), ("3", "2 worlds")),
         (lambda envs, s: envs.set_state(s["own"], worlds=[2]), ("worlds", "2", "0 to 1")),
         (lambda envs, s: envs.set_state(s["own"], source=[0, 5]), ("source", "5", "0 to 1")),
@@ -201,6 +215,108 @@ def test_a_wrong_state_changes_nothing(change, words):
         change(envs, others)
     assert all(word in str(error.value) for word in words), str(error.value)
     assert str(everything(envs)) == before
+
+
+class Stronger(Stormy):
+    """The same as `Stormy`, by its name, with other actions."""
+
+    actions = Wrench(0, force=0.75, torque=0.0, force_axes="x")
+
+
+Stronger.__name__ = "Stormy"
+
+
+class Tuned(Slide):
+    """A task with a setting of its own."""
+
+    def __init__(self, worlds=1, *, worth=1.0, **settings):
+        self.worth = worth
+        super().__init__(worlds, **settings)
+
+    def own_settings(self):
+        return {"worth": self.worth}
+
+    def rewards(self, worlds):
+        return {"speed": self.worth * worlds.linvel[:, 0, 0]}
+
+
+GOAL = {"pos": (3.0, 1.5, 0.0), "tolerance": 0.5}
+OTHER_SETTINGS = {
+    "frame_skip": (BlockReachEnv, lambda: BlockReachEnv(frame_skip=4), ("5", "4")),
+    "dt": (BlockReachEnv, lambda: BlockReachEnv(dt=0.004), ("0.005", "0.004")),
+    "walls": (BlockReachEnv, lambda: BlockReachEnv(half_width=12.0), ("offset=-10.0", "offset=-12.0")),
+    "effects": (BlockReachEnv, lambda: BlockReachEnv(effects=[physics.Drag(0.1, 1.0)]), ("Gravity;", "Drag")),
+    "actions": (lambda: TaskEnv(Stormy), lambda: TaskEnv(Stronger), ("force 0.5", "force 0.75")),
+    "worth": (lambda: TaskEnv(Tuned), lambda: TaskEnv(Tuned, worth=2.0), ("1.0", "2.0")),
+    "reward": (lambda: TaskEnv(BlockReachGoal), lambda: TaskEnv(BlockReachGoal, reward="dense"), ("sparse", "dense")),
+    "goal": (
+        lambda: SceneEnv("drop", goal=GOAL), lambda: SceneEnv("drop", goal={**GOAL, "tolerance": 0.25}), ("0.5", "0.25")
+    ),
+    "length": (lambda: SceneEnv("drop", length=2.0), lambda: SceneEnv("drop", length=3.0), ("2.0", "3.0")),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", OTHER_SETTINGS)
+def test_other_settings_are_refused_by_name_and_nothing_changes(name, tmp_path):
+    make, make_other, words = OTHER_SETTINGS[name]
+    env, other = make(), make_other()
+    env.reset(seed=1)
+    other.reset(seed=2)
+    state, before = env.get_state(), str(everything(other))
+    for each in (state, TaskState.load(state.save(tmp_path / "state.npz"))):
+        with pytest.raises(ValueError, match=f"^{name} of state is .*; allowed is that of this ") as error:
+            other.set_state(each)
+        assert all(word in str(error.value) for word in words), str(error.value)
+        assert str(everything(other)) == before
+        make().set_state(each)
+
+
+@given(skip=st.integers(1, 6), other_skip=st.integers(1, 6), dt=st.sampled_from((0.004, 0.005, 0.0025)))
+@settings(max_examples=20)
+def test_a_state_goes_on_exactly_where_the_steps_are_alike(skip, other_skip, dt):
+    env, other = BlockReachEnv(frame_skip=skip), BlockReachEnv(frame_skip=other_skip, dt=dt)
+    env.reset(seed=1)
+    try:
+        other.set_state(env.get_state())
+    except ValueError:
+        assert (skip, 0.005) != (other_skip, dt)
+        return
+    assert (skip, 0.005) == (other_skip, dt)
+    action = np.full(6, 0.4)
+    np.testing.assert_array_equal(other.step(action)[0], env.step(action)[0])
+
+
+def test_accuracy_limits_and_ranges_of_draws_may_be_others():
+    """A planner rolls out states of a fine environment in a coarse model; the worlds are the same."""
+    env = BlockReachEnv(accuracy="balanced")
+    env.reset(seed=3, options={"mass": 7.0})
+    others = BlockReachEnv(accuracy="fast"), BlockReachEnv(accuracy="precise"), BlockReachEnv(mass=(2.0, 3.0))
+    for other in (*others, BlockReachVectorEnv(1, max_episode_steps=7)):
+        other.set_state(env.get_state())
+        np.testing.assert_array_equal(other.task.world.state, env.task.world.state)
+        assert other.task.drawn["mass"][0] == 7.0
+
+
+def test_a_file_without_settings_is_refused(tmp_path):
+    path = BlockReachEnv().get_state().save(tmp_path / "state.npz")
+    with np.load(path) as file:
+        parts = dict(file)
+    head = json.loads(str(parts["head"]))
+    lacking = "has format 1, which does not hold settings of the task; allowed is format 2"
+    for number, words in ((1, lacking), (3, "has format 3; allowed is format 2")):
+        np.savez(path, **{**parts, "head": json.dumps({**head, "format": number})})
+        with pytest.raises(ValueError, match=words):
+            TaskState.load(path)
+
+
+def test_held_values_of_another_form_are_refused():
+    envs = BlockReachVectorEnv(2)
+    envs.reset(seed=1)
+    state, before = envs.get_state(), str(everything(envs))
+    for held in ({"mass": np.ones((2, 3))}, {"hue": np.ones(2)}):
+        with pytest.raises(ValueError, match=r"held mass of state has shape|state holds hue"):
+            envs.set_state(dataclasses.replace(state, held=held))
+        assert str(everything(envs)) == before
 
 
 @pytest.mark.parametrize("content", [b"", b"PK\x03\x04 no archive", b"not a state"])

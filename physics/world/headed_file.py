@@ -1,0 +1,95 @@
+"""Files of arrays with a head that says what they are: ``.npz``, of which nothing is run when they are read."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any, BinaryIO, TypeVar
+from zipfile import is_zipfile
+
+import numpy as np
+
+from physics import validation
+
+T = TypeVar("T")
+
+
+@dataclass(frozen=True)
+class FileKind:
+    """A kind of such files.
+
+    Parameters
+    ----------
+    kind : str
+        Its name in the head.
+    name : str
+        Its name in errors, such as ``snapshot``.
+    writer : str
+        Name of the method that writes it, for errors.
+    format : int
+        Number of the format that is written; a newer one is refused.
+    oldest : int
+        Oldest format that is read.
+    missing : str
+        What an older one lacks, for errors.
+    """
+
+    kind: str
+    name: str
+    writer: str
+    format: int = 1
+    oldest: int = 1
+    missing: str = ""
+
+    def write(self, file: BinaryIO, head: Mapping[str, Any], parts: Mapping[str, np.ndarray]) -> None:
+        """Write a head, which JSON can hold, and arrays by name into an open file."""
+        head = {"kind": self.kind, "format": self.format, **head}
+        np.savez_compressed(file, head=json.dumps(head), **parts)
+
+    def read(
+        self, content: BinaryIO, path: str | os.PathLike, make: Callable[[dict[str, Any], dict[str, np.ndarray]], T]
+    ) -> T:
+        """Read the content of a file.
+
+        Parameters
+        ----------
+        content : open binary file
+        path : str or Path
+            Its name in an error.
+        make : callable
+            Makes the thing of head and arrays; any exception means that the file is no such thing.
+
+        Raises
+        ------
+        ValueError
+            It is of another kind, damaged, or of a format that is not read.
+        """
+        if not is_zipfile(content):
+            raise ValueError(f"{path} is no {self.name}; {self._allowed}")
+        try:
+            with np.load(content, allow_pickle=False) as file:
+                parts = dict(file)
+            head = json.loads(str(parts.pop("head")))
+            if head["kind"] != self.kind:
+                raise ValueError(f"it is a {head['kind']}")
+            number = validation.count(head["format"], "its format")
+            found = make(head, parts) if self.oldest <= number <= self.format else None
+        except Exception as error:  # whatever is wrong with it, it is none
+            told = f"there is no {error}" if isinstance(error, KeyError) else error
+            raise ValueError(f"{path} is no {self.name} ({told}); {self._allowed}") from None
+        if found is None:
+            raise ValueError(f"{path} has format {number}{self._formats(number)}")
+        return found
+
+    @property
+    def _allowed(self) -> str:
+        return f"allowed is what {self.writer} writes (.npz)"
+
+    def _formats(self, number: int) -> str:
+        lacks = f", which does not hold {self.missing}" if number < self.oldest else ""
+        if self.oldest == self.format > 1:
+            return f"{lacks}; allowed is format {self.format}"
+        since = "up to" if self.oldest == 1 else f"{self.oldest} to"
+        return f"{lacks}; allowed are formats {since} {self.format}"

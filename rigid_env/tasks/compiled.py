@@ -1,0 +1,31 @@
+"""Names that a compiled task needs: `kernel`, and the places of numbers in the arrays that it gets.
+
+``Task.compiled`` is a kernel that takes ``(taken, state, record, walls, actions, obs, outcome)``; docs/tasks.md has the
+arrays and a whole task.
+"""
+
+from __future__ import annotations
+
+from physics.kernels.compile.decorators import inlined, kernel
+from physics.kernels.math.quaternion import to_matrix
+from physics.kernels.parallel.work_stealing import TAKEN_COUNT, TAKEN_FIRST_WORLD
+from physics.kernels.state.layout import ANGVEL, LINVEL, POS, QUAT, WALL_NORMAL, WALL_OFFSET
+from rigid_env.tasks.layout import FAILURE, INFO, REWARD, SUCCESS
+
+__all__ = [
+    "ANGVEL",
+    "FAILURE",
+    "INFO",
+    "LINVEL",
+    "POS",
+    "QUAT",
+    "REWARD",
+    "SUCCESS",
+    "TAKEN_COUNT",
+    "TAKEN_FIRST_WORLD",
+    "WALL_NORMAL",
+    "WALL_OFFSET",
+    "inlined",
+    "kernel",
+    "to_matrix",
+]

@@ -1,0 +1,237 @@
+"""Starts of a task's episodes: what is drawn, where bodies are placed, and what follows from their parameters."""
+
+from __future__ import annotations
+
+import reprlib
+from collections.abc import Mapping
+from dataclasses import replace as replace_fields
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from gymnasium.utils import seeding
+
+import physics
+from physics import validation
+from physics.kernels.state import layout as at
+from physics.parallel.team import listed
+from physics.world.setters import start_anew
+from rigid_env.tasks.declaration import Declaration
+from rigid_env.tasks.distributions import Distribution, as_distribution
+from rigid_env.tasks.draws import parameter_of, world_arguments
+from rigid_env.tasks.options import require_known
+from rigid_env.tasks.parameters import LENGTHS
+from rigid_env.tasks.replacing import refuse_replaced, replaced
+from rigid_env.tasks.state import put, take
+
+PARAMETER_ROUNDING = 1e-12
+"""Share by which a parameter differs from itself after it was stored: an inverse, twice a half."""
+
+AT_STARTS = ("declared_draws", "place", "note_episodes")
+"""Functions of a compiled task that a start calls."""
+
+UNIT_GRAVITY = 9.81
+"""[m/s²] In the unit of forces where a scene has no gravity."""
+
+
+class Starts(Declaration):
+    """The part of `Task` that begins episodes, and gives worlds the values that are drawn for them."""
+
+    def seed(self, world: int, seed: int | None) -> int:
+        """Give one world a new generator, as `gymnasium.Env.reset` does; returns the seed."""
+        self.generators[world], used = seeding.np_random(seed)
+        return used
+
+    def start(self, rows: np.ndarray, options: Mapping[str, Any] | None = None) -> None:
+        """Start a new episode in the worlds `rows`.
+
+        Parameters
+        ----------
+        rows : (n,) int64
+            Worlds.
+        options : dict, optional
+            Fix what is otherwise drawn, each for all `rows` or one per row, by the names of the task's `draws`.
+
+        Raises
+        ------
+        TypeError, ValueError
+            An option that is unknown or out of range. Nothing has changed then, the generators included.
+        """
+        options = require_known(options, self.option_names)
+        chosen = {name: self.episodes.read(name, f"options {name}", options[name], len(rows)) for name in options}
+        refuse_replaced(self.effects, chosen, "options ")
+        if not self.may_fail and not chosen:
+            self._start(rows, chosen)
+            return
+        before = take(self, {}, [None] * self.worlds, rows)
+        try:
+            self._start(rows, chosen)
+        except BaseException:
+            put(self, {}, before, rows)
+            raise
+
+    def _start(self, rows: np.ndarray, chosen: Mapping[str, np.ndarray]) -> None:
+        shares = np.array([self.generators[world].random(self.episodes.uniforms) for world in rows])
+        values = self.episodes.draw(rows, shares, chosen)
+        self.move(rows, values, chosen)
+        self.episodes.begin(rows, values, chosen)
+        self._note_parameters(rows)
+        for array in (self.action, self.previous_action, self.wrench, self.outcome, *self.memory_arrays.values()):
+            array[rows] = 0.0
+        self._began[rows] = self.clock
+        self.status[rows] = physics.Status.OK
+        if self.disturbed is not None:
+            self.disturbed.begin(rows)
+        self.note_episodes(rows, values)
+        if self.compiled is None:
+            self._functions.begin(rows)
+        else:
+            world = self.world
+            self.compiled(listed(rows), world.state, self.record, world.walls, None, self.obs, self.outcome)
+
+    def move(self, rows: np.ndarray, values: Mapping[str, np.ndarray], chosen: Mapping[str, np.ndarray]) -> None:
+        """Write poses and parameters of episodes with these values into the world; after an error nothing has changed.
+
+        Parameters
+        ----------
+        rows : (n,) int64
+        values : mapping of str to (n,) or (n, k) array
+        chosen : mapping
+            Those of them that options fix.
+        """
+        told = self.episodes.varying | chosen.keys()
+        changed = {name: values[name] for name in self.episodes.parameters if name in told}
+        what = f"options {', '.join(self.place_options)}" if chosen else f"place of {type(self).__name__}"
+        try:
+            start_anew(self.world, rows, self._starts(values), self._arguments(rows, changed), what)
+        except ValueError as error:
+            if str(error).startswith(what):
+                raise
+            raise ValueError(f"{what}: {error}") from None
+
+    def _arguments(self, rows: np.ndarray, values: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
+        """Arguments of `World.set_parameters` for physical parameters by name."""
+        return world_arguments(values, self._parameters_of(rows)) if values else {}
+
+    def _parameters_of(self, rows: np.ndarray) -> dict[str, np.ndarray]:
+        """Physical parameters of worlds `rows`: (n, bodies) or (n, bodies, 3), gravity (n, 3)."""
+        world = self.world
+        params = world.params.reshape(self.worlds, world.body_count, -1)[rows]
+        return {
+            "mass": 1.0 / params[..., at.INV_MASS],
+            "size": 2.0 * params[..., at.DIMENSIONS : at.DIMENSIONS + 3],
+            "friction": params[..., at.FRICTION],
+            "restitution": params[..., at.RESTITUTION],
+            "gravity": world.gravity[rows],
+        }
+
+    def _unlike_scene(self) -> set[str]:
+        """Parameters that are fixed at another value than the scene's."""
+        one = np.zeros(1, dtype=np.int64)
+        taken = replaced(self.effects)
+        names = [name for name in self.episodes.parameters if parameter_of(name)[0] not in taken]
+        fixed = {name: self.drawn[name][:1] for name in names}
+        found = set()
+        for name, value in fixed.items():
+            parameter, _ = parameter_of(name)
+            (now,) = self._arguments(one, {name: value}).values()
+            if not np.allclose(now, self._parameters_of(one)[parameter], rtol=PARAMETER_ROUNDING, atol=0.0):
+                found.add(name)
+        return found
+
+    def _starts(self, values: Mapping[str, np.ndarray]) -> dict[str, Any]:
+        """Arguments of `World.set_state`: the scene's poses, with those of `place` instead."""
+        given = self.place(values)
+        if not isinstance(given, Mapping) or not set(given) <= set(self._own_starts):
+            raise ValueError(
+                f"place of {type(self).__name__} gave {reprlib.repr(given)}; allowed is a dict with keys of "
+                f"{', '.join(self._own_starts)}"
+            )
+        return {**self._own_starts, **given}
+
+    @property
+    def place_options(self) -> tuple[str, ...]:
+        """Options that decide where bodies start, for errors."""
+        return self.option_names
+
+    def _note_parameters(self, rows: np.ndarray) -> None:
+        """Renew what follows from masses, sizes and gravity: weights and the limits of actions."""
+        self.weights[rows] = weights = self._weights(rows)
+        params = self.world.params.reshape(self.worlds, self.world.body_count, -1)[rows]
+        reach = params[..., at.DIMENSIONS : at.DIMENSIONS + 3].max(axis=2)
+        self.limits[rows] = self._table.limits(weights, reach, self.world.dt)
+
+    def _weights(self, rows: np.ndarray) -> np.ndarray:
+        """(n, bodies) m g [N]."""
+        gravity = np.linalg.norm(self.world.gravity[rows], axis=1)
+        gravity[gravity == 0.0] = UNIT_GRAVITY
+        masses = 1.0 / self.world.params.reshape(self.worlds, self.world.body_count, -1)[rows, :, at.INV_MASS]
+        return masses * gravity[:, None]
+
+    def hold(self, name: str, value) -> None:
+        """Give a drawn value of every world from now on: a physical parameter at once, any other from the next start.
+
+        Parameters
+        ----------
+        name : str
+            Of `drawn`.
+        value : array_like
+            One for all worlds or one for each; None: draw it again from the next episode on.
+
+        Raises
+        ------
+        ValueError
+            Out of range, or a size that reaches deep into a wall where the body is. Nothing has changed then.
+        """
+        refuse_replaced(self.effects, (name,))
+        if value is not None:
+            value = self.episodes.read(name, name, value, self.worlds)
+            if name in self.episodes.parameters:
+                self._change(name, value)
+        self.episodes.hold(name, value)
+        self._note_parameters(np.arange(self.worlds))
+
+    def _change(self, name: str, value: np.ndarray) -> None:
+        """Give a parameter of all worlds the values (worlds,) or (worlds, k); after an error nothing has changed."""
+        try:
+            self.world.set_parameters(**self._arguments(np.arange(self.worlds), {name: value}))
+        except ValueError as error:
+            raise ValueError(f"{name} is {reprlib.repr(value.tolist())}: {error}") from None
+
+    @cached_property
+    def may_fail(self) -> bool:
+        """True if code of a user runs at the start of an episode, which may end with an error."""
+        parts = [getattr(type(self), name) for name in AT_STARTS]
+        for each in self.distributions.values():
+            parts += [type(each), *(type(part) for part in vars(each).values() if isinstance(part, Distribution))]
+        return not self.compiled or any(not part.__module__.startswith("rigid_env.") for part in parts)
+
+    @property
+    def own_draws(self) -> tuple[str, ...]:
+        """Names that `reset` tells in its info: all that `effects` leave to the task."""
+        taken = replaced(self.effects)
+        return tuple(name for name in self.drawn if name not in taken)
+
+    @property
+    def option_names(self) -> tuple[str, ...]:
+        """Options of `start`."""
+        return tuple(self.drawn)
+
+    def _scene(self, distributions: Mapping[str, Distribution]) -> physics.Scene:
+        scene = self.make_scene(distributions)
+        validation.instance(scene, physics.Scene, f"scene of {type(self).__name__}", "a physics.Scene")
+        given = {type(effect) for effect in self.effects}
+        kept = [effect for effect in scene.effects if type(effect) not in given]
+        return replace_fields(scene, effects=(*kept, *self.effects)) if given else scene
+
+
+def distributions_of(declared: Mapping[str, Any], given: Mapping[str, Any] | None) -> dict[str, Distribution]:
+    """Distributions of a task, with those that a user gives in place of its own, of the same lengths."""
+    declared = require_known(declared, declared, "draws")
+    given = require_known(given, tuple(declared), "draws")
+    found = {}
+    for name, value in declared.items():
+        field, parameter = f"draws {name}", parameter_of(name)
+        own = as_distribution(field, value, LENGTHS[parameter[0]] if parameter else None)
+        found[name] = as_distribution(field, given[name], own.length) if name in given else own
+    return found
