@@ -186,7 +186,7 @@ def share(value: ArrayLike, shape: tuple[int, ...], field: str) -> np.ndarray:
 
 def count(value: int, field: str, least: int = 1, most: int | None = MOST) -> int:
     """An integer from `least` to `most`; None: of any size."""
-    if type(value) is int and least <= value <= MOST:
+    if type(value) is int and least <= value and (most is None or value <= most):
         return value
     if isinstance(value, bool) or not isinstance(value, (int, np.integer)) or value < least:
         raise ValueError(f"{field} is {shown(value)}; allowed are integers of at least {least}")

@@ -120,6 +120,7 @@ class BlockReachEnv(BlockEnv):
     | `obs` | `"state"` | observations: `"state"`, the table above, or `"pixels"`, pictures (uint8) |
     | `obs_size` | (84, 84) | height and width of these [px] |
     | `obs_stack` | 1 | of the last so many control steps, along the last axis, the newest last |
+    | `contacts` | 0 | contacts told in `info`, those with the largest forces |
 
     `mass`, `size`, `friction`, `restitution` and `gravity` take a pair (low, high) as well: each episode
     then draws its own value. What is drawn is not observed, the edges in the gaps to the walls apart. They are

@@ -15,6 +15,7 @@ from gymnasium.vector import AutoresetMode
 from rigid_env.envs.env import TaskEnv
 from rigid_env.envs.making import task_class
 from rigid_env.envs.vector_env import TaskVectorEnv
+from rigid_env.envs.vector_infos import keys
 from rigid_env.tasks import Task
 
 SEED = 7
@@ -42,7 +43,7 @@ def check_task(
     contexts : tuple of str
         Ways to start workers that are tried; a class that stands in `__main__` without a file cannot be spawned.
     settings
-        Arguments of the task.
+        Arguments of the task, and ``contacts`` of its environments.
 
     Raises
     ------
@@ -93,7 +94,7 @@ class _Checks:
                 _same("observation", _of_world(obs, i), alone[0], where)
                 _same("reward", rewards[i], alone[1], where)
                 _same("end of the episode", ends[i], alone[2], where)
-                for name in envs.task.info_names:
+                for name in keys(envs.task, envs.contact_infos):
                     _same(f"info {name}", infos[name][i], alone[4][name], where)
             if ends.any():
                 return

@@ -15,7 +15,7 @@ import physics
 from physics.parallel.exclusive import exclusive, in_use
 from rigid_env.envs.attributes import EpisodeParameters, value_of
 from rigid_env.envs.goals import lend_goals
-from rigid_env.envs.infos import InfoMaker
+from rigid_env.envs.infos import info_maker
 from rigid_env.envs.making import make_task
 from rigid_env.envs.sources import StateSource, make_source
 from rigid_env.envs.spaces import action_space
@@ -46,6 +46,8 @@ class RigidEnv(gym.Env):
     obs_size : (2,) int
         Height and width [px].
     obs_stack : int
+    contacts : int
+        Contacts that every info tells, those with the largest forces; see `rigid_env.envs.contact_infos`. 0: none.
 
     Raises
     ------
@@ -65,6 +67,7 @@ class RigidEnv(gym.Env):
         obs: str = "state",
         obs_size: Sequence[int] = (84, 84),
         obs_stack: int = 1,
+        contacts: int = 0,
     ):
         self.task = task
         self._source = make_source(task, obs, obs_size, obs_stack)
@@ -77,7 +80,7 @@ class RigidEnv(gym.Env):
         self._world = np.zeros(1, dtype=np.int64)
         self._is_plain = type(self._source) is StateSource
         self._action_shape = self.action_space.shape
-        self._info = InfoMaker(task.info_names)
+        self._info = info_maker(task, contacts)
         self._ends_on_success = task.ends_on_success
         self._has_reset = self._is_closed = False
 
@@ -258,7 +261,7 @@ class TaskEnv(RigidEnv):
     ----------
     task : class of Task, or str
         The class, or where it stands: ``module:Class``.
-    render_mode, width, height, obs, obs_size, obs_stack
+    render_mode, width, height, obs, obs_size, obs_stack, contacts
         As of `RigidEnv`.
     settings
         Arguments of the task.
@@ -281,9 +284,10 @@ class TaskEnv(RigidEnv):
         obs: str = "state",
         obs_size: Sequence[int] = (84, 84),
         obs_stack: int = 1,
+        contacts: int = 0,
         **settings,
     ):
-        super().__init__(make_task(task, 1, settings), render_mode, width, height, obs, obs_size, obs_stack)
+        super().__init__(make_task(task, 1, settings), render_mode, width, height, obs, obs_size, obs_stack, contacts)
 
 
 class BlockEnv(EpisodeParameters, RigidEnv):
@@ -291,7 +295,7 @@ class BlockEnv(EpisodeParameters, RigidEnv):
 
     Parameters
     ----------
-    render_mode, width, height, obs, obs_size, obs_stack
+    render_mode, width, height, obs, obs_size, obs_stack, contacts
         As of `RigidEnv`.
     accuracy, walls, half_width, mass, size, friction, restitution, gravity, effects, frame_skip, dt, dump_faults
         Of the task, see `rigid_env.tasks.block.BlockTask`.
@@ -315,6 +319,7 @@ class BlockEnv(EpisodeParameters, RigidEnv):
         obs: str = "state",
         obs_size: Sequence[int] = (84, 84),
         obs_stack: int = 1,
+        contacts: int = 0,
         accuracy: str | physics.Accuracy = "balanced",
         walls: str = "three",
         half_width: float = 10.0,
@@ -333,4 +338,4 @@ class BlockEnv(EpisodeParameters, RigidEnv):
             restitution=restitution, gravity=gravity, effects=effects, frame_skip=frame_skip, dt=dt,
             dump_faults=dump_faults,
         )  # fmt: skip
-        super().__init__(task, render_mode, width, height, obs, obs_size, obs_stack)
+        super().__init__(task, render_mode, width, height, obs, obs_size, obs_stack, contacts)

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
+from rigid_env.envs.contact_infos import ContactInfos, contact_infos
+from rigid_env.tasks import Task
 from rigid_env.tasks.layout import INFO, SUCCESS
 
 
@@ -34,3 +36,26 @@ class InfoMaker:
 
     def __reduce__(self):
         return InfoMaker, (self._names,)
+
+
+class ContactInfoMaker:
+    """Make the same, with the contacts of the world.
+
+    Parameters
+    ----------
+    plain : InfoMaker
+    contacts : ContactInfos
+    """
+
+    def __init__(self, plain: InfoMaker, contacts: ContactInfos):
+        self._plain, self._contacts = plain, contacts
+
+    def __call__(self, row: list[float], status: int) -> dict[str, Any]:
+        """Info of an outcome, and of the contacts now."""
+        return {**self._plain(row, status), **self._contacts.one()}
+
+
+def info_maker(task: Task, contacts: int) -> InfoMaker | ContactInfoMaker:
+    """Maker of the infos of a task of one world; `contacts` as in `rigid_env.envs.contact_infos.contact_infos`."""
+    plain, reader = InfoMaker(task.info_names), contact_infos(task, contacts)
+    return plain if reader is None else ContactInfoMaker(plain, reader)

@@ -110,7 +110,7 @@ class RigidVecEnv(VecEnv):
         info = {
             "terminal_observation": vector_infos["final_obs"][i],
             "TimeLimit.truncated": is_truncated,
-            **{key: final[key][i].item() for key in infos_of_batches.keys(self.vector_env.task)},
+            **{key: self._of_world(final[key], i) for key in self._keys()},
         }
         if self.monitor:
             info["episode"] = {
@@ -122,8 +122,17 @@ class RigidVecEnv(VecEnv):
 
     def _row_of(self, infos: dict[str, Any], world: int) -> dict[str, Any]:
         """One world's info at the start of its episode."""
-        keys = (*infos_of_batches.keys(self.vector_env.task), *self.vector_env.task.own_draws)
+        keys = (*self._keys(), *self.vector_env.task.own_draws)
         return {key: infos[key][world].tolist() for key in keys}
+
+    def _keys(self) -> tuple[str, ...]:
+        """Keys of every info."""
+        return infos_of_batches.keys(self.vector_env.task, self.vector_env.contact_infos)
+
+    @staticmethod
+    def _of_world(values: np.ndarray, world: int) -> Any:
+        """One world's number, or a copy of its array."""
+        return values[world].item() if values.ndim == 1 else values[world].copy()
 
     def close(self) -> None:
         """Close the vector environment."""

@@ -131,6 +131,7 @@ class SceneEnv(RigidEnv):
     | `obs` | `"state"` | observations: `"state"`, the table above, or `"pixels"`, pictures (uint8) |
     | `obs_size` | (84, 84) | height and width of these [px] |
     | `obs_stack` | 1 | of the last so many control steps, along the last axis, the newest last |
+    | `contacts` | 0 | contacts told in `info`, those with the largest forces |
 
     From `driven` to `episode_steps` an argument takes the place of that key in the file; None leaves the file's, or the
     default in brackets.
@@ -150,6 +151,7 @@ class SceneEnv(RigidEnv):
         obs: str = "state",
         obs_size: Sequence[int] = (84, 84),
         obs_stack: int = 1,
+        contacts: int = 0,
         driven: Driven | None = None,
         force: float | None = None,
         torque: float | None = None,
@@ -169,7 +171,7 @@ class SceneEnv(RigidEnv):
             frame_skip=frame_skip, dt=dt, episode_steps=episode_steps, accuracy=accuracy, effects=effects,
             dump_faults=dump_faults,
         )  # fmt: skip
-        super().__init__(task, render_mode, width, height, obs, obs_size, obs_stack)
+        super().__init__(task, render_mode, width, height, obs, obs_size, obs_stack, contacts)
 
     def step(self, action):
         """Hold an action for one control step; as `RigidEnv.step`, but truncated at the limit of the task."""
@@ -188,7 +190,7 @@ class SceneVectorEnv(RigidVectorEnv):
     ----------
     num_envs : int
     scene : physics.Scene, str or Path
-    autoreset_mode, max_episode_steps, render_mode, width, height, obs, obs_size, obs_stack
+    autoreset_mode, max_episode_steps, render_mode, width, height, obs, obs_size, obs_stack, contacts
         As of `RigidVectorEnv`; `max_episode_steps` is `episode_steps` by default, and at most that.
     driven, force, torque, frame, length, goal, start, frame_skip, dt, episode_steps, accuracy, effects, dump_faults
         As of `SceneEnv`.
@@ -216,6 +218,7 @@ class SceneVectorEnv(RigidVectorEnv):
         obs: str = "state",
         obs_size: Sequence[int] = (84, 84),
         obs_stack: int = 1,
+        contacts: int = 0,
         driven: Driven | None = None,
         force: float | None = None,
         torque: float | None = None,
@@ -237,7 +240,8 @@ class SceneVectorEnv(RigidVectorEnv):
             accuracy=accuracy, effects=effects, dump_faults=dump_faults, threads=threads,
         )  # fmt: skip
         check_limit(max_episode_steps, task.max_episode_steps)
-        super().__init__(task, autoreset_mode, max_episode_steps, render_mode, width, height, obs, obs_size, obs_stack)
+        told = render_mode, width, height, obs, obs_size, obs_stack, contacts
+        super().__init__(task, autoreset_mode, max_episode_steps, *told)
 
 
 def check_limit(value: int | str | None, limit: int | None) -> None:

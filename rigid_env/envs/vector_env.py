@@ -19,6 +19,7 @@ from physics.parallel.exclusive import exclusive
 from rigid_env.envs import vector_arguments as arguments
 from rigid_env.envs import vector_infos
 from rigid_env.envs.attributes import BatchAttributes
+from rigid_env.envs.contact_infos import contact_infos
 from rigid_env.envs.goals import lend_goals
 from rigid_env.envs.making import make_task
 from rigid_env.envs.sources import make_source
@@ -49,7 +50,7 @@ class RigidVectorEnv(BatchAttributes):
         ``human`` shows world 0.
     width, height : int
         Of one world's picture [px].
-    obs, obs_size, obs_stack
+    obs, obs_size, obs_stack, contacts
         As of `rigid_env.envs.env.RigidEnv`.
 
     Raises
@@ -72,9 +73,11 @@ class RigidVectorEnv(BatchAttributes):
         obs: str = "state",
         obs_size: Sequence[int] = (84, 84),
         obs_stack: int = 1,
+        contacts: int = 0,
     ):
         self.task = task
         self._source = make_source(task, obs, obs_size, obs_stack)
+        self.contact_infos = contact_infos(task, contacts)
         lend_goals(task, self)
         self.num_envs = num_envs = task.worlds
         self.autoreset_mode = arguments.autoreset_mode(autoreset_mode)
@@ -151,7 +154,7 @@ class RigidVectorEnv(BatchAttributes):
             raise
         self._waiting[rows] = False
         self._show()
-        infos = vector_infos.of_outcomes(self.task, mask)
+        infos = vector_infos.of_outcomes(self.task, mask, self.contact_infos)
         vector_infos.add_drawn(infos, self.task, rows)
         return self._source.all(), infos
 
@@ -212,14 +215,15 @@ class RigidVectorEnv(BatchAttributes):
         if self.autoreset_mode is AutoresetMode.SAME_STEP:
             rows = np.flatnonzero(self._ended)
             if len(rows):
-                finals = vector_infos.of_ended(task, self._source, rows, self._ended)
+                finals = vector_infos.of_ended(task, self._source, self._ended, self.contact_infos)
         if self.autoreset_mode is not AutoresetMode.DISABLED and len(rows):
             ended = self._ended
             self._begin(rows, {})
             self._ended = ended & (self.autoreset_mode is AutoresetMode.NEXT_STEP)
             vector_infos.add_drawn(finals, task, rows)
         self._show()
-        return self._source.all(), rewards, terminations, truncations, {**vector_infos.of_outcomes(task), **finals}
+        infos = vector_infos.of_outcomes(task, contacts=self.contact_infos)
+        return self._source.all(), rewards, terminations, truncations, {**infos, **finals}
 
     @exclusive
     def get_state(self, worlds: ArrayLike | None = None) -> TaskState:
@@ -339,7 +343,7 @@ class TaskVectorEnv(RigidVectorEnv):
     num_envs : int
     task : class of Task, or str
         The class, or where it stands: ``module:Class``.
-    autoreset_mode, max_episode_steps, render_mode, width, height, obs, obs_size, obs_stack
+    autoreset_mode, max_episode_steps, render_mode, width, height, obs, obs_size, obs_stack, contacts
         As of `RigidVectorEnv`.
     settings
         Arguments of the task, ``threads`` among them.
@@ -365,11 +369,12 @@ class TaskVectorEnv(RigidVectorEnv):
         obs: str = "state",
         obs_size: Sequence[int] = (84, 84),
         obs_stack: int = 1,
+        contacts: int = 0,
         **settings,
     ):
         batch = make_task(task, validation.count(num_envs, "num_envs"), settings)
-        picture = render_mode, width, height, obs, obs_size, obs_stack
-        super().__init__(batch, autoreset_mode, max_episode_steps, *picture)
+        told = render_mode, width, height, obs, obs_size, obs_stack, contacts
+        super().__init__(batch, autoreset_mode, max_episode_steps, *told)
 
 
 class BlockVectorEnv(RigidVectorEnv):
@@ -378,7 +383,7 @@ class BlockVectorEnv(RigidVectorEnv):
     Parameters
     ----------
     num_envs : int
-    autoreset_mode, max_episode_steps, render_mode, width, height, obs, obs_size, obs_stack
+    autoreset_mode, max_episode_steps, render_mode, width, height, obs, obs_size, obs_stack, contacts
         As of `RigidVectorEnv`.
     threads : int
         Threads that share a step.
@@ -407,6 +412,7 @@ class BlockVectorEnv(RigidVectorEnv):
         obs: str = "state",
         obs_size: Sequence[int] = (84, 84),
         obs_stack: int = 1,
+        contacts: int = 0,
         threads: int = 1,
         accuracy: str | physics.Accuracy = "balanced",
         walls: str = "three",
@@ -426,8 +432,8 @@ class BlockVectorEnv(RigidVectorEnv):
             half_width=half_width, mass=mass, size=size, friction=friction, restitution=restitution, gravity=gravity,
             effects=effects, frame_skip=frame_skip, dt=dt, dump_faults=dump_faults,
         )  # fmt: skip
-        picture = render_mode, width, height, obs, obs_size, obs_stack
-        super().__init__(task, autoreset_mode, max_episode_steps, *picture)
+        told = render_mode, width, height, obs, obs_size, obs_stack, contacts
+        super().__init__(task, autoreset_mode, max_episode_steps, *told)
 
 
 @known_keywords

@@ -6,22 +6,25 @@ from typing import Any
 
 import numpy as np
 
+from rigid_env.envs.contact_infos import KEYS, ContactInfos
 from rigid_env.tasks import Task
 from rigid_env.tasks import layout as col
 
 
-def keys(task: Task) -> tuple[str, ...]:
+def keys(task: Task, contacts: ContactInfos | None = None) -> tuple[str, ...]:
     """Keys of every info, of a step and of a start."""
-    return ("is_success", *task.info_names, "physics_status")
+    return ("is_success", *task.info_names, "physics_status", *(() if contacts is None else KEYS))
 
 
-def of_outcomes(task: Task, mask: np.ndarray | None = None) -> dict[str, Any]:
+def of_outcomes(task: Task, mask: np.ndarray | None = None, contacts: ContactInfos | None = None) -> dict[str, Any]:
     """Infos that the last step or start left, of the worlds of `mask` (worlds,) bool; zero in the others."""
     outcome = task.outcome
     infos = {"is_success": outcome[:, col.SUCCESS] > 0.0}
     for column, name in enumerate(task.info_names, col.INFO):
         infos[name] = outcome[:, column].copy()
     infos["physics_status"] = task.status.copy()
+    if contacts is not None:
+        infos.update(contacts.all())
     if mask is None:
         mask = np.ones(task.worlds, dtype=np.bool_)
     else:
@@ -42,14 +45,14 @@ def add_drawn(infos: dict[str, Any], task: Task, rows: np.ndarray) -> None:
         infos[name], infos[f"_{name}"] = told, mask.copy()
 
 
-def of_ended(task: Task, source, rows: np.ndarray, mask: np.ndarray) -> dict[str, Any]:
-    """`final_obs` and `final_info` of the episodes that end in `rows`, where `mask` is True, before they start anew."""
+def of_ended(task: Task, source, mask: np.ndarray, contacts: ContactInfos | None = None) -> dict[str, Any]:
+    """`final_obs` and `final_info` of the episodes that end where `mask` is True, before they start anew."""
     final_obs = np.full(task.worlds, None, dtype=object)
-    for i in rows:
+    for i in np.flatnonzero(mask):
         final_obs[i] = source.one(i)
     return {
         "final_obs": final_obs,
         "_final_obs": mask.copy(),
-        "final_info": of_outcomes(task, mask),
+        "final_info": of_outcomes(task, mask, contacts),
         "_final_info": mask.copy(),
     }

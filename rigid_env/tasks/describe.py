@@ -39,6 +39,7 @@ OF_ENVIRONMENTS = {
     "obs": 'observations: `"state"`, the table above, or `"pixels"`, pictures (uint8)',
     "obs_size": "height and width of these [px]",
     "obs_stack": "of the last so many control steps, along the last axis, the newest last",
+    "contacts": "contacts told in `info`, those with the largest forces",
 }
 """Meanings of the arguments that environments add."""
 

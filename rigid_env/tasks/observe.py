@@ -6,11 +6,16 @@ begins with that of the body where there are several.
 
 from __future__ import annotations
 
+import numpy as np
+
+from physics import validation
 from rigid_env.tasks.actions import check_body
 from rigid_env.tasks.entries import Entry
 
 AXES = "xyz"
 LENGTH, SPEED, SPIN, REACH = 5.0, 5.0, 5.0, 10.0  # [m], [m/s], [rad/s], and how many units an entry may hold
+IMPULSE = 0.01  # [m g s]: a weight over two of the default physics steps
+MOST_CONTACTS = 1024
 
 
 def _names(what: str, body: int, parts=AXES) -> tuple[str, ...]:
@@ -72,6 +77,48 @@ def contact_force(body: int = 0, bound: float = REACH) -> Entry:
     names = _names("contact force", body)
     read = lambda worlds: worlds.contact_force[:, body] / worlds.weight[:, body, None]  # noqa: E731
     return Entry(names, "m g", -bound, bound, read)
+
+
+def contact_impulse(body: int = 0, scale: float = IMPULSE, bound: float = REACH) -> Entry:
+    """Sum of the contact impulses on a body over its weight, of the last resting stage; collisions have no part in it.
+
+    A stage is what the last physics step ends with: see `rigid_env.tasks.contacts.Contacts`.
+    """
+    names = _names("contact impulse", body)
+    read = lambda worlds: worlds.contact_impulse[:, body] / worlds.weight[:, body, None]  # noqa: E731
+    return Entry(names, "m g s", -bound, bound, read, scale)
+
+
+def contact_points(body: int = 0, count: int = 4, scale: float = LENGTH, bound: float = REACH) -> Entry:
+    """Points of the `count` strongest contacts of a body, from its centre of mass [m]; zeros where there are fewer."""
+    names = _contact_names("point", body, count)
+    return Entry(names, "m", -bound, bound, lambda worlds: _arms(worlds, body, count), scale)
+
+
+def contact_forces(body: int = 0, count: int = 4, bound: float = REACH) -> Entry:
+    """Forces of these contacts on the body over its weight, in the same order."""
+    names = _contact_names("force", body, count)
+    read = lambda worlds: _rows(worlds.contacts_of(body, count).force) / worlds.weight[:, body, None]  # noqa: E731
+    return Entry(names, "m g", -bound, bound, read)
+
+
+def _contact_names(what: str, body: int, count: int) -> tuple[str, ...]:
+    check_body(body)
+    validation.count(count, "count", most=MOST_CONTACTS)
+    head = "contact" if body == 0 else f"contact of body {body}"
+    return tuple(f"{head}: {what} {k} {axis}" for k in range(count) for axis in AXES)
+
+
+def _rows(vectors: np.ndarray) -> np.ndarray:
+    """(n, rows, 3) as (n, 3 rows)."""
+    return vectors.reshape(len(vectors), -1)
+
+
+def _arms(worlds, body: int, count: int) -> np.ndarray:
+    """(n, 3 count) [m]: from the centre of mass of a body to the points of its contacts."""
+    contacts = worlds.contacts_of(body, count)
+    is_there = np.arange(count) < contacts.count[:, None]
+    return _rows((contacts.point - worlds.pos[:, body, None]) * is_there[:, :, None])
 
 
 def drawn(name: str, length: int = 1, unit: str = "1", scale: float = 1.0, bound: float = REACH) -> Entry:

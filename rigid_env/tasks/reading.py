@@ -9,7 +9,7 @@ import numpy as np
 
 from physics.kernels.compile.decorators import entry_kernel
 from physics.kernels.half_space import support_function as geo
-from physics.kernels.half_space.persistent_contacts import WALL_MEMORY_HEAD
+from physics.kernels.half_space.persistent_contacts import WALL_MEMORY_HEAD, WALL_MEMORY_STAGE
 from physics.kernels.math import quaternion as qt
 from physics.kernels.multibody.data import arrays as many
 from physics.kernels.state import layout as at
@@ -103,3 +103,16 @@ def write_contact_forces(world: World, indices: np.ndarray, out: np.ndarray) -> 
         _all_forces(indices, world.memory, out)
     else:
         _wall_forces(indices, world.memory, world.walls, world.plan.features, out)
+
+
+def write_contact_impulses(world: World, indices: np.ndarray, out: np.ndarray) -> None:
+    """Sums of the contact impulses on bodies, as `rigid_env.tasks.contacts.Contacts` tells them, into `out`."""
+    write_contact_forces(world, indices, out)
+    if not world.plan.contact:
+        return
+    if world.plan.many:
+        out *= world.memory[indices, many.WARM_STAGE_LENGTH, None, None]
+    elif world.plan.events:
+        out *= world.dt
+    else:
+        out *= world.memory[:, WALL_MEMORY_STAGE].reshape(world.worlds, world.body_count)[indices, :, None]

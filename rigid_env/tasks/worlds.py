@@ -6,8 +6,9 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from rigid_env.tasks.contacts import Contacts, contact_rows, read_contacts
 from rigid_env.tasks.named import Named
-from rigid_env.tasks.reading import write_contact_forces, write_rotations, write_wall_gaps
+from rigid_env.tasks.reading import write_contact_forces, write_contact_impulses, write_rotations, write_wall_gaps
 
 
 def read_only(array: np.ndarray) -> np.ndarray:
@@ -60,6 +61,7 @@ class Worlds:
         self.success = self.failure = np.zeros(len(self.indices), dtype=np.bool_)
         self.measured: Mapping[str, np.ndarray] = {}
         self._found: dict[str, np.ndarray] = {}
+        self._contacts: dict[tuple[int, ...], Contacts] = {}
 
     def __len__(self) -> int:
         return len(self.indices)
@@ -89,6 +91,25 @@ class Worlds:
     def contact_force(self) -> np.ndarray:
         """(n, bodies, 3) float64. Sum of the contact forces on each body in the last physics step, world frame [N]."""
         return self._worked_out("contact_force", write_contact_forces, (self._task.world.body_count, 3))
+
+    @property
+    def contact_impulse(self) -> np.ndarray:
+        """(n, bodies, 3) float64. Sum of the contact impulses of the last resting stage, world frame [N s]."""
+        return self._worked_out("contact_impulse", write_contact_impulses, (self._task.world.body_count, 3))
+
+    @property
+    def contacts(self) -> Contacts:
+        """Contacts of the last physics step, at most 12 rows for each body; see `rigid_env.tasks.contacts.Contacts`."""
+        return self._contacts_of(contact_rows(self._task.world))
+
+    def contacts_of(self, body: int, count: int) -> Contacts:
+        """Contacts of one body, which is their first body: the `count` with the largest forces."""
+        return self._contacts_of(count, body)
+
+    def _contacts_of(self, *chosen: int) -> Contacts:
+        if chosen not in self._contacts:
+            self._contacts[chosen] = read_contacts(self._task.world, self.indices, *chosen)
+        return self._contacts[chosen]
 
     @property
     def wrench(self) -> np.ndarray:

@@ -124,6 +124,10 @@ CASES = [
         ("max_episode_steps", "'many'", "at least 1"),
     ),
     Case("threads-zero", lambda: BlockReachVectorEnv(2, threads=0), ("threads", "0", "at least 1")),
+    Case("contacts-negative", lambda: BlockReachEnv(contacts=-1), ("contacts", "-1", "at least 0")),
+    Case("contacts-half", lambda: BlockReachVectorEnv(2, contacts=1.5), ("contacts", "1.5", "at least 0")),
+    Case("contacts-text", lambda: BlockReachEnv(contacts="a"), ("contacts", "'a'", "at least 0")),
+    Case("contacts-many", lambda: BlockReachEnv(contacts=10**9), ("contacts", "1000000000", "0 to 65536")),
     # --- stepped ------------------------------------------------------------------------------------------
     Case("step-first", lambda env: env.step(STILL), ("reset()", "step()"), "new-env", NOT_READY),
     Case("step-first-batch", lambda envs: envs.step(np.zeros((2, 6))), ("reset()", "step()"), "new-batch", NOT_READY),
