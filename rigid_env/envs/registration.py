@@ -12,7 +12,7 @@ NAMESPACE = "rigid_env"
 MAX_EPISODE_STEPS = {"BlockReach": 300, "BlockReorient": 300}
 """Control steps after which an episode is truncated: 7.5 s at the default 25 ms."""
 
-GOALS = {"BlockReachGoal": 150, "BlockReorientGoal": 150}
+GOALS = {"BlockReachGoal": 75, "BlockReorientGoal": 75}
 """Tasks with goals, and control steps of their episodes: 7.5 s at the default 50 ms."""
 
 SCENE_ID = f"{NAMESPACE}/Scene-v0"

@@ -39,7 +39,7 @@ MOTION = (
 class BlockGoal(GoalTask, BlockTask):
     """Base of the block's tasks with goals."""
 
-    def __init__(self, worlds: int = 1, *, reward="sparse", frame_skip=10, **settings):
+    def __init__(self, worlds: int = 1, *, reward="sparse", frame_skip=20, **settings):
         super().__init__(worlds, reward=reward, frame_skip=frame_skip, **settings)
 
     def shortfall(self, achieved, desired):
@@ -56,12 +56,12 @@ class BlockGoal(GoalTask, BlockTask):
 class BlockReachGoal(BlockGoal):
     """Bring a block to a place on the floor, and keep it at rest there: a task with goals.
 
-    The block, the box and the actions are those of `rigid_env.BlockReachEnv`, at 50 ms for a control step. An
+    The block, the box and the actions are those of `rigid_env.BlockReachEnv`, at 100 ms for a control step. An
     observation is a dict. A goal is x and z of the block's centre [5 m], its speed [m/s] and its spin [rad/s]; the one
     that is wanted has speed and spin 0. It is reached within 0.3 m, 0.1 m/s and 0.1 rad/s.
     """
 
-    max_episode_steps = 150
+    max_episode_steps = 75
     observation = (Entry(("position x", "position z"), "m", -BOUND, BOUND, lambda w: w.pos[:, 0, ::2], LENGTH), *MOTION)
     goal_entries = (Entry(("place x", "place z"), "m", -BOUND, BOUND, lambda w: w.pos[:, 0, ::2], LENGTH), *REST)
     goal_draw = "goal"
@@ -87,13 +87,13 @@ class BlockReachGoal(BlockGoal):
 class BlockReorientGoal(BlockGoal):
     """Turn a block so that a face is down, and keep it at rest: a task with goals.
 
-    The block, the box and the actions are those of `rigid_env.BlockReorientEnv`, at 50 ms for a control step. An
+    The block, the box and the actions are those of `rigid_env.BlockReorientEnv`, at 100 ms for a control step. An
     observation is a dict. A goal is the direction straight down, as the block sees it (three numbers), speed [m/s] and
     spin [rad/s]; of the one that is wanted the direction is the outward normal of a face, and speed and spin are 0. It
     is reached within 0.1 rad, 0.1 m/s and 0.1 rad/s.
     """
 
-    max_episode_steps = 150
+    max_episode_steps = 75
     observation = (*MOTION, Entry(("edge x", "edge y", "edge z"), "m", 0.0, BOUND, lambda w: w.drawn["size"], LENGTH))
     goal_entries = (
         Entry(("down x", "down y", "down z"), "1", -1.0, 1.0, lambda worlds: -worlds.rotation[:, 0, 1]),
