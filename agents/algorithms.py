@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import gymnasium as gym
@@ -94,6 +95,8 @@ def algorithm_arguments(config: RunConfig, action_size: int = 6) -> dict[str, An
     if "hindsight" in arguments:
         arguments["replay_buffer_class"] = HerReplayBuffer
         arguments["replay_buffer_kwargs"] = arguments.pop("hindsight")
+    if isinstance(arguments.get("learning_rate"), dict):
+        arguments["learning_rate"] = _falling_rate(arguments["learning_rate"])
     if "action_noise" in arguments:
         arguments["action_noise"] = _slow_noise(arguments["action_noise"], action_size)
     return {**arguments, "policy_kwargs": policy}
@@ -104,6 +107,18 @@ def _slow_noise(given: dict[str, float], size: int) -> OrnsteinUhlenbeckActionNo
     if given.keys() != {"sigma", "theta"}:
         raise ValueError(f"action_noise has the keys {', '.join(given)}; allowed are sigma, theta")
     return OrnsteinUhlenbeckActionNoise(np.zeros(size), np.full(size, given["sigma"]), given["theta"], dt=1.0)
+
+
+def _falling_rate(given: dict[str, float]) -> Callable[[float], float]:
+    """Learning rate that falls in a line from the first step of a run to `max_steps`."""
+    if given.keys() != {"start", "end"}:
+        raise ValueError(f"learning_rate has the keys {', '.join(given)}; allowed are a number, or start, end")
+    return partial(_between, given["start"], given["end"])
+
+
+def _between(start: float, end: float, left: float) -> float:
+    """Value where the share `left` of a run is left."""
+    return end + (start - end) * left
 
 
 def make_model(config: RunConfig, env: RigidVecEnv) -> BaseAlgorithm:

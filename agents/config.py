@@ -40,7 +40,8 @@ class RunConfig:
     algorithm : dict
         Keyword arguments of the class in Stable-Baselines3; ``policy_kwargs.activation_fn`` by its name in
         `torch.nn`. ``hindsight`` holds the arguments of its `HerReplayBuffer`, for environments with goals;
-        ``action_noise`` the ``sigma`` and ``theta`` of an Ornstein-Uhlenbeck process, per control step.
+        ``action_noise`` the ``sigma`` and ``theta`` of an Ornstein-Uhlenbeck process, per control step. A
+        ``learning_rate`` with ``start`` and ``end`` falls in a line until `max_steps`.
     env_kwargs : dict
         Further arguments of the environment.
 

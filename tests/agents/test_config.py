@@ -98,3 +98,12 @@ def test_noise_of_other_keys_is_named():
     config = change(config, algorithm={"action_noise": {"sigma": 0.3}})
     with pytest.raises(ValueError, match="action_noise has the keys sigma; allowed are sigma, theta"):
         algorithm_arguments(config)
+
+
+def test_a_learning_rate_may_fall():
+    config = make_config("rigid_env/BlockReachGoal-v0", "sac", seed=0)
+    rate = algorithm_arguments(config)["learning_rate"]
+    assert [rate(1.0), rate(0.5), rate(0.0)] == pytest.approx([1e-3, 5.5e-4, 1e-4])
+    config = change(config, algorithm={"learning_rate": {"start": 1e-3}})
+    with pytest.raises(ValueError, match="learning_rate has the keys start; allowed are a number, or start, end"):
+        algorithm_arguments(config)
