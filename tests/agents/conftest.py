@@ -24,7 +24,7 @@ TINY_ALGORITHMS = {
 HINDSIGHT = "sac with hindsight"
 TINY_ALGORITHMS[HINDSIGHT] = {
     **TINY_ALGORITHMS["sac"], "learning_starts": NUM_ENVS * 8, "hindsight": {"n_sampled_goal": 4},
-    "action_noise": {"sigma": 0.3, "theta": 0.15}, "learning_rate": {"start": 1e-3, "end": 1e-4},
+    "action_noise": {"sigma": 0.3, "theta": 0.15},
 }  # fmt: skip
 
 
