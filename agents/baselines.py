@@ -1,41 +1,15 @@
-"""Policies to compare trained agents with: uniformly random, and controllers written by hand.
+"""Policies to compare trained agents with: uniformly random, and the controllers written by hand.
 
-A policy is a function from observations (n, entries) to actions (n, 6). The controllers see what an agent
-sees, and know the block's observation table (see `rigid_env.envs.block_reach`), nothing else.
+A policy is a function from observations (n, entries) to actions (n, 6).
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import numpy as np
 
-Policy = Callable[[np.ndarray], np.ndarray]
+from rigid_env.envs.controllers import AXES, CONTROLLERS, Policy, reach_controller, reorient_controller
 
-UP = np.array((0.0, 1.0, 0.0))
-AXES = 6  # force x, y, z, torque x, y, z as shares of their limits
-
-# --- units of the observation tables ----------------------------------------------------------------------
-LENGTH = 5.0  # [m]
-SPEED = 5.0  # [m/s]
-SPIN = 5.0  # [rad/s]
-
-# --- BlockReach -------------------------------------------------------------------------------------------
-LIFT = 0.75  # share of the force limit that takes weight off the floor, and friction with it
-ACCELERATION = 3.0  # to brake with, such that the speed wanted at distance d is sqrt(2 a d) [m/s²]
-APPROACH = 3.0  # speed wanted per distance close to the goal, where that is less [1/s]
-TOP_SPEED = 6.0  # [m/s]
-SPEED_GAIN = 0.6  # share of the force limit per m/s of error
-TILT_GAIN = 2.0  # share of the torque limit per sine of the tilt
-SPIN_GAIN = 0.5  # share of the torque limit per rad/s
-ARRIVED = 0.15  # distance within which the block is let down, and friction stops it [m]
-
-# --- BlockReorient ----------------------------------------------------------------------------------------
-TURN_GAIN = 2.0  # share of the torque limit per radian
-TURN_DAMPING = 0.9  # share of the torque limit per rad/s
-DRIFT_GAIN = 0.3  # share of the force limit per m/s of sideways drift
-TURNED = 0.15  # angle within which the block is let down to rest [rad]
-HALF_TURN = 1e-3  # |sine| of the angle below which its axis is not determined
+__all__ = ["CONTROLLERS", "Policy", "baseline_policy", "random_policy", "reach_controller", "reorient_controller"]
 
 
 def random_policy(seed: int = 0) -> Policy:
@@ -52,78 +26,6 @@ def random_policy(seed: int = 0) -> Policy:
     """
     generator = np.random.default_rng(seed)
     return lambda observations: generator.uniform(-1.0, 1.0, (len(observations), AXES)).astype(np.float32)
-
-
-def reach_controller(observations: np.ndarray) -> np.ndarray:
-    """BlockReach by hand: carry most of the weight, slide to the goal no faster than one can brake, set down.
-
-    The friction that remains under the lifted block is left to the speed loop to overcome; a torque turns the
-    body axis that is nearest to the vertical into it, so that the block stays on its face.
-
-    Parameters
-    ----------
-    observations : (n, 24) float32
-
-    Returns
-    -------
-    (n, 6) float32
-    """
-    offset = LENGTH * observations[:, (0, 1)]
-    velocity = SPEED * observations[:, (5, 7)]
-    distance = np.linalg.norm(offset, axis=1, keepdims=True)
-    speed = np.minimum(np.sqrt(2.0 * ACCELERATION * distance), TOP_SPEED)
-    speed = np.minimum(speed, APPROACH * distance)
-    wanted = speed * offset / np.maximum(distance, ARRIVED)
-    actions = np.zeros((len(observations), AXES), dtype=np.float32)
-    push = SPEED_GAIN * (wanted - velocity)
-    room = np.sqrt(1.0 - LIFT**2)
-    push *= room / np.maximum(room, np.linalg.norm(push, axis=1, keepdims=True))
-    actions[:, (0, 2)] = push
-    actions[:, 1] = LIFT
-    actions[distance[:, 0] <= ARRIVED, :3] = 0.0
-    actions[:, 3:] = TILT_GAIN * _tilt(observations[:, 11:20]) - SPIN_GAIN * SPIN * observations[:, 8:11]
-    return actions
-
-
-def _tilt(rotation: np.ndarray) -> np.ndarray:
-    """Axis times sine of the turn (n, 3) that makes the nearest body axis vertical, from R (n, 9) by rows."""
-    heights = rotation[:, 3:6]
-    nearest = np.argmax(np.abs(heights), axis=1)
-    rows = np.arange(len(rotation))
-    axis = rotation.reshape(-1, 3, 3)[rows, :, nearest] * np.sign(heights[rows, nearest])[:, None]
-    return np.cross(axis, UP)
-
-
-def reorient_controller(observations: np.ndarray) -> np.ndarray:
-    """BlockReorient by hand: carry the weight, turn the target face down about the shortest arc, set down.
-
-    Parameters
-    ----------
-    observations : (n, 23) float32
-
-    Returns
-    -------
-    (n, 6) float32
-    """
-    normal, spare_axis = observations[:, 0:3], observations[:, 3:6]
-    velocity, spin = SPEED * observations[:, 13:16], SPIN * observations[:, 16:19]
-    axis = np.cross(normal, -UP)
-    sine = np.linalg.norm(axis, axis=1, keepdims=True)
-    axis = np.where(sine < HALF_TURN, spare_axis, axis / np.maximum(sine, HALF_TURN))
-    angle = np.arctan2(sine, -normal @ UP[:, None])
-    turn = TURN_GAIN * angle * axis - TURN_DAMPING * spin
-    is_turned = angle[:, 0] < TURNED
-    actions = np.empty((len(observations), AXES), dtype=np.float32)
-    actions[:, :3] = -DRIFT_GAIN * velocity
-    actions[:, 1] = np.where(is_turned, 0.0, 1.0)
-    actions[:, 3:] = np.where(is_turned[:, None], -TURN_DAMPING * spin, turn)
-    return actions
-
-
-CONTROLLERS: dict[str, Policy] = {
-    "rigid_env/BlockReach-v0": reach_controller,
-    "rigid_env/BlockReorient-v0": reorient_controller,
-}
 
 
 def baseline_policy(name: str, env_id: str, seed: int = 0) -> Policy:

@@ -21,11 +21,9 @@ from stable_baselines3.common.off_policy_algorithm import OffPolicyAlgorithm
 from agents.algorithms import CLASSES
 from agents.baselines import Policy
 from agents.config import RunConfig, RunFolder
+from rigid_env.envs.policy_files import WITHOUT_REPLAY, greedy
 
 KEPT = 3  # newest checkpoints of a run; older ones are deleted
-
-# Of a model that only acts: no memory for a replay buffer, and no environment that one would ask for rewards.
-WITHOUT_REPLAY = {"replay_buffer_class": None, "replay_buffer_kwargs": {}, "buffer_size": 1}
 
 MODEL, REPLAY, STATE = "model.zip", "replay_buffer.pkl", "state.pkl"
 
@@ -127,8 +125,3 @@ def load_policy(run: RunFolder) -> tuple[RunConfig, Policy]:
         raise ValueError(f"run is {str(run.path)!r}; allowed is one with a model.zip or a checkpoint")
     torch.set_num_threads(config.torch_threads)
     return config, greedy(CLASSES[config.algo].load(found[-1], device="cpu", custom_objects=WITHOUT_REPLAY))
-
-
-def greedy(model: BaseAlgorithm) -> Policy:
-    """The most likely action of a model for each observation."""
-    return lambda observations: model.predict(observations, deterministic=True)[0]

@@ -10,7 +10,9 @@ The contract in five lines::
 """
 
 from physics.analysis.diagnostics import Diagnostics, diagnose, look_at
-from physics.analysis.simulate import Event, Trajectory, simulate
+from physics.analysis.events import Event
+from physics.analysis.simulate import simulate
+from physics.analysis.trajectory import Trajectory
 from physics.io.mjcf import load_mjcf, save_mjcf
 from physics.io.recorder import Recorder
 from physics.io.recording import Recording, Replay

@@ -2,25 +2,22 @@
 
 from __future__ import annotations
 
-import csv
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
 from functools import partial
 from itertools import pairwise
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from physics import validation
 from physics.analysis.diagnostics import diagnose
-from physics.kernels.time_stepping import event_log
+from physics.analysis.events import Event, contact_events, contact_pairs, fault_events, logged_events
+from physics.analysis.trajectory import Trajectory
 from physics.keywords import known_keywords
 from physics.plan.accuracy import Accuracy
 from physics.scene.scene import Scene
-from physics.summary import counted, lines_repr
-from physics.world.report import Status, StepReport, add_report
+from physics.world.report import StepReport, add_report
 from physics.world.world import World
 
 # Samples further apart than this share of sample_dt from the last one are a sample of their own at the end.
@@ -34,125 +31,6 @@ MOST_SAMPLES = 100_000_000
 
 # Events per body that a step has room for at first; one with more is taken again with more room.
 EVENT_ROOM = 16
-
-COLUMNS = (
-    "x", "y", "z", "qw", "qx", "qy", "qz", "vx", "vy", "vz", "wx", "wy", "wz",
-)  # fmt: skip
-
-
-@dataclass(frozen=True)
-class Event:
-    """Something that happened to a body, at a wall, with another body or alone.
-
-    An ``impact`` is one event for each pair of bodies, or body and wall, however many contacts they have: `impulse` is
-    the sum over these. The change of a body's momentum by impacts is the sum of `impulse` over the events of which it
-    is the `body`, less that over those of which it is the `other`.
-
-    Attributes
-    ----------
-    t : float
-        When [s]. The event-driven scheme knows it to rounding; where it has left out the end of a sequence of ever
-        smaller bounces, the contact's ``touch`` and the body's ``rest`` come when that would have ended. Time
-        stepping knows the moment of an ``impact``; of the other kinds the sample interval: `t` is its end.
-    kind : str
-        ``impact`` (velocities jumped), ``touch`` (a resting contact began), ``release`` (one ended), ``fault``; of
-        the event-driven scheme also ``stick`` and ``slip`` (a resting contact ceased or began to slide) and
-        ``rest`` (the body came to rest). What time stepping meets so slowly that loads could have made it as fast
-        within a step is a ``touch`` without an ``impact``.
-    body : int
-    wall : int
-        -1 where the kind has none, and where bodies meet.
-    impulse : (3,) tuple of float
-        Of an ``impact``, on the `body`, world frame [N s]; zero for the other kinds.
-    other : int
-        The other body where two meet, which gets the opposite impulse; -1: none.
-    point : (3,) tuple of float
-        Of an ``impact``: the point of `body` where the impulse acts, of several contacts the mean weighted by their
-        normal impulses, world frame [m]. On a face the impulse acts there with the moment of all contacts but for
-        what friction exerts about the normal. Zero for the other kinds.
-    normal : (3,) tuple of float
-        Of an ``impact``: unit normal out of the wall or of the other body towards `body`, of several contacts the
-        weighted mean, world frame. Zero for the other kinds.
-    """
-
-    t: float
-    kind: str
-    body: int
-    wall: int = -1
-    impulse: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    other: int = -1
-    point: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    normal: tuple[float, float, float] = (0.0, 0.0, 0.0)
-
-
-@dataclass(frozen=True)
-class Trajectory:
-    """Samples of one world.
-
-    Attributes
-    ----------
-    t : (samples,) float64
-        [s].
-    pos, quat, linvel, angvel : (samples, bodies, 3|4|3|3) float64
-        World frame; see `World`.
-    energy : (samples, bodies) float64
-        Kinetic and potential [J].
-    events : tuple of Event
-    reports : tuple of StepReport
-        One per sample interval.
-    """
-
-    t: np.ndarray
-    pos: np.ndarray
-    quat: np.ndarray
-    linvel: np.ndarray
-    angvel: np.ndarray
-    energy: np.ndarray
-    events: tuple[Event, ...]
-    reports: tuple[StepReport, ...]
-
-    def __repr__(self) -> str:
-        samples, bodies = self.pos.shape[:2]
-        return lines_repr(
-            "Trajectory", f"{samples} samples of {bodies} bodies", f"t = {self.t[0]:.6g} to {self.t[-1]:.6g} s",
-            f"events: {counted(event.kind for event in self.events)}", f"ok={self.ok}{self._why()}",
-        )  # fmt: skip
-
-    def _why(self) -> str:
-        """The gravest status, and when it was met first: for the `repr`; `messages` of the reports tell more."""
-        met = [int(report.status[0]) for report in self.reports]
-        worst = max(met, key=Status.severity, default=int(Status.OK))
-        if worst == Status.OK:
-            return ""
-        name, first = Status(worst).name.lower(), met.index(worst)
-        return f": {name} in {met.count(worst)} of {len(met)} reports, first in reports[{first}].messages()"
-
-    @property
-    def ok(self) -> bool:
-        """True if every interval's report was."""
-        return all(report.ok for report in self.reports)
-
-    def to_npz(self, path: str | Path) -> None:
-        """Write the samples as a NumPy archive."""
-        np.savez(
-            path,
-            t=self.t,
-            pos=self.pos,
-            quat=self.quat,
-            linvel=self.linvel,
-            angvel=self.angvel,
-            energy=self.energy,
-        )
-
-    def to_csv(self, path: str | Path) -> None:
-        """Write the samples as comma-separated values, one row per sample and body."""
-        with open(path, "w", newline="", encoding="utf-8") as file:
-            writer = csv.writer(file)
-            writer.writerow(("t", "body", *COLUMNS, "energy"))
-            for k, t in enumerate(self.t):
-                for b in range(self.pos.shape[1]):
-                    row = np.concatenate((self.pos[k, b], self.quat[k, b], self.linvel[k, b], self.angvel[k, b]))
-                    writer.writerow((repr(float(t)), b, *map(repr, row.tolist()), repr(float(self.energy[k, b]))))
 
 
 @known_keywords
@@ -213,7 +91,7 @@ def simulate(
         samples.append(_sample(world))
         reports.append(report)
     columns = [np.array(column) for column in zip(*samples)]
-    return Trajectory(np.array(times), *columns, events=tuple(events), reports=tuple(reports))
+    return Trajectory(np.array(times), *columns, events=tuple(events), reports=tuple(reports), scene=scene)
 
 
 def _times(duration, sample_dt, dt) -> tuple[float, float, float]:
@@ -275,14 +153,8 @@ class _Touching:
     def __call__(self, world: World, start: float, end: float, step: Callable[[], StepReport]) -> list[Event]:
         """Take a step; the events of it."""
         events = _logged(world, start, end, step)
-        before, now = self._before, {(int(body), int(other)) for body, other in world.contact_ends()}
-        self._before = now
-        for kind, pairs in (("touch", now - before), ("release", before - now)):
-            for body, end_of in sorted(pairs, key=lambda pair: (pair[0], abs(pair[1]), pair[1])):
-                events.append(Event(end, kind, body, max(-1, -1 - end_of), other=max(-1, end_of)))
-        if world.report.faults[0]:
-            events.append(Event(end, "fault", int(world.report.fault_body[0])))
-        return events
+        before, self._before = self._before, contact_pairs(world)
+        return events + contact_events(before, self._before, end) + fault_events(world, end)
 
 
 def _logged(world: World, start: float, end: float, step: Callable[[], StepReport]) -> list[Event]:
@@ -294,14 +166,4 @@ def _logged(world: World, start: float, end: float, step: Callable[[], StepRepor
         world.restore(before)
         world.make_event_room(2 * most)
         return _logged(world, start, end, step)
-    events = []
-    for body, (count, rows) in enumerate(zip(world.event_counts.tolist(), world.event_log)):
-        for row in rows[:count].tolist():
-            impulse, point, normal = (
-                tuple(row[k : k + 3]) for k in (event_log.EVENT_IMPULSE, event_log.EVENT_POINT, event_log.EVENT_NORMAL)
-            )
-            t, kind, wall, other = row[: event_log.EVENT_IMPULSE]
-            events.append(
-                Event(start + t, event_log.KIND_NAMES[int(kind)], body, int(wall), impulse, int(other), point, normal)
-            )
-    return sorted(events, key=lambda event: event.t)
+    return logged_events(world, start)

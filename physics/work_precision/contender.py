@@ -6,7 +6,8 @@ from collections.abc import Callable
 from dataclasses import dataclass, fields
 from typing import Protocol
 
-from physics.analysis.simulate import Trajectory, simulate
+from physics.analysis.simulate import simulate
+from physics.analysis.trajectory import Trajectory
 from physics.plan.accuracy import PRESETS, Accuracy, resolve
 from physics.scene.scene import Scene
 from physics.world.stepper import Stepper

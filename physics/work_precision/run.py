@@ -11,7 +11,7 @@ from itertools import product
 import numpy as np
 
 from physics import validation
-from physics.analysis.simulate import Trajectory
+from physics.analysis.trajectory import Trajectory
 from physics.keywords import known_keywords
 from physics.plan.accuracy import Accuracy, resolve
 from physics.scene.scene import Scene

@@ -9,7 +9,8 @@ from functools import cached_property
 import numpy as np
 
 from physics import validation
-from physics.analysis.simulate import Trajectory, simulate
+from physics.analysis.simulate import simulate
+from physics.analysis.trajectory import Trajectory
 from physics.keywords import known_keywords
 from physics.plan.accuracy import Accuracy, resolve
 from physics.scene.scene import Scene

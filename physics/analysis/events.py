@@ -1,0 +1,96 @@
+"""Events of a run: what happened to bodies, read from a world's log and told from its contacts."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from physics.kernels.time_stepping import event_log
+from physics.world.world import World
+
+
+@dataclass(frozen=True)
+class Event:
+    """Something that happened to a body, at a wall, with another body or alone.
+
+    An ``impact`` is one event for each pair of bodies, or body and wall, however many contacts they have: `impulse` is
+    the sum over these. The change of a body's momentum by impacts is the sum of `impulse` over the events of which it
+    is the `body`, less that over those of which it is the `other`.
+
+    Attributes
+    ----------
+    t : float
+        When [s]. The event-driven scheme knows it to rounding; where it has left out the end of a sequence of ever
+        smaller bounces, the contact's ``touch`` and the body's ``rest`` come when that would have ended. Time
+        stepping knows the moment of an ``impact``; of the other kinds the sample interval: `t` is its end.
+    kind : str
+        ``impact`` (velocities jumped), ``touch`` (a resting contact began), ``release`` (one ended), ``fault``; of
+        the event-driven scheme also ``stick`` and ``slip`` (a resting contact ceased or began to slide) and
+        ``rest`` (the body came to rest). What time stepping meets so slowly that loads could have made it as fast
+        within a step is a ``touch`` without an ``impact``.
+    body : int
+    wall : int
+        -1 where the kind has none, and where bodies meet.
+    impulse : (3,) tuple of float
+        Of an ``impact``, on the `body`, world frame [N s]; zero for the other kinds.
+    other : int
+        The other body where two meet, which gets the opposite impulse; -1: none.
+    point : (3,) tuple of float
+        Of an ``impact``: the point of `body` where the impulse acts, of several contacts the mean weighted by their
+        normal impulses, world frame [m]. On a face the impulse acts there with the moment of all contacts but for
+        what friction exerts about the normal. Zero for the other kinds.
+    normal : (3,) tuple of float
+        Of an ``impact``: unit normal out of the wall or of the other body towards `body`, of several contacts the
+        weighted mean, world frame. Zero for the other kinds.
+    """
+
+    t: float
+    kind: str
+    body: int
+    wall: int = -1
+    impulse: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    other: int = -1
+    point: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    normal: tuple[float, float, float] = (0.0, 0.0, 0.0)
+
+
+def logged_events(world: World, start: float) -> list[Event]:
+    """Events of the last call of a step that found room in the log, in the order of time.
+
+    Parameters
+    ----------
+    world : World
+        Of one world; `World.make_event_room` has made room.
+    start : float
+        Time at which that call began [s].
+    """
+    events = []
+    for body, (count, rows) in enumerate(zip(world.event_counts.tolist(), world.event_log)):
+        for row in rows[:count].tolist():
+            impulse, point, normal = (
+                tuple(row[k : k + 3]) for k in (event_log.EVENT_IMPULSE, event_log.EVENT_POINT, event_log.EVENT_NORMAL)
+            )
+            t, kind, wall, other = row[: event_log.EVENT_IMPULSE]
+            events.append(
+                Event(start + t, event_log.KIND_NAMES[int(kind)], body, int(wall), impulse, int(other), point, normal)
+            )
+    return sorted(events, key=lambda event: event.t)
+
+
+def contact_pairs(world: World) -> set[tuple[int, int]]:
+    """Body, and other body or -1 - k for wall k, of all resting contacts of world 0."""
+    return {(int(body), int(other)) for body, other in world.contact_ends()}
+
+
+def contact_events(before: set[tuple[int, int]], now: set[tuple[int, int]], t: float) -> list[Event]:
+    """Contacts that began and ended between two moments, as `contact_pairs` gives them; `t` is the later one [s]."""
+    events = []
+    for kind, pairs in (("touch", now - before), ("release", before - now)):
+        for body, end_of in sorted(pairs, key=lambda pair: (pair[0], abs(pair[1]), pair[1])):
+            events.append(Event(t, kind, body, max(-1, -1 - end_of), other=max(-1, end_of)))
+    return events
+
+
+def fault_events(world: World, t: float) -> list[Event]:
+    """The fault of the last step of world 0, if it had one; `t` is the end of that step [s]."""
+    report = world.report
+    return [Event(t, "fault", int(report.fault_body[0]))] if report.faults[0] else []

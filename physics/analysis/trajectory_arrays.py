@@ -1,0 +1,79 @@
+"""Events and the shapes of a scene as plain arrays, for files of trajectories, and back."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from physics.analysis.events import Event
+from physics.scene.bodies import Block, Body, Ellipsoid, Hull, Sphere
+from physics.scene.effects import Contact
+from physics.scene.scene import HalfSpace, Scene
+
+EVENTS, SCENE = "event_", "scene_"
+
+
+def event_arrays(events: Sequence[Event]) -> dict[str, np.ndarray]:
+    """Arrays with a row for each event: time, kind, body with wall and other body, three vectors."""
+    vectors = [(event.impulse, event.point, event.normal) for event in events]
+    return {
+        f"{EVENTS}t": np.array([event.t for event in events], dtype=np.float64),
+        f"{EVENTS}kind": np.array([event.kind for event in events], dtype=np.str_),
+        f"{EVENTS}ends": np.array([(e.body, e.wall, e.other) for e in events], dtype=np.int64).reshape(-1, 3),
+        f"{EVENTS}vectors": np.array(vectors, dtype=np.float64).reshape(-1, 3, 3),
+    }
+
+
+def events_of(parts: Mapping[str, np.ndarray]) -> tuple[Event, ...]:
+    """Events of a file; none where it has no such arrays."""
+    if f"{EVENTS}t" not in parts:
+        return ()
+    columns = (parts[f"{EVENTS}{name}"].tolist() for name in ("t", "kind", "ends", "vectors"))
+    return tuple(
+        Event(t, kind, body, wall, tuple(impulse), other, tuple(point), tuple(normal))
+        for t, kind, (body, wall, other), (impulse, point, normal) in zip(*columns, strict=True)
+    )
+
+
+def scene_arrays(scene: Scene | None) -> dict[str, np.ndarray]:
+    """Bodies and walls of a scene, its effects apart; nothing where it is unknown."""
+    if scene is None:
+        return {}
+    corners = [body.polyhedron.vertices if body.kind == "hull" else np.zeros((0, 3)) for body in scene.bodies]
+    walls = scene.walls if scene.effect(Contact) else ()
+    return {
+        f"{SCENE}kind": np.array([body.kind for body in scene.bodies], dtype=np.str_),
+        f"{SCENE}mass": np.array([body.mass for body in scene.bodies]),
+        f"{SCENE}inertia": np.array([body.inertia for body in scene.bodies]),
+        f"{SCENE}dimensions": np.array([body.dimensions for body in scene.bodies]),
+        f"{SCENE}center": np.array([body.center for body in scene.bodies]),
+        f"{SCENE}corners": np.concatenate(corners),
+        f"{SCENE}corner_counts": np.array([len(each) for each in corners], dtype=np.int64),
+        f"{SCENE}walls": np.array([(*wall.normal, wall.offset) for wall in walls]).reshape(-1, 4),
+    }
+
+
+def scene_of(parts: Mapping[str, np.ndarray]) -> Scene | None:
+    """Bodies and walls of a file as a scene; None where it has no such arrays."""
+    if f"{SCENE}kind" not in parts:
+        return None
+    names = ("kind", "mass", "inertia", "dimensions", "center")
+    rows = zip(*(parts[f"{SCENE}{name}"].tolist() for name in names), strict=True)
+    corners = np.split(parts[f"{SCENE}corners"], np.cumsum(parts[f"{SCENE}corner_counts"])[:-1])
+    bodies = [_body(*row, points.tolist()) for row, points in zip(rows, corners, strict=True)]
+    walls = [HalfSpace(row[:3], row[3]) for row in parts[f"{SCENE}walls"].tolist()]
+    return Scene(bodies, walls, [Contact()] if walls else [])
+
+
+def _body(kind, mass, inertia, dimensions, center, corners) -> Body:
+    given = {"mass": mass, "inertia_body": inertia}
+    if kind == "block":
+        return Block([2.0 * half for half in dimensions], center=center, **given)
+    if kind == "sphere":
+        return Sphere(dimensions[0], **given)
+    if kind == "ellipsoid":
+        return Ellipsoid(dimensions, **given)
+    if kind == "hull":
+        return Hull(corners, **given)
+    raise ValueError(f"its scene has a body of kind {kind!r}")

@@ -1,0 +1,213 @@
+"""Policies from files: models of Stable-Baselines3, and small networks as plain arrays.
+
+A policy is a function from observations with the worlds first, (n, entries) or a dict of such arrays, to actions
+(n, numbers).
+
+Plain arrays are a NumPy archive (``.npz``) of a fully connected network:
+
+| array | shape | meaning |
+| --- | --- | --- |
+| `w0`, `w1`, ... | (inputs, outputs) | weights of the layers, in their order |
+| `b0`, `b1`, ... | (outputs,) | biases: a layer gives ``x @ w + b`` |
+| `activation` | text | after all layers but the last: `tanh` (also if missing), `relu`, `elu`, `sigmoid` or `linear` |
+| `output` | text | after the last one; `linear` where it is missing |
+| `mean`, `std` | (entries,) | optional: the network is given ``(observation - mean) / std`` |
+
+Where observations are a dict, their parts follow each other in the order of their names. Actions are clipped to ±1.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import zipfile
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from physics import validation
+from rigid_env.extras import require
+
+WITHOUT_REPLAY = {"replay_buffer_class": None, "replay_buffer_kwargs": {}, "buffer_size": 1}
+"""Arguments for loading a model that only acts: no memory for a replay buffer, and no environment for its rewards."""
+
+ACTIVATIONS: dict[str, Callable[[np.ndarray], np.ndarray]] = {
+    "tanh": np.tanh,
+    "relu": lambda x: np.maximum(x, 0.0),
+    "elu": lambda x: np.where(x > 0.0, x, np.expm1(np.minimum(x, 0.0))),
+    "sigmoid": lambda x: 0.5 * (1.0 + np.tanh(0.5 * x)),
+    "linear": lambda x: x,
+}
+
+SETTINGS = {"PPO": "clip_range", "SAC": "target_entropy", "TD3": "policy_delay", "A2C": "gae_lambda"}
+"""Algorithms of Stable-Baselines3 for actions that are numbers, and a setting by which each is told from those below.
+
+DDPG is TD3 with other settings.
+"""
+
+Observations = np.ndarray | Mapping[str, np.ndarray]
+
+
+def load_policy(path: str | os.PathLike) -> Callable[[Observations], np.ndarray]:
+    """Read the policy of a file.
+
+    Parameters
+    ----------
+    path : str or Path
+        ``.npz``: plain arrays, of which nothing is run. ``.zip``: a model of Stable-Baselines3, which needs the extra
+        `agents`; its file may hold code, which runs when it is read: take it from those you trust only.
+
+    Returns
+    -------
+    callable
+        Observations with the worlds first to actions (n, numbers), the most likely ones.
+
+    Raises
+    ------
+    ValueError
+        No such file, or not one of these.
+    gymnasium.error.DependencyNotInstalled
+        It is a model, and the extra is not installed.
+    """
+    path = Path(validation.path(path, "policy"))
+    allowed = "allowed are a model of Stable-Baselines3 (.zip) and plain arrays (.npz)"
+    if not path.is_file():
+        raise ValueError(f"policy is {str(path)!r}, which is no file; {allowed}")
+    if not zipfile.is_zipfile(path):
+        raise ValueError(f"policy is {str(path)!r}, which is neither; {allowed}")
+    with zipfile.ZipFile(path) as content:
+        names = content.namelist()
+        settings = content.read("data") if "data" in names else None
+    if "w0.npy" in names:
+        return Network.load(path)
+    if settings is None:
+        raise ValueError(f"policy is {str(path)!r}, which is neither; {allowed}")
+    return greedy(load_model(path, settings))
+
+
+def greedy(model: Any) -> Callable[[Observations], np.ndarray]:
+    """The most likely action of a model of Stable-Baselines3 for each observation."""
+    return lambda observations: model.predict(observations, deterministic=True)[0]
+
+
+def load_model(path: Path, settings: bytes) -> Any:
+    """Load a model of Stable-Baselines3 to act with; `settings` is the part ``data`` of its file.
+
+    Raises
+    ------
+    ValueError
+        It is of no algorithm of `SETTINGS`.
+    gymnasium.error.DependencyNotInstalled
+    """
+    require("agents", "torch", "stable_baselines3", purpose="a policy of Stable-Baselines3")
+    import stable_baselines3
+
+    try:
+        keys = json.loads(settings).keys()
+        name = next(algorithm for algorithm, setting in SETTINGS.items() if setting in keys)
+    except (ValueError, AttributeError, StopIteration):
+        known = ", ".join((*SETTINGS, "DDPG"))
+        raise ValueError(f"policy is {str(path)!r}, of an unknown algorithm; allowed are {known}") from None
+    return getattr(stable_baselines3, name).load(path, device="cpu", custom_objects=WITHOUT_REPLAY)
+
+
+class Network:
+    """A fully connected network of plain arrays; see the table in this module.
+
+    Parameters
+    ----------
+    layers : sequence of pairs of arrays
+        Weights (inputs, outputs) and biases (outputs,).
+    activation, output : str
+        After each layer but the last, and after the last; of `ACTIVATIONS`.
+    mean, std : (entries,) array_like, optional
+
+    Raises
+    ------
+    ValueError
+        Arrays that do not fit each other or are not finite, or an unknown activation.
+    """
+
+    def __init__(
+        self,
+        layers: Sequence[tuple[np.ndarray, np.ndarray]],
+        activation: str = "tanh",
+        output: str = "linear",
+        mean: np.ndarray | None = None,
+        std: np.ndarray | None = None,
+    ):
+        if not layers:
+            raise ValueError("layers is empty; allowed is at least one pair of weights and biases")
+        self.layers = [(_numbers(w, f"w{k}", 2), _numbers(b, f"b{k}", 1)) for k, (w, b) in enumerate(layers)]
+        size = self.inputs
+        for k, (w, b) in enumerate(self.layers):
+            if w.shape != (size, *b.shape):
+                raise ValueError(f"w{k} has shape {w.shape}, b{k} {b.shape}; allowed is w{k} of ({size}, len(b{k}))")
+            size = len(b)
+        self.activation = validation.one_of(activation, ACTIVATIONS, "activation")
+        self.output = validation.one_of(output, ACTIVATIONS, "output")
+        self.mean = np.zeros(self.inputs) if mean is None else validation.finite(mean, (self.inputs,), "mean")
+        self.std = np.ones(self.inputs) if std is None else validation.positive(std, (self.inputs,), "std")
+
+    @property
+    def inputs(self) -> int:
+        """Numbers of an observation."""
+        return len(self.layers[0][0])
+
+    def __call__(self, observations: Observations) -> np.ndarray:
+        """Actions (n, numbers) float32 of observations (n, entries), or of a dict of their parts.
+
+        Raises
+        ------
+        ValueError
+            Observations of another length.
+        """
+        if isinstance(observations, Mapping):
+            observations = np.concatenate([observations[name] for name in sorted(observations)], axis=-1)
+        x = np.asarray(observations, dtype=np.float64)
+        if x.ndim != 2 or x.shape[1] != self.inputs:
+            raise ValueError(f"observations have shape {x.shape}; the policy allows (n, {self.inputs})")
+        x = (x - self.mean) / self.std
+        inner = ACTIVATIONS[self.activation]
+        for w, b in self.layers[:-1]:
+            x = inner(x @ w + b)
+        w, b = self.layers[-1]
+        return np.clip(ACTIVATIONS[self.output](x @ w + b), -1.0, 1.0).astype(np.float32)
+
+    def save(self, path: str | os.PathLike) -> Path:
+        """Write it as ``.npz`` (`load` reads it); returns the path."""
+        arrays = {f"{name}{k}": array for k, pair in enumerate(self.layers) for name, array in zip("wb", pair)}
+        with open(validation.path(path), "wb") as file:
+            np.savez(file, **arrays, activation=self.activation, output=self.output, mean=self.mean, std=self.std)
+        return Path(path)
+
+    @classmethod
+    def load(cls, path: str | os.PathLike) -> Network:
+        """Read a network; nothing in a file is run.
+
+        Raises
+        ------
+        ValueError
+            It is none, or a damaged one.
+        """
+        try:
+            with np.load(path, allow_pickle=False) as file:
+                parts = dict(file)
+            count = sum(re.fullmatch(r"w\d+", name) is not None for name in parts)
+            layers = [(parts[f"w{k}"], parts[f"b{k}"]) for k in range(count)]
+            words = {name: str(parts[name]) for name in ("activation", "output") if name in parts}
+            return cls(layers, **words, mean=parts.get("mean"), std=parts.get("std"))
+        except (KeyError, ValueError, zipfile.BadZipFile) as error:
+            told = f"there is no {error}" if isinstance(error, KeyError) else error
+            raise ValueError(f"policy is {str(path)!r}, which holds no network ({told})") from None
+
+
+def _numbers(array: np.ndarray, name: str, axes: int) -> np.ndarray:
+    """Finite float64 numbers with so many axes, none of them empty."""
+    array = np.asarray(array)
+    if array.dtype.kind not in "fiu" or array.ndim != axes or array.size == 0 or not np.isfinite(array).all():
+        raise ValueError(f"{name} has shape {array.shape} of {array.dtype}; allowed are finite numbers, {axes} axes")
+    return array.astype(np.float64)

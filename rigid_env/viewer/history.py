@@ -1,0 +1,126 @@
+"""History of a run: states to go back to, and the inputs and records with which steps are taken again."""
+
+from __future__ import annotations
+
+from bisect import bisect_right
+from collections.abc import Mapping
+from dataclasses import is_dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+
+EVERY = 16
+"""Steps from one kept state to the next, at first."""
+
+ROOM = 128 * 2**20
+"""Memory that kept states may take [bytes]: beyond it every second one goes, and those to come are twice as far apart.
+"""
+
+
+class Input(NamedTuple):
+    """Something that the user did before a step: the name of a method of `session.Session`, and its arguments."""
+
+    name: str
+    arguments: tuple
+
+
+class Entry(NamedTuple):
+    """State of a run before a step, after some of the inputs that were given there."""
+
+    index: int
+    state: Any
+    inputs: int
+    size: int
+
+
+class History:
+    """States of some steps, inputs and records of all.
+
+    Parameters
+    ----------
+    room : int
+        [bytes].
+
+    Attributes
+    ----------
+    times : list of float
+        Before each step, and after the last [s].
+    records : list
+        For each step what has to be given to the subject to repeat it.
+    event_counts : list of int
+        Events up to each of the `times`.
+    inputs : dict of int to list of Input
+        Given before each step, by its index.
+    """
+
+    def __init__(self, time: float, room: int = ROOM):
+        self.times, self.records, self.event_counts = [time], [], [0]
+        self.inputs: dict[int, list[Input]] = {}
+        self._entries: list[Entry] = []
+        self._every, self._room, self._size = EVERY, room, 0
+
+    @property
+    def last(self) -> int:
+        """Index of the latest time."""
+        return len(self.records)
+
+    @property
+    def size(self) -> int:
+        """Memory that the kept states take [bytes]."""
+        return self._size
+
+    def index_at(self, time: float) -> int:
+        """Index of the last of the `times` that is not later than `time`, within rounding."""
+        return max(0, bisect_right(self.times, time * (1.0 + 1e-12) + 1e-12) - 1)
+
+    def is_due(self, index: int) -> bool:
+        """True if the state before this step is to be kept."""
+        return index % self._every == 0
+
+    def keep(self, index: int, state: Any) -> None:
+        """Keep the state before a step, later than all that are kept or the same as the last."""
+        while self._entries and self._entries[-1].index >= index:
+            self._size -= self._entries.pop().size
+        entry = Entry(index, state, len(self.inputs.get(index, ())), size_of(state))
+        self._entries.append(entry)
+        self._size += entry.size
+        while self._size > self._room and len(self._entries) > 2:
+            self._thin()
+
+    def _thin(self) -> None:
+        self._every *= 2
+        self._entries = [entry for entry in self._entries if entry.index % self._every == 0]
+        self._size = sum(entry.size for entry in self._entries)
+
+    def before(self, index: int) -> Entry | None:
+        """The latest kept state that is not later than this index; None before the first step."""
+        place = bisect_right(self._entries, index, key=lambda entry: entry.index)
+        return self._entries[place - 1] if place else None
+
+    def add(self, time: float, record: Any, events: int) -> None:
+        """Note a step."""
+        self.times.append(time)
+        self.records.append(record)
+        self.event_counts.append(events)
+
+    def forget(self, index: int) -> None:
+        """Forget all that came after this index; inputs that were given there stay."""
+        if index == self.last:
+            return
+        del self.times[index + 1 :], self.records[index:], self.event_counts[index + 1 :]
+        self.inputs = {k: given for k, given in self.inputs.items() if k <= index}
+        while self._entries[-1].index > index:
+            self._size -= self._entries.pop().size
+
+
+def size_of(thing: Any) -> int:
+    """Memory of the arrays in a state, about [bytes]."""
+    if isinstance(thing, np.ndarray):
+        return thing.nbytes
+    if is_dataclass(thing) and not isinstance(thing, type):
+        return sum(map(size_of, vars(thing).values()))
+    if isinstance(thing, Mapping):
+        return sum(map(size_of, thing.values()))
+    if isinstance(thing, (list, tuple)):
+        return sum(map(size_of, thing))
+    return 32

@@ -1,0 +1,110 @@
+"""Listener of a world's steps: which calls were made, what they took, and what happened in them."""
+
+from __future__ import annotations
+
+import time
+from typing import NamedTuple
+
+import numpy as np
+
+import physics
+from physics import Event, Status
+from physics.analysis.events import contact_events, contact_pairs, fault_events, logged_events
+
+EVENT_ROOM = 128
+"""Events per body and call of a step that are told; more are left out."""
+
+
+class Call(NamedTuple):
+    """Call of a world's step.
+
+    Attributes
+    ----------
+    wrench : (1, bodies, 6) float64
+        Force [N] and torque [N m], world frame.
+    steps : int
+    dt : float
+        Length of one [s].
+    start : Snapshot or None
+        State before the call, where the world was put there from outside.
+    """
+
+    wrench: np.ndarray
+    steps: int
+    dt: float
+    start: physics.Snapshot | None
+
+
+class Listener:
+    """Listener of one world, in the place of its recorder (`physics.world.step_listener.StepListener`).
+
+    It must be made before the world is stepped by a `Stepper`, which binds the log of events.
+
+    Parameters
+    ----------
+    world : World
+        Of one world.
+
+    Attributes
+    ----------
+    calls : list of Call
+        Since `begin`, and so are the others.
+    events : list of Event
+    seconds : float
+        Time that the calls took [s].
+    penetration, residual : float
+        The largest of any call [m], [1].
+    fault : str
+        Message of the last fault; empty without one.
+    pairs : set
+        Contacts after the last call; see `physics.analysis.events.contact_pairs`.
+    is_changed : bool
+        The world was changed from outside since the last call.
+    """
+
+    def __init__(self, world: physics.World):
+        self._world = world
+        world.make_event_room(EVENT_ROOM)
+        world.recorder = self
+        self.pairs: set[tuple[int, int]] = set()
+        self.is_changed = False
+        self._clock = self._from = 0.0
+        self.begin()
+
+    def begin(self) -> None:
+        """Forget the calls so far."""
+        self.calls: list[Call] = []
+        self.events: list[Event] = []
+        self.seconds = self.penetration = self.residual = 0.0
+        self.fault = ""
+
+    # --- told by the world ---------------------------------------------------------------------------------
+
+    def changed(self, worlds: np.ndarray | slice) -> None:
+        """The world was changed from outside."""
+        self.is_changed = True
+
+    def before(self, wrench: np.ndarray, steps: int, dt: float) -> None:
+        """A call is about to be made."""
+        start = self._world.snapshot() if self.is_changed else None
+        self.is_changed = False
+        self.calls.append(Call(wrench.copy(), steps, dt, start))
+        self._from = self._world.time
+        self._clock = time.perf_counter()
+
+    def after(self) -> None:
+        """It has been made."""
+        self.seconds += time.perf_counter() - self._clock
+        world, report = self._world, self._world.report
+        self.events += logged_events(world, self._from)
+        if not world.plan.events:
+            before, self.pairs = self.pairs, contact_pairs(world)
+            self.events += contact_events(before, self.pairs, world.time) + fault_events(world, world.time)
+        self.penetration = max(self.penetration, float(report.penetration[0]))
+        self.residual = max(self.residual, float(report.residual[0]))
+        if report.status[0] == Status.FAULT:
+            self.fault = report.messages()[0]
+
+    def undone(self) -> None:
+        """It is none: an exception has put everything back."""
+        self.calls.pop()

@@ -1,0 +1,273 @@
+"""Session: a subject that is played, with its past, its samples, the user's hand and a ghost beside it."""
+
+from __future__ import annotations
+
+import time as clock
+
+from physics import PRESETS, Event, validation
+from rigid_env.viewer.background import Background
+from rigid_env.viewer.controls import Controls
+from rigid_env.viewer.ghost import Ghost
+from rigid_env.viewer.interface import Subject
+from rigid_env.viewer.look import Look
+from rigid_env.viewer.pace import Pace
+from rigid_env.viewer.run import Run, known_events
+from rigid_env.viewer.samples import Samples
+
+BUDGET = 0.05
+"""Time of computing after which a call of `Session.advance` takes no further step [s]."""
+
+START, GHOST = "the scene", "the ghost"
+"""Names of what compiles besides accuracies."""
+
+
+class Session(Controls):
+    """Player of a subject; used from one thread only.
+
+    Kernels compile in the background. Until then `is_compiling` is True, and the run stands still at its start, or
+    goes on as it was. Errors of a simulation pause it and stand in `message`.
+
+    Parameters
+    ----------
+    subject : Subject
+        Of `rigid_env.viewer.subject.open_subject`; its sessions are one at a time.
+
+    Attributes
+    ----------
+    subject : Subject
+    is_playing : bool
+    """
+
+    def __init__(self, subject: Subject):
+        self.subject = subject
+        self.is_playing = False
+        self._run, self._pace, self._note = Run(subject), Pace(), ""
+        self._sliders: dict[str, float] = {}
+        self._jobs: dict[str, Background] = {}
+        self._ghost: Ghost | None = None  # that is wanted, and may compile
+        self._ready, self._wanted = {subject.accuracy}, subject.accuracy
+        work = subject.rehearsal()
+        if work is not None:
+            self._jobs[START] = Background(START, work)
+
+    # --- to be read --------------------------------------------------------------------------------------------
+
+    @property
+    def time(self) -> float:
+        """Simulated time [s]."""
+        return self.subject.time
+
+    @property
+    def span(self) -> tuple[float, float]:
+        """First and last time that `seek` goes to [s]."""
+        times, end = self._run.history.times, self.subject.end
+        return times[0], times[-1] if end is None else end
+
+    @property
+    def seed(self) -> int:
+        """Seed of the run."""
+        return self.subject.seed
+
+    @property
+    def accuracy(self) -> str:
+        """Name of the preset, ``custom``, or empty where nothing is simulated."""
+        return self.subject.accuracy
+
+    @property
+    def speed(self) -> float:
+        """Simulated seconds per real second."""
+        return self._pace.speed
+
+    @speed.setter
+    def speed(self, value: float) -> None:
+        self._pace.speed = float(validation.positive(value, (), "speed"))
+
+    @property
+    def samples(self) -> Samples:
+        """One at the start and one after each step, up to the latest that is known."""
+        return self._run.samples
+
+    @property
+    def events(self) -> list[Event]:
+        """Events up to now, a copy."""
+        return known_events(self._run)
+
+    @property
+    def is_compiling(self) -> bool:
+        """Something compiles in the background."""
+        return bool(self._jobs)
+
+    @property
+    def ghost_label(self) -> str:
+        """Name of the ghost, with its own error where it has one; empty without one."""
+        return "" if self._run.ghost is None else self._run.ghost.label
+
+    @property
+    def message(self) -> str:
+        """One line about the state of affairs."""
+        if self._note:
+            return self._note
+        compiling = f"compiling {', '.join(self._jobs)} ..." if self._jobs else ""
+        return "; ".join(filter(None, (compiling, self._pace.message, self.subject.message)))
+
+    def look(self) -> Look:
+        """Everything to draw of now."""
+        run, subject, motion = self._run, self.subject, self.subject.motion()
+        drag = None if subject.world is None else run.hand.ends(subject.world)
+        ghost = None if run.ghost is None else run.ghost.frame()
+        return Look(
+            subject.frame(), subject.time, motion.linvel, motion.angvel, motion.is_asleep, motion.radius, drag, ghost
+        )
+
+    # --- time --------------------------------------------------------------------------------------------------
+
+    def play(self) -> None:
+        """Let time go on with `advance`."""
+        self.is_playing, self._note = True, ""
+        self._pace.stop()
+
+    def pause(self) -> None:
+        """Stand still."""
+        self.is_playing = False
+
+    def step(self) -> bool:
+        """Take one step; returns False at the end, while the scene compiles, and after an error."""
+        self._poll()
+        self._note = ""
+        return self._take()
+
+    def advance(self, seconds: float) -> int:
+        """Take the steps that are due after `seconds` of real time; returns how many were taken.
+
+        After `BUDGET` those that are left are left out, and `message` says so.
+        """
+        self._poll()
+        if not self.is_playing or START in self._jobs:
+            return 0
+        pace, subject = self._pace, self.subject
+        pace.owe(seconds)
+        limit, wanted, count = clock.perf_counter() + BUDGET, pace.due, 0
+        while self.is_playing and (subject.is_over or pace.is_due(subject.interval)):
+            if count and clock.perf_counter() > limit:
+                pace.leave_out(wanted)
+                return count
+            interval = 0.0 if subject.is_over else subject.interval
+            if self._take():
+                pace.due -= interval
+                count += 1
+        pace.keep_up()
+        return count
+
+    def seek(self, time: float) -> None:
+        """Go to the last known moment that is not later than `time` [s], bit for bit; where the end is known, to any.
+
+        What came later is forgotten once a step is taken, or an input given, from there.
+        """
+        time = validation.number(time, "time")
+        self._poll()
+        self._note = ""
+        self._pace.stop()
+        run = self._run
+        self._safely(lambda: run.go_to(run.history.index_at(time)))
+        if self.subject.end is None or run.index != run.history.last:
+            return
+        while not self.subject.is_over and self.time + self.subject.interval <= time * (1.0 + 1e-12) + 1e-12:
+            if not self._take():
+                break
+
+    def reset(self, seed: int | None = None) -> None:
+        """Begin anew, with the sliders where they are.
+
+        Parameters
+        ----------
+        seed : int, optional
+            Of the first episode and of random actions; None: the same as before.
+
+        Raises
+        ------
+        ValueError
+            It is no seed.
+        """
+        seed = self.seed if seed is None else validation.index(seed, 2**32, "seed")
+        self._poll()
+        self._note = ""
+        self._pace.stop()
+        self._run.restart(seed)
+        for name, value in self._sliders.items():
+            self._run.give(name, value)
+
+    def _take(self) -> bool:
+        """Take a step; what is wrong with it is told."""
+        if START in self._jobs:
+            return False
+        if self.subject.is_over:
+            self.is_playing, self._note = False, "the end"
+            return False
+        if not self._safely(self._run.take):
+            return False
+        if self._run.fault:
+            self.is_playing, self._note = False, self._run.fault
+        return True
+
+    def _safely(self, work) -> bool:
+        """Do something that calls functions of users; an error pauses the run at the last whole moment."""
+        try:
+            work()
+        except Exception as error:
+            self.is_playing, self._note = False, f"{type(error).__name__}: {error}"
+            self._run.go_to(self._run.index, anew=True)
+            return False
+        return True
+
+    # --- accuracy ----------------------------------------------------------------------------------------------
+
+    def set_accuracy(self, preset: str) -> None:
+        """Go on at another preset, from the same state, once its kernel is there.
+
+        Raises
+        ------
+        ValueError
+            No such preset, or one that this scene does not allow.
+        """
+        self._needs("accuracy")
+        validation.one_of(preset, {**PRESETS, **dict.fromkeys(self._ready)}, "accuracy")
+        if preset not in self._ready and preset not in self._jobs:
+            self._jobs[preset] = Background(preset, self.subject.prepare(preset))
+        self._wanted = preset
+        self._switch()
+
+    def _switch(self) -> None:
+        if self._wanted != self.accuracy and self._wanted in self._ready:
+            self._run.give("accuracy", self._wanted)
+
+    def set_ghost(self, on: bool) -> None:
+        """Show the same scene at ``reference`` beside it, from this moment on, once its kernel is there; or do not."""
+        if not on:
+            self._run.ghost = self._ghost = None
+            self._jobs.pop(GHOST, None)
+        elif self._ghost is None:
+            self._needs("ghost")
+            self._ghost = Ghost(self.subject.world)
+            self._jobs[GHOST] = Background(GHOST, self._ghost.warm)
+
+    # --- in the background -------------------------------------------------------------------------------------
+
+    def wait(self) -> None:
+        """Wait until nothing compiles any more."""
+        for job in list(self._jobs.values()):
+            job.join()
+        self._poll()
+
+    def _poll(self) -> None:
+        """Take over what has compiled."""
+        for name in [name for name, job in self._jobs.items() if job.is_done]:
+            error = self._jobs.pop(name).error
+            if error is not None:
+                self._note = f"{name}: {type(error).__name__}: {error}"
+                self.is_playing = self.is_playing and name != START
+            elif name == GHOST:
+                self._ghost.start(self.subject.world.snapshot())
+                self._run.ghost = self._ghost
+            elif name != START:
+                self._ready.add(name)
+                self._switch()

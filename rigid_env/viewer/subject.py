@@ -1,0 +1,203 @@
+"""From a name, a file or an object to a subject that can be played."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import Any
+from zipfile import is_zipfile
+
+import numpy as np
+
+import physics
+from physics import scenes, validation
+from physics.keywords import nearest_first
+from physics.plan.accuracy import resolve
+from physics.summary import shown
+from rigid_env.viewer.interface import Subject
+from rigid_env.viewer.replays import PlayedRecording, PlayedTrajectory
+from rigid_env.viewer.worlds import live_scene, live_world
+
+ACCURACY, DT = "balanced", 0.01
+
+ALLOWED = (
+    "a canonical scene, a scene file (.toml), an environment id, a recording or a trajectory (.npz), and of Python "
+    "physics.Scene, World, Trajectory, Recording and environments of rigid_env"
+)
+
+KNOWN_FIRST = 3
+"""Names that are like a wrong one and stand in the message about it."""
+
+
+def open_subject(
+    what: Any,
+    *,
+    accuracy: Any = None,
+    dt: float | None = None,
+    seed: int = 0,
+    policy: Any = None,
+    controller: bool = False,
+) -> Subject:
+    """Make a subject of anything that can be played.
+
+    Parameters
+    ----------
+    what : object
+        Name of a canonical scene, path of a scene file, of a recording or of a trajectory, id of an environment; or a
+        `physics.Scene`, `World`, `Trajectory`, `Recording`, or an environment of `rigid_env`, wrapped or not. A world
+        or an environment goes on from its present state in a copy; it stays as it is.
+    accuracy : str or physics.Accuracy, optional
+        None: that of a world or an environment; of others ``balanced``.
+    dt : float, optional
+        Step of a scene or a world [s]. None: 0.01, or that of a world. Environments have steps of their own.
+    seed : int
+        Of the first episode and of random actions.
+    policy : path, callable or model, optional
+        Of an environment: a file (`rigid_env.envs.policy_files.load_policy`), a function from observations with the
+        worlds first to actions, or a model of Stable-Baselines3. None: random actions.
+    controller : bool
+        Let the controller written by hand for this environment act (`rigid_env.envs.controllers`).
+
+    Returns
+    -------
+    Subject
+
+    Raises
+    ------
+    ValueError
+        Something else, a file with a mistake, or an argument that this subject does not take.
+    gymnasium.error.DependencyNotInstalled
+        A policy of Stable-Baselines3 without the extra `agents`.
+    """
+    seed = validation.index(seed, 2**32, "seed")
+    if accuracy is not None:
+        resolve(accuracy)
+    if dt is not None:
+        dt = float(validation.positive(dt, (), "dt"))
+    what, name = _loaded(what)
+    if _is_environment(what):
+        return _open_environment(what, name, accuracy, dt, seed, policy, controller)
+    _refuse(name, "no environment", policy=policy, controller=controller or None)
+    if isinstance(what, physics.Scene):
+        return live_scene(what, name, accuracy or ACCURACY, dt or DT)
+    if isinstance(what, physics.World):
+        return live_world(what, name, accuracy, dt)
+    _refuse(name, "no longer simulated at will", accuracy=accuracy, dt=dt)
+    kind = PlayedRecording if isinstance(what, physics.Recording) else PlayedTrajectory
+    return kind(what, name)
+
+
+def _refuse(name: str, why: str, **given: Any) -> None:
+    """Refuse arguments that a subject does not take; those that are None were not given."""
+    for field, value in given.items():
+        if value is not None:
+            raise ValueError(f"{field} is {shown(value)}, but {name} is {why}; allowed is None")
+
+
+def _loaded(what: Any) -> tuple[Any, str]:
+    """Scene, world, trajectory, recording, environment or its id, and a name for it."""
+    if isinstance(what, (str, os.PathLike)):
+        return _of_text(os.fspath(what))
+    known = (physics.Scene, physics.World, physics.Trajectory, physics.Recording)
+    if isinstance(what, known) or _is_environment(what):
+        return what, type(getattr(what, "unwrapped", what)).__name__
+    raise ValueError(f"what is {shown(what)}; allowed are {ALLOWED}")
+
+
+def _of_text(text: str) -> tuple[Any, str]:
+    from rigid_env.tasks.scene_source import SCENE_FILE, find_scene
+
+    path = Path(text)
+    if text in scenes.SCENES or path.suffix.lower() == SCENE_FILE:
+        found = find_scene(text)
+        return found.scene, found.name
+    if path.is_file():
+        return _of_archive(path), path.stem
+    if _is_environment(text):
+        return text, text.split("/")[-1]
+    near = nearest_first(text, [*scenes.SCENES, *_ids()])[:KNOWN_FIRST]
+    raise ValueError(f"what is {text!r}; allowed are {ALLOWED} (such as {', '.join(near)})")
+
+
+def _of_archive(path: Path) -> physics.Recording | physics.Trajectory:
+    """Recording or trajectory of a file."""
+    allowed = "allowed are what physics.Recorder and Trajectory.to_npz write"
+    if not is_zipfile(path):
+        raise ValueError(f"what is {str(path)!r}, which is no archive; {allowed}")
+    with np.load(path, allow_pickle=False) as file:
+        names = set(file.files)
+    if {"t", "pos"} <= names:
+        return physics.Trajectory.from_npz(path)
+    if {"head", "states"} <= names:
+        return physics.Recording.load(path)
+    raise ValueError(f"what is {str(path)!r}, which is neither a recording nor a trajectory; {allowed}")
+
+
+# --- environments ------------------------------------------------------------------------------------------------
+
+
+def _ids() -> list[str]:
+    """Ids of the environments of `rigid_env`, its own and those of registered tasks."""
+    from gymnasium import registry
+
+    return [name for name, spec in registry.items() if str(spec.entry_point).startswith("rigid_env.")]
+
+
+def _is_environment(what: Any) -> bool:
+    if isinstance(what, str):
+        return what.split(":")[-1] in _ids() or ":" in what
+    if not hasattr(what, "unwrapped"):
+        return False
+    from rigid_env.envs.env import RigidEnv
+
+    return isinstance(what.unwrapped, RigidEnv)
+
+
+def _open_environment(what, name, accuracy, dt, seed, policy, controller) -> Subject:
+    import gymnasium as gym
+
+    from rigid_env.viewer.episodes import LiveEnv
+
+    if dt is not None:
+        raise ValueError(f"dt is {dt!r}, but {name} has control steps of its own; allowed is None")
+    env = what
+    if isinstance(what, str):
+        if what.split(":")[-1].split("/")[-1] == "Scene-v0":
+            raise ValueError(f"what is {what!r}, which needs a scene; allowed is the scene, or the environment itself")
+        try:
+            env = gym.make(what, disable_env_checker=True)
+        except (gym.error.Error, ImportError) as error:
+            raise ValueError(f"what is {what!r}, which Gymnasium does not make ({error})") from error
+        if not _is_environment(env):
+            raise ValueError(f"what is {what!r}; allowed are environments of rigid_env")
+    return LiveEnv(env, name, seed, _policy(env, policy, controller), accuracy)
+
+
+def _policy(env, policy, controller):
+    """Function from observations to actions; None: random actions."""
+    if controller:
+        return _controller(env, policy)
+    if isinstance(policy, (str, os.PathLike)):
+        from rigid_env.envs.policy_files import load_policy
+
+        return load_policy(policy)
+    if hasattr(policy, "predict"):
+        from rigid_env.envs.policy_files import greedy
+
+        return greedy(policy)
+    if policy is not None and not callable(policy):
+        raise ValueError(f"policy is {shown(policy)}; allowed are a file, a function and a model")
+    return policy
+
+
+def _controller(env, policy):
+    """The controller written by hand for an environment."""
+    from rigid_env.envs.controllers import CONTROLLERS
+
+    if policy is not None:
+        raise ValueError(f"policy is {shown(policy)} with controller=True; allowed is one of the two")
+    names = {id_.split("/")[-1].split("-")[0]: each for id_, each in CONTROLLERS.items()}
+    task = type(env.unwrapped.task).__name__
+    if task not in names:
+        raise ValueError(f"controller is True with {task}; allowed is {', '.join(names)}")
+    return names[task]
