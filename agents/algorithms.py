@@ -16,6 +16,7 @@ from stable_baselines3.common.noise import OrnsteinUhlenbeckActionNoise
 
 import physics
 from agents.config import RunConfig
+from agents.features import GoalDifference
 from rigid_env import RigidVecEnv
 
 CLASSES: dict[str, type[BaseAlgorithm]] = {"ppo": PPO, "sac": SAC}
@@ -93,6 +94,7 @@ def algorithm_arguments(config: RunConfig, action_size: int = 6) -> dict[str, An
             raise ValueError(f"policy_kwargs.activation_fn is {name!r}; allowed are class names of torch.nn")
         policy["activation_fn"] = getattr(torch.nn, name)
     if "hindsight" in arguments:
+        policy["features_extractor_class"] = GoalDifference
         arguments["replay_buffer_class"] = HerReplayBuffer
         arguments["replay_buffer_kwargs"] = arguments.pop("hindsight")
     if isinstance(arguments.get("learning_rate"), dict):

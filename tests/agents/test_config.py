@@ -5,11 +5,13 @@ from __future__ import annotations
 import inspect
 
 import gymnasium as gym
+import numpy as np
 import pytest
 import yaml
 
 pytest.importorskip("stable_baselines3")
 
+import torch
 from stable_baselines3 import HerReplayBuffer
 from stable_baselines3.common.policies import ActorCriticPolicy
 from stable_baselines3.sac.policies import SACPolicy
@@ -17,6 +19,7 @@ from stable_baselines3.sac.policies import SACPolicy
 import physics
 from agents.algorithms import CLASSES, algorithm_arguments
 from agents.config import ALGORITHMS, HYPERPARAMETERS, RunFolder, change, make_config
+from agents.features import FINE, GoalDifference
 
 TABLE = yaml.safe_load(HYPERPARAMETERS.read_text(encoding="utf-8"))
 ENTRIES = [(env, algo) for env, entry in TABLE.items() for algo in entry]
@@ -107,3 +110,15 @@ def test_a_learning_rate_may_fall():
     config = change(config, algorithm={"learning_rate": {"start": 1e-3}})
     with pytest.raises(ValueError, match="learning_rate has the keys start; allowed are a number, or start, end"):
         algorithm_arguments(config)
+
+
+def test_features_hold_the_way_to_the_goal_coarsely_and_finely():
+    sizes = {"observation": 2, "achieved_goal": 2, "desired_goal": 2}
+    space = gym.spaces.Dict({key: gym.spaces.Box(-9, 9, (size,)) for key, size in sizes.items()})
+    features = GoalDifference(space)
+    parts = {"observation": [1.0, 2.0], "achieved_goal": [0.5, -1.0], "desired_goal": [0.6, 3.0]}
+    found = features({key: torch.tensor([values], dtype=torch.float64) for key, values in parts.items()})[0]
+    way = np.array([0.1, 4.0])
+    expected = np.concatenate(([1.0, 2.0, 0.5, -1.0], way, np.tanh(FINE * way)))
+    assert features.features_dim == len(expected)
+    np.testing.assert_allclose(found.numpy(), expected, rtol=1e-14)  # a few roundings of float64
