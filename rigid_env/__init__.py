@@ -39,6 +39,7 @@ if TYPE_CHECKING:
     from rigid_env.tasks.goal import GoalTask
     from rigid_env.tasks.rollout import TaskRollout, rollout
     from rigid_env.tasks.state import TaskState
+    from rigid_env.viewer.show import show, to_html
 
     __version__: str
 
@@ -68,6 +69,8 @@ _LAZY = {
     "TaskState": "rigid_env.tasks.state",
     "check_task": "rigid_env.envs.checks",
     "rollout": "rigid_env.tasks.rollout",
+    "show": "rigid_env.viewer.show",
+    "to_html": "rigid_env.viewer.show",
     "TaskVectorEnv": "rigid_env.envs.vector_env",
     "RigidVecEnv": "rigid_env.envs.sb3",  # needs the extra `agents`, so it is not in `__all__`
 }
@@ -107,6 +110,8 @@ __all__ = [
     "register_envs",
     "register_task",
     "rollout",
+    "show",
+    "to_html",
 ]
 
 

@@ -21,6 +21,7 @@ EXTRAS: dict[str, dict[str, str]] = {
         "PIL": "Pillow",
     },
     "plot": {"matplotlib": "matplotlib"},
+    "view": {"viser": "viser"},
     "bench": {"mujoco": "MuJoCo"},
     "peers": {"mujoco": "MuJoCo", "pybullet": "PyBullet", "pydrake": "Drake"},
 }
@@ -37,7 +38,7 @@ def require(extra: str, *modules: str, purpose: str = "this command") -> None:
 
     Parameters
     ----------
-    extra : {"render", "plot", "agents", "bench", "peers"}
+    extra : {"render", "plot", "view", "agents", "bench", "peers"}
     *modules : str
         Names as imported; the default is all of `EXTRAS[extra]`.
     purpose : str

@@ -7,10 +7,10 @@ from typing import Annotated
 
 import typer
 
-from rigid_env.cli import describing, exploring, measuring
+from rigid_env.cli import describing, exploring, measuring, viewing
 from rigid_env.cli.common import app
 
-__all__ = ["app", "describing", "exploring", "measuring"]
+__all__ = ["app", "describing", "exploring", "measuring", "viewing"]
 
 
 def _print_version(is_wanted: bool) -> None:

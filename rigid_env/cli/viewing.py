@@ -1,0 +1,75 @@
+"""The command that shows something in a browser."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from rigid_env.cli import names
+from rigid_env.cli.common import app, at_least, tell_file, told_errors
+from rigid_env.cli.files import make_parents, output_option
+from rigid_env.terminal import make_console, say
+
+WHAT = "A canonical scene, a scene file, an environment id, a recording or a trajectory (.npz)."
+
+
+@app.command(short_help="Look at a scene, an environment, a recording or a trajectory in a browser.")
+def view(
+    what: Annotated[str, typer.Argument(help=WHAT, autocompletion=names.complete_scene)] = "drop",
+    accuracy: Annotated[str | None, typer.Option(help="Preset of the engine; balanced by default.")] = None,
+    dt: Annotated[float | None, typer.Option("--dt", help="Step of a scene [s]; 0.01 by default.")] = None,
+    seed: Annotated[int, typer.Option(min=0, help="Of the first episode, and of random actions.")] = 0,
+    policy: Annotated[
+        Path | None, typer.Option(help="Of an environment: a file of Stable-Baselines3, or plain arrays (.npz).")
+    ] = None,
+    controller: Annotated[bool, typer.Option("--controller", help="The controller written by hand acts.")] = False,
+    host: Annotated[
+        str, typer.Option(help="Address to serve on; 0.0.0.0 lets other machines look, too.")
+    ] = "127.0.0.1",
+    port: Annotated[int, typer.Option(min=1, max=65535, help="The next free one is taken.")] = 8080,
+    export: Annotated[
+        Path | None, output_option("--export", ".html", help="Write a run as one offline page instead.")
+    ] = None,
+    duration: Annotated[float, typer.Option(callback=at_least(0), help="Of an exported run [s].")] = 10.0,
+    browser: Annotated[bool, typer.Option("--browser/--no-browser", help="Open a browser here.")] = False,
+) -> None:
+    """Look at something in a browser: play, pause, go back, drag, kick, and see what accuracy costs.
+
+    Without --policy or --controller an environment gets random actions. Ctrl-C ends it.
+    """
+    with told_errors():
+        from rigid_env.extras import require
+
+        require("view", purpose="the viewer")
+        settings = {"accuracy": accuracy, "dt": dt, "seed": seed, "policy": policy, "controller": controller}
+        console = make_console()
+        if export is not None:
+            make_parents(export)
+            _export(what, export, duration, settings, console)
+            return
+        from rigid_env.viewer.server import Viewer, directions
+        from rigid_env.viewer.session import Session
+        from rigid_env.viewer.subject import open_subject
+
+        session = Session(open_subject(what, **settings))
+        viewer = Viewer(session, host, port)
+        session.play()
+        for text in directions(viewer, host):
+            console.print(text, soft_wrap=True, highlight=False)
+        if browser:
+            import webbrowser
+
+            webbrowser.open(viewer.address)
+        viewer.run()
+        say(console, "viewer", "ended")
+
+
+def _export(what: str, path: Path, duration: float, settings: dict, console) -> None:
+    from rigid_env.viewer.show import to_html
+
+    with console.status("simulating"):
+        to_html(what, path, duration=duration, **settings)
+    tell_file(path, console)
+    say(console, "size", f"{path.stat().st_size / 1e6:.2f} MB")

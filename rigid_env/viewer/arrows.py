@@ -1,0 +1,114 @@
+"""Arrows, lines and springs on the stage: nodes that come with their first line and go with the last."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from rigid_env.rendering.geometry import plane_axes
+from rigid_env.viewer.colours import vivid
+from rigid_env.viewer.placement import Placement
+
+SHAFT, HEAD, HEAD_LENGTH = 0.013, 0.036, 0.11
+"""Radii and length of an arrow, in units of the largest body."""
+
+SHORTEST = 0.6
+"""Shortest arrow drawn, in lengths of a head."""
+
+LONGEST = 1.6
+"""Longest arrow drawn, in units of the largest body: the force of an impact would reach out of every room."""
+
+LINE = 0.011
+"""Width of a line, in units of the largest body."""
+
+COILS, COIL_POINTS, COIL_RADIUS = 9, 12, 0.03
+"""Of a spring: its turns, the points of each, and the radius in units of the largest body."""
+
+
+class Arrows:
+    """Arrows of one node.
+
+    Parameters
+    ----------
+    scene : viser.SceneApi
+    name : str
+        Of the node.
+    placement : Placement
+    """
+
+    def __init__(self, scene, name: str, placement: Placement):
+        self._scene, self._name, self._placement, self._node = scene, name, placement, None
+
+    def show(self, starts, vectors, colours) -> None:
+        """Draw arrows from `starts` (n, 3) [m], as long as `vectors` (n, 3) [m]; one colour, or (n, 3)."""
+        starts, vectors = np.asarray(starts, dtype=float), np.asarray(vectors, dtype=float)
+        unit = self._placement.unit
+        lengths = np.sqrt(np.sum(vectors * vectors, axis=1))
+        kept = np.isfinite(lengths) & (lengths > SHORTEST * HEAD_LENGTH * unit)
+        if not kept.any():
+            self.hide()
+            return
+        vectors = vectors[kept] * np.minimum(1.0, LONGEST * unit / lengths[kept])[:, None]
+        ends = self._placement.drawn(np.stack([starts[kept], starts[kept] + vectors], axis=1))
+        colours = vivid(colours)
+        self._send(ends, np.broadcast_to(colours if colours.ndim == 1 else colours[kept], (len(ends), 3)))
+
+    def _send(self, ends, colours) -> None:
+        if self._node is None:
+            size = self._placement.unit * self._placement.scale
+            self._node = self._scene.add_arrows(
+                self._name, ends, colours, shaft_radius=SHAFT * size, head_radius=HEAD * size,
+                head_length=HEAD_LENGTH * size,
+            )  # fmt: skip
+        else:
+            self._node.points, self._node.colors, self._node.visible = ends, colours, True
+
+    def hide(self) -> None:
+        """Draw nothing until the next `show`."""
+        if self._node is not None:
+            self._node.visible = False
+
+
+class Lines:
+    """Line segments of one colour, in one node."""
+
+    def __init__(self, scene, name: str, placement: Placement, colour):
+        self._scene, self._name, self._placement, self._colour = scene, name, placement, colour
+        self._node = None
+
+    def show(self, segments) -> None:
+        """Draw segments (n, 2, 3) [m]."""
+        if len(segments) == 0:
+            self.hide()
+            return
+        drawn = self._placement.drawn(segments)
+        if self._node is None:
+            size = self._placement.unit * self._placement.scale
+            self._node = self._scene.add_line_segments(self._name, drawn, vivid(self._colour), thickness=LINE * size)
+        else:
+            self._node.points, self._node.visible = drawn, True
+
+    def hide(self) -> None:
+        """Draw nothing until the next `show`."""
+        if self._node is not None:
+            self._node.visible = False
+
+
+def path(points) -> np.ndarray:
+    """Segments (n - 1, 2, 3) through points (n, 3)."""
+    points = np.asarray(points, dtype=float)
+    return np.stack([points[:-1], points[1:]], axis=1)
+
+
+def spring(start, end, unit: float) -> np.ndarray:
+    """Segments of a coil between two points (3,) [m]; `unit` is the extent of the largest body [m]."""
+    start, end = np.asarray(start, dtype=float), np.asarray(end, dtype=float)
+    along = end - start
+    length = float(np.linalg.norm(along))
+    if not 0.0 < length < np.inf:
+        return np.zeros((0, 2, 3))
+    u, v = plane_axes(along / length)
+    share = np.linspace(0.0, 1.0, COILS * COIL_POINTS + 1)
+    angle = 2.0 * np.pi * COILS * share
+    radius = COIL_RADIUS * unit * np.minimum(1.0, 8.0 * np.minimum(share, 1.0 - share))
+    circle = np.cos(angle)[:, None] * u + np.sin(angle)[:, None] * v
+    return path(start + share[:, None] * along + radius[:, None] * circle)

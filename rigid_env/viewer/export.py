@@ -1,0 +1,162 @@
+"""One file for a motion: an HTML page with a time line that plays offline.
+
+viser's own client is in the page, with the messages it would have got from a server and their times. Its player has
+play and pause (also the space bar), a time line, the speed and a tree of the scene, in which layers can be hidden.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable, Iterator
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+
+from physics import Scene, Trajectory, validation
+from rigid_env.extras import require
+from rigid_env.viewer.look import Look
+from rigid_env.viewer.replay import trajectory_looks
+from rigid_env.viewer.servers import server_for_a_while
+from rigid_env.viewer.stage import LAYERS, Stage
+
+TITLE = "<title>Viser</title>"
+
+TIME_SLACK = 1e-9
+"""Share of the time between pictures by which a look may come too early."""
+
+
+def to_html(
+    source: Iterable[Look] | Trajectory,
+    path: str | Path,
+    *,
+    scene: Scene | None = None,
+    duration: float = 10.0,
+    fps: float = 30.0,
+    layers: Iterable[str] | None = None,
+    title: str = "rigid-env",
+) -> Path:
+    """Write a motion as one HTML file that plays in a browser without a network.
+
+    Poses are float32, as everywhere in viser; nothing is interpolated. The file has viser's client (about 0.8 MB) and,
+    for each picture, 28 bytes for each body that moves, before compression.
+
+    Parameters
+    ----------
+    source : iterable of Look, or Trajectory
+        In order of time. The first one is shown at time 0.
+    path : str or Path
+        Of the file; it is written whole or not at all.
+    scene : Scene, optional
+        Of a trajectory, which has no shapes; its fields are drawn. Of looks: only the latter.
+    duration : float
+        Looks later than this after the first are left out [s].
+    fps : float
+        Pictures a second at most: looks that are nearer to the last one taken are left out [1/s].
+    layers : iterable of str, optional
+        Names of the layers that are shown, of `stage.LAYERS`. None: those that are shown at first.
+    title : str
+        Of the page.
+
+    Returns
+    -------
+    Path
+        The file.
+
+    Raises
+    ------
+    ValueError
+        On a source without looks, times that go back, an unknown layer, a trajectory without a scene, or a number that
+        is not positive.
+    gymnasium.error.DependencyNotInstalled
+        If viser is missing.
+    """
+    validation.path(path)
+    page = html_of(source, scene=scene, duration=duration, fps=fps, layers=layers, title=title)
+    path = Path(path)
+    partial = path.with_name(f".{path.name}.part")
+    try:
+        partial.write_text(page, encoding="utf-8")
+        os.replace(partial, path)
+    finally:
+        partial.unlink(missing_ok=True)
+    return path
+
+
+def html_of(source, *, scene=None, duration=10.0, fps=30.0, layers=None, title="rigid-env") -> str:
+    """Text of the page that `to_html` writes; parameters and errors are the same."""
+    require("view", purpose="an HTML file")
+    duration = float(validation.positive(duration, (), "duration"))
+    fps = float(validation.positive(fps, (), "fps"))
+    shown = [name for name, is_on in LAYERS.items() if is_on] if layers is None else list(layers)
+    for name in shown:
+        validation.one_of(name, LAYERS, "layers")
+    looks = list(taken(_looks(source, scene), duration, 1.0 / fps))
+    if not looks:
+        raise ValueError("source has no looks; allowed is at least one")
+    page = _record(looks, scene, shown)
+    return page.replace(TITLE, f"<title>{_escaped(title)}</title>", 1)
+
+
+def taken(looks: Iterable[Look], duration: float, interval: float) -> Iterator[Look]:
+    """Looks up to `duration` [s] after the first that are at least `interval` [s] apart.
+
+    Raises
+    ------
+    ValueError
+        If times go back.
+    """
+    start = before = due = None
+    for look in looks:
+        if start is None:
+            start = before = due = look.time
+        if look.time < before:
+            raise ValueError(
+                f"source has a look at {look.time:g} s after one at {before:g} s; allowed are rising times"
+            )
+        before = look.time
+        slack = TIME_SLACK * interval + 1e-12 * abs(look.time)
+        if look.time > start + duration + slack:
+            return
+        if look.time >= due - slack:
+            yield look
+            due = max(due + interval, look.time + 0.5 * interval)
+
+
+def _looks(source, scene: Scene | None) -> Iterable[Look]:
+    if not isinstance(source, Trajectory):
+        return source
+    if scene is None:
+        raise ValueError("scene is None with a Trajectory; allowed is the Scene that was simulated")
+    return trajectory_looks(scene, source)
+
+
+def _record(looks: list[Look], scene: Scene | None, shown: list[str]) -> str:
+    """Show looks on a stage that nobody sees, and keep its messages."""
+    with server_for_a_while() as server:
+        stage = Stage(server, fields=scene, bounds=_bounds(looks))
+        for name in LAYERS:
+            stage.set_layer(name, name in shown)
+        stage.show(looks[0])
+        recording = server.get_scene_serializer()
+        for before, look in pairwise(looks):
+            recording.insert_sleep(look.time - before.time)
+            stage.show(look)
+        return recording.as_html()
+
+
+def _bounds(looks: list[Look]):
+    """Lower and upper corner (3,) [m] of all places where bodies are."""
+    boxes = []
+    for look in looks:
+        pos, radius = look.frame.poses.pos, np.asarray(look.radius)[:, None]
+        if len(pos):
+            boxes.append(((pos - radius).min(axis=0), (pos + radius).max(axis=0)))
+    if not boxes:
+        return None
+    lower, upper = zip(*boxes)
+    return np.min(lower, axis=0), np.max(upper, axis=0)
+
+
+def _escaped(text: str) -> str:
+    return text.replace("&", "&amp;").replace("<", "&lt;")

@@ -1,0 +1,246 @@
+"""Layers of the stage that can be switched: each shows its part of a `Look`, or hides it."""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+import numpy as np
+
+from rigid_env.rendering import palette
+from rigid_env.rendering.geometry import plane_axes
+from rigid_env.viewer.arrows import HEAD_LENGTH, Arrows, Lines, path, spring
+from rigid_env.viewer.bodies import Bodies
+from rigid_env.viewer.look import Look
+from rigid_env.viewer.picking import leave
+from rigid_env.viewer.placement import Placement
+from rigid_env.viewer.scenery import add_walls
+from rigid_env.viewer.shapes import octants
+
+VELOCITY, SPIN = (196, 58, 148), (150, 104, 208)
+"""Colours of arrows of velocity and angular velocity."""
+
+DRAG = (44, 54, 74)
+BOUND = (96, 116, 150)
+BOUND_OPACITY = 0.16
+
+POINT = 0.036
+"""Size of a contact point, in units of the largest body."""
+
+AXIS, AXIS_RADIUS = 0.75, 0.012
+"""Length of an axis in radii of its body, and its radius in units of the largest body."""
+
+TORQUE_RADIUS, TORQUE_SWEEP, TORQUE_POINTS = 0.62, np.radians(300.0), 32
+"""Arc of a torque: its radius in extents of the body, its largest angle and its points."""
+
+EARTH = 9.81
+"""[m/s²]. A body that falls by half its size is drawn with an arrow about as long."""
+
+
+class Layer(Protocol):
+    """Part of the picture with a switch."""
+
+    def show(self, look: Look) -> None:
+        """Draw what is there at a moment."""
+
+    def hide(self) -> None:
+        """Draw nothing until the next `show`."""
+
+
+class Walls:
+    """Floor and walls of the room; they are added once."""
+
+    def __init__(self, scene, placement: Placement):
+        self._nodes = add_walls(scene, "/scene/walls", placement)
+
+    def show(self, look: Look) -> None:
+        for node in self._nodes:
+            node.visible = True
+
+    def hide(self) -> None:
+        for node in self._nodes:
+            node.visible = False
+
+
+class Contacts:
+    """Contact points."""
+
+    def __init__(self, scene, placement: Placement):
+        self._scene, self._placement, self._node = scene, placement, None
+
+    def show(self, look: Look) -> None:
+        points = look.frame.contact_points
+        if len(points) == 0:
+            self.hide()
+            return
+        drawn = self._placement.drawn(points)
+        if self._node is None:
+            size = POINT * self._placement.unit * self._placement.scale
+            self._node = self._scene.add_point_cloud(
+                "/scene/contacts", drawn, palette.CONTACT, point_size=size, point_shape="circle", precision="float32",
+                point_shading="flat",
+            )  # fmt: skip
+        else:
+            self._node.points, self._node.visible = drawn, True
+
+    def hide(self) -> None:
+        if self._node is not None:
+            self._node.visible = False
+
+
+class Forces:
+    """Arrows of contact forces."""
+
+    def __init__(self, scene, placement: Placement):
+        self._arrows, self._unit = Arrows(scene, "/scene/forces", placement), placement.unit
+
+    def show(self, look: Look) -> None:
+        frame = look.frame
+        self._arrows.show(frame.contact_points, force_scale(frame, self._unit) * frame.contact_forces, palette.CONTACT)
+
+    def hide(self) -> None:
+        self._arrows.hide()
+
+
+class Applied:
+    """Arrow of the force that is applied to body 0, from its surface, and arc of the torque round it."""
+
+    def __init__(self, scene, placement: Placement):
+        self._force = Arrows(scene, "/scene/applied/force", placement)
+        self._turn = Arrows(scene, "/scene/applied/turn", placement)
+        self._arc = Lines(scene, "/scene/applied/arc", placement, palette.TORQUE)
+        self._unit = placement.unit
+
+    def show(self, look: Look) -> None:
+        frame = look.frame
+        if not frame.bodies:
+            self.hide()
+            return
+        body, scale = frame.bodies[0], force_scale(frame, self._unit)
+        start = leave(body, frame.applied_force)
+        self._force.show(start[None], scale * frame.applied_force[None], palette.APPLIED_FORCE)
+        arc = torque_arc(body, scale * frame.applied_torque)
+        self._arc.show(path(arc) if len(arc) else ())
+        ends = arc[-2:-1], arc[-1:]
+        lengths = np.linalg.norm(ends[1] - ends[0], axis=1, keepdims=True)
+        self._turn.show(ends[1], HEAD_LENGTH * self._unit * (ends[1] - ends[0]) / lengths, palette.TORQUE)
+
+    def hide(self) -> None:
+        for part in (self._force, self._turn, self._arc):
+            part.hide()
+
+
+class Velocities:
+    """Arrows of velocities and angular velocities, from the surfaces of the bodies."""
+
+    def __init__(self, scene, placement: Placement):
+        self._arrows, self._unit = Arrows(scene, "/scene/velocities", placement), placement.unit
+
+    def show(self, look: Look) -> None:
+        bodies, unit = look.frame.bodies, self._unit
+        rates = np.concatenate([look.linvel, look.angvel])
+        starts = [leave(body, rate) for body, rate in zip(bodies * 2, rates)]
+        scales = np.repeat((0.5 * (unit / EARTH) ** 0.5, 0.5 * unit * (unit / EARTH) ** 0.5), len(bodies))
+        colours = np.repeat((VELOCITY, SPIN), len(bodies), axis=0)
+        self._arrows.show(np.reshape(starts, (-1, 3)), scales[:, None] * rates, colours)
+
+    def hide(self) -> None:
+        self._arrows.hide()
+
+
+class Axes:
+    """Axes of the bodies, from the centre of the shape: x red, y green, z blue."""
+
+    def __init__(self, scene, placement: Placement):
+        self._scene, self._placement, self._node, self._count = scene, placement, None, 0
+
+    def show(self, look: Look) -> None:
+        poses, scale = look.frame.poses, self._placement.scale
+        pos, sizes = self._placement.drawn(poses.pos), (AXIS * 2.0 * scale * np.asarray(look.radius)).astype(np.float32)
+        quat = np.array([body.quat for body in look.frame.bodies], dtype=np.float32).reshape(-1, 4)
+        if self._node is None or self._count != len(pos):
+            self._count = len(pos)
+            radius = (
+                AXIS_RADIUS * self._placement.unit / max(float(np.max(look.radius, initial=0.0)) * 2.0 * AXIS, 1e-9)
+            )
+            self._node = self._scene.add_batched_axes(
+                "/scene/axes", quat, pos, sizes, axes_length=1.0, axes_radius=radius
+            )
+        node = self._node
+        node.batched_positions, node.batched_wxyzs, node.batched_scales, node.visible = pos, quat, sizes, True
+
+    def hide(self) -> None:
+        if self._node is not None:
+            self._node.visible = False
+
+
+class Bounds:
+    """Spheres that hold the bodies."""
+
+    def __init__(self, scene, placement: Placement):
+        self._scene, self._placement, self._nodes, self._count = scene, placement, [], 0
+
+    def show(self, look: Look) -> None:
+        pos = self._placement.drawn(look.frame.poses.pos)
+        sizes = (self._placement.scale * np.asarray(look.radius)).astype(np.float32)
+        if len(pos) != self._count:
+            self._count, upright = len(pos), np.tile(np.eye(4, dtype=np.float32)[0], (len(pos), 1))
+            self._nodes = [
+                self._scene.add_batched_meshes_simple(
+                    f"/scene/bounds/{k}", part.vertices, part.faces, upright, pos, batched_scales=sizes, lod="off",
+                    batched_colors=BOUND, opacity=BOUND_OPACITY, cast_shadow=False, receive_shadow=False,
+                )
+                for k, part in enumerate(octants())
+            ]  # fmt: skip
+        for node in self._nodes:
+            node.batched_positions, node.batched_scales, node.visible = pos, sizes, True
+
+    def hide(self) -> None:
+        for node in self._nodes:
+            node.visible = False
+
+
+class Drag:
+    """Spring from a body to the mouse."""
+
+    def __init__(self, scene, placement: Placement):
+        self._lines, self._unit = Lines(scene, "/scene/drag", placement, DRAG), placement.unit
+
+    def show(self, look: Look) -> None:
+        self._lines.show(() if look.drag is None else spring(*look.drag, self._unit))
+
+    def hide(self) -> None:
+        self._lines.hide()
+
+
+class Ghost:
+    """The same bodies at the accuracy ``reference``, translucent."""
+
+    def __init__(self, scene, placement: Placement):
+        self._bodies = Bodies(scene, "/scene/ghost", placement, is_ghost=True)
+
+    def show(self, look: Look) -> None:
+        if look.ghost is None:
+            self.hide()
+        else:
+            self._bodies.show(look.ghost)
+
+    def hide(self) -> None:
+        self._bodies.clear()
+
+
+def force_scale(frame, unit: float) -> float:
+    """Length of a force's arrow [m/N]; `Frame.force_scale` is made for bodies of five metres."""
+    return frame.force_scale * min(1.0, unit / 5.0)
+
+
+def torque_arc(body, scaled) -> np.ndarray:
+    """Points (n, 3) [m] of an arc round a body and the axis of a torque; `scaled` (3,) is as long as the arc [m]."""
+    size = float(np.linalg.norm(scaled))
+    extent = float(body.dimensions.max()) * (1.0 if body.kind == "block" else 2.0)
+    radius = TORQUE_RADIUS * extent
+    sweep = min(size / radius, TORQUE_SWEEP) if np.isfinite(size) else 0.0
+    if sweep < 0.2:
+        return np.zeros((0, 3))
+    u, v = plane_axes(scaled / size)
+    angles = np.linspace(-0.5 * sweep, 0.5 * sweep, TORQUE_POINTS)
+    return body.pos + radius * (np.cos(angles)[:, None] * u + np.sin(angles)[:, None] * v)

@@ -1,0 +1,169 @@
+"""Panel of controls beside the picture: what the user does goes to the session, what the session does is shown."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from physics import PRESETS
+from rigid_env.viewer.event_list import EventList
+from rigid_env.viewer.plots import Plots
+from rigid_env.viewer.session import Session
+from rigid_env.viewer.stage import LAYERS, Stage
+
+SPEEDS = ("0.1", "0.25", "0.5", "1", "2", "4")
+SLIDERS = {"gravity": ("gravity [m/s²]", 0.0, 30.0, 0.01), "friction": ("friction", 0.0, 2.0, 0.01),
+           "restitution": ("restitution", 0.0, 1.0, 0.01)}  # fmt: skip
+ROOM = "the room"
+"""What the camera follows where it follows no body."""
+
+KICK = 1.0
+"""Change of a body's speed by a kick at first [m/s]."""
+
+
+class Panel:
+    """Controls of a viewer.
+
+    Parameters
+    ----------
+    gui : viser.GuiApi
+    session : Session
+    stage : Stage
+    post : callable
+        Takes what is to be done in the thread of the session: callbacks come in threads of the server.
+    """
+
+    def __init__(self, gui, session: Session, stage: Stage, post: Callable[[Callable[[], Any]], None]):
+        self._gui, self._session, self._stage, self._post = gui, session, stage, post
+        self._status = gui.add_markdown("")
+        self._is_telling = False
+        with gui.add_folder("Time"):
+            self._time_controls()
+        if any((session.can.gravity, session.can.friction, session.can.restitution, session.can.accuracy)):
+            with gui.add_folder("Physics"):
+                self._physics_controls()
+        if session.can.drag:
+            with gui.add_folder("Hand"):
+                self._hand_controls()
+        with gui.add_folder("Show", expand_by_default=False):
+            self._layer_controls()
+        with gui.add_folder("Plots", expand_by_default=False):
+            self._plots = Plots(gui)
+        with gui.add_folder("Events", expand_by_default=False):
+            self._events = EventList(gui, lambda time: post(lambda: session.seek(time)))
+
+    @property
+    def kick_speed(self) -> float:
+        """Change of a body's speed by a click on it [m/s]; 0: a click does nothing."""
+        return self._kick.value if self._session.can.drag and self._kicks.value else 0.0
+
+    def show(self) -> None:
+        """Bring numbers and texts up to date, with what compiles, and where the time is."""
+        session = self._session
+        text = self._cost_text()
+        self._put(self._status, "content", "  \n".join(filter(None, (session.message, text))) or "ready")
+        first, last = session.span
+        self._is_telling = True  # a slider that is set here calls back, too
+        try:
+            self._put(self._slider, "max", max(last, first + 1e-3))
+            self._put(self._slider, "min", first)
+            self._put(self._slider, "value", min(max(session.time, first), last))
+            self._put(self._play, "label", "Pause" if session.is_playing else "Play")
+            for name, slider in self._sliders.items():
+                self._put(slider, "value", session.settings[name])
+            if self._accuracy is not None and not session.is_compiling:
+                self._put(self._accuracy, "value", session.accuracy)
+        finally:
+            self._is_telling = False
+        self._plots.show(session.samples)
+        self._events.show(session.events)
+
+    @staticmethod
+    def _put(handle, name: str, value) -> None:
+        """Set a property where it differs: every change is sent."""
+        if getattr(handle, name) != value:
+            setattr(handle, name, value)
+
+    # --- groups of controls --------------------------------------------------------------------------------------
+
+    def _time_controls(self) -> None:
+        gui, session = self._gui, self._session
+        self._play = self._button("Play", lambda: session.pause() if session.is_playing else session.play())
+        self._button("Step", self._step)
+        self._slider = gui.add_slider("time [s]", 0.0, 1e-3, 1e-3, 0.0)
+        self._when(self._slider, session.seek)
+        speed = gui.add_dropdown("speed", SPEEDS, initial_value="1")
+        self._when(speed, lambda value: setattr(session, "speed", float(value)))
+        seed = None
+        if session.can.seed:
+            seed = gui.add_number("seed", session.seed, min=0, max=2**32 - 1, step=1)
+        self._button("Reset", lambda: session.reset(None if seed is None else int(seed.value)))
+        bodies = [f"body {k}" for k in range(len(session.look().frame.bodies))]
+        follow = gui.add_dropdown("follow", (ROOM, *bodies), initial_value=ROOM)
+        self._when(follow, lambda value: self._stage.follow(None if value == ROOM else bodies.index(value)))
+
+    def _step(self) -> None:
+        self._session.pause()
+        self._session.step()
+
+    def _physics_controls(self) -> None:
+        gui, session = self._gui, self._session
+        self._sliders = {}
+        for name, value in session.settings.items():
+            label, low, high, step = SLIDERS[name]
+            self._sliders[name] = gui.add_slider(label, low, max(high, value), step, value)
+            self._when(self._sliders[name], getattr(session, f"set_{name}"))
+        if session.can.accuracy:
+            options = list(dict.fromkeys((*PRESETS, session.accuracy)))
+            self._accuracy = gui.add_dropdown("accuracy", options, initial_value=session.accuracy)
+            self._when(self._accuracy, session.set_accuracy)
+        if session.can.ghost:
+            self._when(gui.add_checkbox("ghost at reference", False), session.set_ghost)
+
+    def _hand_controls(self) -> None:
+        self._kicks = self._gui.add_checkbox("a click kicks", True, hint="A body, along the line of sight")
+        self._kick = self._gui.add_slider("kick [m/s]", 0.1, 10.0, 0.1, KICK)
+        self._gui.add_markdown("Drag a body with the left button: a spring pulls it.")
+
+    def _layer_controls(self) -> None:
+        for name in LAYERS:
+            box = self._gui.add_checkbox(name, self._stage.has_layer(name))
+            self._when(box, lambda value, name=name: self._stage.set_layer(name, value))
+
+    _sliders: dict[str, Any] = {}  # noqa: RUF012 - of subjects without controls
+    _accuracy = None
+
+    # --- callbacks -------------------------------------------------------------------------------------------------
+
+    def _button(self, label: str, act: Callable[[], Any]):
+        button = self._gui.add_button(label)
+        button.on_click(lambda _: self._post(act))
+        return button
+
+    def _when(self, handle, act: Callable[[Any], Any]) -> None:
+        """Do something with the new value of a control that the user has changed."""
+
+        @handle.on_update
+        def _(event) -> None:
+            if event.client is not None:  # not the panel itself
+                value = handle.value
+                self._post(lambda: act(value))
+
+    def _cost_text(self) -> str:
+        """Tell what accuracy costs, in a line or two."""
+        samples, session = self._session.samples, self._session
+        if not len(samples) or not session.accuracy:
+            return ""
+        lines = [f"{session.accuracy}: {_microseconds(samples.cost[-1])}"]
+        if session.ghost_label:
+            lines.append(f"{session.ghost_label}: {_microseconds(samples.cost_of_reference[-1])}")
+            lines.append(f"distance {_number(samples.error[-1])} m")
+        return "  \n".join(lines)
+
+
+def _microseconds(cost: float) -> str:
+    return f"{cost:,.0f} µs per simulated second" if cost == cost else "not measured yet"
+
+
+def _number(value: float) -> str:
+    return f"{value:.2g}" if value == value else "-"

@@ -1,0 +1,140 @@
+"""Scenery that does not move: light, background, floor and walls of finite size."""
+
+from __future__ import annotations
+
+from math import atan2, log10
+
+import numpy as np
+
+from rigid_env.rendering import palette
+from rigid_env.rendering.layout import is_floor
+from rigid_env.viewer.placement import Placement
+
+SUN, SKY = 1.9, 1.1
+"""Strengths of the lamp and of the light from all sides."""
+
+SKY_COLOUR, GROUND_COLOUR = (255, 255, 255), (196, 204, 218)
+
+WALL_OPACITY, OUTLINE_WIDTH = 0.5, 0.012
+"""The latter in drawn units."""
+
+CELLS = 5
+"""Lines of the floor from one strong line to the next."""
+
+FLOOR_SHADOW = 0.3
+FADE_STRENGTH = 0.6
+
+
+SHADE, SHADE_DISTANCE, SHADE_REACH = 0.02, 40.0, 9.0
+"""Of the lamp that casts shadows: its strength, distance and the radius that it lights [drawn units]."""
+
+
+def light(scene) -> None:
+    """Light the scene as `rendering.palette` does: from the sun and the sky, with shadows on floor and walls.
+
+    Shadows come from one weak spot. viser's shadows of a light from afar take three maps of the scene, each as large
+    as the spot's: drawn without a GPU, a picture takes ten times as long.
+    """
+    scene.configure_default_lights(enabled=False)
+    scene.configure_environment_map(None)
+    sun, towards = tuple((SHADE_DISTANCE * palette.LIGHT).tolist()), tuple((-palette.LIGHT).tolist())
+    scene.add_light_directional("/light/sun", intensity=SUN, position=sun)
+    scene.add_light_spot(
+        "/light/shade", intensity=SHADE, cast_shadow=True, decay=0.0, angle=atan2(SHADE_REACH, SHADE_DISTANCE),
+        position=sun, direction=towards,
+    )  # fmt: skip
+    scene.add_light_hemisphere(
+        "/light/sky", sky_color=SKY_COLOUR, ground_color=GROUND_COLOUR, intensity=SKY, position=(0.0, 1.0, 0.0)
+    )
+
+
+def paint_background(scene) -> None:
+    """Paint the background of `rendering.palette`, lighter above."""
+    down = np.linspace(0.0, 1.0, 64)[:, None, None]
+    top, bottom = np.array(palette.BACKGROUND_TOP), np.array(palette.BACKGROUND_BOTTOM)
+    scene.set_background_image(np.rint(top + down * (bottom - top)).astype(np.uint8), format="png")
+
+
+def add_walls(scene, root: str, placement: Placement) -> list:
+    """Add the walls of a placement's room.
+
+    A floor is a grid that fades out and carries shadows. Other walls are translucent from inside and an outline from
+    outside, so that none hides the bodies.
+
+    Returns
+    -------
+    list of viser scene nodes
+    """
+    nodes = []
+    for index, wall in enumerate(placement.room.walls):
+        corners = placement.drawn(placement.room.wall_polygons[index])
+        if len(corners) < 3:
+            continue
+        name = f"{root}/{index}"
+        if is_floor(wall) and _is_rectangle(corners, wall.normal):
+            nodes.append(_add_floor(scene, name, corners, wall.normal, placement))
+        else:
+            nodes += _add_pane(scene, name, corners, is_floor(wall))
+    return nodes
+
+
+def _add_floor(scene, name, corners, normal, placement: Placement):
+    axes = np.stack(_axes(normal), axis=1)
+    flat = corners @ axes
+    middle = 0.5 * (corners.min(axis=0) + corners.max(axis=0))
+    width, _, height = flat.max(axis=0) - flat.min(axis=0)
+    cell = 10.0 ** round(log10(placement.unit / 3.0)) * placement.scale
+    reach = float(np.linalg.norm(corners, axis=1).max())
+    return scene.add_grid(
+        name, float(width), float(height), plane="xz", cell_size=cell, section_size=CELLS * cell,
+        cell_color=palette.mix(palette.GRID, palette.FLOOR, 0.6), section_color=palette.GRID,
+        plane_color=palette.FLOOR, plane_opacity=1.0, shadow_opacity=FLOOR_SHADOW, fade_from="origin",
+        fade_distance=1.02 * reach, fade_strength=FADE_STRENGTH, wxyz=_turn_to(axes), position=middle,
+    )  # fmt: skip
+
+
+def turn_to_normal(normal) -> np.ndarray:
+    """Unit quaternion (4,), scalar first, of the rotation that takes y to a normal (3,), and x near the world's."""
+    return _turn_to(np.stack(_axes(np.asarray(normal)), axis=1))
+
+
+def _add_pane(scene, name, corners, is_floor: bool) -> list:
+    fan = np.array([(0, k, k + 1) for k in range(1, len(corners) - 1)], dtype=np.uint32)
+    pane = scene.add_mesh_simple(
+        name, corners, fan, color=palette.FLOOR if is_floor else palette.WALL, flat_shading=True, cast_shadow=False,
+        opacity=None if is_floor else WALL_OPACITY, side="double" if is_floor else "front", receive_shadow=FLOOR_SHADOW,
+    )  # fmt: skip
+    sides = np.stack([corners, np.roll(corners, -1, axis=0)], axis=1)
+    return [
+        pane, scene.add_line_segments(f"{name}/outline", sides, palette.WALL_OUTLINE, thickness=OUTLINE_WIDTH)
+    ]  # fmt: skip
+
+
+def _axes(normal):
+    """Axes of a floor's plane and its normal between them, x, y and z of the grid: along the world's where they can."""
+    x = np.array((1.0, 0.0, 0.0)) - normal[0] * normal
+    x /= np.linalg.norm(x)
+    return x, normal, np.cross(x, normal)
+
+
+def _is_rectangle(corners, normal) -> bool:
+    x, _, z = np.stack(_axes(normal), axis=0) @ corners.T.astype(float)
+    box = (x.max() - x.min()) * (z.max() - z.min())
+    area = 0.5 * abs(np.sum(x * np.roll(z, -1) - z * np.roll(x, -1)))
+    return area > (1.0 - 1e-3) * box
+
+
+def _turn_to(axes) -> np.ndarray:
+    """Unit quaternion (4,), scalar first, of the rotation with these columns.
+
+    The eigenvector of the largest eigenvalue: Bar-Itzhack, *New method for extracting the quaternion from a rotation
+    matrix*, JGCD 23, 2000.
+    """
+    K = np.array([
+        [axes[0, 0] - axes[1, 1] - axes[2, 2], 0, 0, 0],
+        [axes[0, 1] + axes[1, 0], axes[1, 1] - axes[0, 0] - axes[2, 2], 0, 0],
+        [axes[0, 2] + axes[2, 0], axes[1, 2] + axes[2, 1], axes[2, 2] - axes[0, 0] - axes[1, 1], 0],
+        [axes[2, 1] - axes[1, 2], axes[0, 2] - axes[2, 0], axes[1, 0] - axes[0, 1], np.trace(axes)],
+    ])  # fmt: skip
+    x, y, z, w = np.linalg.eigh(K)[1][:, -1]
+    return np.array((w, x, y, z))

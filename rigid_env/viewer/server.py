@@ -1,0 +1,162 @@
+"""Viewer: a session in a browser, in real time."""
+
+from __future__ import annotations
+
+import queue
+import time
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from physics import validation
+from physics.kernels.state import layout as at
+from rigid_env.viewer.panel import Panel
+from rigid_env.viewer.servers import LOOPBACK, start_server, stop_server
+from rigid_env.viewer.session import Session
+from rigid_env.viewer.stage import Stage
+
+FPS = 60.0
+"""Pictures a second at most [1/s]."""
+
+TEXTS = 5.0
+"""Times a second at which numbers, plots and lists are brought up to date [1/s]."""
+
+PORT = 8080
+
+
+class Viewer:
+    """A session in a browser: server, picture and panel.
+
+    Parameters
+    ----------
+    session : Session
+    host : str
+        Address to serve on. The loopback address by default: nobody else reaches it.
+    port : int
+        Port to serve on; where it is taken, the next one that is free.
+
+    Attributes
+    ----------
+    address : str
+        Where it is served.
+
+    Raises
+    ------
+    ValueError
+        On a port that is none.
+    gymnasium.error.DependencyNotInstalled
+        If viser is missing.
+    OSError
+        If `host` is no address of this machine.
+    """
+
+    def __init__(self, session: Session, host: str = LOOPBACK, port: int = PORT):
+        port = validation.count(port, "port", most=65_535)
+        self._session = session
+        self._inbox: queue.SimpleQueue[Callable[[], Any]] = queue.SimpleQueue()
+        self._server = start_server(host, port, f"rigid-env: {session.subject.name}")
+        self._server.gui.configure_theme(show_logo=False, show_share_button=False)
+        self._server.gui.main_panel.dock_right()
+        self._stage = Stage(self._server, fields=getattr(session.subject, "scene", None))
+        self._stage.show(session.look())
+        self._panel = Panel(self._server.gui, session, self._stage, self._inbox.put)
+        if session.can.drag:
+            self._stage.on_drag(self._dragged)
+            self._stage.on_click(self._clicked)
+        self._is_running, self._note = False, ""
+        self._drawn: float | None = None
+        self.address = f"http://{_shown_host(host)}:{self._server.get_port()}"
+
+    def run(self) -> None:
+        """Serve until `stop`, or Ctrl-C."""
+        self._is_running = True
+        before = texts = time.perf_counter()
+        try:
+            while self._is_running:
+                now = time.perf_counter()
+                is_new = self.turn(now - before)
+                if now >= texts and self._server.get_clients():
+                    self._panel.show()
+                    texts = now + 1.0 / TEXTS
+                before = now
+                self._rest(now, is_new)
+        except KeyboardInterrupt:
+            pass
+        finally:
+            self.close()
+
+    def turn(self, seconds: float) -> bool:
+        """Do what users want, let time go on by `seconds` [s], and draw; whether there was something to draw."""
+        is_new = self._answer()
+        is_new = self._session.advance(seconds) > 0 or is_new
+        look_time = self._session.time
+        if (is_new or look_time != self._drawn) and self._server.get_clients():
+            self._stage.show(self._session.look())
+            self._drawn = look_time
+        return is_new
+
+    def stop(self) -> None:
+        """Let `run` end; from any thread."""
+        self._is_running = False
+
+    def close(self) -> None:
+        """End the server."""
+        self._is_running = False
+        stop_server(self._server)
+
+    def _rest(self, since: float, is_new: bool) -> None:
+        """Wait for the next picture, or for the user."""
+        left = since + 1.0 / FPS - time.perf_counter()
+        if left > 0.0:
+            time.sleep(left)
+
+    def _answer(self) -> bool:
+        """Do what was posted; a mistake is told in the panel. Whether there was anything."""
+        is_any = False
+        while True:
+            try:
+                act = self._inbox.get_nowait()
+            except queue.Empty:
+                return is_any
+            is_any = True
+            try:
+                act()
+            except ValueError as error:
+                self._tell(str(error))
+
+    def _tell(self, text: str) -> None:
+        for client in self._server.get_clients().values():
+            client.add_notification(title="rigid-env", body=text)
+
+    # --- the user's hand -------------------------------------------------------------------------------------------
+
+    def _dragged(self, phase: str, body: int, point: np.ndarray, target: np.ndarray) -> None:
+        session = self._session
+        if phase == "end":
+            self._inbox.put(session.release)
+        else:
+            self._inbox.put(lambda: session.drag(body, point, target))
+
+    def _clicked(self, body: int, _point: np.ndarray, direction: np.ndarray) -> None:
+        session, speed = self._session, self._panel.kick_speed
+        if speed > 0.0:
+            self._inbox.put(lambda: session.kick(body, speed * _mass(session, body) * direction))
+
+
+def _mass(session: Session, body: int) -> float:
+    """[kg]."""
+    return float(1.0 / session.subject.world.params[body, at.INV_MASS])
+
+
+def _shown_host(host: str) -> str:
+    return "localhost" if host in (LOOPBACK, "localhost", "::1") else host
+
+
+def directions(viewer: Viewer, host: str) -> list[str]:
+    """Lines that say where the viewer is, and how to reach it from another machine."""
+    port = viewer.address.rsplit(":", 1)[1]
+    lines = [f"viewer      {viewer.address}"]
+    if host == LOOPBACK:
+        lines.append(f"over SSH    ssh -L {port}:localhost:{port} THIS_MACHINE, then open http://localhost:{port}")
+    return lines

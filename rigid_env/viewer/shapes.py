@@ -1,0 +1,117 @@
+"""Triangles of bodies: solids of unit size, bright rims along their edges, and octants of two shades."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+
+from rigid_env.rendering import BodyView
+from rigid_env.rendering.bodies import EDGE_LIGHTENING
+from rigid_env.rendering.meshes import BLOCK_FACES, Mesh, block_mesh, ellipsoid_mesh, hull_mesh
+from rigid_env.rendering.solids import OCTANT_LIGHTENING
+
+SUBDIVISIONS = 10
+"""Of a round body's octants."""
+
+RIM_SHARE = 0.035
+"""Width of a rim: part of the way from a corner of a face to its middle."""
+
+RIM_LIFT = 1.002
+"""Size of a rim relative to its body, so that it lies on top."""
+
+
+@dataclass(frozen=True, eq=False)
+class Part:
+    """Triangles of one colour.
+
+    Parameters
+    ----------
+    vertices : (v, 3) float32
+        Body frame; of a hull [m], of the others to be stretched by the dimensions.
+    faces : (f, 3) uint32
+        Counter-clockwise as seen from outside.
+    lightening : float
+        Part of the way from the body's colour to white.
+    is_flat : bool
+        Whether faces are flat, or stand for a round surface.
+    is_rim : bool
+        Whether it is drawn on another part, and casts no shadow.
+    """
+
+    vertices: np.ndarray
+    faces: np.ndarray
+    lightening: float = 0.0
+    is_flat: bool = True
+    is_rim: bool = False
+
+
+def shape_key(body: BodyView):
+    """Hashable: bodies of equal keys have the same parts."""
+    if body.kind == "hull":
+        return body.corners.tobytes(), body.faces
+    return "block" if body.kind == "block" else "round"
+
+
+@lru_cache(maxsize=256)
+def parts(key) -> tuple[Part, ...]:
+    """Parts of the bodies with a `shape_key`."""
+    if key == "block":
+        mesh = block_mesh((1.0, 1.0, 1.0))
+        return solid(mesh), rim(mesh.vertices, BLOCK_FACES.tolist())
+    if key == "round":
+        return octants()
+    corners, polygons = np.frombuffer(key[0]).reshape(-1, 3), key[1]
+    return solid(hull_mesh(tuple(map(tuple, corners.tolist())), polygons)), rim(corners, polygons)
+
+
+def solid(mesh: Mesh) -> Part:
+    """All of a polyhedron."""
+    return Part(mesh.vertices.astype(np.float32), _triangles(mesh.faces))
+
+
+def octants() -> tuple[Part, Part]:
+    """The octants of a sphere of radius 1, every second one lighter: its rotation can be seen."""
+    mesh = ellipsoid_mesh((1.0, 1.0, 1.0), SUBDIVISIONS)
+    sides = []
+    for is_odd in (False, True):
+        used, faces = np.unique(mesh.faces[mesh.is_odd_octant == is_odd], return_inverse=True)
+        vertices = mesh.vertices[used].astype(np.float32)
+        lightening = OCTANT_LIGHTENING if is_odd else 0.0
+        sides.append(Part(vertices, faces.reshape(-1, 3).astype(np.uint32), lightening, is_flat=False))
+    return tuple(sides)
+
+
+def rim(corners, polygons: Sequence[Sequence[int]], share: float = RIM_SHARE, lift: float = RIM_LIFT) -> Part:
+    """Ring along the edges of each face of a convex polyhedron that holds the origin.
+
+    Parameters
+    ----------
+    corners : (n, 3) float
+    polygons : sequence of sequences of int
+        Corners of the faces, counter-clockwise.
+    share : float
+        Width of the ring: part of the way from the corners to their mean.
+    lift : float
+        Factor by which all corners are moved away from the origin.
+    """
+    vertices, faces = [], []
+    for polygon in polygons:
+        outer = lift * np.asarray(corners)[list(polygon)]
+        inner = outer + share * (outer.mean(axis=0) - outer)
+        first, count = sum(map(len, vertices)), len(polygon)
+        vertices += [outer, inner]
+        for i in range(count):
+            j = (i + 1) % count
+            a, b, c, d = first + i, first + j, first + count + j, first + count + i
+            faces += [(a, b, c), (a, c, d)]
+    return Part(
+        np.concatenate(vertices).astype(np.float32), np.array(faces, dtype=np.uint32), EDGE_LIGHTENING, is_rim=True
+    )
+
+
+def _triangles(faces: np.ndarray) -> np.ndarray:
+    """Faces (m, k) as triangles, (m (k - 2), 3) uint32."""
+    return np.concatenate([faces[:, [0, k, k + 1]] for k in range(1, faces.shape[1] - 1)]).astype(np.uint32)

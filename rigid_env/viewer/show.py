@@ -1,0 +1,112 @@
+"""Show anything that can be played: in a notebook as a page within it, elsewhere in a browser."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+from physics import validation
+from rigid_env.viewer.look import Look
+from rigid_env.viewer.session import Session
+from rigid_env.viewer.subject import open_subject
+
+DURATION, FRAMES = 10.0, 30.0
+"""Of an exported run [s], [1/s]."""
+
+
+def looks(session: Session, duration: float) -> Iterator[Look]:
+    """Looks of a session from now on, one after each step, up to `duration` [s] later, or its end."""
+    session.wait()
+    start = session.time
+    yield session.look()
+    while session.time < start + duration and session.step():
+        yield session.look()
+
+
+def to_html(x: Any, path: str | Path, *, duration: float = DURATION, fps: float = FRAMES, **settings: Any) -> Path:
+    """Play something, and write it as one HTML file with a time line, which opens without a network.
+
+    Parameters
+    ----------
+    x : object
+        A `physics.Scene`, `World`, `Trajectory` or `Recording`, an environment, the name of a canonical scene, an
+        environment's id, or the path of a file; as of `rigid_env.viewer.subject.open_subject`.
+    path : str or Path
+        Of the file.
+    duration : float
+        Simulated time at most [s].
+    fps : float
+        Pictures a second at most [1/s].
+    **settings
+        ``accuracy``, ``dt``, ``seed``, ``policy``, ``controller`` of `open_subject`; ``layers`` and ``title`` of
+        `rigid_env.viewer.export.to_html`.
+
+    Returns
+    -------
+    Path
+        The file.
+
+    Raises
+    ------
+    ValueError
+        Something that cannot be played, or an argument out of range.
+    gymnasium.error.DependencyNotInstalled
+        If viser is missing.
+    """
+    from rigid_env.viewer import export
+
+    duration = float(validation.positive(duration, (), "duration"))
+    of_page = {name: settings.pop(name) for name in ("layers", "title") if name in settings}
+    session = Session(open_subject(x, **settings))
+    of_page.setdefault("title", session.subject.name)
+    scene = getattr(session.subject, "scene", None)
+    return export.to_html(looks(session, duration), path, scene=scene, duration=duration, fps=fps, **of_page)
+
+
+def show(
+    x: Any, *, host: str = "127.0.0.1", port: int = 8080, block: bool = True, duration: float = DURATION, **settings
+) -> Any:
+    """Show something: in a notebook as a page with a time line, elsewhere in a viewer that the browser opens.
+
+    Parameters
+    ----------
+    x : object
+        As of `to_html`. A world or an environment is copied, and stays as it is.
+    host, port : str, int
+        Where the viewer is served; of no use in a notebook.
+    block : bool
+        Serve until Ctrl-C. False: in a thread, and the viewer is returned; its `stop` ends it.
+    duration : float
+        In a notebook: simulated time [s].
+    **settings
+        ``accuracy``, ``dt``, ``seed``, ``policy``, ``controller``.
+
+    Returns
+    -------
+    object
+        In a notebook what displays the page; else the `Viewer`.
+
+    Raises
+    ------
+    ValueError
+        Something that cannot be played, or an argument out of range.
+    gymnasium.error.DependencyNotInstalled
+        If viser is missing.
+    """
+    from rigid_env.viewer import export, notebook
+    from rigid_env.viewer.server import Viewer, directions
+
+    session = Session(open_subject(x, **settings))
+    if notebook.in_notebook():
+        scene = getattr(session.subject, "scene", None)
+        return notebook.Embedded(export.html_of(looks(session, duration), scene=scene, duration=duration))
+    viewer = Viewer(session, host, port)
+    session.play()
+    print("\n".join(directions(viewer, host)), flush=True)
+    if block:
+        viewer.run()
+    else:
+        threading.Thread(target=viewer.run, name="viewer", daemon=True).start()
+    return viewer

@@ -1,0 +1,208 @@
+"""Stage: looks drawn with viser, in layers that are switched by name, and bodies that can be picked."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from physics import Scene, validation
+from rigid_env.viewer import layers, scenery
+from rigid_env.viewer.bodies import Bodies
+from rigid_env.viewer.fields import Fields
+from rigid_env.viewer.goal import Goal
+from rigid_env.viewer.look import Look
+from rigid_env.viewer.picking import body_point, hit
+from rigid_env.viewer.placement import Placement, place
+
+LAYERS = {
+    "walls": True, "contacts": True, "forces": True, "applied": True, "velocities": False, "axes": False,
+    "bounds": False, "sleeping": True, "goal": True, "fields": True, "drag": True, "ghost": True,
+}  # fmt: skip
+"""Names of all layers, and whether they are shown at first."""
+
+
+class Stage:
+    """Draw looks into the scene of a viser server, whoever is connected.
+
+    Used from one thread. `show` sends only what has changed.
+
+    Parameters
+    ----------
+    server : viser.ViserServer
+    fields : physics.Scene, optional
+        Its wind, fluids and springs are drawn.
+    bounds : pair of (3,) float, optional
+        Lower and upper corner of a box to be in sight from the start [m].
+    """
+
+    def __init__(self, server, fields: Scene | None = None, bounds=None):
+        self._server, self._scene = server, server.scene
+        self._fields, self._bounds = fields, bounds
+        self._is_on = dict(LAYERS)
+        self._on_drag: Callable | None = None
+        self._on_click: Callable | None = None
+        self._grip: tuple[int, np.ndarray] | None = None
+        self._followed: int | None = None
+        self._look: Look | None = None
+        self._walls = None
+        self.placement: Placement | None = None
+        server.scene.set_up_direction("+y")
+        scenery.light(self._scene)
+        scenery.paint_background(self._scene)
+
+    def show(self, look: Look) -> None:
+        """Draw a `Look`. With other walls than before the room is made anew, and the camera stays."""
+        with self._server.atomic():
+            if self._needs_room(look):
+                self._make_room(look)
+            self._look = look
+            self._center(look)
+            self._bodies.show(look.frame, look.is_asleep if self._is_on["sleeping"] else None)
+            for name, layer in self._layers.items():
+                if self._is_on[name]:
+                    layer.show(look)
+        self._server.flush()
+
+    def set_layer(self, name: str, is_on: bool) -> None:
+        """Switch a layer of `LAYERS`.
+
+        Raises
+        ------
+        ValueError
+            On a name that is none of `LAYERS`.
+        """
+        self._is_on[validation.one_of(name, LAYERS, "layer")] = bool(is_on)
+        if self._look is None:
+            return
+        if not is_on and name in self._layers:
+            with self._server.atomic():
+                self._layers[name].hide()
+            self._server.flush()
+        self.show(self._look)
+
+    def has_layer(self, name: str) -> bool:
+        """True if a layer of `LAYERS` is switched on; a ValueError as of `set_layer`."""
+        return self._is_on[validation.one_of(name, LAYERS, "layer")]
+
+    def follow(self, body: int | None) -> None:
+        """Keep a body where it is in the picture, from now on; None keeps the room.
+
+        Raises
+        ------
+        ValueError
+            On an index that is not of a body in the last look.
+        """
+        if body is not None:
+            body = validation.index(body, 0 if self._look is None else len(self._look.frame.bodies), "body")
+        self._followed = body
+        if self._look is not None:
+            self.show(self._look)
+
+    def on_drag(self, callback: Callable[[str, int, np.ndarray, np.ndarray], None]) -> None:
+        """Have drags of bodies by the left button reported; camera moves start beside the bodies.
+
+        Parameters
+        ----------
+        callback : callable
+            ``(phase, body, point_body, target)``: "start", "update" or "end"; index of the body; the point that was
+            grabbed, in the body's frame from `BodyView.pos` [m]; where the mouse is, at the depth of the point, world
+            frame [m]. Called in the thread of the server: keep it short.
+        """
+        self._on_drag = callback
+
+    def on_click(self, callback: Callable[[int, np.ndarray, np.ndarray], None]) -> None:
+        """Have clicks on bodies reported.
+
+        Parameters
+        ----------
+        callback : callable
+            ``(body, point, direction)``: index of the body; the point of its surface, world frame [m]; unit vector of
+            the line of sight. Called in the thread of the server: keep it short.
+        """
+        self._on_click = callback
+
+    # --- room ----------------------------------------------------------------------------------------------
+
+    def _needs_room(self, look: Look) -> bool:
+        return self._walls != _walls_of(look)
+
+    def _make_room(self, look: Look) -> None:
+        is_first = self.placement is None
+        if not is_first:
+            self._scene.remove_by_name("/scene")
+        self.placement = placement = place(look, self._bounds)
+        self._walls, self._followed = _walls_of(look), None
+        self._root = self._scene.add_frame("/scene", show_axes=False)
+        self._bodies = Bodies(self._scene, "/scene/bodies", placement, added=self._watch)
+        kinds = {
+            "walls": layers.Walls, "contacts": layers.Contacts, "forces": layers.Forces, "applied": layers.Applied,
+            "velocities": layers.Velocities, "axes": layers.Axes, "bounds": layers.Bounds, "goal": Goal,
+            "drag": layers.Drag, "ghost": layers.Ghost,
+        }  # fmt: skip
+        self._layers: dict[str, layers.Layer] = {name: kind(self._scene, placement) for name, kind in kinds.items()}
+        self._layers["fields"] = Fields(self._scene, placement, self._fields)
+        for name, layer in self._layers.items():
+            if not self._is_on[name]:
+                layer.hide()
+        if is_first:
+            self._aim()
+
+    def _aim(self) -> None:
+        camera, place_ = self._server.initial_camera, self.placement
+        camera.fov = float(np.radians(place_.camera.fov_y))
+        camera.look_at = place_.drawn(place_.camera.target).astype(float)
+        camera.position = place_.drawn(place_.camera.eye).astype(float)
+        camera.up = (0.0, 1.0, 0.0)
+
+    def _center(self, look: Look) -> None:
+        """Move the whole scene so that the followed body stays in the middle of its room."""
+        shift = np.zeros(3)
+        if self._followed is not None and self._followed < len(look.frame.bodies):
+            shift = -self.placement.drawn(look.frame.bodies[self._followed].pos)
+            shift[1] = 0.0
+        self._root.position = shift
+
+    # --- picking -------------------------------------------------------------------------------------------
+
+    def _watch(self, node, members: np.ndarray) -> None:
+        """Report drags and clicks of the bodies in a new node."""
+
+        async def dragged(event) -> None:
+            self._drag(event.phase, int(members[event.instance_index or 0]), event)
+
+        async def clicked(event) -> None:
+            self._click(int(members[event.instance_index or 0]), event)
+
+        node.on_drag("left")(dragged)
+        node.on_click(clicked)
+
+    def _drag(self, phase: str, body: int, event) -> None:
+        look = self._look
+        if self._on_drag is None or look is None or body >= len(look.frame.bodies):
+            return
+        if phase == "start" or self._grip is None or self._grip[0] != body:
+            start = self._world(event.start_position)
+            self._grip = body, body_point(look.frame.bodies[body], start)
+        self._on_drag(phase, body, self._grip[1], self._world(event.end_position))
+        if phase == "end":
+            self._grip = None
+
+    def _click(self, body: int, event) -> None:
+        look = self._look
+        if self._on_click is None or look is None or body >= len(look.frame.bodies):
+            return
+        direction = np.asarray(event.ray_direction, dtype=float)
+        direction /= np.linalg.norm(direction)
+        point = hit(look.frame.bodies[body], self._world(event.ray_origin), direction)
+        if point is not None:
+            self._on_click(body, point, direction)
+
+    def _world(self, point) -> np.ndarray:
+        """Point (3,) of viser's world in that of the scene [m]."""
+        return self.placement.world(np.asarray(point, dtype=float) - self._root.position)
+
+
+def _walls_of(look: Look):
+    """Hashable: looks with equal ones share a room."""
+    return tuple((*wall.normal.tolist(), wall.offset) for wall in look.frame.walls)

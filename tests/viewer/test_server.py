@@ -1,0 +1,193 @@
+"""The viewer without a browser: its server, its panel, plots and lists, and the command."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from typer.testing import CliRunner
+
+pytest.importorskip("viser")
+
+import rigid_env
+from physics import Event, World, scenes
+from rigid_env.cli import app
+from rigid_env.viewer import session as session_module
+from rigid_env.viewer.event_list import ROWS, EventList, told
+from rigid_env.viewer.plots import SMALLEST, line, thinned
+from rigid_env.viewer.server import Viewer, directions
+from rigid_env.viewer.session import Session
+from rigid_env.viewer.subject import open_subject
+
+NO_WALL = -1
+
+
+def event(t: float, kind: str = "impact", wall: int = 0, other: int = -1) -> Event:
+    return Event(t, kind, 0, wall, (0.0, 0.0, 0.0), other, (0.0, 0.0, 0.0), (0.0, 1.0, 0.0))
+
+
+@pytest.fixture(scope="module")
+def viewer():
+    session = Session(open_subject("drop", accuracy="fast"))
+    viewer = Viewer(session, port=8450)
+    session.wait()
+    yield viewer
+    viewer.close()
+
+
+@pytest.fixture(autouse=True)
+def patience(monkeypatch):
+    """No step is left out where other programs have the processors."""
+    monkeypatch.setattr(session_module, "BUDGET", 1e6)
+
+
+def turns(viewer: Viewer, count: int) -> None:
+    for _ in range(count):
+        viewer.turn(0.02)
+
+
+def test_time_goes_on_as_real_time_does_and_no_step_is_late(viewer):
+    session = viewer._session
+    session.reset()
+    session.play()
+    turns(viewer, 50)
+    # Each turn owes 20 ms, two steps of 10 ms; after the last one less than a step is owed.
+    assert session.time == pytest.approx(1.0, abs=0.01 + 1e-9)
+    session.pause()
+    turns(viewer, 5)
+    assert session.time == pytest.approx(1.0, abs=0.01 + 1e-9)
+
+
+def test_what_is_posted_is_done_in_the_next_turn_and_a_mistake_changes_nothing(viewer):
+    session = viewer._session
+    session.reset()
+    viewer._inbox.put(lambda: session.set_friction(0.9))
+    viewer._inbox.put(lambda: session.set_friction(-1.0))  # a ValueError: told in the panel
+    viewer.turn(0.0)
+    assert session.settings["friction"] == 0.9
+
+
+def test_the_panel_follows_the_session(viewer):
+    session, panel = viewer._session, viewer._panel
+    session.reset()
+    session.play()
+    turns(viewer, 120)
+    panel.show()
+    assert panel._play.label == "Pause"
+    assert panel._slider.value == pytest.approx(session.time)
+    assert "fast" in panel._status.content
+    assert "µs per simulated second" in panel._status.content
+    assert panel._events._rows[0].label == told(session.events[-1])
+    session.seek(0.5)
+    panel.show()
+    assert panel._slider.value == pytest.approx(session.time) == pytest.approx(0.5)
+
+
+def test_it_says_where_it_is_and_how_to_reach_it(viewer):
+    where, ssh = directions(viewer, "127.0.0.1")
+    port = viewer.address.rsplit(":", 1)[1]
+    assert where.endswith(f"http://localhost:{port}")
+    assert f"ssh -L {port}:localhost:{port}" in ssh
+    assert len(directions(viewer, "0.0.0.0")) == 1
+
+
+def test_a_port_that_is_none_is_refused():
+    with pytest.raises(ValueError, match="port is 0; allowed are integers of at least 1"):
+        Viewer(Session(open_subject("drop", accuracy="fast")), port=0)
+
+
+# --- plots and events ---------------------------------------------------------------------------------------------
+
+
+@given(count=st.integers(1, 5000), most=st.integers(2, 500))
+def test_a_line_is_thinned_evenly_from_its_first_to_its_last_sample(count, most):
+    chosen = thinned(count, most)
+    assert len(chosen) <= most
+    assert chosen[0] == 0
+    assert chosen[-1] == count - 1
+    gaps = np.diff(chosen)
+    assert (gaps > 0).all()
+    assert gaps.size == 0 or gaps.max() - gaps.min() <= 1  # rounding of equal parts
+
+
+def test_zero_stands_at_the_bottom_of_a_logarithmic_axis():
+    assert line(np.array([0.0, 1e-3]), True).tolist() == [SMALLEST, 1e-3]
+    assert line(np.array([0.0, 1e-3]), False).tolist() == [0.0, 1e-3]
+
+
+def test_an_event_is_told_in_a_line():
+    assert told(event(1.25)) == "1.250 s  impact: body 0, wall 0"
+    assert told(event(0.5, other=3)) == "0.500 s  impact: body 0, body 3"
+    assert told(event(0.5, "rest", NO_WALL)) == "0.500 s  rest: body 0"
+
+
+class Handle:
+    """A control that nobody sees."""
+
+    def __init__(self, **values):
+        vars(self).update(values)
+        self.acts = []
+
+    def on_click(self, act):
+        self.acts.append(act)
+
+    on_update = on_click
+
+
+class Gui:
+    """Controls that nobody sees."""
+
+    def add_slider(self, label, low, high, step, value, visible=True):
+        return Handle(max=high, value=value, visible=visible)
+
+    def add_markdown(self, content):
+        return Handle(content=content)
+
+    def add_button(self, label, visible=True, color=None):
+        return Handle(label=label, visible=visible)
+
+
+def test_the_newest_events_are_in_sight_and_a_click_goes_to_their_time():
+    went = []
+    events = EventList(Gui(), went.append)
+    events.show([event(0.1 * k) for k in range(20)])
+    assert [row.label for row in events._rows] == [told(event(0.1 * k)) for k in range(19, 19 - ROWS, -1)]
+    events._rows[2].acts[0](None)
+    assert went == [pytest.approx(1.7)]
+    events._back.value = 12  # the earliest
+    events._back.acts[0](None)
+    assert events._rows[-1].label == told(event(0.0))
+    events.show([event(0.3)])  # after going back in time
+    assert [row.visible for row in events._rows] == [True] + [False] * (ROWS - 1)
+    events.show([])
+    assert not any(row.visible for row in events._rows)
+
+
+# --- from Python and from the command line ---------------------------------------------------------------------------
+
+
+def test_a_run_is_written_as_one_page(tmp_path):
+    world = World(scenes.drop(), accuracy="fast")
+    path = rigid_env.to_html(world, tmp_path / "drop.html", duration=0.5, fps=10)
+    page = path.read_text(encoding="utf-8")
+    assert page.lstrip().lower().startswith("<!doctype html>")
+    assert path.stat().st_size < 2e6
+    assert world.time == 0.0  # a copy was played
+    with pytest.raises(ValueError, match="duration is -1"):
+        rigid_env.to_html(world, tmp_path / "none.html", duration=-1.0)
+    with pytest.raises(ValueError, match="what is 7; allowed are a canonical scene"):
+        rigid_env.to_html(7, tmp_path / "none.html")
+    assert not (tmp_path / "none.html").exists()
+
+
+def test_the_command_exports_and_says_what_is_wrong(tmp_path):
+    runner = CliRunner()
+    path = tmp_path / "a.html"
+    done = runner.invoke(app, ["view", "drop", "--accuracy", "fast", "--export", str(path), "--duration", "0.2"])
+    assert done.exit_code == 0, done.output
+    assert path.is_file()
+    assert "MB" in done.output
+    wrong = runner.invoke(app, ["view", "dropp", "--export", str(path)])
+    assert wrong.exit_code != 0
+    assert "what is 'dropp'; allowed are" in " ".join(wrong.output.split())
