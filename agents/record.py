@@ -22,6 +22,7 @@ from agents.evaluate import (
     choose_subject,
     evaluation_seeds,
 )
+from rigid_env.cli.camera_options import ArrowsOption, EyeOption, TargetOption, checked_camera
 from rigid_env.terminal import make_console, run_program
 
 SIZE = (640, 400)  # width and height of the picture [px]; even, as the video's colour format asks
@@ -42,7 +43,7 @@ def record(env: str, policy: Policy, seeds: range, path: Path, **arguments: Any)
     path : Path
         With the suffix ``.mp4`` or ``.gif``. Without ffmpeg, ``.mp4`` becomes ``.gif``.
     **arguments
-        Of the environment.
+        Of the environment, ``camera`` and ``arrows`` of its pictures among them.
 
     Returns
     -------
@@ -121,13 +122,18 @@ def main(
     seed: SeedOption = 0,
     accuracy: AccuracyOption = None,
     out: Annotated[Path | None, typer.Option(help="File to write, .mp4 or .gif.")] = None,
+    eye: EyeOption = None,
+    target: TargetOption = None,
+    arrows: ArrowsOption = True,
 ) -> None:
     """Video of episodes of a trained agent or a baseline."""
     try:
         subject = choose_subject(run, baseline, env, seed, accuracy)
         path = out or (RunFolder(run).video if run else Path(f"{baseline}-{env.rpartition('/')[2]}.mp4"))
         seeds = evaluation_seeds(seed, episodes)
-        path = record(subject.env, subject.policy, seeds, path, **subject.arguments)
+        view = {"camera": checked_camera(eye, target), "arrows": arrows}
+        chosen = {name: value for name, value in view.items() if value is not None and value is not True}
+        path = record(subject.env, subject.policy, seeds, path, **{**subject.arguments, **chosen})
     except ValueError as error:
         raise typer.BadParameter(str(error)) from error
     make_console().print(f"{subject.title}: {episodes} episodes in {path}", soft_wrap=True)

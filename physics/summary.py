@@ -6,6 +6,7 @@ import reprlib
 from collections import Counter
 from collections.abc import Iterable
 from dataclasses import fields
+from typing import Protocol
 
 import numpy as np
 
@@ -68,6 +69,18 @@ def fields_repr(item) -> str:
         return text
     lines = [f"    {key}={shown(value, LINE - len(key) - 6)}" for key, value in parts]
     return f"{name}(\n" + ",\n".join(lines) + ")"
+
+
+class HasParts(Protocol):
+    """Class whose `repr` is made of parts."""
+
+    def _parts(self) -> tuple[str, ...]:
+        """Parts of the `repr`: a name and its value, ``dt=0.01`` or ``events: none``, or any other words."""
+
+
+def parts_repr(item: HasParts) -> str:
+    """The `repr` of an object from its parts, broken where a line is full."""
+    return lines_repr(type(item).__name__, *item._parts())
 
 
 def lines_repr(name: str, *parts: str) -> str:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from physics import validation
+from physics.html_table import parts_table
 from physics.kernels.forces.queries import evaluate_fields
 from physics.kernels.half_space.gap_queries import contact_spring_energies
 from physics.kernels.state import layout as at
@@ -14,7 +15,7 @@ from physics.kernels.state.contact_law_dispatch import LAW_STIFFNESS
 from physics.kernels.time_stepping.workspace import body_records
 from physics.parallel.exclusive import exclusive
 from physics.scene.field_errors import raised
-from physics.summary import lines_repr
+from physics.summary import parts_repr
 from physics.world.wall_distance import wall_gaps
 from physics.world.world import World
 
@@ -29,10 +30,13 @@ class Diagnostics:
     angular_momentum: np.ndarray  # about the centre of mass [kg m²/s], world frame
     gap: np.ndarray  # smallest distance to a wall [m], negative when penetrating, inf without walls
 
-    def __repr__(self) -> str:
+    __repr__ = parts_repr
+    _repr_html_ = parts_table
+
+    def _parts(self) -> tuple[str, ...]:
         worlds, bodies = self.gap.shape
-        return lines_repr(
-            "Diagnostics", f"{worlds} worlds of {bodies} bodies",
+        return (
+            f"{worlds} worlds of {bodies} bodies",
             f"energy {self.energy.min():.6g} to {self.energy.max():.6g} J",
             f"gap {self.gap.min():.6g} to {self.gap.max():.6g} m",
         )  # fmt: skip

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from physics.html_table import fields_table
 from physics.kernels.time_stepping import event_log
 from physics.world.world import World
 
@@ -51,6 +52,8 @@ class Event:
     other: int = -1
     point: tuple[float, float, float] = (0.0, 0.0, 0.0)
     normal: tuple[float, float, float] = (0.0, 0.0, 0.0)
+
+    _repr_html_ = fields_table
 
 
 def logged_events(world: World, start: float) -> list[Event]:

@@ -12,8 +12,9 @@ import numpy as np
 from physics import validation
 from physics.analysis.events import Event
 from physics.analysis.trajectory_arrays import event_arrays, events_of, scene_arrays, scene_of
+from physics.html_table import parts_table
 from physics.scene.scene import Scene
-from physics.summary import counted, lines_repr
+from physics.summary import counted, parts_repr
 from physics.world.report import Status, StepReport
 
 COLUMNS = (
@@ -54,10 +55,16 @@ class Trajectory:
     reports: tuple[StepReport, ...]
     scene: Scene | None = field(default=None, compare=False)
 
-    def __repr__(self) -> str:
+    __repr__ = parts_repr
+
+    def _repr_html_(self) -> str:
+        energy = self.energy.sum(axis=1)
+        return parts_table(self, ("energy", f"{energy[0]:.6g} to {energy[-1]:.6g} J"))
+
+    def _parts(self) -> tuple[str, ...]:
         samples, bodies = self.pos.shape[:2]
-        return lines_repr(
-            "Trajectory", f"{samples} samples of {bodies} bodies", f"t = {self.t[0]:.6g} to {self.t[-1]:.6g} s",
+        return (
+            f"{samples} samples of {bodies} bodies", f"t = {self.t[0]:.6g} to {self.t[-1]:.6g} s",
             f"events: {counted(event.kind for event in self.events)}", f"ok={self.ok}{self._why()}",
         )  # fmt: skip
 

@@ -18,6 +18,7 @@ import numpy as np
 
 from physics import validation
 from physics.analysis.diagnostics import diagnose
+from physics.html_table import parts_table
 from physics.io.toml import from_toml, to_toml
 from physics.kernels.compile.cache_folder import folder_name
 from physics.kernels.compile.compiler_choice import COMPILER, FUSED
@@ -25,7 +26,7 @@ from physics.kernels.state import layout as at
 from physics.plan.accuracy import Accuracy
 from physics.scene.force_field import Field
 from physics.scene.scene import Scene
-from physics.summary import lines_repr
+from physics.summary import parts_repr
 from physics.version import version
 from physics.world.report import StepReport
 from physics.world.snapshot import KEPT, Snapshot
@@ -90,9 +91,12 @@ class Recording:
     reason: str
     origin: dict
 
-    def __repr__(self) -> str:
-        return lines_repr(
-            "Recording", f"{len(self)} calls of step", f"{len(self.scene.bodies)} bodies",
+    __repr__ = parts_repr
+    _repr_html_ = parts_table
+
+    def _parts(self) -> tuple[str, ...]:
+        return (
+            f"{len(self)} calls of step", f"{len(self.scene.bodies)} bodies",
             f"{len(self.starts)} starts", f"reason={self.reason!r}",
         )  # fmt: skip
 
@@ -207,11 +211,14 @@ class Replay:
     reports: tuple[StepReport, ...]
     energies: np.ndarray
 
-    def __repr__(self) -> str:
+    __repr__ = parts_repr
+    _repr_html_ = parts_table
+
+    def _parts(self) -> tuple[str, ...]:
         first = self.first_difference
         told = "identical" if self.is_identical else f"equal within {self.tolerance:g}"
         told = told if first is None else f"the first difference is after call {first}"
-        return lines_repr("Replay", f"{len(self.states)} calls of step", told)
+        return f"{len(self.states)} calls of step", told
 
     @property
     def tolerance(self) -> float:

@@ -21,6 +21,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from physics.html_table import fields_table
 from physics.summary import fields_repr
 
 if TYPE_CHECKING:
@@ -70,6 +71,7 @@ class Polyhedron:
     second_moment: np.ndarray
 
     __repr__ = fields_repr
+    _repr_html_ = fields_table
 
     @property
     def radius(self) -> float:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 from physics import validation
+from physics.html_table import fields_table
 from physics.kernels.flight import integrators
 from physics.keywords import known_keywords
 
@@ -93,6 +94,8 @@ class Accuracy:
     rest_share: float = 0.5
     slip: str = "mean"
     collisions: str = "simultaneous"
+
+    _repr_html_ = fields_table
 
     def __post_init__(self):
         for name in ("substeps", "iterations", "impacts"):

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from physics import validation
+from physics.html_table import parts_table
 from physics.kernels.forces.force_field_dispatch import Term
 from physics.kernels.state.contact_law_dispatch import (
     LAW_ANISOTROPY,
@@ -24,7 +25,7 @@ from physics.plan.explanation import Row, make_rows
 from physics.scene.effects import Contact, Friction, Gravity, RollingFriction, Sleeping, SpinFriction
 from physics.scene.force_field import Field, FieldSlot, field_slots
 from physics.scene.scene import Scene
-from physics.summary import lines_repr
+from physics.summary import parts_repr
 
 SHAPE_CODES = {"block": BLOCK, "sphere": SPHERE, "ellipsoid": ELLIPSOID, "hull": HULL}
 
@@ -69,9 +70,12 @@ class Plan:
     laws: tuple[str, ...]
     rows: tuple[Row, ...]
 
-    def __repr__(self) -> str:
+    __repr__ = parts_repr
+    _repr_html_ = parts_table
+
+    def _parts(self) -> tuple[str, ...]:
         on = [row.effect for row in self.rows if row.is_on]
-        return lines_repr("Plan", *(f"{effect}: on" for effect in on[:MOST_ROWS]), f"{len(self.rows) - len(on)} off")
+        return (*(f"{effect}: on" for effect in on[:MOST_ROWS]), f"{len(self.rows) - len(on)} off")
 
     @property
     def key(self) -> tuple:

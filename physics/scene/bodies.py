@@ -9,6 +9,7 @@ from typing import ClassVar
 import numpy as np
 
 from physics import validation
+from physics.html_table import fields_table
 from physics.keywords import known_keywords
 from physics.mass import inertia
 from physics.mass.polyhedron import Polyhedron, convex_hull
@@ -55,6 +56,8 @@ class Body:
     density: float | None = field(default=None, repr=False, compare=False)
     name: str | None = None
     center: ClassVar[tuple] = (0.0, 0.0, 0.0)  # of the shape, from the centre of mass; a block may have another
+
+    _repr_html_ = fields_table
 
     def __post_init__(self):
         if type(self) is Body:

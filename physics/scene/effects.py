@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from physics import validation
+from physics.html_table import fields_table
 from physics.keywords import known_keywords
 from physics.scene.force_field import Field
 from physics.summary import fields_repr, shown
@@ -29,6 +30,8 @@ class Gravity:
     """
 
     acceleration: tuple = (0.0, -9.81, 0.0)
+
+    _repr_html_ = fields_table
 
     def __post_init__(self):
         value = validation.finite(self.acceleration, (3,), "Gravity.acceleration")
@@ -64,6 +67,8 @@ class Contact:
     tangential: float | None = None
     stiffness: float | None = None
     damping: float = 0.0
+
+    _repr_html_ = fields_table
 
     def __post_init__(self):
         if not isinstance(self.between_bodies, (bool, np.bool_)):
@@ -126,6 +131,7 @@ class Friction:
             object.__setattr__(self, "axis", _axes(self.axis))
 
     __repr__ = fields_repr
+    _repr_html_ = fields_table
 
     @property
     def along(self) -> float:
@@ -156,6 +162,8 @@ def _axes(axis) -> tuple:
 
 class _Resistance:
     """A torque of contact, bounded by a length times the normal force."""
+
+    _repr_html_ = fields_table
 
     def __post_init__(self):
         name = f"{type(self).__name__}.radius"
@@ -215,6 +223,8 @@ class Actuator:
     lag: float = 0.0
     delay: float = 0.0
 
+    _repr_html_ = fields_table
+
     def __post_init__(self):
         for name in ("limit_force", "limit_torque"):
             value = getattr(self, name)
@@ -251,6 +261,8 @@ class Sleeping:
 
     slops: float = 4.0
     time: float | None = None
+
+    _repr_html_ = fields_table
 
     def __post_init__(self):
         object.__setattr__(self, "slops", float(validation.positive(self.slops, (), "Sleeping.slops")))

@@ -21,6 +21,7 @@ from typing import ClassVar
 
 import numpy as np
 
+from physics.html_table import fields_table
 from physics.kernels.compile.decorators import is_kernel, plain_function, user_kernel
 from physics.kernels.forces.force_field_dispatch import AIR, LOAD, Term
 from physics.scene import field_check
@@ -63,6 +64,8 @@ class Field:
     _rates: ClassVar = None  # of the built-in ones: see `physics.kernels.forces.implicit_loads`
     _soften: ClassVar = None
     _mean: ClassVar = None
+
+    _repr_html_ = fields_table
 
     def __new__(cls, *values, **named):
         field_check.check_class(cls, Field)

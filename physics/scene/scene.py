@@ -10,11 +10,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from physics import validation
+from physics.html_table import fields_table, parts_table, table
 from physics.keywords import known_keywords
 from physics.scene.bodies import Block, Body, Ellipsoid, Hull, Sphere
 from physics.scene.effects import EFFECTS, RESISTANCES, Contact, Friction, Sleeping
 from physics.scene.force_field import Field
-from physics.summary import SCREEN, counted, lines_repr, shown
+from physics.summary import SCREEN, counted, parts_repr, shown
 
 # An axis of friction and the normal of a wall count as parallel below this sine of the angle between them [rad]: of the
 # sixteen digits of a direction ten are left for its part along the wall.
@@ -48,6 +49,8 @@ class HalfSpace:
 
     normal: tuple
     offset: float = 0.0
+
+    _repr_html_ = fields_table
 
     def __post_init__(self):
         normal = validation.finite(self.normal, (3,), "HalfSpace.normal")
@@ -125,13 +128,27 @@ class Scene:
             warnings.warn(NO_CONTACT, SceneWarning, stacklevel=_frames_of_package())
 
     def __repr__(self) -> str:
-        if len(self.bodies) + len(self.walls) + len(self.effects) <= MOST_SHOWN:
-            text = f"Scene(bodies={self.bodies!r}, walls={self.walls!r}, effects={self.effects!r})"
-            if len(text) <= SCREEN:
-                return text
+        return self._expression() or parts_repr(self)
+
+    def _repr_html_(self) -> str:
+        if not self._expression():
+            return parts_table(self)
+        lists = {"bodies": self.bodies, "walls": self.walls, "effects": self.effects}
+        return table(
+            "Scene", ((f"{name}[{k}]", repr(each)) for name, items in lists.items() for k, each in enumerate(items))
+        )
+
+    def _expression(self) -> str:
+        """Expression that makes the scene again; none where it fills a screen."""
+        if len(self.bodies) + len(self.walls) + len(self.effects) > MOST_SHOWN:
+            return ""
+        text = f"Scene(bodies={self.bodies!r}, walls={self.walls!r}, effects={self.effects!r})"
+        return text if len(text) <= SCREEN else ""
+
+    def _parts(self) -> tuple[str, ...]:
         kinds = {name: [type(item).__name__ for item in getattr(self, name)] for name in ("bodies", "effects")}
-        return lines_repr(
-            "Scene", f"{len(self.bodies)} bodies: {counted(kinds['bodies'])}", f"{len(self.walls)} walls",
+        return (
+            f"{len(self.bodies)} bodies: {counted(kinds['bodies'])}", f"{len(self.walls)} walls",
             f"effects: {counted(kinds['effects'])}",
         )  # fmt: skip
 

@@ -7,7 +7,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from physics import validation
-from physics.summary import counted, fields_repr, lines_repr
+from physics.html_table import fields_table, parts_table
+from physics.summary import counted, fields_repr, parts_repr
 from physics.work_precision import analysis as frontier_analysis
 from physics.work_precision.contender import OURS, setting_name
 
@@ -41,6 +42,7 @@ class FrontierPoint:
     note: str = ""
 
     __repr__ = fields_repr
+    _repr_html_ = fields_table
 
     @property
     def cost(self) -> float:
@@ -172,9 +174,12 @@ class Frontier:
         """Every (engine, setting) that was measured, in that order."""
         return tuple(dict.fromkeys((p.engine, p.setting) for p in self.points))
 
-    def __repr__(self) -> str:
-        return lines_repr(
-            "Frontier", f"{len(self.points)} points", f"settings: {counted(p.setting for p in self.points)}",
+    __repr__ = parts_repr
+    _repr_html_ = parts_table
+
+    def _parts(self) -> tuple[str, ...]:
+        return (
+            f"{len(self.points)} points", f"settings: {counted(p.setting for p in self.points)}",
             f"measure={self.measure!r}", f"duration={self.duration:.6g} s", f"is_complete={self.is_complete}",
             f"{len(self.skipped)} skipped", f"truth: {self.truth}",
         )  # fmt: skip

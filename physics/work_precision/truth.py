@@ -11,6 +11,7 @@ import numpy as np
 from physics import validation
 from physics.analysis.simulate import simulate
 from physics.analysis.trajectory import Trajectory
+from physics.html_table import fields_table
 from physics.keywords import known_keywords
 from physics.plan.accuracy import Accuracy, resolve
 from physics.scene.scene import Scene
@@ -64,6 +65,8 @@ class Truth:
     own_error: float = 0.0
     scale: float | None = None
     text: str = "given by the caller"
+
+    _repr_html_ = fields_table
 
     def __post_init__(self):
         if not callable(self.error):

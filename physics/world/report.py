@@ -6,6 +6,7 @@ from enum import IntEnum
 
 import numpy as np
 
+from physics.html_table import parts_table
 from physics.kernels.compile.decorators import entry_kernel, kernel
 from physics.kernels.state import layout as at
 
@@ -199,10 +200,15 @@ class StepReport:
         return told
 
     def __repr__(self) -> str:
+        return f"StepReport({', '.join(self._parts())})"
+
+    _repr_html_ = parts_table
+
+    def _parts(self) -> tuple[str, ...]:
         counts = np.bincount(self.status, minlength=len(Status)).tolist()
         bad = [f"{Status(k).name.lower()} in {count} worlds" for k, count in enumerate(counts) if k and count]
         why = f" ({', '.join(bad)})" if bad else ""
         return (
-            f"StepReport(worlds={len(self._table)}, ok={self.ok}{why}, penetration={self.penetration.max():.3g} m, "
-            f"residual={self.residual.max():.3g}, iterations={self.iterations.sum()})"
-        )
+            f"worlds={len(self._table)}", f"ok={self.ok}{why}", f"penetration={self.penetration.max():.3g} m",
+            f"residual={self.residual.max():.3g}", f"iterations={self.iterations.sum()}",
+        )  # fmt: skip

@@ -9,10 +9,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from physics import validation
+from physics.html_table import parts_table
 from physics.kernels.state import layout as at
 from physics.keywords import known_keywords
 from physics.parallel.exclusive import exclusive
-from physics.summary import lines_repr, shown
+from physics.summary import parts_repr, shown
 from physics.world import batch_arrays, restoring
 from physics.world.report import StepReport
 from physics.world.rollout_course import advance
@@ -68,10 +69,13 @@ class Rollout:
         arrays = (*(getattr(self, name) for name in self.columns), self.times, self.report_table)
         return sum(array.nbytes for array in arrays)
 
-    def __repr__(self) -> str:
+    __repr__ = parts_repr
+    _repr_html_ = parts_table
+
+    def _parts(self) -> tuple[str, ...]:
         first = getattr(self, self.columns[0])
-        return lines_repr(
-            "Rollout", f"{len(first)} worlds of {first.shape[2]} bodies", f"{first.shape[1]} states",
+        return (
+            f"{len(first)} worlds of {first.shape[2]} bodies", f"{first.shape[1]} states",
             f"t = {self.times[0]:.6g} to {self.times[-1]:.6g} s", *self.columns, f"ok={self.report.ok}",
             f"{self.nbytes / MEBIBYTE:.3g} MiB",
         )  # fmt: skip

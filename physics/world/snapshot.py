@@ -11,9 +11,10 @@ from typing import BinaryIO
 import numpy as np
 
 from physics import validation
+from physics.html_table import parts_table
 from physics.kernels.compile.compiler_choice import COMPILER
 from physics.kernels.state import layout as at
-from physics.summary import lines_repr
+from physics.summary import parts_repr
 from physics.version import version
 from physics.world.headed_file import FileKind
 
@@ -102,9 +103,12 @@ class Snapshot:
         """Read the content of a file as `load` does; `path` is its name in an error."""
         return FILE.read(content, path, lambda head, parts: _from_parts(parts, str(head["compiler"])))
 
-    def __repr__(self) -> str:
+    __repr__ = parts_repr
+    _repr_html_ = parts_table
+
+    def _parts(self) -> tuple[str, ...]:
         shapes = (f"{name} {array.shape}" for name, array in zip(KEPT, self.arrays))
-        return lines_repr("Snapshot", f"time={self.time:.6g} s", *shapes, f"compiler={self.compiler}")
+        return (f"time={self.time:.6g} s", *shapes, f"compiler={self.compiler}")
 
 
 def _from_parts(parts: dict[str, np.ndarray], compiler: str) -> Snapshot:

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from physics import validation
+from physics.html_table import parts_table
 from physics.kernels.forces.force_field_dispatch import register_terms
 from physics.kernels.state import layout as at
 from physics.kernels.state.sleeping import SLEEP_GROUP, SLEEP_SIZE
@@ -17,11 +18,12 @@ from physics.keywords import known_keywords
 from physics.parallel.bound_call import Work
 from physics.parallel.exclusive import exclusive, in_use, watch
 from physics.parallel.team import Team
-from physics.plan.accuracy import Accuracy, resolve
+from physics.plan.accuracy import PRESETS, Accuracy, resolve
 from physics.plan.plan import SHAPE_CODES, make_plan
 from physics.scene.effects import Actuator, Friction, RollingFriction, SpinFriction
 from physics.scene.force_field import Field
 from physics.scene.scene import Scene
+from physics.summary import counted
 from physics.world import batch_arrays, parameters, restoring, setters
 from physics.world.actuator import Actuation
 from physics.world.batch import Batch
@@ -419,4 +421,14 @@ class World(Batch):
         self._bind_views()
 
     def __repr__(self) -> str:
-        return f"World({self.worlds} worlds of {self.body_count} bodies, dt={self.dt}, time={self.time:.6g} s)"
+        return f"World({', '.join(self._parts())})"
+
+    def _repr_html_(self) -> str:
+        scene = self.scene
+        bodies, effects = (counted(type(each).__name__ for each in items) for items in (scene.bodies, scene.effects))
+        preset = next((name for name, each in PRESETS.items() if each == self.accuracy), repr(self.accuracy))
+        rows = ("bodies", bodies), ("walls", f"{len(scene.walls)}"), ("effects", effects), ("accuracy", preset)
+        return parts_table(self, *rows)
+
+    def _parts(self) -> tuple[str, ...]:
+        return f"{self.worlds} worlds of {self.body_count} bodies", f"dt={self.dt}", f"time={self.time:.6g} s"

@@ -9,6 +9,7 @@ import typer
 from rich.console import Console
 
 from rigid_env.cli import names
+from rigid_env.cli.camera_options import ArrowsOption, EyeOption, TargetOption, checked_shot
 from rigid_env.cli.common import Accuracy, Json, SceneArgument, app, at_least, tell_file, told_errors, write
 from rigid_env.cli.files import PICTURES, checked_folder, make_parents, output_option
 from rigid_env.terminal import make_console, progress_bar, say
@@ -16,6 +17,7 @@ from rigid_env.terminal import make_console, progress_bar, say
 if TYPE_CHECKING:
     from physics import Scene
     from rigid_env.lab.demo import Demo
+    from rigid_env.rendering.staging import Shot
 
 Duration = Annotated[float, typer.Option(callback=at_least(0), help="Simulated time [s].")]
 Dt = Annotated[float, typer.Option("--dt", help="Step, and time between samples [s].")]
@@ -32,18 +34,22 @@ def demo(
     out: Annotated[Path, typer.Option(metavar="DIR", help="Where PNG and GIF go.", callback=checked_folder)] = Path(
         "demo"
     ),
+    eye: EyeOption = None,
+    target: TargetOption = None,
+    arrows: ArrowsOption = True,
     json: Json = None,
 ) -> None:
     """Drop the block in the three-wall box; print what happens, write a picture and a GIF."""
     with told_errors():
         _require_pictures()
+        shot = checked_shot(eye, target, arrows)
         name, built = names.load_scene(scene)
         pictures = [out / f"{name}{ending}" for ending in PICTURES]
         make_parents(*pictures, json)
         console = make_console()
         done = _simulate(name, built, duration, accuracy, dt, console)
         summary = done.summary()
-        _draw(done, pictures, console)
+        _draw(done, pictures, shot, console)
         summary["files"] = {path.suffix[1:]: str(path) for path in pictures}
         write(json, summary, console)
 
@@ -57,12 +63,16 @@ def run(
     plot: Annotated[Path | None, output_option("--plot", *PICTURES, help="Draw the motion.")] = None,
     npz: Annotated[Path | None, output_option("--npz", ".npz", help="Write the samples as a NumPy archive.")] = None,
     csv: Annotated[Path | None, output_option("--csv", ".csv", help="Write the samples as a table.")] = None,
+    eye: EyeOption = None,
+    target: TargetOption = None,
+    arrows: ArrowsOption = True,
     json: Json = None,
 ) -> None:
     """Simulate a scene; print what happens, and write samples or a picture."""
     with told_errors():
         if plot is not None:
             _require_pictures()
+        shot = checked_shot(eye, target, arrows)
         name, built = names.load_scene(scene)
         make_parents(plot, npz, csv, json)
         console = make_console()
@@ -71,7 +81,7 @@ def run(
             if path is not None:
                 save(path)
                 tell_file(path, console)
-        _draw(done, [] if plot is None else [plot], console)
+        _draw(done, [] if plot is None else [plot], shot, console)
         write(json, {"file": scene, **done.summary()}, console)
 
 
@@ -92,12 +102,12 @@ def _simulate(name: str, scene: Scene, duration: float, accuracy: str, dt: float
     return done
 
 
-def _draw(done: Demo, paths: list[Path], console: Console) -> None:
+def _draw(done: Demo, paths: list[Path], shot: Shot, console: Console) -> None:
     """Draw and write pictures, and say where."""
     for path in paths:
         with progress_bar(console) as progress:
             task = progress.add_task("drawing", total=done.frame_count)
-            done.write_picture(path, lambda task=task: progress.advance(task))
+            done.write_picture(path, lambda task=task: progress.advance(task), shot)
         tell_file(path, console)
         if path.suffix == ".gif" and done.speed != 1.0:
             say(console, "", f"shows {done.speed:.3g} s in one second")

@@ -19,6 +19,7 @@ from rigid_env.envs.infos import info_maker
 from rigid_env.envs.making import make_task
 from rigid_env.envs.sources import StateSource, make_source
 from rigid_env.envs.spaces import action_space
+from rigid_env.rendering.camera_argument import CameraArgument
 from rigid_env.rendering.view import RENDER_MODES, View
 from rigid_env.tasks import Task
 from rigid_env.tasks.block import BlockTask
@@ -48,6 +49,11 @@ class RigidEnv(gym.Env):
     obs_stack : int
     contacts : int
         Contacts that every info tells, those with the largest forces; see `rigid_env.envs.contact_infos`. 0: none.
+    camera : Camera, mapping or None
+        Of pictures that `render` makes: a `rigid_env.rendering.Camera`, or a mapping of its parameters. None has the
+        whole room in sight. Observations keep their own view.
+    arrows : bool
+        Whether these show contact points, forces and torques.
 
     Raises
     ------
@@ -68,6 +74,9 @@ class RigidEnv(gym.Env):
         obs_size: Sequence[int] = (84, 84),
         obs_stack: int = 1,
         contacts: int = 0,
+        *,
+        camera: CameraArgument = None,
+        arrows: bool = True,
     ):
         self.task = task
         self._source = make_source(task, obs, obs_size, obs_stack)
@@ -76,7 +85,7 @@ class RigidEnv(gym.Env):
         self.render_mode = render_mode
         self.observation_space = self._source.space
         self.action_space = action_space(task)
-        self._view = View(render_mode, width, height, self.metadata["render_fps"], type(task).__name__)
+        self._view = View(render_mode, width, height, self.metadata["render_fps"], type(task).__name__, camera, arrows)
         self._world = np.zeros(1, dtype=np.int64)
         self._is_plain = type(self._source) is StateSource
         self._action_shape = self.action_space.shape
@@ -261,7 +270,7 @@ class TaskEnv(RigidEnv):
     ----------
     task : class of Task, or str
         The class, or where it stands: ``module:Class``.
-    render_mode, width, height, obs, obs_size, obs_stack, contacts
+    render_mode, width, height, obs, obs_size, obs_stack, contacts, camera, arrows
         As of `RigidEnv`.
     settings
         Arguments of the task.
@@ -281,13 +290,16 @@ class TaskEnv(RigidEnv):
         width: int = 960,
         height: int = 600,
         *,
+        camera: CameraArgument = None,
+        arrows: bool = True,
         obs: str = "state",
         obs_size: Sequence[int] = (84, 84),
         obs_stack: int = 1,
         contacts: int = 0,
         **settings,
     ):
-        super().__init__(make_task(task, 1, settings), render_mode, width, height, obs, obs_size, obs_stack, contacts)
+        told = render_mode, width, height, obs, obs_size, obs_stack, contacts
+        super().__init__(make_task(task, 1, settings), *told, camera=camera, arrows=arrows)
 
 
 class BlockEnv(EpisodeParameters, RigidEnv):
@@ -295,7 +307,7 @@ class BlockEnv(EpisodeParameters, RigidEnv):
 
     Parameters
     ----------
-    render_mode, width, height, obs, obs_size, obs_stack, contacts
+    render_mode, width, height, obs, obs_size, obs_stack, contacts, camera, arrows
         As of `RigidEnv`.
     accuracy, walls, half_width, mass, size, friction, restitution, gravity, effects, frame_skip, dt, dump_faults
         Of the task, see `rigid_env.tasks.block.BlockTask`.
@@ -316,6 +328,8 @@ class BlockEnv(EpisodeParameters, RigidEnv):
         width: int = 960,
         height: int = 600,
         *,
+        camera: CameraArgument = None,
+        arrows: bool = True,
         obs: str = "state",
         obs_size: Sequence[int] = (84, 84),
         obs_stack: int = 1,
@@ -338,4 +352,5 @@ class BlockEnv(EpisodeParameters, RigidEnv):
             restitution=restitution, gravity=gravity, effects=effects, frame_skip=frame_skip, dt=dt,
             dump_faults=dump_faults,
         )  # fmt: skip
-        super().__init__(task, render_mode, width, height, obs, obs_size, obs_stack, contacts)
+        told = render_mode, width, height, obs, obs_size, obs_stack, contacts
+        super().__init__(task, *told, camera=camera, arrows=arrows)

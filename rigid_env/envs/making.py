@@ -10,7 +10,7 @@ from typing import Any
 from physics.keywords import nearest_first
 from rigid_env.tasks import Task
 
-OF_ENVIRONMENT = ["render_mode", "width", "height", "obs", "obs_size", "obs_stack", "contacts"]
+OF_ENVIRONMENT = ["render_mode", "width", "height", "camera", "arrows", "obs", "obs_size", "obs_stack", "contacts"]
 """Settings of an environment that are none of its task."""
 
 

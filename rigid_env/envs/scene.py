@@ -14,6 +14,7 @@ from physics import validation
 from physics.keywords import known_keywords
 from rigid_env.envs.env import RigidEnv
 from rigid_env.envs.vector_env import RigidVectorEnv
+from rigid_env.rendering.camera_argument import CameraArgument
 from rigid_env.tasks.scene_task import SceneTask
 
 SceneSource = physics.Scene | str | os.PathLike
@@ -132,6 +133,8 @@ class SceneEnv(RigidEnv):
     | `obs_size` | (84, 84) | height and width of these [px] |
     | `obs_stack` | 1 | of the last so many control steps, along the last axis, the newest last |
     | `contacts` | 0 | contacts told in `info`, those with the largest forces |
+    | `camera` | None | of pictures: a `rigid_env.rendering.Camera`, or a dict of its parameters; None sees the room |
+    | `arrows` | True | whether pictures show contacts, forces and torques |
 
     From `driven` to `episode_steps` an argument takes the place of that key in the file; None leaves the file's, or the
     default in brackets.
@@ -148,6 +151,8 @@ class SceneEnv(RigidEnv):
         width: int = 960,
         height: int = 600,
         *,
+        camera: CameraArgument = None,
+        arrows: bool = True,
         obs: str = "state",
         obs_size: Sequence[int] = (84, 84),
         obs_stack: int = 1,
@@ -171,7 +176,8 @@ class SceneEnv(RigidEnv):
             frame_skip=frame_skip, dt=dt, episode_steps=episode_steps, accuracy=accuracy, effects=effects,
             dump_faults=dump_faults,
         )  # fmt: skip
-        super().__init__(task, render_mode, width, height, obs, obs_size, obs_stack, contacts)
+        told = render_mode, width, height, obs, obs_size, obs_stack, contacts
+        super().__init__(task, *told, camera=camera, arrows=arrows)
 
     def step(self, action):
         """Hold an action for one control step; as `RigidEnv.step`, but truncated at the limit of the task."""
@@ -190,7 +196,7 @@ class SceneVectorEnv(RigidVectorEnv):
     ----------
     num_envs : int
     scene : physics.Scene, str or Path
-    autoreset_mode, max_episode_steps, render_mode, width, height, obs, obs_size, obs_stack, contacts
+    autoreset_mode, max_episode_steps, render_mode, width, height, obs, obs_size, obs_stack, contacts, camera, arrows
         As of `RigidVectorEnv`; `max_episode_steps` is `episode_steps` by default, and at most that.
     driven, force, torque, frame, length, goal, start, frame_skip, dt, episode_steps, accuracy, effects, dump_faults
         As of `SceneEnv`.
@@ -215,6 +221,8 @@ class SceneVectorEnv(RigidVectorEnv):
         width: int = 960,
         height: int = 600,
         *,
+        camera: CameraArgument = None,
+        arrows: bool = True,
         obs: str = "state",
         obs_size: Sequence[int] = (84, 84),
         obs_stack: int = 1,
@@ -241,7 +249,7 @@ class SceneVectorEnv(RigidVectorEnv):
         )  # fmt: skip
         check_limit(max_episode_steps, task.max_episode_steps)
         told = render_mode, width, height, obs, obs_size, obs_stack, contacts
-        super().__init__(task, autoreset_mode, max_episode_steps, *told)
+        super().__init__(task, autoreset_mode, max_episode_steps, *told, camera=camera, arrows=arrows)
 
 
 def check_limit(value: int | str | None, limit: int | None) -> None:

@@ -24,6 +24,7 @@ from rigid_env.envs.goals import lend_goals
 from rigid_env.envs.making import make_task
 from rigid_env.envs.sources import make_source
 from rigid_env.envs.spaces import action_space
+from rigid_env.rendering.camera_argument import CameraArgument
 from rigid_env.rendering.view import RENDER_MODES, View
 from rigid_env.tasks import BlockReach, BlockReorient, Task
 from rigid_env.tasks import layout as col
@@ -50,7 +51,7 @@ class RigidVectorEnv(BatchAttributes):
         ``human`` shows world 0.
     width, height : int
         Of one world's picture [px].
-    obs, obs_size, obs_stack, contacts
+    obs, obs_size, obs_stack, contacts, camera, arrows
         As of `rigid_env.envs.env.RigidEnv`.
 
     Raises
@@ -74,6 +75,9 @@ class RigidVectorEnv(BatchAttributes):
         obs_size: Sequence[int] = (84, 84),
         obs_stack: int = 1,
         contacts: int = 0,
+        *,
+        camera: CameraArgument = None,
+        arrows: bool = True,
     ):
         self.task = task
         self._source = make_source(task, obs, obs_size, obs_stack)
@@ -94,7 +98,7 @@ class RigidVectorEnv(BatchAttributes):
         self.single_action_space = action_space(task)
         self.observation_space = batch_space(self.single_observation_space, num_envs)
         self.action_space = batch_space(self.single_action_space, num_envs)
-        self._view = View(render_mode, width, height, fps, type(task).__name__)
+        self._view = View(render_mode, width, height, fps, type(task).__name__, camera, arrows)
         self._seeds = [-1] * num_envs
         self._ended = np.zeros(num_envs, dtype=np.bool_)
         self._waiting = np.ones(num_envs, dtype=np.bool_)  # for their first reset
@@ -343,7 +347,7 @@ class TaskVectorEnv(RigidVectorEnv):
     num_envs : int
     task : class of Task, or str
         The class, or where it stands: ``module:Class``.
-    autoreset_mode, max_episode_steps, render_mode, width, height, obs, obs_size, obs_stack, contacts
+    autoreset_mode, max_episode_steps, render_mode, width, height, obs, obs_size, obs_stack, contacts, camera, arrows
         As of `RigidVectorEnv`.
     settings
         Arguments of the task, ``threads`` among them.
@@ -366,6 +370,8 @@ class TaskVectorEnv(RigidVectorEnv):
         render_mode: str | None = None,
         width: int = 960,
         height: int = 600,
+        camera: CameraArgument = None,
+        arrows: bool = True,
         obs: str = "state",
         obs_size: Sequence[int] = (84, 84),
         obs_stack: int = 1,
@@ -374,7 +380,7 @@ class TaskVectorEnv(RigidVectorEnv):
     ):
         batch = make_task(task, validation.count(num_envs, "num_envs"), settings)
         told = render_mode, width, height, obs, obs_size, obs_stack, contacts
-        super().__init__(batch, autoreset_mode, max_episode_steps, *told)
+        super().__init__(batch, autoreset_mode, max_episode_steps, *told, camera=camera, arrows=arrows)
 
 
 class BlockVectorEnv(RigidVectorEnv):
@@ -383,7 +389,7 @@ class BlockVectorEnv(RigidVectorEnv):
     Parameters
     ----------
     num_envs : int
-    autoreset_mode, max_episode_steps, render_mode, width, height, obs, obs_size, obs_stack, contacts
+    autoreset_mode, max_episode_steps, render_mode, width, height, obs, obs_size, obs_stack, contacts, camera, arrows
         As of `RigidVectorEnv`.
     threads : int
         Threads that share a step.
@@ -409,6 +415,8 @@ class BlockVectorEnv(RigidVectorEnv):
         width: int = 960,
         height: int = 600,
         *,
+        camera: CameraArgument = None,
+        arrows: bool = True,
         obs: str = "state",
         obs_size: Sequence[int] = (84, 84),
         obs_stack: int = 1,
@@ -433,7 +441,7 @@ class BlockVectorEnv(RigidVectorEnv):
             effects=effects, frame_skip=frame_skip, dt=dt, dump_faults=dump_faults,
         )  # fmt: skip
         told = render_mode, width, height, obs, obs_size, obs_stack, contacts
-        super().__init__(task, autoreset_mode, max_episode_steps, *told)
+        super().__init__(task, autoreset_mode, max_episode_steps, *told, camera=camera, arrows=arrows)
 
 
 @known_keywords

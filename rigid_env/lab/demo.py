@@ -11,9 +11,9 @@ import numpy as np
 
 import physics
 from physics import scenes, validation
-from rigid_env.rendering import Renderer
+from rigid_env.rendering import Frame, Renderer
 from rigid_env.rendering.picture import stroboscope, without_bodies, world_frame, write_gif, write_png
-from rigid_env.rendering.staging import Stage
+from rigid_env.rendering.staging import CHOSEN, Shot, Stage
 
 SAMPLE_DT = 0.01  # step, and time between samples, where none is given [s]
 FRAME_TIME = 0.04  # least time between pictures of the GIF, which counts in hundredths of a second [s]
@@ -140,36 +140,36 @@ class Demo:
         """Simulated seconds that the GIF shows in one."""
         return 1.0 if self.duration <= LARGEST_GIF * FRAME_TIME else self.frame_time / FRAME_TIME
 
-    def write_picture(self, path: Path, tick: Callable[[], None] = lambda: None) -> None:
+    def write_picture(self, path: Path, tick: Callable[[], None] = lambda: None, shot: Shot = CHOSEN) -> None:
         """Write a PNG or a GIF, by the ending of its name; `tick` is called for each picture of a GIF."""
         if path.suffix.lower() == ".gif":
-            self.write_gif(path, tick)
+            self.write_gif(path, tick, shot)
         else:
-            self.write_png(path)
+            self.write_png(path, shot)
 
-    def write_gif(self, path: Path, tick: Callable[[], None]) -> None:
+    def write_gif(self, path: Path, tick: Callable[[], None], shot: Shot = CHOSEN) -> None:
         """Draw and write the animation; `tick` is called once per picture."""
         stage = self._stage()
-        renderer = Renderer(*GIF_SIZE, bounds=stage.bounds)
+        renderer = Renderer(*GIF_SIZE, camera=stage.camera(shot), bounds=stage.bounds)
         pictures = []
         for k in range(self.frame_count):
             self._go_to(min(round(k * self.frame_time / self.dt), self._sample_count))
-            pictures.append(renderer.draw(stage.place(world_frame(self.world, text=[f"t = {self.world.time:.2f} s"]))))
+            pictures.append(renderer.draw(self._frame(stage, f"t = {self.world.time:.2f} s", shot)))
             tick()
         renderer.close()
         write_gif(path, pictures, self.speed / self.frame_time)
 
-    def write_png(self, path: Path) -> None:
+    def write_png(self, path: Path, shot: Shot = CHOSEN) -> None:
         """Draw and write the stroboscopic picture: where the bodies were, and how they end."""
         stage = self._stage()
-        renderer = Renderer(*PICTURE_SIZE, bounds=stage.bounds)
+        renderer = Renderer(*PICTURE_SIZE, camera=stage.camera(shot), bounds=stage.bounds)
         pictures = []
         for sample in np.linspace(0, self._last_motion(), STROBES).astype(int):
             self._go_to(int(sample))
             frame = replace(stage.place(world_frame(self.world)), contact_points=(), contact_forces=())
             pictures.append(renderer.draw(frame))
         self._go_to(self._sample_count)
-        frame = stage.place(world_frame(self.world, text=[f"{self.name}, t = 0 .. {self.world.time:g} s"]))
+        frame = self._frame(stage, f"{self.name}, t = 0 .. {self.world.time:g} s", shot)
         pictures.append(renderer.draw(frame))
         empty = without_bodies(frame, renderer.camera(frame))
         write_png(path, stroboscope(pictures, renderer.draw(empty)))
@@ -180,6 +180,9 @@ class Demo:
         speed = np.maximum(np.abs(self.trajectory.linvel), np.abs(self.trajectory.angvel)).max(axis=(1, 2))
         moving = np.flatnonzero(speed > SEEN_SPEED)
         return int(moving[-1]) if len(moving) else 0
+
+    def _frame(self, stage: Stage, text: str, shot: Shot) -> Frame:
+        return stage.place(world_frame(self.world, text=[text], arrows=shot.arrows))
 
     def _stage(self) -> Stage:
         return Stage(self.scene, world_frame(self.world), self.trajectory.pos)

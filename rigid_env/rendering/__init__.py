@@ -5,9 +5,9 @@ a `Renderer` is made, not before. `rendering.picture` makes frames of a `physics
 observations of one.
 """
 
-from rigid_env.rendering.camera import Camera
+from rigid_env.rendering.camera import Camera, fit_camera
 from rigid_env.rendering.frame import BodyView, Frame, GoalView, WallView
 from rigid_env.rendering.layout import Room, make_room
 from rigid_env.rendering.renderer import Renderer
 
-__all__ = ["BodyView", "Camera", "Frame", "GoalView", "Renderer", "Room", "WallView", "make_room"]
+__all__ = ["BodyView", "Camera", "Frame", "GoalView", "Renderer", "Room", "WallView", "fit_camera", "make_room"]

@@ -6,7 +6,7 @@ import numpy as np
 
 from physics import World
 from rigid_env.extras import require
-from rigid_env.rendering.camera import Camera
+from rigid_env.rendering.camera_argument import CameraArgument, as_camera, as_switch
 from rigid_env.rendering.frame import Frame
 from rigid_env.rendering.layout import Room
 from rigid_env.rendering.painter import Painter
@@ -24,7 +24,7 @@ class PixelObserver:
     ----------
     width, height : int
         [px].
-    camera : Camera, optional
+    camera : Camera or mapping, optional
         None looks into the room, see `Renderer`.
     room : Room, optional
         Part of space that is shown, see `make_room`. None takes one that fits the walls and the bodies' sizes of each
@@ -35,7 +35,7 @@ class PixelObserver:
     Raises
     ------
     ValueError
-        On a size that is not positive.
+        On a size that is not positive, or a camera that cannot be.
     gymnasium.error.DependencyNotInstalled
         If pygame is missing.
 
@@ -51,14 +51,14 @@ class PixelObserver:
     """
 
     def __init__(
-        self, width: int, height: int, camera: Camera | None = None, *, room: Room | None = None, arrows: bool = False
+        self, width: int, height: int, camera: CameraArgument = None, *, room: Room | None = None, arrows: bool = False
     ):
         for name, value in (("width", width), ("height", height)):
             if isinstance(value, bool) or not isinstance(value, (int, np.integer)) or value < 1:
                 raise ValueError(f"{name} is {value!r}; allowed are integers of at least 1")
         require("render", "pygame", purpose="pixel observations")
         self.width, self.height = int(width), int(height)
-        self._camera, self._room, self._arrows = camera, room, arrows
+        self._camera, self._room, self._arrows = as_camera(camera), room, as_switch(arrows, "arrows")
         self._painter: Painter | None = None
 
     @property

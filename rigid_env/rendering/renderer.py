@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from rigid_env.rendering import palette
+from rigid_env.rendering.camera_argument import as_camera, as_switch
 from rigid_env.rendering.painter import Painter, import_pygame
 
 MODES = ("rgb_array", "human")
@@ -27,9 +28,10 @@ class Renderer:
         [1/s].
     title : str
         Of the window.
-    camera : Camera or None
-        None chooses one that has the room between the walls in sight: for frames with walls it depends on the
-        walls and the bodies' sizes, without walls also on the positions in the first frame drawn.
+    camera : Camera, mapping or None
+        A mapping has the parameters of a `Camera`, ``{"eye": (0, 8, 20)}``. None chooses one that has the room between
+        the walls in sight: for frames with walls it depends on the walls and the bodies' sizes, without walls also on
+        the positions in the first frame drawn.
     bounds : pair of (3,) float, optional
         [m]. Lower and upper corner of a box that is in sight, too, where no wall bounds the room.
     arrows : bool
@@ -42,7 +44,7 @@ class Renderer:
     gymnasium.error.DependencyNotInstalled
         If pygame is missing.
     ValueError
-        On an unknown mode or a size that is not positive.
+        On an unknown mode, a size that is not positive, or a camera that cannot be.
     """
 
     def __init__(
@@ -55,6 +57,7 @@ class Renderer:
             raise ValueError(f"width and height must be positive, not {width} x {height}")
         self._pygame = import_pygame()
         self.width, self.height, self.mode, self.fps, self.title = int(width), int(height), mode, fps, title
+        camera, arrows = as_camera(camera), as_switch(arrows, "arrows")
         self._painter = Painter((self.width, self.height), camera, bounds=bounds, arrows=arrows)
         self._has_text = text
         self._font = self._window = self._clock = None

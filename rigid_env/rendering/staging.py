@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from physics import Gravity, Scene
-from rigid_env.rendering import BodyView, Frame, WallView
+from rigid_env.rendering import BodyView, Camera, Frame, WallView
+from rigid_env.rendering.camera_argument import as_camera, upwards
 from rigid_env.rendering.geometry import rotation_matrix
 
 Y = np.array((0.0, 1.0, 0.0))
@@ -16,6 +17,29 @@ SIGHT = 100.0  # further from the origin than this the camera travels with the b
 DRAWN_SIZE = 2.0  # a largest body smaller than this is drawn that large [m]
 LONGEST_ARROW = 0.3  # of the extent of the picture
 MOST_ARROWS = 16  # contact points; of more of them no forces are drawn
+
+
+@dataclass(frozen=True)
+class Shot:
+    """View of a motion in pictures.
+
+    Parameters
+    ----------
+    eye : (3,) float, optional
+        Place of the camera, world frame of the scene [m]. None: chosen so that the motion is in sight.
+    target : (3,) float, optional
+        Place in the middle of the picture [m]. None: the middle of the motion.
+    arrows : bool
+        Whether contact points and forces are drawn.
+    """
+
+    eye: tuple[float, float, float] | None = None
+    target: tuple[float, float, float] | None = None
+    arrows: bool = True
+
+
+CHOSEN = Shot()
+"""All of the motion in sight."""
 
 
 class Stage:
@@ -63,6 +87,25 @@ class Stage:
         return replace(
             frame, bodies=bodies, walls=walls, contact_points=points, contact_forces=forces, force_scale=arrow
         )
+
+    def camera(self, shot: Shot) -> Camera | None:
+        """Camera of a shot, in the frame of `place`, with what is up in the scene upwards; None where none is chosen.
+
+        Without a target it looks at the middle of the motion. Where the picture travels with body 0, both places are
+        counted from it.
+
+        Raises
+        ------
+        ValueError
+            The two places are one.
+        """
+        if shot.eye is None:
+            return None
+        middle = np.zeros(3) if self.bounds is None else 0.5 * np.add(*self.bounds)
+        eye = self._scale * self._matrix @ shot.eye
+        target = middle if shot.target is None else self._scale * self._matrix @ shot.target
+        eye, target = tuple(eye.tolist()), tuple(target.tolist())
+        return as_camera(Camera(eye, target, upwards(eye, target)))
 
     def _placed(self, body: BodyView, matrix: np.ndarray) -> BodyView:
         corners = {} if body.corners is None else {"corners": self._scale * np.asarray(body.corners)}

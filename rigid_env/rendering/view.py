@@ -8,6 +8,7 @@ import numpy as np
 
 from rigid_env.extras import require
 from rigid_env.rendering import Frame, GoalView, Renderer, Room, make_room
+from rigid_env.rendering.camera_argument import CameraArgument, as_camera, as_switch
 from rigid_env.rendering.picture import WEIGHT_ARROW, world_frame
 from rigid_env.tasks import Task
 
@@ -53,21 +54,35 @@ class View:
     fps : float
         [1/s].
     title : str
+    camera : Camera, mapping or None
+        As of `rigid_env.rendering.camera_argument.as_camera`.
+    arrows : bool
+        Whether contacts, forces and torques are drawn.
 
     Raises
     ------
     ValueError
-        On an unknown mode or a size that is not positive.
+        On an unknown mode, a size that is not positive, or a camera that cannot be.
     gymnasium.error.DependencyNotInstalled
         If there is a mode, but no pygame.
     """
 
-    def __init__(self, mode: str | None, width: int, height: int, fps: float, title: str):
+    def __init__(
+        self,
+        mode: str | None,
+        width: int,
+        height: int,
+        fps: float,
+        title: str,
+        camera: CameraArgument = None,
+        arrows: bool = True,
+    ):
         if mode is not None and mode not in RENDER_MODES:
             raise ValueError(f"render_mode is {mode!r}; allowed are None, {', '.join(map(repr, RENDER_MODES))}")
         for name, value in (("width", width), ("height", height)):
             if isinstance(value, bool) or not isinstance(value, (int, np.integer)) or value < 1:
                 raise ValueError(f"{name} is {value!r}; allowed are integers of at least 1")
+        self.camera, self.arrows = as_camera(camera), as_switch(arrows, "arrows")
         if mode is not None:
             require("render", "pygame", purpose="rendering")
         self.mode, self.width, self.height, self.fps, self.title = mode, width, height, fps, title
@@ -76,8 +91,8 @@ class View:
     def draw(self, task: Task, world: int = 0) -> np.ndarray:
         """(height, width, 3) uint8 picture of one world; in mode "human" it is shown in the window, too."""
         if self._renderer is None:
-            self._renderer = Renderer(self.width, self.height, self.mode, self.fps, self.title)
-        return self._renderer.draw(frame_of(task, world))
+            self._renderer = Renderer(self.width, self.height, self.mode, self.fps, self.title, self.camera)
+        return self._renderer.draw(frame_of(task, world, self.arrows))
 
     def close(self) -> None:
         """Close the window, if any. May be called again."""

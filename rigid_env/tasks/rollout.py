@@ -8,10 +8,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from physics import validation
+from physics.html_table import parts_table
 from physics.keywords import known_keywords
 from physics.parallel.bound_call import bound_alike
 from physics.parallel.exclusive import exclusive
-from physics.summary import lines_repr
+from physics.summary import parts_repr
 from physics.world.batch_arrays import machine_memory
 from physics.world.report import Status, gravest
 from rigid_env.tasks import layout as col
@@ -68,11 +69,14 @@ class TaskRollout:
         arrays = (self.rewards, self.success, self.failure, self.observations, self.status)
         return sum(array.nbytes for array in arrays if array is not None)
 
-    def __repr__(self) -> str:
+    __repr__ = parts_repr
+    _repr_html_ = parts_table
+
+    def _parts(self) -> tuple[str, ...]:
         worlds, length = self.rewards.shape
         observed = "no observations" if self.observations is None else f"{self.observations.shape[1]} observations"
-        return lines_repr(
-            "TaskRollout", f"{worlds} worlds", f"{length} control steps", observed,
+        return (
+            f"{worlds} worlds", f"{length} control steps", observed,
             f"returns {self.returns.min():.4g} to {self.returns.max():.4g}", f"status {self._worst.name}",
             f"{self.nbytes / MEBIBYTE:.3g} MiB",
         )  # fmt: skip

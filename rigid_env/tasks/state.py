@@ -14,6 +14,7 @@ import numpy as np
 
 import physics
 from physics import validation
+from physics.html_table import parts_table
 from physics.world import choice, restoring
 from physics.world.headed_file import FileKind
 from rigid_env.tasks.state_settings import check_settings
@@ -64,7 +65,12 @@ class TaskState:
         return len(self.generators)
 
     def __repr__(self) -> str:
-        return f"TaskState({self.task}, {self.worlds} worlds, time={self.world.time:.6g} s)"
+        return f"TaskState({', '.join(self._parts())})"
+
+    _repr_html_ = parts_table
+
+    def _parts(self) -> tuple[str, ...]:
+        return self.task, f"{self.worlds} worlds", f"time={self.world.time:.6g} s"
 
     def save(self, path: str | os.PathLike) -> Path:
         """Write it as ``.npz`` (`load` reads it); returns the path.

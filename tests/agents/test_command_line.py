@@ -85,6 +85,24 @@ def test_record_a_baseline(tmp_path, monkeypatch, suffix, start):
     assert start in path.read_bytes()[:12]
 
 
+def test_record_from_an_eye_without_arrows(tmp_path, monkeypatch):
+    make, made = record.make_single_env, {}
+
+    def kept(env, **arguments):
+        made.update(arguments)
+        return make(env, max_episode_steps=2, **arguments)
+
+    monkeypatch.setattr(record, "make_single_env", kept)
+    options = ("--baseline", "random", "--episodes", 1, "--out", tmp_path / "video.gif")
+    result = run(record, *options, "--eye", 0, 12, 20, "--no-arrows")
+    assert result.exit_code == 0, result.output
+    assert made["camera"].eye == (0.0, 12.0, 20.0)
+    assert made["arrows"] is False
+    result = run(record, *options, "--target", 0, 1, 0)
+    assert result.exit_code == 2
+    assert "--target is (0.0, 1.0, 0.0) without --eye" in result.output
+
+
 def test_video_without_ffmpeg_is_a_gif(tmp_path, monkeypatch):
     make = record.make_single_env
     monkeypatch.setattr(record, "make_single_env", lambda env, **kw: make(env, max_episode_steps=5, **kw))

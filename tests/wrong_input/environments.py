@@ -106,6 +106,8 @@ CASES = [
     ),
     Case("render-mode", lambda: BlockReachEnv(render_mode="ansi"), ("render_mode", "'ansi'", "'rgb_array'")),
     Case("width", lambda: BlockReachEnv(width="960"), ("width", "'960'", "at least 1")),
+    Case("camera", lambda: BlockReachEnv(camera=(0, 9, 20)), ("camera", "(0, 9, 20)", "a Camera, a dict")),
+    Case("arrows", lambda: BlockReachVectorEnv(2, arrows="none"), ("arrows", "'none'", "True and False")),
     Case("num-envs-zero", lambda: BlockReachVectorEnv(0), ("num_envs", "0", "at least 1")),
     Case("num-envs-negative", lambda: BlockReachVectorEnv(-1), ("num_envs", "-1", "at least 1")),
     Case("num-envs-half", lambda: BlockReachVectorEnv(2.5), ("num_envs", "2.5", "at least 1")),

@@ -1,0 +1,66 @@
+"""Options of commands that draw: from where, towards what, and with arrows or without."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+if TYPE_CHECKING:
+    from rigid_env.rendering import Camera
+    from rigid_env.rendering.staging import Shot
+
+Point = tuple[float, float, float]
+
+EyeOption = Annotated[
+    Point | None, typer.Option("--eye", metavar="X Y Z", help="Place of the camera [m]; chosen by default.")
+]
+TargetOption = Annotated[
+    Point | None, typer.Option("--target", metavar="X Y Z", help="Place in the middle of the picture [m], with --eye.")
+]
+ArrowsOption = Annotated[
+    bool, typer.Option("--arrows/--no-arrows", help="Draw contact points, forces and torques, or leave them out.")
+]
+
+
+def checked_camera(eye: Point | None, target: Point | None) -> Camera | None:
+    """Camera of the options, with y upwards, or -z where it looks straight up or down; None where there is no eye.
+
+    Parameters
+    ----------
+    eye : (3,) float or None
+        [m], world frame.
+    target : (3,) float or None
+        [m], world frame; None: the origin.
+
+    Raises
+    ------
+    typer.BadParameter
+        A target without an eye, numbers that are not finite, or two equal places.
+    """
+    from rigid_env.rendering.camera_argument import as_camera, upwards
+
+    if eye is None:
+        if target is not None:
+            raise typer.BadParameter(f"--target is {target} without --eye; allowed is --eye alone, or both")
+        return None
+    target = (0.0, 0.0, 0.0) if target is None else target
+    try:
+        return as_camera({"eye": eye, "target": target, "up": upwards(eye, target)})
+    except ValueError as error:
+        raise typer.BadParameter(str(error)) from error
+
+
+def checked_shot(eye: Point | None, target: Point | None, arrows: bool) -> Shot:
+    """View of a motion that the options ask for; without a target the middle of the motion is in the picture's.
+
+    Raises
+    ------
+    typer.BadParameter
+        As of `checked_camera`.
+    """
+    from rigid_env.rendering.staging import Shot
+
+    anywhere = (0.0, 0.0, 0.0) if eye is None or any(eye) else (0.0, 0.0, -1.0)  # the middle is known later
+    checked_camera(eye, anywhere if eye is not None and target is None else target)
+    return Shot(eye, target, arrows)
