@@ -233,7 +233,9 @@ def _set_array(view, name, shape):
         array.setflags(write=False)
     if array.size == 0 and shape[0] in (-1, 0):
         array = array.reshape(0, *shape[1:])
-    if array.ndim != len(shape) or any(want not in (-1, have) for want, have in zip(shape, array.shape)):
+    if array.shape != shape and (
+        array.ndim != len(shape) or any(want not in (-1, have) for want, have in zip(shape, array.shape))
+    ):
         raise ValueError(f"{name} must have shape {shape}, not {array.shape}")
     object.__setattr__(view, name, array)
 
