@@ -62,8 +62,8 @@ class Bodies:
         if is_asleep is not None and np.any(is_asleep):
             colours[is_asleep] = np.rint((1.0 - ASLEEP_SHARE) * colours[is_asleep] + ASLEEP_SHARE * np.array(ASLEEP))
         pos, size, quat = (
-            np.array([getattr(body, name) for body in bodies]).reshape(count, -1)
-            for name in ("pos", "dimensions", "quat")
+            np.array([getattr(body, name) for body in bodies]).reshape(count, width)
+            for name, width in (("pos", 3), ("dimensions", 3), ("quat", 4))
         )
         drawn = self._placement.drawn(pos), (self._placement.scale * size).astype(np.float32), quat.astype(np.float32)
         if keys != self._keys:

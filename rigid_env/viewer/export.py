@@ -48,7 +48,7 @@ def to_html(
     path : str or Path
         Of the file; it is written whole or not at all.
     scene : Scene, optional
-        Of a trajectory, which has no shapes; its fields are drawn. Of looks: only the latter.
+        Of a trajectory that does not hold its own: shapes and fields. Of looks: only fields are taken from it.
     duration : float
         Looks later than this after the first are left out [s].
     fps : float
@@ -91,6 +91,7 @@ def html_of(source, *, scene=None, duration=10.0, fps=30.0, layers=None, title="
     shown = [name for name, is_on in LAYERS.items() if is_on] if layers is None else list(layers)
     for name in shown:
         validation.one_of(name, LAYERS, "layers")
+    scene = getattr(source, "scene", None) if scene is None else scene
     looks = list(taken(_looks(source, scene), duration, 1.0 / fps))
     if not looks:
         raise ValueError("source has no looks; allowed is at least one")

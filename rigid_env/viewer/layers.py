@@ -102,7 +102,7 @@ class Forces:
 
 
 class Applied:
-    """Arrow of the force that is applied to body 0, from its surface, and arc of the torque round it."""
+    """Arrows of the forces that are applied to bodies, from their surfaces, and arcs of the torques round them."""
 
     def __init__(self, scene, placement: Placement):
         self._force = Arrows(scene, "/scene/applied/force", placement)
@@ -112,17 +112,20 @@ class Applied:
 
     def show(self, look: Look) -> None:
         frame = look.frame
-        if not frame.bodies:
+        if not frame.bodies or not len(frame.applied_force):
             self.hide()
             return
-        body, scale = frame.bodies[0], force_scale(frame, self._unit)
-        start = leave(body, frame.applied_force)
-        self._force.show(start[None], scale * frame.applied_force[None], palette.APPLIED_FORCE)
-        arc = torque_arc(body, scale * frame.applied_torque)
-        self._arc.show(path(arc) if len(arc) else ())
-        ends = arc[-2:-1], arc[-1:]
-        lengths = np.linalg.norm(ends[1] - ends[0], axis=1, keepdims=True)
-        self._turn.show(ends[1], HEAD_LENGTH * self._unit * (ends[1] - ends[0]) / lengths, palette.TORQUE)
+        scale = force_scale(frame, self._unit)
+        forces, torques = scale * frame.applied_force, scale * frame.applied_torque
+        starts = np.array([leave(body, force) for body, force in zip(frame.bodies, forces)])
+        self._force.show(starts, forces, palette.APPLIED_FORCE)
+        arcs = [torque_arc(body, torque) for body, torque in zip(frame.bodies, torques)]
+        arcs = [arc for arc in arcs if len(arc)]
+        self._arc.show(np.concatenate([path(arc) for arc in arcs]) if arcs else ())
+        ends = np.array([arc[-2:] for arc in arcs]).reshape(-1, 2, 3)
+        ways = ends[:, 1] - ends[:, 0]
+        lengths = np.linalg.norm(ways, axis=1, keepdims=True)
+        self._turn.show(ends[:, 1], HEAD_LENGTH * self._unit * ways / lengths, palette.TORQUE)
 
     def hide(self) -> None:
         for part in (self._force, self._turn, self._arc):
@@ -154,6 +157,9 @@ class Axes:
         self._scene, self._placement, self._node, self._count = scene, placement, None, 0
 
     def show(self, look: Look) -> None:
+        if not look.frame.bodies:
+            self.hide()
+            return
         poses, scale = look.frame.poses, self._placement.scale
         pos, sizes = self._placement.drawn(poses.pos), (AXIS * 2.0 * scale * np.asarray(look.radius)).astype(np.float32)
         quat = np.array([body.quat for body in look.frame.bodies], dtype=np.float32).reshape(-1, 4)
@@ -180,6 +186,9 @@ class Bounds:
         self._scene, self._placement, self._nodes, self._count = scene, placement, [], 0
 
     def show(self, look: Look) -> None:
+        if not look.frame.bodies:
+            self.hide()
+            return
         pos = self._placement.drawn(look.frame.poses.pos)
         sizes = (self._placement.scale * np.asarray(look.radius)).astype(np.float32)
         if len(pos) != self._count:

@@ -30,7 +30,7 @@ SHADE, SHADE_DISTANCE, SHADE_REACH = 0.02, 40.0, 9.0
 
 
 def light(scene) -> None:
-    """Light the scene as `rendering.palette` does: from the sun and the sky, with shadows on floor and walls.
+    """Light the scene as `rendering.palette` does: from the sun and the sky, with shadows on floors.
 
     Shadows come from one weak spot. viser's shadows of a light from afar take three maps of the scene, each as large
     as the spot's: drawn without a GPU, a picture takes ten times as long.
@@ -102,7 +102,8 @@ def _add_pane(scene, name, corners, is_floor: bool) -> list:
     fan = np.array([(0, k, k + 1) for k in range(1, len(corners) - 1)], dtype=np.uint32)
     pane = scene.add_mesh_simple(
         name, corners, fan, color=palette.FLOOR if is_floor else palette.WALL, flat_shading=True, cast_shadow=False,
-        opacity=None if is_floor else WALL_OPACITY, side="double" if is_floor else "front", receive_shadow=FLOOR_SHADOW,
+        opacity=None if is_floor else WALL_OPACITY, side="double" if is_floor else "front",
+        receive_shadow=FLOOR_SHADOW if is_floor else False,
     )  # fmt: skip
     sides = np.stack([corners, np.roll(corners, -1, axis=0)], axis=1)
     return [
@@ -127,8 +128,7 @@ def _is_rectangle(corners, normal) -> bool:
 def _turn_to(axes) -> np.ndarray:
     """Unit quaternion (4,), scalar first, of the rotation with these columns.
 
-    The eigenvector of the largest eigenvalue: Bar-Itzhack, *New method for extracting the quaternion from a rotation
-    matrix*, JGCD 23, 2000.
+    It is the eigenvector of the largest eigenvalue of a symmetric matrix (Bar-Itzhack 2000).
     """
     K = np.array([
         [axes[0, 0] - axes[1, 1] - axes[2, 2], 0, 0, 0],

@@ -136,7 +136,8 @@ class Viewer:
         if phase == "end":
             self._inbox.put(session.release)
         else:
-            self._inbox.put(lambda: session.drag(body, point, target))
+            arm = point + session.subject.world.params[body, at.CENTER : at.CENTER + 3]  # from the centre of mass
+            self._inbox.put(lambda: session.drag(body, arm, target))
 
     def _clicked(self, body: int, _point: np.ndarray, direction: np.ndarray) -> None:
         session, speed = self._session, self._panel.kick_speed

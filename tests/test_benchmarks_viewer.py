@@ -1,0 +1,30 @@
+"""Pictures a second and sizes of files: that both are measured. No test asserts a time."""
+
+import json
+
+import pytest
+import typer
+from typer.testing import CliRunner
+
+pytest.importorskip("viser")
+
+from benchmarks import viewer
+
+
+def test_a_quick_run_writes_what_it_found(tmp_path):
+    app = typer.Typer()
+    app.command()(viewer.main)
+    found = CliRunner().invoke(app, ["--quick", "--json", str(tmp_path / "v.json")])
+    assert found.exit_code == 0, found.output
+    rows = {row["key"]: row for row in json.loads((tmp_path / "v.json").read_text())["rows"]}
+    assert list(rows) == ["pictures_1", "pictures_100", "file_1", "file_50"]
+    assert rows["file_1"]["ours"]["median"] > 0.5
+    assert rows["pictures_100"]["notes"]["shown"]["median"] > 0.0
+
+
+def test_every_body_moves_and_turns_in_every_look():
+    before, after = list(viewer.motion(7, 0.05))[:2]
+    assert before.time < after.time
+    for one, other in zip(before.frame.bodies, after.frame.bodies):
+        assert (one.pos != other.pos).all()
+        assert (one.quat != other.quat).any()

@@ -1,0 +1,121 @@
+"""A real browser for tests of the viewer: a system's Chromium without a window or a GPU, driven by Playwright."""
+
+from __future__ import annotations
+
+import base64
+import io
+import shutil
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from urllib.parse import urlsplit
+
+import numpy as np
+import pytest
+
+PROGRAMS = ("chromium", "chromium-browser", "google-chrome")
+
+ARGUMENTS = (
+    "--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader",
+    "--ignore-gpu-blocklist", "--disable-background-networking", "--disable-component-update", "--disable-sync",
+    "--no-first-run",
+)  # fmt: skip
+"""Of Chromium: WebGL in software, and nothing on its own account over the network."""
+
+SIZE = {"width": 640, "height": 400}
+"""[px]. Small, as every pixel is drawn in software."""
+
+PATIENCE = 240.0
+"""[s]. Time after which a test gives up; a machine that others use draws a picture in seconds."""
+
+CANVAS = "canvas[data-engine]"
+
+
+class Watched:
+    """A page, and what it should not do.
+
+    Attributes
+    ----------
+    page : playwright.sync_api.Page
+    leaving : list of str
+        Addresses of requests to other machines.
+    errors : list of str
+        Errors on the console, and those that nobody caught.
+    """
+
+    def __init__(self, page):
+        self.page, self.leaving, self.errors = page, [], []
+        page.set_default_timeout(1e3 * PATIENCE)
+        page.on("request", lambda request: self._note(request.url))
+        page.on("websocket", lambda socket: self._note(socket.url))
+        page.on("console", lambda message: message.type == "error" and self.errors.append(message.text))
+        page.on("pageerror", lambda error: self.errors.append(str(error)))
+
+    def _note(self, url: str) -> None:
+        parts = urlsplit(url)
+        if parts.scheme in ("http", "https", "ws", "wss") and parts.hostname != "127.0.0.1":
+            self.leaving.append(url)
+
+    def open(self, url: str) -> None:
+        """Open a page of the viewer and wait until there is a picture to draw on."""
+        self.page.goto(url)
+        self.page.wait_for_selector(CANVAS, state="attached")
+
+    def picture(self) -> np.ndarray:
+        """(height, width, 3) uint8: the scene without the panels on it."""
+        from PIL import Image
+
+        drawn = self.page.evaluate(f"document.querySelector('{CANVAS}').toDataURL('image/png')")
+        with Image.open(io.BytesIO(base64.b64decode(drawn.split(",", 1)[1]))) as image:
+            return np.asarray(image.convert("RGB"))
+
+    def wait_for(self, is_right: Callable[[np.ndarray], bool]) -> np.ndarray:
+        """Wait for a picture for which `is_right` is true, and return it."""
+        end = time.monotonic() + PATIENCE
+        while not is_right(picture := self.picture()):
+            assert time.monotonic() < end, "the picture does not become right"
+            self.page.wait_for_timeout(200)
+        return picture
+
+    def assert_quiet(self) -> None:
+        """Nothing went to another machine, and no error came."""
+        assert self.leaving == []
+        assert self.errors == []
+
+
+@contextmanager
+def open_browser() -> Iterator[Watched]:
+    """Page of a browser; the test skips where there is none."""
+    pytest.importorskip("viser", reason="the extra `view` is not installed")
+    pytest.importorskip("PIL", reason="the extra `render` is not installed")
+    api = pytest.importorskip("playwright.sync_api", reason="Playwright is not installed")
+    program = next(filter(None, map(shutil.which, PROGRAMS)), None)
+    if program is None:
+        pytest.skip(f"no browser is installed: looked for {', '.join(PROGRAMS)}")
+    if is_memory_limited():
+        pytest.skip("the address space of processes is limited here, of which a browser needs more than it uses")
+    with api.sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=program, args=list(ARGUMENTS))
+        try:
+            yield Watched(browser.new_page(viewport=SIZE))
+        finally:
+            browser.close()
+
+
+def is_memory_limited() -> bool:
+    """True if processes may not reserve as many addresses as they like."""
+    try:
+        import resource
+    except ImportError:
+        return False
+    return resource.getrlimit(resource.RLIMIT_AS)[0] != resource.RLIM_INFINITY
+
+
+def share_of(picture: np.ndarray, colour, tolerance: float = 60.0) -> float:
+    """Share of a picture's pixels that are near a colour (3,) in every channel."""
+    return float((np.abs(picture.astype(float) - np.asarray(colour)).max(axis=2) < tolerance).mean())
+
+
+def change(before: np.ndarray, after: np.ndarray) -> float:
+    """Share of pixels that differ visibly."""
+    return float((np.abs(before.astype(int) - after).max(axis=2) > 8).mean())
