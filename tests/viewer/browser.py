@@ -57,8 +57,11 @@ class Watched:
             self.leaving.append(url)
 
     def open(self, url: str) -> None:
-        """Open a page of the viewer and wait until there is a picture to draw on."""
-        self.page.goto(url)
+        """Open a page of the viewer and wait until there is a picture to draw on.
+
+        viser draws fewer pixels on a machine that is busy, unless it is told how many.
+        """
+        self.page.goto(f"{url}{'&' if '?' in url else '?'}fixedDpr=1")
         self.page.wait_for_selector(CANVAS, state="attached")
 
     def picture(self) -> np.ndarray:
