@@ -28,6 +28,7 @@ runner = CliRunner()
 COMMANDS = {
     "demo": (), "run": ("rest",), "replay": ("none.npz",), "explain": ("rest",), "warmup": (), "bench": (),
     "effects": (), "accuracy": (), "tosses": ("none.npz",), "hard-cases": (), "describe": ("rigid_env/BlockReach-v0",),
+    "view": ("rest",),
 }  # fmt: skip
 
 CART = Path(__file__).parents[2] / "examples" / "cart.toml"
@@ -93,10 +94,17 @@ def written_options():
 
 
 def test_every_command_that_measures_has_json():
-    assert {name for name, option in written_options() if option == "--json"} == set(COMMANDS)
+    assert {name for name, option in written_options() if option == "--json"} == set(COMMANDS) - {"view"}
 
 
-ENDINGS = {"--json": ".json", "--npz": ".npz", "--csv": ".csv", "--plot": ".png", "--markdown": ".md"}
+ENDINGS = {
+    "--json": ".json",
+    "--npz": ".npz",
+    "--csv": ".csv",
+    "--plot": ".png",
+    "--markdown": ".md",
+    "--export": ".html",
+}
 
 
 @pytest.mark.parametrize(("command", "option"), written_options())
