@@ -36,7 +36,8 @@ class Panel:
     def __init__(self, gui, session: Session, stage: Stage, post: Callable[[Callable[[], Any]], None]):
         self._gui, self._session, self._stage, self._post = gui, session, stage, post
         self._status = gui.add_markdown("")
-        self._is_telling = False
+        self._sliders: dict[str, Any] = {}
+        self._accuracy = None
         with gui.add_folder("Time"):
             self._time_controls()
         if any((session.can.gravity, session.can.friction, session.can.restitution, session.can.accuracy)):
@@ -63,18 +64,14 @@ class Panel:
         text = self._cost_text()
         self._put(self._status, "content", "  \n".join(filter(None, (session.message, text))) or "ready")
         first, last = session.span
-        self._is_telling = True  # a slider that is set here calls back, too
-        try:
-            self._put(self._slider, "max", max(last, first + 1e-3))
-            self._put(self._slider, "min", first)
-            self._put(self._slider, "value", min(max(session.time, first), last))
-            self._put(self._play, "label", "Pause" if session.is_playing else "Play")
-            for name, slider in self._sliders.items():
-                self._put(slider, "value", session.settings[name])
-            if self._accuracy is not None and not session.is_compiling:
-                self._put(self._accuracy, "value", session.accuracy)
-        finally:
-            self._is_telling = False
+        self._put(self._slider, "max", max(last, first + 1e-3))
+        self._put(self._slider, "min", first)
+        self._put(self._slider, "value", min(max(session.time, first), last))
+        self._put(self._play, "label", "Pause" if session.is_playing else "Play")
+        for name, slider in self._sliders.items():
+            self._put(slider, "value", session.settings[name])
+        if self._accuracy is not None and not session.is_compiling:
+            self._put(self._accuracy, "value", session.accuracy)
         self._plots.show(session.samples)
         self._events.show(session.events)
 
@@ -108,7 +105,6 @@ class Panel:
 
     def _physics_controls(self) -> None:
         gui, session = self._gui, self._session
-        self._sliders = {}
         for name, value in session.settings.items():
             label, low, high, step = SLIDERS[name]
             self._sliders[name] = gui.add_slider(label, low, max(high, value), step, value)
@@ -129,9 +125,6 @@ class Panel:
         for name in LAYERS:
             box = self._gui.add_checkbox(name, self._stage.has_layer(name))
             self._when(box, lambda value, name=name: self._stage.set_layer(name, value))
-
-    _sliders: dict[str, Any] = {}  # noqa: RUF012 - of subjects without controls
-    _accuracy = None
 
     # --- callbacks -------------------------------------------------------------------------------------------------
 

@@ -64,7 +64,7 @@ class Viewer:
         if session.can.drag:
             self._stage.on_drag(self._dragged)
             self._stage.on_click(self._clicked)
-        self._is_running, self._note = False, ""
+        self._is_running = False
         self._drawn: float | None = None
         self.address = f"http://{_shown_host(host)}:{self._server.get_port()}"
 
@@ -75,12 +75,12 @@ class Viewer:
         try:
             while self._is_running:
                 now = time.perf_counter()
-                is_new = self.turn(now - before)
+                self.turn(now - before)
                 if now >= texts and self._server.get_clients():
                     self._panel.show()
                     texts = now + 1.0 / TEXTS
                 before = now
-                self._rest(now, is_new)
+                self._rest(now)
         except KeyboardInterrupt:
             pass
         finally:
@@ -105,8 +105,8 @@ class Viewer:
         self._is_running = False
         stop_server(self._server)
 
-    def _rest(self, since: float, is_new: bool) -> None:
-        """Wait for the next picture, or for the user."""
+    def _rest(self, since: float) -> None:
+        """Wait for the next picture."""
         left = since + 1.0 / FPS - time.perf_counter()
         if left > 0.0:
             time.sleep(left)
