@@ -88,21 +88,26 @@ def test_whoever_is_fast_each_world_is_taken_once(size, worlds, chunk, random):
 
 @kernel
 def visit(visits, k, pauses, begun):
-    """Wait, and note it; -1 instead of a number of pauses raises. The one that leads waits until all have begun."""
+    """Wait, and note it. The one that leads waits until all have begun.
+
+    Instead of a number of pauses, -1 raises, and -2 (HELD) waits until something else stands there.
+    """
     atomic_add(begun, 0, 0, 1)
     while k == 0 and atomic_load(begun, 0, 0) % visits.shape[1] != 0:
         spin_pause()
-    if pauses[k] < 0:
+    while atomic_load(pauses, 0, k) == -2:
+        spin_pause()
+    if pauses[0, k] < 0:
         raise ZeroDivisionError("this thread")
-    for _ in range(pauses[k]):
+    for _ in range(pauses[0, k]):
         spin_pause()
     atomic_add(visits, 0, k, 1)
 
 
 def visitors(size: int, pauses=0) -> tuple[list, np.ndarray, np.ndarray]:
     """Calls for so many threads; what they note, and how long each waits."""
-    visits, pauses, begun = np.zeros((1, size), dtype=np.int64), np.full(size, pauses), np.zeros((1, 1), dtype=np.int64)
-    return [bound(visit, visits, k, pauses, begun) for k in range(size)], visits, pauses
+    visits, pauses, begun = np.zeros((1, size), np.int64), np.full((1, size), pauses), np.zeros((1, 1), np.int64)
+    return [bound(visit, visits, k, pauses, begun) for k in range(size)], visits, pauses[0]
 
 
 @pytest.fixture
@@ -121,6 +126,7 @@ def sent(monkeypatch) -> list:
 
 
 SLOW = 2_000_000  # pauses: some hundredths of a second
+HELD = -2  # until it is let go: for tests that would fail if the one that leads were the slower one
 
 
 @pytest.mark.parametrize(("patience", "stay"), [(0.0, 0.0), (10.0, 0.0), (0.0, 10.0), (10.0, 10.0)])
@@ -195,12 +201,13 @@ def test_after_an_interrupt_the_team_waits_for_who_is_busy(delay, sent, monkeypa
     monkeypatch.setattr(Team, "_be_member", lambda team, member: (time.sleep(delay), be_member(team, member)))
     team, (calls, visits, pauses) = Team(2, 100), visitors(2)
     team.run(calls)
-    pauses[1] = SLOW
+    pauses[1] = HELD
     with monkeypatch.context() as patch:
         patch.setattr(Team, "_let_go", interrupt)
         with pytest.raises(KeyboardInterrupt):
             team.run(calls)
     others, seen, _ = visitors(2)
+    threading.Timer(0.05, pauses.__setitem__, (1, 0)).start()
     team.run(others)
     assert visits.tolist() == [[2, 2]]
     assert seen.tolist() == [[1, 1]]
