@@ -49,20 +49,7 @@ def view(
             make_parents(export)
             _export(what, export, duration, settings, console)
             return
-        from rigid_env.viewer.server import Viewer, directions
-        from rigid_env.viewer.session import Session
-        from rigid_env.viewer.subject import open_subject
-
-        session = Session(open_subject(what, **settings))
-        viewer = Viewer(session, host, port)
-        session.play()
-        for text in directions(viewer, host):
-            console.print(text, soft_wrap=True, highlight=False)
-        if browser:
-            import webbrowser
-
-            webbrowser.open(viewer.address)
-        viewer.run()
+        _serve(what, host, port, browser, settings, console)
         say(console, "viewer", "ended")
 
 
@@ -73,3 +60,27 @@ def _export(what: str, path: Path, duration: float, settings: dict, console) -> 
         to_html(what, path, duration=duration, **settings)
     tell_file(path, console)
     say(console, "size", f"{path.stat().st_size / 1e6:.2f} MB")
+
+
+def _serve(what: str, host: str, port: int, browser: bool, settings: dict, console) -> None:
+    """Serve until Ctrl-C. The page is there first: the browser loads it while the engine is imported."""
+    from rigid_env.viewer.servers import address_of, directions, start_viewer_server, stop_server
+
+    server = start_viewer_server(what, host, port)
+    try:
+        for text in directions(server):
+            console.print(text, soft_wrap=True, highlight=False)
+        if browser:
+            import webbrowser
+
+            webbrowser.open(address_of(server))
+        from rigid_env.viewer.server import Viewer
+        from rigid_env.viewer.session import Session
+        from rigid_env.viewer.subject import open_subject
+
+        session = Session(open_subject(what, **settings))
+        viewer = Viewer(session, server)
+        session.play()
+        viewer.run()
+    finally:
+        stop_server(server)

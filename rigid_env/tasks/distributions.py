@@ -11,7 +11,6 @@ from abc import ABC, abstractmethod
 from collections.abc import Mapping
 
 import numpy as np
-from scipy.special import ndtr, ndtri
 
 LAST = float(np.nextafter(1.0, 0.0))
 """Largest uniform number."""
@@ -235,9 +234,13 @@ class Normal(_Elementwise):
             raise ValueError(f"deviation of Normal is {deviation!r}; allowed are numbers above 0")
         if not (self.low < self.high).all():
             raise ValueError(f"Normal has low {low!r} and high {high!r}; allowed is low below high")
+        from scipy.special import ndtr  # half a second, for those who draw from one
+
         self._ends = tuple(ndtr((end - self.mean) / self.deviation) for end in (self.low, self.high))
 
     def at(self, shares, drawn):
+        from scipy.special import ndtri
+
         low, high = self._ends
         values = self.mean + self.deviation * ndtri(low + (high - low) * self._row(shares))
         return np.clip(values, self.low, self.high)

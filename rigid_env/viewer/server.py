@@ -9,10 +9,9 @@ from typing import Any
 
 import numpy as np
 
-from physics import validation
 from physics.kernels.state import layout as at
 from rigid_env.viewer.panel import Panel
-from rigid_env.viewer.servers import LOOPBACK, start_server, stop_server
+from rigid_env.viewer.servers import address_of, stop_server
 from rigid_env.viewer.session import Session
 from rigid_env.viewer.stage import Stage
 
@@ -22,8 +21,6 @@ FPS = 60.0
 TEXTS = 5.0
 """Times a second at which numbers, plots and lists are brought up to date [1/s]."""
 
-PORT = 8080
-
 
 class Viewer:
     """A session in a browser: server, picture and panel.
@@ -31,42 +28,29 @@ class Viewer:
     Parameters
     ----------
     session : Session
-    host : str
-        Address to serve on. The loopback address by default: nobody else reaches it.
-    port : int
-        Port to serve on; where it is taken, the next one that is free.
+    server : viser.ViserServer
+        Of `rigid_env.viewer.servers.start_viewer_server`; it ends with the viewer.
 
     Attributes
     ----------
     address : str
         Where it is served.
-
-    Raises
-    ------
-    ValueError
-        On a port that is none.
-    gymnasium.error.DependencyNotInstalled
-        If viser is missing.
-    OSError
-        If `host` is no address of this machine.
     """
 
-    def __init__(self, session: Session, host: str = LOOPBACK, port: int = PORT):
-        port = validation.count(port, "port", most=65_535)
-        self._session = session
+    def __init__(self, session: Session, server):
+        self._session, self._server = session, server
         self._inbox: queue.SimpleQueue[Callable[[], Any]] = queue.SimpleQueue()
-        self._server = start_server(host, port, f"rigid-env: {session.subject.name}")
-        self._server.gui.configure_theme(show_logo=False, show_share_button=False)
-        self._server.gui.main_panel.dock_right()
-        self._stage = Stage(self._server, fields=getattr(session.subject, "scene", None))
+        self.address = address_of(server)
+        self._stage = Stage(server, fields=getattr(session.subject, "scene", None))
         self._stage.show(session.look())
-        self._panel = Panel(self._server.gui, session, self._stage, self._inbox.put)
+        server.gui.reset()
+        server.gui.set_panel_label(f"rigid-env: {session.subject.name}")
+        self._panel = Panel(server.gui, session, self._stage, self._inbox.put)
         if session.can.drag:
             self._stage.on_drag(self._dragged)
             self._stage.on_click(self._clicked)
         self._is_running = False
         self._drawn: float | None = None
-        self.address = f"http://{_shown_host(host)}:{self._server.get_port()}"
 
     def run(self) -> None:
         """Serve until `stop`, or Ctrl-C."""
@@ -148,16 +132,3 @@ class Viewer:
 def _mass(session: Session, body: int) -> float:
     """[kg]."""
     return float(1.0 / session.subject.world.params[body, at.INV_MASS])
-
-
-def _shown_host(host: str) -> str:
-    return "localhost" if host in (LOOPBACK, "localhost", "::1") else host
-
-
-def directions(viewer: Viewer, host: str) -> list[str]:
-    """Lines that say where the viewer is, and how to reach it from another machine."""
-    port = viewer.address.rsplit(":", 1)[1]
-    lines = [f"viewer      {viewer.address}"]
-    if host == LOOPBACK:
-        lines.append(f"over SSH    ssh -L {port}:localhost:{port} THIS_MACHINE, then open http://localhost:{port}")
-    return lines

@@ -1,4 +1,8 @@
-"""Servers of viser that print nothing: their banner does not tell how to reach them from elsewhere."""
+"""Servers of viser that print nothing: their banner does not tell how to reach them from elsewhere.
+
+A server can be up before there is anything to show, and before the engine is imported: the browser loads the page
+meanwhile, which takes as long.
+"""
 
 from __future__ import annotations
 
@@ -10,6 +14,9 @@ import rich
 from rigid_env.extras import require
 
 LOOPBACK = "127.0.0.1"
+
+PORT = 8080
+"""Of viewers."""
 
 
 def start_server(host: str = LOOPBACK, port: int = 0, label: str | None = None):
@@ -41,6 +48,50 @@ def start_server(host: str = LOOPBACK, port: int = 0, label: str | None = None):
         return viser.ViserServer(host=host, port=port, label=label, verbose=False)
 
 
+def start_viewer_server(name: str, host: str = LOOPBACK, port: int = PORT):
+    """Start the server of a viewer, whose page says that something is being opened.
+
+    Parameters
+    ----------
+    name : str
+        What is being opened.
+    host, port
+        As of `start_server`.
+
+    Returns
+    -------
+    viser.ViserServer
+        For `rigid_env.viewer.server.Viewer`.
+
+    Raises
+    ------
+    OSError
+        If `host` is no address of this machine.
+    gymnasium.error.DependencyNotInstalled
+        If viser is missing.
+    """
+    server = start_server(host, port, "rigid-env")
+    server.gui.configure_theme(show_logo=False, show_share_button=False)
+    server.gui.main_panel.dock_right()
+    server.gui.add_markdown(f"opening {name} ...")
+    return server
+
+
+def address_of(server) -> str:
+    """Address of a server as it is reached from this machine."""
+    host = server.get_host()
+    shown = "localhost" if host in (LOOPBACK, "localhost", "::1") else host
+    return f"http://{shown}:{server.get_port()}"
+
+
+def directions(server) -> list[str]:
+    """Lines that say where a viewer is, and how to reach it from another machine."""
+    lines, port = [f"viewer      {address_of(server)}"], server.get_port()
+    if server.get_host() == LOOPBACK:
+        lines.append(f"over SSH    ssh -L {port}:localhost:{port} THIS_MACHINE, then open http://localhost:{port}")
+    return lines
+
+
 def stop_server(server) -> None:
     """End a server; connections are closed."""
     with _hushed():
@@ -48,9 +99,9 @@ def stop_server(server) -> None:
 
 
 @contextmanager
-def server_for_a_while() -> Iterator:
-    """Server on the loopback address that ends with the block."""
-    server = start_server()
+def server_for_a_while(host: str = LOOPBACK) -> Iterator:
+    """Server that ends with the block, at any free port."""
+    server = start_server(host)
     try:
         yield server
     finally:

@@ -96,15 +96,18 @@ def show(
         If viser is missing.
     """
     from rigid_env.viewer import export, notebook
-    from rigid_env.viewer.server import Viewer, directions
+    from rigid_env.viewer.server import Viewer
+    from rigid_env.viewer.servers import directions, start_viewer_server
 
+    port = validation.count(port, "port", most=65_535)
     session = Session(open_subject(x, **settings))
     if notebook.in_notebook():
         scene = getattr(session.subject, "scene", None)
         return notebook.Embedded(export.html_of(looks(session, duration), scene=scene, duration=duration))
-    viewer = Viewer(session, host, port)
+    server = start_viewer_server(session.subject.name, host, port)
+    viewer = Viewer(session, server)
     session.play()
-    print("\n".join(directions(viewer, host)), flush=True)
+    print("\n".join(directions(server)), flush=True)
     if block:
         viewer.run()
     else:

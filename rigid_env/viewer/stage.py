@@ -154,6 +154,15 @@ class Stage:
         camera.look_at = place_.drawn(place_.camera.target).astype(float)
         camera.position = place_.drawn(place_.camera.eye).astype(float)
         camera.up = (0.0, 1.0, 0.0)
+        self._server.on_client_connect(self._aim_early)
+
+    def _aim_early(self, client) -> None:
+        """Aim a browser that may have connected before the camera was known: only new ones follow it by themselves."""
+        camera = self._server.initial_camera
+        with client.atomic():
+            client.camera.fov = camera.fov
+            client.camera.position, client.camera.look_at = camera.position, camera.look_at
+            client.camera.up_direction = camera.up
 
     def _center(self, look: Look) -> None:
         """Move the whole scene so that the followed body stays in the middle of its room."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import pickle
 import resource
@@ -105,6 +106,42 @@ def test_a_damaged_file_is_compiled_anew_and_said_so_once(damage, kept, tmp_path
     assert str(path) in lines[0]
     assert "compiled anew" in lines[0]
     assert run(cache) == (state, 1, [])  # it is healed
+
+
+LIBRARY = """
+import math
+import numba
+from physics.kernels.compile.decorators import entry_kernel
+
+@numba.njit
+def of_user(x):
+    return math.erf(x) + math.gamma(x) ** 0.3
+
+@entry_kernel
+def work(x):
+    return of_user(x)
+"""
+
+OF_LIBRARY = """
+import json, sys
+sys.path.insert(0, sys.argv[1])
+from library import work
+print(json.dumps([work(0.5), sum(work.stats.cache_hits.values()), "numba.np.arraymath" in sys.modules]))
+"""
+
+
+def test_machine_code_is_loaded_without_what_only_compiling_needs(tmp_path):
+    """And finds in another process what it calls outside of itself."""
+    (tmp_path / "library.py").write_text(LIBRARY)
+    _, environment = command_and_environment(tmp_path)
+    command = [sys.executable, "-c", OF_LIBRARY, str(tmp_path)]
+    found = [
+        json.loads(subprocess.run(command, env=environment, capture_output=True, text=True, check=True).stdout)
+        for _ in range(2)
+    ]
+    (value, *first), (again, *second) = found
+    assert value == again
+    assert (first, second) == ([0, True], [1, False])
 
 
 class Gone:

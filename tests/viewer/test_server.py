@@ -16,7 +16,8 @@ from rigid_env.cli import app
 from rigid_env.viewer import session as session_module
 from rigid_env.viewer.event_list import ROWS, EventList, told
 from rigid_env.viewer.plots import SMALLEST, line, thinned
-from rigid_env.viewer.server import Viewer, directions
+from rigid_env.viewer.server import Viewer
+from rigid_env.viewer.servers import directions, server_for_a_while, start_viewer_server
 from rigid_env.viewer.session import Session
 from rigid_env.viewer.subject import open_subject
 
@@ -30,7 +31,7 @@ def event(t: float, kind: str = "impact", wall: int = 0, other: int = -1) -> Eve
 @pytest.fixture(scope="module")
 def viewer():
     session = Session(open_subject("drop", accuracy="fast"))
-    viewer = Viewer(session, port=8450)
+    viewer = Viewer(session, start_viewer_server("drop", port=8450))
     session.wait()
     yield viewer
     viewer.close()
@@ -85,16 +86,17 @@ def test_the_panel_follows_the_session(viewer):
 
 
 def test_it_says_where_it_is_and_how_to_reach_it(viewer):
-    where, ssh = directions(viewer, "127.0.0.1")
+    where, ssh = directions(viewer._server)
     port = viewer.address.rsplit(":", 1)[1]
     assert where.endswith(f"http://localhost:{port}")
     assert f"ssh -L {port}:localhost:{port}" in ssh
-    assert len(directions(viewer, "0.0.0.0")) == 1
+    with server_for_a_while("0.0.0.0") as open_to_all:
+        assert len(directions(open_to_all)) == 1
 
 
 def test_a_port_that_is_none_is_refused():
     with pytest.raises(ValueError, match="port is 0; allowed are integers of at least 1"):
-        Viewer(Session(open_subject("drop", accuracy="fast")), port=0)
+        rigid_env.show("drop", accuracy="fast", port=0)
 
 
 # --- plots and events ---------------------------------------------------------------------------------------------

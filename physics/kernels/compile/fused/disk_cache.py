@@ -15,6 +15,7 @@ import numba
 from numba import _dynfunc
 from numba.core.compiler import CompileResult, compile_result
 from numba.core.environment import Environment
+from numba.core.runtime import rtsys
 from numba.core.serialize import dumps
 
 from physics.kernels.compile.cache_folder import is_owned_by_user
@@ -57,7 +58,7 @@ class _Cache:
         """Machine code for the types `sig` of arguments; None if there is none that can be used."""
         if not self._is_enabled:
             return None
-        target_context.refresh()
+        know_symbols(target_context)
         path, purpose = self._place(sig, target_context.codegen())
         try:
             payload = cache_files.read_cache_file(path, purpose)
@@ -102,6 +103,19 @@ class _Cache:
         """File of machine code, and what it is for."""
         purpose = self._about + repr((str(sig), codegen.magic_tuple())).encode()
         return self.cache_path / f"{self._name}.{hashlib.sha256(purpose).hexdigest()[:24]}.nbc", purpose
+
+
+@cache
+def know_symbols(target_context) -> None:
+    """Have LLVM know what machine code calls of Numba: allocation, and the secrets of Python's hashes.
+
+    Numba's own `refresh` of a context does that as well, and fills it with all that it can compile, with SciPy
+    imported for it: four times as long as to read a step. A kernel that is compiled in spite of the cache has
+    `CompilerBase` refresh the context.
+    """
+    from numba.cpython import hashing  # noqa: F401
+
+    rtsys.initialize(target_context)
 
 
 @cache
