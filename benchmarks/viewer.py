@@ -1,4 +1,8 @@
-"""Pictures a second that leave the viewer's server, and sizes of files: ``python -m benchmarks.viewer [--quick]``.
+"""Time to the viewer's first picture, pictures a second, and sizes of files: ``python -m benchmarks.viewer [--quick]``.
+
+`rigid-env view drop` is started beside a browser that runs already (Chromium without a GPU, driven by Playwright); the
+time ends when the block is on the page's canvas. In turns with it the same browser opens an empty page of viser, whose
+server is there already: what viser's own page takes on this machine. Left out where there is no browser.
 
 A process of its own stands for the browser: it reads what the server sends and counts the pictures, that is windows of
 messages in which the first body has moved. `Stage.show` is called as fast as it goes, with all layers off but the
@@ -9,8 +13,12 @@ pictures a second of the same motions, of which nothing rests.
 from __future__ import annotations
 
 import multiprocessing
+import signal
+import subprocess
+import sys
 import time
 from collections.abc import Iterator
+from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Annotated
@@ -25,8 +33,9 @@ from rigid_env.rendering import BodyView, Frame, WallView
 from rigid_env.terminal import make_console
 from rigid_env.viewer.export import to_html
 from rigid_env.viewer.look import Look
-from rigid_env.viewer.servers import server_for_a_while
+from rigid_env.viewer.servers import address_of, server_for_a_while
 from rigid_env.viewer.stage import LAYERS, Stage
+from tests.viewer.browser import SIZE, Watched, browser, share_of, what_is_missing
 
 BODIES = (1, 100)
 FILE_BODIES = (1, 50)
@@ -35,6 +44,8 @@ SIZES = {1: 2.0, 50: 5.0}  # of a file at most [MB]
 REPEATS, QUICK_REPEATS = 9, 2
 SECONDS, QUICK_SECONDS = 2.0, 0.3  # of one repeat
 FPS, DURATION = 30.0, 10.0
+FIRST = 5.0  # time to the first picture at most [s]
+BLOCK_COLOUR, BLOCK_SHARE = (45, 95, 170), 0.002  # of the drop's block, and the share of pixels that have it
 NODE = "/scene/bodies/0.0"
 PATIENCE = 30.0  # for the reader to be there, and to end [s]
 
@@ -123,6 +134,50 @@ def measure_pictures(count: int, is_quick: bool) -> Row:
     return Row(f"pictures_{count}", what, "ms", times, target=TIMES[count], is_ratio=False, notes=notes)
 
 
+def time_to_picture(page, command: list[str]) -> float:
+    """Time from the start of a command to the block in a page of a browser [s]."""
+    watched, start = Watched(page), time.perf_counter()
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as viewer:
+        try:
+            line = viewer.stdout.readline()
+            watched.open(line.split()[-1])
+            watched.wait_for(lambda picture: share_of(picture, BLOCK_COLOUR) > BLOCK_SHARE)
+            return time.perf_counter() - start
+        finally:
+            viewer.send_signal(signal.SIGINT)
+
+
+def time_of_empty_page(page) -> float:
+    """Time from the address of a server that shows nothing to its first picture in a page of a browser [s]."""
+    watched = Watched(page)
+    with server_for_a_while() as server:
+        time.sleep(1.0)  # for its thread
+        start = time.perf_counter()
+        watched.open(address_of(server))
+        watched.picture()
+        return time.perf_counter() - start
+
+
+def measure_first_picture(is_quick: bool) -> list[Row]:
+    """Seconds to the first picture, warm, and of that an empty page; nothing where there is no browser."""
+    if what_is_missing():
+        return []
+    view = [sys.executable, "-c", "from rigid_env.cli import app; app()", "view", "drop"]
+    ways = {"first": partial(time_to_picture, command=view), "empty": time_of_empty_page}
+    times: dict[str, list[float]] = {name: [] for name in ways}
+    with browser() as opened:
+        for _ in range(1 + (1 if is_quick else REPEATS)):
+            for name, way in ways.items():
+                page = opened.new_page(viewport=SIZE)
+                times[name].append(way(page))
+                page.close()
+    first, empty = (Spread(tuple(values[1:])) for values in times.values())  # the first of each warms what it uses
+    return [
+        Row("first_picture", "`rigid-env view drop` to its first picture", "s", first, target=FIRST, is_ratio=False),
+        Row("empty_page", "an empty page of viser to its first picture", "s", empty, target=None, is_ratio=False),
+    ]
+
+
 def measure_file(count: int, is_quick: bool) -> Row:
     """Size of a file in megabytes."""
     duration = 0.5 if is_quick else DURATION
@@ -137,9 +192,12 @@ def main(
     json: Annotated[Path | None, typer.Option(help="Where to write the result.")] = None,
     quick: Annotated[bool, typer.Option("--quick", help="Only see that it runs.")] = False,
 ) -> None:
-    """Measure how many pictures a second leave the viewer's server, and how large its files are."""
+    """Measure how soon the viewer shows a picture, how many a second leave its server, and how large its files are."""
     console = make_console()
     found = [measure_pictures(count, quick) for count in BODIES] + [measure_file(count, quick) for count in FILE_BODIES]
+    found += measure_first_picture(quick)
+    if reason := what_is_missing():
+        console.print(f"the time to the first picture is left out: {reason}")
     console.print(make_table(found, machine.headline()))
     for row in found[: len(BODIES)]:
         arrived, size = row.notes["arrived"]["median"], row.notes["bytes"]["median"]

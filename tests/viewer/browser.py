@@ -8,6 +8,7 @@ import shutil
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from importlib.util import find_spec
 from urllib.parse import urlsplit
 
 import numpy as np
@@ -89,20 +90,40 @@ class Watched:
 @contextmanager
 def open_browser() -> Iterator[Watched]:
     """Page of a browser; the test skips where there is none."""
-    pytest.importorskip("viser", reason="the extra `view` is not installed")
-    pytest.importorskip("PIL", reason="the extra `render` is not installed")
-    api = pytest.importorskip("playwright.sync_api", reason="Playwright is not installed")
-    program = next(filter(None, map(shutil.which, PROGRAMS)), None)
-    if program is None:
-        pytest.skip(f"no browser is installed: looked for {', '.join(PROGRAMS)}")
-    if is_memory_limited():
-        pytest.skip("the address space of processes is limited here, of which a browser needs more than it uses")
-    with api.sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=program, args=list(ARGUMENTS))
+    reason = what_is_missing()
+    if reason:
+        pytest.skip(reason)
+    with browser() as opened:
+        yield Watched(opened.new_page(viewport=SIZE))
+
+
+@contextmanager
+def browser() -> Iterator:
+    """Browser of Playwright, without a page."""
+    from playwright.sync_api import sync_playwright
+
+    with sync_playwright() as playwright:
+        opened = playwright.chromium.launch(executable_path=_program(), args=list(ARGUMENTS))
         try:
-            yield Watched(browser.new_page(viewport=SIZE))
+            yield opened
         finally:
-            browser.close()
+            opened.close()
+
+
+def what_is_missing() -> str:
+    """Reason why there is no browser here; empty where there is one."""
+    for module, name in (("viser", "extra `view`"), ("PIL", "extra `render`"), ("playwright", "package `playwright`")):
+        if find_spec(module) is None:
+            return f"the {name} is not installed"
+    if _program() is None:
+        return f"no browser is installed: looked for {', '.join(PROGRAMS)}"
+    if is_memory_limited():
+        return "the address space of processes is limited here, of which a browser needs more than it uses"
+    return ""
+
+
+def _program() -> str | None:
+    return next(filter(None, map(shutil.which, PROGRAMS)), None)
 
 
 def is_memory_limited() -> bool:
