@@ -20,7 +20,6 @@ import time
 from collections.abc import Iterator
 from functools import partial
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Annotated
 
 import numpy as np
@@ -31,7 +30,7 @@ from rigid_env.lab.measure.table import make_table
 from rigid_env.lab.measure.timing import Row, Spread
 from rigid_env.rendering import BodyView, Frame, WallView
 from rigid_env.terminal import make_console
-from rigid_env.viewer.export import to_html
+from rigid_env.viewer.export import page_of
 from rigid_env.viewer.look import Look
 from rigid_env.viewer.servers import address_of, server_for_a_while
 from rigid_env.viewer.stage import LAYERS, Stage
@@ -181,9 +180,7 @@ def measure_first_picture(is_quick: bool) -> list[Row]:
 def measure_file(count: int, is_quick: bool) -> Row:
     """Size of a file in megabytes."""
     duration = 0.5 if is_quick else DURATION
-    with TemporaryDirectory() as folder:
-        path = to_html(motion(count, duration), Path(folder) / "run.html", duration=duration, fps=FPS)
-        size = path.stat().st_size / 1e6
+    size = len(page_of(motion(count, duration), duration=duration, fps=FPS).encode("utf-8")) / 1e6
     what = f"a file of {duration:g} s of {count} {'body' if count == 1 else 'bodies'}"
     return Row(f"file_{count}", what, "MB", Spread((size,)), target=SIZES[count], is_ratio=False)
 

@@ -13,10 +13,9 @@ from pathlib import Path
 
 import numpy as np
 
-from physics import Scene, Trajectory, validation
+from physics import Scene, validation
 from rigid_env.extras import require
 from rigid_env.viewer.look import Look
-from rigid_env.viewer.replay import trajectory_looks
 from rigid_env.viewer.servers import server_for_a_while
 from rigid_env.viewer.stage import LAYERS, Stage
 
@@ -26,29 +25,26 @@ TIME_SLACK = 1e-9
 """Share of the time between pictures by which a look may come too early."""
 
 
-def to_html(
-    source: Iterable[Look] | Trajectory,
-    path: str | Path,
+def page_of(
+    looks: Iterable[Look],
     *,
     scene: Scene | None = None,
     duration: float = 10.0,
     fps: float = 30.0,
     layers: Iterable[str] | None = None,
     title: str = "rigid-env",
-) -> Path:
-    """Write a motion as one HTML file that plays in a browser without a network.
+) -> str:
+    """Make a motion an HTML page that plays in a browser without a network.
 
-    Poses are float32, as everywhere in viser; nothing is interpolated. The file has viser's client (about 0.8 MB) and,
+    Poses are float32, as everywhere in viser; nothing is interpolated. The page has viser's client (about 0.8 MB) and,
     for each picture, 28 bytes for each body that moves, before compression.
 
     Parameters
     ----------
-    source : iterable of Look, or Trajectory
+    looks : iterable of Look
         In order of time. The first one is shown at time 0.
-    path : str or Path
-        Of the file; it is written whole or not at all.
     scene : Scene, optional
-        Of a trajectory that does not hold its own: shapes and fields. Of looks: only fields are taken from it.
+        Its fields are drawn.
     duration : float
         Looks later than this after the first are left out [s].
     fps : float
@@ -60,19 +56,30 @@ def to_html(
 
     Returns
     -------
-    Path
-        The file.
+    str
 
     Raises
     ------
     ValueError
-        On a source without looks, times that go back, an unknown layer, a trajectory without a scene, or a number that
-        is not positive.
+        No looks, times that go back, an unknown layer, or a number that is not positive.
     gymnasium.error.DependencyNotInstalled
         If viser is missing.
     """
-    validation.path(path)
-    page = html_of(source, scene=scene, duration=duration, fps=fps, layers=layers, title=title)
+    require("view", purpose="an HTML file")
+    duration = float(validation.positive(duration, (), "duration"))
+    fps = float(validation.positive(fps, (), "fps"))
+    shown = [name for name, is_on in LAYERS.items() if is_on] if layers is None else list(layers)
+    for name in shown:
+        validation.one_of(name, LAYERS, "layers")
+    chosen = list(taken(looks, duration, 1.0 / fps))
+    if not chosen:
+        raise ValueError("there are no looks; allowed is at least one")
+    page = _record(chosen, scene, shown)
+    return page.replace(TITLE, f"<title>{_escaped(title)}</title>", 1)
+
+
+def write_page(page: str, path: str | Path) -> Path:
+    """Write a page as a file, whole or not at all; returns the path."""
     path = Path(path)
     partial = path.with_name(f".{path.name}.part")
     try:
@@ -81,22 +88,6 @@ def to_html(
     finally:
         partial.unlink(missing_ok=True)
     return path
-
-
-def html_of(source, *, scene=None, duration=10.0, fps=30.0, layers=None, title="rigid-env") -> str:
-    """Text of the page that `to_html` writes; parameters and errors are the same."""
-    require("view", purpose="an HTML file")
-    duration = float(validation.positive(duration, (), "duration"))
-    fps = float(validation.positive(fps, (), "fps"))
-    shown = [name for name, is_on in LAYERS.items() if is_on] if layers is None else list(layers)
-    for name in shown:
-        validation.one_of(name, LAYERS, "layers")
-    scene = getattr(source, "scene", None) if scene is None else scene
-    looks = list(taken(_looks(source, scene), duration, 1.0 / fps))
-    if not looks:
-        raise ValueError("source has no looks; allowed is at least one")
-    page = _record(looks, scene, shown)
-    return page.replace(TITLE, f"<title>{_escaped(title)}</title>", 1)
 
 
 def taken(looks: Iterable[Look], duration: float, interval: float) -> Iterator[Look]:
@@ -112,9 +103,7 @@ def taken(looks: Iterable[Look], duration: float, interval: float) -> Iterator[L
         if start is None:
             start = before = due = look.time
         if look.time < before:
-            raise ValueError(
-                f"source has a look at {look.time:g} s after one at {before:g} s; allowed are rising times"
-            )
+            raise ValueError(f"looks have one at {look.time:g} s after one at {before:g} s; allowed are rising times")
         before = look.time
         slack = TIME_SLACK * interval + 1e-12 * abs(look.time)
         if look.time > start + duration + slack:
@@ -122,14 +111,6 @@ def taken(looks: Iterable[Look], duration: float, interval: float) -> Iterator[L
         if look.time >= due - slack:
             yield look
             due = max(due + interval, look.time + 0.5 * interval)
-
-
-def _looks(source, scene: Scene | None) -> Iterable[Look]:
-    if not isinstance(source, Trajectory):
-        return source
-    if scene is None:
-        raise ValueError("scene is None with a Trajectory; allowed is the Scene that was simulated")
-    return trajectory_looks(scene, source)
 
 
 def _record(looks: list[Look], scene: Scene | None, shown: list[str]) -> str:

@@ -88,6 +88,11 @@ class Subject:
     message = ""
 
     @property
+    def scene(self) -> physics.Scene:
+        """Bodies, walls and effects."""
+        raise NotImplementedError
+
+    @property
     def time(self) -> float:
         """Simulated time [s]."""
         raise NotImplementedError
@@ -166,6 +171,10 @@ class WorldSubject(Subject):
     def _set_world(self, world: physics.World, listener: Listener) -> None:
         self.world, self.listener = world, listener
         self.accuracy = accuracy_name(world.accuracy)
+
+    @property
+    def scene(self) -> physics.Scene:
+        return self.world.scene
 
     @property
     def time(self) -> float:

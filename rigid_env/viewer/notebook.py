@@ -22,7 +22,7 @@ def frame_of_page(page: str, height: int = HEIGHT) -> str:
     Parameters
     ----------
     page : str
-        Text of a self-contained HTML page, such as `export.html_of` makes.
+        Text of a self-contained HTML page, such as `export.page_of` makes.
     height : int
         [px].
 

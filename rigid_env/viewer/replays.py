@@ -128,13 +128,17 @@ class PlayedTrajectory(Subject):
                 "physics.simulate, and files that this version has written"
             )
         self.name, self._trajectory, self._sample = name, trajectory, 0
-        self._bodies = trajectory.scene.bodies
+        self._bodies = self.scene.bodies
         self._events = sorted(trajectory.events, key=lambda event: event.t)
         self._mass = np.array([body.mass for body in self._bodies])
         self._inertia = np.array([body.inertia for body in self._bodies])
         self._radius = np.array([_radius(body) for body in self._bodies])
-        walls = trajectory.scene.walls if trajectory.scene.effect(Contact) else ()
+        walls = self.scene.walls if self.scene.effect(Contact) else ()
         self._walls = tuple(WallView(wall.normal, wall.offset) for wall in walls)
+
+    @property
+    def scene(self) -> physics.Scene:
+        return self._trajectory.scene
 
     @property
     def time(self) -> float:

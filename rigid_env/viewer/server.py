@@ -41,7 +41,7 @@ class Viewer:
         self._session, self._server = session, server
         self._inbox: queue.SimpleQueue[Callable[[], Any]] = queue.SimpleQueue()
         self.address = address_of(server)
-        self._stage = Stage(server, fields=getattr(session.subject, "scene", None))
+        self._stage = Stage(server, fields=session.subject.scene)
         self._stage.show(session.look())
         server.gui.reset()
         server.gui.set_panel_label(f"rigid-env: {session.subject.name}")

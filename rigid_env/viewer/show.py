@@ -41,7 +41,7 @@ def to_html(x: Any, path: str | Path, *, duration: float = DURATION, fps: float 
         Pictures a second at most [1/s].
     **settings
         ``accuracy``, ``dt``, ``seed``, ``policy``, ``controller`` of `open_subject`; ``layers`` and ``title`` of
-        `rigid_env.viewer.export.to_html`.
+        `rigid_env.viewer.export.page_of`.
 
     Returns
     -------
@@ -57,12 +57,20 @@ def to_html(x: Any, path: str | Path, *, duration: float = DURATION, fps: float 
     """
     from rigid_env.viewer import export
 
+    validation.path(path)
     duration = float(validation.positive(duration, (), "duration"))
     of_page = {name: settings.pop(name) for name in ("layers", "title") if name in settings}
-    session = Session(open_subject(x, **settings))
-    of_page.setdefault("title", session.subject.name)
-    scene = getattr(session.subject, "scene", None)
-    return export.to_html(looks(session, duration), path, scene=scene, duration=duration, fps=fps, **of_page)
+    page = _page(Session(open_subject(x, **settings)), duration, fps=fps, **of_page)
+    return export.write_page(page, path)
+
+
+def _page(session: Session, duration: float, **of_page: Any) -> str:
+    """Page of a session from now on."""
+    from rigid_env.viewer import export
+
+    subject = session.subject
+    of_page.setdefault("title", subject.name)
+    return export.page_of(looks(session, duration), scene=subject.scene, duration=duration, **of_page)
 
 
 def show(
@@ -95,15 +103,14 @@ def show(
     gymnasium.error.DependencyNotInstalled
         If viser is missing.
     """
-    from rigid_env.viewer import export, notebook
+    from rigid_env.viewer import notebook
     from rigid_env.viewer.server import Viewer
     from rigid_env.viewer.servers import directions, start_viewer_server
 
     port = validation.count(port, "port", most=65_535)
     session = Session(open_subject(x, **settings))
     if notebook.in_notebook():
-        scene = getattr(session.subject, "scene", None)
-        return notebook.Embedded(export.html_of(looks(session, duration), scene=scene, duration=duration))
+        return notebook.Embedded(_page(session, duration))
     server = start_viewer_server(session.subject.name, host, port)
     viewer = Viewer(session, server)
     session.play()

@@ -101,9 +101,10 @@ def until(watched, is_done) -> None:
 
 def test_a_file_plays_offline(tmp_path, rng):
     pytest.importorskip("viser")
-    from rigid_env.viewer.export import to_html
+    from rigid_env.viewer.export import page_of, write_page
 
-    path = to_html(motion((BLOCK,), 4.0, 10.0, rng), tmp_path / "run.html", fps=10.0, title="a block & more")
+    page = page_of(motion((BLOCK,), 4.0, 10.0, rng), fps=10.0, title="a block & more")
+    path = write_page(page, tmp_path / "run.html")
     with open_browser() as watched:
         watched.open(path.as_uri())
         assert watched.page.title() == "a block & more"

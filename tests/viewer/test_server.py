@@ -11,7 +11,7 @@ from typer.testing import CliRunner
 pytest.importorskip("viser")
 
 import rigid_env
-from physics import Event, World, scenes
+from physics import Block, Drag, Event, Gravity, Scene, Wind, World, scenes
 from rigid_env.cli import app
 from rigid_env.viewer import session as session_module
 from rigid_env.viewer.event_list import ROWS, EventList, told
@@ -97,6 +97,14 @@ def test_it_says_where_it_is_and_how_to_reach_it(viewer):
 def test_a_port_that_is_none_is_refused():
     with pytest.raises(ValueError, match="port is 0; allowed are integers of at least 1"):
         rigid_env.show("drop", accuracy="fast", port=0)
+
+
+def test_fields_of_the_scene_are_drawn():
+    scene = Scene([Block((1, 1, 1), 1.0, pos=(0, 2, 0))], effects=[Gravity(), Drag(), Wind((3.0, 0.0, 0.0))])
+    with server_for_a_while() as server:
+        viewer = Viewer(Session(open_subject(scene, accuracy="fast")), server)
+        (label,) = viewer._stage._layers["fields"]._nodes
+    assert label.text == "wind 3 m/s"
 
 
 # --- plots and events ---------------------------------------------------------------------------------------------
