@@ -6,9 +6,11 @@ from dataclasses import replace
 
 import numpy as np
 
+from physics import Body, Scene
 from rigid_env.extras import require
 from rigid_env.rendering import Frame, GoalView, Renderer, Room, make_room
 from rigid_env.rendering.camera_argument import CameraArgument, as_camera, as_switch
+from rigid_env.rendering.geometry import rotation_matrix
 from rigid_env.rendering.picture import WEIGHT_ARROW, world_frame
 from rigid_env.tasks import Task
 
@@ -39,7 +41,21 @@ def frame_of(task: Task, world: int = 0, arrows: bool = True) -> Frame:
 def room_of(task: Task) -> Room:
     """Part of space that pictures of a task show: the same for all its worlds and episodes."""
     frame = world_frame(task.world, arrows=False)
-    return make_room(frame.walls, frame.bodies)
+    return make_room(frame.walls, frame.bodies, bounds_of(task.world.scene))
+
+
+def bounds_of(scene: Scene) -> tuple[np.ndarray, np.ndarray]:
+    """Lower and upper corner (3,) [m] of a box around all bodies where a scene declares them."""
+    boxes = np.array([_box_of(body) for body in scene.bodies])
+    return boxes[:, 0].min(axis=0), boxes[:, 1].max(axis=0)
+
+
+def _box_of(body: Body) -> tuple[np.ndarray, np.ndarray]:
+    """Lower and upper corner (3,) [m] of a box around a body: that of its own box, or that of a sphere around it."""
+    rotation = rotation_matrix(np.array(body.quat))
+    reach = np.minimum(np.abs(rotation) @ body.dimensions, body.bounding_radius(body.dimensions))
+    middle = np.array(body.pos) + rotation @ np.array(body.center)
+    return middle - reach, middle + reach
 
 
 class View:
@@ -91,7 +107,8 @@ class View:
     def draw(self, task: Task, world: int = 0) -> np.ndarray:
         """(height, width, 3) uint8 picture of one world; in mode "human" it is shown in the window, too."""
         if self._renderer is None:
-            self._renderer = Renderer(self.width, self.height, self.mode, self.fps, self.title, self.camera)
+            bounds = bounds_of(task.world.scene)
+            self._renderer = Renderer(self.width, self.height, self.mode, self.fps, self.title, self.camera, bounds)
         return self._renderer.draw(frame_of(task, world, self.arrows))
 
     def close(self) -> None:

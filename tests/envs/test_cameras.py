@@ -21,11 +21,12 @@ from rigid_env.rendering.camera_argument import as_camera, upwards
 from rigid_env.rendering.picture import world_frame
 from rigid_env.rendering.pixels import PixelObserver
 from rigid_env.rendering.staging import Shot, Stage
-from rigid_env.rendering.view import frame_of
+from rigid_env.rendering.view import bounds_of, frame_of, room_of
 
 pytest.importorskip("pygame")
 
 CART = Path(__file__).parents[2] / "examples" / "cart.toml"
+CORNERS = np.array(np.meshgrid(*3 * [(-1.0, 1.0)])).reshape(3, -1).T
 CAMERA = Camera((6.0, 9.0, 12.0), (0.0, 1.0, 0.0), fov_y=40.0)
 SIZE = {"render_mode": "rgb_array", "width": 160, "height": 100}
 MADE = {
@@ -55,7 +56,8 @@ def pictures_of(env) -> np.ndarray:
 def test_environments_take_a_camera_and_a_switch(make):
     env = make(camera=CAMERA, arrows=False)
     seen = pictures_of(env)
-    task, renderer = env.unwrapped.task, Renderer(160, 100, camera=CAMERA)
+    task = env.unwrapped.task
+    renderer = Renderer(160, 100, camera=CAMERA, bounds=bounds_of(task.world.scene))
     expected = [renderer.draw(frame_of(task, world, arrows=False)) for world in range(task.worlds)]
     np.testing.assert_array_equal(seen, expected)
     plain, with_arrows = pictures_of(make()), pictures_of(make(camera={"eye": CAMERA.eye, "target": CAMERA.target}))
@@ -229,3 +231,21 @@ def test_wrong_places_are_refused_before_anything_is_computed(options, words, tm
     output = run("demo", "rest", "--out", tmp_path / "none", *options, code=2)
     assert all(word in output for word in words), output
     assert not (tmp_path / "none").exists()
+
+
+def test_all_bodies_of_a_scene_are_in_sight_at_its_start():
+    """Also those above the room that their sizes alone would make; in the picture of a batch of pixels, too."""
+    env = gym.make("rigid_env/Scene-v0", scene="heap", driven=[99], render_mode="rgb_array")
+    env.reset(seed=0)
+    env.render()
+    inner = env.unwrapped
+    frame = frame_of(inner.task)
+    corners = frame.poses.pos[:, None] + frame.poses.radius[:, None, None] * CORNERS / np.sqrt(3.0)
+    camera = inner._view._renderer.camera(frame)
+    pixels, depths = camera.project(corners.reshape(-1, 3), (inner._view.width, inner._view.height))
+    assert depths.min() > 0.0
+    assert (pixels >= 0.0).all()
+    assert (pixels <= (inner._view.width, inner._view.height)).all()
+    room = room_of(inner.task)
+    assert (frame.poses.pos < room.upper).all()
+    env.close()
