@@ -150,7 +150,8 @@ class Task(Starts):
 
     def _allocate(self) -> None:
         worlds, bodies = self.worlds, self.world.body_count
-        self.action, self.previous_action = (np.zeros((worlds, self._table.size)) for _ in range(2))
+        size = worlds, self._table.size
+        self.action, self.previous_action, self._action_before = (np.zeros(size) for _ in range(3))
         require_known(self.memory, self.memory, "memory")
         self.memory_arrays = {
             name: np.zeros(worlds if validation.count(size, f"memory {name}") == 1 else (worlds, size))
@@ -272,8 +273,13 @@ class Task(Starts):
             return
         if self._before is not None:
             self._before.keep()
+        self._action_before[...] = self.action
         self.action[...] = actions
-        self.act()
+        try:
+            self.act()
+        except ValueError:
+            self.action[...] = self._action_before
+            raise
 
     def _keeper(self) -> Before | None:
         if self._functions is not None:

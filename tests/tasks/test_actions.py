@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 import physics
+import rigid_env
 from physics.kernels.state import layout as at
 from rigid_env.tasks import Force, Impulse, Task, Wrench, observe
 from tests.tasks.conftest import Free, started
@@ -88,6 +89,18 @@ def test_an_action_that_is_not_finite_moves_nothing():
         task.step(np.array([[0.0] * 6, [0.0] * 5 + [np.nan]]))
     np.testing.assert_array_equal(task.world.state, state)
     np.testing.assert_array_equal(task.action, before)
+
+
+def test_a_refused_action_leaves_the_state_of_a_compiled_task():
+    env = rigid_env.BlockReachEnv()
+    env.reset(seed=0)
+    env.step(np.full(6, 0.5))
+    before = env.get_state()
+    with pytest.raises(ValueError, match="allowed are finite"):
+        env.step(np.array([0.0] * 5 + [np.inf]))
+    after = env.get_state()
+    for name, array in before.arrays.items():
+        np.testing.assert_array_equal(array, after.arrays[name], err_msg=name)
 
 
 REFUSED = {
