@@ -6,8 +6,10 @@ meanwhile, which takes as long.
 
 from __future__ import annotations
 
+import os
+import socket
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 
 import rich
 
@@ -17,6 +19,9 @@ LOOPBACK = "127.0.0.1"
 
 PORT = 8080
 """Of viewers."""
+
+PORTS, LAST_PORT = 1000, 65_535
+"""Ports that are tried, one after the other, and the last one that there is."""
 
 
 def start_server(host: str = LOOPBACK, port: int = 0, label: str | None = None):
@@ -38,14 +43,46 @@ def start_server(host: str = LOOPBACK, port: int = 0, label: str | None = None):
 
     Raises
     ------
+    ValueError
+        If `host` is no address of this machine, or no port is free.
     gymnasium.error.DependencyNotInstalled
         If viser is missing.
     """
     require("view", purpose="the viewer")
+    port = free_port(host, port)
     import viser
 
     with _hushed():
         return viser.ViserServer(host=host, port=port, label=label, verbose=False)
+
+
+def free_port(host: str, port: int) -> int:
+    """First port from `port` on that is free; 0 stays 0. viser itself would wait for ever where there is none.
+
+    Raises
+    ------
+    ValueError
+        If `host` is no address of this machine, or no port is free.
+    """
+    try:
+        _bind(host, 0)
+    except OSError as error:
+        allowed = "allowed are addresses of this machine, such as 127.0.0.1, and 0.0.0.0 for all of them"
+        raise ValueError(f"host is {host!r}; {allowed} ({error.strerror})") from error
+    for each in range(port, min(port + PORTS, LAST_PORT + 1)):
+        with suppress(OSError):  # it is taken, or not for this user
+            _bind(host, each)
+            return each
+    raise ValueError(f"port is {port}, and none from there on is free; allowed is a smaller one")
+
+
+def _bind(host: str, port: int) -> None:
+    """Take a port, and let go of it."""
+    family, *_ = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)[0]
+    with socket.socket(family) as taken:
+        if os.name == "posix":  # as asyncio does: a port that was let go of a moment ago
+            taken.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        taken.bind((host, port))
 
 
 def start_viewer_server(name: str, host: str = LOOPBACK, port: int = PORT):
@@ -65,8 +102,8 @@ def start_viewer_server(name: str, host: str = LOOPBACK, port: int = PORT):
 
     Raises
     ------
-    OSError
-        If `host` is no address of this machine.
+    ValueError
+        If `host` is no address of this machine, or no port is free.
     gymnasium.error.DependencyNotInstalled
         If viser is missing.
     """

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import socket
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -17,7 +19,7 @@ from rigid_env.viewer import session as session_module
 from rigid_env.viewer.event_list import ROWS, EventList, told
 from rigid_env.viewer.plots import SMALLEST, line, thinned
 from rigid_env.viewer.server import Viewer
-from rigid_env.viewer.servers import directions, server_for_a_while, start_viewer_server
+from rigid_env.viewer.servers import LAST_PORT, directions, free_port, server_for_a_while, start_viewer_server
 from rigid_env.viewer.session import Session
 from rigid_env.viewer.subject import open_subject
 
@@ -97,6 +99,21 @@ def test_it_says_where_it_is_and_how_to_reach_it(viewer):
 def test_a_port_that_is_none_is_refused():
     with pytest.raises(ValueError, match="port is 0; allowed are integers of at least 1"):
         rigid_env.show("drop", accuracy="fast", port=0)
+
+
+def test_a_port_that_is_taken_gives_the_next_one_and_a_host_that_is_none_an_error():
+    with server_for_a_while() as server:
+        taken = server.get_port()
+        assert free_port("127.0.0.1", taken) > taken
+    with pytest.raises(ValueError, match=r"host is '203.0.113.7'; allowed are addresses of this machine"):
+        start_viewer_server("drop", "203.0.113.7")
+    with pytest.raises(ValueError, match=r"host is 'no such host'; allowed are addresses of this machine"):
+        start_viewer_server("drop", "no such host")
+    with socket.socket() as last:
+        last.bind(("127.0.0.1", LAST_PORT))
+        last.listen()
+        with pytest.raises(ValueError, match=r"port is 65535, and none from there on is free"):
+            free_port("127.0.0.1", LAST_PORT)
 
 
 def test_fields_of_the_scene_are_drawn():
