@@ -11,12 +11,11 @@ from rigid_env.envs.registration import register_envs, register_task
 from rigid_env.shadowing import check_engine_is_found
 
 if TYPE_CHECKING:
-    from rigid_env.envs.block_reach import BlockReachEnv
-    from rigid_env.envs.block_reorient import BlockReorientEnv
+    from rigid_env.envs.block_reach import BlockReachEnv, BlockReachVectorEnv
+    from rigid_env.envs.block_reorient import BlockReorientEnv, BlockReorientVectorEnv
     from rigid_env.envs.checks import check_task
-    from rigid_env.envs.env import TaskEnv
     from rigid_env.envs.scene import SceneEnv, SceneVectorEnv
-    from rigid_env.envs.vector_env import BlockReachVectorEnv, BlockReorientVectorEnv, TaskVectorEnv
+    from rigid_env.envs.task import TaskEnv, TaskVectorEnv
     from rigid_env.tasks import (
         Choice,
         Distribution,
@@ -53,9 +52,9 @@ _OF_TASKS = (
 
 _LAZY = {
     "BlockReachEnv": "rigid_env.envs.block_reach",
-    "BlockReachVectorEnv": "rigid_env.envs.vector_env",
+    "BlockReachVectorEnv": "rigid_env.envs.block_reach",
     "BlockReorientEnv": "rigid_env.envs.block_reorient",
-    "BlockReorientVectorEnv": "rigid_env.envs.vector_env",
+    "BlockReorientVectorEnv": "rigid_env.envs.block_reorient",
     **dict.fromkeys(_OF_TASKS, "rigid_env.tasks"),
     "SceneEnv": "rigid_env.envs.scene",
     "SceneVectorEnv": "rigid_env.envs.scene",
@@ -64,14 +63,14 @@ _LAZY = {
     "BlockReorient": "rigid_env.tasks.block_reorient",
     "BlockReorientGoal": "rigid_env.tasks.block_goals",
     "GoalTask": "rigid_env.tasks.goal",
-    "TaskEnv": "rigid_env.envs.env",
+    "TaskEnv": "rigid_env.envs.task",
     "TaskRollout": "rigid_env.tasks.rollout",
     "TaskState": "rigid_env.tasks.state",
     "check_task": "rigid_env.envs.checks",
     "rollout": "rigid_env.tasks.rollout",
     "show": "rigid_env.viewer.show",
     "to_html": "rigid_env.viewer.show",
-    "TaskVectorEnv": "rigid_env.envs.vector_env",
+    "TaskVectorEnv": "rigid_env.envs.task",
     "RigidVecEnv": "rigid_env.envs.sb3",  # needs the extra `agents`, so it is not in `__all__`
 }
 

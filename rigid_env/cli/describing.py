@@ -65,7 +65,8 @@ def _make(task: str) -> RigidEnv:
     """
     import gymnasium as gym
 
-    from rigid_env.envs.env import RigidEnv, TaskEnv
+    from rigid_env.envs.env import RigidEnv
+    from rigid_env.envs.task import TaskEnv
 
     if os.getcwd() not in sys.path:
         sys.path.append(os.getcwd())

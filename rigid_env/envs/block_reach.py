@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from physics.keywords import known_keywords
-from rigid_env.envs.env import BlockEnv
+from rigid_env.envs.block import BlockEnv, BlockVectorEnv
 from rigid_env.tasks import BlockReach
 
 
@@ -132,5 +132,12 @@ class BlockReachEnv(BlockEnv):
 
     - v0: first version.
     """
+
+    task_class = BlockReach
+
+
+@known_keywords
+class BlockReachVectorEnv(BlockVectorEnv):
+    """Many worlds of `BlockReachEnv`, which documents the task."""
 
     task_class = BlockReach

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from physics.keywords import known_keywords
-from rigid_env.envs.env import BlockEnv
+from rigid_env.envs.block import BlockEnv, BlockVectorEnv
 from rigid_env.tasks import BlockReorient
 
 
@@ -98,5 +98,12 @@ class BlockReorientEnv(BlockEnv):
 
     - v0: first version.
     """
+
+    task_class = BlockReorient
+
+
+@known_keywords
+class BlockReorientVectorEnv(BlockVectorEnv):
+    """Many worlds of `BlockReorientEnv`, which documents the task."""
 
     task_class = BlockReorient

@@ -12,9 +12,8 @@ import numpy as np
 from gymnasium.utils.env_checker import check_env
 from gymnasium.vector import AutoresetMode
 
-from rigid_env.envs.env import TaskEnv
 from rigid_env.envs.making import task_class
-from rigid_env.envs.vector_env import TaskVectorEnv
+from rigid_env.envs.task import TaskEnv, TaskVectorEnv
 from rigid_env.envs.vector_infos import keys
 from rigid_env.tasks import Task
 

@@ -1,31 +1,26 @@
-"""Tasks as single Gymnasium environments: batches of one world."""
+"""A task as a single Gymnasium environment: a batch of one world."""
 
 from __future__ import annotations
 
 import inspect
 import reprlib
 from collections.abc import Sequence
-from pathlib import Path
 from typing import Any, ClassVar
 
 import gymnasium as gym
 import numpy as np
 
-import physics
 from physics.parallel.exclusive import exclusive, in_use
-from rigid_env.envs.attributes import EpisodeParameters, value_of
+from rigid_env.envs.attributes import value_of
 from rigid_env.envs.goals import lend_goals
 from rigid_env.envs.infos import info_maker
-from rigid_env.envs.making import make_task
 from rigid_env.envs.sources import StateSource, make_source
 from rigid_env.envs.spaces import action_space
 from rigid_env.rendering.camera_argument import CameraArgument
 from rigid_env.rendering.view import RENDER_MODES, View
 from rigid_env.tasks import Task
-from rigid_env.tasks.block import BlockTask
 from rigid_env.tasks.describe import Section, markdown, sections
 from rigid_env.tasks.layout import FAILURE, REWARD
-from rigid_env.tasks.parameters import Edges, Number
 from rigid_env.tasks.state import TaskState, put, take
 
 RENDER_FPS = 40  # of the default control period, 5 steps of 5 ms
@@ -247,10 +242,14 @@ class RigidEnv(gym.Env):
     def documentation(self) -> tuple[Section, ...]:
         """The same, section by section; with the defaults of the id that this environment was made by, if any."""
         registered = None if self.spec is None else gym.registry.get(self.spec.id)
-        documented = type(self) if isinstance(self, BlockEnv) else type(self.task)
+        documented = self._documented()
         own = list(inspect.signature(RigidEnv.__init__).parameters.values())[2:]  # without self and task
         added = {parameter.name: parameter.default for parameter in own}
         return sections(self.task, documented, added, None if registered is None else registered.kwargs)
+
+    def _documented(self) -> type:
+        """Class whose docstring tells about the task."""
+        return type(self.task)
 
     def close(self):
         """Close the window, if any; `reset` begins anew."""
@@ -261,96 +260,3 @@ class RigidEnv(gym.Env):
         if self._is_closed:
             return gym.error.ClosedEnvironmentError(f"{call}() after close(): allowed is reset() or a new environment")
         return gym.error.ResetNeeded(f"call reset() before {call}()")
-
-
-class TaskEnv(RigidEnv):
-    """Any task as a Gymnasium environment; see `rigid_env.register_task`.
-
-    Parameters
-    ----------
-    task : class of Task, or str
-        The class, or where it stands: ``module:Class``.
-    render_mode, width, height, obs, obs_size, obs_stack, contacts, camera, arrows
-        As of `RigidEnv`.
-    settings
-        Arguments of the task.
-
-    Raises
-    ------
-    TypeError
-        An unknown argument, with the known ones, the nearest first.
-    ValueError
-        Naming the field, the value and what is allowed.
-    """
-
-    def __init__(
-        self,
-        task: type[Task] | str,
-        render_mode: str | None = None,
-        width: int = 960,
-        height: int = 600,
-        *,
-        camera: CameraArgument = None,
-        arrows: bool = True,
-        obs: str = "state",
-        obs_size: Sequence[int] = (84, 84),
-        obs_stack: int = 1,
-        contacts: int = 0,
-        **settings,
-    ):
-        told = render_mode, width, height, obs, obs_size, obs_stack, contacts
-        super().__init__(make_task(task, 1, settings), *told, camera=camera, arrows=arrows)
-
-
-class BlockEnv(EpisodeParameters, RigidEnv):
-    """A task of the block as a Gymnasium environment; subclasses name the task.
-
-    Parameters
-    ----------
-    render_mode, width, height, obs, obs_size, obs_stack, contacts, camera, arrows
-        As of `RigidEnv`.
-    accuracy, walls, half_width, mass, size, friction, restitution, gravity, effects, frame_skip, dt, dump_faults
-        Of the task, see `rigid_env.tasks.block.BlockTask`.
-
-    Raises
-    ------
-    TypeError
-        An unknown argument, with the known ones, the nearest first.
-    ValueError
-        Naming the field, the value and what is allowed.
-    """
-
-    task_class: ClassVar[type[BlockTask]]
-
-    def __init__(
-        self,
-        render_mode: str | None = None,
-        width: int = 960,
-        height: int = 600,
-        *,
-        camera: CameraArgument = None,
-        arrows: bool = True,
-        obs: str = "state",
-        obs_size: Sequence[int] = (84, 84),
-        obs_stack: int = 1,
-        contacts: int = 0,
-        accuracy: str | physics.Accuracy = "balanced",
-        walls: str = "three",
-        half_width: float = 10.0,
-        mass: Number = 6.0,
-        size: Edges = (5.0, 3.0, 2.0),
-        friction: Number = 0.5,
-        restitution: Number = 0.2,
-        gravity: Number = 9.81,
-        effects: Sequence = (),
-        frame_skip: int = 5,
-        dt: float = 0.005,
-        dump_faults: str | Path | None = None,
-    ):
-        task = self.task_class(
-            1, accuracy=accuracy, walls=walls, half_width=half_width, mass=mass, size=size, friction=friction,
-            restitution=restitution, gravity=gravity, effects=effects, frame_skip=frame_skip, dt=dt,
-            dump_faults=dump_faults,
-        )  # fmt: skip
-        told = render_mode, width, height, obs, obs_size, obs_stack, contacts
-        super().__init__(task, *told, camera=camera, arrows=arrows)

@@ -37,7 +37,7 @@ def register_envs() -> None:
         register(
             id=env_id,
             entry_point=f"rigid_env.envs.{module}:{name}Env",
-            vector_entry_point=f"rigid_env.envs.vector_env:{name}VectorEnv",
+            vector_entry_point=f"rigid_env.envs.{module}:{name}VectorEnv",
             max_episode_steps=steps,
         )
     for name, steps in GOALS.items():
@@ -45,8 +45,8 @@ def register_envs() -> None:
         if env_id not in registry:
             register(
                 id=env_id,
-                entry_point="rigid_env.envs.env:TaskEnv",
-                vector_entry_point="rigid_env.envs.vector_env:TaskVectorEnv",
+                entry_point="rigid_env.envs.task:TaskEnv",
+                vector_entry_point="rigid_env.envs.task:TaskVectorEnv",
                 max_episode_steps=steps,
                 kwargs={"task": f"rigid_env.tasks.block_goals:{name}"},
             )
@@ -83,8 +83,8 @@ def register_task(id: str, task: type | str, **settings: Any) -> None:
         validation.count(kind.max_episode_steps, f"max_episode_steps of {kind.__name__}")
     register(
         id=id,
-        entry_point="rigid_env.envs.env:TaskEnv",
-        vector_entry_point="rigid_env.envs.vector_env:TaskVectorEnv",
+        entry_point="rigid_env.envs.task:TaskEnv",
+        vector_entry_point="rigid_env.envs.task:TaskVectorEnv",
         max_episode_steps=kind.max_episode_steps,
         kwargs={"task": task, **settings},
     )

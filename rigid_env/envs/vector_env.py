@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from pathlib import Path
-from typing import Any, ClassVar
+from typing import Any
 
 import gymnasium as gym
 import numpy as np
@@ -12,25 +11,19 @@ from gymnasium.vector import AutoresetMode
 from gymnasium.vector.utils import batch_space
 from numpy.typing import ArrayLike
 
-import physics
-from physics import validation
-from physics.keywords import known_keywords
 from physics.parallel.exclusive import exclusive
 from rigid_env.envs import vector_arguments as arguments
 from rigid_env.envs import vector_infos
 from rigid_env.envs.attributes import BatchAttributes
 from rigid_env.envs.contact_infos import contact_infos
 from rigid_env.envs.goals import lend_goals
-from rigid_env.envs.making import make_task
 from rigid_env.envs.sources import make_source
 from rigid_env.envs.spaces import action_space
 from rigid_env.rendering.camera_argument import CameraArgument
 from rigid_env.rendering.view import RENDER_MODES, View
-from rigid_env.tasks import BlockReach, BlockReorient, Task
+from rigid_env.tasks import Task
 from rigid_env.tasks import layout as col
-from rigid_env.tasks.block import BlockTask
 from rigid_env.tasks.options import require_known
-from rigid_env.tasks.parameters import Edges, Number
 from rigid_env.tasks.state import TaskState, put, take
 
 
@@ -337,122 +330,3 @@ class RigidVectorEnv(BatchAttributes):
         """Close the window, if any."""
         if self._view is not None:
             self._view.close()
-
-
-class TaskVectorEnv(RigidVectorEnv):
-    """Many worlds of any task as a Gymnasium vector environment; see `rigid_env.register_task`.
-
-    Parameters
-    ----------
-    num_envs : int
-    task : class of Task, or str
-        The class, or where it stands: ``module:Class``.
-    autoreset_mode, max_episode_steps, render_mode, width, height, obs, obs_size, obs_stack, contacts, camera, arrows
-        As of `RigidVectorEnv`.
-    settings
-        Arguments of the task, ``threads`` among them.
-
-    Raises
-    ------
-    TypeError
-        An unknown argument, with the known ones, the nearest first.
-    ValueError
-        Naming the field, the value and what is allowed.
-    """
-
-    def __init__(
-        self,
-        num_envs: int = 1,
-        *,
-        task: type[Task] | str,
-        autoreset_mode: AutoresetMode | str = AutoresetMode.NEXT_STEP,
-        max_episode_steps: int | str | None = "registered",
-        render_mode: str | None = None,
-        width: int = 960,
-        height: int = 600,
-        camera: CameraArgument = None,
-        arrows: bool = True,
-        obs: str = "state",
-        obs_size: Sequence[int] = (84, 84),
-        obs_stack: int = 1,
-        contacts: int = 0,
-        **settings,
-    ):
-        batch = make_task(task, validation.count(num_envs, "num_envs"), settings)
-        told = render_mode, width, height, obs, obs_size, obs_stack, contacts
-        super().__init__(batch, autoreset_mode, max_episode_steps, *told, camera=camera, arrows=arrows)
-
-
-class BlockVectorEnv(RigidVectorEnv):
-    """Many worlds of a task of the block; subclasses name the task.
-
-    Parameters
-    ----------
-    num_envs : int
-    autoreset_mode, max_episode_steps, render_mode, width, height, obs, obs_size, obs_stack, contacts, camera, arrows
-        As of `RigidVectorEnv`.
-    threads : int
-        Threads that share a step.
-    accuracy, walls, half_width, mass, size, friction, restitution, gravity, effects, frame_skip, dt, dump_faults
-        Of the task, see `rigid_env.tasks.block.BlockTask`.
-
-    Raises
-    ------
-    TypeError
-        An unknown argument, with the known ones, the nearest first.
-    ValueError
-        Naming the field, the value and what is allowed.
-    """
-
-    task_class: ClassVar[type[BlockTask]]
-
-    def __init__(
-        self,
-        num_envs: int = 1,
-        autoreset_mode: AutoresetMode | str = AutoresetMode.NEXT_STEP,
-        max_episode_steps: int | str | None = "registered",
-        render_mode: str | None = None,
-        width: int = 960,
-        height: int = 600,
-        *,
-        camera: CameraArgument = None,
-        arrows: bool = True,
-        obs: str = "state",
-        obs_size: Sequence[int] = (84, 84),
-        obs_stack: int = 1,
-        contacts: int = 0,
-        threads: int = 1,
-        accuracy: str | physics.Accuracy = "balanced",
-        walls: str = "three",
-        half_width: float = 10.0,
-        mass: Number = 6.0,
-        size: Edges = (5.0, 3.0, 2.0),
-        friction: Number = 0.5,
-        restitution: Number = 0.2,
-        gravity: Number = 9.81,
-        effects: Sequence = (),
-        frame_skip: int = 5,
-        dt: float = 0.005,
-        dump_faults: str | Path | None = None,
-    ):
-        task = self.task_class(
-            validation.count(num_envs, "num_envs"), threads=threads, accuracy=accuracy, walls=walls,
-            half_width=half_width, mass=mass, size=size, friction=friction, restitution=restitution, gravity=gravity,
-            effects=effects, frame_skip=frame_skip, dt=dt, dump_faults=dump_faults,
-        )  # fmt: skip
-        told = render_mode, width, height, obs, obs_size, obs_stack, contacts
-        super().__init__(task, autoreset_mode, max_episode_steps, *told, camera=camera, arrows=arrows)
-
-
-@known_keywords
-class BlockReachVectorEnv(BlockVectorEnv):
-    """Many worlds of `rigid_env.envs.block_reach.BlockReachEnv`, which documents the task."""
-
-    task_class = BlockReach
-
-
-@known_keywords
-class BlockReorientVectorEnv(BlockVectorEnv):
-    """Many worlds of `rigid_env.envs.block_reorient.BlockReorientEnv`, which documents the task."""
-
-    task_class = BlockReorient

@@ -5,9 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from rigid_env.envs.block_reach import BlockReachEnv
-from rigid_env.envs.block_reorient import BlockReorientEnv
-from rigid_env.envs.vector_env import BlockReachVectorEnv, BlockReorientVectorEnv
+from rigid_env.envs.block_reach import BlockReachEnv, BlockReachVectorEnv
+from rigid_env.envs.block_reorient import BlockReorientEnv, BlockReorientVectorEnv
 
 IDS = ("rigid_env/BlockReach-v0", "rigid_env/BlockReorient-v0")
 

@@ -12,6 +12,7 @@ import pytest
 from gymnasium.utils.env_checker import data_equivalence
 from gymnasium.vector import AsyncVectorEnv, AutoresetMode, SyncVectorEnv
 
+import rigid_env
 from tests.envs.conftest import random_actions
 
 RANDOMISED = {
@@ -35,9 +36,7 @@ def parameters(request):
 @pytest.fixture
 def pair(env_class):
     """(single class, vector class) of one task."""
-    import rigid_env.envs.vector_env as module
-
-    return env_class, getattr(module, env_class.__name__.replace("Env", "VectorEnv"))
+    return env_class, getattr(rigid_env, env_class.__name__.replace("Env", "VectorEnv"))
 
 
 @pytest.mark.parametrize("mode", [AutoresetMode.NEXT_STEP, AutoresetMode.SAME_STEP])

@@ -13,6 +13,7 @@ from gymnasium.utils.env_checker import check_env
 from gymnasium.vector import AutoresetMode
 
 from rigid_env.envs.registration import MAX_EPISODE_STEPS, register_envs
+from rigid_env.envs.vector_env import RigidVectorEnv
 
 
 def test_gymnasium_check_env_without_a_warning(env_id):
@@ -62,7 +63,7 @@ def test_make_truncates_at_the_registered_step(env_id):
 def test_make_vec_gives_the_native_batch_and_its_limit(env_id):
     envs = gym.make_vec(env_id, num_envs=3, accuracy="fast")
     assert envs.metadata["autoreset_mode"] is AutoresetMode.NEXT_STEP
-    assert type(envs).__module__ == "rigid_env.envs.vector_env"
+    assert isinstance(envs, RigidVectorEnv)
     assert envs.max_episode_steps == gym.spec(env_id).max_episode_steps
     assert gym.make_vec(env_id, num_envs=1, max_episode_steps=7).max_episode_steps == 7
 

@@ -66,7 +66,7 @@ def test_importing_the_package_leaves_the_engine_alone(tmp_path):
 
 def test_lazy_names():
     from rigid_env.envs.block_reach import BlockReachEnv
-    from rigid_env.envs.vector_env import BlockReorientVectorEnv
+    from rigid_env.envs.block_reorient import BlockReorientVectorEnv
 
     assert rigid_env.BlockReachEnv is BlockReachEnv
     assert rigid_env.BlockReorientVectorEnv is BlockReorientVectorEnv

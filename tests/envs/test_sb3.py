@@ -7,7 +7,7 @@ import warnings
 import numpy as np
 import pytest
 
-from rigid_env.envs.vector_env import BlockReachVectorEnv
+from rigid_env.envs.block_reach import BlockReachVectorEnv
 
 pytest.importorskip("stable_baselines3")
 

@@ -10,9 +10,8 @@ import numpy as np
 import pytest
 
 import physics
-from rigid_env.envs.block_reach import BlockReachEnv
-from rigid_env.envs.block_reorient import BlockReorientEnv
-from rigid_env.envs.vector_env import BlockReachVectorEnv, BlockReorientVectorEnv
+from rigid_env.envs.block_reach import BlockReachEnv, BlockReachVectorEnv
+from rigid_env.envs.block_reorient import BlockReorientEnv, BlockReorientVectorEnv
 from rigid_env.tasks import block as base
 from rigid_env.tasks import kernels
 from rigid_env.tasks import layout as col

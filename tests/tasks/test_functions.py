@@ -8,8 +8,9 @@ import pytest
 import physics
 from benchmarks.numpy_reach import NumpyReach
 from rigid_env.envs.checks import CheckError, check_task
-from rigid_env.envs.env import RigidEnv, TaskEnv
-from rigid_env.envs.vector_env import RigidVectorEnv, TaskVectorEnv
+from rigid_env.envs.env import RigidEnv
+from rigid_env.envs.task import TaskEnv, TaskVectorEnv
+from rigid_env.envs.vector_env import RigidVectorEnv
 from rigid_env.tasks import BlockReach, BlockReorient, Entry, Task, Wrench, observe
 from rigid_env.tasks.parameters import LENGTHS
 from tests.tasks.conftest import Free, Slide, started
