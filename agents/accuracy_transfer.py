@@ -129,7 +129,7 @@ def make_table(env: str, rows: list[Transfer]) -> Table:
 
 def main(
     env: Annotated[str, typer.Option(help="Gymnasium id.")] = DEFAULTS["env"],
-    algo: Annotated[str, typer.Option(help="ppo or sac.")] = DEFAULTS["algo"],
+    algo: Annotated[str, typer.Option(help="ppo or sac.")] = "ppo",
     seed: Annotated[int, typer.Option(min=0, help="Of all that is random.")] = DEFAULTS["seed"],
     accuracies: Annotated[str, typer.Option(metavar="NAMES", help="Presets to train at, with commas.")] = TRAINED_AT,
     episodes: Annotated[int, typer.Option(min=1, help="Of each evaluation.")] = EPISODES,

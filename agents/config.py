@@ -106,16 +106,27 @@ def read_hyperparameters(env: str, algo: str, path: Path = HYPERPARAMETERS) -> d
     ValueError
         If there is no such entry, or it has an unknown key.
     """
-    table = yaml.safe_load(path.read_text(encoding="utf-8"))
-    if env not in table:
-        raise ValueError(f"env is {env!r}; allowed are those of {path.name}: {', '.join(table)}")
-    if algo not in table[env]:
-        raise ValueError(f"algo is {algo!r}; allowed with {env} are {', '.join(table[env])}")
-    entry = table[env][algo]
+    known = _entries(env, path)
+    if algo not in known:
+        raise ValueError(f"algo is {algo!r}; allowed with {env} are {', '.join(known)}")
+    entry = known[algo]
     unknown = set(entry) - {f.name for f in fields(RunConfig)}
     if unknown:
         raise ValueError(f"{path.name}: {env}, {algo} has the unknown keys {', '.join(sorted(unknown))}")
     return entry
+
+
+def default_algorithm(env: str, path: Path = HYPERPARAMETERS) -> str:
+    """The first algorithm of an environment in a file of hyperparameters; a ValueError where there is no such entry."""
+    return next(iter(_entries(env, path)))
+
+
+def _entries(env: str, path: Path) -> dict[str, dict[str, Any]]:
+    """The entries of an environment, by algorithm."""
+    table = yaml.safe_load(path.read_text(encoding="utf-8"))
+    if env not in table:
+        raise ValueError(f"env is {env!r}; allowed are those of {path.name}: {', '.join(table)}")
+    return table[env]
 
 
 def make_config(env: str, algo: str, seed: int, path: Path = HYPERPARAMETERS, **changes: Any) -> RunConfig:

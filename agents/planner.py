@@ -17,6 +17,7 @@ import statistics
 import time
 from dataclasses import dataclass, replace
 from json import dumps
+from pathlib import Path
 from typing import Annotated
 
 import gymnasium as gym
@@ -24,16 +25,20 @@ import numpy as np
 import typer
 from rich.progress import Progress
 
-from agents.evaluate import JsonOption
 from agents.interval import wilson
 from physics import validation
+from rigid_env.cli.files import output_option
 from rigid_env.envs.making import make_task
+from rigid_env.envs.named import make_named
 from rigid_env.tasks.rollout import rollout
 from rigid_env.tasks.state import TaskState
 from rigid_env.terminal import Column, Table, make_console, number_columns, run_program
 
 ENV_ID = "rigid_env:rigid_env/BlockReach-v0"
 METHODS = ("mppi", "cem")
+
+INTERRUPTED = 130
+"""Exit status after Ctrl-C."""
 
 
 @dataclass(frozen=True)
@@ -188,8 +193,14 @@ class Solved:
     steps: list[int]
     seconds: list[float]
 
+    def add(self, others: Solved) -> None:
+        """Take in episodes that were planned later."""
+        self.is_success.extend(others.is_success)
+        self.steps.extend(others.steps)
+        self.seconds.extend(others.seconds)
 
-def solve(env: gym.Env, planner: Planner, episodes: int, seed: int = 0, tick=lambda: None) -> Solved:
+
+def solve(env: gym.Env, planner: Planner, episodes: int, seed: int = 0) -> Solved:
     """Plan whole episodes.
 
     Parameters
@@ -200,8 +211,6 @@ def solve(env: gym.Env, planner: Planner, episodes: int, seed: int = 0, tick=lam
     episodes : int
     seed : int
         Of the first episode; the others follow it.
-    tick : callable
-        Called after each episode.
     """
     found = Solved([], [], [])
     for episode in range(episodes):
@@ -218,7 +227,6 @@ def solve(env: gym.Env, planner: Planner, episodes: int, seed: int = 0, tick=lam
         found.is_success.append(bool(info["is_success"]))
         found.steps.append(steps)
         found.seconds.append(time.process_time() - start)
-        tick()
     return found
 
 
@@ -229,25 +237,39 @@ def main(
     samples: Annotated[int, typer.Option(min=1, help="Sequences in one iteration.")] = PlannerSettings.samples,
     accuracy: Annotated[str, typer.Option(help="Preset of the model; the environment has its default.")] = "fast",
     seed: Annotated[int, typer.Option(min=0, help="Of the first episode, and of the noise.")] = 1000,
-    json: JsonOption = None,
+    json: Annotated[Path | None, output_option("--json", ".json", help="Write the numbers here, too.")] = None,
 ) -> None:
     """Solve episodes by planning, without training."""
-    world = gym.make(env)
-    settings = PlannerSettings(method=method, samples=samples)
-    planner = Planner(type(world.unwrapped.task), settings, seed, accuracy=accuracy)
-    with Progress(console=make_console(), transient=True) as progress:
-        task = progress.add_task("episodes", total=episodes)
-        found = solve(world, planner, episodes, seed, lambda: progress.advance(task))
-    low, high = wilson(sum(found.is_success), episodes)
+    try:
+        world = make_named(env)
+        settings = PlannerSettings(method=method, samples=samples)
+        planner = Planner(type(world.unwrapped.task), settings, seed, accuracy=accuracy)
+    except (ValueError, TypeError) as error:
+        raise typer.BadParameter(str(error)) from error
+    console, found = make_console(), Solved([], [], [])
+    try:
+        with Progress(console=console, transient=True) as progress:
+            task = progress.add_task("episodes", total=episodes)
+            for episode in range(episodes):
+                found.add(solve(world, planner, 1, seed + episode))
+                progress.advance(task)
+    except KeyboardInterrupt:
+        console.print(f"interrupted after {len(found.steps)} of {episodes} episodes")
+        if not found.steps:
+            raise typer.Exit(INTERRUPTED) from None
+    count = len(found.steps)
+    low, high = wilson(sum(found.is_success), count)
     row = {
-        "env": env, "method": method, "success": sum(found.is_success) / episodes, "interval": [low, high],
-        "steps": statistics.fmean(found.steps), "seconds": statistics.median(found.seconds),
+        "env": env, "method": method, "episodes": count, "success": sum(found.is_success) / count,
+        "interval": [low, high], "steps": statistics.fmean(found.steps), "seconds": statistics.median(found.seconds),
     }  # fmt: skip
     table = Table([Column("environment"), Column("method"), *number_columns("success", "steps", "CPU s an episode")])
     table.add_row(env, method, f"{row['success']:.2f}", f"{row['steps']:.0f}", f"{row['seconds']:.2f}")
-    make_console().print(table)
+    console.print(table)
     if json is not None:
         json.write_text(dumps(row, indent=2) + "\n", encoding="utf-8")
+    if count < episodes:
+        raise typer.Exit(INTERRUPTED)
 
 
 if __name__ == "__main__":

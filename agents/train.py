@@ -24,7 +24,7 @@ from stable_baselines3.common.logger import configure
 
 from agents.algorithms import make_model, make_training_env
 from agents.checkpoint import greedy, list_checkpoints, load_checkpoint
-from agents.config import HYPERPARAMETERS, RunConfig, RunFolder, change, make_config
+from agents.config import HYPERPARAMETERS, RunConfig, RunFolder, change, default_algorithm, make_config
 from agents.curve import History, plot_curve, write_curve
 from agents.evaluate import JsonOption, evaluate, evaluation_seeds, print_evaluation, write_json
 from agents.progress import ProgressDisplay
@@ -32,7 +32,7 @@ from agents.record import record
 from agents.supervisor import Supervisor
 from rigid_env.terminal import make_console, run_program
 
-DEFAULTS = {"env": "rigid_env/BlockReach-v0", "algo": "ppo", "seed": 0}
+DEFAULTS = {"env": "rigid_env/BlockReach-v0", "seed": 0}
 EVALUATION_EPISODES = 1000
 VIDEO_EPISODES = 3
 INTERRUPTED = 130  # exit status of a program ended by Ctrl-C
@@ -145,7 +145,9 @@ def choose_config(resume: Path | None, hyperparameters: Path, fixed: dict[str, A
     """
     given = {name: value for name, value in fixed.items() if value is not None}
     if resume is None:
-        return make_config(path=hyperparameters, **{**DEFAULTS, **given})
+        wanted = {**DEFAULTS, **given}
+        wanted.setdefault("algo", default_algorithm(wanted["env"], hyperparameters))
+        return make_config(path=hyperparameters, **wanted)
     if given:
         raise ValueError(f"{next(iter(given))} cannot change with --resume; allowed are target, max_steps, threads")
     return RunFolder(resume).read_config()
@@ -182,7 +184,7 @@ def new_folder(out: Path, config: RunConfig) -> RunFolder:
 
 def main(
     env: Annotated[str | None, typer.Option(help="Gymnasium id.", show_default=DEFAULTS["env"])] = None,
-    algo: Annotated[str | None, typer.Option(help="ppo or sac.", show_default=DEFAULTS["algo"])] = None,
+    algo: Annotated[str | None, typer.Option(help="ppo or sac.", show_default="the first of the environment")] = None,
     seed: Annotated[int | None, typer.Option(help="Of all that is random.", show_default="0")] = None,
     num_envs: Annotated[int | None, typer.Option(help="Worlds trained on at once.")] = None,
     accuracy: Annotated[str | None, typer.Option(help="Preset of the engine in training.")] = None,

@@ -100,6 +100,8 @@ class Actuation:
 
     def forget(self, worlds: np.ndarray) -> None:
         """Let these worlds begin at rest: no output, no commands on their way."""
+        if len(worlds) == self._shape[0]:
+            self._late = []  # their time may begin anew
         for rows in (self.output, *(command for _, command in self._late)):
             rows.reshape(self._shape)[worlds] = 0.0
 

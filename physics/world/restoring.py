@@ -7,13 +7,10 @@ from typing import NamedTuple
 import numpy as np
 
 from physics import validation
-from physics.kernels.forces.wind import WIND_GUST
-from physics.kernels.state import layout as at
-from physics.plan.plan import Plan
-from physics.scene.force_fields import Wind
 from physics.summary import shown
 from physics.world import choice
 from physics.world.batch import Batch
+from physics.world.gusts import reads_time
 from physics.world.snapshot import KEPT, Snapshot
 from physics.world.warm_starts import check_numbers, copy_memory
 
@@ -163,21 +160,9 @@ def _other_snapshot(snapshot: Snapshot, count: int) -> ValueError:
 
 def _check_clock(world: Batch, snapshot: Snapshot) -> None:
     """Refuse to restore some worlds to another time of fields that change with it: a batch has one time."""
-    if _reads_time(world.plan, world.params) or _reads_time(world.plan, snapshot.arrays[KEPT.index("params")]):
+    if reads_time(world.plan, world.params) or reads_time(world.plan, snapshot.arrays[KEPT.index("params")]):
         raise ValueError(
             f"snapshot is of time {snapshot.time!r} s, and the batch of time {world.time!r} s, in a scene with a field "
             "that may change with time; allowed is to restore all worlds, or a snapshot of the same time "
             "(dataclasses.replace(snapshot, time=world.time), if the time does not matter)"
         )
-
-
-def _reads_time(plan: Plan, params: np.ndarray) -> bool:
-    """True if a field may change with time: wind with gusts, or a user's that does not say that it is steady."""
-    for slot in plan.fields:
-        if slot.is_users and not all(effect.is_steady for effect in slot.effects):
-            return True
-        if slot.kind is Wind:
-            gusts = at.PARAM_SIZE + slot.first + WIND_GUST + slot.term.size * np.arange(slot.term.count)
-            if params[:, gusts].any():
-                return True
-    return False

@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import os
-import re
-import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -18,7 +15,6 @@ if TYPE_CHECKING:
     from rigid_env.envs.env import RigidEnv
     from rigid_env.tasks.describe import Section
 
-CLASS = re.compile(r"[\w.]+:[A-Za-z_]\w*")
 NUMBERS = ("Num", "Min", "Max", "Numbers")  # columns
 
 
@@ -63,23 +59,9 @@ def _make(task: str) -> RigidEnv:
     ValueError
         There is none, or it is not of this package.
     """
-    import gymnasium as gym
+    from rigid_env.envs.named import make_named
 
-    from rigid_env.envs.env import RigidEnv
-    from rigid_env.envs.task import TaskEnv
-
-    if os.getcwd() not in sys.path:
-        sys.path.append(os.getcwd())
-    if CLASS.fullmatch(task):
-        return TaskEnv(task)
-    try:
-        made = gym.make(task).unwrapped
-    except (gym.error.Error, ImportError) as error:
-        allowed = "allowed are ids such as 'rigid_env/BlockReach-v0', 'module:id', and 'module:Class' of a task"
-        raise ValueError(f"task is {task!r}, which is not there ({error}); {allowed}") from error
-    if not isinstance(made, RigidEnv):
-        raise ValueError(f"task is {task!r}, a {type(made).__name__}; allowed are environments of rigid_env")
-    return made
+    return make_named(task, "task").unwrapped
 
 
 def _table(section: Section) -> Table:

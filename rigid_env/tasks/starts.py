@@ -15,6 +15,7 @@ import physics
 from physics import validation
 from physics.kernels.state import layout as at
 from physics.parallel.team import listed
+from physics.world.gusts import begin_gusts, gust_phases, reads_time
 from physics.world.setters import start_anew
 from rigid_env.tasks.declaration import Declaration
 from rigid_env.tasks.distributions import Distribution, as_distribution
@@ -72,8 +73,11 @@ class Starts(Declaration):
 
     def _start(self, rows: np.ndarray, chosen: Mapping[str, np.ndarray]) -> None:
         shares = np.array([self.generators[world].random(self.episodes.uniforms) for world in rows])
+        if len(rows) == self.worlds and reads_time(self.world.plan, self.world.params):
+            self.world.time = 0.0  # so that the same seed leads to the same bits
         values = self.episodes.draw(rows, shares, chosen)
         self.move(rows, values, chosen)
+        self._begin_gusts(rows)
         self.episodes.begin(rows, values, chosen)
         self._note_parameters(rows)
         for array in (self.action, self.previous_action, self.wrench, self.outcome, *self.memory_arrays.values()):
@@ -88,6 +92,12 @@ class Starts(Declaration):
         else:
             world = self.world
             self.compiled(listed(rows), world.state, self.record, world.walls, None, self.obs, self.outcome)
+
+    def _begin_gusts(self, rows: np.ndarray) -> None:
+        """Draw gusts anew, where the scene has any."""
+        count = gust_phases(self.world.plan)
+        if count:
+            begin_gusts(self.world, rows, np.array([self.generators[world].random(count) for world in rows]))
 
     def move(self, rows: np.ndarray, values: Mapping[str, np.ndarray], chosen: Mapping[str, np.ndarray]) -> None:
         """Write poses and parameters of episodes with these values into the world; after an error nothing has changed.

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import gymnasium as gym
 import numpy as np
 
+from physics import Event
 from rigid_env.rendering.view import frame_of
 from rigid_env.viewer.copies import accuracy_name
 from rigid_env.viewer.env_copies import copied_env, put_chain, take_chain
@@ -27,6 +29,7 @@ class State(NamedTuple):
     observation: Any
     is_ended: bool
     episode: tuple[int, float]
+    shift: float
     generator: Mapping[str, Any]
     pairs: frozenset[tuple[int, int]]
 
@@ -59,6 +62,7 @@ class LiveEnv(WorldSubject):
         self.can = allowed_of(self.world, seed=True)
         self._down = direction_of(self.world.gravity[0])
         self._is_ended, self._episode, self._observation = False, (0, 0.0), None
+        self._shift = 0.0  # of the time [s]: where gusts blow, a reset sets that of the world to 0
         self._begin_first(seed)
         self._first = self.snapshot()
 
@@ -85,8 +89,16 @@ class LiveEnv(WorldSubject):
         self.listener.is_changed = False
 
     @property
+    def time(self) -> float:
+        """Simulated time of all episodes together [s]."""
+        return self.world.time + self._shift
+
+    @property
     def interval(self) -> float:
         return self._task.control_dt
+
+    def events(self) -> list[Event]:
+        return [replace(event, t=event.t + self._shift) for event in super().events()]
 
     @property
     def message(self) -> str:
@@ -98,14 +110,16 @@ class LiveEnv(WorldSubject):
         put_chain(self._env, self._first.chain, is_other=True)
         self.seed, self._generator = seed, np.random.default_rng(seed)
         self._observation, _ = self._env.reset(seed=seed)
-        self._is_ended, self._episode = False, (0, 0.0)
+        self._is_ended, self._episode, self._shift = False, (0, 0.0), 0.0
         self.listener.begin()
         self.listener.pairs, self.listener.is_changed = set(), False
 
     def step(self, load=None, record=None):
         self.listener.begin()
         if self._is_ended:
+            before = self.world.time
             self._observation, _ = self._env.reset()
+            self._shift += before - self.world.time
             self._is_ended, self._episode = False, (self._episode[0] + 1, 0.0)
         action = self._act() if record is None else record
         hand = self._task.disturbed
@@ -133,14 +147,14 @@ class LiveEnv(WorldSubject):
     def snapshot(self) -> State:
         return State(
             self.accuracy, take_chain(self._env), copy.deepcopy(self._observation), self._is_ended, self._episode,
-            self._generator.bit_generator.state, frozenset(self.listener.pairs),
+            self._shift, self._generator.bit_generator.state, frozenset(self.listener.pairs),
         )  # fmt: skip
 
     def restore(self, snapshot: State) -> None:
         self._use(snapshot.accuracy)
         put_chain(self._env, snapshot.chain)
         self._observation = copy.deepcopy(snapshot.observation)
-        self._is_ended, self._episode = snapshot.is_ended, snapshot.episode
+        self._is_ended, self._episode, self._shift = snapshot.is_ended, snapshot.episode, snapshot.shift
         self._generator.bit_generator.state = snapshot.generator
         self.listener.begin()
         self.listener.pairs, self.listener.is_changed = set(snapshot.pairs), False

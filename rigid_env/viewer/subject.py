@@ -115,6 +115,8 @@ def _of_text(text: str) -> tuple[Any, str]:
         return _of_archive(path), path.stem
     if _is_environment(text):
         return text, text.split("/")[-1]
+    if path.suffix:
+        raise ValueError(f"what is {text!r}, a file that does not exist; allowed are {ALLOWED}")
     near = nearest_first(text, [*scenes.SCENES, *_ids()])[:KNOWN_FIRST]
     raise ValueError(f"what is {text!r}; allowed are {ALLOWED} (such as {', '.join(near)})")
 
@@ -154,8 +156,7 @@ def _is_environment(what: Any) -> bool:
 
 
 def _open_environment(what, name, accuracy, dt, seed, policy, controller) -> Subject:
-    import gymnasium as gym
-
+    from rigid_env.envs.named import make_named
     from rigid_env.viewer.episodes import LiveEnv
 
     if dt is not None:
@@ -164,12 +165,7 @@ def _open_environment(what, name, accuracy, dt, seed, policy, controller) -> Sub
     if isinstance(what, str):
         if what.split(":")[-1].split("/")[-1] == "Scene-v0":
             raise ValueError(f"what is {what!r}, which needs a scene; allowed is the scene, or the environment itself")
-        try:
-            env = gym.make(what, disable_env_checker=True)
-        except (gym.error.Error, ImportError) as error:
-            raise ValueError(f"what is {what!r}, which Gymnasium does not make ({error})") from error
-        if not _is_environment(env):
-            raise ValueError(f"what is {what!r}; allowed are environments of rigid_env")
+        env = make_named(what, "what")
     return LiveEnv(env, name, seed, _policy(env, policy, controller), accuracy)
 
 

@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+import json
+
 import gymnasium as gym
 import numpy as np
 import pytest
+import typer
+from typer.testing import CliRunner
 
-from agents.planner import Planner, PlannerSettings, solve
+import agents.planner
+from agents.planner import INTERRUPTED, Planner, PlannerSettings, main, solve
 from rigid_env import BlockReachEnv
 
 
@@ -61,3 +66,65 @@ def test_settings_out_of_range_are_refused(field, value, words):
     with pytest.raises(ValueError, match="allowed") as error:
         PlannerSettings(**{field: value})
     assert all(word in str(error.value) for word in words), str(error.value)
+
+
+def run(*arguments):
+    app = typer.Typer(rich_markup_mode=None)
+    app.command()(main)
+    return CliRunner().invoke(app, [str(argument) for argument in arguments])
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (("--method", "luck"), "method is 'luck'; allowed are mppi, cem"),
+        (("--samples", 1), "elites is 4; allowed are at most the samples, 1"),
+        (("--env", "CartPole-v1"), "env is 'CartPole-v1', a CartPoleEnv; allowed are environments of rigid_env"),
+        (("--env", "rigid_env/Nope-v0"), "env is 'rigid_env/Nope-v0', which is not there"),
+        (("--env", "rigid_env/Scene-v0"), "scene is None"),
+    ],
+)
+def test_the_command_tells_a_mistake_in_a_line(arguments, words):
+    result = run(*arguments)
+    assert result.exit_code == 2
+    assert words in " ".join(result.output.split())
+
+
+def test_what_was_planned_before_ctrl_c_is_kept(monkeypatch, tmp_path):
+    done = []
+
+    def interrupted(*arguments):
+        if len(done) == 2:
+            raise KeyboardInterrupt
+        done.append(arguments)
+        return agents.planner.Solved([True], [10], [0.1])
+
+    monkeypatch.setattr(agents.planner, "solve", interrupted)
+    path = tmp_path / "found.json"
+    result = run("--episodes", 5, "--json", path)
+    assert result.exit_code == INTERRUPTED
+    assert "interrupted after 2 of 5 episodes" in result.output
+    assert json.loads(path.read_text())["episodes"] == 2
+
+
+def test_a_task_of_ones_own_in_the_working_folder_is_planned(monkeypatch, tmp_path):
+    (tmp_path / "mine_to_plan.py").write_text(OWN)
+    monkeypatch.chdir(tmp_path)
+    result = run("--env", "mine_to_plan:Up", "--episodes", 1, "--samples", 8)
+    assert result.exit_code == 0, result.output
+
+
+OWN = """
+import physics
+from rigid_env import Task, Wrench, observe
+
+
+class Up(Task):
+    max_episode_steps = 5
+    scene = physics.Scene([physics.Block((1, 1, 1), 1.0)], effects=[physics.Gravity()])
+    actions = Wrench(0)
+    observation = [observe.pos(0)]
+
+    def rewards(self, worlds):
+        return {"height": worlds.pos[:, 0, 1]}
+"""

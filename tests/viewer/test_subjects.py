@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import gymnasium as gym
 import numpy as np
 import pytest
@@ -14,6 +16,8 @@ from rigid_env.rendering.picture import world_frame
 from rigid_env.viewer.subject import open_subject
 from tests.tasks.conftest import Slide
 from tests.viewer.conftest import session_of, state_of, take
+
+EXAMPLES = Path(__file__).parents[2] / "examples"
 
 
 def same(frame, other) -> None:
@@ -156,6 +160,14 @@ def test_a_trajectory_is_played_to_its_end(fallen, tmp_path):
         assert getattr(session.samples, name) == pytest.approx(getattr(known.samples, name), abs=1e-9)
 
 
+def test_a_task_of_ones_own_in_the_working_folder_is_found(tmp_path, monkeypatch):
+    (tmp_path / "mine_to_view.py").write_text((EXAMPLES / "two_blocks.py").read_text())
+    monkeypatch.chdir(tmp_path)
+    subject = open_subject("mine_to_view:TwoBlocks", accuracy="fast")
+    subject.step()
+    assert len(subject.scene.bodies) == 2
+
+
 @pytest.mark.parametrize(
     ("what", "arguments", "told"),
     [
@@ -163,7 +175,8 @@ def test_a_trajectory_is_played_to_its_end(fallen, tmp_path):
         (3, {}, r"what is 3; allowed are a canonical scene"),
         ("none.toml", {}, r"'none.toml', which does not exist; allowed"),
         ("rigid_env/Scene-v0", {}, r"needs a scene; allowed"),
-        ("nothing:here-v0", {}, r"'nothing:here-v0', which Gymnasium does not make"),
+        ("nothing:here-v0", {}, r"what is 'nothing:here-v0', which is not there"),
+        ("nothing.npz", {}, r"what is 'nothing.npz', a file that does not exist; allowed"),
         ("CartPole-v1", {}, r"what is 'CartPole-v1'; allowed"),
         ("drop", {"accuracy": "exact"}, r"accuracy is 'exact'; allowed"),
         ("drop", {"dt": 0.0}, r"dt is 0.0; allowed"),

@@ -1,0 +1,71 @@
+"""Gusts that begin anew in some worlds of a batch, which has one time, and whether a field changes with time at all."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from physics.kernels.forces.wind import WIND_GUST, WIND_PHASES, WIND_TIME_SCALE, WIND_WAVES
+from physics.kernels.state import layout as at
+from physics.plan.plan import Plan
+from physics.scene.force_fields import Wind
+from physics.world.batch import Batch
+
+PHASES = 3 * WIND_WAVES
+"""Of one wind."""
+
+
+def reads_time(plan: Plan, params: np.ndarray) -> bool:
+    """True if a field may change with time: wind with gusts, or a user's that does not say that it is steady."""
+    if any(slot.is_users and not all(effect.is_steady for effect in slot.effects) for slot in plan.fields):
+        return True
+    return any(params[:, first + WIND_GUST].any() for first in _winds(plan))
+
+
+def gust_phases(plan: Plan) -> int:
+    """Number of phases that decide the gusts of one world; 0: its winds are steady."""
+    return PHASES * len(_winds(plan)) if any(_has_gusts(slot) for slot in plan.fields) else 0
+
+
+def begin_gusts(world: Batch, worlds: np.ndarray, shares: np.ndarray) -> None:
+    """Let gusts begin anew in some worlds, as they would at time 0 of a batch of their own.
+
+    A wave cos(ω t + φ) gets the phase φ - ω t of the present time t. At t = 0 nothing is rounded; later the gusts are
+    the same up to the rounding of ω t.
+
+    Parameters
+    ----------
+    world : Batch
+    worlds : (k,) int64
+    shares : (k, `gust_phases`) float
+        Of a turn, 0 to 1.
+    """
+    params = world.params.reshape(world.worlds, world.body_count, -1)
+    turns = 2.0 * math.pi * shares.reshape(len(worlds), -1, 3, WIND_WAVES)
+    for first, phases in zip(_winds(world.plan), turns.swapaxes(0, 1)):
+        time_scale = params[worlds, 0, first + WIND_TIME_SCALE, None, None]
+        begun = phases - _frequencies() / time_scale * world.time
+        columns = slice(first + WIND_PHASES, first + WIND_PHASES + PHASES)
+        params[worlds, :, columns] = begun.reshape(len(worlds), 1, PHASES)
+    if world.recorder is not None:
+        world.recorder.changed(worlds)
+
+
+def _frequencies() -> np.ndarray:
+    """(waves,) ω τ, as of `physics.kernels.forces.wind.gust_frequency`."""
+    return np.tan(0.5 * math.pi * (np.arange(WIND_WAVES) + 0.5) / WIND_WAVES)
+
+
+def _winds(plan: Plan) -> list[int]:
+    """First column of each wind in the parameters."""
+    return [
+        at.PARAM_SIZE + slot.first + slot.term.size * k
+        for slot in plan.fields
+        if slot.kind is Wind
+        for k in range(slot.term.count)
+    ]
+
+
+def _has_gusts(slot) -> bool:
+    return slot.kind is Wind and any(effect.gust > 0.0 for effect in slot.effects)
