@@ -22,7 +22,7 @@ class EventList:
 
     def __init__(self, gui, go_to: Callable[[float], None]):
         self._times: list[float | None] = [None] * ROWS
-        self._events: Sequence[Event] = ()
+        self._events: Sequence[Event] = []
         self._back = gui.add_slider("earlier", 0, 1, 1, 0, visible=False)
         self._back.on_update(lambda _: self._fill())
         self._count = gui.add_markdown("none yet")
@@ -32,9 +32,9 @@ class EventList:
 
     def show(self, events: Sequence[Event]) -> None:
         """Bring the list up to date."""
-        if len(events) == len(self._events):
+        if len(events) == len(self._events) and all(new is old for new, old in zip(events[-1:], self._events[-1:])):
             return
-        self._events = events
+        self._events = list(events)
         earlier = max(0, len(events) - ROWS)
         if earlier:
             self._back.max = earlier
@@ -46,7 +46,7 @@ class EventList:
         self._fill()
 
     def _fill(self) -> None:
-        newest = list(self._events)[::-1][int(self._back.value) :][:ROWS]
+        newest = self._events[::-1][int(self._back.value) :][:ROWS]
         for k, row in enumerate(self._rows):
             event = newest[k] if k < len(newest) else None
             self._times[k] = None if event is None else event.t

@@ -35,6 +35,8 @@ class Panel:
 
     def __init__(self, gui, session: Session, stage: Stage, post: Callable[[Callable[[], Any]], None]):
         self._gui, self._session, self._stage, self._post = gui, session, stage, post
+        self._pending: list[Any] = []  # controls whose new value the session has not got yet
+        self._told: dict[tuple[int, str], Any] = {}  # properties of controls as the page has them
         self._status = gui.add_markdown("")
         self._sliders: dict[str, Any] = {}
         self._accuracy = None
@@ -48,8 +50,7 @@ class Panel:
                 self._hand_controls()
         with gui.add_folder("Show", expand_by_default=False):
             self._layer_controls()
-        with gui.add_folder("Plots", expand_by_default=False):
-            self._plots = Plots(gui)
+        self._plots = Plots(gui, gui.add_folder("Plots", expand_by_default=False))
         with gui.add_folder("Events", expand_by_default=False):
             self._events = EventList(gui, lambda time: post(lambda: session.seek(time)))
 
@@ -75,9 +76,12 @@ class Panel:
         self._plots.show(session.samples)
         self._events.show(session.events)
 
-    @staticmethod
-    def _put(handle, name: str, value) -> None:
-        """Set a property where it differs: every change is sent."""
+    def _put(self, handle, name: str, value) -> None:
+        """Set a property where the session has changed it; what the user has just set stays, told or not yet."""
+        key = id(handle), name
+        if self._told.get(key) == value or any(handle is each for each in self._pending):
+            return
+        self._told[key] = value
         if getattr(handle, name) != value:
             setattr(handle, name, value)
 
@@ -140,7 +144,13 @@ class Panel:
         def _(event) -> None:
             if event.client is not None:  # not the panel itself
                 value = handle.value
-                self._post(lambda: act(value))
+                self._pending.append(handle)
+                self._post(lambda: self._do(handle, act, value))
+
+    def _do(self, handle, act: Callable[[Any], Any], value: Any) -> None:
+        self._pending.remove(handle)
+        self._told[id(handle), "value"] = value
+        act(value)
 
     def _cost_text(self) -> str:
         """Tell what accuracy costs, in a line or two."""

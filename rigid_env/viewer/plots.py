@@ -3,16 +3,22 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
-from rigid_env.viewer.samples import UNITS, Samples
+from rigid_env.viewer.samples import Samples
 
 POINTS = 400
 """Points of a line at most: longer runs are thinned."""
 
 SMALLEST = 1e-16
-"""Stands in for zero on a logarithmic axis."""
+"""Stands in for zero where powers of ten are drawn."""
+
+LEAST = 2
+"""Samples from which on there is a line."""
+
+FONT = "11px sans-serif"
 
 COLOURS = ("#1c7ed6", "#e8590c", "#2b8a3e")
 
@@ -24,52 +30,84 @@ class Plot:
     Parameters
     ----------
     title : str
+        With the unit.
     columns : tuple of str
         Of `Samples`.
+    factor : float
+        From the unit of the columns to that of the title: the page writes numbers with three decimals at most.
     is_log : bool
+        The axis is logarithmic: for a few decades.
+    is_power : bool
+        Powers of ten are drawn, on a linear axis: for many decades.
     """
 
     title: str
     columns: tuple[str, ...]
+    factor: float = 1.0
     is_log: bool = False
+    is_power: bool = False
 
 
 PLOTS = (
-    Plot("energy", ("energy", "kinetic_energy", "potential_energy")),
-    Plot("momentum", ("momentum",)),
-    Plot("penetration", ("penetration",)),
-    Plot("residual", ("residual",), is_log=True),
-    Plot("error against reference", ("error", "error_of_reference"), is_log=True),
-    Plot("cost", ("cost", "cost_of_reference"), is_log=True),
+    Plot("energy [J]", ("energy", "kinetic_energy", "potential_energy")),
+    Plot("momentum [kg m/s]", ("momentum",)),
+    Plot("penetration [µm]", ("penetration",), factor=1e6),
+    Plot("log₁₀ residual", ("residual",), is_power=True),
+    Plot("log₁₀ distance to reference [m]", ("error", "error_of_reference"), is_power=True),
+    Plot("cost [µs/s]", ("cost", "cost_of_reference"), is_log=True),
 )
 
 
 class Plots:
-    """All plots of `PLOTS`, brought up to date together.
+    """All plots of `PLOTS` that have a line, brought up to date together.
 
     Parameters
     ----------
     gui : viser.GuiApi
+    folder : viser.GuiFolderHandle
+        Holds them.
     """
 
-    def __init__(self, gui):
-        self._handles = [_add(gui, plot) for plot in PLOTS]
+    def __init__(self, gui, folder):
+        self._gui, self._folder = gui, folder
+        self._handles: dict[Plot, tuple[tuple[str, ...], Any]] = {}
         self._shown: tuple[int, float] = (0, 0.0)
 
     def show(self, samples: Samples) -> None:
         """Draw the samples; nothing is sent where there are no new ones."""
-        if not len(samples) or self._shown == (len(samples), float(samples.time[-1])):
+        state = len(samples), float(samples.time[-1]) if len(samples) else 0.0
+        if self._shown == state:
             return
-        self._shown = len(samples), float(samples.time[-1])
+        self._shown = state
         every = thinned(len(samples), POINTS)
-        time = samples.time[every]
-        for plot, handle in zip(PLOTS, self._handles):
-            lines = [line(getattr(samples, name)[every], plot.is_log) for name in plot.columns]
-            is_there = any(np.isfinite(values).any() for values in lines)
-            if handle.visible != is_there:
-                handle.visible = is_there
-            if is_there:
-                handle.data = (time.copy(), *lines)
+        for plot in PLOTS:
+            self._draw(plot, *drawn(plot, samples, every))
+
+    def _draw(self, plot: Plot, columns: tuple[str, ...], data: tuple[np.ndarray, ...]) -> None:
+        """Give a plot its data; it is made anew where other columns are known than before."""
+        before, handle = self._handles.get(plot, ((), None))
+        if columns == before:
+            if columns:
+                handle.data = data
+            return
+        if handle is not None:
+            handle.remove()
+        with self._folder:
+            self._handles[plot] = columns, _add(self._gui, plot, columns, data) if columns else None
+
+
+def drawn(plot: Plot, samples: Samples, every: np.ndarray) -> tuple[tuple[str, ...], tuple[np.ndarray, ...]]:
+    """Columns of a plot that are known, and its data: times [s] from when the first is known, and a line of each.
+
+    The page draws nothing at all on a linear axis if a line begins with NaN.
+    """
+    lines = {name: line(getattr(samples, name)[every], plot) for name in plot.columns}
+    known = {name: np.isfinite(values) for name, values in lines.items()}
+    columns = tuple(name for name in plot.columns if known[name].sum() >= LEAST)
+    if not columns:
+        return (), ()
+    rows = known[columns[0]]
+    return columns, (samples.time[every][rows], *(lines[name][rows] for name in columns))
 
 
 def thinned(count: int, most: int) -> np.ndarray:
@@ -79,22 +117,20 @@ def thinned(count: int, most: int) -> np.ndarray:
     return np.unique(np.linspace(0, count - 1, most).round().astype(np.int64))
 
 
-def line(values: np.ndarray, is_log: bool) -> np.ndarray:
-    """(n,) float64 to draw; on a logarithmic axis what is zero stands at the bottom."""
-    return np.where(values < SMALLEST, SMALLEST, values) if is_log else values.copy()
+def line(values: np.ndarray, plot: Plot) -> np.ndarray:
+    """(n,) float64 to draw in a plot; of powers of ten, that of zero stands at the bottom."""
+    values = plot.factor * values
+    return np.log10(np.maximum(values, SMALLEST)) if plot.is_power else values
 
 
-def _add(gui, plot: Plot):
+def _add(gui, plot: Plot, columns: tuple[str, ...], data: tuple[np.ndarray, ...]):
     from viser import uplot
 
-    lines = [
-        uplot.Series(label=name.replace("_", " "), stroke=colour, width=1.5)
-        for name, colour in zip(plot.columns, COLOURS)
-    ]
-    unit = UNITS[plot.columns[0]]
+    colours = dict(zip(plot.columns, COLOURS))
+    lines = [uplot.Series(label=name.replace("_", " "), stroke=colours[name], width=1.5) for name in columns]
     scales = {"x": uplot.Scale(time=False), "y": uplot.Scale(distr=3 if plot.is_log else 1)}
-    axes = (uplot.Axis(label="time [s]"), uplot.Axis(label=f"{plot.title} [{unit}]", size=64))
-    nothing = tuple(np.zeros(0) for _ in range(1 + len(lines)))
+    upright = uplot.Axis(font=FONT, size=56, ticks={"show": False}, grid={"show": not plot.is_log})
     return gui.add_uplot(
-        nothing, (uplot.Series(label="time [s]"), *lines), scales=scales, axes=axes, aspect=1.6, visible=False
-    )
+        data, (uplot.Series(label="time [s]"), *lines), title=plot.title, scales=scales,
+        axes=(uplot.Axis(font=FONT), upright), aspect=1.6, padding=(10, 16, 0, 0), order=PLOTS.index(plot),
+    )  # fmt: skip

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import socket
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -17,7 +18,8 @@ from physics import Block, Drag, Event, Gravity, Scene, Wind, World, scenes
 from rigid_env.cli import app
 from rigid_env.viewer import session as session_module
 from rigid_env.viewer.event_list import ROWS, EventList, told
-from rigid_env.viewer.plots import SMALLEST, line, thinned
+from rigid_env.viewer.plots import SMALLEST, Plot, drawn, line, thinned
+from rigid_env.viewer.samples import Samples
 from rigid_env.viewer.server import Viewer
 from rigid_env.viewer.servers import LAST_PORT, directions, free_port, server_for_a_while, start_viewer_server
 from rigid_env.viewer.session import Session
@@ -87,6 +89,23 @@ def test_the_panel_follows_the_session(viewer):
     assert panel._slider.value == pytest.approx(session.time) == pytest.approx(0.5)
 
 
+def test_a_slider_does_not_jump_back_before_the_session_has_its_value(viewer):
+    session, panel, slider = viewer._session, viewer._panel, Handle(value=0.9)
+    panel._when(slider, session.set_friction)
+    slider.value = 0.5
+    panel._put(slider, "value", 0.5)
+    slider.value = 0.9  # of the user: its callback comes a moment later
+    panel._put(slider, "value", 0.5)
+    assert slider.value == 0.9
+    slider.acts[0](SimpleNamespace(client="a browser"))
+    panel._put(slider, "value", 0.5)  # of the session, still
+    assert slider.value == 0.9
+    viewer.turn(0.0)
+    assert session.settings["friction"] == 0.9
+    panel._put(slider, "value", 0.5)
+    assert slider.value == 0.5
+
+
 def test_it_says_where_it_is_and_how_to_reach_it(viewer):
     where, ssh = directions(viewer._server)
     port = viewer.address.rsplit(":", 1)[1]
@@ -138,9 +157,22 @@ def test_a_line_is_thinned_evenly_from_its_first_to_its_last_sample(count, most)
     assert gaps.size == 0 or gaps.max() - gaps.min() <= 1  # rounding of equal parts
 
 
-def test_zero_stands_at_the_bottom_of_a_logarithmic_axis():
-    assert line(np.array([0.0, 1e-3]), True).tolist() == [SMALLEST, 1e-3]
-    assert line(np.array([0.0, 1e-3]), False).tolist() == [0.0, 1e-3]
+def test_a_line_has_the_unit_of_its_plot_and_powers_of_ten_a_bottom():
+    values = np.array([0.0, 1e-3, np.nan])
+    power, micro = Plot("a", ("residual",), is_power=True), Plot("b", ("penetration",), factor=1e6)
+    assert line(values, power) == pytest.approx([np.log10(SMALLEST), -3.0, np.nan], nan_ok=True)
+    assert line(values, micro) == pytest.approx([0.0, 1e3, np.nan], nan_ok=True)
+
+
+def test_a_plot_has_the_columns_that_are_known_from_when_the_first_is():
+    samples, plot = Samples(), Plot("distance", ("error", "error_of_reference"))
+    for k in range(6):
+        samples.append(time=0.1 * k, error=float(k) if k >= 2 else np.nan)
+    columns, data = drawn(plot, samples, np.arange(6))
+    assert columns == ("error",)
+    assert [part.tolist() for part in data] == [pytest.approx([0.2, 0.3, 0.4, 0.5]), [2.0, 3.0, 4.0, 5.0]]
+    samples.truncate(3)
+    assert drawn(plot, samples, np.arange(3)) == ((), ())  # a single point is no line
 
 
 def test_an_event_is_told_in_a_line():
@@ -186,6 +218,8 @@ def test_the_newest_events_are_in_sight_and_a_click_goes_to_their_time():
     events._back.acts[0](None)
     assert events._rows[-1].label == told(event(0.0))
     events.show([event(0.3)])  # after going back in time
+    events.show([event(0.4)])  # and on, to as many
+    assert events._rows[0].label == told(event(0.4))
     assert [row.visible for row in events._rows] == [True] + [False] * (ROWS - 1)
     events.show([])
     assert not any(row.visible for row in events._rows)

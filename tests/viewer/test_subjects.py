@@ -42,6 +42,12 @@ def test_names_and_scene_files(tmp_path):
     assert open_subject(path).name == "box"
 
 
+def test_a_subject_knows_its_scene_whose_fields_are_drawn(fallen):
+    assert open_subject("drop").scene.walls == scenes.drop().walls
+    assert open_subject("rigid_env/BlockReach-v0").scene.effects
+    assert open_subject(fallen).scene is fallen.scene
+
+
 def test_a_world_goes_on_in_a_copy_bit_for_bit():
     """The first of a batch; the batch stays as it is."""
     world = physics.World(scenes.drop(), worlds=3, dt=0.005, accuracy="fast")
