@@ -91,6 +91,7 @@ def _refuse(name: str, why: str, **given: Any) -> None:
     """Refuse arguments that a subject does not take; those that are None were not given."""
     for field, value in given.items():
         if value is not None:
+            value = str(value) if isinstance(value, os.PathLike) else value
             raise ValueError(f"{field} is {shown(value)}, but {name} is {why}; allowed is None")
 
 
