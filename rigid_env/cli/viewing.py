@@ -78,9 +78,8 @@ def _serve(what: str, host: str, port: int, browser: bool, settings: dict, conso
         from rigid_env.viewer.session import Session
         from rigid_env.viewer.subject import open_subject
 
-        session = Session(open_subject(what, **settings))
-        viewer = Viewer(session, server)
-        session.play()
+        viewer = Viewer(Session(open_subject(what, **settings)), server)
+        viewer.play_once_seen()
         viewer.run()
     finally:
         stop_server(server)

@@ -49,8 +49,17 @@ class Viewer:
         if session.can.drag:
             self._stage.on_drag(self._dragged)
             self._stage.on_click(self._clicked)
-        self._is_running = False
+        self._is_running = self._is_seen = False
         self._drawn: float | None = None
+
+    def play_once_seen(self) -> None:
+        """Let time go on as soon as a browser is there, so that nobody misses the start; later ones change nothing."""
+        self._server.on_client_connect(self._see)
+
+    def _see(self, _client) -> None:
+        if not self._is_seen:
+            self._is_seen = True
+            self._inbox.put(self._session.play)
 
     def run(self) -> None:
         """Serve until `stop`, or Ctrl-C."""

@@ -113,7 +113,7 @@ def show(
         return notebook.Embedded(_page(session, duration))
     server = start_viewer_server(session.subject.name, host, port)
     viewer = Viewer(session, server)
-    session.play()
+    viewer.play_once_seen()
     print("\n".join(directions(server)), flush=True)
     if block:
         viewer.run()

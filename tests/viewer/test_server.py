@@ -64,6 +64,22 @@ def test_time_goes_on_as_real_time_does_and_no_step_is_late(viewer):
     assert session.time == pytest.approx(1.0, abs=0.01 + 1e-9)
 
 
+def test_time_begins_with_the_first_browser(viewer):
+    session = viewer._session
+    session.reset()
+    session.pause()
+    viewer.play_once_seen()
+    turns(viewer, 3)
+    assert session.time == 0.0
+    viewer._see(None)
+    turns(viewer, 3)
+    assert session.time > 0.0
+    session.pause()
+    viewer._see(None)  # another one
+    turns(viewer, 1)
+    assert not session.is_playing
+
+
 def test_what_is_posted_is_done_in_the_next_turn_and_a_mistake_changes_nothing(viewer):
     session = viewer._session
     session.reset()
