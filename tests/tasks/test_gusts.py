@@ -120,3 +120,17 @@ def test_time_goes_on_in_the_viewer(monkeypatch):
     session.seek(times[-1])
     assert session.time == times[-1]
     np.testing.assert_array_equal(session.subject.world.state, state)
+
+
+def test_recordings_over_starts_repeat_bit_by_bit():
+    """Of a batch whose worlds begin together, and one of them once more by itself."""
+    batch = rigid_env.BlockReachVectorEnv(2, effects=GUSTY, accuracy="fast", autoreset_mode="Disabled")
+    recorder = physics.Recorder(batch.task.world)
+    for options in ({}, {"reset_mask": np.array([False, True])}, {}):
+        batch.reset(seed=3, options=options)
+        for _ in range(3):
+            batch.step(np.zeros((2, 6)))
+    for world in range(2):
+        recording = recorder.recording(world)
+        assert len(recording) == 9
+        assert recording.replay().is_identical
