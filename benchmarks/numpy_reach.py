@@ -47,7 +47,7 @@ class NumpyReach(BlockReach):
         Entry("hold", "1", 0, 1, lambda worlds: np.minimum(worlds.memory["hold"] / kernels.HOLD_STEPS, 1.0)),
     )
     compiled = None
-    memory = {"hold": 1, "potential": 1}  # noqa: RUF012
+    memory = {"hold": 1, "potential": 1}  # noqa: RUF012 (declared, never changed)
 
     def goal(self):
         """Places on the floor."""

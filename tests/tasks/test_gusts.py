@@ -123,7 +123,7 @@ def test_time_goes_on_in_the_viewer(monkeypatch):
 
 
 def test_recordings_over_starts_repeat_bit_by_bit():
-    """Of a batch whose worlds begin together, and one of them once more by itself."""
+    """All worlds of the batch start an episode together; later one of them starts alone."""
     batch = rigid_env.BlockReachVectorEnv(2, effects=GUSTY, accuracy="fast", autoreset_mode="Disabled")
     recorder = physics.Recorder(batch.task.world)
     for options in ({}, {"reset_mask": np.array([False, True])}, {}):

@@ -15,7 +15,6 @@ import numba
 from numba import _dynfunc
 from numba.core.compiler import CompileResult, compile_result
 from numba.core.environment import Environment
-from numba.core.runtime import rtsys
 from numba.core.serialize import dumps
 
 from physics.kernels.compile.cache_folder import is_owned_by_user
@@ -55,10 +54,14 @@ class _Cache:
             path.unlink(missing_ok=True)
 
     def load_overload(self, sig, target_context):
-        """Machine code for the types `sig` of arguments; None if there is none that can be used."""
+        """Machine code for the types `sig` of arguments; None if there is none that can be used.
+
+        Numba refreshes its context first: that fills it with all it can compile, for which SciPy is imported, and takes
+        four times as long as to read a step. Machine code needs none of it, as kernels have no run time of Numba
+        (`_nrt` of `backend`). Where a kernel is compiled after all, `CompilerBase` refreshes the context.
+        """
         if not self._is_enabled:
             return None
-        know_symbols(target_context)
         path, purpose = self._place(sig, target_context.codegen())
         try:
             payload = cache_files.read_cache_file(path, purpose)
@@ -103,19 +106,6 @@ class _Cache:
         """File of machine code, and what it is for."""
         purpose = self._about + repr((str(sig), codegen.magic_tuple())).encode()
         return self.cache_path / f"{self._name}.{hashlib.sha256(purpose).hexdigest()[:24]}.nbc", purpose
-
-
-@cache
-def know_symbols(target_context) -> None:
-    """Have LLVM know what machine code calls of Numba: allocation, and the secrets of Python's hashes.
-
-    Numba's own `refresh` of a context does that as well, and fills it with all that it can compile, with SciPy
-    imported for it: four times as long as to read a step. A kernel that is compiled in spite of the cache has
-    `CompilerBase` refresh the context.
-    """
-    from numba.cpython import hashing  # noqa: F401
-
-    rtsys.initialize(target_context)
 
 
 @cache
