@@ -90,8 +90,8 @@ class Functions:
         self.before.keep()
         try:
             task.previous_action[...] = task.action
-            np.maximum(actions, -1.0, out=task.action)
-            np.minimum(task.action, 1.0, out=task.action)
+            np.maximum(actions, -1.0, out=task.given)
+            np.minimum(task.given, 1.0, out=task.given)
             task.act()
             self._conclude()
         except BaseException:  # of an interrupt, too

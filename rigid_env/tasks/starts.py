@@ -73,11 +73,13 @@ class Starts(Declaration):
 
     def _start(self, rows: np.ndarray, chosen: Mapping[str, np.ndarray]) -> None:
         shares = np.array([self.generators[world].random(self.episodes.uniforms) for world in rows])
-        if len(rows) == self.worlds and reads_time(self.world.plan, self.world.params):
+        has_fields = bool(self.world.plan.fields)
+        if has_fields and len(rows) == self.worlds and reads_time(self.world.plan, self.world.params):
             self.world.time = 0.0  # so that the same seed leads to the same bits
         values = self.episodes.draw(rows, shares, chosen)
         self.move(rows, values, chosen)
-        self._begin_gusts(rows)
+        if has_fields:
+            self._begin_gusts(rows)
         self.episodes.begin(rows, values, chosen)
         self._note_parameters(rows)
         for array in (self.action, self.previous_action, self.wrench, self.outcome, *self.memory_arrays.values()):

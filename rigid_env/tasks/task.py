@@ -32,7 +32,8 @@ from rigid_env.tasks.steps import Steps
 from rigid_env.tasks.wrenches import write_wrenches
 
 OF_PROCESS = (
-    "_before", "_functions", "_write_wrenches", "kept_arrays", "observed", "rollout_loop", "rollout_observers",
+    "_before", "_functions", "_write_arguments", "_write_wrenches", "kept_arrays", "observed", "rollout_loop",
+    "rollout_observers",
 )  # fmt: skip
 """Attributes that are left out of copies: machine code, and functions of the class."""
 
@@ -151,7 +152,7 @@ class Task(Starts):
     def _allocate(self) -> None:
         worlds, bodies = self.worlds, self.world.body_count
         size = worlds, self._table.size
-        self.action, self.previous_action, self._action_before = (np.zeros(size) for _ in range(3))
+        self.action, self.previous_action, self.given = (np.zeros(size) for _ in range(3))
         require_known(self.memory, self.memory, "memory")
         self.memory_arrays = {
             name: np.zeros(worlds if validation.count(size, f"memory {name}") == 1 else (worlds, size))
@@ -273,13 +274,8 @@ class Task(Starts):
             return
         if self._before is not None:
             self._before.keep()
-        self._action_before[...] = self.action
-        self.action[...] = actions
-        try:
-            self.act()
-        except ValueError:
-            self.action[...] = self._action_before
-            raise
+        self.given[...] = actions
+        self.act()
 
     def _keeper(self) -> Before | None:
         if self._functions is not None:
@@ -292,10 +288,10 @@ class Task(Starts):
             self._before.put_back()
 
     def act(self) -> None:
-        """Move the worlds by one control step."""
-        bad = self._write_wrenches(*self.wrench_arguments)
+        """Move the worlds by one control step, under the actions in `given`."""
+        bad = self._write_wrenches(*self._write_arguments)
         if bad >= 0:
-            raise ValueError(f"action of world {bad} is {self.action[bad].tolist()}; allowed are finite numbers")
+            raise ValueError(f"action of world {bad} is {self.given[bad].tolist()}; allowed are finite numbers")
         advance = self._advance
         if self.disturbed is not None:
             self.disturbed.act(advance.wrench, advance.kick)
@@ -311,7 +307,8 @@ class Task(Starts):
         self.wrench_arguments = (
             self.action, table.table, table.points, self.limits, self.world.state, advance.wrench, advance.kick
         )  # fmt: skip
-        self._write_wrenches = compiled(write_wrenches, self.wrench_arguments)
+        self._write_arguments = self.given, *self.wrench_arguments
+        self._write_wrenches = compiled(write_wrenches, self._write_arguments)
         self.kept_arrays = {
             "action": self.action, "previous action": self.previous_action, "record": self.record, "obs": self.obs,
             "outcome": self.outcome, "status": self.status, "wrench": self.wrench, "weights": self.weights,

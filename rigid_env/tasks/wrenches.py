@@ -58,12 +58,14 @@ def write_wrench(i, actions, table, points, limits, state, wrench, kick):
 
 
 @entry_kernel
-def write_wrenches(actions, table, points, limits, state, wrench, kick):
+def write_wrenches(given, actions, table, points, limits, state, wrench, kick):
     """Wrenches from actions: numbers clipped to ±1 each, then each vector to its ball of radius 1.
 
     Parameters
     ----------
-    actions : (worlds, numbers) float64
+    given : (worlds, numbers) float64
+    actions : (worlds, numbers) float64, out
+        Those given.
     table, points : (vectors, 6) int64, (vectors, 3) float64
         As of `actions.ActionTable`.
     limits : (worlds, vectors) float64
@@ -77,11 +79,13 @@ def write_wrenches(actions, table, points, limits, state, wrench, kick):
     int
         Index of the first world whose action is not finite, else -1; the outputs are written in the second case only.
     """
-    for i in range(actions.shape[0]):
-        for k in range(actions.shape[1]):
-            if not math.isfinite(actions[i, k]):
+    for i in range(given.shape[0]):
+        for k in range(given.shape[1]):
+            if not math.isfinite(given[i, k]):
                 return i
-    for i in range(actions.shape[0]):
+    for i in range(given.shape[0]):
+        for k in range(given.shape[1]):
+            actions[i, k] = given[i, k]
         write_wrench(i, actions, table, points, limits, state, wrench, kick)
     return -1
 
