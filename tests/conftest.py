@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 from hypothesis import settings
@@ -9,6 +11,19 @@ from hypothesis import settings
 # Compiling inside the first example would count against its deadline.
 settings.register_profile("rigid-env", deadline=None, max_examples=50, derandomize=True)
 settings.load_profile("rigid-env")
+
+
+def pytest_addoption(parser):
+    """Add the options of this suite."""
+    parser.addoption("--costs", metavar="FILE", help="append the cost of each test to FILE (tests/costs.py)")
+
+
+def pytest_configure(config):
+    """Record costs where a file is given."""
+    if config.getoption("--costs"):
+        from tests.costs import CostRecorder
+
+        config.pluginmanager.register(CostRecorder(Path(config.getoption("--costs")).absolute()))
 
 
 @pytest.fixture
