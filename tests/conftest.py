@@ -8,6 +8,8 @@ import numpy as np
 import pytest
 from hypothesis import settings
 
+from tests.tiers import plugin as tiers
+
 # Compiling inside the first example would count against its deadline.
 settings.register_profile("rigid-env", deadline=None, max_examples=50, derandomize=True)
 settings.load_profile("rigid-env")
@@ -15,11 +17,13 @@ settings.load_profile("rigid-env")
 
 def pytest_addoption(parser):
     """Add the options of this suite."""
+    tiers.add_options(parser)
     parser.addoption("--costs", metavar="FILE", help="append the cost of each test to FILE (tests/costs.py)")
 
 
 def pytest_configure(config):
-    """Record costs where a file is given."""
+    """Choose the tier, and record costs where a file is given."""
+    tiers.configure(config)
     if config.getoption("--costs"):
         from tests.costs import CostRecorder
 
