@@ -207,6 +207,7 @@ def log_stamp():
     return log.stat().st_mtime if log.exists() else None
 
 
+@pytest.mark.exhaustive
 @pytest.mark.slow
 def test_throughput_runs_and_writes_every_row(tmp_path):
     path = tmp_path / "throughput.json"

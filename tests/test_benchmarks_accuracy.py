@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 
+import pytest
 import typer
 from typer.testing import CliRunner
 
@@ -11,6 +12,7 @@ from benchmarks import accuracy
 from rigid_env.lab.measure.accuracy import QUICK
 
 
+@pytest.mark.exhaustive
 def test_the_program_writes_what_it_measured(tmp_path):
     app = typer.Typer()
     app.command()(accuracy.main)

@@ -49,6 +49,7 @@ def test_only_what_is_deep_is_fitted():
     assert growing.fit(other + law[:1]) is None
 
 
+@pytest.mark.exhaustive
 def test_a_quick_run_writes_what_it_found(tmp_path):
     found = run("--json", str(tmp_path / "g.json"), "--plot", str(tmp_path / "g.png"))
     assert found.exit_code == 0, found.output

@@ -21,6 +21,7 @@ def run(*arguments):
     return CliRunner().invoke(app, ["--quick", *arguments])
 
 
+@pytest.mark.exhaustive
 def test_a_quick_run_writes_what_it_found(tmp_path):
     found = run("--json", str(tmp_path / "p.json"), "--plot", str(tmp_path / "p.png"))
     assert found.exit_code == 0, found.output

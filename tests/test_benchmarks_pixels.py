@@ -11,6 +11,7 @@ from benchmarks import pixels
 pytest.importorskip("pygame")
 
 
+@pytest.mark.exhaustive
 def test_a_quick_run_writes_what_it_found(tmp_path):
     app = typer.Typer()
     app.command()(pixels.main)

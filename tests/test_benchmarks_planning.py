@@ -164,6 +164,7 @@ def test_a_row_passes_only_if_both_sides_solve_the_task():
     assert (rows(1.0)["balanced"].target, rows(1.0)["fast"].target) == (3.5, 5.0)
 
 
+@pytest.mark.exhaustive
 def test_a_quick_run_writes_what_it_found(tmp_path):
     given = ["--mjbatch-python", sys.executable] if HAS_MJBATCH else []
     found = run("--json", str(tmp_path / "p.json"), *given)

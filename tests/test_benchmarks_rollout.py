@@ -2,12 +2,14 @@
 
 import json
 
+import pytest
 import typer
 from typer.testing import CliRunner
 
 from benchmarks import rollout
 
 
+@pytest.mark.exhaustive
 def test_a_quick_run_writes_what_it_found(tmp_path):
     app = typer.Typer()
     app.command()(rollout.main)

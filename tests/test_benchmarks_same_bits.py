@@ -4,6 +4,7 @@ import json
 import shutil
 from pathlib import Path
 
+import pytest
 import typer
 from typer.testing import CliRunner
 
@@ -18,6 +19,7 @@ def run(*arguments):
     return CliRunner().invoke(app, ["--scene", "kick", "--preset", "fast", "--steps", "25", *map(str, arguments)])
 
 
+@pytest.mark.exhaustive
 def test_a_commit_has_the_bits_of_itself(tmp_path):
     found = run(ROOT, "--json", tmp_path / "bits.json")
     assert found.exit_code == 0, found.output
@@ -25,6 +27,7 @@ def test_a_commit_has_the_bits_of_itself(tmp_path):
     assert json.loads((tmp_path / "bits.json").read_text())["runs"] == {"kick fast": "same"}
 
 
+@pytest.mark.exhaustive
 def test_another_density_of_the_air_is_another_result(tmp_path):
     shutil.copytree(ROOT / "physics", tmp_path / "physics", ignore=shutil.ignore_patterns("__pycache__"))
     fields = tmp_path / "physics" / "scene" / "force_fields.py"

@@ -26,6 +26,7 @@ def test_pivoting_solves_what_has_a_solution_and_says_so_of_what_has_none(proble
         assert outcomes["sweeps"].residual > solvers.TOLERANCE
 
 
+@pytest.mark.exhaustive
 def test_the_default_solves_what_sweeps_do_not():
     """1,000,000 kg on 1 kg: sweeps contract by 1 - 1e-6 each."""
     problem = next(p for p in problems.hard() if p.name == "1,000,000 kg on 1 kg")

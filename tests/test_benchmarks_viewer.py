@@ -12,6 +12,7 @@ from benchmarks import viewer
 from tests.viewer.browser import what_is_missing
 
 
+@pytest.mark.exhaustive
 def test_a_quick_run_writes_what_it_found(tmp_path):
     app = typer.Typer()
     app.command()(viewer.main)

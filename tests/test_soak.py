@@ -8,6 +8,7 @@ import sys
 
 import gymnasium as gym
 import numpy as np
+import pytest
 
 import physics
 from benchmarks.shrink import law_broken, shrink
@@ -52,6 +53,7 @@ def test_the_judge_knows_rewards_that_were_not_earned():
             assert wrong == {20: {"reward not earned": 6}, 30: {"success not earned": 6}}.get(k, {})
 
 
+@pytest.mark.exhaustive
 def test_the_soak_runs_and_writes_what_it_found(tmp_path):
     command = [sys.executable, "-m", "benchmarks.soak", "--minutes", "0.02", "--env", "rigid_env/BlockReach-v0"]
     out = tmp_path / "soak.json"

@@ -128,6 +128,7 @@ def test_finished_run_asks_for_more_steps(tiny, tmp_path):
         train(tiny, run, is_resumed=True, console=QUIET)
 
 
+@pytest.mark.exhaustive
 @pytest.mark.train
 def test_learns_to_reach_in_a_narrow_box(tmp_path):
     config = make_config("rigid_env/BlockReach-v0", "ppo", seed=0, target=0.7, max_steps=1_500_000, num_envs=128)

@@ -13,7 +13,7 @@ import pytest
 from physics.kernels.compile.compiler_choice import NUMBA, PYTHON
 from tests.compilers.trajectory import by_compiler, trajectory
 
-# The block at three presets, a tower, and a scene for each shape, law and field (`benchmarks.bit_scenes`); with the
+# The block at three presets, a tower, and, exhaustively, a scene for each shape, law and field (`benchmarks.bit_scenes`); with the
 # number of steps, enough for the first contact.
 JOBS = [
     ("drop", "fast", 80), ("drop", "balanced", 80), ("drop", "precise", 80), ("tower", "balanced", 20),
@@ -23,6 +23,8 @@ JOBS = [
     ("push", "balanced", 40), ("actuated", "balanced", 40), ("pendulum", "balanced", 40), ("mixed", "balanced", 60),
     ("sleeping-tower", "balanced", 30),
 ]  # fmt: skip
+
+FEW = [*JOBS[:2], JOBS[3]]
 
 # Roundings of 1e-16 in lengths and speeds of some units, over some dozen steps of stable motion.
 ROUNDING = 1e-10
@@ -50,14 +52,15 @@ def first_change(found: dict) -> int:
     return next(changes, len(marks))
 
 
-@pytest.fixture(scope="module")
-def in_python() -> dict[tuple, dict]:
-    return dict(zip(JOBS, by_compiler(PYTHON, JOBS)))
+def jobs():
+    """All of them, few of them in the default tier."""
+    for job in JOBS:
+        yield pytest.param(job, id=f"{job[0]}-{job[1]}", marks=[] if job in FEW else [pytest.mark.exhaustive])
 
 
-@pytest.mark.parametrize("job", JOBS, ids=lambda job: f"{job[0]}-{job[1]}")
-def test_python_gives_the_numbers_of_machine_code(job, in_python):
-    compiled, interpreted = trajectory(*job), in_python[job]
+@pytest.mark.parametrize("job", jobs())
+def test_python_gives_the_numbers_of_machine_code(job):
+    compiled, (interpreted,) = trajectory(*job), by_compiler(PYTHON, [job])
     assert compiled["is_rolled_out"]
     assert interpreted["is_rolled_out"]
     change = first_change(compiled)
@@ -69,6 +72,7 @@ def test_python_gives_the_numbers_of_machine_code(job, in_python):
         assert differences(compiled, interpreted, law).max() <= SOLVED
 
 
+@pytest.mark.exhaustive
 def test_plain_numba_gives_the_bits_of_python():
     """With one thread and with two, in a process that may not import `fused`."""
     alone, shared = ("drop", "fast", 80), ("drop", "fast", 80, 2)

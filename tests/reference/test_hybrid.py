@@ -69,6 +69,7 @@ def test_incline_holds_up_to_the_angle_of_friction():
     assert result.events[-1].t == 0.0
 
 
+@pytest.mark.exhaustive
 @pytest.mark.slow  # four directions at once begin to be sought: 41 short integrations per Newton step
 def test_incline_slides_with_the_rest_of_gravity():
     angle = math.radians(20.0)

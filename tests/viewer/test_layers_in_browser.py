@@ -8,7 +8,7 @@ import pytest
 import physics
 from tests.viewer.user import user_of, wait_until
 
-pytestmark = pytest.mark.slow
+pytestmark = pytest.mark.exhaustive
 
 
 def shore() -> physics.Scene:

@@ -11,7 +11,7 @@ from rigid_env.viewer.event_list import ROWS, told
 from tests.viewer.browser import change
 from tests.viewer.user import user_of, wait_until
 
-pytestmark = pytest.mark.slow
+pytestmark = pytest.mark.exhaustive
 
 DT = 0.05
 """Step of the drop [s]: long, so that its accuracy is seen beside the reference."""
