@@ -58,20 +58,25 @@ class CostRecorder:
         event.register("numba:compile", compilations)
         begun = time.perf_counter(), time.process_time(), _child_seconds()
         try:
-            return (yield)
+            outcome = yield
         finally:
             event.unregister("numba:compile", compilations)
-            line = {
-                "test": item.nodeid,
-                "wall": round(time.perf_counter() - begun[0], 3),
-                "cpu": round(time.process_time() - begun[1], 3),
-                "children": round(_child_seconds() - begun[2], 3),
-                "kernels": compilations.kernels,
-                "compiling": round(compilations.seconds, 3),
-                "entries": dict(compilations.entries),
-            }
-            with self._path.open("a", encoding="utf-8") as file:
-                file.write(json.dumps(line) + "\n")
+        if not getattr(item, "is_relayed", False):  # else its own process writes the line
+            self._write(item.nodeid, begun, compilations)
+        return outcome
+
+    def _write(self, test: str, begun: tuple[float, float, float], compilations: _Compilations) -> None:
+        line = {
+            "test": test,
+            "wall": round(time.perf_counter() - begun[0], 3),
+            "cpu": round(time.process_time() - begun[1], 3),
+            "children": round(_child_seconds() - begun[2], 3),
+            "kernels": compilations.kernels,
+            "compiling": round(compilations.seconds, 3),
+            "entries": dict(compilations.entries),
+        }
+        with self._path.open("a", encoding="utf-8") as file:
+            file.write(json.dumps(line) + "\n")
 
 
 def report(path: Path, longest: int = 40) -> None:

@@ -47,6 +47,7 @@ def test_each_applies_alone_to_the_files_it_names(title, tmp_path):
         assert f"`{path}`" in text
 
 
+@pytest.mark.interpreted
 @pytest.mark.slow
 @pytest.mark.parametrize("title", TITLES)
 def test_the_proof_holds(title, changed_packages):

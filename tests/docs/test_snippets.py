@@ -14,6 +14,7 @@ import typer
 import physics
 from rigid_env.cli import app
 from tests.docs import snippets
+from tests.tiers.sweep import sweep
 
 ROOT = snippets.ROOT
 USAGE_ERROR = typer.BadParameter.__base__
@@ -28,8 +29,13 @@ def program(page: Path) -> str:
     return "\n".join(lines) + "\n"
 
 
+# Pages whose scenes and trainings take long; blocks of the tasks page are run one by one by `test_tasks_page`.
+LONG = ("docs/environments.md", "docs/tasks.md")
+PAGES = sweep(snippets.pages_with("python"), lambda page: snippets.name_of(page) not in LONG, snippets.name_of)
+
+
 @pytest.mark.slow
-@pytest.mark.parametrize("page", snippets.pages_with("python"), ids=snippets.name_of)
+@pytest.mark.parametrize("page", PAGES)
 def test_python_runs_as_it_stands(page, tmp_path):
     """All blocks of a page in their order, in one new process, in an empty folder."""
     folder = tmp_path / "empty"

@@ -10,6 +10,8 @@ import pytest
 
 import physics
 
+pytestmark = pytest.mark.interpreted
+
 M = 2.0
 BALL = physics.Sphere(0.5, M)
 FORCE = np.array([[[6.0, 0, 0, 0, 0, 0.3]]])

@@ -12,6 +12,8 @@ from scipy.integrate import solve_ivp
 
 import physics
 
+pytestmark = pytest.mark.interpreted
+
 G = 9.81
 M, R = 2.0, 0.5
 FLOOR = physics.HalfSpace((0, 1, 0))

@@ -15,6 +15,8 @@ from physics import scenes
 from physics.kernels.multibody.data.arrays import NUM_PAIRS
 from physics.world.report import Solver, Status
 
+pytestmark = pytest.mark.interpreted
+
 G = 9.81
 FLOOR = [physics.HalfSpace((0, 1, 0))]
 EPS = np.finfo(float).eps

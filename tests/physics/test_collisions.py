@@ -15,6 +15,8 @@ from physics import scenes
 from physics.plan.accuracy import PRESETS
 from tests.reference import impacts
 
+pytestmark = pytest.mark.interpreted
+
 MASS, RADIUS = 2.0, 0.5
 INERTIA = np.diag([6.5, 14.5, 17.0])
 LAWS = {"simultaneous": impacts.simultaneous, "sequential": impacts.sequential}

@@ -11,6 +11,8 @@ from hypothesis import strategies as st
 
 import physics
 
+pytestmark = pytest.mark.interpreted
+
 G = 9.81
 M, R = 2.0, 0.5
 FLOOR = physics.HalfSpace((0, 1, 0))

@@ -14,6 +14,8 @@ import physics
 from physics import scenes
 from tests.reference.rigid_body import RigidState, integrate_rigid_body, orientation_error, rotation_matrix
 
+pytestmark = pytest.mark.interpreted
+
 EPS = np.finfo(float).eps
 INERTIA = np.diag([6.5, 14.5, 17.0])
 FLOOR = [physics.HalfSpace((0, 1, 0))]

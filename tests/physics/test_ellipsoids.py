@@ -9,6 +9,8 @@ import pytest
 
 import physics
 
+pytestmark = pytest.mark.interpreted
+
 G = 9.81
 AXES = (1.0, 0.6, 0.8)
 FLOOR = [physics.HalfSpace((0, 1, 0))]

@@ -9,6 +9,8 @@ from scipy.integrate import solve_ivp
 import physics
 from physics import scenes
 
+pytestmark = pytest.mark.interpreted
+
 HALF = np.array(scenes.SIZE) / 2
 MU = 0.5
 

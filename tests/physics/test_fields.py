@@ -15,6 +15,8 @@ from physics import scenes
 from tests.reference import fields as ref
 from tests.reference.rigid_body import orientation_error
 
+pytestmark = pytest.mark.interpreted
+
 EPS = np.finfo(float).eps
 G = 9.81
 GRAVITY = physics.Gravity((0, -G, 0))

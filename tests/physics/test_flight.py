@@ -13,6 +13,8 @@ from rigid_env.lab.hard_cases.case import Setting
 from rigid_env.lab.hard_cases.cases.flight import parabola
 from tests.reference import rigid_body as ref
 
+pytestmark = pytest.mark.interpreted
+
 EPS = np.finfo(float).eps
 INERTIA = np.array([6.5, 14.5, 17.0])
 

@@ -18,6 +18,8 @@ from physics.work_precision.errors import deepest_penetration
 from physics.world.report import Status
 from tests.reference.polyhedra import prism
 
+pytestmark = pytest.mark.interpreted
+
 G = 9.81
 FLOOR = physics.HalfSpace((0, 1, 0))
 SIGNS = np.array(list(itertools.product((-0.5, 0.5), repeat=3)))

@@ -9,6 +9,8 @@ import physics
 from physics.analysis import simulate
 from physics.kernels.time_stepping import event_log
 
+pytestmark = pytest.mark.interpreted
+
 PRESETS = ("fast", "balanced", "precise", "reference")
 FLOOR = physics.HalfSpace((0, 1, 0), 0.0)
 

@@ -14,6 +14,8 @@ from physics import scenes
 from physics.kernels.state import layout as at
 from tests.physics.test_bodies import heap
 
+pytestmark = pytest.mark.interpreted
+
 
 def pushed(worlds=3):
     return physics.World(scenes.shove(), worlds=worlds, dt=0.005)

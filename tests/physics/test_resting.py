@@ -11,6 +11,8 @@ import physics
 from physics import scenes
 from physics.analysis.resting_contact import resting_contact
 
+pytestmark = pytest.mark.interpreted
+
 
 def test_block_at_rest_is_carried_by_its_corners():
     """Σ f = m g, no acceleration; A is singular (four corners of one face, rank 3) and the solver says solved."""

@@ -11,6 +11,8 @@ from hypothesis import strategies as st
 
 import physics
 
+pytestmark = pytest.mark.interpreted
+
 EPS = np.finfo(float).eps
 G = 9.81
 R, M = 0.5, 2.0

@@ -13,6 +13,8 @@ from rigid_env.lab.hard_cases.cases.rolling import Ellipse
 from rigid_env.lab.hard_cases.cases.scenery import on_floor
 from tests.reference import ellipsoid_on_floor as truth
 
+pytestmark = pytest.mark.interpreted
+
 G = 9.81
 SECONDS = 2.0
 STEPS = (2e-3, 1e-2, 2e-2)  # at 50 ms the push of some grows twentyfold within a step

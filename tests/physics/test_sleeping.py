@@ -16,6 +16,8 @@ from physics.plan.accuracy import resolve
 from rigid_env.lab.hard_cases import registry
 from rigid_env.lab.hard_cases.case import Setting
 
+pytestmark = pytest.mark.interpreted
+
 DT, G, MU = 0.01, scenes.GRAVITY, 0.3
 WEIGHT = scenes.MASS * G
 BLOCK = scenes.block_in_box((0.0, scenes.SIZE[1] / 2, 0.0), restitution=0.0, friction=MU)

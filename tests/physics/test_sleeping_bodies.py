@@ -11,6 +11,8 @@ import physics
 from physics.kernels.multibody.data.arrays import NUM_CONTACTS
 from physics.plan.accuracy import resolve
 
+pytestmark = pytest.mark.interpreted
+
 DT, G, MU = 0.01, 9.81, 0.5
 RADIUS = math.sqrt(0.75)  # of a unit cube [m]
 WINDOW = math.sqrt(2 * RADIUS / G)  # [s]

@@ -10,6 +10,8 @@ import pytest
 import physics
 from physics.rotations import rotation_matrices
 
+pytestmark = pytest.mark.interpreted
+
 G = 9.81
 STEPS = np.array([0.04, 0.02, 0.01, 0.005])
 PAIR = [

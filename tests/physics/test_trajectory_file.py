@@ -10,6 +10,8 @@ from physics import scenes
 from physics.analysis.trajectory import SAMPLES
 from physics.analysis.trajectory_arrays import scene_arrays, scene_of
 
+pytestmark = pytest.mark.interpreted
+
 WEDGE = ((0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1), (0.2, 0.2, 0.2))
 
 

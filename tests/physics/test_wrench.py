@@ -7,6 +7,8 @@ import pytest
 
 import physics
 
+pytestmark = pytest.mark.interpreted
+
 EPS = np.finfo(float).eps
 
 

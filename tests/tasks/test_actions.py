@@ -14,6 +14,8 @@ from physics.kernels.state import layout as at
 from rigid_env.tasks import Force, Impulse, Task, Wrench, observe
 from tests.tasks.conftest import Free, started
 
+pytestmark = pytest.mark.interpreted
+
 TILT = (0.5, 0.5, -0.5, 0.5)
 
 

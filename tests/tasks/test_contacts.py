@@ -17,6 +17,8 @@ from rigid_env.tasks import Task, observe
 from rigid_env.tasks.contacts import Contacts, contact_rows, read_contacts
 from tests.tasks.conftest import Free, Slide, started
 
+pytestmark = pytest.mark.interpreted
+
 FLOOR = physics.HalfSpace((0, 1, 0), 0.0)
 CORNER = [FLOOR, physics.HalfSpace((1, 0, 0), 0.0), physics.HalfSpace((0, 0, 1), 0.0)]
 PRESSED = (physics.Gravity((-3.0, -9.0, -4.0)), physics.Contact(), physics.Friction(0.5))

@@ -10,6 +10,8 @@ from rigid_env.tasks import Gust, Push, Uniform
 from rigid_env.tasks.disturbances import direction
 from tests.tasks.conftest import Free, started
 
+pytestmark = pytest.mark.interpreted
+
 STILL = np.zeros((1, 6))
 
 

@@ -15,6 +15,8 @@ from rigid_env.tasks import BlockReach, BlockReorient, Entry, Task, Wrench, obse
 from rigid_env.tasks.parameters import LENGTHS
 from tests.tasks.conftest import Free, Slide, started
 
+pytestmark = pytest.mark.interpreted
+
 
 def state_of(task: Task) -> list:
     """All that decides how a task goes on."""

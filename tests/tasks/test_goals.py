@@ -13,6 +13,8 @@ from hypothesis import strategies as st
 from rigid_env import BlockReachEnv, RigidVecEnv, TaskEnv, TaskVectorEnv, check_task
 from rigid_env.tasks.block_goals import BlockReachGoal, BlockReorientGoal
 
+pytestmark = pytest.mark.interpreted
+
 TASKS = (BlockReachGoal, BlockReorientGoal)
 IDS = ("rigid_env/BlockReachGoal-v0", "rigid_env/BlockReorientGoal-v0")
 

@@ -15,6 +15,8 @@ from physics.kernels.forces.wind import WIND_GUST, WIND_MEAN, WIND_PHASES, WIND_
 from physics.kernels.state import layout as at
 from physics.world.gusts import begin_gusts, gust_phases
 
+pytestmark = pytest.mark.interpreted
+
 GUSTY = [physics.Drag(), physics.Wind((3.0, 0.0, 1.0), gust=20.0, time_scale=0.5)]
 STILL = np.zeros(6)
 

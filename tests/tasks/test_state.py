@@ -25,6 +25,8 @@ from rigid_env import (
 from rigid_env.tasks import Gust, Push, Wrench
 from tests.tasks.conftest import Slide
 
+pytestmark = pytest.mark.interpreted
+
 VARIED = {"mass": (4.0, 8.0), "size": ((4.0, 2.5, 1.5), (6.0, 3.5, 2.5)), "friction": (0.3, 0.7)}
 
 

@@ -18,6 +18,7 @@ from tests.tiers.child import Child
 MARKS = (
     "exhaustive: a sweep, a long run or a combination; left out without --exhaustive",
     "interpreted: runs under the compiler `python` without --exhaustive, since its kernels take longer to compile",
+    "compiled: runs compiled in every tier, in a module that is interpreted",
 )
 
 
@@ -57,8 +58,9 @@ class _Interpret:
 
     @pytest.hookimpl(tryfirst=True)
     def pytest_runtest_protocol(self, item, nextitem):
-        if not item.get_closest_marker("interpreted"):
+        if not _is_interpreted(item):
             return None
+        item.is_relayed = True
         item.ihook.pytest_runtest_logstart(nodeid=item.nodeid, location=item.location)
         for report in self._reports_of(item):
             item.ihook.pytest_runtest_logreport(report=report)
@@ -88,10 +90,15 @@ class _Interpret:
         if self._child is None:
             self._child = Child(self._config.rootpath)
         others = [each.nodeid for each in item.session.items
-                  if each.path == item.path and each.get_closest_marker("interpreted")]  # fmt: skip
+                  if each.path == item.path and _is_interpreted(each)]  # fmt: skip
         waiting = others[others.index(item.nodeid) :]
         self._child.ask(str(item.path), waiting, self._config.getoption("--costs", None))
         self._asked = item.path
+
+
+def _is_interpreted(item) -> bool:
+    """Answer whether a test needs no compiler: a test of a module that is marked may ask for one."""
+    return bool(item.get_closest_marker("interpreted")) and not item.get_closest_marker("compiled")
 
 
 def _is_over(reports: list) -> bool:

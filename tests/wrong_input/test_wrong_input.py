@@ -11,6 +11,8 @@ import pytest
 
 from tests import wrong_input
 
+pytestmark = pytest.mark.interpreted
+
 MODULES = [
     module
     for found in pkgutil.iter_modules(wrong_input.__path__)
