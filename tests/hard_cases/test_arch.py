@@ -71,6 +71,7 @@ def test_the_stones_fill_the_arch_and_touch_the_floor():
         assert corners[:, 1].min() >= -1e-16
 
 
+@pytest.mark.exhaustive
 def test_parts_of_a_substep_are_solved_as_finely_as_it_and_no_finer():
     """Stones that turn on their edges, in parts of 1/64 of a substep and less.
 
@@ -87,6 +88,7 @@ def test_parts_of_a_substep_are_solved_as_finely_as_it_and_no_finer():
     assert unsolved <= 0.15 * solves
 
 
+@pytest.mark.exhaustive
 def test_a_high_arch_at_its_limit_stays_solved_at_precise():
     """An arch that stands is not swept on where goals are next to rounding: every solve ends within its tolerance."""
     world = physics.World(arch(51, (1 + NEAR) * least_thickness(51)), dt=0.01, accuracy="precise")

@@ -16,6 +16,22 @@ from rigid_env.lab.hard_cases.run import Status, run_case
 ACCURACIES = ("balanced", "precise")
 DT = 0.01
 
+# Numbers of cases that take more than some seconds in Python, by accuracy. All cases run with --exhaustive.
+LONG = {
+    "balanced": {25, 26, 27, 28, 30, 31, 32, 44, 45, 47},
+    "precise": {8, 9, 19, 22, 24, 25, 26, *range(27, 56)} - {35, 36, 37},
+}
+
+# Numbers of cases of one body that take many steps, and share one kind of scene.
+COMPILED = {"balanced": {2, 6, 16, 17, 20, 21}, "precise": {2, 6, 16, 17, 20, 21}}
+
+
+def tier_of(case: Case, accuracy: str) -> list:
+    """Marks that decide when and how a case is run."""
+    if case.number in LONG[accuracy]:
+        return [pytest.mark.exhaustive]
+    return [] if case.number in COMPILED[accuracy] else [pytest.mark.interpreted]
+
 
 def parameters():
     """Every case that is built, at every accuracy."""
@@ -23,7 +39,9 @@ def parameters():
     for case in registry.CASES:
         for accuracy in ACCURACIES:
             reason = case.faults.get(accuracy)
-            marks = [pytest.mark.xfail(strict=True, raises=AssertionError, reason=reason)] if reason else []
+            marks = tier_of(case, accuracy)
+            if reason:
+                marks.append(pytest.mark.xfail(strict=True, raises=AssertionError, reason=reason))
             if case.run is not None:
                 found.append(pytest.param(case, accuracy, id=f"{case.number}-{case.name}-{accuracy}", marks=marks))
     return found
@@ -40,6 +58,7 @@ def test_the_case_comes_out_as_it_must(case, accuracy):
     assert not failed, "\n".join(map(str, failed))
 
 
+@pytest.mark.interpreted
 @pytest.mark.parametrize("dt", [0.02, 0.05])
 def test_a_moving_frame_changes_nothing_at_long_steps(dt):
     """A stage that gains energy is solved again; speed along a frictionless wall must not decide whether it gains."""

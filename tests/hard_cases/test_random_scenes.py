@@ -18,6 +18,7 @@ DRAWS = [
 ]
 
 
+@pytest.mark.exhaustive
 @pytest.mark.parametrize(("family", "worlds", "seed", "accuracy"), DRAWS)
 def test_no_law_is_broken(family, worlds, seed, accuracy):
     world = physics.World(random_scenes.scene_of(family), worlds=worlds, dt=0.01, accuracy=accuracy)
@@ -27,6 +28,7 @@ def test_no_law_is_broken(family, worlds, seed, accuracy):
     assert [(k, outcome.law(k, limit)) for k in broken.tolist()] == []
 
 
+@pytest.mark.interpreted
 def test_what_is_deep_in_a_wall_is_taken_out_under_any_load():
     """Strong loads let a contact set reach far: the error of pushing apart is a share of the depth, not of that."""
     block = physics.Block((1, 1, 1), 1.0, pos=(0, 0.492, 0))  # 8 mm deep
@@ -43,6 +45,7 @@ def test_what_is_deep_in_a_wall_is_taken_out_under_any_load():
     assert np.abs(world.linvel[0, 0]).max() <= 1e-6 * 1e6 * 9.81 * 0.01  # the tolerance, of the speed its loads give
 
 
+@pytest.mark.interpreted
 def test_a_ball_between_three_rough_walls_holds_no_stress_beyond_its_loads():
     """Three rough walls let a ball hold any stress; loads of a million times its weight leave none when they end."""
     walls = [physics.HalfSpace(tuple(float(k == axis) for k in range(3))) for axis in range(3)]
