@@ -14,6 +14,7 @@ from physics import validation
 from physics.analysis.diagnostics import diagnose
 from physics.analysis.events import Event, contact_events, contact_pairs, fault_events, logged_events
 from physics.analysis.trajectory import Trajectory
+from physics.annotations import Preset
 from physics.keywords import known_keywords
 from physics.plan.accuracy import Accuracy
 from physics.scene.scene import Scene
@@ -37,7 +38,7 @@ EVENT_ROOM = 16
 def simulate(
     scene: Scene,
     duration: float,
-    accuracy: str | Accuracy = "balanced",
+    accuracy: Preset | Accuracy = "balanced",
     sample_dt: float | None = None,
     wrench: ArrayLike | Callable[[float, World], ArrayLike] | None = None,
     dt: float | None = None,

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from physics import validation
+from physics.annotations import Preset
 from physics.html_table import parts_table
 from physics.kernels.forces.force_field_dispatch import Term
 from physics.kernels.state.contact_law_dispatch import (
@@ -194,7 +195,7 @@ def _laws(scene: Scene, contact: Contact, friction: Friction | None) -> tuple[st
     return tuple(law for law in LAWS if is_on[law])
 
 
-def make_plan(scene: Scene, accuracy: str | Accuracy) -> Plan:
+def make_plan(scene: Scene, accuracy: Preset | Accuracy) -> Plan:
     """Decide what a scene needs at an accuracy, or the preset of that name."""
     validation.instance(scene, Scene, "scene", "a physics.Scene")
     accuracy = resolve(accuracy)

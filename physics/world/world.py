@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from physics import validation
+from physics.annotations import Preset
 from physics.html_table import parts_table
 from physics.kernels.forces.force_field_dispatch import register_terms
 from physics.kernels.state import layout as at
@@ -75,7 +76,7 @@ class World(Batch):
         scene: Scene,
         worlds: int = 1,
         dt: float = 0.01,
-        accuracy: str | Accuracy = "balanced",
+        accuracy: Preset | Accuracy = "balanced",
         threads: int = 1,
     ):
         validation.instance(scene, Scene, "scene", "a physics.Scene")

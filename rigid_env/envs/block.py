@@ -10,6 +10,7 @@ from gymnasium.vector import AutoresetMode
 
 import physics
 from physics import validation
+from physics.annotations import Preset
 from rigid_env.envs.attributes import EpisodeParameters
 from rigid_env.envs.env import RigidEnv
 from rigid_env.envs.vector_env import RigidVectorEnv
@@ -50,7 +51,7 @@ class BlockEnv(EpisodeParameters, RigidEnv):
         obs_size: Sequence[int] = (84, 84),
         obs_stack: int = 1,
         contacts: int = 0,
-        accuracy: str | physics.Accuracy = "balanced",
+        accuracy: Preset | physics.Accuracy = "balanced",
         walls: str = "three",
         half_width: float = 10.0,
         mass: Number = 6.0,
@@ -114,7 +115,7 @@ class BlockVectorEnv(RigidVectorEnv):
         obs_stack: int = 1,
         contacts: int = 0,
         threads: int = 1,
-        accuracy: str | physics.Accuracy = "balanced",
+        accuracy: Preset | physics.Accuracy = "balanced",
         walls: str = "three",
         half_width: float = 10.0,
         mass: Number = 6.0,

@@ -11,6 +11,7 @@ from gymnasium.vector import AutoresetMode
 
 import physics
 from physics import validation
+from physics.annotations import Preset
 from physics.keywords import known_keywords
 from rigid_env.envs.env import RigidEnv
 from rigid_env.envs.vector_env import RigidVectorEnv
@@ -167,7 +168,7 @@ class SceneEnv(RigidEnv):
         frame_skip: int | None = None,
         dt: float | None = None,
         episode_steps: int | None = None,
-        accuracy: str | physics.Accuracy = "balanced",
+        accuracy: Preset | physics.Accuracy = "balanced",
         effects: Sequence = (),
         dump_faults: str | Path | None = None,
     ):
@@ -237,7 +238,7 @@ class SceneVectorEnv(RigidVectorEnv):
         frame_skip: int | None = None,
         dt: float | None = None,
         episode_steps: int | None = None,
-        accuracy: str | physics.Accuracy = "balanced",
+        accuracy: Preset | physics.Accuracy = "balanced",
         effects: Sequence = (),
         dump_faults: str | Path | None = None,
         threads: int = 1,
