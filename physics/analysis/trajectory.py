@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from physics import validation
 from physics.analysis.events import Event
@@ -45,12 +46,12 @@ class Trajectory:
         The scene, if it is known; read from a file its bodies and walls, without effects.
     """
 
-    t: np.ndarray
-    pos: np.ndarray
-    quat: np.ndarray
-    linvel: np.ndarray
-    angvel: np.ndarray
-    energy: np.ndarray
+    t: NDArray[np.float64]
+    pos: NDArray[np.float64]
+    quat: NDArray[np.float64]
+    linvel: NDArray[np.float64]
+    angvel: NDArray[np.float64]
+    energy: NDArray[np.float64]
     events: tuple[Event, ...]
     reports: tuple[StepReport, ...]
     scene: Scene | None = field(default=None, compare=False)

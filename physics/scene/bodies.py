@@ -30,8 +30,32 @@ def check_name(name: str) -> None:
         raise ValueError(f"name is {shown(name)}; allowed are printable characters, no blank at the ends")
 
 
+if TYPE_CHECKING:
+
+    class _Shape:
+        """Attributes that every shape has, as checkers see them."""
+
+        kind: ClassVar[Shape]
+        mass: float
+        center: Vector
+
+        @property
+        def volume(self) -> float: ...
+
+        @property
+        def dimensions(self) -> NDArray[np.float64]: ...
+
+        @staticmethod
+        def uniform_moments(dimensions: NDArray[np.float64], mass: Any) -> NDArray[np.float64]: ...
+
+        def bounding_radius(self, dimensions: NDArray[np.float64]) -> NDArray[np.float64]: ...
+
+else:
+    _Shape = object
+
+
 @dataclass(frozen=True, kw_only=True)
-class Body:
+class Body(_Shape):
     """Base of all bodies; use `Block`, `Sphere`, `Ellipsoid` or `Hull`.
 
     Parameters
@@ -59,32 +83,7 @@ class Body:
     inertia_body: tuple[Vector, Vector, Vector] | None = None
     density: float | None = field(default=None, repr=False, compare=False)
     name: str | None = None
-
-    if TYPE_CHECKING:  # what each shape has
-        kind: ClassVar[Shape]
-        mass: float
-
-        @property
-        def center(self) -> Vector:
-            """Geometric centre from the centre of mass, along the body axes [m]."""
-
-        @property
-        def volume(self) -> float:
-            """[m³]."""
-
-        @property
-        def dimensions(self) -> NDArray[np.float64]:
-            """(3,) half extents along the body axes [m]."""
-
-        @staticmethod
-        def uniform_moments(dimensions: NDArray[np.float64], mass: Any) -> NDArray[np.float64]:
-            """Principal moments (..., 3) of uniform density [kg m²]."""
-
-        def bounding_radius(self, dimensions: NDArray[np.float64]) -> NDArray[np.float64]:
-            """Radius (...) of the sphere about the centre that holds the body [m]."""
-
-    else:
-        center: ClassVar = (0.0, 0.0, 0.0)  # a block may have another
+    center = (0.0, 0.0, 0.0)  # of the shape, from the centre of mass; a block may have another
 
     _repr_html_ = fields_table
 

@@ -6,6 +6,7 @@ from operator import attrgetter
 from typing import Any, Protocol
 
 import numpy as np
+from numpy.typing import NDArray
 
 from physics.kernels.state.sleeping import Sleep
 from physics.kernels.time_stepping.workspace import body_records
@@ -97,20 +98,20 @@ class Batch:
     threads: int
     dt: float
     time: float
-    pos: np.ndarray
-    quat: np.ndarray
-    linvel: np.ndarray
-    angvel: np.ndarray
-    state: np.ndarray
-    params: np.ndarray
-    gravity: np.ndarray
-    walls: np.ndarray
-    shapes: np.ndarray
-    memory: np.ndarray
-    sleep: np.ndarray
-    report_table: np.ndarray
-    event_log: np.ndarray
-    event_counts: np.ndarray
+    pos: NDArray[np.float64]
+    quat: NDArray[np.float64]
+    linvel: NDArray[np.float64]
+    angvel: NDArray[np.float64]
+    state: NDArray[np.float64]
+    params: NDArray[np.float64]
+    gravity: NDArray[np.float64]
+    walls: NDArray[np.float64]
+    shapes: NDArray[np.int64]
+    memory: NDArray[np.float64]
+    sleep: NDArray[np.float64]
+    report_table: NDArray[np.float64]
+    event_log: NDArray[np.float64]
+    event_counts: NDArray[np.int64]
     actuation: ActuatorState | None
     team: Team
     scratch: list
@@ -128,7 +129,7 @@ class Batch:
         self.team.run(calls)
         self.time += duration
 
-    def no_wrench(self) -> np.ndarray:
+    def no_wrench(self) -> NDArray[np.float64]:
         """(worlds, bodies, 6) float64 zeros: an array for wrenches."""
         return np.zeros((self.worlds, self.body_count, 6))
 

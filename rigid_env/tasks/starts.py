@@ -6,7 +6,7 @@ import reprlib
 from collections.abc import Mapping
 from dataclasses import replace as replace_fields
 from functools import cached_property
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from gymnasium.utils import seeding
@@ -25,6 +25,14 @@ from rigid_env.tasks.parameters import LENGTHS
 from rigid_env.tasks.replacing import refuse_replaced, replaced
 from rigid_env.tasks.state import put, take
 
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from physics.scene.effects import Effect
+    from rigid_env.tasks.actions import ActionTable
+    from rigid_env.tasks.disturbances import Disturbances
+    from rigid_env.tasks.draws import Draws
+
 PARAMETER_ROUNDING = 1e-12
 """Share by which a parameter differs from itself after it was stored: an inverse, twice a half."""
 
@@ -37,6 +45,40 @@ UNIT_GRAVITY = 9.81
 
 class Starts(Declaration):
     """The part of `Task` that begins episodes, and gives worlds the values that are drawn for them."""
+
+    if TYPE_CHECKING:  # what `Task` makes and keeps
+        world: physics.World
+        effects: tuple[Effect, ...]
+        generators: list[np.random.Generator | None]
+        episodes: Draws
+        disturbed: Disturbances | None
+        clock: int
+        action: NDArray[np.float64]
+        previous_action: NDArray[np.float64]
+        given: NDArray[np.float64]
+        outcome: NDArray[np.float64]
+        record: NDArray[np.float64]
+        obs: NDArray[np.float32]
+        status: NDArray[np.int64]
+        weights: NDArray[np.float64]
+        limits: NDArray[np.float64]
+        memory_arrays: dict[str, NDArray[np.float64]]
+        _began: NDArray[np.int64]
+        _functions: Any
+        _own_starts: dict[str, np.ndarray]
+        _table: ActionTable
+
+        @property
+        def worlds(self) -> int: ...
+
+        @property
+        def wrench(self) -> NDArray[np.float64]: ...
+
+        @property
+        def drawn(self) -> dict[str, NDArray[np.float64]]: ...
+
+        @property
+        def distributions(self) -> dict[str, Distribution]: ...
 
     def seed(self, world: int, seed: int | None) -> int:
         """Give one world a new generator, as `gymnasium.Env.reset` does; returns the seed."""
