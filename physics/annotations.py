@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, Literal, TypeVar
+from typing import TYPE_CHECKING, Any, Literal, TypeVar
 
 Vector = tuple[float, float, float]
 """Three numbers, kept by a frozen description; any sequence or array of three is taken."""
@@ -28,3 +28,11 @@ Scheme = Literal["events", "exact", "explicit_euler", "semi_implicit_euler", "mi
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 """A function that a decorator returns with its signature."""
+
+if TYPE_CHECKING:
+
+    class Effect:
+        """Effect of a scene, as checkers see it: a list of different ones is a list of these."""
+
+else:
+    Effect = object

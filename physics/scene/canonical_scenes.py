@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from physics.annotations import Layout
+from physics.annotations import Effect, Layout
 from physics.scene.bodies import Block, Ellipsoid, Sphere
-from physics.scene.effects import Contact, Effect, Friction, Gravity
+from physics.scene.effects import Contact, Friction, Gravity
 from physics.scene.force_fields import AngularDrag, Drag, Magnus
 from physics.scene.scene import HalfSpace, Scene, corner, three_walls
 

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from physics import validation
-from physics.annotations import Vector
+from physics.annotations import Effect, Vector
 from physics.html_table import fields_table
 from physics.keywords import known_keywords
 from physics.scene.force_field import Field
@@ -23,7 +23,7 @@ from physics.summary import fields_repr, shown
 
 @known_keywords
 @dataclass(frozen=True)
-class Gravity:
+class Gravity(Effect):
     """A uniform force field: every body accelerates by the same vector, and it exerts no torque.
 
     Parameters
@@ -47,7 +47,7 @@ class Gravity:
 
 @known_keywords
 @dataclass(frozen=True)
-class Contact:
+class Contact(Effect):
     """Bodies do not pass through walls, nor through each other.
 
     Parameters
@@ -107,7 +107,7 @@ class Contact:
 
 @known_keywords
 @dataclass(frozen=True)
-class Friction:
+class Friction(Effect):
     """Coulomb friction with the exact cone: |f_t| <= μ f_n, opposed to sliding.
 
     Parameters
@@ -171,7 +171,7 @@ def _axes(axis: Any) -> tuple:
     return tuple(value.tolist()) if value.ndim == 1 else tuple(tuple(row) for row in value.tolist())
 
 
-class _Resistance:
+class _Resistance(Effect):
     """A torque of contact, bounded by a length times the normal force."""
 
     radius: float
@@ -217,7 +217,7 @@ class SpinFriction(_Resistance):
 
 @known_keywords
 @dataclass(frozen=True)
-class Actuator:
+class Actuator(Effect):
     """Actuator between the wrench of `World.step` and the bodies: delay, then limits, then lag, in this order.
 
     Parameters
@@ -254,7 +254,7 @@ class Actuator:
 
 @known_keywords
 @dataclass(frozen=True)
-class Sleeping:
+class Sleeping(Effect):
     """Bodies at rest are left out of the step until something changes that acts on them.
 
     What has gone no way in two windows of time in a row, and not ever further, sleeps with all that it touches, is near
@@ -284,5 +284,3 @@ class Sleeping:
 
 RESISTANCES = (RollingFriction, SpinFriction)
 EFFECTS = (Gravity, Contact, Friction, *RESISTANCES, Actuator, Sleeping, Field)
-Effect = Gravity | Contact | Friction | RollingFriction | SpinFriction | Actuator | Sleeping | Field
-"""Whatever `Scene.effects` may hold."""

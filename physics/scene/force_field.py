@@ -22,6 +22,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from physics.annotations import Effect
 from physics.html_table import fields_table
 from physics.kernels.compile.decorators import is_kernel, plain_function, user_kernel
 from physics.kernels.forces.force_field_dispatch import AIR, LOAD, Term
@@ -35,7 +36,7 @@ field_function = user_kernel
 
 
 @dataclass(frozen=True)
-class Field:
+class Field(Effect):
     """A force field: force and torque on every body from its state and the time. Subclass it to make one.
 
     A subclass is a frozen dataclass, or gives its numbers by `columns`; one that does neither is a ValueError when an

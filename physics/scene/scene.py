@@ -12,11 +12,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from physics import validation
-from physics.annotations import Vector
+from physics.annotations import Effect, Vector
 from physics.html_table import fields_table, parts_table, table
 from physics.keywords import known_keywords
 from physics.scene.bodies import Block, Body, Ellipsoid, Hull, Sphere
-from physics.scene.effects import EFFECTS, RESISTANCES, Contact, Effect, Friction, Sleeping
+from physics.scene.effects import EFFECTS, RESISTANCES, Contact, Friction, Sleeping
 from physics.scene.force_field import Field
 from physics.summary import SCREEN, counted, parts_repr, shown
 

@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 
 import physics
 from physics import validation
-from physics.annotations import Layout, Preset
-from physics.scene.effects import Effect
+from physics.annotations import Effect, Layout, Preset
 from rigid_env.envs.attributes import EpisodeParameters
 from rigid_env.envs.env import RigidEnv
 from rigid_env.envs.sources import ObsKind

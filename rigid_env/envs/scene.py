@@ -12,9 +12,8 @@ from numpy.typing import ArrayLike, NDArray
 
 import physics
 from physics import validation
-from physics.annotations import Frame, Preset
+from physics.annotations import Effect, Frame, Preset
 from physics.keywords import known_keywords
-from physics.scene.effects import Effect
 from rigid_env.envs.env import RigidEnv
 from rigid_env.envs.sources import ObsKind
 from rigid_env.envs.vector_arguments import Autoreset

@@ -9,8 +9,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 import physics
-from physics.annotations import Layout, Preset
-from physics.scene.effects import Effect
+from physics.annotations import Effect, Layout, Preset
 from rigid_env.tasks import layout as col
 from rigid_env.tasks.actions import Wrench
 from rigid_env.tasks.area import Area

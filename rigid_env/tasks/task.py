@@ -13,10 +13,9 @@ from numpy.typing import ArrayLike, NDArray
 
 import physics
 from physics import validation
-from physics.annotations import Preset
+from physics.annotations import Effect, Preset
 from physics.kernels.state import layout as at
 from physics.parallel.bound_call import Work, bound_alike, compiled
-from physics.scene.effects import Effect
 from physics.world.report import gravest
 from physics.world.rollout_loop import RolloutLoop
 from rigid_env.tasks import layout as col
