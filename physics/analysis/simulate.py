@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable
 from functools import partial
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -91,8 +92,8 @@ def simulate(
         events += found
         samples.append(_sample(world))
         reports.append(report)
-    columns = [np.array(column) for column in zip(*samples)]
-    return Trajectory(np.array(times), *columns, events=tuple(events), reports=tuple(reports), scene=scene)
+    columns: Any = [np.array(column) for column in zip(*samples)]
+    return Trajectory(np.array(times), *columns, events=tuple(events), reports=tuple(reports), scene=scene)  # type: ignore[misc]
 
 
 def _times(duration, sample_dt, dt) -> tuple[float, float, float]:

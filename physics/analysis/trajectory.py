@@ -6,6 +6,7 @@ import csv
 import zipfile
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -85,8 +86,8 @@ class Trajectory:
 
     def to_npz(self, path: str | Path) -> None:
         """Write samples, events, and the bodies and walls of the scene as a NumPy archive; `from_npz` reads it."""
-        samples = {name: getattr(self, name) for name in SAMPLES}
-        np.savez(path, **samples, **event_arrays(self.events), **scene_arrays(self.scene))
+        arrays: Any = {name: getattr(self, name) for name in SAMPLES}
+        np.savez(path, **arrays, **event_arrays(self.events), **scene_arrays(self.scene))
 
     @classmethod
     def from_npz(cls, path: str | Path) -> Trajectory:

@@ -125,4 +125,5 @@ def resolve(accuracy: Preset | Accuracy, field: str = "accuracy") -> Accuracy:
     """The `Accuracy` of a preset's name, or the one given; `field` is what messages call it."""
     if isinstance(accuracy, Accuracy):
         return accuracy
-    return PRESETS[validation.one_of(accuracy, PRESETS, field, ", or a physics.Accuracy(...)")]
+    known: Any = PRESETS
+    return known[validation.one_of(accuracy, PRESETS, field, ", or a physics.Accuracy(...)")]

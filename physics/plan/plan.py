@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -133,7 +134,7 @@ class Plan:
         return "\n".join(lines)
 
 
-def is_isotropic(moments: np.ndarray) -> np.ndarray:
+def is_isotropic(moments: np.ndarray) -> Any:
     """True if all `moments` (..., 3) are equal to rounding: then ω stays constant in free flight."""
     return np.ptp(moments, axis=-1) <= ISOTROPY_TOLERANCE * np.max(moments, axis=-1)
 
@@ -147,7 +148,7 @@ def is_tilted(R: np.ndarray) -> np.ndarray:
 class _Seen:
     """Findings that a plan is made of."""
 
-    contact: Contact | None
+    contact: Any
     friction: Friction | None
     gravity: Gravity | None
     touching: bool
@@ -163,7 +164,7 @@ class _Seen:
 
 def _see(scene: Scene) -> _Seen:
     """Find the effects that can act in a scene."""
-    contact, friction, gravity = (scene.effect(kind) for kind in (Contact, Friction, Gravity))
+    contact, friction, gravity = scene.effect(Contact), scene.effect(Friction), scene.effect(Gravity)
     meeting = contact is not None and contact.between_bodies and len(scene.bodies) > 1
     touching = contact is not None and (bool(scene.walls) or meeting)
     axes = [principal_axes(body.inertia) for body in scene.bodies]
@@ -181,7 +182,7 @@ def _see(scene: Scene) -> _Seen:
     )  # fmt: skip
 
 
-def _laws(scene: Scene, contact: Contact, friction: Friction | None) -> tuple[str, ...]:
+def _laws(scene: Scene, contact: Any, friction: Friction | None) -> tuple[str, ...]:
     """The laws of `physics.kernels.state.contact_law_dispatch` that act where bodies touch walls."""
     has_round = any(body.kind in ("sphere", "ellipsoid") for body in scene.bodies)
     is_on = {

@@ -188,7 +188,8 @@ class Scene:
         if axes.ndim == 2 and len(axes) != len(self.walls):
             count = len(self.walls)
             raise ValueError(f"Friction.axis has {len(axes)} directions; allowed are one, or {count}: one per wall")
-        for k, (axis, wall) in enumerate(zip(friction.directions(len(self.walls)), self.walls)):
+        directions: Any = friction.directions(len(self.walls))
+        for k, (axis, wall) in enumerate(zip(directions, self.walls)):
             if not np.linalg.norm(np.cross(axis, wall.normal)) > LEAST_SINE * np.linalg.norm(axis):
                 raise ValueError(
                     f"Friction.axis is {axis.tolist()}, the normal of walls[{k}]; allowed are directions along a wall, "

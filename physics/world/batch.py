@@ -38,6 +38,9 @@ class ActuatorState(Protocol):
     def put_worlds(self, kept: Any, source: np.ndarray, worlds: np.ndarray, shift: float | None) -> None:
         """Let worlds go on as those of `source` in `kept`, whose times are `shift` [s] early; None: of all worlds."""
 
+    def advance(self, world: Any, calls: list[Work], wrench: np.ndarray, steps: int, dt: float) -> None:
+        """Make steps with the wrench that the actuators let through."""
+
     def forget(self, worlds: np.ndarray) -> None:
         """Forget all commands that these worlds were given."""
 
@@ -147,5 +150,5 @@ class Batch:
         """Sleep record for the step; None where no body may sleep."""
         if not self.plan.sleeping:
             return None
-        effect = self.scene.effect(Sleeping)
+        effect: Any = self.scene.effect(Sleeping)
         return Sleep(self.sleep, effect.slops * self.accuracy.slop, effect.time or 0.0)

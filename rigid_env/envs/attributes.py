@@ -13,8 +13,6 @@ from rigid_env.envs.sources import Obs
 from rigid_env.envs.vector_arguments import episode_limit
 
 if TYPE_CHECKING:
-    from rigid_env.tasks import Task
-
     T_co = TypeVar("T_co", covariant=True)
 
     class _Drawn(Generic[T_co]):
@@ -82,7 +80,7 @@ class BatchAttributes(gym.vector.VectorEnv[Obs, NDArray[Any], NDArray[Any]]):
     mean nothing for one world of it are refused, never ignored.
     """
 
-    task: Task
+    task: Any
 
     def get_attr(self, name: str) -> tuple[Any, ...]:
         """An attribute of every world.

@@ -127,7 +127,7 @@ class PixelSource:
         return np.concatenate(tuple(self._pictures.swapaxes(0, 1)), axis=-1)
 
 
-def make_source(task: Task, obs: str, size: Sequence[int], stack: int) -> StateSource | PixelSource | GoalSource:
+def make_source(task: Task, obs: str, size: Sequence[int], stack: int) -> Any:
     """Make the source of observations that an environment's arguments ask for.
 
     Raises

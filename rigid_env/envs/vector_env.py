@@ -57,6 +57,7 @@ class RigidVectorEnv(BatchAttributes[Obs]):
         Naming the field, the value and what is allowed.
     """
 
+    task: Task
     is_free = True  # no thread is in a call: of `physics.parallel.exclusive`
     _view: Any = None  # a `View`; Gymnasium closes batches, too, whose construction ended with an error
 
@@ -100,7 +101,7 @@ class RigidVectorEnv(BatchAttributes[Obs]):
         self._ended = np.zeros(num_envs, dtype=np.bool_)
         self._waiting = np.ones(num_envs, dtype=np.bool_)  # for their first reset
 
-    @property
+    @property  # type: ignore[misc]
     def np_random(self) -> tuple[np.random.Generator | None, ...]:  # type: ignore[override]
         """One generator per world."""
         return tuple(self.task.generators)

@@ -44,7 +44,7 @@ class Vector(NamedTuple):
     axes: str
     share: float
     frame: Frame = "world"
-    point: tuple[float, float, float] | None = None
+    point: Sequence[float] | None = None
 
     @property
     def names(self) -> list[str]:

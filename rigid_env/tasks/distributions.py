@@ -230,6 +230,9 @@ class Normal(_Elementwise):
         Numbers that are not finite, a deviation that is not positive, or ends the wrong way round.
     """
 
+    mean: NDArray[np.float64]
+    deviation: NDArray[np.float64]
+
     def __init__(self, mean, deviation, low=None, high=None):
         ends = {"low": 0.0 if low is None else low, "high": 0.0 if high is None else high}
         self._set("Normal", mean=mean, deviation=deviation, **ends)

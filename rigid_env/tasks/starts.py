@@ -28,7 +28,7 @@ from rigid_env.tasks.state import put, take
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-        from physics.annotations import Effect
+    from physics.annotations import Effect
     from rigid_env.tasks.actions import ActionTable
     from rigid_env.tasks.disturbances import Disturbances
     from rigid_env.tasks.draws import Draws
