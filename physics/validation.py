@@ -155,7 +155,7 @@ def rows(value: ArrayLike, width: int, field: str) -> np.ndarray:
     return finite(array, array.shape, field)
 
 
-def number(value: float, field: str) -> float:
+def number(value: ArrayLike, field: str) -> float:
     """A finite float."""
     return float(finite(value, (), field))
 

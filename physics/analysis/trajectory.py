@@ -87,7 +87,8 @@ class Trajectory:
     def to_npz(self, path: str | Path) -> None:
         """Write samples, events, and the bodies and walls of the scene as a NumPy archive; `from_npz` reads it."""
         arrays: Any = {name: getattr(self, name) for name in SAMPLES}
-        np.savez(path, **arrays, **event_arrays(self.events), **scene_arrays(self.scene))
+        arrays |= {**event_arrays(self.events), **scene_arrays(self.scene)}
+        np.savez(path, **arrays)
 
     @classmethod
     def from_npz(cls, path: str | Path) -> Trajectory:

@@ -139,7 +139,7 @@ def is_isotropic(moments: np.ndarray) -> Any:
     return np.ptp(moments, axis=-1) <= ISOTROPY_TOLERANCE * np.max(moments, axis=-1)
 
 
-def is_tilted(R: np.ndarray) -> np.ndarray:
+def is_tilted(R: np.ndarray) -> Any:
     """True if the principal axes `R` (..., 3, 3) are not the body axes."""
     return (R - np.eye(3)).any(axis=(-2, -1))
 

@@ -226,7 +226,7 @@ class RigidEnv(gym.Env[Obs, NDArray[Any]]):
         flags = {"waiting": np.array([not self._has_reset]), "ended": np.zeros(1, dtype=np.bool_)}
         return {**flags, **self._source.arrays}
 
-    def render(self) -> NDArray[np.uint8] | None:  # type: ignore[override]
+    def render(self) -> NDArray[np.uint8] | None:
         """(height, width, 3) uint8 picture in mode "rgb_array"; in mode "human" shows it and returns None."""
         if self._is_closed:
             raise self._not_ready("render")

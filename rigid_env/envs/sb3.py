@@ -183,7 +183,7 @@ class RigidVecEnv(VecEnv):
         is_wrapped = self.monitor and wrapper_class is Monitor
         return [is_wrapped for _ in self._get_indices(indices)]
 
-    def get_images(self) -> list[NDArray[np.uint8] | None]:  # type: ignore[override]
+    def get_images(self) -> list[NDArray[np.uint8] | None]:
         """A picture of each world, (height, width, 3) uint8."""
         if self.render_mode != "rgb_array":
             return [None] * self.num_envs

@@ -316,7 +316,7 @@ class RigidVectorEnv(BatchAttributes[Obs]):
 
     # --- pictures -----------------------------------------------------------------------------------------
 
-    def render(self) -> tuple[NDArray[np.uint8], ...] | None:  # type: ignore[override]
+    def render(self) -> tuple[NDArray[np.uint8], ...] | None:
         """A picture of each world, (height, width, 3) uint8; mode ``human`` shows world 0 and gives None."""
         self._check_open("render")
         if self.render_mode is None:

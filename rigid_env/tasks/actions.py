@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -187,7 +187,7 @@ class Impulse:
     frame: Frame = "world"
     agent: str = "agent"
 
-    __post_init__ = Force.__post_init__
+    __post_init__ = Force.__post_init__  # type: ignore[misc]
 
     @property
     def vectors(self) -> tuple[Vector, ...]:
@@ -240,7 +240,9 @@ class ActionTable:
         if not ways or not all(isinstance(way, (Wrench, Force, Impulse)) for way in ways):
             raise ValueError(f"actions is {ways!r}; allowed are Wrench, Force and Impulse, at least one")
         self.vectors: list[Vector] = []
-        rows, agents, self.size = [], {}, 0
+        rows: list[Any] = []
+        agents: dict[str, Any] = {}
+        self.size = 0
         for way in ways:
             if way.body >= body_count:
                 raise ValueError(f"body of {way!r} is {way.body}; allowed are 0 to {body_count - 1}")

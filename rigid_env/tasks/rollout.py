@@ -175,9 +175,9 @@ def _room(task: Task, length: int, samples: int, out: TaskRollout | None) -> Kep
             f"{length} control steps of {worlds} worlds need {needed / 2**30:.3g} GiB, and this machine has "
             f"{memory / 2**30:.3g} GiB of memory; allowed are fewer: raise `every`, or leave out `observations`"
         )
-    flags = (np.empty((worlds, length), dtype=np.bool_) for _ in range(2))
+    success, failure = (np.empty((worlds, length), dtype=np.bool_) for _ in range(2))
     observed = np.empty((worlds, samples, entries), dtype=np.float32)
-    return Kept(np.empty((worlds, length)), *flags, observed)
+    return Kept(np.empty((worlds, length)), success, failure, observed)
 
 
 def _checked(out: TaskRollout, worlds: int, length: int, shape: tuple[int, int, int]) -> Kept:

@@ -183,11 +183,12 @@ class Starts(Declaration):
         """Parameters that are fixed at another value than the scene's."""
         one = np.zeros(1, dtype=np.int64)
         taken = replaced(self.effects)
-        names = [name for name in self.episodes.parameters if parameter_of(name)[0] not in taken]
+        of: Any = parameter_of
+        names = [name for name in self.episodes.parameters if of(name)[0] not in taken]
         fixed = {name: self.drawn[name][:1] for name in names}
         found = set()
         for name, value in fixed.items():
-            parameter, _ = parameter_of(name)
+            parameter, _ = of(name)
             (now,) = self._arguments(one, {name: value}).values()
             if not np.allclose(now, self._parameters_of(one)[parameter], rtol=PARAMETER_ROUNDING, atol=0.0):
                 found.add(name)
@@ -248,7 +249,8 @@ class Starts(Declaration):
     def _change(self, name: str, value: np.ndarray) -> None:
         """Give a parameter of all worlds the values (worlds,) or (worlds, k); after an error nothing has changed."""
         try:
-            self.world.set_parameters(**self._arguments(np.arange(self.worlds), {name: value}))
+            arguments: Any = self._arguments(np.arange(self.worlds), {name: value})
+            self.world.set_parameters(**arguments)
         except ValueError as error:
             raise ValueError(f"{name} is {reprlib.repr(value.tolist())}: {error}") from None
 

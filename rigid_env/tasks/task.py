@@ -313,7 +313,7 @@ class Task(Starts):
         )  # fmt: skip
         self._write_arguments = self.given, *self.wrench_arguments
         self._write_wrenches = compiled(write_wrenches, self._write_arguments)
-        self.kept_arrays = {
+        self.kept_arrays: dict[str, Any] = {
             "action": self.action, "previous action": self.previous_action, "record": self.record, "obs": self.obs,
             "outcome": self.outcome, "status": self.status, "wrench": self.wrench, "weights": self.weights,
             "limits": self.limits, **({} if self.disturbed is None else self.disturbed.arrays),
@@ -366,4 +366,5 @@ class Task(Starts):
     def observer(self, taken: np.ndarray) -> Work:
         """Return the kernel that observes the worlds of a list, such as a thread has stepped."""
         arguments = (taken, self.world.state, self.record, self.world.walls, self.action, self.obs, self.outcome)
-        return bound_alike(None, self.compiled, *arguments)
+        compiled_task: Any = self.compiled
+        return bound_alike(None, compiled_task, *arguments)
