@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from operator import attrgetter
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -123,6 +123,10 @@ class Batch:
     telling: int | None
     is_free: bool
     is_torn: bool
+
+    if TYPE_CHECKING:  # of `World`
+
+        def advance(self, calls: list[Work], wrench: np.ndarray, steps: int, dt: float) -> None: ...
 
     def make(self, calls: list[Work], duration: float) -> None:
         """Make kernel calls that take so long [s]."""
