@@ -7,9 +7,9 @@ import functools
 import inspect
 import reprlib
 from collections.abc import Callable, Iterable
-from typing import TypeVar
+from typing import Any, cast
 
-T = TypeVar("T", bound=Callable)
+from physics.annotations import Function
 
 # Names with at least this share of their letters in common, in the same order, may be misspellings of each other.
 ALIKE = 0.6
@@ -22,7 +22,7 @@ def nearest_first(name: object, allowed: Iterable[str]) -> list[str]:
     return sorted(allowed, key=lambda known: -likeness[known] if likeness[known] >= ALIKE else 0.0)
 
 
-def known_keywords(target: T) -> T:
+def known_keywords(target: Function) -> Function:
     """Let a function, or a class when it is made, refuse unknown keywords with the list of those it knows.
 
     A decorator; above `dataclass` where both are used. The signature stays, for editors, `help` and
@@ -43,10 +43,11 @@ def known_keywords(target: T) -> T:
         When called: ``World has no argument 'acuracy' (given: 'fast'); allowed are accuracy, scene, ...``.
     """
     if isinstance(target, type):
-        target.__init__ = _checked(target.__init__, target.__name__, first=1)
+        kind: Any = target
+        kind.__init__ = _checked(kind.__init__, kind.__name__, first=1)
         return target
     is_method = next(iter(inspect.signature(target).parameters), None) == "self"
-    return _checked(target, target.__qualname__, first=int(is_method))
+    return cast("Function", _checked(target, target.__qualname__, first=int(is_method)))
 
 
 def _checked(function: Callable, name: str, first: int = 0) -> Callable:

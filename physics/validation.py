@@ -7,6 +7,7 @@ import os
 from collections.abc import Callable, Iterable
 from decimal import Decimal
 from functools import cache
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -154,7 +155,7 @@ def rows(value: ArrayLike, width: int, field: str) -> np.ndarray:
     return finite(array, array.shape, field)
 
 
-def number(value: float, field: str) -> float:
+def number(value: ArrayLike, field: str) -> float:
     """A finite float."""
     return float(finite(value, (), field))
 
@@ -241,6 +242,6 @@ def unit_quaternion(value: ArrayLike, shape: tuple[int, ...], field: str) -> np.
     return unit(array, length)
 
 
-def unit(array: np.ndarray, length: np.ndarray) -> np.ndarray:
+def unit(array: np.ndarray, length: Any) -> np.ndarray:
     """`array` divided by its `length`; where that is 1 to rounding as it is, so that doing it twice changes nothing."""
     return np.where(np.abs(length - 1) <= UNIT_ROUNDING, array, array / length)

@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from rigid_env.envs.block_reach import BlockReachEnv, BlockReachVectorEnv
     from rigid_env.envs.block_reorient import BlockReorientEnv, BlockReorientVectorEnv
     from rigid_env.envs.checks import check_task
+    from rigid_env.envs.sb3 import RigidVecEnv as RigidVecEnv
     from rigid_env.envs.scene import SceneEnv, SceneVectorEnv
     from rigid_env.envs.task import TaskEnv, TaskVectorEnv
     from rigid_env.tasks import (

@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable
 from functools import partial
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -14,6 +15,7 @@ from physics import validation
 from physics.analysis.diagnostics import diagnose
 from physics.analysis.events import Event, contact_events, contact_pairs, fault_events, logged_events
 from physics.analysis.trajectory import Trajectory
+from physics.annotations import Preset
 from physics.keywords import known_keywords
 from physics.plan.accuracy import Accuracy
 from physics.scene.scene import Scene
@@ -37,7 +39,7 @@ EVENT_ROOM = 16
 def simulate(
     scene: Scene,
     duration: float,
-    accuracy: str | Accuracy = "balanced",
+    accuracy: Preset | Accuracy = "balanced",
     sample_dt: float | None = None,
     wrench: ArrayLike | Callable[[float, World], ArrayLike] | None = None,
     dt: float | None = None,
@@ -90,8 +92,8 @@ def simulate(
         events += found
         samples.append(_sample(world))
         reports.append(report)
-    columns = [np.array(column) for column in zip(*samples)]
-    return Trajectory(np.array(times), *columns, events=tuple(events), reports=tuple(reports), scene=scene)
+    columns: Any = [np.array(column) for column in zip(*samples)]
+    return Trajectory(np.array(times), *columns, events=tuple(events), reports=tuple(reports), scene=scene)  # type: ignore[misc]
 
 
 def _times(duration, sample_dt, dt) -> tuple[float, float, float]:

@@ -6,8 +6,10 @@ import csv
 import zipfile
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from physics import validation
 from physics.analysis.events import Event
@@ -45,12 +47,12 @@ class Trajectory:
         The scene, if it is known; read from a file its bodies and walls, without effects.
     """
 
-    t: np.ndarray
-    pos: np.ndarray
-    quat: np.ndarray
-    linvel: np.ndarray
-    angvel: np.ndarray
-    energy: np.ndarray
+    t: NDArray[np.float64]
+    pos: NDArray[np.float64]
+    quat: NDArray[np.float64]
+    linvel: NDArray[np.float64]
+    angvel: NDArray[np.float64]
+    energy: NDArray[np.float64]
     events: tuple[Event, ...]
     reports: tuple[StepReport, ...]
     scene: Scene | None = field(default=None, compare=False)
@@ -84,8 +86,9 @@ class Trajectory:
 
     def to_npz(self, path: str | Path) -> None:
         """Write samples, events, and the bodies and walls of the scene as a NumPy archive; `from_npz` reads it."""
-        samples = {name: getattr(self, name) for name in SAMPLES}
-        np.savez(path, **samples, **event_arrays(self.events), **scene_arrays(self.scene))
+        arrays: Any = {name: getattr(self, name) for name in SAMPLES}
+        arrays |= {**event_arrays(self.events), **scene_arrays(self.scene)}
+        np.savez(path, **arrays)
 
     @classmethod
     def from_npz(cls, path: str | Path) -> Trajectory:

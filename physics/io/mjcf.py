@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import xml.etree.ElementTree as ET
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -92,10 +93,10 @@ def to_mjcf(scene: Scene, drop: bool = False) -> str:
     ET.SubElement(root, "option", gravity=_text(gravity.acceleration if gravity else (0, 0, 0)))
     _add_meshes(root, scene)
     world = ET.SubElement(root, "worldbody")
-    surface = _surface(scene)
+    surface: Any = _surface(scene)
     for wall in scene.walls:
-        touch = {"contype": "0", "conaffinity": "1" if scene.effect(Contact) else "0"}
-        place = {"pos": _text(wall.offset * np.array(wall.normal)), "zaxis": _text(wall.normal), "size": "0 0 1"}
+        touch: Any = {"contype": "0", "conaffinity": "1" if scene.effect(Contact) else "0"}
+        place: Any = {"pos": _text(wall.offset * np.array(wall.normal)), "zaxis": _text(wall.normal), "size": "0 0 1"}
         ET.SubElement(world, "geom", type="plane", **place, **touch, **surface)
     springs = [effect for effect in scene.effects if isinstance(effect, Spring)]
     _check_names(scene)
@@ -121,15 +122,15 @@ def _check_names(scene: Scene) -> None:
 
 def _add_meshes(root: ET.Element, scene: Scene) -> None:
     """Corners of the hulls, about their centres of mass."""
-    hulls = {f"hull{b}": body for b, body in enumerate(scene.bodies) if body.kind == "hull"}
-    assets = ET.SubElement(root, "asset") if hulls else None
+    hulls: dict[str, Any] = {f"hull{b}": body for b, body in enumerate(scene.bodies) if body.kind == "hull"}
+    assets: Any = ET.SubElement(root, "asset") if hulls else None
     for name, body in hulls.items():
         ET.SubElement(assets, "mesh", name=name, vertex=_text(body.polyhedron.vertices))
 
 
 def _inexpressible(scene: Scene) -> list:
     contact = scene.effect(Contact)
-    lost = [contact] if contact and (contact.restitution or contact.tangential or contact.stiffness) else []
+    lost: list[Any] = [contact] if contact and (contact.restitution or contact.tangential or contact.stiffness) else []
     friction = scene.effect(Friction)
     lost += [friction] if friction and friction.axis is not None else []
     return lost + [e for e in scene.effects if not isinstance(e, (Gravity, Contact, Friction, Spring))]
@@ -157,8 +158,8 @@ def _add_body(world: ET.Element, b: int, body, contact: Contact | None, surface:
     ET.SubElement(element, "inertial", pos="0 0 0", mass=_text(body.mass), fullinertia=full)
     size = body.dimensions[:1] if body.kind == "sphere" else body.dimensions
     extent = {"mesh": f"hull{b}"} if body.kind == "hull" else {"size": _text(size)}
-    shape = {"type": GEOMS[body.kind], **extent, "pos": _text(body.center)}
-    touch = {
+    shape: Any = {"type": GEOMS[body.kind], **extent, "pos": _text(body.center)}
+    touch: Any = {
         "contype": str(int(contact is not None)),
         "conaffinity": str(int(bool(contact and contact.between_bodies))),
     }

@@ -6,6 +6,7 @@ import os
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -154,7 +155,9 @@ class Recorder:
         """
         worlds, bodies = self.world.worlds, self.world.body_count
         validation.index(world, worlds, "world")
-        starts, loads, states = [], [], []
+        starts: list[Any] = []
+        loads: list[Any] = []
+        states: list[Any] = []
         for chapter in self._chapters:
             first, count = len(loads), len(chapter.states)  # an interrupted step has a load, but no state
             starts += _starts_of(chapter, world, first, count)

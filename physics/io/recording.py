@@ -12,6 +12,7 @@ from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from importlib import metadata
 from pathlib import Path
+from typing import Any
 from zipfile import BadZipFile, is_zipfile
 
 import numpy as np
@@ -136,13 +137,14 @@ class Recording:
         }  # fmt: skip
         columns = zip(*(start.snapshot.arrays for start in self.starts))
         with open(path, "wb") as file:
+            starts: Any = {f"start_{name}": np.array(column) for name, column in zip(KEPT, columns)}
             np.savez_compressed(
                 file,
                 head=json.dumps(head),
                 wrenches=self.wrenches, steps=self.steps, dt=self.dt, states=self.states,
                 start_steps=[start.step for start in self.starts],
                 start_times=[start.snapshot.time for start in self.starts],
-                **{f"start_{name}": np.array(column) for name, column in zip(KEPT, columns)},
+                **starts,
             )  # fmt: skip
         return Path(path)
 

@@ -13,11 +13,13 @@ from __future__ import annotations
 import os
 import threading
 import weakref
-from collections.abc import Callable
 from functools import wraps
+from typing import Any, cast
+
+from physics.annotations import Function
 
 
-def exclusive(method: Callable) -> Callable:
+def exclusive(method: Function) -> Function:
     """Refuse a method, or a function of a world, while another thread is in one that takes the same object.
 
     Parameters
@@ -44,10 +46,10 @@ def exclusive(method: Callable) -> Callable:
         finally:
             self.is_free = True
 
-    return call
+    return cast("Function", call)
 
 
-def in_use(thing) -> RuntimeError:
+def in_use(thing: Any) -> RuntimeError:
     """The error for who comes while another thread is at it."""
     name = type(thing).__name__
     if getattr(thing, "is_torn", False):
@@ -64,7 +66,7 @@ def in_use(thing) -> RuntimeError:
 _WORLDS: weakref.WeakSet = weakref.WeakSet()
 
 
-def watch(world) -> None:
+def watch(world: Any) -> None:
     """Have a world known in case the process is forked."""
     _WORLDS.add(world)
 

@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Any, Literal
 
 from physics import validation
+from physics.annotations import Preset, Scheme
 from physics.html_table import fields_table
 from physics.kernels.flight import integrators
 from physics.keywords import known_keywords
 
 # Schemes by name; 0 is time stepping with the exact flow, -1 the event-driven scheme.
 EVENTS = -1
-SCHEMES = {
+SCHEMES: dict[Scheme, int] = {
     "events": EVENTS,
     "exact": 0,
     "explicit_euler": integrators.EXPLICIT_EULER,
@@ -85,19 +87,19 @@ class Accuracy:
     """
 
     substeps: int = 1
-    scheme: str = "exact"
-    solver: str = "sweeps+pivoting"
+    scheme: Scheme = "exact"
+    solver: Literal["sweeps", "sweeps+pivoting"] = "sweeps+pivoting"
     tolerance: float = 1e-6
     iterations: int = 200
     impacts: int = 8
     slop: float = 1e-6
     rest_share: float = 0.5
-    slip: str = "mean"
-    collisions: str = "simultaneous"
+    slip: Literal["mean", "end"] = "mean"
+    collisions: Literal["simultaneous", "sequential"] = "simultaneous"
 
     _repr_html_ = fields_table
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         for name in ("substeps", "iterations", "impacts"):
             self._set(name, validation.count(getattr(self, name), f"Accuracy.{name}"))
         for name in ("tolerance", "slop"):
@@ -106,12 +108,12 @@ class Accuracy:
         for name, known in (("scheme", SCHEMES), ("solver", SOLVERS), ("slip", SLIPS), ("collisions", COLLISIONS)):
             validation.one_of(getattr(self, name), known, f"Accuracy.{name}")
 
-    def _set(self, name, value):
+    def _set(self, name: str, value: Any) -> None:
         object.__setattr__(self, name, value)
 
 
 _BALANCED = Accuracy()
-PRESETS = {
+PRESETS: dict[Preset, Accuracy] = {
     "fast": replace(_BALANCED, solver="sweeps", tolerance=1e-3, iterations=20, impacts=4, slop=1e-5, slip="end"),
     "balanced": _BALANCED,
     "precise": replace(_BALANCED, scheme="events", tolerance=1e-10, iterations=2000, impacts=10_000, slop=1e-12),
@@ -119,8 +121,9 @@ PRESETS = {
 }
 
 
-def resolve(accuracy: str | Accuracy, field: str = "accuracy") -> Accuracy:
+def resolve(accuracy: Preset | Accuracy, field: str = "accuracy") -> Accuracy:
     """The `Accuracy` of a preset's name, or the one given; `field` is what messages call it."""
     if isinstance(accuracy, Accuracy):
         return accuracy
-    return PRESETS[validation.one_of(accuracy, PRESETS, field, ", or a physics.Accuracy(...)")]
+    known: Any = PRESETS
+    return known[validation.one_of(accuracy, PRESETS, field, ", or a physics.Accuracy(...)")]

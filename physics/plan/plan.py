@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from physics import validation
+from physics.annotations import Preset
 from physics.html_table import parts_table
 from physics.kernels.forces.force_field_dispatch import Term
 from physics.kernels.state.contact_law_dispatch import (
@@ -132,12 +134,12 @@ class Plan:
         return "\n".join(lines)
 
 
-def is_isotropic(moments: np.ndarray) -> np.ndarray:
+def is_isotropic(moments: np.ndarray) -> Any:
     """True if all `moments` (..., 3) are equal to rounding: then ω stays constant in free flight."""
     return np.ptp(moments, axis=-1) <= ISOTROPY_TOLERANCE * np.max(moments, axis=-1)
 
 
-def is_tilted(R: np.ndarray) -> np.ndarray:
+def is_tilted(R: np.ndarray) -> Any:
     """True if the principal axes `R` (..., 3, 3) are not the body axes."""
     return (R - np.eye(3)).any(axis=(-2, -1))
 
@@ -146,7 +148,7 @@ def is_tilted(R: np.ndarray) -> np.ndarray:
 class _Seen:
     """Findings that a plan is made of."""
 
-    contact: Contact | None
+    contact: Any
     friction: Friction | None
     gravity: Gravity | None
     touching: bool
@@ -162,7 +164,7 @@ class _Seen:
 
 def _see(scene: Scene) -> _Seen:
     """Find the effects that can act in a scene."""
-    contact, friction, gravity = (scene.effect(kind) for kind in (Contact, Friction, Gravity))
+    contact, friction, gravity = scene.effect(Contact), scene.effect(Friction), scene.effect(Gravity)
     meeting = contact is not None and contact.between_bodies and len(scene.bodies) > 1
     touching = contact is not None and (bool(scene.walls) or meeting)
     axes = [principal_axes(body.inertia) for body in scene.bodies]
@@ -180,7 +182,7 @@ def _see(scene: Scene) -> _Seen:
     )  # fmt: skip
 
 
-def _laws(scene: Scene, contact: Contact, friction: Friction | None) -> tuple[str, ...]:
+def _laws(scene: Scene, contact: Any, friction: Friction | None) -> tuple[str, ...]:
     """The laws of `physics.kernels.state.contact_law_dispatch` that act where bodies touch walls."""
     has_round = any(body.kind in ("sphere", "ellipsoid") for body in scene.bodies)
     is_on = {
@@ -194,7 +196,7 @@ def _laws(scene: Scene, contact: Contact, friction: Friction | None) -> tuple[st
     return tuple(law for law in LAWS if is_on[law])
 
 
-def make_plan(scene: Scene, accuracy: str | Accuracy) -> Plan:
+def make_plan(scene: Scene, accuracy: Preset | Accuracy) -> Plan:
     """Decide what a scene needs at an accuracy, or the preset of that name."""
     validation.instance(scene, Scene, "scene", "a physics.Scene")
     accuracy = resolve(accuracy)

@@ -4,19 +4,23 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
-from typing import ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
 from physics import validation
+from physics.annotations import Quaternion, Shape, Vector
 from physics.html_table import fields_table
 from physics.keywords import known_keywords
 from physics.mass import inertia
 from physics.mass.polyhedron import Polyhedron, convex_hull
 from physics.summary import fields_repr, shown
 
+FROM_DENSITY: Any = None  # a body has a mass as soon as it is made
 
-def _tuple(array: np.ndarray) -> tuple:
+
+def _tuple(array: ArrayLike) -> Any:
     return tuple(float(v) for v in np.ravel(array))
 
 
@@ -26,8 +30,32 @@ def check_name(name: str) -> None:
         raise ValueError(f"name is {shown(name)}; allowed are printable characters, no blank at the ends")
 
 
+if TYPE_CHECKING:
+
+    class _Shape:
+        """Attributes that every shape has, as checkers see them."""
+
+        kind: ClassVar[Shape]
+        mass: float
+        center: Vector
+
+        @property
+        def volume(self) -> float: ...
+
+        @property
+        def dimensions(self) -> NDArray[np.float64]: ...
+
+        @staticmethod
+        def uniform_moments(dimensions: NDArray[np.float64], mass: Any) -> NDArray[np.float64]: ...
+
+        def bounding_radius(self, dimensions: NDArray[np.float64]) -> NDArray[np.float64]: ...
+
+else:
+    _Shape = object
+
+
 @dataclass(frozen=True, kw_only=True)
-class Body:
+class Body(_Shape):
     """Base of all bodies; use `Block`, `Sphere`, `Ellipsoid` or `Hull`.
 
     Parameters
@@ -48,18 +76,18 @@ class Body:
         A parameter out of range, not exactly one of mass and density, or a name without printable characters.
     """
 
-    pos: tuple = (0.0, 0.0, 0.0)
-    quat: tuple = (1.0, 0.0, 0.0, 0.0)
-    linvel: tuple = (0.0, 0.0, 0.0)
-    angvel: tuple = (0.0, 0.0, 0.0)
-    inertia_body: tuple | None = None
+    pos: Vector = (0.0, 0.0, 0.0)
+    quat: Quaternion = (1.0, 0.0, 0.0, 0.0)
+    linvel: Vector = (0.0, 0.0, 0.0)
+    angvel: Vector = (0.0, 0.0, 0.0)
+    inertia_body: tuple[Vector, Vector, Vector] | None = None
     density: float | None = field(default=None, repr=False, compare=False)
     name: str | None = None
-    center: ClassVar[tuple] = (0.0, 0.0, 0.0)  # of the shape, from the centre of mass; a block may have another
+    center = (0.0, 0.0, 0.0)  # of the shape, from the centre of mass; a block may have another
 
     _repr_html_ = fields_table
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         if type(self) is Body:
             raise TypeError("Body has no shape; allowed are Block, Sphere, Ellipsoid and Hull")
         self._set_mass()
@@ -92,11 +120,11 @@ class Body:
             moments = np.diagonal(self.inertia)
         inertia.check_range(np.array([self.mass]), moments[None])
 
-    def _set(self, name, value):
+    def _set(self, name: str, value: Any) -> None:
         object.__setattr__(self, name, value)
 
     @property
-    def inertia(self) -> np.ndarray:
+    def inertia(self) -> NDArray[np.float64]:
         """(3, 3) inertia tensor about the centre of mass in the body frame [kg m²]."""
         if self.inertia_body is not None:
             return np.array(self.inertia_body)
@@ -121,12 +149,29 @@ class Block(Body):
         `inertia_body`, about the centre of mass, must be given.
     """
 
-    size: tuple
-    mass: float | None = None
-    center: tuple = field(default=(0.0, 0.0, 0.0), kw_only=True)
+    size: Vector
+    mass: float = FROM_DENSITY
+    center: Vector = field(default=(0.0, 0.0, 0.0), kw_only=True)
     kind = "block"
 
-    def __post_init__(self):
+    if TYPE_CHECKING:  # sequences and arrays are taken, tuples are kept
+
+        def __init__(
+            self,
+            size: ArrayLike,
+            mass: float | None = None,
+            *,
+            pos: ArrayLike = ...,
+            quat: ArrayLike = ...,
+            linvel: ArrayLike = ...,
+            angvel: ArrayLike = ...,
+            inertia_body: ArrayLike | None = None,
+            density: float | None = None,
+            name: str | None = None,
+            center: ArrayLike = ...,
+        ) -> None: ...
+
+    def __post_init__(self) -> None:
         self._set("size", _tuple(validation.positive(self.size, (3,), "size")))
         self._set("center", _tuple(validation.finite(self.center, (3,), "center")))
         if any(self.center) and self.inertia_body is None:
@@ -141,17 +186,17 @@ class Block(Body):
         return math.prod(self.size)
 
     @property
-    def dimensions(self) -> np.ndarray:
+    def dimensions(self) -> NDArray[np.float64]:
         """(3,) half edges [m]."""
         return 0.5 * np.array(self.size)
 
     @staticmethod
-    def uniform_moments(dimensions, mass) -> np.ndarray:
+    def uniform_moments(dimensions: NDArray[np.float64], mass: Any) -> NDArray[np.float64]:
         """Principal moments (..., 3) [kg m²], along the body axes, of half edges `dimensions` (..., 3) [m]."""
         return inertia.block_moments(2 * dimensions, mass)
 
     @staticmethod
-    def bounding_radius(dimensions) -> np.ndarray:
+    def bounding_radius(dimensions: NDArray[np.float64]) -> NDArray[np.float64]:
         """Radius (...) [m] of the sphere about the centre that holds the body."""
         a, b, c = np.moveaxis(dimensions * dimensions, -1, 0)
         return np.sqrt(a + b + c)
@@ -171,10 +216,26 @@ class Sphere(Body):
     """
 
     radius: float
-    mass: float | None = None
+    mass: float = FROM_DENSITY
     kind = "sphere"
 
-    def __post_init__(self):
+    if TYPE_CHECKING:  # sequences and arrays are taken, tuples are kept
+
+        def __init__(
+            self,
+            radius: float,
+            mass: float | None = None,
+            *,
+            pos: ArrayLike = ...,
+            quat: ArrayLike = ...,
+            linvel: ArrayLike = ...,
+            angvel: ArrayLike = ...,
+            inertia_body: ArrayLike | None = None,
+            density: float | None = None,
+            name: str | None = None,
+        ) -> None: ...
+
+    def __post_init__(self) -> None:
         self._set("radius", float(validation.positive(self.radius, (), "radius")))
         super().__post_init__()
 
@@ -184,17 +245,17 @@ class Sphere(Body):
         return 4 / 3 * math.pi * math.prod((self.radius,) * 3)
 
     @property
-    def dimensions(self) -> np.ndarray:
+    def dimensions(self) -> NDArray[np.float64]:
         """(3,) the radius three times [m]."""
         return np.full(3, self.radius)
 
     @staticmethod
-    def uniform_moments(dimensions, mass) -> np.ndarray:
+    def uniform_moments(dimensions: NDArray[np.float64], mass: Any) -> NDArray[np.float64]:
         """Principal moments (..., 3) [kg m²] of solid spheres; `dimensions` (..., 3) as above."""
         return inertia.ellipsoid_moments(dimensions, mass)
 
     @staticmethod
-    def bounding_radius(dimensions) -> np.ndarray:
+    def bounding_radius(dimensions: NDArray[np.float64]) -> NDArray[np.float64]:
         """The radius (...) [m]."""
         return dimensions[..., 0]
 
@@ -212,11 +273,27 @@ class Ellipsoid(Body):
         [kg]; or `density` instead.
     """
 
-    semi_axes: tuple
-    mass: float | None = None
+    semi_axes: Vector
+    mass: float = FROM_DENSITY
     kind = "ellipsoid"
 
-    def __post_init__(self):
+    if TYPE_CHECKING:  # sequences and arrays are taken, tuples are kept
+
+        def __init__(
+            self,
+            semi_axes: ArrayLike,
+            mass: float | None = None,
+            *,
+            pos: ArrayLike = ...,
+            quat: ArrayLike = ...,
+            linvel: ArrayLike = ...,
+            angvel: ArrayLike = ...,
+            inertia_body: ArrayLike | None = None,
+            density: float | None = None,
+            name: str | None = None,
+        ) -> None: ...
+
+    def __post_init__(self) -> None:
         self._set("semi_axes", _tuple(validation.positive(self.semi_axes, (3,), "semi_axes")))
         super().__post_init__()
 
@@ -226,17 +303,17 @@ class Ellipsoid(Body):
         return 4 / 3 * math.pi * math.prod(self.semi_axes)
 
     @property
-    def dimensions(self) -> np.ndarray:
+    def dimensions(self) -> NDArray[np.float64]:
         """(3,) semi-axes [m]."""
         return np.array(self.semi_axes)
 
     @staticmethod
-    def uniform_moments(dimensions, mass) -> np.ndarray:
+    def uniform_moments(dimensions: NDArray[np.float64], mass: Any) -> NDArray[np.float64]:
         """Principal moments (..., 3) [kg m²] of solid ellipsoids of semi-axes `dimensions` (..., 3) [m]."""
         return inertia.ellipsoid_moments(dimensions, mass)
 
     @staticmethod
-    def bounding_radius(dimensions) -> np.ndarray:
+    def bounding_radius(dimensions: NDArray[np.float64]) -> NDArray[np.float64]:
         """The largest semi-axis (...) [m]."""
         return np.max(dimensions, axis=-1)
 
@@ -263,11 +340,27 @@ class Hull(Body):
         `polyhedron.MOST_CORNERS` corners.
     """
 
-    points: tuple
-    mass: float | None = None
+    points: tuple[Vector, ...]
+    mass: float = FROM_DENSITY
     kind = "hull"
 
-    def __post_init__(self):
+    if TYPE_CHECKING:  # sequences and arrays are taken, tuples are kept
+
+        def __init__(
+            self,
+            points: ArrayLike,
+            mass: float | None = None,
+            *,
+            pos: ArrayLike = ...,
+            quat: ArrayLike = ...,
+            linvel: ArrayLike = ...,
+            angvel: ArrayLike = ...,
+            inertia_body: ArrayLike | None = None,
+            density: float | None = None,
+            name: str | None = None,
+        ) -> None: ...
+
+    def __post_init__(self) -> None:
         self._set("points", tuple(map(_tuple, validation.rows(self.points, 3, "points"))))
         if self.points and not np.abs(self.points).max() < 1 / inertia.LEAST:
             raise ValueError(f"points is {shown(self.points)}; allowed are coordinates below {1 / inertia.LEAST:g}")
@@ -282,12 +375,12 @@ class Hull(Body):
         return convex_hull(self.points)
 
     @property
-    def centroid(self) -> tuple[float, float, float]:
+    def centroid(self) -> Vector:
         """Centre of mass in the frame of `points` [m]."""
         return _tuple(self.polyhedron.centroid)
 
     @property
-    def inertia(self) -> np.ndarray:
+    def inertia(self) -> NDArray[np.float64]:
         """(3, 3) inertia tensor about the centre of mass in the body frame [kg m²]."""
         return np.array(self.inertia_body) if self.inertia_body is not None else self.polyhedron.inertia(self.mass)
 
@@ -297,10 +390,10 @@ class Hull(Body):
         return self.polyhedron.volume
 
     @property
-    def dimensions(self) -> np.ndarray:
+    def dimensions(self) -> NDArray[np.float64]:
         """(3,) how far the hull reaches from the centre of mass along each body axis, either way [m]."""
         return np.abs(self.polyhedron.vertices).max(axis=0)
 
-    def bounding_radius(self, dimensions) -> np.ndarray:
+    def bounding_radius(self, dimensions: NDArray[np.float64]) -> NDArray[np.float64]:
         """Distance (...) of the farthest corner from the centre of mass [m]; `dimensions` (..., 3) do not change it."""
         return np.full(np.shape(dimensions)[:-1], self.polyhedron.radius)

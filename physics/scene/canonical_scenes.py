@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
+from physics.annotations import Effect, Layout
 from physics.scene.bodies import Block, Ellipsoid, Sphere
 from physics.scene.effects import Contact, Friction, Gravity
 from physics.scene.force_fields import AngularDrag, Drag, Magnus
@@ -18,17 +21,17 @@ HALF_WIDTH = 10.0  # of the three-wall box [m]
 
 
 def block_in_box(
-    pos=(0.0, 6.0, 0.0),
+    pos: ArrayLike = (0.0, 6.0, 0.0),
     restitution: float | None = 0.3,
     friction: float | None = 0.5,
-    walls: str = "three",
-    **start,
+    walls: Layout = "three",
+    **start: Any,
 ) -> Scene:
     """The block among three walls; `start` takes quat, linvel and angvel, `walls` is ``three`` or ``corner``."""
     layouts = {"three": lambda: three_walls(HALF_WIDTH), "corner": corner}
     if walls not in layouts:
         raise ValueError(f"walls is {walls!r}; allowed are {', '.join(layouts)}")
-    effects = [Gravity((0.0, -GRAVITY, 0.0)), Contact(restitution)]
+    effects: list[Effect] = [Gravity((0.0, -GRAVITY, 0.0)), Contact(restitution)]
     if friction is not None:
         effects.append(Friction(friction))
     return Scene([Block(SIZE, MASS, pos=pos, **start)], layouts[walls](), effects)
@@ -105,7 +108,7 @@ def vertex_drop(restitution: float = 0.3, friction: float = 0.5) -> Scene:
     row = (2 * s * s, 1 - 2 * s * s, 2 * s * math.cos(half))
     height = sum(0.5 * size * abs(c) for size, c in zip(SIZE, row))
     body = Block(SIZE, MASS, pos=(0.0, height + clearance, 0.0), quat=(math.cos(half), s, s, 0.0))
-    effects = [Gravity((0, -GRAVITY, 0)), Contact(restitution), Friction(friction)]
+    effects: list[Effect] = [Gravity((0, -GRAVITY, 0)), Contact(restitution), Friction(friction)]
     return Scene([body], [HalfSpace((0, 1, 0))], effects)
 
 

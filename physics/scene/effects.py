@@ -8,10 +8,13 @@ Force fields (drag, springs, your own) stand in `physics.scene.force_fields`.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
 from physics import validation
+from physics.annotations import Effect, Vector
 from physics.html_table import fields_table
 from physics.keywords import known_keywords
 from physics.scene.force_field import Field
@@ -20,7 +23,7 @@ from physics.summary import fields_repr, shown
 
 @known_keywords
 @dataclass(frozen=True)
-class Gravity:
+class Gravity(Effect):
     """A uniform force field: every body accelerates by the same vector, and it exerts no torque.
 
     Parameters
@@ -29,18 +32,22 @@ class Gravity:
         World frame [m/s²].
     """
 
-    acceleration: tuple = (0.0, -9.81, 0.0)
+    acceleration: Vector = (0.0, -9.81, 0.0)
+
+    if TYPE_CHECKING:
+
+        def __init__(self, acceleration: ArrayLike = ...) -> None: ...
 
     _repr_html_ = fields_table
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         value = validation.finite(self.acceleration, (3,), "Gravity.acceleration")
         object.__setattr__(self, "acceleration", tuple(value.tolist()))
 
 
 @known_keywords
 @dataclass(frozen=True)
-class Contact:
+class Contact(Effect):
     """Bodies do not pass through walls, nor through each other.
 
     Parameters
@@ -70,7 +77,7 @@ class Contact:
 
     _repr_html_ = fields_table
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         if not isinstance(self.between_bodies, (bool, np.bool_)):
             raise ValueError(f"Contact.between_bodies is {shown(self.between_bodies)}; allowed are True and False")
         object.__setattr__(self, "between_bodies", bool(self.between_bodies))
@@ -100,7 +107,7 @@ class Contact:
 
 @known_keywords
 @dataclass(frozen=True)
-class Friction:
+class Friction(Effect):
     """Coulomb friction with the exact cone: |f_t| <= μ f_n, opposed to sliding.
 
     Parameters
@@ -114,10 +121,14 @@ class Friction:
         coefficients, and only then.
     """
 
-    coefficient: float | tuple = 0.5
-    axis: tuple | None = None
+    coefficient: float | tuple[float, float] = 0.5
+    axis: Vector | tuple[Vector, ...] | None = None
 
-    def __post_init__(self):
+    if TYPE_CHECKING:
+
+        def __init__(self, coefficient: ArrayLike = 0.5, axis: ArrayLike | None = None) -> None: ...
+
+    def __post_init__(self) -> None:
         name, given = "Friction.coefficient", self.coefficient
         is_even = not np.iterable(given) or isinstance(given, str)
         if is_even:
@@ -136,19 +147,19 @@ class Friction:
     @property
     def along(self) -> float:
         """μ, or μ1."""
-        return self.coefficient if self.axis is None else self.coefficient[0]
+        return self.coefficient[0] if isinstance(self.coefficient, tuple) else self.coefficient
 
     @property
     def ratio(self) -> float:
         """μ2/μ1."""
-        return 1.0 if self.axis is None else self.coefficient[1] / self.coefficient[0]
+        return self.coefficient[1] / self.coefficient[0] if isinstance(self.coefficient, tuple) else 1.0
 
-    def directions(self, walls: int) -> np.ndarray | None:
+    def directions(self, walls: int) -> NDArray[np.float64] | None:
         """(walls, 3) directions of μ1, world frame; None where it is the same all around."""
         return None if self.axis is None else np.broadcast_to(np.array(self.axis), (walls, 3))
 
 
-def _axes(axis) -> tuple:
+def _axes(axis: Any) -> tuple:
     """One direction or a sequence of them, checked."""
     try:
         shape = np.shape(axis)
@@ -160,12 +171,13 @@ def _axes(axis) -> tuple:
     return tuple(value.tolist()) if value.ndim == 1 else tuple(tuple(row) for row in value.tolist())
 
 
-class _Resistance:
+class _Resistance(Effect):
     """A torque of contact, bounded by a length times the normal force."""
 
+    radius: float
     _repr_html_ = fields_table
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         name = f"{type(self).__name__}.radius"
         object.__setattr__(self, "radius", float(validation.non_negative(self.radius, (), name)))
 
@@ -205,7 +217,7 @@ class SpinFriction(_Resistance):
 
 @known_keywords
 @dataclass(frozen=True)
-class Actuator:
+class Actuator(Effect):
     """Actuator between the wrench of `World.step` and the bodies: delay, then limits, then lag, in this order.
 
     Parameters
@@ -225,7 +237,7 @@ class Actuator:
 
     _repr_html_ = fields_table
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         for name in ("limit_force", "limit_torque"):
             value = getattr(self, name)
             if value is not None:
@@ -242,7 +254,7 @@ class Actuator:
 
 @known_keywords
 @dataclass(frozen=True)
-class Sleeping:
+class Sleeping(Effect):
     """Bodies at rest are left out of the step until something changes that acts on them.
 
     What has gone no way in two windows of time in a row, and not ever further, sleeps with all that it touches, is near
@@ -264,7 +276,7 @@ class Sleeping:
 
     _repr_html_ = fields_table
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         object.__setattr__(self, "slops", float(validation.positive(self.slops, (), "Sleeping.slops")))
         if self.time is not None:
             object.__setattr__(self, "time", float(validation.positive(self.time, (), "Sleeping.time")))

@@ -15,23 +15,28 @@ parameters and the time. The built-in ones stand in `physics.scene.force_fields`
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, fields
-from typing import ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
+from numpy.typing import NDArray
 
+from physics.annotations import Effect
 from physics.html_table import fields_table
 from physics.kernels.compile.decorators import is_kernel, plain_function, user_kernel
 from physics.kernels.forces.force_field_dispatch import AIR, LOAD, Term
 from physics.scene import field_check
 from physics.scene.field_digest import as_it_is, digest
 
+if TYPE_CHECKING:
+    from typing_extensions import Self
+
 field_function = user_kernel
 
 
 @dataclass(frozen=True)
-class Field:
+class Field(Effect):
     """A force field: force and torque on every body from its state and the time. Subclass it to make one.
 
     A subclass is a frozen dataclass, or gives its numbers by `columns`; one that does neither is a ValueError when an
@@ -55,28 +60,28 @@ class Field:
         Whether `function` makes something of the shape and the half axes in the state: a hull has none.
     """
 
-    function: ClassVar = None
-    energy: ClassVar = None
+    function: ClassVar[Any] = None
+    energy: ClassVar[Any] = None
     has_many: ClassVar[bool] = False
     is_air: ClassVar[bool] = False
     is_linked: ClassVar[bool] = False
     needs_axes: ClassVar[bool] = False
-    _rates: ClassVar = None  # of the built-in ones: see `physics.kernels.forces.implicit_loads`
-    _soften: ClassVar = None
-    _mean: ClassVar = None
+    _rates: ClassVar[Any] = None  # of the built-in ones: see `physics.kernels.forces.implicit_loads`
+    _soften: ClassVar[Any] = None
+    _mean: ClassVar[Any] = None
 
     _repr_html_ = fields_table
 
-    def __new__(cls, *values, **named):
+    def __new__(cls, *values: Any, **named: Any) -> Self:
         field_check.check_class(cls, Field)
         return super().__new__(cls)
 
     @property
-    def kind(self) -> type:
+    def kind(self) -> type[Field]:
         """Class whose functions are compiled for it: its own."""
         return type(self)
 
-    def columns(self, body: int, worlds: np.ndarray) -> np.ndarray:
+    def columns(self, body: int, worlds: NDArray[np.int64]) -> NDArray[np.float64]:
         """Numbers for `function`, for one body of the scene.
 
         Parameters
@@ -124,10 +129,10 @@ class Checked(Field):
     """A built-in field: it sets checked values on a frozen dataclass."""
 
     @property
-    def is_steady(self):
+    def is_steady(self) -> bool:
         return True
 
-    def _set(self, name: str, check, shape: tuple = ()) -> None:
+    def _set(self, name: str, check: Callable[..., Any], shape: tuple[int, ...] = ()) -> None:
         value = check(getattr(self, name), shape, f"{type(self).__name__}.{name}")
         object.__setattr__(self, name, tuple(value.tolist()) if shape else float(value))
 
@@ -149,7 +154,7 @@ class FieldSlot:
         Whether a step in which its function is called may end in an exception.
     """
 
-    kind: type
+    kind: type[Field]
     term: Term
     first: int
     effects: tuple[Field, ...]
@@ -157,7 +162,7 @@ class FieldSlot:
     may_raise: bool = False
 
 
-def field_slots(effects: tuple, body_count: int) -> tuple[FieldSlot, ...]:
+def field_slots(effects: Iterable[Any], body_count: int) -> tuple[FieldSlot, ...]:
     """The fields among a scene's effects, by kind; the order in which they were declared does not matter.
 
     Raises
@@ -166,7 +171,7 @@ def field_slots(effects: tuple, body_count: int) -> tuple[FieldSlot, ...]:
         A field without a compiled function, or with another number of columns for another body or effect; a user's
         function that does not fit (`physics.scene.field_check.check_function`).
     """
-    kinds: dict[type, list[Field]] = {}
+    kinds: dict[type[Field], list[Field]] = {}
     for effect in effects:
         if isinstance(effect, Field):
             kinds.setdefault(effect.kind, []).append(effect)
@@ -174,18 +179,19 @@ def field_slots(effects: tuple, body_count: int) -> tuple[FieldSlot, ...]:
     for kind, found in sorted(kinds.items(), key=lambda item: _name(item[0])):
         size = _column_count(kind, found, body_count)
         marker = f"{AIR if kind.is_air else LOAD}_{_name(kind)}_{len(found)}x{size}"
-        functions = [_compiled(kind, name) for name in ("function", "energy")]
+        functions: list[Any] = [_compiled(kind, name) for name in ("function", "energy")]
         is_users = not _is_built_in(functions[0])
         if is_users:
             functions = [each and as_it_is(each) for each in functions]
-        term = Term(marker, *functions, size, len(found), kind.is_linked, kind._rates, kind._soften, kind._mean)
+        function, energy = functions
+        term = Term(marker, function, energy, size, len(found), kind.is_linked, kind._rates, kind._soften, kind._mean)
         may_raise = is_users and _check_functions(kind, term)
         slots.append(FieldSlot(kind, term, first, tuple(found), is_users, may_raise))
         first += size * len(found)
     return tuple(slots)
 
 
-def _column_count(kind: type, found: list[Field], body_count: int) -> int:
+def _column_count(kind: type[Field], found: list[Field], body_count: int) -> int:
     world = np.arange(1)
     sizes = {field_check.numbers_of(effect, b, world).shape[-1] for effect in found for b in range(body_count)}
     if len(sizes) != 1:
@@ -193,7 +199,7 @@ def _column_count(kind: type, found: list[Field], body_count: int) -> int:
     return sizes.pop()
 
 
-def _check_functions(kind: type, term: Term) -> bool:
+def _check_functions(kind: type[Field], term: Term) -> bool:
     """Check a user's functions; whether the one that a step calls may raise an exception."""
     numbers = field_check.describe(kind, Field, term.size)
     form = field_check.AIR if kind.is_air else field_check.LOAD
@@ -206,14 +212,14 @@ def _is_built_in(function: Callable) -> bool:
     return (plain_function(function).__module__ or "").startswith("physics.kernels.")
 
 
-def _compiled(kind: type, name: str) -> Callable | None:
+def _compiled(kind: type[Field], name: str) -> Any:
     function = vars(kind).get(name, getattr(kind, name))
     if is_kernel(function) or (function is None and name == "energy"):
         return function
     raise ValueError(f"{kind.__name__}.{name} is {function!r}; allowed is a function under @physics.field_function")
 
 
-def _name(kind: type) -> str:
+def _name(kind: type[Field]) -> str:
     """Return the name that tells this kind of field from all others: its function's, for a user's own with a digest."""
     function = _compiled(kind, "function")
     name = plain_function(function).__name__.replace("_", "")
@@ -222,7 +228,7 @@ def _name(kind: type) -> str:
     return f"{name}{digest(function, _compiled(kind, 'energy'))}"
 
 
-def write_columns(slots: tuple[FieldSlot, ...], params: np.ndarray, body_count: int, worlds: np.ndarray) -> None:
+def write_columns(slots: Sequence[FieldSlot], params: np.ndarray, body_count: int, worlds: np.ndarray) -> None:
     """Write the parameters of all fields into their columns.
 
     Parameters

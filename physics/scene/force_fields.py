@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
 from physics import validation
+from physics.annotations import Vector
 from physics.kernels.forces import angular_drag, buoyancy, drag, magnus, wind
 from physics.keywords import known_keywords
 from physics.scene.force_field import Checked
@@ -39,20 +41,20 @@ class Drag(Checked):
     density: float = AIR_DENSITY
     linear: float = 0.0
 
-    function: ClassVar = drag.drag
-    _rates: ClassVar = drag.drag_rates
-    _soften: ClassVar = drag.soften_drag
-    needs_axes: ClassVar = True
+    function: ClassVar[Any] = drag.drag
+    _rates: ClassVar[Any] = drag.drag_rates
+    _soften: ClassVar[Any] = drag.soften_drag
+    needs_axes: ClassVar[bool] = True
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         for name in ("coefficient", "density", "linear"):
             self._set(name, validation.non_negative)
 
     @property
-    def takes_energy(self):
+    def takes_energy(self) -> bool | None:
         return True
 
-    def columns(self, body, worlds):
+    def columns(self, body: int, worlds: NDArray[np.int64]) -> NDArray[np.float64]:
         return np.array([0.5 * self.density * self.coefficient, self.linear])
 
 
@@ -72,19 +74,19 @@ class AngularDrag(Checked):
     linear: float = 0.01
     quadratic: float = 0.0
 
-    function: ClassVar = angular_drag.angular_drag
-    _rates: ClassVar = angular_drag.angular_drag_rates
-    _soften: ClassVar = angular_drag.soften_angular_drag
+    function: ClassVar[Any] = angular_drag.angular_drag
+    _rates: ClassVar[Any] = angular_drag.angular_drag_rates
+    _soften: ClassVar[Any] = angular_drag.soften_angular_drag
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         self._set("linear", validation.non_negative)
         self._set("quadratic", validation.non_negative)
 
     @property
-    def takes_energy(self):
+    def takes_energy(self) -> bool | None:
         return True
 
-    def columns(self, body, worlds):
+    def columns(self, body: int, worlds: NDArray[np.int64]) -> NDArray[np.float64]:
         return np.array([self.linear, self.quadratic])
 
 
@@ -104,20 +106,20 @@ class Magnus(Checked):
     coefficient: float = 1.0
     density: float = AIR_DENSITY
 
-    function: ClassVar = magnus.magnus
-    _rates: ClassVar = magnus.magnus_rates
-    _soften: ClassVar = magnus.soften_magnus
-    needs_axes: ClassVar = True
+    function: ClassVar[Any] = magnus.magnus
+    _rates: ClassVar[Any] = magnus.magnus_rates
+    _soften: ClassVar[Any] = magnus.soften_magnus
+    needs_axes: ClassVar[bool] = True
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         self._set("coefficient", validation.non_negative)
         self._set("density", validation.non_negative)
 
     @property
-    def takes_energy(self):
+    def takes_energy(self) -> bool | None:
         return False
 
-    def columns(self, body, worlds):
+    def columns(self, body: int, worlds: NDArray[np.int64]) -> NDArray[np.float64]:
         return np.array([0.5 * self.density * self.coefficient])
 
 
@@ -138,25 +140,35 @@ class Wind(Checked):
         Of the gusts; each world of a batch has its own.
     """
 
-    velocity: tuple = (5.0, 0.0, 0.0)
+    velocity: Vector = (5.0, 0.0, 0.0)
     gust: float = 0.0
     time_scale: float = 1.0
     seed: int = 0
 
-    function: ClassVar = wind.wind
+    if TYPE_CHECKING:
+
+        def __init__(
+            self,
+            velocity: ArrayLike = ...,
+            gust: float = 0.0,
+            time_scale: float = 1.0,
+            seed: int = 0,
+        ) -> None: ...
+
+    function: ClassVar[Any] = wind.wind
     is_air: ClassVar[bool] = True
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         self._set("velocity", validation.finite, (3,))
         self._set("gust", validation.non_negative)
         self._set("time_scale", validation.positive)
         validation.count(self.seed, "Wind.seed", least=0, most=None)
 
     @property
-    def is_steady(self):
+    def is_steady(self) -> bool:
         return self.gust == 0
 
-    def columns(self, body, worlds):
+    def columns(self, body: int, worlds: NDArray[np.int64]) -> NDArray[np.float64]:
         phases = np.zeros((len(worlds), wind.WIND_SIZE - wind.WIND_PHASES))
         if self.gust > 0:
             for row, world in zip(phases, worlds):
@@ -183,17 +195,27 @@ class Buoyancy(Checked):
     """
 
     density: float = WATER_DENSITY
-    normal: tuple = (0.0, 1.0, 0.0)
+    normal: Vector = (0.0, 1.0, 0.0)
     offset: float = 0.0
     gravity: float = 9.81
 
-    function: ClassVar = buoyancy.buoyancy
-    _rates: ClassVar = buoyancy.buoyancy_rates
-    _soften: ClassVar = buoyancy.soften_buoyancy
-    needs_axes: ClassVar = True
-    energy: ClassVar = buoyancy.buoyancy_energy
+    if TYPE_CHECKING:
 
-    def __post_init__(self):
+        def __init__(
+            self,
+            density: float = ...,
+            normal: ArrayLike = ...,
+            offset: float = 0.0,
+            gravity: float = 9.81,
+        ) -> None: ...
+
+    function: ClassVar[Any] = buoyancy.buoyancy
+    _rates: ClassVar[Any] = buoyancy.buoyancy_rates
+    _soften: ClassVar[Any] = buoyancy.soften_buoyancy
+    needs_axes: ClassVar[bool] = True
+    energy: ClassVar[Any] = buoyancy.buoyancy_energy
+
+    def __post_init__(self) -> None:
         self._set("density", validation.non_negative)
         self._set("offset", validation.finite)
         self._set("gravity", validation.non_negative)
@@ -204,10 +226,10 @@ class Buoyancy(Checked):
         object.__setattr__(self, "normal", tuple(validation.unit(np.array(self.normal), length).tolist()))
 
     @property
-    def takes_energy(self):
+    def takes_energy(self) -> bool | None:
         return False
 
-    def columns(self, body, worlds):
+    def columns(self, body: int, worlds: NDArray[np.int64]) -> NDArray[np.float64]:
         return np.array([*self.normal, self.offset, self.density * self.gravity])
 
 

@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import sys
 import warnings
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from physics import validation
+from physics.annotations import Effect, Vector
 from physics.html_table import fields_table, parts_table, table
 from physics.keywords import known_keywords
 from physics.scene.bodies import Block, Body, Ellipsoid, Hull, Sphere
@@ -30,6 +33,9 @@ NO_CONTACT = (
 )
 
 
+EffectType = TypeVar("EffectType")
+
+
 class SceneWarning(UserWarning):
     """A scene that is valid, but in which something that it declares does nothing."""
 
@@ -47,12 +53,16 @@ class HalfSpace:
         Of the normalised plane [m].
     """
 
-    normal: tuple
+    normal: Vector
     offset: float = 0.0
+
+    if TYPE_CHECKING:
+
+        def __init__(self, normal: ArrayLike, offset: float = 0.0) -> None: ...
 
     _repr_html_ = fields_table
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         normal = validation.finite(self.normal, (3,), "HalfSpace.normal")
         length = float(np.linalg.norm(normal))
         if not length > 0 or not np.isfinite(length):
@@ -99,11 +109,20 @@ class Scene:
         Naming what is wrong; also when a body starts deep inside a wall (checked by `World`).
     """
 
-    bodies: Sequence[Body]
-    walls: Sequence[HalfSpace] = ()
-    effects: Sequence = ()
+    bodies: tuple[Body, ...]
+    walls: tuple[HalfSpace, ...] = ()
+    effects: tuple[Effect, ...] = ()
 
-    def __post_init__(self):
+    if TYPE_CHECKING:
+
+        def __init__(
+            self,
+            bodies: Iterable[Body] | Body,
+            walls: Iterable[HalfSpace] | HalfSpace = (),
+            effects: Iterable[Effect] | Effect = (),
+        ) -> None: ...
+
+    def __post_init__(self) -> None:
         for name, allowed in (("bodies", Body), ("walls", HalfSpace), ("effects", EFFECTS)):
             object.__setattr__(self, name, _items(getattr(self, name), name, allowed))
         if not self.bodies:
@@ -169,7 +188,8 @@ class Scene:
         if axes.ndim == 2 and len(axes) != len(self.walls):
             count = len(self.walls)
             raise ValueError(f"Friction.axis has {len(axes)} directions; allowed are one, or {count}: one per wall")
-        for k, (axis, wall) in enumerate(zip(friction.directions(len(self.walls)), self.walls)):
+        directions: Any = friction.directions(len(self.walls))
+        for k, (axis, wall) in enumerate(zip(directions, self.walls)):
             if not np.linalg.norm(np.cross(axis, wall.normal)) > LEAST_SINE * np.linalg.norm(axis):
                 raise ValueError(
                     f"Friction.axis is {axis.tolist()}, the normal of walls[{k}]; allowed are directions along a wall, "
@@ -190,13 +210,13 @@ class Scene:
         if fields and all(field.is_air for field in fields):
             raise ValueError("Scene.effects holds Wind without what it acts through; add physics.Drag()")
 
-    def effect(self, kind: type):
+    def effect(self, kind: type[EffectType]) -> EffectType | None:
         """The scene's effect of this class, or None."""
         validation.instance(kind, type, "kind", "the class of an effect, as physics.Gravity")
         return next((effect for effect in self.effects if isinstance(effect, kind)), None)
 
 
-def _items(given, name: str, allowed) -> tuple:
+def _items(given: Any, name: str, allowed: Any) -> tuple:
     """The bodies, walls or effects of a scene, as a tuple."""
     if isinstance(given, allowed):
         return (given,)
@@ -219,6 +239,6 @@ def _frames_of_package() -> int:
     return level
 
 
-def _names(allowed) -> str:
+def _names(allowed: Any) -> str:
     kinds = {Body: (Block, Sphere, Ellipsoid, Hull)}.get(allowed, allowed if isinstance(allowed, tuple) else (allowed,))
     return ", ".join(kind.__name__ for kind in kinds)

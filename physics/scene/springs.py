@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
 from physics import validation
+from physics.annotations import Frame, Vector
 from physics.kernels.forces import implicit_two_body_spring, spring, two_body_spring
 from physics.keywords import known_keywords
-from physics.scene.force_field import Checked
+from physics.scene.force_field import Checked, Field
 
 
-def _check_body(effect, body_count: int, name: str) -> None:
+def _check_body(effect: Any, body_count: int, name: str) -> None:
     index = getattr(effect, name)
     if index >= body_count:
         raise ValueError(f"{type(effect).__name__}.{name} is {index}; allowed are indices below {body_count}")
@@ -42,22 +44,35 @@ class Spring(Checked):
         Index of another body that holds the anchor, and is pulled by the opposite force. None: the anchor is fixed.
     """
 
-    anchor: tuple = (0.0, 0.0, 0.0)
-    point: tuple = (0.0, 0.0, 0.0)
+    anchor: Vector = (0.0, 0.0, 0.0)
+    point: Vector = (0.0, 0.0, 0.0)
     stiffness: float = 100.0
     damping: float = 0.0
     length: float = 0.0
     body: int = 0
     other: int | None = None
 
-    function: ClassVar = spring.spring
-    energy: ClassVar = spring.spring_energy
-    _rates: ClassVar = spring.spring_rates
-    _soften: ClassVar = spring.soften_spring
-    _mean: ClassVar = spring.mean_spring
+    if TYPE_CHECKING:
+
+        def __init__(
+            self,
+            anchor: ArrayLike = ...,
+            point: ArrayLike = ...,
+            stiffness: float = 100.0,
+            damping: float = 0.0,
+            length: float = 0.0,
+            body: int = 0,
+            other: int | None = None,
+        ) -> None: ...
+
+    function: ClassVar[Any] = spring.spring
+    energy: ClassVar[Any] = spring.spring_energy
+    _rates: ClassVar[Any] = spring.spring_rates
+    _soften: ClassVar[Any] = spring.soften_spring
+    _mean: ClassVar[Any] = spring.mean_spring
     has_many: ClassVar[bool] = True
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         self._set("anchor", validation.finite, (3,))
         self._set("point", validation.finite, (3,))
         for name in ("stiffness", "damping", "length"):
@@ -68,26 +83,26 @@ class Spring(Checked):
             if self.other == self.body:
                 raise ValueError(f"Spring.other is {self.other}, as Spring.body; allowed are other bodies and None")
 
-    def check(self, body_count):
+    def check(self, body_count: int) -> None:
         _check_body(self, body_count, "body")
         if self.other is not None:
             _check_body(self, body_count, "other")
 
     @property
-    def kind(self):
+    def kind(self) -> type[Field]:
         return Spring if self.other is None else _LinkedSpring
 
     @property
-    def takes_energy(self):
+    def takes_energy(self) -> bool | None:
         return None if self.other is not None else self.damping > 0  # between bodies it carries energy across
 
-    def columns(self, body, worlds):
+    def columns(self, body: int, worlds: NDArray[np.int64]) -> NDArray[np.float64]:
         if self.other is not None:
             return self._linked_columns(body)
         acts = float(body == self.body)
         return np.array([*self.point, *self.anchor, self.length, acts * self.stiffness, acts * self.damping])
 
-    def _linked_columns(self, body: int) -> np.ndarray:
+    def _linked_columns(self, body: int) -> NDArray[np.float64]:
         """Columns of one end of a spring between bodies, or of a body at neither."""
         ends = {self.body: (self.point, self.other, self.anchor), self.other: (self.anchor, self.body, self.point)}
         here, other, there = ends.get(body, ((0.0, 0.0, 0.0), -1, (0.0, 0.0, 0.0)))
@@ -102,11 +117,11 @@ class Spring(Checked):
 class _LinkedSpring(Spring):
     """Field that is compiled for springs between bodies."""
 
-    function: ClassVar = two_body_spring.linked_spring
-    energy: ClassVar = two_body_spring.linked_spring_energy
-    _rates: ClassVar = two_body_spring.linked_spring_rates
-    _soften: ClassVar = two_body_spring.soften_linked_arm
-    _mean: ClassVar = None
+    function: ClassVar[Any] = two_body_spring.linked_spring
+    energy: ClassVar[Any] = two_body_spring.linked_spring_energy
+    _rates: ClassVar[Any] = two_body_spring.linked_spring_rates
+    _soften: ClassVar[Any] = two_body_spring.soften_linked_arm
+    _mean: ClassVar[Any] = None
     is_linked: ClassVar[bool] = True
 
 
@@ -127,25 +142,35 @@ class Push(Checked):
         Index in `Scene.bodies`.
     """
 
-    force: tuple = (0.0, 0.0, 0.0)
-    point: tuple = (0.0, 0.0, 0.0)
-    frame: str = "world"
+    force: Vector = (0.0, 0.0, 0.0)
+    point: Vector = (0.0, 0.0, 0.0)
+    frame: Frame = "world"
     body: int = 0
 
-    function: ClassVar = spring.push_load
-    _rates: ClassVar = spring.push_rates
-    _soften: ClassVar = spring.soften_push
+    if TYPE_CHECKING:
+
+        def __init__(
+            self,
+            force: ArrayLike = ...,
+            point: ArrayLike = ...,
+            frame: Frame = "world",
+            body: int = 0,
+        ) -> None: ...
+
+    function: ClassVar[Any] = spring.push_load
+    _rates: ClassVar[Any] = spring.push_rates
+    _soften: ClassVar[Any] = spring.soften_push
     has_many: ClassVar[bool] = True
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         self._set("force", validation.finite, (3,))
         self._set("point", validation.finite, (3,))
         validation.one_of(self.frame, ("world", "body"), "Push.frame")
         validation.count(self.body, "Push.body", least=0)
 
-    def check(self, body_count):
+    def check(self, body_count: int) -> None:
         _check_body(self, body_count, "body")
 
-    def columns(self, body, worlds):
+    def columns(self, body: int, worlds: NDArray[np.int64]) -> NDArray[np.float64]:
         acts = float(body == self.body)
         return np.array([*self.point, *(acts * np.array(self.force)), float(self.frame == "body")])

@@ -8,6 +8,7 @@ from typing import Protocol
 
 from physics.analysis.simulate import simulate
 from physics.analysis.trajectory import Trajectory
+from physics.annotations import Preset
 from physics.plan.accuracy import PRESETS, Accuracy, resolve
 from physics.scene.scene import Scene
 from physics.world.stepper import Stepper
@@ -80,7 +81,7 @@ class EngineContender:
         return (lambda: world.restore(start)), Stepper(world, steps=steps)
 
 
-def setting_name(accuracy: str | Accuracy) -> str:
+def setting_name(accuracy: Preset | Accuracy) -> str:
     """A preset's name, or the nearest preset's with the knobs that differ: ``balanced(substeps=5)``."""
     knobs = resolve(accuracy)
     changes = {

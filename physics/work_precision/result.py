@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 from physics import validation
 from physics.html_table import fields_table, parts_table
@@ -112,7 +113,8 @@ class Frontier:
         ValueError
             There is none.
         """
-        name = setting if setting is None or isinstance(setting, str) else setting_name(setting)
+        given: Any = setting
+        name = setting if setting is None or isinstance(setting, str) else setting_name(given)
         found = [p for p in self.points if name in (None, p.setting) and engine in (None, p.engine)]
         if not found and self.points:
             known = ", ".join(dict.fromkeys(f"{p.engine} {p.setting}" for p in self.points))

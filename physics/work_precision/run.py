@@ -7,11 +7,13 @@ import time
 from collections.abc import Callable, Iterable, Sequence
 from fractions import Fraction
 from itertools import product
+from typing import Any
 
 import numpy as np
 
 from physics import validation
 from physics.analysis.trajectory import Trajectory
+from physics.annotations import Preset
 from physics.keywords import known_keywords
 from physics.plan.accuracy import Accuracy, resolve
 from physics.scene.scene import Scene
@@ -22,7 +24,7 @@ from physics.work_precision.result import Frontier, FrontierPoint
 from physics.work_precision.truth import UNITS, ReferenceTruth, Truth
 from physics.world.report import Status
 
-PRESETS = ("fast", "balanced", "precise")
+PRESETS: tuple[Preset, ...] = ("fast", "balanced", "precise")
 STEPS = (0.02, 0.01, 0.005, 0.002, 0.001)  # [s]
 COARSE_STEPS = (0.1, 0.05)  # of an event-driven scheme besides, which is as exact there and pays less [s]
 REPEATS = 5
@@ -47,8 +49,8 @@ Progress = Callable[[int, int, str], None]
 
 @known_keywords
 def ladder(
-    accuracies: Sequence[str | Accuracy] = PRESETS, steps: Sequence[float] | None = None
-) -> list[tuple[str | Accuracy, float]]:
+    accuracies: Sequence[Preset | Accuracy] = PRESETS, steps: Sequence[float] | None = None
+) -> list[tuple[Preset | Accuracy, float]]:
     """Every accuracy at every step [s]: the `settings` of `frontier`.
 
     Without `steps`: at `STEPS`, and what is event-driven at `COARSE_STEPS`, too.
@@ -74,7 +76,7 @@ def ladder(
 def frontier(
     scene: Scene,
     duration: float,
-    settings: Iterable[tuple[str | Accuracy, float]] | None = None,
+    settings: Iterable[tuple[Preset | Accuracy, float]] | None = None,
     truth: Truth | Callable[[Trajectory], float] | None = None,
     repeats: int = REPEATS,
     progress: Progress | None = None,
@@ -115,7 +117,7 @@ def frontier(
     duration = float(validation.positive(duration, (), "duration"))
     if settings is None:
         settings = ladder() if duration >= max(COARSE_STEPS) else ladder(steps=STEPS)
-    contenders = [
+    contenders: Any = [
         EngineContender(scene, resolve(accuracy, name), float(validation.positive(dt, (), f"{name} step")))
         for name, (accuracy, dt) in _pairs(settings).items()
     ]
@@ -133,16 +135,16 @@ def measure(
     """As `frontier`, for contenders of any engine; without `truth`, at least one must be ours."""
     repeats = validation.count(repeats, "repeats")
     duration, sample_dt = common_times(duration, [c.dt for c in contenders])
-    truth = _as_truth(truth, scene, duration, sample_dt, contenders)
+    reference = _as_truth(truth, scene, duration, sample_dt, contenders)
     tell = _Counter(progress, 1 + len(contenders) * (1 + repeats))
-    tell(f"truth: {truth.text}")
-    floors = dict(truth.floors)
+    tell(f"truth: {reference.text}")
+    floors = dict(reference.floors)
     turns, skipped, is_complete = [], [], True
     try:
         for contender in contenders:
             tell(f"error of {_name(contender)}")
             try:
-                turns.append(_Turn(contender, scene, truth, duration))
+                turns.append(_Turn(contender, scene, reference, duration))
             except TooSlow as error:
                 skipped.append(f"{_name(contender)}: {error}")
         for _ in range(repeats):
@@ -153,8 +155,9 @@ def measure(
         is_complete = False
     points = tuple(turn.point() for turn in turns)
     return Frontier(
-        points, truth.measure, {**truth.units, **{name: UNITS[name] for name in ("energy", "penetration")}}, floors,
-        truth.text, duration, is_complete, tuple(skipped),
+        points, reference.measure,
+        {**reference.units, **{name: UNITS[name] for name in ("energy", "penetration")}}, floors,
+        reference.text, duration, is_complete, tuple(skipped),
     )  # fmt: skip
 
 

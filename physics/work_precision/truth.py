@@ -11,6 +11,7 @@ import numpy as np
 from physics import validation
 from physics.analysis.simulate import simulate
 from physics.analysis.trajectory import Trajectory
+from physics.annotations import Preset
 from physics.html_table import fields_table
 from physics.keywords import known_keywords
 from physics.plan.accuracy import Accuracy, resolve
@@ -113,7 +114,7 @@ class ReferenceTruth:
     measure = "pose"
 
     def __init__(
-        self, scene: Scene, duration: float, sample_dt: float, dt: float, accuracy: str | Accuracy = "reference"
+        self, scene: Scene, duration: float, sample_dt: float, dt: float, accuracy: Preset | Accuracy = "reference"
     ):
         self.scene, self.duration, self.dt = scene, duration, dt
         self.times = sample_dt * np.arange(round(duration / sample_dt) + 1)

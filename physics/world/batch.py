@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from operator import attrgetter
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
+from numpy.typing import NDArray
 
 from physics.kernels.state.sleeping import Sleep
 from physics.kernels.time_stepping.workspace import body_records
@@ -36,6 +37,9 @@ class ActuatorState(Protocol):
 
     def put_worlds(self, kept: Any, source: np.ndarray, worlds: np.ndarray, shift: float | None) -> None:
         """Let worlds go on as those of `source` in `kept`, whose times are `shift` [s] early; None: of all worlds."""
+
+    def advance(self, world: Any, calls: list[Work], wrench: np.ndarray, steps: int, dt: float) -> None:
+        """Make steps with the wrench that the actuators let through."""
 
     def forget(self, worlds: np.ndarray) -> None:
         """Forget all commands that these worlds were given."""
@@ -97,20 +101,20 @@ class Batch:
     threads: int
     dt: float
     time: float
-    pos: np.ndarray
-    quat: np.ndarray
-    linvel: np.ndarray
-    angvel: np.ndarray
-    state: np.ndarray
-    params: np.ndarray
-    gravity: np.ndarray
-    walls: np.ndarray
-    shapes: np.ndarray
-    memory: np.ndarray
-    sleep: np.ndarray
-    report_table: np.ndarray
-    event_log: np.ndarray
-    event_counts: np.ndarray
+    pos: NDArray[np.float64]
+    quat: NDArray[np.float64]
+    linvel: NDArray[np.float64]
+    angvel: NDArray[np.float64]
+    state: NDArray[np.float64]
+    params: NDArray[np.float64]
+    gravity: NDArray[np.float64]
+    walls: NDArray[np.float64]
+    shapes: NDArray[np.int64]
+    memory: NDArray[np.float64]
+    sleep: NDArray[np.float64]
+    report_table: NDArray[np.float64]
+    event_log: NDArray[np.float64]
+    event_counts: NDArray[np.int64]
     actuation: ActuatorState | None
     team: Team
     scratch: list
@@ -120,6 +124,10 @@ class Batch:
     is_free: bool
     is_torn: bool
 
+    if TYPE_CHECKING:  # of `World`
+
+        def advance(self, calls: list[Work], wrench: np.ndarray, steps: int, dt: float) -> None: ...
+
     def make(self, calls: list[Work], duration: float) -> None:
         """Make kernel calls that take so long [s]."""
         if self.plan.fields:
@@ -128,7 +136,7 @@ class Batch:
         self.team.run(calls)
         self.time += duration
 
-    def no_wrench(self) -> np.ndarray:
+    def no_wrench(self) -> NDArray[np.float64]:
         """(worlds, bodies, 6) float64 zeros: an array for wrenches."""
         return np.zeros((self.worlds, self.body_count, 6))
 
@@ -146,5 +154,5 @@ class Batch:
         """Sleep record for the step; None where no body may sleep."""
         if not self.plan.sleeping:
             return None
-        effect = self.scene.effect(Sleeping)
+        effect: Any = self.scene.effect(Sleeping)
         return Sleep(self.sleep, effect.slops * self.accuracy.slop, effect.time or 0.0)

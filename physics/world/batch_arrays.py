@@ -91,7 +91,7 @@ def machine_memory() -> int:
 def fill(world: Batch) -> None:
     """Write the scene's bodies and effects into the arrays of every world."""
     scene, plan = world.scene, world.plan
-    contact, friction, gravity = (scene.effect(kind) for kind in (Contact, Friction, Gravity))
+    contact, friction, gravity = scene.effect(Contact), scene.effect(Friction), scene.effect(Gravity)
     state = world.state.reshape(world.worlds, world.body_count, at.STATE_SIZE)
     for b, body in enumerate(scene.bodies):
         state[:, b, at.POS : at.POS + 3] = body.pos

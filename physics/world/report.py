@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from enum import IntEnum
+from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from physics.html_table import parts_table
 from physics.kernels.compile.decorators import entry_kernel, kernel
@@ -148,27 +150,69 @@ class StepReport:
     def __init__(self, table: np.ndarray):
         self._table = table
 
-    penetration = property(lambda self: self._table[:, at.PENETRATION])
-    residual = property(lambda self: self._table[:, at.RESIDUAL])
-    iterations = property(lambda self: self._table[:, at.ITERATIONS].astype(np.int64))
-    solves = property(lambda self: self._table[:, at.SOLVES].astype(np.int64))
-    fallbacks = property(lambda self: self._table[:, at.FALLBACKS].astype(np.int64))
-    unconverged = property(lambda self: self._table[:, at.UNCONVERGED].astype(np.int64))
-    impacts = property(lambda self: self._table[:, at.SPLITS].astype(np.int64))
-    unresolved = property(lambda self: self._table[:, at.UNRESOLVED].astype(np.int64))
-    faults = property(lambda self: self._table[:, at.FAULTS].astype(np.int64))
-    left_out = property(lambda self: self._table[:, at.CONTACTS_LEFT_OUT].astype(np.int64))
-    coarse = property(lambda self: self._table[:, at.UNRESOLVED_MOTION].astype(np.int64))
-    overlap = property(lambda self: self._table[:, at.OVERLAP])
-    fault_body = property(lambda self: self._table[:, at.FIRST_FAULTY].astype(np.int64) - 1)
+    if TYPE_CHECKING:
+
+        @property
+        def penetration(self) -> NDArray[np.float64]: ...
+
+        @property
+        def residual(self) -> NDArray[np.float64]: ...
+
+        @property
+        def iterations(self) -> NDArray[np.int64]: ...
+
+        @property
+        def solves(self) -> NDArray[np.int64]: ...
+
+        @property
+        def fallbacks(self) -> NDArray[np.int64]: ...
+
+        @property
+        def unconverged(self) -> NDArray[np.int64]: ...
+
+        @property
+        def impacts(self) -> NDArray[np.int64]: ...
+
+        @property
+        def unresolved(self) -> NDArray[np.int64]: ...
+
+        @property
+        def faults(self) -> NDArray[np.int64]: ...
+
+        @property
+        def left_out(self) -> NDArray[np.int64]: ...
+
+        @property
+        def coarse(self) -> NDArray[np.int64]: ...
+
+        @property
+        def overlap(self) -> NDArray[np.float64]: ...
+
+        @property
+        def fault_body(self) -> NDArray[np.int64]: ...
+
+    else:
+        penetration = property(lambda self: self._table[:, at.PENETRATION])
+        residual = property(lambda self: self._table[:, at.RESIDUAL])
+        iterations = property(lambda self: self._table[:, at.ITERATIONS].astype(np.int64))
+        solves = property(lambda self: self._table[:, at.SOLVES].astype(np.int64))
+        fallbacks = property(lambda self: self._table[:, at.FALLBACKS].astype(np.int64))
+        unconverged = property(lambda self: self._table[:, at.UNCONVERGED].astype(np.int64))
+        impacts = property(lambda self: self._table[:, at.SPLITS].astype(np.int64))
+        unresolved = property(lambda self: self._table[:, at.UNRESOLVED].astype(np.int64))
+        faults = property(lambda self: self._table[:, at.FAULTS].astype(np.int64))
+        left_out = property(lambda self: self._table[:, at.CONTACTS_LEFT_OUT].astype(np.int64))
+        coarse = property(lambda self: self._table[:, at.UNRESOLVED_MOTION].astype(np.int64))
+        overlap = property(lambda self: self._table[:, at.OVERLAP])
+        fault_body = property(lambda self: self._table[:, at.FIRST_FAULTY].astype(np.int64) - 1)
 
     @property
-    def solver(self) -> np.ndarray:
+    def solver(self) -> NDArray[np.int64]:
         """(worlds,) int64, values of `Solver`."""
         return self._table[:, at.SOLVER].astype(np.int64)
 
     @property
-    def status(self) -> np.ndarray:
+    def status(self) -> NDArray[np.int64]:
         """(worlds,) int64, values of `Status`: the gravest thing that happened."""
         status = np.empty(len(self._table), dtype=np.int64)
         gravest(self._table, status)

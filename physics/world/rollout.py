@@ -155,7 +155,9 @@ def _rollout(world: World, wrenches, initial, steps, dt, columns, every, out) ->
     every = validation.count(every, "every")
     if length % every:
         raise ValueError(f"every is {every}; allowed are divisors of {length}, the number of wrenches of a world")
-    shapes = {name: (world.worlds, length // every, world.body_count, SIZES[name]) for name in _columns(columns)}
+    shapes: dict[str, tuple[int, ...]] = {
+        name: (world.worlds, length // every, world.body_count, SIZES[name]) for name in _columns(columns)
+    }
     places = None if initial is None else restoring.places(world, initial, None, None)
     found = _room(world, shapes) if out is None else _checked(out, shapes)
     before = restoring.take(world, None, None) if world.plan.may_raise else None

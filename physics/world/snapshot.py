@@ -6,7 +6,7 @@ import io
 import os
 from dataclasses import dataclass
 from pathlib import Path
-from typing import BinaryIO
+from typing import Any, BinaryIO
 
 import numpy as np
 
@@ -73,7 +73,7 @@ class Snapshot:
 
     def write(self, file: BinaryIO) -> None:
         """Write it into an open file, as `save` does."""
-        parts = {"time": np.float64(self.time), **dict(zip(KEPT, self.arrays))}
+        parts: dict[str, Any] = {"time": np.float64(self.time), **dict(zip(KEPT, self.arrays))}
         if self.actuation is not None:
             output, late = self.actuation
             parts["actuator_output"] = output

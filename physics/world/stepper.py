@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -77,7 +77,7 @@ class Stepper:
         self._then = then
         self._calls: list[Work] | None = None
         self._afterwards: list[Work] = []
-        self._alone: Work | None = None  # of `_calls` the only one, where nothing else has a part in a step
+        self._alone: Any = None  # the `Work` of `_calls` the only one, where nothing else has a part in a step
         self._perform: Callable[[], bool] | None = None  # of that
         self._duration = self.steps * self.dt
 

@@ -6,9 +6,10 @@ from collections.abc import Callable, Sequence
 from threading import get_ident
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from physics import validation
+from physics.annotations import Preset
 from physics.html_table import parts_table
 from physics.kernels.forces.force_field_dispatch import register_terms
 from physics.kernels.state import layout as at
@@ -75,9 +76,9 @@ class World(Batch):
         scene: Scene,
         worlds: int = 1,
         dt: float = 0.01,
-        accuracy: str | Accuracy = "balanced",
+        accuracy: Preset | Accuracy = "balanced",
         threads: int = 1,
-    ):
+    ) -> None:
         validation.instance(scene, Scene, "scene", "a physics.Scene")
         self.scene = scene
         self.worlds = validation.count(worlds, "worlds")
@@ -373,7 +374,7 @@ class World(Batch):
     def _restore(self, snapshot: Snapshot, at_places: restoring.Places) -> None:
         restoring.put(self, snapshot, at_places)
 
-    def contacts(self, world: int = 0) -> tuple[np.ndarray, np.ndarray]:
+    def contacts(self, world: int = 0) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Contact points and forces of one world's last step.
 
         Returns
@@ -386,7 +387,7 @@ class World(Batch):
         self._check_index(world)
         return contact_forces(self, world)
 
-    def contact_ends(self, world: int = 0) -> np.ndarray:
+    def contact_ends(self, world: int = 0) -> NDArray[np.int64]:
         """(n, 2) int64: body, and other body or -1 - k for wall k, of each of the `contacts` of one world."""
         self._check_index(world)
         return contact_ends(self, world)
@@ -396,7 +397,7 @@ class World(Batch):
         return {(int(body), -1 - int(other)) for body, other in self.contact_ends(world) if other < 0}
 
     @property
-    def asleep(self) -> np.ndarray:
+    def asleep(self) -> NDArray[np.bool_]:
         """(worlds, bodies) bool: which bodies sleep; see `physics.Sleeping`. A new array."""
         if not self.plan.sleeping:
             return np.zeros((self.worlds, self.body_count), dtype=np.bool_)

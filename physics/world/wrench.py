@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from physics import validation
+from physics.annotations import Frame
 from physics.keywords import known_keywords
 from physics.rotations import rotation_matrices
 from physics.world.world import World
@@ -15,7 +16,11 @@ FRAMES = ("world", "body")
 
 @known_keywords
 def wrench_at(
-    world: World, force: ArrayLike, point: ArrayLike = (0.0, 0.0, 0.0), frame: str = "world", point_frame: str = "body"
+    world: World,
+    force: ArrayLike,
+    point: ArrayLike = (0.0, 0.0, 0.0),
+    frame: Frame = "world",
+    point_frame: Frame = "body",
 ) -> np.ndarray:
     """The wrench of a force at a point of each body, where the bodies are now.
 
@@ -40,14 +45,14 @@ def wrench_at(
     """
     validation.instance(world, World, "world", "a physics.World")
     shape = (world.worlds, world.body_count, 3)
-    force, point = _spread(force, shape, "force"), _spread(point, shape, "point")
+    forces, points = _spread(force, shape, "force"), _spread(point, shape, "point")
     for name, value in (("frame", frame), ("point_frame", point_frame)):
         validation.one_of(value, FRAMES, name)
     R = rotation_matrices(world.quat)
     if frame == "body":
-        force = np.einsum("wbij,wbj->wbi", R, force)
-    arm = np.einsum("wbij,wbj->wbi", R, point) if point_frame == "body" else point - world.pos
-    return np.concatenate((force, np.cross(arm, force)), axis=-1)
+        forces = np.einsum("wbij,wbj->wbi", R, forces)
+    arms = np.einsum("wbij,wbj->wbi", R, points) if point_frame == "body" else points - world.pos
+    return np.concatenate((forces, np.cross(arms, forces)), axis=-1)
 
 
 def _spread(value, shape: tuple[int, int, int], field: str) -> np.ndarray:

@@ -2,20 +2,32 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 import gymnasium as gym
 import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
 from physics.keywords import nearest_first
+from rigid_env.envs.sources import Obs
 from rigid_env.envs.vector_arguments import episode_limit
+
+if TYPE_CHECKING:
+    T_co = TypeVar("T_co", covariant=True)
+
+    class _Drawn(Generic[T_co]):
+        """A parameter as checkers see it: read as a number or an array, set to more than that."""
+
+        def __get__(self, env: Any, kind: Any = None) -> T_co: ...
+
+        def __set__(self, env: Any, value: ArrayLike | None) -> None: ...
 
 
 def _parameter(field: str, what: str) -> property:
-    def read(env) -> float | np.ndarray:
+    def read(env: Any) -> Any:
         return value_of(env.task.drawn[field][0])
 
-    def write(env, value) -> None:
+    def write(env: Any, value: Any) -> None:
         env.task.hold(field, value)
 
     return property(
@@ -23,7 +35,7 @@ def _parameter(field: str, what: str) -> property:
     )
 
 
-def value_of(value) -> float | np.ndarray:
+def value_of(value: Any) -> Any:
     """A float of a scalar, a copy of an array."""
     return float(value) if np.ndim(value) == 0 else value.copy()
 
@@ -34,11 +46,18 @@ class EpisodeParameters:
     Setting raises a ValueError that names the field, the value and what is allowed; nothing has changed then.
     """
 
-    mass = _parameter("mass", "Mass of the block [kg]")
-    size = _parameter("size", "Edges of the block (3,) [m]")
-    friction = _parameter("friction", "Coulomb coefficient against the walls")
-    restitution = _parameter("restitution", "Restitution against the walls")
-    gravity = _parameter("gravity", "Strength of gravity along -y [m/s²]")
+    if TYPE_CHECKING:
+        mass = _Drawn[float]()
+        size = _Drawn[NDArray[np.float64]]()
+        friction = _Drawn[float]()
+        restitution = _Drawn[float]()
+        gravity = _Drawn[float]()
+    else:
+        mass = _parameter("mass", "Mass of the block [kg]")
+        size = _parameter("size", "Edges of the block (3,) [m]")
+        friction = _parameter("friction", "Coulomb coefficient against the walls")
+        restitution = _parameter("restitution", "Restitution against the walls")
+        gravity = _parameter("gravity", "Strength of gravity along -y [m/s²]")
 
 
 SHARED = (
@@ -54,12 +73,14 @@ SINGLE = ("action_space", "observation_space", "np_random", "np_random_seed")
 """Attributes of one world under other names, or in tuples, in the batch."""
 
 
-class BatchAttributes(gym.vector.VectorEnv):
+class BatchAttributes(gym.vector.VectorEnv[Obs, NDArray[Any], NDArray[Any]]):
     """`call`, `get_attr` and `set_attr` of Gymnasium's vector environments, for a native batch.
 
     What Gymnasium's `SyncVectorEnv` asks of its environments one by one is here a look into the batch. Names that
     mean nothing for one world of it are refused, never ignored.
     """
+
+    task: Any
 
     def get_attr(self, name: str) -> tuple[Any, ...]:
         """An attribute of every world.
@@ -169,7 +190,7 @@ class BatchAttributes(gym.vector.VectorEnv):
             return getattr(self.task, name)
         return getattr(self, name)
 
-    def _one_limit(self, values) -> int | None:
+    def _one_limit(self, values: Any) -> int | None:
         limits = set(values) if isinstance(values, (list, tuple)) else {values}
         if len(limits) > 1:
             raise ValueError(f"max_episode_steps is {values!r}; allowed is the same number for all worlds of a batch")

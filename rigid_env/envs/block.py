@@ -2,23 +2,28 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
-from typing import ClassVar
+from typing import Any, ClassVar, Literal
 
 from gymnasium.vector import AutoresetMode
+from numpy.typing import NDArray
 
 import physics
 from physics import validation
+from physics.annotations import Effect, Layout, Preset
 from rigid_env.envs.attributes import EpisodeParameters
 from rigid_env.envs.env import RigidEnv
+from rigid_env.envs.sources import ObsKind
+from rigid_env.envs.vector_arguments import Autoreset
 from rigid_env.envs.vector_env import RigidVectorEnv
 from rigid_env.rendering.camera_argument import CameraArgument
+from rigid_env.rendering.view import RenderMode
 from rigid_env.tasks.block import BlockTask
 from rigid_env.tasks.parameters import Edges, Number
 
 
-class BlockEnv(EpisodeParameters, RigidEnv):
+class BlockEnv(EpisodeParameters, RigidEnv[NDArray[Any]]):
     """A task of the block as a Gymnasium environment; subclasses name the task.
 
     Parameters
@@ -40,29 +45,29 @@ class BlockEnv(EpisodeParameters, RigidEnv):
 
     def __init__(
         self,
-        render_mode: str | None = None,
+        render_mode: RenderMode | None = None,
         width: int = 960,
         height: int = 600,
         *,
         camera: CameraArgument = None,
         arrows: bool = True,
-        obs: str = "state",
+        obs: ObsKind = "state",
         obs_size: Sequence[int] = (84, 84),
         obs_stack: int = 1,
         contacts: int = 0,
-        accuracy: str | physics.Accuracy = "balanced",
-        walls: str = "three",
+        accuracy: Preset | physics.Accuracy = "balanced",
+        walls: Layout = "three",
         half_width: float = 10.0,
         mass: Number = 6.0,
         size: Edges = (5.0, 3.0, 2.0),
         friction: Number = 0.5,
         restitution: Number = 0.2,
         gravity: Number = 9.81,
-        effects: Sequence = (),
+        effects: Iterable[Effect] = (),
         frame_skip: int = 5,
         dt: float = 0.005,
         dump_faults: str | Path | None = None,
-    ):
+    ) -> None:
         task = self.task_class(
             1, accuracy=accuracy, walls=walls, half_width=half_width, mass=mass, size=size, friction=friction,
             restitution=restitution, gravity=gravity, effects=effects, frame_skip=frame_skip, dt=dt,
@@ -75,7 +80,7 @@ class BlockEnv(EpisodeParameters, RigidEnv):
         return type(self)
 
 
-class BlockVectorEnv(RigidVectorEnv):
+class BlockVectorEnv(RigidVectorEnv[NDArray[Any]]):
     """Many worlds of a task of the block; subclasses name the task.
 
     Parameters
@@ -101,32 +106,32 @@ class BlockVectorEnv(RigidVectorEnv):
     def __init__(
         self,
         num_envs: int = 1,
-        autoreset_mode: AutoresetMode | str = AutoresetMode.NEXT_STEP,
-        max_episode_steps: int | str | None = "registered",
-        render_mode: str | None = None,
+        autoreset_mode: AutoresetMode | Autoreset = AutoresetMode.NEXT_STEP,
+        max_episode_steps: int | Literal["registered"] | None = "registered",
+        render_mode: RenderMode | None = None,
         width: int = 960,
         height: int = 600,
         *,
         camera: CameraArgument = None,
         arrows: bool = True,
-        obs: str = "state",
+        obs: ObsKind = "state",
         obs_size: Sequence[int] = (84, 84),
         obs_stack: int = 1,
         contacts: int = 0,
         threads: int = 1,
-        accuracy: str | physics.Accuracy = "balanced",
-        walls: str = "three",
+        accuracy: Preset | physics.Accuracy = "balanced",
+        walls: Layout = "three",
         half_width: float = 10.0,
         mass: Number = 6.0,
         size: Edges = (5.0, 3.0, 2.0),
         friction: Number = 0.5,
         restitution: Number = 0.2,
         gravity: Number = 9.81,
-        effects: Sequence = (),
+        effects: Iterable[Effect] = (),
         frame_skip: int = 5,
         dt: float = 0.005,
         dump_faults: str | Path | None = None,
-    ):
+    ) -> None:
         task = self.task_class(
             validation.count(num_envs, "num_envs"), threads=threads, accuracy=accuracy, walls=walls,
             half_width=half_width, mass=mass, size=size, friction=friction, restitution=restitution, gravity=gravity,

@@ -71,10 +71,10 @@ class _Checks:
     def __init__(self, kind: type[Task], steps: int, settings: dict[str, Any]):
         self.kind, self.steps, self.settings = kind, steps, settings
         self.limit = max(1, steps // 3)
-        size = TaskEnv(kind, **settings).action_space.shape
+        size: Any = TaskEnv(kind, **settings).action_space.shape
         self.actions = np.random.default_rng(SEED).uniform(-1.0, 1.0, (steps, ENVS, *size)).astype(np.float32)
 
-    def batch(self, mode: AutoresetMode | str = AutoresetMode.DISABLED, limit: int | None = None) -> TaskVectorEnv:
+    def batch(self, mode: AutoresetMode = AutoresetMode.DISABLED, limit: int | None = None) -> TaskVectorEnv:
         """A batch of `ENVS` worlds."""
         return TaskVectorEnv(ENVS, task=self.kind, autoreset_mode=mode, max_episode_steps=limit, **self.settings)
 

@@ -5,19 +5,20 @@ from __future__ import annotations
 import inspect
 import reprlib
 from collections.abc import Sequence
-from typing import Any, ClassVar
+from typing import Any
 
 import gymnasium as gym
 import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
 from physics.parallel.exclusive import exclusive, in_use
 from rigid_env.envs.attributes import value_of
 from rigid_env.envs.goals import lend_goals
 from rigid_env.envs.infos import info_maker
-from rigid_env.envs.sources import StateSource, make_source
+from rigid_env.envs.sources import Obs, ObsKind, StateSource, make_source
 from rigid_env.envs.spaces import action_space
 from rigid_env.rendering.camera_argument import CameraArgument
-from rigid_env.rendering.view import RENDER_MODES, View
+from rigid_env.rendering.view import RENDER_MODES, RenderMode, View
 from rigid_env.tasks import Task
 from rigid_env.tasks.describe import Section, markdown, sections
 from rigid_env.tasks.layout import FAILURE, REWARD
@@ -26,7 +27,7 @@ from rigid_env.tasks.state import TaskState, put, take
 RENDER_FPS = 40  # of the default control period, 5 steps of 5 ms
 
 
-class RigidEnv(gym.Env):
+class RigidEnv(gym.Env[Obs, NDArray[Any]]):
     """A `Task` of one world as a Gymnasium environment.
 
     Parameters
@@ -56,25 +57,25 @@ class RigidEnv(gym.Env):
         Naming the field, the value and what is allowed.
     """
 
-    metadata: ClassVar[dict[str, Any]] = {"render_modes": list(RENDER_MODES), "render_fps": RENDER_FPS}
+    metadata: dict[str, Any] = {"render_modes": list(RENDER_MODES), "render_fps": RENDER_FPS}  # noqa: RUF012
     is_free = True  # no thread is in a call: of `physics.parallel.exclusive`
 
     def __init__(
         self,
         task: Task,
-        render_mode: str | None = None,
+        render_mode: RenderMode | None = None,
         width: int = 960,
         height: int = 600,
-        obs: str = "state",
+        obs: ObsKind = "state",
         obs_size: Sequence[int] = (84, 84),
         obs_stack: int = 1,
         contacts: int = 0,
         *,
         camera: CameraArgument = None,
         arrows: bool = True,
-    ):
+    ) -> None:
         self.task = task
-        self._source = make_source(task, obs, obs_size, obs_stack)
+        self._source: Any = make_source(task, obs, obs_size, obs_stack)
         lend_goals(task, self)
         self.metadata = {**self.metadata, "render_fps": max(1, round(1.0 / self.task.control_dt))}
         self.render_mode = render_mode
@@ -89,7 +90,7 @@ class RigidEnv(gym.Env):
         self._has_reset = self._is_closed = False
 
     @exclusive
-    def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None):
+    def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Obs, dict[str, Any]]:
         """Start an episode; see `gymnasium.Env.reset`.
 
         Parameters
@@ -127,7 +128,7 @@ class RigidEnv(gym.Env):
         info = self._info(self.task.outcome[0].tolist(), self.task.status.item())
         return self._source.one(0), {**info, **drawn}
 
-    def step(self, action):
+    def step(self, action: ArrayLike) -> tuple[Obs, float, bool, bool, dict[str, Any]]:
         """Hold an action for one control step; see `gymnasium.Env.step`.
 
         Parameters
@@ -225,7 +226,7 @@ class RigidEnv(gym.Env):
         flags = {"waiting": np.array([not self._has_reset]), "ended": np.zeros(1, dtype=np.bool_)}
         return {**flags, **self._source.arrays}
 
-    def render(self):
+    def render(self) -> NDArray[np.uint8] | None:
         """(height, width, 3) uint8 picture in mode "rgb_array"; in mode "human" shows it and returns None."""
         if self._is_closed:
             raise self._not_ready("render")
@@ -251,12 +252,12 @@ class RigidEnv(gym.Env):
         """Class whose docstring tells about the task."""
         return type(self.task)
 
-    def close(self):
+    def close(self) -> None:
         """Close the window, if any; `reset` begins anew."""
         self._view.close()
         self._is_closed, self._has_reset = True, False
 
-    def _not_ready(self, call: str) -> gym.error.Error:
+    def _not_ready(self, call: str) -> Exception:
         if self._is_closed:
             return gym.error.ClosedEnvironmentError(f"{call}() after close(): allowed is reset() or a new environment")
         return gym.error.ResetNeeded(f"call reset() before {call}()")

@@ -8,6 +8,7 @@ from typing import Any
 import gymnasium as gym
 import numpy as np
 from gymnasium.vector import AutoresetMode
+from numpy.typing import NDArray
 
 from rigid_env.envs import vector_infos as infos_of_batches
 from rigid_env.envs.vector_env import RigidVectorEnv
@@ -47,19 +48,19 @@ class RigidVecEnv(VecEnv):
         If the vector environment has another autoreset mode.
     """
 
-    def __init__(self, vector_env: RigidVectorEnv, monitor: bool = True):
+    def __init__(self, vector_env: RigidVectorEnv[Any], monitor: bool = True) -> None:
         if vector_env.autoreset_mode is not AutoresetMode.SAME_STEP:
             raise ValueError(f"vector_env has {vector_env.autoreset_mode}; allowed is AutoresetMode.SAME_STEP")
         self.vector_env = vector_env
         self.monitor = monitor
-        self._actions = None
+        self._actions: Any = None
         self._returns = np.zeros(vector_env.num_envs)
         self._lengths = np.zeros(vector_env.num_envs, dtype=np.int64)
         self._start = time.perf_counter()
         super().__init__(vector_env.num_envs, vector_env.single_observation_space, vector_env.single_action_space)
         self.metadata = vector_env.metadata
 
-    def reset(self) -> np.ndarray:
+    def reset(self) -> NDArray[Any]:
         """Start all worlds anew, with the seeds and options given since the last reset.
 
         Returns
@@ -78,11 +79,11 @@ class RigidVecEnv(VecEnv):
         self._lengths[:] = 0
         return obs
 
-    def step_async(self, actions: np.ndarray) -> None:
+    def step_async(self, actions: NDArray[Any]) -> None:
         """Keep the actions (num_envs, 6) for `step_wait`."""
         self._actions = actions
 
-    def step_wait(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, list[dict[str, Any]]]:
+    def step_wait(self) -> tuple[NDArray[Any], NDArray[np.float32], NDArray[np.bool_], list[dict[str, Any]]]:
         """Step with the actions kept.
 
         Returns
@@ -98,7 +99,7 @@ class RigidVecEnv(VecEnv):
         self._lengths += 1
         infos: list[dict[str, Any]] = [{} for _ in range(self.num_envs)]
         ended = np.flatnonzero(dones)
-        for i in ended:
+        for i in ended.tolist():
             infos[i] = self._final_info(i, bool(truncations[i] and not terminations[i]), vector_infos)
             self.reset_infos[i] = self._row_of(vector_infos, i)
         self._returns[ended] = 0.0
@@ -140,7 +141,7 @@ class RigidVecEnv(VecEnv):
 
     # --- one environment's attributes are every environment's ---------------------------------------------
 
-    def get_attr(self, attr_name: str, indices=None) -> list[Any]:
+    def get_attr(self, attr_name: str, indices: Any = None) -> list[Any]:
         """The attribute of each world (`RigidVectorEnv.get_attr`), or of the vector environment, once per index."""
         rows = list(self._get_indices(indices))
         try:
@@ -149,7 +150,7 @@ class RigidVecEnv(VecEnv):
             return [getattr(self.vector_env, attr_name) for _ in rows]
         return [values[i] for i in rows]
 
-    def set_attr(self, attr_name: str, value: Any, indices=None) -> None:
+    def set_attr(self, attr_name: str, value: Any, indices: Any = None) -> None:
         """Set an attribute of all worlds to one value; see `RigidVectorEnv.set_attr`.
 
         Raises
@@ -162,7 +163,7 @@ class RigidVecEnv(VecEnv):
         self._require_all("set_attr", indices)
         self.vector_env.set_attr(attr_name, [value] * self.num_envs)
 
-    def env_method(self, method_name: str, *method_args, indices=None, **method_kwargs) -> list[Any]:
+    def env_method(self, method_name: str, *method_args: Any, indices: Any = None, **method_kwargs: Any) -> list[Any]:
         """Call a method of the vector environment once, for all environments; its result, once per index.
 
         A method that looks at no environment, `compute_reward`, may be called for some of them.
@@ -172,18 +173,18 @@ class RigidVecEnv(VecEnv):
         result = getattr(self.vector_env, method_name)(*method_args, **method_kwargs)
         return [result for _ in self._get_indices(indices)]
 
-    def _require_all(self, what: str, indices) -> None:
+    def _require_all(self, what: str, indices: Any) -> None:
         chosen = sorted(set(self._get_indices(indices)))
         if chosen != list(range(self.num_envs)):
             raise ValueError(f"{what} got indices {indices!r}; allowed is None: the environments are one batch")
 
-    def env_is_wrapped(self, wrapper_class: type[gym.Wrapper], indices=None) -> list[bool]:
+    def env_is_wrapped(self, wrapper_class: type[gym.Wrapper[Any, Any, Any, Any]], indices: Any = None) -> list[bool]:
         """True for SB3's `Monitor` where this adapter does its work, else False."""
         is_wrapped = self.monitor and wrapper_class is Monitor
         return [is_wrapped for _ in self._get_indices(indices)]
 
-    def get_images(self) -> list[np.ndarray | None]:
+    def get_images(self) -> list[NDArray[np.uint8] | None]:
         """A picture of each world, (height, width, 3) uint8."""
         if self.render_mode != "rgb_array":
             return [None] * self.num_envs
-        return list(self.vector_env.render())
+        return list(self.vector_env.render())  # type: ignore[arg-type]

@@ -3,18 +3,23 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 from gymnasium.vector import AutoresetMode
+from numpy.typing import ArrayLike, NDArray
 
 import physics
 from physics import validation
+from physics.annotations import Effect, Frame, Preset
 from physics.keywords import known_keywords
 from rigid_env.envs.env import RigidEnv
+from rigid_env.envs.sources import ObsKind
+from rigid_env.envs.vector_arguments import Autoreset
 from rigid_env.envs.vector_env import RigidVectorEnv
 from rigid_env.rendering.camera_argument import CameraArgument
+from rigid_env.rendering.view import RenderMode
 from rigid_env.tasks.scene_task import SceneTask
 
 SceneSource = physics.Scene | str | os.PathLike
@@ -22,7 +27,7 @@ Driven = str | int | Sequence[str | int]
 
 
 @known_keywords
-class SceneEnv(RigidEnv):
+class SceneEnv(RigidEnv[NDArray[Any]]):
     """Drive bodies of any scene, and bring one of them to a place.
 
     ## Description
@@ -147,30 +152,30 @@ class SceneEnv(RigidEnv):
     def __init__(
         self,
         scene: SceneSource | None = None,
-        render_mode: str | None = None,
+        render_mode: RenderMode | None = None,
         width: int = 960,
         height: int = 600,
         *,
         camera: CameraArgument = None,
         arrows: bool = True,
-        obs: str = "state",
+        obs: ObsKind = "state",
         obs_size: Sequence[int] = (84, 84),
         obs_stack: int = 1,
         contacts: int = 0,
         driven: Driven | None = None,
         force: float | None = None,
         torque: float | None = None,
-        frame: str | None = None,
+        frame: Frame | None = None,
         length: float | None = None,
         goal: Mapping[str, Any] | None = None,
         start: Mapping[str, Any] | None = None,
         frame_skip: int | None = None,
         dt: float | None = None,
         episode_steps: int | None = None,
-        accuracy: str | physics.Accuracy = "balanced",
-        effects: Sequence = (),
+        accuracy: Preset | physics.Accuracy = "balanced",
+        effects: Iterable[Effect] = (),
         dump_faults: str | Path | None = None,
-    ):
+    ) -> None:
         task = SceneTask(
             1, scene, driven=driven, force=force, torque=torque, frame=frame, length=length, goal=goal, start=start,
             frame_skip=frame_skip, dt=dt, episode_steps=episode_steps, accuracy=accuracy, effects=effects,
@@ -179,7 +184,7 @@ class SceneEnv(RigidEnv):
         told = render_mode, width, height, obs, obs_size, obs_stack, contacts
         super().__init__(task, *told, camera=camera, arrows=arrows)
 
-    def step(self, action):
+    def step(self, action: ArrayLike) -> tuple[NDArray[Any], float, bool, bool, dict[str, Any]]:
         """Hold an action for one control step; as `RigidEnv.step`, but truncated at the limit of the task."""
         obs, reward, is_terminated, is_truncated, info = super().step(action)
         limit = self.task.max_episode_steps
@@ -189,7 +194,7 @@ class SceneEnv(RigidEnv):
 
 
 @known_keywords
-class SceneVectorEnv(RigidVectorEnv):
+class SceneVectorEnv(RigidVectorEnv[NDArray[Any]]):
     """Many worlds of `SceneEnv`, which documents the task.
 
     Parameters
@@ -215,33 +220,33 @@ class SceneVectorEnv(RigidVectorEnv):
         self,
         num_envs: int = 1,
         scene: SceneSource | None = None,
-        autoreset_mode: AutoresetMode | str = AutoresetMode.NEXT_STEP,
-        max_episode_steps: int | str | None = "registered",
-        render_mode: str | None = None,
+        autoreset_mode: AutoresetMode | Autoreset = AutoresetMode.NEXT_STEP,
+        max_episode_steps: int | Literal["registered"] | None = "registered",
+        render_mode: RenderMode | None = None,
         width: int = 960,
         height: int = 600,
         *,
         camera: CameraArgument = None,
         arrows: bool = True,
-        obs: str = "state",
+        obs: ObsKind = "state",
         obs_size: Sequence[int] = (84, 84),
         obs_stack: int = 1,
         contacts: int = 0,
         driven: Driven | None = None,
         force: float | None = None,
         torque: float | None = None,
-        frame: str | None = None,
+        frame: Frame | None = None,
         length: float | None = None,
         goal: Mapping[str, Any] | None = None,
         start: Mapping[str, Any] | None = None,
         frame_skip: int | None = None,
         dt: float | None = None,
         episode_steps: int | None = None,
-        accuracy: str | physics.Accuracy = "balanced",
-        effects: Sequence = (),
+        accuracy: Preset | physics.Accuracy = "balanced",
+        effects: Iterable[Effect] = (),
         dump_faults: str | Path | None = None,
         threads: int = 1,
-    ):
+    ) -> None:
         task = SceneTask(
             validation.count(num_envs, "num_envs"), scene, driven=driven, force=force, torque=torque, frame=frame,
             length=length, goal=goal, start=start, frame_skip=frame_skip, dt=dt, episode_steps=episode_steps,

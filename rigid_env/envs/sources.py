@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any, Literal, TypeVar
 
 import numpy as np
 from gymnasium import spaces
@@ -15,6 +16,12 @@ from rigid_env.tasks import Task
 from rigid_env.tasks.goal import GoalTask
 
 KINDS = ("state", "pixels")
+
+ObsKind = Literal["state", "pixels"]
+"""One of `KINDS`."""
+
+Obs = TypeVar("Obs")
+"""Observations of an environment: an array, or a dictionary of arrays where a task has goals."""
 
 
 class StateSource:
@@ -120,7 +127,7 @@ class PixelSource:
         return np.concatenate(tuple(self._pictures.swapaxes(0, 1)), axis=-1)
 
 
-def make_source(task: Task, obs: str, size: Sequence[int], stack: int) -> StateSource | PixelSource | GoalSource:
+def make_source(task: Task, obs: str, size: Sequence[int], stack: int) -> Any:
     """Make the source of observations that an environment's arguments ask for.
 
     Raises
@@ -129,5 +136,5 @@ def make_source(task: Task, obs: str, size: Sequence[int], stack: int) -> StateS
         Naming the argument, its value and what is allowed.
     """
     validation.one_of(obs, KINDS, "obs")
-    source = StateSource(task) if obs == "state" else PixelSource(task, size, stack)
+    source: Any = StateSource(task) if obs == "state" else PixelSource(task, size, stack)
     return GoalSource(task, source) if isinstance(task, GoalTask) else source

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from gymnasium.vector import AutoresetMode
 
 from physics import validation
+
+Autoreset = Literal["NextStep", "SameStep", "Disabled"]
+"""Values of `AutoresetMode`."""
 
 
 def autoreset_mode(mode: AutoresetMode | str) -> AutoresetMode:

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, Literal
 
 import gymnasium as gym
 import numpy as np
 from gymnasium.vector import AutoresetMode
 from gymnasium.vector.utils import batch_space
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from physics.parallel.exclusive import exclusive
 from rigid_env.envs import vector_arguments as arguments
@@ -17,17 +17,21 @@ from rigid_env.envs import vector_infos
 from rigid_env.envs.attributes import BatchAttributes
 from rigid_env.envs.contact_infos import contact_infos
 from rigid_env.envs.goals import lend_goals
-from rigid_env.envs.sources import make_source
+from rigid_env.envs.sources import Obs, ObsKind, make_source
 from rigid_env.envs.spaces import action_space
+from rigid_env.envs.vector_arguments import Autoreset
 from rigid_env.rendering.camera_argument import CameraArgument
-from rigid_env.rendering.view import RENDER_MODES, View
+from rigid_env.rendering.view import RENDER_MODES, RenderMode, View
 from rigid_env.tasks import Task
 from rigid_env.tasks import layout as col
 from rigid_env.tasks.options import require_known
 from rigid_env.tasks.state import TaskState, put, take
 
+Step = tuple[Obs, NDArray[np.float64], NDArray[np.bool_], NDArray[np.bool_], dict[str, Any]]
+"""Observations, rewards, terminations, truncations and infos of one control step."""
 
-class RigidVectorEnv(BatchAttributes):
+
+class RigidVectorEnv(BatchAttributes[Obs]):
     """A `Task` as a Gymnasium vector environment.
 
     World i goes through the same bits as the single environment with the same seed, whatever `num_envs`.
@@ -53,27 +57,28 @@ class RigidVectorEnv(BatchAttributes):
         Naming the field, the value and what is allowed.
     """
 
+    task: Task
     is_free = True  # no thread is in a call: of `physics.parallel.exclusive`
-    _view: View | None = None  # Gymnasium closes batches, too, whose construction ended with an error
+    _view: Any = None  # a `View`; Gymnasium closes batches, too, whose construction ended with an error
 
     def __init__(
         self,
         task: Task,
-        autoreset_mode: AutoresetMode | str = AutoresetMode.NEXT_STEP,
-        max_episode_steps: int | str | None = "registered",
-        render_mode: str | None = None,
+        autoreset_mode: AutoresetMode | Autoreset = AutoresetMode.NEXT_STEP,
+        max_episode_steps: int | Literal["registered"] | None = "registered",
+        render_mode: RenderMode | None = None,
         width: int = 960,
         height: int = 600,
-        obs: str = "state",
+        obs: ObsKind = "state",
         obs_size: Sequence[int] = (84, 84),
         obs_stack: int = 1,
         contacts: int = 0,
         *,
         camera: CameraArgument = None,
         arrows: bool = True,
-    ):
+    ) -> None:
         self.task = task
-        self._source = make_source(task, obs, obs_size, obs_stack)
+        self._source: Any = make_source(task, obs, obs_size, obs_stack)
         self.contact_infos = contact_infos(task, contacts)
         lend_goals(task, self)
         self.num_envs = num_envs = task.worlds
@@ -96,13 +101,13 @@ class RigidVectorEnv(BatchAttributes):
         self._ended = np.zeros(num_envs, dtype=np.bool_)
         self._waiting = np.ones(num_envs, dtype=np.bool_)  # for their first reset
 
-    @property
-    def np_random(self) -> tuple[np.random.Generator | None, ...]:
+    @property  # type: ignore[misc]
+    def np_random(self) -> tuple[np.random.Generator | None, ...]:  # type: ignore[override]
         """One generator per world."""
         return tuple(self.task.generators)
 
     @property
-    def np_random_seed(self) -> tuple[int, ...]:
+    def np_random_seed(self) -> tuple[int, ...]:  # type: ignore[override]
         """The seed of each world's generator; -1 before the first reset."""
         return tuple(self._seeds)
 
@@ -111,7 +116,7 @@ class RigidVectorEnv(BatchAttributes):
     @exclusive
     def reset(
         self, *, seed: int | Sequence[int | None] | None = None, options: dict[str, Any] | None = None
-    ) -> tuple[np.ndarray, dict[str, Any]]:
+    ) -> tuple[Obs, dict[str, Any]]:
         """Start episodes; see `gymnasium.vector.VectorEnv.reset`.
 
         Parameters
@@ -142,7 +147,7 @@ class RigidVectorEnv(BatchAttributes):
         rows = np.flatnonzero(mask)
         kept = list(self.task.generators), list(self._seeds)
         try:
-            for i in rows:
+            for i in rows.tolist():
                 if seeds[i] is not None or self.task.generators[i] is None:
                     self._seeds[i] = self.task.seed(i, seeds[i])
             self._begin(rows, options)
@@ -156,7 +161,7 @@ class RigidVectorEnv(BatchAttributes):
         return self._source.all(), infos
 
     @exclusive
-    def step(self, actions) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, dict[str, Any]]:
+    def step(self, actions: ArrayLike) -> Step[Obs]:
         """Hold actions for one control step; see `gymnasium.vector.VectorEnv.step`.
 
         Parameters
@@ -193,7 +198,7 @@ class RigidVectorEnv(BatchAttributes):
                 self._put_pictures(before[1])
             raise
 
-    def _conclude(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, dict[str, Any]]:
+    def _conclude(self) -> Step[Obs]:
         """Observe a step that was taken, and start episodes after those that ended."""
         task = self.task
         self._source.step()
@@ -311,7 +316,7 @@ class RigidVectorEnv(BatchAttributes):
 
     # --- pictures -----------------------------------------------------------------------------------------
 
-    def render(self) -> tuple[np.ndarray, ...] | None:
+    def render(self) -> tuple[NDArray[np.uint8], ...] | None:
         """A picture of each world, (height, width, 3) uint8; mode ``human`` shows world 0 and gives None."""
         self._check_open("render")
         if self.render_mode is None:
@@ -326,7 +331,7 @@ class RigidVectorEnv(BatchAttributes):
         if self.render_mode == "human":
             self.render()
 
-    def close_extras(self, **kwargs) -> None:
+    def close_extras(self, **kwargs: Any) -> None:
         """Close the window, if any."""
         if self._view is not None:
             self._view.close()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Literal
 
 import numpy as np
 
@@ -13,6 +14,9 @@ from rigid_env.rendering.camera_argument import CameraArgument, as_camera, as_sw
 from rigid_env.rendering.geometry import rotation_matrix
 from rigid_env.rendering.picture import WEIGHT_ARROW, world_frame
 from rigid_env.tasks import Task
+
+RenderMode = Literal["rgb_array", "human"]
+"""One of `RENDER_MODES`."""
 
 RENDER_MODES = ("rgb_array", "human")
 

@@ -7,12 +7,14 @@ Limits are told in units of the weight m g of the body, so that a task means the
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from physics import validation
+from physics.annotations import Frame
 
 AXES = "xyz"
 FRAMES = ("world", "body")
@@ -41,8 +43,8 @@ class Vector(NamedTuple):
     body: int
     axes: str
     share: float
-    frame: str = "world"
-    point: tuple[float, float, float] | None = None
+    frame: Frame = "world"
+    point: Sequence[float] | None = None
 
     @property
     def names(self) -> list[str]:
@@ -92,10 +94,10 @@ class Wrench:
     torque: float = 0.5
     force_axes: str = AXES
     torque_axes: str = AXES
-    frame: str = "world"
+    frame: Frame = "world"
     agent: str = "agent"
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         check_body(self.body)
         for name in ("force", "torque"):
             validation.non_negative(getattr(self, name), (), name)
@@ -140,12 +142,12 @@ class Force:
 
     body: int = 0
     strength: float = 0.9
-    point: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    point: Sequence[float] = (0.0, 0.0, 0.0)
     axes: str = AXES
-    frame: str = "world"
+    frame: Frame = "world"
     agent: str = "agent"
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         check_body(self.body)
         validation.positive(self.strength, (), "strength")
         check_axes("axes", self.axes)
@@ -180,12 +182,12 @@ class Impulse:
 
     body: int = 0
     strength: float = 0.1
-    point: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    point: Sequence[float] = (0.0, 0.0, 0.0)
     axes: str = AXES
-    frame: str = "world"
+    frame: Frame = "world"
     agent: str = "agent"
 
-    __post_init__ = Force.__post_init__
+    __post_init__ = Force.__post_init__  # type: ignore[misc]
 
     @property
     def vectors(self) -> tuple[Vector, ...]:
@@ -238,7 +240,9 @@ class ActionTable:
         if not ways or not all(isinstance(way, (Wrench, Force, Impulse)) for way in ways):
             raise ValueError(f"actions is {ways!r}; allowed are Wrench, Force and Impulse, at least one")
         self.vectors: list[Vector] = []
-        rows, agents, self.size = [], {}, 0
+        rows: list[Any] = []
+        agents: dict[str, Any] = {}
+        self.size = 0
         for way in ways:
             if way.body >= body_count:
                 raise ValueError(f"body of {way!r} is {way.body}; allowed are 0 to {body_count - 1}")

@@ -8,6 +8,7 @@ import numpy as np
 
 import physics
 from physics import validation
+from physics.annotations import Layout
 
 LAYOUTS = ("three", "corner")
 
@@ -34,10 +35,10 @@ class Area:
         On an unknown layout or a half width that is not positive.
     """
 
-    walls: str
+    walls: Layout
     half_width: float
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         if self.walls not in LAYOUTS:
             raise ValueError(f"walls is {self.walls!r}; allowed are {', '.join(map(repr, LAYOUTS))}")
         object.__setattr__(self, "half_width", float(validation.positive(self.half_width, (), "half_width")))

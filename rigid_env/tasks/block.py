@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
-from typing import ClassVar
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import Any, ClassVar
 
 import numpy as np
 
 import physics
+from physics.annotations import Effect, Layout, Preset
 from rigid_env.tasks import layout as col
 from rigid_env.tasks.actions import Wrench
 from rigid_env.tasks.area import Area
 from rigid_env.tasks.block_draws import YAW, EdgesInside, Face, OnFloor
 from rigid_env.tasks.distributions import LAST, Distribution, Uniform
 from rigid_env.tasks.kernels import start_poses
-from rigid_env.tasks.parameters import LENGTHS, middle, parse_range, scene_size
+from rigid_env.tasks.parameters import LENGTHS, Edges, Number, middle, parse_range, scene_size
 from rigid_env.tasks.task import Task
 
 FORCE_SHARE = 0.9
@@ -67,20 +70,20 @@ class BlockTask(Task):
         self,
         worlds: int = 1,
         *,
-        accuracy="balanced",
-        walls="three",
-        half_width=10.0,
-        mass=6.0,
-        size=(5.0, 3.0, 2.0),
-        friction=0.5,
-        restitution=0.2,
-        gravity=9.81,
-        effects=(),
-        frame_skip=5,
-        dt=0.005,
-        dump_faults=None,
-        threads=1,
-    ):
+        accuracy: Preset | physics.Accuracy = "balanced",
+        walls: Layout = "three",
+        half_width: float = 10.0,
+        mass: Number = 6.0,
+        size: Edges = (5.0, 3.0, 2.0),
+        friction: Number = 0.5,
+        restitution: Number = 0.2,
+        gravity: Number = 9.81,
+        effects: Iterable[Effect] = (),
+        frame_skip: int = 5,
+        dt: float = 0.005,
+        dump_faults: str | Path | None = None,
+        threads: int = 1,
+    ) -> None:
         self.area = Area(walls, half_width)
         given = {"mass": mass, "size": size, "friction": friction, "restitution": restitution, "gravity": gravity}
         self._parameters = {field: parse_range(field, given[field]) for field in LENGTHS}
@@ -95,7 +98,7 @@ class BlockTask(Task):
             threads=threads,
         )  # fmt: skip
 
-    def declared_draws(self):
+    def declared_draws(self) -> Mapping[str, Any]:
         """Place, yaw and face of the start, the goal, and the five parameters."""
         start = {"place": OnFloor(self.area), "yaw": YAW, "face": Face()}
         goal = {} if self.goal_draw is None else {self.goal_draw: self.goal()}
@@ -105,7 +108,7 @@ class BlockTask(Task):
         """Distribution of goals."""
         raise NotImplementedError
 
-    def make_scene(self, distributions):
+    def make_scene(self, distributions: Mapping[str, Distribution]) -> physics.Scene:
         """The block at the middle of the area, lifted clear of the floor, with the middles of all ranges."""
         size, centre = scene_size(self._parameters["size"]), self.area.centre
         values = {field: float(middle(each)) for field, each in self._parameters.items() if field != "size"}
@@ -120,7 +123,7 @@ class BlockTask(Task):
             ],
         )
 
-    def place(self, drawn):
+    def place(self, drawn: Mapping[str, np.ndarray]) -> Mapping[str, Any]:
         """Poses at rest on the floor."""
         count = len(drawn["yaw"])
         pos, quat = np.empty((count, 1, 3)), np.empty((count, 1, 4))
@@ -128,7 +131,7 @@ class BlockTask(Task):
         return {"pos": pos, "quat": quat}
 
     @property
-    def place_options(self):
+    def place_options(self) -> tuple[str, ...]:
         return ("place", "yaw", "face", "size")
 
     def _weights(self, rows):
@@ -140,7 +143,7 @@ class BlockTask(Task):
         super()._note_parameters(rows)
         self.record[rows, col.HALF : col.HALF + 3] = 0.5 * self.drawn["size"][rows]
 
-    def lines(self, world):
+    def lines(self, world: int) -> tuple[str, ...]:
         if self.compiled is None:
             return super().lines(world)
         error, speed, spin = self.outcome[world, [col.ERROR, col.SPEED, col.SPIN]].tolist()

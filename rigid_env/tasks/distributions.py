@@ -11,6 +11,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Mapping
 
 import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
 LAST = float(np.nextafter(1.0, 0.0))
 """Largest uniform number."""
@@ -154,7 +155,10 @@ class Uniform(_Elementwise):
         Ends that are not finite, of different lengths, or the wrong way round.
     """
 
-    def __init__(self, low, high):
+    low: NDArray[np.float64]
+    high: NDArray[np.float64]
+
+    def __init__(self, low: ArrayLike, high: ArrayLike) -> None:
         self._set("Uniform", low=low, high=high)
         if not (self.low <= self.high).all():
             raise ValueError(f"Uniform has low {low!r} and high {high!r}; allowed is low at most high")
@@ -163,7 +167,7 @@ class Uniform(_Elementwise):
     def is_fixed(self) -> bool:
         return bool((self.low == self.high).all())
 
-    def at(self, shares, drawn):
+    def at(self, shares: np.ndarray, drawn: Drawn) -> np.ndarray:
         return self.low + (self.high - self.low) * self._row(shares)
 
     def describe(self) -> str:
@@ -187,7 +191,10 @@ class LogUniform(_Elementwise):
         Ends that are not finite and positive, of different lengths, or the wrong way round.
     """
 
-    def __init__(self, low, high):
+    low: NDArray[np.float64]
+    high: NDArray[np.float64]
+
+    def __init__(self, low: ArrayLike, high: ArrayLike) -> None:
         self._set("LogUniform", low=low, high=high)
         if not ((self.low > 0.0) & (self.low <= self.high)).all():
             raise ValueError(f"LogUniform has low {low!r} and high {high!r}; allowed is 0 < low <= high")
@@ -196,7 +203,7 @@ class LogUniform(_Elementwise):
     def is_fixed(self) -> bool:
         return bool((self.low == self.high).all())
 
-    def at(self, shares, drawn):
+    def at(self, shares: np.ndarray, drawn: Drawn) -> np.ndarray:
         return self.low * (self.high / self.low) ** self._row(shares)
 
     def describe(self) -> str:
@@ -223,6 +230,9 @@ class Normal(_Elementwise):
         Numbers that are not finite, a deviation that is not positive, or ends the wrong way round.
     """
 
+    mean: NDArray[np.float64]
+    deviation: NDArray[np.float64]
+
     def __init__(self, mean, deviation, low=None, high=None):
         ends = {"low": 0.0 if low is None else low, "high": 0.0 if high is None else high}
         self._set("Normal", mean=mean, deviation=deviation, **ends)
@@ -238,7 +248,7 @@ class Normal(_Elementwise):
 
         self._ends = tuple(ndtr((end - self.mean) / self.deviation) for end in (self.low, self.high))
 
-    def at(self, shares, drawn):
+    def at(self, shares: np.ndarray, drawn: Drawn) -> np.ndarray:
         from scipy.special import ndtri
 
         low, high = self._ends
@@ -284,7 +294,7 @@ class Choice(Distribution):
     def is_fixed(self) -> bool:
         return len(self.values) == 1
 
-    def at(self, shares, drawn):
+    def at(self, shares: np.ndarray, drawn: Drawn) -> np.ndarray:
         return self.values[(len(self.values) * shares[:, 0]).astype(np.int64)]
 
     def read(self, field, value, worlds):

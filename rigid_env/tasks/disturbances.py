@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -169,7 +170,7 @@ class Disturbances:
         time = task.steps * task.control_dt
         for k, kind in enumerate(self.kinds):
             due = np.flatnonzero(self.next[k] <= time)
-            for world in due:
+            for world in due.tolist():
                 self._draw(k, kind, world, time[world])
             if isinstance(kind, Push):
                 kick[due, kind.body, :3] += self.force[k, due]
@@ -177,14 +178,15 @@ class Disturbances:
                 acting = self.end[k] > time
                 wrench[:, kind.body, :3] += np.where(acting[:, None], self.force[k], 0.0)
 
-    def _draw(self, k: int, kind: Push | Gust, world: int, time: float) -> None:
+    def _draw(self, k: int, kind: Any, world: int, time: float) -> None:
         task = self._task
         shares = task.generators[world].random(UNIFORMS)
         along = direction(shares[:2], kind.axes)
         one = shares[2:3, None]
         if isinstance(kind, Push):
             inv_mass = task.inv_mass(world, kind.body)
-            self.force[k, world] = kind.speed.at(one, {})[0] / inv_mass / task.world.dt * along
+            speed: Any = kind.speed
+            self.force[k, world] = speed.at(one, {})[0] / inv_mass / task.world.dt * along
             start = time
         else:
             self.force[k, world] = kind.force.at(one, {})[0] * task.weights[world, kind.body] * along

@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from typing import Any
+
 import numpy as np
+from numpy.typing import NDArray
 
 from physics import validation
 from rigid_env.tasks.distributions import Distribution, Uniform
 
-Number = float | tuple[float, float] | Distribution
+Number = float | Sequence[float] | NDArray[Any] | Distribution
 """A value, a range (low, high) to draw from, or a distribution."""
 
-Edges = tuple[float, float, float] | tuple[tuple[float, float, float], tuple[float, float, float]] | Distribution
+Edges = Sequence[float] | Sequence[Sequence[float]] | NDArray[Any] | Distribution
 """Edges of the block [m], a range of them, or a distribution."""
 
 CHECKS = {
@@ -29,7 +33,7 @@ OFF_MIDDLE = (0.25, 0.4, 0.75)
 """Shares of a range of sizes at which the block of a scene is no cube, where the middle is one."""
 
 
-def parse_range(field: str, value) -> Distribution:
+def parse_range(field: str, value: Any) -> Distribution:
     """Distribution of a parameter from what a user gives.
 
     Parameters

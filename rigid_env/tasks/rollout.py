@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from physics import validation
 from physics.html_table import parts_table
@@ -40,21 +40,21 @@ class TaskRollout:
         Whether an episode ends with its success.
     """
 
-    rewards: np.ndarray
-    success: np.ndarray
-    failure: np.ndarray
-    observations: np.ndarray | None
-    status: np.ndarray
+    rewards: NDArray[np.float64]
+    success: NDArray[np.bool_]
+    failure: NDArray[np.bool_]
+    observations: NDArray[np.float32] | None
+    status: NDArray[np.int64]
     ends_on_success: bool
 
     @property
-    def lengths(self) -> np.ndarray:
+    def lengths(self) -> NDArray[np.int64]:
         """(worlds,) int64. Control steps up to the first that ends an episode, itself included; else all."""
         ends = self.failure | self.success if self.ends_on_success else self.failure
         return np.where(ends.any(axis=1), ends.argmax(axis=1) + 1, ends.shape[1])
 
     @property
-    def returns(self) -> np.ndarray:
+    def returns(self) -> NDArray[np.float64]:
         """(worlds,) float64. Sums of the rewards up to the end of each episode."""
         counts = np.arange(self.rewards.shape[1]) < self.lengths[:, None]
         return np.where(counts, self.rewards, 0.0).sum(axis=1)
@@ -175,9 +175,9 @@ def _room(task: Task, length: int, samples: int, out: TaskRollout | None) -> Kep
             f"{length} control steps of {worlds} worlds need {needed / 2**30:.3g} GiB, and this machine has "
             f"{memory / 2**30:.3g} GiB of memory; allowed are fewer: raise `every`, or leave out `observations`"
         )
-    flags = (np.empty((worlds, length), dtype=np.bool_) for _ in range(2))
+    success, failure = (np.empty((worlds, length), dtype=np.bool_) for _ in range(2))
     observed = np.empty((worlds, samples, entries), dtype=np.float32)
-    return Kept(np.empty((worlds, length)), *flags, observed)
+    return Kept(np.empty((worlds, length)), success, failure, observed)
 
 
 def _checked(out: TaskRollout, worlds: int, length: int, shape: tuple[int, int, int]) -> Kept:

@@ -6,7 +6,7 @@ import reprlib
 from collections.abc import Mapping
 from dataclasses import replace as replace_fields
 from functools import cached_property
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from gymnasium.utils import seeding
@@ -25,6 +25,14 @@ from rigid_env.tasks.parameters import LENGTHS
 from rigid_env.tasks.replacing import refuse_replaced, replaced
 from rigid_env.tasks.state import put, take
 
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from physics.annotations import Effect
+    from rigid_env.tasks.actions import ActionTable
+    from rigid_env.tasks.disturbances import Disturbances
+    from rigid_env.tasks.draws import Draws
+
 PARAMETER_ROUNDING = 1e-12
 """Share by which a parameter differs from itself after it was stored: an inverse, twice a half."""
 
@@ -37,6 +45,40 @@ UNIT_GRAVITY = 9.81
 
 class Starts(Declaration):
     """The part of `Task` that begins episodes, and gives worlds the values that are drawn for them."""
+
+    if TYPE_CHECKING:  # what `Task` makes and keeps
+        world: physics.World
+        effects: tuple[Effect, ...]
+        generators: list[np.random.Generator | None]
+        episodes: Draws
+        disturbed: Disturbances | None
+        clock: int
+        action: NDArray[np.float64]
+        previous_action: NDArray[np.float64]
+        given: NDArray[np.float64]
+        outcome: NDArray[np.float64]
+        record: NDArray[np.float64]
+        obs: NDArray[np.float32]
+        status: NDArray[np.int64]
+        weights: NDArray[np.float64]
+        limits: NDArray[np.float64]
+        memory_arrays: dict[str, NDArray[np.float64]]
+        _began: NDArray[np.int64]
+        _functions: Any
+        _own_starts: dict[str, np.ndarray]
+        _table: ActionTable
+
+        @property
+        def worlds(self) -> int: ...
+
+        @property
+        def wrench(self) -> NDArray[np.float64]: ...
+
+        @property
+        def drawn(self) -> dict[str, NDArray[np.float64]]: ...
+
+        @property
+        def distributions(self) -> dict[str, Distribution]: ...
 
     def seed(self, world: int, seed: int | None) -> int:
         """Give one world a new generator, as `gymnasium.Env.reset` does; returns the seed."""
@@ -141,11 +183,12 @@ class Starts(Declaration):
         """Parameters that are fixed at another value than the scene's."""
         one = np.zeros(1, dtype=np.int64)
         taken = replaced(self.effects)
-        names = [name for name in self.episodes.parameters if parameter_of(name)[0] not in taken]
+        of: Any = parameter_of
+        names = [name for name in self.episodes.parameters if of(name)[0] not in taken]
         fixed = {name: self.drawn[name][:1] for name in names}
         found = set()
         for name, value in fixed.items():
-            parameter, _ = parameter_of(name)
+            parameter, _ = of(name)
             (now,) = self._arguments(one, {name: value}).values()
             if not np.allclose(now, self._parameters_of(one)[parameter], rtol=PARAMETER_ROUNDING, atol=0.0):
                 found.add(name)
@@ -206,7 +249,8 @@ class Starts(Declaration):
     def _change(self, name: str, value: np.ndarray) -> None:
         """Give a parameter of all worlds the values (worlds,) or (worlds, k); after an error nothing has changed."""
         try:
-            self.world.set_parameters(**self._arguments(np.arange(self.worlds), {name: value}))
+            arguments: Any = self._arguments(np.arange(self.worlds), {name: value})
+            self.world.set_parameters(**arguments)
         except ValueError as error:
             raise ValueError(f"{name} is {reprlib.repr(value.tolist())}: {error}") from None
 

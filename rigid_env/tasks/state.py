@@ -155,7 +155,7 @@ def take(task, arrays: Mapping[str, np.ndarray], seeds: Sequence[int | None], wo
     ValueError
         A world that is not there, or named twice.
     """
-    chosen = slice(None) if worlds is None else choice.chosen(worlds, task.worlds)
+    chosen: Any = slice(None) if worlds is None else choice.chosen(worlds, task.worlds)
     indices = range(task.worlds) if worlds is None else chosen.tolist()
     states = [task.generators[world] for world in indices]
     return TaskState(
@@ -266,8 +266,8 @@ def _check(task, arrays: Mapping[str, np.ndarray], state: TaskState) -> None:
     if not has_all or len(given) != len(kept) + len(arrays) + 1:
         odd = given.keys() ^ {*kept, *arrays, "steps"}
         if arrays or odd - OF_ENVIRONMENTS:
-            odd = ", ".join(sorted(odd))
-            raise ValueError(f"state is {state!r}, with other parts ({odd}); allowed are states of the same settings")
+            names = ", ".join(sorted(odd))
+            raise ValueError(f"state is {state!r}, with other parts ({names}); allowed are states of the same settings")
     count, is_alike = state.worlds, state.worlds == task.worlds
     for own in (kept, arrays):
         for part, array in own.items():

@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 import reprlib
+from collections.abc import Iterable, Mapping
 from functools import cached_property
+from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
 import physics
 from physics import validation
+from physics.annotations import Effect, Preset
 from physics.kernels.state import layout as at
 from physics.parallel.bound_call import Work, bound_alike, compiled
 from physics.world.report import gravest
@@ -104,14 +108,14 @@ class Task(Starts):
         self,
         worlds: int = 1,
         *,
-        accuracy="balanced",
-        effects=(),
-        draws=None,
-        frame_skip=5,
-        dt=0.005,
-        dump_faults=None,
-        threads=1,
-    ):
+        accuracy: Preset | physics.Accuracy = "balanced",
+        effects: Iterable[Effect] = (),
+        draws: Mapping[str, Any] | None = None,
+        frame_skip: int = 5,
+        dt: float = 0.005,
+        dump_faults: str | Path | None = None,
+        threads: int = 1,
+    ) -> None:
         self.frame_skip = validation.count(frame_skip, "frame_skip")
         if self.max_episode_steps is not None:
             validation.count(self.max_episode_steps, f"max_episode_steps of {type(self).__name__}")
@@ -145,7 +149,7 @@ class Task(Starts):
         self.info_names = (*self.measures, *(f"reward_{term}" for term in self.terms))
         refuse_same_keys(type(self).__name__, self.info_names, self.drawn)
 
-    def __init_subclass__(cls, **keywords):
+    def __init_subclass__(cls, **keywords: Any) -> None:
         super().__init_subclass__(**keywords)
         check_class(cls, Task, Declaration)
 
@@ -172,7 +176,7 @@ class Task(Starts):
         return self.world.worlds
 
     @property
-    def drawn(self) -> dict[str, np.ndarray]:
+    def drawn(self) -> dict[str, NDArray[np.float64]]:
         """Values of the running episodes, by name."""
         return self.episodes.now
 
@@ -182,7 +186,7 @@ class Task(Starts):
         return self.episodes.distributions
 
     @property
-    def wrench(self) -> np.ndarray:
+    def wrench(self) -> NDArray[np.float64]:
         """(worlds, bodies, 6) float64, applied in the last step: force [N], torque [N m], world frame."""
         return self._advance.wrench
 
@@ -192,7 +196,7 @@ class Task(Starts):
         return self.frame_skip * self.world.dt
 
     @property
-    def steps(self) -> np.ndarray:
+    def steps(self) -> NDArray[np.int64]:
         """(worlds,) int64. Control steps since each episode began."""
         return self.clock - self._began
 
@@ -242,7 +246,7 @@ class Task(Starts):
 
     # --- control steps ------------------------------------------------------------------------------------
 
-    def step(self, actions) -> None:
+    def step(self, actions: ArrayLike) -> None:
         """Hold actions for `frame_skip` physics steps, then observe.
 
         Parameters
@@ -309,7 +313,7 @@ class Task(Starts):
         )  # fmt: skip
         self._write_arguments = self.given, *self.wrench_arguments
         self._write_wrenches = compiled(write_wrenches, self._write_arguments)
-        self.kept_arrays = {
+        self.kept_arrays: dict[str, Any] = {
             "action": self.action, "previous action": self.previous_action, "record": self.record, "obs": self.obs,
             "outcome": self.outcome, "status": self.status, "wrench": self.wrench, "weights": self.weights,
             "limits": self.limits, **({} if self.disturbed is None else self.disturbed.arrays),
@@ -362,4 +366,5 @@ class Task(Starts):
     def observer(self, taken: np.ndarray) -> Work:
         """Return the kernel that observes the worlds of a list, such as a thread has stepped."""
         arguments = (taken, self.world.state, self.record, self.world.walls, self.action, self.obs, self.outcome)
-        return bound_alike(None, self.compiled, *arguments)
+        compiled_task: Any = self.compiled
+        return bound_alike(None, compiled_task, *arguments)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 
@@ -45,7 +46,7 @@ class Worlds:
     def __init__(self, task, indices: np.ndarray | None = None):
         self._task, world = task, task.world
         self.is_all = indices is None
-        self.indices = np.arange(task.worlds) if self.is_all else indices
+        self.indices: Any = np.arange(task.worlds) if indices is None else indices
         take = (lambda array: array) if self.is_all else (lambda array: array[indices])
         moving = world.pos, world.quat, world.linvel, world.angvel
         self.pos, self.quat, self.linvel, self.angvel = (read_only(take(array)) for array in moving)

@@ -9,6 +9,7 @@ import numpy as np
 
 import physics
 from physics import Contact, Friction, Gravity
+from physics.annotations import Preset
 from physics.plan.accuracy import PRESETS, Accuracy, resolve
 from physics.world.snapshot import KEPT
 
@@ -19,7 +20,7 @@ FORGOTTEN = ("memory", "report_table", "sleep")
 """Arrays of a snapshot that another accuracy begins anew: warm starts, reports, sleep."""
 
 
-def accuracy_name(accuracy: str | Accuracy) -> str:
+def accuracy_name(accuracy: Preset | Accuracy) -> str:
     """Name of the preset that an accuracy is, or `CUSTOM`."""
     settings = resolve(accuracy)
     return next((name for name, preset in PRESETS.items() if preset == settings), CUSTOM)
@@ -57,7 +58,7 @@ def fitted(snapshot: physics.Snapshot, world: physics.World) -> physics.Snapshot
     return physics.Snapshot(tuple(arrays), snapshot.time, snapshot.actuation)
 
 
-def copied(world: physics.World, accuracy: str | Accuracy | None = None, dt: float | None = None) -> physics.World:
+def copied(world: physics.World, accuracy: Preset | Accuracy | None = None, dt: float | None = None) -> physics.World:
     """World of its own, of one world, in the state of the first world of a batch, in which sliders act.
 
     It goes on bit by bit as the first world does if the scene, the accuracy and the step are the same.

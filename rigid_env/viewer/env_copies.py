@@ -11,6 +11,7 @@ import gymnasium as gym
 import numpy as np
 from gymnasium import spaces
 
+from physics.annotations import Preset
 from physics.plan.accuracy import Accuracy
 from rigid_env.tasks.disturbances import Disturbances
 from rigid_env.tasks.state import TaskState
@@ -58,7 +59,7 @@ class HandOfUser:
             wrench[0] += self.load
 
 
-def copied_env(env: gym.Env, accuracy: str | Accuracy | None = None) -> gym.Env:
+def copied_env(env: gym.Env, accuracy: Preset | Accuracy | None = None) -> gym.Env:
     """Copy an environment and its wrappers, in a world of its own in which sliders act; it opens no window.
 
     Every reference to the world in it becomes one to a new world at this accuracy (None: the same), in the same state.

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Callable
+from typing import TYPE_CHECKING
 
 from physics.kernels.compile.compiler_choice import COMPILER, FUSED, NUMBA
 
@@ -13,6 +14,9 @@ elif COMPILER == NUMBA:
     from physics.kernels.compile.public import backend
 else:
     from physics.kernels.compile.interpreted import backend
+
+if TYPE_CHECKING:
+    from physics.annotations import Function
 
 is_kernel, lend = backend.is_kernel, backend.lend
 
@@ -78,7 +82,7 @@ def runtime_kernel(function):
     return backend.runtime_part(function)
 
 
-def user_kernel(function):
+def user_kernel(function: Function) -> Function:
     """`runtime_kernel` for a user's function: indices may count from the end; one outside raises IndexError."""
     return backend.user_part(function)
 

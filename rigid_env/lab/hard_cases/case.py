@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 import physics
+from physics.annotations import Preset
 from physics.plan.accuracy import resolve
 from physics.plan.plan import make_plan
 
@@ -110,7 +111,7 @@ class Setting:
         engine's. None: ours.
     """
 
-    accuracy: str | physics.Accuracy = "balanced"
+    accuracy: Preset | physics.Accuracy = "balanced"
     dt: float = 0.01
     is_thorough: bool = True
     maker: Callable[[physics.Scene, float], object] | None = None

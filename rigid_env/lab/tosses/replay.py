@@ -10,6 +10,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 import physics
+from physics.annotations import Preset
 from rigid_env.lab.tosses import data
 from rigid_env.lab.tosses.data import SAMPLE_DT, Tosses
 
@@ -131,7 +132,7 @@ def sunken(begin: Starts, cube: Cube) -> np.ndarray:
 
 
 def replay(
-    lengths: np.ndarray, begin: Starts, cube: Cube, accuracy: str | physics.Accuracy = "balanced", threads: int = 1
+    lengths: np.ndarray, begin: Starts, cube: Cube, accuracy: Preset | physics.Accuracy = "balanced", threads: int = 1
 ) -> tuple[np.ndarray, float]:
     """Simulate tosses from their starts and sample them as the recording does.
 

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 import physics
+from physics.annotations import Preset
 from physics.kernels.state import layout as at
 from physics.plan.accuracy import resolve
 from rigid_env.lab.hard_cases.case import Case, Check, Setting, none_of
@@ -215,7 +216,7 @@ class Outcome:
         return now
 
 
-def gain_limit(accuracy: str | physics.Accuracy) -> float:
+def gain_limit(accuracy: Preset | physics.Accuracy) -> float:
     """Share of the energy by which a step may be off; derived in `random_scenes`."""
     knobs = resolve(accuracy)
     return 4 * knobs.tolerance * (knobs.impacts + 1)

@@ -1,0 +1,1 @@
+"""Types of the public interface, as a user's checker sees them."""
