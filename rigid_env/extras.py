@@ -1,6 +1,7 @@
 """Optional dependencies: which package of an extra is missing, and the line that installs it.
 
-A command calls `require` before anything runs; nothing is imported to find out.
+A command that cannot do without calls `require` before anything runs. One that has more to give than a picture asks
+`lacking`, and ends with that line. Nothing is imported to find out.
 """
 
 from __future__ import annotations
@@ -49,11 +50,21 @@ def require(extra: str, *modules: str, purpose: str = "this command") -> None:
     gymnasium.error.DependencyNotInstalled
         Naming the missing packages and the line that installs them.
     """
+    if told := lacking(extra, *modules, purpose=purpose):
+        raise DependencyNotInstalled(told)
+
+
+def lacking(extra: str, *modules: str, purpose: str) -> str:
+    """Name the missing modules of an extra and the line that installs them; "" where none is missing.
+
+    Arguments as of `require`, which raises instead.
+    """
     names = [EXTRAS[extra].get(module, module) for module in modules or EXTRAS[extra] if not is_installed(module)]
-    if names:
-        listed = " and ".join(filter(None, [", ".join(names[:-1]), names[-1]]))
-        verb = "is" if len(names) == 1 else "are"
-        raise DependencyNotInstalled(f"{purpose} needs {listed}, which {verb} not installed: {install_line(extra)}")
+    if not names:
+        return ""
+    listed = " and ".join(filter(None, [", ".join(names[:-1]), names[-1]]))
+    verb = "is" if len(names) == 1 else "are"
+    return f"{purpose} needs {listed}, which {verb} not installed: {install_line(extra)}"
 
 
 def is_installed(module: str) -> bool:

@@ -71,13 +71,18 @@ def load_mjcf(path: str | Path) -> Scene:
 def from_mjcf(text: str, source: str = "model") -> Scene:
     """The scene of an MJCF text; `source` is what messages call it."""
     try:
-        root = ET.fromstring(text)
+        return read_scene(ET.fromstring(text, ET.XMLParser(target=_WithoutDoctype())))
     except ET.ParseError as error:
         raise ValueError(f"{source}: {error}") from None
-    try:
-        return read_scene(root)
     except ValueError as error:
         raise ValueError(f"{source}: {error}") from None
+
+
+class _WithoutDoctype(ET.TreeBuilder):
+    """Refuses a document type, which declares entities: they could grow without bound, or name other files."""
+
+    def doctype(self, name: str, pubid: str | None, system: str | None) -> None:
+        raise ValueError(f"<!DOCTYPE {name}> is not read; allowed is MJCF without it")
 
 
 def to_mjcf(scene: Scene, drop: bool = False) -> str:

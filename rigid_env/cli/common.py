@@ -74,11 +74,28 @@ def collect(found: list, parts: Iterable[list]) -> bool:
     return True
 
 
-def end(is_complete: bool) -> None:
-    """Say that a measurement was interrupted, and exit with the status for it."""
+def end(is_complete: bool, lacking: str = "") -> None:
+    """Say why a measurement is not complete, or which package a picture lacks, and exit with the status for it."""
+    if lacking:
+        typer.echo(f"Error: {lacking}", err=True)
     if not is_complete:
         typer.echo("interrupted: only what was measured by then is shown", err=True)
         raise typer.Exit(INTERRUPTED)
+    if lacking:
+        raise typer.Exit(1)
+
+
+def drawable(path: Path | None, console: Console) -> tuple[Path | None, str]:
+    """Path of a plot that can be drawn, and the line for `end` where matplotlib is missing.
+
+    The line is printed at once, too: whoever wants the plot need not wait for the measurement.
+    """
+    from rigid_env.lab.measure.plotting import lacks_matplotlib
+
+    told = lacks_matplotlib() if path is not None else ""
+    if told:
+        console.print(f"without the plot: {told}", soft_wrap=True)
+    return (None if told else path), told
 
 
 def write(path: Path | None, content: dict, console: Console) -> None:

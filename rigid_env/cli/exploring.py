@@ -10,7 +10,7 @@ from rich.console import Console
 
 from rigid_env.cli import names
 from rigid_env.cli.camera_options import ArrowsOption, EyeOption, TargetOption, checked_shot
-from rigid_env.cli.common import Accuracy, Json, SceneArgument, app, at_least, tell_file, told_errors, write
+from rigid_env.cli.common import Accuracy, Json, SceneArgument, app, at_least, end, tell_file, told_errors, write
 from rigid_env.cli.files import PICTURES, checked_folder, make_parents, output_option
 from rigid_env.terminal import make_console, progress_bar, say
 
@@ -41,10 +41,10 @@ def demo(
 ) -> None:
     """Drop the block in the three-wall box; print what happens, write a picture and a GIF."""
     with told_errors():
-        _require_pictures()
+        lacking = _lacks_pictures()
         shot = checked_shot(eye, target, arrows)
         name, built = names.load_scene(scene)
-        pictures = [out / f"{name}{ending}" for ending in PICTURES]
+        pictures = [] if lacking else [out / f"{name}{ending}" for ending in PICTURES]
         make_parents(*pictures, json)
         console = make_console()
         done = _simulate(name, built, duration, accuracy, dt, console)
@@ -52,6 +52,8 @@ def demo(
         _draw(done, pictures, shot, console)
         summary["files"] = {path.suffix[1:]: str(path) for path in pictures}
         write(json, summary, console)
+        if lacking:
+            console.print(lacking, soft_wrap=True)
 
 
 @app.command(short_help="Simulate a scene; print what happens, write samples, draw it.")
@@ -70,8 +72,8 @@ def run(
 ) -> None:
     """Simulate a scene; print what happens, and write samples or a picture."""
     with told_errors():
-        if plot is not None:
-            _require_pictures()
+        lacking = "" if plot is None else _lacks_pictures()
+        plot = None if lacking else plot
         shot = checked_shot(eye, target, arrows)
         name, built = names.load_scene(scene)
         make_parents(plot, npz, csv, json)
@@ -83,12 +85,13 @@ def run(
                 tell_file(path, console)
         _draw(done, [] if plot is None else [plot], shot, console)
         write(json, {"file": scene, **done.summary()}, console)
+    end(True, lacking)
 
 
-def _require_pictures() -> None:
-    from rigid_env.extras import require
+def _lacks_pictures() -> str:
+    from rigid_env.extras import lacking
 
-    require("render", purpose="drawing a motion")
+    return lacking("render", purpose="drawing a motion")
 
 
 def _simulate(name: str, scene: Scene, duration: float, accuracy: str, dt: float, console: Console) -> Demo:

@@ -9,7 +9,18 @@ from typing import Annotated
 import typer
 
 from rigid_env.cli import names
-from rigid_env.cli.common import Accuracy, Json, app, at_least, collect, end, tell_file, told_errors, write
+from rigid_env.cli.common import (
+    Accuracy,
+    Json,
+    app,
+    at_least,
+    collect,
+    drawable,
+    end,
+    tell_file,
+    told_errors,
+    write,
+)
 from rigid_env.cli.files import PLOTS, make_parents, output_option
 from rigid_env.terminal import make_console, progress_bar
 
@@ -117,12 +128,10 @@ def accuracy(
     with told_errors():
         from rigid_env.lab.measure import accuracy_plot, accuracy_report
         from rigid_env.lab.measure.accuracy import QUICK, Ladder
-        from rigid_env.lab.measure.plotting import require_matplotlib
 
-        if plot:
-            require_matplotlib()
-        make_parents(json, plot)
         console, ladder = make_console(), QUICK if quick else Ladder()
+        plot, lacking = drawable(plot, console)
+        make_parents(json, plot)
         report = accuracy_report.measure_and_show(console, scene or (), peers, ladder, is_full, below)
         if json:
             accuracy_report.write_result(json, report)
@@ -130,7 +139,7 @@ def accuracy(
         if plot and report.results:
             accuracy_plot.write_plot(report.results, plot)
             tell_file(plot, console)
-    end(report.is_complete)
+    end(report.is_complete, lacking)
 
 
 @app.command(short_help="Replay measured cube tosses and report the errors.")
@@ -149,7 +158,6 @@ def tosses(
     """Replay measured cube tosses: fit a quarter of them, report errors over the rest."""
     with told_errors():
         from physics.plan import accuracy as knobs
-        from rigid_env.lab.measure.plotting import require_matplotlib
         from rigid_env.lab.tosses import data as files
         from rigid_env.lab.tosses import plot as pictures
         from rigid_env.lab.tosses.fit import QUICK, Effort
@@ -157,13 +165,12 @@ def tosses(
         from rigid_env.lab.tosses.show import show
 
         knobs.resolve(accuracy)
-        if plot is not None:
-            require_matplotlib()
         fitted = None if fit is None else tuple(name.strip() for name in fit.split(","))
         effort = QUICK if quick else Effort()
         measurement = Measurement(files.load(data), accuracy, effort, seed, threads, fitted)
-        make_parents(plot, json)
         console = make_console()
+        plot, lacking = drawable(plot, console)
+        make_parents(plot, json)
         with progress_bar(console) as progress:
             task = progress.add_task("fitting", total=measurement.evaluations())
             report = measurement.run(lambda what, done: progress.update(task, advance=done, description=what))
@@ -172,7 +179,7 @@ def tosses(
             pictures.write_plot(plot, report)
             tell_file(plot, console)
         write(json, {"data": data.name, "is_quick": quick, **report.to_dict()}, console)
-    end(report.is_complete)
+    end(report.is_complete, lacking)
 
 
 @app.command(short_help="Run the cases in which simulators break; each must hold.")
@@ -199,10 +206,12 @@ def hard_cases(
     with told_errors():
         from rigid_env.lab.hard_cases.command import run as run_them
 
-        console, files = make_console(), (json, plot, markdown)
+        console = make_console()
+        plot, lacking = drawable(plot, console)
+        files = (json, plot, markdown)
         report, written = run_them(console, cases or (), accuracy, dt, steps, peers, quick, *files)
         for path in written:
             tell_file(path, console)
-    end(report.is_complete)
+    end(report.is_complete, lacking)
     if report.has_failed:
         raise typer.Exit(1)

@@ -31,6 +31,9 @@ import numpy as np
 from physics import validation
 from rigid_env.extras import require
 
+MODEL = ".zip"
+"""Ending of a model of Stable-Baselines3: no other file is read by `pickle`."""
+
 WITHOUT_REPLAY = {"replay_buffer_class": None, "replay_buffer_kwargs": {}, "buffer_size": 1}
 """Arguments for loading a model that only acts: no memory for a replay buffer, and no environment for its rewards."""
 
@@ -85,6 +88,10 @@ def load_policy(path: str | os.PathLike) -> Callable[[Observations], np.ndarray]
         return Network.load(path)
     if settings is None:
         raise ValueError(f"policy is {str(path)!r}, which is neither; {allowed}")
+    if path.suffix.lower() != MODEL:
+        raise ValueError(
+            f"policy is {str(path)!r}, which holds a model, whose code runs; allowed is the ending {MODEL}"
+        )
     return greedy(load_model(path, settings))
 
 

@@ -373,34 +373,97 @@ class Hidden:
         if name.partition(".")[0] in {hidden}:
             raise ModuleNotFoundError(name)
 sys.meta_path.insert(0, Hidden())
-import physics
-def refuse(*arguments, **more):
-    raise AssertionError("something was computed")
-physics.simulate = physics.World.step = refuse
+{first}
 from rigid_env.cli import app
 app({arguments}, prog_name="rigid-env")
 """
 
+REFUSING = """
+import physics
+def refuse(*arguments, **more):
+    raise AssertionError("something was computed")
+physics.simulate = physics.World.step = refuse
+"""
+
+
+def run_hidden(arguments, hidden, first, folder):
+    """Run a command in a folder, with packages hidden from every import and some code before it."""
+    code = HIDING.format(hidden=hidden, first=first, arguments=arguments)
+    return subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, cwd=folder)
+
 
 @pytest.mark.parametrize(
-    ("arguments", "hidden", "words"),
-    [
-        (["demo", "rest"], ["pygame"], ("pygame", "rigid-env[render]")),
-        (["demo", "rest"], ["PIL"], ("Pillow", "rigid-env[render]")),
-        (["run", "rest", "--plot", "x.gif"], ["pygame", "PIL"], ("pygame and Pillow", "rigid-env[render]")),
-        (["accuracy", "--plot", "x.png"], ["matplotlib"], ("matplotlib", "rigid-env[plot]")),
-        (["hard-cases", "--plot", "x.png"], ["matplotlib"], ("matplotlib", "rigid-env[plot]")),
-        (["tosses", "made.npz", "--plot", "x.png"], ["matplotlib"], ("matplotlib", "rigid-env[plot]")),
-    ],
+    "arguments", [["view", "rest"], ["view", "rest", "--export", "x.html"]], ids=lambda arguments: arguments[-1]
 )
-def test_missing_packages_are_named_before_anything_runs(arguments, hidden, words, tmp_path):
-    code = HIDING.format(hidden=set(hidden), arguments=arguments)
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, cwd=tmp_path)
+def test_missing_packages_are_named_before_anything_runs(arguments, tmp_path):
+    """A command that has nothing to give without them."""
+    done = run_hidden(arguments, {"viser"}, REFUSING, tmp_path)
     assert done.returncode == 1, done.stderr
     assert "Traceback" not in done.stderr
-    for word in ("pip install", *words):
+    for word in ("pip install", "viser", "rigid-env[view]"):
         assert word in done.stderr
     assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize(
+    ("hidden", "words"),
+    [
+        ({"pygame"}, "needs pygame, which is"),
+        ({"PIL"}, "needs Pillow, which is"),
+        ({"pygame", "PIL"}, "pygame and Pillow"),
+    ],
+)
+def test_a_demo_without_a_picture_ends_with_the_line_that_brings_it(hidden, words, tmp_path):
+    done = run_hidden(["demo", "rest", "--duration", "0.05", "--json", "x.json"], hidden, "", tmp_path)
+    assert done.returncode == 0, done.stderr
+    lines = done.stdout.splitlines()
+    assert "rest, accuracy balanced" in lines[0]
+    assert words in lines[-1]
+    assert 'pip install "rigid-env[render]"' in lines[-1]
+    assert json.loads((tmp_path / "x.json").read_text())["files"] == {}
+    assert [path.name for path in tmp_path.iterdir()] == ["x.json"]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "hidden", "words", "told"),
+    [
+        (
+            ["run", "rest", "--duration", "0.05", "--plot", "x.gif", "--csv", "x.csv"],
+            {"pygame", "PIL"}, ("pygame and Pillow", "rigid-env[render]"), "rest, accuracy balanced",
+        ),
+        (
+            ["accuracy", "creep", "--quick", "--plot", "x.png", "--json", "x.json"],
+            {"matplotlib"}, ("matplotlib", "rigid-env[plot]"), "creep",
+        ),
+        (
+            ["hard-cases", "zeno", "--quick", "--plot", "x.png", "--json", "x.json"],
+            {"matplotlib"}, ("matplotlib", "rigid-env[plot]"), "zeno",
+        ),
+    ],
+    ids=["run", "accuracy", "hard-cases"],
+)  # fmt: skip
+def test_a_plot_that_cannot_be_drawn_costs_nothing_else(arguments, hidden, words, told, tmp_path):
+    """Numbers are printed and written, the line ends the output, and the status says that a file is missing."""
+    done = run_hidden(arguments, hidden, "", tmp_path)
+    assert done.returncode == 1, done.stderr
+    assert "Traceback" not in done.stderr
+    assert told in done.stdout
+    for word in ("pip install", *words):
+        assert word in done.stderr.splitlines()[-1]
+    assert [path.name for path in tmp_path.iterdir()] == [arguments[-1]]
+
+
+def test_a_measurement_says_at_its_start_that_it_will_not_draw(tmp_path, monkeypatch):
+    """Whoever wants the plot need not wait: the line comes before anything is measured."""
+    from rigid_env.lab.measure import accuracy_report
+
+    def refuse(*arguments, **more):
+        raise ValueError("something was measured")
+
+    monkeypatch.setattr(accuracy_report, "measure_and_show", refuse)
+    monkeypatch.setitem(sys.modules, "matplotlib", None)
+    output = run("accuracy", "--plot", tmp_path / "x.png", code=2)
+    assert output.startswith("without the plot: a plot needs matplotlib")
 
 
 # piped

@@ -94,13 +94,26 @@ def test_scene_files_are_scenes(tmp_path):
                 assert physics.load_scene(path).bodies
 
 
+VENV = "python3 -m venv .venv && . .venv/bin/activate"
+SMALL_TORCH = "pip install -c constraints.txt --no-deps torch --index-url https://download.pytorch.org/whl/cpu"
+INSTALL = "pip install -c constraints.txt -e"
+
+
 def test_the_readme_is_short_and_its_two_commands_stand():
     text = (ROOT / "README.md").read_text(encoding="utf-8")
     assert len(text.splitlines()) <= 150
-    install = "python3 -m venv .venv && . .venv/bin/activate && pip install -c constraints.txt -e "
-    commands = [block.code.strip() for block in snippets.blocks(ROOT / "README.md", "sh")]
-    assert f'{install}".[agents]" && python -m agents.train' in commands
-    assert f'{install}".[dev]" && python -m pytest -n 2 --dist loadfile' in commands
+    blocks = snippets.blocks(ROOT / "README.md", "sh")
+    commands = [" ".join(block.code.replace("\\\n", " ").split()) for block in blocks]
+    assert f'{VENV} && {SMALL_TORCH} && {INSTALL} ".[agents]" && python -m agents.train' in commands
+    assert f'{VENV} && {SMALL_TORCH} && {INSTALL} ".[dev]" && python -m pytest -n 2 --dist loadfile' in commands
+
+
+def test_ci_installs_as_the_readme_says():
+    script = ROOT / ".ci" / "run"
+    if not script.exists():
+        pytest.skip("needs a checkout with .ci")
+    lines = script.read_text(encoding="utf-8").replace("install -q ", "install ").splitlines()
+    assert lines.index(SMALL_TORCH) + 1 == lines.index(f'{INSTALL} ".[dev]"')
 
 
 @pytest.mark.parametrize("page", snippets.PAGES, ids=snippets.name_of)

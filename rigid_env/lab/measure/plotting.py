@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from rigid_env.extras import require
+from rigid_env.extras import lacking, require
+
+PURPOSE = "a plot"
 
 
 def require_matplotlib() -> None:
@@ -13,4 +15,9 @@ def require_matplotlib() -> None:
     gymnasium.error.DependencyNotInstalled
         matplotlib is missing.
     """
-    require("plot", "matplotlib", purpose="a plot")
+    require("plot", "matplotlib", purpose=PURPOSE)
+
+
+def lacks_matplotlib() -> str:
+    """The same message; "" where matplotlib is installed."""
+    return lacking("plot", "matplotlib", purpose=PURPOSE)

@@ -1,0 +1,240 @@
+"""Files that others wrote are data: loading one never runs code. `SECURITY.md` says so, and names the exceptions."""
+
+from __future__ import annotations
+
+import ast
+import base64
+import json
+import pickle
+import zipfile
+from pathlib import Path
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+import physics
+import rigid_env
+from rigid_env.cli import app
+from rigid_env.envs.policy_files import Network, load_policy
+from rigid_env.lab.tosses import data
+from rigid_env.viewer.subject import open_subject
+
+ROOT = Path(__file__).parents[2]
+
+
+class Bomb:
+    """An object whose pickle makes a file when it is loaded."""
+
+    def __init__(self, marker: Path):
+        self.marker = str(marker)
+
+    def __reduce__(self):
+        return open, (self.marker, "w")
+
+
+@pytest.fixture
+def marker(tmp_path):
+    """A file that a bomb makes; it must not be there at the end."""
+    path = tmp_path / "bomb-went-off"
+    yield path
+    assert not path.exists()
+
+
+def test_the_bomb_works(tmp_path):
+    pickle.loads(pickle.dumps(Bomb(tmp_path / "made"))).close()
+    assert (tmp_path / "made").exists()
+
+
+# archives of arrays
+
+
+def snapshot(path):
+    physics.World(physics.scenes.by_name("rest")).snapshot().save(path)
+
+
+def state(path):
+    env = rigid_env.BlockReachEnv()
+    env.reset(seed=0)
+    env.get_state().save(path)
+
+
+def recording(path):
+    world = physics.World(physics.scenes.by_name("rest"))
+    recorder = physics.Recorder(world, keep=5)
+    world.step(steps=2)
+    recorder.save(path)
+
+
+def trajectory(path):
+    physics.simulate(physics.scenes.by_name("rest"), 0.05).to_npz(path)
+
+
+def network(path):
+    Network([(np.ones((2, 1)), np.ones(1))]).save(path)
+
+
+def tosses(path):
+    states = np.tile(np.eye(13)[3], (4, 1))
+    np.savez(path, states=states, offsets=[0, 2, 4], source_index=[0, 1])
+
+
+def viewed(path):
+    return open_subject(str(path), accuracy=None, dt=None, seed=0, policy=None, controller=False)
+
+
+KINDS = {
+    "snapshot": (snapshot, physics.Snapshot.load),
+    "state": (state, rigid_env.TaskState.load),
+    "recording": (recording, physics.Recording.load),
+    "trajectory": (trajectory, physics.Trajectory.from_npz),
+    "network": (network, load_policy),
+    "tosses": (tosses, data.load),
+    "viewed recording": (recording, viewed),
+    "viewed trajectory": (trajectory, viewed),
+}
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_an_archive_with_pickled_objects_is_refused(kind, tmp_path, marker):
+    """Each array in turn is a bomb."""
+    make, load = KINDS[kind]
+    path = tmp_path / "file.npz"
+    make(path)
+    load(path)
+    with np.load(path) as content:
+        parts = dict(content)
+    for name in parts:
+        np.savez(path, **{**parts, name: np.array([Bomb(marker)], dtype=object)})
+        with pytest.raises(ValueError, match="file"):
+            load(path)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_pickle_in_place_of_an_archive_is_refused(kind, tmp_path, marker):
+    path = tmp_path / "file.npz"
+    path.write_bytes(pickle.dumps(Bomb(marker)))
+    with pytest.raises(ValueError, match="file"):
+        KINDS[kind][1](path)
+
+
+def test_the_command_line_refuses_them(tmp_path, marker):
+    path = tmp_path / "file.npz"
+    recording(path)
+    with np.load(path) as content:
+        np.savez(path, **{**content, "states": np.array([Bomb(marker)], dtype=object)})
+    for words in (["replay", str(path)], ["tosses", str(path)]):
+        assert CliRunner().invoke(app, words).exit_code == 2
+
+
+def test_a_toss_of_torch_is_read_as_numbers_only(tmp_path, marker):
+    torch = pytest.importorskip("torch")
+    torch.save(Bomb(marker), tmp_path / "0.pt")
+    with pytest.raises(ValueError, match=r"0\.pt"):
+        data.load(tmp_path)
+
+
+# scenes
+
+BODY = "[[bodies]]\nkind = {kind}\nradius = 1.0\nmass = 1.0\n"
+
+
+@pytest.mark.parametrize("kind", ["builtins.open", "physics.io.toml:Path", "__import__('os').getcwd()", "Field"])
+def test_a_scene_names_known_kinds_only(kind, tmp_path):
+    path = tmp_path / "scene.toml"
+    path.write_text(BODY.format(kind=json.dumps(kind)), encoding="utf-8")
+    with pytest.raises(ValueError, match="kind is "):
+        physics.load_scene(path)
+
+
+@pytest.mark.parametrize(("name", "load"), [("s.toml", physics.load_scene), ("s.xml", physics.load_mjcf)])
+def test_a_pickle_in_place_of_a_scene_is_refused(name, load, tmp_path, marker):
+    (tmp_path / name).write_bytes(pickle.dumps(Bomb(marker)))
+    with pytest.raises(ValueError, match=name):
+        load(tmp_path / name)
+
+
+LAUGHS = "".join(f'<!ENTITY l{k} "{f"&l{k - 1};" * 10}">' for k in range(1, 20))
+MODELS = {
+    "grows": f'<!DOCTYPE m [<!ENTITY l0 "ha">{LAUGHS}]><mujoco model="&l19;"><worldbody/></mujoco>',
+    "a file": '<!DOCTYPE m [<!ENTITY f SYSTEM "file:///etc/passwd">]><mujoco><worldbody>&f;</worldbody></mujoco>',
+    "elsewhere": '<!DOCTYPE m SYSTEM "http://localhost:9/m.dtd"><mujoco><worldbody/></mujoco>',
+}
+
+
+@pytest.mark.parametrize("model", MODELS)
+def test_a_model_declares_no_entities(model, tmp_path):
+    path = tmp_path / "model.xml"
+    path.write_text(MODELS[model], encoding="utf-8")
+    with pytest.raises(ValueError, match=r"model\.xml: <!DOCTYPE m> is not read"):
+        physics.load_mjcf(path)
+
+
+# policies: the exception
+
+
+def model_with(bomb: Bomb, path: Path) -> None:
+    """A file of Stable-Baselines3 whose settings hold a pickle."""
+    settings = {
+        "clip_range": {":type:": "bomb", ":serialized:": base64.b64encode(pickle.dumps(bomb)).decode()},
+    }
+    with zipfile.ZipFile(path, "w") as file:
+        file.writestr("data", json.dumps(settings))
+
+
+def test_a_model_under_the_ending_of_arrays_is_refused(tmp_path, marker):
+    """`.npz` stands for plain arrays: a model is read under its own ending only."""
+    model_with(Bomb(marker), tmp_path / "policy.npz")
+    with pytest.raises(ValueError, match=r"policy\.npz.*allowed is the ending \.zip"):
+        load_policy(tmp_path / "policy.npz")
+
+
+def test_a_model_of_stable_baselines3_runs_its_code(tmp_path):
+    """`SECURITY.md` warns of it; once this no longer holds, the warning can go."""
+    pytest.importorskip("stable_baselines3")
+    model_with(Bomb(tmp_path / "made"), tmp_path / "policy.zip")
+    with pytest.raises(Exception):  # noqa: B017, PT011 - whatever Stable-Baselines3 makes of the rest
+        load_policy(tmp_path / "policy.zip")
+    assert (tmp_path / "made").exists()
+
+
+# readers
+
+# The first two read files that the program itself wrote, in folders of the user: SECURITY.md names them.
+ALLOWED = {
+    "agents/checkpoint.py": "checkpoints of training runs",
+    "physics/kernels/compile/fused/cache_files.py": "the kernel cache",
+    "rigid_env/envs/checks.py": "a pickle that it has just made",
+    "rigid_env/envs/infos.py": "a program of quoted names that it has just written",
+}
+SAFE_ARGUMENT = {"np.load": ("allow_pickle", False), "torch.load": ("weights_only", True)}
+RUNNING = {"pickle.load", "pickle.loads", "eval", "exec", "yaml.load", "marshal.loads", "cloudpickle.loads"}
+
+
+def unsafe_readers(source: str) -> list[str]:
+    """Calls in a module that can run code of a file."""
+    found = []
+    for node in ast.walk(ast.parse(source)):
+        if isinstance(node, ast.Call):
+            called = ast.unparse(node.func)
+            given = {word.arg: getattr(word.value, "value", None) for word in node.keywords}
+            name, value = SAFE_ARGUMENT.get(called, ("", None))
+            if called in RUNNING or (name and given.get(name) is not value):
+                found.append(called)
+    return found
+
+
+def test_unsafe_readers_are_found():
+    assert unsafe_readers("np.load(p)\ntorch.load(p, weights_only=False)\npickle.loads(b)\neval(t)") == [
+        "np.load",
+        "torch.load",
+        "pickle.loads",
+        "eval",
+    ]
+    assert not unsafe_readers("np.load(p, allow_pickle=False)\njson.loads(t)\nyaml.safe_load(t)")
+
+
+def test_no_reader_can_run_code_of_a_file():
+    paths = [path for package in ("physics", "rigid_env", "agents") for path in (ROOT / package).rglob("*.py")]
+    unsafe = {path.relative_to(ROOT).as_posix() for path in paths if unsafe_readers(path.read_text(encoding="utf-8"))}
+    assert unsafe == set(ALLOWED)
