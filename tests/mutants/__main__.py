@@ -37,9 +37,9 @@ def choose(patterns: list[str]) -> list[Mutant]:
     return [mutant for mutant in MUTANTS if not patterns or any(fnmatchcase(mutant.name, each) for each in patterns)]
 
 
-def judge_all(mutants: list[Mutant], results: Results, jobs: int) -> None:
-    """Run the mutants that have no verdict yet, and keep each verdict at once."""
-    waiting = [mutant for mutant in mutants if results.of(mutant) is None]
+def judge_all(mutants: list[Mutant], results: Results, jobs: int, is_anew: bool) -> None:
+    """Run the mutants that have no verdict yet, or all of them anew, and keep each verdict at once."""
+    waiting = [mutant for mutant in mutants if is_anew or results.of(mutant) is None]
     console, done = make_console(), []
 
     def judge(copy: Copy, mutant: Mutant) -> None:
@@ -77,6 +77,7 @@ def main(
     names: Annotated[list[str] | None, typer.Argument(help="Names of mutants, or globs; all without.")] = None,
     jobs: Annotated[int, typer.Option(min=1, help="Mutants that run side by side.")] = 1,
     table: Annotated[bool, typer.Option("--table", help="Print the kept verdicts only.")] = False,
+    again: Annotated[bool, typer.Option("--again", help="Run mutants that have a verdict, too.")] = False,
     sound: Annotated[bool, typer.Option("--check-sound", help="Run the tests without any fault instead.")] = False,
 ) -> None:
     """Run the tests of each mutant, which must fail."""
@@ -86,7 +87,7 @@ def main(
             raise typer.Exit(0 if check_sound(mutants, jobs) else 1)
         if not table:
             results.forget_others({mutant.name for mutant in MUTANTS})
-            judge_all(mutants, results, jobs)
+            judge_all(mutants, results, jobs, again)
     except KeyboardInterrupt:
         make_console().print("interrupted; run it again to go on")
         raise typer.Exit(INTERRUPTED) from None

@@ -63,12 +63,12 @@ DATA = [
         "kernels/test_hulls.py::test_the_tables_of_a_block_are_those_of_a_cube",
     ),
     _mutant(
-        "data-wake",
-        "A sleeping group does not wake when a body comes near.",
+        "data-group",
+        "A body falls asleep although another one of its group is not quiet.",
         "data/sleeping.py",
-        "if is_asleep(a, sleep) != is_asleep(b, sleep):",
-        "if is_asleep(a, sleep) != is_asleep(b, sleep) and a == b:",
-        "physics/test_sleeping_bodies.py::test_what_comes_near_wakes_what_it_meets_before_it_does",
+        "found[root, 2] = 1.0",
+        "found[root, 2] = 0.0",
+        "physics/test_sleeping_bodies.py::test_what_touches_something_in_motion_does_not_sleep",
     ),
 ]
 

@@ -319,18 +319,18 @@ EVENT_DRIVEN = [
 PARALLEL = [
     _mutant(
         "parallel-ranges",
-        "Every thread's range of worlds begins with the first world.",
+        "A thread looks for worlds in one range less than there are.",
         "parallel/work_stealing.py",
-        "turns[k, RANGE_NEXT] = turns[k - 1, RANGE_END] if k > 1 else 0",
-        "turns[k, RANGE_NEXT] = 0",
+        "for _ in range(1, turns.shape[0]):",
+        "for _ in range(2, turns.shape[0]):",
         "physics/test_threads.py::test_whoever_is_fast_each_world_is_taken_once",
     ),
     _mutant(
         "parallel-chunk",
-        "The last chunk of a range reaches into the next range.",
+        "Of a chunk of worlds only the first one is stepped.",
         "parallel/work_stealing.py",
         "min(world + chunk, turns[place, RANGE_END])",
-        "world + chunk",
+        "min(world + 1, turns[place, RANGE_END])",
         "physics/test_threads.py::test_whoever_is_fast_each_world_is_taken_once",
     ),
     _mutant(

@@ -47,7 +47,7 @@ class Outcome(NamedTuple):
 
 
 class Copy:
-    """Copy of the files that git tracks, with its own folder of compiled kernels.
+    """Copy of the files that git tracks or does not ignore, with its own folder of compiled kernels.
 
     Parameters
     ----------
@@ -56,7 +56,8 @@ class Copy:
 
     def __init__(self, folder: Path):
         self._folder, self._process, self.is_stopped = folder, None, False
-        listed = subprocess.run(["git", "ls-files", "-z"], cwd=ROOT, capture_output=True, check=True, text=True).stdout
+        command = ["git", "ls-files", "-z", "--cached", "--others", "--exclude-standard"]
+        listed = subprocess.run(command, cwd=ROOT, capture_output=True, check=True, text=True).stdout
         for name in filter(None, listed.split("\0")):
             if (ROOT / name).is_file():
                 (folder / name).parent.mkdir(parents=True, exist_ok=True)
@@ -79,7 +80,10 @@ class Copy:
         """Run tests up to the first that fails."""
         report = self._folder / "report.xml"
         report.unlink(missing_ok=True)
-        command = [sys.executable, "-m", "pytest", "-x", "-q", "-p", "no:cacheprovider", f"--junitxml={report}"]
+        command = [
+            sys.executable, "-m", "pytest", "-x", "-q", "-p", "no:cacheprovider", "-p", "tests.mutants.no_shrinking",
+            f"--junitxml={report}",
+        ]  # fmt: skip
         # Bytecode is told apart by size and second of its source: a mutant would run that of the one before.
         environment = {
             **os.environ, "PYTHONPATH": str(self._folder), "NUMBA_CACHE_DIR": str(self._folder / "numba"),
