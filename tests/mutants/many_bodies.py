@@ -1,0 +1,156 @@
+"""Mutants of the kernels of worlds whose bodies touch each other."""
+
+from __future__ import annotations
+
+from tests.mutants.mutant import Mutant
+
+
+def _mutant(name: str, fault: str, path: str, old: str, new: str, test: str) -> Mutant:
+    """Mutant of such a kernel with one test."""
+    return Mutant(name, fault, "physics/kernels/multibody/" + path, old, new, ("tests/" + test,))
+
+
+BROADPHASE = [
+    _mutant(
+        "broadphase-overlap",
+        "Two boxes count as overlapping although the second one begins beyond the end of the first one.",
+        "broadphase/sweep_and_prune.py",
+        "if box[a, k] > box[b, k + 3] or box[b, k] > box[a, k + 3]:",
+        "if box[a, k] > box[b, k + 3]:",
+        "kernels/test_many.py::test_pairs_are_those_whose_boxes_overlap_in_the_order_of_the_sweep",
+    ),
+    _mutant(
+        "broadphase-order",
+        "Pairs of one body are sorted by index instead of the order of the sweep.",
+        "broadphase/sweep_and_prune.py",
+        "rank[pairs[j - 1, 1]] > rank[b]",
+        "pairs[j - 1, 1] > b",
+        "kernels/test_many.py::test_pairs_are_those_whose_boxes_overlap_in_the_order_of_the_sweep",
+    ),
+    _mutant(
+        "broadphase-strip",
+        "A body is listed in the first column that its box enters only.",
+        "broadphase/grid.py",
+        "strip_index(box[b, u], lu, du, nu), strip_index(box[b, u + 3], lu, du, nu),",
+        "strip_index(box[b, u], lu, du, nu), strip_index(box[b, u], lu, du, nu),",
+        "kernels/test_many.py::test_pairs_are_those_whose_boxes_overlap_in_the_order_of_the_sweep",
+    ),
+]
+
+DATA = [
+    _mutant(
+        "data-arm",
+        "The arm of a contact leads from its point to the centre of mass.",
+        "data/contact_set.py",
+        "arm = subtract(point, row_vector(many.bodies.state, b, 0))",
+        "arm = subtract(row_vector(many.bodies.state, b, 0), point)",
+        "kernels/test_hulls.py::test_a_hull_touches_a_wall_with_the_corners_that_are_near",
+    ),
+    _mutant(
+        "data-second-body",
+        "The turning of the second body does not count in the relative velocity of a contact.",
+        "data/contact_set.py",
+        "u, add_scaled(row_vector(t, b, 0), 1.0, qt.cross(",
+        "u, add_scaled(row_vector(t, b, 0), 0.0, qt.cross(",
+        "kernels/test_many_solve.py::test_where_the_impulses_are_determined_they_are_those_of_the_oracle",
+    ),
+    _mutant(
+        "data-cube",
+        "The faces of the cube's table look inwards on one side of each axis.",
+        "data/hull_tables.py",
+        "normals.append(sign * np.eye(3)[axis])",
+        "normals.append(np.eye(3)[axis])",
+        "kernels/test_hulls.py::test_the_tables_of_a_block_are_those_of_a_cube",
+    ),
+    _mutant(
+        "data-group",
+        "A body falls asleep although another one of its group is not quiet.",
+        "data/sleeping.py",
+        "found[root, 2] = 1.0",
+        "found[root, 2] = 0.0",
+        "physics/test_sleeping_bodies.py::test_what_touches_something_in_motion_does_not_sleep",
+    ),
+]
+
+NARROWPHASE = [
+    _mutant(
+        "narrowphase-edges",
+        "The extent of a block along a product of edges mixes up its two other axes.",
+        "narrowphase/box_sat.py",
+        "size = (da[ip] * S[iq, j] + da[iq] * S[ip, j])",
+        "size = (da[ip] * S[ip, j] + da[iq] * S[iq, j])",
+        "kernels/test_many.py::test_the_normal_of_two_blocks_separates_them_most",
+    ),
+    _mutant(
+        "narrowphase-face",
+        "The faces of the second block are tested with the transposed rotation.",
+        "narrowphase/box_sat.py",
+        "(db[j] + (da[0] * S[0, j] + da[1] * S[1, j] + da[2] * S[2, j]))",
+        "(db[j] + (da[0] * S[j, 0] + da[1] * S[j, 1] + da[2] * S[j, 2]))",
+        "kernels/test_many.py::test_the_normal_of_two_blocks_separates_them_most",
+    ),
+    _mutant(
+        "narrowphase-corner",
+        "The gap of a hull's corner to a wall is that of the opposite corner.",
+        "narrowphase/body_wall.py",
+        "gap = d + qt.dot(n, r)",
+        "gap = d - qt.dot(n, r)",
+        "kernels/test_hulls.py::test_a_hull_touches_a_wall_with_the_corners_that_are_near",
+    ),
+]
+
+SOLVER = [
+    _mutant(
+        "solver-scaling",
+        "The scaling of two points of the cone adds their tangents instead of their difference.",
+        "solver/second_order_cone.py",
+        "half * (t * u[1] - s * p[1])",
+        "half * (t * u[1] + s * p[1])",
+        "kernels/test_many.py::test_the_scaling_takes_p_and_u_to_the_same_point",
+    ),
+    _mutant(
+        "solver-quotient",
+        "The quotient in the cone's algebra has one wrong sign.",
+        "solver/second_order_cone.py",
+        "x = (a[0] * b[0] - a[1] * b[1] - a[2] * b[2])",
+        "x = (a[0] * b[0] - a[1] * b[1] + a[2] * b[2])",
+        "kernels/test_many.py::test_the_quotient_undoes_the_product_and_the_way_out_ends_at_the_boundary",
+    ),
+    _mutant(
+        "solver-budget",
+        "Elimination goes on beyond the products that it is allowed.",
+        "solver/minimum_degree.py",
+        "        if work > most:\n            return -1\n",
+        "",
+        "kernels/test_many.py::test_elimination_ends_where_it_takes_more_products_than_are_allowed",
+    ),
+    _mutant(
+        "solver-reaction",
+        "The impulse of a contact pushes both bodies the same way.",
+        "solver/contact_operator.py",
+        "add_scaled(row_vector(t, b, 0), -many.bodies.inv_mass[b], p)",
+        "add_scaled(row_vector(t, b, 0), many.bodies.inv_mass[b], p)",
+        "kernels/test_many_solve.py::test_where_the_impulses_are_determined_they_are_those_of_the_oracle",
+    ),
+]
+
+STEPPING = [
+    _mutant(
+        "stepping-restitution",
+        "A bounce returns all of its speed, whatever its restitution.",
+        "stepping/impact.py",
+        "goal, is_hit = -many.contacts.restitution[k] * speed, True",
+        "goal, is_hit = -speed, True",
+        "physics/test_bodies.py::test_head_on_impact",
+    ),
+    _mutant(
+        "stepping-overlap",
+        "Bodies that overlap are not pushed apart.",
+        "stepping/position_correction.py",
+        "goal = -_CORRECTION_SHARE * (gap + 0.5 * slop)",
+        "goal = _CORRECTION_SHARE * (gap + 0.5 * slop)",
+        "physics/test_bodies.py::test_overlapping_bodies_come_apart_without_speed",
+    ),
+]
+
+MANY_BODIES = [*BROADPHASE, *DATA, *NARROWPHASE, *SOLVER, *STEPPING]

@@ -1,0 +1,99 @@
+"""Mutants of worlds and of files of scenes and recordings."""
+
+from __future__ import annotations
+
+from tests.mutants.mutant import Mutant
+
+
+def _mutant(name: str, fault: str, path: str, old: str, new: str, test: str) -> Mutant:
+    """Mutant of `physics` with one test."""
+    return Mutant(name, fault, "physics/" + path, old, new, ("tests/physics/" + test,))
+
+
+WORLD = [
+    _mutant(
+        "world-limits",
+        "An actuator's limits of force and torque are exchanged.",
+        "world/actuator.py",
+        "limits = (self.actuator.limit_force, self.actuator.limit_torque)",
+        "limits = (self.actuator.limit_torque, self.actuator.limit_force)",
+        "test_actuator.py::test_limits_shorten_the_wrench_and_keep_its_direction",
+    ),
+    _mutant(
+        "world-arm",
+        "The arm of a force begins at the world's origin instead of the centre of mass.",
+        "world/wrench.py",
+        "else point - world.pos",
+        "else point",
+        "test_wrench.py::test_points_of_the_world_and_bodies_that_nothing_acts_on",
+    ),
+    _mutant(
+        "world-frame",
+        "A force along the body axes is turned by the inverse rotation.",
+        "world/wrench.py",
+        'force = np.einsum("wbij,wbj->wbi", R, force)',
+        'force = np.einsum("wbji,wbj->wbi", R, force)',
+        "test_wrench.py::test_a_force_at_a_point_of_a_body_is_what_a_push_is",
+    ),
+    _mutant(
+        "world-fault",
+        "The status of a world with one fault does not tell it.",
+        "world/report.py",
+        "if table[world, at.FAULTS] > 0.0:",
+        "if table[world, at.FAULTS] > 1.0:",
+        "test_stepper.py::test_the_status_is_the_gravest_thing_whatever_else_is_in_the_batch",
+    ),
+    Mutant(
+        "world-gusts",
+        "Gusts that begin later have the wrong sign of their delay.",
+        "physics/world/gusts.py",
+        "begun = phases - _frequencies()",
+        "begun = phases + _frequencies()",
+        ("tests/tasks/test_gusts.py::test_gusts_that_begin_later_are_the_same",),
+    ),
+    _mutant(
+        "world-snapshot",
+        "A snapshot's file has no output of the actuators.",
+        "world/snapshot.py",
+        'parts["actuator_output"] = output',
+        'parts["actuator_output"] = 0.0 * output',
+        "test_snapshot_file.py::test_commands_on_their_way_are_in_the_file",
+    ),
+]
+
+IO = [
+    _mutant(
+        "io-spin",
+        "The spin of a body in MJCF is along the wrong axes.",
+        "io/mjcf.py",
+        "rotation_matrices(np.array(body.quat)).T @ body.angvel",
+        "rotation_matrices(np.array(body.quat)) @ body.angvel",
+        "test_mjcf.py::test_a_scene_comes_back",
+    ),
+    _mutant(
+        "io-inertia",
+        "Two products of inertia are exchanged in MJCF.",
+        "io/mjcf.py",
+        "I[0, 1], I[0, 2], I[1, 2]",
+        "I[0, 2], I[0, 1], I[1, 2]",
+        "test_mjcf.py::test_a_scene_comes_back",
+    ),
+    _mutant(
+        "io-wrench",
+        "A recorder keeps the array of wrenches itself instead of a copy.",
+        "io/recorder.py",
+        "chapter.loads.append((wrench.copy(), steps, dt))",
+        "chapter.loads.append((wrench, steps, dt))",
+        "test_recorder.py::test_a_fault_is_written_once_and_says_why",
+    ),
+    _mutant(
+        "io-default",
+        "A scene file leaves out parameters that are zero, whatever their default.",
+        "io/toml.py",
+        "if field.default is MISSING or value != field.default:",
+        "if field.default is MISSING or (value != field.default and value != 0.0):",
+        "test_scene_file.py::test_a_scene_comes_back_equal",
+    ),
+]
+
+WORLDS = [*WORLD, *IO]
