@@ -171,6 +171,23 @@ def test_a_scene_without_closed_form_is_compared_with_the_reference():
     assert "truth: DOP853" in output
 
 
+def test_scene_files_are_measured(tmp_path):
+    """Also those of MuJoCo."""
+    paths = [tmp_path / "mine.toml", tmp_path / "mine.xml"]
+    physics.save_scene(physics.scenes.tumble(), paths[0])
+    physics.save_mjcf(physics.scenes.tumble(), paths[1])
+    file = tmp_path / "numbers.json"
+    output = run(paths[1], "--quick", "--duration", 0.2, "--json", file)
+    (found,) = json.loads(file.read_text())["scenes"]
+    assert (found["case"], found["duration"]) == (str(paths[1]), 0.2)
+    assert f"{paths[1]}: " in output
+    (job,) = accuracy.make_jobs([str(paths[0])], ladder=QUICK)
+    assert (job.scene, job.duration) == (physics.scenes.tumble(), accuracy.DURATION)
+    assert "mine.txt" in run(tmp_path / "mine.txt", "--quick", code=2)
+    assert "does not exist" in run(tmp_path / "none.toml", "--quick", code=2)
+    assert "duration is 0" in run(paths[0], "--quick", "--duration", 0, code=2)
+
+
 def test_a_peer_that_is_missing_is_skipped_with_a_message(monkeypatch):
     monkeypatch.setattr(peers, "is_installed", lambda name: False)
     output = run("vertex", "--quick", "--peers", "drake")
