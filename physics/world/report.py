@@ -9,6 +9,7 @@ import numpy as np
 from physics.html_table import parts_table
 from physics.kernels.compile.decorators import entry_kernel, kernel
 from physics.kernels.state import layout as at
+from physics.scene.body_names import body_label
 
 
 class Solver(IntEnum):
@@ -143,10 +144,10 @@ class StepReport:
         -1: none.
     """
 
-    __slots__ = ("_table",)
+    __slots__ = ("_names", "_table")
 
-    def __init__(self, table: np.ndarray):
-        self._table = table
+    def __init__(self, table: np.ndarray, names: tuple[str, ...] = ()):
+        self._table, self._names = table, names  # of the bodies, for messages
 
     penetration = property(lambda self: self._table[:, at.PENETRATION])
     residual = property(lambda self: self._table[:, at.RESIDUAL])
@@ -190,7 +191,7 @@ class StepReport:
         for w in np.flatnonzero(status).tolist():
             told[w] = Status(int(status[w])).message
             if status[w] == Status.FAULT:
-                told[w] = f"body {self.fault_body[w]}: {told[w]}"
+                told[w] = f"body {body_label(int(self.fault_body[w]), self._names)}: {told[w]}"
             elif status[w] == Status.OVERLAP:
                 told[w] += f" (the deepest overlap is {self.overlap[w]:.3g} m)"
             elif status[w] == Status.UNCONVERGED:

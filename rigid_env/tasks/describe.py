@@ -9,9 +9,11 @@ import inspect
 import re
 import textwrap
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
+from physics import Body
+from physics.scene.body_names import body_label
 from physics.summary import counted
 from rigid_env.tasks.actions import IMPULSE, TORQUE
 from rigid_env.tasks.declaration import Declaration
@@ -119,7 +121,7 @@ def sections(
     registered : mapping, optional
         Defaults of the id that the environment is registered under, instead of its class's.
     """
-    return (
+    found = (
         _description(task, documented or type(task)),
         _actions(task),
         _observation(task),
@@ -129,6 +131,7 @@ def sections(
         _end(task),
         _arguments(task, added or {}, registered or {}),
     )
+    return tuple(_named(section, task.world.names) for section in found)
 
 
 # --- sections ---------------------------------------------------------------------------------------------------------
@@ -136,7 +139,7 @@ def sections(
 
 def _description(task: Task, documented: type) -> Section:
     scene, doc = task.world.scene, inspect.cleandoc(documented.__doc__ or "")
-    bodies = "; ".join(f"{i} {type(body).__name__} of {body.mass:g} kg" for i, body in enumerate(scene.bodies))
+    bodies = "; ".join(f"{_kind(i, body)} of {body.mass:g} kg" for i, body in enumerate(scene.bodies))
     effects = counted(type(effect).__name__ for effect in scene.effects)
     text = [*_paragraphs(doc), f"Bodies: {bodies}. Walls: {len(scene.walls)}. Effects: {effects}."]
     if "## Rewards" in doc:
@@ -214,7 +217,9 @@ def _disturbances(task: Task) -> tuple[Section, ...]:
             size = f"speed {kind.speed.describe()} m/s"
         else:
             size = f"force {kind.force.describe()} m g, lasts {kind.lasts.describe()} s"
-        rows.append((type(kind).__name__, str(kind.body), size, kind.axes, f"{kind.every:g} s"))
+        rows.append(
+            (type(kind).__name__, body_label(kind.body, task.world.names), size, kind.axes, f"{kind.every:g} s")
+        )
     text = "Pushes and gusts come at random times, exponentially distributed."
     columns = ("Kind", "Body", "Size", "Axes", "Mean wait")
     return (Section("Disturbances", (text,), columns, tuple(rows)),) if rows else ()
@@ -251,6 +256,22 @@ def _arguments(task: Task, added: Mapping[str, Any], registered: Mapping[str, An
 
 
 # --- parts of these ---------------------------------------------------------------------------------------------------
+
+
+def _kind(index: int, body: Body) -> str:
+    """Index, name and class of a body."""
+    kind = type(body).__name__
+    return f"{index} {kind}" if body.name is None else f"{index} {body.name} ({kind})"
+
+
+def _named(section: Section, names: tuple[str, ...]) -> Section:
+    """Section with the names of bodies behind their indices."""
+
+    def label(found: re.Match) -> str:
+        return f"body {body_label(int(found[1]), names)}"
+
+    rows = tuple(tuple(re.sub(r"\bbody (\d+)", label, cell) for cell in row) for row in section.rows)
+    return replace(section, rows=rows)
 
 
 def _meaning(name: str) -> str:

@@ -236,11 +236,22 @@ def test_the_plot_has_a_panel_per_scene(tmp_path):
     write_plot(results, tmp_path / "deep" / "three.png")
     with image.open(tmp_path / "one.png") as one, image.open(tmp_path / "deep" / "three.png") as three:
         assert three.size[0] == 3 * one.size[0]
-        assert three.size[1] == one.size[1]
+        assert three.size[1] <= one.size[1]  # of a legend with fewer rows
     with pytest.raises(ValueError, match="results is empty"):
         write_plot([], tmp_path / "none.png")
     with pytest.raises(ValueError, match="xyz"):
         write_plot(results, tmp_path / "one.xyz")
+
+
+def test_the_legend_fits_below_the_panel(tmp_path):
+    pytest.importorskip("matplotlib")
+    long = point("rigid-env", "a preset of one's own with a long name", 0.02, 1e-3, 50.0)
+    figure = found((*POINTS, long), own_error=1e-9).frontier.plot(tmp_path / "one.png")
+    (legend,) = figure.legends
+    extent = legend.get_window_extent(figure.canvas.get_renderer())
+    assert 0 <= extent.x0 < extent.x1 <= figure.bbox.width
+    assert (tmp_path / "one.png").stat().st_size > 0
+    assert "rigid-env fast" in {text.get_text() for text in legend.get_texts()}
 
 
 def test_without_matplotlib_the_extra_is_named_before_anything_is_measured(monkeypatch, tmp_path):

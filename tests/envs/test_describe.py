@@ -16,7 +16,7 @@ import pytest
 from typer.testing import CliRunner
 
 import physics
-from rigid_env import BlockReachEnv, Force, Impulse, Push, Task, TaskEnv, Wrench, observe, register_task
+from rigid_env import BlockReachEnv, Force, Impulse, Push, SceneEnv, Task, TaskEnv, Wrench, observe, register_task
 from rigid_env.cli import app
 from rigid_env.envs.env import RigidEnv
 from rigid_env.tasks.describe import describe
@@ -37,6 +37,14 @@ def rows(text: str, title: str) -> list[list[str]]:
 
 def plain(cells) -> list[str]:
     return [cell.strip("`") for cell in cells]
+
+
+def test_bodies_are_told_by_their_names():
+    balls = [physics.Sphere(0.5, 2.0, name="cart"), physics.Sphere(0.5, 2.0, pos=(5, 0, 0), name="crate")]
+    text = SceneEnv(physics.Scene(balls, effects=[physics.Gravity()]), driven="crate").describe()
+    assert "Bodies: 0 cart (Sphere) of 2 kg; 1 crate (Sphere) of 2 kg." in " ".join(text.split())
+    assert rows(text, "Action Space")[0][1] == "force along x of body 1 (crate)"
+    assert rows(text, "Observation Space")[18][1] == "position of body 1 (crate) x"
 
 
 # --- against the docstrings written by hand -------------------------------------------------------------------
