@@ -179,6 +179,9 @@ class SceneEnv(RigidEnv):
         told = render_mode, width, height, obs, obs_size, obs_stack, contacts
         super().__init__(task, *told, camera=camera, arrows=arrows)
 
+    def _documented(self) -> type:
+        return type(self)
+
     def step(self, action):
         """Hold an action for one control step; as `RigidEnv.step`, but truncated at the limit of the task."""
         obs, reward, is_terminated, is_truncated, info = super().step(action)

@@ -20,6 +20,7 @@ from rigid_env.tasks.declaration import Declaration
 from rigid_env.tasks.draws import parameter_of
 from rigid_env.tasks.goal import GoalTask
 from rigid_env.tasks.task import Task
+from rigid_env.tasks.written import Part, sentences, written_parts
 
 WIDTH = 79  # of lines of text [characters]
 
@@ -115,7 +116,8 @@ def sections(
     ----------
     task : Task
     documented : type, optional
-        Class whose docstring describes the task; None: that of the task.
+        Class whose docstring describes the task; None: that of the task. Where it has the sections of Gymnasium, their
+        words stand around the tables, and their meanings of arguments in the last one.
     added : mapping, optional
         Arguments that the environment adds to the task's, with their defaults.
     registered : mapping, optional
@@ -131,7 +133,11 @@ def sections(
         _end(task),
         _arguments(task, added or {}, registered or {}),
     )
-    return tuple(_named(section, task.world.names) for section in found)
+    parts = written_parts(documented or type(task))
+    known = {section.title for section in found}
+    own = (Section(title, part.text) for title, part in parts.items() if title not in known)
+    merged = (_merged(section, parts[section.title]) if section.title in parts else section for section in found)
+    return tuple(_named(section, task.world.names) for section in (*merged, *own))
 
 
 # --- sections ---------------------------------------------------------------------------------------------------------
@@ -141,10 +147,8 @@ def _description(task: Task, documented: type) -> Section:
     scene, doc = task.world.scene, inspect.cleandoc(documented.__doc__ or "")
     bodies = "; ".join(f"{_kind(i, body)} of {body.mass:g} kg" for i, body in enumerate(scene.bodies))
     effects = counted(type(effect).__name__ for effect in scene.effects)
-    text = [*_paragraphs(doc), f"Bodies: {bodies}. Walls: {len(scene.walls)}. Effects: {effects}."]
-    if "## Rewards" in doc:
-        text.append(f"`help({documented.__module__}.{documented.__qualname__})` says more.")
-    return Section("Description", tuple(text))
+    text = f"Bodies: {bodies}. Walls: {len(scene.walls)}. Effects: {effects}."
+    return Section("Description", tuple(_paragraphs(doc)), after=(text,))
 
 
 def _actions(task: Task) -> Section:
@@ -253,6 +257,30 @@ def _arguments(task: Task, added: Mapping[str, Any], registered: Mapping[str, An
     defaults = {**known, **added}
     rows = tuple((f"`{name}`", _default(registered.get(name, defaults[name])), meanings[name]) for name in defaults)
     return Section("Arguments", (), ("Argument", "Default", "Meaning"), rows)
+
+
+# --- with the words of a docstring ------------------------------------------------------------------------------------
+
+
+def _merged(section: Section, part: Part) -> Section:
+    """Section with the text that a docstring has under its title; numbers of its own tables and limits stay."""
+    title = section.title
+    if title == "Description":
+        return replace(section, before=(*section.before, *part.text))
+    if title in ("Action Space", "Observation Space"):
+        told = " ".join(section.before)
+        words = sentences(part.text, lambda text: "float32" not in text and text[-1] != ":" and text not in told)
+        return replace(section, after=words)
+    if title == "Episode End":
+        words = sentences(part.text, lambda text: not text.startswith("Truncation: "))
+        return replace(section, before=(*words, *section.before[1:]))
+    if title == "Arguments":
+        meanings = {row[0]: row[-1] for row in part.rows}
+        meanings.setdefault("`threads`", ARGUMENTS["threads"])  # of batches
+        rows = tuple((*row[:-1], meanings[row[0]]) for row in section.rows if row[0] in meanings)
+        rows = rows if part.rows else section.rows
+        return replace(section, rows=rows, before=part.before, after=part.after)
+    return replace(section, before=part.text)
 
 
 # --- parts of these ---------------------------------------------------------------------------------------------------

@@ -71,6 +71,12 @@ def test_help_is_printed_as_it_is_written(command):
             assert " ".join(told.split()) in text
 
 
+def test_help_names_tasks_of_ones_own():
+    for command in ("view", "describe"):
+        assert "module:Class" in " ".join(run(command, "--help").split())
+    assert "'module:Class'" in run("view", "nothing", code=2)
+
+
 def test_units_are_there():
     assert "Simulated time [s]." in run("demo", "--help")
     assert "Step [s]." in run("hard-cases", "--help")
