@@ -128,7 +128,7 @@ def make_table(env: str, rows: list[Transfer]) -> Table:
 
 
 def main(
-    env: Annotated[str, typer.Option(help="Gymnasium id.")] = DEFAULTS["env"],
+    env: Annotated[str, typer.Option(help="Gymnasium id, or module:id.")] = DEFAULTS["env"],
     algo: Annotated[str, typer.Option(help="ppo or sac.")] = "ppo",
     seed: Annotated[int, typer.Option(min=0, help="Of all that is random.")] = DEFAULTS["seed"],
     accuracies: Annotated[str, typer.Option(metavar="NAMES", help="Presets to train at, with commas.")] = TRAINED_AT,

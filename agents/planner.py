@@ -231,7 +231,7 @@ def solve(env: gym.Env, planner: Planner, episodes: int, seed: int = 0) -> Solve
 
 
 def main(
-    env: Annotated[str, typer.Option(help="Gymnasium id of an environment of this package.")] = ENV_ID,
+    env: Annotated[str, typer.Option(help="Id of an environment of this package, or module:Class of a task.")] = ENV_ID,
     episodes: Annotated[int, typer.Option(min=1, help="Episodes to plan.")] = 100,
     method: Annotated[str, typer.Option(help=f"One of {', '.join(METHODS)}.")] = METHODS[0],
     samples: Annotated[int, typer.Option(min=1, help="Sequences in one iteration.")] = PlannerSettings.samples,

@@ -183,7 +183,7 @@ def new_folder(out: Path, config: RunConfig) -> RunFolder:
 
 
 def main(
-    env: Annotated[str | None, typer.Option(help="Gymnasium id.", show_default=DEFAULTS["env"])] = None,
+    env: Annotated[str | None, typer.Option(help="Gymnasium id, or module:id.", show_default=DEFAULTS["env"])] = None,
     algo: Annotated[str | None, typer.Option(help="ppo or sac.", show_default="the first of the environment")] = None,
     seed: Annotated[int | None, typer.Option(help="Of all that is random.", show_default="0")] = None,
     num_envs: Annotated[int | None, typer.Option(help="Worlds trained on at once.")] = None,

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 from physics.html_table import fields_table
 from physics.kernels.time_stepping import event_log
@@ -42,6 +43,8 @@ class Event:
     normal : (3,) tuple of float
         Of an ``impact``: unit normal out of the wall or of the other body towards `body`, of several contacts the
         weighted mean, world frame. Zero for the other kinds.
+    name, other_name : str
+        Of `body` and of `other` in the scene; "" where they have none.
     """
 
     t: float
@@ -52,6 +55,8 @@ class Event:
     other: int = -1
     point: tuple[float, float, float] = (0.0, 0.0, 0.0)
     normal: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    name: str = ""
+    other_name: str = ""
 
     _repr_html_ = fields_table
 
@@ -77,6 +82,14 @@ def logged_events(world: World, start: float) -> list[Event]:
                 Event(start + t, event_log.KIND_NAMES[int(kind)], body, int(wall), impulse, int(other), point, normal)
             )
     return sorted(events, key=lambda event: event.t)
+
+
+def named(events: list[Event], names: Sequence[str]) -> list[Event]:
+    """Events with the names of their bodies; `names` has "" for a body without one."""
+    if not any(names):
+        return events
+    known = dict(enumerate(names))
+    return [replace(each, name=known.get(each.body, ""), other_name=known.get(each.other, "")) for each in events]
 
 
 def contact_pairs(world: World) -> set[tuple[int, int]]:

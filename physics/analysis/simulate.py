@@ -12,8 +12,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from physics import validation
+from physics.analysis.contact_samples import contact_samples, contacts_of
 from physics.analysis.diagnostics import diagnose
-from physics.analysis.events import Event, contact_events, contact_pairs, fault_events, logged_events
+from physics.analysis.events import Event, contact_events, contact_pairs, fault_events, logged_events, named
 from physics.analysis.trajectory import Trajectory
 from physics.annotations import Preset
 from physics.keywords import known_keywords
@@ -81,7 +82,7 @@ def simulate(
         times.append(duration)
     else:
         times[-1] = min(times[-1], duration) if whole else times[-1]
-    samples, events, reports = [_sample(world)], [], []
+    samples, contacts, events, reports = [_sample(world)], [contacts_of(world)], [], []
     watch = _logged if world.plan.events else _Touching()
     world.make_event_room(EVENT_ROOM)
     for start, end in pairwise(times):
@@ -91,9 +92,11 @@ def simulate(
         found, report = _interval(world, watch, start, end, load(start), count, shorter)
         events += found
         samples.append(_sample(world))
+        contacts.append(contacts_of(world))
         reports.append(report)
     columns: Any = [np.array(column) for column in zip(*samples)]
-    return Trajectory(np.array(times), *columns, events=tuple(events), reports=tuple(reports), scene=scene)  # type: ignore[misc]
+    touched = contact_samples(times, contacts)
+    return Trajectory(np.array(times), *columns, tuple(events), tuple(reports), scene, touched)
 
 
 def _times(duration, sample_dt, dt) -> tuple[float, float, float]:
@@ -136,7 +139,7 @@ def _interval(world: World, watch, start: float, end: float, load, steps: int, d
     for begin, stop in pairwise(edges):
         events += watch(world, begin, stop, partial(world.step, load, 1, dt))
         add_report(total, world.report_table)
-    return events, StepReport(total)
+    return events, StepReport(total, world.names)
 
 
 def _sample(world: World) -> tuple[np.ndarray, ...]:
@@ -156,7 +159,8 @@ class _Touching:
         """Take a step; the events of it."""
         events = _logged(world, start, end, step)
         before, self._before = self._before, contact_pairs(world)
-        return events + contact_events(before, self._before, end) + fault_events(world, end)
+        events += contact_events(before, self._before, end) + fault_events(world, end)
+        return named(events, world.names)
 
 
 def _logged(world: World, start: float, end: float, step: Callable[[], StepReport]) -> list[Event]:
@@ -168,4 +172,4 @@ def _logged(world: World, start: float, end: float, step: Callable[[], StepRepor
         world.restore(before)
         world.make_event_room(2 * most)
         return _logged(world, start, end, step)
-    return logged_events(world, start)
+    return named(logged_events(world, start), world.names)

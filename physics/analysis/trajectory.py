@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import zipfile
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -12,16 +11,24 @@ import numpy as np
 from numpy.typing import NDArray
 
 from physics import validation
-from physics.analysis.events import Event
-from physics.analysis.trajectory_arrays import event_arrays, events_of, scene_arrays, scene_of
+from physics.analysis import trajectory_plot
+from physics.analysis.contact_samples import ContactSamples
+from physics.analysis.events import Event, named
+from physics.analysis.tables import columns_of, write_csv
+from physics.analysis.trajectory_arrays import (
+    contact_arrays,
+    contacts_of_file,
+    event_arrays,
+    events_of,
+    scene_arrays,
+    scene_of,
+)
 from physics.html_table import parts_table
+from physics.optional import load_optional
+from physics.scene.body_names import body_index, body_names
 from physics.scene.scene import Scene
 from physics.summary import counted, parts_repr
 from physics.world.report import Status, StepReport
-
-COLUMNS = (
-    "x", "y", "z", "qw", "qx", "qy", "qz", "vx", "vy", "vz", "wx", "wy", "wz",
-)  # fmt: skip
 
 # Numbers of a sample of one body.
 TAILS: dict[str, tuple[int, ...]] = {"pos": (3,), "quat": (4,), "linvel": (3,), "angvel": (3,), "energy": ()}
@@ -45,6 +52,8 @@ class Trajectory:
         One per sample interval.
     scene : Scene or None
         The scene, if it is known; read from a file its bodies and walls, without effects.
+    contacts : ContactSamples or None
+        Contact points and forces at the samples, if they are known.
     """
 
     t: NDArray[np.float64]
@@ -56,8 +65,10 @@ class Trajectory:
     events: tuple[Event, ...]
     reports: tuple[StepReport, ...]
     scene: Scene | None = field(default=None, compare=False)
+    contacts: ContactSamples | None = field(default=None, compare=False)
 
     __repr__ = parts_repr
+    __iter__ = None  # `trajectory[body]` makes no sequence of it
 
     def _repr_html_(self) -> str:
         energy = self.energy.sum(axis=1)
@@ -84,11 +95,97 @@ class Trajectory:
         """True if every interval's report was."""
         return all(report.ok for report in self.reports)
 
+    # --- bodies ------------------------------------------------------------------------------------------------
+
+    def __getitem__(self, body: str | int) -> BodyTrajectory:
+        """Samples of one body, by its name or its index.
+
+        Raises
+        ------
+        ValueError
+            No such body: names those there are, the nearest first.
+        """
+        b = self._index(body)
+        samples = {name: getattr(self, name)[:, b] for name in TAILS}
+        events = tuple(event for event in self.events if b in (event.body, event.other))
+        return BodyTrajectory(b, self.names[b], self.t, **samples, events=events)
+
+    def _index(self, body: str | int) -> int:
+        if self.scene is not None:
+            return body_index(body, "body", self.scene)
+        if isinstance(body, str):
+            raise ValueError(
+                f"body is {body!r} of a trajectory without a scene, which has no names; allowed is an index"
+            )
+        return validation.index(body, self.pos.shape[1], "body")
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the bodies; "" for one without a name."""
+        return ("",) * self.pos.shape[1] if self.scene is None else body_names(self.scene)
+
+    def label(self, body: int) -> str:
+        """Name of a body, or its index."""
+        return self.names[body] or f"body {body}"
+
+    # --- tables and pictures -----------------------------------------------------------------------------------
+
+    def to_csv(self, path: str | Path, what: str = "samples") -> None:
+        """Write a table as comma-separated values; docs/recordings.md lists the columns.
+
+        Parameters
+        ----------
+        path : str or Path
+        what : {"samples", "events", "contacts"}
+            A row for each sample of each body, for each event, or for each contact at each sample.
+        """
+        validation.path(path)
+        write_csv(path, columns_of(self, what))
+
+    def to_pandas(self, what: str = "samples"):
+        """Return the same table as a `pandas.DataFrame`.
+
+        Parameters
+        ----------
+        what : {"samples", "events", "contacts"}
+
+        Raises
+        ------
+        ModuleNotFoundError
+            pandas is missing.
+        """
+        columns = columns_of(self, what)
+        return load_optional("pandas", "Trajectory.to_pandas").DataFrame(columns)
+
+    def plot(self, path: str | Path | None = None):
+        """Draw the motion over time: of one body its vectors, of several heights, speeds and spins.
+
+        Parameters
+        ----------
+        path : str or Path, optional
+            File to write, in a format that matplotlib knows by its ending.
+
+        Returns
+        -------
+        matplotlib.figure.Figure
+            A notebook shows it.
+
+        Raises
+        ------
+        ModuleNotFoundError
+            matplotlib is missing.
+        """
+        if self.pos.shape[1] == 1:
+            return self[0].plot(path)
+        return trajectory_plot.plot_bodies(self, path)
+
+    # --- files -------------------------------------------------------------------------------------------------
+
     def to_npz(self, path: str | Path) -> None:
-        """Write samples, events, and the bodies and walls of the scene as a NumPy archive; `from_npz` reads it."""
-        arrays: Any = {name: getattr(self, name) for name in SAMPLES}
-        arrays |= {**event_arrays(self.events), **scene_arrays(self.scene)}
-        np.savez(path, **arrays)
+        """Write samples, events, contacts, and the scene's bodies and walls as an archive; `from_npz` reads it."""
+        samples: Any = {name: getattr(self, name) for name in SAMPLES}
+        rest = {**event_arrays(self.events), **contact_arrays(self.contacts), **scene_arrays(self.scene)}
+        np.savez(path, **samples, **rest)
 
     @classmethod
     def from_npz(cls, path: str | Path) -> Trajectory:
@@ -115,20 +212,62 @@ class Trajectory:
                 with np.load(file, allow_pickle=False) as content:
                     parts = dict(content)
                 samples = _checked({name: parts[name] for name in SAMPLES})
-                return cls(**samples, events=events_of(parts), reports=(), scene=_matching(scene_of(parts), samples))
+                scene = _matching(scene_of(parts), samples)
+                events = tuple(named(events_of(parts), () if scene is None else body_names(scene)))
+                contacts = contacts_of_file(parts)
+                return cls(**samples, events=events, reports=(), scene=scene, contacts=contacts)
             except Exception as error:  # whatever is wrong with it, it is none
                 told = f"there is no {error}" if isinstance(error, KeyError) else error
                 raise ValueError(f"{path} is no trajectory ({told}); {allowed}") from None
 
-    def to_csv(self, path: str | Path) -> None:
-        """Write the samples as comma-separated values, one row per sample and body."""
-        with open(path, "w", newline="", encoding="utf-8") as file:
-            writer = csv.writer(file)
-            writer.writerow(("t", "body", *COLUMNS, "energy"))
-            for k, t in enumerate(self.t):
-                for b in range(self.pos.shape[1]):
-                    row = np.concatenate((self.pos[k, b], self.quat[k, b], self.linvel[k, b], self.angvel[k, b]))
-                    writer.writerow((repr(float(t)), b, *map(repr, row.tolist()), repr(float(self.energy[k, b]))))
+
+@dataclass(frozen=True, eq=False)
+class BodyTrajectory:
+    """Samples of one body of a trajectory: ``trajectory["crate"]``.
+
+    Attributes
+    ----------
+    body : int
+        Its index in the scene.
+    name : str
+        "" if it has none.
+    t : (samples,) float64
+        [s].
+    pos, quat, linvel, angvel : (samples, 3|4|3|3) float64
+        World frame; see `World`.
+    energy : (samples,) float64
+        Kinetic and potential [J].
+    events : tuple of Event
+        Those of this body, also where it is the other one.
+    """
+
+    body: int
+    name: str
+    t: np.ndarray
+    pos: np.ndarray
+    quat: np.ndarray
+    linvel: np.ndarray
+    angvel: np.ndarray
+    energy: np.ndarray
+    events: tuple[Event, ...]
+
+    __repr__ = parts_repr
+    _repr_html_ = parts_table
+
+    def _parts(self) -> tuple[str, ...]:
+        return (
+            self.label, f"{len(self.t)} samples", f"t = {self.t[0]:.6g} to {self.t[-1]:.6g} s",
+            f"events: {counted(event.kind for event in self.events)}",
+        )  # fmt: skip
+
+    @property
+    def label(self) -> str:
+        """Its name, or its index."""
+        return self.name or f"body {self.body}"
+
+    def plot(self, path: str | Path | None = None):
+        """Draw position, velocity, angular velocity and energy over time; see `Trajectory.plot`."""
+        return trajectory_plot.plot_body(self, path)
 
 
 def _checked(samples: dict[str, np.ndarray]) -> dict[str, np.ndarray]:

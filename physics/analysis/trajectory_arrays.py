@@ -6,12 +6,14 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from physics.analysis.contact_samples import NAMES, ContactSamples
 from physics.analysis.events import Event
 from physics.scene.bodies import Block, Body, Ellipsoid, Hull, Sphere
+from physics.scene.body_names import body_names
 from physics.scene.effects import Contact
 from physics.scene.scene import HalfSpace, Scene
 
-EVENTS, SCENE = "event_", "scene_"
+EVENTS, CONTACTS, SCENE = "event_", "contact_", "scene_"
 
 
 def event_arrays(events: Sequence[Event]) -> dict[str, np.ndarray]:
@@ -36,6 +38,22 @@ def events_of(parts: Mapping[str, np.ndarray]) -> tuple[Event, ...]:
     )
 
 
+def contact_arrays(contacts: ContactSamples | None) -> dict[str, np.ndarray]:
+    """Arrays with a row for each contact at each sample; nothing where they are unknown."""
+    return {} if contacts is None else {f"{CONTACTS}{name}": getattr(contacts, name) for name in NAMES}
+
+
+def contacts_of_file(parts: Mapping[str, np.ndarray]) -> ContactSamples | None:
+    """Contacts of a file; None where it has no such arrays."""
+    if f"{CONTACTS}t" not in parts:
+        return None
+    arrays = [parts[f"{CONTACTS}{name}"] for name in NAMES]
+    shape = arrays[0].shape
+    if len(shape) != 1 or any(array.shape != (*shape, 3)[: array.ndim] for array in arrays):
+        raise ValueError(f"its contacts have the shapes {[array.shape for array in arrays]}")
+    return ContactSamples(*arrays)
+
+
 def scene_arrays(scene: Scene | None) -> dict[str, np.ndarray]:
     """Bodies and walls of a scene, its effects apart; nothing where it is unknown."""
     if scene is None:
@@ -44,6 +62,7 @@ def scene_arrays(scene: Scene | None) -> dict[str, np.ndarray]:
     walls = scene.walls if scene.effect(Contact) else ()
     return {
         f"{SCENE}kind": np.array([body.kind for body in scene.bodies], dtype=np.str_),
+        f"{SCENE}name": np.array(body_names(scene), dtype=np.str_),
         f"{SCENE}mass": np.array([body.mass for body in scene.bodies]),
         f"{SCENE}inertia": np.array([body.inertia for body in scene.bodies]),
         f"{SCENE}dimensions": np.array([body.dimensions for body in scene.bodies]),
@@ -61,13 +80,14 @@ def scene_of(parts: Mapping[str, np.ndarray]) -> Scene | None:
     names = ("kind", "mass", "inertia", "dimensions", "center")
     rows = zip(*(parts[f"{SCENE}{name}"].tolist() for name in names), strict=True)
     corners = np.split(parts[f"{SCENE}corners"], np.cumsum(parts[f"{SCENE}corner_counts"])[:-1])
-    bodies = [_body(*row, points.tolist()) for row, points in zip(rows, corners, strict=True)]
+    labels = parts.get(f"{SCENE}name", np.full(len(parts[f"{SCENE}kind"]), "")).tolist()
+    bodies = [_body(*row, points.tolist(), label) for row, points, label in zip(rows, corners, labels, strict=True)]
     walls = [HalfSpace(row[:3], row[3]) for row in parts[f"{SCENE}walls"].tolist()]
     return Scene(bodies, walls, [Contact()] if walls else [])
 
 
-def _body(kind, mass, inertia, dimensions, center, corners) -> Body:
-    given = {"mass": mass, "inertia_body": inertia}
+def _body(kind, mass, inertia, dimensions, center, corners, name) -> Body:
+    given = {"mass": mass, "inertia_body": inertia, "name": name or None}
     if kind == "block":
         return Block([2.0 * half for half in dimensions], center=center, **given)
     if kind == "sphere":

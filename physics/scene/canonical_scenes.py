@@ -78,7 +78,7 @@ def slide(speed: float = 3.0, friction: float = 0.3) -> Scene:
 
 
 def incline(angle: float, friction: float) -> Scene:
-    """The block face down on an incline of `angle` [rad] falling along +x; the wall is tilted, gravity is not."""
+    """The block face down on an incline that falls along +x, by `angle` [rad]; the wall is tilted, gravity is not."""
     normal = (math.sin(angle), math.cos(angle), 0.0)
     half = SIZE[1] / 2
     body = Block(
@@ -89,7 +89,10 @@ def incline(angle: float, friction: float) -> Scene:
 
 
 def bounce(height: float = 1.0, restitution: float = 1.0) -> Scene:
-    """The block dropped face down from a `height` [m] of its lowest face above the floor; no friction."""
+    """The block dropped face down, elastic and without friction.
+
+    The `height` [m] is that of its lowest face above the floor.
+    """
     body = Block(SIZE, MASS, pos=(0.0, SIZE[1] / 2 + height, 0.0))
     return Scene([body], [HalfSpace((0, 1, 0))], [Gravity((0, -GRAVITY, 0)), Contact(restitution)])
 
@@ -113,14 +116,20 @@ def vertex_drop(restitution: float = 0.3, friction: float = 0.5) -> Scene:
 
 
 def closed_box(half: float = 5.0) -> Scene:
-    """The elastic block tumbling without gravity or friction between six walls at ±`half` [m]: chaotic."""
+    """The elastic block tumbling without gravity or friction in a box of six walls: chaotic.
+
+    The walls are at ±`half` [m].
+    """
     normals = [tuple(sign * (axis == k) for k in range(3)) for axis in range(3) for sign in (1.0, -1.0)]
     body = Block(SIZE, MASS, linvel=(3.0, 4.0, 5.0), angvel=(1.0, 2.0, 0.5))
     return Scene([body], [HalfSpace(normal, -half) for normal in normals], [Contact(1.0)])
 
 
 def tower(count: int = 10, top: float = 1.0) -> Scene:
-    """Unit cubes of 1 kg standing on each other on an endless floor, the top one of mass `top` [kg]."""
+    """Unit cubes of 1 kg standing on each other on an endless floor.
+
+    The top one has the mass `top` [kg].
+    """
     masses = [1.0] * (count - 1) + [top]
     bodies = [Block((1.0, 1.0, 1.0), mass, pos=(0.0, k + 0.5, 0.0)) for k, mass in enumerate(masses)]
     return Scene(bodies, [HalfSpace((0, 1, 0))], [Gravity((0, -GRAVITY, 0)), Contact(), Friction(0.5)])
@@ -161,7 +170,20 @@ SCENES = {
         tower, heap, football,
     )
 }  # fmt: skip
-SCENES["incline"] = lambda: incline(math.radians(20.0), 1.01 * math.tan(math.radians(20.0)))
+
+
+def _steep_incline() -> Scene:
+    """The block face down on an incline of 20 degrees, on which friction just holds it."""
+    angle = math.radians(20.0)
+    return incline(angle, 1.01 * math.tan(angle))
+
+
+SCENES["incline"] = _steep_incline
+
+
+def about(name: str) -> str:
+    """One line about a canonical scene."""
+    return SCENES[name].__doc__.splitlines()[0].rstrip(".")
 
 
 def by_name(name: str) -> Scene:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 from physics import validation
@@ -12,6 +13,7 @@ from physics.html_table import fields_table, parts_table
 from physics.summary import counted, fields_repr, parts_repr
 from physics.work_precision import analysis as frontier_analysis
 from physics.work_precision.contender import OURS, setting_name
+from physics.work_precision.frontier_plot import plot_frontier
 
 
 @dataclass(frozen=True)
@@ -187,6 +189,26 @@ class Frontier:
         )  # fmt: skip
 
     # --- showing -----------------------------------------------------------------------------------------------
+
+    def plot(self, path: str | Path | None = None):
+        """Draw error against time, with the front as stairs.
+
+        Parameters
+        ----------
+        path : str or Path, optional
+            File to write, in a format that matplotlib knows by its ending.
+
+        Returns
+        -------
+        matplotlib.figure.Figure
+            A notebook shows it.
+
+        Raises
+        ------
+        ModuleNotFoundError
+            matplotlib is missing.
+        """
+        return plot_frontier(self, path)
 
     def to_dict(self) -> dict:
         """For JSON: what is not finite is None."""

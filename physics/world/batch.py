@@ -54,6 +54,8 @@ class Batch:
         What is simulated, and how.
     worlds, body_count, threads : int
         Size of the batch, bodies of a world, threads that share a step.
+    names : tuple of str
+        Of the bodies; "" for one without a name.
     dt, time : float
         Step, and time since the start [s].
     pos, quat, linvel, angvel : (worlds, bodies, 3|4|3|3) float64
@@ -99,6 +101,7 @@ class Batch:
     worlds: int
     body_count: int
     threads: int
+    names: tuple[str, ...]
     dt: float
     time: float
     pos: NDArray[np.float64]

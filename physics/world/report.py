@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from physics.html_table import parts_table
 from physics.kernels.compile.decorators import entry_kernel, kernel
 from physics.kernels.state import layout as at
+from physics.scene.body_names import body_label
 
 
 class Solver(IntEnum):
@@ -145,10 +146,10 @@ class StepReport:
         -1: none.
     """
 
-    __slots__ = ("_table",)
+    __slots__ = ("_names", "_table")
 
-    def __init__(self, table: np.ndarray):
-        self._table = table
+    def __init__(self, table: np.ndarray, names: tuple[str, ...] = ()):
+        self._table, self._names = table, names  # of the bodies, for messages
 
     if TYPE_CHECKING:
 
@@ -234,7 +235,7 @@ class StepReport:
         for w in np.flatnonzero(status).tolist():
             told[w] = Status(int(status[w])).message
             if status[w] == Status.FAULT:
-                told[w] = f"body {self.fault_body[w]}: {told[w]}"
+                told[w] = f"body {body_label(int(self.fault_body[w]), self._names)}: {told[w]}"
             elif status[w] == Status.OVERLAP:
                 told[w] += f" (the deepest overlap is {self.overlap[w]:.3g} m)"
             elif status[w] == Status.UNCONVERGED:

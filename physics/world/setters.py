@@ -11,6 +11,7 @@ from physics import validation
 from physics.kernels.half_space.gap_queries import write_angular_momenta
 from physics.kernels.state import layout as at
 from physics.kernels.state.contact_law_dispatch import LAW_STIFFNESS
+from physics.scene.body_names import body_label
 from physics.scene.effects import RESISTANCES, Friction
 from physics.scene.force_field import Field, FieldSlot, write_columns
 from physics.summary import shown
@@ -172,9 +173,11 @@ def _check_centres(world: Batch, state: np.ndarray, params: np.ndarray, chosen: 
         a, b = sorted(order[k, i : i + 2].tolist())
         first = k * world.body_count
         places = [state[first + body, at.POS : at.POS + 3].tolist() for body in (a, b)]
+        first_label, second_label = (body_label(body, world.names) for body in (a, b))
         raise ValueError(
-            f"{what}: bodies {a} and {b} in world {int(chosen[k])} have their centres in the same place, pos "
-            f"{places[0]} and {places[1]}; allowed are different places (what overlaps otherwise is lifted apart)"
+            f"{what}: bodies {first_label} and {second_label} in world {int(chosen[k])} have their centres in the "
+            f"same place, pos {places[0]} and {places[1]}; allowed are different places (what overlaps otherwise is "
+            "lifted apart)"
         )
 
 
@@ -203,8 +206,9 @@ def check_depth(world: Batch, state: np.ndarray, params: np.ndarray, chosen: np.
     bad = np.flatnonzero(gaps < -allowed)
     if len(bad):
         k = int(bad[0])
+        body = body_label(k % world.body_count, world.names)
         raise ValueError(
-            f"{what}: pos {state[k, at.POS : at.POS + 3].tolist()} of body {k % world.body_count} in world "
+            f"{what}: pos {state[k, at.POS : at.POS + 3].tolist()} of body {body} in world "
             f"{int(chosen[k // world.body_count])} is {-gaps[k]:.6g} m inside walls[{which[k]}]; allowed is at most "
             f"{allowed[k]:.3g} m"
         )

@@ -21,6 +21,7 @@ from physics.parallel.exclusive import exclusive, in_use, watch
 from physics.parallel.team import Team
 from physics.plan.accuracy import PRESETS, Accuracy, resolve
 from physics.plan.plan import SHAPE_CODES, make_plan
+from physics.scene.body_names import body_names
 from physics.scene.effects import Actuator, Friction, RollingFriction, SpinFriction
 from physics.scene.force_field import Field
 from physics.scene.scene import Scene
@@ -87,6 +88,7 @@ class World(Batch):
         self.threads = validation.count(threads, "threads")
         self.plan = make_plan(scene, self.accuracy)
         self.body_count = len(scene.bodies)
+        self.names = body_names(scene)
         self.time = 0.0
         self.recorder = None
         batch_arrays.check_room(self.worlds, self.body_count, self.plan)
@@ -235,7 +237,7 @@ class World(Batch):
     @property
     def report(self) -> StepReport:
         """Report of the last step, whoever took it."""
-        return StepReport(self.report_table.copy())
+        return StepReport(self.report_table.copy(), self.names)
 
     # --- changing ----------------------------------------------------------------------------------------------
 

@@ -31,7 +31,7 @@ Accuracy = Annotated[
 SceneArgument = Annotated[
     str,
     typer.Argument(
-        metavar="SCENE", help="A canonical scene, or a scene file (.toml).", autocompletion=names.complete_scene
+        metavar="SCENE", help="A canonical scene, or a scene file (.toml or .xml).", autocompletion=names.complete_scene
     ),
 ]
 

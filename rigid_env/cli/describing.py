@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from rigid_env.cli import names
 from rigid_env.cli.common import Json, app, tell_file, told_errors, write
 from rigid_env.cli.files import make_parents, output_option
 from rigid_env.terminal import Column, Table, make_console
@@ -22,7 +23,11 @@ NUMBERS = ("Num", "Min", "Max", "Numbers")  # columns
 def describe(
     task: Annotated[
         str,
-        typer.Argument(metavar="TASK", help="Id of an environment, MODULE:ID, or MODULE:CLASS of a task."),
+        typer.Argument(
+            metavar="TASK",
+            help="Id of an environment, module:id, module:Class of a task, or a scene: that of rigid_env/Scene-v0.",
+            autocompletion=names.complete_scene,
+        ),
     ],
     markdown: Annotated[Path | None, output_option("--markdown", ".md", help="Write it as Markdown, too.")] = None,
     json: Json = None,
@@ -52,15 +57,24 @@ def describe(
 
 
 def _make(task: str) -> RigidEnv:
-    """Environment of an id, or of a task's class.
+    """Environment of an id, of a task's class, or of a scene.
+
+    Without a scene `rigid_env/Scene-v0` has one body and a goal, as its docstring.
 
     Raises
     ------
     ValueError
         There is none, or it is not of this package.
     """
+    from physics import scenes
     from rigid_env.envs.named import make_named
+    from rigid_env.envs.registration import SCENE_ID
+    from rigid_env.envs.scene import SceneEnv
 
+    if task in scenes.SCENES or Path(task).suffix.lower() in names.SCENE_FILES:
+        return SceneEnv(task)
+    if task.split(":")[-1] == SCENE_ID:
+        return SceneEnv("rest", goal={"pos": (3.0, 1.5, 0.0), "tolerance": 0.5})
     return make_named(task, "task").unwrapped
 
 

@@ -12,7 +12,7 @@ from rigid_env.cli import names
 from rigid_env.cli.camera_options import ArrowsOption, EyeOption, TargetOption, checked_shot
 from rigid_env.cli.common import Accuracy, Json, SceneArgument, app, at_least, end, tell_file, told_errors, write
 from rigid_env.cli.files import PICTURES, checked_folder, make_parents, output_option
-from rigid_env.terminal import make_console, progress_bar, say
+from rigid_env.terminal import Column, Table, make_console, number_columns, progress_bar, say
 
 if TYPE_CHECKING:
     from physics import Scene
@@ -26,7 +26,8 @@ Dt = Annotated[float, typer.Option("--dt", help="Step, and time between samples 
 @app.command(short_help="Drop the block; print what happens, write a picture and a GIF.")
 def demo(
     scene: Annotated[
-        str, typer.Argument(help="A canonical scene, or a scene file.", autocompletion=names.complete_scene)
+        str,
+        typer.Argument(help="A canonical scene, or a scene file (.toml or .xml).", autocompletion=names.complete_scene),
     ] = "drop",
     duration: Duration = 5.0,
     accuracy: Accuracy = "balanced",
@@ -114,6 +115,29 @@ def _draw(done: Demo, paths: list[Path], shot: Shot, console: Console) -> None:
         tell_file(path, console)
         if path.suffix == ".gif" and done.speed != 1.0:
             say(console, "", f"shows {done.speed:.3g} s in one second")
+
+
+@app.command(short_help="List the canonical scenes.")
+def scenes(json: Json = None) -> None:
+    """List the canonical scenes, which every command knows by their names.
+
+    A scene of your own is a file: docs/scene-files.md says how to write one.
+    """
+    with told_errors():
+        from physics.scene.canonical_scenes import SCENES, about
+
+        make_parents(json)
+        console = make_console()
+        table = Table([Column("scene", is_whole=True), *number_columns("bodies", "walls"), Column("what it is")])
+        rows = []
+        for name, make in SCENES.items():
+            scene = make()
+            rows.append(
+                {"scene": name, "bodies": len(scene.bodies), "walls": len(scene.walls), "what": about(name)},
+            )
+            table.add_row(*map(str, rows[-1].values()))
+        console.print(table)
+        write(json, {"scenes": rows}, console)
 
 
 @app.command(short_help="Take recorded steps again: are they the same, bit for bit?")

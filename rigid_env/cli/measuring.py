@@ -110,7 +110,10 @@ def effects(
 def accuracy(
     scene: Annotated[
         list[str] | None,
-        typer.Argument(help="Scenes; none: all with a known outcome.", autocompletion=names.complete_truth),
+        typer.Argument(
+            help="Scenes, also of files (.toml or .xml); none: all with a known outcome.",
+            autocompletion=names.complete_truth,
+        ),
     ] = None,
     peers: Annotated[
         str,
@@ -118,6 +121,9 @@ def accuracy(
             metavar="NAMES", help="Of mujoco,pybullet,drake; with commas.", autocompletion=names.complete_peers
         ),
     ] = "",
+    duration: Annotated[
+        float | None, typer.Option(help="Simulated time of scenes without a closed form [s]; 2 or 3 by default.")
+    ] = None,
     below: Annotated[float | None, typer.Option(help="Name the cheapest setting below this error.")] = None,
     json: Json = None,
     plot: Plot = None,
@@ -132,7 +138,7 @@ def accuracy(
         console, ladder = make_console(), QUICK if quick else Ladder()
         plot, lacking = drawable(plot, console)
         make_parents(json, plot)
-        report = accuracy_report.measure_and_show(console, scene or (), peers, ladder, is_full, below)
+        report = accuracy_report.measure_and_show(console, scene or (), peers, ladder, is_full, below, duration)
         if json:
             accuracy_report.write_result(json, report)
             tell_file(json, console)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from physics import Scene
 
-SCENE_FILE = ".toml"  # as of `rigid_env.tasks.scene_source`, which takes long to import
+SCENE_FILES = (".toml", ".xml")  # as of `rigid_env.tasks.scene_source`, which takes long to import
 
 
 def load_scene(name: str) -> tuple[str, Scene]:
@@ -33,12 +33,7 @@ def complete_scene(incomplete: str) -> list[str]:
     """Canonical scenes and scene files that begin like this."""
     from physics import scenes
 
-    folder, _, start = incomplete.rpartition("/")
-    place = Path(folder + "/") if folder or incomplete.startswith("/") else Path()
-    files = (path for path in sorted(place.glob("*")) if path.is_dir() or path.suffix == SCENE_FILE)
-    prefix = incomplete.removesuffix(start)
-    paths = [prefix + path.name + ("/" if path.is_dir() else "") for path in files if path.name.startswith(start)]
-    return [*_starting(incomplete, scenes.SCENES), *paths]
+    return [*_starting(incomplete, scenes.SCENES), *_scene_files(incomplete)]
 
 
 def complete_canonical(incomplete: str) -> list[str]:
@@ -63,10 +58,10 @@ def complete_presets(incomplete: str) -> list[str]:
 
 
 def complete_truth(incomplete: str) -> list[str]:
-    """Scenes whose accuracy can be measured."""
+    """Scenes whose accuracy can be measured, and scene files."""
     from rigid_env.lab.measure import accuracy
 
-    return _starting(incomplete, accuracy.names())
+    return [*_starting(incomplete, accuracy.names()), *_scene_files(incomplete)]
 
 
 def complete_peers(incomplete: str) -> list[str]:
@@ -88,6 +83,15 @@ def complete_case(incomplete: str) -> list[str]:
     from rigid_env.lab.hard_cases import registry
 
     return _starting(incomplete, (case.name for case in registry.CASES))
+
+
+def _scene_files(incomplete: str) -> list[str]:
+    """Scene files, and folders, that begin like this."""
+    folder, _, start = incomplete.rpartition("/")
+    place = Path(folder + "/") if folder or incomplete.startswith("/") else Path()
+    files = (path for path in sorted(place.glob("*")) if path.is_dir() or path.suffix in SCENE_FILES)
+    prefix = incomplete.removesuffix(start)
+    return [prefix + path.name + ("/" if path.is_dir() else "") for path in files if path.name.startswith(start)]
 
 
 def _starting(incomplete: str, known: Iterable[str]) -> list[str]:

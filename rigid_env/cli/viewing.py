@@ -12,12 +12,15 @@ from rigid_env.cli.common import app, at_least, tell_file, told_errors
 from rigid_env.cli.files import make_parents, output_option
 from rigid_env.terminal import make_console, say
 
-WHAT = "A canonical scene, a scene file, an environment id, a recording or a trajectory (.npz)."
+WHAT = (
+    "A canonical scene, a scene file (.toml or .xml), the id of an environment, module:Class of a task, a recording or "
+    "a trajectory (.npz)."
+)
 
 
 @app.command(short_help="Look at a scene, an environment, a recording or a trajectory in a browser.")
 def view(
-    what: Annotated[str, typer.Argument(help=WHAT, autocompletion=names.complete_scene)] = "drop",
+    what: Annotated[str, typer.Argument(metavar="[WHAT]", help=WHAT, autocompletion=names.complete_scene)] = "drop",
     accuracy: Annotated[str | None, typer.Option(help="Preset of the engine; balanced by default.")] = None,
     dt: Annotated[float | None, typer.Option("--dt", help="Step of a scene [s]; 0.01 by default.")] = None,
     seed: Annotated[int, typer.Option(min=0, help="Of the first episode, and of random actions.")] = 0,

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Mapping, Sequence
+from copy import deepcopy
 from typing import Any
 
 import gymnasium as gym
@@ -10,6 +12,7 @@ import numpy as np
 from gymnasium.vector import AutoresetMode
 from numpy.typing import NDArray
 
+from physics.summary import shown
 from rigid_env.envs import vector_infos as infos_of_batches
 from rigid_env.envs.vector_env import RigidVectorEnv
 from rigid_env.extras import require
@@ -37,7 +40,7 @@ class RigidVecEnv(VecEnv):
     Parameters
     ----------
     vector_env : RigidVectorEnv
-        In the autoreset mode ``SameStep``.
+        Made with ``autoreset_mode="SameStep"``.
     monitor : bool
         Add the ``episode`` statistics, as SB3's `Monitor` would; `env_is_wrapped(Monitor)` is then True. Turn
         off to use SB3's `VecMonitor`.
@@ -50,10 +53,15 @@ class RigidVecEnv(VecEnv):
 
     def __init__(self, vector_env: RigidVectorEnv[Any], monitor: bool = True) -> None:
         if vector_env.autoreset_mode is not AutoresetMode.SAME_STEP:
-            raise ValueError(f"vector_env has {vector_env.autoreset_mode}; allowed is AutoresetMode.SAME_STEP")
+            raise ValueError(
+                f"vector_env has autoreset_mode={vector_env.autoreset_mode}; allowed is AutoresetMode.SAME_STEP: make "
+                f'it with {type(vector_env).__name__}(..., autoreset_mode="SameStep"), or with '
+                'gymnasium.make_vec(..., autoreset_mode="SameStep")'
+            )
         self.vector_env = vector_env
         self.monitor = monitor
         self._actions: Any = None
+        self._shared: dict[str, Any] = {}  # options of all environments; `_options` are those of each
         self._returns = np.zeros(vector_env.num_envs)
         self._lengths = np.zeros(vector_env.num_envs, dtype=np.int64)
         self._start = time.perf_counter()
@@ -67,19 +75,77 @@ class RigidVecEnv(VecEnv):
         -------
         (num_envs, entries) float32
         """
-        options = self._options[0]
-        if any(other != options for other in self._options):
-            raise ValueError("set_options got different options; allowed is one dict for all environments")
         seeds = None if all(seed is None for seed in self._seeds) else self._seeds
-        obs, infos = self.vector_env.reset(seed=seeds, options=options or None)
-        self.reset_infos = [self._row_of(infos, i) for i in range(self.num_envs)]
+        starts: list[dict[str, Any]] = [{} for _ in range(self.num_envs)]
+        for rows, options in self._option_groups():
+            obs, infos = self.vector_env.reset(seed=seeds, options=options or None)
+            for i in rows:
+                starts[i] = self._row_of(infos, i)
+        self.reset_infos = starts
         self._reset_seeds()
         self._reset_options()
         self._returns[:] = 0.0
         self._lengths[:] = 0
         return obs
 
+<<<<<<< HEAD
     def step_async(self, actions: NDArray[Any]) -> None:
+=======
+    def set_options(self, options: Mapping[str, Any] | Sequence[Mapping[str, Any]] | None = None) -> None:
+        """Fix draws of the next episodes; used once, at the next `reset`.
+
+        Parameters
+        ----------
+        options : dict, or list of dict, optional
+            One dict is that of `RigidVectorEnv.reset`: each value is for all environments, or an array with a row for
+            each. A list has a dict for each environment, with values for this one; their keys may differ.
+
+        Raises
+        ------
+        ValueError
+            Something else, or another number of dicts than of environments.
+        """
+        if options is None or isinstance(options, Mapping):
+            self._shared, self._options = deepcopy(dict(options or {})), [{} for _ in range(self.num_envs)]
+            return
+        each = list(options) if isinstance(options, Sequence) and not isinstance(options, str) else []
+        if len(each) != self.num_envs or not all(isinstance(one, Mapping) for one in each):
+            raise ValueError(
+                f"options is {shown(options)}; allowed are a dict, or a list of {self.num_envs} dicts, one for each "
+                "environment"
+            )
+        for i, one in enumerate(each):
+            if "reset_mask" in one:
+                raise ValueError(f"options[{i}] holds reset_mask; allowed are draws of one environment")
+        self._shared, self._options = {}, [deepcopy(dict(one)) for one in each]
+
+    def _reset_options(self) -> None:
+        self.set_options(None)
+
+    def _option_groups(self) -> list[tuple[Sequence[int], dict[str, Any]]]:
+        """Environments that fix the same draws, and their options: a `reset` of the batch for each group."""
+        groups: dict[frozenset, list[int]] = {}
+        for i, one in enumerate(self._options):
+            groups.setdefault(frozenset(one), []).append(i)
+        found = []
+        for keys, rows in groups.items():
+            options = {key: self._stacked(key, rows) for key in sorted(keys)}
+            if len(groups) > 1:
+                options["reset_mask"] = np.isin(np.arange(self.num_envs), rows)
+            found.append((rows, {**self._shared, **options}))
+        return found
+
+    def _stacked(self, key: str, rows: Sequence[int]) -> np.ndarray:
+        """Values of one option, with a row for each of these environments."""
+        values = [np.asarray(self._options[i][key]) for i in rows]
+        for i, value in zip(rows, values):
+            if value.shape != values[0].shape:
+                allowed = f"{values[0].shape}, as options[{rows[0]}]"
+                raise ValueError(f"options[{i}] has {key} of shape {value.shape}; allowed is {allowed}")
+        return np.stack(values)
+
+    def step_async(self, actions: np.ndarray) -> None:
+>>>>>>> small
         """Keep the actions (num_envs, 6) for `step_wait`."""
         self._actions = actions
 

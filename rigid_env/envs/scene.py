@@ -117,7 +117,7 @@ class SceneEnv(RigidEnv[NDArray[Any]]):
 
     | Argument | Default | Meaning |
     | --- | --- | --- |
-    | `scene` | None | scene file (.toml), name of a canonical scene, or a `physics.Scene`; must be given |
+    | `scene` | None | scene file (.toml or .xml), name of a canonical scene, or a `physics.Scene`; must be given |
     | `driven` | None | names or indices of driven bodies; with one body in the scene that one |
     | `force` | None | longest force over the body's weight (0.9) |
     | `torque` | None | longest torque over weight times longest half extent (0.5) |
@@ -183,6 +183,9 @@ class SceneEnv(RigidEnv[NDArray[Any]]):
         )  # fmt: skip
         told = render_mode, width, height, obs, obs_size, obs_stack, contacts
         super().__init__(task, *told, camera=camera, arrows=arrows)
+
+    def _documented(self) -> type:
+        return type(self)
 
     def step(self, action: ArrayLike) -> tuple[NDArray[Any], float, bool, bool, dict[str, Any]]:
         """Hold an action for one control step; as `RigidEnv.step`, but truncated at the limit of the task."""

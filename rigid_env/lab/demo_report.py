@@ -21,12 +21,13 @@ def show(demo: Demo, summary: dict, console: Console) -> None:
     title = f", accuracy {demo.accuracy}, {demo.duration:g} s"
     console.print(Text.assemble((demo.name, "bold"), title))
     kinds = [type(body).__name__ for body in demo.scene.bodies]
-    console.print(event_table(summary["events"], kinds))
+    names = [body.name or kind for body, kind in zip(demo.scene.bodies, kinds)]
+    console.print(event_table(summary["events"], names))
     energy = summary["energy"]
     told = f"{energy['start']:.4f} J at the start, {energy['end']:.4f} J at the end"
     say(console, "energy", f"{told}, {energy['dissipated']:.4f} J dissipated")
     final = summary["final"]
-    _show_bodies(final, kinds, console)
+    _show_bodies(final, kinds, names, console)
     say(console, "at rest", "yes" if final["is_at_rest"] else "no")
     _show_contacts(summary["contacts"], console)
     status = summary["status"]
@@ -37,8 +38,8 @@ def show(demo: Demo, summary: dict, console: Console) -> None:
     say(console, "", f"{effort}, {status['unconverged']} above the tolerance; {worst}")
 
 
-def event_table(events: list[dict], kinds: list[str]) -> Table:
-    """The first events; `kinds` are the classes of the bodies."""
+def event_table(events: list[dict], names: list[str]) -> Table:
+    """The first events; `names` are those of the bodies, or their classes."""
     columns = [*number_columns("time [s]"), Column("what"), Column("body"), Column("with")]
     more = len(events) - SHOWN_EVENTS
     caption = f"{more} more are left out; --json has all" if more > 0 else ""
@@ -51,42 +52,42 @@ def event_table(events: list[dict], kinds: list[str]) -> Table:
         times = f" x {event['count']}" if event["count"] > 1 else ""
         impulse = float(np.linalg.norm(event["impulse"]))
         table.add_row(
-            f"{event['t']:.4f}", event["kind"] + times, _name_of(event["body"], kinds), _partner(event, kinds),
+            f"{event['t']:.4f}", event["kind"] + times, _name_of(event["body"], names), _partner(event, names),
             f"{impulse:.4g}" if impulse else "-",
         )  # fmt: skip
     return table
 
 
-def _name_of(body: int, kinds: list[str]) -> str:
-    return f"{body} {kinds[body]}" if body >= 0 else "-"
+def _name_of(body: int, names: list[str]) -> str:
+    return f"{body} {names[body]}" if body >= 0 else "-"
 
 
-def _partner(event: dict, kinds: list[str]) -> str:
+def _partner(event: dict, names: list[str]) -> str:
     """The wall or the other body that an event is about."""
-    return f"wall {event['wall']}" if event["wall"] >= 0 else _name_of(event["other"], kinds)
+    return f"wall {event['wall']}" if event["wall"] >= 0 else _name_of(event["other"], names)
 
 
-def _show_bodies(final: dict, kinds: list[str], console: Console) -> None:
+def _show_bodies(final: dict, kinds: list[str], names: list[str], console: Console) -> None:
     if len(kinds) == 1:
         for name, unit in QUANTITIES:
             say(console, name, f"({_numbers(final[name][0])}) {unit}".rstrip())
     elif len(kinds) <= FEW:
-        console.print(_body_table(final, kinds))
+        console.print(_body_table(final, names))
     else:
-        _summarise(final, kinds, console)
+        _summarise(final, kinds, names, console)
 
 
-def _body_table(final: dict, kinds: list[str]) -> Table:
+def _body_table(final: dict, names: list[str]) -> Table:
     heads = [f"{name} [{unit}]" if unit else name for name, unit in QUANTITIES]
     columns = [Column("body"), *number_columns(*heads)]
     table = Table(columns, "bodies at the end")
-    for body, kind in enumerate(kinds):
+    for body, label in enumerate(names):
         cells = ("\n".join(_numbers([value]) for value in final[name][body]) for name, _ in QUANTITIES)
-        table.add_row(f"{body} {kind}", *cells)
+        table.add_row(f"{body} {label}", *cells)
     return table
 
 
-def _summarise(final: dict, kinds: list[str], console: Console) -> None:
+def _summarise(final: dict, kinds: list[str], names: list[str], console: Console) -> None:
     """Print ranges in place of bodies, and the bodies that are fastest."""
     counts = {kind: kinds.count(kind) for kind in dict.fromkeys(kinds)}
     say(console, "bodies", ", ".join(f"{count} {kind}" for kind, count in counts.items()))
@@ -96,7 +97,8 @@ def _summarise(final: dict, kinds: list[str], console: Console) -> None:
     for name, unit in QUANTITIES[2:]:
         speeds = np.linalg.norm(final[name], axis=1)
         fastest = int(speeds.argmax())
-        told = f"{speeds.max():.3g} {unit} at most, body {fastest}; median {np.median(speeds):.3g} {unit}"
+        most = f"{speeds.max():.3g} {unit} at most, body {_name_of(fastest, names)}"
+        told = f"{most}; median {np.median(speeds):.3g} {unit}"
         say(console, name, told)
 
 

@@ -9,15 +9,18 @@ import inspect
 import re
 import textwrap
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
+from physics import Body
+from physics.scene.body_names import body_label
 from physics.summary import counted
 from rigid_env.tasks.actions import IMPULSE, TORQUE
 from rigid_env.tasks.declaration import Declaration
 from rigid_env.tasks.draws import parameter_of
 from rigid_env.tasks.goal import GoalTask
 from rigid_env.tasks.task import Task
+from rigid_env.tasks.written import Part, sentences, written_parts
 
 WIDTH = 79  # of lines of text [characters]
 
@@ -113,13 +116,14 @@ def sections(
     ----------
     task : Task
     documented : type, optional
-        Class whose docstring describes the task; None: that of the task.
+        Class whose docstring describes the task; None: that of the task. Where it has the sections of Gymnasium, their
+        words stand around the tables, and their meanings of arguments in the last one.
     added : mapping, optional
         Arguments that the environment adds to the task's, with their defaults.
     registered : mapping, optional
         Defaults of the id that the environment is registered under, instead of its class's.
     """
-    return (
+    found = (
         _description(task, documented or type(task)),
         _actions(task),
         _observation(task),
@@ -129,6 +133,11 @@ def sections(
         _end(task),
         _arguments(task, added or {}, registered or {}),
     )
+    parts = written_parts(documented or type(task))
+    known = {section.title for section in found}
+    own = (Section(title, part.text) for title, part in parts.items() if title not in known)
+    merged = (_merged(section, parts[section.title]) if section.title in parts else section for section in found)
+    return tuple(_named(section, task.world.names) for section in (*merged, *own))
 
 
 # --- sections ---------------------------------------------------------------------------------------------------------
@@ -136,12 +145,10 @@ def sections(
 
 def _description(task: Task, documented: type) -> Section:
     scene, doc = task.world.scene, inspect.cleandoc(documented.__doc__ or "")
-    bodies = "; ".join(f"{i} {type(body).__name__} of {body.mass:g} kg" for i, body in enumerate(scene.bodies))
+    bodies = "; ".join(f"{_kind(i, body)} of {body.mass:g} kg" for i, body in enumerate(scene.bodies))
     effects = counted(type(effect).__name__ for effect in scene.effects)
-    text = [*_paragraphs(doc), f"Bodies: {bodies}. Walls: {len(scene.walls)}. Effects: {effects}."]
-    if "## Rewards" in doc:
-        text.append(f"`help({documented.__module__}.{documented.__qualname__})` says more.")
-    return Section("Description", tuple(text))
+    text = f"Bodies: {bodies}. Walls: {len(scene.walls)}. Effects: {effects}."
+    return Section("Description", tuple(_paragraphs(doc)), after=(text,))
 
 
 def _actions(task: Task) -> Section:
@@ -214,7 +221,9 @@ def _disturbances(task: Task) -> tuple[Section, ...]:
             size = f"speed {kind.speed.describe()} m/s"
         else:
             size = f"force {kind.force.describe()} m g, lasts {kind.lasts.describe()} s"
-        rows.append((type(kind).__name__, str(kind.body), size, kind.axes, f"{kind.every:g} s"))
+        rows.append(
+            (type(kind).__name__, body_label(kind.body, task.world.names), size, kind.axes, f"{kind.every:g} s")
+        )
     text = "Pushes and gusts come at random times, exponentially distributed."
     columns = ("Kind", "Body", "Size", "Axes", "Mean wait")
     return (Section("Disturbances", (text,), columns, tuple(rows)),) if rows else ()
@@ -250,7 +259,47 @@ def _arguments(task: Task, added: Mapping[str, Any], registered: Mapping[str, An
     return Section("Arguments", (), ("Argument", "Default", "Meaning"), rows)
 
 
+# --- with the words of a docstring ------------------------------------------------------------------------------------
+
+
+def _merged(section: Section, part: Part) -> Section:
+    """Section with the text that a docstring has under its title; numbers of its own tables and limits stay."""
+    title = section.title
+    if title == "Description":
+        return replace(section, before=(*section.before, *part.text))
+    if title in ("Action Space", "Observation Space"):
+        told = " ".join(section.before)
+        words = sentences(part.text, lambda text: "float32" not in text and text[-1] != ":" and text not in told)
+        return replace(section, after=words)
+    if title == "Episode End":
+        words = sentences(part.text, lambda text: not text.startswith("Truncation: "))
+        return replace(section, before=(*words, *section.before[1:]))
+    if title == "Arguments":
+        meanings = {row[0]: row[-1] for row in part.rows}
+        meanings.setdefault("`threads`", ARGUMENTS["threads"])  # of batches
+        rows = tuple((*row[:-1], meanings[row[0]]) for row in section.rows if row[0] in meanings)
+        rows = rows if part.rows else section.rows
+        return replace(section, rows=rows, before=part.before, after=part.after)
+    return replace(section, before=part.text)
+
+
 # --- parts of these ---------------------------------------------------------------------------------------------------
+
+
+def _kind(index: int, body: Body) -> str:
+    """Index, name and class of a body."""
+    kind = type(body).__name__
+    return f"{index} {kind}" if body.name is None else f"{index} {body.name} ({kind})"
+
+
+def _named(section: Section, names: tuple[str, ...]) -> Section:
+    """Section with the names of bodies behind their indices."""
+
+    def label(found: re.Match) -> str:
+        return f"body {body_label(int(found[1]), names)}"
+
+    rows = tuple(tuple(re.sub(r"\bbody (\d+)", label, cell) for cell in row) for row in section.rows)
+    return replace(section, rows=rows)
 
 
 def _meaning(name: str) -> str:

@@ -5,11 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping
 from typing import Any, TypeVar
 
-import numpy as np
-
 import physics
 from physics.io.scene_places import Places
 from physics.keywords import nearest_first
+from physics.scene.body_names import body_index
 from physics.summary import shown
 
 T = TypeVar("T")
@@ -70,23 +69,6 @@ class Section:
         return part
 
 
-def body_index(value, field: str, scene: physics.Scene, verb: str = "is") -> int:
-    """Index of a body of a scene, from its name or itself.
-
-    Raises
-    ------
-    ValueError
-        No such body: names the field, the value and the bodies there are, the nearest name first.
-    """
-    names = {body.name: b for b, body in enumerate(scene.bodies) if body.name is not None}
-    if isinstance(value, str) and value in names:
-        return names[value]
-    count = len(scene.bodies)
-    if isinstance(value, (int, np.integer)) and not isinstance(value, bool) and 0 <= value < count:
-        return int(value)
-    raise ValueError(f"{field} {verb} {shown(value)}; allowed are {_bodies(names, count, value)}")
-
-
 def body_indices(value, field: str, scene: physics.Scene) -> tuple[int, ...]:
     """Indices of bodies, from a list of names and indices, or from one of them; each once, at least one."""
     given = list(value) if isinstance(value, (list, tuple)) else [value]
@@ -97,15 +79,3 @@ def body_indices(value, field: str, scene: physics.Scene) -> tuple[int, ...]:
         if body in found[:k]:
             raise ValueError(f"{field} holds body {body} twice; allowed is each body once")
     return tuple(found)
-
-
-def told_bodies(scene: physics.Scene) -> str:
-    """Names and indices of a scene's bodies, for errors."""
-    names = [body.name for body in scene.bodies if body.name is not None]
-    return _bodies(names, len(scene.bodies), "")
-
-
-def _bodies(names: Iterable[str], count: int, near: object) -> str:
-    indices = f"indices from 0 to {count - 1}" if count > 1 else "the index 0"
-    ordered = nearest_first(near, names) if isinstance(near, str) else list(names)
-    return f"{', '.join(ordered)}, or {indices}" if ordered else indices

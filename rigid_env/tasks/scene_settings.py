@@ -11,11 +11,12 @@ import numpy as np
 import physics
 from physics import validation
 from physics.io.toml import SceneFile
+from physics.scene.body_names import body_index, told_bodies
 from physics.summary import shown
 from rigid_env.tasks.actions import FRAMES
 from rigid_env.tasks.distributions import Uniform, read_numbers
 from rigid_env.tasks.observe import LENGTH, REACH
-from rigid_env.tasks.scene_section import Section, body_index, body_indices, told_bodies
+from rigid_env.tasks.scene_section import Section, body_indices
 
 FORCE, TORQUE = 0.9, 0.5
 """Longest force over a driven body's weight, and longest torque over weight times longest half extent."""

@@ -8,12 +8,16 @@ from typing import NamedTuple
 
 import physics
 from physics import scenes
+from physics.io.mjcf import load_mjcf
 from physics.io.toml import SceneFile, load_file
 from physics.keywords import nearest_first
 from physics.summary import shown
 
-SCENE_FILE = ".toml"
-"""Ending of scene files."""
+MJCF_FILE = ".xml"
+"""Ending of files in MJCF, the format of MuJoCo."""
+
+SCENE_FILES = (".toml", MJCF_FILE)
+"""Endings of files that hold a scene."""
 
 
 class Found(NamedTuple):
@@ -25,7 +29,7 @@ class Found(NamedTuple):
         Short, for titles.
     scene : physics.Scene
     file : SceneFile or None
-        None: the scene is no file's.
+        None: the scene is no file's, or that of a file in MJCF, which holds nothing else.
     """
 
     name: str
@@ -43,15 +47,17 @@ def find_scene(scene: physics.Scene | str | os.PathLike) -> Found:
     """
     if isinstance(scene, physics.Scene):
         return Found("Scene", scene, None)
-    allowed = f"a scene file ({SCENE_FILE})"
+    allowed = f"a scene file ({' or '.join(SCENE_FILES)})"
     if not isinstance(scene, (str, os.PathLike)) or not os.fspath(scene):
         raise ValueError(f"scene is {shown(scene)}; allowed are {allowed}, a canonical scene, or a physics.Scene")
     name = os.fspath(scene)
     path = Path(name)
-    if path.suffix.lower() == SCENE_FILE or path.is_file():
+    if path.suffix.lower() in SCENE_FILES or path.is_file():
         if not path.is_file():
             what = "is a folder" if path.is_dir() else "does not exist"
             raise ValueError(f"scene is {name!r}, which {what}; allowed is a scene file, or a canonical scene")
+        if path.suffix.lower() == MJCF_FILE:
+            return Found(path.stem, load_mjcf(path), None)
         file = load_file(path)
         return Found(path.stem, file.scene, file)
     if name in scenes.SCENES:

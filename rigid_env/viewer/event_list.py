@@ -59,5 +59,6 @@ class EventList:
 
 def told(event: Event) -> str:
     """One line about an event."""
-    where = f", body {event.other}" if event.other >= 0 else f", wall {event.wall}" if event.wall >= 0 else ""
-    return f"{event.t:.3f} s  {event.kind}: body {event.body}{where}"
+    other = event.other_name or f"body {event.other}"
+    where = f", {other}" if event.other >= 0 else f", wall {event.wall}" if event.wall >= 0 else ""
+    return f"{event.t:.3f} s  {event.kind}: {event.name or f'body {event.body}'}{where}"

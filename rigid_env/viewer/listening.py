@@ -9,7 +9,7 @@ import numpy as np
 
 import physics
 from physics import Event, Status
-from physics.analysis.events import contact_events, contact_pairs, fault_events, logged_events
+from physics.analysis.events import contact_events, contact_pairs, fault_events, logged_events, named
 
 EVENT_ROOM = 128
 """Events per body and call of a step that are told; more are left out."""
@@ -96,10 +96,11 @@ class Listener:
         """It has been made."""
         self.seconds += time.perf_counter() - self._clock
         world, report = self._world, self._world.report
-        self.events += logged_events(world, self._from)
+        events = logged_events(world, self._from)
         if not world.plan.events:
             before, self.pairs = self.pairs, contact_pairs(world)
-            self.events += contact_events(before, self.pairs, world.time) + fault_events(world, world.time)
+            events += contact_events(before, self.pairs, world.time) + fault_events(world, world.time)
+        self.events += named(events, world.names)
         self.penetration = max(self.penetration, float(report.penetration[0]))
         self.residual = max(self.residual, float(report.residual[0]))
         if report.status[0] == Status.FAULT:

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from typing import Any
 
 from physics import PRESETS
+from physics.scene.body_names import body_label, body_names
 from rigid_env.viewer.event_list import EventList
 from rigid_env.viewer.plots import Plots
 from rigid_env.viewer.session import Session
@@ -99,7 +100,8 @@ class Panel:
         if session.can.seed:
             seed = gui.add_number("seed", session.seed, min=0, max=2**32 - 1, step=1)
         self._button("Reset", lambda: session.reset(None if seed is None else int(seed.value)))
-        bodies = [f"body {k}" for k in range(len(session.look().frame.bodies))]
+        names = body_names(session.subject.scene)
+        bodies = [f"body {body_label(k, names)}" for k in range(len(session.look().frame.bodies))]
         follow = gui.add_dropdown("follow", (ROOM, *bodies), initial_value=ROOM)
         self._when(follow, lambda value: self._stage.follow(None if value == ROOM else bodies.index(value)))
 

@@ -21,8 +21,8 @@ from rigid_env.viewer.worlds import live_scene, live_world
 ACCURACY, DT = "balanced", 0.01
 
 ALLOWED = (
-    "a canonical scene, a scene file (.toml), an environment id, a recording or a trajectory (.npz), and of Python "
-    "physics.Scene, World, Trajectory, Recording and environments of rigid_env"
+    "a canonical scene, a scene file (.toml or .xml), the id of an environment, 'module:Class' of a task, a recording "
+    "or a trajectory (.npz), and of Python physics.Scene, World, Trajectory, Recording and environments of rigid_env"
 )
 
 KNOWN_FIRST = 3
@@ -106,10 +106,10 @@ def _loaded(what: Any) -> tuple[Any, str]:
 
 
 def _of_text(text: str) -> tuple[Any, str]:
-    from rigid_env.tasks.scene_source import SCENE_FILE, find_scene
+    from rigid_env.tasks.scene_source import SCENE_FILES, find_scene
 
     path = Path(text)
-    if text in scenes.SCENES or path.suffix.lower() == SCENE_FILE:
+    if text in scenes.SCENES or path.suffix.lower() in SCENE_FILES:
         found = find_scene(text)
         return found.scene, found.name
     if path.is_file():

@@ -28,7 +28,7 @@ runner = CliRunner()
 COMMANDS = {
     "demo": (), "run": ("rest",), "replay": ("none.npz",), "explain": ("rest",), "warmup": (), "bench": (),
     "effects": (), "accuracy": (), "tosses": ("none.npz",), "hard-cases": (), "describe": ("rigid_env/BlockReach-v0",),
-    "view": ("rest",),
+    "view": ("rest",), "scenes": (),
 }  # fmt: skip
 
 CART = Path(__file__).parents[2] / "examples" / "cart.toml"
@@ -69,6 +69,12 @@ def test_help_is_printed_as_it_is_written(command):
         told = getattr(parameter, "help", None)
         if told:
             assert " ".join(told.split()) in text
+
+
+def test_help_names_tasks_of_ones_own():
+    for command in ("view", "describe"):
+        assert "module:Class" in " ".join(run(command, "--help").split())
+    assert "'module:Class'" in run("view", "nothing", code=2)
 
 
 def test_units_are_there():
@@ -175,6 +181,27 @@ def test_run_and_demo_take_scenes_and_files_alike(ball, tmp_path):
     out = tmp_path / "pictures"
     assert "ball, accuracy balanced" in run("demo", ball, "--duration", 0.05, "--out", out)
     assert sorted(path.name for path in out.iterdir()) == ["ball.gif", "ball.png"]
+
+
+def test_scenes_are_listed(tmp_path):
+    file = tmp_path / "scenes.json"
+    output = run("scenes", "--json", file)
+    rows = {row["scene"]: row for row in json.loads(file.read_text())["scenes"]}
+    assert list(rows) == list(scenes.SCENES)
+    for name, row in rows.items():
+        assert f"{name} " in output
+        assert row["what"] in output
+        assert "`" not in row["what"]
+    assert (rows["heap"]["bodies"], rows["heap"]["walls"]) == (100, 5)
+
+
+def test_run_takes_files_of_mujoco(tmp_path):
+    path = tmp_path / "ball.xml"
+    physics.save_mjcf(BALL, path)
+    assert "pos         (0.1000, -0.0490, 0.0000) m" in run("run", path, "--duration", 0.1)
+    path.write_text("<mujoco><worldbody>")
+    assert "ball.xml: no element found" in run("run", path, code=2)
+    assert "does not exist" in run("explain", tmp_path / "none.xml", code=2)
 
 
 def test_run_takes_the_scene_of_an_environment():
@@ -342,14 +369,16 @@ def test_commands_scenes_presets_and_cases_are_completed(tmp_path):
 
 
 def test_scene_files_are_completed(tmp_path, monkeypatch):
-    from rigid_env.cli.names import complete_scene
+    from rigid_env.cli.names import complete_scene, complete_truth
 
     monkeypatch.chdir(tmp_path)
     (tmp_path / "dropped.toml").touch()
+    (tmp_path / "tumbling.xml").touch()
     (tmp_path / "deep").mkdir()
     (tmp_path / "deep" / "one.toml").touch()
     (tmp_path / "data.csv").touch()
     assert complete_scene("d") == ["drop", "deep/", "dropped.toml"]
+    assert complete_scene("tum") == complete_truth("tum") == ["tumble", "tumbling.xml"]
     assert complete_scene("deep/") == ["deep/one.toml"]
     assert complete_scene(f"{tmp_path}/deep/o") == [f"{tmp_path}/deep/one.toml"]
 

@@ -171,6 +171,23 @@ def test_a_scene_without_closed_form_is_compared_with_the_reference():
     assert "truth: DOP853" in output
 
 
+def test_scene_files_are_measured(tmp_path):
+    """Also those of MuJoCo."""
+    paths = [tmp_path / "mine.toml", tmp_path / "mine.xml"]
+    physics.save_scene(physics.scenes.tumble(), paths[0])
+    physics.save_mjcf(physics.scenes.tumble(), paths[1])
+    file = tmp_path / "numbers.json"
+    output = run(paths[1], "--quick", "--duration", 0.2, "--json", file)
+    (found,) = json.loads(file.read_text())["scenes"]
+    assert (found["case"], found["duration"]) == (str(paths[1]), 0.2)
+    assert f"{paths[1]}: " in output
+    (job,) = accuracy.make_jobs([str(paths[0])], ladder=QUICK)
+    assert (job.scene, job.duration) == (physics.scenes.tumble(), accuracy.DURATION)
+    assert "mine.txt" in run(tmp_path / "mine.txt", "--quick", code=2)
+    assert "does not exist" in run(tmp_path / "none.toml", "--quick", code=2)
+    assert "duration is 0" in run(paths[0], "--quick", "--duration", 0, code=2)
+
+
 def test_a_peer_that_is_missing_is_skipped_with_a_message(monkeypatch):
     monkeypatch.setattr(peers, "is_installed", lambda name: False)
     output = run("vertex", "--quick", "--peers", "drake")
@@ -219,11 +236,22 @@ def test_the_plot_has_a_panel_per_scene(tmp_path):
     write_plot(results, tmp_path / "deep" / "three.png")
     with image.open(tmp_path / "one.png") as one, image.open(tmp_path / "deep" / "three.png") as three:
         assert three.size[0] == 3 * one.size[0]
-        assert three.size[1] == one.size[1]
+        assert three.size[1] <= one.size[1]  # of a legend with fewer rows
     with pytest.raises(ValueError, match="results is empty"):
         write_plot([], tmp_path / "none.png")
     with pytest.raises(ValueError, match="xyz"):
         write_plot(results, tmp_path / "one.xyz")
+
+
+def test_the_legend_fits_below_the_panel(tmp_path):
+    pytest.importorskip("matplotlib")
+    long = point("rigid-env", "a preset of one's own with a long name", 0.02, 1e-3, 50.0)
+    figure = found((*POINTS, long), own_error=1e-9).frontier.plot(tmp_path / "one.png")
+    (legend,) = figure.legends
+    extent = legend.get_window_extent(figure.canvas.get_renderer())
+    assert 0 <= extent.x0 < extent.x1 <= figure.bbox.width
+    assert (tmp_path / "one.png").stat().st_size > 0
+    assert "rigid-env fast" in {text.get_text() for text in legend.get_texts()}
 
 
 def test_without_matplotlib_the_extra_is_named_before_anything_is_measured(monkeypatch, tmp_path):

@@ -32,8 +32,50 @@ def make(num_envs=3, monitor=True, **arguments):
 
 
 def test_only_same_step_autoreset_is_taken():
-    with pytest.raises(ValueError, match=r"NEXT_STEP; allowed is .*SAME_STEP"):
+    """The error says which argument that is."""
+    with pytest.raises(ValueError, match=r"NEXT_STEP; allowed is .*SAME_STEP") as error:
         RigidVecEnv(BlockReachVectorEnv(2))
+    assert 'BlockReachVectorEnv(..., autoreset_mode="SameStep")' in str(error.value)
+
+
+def test_options_are_arrays_or_a_dict_for_each_environment():
+    venv = make()
+    goals = np.array([(0.0, 0.0), (1.0, 2.0), (3.0, 3.0)])
+    venv.set_options({"goal": goals, "mass": np.array([5.0, 6.0, 7.0])})
+    together = venv.reset()
+    assert [info["goal"] for info in venv.reset_infos] == goals.tolist()
+    assert [info["mass"] for info in venv.reset_infos] == [5.0, 6.0, 7.0]
+    for each in (True, False):  # of all, and of some of them
+        venv.seed(3)
+        venv.set_options([{"goal": goal, "mass": 5.0} if each or i != 1 else {} for i, goal in enumerate(goals)])
+        obs, infos = venv.reset(), venv.reset_infos
+        assert obs.shape == together.shape
+        chosen = [0, 1, 2] if each else [0, 2]
+        assert [infos[i]["goal"] for i in chosen] == goals[chosen].tolist()
+        assert [info["mass"] for info in infos] == [5.0, 5.0 if each else 6.0, 5.0]
+    venv.seed(3)
+    drawn = venv.reset()
+    np.testing.assert_array_equal(drawn[1], obs[1])  # no option is left, and that of one is no other's
+    assert not np.array_equal(drawn[0], obs[0])
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        ([{}], "allowed are a dict, or a list of 3 dicts"),
+        ("goal", "allowed are a dict, or a list of 3 dicts"),
+        ([{}, {"reset_mask": True}, {}], r"options\[1\] holds reset_mask"),
+        ([{"goal": (0, 0)}, {"goal": 1.0}, {"goal": (1, 1)}], r"options\[1\] has goal of shape \(\)"),
+        ([{"gaol": (0, 0)}, {}, {}], "gaol"),
+    ],
+)
+def test_options_that_fit_no_environment_are_refused(options, words):
+    def start(venv):
+        venv.set_options(options)
+        venv.reset()
+
+    with pytest.raises(ValueError, match=words):
+        start(make())
 
 
 def test_truncation_is_told_apart_and_the_final_observation_kept(rng):

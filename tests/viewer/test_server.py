@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import socket
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -195,6 +196,7 @@ def test_an_event_is_told_in_a_line():
     assert told(event(1.25)) == "1.250 s  impact: body 0, wall 0"
     assert told(event(0.5, other=3)) == "0.500 s  impact: body 0, body 3"
     assert told(event(0.5, "rest", NO_WALL)) == "0.500 s  rest: body 0"
+    assert told(replace(event(0.5, other=3), name="cart", other_name="crate")) == "0.500 s  impact: cart, crate"
 
 
 class Handle:

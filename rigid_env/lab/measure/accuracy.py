@@ -4,22 +4,24 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
 import physics
-from physics import scenes
+from physics import scenes, validation
 from physics.keywords import nearest_first
 from physics.work_precision import run as frontier_run
 from physics.work_precision.contender import OURS, Contender, EngineContender
 from physics.work_precision.run import REPEATS, STEPS
 from rigid_env.lab.measure import peers
 from rigid_env.lab.measure.truths import CASES, Case
+from rigid_env.tasks.scene_source import SCENE_FILES, find_scene
 
 # Peers are measured at smaller steps, too, at which they do better.
 PEER_STEPS = (*STEPS, 0.0005)  # [s]
 
 # Scenes without a closed form that are measured where none are named, and for how long [s].
 OPEN = {"drop": 3.0, "corner_drop": 3.0, "vertex_drop": 2.0}
-DURATION = 2.0  # of other canonical scenes [s]
+DURATION = 2.0  # of other scenes [s]
 
 Tick = Callable[[str], None]
 
@@ -140,22 +142,35 @@ def load_peers(wanted: Sequence[str]) -> tuple[dict[str, peers.Engine], list[str
 
 
 def make_jobs(
-    wanted: Sequence[str] = (), engines: Mapping[str, peers.Engine] | None = None, ladder: Ladder | None = None
+    wanted: Sequence[str] = (),
+    engines: Mapping[str, peers.Engine] | None = None,
+    ladder: Ladder | None = None,
+    duration: float | None = None,
 ) -> list[Job]:
-    """The scenes of these names, ready to be measured; without names: those with a closed form, and `OPEN`.
+    """Scenes, ready to be measured.
+
+    Parameters
+    ----------
+    wanted : sequence of str
+        Of `names`, or scene files; none: those with a closed form, and `OPEN`.
+    engines : mapping of Engine, optional
+    ladder : Ladder, optional
+    duration : float, optional
+        Of scenes without a closed form [s]; None: that of `OPEN`, or `DURATION`.
 
     Raises
     ------
     ValueError
-        There is no such scene.
+        There is no such scene, a file has a mistake, or the duration is not positive.
     """
-    unknown = sorted(set(wanted) - set(names()))
+    if duration is not None:
+        duration = float(validation.positive(duration, (), "duration"))
+    unknown = sorted(name for name in set(wanted) - set(names()) if not _is_file(name))
     if unknown:
-        raise ValueError(
-            f"scene is {', '.join(map(repr, unknown))}; allowed are {', '.join(nearest_first(unknown[0], names()))}"
-        )
+        told = f"scene is {', '.join(map(repr, unknown))}; allowed are {', '.join(nearest_first(unknown[0], names()))}"
+        raise ValueError(f"{told}, or a scene file ({' or '.join(SCENE_FILES)})")
     chosen = list(dict.fromkeys(wanted)) or [*(case.key for case in CASES), *OPEN]
-    return [_make_job(name, engines or {}, ladder or Ladder()) for name in chosen]
+    return [_make_job(name, engines or {}, ladder or Ladder(), duration) for name in chosen]
 
 
 def run_count(jobs: Sequence[Job], ladder: Ladder) -> int:
@@ -181,11 +196,16 @@ def run(jobs: Sequence[Job], ladder: Ladder, tick: Tick = lambda what: None) -> 
             return
 
 
-def _make_job(name: str, engines: Mapping[str, peers.Engine], ladder: Ladder) -> Job:
+def _is_file(name: str) -> bool:
+    return Path(name).suffix.lower() in SCENE_FILES or Path(name).is_file()
+
+
+def _make_job(name: str, engines: Mapping[str, peers.Engine], ladder: Ladder, duration: float | None) -> Job:
     case = next((case for case in CASES if case.key == name), None)
-    scene = case.scene() if case else scenes.by_name(name)
-    duration = case.duration if case else OPEN.get(name, DURATION)
-    what = case.what if case else f"{name}, {duration:g} s: largest error of any point of the body"
+    scene = case.scene() if case else find_scene(name).scene
+    duration = case.duration if case else duration or OPEN.get(name, DURATION)
+    title = f"{duration:g} s" if _is_file(name) else f"{name}, {duration:g} s"
+    what = case.what if case else f"{title}: largest error of any point of a body"
     settings = physics.ladder(ladder.accuracies, ladder.steps)
     ours = [EngineContender(scene, physics.PRESETS[a], dt) for a, dt in settings]
     theirs, skipped = [], []

@@ -42,6 +42,7 @@ def measure_and_show(
     ladder: Ladder | None = None,
     is_full: bool = False,
     below: float | None = None,
+    duration: float | None = None,
 ) -> Report:
     """Measure scenes and print a table of each as soon as it is there.
 
@@ -57,11 +58,13 @@ def measure_and_show(
         Show every point.
     below : float, optional
         Say which setting is the cheapest below this error, in each scene's unit.
+    duration : float, optional
+        See `accuracy.make_jobs`.
 
     Raises
     ------
     ValueError
-        No such scene or peer, or `below` is not positive.
+        No such scene or peer, or `below` or `duration` is not positive.
     """
     if below is not None:
         validation.positive(below, (), "below")
@@ -71,7 +74,7 @@ def measure_and_show(
         console.print(f"skipped: {message}")
     if engines:
         console.print("peers: " + ", ".join(f"{e.name} {e.version}" for e in engines.values()))
-    jobs = accuracy.make_jobs(scenes, engines, ladder)
+    jobs = accuracy.make_jobs(scenes, engines, ladder, duration)
     results = []
     with progress_bar(console, has_thread=False) as progress, elsewhere():
         task = progress.add_task("accuracy", total=accuracy.run_count(jobs, ladder))
