@@ -88,9 +88,6 @@ class RigidVecEnv(VecEnv):
         self._lengths[:] = 0
         return obs
 
-<<<<<<< HEAD
-    def step_async(self, actions: NDArray[Any]) -> None:
-=======
     def set_options(self, options: Mapping[str, Any] | Sequence[Mapping[str, Any]] | None = None) -> None:
         """Fix draws of the next episodes; used once, at the next `reset`.
 
@@ -144,8 +141,7 @@ class RigidVecEnv(VecEnv):
                 raise ValueError(f"options[{i}] has {key} of shape {value.shape}; allowed is {allowed}")
         return np.stack(values)
 
-    def step_async(self, actions: np.ndarray) -> None:
->>>>>>> small
+    def step_async(self, actions: NDArray[Any]) -> None:
         """Keep the actions (num_envs, 6) for `step_wait`."""
         self._actions = actions
 
