@@ -24,8 +24,8 @@ MISTAKES = {
 
 # Packages whose types the program does not need: mypy would read thousands of their files.
 SKIPPED = (
-    "torch", "numba", "llvmlite", "matplotlib", "pandas", "pygame", "viser", "scipy", "rich", "typer", "stable_baselines3",
-    "physics.kernels", "rigid_env.lab",
+    "torch", "numba", "llvmlite", "matplotlib", "pandas", "pygame", "viser", "scipy", "rich", "typer",
+    "stable_baselines3", "physics.kernels", "rigid_env.lab",
 )  # fmt: skip
 
 
