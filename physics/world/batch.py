@@ -129,7 +129,7 @@ class Batch:
 
     if TYPE_CHECKING:  # of `World`
 
-        def advance(self, calls: list[Work], wrench: np.ndarray, steps: int, dt: float) -> None: ...
+        def advance(self, calls: Any, wrench: np.ndarray, steps: int, dt: float) -> None: ...
 
     def make(self, calls: list[Work], duration: float) -> None:
         """Make kernel calls that take so long [s]."""

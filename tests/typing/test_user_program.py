@@ -22,8 +22,11 @@ MISTAKES = {
     "effect": ("physics.Gravity([0", "physics.Gravitation([0"),
 }
 
-# Libraries whose own types the program does not need: mypy would read thousands of their files.
-SKIPPED = ("torch", "numba", "llvmlite", "matplotlib", "pandas", "pygame", "viser", "scipy", "rich", "typer")
+# Packages whose types the program does not need: mypy would read thousands of their files.
+SKIPPED = (
+    "torch", "numba", "llvmlite", "matplotlib", "pandas", "pygame", "viser", "scipy", "rich", "typer",
+    "stable_baselines3", "physics.kernels", "rigid_env.lab",
+)  # fmt: skip
 
 
 def planted(folder: Path) -> dict[str, int]:
