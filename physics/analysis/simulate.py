@@ -6,7 +6,6 @@ import math
 from collections.abc import Callable
 from functools import partial
 from itertools import pairwise
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -94,9 +93,10 @@ def simulate(
         samples.append(_sample(world))
         contacts.append(contacts_of(world))
         reports.append(report)
-    columns: Any = [np.array(column) for column in zip(*samples)]
+    pos, quat, linvel, angvel, energy = (np.array(column) for column in zip(*samples))
     touched = contact_samples(times, contacts)
-    return Trajectory(np.array(times), *columns, tuple(events), tuple(reports), scene, touched)
+    parts = (tuple(events), tuple(reports), scene, touched)
+    return Trajectory(np.array(times), pos, quat, linvel, angvel, energy, *parts)
 
 
 def _times(duration, sample_dt, dt) -> tuple[float, float, float]:

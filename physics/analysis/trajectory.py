@@ -184,7 +184,7 @@ class Trajectory:
     def to_npz(self, path: str | Path) -> None:
         """Write samples, events, contacts, and the scene's bodies and walls as an archive; `from_npz` reads it."""
         samples: Any = {name: getattr(self, name) for name in SAMPLES}
-        rest = {**event_arrays(self.events), **contact_arrays(self.contacts), **scene_arrays(self.scene)}
+        rest: Any = {**event_arrays(self.events), **contact_arrays(self.contacts), **scene_arrays(self.scene)}
         np.savez(path, **samples, **rest)
 
     @classmethod
@@ -213,7 +213,7 @@ class Trajectory:
                     parts = dict(content)
                 samples = _checked({name: parts[name] for name in SAMPLES})
                 scene = _matching(scene_of(parts), samples)
-                events = tuple(named(events_of(parts), () if scene is None else body_names(scene)))
+                events = tuple(named(list(events_of(parts)), () if scene is None else body_names(scene)))
                 contacts = contacts_of_file(parts)
                 return cls(**samples, events=events, reports=(), scene=scene, contacts=contacts)
             except Exception as error:  # whatever is wrong with it, it is none

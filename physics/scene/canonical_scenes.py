@@ -183,7 +183,7 @@ SCENES["incline"] = _steep_incline
 
 def about(name: str) -> str:
     """One line about a canonical scene."""
-    return SCENES[name].__doc__.splitlines()[0].rstrip(".")
+    return (SCENES[name].__doc__ or name).splitlines()[0].rstrip(".")
 
 
 def by_name(name: str) -> Scene:

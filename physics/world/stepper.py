@@ -119,7 +119,7 @@ class Stepper:
             world.is_free = True
 
     def _advance(self) -> None:
-        world = self.world
+        world: Any = self.world
         if self._calls is None:
             self._prepare()
         world.advance(self._calls, self._wrench, self.steps, self.dt)

@@ -124,7 +124,7 @@ class RigidVecEnv(VecEnv):
         groups: dict[frozenset, list[int]] = {}
         for i, one in enumerate(self._options):
             groups.setdefault(frozenset(one), []).append(i)
-        found = []
+        found: list[tuple[Sequence[int], dict[str, Any]]] = []
         for keys, rows in groups.items():
             options = {key: self._stacked(key, rows) for key in sorted(keys)}
             if len(groups) > 1:
