@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import pytest
 
-from agents.config import RunConfig
+if TYPE_CHECKING:  # it needs the extra `agents`
+    from agents.config import RunConfig
 
 NUM_ENVS, ROLLOUT = 8, 16
 
@@ -31,6 +34,8 @@ TINY_ALGORITHMS[HINDSIGHT] = {
 @pytest.fixture(params=TINY_ALGORITHMS)
 def tiny(request) -> RunConfig:
     """Two rollouts of 8 worlds (PPO), or as many steps (SAC); with hindsight in episodes of five steps."""
+    from agents.config import RunConfig
+
     is_goal = request.param == HINDSIGHT
     return RunConfig(
         env="rigid_env/BlockReachGoal-v0" if is_goal else "rigid_env/BlockReach-v0",

@@ -7,11 +7,11 @@ import inspect
 import gymnasium as gym
 import numpy as np
 import pytest
-import yaml
 
 pytest.importorskip("stable_baselines3")
 
 import torch
+import yaml
 from stable_baselines3 import HerReplayBuffer
 from stable_baselines3.common.policies import ActorCriticPolicy
 from stable_baselines3.sac.policies import SACPolicy

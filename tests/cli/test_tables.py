@@ -9,7 +9,6 @@ import pytest
 from rich.console import Console
 
 import physics
-from agents.evaluate import make_table as evaluation_table
 from benchmarks import compile as compiling
 from benchmarks import solvers
 from physics import Frontier, FrontierPoint, scenes
@@ -123,16 +122,21 @@ def compiled() -> Table:
 
 
 def evaluated() -> Table:
+    pytest.importorskip("stable_baselines3")
+    from agents import evaluate
+
     result = {
         "env": "rigid_env/BlockReorient-v0", "episodes": 1000, "seed": 0, "success_rate": 0.987,
         "interval": (0.978, 0.993), "return_mean": 12.345, "return_std": 1.234, "length_mean": 123.4,
         "length_max": 500, "seconds": 12.3,
     }  # fmt: skip
-    return evaluation_table(result, "runs/BlockReorient-v0-ppo-s0-2")
+    return evaluate.make_table(result, "runs/BlockReorient-v0-ppo-s0-2")
 
 
 def transferred() -> Table:
-    transfer = pytest.importorskip("agents.accuracy_transfer")
+    pytest.importorskip("stable_baselines3")
+    from agents import accuracy_transfer as transfer
+
     seen = {"success_rate": 0.987, "interval": (0.978, 0.993)}
     row = transfer.Transfer("balanced", 123.4, 1_980_000, False, seen, seen)
     return transfer.make_table("rigid_env/BlockReach-v0", [row])

@@ -9,7 +9,7 @@ import gymnasium as gym
 import numpy as np
 import pytest
 
-from rigid_env import RigidVecEnv, TaskVectorEnv, check_task
+from rigid_env import TaskVectorEnv, check_task
 
 FOLDER = Path(__file__).parents[2] / "examples"
 CLASSES = {"edge_balance": "EdgeBalance", "two_blocks": "TwoBlocks", "sphere_in_wind": "SphereInWind"}
@@ -49,6 +49,9 @@ def test_gymnasium_finds_them_and_draws_them(name):
 
 @pytest.mark.parametrize("name", CLASSES)
 def test_stable_baselines3_takes_them(name):
+    pytest.importorskip("stable_baselines3")
+    from rigid_env import RigidVecEnv
+
     task = getattr(importlib.import_module(name), CLASSES[name])
     envs = RigidVecEnv(TaskVectorEnv(2, task=task, autoreset_mode="SameStep", max_episode_steps=3))
     envs.reset()

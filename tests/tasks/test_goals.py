@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rigid_env import BlockReachEnv, RigidVecEnv, TaskEnv, TaskVectorEnv, check_task
+from rigid_env import BlockReachEnv, TaskEnv, TaskVectorEnv, check_task
 from rigid_env.tasks.block_goals import BlockReachGoal, BlockReorientGoal
 
 pytestmark = pytest.mark.interpreted
@@ -27,6 +27,7 @@ def test_tasks_pass_their_checks(task, reward):
 
 @pytest.mark.parametrize("env_id", IDS)
 def test_sb3_check_env_without_a_warning(env_id):
+    pytest.importorskip("stable_baselines3")
     import warnings
 
     from stable_baselines3.common.env_checker import check_env
@@ -139,7 +140,10 @@ def test_goals_go_along_with_states_and_pickles_and_pictures():
 
 
 def test_hindsight_replay_of_stable_baselines3_takes_the_native_batch():
+    pytest.importorskip("stable_baselines3")
     from stable_baselines3 import SAC, HerReplayBuffer
+
+    from rigid_env import RigidVecEnv
 
     envs = RigidVecEnv(TaskVectorEnv(2, task=BlockReachGoal, autoreset_mode="SameStep", max_episode_steps=10))
     model = SAC(
@@ -157,6 +161,9 @@ def test_hindsight_replay_of_stable_baselines3_takes_the_native_batch():
 
 
 def test_what_a_batch_cannot_do_for_some_of_its_worlds_is_refused_still():
+    pytest.importorskip("stable_baselines3")
+    from rigid_env import RigidVecEnv
+
     envs = RigidVecEnv(TaskVectorEnv(2, task=BlockReachGoal, autoreset_mode="SameStep"))
     with pytest.raises(ValueError, match="indices"):
         envs.env_method("render", indices=[0])
