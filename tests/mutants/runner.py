@@ -99,20 +99,20 @@ class Copy:
         try:
             output, _ = self._process.communicate(timeout=TIME_LIMIT)
         except subprocess.TimeoutExpired:
-            self._end()
+            self._kill()
+            self._process.communicate()
             output = f"no end within {TIME_LIMIT:.0f} s"
         return Outcome(self._process.returncode, *_read_report(report), output)
 
     def stop(self) -> None:
         """End the tests that are running."""
         self.is_stopped = True
-        if self._process is not None:
-            self._end()
+        if self._process is not None and self._process.poll() is None:
+            self._kill()
 
-    def _end(self) -> None:
+    def _kill(self) -> None:
         with suppress(ProcessLookupError):
             os.killpg(self._process.pid, signal.SIGKILL)
-        self._process.communicate()
 
 
 def _read_report(path: Path) -> tuple[int, str]:
