@@ -9,7 +9,7 @@ import subprocess
 import sys
 import time
 import xml.etree.ElementTree as ET
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from pathlib import Path
@@ -135,9 +135,11 @@ def verdict_of(outcome: Outcome) -> tuple[str, str]:
     return BROKEN, f"exit status {outcome.status}: {(outcome.failure or last).splitlines()[0][:200]}"
 
 
-def in_copies(work: Callable[[Copy, T], None], items: Iterable[T], jobs: int, folder: Path) -> None:
+def in_copies(work: Callable[[Copy, T], None], items: Sequence[T], jobs: int, folder: Path) -> None:
     """Call `work` for each item with one of `jobs` copies under `folder`; Ctrl-C ends the tests that are running."""
-    copies = [Copy(folder / str(k)) for k in range(jobs)]
+    if not items:
+        return
+    copies = [Copy(folder / str(k)) for k in range(min(jobs, len(items)))]
     idle: SimpleQueue[Copy] = SimpleQueue()
     for copy in copies:
         idle.put(copy)
@@ -149,7 +151,7 @@ def in_copies(work: Callable[[Copy, T], None], items: Iterable[T], jobs: int, fo
         finally:
             idle.put(copy)
 
-    pool = ThreadPoolExecutor(jobs)
+    pool = ThreadPoolExecutor(len(copies))
     try:
         for done in [pool.submit(with_copy, item) for item in items]:
             done.result()
