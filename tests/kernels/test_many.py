@@ -154,6 +154,20 @@ def test_the_normal_of_two_blocks_separates_them_most(seed, distance):
         assert normal @ (points[0] - points[1]) == pytest.approx(many.contacts.gap[k], abs=1e-12)
 
 
+@pytest.mark.parametrize("seed", range(5))
+def test_the_speed_of_a_contact_is_that_of_its_two_points(seed):
+    rng = np.random.default_rng(seed)
+    many = blocks([np.zeros(3), [0.2, 0.9, 0.1]], [rotation(rng), rotation(rng)], np.full((2, 3), 0.5))
+    many.bodies.twist[:] = rng.normal(size=(2, 6))
+    find_contacts(0.01, None, None, 0, None, many)
+    n, twist = many.counts[NUM_CONTACTS], many.bodies.twist
+    assert n > 0
+    arms = many.contacts.arm[:n].reshape(n, 2, 3)
+    points = twist[:, :3] + np.cross(twist[:, 3:], arms)
+    speeds = np.einsum("ki,ki->k", many.contacts.frame[:n, :3], points[:, 0] - points[:, 1])
+    np.testing.assert_allclose(many.contacts.speed[:n], speeds, rtol=0, atol=1e-14)
+
+
 @settings(max_examples=100, deadline=None)
 @given(
     seed=st.integers(0, 2**32 - 1),

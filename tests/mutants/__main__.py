@@ -52,7 +52,7 @@ def judge_all(mutants: list[Mutant], results: Results, jobs: int, is_anew: bool)
         console.print(f"{len(done):3d} of {len(waiting)}  {found.verdict:8}  {mutant.name:40} {about}")
 
     with tempfile.TemporaryDirectory(prefix="mutants-") as folder:
-        in_copies(judge, waiting, min(jobs, max(len(waiting), 1)), Path(folder))
+        in_copies(judge, waiting, jobs, Path(folder))
 
 
 def check_sound(mutants: list[Mutant], jobs: int) -> bool:

@@ -52,7 +52,7 @@ DATA = [
         "data/contact_set.py",
         "u, add_scaled(row_vector(t, b, 0), 1.0, qt.cross(",
         "u, add_scaled(row_vector(t, b, 0), 0.0, qt.cross(",
-        "kernels/test_many_solve.py::test_where_the_impulses_are_determined_they_are_those_of_the_oracle",
+        "kernels/test_many.py::test_the_speed_of_a_contact_is_that_of_its_two_points",
     ),
     _mutant(
         "data-cube",

@@ -9,7 +9,7 @@ import subprocess
 import sys
 import time
 import xml.etree.ElementTree as ET
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from pathlib import Path
@@ -99,20 +99,20 @@ class Copy:
         try:
             output, _ = self._process.communicate(timeout=TIME_LIMIT)
         except subprocess.TimeoutExpired:
-            self._end()
+            self._kill()
+            self._process.communicate()
             output = f"no end within {TIME_LIMIT:.0f} s"
         return Outcome(self._process.returncode, *_read_report(report), output)
 
     def stop(self) -> None:
         """End the tests that are running."""
         self.is_stopped = True
-        if self._process is not None:
-            self._end()
+        if self._process is not None and self._process.poll() is None:
+            self._kill()
 
-    def _end(self) -> None:
+    def _kill(self) -> None:
         with suppress(ProcessLookupError):
             os.killpg(self._process.pid, signal.SIGKILL)
-        self._process.communicate()
 
 
 def _read_report(path: Path) -> tuple[int, str]:
@@ -135,9 +135,11 @@ def verdict_of(outcome: Outcome) -> tuple[str, str]:
     return BROKEN, f"exit status {outcome.status}: {(outcome.failure or last).splitlines()[0][:200]}"
 
 
-def in_copies(work: Callable[[Copy, T], None], items: Iterable[T], jobs: int, folder: Path) -> None:
+def in_copies(work: Callable[[Copy, T], None], items: Sequence[T], jobs: int, folder: Path) -> None:
     """Call `work` for each item with one of `jobs` copies under `folder`; Ctrl-C ends the tests that are running."""
-    copies = [Copy(folder / str(k)) for k in range(jobs)]
+    if not items:
+        return
+    copies = [Copy(folder / str(k)) for k in range(min(jobs, len(items)))]
     idle: SimpleQueue[Copy] = SimpleQueue()
     for copy in copies:
         idle.put(copy)
@@ -149,7 +151,7 @@ def in_copies(work: Callable[[Copy, T], None], items: Iterable[T], jobs: int, fo
         finally:
             idle.put(copy)
 
-    pool = ThreadPoolExecutor(jobs)
+    pool = ThreadPoolExecutor(len(copies))
     try:
         for done in [pool.submit(with_copy, item) for item in items]:
             done.result()
