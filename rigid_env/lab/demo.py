@@ -182,7 +182,8 @@ class Demo:
         return int(moving[-1]) if len(moving) else 0
 
     def _frame(self, stage: Stage, text: str, shot: Shot) -> Frame:
-        return stage.place(world_frame(self.world, text=[text], arrows=shot.arrows))
+        share = self._sample / self._sample_count if self._sample_count else 1.0
+        return stage.place(world_frame(self.world, text=[text, *stage.notes], arrows=shot.arrows), share)
 
     def _stage(self) -> Stage:
         return Stage(self.scene, world_frame(self.world), self.trajectory.pos)

@@ -168,6 +168,8 @@ class Frame:
         [N]. At the centre of body 0, or of the first n bodies, world frame; kept as (n, 3).
     applied_torque : (3,) or (n, 3) float
         [N m]. On the same bodies, world frame; kept as (n, 3).
+    path : (n, 3) float
+        [m]. Line along which a body has come, world frame; it is drawn again on the floor below.
     text : tuple of str
         Lines in the upper left corner.
     force_scale : float
@@ -188,11 +190,13 @@ class Frame:
     applied_torque: np.ndarray = field(default_factory=lambda: NO_POINTS)
     text: tuple[str, ...] = ()
     force_scale: float = 0.1
+    path: np.ndarray = field(default_factory=lambda: NO_POINTS)
 
     def __post_init__(self):
         for name in ("bodies", "walls", "text"):
             object.__setattr__(self, name, tuple(getattr(self, name)))
         _set_array(self, "contact_points", (-1, 3))
+        _set_array(self, "path", (-1, 3))
         _set_array(self, "contact_forces", (len(self.contact_points), 3))
         for name in ("applied_force", "applied_torque"):
             if np.ndim(getattr(self, name)) == 1:

@@ -28,6 +28,9 @@ TORQUE_SWEEP = np.radians(300.0)
 AXIS_WIDTH = 1.8
 """[units] of the canvas. Of the line along a torque's axis."""
 
+PATH_WIDTH = 2.2
+"""[units] of the canvas."""
+
 TORQUE_STEP = np.radians(6.0)
 DISC_CORNERS = 72
 GOAL_ALPHA = 46
@@ -52,6 +55,17 @@ def draw_goal(canvas, goal, room):
     canvas.loop(inner, 0.7, palette.mix(colour, palette.FLOOR, 0.35))
     arms = 0.16 * goal.radius * np.stack(axes)
     canvas.segments(foot - arms, foot + arms, 1.4, colour)
+
+
+def draw_path(canvas, frame, room):
+    """Path of a body, and the same on the floors of a `Room` below it."""
+    if len(frame.path) < 2:
+        return
+    for wall in room.walls:
+        if is_floor(wall):
+            feet = frame.path - (frame.path @ wall.normal - wall.offset)[:, None] * wall.normal
+            canvas.segments(feet[:-1], feet[1:], PATH_WIDTH, palette.mix(palette.GRID, palette.SHADOW, 0.25))
+    canvas.segments(frame.path[:-1], frame.path[1:], PATH_WIDTH, palette.PATH)
 
 
 def draw_contacts(canvas, frame, room):

@@ -19,12 +19,13 @@ from rigid_env.rendering.overlays import (
     draw_far_outlines,
     draw_goal,
     draw_near_walls,
+    draw_path,
     draw_wrench,
     has_near_walls,
 )
 from rigid_env.rendering.shadow_layer import LitWall, ShadowLayer, lit_walls
 
-BODY_STAGES = (draw_bodies,)
+BODY_STAGES = (draw_path, draw_bodies)
 ARROW_STAGES = (draw_contacts, draw_wrench)
 """Drawn in this order on the canvas, each a function of canvas, frame and room."""
 
@@ -172,7 +173,8 @@ class Painter:
         f r √(1 + (x/z)²) / (z - r) away from it in the picture, f the focal length.
         """
         whole = self._pygame.Rect((0, 0), self.size)
-        if self.size[0] * self.size[1] < SMALL or (self._has_arrows and frame.has_arrows):
+        has_lines = len(frame.path) > 1 or (self._has_arrows and frame.has_arrows)
+        if self.size[0] * self.size[1] < SMALL or has_lines:
             return whole
         if not frame.bodies:
             return self._pygame.Rect(0, 0, 0, 0)

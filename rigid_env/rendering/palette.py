@@ -18,6 +18,7 @@ BODIES = ((58, 118, 222), (238, 150, 60), (46, 160, 140), (150, 104, 208))
 """Of bodies without a colour of their own, in turn."""
 
 CONTACT = (222, 52, 60)
+PATH = (92, 140, 220)
 APPLIED_FORCE = (245, 136, 24)
 TORQUE = (136, 72, 210)
 GOAL = (14, 156, 178)

@@ -1,5 +1,7 @@
 """A motion before the camera: upright, large enough, and in sight."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -7,7 +9,7 @@ import physics
 from rigid_env.rendering import Renderer
 from rigid_env.rendering.geometry import rotation_matrix
 from rigid_env.rendering.picture import world_frame
-from rigid_env.rendering.staging import DRAWN_SIZE, MOST_ARROWS, Stage
+from rigid_env.rendering.staging import DRAWN_SIZE, FLYING_SIZE, MOST_ARROWS, PATH_POINTS, Stage
 
 UPS = [(0, 1, 0), (0, 0, 1), (1, 0, 0), (-1, 0, 0), (0, -1, 0), (0, 0, -1)]
 
@@ -56,9 +58,41 @@ def test_all_of_the_motion_is_in_sight():
     assert (pixels <= (640, 400)).all()
 
 
-def test_what_goes_far_is_followed_without_walls():
-    path = np.linspace((0.0, 5.0, 0.0), (900.0, 5.0, 0.0), 5)[:, None]
-    stage, frame = staged([physics.Sphere(0.5, 1.0, pos=(0, 5, 0))], [physics.HalfSpace((0, 1, 0))], path=path)
+@pytest.mark.parametrize("up", UPS)
+@pytest.mark.parametrize("has_floor", [True, False])
+def test_a_flight_of_one_body_is_in_sight_with_path_and_ground(up, has_floor):
+    pytest.importorskip("pygame")
+    up = np.array(up, dtype=float)
+    t = np.linspace(0.0, 1.0, 2001)[:, None, None]
+    side = np.roll(up, 1)
+    path = 1000.0 * side + t * (80.0 * side + 60.0 * up) - t * t * 60.0 * up + up
+    walls = [physics.HalfSpace(up)] if has_floor else []
+    stage, frame = staged([physics.Sphere(0.11, 0.4, pos=path[0, 0])], walls, up, path)
+    assert 2.0 * frame.bodies[0].dimensions.max() == pytest.approx(FLYING_SIZE)
+    assert stage.notes == ("grid 10 m, body drawn 15 times as large",)
+    (ground,) = frame.walls
+    assert ground.normal == pytest.approx((0.0, 1.0, 0.0), abs=1e-12)
+    assert (frame.path[:, 1] > ground.offset).all()
+    assert len(frame.path) <= PATH_POINTS
+    assert np.ptp(frame.path, axis=0).max() == pytest.approx(80.0 / 2.0)  # a cell of 10 m is drawn 5 m long
+    assert frame.path[0] == pytest.approx(frame.bodies[0].pos, abs=1e-9)
+    half = stage.place(world_frame(physics.World(physics.Scene([physics.Sphere(0.11, 0.4)]))), 0.5).path
+    assert half[-1] == pytest.approx(frame.path[len(frame.path) // 2], abs=0.1)
+    renderer = Renderer(640, 400, bounds=stage.bounds)
+    pixels, depth = renderer.camera(frame).project(frame.path, (640, 400))
+    with_path, without = renderer.draw(frame), renderer.draw(replace(frame, path=()))
+    renderer.close()
+    assert (depth > 0).all()
+    assert (pixels >= 0).all()
+    assert (pixels <= (640, 400)).all()
+    x, y = pixels[len(pixels) // 4].astype(int)
+    assert (with_path[y, x] != without[y, x]).any()
+
+
+def test_several_bodies_that_go_far_are_followed_without_walls():
+    path = np.linspace((0.0, 5.0, 0.0), (900.0, 5.0, 0.0), 5)[:, None] + ((0, 0, 0), (3, 0, 0))
+    balls = [physics.Sphere(0.5, 1.0, pos=(x, 5, 0)) for x in (0, 3)]
+    stage, frame = staged(balls, [physics.HalfSpace((0, 1, 0))], path=path)
     assert stage.bounds is None
     assert frame.walls == ()
     assert frame.bodies[0].pos.tolist() == [0.0, 0.0, 0.0]
