@@ -305,6 +305,7 @@ def test_a_physics_fault_is_told():
     assert envs.reset(options={"reset_mask": mask})[1]["physics_status"].tolist() == [physics.Status.OK] * 2
 
 
+@pytest.mark.interpreted
 def test_effects_are_added_or_take_the_place_of_the_tasks():
     """Through `gymnasium.make`: water drags, half the gravity halves weight and force limit; the rest stays."""
     plain = BlockReachEnv()
@@ -329,6 +330,7 @@ def test_effects_are_added_or_take_the_place_of_the_tasks():
     assert speeds[1] == pytest.approx(force / 5.0 * (1 - math.exp(-5.0 * 0.2 / 6.0)), rel=1e-5)
 
 
+@pytest.mark.interpreted
 def test_a_task_on_walls_with_a_grain():
     """`Friction` with two coefficients in place of the task's: shoved along z and x the block slows by its own μ g."""
     mu = (0.2, 0.4)
@@ -343,6 +345,7 @@ def test_a_task_on_walls_with_a_grain():
         assert world.linvel[0, 0] @ way == pytest.approx(1 - mu[k] * 9.81 * 0.1, abs=1e-9)
 
 
+@pytest.mark.interpreted
 def test_a_task_in_fields_is_pickled_and_batched_like_any_other(rng):
     effects = [physics.Drag(), physics.Wind(gust=2.0)]
     single, batch = BlockReachEnv(effects=effects), BlockReachVectorEnv(3, effects=effects)

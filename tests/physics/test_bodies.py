@@ -120,6 +120,7 @@ def test_a_bullet_does_not_pass_through_a_plate(thin):
 # --- impacts: laws ---------------------------------------------------------------------------------------------
 
 
+@pytest.mark.compiled
 @settings(max_examples=25, deadline=None)
 @given(seed=st.integers(0, 2**32 - 1), restitution=st.sampled_from([0.0, 0.6]))
 def test_free_bodies_keep_their_momenta_and_gain_no_energy(seed, restitution):
@@ -212,6 +213,7 @@ def test_at_fast_too_a_tower_gathers_no_speed():
     assert np.abs(world.linvel).max() <= 100 * 10 * 1e-9 * 0.049
 
 
+@pytest.mark.exhaustive
 @pytest.mark.parametrize("accuracy", ["fast", "balanced"])
 def test_a_pile_lies_stiller_than_its_solves_are_fine(accuracy):
     """Solves may leave a share of g h, the tolerance. Left to them the pile goes on at that, body by body in cycles."""

@@ -221,6 +221,7 @@ def test_a_textbook_scheme_keeps_its_explicit_loads(scheme):
     assert report.status[0] == physics.Status.COARSE
 
 
+@pytest.mark.compiled
 @pytest.mark.parametrize("accuracy", sweep(["precise", "reference"], ["precise"]))
 @pytest.mark.parametrize("has_wall", sweep([False, True], [False]), ids=("in flight", "above a wall"))
 @pytest.mark.parametrize("stiffness", sweep([1e6, 1e9, 1e12], [1e6, 1e12]))
@@ -289,7 +290,9 @@ FOUND = [
 ]
 
 
-@pytest.mark.parametrize(("names", "on_floor", "seed"), FOUND, ids=lambda value: str(value).replace(" ", "-"))
+@pytest.mark.parametrize(
+    ("names", "on_floor", "seed"), sweep(FOUND, FOUND[1:-1], lambda draw: "-".join(map(str, draw)))
+)
 def test_draws_that_once_gave_energy(names, on_floor, seed):
     """The energy of each stays within the law of `rigid_env.lab.measure.drawn_effects`."""
     outcome = one(names, on_floor, "fast", seed)
