@@ -460,9 +460,9 @@ def test_a_demo_without_a_picture_ends_with_the_line_that_brings_it(hidden, word
             ["run", "rest", "--duration", "0.05", "--plot", "x.gif", "--csv", "x.csv"],
             {"pygame", "PIL"}, ("pygame and Pillow", "rigid-env[render]"), "rest, accuracy balanced",
         ),
-        (
+        pytest.param(
             ["accuracy", "creep", "--quick", "--plot", "x.png", "--json", "x.json"],
-            {"matplotlib"}, ("matplotlib", "rigid-env[plot]"), "creep",
+            {"matplotlib"}, ("matplotlib", "rigid-env[plot]"), "creep", marks=pytest.mark.exhaustive,
         ),
         (
             ["hard-cases", "zeno", "--quick", "--plot", "x.png", "--json", "x.json"],
