@@ -297,6 +297,7 @@ def heap(worlds, threads=1):
     return world
 
 
+@pytest.mark.compiled
 def test_same_bits_for_threads_and_batch_sizes():
     one, two = heap(7), heap(7, threads=2)
     one.step(steps=120)
