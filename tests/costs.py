@@ -8,7 +8,6 @@ them. `python -m tests.costs FILE` prints the sums by file, the longest tests, a
 from __future__ import annotations
 
 import json
-import os
 import resource
 import sys
 import time
@@ -83,7 +82,9 @@ def report(path: Path, longest: int = 40) -> None:
         files[row["test"].split("::")[0]].append(row)
 
     def show(name: str, of: list[dict]) -> None:
-        wall, cpu, children, compiling = (sum(row[key] for row in of) for key in ("wall", "cpu", "children", "compiling"))
+        wall, cpu, children, compiling = (
+            sum(row[key] for row in of) for key in ("wall", "cpu", "children", "compiling")
+        )
         entries = sum(sum(row["entries"].values()) for row in of)
         print(f"{wall:8.1f} {cpu:8.1f} {children:8.1f} {compiling:9.1f} {entries:7d} {len(of):6d}  {name}")
 
