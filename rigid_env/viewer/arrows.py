@@ -33,15 +33,21 @@ class Arrows:
     name : str
         Of the node.
     placement : Placement
+
+    Attributes
+    ----------
+    unit : float
+        That sizes are given in [m]; the extent of the largest body at first.
     """
 
     def __init__(self, scene, name: str, placement: Placement):
         self._scene, self._name, self._placement, self._node = scene, name, placement, None
+        self.unit = placement.unit
 
     def show(self, starts, vectors, colours) -> None:
         """Draw arrows from `starts` (n, 3) [m], as long as `vectors` (n, 3) [m]; one colour, or (n, 3)."""
         starts, vectors = np.asarray(starts, dtype=float), np.asarray(vectors, dtype=float)
-        unit = self._placement.unit
+        unit = self.unit
         lengths = np.sqrt(np.sum(vectors * vectors, axis=1))
         kept = np.isfinite(lengths) & (lengths > SHORTEST * HEAD_LENGTH * unit)
         if not kept.any():
@@ -54,7 +60,7 @@ class Arrows:
 
     def _send(self, ends, colours) -> None:
         if self._node is None:
-            size = self._placement.unit * self._placement.scale
+            size = self.unit * self._placement.scale
             self._node = self._scene.add_arrows(
                 self._name, ends, colours, shaft_radius=SHAFT * size, head_radius=HEAD * size,
                 head_length=HEAD_LENGTH * size,

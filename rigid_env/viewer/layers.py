@@ -91,11 +91,12 @@ class Forces:
     """Arrows of contact forces."""
 
     def __init__(self, scene, placement: Placement):
-        self._arrows, self._unit = Arrows(scene, "/scene/forces", placement), placement.unit
+        self._arrows = Arrows(scene, "/scene/forces", placement)
 
     def show(self, look: Look) -> None:
         frame = look.frame
-        self._arrows.show(frame.contact_points, force_scale(frame, self._unit) * frame.contact_forces, palette.CONTACT)
+        self._arrows.unit = unit = smallest(frame, self._arrows.unit)
+        self._arrows.show(frame.contact_points, force_scale(frame, unit) * frame.contact_forces, palette.CONTACT)
 
     def hide(self) -> None:
         self._arrows.hide()
@@ -240,6 +241,12 @@ class Ghost:
 def force_scale(frame, unit: float) -> float:
     """Length of a force's arrow [m/N]; `Frame.force_scale` is made for bodies of five metres."""
     return frame.force_scale * min(1.0, unit / 5.0)
+
+
+def smallest(frame, unit: float) -> float:
+    """Extent of the smallest body of a frame [m], `unit` where it has none."""
+    extents = (float(body.dimensions.max()) * (1.0 if body.kind == "block" else 2.0) for body in frame.bodies)
+    return min(extents, default=unit)
 
 
 def torque_arc(body, scaled) -> np.ndarray:

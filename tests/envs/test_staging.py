@@ -58,8 +58,7 @@ def test_all_of_the_motion_is_in_sight():
     assert (pixels <= (640, 400)).all()
 
 
-@pytest.mark.parametrize("up", UPS)
-@pytest.mark.parametrize("has_floor", [True, False])
+@pytest.mark.parametrize(("up", "has_floor"), [((0, 1, 0), False), ((0, 0, 1), True)])
 def test_a_flight_of_one_body_is_in_sight_with_path_and_ground(up, has_floor):
     pytest.importorskip("pygame")
     up = np.array(up, dtype=float)

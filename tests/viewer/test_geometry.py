@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -11,11 +12,12 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 import physics
+from rigid_env.rendering import BodyView, Frame
 from rigid_env.rendering.geometry import rotation_matrix
 from rigid_env.rendering.meshes import body_mesh
-from rigid_env.viewer.arrows import spring
+from rigid_env.viewer.arrows import SHAFT, spring
 from rigid_env.viewer.colours import vivid
-from rigid_env.viewer.layers import torque_arc
+from rigid_env.viewer.layers import Forces, torque_arc
 from rigid_env.viewer.marks import field_marks, spring_ends
 from rigid_env.viewer.picking import body_point, hit, leave, world_point
 from rigid_env.viewer.placement import place
@@ -187,3 +189,18 @@ def test_the_end_of_a_spring_is_told_from_the_centre_of_mass():
     start, end = spring_ends(link, scene, drawn)
     np.testing.assert_allclose(start, (0.5, 5.0, 0.0))
     np.testing.assert_allclose(end, (3.5, 5.0, 0.0))
+
+
+def test_contact_arrows_are_as_large_as_the_smallest_body_asks_for():
+    """A pebble on a block: arrows in units of the block would hide it."""
+    made = []
+    scene = SimpleNamespace(add_arrows=lambda *given, **sizes: made.append((given, sizes)))
+    placement = SimpleNamespace(unit=5.0, scale=1.0, drawn=np.asarray)
+    block = BodyView("block", (5.0, 3.0, 2.0), (0.0, 0.0, 0.0))
+    pebble = BodyView("sphere", (0.25, 0.25, 0.25), (0.0, 1.75, 0.0))
+    for bodies, unit in (((block,), 5.0), ((block, pebble), 0.5)):
+        frame = Frame(bodies, contact_points=[(0, 1.5, 0)], contact_forces=[(0, 10, 0)], force_scale=0.1)
+        Forces(scene, placement).show(SimpleNamespace(frame=frame))
+        (_, ends, _), sizes = made.pop()
+        assert np.ptp(ends, axis=1)[0, 1] == pytest.approx(1.0 * unit / 5.0)
+        assert sizes["shaft_radius"] == pytest.approx(SHAFT * unit)
