@@ -159,6 +159,7 @@ print(refused)
 """
 
 
+@pytest.mark.exhaustive
 def test_indices_are_checked_where_that_is_asked_for(tmp_path):
     """Kernels do not look at them (a negative one reads what stands before): here all of two scenes are looked at."""
     root = str(Path(physics.__file__).parents[1])

@@ -347,6 +347,7 @@ def test_what_is_not_known_yet_is_refused():
     assert not world.plan.many
 
 
+@pytest.mark.compiled
 def test_contacts_without_room_are_reported():
     # Forty balls at nearly one place: 780 near pairs, and room for 8 per body.
     bodies = [physics.Sphere(1.0, 1.0, pos=(0.01 * k, 0, 0)) for k in range(40)]

@@ -15,6 +15,7 @@ from physics import scenes
 from physics.plan.accuracy import resolve
 from rigid_env.lab.hard_cases import registry
 from rigid_env.lab.hard_cases.case import Setting
+from tests.tiers.sweep import sweep
 
 pytestmark = pytest.mark.interpreted
 
@@ -153,7 +154,7 @@ class WithSleep(Setting):
 
 
 @pytest.mark.parametrize("accuracy", ["fast", "balanced"])
-@pytest.mark.parametrize("name", ["on-edge", "on-vertex", "dominoes"])
+@pytest.mark.parametrize("name", sweep(["on-edge", "on-vertex", "dominoes"], ["on-edge", "on-vertex"]))
 def test_what_must_fall_falls(name, accuracy):
     (case,) = registry.find((name,))
     failed = [check for check in case.run(WithSleep(accuracy, DT, is_thorough=False)) if not check.passes]
@@ -170,7 +171,7 @@ def on_edge(offset):
 
 
 @pytest.mark.parametrize("accuracy", ["fast", "balanced"])
-@pytest.mark.parametrize("power", range(2, 15, 2))
+@pytest.mark.parametrize("power", sweep(range(2, 15, 2), [2, 8, 14]))
 def test_from_the_smallest_offset_a_cube_falls_off_its_edge_as_if_none_slept(power, accuracy):
     """In a window it turns by less than the slop, for many windows, but by more in each: the same bits as without."""
     world, awake = worlds(on_edge(10.0**-power), accuracy=accuracy)
@@ -239,6 +240,7 @@ def test_on_its_face_the_bits_are_those_of_what_never_sleeps():
         assert np.array_equal(world.memory, awake.memory)
 
 
+@pytest.mark.compiled
 @given(st.lists(st.tuples(st.sampled_from([0.0, 0.1, 0.29, 0.31, 0.5, -0.4]), st.integers(1, 5 * STEPS)), max_size=6))
 def test_whatever_the_pushes_it_is_where_it_would_be_but_for_the_slop_of_each_window(pushes):
     """On the floor and at the walls: what sleeps would have gone less than a slop in each window."""
