@@ -10,6 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import physics
+from tests.tiers.sweep import sweep
 
 pytestmark = pytest.mark.interpreted
 
@@ -140,7 +141,7 @@ def test_an_undamped_bounce_loses_what_the_last_step_of_contact_cuts_off():
         assert e.min() >= math.sqrt(1 - (math.sqrt(K / M) * dt) ** 2 / 4)
 
 
-@pytest.mark.parametrize("zeta", [0.0, 0.1, 0.4, 0.9])
+@pytest.mark.parametrize("zeta", sweep([0.0, 0.1, 0.4, 0.9], [0.1, 0.9]))
 def test_a_bounce_takes_its_time_and_its_energy(zeta):
     """The force of x'' + 2ζω x' + ω² x = 0 from x = 0, x' = -v ends where x'' = 0 (Schwager and Pöschel 2007).
 
@@ -164,7 +165,7 @@ def test_a_bounce_takes_its_time_and_its_energy(zeta):
 
 
 @pytest.mark.parametrize("friction", [None, physics.Friction(0.5)])
-@pytest.mark.parametrize("k", [1e3, 1e6, 1e9, 1e12, 1e15])
+@pytest.mark.parametrize("k", sweep([1e3, 1e6, 1e9, 1e12, 1e15], [1e6, 1e15]))
 def test_no_stiffness_gives_energy(k, friction):
     """200 blocks that tumble onto the floor, undamped, steps of 10 ms.
 
