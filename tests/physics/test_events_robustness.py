@@ -11,8 +11,6 @@ import physics
 from physics import scenes
 from physics.plan import accuracy
 
-pytestmark = pytest.mark.interpreted
-
 WORLDS, STEPS, DT = 4, 200, 0.02
 RADIUS = float(np.linalg.norm(scenes.SIZE)) / 2
 # A step of 20 ms has some ten events, a whole sequence of bounces a hundred; 500 are a scheme that gets nowhere. The

@@ -188,6 +188,7 @@ def test_contact_never_gives_energy(linvel, angvel, rolling, spin, mu, tangentia
         before = now
 
 
+@pytest.mark.compiled
 def test_in_a_corner_no_law_gives_energy():
     """A ball that rests on one wall and hits another, and keeps what it has of the laws' energy at most."""
     rng = np.random.default_rng(3)

@@ -27,6 +27,7 @@ def state_of(task: Task) -> list:
 # --- the same as compiled -------------------------------------------------------------------------------------
 
 
+@pytest.mark.compiled
 def test_block_reach_in_numpy_is_block_reach():
     compiled, plain = RigidVectorEnv(BlockReach(8)), RigidVectorEnv(NumpyReach(8))
     ours, theirs = compiled.reset(seed=1)[0], plain.reset(seed=1)[0]
@@ -303,6 +304,7 @@ def test_an_unknown_setting_is_refused_with_the_nearest_name():
 # --- checks ---------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.compiled
 @pytest.mark.parametrize("task", [BlockReach, BlockReorient, NumpyReach, Slide, "tests.tasks.conftest:Free"])
 def test_tasks_pass_their_checks(task):
     check_task(task, contexts=("fork",))
