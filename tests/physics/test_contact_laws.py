@@ -131,6 +131,7 @@ def test_hard_case_5_zeno_comes_to_rest_in_the_time_of_the_series():
     assert seen == pytest.approx(truth, abs=(1 + math.sqrt(2) / (1 - 0.5)) * 0.005)
 
 
+@pytest.mark.compiled
 @given(st.floats(0, 2 * math.pi), st.sampled_from([0.1, 0.3, 0.5]), st.sampled_from([1.0, 3.0]))
 def test_hard_case_16_sliding_stops_at_v2_over_2mug_in_any_heading(heading, mu, speed):
     """Issue: within 0.1 % at step 5 ms, straight, and no creep afterwards. The step in which friction stops the

@@ -292,6 +292,7 @@ def test_two_threads_step_one_world_a_hundred_times(threads, prepared, cache):
     assert together(cache, threads, tries=100, steps=50, prepared=prepared) > 0
 
 
+@pytest.mark.exhaustive
 @pytest.mark.slow
 @pytest.mark.parametrize("threads", [1, 2])
 def test_also_where_the_first_step_compiles(threads, tmp_path):
