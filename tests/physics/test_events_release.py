@@ -11,8 +11,6 @@ import pytest
 import physics
 from tests.reference.release import ellipse, ladder, release
 
-pytestmark = pytest.mark.interpreted
-
 G = 9.81
 FLOOR, LEFT = physics.HalfSpace((0, 1, 0)), physics.HalfSpace((1, 0, 0))
 STEPS = (0.001, 0.002, 0.005, 0.01, 0.02, 0.05, 0.1)

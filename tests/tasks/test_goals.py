@@ -19,6 +19,7 @@ TASKS = (BlockReachGoal, BlockReorientGoal)
 IDS = ("rigid_env/BlockReachGoal-v0", "rigid_env/BlockReorientGoal-v0")
 
 
+@pytest.mark.compiled
 @pytest.mark.parametrize("task", TASKS)
 @pytest.mark.parametrize("reward", ["sparse", "dense"])
 def test_tasks_pass_their_checks(task, reward):
