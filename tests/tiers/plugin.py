@@ -65,6 +65,7 @@ class _Interpret:
         for report in self._reports_of(item):
             item.ihook.pytest_runtest_logreport(report=report)
         item.ihook.pytest_runtest_logfinish(nodeid=item.nodeid, location=item.location)
+        item.session._setupstate.teardown_exact(nextitem)  # fixtures that the test before it left for it
         return True
 
     def pytest_sessionfinish(self):

@@ -95,6 +95,16 @@ def test_the_default_tier_leaves_out_and_interprets(options, tmp_path):
     assert "for a reason" in output
 
 
+def test_a_folder_may_end_with_an_interpreted_test(tmp_path):
+    """Fixtures of a folder are taken down before the tests of the next folder."""
+    for name, mark in (("first", ""), ("second", "@pytest.mark.interpreted\n")):
+        (tmp_path / "a").mkdir(exist_ok=True)
+        (tmp_path / "a" / f"test_{name}.py").write_text(f"import pytest\n\n{mark}def test_{name}():\n    pass\n")
+    (tmp_path / "b").mkdir()
+    (tmp_path / "b" / "test_third.py").write_text("def test_third():\n    pass\n")
+    assert counts(run(tmp_path, "def test_last():\n    pass\n"))["passed"] == 4
+
+
 def test_exhaustive_runs_all_of_them_compiled(tmp_path):
     output = run(tmp_path, TESTS, "--exhaustive")
     assert "PASSED test_them.py::test_left_out" in output
