@@ -124,6 +124,7 @@ def test_an_egg_rocks_on_a_block_with_the_period_of_small_swings():
     assert halves[2] - halves[0] == pytest.approx(period, rel=2e-3)
 
 
+@pytest.mark.exhaustive
 def test_many_eggs_come_to_rest_and_none_goes_through():
     rng = np.random.default_rng(1)
     bodies = [physics.Block((8, 1, 8), 1000.0, pos=(0, 0.5, 0))]

@@ -185,6 +185,7 @@ def test_a_bullet_does_not_pass_through_a_plate():
     assert world.pos[0, 1, 0] < 0.0
 
 
+@pytest.mark.compiled
 @settings(max_examples=20, deadline=None)
 @given(seed=st.integers(0, 2**32 - 1), restitution=st.sampled_from([0.0, 0.6]))
 def test_rocks_that_collide_keep_their_momenta_and_gain_no_energy(seed, restitution):
@@ -239,6 +240,7 @@ def heap(worlds, threads=1):
     return world
 
 
+@pytest.mark.compiled
 def test_same_bits_for_threads_and_batch_sizes():
     one, two, few = heap(7), heap(7, threads=2), heap(3)
     for world in (one, two, few):
@@ -247,6 +249,7 @@ def test_same_bits_for_threads_and_batch_sizes():
     np.testing.assert_array_equal(few.state, one.state[: 3 * 6])
 
 
+@pytest.mark.compiled
 def test_a_snapshot_in_contact_and_a_pickled_world_continue_bit_identically():
     world = heap(2)
     world.step(steps=60)

@@ -32,6 +32,7 @@ def drive(world, steps, seed=0):
         world.step(rng.uniform(-5, 5, (world.worlds, world.body_count, 6)), steps=1 + k % 2)
 
 
+@pytest.mark.compiled
 @pytest.mark.parametrize("make", [pushed, heap])
 def test_a_recording_is_replayed_bit_for_bit_world_by_world(make, tmp_path):
     """In a world of its own, although it was one of three; wrenches, changes from outside and all."""
@@ -120,6 +121,7 @@ def command(*arguments):
     return subprocess.run([sys.executable, "-m", "rigid_env", "replay", *arguments], capture_output=True, text=True)
 
 
+@pytest.mark.compiled
 def test_another_process_replays_bodies_in_contact_bit_for_bit(tmp_path):
     """From the middle of contact between bodies, warm starts and all; and it says when it does not."""
     world = heap(2)

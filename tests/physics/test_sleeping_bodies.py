@@ -131,6 +131,7 @@ def test_what_does_not_sleep_has_the_same_bits():
         assert np.array_equal(world.memory, awake.memory)
 
 
+@pytest.mark.compiled
 def test_worlds_of_a_batch_sleep_for_themselves_and_go_on_from_a_snapshot():
     places = [*tower(0, 3), *tower(3, 2)]
     batch, alone = cubes(*places, worlds=4, threads=2), [cubes(*places) for _ in range(4)]
