@@ -208,7 +208,6 @@ def log_stamp():
 
 
 @pytest.mark.exhaustive
-@pytest.mark.slow
 def test_throughput_runs_and_writes_every_row(tmp_path):
     path = tmp_path / "throughput.json"
     command = [sys.executable, "-m", "benchmarks.throughput", "--quick", "--json", str(path)]

@@ -48,7 +48,6 @@ def test_each_applies_alone_to_the_files_it_names(title, tmp_path):
 
 
 @pytest.mark.interpreted
-@pytest.mark.slow
 @pytest.mark.parametrize("title", TITLES)
 def test_the_proof_holds(title, changed_packages):
     done = run(recipes.proof(title), changed_packages, changed_packages / "cache")

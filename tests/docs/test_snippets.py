@@ -34,7 +34,6 @@ LONG = ("docs/environments.md", "docs/tasks.md")
 PAGES = sweep(snippets.pages_with("python"), lambda page: snippets.name_of(page) not in LONG, snippets.name_of)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("page", PAGES)
 def test_python_runs_as_it_stands(page, tmp_path):
     """All blocks of a page in their order, in one new process, in an empty folder."""

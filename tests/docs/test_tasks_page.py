@@ -70,7 +70,6 @@ def printed(tmp_path_factory):
     del sys.modules[module.__name__]
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("block", BLOCKS, ids=lambda block: f"line {block.line}")
 def test_a_block_runs_and_prints_what_stands_below_it(block, printed):
     if block.line not in printed:

@@ -110,7 +110,6 @@ def test_an_environment_with_a_picture_can_be_pickled(env_class):
     np.testing.assert_array_equal(pickle.loads(pickle.dumps(env)).render(), picture)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("context", ["fork", "spawn"])
 def test_async_vector_env(env_id, context, rng):
     """Children by fork (kernels and threads already in use here) and by spawn equal the native batch."""

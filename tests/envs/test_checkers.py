@@ -8,7 +8,6 @@ import warnings
 
 import gymnasium as gym
 import numpy as np
-import pytest
 from gymnasium.utils.env_checker import check_env
 from gymnasium.vector import AutoresetMode
 
@@ -34,7 +33,6 @@ def test_sb3_check_env_without_a_warning(env_id):
     env.close()
 
 
-@pytest.mark.slow
 def test_make_with_module_prefix_in_a_fresh_process(env_id):
     code = f"import gymnasium as gym\nenv = gym.make('rigid_env:{env_id}')\nprint(env.reset(seed=0)[0].shape)\n"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=300)

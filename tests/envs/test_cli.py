@@ -229,7 +229,6 @@ def test_second_warmup_compiles_nothing(tmp_path, monkeypatch):
     assert found["seconds"] == pytest.approx(sum(plan["seconds"] for plan in found["plans"]))
 
 
-@pytest.mark.slow
 def test_bench_measures(tmp_path):
     path = tmp_path / "bench.json"
     output = run("bench", "--quick", "--json", path)

@@ -31,7 +31,6 @@ def python(folder: Path, *arguments: str, path: str = str(ROOT)) -> subprocess.C
     )
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("snippet", SNIPPETS, ids=range(1, len(SNIPPETS) + 1))
 def test_snippets_of_the_page_run_as_they_stand(snippet, tmp_path):
     if "stable_baselines3" in snippet:

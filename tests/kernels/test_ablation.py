@@ -86,7 +86,6 @@ def run_without(names: str, folder: Path) -> dict:
 
 
 @pytest.mark.exhaustive
-@pytest.mark.slow
 def test_switches_leave_the_result_as_it_is_and_kernels_in_folders_of_their_own(tmp_path):
     """Each changes machine code; all of them at once still compile."""
     everything = ",".join(ablation.OPTIMISATIONS)

@@ -10,8 +10,6 @@ import subprocess
 import sys
 from pathlib import Path
 
-import pytest
-
 import physics
 from physics.kernels.compile import cache_folder
 
@@ -71,7 +69,6 @@ def _fresh_process(cache: Path) -> dict:
     return json.loads(done.stdout)
 
 
-@pytest.mark.slow
 def test_a_second_process_compiles_nothing_and_gets_the_same_bits(tmp_path: Path):
     first, second = _fresh_process(tmp_path), _fresh_process(tmp_path)
     assert (first["hits"], first["misses"]) == (0, 1)

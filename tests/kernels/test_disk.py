@@ -243,7 +243,6 @@ def test_a_full_disk(kept, tmp_path):
     assert [path for path in tmp_path.rglob("*") if path.is_file()] == []
 
 
-@pytest.mark.slow
 def test_processes_at_once_and_killed_ones(kept, tmp_path):
     """Killed at any time from before the first file until after the last."""
     command, environment = command_and_environment(tmp_path)

@@ -190,7 +190,6 @@ def first_use(accuracies: str, cache: Path, *and_bodies: str) -> dict:
 
 
 @pytest.mark.exhaustive
-@pytest.mark.slow
 def test_a_contact_plan_is_optimised_once_and_compiled_once_for_all_processes(tmp_path):
     """Two plans, each with and without a wrench, and a tower in one process; then again in another."""
     first = first_use("fast,balanced", tmp_path, "tower")

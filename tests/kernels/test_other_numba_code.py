@@ -8,8 +8,6 @@ import subprocess
 import sys
 from pathlib import Path
 
-import pytest
-
 import physics
 
 PROGRAM = '''
@@ -129,7 +127,6 @@ print(json.dumps({
 '''
 
 
-@pytest.mark.slow
 def test_functions_of_others_are_compiled_as_without_physics(tmp_path: Path):
     """In a process that compiles a step between: results, signatures and LLVM IR are the same, Numba's classes, too."""
     program = tmp_path / "program.py"

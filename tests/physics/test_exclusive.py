@@ -293,7 +293,6 @@ def test_two_threads_step_one_world_a_hundred_times(threads, prepared, cache):
 
 
 @pytest.mark.exhaustive
-@pytest.mark.slow
 @pytest.mark.parametrize("threads", [1, 2])
 def test_also_where_the_first_step_compiles(threads, tmp_path):
     for k in range(5):
@@ -328,7 +327,6 @@ print("same")
 """
 
 
-@pytest.mark.slow
 def test_worlds_of_several_plans_compile_in_several_threads(tmp_path):
     for k in range(4):
         environment = {**os.environ, "PYTHONPATH": ROOT, "NUMBA_CACHE_DIR": str(tmp_path / str(k % 2))}

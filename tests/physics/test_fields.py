@@ -381,7 +381,6 @@ BALL_ON_BLOCK = physics.Scene(
 )  # fmt: skip
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(
     ("built", "accuracy"),
     [

@@ -47,7 +47,6 @@ def fresh_process(folder: Path, cache: Path) -> dict:
     return json.loads(done.stdout)
 
 
-@pytest.mark.slow
 def test_the_example_of_the_docs_is_right_and_compiled_once(tmp_path):
     """A circular orbit: v² = k/(m r) at r = 1 m, k = 4.5, m = 2: 1.5 rad/s. Then the file is edited: never stale."""
     file = tmp_path / "attraction.py"

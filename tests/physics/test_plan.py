@@ -86,7 +86,6 @@ def compiled_names(effects: str, cache: Path) -> set[str]:
     return set(json.loads(done.stdout))
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(
     ("effects", "present", "absent"),
     [
@@ -187,7 +186,6 @@ print(json.dumps({"names": found, "members": list(world.scratch[0].dtype.names)}
 )
 
 
-@pytest.mark.slow
 def test_machine_code_holds_only_the_fields_that_are_declared(tmp_path):
     """Names of compiled functions in the step of a scene: those of its fields, of no field where it has none."""
 

@@ -18,7 +18,6 @@ def drawn(request):
     return turning.draw(request.param, FEW[request.param], seed=1)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("accuracy", sweep(turning.PRESETS, turning.PRESETS[1:2]))
 def test_what_turns_misses_nothing_and_invents_nothing(drawn, accuracy):
     found = turning.run(drawn, accuracy)

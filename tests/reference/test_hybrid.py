@@ -69,8 +69,7 @@ def test_incline_holds_up_to_the_angle_of_friction():
     assert result.events[-1].t == 0.0
 
 
-@pytest.mark.exhaustive
-@pytest.mark.slow  # four directions at once begin to be sought: 41 short integrations per Newton step
+@pytest.mark.exhaustive  # four directions at once begin to be sought: 41 short integrations per Newton step
 def test_incline_slides_with_the_rest_of_gravity():
     angle = math.radians(20.0)
     mu = 0.5 * math.tan(angle)
@@ -193,7 +192,6 @@ def _sliding(mu, side):
     return derivative
 
 
-@pytest.mark.slow  # two directions are sought at the slip
 def test_tipping_block_slips_where_the_cone_ends():
     mu, tilt, end = 0.3, 0.15, 1.25
     _, result = run(tall_block(tilt, mu), end)

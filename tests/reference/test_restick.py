@@ -42,7 +42,6 @@ def test_a_body_that_rolls_keeps_its_energy_and_loses_what_friction_takes():
     assert energy(truth.sticks) < energy(slipping)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("k", [0, pytest.param(12, marks=pytest.mark.exhaustive)])
 def test_the_stored_truths_can_be_had_again_with_a_slip_half_as_stiff(k, monkeypatch):
     """From a tenth of the speed with which a slip begins, and to ten times that up to which it is called stiff."""

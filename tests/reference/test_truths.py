@@ -29,7 +29,6 @@ def test_block_comes_to_rest_on_its_face_outside_the_walls(name):
     assert max(truth["error"][key] for key in truths.STATE) < 1e-8
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(("name", "until"), sweep([("vertex_drop", 1.3), ("drop", 1.7)], [("drop", 1.7)]))
 def test_event_driven_truth_can_be_had_again(name, until):
     truth = truths.load(name)
@@ -45,7 +44,6 @@ def test_event_driven_truth_can_be_had_again(name, until):
     assert [[e.kind, *e.contact] for e in counted] == [e[1:4] for e in stored]
 
 
-@pytest.mark.slow
 def test_multiple_precision_truth_can_be_had_again():
     truth = truths.load("closed_box")
     problem, _ = hybrid.from_scene(scenes.closed_box())

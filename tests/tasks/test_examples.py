@@ -30,7 +30,6 @@ def test_they_have_forty_lines_at_most(name):
     assert len((FOLDER / f"{name}.py").read_text(encoding="utf-8").splitlines()) <= 40
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("name", CLASSES)
 def test_they_pass_their_checks_in_workers_too(name):
     check_task(f"{name}:{CLASSES[name]}", contexts=("fork", "spawn"))

@@ -10,8 +10,6 @@ import pytest
 from tests.viewer.browser import PATIENCE, change, open_browser, share_of
 from tests.viewer.looks import BLOCK, busy_look, look_of, motion
 
-pytestmark = pytest.mark.slow
-
 BLUE = (45, 95, 170)
 """Colour of the first body, between its lit and its dark faces."""
 

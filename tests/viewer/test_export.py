@@ -30,7 +30,6 @@ def test_ten_seconds_of_a_block_that_never_rests_are_small(rng):
     assert size_of(motion((BLOCK,), 10.0, 30.0, rng)) <= 2.0 * MEGABYTE
 
 
-@pytest.mark.slow
 def test_ten_seconds_of_fifty_bodies_that_never_rest_are_small(rng):
     assert size_of(motion(crowd(50, rng), 10.0, 30.0, rng)) <= 5.0 * MEGABYTE
 
