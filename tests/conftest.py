@@ -11,8 +11,8 @@ from hypothesis import settings
 from tests.tiers import plugin as tiers
 
 # Compiling inside the first example would count against its deadline.
-settings.register_profile("rigid-env", deadline=None, max_examples=50, derandomize=True)
-settings.load_profile("rigid-env")
+settings.register_profile("default tier", deadline=None, max_examples=20, derandomize=True)
+settings.register_profile("exhaustive", settings.get_profile("default tier"), max_examples=50)
 
 
 def pytest_addoption(parser):
@@ -24,10 +24,17 @@ def pytest_addoption(parser):
 def pytest_configure(config):
     """Choose the tier, and record costs where a file is given."""
     tiers.configure(config)
+    settings.load_profile("exhaustive" if config.getoption("--exhaustive") else "default tier")
     if config.getoption("--costs"):
         from tests.costs import CostRecorder
 
         config.pluginmanager.register(CostRecorder(Path(config.getoption("--costs")).absolute()))
+
+
+@pytest.fixture(scope="session")
+def is_exhaustive(request) -> bool:
+    """Answer whether `--exhaustive` is given: a test takes more worlds or steps then."""
+    return request.config.getoption("--exhaustive")
 
 
 @pytest.fixture

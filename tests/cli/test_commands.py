@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import typer
+from click.shell_completion import ShellComplete
 from typer.testing import CliRunner
 
 import physics
@@ -342,7 +343,7 @@ def test_a_signal_ends_a_process_cleanly(tmp_path):
 
 
 def completions(folder, *words, shell="bash"):
-    """Return the completions that the shell is offered for the last word."""
+    """Return the completions that a process offers the shell for the last word."""
     line = " ".join(("rigid-env", *words))
     given = {"_RIGID_ENV_COMPLETE": f"complete_{shell}", "COMP_WORDS": line, "COMP_CWORD": str(len(words))}
     given["_TYPER_COMPLETE_ARGS"] = line
@@ -354,18 +355,26 @@ def completions(folder, *words, shell="bash"):
     return done.stdout
 
 
-def test_commands_scenes_presets_and_cases_are_completed(tmp_path):
+def test_a_shell_is_offered_commands_and_their_arguments(tmp_path):
     assert set(completions(tmp_path, "e").split()) == {"explain", "effects"}
-    assert set(completions(tmp_path, "explain", "t").split()) == {
-        name for name in scenes.SCENES if name.startswith("t")
-    }
     assert completions(tmp_path, "run", "drop", "--accuracy", "bal").split() == ["balanced"]
-    assert completions(tmp_path, "hard-cases", "zen").split() == ["zeno"]
-    assert completions(tmp_path, "hard-cases", "--accuracy", "fast,bal").split() == ["fast,balanced"]
-    assert completions(tmp_path, "accuracy", "--peers", "mu").split() == ["mujoco"]
-    assert "creep" in completions(tmp_path, "accuracy", "cr")
-    assert completions(tmp_path, "effects", "grav").split() == ["gravity"]
     assert "explain" in completions(tmp_path, "e", shell="zsh")
+
+
+def test_scenes_presets_and_cases_are_completed():
+    command = typer.main.get_command(app)
+
+    def offered(*words):
+        *arguments, incomplete = words
+        found = ShellComplete(command, {}, "rigid-env", "_RIGID_ENV_COMPLETE").get_completions(arguments, incomplete)
+        return [item.value for item in found]
+
+    assert set(offered("explain", "t")) == {name for name in scenes.SCENES if name.startswith("t")}
+    assert offered("hard-cases", "zen") == ["zeno"]
+    assert offered("hard-cases", "--accuracy", "fast,bal") == ["fast,balanced"]
+    assert offered("accuracy", "--peers", "mu") == ["mujoco"]
+    assert "creep" in offered("accuracy", "cr")
+    assert offered("effects", "grav") == ["gravity"]
 
 
 def test_scene_files_are_completed(tmp_path, monkeypatch):

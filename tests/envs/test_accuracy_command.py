@@ -21,6 +21,8 @@ from rigid_env.lab.measure.accuracy import QUICK, Found, Job, Ladder
 from rigid_env.lab.measure.accuracy_table import answers, make_table, summary
 from rigid_env.lab.measure.truths import CASES
 
+pytestmark = pytest.mark.interpreted
+
 runner = CliRunner()
 
 

@@ -20,6 +20,8 @@ from rigid_env.lab.measure.shares import names_of, without
 from rigid_env.rendering import Camera
 from rigid_env.rendering.picture import stroboscope, without_bodies, world_frame
 
+pytestmark = pytest.mark.interpreted
+
 runner = CliRunner()
 
 
@@ -229,6 +231,7 @@ def test_second_warmup_compiles_nothing(tmp_path, monkeypatch):
     assert found["seconds"] == pytest.approx(sum(plan["seconds"] for plan in found["plans"]))
 
 
+@pytest.mark.compiled
 def test_bench_measures(tmp_path):
     path = tmp_path / "bench.json"
     output = run("bench", "--quick", "--json", path)

@@ -37,6 +37,8 @@ from rigid_env.rendering.view import frame_of
 from rigid_env.tasks import Wrench
 from tests.tasks.conftest import started
 
+pytestmark = pytest.mark.interpreted
+
 pytest.importorskip("pygame")
 
 SIZE = (320, 200)

@@ -17,6 +17,8 @@ from rigid_env.tasks import kernels
 from rigid_env.tasks import layout as col
 from tests.envs.conftest import push, random_actions
 
+pytestmark = pytest.mark.interpreted
+
 FACE_NORMALS = np.array([[-1, 0, 0], [1, 0, 0], [0, -1, 0], [0, 1, 0], [0, 0, -1], [0, 0, 1]], dtype=float)
 
 
@@ -99,6 +101,7 @@ def test_the_block_cannot_fly():
     assert env.task.world.pos[0, 0, 1] <= 1.5 + 1e-9
 
 
+@pytest.mark.compiled
 def test_reach_by_a_scripted_controller():
     envs = BlockReachVectorEnv(24, autoreset_mode="SameStep")
     obs, _ = envs.reset(seed=0)

@@ -9,6 +9,8 @@ import pytest
 import physics
 from benchmarks.shrink import law_broken
 
+pytestmark = pytest.mark.interpreted
+
 RECORDINGS = sorted((Path(__file__).parent / "data").glob("*.npz"))
 
 

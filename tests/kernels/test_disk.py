@@ -17,6 +17,7 @@ import pytest
 
 from physics.kernels.compile import cache_folder
 from physics.kernels.compile.fused import cache_files
+from tests.tiers.sweep import sweep
 
 ROOT = str(Path(__file__).parents[2])
 
@@ -91,9 +92,10 @@ def _directory(path: Path) -> None:
     (path / "file").write_text("not ours")
 
 
-@pytest.mark.parametrize(
-    "damage", [_truncated, _empty, _garbage, _one_bit, _foreign_pickle, _of_another_kernel, _directory]
-)
+DAMAGES = [_truncated, _empty, _garbage, _one_bit, _foreign_pickle, _of_another_kernel, _directory]
+
+
+@pytest.mark.parametrize("damage", sweep(DAMAGES, [_truncated, _one_bit, _foreign_pickle, _of_another_kernel]))
 def test_a_damaged_file_is_compiled_anew_and_said_so_once(damage, kept, tmp_path):
     folder, state = kept
     cache = tmp_path / "cache"
@@ -243,10 +245,10 @@ def test_a_full_disk(kept, tmp_path):
     assert [path for path in tmp_path.rglob("*") if path.is_file()] == []
 
 
-def test_processes_at_once_and_killed_ones(kept, tmp_path):
+def test_processes_at_once_and_killed_ones(kept, tmp_path, is_exhaustive):
     """Killed at any time from before the first file until after the last."""
     command, environment = command_and_environment(tmp_path)
-    for k in range(12):
+    for k in range(12) if is_exhaustive else (1, 5, 9):
         process = subprocess.Popen(command, env=environment, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
         time.sleep(0.8 + 0.15 * k)
         process.kill()

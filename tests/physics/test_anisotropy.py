@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 
 import numpy as np
@@ -11,6 +12,7 @@ from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
 import physics
+from tests.tiers.sweep import sweep
 
 pytestmark = pytest.mark.interpreted
 
@@ -135,9 +137,16 @@ def test_a_slide_across_the_axes_is_of_the_order_of_the_scheme(rolls, t, order):
     assert slopes == pytest.approx([order, order], abs=0.1)
 
 
-@pytest.mark.parametrize("accuracy", ["balanced", "precise"])
-@pytest.mark.parametrize("angle", np.radians([0, 20, 45, 70, 90]))
-@pytest.mark.parametrize("share", [0.99, 1.01])
+def is_short(slope):
+    """Answer whether a slope takes no curved slide at `precise`, whose arcs are many."""
+    angle, share, accuracy = slope
+    return accuracy == "balanced" or share < 1 or angle in (0, math.pi / 2)
+
+
+SLOPES = itertools.product(np.radians([0, 20, 45, 70, 90]), [0.99, 1.01], ["balanced", "precise"])
+
+
+@pytest.mark.parametrize(("angle", "share", "accuracy"), sweep(SLOPES, is_short))
 def test_a_slope_holds_inside_the_ellipse(angle, share, accuracy):
     """Down the slope tan θ (cos φ, sin φ) of the weight pulls: held iff |(cos φ/μ1, sin φ/μ2)| tan θ <= 1."""
     way = np.array([math.cos(angle), math.sin(angle)])

@@ -14,6 +14,7 @@ import physics
 from physics import scenes
 from physics.kernels.multibody.data.arrays import NUM_PAIRS
 from physics.world.report import Solver, Status
+from tests.tiers.sweep import sweep
 
 pytestmark = pytest.mark.interpreted
 
@@ -226,8 +227,8 @@ def test_a_pile_lies_stiller_than_its_solves_are_fine(accuracy):
     assert np.median(seen) <= 0.25 * world.accuracy.tolerance * G * 0.005
 
 
-@pytest.mark.parametrize("count", [2, 10, 20])
-@pytest.mark.parametrize("top", [1.0, 1e3, 1e6])
+@pytest.mark.parametrize("count", sweep([2, 10, 20], [2, 10]))
+@pytest.mark.parametrize("top", sweep([1.0, 1e3, 1e6], [1.0, 1e6]))
 @pytest.mark.parametrize("accuracy", ["fast", "balanced"])
 def test_a_tower_stands_and_every_body_is_in_balance(count, top, accuracy):
     world = physics.World(tower(count, top), dt=0.01, accuracy=accuracy)
@@ -310,14 +311,14 @@ def test_same_bits_for_threads_and_batch_sizes():
 
 def test_a_snapshot_in_contact_continues_bit_identically():
     world = heap(2)
-    world.step(steps=60)
+    world.step(steps=40)
     assert len(world.contact_ends(0))
     snapshot = pickle.loads(pickle.dumps(world.snapshot()))
-    world.step(steps=60)
+    world.step(steps=20)
     expected = world.state.copy()
     other = heap(2)
     other.restore(snapshot)
-    other.step(steps=60)
+    other.step(steps=20)
     np.testing.assert_array_equal(other.state, expected)
 
 

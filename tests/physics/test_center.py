@@ -14,6 +14,8 @@ from rigid_env.rendering.picture import world_frame
 from tests.reference import hybrid
 from tests.reference.rigid_body import rotation_matrix
 
+pytestmark = pytest.mark.interpreted
+
 G = 9.81
 CENTER = (0.1, -0.2, 0.05)
 SIZE, MASS = np.array([2.0, 1.0, 1.0]), 2.0

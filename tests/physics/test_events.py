@@ -119,6 +119,7 @@ def test_stick_comes_when_the_truth_says(accuracy):
     assert of_kind(run, "stick")[0].t == pytest.approx(stored[0], abs=10 * ERRORS[accuracy])
 
 
+@pytest.mark.interpreted
 @pytest.mark.parametrize("sample_dt", [0.05, 0.37])
 def test_closed_box_hits_twenty_times_in_the_order_of_the_truth(sample_dt):
     """Rounding of the start alone moves the state after the last hit by `sensitivity`: within a hundred of it."""
@@ -255,6 +256,7 @@ def test_slide_stops_at_v2_over_2mug(sample_dt):
     assert not run.angvel[-1].any()
 
 
+@pytest.mark.interpreted
 def test_sphere_starts_to_roll_at_5_7_of_its_speed():
     """Sticks at 2v/(7μg), then rolls at 5v/7 with neither gain nor loss."""
     v, mu = 5.0, 0.2

@@ -11,6 +11,8 @@ import pytest
 import physics
 from physics import validation
 
+pytestmark = pytest.mark.interpreted
+
 WORLDS = 3
 
 

@@ -106,11 +106,17 @@ def compiled_names(effects: str, cache: Path) -> set[str]:
                 "bind_laws",
             },
         ),
-        ("[physics.Contact(), physics.Friction()]", {"cone_sweeps"}, {"unstretch_tangents", "bind_laws"}),
-        (
+        pytest.param(
+            "[physics.Contact(), physics.Friction()]",
+            {"cone_sweeps"},
+            {"unstretch_tangents", "bind_laws"},
+            marks=pytest.mark.exhaustive,
+        ),
+        pytest.param(
             "[physics.Contact(), physics.Friction((0.1, 0.2), (0, 0, 1))]",
             {"cone_sweeps", "unstretch_tangents", "bind_laws"},
             set(),
+            marks=pytest.mark.exhaustive,
         ),
     ],
 )

@@ -35,10 +35,12 @@ def started(seed: int, mode: str) -> physics.Ellipsoid:
 
 @pytest.mark.parametrize("accuracy", ["fast", "balanced"])
 @pytest.mark.parametrize(("mode", "mu"), [(truth.SMOOTH, 0.0), (truth.ROLLS, 10.0)])
-def test_what_is_pressed_to_the_floor_neither_hits_nor_leaves_it(mode, mu, accuracy):
+def test_what_is_pressed_to_the_floor_neither_hits_nor_leaves_it(mode, mu, accuracy, is_exhaustive):
     """No body does whose push stays above a twentieth of its weight (and within the cone), by DOP853."""
     times, tried = np.linspace(0.0, SECONDS, 101), 0
     for seed in range(12):
+        if tried == 3 and not is_exhaustive:
+            break
         body = started(seed, mode)
         motion = truth.move(body, mode, times, mu=mu)
         if motion.push.min() < 0.05 * G or (mu > 0.0 and motion.grip.max() > 0.5 * mu):

@@ -6,6 +6,8 @@ world was there before, and results would depend on the batch, or be nonsense.
 
 from __future__ import annotations
 
+import itertools
+
 import numpy as np
 import pytest
 
@@ -76,8 +78,17 @@ CASES["slender"] = lambda: (slender(), np.array([-8.21590761e07, 9.83922068e06, 
 CASES["heap"] = lambda: (scenes.heap(6), np.array([3.0, 20.0, -5.0, 1.0, -4.0, 2.0]))
 
 
-@pytest.mark.parametrize("accuracy", ["fast", "balanced", "precise"])
-@pytest.mark.parametrize("case", CASES)
+def tier_of(case, accuracy):
+    """Marks of a case: events under a steady push are many, and piles are faster compiled."""
+    if case in ("shove", "slender") and accuracy == "precise":
+        return pytest.mark.exhaustive
+    return pytest.mark.compiled if case == "heap" else pytest.mark.interpreted
+
+
+@pytest.mark.parametrize(
+    ("case", "accuracy"),
+    [pytest.param(*each, marks=tier_of(*each)) for each in itertools.product(CASES, ["fast", "balanced", "precise"])],
+)
 def test_scratch_may_hold_anything(case, accuracy):
     scene, wrench = CASES[case]()
     clean, spoilt = (physics.World(scene, dt=0.01, accuracy=accuracy, threads=1) for _ in range(2))

@@ -8,7 +8,7 @@ from typing import ClassVar
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 import physics
@@ -59,7 +59,6 @@ def test_a_fall_that_reaches_its_terminal_speed_within_a_step(ratio):
     assert world.linvel[0, 0, 1] == pytest.approx(-terminal * math.tanh(x), rel=0.03)
 
 
-@settings(max_examples=60, deadline=None)
 @given(c=DECADES, dt=STEPS, quadratic=st.booleans())
 def test_drag_never_gives(c, dt, quadratic):
     """A speed falls, step by step, and does not turn round; the closed forms say to what."""
@@ -78,7 +77,6 @@ def test_drag_never_gives(c, dt, quadratic):
             assert speed == pytest.approx(5.0 / (1.0 + strength * 5.0 * k * dt), rel=0.06)
 
 
-@settings(max_examples=60, deadline=None)
 @given(c=DECADES, d=DECADES, dt=STEPS)
 def test_drag_on_the_spin_never_gives(c, d, dt):
     """ω·L, twice the energy of turning, falls from step to step."""
@@ -92,7 +90,6 @@ def test_drag_on_the_spin_never_gives(c, d, dt):
         energy = now
 
 
-@settings(max_examples=60, deadline=None)
 @given(k=DECADES, length=st.sampled_from((0.0, 0.5, 3.0)), dt=STEPS, corner=st.booleans())
 def test_a_spring_is_bounded_at_any_stiffness(k, length, dt, corner):
     """E_n <= 4/3 E_0 where h Ω <= 1 (leapfrog keeps ½ k x² + ½ m v² (1 - (h Ω)²/4)); no gain, and a report, beyond."""
@@ -128,7 +125,6 @@ def test_a_pendulum_on_a_spring_that_no_step_resolves():
     assert period == pytest.approx(2 * math.pi * math.sqrt(l / 9.81), rel=0.05)
 
 
-@settings(max_examples=40, deadline=None)
 @given(k=DECADES, c=DECADES, dt=STEPS, damped=st.booleans())
 def test_springs_between_bodies_keep_momentum_at_any_stiffness(k, c, dt, damped):
     """One end gets the momentum that the other loses; the energy is at most 4/3 of what it was."""
@@ -316,14 +312,11 @@ def test_a_stiff_damper_between_two_bodies_does_not_push_them_through_the_air():
 
 
 @pytest.mark.parametrize("index", sweep(DRAWN, SHORT, lambda index: " and ".join(PAIRS[index])))
-def test_no_energy_from_nowhere(index):
+def test_no_energy_from_nowhere(index, is_exhaustive):
     """Ten pairs of effects with drawn parameters; all pairs: `python -m benchmarks.drawn_effects`."""
-    found = 0
-    for seed in range(5):
+    for seed in range(5 if is_exhaustive else 2):
         rng = np.random.default_rng([35, index, seed])
         scene = drawn_effects.draw_scene(rng, PAIRS[index], on_floor=True)
         outcome = drawn_effects.run(rng, scene, ("fast", "balanced")[seed % 2], 4)
         assert outcome.is_finite.all()
         assert (outcome.excess <= 0.0).all()
-        found += 1
-    assert found == 5

@@ -10,6 +10,8 @@ from rigid_env import TaskEnv, TaskVectorEnv, register_task
 from rigid_env.tasks import Entry, Gust, LogUniform, Normal, Push, Uniform, observe
 from tests.tasks.conftest import Free, Slide, started
 
+pytestmark = pytest.mark.interpreted
+
 ROUGH = physics.Scene(Slide.scene.bodies, Slide.scene.walls, [*Slide.scene.effects, physics.Friction(0.4)])
 
 
