@@ -7,8 +7,6 @@ import pickle
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 import physics
 from physics import scenes
@@ -121,9 +119,8 @@ def test_a_bullet_does_not_pass_through_a_plate(thin):
 # --- impacts: laws ---------------------------------------------------------------------------------------------
 
 
-@pytest.mark.compiled
-@settings(max_examples=25, deadline=None)
-@given(seed=st.integers(0, 2**32 - 1), restitution=st.sampled_from([0.0, 0.6]))
+@pytest.mark.parametrize("restitution", [0.0, 0.6])
+@pytest.mark.parametrize("seed", sweep(range(10), [0]))
 def test_free_bodies_keep_their_momenta_and_gain_no_energy(seed, restitution):
     rng = np.random.default_rng(seed)
     bodies = []
@@ -350,13 +347,13 @@ def test_what_is_not_known_yet_is_refused():
 
 @pytest.mark.compiled
 def test_contacts_without_room_are_reported():
-    # Forty balls at nearly one place: 780 near pairs, and room for 8 per body.
-    bodies = [physics.Sphere(1.0, 1.0, pos=(0.01 * k, 0, 0)) for k in range(40)]
+    # Twenty balls at nearly one place: 190 near pairs, and room for 8 per body.
+    bodies = [physics.Sphere(1.0, 1.0, pos=(0.01 * k, 0, 0)) for k in range(20)]
     world = physics.World(physics.Scene(bodies, (), [physics.Contact(1.0)]), dt=0.01)
     report = world.step()
     assert report.status[0] == Status.LEFT_OUT
     assert not report.ok
-    assert report.left_out[0] >= 780 - 8 * 40
+    assert report.left_out[0] >= 190 - 8 * 20
     assert "contacts were left out" in report.messages()[0]
 
 
