@@ -40,6 +40,10 @@ class _Compilations(event.Listener):
             self.seconds += time.process_time() - self._begun
 
 
+STEPS = ("step_worlds", "step_events", "step_linked", "step_many")
+"""Entry kernels of a step: each compilation of one is a plan."""
+
+
 def _child_seconds() -> float:
     usage = resource.getrusage(resource.RUSAGE_CHILDREN)
     return usage.ru_utime + usage.ru_stime
@@ -93,6 +97,8 @@ def report(path: Path, longest: int = 40) -> None:
         entries = sum(sum(row["entries"].values()) for row in of)
         print(f"{wall:8.1f} {cpu:8.1f} {children:8.1f} {compiling:9.1f} {entries:7d} {len(of):6d}  {name}")
 
+    plans = sum(row["entries"].get(name, 0) for row in rows for name in STEPS)
+    print(f"{plans} plans were compiled in the processes of tests")
     print("    wall      cpu children compiling entries  tests")
     show("all", rows)
     for name, of in sorted(files.items(), key=lambda pair: -sum(row["wall"] for row in pair[1])):

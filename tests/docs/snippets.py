@@ -5,9 +5,14 @@ A comment before a block, ``<!-- not run: REASON -->``, keeps it from being run.
 
 from __future__ import annotations
 
+import os
 import re
+import subprocess
+import sys
 from dataclasses import dataclass
 from pathlib import Path
+
+import pytest
 
 ROOT = Path(__file__).parents[2]
 PAGES = (ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md")))
@@ -46,6 +51,30 @@ def blocks(page: Path, language: str) -> list[Block]:
             line = text.count("\n", 0, match.start(2)) + 1
             found.append(Block(page, line, match[1], match[2], skip[1] if skip else ""))
     return found
+
+
+def program(page: Path) -> str:
+    """The blocks of a page, each on its own lines of the page, so that an error names the line in it."""
+    lines: list[str] = []
+    for block in blocks(page, "python"):
+        if not block.skipped:
+            lines += [""] * (block.line - 1 - len(lines)) + block.code.splitlines()
+    return "\n".join(lines) + "\n"
+
+
+def run(code: str, page: Path, folder: Path) -> None:
+    """Run code of a page in a new process, in an empty folder within `folder`; it must end without an error."""
+    if "stable_baselines3" in code:
+        pytest.importorskip("stable_baselines3")
+    (empty := folder / "empty").mkdir()
+    file = folder / page.name.replace(".md", ".py")
+    file.write_text(code, encoding="utf-8")
+    path = os.pathsep.join([str(ROOT), *filter(None, [os.environ.get("PYTHONPATH")])])
+    environment = {**os.environ, "PYTHONPATH": path, "SDL_VIDEODRIVER": "dummy"}
+    done = subprocess.run(
+        [sys.executable, str(file)], capture_output=True, text=True, cwd=empty, env=environment, timeout=600
+    )  # fmt: skip
+    assert done.returncode == 0, f"{name_of(page)}:\n{done.stderr}"
 
 
 def links(page: Path) -> list[str]:

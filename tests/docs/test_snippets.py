@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-import os
 import shlex
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
@@ -20,36 +17,15 @@ ROOT = snippets.ROOT
 USAGE_ERROR = typer.BadParameter.__base__
 
 
-def program(page: Path) -> str:
-    """The blocks of a page, each on its own lines of the page, so that an error names the line in it."""
-    lines: list[str] = []
-    for block in snippets.blocks(page, "python"):
-        if not block.skipped:
-            lines += [""] * (block.line - 1 - len(lines)) + block.code.splitlines()
-    return "\n".join(lines) + "\n"
-
-
-# Pages whose scenes and trainings take long; blocks of the tasks page are run one by one by `test_tasks_page`.
-LONG = ("docs/environments.md", "docs/tasks.md")
+# Pages whose scenes and trainings take long, and those whose blocks run one by one: `test_tasks_page`, `test_readme`.
+LONG = ("docs/environments.md", "docs/tasks.md", "README.md")
 PAGES = sweep(snippets.pages_with("python"), lambda page: snippets.name_of(page) not in LONG, snippets.name_of)
 
 
 @pytest.mark.parametrize("page", PAGES)
 def test_python_runs_as_it_stands(page, tmp_path):
     """All blocks of a page in their order, in one new process, in an empty folder."""
-    folder = tmp_path / "empty"
-    folder.mkdir()
-    text = program(page)
-    if "stable_baselines3" in text:
-        pytest.importorskip("stable_baselines3")
-    code = tmp_path / page.name.replace(".md", ".py")
-    code.write_text(text, encoding="utf-8")
-    path = os.pathsep.join([str(ROOT), *filter(None, [os.environ.get("PYTHONPATH")])])
-    environment = {**os.environ, "PYTHONPATH": path, "SDL_VIDEODRIVER": "dummy"}
-    done = subprocess.run(
-        [sys.executable, str(code)], capture_output=True, text=True, cwd=folder, env=environment, timeout=600
-    )  # fmt: skip
-    assert done.returncode == 0, f"{snippets.name_of(page)}:\n{done.stderr}"
+    snippets.run(snippets.program(page), page, tmp_path)
 
 
 def shell_lines():
@@ -99,28 +75,6 @@ def test_scene_files_are_scenes(tmp_path):
                 assert physics.load_scene(path).bodies
 
 
-VENV = "python3 -m venv .venv && . .venv/bin/activate"
-SMALL_TORCH = "pip install -c constraints.txt --no-deps torch --index-url https://download.pytorch.org/whl/cpu"
-INSTALL = "pip install -c constraints.txt -e"
-
-
-def test_the_readme_is_short_and_its_two_commands_stand():
-    text = (ROOT / "README.md").read_text(encoding="utf-8")
-    assert len(text.splitlines()) <= 150
-    blocks = snippets.blocks(ROOT / "README.md", "sh")
-    commands = [" ".join(block.code.replace("\\\n", " ").split()) for block in blocks]
-    assert f'{VENV} && {SMALL_TORCH} && {INSTALL} ".[agents]" && python -m agents.train' in commands
-    assert f'{VENV} && {SMALL_TORCH} && {INSTALL} ".[dev]" && python -m pytest -n 2 --dist loadfile' in commands
-
-
-def test_ci_installs_as_the_readme_says():
-    script = ROOT / ".ci" / "run"
-    if not script.exists():
-        pytest.skip("needs a checkout with .ci")
-    lines = script.read_text(encoding="utf-8").replace("install -q ", "install ").splitlines()
-    assert lines.index(SMALL_TORCH) + 1 == lines.index(f'{INSTALL} ".[dev]"')
-
-
 @pytest.mark.parametrize("page", snippets.PAGES, ids=snippets.name_of)
 def test_links_lead_somewhere(page):
     for target in snippets.links(page):
@@ -132,4 +86,4 @@ def test_a_block_that_is_not_run_says_why(tmp_path):
     page.write_text("<!-- not run: needs a day -->\n\n```python\nx = 1\n```\n\ntext\n\n```python\ny = 2\n```\n")
     first, second = snippets.blocks(page, "python")
     assert (first.skipped, first.line, second.skipped, second.line) == ("needs a day", 4, "", 10)
-    assert program(page).splitlines() == [""] * 9 + ["y = 2"]
+    assert snippets.program(page).splitlines() == [""] * 9 + ["y = 2"]

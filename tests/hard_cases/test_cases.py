@@ -1,7 +1,4 @@
-"""Every hard case at the default accuracy and 10 ms, and event-driven: each check derives its own limit.
-
-What does not hold is expected to fail, with the reason found (`Case.faults`), and fails here when it does hold.
-"""
+"""Every hard case at the default accuracy and 10 ms: each check derives its own limit. And what a case is."""
 
 from __future__ import annotations
 
@@ -12,50 +9,12 @@ import pytest
 from rigid_env.lab.hard_cases import registry
 from rigid_env.lab.hard_cases.case import Case, Check, Setting, UnsupportedError, at_least, none_of, within
 from rigid_env.lab.hard_cases.run import Status, run_case
-
-ACCURACIES = ("balanced", "precise")
-DT = 0.01
-
-# Numbers of cases that take more than some seconds in Python, by accuracy. All cases run with --exhaustive.
-LONG = {
-    "balanced": {25, 26, 27, 28, 30, 31, 32, 44, 45, 47, 50},
-    "precise": {2, 6, 8, 9, 19, 21, 22, 24, 25, 26, *range(27, 56)} - {35, 36, 37},
-}
-
-# Numbers of cases of one body that take many steps, and share one kind of scene.
-COMPILED = {"balanced": {2, 6, 16, 17, 20, 21}, "precise": {16, 17, 20}}
+from tests.hard_cases import tier
 
 
-def tier_of(case: Case, accuracy: str) -> list:
-    """Marks that decide when and how a case is run."""
-    if case.number in LONG[accuracy]:
-        return [pytest.mark.exhaustive]
-    return [] if case.number in COMPILED[accuracy] else [pytest.mark.interpreted]
-
-
-def parameters():
-    """Every case that is built, at every accuracy."""
-    found = []
-    for case in registry.CASES:
-        for accuracy in ACCURACIES:
-            reason = case.faults.get(accuracy)
-            marks = tier_of(case, accuracy)
-            if reason:
-                marks.append(pytest.mark.xfail(strict=True, raises=AssertionError, reason=reason))
-            if case.run is not None:
-                found.append(pytest.param(case, accuracy, id=f"{case.number}-{case.name}-{accuracy}", marks=marks))
-    return found
-
-
-@pytest.mark.parametrize(("case", "accuracy"), parameters())
-def test_the_case_comes_out_as_it_must(case, accuracy):
-    try:
-        checks = case.run(Setting(accuracy, DT, is_thorough=False))
-    except UnsupportedError as error:
-        pytest.skip(f"not supported: {error}")
-    assert checks
-    failed = [check for check in checks if not check.passes]
-    assert not failed, "\n".join(map(str, failed))
+@pytest.mark.parametrize("case", tier.cases("balanced"))
+def test_the_case_comes_out_as_it_must(case):
+    tier.check(case, "balanced")
 
 
 @pytest.mark.interpreted

@@ -101,6 +101,7 @@ def test_hard_case_15_face_flat_landing_has_no_spin_bit_for_bit(e, friction):
         assert world.linvel[0, 0, 0] == world.linvel[0, 0, 2] == 0.0
 
 
+@pytest.mark.exhaustive  # the case itself is in the default tier
 def test_hard_case_6_elastic_bounces_keep_their_apex():
     """e = 1, default settings: after 300 bounces the energy is that of the start. Impact happens within slop of
     the floor at constant energy, so each bounce changes it by rounding only."""

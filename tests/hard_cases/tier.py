@@ -1,0 +1,53 @@
+"""Hard cases as tests: which of them the default tier runs, and how.
+
+What does not hold is expected to fail, with the reason found (`Case.faults`), and fails here when it does hold.
+"""
+
+from __future__ import annotations
+
+import pytest
+
+from rigid_env.lab.hard_cases import registry
+from rigid_env.lab.hard_cases.case import Case, Setting, UnsupportedError
+
+DT = 0.01
+
+# Numbers of cases that take more than some seconds in Python, by accuracy. All cases run with --exhaustive.
+LONG = {
+    "balanced": {25, 26, 27, 28, 30, 31, 32, 44, 45, 47, 50},
+    "precise": {2, 6, 8, 9, 19, 21, 22, 24, 25, 26, *range(27, 56)} - {35, 36, 37},
+}
+
+# Numbers of cases of one body that take many steps, and share one kind of scene.
+COMPILED = {"balanced": {2, 6, 16, 17, 20, 21}, "precise": {16, 17, 20}}
+
+
+def tier_of(case: Case, accuracy: str) -> list:
+    """Marks that decide when and how a case is run."""
+    if case.number in LONG[accuracy]:
+        return [pytest.mark.exhaustive]
+    return [] if case.number in COMPILED[accuracy] else [pytest.mark.interpreted]
+
+
+def cases(accuracy: str) -> list:
+    """Every case that is built, as parameters of a test."""
+    found = []
+    for case in registry.CASES:
+        reason = case.faults.get(accuracy)
+        marks = tier_of(case, accuracy)
+        if reason:
+            marks.append(pytest.mark.xfail(strict=True, raises=AssertionError, reason=reason))
+        if case.run is not None:
+            found.append(pytest.param(case, id=f"{case.number}-{case.name}", marks=marks))
+    return found
+
+
+def check(case: Case, accuracy: str) -> None:
+    """Run a case; each of its checks must pass."""
+    try:
+        checks = case.run(Setting(accuracy, DT, is_thorough=False))
+    except UnsupportedError as error:
+        pytest.skip(f"not supported: {error}")
+    assert checks
+    failed = [check for check in checks if not check.passes]
+    assert not failed, "\n".join(map(str, failed))
