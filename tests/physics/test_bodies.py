@@ -307,13 +307,13 @@ def test_same_bits_for_threads_and_batch_sizes():
 
 
 def test_a_snapshot_in_contact_continues_bit_identically():
-    world = heap(2)
+    world = heap(1)
     world.step(steps=40)
     assert len(world.contact_ends(0))
     snapshot = pickle.loads(pickle.dumps(world.snapshot()))
     world.step(steps=20)
     expected = world.state.copy()
-    other = heap(2)
+    other = heap(1)
     other.restore(snapshot)
     other.step(steps=20)
     np.testing.assert_array_equal(other.state, expected)

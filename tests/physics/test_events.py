@@ -438,6 +438,7 @@ def test_flight_under_a_constant_torque_is_that_of_dop853(accuracy, error):
     assert run.angvel[-1, 0] == pytest.approx(R @ np.linalg.inv(INERTIA) @ R.T @ truth.angular_momentum, abs=error)
 
 
+@pytest.mark.interpreted
 def test_sphere_at_500_metres_per_second_does_not_tunnel():
     """Through 500 m in one step of a second: it turns at the floor, at the time the parabola says."""
     sphere = physics.Sphere(0.01, 1.0, pos=(0, 100, 0), linvel=(0, -500, 0))
