@@ -61,7 +61,10 @@ def test_hard_case_14_one_vertex_hits(e, accuracy):
     st.floats(0, 2),
 )
 def test_frictional_impact_obeys_newton_coulomb_and_dissipates(q, v, w, e, mu):
-    """Any pose and velocity: the impulse is in the cone, the vertex leaves at -e v_n, and with e = 0 energy falls."""
+    """Any pose and velocity: the impulse is in the cone, the vertex leaves at -e v_n, and no energy is gained.
+
+    Where a rebound at -e v_n would gain energy (Kane's paradox) it is as fast as the energy before allows.
+    """
     quat = np.array(q) / np.linalg.norm(q)
     scene, r, R = on_lowest_vertex(tuple(quat), v, w, e, mu)
     heights = np.sort((np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]) * HALF) @ R.T[:, 1])
@@ -81,10 +84,12 @@ def test_frictional_impact_obeys_newton_coulomb_and_dissipates(q, v, w, e, mu):
     assert np.hypot(impulse[0], impulse[2]) <= mu * impulse[1] + slack
     assert after.angular_momentum[0, 0] - angular == pytest.approx(np.cross(r, impulse), abs=slack * 3)
     leaving = (world.linvel[0, 0] + np.cross(world.angvel[0, 0], r))[1]
-    assert leaving == pytest.approx(-e * approach, abs=1e-6 * 20 + 1e-4)  # the pose moved for a microsecond
-    if e == 0:
-        before = 0.5 * 6.0 * np.dot(v, v) + 0.5 * np.dot(w, angular)
-        assert after.kinetic_energy[0, 0] <= before * (1 + 1e-9)
+    before = 0.5 * 6.0 * np.dot(v, v) + 0.5 * np.dot(w, angular)
+    assert after.kinetic_energy[0, 0] <= before * (1 + 1e-9)
+    if after.kinetic_energy[0, 0] < before * (1 - 1e-9):
+        assert leaving == pytest.approx(-e * approach, abs=1e-6 * 20 + 1e-4)  # the pose moved for a microsecond
+    else:
+        assert 0 <= leaving <= -e * approach + 1e-6 * 20 + 1e-4
 
 
 @pytest.mark.parametrize("friction", [None, 0.5])
