@@ -93,6 +93,18 @@ def test_the_wrench_never_exceeds_its_limits(vector_class, rng):
         np.testing.assert_allclose(task.wrench[inside, 0, :3], expected[inside], rtol=1e-6)
 
 
+def test_numbers_beyond_one_act_as_one(vector_class, rng):
+    """Each is clipped before a vector is shortened: (2, 1) pushes as (1, 1) does, not half as far aside."""
+    actions = rng.uniform(-3.0, 3.0, (50, 6)).astype(np.float32)
+    wrenches = []
+    for given in (actions, np.clip(actions, -1.0, 1.0)):
+        envs = vector_class(50)
+        envs.reset(seed=0)
+        envs.step(given)
+        wrenches.append(envs.task.wrench.copy())
+    np.testing.assert_array_equal(*wrenches)
+
+
 def test_the_block_cannot_fly():
     env = BlockReachEnv()
     env.reset(seed=0, options={"face": 2})

@@ -17,7 +17,7 @@ TASKS = [
         "rigid_env/tasks/wrenches.py",
         "return clip(actions[i, k], -1.0, 1.0) if k >= 0 else 0.0",
         "return actions[i, k] if k >= 0 else 0.0",
-        "tasks/test_actions.py::test_a_wrench_is_clipped_and_shortened_to_its_limits",
+        "envs/test_tasks.py::test_numbers_beyond_one_act_as_one",
     ),
     _mutant(
         "tasks-draw",
