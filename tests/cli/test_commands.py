@@ -204,6 +204,7 @@ def test_run_takes_files_of_mujoco(tmp_path):
     assert "does not exist" in run("explain", tmp_path / "none.xml", code=2)
 
 
+@pytest.mark.interpreted
 def test_run_takes_the_scene_of_an_environment():
     assert "cart, accuracy balanced" in run("run", CART, "--duration", 0.05)
 

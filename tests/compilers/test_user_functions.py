@@ -12,7 +12,8 @@ import numpy as np
 import pytest
 
 import physics
-from physics.kernels.compile.compiler_choice import COMPILERS, FUSED, VARIABLE
+from physics.kernels.compile.compiler_choice import COMPILERS, FUSED, PYTHON, VARIABLE
+from tests.tiers.sweep import sweep
 
 PROGRAM = """
 import json
@@ -72,7 +73,7 @@ print(json.dumps(found))
 """
 
 
-@pytest.mark.parametrize("compiler", [name for name in COMPILERS if name != FUSED])
+@pytest.mark.parametrize("compiler", sweep([name for name in COMPILERS if name != FUSED], [PYTHON]))
 def test_fields_act_and_faults_are_told(compiler, tmp_path):
     file = tmp_path / "fields.py"
     file.write_text(PROGRAM, encoding="utf-8")

@@ -29,8 +29,7 @@ from rigid_env.tasks import (
     Wrench,
     observe,
 )
-from tests.docs.snippets import ROOT
-from tests.docs.test_snippets import program
+from tests.docs.snippets import ROOT, program
 
 PAGE = (ROOT / "docs" / "tasks.md").read_text(encoding="utf-8")
 BLOCK = re.compile(r"^```python\n(.*?)^```$(?:\n\n^```text\n(.*?)^```$)?", re.MULTILINE | re.DOTALL)

@@ -327,8 +327,8 @@ print("same")
 """
 
 
-def test_worlds_of_several_plans_compile_in_several_threads(tmp_path):
-    for k in range(4):
+def test_worlds_of_several_plans_compile_in_several_threads(tmp_path, is_exhaustive):
+    for k in range(4 if is_exhaustive else 2):
         environment = {**os.environ, "PYTHONPATH": ROOT, "NUMBA_CACHE_DIR": str(tmp_path / str(k % 2))}
         command = [sys.executable, "-X", "faulthandler", "-c", TWO_PLANS]
         done = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=300)
@@ -353,9 +353,9 @@ print("over")
 
 
 @pytest.mark.parametrize("threads", ["1", "2"])
-def test_the_process_may_end_while_a_daemon_thread_steps(threads, cache):
+def test_the_process_may_end_while_a_daemon_thread_steps(threads, cache, is_exhaustive):
     environment = {**os.environ, "PYTHONPATH": ROOT}
-    for _ in range(3):
+    for _ in range(3 if is_exhaustive else 1):
         command = [sys.executable, "-X", "faulthandler", "-c", EXIT, threads]
         done = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=100)
         assert (done.returncode, done.stdout.strip()) == (0, "over"), done.stderr[-3000:]

@@ -94,7 +94,7 @@ def compiled_names(effects: str, cache: Path) -> set[str]:
             {"free_rotation"},
             {"collect_wall_contacts", "solve_contacts", "cone_sweeps", "normal_sweeps"},
         ),
-        (
+        pytest.param(
             "[physics.Contact()]",
             {"collect_wall_contacts", "normal_sweeps"},
             {
@@ -105,6 +105,7 @@ def compiled_names(effects: str, cache: Path) -> set[str]:
                 "set_tangential_targets",
                 "bind_laws",
             },
+            marks=pytest.mark.exhaustive,
         ),
         pytest.param(
             "[physics.Contact(), physics.Friction()]",

@@ -111,6 +111,7 @@ def test_exhaustive_runs_all_of_them_compiled(tmp_path):
     assert (counts(output)["passed"], counts(output)["failed"]) == (2, 4)
 
 
+@pytest.mark.exhaustive
 def test_a_compiler_that_is_chosen_runs_all_tests_here(tmp_path):
     output = run(tmp_path, TESTS, RIGID_ENV_COMPILER="python")
     assert counts(output)["failed"] == 2  # the one that must, and the one that wants a compiler
