@@ -29,24 +29,24 @@ WORKER = Path(__file__).with_name("bit_scenes.py")
 
 
 class Checkout:
-    """A process that runs scenes over one checkout, with a compiler of kernels (None: the default)."""
+    """A process that runs a worker over one checkout, with a compiler of kernels (None: the default)."""
 
-    def __init__(self, folder: Path, compiler: str | None = None):
+    def __init__(self, folder: Path, compiler: str | None = None, worker: Path = WORKER):
         environment = {**os.environ, "PYTHONPATH": str(folder)}
         if compiler is not None:
             environment[VARIABLE] = compiler
         self._process = subprocess.Popen(
-            [sys.executable, str(WORKER)],
+            [sys.executable, str(worker)],
             stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, env=environment, cwd=folder,
         )  # fmt: skip
 
-    def ask(self, scene: str, preset: str, steps: int) -> None:
-        """Have it run a scene; both checkouts do at once."""
-        self._process.stdin.write(json.dumps([scene, preset, steps]) + "\n")
+    def ask(self, *request: str | int) -> None:
+        """Have it work on a request; several processes do at once."""
+        self._process.stdin.write(json.dumps(request) + "\n")
         self._process.stdin.flush()
 
-    def answer(self) -> dict:
-        """Result of `bit_scenes.record`."""
+    def answer(self):
+        """What the worker found."""
         line = self._process.stdout.readline()
         if not line:
             raise RuntimeError(f"the process over this checkout ended with {self._process.wait()}")

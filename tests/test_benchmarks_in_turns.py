@@ -13,9 +13,11 @@ class Side:
     def __init__(self, name: str, step_seconds: float, asked: list):
         self.name, self.step_seconds, self.asked = name, step_seconds, asked
 
-    def seconds(self, scene: str, count: int) -> float:
+    def ask(self, scene: str, count: int) -> None:
         self.asked.append((self.name, count))
-        return self.step_seconds * count
+
+    def answer(self) -> float:
+        return self.step_seconds * self.asked[-1][1]
 
 
 def test_a_ratio_is_the_time_there_over_the_time_here_and_who_begins_changes():
@@ -29,7 +31,7 @@ def test_a_ratio_is_the_time_there_over_the_time_here_and_who_begins_changes():
 
 @pytest.mark.exhaustive
 def test_processes_step_a_scene_and_an_environment():
-    side = in_turns.Checkout(in_turns.Path(in_turns.__file__).parents[1])
-    assert side.seconds("kick", 10) > 0
-    assert side.seconds(in_turns.ENVIRONMENT, 2) > 0
+    side = in_turns.Checkout(in_turns.WORKER.parents[1], worker=in_turns.WORKER)
+    assert in_turns.seconds(side, "kick", 10) > 0
+    assert in_turns.seconds(side, in_turns.ENVIRONMENT, 2) > 0
     side.close()
