@@ -46,7 +46,7 @@ class Checkout:
         self._process.stdin.flush()
 
     def answer(self):
-        """What the worker found."""
+        """Wait for the result of the worker."""
         line = self._process.stdout.readline()
         if not line:
             raise RuntimeError(f"the process over this checkout ended with {self._process.wait()}")
