@@ -12,6 +12,7 @@ from collections.abc import Callable
 
 ENVIRONMENT = "BlockReach"
 WORLDS = 64
+RUN = 200  # steps from the start of a scene until it begins anew, before all is asleep
 
 
 def _stepper(name: str) -> Callable[[int], None]:
@@ -39,8 +40,9 @@ def _stepper(name: str) -> Callable[[int], None]:
     start = world.snapshot()
 
     def step(count):
-        world.restore(start)
-        world.step(steps=count)
+        for done in range(0, count, RUN):
+            world.restore(start)
+            world.step(steps=min(RUN, count - done))
 
     return step
 

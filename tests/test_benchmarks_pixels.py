@@ -23,6 +23,7 @@ def test_a_quick_run_writes_what_it_found(tmp_path):
     assert [row["target"] for row in rows] == [1.0, None, 30.0]
 
 
+@pytest.mark.interpreted
 def test_the_pile_has_all_the_shapes():
     world = pixels.mixed_heap(1)
     assert {body.kind for body in world.scene.bodies} == {"block", "sphere", "ellipsoid"}

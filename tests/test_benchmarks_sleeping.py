@@ -23,6 +23,7 @@ def test_a_quick_run_writes_what_it_found(tmp_path):
     assert rows["bare_flight"]["notes"]["contacts"] == {"bare": 0, "in a large box": 0, "near walls": 0}
 
 
+@pytest.mark.interpreted
 def test_the_narrow_box_is_one_that_cannot_be_left_out_and_is_never_met():
     world = sleeping.flights("fast")["near walls"]
     radius = float(world.scene.bodies[0].bounding_radius(world.scene.bodies[0].dimensions))

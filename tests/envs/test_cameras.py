@@ -52,6 +52,7 @@ def pictures_of(env) -> np.ndarray:
     return np.array(made if isinstance(made, tuple) else [made])
 
 
+@pytest.mark.interpreted
 @pytest.mark.parametrize("make", MADE.values(), ids=MADE)
 def test_environments_take_a_camera_and_a_switch(make):
     env = make(camera=CAMERA, arrows=False)

@@ -97,6 +97,7 @@ def test_several_bodies_that_go_far_are_followed_without_walls():
     assert frame.bodies[0].pos.tolist() == [0.0, 0.0, 0.0]
 
 
+@pytest.mark.interpreted
 def test_a_crowd_has_no_arrows():
     blocks = [physics.Block((1, 1, 1), 1.0, pos=(2.0 * k, 0.5, 0.0)) for k in range(MOST_ARROWS // 4 + 1)]
     scene = physics.Scene(blocks, [physics.HalfSpace((0, 1, 0))], [physics.Gravity(), physics.Contact()])

@@ -9,6 +9,7 @@ from physics.kernels.math.quaternion import to_matrix
 from physics.kernels.state.contact_law_dispatch import LAW_ANISOTROPY, LAW_DAMPING, LAW_STIFFNESS
 from physics.kernels.state.groups import ContactSwitches
 from physics.kernels.time_stepping.workspace import make_workspace
+from tests.kernels.called import called
 
 SIZE = np.array([2.5, 1.5, 1.0])
 MASS = 6.0
@@ -100,6 +101,6 @@ class Problem:
         if warm is not None:
             self.one["impulse"][: 3 * self.n] = np.ravel(warm)
         contact = ContactSwitches(True, True if friction else None, True)
-        result = solve_contacts(self.n, contact, self.v, self.L, self.R, self.one)
+        result = called(solve_contacts, self.n, contact, self.v, self.L, self.R, self.one)
         width = 3 if friction else 1
         return np.array(self.one["impulse"][: width * self.n]).reshape(self.n, width), result

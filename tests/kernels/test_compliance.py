@@ -11,6 +11,8 @@ from physics.kernels.state.layout import METHOD_PIVOTING
 from tests.kernels.contact_problem import FACE, Problem
 from tests.kernels.test_direct import FALL, floor, law_defect
 
+pytestmark = pytest.mark.interpreted
+
 TOLERANCE = 1e-10
 
 speeds = st.tuples(*[st.floats(-0.2, 0.2).map(lambda s: round(s, 4))] * 6)

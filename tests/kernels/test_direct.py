@@ -12,6 +12,8 @@ from physics.kernels.state.layout import METHOD_DIRECT, METHOD_PIVOTING
 from tests.kernels.contact_problem import FACE, INERTIA, MASS, SIZE, Problem
 from tests.reference.lcp import coulomb_defect, solve_coulomb
 
+pytestmark = pytest.mark.interpreted
+
 GRAVITY, H = 9.81, 0.005
 FALL = -GRAVITY * H  # velocity that a step of gravity adds
 

@@ -12,6 +12,8 @@ from physics.kernels.state.layout import METHOD_DIRECT, METHOD_PIVOTING
 from tests.kernels.contact_problem import FACE, Problem
 from tests.kernels.test_direct import FALL, floor
 
+pytestmark = pytest.mark.interpreted
+
 TOLERANCE = 1e-9
 
 

@@ -17,7 +17,10 @@ from physics.kernels.multibody.data.hull_tables import CUBE, make_hulls
 from physics.kernels.multibody.narrowphase.dispatch import find_contacts
 from physics.plan.plan import SHAPE_CODES
 from physics.world import parameters
+from tests.kernels.called import called
 from tests.reference import polyhedra, separation
+
+pytestmark = pytest.mark.interpreted
 
 SETTINGS = {"relative_slop": 1e-6, "tolerance": 1e-6, "sweeps": 100, "splits": 8, "rest_share": 0.5}
 SIGNS = np.array(list(itertools.product((-1.0, 1.0), repeat=3)))
@@ -39,7 +42,7 @@ def found(bodies, places, rotations, walls=(), h=EVERYTHING):
     many.bodies.work["slop"] = 1e-6 * many.bodies.work["radius"]
     many.bodies.center[:] = many.bodies.state[:, :3] = places
     many.bodies.rotation[:] = np.reshape(rotations, (-1, 9))
-    find_contacts(h, True, True, 0, None, many)
+    called(find_contacts, h, True, True, 0, None, many)
     return many, many.counts[NUM_CONTACTS]
 
 

@@ -23,6 +23,9 @@ from physics.kernels.multibody.solver import contact_batches, newton_system, sec
 from physics.kernels.multibody.solver.islands import find_islands
 from physics.kernels.multibody.solver.minimum_degree import order_elimination
 from physics.kernels.state import layout as at
+from tests.kernels.called import called
+
+pytestmark = pytest.mark.interpreted
 
 SETTINGS = {"relative_slop": 1e-6, "tolerance": 1e-6, "sweeps": 100, "splits": 8, "rest_share": 0.5}
 
@@ -70,12 +73,13 @@ def pairs_in_the_order_of_the_sweep(many):
     ]
 
 
+@pytest.mark.compiled
 @pytest.mark.parametrize("count", [1, 2, 3, 10, 100, 400])
 @pytest.mark.parametrize("ratio", [1.0, 3.0, 1000.0])  # of the largest to the smallest: large ones enter many columns
 @pytest.mark.parametrize("stretch", [(3, 3, 3), (30, 1, 2), (1, 40, 40)])
 def test_pairs_are_those_whose_boxes_overlap_in_the_order_of_the_sweep(count, ratio, stretch):
     many = spread_out(count, count, ratio, stretch)
-    find_pairs(0.0, many)
+    called(find_pairs, 0.0, many)
     found = [tuple(pair) for pair in many.broadphase.pairs[: many.counts[NUM_PAIRS]].tolist()]
     expected = pairs_in_the_order_of_the_sweep(many)
     assert found == expected[: len(many.broadphase.pairs)] or len(expected) > len(many.broadphase.pairs)
@@ -87,18 +91,19 @@ def test_pairs_are_found_within_columns_not_by_comparing_all(seed):
     """The bodies listed in one column are few, however many there are."""
     count = 400
     many = spread_out(seed, count, 1.0, (6, 6, 6))
-    find_pairs(0.0, many)
+    called(find_pairs, 0.0, many)
     lengths = np.diff(many.broadphase.first_entry)[many.broadphase.cursor != many.broadphase.first_entry[:-1]]
     # Boxes are 0.4 to 0.7 wide (a cube's 2 x 0.2, turned): strips of at most 1.4 + cuts on 12 are 8 or more a side.
     # 400 bodies that enter at most 4 columns each: 25 or less in each of 64 on average; twice that is never reached.
     assert 0 < lengths.max() <= 50
 
 
+@pytest.mark.compiled
 @pytest.mark.parametrize("value", [np.nan, np.inf, 1e300])
 def test_a_box_that_is_not_finite_is_no_reason_to_read_beyond_the_columns(value):
     many = spread_out(0, 50, 1.0, (3, 3, 3))
     many.bodies.center[7, 1] = value
-    find_pairs(0.0, many)
+    called(find_pairs, 0.0, many)
     assert 0 <= many.counts[NUM_PAIRS] <= len(many.broadphase.pairs)
 
 
@@ -123,7 +128,7 @@ def test_the_normal_of_two_blocks_separates_them_most(seed, distance):
     many = blocks([np.zeros(3), distance * direction], [rotation(rng), rotation(rng)], halves)
     h = 10.0  # the margin is the way that the loads could bring the blocks in h: gaps up to a m/s² h² = 100 m count
     many.bodies.work["acceleration"] = 1.0
-    find_contacts(h, None, None, 0, None, many)
+    called(find_contacts, h, None, None, 0, None, many)
     n = many.counts[NUM_CONTACTS]
     assert n > 0
     normal = many.contacts.frame[0, :3]
@@ -159,7 +164,7 @@ def test_the_speed_of_a_contact_is_that_of_its_two_points(seed):
     rng = np.random.default_rng(seed)
     many = blocks([np.zeros(3), [0.2, 0.9, 0.1]], [rotation(rng), rotation(rng)], np.full((2, 3), 0.5))
     many.bodies.twist[:] = rng.normal(size=(2, 6))
-    find_contacts(0.01, None, None, 0, None, many)
+    called(find_contacts, 0.01, None, None, 0, None, many)
     n, twist = many.counts[NUM_CONTACTS], many.bodies.twist
     assert n > 0
     arms = many.contacts.arm[:n].reshape(n, 2, 3)
@@ -193,7 +198,7 @@ def test_parallel_edges_that_touch_push_along_the_middle_of_what_both_allow(seed
     if abs(shift) * halves[:, 2].sum() > halves[:, 2].sum() - 0.01:
         return  # beside each other along the edges
     many = blocks([world @ a, world @ b], [world @ R for R in planar], halves)
-    find_contacts(0.01, None, None, 0, None, many)
+    called(find_contacts, 0.01, None, None, 0, None, many)
     n = many.counts[NUM_CONTACTS]
     middle = 0.5 * (alpha + beta) + 0.25 * math.pi
     assert n == 2
@@ -227,7 +232,7 @@ def test_no_contact_is_lost_where_a_face_is_tilted_by_some_slops(yaw, shift, til
         tipped = (np.eye(3) + math.sin(angle) * cross + (1 - math.cos(angle)) * cross @ cross) @ turned
         many = blocks([[0, 0, 0], [shift[0], 1.0, shift[1]]], [np.eye(3), tipped], np.full((2, 3), 0.5))
         many.bodies.work["acceleration"] = acceleration
-        find_contacts(h, None, None, 0, None, many)
+        called(find_contacts, h, None, None, 0, None, many)
         n = many.counts[NUM_CONTACTS]
         return n, many.contacts.frame[:n, :3]
 
@@ -242,7 +247,7 @@ def test_names_of_equal_stacked_blocks_do_not_change_with_rounding():
     names = []
     for shift in (0.0, 1e-15, -1e-15):
         many = blocks([[0, 0, 0], [shift, 1, shift]], [np.eye(3), np.eye(3)], np.full((2, 3), 0.5))
-        find_contacts(0.01, None, None, 0, None, many)
+        called(find_contacts, 0.01, None, None, 0, None, many)
         names.append(sorted(many.contacts.id[: many.counts[NUM_CONTACTS]].tolist()))
     assert len(names[0]) == 4
     assert names[0] == names[1] == names[2]
@@ -257,7 +262,7 @@ def test_faces_that_end_together_touch_all_over(yaw, shift):
     c, s = math.cos(yaw * slop), math.sin(yaw * slop)
     turned = np.array([[c, 0.0, s], [0.0, 1.0, 0.0], [-s, 0.0, c]])
     many = blocks([[0, 0, 0], [shift[0] * slop, 1, shift[1] * slop]], [np.eye(3), turned], np.full((2, 3), 0.5))
-    find_contacts(0.01, None, None, 0, None, many)
+    called(find_contacts, 0.01, None, None, 0, None, many)
     points = many.contacts.arm[: many.counts[NUM_CONTACTS], :3]
     # A corner is off by the shift, its way by the turn, and what the clip leaves or takes: a slop.
     reach = (3 + 4 * 0.5 + 1 + 1e-6) * slop
@@ -296,7 +301,7 @@ def test_islands_are_the_connected_components(seed, count, links):
     pairs = [every[k] for k in rng.permutation(len(every))[:links]]
     walls = rng.choice(count, rng.integers(1, count + 1), replace=False).tolist()
     many, n = touching(count, pairs, walls)
-    found = find_islands(n, many)
+    found = called(find_islands, n, many)
     graph = csr_array((np.ones(len(pairs)), np.reshape(pairs, (-1, 2)).T.astype(int)), (count, count))
     labels = connected_components(graph, directed=False)[1]
     seen = []
@@ -314,8 +319,8 @@ def test_islands_are_the_connected_components(seed, count, links):
 def island_of_all(count, pairs, most=ANY):
     """Workspace with one island, which `pairs` must connect, ordered for elimination; products that it takes."""
     many, n = touching(count, pairs, [0])
-    assert find_islands(n, many) == 1
-    return many, order_elimination(0, n, 0, count, most, many)
+    assert called(find_islands, n, many) == 1
+    return many, called(order_elimination, 0, n, 0, count, most, many)
 
 
 def connected_pairs(rng, count, links):
@@ -332,7 +337,7 @@ def test_the_block_system_is_solved(count, links):
     pairs = connected_pairs(rng, count, links)
     many, products = island_of_all(count, pairs)
     assert products >= count
-    blocks_of.clear_system(0, count, many)
+    called(blocks_of.clear_system, 0, count, many)
     A = np.zeros((6 * count, 6 * count))
     for a, b in [*pairs, *((b, b) for b in range(count))]:
         for i, j in {(a, b), (b, a)}:
@@ -340,14 +345,14 @@ def test_the_block_system_is_solved(count, links):
             if i == j:
                 many.system.diagonal[i] += numbers_of(block)
             elif many.system.rank[i] > many.system.rank[j]:
-                many.system.lower[blocks_of.find_block_index(j, i, many)] += numbers_of(block)
+                many.system.lower[called(blocks_of.find_block_index, j, i, many)] += numbers_of(block)
             else:
-                many.system.upper[blocks_of.find_block_index(i, j, many)] += numbers_of(block)
+                many.system.upper[called(blocks_of.find_block_index, i, j, many)] += numbers_of(block)
             A[6 * i : 6 * i + 6, 6 * j : 6 * j + 6] += block
     right = rng.normal(size=(count, 6))
     x = np.pad(right.reshape(count, 2, 3), ((0, 0), (0, 0), (0, 1))).reshape(count, 8)
-    blocks_of.factor_system(0, count, many)
-    blocks_of.solve_factored(0, count, x, many)
+    called(blocks_of.factor_system, 0, count, many)
+    called(blocks_of.solve_factored, 0, count, x, many)
     x = x.reshape(count, 2, 4)[:, :, :3]
     # Backward error of elimination: rounding times the condition of A times its order.
     bound = 6 * count * np.finfo(float).eps * np.linalg.cond(A) * np.abs(x).max()
@@ -401,8 +406,8 @@ def test_the_matrix_is_that_of_the_contacts(count, links, contacts):
     rng = np.random.default_rng(links)
     pairs = [pair for pair in connected_pairs(rng, count, links) for _ in range(contacts)]
     many, n = touching(count, pairs, list(range(0, count, 2)))
-    find_islands(n, many)
-    order_elimination(0, n, 0, count, ANY, many)
+    called(find_islands, n, many)
+    called(order_elimination, 0, n, 0, count, ANY, many)
     many.contacts.frame[:n] = [np.linalg.qr(rng.normal(size=(3, 3)))[0].ravel() for _ in range(n)]
     many.contacts.arm[:n], many.bodies.inv_mass[:] = rng.normal(size=(n, 6)), rng.uniform(0.5, 2, count)
     M, D, rho = np.zeros((6 * count, 6 * count)), rng.normal(size=(n, 9)), 0.7
@@ -412,8 +417,8 @@ def test_the_matrix_is_that_of_the_contacts(count, links, contacts):
         many.bodies.inv_inertia[b] = K[np.triu_indices(3)]
         M[6 * b : 6 * b + 3, 6 * b : 6 * b + 3] = many.bodies.inv_mass[b] * np.eye(3)
         M[6 * b + 3 : 6 * b + 6, 6 * b + 3 : 6 * b + 6] = K
-    assert contact_batches.batch_contacts(0, n, many)
-    blocks_of.clear_system(0, count, many)
+    assert called(contact_batches.batch_contacts, 0, n, many)
+    called(blocks_of.clear_system, 0, count, many)
     A, found = np.eye(6 * count), np.zeros((6 * count, 6 * count))
     for k in range(n):
         J = np.zeros((3, 6 * count))
@@ -423,8 +428,8 @@ def test_the_matrix_is_that_of_the_contacts(count, links, contacts):
                 J[:, 6 * b : 6 * b + 6] = sign * np.hstack([np.eye(3), np.cross(np.eye(3), r).T])  # v + ω x r
         J = many.contacts.frame[k].reshape(3, 3) @ J
         A += M @ J.T @ (rho * D[k].reshape(3, 3)) @ J
-    add_batches(rho, *(np.ascontiguousarray(D[:, k : k + 3]) for k in (0, 3, 6)), many)
-    newton_system.complete_matrix(0, count, many)
+    called(add_batches, rho, *(np.ascontiguousarray(D[:, k : k + 3]) for k in (0, 3, 6)), many)
+    called(newton_system.complete_matrix, 0, count, many)
     for b in range(count):
         found[6 * b : 6 * b + 6, 6 * b : 6 * b + 6] = block_of(many.system.diagonal[b])
         for k in range(many.system.start[b], many.system.stop[b]):

@@ -10,8 +10,11 @@ from physics.kernels.compile.decorators import kernel
 from physics.kernels.half_space.conservative_advancement import safe_advance, spin_bound
 from physics.kernels.multibody.narrowphase.gjk import gjk_distance
 from physics.kernels.state.layout import HULL, SPHERE
+from tests.kernels.called import called
 from tests.reference import turning as truth
 from tests.reference.separation import largest_separation
+
+pytestmark = pytest.mark.interpreted
 
 HULL_POINTS = ((1.0, 0.0, -0.6), (-0.5, 0.9, -0.6), (-0.5, -0.9, -0.6), (0.2, 0.1, 1.1), (0.9, 0.8, 0.3))
 SHAPES = {
@@ -59,8 +62,16 @@ def test_the_distance_of_two_bodies_is_a_bound_that_falls_short_by_a_tenth_at_mo
         R, S = (truth.Rotation.random(random_state=rng.integers(1 << 30)).as_matrix() for _ in range(2))
         d = rng.standard_normal(3)
         d *= (0.5 + 1.5 * rng.random()) / np.linalg.norm(d)
-        n, gap = gjk_distance(
-            0, 1, (tuple(d), tuple(R.ravel())), ((0.0, 0.0, 0.0), tuple(S.ravel())), tuple(d), 1e-9, has_hulls, many
+        n, gap = called(
+            gjk_distance,
+            0,
+            1,
+            (tuple(d), tuple(R.ravel())),
+            ((0.0, 0.0, 0.0), tuple(S.ravel())),
+            tuple(d),
+            1e-9,
+            has_hulls,
+            many,
         )
         best = largest_separation(lambda n, R=R: support(a, R, -n), lambda n, S=S: support(b, S, n), d, seed=k)
         n = np.array(n)
@@ -116,7 +127,9 @@ def test_no_wall_is_reached_within_the_safe_time(shape):
         world.step(dt=1e-12)  # writes the body's record
         L = tuple(world.state[0, 10:13])
         horizon = 0.1
-        spin, found, t = safe_time_of((tuple(pos[0]), tuple(q[0]), tuple(linvel[0]), L), horizon, world.scratch[0])
+        spin, found, t = called(
+            safe_time_of, (tuple(pos[0]), tuple(q[0]), tuple(linvel[0]), L), horizon, world.scratch[0]
+        )
         assert spin >= np.linalg.norm(angvel) * (1 - 1e-12)
         assert found == pytest.approx(gap(np.zeros(1))[0], abs=1e-12)
         assert (gap(np.linspace(0, t, 400)) > 0).all()

@@ -37,6 +37,7 @@ def releases(trajectory, wall):
 SPINNING = {"fast": (0.3, 0.15, 14.0), "slow": (0.3, 0.15, 13.22), "flat": (0.3, 0.03, 18.1)}
 
 
+@pytest.mark.interpreted
 @pytest.mark.parametrize("accuracy", LATE)
 @pytest.mark.parametrize("friction", [None, 0.0])
 @pytest.mark.parametrize("spinning", SPINNING)

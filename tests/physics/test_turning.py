@@ -57,6 +57,7 @@ def test_separating_axes_agree_with_a_ball_about_a_point():
     assert np.abs(other[ball < 0] - ball[ball < 0]).max() < 2 * tiny
 
 
+@pytest.mark.interpreted
 def test_edges_of_slender_blocks_push_apart():
     """Rods that cross by less than 11 degrees' tilt far from their middles, whose middles are on other sides of a face.
 

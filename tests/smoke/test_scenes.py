@@ -69,6 +69,7 @@ def test_an_ellipsoid_rebounds_with_its_share_of_the_speed():
     assert drop.pos[-1, 0, 1] == pytest.approx(0.3 + speed * 0.1 - 0.5 * G * 0.01, abs=1e-8)
 
 
+@pytest.mark.interpreted
 def test_spheres_that_meet_a_hull_keep_their_momentum():
     wedge = physics.Hull([(-1, -1, -1), (1, -1, -1), (0, 1, -1), (-1, -1, 1), (1, -1, 1), (0, 1, 1)], mass=2.0)
     ball = physics.Sphere(radius=0.5, mass=1.0, pos=(0, 0, 4.0), linvel=(0.1, 0, -6))

@@ -221,6 +221,7 @@ class Flying(BlockReach):
     actions = Wrench(0, force=3.0)
 
 
+@pytest.mark.interpreted
 @pytest.mark.parametrize("threads", [1, 2])
 def test_an_exception_of_a_field_puts_everything_back(threads):
     task, twin = (started(Flying(2, effects=[Reaching()], threads=threads)) for _ in range(2))

@@ -95,6 +95,7 @@ def test_a_slider_of_an_environment_stays_in_later_episodes():
     assert session.settings["friction"] == 0.1
 
 
+@pytest.mark.interpreted
 def test_effects_are_declared_in_the_copy_alone():
     scene = scenes.tower(2)
     world = physics.World(scene)
