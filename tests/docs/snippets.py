@@ -5,14 +5,13 @@ A comment before a block, ``<!-- not run: REASON -->``, keeps it from being run.
 
 from __future__ import annotations
 
-import os
 import re
-import subprocess
-import sys
 from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
+
+from tests import prepared
 
 ROOT = Path(__file__).parents[2]
 PAGES = (ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md")))
@@ -69,12 +68,8 @@ def run(code: str, page: Path, folder: Path) -> None:
     (empty := folder / "empty").mkdir()
     file = folder / page.name.replace(".md", ".py")
     file.write_text(code, encoding="utf-8")
-    path = os.pathsep.join([str(ROOT), *filter(None, [os.environ.get("PYTHONPATH")])])
-    environment = {**os.environ, "PYTHONPATH": path, "SDL_VIDEODRIVER": "dummy"}
-    done = subprocess.run(
-        [sys.executable, str(file)], capture_output=True, text=True, cwd=empty, env=environment, timeout=600
-    )  # fmt: skip
-    assert done.returncode == 0, f"{name_of(page)}:\n{done.stderr}"
+    status, output = prepared.run(file, empty)
+    assert status == 0, f"{name_of(page)}:\n{output}"
 
 
 def links(page: Path) -> list[str]:

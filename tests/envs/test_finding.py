@@ -13,6 +13,7 @@ from pathlib import Path
 import pytest
 
 import rigid_env
+from tests import prepared
 
 ROOT = Path(__file__).parents[2]
 PAGE = (ROOT / "docs" / "environments.md").read_text(encoding="utf-8")
@@ -35,9 +36,9 @@ def python(folder: Path, *arguments: str, path: str = str(ROOT)) -> subprocess.C
 def test_snippets_of_the_page_run_as_they_stand(snippet, tmp_path):
     if "stable_baselines3" in snippet:
         pytest.importorskip("stable_baselines3")
-    (tmp_path / "snippet.py").write_text(snippet, encoding="utf-8")
-    done = python(tmp_path, "snippet.py")
-    assert done.returncode == 0, done.stderr
+    (file := tmp_path / "snippet.py").write_text(snippet, encoding="utf-8")
+    status, output = prepared.run(file, tmp_path)
+    assert status == 0, output
 
 
 def test_the_page_lists_the_options():

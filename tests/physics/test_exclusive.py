@@ -18,6 +18,7 @@ import pytest
 
 import physics
 from physics.parallel.bound_call import Work
+from tests.tiers.sweep import sweep
 
 ROOT = str(Path(__file__).parents[2])
 
@@ -285,8 +286,9 @@ def cache() -> str:
     return os.environ.get("NUMBA_CACHE_DIR", "")
 
 
-@pytest.mark.parametrize("prepared", [False, True])
-@pytest.mark.parametrize("threads", [1, 2])
+@pytest.mark.parametrize(
+    ("threads", "prepared"), sweep([(1, False), (1, True), (2, False), (2, True)], [(1, False), (2, True)])
+)
 def test_two_threads_step_one_world_a_hundred_times(threads, prepared, cache):
     """No crash, no hang: each call took a whole step or none, and the state is that of so many steps one by one."""
     assert together(cache, threads, tries=100, steps=50, prepared=prepared) > 0
@@ -328,7 +330,7 @@ print("same")
 
 
 def test_worlds_of_several_plans_compile_in_several_threads(tmp_path, is_exhaustive):
-    for k in range(4 if is_exhaustive else 2):
+    for k in range(4 if is_exhaustive else 1):
         environment = {**os.environ, "PYTHONPATH": ROOT, "NUMBA_CACHE_DIR": str(tmp_path / str(k % 2))}
         command = [sys.executable, "-X", "faulthandler", "-c", TWO_PLANS]
         done = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=300)

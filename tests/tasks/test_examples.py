@@ -31,8 +31,9 @@ def test_they_have_forty_lines_at_most(name):
 
 
 @pytest.mark.parametrize("name", CLASSES)
-def test_they_pass_their_checks_in_workers_too(name):
-    check_task(f"{name}:{CLASSES[name]}", contexts=("fork", "spawn"))
+def test_they_pass_their_checks_in_workers_too(name, is_exhaustive):
+    is_spawned = is_exhaustive or name == "edge_balance"
+    check_task(f"{name}:{CLASSES[name]}", contexts=("fork", "spawn") if is_spawned else ("fork",))
 
 
 @pytest.mark.parametrize("name", CLASSES)

@@ -67,10 +67,23 @@ def test_comes_after():
 """
 
 
-def run(folder: Path, tests: str, *options: str, **variables: str) -> str:
-    """Output of pytest over a file of tests, in a folder with this suite's tiers."""
-    (folder / "conftest.py").write_text(CONFTEST, encoding="utf-8")
-    (folder / "test_them.py").write_text(tests, encoding="utf-8")
+FIRST = "def test_{}():\n    pass\n"
+SECOND = f"import pytest\n\n@pytest.mark.interpreted\n{FIRST}"
+FILES = {
+    "test_them.py": TESTS,
+    "test_dying.py": DYING,
+    # fixtures of a folder that ends with an interpreted test are taken down before the tests of the next folder
+    "a/test_first.py": FIRST.format("first"),
+    "a/test_second.py": SECOND.format("second"),
+    "b/test_third.py": FIRST.format("third"),
+}
+
+
+def run(folder: Path, *options: str, **variables: str) -> str:
+    """Output of pytest over some files of tests, in a folder with this suite's tiers."""
+    for name, code in {"conftest.py": CONFTEST, **FILES}.items():
+        (folder / name).parent.mkdir(exist_ok=True)
+        (folder / name).write_text(code, encoding="utf-8")
     environment = {name: text for name, text in os.environ.items() if name != "RIGID_ENV_COMPILER"}
     path = os.pathsep.join([str(ROOT), *filter(None, [os.environ.get("PYTHONPATH")])])
     environment |= {"PYTHONPATH": path, "PYTHONIOENCODING": "utf-8", **variables}
@@ -84,40 +97,32 @@ def counts(output: str) -> dict[str, int]:
     return {word: int(number) for number, word in re.findall(r"(\d+) (\w+)", output.splitlines()[-1])}
 
 
-@pytest.mark.parametrize("options", [(), ("-n", "1", "--dist", "loadfile")], ids=["alone", "xdist"])
+@pytest.mark.parametrize(
+    "options",
+    [(), pytest.param(("-n", "1", "--dist", "loadfile"), marks=pytest.mark.exhaustive)],
+    ids=["alone", "xdist"],
+)
 def test_the_default_tier_leaves_out_and_interprets(options, tmp_path):
-    output = run(tmp_path, TESTS, *options)
-    expected = {"passed": 4, "failed": 1, "skipped": 1, "xfailed": 1}
-    assert {name: counts(output)[name] for name in expected} == expected
+    output = run(tmp_path, *options)
+    expected = {"passed": 8, "failed": 2, "skipped": 1, "xfailed": 1}
+    assert {name: counts(output).get(name) for name in expected} == expected
+    assert "error" not in counts(output)
     assert "test_left_out" not in output
     assert "said by the test" in output
     assert "FAILED test_them.py::test_fails - AssertionError" in output
     assert "for a reason" in output
-
-
-def test_a_folder_may_end_with_an_interpreted_test(tmp_path):
-    """Fixtures of a folder are taken down before the tests of the next folder."""
-    for name, mark in (("first", ""), ("second", "@pytest.mark.interpreted\n")):
-        (tmp_path / "a").mkdir(exist_ok=True)
-        (tmp_path / "a" / f"test_{name}.py").write_text(f"import pytest\n\n{mark}def test_{name}():\n    pass\n")
-    (tmp_path / "b").mkdir()
-    (tmp_path / "b" / "test_third.py").write_text("def test_third():\n    pass\n")
-    assert counts(run(tmp_path, "def test_last():\n    pass\n"))["passed"] == 4
+    # a process that ends fails its test alone
+    assert "FAILED test_dying.py::test_ends_its_process - the process of" in output
+    assert "PASSED test_dying.py::test_comes_after" in output
 
 
 def test_exhaustive_runs_all_of_them_compiled(tmp_path):
-    output = run(tmp_path, TESTS, "--exhaustive")
+    output = run(tmp_path, "--exhaustive", "test_them.py")
     assert "PASSED test_them.py::test_left_out" in output
     assert (counts(output)["passed"], counts(output)["failed"]) == (2, 4)
 
 
 @pytest.mark.exhaustive
 def test_a_compiler_that_is_chosen_runs_all_tests_here(tmp_path):
-    output = run(tmp_path, TESTS, RIGID_ENV_COMPILER="python")
+    output = run(tmp_path, "test_them.py", RIGID_ENV_COMPILER="python")
     assert counts(output)["failed"] == 2  # the one that must, and the one that wants a compiler
-
-
-def test_a_process_that_ends_fails_its_test_alone(tmp_path):
-    output = run(tmp_path, DYING)
-    assert "FAILED test_them.py::test_ends_its_process - the process of interpreted tests" in output
-    assert "PASSED test_them.py::test_comes_after" in output
