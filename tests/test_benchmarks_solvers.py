@@ -38,6 +38,7 @@ def test_the_default_solves_what_sweeps_do_not():
     assert outcomes["Lemke, pyramid"].residual <= solvers.TOLERANCE
 
 
+@pytest.mark.exhaustive
 def test_a_run_writes_what_it_found(tmp_path, monkeypatch):
     monkeypatch.setattr(problems, "hard", lambda: iter(()))
     monkeypatch.setattr(problems, "piles", lambda: iter((problems.pile(0, 2, 4, 0.2),)))

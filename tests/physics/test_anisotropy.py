@@ -186,7 +186,7 @@ def test_a_quarter_turn_with_the_coefficients_exchanged_is_the_same_wall():
 vectors = st.tuples(*[st.floats(-5, 5)] * 3)
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=settings().max_examples * 6 // 5, deadline=None)
 @given(
     linvel=vectors, angvel=vectors, mu=st.tuples(st.floats(0.01, 3), st.floats(0.01, 3)), e=st.floats(0, 1),
     axis=st.tuples(st.floats(-1, 1), st.just(0.0), st.floats(0.1, 1)), height=st.floats(0.9, 1.5),

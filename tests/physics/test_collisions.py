@@ -183,7 +183,7 @@ def in_a_row(places, speeds, masses, e, collisions) -> np.ndarray:
     e=st.floats(0.0, 1.0),
 )
 @example(speeds=[0.0, 0.0, -1.0], masses=[1.0, 0.5, 1.0, 1.0], e=0.125)  # all end at -0.4: what is left is rounding
-@settings(max_examples=60)
+@settings(max_examples=settings().max_examples * 6 // 5)
 def test_balls_that_touch_in_a_row_follow_the_law_that_was_asked_for(speeds, masses, e):
     """In a row that touches every velocity of approach is v_i - v_{i+1}: the reference's J, and M the masses."""
     n = len(speeds)

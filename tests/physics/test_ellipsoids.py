@@ -64,13 +64,13 @@ def test_an_oblique_impact_is_that_of_one_contact(other, ellipsoid_first):
     assert before[2] - after[2] == pytest.approx(0.5 * (1 - 0.7) * j * closing, rel=1e-5)
 
 
-def test_a_ball_by_another_name_does_the_same():
+def test_a_ball_by_another_name_does_the_same(is_exhaustive):
     def run(ball):
         block = physics.Block((2, 1, 2), 3.0, pos=(0, 0.5, 0))
         world = physics.World(
             physics.Scene([block, ball(pos=(0.2, 2.5, 0.1), angvel=(1, 2, 3))], FLOOR, RUBBING), dt=0.01
         )
-        world.step(steps=150)
+        world.step(steps=150 if is_exhaustive else 80)  # it lands after 0.45 s
         return world
 
     one = run(lambda **start: physics.Sphere(0.5, 2.0, **start))
@@ -97,21 +97,21 @@ def test_an_egg_rests_on_a_block_and_carries_its_weight():
     assert abs(on_egg.sum()) == pytest.approx(2.0 * G, rel=1e-5)
 
 
-def test_an_egg_rocks_on_a_block_with_the_period_of_small_swings():
+def test_an_egg_rocks_on_a_block_with_the_period_of_small_swings(is_exhaustive):
     """ω² = g (ρ - b)/(b² + k²): a body of centre height b and radius of curvature ρ = a²/b that rolls on a plane.
 
     Turned by θ about z its centre is (ρ - b) (1 - cos θ) above its lowest, to second order, and it turns about the
     point of contact with the moment m (k² + b²), k² = (a² + b²)/5. Amplitude 0.02 rad: off by some θ²/16, 1e-4.
     """
     a, b = AXES[0], AXES[1]
-    theta, dt = 0.02, 0.005
+    theta, dt, periods = 0.02, *((0.005, 2.2) if is_exhaustive else (0.02, 1.7))
     height = math.hypot(a * math.sin(theta), b * math.cos(theta))
     block = physics.Block((6, 1, 6), 500.0, pos=(0, 0.5, 0))
     egg = physics.Ellipsoid(AXES, 2.0, pos=(0, 1 + height, 0), quat=turn((0, 0, 1), theta))
     world = physics.World(physics.Scene([block, egg], FLOOR, RUBBING), dt=dt)
     period = 2 * math.pi / math.sqrt(G * (a * a / b - b) / (b * b + (a * a + b * b) / 5))
     times, spins = [], []
-    for k in range(int(2.2 * period / dt)):
+    for k in range(int(periods * period / dt)):
         world.step()
         times.append((k + 1) * dt)
         spins.append(world.angvel[0, 1, 2])
@@ -120,7 +120,7 @@ def test_an_egg_rocks_on_a_block_with_the_period_of_small_swings():
     share = spins[crossings] / (spins[crossings] - spins[crossings + 1])
     halves = np.array(times)[crossings] + dt * share
     assert len(halves) >= 3
-    # Second order in the step, (ω h)²/12 < 1e-5; the amplitude's 1e-4; friction and slop take a little of the swing.
+    # Second order in the step, (ω h)²/12 = 6e-4 at 20 ms; the amplitude's 1e-4; friction and slop take a little of it.
     assert halves[2] - halves[0] == pytest.approx(period, rel=2e-3)
 
 

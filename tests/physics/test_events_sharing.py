@@ -9,8 +9,6 @@ from scipy.integrate import solve_ivp
 import physics
 from physics import scenes
 
-pytestmark = pytest.mark.interpreted
-
 HALF = np.array(scenes.SIZE) / 2
 MU = 0.5
 
@@ -54,6 +52,7 @@ def pivoting(angle, rate, force, torque):
     return alpha, shapes @ coefficients, np.array([fx, fz])
 
 
+@pytest.mark.interpreted
 def test_a_face_slides_round_a_corner_that_holds():
     """Pose and force after 50 ms against SciPy's integral of the six balances, to the tolerance of the scheme.
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import itertools
 import pickle
 
@@ -60,19 +61,23 @@ def totals(world, count):
 # --- a block by another name -----------------------------------------------------------------------------------
 
 
+@functools.cache
+def way_of_a_fall(first: str, second: str) -> np.ndarray:
+    """Places (steps, 2, 3) of two boxes of which the second falls on the first."""
+    q = unit(np.random.default_rng(3))
+    make = {"block": physics.Block, "hull": box}
+    bodies = [
+        make[first]((2, 1, 1.5), 3.0, pos=(0, 0.5, 0)),
+        make[second]((1, 0.6, 0.8), 1.0, pos=(0.2, 2.2, 0.1), quat=q, angvel=(1, 0.5, -1)),
+    ]
+    world = physics.World(scene(bodies), dt=0.01)
+    return np.array([world.step() and world.pos[0, :2].copy() for _ in range(200)])
+
+
 @pytest.mark.parametrize("kinds", [("hull", "hull"), ("hull", "block"), ("block", "hull")])
 def test_a_box_of_points_moves_as_a_block_does(kinds):
     """It falls on another one, tumbles and comes to rest."""
-    q = unit(np.random.default_rng(3))
-    make = {"block": physics.Block, "hull": box}
-    ways = []
-    for first, second in (("block", "block"), kinds):
-        bodies = [
-            make[first]((2, 1, 1.5), 3.0, pos=(0, 0.5, 0)),
-            make[second]((1, 0.6, 0.8), 1.0, pos=(0.2, 2.2, 0.1), quat=q, angvel=(1, 0.5, -1)),
-        ]
-        world = physics.World(scene(bodies), dt=0.01)
-        ways.append(np.array([world.step() and world.pos[0, :2].copy() for _ in range(200)]))
+    ways = way_of_a_fall("block", "block"), way_of_a_fall(*kinds)
     apart = np.abs(ways[0] - ways[1]).max(axis=(1, 2))
     # In flight the same but for rounding (for 0.3 s); from then on each solve is off by the tolerance of the free
     # speed, 1e-6 of 5 m/s, and what they are off by at the impact grows with the time after it, 1.5 s, and with every
@@ -186,7 +191,7 @@ def test_a_bullet_does_not_pass_through_a_plate():
 
 @pytest.mark.parametrize("restitution", [0.0, 0.6])
 @pytest.mark.parametrize("seed", sweep(range(10), [0]))
-def test_rocks_that_collide_keep_their_momenta_and_gain_no_energy(seed, restitution):
+def test_rocks_that_collide_keep_their_momenta_and_gain_no_energy(seed, restitution, is_exhaustive):
     rng = np.random.default_rng(seed)
     bodies = [
         rock(
@@ -202,7 +207,7 @@ def test_rocks_that_collide_keep_their_momenta_and_gain_no_energy(seed, restitut
     ratio = max(np.ptp(np.linalg.eigvalsh(b.inertia)) / np.linalg.eigvalsh(b.inertia)[0] for b in bodies)
     radius = min(b.polyhedron.radius for b in bodies)
     depth, met = 0.0, 0
-    for _ in range(150):
+    for _ in range(150 if is_exhaustive else 90):
         world.step()
         met += len(world.contact_ends())
         now = totals(world, 8)[2]
@@ -248,16 +253,17 @@ def test_same_bits_for_threads_and_batch_sizes(is_exhaustive):
     np.testing.assert_array_equal(part, one[: len(part)])
 
 
-def test_a_snapshot_in_contact_and_a_pickled_world_continue_bit_identically():
+def test_a_snapshot_in_contact_and_a_pickled_world_continue_bit_identically(is_exhaustive):
     world = heap(1)
-    world.step(steps=50)
+    world.step(steps=50 if is_exhaustive else 20)
     assert len(world.contact_ends(0))
     snapshot, copy = pickle.loads(pickle.dumps(world.snapshot())), pickle.loads(pickle.dumps(world))
-    world.step(steps=15)
+    after = 15 if is_exhaustive else 5
+    world.step(steps=after)
     other = heap(1)
     other.restore(snapshot)
     for again in (other, copy):
-        again.step(steps=15)
+        again.step(steps=after)
         np.testing.assert_array_equal(again.state, world.state)
 
 

@@ -165,10 +165,11 @@ def test_forces_that_can_be_borne_move_as_newton_says_or_are_reported(accuracy):
             np.testing.assert_allclose((world.linvel - before)[0, 0, 1], expected, rtol=1e-12)
 
 
+@pytest.mark.compiled
 @pytest.mark.parametrize("accuracy", sweep(["precise", "reference"], ["precise"]))
 @pytest.mark.parametrize("walls", sweep([[], [FLOOR]], [[]]))
 def test_a_torque_that_turns_too_often_to_be_followed_is_reported(accuracy, walls):
-    """L = T h all the same."""
+    """L = T h all the same. Many turns, by kernels that others need anyway: compiled."""
     body = physics.Block((5, 3, 2), 6.0, pos=(0, 50, 0))
     world = physics.World(physics.Scene([body], walls, LAWS), accuracy=accuracy)
     wrench = world.no_wrench()

@@ -170,7 +170,7 @@ vectors = st.tuples(*[st.floats(-5, 5)] * 3)
 
 
 @example((0.0, 0.0625, 0.0), (0.0, 0.0, 0.0), 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)  # leaves, and is back within the step
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=2 * settings().max_examples, deadline=None)
 @given(
     linvel=vectors, angvel=vectors, rolling=st.floats(0, 0.3), spin=st.floats(0, 0.3), mu=st.floats(0, 3),
     tangential=st.floats(-1, 1), e=st.floats(0, 1), height=st.floats(0, 0.3),

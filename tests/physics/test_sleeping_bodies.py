@@ -12,8 +12,6 @@ from physics.kernels.multibody.data.arrays import NUM_CONTACTS
 from physics.plan.accuracy import resolve
 from tests.tiers.sweep import sweep
 
-pytestmark = pytest.mark.interpreted
-
 DT, G, MU = 0.01, 9.81, 0.5
 RADIUS = math.sqrt(0.75)  # of a unit cube [m]
 WINDOW = math.sqrt(2 * RADIUS / G)  # [s]
@@ -50,7 +48,9 @@ def push(world, body, x):
 
 
 @pytest.mark.parametrize("accuracy", ["fast", "balanced"])
-@pytest.mark.parametrize("count", sweep([1, 3, 10, 50], [1, 10]))
+@pytest.mark.parametrize("count", [
+    pytest.param(1, marks=pytest.mark.interpreted), *sweep([3, 10, 50], [10]),
+])  # fmt: skip
 def test_a_tower_sleeps_and_costs_nothing(count, accuracy):
     world = cubes(*tower(0, count), accuracy=accuracy)
     until_asleep(world)
@@ -132,7 +132,6 @@ def test_what_does_not_sleep_has_the_same_bits():
         assert np.array_equal(world.memory, awake.memory)
 
 
-@pytest.mark.compiled
 def test_worlds_of_a_batch_sleep_for_themselves_and_go_on_from_a_snapshot():
     places = [*tower(0, 3), *tower(3, 2)]
     batch, alone = cubes(*places, worlds=4, threads=2), [cubes(*places) for _ in range(4)]
@@ -184,6 +183,7 @@ def test_what_is_left_out_of_the_contact_memory_comes_back():
     assert report.iterations <= 1  # the linear system of what holds: no search from nothing
 
 
+@pytest.mark.interpreted
 def test_bodies_that_a_spring_ties_sleep_and_wake_together():
     bodies = [physics.Block((1, 1, 1), 1.0, pos=(x, 0.5, 0)) for x in (0, 4, 9)]
     spring = physics.Spring(stiffness=50.0, damping=10.0, length=4.0, body=0, other=1)
