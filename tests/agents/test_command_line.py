@@ -30,7 +30,10 @@ def small(tmp_path):
     return ("--num-envs", 64, "--max-steps", 2048, "--threads", 1, "--out", tmp_path / "runs")
 
 
-def test_train_evaluate_record_resume(small, tmp_path, monkeypatch):
+def test_train_evaluate_record_resume(small, tmp_path, monkeypatch, is_exhaustive):
+    if not is_exhaustive:  # a short video
+        make = record.make_single_env
+        monkeypatch.setattr(record, "make_single_env", lambda env, **kw: make(env, max_episode_steps=20, **kw))
     monkeypatch.setattr(train, "EVALUATION_EPISODES", 10)
     monkeypatch.setattr(train, "VIDEO_EPISODES", 1)
     result = run(train, *small, "--json", tmp_path / "r.json")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from itertools import product
 
 import gymnasium as gym
 import numpy as np
@@ -13,10 +14,16 @@ from typer.testing import CliRunner
 import agents.planner
 from agents.planner import INTERRUPTED, Planner, PlannerSettings, main, solve
 from rigid_env import BlockReachEnv
+from tests.tiers.sweep import sweep
 
 
-@pytest.mark.parametrize("method", ["mppi", "cem"])
-@pytest.mark.parametrize("name", ["BlockReach", "BlockReorient"])
+@pytest.mark.parametrize(
+    ("name", "method"),
+    sweep(
+        product(("BlockReach", "BlockReorient"), ("mppi", "cem")),
+        [("BlockReach", "mppi"), ("BlockReorient", "cem")], id="-".join,
+    ),
+)  # fmt: skip
 def test_it_solves_episodes_without_training(name, method):
     env = gym.make(f"rigid_env:rigid_env/{name}-v0")
     planner = Planner(type(env.unwrapped.task), PlannerSettings(method=method), accuracy="fast")

@@ -19,6 +19,8 @@ from agents.config import RunFolder, change, make_config
 from agents.evaluate import run_episodes
 from agents.supervisor import Supervisor
 from agents.train import Interrupted, train
+from tests.agents.conftest import HINDSIGHT, TINY_ALGORITHMS
+from tests.tiers.sweep import sweep
 
 QUIET = Console(quiet=True)
 
@@ -50,9 +52,18 @@ def interrupt_at(monkeypatch, step):
     monkeypatch.setattr(Supervisor, "_on_step", stepped)
 
 
-def test_run_writes_its_files(tiny, tmp_path):
+@pytest.fixture
+def limited(tiny, is_exhaustive):
+    """A configuration, and the number of steps in which each of its 8 worlds ends an episode."""
+    if is_exhaustive:
+        return tiny, 300
+    return change(tiny, env_kwargs={"max_episode_steps": 30, **tiny.env_kwargs}), 30
+
+
+def test_run_writes_its_files(limited, tmp_path):
+    tiny, length = limited
     run = RunFolder(tmp_path / "run")
-    config = change(tiny, max_steps=8 * 301)  # every world ends its first episode
+    config = change(tiny, max_steps=8 * (length + 1))  # every world ends its first episode
     result = train(config, run, console=QUIET)
     assert result["steps"] >= config.max_steps
     assert not result["is_target_reached"]
@@ -81,6 +92,7 @@ def test_resumed_run_ends_with_the_bits_of_an_uninterrupted_one(tiny, tmp_path):
     assert torch.equal(parameters(whole), parameters(halves))
 
 
+@pytest.mark.parametrize("tiny", sweep(TINY_ALGORITHMS, ("ppo", HINDSIGHT)), indirect=True)
 def test_interrupted_run_keeps_its_checkpoint_and_goes_on(tiny, tmp_path, monkeypatch):
     run = RunFolder(tmp_path / "run")
     with monkeypatch.context() as patch:
@@ -103,11 +115,12 @@ def test_interrupted_run_keeps_its_checkpoint_and_goes_on(tiny, tmp_path, monkey
     assert seconds == sorted(seconds)
 
 
-def test_interrupted_monitor_file_is_cut_at_the_checkpoint(tmp_path, monkeypatch, tiny):
+def test_interrupted_monitor_file_is_cut_at_the_checkpoint(tmp_path, monkeypatch, limited):
+    tiny, length = limited
     run = RunFolder(tmp_path / "run")
-    config = change(tiny, max_steps=8 * 320)  # the first episodes end at step 8 * 300, after the checkpoint
+    config = change(tiny, max_steps=8 * (length + 20))  # first episodes end at 8 * length, after the checkpoint
     with monkeypatch.context() as patch:
-        interrupt_at(patch, 8 * 310)
+        interrupt_at(patch, 8 * (length + 10))
         with pytest.raises(Interrupted):
             train(config, run, console=QUIET)
     train(config, run, is_resumed=True, console=QUIET)
@@ -124,6 +137,7 @@ def test_partial_checkpoint_is_not_found(tmp_path):
     assert [path.name for path in list_checkpoints(tmp_path)] == ["000000000512"]
 
 
+@pytest.mark.parametrize("tiny", sweep(TINY_ALGORITHMS, ("ppo",)), indirect=True)
 def test_finished_run_asks_for_more_steps(tiny, tmp_path):
     run = RunFolder(tmp_path / "run")
     train(tiny, run, console=QUIET)

@@ -43,9 +43,8 @@ def run(program: str, folder, cache, *arguments: str) -> subprocess.CompletedPro
     environment = {
         **os.environ, "PYTHONPATH": str(folder), "NUMBA_CACHE_DIR": str(cache), "SDL_VIDEODRIVER": "dummy"
     }  # fmt: skip
-    return subprocess.run(
-        [sys.executable, "-c", program, *arguments], capture_output=True, text=True, cwd=folder, env=environment, timeout=600
-    )  # fmt: skip
+    command = [sys.executable, "-c", program, *arguments]
+    return subprocess.run(command, capture_output=True, text=True, cwd=folder, env=environment, timeout=600)
 
 
 def test_there_are_four_in_order():

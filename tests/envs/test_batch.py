@@ -5,6 +5,7 @@ from __future__ import annotations
 import copy
 import pickle
 from functools import partial
+from itertools import product
 
 import gymnasium as gym
 import numpy as np
@@ -13,7 +14,8 @@ from gymnasium.utils.env_checker import data_equivalence
 from gymnasium.vector import AsyncVectorEnv, AutoresetMode, SyncVectorEnv
 
 import rigid_env
-from tests.envs.conftest import random_actions
+from tests.envs.conftest import IDS, random_actions
+from tests.tiers.sweep import sweep
 
 RANDOMISED = {
     "friction": (0.3, 0.7),
@@ -110,7 +112,10 @@ def test_an_environment_with_a_picture_can_be_pickled(env_class):
     np.testing.assert_array_equal(pickle.loads(pickle.dumps(env)).render(), picture)
 
 
-@pytest.mark.parametrize("context", ["fork", "spawn"])
+@pytest.mark.parametrize(
+    ("env_id", "context"),
+    sweep(product(IDS, ("fork", "spawn")), lambda pair: pair != (IDS[1], "spawn"), id="-".join),
+)
 def test_async_vector_env(env_id, context, rng):
     """Children by fork (kernels and threads already in use here) and by spawn equal the native batch."""
     native = gym.make_vec(env_id, num_envs=2, threads=2)

@@ -16,6 +16,7 @@ from typer.testing import CliRunner
 import physics
 import rigid_env
 from rigid_env.cli import app
+from rigid_env.lab import demo
 from rigid_env.rendering import Camera, Renderer, fit_camera
 from rigid_env.rendering.camera_argument import as_camera, upwards
 from rigid_env.rendering.picture import world_frame
@@ -204,7 +205,10 @@ def run(*arguments, code=0):
     return result.output
 
 
-def test_commands_draw_from_an_eye_and_without_arrows(tmp_path):
+def test_commands_draw_from_an_eye_and_without_arrows(tmp_path, monkeypatch, is_exhaustive):
+    if not is_exhaustive:
+        monkeypatch.setattr(demo, "PICTURE_SIZE", (320, 200))
+        monkeypatch.setattr(demo, "GIF_SIZE", (160, 100))
     drawn = {}
     for name, options in {
         "plain": (), "aimed": ("--eye", -9, 6, 14, "--target", 0, 1, 0), "bare": ("--no-arrows",)

@@ -8,11 +8,14 @@ import warnings
 
 import gymnasium as gym
 import numpy as np
+import pytest
 from gymnasium.utils.env_checker import check_env
 from gymnasium.vector import AutoresetMode
 
 from rigid_env.envs.registration import MAX_EPISODE_STEPS, register_envs
 from rigid_env.envs.vector_env import RigidVectorEnv
+from tests.envs.conftest import IDS
+from tests.tiers.sweep import sweep
 
 
 def test_gymnasium_check_env_without_a_warning(env_id):
@@ -33,6 +36,7 @@ def test_sb3_check_env_without_a_warning(env_id):
     env.close()
 
 
+@pytest.mark.parametrize("env_id", sweep(IDS, IDS[:1]))
 def test_make_with_module_prefix_in_a_fresh_process(env_id):
     code = f"import gymnasium as gym\nenv = gym.make('rigid_env:{env_id}')\nprint(env.reset(seed=0)[0].shape)\n"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=300)
@@ -66,6 +70,7 @@ def test_make_vec_gives_the_native_batch_and_its_limit(env_id):
     assert gym.make_vec(env_id, num_envs=1, max_episode_steps=7).max_episode_steps == 7
 
 
+@pytest.mark.parametrize("env_id", sweep(IDS, IDS[:1]))
 def test_record_video_of_a_single_environment(env_id, tmp_path):
     env = gym.make(env_id, render_mode="rgb_array", width=64, height=48)
     env = gym.wrappers.RecordVideo(env, str(tmp_path / "video"), episode_trigger=lambda k: True, video_length=3)
@@ -77,6 +82,7 @@ def test_record_video_of_a_single_environment(env_id, tmp_path):
     assert video.stat().st_size > 500
 
 
+@pytest.mark.parametrize("env_id", sweep(IDS, IDS[1:]))
 def test_record_video_of_a_vector_environment(env_id, tmp_path):
     envs = gym.make_vec(env_id, num_envs=2, render_mode="rgb_array", width=64, height=48)
     frames = (envs.reset(seed=0), envs.render())[1]

@@ -15,6 +15,7 @@ from physics import scenes
 from physics.kernels.state.sleeping import SLEEP_SIZE
 from physics.scene.force_fields import FIELDS
 from rigid_env.cli import app
+from rigid_env.lab import demo
 from rigid_env.lab.measure import effects as costs
 from rigid_env.lab.measure.shares import names_of, without
 from rigid_env.rendering import Camera
@@ -101,7 +102,10 @@ def test_demo_at_rest(tmp_path):
     assert set(found["files"]) == {"png", "gif"}
 
 
-def test_demo_tells_of_the_fall(tmp_path):
+def test_demo_tells_of_the_fall(tmp_path, monkeypatch, is_exhaustive):
+    if not is_exhaustive:
+        monkeypatch.setattr(demo, "PICTURE_SIZE", (240, 150))
+        monkeypatch.setattr(demo, "GIF_SIZE", (160, 100))
     image = pytest.importorskip("PIL.Image")
     pytest.importorskip("pygame")
     numbers = tmp_path / "numbers.json"
@@ -327,7 +331,9 @@ def test_every_effect_has_a_case_that_stores_what_its_plan_says():
     assert stored["sleeping"] == 8 * SLEEP_SIZE
 
 
-def test_effects_measures_a_scene_with_an_effect_and_without(tmp_path):
+def test_effects_measures_a_scene_with_an_effect_and_without(tmp_path, monkeypatch, is_exhaustive):
+    if not is_exhaustive:
+        monkeypatch.setattr(costs, "QUICK_STEPS", 100)
     path = tmp_path / "effects.json"
     run("effects", "gravity", "friction", "--quick", "--json", path)
     rows = {row["key"]: row for row in loaded(path)["rows"]}

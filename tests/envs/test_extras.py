@@ -57,6 +57,7 @@ def test_a_command_of_agents_says_what_is_missing_before_anything_runs(command, 
     assert list((tmp_path / "work").iterdir()) == []
 
 
+@pytest.mark.exhaustive  # `.ci/run` trains with one each time
 def test_a_command_of_agents_runs_where_nothing_is_missing(tmp_path):
     done = without((), tmp_path, "-m", "agents.evaluate", "--help")
     assert done.returncode == 0, done.stderr
@@ -76,9 +77,9 @@ def test_baselines_do_without_the_extra(tmp_path):
             ("torch", "stable_baselines3"), "import rigid_env.envs.sb3",
             "rigid_env.envs.sb3 needs torch and Stable-Baselines3",
         ),
-        (
+        pytest.param(
             ("stable_baselines3",), "import rigid_env.envs.sb3",
-            "rigid_env.envs.sb3 needs Stable-Baselines3, which is not",
+            "rigid_env.envs.sb3 needs Stable-Baselines3, which is not", marks=pytest.mark.exhaustive,
         ),
         (
             ("pygame",),

@@ -16,6 +16,9 @@ from rigid_env import SceneEnv, SceneVectorEnv, Uniform
 from rigid_env.envs.checks import check_task
 from rigid_env.tasks.scene_task import BONUS, SceneTask
 from tests.envs.test_documentation import SECTIONS, ast_literal, check_rows, section, table
+from tests.tiers.sweep import sweep
+
+pytestmark = pytest.mark.interpreted
 
 CART = Path(__file__).parents[2] / "examples" / "cart.toml"
 ID = "rigid_env:rigid_env/Scene-v0"
@@ -37,13 +40,15 @@ CHECKED = {
 }
 
 
-@pytest.mark.parametrize("name", CHECKED)
-def test_check_task_finds_nothing(name):
-    contexts = ("fork", "spawn") if name == "file" else ("fork",)
+# One that compiles a plan of its own is interpreted.
+@pytest.mark.parametrize("name", [pytest.param(n, marks=() if n == "drag" else pytest.mark.compiled) for n in CHECKED])
+def test_check_task_finds_nothing(name, is_exhaustive):
+    contexts = ("fork", "spawn") if name == "file" and is_exhaustive else ("fork",)  # `test_examples` spawns, too
     check_task(SceneTask, steps=30, contexts=contexts, **CHECKED[name])
 
 
-@pytest.mark.parametrize("name", CHECKED)
+@pytest.mark.compiled
+@pytest.mark.parametrize("name", sweep(CHECKED, lambda name: name != "drag"))
 def test_checkers_find_nothing(name):
     from gymnasium.utils.env_checker import check_env
     from stable_baselines3.common.env_checker import check_env as sb3_check_env
@@ -136,6 +141,7 @@ def test_the_documented_arguments_and_sections_are_there():
 # --- rewards and ends ------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.compiled
 def test_the_example_can_be_solved_and_its_rewards_add_up():
     """Gains of closeness add up to the difference of its ends, log((1 + d0 / t) / (1 + d / t)), and the bonus."""
     env = gym.make(ID, scene=str(CART))

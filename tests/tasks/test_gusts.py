@@ -28,7 +28,7 @@ def course(env, seed: int | None = None, steps: int = 5) -> np.ndarray:
 
 
 @pytest.mark.parametrize("more", [(), (physics.Actuator(delay=0.03),)])
-def test_the_same_seed_leads_to_the_same_gusts_and_another_to_others(more):
+def test_the_same_seed_leads_to_the_same_gusts_and_another_to_others(more, is_exhaustive):
     env = rigid_env.BlockReachEnv(effects=[*GUSTY, *more], accuracy="fast")
     first, other = course(env, 1), course(env, 2)
     np.testing.assert_array_equal(course(env, 1), first)
@@ -38,7 +38,7 @@ def test_the_same_seed_leads_to_the_same_gusts_and_another_to_others(more):
     ends = []
     for seed in (1, 2):  # the gusts differ, not only the starts
         env.reset(seed=seed, options=place)
-        ends.append([env.step(STILL)[0] for _ in range(20)][-1])
+        ends.append([env.step(STILL)[0] for _ in range(20 if is_exhaustive else 5)][-1])
     assert (ends[0] != ends[1]).any()
     assert (first != other).any()
 
