@@ -49,11 +49,15 @@ class Supervisor(BaseCallback):
         self.is_target_reached = False
         self._last_point = self._last_checkpoint = float("-inf")
         self._checkpoint_every = CHECKPOINT_EVERY
+        self._open_monitor()
+
+    def close(self) -> None:
+        """Close the monitor file, however training ended: rows that wait would be written into a resumed run's."""
+        self._monitor.close()
 
     # --- calls of Stable-Baselines3 -----------------------------------------------------------------------
 
     def _on_training_start(self) -> None:
-        self._open_monitor()
         self._start = time.perf_counter() - self.history.seconds
         if self.history.noise is not None:
             self.model.action_noise = self.history.noise
@@ -83,7 +87,6 @@ class Supervisor(BaseCallback):
             self.history.seconds = time.perf_counter() - self._start
             self._add_point()
             self._checkpoint()
-        self._monitor.close()
 
     # --- parts of these -----------------------------------------------------------------------------------
 

@@ -99,6 +99,7 @@ def train(
         except KeyboardInterrupt as interrupt:
             raise Interrupted(interruption_message(run, model.num_timesteps)) from interrupt
         finally:
+            supervisor.close()
             write_curve(history.points, run.curve)
             title = f"{config.env}, {config.algo}, seed {config.seed}"
             plot_curve(history.points, config.target, title, run.curve.with_suffix(".png"))

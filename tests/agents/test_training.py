@@ -41,15 +41,17 @@ def monitored(run):
 
 
 def interrupt_at(monkeypatch, step):
-    """Press Ctrl-C at a step of training."""
-    on_step = Supervisor._on_step
+    """Press Ctrl-C at a step of training; the supervisor that was interrupted, in a list."""
+    on_step, stopped = Supervisor._on_step, []
 
     def stepped(supervisor):
+        stopped[:] = [supervisor]
         if supervisor.num_timesteps >= step:
             raise KeyboardInterrupt
         return on_step(supervisor)
 
     monkeypatch.setattr(Supervisor, "_on_step", stepped)
+    return stopped
 
 
 @pytest.fixture
@@ -120,9 +122,10 @@ def test_interrupted_monitor_file_is_cut_at_the_checkpoint(tmp_path, monkeypatch
     run = RunFolder(tmp_path / "run")
     config = change(tiny, max_steps=8 * (length + 20))  # first episodes end at 8 * length, after the checkpoint
     with monkeypatch.context() as patch:
-        interrupt_at(patch, 8 * (length + 10))
+        stopped = interrupt_at(patch, 8 * (length + 10))
         with pytest.raises(Interrupted):
             train(config, run, console=QUIET)
+    assert stopped[0]._monitor.closed  # else its last rows would come into the file of the resumed run, some time
     train(config, run, is_resumed=True, console=QUIET)
     straight = RunFolder(tmp_path / "straight")
     train(config, straight, console=QUIET)
