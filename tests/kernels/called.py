@@ -9,7 +9,7 @@ from physics.kernels.compile.interpreted.records import records_of
 
 
 def called(kernel, *arguments):
-    """What a kernel returns; where nothing is compiled, records have attributes, and 0/0 is no warning."""
+    """Return what a kernel returns; where nothing is compiled, records have attributes, and 0/0 is no warning."""
     if COMPILER != PYTHON:
         return kernel(*arguments)
     with np.errstate(all="ignore"):
