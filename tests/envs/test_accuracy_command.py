@@ -169,6 +169,7 @@ def test_it_measures_writes_and_answers(tmp_path):
     assert all(row["us"] > 0 and row["errors"]["penetration"] >= 0 for row in content["rows"])
 
 
+@pytest.mark.compiled
 def test_a_scene_without_closed_form_is_compared_with_the_reference(monkeypatch, is_exhaustive):
     if not is_exhaustive:
         monkeypatch.setattr(accuracy, "QUICK", replace(QUICK, accuracies=("balanced",)))

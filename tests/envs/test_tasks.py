@@ -74,6 +74,7 @@ def test_reorient_never_starts_on_its_target():
     assert set(envs.task.record[:, col.FACE]) == set(range(6))
 
 
+@pytest.mark.compiled
 def test_the_wrench_never_exceeds_its_limits(vector_class, rng, is_exhaustive):
     worlds = 50 if is_exhaustive else 16
     envs = vector_class(worlds, mass=(2.0, 8.0), gravity=(5.0, 10.0))
@@ -94,6 +95,7 @@ def test_the_wrench_never_exceeds_its_limits(vector_class, rng, is_exhaustive):
         np.testing.assert_allclose(task.wrench[inside, 0, :3], expected[inside], rtol=1e-6)
 
 
+@pytest.mark.compiled
 def test_numbers_beyond_one_act_as_one(vector_class, rng, is_exhaustive):
     """Each is clipped before a vector is shortened: (2, 1) pushes as (1, 1) does, not half as far aside."""
     worlds = 50 if is_exhaustive else 12

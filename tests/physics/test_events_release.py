@@ -72,6 +72,7 @@ def test_a_smooth_ladder_leaves_the_wall(width, rate, friction, accuracy):
         assert not releases(found, 0)
 
 
+@pytest.mark.interpreted
 @pytest.mark.parametrize("accuracy", LATE)
 def test_a_push_that_ends_for_less_than_a_step_is_seen_to_end(accuracy, is_exhaustive):
     """Ellipsoids that are let go by a little as they turn over their tips, for 0.01 rad to 0.1 rad; steps turn by 0.25.

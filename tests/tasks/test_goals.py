@@ -39,6 +39,7 @@ def test_sb3_check_env_without_a_warning(env_id):
         check_env(gym.make(env_id).unwrapped, warn=True, skip_render_check=True)
 
 
+@pytest.mark.compiled
 @pytest.mark.parametrize("env_id", IDS)
 @pytest.mark.parametrize("reward", ["sparse", "dense"])
 def test_the_reward_is_that_of_the_observed_goals(env_id, reward, is_exhaustive):

@@ -83,8 +83,8 @@ class Watched:
 
     def assert_quiet(self) -> None:
         """Nothing went to another machine, and no error came."""
-        assert self.leaving == []
-        assert self.errors == []
+        assert self.leaving == [], self.leaving
+        assert self.errors == [], self.errors
 
 
 @contextmanager
