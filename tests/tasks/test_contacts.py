@@ -73,7 +73,6 @@ def read(world: physics.World, rows: int, *body: int) -> Contacts:
 # --- the same as of one world ---------------------------------------------------------------------------------
 
 
-@pytest.mark.compiled
 @pytest.mark.parametrize("accuracy", ["fast", "balanced", "precise"])
 @pytest.mark.parametrize("name", SCENES)
 def test_rows_are_the_contacts_of_each_world(name, accuracy, is_exhaustive):
