@@ -65,7 +65,6 @@ def test_a_force_without_bound_is_not_stepped_over(spread):
     assert (gained <= 200 * world.accuracy.tolerance * before.kinetic_energy.sum(axis=1)).all()
 
 
-@pytest.mark.interpreted
 def test_a_rebound_that_a_wedge_does_not_allow():
     """Between two walls, with μ = 1.9 at both: friction holds any stress along the line between the two contacts.
 
