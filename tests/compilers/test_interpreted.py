@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import linecache
 import math
 import traceback
 
@@ -88,6 +89,25 @@ def test_a_function_without_a_source_stays_as_it_is():
     found: dict = {}
     exec("def typed_in(x):\n    return x", found)
     assert as_ieee(found["typed_in"]) is found["typed_in"]
+
+
+def test_an_edited_file_is_read_again(tmp_path):
+    """As by `importlib.reload`: the line is the same, what stands in it is not."""
+    path = tmp_path / "edited.py"
+    for text, expected in (("1.0 / x", math.inf), ("-100.0 / x", -math.inf)):
+        path.write_text(f"def share(x):\n    return {text}\n")
+        found: dict = {}
+        exec(compile(path.read_text(), str(path), "exec"), found)
+        assert as_ieee(found["share"])(0.0) == expected
+
+
+def test_a_function_of_a_notebook_has_a_source():
+    """Its cell is no file; its lines are known to `linecache`."""
+    source, found = "def share(x):\n    return 1.0 / x\n", {}
+    linecache.cache["<cell>"] = (len(source), None, source.splitlines(keepends=True), "<cell>")
+    exec(compile(source, "<cell>", "exec"), found)
+    assert as_ieee(found["share"])(0.0) == math.inf
+    del linecache.cache["<cell>"]
 
 
 def test_fields_of_records_are_attributes_even_one_named_shape():

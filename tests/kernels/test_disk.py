@@ -21,7 +21,31 @@ from tests.tiers.sweep import sweep
 
 ROOT = str(Path(__file__).parents[2])
 
+KERNELS = """
+import math
+from physics.kernels.compile.decorators import entry_kernel, kernel
+
+@kernel
+def part(x):
+    return math.sqrt(x) + 1.0
+
+@entry_kernel
+def whole(x):
+    return part(x) * part(x + 1.0)
+
+@entry_kernel
+def other(x):
+    return part(x)
+"""
+
 PROGRAM = """
+import sys
+sys.path.insert(0, sys.argv[1])
+from kernels import other, whole
+print(other(2.0).hex() + whole(2.0).hex(), sum(whole.stats.cache_hits.values()))
+"""
+
+STEPS = """
 import physics
 from physics.kernels.time_stepping.step import step_worlds
 world = physics.World(physics.Scene([physics.Sphere(0.5, mass=1.0, linvel=(1, 2, 3))]), dt=0.01, accuracy="fast")
@@ -30,32 +54,45 @@ print(world.state.tobytes().hex(), sum(step_worlds.stats.cache_hits.values()))
 """
 
 
-def command_and_environment(cache: Path) -> tuple[list, dict]:
-    return [sys.executable, "-c", PROGRAM], {**os.environ, "PYTHONPATH": ROOT, "NUMBA_CACHE_DIR": str(cache)}
+class Program:
+    """A program with a kernel: of a few lines, or that of a step."""
+
+    def __init__(self, folder: Path, text: str, name: str):
+        (folder / "kernels.py").write_text(KERNELS)
+        self.text, self.name, self.folder = text, name, str(folder)
+
+    def command_and_environment(self, cache: Path, before: str = "") -> tuple[list, dict]:
+        environment = {**os.environ, "PYTHONPATH": ROOT, "NUMBA_CACHE_DIR": str(cache)}
+        return [sys.executable, "-c", before + self.text, self.folder], environment
+
+    def run(self, cache: Path, **more) -> tuple[str, int, list[str]]:
+        """What it found in a new process, how often its kernel was loaded, lines on standard error."""
+        command, environment = self.command_and_environment(cache)
+        done = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=200, **more)
+        assert done.returncode == 0, done.stderr
+        found, hits = done.stdout.split()
+        lines = [line for line in done.stderr.splitlines() if "compiling the kernel of this scene" not in line]
+        return found, int(hits), lines
+
+    def file(self, cache: Path) -> Path:
+        """The file of its machine code."""
+        (path,) = cache.rglob(f"*{self.name}*.nbc")
+        return path
 
 
-def run(cache: Path, **more) -> tuple[str, int, list[str]]:
-    """State after three steps in a new process, how often the step was loaded, lines on standard error."""
-    command, environment = command_and_environment(cache)
-    done = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=200, **more)
-    assert done.returncode == 0, done.stderr
-    state, hits = done.stdout.split()
-    lines = [line for line in done.stderr.splitlines() if "compiling the kernel of this scene" not in line]
-    return state, int(hits), lines
+@pytest.fixture(scope="module", params=sweep(["whole", "step_worlds"], ["whole"]))
+def program(request, tmp_path_factory) -> Program:
+    texts = {"whole": PROGRAM, "step_worlds": STEPS}
+    return Program(tmp_path_factory.mktemp("program"), texts[request.param], request.param)
 
 
 @pytest.fixture(scope="module")
-def kept(tmp_path_factory) -> tuple[Path, str]:
-    """A folder of kernels, and the state that they lead to."""
+def kept(program, tmp_path_factory) -> tuple[Path, str]:
+    """A folder of kernels, and what they lead to."""
     folder = tmp_path_factory.mktemp("kept")
-    state, hits, lines = run(folder)
+    state, hits, lines = program.run(folder)
     assert (hits, lines) == (0, [])
     return folder, state
-
-
-def step_file(folder: Path) -> Path:
-    (path,) = folder.rglob("*step_worlds*.nbc")
-    return path
 
 
 def _truncated(path: Path) -> None:
@@ -96,18 +133,18 @@ DAMAGES = [_truncated, _empty, _garbage, _one_bit, _foreign_pickle, _of_another_
 
 
 @pytest.mark.parametrize("damage", sweep(DAMAGES, [_one_bit, _foreign_pickle]))
-def test_a_damaged_file_is_compiled_anew_and_said_so_once(damage, kept, tmp_path):
+def test_a_damaged_file_is_compiled_anew_and_said_so_once(damage, program, kept, tmp_path):
     folder, state = kept
     cache = tmp_path / "cache"
     shutil.copytree(folder, cache)
-    path = step_file(cache)
+    path = program.file(cache)
     damage(path)
-    found, hits, lines = run(cache)
+    found, hits, lines = program.run(cache)
     assert (found, hits) == (state, 0)
     assert len(lines) == 1, lines
     assert str(path) in lines[0]
     assert "compiled anew" in lines[0]
-    assert run(cache) == (state, 1, [])  # it is healed
+    assert program.run(cache) == (state, 1, [])  # it is healed
 
 
 @pytest.mark.parametrize("damage", [_truncated, _empty, _garbage, _one_bit, _foreign_pickle])
@@ -144,7 +181,7 @@ print(json.dumps([work(0.5), sum(work.stats.cache_hits.values()), "numba.np.arra
 def test_machine_code_is_loaded_without_what_only_compiling_needs(tmp_path):
     """And finds in another process what it calls outside of itself."""
     (tmp_path / "library.py").write_text(LIBRARY)
-    _, environment = command_and_environment(tmp_path)
+    environment = {**os.environ, "PYTHONPATH": ROOT, "NUMBA_CACHE_DIR": str(tmp_path)}
     command = [sys.executable, "-c", OF_LIBRARY, str(tmp_path)]
     found = [
         json.loads(subprocess.run(command, env=environment, capture_output=True, text=True, check=True).stdout)
@@ -159,24 +196,24 @@ class Gone:
     """A class that is not there when it is read."""
 
 
-def test_what_cannot_be_unpickled_is_damaged_too(kept, tmp_path, monkeypatch):
+def test_what_cannot_be_unpickled_is_damaged_too(program, kept, tmp_path, monkeypatch):
     """Whole and of this kernel, of a class that no longer exists."""
     folder, state = kept
     cache = tmp_path / "cache"
     shutil.copytree(folder, cache)
-    path = step_file(cache)
-    program = (
+    path = program.file(cache)
+    before = (
         "import physics\nfrom physics.kernels.compile.fused import disk_cache\n"
         f"disk_cache.dumps = lambda value: {pickle.dumps(Gone()).replace(b'Gone', b'Lost')!r}\n"
     )
     path.unlink()
-    command, environment = command_and_environment(cache)
-    subprocess.run([command[0], "-c", program + PROGRAM], env=environment, check=True, capture_output=True, timeout=200)
-    found, _, lines = run(cache)
+    command, environment = program.command_and_environment(cache, before)
+    subprocess.run(command, env=environment, check=True, capture_output=True, timeout=200)
+    found, _, lines = program.run(cache)
     assert found == state
     assert len(lines) == 1
     assert "compiled anew" in lines[0]
-    assert run(cache) == (state, 1, [])
+    assert program.run(cache) == (state, 1, [])
 
 
 @pytest.mark.skipif(not hasattr(os, "getuid"), reason="no owners")
@@ -220,51 +257,51 @@ def test_a_file_for_another_purpose_is_damaged(tmp_path):
         cache_files.read_cache_file(tmp_path / "file", b"other")
 
 
-def test_what_others_may_write_costs_a_compilation_and_a_line(kept, tmp_path, is_exhaustive):
+def test_what_others_may_write_costs_a_compilation_and_a_line(program, kept, tmp_path, is_exhaustive):
     folder, state = kept
     cache = tmp_path / "cache"
     shutil.copytree(folder, cache)
-    path = step_file(cache)
+    path = program.file(cache)
     path.chmod(0o666)
     content = path.read_bytes()
     for _ in range(2 if is_exhaustive else 1):
-        found, hits, lines = run(cache)
+        found, hits, lines = program.run(cache)
         assert (found, hits, len(lines)) == (state, 0, 1)
         assert "other users may write to it" in lines[0]
     assert path.read_bytes() == content
 
 
-def test_a_folder_that_cannot_be_made(kept, tmp_path):
+def test_a_folder_that_cannot_be_made(program, kept, tmp_path):
     (tmp_path / "file").write_text("in the way")
-    found, hits, lines = run(tmp_path / "file" / "cache")
+    found, hits, lines = program.run(tmp_path / "file" / "cache")
     assert (found, hits, len(lines)) == (kept[1], 0, 1)
     assert "cannot be kept" in lines[0]
 
 
-def test_a_full_disk(kept, tmp_path):
+def test_a_full_disk(program, kept, tmp_path):
     """As far as a limit of the size of files can tell: nothing can be written, and nothing is left behind."""
 
     def no_room():
         signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
         resource.setrlimit(resource.RLIMIT_FSIZE, (1000, 1000))
 
-    found, hits, lines = run(tmp_path, preexec_fn=no_room)
+    found, hits, lines = program.run(tmp_path, preexec_fn=no_room)
     assert (found, hits, len(lines)) == (kept[1], 0, 1)
     assert "cannot be kept" in lines[0]
     assert [path for path in tmp_path.rglob("*") if path.is_file()] == []
 
 
-def test_processes_at_once_and_killed_ones(kept, tmp_path, is_exhaustive):
+def test_processes_at_once_and_killed_ones(program, kept, tmp_path, is_exhaustive):
     """Killed at any time from before the first file until after the last."""
-    command, environment = command_and_environment(tmp_path)
-    for k in range(12) if is_exhaustive else (1, 7):
+    command, environment = program.command_and_environment(tmp_path)
+    for k in range(12) if is_exhaustive else (1, 4):
         process = subprocess.Popen(command, env=environment, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
         time.sleep(0.8 + 0.15 * k)
         process.kill()
         process.wait()
-    assert run(tmp_path)[::2] == (kept[1], [])
-    assert run(tmp_path) == (kept[1], 1, [])
+    assert program.run(tmp_path)[::2] == (kept[1], [])
+    assert program.run(tmp_path) == (kept[1], 1, [])
     shutil.rmtree(tmp_path)
     both = [subprocess.Popen(command, env=environment, stdout=subprocess.PIPE, text=True) for _ in range(2)]
     assert [each.communicate(timeout=200)[0].split()[0] for each in both] == [kept[1]] * 2
-    assert run(tmp_path) == (kept[1], 1, [])
+    assert program.run(tmp_path) == (kept[1], 1, [])

@@ -5,16 +5,12 @@ anew for that, line by line where it stands, so that a debugger stops at the sta
 """
 
 from __future__ import annotations
-import __future__
 
 import ast
-import copy
-import inspect
+import linecache
 import math
-import textwrap
 from collections.abc import Callable
 from functools import cache
-from pathlib import Path
 from types import CodeType, FunctionType, SimpleNamespace
 
 import numpy as np
@@ -101,42 +97,30 @@ def _call(name: str, where: ast.AST, *arguments: ast.expr) -> ast.Call:
 
 
 @cache
-def _tree(file: str) -> dict[int, ast.FunctionDef]:
-    """Functions of a file by the line in which they or their decorators begin."""
-    found = {}
-    for node in ast.walk(ast.parse(Path(file).read_text(encoding="utf-8"))):
-        if isinstance(node, ast.FunctionDef):
-            for line in (node.lineno, *(each.lineno for each in node.decorator_list)):
-                found[line] = node
+def _codes(file: str, source: str) -> dict[tuple[int, str], CodeType]:
+    """Code of all functions of a file, written anew, by the line in which each begins and its name."""
+    try:
+        tree = ast.parse(source)
+    except SyntaxError:  # no Python, as a cell of a notebook with commands of its own
+        return {}
+    found, left = {}, [compile(_Rewrite().visit(tree), file, "exec", dont_inherit=True)]
+    while left:
+        inner = [each for each in left.pop().co_consts if isinstance(each, CodeType)]
+        found.update({(code.co_firstlineno, code.co_name): code for code in inner})
+        left.extend(inner)
     return found
-
-
-def _definition(function: FunctionType) -> ast.FunctionDef | None:
-    """Return the source of a function as a tree; None where there is none, as of one typed in."""
-    code = function.__code__
-    found = None
-    if Path(code.co_filename).is_file():
-        found = _tree(code.co_filename).get(code.co_firstlineno)
-    if found is None:
-        try:
-            lines, first = inspect.getsourcelines(function)
-            found = ast.parse(textwrap.dedent("".join(lines))).body[0]
-        except (OSError, TypeError, SyntaxError, IndexError):
-            return None
-        ast.increment_lineno(found, max(first, 1) - 1)
-    return found if isinstance(found, ast.FunctionDef) and found.name == code.co_name else None
 
 
 def as_ieee(function: FunctionType) -> FunctionType:
     """Make a function whose numbers behave as those of machine code; the same one where its source is not known."""
-    found = _definition(function)
-    if found is None:
+    old = function.__code__
+    linecache.checkcache(old.co_filename)  # it may have been edited
+    source = "".join(linecache.getlines(old.co_filename, function.__globals__))
+    code = _codes(old.co_filename, source).get((old.co_firstlineno, old.co_name))
+    if code is None or code.co_name == "<lambda>":  # of which a line may hold several
         return function
-    definition = copy.deepcopy(found)
-    definition.decorator_list, definition.returns = [], None
-    code = _compiled(_Rewrite().visit(definition), function)
     function.__globals__.update(_NAMES)
-    cells = dict(zip(function.__code__.co_freevars, function.__closure__ or (), strict=True))
+    cells = dict(zip(old.co_freevars, function.__closure__ or (), strict=True))
     made = FunctionType(
         code,
         function.__globals__,
@@ -147,20 +131,3 @@ def as_ieee(function: FunctionType) -> FunctionType:
     made.__kwdefaults__, made.__doc__ = function.__kwdefaults__, function.__doc__
     made.__qualname__, made.__module__, made.__dict__ = function.__qualname__, function.__module__, dict(vars(function))
     return made
-
-
-def _compiled(definition: ast.FunctionDef, function: FunctionType) -> CodeType:
-    """Code of a function; what it takes from functions around it stays so."""
-    free = function.__code__.co_freevars
-    module = ast.parse(f"def around({', '.join(free)}):\n    pass")
-    around = module.body[0]
-    around.body = [definition, ast.Return(ast.Name(definition.name, ast.Load()))]
-    ast.fix_missing_locations(ast.copy_location(around, definition))
-    for each in ast.walk(around):  # what was added stands where the function does
-        if hasattr(each, "end_lineno") and each.end_lineno < each.lineno:
-            ast.copy_location(each, definition)
-    outer = compile(
-        module, function.__code__.co_filename, "exec", dont_inherit=True, flags=__future__.annotations.compiler_flag
-    )
-    within = next(each for each in outer.co_consts if isinstance(each, CodeType))
-    return next(each for each in within.co_consts if isinstance(each, CodeType) and each.co_name == definition.name)
