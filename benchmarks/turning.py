@@ -51,9 +51,9 @@ def _scene(thing: str) -> physics.Scene:
     rod = physics.Block(tuple(SIZE), 1.0, pos=(0, 3, 0))
     if thing.startswith("ellipsoid"):
         rod = physics.Ellipsoid(tuple(0.5 * SIZE), 1.0, pos=(0, 3, 0))
-    contact = [physics.Contact(0.5), physics.Friction(0.3)]
+    effects = [physics.Gravity(tuple(_gravity(thing))), physics.Contact(0.5), physics.Friction(0.3)]
     if thing.endswith("wall"):
-        return physics.Scene([rod], [physics.HalfSpace((0, 1, 0), 0.0)], [physics.Gravity((0, -9.81, 0)), *contact])
+        return physics.Scene([rod], [physics.HalfSpace((0, 1, 0), 0.0)], effects)
     other = {
         "ball": lambda: physics.Sphere(BALL, 1.0),
         "ellipsoid": lambda: physics.Sphere(BALL, 1.0),
@@ -61,7 +61,12 @@ def _scene(thing: str) -> physics.Scene:
         "hull": lambda: physics.Hull(tuple(map(tuple, HULL)), 1.0),
         "rod": lambda: physics.Block(tuple(SIZE), 1.0),
     }[thing]()
-    return physics.Scene([rod, other], [], contact)
+    return physics.Scene([rod, other], [], effects)
+
+
+def _gravity(thing: str) -> np.ndarray:
+    """None without a wall to lie on. It is declared all the same: so the kernel is that of other scenes."""
+    return np.array([0.0, -9.81 if thing.endswith("wall") else 0.0, 0.0])
 
 
 def _units(rng, n: int, size: int) -> np.ndarray:
@@ -69,8 +74,8 @@ def _units(rng, n: int, size: int) -> np.ndarray:
     return v / np.linalg.norm(v, axis=1)[:, None]
 
 
-def _tops(scene, pos, quat, linvel, angvel) -> list[truth.Top]:
-    gravity = np.array([0, -9.81, 0.0]) if scene.walls else np.zeros(3)
+def _tops(thing: str, scene, pos, quat, linvel, angvel) -> list[truth.Top]:
+    gravity = _gravity(thing)
     moments = [np.diag(body.inertia) for body in scene.bodies]
     return [
         truth.Top(I[0], I[1], pos[:, b], quat[:, b], linvel[:, b], angvel[:, b], gravity) for b, I in enumerate(moments)
@@ -130,7 +135,7 @@ def draw(thing: str, placements: int, seed: int = 0) -> Drawn:
     kept: list[tuple] = []
     while len(kept) < placements:
         some = _draw_some(thing, scene, 50, rng)
-        tops = _tops(scene, *some)
+        tops = _tops(thing, scene, *some)
         for k in range(50):
             least, first = truth.least(_distance(thing, scene, tops, k), STEPS * DT)
             if first > APART and abs(least) > MARGIN:
@@ -149,7 +154,7 @@ def run(drawn: Drawn, accuracy: str, step_share: float = 1.0) -> dict:
     for _ in range(round(STEPS / step_share)):
         bad |= np.asarray(world.step().status) != 0
     seconds = time.perf_counter() - start
-    free = drawn.linvel + STEPS * DT * (np.array([0, -9.81, 0]) if drawn.scene.walls else 0.0)
+    free = drawn.linvel + STEPS * DT * _gravity(drawn.thing)
     is_hit = (np.abs(world.linvel - free).max(axis=(1, 2)) > 1e-9) | (
         np.abs(np.linalg.norm(world.angvel, axis=2) - np.linalg.norm(drawn.angvel, axis=2)).max(axis=1) > 1e-6
     )

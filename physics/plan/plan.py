@@ -43,8 +43,9 @@ class Plan:
     """The switches that the kernel is compiled for, and the reasons. None is off, True is on.
 
     `offset_frame` is on where the body frame of a body is not all there is to know of its mass: its principal axes are
-    not its body axes, or its geometric centre is not its centre of mass. `many` is on where bodies touch each other, or
-    touch walls and are tied together by springs, or a hull touches walls; `meeting` says whether they touch each other,
+    not its body axes, or its geometric centre is not its centre of mass. `pivots` is on where bodies
+    touch walls alone and their solver may pivot. `many` is on where bodies touch each other, or touch walls and are
+    tied together by springs, or a hull touches walls; `meeting` says whether they touch each other,
     `ellipsoids` whether there are any among those, `hulls` whether any hulls touch anything. `refined` is on where
     `many` is and steps have an error tolerance: by the scheme ``events``. `linked` is on where they are tied together
     and touch nothing. `sleeping` is on where bodies may sleep. `laws` are those of
@@ -219,7 +220,7 @@ def make_plan(scene: Scene, accuracy: Preset | Accuracy) -> Plan:
         gravity=(seen.gravity is not None) or None,
         gyroscopic=(not seen.isotropic) or None,
         offset_frame=(seen.turned or bool(seen.uneven)) or None,
-        pivots=(seen.touching and accuracy.solver == "sweeps+pivoting") or None,
+        pivots=(seen.touching and not many and accuracy.solver == "sweeps+pivoting") or None,
         scheme=scheme if scheme > 0 else None,
         events=(scheme == EVENTS and not many) or None,
         many=many or None,

@@ -8,6 +8,7 @@ import pytest
 from benchmarks import problems
 from benchmarks.problems import SETTINGS
 from physics import scenes
+from physics.kernels.compile.decorators import entry_kernel
 from physics.kernels.multibody.data.allocation import make_bodies_workspace
 from physics.kernels.multibody.data.arrays import BodiesWorkspace
 from physics.kernels.multibody.solver import (
@@ -21,6 +22,12 @@ from physics.kernels.multibody.solver import (
 )
 from physics.kernels.state import layout as at
 from tests.reference.lcp import coulomb_defect, solve_coulomb
+
+
+@entry_kernel
+def solve_contacts(n, friction, many):
+    """As a step calls it: the machine code that the steps of all plans share."""
+    return solve.solve_contacts(n, friction, many)
 
 
 def pile(*arguments) -> tuple[BodiesWorkspace, int]:
@@ -56,7 +63,7 @@ def test_where_the_impulses_are_determined_they_are_those_of_the_oracle(seed, mu
     J, inverse, b = dense(many, n)
     W = J @ inverse @ J.T
     expected = solve_coulomb(W, b, np.full(n, mu))
-    _, residual, _ = solve.solve_contacts(n, True, many)
+    _, residual, _ = solve_contacts(n, True, many)
     assert residual <= 1e-6
     # An error u of the velocities is one of W⁻¹ u of the impulses, and the residual says u relative to the largest.
     error = np.abs(many.contacts.impulse[:n].ravel() - expected).max()
@@ -70,7 +77,7 @@ def test_piles_with_more_contacts_than_are_determined_obey_the_law(seed, bodies,
     many, n = pile(seed, bodies, 4, 0.2, masses)
     J, inverse, b = dense(many, n)
     free = many.bodies.twist.ravel().copy()
-    _, residual, _ = solve.solve_contacts(n, True, many)
+    _, residual, _ = solve_contacts(n, True, many)
     p = many.contacts.impulse[:n].ravel()
     # Twists and impulses belong to each other, to rounding of some hundred additions.
     np.testing.assert_allclose(many.bodies.twist.ravel(), free + inverse @ J.T @ p, atol=1e-12 * np.abs(b).max())
@@ -87,7 +94,7 @@ def test_of_piles_that_wedge_nine_in_ten_are_solved():
     solved = 0
     for seed in range(40):
         many, n = pile(seed, 12, 4, 0.5)
-        solved += solve.solve_contacts(n, True, many)[1] <= 1e-6
+        solved += solve_contacts(n, True, many)[1] <= 1e-6
     assert solved >= 36
 
 
@@ -100,7 +107,7 @@ def test_piles_that_slip_a_little_in_all_directions_are_solved_and_soon():
     for arguments in ((8, 4, 1.0), (12, 3, 0.7)):
         for seed in range(60):
             many, n = pile(seed, *arguments)
-            count, residual, _ = solve.solve_contacts(n, True, many)
+            count, residual, _ = solve_contacts(n, True, many)
             solved, iterations = solved + (residual <= 1e-6), iterations + count
     assert solved >= 118
     assert iterations <= 42 * 120
@@ -111,7 +118,7 @@ def test_of_piles_with_masses_far_apart_four_in_five_are_solved():
     solved = 0
     for seed in range(60):
         many, n = pile(seed, 12, 4, 0.2, 1000.0)
-        solved += solve.solve_contacts(n, True, many)[1] <= 1e-6
+        solved += solve_contacts(n, True, many)[1] <= 1e-6
     assert solved >= 48
 
 
@@ -221,7 +228,7 @@ def test_what_is_too_dear_for_its_system_is_swept_while_it_moves(load):
     many, n = crowd(30)
     many.settings["tolerance"], many.settings["sweeps"], many.settings["is_resting_stage"] = 1e-9, 20, 1
     many.settings["load_speed"] = load
-    iterations, residual, method = solve.solve_contacts(n, True, many)
+    iterations, residual, method = solve_contacts(n, True, many)
     assert method == (at.METHOD_SWEEPS if load == 0.0 else at.METHOD_NEWTON)
     assert iterations <= (20 if load == 0.0 else 3 * 20)
     assert residual == pytest.approx(
@@ -239,7 +246,7 @@ def test_an_impact_that_is_not_solved_finely_is_swept_first():
     """And the few sweeps that a small pile takes are all there is: no linear system."""
     many, n = pile(0, 4, 4, 0.3)
     many.settings["tolerance"], many.settings["sweeps"] = 1e-3, 200
-    _, residual, method = solve.solve_contacts(n, True, many)
+    _, residual, method = solve_contacts(n, True, many)
     assert residual <= 1e-3
     assert method == at.METHOD_SWEEPS
 
@@ -249,7 +256,7 @@ def test_calming_keeps_what_is_solved_solved(seed):
     """From impulses that are just within the goal: whatever the sweeps do first, they end within it."""
     many, n = pile(seed, 12, 4, 0.5, 10.0)
     many.settings["tolerance"] = 1e-2
-    solve.solve_contacts(n, True, many)
+    solve_contacts(n, True, many)
     goal = contact_operator.max_contact_residual(0, n, True, many)
     many.settings["is_resting_stage"] = 1  # and all bodies were at rest before the stage: `momenta` are zero
     count, residual, _ = near_rest_refinement.refine_near_rest((0, n, 0, 12), True, goal, goal, 1e-12, 1e-12, many)
@@ -265,12 +272,12 @@ def test_what_stands_is_calmed_by_one_linear_system():
     problem = problems.beginning("tower", scenes.tower(10))
     many, n = problem.many, problem.count
     many.bodies.twist[:] = problem.twists
-    solve.solve_contacts(n, True, many)
+    solve_contacts(n, True, many)
     many.contacts.impulse[:n] *= 1 + 1e-4
     many.bodies.twist[:] = problem.twists
     many.bodies.momenta[:] = 0.0  # it stood still before
     many.settings["tolerance"], many.settings["is_resting_stage"] = 1e-2, 1
-    iterations, residual, method = solve.solve_contacts(n, True, many)
+    iterations, residual, method = solve_contacts(n, True, many)
     assert (iterations, method) == (1, at.METHOD_NEWTON)
     assert residual <= solve.STICKING_SHARE * solve.FINE_TOLERANCE
 
@@ -299,7 +306,7 @@ def test_islands_are_solved_as_if_they_were_alone():
     one.settings["tolerance"] *= max(largest) / largest[0]
     two.settings["tolerance"] *= max(largest) / largest[1]
     for many, contacts in ((one, n), (two, n), (both, 2 * n)):
-        solve.solve_contacts(contacts, True, many)
+        solve_contacts(contacts, True, many)
     np.testing.assert_allclose(
         both.bodies.twist, np.vstack([one.bodies.twist, two.bodies.twist]), atol=1e-5 * max(largest)
     )

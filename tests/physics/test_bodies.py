@@ -355,7 +355,7 @@ def test_what_is_not_known_yet_is_refused():
 def test_contacts_without_room_are_reported():
     # Twenty balls at nearly one place: 190 near pairs, and room for 8 per body.
     bodies = [physics.Sphere(1.0, 1.0, pos=(0.01 * k, 50, 0)) for k in range(20)]
-    far = physics.Block((1, 1, 1), 1.0, pos=(0, 90, 0))  # so that the kernel is that of `heap`
+    far = physics.Block((1, 0.8, 1.2), 1.0, pos=(0, 90, 0))  # so that the kernel is that of `heap`
     effects = [physics.Gravity((0, -G, 0)), physics.Contact(1.0), physics.Friction(0.5)]
     world = physics.World(physics.Scene([*bodies, far], FLOOR, effects), dt=0.01)
     report = world.step()

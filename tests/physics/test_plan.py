@@ -38,6 +38,11 @@ def test_only_what_is_declared_is_on():
     }  # fmt: skip
 
 
+def test_bodies_that_meet_have_one_kernel_for_two_presets():
+    """Their solver knows no pivoting."""
+    assert len({physics.make_plan(scenes.tower(3), resolve(name)).key for name in ("fast", "balanced")}) == 1
+
+
 @pytest.mark.filterwarnings("ignore::physics.SceneWarning")
 def test_explain_names_every_effect_and_its_reason():
     text = physics.make_plan(scenes.drop(), resolve("balanced")).explain()

@@ -18,8 +18,9 @@ TIGHT = physics.Accuracy(tolerance=1e-9)
 
 
 def scene(body, mu=0.3):
-    """The body on a floor; restitution 0, so that one kernel does for most tests."""
-    effects = [physics.Gravity((0, -G, 0)), physics.Contact(0.0), physics.Friction(mu)]
+    """The body on a floor; a block's restitution is 0, a sphere has none: so are the kernels of most tests."""
+    restitution = None if body.kind == "sphere" else 0.0
+    effects = [physics.Gravity((0, -G, 0)), physics.Contact(restitution), physics.Friction(mu)]
     return physics.Scene([body], [physics.HalfSpace((0, 1, 0))], effects)
 
 
