@@ -39,7 +39,7 @@ def test_what_is_pressed_to_the_floor_neither_hits_nor_leaves_it(mode, mu, accur
     """No body does whose push stays above a twentieth of its weight (and within the cone), by DOP853."""
     times, tried = np.linspace(0.0, SECONDS, 101), 0
     for seed in range(12):
-        if tried == 2 and not is_exhaustive:
+        if tried == 1 and not is_exhaustive:
             break
         body = started(seed, mode)
         motion = truth.move(body, mode, times, mu=mu)
@@ -50,7 +50,7 @@ def test_what_is_pressed_to_the_floor_neither_hits_nor_leaves_it(mode, mu, accur
             duration = SECONDS if is_exhaustive else min(SECONDS, 100 * dt)
             run = physics.simulate(on_floor(body, 0.5, mu), duration, accuracy, dt=dt, sample_dt=dt)
             assert {event.kind for event in run.events} <= {"touch"}, (seed, dt)
-    assert tried >= (3 if is_exhaustive else 2)
+    assert tried >= (3 if is_exhaustive else 1)
 
 
 def test_the_reference_keeps_the_energy_and_the_contact():

@@ -81,6 +81,15 @@ class Watched:
             self.page.wait_for_timeout(200)
         return picture
 
+    def wait_until_still(self) -> np.ndarray:
+        """Wait until a picture stays as it is for half a second, and return it."""
+        before = self.picture()
+        self.page.wait_for_timeout(500)
+        while change(before, self.picture()) > 0.0:
+            before = self.picture()
+            self.page.wait_for_timeout(500)
+        return before
+
     def assert_quiet(self) -> None:
         """Nothing went to another machine, and no error came."""
         assert self.leaving == [], self.leaving
