@@ -9,6 +9,8 @@ from dataclasses import asdict, dataclass, field, fields
 from pathlib import Path
 from typing import Any
 
+from physics.work_precision.frontier_plot import add_legend
+
 WINDOW = 500  # finished episodes whose mean is shown, and held against the target
 
 
@@ -100,14 +102,16 @@ def plot_curve(points: list[CurvePoint], target: float, title: str, path: Path) 
     title : str
     path : Path
     """
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(9.0, 5.5), layout="constrained")
+    FigureCanvasAgg(figure)
     axes = figure.subplots(2, 2, sharex="col", sharey="row")
     xs = [point.steps / 1e6 for point in points], [point.seconds for point in points]
     for column, (x, label) in enumerate(zip(xs, ("million steps", "seconds"))):
         axes[0, column].plot(x, [point.success_rate for point in points], color="tab:green")
-        axes[0, column].axhline(target, color="grey", linestyle="--", linewidth=1.0)
+        axes[0, column].axhline(target, color="grey", linestyle="--", linewidth=1.0, label="target of the success rate")
         axes[1, column].plot(x, [point.mean_return for point in points], color="tab:blue")
         axes[1, column].set_xlabel(label)
     for axis in axes.flat:
@@ -115,6 +119,7 @@ def plot_curve(points: list[CurvePoint], target: float, title: str, path: Path) 
     axes[0, 0].set_ylabel("success rate")
     axes[0, 0].set_ylim(-0.02, 1.02)
     axes[1, 0].set_ylabel("mean return")
+    add_legend(figure, [axes[0, 0]])
     figure.suptitle(f"{title}, mean of the last {WINDOW} episodes")
     figure.savefig(path, dpi=110)
 
@@ -128,9 +133,11 @@ def plot_transfer(rows: list, title: str, path: Path) -> None:
     title : str
     path : Path
     """
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(6.5, 4.5), layout="constrained")
+    FigureCanvasAgg(figure)
     axis = figure.subplots()
     for row in rows:
         rate, (low, high) = row.truth["success_rate"], row.truth["interval"]
@@ -142,6 +149,6 @@ def plot_transfer(rows: list, title: str, path: Path) -> None:
     axis.set_xlabel("training [s]")
     axis.set_ylabel("success at reference")
     axis.grid(alpha=0.3, which="both")
-    axis.legend()
     axis.set_title(title)
+    add_legend(figure, [axis])
     figure.savefig(path, dpi=110)

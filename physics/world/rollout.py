@@ -39,6 +39,8 @@ class Rollout:
         Time of each state [s].
     report_table : (worlds, REPORT_SIZE) float64
         The array behind `report`.
+    names : tuple of str
+        Of the bodies.
     """
 
     pos: np.ndarray | None
@@ -47,6 +49,7 @@ class Rollout:
     angvel: np.ndarray | None
     times: np.ndarray
     report_table: np.ndarray
+    names: tuple[str, ...] = ()
 
     @property
     def columns(self) -> tuple[str, ...]:
@@ -56,7 +59,7 @@ class Rollout:
     @property
     def report(self) -> StepReport:
         """Report of all its steps together."""
-        return StepReport(self.report_table)
+        return StepReport(self.report_table, self.names)
 
     @property
     def status(self) -> np.ndarray:
@@ -159,7 +162,7 @@ def _rollout(world: World, wrenches, initial, steps, dt, columns, every, out) ->
         name: (world.worlds, length // every, world.body_count, SIZES[name]) for name in _columns(columns)
     }
     places = None if initial is None else restoring.places(world, initial, None, None)
-    found = _room(world, shapes) if out is None else _checked(out, shapes)
+    found = _room(world, shapes) if out is None else _checked(out, world.names, shapes)
     before = restoring.take(world, None, None) if world.plan.may_raise else None
     try:
         if places is not None:
@@ -207,16 +210,21 @@ def _room(world: World, shapes: dict[str, tuple[int, ...]]) -> Rollout:
         raise ValueError(message)
     try:
         arrays = {name: np.empty(shapes[name]) if name in shapes else None for name in COLUMNS}
-        return Rollout(**arrays, times=np.empty(samples), report_table=np.zeros((world.worlds, at.REPORT_SIZE)))
+        table = np.zeros((world.worlds, at.REPORT_SIZE))
+        return Rollout(**arrays, times=np.empty(samples), report_table=table, names=world.names)
     except MemoryError:
         raise ValueError(message) from None
 
 
-def _checked(out: Rollout, shapes: dict[str, tuple[int, ...]]) -> Rollout:
-    """`out`, which must have exactly these arrays."""
+def _checked(out: Rollout, names: tuple[str, ...], shapes: dict[str, tuple[int, ...]]) -> Rollout:
+    """`out`, which must have exactly these arrays, and these names of bodies."""
     validation.instance(out, Rollout, "out", "None or a physics.Rollout")
     arrays = {name: getattr(out, name) for name in out.columns}
     is_ours = all(array.flags.c_contiguous and array.flags.writeable for array in arrays.values())
     if {name: array.shape for name, array in arrays.items()} != shapes or not is_ours:
         raise ValueError(f"out is {out!r}; allowed is one that `rollout` has made, with {shapes}")
+    if out.names != names:
+        raise ValueError(
+            f"out is a rollout of bodies with the names {out.names!r}; allowed are those of world, {names!r}"
+        )
     return out

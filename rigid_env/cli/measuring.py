@@ -128,6 +128,7 @@ def accuracy(
     json: Json = None,
     plot: Plot = None,
     is_full: Annotated[bool, typer.Option("--all", help="Show every point, not only each engine's best.")] = False,
+    has_goals: Annotated[bool, typer.Option("--goals", help="Show this project's goals, too.")] = False,
     quick: Annotated[bool, typer.Option("--quick", help="Only see that it runs.")] = False,
 ) -> None:
     """Show what accuracy costs in time: error against truth and wall-clock time, beside other engines."""
@@ -138,12 +139,13 @@ def accuracy(
         console, ladder = make_console(), QUICK if quick else Ladder()
         plot, lacking = drawable(plot, console)
         make_parents(json, plot)
-        report = accuracy_report.measure_and_show(console, scene or (), peers, ladder, is_full, below, duration)
+        shown = accuracy_report.Shown(is_full, has_goals, below)
+        report = accuracy_report.measure_and_show(console, scene or (), peers, ladder, duration, shown)
         if json:
             accuracy_report.write_result(json, report)
             tell_file(json, console)
         if plot and report.results:
-            accuracy_plot.write_plot(report.results, plot)
+            accuracy_plot.write_plot(report.results, plot, has_goals)
             tell_file(plot, console)
     end(report.is_complete, lacking)
 

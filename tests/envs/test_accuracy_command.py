@@ -19,7 +19,7 @@ from physics.work_precision import run as frontier_run
 from rigid_env.cli import app
 from rigid_env.lab.measure import accuracy, accuracy_report, peers
 from rigid_env.lab.measure.accuracy import QUICK, Found, Job, Ladder
-from rigid_env.lab.measure.accuracy_table import answers, make_table, summary
+from rigid_env.lab.measure.accuracy_table import answers, goals, make_table, summary
 from rigid_env.lab.measure.truths import CASES
 
 pytestmark = pytest.mark.interpreted
@@ -134,10 +134,15 @@ def test_the_table_shows_each_engines_front_and_the_best_of_each_setting():
     assert "more points" not in text(make_table(found(POINTS[:2])))
 
 
-def test_the_summary_tells_goals_orders_skips_and_trouble():
-    lines = summary(found((*POINTS, point("rigid-env", "fast", 0.005, 1e-5, 500.0, note="oh")), skipped=("x: no",)))
+def test_goals_are_told_apart():
+    lines = goals(found(POINTS))
     assert "goal ≤ 0.0001 m at ≤ 150 µs: reached by fast at 10 ms in 100 µs" in lines
     assert "goal ≤ 1e-06 m at ≤ 500 µs: not reached" in lines
+
+
+def test_the_summary_tells_orders_skips_and_trouble():
+    lines = summary(found((*POINTS, point("rigid-env", "fast", 0.005, 1e-5, 500.0, note="oh")), skipped=("x: no",)))
+    assert not any("goal" in line for line in lines)
     assert any(line.startswith("fast: observed order") for line in lines)
     assert "skipped: x: no" in lines
     assert "not all well: fast at 5 ms: oh" in lines
@@ -158,6 +163,7 @@ def test_it_measures_writes_and_answers(tmp_path):
     output = run("vertex", "--quick", "--below", "1e-3", "--json", file)
     assert "vertex: one vertex hits" in output
     assert "vertex, ours: below 0.001 m/s: " in output
+    assert "goal" not in output
     content = json.loads(file.read_text())
     assert {"date", "processor", "versions", "git"} <= set(content["machine"])
     (scene,) = content["scenes"]
@@ -246,6 +252,8 @@ def test_the_plot_has_a_panel_per_scene(tmp_path):
         assert three.size[1] <= one.size[1]  # of a legend with fewer rows
     with pytest.raises(ValueError, match="results is empty"):
         write_plot([], tmp_path / "none.png")
+    write_plot(results[:1], tmp_path / "with.png", has_goals=True)
+    assert (tmp_path / "with.png").read_bytes() != (tmp_path / "one.png").read_bytes()
     with pytest.raises(ValueError, match="xyz"):
         write_plot(results, tmp_path / "one.xyz")
 

@@ -66,7 +66,7 @@ class Program:
         return [sys.executable, "-c", before + self.text, self.folder], environment
 
     def run(self, cache: Path, **more) -> tuple[str, int, list[str]]:
-        """What it found in a new process, how often its kernel was loaded, lines on standard error."""
+        """Read what it prints in a new process, how often its kernel was loaded, lines on standard error."""
         command, environment = self.command_and_environment(cache)
         done = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=200, **more)
         assert done.returncode == 0, done.stderr

@@ -173,6 +173,17 @@ def test_faults_of_any_step_count():
     assert "ok=False" in repr(found)
 
 
+def test_messages_name_bodies_and_out_is_of_the_same():
+    named, other = (physics.World(physics.Scene([physics.Sphere(0.5, 2.0, name=name)])) for name in ("crate", "barrel"))
+    wrenches = np.zeros((1, 1, 1, 6))
+    found = physics.rollout(named, 1e300 * (wrenches + 1))
+    assert "crate" in found.report.messages()[0]
+    before = other.state.copy()
+    with pytest.raises(ValueError, match=r"out .*'crate'.*'barrel'"):
+        physics.rollout(other, wrenches, out=found)
+    np.testing.assert_array_equal(other.state, before)
+
+
 @pytest.mark.parametrize("threads", [1, 2])
 @pytest.mark.parametrize("is_recorded", [False, True])
 def test_an_exception_of_a_field_puts_everything_back(threads, is_recorded):

@@ -13,8 +13,8 @@ from rigid_env.lab.measure.plotting import require_matplotlib
 COLUMNS = 3
 
 
-def write_plot(results: Sequence[Found], path: str | Path) -> None:
-    """Draw the results into a file whose name says the format (png, svg, pdf).
+def write_plot(results: Sequence[Found], path: str | Path, has_goals: bool = False) -> None:
+    """Draw the results into a file whose name says the format (png, svg, pdf); our own goals only on request.
 
     Raises
     ------
@@ -30,7 +30,8 @@ def write_plot(results: Sequence[Found], path: str | Path) -> None:
     figure, panels = make_figure(math.ceil(len(results) / columns), columns)
     styles = styles_of([found.frontier for found in results])
     for panel, found in zip(panels, results):
-        draw_panel(panel, found.frontier, styles, found.job.key, found.job.what, found.job.goals)
+        goals = found.job.goals if has_goals else ()
+        draw_panel(panel, found.frontier, styles, found.job.key, found.job.what, goals)
     for panel in panels[len(results) :]:
         panel.set_axis_off()
     add_legend(figure, panels[: len(results)])

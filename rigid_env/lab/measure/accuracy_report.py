@@ -12,7 +12,7 @@ import physics
 from physics import validation
 from rigid_env.lab.measure import accuracy
 from rigid_env.lab.measure.accuracy import Found, Ladder
-from rigid_env.lab.measure.accuracy_table import MARKS, answers, make_table, summary
+from rigid_env.lab.measure.accuracy_table import MARKS, answers, goals, make_table, summary
 from rigid_env.lab.measure.machine import write_json
 from rigid_env.lab.measure.mujoco_scene import elsewhere
 from rigid_env.terminal import progress_bar
@@ -35,14 +35,32 @@ class Report:
     is_complete: bool
 
 
+@dataclass(frozen=True)
+class Shown:
+    """Parts of a measurement that are printed beside its points.
+
+    Parameters
+    ----------
+    is_full : bool
+        Every point.
+    has_goals : bool
+        Our own goals, and which setting reaches them.
+    below : float, optional
+        The cheapest setting below this error, in each scene's unit.
+    """
+
+    is_full: bool = False
+    has_goals: bool = False
+    below: float | None = None
+
+
 def measure_and_show(
     console: Console,
     scenes: Sequence[str] = (),
     peers: str = "",
     ladder: Ladder | None = None,
-    is_full: bool = False,
-    below: float | None = None,
     duration: float | None = None,
+    shown: Shown | None = None,
 ) -> Report:
     """Measure scenes and print a table of each as soon as it is there.
 
@@ -54,20 +72,18 @@ def measure_and_show(
     peers : str
         Names with commas between them.
     ladder : Ladder, optional
-    is_full : bool
-        Show every point.
-    below : float, optional
-        Say which setting is the cheapest below this error, in each scene's unit.
     duration : float, optional
         See `accuracy.make_jobs`.
+    shown : Shown, optional
 
     Raises
     ------
     ValueError
-        No such scene or peer, or `below` or `duration` is not positive.
+        No such scene or peer, or `shown.below` or `duration` is not positive.
     """
-    if below is not None:
-        validation.positive(below, (), "below")
+    shown = shown or Shown()
+    if shown.below is not None:
+        validation.positive(shown.below, (), "below")
     ladder = ladder or Ladder()
     engines, missing = accuracy.load_peers([name.strip() for name in peers.split(",") if name.strip()])
     for message in missing:
@@ -84,9 +100,9 @@ def measure_and_show(
 
         for found in accuracy.run(jobs, ladder, tick):
             results.append(found)
-            _show(console, found, is_full)
+            _show(console, found, shown)
     console.print(MARKS, style="dim")
-    for line in [line for found in results for line in (answers(found, below) if below else ())]:
+    for line in [line for found in results for line in (answers(found, shown.below) if shown.below else ())]:
         console.print(line, soft_wrap=True)
     is_complete = len(results) == len(jobs) and all(found.frontier.is_complete for found in results)
     return Report(tuple(results), ladder, is_complete)
@@ -112,8 +128,8 @@ def _row(case: str, measure: str, point: dict) -> dict:
     return {"case": case, "error": point["errors"].get(measure), **times, **rest}
 
 
-def _show(console: Console, found: Found, is_full: bool) -> None:
-    console.print(make_table(found, is_full))
-    for line in summary(found):
+def _show(console: Console, found: Found, shown: Shown) -> None:
+    console.print(make_table(found, shown.is_full))
+    for line in [*(goals(found) if shown.has_goals else ()), *summary(found)]:
         console.print(f"  {line}", soft_wrap=True)
     console.print()

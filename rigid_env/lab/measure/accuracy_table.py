@@ -33,13 +33,18 @@ def make_table(found: Found, is_full: bool = False) -> Table:
     return table
 
 
-def summary(found: Found) -> list[str]:
-    """Lines under a table: goals, what each of our settings does with the step, and who could not take part."""
-    frontier, lines = found.frontier, []
-    unit = frontier.units[frontier.measure]
+def goals(found: Found) -> list[str]:
+    """Lines under a table: our goals for the scene, and which setting reaches each."""
+    unit, lines = found.frontier.units[found.frontier.measure], []
     for error, us, point in found.goals_met():
         how = f"reached by {point} in {1e6 * point.cost:.0f} µs" if point else "not reached"
         lines.append(f"goal ≤ {error:g} {unit} at ≤ {us:g} µs: {how}")
+    return lines
+
+
+def summary(found: Found) -> list[str]:
+    """Lines under a table: what each of our settings does with the step, and who could not take part."""
+    frontier, lines = found.frontier, []
     for engine, setting in frontier.families():
         if engine == OURS:
             lines.append(f"{setting}: {_behaviour(frontier, setting)}")

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
+from physics.work_precision.frontier_plot import add_legend
 from rigid_env.lab.tosses.report import Report
 
 SIZE = (10.0, 7.0)  # [in]
@@ -23,7 +24,7 @@ def write_plot(path: Path, report: Report) -> None:
     for column, (name, unit) in enumerate((("position", "cube widths"), ("rotation", "deg"))):
         _draw_ladder(axes[0, column], report, name, unit)
         _draw_along(axes[1, column], report, name, unit)
-    axes[0, 0].legend(fontsize="small")
+    add_legend(figure, [axes[0, 0]])
     path.parent.mkdir(parents=True, exist_ok=True)
     figure.savefig(path, dpi=DPI)
 
