@@ -218,8 +218,11 @@ def test_units_of_any_size_stand_side_by_side():
 
 def test_interpreted_kernel_gives_the_bits_of_the_compiled_one():
     code = (
-        "import numpy as np; from tests.kernels.test_lemke import solve;"
-        "print([float(x).hex() for x in solve([[1, 2, 0], [0, 1, 2], [2, 0, 1]], [-1, -1.5, -1])[2]])"
+        "import numpy as np; from physics.kernels.lcp.lemke import lemke, lemke_sizes;"
+        "M, q, z = np.array([[1.0, 2, 0], [0, 1, 2], [2, 0, 1]]), np.array([-1, -1.5, -1]), np.zeros(3);"
+        "shape, length = lemke_sizes(3);"
+        "lemke(M, q, z, np.zeros(shape), np.zeros(length, int), 100);"
+        "print([float(x).hex() for x in z])"
     )
     printed = [
         subprocess.run(

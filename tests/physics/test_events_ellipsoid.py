@@ -91,6 +91,7 @@ def test_a_rebound_that_a_wedge_does_not_allow():
     assert physics.diagnose(world).energy.sum() <= before * (1 + 20 * world.accuracy.tolerance)
 
 
+@pytest.mark.interpreted
 def test_angular_momentum_is_held_against_the_real_spin():
     """A rod end over end, in a field: errors of L count by the speed of its ends, not by a spin of that L on its axis.
 

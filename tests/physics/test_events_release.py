@@ -12,6 +12,8 @@ import physics
 from tests.reference.release import ellipse, ladder, release
 from tests.tiers.sweep import sweep
 
+pytestmark = pytest.mark.interpreted
+
 G = 9.81
 FLOOR, LEFT = physics.HalfSpace((0, 1, 0)), physics.HalfSpace((1, 0, 0))
 STEPS = (0.001, 0.002, 0.005, 0.01, 0.02, 0.05, 0.1)
@@ -38,7 +40,6 @@ def releases(trajectory, wall):
 SPINNING = {"fast": (0.3, 0.15, 14.0), "slow": (0.3, 0.15, 13.22), "flat": (0.3, 0.03, 18.1)}
 
 
-@pytest.mark.interpreted
 @pytest.mark.parametrize("accuracy", sweep(LATE, ["precise"]))
 @pytest.mark.parametrize("friction", sweep([None, 0.0], [0.0]))
 @pytest.mark.parametrize("spinning", SPINNING)
@@ -72,7 +73,6 @@ def test_a_smooth_ladder_leaves_the_wall(width, rate, friction, accuracy, is_exh
         assert not releases(found, 0)
 
 
-@pytest.mark.interpreted
 @pytest.mark.parametrize("accuracy", LATE)
 def test_a_push_that_ends_for_less_than_a_step_is_seen_to_end(accuracy, is_exhaustive):
     """Ellipsoids that are let go by a little as they turn over their tips, for 0.01 rad to 0.1 rad; steps turn by 0.25.

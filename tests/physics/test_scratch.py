@@ -115,7 +115,7 @@ def test_scratch_may_hold_anything(case, accuracy, is_exhaustive):
 @pytest.mark.parametrize("accuracy", ["fast", "balanced", "precise"])
 def test_a_world_that_overflows_leaves_the_others_alone(accuracy):
     """Bodies that meet at 1e200 m/s: squares of that are beyond the largest number."""
-    scene = scenes.heap(6)
+    scene = heap()
     alone, beside = (
         physics.World(scene, 1, dt=0.01, accuracy=accuracy),
         physics.World(scene, 2, dt=0.01, accuracy=accuracy, threads=1),
