@@ -166,7 +166,7 @@ def write_json(path: Path, content: dict[str, Any]) -> None:
 def make_table(result: dict[str, Any], title: str) -> Table:
     """An evaluation as a table."""
     low, high = result["interval"]
-    table = Table([Column("of the episodes", is_whole=True), "value"], title)
+    table = Table([Column("quantity", is_whole=True), "value"], title)
     table.add_row("environment", result["env"])
     table.add_row("episodes", f"{result['episodes']} (seed {result['seed']})")
     table.add_row("success rate", f"{result['success_rate']:.1%}  ({low:.1%} to {high:.1%}, 95 %)")

@@ -54,7 +54,7 @@ class ProgressDisplay:
         success = "  ..." if math.isnan(point.success_rate) else f"{point.success_rate:5.1%}"
         mean_return = "  ..." if math.isnan(point.mean_return) else f"{point.mean_return:6.2f}"
         steps = f"{point.steps / 1e6:5.2f} M steps"
-        numbers = f"success {success}  return {mean_return}  {steps}  {rate} steps/s"
+        numbers = f"exploring: success {success}  return {mean_return}  {steps}  {rate} steps/s"
         self._bar.update(self._task, completed=min(point.steps, self._max_steps), numbers=numbers)
         if not self.console.is_terminal and now - self._last_line >= LINE_EVERY:
             self._last_line = now

@@ -121,7 +121,7 @@ class Supervisor(BaseCallback):
         history.seconds = time.perf_counter() - self._start
         self.display.say(
             f"{history.seconds:6.1f} s  {rate:.1%} of {CONFIRMATION_EPISODES} fresh episodes succeed without "
-            f"exploration, the target is {self.config.target:.1%}"
+            f"exploration, as it is judged in the end; the target is {self.config.target:.1%}"
         )
         return bool(rate >= self.config.target)
 

@@ -227,6 +227,8 @@ def main(
     write_json(run.result, result)
     if json_file is not None:
         write_json(json_file, result)
+    for name, path in (("curve", run.curve.with_suffix(".png")), ("evaluation", run.evaluation), ("policy", run.model)):
+        console.print(f"{name:<11} {path}", soft_wrap=True)
     console.print(f"all         {seconds:.1f} s")
 
 

@@ -73,7 +73,7 @@ def compiling():
 
     The garbage collector looks at Numba's growing tables less often: it would take a tenth of the time, or a fifth.
     """
-    text = "rigid-env: compiling the kernel of this scene, once (it is kept for later runs) ..."
+    text = "rigid-env: compiling a kernel for this scene (it is kept for later runs) ..."
     timer = threading.Timer(COMPILE_NOTICE, lambda: print(text, file=sys.stderr, flush=True))
     timer.daemon = True
     before = gc.get_threshold()

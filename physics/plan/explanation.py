@@ -82,11 +82,15 @@ def _center_row(uneven) -> Row:
     return Row("uneven mass", True, reason, "contacts about the centre of mass")
 
 
+def _counted(count: int, what: str) -> str:
+    return f"{count} {what}{'' if count == 1 else 's'}"
+
+
 def _field_rows(fields: tuple[FieldSlot, ...]) -> list[Row]:
     """Rows of the declared fields, then of the built-in fields that are not."""
     rows = [
         Row(slot.effects[0].label, True, f"declared: {', '.join(map(repr, slot.effects))}",
-            f"{slot.term.count * slot.term.size} parameters per body, one function"
+            f"{_counted(slot.term.count * slot.term.size, 'parameter')} per body, one function"
             + (", all bodies at once" if slot.term.is_linked else ""))
         for slot in fields
     ]  # fmt: skip
@@ -161,6 +165,6 @@ def make_rows(scene, accuracy, seen, refined) -> tuple[Row, ...]:
         _gyroscopic_row(seen.isotropic, seen.turned),
         _center_row(seen.uneven),
         *_field_rows(seen.fields),
-        Row("free motion", True, f"scheme {accuracy.scheme}, {accuracy.substeps} substep(s) per dt",
+        Row("free motion", True, f"scheme {accuracy.scheme}, {_counted(accuracy.substeps, 'substep')} per dt",
             "parts that meet an error" if refined else ""),
     )  # fmt: skip

@@ -166,7 +166,8 @@ class RigidEnv(gym.Env[Obs, NDArray[Any]]):
                 allowed = f"{self.task.action_size} numbers"
                 raise ValueError(f"action is {reprlib.repr(action)}; allowed are {allowed}") from None
             if action.shape != self._action_shape:
-                raise ValueError(f"action has shape {action.shape}; allowed is shape {self._action_shape}")
+                shown = f" ({reprlib.repr(action.item())})" if action.ndim == 0 else ""
+                raise ValueError(f"action has shape {action.shape}{shown}; allowed is shape {self._action_shape}")
             task = self.task
             task.take(action)
             (outcome,) = task.outcome.tolist()  # one world: cheaper than the row of an array

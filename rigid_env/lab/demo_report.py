@@ -22,7 +22,10 @@ def show(demo: Demo, summary: dict, console: Console) -> None:
     console.print(Text.assemble((demo.name, "bold"), title))
     kinds = [type(body).__name__ for body in demo.scene.bodies]
     names = [body.name or kind for body, kind in zip(demo.scene.bodies, kinds)]
-    console.print(event_table(summary["events"], names))
+    if summary["events"]:
+        console.print(event_table(summary["events"], names))
+    else:
+        say(console, "events", "none")
     energy = summary["energy"]
     told = f"{energy['start']:.4f} J at the start, {energy['end']:.4f} J at the end"
     say(console, "energy", f"{told}, {energy['dissipated']:.4f} J dissipated")

@@ -15,6 +15,14 @@ from tests.tiers.sweep import sweep
 TITLES = recipes.titles()
 PROVEN = [title for title in TITLES if "task" not in title]  # in the default tier: `test_tasks_page` makes a task, too
 
+EACH_EFFECT_HAS_A_CASE = """
+from physics.scene.force_fields import FIELDS
+from rigid_env.lab.measure.effects import CASES
+
+names = {name.replace(" ", "") for name in CASES}
+assert names.issuperset(kind.__name__.lower() for kind in FIELDS), names
+"""
+
 ONE_AFTER_ANOTHER = """
 import json, sys, traceback
 
@@ -66,11 +74,12 @@ def errors(changed_packages, is_exhaustive):
     """Errors of proofs that fail, by their title; the default tier imports the packages once for all."""
     cache = changed_packages / "cache"
     if not is_exhaustive:
-        programs = {title: recipes.proof(title) for title in PROVEN}
+        programs = {title: recipes.proof(title) for title in PROVEN} | {"cases": EACH_EFFECT_HAS_A_CASE}
         done = run(ONE_AFTER_ANOTHER, changed_packages, cache, json.dumps(programs))
         assert done.returncode == 0, done.stderr[-3000:]
         return json.loads(done.stdout)
-    ended = {title: run(recipes.proof(title), changed_packages, cache) for title in TITLES}
+    programs = {title: recipes.proof(title) for title in TITLES} | {"cases": EACH_EFFECT_HAS_A_CASE}
+    ended = {title: run(program, changed_packages, cache) for title, program in programs.items()}
     return {title: done.stderr[-3000:] for title, done in ended.items() if done.returncode != 0}
 
 
@@ -78,6 +87,11 @@ def errors(changed_packages, is_exhaustive):
 @pytest.mark.parametrize("title", sweep(TITLES, PROVEN))
 def test_the_proof_holds(title, errors):
     assert title not in errors, errors[title]
+
+
+@pytest.mark.interpreted
+def test_an_added_effect_has_all_that_tests_ask_of_one(errors):
+    assert "cases" not in errors, errors["cases"]
 
 
 def test_a_hunk_that_does_not_fit_is_seen():

@@ -278,6 +278,8 @@ def test_a_bad_action_changes_nothing(env_class, vector_class):
         envs.step(bad)
     with pytest.raises(ValueError, match=r"actions has shape \(6,\); allowed is shape \(2, 6\)"):
         envs.step(bad[0])
+    with pytest.raises(ValueError, match=r"action has shape \(\) \('left'\); allowed is shape \(6,\)"):
+        env.step("left")
     with pytest.raises(ValueError, match=r"action has shape \(5,\); allowed is shape \(6,\)"):
         env.step(np.zeros(5))
     np.testing.assert_array_equal(envs.task.world.state, state)

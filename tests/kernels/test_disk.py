@@ -71,7 +71,7 @@ class Program:
         done = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=200, **more)
         assert done.returncode == 0, done.stderr
         found, hits = done.stdout.split()
-        lines = [line for line in done.stderr.splitlines() if "compiling the kernel of this scene" not in line]
+        lines = [line for line in done.stderr.splitlines() if "compiling a kernel for this scene" not in line]
         return found, int(hits), lines
 
     def file(self, cache: Path) -> Path:

@@ -137,7 +137,7 @@ def test_a_key_that_is_missing_is_not_looked_for_in_the_table_behind():
 
 def test_a_file_that_cannot_be_read_is_named(tmp_path):
     path = tmp_path / "scene.toml"
-    with pytest.raises(FileNotFoundError, match=r"scene\.toml"):
+    with pytest.raises(FileNotFoundError, match=r"scene\.toml.*does not exist; allowed is"):
         physics.load_scene(path)
     path.write_bytes(b"# caf\xe9\n")
     with pytest.raises(ValueError, match=r"scene.toml: byte 5 is no UTF-8; allowed is a text file"):
