@@ -23,7 +23,8 @@ class Event:
     t : float
         When [s]. The event-driven scheme knows it to rounding; where it has left out the end of a sequence of ever
         smaller bounces, the contact's ``touch`` and the body's ``rest`` come when that would have ended. Time
-        stepping knows the moment of an ``impact``; of the other kinds the sample interval: `t` is its end.
+        stepping knows the moment of an ``impact``; of the other kinds the sample interval: `t` is its end. It notes a
+        ``release`` after the first stage in which the contact does not push, up to two steps late.
     kind : str
         ``impact`` (velocities jumped), ``touch`` (a resting contact began), ``release`` (one ended), ``fault``; of
         the event-driven scheme also ``stick`` and ``slip`` (a resting contact ceased or began to slide) and

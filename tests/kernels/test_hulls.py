@@ -46,6 +46,12 @@ def found(bodies, places, rotations, walls=(), h=EVERYTHING):
     return many, many.counts[NUM_CONTACTS]
 
 
+def ends(many, side, n) -> np.ndarray:
+    """(n, 3) points of the first (0) or second (1) bodies of the first n contacts, world frame."""
+    b, anchors = many.contacts.bodies[:n, side], many.contacts.anchor[:n, 3 * side : 3 * side + 3]
+    return many.bodies.center[b] + np.einsum("kij,kj->ki", many.bodies.rotation[b].reshape(-1, 3, 3), anchors)
+
+
 def rock(rng) -> physics.Hull:
     return physics.Hull(rng.normal(size=(rng.integers(4, 16), 3)) * rng.uniform(0.3, 1.0, 3), 1.0)
 
@@ -87,7 +93,7 @@ def test_the_normal_of_two_polyhedra_separates_them_most(seed, kinds):
     true, normal, least = polyhedra.largest_separation(a, b), many.contacts.frame[0, :3], many.contacts.gap[:n].min()
     along = polyhedra.separation_along(-normal, a, b)
     np.testing.assert_allclose(many.contacts.frame[:n, :3], np.tile(normal, (n, 1)), atol=1e-15)
-    points = places + many.contacts.arm[:n].reshape(n, 2, 3)
+    points = np.moveaxis([ends(many, k, n) for k in range(2)], 0, 1)
     rounding, reach = 1e-9 * size, 4 * slop + 1e-9 * size
     np.testing.assert_allclose((points[:, 0] - points[:, 1]) @ normal, many.contacts.gap[:n], atol=rounding)
     if true >= 0:  # apart: the distance of two corners is along no face and no two edges; but a plane is between them
@@ -184,7 +190,7 @@ def test_a_sphere_touches_the_nearest_point_of_a_hull(seed, hull_first):
     point, distance = polyhedra.nearest_point(corners(hull, places[0], R[0]), places[1])
     # Non-negative least squares is good to about the root of rounding of the condition of its normal equations.
     assert many.contacts.gap[0] == pytest.approx(distance - radius, abs=1e-8)
-    on_hull = places[0] + many.contacts.arm[0, :3] if hull_first else places[0] + many.contacts.arm[0, 3:]
+    on_hull = ends(many, 0 if hull_first else 1, 1)[0]
     if distance > 1e-3:
         np.testing.assert_allclose(on_hull, point, atol=1e-6)
         outward = -many.contacts.frame[0, :3] if hull_first else many.contacts.frame[0, :3]
@@ -219,7 +225,7 @@ def test_an_ellipsoid_is_as_far_from_a_hull_as_any_direction_says(seed, gap, hul
     )
     # and the largest: the oracle never finds more than there is, and may miss some of it.
     assert many.contacts.gap[0] >= best - 1e-12
-    points = places[order] + many.contacts.arm[0].reshape(2, 3)
+    points = [ends(many, k, 1)[0] for k in range(2)]
     np.testing.assert_allclose(points[0] - points[1], many.contacts.gap[0] * many.contacts.frame[0, :3], atol=1e-12)
 
 

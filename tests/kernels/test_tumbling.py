@@ -66,10 +66,11 @@ def test_the_distance_of_two_bodies_is_a_bound_that_falls_short_by_a_tenth_at_mo
             gjk_distance,
             0,
             1,
-            (tuple(d), tuple(R.ravel())),
-            ((0.0, 0.0, 0.0), tuple(S.ravel())),
+            ((tuple(d), tuple(R.ravel())), ((0.0, 0.0, 0.0), tuple(S.ravel()))),
+            None,
             tuple(d),
             1e-9,
+            0.0,
             has_hulls,
             many,
         )

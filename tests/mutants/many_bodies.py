@@ -17,15 +17,15 @@ BROADPHASE = [
         "broadphase/sweep_and_prune.py",
         "if box[a, k] > box[b, k + 3] or box[b, k] > box[a, k + 3]:",
         "if box[a, k] > box[b, k + 3]:",
-        "kernels/test_many.py::test_pairs_are_those_whose_boxes_overlap_in_the_order_of_the_sweep",
+        "kernels/test_many.py::test_pairs_are_those_whose_boxes_overlap_in_the_order_of_bodies",
     ),
     _mutant(
         "broadphase-order",
-        "Pairs of one body are sorted by index instead of the order of the sweep.",
+        "Pairs are not sorted by their second body.",
         "broadphase/sweep_and_prune.py",
-        "rank[pairs[j - 1, 1]] > rank[b]",
-        "pairs[j - 1, 1] > b",
-        "kernels/test_many.py::test_pairs_are_those_whose_boxes_overlap_in_the_order_of_the_sweep",
+        "_count_into(sweep.pairs, 1, count, sweep.first_entry, sweep.sorted_pairs)",
+        "_count_into(sweep.pairs, 0, count, sweep.first_entry, sweep.sorted_pairs)",
+        "kernels/test_many.py::test_pairs_are_those_whose_boxes_overlap_in_the_order_of_bodies",
     ),
     _mutant(
         "broadphase-strip",
@@ -33,7 +33,7 @@ BROADPHASE = [
         "broadphase/grid.py",
         "strip_index(box[b, u], lu, du, nu), strip_index(box[b, u + 3], lu, du, nu),",
         "strip_index(box[b, u], lu, du, nu), strip_index(box[b, u], lu, du, nu),",
-        "kernels/test_many.py::test_pairs_are_those_whose_boxes_overlap_in_the_order_of_the_sweep",
+        "kernels/test_many.py::test_pairs_are_those_whose_boxes_overlap_in_the_order_of_bodies",
     ),
 ]
 
@@ -134,13 +134,15 @@ SOLVER = [
     ),
 ]
 
+_CASE = "hard_cases/test_cases.py::test_the_case_comes_out_as_it_must"
+
 STEPPING = [
     _mutant(
         "stepping-restitution",
         "A bounce returns all of its speed, whatever its restitution.",
         "stepping/impact.py",
-        "goal, is_hit = -many.contacts.restitution[k] * speed, True",
-        "goal, is_hit = -speed, True",
+        "return -many.contacts.restitution[k] * speed, not speed > 0.0",
+        "return -speed, not speed > 0.0",
         "physics/test_bodies.py::test_head_on_impact",
     ),
     _mutant(
@@ -150,6 +152,46 @@ STEPPING = [
         "goal = -_CORRECTION_SHARE * (gap + 0.5 * slop)",
         "goal = _CORRECTION_SHARE * (gap + 0.5 * slop)",
         "physics/test_bodies.py::test_overlapping_bodies_come_apart_without_speed",
+    ),
+    _mutant(
+        "stepping-foretold",
+        "A contact that is to be met in time is braked in the air before it.",
+        "stepping/midpoint_step.py",
+        "if many.contacts.target[k, 0] == FORETOLD:",
+        "if many.contacts.target[k, 0] == 1.0:",
+        _CASE + "[56-bounce-in-company]",
+    ),
+    _mutant(
+        "stepping-passing",
+        "The contact of a pair that passes keeps the direction that it has now.",
+        "stepping/passing_pairs.py",
+        "if not is_parted or qt.dot(way, m) > _SAME_DIRECTION:",
+        "if is_parted or qt.dot(way, m) > _SAME_DIRECTION:",
+        _CASE + "[58-sliding-past]",
+    ),
+    _mutant(
+        "stepping-thinning",
+        "Bodies are not thinned by the depth to which they land.",
+        "stepping/passing_pairs.py",
+        "return slop + landing",
+        "return slop",
+        _CASE + "[59-seams]",
+    ),
+    _mutant(
+        "stepping-point",
+        "The impulses of a contact act at two points, a gap apart.",
+        "data/contact_set.py",
+        "put_vector(many.contacts.arm, k, 0, subtract(other, way))",
+        "put_vector(many.contacts.arm, k, 0, one)",
+        "kernels/test_many.py::test_the_normal_of_two_blocks_separates_them_most",
+    ),
+    _mutant(
+        "stepping-spin",
+        "To push bodies apart adds angular momentum.",
+        "stepping/position_correction.py",
+        "add_scaled(L, share * p, turn)",
+        "add_scaled(L, 0.0, turn)",
+        _CASE + "[60-closed-pairs]",
     ),
 ]
 

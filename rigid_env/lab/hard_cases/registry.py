@@ -11,7 +11,7 @@ from rigid_env.lab.hard_cases.case import Case
 # Each has a tuple CASES.
 MODULES = (
     "flight", "bounces", "impacts", "friction", "rolling", "tipping", "scaling", "piles", "leaning", "arch",
-    "chains", "stiff", "turning", "letting_go", "random_scenes",
+    "chains", "stiff", "turning", "letting_go", "random_scenes", "company",
 )  # fmt: skip
 
 

@@ -2,8 +2,8 @@
 
 Sweep and prune: the boxes around the bodies, the motion of the stage included, are sorted along the world axis on
 which the bodies are spread most; a body is then compared with those behind it until one begins beyond its end. Many
-bodies are compared within columns along that axis only (`grid`). The pairs come in the order of the sweep, however
-the columns are cut.
+bodies are compared within columns along that axis only (`grid`). The pairs come in the order of the bodies, so
+that what two of them do does not depend on where others are.
 
 Reference: D. Baraff, *Dynamic simulation of non-penetrating rigid bodies*, PhD thesis, Cornell, 1992, section 2.3.
 """
@@ -148,18 +148,6 @@ def _overlap(a, b, many):
 
 
 @inlined
-def _sort_behind(first, last, many):
-    """Sort the new pairs `many.broadphase.pairs[first:last]` of one first body by the rank of the second body."""
-    pairs, rank = many.broadphase.pairs, many.broadphase.merged
-    for i in range(first + 1, last):
-        b, j = pairs[i, 1], i
-        while j > first and rank[pairs[j - 1, 1]] > rank[b]:
-            pairs[j, 1] = pairs[j - 1, 1]
-            j -= 1
-        pairs[j, 1] = b
-
-
-@inlined
 def _pair_in_column(a, i, j, axes, cuts, count, many):
     """Add the pairs of a with those behind it in a column, if their boxes overlap there first: how many pairs now."""
     axis, u, v = axes
@@ -184,24 +172,55 @@ def _pair_in_column(a, i, j, axes, cuts, count, many):
     return count
 
 
+@inlined
+def _count_into(pairs, column, count, first, target):
+    """Copy `count` pairs to `target`, in the order of one of their bodies, else as they are (counting sort)."""
+    for b in range(first.shape[0]):
+        first[b] = 0
+    for k in range(count):
+        first[pairs[k, column] + 1] += 1
+    for b in range(1, first.shape[0]):
+        first[b] += first[b - 1]
+    for k in range(count):
+        b = pairs[k, column]
+        target[first[b], 0], target[first[b], 1] = pairs[k, 0], pairs[k, 1]
+        first[b] += 1
+
+
+@inlined
+def _is_sorted(pairs, count):
+    """True if the pairs come in the order of their first, then their second body."""
+    for k in range(1, count):
+        if pairs[k, 0] < pairs[k - 1, 0] or (pairs[k, 0] == pairs[k - 1, 0] and pairs[k, 1] < pairs[k - 1, 1]):
+            return False
+    return True
+
+
+@kernel
+def _sort_pairs(count, many):
+    """Sort the pairs by their first, then their second body: where other bodies are does not change their order."""
+    sweep = many.broadphase
+    _count_into(sweep.pairs, 1, count, sweep.first_entry, sweep.sorted_pairs)
+    _count_into(sweep.sorted_pairs, 0, count, sweep.first_entry, sweep.pairs)
+
+
 @kernel
 def find_pairs(h, many):
-    """Write `many.broadphase.pairs` and their number: all pairs (a < b) of bodies whose boxes overlap."""
+    """Write `many.broadphase.pairs` and their number: all pairs (a < b) of bodies whose boxes overlap, in order."""
     write_swept_boxes(h, many)
     axis = widest_axis(many)
     sort_bodies(axis, many)
     u, v = (axis + 1) % 3, (axis + 2) % 3
     cuts, pairs, count = fill_columns(u, v, many), many.broadphase.pairs, 0
     for r in range(many.broadphase.order.shape[0]):
-        many.broadphase.merged[many.broadphase.order[r]] = r
-    for r in range(many.broadphase.order.shape[0]):
         a, first = many.broadphase.order[r], count
         i_first, i_last, j_first, j_last = body_strips(a, u, v, cuts, many)
         for i in range(i_first, i_last + 1):
             for j in range(j_first, j_last + 1):
                 count = _pair_in_column(a, i, j, (axis, u, v), cuts, count, many)
-        _sort_behind(first, count, many)
         for k in range(first, count):
             b = pairs[k, 1]
             pairs[k, 0], pairs[k, 1] = min(a, b), max(a, b)
+    if not _is_sorted(pairs, count):
+        _sort_pairs(count, many)
     many.counts[NUM_PAIRS] = count

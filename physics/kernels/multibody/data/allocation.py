@@ -47,6 +47,7 @@ def bodies_setting_fields() -> list[tuple]:
         *setting_fields(),
         ("residual_limit", f),  # allowed beside the tolerance [m/s]: see `time_stepping.midpoint_step.rest_residual`
         ("half_load_speed", f),  # with error control: least speed that half a substep's loads give a body [m/s], else 0
+        ("substep", f),  # length of the substep, or of a part of it with error control [s]
         ("load_speed", f),  # largest speed that the loads of a resting stage give a body [m/s], else 0
         ("is_resting_stage", i),  # 1: contacts are held through a stage, 0: impacts
         ("meet", i),  # 1: bodies touch each other, 0: walls only
@@ -111,7 +112,7 @@ def make_bodies_workspace(
         system=_make_linear_system(bodies, block_capacity(bodies)),
         newton=_make_newton(bodies, batch_capacity(bodies, contacts)),
         walls=walls.copy(),
-        counts=np.zeros(4, np.int64),
+        counts=np.zeros(5, np.int64),
         settings=_make_settings({**settings, **switches}),
     )
 
@@ -140,6 +141,7 @@ def _make_broad_phase(bodies: int) -> BroadPhase:
     i = np.int64
     return BroadPhase(
         pairs=np.zeros((pair_capacity(bodies), 2), i),
+        sorted_pairs=np.zeros((pair_capacity(bodies), 2), i),
         order=np.arange(bodies, dtype=i),
         merged=np.zeros(bodies, i),
         first_entry=np.zeros(bodies + 1, i),

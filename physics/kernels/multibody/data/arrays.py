@@ -48,7 +48,7 @@ BLOCKS_PER_BODY = 32
 BATCHES_PER_BODY = 32
 
 # Entries of `counts`: contacts, pairs, contacts or pairs without room, and batches of the island that is solved.
-NUM_CONTACTS, NUM_PAIRS, NUM_DROPPED, NUM_BATCHES = range(4)
+NUM_CONTACTS, NUM_PAIRS, NUM_DROPPED, NUM_BATCHES, NUM_STOPPING = range(5)
 
 # Of `block_lu`: numbers of a column, velocity and angular velocity with one unused after each, and of a block of six.
 COLUMN_SIZE = 8
@@ -105,8 +105,9 @@ class BroadPhase(NamedTuple):
     """Sweep and prune along one axis, and the columns that cut the other two."""
 
     pairs: np.ndarray  # (pairs, 2) int, bodies whose boxes overlap
+    sorted_pairs: np.ndarray  # (pairs, 2) int, scratch: pairs by their second body
     order: np.ndarray  # (bodies,) int, bodies by the lower end of their boxes
-    merged: np.ndarray  # (bodies,) int, scratch of the merge sort; then the position of each body in `order`
+    merged: np.ndarray  # (bodies,) int, scratch of the merge sort
     first_entry: np.ndarray  # (bodies + 1,) int, first position of a column in `entry`
     cursor: np.ndarray  # (bodies,) int, position in `entry` at which a column continues
     entry: np.ndarray  # (ENTRIES_PER_BODY * bodies,) int, bodies, column by column
@@ -214,5 +215,5 @@ class BodiesWorkspace(NamedTuple):
     system: LinearSystem
     newton: Newton
     walls: np.ndarray  # (walls, WALL_SIZE) columns of `layout`
-    counts: np.ndarray  # (4,) int: `NUM_CONTACTS`, `NUM_PAIRS`, `NUM_DROPPED`, `NUM_BATCHES`
+    counts: np.ndarray  # (5,) int: `NUM_CONTACTS` and those that follow it above
     settings: np.ndarray  # (1,) record: `bodies_setting_fields`

@@ -8,11 +8,15 @@ from physics.kernels.compile.decorators import inlined, kernel
 from physics.kernels.half_space import support_function as geo
 from physics.kernels.math import quaternion as qt
 from physics.kernels.math.vector import row_vector
-from physics.kernels.multibody.data.arrays import NUM_CONTACTS, NUM_DROPPED
+from physics.kernels.multibody.data.arrays import NUM_CONTACTS, NUM_DROPPED, NUM_STOPPING
 from physics.kernels.state.layout import ELLIPSOID, SPHERE
 
 # Contact features that two bodies, or a body and a wall, have unless one is a hull: the parts of a contact's id.
 FEATURES_PER_PAIR = 512
+
+# Slops by which a contact that touches has to go in to count as stopping its bodies: more than two bodies that are
+# thinned by the slop lose along any direction, 2 √3 (`stepping.passing_pairs`).
+DEEP_SHARE = 4.0
 
 # Distance at which bodies that turn far have arrived, where the slop is less, in the smaller bounding radius: what is
 # left is small enough for contacts to be foretold by their speed, and large beside rounding.
@@ -146,6 +150,47 @@ def _write_anchor(k, b, first, point, many):
     put_vector(many.contacts.anchor, k, first, qt.transposed_matvec(row_matrix(many.bodies.rotation, b), arm))
 
 
+@inlined
+def _first_body_share(a, b, many):
+    """Share of the first body's point in the common one, of a contact whose normal no body owns.
+
+    1 or 0 where one body is rounder, whose point stays under its centre; 1/2 where neither comes first.
+    """
+    one, other = many.bodies.work[a].shape, many.bodies.work[b].shape
+    if one != other:
+        for shape in (SPHERE, ELLIPSOID):
+            if one == shape:
+                return 1.0
+            if other == shape:
+                return 0.0
+    return 0.5
+
+
+@inlined
+def _join_points(k, a, b, owner, gap, n, many):
+    """Let both arms of contact k end in one point, halfway across the gap along n.
+
+    Equal and opposite impulses at one point keep the angular momentum of the two, whatever lies between them. A point
+    on a face slides along it with the other body.
+    """
+    way = subtract(row_vector(many.bodies.state, a, 0), row_vector(many.bodies.state, b, 0))
+    one = add_scaled(row_vector(many.contacts.arm, k, 0), -0.5 * gap, n)
+    other = add_scaled(row_vector(many.contacts.arm, k, 3), 0.5 * gap, n)
+    if owner < 0:
+        from_one = add_scaled(one, 1.0, way)
+        other = add_scaled(other, _first_body_share(a, b, many), subtract(from_one, other))
+    elif owner == b:
+        other = add_scaled(one, 1.0, way)
+    put_vector(many.contacts.arm, k, 0, subtract(other, way))
+    put_vector(many.contacts.arm, k, 3, other)
+
+
+@inlined
+def is_stopping(gap, speed, slop, h):
+    """True if a contact would stop its bodies within h: it goes in, and by slops if it touches now."""
+    return gap + h * speed < (0.0 if gap > slop else -DEEP_SHARE * slop)
+
+
 @kernel
 def add_contact(a, b, feature, owner, normal, point_a, point_b, gap, h, many):
     """Add a contact to the set if it touches, or could within h: whether there was room for it.
@@ -175,6 +220,7 @@ def add_contact(a, b, feature, owner, normal, point_a, point_b, gap, h, many):
     partner = count - 1 - b
     if b >= 0:
         _write_anchor(k, b, 3, point_b, many)
+        _join_points(k, a, b, owner, gap, normal, many)
         acceleration += many.bodies.work[b].acceleration
         partner = b
     write_contact_frame(k, normal, many)
@@ -197,6 +243,8 @@ def add_contact(a, b, feature, owner, normal, point_a, point_b, gap, h, many):
     many.bodies.touched[a] = 1
     if b >= 0:
         many.bodies.touched[b] = 1
+        if is_stopping(gap, speed, slop, h):
+            many.counts[NUM_STOPPING] += 1
     many.counts[NUM_CONTACTS] = k + 1
     return True
 
@@ -227,20 +275,22 @@ def _carried_point(b, k, first, side, n, many):
 
 
 @inlined
-def _slide_on_face(k, a, b, owner, n, many):
-    """Let the point on the face that has the normal be where the other body's point is, which slides along it."""
-    if owner < 0:
-        return
-    other, of_other, of_owner, side = a, 0, 3, -1.0
-    if owner == a:
-        other, of_other, of_owner, side = b, 3, 0, 1.0
-    point = add_scaled(row_vector(many.bodies.state, other, 0), 1.0, row_vector(many.contacts.arm, k, of_other))
-    put_vector(
-        many.contacts.arm,
-        k,
-        of_owner,
-        subtract(add_scaled(point, side * many.contacts.gap[k], n), row_vector(many.bodies.state, owner, 0)),
-    )
+def _turn_frame(k, a, b, many):
+    """Turn the frame of contact k to where its bodies are now, and return its normal.
+
+    A face's normal turns with its owner, that of two spheres is along the line of their centres.
+    """
+    n, owner = row_vector(many.contacts.normal, k, 0), many.contacts.owner[k]
+    if owner >= 0:
+        n = qt.matvec(row_matrix(many.bodies.rotation, owner), n)
+        write_contact_frame(k, n, many)
+    elif b >= 0 and many.bodies.work[a].shape == SPHERE and many.bodies.work[b].shape == SPHERE:
+        d = subtract(row_vector(many.bodies.center, a, 0), row_vector(many.bodies.center, b, 0))
+        size = math.sqrt(qt.dot(d, d))
+        if size > 0.0:
+            n = (d[0] / size, d[1] / size, d[2] / size)
+            write_contact_frame(k, n, many)
+    return n
 
 
 @kernel
@@ -250,19 +300,16 @@ def update_contacts(many):
     The gap between the two points along the normal; the second one of a wall is the first one projected on it.
     """
     for k in range(many.counts[NUM_CONTACTS]):
-        a, b, owner = many.contacts.bodies[k, 0], many.contacts.bodies[k, 1], many.contacts.owner[k]
-        n = row_vector(many.contacts.normal, k, 0)
-        if owner >= 0:
-            n = qt.matvec(row_matrix(many.bodies.rotation, owner), n)
-            write_contact_frame(k, n, many)
+        a, b = many.contacts.bodies[k, 0], many.contacts.bodies[k, 1]
+        n = _turn_frame(k, a, b, many)
         arm = _carried_point(a, k, 0, -1.0, n, many)
         put_vector(many.contacts.arm, k, 0, arm)
         point = add_scaled(arm, 1.0, row_vector(many.bodies.state, a, 0))
         if b < 0:
             many.contacts.gap[k] = qt.dot(n, point) - many.walls[-1 - b, 9]
-        else:
-            arm = _carried_point(b, k, 3, 1.0, n, many)
-            put_vector(many.contacts.arm, k, 3, arm)
-            many.contacts.gap[k] = qt.dot(n, subtract(point, add_scaled(arm, 1.0, row_vector(many.bodies.state, b, 0))))
-            if many.settings[0].is_error_controlled == 1:
-                _slide_on_face(k, a, b, owner, n, many)
+            continue
+        arm = _carried_point(b, k, 3, 1.0, n, many)
+        put_vector(many.contacts.arm, k, 3, arm)
+        gap = qt.dot(n, subtract(point, add_scaled(arm, 1.0, row_vector(many.bodies.state, b, 0))))
+        many.contacts.gap[k] = gap
+        _join_points(k, a, b, many.contacts.owner[k], gap, n, many)

@@ -9,7 +9,7 @@ from physics.kernels.multibody.broadphase.sweep_and_prune import (
     may_reach_wall,
     surface_motion_bound,
 )
-from physics.kernels.multibody.data.arrays import NUM_CONTACTS, NUM_PAIRS
+from physics.kernels.multibody.data.arrays import NUM_CONTACTS, NUM_PAIRS, NUM_STOPPING
 from physics.kernels.multibody.data.contact_set import pair_slop
 from physics.kernels.multibody.data.sleeping import wake_touched_groups
 from physics.kernels.multibody.narrowphase.body_wall import collide_body_wall, collide_hull_wall
@@ -29,7 +29,7 @@ def find_contacts(h, ellipsoids, hulls, world, sleep, many):
     `ellipsoids` and `hulls` are None where the scene has none, `sleep` where it does not declare it. What sleeps
     and comes near nothing is left out.
     """
-    many.counts[NUM_CONTACTS] = many.counts[NUM_PAIRS] = 0
+    many.counts[NUM_CONTACTS] = many.counts[NUM_PAIRS] = many.counts[NUM_STOPPING] = 0
     bodies = many.bodies.work
     first_row = world * bodies.shape[0]
     if many.settings[0].meet == 1:

@@ -39,21 +39,45 @@ def hull_support_vertex(b, k, many):
 
 
 @inlined
-def _support_point(b, x, R, k, hulls, many):
-    """Point of body b (of a sphere its centre) that is farthest along k, for its geometric centre at x [m]."""
+def support_point(b, x, R, k, thinner, hulls, many):
+    """Point of body b that is farthest along k, a unit vector, for its geometric centre at x and rotation R [m].
+
+    The body is taken thinner by `thinner` [m] on all sides.
+    """
     d, shape = many.bodies.work[b].dims, many.bodies.work[b].shape
     if shape == SPHERE:
-        return x
+        return add_scaled(x, d[0] - thinner, k)
     e = qt.transposed_matvec(R, k)
     if hulls is not None:  # noqa: SIM102 (a branch of its own is what the compiler prunes)
         if shape == HULL:
-            return add_scaled(x, 1.0, qt.matvec(R, hull_support_vertex(b, e, many)))
+            corner = hull_support_vertex(b, e, many)
+            return add_scaled(x, 1.0 - thinner / math.sqrt(qt.dot(corner, corner)), qt.matvec(R, corner))
+    d = (d[0] - thinner, d[1] - thinner, d[2] - thinner)
     if shape == BLOCK:
         r = (math.copysign(d[0], e[0]), math.copysign(d[1], e[1]), math.copysign(d[2], e[2]))
         return add_scaled(x, 1.0, qt.matvec(R, r))
     f = (d[0] * e[0], d[1] * e[1], d[2] * e[2])
     s = math.sqrt(qt.dot(f, f))
     return add_scaled(x, 1.0 / s, qt.matvec(R, (d[0] * f[0], d[1] * f[1], d[2] * f[2])))
+
+
+@inlined
+def _core_point(b, x, R, k, thinner, hulls, many):
+    """`support_point` of the core of body b: the centre of a sphere, any other body itself; k of any length."""
+    if many.bodies.work[b].shape == SPHERE:
+        return x
+    return support_point(b, x, R, k, thinner, hulls, many)
+
+
+@inlined
+def _difference_point(a, b, poses, v, thinner, hulls, many):
+    """Corner of A - B that is farthest against v, for the poses of both."""
+    one, other = poses
+    x, y = subtract(one[0], other[0]), (0.0, 0.0, 0.0)
+    return subtract(
+        _core_point(a, x, one[1], (-v[0], -v[1], -v[2]), thinner, hulls, many),
+        _core_point(b, y, other[1], v, thinner, hulls, many),
+    )
 
 
 @kernel
@@ -107,33 +131,36 @@ def closest_on_simplex(count, many):
 
 
 @inlined
-def _core_radius(b, many):
+def _core_radius(b, thinner, many):
     """Radius around the core of body b [m]: a sphere's own, 0 of other shapes."""
-    return many.bodies.work[b].dims[0] if many.bodies.work[b].shape == SPHERE else 0.0
+    return many.bodies.work[b].dims[0] - thinner if many.bodies.work[b].shape == SPHERE else 0.0
 
 
 @kernel
-def gjk_distance(a, b, pose_a, pose_b, way, touch, hulls, many):
+def gjk_distance(a, b, now, later, way, touch, thinner, hulls, many):
     """Distance of body a from body b in their poses, or a bound that is nearly it: (direction out of b, distance).
 
     Parameters
     ----------
-    pose_a, pose_b : tuples
-        Geometric centre (3 floats) [m], body frame to world (9 floats).
+    now : pair of tuples
+        Geometric centre (3 floats) [m] and rotation (9 floats) of a, and of b.
+    later : pair of tuples or None
+        Other poses of both: the distance is then that of the convex hull of A - B in both.
     way : tuple of 3 floats
         Where to look first, not 0.
     touch : float
         Distance below which no more is asked [m]: 0 is returned then.
+    thinner : float
+        By how much both bodies are taken thinner on all sides [m].
     """
-    x, R, y, S = pose_a[0], pose_a[1], pose_b[0], pose_b[1]
-    v, count, core = way, 0, _core_radius(a, many) + _core_radius(b, many)
+    v, count, core = way, 0, _core_radius(a, thinner, many) + _core_radius(b, thinner, many)
     best, n = -math.inf, way
     for _ in range(_MAX_ITERATIONS):
-        back = (-v[0], -v[1], -v[2])
-        w = subtract(
-            _support_point(a, subtract(x, y), R, back, hulls, many),
-            _support_point(b, (0.0, 0.0, 0.0), S, v, hulls, many),
-        )
+        w = _difference_point(a, b, now, v, thinner, hulls, many)
+        if later is not None:
+            u = _difference_point(a, b, later, v, thinner, hulls, many)
+            if qt.dot(v, u) < qt.dot(v, w):
+                w = u
         size = math.sqrt(qt.dot(v, v))
         bound = qt.dot(v, w) / size - core
         if bound > best:

@@ -13,7 +13,7 @@ from physics.kernels.math.union_find import find_root, unite_sets
 
 
 @inlined
-def _union_contacts(n, many):
+def union_contacts(n, many):
     """Let `many.islands.parent` lead from every body to the first one that contacts connect it with."""
     parent = many.islands.parent
     for b in range(parent.shape[0]):
@@ -76,7 +76,7 @@ def find_islands(n, many):
     Contacts of island i are `many.islands.contacts[first_contact[i] : first_contact[i + 1]]`, its bodies
     `many.islands.bodies[first_body[i] : first_body[i + 1]]`.
     """
-    _union_contacts(n, many)
+    union_contacts(n, many)
     count = _list_contacts(n, many)
     _list_bodies(count, many)
     return count

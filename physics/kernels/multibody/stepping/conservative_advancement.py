@@ -211,7 +211,7 @@ def _time_of_impact(a, b, h, gyroscopic, offset_frame, hulls, many):
         left = _contact_side(a, one, n, offset_frame, many)
         right = _contact_side(partner, other, n, offset_frame, many)
         if b >= 0:
-            n, gap = gjk_distance(a, b, left, right, n, touch, hulls, many)
+            n, gap = gjk_distance(a, b, (left[:2], right[:2]), None, n, touch, 0.0, hulls, many)
             left, right = _contact_side(a, one, n, offset_frame, many), _contact_side(b, other, n, offset_frame, many)
         else:
             gap = _gap_bound(0.0, a, b, n, (left, right), 0.0, 0.0, hulls, many)

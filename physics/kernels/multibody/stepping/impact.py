@@ -23,26 +23,39 @@ TURNING_MARGIN = 2.0
 # Slops that something may go in until the resting stage stops it at the middle of the step: a contact problem less.
 _SOFT_LANDING_SLOPS = 100.0
 
+# Slops within which contacts that are apart belong to an impact of others.
+_SAME_MOMENT_SLOPS = 2.0
+
 _UNCONSTRAINED = 1.0e300
+
+# Target of a contact that is apart and is to be met in time, until the resting stage sets its own.
+FORETOLD = -1.0e299
 
 
 @inlined
-def is_bouncing(k, h, many):
-    """True if contact k would leave again for longer than `rest_share` of h after an impact at its speed now."""
-    least = many.settings[0].rest_share * relative_acceleration_bound(k, many) * h
-    return many.contacts.restitution[k] > 0.0 and -many.contacts.restitution[k] * many.contacts.speed[k] > least
+def _rest_speed(k, many):
+    """Speed that loads give contact k within `rest_share` of the substep [m/s].
+
+    Of all of it, however little is left after an impact of others: else those would make what rests bounce.
+    """
+    return many.settings[0].rest_share * relative_acceleration_bound(k, many) * many.settings[0].substep
+
+
+@inlined
+def is_bouncing(k, many):
+    """True if contact k would leave again for longer than `rest_share` of the substep after an impact at its speed."""
+    bounce = -many.contacts.restitution[k] * many.contacts.speed[k]
+    return many.contacts.restitution[k] > 0.0 and bounce > _rest_speed(k, many)
 
 
 @inlined
 def rest_speed_limit(k, h, many):
     """Speed that the resting stage may stop [m/s].
 
-    What loads give within `rest_share` of h, or what goes in by a few slops only until the middle of it.
+    What loads give within `rest_share` of the substep, or what goes in by a few slops only until the middle of h.
     """
     slop = pair_slop(many.contacts.bodies[k, 0], many.contacts.bodies[k, 1], many)
-    return max(
-        2.0 * _SOFT_LANDING_SLOPS * slop / h, many.settings[0].rest_share * relative_acceleration_bound(k, many) * h
-    )
+    return max(2.0 * _SOFT_LANDING_SLOPS * slop / h, _rest_speed(k, many))
 
 
 @inlined
@@ -92,7 +105,41 @@ def is_impact_ahead(k, h, many):
     a, b = many.contacts.bodies[k, 0], many.contacts.bodies[k, 1]
     if not (many.contacts.gap[k] > pair_slop(a, b, many) and many.contacts.speed[k] < 0.0):
         return False
-    return is_bouncing(k, h, many) or -many.contacts.speed[k] > impact_speed_limit(k, h, many)
+    return is_bouncing(k, many) or -many.contacts.speed[k] > impact_speed_limit(k, h, many)
+
+
+@inlined
+def _impact_target(k, h, many):
+    """Target of contact k that takes part in an impact, and whether it is hit: others may leave it as it is.
+
+    What leaves may be turned round to e times its speed, Moreau's law: without it a struck chain could gain energy.
+    """
+    speed = many.contacts.speed[k]
+    if speed > 0.0 or is_bouncing(k, many):
+        return -many.contacts.restitution[k] * speed, not speed > 0.0
+    return 0.0, -speed > min(rest_speed_limit(k, h, many), impact_speed_limit(k, h, many))
+
+
+@inlined
+def _distant_target(k, h, is_last, many):
+    """Target of contact k that is apart, and whether it has to be braked in the air; not constrained if met in time."""
+    goal = -many.contacts.gap[k] / h
+    if is_left_to_advancement(k, many) or (not is_last and is_impact_ahead(k, h, many)):
+        return -_UNCONSTRAINED, False
+    return goal, goal - many.contacts.speed[k] > min(rest_speed_limit(k, h, many), impact_speed_limit(k, h, many))
+
+
+@inlined
+def _is_in_same_moment(k, many):
+    """True if contact k, which is apart, is so near that it belongs to an impact of others.
+
+    That is within two slops, or, of a pair that touches elsewhere, within the tolerance's share of the substep: the
+    corners of one face would else hit one after another, each turning the body that the next one turns back.
+    """
+    gap, near = many.contacts.gap[k], -many.contacts.speed[k] * many.settings[0].tolerance * many.settings[0].substep
+    if gap <= _SAME_MOMENT_SLOPS * pair_slop(many.contacts.bodies[k, 0], many.contacts.bodies[k, 1], many):
+        return True
+    return gap <= near and (_pair_touches(k, 1, many) or _pair_touches(k, -1, many))
 
 
 @inlined
@@ -104,29 +151,29 @@ def set_impact_targets(n, h, is_last, many):
     What approaches no faster than loads make it within `rest_share` of the step, or would go in by a few slops only
     until the middle of it, is left to the resting stage, unless it is fast.
     """
-    fastest = -1
+    fastest, is_impact = -1, False
     for k in range(n):
-        slop = pair_slop(many.contacts.bodies[k, 0], many.contacts.bodies[k, 1], many)
-        gap, speed, goal, is_hit = many.contacts.gap[k], many.contacts.speed[k], 0.0, False
-        slow = min(rest_speed_limit(k, h, many), impact_speed_limit(k, h, many))
-        if gap > slop:
-            goal = -gap / h
-            if is_left_to_advancement(k, many) or (not is_last and is_impact_ahead(k, h, many)):
-                goal = -_UNCONSTRAINED
-            elif goal - speed > slow:
-                is_hit = True
-        elif speed > 0.0:
-            goal = (
-                -many.contacts.restitution[k] * speed
-            )  # Moreau's law for what leaves: without it a struck chain could gain energy
-        elif is_bouncing(k, h, many):
-            goal, is_hit = -many.contacts.restitution[k] * speed, True
-        elif -speed > slow:
-            is_hit = True
-        if is_hit and (fastest < 0 or speed < many.contacts.speed[fastest]):
+        is_touching = not many.contacts.gap[k] > pair_slop(many.contacts.bodies[k, 0], many.contacts.bodies[k, 1], many)
+        goal, is_hit = _impact_target(k, h, many) if is_touching else _distant_target(k, h, is_last, many)
+        is_impact = is_impact or (is_hit and is_touching)
+        if is_hit and (fastest < 0 or many.contacts.speed[k] < many.contacts.speed[fastest]):
             fastest = k
         put_vector(many.contacts.target, k, 0, (goal, 0.0, 0.0))
         put_vector(many.contacts.impulse, k, 0, (0.0, 0.0, 0.0))
+    if is_impact:
+        fastest = _extend_impact(n, h, fastest, many)
+    return fastest
+
+
+@kernel
+def _extend_impact(n, h, fastest, many):
+    """Let an impact take in what belongs to the same moment; the contact that approaches fastest then."""
+    for k in range(n):
+        slop = pair_slop(many.contacts.bodies[k, 0], many.contacts.bodies[k, 1], many)
+        if many.contacts.gap[k] > slop and _is_in_same_moment(k, many):
+            many.contacts.target[k, 0], is_hit = _impact_target(k, h, many)
+            if is_hit and many.contacts.speed[k] < many.contacts.speed[fastest]:
+                fastest = k
     return fastest
 
 
@@ -168,7 +215,7 @@ def constrain_coupled_contacts(n, many):
             if not many.contacts.target[k, 0] > -_UNCONSTRAINED and (
                 many.bodies.touched[a] == 1 or (b >= 0 and many.bodies.touched[b] == 1)
             ):
-                many.contacts.target[k, 0], is_growing = 0.0, True
+                many.contacts.target[k, 0], is_growing = FORETOLD, True
                 _mark_bodies(k, many)
 
 

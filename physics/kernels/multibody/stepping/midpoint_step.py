@@ -38,6 +38,7 @@ from physics.kernels.multibody.stepping.energy_budget import (
     save_pre_load_velocity,
     update_twist,
 )
+from physics.kernels.multibody.stepping.impact import FORETOLD
 from physics.kernels.multibody.stepping.solve_and_apply import solve_and_apply, solve_frictionless_and_apply
 from physics.kernels.state import layout as at
 from physics.kernels.state.body import angular_velocity, read_state, write_state
@@ -109,7 +110,9 @@ def set_resting_targets(n, h, many):
             t = (t[0] + h * _coriolis(k, many), t[1], t[2])
             gap += 0.5 * half * t[0]
         t = clamp_target_to_energy(t, contact_velocity(k, many))
-        if gap > slop:
+        if many.contacts.target[k, 0] == FORETOLD:
+            t = (t[0] - (max(gap, 0.0) + slop) / half, t[1], t[2])
+        elif gap > slop:
             t = (t[0] - gap / half, t[1], t[2])
         elif gap > 0.0:
             t = (t[0] - GAP_CLOSING_SHARE * gap / h, t[1], t[2])

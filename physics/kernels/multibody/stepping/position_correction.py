@@ -9,11 +9,13 @@ from __future__ import annotations
 
 import math
 
-from physics.kernels.compile.decorators import inlined, shared_kernel
+from physics.kernels.compile.decorators import inlined, kernel, shared_kernel
 from physics.kernels.math import quaternion as qt
+from physics.kernels.math.union_find import find_root
 from physics.kernels.math.vector import row_vector
-from physics.kernels.multibody.data.contact_set import add_scaled, pair_slop, put_vector, update_contacts
+from physics.kernels.multibody.data.contact_set import add_scaled, pair_slop, put_vector, subtract, update_contacts
 from physics.kernels.multibody.data.kinematics import update_body_pose
+from physics.kernels.multibody.solver.islands import union_contacts
 from physics.kernels.multibody.stepping.energy_budget import (
     cap_rotational_energy,
     clamp_body_inside_walls,
@@ -22,6 +24,7 @@ from physics.kernels.multibody.stepping.energy_budget import (
     work_against_loads,
 )
 from physics.kernels.multibody.stepping.position_sweeps import sweep_positions
+from physics.kernels.state import layout as at
 from physics.kernels.state.body import angular_velocity, read_state, write_state
 
 # Share of the depth beyond half a slop that one stage takes back: turning makes the whole of it overshoot.
@@ -68,6 +71,43 @@ def _pose_inside_walls(b, offset_frame, many):
     clamp_body_inside_walls(b, offset_frame, many)
 
 
+@kernel
+def _mark_held_islands(n, many):
+    """Mark the islands that a wall pushes: `many.islands.of_body` is 1 at their root, else 0."""
+    union_contacts(n, many)
+    for b in range(many.bodies.state.shape[0]):
+        many.islands.of_body[b] = 0
+    for k in range(n):
+        if many.contacts.bodies[k, 1] < 0 and many.contacts.impulse[k, 0] > 0.0:
+            many.islands.of_body[find_root(many.contacts.bodies[k, 0], many.islands.parent)] = 1
+
+
+@inlined
+def _is_held(b, many):
+    """True if a wall pushes the island of body b."""
+    return many.islands.of_body[find_root(b, many.islands.parent)] == 1
+
+
+@kernel
+def _keep_angular_momentum(n, many):
+    """Turn the bodies of each contact against the angular momentum of their centres that pushing them apart adds.
+
+    To move a by p n/m_a and b by -p n/m_b adds p n x (v_a - v_b). Both take up a part by their m r²: the same angular
+    velocity, as if they were one body.
+    """
+    for k in range(n):
+        a, b, p = many.contacts.bodies[k, 0], many.contacts.bodies[k, 1], many.contacts.impulse[k, 0]
+        if b < 0 or not p > 0.0:
+            continue
+        u = subtract(row_vector(many.bodies.state, a, at.LINVEL), row_vector(many.bodies.state, b, at.LINVEL))
+        turn = qt.cross(u, row_vector(many.contacts.frame, k, 0))
+        one = many.bodies.work[a].radius ** 2 / many.bodies.inv_mass[a]
+        other = many.bodies.work[b].radius ** 2 / many.bodies.inv_mass[b]
+        for body, share in ((a, one / (one + other)), (b, other / (one + other))):
+            L = row_vector(many.bodies.state, body, at.ANGMOM)
+            put_vector(many.bodies.state, body, at.ANGMOM, add_scaled(L, share * p, turn))
+
+
 @inlined
 def _displace(b, offset_frame, many):
     """Move and turn body b by what `many.bodies.twist` says; the work that it takes against its loads [J]."""
@@ -76,6 +116,8 @@ def _displace(b, offset_frame, many):
     turn = qt.exp_map(row_vector(many.bodies.twist, b, 3))
     x = add_scaled(x, 1.0, row_vector(many.bodies.twist, b, 0))
     write_state(many.bodies.state, b, (x, qt.normalise(qt.multiply(turn, q)), v, L))
+    if not _is_held(b, many):
+        return 0.0
     cap_rotational_energy(b, before, offset_frame, many)
     return work_against_loads(b, start, many)
 
@@ -110,6 +152,8 @@ def _correct_once(n, offset_frame, many):
     sweep_positions(
         n, error, _DEEP_SWEEPS if deepest > _DEEP_SLOPS else min(_CORRECTION_SWEEPS, many.settings[0].sweeps), many
     )
+    _mark_held_islands(n, many)
+    _keep_angular_momentum(n, many)
     _displace_all(offset_frame, many)
     return deepest
 

@@ -6,7 +6,7 @@ from physics.kernels.compile.decorators import inlined, kernel
 from physics.kernels.contact_law.restitution_energy import IMPACT_ENERGY_ROUNDING, rebound_share
 from physics.kernels.math import quaternion as qt
 from physics.kernels.math.vector import row_vector
-from physics.kernels.multibody.data.contact_set import add_scaled, pair_slop, put_vector
+from physics.kernels.multibody.data.contact_set import add_scaled, put_vector
 from physics.kernels.multibody.stepping.solve_and_apply import solve_and_apply, solve_frictionless_and_apply
 from physics.kernels.state import layout as at
 from physics.kernels.state.body import angular_velocity, read_state
@@ -79,11 +79,18 @@ def _blend_impulses(n, s, many):
 
 
 @inlined
+def _is_to_rebound(k, many):
+    """True if the target of contact k is that of Newton's law with its restitution, and not 0."""
+    goal = many.contacts.target[k, 0]
+    return goal != 0.0 and goal == -many.contacts.restitution[k] * many.contacts.speed[k]
+
+
+@inlined
 def _set_plastic_targets(n, many):
     """Targets of what touches without rebound, and momenta as before the impact."""
     for k in range(n):
         put_vector(many.contacts.impulse, k, 0, (0.0, 0.0, 0.0))
-        if not many.contacts.gap[k] > pair_slop(many.contacts.bodies[k, 0], many.contacts.bodies[k, 1], many):
+        if _is_to_rebound(k, many):
             many.contacts.target[k, 0] = 0.0
     for b in range(many.bodies.state.shape[0]):
         put_vector(many.bodies.state, b, at.LINVEL, row_vector(many.bodies.momenta, b, _PRE_IMPACT))
@@ -92,11 +99,9 @@ def _set_plastic_targets(n, many):
 
 @inlined
 def _has_rebound(n, many):
-    """True if any contact that touches is to leave with a speed."""
+    """True if any contact is to leave with a speed."""
     for k in range(n):
-        if many.contacts.target[k, 0] != 0.0 and not many.contacts.gap[k] > pair_slop(
-            many.contacts.bodies[k, 0], many.contacts.bodies[k, 1], many
-        ):
+        if _is_to_rebound(k, many):
             return True
     return False
 

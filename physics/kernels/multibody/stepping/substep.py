@@ -7,15 +7,16 @@ impulses.
 1. Hold loads         f = f(y), held over the stage                                        `hold_all_loads`
 2. Find contacts      {i : g_i <= what the time left can close}: sweep and prune, then the `find_contacts`
                       narrow phase of each pair
-3. Resolve impacts    M Δ(v, ω) = Jᵀ p, u_n⁺ >= -e u_n⁻ ⟂ p_n >= 0, |p_t| <= μ p_n;        `resolve_impacts`
+3. Part passing pairs n such that n·(a - b) > 0 all through the stage, where there is one  `redirect_passing_pairs`
+4. Resolve impacts    M Δ(v, ω) = Jᵀ p, u_n⁺ >= -e u_n⁻ ⟂ p_n >= 0, |p_t| <= μ p_n;        `resolve_impacts`
                       later meetings are speculative: u_n⁺ >= -g/t
-4. Limit the stage    the first t at which bodies meet that bounce, are fast, or turn far  `safe_stage_length`
-5. Integrate          in the air the exact flow of ẋ = v, q̇ = ½ ω q, M v̇ = f              `midpoint_step`
+5. Limit the stage    the first t at which bodies meet that bounce, are fast, or turn far  `safe_stage_length`
+6. Integrate          in the air the exact flow of ẋ = v, q̇ = ½ ω q, M v̇ = f              `midpoint_step`
                       in contact Moreau's midpoint step: x, q drift by h/2;
                       M Δ(v, ω) = h f + Jᵀ p, u_n >= target ⟂ p_n >= 0, |p_t| <= μ p_n;
                       x, q drift by h/2
-6. Correct positions  overlaps are pushed apart, positions only                            `correct_positions`
-7. Sleep              groups whose motion stays below a threshold are left out (`step`)    `update_sleep`
+7. Correct positions  overlaps are pushed apart, positions only                            `correct_positions`
+8. Sleep              groups whose motion stays below a threshold are left out (`step`)    `update_sleep`
 
 No body passes through another one, however fast: a speculative contact bounds the speed at which the gap may close.
 """
@@ -25,7 +26,7 @@ from __future__ import annotations
 from physics.kernels.compile.decorators import inlined, kernel
 from physics.kernels.forces.held_loads import advance_clock
 from physics.kernels.half_space.conservative_advancement import MAX_TURNING_CUTS
-from physics.kernels.multibody.data.arrays import NUM_CONTACTS, NUM_DROPPED, WARM_STAGE_LENGTH
+from physics.kernels.multibody.data.arrays import NUM_CONTACTS, NUM_DROPPED, NUM_STOPPING, WARM_STAGE_LENGTH
 from physics.kernels.multibody.data.kinematics import update_poses_and_twists
 from physics.kernels.multibody.narrowphase.dispatch import find_contacts
 from physics.kernels.multibody.stepping.conservative_advancement import (
@@ -35,6 +36,7 @@ from physics.kernels.multibody.stepping.conservative_advancement import (
 )
 from physics.kernels.multibody.stepping.impact import resolve_impacts
 from physics.kernels.multibody.stepping.midpoint_step import hold_all_loads, midpoint_step
+from physics.kernels.multibody.stepping.passing_pairs import redirect_passing_pairs
 from physics.kernels.multibody.stepping.position_correction import correct_positions
 from physics.kernels.state import layout as at
 from physics.kernels.state.groups import flies_exactly
@@ -84,6 +86,7 @@ def substep_world(
     world, start, h, switches, sleep, records, many):  # fmt: skip
     """Advance the bodies of one world by h, `start` after the call [s]: the stages of the module's list."""
     left, impacts, cuts, turns = h, 0, 0, 0
+    many.settings[0].substep = h
     while True:
         is_last = impacts >= many.settings[0].splits or cuts == SPLITS_PER_IMPACT * many.settings[0].splits
         hold_all_loads(left, switches.flight.gyroscopic, switches.flight.offset_frame, many)
@@ -95,6 +98,11 @@ def substep_world(
         find_contacts(left, switches.ellipsoids, switches.hulls, world, sleep, many)
         n = many.counts[NUM_CONTACTS]
         record_penetration(n, world, records.memory, records.report, many)
+        if many.counts[NUM_STOPPING] > 0:
+            redirect_passing_pairs(
+                n, left, switches.flight.gyroscopic, switches.flight.offset_frame, switches.hulls, many
+            )
+            n = many.counts[NUM_CONTACTS]
         n, t, is_impact = resolve_impacts(n, world, start + (h - left), left, is_last, switches, records, many)
         many.counts[NUM_CONTACTS] = n
         if is_impact and not is_last:

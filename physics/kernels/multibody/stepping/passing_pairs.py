@@ -1,0 +1,164 @@
+"""Pairs of bodies that pass each other within a stage: a contact between them acts along a plane that parts them.
+
+A contact of two bodies that are apart keeps its direction through the stage, which is that between their nearest
+points now. To a body that slides past an edge this direction is a wall across its way. Motion decides instead: where
+bodies move freely and turn little, their difference A - B sweeps the convex hull of both its places, at the start and
+at the end. If that hull does not hold the origin, the two never touch, and the direction n in which it is nearest to
+the origin parts them all along: n·(a - b) > 0 for all their points at both ends, and between them. The contact is then
+along n, and gives no impulse unless something else pushes the two together.
+
+Bodies are taken thinner by the slop each, and by the depth to which they have landed in others: an edge that stands out
+by less than that is no obstacle.
+"""
+
+from __future__ import annotations
+
+from physics.kernels.compile.decorators import inlined, kernel, shared_kernel
+from physics.kernels.flight.free_flight import drift_attitude
+from physics.kernels.half_space.contact_point import center_arm
+from physics.kernels.math import quaternion as qt
+from physics.kernels.math.quaternion import to_matrix
+from physics.kernels.math.vector import row_vector
+from physics.kernels.multibody.data import warm_start as kept
+from physics.kernels.multibody.data.arrays import NUM_CONTACTS
+from physics.kernels.multibody.data.contact_set import (
+    DEEP_SHARE,
+    FEATURES_PER_PAIR,
+    add_contact,
+    add_scaled,
+    is_stopping,
+    pair_slop,
+    row_matrix,
+    subtract,
+)
+from physics.kernels.multibody.narrowphase.gjk import gjk_distance, support_point
+from physics.kernels.state.body import read_state
+
+# Share of the slop below which the distance between thinned bodies counts as none: what GJK cannot tell from rounding.
+_TOUCH_SHARE = 1.0e-2
+
+# Cosine of the angle below which two directions are the same (4e-4 rad).
+_SAME_DIRECTION = 1.0 - 1.0e-7
+
+# Slops up to which the depth that bodies have gone in counts: a soft landing, not an overlap that a user made.
+_MAX_DEPTH_SLOPS = 100.0
+
+
+@inlined
+def _depth_after(k, h, many):
+    """Depth of contact k after h at its speed now [m]."""
+    return -many.contacts.gap[k] - h * many.contacts.speed[k]
+
+
+@kernel
+def _thinning(a, b, n, h, many):
+    """By how much bodies a and b are taken thinner [m]: the slop, and how deep they land in others within h."""
+    slop, landing = pair_slop(a, b, many), 0.0
+    for k in range(n):
+        c, d = many.contacts.bodies[k, 0], many.contacts.bodies[k, 1]
+        if (c == a and d == b) or (c not in (a, b) and d not in (a, b)):
+            continue
+        depth = max(_depth_after(k, h, many), -many.contacts.gap[k])
+        if depth <= _MAX_DEPTH_SLOPS * slop:
+            landing = max(landing, depth)
+    return slop + landing
+
+
+@inlined
+def _is_stopping(k, h, many):
+    """True if contact k of two bodies would stop them within h."""
+    slop = pair_slop(many.contacts.bodies[k, 0], many.contacts.bodies[k, 1], many)
+    return is_stopping(many.contacts.gap[k], many.contacts.speed[k], slop, h)
+
+
+@inlined
+def _end_pose(b, h, gyroscopic, offset_frame, many):
+    """(geometric centre, rotation) of body b after h of free motion at constant momenta."""
+    x, q, v, L = read_state(many.bodies.state, b)
+    R = to_matrix(drift_attitude(q, L, many.bodies.work[b], h, gyroscopic, offset_frame))
+    x = add_scaled(x, h, v)
+    if offset_frame is not None:
+        x = add_scaled(x, 1.0, center_arm(R, many.bodies.work[b]))
+    return x, R
+
+
+@kernel
+def _parting_direction(a, b, way, thinner, h, gyroscopic, offset_frame, hulls, many):
+    """Direction out of b that parts the two all through h, and whether there is one; `way` is a first guess."""
+    now = (
+        (row_vector(many.bodies.center, a, 0), row_matrix(many.bodies.rotation, a)),
+        (row_vector(many.bodies.center, b, 0), row_matrix(many.bodies.rotation, b)),
+    )
+    later = (_end_pose(a, h, gyroscopic, offset_frame, many), _end_pose(b, h, gyroscopic, offset_frame, many))
+    touch = _TOUCH_SHARE * pair_slop(a, b, many)
+    n, gap = gjk_distance(a, b, now, later, way, touch, thinner, hulls, many)
+    return n, gap > 0.0
+
+
+@kernel
+def _gap_along(a, b, n, hulls, many):
+    """Gap between two bodies along n, and their points that are nearest along it [m]."""
+    x, y = row_vector(many.bodies.center, a, 0), row_vector(many.bodies.center, b, 0)
+    p = support_point(a, x, row_matrix(many.bodies.rotation, a), (-n[0], -n[1], -n[2]), 0.0, hulls, many)
+    q = support_point(b, y, row_matrix(many.bodies.rotation, b), n, 0.0, hulls, many)
+    return qt.dot(n, subtract(p, q)), p, q
+
+
+@inlined
+def _end_of_pair(k, n, many):
+    """First contact after k, of the n in the set, that is of another pair."""
+    a, b = many.contacts.bodies[k, 0], many.contacts.bodies[k, 1]
+    while k < n and many.contacts.bodies[k, 0] == a and many.contacts.bodies[k, 1] == b:
+        k += 1
+    return k
+
+
+@inlined
+def _fastest_stopping(first, last, h, many):
+    """Contact of a pair's that would stop it, the fastest, or -1: none would, or advancement sees to the pair."""
+    a, b, found = many.contacts.bodies[first, 0], many.contacts.bodies[first, 1], -1
+    if b < 0 or many.bodies.spin_bound[a] > 0.0 or many.bodies.spin_bound[b] > 0.0:
+        return found
+    for k in range(first, last):
+        if _is_stopping(k, h, many) and (found < 0 or many.contacts.speed[k] < many.contacts.speed[found]):
+            found = k
+    return found
+
+
+@kernel
+def _redirect_pair(k, n, to, h, gyroscopic, offset_frame, hulls, many):
+    """Write the contact that takes the place of those of a pair that passes at `to`; k is its fastest, of n in the set.
+
+    Returns whether it passes, and the contacts of the set from then on. A contact that lands along its own direction
+    stays. So does that of bodies that touch along the plane between them, unless it goes deeper than they are thinned
+    by along any direction.
+    """
+    a, b, way = many.contacts.bodies[k, 0], many.contacts.bodies[k, 1], row_vector(many.contacts.frame, k, 0)
+    thinner = _thinning(a, b, n, h, many)
+    m, is_parted = _parting_direction(a, b, way, thinner, h, gyroscopic, offset_frame, hulls, many)
+    if not is_parted or qt.dot(way, m) > _SAME_DIRECTION:
+        return False, to
+    gap, p, q = _gap_along(a, b, m, hulls, many)
+    if not gap > pair_slop(a, b, many):
+        return _depth_after(k, h, many) > DEEP_SHARE * thinner, to
+    many.counts[NUM_CONTACTS] = to
+    add_contact(a, b, FEATURES_PER_PAIR - 1, -1, m, p, q, gap, h, many)
+    return True, many.counts[NUM_CONTACTS]
+
+
+@shared_kernel
+def redirect_passing_pairs(n, h, gyroscopic, offset_frame, hulls, many):
+    """Replace the contacts of each pair that passes within h by one along a plane that parts the two."""
+    k, left = 0, 0
+    while k < n:
+        last, is_passing = _end_of_pair(k, n, many), False
+        found = _fastest_stopping(k, last, h, many)
+        if found >= 0:
+            is_passing, left = _redirect_pair(found, n, left, h, gyroscopic, offset_frame, hulls, many)
+        if not is_passing:
+            for i in range(k, last):
+                if left < i:
+                    kept.copy_contact(i, left, many)
+                left += 1
+        k = last
+    many.counts[NUM_CONTACTS] = left

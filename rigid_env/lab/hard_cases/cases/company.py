@@ -1,0 +1,271 @@
+"""Hard cases of bodies in company: a collision, a clearance, a seam and a far body change nothing that they should not.
+
+Each draws placements of one scene and runs them as worlds side by side. Public reports against other engines are of
+these kinds; those of this engine are in the decisions.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+import physics
+from physics.rotations import rotation_matrices
+from physics.scene.canonical_scenes import GRAVITY
+from rigid_env.lab.hard_cases.case import Case, Check, Setting, none_of
+from rigid_env.lab.hard_cases.cases.scenery import EPS, FLOOR, laws
+
+RADIUS = 0.03  # of the balls [m]
+SLAB = 0.5  # thickness of slabs [m]
+LENGTH = 0.8  # of each of five of them [m]
+
+
+def _side_by_side(on: Setting, scene: physics.Scene, pos, linvel, **more) -> physics.World:
+    """Worlds of the scene, one for each row of the positions (worlds, bodies, 3)."""
+    world = on.world(scene, len(pos))
+    world.set_state(pos=pos, linvel=np.broadcast_to(linvel, pos.shape), **more)
+    return world
+
+
+def _rows(*parts) -> np.ndarray:
+    """(worlds, bodies, 3) of one (worlds, 3) or (3,) for each body."""
+    count = max(len(np.atleast_2d(part)) for part in parts)
+    return np.stack([np.broadcast_to(part, (count, 3)) for part in parts], axis=1).astype(float)
+
+
+def _along_x(x, y: float = 0.0) -> np.ndarray:
+    """(worlds, 3) points at the height y."""
+    return np.stack([np.asarray(x), np.full(np.shape(x), y), np.zeros(np.shape(x))], axis=1)
+
+
+def bounce_in_company(on: Setting) -> Sequence[Check]:
+    """A ball on a table hits an equal one, a ball falls on a block that lies: speeds apart are e times those before.
+
+    Head on, without friction, the floor takes no part: u⁺ = -e u⁻ of the two balls, v₂ = (1 + e)/2 v. A ball of mass m
+    on a lying block: the floor holds the block within the moment of impact, Newton's law for both contacts at once,
+    so that the ball leaves with e √(2 g h), and the block rests. Each from many distances: a step may begin at any
+    place before the impact. Where a step begins inside a slop of the impact, the ball has got a slop's speed less;
+    contact problems leave their tolerance of the speed, once at the impact and once for each step at rest before it.
+    """
+    count, checks = on.pick(400, 60), []
+    for e in (0.0, 0.3, 0.8, 1.0):
+        balls = [physics.Sphere(RADIUS, 0.17, pos=(k, RADIUS, 0)) for k in range(2)]
+        x = 2 * RADIUS + np.linspace(0.02, 0.5, count)
+        pos, scene = _rows((0, RADIUS, 0), _along_x(x, RADIUS)), physics.Scene(balls, [FLOOR], laws(e))
+        world = _side_by_side(on, scene, pos, _rows((2, 0, 0), np.zeros(3)))
+        world.step(steps=on.steps(0.4))
+        taken = np.abs(world.linvel[:, 1, 0] - (1 + e)).max() / 2
+        checks.append(Check(f"share of the speed that the second ball lacks, e = {e}", taken, 10 * on.tolerance + 1e-9))
+    for e in (0.3, 0.8, 1.0):
+        plate = physics.Block((1, 0.2, 1), 5.0, pos=(0, 0.1, 0))
+        h = np.linspace(0.3, 0.6, count)
+        scene = physics.Scene([plate, physics.Sphere(0.05, 0.5, pos=(0, 1, 0))], [FLOOR], laws(e))
+        pos = _rows((0, 0.1, 0), _along_x(np.zeros(count), 0.25) + h[:, None] * (0, 1, 0))
+        world, limit = _side_by_side(on, scene, pos, np.zeros(3)), 20 * on.tolerance + 4 * on.slop
+        checks.append(Check(f"energy that a bounce on a block lacks, e = {e}", _lack(world, on, h, e), limit))
+    return checks
+
+
+def _lack(world: physics.World, on: Setting, h: np.ndarray, e: float) -> float:
+    """Largest difference of the ball's energy above the block from e² m g h after its first bounce, by m g h."""
+    fall = np.sqrt(2 * h / GRAVITY)
+    worst = np.zeros(len(h))
+    for _ in range(on.steps(float((fall * (1 + e)).min()))):
+        world.step()
+        height, speed = world.pos[:, 1, 1] - 0.25, world.linvel[:, 1, 1]
+        is_after = (world.time > fall + 2 * on.dt) & (world.time < fall * (1 + e))
+        lack = np.abs((speed**2 / (2 * GRAVITY) + height) / h - e * e)
+        worst = np.maximum(worst, np.where(is_after, lack, 0.0))
+    return float(worst.max())
+
+
+def _attitudes(rng, count: int) -> np.ndarray:
+    """(count, 2, 4) unit quaternions, any attitude as likely as any other."""
+    quat = rng.normal(size=(count, 2, 4))
+    return quat / np.linalg.norm(quat, axis=2, keepdims=True)
+
+
+def passing(on: Setting) -> Sequence[Check]:
+    """Bodies that pass each other without touching move as if they were alone.
+
+    Blocks and balls fly past each other at clearances from 1e-5 to 0.1 m: no force acts, so velocities keep their
+    bits but for the sums that make them up, and there is no impact. The clearance is that of bounding spheres where
+    bodies turn. Where they do not it is that of their shadows along the way, the largest n·d - s(n) over all n across
+    the way, d from the block to the ball and s the reach of both.
+    """
+    rng, count = np.random.default_rng(5), on.pick(400, 60)
+    bodies = [physics.Block((1, 0.6, 0.4), 1.0, pos=(0, 0, 0)), physics.Sphere(0.4, 0.7, pos=(5, 0, 0))]
+    scene = physics.Scene(bodies, [], laws(0.5, 0.3, (0, 0, 0)))
+    quat = _attitudes(rng, count)
+    speed, clearance = np.exp(rng.uniform(math.log(0.3), math.log(30), count)), 10 ** rng.uniform(-5, -1, count)
+    is_turning = rng.random(count) < 0.3
+    pos, linvel, angvel = np.zeros((3, count, 2, 3))
+    for k in range(count):
+        way, across, other = np.linalg.qr(rng.normal(size=(3, 3)))[0].T
+        offset = 0.5 * math.hypot(1, 0.6, 0.4) + 0.4 + clearance[k]
+        if is_turning[k]:
+            angvel[k] = 3 * rng.normal(size=(2, 3))
+        else:
+            offset = _offset(across, other, rotation_matrices(quat[k, 0]), clearance[k])
+        pos[k, 0], linvel[k, 0] = offset * across - 2 * way, speed[k] * way
+    world = _side_by_side(on, scene, pos, linvel, quat=quat, angvel=angvel)
+    world.make_event_room(4)
+    events = 0
+    for _ in range(min(on.steps(4 / 0.3), on.pick(4000, 300))):
+        world.step()
+        events += int(world.event_counts.sum())
+    change = np.abs(world.linvel - linvel).max(axis=(1, 2)) / speed
+    return [
+        Check(f"change of a velocity, {count} pairs", float(change.max()), 4 * EPS),
+        none_of("impacts", events),
+    ]
+
+
+def _offset(across, other, R, clearance: float) -> float:
+    """Distance along `across` at which a ball passes the turned block at this clearance, both seen along the way."""
+    angle = np.linspace(0, 2 * math.pi, 3601)
+    n = np.cos(angle)[:, None] * across + np.sin(angle)[:, None] * other
+    reach = np.abs(n @ R) @ (0.5, 0.3, 0.2) + 0.4
+    low, high = 0.0, 3.0
+    for _ in range(60):
+        middle = 0.5 * (low + high)
+        low, high = (low, middle) if (middle * (n @ across) - reach).max() > clearance else (middle, high)
+    return high
+
+
+def sliding_past(on: Setting) -> Sequence[Check]:
+    """A block slides past a heavy one at a clearance, and is slowed by the floor alone: v = v₀ - μ g t.
+
+    The other block lies beside its way, its edge nearest of all that it has in front. What the solver leaves of the
+    speed turns the block, so that its corner may reach the other: the clearances are above tolerance times way.
+    """
+    count, checks = on.pick(24, 6), []
+    for speed in (1.0, 5.0):
+        way = speed * 0.2
+        clearance = np.geomspace(max(1e-4, 20 * on.tolerance * way), 1e-1, count)
+        bodies = [
+            physics.Block((0.4, 0.2, 0.3), 0.5, pos=(-0.27, 0.1, 0)),
+            physics.Block((2, 0.5, 2), 1e4, pos=(1, 0.25, -3)),
+        ]
+        beside = np.stack([np.ones(count), np.full(count, 0.25), -1.15 - clearance], axis=1)
+        world = _side_by_side(
+            on,
+            physics.Scene(bodies, [FLOOR], laws(0.0, 0.2)),
+            _rows((-0.27, 0.1, 0), beside),
+            _rows((speed, 0, 0), np.zeros((count, 3))),
+        )
+        world.step(steps=on.steps(0.2))
+        lost = np.abs(world.linvel[:, 0] - (speed - 0.2 * GRAVITY * world.time, 0, 0)).max() / speed
+        checks.append(Check(f"speed lost to a block beside the way, {speed} m/s", float(lost), 20 * on.tolerance))
+    return checks
+
+
+def seams(on: Setting) -> Sequence[Check]:
+    """A block slides and a ball rolls over five level slabs as over one, and over slabs that are a little lower.
+
+    Flush slabs are one plane: what is off is a seam's. Where each slab is 5e-6 m lower than the one before, four seams
+    give g times their height to ½ v²: 1.3e-4 m/s at 1.5 m/s, less than 4e-5 m.
+    """
+    count, checks = on.pick(60, 10), []
+    rng = np.random.default_rng(3)
+    for name, mu, body in (
+        ("block", 0.2, physics.Block((0.4, 0.2, 0.3), 0.5, pos=(-0.5, 0.1, 0))),
+        ("ball", 0.5, physics.Sphere(0.1, 0.5, pos=(-0.5, 0.1, 0))),
+    ):
+        start, speed = rng.uniform(-0.6, -0.4, count), rng.uniform(1.5, 3.0, count)
+        turn = 0.0 if name == "block" else -speed / 0.1
+        one = _cross(on, body, mu, [_slab(0, 5 * LENGTH, SLAB)], start, speed, turn)
+        for drop in (0.0, 5e-6):
+            slabs = [_slab(k, LENGTH, SLAB - k * drop) for k in range(5)]
+            off = np.abs(_cross(on, body, mu, slabs, start, speed, turn) - one).max()
+            checks.append(Check(f"{name} off its way over five slabs, {drop:g} m lower each", float(off), 1e-4, "m"))
+    return checks
+
+
+def _slab(k: int, length: float, thickness: float) -> physics.Block:
+    """Slab k of a row along x from -1 m, on a floor at -`SLAB`."""
+    return physics.Block((length, thickness, 4.0), 1e4, pos=(length * (k + 0.5) - 1, 0.5 * thickness - SLAB, 0))
+
+
+def _cross(on: Setting, body: physics.Body, mu: float, slabs, start, speed, turn) -> np.ndarray:
+    """Places of the bodies along x after 0.6 s, from `start` on at `speed` and turning about z [m]."""
+    pos = _rows(_along_x(start, 0.1), *(slab.pos for slab in slabs))
+    linvel, angvel = _rows(_along_x(speed), *np.zeros((len(slabs), 3))), np.zeros_like(pos)
+    angvel[:, 0, 2] = turn
+    scene = physics.Scene([body, *slabs], [physics.HalfSpace((0, 1, 0), -SLAB)], laws(0.0, mu))
+    world = _side_by_side(on, scene, pos, linvel, angvel=angvel)
+    world.step(steps=on.steps(0.6))
+    return world.pos[:, 0, 0]
+
+
+def closed_pairs(on: Setting) -> Sequence[Check]:
+    """Pairs that hit each other in space keep linear and angular momentum to rounding, whatever their restitution.
+
+    Impulses of a contact are opposite and act at one point. Each step rounds places, attitudes and momenta a few times,
+    all of them the same way at worst.
+    """
+    rng, count, checks = np.random.default_rng(9), on.pick(200, 40), []
+    sizes = {(1, 0.6, 0.4): 1.0, (0.5, 0.7, 0.6): 0.6}
+    bodies = [physics.Block(size, mass, pos=(5 * k, 0, 0)) for k, (size, mass) in enumerate(sizes.items())]
+    inertia = [body.mass / 12 * (np.sum(np.square(body.size)) - np.square(body.size)) for body in bodies]
+    for e in (0.0, 0.5, 1.0):
+        away = rng.normal(size=(count, 3))
+        away *= 1.7 / np.linalg.norm(away, axis=1, keepdims=True)
+        quat = _attitudes(rng, count)
+        pos = _rows(np.zeros(3), away)
+        linvel = _rows(rng.uniform(0.5, 2, (count, 1)) * away, 0.3 * rng.normal(size=(count, 3)))
+        scene = physics.Scene(bodies, [], laws(e, 0.5, (0, 0, 0)))
+        world = _side_by_side(on, scene, pos, linvel, quat=quat, angvel=1.5 * rng.normal(size=(count, 2, 3)))
+        before, steps = _momenta(world, bodies, inertia), on.steps(on.pick(2.0, 1.0))
+        world.step(steps=steps)
+        for what, one, other in zip(("linear", "angular"), before, _momenta(world, bodies, inertia)):
+            change = np.abs(one - other).max() / np.abs(one).max()
+            checks.append(Check(f"change of the {what} momentum, e = {e}", float(change), 8 * EPS * steps))
+    return checks
+
+
+def _momenta(world: physics.World, bodies, inertia) -> tuple[np.ndarray, np.ndarray]:
+    """Linear and angular momenta of each world."""
+    p = np.array([body.mass for body in bodies])[:, None] * world.linvel
+    L = np.cross(world.pos, p)
+    for k, moments in enumerate(inertia):
+        R = rotation_matrices(world.quat[:, k])
+        L[:, k] += np.einsum("wij,wj->wi", R, moments * np.einsum("wji,wj->wi", R, world.angvel[:, k]))
+    return p.sum(axis=1), L.sum(axis=1)
+
+
+def far_body(on: Setting) -> Sequence[Check]:
+    """The place of a body that nothing comes near to does not change a bit of what the others do.
+
+    Three blocks topple under a ball while another ball lies at one of five places: the same bits for each.
+    """
+    bodies = [
+        *(physics.Block((0.4, 0.4, 0.4), 1.0, pos=(0.05 * (k % 2), 0.2 + 0.4 * k, 0)) for k in range(3)),
+        *(physics.Sphere(0.2, 1.0, pos=(0.5 + 19 * k, 1.5 - 1.3 * k, 0)) for k in range(2)),
+    ]
+    places = np.array([(-20, 0.2, 0), (30, 0.2, 0), (0, 0.2, 40), (-20, 0.2, 7.3), (5, 0.2, -5000)])
+    scene = physics.Scene(bodies, [FLOOR], laws(0.4, 0.4))
+    pos = _rows(*(body.pos for body in bodies[:4]), places)
+    linvel = _rows((0.1, 0, 0), np.zeros(3), (-0.3, 0, 0.2), (-0.5, 0, 0), np.zeros((len(places), 3)))
+    world = _side_by_side(on, scene, pos, linvel)
+    world.step(steps=on.steps(on.pick(1.5, 0.6)))
+    parts = [np.asarray(part)[:, :4] for part in (world.pos, world.quat, world.linvel, world.angvel)]
+    return [none_of("numbers with other bits", sum(int(np.count_nonzero(part != part[:1])) for part in parts))]
+
+
+CASES = (
+    Case(
+        56, "bounce-in-company", "balls hit on a table, and on a block", "speeds apart are e times those before",
+        bounce_in_company,
+    ),
+    Case(57, "passing", "bodies fly past each other at a clearance", "velocities as if alone, no impact", passing),
+    Case(58, "sliding-past", "a block slides past a heavy one", "v = v₀ - μ g t, as if alone", sliding_past),
+    Case(
+        59, "seams", "a block and a ball cross level slabs", "as over one slab, within 1e-4 m", seams,
+        faults={"fast": "slabs sink into the floor by some slops each, at 1e-3 of their weight: edges stand out"},
+    ),
+    Case(60, "closed-pairs", "hits in space, e from 0 to 1", "both momenta kept to rounding", closed_pairs),
+    Case(61, "far-body", "a body far off lies elsewhere", "the same bits of all others", far_body),
+)  # fmt: skip
