@@ -108,8 +108,8 @@ class LiveEnv(WorldSubject):
 
     def restart(self, seed: int) -> None:
         put_chain(self._env, self._first.chain, is_other=True)
-        self.seed, self._generator = seed, np.random.default_rng(seed)
         self._observation, _ = self._env.reset(seed=seed)
+        self.seed, self._generator = seed, np.random.default_rng(seed)
         self._is_ended, self._episode, self._shift = False, (0, 0.0), 0.0
         self.listener.begin()
         self.listener.pairs, self.listener.is_changed = set(), False
