@@ -32,6 +32,7 @@ from physics.world.batch import Batch
 from physics.world.contact_report import contact_ends, contact_forces
 from physics.world.report import StepReport
 from physics.world.rollback import Before
+from physics.world.scene_settings import scene_settings
 from physics.world.snapshot import Snapshot
 from physics.world.stepper import kernel_calls, retime
 
@@ -87,6 +88,7 @@ class World(Batch):
         self.accuracy = resolve(accuracy)
         self.threads = validation.count(threads, "threads")
         self.plan = make_plan(scene, self.accuracy)
+        self.scene_settings = scene_settings(scene)
         self.body_count = len(scene.bodies)
         self.names = body_names(scene)
         self.time = 0.0

@@ -224,7 +224,7 @@ def _disturbances(task: Task) -> tuple[Section, ...]:
         rows.append(
             (type(kind).__name__, body_label(kind.body, task.world.names), size, kind.axes, f"{kind.every:g} s")
         )
-    text = "Pushes and gusts come at random times, exponentially distributed."
+    text = "They begin and end with control steps: in each quiet one with the same probability, and past any actuator."
     columns = ("Kind", "Body", "Size", "Axes", "Mean wait")
     return (Section("Disturbances", (text,), columns, tuple(rows)),) if rows else ()
 

@@ -312,8 +312,8 @@ def test_a_file_without_settings_is_refused(tmp_path):
     with np.load(path) as file:
         parts = dict(file)
     head = json.loads(str(parts["head"]))
-    lacking = "has format 1, which does not hold settings of the task; allowed is format 2"
-    for number, words in ((1, lacking), (3, "has format 3; allowed is format 2")):
+    lacking = "has format 1, which does not hold all settings of the task; allowed is format 3"
+    for number, words in ((1, lacking), (4, "has format 4; allowed is format 3")):
         np.savez(path, **{**parts, "head": json.dumps({**head, "format": number})})
         with pytest.raises(ValueError, match=words):
             TaskState.load(path)
