@@ -44,7 +44,7 @@ def _effect(effect) -> str:
     if isinstance(effect, NUMBERS_IN_PLAN):
         return repr(effect)
     if isinstance(effect, Contact):
-        return f"Contact({', '.join(_switches(effect))})"
+        return " with ".join(["Contact", *_switches(effect)])
     if isinstance(effect, Friction) and effect.axis is not None:
         return f"Friction(axis={effect.axis})"
     return effect.kind.__name__.lstrip("_") if isinstance(effect, Field) else type(effect).__name__
@@ -53,4 +53,4 @@ def _effect(effect) -> str:
 def _switches(contact: Contact) -> list[str]:
     """Properties that a contact has, apart from their numbers."""
     named = [name for name in ("restitution", "tangential", "stiffness") if getattr(contact, name) is not None]
-    return named + ["walls only"] * (not contact.between_bodies)
+    return named + ["walls alone"] * (not contact.between_bodies)

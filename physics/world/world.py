@@ -293,7 +293,8 @@ class World(Batch):
         ----------
         mass, friction, restitution : (), (k,) or (k, bodies) array_like, optional
             [kg], coefficients. One axis is that of worlds wherever its length is k; (bodies,) of another length is for
-            all worlds alike. Of a `Friction` with two coefficients the first; the second changes with it.
+            all worlds alike. Of a `Friction` with two coefficients the first; the second changes with it. Two bodies
+            that touch have the geometric mean of their frictions and the larger restitution; a wall has the body's.
         size : (3,), (k, 3) or (k, bodies, 3) array_like, optional
             Full edges of a block, twice the semi-axes of an ellipsoid, three equal diameters of a sphere [m]; a hull
             cannot change its size: twice its `dimensions`.

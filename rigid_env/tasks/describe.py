@@ -57,6 +57,9 @@ PARAMETERS = {
 }
 """Meanings of draws that are physical parameters."""
 
+REACH = "longest half extent, of a hull the farthest along a body axis from the centre of mass"
+"""Meaning of the unit of torques over the weight."""
+
 
 @dataclass(frozen=True)
 class Section:
@@ -164,7 +167,7 @@ def _actions(task: Task) -> Section:
             rows.append((str(len(rows)), name + where, "-1", "1", vector.unit, *agent))
     kinds = {vector.kind for vector in task.action_vectors}
     notes = ["m is the mass of the body, g gravity (9.81 m/s² where there is none)"]
-    notes += ["a the longest half extent of the body"] if TORQUE in kinds else []
+    notes += [f"a the reach of the body ({REACH})"] if TORQUE in kinds else []
     text = (
         f"{', '.join(notes)}. Each number is clipped to ±1, then a vector is shortened to length 1 where it is longer."
     )

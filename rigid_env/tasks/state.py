@@ -135,7 +135,10 @@ def _are_names(value: Any) -> bool:
 
 
 def _are_seeds(value: Any, count: int) -> bool:
-    return isinstance(value, list) and len(value) == count and all(each is None or is_count(each) for each in value)
+    """Answer whether these are seeds: -1 or None before the first reset."""
+    return (
+        isinstance(value, list) and len(value) == count and all(each in (None, -1) or is_count(each) for each in value)
+    )
 
 
 def _are_generators(value: Any, count: int) -> bool:

@@ -203,7 +203,10 @@ def everything(envs) -> tuple:
         (lambda envs, s: envs.set_state(None), ("state", "None", "get_state")),
         (lambda envs, s: envs.set_state(s["reorient"]), ("BlockReorient", "states of BlockReach")),
         (lambda envs, s: envs.set_state(s["pixels"]), ("pictures", "same settings")),
-        (lambda envs, s: envs.set_state(s["actuated"]), ("effects", "lag=0.1", "Contact, Friction, Gravity")),
+        (
+            lambda envs, s: envs.set_state(s["actuated"]),
+            ("effects", "lag=0.1", "Contact with restitution, Friction, Gravity"),
+        ),
         (lambda envs, s: envs.set_state(s["three"]), ("3", "2 worlds")),
         (lambda envs, s: envs.set_state(s["own"], worlds=[2]), ("worlds", "2", "0 to 1")),
         (lambda envs, s: envs.set_state(s["own"], source=[0, 5]), ("source", "5", "0 to 1")),
