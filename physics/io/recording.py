@@ -151,15 +151,16 @@ class Recording:
         }  # fmt: skip
         columns = zip(*(start.snapshot.arrays for start in self.starts))
         with open(path, "wb") as file:
-            starts: Any = {f"start_{name}": np.array(column) for name, column in zip(KEPT, columns)}
+            more: Any = {f"start_{name}": np.array(column) for name, column in zip(KEPT, columns)}
+            if self.past is not None:
+                more["past"] = self.past
             np.savez_compressed(
                 file,
                 head=json.dumps(head),
                 wrenches=self.wrenches, steps=self.steps, dt=self.dt, states=self.states,
                 start_steps=[start.step for start in self.starts],
                 start_times=[start.snapshot.time for start in self.starts],
-                **starts,
-                **({} if self.past is None else {"past": self.past}),
+                **more,
             )  # fmt: skip
         return Path(path)
 

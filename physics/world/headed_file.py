@@ -16,7 +16,7 @@ from physics.summary import shown
 T = TypeVar("T")
 
 
-def head_value(head: Any, name: str, is_right: Callable[[Any], bool], allowed: str) -> Any:
+def head_value(head: Any, name: str, is_right: Callable[[Any], object], allowed: str) -> Any:
     """Value of a name in a head.
 
     Parameters
@@ -39,7 +39,7 @@ def head_value(head: Any, name: str, is_right: Callable[[Any], bool], allowed: s
     try:
         if is_right(value):
             return value
-    except Exception:  # of a value that is quite another thing
+    except Exception:  # of a value of another type
         pass
     raise ValueError(f"{name} of its head is {shown(value)}; allowed is {allowed}")
 

@@ -144,7 +144,8 @@ def _are_seeds(value: Any, count: int) -> bool:
 def _are_generators(value: Any, count: int) -> bool:
     for state in value:
         if state is not None:
-            np.random.PCG64().state = _of_json(state)
+            bits: Any = np.random.PCG64()
+            bits.state = _of_json(state)
     return isinstance(value, list) and len(value) == count
 
 

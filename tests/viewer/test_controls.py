@@ -33,7 +33,7 @@ def test_a_kick_gives_its_impulse(what):
 
 
 def test_no_actuator_stands_between_the_hand_and_a_body(tmp_path):
-    """Of a scene, of an environment, with a ghost and in a replay; 9 N s in a step of 0.01 s are 900 N."""
+    """Hold for a scene and an environment, with a ghost and on the way back; 9 N s in a step of 0.01 s are 900 N."""
     weak = physics.Actuator(limit_force=1.0)
     ball = physics.Scene([physics.Sphere(0.5, scenes.MASS)], effects=[physics.Gravity((0, 0, 0)), weak])
     still = {"policy": lambda observations: np.zeros((1, 6))}
