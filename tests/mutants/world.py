@@ -98,8 +98,8 @@ IO = [
         "io-wrench",
         "A recorder keeps the array of wrenches itself instead of a copy.",
         "io/recorder.py",
-        "chapter.loads.append((wrench.copy(), steps, dt))",
-        "chapter.loads.append((wrench, steps, dt))",
+        "_Load(wrench.copy(), None",
+        "_Load(wrench, None",
         "test_recorder.py::test_a_fault_is_written_once_and_says_why",
     ),
     _mutant(
