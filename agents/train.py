@@ -20,7 +20,7 @@ from typing import Annotated, Any
 import torch
 import typer
 from rich.console import Console
-from stable_baselines3.common.logger import configure
+from stable_baselines3.common.logger import Logger, configure
 
 from agents.algorithms import make_model, make_training_env
 from agents.checkpoint import greedy, list_checkpoints, load_checkpoint
@@ -84,8 +84,7 @@ def train(
         model, history = make_model(config, make_training_env(config)), History()
     run.path.mkdir(parents=True, exist_ok=True)
     config.write(run.config)
-    if with_tensorboard:
-        model.set_logger(configure(str(run.path / "tensorboard"), ["tensorboard"]))
+    model.set_logger(_logger(run, with_tensorboard))
 
     first_step, first_second = model.num_timesteps, history.seconds
     with ProgressDisplay(console, config.max_steps) as display:
@@ -114,6 +113,11 @@ def train(
         "training_return_mean": last.mean_return,
         "policy": greedy(model),
     }
+
+
+def _logger(run: RunFolder, with_tensorboard: bool) -> Logger:
+    """Logger of Stable-Baselines3; its own default leaves an empty folder in that of temporary files."""
+    return configure(str(run.path / "tensorboard"), ["tensorboard"]) if with_tensorboard else Logger(None, [])
 
 
 def interruption_message(run: RunFolder, step: int) -> str:

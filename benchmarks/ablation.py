@@ -28,6 +28,7 @@ from benchmarks import machine
 from benchmarks.compile import first_step
 from physics.kernels.compile.fused.ablation import BASES, OPTIMISATIONS, VARIABLE
 from rigid_env.lab.measure.machine import write_json
+from rigid_env.lab.measure.processes import PATIENCE
 from rigid_env.terminal import Column, Table, make_console, number_columns
 
 SCENE, ACCURACY = "drop", "balanced"
@@ -69,7 +70,7 @@ def steps_per_second(kernels: Path) -> dict[str, float]:
     """Speeds of the workloads in a new process that keeps its kernels in the folder `kernels`."""
     path = os.pathsep.join([str(Path(__file__).parents[1]), *filter(None, [os.environ.get("PYTHONPATH")])])
     done = subprocess.run(
-        [sys.executable, "-c", SPEEDS, ACCURACY, str(RUNS)], check=True, stdout=subprocess.PIPE,
+        [sys.executable, "-c", SPEEDS, ACCURACY, str(RUNS)], check=True, timeout=PATIENCE, stdout=subprocess.PIPE,
         stderr=subprocess.DEVNULL, text=True, env={**os.environ, "PYTHONPATH": path, "NUMBA_CACHE_DIR": str(kernels)},
     )  # fmt: skip
     return json_module.loads(done.stdout)

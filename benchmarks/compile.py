@@ -21,6 +21,7 @@ import typer
 
 import physics
 from benchmarks import machine
+from rigid_env.lab.measure.processes import PATIENCE
 from rigid_env.terminal import Column, Table, make_console, number_columns
 
 PROGRAM = """
@@ -62,8 +63,9 @@ def first_step(scene: str, accuracy: str, kernels: Path, *, is_other: bool = Fal
     root = str(Path(physics.__file__).parents[1])
     path = os.pathsep.join([root, *filter(None, [os.environ.get("PYTHONPATH")])])
     done = subprocess.run(
-        [sys.executable, "-c", PROGRAM, scene, accuracy, str(is_other)], check=True, stdout=subprocess.PIPE,
-        stderr=subprocess.DEVNULL, text=True, env={**os.environ, "PYTHONPATH": path, "NUMBA_CACHE_DIR": str(kernels)},
+        [sys.executable, "-c", PROGRAM, scene, accuracy, str(is_other)], check=True, timeout=PATIENCE,
+        stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True,
+        env={**os.environ, "PYTHONPATH": path, "NUMBA_CACHE_DIR": str(kernels)},
     )  # fmt: skip
     return FirstStep(**json.loads(done.stdout))
 

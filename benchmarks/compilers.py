@@ -24,6 +24,7 @@ import physics
 from benchmarks import machine
 from physics.kernels.compile.compiler_choice import COMPILERS, FUSED, NUMBA, PYTHON, VARIABLE
 from rigid_env.lab.measure.machine import write_json
+from rigid_env.lab.measure.processes import PATIENCE
 from rigid_env.terminal import Column, Table, make_console, number_columns
 
 WORK = ("flight", "rest", "shoved", "stack")
@@ -63,7 +64,7 @@ def _run(program: str, compiler: str, kernels: Path, *arguments: str) -> dict:
     environment = {**os.environ, "PYTHONPATH": path, "NUMBA_CACHE_DIR": str(kernels), VARIABLE: compiler}
     done = subprocess.run(
         [sys.executable, "-c", program, *arguments],
-        check=True, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True, env=environment,
+        check=True, timeout=PATIENCE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True, env=environment,
     )  # fmt: skip
     return json_module.loads(done.stdout.splitlines()[-1])
 

@@ -57,14 +57,13 @@ def main(
     json: Annotated[Path | None, typer.Option(help="Where to write the result.")] = None,
 ) -> None:
     """Print the median ratio of each scene; keep all samples."""
-    here, there = (Checkout(folder, worker=WORKER) for folder in (Path(__file__).parents[1], other.resolve()))
     found = {}
-    for name in scene or (*SCENES, ENVIRONMENT):
-        found[name] = compare(here, there, name, turns)
-        low, high = min(found[name]), max(found[name])
-        typer.echo(f"{name:16} {statistics.median(found[name]):6.3f}   {low:.3f} to {high:.3f}")
-    here.close()
-    there.close()
+    mine = Path(__file__).parents[1]
+    with Checkout(mine, worker=WORKER) as here, Checkout(other.resolve(), worker=WORKER) as there:
+        for name in scene or (*SCENES, ENVIRONMENT):
+            found[name] = compare(here, there, name, turns)
+            low, high = min(found[name]), max(found[name])
+            typer.echo(f"{name:16} {statistics.median(found[name]):6.3f}   {low:.3f} to {high:.3f}")
     if json is not None:
         write_json(json, {"name": "in_turns", "machine": machine.headline(), "ratios": found})
 

@@ -18,6 +18,7 @@ from physics.kernels.state import layout as at
 from physics.rotations import rotation_matrices
 from physics.world.snapshot import KEPT
 from rigid_env.lab.measure.mujoco_scene import model_xml
+from rigid_env.lab.measure.processes import PATIENCE, killed_after, wait_for_end
 from rigid_env.lab.measure.timing import Stopwatch
 from rigid_env.tasks import kernels
 from rigid_env.tasks import layout as col
@@ -128,19 +129,22 @@ class Worker:
         return float(numbers[0]), numbers[1:]
 
     def _ask(self, request: bytes, size: int | None) -> bytes:
-        """Answer of this size, or a line."""
-        try:
-            self._process.stdin.write(request)
-            self._process.stdin.flush()
-        except BrokenPipeError:
-            return b""
-        return self._process.stdout.readline() if size is None else self._process.stdout.read(size)
+        """Answer of this size, or a line; empty where the worker ends, or is killed after `PATIENCE`."""
+        with killed_after(self._process, PATIENCE):
+            try:
+                self._process.stdin.write(request)
+                self._process.stdin.flush()
+            except BrokenPipeError:
+                return b""
+            return self._process.stdout.readline() if size is None else self._process.stdout.read(size)
 
     def close(self) -> None:
         """End the process."""
         if self._process is not None:
-            with contextlib.suppress(BrokenPipeError), self._process:  # closes its pipes: no more requests, so it ends
-                pass
+            with contextlib.suppress(BrokenPipeError):
+                self._process.stdin.close()  # no more requests, so it ends
+            wait_for_end(self._process)
+            self._process.stdout.close()
         self._folder.cleanup()
 
     def __enter__(self):

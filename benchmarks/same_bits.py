@@ -9,6 +9,7 @@ one, on this machine. A checkout of an older commit is made with ``git worktree 
 
 from __future__ import annotations
 
+import contextlib
 import json
 import os
 import subprocess
@@ -24,12 +25,18 @@ from benchmarks import machine
 from benchmarks.bit_scenes import PRESETS, SCENES, STEPS
 from physics.kernels.compile.compiler_choice import COMPILERS, VARIABLE
 from rigid_env.lab.measure.machine import write_json
+from rigid_env.lab.measure.processes import ENDING, PATIENCE, killed_after, wait_for_end
 
 WORKER = Path(__file__).with_name("bit_scenes.py")
 
 
 class Checkout:
-    """A process that runs a worker over one checkout, with a compiler of kernels (None: the default)."""
+    """A process that runs a worker over one checkout, with a compiler of kernels (None: the default).
+
+    It is killed where an answer takes longer than `patience` [s], or its end longer than `ending` [s].
+    """
+
+    patience, ending = PATIENCE, ENDING
 
     def __init__(self, folder: Path, compiler: str | None = None, worker: Path = WORKER):
         environment = {**os.environ, "PYTHONPATH": str(folder)}
@@ -47,15 +54,25 @@ class Checkout:
 
     def answer(self):
         """Wait for the result of the worker."""
-        line = self._process.stdout.readline()
+        with killed_after(self._process, self.patience):
+            line = self._process.stdout.readline()
         if not line:
-            raise RuntimeError(f"the process over this checkout ended with {self._process.wait()}")
+            status = wait_for_end(self._process, self.ending)
+            raise RuntimeError(f"the process over this checkout ended with {status}")
         return json.loads(line)
 
     def close(self) -> None:
         """End the process."""
-        self._process.stdin.close()
-        self._process.wait()
+        with contextlib.suppress(BrokenPipeError):
+            self._process.stdin.close()
+        wait_for_end(self._process, self.ending)
+        self._process.stdout.close()
+
+    def __enter__(self) -> Checkout:
+        return self
+
+    def __exit__(self, *_) -> None:
+        self.close()
 
 
 def verdict(ours: dict, theirs: dict) -> str:
@@ -81,14 +98,12 @@ def main(
         if each not in (None, *COMPILERS):
             raise typer.BadParameter(f"{each} is no compiler; allowed are {', '.join(COMPILERS)}")
     pairs = [(name, level) for name in scene or SCENES for level in preset or PRESETS]
-    here, there = Checkout(Path(__file__).parents[1], compiler), Checkout(other.resolve(), other_compiler)
     found = {}
-    for name, level in track(pairs, description="scenes"):
-        here.ask(name, level, steps)
-        there.ask(name, level, steps)
-        found[f"{name} {level}"] = verdict(here.answer(), there.answer())
-    here.close()
-    there.close()
+    with Checkout(Path(__file__).parents[1], compiler) as here, Checkout(other.resolve(), other_compiler) as there:
+        for name, level in track(pairs, description="scenes"):
+            here.ask(name, level, steps)
+            there.ask(name, level, steps)
+            found[f"{name} {level}"] = verdict(here.answer(), there.answer())
     different = {run: how for run, how in found.items() if how != "same"}
     for run, how in different.items():
         typer.echo(f"{run}: {how}")

@@ -10,6 +10,7 @@ import time
 from pathlib import Path
 
 import physics
+from rigid_env.lab.measure.processes import PATIENCE
 from rigid_env.lab.measure.timing import Row, Spread
 
 LIMIT = 1.5  # [s]
@@ -45,5 +46,5 @@ def _seconds(code: str) -> float:
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join(paths)}
     with tempfile.TemporaryDirectory() as folder:
         start = time.perf_counter()
-        subprocess.run([sys.executable, "-c", code], check=True, cwd=folder, env=environment)
+        subprocess.run([sys.executable, "-c", code], check=True, timeout=PATIENCE, cwd=folder, env=environment)
         return time.perf_counter() - start

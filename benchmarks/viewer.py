@@ -13,11 +13,11 @@ pictures a second of the same motions, of which nothing rests.
 from __future__ import annotations
 
 import multiprocessing
-import signal
 import subprocess
 import sys
 import time
 from collections.abc import Iterator
+from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
 from typing import Annotated
@@ -26,6 +26,7 @@ import numpy as np
 import typer
 
 from benchmarks import machine
+from rigid_env.lab.measure.processes import killed_after, wait_for_end
 from rigid_env.lab.measure.table import make_table
 from rigid_env.lab.measure.timing import Row, Spread
 from rigid_env.rendering import BodyView, Frame, WallView
@@ -46,7 +47,7 @@ FPS, DURATION = 30.0, 10.0
 FIRST = 5.0  # time to the first picture at most [s]
 BLOCK_COLOUR, BLOCK_SHARE = (45, 95, 170), 0.002  # of the drop's block, and the share of pixels that have it
 NODE = "/scene/bodies/0.0"
-PATIENCE = 30.0  # for the reader to be there, and to end [s]
+PATIENCE = 60.0  # for the reader or the viewer to be there, and to end [s]
 
 
 def motion(count: int, duration: float) -> Iterator[Look]:
@@ -104,15 +105,18 @@ def run(count: int, seconds: float) -> dict:
         address = f"ws://127.0.0.1:{server.get_port()}"
         reader = context.Process(target=read, args=(address, viser.__version__, there), daemon=True)
         reader.start()
-        _answer(here)
-        start, shown = time.perf_counter(), 0
-        while (now := time.perf_counter()) < start + seconds:
-            shown += 1
-            stage.show(looks[shown % len(looks)])
-            time.sleep(0.0)
-        here.send("stop")
-        pictures, size = _answer(here)
-        reader.join(PATIENCE)
+        try:
+            _answer(here)
+            start, shown = time.perf_counter(), 0
+            while (now := time.perf_counter()) < start + seconds:
+                shown += 1
+                stage.show(looks[shown % len(looks)])
+                time.sleep(0.0)
+            here.send("stop")
+            pictures, size = _answer(here)
+            reader.join(PATIENCE)
+        finally:
+            reader.kill()  # where it has not ended
     return {"arrived": pictures / (now - start), "shown": shown / (now - start), "bytes": size / max(pictures, 1)}
 
 
@@ -136,14 +140,30 @@ def measure_pictures(count: int, is_quick: bool) -> Row:
 def time_to_picture(page, command: list[str]) -> float:
     """Time from the start of a command to the block in a page of a browser [s]."""
     watched, start = Watched(page), time.perf_counter()
-    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as viewer:
+    with running(command) as viewer:
+        watched.open(address_told(viewer))
+        watched.wait_for(lambda picture: share_of(picture, BLOCK_COLOUR) > BLOCK_SHARE)
+        return time.perf_counter() - start
+
+
+@contextmanager
+def running(command: list[str], patience: float = PATIENCE) -> Iterator[subprocess.Popen]:
+    """Run a command beside the block. It is told to end by SIGTERM, and killed `patience` [s] later."""
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
         try:
-            line = viewer.stdout.readline()
-            watched.open(line.split()[-1])
-            watched.wait_for(lambda picture: share_of(picture, BLOCK_COLOUR) > BLOCK_SHARE)
-            return time.perf_counter() - start
+            yield process
         finally:
-            viewer.send_signal(signal.SIGINT)
+            process.terminate()
+            wait_for_end(process, patience)
+
+
+def address_told(viewer: subprocess.Popen) -> str:
+    """Address in the first line of a viewer; an error where it does not come."""
+    with killed_after(viewer, PATIENCE):
+        line = viewer.stdout.readline()
+    if not line:
+        raise RuntimeError(f"the viewer gave no address within {PATIENCE:g} s")
+    return line.split()[-1]
 
 
 def time_of_empty_page(page) -> float:

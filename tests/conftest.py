@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 
 import numpy as np
@@ -35,6 +36,12 @@ def pytest_configure(config):
 def is_exhaustive(request) -> bool:
     """Answer whether `--exhaustive` is given: a test takes more worlds or steps then."""
     return request.config.getoption("--exhaustive")
+
+
+@pytest.fixture(scope="session", autouse=True)
+def _logs(tmp_path_factory):
+    """Keep the folders that Stable-Baselines3 makes for its logs where pytest clears up, of programs, too."""
+    os.environ.setdefault("SB3_LOGDIR", str(tmp_path_factory.mktemp("sb3")))
 
 
 @pytest.fixture

@@ -1,6 +1,7 @@
 """Pictures a second, sizes of files, time to the first picture: that they are measured. No test asserts a time."""
 
 import json
+import sys
 
 import pytest
 import typer
@@ -31,3 +32,22 @@ def test_every_body_moves_and_turns_in_every_look():
     for one, other in zip(before.frame.bodies, after.frame.bodies):
         assert (one.pos != other.pos).all()
         assert (one.quat != other.quat).any()
+
+
+STUBBORN = """
+import signal, time
+for each in (signal.SIGINT, signal.SIGTERM):
+    signal.signal(each, signal.SIG_IGN)
+time.sleep(600.0)
+"""
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="signals")
+def test_a_viewer_that_does_not_answer_or_end_is_killed(monkeypatch):
+    monkeypatch.setattr(viewer, "PATIENCE", 2.0)
+    with (
+        pytest.raises(RuntimeError, match="the viewer gave no address within 2 s"),
+        viewer.running([sys.executable, "-c", STUBBORN], patience=0.5) as process,
+    ):
+        viewer.address_told(process)
+    assert process.returncode == -9

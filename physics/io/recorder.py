@@ -6,7 +6,7 @@ import os
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -19,13 +19,22 @@ from physics.world.snapshot import Snapshot
 from physics.world.world import World
 
 
+class _Load(NamedTuple):
+    """Arguments of a call, of all worlds."""
+
+    wrench: np.ndarray
+    past: np.ndarray | None  # past the actuator
+    steps: int
+    dt: float
+
+
 @dataclass
 class _Chapter:
     """Consecutive steps of the batch from one complete snapshot on."""
 
     # (step, worlds, rows of each kept array for each of these worlds, time)
     starts: list[tuple[int, np.ndarray, list[np.ndarray], float]] = field(default_factory=list)
-    loads: list[tuple[np.ndarray, int, float]] = field(default_factory=list)  # wrench, steps, dt
+    loads: list[_Load] = field(default_factory=list)
     states: list[np.ndarray] = field(default_factory=list)
 
 
@@ -120,7 +129,8 @@ class Recorder:
             rows = [_rows(array, world.worlds, chosen) for array in world.kept()]
             chapter.starts.append((len(chapter.loads), chosen, rows, world.time))
             self._changed[:] = False
-        chapter.loads.append((wrench.copy(), steps, dt))
+        past = None if self.world.actuation is None else self.world.actuation.past
+        chapter.loads.append(_Load(wrench.copy(), None if past is None else past.copy(), steps, dt))
 
     def after(self) -> None:
         """The step has been taken."""
@@ -156,27 +166,36 @@ class Recorder:
         worlds, bodies = self.world.worlds, self.world.body_count
         validation.index(world, worlds, "world")
         starts: list[Any] = []
-        loads: list[Any] = []
+        loads: list[_Load] = []
         states: list[Any] = []
         for chapter in self._chapters:
             first, count = len(loads), len(chapter.states)  # an interrupted step has a load, but no state
-            starts += _starts_of(chapter, world, first, count)
+            starts += _starts_of(chapter, world, first, count, self.world.scene_settings)
             loads += chapter.loads[:count]
             states += [state[world * bodies : (world + 1) * bodies] for state in chapter.states]
         if not starts:
             arrays = [_rows(array, worlds, np.array([world]))[0] for array in self.world.kept()]
-            starts = [Start(0, Snapshot(tuple(arrays), self.world.time))]
+            starts = [Start(0, Snapshot(tuple(arrays), self.world.time, scene=self.world.scene_settings))]
         return Recording(
             scene=self.world.scene,
             accuracy=self.world.accuracy,
             starts=tuple(starts),
-            wrenches=np.array([wrench[world] for wrench, _, _ in loads]).reshape(-1, bodies, 6),
-            steps=np.array([steps for _, steps, _ in loads], dtype=np.int64),
-            dt=np.array([dt for _, _, dt in loads], dtype=np.float64),
+            wrenches=np.array([load.wrench[world] for load in loads]).reshape(-1, bodies, 6),
+            steps=np.array([load.steps for load in loads], dtype=np.int64),
+            dt=np.array([load.dt for load in loads], dtype=np.float64),
             states=np.array(states).reshape(-1, bodies, self.world.state.shape[1]),
             reason=reason,
             origin=origin(),
+            past=_past(loads, world, bodies),
         )
+
+
+def _past(loads: Sequence[_Load], world: int, bodies: int) -> np.ndarray | None:
+    """(n, bodies, 6) loads of one world past its actuator; None where there are none."""
+    if all(load.past is None for load in loads):
+        return None
+    nothing = np.zeros((bodies, 6))
+    return np.array([nothing if load.past is None else load.past[world] for load in loads])
 
 
 def _rows(array: np.ndarray, worlds: int, chosen: np.ndarray) -> np.ndarray:
@@ -186,13 +205,14 @@ def _rows(array: np.ndarray, worlds: int, chosen: np.ndarray) -> np.ndarray:
     return array.reshape(worlds, len(array) // worlds, *array.shape[1:])[chosen]
 
 
-def _starts_of(chapter: _Chapter, world: int, first: int, count: int) -> list[Start]:
+def _starts_of(chapter: _Chapter, world: int, first: int, count: int, scene: dict[str, str]) -> list[Start]:
     """Find the starts of one world in a chapter whose first step is number `first` of the recording."""
     found = []
     for step, worlds, rows, time in chapter.starts:
         place = np.flatnonzero(worlds == world)
         if len(place) and step < count:
-            found.append(Start(first + step, Snapshot(tuple(part[place[0]] for part in rows), time)))
+            arrays = tuple(part[place[0]] for part in rows)
+            found.append(Start(first + step, Snapshot(arrays, time, scene=scene)))
     return found
 
 

@@ -9,11 +9,12 @@ from __future__ import annotations
 import json
 import platform
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from contextlib import AbstractContextManager, nullcontext
+from dataclasses import asdict, dataclass, replace
 from importlib import metadata
 from pathlib import Path
 from typing import Any
-from zipfile import BadZipFile, is_zipfile
+from zipfile import is_zipfile
 
 import numpy as np
 
@@ -29,13 +30,16 @@ from physics.scene.force_field import Field
 from physics.scene.scene import Scene
 from physics.summary import parts_repr
 from physics.version import version
+from physics.world.headed_file import head_value, is_count, is_text
 from physics.world.report import StepReport
+from physics.world.scene_settings import scene_settings
 from physics.world.snapshot import KEPT, Snapshot
 from physics.world.stepper import Stepper
 from physics.world.world import World
 
-# Number of the format; a reader refuses what is newer than itself.
-FORMAT = 1
+# Number of the format; a reader refuses what is newer than itself. Format 2 has loads past an actuator.
+FORMAT = 2
+ALLOWED = "allowed is what physics.Recorder writes (.npz)"
 
 # Difference allowed in a replay by a compiler that rounds differently. Before the first contact changes it is rounding;
 # from then on a solver's tolerance decides, 2e-7 for a block dropped at `balanced`. Chaotic motion exceeds any number.
@@ -80,6 +84,8 @@ class Recording:
         Why it was kept.
     origin : dict of str to str
         What it was made with: version, kernels, compiler, numba, numpy, python, machine.
+    past : (n, bodies, 6) float64 or None
+        Force [N] and torque [N m] of each call that went past the actuator, as gusts of an environment do; None: none.
     """
 
     scene: Scene
@@ -91,6 +97,7 @@ class Recording:
     states: np.ndarray
     reason: str
     origin: dict
+    past: np.ndarray | None = None
 
     __repr__ = parts_repr
     _repr_html_ = parts_table
@@ -123,28 +130,37 @@ class Recording:
                 steppers[steps, dt] = Stepper(world, steps, dt)
             stepper = steppers[steps, dt]
             stepper.wrench[0] = wrench  # as it was: `World.step` would refuse one that is not finite
-            stepper()
+            with self.past_actuator(world, k):
+                stepper()
             states.append(world.state.copy())
             reports.append(world.report)
             energies.append(float(diagnose(world).energy.sum()))
         return Replay(self, np.array(states).reshape(self.states.shape), tuple(reports), np.array(energies))
 
+    def past_actuator(self, world: World, k: int) -> AbstractContextManager[None]:
+        """Let the load of call `k` that went past the actuator act in a world during a block."""
+        if self.past is None or world.actuation is None:
+            return nullcontext()
+        return world.actuation.passed_by(self.past[k : k + 1])
+
     def save(self, path: str | Path) -> Path:
         """Write it as ``.npz`` (`load` reads it); returns the path."""
         head = {
-            "format": FORMAT, "scene": to_toml(self.scene), "accuracy": asdict(self.accuracy), "reason": self.reason,
-            "origin": self.origin,
+            "format": 1 if self.past is None else FORMAT, "scene": to_toml(self.scene),
+            "accuracy": asdict(self.accuracy), "reason": self.reason, "origin": self.origin,
         }  # fmt: skip
         columns = zip(*(start.snapshot.arrays for start in self.starts))
         with open(path, "wb") as file:
-            starts: Any = {f"start_{name}": np.array(column) for name, column in zip(KEPT, columns)}
+            more: Any = {f"start_{name}": np.array(column) for name, column in zip(KEPT, columns)}
+            if self.past is not None:
+                more["past"] = self.past
             np.savez_compressed(
                 file,
                 head=json.dumps(head),
                 wrenches=self.wrenches, steps=self.steps, dt=self.dt, states=self.states,
                 start_steps=[start.step for start in self.starts],
                 start_times=[start.snapshot.time for start in self.starts],
-                **starts,
+                **more,
             )  # fmt: skip
         return Path(path)
 
@@ -167,27 +183,44 @@ class Recording:
         """
         validation.path(path)
         if not is_zipfile(path) and Path(path).is_file():
-            raise ValueError(f"{path} is no recording; allowed is what physics.Recorder writes (.npz)")
+            raise ValueError(f"{path} is no recording; {ALLOWED}")
         try:
             with np.load(path, allow_pickle=False) as file:
                 content = dict(file)
             head = json.loads(str(content["head"]))
-            content["start_report_table"] = _widened(content["start_report_table"])
-            columns = [content[f"start_{name}"] for name in KEPT if name != "sleep" or "start_sleep" in content]
-        except (KeyError, ValueError, TypeError, EOFError, BadZipFile) as error:
-            raise ValueError(f"{path} is no recording ({error}); allowed is what physics.Recorder writes") from None
-        if head["format"] > FORMAT:
-            raise ValueError(f"{path} has format {head['format']}; allowed are formats up to {FORMAT}")
-        compiler = head["origin"].setdefault("compiler", FUSED)  # there was no other
-        starts = zip(content["start_steps"].tolist(), content["start_times"].tolist(), zip(*columns))
-        return cls(
-            scene=from_toml(head["scene"], str(path), kinds),
-            accuracy=Accuracy(**head["accuracy"]),
-            starts=tuple(Start(step, Snapshot(arrays, time, compiler=compiler)) for step, time, arrays in starts),
-            **{name: content[name] for name in ("wrenches", "steps", "dt", "states")},
-            reason=head["reason"],
-            origin=head["origin"],
-        )
+            number = head_value(head, "format", is_count, "the number of a format")
+            found = _from_parts(head, content) if number <= FORMAT else {}
+        except OSError:
+            raise
+        except Exception as error:  # whatever is wrong with it, it is none
+            told = f"there is no {error}" if isinstance(error, KeyError) else error
+            raise ValueError(f"{path} is no recording ({told}); {ALLOWED}") from None
+        if number > FORMAT:
+            raise ValueError(f"{path} has format {number}; allowed are formats up to {FORMAT}")
+        scene = from_toml(head["scene"], str(path), kinds)
+        starts = tuple(Start(step, replace(each, scene=scene_settings(scene))) for step, each in found.pop("starts"))
+        return cls(scene=scene, starts=starts, **found)
+
+
+def _from_parts(head: dict[str, Any], content: dict[str, np.ndarray]) -> dict[str, Any]:
+    """Fields of a recording, apart from its scene, of the head and the arrays of a file."""
+    head_value(head, "scene", is_text, "a scene as TOML")
+    settings = head_value(head, "accuracy", lambda value: Accuracy(**value), "the fields of a physics.Accuracy")
+    about = head_value(head, "origin", _is_table_of_text, "names and texts")
+    about.setdefault("compiler", FUSED)  # there was no other
+    content["start_report_table"] = _widened(content["start_report_table"])
+    columns = [content[f"start_{name}"] for name in KEPT if name != "sleep" or "start_sleep" in content]
+    starts = zip(content["start_steps"].tolist(), content["start_times"].tolist(), zip(*columns))
+    return {
+        "accuracy": Accuracy(**settings),
+        "starts": [(step, Snapshot(arrays, time, compiler=about["compiler"])) for step, time, arrays in starts],
+        **{name: content[name] for name in ("wrenches", "steps", "dt", "states")},
+        "reason": head_value(head, "reason", is_text, "a text"), "origin": about, "past": content.get("past"),
+    }  # fmt: skip
+
+
+def _is_table_of_text(value: Any) -> bool:
+    return isinstance(value, dict) and all(map(is_text, value.values()))
 
 
 def _widened(table: np.ndarray) -> np.ndarray:

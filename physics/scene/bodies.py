@@ -58,6 +58,10 @@ else:
 class Body(_Shape):
     """Base of all bodies; use `Block`, `Sphere`, `Ellipsoid` or `Hull`.
 
+    Friction and restitution are those of the scene's `Friction` and `Contact`, or of `World.set_parameters` for each
+    body. Two bodies that touch have the geometric mean of their frictions and the larger restitution; a wall has the
+    body's.
+
     Parameters
     ----------
     pos, quat, linvel, angvel : array_like

@@ -54,7 +54,8 @@ class Contact(Effect):
     ----------
     restitution : float, optional
         Newton's coefficient e in [0, 1]: the normal velocity after an impact is -e times that before. None:
-        impacts are plastic and the kernel holds no restitution.
+        impacts are plastic and the kernel holds no restitution. Where bodies have coefficients of their own
+        (`World.set_parameters`), two that meet have the larger one, and a wall has the body's.
     between_bodies : bool, optional
         False: bodies meet walls only, and pass through each other.
     tangential : float, optional
@@ -113,9 +114,11 @@ class Friction(Effect):
     Parameters
     ----------
     coefficient : float or (2,) array_like
-        μ, the same for sticking and sliding; at least 0. Two, greater than 0: μ1 along `axis` and μ2 across it, of
-        walls with a grain. Their tangential forces fill the ellipse (f1/μ1)² + (f2/μ2)² <= f_n², and what slides is
-        opposed by the one that dissipates most (Goyal, Ruina and Papadopoulos 1991).
+        μ, the same for sticking and sliding; at least 0. Where bodies have coefficients of their own
+        (`World.set_parameters`), two that touch have the geometric mean, and a wall has the body's. Two coefficients,
+        greater than 0: μ1 along `axis` and μ2 across it, of walls with a grain. Their tangential forces fill the
+        ellipse (f1/μ1)² + (f2/μ2)² <= f_n², and what slides is opposed by the one that dissipates most (Goyal, Ruina
+        and Papadopoulos 1991).
     axis : (3,) or (walls, 3) array_like, optional
         Direction of μ1, world frame, for all walls or one for each; its part along the wall counts. Needed with two
         coefficients, and only then.

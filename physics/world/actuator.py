@@ -7,11 +7,16 @@ given; each tread is clipped. Behind it stands the lag τ w' = c - w, which over
 
 both exact. The kernel holds over a step the mean of w over it: momentum at the end of every step is exact, place and
 attitude are of second order in the step, as with anything that is held.
+
+A command is known by its age. Times since the start of a batch would round otherwise in a batch whose worlds begin at
+other times. Loads that are no commands, such as a gust, go past the actuator: `Actuation.passed_by`.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
+from contextlib import contextmanager
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
@@ -44,6 +49,8 @@ class Actuation:
         What acts in the next step: force [N], torque [N m], world frame; renewed in place.
     output : (worlds * bodies, 6) float64
         Wrench that the lag has reached.
+    past : (worlds, bodies, 6) float64 or None
+        Loads that go past the actuator in the next steps: force [N], torque [N m], world frame.
     """
 
     def __init__(self, actuator: Actuator, shape: tuple[int, int, int]):
@@ -52,7 +59,8 @@ class Actuation:
         self._shape = shape
         self.output = self._nothing()
         self._command = self._nothing()  # of this step, clipped
-        self._late: list[tuple[float, np.ndarray]] = []  # commands with a delay that still count: when given [s]
+        self._late: list[tuple[float, np.ndarray]] = []  # delayed commands that still count, oldest first: age [s]
+        self.past: np.ndarray | None = None
 
     def _nothing(self) -> np.ndarray:
         return np.zeros((self._shape[0] * self._shape[1], 6))
@@ -60,99 +68,107 @@ class Actuation:
     def advance(self, world: Batch, calls: list[Work], wrench: np.ndarray, steps: int, dt: float) -> None:
         """`World.advance` through the actuator: one that remembers is asked at each step."""
         if steps == 1 or not self.actuator.remembers:
-            self.take(wrench, world.time, dt)
+            self.take(wrench, dt)
             world.make(calls, steps * dt)
             return
         total = np.zeros_like(world.report_table)
         for _ in range(steps):
-            self.take(wrench, world.time, dt)
+            self.take(wrench, dt)
             world.make(calls, dt)
             add_report(total, world.report_table)
         world.report_table[...] = total
 
-    def take(self, wrench: np.ndarray, start: float, dt: float) -> None:
-        """Take the command of the step from `start` over `dt` [s]; `applied` is then what acts in it."""
+    @contextmanager
+    def passed_by(self, load: np.ndarray | None) -> Iterator[None]:
+        """Let a load (worlds, bodies, 6) act in the steps of the block besides what the actuator gives."""
+        self.past = load
+        try:
+            yield
+        finally:
+            self.past = None
+
+    def take(self, wrench: np.ndarray, dt: float) -> None:
+        """Take the command of a step of `dt` [s]; `applied` is then what acts in it."""
         if self.actuator.delay > 0.0:
             self._command = self._nothing()
         self._command[...] = wrench.reshape(-1, 6)
         limits = (self.actuator.limit_force, self.actuator.limit_torque)
         clamp_command(self._command, *(np.inf if limit is None else limit for limit in limits))
         applied = self.applied.reshape(-1, 6)
-        for k, (share, tread) in enumerate(self._treads(start, dt)):
+        for k, (share, tread) in enumerate(self._treads(dt)):
             gone, kept = 1.0, 0.0
             if self.actuator.lag > 0.0:
                 x = share * dt / self.actuator.lag
                 gone = -math.expm1(-x)
                 kept = gone / x
             apply_actuator_lag(tread, gone, kept, share, k == 0, self.output, applied)
+        if self.past is not None:
+            self.applied += self.past
 
-    def _treads(self, start: float, dt: float) -> list[tuple[float, np.ndarray]]:
-        """(share of the step, command) of the staircase from `start` over `dt`; zero before the first command."""
+    def _treads(self, dt: float) -> list[tuple[float, np.ndarray]]:
+        """(share of the step, command) of the staircase over a step of `dt`; zero before the first command."""
         if self.actuator.delay == 0.0:
             return [(1.0, self._command)]
-        self._late.append((start, self._command))
-        arrivals = [-np.inf, *(_snapped((given + self.actuator.delay - start) / dt) for given, _ in self._late)]
-        commands = [self._nothing(), *(command for _, command in self._late)]
+        late = [*self._late, (0.0, self._command)]
+        arrivals = [-np.inf, *(_snapped((self.actuator.delay - age) / dt) for age, _ in late)]
+        commands = [self._nothing(), *(command for _, command in late)]
         begun = sum(share <= 0.0 for share in arrivals) - 1
-        del self._late[: max(begun - 1, 0)]
+        self._late = [(age + dt, command) for age, command in late[max(begun - 1, 0) :]]
         edges = [min(max(share, 0.0), 1.0) for share in (*arrivals, 1.0)]
         return [(end - begin, command) for (begin, end), command in zip(pairwise(edges), commands) if end > begin]
 
     def forget(self, worlds: np.ndarray) -> None:
         """Let these worlds begin at rest: no output, no commands on their way."""
         if len(worlds) == self._shape[0]:
-            self._late = []  # their time may begin anew
+            self._late = []
         for rows in (self.output, *(command for _, command in self._late)):
             rows.reshape(self._shape)[worlds] = 0.0
 
     def kept(self, worlds: np.ndarray | None = None) -> tuple:
         """State of the actuators of some worlds, or of all, for `put_back` and `put_worlds`."""
         if worlds is None:
-            return self.output.copy(), [(given, command.copy()) for given, command in self._late]
+            return self.output.copy(), [(age, command.copy()) for age, command in self._late]
         output, late = self.output, self._late
         return self._rows(output, worlds).reshape(-1, 6), [
-            (given, self._rows(command, worlds).reshape(-1, 6)) for given, command in late
+            (age, self._rows(command, worlds).reshape(-1, 6)) for age, command in late
         ]
 
     def put_back(self, kept: tuple) -> None:
         """Go on from what `kept` gave of all worlds."""
         output, late = kept
         self.output[...] = output
-        self._late = [(given, command.copy()) for given, command in late]
+        self._late = [(age, command.copy()) for age, command in late]
 
-    def put_worlds(self, kept: tuple, source: np.ndarray, worlds: np.ndarray, shift: float | None) -> None:
+    def put_worlds(self, kept: tuple, source: np.ndarray, worlds: np.ndarray) -> None:
         """Let `worlds` (k,) go on as the worlds `source` (k,) of what `kept` gave.
 
         Parameters
         ----------
         kept : tuple
         source, worlds : (k,) int64
-        shift : float or None
-            Added to the times at which commands were given [s]. None: `worlds` are all there are, and nothing of the
-            batch's own commands is left.
+            If `worlds` are all there are, nothing of the batch's own commands is left.
         """
-        output, late = kept
+        output, theirs = kept
         self.output.reshape(self._shape)[worlds] = self._rows(output, source)
-        own = [] if shift is None else self._late
-        theirs = [(given + (shift or 0.0), command) for given, command in late]
+        own = [] if len(worlds) == self._shape[0] else self._late
         near = NO_TIME * self.actuator.delay
-        moments = [given for given, _ in own]
-        moments += [given for given, _ in theirs if all(abs(given - known) > near for known in moments)]
+        ages = [age for age, _ in own]
+        ages += [age for age, _ in theirs if all(abs(age - known) > near for known in ages)]
         self._late = []
-        for given in sorted(moments):
-            held, taken = _held(own, given), _held(theirs, given + near)
+        for age in sorted(ages, reverse=True):
+            held, taken = _held(own, age), _held(theirs, age - near)
             command = self._nothing() if held is None else held.copy()
             command.reshape(self._shape)[worlds] = 0.0 if taken is None else self._rows(taken, source)
-            self._late.append((given, command))
+            self._late.append((age, command))
 
     def _rows(self, table: np.ndarray, worlds: np.ndarray) -> np.ndarray:
         """Rows (k, bodies, 6) of some worlds in a table (worlds * bodies, 6), copied."""
         return table.reshape(-1, *self._shape[1:])[worlds]
 
 
-def _held(staircase: list[tuple[float, np.ndarray]], moment: float) -> np.ndarray | None:
-    """The last command of a staircase that was given by this moment [s]; None: there is none."""
-    return next((command for given, command in reversed(staircase) if given <= moment), None)
+def _held(staircase: list[tuple[float, np.ndarray]], age: float) -> np.ndarray | None:
+    """The youngest command of a staircase that is at least as old as this [s]; None: there is none."""
+    return next((command for each, command in reversed(staircase) if each >= age), None)
 
 
 def _snapped(share: float) -> float:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import AbstractContextManager
 from operator import attrgetter
 from typing import TYPE_CHECKING, Any, Protocol
 
@@ -28,6 +29,10 @@ class ActuatorState(Protocol):
     actuator: Actuator
     applied: np.ndarray
     output: np.ndarray
+    past: np.ndarray | None
+
+    def passed_by(self, load: np.ndarray | None) -> AbstractContextManager[None]:
+        """Let a load act besides in the steps of a block."""
 
     def kept(self, worlds: np.ndarray | None = None) -> Any:
         """All that decides what acts from now on, of some worlds or all."""
@@ -35,8 +40,8 @@ class ActuatorState(Protocol):
     def put_back(self, kept: Any) -> None:
         """As it was when `kept` was taken."""
 
-    def put_worlds(self, kept: Any, source: np.ndarray, worlds: np.ndarray, shift: float | None) -> None:
-        """Let worlds go on as those of `source` in `kept`, whose times are `shift` [s] early; None: of all worlds."""
+    def put_worlds(self, kept: Any, source: np.ndarray, worlds: np.ndarray) -> None:
+        """Let worlds go on as those of `source` in `kept`."""
 
     def advance(self, world: Any, calls: list[Work], wrench: np.ndarray, steps: int, dt: float) -> None:
         """Make steps with the wrench that the actuators let through."""
@@ -52,6 +57,8 @@ class Batch:
     ----------
     scene, accuracy, plan : Scene, Accuracy, Plan
         What is simulated, and how.
+    scene_settings : dict of str to str
+        Settings of the scene that no array holds; see `physics.world.scene_settings`.
     worlds, body_count, threads : int
         Size of the batch, bodies of a world, threads that share a step.
     names : tuple of str
@@ -98,6 +105,7 @@ class Batch:
     scene: Scene
     accuracy: Accuracy
     plan: Plan
+    scene_settings: dict[str, str]
     worlds: int
     body_count: int
     threads: int

@@ -11,9 +11,47 @@ from zipfile import is_zipfile
 
 import numpy as np
 
-from physics import validation
+from physics.summary import shown
 
 T = TypeVar("T")
+
+
+def head_value(head: Any, name: str, is_right: Callable[[Any], object], allowed: str) -> Any:
+    """Value of a name in a head.
+
+    Parameters
+    ----------
+    head : dict
+    name : str
+    is_right : callable
+        Whether a value may be there; an exception means that it may not.
+    allowed : str
+        What may be there, for the error.
+
+    Raises
+    ------
+    ValueError
+        Naming the field, its value and what is allowed.
+    """
+    if not isinstance(head, dict) or name not in head:
+        raise ValueError(f"its head has no {name}; allowed is {allowed}")
+    value = head[name]
+    try:
+        if is_right(value):
+            return value
+    except Exception:  # of a value of another type
+        pass
+    raise ValueError(f"{name} of its head is {shown(value)}; allowed is {allowed}")
+
+
+def is_text(value: Any) -> bool:
+    """True for a text."""
+    return isinstance(value, str)
+
+
+def is_count(value: Any) -> bool:
+    """True for an integer of at least 0."""
+    return isinstance(value, int) and not isinstance(value, bool) and value >= 0
 
 
 @dataclass(frozen=True)
@@ -72,9 +110,10 @@ class FileKind:
             with np.load(content, allow_pickle=False) as file:
                 parts = dict(file)
             head = json.loads(str(parts.pop("head")))
-            if head["kind"] != self.kind:
-                raise ValueError(f"it is a {head['kind']}")
-            number = validation.count(head["format"], "its format")
+            kind = head_value(head, "kind", is_text, f"{self.kind!r}")
+            if kind != self.kind:
+                raise ValueError(f"it is a {kind}")
+            number = head_value(head, "format", lambda value: is_count(value) and value, "an integer of at least 1")
             found = make(head, parts) if self.oldest <= number <= self.format else None
         except Exception as error:  # whatever is wrong with it, it is none
             told = f"there is no {error}" if isinstance(error, KeyError) else error

@@ -7,10 +7,13 @@ from typing import NamedTuple
 import numpy as np
 
 from physics import validation
+from physics.kernels.state import layout as at
+from physics.plan.plan import is_isotropic
 from physics.summary import shown
 from physics.world import choice
 from physics.world.batch import Batch
 from physics.world.gusts import reads_time
+from physics.world.scene_settings import other_setting
 from physics.world.snapshot import KEPT, Snapshot
 from physics.world.warm_starts import check_numbers, copy_memory
 
@@ -35,25 +38,32 @@ def take(world: Batch, worlds, out: Snapshot | None) -> Snapshot:
     if out is None:
         arrays = (part.copy() if part is array else part.reshape(-1, array.shape[-1])
                   for part, array in zip(parts, kept))  # fmt: skip
-        return Snapshot(tuple(arrays), world.time, actuation)
+        return Snapshot(tuple(arrays), world.time, actuation, scene=world.scene_settings)
     count = world.worlds if chosen is None else len(chosen)
     validation.instance(out, Snapshot, "out", "None or a physics.Snapshot")
     if not (_fits(world, out, count) and all(array.flags.writeable for array in out.arrays)):
         raise ValueError(f"out is {out!r}; allowed is a snapshot of this scene, of {count} worlds, that can be written")
     for target, part, array in zip(out.arrays, parts, kept):
         _copy(world, part.reshape(target.shape), target, array is world.memory)
-    out.renew(world.time, actuation)
+    out.renew(world.time, actuation, world.scene_settings)
     return out
 
 
 def places(world: Batch, snapshot: Snapshot, worlds, source) -> Places:
     """Check arguments of `World.restore`, which documents them: the worlds meant."""
     validation.instance(snapshot, Snapshot, "snapshot", "a physics.Snapshot, as `World.snapshot` gives it")
-    if worlds is None and source is None and not snapshot.is_read and _is_alike(world, snapshot):  # the most frequent
+    is_own = snapshot.scene is world.scene_settings
+    if not is_own:
+        _check_scene(world, snapshot)
+    if (
+        worlds is None and source is None and not snapshot.is_read and is_own and _is_alike(world, snapshot)
+    ):  # the most frequent
         return Places(None, None, True)
     chosen = None if worlds is None else choice.chosen(worlds, world.worlds)
     count = world.worlds if chosen is None else len(chosen)
     held = _world_count(world, snapshot, count)
+    if not is_own:
+        _check_inertia(world, snapshot)
     if snapshot.is_read:
         check_numbers(world, snapshot)
     if source is None:
@@ -97,9 +107,7 @@ def _put_actuation(world: Batch, snapshot: Snapshot, at_places: Places) -> None:
         return
     source = np.arange(snapshot.worlds) if at_places.source is None else at_places.source
     source = np.broadcast_to(source, len(chosen))
-    world.actuation.put_worlds(
-        snapshot.actuation, source, chosen, None if at_places.is_all else world.time - snapshot.time
-    )
+    world.actuation.put_worlds(snapshot.actuation, source, chosen)
 
 
 def _copy(world: Batch, source: np.ndarray, target: np.ndarray, is_memory: bool) -> None:
@@ -148,6 +156,31 @@ def _world_count(world: Batch, snapshot: Snapshot, count: int) -> int:
     if not _fits(world, snapshot, held):
         raise _other_snapshot(snapshot, count)
     return held
+
+
+def _check_scene(world: Batch, snapshot: Snapshot) -> None:
+    """Refuse a snapshot of a scene whose settings, which no array holds, are others."""
+    other = None if snapshot.scene is None else other_setting(world.scene_settings, snapshot.scene)
+    if other is not None:
+        name, ours, theirs = other
+        raise ValueError(
+            f"snapshot is of another scene, whose {name} are {shown(theirs)}; allowed is one of this scene, whose "
+            f"{name} are {shown(ours)}"
+        )
+
+
+def _check_inertia(world: Batch, snapshot: Snapshot) -> None:
+    """Refuse bodies that the kernel of this scene cannot turn, as it leaves out parts of the rotation."""
+    plan, rows = world.plan, snapshot.arrays[KEPT.index("params")]
+    is_odd = not plan.gyroscopic and not is_isotropic(1.0 / rows[:, at.INV_INERTIA : at.INV_INERTIA + 3]).all()
+    if not plan.offset_frame:
+        is_odd |= bool(rows[:, at.CENTER : at.CENTER + 3].any())
+        is_odd |= bool(plan.gyroscopic and rows[:, at.PRINCIPAL + 1 : at.PRINCIPAL + 4].any())
+    if is_odd:
+        raise ValueError(
+            f"snapshot is {snapshot!r}, with inertias or centres of mass that the kernel of this scene leaves out; "
+            "allowed are such as its bodies have: give a body of the scene such a size, inertia_body or center"
+        )
 
 
 def _other_snapshot(snapshot: Snapshot, count: int) -> ValueError:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import os
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, BinaryIO
@@ -16,9 +17,10 @@ from physics.kernels.compile.compiler_choice import COMPILER
 from physics.kernels.state import layout as at
 from physics.summary import parts_repr
 from physics.version import version
-from physics.world.headed_file import FileKind
+from physics.world.headed_file import FileKind, head_value, is_text
 
-FILE = FileKind("snapshot", "snapshot", "Snapshot.save")
+FILE = FileKind("snapshot", "snapshot", "Snapshot.save", format=2)
+TIMES = 1  # the format in which commands have times instead of ages, and the scene is not told
 
 # Arrays that decide how a `World` goes on, in the order of `Snapshot.arrays`; the last one where bodies may sleep.
 KEPT = ("state", "params", "gravity", "memory", "report_table", "sleep")
@@ -35,13 +37,15 @@ class Snapshot:
     time : float
         Of the batch that it was taken of [s].
     actuation : tuple or None
-        Wrench that the actuator's lag has reached, (worlds * bodies, 6), and its delayed commands: a list of the time
-        at which each was given [s] and the command (worlds * bodies, 6). None without an actuator.
+        Wrench that the actuator's lag has reached, (worlds * bodies, 6), and its delayed commands, oldest first: a list
+        of the age of each [s] and the command (worlds * bodies, 6). None without an actuator.
     compiler : str
         The one that made it (`physics.kernels.compile.compiler_choice`): with another one a world goes on with other
         last bits.
     is_read : bool
         It is of a file: whoever restores it looks at its numbers first.
+    scene : dict of str to str or None
+        Settings of its scene that the arrays do not hold (`physics.world.scene_settings`); None: not told.
     """
 
     arrays: tuple[np.ndarray, ...]
@@ -49,15 +53,17 @@ class Snapshot:
     actuation: tuple | None = None
     compiler: str = COMPILER
     is_read: bool = False
+    scene: Mapping[str, str] | None = None
 
     @property
     def worlds(self) -> int:
         """Number of worlds that it is of."""
         return len(self.arrays[KEPT.index("gravity")])
 
-    def renew(self, time: float, actuation: tuple | None) -> None:
+    def renew(self, time: float, actuation: tuple | None, scene: Mapping[str, str]) -> None:
         """Be of another moment: whoever has overwritten `arrays` calls this (`World.snapshot` with `out`)."""
-        for name, value in (("time", time), ("actuation", actuation), ("compiler", COMPILER), ("is_read", False)):
+        new = {"time": time, "actuation": actuation, "compiler": COMPILER, "is_read": False, "scene": scene}
+        for name, value in new.items():
             object.__setattr__(self, name, value)
 
     def save(self, path: str | os.PathLike) -> Path:
@@ -77,9 +83,10 @@ class Snapshot:
         if self.actuation is not None:
             output, late = self.actuation
             parts["actuator_output"] = output
-            parts["actuator_times"] = np.array([given for given, _ in late], dtype=np.float64)
+            parts["actuator_ages"] = np.array([age for age, _ in late], dtype=np.float64)
             parts["actuator_commands"] = np.array([command for _, command in late]).reshape(-1, *output.shape)
-        FILE.write(file, {"compiler": self.compiler, "version": version()}, parts)
+        scene = None if self.scene is None else dict(self.scene)
+        FILE.write(file, {"compiler": self.compiler, "version": version(), "scene": scene}, parts)
 
     @classmethod
     def load(cls, path: str | os.PathLike) -> Snapshot:
@@ -101,7 +108,7 @@ class Snapshot:
     @classmethod
     def read(cls, content: BinaryIO, path: str | os.PathLike) -> Snapshot:
         """Read the content of a file as `load` does; `path` is its name in an error."""
-        return FILE.read(content, path, lambda head, parts: _from_parts(parts, str(head["compiler"])))
+        return FILE.read(content, path, _from_parts)
 
     __repr__ = parts_repr
     _repr_html_ = parts_table
@@ -111,8 +118,15 @@ class Snapshot:
         return (f"time={self.time:.6g} s", *shapes, f"compiler={self.compiler}")
 
 
-def _from_parts(parts: dict[str, np.ndarray], compiler: str) -> Snapshot:
-    """Snapshot of the arrays of a file; whether they fit a scene is found out by who restores it."""
+def _is_scene(value: Any) -> bool:
+    return value is None or (isinstance(value, dict) and all(map(is_text, value.values())))
+
+
+def _from_parts(head: Mapping[str, Any], parts: dict[str, np.ndarray]) -> Snapshot:
+    """Snapshot of the head and the arrays of a file; whether they fit a scene is found out by who restores it."""
+    compiler, scene = head_value(head, "compiler", is_text, "the name of a compiler"), None
+    if head["format"] > TIMES:
+        scene = head_value(head, "scene", _is_scene, "null and settings of a scene by name, as text")
     arrays = tuple(parts[name] for name in KEPT if name != "sleep" or name in parts)
     rows, worlds = len(parts["state"]), len(parts["gravity"])
     rows_of = {"state": rows, "params": rows, "gravity": worlds, "report_table": worlds, "sleep": rows}
@@ -124,10 +138,12 @@ def _from_parts(parts: dict[str, np.ndarray], compiler: str) -> Snapshot:
             raise ValueError(f"{name} has {parts[name].shape[1]} columns instead of {width}")
     actuation = None
     if "actuator_output" in parts:
-        output, times, commands = (parts[f"actuator_{name}"] for name in ("output", "times", "commands"))
-        if output.shape != (rows, 6) or times.ndim != 1 or commands.shape != (len(times), rows, 6):
+        if head["format"] == TIMES:
+            parts["actuator_ages"] = parts["time"] - parts.pop("actuator_times")
+        output, ages, commands = (parts[f"actuator_{name}"] for name in ("output", "ages", "commands"))
+        if output.shape != (rows, 6) or ages.ndim != 1 or commands.shape != (len(ages), rows, 6):
             raise ValueError(f"actuator_output has shape {output.shape}, actuator_commands {commands.shape}")
-        actuation = output, list(zip(times.tolist(), commands))
+        actuation = output, list(zip(ages.tolist(), commands))
     if any(array.dtype != np.float64 for array in parts.values()):
         raise ValueError("it holds other numbers than 64-bit floats")
-    return Snapshot(arrays, validation.number(parts["time"], "its time"), actuation, compiler, is_read=True)
+    return Snapshot(arrays, validation.number(parts["time"], "its time"), actuation, compiler, True, scene)

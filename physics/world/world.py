@@ -32,6 +32,7 @@ from physics.world.batch import Batch
 from physics.world.contact_report import contact_ends, contact_forces
 from physics.world.report import StepReport
 from physics.world.rollback import Before
+from physics.world.scene_settings import scene_settings
 from physics.world.snapshot import Snapshot
 from physics.world.stepper import kernel_calls, retime
 
@@ -87,6 +88,7 @@ class World(Batch):
         self.accuracy = resolve(accuracy)
         self.threads = validation.count(threads, "threads")
         self.plan = make_plan(scene, self.accuracy)
+        self.scene_settings = scene_settings(scene)
         self.body_count = len(scene.bodies)
         self.names = body_names(scene)
         self.time = 0.0
@@ -291,7 +293,8 @@ class World(Batch):
         ----------
         mass, friction, restitution : (), (k,) or (k, bodies) array_like, optional
             [kg], coefficients. One axis is that of worlds wherever its length is k; (bodies,) of another length is for
-            all worlds alike. Of a `Friction` with two coefficients the first; the second changes with it.
+            all worlds alike. Of a `Friction` with two coefficients the first; the second changes with it. Two bodies
+            that touch have the geometric mean of their frictions and the larger restitution; a wall has the body's.
         size : (3,), (k, 3) or (k, bodies, 3) array_like, optional
             Full edges of a block, twice the semi-axes of an ellipsoid, three equal diameters of a sphere [m]; a hull
             cannot change its size: twice its `dimensions`.

@@ -10,6 +10,11 @@ if TYPE_CHECKING:
     from physics import Scene
 
 SCENE_FILES = (".toml", ".xml")  # as of `rigid_env.tasks.scene_source`, which takes long to import
+CANONICAL = (
+    "drop", "flight", "tumble", "rest", "shove", "corner_drop", "slide", "bounce", "rolling_sphere", "vertex_drop",
+    "closed_box", "tower", "heap", "football", "incline",
+)  # fmt: skip
+"""Names of `physics.scenes.SCENES`, which takes long to import, too."""
 
 
 def load_scene(name: str) -> tuple[str, Scene]:

@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from rigid_env.cli import names
-from rigid_env.cli.common import app, at_least, tell_file, told_errors
+from rigid_env.cli.common import app, at_least, ending_on_sigterm, tell_file, told_errors
 from rigid_env.cli.files import make_parents, output_option
 from rigid_env.terminal import make_console, say
 
@@ -40,9 +40,9 @@ def view(
 ) -> None:
     """Look at something in a browser: play, pause, go back, drag, kick, and see what accuracy costs.
 
-    Without --policy or --controller an environment gets random actions. Ctrl-C ends it.
+    Without --policy or --controller an environment gets random actions. Ctrl-C or SIGTERM ends it.
     """
-    with told_errors():
+    with told_errors(), ending_on_sigterm():
         from rigid_env.extras import require
 
         require("view", purpose="the viewer")
@@ -66,23 +66,38 @@ def _export(what: str, path: Path, duration: float, settings: dict, console) -> 
 
 
 def _serve(what: str, host: str, port: int, browser: bool, settings: dict, console) -> None:
-    """Serve until Ctrl-C. The page is there first: the browser loads it while the engine is imported."""
-    from rigid_env.viewer.servers import address_of, directions, start_viewer_server, stop_server
+    """Serve until Ctrl-C or SIGTERM; the address is told once it is sure that there will be something to look at.
+
+    A canonical scene is sure. The browser then loads the page while the engine is imported.
+    """
+    from rigid_env.viewer.servers import start_viewer_server, stop_server
 
     server = start_viewer_server(what, host, port)
     try:
-        for text in directions(server):
-            console.print(text, soft_wrap=True, highlight=False)
-        if browser:
-            import webbrowser
-
-            webbrowser.open(address_of(server))
+        is_sure = what in names.CANONICAL and not any(settings.values())
+        if is_sure:
+            _tell_address(server, browser, console)
         from rigid_env.viewer.server import Viewer
         from rigid_env.viewer.session import Session
         from rigid_env.viewer.subject import open_subject
 
-        viewer = Viewer(Session(open_subject(what, **settings)), server)
+        session = Session(open_subject(what, **settings))
+        if not is_sure:
+            _tell_address(server, browser, console)
+        viewer = Viewer(session, server)
         viewer.play_once_seen()
         viewer.run()
     finally:
         stop_server(server)
+
+
+def _tell_address(server, browser: bool, console) -> None:
+    """Say where a viewer is, and open a browser there where one is wanted."""
+    from rigid_env.viewer.servers import address_of, directions
+
+    for text in directions(server):
+        console.print(text, soft_wrap=True, highlight=False)
+    if browser:
+        import webbrowser
+
+        webbrowser.open(address_of(server))

@@ -50,10 +50,11 @@ class SceneEnv(RigidEnv[NDArray[Any]]):
     | 4 | torque about y | -1 | 1 | 0.5 m g a |
     | 5 | torque about z | -1 | 1 | 0.5 m g a |
 
-    m is the mass of the body, g gravity (9.81 m/s² where there is none), a its longest half extent. `force`
-    and `torque` stand in place of 0.9 and 0.5; a limit of 0 takes its three numbers away. World frame, or
-    the body's with `frame = "body"`. Each number is clipped to ±1, then force and torque vector are
-    shortened to length 1 where they are longer.
+    m is the mass of the body, g gravity (9.81 m/s² where there is none), a its reach: the longest half
+    extent, of a hull the farthest along a body axis from the centre of mass. `force` and `torque` stand in
+    place of 0.9 and 0.5; a limit of 0 takes its three numbers away. World frame, or the body's with
+    `frame = "body"`. Each number is clipped to ±1, then force and torque vector are shortened to length 1
+    where they are longer.
 
     ## Observation Space
 
@@ -120,7 +121,7 @@ class SceneEnv(RigidEnv[NDArray[Any]]):
     | `scene` | None | scene file (.toml or .xml), name of a canonical scene, or a `physics.Scene`; must be given |
     | `driven` | None | names or indices of driven bodies; with one body in the scene that one |
     | `force` | None | longest force over the body's weight (0.9) |
-    | `torque` | None | longest torque over weight times longest half extent (0.5) |
+    | `torque` | None | longest torque over weight times reach (0.5) |
     | `frame` | None | `"world"` (default) or `"body"`: frame of force and torque |
     | `length` | None | unit of lengths in observations (5) [m] |
     | `goal` | None | dict of `body`, `pos` (or `low` and `high`), `tolerance`, `speed` |

@@ -24,6 +24,7 @@ MOST_ARROWS = 16  # contact points; of more of them no forces are drawn
 FLIGHT_CELLS = 8  # strong lines of the grid that the flight is longer than, at most
 FLYING_SIZE = 1.6  # of the body as it is drawn, where 5 is a cell of the grid [m]
 FLIGHT_DEPTH = 0.15  # least half width of the ground, in lengths of the flight
+FAR_WALL = 2.0  # distance from the middle of the flight from which on a wall is left out, in lengths of the flight
 PATH_POINTS = 600  # at most
 
 
@@ -86,10 +87,10 @@ class Stage:
         self._span = size if self._travels else span
         self.bounds = None if self._travels else (lower, upper)
         if len(frame.bodies) == 1 and span > FAR_SPAN * size:
-            self._show_flight(scene, frame, np.asarray(pos)[:, 0] @ self._matrix.T)
+            self._show_flight(frame, np.asarray(pos)[:, 0] @ self._matrix.T)
 
-    def _show_flight(self, scene: Scene, frame: Frame, path: np.ndarray) -> None:
-        """Show all of a flight along `path` (samples, 3) [m]: with the ground, and the body as large as can be seen."""
+    def _show_flight(self, frame: Frame, path: np.ndarray) -> None:
+        """Show all of a flight along `path` (samples, 3) [m]: with walls near it, the body as large as can be seen."""
         lower, upper = path.min(axis=0), path.max(axis=0)
         span, size = float((upper - lower).max()), _extent(frame.bodies[0])
         cell = _round_up(span / FLIGHT_CELLS)
@@ -99,14 +100,11 @@ class Stage:
         half[[0, 2]] = np.maximum(half[[0, 2]], FLIGHT_DEPTH * span)
         self.bounds, self._span = (-self._scale * half, self._scale * half), self._scale * span
         self._path = self._scale * (path - self._shift)
-        walls = [self._wall(wall) for wall in frame.walls]
-        if not walls or any(abs(wall.offset) > 2.0 * self._span for wall in walls):
-            pulls = scene.effect(Gravity) is not None
-            walls = [WallView(Y, self.bounds[0][1])] if pulls else []
-        self._ground = tuple(walls)
+        walls = map(self._wall, frame.walls)
+        self._ground = tuple(wall for wall in walls if abs(wall.offset) <= FAR_WALL * self._span)
         times = self._body_scale / self._scale
         larger = f", body drawn {times:.2g} times as large" if times > 1.05 else ""
-        self.notes = (f"grid {cell:g} m{larger}",)
+        self.notes = (f"grid {cell:g} m{larger}" if self._ground else f"flight {span:.3g} m across{larger}",)
 
     def place(self, frame: Frame, share: float = 1.0) -> Frame:
         """A frame of the motion as it is drawn.

@@ -38,7 +38,7 @@ def frame_of(task: Task, world: int = 0, arrows: bool = True) -> Frame:
     """
     mark = task.goal_mark(world)
     goal = None if mark is None else GoalView(**mark)
-    frame = world_frame(task.world, world, task.lines(world), goal, task.wrench[world], arrows=arrows)
+    frame = world_frame(task.world, world, task.lines(world), goal, task.load[world], arrows=arrows)
     return replace(frame, force_scale=WEIGHT_ARROW / task.weights[world, 0])
 
 

@@ -32,7 +32,7 @@ class Vector(NamedTuple):
     axes : str
         Axes that the action has numbers for, of "xyz".
     share : float
-        Longest force over the weight, torque over weight times longest half extent, impulse over weight times 1 s.
+        Longest force over the weight, torque over weight times reach, impulse over weight times 1 s.
     frame : str
         Of the vector.
     point : (3,) tuple or None
@@ -55,7 +55,7 @@ class Vector(NamedTuple):
 
     @property
     def unit(self) -> str:
-        """Unit of its numbers, for tables: m mass of the body, g gravity, a its longest half extent."""
+        """Unit of its numbers, for tables: m mass of the body, g gravity, a its reach."""
         return f"{self.share:g} m g" + {FORCE: "", TORQUE: " a", IMPULSE: " s"}[self.kind]
 
     @property
@@ -76,7 +76,8 @@ class Wrench:
     force : float
         Longest force over the weight of the body; 0: no force.
     torque : float
-        Longest torque over the weight times the body's longest half extent; 0: no torque.
+        Longest torque over the weight times the body's reach, which is its longest half extent, and of a hull the
+        farthest along a body axis from the centre of mass; 0: no torque.
     force_axes, torque_axes : str
         Axes that the agent has in hand, of "xyz".
     frame : {"world", "body"}
@@ -266,7 +267,7 @@ class ActionTable:
         Parameters
         ----------
         weight, reach : (worlds, bodies) float64
-            Weights m g [N], and longest half extents [m].
+            Weights m g [N], and reaches [m].
         first_dt : float
             Time in which an impulse acts, as a force [s].
 

@@ -57,6 +57,9 @@ PARAMETERS = {
 }
 """Meanings of draws that are physical parameters."""
 
+REACH = "longest half extent, of a hull the farthest along a body axis from the centre of mass"
+"""Meaning of the unit of torques over the weight."""
+
 
 @dataclass(frozen=True)
 class Section:
@@ -164,7 +167,7 @@ def _actions(task: Task) -> Section:
             rows.append((str(len(rows)), name + where, "-1", "1", vector.unit, *agent))
     kinds = {vector.kind for vector in task.action_vectors}
     notes = ["m is the mass of the body, g gravity (9.81 m/s² where there is none)"]
-    notes += ["a the longest half extent of the body"] if TORQUE in kinds else []
+    notes += [f"a the reach of the body ({REACH})"] if TORQUE in kinds else []
     text = (
         f"{', '.join(notes)}. Each number is clipped to ±1, then a vector is shortened to length 1 where it is longer."
     )
@@ -224,7 +227,7 @@ def _disturbances(task: Task) -> tuple[Section, ...]:
         rows.append(
             (type(kind).__name__, body_label(kind.body, task.world.names), size, kind.axes, f"{kind.every:g} s")
         )
-    text = "Pushes and gusts come at random times, exponentially distributed."
+    text = "They begin and end with control steps: in each quiet one with the same probability, and past any actuator."
     columns = ("Kind", "Body", "Size", "Axes", "Mean wait")
     return (Section("Disturbances", (text,), columns, tuple(rows)),) if rows else ()
 

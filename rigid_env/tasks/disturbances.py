@@ -1,6 +1,7 @@
 """Disturbances: pushes and gusts at random times, which the agent does not choose.
 
-Waiting times are exponential, so that the time since the last disturbance tells nothing about the next one. All random
+They begin and end with control steps. One begins in each quiet control step with the same probability, so that the time
+since the last one tells nothing about the next. No actuator stands between a disturbance and its body. All random
 numbers come from the generator of the world that is disturbed.
 """
 
@@ -17,6 +18,8 @@ from rigid_env.tasks.actions import check_axes, check_body
 from rigid_env.tasks.distributions import Distribution, as_distribution
 
 UNIFORMS = 5  # of one disturbance: direction (2), size (1), duration (1), wait (1)
+FAR = 2**53  # control steps after which nobody looks: larger numbers are cut
+NEVER = np.iinfo(np.int64).max  # control step of a disturbance before its episode has begun
 
 
 @dataclass(frozen=True)
@@ -29,7 +32,7 @@ class Push:
     speed : number, pair or Distribution
         Change of the body's speed [m/s].
     every : float
-        Mean time between two [s].
+        Mean time between two [s]; a control step has at most one.
     axes : str
         Axes that span the directions, each as likely as the other: ``xz`` is horizontal.
 
@@ -61,7 +64,7 @@ class Gust:
     force : number, pair or Distribution
         Force over the body's weight.
     lasts : number, pair or Distribution
-        Duration [s].
+        Duration [s], to the nearest number of control steps, at least one.
     every : float
         Mean time from the end of one to the start of the next [s].
     axes : str
@@ -112,6 +115,19 @@ def direction(shares: np.ndarray, axes: str) -> np.ndarray:
     return vector
 
 
+def quiet_steps(mean: float, share: float) -> int:
+    """Number of control steps before a disturbance that starts in each with the same probability, 1 / (1 + `mean`).
+
+    Parameters
+    ----------
+    mean : float
+        Of the number; none are below 0.
+    share : float
+        Uniform random number, at least 0 and below 1.
+    """
+    return math.floor(min(-math.log1p(-share) / math.log1p(1.0 / mean), FAR)) if mean > 0.0 else 0
+
+
 class Disturbances:
     """All disturbances of a batch, and when the next ones come.
 
@@ -122,12 +138,14 @@ class Disturbances:
 
     Attributes
     ----------
-    next : (kinds, worlds) float64
-        Time in the episode at which the next one starts [s].
-    end : (kinds, worlds) float64
-        Time at which the present one ends [s].
+    next : (kinds, worlds) int64
+        Control step of the episode in which the next one starts.
+    end : (kinds, worlds) int64
+        Control step before which the present one ends.
     force : (kinds, worlds, 3) float64
         Of the present one [N].
+    load : (worlds, bodies, 6) float64
+        Of all gusts in the last control step: force [N], torque [N m], world frame.
 
     Raises
     ------
@@ -143,43 +161,51 @@ class Disturbances:
             if kind.body >= task.world.body_count:
                 raise ValueError(f"body of {kind!r} is {kind.body}; allowed are 0 to {task.world.body_count - 1}")
         shape = (len(self.kinds), task.worlds)
-        self.next, self.end, self.force = np.full(shape, np.inf), np.zeros(shape), np.zeros((*shape, 3))
+        self.next, self.end = np.full(shape, NEVER), np.zeros(shape, dtype=np.int64)
+        self.force, self.load = np.zeros((*shape, 3)), task.world.no_wrench()
+        self._push = task.world.no_wrench() if any(isinstance(kind, Push) for kind in self.kinds) else None
 
     @property
     def arrays(self) -> dict[str, np.ndarray]:
         """All that decides what comes, the generators apart: views with the worlds first."""
         return {
             "disturbance start": self.next.swapaxes(0, 1), "disturbance end": self.end.swapaxes(0, 1),
-            "disturbance force": self.force.swapaxes(0, 1),
+            "disturbance force": self.force.swapaxes(0, 1), "disturbance load": self.load,
         }  # fmt: skip
 
     def begin(self, rows: np.ndarray) -> None:
         """Draw the first disturbances of episodes that begin in worlds `rows`."""
+        self.load[rows] = 0.0
         for k, kind in enumerate(self.kinds):
-            self.force[k, rows] = self.end[k, rows] = 0.0
-            self.next[k, rows] = [self._wait(kind, self._task.generators[world].random()) for world in rows]
+            self.force[k, rows] = self.end[k, rows] = 0
+            quiet = kind.every / self._task.control_dt
+            self.next[k, rows] = [quiet_steps(quiet, self._task.generators[world].random()) for world in rows]
 
     def due(self) -> np.ndarray:
         """(n,) int64. Worlds in which a disturbance starts in the coming control step."""
-        time = self._task.steps * self._task.control_dt
-        return np.flatnonzero((self.next <= time).any(axis=0))
+        return np.flatnonzero((self.next <= self._task.steps).any(axis=0))
 
-    def act(self, wrench: np.ndarray, kick: np.ndarray) -> None:
-        """Add what acts in the coming control step to wrenches and to those of its first physics step."""
-        task = self._task
-        time = task.steps * task.control_dt
+    def act(self) -> tuple[np.ndarray, np.ndarray | None]:
+        """Load (worlds, bodies, 6) of the coming control step, and that of its first physics step besides, if any."""
+        steps, push = self._task.steps, self._push
+        self.load.fill(0.0)
+        if push is not None:
+            push.fill(0.0)
         for k, kind in enumerate(self.kinds):
-            due = np.flatnonzero(self.next[k] <= time)
+            due = np.flatnonzero(self.next[k] <= steps)
             for world in due.tolist():
-                self._draw(k, kind, world, time[world])
+                self._draw(k, kind, world, int(steps[world]))
             if isinstance(kind, Push):
-                kick[due, kind.body, :3] += self.force[k, due]
+                push[due, kind.body, :3] += self.force[k, due]
             else:
-                acting = self.end[k] > time
-                wrench[:, kind.body, :3] += np.where(acting[:, None], self.force[k], 0.0)
+                acting = self.end[k] > steps
+                self.load[:, kind.body, :3] += np.where(acting[:, None], self.force[k], 0.0)
+        return self.load, push
 
-    def _draw(self, k: int, kind: Any, world: int, time: float) -> None:
+    def _draw(self, k: int, kind: Any, world: int, step: int) -> None:
+        """Draw the disturbance that starts in a control step, and when the next one does."""
         task = self._task
+        quiet = kind.every / task.control_dt
         shares = task.generators[world].random(UNIFORMS)
         along = direction(shares[:2], kind.axes)
         one = shares[2:3, None]
@@ -187,12 +213,9 @@ class Disturbances:
             inv_mass = task.inv_mass(world, kind.body)
             speed: Any = kind.speed
             self.force[k, world] = speed.at(one, {})[0] / inv_mass / task.world.dt * along
-            start = time
+            quiet, end = quiet - 1.0, step + 1
         else:
             self.force[k, world] = kind.force.at(one, {})[0] * task.weights[world, kind.body] * along
-            start = self.end[k, world] = time + kind.lasts.at(shares[3:4, None], {})[0]
-        self.next[k, world] = start + self._wait(kind, shares[4])
-
-    @staticmethod
-    def _wait(kind: Push | Gust, share: float) -> float:
-        return -kind.every * math.log1p(-share)
+            lasts = kind.lasts.at(shares[3:4, None], {})[0] / task.control_dt
+            end = self.end[k, world] = step + max(1, round(min(lasts, FAR)))
+        self.next[k, world] = end + quiet_steps(quiet, shares[4])

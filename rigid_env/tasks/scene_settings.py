@@ -19,7 +19,7 @@ from rigid_env.tasks.observe import LENGTH, REACH
 from rigid_env.tasks.scene_section import Section, body_indices
 
 FORCE, TORQUE = 0.9, 0.5
-"""Longest force over a driven body's weight, and longest torque over weight times longest half extent."""
+"""Longest force over a driven body's weight, and longest torque over weight times reach (`actions.Wrench`)."""
 
 LIMITS = {"force": FORCE, "torque": TORQUE}
 """Keys of the limits, with their defaults."""

@@ -16,12 +16,15 @@ import physics
 from physics import validation
 from physics.html_table import parts_table
 from physics.world import choice, restoring
-from physics.world.headed_file import FileKind
+from physics.world.headed_file import FileKind, head_value, is_count, is_text
+from rigid_env.tasks.draws import parameter_of
 from rigid_env.tasks.state_settings import check_settings
 
 HELD = "held "
 OF_ENVIRONMENTS = frozenset(("waiting", "ended", "pictures"))  # parts that a task without an environment leaves out
-FILE = FileKind("task state", "state of a task", "TaskState.save", format=2, oldest=2, missing="settings of the task")
+FILE = FileKind(
+    "task state", "state of a task", "TaskState.save", format=3, oldest=3, missing="all settings of the task"
+)
 
 
 @dataclass(frozen=True)
@@ -113,9 +116,44 @@ def _from_parts(path: str | os.PathLike, head: Mapping[str, Any], parts: dict[st
     """State of the head and the arrays of a file; whether it fits a task is found out by `put`."""
     world = physics.Snapshot.read(io.BytesIO(parts.pop("world").tobytes()), path)
     held = {name.removeprefix(HELD): parts.pop(name) for name in list(parts) if name.startswith(HELD)}
-    told, seeds = tuple(head["told"]), tuple(head["seeds"])
-    generators = tuple(map(_of_json, head["generators"]))
-    return TaskState(str(head["task"]), dict(head["settings"]), world, parts, held, told, generators, seeds)
+    count = world.worlds
+    task = head_value(head, "task", is_text, "the name of a class")
+    settings = head_value(head, "settings", _are_settings, "names and texts or numbers")
+    told = head_value(head, "told", _are_names, "a list of physical parameters")
+    generators = head_value(head, "generators", lambda value: _are_generators(value, count), f"{count} states of PCG64")
+    seeds = head_value(head, "seeds", lambda value: _are_seeds(value, count), f"a list of {count} integers, or null")
+    _check_rows(parts | held, count)
+    return TaskState(task, settings, world, parts, held, tuple(told), tuple(map(_of_json, generators)), tuple(seeds))
+
+
+def _are_settings(value: Any) -> bool:
+    return isinstance(value, dict) and all(isinstance(each, (str, int, float)) for each in value.values())
+
+
+def _are_names(value: Any) -> bool:
+    return isinstance(value, list) and all(isinstance(name, str) and parameter_of(name) for name in value)
+
+
+def _are_seeds(value: Any, count: int) -> bool:
+    """Answer whether these are seeds: -1 or None before the first reset."""
+    return (
+        isinstance(value, list) and len(value) == count and all(each in (None, -1) or is_count(each) for each in value)
+    )
+
+
+def _are_generators(value: Any, count: int) -> bool:
+    for state in value:
+        if state is not None:
+            bits: Any = np.random.PCG64()
+            bits.state = _of_json(state)
+    return isinstance(value, list) and len(value) == count
+
+
+def _check_rows(arrays: Mapping[str, np.ndarray], count: int) -> None:
+    """Refuse an array that does not have a row for each world."""
+    for name, array in arrays.items():
+        if array.ndim == 0 or len(array) != count:
+            raise ValueError(f"{name} has shape {array.shape}; allowed is a row for each of {count} worlds")
 
 
 def _as_json(state: Mapping[str, Any] | None) -> Any:
@@ -275,6 +313,10 @@ def _check(task, arrays: Mapping[str, np.ndarray], state: TaskState) -> None:
             if not is_alike or value.shape != array.shape or value.dtype is not array.dtype:  # rarely
                 _check_part(part, value, array, count)
     _check_part("steps", given["steps"], task.status, count)
+    for part in state.told:
+        if part not in task.episodes.parameters:
+            allowed = ", ".join(task.episodes.parameters) or "none"
+            raise ValueError(f"state tells worlds of {part}, which {name} does not draw; allowed are {allowed}")
     for part, value in state.held.items():
         if part not in task.drawn:
             raise ValueError(f"state holds {part}, which {name} does not draw; allowed are {', '.join(task.drawn)}")

@@ -4,14 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from typing import Any
-from zlib import crc32
 
-import physics
+from physics.world.scene_settings import other_setting
 
 Setting = str | int | float
-
-NUMBERS_IN_PLAN = (physics.Actuator, physics.Sleeping)
-"""Effects whose numbers are no parameters of a world: a snapshot has those of all others."""
 
 
 def state_settings(task) -> dict[str, Setting]:
@@ -24,14 +20,11 @@ def state_settings(task) -> dict[str, Setting]:
     task : Task
     """
     world = task.world
-    scene = world.scene
     return {
         "frame_skip": task.frame_skip,
         "dt": float(world.dt),
         "actions": task.action_text,
-        "bodies": ", ".join(map(_body, scene.bodies)),
-        "walls": ", ".join(map(repr, scene.walls)),
-        "effects": ", ".join((*sorted(map(_effect, scene.effects)), *world.plan.laws)),
+        **world.scene_settings,
         **{name: _plain(value) for name, value in task.own_settings().items()},
     }
 
@@ -51,21 +44,13 @@ def check_settings(task: str, ours: Mapping[str, Setting], theirs: Mapping[str, 
     ValueError
         Naming the setting, its value in the state, and the task's.
     """
-    for name in (*ours, *theirs):
-        if ours.get(name) != theirs.get(name):
-            raise ValueError(
-                f"{name} of state is {theirs.get(name, 'not told')}; allowed is that of this {task}, "
-                f"{ours.get(name, 'none')}"
-            )
-
-
-def _body(body) -> str:
-    """Kind of a body, and a checksum of the corners of a hull; its size and mass are parameters."""
-    return f"hull {crc32(body.polyhedron.vertices.tobytes()):08x}" if body.kind == "hull" else body.kind
-
-
-def _effect(effect) -> str:
-    return repr(effect) if isinstance(effect, NUMBERS_IN_PLAN) else type(effect).__name__
+    other = other_setting(ours, theirs)
+    if other is not None:
+        name, here, there = other
+        raise ValueError(
+            f"{name} of state is {'not told' if there is None else there}; allowed is that of this {task}, "
+            f"{'none' if here is None else here}"
+        )
 
 
 def _plain(value: Any) -> Setting:

@@ -11,30 +11,34 @@ from physics.world.report import gravest
 class Steps:
     """The `frame_skip` physics steps of a control step.
 
-    Where a task has impulses, they act as a force during the first of them.
+    Impulses act as a force during the first of them. Commands go through the actuator of the scene, disturbances past
+    it.
 
     Parameters
     ----------
     world : physics.World
     frame_skip : int
     has_impulses : bool
+        Actions may be impulses.
+    has_pushes : bool
+        Disturbances may be impulses.
     then : callable, optional
         What each thread does with the worlds that it has stepped; see `physics.Stepper`.
 
     Attributes
     ----------
     wrench : (worlds, bodies, 6) float64
-        To be written: force [N] and torque [N m] of all steps.
+        To be written: command of all steps, force [N] and torque [N m].
     kick : (worlds, bodies, 6) float64
-        To be written: of the first step besides. The same array as `wrench` without impulses.
+        To be written: command of the first step besides. The same array as `wrench` without impulses.
     take : callable
-        Takes the steps.
+        Takes the steps without a disturbance.
     has_first : bool
         The first step is one of its own, of which the world's report does not tell: see `note_first`.
     """
 
-    def __init__(self, world: physics.World, frame_skip: int, has_impulses: bool, then=None):
-        self._world, self.has_first = world, has_impulses and frame_skip > 1
+    def __init__(self, world: physics.World, frame_skip: int, has_impulses: bool, has_pushes: bool = False, then=None):
+        self._world, self.has_first = world, (has_impulses or has_pushes) and frame_skip > 1
         self._last = physics.Stepper(world, frame_skip - 1 if self.has_first else frame_skip, then=then)
         self._first = physics.Stepper(world, 1) if self.has_first else None
         self.wrench = np.zeros((world.worlds, world.body_count, 6)) if has_impulses else self._last.wrench
@@ -43,14 +47,39 @@ class Steps:
         self.take = self._take_with_impulses if has_impulses else self._last
 
     def _take_with_impulses(self) -> None:
-        if self._first is not None:
-            np.add(self.wrench, self.kick, out=self._first.wrench)
-            self._first()
-            gravest(self._world.report_table, self._early)
-            self._last.wrench[...] = self.wrench
-        else:
-            np.add(self.wrench, self.kick, out=self._last.wrench)
-        self._last()
+        self.take_disturbed(None, None)
+
+    def take_disturbed(self, load: np.ndarray | None, push: np.ndarray | None) -> None:
+        """Take the steps under a load besides, and in the first one under a push besides: no commands.
+
+        Parameters
+        ----------
+        load, push : (worlds, bodies, 6) float64 or None
+            Force [N] and torque [N m], world frame.
+        """
+        command = self.wrench.copy()
+        first = command if self.kick is self.wrench else command + self.kick
+        both = load if push is None else push if load is None else load + push
+        try:
+            if self._first is not None:
+                self._run(self._first, first, both)
+                gravest(self._world.report_table, self._early)
+                self._run(self._last, command, load)
+            else:
+                self._run(self._last, first, both)
+        finally:
+            self.wrench[...] = command  # which may be the array of the stepper
+
+    def _run(self, stepper: physics.Stepper, command: np.ndarray, load: np.ndarray | None) -> None:
+        """Call a stepper with a command, and a load that is none."""
+        actuation = self._world.actuation
+        if actuation is None:
+            stepper.wrench[...] = command if load is None else command + load
+            stepper()
+            return
+        stepper.wrench[...] = command
+        with actuation.passed_by(load):
+            stepper()
 
     def note_first(self, status: np.ndarray) -> None:
         """Write into `status` (worlds,) what the first step came to, where it is OK otherwise."""

@@ -136,8 +136,10 @@ class Task(Starts):
         self.clock, self._began = 0, np.zeros(self.worlds, dtype=np.int64)
         self._allocate()
         disturbances = self.disturbances if isinstance(self.disturbances, (list, tuple)) else (self.disturbances,)
-        kicks = self._table.has_impulses or any(isinstance(each, Push) for each in disturbances)
-        self._advance = Steps(self.world, self.frame_skip, kicks, self.observer if self.compiled else None)
+        self._advance = Steps(
+            self.world, self.frame_skip, self._table.has_impulses, any(isinstance(each, Push) for each in disturbances),
+            self.observer if self.compiled else None,
+        )  # fmt: skip
         if dump_faults is not None:
             physics.Recorder(self.world, folder=dump_faults)
         self.disturbed = Disturbances(disturbances, self) if disturbances else None
@@ -187,8 +189,13 @@ class Task(Starts):
 
     @property
     def wrench(self) -> NDArray[np.float64]:
-        """(worlds, bodies, 6) float64, applied in the last step: force [N], torque [N m], world frame."""
+        """(worlds, bodies, 6) float64, commanded by the last action: force [N], torque [N m], world frame."""
         return self._advance.wrench
+
+    @property
+    def load(self) -> NDArray[np.float64]:
+        """(worlds, bodies, 6) float64: `wrench` with the gusts of the last step."""
+        return self.wrench if self.disturbed is None else self.wrench + self.disturbed.load
 
     @property
     def control_dt(self) -> float:
@@ -207,7 +214,7 @@ class Task(Starts):
 
     @property
     def has_impulses(self) -> bool:
-        """An action, or a disturbance, may be an impulse."""
+        """An action may be an impulse."""
         return self._advance.kick is not self._advance.wrench
 
     @cached_property
@@ -297,9 +304,10 @@ class Task(Starts):
         if bad >= 0:
             raise ValueError(f"action of world {bad} is {self.given[bad].tolist()}; allowed are finite numbers")
         advance = self._advance
-        if self.disturbed is not None:
-            self.disturbed.act(advance.wrench, advance.kick)
-        advance.take()
+        if self.disturbed is None:
+            advance.take()
+        else:
+            advance.take_disturbed(*self.disturbed.act())
         gravest(self.world.report_table, self.status)
         if advance.has_first:
             advance.note_first(self.status)

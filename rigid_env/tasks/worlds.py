@@ -114,7 +114,7 @@ class Worlds:
 
     @property
     def wrench(self) -> np.ndarray:
-        """(n, bodies, 6) float64. Wrench of the last action: force [N] and torque [N m], world frame."""
+        """(n, bodies, 6) float64. Wrench of the last action alone: force [N] and torque [N m], world frame."""
         return self._take(self._task.wrench)
 
     @property

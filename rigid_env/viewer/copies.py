@@ -55,7 +55,7 @@ def fitted(snapshot: physics.Snapshot, world: physics.World) -> physics.Snapshot
     """
     given, own = (dict(zip(KEPT, each.arrays)) for each in (snapshot, world.snapshot()))
     arrays = [np.zeros_like(own[name]) if name in FORGOTTEN else given[name] for name in own]
-    return physics.Snapshot(tuple(arrays), snapshot.time, snapshot.actuation)
+    return physics.Snapshot(tuple(arrays), snapshot.time, snapshot.actuation, scene=world.scene_settings)
 
 
 def copied(world: physics.World, accuracy: Preset | Accuracy | None = None, dt: float | None = None) -> physics.World:

@@ -30,17 +30,22 @@ class HandOfUser:
 
     Attributes
     ----------
-    load : (bodies, 6) float64 or None
-        Force [N] and torque [N m] of the coming control step.
+    pull : (bodies, 6) float64 or None
+        Force [N] and torque [N m] of the user in the coming control step.
     """
 
     def __init__(self, inner: Disturbances | None):
-        self.inner, self.load = inner, None
+        self.inner, self.pull = inner, None
 
     @property
     def arrays(self) -> dict[str, np.ndarray]:
         """Arrays of the task's own disturbances."""
         return {} if self.inner is None else self.inner.arrays
+
+    @property
+    def load(self) -> np.ndarray | float:
+        """Loads of the task's own disturbances in the last control step; the user's hand is drawn as a spring."""
+        return 0.0 if self.inner is None else self.inner.load
 
     def due(self) -> np.ndarray:
         """Worlds in which a disturbance of the task starts in the coming control step."""
@@ -51,12 +56,12 @@ class HandOfUser:
         if self.inner is not None:
             self.inner.begin(rows)
 
-    def act(self, wrench: np.ndarray, kick: np.ndarray) -> None:
-        """Add what acts in the coming control step."""
-        if self.inner is not None:
-            self.inner.act(wrench, kick)
-        if self.load is not None:
-            wrench[0] += self.load
+    def act(self) -> tuple[np.ndarray | None, np.ndarray | None]:
+        """Load (1, bodies, 6) of the coming control step, and of its first physics step besides, or None."""
+        load, push = (None, None) if self.inner is None else self.inner.act()
+        if self.pull is None:
+            return load, push
+        return (self.pull[None] if load is None else load + self.pull), push
 
 
 def copied_env(env: gym.Env, accuracy: Preset | Accuracy | None = None) -> gym.Env:

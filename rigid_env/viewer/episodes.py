@@ -108,8 +108,8 @@ class LiveEnv(WorldSubject):
 
     def restart(self, seed: int) -> None:
         put_chain(self._env, self._first.chain, is_other=True)
-        self.seed, self._generator = seed, np.random.default_rng(seed)
         self._observation, _ = self._env.reset(seed=seed)
+        self.seed, self._generator = seed, np.random.default_rng(seed)
         self._is_ended, self._episode, self._shift = False, (0, 0.0), 0.0
         self.listener.begin()
         self.listener.pairs, self.listener.is_changed = set(), False
@@ -123,11 +123,11 @@ class LiveEnv(WorldSubject):
             self._is_ended, self._episode = False, (self._episode[0] + 1, 0.0)
         action = self._act() if record is None else record
         hand = self._task.disturbed
-        hand.load = load
+        hand.pull = load
         try:
             self._observation, reward, is_over, is_cut, _ = self._env.step(action)
         finally:
-            hand.load = None
+            hand.pull = None
         self._is_ended = bool(is_over or is_cut)
         self._episode = self._episode[0], self._episode[1] + float(reward)
         return action

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Iterable
+from contextlib import nullcontext
 from dataclasses import replace
 
 import numpy as np
@@ -83,10 +84,10 @@ class Ghost:
             if call.start is not None:
                 self.start(call.start)
             clock = time.perf_counter()
-            self.world.step(call.wrench, call.steps, call.dt)
+            _take(self.world, call)
             self.cost.add(time.perf_counter() - clock, call.steps * call.dt)
             if self._looser is not None:
-                self._looser.step(call.wrench, call.steps, call.dt)
+                _take(self._looser, call)
 
     def distance(self, world: physics.World) -> tuple[float, float]:
         """Largest distance of a body's centre of mass from the ghost's [m], and largest angle between the two [rad]."""
@@ -114,6 +115,12 @@ class Ghost:
     def frame(self) -> Frame:
         """Picture of it, without arrows."""
         return world_frame(self.world, arrows=False)
+
+
+def _take(world: physics.World, call: Call) -> None:
+    """Take the steps of a call."""
+    with nullcontext() if world.actuation is None else world.actuation.passed_by(call.past):
+        world.step(call.wrench, call.steps, call.dt)
 
 
 def _looser(best: physics.Accuracy, is_refined: bool) -> physics.Accuracy:

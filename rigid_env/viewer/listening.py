@@ -27,12 +27,15 @@ class Call(NamedTuple):
         Length of one [s].
     start : Snapshot or None
         State before the call, where the world was put there from outside.
+    past : (1, bodies, 6) float64 or None
+        Force and torque that went past an actuator.
     """
 
     wrench: np.ndarray
     steps: int
     dt: float
     start: physics.Snapshot | None
+    past: np.ndarray | None = None
 
 
 class Listener:
@@ -88,7 +91,8 @@ class Listener:
         """A call is about to be made."""
         start = self._world.snapshot() if self.is_changed else None
         self.is_changed = False
-        self.calls.append(Call(wrench.copy(), steps, dt, start))
+        past = None if self._world.actuation is None else self._world.actuation.past
+        self.calls.append(Call(wrench.copy(), steps, dt, start, None if past is None else past.copy()))
         self._from = self._world.time
         self._clock = time.perf_counter()
 

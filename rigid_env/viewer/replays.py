@@ -85,7 +85,8 @@ class PlayedRecording(WorldSubject):
             self._steppers[steps, dt] = physics.Stepper(self.world, steps, dt)
         stepper = self._steppers[steps, dt]
         stepper.wrench[0] = recording.wrenches[k]  # as it was: `World.step` would refuse one that is not finite
-        stepper()
+        with recording.past_actuator(self.world, k):
+            stepper()
         self._call += 1
 
     def events(self) -> list[Event]:

@@ -63,8 +63,13 @@ class Run:
         self._sample()
 
     def restart(self, seed: int) -> None:
-        """Begin anew; the ghost goes along."""
-        self.subject.restart(seed)
+        """Begin anew; the ghost goes along. After an error of a user's function all is as it was."""
+        before = self.subject.snapshot()
+        try:
+            self.subject.restart(seed)
+        except Exception:
+            self.subject.restore(before)
+            raise
         if self.ghost is not None:
             self.ghost.start(self.subject.world.snapshot())
         self._begin()

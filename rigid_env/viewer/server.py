@@ -85,8 +85,8 @@ class Viewer:
         is_new = self._session.advance(seconds) > 0 or is_new
         look_time = self._session.time
         if (is_new or look_time != self._drawn) and self._server.get_clients():
-            self._stage.show(self._session.look())
             self._drawn = look_time
+            self._guarded(lambda: self._stage.show(self._session.look()))
         return is_new
 
     def stop(self) -> None:
@@ -105,7 +105,7 @@ class Viewer:
             time.sleep(left)
 
     def _answer(self) -> bool:
-        """Do what was posted; a mistake is told in the panel. Whether there was anything."""
+        """Do what was posted. Whether there was anything."""
         is_any = False
         while True:
             try:
@@ -113,10 +113,17 @@ class Viewer:
             except queue.Empty:
                 return is_any
             is_any = True
-            try:
-                act()
-            except ValueError as error:
-                self._tell(str(error))
+            self._guarded(act)
+
+    def _guarded(self, act: Callable[[], Any]) -> None:
+        """Do something; a mistake of the user, or an error in a function of the user's, is told in the page."""
+        try:
+            act()
+        except ValueError as error:
+            self._tell(str(error))
+        except Exception as error:
+            self._session.pause()
+            self._tell(f"{type(error).__name__}: {error}")
 
     def _tell(self, text: str) -> None:
         for client in self._server.get_clients().values():

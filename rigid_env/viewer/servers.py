@@ -1,7 +1,6 @@
 """Servers of viser that print nothing: their banner does not tell how to reach them from elsewhere.
 
-A server can be up before there is anything to show, and before the engine is imported: the browser loads the page
-meanwhile, which takes as long.
+A server can be up before there is anything to show: the browser loads the page meanwhile, which takes as long.
 """
 
 from __future__ import annotations

@@ -176,7 +176,7 @@ class Session(Controls):
                 break
 
     def reset(self, seed: int | None = None) -> None:
-        """Begin anew, with the sliders where they are.
+        """Begin anew, with the sliders where they are; an error of a user's function stands in `message` instead.
 
         Parameters
         ----------
@@ -192,7 +192,8 @@ class Session(Controls):
         self._poll()
         self._note = ""
         self._pace.stop()
-        self._run.restart(seed)
+        if not self._safely(lambda: self._run.restart(seed)):
+            return
         for name, value in self._sliders.items():
             self._run.give(name, value)
 

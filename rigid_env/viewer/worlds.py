@@ -54,7 +54,11 @@ class LiveWorld(WorldSubject):
 
     def step(self, load=None, record=None):
         self.listener.begin()
-        self.world.step(load)
+        if self.world.actuation is None:
+            self.world.step(load)
+        else:  # the user's hand is no command
+            with self.world.actuation.passed_by(None if load is None else load[None]):
+                self.world.step()
         return None
 
     def snapshot(self) -> State:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import json
+import tempfile
 
 import numpy as np
 import pytest
@@ -62,7 +63,10 @@ def limited(tiny, is_exhaustive):
     return change(tiny, env_kwargs={"max_episode_steps": 30, **tiny.env_kwargs}), 30
 
 
-def test_run_writes_its_files(limited, tmp_path):
+def test_run_writes_its_files(limited, tmp_path, monkeypatch):
+    (tmp_path / "temporary").mkdir()
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path / "temporary"))
+    monkeypatch.delenv("SB3_LOGDIR", raising=False)
     tiny, length = limited
     run = RunFolder(tmp_path / "run")
     config = change(tiny, max_steps=8 * (length + 1))  # every world ends its first episode
@@ -82,6 +86,7 @@ def test_run_writes_its_files(limited, tmp_path):
     _, policy = load_policy(run)
     observations = make_vector_env(tiny.env, 2).reset(seed=1)[0]
     np.testing.assert_array_equal(policy(observations), result["policy"](observations))
+    assert list((tmp_path / "temporary").glob("SB3-*")) == []  # and no others
 
 
 def test_resumed_run_ends_with_the_bits_of_an_uninterrupted_one(tiny, tmp_path):

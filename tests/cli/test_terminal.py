@@ -1,5 +1,6 @@
 """Tables and lines at any width: what is printed is whole."""
 
+import contextlib
 import io
 import os
 import pty
@@ -11,6 +12,7 @@ import pytest
 from rich.console import Console
 from rich.text import Text
 
+from rigid_env.lab.measure.processes import killed_after
 from rigid_env.terminal import Column, Table, make_console, number_columns, say
 
 WIDTHS = (40, 60, 80, 120)
@@ -116,12 +118,11 @@ def test_a_terminal_sets_the_width(width):
     process = subprocess.Popen([sys.executable, "-c", PROGRAM], stdout=slave, env=environment(TERM="xterm"))
     os.close(slave)
     text = b""
-    try:
-        while part := os.read(master, 4096):
-            text += part
-    except OSError:  # the other side is closed
-        pass
-    assert process.wait() == 0
+    with killed_after(process, 300.0):
+        with contextlib.suppress(OSError):  # the other side is closed
+            while part := os.read(master, 4096):
+                text += part
+        assert process.wait() == 0
     lines = re.sub(r"\x1b\[[0-9;?]*[a-zA-Z]", "", text.decode()).splitlines()
     assert 0.9 * width < max(map(len, lines)) <= width
     assert any(line.rstrip().endswith("1.25") for line in lines)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import tempfile
 import warnings
 
 import numpy as np
@@ -174,8 +175,10 @@ def test_evaluate_policy_counts_the_scripted_controllers_successes():
     assert np.mean(successes) > 0.8
 
 
-def test_ppo_runs_and_logs_success():
+def test_ppo_runs_and_logs_success(monkeypatch, tmp_path):
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
     model = PPO("MlpPolicy", make(4, max_episode_steps=8), n_steps=16, batch_size=32, n_epochs=1, device="cpu")
     model.learn(128)
     assert len(model.ep_success_buffer) > 0
     assert model.ep_info_buffer[0]["l"] == 8
+    assert list(tmp_path.glob("SB3-*")) == []  # logs of tests stay among the files of tests

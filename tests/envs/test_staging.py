@@ -59,7 +59,7 @@ def test_all_of_the_motion_is_in_sight():
 
 
 @pytest.mark.parametrize(("up", "has_floor"), [((0, 1, 0), False), ((0, 0, 1), True)])
-def test_a_flight_of_one_body_is_in_sight_with_path_and_ground(up, has_floor):
+def test_a_flight_of_one_body_is_in_sight_with_its_path_and_the_floor_if_there_is_one(up, has_floor):
     pytest.importorskip("pygame")
     up = np.array(up, dtype=float)
     t = np.linspace(0.0, 1.0, 2001)[:, None, None]
@@ -68,10 +68,12 @@ def test_a_flight_of_one_body_is_in_sight_with_path_and_ground(up, has_floor):
     walls = [physics.HalfSpace(up)] if has_floor else []
     stage, frame = staged([physics.Sphere(0.11, 0.4, pos=path[0, 0])], walls, up, path)
     assert 2.0 * frame.bodies[0].dimensions.max() == pytest.approx(FLYING_SIZE)
-    assert stage.notes == ("grid 10 m, body drawn 15 times as large",)
-    (ground,) = frame.walls
-    assert ground.normal == pytest.approx((0.0, 1.0, 0.0), abs=1e-12)
-    assert (frame.path[:, 1] > ground.offset).all()
+    scale = "grid 10 m" if has_floor else "flight 80 m across"
+    assert stage.notes == (f"{scale}, body drawn 15 times as large",)
+    assert len(frame.walls) == has_floor
+    for ground in frame.walls:
+        assert ground.normal == pytest.approx((0.0, 1.0, 0.0), abs=1e-12)
+        assert (frame.path[:, 1] > ground.offset).all()
     assert len(frame.path) <= PATH_POINTS
     assert np.ptp(frame.path, axis=0).max() == pytest.approx(80.0 / 2.0)  # a cell of 10 m is drawn 5 m long
     assert frame.path[0] == pytest.approx(frame.bodies[0].pos, abs=1e-9)
@@ -86,6 +88,13 @@ def test_a_flight_of_one_body_is_in_sight_with_path_and_ground(up, has_floor):
     assert (pixels <= (640, 400)).all()
     x, y = pixels[len(pixels) // 4].astype(int)
     assert (with_path[y, x] != without[y, x]).any()
+
+
+def test_a_wall_that_is_far_from_a_flight_is_left_out():
+    path = np.linspace((0.0, 1000.0, 0.0), (80.0, 1000.0, 0.0), 5)[:, None]
+    stage, frame = staged([physics.Sphere(0.11, 0.4, pos=path[0, 0])], [physics.HalfSpace((0, 1, 0))], path=path)
+    assert frame.walls == ()
+    assert stage.notes[0].startswith("flight 80 m across")
 
 
 def test_several_bodies_that_go_far_are_followed_without_walls():

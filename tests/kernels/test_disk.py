@@ -17,6 +17,7 @@ import pytest
 
 from physics.kernels.compile import cache_folder
 from physics.kernels.compile.fused import cache_files
+from rigid_env.lab.measure.processes import killed_after
 from tests.tiers.sweep import sweep
 
 ROOT = str(Path(__file__).parents[2])
@@ -303,5 +304,6 @@ def test_processes_at_once_and_killed_ones(program, kept, tmp_path, is_exhaustiv
     assert program.run(tmp_path) == (kept[1], 1, [])
     shutil.rmtree(tmp_path)
     both = [subprocess.Popen(command, env=environment, stdout=subprocess.PIPE, text=True) for _ in range(2)]
-    assert [each.communicate(timeout=200)[0].split()[0] for each in both] == [kept[1]] * 2
+    with killed_after(both[0], 200.0), killed_after(both[1], 200.0):
+        assert [each.communicate()[0].split()[0] for each in both] == [kept[1]] * 2
     assert program.run(tmp_path) == (kept[1], 1, [])

@@ -57,7 +57,9 @@ class Copy:
     def __init__(self, folder: Path):
         self._folder, self._process, self.is_stopped = folder, None, False
         command = ["git", "ls-files", "-z", "--cached", "--others", "--exclude-standard"]
-        listed = subprocess.run(command, cwd=ROOT, capture_output=True, check=True, text=True).stdout
+        listed = subprocess.run(
+            command, cwd=ROOT, capture_output=True, check=True, text=True, timeout=TIME_LIMIT
+        ).stdout
         for name in filter(None, listed.split("\0")):
             if (ROOT / name).is_file():
                 (folder / name).parent.mkdir(parents=True, exist_ok=True)

@@ -59,6 +59,22 @@ WORLD = [
         'parts["actuator_output"] = 0.0 * output',
         "test_snapshot_file.py::test_commands_on_their_way_are_in_the_file",
     ),
+    _mutant(
+        "world-other-scene",
+        "A snapshot of another scene is taken where the sizes of arrays agree.",
+        "world/restoring.py",
+        "        _check_scene(world, snapshot)",
+        "        pass",
+        "test_restore.py::test_a_snapshot_of_another_scene_is_refused_also_where_the_sizes_of_arrays_agree",
+    ),
+    _mutant(
+        "world-age",
+        "Commands of a delayed actuator do not age.",
+        "world/actuator.py",
+        "(age + dt, command) for age",
+        "(age, command) for age",
+        "test_actuator.py::test_a_step_of_the_command_arrives_as_lag_and_dead_time_say",
+    ),
 ]
 
 IO = [
@@ -82,8 +98,8 @@ IO = [
         "io-wrench",
         "A recorder keeps the array of wrenches itself instead of a copy.",
         "io/recorder.py",
-        "chapter.loads.append((wrench.copy(), steps, dt))",
-        "chapter.loads.append((wrench, steps, dt))",
+        "_Load(wrench.copy(), None",
+        "_Load(wrench, None",
         "test_recorder.py::test_a_fault_is_written_once_and_says_why",
     ),
     _mutant(

@@ -127,8 +127,7 @@ def test_set_state_lets_a_world_begin_at_rest_and_leaves_the_others_alone():
     built.set_state(pos=still, linvel=still, angvel=still, quat=[[[1.0, 0, 0, 0]]], worlds=[0])
     for run in (built, fresh, other):
         run.step(-wrench, steps=8)
-    # `fresh` is at another time: where treads begin is known to a rounding of the time.
-    assert built.state[0] == pytest.approx(fresh.state[0], abs=1e-14)
+    assert np.array_equal(built.state[0], fresh.state[0])  # which is at another time
     assert np.array_equal(built.state[1], other.state[1])
 
 
@@ -141,6 +140,39 @@ def test_a_world_does_not_depend_on_its_batch():
         batch.step(wrench)
         alone.step(wrench[3:4])
     assert np.array_equal(batch.state[3], alone.state[0])
+
+
+@pytest.mark.parametrize("delay", [0.034, 0.005, 0.0123])
+def test_a_world_does_not_depend_on_when_it_began(delay):
+    """A batch whose worlds begin anew at times of their own, each against one that stands alone."""
+    rng, given = np.random.default_rng(2), {"lag": 0.05, "delay": delay, "dt": 0.01}
+    batch, singles = world(worlds=4, **given), [world(**given) for _ in range(4)]
+    for step in range(60):
+        if step in (7, 20, 33):  # one of them begins anew, and its time, too, where it stands alone
+            k = step % 4
+            batch.set_state(*((0, 0, 0), (1, 0, 0, 0), (0, 0, 0), (0, 0, 0)), worlds=[k])
+            singles[k] = world(**given)
+        wrenches = rng.normal(size=(4, 1, 6))
+        batch.step(wrenches)
+        for single, wrench in zip(singles, wrenches):
+            single.step(wrench[None])
+    for k, single in enumerate(singles):
+        assert np.array_equal(batch.state[k], single.state[0])
+
+
+def test_loads_past_the_actuator_act_unchanged_and_only_in_their_block():
+    built, plain = world(limit_force=5.0, lag=0.1), world()
+    load = np.array([[[30.0, 0, 0, 0, 0, 0.5]]])
+    with built.actuation.passed_by(load):
+        built.step(steps=3)
+    plain.step(load, steps=3)
+    assert built.state == pytest.approx(plain.state, abs=1e-14)
+    speed = built.linvel[0, 0, 0]
+    built.step()
+    assert built.linvel[0, 0, 0] == speed
+    with pytest.raises(ValueError, match="steps is 0"), built.actuation.passed_by(load):
+        built.step(steps=0)
+    assert built.actuation.past is None
 
 
 def test_an_actuator_without_effect_leaves_every_bit_and_costs_no_parameters():

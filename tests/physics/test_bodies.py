@@ -92,6 +92,26 @@ def test_a_ball_turns_the_block_that_it_hits_off_centre(restitution, ball_first,
 
 
 @pytest.mark.compiled
+@pytest.mark.parametrize("floor", ["body", "wall"])
+@pytest.mark.parametrize("is_first", [True, False])
+def test_a_pair_has_the_mean_friction_and_the_larger_restitution_and_a_wall_the_body_s(floor, is_first):
+    """A ball that slides all through its impact loses μ (1 + e) of its normal speed along the floor."""
+    ball = physics.Sphere(0.5, 1.0, pos=(0, 0.6, 0), linvel=(5, -1, 0))
+    other = (
+        physics.Block((10, 1, 10), 1e12, pos=(0, -0.5, 0))
+        if floor == "body"
+        else physics.Sphere(0.5, 1.0, pos=(0, 9, 0))
+    )
+    bodies, walls = [ball, other] if is_first else [other, ball], FLOOR if floor == "wall" else []
+    world = physics.World(physics.Scene(bodies, walls, [physics.Contact(0.0), physics.Friction()]), dt=0.01)
+    order = slice(None) if is_first else slice(None, None, -1)
+    mu, e = np.array([0.1, 0.4])[order], np.array([0.3, 0.6])[order]
+    world.set_parameters(friction=mu[None], restitution=e[None])
+    world.step(steps=30)
+    mu, e = (0.2, 0.6) if floor == "body" else (0.1, 0.3)
+    np.testing.assert_allclose(world.linvel[0, 0 if is_first else 1], (5 - mu * (1 + e), e, 0), rtol=0, atol=1e-9)
+
+
 def test_a_plastic_landing_stops_in_front_of_what_it_meets():
     """At whatever moment of a step it comes: eight heights, spread over the way of one step."""
     speed, dt = np.sqrt(2 * G * 0.5), 0.01

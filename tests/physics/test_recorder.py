@@ -49,6 +49,27 @@ def test_a_recording_is_replayed_bit_for_bit_world_by_world(make, tmp_path):
         assert np.array_equal(replay.reports[-1].penetration, world.report.penetration[[k]])
 
 
+def test_loads_past_an_actuator_are_replayed_and_told_by_the_format(tmp_path):
+    scene = physics.Scene([physics.Sphere(0.5, 2.0)], effects=[physics.Actuator(limit_force=5.0)])
+    world = physics.World(scene, worlds=2)
+    recorder = physics.Recorder(world)
+    rng = np.random.default_rng(0)
+    formats = []
+    for turn in range(2):
+        for k in range(6):
+            load = rng.uniform(-50, 50, (2, 1, 6)) if turn and k % 2 else None
+            with world.actuation.passed_by(load):
+                world.step(rng.uniform(-9, 9, (2, 1, 6)), steps=1 + k % 2)
+        for k in range(2):
+            path = recorder.save(tmp_path / "run.npz", world=k)
+            replay = physics.Recording.load(path).replay()
+            assert replay.is_identical
+            assert np.array_equal(replay.states[-1], world.state[k : k + 1])
+            with np.load(path) as file:
+                formats.append(json.loads(str(file["head"]))["format"])
+    assert formats == [1, 1, 2, 2]  # a reader that knows no such loads refuses a file that has some
+
+
 def test_a_fault_is_written_once_and_says_why(tmp_path):
     """A torque that overflows in world 1, given to the Stepper unchecked."""
     world = physics.World(scenes.tumble(), worlds=2, dt=0.01)

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 import physics
 from physics.world.snapshot import KEPT
-from tests.physics.test_restore import CASES, advanced, blocks, go_on, lagging
+from tests.physics.test_restore import CASES, advanced, blocks, go_on, lagging, pushes
 
 
 @pytest.mark.parametrize("name", CASES)
@@ -46,6 +46,23 @@ def test_commands_on_their_way_are_in_the_file(tmp_path):
     lagging(2).restore(fresh)
 
 
+def test_a_file_of_the_first_format_goes_on(tmp_path):
+    """It has the times of commands instead of their ages, and no scene."""
+    source = advanced("an actuator with memory")
+    with np.load(source.snapshot().save(tmp_path / "kept.npz")) as file:
+        parts = dict(file)
+    head = json.loads(str(parts["head"]))
+    del head["scene"]
+    parts["actuator_times"] = parts["time"] - parts.pop("actuator_ages")
+    np.savez(tmp_path / "kept.npz", **{**parts, "head": json.dumps({**head, "format": 1})})
+    batch = lagging(3)
+    batch.restore(physics.Snapshot.load(tmp_path / "kept.npz"))
+    for k in range(10):
+        batch.step(pushes(batch, k))
+        source.step(pushes(batch, k))
+    np.testing.assert_allclose(batch.state, source.state, rtol=0, atol=1e-13)  # ages by a rounding of the time
+
+
 def test_the_compiler_is_in_the_file(tmp_path):
     other = dataclasses.replace(blocks(1).snapshot(), compiler="numba")
     assert "compiler=numba" in repr(physics.Snapshot.load(other.save(tmp_path / "kept.npz")))
@@ -68,17 +85,24 @@ class Loud:
         return print, ("code of a file was run",)
 
 
+def with_head(**changes):
+    return lambda path: rewritten(path, head=changes)
+
+
 FOREIGN = {
-    "newer": (lambda path: rewritten(path, head={"format": 2}), "has format 2; allowed are formats up to 1"),
-    "another kind": (lambda path: rewritten(path, head={"kind": "recording"}), r"is no snapshot \(it is a recording\)"),
-    "no format": (lambda path: rewritten(path, head={"format": "1"}), r"\(its format is '1'; allowed are integers"),
+    "newer": (with_head(format=3), "has format 3; allowed are formats up to 2"),
+    "no compiler": (with_head(compiler=7), r"\(compiler of its head is 7; allowed is the name"),
+    "no scene": (with_head(scene=["a"]), r"\(scene of its head is \['a'\]; allowed is null and"),
+    "half a scene": (with_head(scene={"walls": 3}), r"\(scene of its head is {'walls': 3}; allowed"),
+    "another kind": (with_head(kind="recording"), r"is no snapshot \(it is a recording\)"),
+    "no format": (with_head(format="1"), r"\(format of its head is '1'; allowed is an integer"),
     "no state": (lambda path: rewritten(path, state=None), r"is no snapshot \(there is no 'state.*'\); allowed is"),
     "no axes": (lambda path: rewritten(path, memory=np.zeros(4)), r"\(memory has shape \(4,\)\)"),
     "other rows": (lambda path: rewritten(path, params=np.zeros((3, 35))), r"\(params has shape \(3, 35\)\)"),
     "other columns": (lambda path: rewritten(path, state=np.zeros((2, 9))), r"\(state has 9 columns instead of 16\)"),
     "other numbers": (lambda path: rewritten(path, gravity=np.zeros((2, 3), np.float32)), "than 64-bit floats"),
     "no time": (lambda path: rewritten(path, time=np.nan), r"\(its time is nan; allowed are finite numbers\)"),
-    "half an actuator": (lambda path: rewritten(path, actuator_output=np.zeros((2, 6))), "there is no 'actuator_times"),
+    "half an actuator": (lambda path: rewritten(path, actuator_output=np.zeros((2, 6))), "there is no 'actuator_ages"),
     "a pickle": (lambda path: rewritten(path, memory=np.array([Loud()])), r"allow_pickle=False"),
     "text": (lambda path: path.write_text("state"), "is no snapshot; allowed is what Snapshot.save writes"),
     "nothing": (lambda path: path.write_bytes(b""), "is no snapshot; allowed is what Snapshot.save writes"),

@@ -12,6 +12,7 @@ import physics
 import rigid_env
 from physics.kernels.state import layout as at
 from rigid_env.tasks import Force, Impulse, Task, Wrench, observe
+from rigid_env.tasks.describe import describe
 from tests.tasks.conftest import Free, started
 
 pytestmark = pytest.mark.interpreted
@@ -43,6 +44,21 @@ def test_a_wrench_is_clipped_and_shortened_to_its_limits(action):
         expected = limit * vector / max(1.0, np.linalg.norm(vector))
         # A norm, a quotient and a product: a few roundings of the limit.
         np.testing.assert_allclose(task.wrench[0, 0, ours], expected, rtol=1e-14, atol=1e-14 * limit)
+
+
+def test_the_reach_of_a_hull_is_the_farthest_along_an_axis_from_its_centre_of_mass():
+    """A cone over a square of 2 m, 4 m high: its centre of mass is 1 m above the square, 3 m below the tip."""
+    cone = physics.Hull([(1, 0, 1), (1, 0, -1), (-1, 0, 1), (-1, 0, -1), (0, 4, 0)], 6.0)
+
+    class Turning(Free):
+        scene = physics.Scene([cone], effects=[])
+        actions = Wrench(0, force=0.0, torque=0.5)
+
+    task = started(Turning())
+    task.step(np.array([[0.0, 0.0, 1.0]]))
+    assert task.wrench[0, 0, 5] == pytest.approx(0.5 * 6.0 * 9.81 * 3.0, rel=1e-12)
+    told = "(longest half extent, of a hull the farthest along a body axis from the centre of mass)"
+    assert f"a the reach of the body {told}" in " ".join(describe(task).split())
 
 
 @pytest.mark.parametrize("frame", ["world", "body"])

@@ -203,7 +203,10 @@ def everything(envs) -> tuple:
         (lambda envs, s: envs.set_state(None), ("state", "None", "get_state")),
         (lambda envs, s: envs.set_state(s["reorient"]), ("BlockReorient", "states of BlockReach")),
         (lambda envs, s: envs.set_state(s["pixels"]), ("pictures", "same settings")),
-        (lambda envs, s: envs.set_state(s["actuated"]), ("effects", "lag=0.1", "Contact, Friction, Gravity")),
+        (
+            lambda envs, s: envs.set_state(s["actuated"]),
+            ("effects", "lag=0.1", "Contact with restitution, Friction, Gravity"),
+        ),
         (lambda envs, s: envs.set_state(s["three"]), ("3", "2 worlds")),
         (lambda envs, s: envs.set_state(s["own"], worlds=[2]), ("worlds", "2", "0 to 1")),
         (lambda envs, s: envs.set_state(s["own"], source=[0, 5]), ("source", "5", "0 to 1")),
@@ -312,8 +315,8 @@ def test_a_file_without_settings_is_refused(tmp_path):
     with np.load(path) as file:
         parts = dict(file)
     head = json.loads(str(parts["head"]))
-    lacking = "has format 1, which does not hold settings of the task; allowed is format 2"
-    for number, words in ((1, lacking), (3, "has format 3; allowed is format 2")):
+    lacking = "has format 1, which does not hold all settings of the task; allowed is format 3"
+    for number, words in ((1, lacking), (4, "has format 4; allowed is format 3")):
         np.savez(path, **{**parts, "head": json.dumps({**head, "format": number})})
         with pytest.raises(ValueError, match=words):
             TaskState.load(path)

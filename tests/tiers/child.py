@@ -15,6 +15,10 @@ from pathlib import Path
 import pytest
 
 from physics.kernels.compile.compiler_choice import PYTHON, VARIABLE
+from rigid_env.lab.measure.processes import killed_after, wait_for_end
+
+SILENCE = 1600.0
+"""Time without a report after which its process is killed [s]; the time-out of a test in pyproject.toml is shorter."""
 
 
 class Child:
@@ -45,15 +49,16 @@ class Child:
         self._process.stdin.flush()
 
     def read(self) -> dict | None:
-        """Wait for the next report; None if the process has ended."""
-        line = self._process.stdout.readline()
+        """Wait for the next report; None if the process has ended, or was killed after `SILENCE`."""
+        with killed_after(self._process, SILENCE):
+            line = self._process.stdout.readline()
         return json.loads(line) if line else None
 
     def end(self) -> None:
-        """Let the process end."""
+        """Let the process end; one that does not is killed."""
         self._process.stdin.close()
         self._process.stdout.close()
-        self._process.wait()
+        wait_for_end(self._process)
 
 
 class _Relay:

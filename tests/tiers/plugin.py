@@ -68,6 +68,11 @@ class _Interpret:
         item.session._setupstate.teardown_exact(nextitem)  # fixtures that the test before it left for it
         return True
 
+    @pytest.hookimpl(optionalhook=True)
+    def pytest_timeout_set_timer(self, item):
+        """Leave the time-out of a test to the process that runs it."""
+        return True if _is_interpreted(item) else None
+
     def pytest_sessionfinish(self):
         if self._child is not None:
             self._child.end()

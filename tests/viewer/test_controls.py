@@ -32,6 +32,26 @@ def test_a_kick_gives_its_impulse(what):
     assert momentum(session) == pytest.approx((0.0, 9.0, 0.0), abs=1e-6)
 
 
+def test_no_actuator_stands_between_the_hand_and_a_body(tmp_path):
+    """Hold for a scene and an environment, with a ghost and on the way back; 9 N s in a step of 0.01 s are 900 N."""
+    weak = physics.Actuator(limit_force=1.0)
+    ball = physics.Scene([physics.Sphere(0.5, scenes.MASS)], effects=[physics.Gravity((0, 0, 0)), weak])
+    still = {"policy": lambda observations: np.zeros((1, 6))}
+    for session in (session_of(ball), session_of(rigid_env.BlockReachEnv(gravity=1e-9, effects=[weak]), **still)):
+        session.set_ghost(True)
+        session.wait()
+        world = session.subject.world
+        session.kick(0, (0.0, 9.0, 0.0))
+        take(session, 3)
+        assert momentum(session) == pytest.approx((0.0, 9.0, 0.0), abs=1e-6)
+        assert session.samples.error[-1] < 1e-9
+        now = state_of(session)
+        session.seek(0.0)
+        take(session, 3)
+        assert np.array_equal(state_of(session), now)
+        assert world.actuation.past is None
+
+
 @pytest.mark.parametrize("dt", [0.01, 0.1])
 def test_a_drag_brings_the_point_to_the_target(dt):
     """Held at a corner: the body swings about it for ever, but the spring itself is calm, whatever the step."""

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import signal
 import socket
+import subprocess
+import sys
 from dataclasses import replace
 from types import SimpleNamespace
 
@@ -17,6 +20,7 @@ pytest.importorskip("viser")
 import rigid_env
 from physics import Block, Drag, Event, Gravity, Scene, Wind, World, scenes
 from rigid_env.cli import app
+from rigid_env.cli.names import CANONICAL
 from rigid_env.viewer import session as session_module
 from rigid_env.viewer.event_list import ROWS, EventList, told
 from rigid_env.viewer.plots import SMALLEST, Plot, drawn, line, thinned
@@ -25,6 +29,7 @@ from rigid_env.viewer.server import Viewer
 from rigid_env.viewer.servers import LAST_PORT, directions, free_port, server_for_a_while, start_viewer_server
 from rigid_env.viewer.session import Session
 from rigid_env.viewer.subject import open_subject
+from tests.tasks.conftest import Slide
 
 NO_WALL = -1
 
@@ -88,6 +93,49 @@ def test_what_is_posted_is_done_in_the_next_turn_and_a_mistake_changes_nothing(v
     viewer._inbox.put(lambda: session.set_friction(-1.0))  # a ValueError: told in the panel
     viewer.turn(0.0)
     assert session.settings["friction"] == 0.9
+
+
+class NextFails(Slide):
+    """A task whose episodes take three steps, and begin while `is_right`."""
+
+    is_right = True
+
+    def place(self, drawn):
+        if not self.is_right:
+            raise KeyError("mass")
+        return {}
+
+    def failure(self, worlds):
+        return worlds.steps >= 3
+
+
+def test_an_error_of_a_users_function_pauses_the_run_and_the_viewer_goes_on(monkeypatch):
+    """At a reset, in the next episode and in a picture."""
+    session = Session(open_subject(rigid_env.TaskEnv(NextFails)))
+    with server_for_a_while() as server:
+        viewer = Viewer(session, server)
+        session.wait()
+        assert session.step()
+        before, seed = session.subject.world.state.copy(), session.seed
+        monkeypatch.setattr(NextFails, "is_right", False)
+        session.play()
+        viewer._inbox.put(lambda: session.reset(seed + 1))
+        viewer.turn(0.0)
+        assert (session.is_playing, session.message) == (False, "KeyError: 'mass'")
+        assert np.array_equal(session.subject.world.state, before)
+        assert session.seed == seed
+        assert session.step()
+        assert session.step()
+        assert not session.step()  # the next episode
+        assert session.message == "KeyError: 'mass'"
+        told = []
+        client = SimpleNamespace(add_notification=lambda title, body: told.append(body))
+        monkeypatch.setattr(server, "get_clients", lambda: {0: client})
+        monkeypatch.setattr(viewer._stage, "show", {}.__getitem__)
+        viewer._drawn = None
+        turns(viewer, 2)
+        assert len(told) == 1
+        assert told[0].startswith("KeyError")
 
 
 def test_the_panel_follows_the_session(viewer):
@@ -270,3 +318,46 @@ def test_the_command_exports_and_says_what_is_wrong(tmp_path):
     wrong = runner.invoke(app, ["view", "dropp", "--export", str(path)])
     assert wrong.exit_code != 0
     assert "what is 'dropp'; allowed are" in " ".join(wrong.output.split())
+
+
+ENDING = """
+import os, signal
+from rigid_env.cli import app
+from rigid_env.viewer.server import Viewer
+
+Viewer.turn = lambda viewer, seconds: os.kill(os.getpid(), signal.SIGTERM)
+app(["view", "drop", "--port", "8460", *{options}])
+"""
+
+
+def told_at_the_end(*options: str) -> tuple[int, str]:
+    """Exit status and output of a viewer that gets SIGTERM; it ignores SIGINT, as if started in the background."""
+    done = subprocess.run(
+        [sys.executable, "-c", ENDING.format(options=list(options))], capture_output=True, text=True,
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_IGN),
+    )  # fmt: skip
+    return done.returncode, done.stdout + done.stderr
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="signals")
+def test_sigterm_ends_the_viewer():
+    status, output = told_at_the_end("--accuracy", "fast")
+    assert status == 0, output
+    assert output.count("http://localhost:") == 2  # and over SSH
+    assert output.count("ended") == 1
+
+
+def test_an_address_is_told_only_where_there_is_something_to_look_at(tmp_path):
+    path = tmp_path / "wrong.toml"
+    path.write_text("[[bodies]]\nkind = 'block'\nmass = -1.0\n")
+    runner = CliRunner()
+    for wrong in (
+        ["dropp"],
+        [str(path)],
+        ["drop", "--accuracy", "exact"],
+        ["rigid_env/BlockReach-v0", "--policy", "x"],
+    ):
+        done = runner.invoke(app, ["view", *wrong, "--port", "8470"])
+        assert done.exit_code == 2
+        assert "http" not in done.output
+    assert set(CANONICAL) == set(scenes.SCENES)  # of these it is told at once

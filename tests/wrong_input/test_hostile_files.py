@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import base64
+import contextlib
 import json
 import pickle
 import zipfile
@@ -116,6 +117,62 @@ def test_a_pickle_in_place_of_an_archive_is_refused(kind, tmp_path, marker):
     path.write_bytes(pickle.dumps(Bomb(marker)))
     with pytest.raises(ValueError, match="file"):
         KINDS[kind][1](path)
+
+
+JUNK = [None, 7, -1, 1.5, True, "x", [], ["x"], [None], [7], [[1]], {}, {"x": 1}, {"x": ["y"]}, [{"x": "y"}]]
+
+
+def restored(snapshot):
+    physics.World(physics.scenes.by_name("rest")).restore(snapshot)
+
+
+def set_back(state):
+    rigid_env.BlockReachEnv().set_state(state)
+
+
+USES = {"snapshot": restored, "state": set_back, "recording": physics.Recording.world}
+
+
+@pytest.mark.parametrize("kind", USES)
+def test_an_edited_head_is_refused_by_its_field_or_does_no_harm(kind, tmp_path):
+    make, load = KINDS[kind]
+    path = tmp_path / "file.npz"
+    make(path)
+    with np.load(path) as content:
+        parts = dict(content)
+    head = json.loads(str(parts["head"]))
+    refused = set()
+    for name in head:
+        for edited in (*({**head, name: value} for value in JUNK), {key: head[key] for key in head if key != name}):
+            np.savez(path, **{**parts, "head": json.dumps(edited)})
+            try:
+                found = load(path)
+            except ValueError as error:
+                assert "file.npz" in str(error)  # noqa: PT017
+                assert name in str(error) or name in ("kind", "scene"), str(error)  # noqa: PT017
+                refused.add(name)
+                continue
+            with contextlib.suppress(ValueError):  # it may be of another task or scene
+                USES[kind](found)
+    assert refused == set(head) - {"version"}, "a name of no consequence"
+    for text in ("7", "[]", "null", '"x"'):
+        np.savez(path, **{**parts, "head": text})
+        with pytest.raises(ValueError, match="its head has no"):
+            load(path)
+
+
+def test_arrays_of_a_state_without_a_row_for_each_world_are_refused(tmp_path):
+    path = tmp_path / "file.npz"
+    state(path)
+    with np.load(path) as content:
+        parts = dict(content)
+    for wrong in (np.float64(1.0), np.zeros(3), np.zeros((0, 2))):
+        for name in parts.keys() - {"head", "world"}:
+            np.savez(path, **{**parts, name: wrong})
+            with pytest.raises(
+                ValueError, match=rf"file\.npz is no .*{name.removeprefix('held ')} has shape .*allowed"
+            ):
+                rigid_env.TaskState.load(path)
 
 
 def test_the_command_line_refuses_them(tmp_path, marker):

@@ -20,6 +20,7 @@ PACKAGES = (
 
 # Results of earlier measurements do not make a checkout differ from its commit.
 RESULTS = "benchmarks/results"
+GIT = 60.0  # time that git may take; what it would tell is then left out [s]
 
 
 def describe() -> dict:
@@ -67,12 +68,13 @@ def git_state(folder: Path) -> dict | None:
         root = Path(_git(folder, "rev-parse", "--show-toplevel"))
         changes = _git(root, "status", "--porcelain", "--", ".", f":(exclude){RESULTS}")
         return {"commit": _git(root, "rev-parse", "HEAD"), "is_dirty": bool(changes)}
-    except (OSError, subprocess.CalledProcessError):
+    except (OSError, subprocess.SubprocessError):
         return None
 
 
 def _git(folder: Path, *arguments: str) -> str:
-    done = subprocess.run(["git", "-C", str(folder), *arguments], capture_output=True, text=True, check=True)
+    command = ["git", "-C", str(folder), *arguments]
+    done = subprocess.run(command, capture_output=True, text=True, check=True, timeout=GIT)
     return done.stdout.strip()
 
 
