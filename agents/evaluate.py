@@ -31,7 +31,8 @@ FIRST_SEED = 1_000_000_000  # far from the seeds of training, which start at the
 SEED_STRIDE = 1_000_000  # episodes between the sets of seeds of two evaluations
 
 # --- options of the command lines -------------------------------------------------------------------------
-RunArgument = Annotated[Path | None, typer.Argument(metavar="RUN_DIR", help="Folder of a run.")]
+RUN_HELP = "Folder of a run; code in its model.zip runs while it is read: take it from those you trust only."
+RunArgument = Annotated[Path | None, typer.Argument(metavar="RUN_DIR", help=RUN_HELP)]
 BaselineOption = Annotated[str | None, typer.Option(help="Instead of a run: random or controller.")]
 EnvOption = Annotated[str, typer.Option(help="Of the baseline.")]
 SeedOption = Annotated[int, typer.Option(min=0, help="Of the set of episodes.")]

@@ -35,6 +35,7 @@ from rigid_env.terminal import make_console, run_program
 DEFAULTS = {"env": "rigid_env/BlockReach-v0", "seed": 0}
 EVALUATION_EPISODES = 1000
 VIDEO_EPISODES = 3
+RESUME_HELP = "Go on with a run; code in its checkpoint runs while it is read: take it from those you trust only."
 INTERRUPTED = 130  # exit status of a program ended by Ctrl-C
 
 
@@ -193,7 +194,7 @@ def main(
     max_steps: Annotated[int | None, typer.Option(help="Steps to stop at.")] = None,
     threads: Annotated[int | None, typer.Option(help="Of the engine.")] = None,
     hyperparameters: Annotated[Path, typer.Option(help="YAML file.", exists=True)] = HYPERPARAMETERS,
-    resume: Annotated[Path | None, typer.Option(metavar="RUN_DIR", help="Go on with a run.")] = None,
+    resume: Annotated[Path | None, typer.Option(metavar="RUN_DIR", help=RESUME_HELP)] = None,
     out: Annotated[Path, typer.Option(help="Where the folders of runs are made.")] = Path("runs"),
     video: Annotated[bool, typer.Option(help="Record some episodes at the end.")] = True,
     tensorboard: Annotated[bool, typer.Option(help="Write diagnostics for TensorBoard.")] = False,
