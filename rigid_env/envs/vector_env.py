@@ -188,7 +188,10 @@ class RigidVectorEnv(BatchAttributes[Obs]):
         """
         self._check_ready()
         before = self._ended, self._kept_pictures()
+        kept = self._generators_of_ended()
         self.task.step(actions)
+        for world, state in kept.items():
+            self.task.generators[world].bit_generator.state = state
         try:
             return self._conclude()
         except BaseException:  # of a start, or of a picture: this step has not been
@@ -291,6 +294,17 @@ class RigidVectorEnv(BatchAttributes[Obs]):
                 f"the episodes of the worlds {np.flatnonzero(self._ended).tolist()} have ended and autoreset "
                 "is disabled: reset(options={'reset_mask': terminations | truncations}) first"
             )
+
+    def _generators_of_ended(self) -> dict[int, Any]:
+        """States of the generators of ended worlds, by world.
+
+        In mode ``NextStep`` they move in the step that starts them anew; a disturbance due then must not take numbers
+        of the next episode.
+        """
+        if self.task.disturbed is None:
+            return {}
+        ended: list[int] = np.flatnonzero(self._ended).tolist()
+        return {world: self.task.generators[world].bit_generator.state for world in ended}
 
     def _kept_pictures(self) -> dict[str, np.ndarray]:
         """Copies of the source's memory, where code of a user may end with an error."""

@@ -11,7 +11,7 @@ from rigid_env.envs.checks import CheckError, check_task
 from rigid_env.envs.env import RigidEnv
 from rigid_env.envs.task import TaskEnv, TaskVectorEnv
 from rigid_env.envs.vector_env import RigidVectorEnv
-from rigid_env.tasks import BlockReach, BlockReorient, Entry, Task, Wrench, observe
+from rigid_env.tasks import BlockReach, BlockReorient, Entry, Push, Task, Wrench, observe
 from rigid_env.tasks.parameters import LENGTHS
 from tests.tasks.conftest import Free, Slide, started
 
@@ -326,6 +326,19 @@ def test_a_check_finds_random_numbers_that_no_seed_fixes():
 
     with pytest.raises((CheckError, AssertionError)):
         check_task(Noisy, contexts=())
+
+
+class Pushed(Slide):
+    draws = {"goal": (-1.0, 1.0)}  # noqa: RUF012
+    disturbances = (Push(0, 0.5, 100.0),)  # none would be due in the steps of the check, if it did not see to it
+
+
+def test_a_check_finds_later_episodes_that_depend_on_the_mode_of_starting_anew(monkeypatch):
+    """As they do where an ended world draws a push in the step that starts it anew."""
+    check_task(Pushed, steps=6, contexts=())
+    monkeypatch.setattr(RigidVectorEnv, "_generators_of_ended", lambda envs: {})
+    with pytest.raises(CheckError, match=r"drawn goal differs by .*world 0, step 1, autoreset_mode 'NextStep'"):
+        check_task(Pushed, steps=6, contexts=())
 
 
 def test_the_parameters_keep_their_order():

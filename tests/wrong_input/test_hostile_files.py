@@ -222,7 +222,7 @@ def test_a_model_of_stable_baselines3_runs_its_code(tmp_path, capsys):
 
 @pytest.mark.parametrize("command", [["view"], ["agents.evaluate"], ["agents.record"], ["agents.train"]])
 def test_help_says_that_a_model_runs_code(command):
-    """Of each command that reads a model."""
+    """Each command that reads a model says so."""
     if command == ["view"]:
         result = CliRunner().invoke(app, ["view", "--help"], env={"COLUMNS": "200"})
         told = result.output
