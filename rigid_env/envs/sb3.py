@@ -107,7 +107,8 @@ class RigidVecEnv(VecEnv):
         ----------
         options : dict, or list of dict, optional
             One dict is that of `RigidVectorEnv.reset`, without ``reset_mask``, since all environments start: each value
-            is for all of them, or an array with a row for each. A list has a dict for each environment, with values for this one; their keys may differ.
+            is for all of them, or an array with a row for each. A list has a dict for each environment, with values for
+            this one; their keys may differ.
 
         Raises
         ------
