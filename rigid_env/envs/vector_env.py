@@ -43,7 +43,7 @@ class RigidVectorEnv(BatchAttributes[Obs]):
     autoreset_mode : AutoresetMode or str
         ``NextStep`` (default), ``SameStep`` or ``Disabled``.
     max_episode_steps : int or None
-        Control steps after which an episode is truncated; None: never. The default is the task's number.
+        Control steps after which an episode is truncated; None or -1: never. The default is the task's number.
     render_mode : {"rgb_array", "human"} or None
         ``human`` shows world 0.
     width, height : int

@@ -22,7 +22,7 @@ from rigid_env.tasks import layout as col
 from rigid_env.tasks.actions import ActionTable
 from rigid_env.tasks.before import Before
 from rigid_env.tasks.declaration import Declaration
-from rigid_env.tasks.declaration_checks import check_class, refuse_same_keys
+from rigid_env.tasks.declaration_checks import check_class, checked_limit, refuse_same_keys
 from rigid_env.tasks.distributions import Distribution
 from rigid_env.tasks.disturbances import Disturbances, Push
 from rigid_env.tasks.draws import Draws, check_draws
@@ -117,8 +117,7 @@ class Task(Starts):
         threads: int = 1,
     ) -> None:
         self.frame_skip = validation.count(frame_skip, "frame_skip")
-        if self.max_episode_steps is not None:
-            validation.count(self.max_episode_steps, f"max_episode_steps of {type(self).__name__}")
+        checked_limit(self.max_episode_steps, f"max_episode_steps of {type(self).__name__}")
         distributions = distributions_of(self.declared_draws(), draws)
         varied = [name for name, each in distributions.items() if not each.is_fixed]
         self.effects = checked_effects(effects, varied)
