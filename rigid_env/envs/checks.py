@@ -119,14 +119,14 @@ class _Checks:
             over = ends | cuts
             _require(envs.observation_space.contains(obs), f"observation of step {counts.max()} is outside its space")
             _require(bool(np.isfinite(rewards).all()), f"reward of step {counts.max()} is {rewards}")
-            for i in np.flatnonzero(~is_first):
+            for i in np.flatnonzero(~is_first).tolist():
                 last = infos["final_obs"][i] if "final_obs" in infos and over[i] else _of_world(obs, i)
                 alone[i].steps_as(counts[i], (last, rewards[i], ends[i], cuts[i]), mode)
             if mode is AutoresetMode.SAME_STEP:
                 _require(bool((envs.task.steps[over] == 0).all()), f"worlds did not start anew in step {counts.max()}")
             if mode is AutoresetMode.DISABLED and over.any():
                 obs, infos = envs.reset(options={"reset_mask": over})
-            for i in np.flatnonzero(is_first if is_late else over):
+            for i in np.flatnonzero(is_first if is_late else over).tolist():
                 alone[i].starts_as(counts[i] - is_late, _of_world(obs, i), infos, mode)
             counts += ~is_first
         envs.close()

@@ -188,10 +188,10 @@ class RigidVectorEnv(BatchAttributes[Obs]):
         """
         self._check_ready()
         before = self._ended, self._kept_pictures()
-        kept = self._generators_of_ended()
+        kept, generators = self._generators_of_ended(), list[Any](self.task.generators)
         self.task.step(actions)
         for world, state in kept.items():
-            self.task.generators[world].bit_generator.state = state
+            generators[world].bit_generator.state = state
         try:
             return self._conclude()
         except BaseException:  # of a start, or of a picture: this step has not been
@@ -303,8 +303,8 @@ class RigidVectorEnv(BatchAttributes[Obs]):
         """
         if self.task.disturbed is None:
             return {}
-        ended: list[int] = np.flatnonzero(self._ended).tolist()
-        return {world: self.task.generators[world].bit_generator.state for world in ended}
+        generators: Any = self.task.generators
+        return {world: generators[world].bit_generator.state for world in np.flatnonzero(self._ended).tolist()}
 
     def _kept_pictures(self) -> dict[str, np.ndarray]:
         """Copies of the source's memory, where code of a user may end with an error."""

@@ -159,6 +159,16 @@ class Disturbances:
             self.force[k, rows] = self.end[k, rows] = 0.0
             self.next[k, rows] = [self._wait(kind, self._task.generators[world].random()) for world in rows]
 
+    def wait_anew(self) -> None:
+        """Draw anew when the next disturbances start: for a model that must not know.
+
+        Waiting times are exponential, so that those that go on from now have the same distribution.
+        """
+        now = self._task.steps * self._task.control_dt
+        for k, kind in enumerate(self.kinds):
+            waits = [self._wait(kind, generator.random()) for generator in self._task.generators]
+            self.next[k] = np.maximum(now, self.end[k]) + waits
+
     def due(self) -> np.ndarray:
         """(n,) int64. Worlds in which a disturbance starts in the coming control step."""
         time = self._task.steps * self._task.control_dt

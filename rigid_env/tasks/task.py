@@ -290,11 +290,15 @@ class Task(Starts):
         if self._before is not None:
             self._before.put_back()
 
+    def not_finite(self, world: int) -> ValueError:
+        """Error for the action in `given` of a world."""
+        return ValueError(f"action of world {world} is {self.given[world].tolist()}; allowed are finite numbers")
+
     def act(self) -> None:
         """Move the worlds by one control step, under the actions in `given`."""
         bad = self._write_wrenches(*self._write_arguments)
         if bad >= 0:
-            raise ValueError(f"action of world {bad} is {self.given[bad].tolist()}; allowed are finite numbers")
+            raise self.not_finite(bad)
         advance = self._advance
         if self.disturbed is not None:
             self.disturbed.act(advance.wrench, advance.kick)

@@ -292,6 +292,43 @@ def test_after_a_wrong_reward_nothing_has_changed(fault, kind, words):
     np.testing.assert_array_equal(task.world.state, twin.world.state)
 
 
+@pytest.mark.parametrize("value", [np.inf, -np.inf, np.nan])
+@pytest.mark.parametrize("is_late", [False, True])
+def test_an_entry_that_is_not_finite_is_refused_though_clipping_would_hide_it(value, is_late):
+    """At the start of an episode, and in a step; nothing has changed then."""
+
+    class Far(Slide):
+        observation = (
+            observe.pos(),
+            Entry("way", "m", -9, 9, lambda worlds: np.where(worlds.steps > (2 if is_late else -1), value, 0.0)),
+        )
+
+    task, still = Far(2), np.zeros((2, 1))
+    if is_late:
+        started(task)
+        task.step(still)
+        task.step(still)
+    before = state_of(task)
+    with pytest.raises(ValueError, match=rf"observation 'way' of Far is {value} in world 0; allowed are finite"):
+        task.step(still) if is_late else started(task)
+    for ours, kept in zip(state_of(task), before):
+        np.testing.assert_array_equal(ours, kept)
+
+
+def test_numbers_of_a_wrong_shape_are_told_before_another_function_reads_them():
+    """Not as the error of NumPy's that the other function ends with."""
+
+    class Crooked(Slide):
+        def measure(self, worlds):
+            return {"way": np.zeros((len(worlds), 3))}
+
+        def success(self, worlds):
+            return worlds.measured["way"] < worlds.pos[:, 0, 0]
+
+    with pytest.raises(ValueError, match=r"'way' of measure of Crooked is of float64 in shape \(2, 3\); allowed are"):
+        Crooked()
+
+
 def test_an_unknown_setting_is_refused_with_the_nearest_name():
     with pytest.raises(TypeError, match=r"'acuracy'.*allowed are accuracy"):
         TaskEnv(Free, acuracy="fast")
