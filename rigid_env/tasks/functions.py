@@ -12,11 +12,15 @@ from rigid_env.tasks.before import Before
 from rigid_env.tasks.named import Named
 from rigid_env.tasks.worlds import Worlds
 
+SEED = 0
+"""Of the draws of a rehearsal: any, so long as it stays the same."""
+
 
 class Functions:
     """Calls of the functions of a task that has no compiled one.
 
-    Each function is called once when this is made, in a world at its start, so that a mistake shows at once.
+    Each function is called once when this is made, in a world at its start, so that a mistake shows at once: a
+    rehearsal, with values that are drawn for it.
 
     Parameters
     ----------
@@ -49,9 +53,32 @@ class Functions:
         self.before = Before(task)
 
     def _rehearse(self) -> None:
-        """Call each function once, for two rows of world 0, so that no shape fits by chance."""
-        task, before = self.task, self.task.world.snapshot()
-        task.move(np.zeros(1, dtype=np.int64), {name: values[:1] for name, values in task.drawn.items()}, {})
+        """Call each function once in world 0, with values drawn for it; an error says that it is a rehearsal."""
+        task = self.task
+        world, kept = task.world.snapshot(), {name: array[0].copy() for name, array in task.drawn.items()}
+        shares = np.random.default_rng(SEED).random((1, task.episodes.uniforms))
+        values = task.episodes.draw(np.zeros(1, dtype=np.int64), shares, {})
+        try:
+            for name, value in values.items():
+                task.drawn[name][0] = value[0]
+            self._call_each(values)
+        except Exception as error:
+            drawn = ", ".join(f"{name} = {value[0].tolist()}" for name, value in values.items())
+            told = f"in the rehearsal of {self._name}, when it is made, {f'with {drawn}' if drawn else 'without draws'}"
+            if isinstance(error, ValueError):
+                raise ValueError(f"{error} ({told})") from error
+            if hasattr(error, "add_note"):  # from Python 3.11 on
+                error.add_note(told)
+            raise
+        finally:
+            task.world.restore(world)
+            for name, array in kept.items():
+                task.drawn[name][0] = array
+
+    def _call_each(self, values: Mapping[str, np.ndarray]) -> None:
+        """Call each function for two rows of world 0, so that no shape fits by chance."""
+        task = self.task
+        task.move(np.zeros(1, dtype=np.int64), values, {})
         worlds = Worlds(task, np.zeros(2, dtype=np.int64))
         self._measure(worlds)
         task.begin(worlds)
@@ -66,8 +93,6 @@ class Functions:
             parts = f"{task.world.body_count} bodies and {len(task.world.walls)} walls"
             told = f"observation of {self._name} ends with {type(error).__name__}: {error}"
             raise ValueError(f"{told}; allowed are parts of its scene, {parts}") from error
-        finally:
-            task.world.restore(before)
 
     def begin(self, rows: np.ndarray) -> None:
         """Observe worlds `rows` (n,) in which episodes begin."""

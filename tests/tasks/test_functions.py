@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+import sys
+import warnings
+
 import numpy as np
 import pytest
 
 import physics
 from benchmarks.numpy_reach import NumpyReach
+from physics.kernels.state import layout as at
 from rigid_env.envs.checks import CheckError, check_task
 from rigid_env.envs.env import RigidEnv
 from rigid_env.envs.task import TaskEnv, TaskVectorEnv
 from rigid_env.envs.vector_env import RigidVectorEnv
-from rigid_env.tasks import BlockReach, BlockReorient, Entry, Push, Task, Wrench, observe
+from rigid_env.tasks import BlockReach, BlockReorient, Entry, Push, Task, Uniform, Wrench, observe
 from rigid_env.tasks.parameters import LENGTHS
 from tests.tasks.conftest import Free, Slide, started
 
@@ -313,6 +317,42 @@ def test_an_entry_that_is_not_finite_is_refused_though_clipping_would_hide_it(va
         task.step(still) if is_late else started(task)
     for ours, kept in zip(state_of(task), before):
         np.testing.assert_array_equal(ours, kept)
+
+
+class Tumbled(Free):
+    """A block in any attitude: four numbers, normalised. Those in the middle of their range are 0."""
+
+    draws = {"attitude": Uniform((-1,) * 4, (1,) * 4), "mass": (2.0, 4.0)}  # noqa: RUF012
+
+    def place(self, drawn):
+        return {"quat": drawn["attitude"] / np.linalg.norm(drawn["attitude"], axis=1, keepdims=True)}
+
+
+def test_a_rehearsal_takes_drawn_values_and_leaves_nothing():
+    """Not the middles of ranges, which an episode may never meet."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        task = Tumbled(2)
+    assert task.drawn["attitude"].tolist() == [[0.0] * 4] * 2  # before the first episode
+    assert task.drawn["mass"].tolist() == [3.0] * 2
+    np.testing.assert_allclose(1.0 / task.world.params[:, at.INV_MASS], 6.0, rtol=1e-12)  # of the scene
+    started(task)
+    np.testing.assert_allclose(np.linalg.norm(task.world.quat[:, 0], axis=1), 1.0)
+
+
+@pytest.mark.parametrize("kind", [ValueError, ZeroDivisionError])
+def test_an_error_of_a_rehearsal_says_that_it_is_one_and_what_was_drawn(kind):
+    class Rehearsed(Tumbled):
+        def rewards(self, worlds):
+            raise kind("a mistake")
+
+    with pytest.raises(kind) as error:
+        Rehearsed()
+    told = "".join((str(error.value), *getattr(error.value, "__notes__", ())))
+    assert "a mistake" in told
+    if kind is ValueError or sys.version_info >= (3, 11):
+        assert "in the rehearsal of Rehearsed, when it is made, with mass = " in told
+        assert "attitude = [" in told
 
 
 def test_numbers_of_a_wrong_shape_are_told_before_another_function_reads_them():
