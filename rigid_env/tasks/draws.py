@@ -9,8 +9,8 @@ from difflib import get_close_matches
 import numpy as np
 
 from physics.world.world import World
-from rigid_env.tasks.distributions import Distribution
-from rigid_env.tasks.parameters import CHECKS, LENGTHS
+from rigid_env.tasks.distributions import Distribution, is_elementwise
+from rigid_env.tasks.parameters import CHECKS, DRAWN_LENGTHS
 
 NEAR = 0.8
 """Likeness from which on a name is taken for a misspelt one."""
@@ -18,7 +18,7 @@ NEAR = 0.8
 DOWN = (0.0, -1.0, 0.0)
 """Direction of gravity in a world that has had none."""
 
-_PARAMETER = re.compile(rf"({'|'.join(LENGTHS)})(?:\[(\d+)\])?$")
+_PARAMETER = re.compile(rf"({'|'.join(DRAWN_LENGTHS)})(?:\[(\d+)\])?$")
 
 
 def parameter_of(name: str) -> tuple[str, int | None] | None:
@@ -33,8 +33,8 @@ class Draws:
     Parameters
     ----------
     distributions : mapping of str to Distribution
-        The names ``mass``, ``size``, ``friction``, ``restitution`` and ``gravity`` mean physical parameters of all
-        bodies, ``mass[1]`` that of body 1 alone.
+        The names ``mass``, ``size``, ``radius`` (of spheres), ``friction``, ``restitution`` and ``gravity`` mean
+        physical parameters of all bodies, ``mass[1]`` that of body 1 alone.
     worlds : int
 
     Attributes
@@ -132,6 +132,8 @@ def world_arguments(values: Mapping[str, np.ndarray], before: Mapping[str, np.nd
             down = np.where(is_on, before["gravity"] / np.where(is_on, strength, 1.0), DOWN)
             arguments[parameter] = value[:, None] * down
             continue
+        if parameter == "radius":  # three equal diameters
+            parameter, value = "size", np.repeat(2.0 * value[:, None], 3, axis=1)
         table = arguments.setdefault(parameter, before[parameter].copy())
         if body is None:
             table[...] = value[:, None]
@@ -163,7 +165,7 @@ def check_draws(task: str, distributions: Mapping[str, Distribution], world: Wor
     for name, distribution in distributions.items():
         parameter = parameter_of(name)
         if parameter is None:
-            near = get_close_matches(name.lower(), LENGTHS, 1, NEAR)
+            near = get_close_matches(name.lower(), DRAWN_LENGTHS, 1, NEAR)
             if near:
                 raise ValueError(f"draws of {task} has {name!r}, which is no {near[0]!r}; allowed is another name")
             continue
@@ -179,5 +181,26 @@ def check_draws(task: str, distributions: Mapping[str, Distribution], world: Wor
                 raise ValueError(f"draws of {task} has {name!r}; allowed are {bodies}")
             if kind in distributions:
                 raise ValueError(f"draws of {task} has {kind!r} and {name!r}; allowed is one of the two")
+        if kind in ("size", "radius"):
+            _check_spheres(task, distributions, world, name)
         ends = distribution.ends()
         CHECKS[kind](ends, ends.shape, f"draws {name} of {task}")
+
+
+def _check_spheres(task: str, distributions: Mapping[str, Distribution], world: World, name: str) -> None:
+    """Refuse a radius of other bodies than spheres, one beside a size, and a size of three numbers of a sphere."""
+    kind, body = parameter_of(name) or ("", None)
+    bodies = world.scene.bodies
+    meant = range(len(bodies)) if body is None else (body,)
+    for index in meant:
+        is_sphere = bodies[index].kind == "sphere"
+        if kind == "radius" and not is_sphere:
+            allowed = "'radius[b]' for a sphere b, or another name"
+            told = f"and body {index} is a {type(bodies[index]).__name__}"
+            raise ValueError(f"draws of {task} has {name!r}, {told}; allowed is {allowed}")
+        other = next((f"size{place}" for place in ("", f"[{index}]") if f"size{place}" in distributions), None)
+        if kind == "radius" and other:
+            raise ValueError(f"draws of {task} has {other!r} and {name!r} of body {index}; allowed is one of the two")
+        if kind == "size" and is_sphere and is_elementwise(distributions[name]):
+            told = f"draws {name} of {task} is {distributions[name]!r}, and body {index} is a Sphere, of one diameter"
+            raise ValueError(f"{told}; allowed is 'radius[{index}]' with a number, a pair or a distribution")

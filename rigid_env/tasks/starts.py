@@ -21,7 +21,7 @@ from rigid_env.tasks.declaration import Declaration
 from rigid_env.tasks.distributions import Distribution, as_distribution
 from rigid_env.tasks.draws import parameter_of, world_arguments
 from rigid_env.tasks.options import require_known
-from rigid_env.tasks.parameters import LENGTHS
+from rigid_env.tasks.parameters import DRAWN_LENGTHS
 from rigid_env.tasks.replacing import refuse_replaced, replaced
 from rigid_env.tasks.state import put, take
 
@@ -188,8 +188,7 @@ class Starts(Declaration):
         fixed = {name: self.drawn[name][:1] for name in names}
         found = set()
         for name, value in fixed.items():
-            parameter, _ = of(name)
-            (now,) = self._arguments(one, {name: value}).values()
+            ((parameter, now),) = self._arguments(one, {name: value}).items()
             if not np.allclose(now, self._parameters_of(one)[parameter], rtol=PARAMETER_ROUNDING, atol=0.0):
                 found.add(name)
         return found
@@ -288,6 +287,6 @@ def distributions_of(declared: Mapping[str, Any], given: Mapping[str, Any] | Non
     found = {}
     for name, value in declared.items():
         field, parameter = f"draws {name}", parameter_of(name)
-        own = as_distribution(field, value, LENGTHS[parameter[0]] if parameter else None)
+        own = as_distribution(field, value, DRAWN_LENGTHS[parameter[0]] if parameter else None)
         found[name] = as_distribution(field, given[name], own.length) if name in given else own
     return found

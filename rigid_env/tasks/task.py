@@ -77,8 +77,8 @@ class Task(Starts):
     observation : sequence of Entry
         Declared: `rigid_env.observe` has the usual ones.
     draws : mapping of str to Distribution, number or pair
-        Declared: what each episode draws. ``mass``, ``size``, ``friction``, ``restitution`` and ``gravity`` are given
-        to the world (``mass[1]``: to body 1 alone), the rest is for the task's functions.
+        Declared: what each episode draws. ``mass``, ``size``, ``radius`` of spheres, ``friction``, ``restitution`` and
+        ``gravity`` are given to the world (``mass[1]``: to body 1 alone), the rest is for the task's functions.
     memory : mapping of str to int
         Declared: numbers per world that functions keep from step to step, and how many each; zeros at the start.
     disturbances : sequence of Push and Gust

@@ -149,6 +149,47 @@ def test_a_parameter_of_one_body_leaves_the_others():
     np.testing.assert_allclose(masses[:, 1], task.drawn["mass[1]"], rtol=1e-14)
 
 
+class Mixed(Free):
+    """A block and a ball."""
+
+    scene = physics.Scene([physics.Block((2, 1, 1), 3.0), physics.Sphere(0.5, 2.0, pos=(9, 0, 0))])
+    draws = {"radius[1]": (0.2, 0.4), "goal": (-1.0, 1.0)}  # noqa: RUF012
+
+
+def test_the_radius_of_a_sphere_is_drawn_by_a_pair():
+    """It is told, goes to the world with the inertia that follows from it, and can be fixed and held."""
+    envs = TaskVectorEnv(3, task=Mixed)
+    _, infos = envs.reset(seed=0)
+    radius = infos["radius[1]"]
+    assert ((radius > 0.2) & (radius < 0.4)).all()
+    assert len(set(radius)) == 3
+    params = envs.task.world.params.reshape(3, 2, -1)
+    np.testing.assert_allclose(params[:, 1, at.DIMENSIONS : at.DIMENSIONS + 3], radius[:, None] * np.ones(3))
+    np.testing.assert_allclose(1.0 / params[:, 1, at.INV_INERTIA], 0.4 * 2.0 * radius**2)
+    np.testing.assert_allclose(params[:, 0, at.DIMENSIONS : at.DIMENSIONS + 3], [[1.0, 0.5, 0.5]] * 3)
+    _, again = envs.reset(seed=0, options={"radius[1]": [0.3, 0.7, 1.0]})
+    np.testing.assert_allclose(params[:, 1, at.DIMENSIONS], [0.3, 0.7, 1.0])
+    np.testing.assert_array_equal(again["goal"], infos["goal"])
+    envs.set_attr("radius[1]", [0.6] * 3)
+    np.testing.assert_allclose(params[:, 1, at.DIMENSIONS], 0.6)
+    assert "radius of a sphere [m] of body 1" in TaskEnv(Mixed).describe()
+
+
+@pytest.mark.parametrize(
+    ("draws", "words"),
+    [
+        ({"radius[1]": -1.0}, "draws radius.1. of Mixed is"),
+        ({"radius": (0.2, 0.4)}, "'radius', and body 0 is a Block; allowed is 'radius.b.' for a sphere b"),
+        ({"radius[0]": 0.3}, "'radius.0.', and body 0 is a Block"),
+        ({"radius[1]": 0.3, "size[1]": (1.0, 1.0, 1.0)}, "'size.1.' and 'radius.1.' of body 1; allowed is one"),
+        ({"size[1]": ((1.0,) * 3, (2.0,) * 3)}, "body 1 is a Sphere, of one diameter; allowed is 'radius.1.' with"),
+    ],
+)
+def test_sizes_that_a_body_cannot_have_are_refused(draws, words):
+    with pytest.raises(ValueError, match=words):
+        type("Mixed", (Mixed,), {"draws": draws})()
+
+
 def test_memory_starts_at_zero_and_is_kept_from_step_to_step():
     class Counting(Slide):
         memory = {"count": 1, "last": 3}  # noqa: RUF012
