@@ -23,6 +23,7 @@ from agents.checkpoint import load_policy
 from agents.config import RunFolder
 from agents.interval import wilson
 from rigid_env.cli.files import output_option
+from rigid_env.cli.names import checked_preset
 from rigid_env.terminal import Column, Table, make_console, run_program
 
 BATCH = 500  # episodes at a time
@@ -36,7 +37,7 @@ RunArgument = Annotated[Path | None, typer.Argument(metavar="RUN_DIR", help=RUN_
 BaselineOption = Annotated[str | None, typer.Option(help="Instead of a run: random or controller.")]
 EnvOption = Annotated[str, typer.Option(help="Of the baseline.")]
 SeedOption = Annotated[int, typer.Option(min=0, help="Of the set of episodes.")]
-AccuracyOption = Annotated[str | None, typer.Option(help="Preset of the engine.")]
+AccuracyOption = Annotated[str | None, typer.Option(help="Preset of the engine.", callback=checked_preset)]
 JsonOption = Annotated[Path | None, output_option("--json", ".json", help="Write the numbers here, too.")]
 
 

@@ -28,6 +28,7 @@ from rich.progress import Progress
 from agents.interval import wilson
 from physics import validation
 from rigid_env.cli.files import output_option
+from rigid_env.cli.names import checked_preset
 from rigid_env.envs.making import make_task
 from rigid_env.envs.named import make_named
 from rigid_env.tasks.rollout import rollout
@@ -253,7 +254,9 @@ def main(
     episodes: Annotated[int, typer.Option(min=1, help="Episodes to plan.")] = 100,
     method: Annotated[str, typer.Option(help=f"One of {', '.join(METHODS)}.")] = METHODS[0],
     samples: Annotated[int, typer.Option(min=2, help="Sequences in one iteration.")] = PlannerSettings.samples,
-    accuracy: Annotated[str, typer.Option(help="Preset of the model; the environment has its default.")] = "fast",
+    accuracy: Annotated[
+        str, typer.Option(help="Preset of the model; the environment has its default.", callback=checked_preset)
+    ] = "fast",
     seed: Annotated[int, typer.Option(min=0, help="Of the first episode, and of the noise.")] = 1000,
     json: Annotated[Path | None, output_option("--json", ".json", help="Write the numbers here, too.")] = None,
 ) -> None:

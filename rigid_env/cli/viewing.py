@@ -26,7 +26,9 @@ POLICY = (
 @app.command(short_help="Look at a scene, an environment, a recording or a trajectory in a browser.")
 def view(
     what: Annotated[str, typer.Argument(metavar="[WHAT]", help=WHAT, autocompletion=names.complete_scene)] = "drop",
-    accuracy: Annotated[str | None, typer.Option(help="Preset of the engine; balanced by default.")] = None,
+    accuracy: Annotated[
+        str | None, typer.Option(help="Preset of the engine; balanced by default.", callback=names.checked_preset)
+    ] = None,
     dt: Annotated[float | None, typer.Option("--dt", help="Step of a scene [s]; 0.01 by default.")] = None,
     seed: Annotated[int, typer.Option(min=0, help="Of the first episode, and of random actions.")] = 0,
     policy: Annotated[Path | None, typer.Option(help=POLICY)] = None,

@@ -140,6 +140,8 @@ def run(*arguments):
         (("--samples", 1), "'--samples'"),
         (("--env", "CartPole-v1"), "env is 'CartPole-v1', a CartPoleEnv; allowed are environments of rigid_env"),
         (("--env", "rigid_env/Nope-v0"), "env is 'rigid_env/Nope-v0', which is not there"),
+        (("--env", "BlockRech"), "which is not there; allowed are names such as 'rigid_env/BlockReach-v0'"),
+        (("--accuracy", "balaced"), "'--accuracy': 'balaced'; allowed are balanced, fast, precise, reference"),
         (("--env", "rigid_env/Scene-v0"), "scene is None"),
     ],
 )
