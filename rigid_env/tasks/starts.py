@@ -203,6 +203,9 @@ class Starts(Declaration):
             )
         return {**self._own_starts, **given}
 
+    def _check_starts(self) -> None:
+        """Refuse starts that are impossible for some draws, where a kind of tasks can tell before any is drawn."""
+
     @property
     def place_options(self) -> tuple[str, ...]:
         """Options that decide where bodies start, for errors."""

@@ -123,6 +123,7 @@ class Task(Starts):
         self.effects = checked_effects(effects, varied)
         self.world = physics.World(self._scene(distributions), worlds, dt, accuracy, threads)
         check_draws(type(self).__name__, distributions, self.world)
+        self._check_starts()
         bodies = self.world.scene.bodies
         self._own_starts = {
             name: np.array([getattr(body, name) for body in bodies]) for name in ("pos", "quat", "linvel", "angvel")
