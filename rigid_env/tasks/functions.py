@@ -12,9 +12,6 @@ from rigid_env.tasks.before import Before
 from rigid_env.tasks.named import Named
 from rigid_env.tasks.worlds import Worlds
 
-SEED = 0
-"""Of the draws of a rehearsal: any, so long as it stays the same."""
-
 
 class Functions:
     """Calls of the functions of a task that has no compiled one.
@@ -56,8 +53,7 @@ class Functions:
         """Call each function once in world 0, with values drawn for it; an error says that it is a rehearsal."""
         task = self.task
         world, kept = task.world.snapshot(), {name: array[0].copy() for name, array in task.drawn.items()}
-        shares = np.random.default_rng(SEED).random((1, task.episodes.uniforms))
-        values = task.episodes.draw(np.zeros(1, dtype=np.int64), shares, {})
+        values = task.episodes.draw(np.zeros(1, dtype=np.int64), task.episodes.rehearsal(), {})
         try:
             for name, value in values.items():
                 task.drawn[name][0] = value[0]

@@ -18,7 +18,7 @@ from physics.parallel.team import listed
 from physics.world.gusts import begin_gusts, gust_phases, reads_time
 from physics.world.setters import start_anew
 from rigid_env.tasks.declaration import Declaration
-from rigid_env.tasks.distributions import Distribution, as_distribution
+from rigid_env.tasks.distributions import Distribution, as_distribution, is_of_user
 from rigid_env.tasks.draws import parameter_of, world_arguments
 from rigid_env.tasks.options import require_known
 from rigid_env.tasks.parameters import DRAWN_LENGTHS
@@ -260,9 +260,8 @@ class Starts(Declaration):
     def may_fail(self) -> bool:
         """True if code of a user runs at the start of an episode, which may end with an error."""
         parts = [getattr(type(self), name) for name in AT_STARTS]
-        for each in self.distributions.values():
-            parts += [type(each), *(type(part) for part in vars(each).values() if isinstance(part, Distribution))]
-        return not self.compiled or any(not part.__module__.startswith("rigid_env.") for part in parts)
+        is_own = any(not part.__module__.startswith("rigid_env.") for part in parts)
+        return not self.compiled or is_own or any(map(is_of_user, self.distributions.values()))
 
     @property
     def own_draws(self) -> tuple[str, ...]:

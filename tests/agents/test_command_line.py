@@ -131,7 +131,7 @@ def test_video_without_ffmpeg_is_a_gif(tmp_path, monkeypatch):
         (evaluate, ("somewhere", "--baseline", "random"), "either the folder of a run or --baseline"),
         (evaluate, ("nowhere",), "run is 'nowhere'; allowed is the folder of a run"),
         (evaluate, ("--baseline", "clever"), "baseline is 'clever'; allowed are"),
-        (evaluate, ("--baseline", "random", "--env", "Nothing-v7"), "env is 'Nothing-v7', which is not there; allowed are"),
+        (evaluate, ("--baseline", "random", "--env", "Nothing-v7"), "'Nothing-v7', which is not there; allowed are"),
         (evaluate, ("--baseline", "random", "--episodes", "0"), "episodes is 0; allowed"),
         (record, ("--baseline", "random", "--out", "video.avi"), "video.avi'; allowed are files named"),
         (evaluate, ("--baseline", "random", "--json", "x.txt"), "'x.txt' ends in '.txt'; allowed is .json"),
