@@ -314,7 +314,7 @@ class Choice(Distribution):
 def is_of_user(distribution: Distribution) -> bool:
     """True if code of a user draws, in it or in a distribution that it holds."""
     parts = (distribution, *(part for part in vars(distribution).values() if isinstance(part, Distribution)))
-    return any(not type(part).__module__.startswith("rigid_env.") for part in parts)
+    return any(not str(type(part).__module__).startswith("rigid_env.") for part in parts)
 
 
 def is_elementwise(distribution: Distribution) -> bool:

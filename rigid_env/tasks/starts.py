@@ -260,8 +260,8 @@ class Starts(Declaration):
     def may_fail(self) -> bool:
         """True if code of a user runs at the start of an episode, which may end with an error."""
         parts = [getattr(type(self), name) for name in AT_STARTS]
-        is_own = any(not part.__module__.startswith("rigid_env.") for part in parts)
-        return not self.compiled or is_own or any(map(is_of_user, self.distributions.values()))
+        is_of_users = any(not str(part.__module__).startswith("rigid_env.") for part in parts)
+        return not self.compiled or is_of_users or any(map(is_of_user, self.distributions.values()))
 
     @property
     def own_draws(self) -> tuple[str, ...]:
