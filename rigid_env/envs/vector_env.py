@@ -188,10 +188,10 @@ class RigidVectorEnv(BatchAttributes[Obs]):
         """
         self._check_ready()
         before = self._ended, self._kept_pictures()
-        kept, generators = self._generators_of_ended(), list[Any](self.task.generators)
+        kept = self._generators_of_ended()
         self.task.step(actions)
-        for world, state in kept.items():
-            generators[world].bit_generator.state = state
+        for generator, state in kept:
+            generator.bit_generator.state = state
         try:
             return self._conclude()
         except BaseException:  # of a start, or of a picture: this step has not been
@@ -295,16 +295,16 @@ class RigidVectorEnv(BatchAttributes[Obs]):
                 "is disabled: reset(options={'reset_mask': terminations | truncations}) first"
             )
 
-    def _generators_of_ended(self) -> dict[int, Any]:
-        """States of the generators of ended worlds, by world.
+    def _generators_of_ended(self) -> list[tuple[Any, Any]]:
+        """Generators of ended worlds, each with its state.
 
         In mode ``NextStep`` they move in the step that starts them anew; a disturbance due then must not take numbers
         of the next episode.
         """
         if self.task.disturbed is None:
-            return {}
-        generators: Any = self.task.generators
-        return {world: generators[world].bit_generator.state for world in np.flatnonzero(self._ended).tolist()}
+            return []
+        ended: Any = [self.task.generators[world] for world in np.flatnonzero(self._ended).tolist()]
+        return [(generator, generator.bit_generator.state) for generator in ended]
 
     def _kept_pictures(self) -> dict[str, np.ndarray]:
         """Copies of the source's memory, where code of a user may end with an error."""

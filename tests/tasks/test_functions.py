@@ -454,7 +454,7 @@ class Pushed(Slide):
 def test_a_check_finds_later_episodes_that_depend_on_the_mode_of_starting_anew(monkeypatch):
     """As they do where an ended world draws a push in the step that starts it anew."""
     check_task(Pushed, steps=6, contexts=())
-    monkeypatch.setattr(RigidVectorEnv, "_generators_of_ended", lambda envs: {})
+    monkeypatch.setattr(RigidVectorEnv, "_generators_of_ended", lambda envs: [])
     with pytest.raises(CheckError, match=r"drawn goal differs by .*world 0, step 1, autoreset_mode 'NextStep'"):
         check_task(Pushed, steps=6, contexts=())
 
