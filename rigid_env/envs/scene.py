@@ -261,6 +261,11 @@ class SceneVectorEnv(RigidVectorEnv[NDArray[Any]]):
         told = render_mode, width, height, obs, obs_size, obs_stack, contacts
         super().__init__(task, autoreset_mode, max_episode_steps, *told, camera=camera, arrows=arrows)
 
+    def _one_limit(self, values: Any) -> int | None:
+        limit = super()._one_limit(values)
+        check_limit(limit, self.task.max_episode_steps)
+        return limit
+
 
 def check_limit(value: int | str | None, limit: int | None) -> None:
     """Refuse a limit of a batch beyond that of its task: Gymnasium cannot lengthen a single environment's, either."""
