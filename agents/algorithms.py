@@ -18,6 +18,7 @@ import physics
 from agents.config import RunConfig
 from agents.features import GoalDifference
 from rigid_env import RigidVecEnv
+from rigid_env.envs.named import not_there
 
 CLASSES: dict[str, type[BaseAlgorithm]] = {"ppo": PPO, "sac": SAC}
 
@@ -54,7 +55,7 @@ def _make(maker: Callable[..., Any], env: str, arguments: dict[str, Any]) -> Any
     try:
         return maker(env, **arguments)
     except gym.error.UnregisteredEnv as error:
-        raise ValueError(f"env is {env!r}; allowed are ids that Gymnasium knows ({error})") from error
+        raise not_there(env) from error
 
 
 def make_training_env(config: RunConfig) -> RigidVecEnv:

@@ -21,7 +21,7 @@ from stable_baselines3.common.off_policy_algorithm import OffPolicyAlgorithm
 from agents.algorithms import CLASSES
 from agents.baselines import Policy
 from agents.config import RunConfig, RunFolder
-from rigid_env.envs.policy_files import WITHOUT_REPLAY, greedy
+from rigid_env.envs.policy_files import WITHOUT_REPLAY, greedy, tell_code_runs
 
 KEPT = 3  # newest checkpoints of a run; older ones are deleted
 
@@ -75,6 +75,8 @@ def list_checkpoints(folder: Path) -> list[Path]:
 def load_checkpoint(run: RunFolder, config: RunConfig) -> tuple[BaseAlgorithm, Any]:
     """The newest checkpoint of a run: model, environments and random generators as they were.
 
+    Code in its files runs while they are read; a line on standard error says so.
+
     The same computer, versions and number of threads given, training goes on with the same bits.
 
     Parameters
@@ -96,6 +98,7 @@ def load_checkpoint(run: RunFolder, config: RunConfig) -> tuple[BaseAlgorithm, A
     found = list_checkpoints(run.checkpoints)
     if not found:
         raise ValueError(f"run is {str(run.path)!r}; allowed is one with a checkpoint")
+    tell_code_runs(found[-1] / MODEL)
     with (found[-1] / STATE).open("rb") as file:
         state = pickle.load(file)
     model = CLASSES[config.algo].load(found[-1] / MODEL, env=state["env"], device="cpu", force_reset=False)
@@ -110,7 +113,8 @@ def load_checkpoint(run: RunFolder, config: RunConfig) -> tuple[BaseAlgorithm, A
 def load_policy(run: RunFolder) -> tuple[RunConfig, Policy]:
     """The trained policy of a run, acting without exploration.
 
-    It is that of `model.zip`, or of the newest checkpoint if training has not ended.
+    It is that of `model.zip`, or of the newest checkpoint if training has not ended. Code in the file runs while it is
+    read; a line on standard error says so.
 
     Raises
     ------
@@ -124,4 +128,5 @@ def load_policy(run: RunFolder) -> tuple[RunConfig, Policy]:
     if not found:
         raise ValueError(f"run is {str(run.path)!r}; allowed is one with a model.zip or a checkpoint")
     torch.set_num_threads(config.torch_threads)
+    tell_code_runs(found[-1])
     return config, greedy(CLASSES[config.algo].load(found[-1], device="cpu", custom_objects=WITHOUT_REPLAY))

@@ -23,6 +23,7 @@ from agents.checkpoint import load_policy
 from agents.config import RunFolder
 from agents.interval import wilson
 from rigid_env.cli.files import output_option
+from rigid_env.cli.names import checked_preset
 from rigid_env.terminal import Column, Table, make_console, run_program
 
 BATCH = 500  # episodes at a time
@@ -31,11 +32,12 @@ FIRST_SEED = 1_000_000_000  # far from the seeds of training, which start at the
 SEED_STRIDE = 1_000_000  # episodes between the sets of seeds of two evaluations
 
 # --- options of the command lines -------------------------------------------------------------------------
-RunArgument = Annotated[Path | None, typer.Argument(metavar="RUN_DIR", help="Folder of a run.")]
+RUN_HELP = "Folder of a run; code in its model.zip runs while it is read: take it from those you trust only."
+RunArgument = Annotated[Path | None, typer.Argument(metavar="RUN_DIR", help=RUN_HELP)]
 BaselineOption = Annotated[str | None, typer.Option(help="Instead of a run: random or controller.")]
 EnvOption = Annotated[str, typer.Option(help="Of the baseline.")]
 SeedOption = Annotated[int, typer.Option(min=0, help="Of the set of episodes.")]
-AccuracyOption = Annotated[str | None, typer.Option(help="Preset of the engine.")]
+AccuracyOption = Annotated[str | None, typer.Option(help="Preset of the engine.", callback=checked_preset)]
 JsonOption = Annotated[Path | None, output_option("--json", ".json", help="Write the numbers here, too.")]
 
 

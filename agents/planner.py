@@ -28,10 +28,11 @@ from rich.progress import Progress
 from agents.interval import wilson
 from physics import validation
 from rigid_env.cli.files import output_option
+from rigid_env.cli.names import checked_preset
 from rigid_env.envs.making import make_task
 from rigid_env.envs.named import make_named
 from rigid_env.tasks.rollout import rollout
-from rigid_env.tasks.state import TaskState
+from rigid_env.tasks.state import TaskState, put
 from rigid_env.terminal import Column, Table, make_console, number_columns, run_program
 
 ENV_ID = "rigid_env:rigid_env/BlockReach-v0"
@@ -49,7 +50,7 @@ class PlannerSettings:
     ----------
     method : {"mppi", "cem"}
     samples : int
-        Sequences in one iteration.
+        Sequences in one iteration, at least 2: one of them is the plan itself.
     horizon : int
         Control steps of a sequence.
     knots : int
@@ -83,13 +84,14 @@ class PlannerSettings:
 
     def __post_init__(self):
         validation.one_of(self.method, METHODS, "method")
-        for field in ("samples", "horizon", "knots", "iterations", "elites", "replan"):
+        validation.count(self.samples, "samples", least=2)
+        for field in ("horizon", "knots", "iterations", "elites", "replan"):
             validation.count(getattr(self, field), field)
         for field in ("noise", "temperature"):
             validation.positive(getattr(self, field), (), field)
         if not 2 <= self.knots <= self.horizon:
             raise ValueError(f"knots is {self.knots}; allowed are 2 to the horizon, {self.horizon}")
-        if self.elites > self.samples:
+        if self.method == "cem" and self.elites > self.samples:
             raise ValueError(f"elites is {self.elites}; allowed are at most the samples, {self.samples}")
         if self.replan > self.horizon:
             raise ValueError(f"replan is {self.replan}; allowed is at most the horizon, {self.horizon}")
@@ -97,6 +99,10 @@ class PlannerSettings:
 
 class Planner:
     """Plan actions of a task by rolling out samples.
+
+    The model knows the state and the draws of the episode, and no random number to come: pushes and gusts that it meets
+    come from generators of its own, and so does the time of the next one. A gust that blows is known up to its end. All
+    sequences of an iteration meet the same ones, so that their returns differ by their actions alone.
 
     Parameters
     ----------
@@ -131,7 +137,15 @@ class Planner:
         Returns
         -------
         (replan, numbers) float64
+
+        Raises
+        ------
+        ValueError
+            It is no state, one of several worlds, or one of another task or of other settings.
         """
+        validation.instance(state, TaskState, "state", "what get_state of an environment gives")
+        if state.worlds != 1:
+            raise ValueError(f"state is {state!r}; allowed are states of one world, such as get_state([0]) of a batch")
         s = self.settings
         for _ in range(s.iterations):
             noise = self._rng.standard_normal((s.samples, s.knots, self.model.action_size))
@@ -145,9 +159,14 @@ class Planner:
 
     def returns(self, state: TaskState, actions: np.ndarray) -> np.ndarray:
         """Returns of sequences of actions (samples, horizon, numbers), each up to the end of its episode."""
-        if self.model.disturbed is None:  # nothing is drawn, and generators take a while to copy
-            state = replace(state, generators=(None,) * state.worlds)
-        return rollout(self.model, actions, initial=state).returns
+        is_disturbed = self.model.disturbed is not None
+        own = np.random.PCG64(self._rng.integers(2**63)).state if is_disturbed else None
+        state = replace(state, generators=(own,) * state.worlds)  # those of the environment would foretell its pushes
+        if not is_disturbed:
+            return rollout(self.model, actions, initial=state).returns
+        put(self.model, {}, state)
+        self.model.disturbed.wait_anew()
+        return rollout(self.model, actions).returns
 
     def _improve(self, knots: np.ndarray, returns: np.ndarray) -> None:
         s = self.settings
@@ -234,15 +253,17 @@ def main(
     env: Annotated[str, typer.Option(help="Id of an environment of this package, or module:Class of a task.")] = ENV_ID,
     episodes: Annotated[int, typer.Option(min=1, help="Episodes to plan.")] = 100,
     method: Annotated[str, typer.Option(help=f"One of {', '.join(METHODS)}.")] = METHODS[0],
-    samples: Annotated[int, typer.Option(min=1, help="Sequences in one iteration.")] = PlannerSettings.samples,
-    accuracy: Annotated[str, typer.Option(help="Preset of the model; the environment has its default.")] = "fast",
+    samples: Annotated[int, typer.Option(min=2, help="Sequences in one iteration.")] = PlannerSettings.samples,
+    accuracy: Annotated[
+        str, typer.Option(help="Preset of the model; the environment has its default.", callback=checked_preset)
+    ] = "fast",
     seed: Annotated[int, typer.Option(min=0, help="Of the first episode, and of the noise.")] = 1000,
     json: Annotated[Path | None, output_option("--json", ".json", help="Write the numbers here, too.")] = None,
 ) -> None:
     """Solve episodes by planning, without training."""
     try:
         world = make_named(env)
-        settings = PlannerSettings(method=method, samples=samples)
+        settings = PlannerSettings(method=method, samples=samples, elites=min(samples, PlannerSettings.elites))
         planner = Planner(type(world.unwrapped.task), settings, seed, accuracy=accuracy)
     except (ValueError, TypeError) as error:
         raise typer.BadParameter(str(error)) from error

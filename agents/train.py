@@ -30,11 +30,13 @@ from agents.evaluate import JsonOption, evaluate, evaluation_seeds, print_evalua
 from agents.progress import ProgressDisplay
 from agents.record import record
 from agents.supervisor import Supervisor
+from rigid_env.cli.names import checked_preset
 from rigid_env.terminal import make_console, run_program
 
 DEFAULTS = {"env": "rigid_env/BlockReach-v0", "seed": 0}
 EVALUATION_EPISODES = 1000
 VIDEO_EPISODES = 3
+RESUME_HELP = "Go on with a run; code in its checkpoint runs while it is read: take it from those you trust only."
 INTERRUPTED = 130  # exit status of a program ended by Ctrl-C
 
 
@@ -192,12 +194,14 @@ def main(
     algo: Annotated[str | None, typer.Option(help="ppo or sac.", show_default="the first of the environment")] = None,
     seed: Annotated[int | None, typer.Option(help="Of all that is random.", show_default="0")] = None,
     num_envs: Annotated[int | None, typer.Option(help="Worlds trained on at once.")] = None,
-    accuracy: Annotated[str | None, typer.Option(help="Preset of the engine in training.")] = None,
+    accuracy: Annotated[
+        str | None, typer.Option(help="Preset of the engine in training.", callback=checked_preset)
+    ] = None,
     target: Annotated[float | None, typer.Option(help="Success rate to stop at, 0 to 1.")] = None,
     max_steps: Annotated[int | None, typer.Option(help="Steps to stop at.")] = None,
     threads: Annotated[int | None, typer.Option(help="Of the engine.")] = None,
     hyperparameters: Annotated[Path, typer.Option(help="YAML file.", exists=True)] = HYPERPARAMETERS,
-    resume: Annotated[Path | None, typer.Option(metavar="RUN_DIR", help="Go on with a run.")] = None,
+    resume: Annotated[Path | None, typer.Option(metavar="RUN_DIR", help=RESUME_HELP)] = None,
     out: Annotated[Path, typer.Option(help="Where the folders of runs are made.")] = Path("runs"),
     video: Annotated[bool, typer.Option(help="Record some episodes at the end.")] = True,
     tensorboard: Annotated[bool, typer.Option(help="Write diagnostics for TensorBoard.")] = False,

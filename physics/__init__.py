@@ -9,6 +9,8 @@ The contract in five lines::
     report = world.step(wrench)
 """
 
+from typing import TYPE_CHECKING
+
 from physics.analysis.diagnostics import Diagnostics, diagnose, look_at
 from physics.analysis.events import Event
 from physics.analysis.simulate import simulate
@@ -17,6 +19,7 @@ from physics.io.mjcf import load_mjcf, save_mjcf
 from physics.io.recorder import Recorder
 from physics.io.recording import Recording, Replay
 from physics.io.toml import load_scene, save_scene
+from physics.keywords import no_attribute as _no_attribute
 from physics.plan.accuracy import PRESETS, Accuracy
 from physics.plan.plan import make_plan
 from physics.scene import canonical_scenes as scenes
@@ -98,3 +101,9 @@ __all__ = [
     "three_walls",
     "wrench_at",
 ]
+
+
+if not TYPE_CHECKING:  # a checker of types would take any name for one that is there
+
+    def __getattr__(name: str) -> object:
+        raise _no_attribute(__name__, name, __all__)

@@ -17,9 +17,23 @@ ALIKE = 0.6
 
 def nearest_first(name: object, allowed: Iterable[str]) -> list[str]:
     """The names `allowed`, those that are like `name` first, the nearest of them ahead; the rest keep its order."""
-    name, allowed = str(name).lower(), list(allowed)
-    likeness = {known: difflib.SequenceMatcher(None, name, known.lower()).ratio() for known in allowed}
-    return sorted(allowed, key=lambda known: -likeness[known] if likeness[known] >= ALIKE else 0.0)
+    allowed = list(allowed)
+    first = alike(name, allowed)
+    return [*first, *(known for known in allowed if known not in first)]
+
+
+def alike(name: object, allowed: Iterable[str]) -> list[str]:
+    """Those of the names `allowed` that `name` may be a misspelling of, the nearest first."""
+    text, allowed = str(name).lower(), list(allowed)
+    likeness = {known: difflib.SequenceMatcher(None, text, known.lower()).ratio() for known in allowed}
+    return sorted((known for known in allowed if likeness[known] >= ALIKE), key=lambda known: -likeness[known])
+
+
+def no_attribute(module: str, name: str, allowed: Iterable[str]) -> AttributeError:
+    """Error for a name that a module does not have: it lists those it has, the nearest first."""
+    return AttributeError(
+        f"module {module!r} has no attribute {name!r}; allowed are {', '.join(nearest_first(name, allowed))}"
+    )
 
 
 def known_keywords(target: Function) -> Function:

@@ -121,7 +121,9 @@ def __getattr__(name: str) -> object:
     elif name == "__version__":
         value = _version()
     else:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}; allowed are {', '.join(__all__)}")
+        from physics.keywords import no_attribute
+
+        raise no_attribute(__name__, name, __all__)
     globals()[name] = value
     return value
 

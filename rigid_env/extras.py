@@ -31,6 +31,9 @@ EXTRAS: dict[str, dict[str, str]] = {
 The extra `agents` brings tensorboard, moviepy and imageio-ffmpeg as well: name them where one is needed.
 """
 
+CPU_TORCH = "--index-url https://download.pytorch.org/whl/cpu"
+"""Where the small torch is, for the processor: the one that pip finds brings CUDA on Linux."""
+
 SOURCES = Path(__file__).parents[1]
 
 
@@ -64,7 +67,8 @@ def lacking(extra: str, *modules: str, purpose: str) -> str:
         return ""
     listed = " and ".join(filter(None, [", ".join(names[:-1]), names[-1]]))
     verb = "is" if len(names) == 1 else "are"
-    return f"{purpose} needs {listed}, which {verb} not installed: {install_line(extra)}"
+    line = install_line(extra, has_torch="torch" not in names)
+    return f"{purpose} needs {listed}, which {verb} not installed: {line}"
 
 
 def is_installed(module: str) -> bool:
@@ -77,9 +81,13 @@ def is_installed(module: str) -> bool:
         return True
 
 
-def install_line(extra: str) -> str:
-    """The line that installs an extra: in a checkout of the sources the editable one, too."""
-    line = f'pip install "rigid-env[{extra}]"'
+def install_line(extra: str, has_torch: bool = True) -> str:
+    """The line that installs an extra: in a checkout of the sources the editable one, too.
+
+    Without torch a line for the small one, of the same versions, stands behind it; it is to be run first.
+    """
+    line, torch = f'pip install "rigid-env[{extra}]"', f"pip install torch {CPU_TORCH}"
     if (SOURCES / "pyproject.toml").is_file() and (SOURCES / "constraints.txt").is_file():
         line += f', or in {SOURCES}: pip install -c constraints.txt -e ".[{extra}]"'
-    return line
+        torch = f"pip install -c constraints.txt --no-deps torch {CPU_TORCH}"
+    return line if has_torch else f"{line}; first, if no GPU is to be used, the small torch: {torch}"

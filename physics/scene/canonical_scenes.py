@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from physics.annotations import Effect, Layout
+from physics.keywords import nearest_first, no_attribute
 from physics.scene.bodies import Block, Ellipsoid, Sphere
 from physics.scene.effects import Contact, Friction, Gravity
 from physics.scene.force_fields import AngularDrag, Drag, Magnus
@@ -189,5 +190,11 @@ def about(name: str) -> str:
 def by_name(name: str) -> Scene:
     """The canonical scene of this name."""
     if name not in SCENES:
-        raise ValueError(f"scene is {name!r}; allowed are {', '.join(sorted(SCENES))}")
+        raise ValueError(f"scene is {name!r}; allowed are {', '.join(nearest_first(name, sorted(SCENES)))}")
     return SCENES[name]()
+
+
+if not TYPE_CHECKING:  # a checker of types would take any name for one that is there
+
+    def __getattr__(name: str) -> object:
+        raise no_attribute("physics.scenes", name, [*SCENES, "SCENES", "about", "block_in_box", "by_name"])

@@ -27,7 +27,12 @@ app = typer.Typer(
 
 Json = Annotated[Path | None, output_option("--json", ".json", help="Write the numbers here, too.")]
 Accuracy = Annotated[
-    str, typer.Option(help="Preset: fast, balanced, precise or reference.", autocompletion=names.complete_preset)
+    str,
+    typer.Option(
+        help="Preset: fast, balanced, precise or reference.",
+        autocompletion=names.complete_preset,
+        callback=names.checked_preset,
+    ),
 ]
 SceneArgument = Annotated[
     str,

@@ -75,7 +75,7 @@ def _make(task: str) -> RigidEnv:
         return SceneEnv(task)
     if task.split(":")[-1] == SCENE_ID:
         return SceneEnv("rest", goal={"pos": (3.0, 1.5, 0.0), "tolerance": 0.5})
-    return make_named(task, "task").unwrapped
+    return make_named(task, "task", scenes.SCENES).unwrapped
 
 
 def _table(section: Section) -> Table:

@@ -79,11 +79,9 @@ def effects(
 ) -> None:
     """Measure what each effect costs: steps per second of its scene with it and without."""
     with told_errors():
-        from physics.plan import accuracy as knobs
         from rigid_env.lab.measure import effects as costs
         from rigid_env.lab.measure.table import make_table
 
-        knobs.resolve(accuracy)
         chosen = costs.chosen(effect or (), markdown)
         make_parents(json)
         console = make_console()
@@ -165,14 +163,12 @@ def tosses(
 ) -> None:
     """Replay measured cube tosses: fit a quarter of them, report errors over the rest."""
     with told_errors():
-        from physics.plan import accuracy as knobs
         from rigid_env.lab.tosses import data as files
         from rigid_env.lab.tosses import plot as pictures
         from rigid_env.lab.tosses.fit import QUICK, Effort
         from rigid_env.lab.tosses.report import Measurement
         from rigid_env.lab.tosses.show import show
 
-        knobs.resolve(accuracy)
         fitted = None if fit is None else tuple(name.strip() for name in fit.split(","))
         effort = QUICK if quick else Effort()
         measurement = Measurement(files.load(data), accuracy, effort, seed, threads, fitted)

@@ -6,6 +6,8 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import typer
+
 if TYPE_CHECKING:
     from physics import Scene
 
@@ -29,6 +31,16 @@ def load_scene(name: str) -> tuple[str, Scene]:
 
     found = find_scene(name)
     return found.name, found.scene
+
+
+def checked_preset(name: str | None) -> str | None:
+    """Check the name of a preset, for the `callback` of an option: a shell has no `physics.Accuracy`."""
+    from physics import PRESETS
+    from physics.keywords import nearest_first
+
+    if name is not None and name not in PRESETS:
+        raise typer.BadParameter(f"{name!r}; allowed are {', '.join(nearest_first(name, PRESETS))}")
+    return name
 
 
 # --- completion in a shell -------------------------------------------------------------------------------------------

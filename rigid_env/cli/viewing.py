@@ -17,16 +17,21 @@ WHAT = (
     "a trajectory (.npz)."
 )
 
+POLICY = (
+    "Of an environment: plain arrays (.npz), of which nothing is run, or a model of Stable-Baselines3 (.zip). Its code "
+    "runs while it is read: take it from those you trust only."
+)
+
 
 @app.command(short_help="Look at a scene, an environment, a recording or a trajectory in a browser.")
 def view(
     what: Annotated[str, typer.Argument(metavar="[WHAT]", help=WHAT, autocompletion=names.complete_scene)] = "drop",
-    accuracy: Annotated[str | None, typer.Option(help="Preset of the engine; balanced by default.")] = None,
+    accuracy: Annotated[
+        str | None, typer.Option(help="Preset of the engine; balanced by default.", callback=names.checked_preset)
+    ] = None,
     dt: Annotated[float | None, typer.Option("--dt", help="Step of a scene [s]; 0.01 by default.")] = None,
     seed: Annotated[int, typer.Option(min=0, help="Of the first episode, and of random actions.")] = 0,
-    policy: Annotated[
-        Path | None, typer.Option(help="Of an environment: a file of Stable-Baselines3, or plain arrays (.npz).")
-    ] = None,
+    policy: Annotated[Path | None, typer.Option(help=POLICY)] = None,
     controller: Annotated[bool, typer.Option("--controller", help="The controller written by hand acts.")] = False,
     host: Annotated[
         str, typer.Option(help="Address to serve on; 0.0.0.0 lets other machines look, too.")

@@ -32,6 +32,8 @@ class BlockEnv(EpisodeParameters, RigidEnv[NDArray[Any]]):
         As of `RigidEnv`.
     accuracy, walls, half_width, mass, size, friction, restitution, gravity, effects, frame_skip, dt, dump_faults
         Of the task, see `rigid_env.tasks.block.BlockTask`.
+    threads : int
+        Taken so that the same arguments make a batch; one world has one thread.
 
     Raises
     ------
@@ -67,10 +69,11 @@ class BlockEnv(EpisodeParameters, RigidEnv[NDArray[Any]]):
         frame_skip: int = 5,
         dt: float = 0.005,
         dump_faults: str | Path | None = None,
+        threads: int = 1,
     ) -> None:
         task = self.task_class(
-            1, accuracy=accuracy, walls=walls, half_width=half_width, mass=mass, size=size, friction=friction,
-            restitution=restitution, gravity=gravity, effects=effects, frame_skip=frame_skip, dt=dt,
+            1, threads=threads, accuracy=accuracy, walls=walls, half_width=half_width, mass=mass, size=size,
+            friction=friction, restitution=restitution, gravity=gravity, effects=effects, frame_skip=frame_skip, dt=dt,
             dump_faults=dump_faults,
         )  # fmt: skip
         told = render_mode, width, height, obs, obs_size, obs_stack, contacts

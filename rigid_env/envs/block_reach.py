@@ -114,6 +114,7 @@ class BlockReachEnv(BlockEnv):
     | `frame_skip` | 5 | physics steps per control step |
     | `dt` | 0.005 | physics step [s] |
     | `dump_faults` | None | folder for what led to a state that was not finite (`rigid-env replay`) |
+    | `threads` | 1 | threads that share a step of a batch; a single environment has one world, and one thread |
     | `render_mode` | None | `"rgb_array"`, `"human"` or None |
     | `width` | 960 | of pictures [px] |
     | `height` | 600 | of pictures [px] |

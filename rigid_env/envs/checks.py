@@ -12,6 +12,7 @@ import numpy as np
 from gymnasium.utils.env_checker import check_env
 from gymnasium.vector import AutoresetMode
 
+from physics.world.gusts import reads_time
 from rigid_env.envs.making import task_class
 from rigid_env.envs.task import TaskEnv, TaskVectorEnv
 from rigid_env.envs.vector_infos import keys
@@ -30,8 +31,8 @@ def check_task(
 ) -> None:
     """Check a task as an environment.
 
-    Gymnasium's `check_env`; the same numbers in a batch as alone, for the same seeds; all modes of starting anew;
-    seeds; copies by `pickle`; workers.
+    Gymnasium's `check_env`; the same numbers in a batch as alone, for the same seeds, in later episodes, too, in all
+    modes of starting anew; seeds; copies by `pickle`; workers.
 
     Parameters
     ----------
@@ -57,8 +58,7 @@ def check_task(
         warnings.simplefilter("error")
         check_env(TaskEnv(kind, **settings), skip_render_check=True)
     check.alone_as_in_a_batch()
-    for mode in AutoresetMode:
-        check.starts_anew(mode)
+    check.later_episodes()
     check.seeds()
     check.copies()
     for context in contexts:
@@ -98,19 +98,37 @@ class _Checks:
             if ends.any():
                 return
 
-    def starts_anew(self, mode: AutoresetMode) -> None:
-        """Episodes end at the limit and start anew as the mode says, inside the observation space."""
+    def later_episodes(self) -> None:
+        """Episodes after the first are those of single environments in all modes of starting anew."""
+        worlds = range(ENVS)
+        alone = [_Episodes(TaskEnv(self.kind, **self.settings), i, self.actions[:, i], self.limit) for i in worlds]
+        for mode in AutoresetMode:
+            self._starts_anew(mode, alone)
+
+    def _starts_anew(self, mode: AutoresetMode, alone: list[_Episodes]) -> None:
+        """Episodes end at the limit and start anew as the mode says, each as it would alone, and in its space."""
+        is_late = mode is AutoresetMode.NEXT_STEP  # a world starts anew in the step after that in which it ended
         envs = self.batch(mode, self.limit)
-        envs.reset(seed=SEED)
-        for k in range(self.steps):
-            obs, rewards, ends, cuts, _ = envs.step(self.actions[k])
-            _require(envs.observation_space.contains(obs), f"observation of step {k} is outside its space")
-            _require(bool(np.isfinite(rewards).all()), f"reward of step {k} is {rewards}")
+        obs, _ = envs.reset(seed=SEED)
+        counts, over = np.zeros(ENVS, dtype=np.int64), np.zeros(ENVS, dtype=np.bool_)
+        while counts.min() < self.steps:
+            is_first = over & is_late
+            if is_first.any() and envs.task.disturbed is not None:
+                envs.task.disturbed.arrays["disturbance start"][is_first] = 0.0  # due in the step that starts anew
+            obs, rewards, ends, cuts, infos = envs.step(self.actions[counts % self.steps, np.arange(ENVS)])
             over = ends | cuts
+            _require(envs.observation_space.contains(obs), f"observation of step {counts.max()} is outside its space")
+            _require(bool(np.isfinite(rewards).all()), f"reward of step {counts.max()} is {rewards}")
+            for i in np.flatnonzero(~is_first).tolist():
+                last = infos["final_obs"][i] if "final_obs" in infos and over[i] else _of_world(obs, i)
+                alone[i].steps_as(counts[i], (last, rewards[i], ends[i], cuts[i]), mode)
+            if mode is AutoresetMode.SAME_STEP:
+                _require(bool((envs.task.steps[over] == 0).all()), f"worlds did not start anew in step {counts.max()}")
             if mode is AutoresetMode.DISABLED and over.any():
-                envs.reset(options={"reset_mask": over})
-            elif mode is AutoresetMode.SAME_STEP:
-                _require(bool((envs.task.steps[over] == 0).all()), f"worlds did not start anew in step {k}")
+                obs, infos = envs.reset(options={"reset_mask": over})
+            for i in np.flatnonzero(is_first if is_late else over).tolist():
+                alone[i].starts_as(counts[i] - is_late, _of_world(obs, i), infos, mode)
+            counts += ~is_first
         envs.close()
 
     def seeds(self) -> None:
@@ -160,6 +178,49 @@ class _Checks:
             if is_ended:
                 break
         return np.concatenate(rows)
+
+
+class _Episodes:
+    """Steps and starts of a single environment, to which those of a world of a batch are compared.
+
+    A field that changes with time sees the one time of a batch: later episodes of such a scene are not compared.
+    """
+
+    def __init__(self, env: TaskEnv, world: int, actions: np.ndarray, limit: int):
+        self.world, self.draws = world, env.task.own_draws
+        env.reset(seed=SEED + world)
+        self.sees_time = reads_time(env.task.world.plan, env.task.world.params)
+        self.steps: list[tuple] = []  # observation, reward, end and truncation of each
+        self.starts: dict[int, tuple] = {}  # observation and info of those after these steps
+        count = 0
+        for k, action in enumerate(actions):
+            obs, reward, is_ended, _, _ = env.step(action)
+            count += 1
+            self.steps.append((obs, reward, is_ended, count >= limit))
+            if is_ended or count >= limit:
+                self.starts[k], count = env.reset(), 0
+
+    def steps_as(self, k: int, theirs: tuple, mode: AutoresetMode) -> None:
+        """Compare step k of the world."""
+        if not self._has(k):
+            return
+        for what, ours, other in zip(("observation", "reward", "end", "truncation"), self.steps[k], theirs):
+            _same(what, ours, other, self._where(k, mode))
+
+    def starts_as(self, k: int, obs, infos: dict[str, Any], mode: AutoresetMode) -> None:
+        """Compare the start after step k of the world."""
+        if not self._has(k):
+            return
+        ours, told = self.starts[k]
+        for name in self.draws:
+            _same(f"drawn {name}", infos[name][self.world], told[name], self._where(k, mode))
+        _same("first observation", obs, ours, self._where(k, mode))
+
+    def _has(self, k: int) -> bool:
+        return not self.sees_time and k < len(self.steps)
+
+    def _where(self, k: int, mode: AutoresetMode) -> str:
+        return f"world {self.world}, step {k}, autoreset_mode {mode.value!r}"
 
 
 def _of_world(obs, world: int):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import inspect
+import sys
 from collections.abc import Mapping
 from importlib import import_module
 from typing import Any
@@ -27,12 +28,20 @@ def task_class(task: type[Task] | str) -> type[Task]:
         try:
             found = getattr(import_module(module), name)
         except (ImportError, AttributeError, ValueError) as error:
-            raise ValueError(f"task is {task!r}, which is not there ({error}); allowed is 'module:Class'") from error
+            allowed = ", ".join(nearest_first(task, _tasks_of(module))) or "'module:Class'"
+            raise ValueError(f"task is {task!r}, which is not there ({error}); allowed is {allowed}") from error
     else:
         found = task
     if not (inspect.isclass(found) and issubclass(found, Task)):
         raise ValueError(f"task is {task!r}; allowed are a subclass of rigid_env.Task and 'module:Class' of one")
     return found
+
+
+def _tasks_of(module: str) -> list[str]:
+    """Names, ``module:Class``, of the tasks that a module holds, if it has been imported."""
+    found = vars(sys.modules[module]) if module in sys.modules else {}
+    classes = [name for name, each in found.items() if inspect.isclass(each) and issubclass(each, Task)]
+    return [f"{module}:{name}" for name in classes if found[name] is not Task]
 
 
 def make_task(task: type[Task] | str, worlds: int, settings: Mapping[str, Any]) -> Task:

@@ -5,18 +5,59 @@ from __future__ import annotations
 import os
 import re
 import sys
+from collections.abc import Iterable
 
 import gymnasium as gym
 
+from physics.keywords import alike
 from rigid_env.envs.env import RigidEnv
 from rigid_env.envs.task import TaskEnv
 
 CLASS = re.compile(r"[\w.]+:[A-Za-z_]\w*")
 
-ALLOWED = "allowed are ids such as 'rigid_env/BlockReach-v0', 'module:id', and 'module:Class' of a task"
+NAMED = 5
+"""Names that a message about an unknown one lists."""
 
 
-def make_named(name: str, field: str = "env") -> gym.Env:
+def known_ids() -> list[str]:
+    """Ids of the environments of this package, its own and those of registered tasks."""
+    return [name for name, spec in gym.registry.items() if str(spec.entry_point).startswith("rigid_env.")]
+
+
+def near_names(name: str, others: Iterable[str] = ()) -> list[str]:
+    """Ids, and `others`, that a name is like, without namespace, version and module; the first ids if it is like none.
+
+    Gymnasium's own guess knows all environments, and no namespace that is left out.
+    """
+    bare = {_bare(each): each for each in [*others, *known_ids()]}
+    found = [bare[each] for each in alike(_bare(name), bare)]
+    return (found or known_ids())[:NAMED]
+
+
+def _bare(name: str) -> str:
+    """Name of an id: BlockReach of ``module:rigid_env/BlockReach-v0``."""
+    return re.sub(r"-v\d+$", "", re.split("[:/]", name)[-1])
+
+
+def not_there(name: str, field: str = "env", why: object = "", others: Iterable[str] = ()) -> ValueError:
+    """Error for a name under which there is no environment, with the names that it is like.
+
+    Parameters
+    ----------
+    name, field
+        As of `make_named`.
+    why : object
+        In brackets, such as the error of an import.
+    others : sequence of str
+        Names that are allowed besides.
+    """
+    near = ", ".join(map(repr, near_names(name, others)))
+    reason = f" ({why})" if why else ""
+    allowed = f"allowed are names such as {near}, 'module:id', and 'module:Class' of a task"
+    return ValueError(f"{field} is {name!r}, which is not there{reason}; {allowed}")
+
+
+def make_named(name: str, field: str = "env", others: Iterable[str] = ()) -> gym.Env:
     """Make an environment that a user names.
 
     Parameters
@@ -25,6 +66,8 @@ def make_named(name: str, field: str = "env") -> gym.Env:
         Id, ``module:id``, or ``module:Class`` of a task.
     field : str
         What the name is called in errors.
+    others : sequence of str
+        Names that the caller knows besides, for errors.
 
     Returns
     -------
@@ -44,8 +87,10 @@ def make_named(name: str, field: str = "env") -> gym.Env:
         return env if limit is None else gym.wrappers.TimeLimit(env, limit)
     try:
         made = gym.make(name, disable_env_checker=True)
+    except gym.error.UnregisteredEnv as error:
+        raise not_there(name, field, others=others) from error
     except (gym.error.Error, ImportError) as error:
-        raise ValueError(f"{field} is {name!r}, which is not there ({error}); {ALLOWED}") from error
+        raise not_there(name, field, error, others) from error
     if not isinstance(made.unwrapped, RigidEnv):
         kind = type(made.unwrapped).__name__
         raise ValueError(f"{field} is {name!r}, a {kind}; allowed are environments of rigid_env")

@@ -1,5 +1,8 @@
 """Policies from files: models of Stable-Baselines3, and small networks as plain arrays.
 
+The ending of a file's name decides how it is read. Nothing of an ``.npz`` is run; a ``.zip`` is a model of
+Stable-Baselines3, and code in it runs while it is read.
+
 A policy is a function from observations with the worlds first, (n, entries) or a dict of such arrays, to actions
 (n, numbers).
 
@@ -21,6 +24,7 @@ from __future__ import annotations
 import json
 import os
 import re
+import sys
 import zipfile
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
@@ -31,8 +35,8 @@ import numpy as np
 from physics import validation
 from rigid_env.extras import require
 
-MODEL = ".zip"
-"""Ending of a model of Stable-Baselines3: no other file is read by `pickle`."""
+MODEL, ARRAYS = ".zip", ".npz"
+"""Endings of a model of Stable-Baselines3, the only file that is read by `pickle`, and of plain arrays."""
 
 WITHOUT_REPLAY = {"replay_buffer_class": None, "replay_buffer_kwargs": {}, "buffer_size": 1}
 """Arguments for loading a model that only acts: no memory for a replay buffer, and no environment for its rewards."""
@@ -60,8 +64,9 @@ def load_policy(path: str | os.PathLike) -> Callable[[Observations], np.ndarray]
     Parameters
     ----------
     path : str or Path
-        ``.npz``: plain arrays, of which nothing is run. ``.zip``: a model of Stable-Baselines3, which needs the extra
-        `agents`; its file may hold code, which runs when it is read: take it from those you trust only.
+        Its ending decides. ``.npz``: plain arrays, of which nothing is run. ``.zip``: a model of Stable-Baselines3,
+        which needs the extra `agents`; code in it runs while it is read, as a line on standard error says: take it from
+        those you trust only.
 
     Returns
     -------
@@ -76,23 +81,21 @@ def load_policy(path: str | os.PathLike) -> Callable[[Observations], np.ndarray]
         It is a model, and the extra is not installed.
     """
     path = Path(validation.path(path, "policy"))
-    allowed = "allowed are a model of Stable-Baselines3 (.zip) and plain arrays (.npz)"
+    allowed = f"allowed are a model of Stable-Baselines3 ({MODEL}) and plain arrays ({ARRAYS})"
     if not path.is_file():
         raise ValueError(f"policy is {str(path)!r}, which is no file; {allowed}")
-    if not zipfile.is_zipfile(path):
-        raise ValueError(f"policy is {str(path)!r}, which is neither; {allowed}")
-    with zipfile.ZipFile(path) as content:
-        names = content.namelist()
-        settings = content.read("data") if "data" in names else None
-    if "w0.npy" in names:
+    ending = path.suffix.lower()
+    if ending == ARRAYS:
         return Network.load(path)
-    if settings is None:
-        raise ValueError(f"policy is {str(path)!r}, which is neither; {allowed}")
-    if path.suffix.lower() != MODEL:
-        raise ValueError(
-            f"policy is {str(path)!r}, which holds a model, whose code runs; allowed is the ending {MODEL}"
-        )
-    return greedy(load_model(path, settings))
+    if ending != MODEL:
+        raise ValueError(f"policy is {str(path)!r}, whose ending says nothing; {allowed}")
+    return greedy(load_model(path))
+
+
+def tell_code_runs(path: Path) -> None:
+    """Say on standard error that the file about to be read can run code."""
+    told = "a model of Stable-Baselines3: code in it runs while it is read; take it from those you trust only"
+    print(f"rigid-env: {path} is {told}", file=sys.stderr, flush=True)
 
 
 def greedy(model: Any) -> Callable[[Observations], np.ndarray]:
@@ -100,25 +103,37 @@ def greedy(model: Any) -> Callable[[Observations], np.ndarray]:
     return lambda observations: model.predict(observations, deterministic=True)[0]
 
 
-def load_model(path: Path, settings: bytes) -> Any:
-    """Load a model of Stable-Baselines3 to act with; `settings` is the part ``data`` of its file.
+def load_model(path: Path) -> Any:
+    """Load a model of Stable-Baselines3 to act with; its code runs, and a line on standard error says so before.
 
     Raises
     ------
     ValueError
-        It is of no algorithm of `SETTINGS`.
+        It is no such model, or of no algorithm of `SETTINGS`.
     gymnasium.error.DependencyNotInstalled
     """
+    algorithm = _algorithm(path)
     require("agents", "torch", "stable_baselines3", purpose="a policy of Stable-Baselines3")
     import stable_baselines3
 
+    tell_code_runs(path)
+    return getattr(stable_baselines3, algorithm).load(path, device="cpu", custom_objects=WITHOUT_REPLAY)
+
+
+def _algorithm(path: Path) -> str:
+    """Name of the algorithm of a model's file, from the settings in it; nothing is run."""
+    try:
+        with zipfile.ZipFile(path) as content:
+            settings = content.read("data")
+    except Exception:  # whatever is wrong with it, it is none
+        told = f"allowed with the ending {MODEL} is a model of Stable-Baselines3, as its `save` writes it"
+        raise ValueError(f"policy is {str(path)!r}, which is none; {told}") from None
     try:
         keys = json.loads(settings).keys()
-        name = next(algorithm for algorithm, setting in SETTINGS.items() if setting in keys)
+        return next(algorithm for algorithm, setting in SETTINGS.items() if setting in keys)
     except (ValueError, AttributeError, StopIteration):
         known = ", ".join((*SETTINGS, "DDPG"))
         raise ValueError(f"policy is {str(path)!r}, of an unknown algorithm; allowed are {known}") from None
-    return getattr(stable_baselines3, name).load(path, device="cpu", custom_objects=WITHOUT_REPLAY)
 
 
 class Network:
@@ -185,21 +200,25 @@ class Network:
         return np.clip(ACTIVATIONS[self.output](x @ w + b), -1.0, 1.0).astype(np.float32)
 
     def save(self, path: str | os.PathLike) -> Path:
-        """Write it as ``.npz`` (`load` reads it); returns the path."""
+        """Write it as ``.npz``, the ending that `path` must have (`load_policy` reads it); returns the path."""
+        if Path(validation.path(path)).suffix.lower() != ARRAYS:
+            raise ValueError(f"path is {str(path)!r}; allowed is the ending {ARRAYS}")
         arrays = {f"{name}{k}": array for k, pair in enumerate(self.layers) for name, array in zip("wb", pair)}
-        with open(validation.path(path), "wb") as file:
+        with open(path, "wb") as file:
             np.savez(file, **arrays, activation=self.activation, output=self.output, mean=self.mean, std=self.std)
         return Path(path)
 
     @classmethod
     def load(cls, path: str | os.PathLike) -> Network:
-        """Read a network; nothing in a file is run.
+        """Read a network; nothing in a file is run, whatever it holds.
 
         Raises
         ------
         ValueError
             It is none, or a damaged one.
         """
+        if not zipfile.is_zipfile(path):
+            raise ValueError(f"policy is {str(path)!r}, which holds no network; allowed is what Network.save writes")
         try:
             with np.load(path, allow_pickle=False) as file:
                 parts = dict(file)
@@ -207,7 +226,7 @@ class Network:
             layers = [(parts[f"w{k}"], parts[f"b{k}"]) for k in range(count)]
             words = {name: str(parts[name]) for name in ("activation", "output") if name in parts}
             return cls(layers, **words, mean=parts.get("mean"), std=parts.get("std"))
-        except (KeyError, ValueError, zipfile.BadZipFile) as error:
+        except Exception as error:  # whatever is wrong with it, it is none
             told = f"there is no {error}" if isinstance(error, KeyError) else error
             raise ValueError(f"policy is {str(path)!r}, which holds no network ({told})") from None
 

@@ -74,13 +74,12 @@ def register_task(id: str, task: type | str, **settings: Any) -> None:
     ValueError
         It is no task.
     """
-    from physics import validation
     from rigid_env.envs.making import check_settings, task_class
+    from rigid_env.tasks.declaration_checks import checked_limit
 
     kind = task_class(task)
     check_settings(kind, settings, of_environment=True)
-    if kind.max_episode_steps is not None:
-        validation.count(kind.max_episode_steps, f"max_episode_steps of {kind.__name__}")
+    checked_limit(kind.max_episode_steps, f"max_episode_steps of {kind.__name__}")
     register(
         id=id,
         entry_point="rigid_env.envs.task:TaskEnv",

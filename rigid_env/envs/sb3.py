@@ -74,13 +74,25 @@ class RigidVecEnv(VecEnv):
         Returns
         -------
         (num_envs, entries) float32
+
+        Raises
+        ------
+        TypeError, ValueError
+            An option or a seed that is unknown or out of range. Nothing has changed then.
         """
         seeds = None if all(seed is None for seed in self._seeds) else self._seeds
         starts: list[dict[str, Any]] = [{} for _ in range(self.num_envs)]
-        for rows, options in self._option_groups():
-            obs, infos = self.vector_env.reset(seed=seeds, options=options or None)
-            for i in rows:
-                starts[i] = self._row_of(infos, i)
+        groups = self._option_groups()
+        before = self.vector_env.get_state() if len(groups) > 1 else None
+        try:
+            for rows, options in groups:
+                obs, infos = self.vector_env.reset(seed=seeds, options=options or None)
+                for i in rows:
+                    starts[i] = self._row_of(infos, i)
+        except BaseException:
+            if before is not None:  # the groups before the one that is refused have begun
+                self.vector_env.set_state(before)
+            raise
         self.reset_infos = starts
         self._reset_seeds()
         self._reset_options()
@@ -94,8 +106,9 @@ class RigidVecEnv(VecEnv):
         Parameters
         ----------
         options : dict, or list of dict, optional
-            One dict is that of `RigidVectorEnv.reset`: each value is for all environments, or an array with a row for
-            each. A list has a dict for each environment, with values for this one; their keys may differ.
+            One dict is that of `RigidVectorEnv.reset`, without ``reset_mask``, since all environments start: each value
+            is for all of them, or an array with a row for each. A list has a dict for each environment, with values for
+            this one; their keys may differ.
 
         Raises
         ------
@@ -103,6 +116,8 @@ class RigidVecEnv(VecEnv):
             Something else, or another number of dicts than of environments.
         """
         if options is None or isinstance(options, Mapping):
+            if options is not None and "reset_mask" in options:
+                raise ValueError("options holds reset_mask; allowed are draws: a reset starts all environments")
             self._shared, self._options = deepcopy(dict(options or {})), [{} for _ in range(self.num_envs)]
             return
         each = list(options) if isinstance(options, Sequence) and not isinstance(options, str) else []

@@ -16,7 +16,7 @@ from physics.annotations import Effect, Frame, Preset
 from physics.keywords import known_keywords
 from rigid_env.envs.env import RigidEnv
 from rigid_env.envs.sources import ObsKind
-from rigid_env.envs.vector_arguments import Autoreset
+from rigid_env.envs.vector_arguments import Autoreset, episode_limit
 from rigid_env.envs.vector_env import RigidVectorEnv
 from rigid_env.rendering.camera_argument import CameraArgument
 from rigid_env.rendering.view import RenderMode
@@ -132,6 +132,7 @@ class SceneEnv(RigidEnv[NDArray[Any]]):
     | `accuracy` | `"balanced"` | preset of the engine, or a `physics.Accuracy` |
     | `effects` | () | `physics` effects besides, or instead of the scene's of that class |
     | `dump_faults` | None | folder for what led to a state that was not finite (`rigid-env replay`) |
+    | `threads` | 1 | threads that share a step of a batch; a single environment has one world, and one thread |
     | `render_mode` | None | `"rgb_array"`, `"human"` or None |
     | `width` | 960 | of pictures [px] |
     | `height` | 600 | of pictures [px] |
@@ -176,11 +177,12 @@ class SceneEnv(RigidEnv[NDArray[Any]]):
         accuracy: Preset | physics.Accuracy = "balanced",
         effects: Iterable[Effect] = (),
         dump_faults: str | Path | None = None,
+        threads: int = 1,
     ) -> None:
         task = SceneTask(
             1, scene, driven=driven, force=force, torque=torque, frame=frame, length=length, goal=goal, start=start,
             frame_skip=frame_skip, dt=dt, episode_steps=episode_steps, accuracy=accuracy, effects=effects,
-            dump_faults=dump_faults,
+            dump_faults=dump_faults, threads=threads,
         )  # fmt: skip
         told = render_mode, width, height, obs, obs_size, obs_stack, contacts
         super().__init__(task, *told, camera=camera, arrows=arrows)
@@ -260,12 +262,18 @@ class SceneVectorEnv(RigidVectorEnv[NDArray[Any]]):
         told = render_mode, width, height, obs, obs_size, obs_stack, contacts
         super().__init__(task, autoreset_mode, max_episode_steps, *told, camera=camera, arrows=arrows)
 
+    def _one_limit(self, values: Any) -> int | None:
+        limit = super()._one_limit(values)
+        check_limit(limit, self.task.max_episode_steps)
+        return limit
+
 
 def check_limit(value: int | str | None, limit: int | None) -> None:
     """Refuse a limit of a batch beyond that of its task: Gymnasium cannot lengthen a single environment's, either."""
     if limit is None or isinstance(value, str):
         return
-    if value is None or validation.count(value, "max_episode_steps") > limit:
+    steps = episode_limit(value)
+    if steps is None or steps > limit:
         raise ValueError(
             f"max_episode_steps is {value}, and the scene's {limit}; allowed are at most {limit}, or another "
             "episode_steps, which takes the place of the file's"

@@ -7,10 +7,13 @@ from typing import Any, Literal
 import numpy as np
 from gymnasium.vector import AutoresetMode
 
-from physics import validation
+from rigid_env.tasks.declaration_checks import checked_limit
 
 Autoreset = Literal["NextStep", "SameStep", "Disabled"]
 """Values of `AutoresetMode`."""
+
+NO_LIMIT = -1
+"""Value by which `gymnasium.make` leaves out the time limit; its None stands for the registered one."""
 
 
 def autoreset_mode(mode: AutoresetMode | str) -> AutoresetMode:
@@ -23,8 +26,9 @@ def autoreset_mode(mode: AutoresetMode | str) -> AutoresetMode:
 
 
 def episode_limit(value) -> int | None:
-    """Control steps of an episode; None: no limit."""
-    return None if value is None else validation.count(value, "max_episode_steps")
+    """Control steps of an episode; None, and -1 as of `gymnasium.make`: no limit."""
+    is_off = isinstance(value, (int, np.integer)) and value == NO_LIMIT
+    return None if is_off else checked_limit(value, "max_episode_steps")
 
 
 def reset_mask(options: dict[str, Any], num_envs: int) -> np.ndarray:

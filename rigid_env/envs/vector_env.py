@@ -43,7 +43,7 @@ class RigidVectorEnv(BatchAttributes[Obs]):
     autoreset_mode : AutoresetMode or str
         ``NextStep`` (default), ``SameStep`` or ``Disabled``.
     max_episode_steps : int or None
-        Control steps after which an episode is truncated; None: never. The default is the task's number.
+        Control steps after which an episode is truncated; None or -1: never. The default is the task's number.
     render_mode : {"rgb_array", "human"} or None
         ``human`` shows world 0.
     width, height : int
@@ -188,7 +188,10 @@ class RigidVectorEnv(BatchAttributes[Obs]):
         """
         self._check_ready()
         before = self._ended, self._kept_pictures()
+        kept = self._generators_of_ended()
         self.task.step(actions)
+        for generator, state in kept:
+            generator.bit_generator.state = state
         try:
             return self._conclude()
         except BaseException:  # of a start, or of a picture: this step has not been
@@ -291,6 +294,17 @@ class RigidVectorEnv(BatchAttributes[Obs]):
                 f"the episodes of the worlds {np.flatnonzero(self._ended).tolist()} have ended and autoreset "
                 "is disabled: reset(options={'reset_mask': terminations | truncations}) first"
             )
+
+    def _generators_of_ended(self) -> list[tuple[Any, Any]]:
+        """Generators of ended worlds, each with its state.
+
+        In mode ``NextStep`` they move in the step that starts them anew; a disturbance due then must not take numbers
+        of the next episode.
+        """
+        if self.task.disturbed is None:
+            return []
+        ended: Any = [self.task.generators[world] for world in np.flatnonzero(self._ended).tolist()]
+        return [(generator, generator.bit_generator.state) for generator in ended]
 
     def _kept_pictures(self) -> dict[str, np.ndarray]:
         """Copies of the source's memory, where code of a user may end with an error."""

@@ -4,6 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from difflib import get_close_matches
+from typing import Any
+
+from physics import validation
 
 NEAR = 0.68  # likeness from which on a name is taken for a misspelt one
 FUNCTIONS = ("place", "note_episodes", "begin", "update", "success", "failure", "rewards", "measure")
@@ -56,3 +59,11 @@ def refuse_same_keys(task: str, names: Iterable[str], drawn: Mapping) -> None:
     twice = sorted({key for key in keys if keys.count(key) > 1})
     if twice:
         raise ValueError(f"info of {task} has {twice[0]!r} twice; allowed are measures, terms and draws of other names")
+
+
+def checked_limit(value: Any, field: str) -> int | None:
+    """Control steps of an episode, at least 1; None: no limit."""
+    try:
+        return None if value is None else validation.count(value, field)
+    except ValueError as error:
+        raise ValueError(f"{error}, and None for no limit") from None

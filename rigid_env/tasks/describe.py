@@ -51,6 +51,7 @@ OF_ENVIRONMENTS = {
 PARAMETERS = {
     "mass": "mass [kg]",
     "size": "edges or diameters [m]",
+    "radius": "radius of a sphere [m]",
     "friction": "Coulomb coefficient",
     "restitution": "restitution",
     "gravity": "strength of gravity [m/s²]",

@@ -311,6 +311,17 @@ class Choice(Distribution):
         return f"Choice({self.values.tolist()})"
 
 
+def is_of_user(distribution: Distribution) -> bool:
+    """True if code of a user draws, in it or in a distribution that it holds."""
+    parts = (distribution, *(part for part in vars(distribution).values() if isinstance(part, Distribution)))
+    return any(not str(type(part).__module__).startswith("rigid_env.") for part in parts)
+
+
+def is_elementwise(distribution: Distribution) -> bool:
+    """True if numbers of one value are drawn, each from a range of its own: several of them are hardly ever equal."""
+    return isinstance(distribution, _Elementwise) and not distribution.is_fixed
+
+
 def as_distribution(field: str, value, length: int | None = None) -> Distribution:
     """Turn what a user gives for a name into a distribution.
 

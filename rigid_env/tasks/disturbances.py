@@ -181,6 +181,16 @@ class Disturbances:
             quiet = kind.every / self._task.control_dt
             self.next[k, rows] = [quiet_steps(quiet, self._task.generators[world].random()) for world in rows]
 
+    def wait_anew(self) -> None:
+        """Draw anew when the next disturbances start: for a model that must not know.
+
+        Waiting times are exponential, so that those that go on from now have the same distribution.
+        """
+        now = self._task.steps * self._task.control_dt
+        for k, kind in enumerate(self.kinds):
+            waits = [self._wait(kind, generator.random()) for generator in self._task.generators]
+            self.next[k] = np.maximum(now, self.end[k]) + waits
+
     def due(self) -> np.ndarray:
         """(n,) int64. Worlds in which a disturbance starts in the coming control step."""
         return np.flatnonzero((self.next <= self._task.steps).any(axis=0))

@@ -8,9 +8,13 @@ from difflib import get_close_matches
 
 import numpy as np
 
+from physics.summary import shown
 from physics.world.world import World
-from rigid_env.tasks.distributions import Distribution
-from rigid_env.tasks.parameters import CHECKS, LENGTHS
+from rigid_env.tasks.distributions import Distribution, is_elementwise, is_of_user
+from rigid_env.tasks.parameters import CHECKS, DRAWN_LENGTHS
+
+SEED = 0
+"""Of values before the first episode: any, so long as it stays the same."""
 
 NEAR = 0.8
 """Likeness from which on a name is taken for a misspelt one."""
@@ -18,7 +22,7 @@ NEAR = 0.8
 DOWN = (0.0, -1.0, 0.0)
 """Direction of gravity in a world that has had none."""
 
-_PARAMETER = re.compile(rf"({'|'.join(LENGTHS)})(?:\[(\d+)\])?$")
+_PARAMETER = re.compile(rf"({'|'.join(DRAWN_LENGTHS)})(?:\[(\d+)\])?$")
 
 
 def parameter_of(name: str) -> tuple[str, int | None] | None:
@@ -33,14 +37,15 @@ class Draws:
     Parameters
     ----------
     distributions : mapping of str to Distribution
-        The names ``mass``, ``size``, ``friction``, ``restitution`` and ``gravity`` mean physical parameters of all
-        bodies, ``mass[1]`` that of body 1 alone.
+        The names ``mass``, ``size``, ``radius`` (of spheres), ``friction``, ``restitution`` and ``gravity`` mean
+        physical parameters of all bodies, ``mass[1]`` that of body 1 alone.
     worlds : int
 
     Attributes
     ----------
     now : dict of str to (worlds,) or (worlds, k) float64
-        Of the running episodes; values at the middle of each distribution before the first.
+        Of the running episodes; before the first, values at the middle of each distribution, and drawn ones of a user's
+        distribution, which need not have a value there.
     uniforms : int
         Uniform numbers that an episode takes.
     held : dict of str to (worlds,) or (worlds, k) float64
@@ -57,9 +62,13 @@ class Draws:
         self.uniforms = ends[-1]
         self.parameters = [name for name in self.distributions if parameter_of(name)]
         self._order = [*self.parameters, *(name for name in self.distributions if name not in self.parameters)]
+        self._of_user = {name for name, each in self.distributions.items() if is_of_user(each)}
         self.held: dict[str, np.ndarray] = {}
         self.varying = {name for name in self.parameters if not self.distributions[name].is_fixed}
-        middle = self.draw(np.arange(worlds), np.full((worlds, self.uniforms), 0.5), {})
+        shares = np.full((worlds, self.uniforms), 0.5)
+        for name in self._of_user:
+            shares[:, self._places[name]] = self.rehearsal()[:, self._places[name]]
+        middle = self.draw(np.arange(worlds), shares, {})
         self.now = {name: np.array(values, dtype=np.float64) for name, values in middle.items()}
 
     def draw(self, rows: np.ndarray, shares: np.ndarray, options: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
@@ -77,6 +86,11 @@ class Draws:
         Returns
         -------
         dict of str to (n,) or (n, k) float64
+
+        Raises
+        ------
+        ValueError
+            A distribution of a user gives what it may not.
         """
         values: dict[str, np.ndarray] = {}
         for name in self._order:
@@ -86,7 +100,24 @@ class Draws:
                 values[name] = self.held[name][rows]
             else:
                 values[name] = self.distributions[name].at(shares[:, self._places[name]], values)
+                if name in self._of_user:
+                    self._check(name, values[name], len(rows))
         return values
+
+    def rehearsal(self) -> np.ndarray:
+        """(1, uniforms) uniform numbers of an episode, always the same: for values before the first one."""
+        return np.random.default_rng(SEED).random((1, self.uniforms))
+
+    def _check(self, name: str, values, count: int) -> None:
+        """Refuse what a distribution of a user gives, if it is no finite numbers of the right shape."""
+        length = self.distributions[name].length
+        shape = (count,) if length == 1 else (count, length)
+        what = f"at of {type(self.distributions[name]).__name__}, draws {name},"
+        if not isinstance(values, np.ndarray) or values.shape != shape or values.dtype.kind not in "fiub":
+            given = f"{values.dtype} of shape {values.shape}" if isinstance(values, np.ndarray) else shown(values)
+            raise ValueError(f"{what} gave {given}; allowed are numbers of shape {shape}")
+        if not np.isfinite(values).all():
+            raise ValueError(f"{what} gave {values[~np.isfinite(values)][0]}; allowed are finite numbers")
 
     def begin(self, rows: np.ndarray, values: Mapping[str, np.ndarray], options: Mapping[str, np.ndarray]) -> None:
         """Note the values of new episodes."""
@@ -132,6 +163,8 @@ def world_arguments(values: Mapping[str, np.ndarray], before: Mapping[str, np.nd
             down = np.where(is_on, before["gravity"] / np.where(is_on, strength, 1.0), DOWN)
             arguments[parameter] = value[:, None] * down
             continue
+        if parameter == "radius":  # three equal diameters
+            parameter, value = "size", np.repeat(2.0 * value[:, None], 3, axis=1)
         table = arguments.setdefault(parameter, before[parameter].copy())
         if body is None:
             table[...] = value[:, None]
@@ -163,7 +196,7 @@ def check_draws(task: str, distributions: Mapping[str, Distribution], world: Wor
     for name, distribution in distributions.items():
         parameter = parameter_of(name)
         if parameter is None:
-            near = get_close_matches(name.lower(), LENGTHS, 1, NEAR)
+            near = get_close_matches(name.lower(), DRAWN_LENGTHS, 1, NEAR)
             if near:
                 raise ValueError(f"draws of {task} has {name!r}, which is no {near[0]!r}; allowed is another name")
             continue
@@ -179,5 +212,26 @@ def check_draws(task: str, distributions: Mapping[str, Distribution], world: Wor
                 raise ValueError(f"draws of {task} has {name!r}; allowed are {bodies}")
             if kind in distributions:
                 raise ValueError(f"draws of {task} has {kind!r} and {name!r}; allowed is one of the two")
+        if kind in ("size", "radius"):
+            _check_spheres(task, distributions, world, name)
         ends = distribution.ends()
         CHECKS[kind](ends, ends.shape, f"draws {name} of {task}")
+
+
+def _check_spheres(task: str, distributions: Mapping[str, Distribution], world: World, name: str) -> None:
+    """Refuse a radius of other bodies than spheres, one beside a size, and a size of three numbers of a sphere."""
+    kind, body = parameter_of(name) or ("", None)
+    bodies = world.scene.bodies
+    meant = range(len(bodies)) if body is None else (body,)
+    for index in meant:
+        is_sphere = bodies[index].kind == "sphere"
+        if kind == "radius" and not is_sphere:
+            allowed = "'radius[b]' for a sphere b, or another name"
+            told = f"and body {index} is a {type(bodies[index]).__name__}"
+            raise ValueError(f"draws of {task} has {name!r}, {told}; allowed is {allowed}")
+        other = next((f"size{place}" for place in ("", f"[{index}]") if f"size{place}" in distributions), None)
+        if kind == "radius" and other:
+            raise ValueError(f"draws of {task} has {other!r} and {name!r} of body {index}; allowed is one of the two")
+        if kind == "size" and is_sphere and is_elementwise(distributions[name]):
+            told = f"draws {name} of {task} is {distributions[name]!r}, and body {index} is a Sphere, of one diameter"
+            raise ValueError(f"{told}; allowed is 'radius[{index}]' with a number, a pair or a distribution")

@@ -109,7 +109,7 @@ class Observation:
                 raise ValueError(
                     f"observation holds {entry!r}; allowed are Entry and the functions of rigid_env.observe"
                 )
-        refuse_twice([name for entry in self.entries for name in entry.names])
+        refuse_twice(self.names)
         self.size = sum(len(entry.names) for entry in self.entries)
         spread = [len(entry.names) for entry in self.entries]
         self.low, self.high = (
@@ -122,8 +122,14 @@ class Observation:
         self._factors = np.repeat([1.0 / entry.scale for entry in self.entries], spread)
         self._targets: tuple[np.ndarray, list] = np.empty((0, self.size)), []
 
-    def read(self, worlds, out: np.ndarray) -> None:
-        """Read all entries into `out` (n, size) float32, scaled and clipped."""
+    def read(self, worlds, out: np.ndarray) -> np.ndarray:
+        """Read all entries into `out` (n, size) float32, scaled and clipped.
+
+        Returns
+        -------
+        (n, size) float64
+            Numbers as the entries gave them, until the next call: clipping would hide infinite ones.
+        """
         table, targets = self._targets
         if len(table) != len(out):
             table, targets = self._make_targets(len(out))
@@ -137,6 +143,12 @@ class Observation:
         np.multiply(table, self._factors, out=out, casting="same_kind")
         np.maximum(out, self.low, out=out)
         np.minimum(out, self.high, out=out)
+        return table
+
+    @property
+    def names(self) -> list[str]:
+        """Name of each number."""
+        return [name for entry in self.entries for name in entry.names]
 
     def _make_targets(self, count: int) -> tuple[np.ndarray, list]:
         """Table (count, size) for what entries give, and the part of it that each one writes."""

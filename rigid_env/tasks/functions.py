@@ -16,7 +16,8 @@ from rigid_env.tasks.worlds import Worlds
 class Functions:
     """Calls of the functions of a task that has no compiled one.
 
-    Each function is called once when this is made, in a world at its start, so that a mistake shows at once.
+    Each function is called once when this is made, in a world at its start, so that a mistake shows at once: a
+    rehearsal, with values that are drawn for it.
 
     Parameters
     ----------
@@ -49,9 +50,31 @@ class Functions:
         self.before = Before(task)
 
     def _rehearse(self) -> None:
-        """Call each function once, for two rows of world 0, so that no shape fits by chance."""
-        task, before = self.task, self.task.world.snapshot()
-        task.move(np.zeros(1, dtype=np.int64), {name: values[:1] for name, values in task.drawn.items()}, {})
+        """Call each function once in world 0, with values drawn for it; an error says that it is a rehearsal."""
+        task = self.task
+        world, kept = task.world.snapshot(), {name: array[0].copy() for name, array in task.drawn.items()}
+        values = task.episodes.draw(np.zeros(1, dtype=np.int64), task.episodes.rehearsal(), {})
+        try:
+            for name, value in values.items():
+                task.drawn[name][0] = value[0]
+            self._call_each(values)
+        except Exception as error:
+            drawn = ", ".join(f"{name} = {value[0].tolist()}" for name, value in values.items())
+            told = f"in the rehearsal of {self._name}, when it is made, {f'with {drawn}' if drawn else 'without draws'}"
+            if isinstance(error, ValueError):
+                raise ValueError(f"{error} ({told})") from error
+            if hasattr(error, "add_note"):  # from Python 3.11 on
+                error.add_note(told)
+            raise
+        finally:
+            task.world.restore(world)
+            for name, array in kept.items():
+                task.drawn[name][0] = array
+
+    def _call_each(self, values: Mapping[str, np.ndarray]) -> None:
+        """Call each function for two rows of world 0, so that no shape fits by chance."""
+        task = self.task
+        task.move(np.zeros(1, dtype=np.int64), values, {})
         worlds = Worlds(task, np.zeros(2, dtype=np.int64))
         self._measure(worlds)
         task.begin(worlds)
@@ -66,8 +89,6 @@ class Functions:
             parts = f"{task.world.body_count} bodies and {len(task.world.walls)} walls"
             told = f"observation of {self._name} ends with {type(error).__name__}: {error}"
             raise ValueError(f"{told}; allowed are parts of its scene, {parts}") from error
-        finally:
-            task.world.restore(before)
 
     def begin(self, rows: np.ndarray) -> None:
         """Observe worlds `rows` (n,) in which episodes begin."""
@@ -78,8 +99,8 @@ class Functions:
         outcome = np.zeros((len(rows), self._outcome.shape[1]))
         self._fill("measure", worlds.measured, task.measures, outcome, col.INFO)
         obs = np.empty((len(rows), task.obs.shape[1]), dtype=np.float32)
-        task.observed.read(worlds, obs)
-        self._check_finite(outcome, obs, rows)
+        seen = task.observed.read(worlds, obs)
+        self._check_finite(outcome, seen, obs, rows)
         for name, values in worlds.memory.items():
             task.memory_arrays[name][rows] = values
         task.outcome[rows], task.obs[rows] = outcome, obs
@@ -87,11 +108,13 @@ class Functions:
     def step(self, actions: np.ndarray) -> None:
         """Move all worlds and look at them; after an error nothing has changed."""
         task = self.task
+        task.given[...] = actions
+        if not np.isfinite(task.given).all():
+            raise task.not_finite(int(np.flatnonzero(~np.isfinite(task.given).all(axis=1))[0]))
         self.before.keep()
         try:
             task.previous_action[...] = task.action
-            np.maximum(actions, -1.0, out=task.given)
-            np.minimum(task.given, 1.0, out=task.given)
+            np.clip(task.given, -1.0, 1.0, out=task.given)
             task.act()
             self._conclude()
         except BaseException:  # of an interrupt, too
@@ -107,8 +130,8 @@ class Functions:
         self._fill("rewards", terms, task.terms, outcome, first)
         outcome[:, first:].sum(axis=1, out=outcome[:, col.REWARD])
         outcome[:, col.SUCCESS], outcome[:, col.FAILURE] = worlds.success, worlds.failure
-        task.observed.read(worlds, self._obs)
-        self._check_finite(outcome, self._obs, worlds.indices)
+        seen = task.observed.read(worlds, self._obs)
+        self._check_finite(outcome, seen, self._obs, worlds.indices)
         task.outcome[...], task.obs[...] = outcome, self._obs
 
     def _look(self, worlds: Worlds) -> Mapping:
@@ -118,18 +141,23 @@ class Functions:
         task.update(worlds)
         worlds.success = self._flags("success", task.success(worlds), len(worlds))
         worlds.failure = self._flags("failure", task.failure(worlds), len(worlds))
-        terms = task.rewards(worlds)
-        self._check_names("rewards", terms)
-        return terms
+        return self._numbers("rewards", task.rewards(worlds), len(worlds))
 
     def _measure(self, worlds: Worlds) -> None:
-        found = self.task.measure(worlds)
-        self._check_names("measure", found)
-        worlds.measured = Named(found, "measured")
+        worlds.measured = Named(self._numbers("measure", self.task.measure(worlds), len(worlds)), "measured")
 
-    def _check_names(self, function: str, values) -> None:
+    def _numbers(self, function: str, values, count: int) -> dict:
+        """Check what a function gives before others read it: a dict of numbers, one for each world or one for all."""
         if type(values) is not dict:
             raise ValueError(f"{function} of {self._name} gave {values!r}; allowed is a dict of arrays by name")
+        shape = (count,)
+        for name, value in values.items():
+            if type(value) in (float, int) or (getattr(value, "shape", None) == shape and value.dtype.kind in "fiub"):
+                continue
+            given = f"of {value.dtype} in shape {value.shape}" if isinstance(value, np.ndarray) else repr(value)
+            what = f"{name!r} of {function} of {self._name} is {given}"
+            raise ValueError(f"{what}; allowed are numbers of shape {shape}, or one for all")
+        return values
 
     def _flags(self, function: str, values, count: int) -> np.ndarray:
         values = np.asarray(values)
@@ -147,25 +175,22 @@ class Functions:
                 f"{function} of {self._name} gave the names {', '.join(map(repr, values))}; allowed are those of its "
                 f"first call, {', '.join(map(repr, names))}, in this order"
             )
-        shape = (len(out),)
-        for k, (name, value) in enumerate(values.items(), first):
-            if type(value) in (float, int) or (getattr(value, "shape", None) == shape and value.dtype.kind in "fiub"):
-                out[:, k] = value
-                continue
-            given = f"of {value.dtype} in shape {value.shape}" if isinstance(value, np.ndarray) else repr(value)
-            what = f"{name!r} of {function} of {self._name} is {given}"
-            raise ValueError(f"{what}; allowed are numbers of shape {shape}, or one for all")
+        for k, value in enumerate(values.values(), first):
+            out[:, k] = value
 
-    def _check_finite(self, outcome: np.ndarray, obs: np.ndarray, indices: np.ndarray) -> None:
+    def _check_finite(self, outcome: np.ndarray, seen: np.ndarray, obs: np.ndarray, indices: np.ndarray) -> None:
+        """Refuse numbers that are not finite: outcomes, what the entries gave (`seen`), observations of it."""
         with np.errstate(invalid="ignore", over="ignore"):
-            total = outcome.sum() + obs.sum()  # not finite if one of the numbers is not
-        if math.isfinite(total) or (np.isfinite(outcome).all() and np.isfinite(obs).all()):
+            total = outcome.sum() + seen.sum() + obs.sum()  # not finite if one of the numbers is not
+        if math.isfinite(total):
             return
         task = self.task
         names = ["reward", "success", "failure", *task.measures, *(f"reward term {term!r}" for term in task.terms)]
-        names += [f"observation {name!r}" for entry in self._entries for name in entry.names]
-        table = np.concatenate((outcome, obs), axis=1)
+        names += 2 * [f"observation {name!r}" for name in task.observed.names]
+        table = np.concatenate((outcome, seen, obs), axis=1)
         bad = np.argwhere(~np.isfinite(table))
+        if len(bad) == 0:
+            return
         row, column = min(bad.tolist(), key=lambda place: (place[1] == col.REWARD, place))  # the term before the sum
         what = f"{names[column]} of {self._name} is {table[row, column]} in world {indices[row]}"
         raise ValueError(f"{what}; allowed are finite numbers")

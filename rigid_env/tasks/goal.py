@@ -9,6 +9,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from physics import validation
+from physics.summary import shown
 from rigid_env.tasks.entries import Entry, Observation
 from rigid_env.tasks.task import Task
 
@@ -61,7 +62,10 @@ class GoalTask(Task):
 
     @abstractmethod
     def desired(self, worlds) -> np.ndarray:
-        """(n, numbers) goals that are wanted, in the units of `goal_entries`."""
+        """(n, numbers) goals that are wanted, before scaling, as `read` of `goal_entries` gives them.
+
+        They are told as those achieved are: over the scales, and clipped to the bounds.
+        """
 
     @abstractmethod
     def shortfall(self, achieved: np.ndarray, desired: np.ndarray) -> np.ndarray:
@@ -113,12 +117,28 @@ class GoalTask(Task):
 
     def measure(self, worlds):
         """Note both goals, and tell the shortfall."""
-        rows = worlds.indices
-        achieved = np.empty((len(worlds), self._goals.size), dtype=np.float32)
-        self._goals.read(worlds, achieved)
+        rows, goals = worlds.indices, self._goals
+        achieved = np.empty((len(worlds), goals.size), dtype=np.float32)
+        self._check_goals("achieved", goals.read(worlds, achieved), rows)
+        desired = self.desired(worlds)
+        self._check_goals("desired", desired, rows)
         self.achieved_goal[rows] = achieved
-        self.desired_goal[rows] = self.desired(worlds) / self._goals.scales
+        self.desired_goal[rows] = np.clip(desired / goals.scales, goals.low, goals.high)
         return {"shortfall": self.shortfall(*self._both(rows))}
+
+    def _check_goals(self, which: str, values: Any, rows: np.ndarray) -> None:
+        """Refuse goals that are no finite numbers of the right shape."""
+        name, shape = type(self).__name__, (len(rows), self._goals.size)
+        if not isinstance(values, np.ndarray) or values.shape != shape or values.dtype.kind not in "fiub":
+            given = f"{values.dtype} of shape {values.shape}" if isinstance(values, np.ndarray) else shown(values)
+            raise ValueError(
+                f"{which} of {name} gave {given}; allowed are numbers of shape {shape}, a row for each world"
+            )
+        bad = np.argwhere(~np.isfinite(values))
+        if len(bad):
+            row, column = bad[0]
+            what = f"{which} goal {self._goals.names[column]!r} of {name} is {values[row, column]} in world {rows[row]}"
+            raise ValueError(f"{what}; allowed are finite numbers")
 
     def success(self, worlds):
         """The goal is reached."""

@@ -23,11 +23,15 @@ CHECKS = {
     "friction": validation.non_negative,
     "restitution": validation.share,
     "gravity": validation.positive,
+    "radius": validation.positive,
 }
 """Values that each parameter may have."""
 
 LENGTHS = {"mass": 1, "size": 3, "friction": 1, "restitution": 1, "gravity": 1}
 """Numbers in each parameter, in the order in which the block's tasks draw them."""
+
+DRAWN_LENGTHS = {**LENGTHS, "radius": 1}
+"""Numbers in each parameter that a task may draw: the radius of spheres has one, where their size has three."""
 
 OFF_MIDDLE = (0.25, 0.4, 0.75)
 """Shares of a range of sizes at which the block of a scene is no cube, where the middle is one."""

@@ -105,7 +105,7 @@ def rollout(
         Clipped to ±1.
     initial : TaskState, optional
         Where all worlds begin: a state of one world for all of them, or of as many (``env.unwrapped.get_state()``).
-        None: where they are.
+        None: where they are. Its generators decide which disturbances come: those that the environment will meet.
     observations : bool
         Keep observations, too.
     every : int

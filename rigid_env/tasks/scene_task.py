@@ -83,12 +83,13 @@ class SceneTask(Task):
         limits = {"force": settings.force, "torque": settings.torque, "frame": settings.frame}
         self.actions = [Wrench(body, **limits) for body in settings.driven]
         self.draws = self._declared()
+        self._reader = reader  # for errors, as long as the task is made
         self.memory = {} if settings.goal is None else {"closeness": 1, "gain": 1}
         super().__init__(
             worlds, accuracy=accuracy, effects=effects, draws=draws, frame_skip=settings.frame_skip, dt=settings.dt,
             dump_faults=dump_faults, threads=threads,
         )  # fmt: skip
-        self._check_starts(reader)
+        del self._reader
 
     def _declared(self) -> dict[str, Uniform]:
         bodies, goal = len(self.scene.bodies), self.settings.goal
@@ -96,7 +97,7 @@ class SceneTask(Task):
         draws = {name: Uniform(-width, width) for name, width in draws.items()}
         return draws if goal is None else {**draws, "goal": goal.place}
 
-    def _check_starts(self, reader: SettingsReader) -> None:
+    def _check_starts(self) -> None:
         """Refuse starts that may lie deep inside a wall: those nearest to each wall are looked at."""
         if "pos" not in self.settings.start:
             return
@@ -107,7 +108,7 @@ class SceneTask(Task):
             try:
                 check_depth(self.world, state, self.world.params[:bodies], chosen, START)
             except ValueError as error:
-                raise reader.start_error("pos", str(error)) from None
+                raise self._reader.start_error("pos", str(error)) from None
 
     @property
     def observation(self):

@@ -18,10 +18,10 @@ from physics.parallel.team import listed
 from physics.world.gusts import begin_gusts, gust_phases, reads_time
 from physics.world.setters import start_anew
 from rigid_env.tasks.declaration import Declaration
-from rigid_env.tasks.distributions import Distribution, as_distribution
+from rigid_env.tasks.distributions import Distribution, as_distribution, is_of_user
 from rigid_env.tasks.draws import parameter_of, world_arguments
 from rigid_env.tasks.options import require_known
-from rigid_env.tasks.parameters import LENGTHS
+from rigid_env.tasks.parameters import DRAWN_LENGTHS
 from rigid_env.tasks.replacing import refuse_replaced, replaced
 from rigid_env.tasks.state import put, take
 
@@ -188,8 +188,7 @@ class Starts(Declaration):
         fixed = {name: self.drawn[name][:1] for name in names}
         found = set()
         for name, value in fixed.items():
-            parameter, _ = of(name)
-            (now,) = self._arguments(one, {name: value}).values()
+            ((parameter, now),) = self._arguments(one, {name: value}).items()
             if not np.allclose(now, self._parameters_of(one)[parameter], rtol=PARAMETER_ROUNDING, atol=0.0):
                 found.add(name)
         return found
@@ -203,6 +202,9 @@ class Starts(Declaration):
                 f"{', '.join(self._own_starts)}"
             )
         return {**self._own_starts, **given}
+
+    def _check_starts(self) -> None:
+        """Refuse starts that are impossible for some draws, where a kind of tasks can tell before any is drawn."""
 
     @property
     def place_options(self) -> tuple[str, ...]:
@@ -258,9 +260,8 @@ class Starts(Declaration):
     def may_fail(self) -> bool:
         """True if code of a user runs at the start of an episode, which may end with an error."""
         parts = [getattr(type(self), name) for name in AT_STARTS]
-        for each in self.distributions.values():
-            parts += [type(each), *(type(part) for part in vars(each).values() if isinstance(part, Distribution))]
-        return not self.compiled or any(not part.__module__.startswith("rigid_env.") for part in parts)
+        is_of_users = any(not str(part.__module__).startswith("rigid_env.") for part in parts)
+        return not self.compiled or is_of_users or any(map(is_of_user, self.distributions.values()))
 
     @property
     def own_draws(self) -> tuple[str, ...]:
@@ -288,6 +289,6 @@ def distributions_of(declared: Mapping[str, Any], given: Mapping[str, Any] | Non
     found = {}
     for name, value in declared.items():
         field, parameter = f"draws {name}", parameter_of(name)
-        own = as_distribution(field, value, LENGTHS[parameter[0]] if parameter else None)
+        own = as_distribution(field, value, DRAWN_LENGTHS[parameter[0]] if parameter else None)
         found[name] = as_distribution(field, given[name], own.length) if name in given else own
     return found

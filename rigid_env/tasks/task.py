@@ -22,7 +22,7 @@ from rigid_env.tasks import layout as col
 from rigid_env.tasks.actions import ActionTable
 from rigid_env.tasks.before import Before
 from rigid_env.tasks.declaration import Declaration
-from rigid_env.tasks.declaration_checks import check_class, refuse_same_keys
+from rigid_env.tasks.declaration_checks import check_class, checked_limit, refuse_same_keys
 from rigid_env.tasks.distributions import Distribution
 from rigid_env.tasks.disturbances import Disturbances, Push
 from rigid_env.tasks.draws import Draws, check_draws
@@ -77,8 +77,8 @@ class Task(Starts):
     observation : sequence of Entry
         Declared: `rigid_env.observe` has the usual ones.
     draws : mapping of str to Distribution, number or pair
-        Declared: what each episode draws. ``mass``, ``size``, ``friction``, ``restitution`` and ``gravity`` are given
-        to the world (``mass[1]``: to body 1 alone), the rest is for the task's functions.
+        Declared: what each episode draws. ``mass``, ``size``, ``radius`` of spheres, ``friction``, ``restitution`` and
+        ``gravity`` are given to the world (``mass[1]``: to body 1 alone), the rest is for the task's functions.
     memory : mapping of str to int
         Declared: numbers per world that functions keep from step to step, and how many each; zeros at the start.
     disturbances : sequence of Push and Gust
@@ -117,13 +117,13 @@ class Task(Starts):
         threads: int = 1,
     ) -> None:
         self.frame_skip = validation.count(frame_skip, "frame_skip")
-        if self.max_episode_steps is not None:
-            validation.count(self.max_episode_steps, f"max_episode_steps of {type(self).__name__}")
+        checked_limit(self.max_episode_steps, f"max_episode_steps of {type(self).__name__}")
         distributions = distributions_of(self.declared_draws(), draws)
         varied = [name for name, each in distributions.items() if not each.is_fixed]
         self.effects = checked_effects(effects, varied)
         self.world = physics.World(self._scene(distributions), worlds, dt, accuracy, threads)
         check_draws(type(self).__name__, distributions, self.world)
+        self._check_starts()
         bodies = self.world.scene.bodies
         self._own_starts = {
             name: np.array([getattr(body, name) for body in bodies]) for name in ("pos", "quat", "linvel", "angvel")
@@ -298,11 +298,15 @@ class Task(Starts):
         if self._before is not None:
             self._before.put_back()
 
+    def not_finite(self, world: int) -> ValueError:
+        """Error for the action in `given` of a world."""
+        return ValueError(f"action of world {world} is {self.given[world].tolist()}; allowed are finite numbers")
+
     def act(self) -> None:
         """Move the worlds by one control step, under the actions in `given`."""
         bad = self._write_wrenches(*self._write_arguments)
         if bad >= 0:
-            raise ValueError(f"action of world {bad} is {self.given[bad].tolist()}; allowed are finite numbers")
+            raise self.not_finite(bad)
         advance = self._advance
         if self.disturbed is None:
             advance.take()

@@ -11,7 +11,6 @@ import numpy as np
 
 import physics
 from physics import scenes, validation
-from physics.keywords import nearest_first
 from physics.plan.accuracy import resolve
 from physics.summary import shown
 from rigid_env.viewer.interface import Subject
@@ -20,13 +19,13 @@ from rigid_env.viewer.worlds import live_scene, live_world
 
 ACCURACY, DT = "balanced", 0.01
 
-ALLOWED = (
+NAMES = (
     "a canonical scene, a scene file (.toml or .xml), the id of an environment, 'module:Class' of a task, a recording "
-    "or a trajectory (.npz), and of Python physics.Scene, World, Trajectory, Recording and environments of rigid_env"
+    "and a trajectory (.npz)"
 )
+"""Texts that name a subject: all that can be typed in a shell."""
 
-KNOWN_FIRST = 3
-"""Names that are like a wrong one and stand in the message about it."""
+OBJECTS = "physics.Scene, World, Trajectory, Recording and environments of rigid_env"
 
 
 def open_subject(
@@ -102,7 +101,7 @@ def _loaded(what: Any) -> tuple[Any, str]:
     known = (physics.Scene, physics.World, physics.Trajectory, physics.Recording)
     if isinstance(what, known) or _is_environment(what):
         return what, type(getattr(what, "unwrapped", what)).__name__
-    raise ValueError(f"what is {shown(what)}; allowed are {ALLOWED}")
+    raise ValueError(f"what is {shown(what)}; allowed are {NAMES}, and {OBJECTS}")
 
 
 def _of_text(text: str) -> tuple[Any, str]:
@@ -117,9 +116,11 @@ def _of_text(text: str) -> tuple[Any, str]:
     if _is_environment(text):
         return text, text.split("/")[-1]
     if path.suffix:
-        raise ValueError(f"what is {text!r}, a file that does not exist; allowed are {ALLOWED}")
-    near = nearest_first(text, [*scenes.SCENES, *_ids()])[:KNOWN_FIRST]
-    raise ValueError(f"what is {text!r}; allowed are {ALLOWED} (such as {', '.join(near)})")
+        raise ValueError(f"what is {text!r}, a file that does not exist; allowed are {NAMES}")
+    from rigid_env.envs.named import near_names
+
+    near = ", ".join(near_names(text, scenes.SCENES))
+    raise ValueError(f"what is {text!r}; allowed are {NAMES}, such as {near}")
 
 
 def _of_archive(path: Path) -> physics.Recording | physics.Trajectory:
@@ -139,16 +140,11 @@ def _of_archive(path: Path) -> physics.Recording | physics.Trajectory:
 # --- environments ------------------------------------------------------------------------------------------------
 
 
-def _ids() -> list[str]:
-    """Ids of the environments of `rigid_env`, its own and those of registered tasks."""
-    from gymnasium import registry
-
-    return [name for name, spec in registry.items() if str(spec.entry_point).startswith("rigid_env.")]
-
-
 def _is_environment(what: Any) -> bool:
     if isinstance(what, str):
-        return what.split(":")[-1] in _ids() or ":" in what
+        from rigid_env.envs.named import known_ids
+
+        return what.split(":")[-1] in known_ids() or ":" in what
     if not hasattr(what, "unwrapped"):
         return False
     from rigid_env.envs.env import RigidEnv

@@ -13,7 +13,8 @@ from typer.testing import CliRunner
 
 import agents.planner
 from agents.planner import INTERRUPTED, Planner, PlannerSettings, main, solve
-from rigid_env import BlockReachEnv
+from rigid_env import BlockReachEnv, Gust, Push, TaskEnv, TaskVectorEnv
+from tests.tasks.conftest import Slide
 from tests.tiers.sweep import sweep
 
 
@@ -58,14 +59,65 @@ def test_a_plan_is_the_same_for_a_seed_and_stays_within_bounds():
     assert np.abs(first).max() <= 1.0
 
 
+class Pushed(Slide):
+    """Pushes in nearly every control step."""
+
+    disturbances = (Push(0, (0.5, 1.5), 0.03), Gust(0, every=0.1))
+
+
+SMALL = PlannerSettings(samples=4, horizon=8, knots=2, replan=8)
+
+
+@pytest.mark.interpreted
+def test_a_plan_does_not_foresee_pushes():
+    """Neither when the next one comes nor what the generator of the environment will draw."""
+    env = TaskEnv(Pushed)
+    env.reset(seed=0)
+    state = env.get_state()
+    plan = Planner(Pushed, SMALL).plan(state)
+    assert env.get_state().generators == state.generators
+    env.task.generators[0] = np.random.default_rng(99)
+    env.task.disturbed.next[:] = 7.0
+    np.testing.assert_array_equal(Planner(Pushed, SMALL).plan(env.get_state()), plan)
+
+
+@pytest.mark.interpreted
+def test_all_sequences_of_an_iteration_meet_the_same_pushes_those_of_another_one_others():
+    env = TaskEnv(Pushed)
+    env.reset(seed=0)
+    planner, actions = Planner(Pushed, SMALL), np.zeros((4, 8, 1))
+    first, second = (planner.returns(env.get_state(), actions) for _ in range(2))
+    assert len(set(first)) == len(set(second)) == 1
+    assert first[0] != second[0]
+
+
+@pytest.mark.interpreted
+def test_a_state_that_is_none_of_one_world_is_refused():
+    planner, envs = Planner(Slide, SMALL), TaskVectorEnv(2, task=Slide)
+    envs.reset(seed=0)
+    for state in (None, np.zeros(3), envs.get_state()):
+        with pytest.raises(ValueError, match=r"state is .*; allowed "):
+            planner.plan(state)
+    assert planner.plan(envs.get_state([1])).shape == (8, 1)
+
+
+@pytest.mark.interpreted
+def test_a_method_reads_its_own_settings_only():
+    """MPPI has no elites: two sequences are enough for it."""
+    env = TaskEnv(Slide)
+    env.reset(seed=0)
+    assert Planner(Slide, PlannerSettings(samples=2)).plan(env.get_state()).shape == (4, 1)
+    with pytest.raises(ValueError, match="elites is 4; allowed are at most the samples, 2"):
+        PlannerSettings(method="cem", samples=2)
+
+
 @pytest.mark.parametrize(
     ("field", "value", "words"),
     [
         ("method", "luck", ("method", "'luck'", "mppi, cem")),
-        ("samples", 0, ("samples", "0")),
+        ("samples", 1, ("samples", "1", "at least 2")),
         ("noise", -1.0, ("noise", "-1")),
         ("knots", 1, ("knots", "1", "2 to")),
-        ("elites", 1000, ("elites", "1000", "128")),
         ("replan", 99, ("replan", "99", "24")),
     ],
 )
@@ -85,9 +137,11 @@ def run(*arguments):
     ("arguments", "words"),
     [
         (("--method", "luck"), "method is 'luck'; allowed are mppi, cem"),
-        (("--samples", 1), "elites is 4; allowed are at most the samples, 1"),
+        (("--samples", 1), "'--samples'"),
         (("--env", "CartPole-v1"), "env is 'CartPole-v1', a CartPoleEnv; allowed are environments of rigid_env"),
         (("--env", "rigid_env/Nope-v0"), "env is 'rigid_env/Nope-v0', which is not there"),
+        (("--env", "BlockRech"), "which is not there; allowed are names such as 'rigid_env/BlockReach-v0'"),
+        (("--accuracy", "balaced"), "'--accuracy': 'balaced'; allowed are balanced, fast, precise, reference"),
         (("--env", "rigid_env/Scene-v0"), "scene is None"),
     ],
 )
@@ -117,8 +171,9 @@ def test_what_was_planned_before_ctrl_c_is_kept(monkeypatch, tmp_path):
 def test_a_task_of_ones_own_in_the_working_folder_is_planned(monkeypatch, tmp_path):
     (tmp_path / "mine_to_plan.py").write_text(OWN)
     monkeypatch.chdir(tmp_path)
-    result = run("--env", "mine_to_plan:Up", "--episodes", 1, "--samples", 8)
-    assert result.exit_code == 0, result.output
+    for method, samples in (("mppi", 8), ("cem", 2)):
+        result = run("--env", "mine_to_plan:Up", "--episodes", 1, "--samples", samples, "--method", method)
+        assert result.exit_code == 0, result.output
 
 
 OWN = """

@@ -100,7 +100,7 @@ def test_resumed_run_ends_with_the_bits_of_an_uninterrupted_one(tiny, tmp_path):
 
 
 @pytest.mark.parametrize("tiny", sweep(TINY_ALGORITHMS, ("ppo", HINDSIGHT)), indirect=True)
-def test_interrupted_run_keeps_its_checkpoint_and_goes_on(tiny, tmp_path, monkeypatch):
+def test_interrupted_run_keeps_its_checkpoint_and_goes_on(tiny, tmp_path, monkeypatch, capsys):
     run = RunFolder(tmp_path / "run")
     with monkeypatch.context() as patch:
         patch.setattr("agents.supervisor.CHECKPOINT_EVERY", 0.0)
@@ -110,9 +110,12 @@ def test_interrupted_run_keeps_its_checkpoint_and_goes_on(tiny, tmp_path, monkey
             train(tiny, run, console=QUIET)
     kept = int(list_checkpoints(run.checkpoints)[-1].name)
     assert 0 < kept < tiny.max_steps
+    capsys.readouterr()
     load_policy(run)  # of the checkpoint: there is no model.zip yet
     assert not run.model.exists()
+    assert "model.zip is a model of Stable-Baselines3: code in it runs" in capsys.readouterr().err
     assert train(tiny, run, is_resumed=True, console=QUIET)["steps"] == tiny.max_steps
+    assert "model.zip is a model of Stable-Baselines3: code in it runs" in capsys.readouterr().err
     straight = RunFolder(tmp_path / "straight")
     train(tiny, straight, console=QUIET)
     assert torch.equal(parameters(run), parameters(straight))

@@ -255,7 +255,7 @@ def test_mistakes_name_field_value_and_what_is_allowed(tmp_path, monkeypatch):
         (("run", "folder.toml"), ("folder.toml", "is a folder")),
         (("run", "bad.toml"), ("bad.toml, line 3", "radius is -1")),
         (("run", "binary.toml"), ("binary.toml", "byte 0 is no UTF-8")),
-        (("run", "rest", "--accuracy", "best"), ("accuracy is 'best'", "balanced")),
+        (("run", "rest", "--accuracy", "best"), ("'--accuracy': 'best'; allowed are fast, balanced, precise",)),
         (("run", "rest", "--duration", "-1"), ("--duration", "-1.0; allowed")),
         (("run", "rest", "--duration", "long"), ("--duration",)),
         (("tosses", "none.npz", "--threads", "0"), ("--threads", "0; allowed")),
@@ -274,6 +274,22 @@ def test_mistakes_name_field_value_and_what_is_allowed(tmp_path, monkeypatch):
         assert len(lines) == 1, output  # not broken, not framed
         for word in words:
             assert word in lines[0]
+
+
+# Of each command that takes a preset: a shell user cannot type what Python takes besides.
+@pytest.mark.parametrize(
+    "arguments",
+    [("run", "rest"), ("explain", "rest"), ("demo",), ("hard-cases",), ("tosses", "x.npz"), ("view", "rest")],
+)
+def test_a_preset_that_is_none_is_told_in_words_of_the_shell(arguments):
+    (line,) = [each for each in run(*arguments, "--accuracy", "balaced", code=2).splitlines() if "Error" in each]
+    assert line.endswith("'balaced'; allowed are balanced, fast, precise, reference")
+
+
+def test_a_subject_that_is_none_is_told_in_words_of_the_shell():
+    output = run("view", "BlockRech", code=2)
+    assert "such as rigid_env/BlockReach-v0" in output
+    assert "physics." not in output
 
 
 # Ctrl-C

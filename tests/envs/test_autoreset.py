@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from gymnasium.vector import AutoresetMode
 
-from rigid_env import BlockReachVectorEnv, TaskVectorEnv, Uniform
+from rigid_env import BlockReachVectorEnv, TaskEnv, TaskVectorEnv, Uniform
 from rigid_env.tasks import BlockReach, Distribution, Push
 from tests.tasks.conftest import Slide
 
@@ -111,6 +111,44 @@ def test_reset_mask_errors(vector_class, mask, text):
     envs.reset(seed=0)
     with pytest.raises(ValueError, match=f"reset_mask.*{text}"):
         envs.reset(options={"reset_mask": mask})
+
+
+class Pushed(Slide):
+    """A push is due in nearly every control step."""
+
+    draws = {"mass": (2.0, 4.0)}  # noqa: RUF012
+    disturbances = (Push(0, 0.5, 0.002),)
+
+
+def episodes_of(mode, count=4, limit=3) -> list[np.ndarray]:
+    """First observations, draws and observations of each step of the episodes of world 1 of a batch."""
+    envs = TaskVectorEnv(2, task=Pushed, autoreset_mode=mode, max_episode_steps=limit)
+    obs, infos = envs.reset(seed=3)
+    found = [obs[1], infos["mass"][1]]
+    for _ in range(count):
+        for k in range(limit):
+            obs, _, _, _, infos = envs.step(np.zeros((2, 1)))
+            found.append(infos["final_obs"][1] if k == limit - 1 and mode == "SameStep" else obs[1])
+        if mode == "NextStep":
+            obs, _, _, _, infos = envs.step(np.zeros((2, 1)))
+        if mode == "Disabled":
+            obs, infos = envs.reset(options={"reset_mask": np.ones(2, dtype=bool)})
+        found += [obs[1], infos["mass"][1]]
+    return found
+
+
+def test_later_episodes_are_those_of_a_single_environment_in_all_modes():
+    """Also where disturbances draw numbers: a world that starts anew in the next step must not draw in it."""
+    env = TaskEnv(Pushed)
+    obs, info = env.reset(seed=4)
+    alone = [obs, info["mass"]]
+    for _ in range(4):
+        alone += [env.step([0.0])[0] for _ in range(3)]
+        obs, info = env.reset()
+        alone += [obs, info["mass"]]
+    for mode in AutoresetMode:
+        for ours, theirs in zip(episodes_of(mode.value), alone, strict=True):
+            np.testing.assert_array_equal(ours, theirs)
 
 
 # --- starts that end with an error ------------------------------------------------------------------------------------

@@ -93,7 +93,7 @@ def test_argument_table_holds_the_defaults():
         name: parameter.default
         for owner in (BlockTask.__init__, BlockReachEnv.__init__)
         for name, parameter in inspect.signature(owner).parameters.items()
-        if parameter.default is not inspect.Parameter.empty and name not in ("worlds", "threads")
+        if parameter.default is not inspect.Parameter.empty and name != "worlds"
     }
     assert rows.keys() == defaults.keys()
     assert {name: ast_literal(text) for name, text in rows.items()} == defaults

@@ -53,6 +53,7 @@ def test_a_command_of_agents_says_what_is_missing_before_anything_runs(command, 
         'pip install "rigid-env[agents]"'
     )
     assert "Traceback" not in done.stderr
+    assert "the small torch: pip install -c constraints.txt --no-deps torch --index-url https://" in done.stderr
     assert done.stderr.count("\n") == 1
     assert list((tmp_path / "work").iterdir()) == []
 
@@ -106,6 +107,18 @@ def test_the_line_for_a_checkout_works_from_its_folder_only(monkeypatch, tmp_pat
     assert extras.install_line("bench").endswith(f'or in {ROOT}: pip install -c constraints.txt -e ".[bench]"')
     monkeypatch.setattr(extras, "SOURCES", tmp_path)
     assert extras.install_line("bench") == 'pip install "rigid-env[bench]"'
+
+
+def test_the_small_torch_is_that_of_the_readme(monkeypatch, tmp_path):
+    """Named where torch is missing, and nowhere else; without a checkout there are no constraints."""
+    line = f"pip install -c constraints.txt --no-deps torch {extras.CPU_TORCH}"
+    assert line in (ROOT / "README.md").read_text(encoding="utf-8")
+    assert extras.install_line("agents", has_torch=False).endswith(f"the small torch: {line}")
+    assert "torch" not in extras.install_line("agents")
+    monkeypatch.setattr(extras, "SOURCES", tmp_path)
+    line = extras.install_line("agents", has_torch=False)
+    assert line.startswith('pip install "rigid-env[agents]"; ')
+    assert line.endswith(f"the small torch: pip install torch {extras.CPU_TORCH}")
 
 
 def test_require_names_all_that_is_missing(monkeypatch):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from itertools import pairwise
 
 import gymnasium as gym
@@ -79,11 +80,29 @@ def test_observations_of_another_length_are_refused(rng):
 
 
 def test_other_files_are_refused(tmp_path):
+    """Each error names the file, and what its ending allows."""
     (tmp_path / "text.zip").write_text("no archive")
+    (tmp_path / "text.npz").write_text("no archive")
+    (tmp_path / "empty.npz").write_bytes(b"")
     np.savez(tmp_path / "other.npz", x=np.zeros(3))
-    for name in ("none.npz", "text.zip", "other.npz"):
-        with pytest.raises(ValueError, match=r"policy is .*allowed are a model of Stable-Baselines3"):
+    np.savez(tmp_path / "arrays", w0=np.ones((1, 1)), b0=np.ones(1))
+    (tmp_path / "arrays.npz").rename(tmp_path / "arrays.zip")
+    for name, told in (
+        ("none.npz", "is no file; allowed are a model of Stable-Baselines3"),
+        ("text.zip", "is none; allowed with the ending .zip is a model"),
+        ("arrays.zip", "is none; allowed with the ending .zip is a model"),
+        ("text.npz", "holds no network"),
+        ("empty.npz", "holds no network"),
+        ("other.npz", "holds no network"),
+    ):
+        with pytest.raises(ValueError, match=rf"policy is '.*{name}', which {re.escape(told)}"):
             load_policy(tmp_path / name)
+
+
+def test_a_network_is_saved_under_the_ending_that_is_read(rng, tmp_path):
+    with pytest.raises(ValueError, match=r"path is '.*policy.zip'; allowed is the ending .npz"):
+        made(rng).save(tmp_path / "policy.zip")
+    assert not (tmp_path / "policy.zip").exists()
 
 
 @pytest.mark.parametrize("algorithm", ["PPO", "SAC", "TD3", "DDPG", "A2C"])

@@ -65,6 +65,7 @@ def test_options_are_arrays_or_a_dict_for_each_environment():
     [
         ([{}], "allowed are a dict, or a list of 3 dicts"),
         ("goal", "allowed are a dict, or a list of 3 dicts"),
+        ({"reset_mask": np.array([True, False, True])}, "options holds reset_mask"),
         ([{}, {"reset_mask": True}, {}], r"options\[1\] holds reset_mask"),
         ([{"goal": (0, 0)}, {"goal": 1.0}, {"goal": (1, 1)}], r"options\[1\] has goal of shape \(\)"),
         ([{"gaol": (0, 0)}, {}, {}], "gaol"),
@@ -77,6 +78,19 @@ def test_options_that_fit_no_environment_are_refused(options, words):
 
     with pytest.raises(ValueError, match=words):
         start(make())
+
+
+def test_options_of_some_that_are_refused_change_nothing():
+    """Environments with other keys start in a call of their own; an error in a later call takes back the first."""
+    venv, twin = make(), make()
+    first = [each.seed(3) and each.reset() for each in (venv, twin)]
+    np.testing.assert_array_equal(*first)
+    venv.set_options([{"goal": (1.0, 2.0)}, {}, {"mass": -1.0}])
+    with pytest.raises(ValueError, match="mass"):
+        venv.reset()
+    venv.set_options(None)
+    np.testing.assert_array_equal(venv.step(np.zeros((3, 6)))[0], twin.step(np.zeros((3, 6)))[0])
+    np.testing.assert_array_equal(venv.reset(), twin.reset())
 
 
 def test_truncation_is_told_apart_and_the_final_observation_kept(rng):

@@ -218,6 +218,15 @@ def test_the_file_limits_episodes(tmp_path):
     assert length(gym.make(ID, scene=path, max_episode_steps=4)) == 4
     assert gym.make_vec(ID, num_envs=2, scene=path).max_episode_steps == 7
     assert SceneVectorEnv(2, BALL).max_episode_steps is None
+    for limit in (-1, None):  # a single environment keeps the file's, too
+        with pytest.raises(ValueError, match=f"max_episode_steps is {limit}, and the scene's 7; allowed are at most 7"):
+            gym.make_vec(ID, num_envs=2, scene=path, max_episode_steps=limit)
+    envs = SceneVectorEnv(2, path)
+    for limit in (8, None, -1):
+        with pytest.raises(ValueError, match="the scene's 7; allowed are at most 7"):
+            envs.set_attr("max_episode_steps", limit)
+    envs.set_attr("max_episode_steps", 5)
+    assert envs.max_episode_steps == 5
     envs = SceneVectorEnv(2, path)
     envs.reset(seed=0)
     cuts = [envs.step(np.zeros((2, 6)))[3].tolist() for _ in range(7)]

@@ -261,10 +261,36 @@ def test_errors_name_field_value_and_what_is_allowed(env_class, vector_class, ar
 def test_errors_of_the_vector_environment(vector_class):
     with pytest.raises(ValueError, match="autoreset_mode is 'never'; allowed are 'NextStep'"):
         vector_class(2, autoreset_mode="never")
-    with pytest.raises(ValueError, match="max_episode_steps is 0"):
-        vector_class(2, max_episode_steps=0)
+    for limit in (0, -2, 2.5, True):
+        with pytest.raises(ValueError, match=rf"max_episode_steps is {limit}; allowed .* and None for no limit"):
+            vector_class(2, max_episode_steps=limit)
     with pytest.raises(ValueError, match="seed has 3 entries"):
         vector_class(2).reset(seed=[1, 2, 3])
+
+
+MADE = [
+    ("rigid_env/BlockReach-v0", {}),
+    ("rigid_env/BlockReachGoal-v0", {}),
+    ("rigid_env/Scene-v0", {"scene": "drop"}),
+]
+
+
+@pytest.mark.parametrize(("env_id", "settings"), MADE)
+def test_a_limit_of_minus_one_is_none_in_environments_and_in_batches(env_id, settings):
+    """As `gymnasium.make` spells it, which takes None for the registered limit."""
+    assert not isinstance(gym.make(env_id, max_episode_steps=-1, **settings), gym.wrappers.TimeLimit)
+    for limit in (-1, None):
+        assert gym.make_vec(env_id, num_envs=2, max_episode_steps=limit, **settings).max_episode_steps is None
+
+
+@pytest.mark.parametrize(("env_id", "settings"), MADE)
+def test_all_modes_of_make_vec_take_threads(env_id, settings):
+    """With the same number as a batch: a single environment has one world, and as many threads."""
+    for mode in (None, "vector_entry_point", "sync"):
+        envs = gym.make_vec(env_id, num_envs=2, vectorization_mode=mode, threads=2, **settings)
+        envs.close()
+        with pytest.raises(ValueError, match="threads is 0; allowed are integers of at least 1"):
+            gym.make_vec(env_id, num_envs=2, vectorization_mode=mode, threads=0, **settings)
 
 
 def test_a_bad_action_changes_nothing(env_class, vector_class):

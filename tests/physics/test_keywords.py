@@ -8,6 +8,7 @@ import pickle
 
 import pytest
 
+import physics
 from physics.keywords import known_keywords, nearest_first
 
 
@@ -79,6 +80,18 @@ def test_what_takes_every_keyword_is_refused():
         @known_keywords
         def gather(**kwargs):
             """Anything."""
+
+
+@pytest.mark.parametrize(
+    ("module", "name", "first"),
+    [(physics, "Wrold", "World"), (physics.scenes, "dorp", "drop"), (physics.scenes, "by_nam", "by_name")],
+)
+def test_a_misspelt_name_of_a_module_is_told_with_the_nearest_first(module, name, first):
+    with pytest.raises(
+        AttributeError, match=rf"module 'physics[.\w]*' has no attribute '{name}'; allowed are {first}, "
+    ):
+        getattr(module, name)
+    assert not hasattr(module, name)
 
 
 def test_names_that_are_not_alike_keep_their_order():

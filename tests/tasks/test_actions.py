@@ -12,7 +12,9 @@ import physics
 import rigid_env
 from physics.kernels.state import layout as at
 from rigid_env.tasks import Force, Impulse, Task, Wrench, observe
+from rigid_env.tasks.block_goals import BlockReachGoal
 from rigid_env.tasks.describe import describe
+from rigid_env.tasks.scene_task import SceneTask
 from tests.tasks.conftest import Free, started
 
 pytestmark = pytest.mark.interpreted
@@ -119,6 +121,31 @@ def test_a_refused_action_leaves_the_state_of_a_compiled_task():
     after = env.get_state()
     for name, array in before.arrays.items():
         np.testing.assert_array_equal(array, after.arrays[name], err_msg=name)
+
+
+@pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf])
+@pytest.mark.parametrize("kind", ["NumPy", "goal", "scene", "compiled"])
+def test_numbers_that_are_not_finite_are_refused_in_all_tasks(kind, bad):
+    """Compiled ones or not; alone, in a batch and in a rollout: none is clipped to a limit."""
+    task, settings = {
+        "NumPy": (Free, {}), "goal": (BlockReachGoal, {}), "scene": (SceneTask, {"scene": "drop"}),
+        "compiled": (rigid_env.BlockReach, {}),
+    }[kind]  # fmt: skip
+    env, envs = rigid_env.TaskEnv(task, **settings), rigid_env.TaskVectorEnv(2, task=task, **settings)
+    env.reset(seed=0)
+    envs.reset(seed=0)
+    before = env.get_state(), envs.get_state()
+    action = np.zeros((2, *env.action_space.shape))
+    action[1, -1] = bad
+    with pytest.raises(ValueError, match=f"action of world 0 is .*{bad}.*; allowed are finite numbers"):
+        env.step(action[1])
+    with pytest.raises(ValueError, match=f"action of world 1 is .*{bad}.*; allowed are finite numbers"):
+        envs.step(action)
+    with pytest.raises(ValueError, match=f"is {bad}; allowed are finite"):
+        rigid_env.rollout(envs.task, action[:, None])
+    for ours, kept in zip((env.get_state(), envs.get_state()), before):
+        for name, array in kept.arrays.items():
+            np.testing.assert_array_equal(ours.arrays[name], array, err_msg=name)
 
 
 REFUSED = {

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import warnings
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -130,6 +132,54 @@ class Drawing(Slide):
 
     draws = {"before": (0.0, 1.0), "height": Triangle(), "after": (0.0, 1.0), "friction": (0.1, 0.5)}  # noqa: RUF012
     scene = physics.Scene(Slide.scene.bodies, Slide.scene.walls, (*Slide.scene.effects, physics.Friction(0.3)))
+
+
+class Direction(Distribution):
+    """Unit vectors: four numbers, normalised, which have no value in their middle."""
+
+    length = uniforms = 4
+
+    def at(self, shares, drawn):
+        numbers = 2.0 * shares - 1.0
+        return numbers / np.linalg.norm(numbers, axis=1, keepdims=True)
+
+    def describe(self):
+        return "any direction"
+
+
+def test_a_distribution_without_a_value_in_its_middle_is_drawn_from():
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        task = started(type("Directed", (Slide,), {"draws": {"towards": Direction()}})(3))
+    np.testing.assert_allclose(np.linalg.norm(task.drawn["towards"], axis=1), 1.0)
+
+
+@pytest.mark.parametrize(
+    ("gave", "told"),
+    [
+        (lambda n: np.full((n, 4), np.inf), "gave inf; allowed are finite numbers"),
+        (lambda n: np.zeros(4), r"gave float64 of shape \(4,\); allowed are numbers of shape \(\d, 4\)"),
+        (lambda n: [[0.0] * 4] * n, r"gave \[\[0.0, 0.0, 0.0, 0.0\].*\]; allowed are numbers of shape \(\d, 4\)"),
+        (lambda n: np.full((n, 4), "a"), r"gave <U1 of shape \(\d, 4\); allowed are numbers of shape \(\d, 4\)"),
+    ],
+)
+@pytest.mark.parametrize("is_late", [False, True])
+def test_what_a_distribution_of_ones_own_may_not_give_is_told(gave, told, is_late):
+    """Not by an error of NumPy's, and not by what follows from it; when the task is made, and at a start."""
+
+    class Odd(Direction):
+        is_odd = not is_late
+
+        def at(self, shares, drawn):
+            return gave(len(shares)) if self.is_odd else super().at(shares, drawn)
+
+    def make():
+        task = type("Directed", (Slide,), {"draws": {"towards": Odd()}})(2)
+        Odd.is_odd = True
+        started(task)
+
+    with pytest.raises(ValueError, match=rf"at of Odd, draws towards, {told}"):
+        make()
 
 
 def test_a_distribution_of_ones_own_draws_in_its_task():

@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+import sys
+import warnings
+
 import numpy as np
 import pytest
 
 import physics
 from benchmarks.numpy_reach import NumpyReach
+from physics.kernels.state import layout as at
 from rigid_env.envs.checks import CheckError, check_task
 from rigid_env.envs.env import RigidEnv
 from rigid_env.envs.task import TaskEnv, TaskVectorEnv
 from rigid_env.envs.vector_env import RigidVectorEnv
-from rigid_env.tasks import BlockReach, BlockReorient, Entry, Task, Wrench, observe
+from rigid_env.tasks import BlockReach, BlockReorient, Entry, Push, Task, Uniform, Wrench, observe
 from rigid_env.tasks.parameters import LENGTHS
 from tests.tasks.conftest import Free, Slide, started
 
@@ -143,6 +147,47 @@ def test_a_parameter_of_one_body_leaves_the_others():
     masses = task.weights / 9.81
     np.testing.assert_array_equal(masses[:, 0], 1.0)
     np.testing.assert_allclose(masses[:, 1], task.drawn["mass[1]"], rtol=1e-14)
+
+
+class Mixed(Free):
+    """A block and a ball."""
+
+    scene = physics.Scene([physics.Block((2, 1, 1), 3.0), physics.Sphere(0.5, 2.0, pos=(9, 0, 0))])
+    draws = {"radius[1]": (0.2, 0.4), "goal": (-1.0, 1.0)}  # noqa: RUF012
+
+
+def test_the_radius_of_a_sphere_is_drawn_by_a_pair():
+    """It is told, goes to the world with the inertia that follows from it, and can be fixed and held."""
+    envs = TaskVectorEnv(3, task=Mixed)
+    _, infos = envs.reset(seed=0)
+    radius = infos["radius[1]"]
+    assert ((radius > 0.2) & (radius < 0.4)).all()
+    assert len(set(radius)) == 3
+    params = envs.task.world.params.reshape(3, 2, -1)
+    np.testing.assert_allclose(params[:, 1, at.DIMENSIONS : at.DIMENSIONS + 3], radius[:, None] * np.ones(3))
+    np.testing.assert_allclose(1.0 / params[:, 1, at.INV_INERTIA], 0.4 * 2.0 * radius**2)
+    np.testing.assert_allclose(params[:, 0, at.DIMENSIONS : at.DIMENSIONS + 3], [[1.0, 0.5, 0.5]] * 3)
+    _, again = envs.reset(seed=0, options={"radius[1]": [0.3, 0.7, 1.0]})
+    np.testing.assert_allclose(params[:, 1, at.DIMENSIONS], [0.3, 0.7, 1.0])
+    np.testing.assert_array_equal(again["goal"], infos["goal"])
+    envs.set_attr("radius[1]", [0.6] * 3)
+    np.testing.assert_allclose(params[:, 1, at.DIMENSIONS], 0.6)
+    assert "radius of a sphere [m] of body 1" in TaskEnv(Mixed).describe()
+
+
+@pytest.mark.parametrize(
+    ("draws", "words"),
+    [
+        ({"radius[1]": -1.0}, "draws radius.1. of Mixed is"),
+        ({"radius": (0.2, 0.4)}, "'radius', and body 0 is a Block; allowed is 'radius.b.' for a sphere b"),
+        ({"radius[0]": 0.3}, "'radius.0.', and body 0 is a Block"),
+        ({"radius[1]": 0.3, "size[1]": (1.0, 1.0, 1.0)}, "'size.1.' and 'radius.1.' of body 1; allowed is one"),
+        ({"size[1]": ((1.0,) * 3, (2.0,) * 3)}, "body 1 is a Sphere, of one diameter; allowed is 'radius.1.' with"),
+    ],
+)
+def test_sizes_that_a_body_cannot_have_are_refused(draws, words):
+    with pytest.raises(ValueError, match=words):
+        type("Mixed", (Mixed,), {"draws": draws})()
 
 
 def test_memory_starts_at_zero_and_is_kept_from_step_to_step():
@@ -292,6 +337,79 @@ def test_after_a_wrong_reward_nothing_has_changed(fault, kind, words):
     np.testing.assert_array_equal(task.world.state, twin.world.state)
 
 
+@pytest.mark.parametrize("value", [np.inf, -np.inf, np.nan])
+@pytest.mark.parametrize("is_late", [False, True])
+def test_an_entry_that_is_not_finite_is_refused_though_clipping_would_hide_it(value, is_late):
+    """At the start of an episode, and in a step; nothing has changed then."""
+
+    class Far(Slide):
+        observation = (
+            observe.pos(),
+            Entry("way", "m", -9, 9, lambda worlds: np.where(worlds.steps > (2 if is_late else -1), value, 0.0)),
+        )
+
+    task, still = Far(2), np.zeros((2, 1))
+    if is_late:
+        started(task)
+        task.step(still)
+        task.step(still)
+    before = state_of(task)
+    with pytest.raises(ValueError, match=rf"observation 'way' of Far is {value} in world 0; allowed are finite"):
+        task.step(still) if is_late else started(task)
+    for ours, kept in zip(state_of(task), before):
+        np.testing.assert_array_equal(ours, kept)
+
+
+class Tumbled(Free):
+    """A block in any attitude: four numbers, normalised. Those in the middle of their range are 0."""
+
+    draws = {"attitude": Uniform((-1,) * 4, (1,) * 4), "mass": (2.0, 4.0)}  # noqa: RUF012
+
+    def place(self, drawn):
+        return {"quat": drawn["attitude"] / np.linalg.norm(drawn["attitude"], axis=1, keepdims=True)}
+
+
+def test_a_rehearsal_takes_drawn_values_and_leaves_nothing():
+    """Not the middles of ranges, which an episode may never meet."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        task = Tumbled(2)
+    assert task.drawn["attitude"].tolist() == [[0.0] * 4] * 2  # before the first episode
+    assert task.drawn["mass"].tolist() == [3.0] * 2
+    np.testing.assert_allclose(1.0 / task.world.params[:, at.INV_MASS], 6.0, rtol=1e-12)  # of the scene
+    started(task)
+    np.testing.assert_allclose(np.linalg.norm(task.world.quat[:, 0], axis=1), 1.0)
+
+
+@pytest.mark.parametrize("kind", [ValueError, ZeroDivisionError])
+def test_an_error_of_a_rehearsal_says_that_it_is_one_and_what_was_drawn(kind):
+    class Rehearsed(Tumbled):
+        def rewards(self, worlds):
+            raise kind("a mistake")
+
+    with pytest.raises(kind) as error:
+        Rehearsed()
+    told = "".join((str(error.value), *getattr(error.value, "__notes__", ())))
+    assert "a mistake" in told
+    if kind is ValueError or sys.version_info >= (3, 11):
+        assert "in the rehearsal of Rehearsed, when it is made, with mass = " in told
+        assert "attitude = [" in told
+
+
+def test_numbers_of_a_wrong_shape_are_told_before_another_function_reads_them():
+    """Not as the error of NumPy's that the other function ends with."""
+
+    class Crooked(Slide):
+        def measure(self, worlds):
+            return {"way": np.zeros((len(worlds), 3))}
+
+        def success(self, worlds):
+            return worlds.measured["way"] < worlds.pos[:, 0, 0]
+
+    with pytest.raises(ValueError, match=r"'way' of measure of Crooked is of float64 in shape \(2, 3\); allowed are"):
+        Crooked()
+
+
 def test_an_unknown_setting_is_refused_with_the_nearest_name():
     with pytest.raises(TypeError, match=r"'acuracy'.*allowed are accuracy"):
         TaskEnv(Free, acuracy="fast")
@@ -326,6 +444,19 @@ def test_a_check_finds_random_numbers_that_no_seed_fixes():
 
     with pytest.raises((CheckError, AssertionError)):
         check_task(Noisy, contexts=())
+
+
+class Pushed(Slide):
+    draws = {"goal": (-1.0, 1.0)}  # noqa: RUF012
+    disturbances = (Push(0, 0.5, 100.0),)  # none would be due in the steps of the check, if it did not see to it
+
+
+def test_a_check_finds_later_episodes_that_depend_on_the_mode_of_starting_anew(monkeypatch):
+    """As they do where an ended world draws a push in the step that starts it anew."""
+    check_task(Pushed, steps=6, contexts=())
+    monkeypatch.setattr(RigidVectorEnv, "_generators_of_ended", lambda envs: [])
+    with pytest.raises(CheckError, match=r"drawn goal differs by .*world 0, step 1, autoreset_mode 'NextStep'"):
+        check_task(Pushed, steps=6, contexts=())
 
 
 def test_the_parameters_keep_their_order():

@@ -11,7 +11,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from rigid_env import BlockReachEnv, TaskEnv, TaskVectorEnv, check_task
+from rigid_env.tasks import Entry
 from rigid_env.tasks.block_goals import BlockReachGoal, BlockReorientGoal
+from rigid_env.tasks.goal import GoalTask
+from tests.tasks.conftest import Slide
 
 pytestmark = pytest.mark.interpreted
 
@@ -165,6 +168,63 @@ def test_hindsight_replay_of_stable_baselines3_takes_the_native_batch():
 
 
 @pytest.mark.compiled
+class Along(GoalTask, Slide):
+    """Slide to a place along x, told in units of 2 m from -1 to 1."""
+
+    goal_entries = (Entry("place", "m", -1.0, 1.0, lambda worlds: worlds.pos[:, 0, 0], 2.0),)
+    draws = {"goal": (-9.0, 9.0)}  # noqa: RUF012
+    rewards = GoalTask.rewards
+
+    def desired(self, worlds):
+        return worlds.drawn["goal"][:, None]
+
+    def shortfall(self, achieved, desired):
+        return np.abs(achieved - desired)[..., 0] / 0.1
+
+
+def test_goals_are_clipped_to_their_space():
+    """The one that is wanted as the one that is achieved: a goal at a bound counts as reached beyond it."""
+    env = TaskEnv(Along)
+    for goal, told in ((5.0, 1.0), (-5.0, -1.0), (1.0, 0.5)):
+        obs, _ = env.reset(seed=0, options={"goal": goal})
+        assert obs["desired_goal"].tolist() == [told]
+        assert env.observation_space.contains(obs)
+    env.reset(options={"goal": 5.0})
+    env.task.world.set_state(pos=(7.0, 0.5, 0.0))
+    obs, reward, *_, info = env.step([0.0])
+    assert obs["achieved_goal"].tolist() == [1.0]
+    assert reward == 0.0
+    assert info["is_success"]
+
+
+@pytest.mark.parametrize(
+    ("gave", "told"),
+    [
+        (lambda n: np.zeros((n, 2)), r"desired of Off gave float64 of shape \(2, 2\); allowed are .* shape \(2, 1\)"),
+        (lambda n: np.zeros(n), r"desired of Off gave float64 of shape \(2,\); allowed are .* shape \(2, 1\)"),
+        (lambda n: [[0.0]] * n, r"desired of Off gave \[\[0.0\], \[0.0\]\]; allowed are .* shape \(2, 1\)"),
+        (lambda n: np.full((n, 1), np.inf), "desired goal 'place' of Off is inf in world 0; allowed are finite"),
+    ],
+)
+def test_goals_that_are_no_rows_of_numbers_are_refused_when_the_task_is_made(gave, told):
+    """Not by an error of NumPy's from the division by the scales."""
+
+    class Off(Along):
+        def desired(self, worlds):
+            return gave(len(worlds))
+
+    with pytest.raises(ValueError, match=told):
+        Off()
+
+
+def test_an_achieved_goal_that_is_not_finite_is_refused_though_clipping_would_hide_it():
+    class Lost(Along):
+        goal_entries = (Entry("place", "m", -1.0, 1.0, lambda worlds: worlds.pos[:, 0, 0] + np.inf),)
+
+    with pytest.raises(ValueError, match="achieved goal 'place' of Lost is inf in world 0; allowed are finite"):
+        Lost()
+
+
 def test_what_a_batch_cannot_do_for_some_of_its_worlds_is_refused_still():
     pytest.importorskip("stable_baselines3")
     from rigid_env import RigidVecEnv

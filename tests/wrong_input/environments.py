@@ -83,7 +83,7 @@ CASES = [
         ("'acuracy'", "'fast'", "allowed are accuracy,"),
     ),
     Case("batch-frictoin", lambda: BlockReorientVectorEnv(2, frictoin=0.1), ("'frictoin'", "0.1", "are friction,")),
-    Case("threads-of-one", lambda: BlockReachEnv(threads=2), ("'threads'", "2", "allowed are")),
+    Case("threads-of-one", lambda: BlockReachEnv(threads=0), ("threads is 0", "at least 1")),
     Case("walls", lambda: BlockReachEnv(walls="four"), ("walls", "'four'", "'three', 'corner'")),
     Case("half-width", lambda: BlockReachEnv(half_width=2.0), ("half_width", "2.0", "more than 3.3")),
     Case("half-width-text", lambda: BlockReachEnv(half_width="wide"), ("half_width", "'wide'", "one number")),

@@ -62,7 +62,7 @@ def make_plan(
     """
     accuracies = tuple(name.strip() for name in accuracy.split(",") if name.strip())
     for name in accuracies:
-        knobs.resolve(name)
+        validation.one_of(name, knobs.PRESETS, "accuracy")
     if not accuracies:
         raise ValueError(f"accuracy is {accuracy!r}; allowed are {', '.join(knobs.PRESETS)}, with commas")
     validation.positive(dt, (), "dt")
