@@ -8,6 +8,7 @@ from types import ModuleType
 # Name of a package as people write it, and the line that installs it.
 INSTALLED_BY = {
     "matplotlib": ("matplotlib", 'pip install "rigid-env[plot]"'),
+    "mujoco": ("MuJoCo", "pip install mujoco"),
     "pandas": ("pandas", "pip install pandas"),
 }
 
@@ -33,3 +34,13 @@ def load_optional(module: str, purpose: str) -> ModuleType:
         package = module.partition(".")[0]
         name, line = INSTALLED_BY[package]
         raise ModuleNotFoundError(f"{purpose} needs {name}, which is not installed: {line}", name=package) from None
+
+
+def find_optional(module: str) -> ModuleType | None:
+    """Module of an optional package, or None where the package is not installed."""
+    try:
+        return import_module(module)
+    except ModuleNotFoundError as error:
+        if error.name != module.partition(".")[0]:  # it is installed, and lacks another one
+            raise
+        return None

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import physics
 from physics import scenes
-from physics.io.mjcf import load_mjcf
+from physics.io.mjcf.files import load_mjcf
 from physics.io.toml import SceneFile, load_file
 from physics.keywords import nearest_first
 from physics.summary import shown

@@ -10,7 +10,8 @@ import pytest
 
 import physics
 from physics import scenes
-from physics.io.mjcf import from_mjcf, to_mjcf
+from physics.io.mjcf.files import from_mjcf
+from physics.io.mjcf.writer import to_mjcf
 from physics.rotations import rotation_matrices
 
 EPS = np.finfo(float).eps

@@ -1,0 +1,103 @@
+"""Bodies of a scene from the masses and geoms of a model, whose frames lie elsewhere."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from physics.mass.inertia import MassProperties, block_moments, ellipsoid_moments
+from physics.rotations import rotation_matrices
+from physics.scene.bodies import Block, Body, Ellipsoid, Hull, Sphere
+
+# Inertia of the uniform body, and a geom at the centre of mass, to rounding of a text and of rotations there and back.
+UNIFORM = 1e-12
+# Likewise of meshes, whose corners MuJoCo keeps in single precision.
+UNIFORM_HULL = 1e-6
+
+
+class Placed(NamedTuple):
+    """A geom of a free body, and the body's mass, both in the frame of the model's body.
+
+    Attributes
+    ----------
+    kind : str
+        "box", "sphere", "ellipsoid" or "mesh".
+    shape : (3,) or (n, 3) float64
+        Half edges, semi-axes or the radius three times; or points of a mesh from `pos` on [m].
+    pos : (3,) float64
+        Centre of the geom [m]. Its axes are the body's.
+    mass : MassProperties
+    """
+
+    kind: str
+    shape: np.ndarray
+    pos: np.ndarray
+    mass: MassProperties
+
+
+def make_body(placed: Placed, pose: np.ndarray, velocity: np.ndarray, name: str | None) -> Body:
+    """Body of a scene: its frame has the axes of the model's body, and its origin at the centre of mass.
+
+    Parameters
+    ----------
+    placed : Placed
+    pose : (7,) float64
+        Origin [m] and unit quaternion of the model's body in the world.
+    velocity : (6,) float64
+        Velocity of that origin in the world [m/s], and angular velocity in the body's frame [rad/s].
+    name : str, optional
+
+    Raises
+    ------
+    ValueError
+        The scene has no such body.
+    """
+    R, centre = rotation_matrices(pose[3:]), placed.mass.centre
+    start = {
+        "pos": pose[:3] + R @ centre,
+        "quat": pose[3:],
+        "linvel": velocity[:3] + R @ np.cross(velocity[3:], centre),
+        "angvel": R @ velocity[3:],
+        "name": name,
+    }
+    if placed.kind == "mesh":
+        return _hull(placed, start)
+    arm = placed.pos - centre
+    if np.abs(arm).max() <= UNIFORM * max(np.abs(placed.pos).max(), placed.shape.max()):
+        arm = np.zeros(3)
+    return _convex(placed, arm, start)
+
+
+def _convex(placed: Placed, arm: np.ndarray, start: dict[str, Any]) -> Body:
+    """A box, sphere or ellipsoid `arm` [m] from the centre of mass."""
+    half, mass = placed.shape, placed.mass.mass
+    moments = block_moments(2 * half, mass) if placed.kind == "box" else ellipsoid_moments(half, mass)
+    if arm.any() or not _is_near(placed.mass.inertia, np.diag(moments), UNIFORM):
+        start = {**start, "inertia_body": placed.mass.inertia}
+    if placed.kind == "box":
+        return Block(tuple(2 * half), mass, center=arm, **start)
+    if arm.any():
+        raise ValueError(f"its {placed.kind} is {arm.tolist()} m from the centre of mass; allowed is that of a box")
+    if placed.kind == "sphere":
+        return Sphere(float(half[0]), mass, **start)
+    return Ellipsoid(tuple(half), mass, **start)
+
+
+def _hull(placed: Placed, start: dict[str, Any]) -> Body:
+    """The convex hull of points, whose own centre of mass must be the body's."""
+    points, mass = placed.pos + placed.shape, placed.mass.mass
+    hull = Hull(tuple(map(tuple, points)), mass, **start)
+    away = np.array(hull.centroid) - placed.mass.centre
+    if np.abs(away).max() > UNIFORM_HULL * np.abs(points).max():
+        raise ValueError(
+            f"the centre of mass of its mesh's convex hull is {away.tolist()} m from that of the body; allowed is a "
+            "convex mesh of uniform density"
+        )
+    if _is_near(placed.mass.inertia, hull.inertia, UNIFORM_HULL):
+        return hull
+    return Hull(tuple(map(tuple, points)), mass, **start, inertia_body=placed.mass.inertia)
+
+
+def _is_near(tensor: np.ndarray, uniform: np.ndarray, share: float) -> bool:
+    return bool(np.abs(tensor - uniform).max() <= share * np.diag(uniform).max())
