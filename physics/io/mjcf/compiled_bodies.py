@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from physics.io.mjcf.left_out import LeftOut
-from physics.io.mjcf.model import Model
+from physics.io.mjcf.model import Frame, Model
 from physics.io.mjcf.shapes import Placed, make_body
 from physics.io.mjcf.text import ModelError
 from physics.io.mjcf.touching import Touching
@@ -22,6 +22,8 @@ TURNED = ("box", "ellipsoid")  # their axes are the body's in a scene
 
 # MuJoCo finds principal axes by an iteration: a tensor that is the file's to this share is the file's.
 DIAGONALISED = 1e-9
+# It keeps the corners of a mesh in single precision: points of the file that are this near, by size, are the same.
+SINGLE = 1e-6
 
 
 class FreeBody(NamedTuple):
@@ -82,8 +84,10 @@ def _free_body(model: Model, touching: Touching, root: int, number: int) -> Free
     pose, velocity = _start(model, joint)
     axes = frame.quat if kind in TURNED else np.array([1.0, 0.0, 0.0, 0.0])
     T = rotation_matrices(axes).T  # from the axes of the model's body to those of the scene's
-    shape = _points(model, geom) @ frame.R.T if kind == "mesh" else _half_axes(kind, m.geom_size[geom])
-    placed = Placed(kind, shape, T @ frame.pos, mass.placed(R=T))
+    if kind == "mesh":
+        placed = Placed(kind, _points(model, geom), np.zeros(3), mass)
+    else:
+        placed = Placed(kind, _half_axes(kind, m.geom_size[geom]), T @ frame.pos, mass.placed(R=T))
     name = model.name("body", root)
     try:
         body = make_body(
@@ -151,12 +155,24 @@ def _half_axes(kind: str, size: np.ndarray) -> np.ndarray:
 
 
 def _points(model: Model, geom: int) -> np.ndarray:
-    """(n, 3) corners of the convex hull of a mesh in the frame of the geom, as MuJoCo keeps it; else all its points."""
-    m, mesh = model.data, int(model.data.geom_dataid[geom])
-    start, graph = int(m.mesh_vertadr[mesh]), int(m.mesh_graphadr[mesh])
+    """(n, 3) corners of the convex hull of a mesh in the body's frame [m]; the file's own digits, where it has them."""
+    m, mesh, frame = model.data, int(model.data.geom_dataid[geom]), model.geom_frames[geom]
+    corners, stated = _corners(model, mesh), model.stated_points(mesh)
+    if stated is not None:
+        # MuJoCo turns a mesh to its principal axes, in single precision.
+        turned = Frame(m.mesh_pos[mesh], m.mesh_quat[mesh])
+        distances = np.linalg.norm(stated[:, None] - (turned.pos + corners @ turned.R.T), axis=2)
+        if distances.min(axis=0).max() <= SINGLE * np.abs(stated).max():
+            frame, corners = frame @ turned.inverse, stated[distances.argmin(axis=0)]
+    return frame.pos + corners @ frame.R.T
+
+
+def _corners(model: Model, mesh: int) -> np.ndarray:
+    """(n, 3) corners of the convex hull of a mesh in its own frame, as MuJoCo keeps it; else all its points."""
+    m, start, graph = model.data, int(model.data.mesh_vertadr[mesh]), int(model.data.mesh_graphadr[mesh])
     points = m.mesh_vert[start : start + int(m.mesh_vertnum[mesh])].astype(float)
     if graph < 0:
         return points
     # The graph of a hull: numbers of corners and of faces, an address for each corner, and the corners themselves.
-    corners = int(m.mesh_graph[graph])
-    return points[m.mesh_graph[graph + 2 + corners : graph + 2 + 2 * corners]]
+    number = int(m.mesh_graph[graph])
+    return points[m.mesh_graph[graph + 2 + number : graph + 2 + 2 * number]]

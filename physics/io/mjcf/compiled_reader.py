@@ -37,8 +37,8 @@ def read_scene(mujoco: ModuleType, text: str, root: Element, path: Path | None, 
     touching = Touching(model)
     free = free_bodies(model, touching, left)
     if not free:
-        told = f"; left out: {', '.join(left.messages)}" if left.messages else ""
-        raise ModelError(f"no body is free; allowed is at least one body with a free joint{told}")
+        told = f"; of {len(left.messages)} parts left out the first is {left.messages[0]}" if left.messages else ""
+        raise ModelError(f"there is no free body that a scene can hold; allowed is at least one{told}")
     for error in forces.joint_faults(model, free):
         left.add(error)
     planes, contact = _contact(model, touching, free, left)

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import contextlib
 import re
+import warnings
+from collections.abc import Iterator
 from pathlib import Path
 from types import ModuleType
 from typing import Any, NamedTuple
@@ -29,6 +32,11 @@ class Frame(NamedTuple):
     def __matmul__(self, inner: Frame) -> Frame:
         """The frame `inner`, given in this one, where this one is given."""
         return Frame(self.pos + self.R @ inner.pos, product(self.quat, inner.quat))
+
+    @property
+    def inverse(self) -> Frame:
+        """The frame in which this one was given, in this one."""
+        return Frame(-self.R.T @ self.pos, self.quat * (1, -1, -1, -1))
 
     @property
     def R(self) -> np.ndarray:
@@ -120,6 +128,13 @@ class Model:
             return self.line("body", int(self.data.jnt_bodyid[k]))
         return int(found.group(1)) if found else 0
 
+    def stated_points(self, mesh: int) -> np.ndarray | None:
+        """(n, 3) points of a mesh as the text states them; None where it names a file."""
+        for element in self.root.iter("mesh"):
+            if element.get("name") == self.name("mesh", mesh) and element.get("vertex"):
+                return np.array(element.get("vertex", "").split(), dtype=float).reshape(-1, 3)
+        return None
+
     def error(self, kind: str, k: int, message: str) -> ModelError:
         """An error about an element."""
         return ModelError(f"{self.label(kind, k)} {message}", self.line(kind, k))
@@ -142,13 +157,27 @@ def compile_model(mujoco: ModuleType, text: str, root: Element, path: Path | Non
         MuJoCo's own message.
     """
     try:
-        if path is not None and path.suffix.lower() in PARSED:
-            spec = mujoco.MjSpec.from_file(str(path))
-        else:
-            spec = mujoco.MjSpec.from_string(text)
-            spec.modelfiledir = str(path.parent) if path is not None else ""
-        return Model(mujoco, spec, root)
+        with _told_warnings(mujoco):
+            if path is not None and path.suffix.lower() in PARSED:
+                spec = mujoco.MjSpec.from_file(str(path))
+            else:
+                spec = mujoco.MjSpec.from_string(text)
+                spec.modelfiledir = str(path.parent) if path is not None else ""
+            return Model(mujoco, spec, root)
     except (ValueError, mujoco.FatalError) as error:
         told = ", ".join(line.strip() for line in str(error).splitlines() if line.strip())
         line = re.search(r", line (\d+)", told)
         raise ModelError(f"MuJoCo refuses it: {told}", int(line.group(1)) if line else 0) from None
+
+
+@contextlib.contextmanager
+def _told_warnings(mujoco: ModuleType) -> Iterator[None]:
+    """Let MuJoCo warn in Python instead of in a file of its own, which it makes in the working folder."""
+    before, told = mujoco.get_mju_user_warning(), []
+    mujoco.set_mju_user_warning(told.append)
+    try:
+        yield
+    finally:
+        mujoco.set_mju_user_warning(before)
+    for message in told:
+        warnings.warn(message, stacklevel=2)

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from physics.mass.inertia import MassProperties, block_moments, ellipsoid_moments
+from physics.mass.polyhedron import convex_hull
 from physics.rotations import rotation_matrices
 from physics.scene.bodies import Block, Body, Ellipsoid, Hull, Sphere
 
@@ -86,17 +88,30 @@ def _convex(placed: Placed, arm: np.ndarray, start: dict[str, Any]) -> Body:
 
 def _hull(placed: Placed, start: dict[str, Any]) -> Body:
     """The convex hull of points, whose own centre of mass must be the body's."""
-    points, mass = placed.pos + placed.shape, placed.mass.mass
-    hull = Hull(tuple(map(tuple, points)), mass, **start)
+    mass, points = placed.mass.mass, tuple(map(tuple, (placed.pos + placed.shape).tolist()))
+    fault = _hull_fault(points)
+    if fault:
+        raise ValueError(fault)
+    hull = Hull(points, mass, **start)
     away = np.array(hull.centroid) - placed.mass.centre
-    if np.abs(away).max() > UNIFORM_HULL * np.abs(points).max():
+    if np.abs(away).max() > UNIFORM_HULL * np.abs(placed.pos + placed.shape).max():
         raise ValueError(
             f"the centre of mass of its mesh's convex hull is {away.tolist()} m from that of the body; allowed is a "
             "convex mesh of uniform density"
         )
     if _is_near(placed.mass.inertia, hull.inertia, UNIFORM_HULL):
         return hull
-    return Hull(tuple(map(tuple, points)), mass, **start, inertia_body=placed.mass.inertia)
+    return Hull(points, mass, **start, inertia_body=placed.mass.inertia)
+
+
+@lru_cache(maxsize=64)
+def _hull_fault(points: tuple) -> str:
+    """Reason why points have no hull here; empty where they have. Bodies share their mesh: it is kept."""
+    try:
+        convex_hull(points)
+    except ValueError as error:
+        return str(error)
+    return ""
 
 
 def _is_near(tensor: np.ndarray, uniform: np.ndarray, share: float) -> bool:
