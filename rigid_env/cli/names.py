@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from physics import Scene
 
-SCENE_FILES = (".toml", ".xml")  # as of `rigid_env.tasks.scene_source`, which takes long to import
+SCENE_FILES = (".toml", ".xml", ".urdf")  # as of `rigid_env.tasks.scene_source`, which takes long to import
 
 
 def load_scene(name: str) -> tuple[str, Scene]:

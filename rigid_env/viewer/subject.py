@@ -21,8 +21,9 @@ from rigid_env.viewer.worlds import live_scene, live_world
 ACCURACY, DT = "balanced", 0.01
 
 ALLOWED = (
-    "a canonical scene, a scene file (.toml or .xml), the id of an environment, 'module:Class' of a task, a recording "
-    "or a trajectory (.npz), and of Python physics.Scene, World, Trajectory, Recording and environments of rigid_env"
+    "a canonical scene, a scene file (.toml, .xml or .urdf), the id of an environment, 'module:Class' of a task, a "
+    "recording or a trajectory (.npz), and of Python physics.Scene, World, Trajectory, Recording and environments of "
+    "rigid_env"
 )
 
 KNOWN_FIRST = 3

@@ -65,7 +65,7 @@ IO = [
     _mutant(
         "io-spin",
         "The spin of a body in MJCF is along the wrong axes.",
-        "io/mjcf.py",
+        "io/mjcf/writer.py",
         "rotation_matrices(np.array(body.quat)).T @ body.angvel",
         "rotation_matrices(np.array(body.quat)) @ body.angvel",
         "test_mjcf.py::test_a_scene_comes_back",
@@ -73,7 +73,7 @@ IO = [
     _mutant(
         "io-inertia",
         "Two products of inertia are exchanged in MJCF.",
-        "io/mjcf.py",
+        "io/mjcf/writer.py",
         "I[0, 1], I[0, 2], I[1, 2]",
         "I[0, 2], I[0, 1], I[1, 2]",
         "test_mjcf.py::test_a_scene_comes_back",

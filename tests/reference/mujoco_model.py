@@ -94,7 +94,9 @@ def _inertia(model, data, root: int) -> np.ndarray:
     for b in range(model.nbody):
         if model.body_weldid[b] == root:
             R, d = data.ximat[b].reshape(3, 3), data.xipos[b] - data.subtree_com[root]
-            total += R @ np.diag(model.body_inertia[b]) @ R.T + model.body_mass[b] * (d @ d * np.eye(3) - np.outer(d, d))
+            total += R @ np.diag(model.body_inertia[b]) @ R.T + model.body_mass[b] * (
+                d @ d * np.eye(3) - np.outer(d, d)
+            )
     return total
 
 
@@ -172,7 +174,9 @@ def _of_contact(model, scene: physics.Scene) -> float:
         expected = {None} if not contact or not is_plane else {mu} if scene.walls else {None}
         worst = max(worst, _friction_off(_met(model, b, geom), expected | ({None} if is_plane else set())))
     for a, b in combinations(bodies, 2):
-        worst = max(worst, _friction_off(_met_bodies(model, a, b), {mu if contact and contact.between_bodies else None}))
+        worst = max(
+            worst, _friction_off(_met_bodies(model, a, b), {mu if contact and contact.between_bodies else None})
+        )
     return worst
 
 

@@ -13,8 +13,6 @@ from physics.io.mjcf.writer import to_mjcf
 from physics.optional import find_optional, load_optional
 from physics.scene.scene import Scene
 
-MORE = "load_mjcf reads more where MuJoCo is installed: pip install mujoco"
-
 
 def save_mjcf(scene: Scene, path: str | Path, drop: bool = False) -> None:
     """Write a scene for MuJoCo.
@@ -92,10 +90,7 @@ def read_mjcf(text: str, source: str, drop: bool = False, path: Path | None = No
         root = parse(text)
         if mujoco is not None:
             return compiled_reader.read_scene(mujoco, text, root, path, left), left.messages
-        try:
-            return plain_reader.read_scene(root), left.messages
-        except ModelError as error:
-            raise ModelError(f"{error}; {MORE}", error.line) from None
+        return plain_reader.read_scene(root), left.messages
     except ModelError as error:
         place = f", {error.place}" if error.place else ""
         raise ValueError(f"{source}{place}: {error}") from None

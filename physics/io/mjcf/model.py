@@ -165,9 +165,20 @@ def compile_model(mujoco: ModuleType, text: str, root: Element, path: Path | Non
                 spec.modelfiledir = str(path.parent) if path is not None else ""
             return Model(mujoco, spec, root)
     except (ValueError, mujoco.FatalError) as error:
-        told = ", ".join(line.strip() for line in str(error).splitlines() if line.strip())
-        line = re.search(r", line (\d+)", told)
-        raise ModelError(f"MuJoCo refuses it: {told}", int(line.group(1)) if line else 0) from None
+        raise _refusal(str(error), root) from None
+
+
+def _refusal(message: str, root: Element) -> ModelError:
+    """MuJoCo's own message as an error, with the value of the attribute that it names."""
+    told = ", ".join(line.strip() for line in message.splitlines() if line.strip())
+    place, attribute = re.search(r", line (\d+)", told), re.search(r"attribute:? '(\w+)'", told)
+    line = int(place.group(1)) if place else 0
+    for element in root.iter():
+        value = element.get(attribute.group(1)) if attribute and element.line == line else None
+        if value is not None:
+            told += f"; {attribute.group(1)} is {value!r}"
+            break
+    return ModelError(f"MuJoCo refuses it: {told}", line)
 
 
 @contextlib.contextmanager

@@ -14,8 +14,9 @@ from physics.io.mjcf.shapes import Placed, make_body
 from physics.io.mjcf.text import Element, ModelError, label
 from physics.io.mjcf.writer import unnamed
 from physics.mass.inertia import MassProperties, block_moments, ellipsoid_moments
+from physics.optional import INSTALLED_BY
 from physics.rotations import rotation_matrices
-from physics.scene.bodies import Body, Hull
+from physics.scene.bodies import Body
 from physics.scene.effects import Gravity
 from physics.scene.scene import HalfSpace, Scene
 
@@ -41,7 +42,18 @@ ELEMENTS: dict[str, tuple[str, str]] = {
     "keyframe": ("", "key"),
     "key": ("name qpos qvel", ""),
 }
-HARMLESS_ELEMENTS = {"camera", "custom", "light", "material", "sensor", "site", "size", "statistic", "texture", "visual"}
+HARMLESS_ELEMENTS = {
+    "camera",
+    "custom",
+    "light",
+    "material",
+    "sensor",
+    "site",
+    "size",
+    "statistic",
+    "texture",
+    "visual",
+}
 HARMLESS_ATTRIBUTES = {"group", "material", "rgba"}
 MANY = {"body", "geom", "joint", "key", "mesh"}  # elements of which there may be several in another one
 
@@ -49,7 +61,7 @@ MANY = {"body", "geom", "joint", "key", "mesh"}  # elements of which there may b
 def read_scene(root: Element) -> Scene:
     """The scene of a model's root element."""
     if root.tag != "mujoco":
-        raise ModelError(f"{_label(root)} is no model; allowed is <mujoco>", root.line)
+        raise _unread(root, "is not read; allowed is <mujoco>")
     _check(root)
     world = root.find("worldbody")
     if world is None:
@@ -57,7 +69,7 @@ def read_scene(root: Element) -> Scene:
     planes = world.findall("geom")
     for plane in planes:
         if _type(plane) != "plane":
-            raise _error(plane, f"of the world is a {_type(plane)}; allowed are planes")
+            raise _unread(plane, f"of the world is a {_type(plane)}; allowed are planes")
     elements = world.findall("body")
     meshes = {mesh.get("name"): mesh for mesh in root.iterfind("asset/mesh")}
     starts = _starts(root, elements)
@@ -79,6 +91,11 @@ def _error(element: Element, message: str) -> ModelError:
     return ModelError(f"{_label(element)} {message}", element.line)
 
 
+def _unread(element: Element, message: str) -> ModelError:
+    """An error about MJCF that MuJoCo would read."""
+    return _error(element, f"{message}; load_mjcf reads more where MuJoCo is installed: {INSTALLED_BY['mujoco'][1]}")
+
+
 def _type(geom: Element) -> str:
     return geom.get("type", "sphere")
 
@@ -88,15 +105,15 @@ def _check(element: Element) -> None:
     attributes, children = (text.split() for text in ELEMENTS[element.tag])
     for key, value in element.attrib.items():
         if key not in attributes and key not in HARMLESS_ATTRIBUTES:
-            raise _error(element, f"has {key}={value!r}, which is not read; allowed are {', '.join(attributes)}")
+            raise _unread(element, f"has {key}={value!r}, which is not read; allowed are {', '.join(attributes)}")
     found = set()
     for child in element:
         if child.tag in HARMLESS_ELEMENTS:
             continue
         if child.tag not in children:
-            raise _error(child, f"in {_label(element)} is not read; allowed are {', '.join(children)}")
+            raise _unread(child, f"in {_label(element)} is not read; allowed are {', '.join(children)}")
         if child.tag in found - MANY:
-            raise _error(child, f"stands in {_label(element)} twice; allowed is one")
+            raise _unread(child, f"stands in {_label(element)} twice; allowed is one")
         found.add(child.tag)
         _check(child)
 
@@ -104,13 +121,14 @@ def _check(element: Element) -> None:
 def _numbers(element: Element, key: str, count: int, default: str | None = None, least: int = 0) -> np.ndarray:
     """`count` numbers of an attribute, or at least `least` of them."""
     text = element.get(key, default)
-    allowed = f"{least} to {count} finite numbers" if least else f"{count} finite numbers"
+    several = f"are {least} to {count} finite numbers" if least else f"are {count} finite numbers"
+    allowed = "is one finite number" if count == 1 else several
     try:
         found = np.array(text.split(), dtype=np.float64)
     except (AttributeError, ValueError):
         found = np.empty(0)
     if not (least or count) <= len(found) <= count or not np.isfinite(found).all():
-        raise ModelError(f"{key} of {_label(element)} is {text!r}; allowed are {allowed}", element.line)
+        raise ModelError(f"{key} of {_label(element)} is {text!r}; allowed {allowed}", element.line)
     return found
 
 
@@ -120,15 +138,13 @@ def _integer(element: Element, key: str, default: int) -> int:
     try:
         return int(text)
     except ValueError:
-        raise ModelError(
-            f"{key} of {_label(element)} is {text!r}; allowed is an integer", element.line
-        ) from None
+        raise ModelError(f"{key} of {_label(element)} is {text!r}; allowed is an integer", element.line) from None
 
 
 def _refuse(element: Element, *keys: str) -> None:
     for key in keys:
         if element.get(key) is not None:
-            raise ModelError(f"{key} of {_label(element)} is not read; allowed is no {key} here", element.line)
+            raise _unread(element, f"has {key}={element.get(key)!r}, which is not read here; allowed is none")
 
 
 def _wall(plane: Element) -> HalfSpace:
@@ -172,13 +188,13 @@ def _body(b: int, element: Element, meshes: dict, pose: np.ndarray, velocity: np
     """A free body; the scene's frame has its axes, and its origin at the centre of mass."""
     joints = element.findall("freejoint") + [j for j in element.findall("joint") if j.get("type") == "free"]
     if len(joints) != 1 or len(element.findall("joint")) + len(element.findall("freejoint")) != 1:
-        raise _error(element, "is not a free body; allowed is one freejoint and no other")
+        raise _unread(element, "is not a free body; allowed is one freejoint and no other")
     geoms = element.findall("geom")
     if len(geoms) != 1:
-        raise _error(element, f"has {len(geoms)} geoms; allowed is one")
+        raise _unread(element, f"has {len(geoms)} geoms; allowed is one")
     geom, kind = geoms[0], _type(geoms[0])
     if kind not in SHAPES:
-        raise _error(geom, f"is a {kind}; allowed are {', '.join(SHAPES)}")
+        raise _unread(geom, f"is a {kind}; allowed are {', '.join(SHAPES)}")
     _refuse(geom, "quat", "zaxis", *(("size", "density") if kind == "mesh" else ("mesh",)))
     shape = _points(geom, meshes) if kind == "mesh" else _half_axes(geom)
     placed = Placed(kind, shape, _numbers(geom, "pos", 3, "0 0 0"), _mass_properties(element, geom, shape))
@@ -223,7 +239,7 @@ def _mass_properties(element: Element, geom: Element, shape: np.ndarray) -> Mass
 def _of_geom(geom: Element, shape: np.ndarray) -> MassProperties:
     """Mass properties of a geom of uniform density."""
     if _type(geom) == "mesh":
-        raise _error(geom, "is a mesh of a body without <inertial>; allowed is a body with it")
+        raise _unread(geom, "is a mesh of a body without <inertial>; allowed is a body with it")
     is_box = _type(geom) == "box"
     if geom.get("mass") is not None:
         mass = float(_numbers(geom, "mass", 1)[0])

@@ -65,17 +65,17 @@ def make_body(placed: Placed, pose: np.ndarray, velocity: np.ndarray, name: str 
     }
     if placed.kind == "mesh":
         return _hull(placed, start)
-    arm = placed.pos - centre
-    if np.abs(arm).max() <= UNIFORM * max(np.abs(placed.pos).max(), placed.shape.max()):
-        arm = np.zeros(3)
-    return _convex(placed, arm, start)
+    return _convex(placed, start)
 
 
-def _convex(placed: Placed, arm: np.ndarray, start: dict[str, Any]) -> Body:
-    """A box, sphere or ellipsoid `arm` [m] from the centre of mass."""
-    half, mass = placed.shape, placed.mass.mass
+def _convex(placed: Placed, start: dict[str, Any]) -> Body:
+    """A box, sphere or ellipsoid; its inertia is stated where it is not that of uniform density."""
+    half, mass, arm = placed.shape, placed.mass.mass, placed.pos - placed.mass.centre
     moments = block_moments(2 * half, mass) if placed.kind == "box" else ellipsoid_moments(half, mass)
-    if arm.any() or not _is_near(placed.mass.inertia, np.diag(moments), UNIFORM):
+    is_uniform = _is_near(placed.mass.inertia, np.diag(moments), UNIFORM)
+    if (is_uniform or placed.kind != "box") and _is_rounding(arm, placed):
+        arm = np.zeros(3)
+    if arm.any() or not is_uniform:
         start = {**start, "inertia_body": placed.mass.inertia}
     if placed.kind == "box":
         return Block(tuple(2 * half), mass, center=arm, **start)
@@ -84,6 +84,11 @@ def _convex(placed: Placed, arm: np.ndarray, start: dict[str, Any]) -> Body:
     if placed.kind == "sphere":
         return Sphere(float(half[0]), mass, **start)
     return Ellipsoid(tuple(half), mass, **start)
+
+
+def _is_rounding(arm: np.ndarray, placed: Placed) -> bool:
+    """True if a geom is at the centre of mass, to rounding of its place and size."""
+    return bool(np.abs(arm).max() <= UNIFORM * max(np.abs(placed.pos).max(), placed.shape.max()))
 
 
 def _hull(placed: Placed, start: dict[str, Any]) -> Body:
