@@ -120,6 +120,10 @@ def _geoms(model, root: int) -> list[int]:
     return [g for g in range(model.ngeom) if model.body_weldid[model.geom_bodyid[g]] == root]
 
 
+def _fixed_geoms(model) -> list[int]:
+    return [g for g in range(model.ngeom) if not model.body_dofnum[model.body_weldid[model.geom_bodyid[g]]]]
+
+
 def _shape_off(model, data, b: int, body, R: np.ndarray) -> float:
     """Difference of the shape in its place: corners of a block or a hull, centre and axes of others."""
     (geom,) = _able(model, _geoms(model, b))
@@ -147,7 +151,7 @@ def _of_walls(model, scene: physics.Scene) -> float:
     """Difference of the planes that a body touches from the walls; infinite where their number differs."""
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
-    planes = [g for g in _geoms(model, 0) if model.geom_type[g] == mujoco.mjtGeom.mjGEOM_PLANE]
+    planes = [g for g in _fixed_geoms(model) if model.geom_type[g] == mujoco.mjtGeom.mjGEOM_PLANE]
     if scene.effect(physics.Contact):
         planes = [g for g in planes if any(_met(model, b, g) for b in free_bodies(model)[:MOST_BODIES])]
     if len(planes) != len(scene.walls):
@@ -168,7 +172,7 @@ def _of_contact(model, scene: physics.Scene) -> float:
     contact, friction = scene.effect(physics.Contact), scene.effect(physics.Friction)
     mu = friction.coefficient if friction else 0.0
     worst = 0.0
-    for b, geom in product(bodies, _geoms(model, 0)):
+    for b, geom in product(bodies, _fixed_geoms(model)):
         is_plane = model.geom_type[geom] == mujoco.mjtGeom.mjGEOM_PLANE
         # Planes that no body meets are no walls: `_of_walls`.
         expected = {None} if not contact or not is_plane else {mu} if scene.walls else {None}
@@ -201,7 +205,8 @@ def _met(model, b: int, geom: int) -> set[float]:
     """Coefficients of friction of a body with a fixed geom, put in its middle."""
     data = _apart(model)
     adr = model.jnt_qposadr[model.body_jntadr[b]]
-    data.qpos[adr : adr + 3] = data.geom_xpos[geom]
+    (own, *_) = _able(model, _geoms(model, b))
+    data.qpos[adr : adr + 3] += data.geom_xpos[geom] - data.geom_xpos[own]
     return _contacts(model, data, [geom], _geoms(model, b))
 
 
@@ -209,7 +214,8 @@ def _met_bodies(model, a: int, b: int) -> set[float]:
     """Coefficients of friction of two bodies, one in the other."""
     data = _apart(model)
     at = [model.jnt_qposadr[model.body_jntadr[body]] for body in (a, b)]
-    data.qpos[at[1] : at[1] + 3] = data.qpos[at[0] : at[0] + 3] + 1e-3
+    own, other = (_able(model, _geoms(model, body))[0] for body in (a, b))
+    data.qpos[at[1] : at[1] + 3] += data.geom_xpos[own] - data.geom_xpos[other] + 1e-3
     return _contacts(model, data, _geoms(model, a), _geoms(model, b))
 
 

@@ -75,7 +75,7 @@ class Model:
         self.frames = [ORIGIN]
         for b in range(1, m.nbody):
             inner = Frame(m.body_pos[b], m.body_quat[b])
-            self.frames.append(ORIGIN if self.moves(b) and m.body_weldid[b] == b else self._parent(b) @ inner)
+            self.frames.append(ORIGIN if m.body_dofnum[b] else self._parent(b) @ inner)
         self.geom_frames = [
             self.frames[m.geom_bodyid[g]] @ Frame(m.geom_pos[g], m.geom_quat[g]) for g in range(m.ngeom)
         ]
@@ -84,8 +84,8 @@ class Model:
         return self.frames[self.data.body_parentid[b]]
 
     def moves(self, b: int) -> bool:
-        """True unless the body is fixed to the world."""
-        return bool(self.data.body_weldid[b] != 0)
+        """True if the body, or the one that it is fixed to, has a joint."""
+        return bool(self.data.body_dofnum[self.data.body_weldid[b]] > 0)
 
     def value(self, name: str, default: Any = 0.0) -> Any:
         """An array of the model; the default where this version of MuJoCo has none."""

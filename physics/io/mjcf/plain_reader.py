@@ -105,13 +105,15 @@ def _check(element: Element) -> None:
     attributes, children = (text.split() for text in ELEMENTS[element.tag])
     for key, value in element.attrib.items():
         if key not in attributes and key not in HARMLESS_ATTRIBUTES:
-            raise _unread(element, f"has {key}={value!r}, which is not read; allowed are {', '.join(attributes)}")
+            raise _unread(
+                element, f"has {key}={value!r}, which is not read; allowed are {', '.join(attributes) or 'none'}"
+            )
     found = set()
     for child in element:
         if child.tag in HARMLESS_ELEMENTS:
             continue
         if child.tag not in children:
-            raise _unread(child, f"in {_label(element)} is not read; allowed are {', '.join(children)}")
+            raise _unread(child, f"in {_label(element)} is not read; allowed are {', '.join(children) or 'none'}")
         if child.tag in found - MANY:
             raise _unread(child, f"stands in {_label(element)} twice; allowed is one")
         found.add(child.tag)
@@ -253,11 +255,14 @@ def _of_geom(geom: Element, shape: np.ndarray) -> MassProperties:
 
 
 def _surface(geom: Element) -> Surface:
+    condim = _integer(geom, "condim", 3)
+    if condim not in (1, 3):
+        raise _error(geom, f"has condim {condim}; allowed are 1 and 3")
     return Surface(
         _label(geom),
         geom.line,
         _integer(geom, "contype", 1),
         _integer(geom, "conaffinity", 1),
-        _integer(geom, "condim", 3),
+        condim,
         float(_numbers(geom, "friction", 3, FRICTION, least=1)[0]),
     )
