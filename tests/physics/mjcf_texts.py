@@ -57,6 +57,7 @@ READ = {
     "priority": model(box(), world=floor('friction=".2" priority="1"')),
     "condim by priority": model(box('condim="3"'), world=floor('condim="1" priority="2"')),
     "condim": model(box('condim="1"'), world=floor('condim="1"')),
+    "friction of none": model(box('friction="0"'), world=floor('friction="0"')),
     "friction of boxes": model(box('friction=".3"'), box('friction=".8"'), world=floor('friction=".8"')),
     "masks": model(box('contype="1" conaffinity="2"'), box('contype="2" conaffinity="1"')),
     "masks of walls": model(*[box('conaffinity="0"')] * 2, world=floor()),

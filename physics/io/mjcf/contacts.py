@@ -49,7 +49,9 @@ class Surface:
     geom: int = -1
 
 
-Friction_of = Callable[[Surface, Surface], "float | None"]
+LEAST_FRICTION = 1e-5  # MuJoCo's; a smaller coefficient counts as this
+
+FrictionOf = Callable[[Surface, Surface], "float | None"]
 
 
 class _Met(NamedTuple):
@@ -69,10 +71,10 @@ def dynamic_friction(a: Surface, b: Surface) -> float | None:
     deciding = [surface for surface in (a, b) if surface.priority == highest]
     if max(surface.condim for surface in deciding) == 1:
         return 0.0
-    return max(surface.friction for surface in deciding)
+    return max(LEAST_FRICTION, *(surface.friction for surface in deciding))
 
 
-def touched(surface: Surface, others: Iterable[Surface], friction_of: Friction_of = dynamic_friction) -> bool:
+def touched(surface: Surface, others: Iterable[Surface], friction_of: FrictionOf = dynamic_friction) -> bool:
     """True if any of the others touches the surface."""
     return any(friction_of(surface, other) is not None for other in others)
 
@@ -81,7 +83,7 @@ def contact_effects(
     bodies: Sequence[Surface],
     planes: Sequence[Surface],
     left: LeftOut,
-    friction_of: Friction_of = dynamic_friction,
+    friction_of: FrictionOf = dynamic_friction,
 ) -> list[Any]:
     """Contact and friction of a scene.
 

@@ -46,8 +46,8 @@ def absent(model: Model) -> Iterator[ModelError]:
 
 
 def _is_passive_off(model: Model) -> bool:
-    """True if all passive forces are disabled: MuJoCo leaves them out where springs and dampers are both off."""
-    return model.disables("SPRING") and model.disables("DAMPER")
+    """True if all passive forces are disabled: by a flag of older versions, or where springs and dampers both are."""
+    return model.disables("PASSIVE") or (model.disables("SPRING") and model.disables("DAMPER"))
 
 
 def _option_error(model: Model, tag: str, key: str, message: str) -> ModelError:
@@ -79,7 +79,7 @@ def damping(model: Model, free: list[FreeBody], left: LeftOut) -> list[Any]:
     """Drag that is linear in the velocity, where it is that of the damping of all free joints."""
     m = model.data
     found = {each.joint: _damping(model, each.joint) for each in free}
-    if model.disables("DAMPER") or not any(map(np.any, found.values())):
+    if model.disables("DAMPER", "PASSIVE") or not any(map(np.any, found.values())):
         return []
     first = next(iter(found.values()))
     is_same = all(np.array_equal(each, first) for each in found.values())
@@ -106,8 +106,10 @@ def joint_faults(model: Model, free: list[FreeBody]) -> Iterator[ModelError]:
     tables = {
         "armature": m.dof_armature,
         "frictionloss": None if model.disables("FRICTIONLOSS", "CONSTRAINT") else m.dof_frictionloss,
-        "stiffness": None if model.disables("SPRING") else m.jnt_stiffness,
-        "stiffness of higher order": None if model.disables("SPRING") else model.value("jnt_stiffnesspoly", None),
+        "stiffness": None if model.disables("SPRING", "PASSIVE") else m.jnt_stiffness,
+        "stiffness of higher order": None
+        if model.disables("SPRING", "PASSIVE")
+        else model.value("jnt_stiffnesspoly", None),
     }
     for each in free:
         for name, table in tables.items():

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Iterator
 
 import numpy as np
 
-from physics.io.mjcf.contacts import Surface, dynamic_friction
+from physics.io.mjcf.contacts import LEAST_FRICTION, Surface, dynamic_friction
 from physics.io.mjcf.model import Model
 from physics.io.mjcf.text import ModelError
 
@@ -62,7 +62,8 @@ class Touching:
         m = self._model.data
         if m.pair_dim[pair] == 1:
             return 0.0
-        return float(m.opt.o_friction[0] if self._overrides else m.pair_friction[pair, 0])
+        friction = m.opt.o_friction[0] if self._overrides else m.pair_friction[pair, 0]
+        return max(LEAST_FRICTION, float(friction))
 
     def _pair(self, a: Surface, b: Surface) -> int | None:
         return self._pairs.get(frozenset((a.geom, b.geom))) if a.geom >= 0 and b.geom >= 0 else None

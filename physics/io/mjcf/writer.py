@@ -87,9 +87,9 @@ def _text(numbers) -> str:
 
 
 def _surface(scene: Scene) -> dict[str, str]:
-    """Friction of all geoms: MuJoCo takes the larger of two, and condim 1 has none."""
+    """Friction of all geoms: MuJoCo takes the larger of two, and condim 1 has none; 0 would count as 1e-5."""
     friction = scene.effect(Friction)
-    if friction is None or friction.axis is not None:
+    if friction is None or friction.axis is not None or friction.coefficient == 0:
         return {"condim": "1"}
     return {"condim": "3", "friction": _text((friction.coefficient, 0, 0))}
 
