@@ -10,7 +10,7 @@ import physics
 from benchmarks import mjcf_files
 from tests.physics.mjcf_texts import HINGE, READ, box, floor, model
 
-pytest.importorskip("mujoco")
+pytest.importorskip("mujoco", minversion="3.3.7")
 
 FILES = {
     "a/read.xml": READ["keyframe"],

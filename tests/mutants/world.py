@@ -79,6 +79,22 @@ IO = [
         "test_mjcf.py::test_a_scene_comes_back",
     ),
     _mutant(
+        "io-friction",
+        "Of two geoms in MJCF the smaller friction counts.",
+        "io/mjcf/contacts.py",
+        "return max(LEAST_FRICTION, *(surface.friction for surface in deciding))",
+        "return min(surface.friction for surface in deciding)",
+        "test_mjcf_plain.py::test_one_box_on_a_plane_of_another_friction_has_the_larger_one",
+    ),
+    _mutant(
+        "io-fixed-mass",
+        "Mass that is fixed to a free body in MJCF is at the body's origin.",
+        "io/mjcf/compiled_bodies.py",
+        "return model.frames[b].pos, model.frames[b].R",
+        "return 0.0 * model.frames[b].pos, model.frames[b].R",
+        "test_mjcf_compiled.py::test_a_text_gives_the_scene_that_mujoco_simulates",
+    ),
+    _mutant(
         "io-wrench",
         "A recorder keeps the array of wrenches itself instead of a copy.",
         "io/recorder.py",

@@ -19,5 +19,5 @@ def reader(request):
     if request.param == "plain":
         request.getfixturevalue("without_mujoco")
     else:
-        pytest.importorskip("mujoco")
+        pytest.importorskip("mujoco", minversion="3.3.7")
     return request.param

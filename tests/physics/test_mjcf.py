@@ -161,13 +161,15 @@ def test_a_spring_between_bodies_pulls_in_mujoco_as_it_does_here():
 
 
 MOMENT = st.floats(0.1, 10.0)
-COORDINATE = st.floats(-100.0, 100.0)
+COORDINATE = st.floats(-100.0, 100.0, allow_subnormal=False)
 
 
 @st.composite
 def quaternions(draw):
-    """Of norm 1 to rounding."""
-    q = np.array(draw(st.tuples(*[st.floats(-1, 1)] * 4).filter(lambda q: np.linalg.norm(q) > 0.1)))
+    """Unit quaternions, to rounding."""
+    q = np.array(
+        draw(st.tuples(*[st.floats(-1, 1, allow_subnormal=False)] * 4).filter(lambda q: np.linalg.norm(q) > 0.1))
+    )
     return tuple((q / np.linalg.norm(q)).tolist())
 
 
@@ -203,7 +205,7 @@ def drawn_scenes(draw):
     between = draw(st.booleans())
     if draw(st.booleans()) and (walls or (between and len(some) > 1)):
         effects.append(physics.Contact(between_bodies=between))
-        mu = draw(st.floats(0.0, 2.0))
+        mu = draw(st.floats(0.0, 2.0, allow_subnormal=False))
         effects += [physics.Friction(mu)] if mu else []
     return physics.Scene(some, walls, effects)
 

@@ -10,7 +10,7 @@ import pytest
 import physics
 from physics.io.mjcf.files import from_mjcf, read_mjcf
 
-mujoco = pytest.importorskip("mujoco")
+mujoco = pytest.importorskip("mujoco", minversion="3.3.7")
 from tests.physics.mjcf_texts import READ, REFUSED, box, floor, model  # noqa: E402 - after the skip
 from tests.reference import mujoco_model  # noqa: E402 - it imports mujoco
 

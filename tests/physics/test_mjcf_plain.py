@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import re
+import sys
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
@@ -11,7 +15,7 @@ from tests.physics.mjcf_texts import READ, REFUSED, box, floor, model, of
 
 pytestmark = pytest.mark.usefixtures("without_mujoco")
 
-MORE = "load_mjcf reads more where MuJoCo is installed: pip install mujoco"
+MORE = 'load_mjcf reads more where MuJoCo is installed: pip install "mujoco>=3.3.7"'
 EPS = np.finfo(float).eps
 
 
@@ -155,6 +159,12 @@ def test_what_is_wrong_is_named_with_its_value_and_line(name):
 def test_the_switch_needs_mujoco(tmp_path):
     path = tmp_path / "model.xml"
     path.write_text(READ["masks"], encoding="utf-8")
-    with pytest.raises(ModuleNotFoundError, match="drop=True needs MuJoCo, which is not installed: pip install mujoco"):
+    with pytest.raises(ModuleNotFoundError, match="drop=True needs MuJoCo 3.3.7 or newer, which is not installed"):
         physics.load_mjcf(path, drop=True)
     assert len(physics.load_mjcf(path).bodies) == 2
+
+
+def test_an_old_mujoco_is_as_good_as_none(monkeypatch):
+    monkeypatch.setitem(sys.modules, "mujoco", SimpleNamespace(__version__="3.2.10"))
+    with pytest.raises(ValueError, match=re.escape(MORE)):
+        from_mjcf(READ["euler"])

@@ -10,8 +10,10 @@ from physics.io.mjcf import compiled_reader, plain_reader
 from physics.io.mjcf.left_out import LeftOut
 from physics.io.mjcf.text import ModelError, parse
 from physics.io.mjcf.writer import to_mjcf
-from physics.optional import find_optional, load_optional
+from physics.optional import find_optional, missing
 from physics.scene.scene import Scene
+
+LEAST_MUJOCO = (3, 3, 7)  # version whose `MjSpec` numbers its elements
 
 
 def save_mjcf(scene: Scene, path: str | Path, drop: bool = False) -> None:
@@ -84,7 +86,9 @@ def from_mjcf(text: str, source: str = "model") -> Scene:
 
 def read_mjcf(text: str, source: str, drop: bool = False, path: Path | None = None) -> tuple[Scene, list[str]]:
     """Scene of a text, and what was left out; files that the model names are looked for beside `path`."""
-    mujoco = load_optional("mujoco", "load_mjcf with drop=True") if drop else find_optional("mujoco")
+    mujoco = find_optional("mujoco", LEAST_MUJOCO)
+    if drop and mujoco is None:
+        raise missing("mujoco", "load_mjcf with drop=True")
     left = LeftOut(drop)
     try:
         root = parse(text)
