@@ -159,7 +159,7 @@ def test_what_is_wrong_is_named_with_its_value_and_line(name):
 def test_the_switch_needs_mujoco(tmp_path):
     path = tmp_path / "model.xml"
     path.write_text(READ["masks"], encoding="utf-8")
-    with pytest.raises(ModuleNotFoundError, match="drop=True needs MuJoCo 3.3.7 or newer, which is not installed"):
+    with pytest.raises(ModuleNotFoundError, match=r"drop=True needs MuJoCo 3\.3\.7 or newer, which is not installed"):
         physics.load_mjcf(path, drop=True)
     assert len(physics.load_mjcf(path).bodies) == 2
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterator
 from typing import NamedTuple
 
@@ -58,18 +59,19 @@ def free_bodies(model: Model, touching: Touching, left: LeftOut) -> list[FreeBod
 
 def parts_of(model: Model, root: int) -> list[int]:
     """The body of a free joint, and all that are fixed to it."""
-    return [b for b in range(model.data.nbody) if model.data.body_weldid[b] == root]
+    return np.flatnonzero(model.data.body_weldid == root).tolist()
 
 
 def _free_roots(model: Model, left: LeftOut) -> Iterator[int]:
     """Bodies with a free joint and no other joint in their tree; the other joints are left out."""
     m = model.data
     kinds = [model.kind("mjtJoint", "mjJNT_", kind) for kind in m.jnt_type]
-    trees = [int(m.body_rootid[body]) for body in m.jnt_bodyid]
+    trees = m.body_rootid[m.jnt_bodyid].tolist()
+    number = Counter(trees)
     for j, kind in enumerate(kinds):
         if kind != "free":
             left.add(model.error("joint", j, f"is a {kind}; allowed is one free joint, and no other in its tree"))
-        elif trees.count(trees[j]) == 1:
+        elif number[trees[j]] == 1:
             yield int(m.jnt_bodyid[j])
 
 
@@ -113,7 +115,7 @@ def _start(model: Model, joint: int) -> tuple[np.ndarray, np.ndarray]:
 def _shape(model: Model, touching: Touching, root: int, parts: list[int]) -> int:
     """The one geom of a body that can touch others, or the one that it has."""
     m = model.data
-    geoms = [g for g in range(m.ngeom) if m.geom_bodyid[g] in parts]
+    geoms = np.flatnonzero(np.isin(m.geom_bodyid, parts)).tolist()
     able = [g for g in geoms if touching.may_touch(g)]
     if len(able or geoms) != 1:
         which = "geoms that can touch others" if able else "geoms"

@@ -14,23 +14,16 @@ from physics.io.mjcf.text import Element, ModelError
 from physics.scene.effects import Gravity
 from physics.scene.force_fields import AngularDrag, Drag
 
-# Kinds of elements that a scene has no counterpart of: kind, attribute with their number, what they are.
-ABSENT = (
-    ("tendon", "ntendon", "tendons"),
-    ("actuator", "nactuator", "actuators"),
-    ("actuator", "nu", "actuators"),
-    ("flex", "nflex", "deformable bodies"),
-)
+ABSENT = {"tendon": "tendons", "actuator": "actuators", "flex": "deformable bodies"}
 
 
 def absent(model: Model) -> Iterator[ModelError]:
     """Elements that have no counterpart in a scene."""
     m = model.data
-    seen = set()
-    for kind, number, name in ABSENT:
-        for k in range(model.value(number, 0) if kind not in seen else 0):
-            seen.add(kind)
-            yield model.error(kind, k, f"has no counterpart; a scene has no {name}")
+    numbers = {"tendon": m.ntendon, "actuator": model.value("nactuator", m.nu), "flex": m.nflex}
+    for kind, number in numbers.items():
+        for k in range(number):
+            yield model.error(kind, k, f"has no counterpart; a scene has no {ABSENT[kind]}")
     for k in range(m.neq):
         if m.eq_active0[k] and not model.disables("EQUALITY", "CONSTRAINT"):
             yield model.error("equality", k, "has no counterpart; a scene has no equality constraints")

@@ -26,5 +26,5 @@ class LeftOut:
     def add(self, error: ModelError) -> None:
         """Raise the error, or list it."""
         if not self.drop:
-            raise error
+            raise ModelError(f"{error}; load_mjcf(path, drop=True) reads the rest", error.line)
         self.messages.append(f"{error.place}: {error}" if error.place else str(error))

@@ -87,7 +87,7 @@ class Model:
         """True if the body, or the one that it is fixed to, has a joint."""
         return bool(self.data.body_dofnum[self.data.body_weldid[b]] > 0)
 
-    def value(self, name: str, default: Any = 0.0) -> Any:
+    def value(self, name: str, default: Any) -> Any:
         """An array of the model; the default where this version of MuJoCo has none."""
         return getattr(self.data, name, default)
 
@@ -183,12 +183,16 @@ def _refusal(message: str, root: Element) -> ModelError:
 
 @contextlib.contextmanager
 def _told_warnings(mujoco: ModuleType) -> Iterator[None]:
-    """Let MuJoCo warn in Python instead of in a file of its own, which it makes in the working folder."""
+    """Let MuJoCo warn once in Python, and not in a file of its own, which it makes in the working folder."""
     before, told = mujoco.get_mju_user_warning(), []
     mujoco.set_mju_user_warning(told.append)
     try:
-        yield
+        with warnings.catch_warnings(record=True) as caught:
+            warnings.simplefilter("always")
+            yield
     finally:
         mujoco.set_mju_user_warning(before)
-    for message in told:
-        warnings.warn(message, stacklevel=2)
+    longer = [str(warning.message) for warning in caught]
+    shorter = [message for message in told if not any(text.startswith(message) for text in longer)]
+    for message in dict.fromkeys(longer + shorter):
+        warnings.warn(message, stacklevel=7)  # the call of `load_mjcf`
