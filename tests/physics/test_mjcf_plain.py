@@ -156,6 +156,12 @@ def test_what_is_wrong_is_named_with_its_value_and_line(name):
     assert words in str(told.value)
 
 
+def test_what_no_scene_has_is_refused_without_a_hint_at_mujoco():
+    with pytest.raises(ValueError, match=r"^here, line 7: <tendon> in <mujoco> has no counterpart in a scene") as told:
+        from_mjcf(REFUSED["tendon"][0], "here")
+    assert MORE not in str(told.value)
+
+
 def test_the_switch_needs_mujoco(tmp_path):
     path = tmp_path / "model.xml"
     path.write_text(READ["masks"], encoding="utf-8")

@@ -55,6 +55,7 @@ HARMLESS_ELEMENTS = {
     "visual",
 }
 HARMLESS_ATTRIBUTES = {"group", "material", "rgba"}
+ABSENT = {"actuator", "deformable", "equality", "tendon"}  # MuJoCo reads them, and a scene has no counterpart
 MANY = {"body", "geom", "joint", "key", "mesh"}  # elements of which there may be several in another one
 
 
@@ -112,6 +113,8 @@ def _check(element: Element) -> None:
     for child in element:
         if child.tag in HARMLESS_ELEMENTS:
             continue
+        if child.tag in ABSENT:
+            raise _error(child, f"in {_label(element)} has no counterpart in a scene; allowed is a model without it")
         if child.tag not in children:
             raise _unread(child, f"in {_label(element)} is not read; allowed are {', '.join(children) or 'none'}")
         if child.tag in found - MANY:
