@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 from pathlib import Path
 
 import numpy as np
@@ -9,6 +10,8 @@ import pytest
 
 import physics
 from physics.io.mjcf.files import from_mjcf, read_mjcf
+from physics.io.mjcf.model import compile_model
+from physics.io.mjcf.text import parse
 
 mujoco = pytest.importorskip("mujoco", minversion="3.3.7")
 from tests.physics.mjcf_texts import READ, REFUSED, box, floor, model  # noqa: E402 - after the skip
@@ -169,3 +172,12 @@ def test_mujoco_warns_in_python_and_writes_no_file(tmp_path, monkeypatch):
         assert len(physics.load_mjcf("model.xml").bodies) == 2
     assert mujoco.get_mju_user_warning() is before
     assert sorted(path.name for path in tmp_path.iterdir()) == ["child.xml", "model.xml"]
+
+
+def test_names_and_lines_outlive_what_mujoco_has_read():
+    """Older versions free the elements of a specification with it: reading one then ends the process."""
+    text = READ["keyframe"]
+    read = compile_model(mujoco, text, parse(text), None)
+    gc.collect()
+    assert read.line("geom", 0) == 4
+    assert read.spec("geom", 0).type == mujoco.mjtGeom.mjGEOM_PLANE

@@ -21,8 +21,9 @@ from physics.scene.bodies import Body
 SHAPES = ("box", "sphere", "ellipsoid", "mesh")
 TURNED = ("box", "ellipsoid")  # their axes are the body's in a scene
 
-# MuJoCo finds principal axes by an iteration: a tensor that is the file's to this share is the file's.
-DIAGONALISED = 1e-9
+# MuJoCo finds principal axes by an iteration, older versions to 2e-7: a tensor that is the file's to this share is the
+# file's.
+DIAGONALISED = 1e-6
 # It keeps the corners of a mesh in single precision: points of the file that are this near, by size, are the same.
 SINGLE = 1e-6
 

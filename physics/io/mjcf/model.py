@@ -69,6 +69,7 @@ class Model:
 
     def __init__(self, mujoco: ModuleType, spec: Any, root: Element):
         self._mujoco, self.root = mujoco, root
+        self._spec = spec  # older versions free its elements with it
         self.data = spec.compile()
         self._found = {kind: {e.id: e for e in getattr(spec, name, [])} for kind, name in LISTS.items()}
         m = self.data
