@@ -15,7 +15,7 @@ from physics.analysis.diagnostics import Diagnostics, diagnose, look_at
 from physics.analysis.events import Event
 from physics.analysis.simulate import simulate
 from physics.analysis.trajectory import Trajectory
-from physics.io.mjcf import load_mjcf, save_mjcf
+from physics.io.mjcf.files import load_mjcf, save_mjcf
 from physics.io.recorder import Recorder
 from physics.io.recording import Recording, Replay
 from physics.io.toml import load_scene, save_scene

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import re
 from importlib import import_module
 from types import ModuleType
 
 # Name of a package as people write it, and the line that installs it.
 INSTALLED_BY = {
     "matplotlib": ("matplotlib", 'pip install "rigid-env[plot]"'),
+    "mujoco": ("MuJoCo 3.3.7 or newer", 'pip install "mujoco>=3.3.7"'),
     "pandas": ("pandas", "pip install pandas"),
 }
 
@@ -30,6 +32,23 @@ def load_optional(module: str, purpose: str) -> ModuleType:
     try:
         return import_module(module)
     except ModuleNotFoundError:
-        package = module.partition(".")[0]
-        name, line = INSTALLED_BY[package]
-        raise ModuleNotFoundError(f"{purpose} needs {name}, which is not installed: {line}", name=package) from None
+        raise missing(module, purpose) from None
+
+
+def missing(module: str, purpose: str) -> ModuleNotFoundError:
+    """Error that names an optional package, and the line that installs it; arguments as of `load_optional`."""
+    package = module.partition(".")[0]
+    name, line = INSTALLED_BY[package]
+    return ModuleNotFoundError(f"{purpose} needs {name}, which is not installed: {line}", name=package)
+
+
+def find_optional(module: str, least: tuple[int, ...] = ()) -> ModuleType | None:
+    """Module of an optional package, or None where the package is not installed or older than the version `least`."""
+    try:
+        found = import_module(module)
+    except ModuleNotFoundError as error:
+        if error.name != module.partition(".")[0]:  # it is installed, and lacks another one
+            raise
+        return None
+    version = getattr(found, "__version__", "")
+    return found if tuple(map(int, re.findall(r"\d+", version)[:3])) >= least else None

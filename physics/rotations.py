@@ -1,4 +1,4 @@
-"""Rotations of many samples at once, in NumPy."""
+"""Rotations in NumPy, outside of kernels."""
 
 from __future__ import annotations
 
@@ -14,3 +14,9 @@ def rotation_matrices(quat: np.ndarray) -> np.ndarray:
         (2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)),
     )
     return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
+
+
+def product(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """Quaternion (4,) of the rotation `b` (4,), then `a` (4,)."""
+    vector = a[0] * b[1:] + b[0] * a[1:] + np.cross(a[1:], b[1:])
+    return np.concatenate(([a[0] * b[0] - a[1:] @ b[1:]], vector))

@@ -37,7 +37,9 @@ Accuracy = Annotated[
 SceneArgument = Annotated[
     str,
     typer.Argument(
-        metavar="SCENE", help="A canonical scene, or a scene file (.toml or .xml).", autocompletion=names.complete_scene
+        metavar="SCENE",
+        help="A canonical scene, or a scene file (.toml, .xml or .urdf).",
+        autocompletion=names.complete_scene,
     ),
 ]
 

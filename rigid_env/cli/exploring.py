@@ -27,7 +27,9 @@ Dt = Annotated[float, typer.Option("--dt", help="Step, and time between samples 
 def demo(
     scene: Annotated[
         str,
-        typer.Argument(help="A canonical scene, or a scene file (.toml or .xml).", autocompletion=names.complete_scene),
+        typer.Argument(
+            help="A canonical scene, or a scene file (.toml, .xml or .urdf).", autocompletion=names.complete_scene
+        ),
     ] = "drop",
     duration: Duration = 5.0,
     accuracy: Accuracy = "balanced",

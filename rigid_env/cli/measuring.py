@@ -109,7 +109,7 @@ def accuracy(
     scene: Annotated[
         list[str] | None,
         typer.Argument(
-            help="Scenes, also of files (.toml or .xml); none: all with a known outcome.",
+            help="Scenes, also of files (.toml, .xml or .urdf); none: all with a known outcome.",
             autocompletion=names.complete_truth,
         ),
     ] = None,

@@ -11,7 +11,7 @@ import typer
 if TYPE_CHECKING:
     from physics import Scene
 
-SCENE_FILES = (".toml", ".xml")  # as of `rigid_env.tasks.scene_source`, which takes long to import
+SCENE_FILES = (".toml", ".xml", ".urdf")  # as of `rigid_env.tasks.scene_source`, which takes long to import
 CANONICAL = (
     "drop", "flight", "tumble", "rest", "shove", "corner_drop", "slide", "bounce", "rolling_sphere", "vertex_drop",
     "closed_box", "tower", "heap", "football", "incline",

@@ -13,8 +13,8 @@ from rigid_env.cli.files import make_parents, output_option
 from rigid_env.terminal import make_console, say
 
 WHAT = (
-    "A canonical scene, a scene file (.toml or .xml), the id of an environment, module:Class of a task, a recording or "
-    "a trajectory (.npz)."
+    "A canonical scene, a scene file (.toml, .xml or .urdf), the id of an environment, module:Class of a task, a "
+    "recording or a trajectory (.npz)."
 )
 
 POLICY = (

@@ -118,7 +118,7 @@ class SceneEnv(RigidEnv[NDArray[Any]]):
 
     | Argument | Default | Meaning |
     | --- | --- | --- |
-    | `scene` | None | scene file (.toml or .xml), name of a canonical scene, or a `physics.Scene`; must be given |
+    | `scene` | None | scene file (.toml, .xml, .urdf), name of a canonical scene, or `physics.Scene`; must be given |
     | `driven` | None | names or indices of driven bodies; with one body in the scene that one |
     | `force` | None | longest force over the body's weight (0.9) |
     | `torque` | None | longest torque over weight times reach (0.5) |

@@ -8,16 +8,19 @@ from typing import NamedTuple
 
 import physics
 from physics import scenes
-from physics.io.mjcf import load_mjcf
+from physics.io.mjcf.files import load_mjcf
 from physics.io.toml import SceneFile, load_file
 from physics.keywords import nearest_first
 from physics.summary import shown
 
-MJCF_FILE = ".xml"
-"""Ending of files in MJCF, the format of MuJoCo."""
+MJCF_FILES = (".xml", ".urdf")
+"""Endings of files in MJCF, the format of MuJoCo, and in URDF, which MuJoCo reads, too."""
 
-SCENE_FILES = (".toml", MJCF_FILE)
+SCENE_FILES = (".toml", *MJCF_FILES)
 """Endings of files that hold a scene."""
+
+ENDINGS = f"{', '.join(SCENE_FILES[:-1])} or {SCENE_FILES[-1]}"
+"""The same in words."""
 
 
 class Found(NamedTuple):
@@ -29,7 +32,7 @@ class Found(NamedTuple):
         Short, for titles.
     scene : physics.Scene
     file : SceneFile or None
-        None: the scene is no file's, or that of a file in MJCF, which holds nothing else.
+        None: the scene is no file's, or that of a file in MJCF or URDF, which holds nothing else.
     """
 
     name: str
@@ -47,7 +50,7 @@ def find_scene(scene: physics.Scene | str | os.PathLike) -> Found:
     """
     if isinstance(scene, physics.Scene):
         return Found("Scene", scene, None)
-    allowed = f"a scene file ({' or '.join(SCENE_FILES)})"
+    allowed = f"a scene file ({ENDINGS})"
     if not isinstance(scene, (str, os.PathLike)) or not os.fspath(scene):
         raise ValueError(f"scene is {shown(scene)}; allowed are {allowed}, a canonical scene, or a physics.Scene")
     name = os.fspath(scene)
@@ -56,7 +59,7 @@ def find_scene(scene: physics.Scene | str | os.PathLike) -> Found:
         if not path.is_file():
             what = "is a folder" if path.is_dir() else "does not exist"
             raise ValueError(f"scene is {name!r}, which {what}; allowed is a scene file, or a canonical scene")
-        if path.suffix.lower() == MJCF_FILE:
+        if path.suffix.lower() in MJCF_FILES:
             return Found(path.stem, load_mjcf(path), None)
         file = load_file(path)
         return Found(path.stem, file.scene, file)

@@ -20,8 +20,8 @@ from rigid_env.viewer.worlds import live_scene, live_world
 ACCURACY, DT = "balanced", 0.01
 
 NAMES = (
-    "a canonical scene, a scene file (.toml or .xml), the id of an environment, 'module:Class' of a task, a recording "
-    "and a trajectory (.npz)"
+    "a canonical scene, a scene file (.toml, .xml or .urdf), the id of an environment, 'module:Class' of a task, a "
+    "recording and a trajectory (.npz)"
 )
 """Texts that name a subject: all that can be typed in a shell."""
 

@@ -129,7 +129,10 @@ def test_tables_that_are_none_are_told(tmp_path):
 
 BALL = physics.Scene([physics.Sphere(0.5, 1.0)])
 ARGUMENTS = {
-    "none": ({}, "scene is None; allowed are a scene file (.toml or .xml), a canonical scene, or a physics.Scene"),
+    "none": (
+        {},
+        "scene is None; allowed are a scene file (.toml, .xml or .urdf), a canonical scene, or a physics.Scene",
+    ),
     "name": ({"scene": "tumbel"}, "scene is 'tumbel'; allowed are tumble,"),
     "file": ({"scene": "nix.toml"}, "scene is 'nix.toml', which does not exist; allowed is a scene file"),
     "number": ({"scene": 3}, "scene is 3; allowed are a scene file"),

@@ -81,7 +81,7 @@ IO = [
     _mutant(
         "io-spin",
         "The spin of a body in MJCF is along the wrong axes.",
-        "io/mjcf.py",
+        "io/mjcf/writer.py",
         "rotation_matrices(np.array(body.quat)).T @ body.angvel",
         "rotation_matrices(np.array(body.quat)) @ body.angvel",
         "test_mjcf.py::test_a_scene_comes_back",
@@ -89,10 +89,26 @@ IO = [
     _mutant(
         "io-inertia",
         "Two products of inertia are exchanged in MJCF.",
-        "io/mjcf.py",
+        "io/mjcf/writer.py",
         "I[0, 1], I[0, 2], I[1, 2]",
         "I[0, 2], I[0, 1], I[1, 2]",
         "test_mjcf.py::test_a_scene_comes_back",
+    ),
+    _mutant(
+        "io-friction",
+        "Of two geoms in MJCF the smaller friction counts.",
+        "io/mjcf/contacts.py",
+        "return max(LEAST_FRICTION, *(surface.friction for surface in deciding))",
+        "return min(surface.friction for surface in deciding)",
+        "test_mjcf_plain.py::test_one_box_on_a_plane_of_another_friction_has_the_larger_one",
+    ),
+    _mutant(
+        "io-fixed-mass",
+        "Mass that is fixed to a free body in MJCF is at the body's origin.",
+        "io/mjcf/compiled_bodies.py",
+        "return model.frames[b].pos, model.frames[b].R",
+        "return 0.0 * model.frames[b].pos, model.frames[b].R",
+        "test_mjcf_compiled.py::test_a_text_gives_the_scene_that_mujoco_simulates",
     ),
     _mutant(
         "io-wrench",

@@ -14,7 +14,7 @@ from physics.work_precision.contender import OURS, Contender, EngineContender
 from physics.work_precision.run import REPEATS, STEPS
 from rigid_env.lab.measure import peers
 from rigid_env.lab.measure.truths import CASES, Case
-from rigid_env.tasks.scene_source import SCENE_FILES, find_scene
+from rigid_env.tasks.scene_source import ENDINGS, SCENE_FILES, find_scene
 
 # Peers are measured at smaller steps, too, at which they do better.
 PEER_STEPS = (*STEPS, 0.0005)  # [s]
@@ -168,7 +168,7 @@ def make_jobs(
     unknown = sorted(name for name in set(wanted) - set(names()) if not _is_file(name))
     if unknown:
         told = f"scene is {', '.join(map(repr, unknown))}; allowed are {', '.join(nearest_first(unknown[0], names()))}"
-        raise ValueError(f"{told}, or a scene file ({' or '.join(SCENE_FILES)})")
+        raise ValueError(f"{told}, or a scene file ({ENDINGS})")
     chosen = list(dict.fromkeys(wanted)) or [*(case.key for case in CASES), *OPEN]
     return [_make_job(name, engines or {}, ladder or Ladder(), duration) for name in chosen]
 

@@ -1,4 +1,4 @@
-"""Scenes as MJCF, MuJoCo's format: what it can express is written, free bodies and planes are read.
+"""From a scene to MJCF, as far as MuJoCo can express it.
 
 Frames: a body's frame here is at its centre of mass, so the exported bodies have `inertial pos="0 0 0"`. A free joint
 turns in the body's frame there, in the world's here; the start velocities stand in a keyframe `start`.
@@ -7,13 +7,10 @@ turns in the body's frame there, in the world's here; the start velocities stand
 from __future__ import annotations
 
 import xml.etree.ElementTree as ET
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from physics import validation
-from physics.io.mjcf_reader import read_scene, unnamed
 from physics.rotations import rotation_matrices
 from physics.scene.effects import Contact, Friction, Gravity
 from physics.scene.force_fields import Spring
@@ -23,66 +20,9 @@ GEOMS = {"block": "box", "sphere": "sphere", "ellipsoid": "ellipsoid", "hull": "
 KEYFRAME = "start"
 
 
-def save_mjcf(scene: Scene, path: str | Path, drop: bool = False) -> None:
-    """Write a scene for MuJoCo.
-
-    Bodies with mass, inertia, pose and velocity (hulls as meshes, which `load_mjcf` does not read), planes, gravity,
-    friction and springs. The contacts are MuJoCo's soft
-    ones with its defaults, its time step too.
-
-    Parameters
-    ----------
-    scene : Scene
-    path : str or Path
-    drop : bool
-        Leave out what MJCF cannot express instead of refusing; a comment in the file names it.
-
-    Raises
-    ------
-    ValueError
-        Naming the effects that MJCF cannot express, unless `drop`.
-    """
-    validation.instance(scene, Scene, "scene", "a physics.Scene")
-    validation.path(path)
-    Path(path).write_text(to_mjcf(scene, drop), encoding="utf-8")
-
-
-def load_mjcf(path: str | Path) -> Scene:
-    """Read a scene of free bodies and planes from MJCF.
-
-    Free bodies of one box, sphere or ellipsoid each in the world body, planes, gravity, one coefficient of friction,
-    and the velocities of the first keyframe.
-
-    Raises
-    ------
-    ValueError
-        Naming the element that a scene here cannot hold.
-    OSError
-        The file cannot be read.
-    """
-    validation.path(path)
-    try:
-        text = Path(path).read_text(encoding="utf-8")
-    except UnicodeDecodeError as error:
-        raise ValueError(f"{path}: byte {error.start} is no UTF-8; allowed is a text file in MJCF") from None
-    return from_mjcf(text, str(path))
-
-
-def from_mjcf(text: str, source: str = "model") -> Scene:
-    """The scene of an MJCF text; `source` is what messages call it."""
-    try:
-        return read_scene(ET.fromstring(text, ET.XMLParser(target=_WithoutDoctype())))
-    except ET.ParseError as error:
-        raise ValueError(f"{source}: {error}") from None
-    except ValueError as error:
-        raise ValueError(f"{source}: {error}") from None
-
-
-class _WithoutDoctype(ET.TreeBuilder):
-    """Refuses a document type, which declares entities: they could grow without bound, or name other files."""
-
-    def doctype(self, name: str, pubid: str | None, system: str | None) -> None:
-        raise ValueError(f"<!DOCTYPE {name}> is not read; allowed is MJCF without it")
+def unnamed(b: int) -> str:
+    """Name in MJCF of body `b` of a scene if it has none there."""
+    return f"body{b}"
 
 
 def to_mjcf(scene: Scene, drop: bool = False) -> str:
@@ -147,9 +87,9 @@ def _text(numbers) -> str:
 
 
 def _surface(scene: Scene) -> dict[str, str]:
-    """Friction of all geoms: MuJoCo takes the larger of two, and condim 1 has none."""
+    """Friction of all geoms: MuJoCo takes the larger of two, and condim 1 has none; 0 would count as 1e-5."""
     friction = scene.effect(Friction)
-    if friction is None or friction.axis is not None:
+    if friction is None or friction.axis is not None or friction.coefficient == 0:
         return {"condim": "1"}
     return {"condim": "3", "friction": _text((friction.coefficient, 0, 0))}
 

@@ -1,0 +1,1 @@
+"""Scenes as MJCF, the format of MuJoCo."""

@@ -1,0 +1,181 @@
+"""Free bodies of a compiled model: a body with a free joint, and all that is fixed to it."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator
+from typing import NamedTuple
+
+import numpy as np
+
+from physics.io.mjcf.left_out import LeftOut
+from physics.io.mjcf.model import Frame, Model
+from physics.io.mjcf.shapes import Placed, make_body
+from physics.io.mjcf.text import ModelError
+from physics.io.mjcf.touching import Touching
+from physics.io.mjcf.writer import unnamed
+from physics.mass.inertia import MassProperties, compose
+from physics.rotations import product, rotation_matrices
+from physics.scene.bodies import Body
+
+SHAPES = ("box", "sphere", "ellipsoid", "mesh")
+TURNED = ("box", "ellipsoid")  # their axes are the body's in a scene
+
+# MuJoCo finds principal axes by an iteration, older versions to 2e-7: a tensor that is the file's to this share is the
+# file's.
+DIAGONALISED = 1e-6
+# It keeps the corners of a mesh in single precision: points of the file that are this near, by size, are the same.
+SINGLE = 1e-6
+
+
+class FreeBody(NamedTuple):
+    """A body of the scene, and where it is in the model.
+
+    Attributes
+    ----------
+    body : Body
+    root, joint, geom : int
+        The model's body, its free joint, and the geom that is its shape.
+    is_centred : bool
+        The joint is at the centre of mass.
+    """
+
+    body: Body
+    root: int
+    joint: int
+    geom: int
+    is_centred: bool
+
+
+def free_bodies(model: Model, touching: Touching, left: LeftOut) -> list[FreeBody]:
+    """All free bodies that a scene can hold, in their order."""
+    found = []
+    for number, root in enumerate(_free_roots(model, left)):
+        try:
+            found.append(_free_body(model, touching, root, number))
+        except ModelError as error:
+            left.add(error)
+    return found
+
+
+def parts_of(model: Model, root: int) -> list[int]:
+    """The body of a free joint, and all that are fixed to it."""
+    return np.flatnonzero(model.data.body_weldid == root).tolist()
+
+
+def _free_roots(model: Model, left: LeftOut) -> Iterator[int]:
+    """Bodies with a free joint and no other joint in their tree; the other joints are left out."""
+    m = model.data
+    kinds = [model.kind("mjtJoint", "mjJNT_", kind) for kind in m.jnt_type]
+    trees = m.body_rootid[m.jnt_bodyid].tolist()
+    number = Counter(trees)
+    for j, kind in enumerate(kinds):
+        if kind != "free":
+            left.add(model.error("joint", j, f"is a {kind}; allowed is one free joint, and no other in its tree"))
+        elif number[trees[j]] == 1:
+            yield int(m.jnt_bodyid[j])
+
+
+def _free_body(model: Model, touching: Touching, root: int, number: int) -> FreeBody:
+    m = model.data
+    parts = parts_of(model, root)
+    geom, mass = _shape(model, touching, root, parts), _mass_properties(model, parts)
+    kind = model.kind("mjtGeom", "mjGEOM_", m.geom_type[geom])
+    if kind not in SHAPES:
+        raise model.error("geom", geom, f"is a {kind}; allowed of a free body are {', '.join(SHAPES)}")
+    frame, joint = model.geom_frames[geom], int(m.body_jntadr[root])
+    pose, velocity = _start(model, joint)
+    axes = frame.quat if kind in TURNED else np.array([1.0, 0.0, 0.0, 0.0])
+    T = rotation_matrices(axes).T  # from the axes of the model's body to those of the scene's
+    if kind == "mesh":
+        placed = Placed(kind, _points(model, geom), np.zeros(3), mass)
+    else:
+        placed = Placed(kind, _half_axes(kind, m.geom_size[geom]), T @ frame.pos, mass.placed(R=T))
+    name = model.name("body", root)
+    try:
+        body = make_body(
+            placed,
+            np.concatenate((pose[:3], product(pose[3:], axes))),
+            np.concatenate((velocity[:3], T @ velocity[3:])),
+            None if name in ("", unnamed(number)) else name,
+        )
+    except ValueError as error:
+        raise model.error("body", root, f"in a scene: {error}") from None
+    return FreeBody(body, root, joint, geom, not mass.centre.any())
+
+
+def _start(model: Model, joint: int) -> tuple[np.ndarray, np.ndarray]:
+    """Pose (7,) and velocity (6,) of the first keyframe; without one the pose of the model, at rest."""
+    m = model.data
+    q, v = int(m.jnt_qposadr[joint]), int(m.jnt_dofadr[joint])
+    if m.nkey:
+        return np.array(m.key_qpos[0, q : q + 7]), np.array(m.key_qvel[0, v : v + 6])
+    return np.array(m.qpos0[q : q + 7]), np.zeros(6)
+
+
+def _shape(model: Model, touching: Touching, root: int, parts: list[int]) -> int:
+    """The one geom of a body that can touch others, or the one that it has."""
+    m = model.data
+    geoms = np.flatnonzero(np.isin(m.geom_bodyid, parts)).tolist()
+    able = [g for g in geoms if touching.may_touch(g)]
+    if len(able or geoms) != 1:
+        which = "geoms that can touch others" if able else "geoms"
+        raise model.error("body", root, f"has {len(able or geoms)} {which}, with all that is fixed to it; allowed is 1")
+    return (able or geoms)[0]
+
+
+def _mass_properties(model: Model, parts: list[int]) -> MassProperties:
+    """Mass, centre of mass and inertia of parts in the frame of their joint."""
+    m = model.data
+    found = [
+        MassProperties(m.body_mass[b], m.body_ipos[b], _tensor(model, b)).placed(*_placing(model, b))
+        for b in parts
+        if m.body_mass[b] > 0
+    ]
+    return found[0] if len(found) == 1 else compose(found)
+
+
+def _placing(model: Model, b: int) -> tuple[np.ndarray, np.ndarray]:
+    return model.frames[b].pos, model.frames[b].R
+
+
+def _tensor(model: Model, b: int) -> np.ndarray:
+    """(3, 3) inertia about the centre of mass in the body's frame; the file's own digits, where it states them."""
+    m, spec = model.data, model.spec("body", b)
+    R = rotation_matrices(m.body_iquat[b])
+    compiled = R @ np.diag(m.body_inertia[b]) @ R.T
+    if spec is not None and spec.explicitinertial and np.isfinite(spec.fullinertia).all():
+        xx, yy, zz, xy, xz, yz = spec.fullinertia
+        stated = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+        if np.abs(stated - compiled).max() <= DIAGONALISED * np.abs(compiled).max():
+            return stated
+    return compiled
+
+
+def _half_axes(kind: str, size: np.ndarray) -> np.ndarray:
+    """Half edges, semi-axes, or the radius three times [m]."""
+    return np.full(3, size[0]) if kind == "sphere" else np.array(size)
+
+
+def _points(model: Model, geom: int) -> np.ndarray:
+    """(n, 3) corners of the convex hull of a mesh in the body's frame [m]; the file's own digits, where it has them."""
+    m, mesh, frame = model.data, int(model.data.geom_dataid[geom]), model.geom_frames[geom]
+    corners, stated = _corners(model, mesh), model.stated_points(mesh)
+    if stated is not None:
+        # MuJoCo turns a mesh to its principal axes, in single precision.
+        turned = Frame(m.mesh_pos[mesh], m.mesh_quat[mesh])
+        distances = np.linalg.norm(stated[:, None] - (turned.pos + corners @ turned.R.T), axis=2)
+        if distances.min(axis=0).max() <= SINGLE * np.abs(stated).max():
+            frame, corners = frame @ turned.inverse, stated[distances.argmin(axis=0)]
+    return frame.pos + corners @ frame.R.T
+
+
+def _corners(model: Model, mesh: int) -> np.ndarray:
+    """(n, 3) corners of the convex hull of a mesh in its own frame, as MuJoCo keeps it; else all its points."""
+    m, start, graph = model.data, int(model.data.mesh_vertadr[mesh]), int(model.data.mesh_graphadr[mesh])
+    points = m.mesh_vert[start : start + int(m.mesh_vertnum[mesh])].astype(float)
+    if graph < 0:
+        return points
+    # The graph of a hull: numbers of corners and of faces, an address for each corner, and the corners themselves.
+    number = int(m.mesh_graph[graph])
+    return points[m.mesh_graph[graph + 2 + number : graph + 2 + 2 * number]]

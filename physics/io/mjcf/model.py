@@ -1,0 +1,199 @@
+"""A model that MuJoCo has compiled: names, lines and frames of its elements."""
+
+from __future__ import annotations
+
+import contextlib
+import re
+import warnings
+from collections.abc import Iterator
+from pathlib import Path
+from types import ModuleType
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from physics.io.mjcf.text import Element, ModelError, label
+from physics.rotations import product, rotation_matrices
+
+# Lists of `mujoco.MjSpec` that hold the elements of a kind.
+LISTS = {
+    "actuator": "actuators", "body": "bodies", "equality": "equalities", "flex": "flexes", "geom": "geoms",
+    "joint": "joints", "pair": "pairs", "tendon": "tendons",
+}  # fmt: skip
+PARSED = (".xml", ".urdf")  # endings of files that MuJoCo opens
+
+
+class Frame(NamedTuple):
+    """Origin (3,) [m] and unit quaternion (4,) of a frame in another one."""
+
+    pos: np.ndarray
+    quat: np.ndarray
+
+    def __matmul__(self, inner: Frame) -> Frame:
+        """The frame `inner`, given in this one, where this one is given."""
+        return Frame(self.pos + self.R @ inner.pos, product(self.quat, inner.quat))
+
+    @property
+    def inverse(self) -> Frame:
+        """The frame in which this one was given, in this one."""
+        return Frame(-self.R.T @ self.pos, self.quat * (1, -1, -1, -1))
+
+    @property
+    def R(self) -> np.ndarray:
+        """(3, 3) rotation matrix."""
+        return rotation_matrices(self.quat)
+
+
+ORIGIN = Frame(np.zeros(3), np.array([1.0, 0.0, 0.0, 0.0]))
+
+
+class Model:
+    """A compiled model.
+
+    Parameters
+    ----------
+    mujoco : module
+    spec : mujoco.MjSpec
+        What MuJoCo has read; it is compiled here.
+    root : Element
+        The same text, for the lines of elements without one in `spec`.
+
+    Attributes
+    ----------
+    data : mujoco.MjModel
+    frames : list of Frame
+        Of each body, in the frame of the moving body that it is fixed to, or of the world.
+    geom_frames : list of Frame
+        Of each geom, likewise.
+    """
+
+    def __init__(self, mujoco: ModuleType, spec: Any, root: Element):
+        self._mujoco, self.root = mujoco, root
+        self._spec = spec  # older versions free its elements with it
+        self.data = spec.compile()
+        self._found = {kind: {e.id: e for e in getattr(spec, name, [])} for kind, name in LISTS.items()}
+        m = self.data
+        self.frames = [ORIGIN]
+        for b in range(1, m.nbody):
+            inner = Frame(m.body_pos[b], m.body_quat[b])
+            self.frames.append(ORIGIN if m.body_dofnum[b] else self._parent(b) @ inner)
+        self.geom_frames = [
+            self.frames[m.geom_bodyid[g]] @ Frame(m.geom_pos[g], m.geom_quat[g]) for g in range(m.ngeom)
+        ]
+
+    def _parent(self, b: int) -> Frame:
+        return self.frames[self.data.body_parentid[b]]
+
+    def moves(self, b: int) -> bool:
+        """True if the body, or the one that it is fixed to, has a joint."""
+        return bool(self.data.body_dofnum[self.data.body_weldid[b]] > 0)
+
+    def value(self, name: str, default: Any) -> Any:
+        """An array of the model; the default where this version of MuJoCo has none."""
+        return getattr(self.data, name, default)
+
+    def disables(self, *flags: str) -> bool:
+        """True if any of these is disabled, such as "GRAVITY"."""
+        bits = [getattr(self._mujoco.mjtDisableBit, f"mjDSBL_{flag}", 0) for flag in flags]
+        return any(self.data.opt.disableflags & int(bit) for bit in bits)
+
+    def enables(self, flag: str) -> bool:
+        """True if this is enabled, such as "OVERRIDE"."""
+        bit = getattr(self._mujoco.mjtEnableBit, f"mjENBL_{flag}", 0)
+        return bool(self.data.opt.enableflags & int(bit))
+
+    def kind(self, enumeration: str, prefix: str, number: int) -> str:
+        """Name of a value of one of MuJoCo's enumerations, such as the type of a geom."""
+        return getattr(self._mujoco, enumeration)(int(number)).name.removeprefix(prefix).lower()
+
+    def spec(self, kind: str, k: int) -> Any:
+        """Element `k` of a kind as MuJoCo has read it; None where it made the element itself."""
+        return self._found[kind].get(k)
+
+    def name(self, kind: str, k: int) -> str:
+        """Name of an element; empty if it has none."""
+        return self._mujoco.mj_id2name(self.data, getattr(self._mujoco.mjtObj, f"mjOBJ_{kind.upper()}"), k) or ""
+
+    def label(self, kind: str, k: int) -> str:
+        """Element as messages call it; a part of a body without a name is told by that of its body."""
+        name = self.name(kind, k)
+        if name or kind not in ("geom", "joint"):
+            return label(kind, name)
+        body = int(self.data.geom_bodyid[k] if kind == "geom" else self.data.jnt_bodyid[k])
+        return f"{label(kind, name)} of {label('body', self.name('body', body))}" if body else label(kind, name)
+
+    def line(self, kind: str, k: int) -> int:
+        """Line of an element; 0 where it is not known, as in a file that another one includes."""
+        found = re.search(r"line (\d+)", getattr(self.spec(kind, k), "info", "") or "")
+        if not found and kind == "joint":
+            return self.line("body", int(self.data.jnt_bodyid[k]))
+        return int(found.group(1)) if found else 0
+
+    def stated_points(self, mesh: int) -> np.ndarray | None:
+        """(n, 3) points of a mesh as the text states them; None where it names a file."""
+        for element in self.root.iter("mesh"):
+            if element.get("name") == self.name("mesh", mesh) and element.get("vertex"):
+                return np.array(element.get("vertex", "").split(), dtype=float).reshape(-1, 3)
+        return None
+
+    def error(self, kind: str, k: int, message: str) -> ModelError:
+        """An error about an element."""
+        return ModelError(f"{self.label(kind, k)} {message}", self.line(kind, k))
+
+
+def compile_model(mujoco: ModuleType, text: str, root: Element, path: Path | None) -> Model:
+    """Compile a model.
+
+    Parameters
+    ----------
+    text : str
+    root : Element
+        The same, parsed.
+    path : Path, optional
+        Its file, beside which included files and meshes are looked for.
+
+    Raises
+    ------
+    ValueError
+        MuJoCo's own message.
+    """
+    try:
+        with _told_warnings(mujoco):
+            if path is not None and path.suffix.lower() in PARSED:
+                spec = mujoco.MjSpec.from_file(str(path))
+            else:
+                spec = mujoco.MjSpec.from_string(text)
+                spec.modelfiledir = str(path.parent) if path is not None else ""
+            return Model(mujoco, spec, root)
+    except (ValueError, mujoco.FatalError) as error:
+        raise _refusal(str(error), root) from None
+
+
+def _refusal(message: str, root: Element) -> ModelError:
+    """MuJoCo's own message as an error, with the value of the attribute that it names."""
+    told = ", ".join(line.strip() for line in message.splitlines() if line.strip())
+    place, attribute = re.search(r", line (\d+)", told), re.search(r"attribute:? '(\w+)'", told)
+    line = int(place.group(1)) if place else 0
+    for element in root.iter():
+        value = element.get(attribute.group(1)) if attribute and element.line == line else None
+        if value is not None:
+            told += f"; {attribute.group(1)} is {value!r}"
+            break
+    return ModelError(f"MuJoCo refuses it: {told}", line)
+
+
+@contextlib.contextmanager
+def _told_warnings(mujoco: ModuleType) -> Iterator[None]:
+    """Let MuJoCo warn once in Python, and not in a file of its own, which it makes in the working folder."""
+    before, told = mujoco.get_mju_user_warning(), []
+    mujoco.set_mju_user_warning(told.append)
+    try:
+        with warnings.catch_warnings(record=True) as caught:
+            warnings.simplefilter("always")
+            yield
+    finally:
+        mujoco.set_mju_user_warning(before)
+    longer = [str(warning.message) for warning in caught]
+    shorter = [message for message in told if not any(text.startswith(message) for text in longer)]
+    for message in dict.fromkeys(longer + shorter):
+        warnings.warn(message, stacklevel=7)  # the call of `load_mjcf`

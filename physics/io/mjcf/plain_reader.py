@@ -1,0 +1,271 @@
+"""From the elements of an MJCF text to a scene, without MuJoCo: the part of MJCF that `save_mjcf` writes.
+
+Elements and attributes of `ELEMENTS` are read, those of `HARMLESS` move nothing, and all others are refused.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from physics import validation
+from physics.io.mjcf.contacts import Surface, contact_effects, touched
+from physics.io.mjcf.left_out import LeftOut
+from physics.io.mjcf.shapes import Placed, make_body
+from physics.io.mjcf.text import Element, ModelError, label
+from physics.io.mjcf.writer import unnamed
+from physics.mass.inertia import MassProperties, block_moments, ellipsoid_moments
+from physics.optional import INSTALLED_BY
+from physics.rotations import rotation_matrices
+from physics.scene.bodies import Body
+from physics.scene.effects import Gravity
+from physics.scene.scene import HalfSpace, Scene
+
+DENSITY = 1000.0  # MuJoCo's default [kg/m³]
+GRAVITY = "0 0 -9.81"  # likewise
+FRICTION = "1 0.005 0.0001"  # likewise: sliding, torsion, rolling
+
+SHAPES = ("box", "sphere", "ellipsoid", "mesh")
+
+# Attributes of each element that is read, and the elements in it.
+ELEMENTS: dict[str, tuple[str, str]] = {
+    "mujoco": ("model", "compiler option worldbody keyframe asset"),
+    "compiler": ("angle", ""),
+    "option": ("gravity", ""),
+    "asset": ("", "mesh"),
+    "mesh": ("name vertex", ""),
+    "worldbody": ("", "geom body"),
+    "body": ("name pos quat", "geom freejoint joint inertial"),
+    "freejoint": ("name", ""),
+    "joint": ("name type", ""),
+    "inertial": ("pos quat mass diaginertia fullinertia", ""),
+    "geom": ("name type size pos quat zaxis mesh mass density contype conaffinity condim friction", ""),
+    "keyframe": ("", "key"),
+    "key": ("name qpos qvel", ""),
+}
+HARMLESS_ELEMENTS = {
+    "camera",
+    "custom",
+    "light",
+    "material",
+    "sensor",
+    "site",
+    "size",
+    "statistic",
+    "texture",
+    "visual",
+}
+HARMLESS_ATTRIBUTES = {"group", "material", "rgba"}
+ABSENT = {"actuator", "deformable", "equality", "tendon"}  # MuJoCo reads them, and a scene has no counterpart
+MANY = {"body", "geom", "joint", "key", "mesh"}  # elements of which there may be several in another one
+
+
+def read_scene(root: Element) -> Scene:
+    """The scene of a model's root element."""
+    if root.tag != "mujoco":
+        raise _unread(root, "is not read; allowed is <mujoco>")
+    _check(root)
+    world = root.find("worldbody")
+    if world is None:
+        raise ModelError("<worldbody> is missing", root.line)
+    planes = world.findall("geom")
+    for plane in planes:
+        if _type(plane) != "plane":
+            raise _unread(plane, f"of the world is a {_type(plane)}; allowed are planes")
+    elements = world.findall("body")
+    meshes = {mesh.get("name"): mesh for mesh in root.iterfind("asset/mesh")}
+    starts = _starts(root, elements)
+    bodies = [_body(b, element, meshes, *start) for b, (element, start) in enumerate(zip(elements, starts))]
+    option = root.find("option")
+    gravity = _numbers(root if option is None else option, "gravity", 3, GRAVITY)
+    effects = [Gravity(gravity)] if gravity.any() else []
+    surfaces, floors = [_surface(element.find("geom")) for element in elements], [_surface(plane) for plane in planes]
+    contact = contact_effects(surfaces, [floor for floor in floors if touched(floor, surfaces)], LeftOut())
+    walls = [_wall(plane) for plane, floor in zip(planes, floors) if not contact or touched(floor, surfaces)]
+    return Scene(bodies, walls, effects + contact)
+
+
+def _label(element: Element) -> str:
+    return label(element.tag, element.get("name"))
+
+
+def _error(element: Element, message: str) -> ModelError:
+    return ModelError(f"{_label(element)} {message}", element.line)
+
+
+def _unread(element: Element, message: str) -> ModelError:
+    """An error about MJCF that MuJoCo would read."""
+    return _error(element, f"{message}; load_mjcf reads more where MuJoCo is installed: {INSTALLED_BY['mujoco'][1]}")
+
+
+def _type(geom: Element) -> str:
+    return geom.get("type", "sphere")
+
+
+def _check(element: Element) -> None:
+    """Refuse attributes and elements that are not read."""
+    attributes, children = (text.split() for text in ELEMENTS[element.tag])
+    for key, value in element.attrib.items():
+        if key not in attributes and key not in HARMLESS_ATTRIBUTES:
+            raise _unread(
+                element, f"has {key}={value!r}, which is not read; allowed are {', '.join(attributes) or 'none'}"
+            )
+    found = set()
+    for child in element:
+        if child.tag in HARMLESS_ELEMENTS:
+            continue
+        if child.tag in ABSENT:
+            raise _error(child, f"in {_label(element)} has no counterpart in a scene; allowed is a model without it")
+        if child.tag not in children:
+            raise _unread(child, f"in {_label(element)} is not read; allowed are {', '.join(children) or 'none'}")
+        if child.tag in found - MANY:
+            raise _unread(child, f"stands in {_label(element)} twice; allowed is one")
+        found.add(child.tag)
+        _check(child)
+
+
+def _numbers(element: Element, key: str, count: int, default: str | None = None, least: int = 0) -> np.ndarray:
+    """`count` numbers of an attribute, or at least `least` of them."""
+    text = element.get(key, default)
+    several = f"are {least} to {count} finite numbers" if least else f"are {count} finite numbers"
+    allowed = "is one finite number" if count == 1 else several
+    try:
+        found = np.array(text.split(), dtype=np.float64)
+    except (AttributeError, ValueError):
+        found = np.empty(0)
+    if not (least or count) <= len(found) <= count or not np.isfinite(found).all():
+        raise ModelError(f"{key} of {_label(element)} is {text!r}; allowed {allowed}", element.line)
+    return found
+
+
+def _integer(element: Element, key: str, default: int) -> int:
+    """An integer of an attribute."""
+    text = element.get(key, str(default))
+    try:
+        return int(text)
+    except ValueError:
+        raise ModelError(f"{key} of {_label(element)} is {text!r}; allowed is an integer", element.line) from None
+
+
+def _refuse(element: Element, *keys: str) -> None:
+    for key in keys:
+        if element.get(key) is not None:
+            raise _unread(element, f"has {key}={element.get(key)!r}, which is not read here; allowed is none")
+
+
+def _wall(plane: Element) -> HalfSpace:
+    """A plane's free side is its +z."""
+    _refuse(plane, "mesh")
+    if plane.get("quat") is not None:
+        _refuse(plane, "zaxis")
+    normal = rotation_matrices(_unit(plane))[:, 2]
+    if plane.get("zaxis") is not None:
+        normal = _numbers(plane, "zaxis", 3)
+    wall = HalfSpace(normal)
+    return HalfSpace(wall.normal, float(np.array(wall.normal) @ _numbers(plane, "pos", 3, "0 0 0")))
+
+
+def _unit(element: Element, key: str = "quat") -> np.ndarray:
+    """The quaternion of an element, normalised: as in MuJoCo it may have any norm but zero."""
+    return _normalised(element, _numbers(element, "quat", 4, "1 0 0 0"))
+
+
+def _normalised(element: Element, q: np.ndarray) -> np.ndarray:
+    norm = np.linalg.norm(q)
+    if not 0 < norm < np.inf:
+        raise _error(element, f"has the quaternion {q.tolist()} of norm {norm:g}; allowed is any norm but 0")
+    return validation.unit(q, norm)
+
+
+def _starts(root: Element, elements: list[Element]) -> list[tuple[np.ndarray, np.ndarray]]:
+    """Pose (7,) and velocity (6,) of each body's frame, as in qpos and qvel of MuJoCo: of the first keyframe."""
+    key = root.find("keyframe/key")
+    poses = [np.concatenate((_numbers(e, "pos", 3, "0 0 0"), _unit(e))) for e in elements]
+    velocities = np.zeros((len(elements), 6))
+    if key is not None and key.get("qpos") is not None:
+        rows = _numbers(key, "qpos", 7 * len(elements)).reshape(-1, 7)
+        poses = [np.concatenate((row[:3], _normalised(key, row[3:]))) for row in rows]
+    if key is not None and key.get("qvel") is not None:
+        velocities = _numbers(key, "qvel", 6 * len(elements)).reshape(-1, 6)
+    return list(zip(poses, velocities))
+
+
+def _body(b: int, element: Element, meshes: dict, pose: np.ndarray, velocity: np.ndarray) -> Body:
+    """A free body; the scene's frame has its axes, and its origin at the centre of mass."""
+    joints = element.findall("freejoint") + [j for j in element.findall("joint") if j.get("type") == "free"]
+    if len(joints) != 1 or len(element.findall("joint")) + len(element.findall("freejoint")) != 1:
+        raise _unread(element, "is not a free body; allowed is one freejoint and no other")
+    geoms = element.findall("geom")
+    if len(geoms) != 1:
+        raise _unread(element, f"has {len(geoms)} geoms; allowed is one")
+    geom, kind = geoms[0], _type(geoms[0])
+    if kind not in SHAPES:
+        raise _unread(geom, f"is a {kind}; allowed are {', '.join(SHAPES)}")
+    _refuse(geom, "quat", "zaxis", *(("size", "density") if kind == "mesh" else ("mesh",)))
+    shape = _points(geom, meshes) if kind == "mesh" else _half_axes(geom)
+    placed = Placed(kind, shape, _numbers(geom, "pos", 3, "0 0 0"), _mass_properties(element, geom, shape))
+    name = element.get("name")
+    try:
+        return make_body(placed, pose, velocity, None if name in (None, "", unnamed(b)) else name)
+    except ValueError as error:
+        raise _error(element, f"in a scene: {error}") from None
+
+
+def _points(geom: Element, meshes: dict) -> np.ndarray:
+    """(n, 3) points of a mesh, in the frame of the geom."""
+    mesh = meshes.get(geom.get("mesh"))
+    if mesh is None:
+        known = ", ".join(map(repr, meshes)) or "none"
+        raise _error(geom, f"has the mesh {geom.get('mesh')!r}; allowed are those of <asset>: {known}")
+    count = len(mesh.get("vertex", "").split())
+    return _numbers(mesh, "vertex", max(count - count % 3, 12)).reshape(-1, 3)
+
+
+def _half_axes(geom: Element) -> np.ndarray:
+    """Half edges, semi-axes, or the radius three times [m]."""
+    return np.resize(_numbers(geom, "size", 1 if _type(geom) == "sphere" else 3), 3)
+
+
+def _mass_properties(element: Element, geom: Element, shape: np.ndarray) -> MassProperties:
+    """Mass, centre of mass and inertia in the body's frame."""
+    inertial = element.find("inertial")
+    if inertial is None:
+        return _of_geom(geom, shape)
+    R = rotation_matrices(_unit(inertial))
+    if inertial.get("fullinertia") is not None:
+        _refuse(inertial, "diaginertia", "quat")
+        a, b, c, d, e, f = _numbers(inertial, "fullinertia", 6)
+        tensor = np.array([[a, d, e], [d, b, f], [e, f, c]])
+    else:
+        tensor = R @ np.diag(_numbers(inertial, "diaginertia", 3)) @ R.T
+    mass, centre = _numbers(inertial, "mass", 1)[0], _numbers(inertial, "pos", 3)
+    return MassProperties(mass, centre, tensor)
+
+
+def _of_geom(geom: Element, shape: np.ndarray) -> MassProperties:
+    """Mass properties of a geom of uniform density."""
+    if _type(geom) == "mesh":
+        raise _unread(geom, "is a mesh of a body without <inertial>; allowed is a body with it")
+    is_box = _type(geom) == "box"
+    if geom.get("mass") is not None:
+        mass = float(_numbers(geom, "mass", 1)[0])
+    else:
+        volume = float(np.prod(shape)) * (8.0 if is_box else 4 * np.pi / 3)
+        mass = volume * float(_numbers(geom, "density", 1, str(DENSITY))[0])
+    if not mass > 0:
+        raise _error(geom, f"has the mass {mass:g}; allowed is more than 0")
+    moments = block_moments(2 * shape, mass) if is_box else ellipsoid_moments(shape, mass)
+    return MassProperties(mass, _numbers(geom, "pos", 3, "0 0 0"), np.diag(moments))
+
+
+def _surface(geom: Element) -> Surface:
+    condim = _integer(geom, "condim", 3)
+    if condim not in (1, 3):
+        raise _error(geom, f"has condim {condim}; allowed are 1 and 3")
+    return Surface(
+        _label(geom),
+        geom.line,
+        _integer(geom, "contype", 1),
+        _integer(geom, "conaffinity", 1),
+        condim,
+        float(_numbers(geom, "friction", 3, FRICTION, least=1)[0]),
+    )

@@ -1,0 +1,66 @@
+"""Elements of an MJCF text, each with its line."""
+
+from __future__ import annotations
+
+import xml.etree.ElementTree as ET
+from xml.parsers import expat
+
+
+class Element(ET.Element):
+    """An element, and the line on which it starts."""
+
+    line = 0
+
+
+class ModelError(ValueError):
+    """An element that a scene cannot hold.
+
+    Parameters
+    ----------
+    message : str
+    line : int
+        Line of the element; 0 where it is not known.
+    """
+
+    def __init__(self, message: str, line: int = 0):
+        super().__init__(message)
+        self.line = line
+
+    @property
+    def place(self) -> str:
+        """The line in words; empty where it is not known."""
+        return f"line {self.line}" if self.line else ""
+
+
+def parse(text: str) -> Element:
+    """Root element of a text.
+
+    Raises
+    ------
+    ValueError
+        The text is no XML, or has a document type, which declares entities: they could grow without bound, or name
+        other files.
+    """
+    parser = expat.ParserCreate("utf-8")
+    builder = ET.TreeBuilder(element_factory=Element)
+
+    def start(tag: str, attributes: dict[str, str]) -> None:
+        builder.start(tag, attributes).line = parser.CurrentLineNumber
+
+    parser.StartElementHandler = start
+    parser.EndElementHandler = builder.end
+    parser.StartDoctypeDeclHandler = _refuse_doctype
+    try:
+        parser.Parse(text, True)
+    except expat.ExpatError as error:
+        raise ValueError(f"{error}; allowed is XML") from None
+    return builder.close()
+
+
+def _refuse_doctype(name: str, *_: object) -> None:
+    raise ValueError(f"<!DOCTYPE {name}> is not read; allowed is MJCF without it")
+
+
+def label(tag: str, name: str | None) -> str:
+    """Element as messages call it."""
+    return f"<{tag} {name!r}>" if name else f"<{tag}>"
