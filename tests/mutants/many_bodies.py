@@ -189,8 +189,8 @@ STEPPING = [
         "stepping-spin",
         "To push bodies apart adds angular momentum.",
         "stepping/position_correction.py",
-        "add_scaled(L, share * p, turn)",
-        "add_scaled(L, 0.0, turn)",
+        "_add_angular_momentum(a, on_a, turn, many)",
+        "_add_angular_momentum(a, on_b, turn, many)",
         _CASE + "[60-closed-pairs]",
     ),
 ]

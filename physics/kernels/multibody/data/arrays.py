@@ -128,7 +128,7 @@ class Contacts(NamedTuple):
 
     bodies: np.ndarray  # (contacts, 2) int, first and second body; -1 - k: wall k
     id: np.ndarray  # (contacts,) int, the same while the same features touch
-    owner: np.ndarray  # (contacts,) int, body that the normal turns with, -1: none
+    owner: np.ndarray  # (contacts,) int, body that the normal turns with, -1: none, -2: `PARTED`
     normal: np.ndarray  # (contacts, 3) unit vector out of the second body, in the frame of the owner
     anchor: np.ndarray  # (contacts, 6) points of both bodies from their centres of mass, in their frames [m]
     frame: np.ndarray  # (contacts, 9) rows normal, tangent 1, tangent 2, world frame

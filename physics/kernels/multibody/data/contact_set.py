@@ -14,6 +14,9 @@ from physics.kernels.state.layout import ELLIPSOID, SPHERE
 # Contact features that two bodies, or a body and a wall, have unless one is a hull: the parts of a contact's id.
 FEATURES_PER_PAIR = 512
 
+# Owner of the normal of a contact along the plane that parts two bodies (`stepping.passing_pairs`).
+PARTED = -2
+
 # Slops by which a contact that touches has to go in to count as stopping its bodies: more than two bodies that are
 # thinned by the slop lose along any direction, 2 √3 (`stepping.passing_pairs`).
 DEEP_SHARE = 4.0
@@ -107,6 +110,14 @@ def pair_slop(a, b, many):
     if b < 0:
         return many.bodies.work[a].slop
     return min(many.bodies.work[a].slop, many.bodies.work[b].slop)
+
+
+@inlined
+def parted_slack(k, many):
+    """By how much contact k may go in beyond its gap [m]: what bodies that pass are thinned by; 0 of all others."""
+    if many.contacts.owner[k] != PARTED:
+        return 0.0
+    return DEEP_SHARE * pair_slop(many.contacts.bodies[k, 0], many.contacts.bodies[k, 1], many)
 
 
 @inlined
@@ -204,7 +215,8 @@ def add_contact(a, b, feature, owner, normal, point_a, point_b, gap, h, many):
     feature : int
         Which of the features of this pair: below `FEATURES_PER_PAIR` unless one of them is a hull.
     owner : int
-        Body that the normal turns with; -1: it keeps its direction.
+        Body that the normal turns with; -1: none; `PARTED`: the normal parts two bodies that pass, each with its own
+        point.
     normal, point_a, point_b : tuples of 3 floats
         Out of b; nearest points of a and b, world frame [m].
     gap, h : float
@@ -220,7 +232,8 @@ def add_contact(a, b, feature, owner, normal, point_a, point_b, gap, h, many):
     partner = count - 1 - b
     if b >= 0:
         _write_anchor(k, b, 3, point_b, many)
-        _join_points(k, a, b, owner, gap, normal, many)
+        if owner != PARTED:
+            _join_points(k, a, b, owner, gap, normal, many)
         acceleration += many.bodies.work[b].acceleration
         partner = b
     write_contact_frame(k, normal, many)
@@ -284,7 +297,7 @@ def _turn_frame(k, a, b, many):
     if owner >= 0:
         n = qt.matvec(row_matrix(many.bodies.rotation, owner), n)
         write_contact_frame(k, n, many)
-    elif b >= 0 and many.bodies.work[a].shape == SPHERE and many.bodies.work[b].shape == SPHERE:
+    elif b >= 0 and owner != PARTED and many.bodies.work[a].shape == SPHERE == many.bodies.work[b].shape:
         d = subtract(row_vector(many.bodies.center, a, 0), row_vector(many.bodies.center, b, 0))
         size = math.sqrt(qt.dot(d, d))
         if size > 0.0:
@@ -312,4 +325,5 @@ def update_contacts(many):
         put_vector(many.contacts.arm, k, 3, arm)
         gap = qt.dot(n, subtract(point, add_scaled(arm, 1.0, row_vector(many.bodies.state, b, 0))))
         many.contacts.gap[k] = gap
-        _join_points(k, a, b, many.contacts.owner[k], gap, n, many)
+        if many.contacts.owner[k] != PARTED:
+            _join_points(k, a, b, many.contacts.owner[k], gap, n, many)

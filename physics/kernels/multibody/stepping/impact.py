@@ -9,7 +9,13 @@ from physics.kernels.math import quaternion as qt
 from physics.kernels.math.vector import row_vector
 from physics.kernels.multibody.data import warm_start as kept
 from physics.kernels.multibody.data.arrays import NUM_CONTACTS
-from physics.kernels.multibody.data.contact_set import arrival_gap, pair_slop, put_vector, relative_acceleration_bound
+from physics.kernels.multibody.data.contact_set import (
+    arrival_gap,
+    pair_slop,
+    parted_slack,
+    put_vector,
+    relative_acceleration_bound,
+)
 from physics.kernels.multibody.stepping.impact_events import log_impacts
 from physics.kernels.multibody.stepping.restitution_energy import apply_impact_within_energy
 
@@ -123,7 +129,7 @@ def _impact_target(k, h, many):
 @inlined
 def _distant_target(k, h, is_last, many):
     """Target of contact k that is apart, and whether it has to be braked in the air; not constrained if met in time."""
-    goal = -many.contacts.gap[k] / h
+    goal = -(many.contacts.gap[k] + parted_slack(k, many)) / h
     if is_left_to_advancement(k, many) or (not is_last and is_impact_ahead(k, h, many)):
         return -_UNCONSTRAINED, False
     return goal, goal - many.contacts.speed[k] > min(rest_speed_limit(k, h, many), impact_speed_limit(k, h, many))

@@ -23,6 +23,7 @@ from physics.kernels.multibody.data.contact_set import (
     add_scaled,
     contact_velocity,
     pair_slop,
+    parted_slack,
     put_vector,
     relative_acceleration_bound,
     relative_velocity,
@@ -113,7 +114,7 @@ def set_resting_targets(n, h, many):
         if many.contacts.target[k, 0] == FORETOLD:
             t = (t[0] - (max(gap, 0.0) + slop) / half, t[1], t[2])
         elif gap > slop:
-            t = (t[0] - gap / half, t[1], t[2])
+            t = (t[0] - (gap + parted_slack(k, many)) / half, t[1], t[2])
         elif gap > 0.0:
             t = (t[0] - GAP_CLOSING_SHARE * gap / h, t[1], t[2])
         negligible = max(

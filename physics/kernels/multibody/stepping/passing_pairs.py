@@ -24,6 +24,7 @@ from physics.kernels.multibody.data.arrays import NUM_CONTACTS
 from physics.kernels.multibody.data.contact_set import (
     DEEP_SHARE,
     FEATURES_PER_PAIR,
+    PARTED,
     add_contact,
     add_scaled,
     is_stopping,
@@ -142,7 +143,7 @@ def _redirect_pair(k, n, to, h, gyroscopic, offset_frame, hulls, many):
     if not gap > pair_slop(a, b, many):
         return _depth_after(k, h, many) > DEEP_SHARE * thinner, to
     many.counts[NUM_CONTACTS] = to
-    add_contact(a, b, FEATURES_PER_PAIR - 1, -1, m, p, q, gap, h, many)
+    add_contact(a, b, FEATURES_PER_PAIR - 1, PARTED, m, p, q, gap, h, many)
     return True, many.counts[NUM_CONTACTS]
 
 

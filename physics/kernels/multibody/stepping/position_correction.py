@@ -15,6 +15,7 @@ from physics.kernels.math.union_find import find_root
 from physics.kernels.math.vector import row_vector
 from physics.kernels.multibody.data.contact_set import add_scaled, pair_slop, put_vector, subtract, update_contacts
 from physics.kernels.multibody.data.kinematics import update_body_pose
+from physics.kernels.multibody.solver.contact_operator import apply_body_inv_inertia
 from physics.kernels.multibody.solver.islands import union_contacts
 from physics.kernels.multibody.stepping.energy_budget import (
     cap_rotational_energy,
@@ -34,6 +35,9 @@ _CORRECTION_SHARE = 0.5
 # the weight have turned deep into others is taken out at once.
 _MAX_ROUNDS = 30
 _DEEP_SLOPS = 100.0
+
+# Share of their energy of turning that bodies without relative motion gain for nothing where momentum is kept.
+_FREE_SPIN_SHARE = 1.0e-6
 
 # Error of the displacements at most, relative to the largest target, or to so many slops where that is less,
 # and sweeps for it at most, if a contact problem may take as many: something light between a wall and something heavy
@@ -88,24 +92,95 @@ def _is_held(b, many):
     return many.islands.of_body[find_root(b, many.islands.parent)] == 1
 
 
+@inlined
+def _add_angular_momentum(b, s, turn, many):
+    """Add s `turn` to the angular momentum of body b."""
+    put_vector(many.bodies.state, b, at.ANGMOM, add_scaled(row_vector(many.bodies.state, b, at.ANGMOM), s, turn))
+
+
+@inlined
+def _spin(b, many):
+    """Angular velocity of body b, world frame [rad/s]."""
+    return apply_body_inv_inertia(b, row_vector(many.bodies.state, b, at.ANGMOM), many)
+
+
+@inlined
+def _share_that_takes(energy, stock):
+    """Share s of a relative velocity to take so that its energy `stock` is less by `energy`: stock (1 - (1 - s)²)."""
+    return 1.0 - math.sqrt(max(0.0, 1.0 - energy / stock)) if stock > 0.0 else 0.0
+
+
+@kernel
+def _take_relative_energy(a, b, energy, many):
+    """Take energy [J] from the relative motion of two bodies, both momenta kept: whether there was as much.
+
+    First from their velocity along the line of centres, then from the difference of their spins, with an inertia no
+    larger than any of theirs. Nothing is taken where both have less.
+    """
+    inverse = many.bodies.inv_mass[a] + many.bodies.inv_mass[b]
+    way = subtract(row_vector(many.bodies.state, a, at.POS), row_vector(many.bodies.state, b, at.POS))
+    u = subtract(row_vector(many.bodies.state, a, at.LINVEL), row_vector(many.bodies.state, b, at.LINVEL))
+    square, w, K = qt.dot(way, way), subtract(_spin(a, many), _spin(b, many)), many.bodies.inv_inertia
+    along = qt.dot(u, way) / square if square > 0.0 else 0.0
+    inertia = 1.0 / (K[a, 0] + K[a, 3] + K[a, 5] + K[b, 0] + K[b, 3] + K[b, 5])
+    central, spinning = 0.5 * along * along * square / inverse, 0.5 * inertia * qt.dot(w, w)
+    if energy > central + spinning:
+        return False
+    part = min(energy, central)
+    p = _share_that_takes(part, central) * along / inverse
+    for body, sign in ((a, -1.0), (b, 1.0)):
+        v = row_vector(many.bodies.state, body, at.LINVEL)
+        put_vector(many.bodies.state, body, at.LINVEL, add_scaled(v, sign * p * many.bodies.inv_mass[body], way))
+    s = _share_that_takes(energy - part, spinning) * inertia
+    _add_angular_momentum(a, -s, w, many)
+    _add_angular_momentum(b, s, w, many)
+    return True
+
+
 @kernel
 def _keep_angular_momentum(n, many):
     """Turn the bodies of each contact against the angular momentum of their centres that pushing them apart adds.
 
     To move a by p n/m_a and b by -p n/m_b adds p n x (v_a - v_b). Both take up a part by their m r²: the same angular
-    velocity, as if they were one body.
+    velocity, as if they were one body. The energy that this adds is noted in `many.contacts.rebound_impulse`.
     """
     for k in range(n):
         a, b, p = many.contacts.bodies[k, 0], many.contacts.bodies[k, 1], many.contacts.impulse[k, 0]
+        many.contacts.rebound_impulse[k, 0] = 0.0
         if b < 0 or not p > 0.0:
             continue
         u = subtract(row_vector(many.bodies.state, a, at.LINVEL), row_vector(many.bodies.state, b, at.LINVEL))
         turn = qt.cross(u, row_vector(many.contacts.frame, k, 0))
         one = many.bodies.work[a].radius ** 2 / many.bodies.inv_mass[a]
-        other = many.bodies.work[b].radius ** 2 / many.bodies.inv_mass[b]
-        for body, share in ((a, one / (one + other)), (b, other / (one + other))):
-            L = row_vector(many.bodies.state, body, at.ANGMOM)
-            put_vector(many.bodies.state, body, at.ANGMOM, add_scaled(L, share * p, turn))
+        on_a = p * one / (one + many.bodies.work[b].radius ** 2 / many.bodies.inv_mass[b])
+        on_b = p - on_a
+        v, w = apply_body_inv_inertia(a, turn, many), apply_body_inv_inertia(b, turn, many)
+        gain = on_a * qt.dot(turn, _spin(a, many)) + on_b * qt.dot(turn, _spin(b, many))
+        gain += 0.5 * (on_a * on_a * qt.dot(turn, v) + on_b * on_b * qt.dot(turn, w))
+        many.contacts.rebound_impulse[k, 0] = gain
+        _add_angular_momentum(a, on_a, turn, many)
+        _add_angular_momentum(b, on_b, turn, many)
+
+
+@inlined
+def _spin_energy(b, many):
+    return 0.5 * qt.dot(row_vector(many.bodies.state, b, at.ANGMOM), _spin(b, many))
+
+
+@kernel
+def _pay_for_spins(n, offset_frame, many):
+    """Take the energy that `_keep_angular_momentum` has added from the relative motion of the bodies.
+
+    What is more than they have, and more than next to nothing, comes from their spins, and momentum with it.
+    """
+    for k in range(n):
+        a, b, gain = many.contacts.bodies[k, 0], many.contacts.bodies[k, 1], many.contacts.rebound_impulse[k, 0]
+        if b < 0 or not gain > 0.0 or _take_relative_energy(a, b, gain, many):
+            continue
+        one, other = _spin_energy(a, many), _spin_energy(b, many)
+        if gain > _FREE_SPIN_SHARE * (one + other):
+            take_kinetic_energy(a, gain * one / (one + other), offset_frame, many)
+            take_kinetic_energy(b, gain * other / (one + other), offset_frame, many)
 
 
 @inlined
@@ -155,6 +230,7 @@ def _correct_once(n, offset_frame, many):
     _mark_held_islands(n, many)
     _keep_angular_momentum(n, many)
     _displace_all(offset_frame, many)
+    _pay_for_spins(n, offset_frame, many)
     return deepest
 
 
