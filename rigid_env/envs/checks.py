@@ -114,7 +114,7 @@ class _Checks:
         while counts.min() < self.steps:
             is_first = over & is_late
             if is_first.any() and envs.task.disturbed is not None:
-                envs.task.disturbed.arrays["disturbance start"][is_first] = 0.0  # due in the step that starts anew
+                envs.task.disturbed.arrays["disturbance start"][is_first] = 0  # due in the step that starts anew
             obs, rewards, ends, cuts, infos = envs.step(self.actions[counts % self.steps, np.arange(ENVS)])
             over = ends | cuts
             _require(envs.observation_space.contains(obs), f"observation of step {counts.max()} is outside its space")

@@ -184,12 +184,17 @@ class Disturbances:
     def wait_anew(self) -> None:
         """Draw anew when the next disturbances start: for a model that must not know.
 
-        Waiting times are exponential, so that those that go on from now have the same distribution.
+        A disturbance starts in each quiet step with the same probability, so waits that go on from now have the same
+        distribution.
         """
-        now = self._task.steps * self._task.control_dt
         for k, kind in enumerate(self.kinds):
-            waits = [self._wait(kind, generator.random()) for generator in self._task.generators]
-            self.next[k] = np.maximum(now, self.end[k]) + waits
+            quiet = self._quiet(kind)
+            waits = [quiet_steps(quiet, generator.random()) for generator in self._task.generators]
+            self.next[k] = np.maximum(self._task.steps, self.end[k]) + waits
+
+    def _quiet(self, kind: Any) -> float:
+        """Mean number of quiet control steps between the end of a disturbance and the start of the next."""
+        return kind.every / self._task.control_dt - (1.0 if isinstance(kind, Push) else 0.0)
 
     def due(self) -> np.ndarray:
         """(n,) int64. Worlds in which a disturbance starts in the coming control step."""
@@ -215,7 +220,6 @@ class Disturbances:
     def _draw(self, k: int, kind: Any, world: int, step: int) -> None:
         """Draw the disturbance that starts in a control step, and when the next one does."""
         task = self._task
-        quiet = kind.every / task.control_dt
         shares = task.generators[world].random(UNIFORMS)
         along = direction(shares[:2], kind.axes)
         one = shares[2:3, None]
@@ -223,9 +227,9 @@ class Disturbances:
             inv_mass = task.inv_mass(world, kind.body)
             speed: Any = kind.speed
             self.force[k, world] = speed.at(one, {})[0] / inv_mass / task.world.dt * along
-            quiet, end = quiet - 1.0, step + 1
+            end = step + 1
         else:
             self.force[k, world] = kind.force.at(one, {})[0] * task.weights[world, kind.body] * along
             lasts = kind.lasts.at(shares[3:4, None], {})[0] / task.control_dt
             end = self.end[k, world] = step + max(1, round(min(lasts, FAR)))
-        self.next[k, world] = end + quiet_steps(quiet, shares[4])
+        self.next[k, world] = end + quiet_steps(self._quiet(kind), shares[4])
