@@ -18,7 +18,7 @@ from physics.kernels.flight.free_flight import drift_attitude
 from physics.kernels.half_space.contact_point import center_arm
 from physics.kernels.math import quaternion as qt
 from physics.kernels.math.quaternion import to_matrix
-from physics.kernels.math.vector import row_vector
+from physics.kernels.math.vector import as_vector, row_vector
 from physics.kernels.multibody.data import warm_start as kept
 from physics.kernels.multibody.data.arrays import NUM_CONTACTS
 from physics.kernels.multibody.data.contact_set import (
@@ -42,7 +42,7 @@ _TOUCH_SHARE = 1.0e-2
 _SAME_DIRECTION = 1.0 - 1.0e-7
 
 # Slops up to which the depth that bodies have gone in counts: a soft landing, not an overlap that a user made.
-_MAX_DEPTH_SLOPS = 100.0
+_MAX_DEPTH_SLOPS = 200.0
 
 
 @inlined
@@ -63,6 +63,18 @@ def _thinning(a, b, n, h, many):
         if depth <= _MAX_DEPTH_SLOPS * slop:
             landing = max(landing, depth)
     return slop + landing
+
+
+@inlined
+def _moves_as_foreseen(a, b, gap, n, h, many):
+    """True if nothing else is near bodies a and b, and their loads do not close the gap between them within h."""
+    for k in range(n):
+        c, d = many.contacts.bodies[k, 0], many.contacts.bodies[k, 1]
+        if (c != a or d != b) and (c in (a, b) or d in (a, b)):
+            return False
+    one, other = many.bodies.work[a].free_acceleration, many.bodies.work[b].free_acceleration
+    g = subtract(as_vector(one), as_vector(other))
+    return 0.25 * h * h * h * h * qt.dot(g, g) < gap * gap
 
 
 @inlined
@@ -132,7 +144,7 @@ def _redirect_pair(k, n, to, h, gyroscopic, offset_frame, hulls, many):
 
     Returns whether it passes, and the contacts of the set from then on. A contact that lands along its own direction
     stays. So does that of bodies that touch along the plane between them, unless it goes deeper than they are thinned
-    by along any direction.
+    by along any direction. Bodies that nothing else can push have no contact.
     """
     a, b, way = many.contacts.bodies[k, 0], many.contacts.bodies[k, 1], row_vector(many.contacts.frame, k, 0)
     thinner = _thinning(a, b, n, h, many)
@@ -142,6 +154,8 @@ def _redirect_pair(k, n, to, h, gyroscopic, offset_frame, hulls, many):
     gap, p, q = _gap_along(a, b, m, hulls, many)
     if not gap > pair_slop(a, b, many):
         return _depth_after(k, h, many) > DEEP_SHARE * thinner, to
+    if _moves_as_foreseen(a, b, gap, n, h, many):
+        return True, to
     many.counts[NUM_CONTACTS] = to
     add_contact(a, b, FEATURES_PER_PAIR - 1, PARTED, m, p, q, gap, h, many)
     return True, many.counts[NUM_CONTACTS]
