@@ -5,10 +5,10 @@ points now. To a body that slides past an edge this direction is a wall across i
 bodies move freely and turn little, their difference A - B sweeps the convex hull of both its places, at the start and
 at the end. If that hull does not hold the origin, the two never touch, and the direction n in which it is nearest to
 the origin parts them all along: n·(a - b) > 0 for all their points at both ends, and between them. The contact is then
-along n, and gives no impulse unless something else pushes the two together.
+along n, and gives no impulse unless something else pushes the two together. Bodies that nothing else is near have none.
 
-Bodies are taken thinner by the slop each, and by the depth to which they have landed in others: an edge that stands out
-by less than that is no obstacle.
+Bodies are taken thinner by the slop each, and by the depth to which they land in others within the stage: an edge that
+stands out by less than that is no obstacle.
 """
 
 from __future__ import annotations
@@ -41,7 +41,8 @@ _TOUCH_SHARE = 1.0e-2
 # Cosine of the angle below which two directions are the same (4e-4 rad).
 _SAME_DIRECTION = 1.0 - 1.0e-7
 
-# Slops up to which the depth that bodies have gone in counts: a soft landing, not an overlap that a user made.
+# Slops up to which the depth that bodies go in counts as a landing: twice the `_SOFT_LANDING_SLOPS` of `impact`, which
+# the resting stage stops at its middle. Deeper is an impact, or an overlap that a user made.
 _MAX_DEPTH_SLOPS = 200.0
 
 
