@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from physics.html_table import fields_table
 from physics.kernels.time_stepping import event_log
+from physics.world.contact_report import pushing_ends
 from physics.world.world import World
+
+# A body, and the other one or -1 - k for wall k.
+Pair = tuple[int, int]
 
 
 @dataclass(frozen=True)
@@ -23,8 +27,8 @@ class Event:
     t : float
         When [s]. The event-driven scheme knows it to rounding; where it has left out the end of a sequence of ever
         smaller bounces, the contact's ``touch`` and the body's ``rest`` come when that would have ended. Time
-        stepping knows the moment of an ``impact``; of the other kinds the sample interval: `t` is its end. It notes a
-        ``release`` after the first stage in which the contact does not push, up to two steps late.
+        stepping knows the moment of an ``impact``; of the other kinds the sample interval. `t` is its end, but for a
+        ``release``, which comes at the end of the last one in which the contact pushed.
     kind : str
         ``impact`` (velocities jumped), ``touch`` (a resting contact began), ``release`` (one ended), ``fault``; of
         the event-driven scheme also ``stick`` and ``slip`` (a resting contact ceased or began to slide) and
@@ -93,17 +97,39 @@ def named(events: list[Event], names: Sequence[str]) -> list[Event]:
     return [replace(each, name=known.get(each.body, ""), other_name=known.get(each.other, "")) for each in events]
 
 
-def contact_pairs(world: World) -> set[tuple[int, int]]:
-    """Body, and other body or -1 - k for wall k, of all resting contacts of world 0."""
-    return {(int(body), int(other)) for body, other in world.contact_ends()}
+def last_pushes(world: World, before: Mapping[Pair, float], t: float) -> dict[Pair, float]:
+    """When each resting contact of world 0 last pushed, as known at the time t.
+
+    Parameters
+    ----------
+    world : World
+    before : dict
+        What this function has returned at the sample before; empty at the first one.
+    t : float
+        Now [s].
+
+    Returns
+    -------
+    dict
+        From body, and other body or -1 - k for wall k, to a time [s]. Of a contact that has not pushed yet it is the
+        time at which it was first seen.
+    """
+    pushing = {(int(body), int(other)) for body, other in pushing_ends(world, 0)}
+    touching = {(int(body), int(other)) for body, other in world.contact_ends()}
+    return {pair: t if pair in pushing else before.get(pair, t) for pair in touching}
 
 
-def contact_events(before: set[tuple[int, int]], now: set[tuple[int, int]], t: float) -> list[Event]:
-    """Contacts that began and ended between two moments, as `contact_pairs` gives them; `t` is the later one [s]."""
+def contact_events(before: Mapping[Pair, float], now: Mapping[Pair, float], t: float) -> list[Event]:
+    """Contacts that began and ended between two samples, from what `last_pushes` gives at both; the later is at t [s].
+
+    A contact ends when it last pushed: what no longer pushes stays in the set until it has left its slop.
+    """
+    began = [("touch", pair, t) for pair in now.keys() - before.keys()]
+    ended = [("release", pair, before[pair]) for pair in before.keys() - now.keys()]
     events = []
-    for kind, pairs in (("touch", now - before), ("release", before - now)):
-        for body, end_of in sorted(pairs, key=lambda pair: (pair[0], abs(pair[1]), pair[1])):
-            events.append(Event(t, kind, body, max(-1, -1 - end_of), other=max(-1, end_of)))
+    for found in (began, ended):
+        for kind, (body, other), when in sorted(found, key=lambda each: (each[1][0], abs(each[1][1]), each[1][1])):
+            events.append(Event(when, kind, body, max(-1, -1 - other), other=max(-1, other)))
     return events
 
 

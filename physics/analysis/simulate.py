@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 from physics import validation
 from physics.analysis.contact_samples import contact_samples, contacts_of
 from physics.analysis.diagnostics import diagnose
-from physics.analysis.events import Event, contact_events, contact_pairs, fault_events, logged_events, named
+from physics.analysis.events import Event, Pair, contact_events, fault_events, last_pushes, logged_events, named
 from physics.analysis.trajectory import Trajectory
 from physics.annotations import Preset
 from physics.keywords import known_keywords
@@ -95,7 +95,7 @@ def simulate(
         reports.append(report)
     pos, quat, linvel, angvel, energy = (np.array(column) for column in zip(*samples))
     touched = contact_samples(times, contacts)
-    parts = (tuple(events), tuple(reports), scene, touched)
+    parts = (tuple(sorted(events, key=lambda event: event.t)), tuple(reports), scene, touched)
     return Trajectory(np.array(times), pos, quat, linvel, angvel, energy, *parts)
 
 
@@ -153,13 +153,13 @@ class _Touching:
     """Events of time stepping: impacts from its log, the rest from contacts and faults at the samples."""
 
     def __init__(self):
-        self._before: set[tuple[int, int]] = set()
+        self._pushes: dict[Pair, float] = {}
 
     def __call__(self, world: World, start: float, end: float, step: Callable[[], StepReport]) -> list[Event]:
         """Take a step; the events of it."""
         events = _logged(world, start, end, step)
-        before, self._before = self._before, contact_pairs(world)
-        events += contact_events(before, self._before, end) + fault_events(world, end)
+        before, self._pushes = self._pushes, last_pushes(world, self._pushes, end)
+        events += contact_events(before, self._pushes, end) + fault_events(world, end)
         return named(events, world.names)
 
 

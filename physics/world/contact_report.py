@@ -21,6 +21,19 @@ def contact_ends(world: Batch, index: int) -> np.ndarray:
     return np.array(ends, dtype=np.int64).reshape(-1, 2)
 
 
+def pushing_ends(world: Batch, index: int) -> np.ndarray:
+    """Those of `contact_ends` whose contacts pushed in the last stage, (n, 2) int64."""
+    ends = contact_ends(world, index)
+    if not len(ends):
+        return ends
+    if world.plan.many:
+        impulses = _many_rows(world, index)[:, many.WARM_IMPULSE : many.WARM_IMPULSE + 3]
+    else:
+        bodies = range(world.body_count)
+        impulses = np.array([_wall_impulse(world, index, b, slot) for b in bodies for slot in _slots(world, index, b)])
+    return ends[impulses.any(axis=1)]
+
+
 def contact_forces(world: Batch, index: int) -> tuple[np.ndarray, np.ndarray]:
     """Points (n, 3) [m] and forces (n, 3) [N], world frame; see `World.contacts`."""
     if not world.plan.contact:
@@ -57,6 +70,12 @@ def _wall_contact(world: Batch, index: int, body: int, slot: int) -> tuple[np.nd
     row, (wall, feature) = world.memory[i], divmod(slot, world.plan.features)
     point = np.empty(3)
     contact_point(world.state, world.params, world.shapes, world.walls, i, wall, feature, point)
-    impulses_at = WALL_MEMORY_HEAD + (world.memory.shape[1] - WALL_MEMORY_HEAD) // 4
-    impulse = row[impulses_at + 3 * slot : impulses_at + 3 * slot + 3]
+    impulse = _wall_impulse(world, index, body, slot)
     return point, world.walls[wall, at.WALL_NORMAL : at.WALL_NORMAL + 9].reshape(3, 3).T @ impulse / row[0]
+
+
+def _wall_impulse(world: Batch, index: int, body: int, slot: int) -> np.ndarray:
+    """Impulse of the last stage at one slot, along the wall's normal and tangents, (3,) [N s]."""
+    row = world.memory[index * world.body_count + body]
+    first = WALL_MEMORY_HEAD + (world.memory.shape[1] - WALL_MEMORY_HEAD) // 4 + 3 * slot
+    return row[first : first + 3]

@@ -11,6 +11,7 @@ import gymnasium as gym
 import numpy as np
 
 from physics import Event
+from physics.analysis.events import Pair
 from rigid_env.rendering.view import frame_of
 from rigid_env.viewer.copies import accuracy_name
 from rigid_env.viewer.env_copies import copied_env, put_chain, take_chain
@@ -31,7 +32,7 @@ class State(NamedTuple):
     episode: tuple[int, float]
     shift: float
     generator: Mapping[str, Any]
-    pairs: frozenset[tuple[int, int]]
+    pushes: dict[Pair, float]
 
 
 class LiveEnv(WorldSubject):
@@ -112,7 +113,7 @@ class LiveEnv(WorldSubject):
         self.seed, self._generator = seed, np.random.default_rng(seed)
         self._is_ended, self._episode, self._shift = False, (0, 0.0), 0.0
         self.listener.begin()
-        self.listener.pairs, self.listener.is_changed = set(), False
+        self.listener.pushes, self.listener.is_changed = {}, False
 
     def step(self, load=None, record=None):
         self.listener.begin()
@@ -147,7 +148,7 @@ class LiveEnv(WorldSubject):
     def snapshot(self) -> State:
         return State(
             self.accuracy, take_chain(self._env), copy.deepcopy(self._observation), self._is_ended, self._episode,
-            self._shift, self._generator.bit_generator.state, frozenset(self.listener.pairs),
+            self._shift, self._generator.bit_generator.state, self.listener.pushes,
         )  # fmt: skip
 
     def restore(self, snapshot: State) -> None:
@@ -157,7 +158,7 @@ class LiveEnv(WorldSubject):
         self._is_ended, self._episode, self._shift = snapshot.is_ended, snapshot.episode, snapshot.shift
         self._generator.bit_generator.state = snapshot.generator
         self.listener.begin()
-        self.listener.pairs, self.listener.is_changed = set(snapshot.pairs), False
+        self.listener.pushes, self.listener.is_changed = snapshot.pushes, False
 
     def frame(self):
         return frame_of(self._task)
@@ -192,11 +193,11 @@ class LiveEnv(WorldSubject):
         return _rehearsed(env)
 
     def switch(self, name: str) -> None:
-        pairs, chain = self.listener.pairs, take_chain(self._env)
+        pushes, chain = self.listener.pushes, take_chain(self._env)
         self._use(name)
         put_chain(self._env, chain, is_other=True)
         self.listener.begin()
-        self.listener.pairs, self.listener.is_changed = pairs, False
+        self.listener.pushes, self.listener.is_changed = pushes, False
 
 
 def _rehearsed(env: gym.Env) -> Callable[[], None]:

@@ -9,7 +9,7 @@ import numpy as np
 
 import physics
 from physics import Event, Status
-from physics.analysis.events import contact_events, contact_pairs, fault_events, logged_events, named
+from physics.analysis.events import Pair, contact_events, fault_events, last_pushes, logged_events, named
 
 EVENT_ROOM = 128
 """Events per body and call of a step that are told; more are left out."""
@@ -59,8 +59,8 @@ class Listener:
         The largest of any call [m], [1].
     fault : str
         Message of the last fault; empty without one.
-    pairs : set
-        Contacts after the last call; see `physics.analysis.events.contact_pairs`.
+    pushes : dict
+        Contacts after the last call, and when each last pushed: `physics.analysis.events.last_pushes`.
     is_changed : bool
         The world was changed from outside since the last call.
     """
@@ -69,7 +69,7 @@ class Listener:
         self._world = world
         world.make_event_room(EVENT_ROOM)
         world.recorder = self
-        self.pairs: set[tuple[int, int]] = set()
+        self.pushes: dict[Pair, float] = {}
         self.is_changed = False
         self._clock = self._from = 0.0
         self.begin()
@@ -102,8 +102,8 @@ class Listener:
         world, report = self._world, self._world.report
         events = logged_events(world, self._from)
         if not world.plan.events:
-            before, self.pairs = self.pairs, contact_pairs(world)
-            events += contact_events(before, self.pairs, world.time) + fault_events(world, world.time)
+            before, self.pushes = self.pushes, last_pushes(world, self.pushes, world.time)
+            events += contact_events(before, self.pushes, world.time) + fault_events(world, world.time)
         self.events += named(events, world.names)
         self.penetration = max(self.penetration, float(report.penetration[0]))
         self.residual = max(self.residual, float(report.residual[0]))

@@ -11,6 +11,7 @@ import numpy as np
 
 import physics
 from physics import Contact, Event
+from physics.analysis.events import Pair
 from physics.rotations import rotation_matrices
 from rigid_env.rendering import BodyView, Frame, WallView
 from rigid_env.viewer.copies import warm
@@ -23,7 +24,7 @@ class RecordedState(NamedTuple):
 
     call: int
     snapshot: physics.Snapshot
-    pairs: frozenset[tuple[int, int]]
+    pushes: dict[Pair, float]
 
 
 class PlayedRecording(WorldSubject):
@@ -94,13 +95,13 @@ class PlayedRecording(WorldSubject):
         return [replace(event, t=event.t + shift) for event in self.listener.events]
 
     def snapshot(self) -> RecordedState:
-        return RecordedState(self._call, self.world.snapshot(), frozenset(self.listener.pairs))
+        return RecordedState(self._call, self.world.snapshot(), self.listener.pushes)
 
     def restore(self, snapshot: RecordedState) -> None:
         self._call = snapshot.call
         self.world.restore(snapshot.snapshot)
         self.listener.begin()
-        self.listener.pairs, self.listener.is_changed = set(snapshot.pairs), False
+        self.listener.pushes, self.listener.is_changed = snapshot.pushes, False
 
     def rehearsal(self) -> Callable[[], None]:
         world = self._recording.world()

@@ -9,6 +9,7 @@ import numpy as np
 
 import physics
 from physics import validation
+from physics.analysis.events import Pair
 from rigid_env.viewer.copies import accuracy_name, copied, declared, fitted, warm
 from rigid_env.viewer.interface import WorldSubject, allowed_of
 from rigid_env.viewer.listening import Listener
@@ -22,7 +23,7 @@ class State(NamedTuple):
 
     accuracy: str
     snapshot: physics.Snapshot
-    pairs: frozenset[tuple[int, int]]
+    pushes: dict[Pair, float]
 
 
 class LiveWorld(WorldSubject):
@@ -50,7 +51,7 @@ class LiveWorld(WorldSubject):
     def restart(self, seed: int) -> None:
         self.world.restore(fitted(self._first, self.world))
         self.listener.begin()
-        self.listener.pairs, self.listener.is_changed = set(), False
+        self.listener.pushes, self.listener.is_changed = {}, False
 
     def step(self, load=None, record=None):
         self.listener.begin()
@@ -62,13 +63,13 @@ class LiveWorld(WorldSubject):
         return None
 
     def snapshot(self) -> State:
-        return State(self.accuracy, self.world.snapshot(), frozenset(self.listener.pairs))
+        return State(self.accuracy, self.world.snapshot(), self.listener.pushes)
 
     def restore(self, snapshot: State) -> None:
         self._set_world(*self._worlds[snapshot.accuracy])
         self.world.restore(snapshot.snapshot)
         self.listener.begin()
-        self.listener.pairs, self.listener.is_changed = set(snapshot.pairs), False
+        self.listener.pushes, self.listener.is_changed = snapshot.pushes, False
 
     def rehearsal(self) -> Callable[[], None]:
         world = physics.World(self.world.scene, dt=self.world.dt, accuracy=self.world.accuracy)
@@ -98,11 +99,11 @@ class LiveWorld(WorldSubject):
         return lambda: warm(world)
 
     def switch(self, name: str) -> None:
-        pairs, snapshot = self.listener.pairs, self.world.snapshot()
+        pushes, snapshot = self.listener.pushes, self.world.snapshot()
         self._set_world(*self._worlds[name])
         self.world.restore(fitted(snapshot, self.world))
         self.listener.begin()
-        self.listener.pairs, self.listener.is_changed = pairs, False
+        self.listener.pushes, self.listener.is_changed = pushes, False
 
 
 def direction_of(gravity: np.ndarray) -> np.ndarray:

@@ -54,10 +54,8 @@ def test_a_smooth_ellipsoid_lifts_off_as_it_turns_over_its_tip(spinning, frictio
         assert releases(found, 0) == pytest.approx([float(truth.time)], abs=LATE[accuracy]), dt
 
 
-@pytest.mark.parametrize("accuracy", LATE)
-@pytest.mark.parametrize("friction", sweep([None, 0.0], [None]))
-@pytest.mark.parametrize(("width", "rate"), [(0.05, 0.0), (0.4, -0.5)])
-def test_a_smooth_ladder_leaves_the_wall(width, rate, friction, accuracy, is_exhaustive):
+def leaning(width, rate):
+    """A smooth ladder that slides down a wall, and its release."""
     length, depth, mass, start = 2.0, 0.4, 3.0, 1.2
     shape = ladder(length, width, mass, G)
     truth = release(shape, start, rate, 0.05, "left")
@@ -67,10 +65,29 @@ def test_a_smooth_ladder_leaves_the_wall(width, rate, friction, accuracy, is_exh
         (length, width, depth), mass, pos=(float(shape.x(start)), float(shape.y(start)), 0), linvel=(*vel, 0),
         quat=(math.cos(turn / 2), 0, 0, math.sin(turn / 2)), angvel=(0, 0, -rate),
     )  # fmt: skip
+    return body, truth
+
+
+@pytest.mark.parametrize("accuracy", LATE)
+@pytest.mark.parametrize("friction", sweep([None, 0.0], [None]))
+@pytest.mark.parametrize(("width", "rate"), [(0.05, 0.0), (0.4, -0.5)])
+def test_a_smooth_ladder_leaves_the_wall(width, rate, friction, accuracy, is_exhaustive):
+    body, truth = leaning(width, rate)
     for dt in STEPS if is_exhaustive else STEPS[2::3]:
         found = simulated(body, [FLOOR, LEFT], friction, accuracy, dt, float(truth.time) + 0.002)
         assert releases(found, 1) == pytest.approx([float(truth.time)], abs=LATE[accuracy]), dt
         assert not releases(found, 0)
+
+
+@pytest.mark.parametrize("friction", sweep([None, 0.0], [None]))
+@pytest.mark.parametrize(("width", "rate"), [(0.05, 0.0), (0.4, -0.5)])
+def test_time_stepping_logs_a_release_within_a_step(width, rate, friction):
+    """It is let go at the end of the last step in which it was pushed, however long it stays within its slop after."""
+    body, truth = leaning(width, rate)
+    for dt in STEPS[:-1]:
+        found = simulated(body, [FLOOR, LEFT], friction, "balanced", dt, float(truth.time) + 0.03 + 3 * dt)
+        assert releases(found, 1) == pytest.approx([float(truth.time)], abs=dt), dt
+        assert [event.t for event in found.events] == sorted(event.t for event in found.events)
 
 
 @pytest.mark.parametrize("accuracy", LATE)

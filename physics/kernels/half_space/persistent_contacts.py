@@ -77,24 +77,27 @@ def is_persistent_contact(i, y, h, offset_frame, memory, work):
 
 @kernel
 def cancel_separation(y, h, offset_frame, memory, work):
-    """State with the one contact of the set at rest along its normal, if it holds on but h would not bring it back.
+    """State with the one contact of the set at rest along its normal, and whether it was not.
+
+    It is changed only where the contact holds on, but h would not bring it back.
 
     What leaves at u after a push p, though it is pressed against its wall still, got u/(n·W n) more than it should
     have. A smaller push of the next stage makes up for that. Where u is more than the motion without a push turns
-    round within h, so much is taken back, at most p: both together push.
+    round within h, so much is taken back, at most p: both together push. `work.rebound` has what was.
     """
     x, q, v, L = y
     gap, u, slot = work.gap[0], work.speed[0], work.slot[0]
     if not is_persistent_contact(0, y, h, offset_frame, memory, work):
-        return y
+        return y, False
     a = free_gap_acceleration(slot, y, offset_frame, work)
     if not (a < 0.0 and gap + h * (u + 0.5 * h * a) > 0.0):
-        return y
+        return y, False
     place_arms(1, qt.to_matrix(q), offset_frame, work)
     n, r = wall_normal(work.walls, wall_of(slot, work)), (work.arm[0, 0], work.arm[0, 1], work.arm[0, 2])
     m = qt.cross(r, n)
     spin = apply_inv_inertia(qt.to_matrix(principal_attitude(q, work, offset_frame)), m, work.J)
     p = min(u / (1.0 / work.mass + qt.dot(m, spin)), last_normal_impulse(slot, memory, work))
     s = p / work.mass
+    work.rebound[0], work.rebound[1], work.rebound[2] = -p, 0.0, 0.0
     v = (v[0] - s * n[0], v[1] - s * n[1], v[2] - s * n[2])
-    return x, q, v, (L[0] - p * m[0], L[1] - p * m[1], L[2] - p * m[2])
+    return (x, q, v, (L[0] - p * m[0], L[1] - p * m[1], L[2] - p * m[2])), True

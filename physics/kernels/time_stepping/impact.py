@@ -35,9 +35,10 @@ def set_plastic_targets(n, work):
 
 @inlined
 def resolve_impacts(n, y, t, h, contact, offset_frame, records, work):
-    """State after the impulses of the contacts that approach; unchanged when none does.
+    """State after the impulses of the contacts that approach, unchanged when none does; and whether nothing was hit.
 
-    It happens t [s] after the start of the call, with h [s] left of the substep.
+    It happens t [s] after the start of the call, with h [s] left of the substep. What goes on from the last stage has
+    hit nothing: its impulses are in `work.rebound`, and belong to the forces of the stage that follows.
     """
     x, q, v, L = y
     bounce_speed = work.rest_share * work.acceleration * h
@@ -47,10 +48,10 @@ def resolve_impacts(n, y, t, h, contact, offset_frame, records, work):
     if not may_have_impact(bounce_speed, slop_speed, work):
         if n == 1 and work.shape == ELLIPSOID and work.speed[0] > slop_speed:
             return cancel_separation(y, h, offset_frame, records.memory, work)
-        return y
+        return y, False
     found = set_impact_targets(n, bounce_speed, slop_speed, y, h, offset_frame, records.memory, work)
     if found == NO_IMPACT:
-        return y
+        return y, False
     place_arms(n, qt.to_matrix(q), offset_frame, work)
     set_tangential_targets(n, bounce_speed, y, offset_frame, work)
     for k in range(3 * n):
@@ -81,6 +82,10 @@ def resolve_impacts(n, y, t, h, contact, offset_frame, records, work):
             v_new, L_new, s = limit_rebound_energy(q, before, (v0, L0), (v_new, L_new), work, offset_frame)
             for k in range(3 * n):
                 work.impulse[k] += s * (work.rebound[k] - work.impulse[k])
-    if records.log.shape[1] > 0 and found == TRUE_IMPACT:
-        log_wall_impacts(n, rows_per_contact(contact), x, 0.0, t, work, records.log, records.counts)
-    return x, q, v_new, L_new
+    if found == TRUE_IMPACT:
+        if records.log.shape[1] > 0:
+            log_wall_impacts(n, rows_per_contact(contact), x, 0.0, t, work, records.log, records.counts)
+    else:
+        for k in range(3 * n):
+            work.rebound[k] = work.impulse[k]
+    return (x, q, v_new, L_new), found != TRUE_IMPACT

@@ -33,6 +33,7 @@ from __future__ import annotations
 from physics.kernels.compile.decorators import cold_kernel, if_given, inlined, kernel
 from physics.kernels.contact_law.compliance import contact_stiffness, correct_spring_depth
 from physics.kernels.contact_law.restitution_energy import lift_conserving_energy
+from physics.kernels.contact_solver.solve import rows_per_contact
 from physics.kernels.flight.free_flight import integrate_flight
 from physics.kernels.forces.energy_budget import has_work_error, limit_energy_gain
 from physics.kernels.forces.held_loads import (
@@ -82,7 +83,7 @@ from physics.kernels.state.sleeping import falls_asleep, remains_asleep, without
 from physics.kernels.time_stepping.event_log import clear_events, drop_events
 from physics.kernels.time_stepping.impact import resolve_impacts
 from physics.kernels.time_stepping.midpoint_step import midpoint_step
-from physics.kernels.time_stepping.warm_start import store_warm_start
+from physics.kernels.time_stepping.warm_start import add_to_warm_start, store_warm_start
 
 # Trials of one time of impact: a secant, then parabolas through the last three. Three are usual.
 IMPACT_TRIALS = 16
@@ -222,15 +223,18 @@ def substep(y, start, h, contact, flight, records, work):
             work.is_last = 1
         hold_loads(y, left, flight.gyroscopic, flight.offset_frame, work)
         n, depth = find_contact_set(y, left, flight.offset_frame, records.memory, work)
+        goes_on = False
         if n > 0:
             records.report[world, at.PENETRATION] = max(records.report[world, at.PENETRATION], depth)
             if not work.is_last and not contact_stiffness(work) > 0.0:
-                y = resolve_impacts(n, y, start + (h - left), left, contact, flight.offset_frame, records, work)
+                y, goes_on = resolve_impacts(n, y, start + (h - left), left, contact, flight.offset_frame, records, work)
         span = left
         is_cut = flies_exactly(flight) and cuts < MAX_TURNING_CUTS and not work.is_last
         if is_cut and may_turn(y[3], h, FAR_TURN, flight.offset_frame, work):
             span = limit_turning_stage(n, y, h, left, flight.gyroscopic, flight.offset_frame, work)
         end, t, is_deep = advance_to_impact(n, y, span, contact, flight, records, work)
+        if goes_on:
+            add_to_warm_start(n, rows_per_contact(contact), records.memory, work)
         if t == span and span < left:
             cuts += 1
             if cuts == MAX_TURNING_CUTS:

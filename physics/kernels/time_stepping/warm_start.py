@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from physics.kernels.compile.decorators import inlined, kernel
+from physics.kernels.compile.decorators import cold_kernel, inlined, kernel
 from physics.kernels.half_space.persistent_contacts import WALL_MEMORY_COUNT, WALL_MEMORY_HEAD, WALL_MEMORY_STAGE
 
 
@@ -59,3 +59,13 @@ def store_warm_start(n, width, memory, i, h, work):
         base = first + 3 * work.slot[k]
         for c in range(width):
             memory[i, base + c] = work.impulse[width * k + c]
+
+
+@cold_kernel
+def add_to_warm_start(n, width, memory, work):
+    """Add the impulses in `work.rebound` to those of the resting stage of the same contacts: forces are read there."""
+    first = WALL_MEMORY_HEAD + work.slot.shape[0]
+    for k in range(n):
+        base = first + 3 * work.slot[k]
+        for c in range(width):
+            memory[work.i, base + c] += work.rebound[width * k + c]

@@ -73,11 +73,15 @@ def tangent_basis(n):
 
 @inlined
 def write_contact_frame(k, n, many):
-    """Write the frame of contact k from its normal."""
-    t1, t2 = tangent_basis(n)
-    put_vector(many.contacts.frame, k, 0, n)
-    put_vector(many.contacts.frame, k, 3, t1)
-    put_vector(many.contacts.frame, k, 6, t2)
+    """Write the frame of contact k from its normal; that of the contact before it where normals are the same."""
+    frame = many.contacts.frame
+    if k > 0 and n == row_vector(frame, k - 1, 0):
+        t1, t2 = row_vector(frame, k - 1, 3), row_vector(frame, k - 1, 6)
+    else:
+        t1, t2 = tangent_basis(n)
+    put_vector(frame, k, 0, n)
+    put_vector(frame, k, 3, t1)
+    put_vector(frame, k, 6, t2)
 
 
 @inlined
