@@ -387,7 +387,9 @@ class World(Batch):
         points : (n, 3) float64
             World frame [m].
         forces : (n, 3) float64
-            On the body, of two bodies on the first one, averaged over the last resting stage, world frame [N].
+            On the body, of two bodies on the first one, averaged over the last resting stage, world frame [N]. Times
+            the step, with the impulses of logged impacts and all loads, they make up the change of momentum, unless an
+            impact has split the step or a body was pushed out of a wall.
         """
         self._check_index(world)
         return contact_forces(self, world)

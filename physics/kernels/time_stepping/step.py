@@ -227,7 +227,9 @@ def substep(y, start, h, contact, flight, records, work):
         if n > 0:
             records.report[world, at.PENETRATION] = max(records.report[world, at.PENETRATION], depth)
             if not work.is_last and not contact_stiffness(work) > 0.0:
-                y, goes_on = resolve_impacts(n, y, start + (h - left), left, contact, flight.offset_frame, records, work)
+                y, goes_on = resolve_impacts(
+                    n, y, start + (h - left), left, contact, flight.offset_frame, records, work
+                )
         span = left
         is_cut = flies_exactly(flight) and cuts < MAX_TURNING_CUTS and not work.is_last
         if is_cut and may_turn(y[3], h, FAR_TURN, flight.offset_frame, work):
