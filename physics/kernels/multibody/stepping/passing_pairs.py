@@ -34,6 +34,7 @@ from physics.kernels.multibody.data.contact_set import (
 )
 from physics.kernels.multibody.narrowphase.gjk import gjk_distance, support_point
 from physics.kernels.state.body import read_state
+from physics.kernels.state.layout import SPHERE
 
 # Share of the slop below which the distance between thinned bodies counts as none: what GJK cannot tell from rounding.
 _TOUCH_SHARE = 1.0e-2
@@ -45,11 +46,23 @@ _SAME_DIRECTION = 1.0 - 1.0e-7
 # the resting stage stops at its middle. Deeper is an impact, or an overlap that a user made.
 _MAX_DEPTH_SLOPS = 200.0
 
+# Bodies are taken thinner by no more than this share of the smallest half-width.
+_MAX_THINNING_SHARE = 0.5
+
 
 @inlined
 def _depth_after(k, h, many):
     """Depth of contact k after h at its speed now [m]."""
     return -many.contacts.gap[k] - h * many.contacts.speed[k]
+
+
+@inlined
+def _smallest_half_width(b, many):
+    """Smallest half-width of body b [m], of a hull that of the block that reaches as far."""
+    d = many.bodies.work[b].dims
+    if many.bodies.work[b].shape == SPHERE:
+        return d[0]
+    return min(d[0], min(d[1], d[2]))
 
 
 @kernel
@@ -63,7 +76,8 @@ def _thinning(a, b, n, h, many):
         depth = max(_depth_after(k, h, many), -many.contacts.gap[k])
         if depth <= _MAX_DEPTH_SLOPS * slop:
             landing = max(landing, depth)
-    return slop + landing
+    most = _MAX_THINNING_SHARE * min(_smallest_half_width(a, many), _smallest_half_width(b, many))
+    return min(slop + landing, most)
 
 
 @inlined
