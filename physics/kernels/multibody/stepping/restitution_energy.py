@@ -116,10 +116,10 @@ def _apply_frictionless(n, offset_frame, many):
 
 @kernel
 def apply_impact_within_energy(n, world, friction, offset_frame, report, many):
-    """Solve and apply the n contacts of an impact; with friction, with as much rebound as there is energy for."""
-    if friction is None:
-        solve_and_apply(n, world, friction, report, many)
-        return
+    """Solve and apply the n contacts of an impact with as much rebound as there is energy for.
+
+    With friction the law itself may ask for more than there is; without, what a loose solve leaves.
+    """
     _save_momenta(_PRE_IMPACT, many)
     before = world_kinetic_energy(offset_frame, many)
     most = before + _ENERGY_TOLERANCES * many.settings[0].tolerance * before
