@@ -248,12 +248,12 @@ def max_impulse_speed(first, last, many):
 
 @inlined
 def max_body_speed(many):
-    """No point of a body is faster than this [m/s]."""
+    """No point of a body that something is near is faster than this [m/s]."""
     most = 0.0
     for b in range(many.bodies.twist.shape[0]):
-        most = max(
-            most, point_speed_bound(row_vector(many.bodies.twist, b, 0), row_vector(many.bodies.twist, b, 3), b, many)
-        )
+        if many.bodies.touched[b] == 1:
+            v, w = row_vector(many.bodies.twist, b, 0), row_vector(many.bodies.twist, b, 3)
+            most = max(most, point_speed_bound(v, w, b, many))
     return most
 
 
