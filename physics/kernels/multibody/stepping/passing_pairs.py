@@ -46,7 +46,7 @@ _SAME_DIRECTION = 1.0 - 1.0e-7
 # the resting stage stops at its middle. Deeper is an impact, or an overlap that a user made.
 _MAX_DEPTH_SLOPS = 200.0
 
-# Bodies are taken thinner by no more than this share of the smallest half-width.
+# Share of the smallest half-width by which bodies are taken thinner at most.
 _MAX_THINNING_SHARE = 0.5
 
 
