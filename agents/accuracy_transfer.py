@@ -22,7 +22,7 @@ from agents.config import HYPERPARAMETERS, RunConfig, RunFolder, make_config
 from agents.curve import plot_transfer
 from agents.evaluate import JsonOption, evaluate, write_json
 from agents.train import DEFAULTS, INTERRUPTED, Interrupted, train
-from physics.plan.accuracy import PRESETS
+from physics.accuracy import PRESETS
 from rigid_env.cli.files import PLOTS, output_option
 from rigid_env.lab.measure import machine
 from rigid_env.terminal import Table, make_console, number_columns, run_program

@@ -88,7 +88,7 @@ def main(
     console = Console()
     presets = accuracy or (list(physics.PRESETS) if env else ["balanced"])
     for name in presets:
-        physics.plan.accuracy.resolve(name)
+        physics.accuracy.resolve(name)
     jobs = [(preset, name) for preset in presets for name in env or [None]]
     found: dict = {}
     console.print(machine.headline())

@@ -11,6 +11,7 @@ The contract in five lines::
 
 from typing import TYPE_CHECKING
 
+from physics.accuracy import PRESETS, Accuracy
 from physics.analysis.diagnostics import Diagnostics, diagnose, look_at
 from physics.analysis.events import Event
 from physics.analysis.simulate import simulate
@@ -20,7 +21,6 @@ from physics.io.recorder import Recorder
 from physics.io.recording import Recording, Replay
 from physics.io.toml import load_scene, save_scene
 from physics.keywords import no_attribute as _no_attribute
-from physics.plan.accuracy import PRESETS, Accuracy
 from physics.plan.plan import make_plan
 from physics.scene import canonical_scenes as scenes
 from physics.scene.bodies import Block, Body, Ellipsoid, Hull, Sphere

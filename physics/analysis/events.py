@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 from physics.html_table import fields_table
 from physics.kernels.time_stepping import event_log
-from physics.world.contact_report import pushing_ends
+from physics.world.contacts import contacts_of_world
 from physics.world.world import World
 
 # A body, and the other one or -1 - k for wall k.
@@ -114,8 +114,9 @@ def last_pushes(world: World, before: Mapping[Pair, float], t: float) -> dict[Pa
         From body, and other body or -1 - k for wall k, to a time [s]. Of a contact that has not pushed yet it is the
         time at which it was first seen.
     """
-    pushing = {(int(body), int(other)) for body, other in pushing_ends(world, 0)}
-    touching = {(int(body), int(other)) for body, other in world.contact_ends()}
+    found = contacts_of_world(world, 0)
+    touching = [(int(body), int(other)) for body, other in found.ends[0]]
+    pushing = {pair for pair, is_pushing in zip(touching, found.force[0].any(axis=1)) if is_pushing}
     return {pair: t if pair in pushing else before.get(pair, t) for pair in touching}
 
 

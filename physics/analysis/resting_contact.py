@@ -69,7 +69,7 @@ def resting_contact(
         raise ValueError(
             f"index, body is {index}, {body}; allowed are below {world.worlds} worlds and {world.body_count} bodies"
         )
-    if world.plan.many:
+    if world.plan.scheme.couples_bodies:
         raise ValueError("world has contact between bodies; allowed here are scenes with Contact(between_bodies=False)")
     if world.scene.bodies[body].kind == "hull":
         raise ValueError(f"body is {body}, a hull; allowed are blocks, spheres and ellipsoids")

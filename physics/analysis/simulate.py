@@ -11,13 +11,13 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from physics import validation
+from physics.accuracy import Accuracy
 from physics.analysis.contact_samples import contact_samples, contacts_of
 from physics.analysis.diagnostics import diagnose
 from physics.analysis.events import Event, Pair, contact_events, fault_events, last_pushes, logged_events, named
 from physics.analysis.trajectory import Trajectory
 from physics.annotations import Preset
 from physics.keywords import known_keywords
-from physics.plan.accuracy import Accuracy
 from physics.scene.scene import Scene
 from physics.world.report import StepReport, add_report
 from physics.world.world import World
@@ -82,7 +82,7 @@ def simulate(
     else:
         times[-1] = min(times[-1], duration) if whole else times[-1]
     samples, contacts, events, reports = [_sample(world)], [contacts_of(world)], [], []
-    watch = _logged if world.plan.events else _Touching()
+    watch = _logged if world.plan.scheme.logs_all_events else _Touching()
     world.make_event_room(EVENT_ROOM)
     for start, end in pairwise(times):
         is_short = end == times[-1] and len(times) > whole + 1

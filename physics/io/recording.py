@@ -19,13 +19,13 @@ from zipfile import is_zipfile
 import numpy as np
 
 from physics import validation
+from physics.accuracy import Accuracy
 from physics.analysis.diagnostics import diagnose
 from physics.html_table import parts_table
 from physics.io.toml import from_toml, to_toml
 from physics.kernels.compile.cache_folder import folder_name
 from physics.kernels.compile.compiler_choice import COMPILER, FUSED
 from physics.kernels.state import layout as at
-from physics.plan.accuracy import Accuracy
 from physics.scene.force_field import Field
 from physics.scene.scene import Scene
 from physics.summary import parts_repr

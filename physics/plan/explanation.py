@@ -146,25 +146,25 @@ def _sleeping_row(scene, touching, sleeping) -> Row:
     return Row("sleeping", False, f"declared, but nothing rests under what may change on its own: {names}", "")
 
 
-def make_rows(scene, accuracy, seen, refined) -> tuple[Row, ...]:
-    """All rows of a plan; `seen` holds what `physics.plan.plan.make_plan` found out of the scene."""
-    contact, friction, touching, rubbing = seen.contact, seen.friction, seen.touching, seen.rubbing
+def make_rows(scene, accuracy, needs, refined) -> tuple[Row, ...]:
+    """All rows of a plan; `needs` are those of the scene (`physics.scene.needs`)."""
+    contact, friction, touching, rubbing = needs.contact, needs.friction, needs.touching, needs.rubbing
     return (
-        _gravity_row(seen.gravity),
+        _gravity_row(needs.gravity),
         Row("applied wrench", True, "given to step(wrench)", "six numbers per body, zero without one"),
         _actuator_row(scene),
-        _sleeping_row(scene, touching, seen.sleeping),
+        _sleeping_row(scene, touching, needs.sleeping),
         _contact_row(scene, contact),
-        _between_row(scene, contact, seen.meeting),
+        _between_row(scene, contact, needs.meeting),
         _friction_row(friction, rubbing),
         _restitution_row(contact, touching),
-        _tangential_row(scene, contact, seen.laws),
-        _compliance_row(contact, seen.laws),
-        _resistance_row(scene, RollingFriction, LAW_ROLLING, seen.laws),
-        _resistance_row(scene, SpinFriction, LAW_SPIN, seen.laws),
-        _gyroscopic_row(seen.isotropic, seen.turned),
-        _center_row(seen.uneven),
-        *_field_rows(seen.fields),
+        _tangential_row(scene, contact, needs.laws),
+        _compliance_row(contact, needs.laws),
+        _resistance_row(scene, RollingFriction, LAW_ROLLING, needs.laws),
+        _resistance_row(scene, SpinFriction, LAW_SPIN, needs.laws),
+        _gyroscopic_row(needs.isotropic, needs.turned),
+        _center_row(needs.uneven),
+        *_field_rows(needs.fields),
         Row("free motion", True, f"scheme {accuracy.scheme}, {_counted(accuracy.substeps, 'substep')} per dt",
             "parts that meet an error" if refined else ""),
     )  # fmt: skip

@@ -6,10 +6,10 @@ from collections.abc import Callable
 from dataclasses import dataclass, fields
 from typing import Protocol
 
+from physics.accuracy import PRESETS, Accuracy, resolve
 from physics.analysis.simulate import simulate
 from physics.analysis.trajectory import Trajectory
 from physics.annotations import Preset
-from physics.plan.accuracy import PRESETS, Accuracy, resolve
 from physics.scene.scene import Scene
 from physics.world.stepper import Stepper
 from physics.world.world import World

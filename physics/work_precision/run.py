@@ -12,10 +12,10 @@ from typing import Any
 import numpy as np
 
 from physics import validation
+from physics.accuracy import Accuracy, resolve
 from physics.analysis.trajectory import Trajectory
 from physics.annotations import Preset
 from physics.keywords import known_keywords
-from physics.plan.accuracy import Accuracy, resolve
 from physics.scene.scene import Scene
 from physics.summary import shown
 from physics.work_precision.contender import OURS, Contender, EngineContender, TooSlow

@@ -9,12 +9,12 @@ from functools import cached_property
 import numpy as np
 
 from physics import validation
+from physics.accuracy import Accuracy, resolve
 from physics.analysis.simulate import simulate
 from physics.analysis.trajectory import Trajectory
 from physics.annotations import Preset
 from physics.html_table import fields_table
 from physics.keywords import known_keywords
-from physics.plan.accuracy import Accuracy, resolve
 from physics.scene.scene import Scene
 from physics.summary import shown
 from physics.work_precision.errors import angles_between, distances, event_error, root_mean_square

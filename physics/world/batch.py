@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING, Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from physics.accuracy import Accuracy
 from physics.kernels.state.sleeping import Sleep
 from physics.kernels.time_stepping.workspace import body_records
 from physics.parallel.bound_call import Work
 from physics.parallel.team import Team
-from physics.plan.accuracy import Accuracy
 from physics.plan.plan import Plan
 from physics.scene.effects import Actuator, Sleeping
 from physics.scene.scene import Scene
@@ -158,7 +158,7 @@ class Batch:
     def kept_rows(self) -> tuple[int, ...]:
         """Rows that one world has in each of the `kept` arrays; 0: it has one row for all worlds, which is not used."""
         bodies = self.body_count
-        memory = 1 if self.plan.many else bodies if self.plan.contact else 0
+        memory = self.plan.scheme.memory.rows_per_world(bodies) if self.plan.contact else 0
         return (bodies, bodies, 1, memory, 1, bodies) if self.plan.sleeping else (bodies, bodies, 1, memory, 1)
 
     def sleep_of_kernel(self) -> Sleep | None:

@@ -9,7 +9,6 @@ import numpy as np
 from physics import validation
 from physics.kernels.compile.decorators import entry_kernel
 from physics.kernels.flight.free_rotation import attitude_series, write_attitude_series
-from physics.kernels.multibody.data.hull_tables import CUBE
 from physics.kernels.state import layout as at
 from physics.kernels.state.contact_law_dispatch import (
     LAW_ANISOTROPY,
@@ -51,14 +50,6 @@ def write_bodies(params: np.ndarray, bodies: tuple[Body, ...]) -> None:
             params[b :: len(bodies)], body, np.array([body.mass]), moments[None], R[None], body.dimensions[None]
         )
     _write_series(params)
-
-
-def polyhedra(bodies: tuple[Body, ...]) -> list:
-    """Polyhedra of a scene's bodies for `hull_tables.make_hulls`; empty where none is a hull."""
-    if not any(body.kind == "hull" for body in bodies):
-        return []
-    blocks = {"block": CUBE}
-    return [body.polyhedron if body.kind == "hull" else blocks.get(body.kind) for body in bodies]
 
 
 def _write_body(rows, body, masses, moments, R, dimensions) -> None:

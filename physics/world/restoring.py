@@ -8,14 +8,14 @@ import numpy as np
 
 from physics import validation
 from physics.kernels.state import layout as at
-from physics.plan.plan import is_isotropic
+from physics.scene.needs import is_isotropic
 from physics.summary import shown
 from physics.world import choice
 from physics.world.batch import Batch
+from physics.world.file_numbers import check_numbers
 from physics.world.gusts import reads_time
 from physics.world.scene_settings import other_setting
 from physics.world.snapshot import KEPT, Snapshot
-from physics.world.warm_starts import check_numbers, copy_memory
 
 
 class Places(NamedTuple):
@@ -112,8 +112,8 @@ def _put_actuation(world: Batch, snapshot: Snapshot, at_places: Places) -> None:
 
 def _copy(world: Batch, source: np.ndarray, target: np.ndarray, is_memory: bool) -> None:
     """Copy one of the kept arrays, of all its worlds."""
-    if is_memory:
-        copy_memory(world, source, target)
+    if is_memory and world.plan.contact:
+        world.plan.scheme.memory.copy(source, target)
     else:
         target[...] = source
 

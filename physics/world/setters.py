@@ -223,7 +223,7 @@ def _adopt(world: Batch, chosen, rows, state, params, what, keep_memory=False) -
     if world.plan.sleeping:
         world.sleep[rows] = 0.0
     if world.plan.contact and not keep_memory:
-        world.memory[chosen if world.plan.many else rows] = 0.0
+        world.memory.reshape(world.worlds, -1)[chosen] = 0.0
     if world.recorder is not None:
         world.recorder.changed(chosen)
 

@@ -3,24 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from physics import validation
-from physics.kernels.event_driven.step import step_events
-from physics.kernels.multibody.stepping.step import step_many
-from physics.kernels.state.groups import (
-    BodyArrays,
-    ContactSwitches,
-    FlightSwitches,
-    MultibodySwitches,
-    Records,
-    TimeGrid,
-    WorkQueue,
-)
-from physics.kernels.time_stepping.spring_coupled_step import step_linked
-from physics.kernels.time_stepping.step import step_worlds
+from physics.kernels.state.groups import BodyArrays, TimeGrid, WorkQueue
 from physics.keywords import known_keywords
 from physics.parallel.bound_call import Work, bound_alike
 from physics.parallel.exclusive import in_use
@@ -29,9 +17,6 @@ from physics.world.batch import Batch
 
 # Which argument of all step kernels the `TimeGrid` is.
 GRID = 1
-
-if TYPE_CHECKING:
-    from physics.plan.plan import Plan
 
 
 @known_keywords
@@ -179,12 +164,12 @@ def kernel_calls(
     if world.actuation is not None:
         wrench = world.actuation.applied
     grid = _time_grid(world, steps, dt)
-    kernel, own_arguments = _step_of(plan)
+    scheme = plan.scheme
     gravity = world.gravity if plan.gravity else None
     bodies = BodyArrays(world.state, world.params, world.shapes, gravity, wrench.reshape(-1, 6))
-    argument_lists = [(queue, grid, bodies, *own_arguments(world, k)) for k, queue in enumerate(queues)]
+    argument_lists = [(queue, grid, bodies, *scheme.arguments(world, k)) for k, queue in enumerate(queues)]
     key = (plan.key, len(world.walls))
-    return [bound_alike(key, kernel, *arguments) for arguments in argument_lists]
+    return [bound_alike(key, scheme.kernel, *arguments) for arguments in argument_lists]
 
 
 def retime(world: Batch, calls: list[Work], steps: int, dt: float) -> None:
@@ -197,49 +182,3 @@ def _time_grid(world: Batch, steps: int, dt: float) -> TimeGrid:
     """Time that a kernel is called for."""
     substeps = world.accuracy.substeps
     return TimeGrid(1 if takes_each_step(world) else steps, substeps, dt / substeps)
-
-
-def _step_of(plan: Plan) -> tuple[Callable, Callable[[Batch, int], tuple]]:
-    """The step kernel of a plan, and what gives the arguments that it alone has for one thread."""
-    if plan.many:
-        return step_many, _many_arguments
-    if plan.linked:
-        return step_linked, _linked_arguments
-    if plan.events:
-        return step_events, _event_arguments
-    return step_worlds, _world_arguments
-
-
-def _many_arguments(world: Batch, k: int) -> tuple:
-    plan = world.plan
-    switches = MultibodySwitches(plan.friction, _flight(plan), plan.ellipsoids, plan.hulls), plan.restitution
-    return *switches, world.motions[k], world.sleep_of_kernel(), _records(world), world.scratch[k]
-
-
-def _linked_arguments(world: Batch, k: int) -> tuple:
-    held = None if world.plan.events else True
-    return _flight(world.plan), held, world.plan.events, _records(world), world.scratch[k]
-
-
-def _records(world: Batch) -> Records:
-    return Records(world.memory, world.report_table, world.event_log, world.event_counts)
-
-
-def _contact(plan: Plan) -> ContactSwitches:
-    return ContactSwitches(plan.contact, plan.friction, plan.pivots)
-
-
-def _flight(plan: Plan) -> FlightSwitches:
-    return FlightSwitches(plan.gyroscopic, plan.offset_frame, plan.scheme)
-
-
-def _event_arguments(world: Batch, k: int) -> tuple:
-    plan = world.plan
-    switches = _contact(plan), plan.restitution, _flight(plan)
-    return *switches, _records(world), world.scratch[k], world.motions[k]
-
-
-def _world_arguments(world: Batch, k: int) -> tuple:
-    plan = world.plan
-    switches = _contact(plan), plan.restitution, _flight(plan)
-    return *switches, world.sleep_of_kernel(), _records(world), world.scratch[k]

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from physics import validation
+from physics.accuracy import PRESETS, Accuracy, resolve
 from physics.annotations import Preset
 from physics.html_table import parts_table
 from physics.kernels.forces.force_field_dispatch import register_terms
@@ -19,7 +20,6 @@ from physics.keywords import known_keywords
 from physics.parallel.bound_call import Work
 from physics.parallel.exclusive import exclusive, in_use, watch
 from physics.parallel.team import Team
-from physics.plan.accuracy import PRESETS, Accuracy, resolve
 from physics.plan.plan import SHAPE_CODES, make_plan
 from physics.scene.body_names import body_names
 from physics.scene.effects import Actuator, Friction, RollingFriction, SpinFriction
@@ -29,7 +29,7 @@ from physics.summary import counted
 from physics.world import batch_arrays, parameters, restoring, setters
 from physics.world.actuator import Actuation
 from physics.world.batch import Batch
-from physics.world.contact_report import contact_ends, contact_forces
+from physics.world.contacts import contacts_of_world
 from physics.world.report import StepReport
 from physics.world.rollback import Before
 from physics.world.scene_settings import scene_settings
@@ -109,7 +109,7 @@ class World(Batch):
         friction = self.scene.effect(Friction)
         along = friction.directions(len(self.scene.walls)) if friction else None
         self.walls = parameters.wall_table(self.scene.walls, along)
-        self.memory = batch_arrays.make_memory(self.scene, self.plan, self.worlds)
+        self.memory = np.zeros(self.plan.scheme.memory.shape(self.scene, self.plan, self.worlds))
         self.sleep = np.zeros((rows if self.plan.sleeping else 0, SLEEP_SIZE))
         self.report_table = np.zeros((self.worlds, at.REPORT_SIZE))
         self.event_counts = np.zeros(rows, dtype=np.int64)
@@ -128,9 +128,12 @@ class World(Batch):
         register_terms(self.plan.terms)
         self._may_raise = self.plan.may_raise
         self.scratch = [
-            batch_arrays.make_scratch(self.scene, self.plan, self.walls, self.accuracy) for _ in range(self.team.size)
+            self.plan.scheme.make_scratch(self.scene, self.plan, self.walls, self.accuracy)
+            for _ in range(self.team.size)
         ]
-        self.motions = [batch_arrays.make_motion(self.scene, self.plan, self.accuracy) for _ in range(self.team.size)]
+        self.motions = [
+            self.plan.scheme.make_motion(self.scene, self.plan, self.accuracy) for _ in range(self.team.size)
+        ]
         self._wrench = self.no_wrench()
         self._calls: list[Work] = []
         self._bound_for: tuple | None = None  # arguments of `step`: the next call with the same finds all bound
@@ -392,12 +395,13 @@ class World(Batch):
             impact has split the step or a body was pushed out of a wall.
         """
         self._check_index(world)
-        return contact_forces(self, world)
+        found = contacts_of_world(self, world)
+        return found.point[0], found.force[0]
 
     def contact_ends(self, world: int = 0) -> NDArray[np.int64]:
         """(n, 2) int64: body, and other body or -1 - k for wall k, of each of the `contacts` of one world."""
         self._check_index(world)
-        return contact_ends(self, world)
+        return contacts_of_world(self, world).ends[0]
 
     def touching(self, world: int = 0) -> set[tuple[int, int]]:
         """(body, wall) of every resting contact with a wall of one world at its last step."""

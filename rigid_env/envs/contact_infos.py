@@ -7,11 +7,12 @@ from typing import Any
 import numpy as np
 
 from physics import validation
+from physics.schemes.contacts import Contacts
+from physics.world.contacts import read_contacts
 from rigid_env.tasks import Task
-from rigid_env.tasks.contacts import Contacts, read_contacts
 
 KEYS = tuple(f"contact_{field}" for field in Contacts._fields)
-"""Keys of infos, in the order of the fields of `rigid_env.tasks.contacts.Contacts`."""
+"""Keys of infos, in the order of the fields of `physics.schemes.contacts.Contacts`."""
 
 MOST_ROWS = 65_536
 

@@ -82,7 +82,7 @@ def contact_force(body: int = 0, bound: float = REACH) -> Entry:
 def contact_impulse(body: int = 0, scale: float = IMPULSE, bound: float = REACH) -> Entry:
     """Sum of the contact impulses on a body over its weight, of the last resting stage; collisions have no part in it.
 
-    A stage is what the last physics step ends with: see `rigid_env.tasks.contacts.Contacts`.
+    A stage is what the last physics step ends with: see `physics.schemes.contacts.Contacts`.
     """
     names = _names("contact impulse", body)
     read = lambda worlds: worlds.contact_impulse[:, body] / worlds.weight[:, body, None]  # noqa: E731

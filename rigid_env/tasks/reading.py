@@ -1,4 +1,4 @@
-"""Quantities of many worlds that are worked out from their state: rotations, gaps to walls, contact forces.
+"""Quantities of many worlds that are worked out from their state: rotations and gaps to walls.
 
 Compiled, each in one call for all worlds. An array of results has a row for each world of `indices`.
 """
@@ -9,9 +9,7 @@ import numpy as np
 
 from physics.kernels.compile.decorators import entry_kernel
 from physics.kernels.half_space import support_function as geo
-from physics.kernels.half_space.persistent_contacts import WALL_MEMORY_HEAD, WALL_MEMORY_STAGE
 from physics.kernels.math import quaternion as qt
-from physics.kernels.multibody.data import arrays as many
 from physics.kernels.state import layout as at
 from physics.rotations import rotation_matrices
 from physics.world.world import World
@@ -44,40 +42,6 @@ def _wall_gaps(indices, state, params, shapes, walls, out):
                 out[k, b, w] = qt.dot(n, x) - walls[w, at.WALL_OFFSET] - reach
 
 
-@entry_kernel
-def _wall_forces(indices, memory, walls, features, out):
-    bodies = out.shape[1]
-    impulses = WALL_MEMORY_HEAD + (memory.shape[1] - WALL_MEMORY_HEAD) // 4
-    for k in range(indices.shape[0]):
-        for b in range(bodies):
-            i = indices[k] * bodies + b
-            for slot in range(int(memory[i, 1])):
-                s = int(memory[i, WALL_MEMORY_HEAD + slot])
-                wall = s // features
-                for j in range(3):
-                    axis = at.WALL_NORMAL + 3 * j
-                    impulse = memory[i, impulses + 3 * s + j] / memory[i, 0]
-                    for c in range(3):
-                        out[k, b, c] += impulse * walls[wall, axis + c]
-
-
-@entry_kernel
-def _all_forces(indices, memory, out):
-    for k in range(indices.shape[0]):
-        i = indices[k]
-        length = memory[i, many.WARM_STAGE_LENGTH]
-        if length == 0.0:  # nothing touched yet
-            continue
-        for c in range(int(memory[i, many.WARM_CONTACT_COUNT])):
-            row = many.WARM_HEADER_SIZE + many.WARM_CONTACT_SIZE * c
-            a, b = int(memory[i, row + many.WARM_BODY_A]), int(memory[i, row + many.WARM_BODY_B])
-            for j in range(3):
-                force = memory[i, row + many.WARM_IMPULSE + j] / length
-                out[k, a, j] += force
-                if b >= 0:
-                    out[k, b, j] -= force
-
-
 def write_rotations(world: World, indices: np.ndarray, out: np.ndarray) -> None:
     """Rotation matrices, body to world, into `out` (n, bodies, 3, 3)."""
     _rotations(indices, world.state, out)
@@ -92,27 +56,3 @@ def write_wall_gaps(world: World, indices: np.ndarray, out: np.ndarray) -> None:
             R = rotation_matrices(world.quat[indices, b])
             reach = np.einsum("wi,kij,vj->kwv", normals, R, body.polyhedron.vertices).min(axis=-1)
             out[:, b] = world.pos[indices, b] @ normals.T - offsets + reach
-
-
-def write_contact_forces(world: World, indices: np.ndarray, out: np.ndarray) -> None:
-    """Sums of the contact forces on bodies in the last step [N], world frame, into `out` (n, bodies, 3)."""
-    out[...] = 0.0
-    if not world.plan.contact:
-        return
-    if world.plan.many:
-        _all_forces(indices, world.memory, out)
-    else:
-        _wall_forces(indices, world.memory, world.walls, world.plan.features, out)
-
-
-def write_contact_impulses(world: World, indices: np.ndarray, out: np.ndarray) -> None:
-    """Sums of the contact impulses on bodies, as `rigid_env.tasks.contacts.Contacts` tells them, into `out`."""
-    write_contact_forces(world, indices, out)
-    if not world.plan.contact:
-        return
-    if world.plan.many:
-        out *= world.memory[indices, many.WARM_STAGE_LENGTH, None, None]
-    elif world.plan.events:
-        out *= world.dt
-    else:
-        out *= world.memory[:, WALL_MEMORY_STAGE].reshape(world.worlds, world.body_count)[indices, :, None]

@@ -7,9 +7,10 @@ from typing import Any
 
 import numpy as np
 
-from rigid_env.tasks.contacts import Contacts, contact_rows, read_contacts
+from physics.schemes.contacts import Contacts
+from physics.world.contacts import contact_rows, read_contacts, write_contact_forces, write_contact_impulses
 from rigid_env.tasks.named import Named
-from rigid_env.tasks.reading import write_contact_forces, write_contact_impulses, write_rotations, write_wall_gaps
+from rigid_env.tasks.reading import write_rotations, write_wall_gaps
 
 
 def read_only(array: np.ndarray) -> np.ndarray:
@@ -100,7 +101,7 @@ class Worlds:
 
     @property
     def contacts(self) -> Contacts:
-        """Contacts of the last physics step, at most 12 rows for each body; see `rigid_env.tasks.contacts.Contacts`."""
+        """Contacts of the last physics step, at most 12 rows for each body; see `physics.schemes.contacts.Contacts`."""
         return self._contacts_of(contact_rows(self._task.world))
 
     def contacts_of(self, body: int, count: int) -> Contacts:

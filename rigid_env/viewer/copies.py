@@ -9,8 +9,8 @@ import numpy as np
 
 import physics
 from physics import Contact, Friction, Gravity
+from physics.accuracy import PRESETS, Accuracy, resolve
 from physics.annotations import Preset
-from physics.plan.accuracy import PRESETS, Accuracy, resolve
 from physics.world.snapshot import KEPT
 
 CUSTOM = "custom"

@@ -11,8 +11,8 @@ import gymnasium as gym
 import numpy as np
 from gymnasium import spaces
 
+from physics.accuracy import Accuracy
 from physics.annotations import Preset
-from physics.plan.accuracy import Accuracy
 from rigid_env.tasks.disturbances import Disturbances
 from rigid_env.tasks.state import TaskState
 from rigid_env.viewer.copies import copied, fitted

@@ -12,7 +12,6 @@ import numpy as np
 
 import physics
 from physics import PRESETS
-from physics.kernels.multibody.stepping.adaptive_substep import MIN_RELATIVE_SLOP, MIN_SOLVER_TOLERANCE
 from physics.work_precision.errors import angles_between
 from physics.work_precision.truth import LOOSER
 from rigid_env.rendering import Frame
@@ -48,8 +47,9 @@ class Ghost:
     def __init__(self, world: physics.World):
         best = PRESETS[REFERENCE]
         self.world = physics.World(world.scene, dt=world.dt, accuracy=best)
-        self.is_estimate = bool(self.world.plan.refined or self.world.plan.linked)
-        looser = _looser(best, bool(self.world.plan.refined))
+        scheme = self.world.plan.scheme
+        self.is_estimate = not scheme.is_event_driven
+        looser = _looser(scheme.acting(best))
         self._looser = physics.World(world.scene, dt=world.dt, accuracy=looser) if self.is_estimate else None
         self.cost = Cost()
         self.start(world.snapshot())
@@ -123,11 +123,9 @@ def _take(world: physics.World, call: Call) -> None:
         world.step(call.wrench, call.steps, call.dt)
 
 
-def _looser(best: physics.Accuracy, is_refined: bool) -> physics.Accuracy:
-    """Accuracy with tolerances ten times as large as those that act: where bodies touch these have least values."""
-    least = (MIN_SOLVER_TOLERANCE, MIN_RELATIVE_SLOP) if is_refined else (0.0, 0.0)
-    tolerance, slop = (LOOSER * max(pair) for pair in zip((best.tolerance, best.slop), least))
-    return replace(best, tolerance=tolerance, slop=slop)
+def _looser(acting: physics.Accuracy) -> physics.Accuracy:
+    """Accuracy with tolerances ten times as large."""
+    return replace(acting, tolerance=LOOSER * acting.tolerance, slop=LOOSER * acting.slop)
 
 
 def distance(one: physics.World, other: physics.World) -> tuple[float, float]:

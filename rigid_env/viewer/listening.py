@@ -101,7 +101,7 @@ class Listener:
         self.seconds += time.perf_counter() - self._clock
         world, report = self._world, self._world.report
         events = logged_events(world, self._from)
-        if not world.plan.events:
+        if not world.plan.scheme.logs_all_events:
             before, self.pushes = self.pushes, last_pushes(world, self.pushes, world.time)
             events += contact_events(before, self.pushes, world.time) + fault_events(world, world.time)
         self.events += named(events, world.names)

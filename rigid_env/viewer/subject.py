@@ -11,7 +11,7 @@ import numpy as np
 
 import physics
 from physics import scenes, validation
-from physics.plan.accuracy import resolve
+from physics.accuracy import resolve
 from physics.summary import shown
 from rigid_env.viewer.interface import Subject
 from rigid_env.viewer.replays import PlayedRecording, PlayedTrajectory

@@ -355,7 +355,7 @@ def test_without_contact_between_them_bodies_are_alone():
         alone.step(steps=200)
         # A sphere alone needs no gyroscopic torque, and its kernel leaves it out: equal to rounding there.
         np.testing.assert_allclose(both.pos[0, b], alone.pos[0, 0], atol=1e-12)
-    assert not both.plan.many
+    assert not both.plan.scheme.couples_bodies
     assert "declared without contact between bodies" in both.plan.explain()
 
 
@@ -368,7 +368,7 @@ def test_what_is_not_known_yet_is_refused():
         physics.Contact(between_bodies=1)
     world = physics.World(physics.Scene(two, FLOOR, [physics.Gravity(), physics.Contact(between_bodies=False)]),
                           accuracy="precise")  # fmt: skip
-    assert not world.plan.many
+    assert not world.plan.scheme.couples_bodies
 
 
 @pytest.mark.compiled

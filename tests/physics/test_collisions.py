@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 import physics
 from physics import scenes
-from physics.plan.accuracy import PRESETS
+from physics.accuracy import PRESETS
 from tests.reference import impacts
 
 pytestmark = pytest.mark.interpreted

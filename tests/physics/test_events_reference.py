@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 
 import physics
 from physics import scenes
-from physics.plan.accuracy import PRESETS
+from physics.accuracy import PRESETS
 
 # Control periods of an agent that pushes with all its strength, found by the soak of the environments.
 FOUND = {

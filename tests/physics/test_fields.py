@@ -441,7 +441,7 @@ def test_bodies_that_may_touch_each_other_feel_fields_as_each_alone_does():
     # Compiled before, without fields: a record may stand for one that it begins with, but these kernels must not.
     physics.World(physics.Scene([ball, brick], effects=[GRAVITY, physics.Contact()]), dt=0.01).step()
     both = physics.World(physics.Scene([ball, brick], effects=effects), dt=0.01)
-    assert both.plan.many
+    assert both.plan.scheme.couples_bodies
     both.step(steps=100)
     for b, body in enumerate((ball, brick)):
         alone = replace(springs[b], body=0)

@@ -317,7 +317,7 @@ def test_a_lone_hull_has_the_step_of_many_bodies_and_says_so():
     laws = [physics.Gravity(), physics.Contact(), physics.Friction(0.5)]
     one = physics.Scene([physics.Hull(WEDGE, 1.0, pos=(0, 2, 0))], [FLOOR], laws)
     plan = physics.make_plan(one, physics.Accuracy())
-    assert plan.many
+    assert plan.scheme.couples_bodies
     assert plan.hulls
     assert not plan.meeting
     assert "corners of hulls" in plan.explain()

@@ -12,7 +12,7 @@ import pytest
 
 import physics
 from physics import scenes
-from physics.plan.accuracy import resolve
+from physics.accuracy import resolve
 
 BLOCK = physics.Block((5, 3, 2), 6.0, pos=(0, 5, 0))
 CUBE = physics.Block((2, 2, 2), 6.0, pos=(0, 5, 0))

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 import physics
+from physics.accuracy import PRESETS
 from physics.kernels.multibody.stepping.adaptive_substep import ERROR_PER_TOLERANCE
-from physics.plan.accuracy import PRESETS
 
 G = 9.81
 FLOOR = physics.HalfSpace((0, 1, 0))

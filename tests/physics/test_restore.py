@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 import physics
 from physics import scenes
-from physics.world.warm_starts import MANY_ROWS, copy_wall_memory
+from physics.schemes.wall_memory import MANY_ROWS, copy_wall_memory
 from tests.physics.test_sleeping_bodies import cubes, tower
 
 DT = 0.01

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 import physics
 from physics import scenes
-from physics.plan.accuracy import resolve
+from physics.accuracy import resolve
 from rigid_env.lab.hard_cases import registry
 from rigid_env.lab.hard_cases.case import Setting
 from tests.tiers.sweep import sweep

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 import physics
+from physics.accuracy import resolve
 from physics.kernels.multibody.data.arrays import NUM_CONTACTS
-from physics.plan.accuracy import resolve
 from tests.tiers.sweep import sweep
 
 DT, G, MU = 0.01, 9.81, 0.5

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 import physics
-from physics.plan.accuracy import resolve
+from physics.accuracy import resolve
 from physics.plan.explanation import Row
 from tests.physics.test_sleeping import BLOCK, sleeping
 

@@ -159,7 +159,7 @@ def test_without_strength_a_spring_between_bodies_leaves_every_bit():
         world = physics.World(physics.Scene(PAIR, effects=[physics.Gravity(), physics.Drag(), *extra]))
         world.step(steps=200)
         ends.append(world.state.tobytes())
-        assert bool(world.plan.linked) == bool(extra)
+        assert (world.plan.scheme.name == "springs between bodies") == bool(extra)
     assert ends[0] == ends[1]
 
 
@@ -172,8 +172,8 @@ def test_bodies_that_may_touch_each_other_are_tied_as_those_that_may_not():
     effects = [physics.Gravity(), tied(damping=0.3)]
     alone = end(physics.Scene(bodies, effects=effects), 1.0, 0.01)
     both = end(physics.Scene(bodies, effects=[*effects, physics.Contact()]), 1.0, 0.01)
-    assert alone.plan.linked
-    assert both.plan.many
+    assert alone.plan.scheme.name == "springs between bodies"
+    assert both.plan.scheme.couples_bodies
     for name in ("pos", "quat", "linvel", "angvel"):
         assert getattr(both, name) == pytest.approx(getattr(alone, name), abs=1e-12)
 
@@ -191,7 +191,7 @@ def test_a_mass_stands_on_a_spring_on_a_ball_on_the_floor(between):
     assert world.pos[0, :, 1] == pytest.approx([0.3, upper], abs=1e-9)
     _, forces = world.contacts()
     assert forces[:, 1].sum() == pytest.approx(3.0 * G, rel=1e-9)
-    assert (world.plan.many, world.plan.meeting) == (True, between)
+    assert (world.plan.scheme.couples_bodies, world.plan.meeting) == (True, between)
 
 
 def test_two_balls_pulled_together_collide_and_keep_their_momentum():
@@ -214,7 +214,7 @@ def test_what_a_spring_between_bodies_costs_is_stored_only_where_there_is_one():
     assert both.params.shape[1] == one_way.params.shape[1] + 17
     assert {"middle", "load_linkedspring_1x17"} <= set(both.scratch[0].work.dtype.names)
     assert not {"middle", "load_linkedspring_1x17"} & set(one_way.scratch[0].dtype.names)
-    assert one_way.plan.linked is None
+    assert one_way.plan.scheme.name != "springs between bodies"
     assert "all bodies at once" in both.plan.explain()
 
 

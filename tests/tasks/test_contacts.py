@@ -13,9 +13,10 @@ from hypothesis import strategies as st
 import physics
 from physics.kernels.half_space.persistent_contacts import WALL_MEMORY_HEAD
 from physics.kernels.multibody.data import arrays as many
+from physics.schemes.contacts import Contacts
+from physics.world.contacts import contact_rows, read_contacts
 from rigid_env.envs.task import TaskEnv
 from rigid_env.tasks import Task, observe
-from rigid_env.tasks.contacts import Contacts, contact_rows, read_contacts
 from tests.tasks.conftest import Free, Slide, started
 
 pytestmark = pytest.mark.interpreted

@@ -9,8 +9,8 @@ from dataclasses import dataclass, field
 import numpy as np
 
 import physics
+from physics.accuracy import resolve
 from physics.annotations import Preset
-from physics.plan.accuracy import resolve
 from physics.plan.plan import make_plan
 
 AT_MOST, AT_LEAST, WITHIN = "at most", "at least", "within"

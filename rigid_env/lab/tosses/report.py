@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from physics.plan.accuracy import PRESETS
+from physics.accuracy import PRESETS
 from rigid_env.lab.tosses import data
 from rigid_env.lab.tosses.data import Tosses
 from rigid_env.lab.tosses.fit import NOMINAL, Effort, Fit, Objective, check_names, fit

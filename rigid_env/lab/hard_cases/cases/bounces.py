@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 import physics
-from physics.plan.accuracy import resolve
+from physics.accuracy import resolve
 from physics.scene.canonical_scenes import GRAVITY, MASS, SIZE
 from rigid_env.lab.hard_cases.case import Case, Check, Setting, none_of, within
 from rigid_env.lab.hard_cases.cases.scenery import (

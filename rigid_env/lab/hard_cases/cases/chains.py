@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 import physics
-from physics.plan.accuracy import resolve
+from physics.accuracy import resolve
 from rigid_env.lab.hard_cases.case import Case, Check, Setting, within
 
 RADIUS = 0.5  # [m]

@@ -12,7 +12,7 @@ from scipy.optimize import brentq
 from scipy.spatial.transform import Rotation
 
 import physics
-from physics.plan.accuracy import resolve
+from physics.accuracy import resolve
 from physics.scene.canonical_scenes import GRAVITY
 from rigid_env.lab.hard_cases.case import Case, Check, Setting, none_of, within
 from rigid_env.lab.hard_cases.cases.scenery import EPS, FLOOR, laws, on_floor, turned

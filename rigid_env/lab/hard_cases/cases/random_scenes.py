@@ -11,9 +11,9 @@ from dataclasses import dataclass
 import numpy as np
 
 import physics
+from physics.accuracy import resolve
 from physics.annotations import Preset
 from physics.kernels.state import layout as at
-from physics.plan.accuracy import resolve
 from rigid_env.lab.hard_cases.case import Case, Check, Setting, none_of
 
 HALF_WIDTH = 10.0  # of the closed box that all scenes are in [m]

@@ -11,9 +11,9 @@ from physics.html_table import fields_table
 from physics.kernels.flight import integrators
 from physics.keywords import known_keywords
 
-# Schemes by name; 0 is time stepping with the exact flow, -1 the event-driven scheme.
+# Values of `Accuracy.scheme` and their codes: 0 is time stepping with the exact flow, -1 stepping to a tolerance.
 EVENTS = -1
-SCHEMES: dict[Scheme, int] = {
+INTEGRATORS: dict[Scheme, int] = {
     "events": EVENTS,
     "exact": 0,
     "explicit_euler": integrators.EXPLICIT_EULER,
@@ -105,7 +105,7 @@ class Accuracy:
         for name in ("tolerance", "slop"):
             self._set(name, float(validation.positive(getattr(self, name), (), f"Accuracy.{name}")))
         self._set("rest_share", float(validation.share(self.rest_share, (), "Accuracy.rest_share")))
-        for name, known in (("scheme", SCHEMES), ("solver", SOLVERS), ("slip", SLIPS), ("collisions", COLLISIONS)):
+        for name, known in (("scheme", INTEGRATORS), ("solver", SOLVERS), ("slip", SLIPS), ("collisions", COLLISIONS)):
             validation.one_of(getattr(self, name), known, f"Accuracy.{name}")
 
     def _set(self, name: str, value: Any) -> None:

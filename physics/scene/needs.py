@@ -1,0 +1,121 @@
+"""What a scene needs: the effects that can act in it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from physics.kernels.state.contact_law_dispatch import (
+    LAW_ANISOTROPY,
+    LAW_DAMPING,
+    LAW_ROLLING,
+    LAW_SPIN,
+    LAW_STIFFNESS,
+    LAW_TANGENTIAL,
+    LAWS,
+)
+from physics.kernels.state.layout import VERTEX_COUNT
+from physics.mass.inertia import principal_axes
+from physics.scene.effects import Contact, Friction, Gravity, RollingFriction, Sleeping, SpinFriction
+from physics.scene.force_field import Field, FieldSlot, field_slots
+from physics.scene.scene import Scene
+
+# Moments that differ by less than this share are equal to rounding: the gyroscopic torque would be noise.
+ISOTROPY_TOLERANCE = 1e-14
+
+
+@dataclass(frozen=True)
+class Needs:
+    """Effects that can act in a scene.
+
+    Attributes
+    ----------
+    contact, friction, gravity : Contact, Friction, Gravity or None
+        As declared.
+    touching, meeting, rubbing : bool
+        Anything can touch; bodies can touch each other; friction can act.
+    linked : bool
+        Springs tie bodies together.
+    ellipsoids, hulls : bool
+        Some of the bodies that touch each other are ellipsoids; some that touch anything are hulls.
+    features : int
+        Features of a body that may touch a wall.
+    isotropic, turned : bool
+        All moments of every body are equal; else principal axes of some are not their body axes.
+    uneven : list of int
+        Bodies whose centre of mass is not their geometric centre.
+    sleeping : bool
+        Bodies may sleep.
+    fields : tuple of FieldSlot
+    laws : tuple of str
+        Those of `physics.kernels.state.contact_law_dispatch` that act where bodies touch walls.
+    """
+
+    contact: Any
+    friction: Friction | None
+    gravity: Gravity | None
+    touching: bool
+    meeting: bool
+    rubbing: bool
+    linked: bool
+    ellipsoids: bool
+    hulls: bool
+    features: int
+    isotropic: bool
+    turned: bool
+    uneven: list[int]
+    sleeping: bool
+    fields: tuple[FieldSlot, ...]
+    laws: tuple[str, ...]
+
+
+def is_isotropic(moments: np.ndarray) -> Any:
+    """True if all `moments` (..., 3) are equal to rounding: then ω stays constant in free flight."""
+    return np.ptp(moments, axis=-1) <= ISOTROPY_TOLERANCE * np.max(moments, axis=-1)
+
+
+def is_tilted(R: np.ndarray) -> Any:
+    """True if the principal axes `R` (..., 3, 3) are not the body axes."""
+    return (R - np.eye(3)).any(axis=(-2, -1))
+
+
+def find_needs(scene: Scene) -> Needs:
+    """Find the effects that can act in a scene."""
+    contact, friction, gravity = scene.effect(Contact), scene.effect(Friction), scene.effect(Gravity)
+    kinds = {body.kind for body in scene.bodies}
+    meeting = contact is not None and contact.between_bodies and len(scene.bodies) > 1
+    touching = contact is not None and (bool(scene.walls) or meeting)
+    axes = [principal_axes(body.inertia) for body in scene.bodies]
+    isotropic = all(is_isotropic(moments) for moments, _ in axes)
+    steady = all(effect.is_steady for effect in scene.effects if isinstance(effect, Field))
+    fields = field_slots(scene.effects, len(scene.bodies))
+    return Needs(
+        contact, friction, gravity, touching, meeting,
+        rubbing=touching and friction is not None,
+        linked=any(slot.term.is_linked for slot in fields),
+        ellipsoids=meeting and "ellipsoid" in kinds,
+        hulls=touching and "hull" in kinds,
+        features=VERTEX_COUNT if "block" in kinds else 1,
+        isotropic=isotropic,
+        turned=not isotropic and any(is_tilted(R) for _, R in axes),
+        uneven=[b for b, body in enumerate(scene.bodies) if any(body.center)],
+        sleeping=touching and steady and scene.effect(Sleeping) is not None,
+        fields=fields,
+        laws=_laws(scene, contact, friction) if touching else (),
+    )  # fmt: skip
+
+
+def _laws(scene: Scene, contact: Any, friction: Friction | None) -> tuple[str, ...]:
+    """The laws of `physics.kernels.state.contact_law_dispatch` that act where bodies touch walls."""
+    has_round = any(body.kind in ("sphere", "ellipsoid") for body in scene.bodies)
+    is_on = {
+        LAW_TANGENTIAL: contact.tangential is not None,
+        LAW_ROLLING: has_round and scene.effect(RollingFriction) is not None,
+        LAW_SPIN: has_round and scene.effect(SpinFriction) is not None,
+        LAW_ANISOTROPY: friction is not None and friction.axis is not None,
+        LAW_STIFFNESS: contact.stiffness is not None,
+        LAW_DAMPING: contact.stiffness is not None,
+    }
+    return tuple(law for law in LAWS if is_on[law])

@@ -1,0 +1,14 @@
+"""Polyhedra of a scene's bodies, for the tables that kernels read."""
+
+from __future__ import annotations
+
+from physics.kernels.multibody.data.hull_tables import CUBE
+from physics.scene.bodies import Body
+
+
+def polyhedra(bodies: tuple[Body, ...]) -> list:
+    """Polyhedra of bodies for `hull_tables.make_hulls`; empty where none is a hull."""
+    if not any(body.kind == "hull" for body in bodies):
+        return []
+    blocks = {"block": CUBE}
+    return [body.polyhedron if body.kind == "hull" else blocks.get(body.kind) for body in bodies]

@@ -1,0 +1,82 @@
+"""Bodies that touch each other: one contact problem for all bodies of a world."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from physics.accuracy import EVENTS, INTEGRATORS, Accuracy
+from physics.kernels.multibody.data import allocation
+from physics.kernels.multibody.stepping.adaptive_substep import MIN_RELATIVE_SLOP, MIN_SOLVER_TOLERANCE
+from physics.kernels.multibody.stepping.step import step_many
+from physics.kernels.state.groups import MultibodySwitches
+from physics.scene.needs import Needs
+from physics.scene.polyhedra import polyhedra
+from physics.scene.scene import Scene
+from physics.schemes import objections
+from physics.schemes.body_memory import BodyMemory
+from physics.schemes.scheme import Scheme, Switches, Worlds, records, settings
+
+
+class ManyBodies(Scheme):
+    """Bodies that touch each other; or touch walls, and are tied together by springs or are hulls.
+
+    Parameters
+    ----------
+    is_error_controlled : bool
+        Substeps are cut into parts that meet a tolerance.
+    """
+
+    name = "bodies that touch"
+    kernel = staticmethod(step_many)
+    couples_bodies = True
+
+    def __init__(self, is_error_controlled: bool):
+        self.is_error_controlled, self.memory = is_error_controlled, BodyMemory(is_error_controlled)
+
+    def takes(self, needs: Needs, accuracy: Accuracy) -> bool:
+        is_precise = INTEGRATORS[accuracy.scheme] == EVENTS
+        is_coupled = needs.touching and (needs.meeting or needs.linked or needs.hulls)
+        return is_coupled and is_precise == self.is_error_controlled
+
+    def objection(self, scene: Scene, needs: Needs, accuracy: Accuracy) -> str:
+        found = objections.to_laws_of_stages(needs) if self.is_error_controlled else ""
+        if not found and (names := objections.declared_laws(needs)):
+            found = (
+                f"Scene.effects holds {names}, which act between a body and a wall; allowed are scenes of one body, or "
+                "with Contact(between_bodies=False), without hulls and without Spring between bodies"
+            )
+        return found or (objections.to_sleeping(needs) if self.is_error_controlled else "")
+
+    def make_scratch(self, scene: Scene, switches: Switches, walls: np.ndarray, accuracy: Accuracy) -> Any:
+        bodies, accuracy = len(scene.bodies), self.acting(accuracy)
+        return allocation.make_bodies_workspace(
+            bodies, walls, switches.terms, polyhedra(scene.bodies), meet=switches.meeting,
+            is_sequential=accuracy.collisions == "sequential", is_error_controlled=self.is_error_controlled,
+            **settings(accuracy, impacts_of=bodies),
+        )  # fmt: skip
+
+    def make_motion(self, scene: Scene, switches: Switches, accuracy: Accuracy) -> Any:
+        """Make room for the world at some moments, where parts are tried; None without error control."""
+        if not self.is_error_controlled:
+            return None
+        bodies, walls = len(scene.bodies), len(scene.walls)
+        return allocation.make_snapshots(bodies, allocation.warm_start_size(bodies, walls, polyhedra(scene.bodies)))
+
+    def acting(self, accuracy: Accuracy) -> Accuracy:
+        """Accuracy that acts: with error control rounding would decide below the least tolerances."""
+        if not self.is_error_controlled:
+            return accuracy
+        tolerance, slop = max(accuracy.tolerance, MIN_SOLVER_TOLERANCE), max(accuracy.slop, MIN_RELATIVE_SLOP)
+        return replace(accuracy, tolerance=tolerance, slop=slop)
+
+    def arguments(self, worlds: Worlds, k: int) -> tuple:
+        plan = worlds.plan
+        switches = MultibodySwitches(plan.friction, plan.of_flight, plan.ellipsoids, plan.hulls)
+        ours = plan.restitution, worlds.motions[k], worlds.sleep_of_kernel()
+        return switches, *ours, records(worlds), worlds.scratch[k]
+
+
+SCHEMES = (ManyBodies(False), ManyBodies(True))
