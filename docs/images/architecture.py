@@ -18,7 +18,7 @@ ROW = 26
 LAYERS = (
     ("agents", "#fdf1dc", ("training and evaluation of policies",)),
     ("rigid_env", "#fdf1dc", ("cli · viewer · lab", "envs", "rendering · tasks · terminal")),
-    ("physics", "#e3eefb", ("io · work_precision · analysis", "world", "plan · scene", "mass · parallel")),
+    ("physics", "#e3eefb", ("io · work_precision · analysis", "world", "plan · schemes · scene", "mass · parallel")),
     (
         "physics/kernels, compiled", "#dff3e4",
         (

@@ -38,8 +38,8 @@ class Needs:
         Anything can touch; bodies can touch each other; friction can act.
     linked : bool
         Springs tie bodies together.
-    ellipsoids, hulls : bool
-        Some of the bodies that touch each other are ellipsoids; some that touch anything are hulls.
+    kinds : frozenset of str
+        Kinds of the bodies.
     features : int
         Features of a body that may touch a wall.
     isotropic, turned : bool
@@ -60,8 +60,7 @@ class Needs:
     meeting: bool
     rubbing: bool
     linked: bool
-    ellipsoids: bool
-    hulls: bool
+    kinds: frozenset[str]
     features: int
     isotropic: bool
     turned: bool
@@ -69,6 +68,16 @@ class Needs:
     sleeping: bool
     fields: tuple[FieldSlot, ...]
     laws: tuple[str, ...]
+
+    @property
+    def ellipsoids(self) -> bool:
+        """True if ellipsoids are among bodies that touch each other."""
+        return self.meeting and "ellipsoid" in self.kinds
+
+    @property
+    def hulls(self) -> bool:
+        """True if hulls may touch anything."""
+        return self.touching and "hull" in self.kinds
 
 
 def is_isotropic(moments: np.ndarray) -> Any:
@@ -84,7 +93,7 @@ def is_tilted(R: np.ndarray) -> Any:
 def find_needs(scene: Scene) -> Needs:
     """Find the effects that can act in a scene."""
     contact, friction, gravity = scene.effect(Contact), scene.effect(Friction), scene.effect(Gravity)
-    kinds = {body.kind for body in scene.bodies}
+    kinds = frozenset(body.kind for body in scene.bodies)
     meeting = contact is not None and contact.between_bodies and len(scene.bodies) > 1
     touching = contact is not None and (bool(scene.walls) or meeting)
     axes = [principal_axes(body.inertia) for body in scene.bodies]
@@ -95,8 +104,7 @@ def find_needs(scene: Scene) -> Needs:
         contact, friction, gravity, touching, meeting,
         rubbing=touching and friction is not None,
         linked=any(slot.term.is_linked for slot in fields),
-        ellipsoids=meeting and "ellipsoid" in kinds,
-        hulls=touching and "hull" in kinds,
+        kinds=kinds,
         features=VERTEX_COUNT if "block" in kinds else 1,
         isotropic=isotropic,
         turned=not isotropic and any(is_tilted(R) for _, R in axes),
