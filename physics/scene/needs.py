@@ -1,4 +1,4 @@
-"""What a scene needs: the effects that can act in it."""
+"""Needs of a scene: the effects that can act in it."""
 
 from __future__ import annotations
 

@@ -41,7 +41,7 @@ from physics.schemes.contact_memory import ContactMemory
 
 @dataclass(frozen=True)
 class Switches:
-    """What a kernel is compiled for. None is off, True is on.
+    """Switches that a kernel is compiled for. None is off, True is on.
 
     `offset_frame` is on where the body frame of a body is not all there is to know of its mass: its principal axes are
     not its body axes, or its geometric centre is not its centre of mass. `pivots` is on where the solver of a body may

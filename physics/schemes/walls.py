@@ -17,7 +17,7 @@ from physics.schemes.wall_memory import WallMemory
 
 
 class BodiesAtWalls(Scheme):
-    """Time stepping of each body by itself, with Moreau's midpoint step in contact."""
+    """Time stepping of each body alone, with Moreau's midpoint step in contact."""
 
     name = "bodies at walls"
     kernel = staticmethod(step_worlds)
