@@ -21,7 +21,8 @@ from rigid_env.lab.measure.machine import write_json
 
 WORKER = Path(__file__).with_name("turn_worker.py")
 SCENES = (
-    "tumble", "drop", "shoved", "elastic", "grain", "kick", "floats", "spring", "tower", "mixed", "mixed-drawn", "sleeping-tower",
+    "tumble", "drop", "shoved", "elastic", "grain", "kick", "floats", "spring", "tower", "mixed", "mixed-drawn",
+    "sleeping-tower",
 )  # fmt: skip
 SAMPLE_SECONDS = 0.3  # CPU time of a sample, at least
 
