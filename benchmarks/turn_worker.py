@@ -13,6 +13,8 @@ from collections.abc import Callable
 ENVIRONMENT = "BlockReach"
 WORLDS = 64
 RUN = 200  # steps from the start of a scene until it begins anew, before all is asleep
+DRAWN = "-drawn"  # end of the name of a scene whose worlds start at drawn places: many motions instead of one
+APART = 0.05  # bodies start within this distance of their places along each axis [m]
 
 
 def _stepper(name: str) -> Callable[[int], None]:
@@ -33,10 +35,14 @@ def _stepper(name: str) -> Callable[[int], None]:
 
         return step
     import bit_scenes
+    import numpy as np
 
     import physics
 
-    world = physics.World(bit_scenes.SCENES[name](), worlds=WORLDS, dt=bit_scenes.DT, threads=1)
+    world = physics.World(bit_scenes.SCENES[name.removesuffix(DRAWN)](), worlds=WORLDS, dt=bit_scenes.DT, threads=1)
+    if name.endswith(DRAWN):
+        moved = np.random.default_rng(1).uniform(-APART, APART, world.pos.shape)
+        world.set_state(pos=world.pos + moved + (0.0, APART, 0.0))
     start = world.snapshot()
 
     def step(count):
