@@ -1,5 +1,5 @@
 """Viewer in the browser: a `Look` at a moment, drawn by `stage.Stage` with viser; extra ``view``.
 
-`stage` draws, `export` writes a motion into one file that plays offline, `notebook` embeds it. viser is imported when
-one of them is, and `physics` knows nothing of it.
+`stage` draws, `export` makes a motion one page that plays offline, in a file or a notebook. viser is imported when a
+server is started, and `physics` knows nothing of it.
 """

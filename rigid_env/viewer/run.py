@@ -7,19 +7,16 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from physics import Event
-from rigid_env.viewer.cost import MICROSECONDS, Cost
 from rigid_env.viewer.hand import Hand
-from rigid_env.viewer.history import History, Input
+from rigid_env.viewer.history import History, Input, Samples
 from rigid_env.viewer.interface import Subject
-from rigid_env.viewer.samples import Samples
+from rigid_env.viewer.pace import MICROSECONDS, Cost
 
 MOST_EVENTS = 100_000
 """Events that are kept; later ones are left out."""
 
 PATIENCE = 1.0
 """Time that a ghost may take to follow to a moment of the past [s]; a slower one starts anew there."""
-
-SLIDERS = ("gravity", "friction", "restitution")
 
 
 class Kept(NamedTuple):
@@ -133,7 +130,7 @@ class Run:
         Parameters
         ----------
         name : str
-            ``drag`` (body, point, target), ``release``, ``kick`` (body, impulse), one of `SLIDERS` (value), or
+            ``drag`` (body, point, target), ``release``, ``kick`` (body, impulse), one of `worlds.SLIDERS` (value), or
             ``accuracy`` (name).
         """
         done = Input(name, arguments)
@@ -153,7 +150,7 @@ class Run:
             self.subject.switch(*arguments)
             self.cost = Cost()
         else:
-            getattr(self.subject, f"set_{name}")(*arguments)
+            self.subject.set(name, *arguments)
             if self.ghost is not None:
                 self.ghost.take_parameters(self.subject.world)
 

@@ -7,10 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rigid_env.viewer.cost import Cost
-from rigid_env.viewer.history import History, size_of
-from rigid_env.viewer.pace import Pace
-from rigid_env.viewer.samples import UNITS, Samples
+from rigid_env.viewer.history import UNITS, History, Samples, size_of
+from rigid_env.viewer.pace import Cost, Pace
 
 STATE = np.zeros(100)  # 800 bytes
 

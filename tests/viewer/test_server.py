@@ -22,9 +22,9 @@ from physics import Block, Drag, Event, Gravity, Scene, Wind, World, scenes
 from rigid_env.cli import app
 from rigid_env.cli.names import CANONICAL
 from rigid_env.viewer import session as session_module
-from rigid_env.viewer.event_list import ROWS, EventList, told
+from rigid_env.viewer.history import Samples
+from rigid_env.viewer.panel import ROWS, EventList, told
 from rigid_env.viewer.plots import SMALLEST, Plot, drawn, line, thinned
-from rigid_env.viewer.samples import Samples
 from rigid_env.viewer.server import Viewer
 from rigid_env.viewer.servers import LAST_PORT, directions, free_port, server_for_a_while, start_viewer_server
 from rigid_env.viewer.session import Session
