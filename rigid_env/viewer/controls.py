@@ -55,13 +55,7 @@ class Background:
 
 
 class Controls:
-    """Part of `session.Session` by which a user acts in its run.
-
-    Attributes
-    ----------
-    subject : Subject
-    is_playing : bool
-    """
+    """Part of `session.Session` by which a user acts in the run of its subject."""
 
     def __init__(self, subject: Subject):
         self.subject, self.is_playing = subject, False

@@ -62,7 +62,7 @@ class LiveEnv(LiveSubject):
         env = copied_env(env, accuracy)
         world = env.unwrapped.task.world
         self._envs = {accuracy_name(world.accuracy): env}
-        super().__init__(name, world, seed=True)
+        super().__init__(world, name, seed=True)
         self._policy = policy
         self._begin_run(seed)
         self._begin_first(seed)

@@ -31,7 +31,7 @@ class PlayedRecording(WorldSubject):
     def __init__(self, recording: physics.Recording, name: str):
         if not len(recording):
             raise ValueError("recording holds no step; allowed is one of at least one step")
-        super().__init__(name, recording.world())
+        super().__init__(recording.world(), name)
         self._recording, self._call = recording, 0
         self._starts = {start.step: start.snapshot for start in recording.starts}
         self._steppers: dict[tuple[int, float], physics.Stepper] = {}

@@ -43,6 +43,7 @@ class Run:
     samples : Samples
         One at the start and one after each step.
     events : list of Event
+        Up to the latest moment that is known.
     ghost : Ghost or None
     hand : Hand
     fault : str
@@ -70,6 +71,11 @@ class Run:
         if self.ghost is not None:
             self.ghost.start(self.subject.world.snapshot())
         self._begin()
+
+    @property
+    def known_events(self) -> list[Event]:
+        """Events up to the present moment, a copy."""
+        return self.events[: self.history.event_counts[self.index]]
 
     # --- onward ------------------------------------------------------------------------------------------------
 
@@ -203,8 +209,3 @@ class Run:
             return False
         self.ghost.restore(kept)
         return True
-
-
-def known_events(run: Run) -> list[Event]:
-    """Events up to the present moment of a run."""
-    return run.events[: run.history.event_counts[run.index]]

@@ -10,7 +10,6 @@ from rigid_env.viewer.controls import START, Controls
 from rigid_env.viewer.history import Samples
 from rigid_env.viewer.interface import Look, Subject
 from rigid_env.viewer.pace import Pace
-from rigid_env.viewer.run import known_events
 
 BUDGET = 0.05
 """Time of computing after which a call of `Session.advance` takes no further step [s]."""
@@ -72,7 +71,7 @@ class Session(Controls):
     @property
     def events(self) -> list[Event]:
         """Events up to now, a copy."""
-        return known_events(self._run)
+        return self._run.known_events
 
     @property
     def message(self) -> str:

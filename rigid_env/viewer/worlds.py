@@ -14,7 +14,7 @@ from physics.analysis.events import Pair
 from physics.kernels.state import layout as at
 from rigid_env.rendering import Frame
 from rigid_env.rendering.picture import world_frame
-from rigid_env.viewer.copies import accuracy_name, copied, declared, fitted, warm
+from rigid_env.viewer.copies import accuracy_name, fitted, warm
 from rigid_env.viewer.interface import Can, Look, Subject
 from rigid_env.viewer.listening import Listener
 
@@ -40,16 +40,16 @@ class WorldSubject(Subject):
 
     Parameters
     ----------
-    name : str
     world : World
         Its own, of one world.
+    name : str
     """
 
     world: physics.World
     listener: Listener
     _shift = 0.0  # from times of the world to those of the subject [s]
 
-    def __init__(self, name: str, world: physics.World):
+    def __init__(self, world: physics.World, name: str):
         self.name = name
         self._worlds: dict[str, tuple[physics.World, Listener]] = {}
         self._use(self._add(world))
@@ -121,15 +121,15 @@ class LiveSubject(WorldSubject):
 
     Parameters
     ----------
-    name : str
     world : World
         Its own, of one world; its scene declares what sliders change (`copies.copied`).
+    name : str
     seed : bool
         Another seed makes another run.
     """
 
-    def __init__(self, name: str, world: physics.World, seed: bool = False):
-        super().__init__(name, world)
+    def __init__(self, world: physics.World, name: str, seed: bool = False):
+        super().__init__(world, name)
         plan, gravity = world.plan, world.gravity[0]
         flags = (bool(each) for each in (plan.gravity, plan.friction, plan.restitution))
         self.can = Can(True, *flags, accuracy=True, ghost=True, seed=seed)
@@ -167,8 +167,8 @@ class LiveSubject(WorldSubject):
 class LiveWorld(LiveSubject):
     """World of one scene, and nothing around it."""
 
-    def __init__(self, name: str, world: physics.World):
-        super().__init__(name, world)
+    def __init__(self, world: physics.World, name: str):
+        super().__init__(world, name)
         self._first = world.snapshot()
 
     def restart(self, seed: int) -> None:
@@ -195,13 +195,3 @@ class LiveWorld(LiveSubject):
     def _at(self, accuracy: Any) -> physics.World:
         """Another world of the scene."""
         return physics.World(self.world.scene, dt=self.world.dt, accuracy=accuracy)
-
-
-def live_scene(scene: physics.Scene, name: str, accuracy, dt: float) -> LiveWorld:
-    """A scene from its start."""
-    return LiveWorld(name, physics.World(declared(scene), dt=dt, accuracy=accuracy))
-
-
-def live_world(world: physics.World, name: str, accuracy=None, dt: float | None = None) -> LiveWorld:
-    """The first world of a batch, from its present state; the batch itself stays as it is."""
-    return LiveWorld(name, copied(world, accuracy, dt))
