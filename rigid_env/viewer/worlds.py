@@ -1,4 +1,4 @@
-"""Subjects that are simulated in a world: those in which the user acts, and of them a scene or a world itself."""
+"""Subjects that are simulated in a world, those of them in which the user acts, and a world alone."""
 
 from __future__ import annotations
 
@@ -61,7 +61,9 @@ class WorldSubject(Subject):
         return name
 
     def _use(self, accuracy: str) -> None:
-        self.accuracy, (self.world, self.listener) = accuracy, self._worlds[accuracy]
+        """Go on in the world at an accuracy that was added."""
+        self.accuracy = accuracy
+        self.world, self.listener = self._worlds[accuracy]
 
     # --- the present ---------------------------------------------------------------------------------------------
 
@@ -95,7 +97,8 @@ class WorldSubject(Subject):
         }  # fmt: skip
 
     def events(self) -> list[Event]:
-        return [replace(event, t=event.t + self._shift) for event in self.listener.events]
+        shift = self._shift
+        return [replace(event, t=event.t + shift) for event in self.listener.events]
 
     # --- back to a moment ----------------------------------------------------------------------------------------
 
@@ -146,10 +149,11 @@ class LiveSubject(WorldSubject):
 
     def set(self, name: str, value: float) -> None:
         """Change one of `SLIDERS`: the strength of gravity [m/s²], or a coefficient of all bodies."""
-        self._hold(name, float(SLIDERS[name](value, (), name)))
+        self._hold(name, value)
         self.listener.is_changed = False  # the state is the same
 
     def _hold(self, name: str, value: float) -> None:
+        value = float(SLIDERS[name](value, (), name))
         self.world.set_parameters(**{name: value * self._down if name == "gravity" else value})
 
     def prepare(self, name: str) -> Callable[[], None]:
