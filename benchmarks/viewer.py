@@ -32,7 +32,7 @@ from rigid_env.lab.measure.timing import Row, Spread
 from rigid_env.rendering import BodyView, Frame, WallView
 from rigid_env.terminal import make_console
 from rigid_env.viewer.export import page_of
-from rigid_env.viewer.look import Look
+from rigid_env.viewer.interface import Look
 from rigid_env.viewer.servers import address_of, server_for_a_while
 from rigid_env.viewer.stage import LAYERS, Stage
 from tests.viewer.browser import SIZE, Watched, browser, share_of, what_is_missing

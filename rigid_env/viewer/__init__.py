@@ -1,5 +1,9 @@
-"""Viewer in the browser: a `Look` at a moment, drawn by `stage.Stage` with viser; extra ``view``.
+"""Viewer in the browser: anything that can be played, with its past and the user's hand; extra ``view``.
 
-`stage` draws, `export` writes a motion into one file that plays offline, `notebook` embeds it. viser is imported when
-one of them is, and `physics` knows nothing of it.
+- Subjects: `subject` makes one behind the `interface`, of `worlds`, `episodes` or `replays`; `copies`, `listening`.
+- Session: `session` with its `controls`, a `run` with its `history`, `hand` and `ghost`, the `pace` of real time.
+- Picture: `stage` draws a `Look` in `layers` and `marks`, with `scenery`, `bodies`, `shapes` and `arrows`.
+- Page: `server` with `panel` and `plots`, `servers` of viser; `show` opens it, `export` makes one that plays offline.
+
+viser is imported when a server is started, and `physics` knows nothing of it.
 """

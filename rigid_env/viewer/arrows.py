@@ -1,12 +1,11 @@
-"""Arrows, lines and springs on the stage: nodes that come with their first line and go with the last."""
+"""Arrows, lines and springs on the stage: nodes that come with their first line and are hidden after the last."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from rigid_env.rendering.geometry import plane_axes
-from rigid_env.viewer.colours import vivid
-from rigid_env.viewer.placement import Placement
+from rigid_env.viewer.scenery import Placement, vivid
 
 SHAFT, HEAD, HEAD_LENGTH = 0.013, 0.036, 0.11
 """Radii and length of an arrow, in units of the largest body."""
@@ -24,15 +23,37 @@ COILS, COIL_POINTS, COIL_RADIUS = 9, 12, 0.03
 """Of a spring: its turns, the points of each, and the radius in units of the largest body."""
 
 
-class Arrows:
-    """Arrows of one node.
+class Nodes:
+    """Nodes of viser's scene that come with the first picture of them, and can be hidden.
 
     Parameters
     ----------
     scene : viser.SceneApi
-    name : str
-        Of the node.
     placement : Placement
+    name : str, optional
+        Of the node, or of that above all; a class may have one.
+    """
+
+    name = ""
+
+    def __init__(self, scene, placement: Placement, name: str = ""):
+        self._scene, self._placement, self._name = scene, placement, name or self.name
+        self._nodes: list = []
+
+    def hide(self) -> None:
+        """Draw nothing until the next `show`."""
+        for node in self._nodes:
+            node.visible = False
+
+    def _move(self, **values) -> None:
+        """Give all nodes other values, and show them."""
+        for node in self._nodes:
+            for name, value in {**values, "visible": True}.items():
+                setattr(node, name, value)
+
+
+class Arrows(Nodes):
+    """Arrows of one node.
 
     Attributes
     ----------
@@ -40,13 +61,13 @@ class Arrows:
         That sizes are given in [m]; the extent of the largest body at first.
     """
 
-    def __init__(self, scene, name: str, placement: Placement):
-        self._scene, self._name, self._placement, self._node = scene, name, placement, None
+    def __init__(self, scene, placement: Placement, name: str = ""):
+        super().__init__(scene, placement, name)
         self.unit = placement.unit
 
-    def show(self, starts, vectors, colours) -> None:
+    def draw(self, starts, vectors, colours) -> None:
         """Draw arrows from `starts` (n, 3) [m], as long as `vectors` (n, 3) [m]; one colour, or (n, 3)."""
-        starts, vectors = np.asarray(starts, dtype=float), np.asarray(vectors, dtype=float)
+        starts, vectors = (np.asarray(each, dtype=float).reshape(-1, 3) for each in (starts, vectors))
         unit = self.unit
         lengths = np.sqrt(np.sum(vectors * vectors, axis=1))
         kept = np.isfinite(lengths) & (lengths > SHORTEST * HEAD_LENGTH * unit)
@@ -56,47 +77,31 @@ class Arrows:
         vectors = vectors[kept] * np.minimum(1.0, LONGEST * unit / lengths[kept])[:, None]
         ends = self._placement.drawn(np.stack([starts[kept], starts[kept] + vectors], axis=1))
         colours = vivid(colours)
-        self._send(ends, np.broadcast_to(colours if colours.ndim == 1 else colours[kept], (len(ends), 3)))
-
-    def _send(self, ends, colours) -> None:
-        if self._node is None:
-            size = self.unit * self._placement.scale
-            self._node = self._scene.add_arrows(
-                self._name, ends, colours, shaft_radius=SHAFT * size, head_radius=HEAD * size,
-                head_length=HEAD_LENGTH * size,
-            )  # fmt: skip
-        else:
-            self._node.points, self._node.colors, self._node.visible = ends, colours, True
-
-    def hide(self) -> None:
-        """Draw nothing until the next `show`."""
-        if self._node is not None:
-            self._node.visible = False
+        colours = np.broadcast_to(colours if colours.ndim == 1 else colours[kept], (len(ends), 3))
+        if self._nodes:
+            self._move(points=ends, colors=colours)
+            return
+        size = unit * self._placement.scale
+        sizes = {"shaft_radius": SHAFT * size, "head_radius": HEAD * size, "head_length": HEAD_LENGTH * size}
+        self._nodes = [self._scene.add_arrows(self._name, ends, colours, **sizes)]
 
 
-class Lines:
+class Lines(Nodes):
     """Line segments of one colour, in one node."""
 
-    def __init__(self, scene, name: str, placement: Placement, colour):
-        self._scene, self._name, self._placement, self._colour = scene, name, placement, colour
-        self._node = None
+    colour = (0, 0, 0)
 
-    def show(self, segments) -> None:
+    def draw(self, segments) -> None:
         """Draw segments (n, 2, 3) [m]."""
         if len(segments) == 0:
             self.hide()
             return
         drawn = self._placement.drawn(segments)
-        if self._node is None:
-            size = self._placement.unit * self._placement.scale
-            self._node = self._scene.add_line_segments(self._name, drawn, vivid(self._colour), thickness=LINE * size)
-        else:
-            self._node.points, self._node.visible = drawn, True
-
-    def hide(self) -> None:
-        """Draw nothing until the next `show`."""
-        if self._node is not None:
-            self._node.visible = False
+        if self._nodes:
+            self._move(points=drawn)
+            return
+        width = LINE * self._placement.unit * self._placement.scale
+        self._nodes = [self._scene.add_line_segments(self._name, drawn, vivid(self.colour), thickness=width)]
 
 
 def path(points) -> np.ndarray:

@@ -9,8 +9,7 @@ import numpy as np
 
 from rigid_env.rendering import Frame, palette
 from rigid_env.rendering.bodies import body_colour
-from rigid_env.viewer.colours import vivid
-from rigid_env.viewer.placement import Placement
+from rigid_env.viewer.scenery import Placement, vivid
 from rigid_env.viewer.shapes import Part, parts, shape_key
 
 ASLEEP = (176, 182, 192)

@@ -1,23 +1,72 @@
-"""Controls by which a user acts in a run: drag, kick, and sliders."""
+"""Controls by which a user acts in a run: hand, sliders, accuracy and ghost; kernels compile in the background."""
 
 from __future__ import annotations
 
-from rigid_env.viewer.hand import checked_body, checked_vector
+import threading
+from collections.abc import Callable
+
+import numpy as np
+
+from physics import PRESETS, validation
+from rigid_env.viewer.ghost import Ghost
 from rigid_env.viewer.interface import Can, Subject
 from rigid_env.viewer.run import Run
 
+START, GHOST = "the scene", "the ghost"
+"""Names of what compiles besides accuracies."""
 
-class Controls:
-    """Part of `session.Session`: all that becomes an input of its run.
+
+class Background:
+    """One call in a thread of its own, which ends with the program.
+
+    Parameters
+    ----------
+    name : str
+        Of the thread.
+    work : callable
+        Takes nothing.
 
     Attributes
     ----------
-    subject : Subject
+    error : BaseException or None
+        The one that it ended in.
     """
 
-    subject: Subject
-    _run: Run
-    _sliders: dict[str, float]  # as they were set
+    def __init__(self, name: str, work: Callable[[], None]):
+        self.error: BaseException | None = None
+        self._work = work
+        self._thread = threading.Thread(target=self._run, name=name, daemon=True)
+        self._thread.start()
+
+    def _run(self) -> None:
+        try:
+            self._work()
+        except BaseException as error:  # told by whoever looks
+            self.error = error
+
+    @property
+    def is_done(self) -> bool:
+        """True once the call has ended, in an error, too."""
+        return not self._thread.is_alive()
+
+    def join(self) -> None:
+        """Wait for its end."""
+        self._thread.join()
+
+
+class Controls:
+    """Part of `session.Session` by which a user acts in the run of its subject."""
+
+    def __init__(self, subject: Subject):
+        self.subject, self.is_playing = subject, False
+        self._run, self._note = Run(subject), ""
+        self._sliders: dict[str, float] = {}  # as they were set
+        self._jobs: dict[str, Background] = {}
+        self._ghost: Ghost | None = None  # that is wanted, and may compile
+        self._ready, self._wanted = {subject.accuracy}, subject.accuracy
+        work = subject.rehearsal()
+        if work is not None:
+            self._jobs[START] = Background(START, work)
 
     @property
     def can(self) -> Can:
@@ -48,8 +97,7 @@ class Controls:
             No such body, numbers that are not finite, or a subject that cannot be dragged.
         """
         self._needs("drag")
-        body = checked_body(self.subject.world, body)
-        self._run.give("drag", body, checked_vector(point_body, "point_body"), checked_vector(target, "target"))
+        self._run.give("drag", self._body(body), _vector(point_body, "point_body"), _vector(target, "target"))
 
     def release(self) -> None:
         """End a `drag`."""
@@ -59,7 +107,10 @@ class Controls:
     def kick(self, body: int, impulse) -> None:
         """Push a body at its centre of mass in the next step: an impulse (3,), world frame [N s]."""
         self._needs("drag")
-        self._run.give("kick", checked_body(self.subject.world, body), checked_vector(impulse, "impulse"))
+        self._run.give("kick", self._body(body), _vector(impulse, "impulse"))
+
+    def _body(self, body: int) -> int:
+        return validation.index(body, self.subject.world.body_count, "body")
 
     # --- sliders -----------------------------------------------------------------------------------------------
 
@@ -78,10 +129,82 @@ class Controls:
     @property
     def settings(self) -> dict[str, float]:
         """Present values of the sliders that the subject allows: gravity [m/s²], friction, restitution of body 0."""
-        values = {} if self.subject.world is None else self.subject.settings()
-        return {name: value for name, value in values.items() if getattr(self.can, name)}
+        return self.subject.settings()
 
     def _slide(self, name: str, value: float) -> None:
         self._needs(name)
         self._run.give(name, value)
         self._sliders[name] = value
+
+    # --- accuracy ----------------------------------------------------------------------------------------------
+
+    @property
+    def accuracy(self) -> str:
+        """Name of the preset, ``custom``, or empty where nothing is simulated."""
+        return self.subject.accuracy
+
+    def set_accuracy(self, preset: str) -> None:
+        """Go on at another preset, from the same state, once its kernel is there.
+
+        Raises
+        ------
+        ValueError
+            No such preset, or one that this scene does not allow.
+        """
+        self._needs("accuracy")
+        validation.one_of(preset, {**PRESETS, **dict.fromkeys(self._ready)}, "accuracy")
+        if preset not in self._ready and preset not in self._jobs:
+            self._jobs[preset] = Background(preset, self.subject.prepare(preset))
+        self._wanted = preset
+        self._switch()
+
+    def _switch(self) -> None:
+        if self._wanted != self.accuracy and self._wanted in self._ready:
+            self._run.give("accuracy", self._wanted)
+
+    @property
+    def ghost_label(self) -> str:
+        """Name of the ghost, with its own error where it has one; empty without one."""
+        return "" if self._run.ghost is None else self._run.ghost.label
+
+    def set_ghost(self, on: bool) -> None:
+        """Show the same scene at ``reference`` beside it, from this moment on, once its kernel is there; or do not."""
+        if not on:
+            self._run.ghost = self._ghost = None
+            self._jobs.pop(GHOST, None)
+        elif self._ghost is None:
+            self._needs("ghost")
+            self._ghost = Ghost(self.subject.world)
+            self._jobs[GHOST] = Background(GHOST, self._ghost.warm)
+
+    # --- in the background -------------------------------------------------------------------------------------
+
+    @property
+    def is_compiling(self) -> bool:
+        """Something compiles in the background."""
+        return bool(self._jobs)
+
+    def wait(self) -> None:
+        """Wait until nothing compiles any more."""
+        for job in list(self._jobs.values()):
+            job.join()
+        self._poll()
+
+    def _poll(self) -> None:
+        """Take over what has compiled."""
+        for name in [name for name, job in self._jobs.items() if job.is_done]:
+            error = self._jobs.pop(name).error
+            if error is not None:
+                self._note = f"{name}: {type(error).__name__}: {error}"
+                self.is_playing = self.is_playing and name != START
+            elif name == GHOST:
+                self._ghost.start(self.subject.world.snapshot())
+                self._run.ghost = self._ghost
+            elif name != START:
+                self._ready.add(name)
+                self._switch()
+
+
+def _vector(value, name: str) -> np.ndarray:
+    """(3,) finite numbers, a copy."""
+    return np.array(validation.finite(value, (3,), name))

@@ -1,41 +1,45 @@
-"""An environment that is played live: episode after episode, by a policy."""
+"""An environment that is played live, in a copy of it and its wrappers: episode after episode, by a policy."""
 
 from __future__ import annotations
 
 import copy
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 from typing import Any, NamedTuple
 
 import gymnasium as gym
 import numpy as np
+from gymnasium import spaces
 
-from physics import Event
-from physics.analysis.events import Pair
+from physics.accuracy import Accuracy
+from physics.annotations import Preset
 from rigid_env.rendering.view import frame_of
-from rigid_env.viewer.copies import accuracy_name
-from rigid_env.viewer.env_copies import copied_env, put_chain, take_chain
-from rigid_env.viewer.interface import WorldSubject, allowed_of
-from rigid_env.viewer.listening import Listener
-from rigid_env.viewer.worlds import direction_of
+from rigid_env.tasks.state import TaskState
+from rigid_env.viewer.copies import accuracy_name, copied, fitted
+from rigid_env.viewer.hand import HandOfUser
+from rigid_env.viewer.worlds import LiveSubject
 
 Policy = Callable[[Any], np.ndarray]
 
+Chain = tuple[TaskState, list[dict[str, Any]]]
+"""State of an environment, and what each of its wrappers remembers."""
+
+APART = ("env", "spec", "metadata")
+"""Attributes of wrappers that are no state."""
+
 
 class State(NamedTuple):
-    """All that decides how an environment goes on, the accuracy and the random actions included."""
+    """All that decides how an environment goes on, the random actions included."""
 
-    accuracy: str
-    chain: tuple
+    chain: Chain
     observation: Any
     is_ended: bool
     episode: tuple[int, float]
     shift: float
     generator: Mapping[str, Any]
-    pushes: dict[Pair, float]
 
 
-class LiveEnv(WorldSubject):
+class LiveEnv(LiveSubject):
     """Environment in which a policy acts, and the user.
 
     An episode that has ended is followed by the next one, with the next step.
@@ -55,28 +59,24 @@ class LiveEnv(WorldSubject):
     """
 
     def __init__(self, env: gym.Env, name: str, seed: int = 0, policy: Policy | None = None, accuracy=None):
-        self.name, self.seed, self._policy = name, seed, policy
-        self._envs: dict[str, tuple[gym.Env, Listener]] = {}
-        self._generator = np.random.default_rng(seed)
         env = copied_env(env, accuracy)
-        self._use(self._add(env))
-        self.can = allowed_of(self.world, seed=True)
-        self._down = direction_of(self.world.gravity[0])
-        self._is_ended, self._episode, self._observation = False, (0, 0.0), None
-        self._shift = 0.0  # of the time [s]: where gusts blow, a reset sets that of the world to 0
-        self._begin_first(seed)
-        self._first = self.snapshot()
-
-    def _add(self, env: gym.Env) -> str:
         world = env.unwrapped.task.world
-        name = accuracy_name(world.accuracy)
-        self._envs[name] = env, Listener(world)
-        return name
+        self._envs = {accuracy_name(world.accuracy): env}
+        super().__init__(world, name, seed=True)
+        self._policy = policy
+        self._begin_run(seed)
+        self._begin_first(seed)
+        self._first = self._take()
 
-    def _use(self, name: str) -> None:
-        self._env, listener = self._envs[name]
+    def _use(self, accuracy: str) -> None:
+        super()._use(accuracy)
+        self._env = self._envs[accuracy]
         self._task = self._env.unwrapped.task
-        self._set_world(self._task.world, listener)
+
+    def _begin_run(self, seed: int) -> None:
+        self.seed, self._generator = seed, np.random.default_rng(seed)
+        self._is_ended, self._episode = False, (0, 0.0)
+        self._shift = 0.0  # where gusts blow, a reset sets the time of the world to 0
 
     def _begin_first(self, seed: int) -> None:
         """Go on with the episode that has begun, or begin one: where none has, or its observation cannot be read."""
@@ -90,16 +90,8 @@ class LiveEnv(WorldSubject):
         self.listener.is_changed = False
 
     @property
-    def time(self) -> float:
-        """Simulated time of all episodes together [s]."""
-        return self.world.time + self._shift
-
-    @property
     def interval(self) -> float:
         return self._task.control_dt
-
-    def events(self) -> list[Event]:
-        return [replace(event, t=event.t + self._shift) for event in super().events()]
 
     @property
     def message(self) -> str:
@@ -107,13 +99,16 @@ class LiveEnv(WorldSubject):
         number, total = self._episode
         return f"episode {number + 1}, return {total:.2f}"
 
+    def frame(self):
+        return frame_of(self._task)
+
+    # --- time ----------------------------------------------------------------------------------------------------
+
     def restart(self, seed: int) -> None:
         put_chain(self._env, self._first.chain, is_other=True)
         self._observation, _ = self._env.reset(seed=seed)
-        self.seed, self._generator = seed, np.random.default_rng(seed)
-        self._is_ended, self._episode, self._shift = False, (0, 0.0), 0.0
-        self.listener.begin()
-        self.listener.pushes, self.listener.is_changed = {}, False
+        self._begin_run(seed)
+        self.listener.resume({})
 
     def step(self, load=None, record=None):
         self.listener.begin()
@@ -145,59 +140,74 @@ class LiveEnv(WorldSubject):
             raise ValueError(f"policy gave actions of shape {actions.shape}; allowed is {(1, *space.shape)}")
         return actions[0].astype(space.dtype)
 
-    def snapshot(self) -> State:
+    def _take(self) -> State:
         return State(
-            self.accuracy, take_chain(self._env), copy.deepcopy(self._observation), self._is_ended, self._episode,
-            self._shift, self._generator.bit_generator.state, self.listener.pushes,
+            take_chain(self._env), copy.deepcopy(self._observation), self._is_ended, self._episode, self._shift,
+            self._generator.bit_generator.state,
         )  # fmt: skip
 
-    def restore(self, snapshot: State) -> None:
-        self._use(snapshot.accuracy)
-        put_chain(self._env, snapshot.chain)
-        self._observation = copy.deepcopy(snapshot.observation)
-        self._is_ended, self._episode, self._shift = snapshot.is_ended, snapshot.episode, snapshot.shift
-        self._generator.bit_generator.state = snapshot.generator
-        self.listener.begin()
-        self.listener.pushes, self.listener.is_changed = snapshot.pushes, False
+    def _put(self, state: State, is_other: bool = False) -> None:
+        put_chain(self._env, state.chain, is_other)
+        self._observation = copy.deepcopy(state.observation)
+        self._is_ended, self._episode, self._shift = state.is_ended, state.episode, state.shift
+        self._generator.bit_generator.state = state.generator
 
-    def frame(self):
-        return frame_of(self._task)
+    # --- parameters and accuracy ---------------------------------------------------------------------------------
 
-    def rehearsal(self) -> Callable[[], None]:
-        return _rehearsed(copied_env(self._env))
-
-    # --- sliders ---------------------------------------------------------------------------------------------
-
-    def set_gravity(self, strength: float) -> None:
-        self._hold("gravity", strength, strength * self._down)
-
-    def set_friction(self, coefficient: float) -> None:
-        self._hold("friction", coefficient, coefficient)
-
-    def set_restitution(self, coefficient: float) -> None:
-        self._hold("restitution", coefficient, coefficient)
-
-    def _hold(self, name: str, value: float, given: Any) -> None:
+    def _hold(self, name: str, value: float) -> None:
         """Change a parameter now, and in later episodes where they draw it."""
         if name in self._task.own_draws:
             self._task.hold(name, value)
         else:
-            self.world.set_parameters(**{name: given})
-        self.listener.is_changed = False  # the state is the same
+            super()._hold(name, value)
 
-    # --- accuracy --------------------------------------------------------------------------------------------
+    def rehearsal(self) -> Callable[[], None]:
+        return _rehearsed(copied_env(self._env))
 
     def prepare(self, name: str) -> Callable[[], None]:
         env = copied_env(self._env, name)
-        self._add(env)
+        self._envs[self._add(env.unwrapped.task.world)] = env
         return _rehearsed(env)
 
-    def switch(self, name: str) -> None:
-        pushes, chain = self.listener.pushes, take_chain(self._env)
-        self._use(name)
-        put_chain(self._env, chain, is_other=True)
-        self.listener.begin()
-        self.listener.pushes, self.listener.is_changed = pushes, False
+
+def copied_env(env: gym.Env, accuracy: Preset | Accuracy | None = None) -> gym.Env:
+    """Copy an environment and its wrappers, in a world of its own in which sliders act; it opens no window.
+
+    Every reference to the world in it becomes one to a new world at this accuracy (None: the same), in the same state.
+    """
+    task = env.unwrapped.task
+    own = copy.deepcopy(env, {id(task.world): copied(task.world, accuracy)})
+    own.unwrapped.render_mode = None
+    task = own.unwrapped.task
+    if not isinstance(task.disturbed, HandOfUser):
+        task.disturbed = HandOfUser(task.disturbed)
+    return own
+
+
+def wrappers(env: gym.Env) -> Iterator[gym.Wrapper]:
+    """Wrappers of an environment, the outermost first."""
+    while isinstance(env, gym.Wrapper):
+        yield env
+        env = env.env
+
+
+def take_chain(env: gym.Env) -> Chain:
+    """State of an environment, and copies of what its wrappers remember."""
+    remembered = []
+    for wrapper in wrappers(env):
+        kept = {name: value for name, value in vars(wrapper).items() if name not in APART}
+        remembered.append({name: value for name, value in kept.items() if not isinstance(value, spaces.Space)})
+    return env.unwrapped.get_state(), copy.deepcopy(remembered)
+
+
+def put_chain(env: gym.Env, chain: Chain, is_other: bool = False) -> None:
+    """Let an environment and its wrappers go on from a state of `take_chain`; `is_other`: of another accuracy."""
+    state, remembered = chain
+    if is_other:
+        state = replace(state, world=fitted(state.world, env.unwrapped.task.world))
+    env.unwrapped.set_state(state)
+    for wrapper, values in zip(wrappers(env), copy.deepcopy(remembered), strict=True):
+        vars(wrapper).update(values)
 
 
 def _rehearsed(env: gym.Env) -> Callable[[], None]:

@@ -17,8 +17,8 @@ from physics.work_precision.truth import LOOSER
 from rigid_env.rendering import Frame
 from rigid_env.rendering.picture import world_frame
 from rigid_env.viewer.copies import fitted, warm, with_parameters
-from rigid_env.viewer.cost import Cost
 from rigid_env.viewer.listening import Call
+from rigid_env.viewer.pace import Cost
 
 REFERENCE = "reference"
 

@@ -1,15 +1,18 @@
-"""Hand of the user in a world: a spring that drags a body, and kicks."""
+"""Hand of the user in a world, or in a task: a spring that drags a body, and kicks."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 import physics
-from physics import validation
 from physics.kernels.state import layout as at
 from physics.rotations import rotation_matrices
+
+if TYPE_CHECKING:
+    from rigid_env.tasks.disturbances import Disturbances
 
 RATE = 10.0
 """Angular frequency at which the spring swings the body's mass [rad/s]."""
@@ -89,17 +92,44 @@ def _least_mass(params: np.ndarray, quat: np.ndarray, arm: np.ndarray) -> float:
     return 1.0 / float(np.linalg.eigvalsh(params[at.INV_MASS] * np.eye(3) - cross @ inverse @ cross)[-1])
 
 
-def checked_body(world: physics.World, body) -> int:
-    """Index of a body of a world.
+class HandOfUser:
+    """Forces of the user in a task: in the place of its disturbances, which act besides.
 
-    Raises
-    ------
-    ValueError
-        There is no such body.
+    Parameters
+    ----------
+    inner : Disturbances or None
+
+    Attributes
+    ----------
+    pull : (bodies, 6) float64 or None
+        Force [N] and torque [N m] of the user in the coming control step.
     """
-    return validation.index(body, world.body_count, "body")
 
+    def __init__(self, inner: Disturbances | None):
+        self.inner, self.pull = inner, None
 
-def checked_vector(value, name: str) -> np.ndarray:
-    """(3,) finite numbers, a copy."""
-    return np.array(validation.finite(value, (3,), name))
+    @property
+    def arrays(self) -> dict[str, np.ndarray]:
+        """Arrays of the task's own disturbances."""
+        return {} if self.inner is None else self.inner.arrays
+
+    @property
+    def load(self) -> np.ndarray | float:
+        """Loads of the task's own disturbances in the last control step; the user's hand is drawn as a spring."""
+        return 0.0 if self.inner is None else self.inner.load
+
+    def due(self) -> np.ndarray:
+        """Worlds in which a disturbance of the task starts in the coming control step."""
+        return np.zeros(0, dtype=np.int64) if self.inner is None else self.inner.due()
+
+    def begin(self, rows: np.ndarray) -> None:
+        """Begin episodes."""
+        if self.inner is not None:
+            self.inner.begin(rows)
+
+    def act(self) -> tuple[np.ndarray | None, np.ndarray | None]:
+        """Load (1, bodies, 6) of the coming control step, and of its first physics step besides, or None."""
+        load, push = (None, None) if self.inner is None else self.inner.act()
+        if self.pull is None:
+            return load, push
+        return (self.pull[None] if load is None else load + self.pull), push

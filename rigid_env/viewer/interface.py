@@ -1,4 +1,4 @@
-"""Subject: anything that can be played, behind one interface; `rigid_env.viewer.subject` makes one."""
+"""Subject: anything that can be played, behind one interface, and its looks; `rigid_env.viewer.subject` makes one."""
 
 from __future__ import annotations
 
@@ -10,11 +10,39 @@ import numpy as np
 
 import physics
 from physics import Event
-from physics.kernels.state import layout as at
 from rigid_env.rendering import Frame
-from rigid_env.rendering.picture import world_frame
-from rigid_env.viewer.copies import accuracy_name
 from rigid_env.viewer.listening import Listener
+
+
+@dataclass(frozen=True, eq=False)
+class Look:
+    """Everything that the viewer draws at a moment. World frame, SI units.
+
+    Parameters
+    ----------
+    frame : Frame
+        Bodies, walls, goal, contacts and the applied wrench.
+    time : float
+        [s].
+    linvel, angvel : (bodies, 3) float
+        [m/s] and [rad/s].
+    is_asleep : (bodies,) bool
+    radius : (bodies,) float
+        Of a sphere round `BodyView.pos` that holds the body [m].
+    drag : pair of (3,) float or None
+        Ends of the spring by which the mouse drags a body: on the body, and at the mouse [m].
+    ghost : Frame or None
+        The same scene at the accuracy ``reference``.
+    """
+
+    frame: Frame
+    time: float
+    linvel: np.ndarray
+    angvel: np.ndarray
+    is_asleep: np.ndarray
+    radius: np.ndarray
+    drag: tuple[np.ndarray, np.ndarray] | None = None
+    ghost: Frame | None = None
 
 
 @dataclass(frozen=True)
@@ -42,24 +70,6 @@ class Can:
     accuracy: bool = False
     ghost: bool = False
     seed: bool = False
-
-
-class Motion:
-    """Velocities and more of all bodies at a moment, copied.
-
-    Attributes
-    ----------
-    linvel, angvel : (bodies, 3) float64
-        World frame [m/s], [rad/s].
-    is_asleep : (bodies,) bool
-    radius : (bodies,) float64
-        Of a bounding sphere [m].
-    """
-
-    def __init__(self, linvel: np.ndarray, angvel: np.ndarray, is_asleep: np.ndarray, radius: np.ndarray):
-        self.linvel, self.angvel, self.is_asleep, self.radius = (
-            np.array(each) for each in (linvel, angvel, is_asleep, radius)
-        )
 
 
 class Subject:
@@ -145,97 +155,22 @@ class Subject:
         """Picture of now."""
         raise NotImplementedError
 
-    def motion(self) -> Motion:
-        """Velocities and more of now."""
+    def look(self) -> Look:
+        """Everything to draw of now, but for the hand and the ghost."""
         raise NotImplementedError
 
     def measure(self) -> dict[str, float]:
-        """Columns of `samples.Samples`, of now and of the last step."""
+        """Columns of `history.Samples`, of now and of the last step."""
         raise NotImplementedError
 
     def events(self) -> list[Event]:
         """Events of the last step."""
         return []
 
+    def settings(self) -> dict[str, float]:
+        """Present values of the sliders that it allows: gravity [m/s²], friction, restitution of body 0."""
+        return {}
+
     def rehearsal(self) -> Callable[[], None] | None:
         """Work that compiles what a step needs, which another thread may do; None: nothing has to be compiled."""
         return None
-
-
-class WorldSubject(Subject):
-    """A subject that is simulated in `world`, to which `listener` listens."""
-
-    world: physics.World
-    listener: Listener
-
-    def _set_world(self, world: physics.World, listener: Listener) -> None:
-        self.world, self.listener = world, listener
-        self.accuracy = accuracy_name(world.accuracy)
-
-    @property
-    def scene(self) -> physics.Scene:
-        return self.world.scene
-
-    @property
-    def time(self) -> float:
-        return self.world.time
-
-    @property
-    def interval(self) -> float:
-        return self.world.dt
-
-    def frame(self) -> Frame:
-        return world_frame(self.world)
-
-    def motion(self) -> Motion:
-        world = self.world
-        return Motion(world.linvel[0], world.angvel[0], world.asleep[0], world.params[:, at.RADIUS])
-
-    def measure(self) -> dict[str, float]:
-        found = physics.diagnose(self.world)
-        kinetic, potential = float(found.kinetic_energy.sum()), float(found.potential_energy.sum())
-        return {
-            "kinetic_energy": kinetic, "potential_energy": potential, "energy": kinetic + potential,
-            "momentum": float(np.linalg.norm(found.momentum.sum(axis=(0, 1)))),
-            "penetration": self.listener.penetration, "residual": self.listener.residual,
-        }  # fmt: skip
-
-    def events(self) -> list[Event]:
-        return self.listener.events
-
-    def settings(self) -> dict[str, float]:
-        """Values of sliders: gravity [m/s²], friction and restitution of body 0."""
-        params = self.world.params[0]
-        strength = float(np.linalg.norm(self.world.gravity[0]))
-        return {
-            "gravity": strength, "friction": float(params[at.FRICTION]), "restitution": float(params[at.RESTITUTION]),
-        }  # fmt: skip
-
-    # --- what live subjects add ------------------------------------------------------------------------------
-
-    def set_gravity(self, strength: float) -> None:
-        """Change the strength of gravity, at least 0 [m/s²]; its direction stays."""
-        raise NotImplementedError
-
-    def set_friction(self, coefficient: float) -> None:
-        """Change the coefficient of friction of all bodies."""
-        raise NotImplementedError
-
-    def set_restitution(self, coefficient: float) -> None:
-        """Change the coefficient of restitution of all bodies."""
-        raise NotImplementedError
-
-    def prepare(self, name: str) -> Callable[[], None]:
-        """Make another preset ready for `switch`; returns the rest of the work, which another thread may do."""
-        raise NotImplementedError
-
-    def switch(self, name: str) -> None:
-        """Go on at another preset, from the same state."""
-        raise NotImplementedError
-
-
-def allowed_of(world: physics.World, seed: bool = False) -> Can:
-    """Controls of a world that is simulated live."""
-    plan = world.plan
-    flags = (bool(each) for each in (plan.gravity, plan.friction, plan.restitution))
-    return Can(True, *flags, accuracy=True, ghost=True, seed=seed)

@@ -6,15 +6,13 @@ from typing import Protocol
 
 import numpy as np
 
-from rigid_env.rendering import palette
+from rigid_env.rendering import BodyView, palette
 from rigid_env.rendering.geometry import plane_axes
-from rigid_env.viewer.arrows import HEAD_LENGTH, Arrows, Lines, path, spring
+from rigid_env.viewer.arrows import HEAD_LENGTH, Arrows, Lines, Nodes, path, spring
 from rigid_env.viewer.bodies import Bodies
-from rigid_env.viewer.look import Look
-from rigid_env.viewer.picking import leave
-from rigid_env.viewer.placement import Placement
-from rigid_env.viewer.scenery import add_walls
-from rigid_env.viewer.shapes import octants
+from rigid_env.viewer.interface import Look
+from rigid_env.viewer.scenery import Placement, add_walls
+from rigid_env.viewer.shapes import leave, octants
 
 VELOCITY, SPIN = (196, 58, 148), (150, 104, 208)
 """Colours of arrows of velocity and angular velocity."""
@@ -46,26 +44,21 @@ class Layer(Protocol):
         """Draw nothing until the next `show`."""
 
 
-class Walls:
+class Walls(Nodes):
     """Floor and walls of the room; they are added once."""
 
     def __init__(self, scene, placement: Placement):
-        self._nodes = add_walls(scene, "/scene/walls", placement)
+        super().__init__(scene, placement, "/scene/walls")
+        self._nodes = add_walls(scene, self._name, placement)
 
     def show(self, look: Look) -> None:
-        for node in self._nodes:
-            node.visible = True
-
-    def hide(self) -> None:
-        for node in self._nodes:
-            node.visible = False
+        self._move()
 
 
-class Contacts:
+class Contacts(Nodes):
     """Contact points."""
 
-    def __init__(self, scene, placement: Placement):
-        self._scene, self._placement, self._node = scene, placement, None
+    name = "/scene/contacts"
 
     def show(self, look: Look) -> None:
         points = look.frame.contact_points
@@ -73,89 +66,84 @@ class Contacts:
             self.hide()
             return
         drawn = self._placement.drawn(points)
-        if self._node is None:
-            size = POINT * self._placement.unit * self._placement.scale
-            self._node = self._scene.add_point_cloud(
-                "/scene/contacts", drawn, palette.CONTACT, point_size=size, point_shape="circle", precision="float32",
+        if self._nodes:
+            self._move(points=drawn)
+            return
+        size = POINT * self._placement.unit * self._placement.scale
+        self._nodes = [
+            self._scene.add_point_cloud(
+                self._name, drawn, palette.CONTACT, point_size=size, point_shape="circle", precision="float32",
                 point_shading="flat",
-            )  # fmt: skip
-        else:
-            self._node.points, self._node.visible = drawn, True
-
-    def hide(self) -> None:
-        if self._node is not None:
-            self._node.visible = False
+            )
+        ]  # fmt: skip
 
 
-class Forces:
-    """Arrows of contact forces."""
+class Forces(Arrows):
+    """Arrows of contact forces, in units of the smallest body: those of a block would hide a pebble."""
 
-    def __init__(self, scene, placement: Placement):
-        self._arrows = Arrows(scene, "/scene/forces", placement)
+    name = "/scene/forces"
 
     def show(self, look: Look) -> None:
         frame = look.frame
-        self._arrows.unit = unit = smallest(frame, self._arrows.unit)
-        self._arrows.show(frame.contact_points, force_scale(frame, unit) * frame.contact_forces, palette.CONTACT)
+        self.unit = unit = min(map(extent, frame.bodies), default=self.unit)
+        self.draw(frame.contact_points, force_scale(frame, unit) * frame.contact_forces, palette.CONTACT)
 
-    def hide(self) -> None:
-        self._arrows.hide()
+
+class Arcs(Lines):
+    """Arcs of torques."""
+
+    name, colour = "/scene/applied/arc", palette.TORQUE
 
 
 class Applied:
     """Arrows of the forces that are applied to bodies, from their surfaces, and arcs of the torques round them."""
 
     def __init__(self, scene, placement: Placement):
-        self._force = Arrows(scene, "/scene/applied/force", placement)
-        self._turn = Arrows(scene, "/scene/applied/turn", placement)
-        self._arc = Lines(scene, "/scene/applied/arc", placement, palette.TORQUE)
-        self._unit = placement.unit
+        self._force = Arrows(scene, placement, "/scene/applied/force")
+        self._turn = Arrows(scene, placement, "/scene/applied/turn")
+        self._arc = Arcs(scene, placement)
 
     def show(self, look: Look) -> None:
-        frame = look.frame
+        frame, unit = look.frame, self._force.unit
         if not frame.bodies or not len(frame.applied_force):
             self.hide()
             return
-        scale = force_scale(frame, self._unit)
+        scale = force_scale(frame, unit)
         forces, torques = scale * frame.applied_force, scale * frame.applied_torque
         starts = np.array([leave(body, force) for body, force in zip(frame.bodies, forces)])
-        self._force.show(starts, forces, palette.APPLIED_FORCE)
+        self._force.draw(starts, forces, palette.APPLIED_FORCE)
         arcs = [torque_arc(body, torque) for body, torque in zip(frame.bodies, torques)]
         arcs = [arc for arc in arcs if len(arc)]
-        self._arc.show(np.concatenate([path(arc) for arc in arcs]) if arcs else ())
+        self._arc.draw(np.concatenate([path(arc) for arc in arcs]) if arcs else ())
         ends = np.array([arc[-2:] for arc in arcs]).reshape(-1, 2, 3)
         ways = ends[:, 1] - ends[:, 0]
         lengths = np.linalg.norm(ways, axis=1, keepdims=True)
-        self._turn.show(ends[:, 1], HEAD_LENGTH * self._unit * ways / lengths, palette.TORQUE)
+        self._turn.draw(ends[:, 1], HEAD_LENGTH * unit * ways / lengths, palette.TORQUE)
 
     def hide(self) -> None:
         for part in (self._force, self._turn, self._arc):
             part.hide()
 
 
-class Velocities:
+class Velocities(Arrows):
     """Arrows of velocities and angular velocities, from the surfaces of the bodies."""
 
-    def __init__(self, scene, placement: Placement):
-        self._arrows, self._unit = Arrows(scene, "/scene/velocities", placement), placement.unit
+    name = "/scene/velocities"
 
     def show(self, look: Look) -> None:
-        bodies, unit = look.frame.bodies, self._unit
+        bodies, unit = look.frame.bodies, self.unit
         rates = np.concatenate([look.linvel, look.angvel])
         starts = [leave(body, rate) for body, rate in zip(bodies * 2, rates)]
         scales = np.repeat((0.5 * (unit / EARTH) ** 0.5, 0.5 * unit * (unit / EARTH) ** 0.5), len(bodies))
         colours = np.repeat((VELOCITY, SPIN), len(bodies), axis=0)
-        self._arrows.show(np.reshape(starts, (-1, 3)), scales[:, None] * rates, colours)
-
-    def hide(self) -> None:
-        self._arrows.hide()
+        self.draw(starts, scales[:, None] * rates, colours)
 
 
-class Axes:
+class Axes(Nodes):
     """Axes of the bodies, from the centre of the shape: x red, y green, z blue."""
 
-    def __init__(self, scene, placement: Placement):
-        self._scene, self._placement, self._node, self._count = scene, placement, None, 0
+    name = "/scene/axes"
+    _count = 0
 
     def show(self, look: Look) -> None:
         if not look.frame.bodies:
@@ -164,27 +152,21 @@ class Axes:
         poses, scale = look.frame.poses, self._placement.scale
         pos, sizes = self._placement.drawn(poses.pos), (AXIS * 2.0 * scale * np.asarray(look.radius)).astype(np.float32)
         quat = np.array([body.quat for body in look.frame.bodies], dtype=np.float32).reshape(-1, 4)
-        if self._node is None or self._count != len(pos):
+        if self._count != len(pos):
             self._count = len(pos)
-            radius = (
-                AXIS_RADIUS * self._placement.unit / max(float(np.max(look.radius, initial=0.0)) * 2.0 * AXIS, 1e-9)
-            )
-            self._node = self._scene.add_batched_axes(
-                "/scene/axes", quat, pos, sizes, axes_length=1.0, axes_radius=radius
-            )
-        node = self._node
-        node.batched_positions, node.batched_wxyzs, node.batched_scales, node.visible = pos, quat, sizes, True
-
-    def hide(self) -> None:
-        if self._node is not None:
-            self._node.visible = False
+            longest = max(float(np.max(look.radius, initial=0.0)) * 2.0 * AXIS, 1e-9)
+            radius = AXIS_RADIUS * self._placement.unit / longest
+            self._nodes = [
+                self._scene.add_batched_axes(self._name, quat, pos, sizes, axes_length=1.0, axes_radius=radius)
+            ]
+        self._move(batched_positions=pos, batched_wxyzs=quat, batched_scales=sizes)
 
 
-class Bounds:
+class Bounds(Nodes):
     """Spheres that hold the bodies."""
 
-    def __init__(self, scene, placement: Placement):
-        self._scene, self._placement, self._nodes, self._count = scene, placement, [], 0
+    name = "/scene/bounds"
+    _count = 0
 
     def show(self, look: Look) -> None:
         if not look.frame.bodies:
@@ -196,30 +178,21 @@ class Bounds:
             self._count, upright = len(pos), np.tile(np.eye(4, dtype=np.float32)[0], (len(pos), 1))
             self._nodes = [
                 self._scene.add_batched_meshes_simple(
-                    f"/scene/bounds/{k}", part.vertices, part.faces, upright, pos, batched_scales=sizes, lod="off",
+                    f"{self._name}/{k}", part.vertices, part.faces, upright, pos, batched_scales=sizes, lod="off",
                     batched_colors=BOUND, opacity=BOUND_OPACITY, cast_shadow=False, receive_shadow=False,
                 )
                 for k, part in enumerate(octants())
             ]  # fmt: skip
-        for node in self._nodes:
-            node.batched_positions, node.batched_scales, node.visible = pos, sizes, True
-
-    def hide(self) -> None:
-        for node in self._nodes:
-            node.visible = False
+        self._move(batched_positions=pos, batched_scales=sizes)
 
 
-class Drag:
+class Drag(Lines):
     """Spring from a body to the mouse."""
 
-    def __init__(self, scene, placement: Placement):
-        self._lines, self._unit = Lines(scene, "/scene/drag", placement, DRAG), placement.unit
+    name, colour = "/scene/drag", DRAG
 
     def show(self, look: Look) -> None:
-        self._lines.show(() if look.drag is None else spring(*look.drag, self._unit))
-
-    def hide(self) -> None:
-        self._lines.hide()
+        self.draw(() if look.drag is None else spring(*look.drag, self._placement.unit))
 
 
 class Ghost:
@@ -243,17 +216,15 @@ def force_scale(frame, unit: float) -> float:
     return frame.force_scale * min(1.0, unit / 5.0)
 
 
-def smallest(frame, unit: float) -> float:
-    """Extent of the smallest body of a frame [m], `unit` where it has none."""
-    extents = (float(body.dimensions.max()) * (1.0 if body.kind == "block" else 2.0) for body in frame.bodies)
-    return min(extents, default=unit)
+def extent(body: BodyView) -> float:
+    """Largest size of a body along its axes [m]."""
+    return float(body.dimensions.max()) * (1.0 if body.kind == "block" else 2.0)
 
 
-def torque_arc(body, scaled) -> np.ndarray:
+def torque_arc(body: BodyView, scaled) -> np.ndarray:
     """Points (n, 3) [m] of an arc round a body and the axis of a torque; `scaled` (3,) is as long as the arc [m]."""
     size = float(np.linalg.norm(scaled))
-    extent = float(body.dimensions.max()) * (1.0 if body.kind == "block" else 2.0)
-    radius = TORQUE_RADIUS * extent
+    radius = TORQUE_RADIUS * extent(body)
     sweep = min(size / radius, TORQUE_SWEEP) if np.isfinite(size) else 0.0
     if sweep < 0.2:
         return np.zeros((0, 3))

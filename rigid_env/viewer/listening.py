@@ -81,6 +81,11 @@ class Listener:
         self.seconds = self.penetration = self.residual = 0.0
         self.fault = ""
 
+    def resume(self, pushes: dict[Pair, float]) -> None:
+        """Forget the calls so far: the world was put into a state with these `pushes`, and goes on from there."""
+        self.begin()
+        self.pushes, self.is_changed = pushes, False
+
     # --- told by the world ---------------------------------------------------------------------------------
 
     def changed(self, worlds: np.ndarray | slice) -> None:

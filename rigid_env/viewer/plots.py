@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from rigid_env.viewer.samples import Samples
+from rigid_env.viewer.history import Samples
 
 POINTS = 400
 """Points of a line at most: longer runs are thinned."""

@@ -4,27 +4,16 @@ from __future__ import annotations
 
 from bisect import bisect_right
 from collections.abc import Callable
-from dataclasses import replace
-from typing import NamedTuple
 
 import numpy as np
 
 import physics
 from physics import Contact, Event
-from physics.analysis.events import Pair
 from physics.rotations import rotation_matrices
 from rigid_env.rendering import BodyView, Frame, WallView
 from rigid_env.viewer.copies import warm
-from rigid_env.viewer.interface import Can, Motion, Subject, WorldSubject
-from rigid_env.viewer.listening import Listener
-
-
-class RecordedState(NamedTuple):
-    """All that decides how a replay goes on."""
-
-    call: int
-    snapshot: physics.Snapshot
-    pushes: dict[Pair, float]
+from rigid_env.viewer.interface import Can, Look, Subject
+from rigid_env.viewer.worlds import WorldSubject
 
 
 class PlayedRecording(WorldSubject):
@@ -42,18 +31,21 @@ class PlayedRecording(WorldSubject):
     def __init__(self, recording: physics.Recording, name: str):
         if not len(recording):
             raise ValueError("recording holds no step; allowed is one of at least one step")
-        self.name, self._recording, self._call = name, recording, 0
+        super().__init__(recording.world(), name)
+        self._recording, self._call = recording, 0
         self._starts = {start.step: start.snapshot for start in recording.starts}
         self._steppers: dict[tuple[int, float], physics.Stepper] = {}
-        world = recording.world()
-        self._set_world(world, Listener(world))
-        self._times = world.time + np.concatenate(([0.0], np.cumsum(recording.steps * recording.dt)))
+        self._times = self.world.time + np.concatenate(([0.0], np.cumsum(recording.steps * recording.dt)))
         self._first = self.snapshot()
 
     @property
     def time(self) -> float:
         """Time of the first world, and from then on the sum of the steps [s]: a reset does not set it back."""
         return float(self._times[self._call])
+
+    @property
+    def _shift(self) -> float:
+        return self.time - self.world.time
 
     @property
     def interval(self) -> float:
@@ -90,18 +82,12 @@ class PlayedRecording(WorldSubject):
             stepper()
         self._call += 1
 
-    def events(self) -> list[Event]:
-        shift = self.time - self.world.time
-        return [replace(event, t=event.t + shift) for event in self.listener.events]
+    def _take(self) -> tuple[int, physics.Snapshot]:
+        return self._call, self.world.snapshot()
 
-    def snapshot(self) -> RecordedState:
-        return RecordedState(self._call, self.world.snapshot(), self.listener.pushes)
-
-    def restore(self, snapshot: RecordedState) -> None:
-        self._call = snapshot.call
-        self.world.restore(snapshot.snapshot)
-        self.listener.begin()
-        self.listener.pushes, self.listener.is_changed = snapshot.pushes, False
+    def _put(self, state: tuple[int, physics.Snapshot], is_other: bool = False) -> None:
+        self._call, snapshot = state
+        self.world.restore(snapshot)
 
     def rehearsal(self) -> Callable[[], None]:
         world = self._recording.world()
@@ -175,10 +161,10 @@ class PlayedTrajectory(Subject):
         pos, quat = self._trajectory.pos[self._sample], self._trajectory.quat[self._sample]
         return Frame([_view(*each) for each in zip(self._bodies, pos, quat)], self._walls)
 
-    def motion(self) -> Motion:
+    def look(self) -> Look:
         trajectory, k = self._trajectory, self._sample
         asleep = np.zeros(len(self._bodies), dtype=np.bool_)
-        return Motion(trajectory.linvel[k], trajectory.angvel[k], asleep, self._radius)
+        return Look(self.frame(), self.time, trajectory.linvel[k], trajectory.angvel[k], asleep, self._radius)
 
     def measure(self) -> dict[str, float]:
         trajectory, k = self._trajectory, self._sample

@@ -7,19 +7,16 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from physics import Event
-from rigid_env.viewer.cost import MICROSECONDS, Cost
 from rigid_env.viewer.hand import Hand
-from rigid_env.viewer.history import History, Input
+from rigid_env.viewer.history import History, Input, Samples
 from rigid_env.viewer.interface import Subject
-from rigid_env.viewer.samples import Samples
+from rigid_env.viewer.pace import MICROSECONDS, Cost
 
 MOST_EVENTS = 100_000
 """Events that are kept; later ones are left out."""
 
 PATIENCE = 1.0
 """Time that a ghost may take to follow to a moment of the past [s]; a slower one starts anew there."""
-
-SLIDERS = ("gravity", "friction", "restitution")
 
 
 class Kept(NamedTuple):
@@ -46,6 +43,7 @@ class Run:
     samples : Samples
         One at the start and one after each step.
     events : list of Event
+        Up to the latest moment that is known.
     ghost : Ghost or None
     hand : Hand
     fault : str
@@ -73,6 +71,11 @@ class Run:
         if self.ghost is not None:
             self.ghost.start(self.subject.world.snapshot())
         self._begin()
+
+    @property
+    def known_events(self) -> list[Event]:
+        """Events up to the present moment, a copy."""
+        return self.events[: self.history.event_counts[self.index]]
 
     # --- onward ------------------------------------------------------------------------------------------------
 
@@ -133,7 +136,7 @@ class Run:
         Parameters
         ----------
         name : str
-            ``drag`` (body, point, target), ``release``, ``kick`` (body, impulse), one of `SLIDERS` (value), or
+            ``drag`` (body, point, target), ``release``, ``kick`` (body, impulse), one of `worlds.SLIDERS` (value), or
             ``accuracy`` (name).
         """
         done = Input(name, arguments)
@@ -153,7 +156,7 @@ class Run:
             self.subject.switch(*arguments)
             self.cost = Cost()
         else:
-            getattr(self.subject, f"set_{name}")(*arguments)
+            self.subject.set(name, *arguments)
             if self.ghost is not None:
                 self.ghost.take_parameters(self.subject.world)
 
@@ -206,8 +209,3 @@ class Run:
             return False
         self.ghost.restore(kept)
         return True
-
-
-def known_events(run: Run) -> list[Event]:
-    """Events up to the present moment of a run."""
-    return run.events[: run.history.event_counts[run.index]]

@@ -3,22 +3,16 @@
 from __future__ import annotations
 
 import time as clock
+from dataclasses import replace
 
-from physics import PRESETS, Event, validation
-from rigid_env.viewer.background import Background
-from rigid_env.viewer.controls import Controls
-from rigid_env.viewer.ghost import Ghost
-from rigid_env.viewer.interface import Subject
-from rigid_env.viewer.look import Look
+from physics import Event, validation
+from rigid_env.viewer.controls import START, Controls
+from rigid_env.viewer.history import Samples
+from rigid_env.viewer.interface import Look, Subject
 from rigid_env.viewer.pace import Pace
-from rigid_env.viewer.run import Run, known_events
-from rigid_env.viewer.samples import Samples
 
 BUDGET = 0.05
 """Time of computing after which a call of `Session.advance` takes no further step [s]."""
-
-START, GHOST = "the scene", "the ghost"
-"""Names of what compiles besides accuracies."""
 
 
 class Session(Controls):
@@ -39,16 +33,8 @@ class Session(Controls):
     """
 
     def __init__(self, subject: Subject):
-        self.subject = subject
-        self.is_playing = False
-        self._run, self._pace, self._note = Run(subject), Pace(), ""
-        self._sliders: dict[str, float] = {}
-        self._jobs: dict[str, Background] = {}
-        self._ghost: Ghost | None = None  # that is wanted, and may compile
-        self._ready, self._wanted = {subject.accuracy}, subject.accuracy
-        work = subject.rehearsal()
-        if work is not None:
-            self._jobs[START] = Background(START, work)
+        super().__init__(subject)
+        self._pace = Pace()
 
     # --- to be read --------------------------------------------------------------------------------------------
 
@@ -69,11 +55,6 @@ class Session(Controls):
         return self.subject.seed
 
     @property
-    def accuracy(self) -> str:
-        """Name of the preset, ``custom``, or empty where nothing is simulated."""
-        return self.subject.accuracy
-
-    @property
     def speed(self) -> float:
         """Simulated seconds per real second."""
         return self._pace.speed
@@ -90,17 +71,7 @@ class Session(Controls):
     @property
     def events(self) -> list[Event]:
         """Events up to now, a copy."""
-        return known_events(self._run)
-
-    @property
-    def is_compiling(self) -> bool:
-        """Something compiles in the background."""
-        return bool(self._jobs)
-
-    @property
-    def ghost_label(self) -> str:
-        """Name of the ghost, with its own error where it has one; empty without one."""
-        return "" if self._run.ghost is None else self._run.ghost.label
+        return self._run.known_events
 
     @property
     def message(self) -> str:
@@ -112,12 +83,10 @@ class Session(Controls):
 
     def look(self) -> Look:
         """Everything to draw of now."""
-        run, subject, motion = self._run, self.subject, self.subject.motion()
+        run, subject = self._run, self.subject
         drag = None if subject.world is None else run.hand.ends(subject.world)
         ghost = None if run.ghost is None else run.ghost.frame()
-        return Look(
-            subject.frame(), subject.time, motion.linvel, motion.angvel, motion.is_asleep, motion.radius, drag, ghost
-        )
+        return replace(subject.look(), drag=drag, ghost=ghost)
 
     # --- time --------------------------------------------------------------------------------------------------
 
@@ -219,56 +188,3 @@ class Session(Controls):
             self._run.go_to(self._run.index, anew=True)
             return False
         return True
-
-    # --- accuracy ----------------------------------------------------------------------------------------------
-
-    def set_accuracy(self, preset: str) -> None:
-        """Go on at another preset, from the same state, once its kernel is there.
-
-        Raises
-        ------
-        ValueError
-            No such preset, or one that this scene does not allow.
-        """
-        self._needs("accuracy")
-        validation.one_of(preset, {**PRESETS, **dict.fromkeys(self._ready)}, "accuracy")
-        if preset not in self._ready and preset not in self._jobs:
-            self._jobs[preset] = Background(preset, self.subject.prepare(preset))
-        self._wanted = preset
-        self._switch()
-
-    def _switch(self) -> None:
-        if self._wanted != self.accuracy and self._wanted in self._ready:
-            self._run.give("accuracy", self._wanted)
-
-    def set_ghost(self, on: bool) -> None:
-        """Show the same scene at ``reference`` beside it, from this moment on, once its kernel is there; or do not."""
-        if not on:
-            self._run.ghost = self._ghost = None
-            self._jobs.pop(GHOST, None)
-        elif self._ghost is None:
-            self._needs("ghost")
-            self._ghost = Ghost(self.subject.world)
-            self._jobs[GHOST] = Background(GHOST, self._ghost.warm)
-
-    # --- in the background -------------------------------------------------------------------------------------
-
-    def wait(self) -> None:
-        """Wait until nothing compiles any more."""
-        for job in list(self._jobs.values()):
-            job.join()
-        self._poll()
-
-    def _poll(self) -> None:
-        """Take over what has compiled."""
-        for name in [name for name, job in self._jobs.items() if job.is_done]:
-            error = self._jobs.pop(name).error
-            if error is not None:
-                self._note = f"{name}: {type(error).__name__}: {error}"
-                self.is_playing = self.is_playing and name != START
-            elif name == GHOST:
-                self._ghost.start(self.subject.world.snapshot())
-                self._run.ghost = self._ghost
-            elif name != START:
-                self._ready.add(name)
-                self._switch()

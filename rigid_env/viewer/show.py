@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from physics import validation
-from rigid_env.viewer.look import Look
+from rigid_env.viewer.interface import Look
 from rigid_env.viewer.session import Session
 from rigid_env.viewer.subject import open_subject
 
@@ -103,14 +103,14 @@ def show(
     gymnasium.error.DependencyNotInstalled
         If viser is missing.
     """
-    from rigid_env.viewer import notebook
+    from rigid_env.viewer import export
     from rigid_env.viewer.server import Viewer
     from rigid_env.viewer.servers import directions, start_viewer_server
 
     port = validation.count(port, "port", most=65_535)
     session = Session(open_subject(x, **settings))
-    if notebook.in_notebook():
-        return notebook.Embedded(_page(session, duration))
+    if export.in_notebook():
+        return export.Embedded(_page(session, duration))
     server = start_viewer_server(session.subject.name, host, port)
     viewer = Viewer(session, server)
     viewer.play_once_seen()

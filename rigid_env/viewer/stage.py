@@ -9,11 +9,10 @@ import numpy as np
 from physics import Scene, validation
 from rigid_env.viewer import layers, scenery
 from rigid_env.viewer.bodies import Bodies
-from rigid_env.viewer.fields import Fields
-from rigid_env.viewer.goal import Goal
-from rigid_env.viewer.look import Look
-from rigid_env.viewer.picking import body_point, hit
-from rigid_env.viewer.placement import Placement, place
+from rigid_env.viewer.interface import Look
+from rigid_env.viewer.marks import Fields, Goal
+from rigid_env.viewer.scenery import Placement, place
+from rigid_env.viewer.shapes import body_point, hit
 
 LAYERS = {
     "walls": True, "contacts": True, "forces": True, "applied": True, "velocities": False, "axes": False,
@@ -54,7 +53,7 @@ class Stage:
     def show(self, look: Look) -> None:
         """Draw a `Look`. With other walls than before the room is made anew, and the camera stays."""
         with self._server.atomic():
-            if self._needs_room(look):
+            if self._walls != _walls_of(look):
                 self._make_room(look)
             self._look = look
             self._center(look)
@@ -123,9 +122,6 @@ class Stage:
         self._on_click = callback
 
     # --- room ----------------------------------------------------------------------------------------------
-
-    def _needs_room(self, look: Look) -> bool:
-        return self._walls != _walls_of(look)
 
     def _make_room(self, look: Look) -> None:
         is_first = self.placement is None

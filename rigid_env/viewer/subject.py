@@ -13,9 +13,10 @@ import physics
 from physics import scenes, validation
 from physics.accuracy import resolve
 from physics.summary import shown
+from rigid_env.viewer.copies import copied, declared
 from rigid_env.viewer.interface import Subject
 from rigid_env.viewer.replays import PlayedRecording, PlayedTrajectory
-from rigid_env.viewer.worlds import live_scene, live_world
+from rigid_env.viewer.worlds import LiveWorld
 
 ACCURACY, DT = "balanced", 0.01
 
@@ -78,9 +79,9 @@ def open_subject(
         return _open_environment(what, name, accuracy, dt, seed, policy, controller)
     _refuse(name, "no environment", policy=policy, controller=controller or None)
     if isinstance(what, physics.Scene):
-        return live_scene(what, name, accuracy or ACCURACY, dt or DT)
+        return LiveWorld(physics.World(declared(what), dt=dt or DT, accuracy=accuracy or ACCURACY), name)
     if isinstance(what, physics.World):
-        return live_world(what, name, accuracy, dt)
+        return LiveWorld(copied(what, accuracy, dt), name)
     _refuse(name, "no longer simulated at will", accuracy=accuracy, dt=dt)
     kind = PlayedRecording if isinstance(what, physics.Recording) else PlayedTrajectory
     return kind(what, name)

@@ -1,57 +1,183 @@
-"""A scene, or a world, that is simulated live."""
+"""Subjects that are simulated in a world, those of them in which the user acts, and a world alone."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import NamedTuple
+from dataclasses import replace
+from typing import Any, NamedTuple
 
 import numpy as np
 
 import physics
-from physics import validation
+from physics import Event, validation
 from physics.analysis.events import Pair
-from rigid_env.viewer.copies import accuracy_name, copied, declared, fitted, warm
-from rigid_env.viewer.interface import WorldSubject, allowed_of
+from physics.kernels.state import layout as at
+from rigid_env.rendering import Frame
+from rigid_env.rendering.picture import world_frame
+from rigid_env.viewer.copies import accuracy_name, fitted, warm
+from rigid_env.viewer.interface import Can, Look, Subject
 from rigid_env.viewer.listening import Listener
 
 DOWN = np.array((0.0, -1.0, 0.0))
 """Direction of gravity in a scene that has none."""
 
+SLIDERS = {
+    "gravity": validation.non_negative, "friction": validation.non_negative, "restitution": validation.share,
+}  # fmt: skip
+"""Parameters that the user changes, and the check of each."""
 
-class State(NamedTuple):
-    """All that decides how a world goes on, the accuracy included."""
+
+class Moment(NamedTuple):
+    """All that decides how a subject goes on, the accuracy included."""
 
     accuracy: str
-    snapshot: physics.Snapshot
+    state: Any
     pushes: dict[Pair, float]
 
 
-class LiveWorld(WorldSubject):
-    """World of one scene in which the user acts.
+class WorldSubject(Subject):
+    """A subject that is simulated in `world`, to which `listener` listens.
 
     Parameters
     ----------
     world : World
-        Its own: of one world, whose scene declares what sliders change (`copies.copied`).
+        Its own, of one world.
     name : str
     """
+
+    world: physics.World
+    listener: Listener
+    _shift = 0.0  # from times of the world to those of the subject [s]
 
     def __init__(self, world: physics.World, name: str):
         self.name = name
         self._worlds: dict[str, tuple[physics.World, Listener]] = {}
-        self._add(accuracy_name(world.accuracy), world)
-        self._set_world(*next(iter(self._worlds.values())))
-        self.can = allowed_of(world)
-        self._down = direction_of(world.gravity[0])
+        self._use(self._add(world))
+
+    def _add(self, world: physics.World) -> str:
+        """Listen to another world of the scene, and return the name of its accuracy."""
+        name = accuracy_name(world.accuracy)
+        self._worlds[name] = world, Listener(world)
+        return name
+
+    def _use(self, accuracy: str) -> None:
+        """Go on in the world at an accuracy that was added."""
+        self.accuracy = accuracy
+        self.world, self.listener = self._worlds[accuracy]
+
+    # --- the present ---------------------------------------------------------------------------------------------
+
+    @property
+    def scene(self) -> physics.Scene:
+        return self.world.scene
+
+    @property
+    def time(self) -> float:
+        return self.world.time + self._shift
+
+    @property
+    def interval(self) -> float:
+        return self.world.dt
+
+    def frame(self) -> Frame:
+        return world_frame(self.world)
+
+    def look(self) -> Look:
+        world = self.world
+        moving = (world.linvel[0], world.angvel[0], world.asleep[0], world.params[:, at.RADIUS])
+        return Look(self.frame(), self.time, *map(np.array, moving))
+
+    def measure(self) -> dict[str, float]:
+        found = physics.diagnose(self.world)
+        kinetic, potential = float(found.kinetic_energy.sum()), float(found.potential_energy.sum())
+        return {
+            "kinetic_energy": kinetic, "potential_energy": potential, "energy": kinetic + potential,
+            "momentum": float(np.linalg.norm(found.momentum.sum(axis=(0, 1)))),
+            "penetration": self.listener.penetration, "residual": self.listener.residual,
+        }  # fmt: skip
+
+    def events(self) -> list[Event]:
+        shift = self._shift
+        return [replace(event, t=event.t + shift) for event in self.listener.events]
+
+    # --- back to a moment ----------------------------------------------------------------------------------------
+
+    def snapshot(self) -> Moment:
+        return Moment(self.accuracy, self._take(), self.listener.pushes)
+
+    def restore(self, snapshot: Moment) -> None:
+        self._use(snapshot.accuracy)
+        self._put(snapshot.state)
+        self.listener.resume(snapshot.pushes)
+
+    def _take(self) -> Any:
+        """State of the world, and of what is around it."""
+        return self.world.snapshot()
+
+    def _put(self, state: Any, is_other: bool = False) -> None:
+        """Go on from a state of `_take`; `is_other`: of another accuracy."""
+        self.world.restore(fitted(state, self.world) if is_other else state)
+
+
+class LiveSubject(WorldSubject):
+    """A subject in which the user acts.
+
+    Parameters
+    ----------
+    world : World
+        Its own, of one world; its scene declares what sliders change (`copies.copied`).
+    name : str
+    seed : bool
+        Another seed makes another run.
+    """
+
+    def __init__(self, world: physics.World, name: str, seed: bool = False):
+        super().__init__(world, name)
+        plan, gravity = world.plan, world.gravity[0]
+        flags = (bool(each) for each in (plan.gravity, plan.friction, plan.restitution))
+        self.can = Can(True, *flags, accuracy=True, ghost=True, seed=seed)
+        strength = np.linalg.norm(gravity)
+        self._down = gravity / strength if strength > 0.0 else DOWN
+
+    def settings(self) -> dict[str, float]:
+        params = self.world.params[0]
+        values = {
+            "gravity": float(np.linalg.norm(self.world.gravity[0])), "friction": float(params[at.FRICTION]),
+            "restitution": float(params[at.RESTITUTION]),
+        }  # fmt: skip
+        return {name: value for name, value in values.items() if getattr(self.can, name)}
+
+    def set(self, name: str, value: float) -> None:
+        """Change one of `SLIDERS`: the strength of gravity [m/s²], or a coefficient of all bodies."""
+        self._hold(name, value)
+        self.listener.is_changed = False  # the state is the same
+
+    def _hold(self, name: str, value: float) -> None:
+        value = float(SLIDERS[name](value, (), name))
+        self.world.set_parameters(**{name: value * self._down if name == "gravity" else value})
+
+    def prepare(self, name: str) -> Callable[[], None]:
+        """Make another preset ready for `switch`; returns the rest of the work, which another thread may do."""
+        raise NotImplementedError
+
+    def switch(self, name: str) -> None:
+        """Go on at another preset, from the same state."""
+        pushes, state = self.listener.pushes, self._take()
+        self._use(name)
+        self._put(state, is_other=True)
+        self.listener.resume(pushes)
+
+
+class LiveWorld(LiveSubject):
+    """World of one scene, and nothing around it."""
+
+    def __init__(self, world: physics.World, name: str):
+        super().__init__(world, name)
         self._first = world.snapshot()
 
-    def _add(self, name: str, world: physics.World) -> None:
-        self._worlds[name] = world, Listener(world)
-
     def restart(self, seed: int) -> None:
-        self.world.restore(fitted(self._first, self.world))
-        self.listener.begin()
-        self.listener.pushes, self.listener.is_changed = {}, False
+        self._put(self._first, is_other=True)
+        self.listener.resume({})
 
     def step(self, load=None, record=None):
         self.listener.begin()
@@ -60,63 +186,16 @@ class LiveWorld(WorldSubject):
         else:  # the user's hand is no command
             with self.world.actuation.passed_by(None if load is None else load[None]):
                 self.world.step()
-        return None
-
-    def snapshot(self) -> State:
-        return State(self.accuracy, self.world.snapshot(), self.listener.pushes)
-
-    def restore(self, snapshot: State) -> None:
-        self._set_world(*self._worlds[snapshot.accuracy])
-        self.world.restore(snapshot.snapshot)
-        self.listener.begin()
-        self.listener.pushes, self.listener.is_changed = snapshot.pushes, False
 
     def rehearsal(self) -> Callable[[], None]:
-        world = physics.World(self.world.scene, dt=self.world.dt, accuracy=self.world.accuracy)
+        world = self._at(self.world.accuracy)
         return lambda: warm(world)
-
-    # --- sliders ---------------------------------------------------------------------------------------------
-
-    def set_gravity(self, strength: float) -> None:
-        strength = float(validation.non_negative(strength, (), "gravity"))
-        self._set(gravity=strength * self._down)
-
-    def set_friction(self, coefficient: float) -> None:
-        self._set(friction=float(validation.non_negative(coefficient, (), "friction")))
-
-    def set_restitution(self, coefficient: float) -> None:
-        self._set(restitution=float(validation.share(coefficient, (), "restitution")))
-
-    def _set(self, **given) -> None:
-        self.world.set_parameters(**given)
-        self.listener.is_changed = False  # the state is the same
-
-    # --- accuracy --------------------------------------------------------------------------------------------
 
     def prepare(self, name: str) -> Callable[[], None]:
-        world = physics.World(self.world.scene, dt=self.world.dt, accuracy=name)
-        self._add(name, world)
+        world = self._at(name)
+        self._add(world)
         return lambda: warm(world)
 
-    def switch(self, name: str) -> None:
-        pushes, snapshot = self.listener.pushes, self.world.snapshot()
-        self._set_world(*self._worlds[name])
-        self.world.restore(fitted(snapshot, self.world))
-        self.listener.begin()
-        self.listener.pushes, self.listener.is_changed = pushes, False
-
-
-def direction_of(gravity: np.ndarray) -> np.ndarray:
-    """(3,) unit vector along gravity; down where there is none."""
-    strength = np.linalg.norm(gravity)
-    return gravity / strength if strength > 0.0 else DOWN
-
-
-def live_scene(scene: physics.Scene, name: str, accuracy, dt: float) -> LiveWorld:
-    """A scene from its start."""
-    return LiveWorld(physics.World(declared(scene), dt=dt, accuracy=accuracy), name)
-
-
-def live_world(world: physics.World, name: str, accuracy=None, dt: float | None = None) -> LiveWorld:
-    """The first world of a batch, from its present state; the batch itself stays as it is."""
-    return LiveWorld(copied(world, accuracy, dt), name)
+    def _at(self, accuracy: Any) -> physics.World:
+        """Another world of the scene."""
+        return physics.World(self.world.scene, dt=self.world.dt, accuracy=accuracy)

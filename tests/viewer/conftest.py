@@ -1,4 +1,4 @@
-"""Sessions that the tests of the viewer share. Scenes and presets are those that other tests compile, too."""
+"""Sessions and controls that tests of the viewer share. Scenes and presets are those that other tests compile, too."""
 
 from __future__ import annotations
 
@@ -23,3 +23,16 @@ def state_of(session: Session) -> np.ndarray:
 def take(session: Session, steps: int) -> None:
     for _ in range(steps):
         assert session.step(), session.message
+
+
+class Handle:
+    """A control that nobody sees."""
+
+    def __init__(self, **values):
+        vars(self).update(values)
+        self.acts = []
+
+    def on_click(self, act):
+        self.acts.append(act)
+
+    on_update = on_click

@@ -8,7 +8,7 @@ import numpy as np
 
 from rigid_env.rendering import BodyView, Frame, GoalView, WallView
 from rigid_env.rendering.meshes import BLOCK_FACES
-from rigid_env.viewer.look import Look
+from rigid_env.viewer.interface import Look
 
 FLOOR = WallView((0.0, 1.0, 0.0), 0.0)
 BLOCK = BodyView("block", (5.0, 3.0, 2.0), (0.0, 2.5, 0.0), (0.9689124, 0.0, 0.2474040, 0.0))

@@ -85,7 +85,7 @@ def test_a_body_is_dragged_and_clicked(stage):
     body, point, direction = clicks[0]
     assert body == 0
     assert np.linalg.norm(direction) == pytest.approx(1.0)
-    from rigid_env.viewer.picking import body_point
+    from rigid_env.viewer.shapes import body_point
 
     assert np.abs(body_point(BLOCK, point) / (0.5 * BLOCK.dimensions)).max() == pytest.approx(1.0, abs=1e-6)
 

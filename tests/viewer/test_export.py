@@ -12,12 +12,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rigid_env.viewer.notebook import Embedded, embed, frame_of_page, in_notebook
 from tests.viewer.looks import BLOCK, crowd, look_of, motion
 
 pytest.importorskip("viser")
 
-from rigid_env.viewer.export import page_of, taken, write_page
+from rigid_env.viewer.export import Embedded, embed, frame_of_page, in_notebook, page_of, taken, write_page
 
 MEGABYTE = 1e6
 

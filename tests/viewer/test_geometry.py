@@ -16,13 +16,10 @@ from rigid_env.rendering import BodyView, Frame
 from rigid_env.rendering.geometry import rotation_matrix
 from rigid_env.rendering.meshes import body_mesh
 from rigid_env.viewer.arrows import SHAFT, spring
-from rigid_env.viewer.colours import vivid
 from rigid_env.viewer.layers import Forces, torque_arc
 from rigid_env.viewer.marks import field_marks, spring_ends
-from rigid_env.viewer.picking import body_point, hit, leave, world_point
-from rigid_env.viewer.placement import place
-from rigid_env.viewer.scenery import turn_to_normal
-from rigid_env.viewer.shapes import octants, parts, shape_key
+from rigid_env.viewer.scenery import place, turn_to_normal, vivid
+from rigid_env.viewer.shapes import body_point, hit, leave, octants, parts, shape_key, world_point
 from tests.viewer.looks import BLOCK, crowd, look_of
 
 seeds = st.integers(0, 10_000)

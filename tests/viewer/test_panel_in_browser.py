@@ -7,7 +7,7 @@ import threading
 import numpy as np
 import pytest
 
-from rigid_env.viewer.event_list import ROWS, told
+from rigid_env.viewer.panel import ROWS, told
 from tests.viewer.browser import change
 from tests.viewer.user import user_of, wait_until
 

@@ -83,6 +83,9 @@ def test_a_task_of_one_s_own_gets_sliders_that_it_does_not_declare():
     session = session_of(env)
     assert session.settings == {"gravity": 9.81, "friction": 0.0, "restitution": 0.0}
     session.set_friction(0.3)
+    with pytest.raises(ValueError, match=r"gravity is -1.0; allowed are numbers of at least 0"):
+        session.set_gravity(-1.0)
+    assert session.settings == {"gravity": 9.81, "friction": 0.3, "restitution": 0.0}
     take(session, 5)
     assert session.subject.frame().goal is None
     assert env.task.world.time == 0.0

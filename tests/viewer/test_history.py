@@ -1,4 +1,4 @@
-"""History, samples and pace: small parts, and laws that hold for any use of them."""
+"""History and samples: laws that hold for any use of them."""
 
 from __future__ import annotations
 
@@ -7,10 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rigid_env.viewer.cost import Cost
-from rigid_env.viewer.history import History, size_of
-from rigid_env.viewer.pace import Pace
-from rigid_env.viewer.samples import UNITS, Samples
+from rigid_env.viewer.history import UNITS, History, Samples, size_of
 
 STATE = np.zeros(100)  # 800 bytes
 
@@ -69,27 +66,3 @@ def test_columns_are_named_and_cannot_be_written():
         samples.time[0] = 2.0
     with pytest.raises(AttributeError, match="'heat'; allowed are time"):
         samples.heat  # noqa: B018
-
-
-@given(st.lists(st.floats(1e-6, 1e-2), min_size=2, max_size=50))
-def test_cost_lies_between_the_steps_that_it_is_the_mean_of(seconds):
-    cost = Cost()
-    cost.add(100.0, 0.01)  # compiles
-    assert np.isnan(cost.value)
-    for each in seconds:
-        cost.add(each, 0.01)
-    assert 1e8 * min(seconds) * (1 - 1e-9) <= cost.value <= 1e8 * max(seconds) * (1 + 1e-9)
-
-
-@given(st.lists(st.floats(0.0, 0.1), max_size=100), st.floats(0.01, 10.0))
-def test_all_time_that_is_owed_becomes_steps(seconds, speed):
-    pace, interval, steps = Pace(), 0.01, 0
-    pace.speed = speed
-    for each in seconds:
-        pace.owe(each)
-        while pace.is_due(interval):
-            pace.due -= interval
-            steps += 1
-        pace.keep_up()
-    assert abs(steps * interval - sum(seconds) * speed) <= interval
-    assert pace.message == ""
