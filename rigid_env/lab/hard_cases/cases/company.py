@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -204,19 +205,22 @@ def seams(on: Setting) -> Sequence[Check]:
 
 
 def _over_corner(on: Setting) -> Check:
-    """A ball rolls along the diagonal of four slabs and over their common corner, or by a tenth of a millimetre off."""
+    """A ball rolls along the diagonal of four slabs and over their common corner, or by a tenth of a millimetre off.
+
+    At 1 ms at most: in a short step it meets edges ahead of it by some slops only, as if it landed on them. Where it is
+    on an edge within the slop, its push leans by √(2 slop/r): g times this over the time there, 2e-6 of 1 m/s.
+    """
+    on = replace(on, dt=min(on.dt, 1e-3))
     slabs = [physics.Block((1, SLAB, 1), 1e4, pos=(x, 0.5 * SLAB, z)) for x in (-0.5, 0.5) for z in (-0.5, 0.5)]
     aside = np.array([0.0, 1e-9, 1e-6, 1e-4, -1e-4])
     pos = _rows(_along_x(aside - 0.25, SLAB + 0.1) - (0, 0, 0.25), *(slab.pos for slab in slabs))
-    linvel, angvel = _rows((1, 0, 1), *np.zeros((4, 3))), _rows((10, 0, -10), *np.zeros((4, 3)))
+    linvel, angvel = np.zeros_like(pos), np.zeros_like(pos)
+    linvel[:, 0], angvel[:, 0] = (1, 0, 1), (10, 0, -10)
     ball = physics.Sphere(0.1, 0.5, pos=(0, SLAB + 0.1, 0))
-    scene = physics.Scene([ball, *slabs], [FLOOR], laws(0.0, 0.5))
-    world = on.world(scene, len(aside))
-    world.set_state(pos=pos, linvel=np.broadcast_to(linvel, pos.shape), angvel=np.broadcast_to(angvel, pos.shape))
+    world = _side_by_side(on, physics.Scene([ball, *slabs], [FLOOR], laws(0.0, 0.5)), pos, linvel, angvel=angvel)
     world.step(steps=on.steps(0.5))
-    way = np.stack([aside - 0.25 + world.time, np.full(5, SLAB + 0.1), np.full(5, world.time - 0.25)], axis=1)
-    off = np.abs(world.pos[:, 0] - way).max()
-    return Check("ball off its way over the corner of four slabs", float(off), 1e-4, "m")
+    lost = np.abs(world.linvel[:, 0] - (1, 0, 1)).max()
+    return Check("speed that a ball loses over the corner of four slabs", float(lost), 20 * on.tolerance + 1e-11, "m/s")
 
 
 def _slab(k: int, length: float, thickness: float) -> physics.Block:
