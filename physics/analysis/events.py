@@ -111,13 +111,13 @@ def last_pushes(world: World, before: Mapping[Pair, float], t: float) -> dict[Pa
     Returns
     -------
     dict
-        From body, and other body or -1 - k for wall k, to a time [s]. Of a contact that has not pushed yet it is the
-        time at which it was first seen.
+        From body, and other body or -1 - k for wall k, to a time [s]. Contacts that have not pushed yet are left out:
+        bodies that leave each other after an impact do not rest.
     """
     found = contacts_of_world(world, 0)
     touching = [(int(body), int(other)) for body, other in found.ends[0]]
     pushing = {pair for pair, is_pushing in zip(touching, found.force[0].any(axis=1)) if is_pushing}
-    return {pair: t if pair in pushing else before.get(pair, t) for pair in touching}
+    return {pair: t if pair in pushing else before[pair] for pair in touching if pair in pushing or pair in before}
 
 
 def contact_events(before: Mapping[Pair, float], now: Mapping[Pair, float], t: float) -> list[Event]:

@@ -390,9 +390,10 @@ class World(Batch):
         points : (n, 3) float64
             World frame [m].
         forces : (n, 3) float64
-            On the body, of two bodies on the first one, averaged over the last resting stage, world frame [N]. Times
-            the step, with the impulses of logged impacts and all loads, they make up the change of momentum, unless an
-            impact has split the step or a body was pushed out of a wall.
+            On the body, of two bodies on the first one, world frame [N]. Time stepping averages them over the last
+            resting stage; the event-driven scheme has those at the end of the step. A stage is the whole step unless
+            something was met in it. Then forces times step, logged impulses and loads make up the change of momentum,
+            but for bodies that were pushed out of walls.
         """
         self._check_index(world)
         found = contacts_of_world(self, world)

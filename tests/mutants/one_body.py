@@ -380,6 +380,14 @@ STATE = [
 
 TIME_STEPPING = [
     _mutant(
+        "time-stepping-forces",
+        "The impulse that brings a body back to rest is no part of its contact forces.",
+        "time_stepping/warm_start.py",
+        "memory[work.i, base + c] += work.rebound[width * k + c]",
+        "memory[work.i, base + c] += 0.0",
+        "physics/test_momentum_balance.py",
+    ),
+    _mutant(
         "time-stepping-stale",
         "The warm start keeps impulses of contacts that have ended.",
         "time_stepping/warm_start.py",

@@ -29,8 +29,10 @@ TURNING_MARGIN = 2.0
 # Slops that something may go in until the resting stage stops it at the middle of the step: a contact problem less.
 _SOFT_LANDING_SLOPS = 100.0
 
-# Slops within which contacts that are apart belong to an impact of others.
+# Slops within which contacts that are apart belong to an impact of others; and, of a pair that touches elsewhere, radii
+# of the smaller body by the tolerance: a face that comes back from an impact is tilted by what the solve has left.
 _SAME_MOMENT_SLOPS = 2.0
+_SAME_MOMENT_RADII = 10.0
 
 _UNCONSTRAINED = 1.0e300
 
@@ -139,13 +141,18 @@ def _distant_target(k, h, is_last, many):
 def _is_in_same_moment(k, many):
     """True if contact k, which is apart, is so near that it belongs to an impact of others.
 
-    That is within two slops, or, of a pair that touches elsewhere, within the tolerance's share of the substep: the
-    corners of one face would else hit one after another, each turning the body that the next one turns back.
+    That is within two slops, or, of a pair that touches elsewhere, within what the tolerance makes of the way in the
+    substep, or of some radii: the corners of one face would else hit one after another, each turning the body that the
+    next one turns back.
     """
-    gap, near = many.contacts.gap[k], -many.contacts.speed[k] * many.settings[0].tolerance * many.settings[0].substep
-    if gap <= _SAME_MOMENT_SLOPS * pair_slop(many.contacts.bodies[k, 0], many.contacts.bodies[k, 1], many):
+    a, b, gap = many.contacts.bodies[k, 0], many.contacts.bodies[k, 1], many.contacts.gap[k]
+    if gap <= _SAME_MOMENT_SLOPS * pair_slop(a, b, many):
         return True
-    return gap <= near and (_pair_touches(k, 1, many) or _pair_touches(k, -1, many))
+    radius = many.bodies.work[a].radius
+    if b >= 0:
+        radius = min(radius, many.bodies.work[b].radius)
+    way = max(-many.contacts.speed[k] * many.settings[0].substep, _SAME_MOMENT_RADII * radius)
+    return gap <= many.settings[0].tolerance * way and (_pair_touches(k, 1, many) or _pair_touches(k, -1, many))
 
 
 @inlined

@@ -42,6 +42,9 @@ _TOUCH_SHARE = 1.0e-2
 # Cosine of the angle below which two directions are the same (4e-4 rad).
 _SAME_DIRECTION = 1.0 - 1.0e-7
 
+# Mark of a contact of a pair that passes, until targets are set.
+_PASSING = 1.0
+
 # Slops up to which the depth that bodies go in counts as a landing: twice the `_SOFT_LANDING_SLOPS` of `impact`, which
 # the resting stage stops at its middle. Deeper is an impact, or an overlap that a user made.
 _MAX_DEPTH_SLOPS = 200.0
@@ -67,11 +70,14 @@ def _smallest_half_width(b, many):
 
 @kernel
 def _thinning(a, b, n, h, many):
-    """By how much bodies a and b are taken thinner [m]: the slop, and how deep they land in others within h."""
+    """By how much bodies a and b are taken thinner [m]: the slop, and how deep they land in others within h.
+
+    They do not land in bodies that they pass (`_mark_passing`).
+    """
     slop, landing = pair_slop(a, b, many), 0.0
     for k in range(n):
         c, d = many.contacts.bodies[k, 0], many.contacts.bodies[k, 1]
-        if (c == a and d == b) or (c not in (a, b) and d not in (a, b)):
+        if (c == a and d == b) or (c not in (a, b) and d not in (a, b)) or many.contacts.target[k, 0] == _PASSING:
             continue
         depth = max(_depth_after(k, h, many), -many.contacts.gap[k])
         if depth <= _MAX_DEPTH_SLOPS * slop:
@@ -154,6 +160,27 @@ def _fastest_stopping(first, last, h, many):
 
 
 @kernel
+def _mark_passing(n, h, gyroscopic, offset_frame, hulls, many):
+    """Mark contacts of pairs that pass within h if they are thinned by the slop: `many.contacts.target` is `_PASSING`.
+
+    Targets are set later, and only read here.
+    """
+    k = 0
+    while k < n:
+        last = _end_of_pair(k, n, many)
+        found, mark = _fastest_stopping(k, last, h, many), 0.0
+        if found >= 0:
+            a, b = many.contacts.bodies[k, 0], many.contacts.bodies[k, 1]
+            way, slop = row_vector(many.contacts.frame, found, 0), pair_slop(a, b, many)
+            m, is_parted = _parting_direction(a, b, way, slop, h, gyroscopic, offset_frame, hulls, many)
+            if is_parted and qt.dot(way, m) <= _SAME_DIRECTION:
+                mark = _PASSING
+        for i in range(k, last):
+            many.contacts.target[i, 0] = mark
+        k = last
+
+
+@kernel
 def _redirect_pair(k, n, to, h, gyroscopic, offset_frame, hulls, many):
     """Write the contact that takes the place of those of a pair that passes at `to`; k is its fastest, of n in the set.
 
@@ -179,6 +206,7 @@ def _redirect_pair(k, n, to, h, gyroscopic, offset_frame, hulls, many):
 @shared_kernel
 def redirect_passing_pairs(n, h, gyroscopic, offset_frame, hulls, many):
     """Replace the contacts of each pair that passes within h by one along a plane that parts the two."""
+    _mark_passing(n, h, gyroscopic, offset_frame, hulls, many)
     k, left = 0, 0
     while k < n:
         last, is_passing = _end_of_pair(k, n, many), False
