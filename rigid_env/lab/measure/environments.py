@@ -1,4 +1,4 @@
-"""The work that environments are given: random actions, resets included; environment steps per second."""
+"""Measure environments with random actions, resets included: environment steps per second."""
 
 from __future__ import annotations
 
@@ -80,7 +80,7 @@ class Vector:
 
 @dataclass(frozen=True)
 class EnvPeer:
-    """Another implementation to compare with: its name and how its environments are made.
+    """Another implementation for comparison: its name, and a maker of its environments.
 
     Attributes
     ----------

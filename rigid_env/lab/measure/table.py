@@ -12,7 +12,7 @@ VERDICTS = {None: Text("-"), True: Text("yes", style="green"), False: Text("no",
 
 
 def make_table(rows: list[Row], title: str, sides: tuple[str, str] = ("ours", "peer")) -> Table:
-    """Table of measurements: both `sides`, ratio (each the median over the range), target, and verdict."""
+    """Table of measurements: both `sides` and their ratio (each as median over range), target, and verdict."""
     columns = [Column("what"), Column("accuracy", is_whole=True, under="what")]
     columns += [*number_columns(*sides, "ratio", "target"), Column("pass", is_whole=True)]
     table = Table(columns, title)
@@ -37,19 +37,19 @@ def cells(row: Row) -> tuple[Text, ...]:
 
 
 def number(value: float) -> str:
-    """Three digits, with k and M for large numbers."""
+    """Number with three digits, and k or M for large ones."""
     return number_range(value, value)
 
 
 def number_range(lowest: float, highest: float) -> str:
-    """Both numbers as `number` has them, or one if they are the same; a letter stands once, behind the second."""
+    """Two numbers as a range, or one if they are equal; a common letter stands once, behind the second."""
     size, letter = next(((size, letter) for size, letter in SCALES if abs(highest) >= size), (1.0, ""))
     ends = dict.fromkeys(f"{value / size:.3g}" for value in (lowest, highest))
     return "..".join(ends) + letter
 
 
 def two_lines(spread: Spread) -> Text:
-    """The median, and below it lowest and highest sample."""
+    """Two lines: the median, and below it the lowest and highest sample."""
     if len(spread.samples) == 1:
         return Text(number(spread.median))
     return _over(number(spread.median), number_range(spread.lowest, spread.highest))

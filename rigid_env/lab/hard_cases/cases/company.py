@@ -1,4 +1,4 @@
-"""Hard cases of bodies in company: a collision, a clearance, a seam and a far body change nothing that they should not.
+"""Hard cases of bodies in company: collision, clearance, seam and far body must leave other motions unchanged.
 
 Each draws placements of one scene and runs them as worlds side by side. Public reports against other engines are of
 these kinds; those of this engine are in the decisions.
@@ -69,7 +69,7 @@ def bounce_in_company(on: Setting) -> Sequence[Check]:
 
 
 def _lack(world: physics.World, on: Setting, h: np.ndarray, e: float) -> float:
-    """Largest difference of the ball's energy above the block from e² m g h after its first bounce, by m g h."""
+    """Largest difference between the ball's energy above the block after its first bounce and e² m g h, by m g h."""
     fall = np.sqrt(2 * h / GRAVITY)
     worst = np.zeros(len(h))
     for _ in range(on.steps(float((fall * (1 + e)).min()))):

@@ -64,7 +64,7 @@ def _incline(angle: float, mu: float) -> physics.Scene:
 
 
 def _tilted(angle: float, mu: float) -> physics.Scene:
-    """The same with a wall that is turned."""
+    """The incline as a turned wall, gravity unchanged."""
     normal = (math.sin(angle), math.cos(angle), 0.0)
     body = block(tuple(0.5 * SIZE[1] * n for n in normal), quat=turned(-angle))
     return physics.Scene([body], [physics.HalfSpace(normal)], laws(0.0, mu))
@@ -185,7 +185,7 @@ CORNER = 50.0  # how far the corner is from the origin, along each axis [m]
 
 
 def _press(on: Setting, push: np.ndarray) -> tuple:
-    """The block, pushed into the corner for 2 s: world, farthest from its start [m], energies before and after [J]."""
+    """Push the block into the corner for 2 s: (world, largest distance from its start [m], energies [J])."""
     place = np.array(SIZE) / 2 - CORNER
     scene = boxed(block(tuple(place)), (CORNER,) * 3, 0.2, 0.5, (0, -GRAVITY, 0))
     world = on.world(scene)
