@@ -1,4 +1,4 @@
-"""Settings that decide how a task goes on, and that its state does not hold: they must be the same where it goes on."""
+"""Settings outside a task's state that decide its future; they must agree where a state is restored."""
 
 from __future__ import annotations
 

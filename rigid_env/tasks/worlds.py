@@ -1,4 +1,4 @@
-"""The worlds that a task's functions are asked about, as arrays with one row for each."""
+"""Worlds as a task's functions see them: arrays with one row for each."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from rigid_env.tasks.reading import write_contact_forces, write_contact_impulses
 
 
 def read_only(array: np.ndarray) -> np.ndarray:
-    """View of an array that cannot be written."""
+    """Read-only view of an array."""
     view = array.view()
     view.flags.writeable = False
     return view
@@ -58,7 +58,7 @@ class Worlds:
         self.renew()
 
     def renew(self) -> None:
-        """Forget what was worked out: the worlds have moved."""
+        """Clear cached values, since the worlds have moved."""
         self.success = self.failure = np.zeros(len(self.indices), dtype=np.bool_)
         self.measured: Mapping[str, np.ndarray] = {}
         self._found: dict[str, np.ndarray] = {}
@@ -104,7 +104,7 @@ class Worlds:
         return self._contacts_of(contact_rows(self._task.world))
 
     def contacts_of(self, body: int, count: int) -> Contacts:
-        """Contacts of one body, which is their first body: the `count` with the largest forces."""
+        """Contacts of one body, always as the first body: the `count` with the largest forces."""
         return self._contacts_of(count, body)
 
     def _contacts_of(self, *chosen: int) -> Contacts:
