@@ -1,4 +1,4 @@
-"""The version of the installed package, or of the sources where they run as they are."""
+"""Version of the installed package, or of the sources."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Kernels compiled for the arguments they are called with, and bound to them."""
+"""Compile kernels for the types of their arguments, and bind them to the arguments."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ COMPILE_NOTICE = 1.0
 
 
 def compiled(kernel: Callable, arguments: tuple) -> Callable:
-    """The machine code of a kernel for arguments of these types.
+    """Machine code of a kernel for arguments of these types.
 
     To call it leaves out Numba's dispatcher, which finds out the types of all arguments in each call.
     """
@@ -39,13 +39,13 @@ def compiled(kernel: Callable, arguments: tuple) -> Callable:
 
 
 def compiled_entry(kernel: Callable, arguments: tuple):
-    """Entry of a kernel that returns nothing, for arguments of these types: what `Work` takes."""
+    """Entry of a kernel that returns nothing, for arguments of these types, as `Work` takes it."""
     with backend.LOCK, compiling():
         return entry(kernel, arguments)
 
 
 def bound(kernel: Callable, *arguments) -> Work:
-    """A kernel that returns nothing with its arguments, to be called often.
+    """Bind a kernel that returns nothing to its arguments, for many calls.
 
     Parameters
     ----------
@@ -58,7 +58,7 @@ def bound(kernel: Callable, *arguments) -> Work:
 
 
 def bound_alike(key, kernel: Callable, *arguments) -> Work:
-    """`bound`, where the kernel and a `key` determine the types of all arguments: to look at each takes a while."""
+    """Bind a kernel whose types of arguments follow from it and a `key`; this saves the slow look at each argument."""
     if (kernel, key) not in _ENTRIES:
         _ENTRIES[kernel, key] = compiled_entry(kernel, arguments)
     return Work([(_ENTRIES[kernel, key], arguments)])
@@ -69,7 +69,7 @@ _ENTRIES: dict[tuple, object] = {}
 
 @contextmanager
 def compiling():
-    """Say on standard error that a kernel is being compiled, if it takes long enough to notice.
+    """Print on standard error that a kernel is being compiled, if this takes noticeably long.
 
     The garbage collector looks at Numba's growing tables less often: it would take a tenth of the time, or a fifth.
     """

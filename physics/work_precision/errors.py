@@ -1,4 +1,4 @@
-"""Errors of a trajectory against another one, and against the laws: plain NumPy, the same for every engine."""
+"""Errors of a trajectory against another one, and against laws: plain NumPy, the same for every engine."""
 
 from __future__ import annotations
 
@@ -65,7 +65,7 @@ def mechanical_energy(scene: Scene, pos, quat, linvel, angvel) -> np.ndarray:
 
 
 def conserves_energy(scene: Scene) -> bool:
-    """True if nothing in the scene takes energy: no contact, or elastic contact without friction; no drag."""
+    """True if no energy leaves the scene: no contact, or elastic contact without friction; no drag."""
     if any(law is not False for law in _field_laws(scene)):
         return False
     contact, friction = scene.effect(Contact), scene.effect(Friction)
@@ -81,7 +81,7 @@ def _field_laws(scene: Scene) -> list[bool | None]:
 
 
 def energy_error(scene: Scene, energy: np.ndarray) -> float:
-    """By how much the energy [J], (samples, bodies), breaks its law; bodies do not exchange any.
+    """Violation of the energy's law by the energy [J] (samples, bodies); bodies must not exchange energy.
 
     Where it is conserved: the largest departure from the start. Else: the largest rise above an earlier value, which
     nothing passive has; what the right losses are only a truth can tell. Not a number where a field may give energy.
@@ -119,7 +119,7 @@ def _support(body: Body, direction: np.ndarray) -> np.ndarray:
 
 
 def event_error(events: Sequence, true: Sequence) -> float | None:
-    """Worst difference of the times of the same events [s]; None where none can be told to be the same.
+    """Worst difference of the times of the same events [s]; None if no events can be matched.
 
     Events are paired by kind, in order of time, and only those kinds count of which both have equally many: with one
     more or less of them, which belongs to which would be a guess. A fault is no event of the scene.

@@ -1,4 +1,4 @@
-"""A step that ends in an exception of a user's field has changed nothing."""
+"""Undo a step that ends in an exception of a user's field."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from physics.world.batch import Batch
 
 
 class Before:
-    """All that decides how a world goes on, copied before a step that may end in an exception (`Plan.may_raise`).
+    """Copy of a world's whole state before a step that may raise an exception (`Plan.may_raise`).
 
     By then the kernel has advanced some worlds of the batch, and not the others.
 
@@ -24,7 +24,7 @@ class Before:
         self._actuation = None if world.actuation is None else world.actuation.kept()
 
     def put_back(self, error: Exception) -> NoReturn:
-        """Put the world back as it was and raise the exception; that of an index then names the field's class."""
+        """Restore the world and raise the exception; an IndexError then names the field's class."""
         world = self._world
         for array, before in zip(world.kept(), self._kept, strict=True):
             array[...] = before
