@@ -1,4 +1,4 @@
-"""Flight: the time at which the first feature of a body reaches a wall, to rounding and without a miss.
+"""Flight up to the first contact of a feature with a wall, whose time is found to rounding and never missed.
 
 Over a time τ_h the gap of a feature is bounded below by
 
@@ -88,7 +88,7 @@ def parabola_root(g, r, b):
 
 @inlined
 def gap_safe_time(g, r, b, third, horizon):
-    """A time within which a gap g with rate r, second derivative b and third at most `third` is not used up."""
+    """Time within which a gap g with rate r, second derivative b and third at most `third` cannot close."""
     t = min(horizon, parabola_root(g, r, b - third * horizon / 3.0))
     for _ in range(_MAX_HORIZON_DOUBLINGS):
         over = min(horizon, 2.0 * t)
@@ -120,7 +120,7 @@ def gap_jerk_bound(y, left, offset_frame, work):
 
 @kernel
 def safe_flight_time(y, left, third, assured, offset_frame, work, thresholds):
-    """A time within which no feature at y reaches a wall, at most `left`.
+    """Time within which no feature at y can reach a wall, at most `left`.
 
     Those that touch and do not come stay away for `assured_time` at least: where a push has just ended, what lifts
     them is still zero.
@@ -178,7 +178,7 @@ def integrate_free_flight(y, t, offset_frame, work, motion):
 
 @inlined
 def count_unresolved_flight(report, work):
-    """Count a flight that extrapolated steps cannot follow; if there are fields, it is they that are not resolved."""
+    """Count a flight that extrapolated steps cannot follow; with fields, they are not resolved."""
     report[work.world, at.UNRESOLVED] += 1.0
     if has_fields(work):
         report[work.world, at.UNRESOLVED_MOTION] += 1.0

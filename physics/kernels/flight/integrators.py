@@ -158,7 +158,7 @@ def rk4_attitude(q, L, torque, J, h):
 
 @kernel
 def parabola(x, v, a, h):
-    """x + h (v + h a / 2): what any scheme of order 2 or more makes of a held acceleration."""
+    """x + h (v + h a / 2), the result of any scheme of order 2 or more for a constant acceleration."""
     return _along3(x, h, _along3(v, 0.5 * h, a))
 
 

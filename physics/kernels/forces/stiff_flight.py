@@ -31,7 +31,7 @@ _NEARLY_CONVERGED = 1.0e-3
 
 @kernel
 def implicit_flight(y, h, flight, work):
-    """Flight over h from y under loads that agree with its end: discrete gradients, by Newton's method from those held.
+    """Flight over h from y under loads that agree with its end: discrete gradients, by Newton's method from held loads.
 
     A' = A + (1 + M⁻¹ Z)⁻¹ (A(y, end) - A). Where that does not settle the loads of the first step are kept.
     """
@@ -55,7 +55,7 @@ def _as_it_is(end, y, h, flight, work):
 
 @if_declared(_as_it_is)
 def subdivide_stiff_flight(end, y, h, flight, work):
-    """`end` of a flight over h from y under the loads that are held; where these are stiff, made in parts."""
+    """State `end` of a flight over h from y under held loads; stiff flights are made in parts."""
     if work.is_stiff == 0:
         return end
     start, left, part = time_now(work), h, 0.0

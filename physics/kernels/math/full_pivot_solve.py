@@ -66,7 +66,7 @@ def solve_full_pivot(m, A, order, x):
 
 @kernel
 def solve_least_norm(rows, m, A, x):
-    """The x of least norm with A[:rows, :m] x = A[:rows, m]; A is overwritten, a row that others imply is left out.
+    """Solution x of least norm of A[:rows, :m] x = A[:rows, m]; A is overwritten, dependent rows are left out.
 
     Rows are made orthonormal one after the other (modified Gram-Schmidt), so that x, a sum of them, is smooth in A as
     long as its rank is the same; what elimination sets to zero instead is up to rounding where pivots are equal.

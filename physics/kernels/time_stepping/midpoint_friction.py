@@ -61,7 +61,7 @@ def _least_slip(w, h, work):
 
 @if_given("contact.friction", False)
 def oppose_mean_slip(n, contact, v, w, h, work):
-    """Let friction oppose the mean slip of the stage: whether all contacts slip.
+    """Let friction oppose the mean slip of the stage; return whether all contacts slip.
 
     Parameters
     ----------
@@ -91,14 +91,14 @@ def oppose_mean_slip(n, contact, v, w, h, work):
 
 @inlined
 def oppose_end_slip(n, work):
-    """Take `oppose_mean_slip` back."""
+    """Undo `oppose_mean_slip`."""
     for i in range(n):
         work.target[i, 1], work.target[i, 2] = work.held_target[i, 0], work.held_target[i, 1]
 
 
 @inlined
 def has_slip_reversed(n, v, w, work):
-    """True if the slip of a contact that pushes is against the one before, -`work.target`, after impulses."""
+    """True if the slip of a pushing contact opposes the earlier slip, -`work.target`, after impulses."""
     ratio = friction_ratio(work)
     for i in range(n):
         a, b = _tangential(i, v, w, work)
@@ -114,7 +114,7 @@ def _as_solved(n, contact, v, w, solved, free, R, h, work):
 
 @if_law((LAW_STIFFNESS,), _as_solved)
 def cap_friction_work(n, contact, v, w, solved, free, R, h, work):
-    """Result of `solve_contacts` for `free` (v, L); if friction gave energy, that with friction against the mean slip.
+    """Result of `solve_contacts` for `free` (v, L), with friction against the mean slip if it created energy.
 
     An impulse p adds p·½(u⁰ + u¹). Friction that stops a contact adds ½ p_t·u⁰, which in a rigid impact the normal
     impulse outweighs. A spring pushes as much as it is deep, not as much as would do that.

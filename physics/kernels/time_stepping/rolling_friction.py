@@ -47,7 +47,7 @@ def _added(L, s, T):
 
 @inlined
 def _against(n, width, across, along, w, work):
-    """Angular impulse against the turning w, of the normal impulses in `work`, with arms across and along normals."""
+    """Angular impulse against the turning w, from the normal impulses in `work`, with arms across and along normals."""
     x = y = z = 0.0
     for k in range(n):
         p = max(work.impulse[width * k], 0.0)
@@ -63,7 +63,7 @@ def _against(n, width, across, along, w, work):
 
 @kernel
 def _resist(n, contact, across, along, v, L, solved, R, work):
-    """One torque: what `solve_contacts` gives with it, and L with it but without the contacts."""
+    """Solve with one torque: result of `solve_contacts`, and L with the torque but without the contacts."""
     width = rows_per_contact(contact)
     w = apply_inv_inertia(R, solved[1], work.J)
     T = _against(n, width, across, along, w, work)

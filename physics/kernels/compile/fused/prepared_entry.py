@@ -1,4 +1,4 @@
-"""Calls whose arguments stand ready in memory, so that machine code can make them.
+"""Entries of kernels for machine code: arguments are read from memory.
 
 Python hands a kernel two dozen arguments, and of each that is an array seven words are read from a Python object; and
 only one thread at a time runs Python. Here a kernel that returns nothing has a second entry, which takes the address of

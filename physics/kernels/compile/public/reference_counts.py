@@ -11,11 +11,11 @@ import numba
 
 
 def _nothing() -> None:
-    """Stand for a kernel."""
+    """Do nothing, in place of a kernel."""
 
 
 def _knows_option() -> bool:
-    """Compile nothing with the option: Numba looks at options no earlier."""
+    """True if Numba knows the option; only the compilation of an empty function shows it."""
     try:
         numba.njit("void()", _nrt=False)(_nothing)
     except KeyError:
