@@ -84,7 +84,7 @@ class Section:
 
     @property
     def markdown(self) -> str:
-        """Heading, text and table."""
+        """The section in Markdown: heading, text and table."""
         parts = [f"## {self.title}", *map(_wrapped, self.before)]
         if self.rows:
             lines = (self.columns, ("---",) * len(self.columns), *self.rows)

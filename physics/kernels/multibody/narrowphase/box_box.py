@@ -48,7 +48,7 @@ def _reference_face(a, b, face, many):
 
 @inlined
 def _clip_face(a, b, face, many):
-    """Clip the face that looks against this one by its sides: (copy of the polygon, vertices)."""
+    """Clip the face opposite to this one by its sides: (copy of the polygon, vertices)."""
     r, o, axis, sign = _reference_face(a, b, face, many)
     write_incident_face(r, o, axis, sign, many)
     d, slop = many.bodies.work[r].dims, pair_slop(a, b, many)
@@ -64,7 +64,7 @@ def _clip_face(a, b, face, many):
 
 @inlined
 def _parallel_edge_normal(o, out, rim, point, many):
-    """Normal of two parallel edges that touch: the middle of all that are allowed.
+    """Normal of two parallel edges that touch: the middle of all allowed normals.
 
     An edge of a convex body allows every direction between the normals of its two faces: of the one block from `out`
     to `rim`, of block o from one to the other of those whose edge passes `point`, turned round. Both hold `out`, and
@@ -141,7 +141,7 @@ def _middle_of_edge(b, k, n, many):
 
 @inlined
 def _add_edge_contact(a, b, edges, gap, h, many):
-    """The contact of two edges, at their nearest points."""
+    """Add the contact of two edges, at their nearest points."""
     i, j = edges // 3, edges % 3
     x, y = body_axis(many.bodies.rotation, a, i), body_axis(many.bodies.rotation, b, j)
     n = qt.cross(x, y)

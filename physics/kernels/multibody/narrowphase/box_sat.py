@@ -33,7 +33,7 @@ def body_axis(R, b, k):
 
 @inlined
 def write_relative_axes(a, b, many):
-    """Write `many.narrowphase.relative_axes`: axes of b in a, their absolute values, the way from a to b in both."""
+    """Write `many.narrowphase.relative_axes`: axes of b in a, their absolute values, vector from a to b in both."""
     R, mix, place = many.bodies.rotation, many.narrowphase.relative_axes, many.bodies.center
     for i in range(3):
         for j in range(3):
@@ -47,7 +47,7 @@ def write_relative_axes(a, b, many):
 
 @inlined
 def max_box_face_separation(a, b, margin, many):
-    """(separation, face) of the face normal that separates most; the first block's unless the other's is better.
+    """(separation, face) of the most separating face normal; a tie goes to the first block.
 
     One that separates by more than `margin` [m] is enough.
     """
@@ -72,7 +72,7 @@ def max_box_face_separation(a, b, margin, many):
 
 @inlined
 def max_box_edge_separation(a, b, margin, many):
-    """(separation, 3 i + j) of edges i of a and j of b whose product separates most; as `max_box_face_separation`."""
+    """(separation, 3 i + j) of edges i of a and j of b that separate most; ties as `max_box_face_separation`."""
     C, S, way = (
         many.narrowphase.relative_axes[AXES],
         many.narrowphase.relative_axes[SIZES],

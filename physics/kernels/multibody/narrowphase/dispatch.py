@@ -1,4 +1,4 @@
-"""Narrow phase: the contacts of every body with every wall, and of every pair that is near."""
+"""Narrow phase: contacts of every body with every wall, and of every near pair."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from physics.kernels.state.sleeping import is_asleep
 
 @shared_kernel
 def find_contacts(h, ellipsoids, hulls, world, sleep, many):
-    """Write the contact set of the bodies where they are, for a stage of length h.
+    """Write the contact set of the bodies in their present state, for a stage of length h.
 
     `ellipsoids` and `hulls` are None where the scene has none, `sleep` where it does not declare it. What sleeps
     and comes near nothing is left out.

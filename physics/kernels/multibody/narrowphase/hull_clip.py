@@ -1,4 +1,4 @@
-"""The face of one convex polyhedron that looks against a face of another, clipped by the sides of that one.
+"""Clip the face of a convex polyhedron that is opposite to a face of another by the sides of that face.
 
 References
 ----------
@@ -71,7 +71,7 @@ def _has_corner(f, corner, hulls):
 
 @inlined
 def write_hull_incident_face(which, o, out, many):
-    """Write a face of body o, number `which` of the pair, into copy 0: its vertices.
+    """Write a face of body o, number `which` of the pair, into copy 0; return its vertices.
 
     Of the faces with the corner that reaches furthest against `out` the one that looks most against it: the face that
     does so of all need not have that corner.
@@ -96,7 +96,7 @@ def write_hull_incident_face(which, o, out, many):
 
 @inlined
 def clip_incident_face(which, r, o, face, slop, many):
-    """Clip the face of body o that looks against this one of body r, number `which`, by its sides: (copy, vertices)."""
+    """Clip the face of body o opposite to this one of body r, number `which`, by its sides: (copy, vertices)."""
     hulls = many.narrowphase.hulls
     out = row_vector(hulls.normal[which], face, 0)
     source, count = 0, write_hull_incident_face(1 - which, o, out, many)

@@ -65,7 +65,7 @@ def nearest_on_hull(b, x, many):
 
 @kernel
 def collide_sphere_hull(a, b, margin, h, many):
-    """Add the contact of a sphere and a hull, whichever of the two is a."""
+    """Add the contact of a sphere and a hull, in either order."""
     ball, hull = a, b
     if many.bodies.work[b].shape == SPHERE:
         ball, hull = b, a
@@ -89,7 +89,7 @@ def _separation(hull, A, way, n, many):
 
 @inlined
 def _direction_from_edge(e, hull, S, dims, way, many):
-    """Direction of the largest separation of an ellipsoid (attitude S, at `way`) from edge e of a hull alone.
+    """Direction of the largest separation of an ellipsoid (attitude S, at `way`) from edge e of a hull.
 
     That is a block without width and height: `max_separation_direction` in the frame of the edge.
     """
@@ -109,7 +109,7 @@ def _direction_from_edge(e, hull, S, dims, way, many):
 
 @kernel
 def collide_ellipsoid_hull(a, b, margin, h, many):
-    """Add the contact of an ellipsoid and a hull, whichever of the two is a.
+    """Add the contact of an ellipsoid and a hull, in either order.
 
     The direction is that of the largest separation, as in `ellipsoid_distance`. Where the ellipsoid's point over the
     face that is furthest from it is above that face, this is the nearest; if not, the nearest point of the hull is on

@@ -1,4 +1,4 @@
-"""The stage between impacts: exact flight of what touches nothing, Moreau's midpoint step of what does."""
+"""Stage between impacts: exact flight of bodies without contact, Moreau's midpoint step of others."""
 
 from __future__ import annotations
 
@@ -79,7 +79,7 @@ def _centripetal(b, k, first, side, h, many):
 
 @inlined
 def _coriolis(k, many):
-    """Half of what the normal's turning gives to the relative velocity along it, [m/s²]: n·(ω x u).
+    """Half of the change, by the normal's turning, of the relative velocity along it [m/s²]: n·(ω x u).
 
     A point that slides at u on a face that turns at ω meets it where another normal was: the gap's second derivative
     has 2 n·(u x ω) beside the accelerations of the points.
@@ -92,7 +92,7 @@ def _coriolis(k, many):
 
 @inlined
 def set_resting_targets(n, h, many):
-    """Targets of the resting stage over h, with gaps at its middle; see `target_velocity.set_resting_targets`.
+    """Set the targets of the resting stage over h, with gaps at its middle; see `target_velocity.set_resting_targets`.
 
     A contact that was apart at the start may close what is left of its gap at the middle in the half that follows.
     Under error control, what a point on a circle has risen by then is no gap: it would make the velocity an
@@ -139,7 +139,7 @@ def hold_all_loads(h, gyroscopic, offset_frame, many):
 
 @inlined
 def rest_residual(h, many):
-    """Residual that the stage is solved to whatever the tolerance allows; see `midpoint_step.rest_residual`."""
+    """Largest residual of the stage, whatever the tolerance allows; see `midpoint_step.rest_residual`."""
     least = math.inf
     for b in range(many.bodies.state.shape[0]):
         slop_speed = many.bodies.work[b].slop / h
@@ -153,7 +153,7 @@ def rest_residual(h, many):
 
 @inlined
 def max_load_speed(h, many):
-    """Speed that the loads of the stage alone give to what touches, at most [m/s]."""
+    """Largest speed that the loads of the stage alone give to touching bodies [m/s]."""
     most = 0.0
     for b in range(many.bodies.state.shape[0]):
         if many.bodies.touched[b] == 1:
@@ -163,7 +163,7 @@ def max_load_speed(h, many):
 
 @inlined
 def step_under_held_loads(n, world, h, switches, sleep, records, many):
-    """`midpoint_step` under the loads that are held."""
+    """Take a `midpoint_step` under the held loads."""
     half, first = 0.5 * h, world * many.bodies.state.shape[0]
     for b in range(many.bodies.state.shape[0]):
         if is_asleep(first + b, sleep):
@@ -218,7 +218,7 @@ def step_under_held_loads(n, world, h, switches, sleep, records, many):
 
 @kernel
 def midpoint_step(n, world, h, switches, sleep, records, many):
-    """Every body after h: exact flight, or Moreau's midpoint step with the n contacts of the set."""
+    """Advance every body by h: exact flight, or Moreau's midpoint step with the n contacts of the set."""
     hold_all_loads(h, switches.flight.gyroscopic, switches.flight.offset_frame, many)
     note_stage_energy(switches.flight.offset_frame, many.bodies, many.bodies.work[0])
     step_under_held_loads(n, world, h, switches, sleep, records, many)
