@@ -271,7 +271,7 @@ def solve_island_frictionless(part, friction, goal, many):
 
 @shared_kernel
 def solve_all_frictionless(n, many):
-    """Do `solve_island_frictionless` for all contacts, after a failed solve with friction; return the residual [m/s]."""
+    """Do `solve_island_frictionless` for all contacts, when friction found no solution; return the residual [m/s]."""
     save_free_twists(many)
     clear_all_impulses(n, many)
     goal = many.settings[0].tolerance * assemble_contact_blocks(n, many)
