@@ -82,9 +82,10 @@ def is_installed(module: str) -> bool:
 
 
 def install_line(extra: str, has_torch: bool = True) -> str:
-    """The line that installs an extra: in a checkout of the sources the editable one, too.
+    """Command that installs an extra; in a checkout of the sources it installs these as editable, too.
 
-    Without torch a line for the small one, of the same versions, stands behind it; it is to be run first.
+    If torch is missing, a second line follows, which installs the small torch of the same versions. It must be run
+    first.
     """
     line, torch = f'pip install "rigid-env[{extra}]"', f"pip install torch {CPU_TORCH}"
     if (SOURCES / "pyproject.toml").is_file() and (SOURCES / "constraints.txt").is_file():

@@ -52,7 +52,7 @@ def bound(kernel: Callable, *arguments) -> Work:
     kernel : Callable
         Of `physics.kernels.compile.decorators.kernel`.
     *arguments
-        Arrays are bound, not copied: what they hold when a call is made counts.
+        Arrays are bound, not copied: a call reads their contents at its time.
     """
     return Work([(compiled_entry(kernel, arguments), arguments)])
 

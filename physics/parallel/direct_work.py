@@ -13,8 +13,8 @@ class DirectWork:
     Parameters
     ----------
     calls : list of (callable, tuple)
-        A kernel's machine code (`entry`) and its arguments. Arrays are bound, not copied: what they hold when a call is
-        made counts.
+        A kernel's machine code (`entry`) and its arguments. Arrays are bound, not copied: a call reads their contents
+        at its time.
     """
 
     def __init__(self, calls: list[tuple[Callable, tuple]]):

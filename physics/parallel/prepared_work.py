@@ -27,8 +27,8 @@ class PreparedWork:
     Parameters
     ----------
     calls : list of (int, tuple)
-        A kernel's entry (`entry`) and its arguments. Arrays are bound, not copied: what they hold when a
-        call is made counts.
+        A kernel's entry (`entry`) and its arguments. Arrays are bound, not copied: a call reads their contents at its
+        time.
     words : list of array, optional
         Their arguments as a kernel finds them, where others have them already; they are shared.
 

@@ -25,7 +25,8 @@ def front(errors: Sequence[float], costs: Sequence[float], floor: float = 0.0) -
     """Indices of the points that no other point beats, quickest first.
 
     A point is on the front if every quicker one has a larger error. Errors at or below `floor`, the truth's own error,
-    cannot be told apart and count as equal to it: the quickest of them is on the front. What is not finite never is.
+    cannot be told apart and count as equal to it: the quickest of them is on the front. Points that are not finite
+    never are.
     """
     found, best = [], math.inf
     order = sorted(range(len(errors)), key=lambda i: (costs[i], errors[i]))

@@ -84,7 +84,7 @@ def energy_error(scene: Scene, energy: np.ndarray) -> float:
     """Violation of the energy's law by the energy [J] (samples, bodies); bodies must not exchange energy.
 
     Where it is conserved: the largest departure from the start. Else: the largest rise above an earlier value, which
-    nothing passive has; what the right losses are only a truth can tell. Not a number where a field may give energy.
+    nothing passive has; only a truth can tell the right losses. Not a number where a field may give energy.
     """
     if None in _field_laws(scene):
         return float("nan")

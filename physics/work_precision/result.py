@@ -78,7 +78,7 @@ class Frontier:
     duration : float
         Simulated time [s].
     is_complete : bool
-        False: interrupted; what is here is what was done.
+        False: interrupted; the points are those measured until then.
     skipped : tuple of str
         Who was left out, and why.
     """

@@ -97,7 +97,8 @@ class ReferenceTruth:
     """Truth by the preset ``reference``, and its agreement with itself.
 
     Two runs: one at half the finest step of the ladder, one at the finest step and with tolerances ten times as large.
-    The first is the truth, the difference its own stated error: what a setting does better than that cannot be seen.
+    The first is the truth, the difference its own stated error: a setting that is better than that cannot be told
+    apart.
 
     Parameters
     ----------

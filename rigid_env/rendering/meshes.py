@@ -97,7 +97,7 @@ def block_mesh(size):
 def hull_mesh(corners, polygons):
     """Convex polyhedron of `corners` (n tuples of 3) [m] with `polygons`, tuples of corners; see `BodyView`.
 
-    A polygon becomes triangles, which are all the same size; what they have between them is no edge.
+    Each polygon becomes the same number of triangles; sides between two of them are no edges.
     """
     faces, of_side = [], {}
     for polygon in polygons:

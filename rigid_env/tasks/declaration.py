@@ -66,8 +66,8 @@ class Declaration:
         Returns
         -------
         dict
-            Of ``pos``, ``quat``, ``linvel`` and ``angvel``, (n, bodies, 3|4|3|3), of one body also (n, 3|4|3|3), or
-            one for all. What is left out is the scene's.
+            Of ``pos``, ``quat``, ``linvel`` and ``angvel``, (n, bodies, 3|4|3|3), of one body also (n, 3|4|3|3), or one
+            for all. Arrays that are left out are the scene's.
         """
         return {}
 

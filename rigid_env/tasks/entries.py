@@ -21,7 +21,7 @@ class Entry:
     unit : str
         In which it is told, such as ``m/s``.
     low, high : float
-        Bounds, in this unit; what is read is clipped to them.
+        Bounds, in this unit; the numbers read are clipped to them.
     read : callable, optional
         From `Worlds` to the numbers, (n,) or (n, numbers). None where a compiled function writes the observation.
     scale : float

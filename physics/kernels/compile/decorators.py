@@ -42,9 +42,9 @@ def kernel(function):
     `NUMBA_BOUNDSCHECK=1` one that is outside its axis raises IndexError.
 
     Switches among the arguments are passed as ``None`` (off) or not (on). A kernel is compiled for the types of its
-    arguments, so that LLVM drops what is off. Numba prunes a branch on ``x is not None`` of an argument x that is None
-    before it infers types; of any other both branches have to have types. Where one has none, or is large, it stands in
-    a function that is chosen by the type of the switch (`if_given`).
+    arguments, so that LLVM drops effects that are off. Numba prunes a branch on ``x is not None`` of an argument x that
+    is None before it infers types; of any other both branches have to have types. Where one has none, or is large, it
+    stands in a function that is chosen by the type of the switch (`if_given`).
 
     A variable of a kernel with branches is not named after another one with digits behind, as x1 and x12 are: Numba may
     take one for the other, and then cannot compile it (`tests/kernels/test_variable_names.py`).

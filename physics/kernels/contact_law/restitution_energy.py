@@ -6,8 +6,8 @@ can ask for more than the body has (Kane's paradox). A plastic impact never does
     ΔE = ½ p·(u⁻ + u⁺) = ½ (2 p·u⁺ - p·W p) <= 0.
 
 The momenta between it (s = 0) and the full rebound (s = 1) are those of impulses in the same cones, which are convex,
-and leave no contact approaching. The energy is a parabola in s; the largest s at which it is what it was before is
-taken.
+and leave no contact approaching. The energy is a parabola in s. The kernel takes the largest s at which it equals the
+energy before.
 
 References
 ----------

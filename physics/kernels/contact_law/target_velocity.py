@@ -182,10 +182,10 @@ def set_resting_targets(n, motion, h, offset_frame, work):
 
     The impulses act at the middle of the step, the target is the velocity at its end, half a step later: by then a
     point has gained h/2 (ω x ṙ + α x r), α the angular acceleration of free turning, and that is taken off. Of a vertex
-    ṙ = ω x r; the lowest point of an ellipsoid wanders over it; of a sphere it is 0. A feature still above the wall
-    may close `GAP_CLOSING_SHARE` of its gap (all of it in a substep's last stage). What is smaller than the tolerance
-    of the solve, or would move a contact by less than `NEGLIGIBLE_SLOP_SHARE` slops in the step, is 0: a body comes to
-    rest to the last bit, and contacts that hold are not asked to move apart by next to nothing.
+    ṙ = ω x r; the lowest point of an ellipsoid wanders over it; of a sphere it is 0. A feature still above the wall may
+    close `GAP_CLOSING_SHARE` of its gap (all of it in a substep's last stage). A target smaller than the tolerance of
+    the solve, or one that would move a contact by less than `NEGLIGIBLE_SLOP_SHARE` slops in the step, is 0: a body
+    comes to rest to the last bit, and contacts that hold are not asked to move apart by next to nothing.
     """
     w = motion.w
     is_turning = 0.0 < qt.dot(w, w) * h * h <= MAX_TARGET_TURN * MAX_TARGET_TURN and work.shape != SPHERE

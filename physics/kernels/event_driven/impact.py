@@ -124,7 +124,7 @@ def _no_tangential_target(*arguments):
 def set_tangential_rebound(n, y, offset_frame, motion, work):
     """Set targets along the wall of the single bouncing contact, as `tangential_restitution.set_tangential_targets`.
 
-    What does not rebound though it has a restitution is a bounce left out, and is not one along the wall either.
+    A contact with a restitution but without a rebound is a bounce left out; it has no rebound along the wall either.
     """
     bouncing, found = 0, 0
     for i in range(n):
@@ -168,7 +168,7 @@ def fall_back_to_plastic(n, contact, v, L, solved, P, work, report):
 def cap_rebound_energy(n, y, contact, offset_frame, solved, P, work, contacts, report):
     """Result of `solve_contacts` for a collision with friction, its rebound limited to the available energy.
 
-    Impulses are those of what is returned. See `physics.kernels.contact_law.restitution_energy`.
+    The impulses in `work` are those of the result. See `physics.kernels.contact_law.restitution_energy`.
     """
     _, q, v, L = y
     v_full, L_full = solved[0], solved[1]

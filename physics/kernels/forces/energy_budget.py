@@ -1,10 +1,10 @@
 """Energy budget of a stage with stiff fields: the stage may create none.
 
 An implicit step (`implicit_loads`) keeps the energy of a linear spring. Where springs have a rest length, act beside
-the centre of mass, or fluids end at a surface, it may gain. So the energy after such a stage is held to what was there
-before, what the held loads did on the way, and what fields without an energy gave: pushes, the wind. What is too much
-is taken from the motion. Where the motion has not as much the way was too far up a potential: the body stays where it
-was.
+the centre of mass, or fluids end at a surface, it may gain. So the energy after such a stage is limited to the energy
+before, plus the work of the held loads, plus the work of fields without an energy: pushes, the wind. The excess is
+taken from the motion. If the motion has less than that, the body went too far up a potential, and is put back to its
+place.
 """
 
 from __future__ import annotations

@@ -129,9 +129,8 @@ def hold_contact_loads(y, h, gyroscopic, offset_frame, work):
 def hold_mean_loads(y, end, h, gyroscopic, offset_frame, work):
     """Hold the loads of the middle of a stage in contact from y to `end`; return whether they have changed.
 
-    Contacts may have made motion that the start of the stage did not have, so it is looked at anew whether it is stiff.
-    Where it is, the change is softened: with A' = A + (1 + M⁻¹ Z)⁻¹ (A(middle) - A) loads and motion
-    agree, if the contacts push as they did.
+    Contacts may have changed the motion, so stiffness is tested again. In a stiff stage the change is softened: with A'
+    = A + (1 + M⁻¹ Z)⁻¹ (A(middle) - A) loads and motion agree, if the contacts push as before.
     """
     x, q, v, L = y
     half = 0.5 * h

@@ -78,8 +78,9 @@ def spring_energy(state, p, t):
 def mean_spring(states, p, t):
     """(force, torque) of a spring between two states: the discrete gradient of its energy (Gonzalez 1996).
 
-    With e the mean of the vectors at both ends and l the mean of their lengths, F = -k (1 - l0/l) e does just what the
-    energy loses, F·(e1 - e0) = ½ k (l_0 - l0)² - ½ k (l_1 - l0)², since (e1 - e0)·(e1 + e0) = l_1² - l_0².
+    With e the mean of the vectors at both ends and l the mean of their lengths, F = -k (1 - l0/l) e does exactly the
+    work that the energy loses, F·(e1 - e0) = ½ k (l_0 - l0)² - ½ k (l_1 - l0)², since (e1 - e0)·(e1 + e0) = l_1² -
+    l_0².
     """
     if p[SPRING_STIFFNESS] == 0.0 and p[SPRING_DAMPING] == 0.0:
         return ZERO, ZERO

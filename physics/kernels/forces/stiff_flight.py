@@ -1,9 +1,9 @@
 """Flight in fields that are stiff: a step cut into parts that begin short and grow.
 
-What damping does to a velocity is over after a few times 1/λ, and then λ may still be as large: of a linear drag it
-is. So the first part is a share of 1/λ, and each next one is longer than the one before by a constant factor: local
-errors are a share of what is left of the velocity, which falls faster. λ h = 10¹² takes 72 parts; the last one that
-there may be takes all that is left, by an implicit step, when nothing is left to err about.
+Damping changes a velocity during a few times 1/λ, and λ may stay as large afterwards, as it does for linear drag. So
+the first part is a share of 1/λ, and each next one is longer by a constant factor. Local errors are a share of the
+remaining velocity, which falls faster than parts grow. λ h = 10¹² takes 72 parts. The last allowed part takes the rest
+of the step, by an implicit step, when the velocity is negligible.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """`energy_budget` for worlds of many bodies: a stiff stage has one energy, that of all bodies together.
 
-Springs carry energy from body to body, and so does contact. What is too much is taken from the motion of all bodies:
-where nothing but each other holds them, from that against their common centre, so that they keep their momentum.
+Springs carry energy from body to body, and so does contact. The excess is taken from the motion of all bodies: where
+nothing but each other holds them, from that against their common centre, so that they keep their momentum.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
 """Sleep in worlds whose bodies touch each other: touching bodies fall asleep and wake together.
 
 A group is what the broad phase connects: bodies whose boxes overlap, and bodies that springs tie together. Whatever is
-in contact is in one group, so that a group that sleeps has no contact with anything awake; what comes near it is met in
-the broad phase first, and wakes it before a contact is looked for.
+in contact is in one group, so that a group that sleeps has no contact with anything awake; a body that comes near is
+found by the broad phase first, and wakes the group before contacts are searched.
 """
 
 from __future__ import annotations

@@ -129,7 +129,7 @@ def min_vertex_height(source, count, polygon):
 def find_rim_edge(d, axis, source, count, slop, many):
     """Edge along the face's rim that holds all low vertices of the polygon: (its ends, axis of the rim, its sense).
 
-    What is within a slop of the lowest vertex is low; two slops from the rim are on it. Without such an edge the ends
+    Vertices within a slop of the lowest one are low; two slops from the rim are on it. Without such an edge the ends
     are -1.
     """
     p, low = many.narrowphase.polygon, min_vertex_height(source, count, many.narrowphase.polygon)

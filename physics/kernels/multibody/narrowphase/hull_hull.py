@@ -189,8 +189,8 @@ def collide_hulls(a, b, margin, h, many):
     that they are further apart: that something touches. Where edges do say so, and lie nearly flat on that face, what
     is above it touches, as far away as the edges say, unless it is further away itself.
 
-    The first body's face is preferred unless the other's separates more by the slop, and a face to edges likewise: what
-    is equal must not change with rounding.
+    The first body's face is preferred unless the other's separates more by the slop, and a face to edges likewise: a
+    choice between equals must not change with rounding.
     """
     origin, slop = row_vector(many.bodies.center, a, 0), pair_slop(a, b, many)
     pose_hull(0, a, origin, many)

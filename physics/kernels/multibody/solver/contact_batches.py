@@ -1,8 +1,8 @@
 """Batches of up to four contacts of the same two bodies, a lane each, for methods with a linear system.
 
-Two blocks touch with a face, and what is asked of its contacts is the same for each of them; what they do to their
-bodies is a sum. So twists are read once for four contacts, and forces, moments and blocks of the system are summed
-before anything is written. A lane that is left over repeats the last contact, and weighs nothing.
+Two blocks touch with a face. All its contacts need the same computation, and their effects on the bodies add up. So
+twists are read once for four contacts, and forces, moments and blocks of the system are summed before anything is
+written. A lane that is left over repeats the last contact, and weighs nothing.
 
 What is known of contacts is copied here, with the bodies' block of the system, when an island is prepared: field f of a
 batch is `many.newton.lanes[g, 4 f : 4 f + 4]`.

@@ -6,9 +6,9 @@ iteration is one Newton step for
 
     x = M⁻¹ Jᵀ p,    û = S (J x + b) + |û_t| e,    p̂ ∘ û = σ ν e,
 
-scaled as in `second_order_cone` (λ = W p̂ = W⁻¹ û), first with σ = 0 to see how far that leads, then with σ and the
-second-order term that this suggests (Mehrotra [2]_). The derivative of |û_t| is taken along, which makes the matrix
-unsymmetric, and its blocks are those of Newton's method on twists (`newton_system`). What counts is measured as
+scaled as in `second_order_cone` (λ = W p̂ = W⁻¹ û), first with σ = 0, which measures the possible step, then with the σ
+and the second-order term that follow from it (Mehrotra [2]_). The derivative of |û_t| is taken along, which makes the
+matrix unsymmetric, and its blocks are those of Newton's method on twists (`newton_system`). What counts is measured as
 everywhere, by the natural map.
 
 Where û_t is small its direction d turns with every step, and the matrix, with d in it, can be next to singular: steps

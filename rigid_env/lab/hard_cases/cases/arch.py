@@ -100,8 +100,8 @@ def arches(setting: Setting) -> list[Check]:
 
     Masonry of stiff stones that do not slide stands if and only if forces within it can balance its weight [1]: whether
     they can is a linear program (`missing_force`) [2]. A semicircular arch gives at hinges in five joints. With few
-    stones there may be none where it would rather have them: 7 stand from thickness/radius = 0.0957 on, 15 from 0.1061,
-    51 from 0.1074; for ever thinner stones it is 0.1075 [3].
+    stones there may be no joint at the best place for a hinge: 7 stand from thickness/radius = 0.0957 on, 15 from
+    0.1061, 51 from 0.1074; for ever thinner stones it is 0.1075 [3].
 
     Standing, for a minute: each of n + 1 joints may open or close by one slop at one end, which turns all that is above
     it, within 2 m, by that slop over the thickness. Falling: the least sum of helping forces, m times the weight, is by

@@ -138,8 +138,8 @@ def _offset(across, other, R, clearance: float) -> float:
 def sliding_past(on: Setting) -> Sequence[Check]:
     """A block slides past a heavy one at a clearance, and is slowed by the floor alone: v = v₀ - μ g t.
 
-    The other block lies beside its way, its edge nearest of all that it has in front. What the solver leaves of the
-    speed turns the block, so that its corner may reach the other: the clearances are above tolerance times way.
+    The other block lies beside its way, its edge nearest of all that it has in front. The solver's residual turns the
+    block, so that its corner may reach the other: the clearances are above tolerance times way.
     """
     count, checks = on.pick(24, 6), []
     for speed in (1.0, 5.0):
