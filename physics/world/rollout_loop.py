@@ -89,9 +89,9 @@ class RolloutLoop:
     Parameters
     ----------
     world : Batch
-        Without an actuator that has to be asked between two steps; while the loop runs, without a recorder.
+        Its actuator must need no call between two steps; while the loop runs it has no recorder.
     wrench : (worlds, bodies, 6) float64
-        Of the step to come; the actuator's own output where there is one. Written by what comes before a step.
+        Wrenches of the coming step; with an actuator, its output. A call before each step writes them.
     steps : int
         Steps that are taken at once.
     dt : float

@@ -97,7 +97,7 @@ def block_mesh(size):
 def hull_mesh(corners, polygons):
     """Convex polyhedron of `corners` (n tuples of 3) [m] with `polygons`, tuples of corners; see `BodyView`.
 
-    Each polygon becomes the same number of triangles; sides between two of them are no edges.
+    Each polygon is cut into a fan of triangles; sides between two triangles of a polygon are no edges.
     """
     faces, of_side = [], {}
     for polygon in polygons:

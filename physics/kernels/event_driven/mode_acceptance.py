@@ -73,7 +73,7 @@ def has_acceleration_jumped(what, y, offset_frame, work, motion):
 
 @kernel
 def accept_step(what, watched, y, offset_frame, work, motion):
-    """Judge the mode at y; GOES_BACK if the watched step that led there was too long, and no mere look-ahead."""
+    """Judge the contact mode at y; GOES_BACK if the step that led there was too long and must be repeated."""
     if watched > motion.pace.min_look_ahead and has_acceleration_jumped(what, y, offset_frame, work, motion):
         return MODE_ROLLBACK
     return what

@@ -96,9 +96,9 @@ _NO_FORCED_MODE = -1
 def set_event_thresholds(y, h, offset_frame, work, motion):
     """Set the gap and speed that count as zero, and the look-ahead of a mode; problems are solved to rounding.
 
-    Gaps are differences of places, wherever the body may go within h.
-    A contact is still when the speed would not lift it by `_UNSEEN_HOP_GAPS` gaps that count as none: a bounce as low
-    as that would gain from being set down on the wall what it loses in the impact.
+    The gap that counts as zero covers the rounding of any place that the body may reach within h. The speed that counts
+    as zero lifts a contact by less than `_UNSEEN_HOP_GAPS` such gaps. In a lower bounce the energy error of setting the
+    body down on the wall would be as large as the loss of the impact.
     """
     thresholds = motion.thresholds
     work.residual_limit = work.target_error_limit = 0.0

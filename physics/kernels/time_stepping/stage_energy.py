@@ -56,11 +56,11 @@ def has_energy_gain(n, before, w, v, L, solved, R, h, work):
 
 @inlined
 def set_dissipative_targets(n, before, w, work):
-    """Set targets that cannot raise the energy: no contact is pushed away or along, and leaving ones are reversed.
+    """Set targets that cannot raise the energy: none lets a contact gain speed, and leaving contacts are reversed.
 
     A push p changes the energy by p·½(u + u'), with u and u' the normal velocities of its contact before and after. So
-    one that loads bring back within the stage, u > 0, comes back as fast as it left, instead of being stopped above
-    its wall.
+    a leaving contact, u > 0, that loads bring back within the stage comes back as fast as it left. It is not stopped
+    above its wall.
     """
     for i in range(n):
         normal = wall_normal(work.walls, wall_of(work.slot[i], work))
